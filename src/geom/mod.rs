@@ -1,0 +1,9 @@
+//! Pure geometry: exact predicates, lattices, boxes. Knows no mesh.
+
+mod bounds;
+mod lattice;
+mod predicates;
+
+pub use bounds::Bounds;
+pub use lattice::Lattice;
+pub use predicates::{NARROW_BITS, WIDE_BITS, orient3d};

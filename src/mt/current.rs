@@ -1,0 +1,8 @@
+//! The current mesh Σ_S.
+
+/// The current mesh Σ_S, in packed arrays with adjacency.
+#[derive(Clone, Debug, Default)]
+pub struct CurrentMesh {
+    /// The tetrahedra, as slots of vertices.
+    pub tets: Vec<[u32; 4]>,
+}

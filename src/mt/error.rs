@@ -1,0 +1,132 @@
+//! Stored errors, and what can be wrong with an update.
+
+use std::fmt;
+
+/// An error bound in 16 bits, rounded up when stored: 0, or `2^-24 ..= 128` in steps of 0.05 %.
+///
+/// Errors are relative: 1 is the full range of a field. Codes compare as the errors they stand for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ErrorCode(pub u16);
+
+/// Bits of an `f32` below the eleven of the mantissa that a code keeps.
+const DROPPED: u32 = 12;
+/// What the kept bits of 2^-25 are; the code of 2^-24 is then 2^11 + 1 or so, and 0 stays free for zero.
+const BIAS: u32 = (127 - 25) << 11;
+
+impl ErrorCode {
+    /// No error at all.
+    pub const ZERO: Self = Self(0);
+    /// The largest error that can be stored; stands for "anything".
+    pub const MAX: Self = Self(u16::MAX);
+
+    /// The smallest code whose error is at least `error`; [`ErrorCode::MAX`] for infinities and NaN.
+    pub fn at_least(error: f64) -> Self {
+        if error <= 0.0 {
+            return Self::ZERO;
+        }
+        if !(error <= Self::MAX.error()) {
+            return Self::MAX;
+        }
+        // The cast to f32 may round down; the next code up repairs that.
+        let bits = (error as f32).to_bits() >> DROPPED;
+        let code = bits.saturating_sub(BIAS).max(1) as u16;
+        if Self(code).error() >= error { Self(code) } else { Self(code + 1) }
+    }
+
+    /// The largest code whose error is at most `error`: a node is within `error` iff its code is at most this.
+    pub fn at_most(error: f64) -> Self {
+        if !(error > 0.0) {
+            return Self::ZERO;
+        }
+        let code = Self::at_least(error);
+        if code.error() > error { Self(code.0 - 1) } else { code }
+    }
+
+    /// The error this code stands for.
+    pub fn error(self) -> f64 {
+        if self.0 == 0 { 0.0 } else { f64::from(f32::from_bits((u32::from(self.0) + BIAS) << DROPPED)) }
+    }
+}
+
+/// Why an update cannot be stored or applied. Only a damaged or hostile MT leads here.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum UpdateError {
+    /// The update splits a vertex that does not exist yet, or that another update splits already.
+    Vertex {
+        /// The update.
+        update: u32,
+        /// The vertex it names.
+        vertex: u32,
+    },
+    /// A position or a field level leaves its lattice.
+    OffLattice {
+        /// The update.
+        update: u32,
+    },
+    /// The mask does not part the star of the vertex into two sides.
+    Mask {
+        /// The update.
+        update: u32,
+    },
+    /// The update would make a tetrahedron that is flat or turned inside out.
+    Inverted {
+        /// The update.
+        update: u32,
+    },
+    /// The star of the vertex is larger than an update can describe.
+    Star {
+        /// The update.
+        update: u32,
+    },
+    /// The update's error is larger than that of one it depends on.
+    Error {
+        /// The update.
+        update: u32,
+    },
+}
+
+impl fmt::Display for UpdateError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Vertex { update, vertex } => {
+                write!(f, "update {update} splits vertex {vertex}, which is not there to be split")
+            }
+            Self::OffLattice { update } => write!(f, "update {update} leaves the lattice"),
+            Self::Mask { update } => write!(f, "update {update} does not part the star of its vertex in two"),
+            Self::Inverted { update } => write!(f, "update {update} turns a tetrahedron inside out"),
+            Self::Star { update } => write!(f, "update {update} meets a star of more than 64 tetrahedra"),
+            Self::Error { update } => write!(f, "update {update} has a larger error than one it depends on"),
+        }
+    }
+}
+
+impl std::error::Error for UpdateError {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_code_is_its_own_error_rounded_either_way() {
+        for code in 0..=u16::MAX {
+            let error = ErrorCode(code).error();
+            assert_eq!(ErrorCode::at_least(error), ErrorCode(code));
+            assert_eq!(ErrorCode::at_most(error), ErrorCode(code));
+        }
+    }
+
+    #[test]
+    fn rounding_brackets_every_error_by_neighbouring_codes() {
+        let mut error = 1e-12;
+        while error < 1e4 {
+            let (low, high) = (ErrorCode::at_most(error), ErrorCode::at_least(error));
+            assert!(low.error() <= error);
+            assert!(high.error() >= error || high == ErrorCode::MAX);
+            assert!(high.0 - low.0 <= 1);
+            error *= 1.000_37;
+        }
+        assert_eq!(ErrorCode::at_least(f64::NAN), ErrorCode::MAX);
+        assert_eq!(ErrorCode::at_most(f64::NAN), ErrorCode::ZERO);
+    }
+}

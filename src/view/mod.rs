@@ -1,0 +1,15 @@
+//! What is to be seen, computed on the CPU from slices. Knows no MT.
+
+/// A tetrahedral mesh as slices: what the renderer and the isosurface extraction take.
+#[derive(Clone, Copy, Debug)]
+pub struct MeshView<'a> {
+    /// Points in model units.
+    pub positions: &'a [[f32; 3]],
+    /// One field value per point, in the field's own units.
+    pub field: &'a [f32],
+    /// Positive tetrahedra as indices into `positions`.
+    pub tets: &'a [[u32; 4]],
+    /// `neighbors[t][i]` is the tetrahedron across face `i` (opposite vertex `i`) of `t`, or
+    /// [`crate::mesh::NONE`] on the boundary.
+    pub neighbors: &'a [[u32; 4]],
+}
