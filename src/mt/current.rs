@@ -6,3 +6,10 @@ pub struct CurrentMesh {
     /// The tetrahedra, as slots of vertices.
     pub tets: Vec<[u32; 4]>,
 }
+
+impl CurrentMesh {
+    /// An empty mesh.
+    pub fn new() -> Self {
+        Self::default()
+    }
+}

@@ -1,8 +1,12 @@
 //! The Multi-Tessellation itself [§2]: what it is made of and what every kind of it can do.
 
+mod base;
+mod collapse;
 mod current;
 mod error;
 
+pub use base::{BaseMesh, BaseMeshError, MAX_FIELD_BITS, MAX_UPDATES};
+pub use collapse::{EdgeMt, MAX_LINK, MAX_STAR, VertexSplit};
 pub use current::CurrentMesh;
 pub use error::{ErrorCode, UpdateError};
 
@@ -79,15 +83,4 @@ pub struct MtInfo {
     /// The displacement of the boundary, in model units, that counts as an error of 1. A mesh within error `e`
     /// has its boundary within `e · displacement_per_error` of every reference vertex.
     pub displacement_per_error: f64,
-}
-
-/// The coarsest mesh of an MT, on the lattices.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct BaseMesh {
-    /// Integer positions; vertex `i` is [`VertexId`]`(i)`.
-    pub positions: Vec<[i32; 3]>,
-    /// Field levels: `values[i * fields + f]` is field `f` at vertex `i`.
-    pub values: Vec<i32>,
-    /// Positive tetrahedra.
-    pub tets: Vec<[u32; 4]>,
 }

@@ -1,0 +1,163 @@
+//! The compact edge-based Multi-Tessellation [§2.1, §4].
+//!
+//! An update is a vertex split; its inverse collapses an edge to its midpoint. Updates are kept in coarse-to-fine
+//! order, which is the paper's vertex numbering turned round: the label of a vertex `v` is the update `s(v)` that
+//! splits it (none for vertices of the reference mesh). Base vertices are numbered first; update `k` creates the
+//! vertices `b + 2k` (the paper's `v'`) and `b + 2k + 1` (`v''`), so the forest of vertex trees needs one word per
+//! vertex for the way down and one per update for the way up: 12 bytes per reference vertex, as in the paper.
+//!
+//! With `c(v)` the update that created `v` (none for base vertices), all of the partial order is in the labels:
+//! a tetrahedron is created in refinement by the largest `c` of its vertices and removed by the smallest `s`. The
+//! split of `v` is feasible iff every neighbour `w` has `s(w) > s(v)`; the collapse of update `k` is feasible iff
+//! `v'` and `v''` are in the mesh and every other neighbour `w` of either has `c(w) < k`. Then the star of `v` is
+//! the one of the moment it was created, in every consistent set: a mask over it in the order of its labels means
+//! the same everywhere.
+
+use super::BaseMesh;
+use super::ErrorCode;
+use super::MtInfo;
+use super::UpdateError;
+use super::UpdateId;
+use super::VertexId;
+use crate::mesh::NONE;
+
+/// Largest number of tetrahedra around a vertex that an update splits.
+pub const MAX_STAR: usize = 64;
+
+/// Largest number of vertices around a vertex that an update splits.
+pub const MAX_LINK: usize = 32;
+
+/// One update of an edge-based MT: how a vertex becomes two.
+///
+/// With `v` the position of the vertex, `D` the offset and `>>` a floor shift, the new vertices lie at
+/// `v'' = v − (D >> 1)` and `v' = v'' + D`; the inverse is `v = v'' + (D >> 1)`. Field levels go the same way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct VertexSplit<'a> {
+    /// The vertex that is split.
+    pub vertex: VertexId,
+    /// `v' − v''` in lattice steps.
+    pub offset: [i32; 3],
+    /// `v' − v''` in levels, field by field.
+    pub field_offsets: &'a [i32],
+    /// Bit `i` is 0 where tetrahedron `i` of the star goes to `v'`, 1 where it goes to `v''`. The star is in
+    /// ascending order of the sorted vertex numbers of the faces opposite the vertex.
+    pub mask: u64,
+    /// Bounds the error of every tetrahedron that the split removes, and of all updates that depend on this one.
+    pub error: ErrorCode,
+}
+
+/// A compact edge-based MT: at most 36 bytes per reference vertex and 2 for the error, with one field.
+///
+/// It grows by [`push`](EdgeMt::push), coarse to fine; every prefix of an MT is an MT.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EdgeMt {
+    info: MtInfo,
+    base: BaseMesh,
+    /// `s(v)` for every vertex so far, [`NONE`] while nothing splits it.
+    split_of: Vec<u32>,
+    /// The vertex that each update splits.
+    vertex_of: Vec<u32>,
+    offsets: Vec<[i32; 3]>,
+    /// One block of `fields` per update.
+    field_offsets: Vec<i32>,
+    masks: Vec<u64>,
+    errors: Vec<ErrorCode>,
+}
+
+impl EdgeMt {
+    /// An MT without updates. `base` must fit `info`: see [`BaseMesh::check`](super::BaseMesh::check).
+    pub fn new(info: MtInfo, base: BaseMesh) -> Self {
+        let split_of = vec![NONE; base.positions.len()];
+        Self {
+            info,
+            base,
+            split_of,
+            vertex_of: Vec::new(),
+            offsets: Vec::new(),
+            field_offsets: Vec::new(),
+            masks: Vec::new(),
+            errors: Vec::new(),
+        }
+    }
+
+    /// Adds the next update.
+    ///
+    /// # Errors
+    /// The split vertex must exist and be whole, offsets must fit the lattices, and the error must not exceed that
+    /// of the update that made the vertex. What needs the mesh is checked when the update is applied.
+    pub fn push(&mut self, split: &VertexSplit<'_>) -> Result<UpdateId, UpdateError> {
+        let update = self.vertex_of.len() as u32;
+        let vertex = split.vertex.0;
+        if self.split_of.get(vertex as usize) != Some(&NONE) {
+            return Err(UpdateError::Vertex { update, vertex });
+        }
+        let fits = |offset: i32, bits: u32| offset.unsigned_abs() <= 1 << bits;
+        let on_lattice = split.offset.iter().all(|&d| fits(d, self.info.lattice.bits))
+            && split.field_offsets.len() == self.info.fields.len()
+            && split.field_offsets.iter().zip(&self.info.fields).all(|(&d, field)| fits(d, field.bits));
+        if !on_lattice {
+            return Err(UpdateError::OffLattice { update });
+        }
+        if self.created_by(split.vertex).is_some_and(|u| split.error > self.errors[u.0 as usize]) {
+            return Err(UpdateError::Error { update });
+        }
+        self.split_of[vertex as usize] = update;
+        self.split_of.extend([NONE, NONE]);
+        self.vertex_of.push(vertex);
+        self.offsets.push(split.offset);
+        self.field_offsets.extend_from_slice(split.field_offsets);
+        self.masks.push(split.mask);
+        self.errors.push(split.error);
+        Ok(UpdateId(update))
+    }
+
+    /// What is known of the MT as a whole.
+    pub fn info(&self) -> &MtInfo {
+        &self.info
+    }
+
+    /// The base mesh.
+    pub fn base(&self) -> &BaseMesh {
+        &self.base
+    }
+
+    /// Number of updates so far.
+    pub fn updates(&self) -> u32 {
+        self.vertex_of.len() as u32
+    }
+
+    /// What update `u` does.
+    ///
+    /// # Panics
+    /// If the MT has no update `u`.
+    #[inline]
+    pub fn split(&self, u: UpdateId) -> VertexSplit<'_> {
+        let (k, fields) = (u.0 as usize, self.info.fields.len());
+        VertexSplit {
+            vertex: VertexId(self.vertex_of[k]),
+            offset: self.offsets[k],
+            field_offsets: &self.field_offsets[k * fields..][..fields],
+            mask: self.masks[k],
+            error: self.errors[k],
+        }
+    }
+
+    /// The vertices `v'` and `v''` that update `u` creates.
+    #[inline]
+    pub fn created(&self, u: UpdateId) -> [VertexId; 2] {
+        let first = self.base.positions.len() as u32 + 2 * u.0;
+        [VertexId(first), VertexId(first + 1)]
+    }
+
+    /// `c(v)`: the update that creates `v`; none for a vertex of the base mesh.
+    #[inline]
+    pub fn created_by(&self, v: VertexId) -> Option<UpdateId> {
+        v.0.checked_sub(self.base.positions.len() as u32).map(|i| UpdateId(i / 2))
+    }
+
+    /// `s(v)`: the update that splits `v`; none for a vertex of the reference mesh (as far as it is known).
+    #[inline]
+    pub fn split_by(&self, v: VertexId) -> Option<UpdateId> {
+        self.split_of.get(v.0 as usize).filter(|&&s| s != NONE).map(|&s| UpdateId(s))
+    }
+}
