@@ -126,6 +126,12 @@ impl EdgeMt {
         self.vertex_of.len() as u32
     }
 
+    /// The error of update `u`.
+    #[inline]
+    pub fn error_of(&self, u: UpdateId) -> ErrorCode {
+        self.errors[u.0 as usize]
+    }
+
     /// What update `u` does.
     ///
     /// # Panics

@@ -1,15 +1,614 @@
-//! The current mesh Σ_S.
+//! The current mesh Σ_S: packed arrays with adjacency, edited in place by updates.
+//!
+//! Vertices and tetrahedra live in *slots*. Refinement appends slots and reuses free ones; coarsening frees slots;
+//! [`CurrentMesh::compact`] moves the last entries into the holes, after which the arrays are without holes. Slots
+//! changed since [`CurrentMesh::take_changes`] was last called are known by blocks, so that copies elsewhere (a GPU)
+//! can be kept up to date at the cost of the change.
+//!
+//! Guarantees: after every operation [`CurrentMesh::check`] holds. Positions and field levels are integers, so the
+//! mesh depends on the set of applied updates alone, not on their order or on the platform.
 
-/// The current mesh Σ_S, in packed arrays with adjacency.
-#[derive(Clone, Debug, Default)]
-pub struct CurrentMesh {
-    /// The tetrahedra, as slots of vertices.
-    pub tets: Vec<[u32; 4]>,
+use super::BaseMesh;
+use super::BaseMeshError;
+use super::MtInfo;
+use super::VertexId;
+use crate::mesh::FACES;
+use crate::mesh::NONE;
+use std::ops::Range;
+
+/// The labels of the vertex in a slot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Labels {
+    /// Which vertex of the MT it is; [`NONE`] in a free slot.
+    pub vertex: u32,
+    /// The update that splits it, [`NONE`] if nothing does (yet).
+    pub split: u32,
 }
 
+/// The current mesh Σ_S.
+#[derive(Clone, Debug)]
+pub struct CurrentMesh {
+    pub(crate) labels: Vec<Labels>,
+    pub(crate) positions: Vec<[i32; 3]>,
+    /// `levels[slot * fields + f]`.
+    pub(crate) levels: Vec<i32>,
+    /// A tetrahedron at each vertex.
+    pub(crate) incident: Vec<u32>,
+    pub(crate) tets: Vec<[u32; 4]>,
+    pub(crate) neighbors: Vec<[u32; 4]>,
+    /// The slot of each vertex of the MT, [`NONE`] when it is not in the mesh.
+    pub(crate) slot_of: Vec<u32>,
+    pub(crate) fields: usize,
+    free_vertices: Vec<u32>,
+    free_tets: Vec<u32>,
+    /// `epoch << 6 | index in the star` of the last star that each tetrahedron was in.
+    marks: Vec<u32>,
+    epoch: u32,
+    changed_vertices: Changes,
+    changed_tets: Changes,
+    /// Updates that have been applied before and so need not be checked again: their stars are always the same.
+    proven: Vec<u64>,
+    /// Base vertices whose star is not connected through faces: they cannot be split.
+    pinched: Vec<u32>,
+}
+
+/// The tetrahedra around a vertex; scratch space that is filled by [`CurrentMesh::gather_star`].
+#[derive(Clone, Debug)]
+pub(crate) struct Star {
+    pub len: usize,
+    pub tets: [u32; GATHERED],
+    /// Which corner of each tetrahedron is the centre of the star.
+    pub corner: [u8; GATHERED],
+}
+
+impl Default for Star {
+    fn default() -> Self {
+        Self { len: 0, tets: [0; GATHERED], corner: [0; GATHERED] }
+    }
+}
+
+/// Why a star was not gathered.
+#[derive(Debug)]
+pub(crate) enum Gather<T> {
+    /// It has more than [`GATHERED`] tetrahedra.
+    TooLarge,
+    /// The caller's look at a tetrahedron stopped it.
+    Stopped(T),
+}
+
+/// Largest star that is gathered: the two sides of a collapse have at most `MAX_STAR` tetrahedra together, and at
+/// most `MAX_LINK` more lie between them.
+const GATHERED: usize = 128;
+const MARK_BITS: u32 = GATHERED.trailing_zeros();
+const EPOCHS: u32 = 1 << (32 - MARK_BITS);
+
 impl CurrentMesh {
-    /// An empty mesh.
-    pub fn new() -> Self {
-        Self::default()
+    /// The base mesh as the current mesh: no update applied.
+    ///
+    /// # Errors
+    /// If the base mesh does not fit `info` or is not a valid mesh.
+    pub fn new(info: &MtInfo, base: &BaseMesh) -> Result<Self, BaseMeshError> {
+        base.check(info)?;
+        let neighbors = face_neighbors(&base.tets)?;
+        let vertices = base.positions.len();
+        let mut incident = vec![NONE; vertices];
+        for (t, tet) in base.tets.iter().enumerate() {
+            for &v in tet {
+                incident[v as usize] = t as u32;
+            }
+        }
+        if let Some(v) = incident.iter().position(|&t| t == NONE) {
+            return Err(BaseMeshError::Vertex(v as u32));
+        }
+        let mut mesh = Self {
+            labels: (0..vertices as u32).map(|vertex| Labels { vertex, split: NONE }).collect(),
+            positions: base.positions.clone(),
+            levels: base.values.clone(),
+            incident,
+            tets: base.tets.clone(),
+            neighbors,
+            slot_of: (0..vertices as u32).collect(),
+            fields: info.fields.len(),
+            free_vertices: Vec::new(),
+            free_tets: Vec::new(),
+            marks: vec![0; base.tets.len()],
+            epoch: 0,
+            changed_vertices: Changes::all(vertices),
+            changed_tets: Changes::all(base.tets.len()),
+            proven: Vec::new(),
+            pinched: Vec::new(),
+        };
+        mesh.find_pinched();
+        Ok(mesh)
+    }
+
+    /// Finds the vertices whose tetrahedra do not all hang together through faces at the vertex.
+    fn find_pinched(&mut self) {
+        let mut around = vec![0_u32; self.labels.len()];
+        self.tets.iter().flatten().for_each(|&v| around[v as usize] += 1);
+        let mut seen = vec![NONE; self.tets.len()];
+        for v in 0..self.labels.len() as u32 {
+            let mut stack = vec![self.incident[v as usize]];
+            let mut reached = 0;
+            while let Some(t) = stack.pop() {
+                if std::mem::replace(&mut seen[t as usize], v) == v {
+                    continue;
+                }
+                reached += 1;
+                let (tet, next) = (self.tets[t as usize], self.neighbors[t as usize]);
+                stack.extend((0..4).filter(|&i| tet[i] != v && next[i] != NONE).map(|i| next[i]));
+            }
+            if reached != around[v as usize] {
+                self.pinched.push(v);
+            }
+        }
+    }
+
+    /// Whether the vertex in `slot` is one that cannot be split: its star is not connected.
+    #[inline]
+    pub(crate) fn is_pinched(&self, slot: u32) -> bool {
+        !self.pinched.is_empty() && self.pinched.binary_search(&slot).is_ok()
+    }
+
+    /// Whether update `u` has been applied before.
+    #[inline]
+    pub(crate) fn is_proven(&self, u: u32) -> bool {
+        self.proven.get(u as usize / 64).is_some_and(|w| w >> (u % 64) & 1 == 1)
+    }
+
+    #[inline]
+    pub(crate) fn set_proven(&mut self, u: u32) {
+        let word = u as usize / 64;
+        if word >= self.proven.len() {
+            self.proven.resize(word + 1, 0);
+        }
+        self.proven[word] |= 1 << (u % 64);
+    }
+
+    /// Number of tetrahedra.
+    pub fn tet_count(&self) -> usize {
+        self.tets.len() - self.free_tets.len()
+    }
+
+    /// Number of vertices.
+    pub fn vertex_count(&self) -> usize {
+        self.labels.len() - self.free_vertices.len()
+    }
+
+    /// Number of tetrahedron slots, holes included; see [`CurrentMesh::tet`].
+    pub fn tet_slots(&self) -> usize {
+        self.tets.len()
+    }
+
+    /// The vertex slots of tetrahedron `t`; none if the slot is free.
+    #[inline]
+    pub fn tet(&self, t: u32) -> Option<[u32; 4]> {
+        self.tets.get(t as usize).copied().filter(|tet| tet[0] != NONE)
+    }
+
+    /// The tetrahedra as vertex slots; without holes after [`CurrentMesh::compact`].
+    pub fn tets(&self) -> &[[u32; 4]] {
+        &self.tets
+    }
+
+    /// For each tetrahedron the one across each face, [`NONE`] on the boundary.
+    pub fn neighbors(&self) -> &[[u32; 4]] {
+        &self.neighbors
+    }
+
+    /// Integer positions by slot.
+    pub fn positions(&self) -> &[[i32; 3]] {
+        &self.positions
+    }
+
+    /// Levels of all fields at the vertex in `slot`.
+    #[inline]
+    pub fn levels(&self, slot: u32) -> &[i32] {
+        &self.levels[slot as usize * self.fields..][..self.fields]
+    }
+
+    /// Which vertex of the MT lives in `slot`.
+    #[inline]
+    pub fn vertex(&self, slot: u32) -> VertexId {
+        VertexId(self.labels[slot as usize].vertex)
+    }
+
+    /// The slot of a vertex of the MT, if it is in the mesh.
+    #[inline]
+    pub fn slot(&self, vertex: VertexId) -> Option<u32> {
+        self.slot_of.get(vertex.0 as usize).copied().filter(|&s| s != NONE)
+    }
+
+    /// Moves the last entries into the holes that coarsening left, so that all arrays are packed.
+    pub fn compact(&mut self) {
+        while let Some(hole) = self.free_tets.pop() {
+            self.fill_tet(hole);
+        }
+        // Base vertices keep the first slots for good: a hole is never among them unless every later slot is
+        // free too, so a vertex that moves is one whose star is whole.
+        while let Some(hole) = self.free_vertices.pop() {
+            self.fill_vertex(hole);
+        }
+        self.changed_tets.truncate(self.tets.len());
+        self.changed_vertices.truncate(self.labels.len());
+    }
+
+    fn fill_tet(&mut self, hole: u32) {
+        while self.tets.last().is_some_and(|tet| tet[0] == NONE) {
+            self.pop_tet();
+        }
+        let last = self.tets.len() as u32;
+        if hole >= last {
+            return;
+        }
+        let from = last - 1;
+        let (tet, around) = (self.tets[from as usize], self.neighbors[from as usize]);
+        self.tets[hole as usize] = tet;
+        self.neighbors[hole as usize] = around;
+        self.changed_tets.mark(hole);
+        for n in around {
+            if n != NONE {
+                self.relink(n, from, hole);
+            }
+        }
+        for v in tet {
+            if self.incident[v as usize] == from {
+                self.incident[v as usize] = hole;
+            }
+        }
+        self.pop_tet();
+    }
+
+    fn pop_tet(&mut self) {
+        self.tets.pop();
+        self.neighbors.pop();
+        self.marks.pop();
+    }
+
+    fn fill_vertex(&mut self, hole: u32) {
+        while self.labels.last().is_some_and(|l| l.vertex == NONE) {
+            self.pop_vertex();
+        }
+        let last = self.labels.len() as u32;
+        if hole >= last {
+            return;
+        }
+        let from = last - 1;
+        self.rename(from, hole);
+        self.labels[hole as usize] = self.labels[from as usize];
+        self.positions[hole as usize] = self.positions[from as usize];
+        self.incident[hole as usize] = self.incident[from as usize];
+        let fields = self.fields;
+        self.levels.copy_within(from as usize * fields..(from as usize + 1) * fields, hole as usize * fields);
+        self.slot_of[self.labels[hole as usize].vertex as usize] = hole;
+        self.changed_vertices.mark(hole);
+        self.pop_vertex();
+    }
+
+    fn pop_vertex(&mut self) {
+        self.labels.pop();
+        self.positions.pop();
+        self.incident.pop();
+        self.levels.truncate(self.labels.len() * self.fields);
+    }
+
+    /// Replaces vertex slot `from` by `to` in its whole star, however large.
+    fn rename(&mut self, from: u32, to: u32) {
+        let mut stack = vec![self.incident[from as usize]];
+        while let Some(t) = stack.pop() {
+            let Some(corner) = self.tets[t as usize].iter().position(|&v| v == from) else { continue };
+            self.tets[t as usize][corner] = to;
+            self.changed_tets.mark(t);
+            let around = self.neighbors[t as usize];
+            stack.extend((0..4).filter(|&i| i != corner && around[i] != NONE).map(|i| around[i]));
+        }
+    }
+
+    /// Makes neighbour `t` of `from` a neighbour of `to` instead.
+    #[inline]
+    pub(crate) fn relink(&mut self, t: u32, from: u32, to: u32) {
+        for n in &mut self.neighbors[t as usize] {
+            if *n == from {
+                *n = to;
+            }
+        }
+        self.changed_tets.mark(t);
+    }
+
+    /// Collects the tetrahedra around the vertex in `slot` and marks them; `look` sees each and may stop it.
+    #[inline]
+    pub(crate) fn gather_star<T>(
+        &mut self,
+        slot: u32,
+        star: &mut Star,
+        mut look: impl FnMut(&[Labels], &[u32; 4]) -> Option<T>,
+    ) -> Result<(), Gather<T>> {
+        self.epoch += 1;
+        if self.epoch == EPOCHS {
+            self.marks.fill(0);
+            self.epoch = 1;
+        }
+        let first = self.incident[slot as usize];
+        star.len = 1;
+        star.tets[0] = first;
+        self.marks[first as usize] = self.epoch << MARK_BITS;
+        let mut next = 0;
+        while next < star.len {
+            let t = star.tets[next] as usize;
+            let tet = self.tets[t];
+            if let Some(found) = look(&self.labels, &tet) {
+                return Err(Gather::Stopped(found));
+            }
+            let corner = (usize::from(tet[1] == slot))
+                | (usize::from(tet[2] == slot) << 1)
+                | (usize::from(tet[3] == slot) * 3);
+            star.corner[next] = corner as u8;
+            next += 1;
+            let around = self.neighbors[t];
+            for (i, &n) in around.iter().enumerate() {
+                if i == corner || n == NONE || self.marks[n as usize] >> MARK_BITS == self.epoch {
+                    continue;
+                }
+                if star.len == GATHERED {
+                    return Err(Gather::TooLarge);
+                }
+                self.marks[n as usize] = self.epoch << MARK_BITS | star.len as u32;
+                star.tets[star.len] = n;
+                star.len += 1;
+            }
+        }
+        Ok(())
+    }
+
+    /// The index of `t` in the star that was gathered last, if it is in it.
+    #[inline]
+    pub(crate) fn in_star(&self, t: u32) -> Option<usize> {
+        if t == NONE {
+            return None;
+        }
+        let mark = self.marks[t as usize];
+        (mark >> MARK_BITS == self.epoch).then_some((mark & (GATHERED as u32 - 1)) as usize)
+    }
+
+    /// A free or new tetrahedron slot, to be filled by the caller.
+    #[inline]
+    pub(crate) fn new_tet(&mut self) -> u32 {
+        let t = self.free_tets.pop().unwrap_or_else(|| {
+            self.tets.push([NONE; 4]);
+            self.neighbors.push([NONE; 4]);
+            self.marks.push(0);
+            self.tets.len() as u32 - 1
+        });
+        self.changed_tets.mark(t);
+        t
+    }
+
+    pub(crate) fn free_tet(&mut self, t: u32) {
+        self.tets[t as usize] = [NONE; 4];
+        self.neighbors[t as usize] = [NONE; 4];
+        self.free_tets.push(t);
+    }
+
+    /// A free or new vertex slot, to be filled by [`CurrentMesh::put_vertex`].
+    #[inline]
+    pub(crate) fn new_vertex(&mut self) -> u32 {
+        self.free_vertices.pop().unwrap_or_else(|| {
+            self.labels.push(Labels { vertex: NONE, split: NONE });
+            self.positions.push([0; 3]);
+            self.incident.push(NONE);
+            self.levels.resize(self.levels.len() + self.fields, 0);
+            self.labels.len() as u32 - 1
+        })
+    }
+
+    pub(crate) fn free_vertex(&mut self, slot: u32) {
+        self.labels[slot as usize] = Labels { vertex: NONE, split: NONE };
+        self.incident[slot as usize] = NONE;
+        self.free_vertices.push(slot);
+    }
+
+    /// Puts a vertex of the MT into a slot; its levels and incident tetrahedron are the caller's to set.
+    #[inline]
+    pub(crate) fn put_vertex(&mut self, slot: u32, labels: Labels, position: [i32; 3]) {
+        let old = std::mem::replace(&mut self.labels[slot as usize], labels).vertex;
+        if old != NONE {
+            self.slot_of[old as usize] = NONE;
+        }
+        if self.slot_of.len() <= labels.vertex as usize {
+            self.slot_of.resize(labels.vertex as usize + 1, NONE);
+        }
+        self.slot_of[labels.vertex as usize] = slot;
+        self.positions[slot as usize] = position;
+        self.changed_vertices.mark(slot);
+    }
+
+    #[inline]
+    pub(crate) fn mark_tet(&mut self, t: u32) {
+        self.changed_tets.mark(t);
+    }
+
+    /// Ranges of vertex slots and of tetrahedron slots that changed since the last call, in ascending order.
+    /// Entries may have moved only inside these ranges; anything beyond the arrays' ends is gone.
+    pub fn take_changes(&mut self) -> MeshChanges {
+        MeshChanges {
+            vertices: self.changed_vertices.take(self.labels.len()),
+            tets: self.changed_tets.take(self.tets.len()),
+        }
+    }
+
+    /// A hash of the mesh that depends neither on slots nor on the order of updates: equal sets of tetrahedra with
+    /// equal vertices, positions and levels have equal hashes, on every platform.
+    pub fn hash(&self) -> u64 {
+        let vertices: Vec<u64> = (0..self.labels.len()).map(|slot| self.hash_vertex(slot)).collect();
+        let tet_hash = |tet: &[u32; 4]| {
+            let h = tet.map(|v| vertices[v as usize]);
+            mix(h.iter().fold(0, |s, &x| u64::wrapping_add(s, x)) ^ mix(h[0] ^ h[1] ^ h[2] ^ h[3]))
+        };
+        self.tets.iter().filter(|tet| tet[0] != NONE).fold(0, |sum, tet| sum.wrapping_add(tet_hash(tet)))
+    }
+
+    fn hash_vertex(&self, slot: usize) -> u64 {
+        let words = std::iter::once(self.labels[slot].vertex)
+            .chain(self.positions[slot].map(|x| x as u32))
+            .chain(self.levels(slot as u32).iter().map(|&q| q as u32));
+        words.fold(0, |h, word| mix(h ^ u64::from(word)))
+    }
+
+    /// Checks every identity of the structure: orientation, symmetric adjacency, faces shared by at most two,
+    /// labels, incident tetrahedra. For tests and `verify`; takes time in proportion to the mesh.
+    pub fn check(&self) -> Result<(), String> {
+        for (t, tet) in self.tets.iter().enumerate().filter(|(_, tet)| tet[0] != NONE) {
+            self.check_tet(t, *tet)?;
+        }
+        let live: Vec<[u32; 4]> = self.tets.iter().filter(|tet| tet[0] != NONE).copied().collect();
+        if live.len() != self.tet_count() {
+            return Err(format!("{} tetrahedra live, {} counted", live.len(), self.tet_count()));
+        }
+        let matched = face_neighbors(&live).map_err(|e| e.to_string())?;
+        let shared = |n: &[[u32; 4]]| n.iter().flatten().filter(|&&n| n != NONE).count();
+        if shared(&matched) != shared(&self.neighbors) {
+            return Err("two tetrahedra share a face but are not neighbours".into());
+        }
+        for (slot, labels) in self.labels.iter().enumerate().filter(|(_, l)| l.vertex != NONE) {
+            if self.slot_of[labels.vertex as usize] != slot as u32 {
+                return Err(format!("vertex {} is not in its slot {slot}", labels.vertex));
+            }
+            let t = self.incident[slot];
+            if self.tet(t).is_none_or(|tet| !tet.contains(&(slot as u32))) {
+                return Err(format!("tetrahedron {t} does not have the vertex in slot {slot}"));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_tet(&self, t: usize, tet: [u32; 4]) -> Result<(), String> {
+        if tet.iter().any(|&v| self.labels[v as usize].vertex == NONE) {
+            return Err(format!("tetrahedron {t} has a vertex that is not in the mesh"));
+        }
+        let [a, b, c, d] = tet.map(|v| self.positions[v as usize]);
+        if crate::geom::orient3d(a, b, c, d) <= 0 {
+            return Err(format!("tetrahedron {t} is not positive"));
+        }
+        for (i, face) in FACES.iter().enumerate() {
+            let n = self.neighbors[t][i];
+            if n == NONE {
+                continue;
+            }
+            let other = self.tet(n).ok_or(format!("tetrahedron {t} has a free slot as neighbour"))?;
+            let shared = face.iter().all(|&j| other.contains(&tet[j]));
+            let back = self.neighbors[n as usize].iter().filter(|&&m| m as usize == t).count();
+            if !shared || back != 1 {
+                return Err(format!("tetrahedra {t} and {n} are not neighbours of each other"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A finaliser that spreads every input bit over the word (the constants are those of SplitMix64).
+#[inline]
+fn mix(x: u64) -> u64 {
+    let x = x.wrapping_add(0x9E37_79B9_7F4A_7C15);
+    let x = (x ^ x >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    let x = (x ^ x >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
+    x ^ x >> 31
+}
+
+/// Finds the neighbour across every face. Each face may be shared by two tetrahedra that lie on its two sides.
+pub(crate) fn face_neighbors(tets: &[[u32; 4]]) -> Result<Vec<[u32; 4]>, BaseMeshError> {
+    let mut faces: Vec<([u32; 3], bool, u32)> = Vec::with_capacity(tets.len() * 4);
+    for (t, tet) in tets.iter().enumerate() {
+        for (i, face) in FACES.iter().enumerate() {
+            let (sorted, even) = sort3(face.map(|j| tet[j]));
+            faces.push((sorted, even, (t * 4 + i) as u32));
+        }
+    }
+    faces.sort_unstable();
+    let mut neighbors = vec![[NONE; 4]; tets.len()];
+    let mut rest = faces.as_slice();
+    while let [(face, even, at), tail @ ..] = rest {
+        rest = tail;
+        let Some((_, other_even, other)) = tail.first().filter(|(f, ..)| f == face) else { continue };
+        let crowded = tail.get(1).is_some_and(|(f, ..)| f == face);
+        if crowded || even == other_even {
+            return Err(BaseMeshError::Face(at / 4));
+        }
+        neighbors[*at as usize / 4][*at as usize % 4] = other / 4;
+        neighbors[*other as usize / 4][*other as usize % 4] = at / 4;
+        rest = &tail[1..];
+    }
+    Ok(neighbors)
+}
+
+/// Sorts three numbers and tells whether the permutation was even.
+#[inline]
+fn sort3(mut v: [u32; 3]) -> ([u32; 3], bool) {
+    let mut even = true;
+    for (i, j) in [(0, 1), (1, 2), (0, 1)] {
+        if v[i] > v[j] {
+            v.swap(i, j);
+            even = !even;
+        }
+    }
+    (v, even)
+}
+
+/// What [`CurrentMesh::take_changes`] tells.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct MeshChanges {
+    /// Changed ranges of vertex slots.
+    pub vertices: Vec<Range<u32>>,
+    /// Changed ranges of tetrahedron slots.
+    pub tets: Vec<Range<u32>>,
+}
+
+/// Changed entries of an array, by blocks.
+#[derive(Clone, Debug, Default)]
+struct Changes {
+    blocks: Vec<u64>,
+}
+
+/// log2 of the entries in a block: 1 KiB of tetrahedra.
+const BLOCK_BITS: u32 = 6;
+
+impl Changes {
+    fn all(len: usize) -> Self {
+        let mut changes = Self::default();
+        (0..len.next_multiple_of(1 << BLOCK_BITS))
+            .step_by(1 << BLOCK_BITS)
+            .for_each(|i| changes.mark(i as u32));
+        changes
+    }
+
+    #[inline]
+    fn mark(&mut self, entry: u32) {
+        let block = entry >> BLOCK_BITS;
+        let word = (block / 64) as usize;
+        if word >= self.blocks.len() {
+            self.blocks.resize(word + 1, 0);
+        }
+        self.blocks[word] |= 1 << (block % 64);
+    }
+
+    fn truncate(&mut self, len: usize) {
+        self.blocks.truncate(len.div_ceil(64 << BLOCK_BITS));
+    }
+
+    fn take(&mut self, len: usize) -> Vec<Range<u32>> {
+        let mut ranges: Vec<Range<u32>> = Vec::new();
+        for (i, word) in self.blocks.iter_mut().enumerate() {
+            let mut bits = std::mem::take(word);
+            while bits != 0 {
+                let block = i as u32 * 64 + bits.trailing_zeros();
+                bits &= bits - 1;
+                let (start, end) = (block << BLOCK_BITS, ((block + 1) << BLOCK_BITS).min(len as u32));
+                match ranges.last_mut() {
+                    _ if start >= end => {}
+                    Some(last) if last.end == start => last.end = end,
+                    _ => ranges.push(start..end),
+                }
+            }
+        }
+        ranges
     }
 }

@@ -24,7 +24,7 @@ impl ErrorCode {
         if error <= 0.0 {
             return Self::ZERO;
         }
-        if !(error <= Self::MAX.error()) {
+        if error.is_nan() || error > Self::MAX.error() {
             return Self::MAX;
         }
         // The cast to f32 may round down; the next code up repairs that.
@@ -35,7 +35,7 @@ impl ErrorCode {
 
     /// The largest code whose error is at most `error`: a node is within `error` iff its code is at most this.
     pub fn at_most(error: f64) -> Self {
-        if !(error > 0.0) {
+        if error.is_nan() || error <= 0.0 {
             return Self::ZERO;
         }
         let code = Self::at_least(error);

@@ -4,11 +4,13 @@ mod base;
 mod collapse;
 mod current;
 mod error;
+mod split;
 
 pub use base::{BaseMesh, BaseMeshError, MAX_FIELD_BITS, MAX_UPDATES};
 pub use collapse::{EdgeMt, MAX_LINK, MAX_STAR, VertexSplit};
-pub use current::CurrentMesh;
+pub use current::{CurrentMesh, MeshChanges};
 pub use error::{ErrorCode, UpdateError};
+pub use split::Applied;
 
 use crate::geom::Lattice;
 
@@ -83,4 +85,49 @@ pub struct MtInfo {
     /// The displacement of the boundary, in model units, that counts as an error of 1. A mesh within error `e`
     /// has its boundary within `e · displacement_per_error` of every reference vertex.
     pub displacement_per_error: f64,
+}
+
+/// A tetrahedron as criteria see it: positions and levels of one field at its corners, on the lattices.
+pub type LookAtTet<'a> = &'a mut dyn FnMut(&[[i32; 3]; 4], &[i32; 4]) -> bool;
+
+/// What selective refinement needs of a Multi-Tessellation of any kind [§2.3].
+pub trait MultiTessellation {
+    /// What is known of the MT as a whole.
+    fn info(&self) -> &MtInfo;
+
+    /// The base mesh.
+    fn base(&self) -> &BaseMesh;
+
+    /// Number of updates so far; they are `UpdateId(0) .. UpdateId(updates)`, parents before children.
+    fn updates(&self) -> u32;
+
+    /// The error `e(u)` of update `u`: bounds that of every tetrahedron `u+` removes, and of every update that
+    /// depends on `u`.
+    fn error(&self, u: UpdateId) -> ErrorCode;
+
+    /// The update that removes a tetrahedron of the current mesh; none if it belongs to the reference mesh.
+    fn remover(&self, mesh: &CurrentMesh, tet: &[u32; 4]) -> Option<UpdateId>;
+
+    /// Whether all that `u+` created is still in the mesh, as far as can be told at a glance.
+    /// False means that some child of `u` is applied, or `u` is not.
+    fn may_coarsen(&self, mesh: &CurrentMesh, u: UpdateId) -> bool;
+
+    /// Applies `u+` to a mesh that does not contain `u`, or names a parent that has to come first.
+    fn refine(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError>;
+
+    /// Applies `u−` to a mesh that contains `u`, or names a child that has to go first.
+    fn coarsen(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError>;
+
+    /// Shows `look` the tetrahedra that `u+` removes until it returns true, in a mesh that contains `u` and none
+    /// of its children; or names a child that is in the way.
+    fn look_at_removed(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        field: usize,
+        look: LookAtTet<'_>,
+    ) -> Result<Applied, UpdateError>;
+
+    /// Tells the mesh of updates that have arrived since it last knew of `known` of them.
+    fn announce(&self, mesh: &mut CurrentMesh, known: u32);
 }
