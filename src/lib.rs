@@ -31,4 +31,5 @@
 pub mod geom;
 pub mod mesh;
 pub mod mt;
+pub mod refine;
 pub mod view;

@@ -3,7 +3,9 @@
 mod bounds;
 mod lattice;
 mod predicates;
+mod tet_box;
 
 pub use bounds::Bounds;
 pub use lattice::Lattice;
 pub use predicates::{NARROW_BITS, WIDE_BITS, orient3d};
+pub use tet_box::{LatticeBox, tet_meets_box};

@@ -46,6 +46,8 @@ pub struct CurrentMesh {
     epoch: u32,
     changed_vertices: Changes,
     changed_tets: Changes,
+    /// The tetrahedra of the stars that updates changed since the list was last cleared; free slots among them.
+    touched: Vec<u32>,
     /// Updates that have been applied before and so need not be checked again: their stars are always the same.
     proven: Vec<u64>,
     /// Base vertices whose star is not connected through faces: they cannot be split.
@@ -115,6 +117,7 @@ impl CurrentMesh {
             epoch: 0,
             changed_vertices: Changes::all(vertices),
             changed_tets: Changes::all(base.tets.len()),
+            touched: Vec::new(),
             proven: Vec::new(),
             pinched: Vec::new(),
         };
@@ -420,6 +423,20 @@ impl CurrentMesh {
         self.slot_of[labels.vertex as usize] = slot;
         self.positions[slot as usize] = position;
         self.changed_vertices.mark(slot);
+    }
+
+    #[inline]
+    pub(crate) fn touch(&mut self, tets: &[u32]) {
+        self.touched.extend_from_slice(tets);
+    }
+
+    /// Tetrahedra that updates changed since [`CurrentMesh::clear_touched`]; some may be gone.
+    pub(crate) fn touched(&self) -> &[u32] {
+        &self.touched
+    }
+
+    pub(crate) fn clear_touched(&mut self) {
+        self.touched.clear();
     }
 
     #[inline]

@@ -108,6 +108,9 @@ pub trait MultiTessellation {
     /// The update that removes a tetrahedron of the current mesh; none if it belongs to the reference mesh.
     fn remover(&self, mesh: &CurrentMesh, tet: &[u32; 4]) -> Option<UpdateId>;
 
+    /// The update that created a tetrahedron of the current mesh in refinement; none if it is of the base mesh.
+    fn creator(&self, mesh: &CurrentMesh, tet: &[u32; 4]) -> Option<UpdateId>;
+
     /// Whether all that `u+` created is still in the mesh, as far as can be told at a glance.
     /// False means that some child of `u` is applied, or `u` is not.
     fn may_coarsen(&self, mesh: &CurrentMesh, u: UpdateId) -> bool;

@@ -191,6 +191,8 @@ impl EdgeMt {
             mesh.mark_tet(near);
             mesh.relink(far, near, t);
         }
+        mesh.touch(&star.tets[..star.len]);
+        mesh.touch(&created[..fan.len]);
         for i in 0..star.len {
             let t = star.tets[i];
             if sides >> i & 1 == 1 {
@@ -234,6 +236,8 @@ impl EdgeMt {
             Ok(slots) => slots,
             Err(child) => return Ok(Applied::Blocked(child)),
         };
+        mesh.touch(&near.tets[..near.len]);
+        mesh.touch(&far.tets[..far.len]);
         for &t in &far.tets[..far.len] {
             let tet = mesh.tets[t as usize];
             let at = |slot: u32| tet.iter().position(|&v| v == slot);
@@ -518,6 +522,11 @@ impl MultiTessellation for EdgeMt {
     fn remover(&self, mesh: &CurrentMesh, tet: &[u32; 4]) -> Option<UpdateId> {
         let first = tet.iter().map(|&v| mesh.labels[v as usize].split).min();
         first.filter(|&s| s != NONE).map(UpdateId)
+    }
+
+    #[inline]
+    fn creator(&self, mesh: &CurrentMesh, tet: &[u32; 4]) -> Option<UpdateId> {
+        tet.iter().filter_map(|&v| self.created_by(mesh.vertex(v))).max()
     }
 
     #[inline]
