@@ -4,8 +4,10 @@ mod bounds;
 mod lattice;
 mod predicates;
 mod tet_box;
+mod triangle;
 
 pub use bounds::Bounds;
 pub use lattice::Lattice;
 pub use predicates::{NARROW_BITS, WIDE_BITS, orient3d};
 pub use tet_box::{LatticeBox, tet_meets_box};
+pub use triangle::nearest_on_triangle;

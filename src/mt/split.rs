@@ -393,6 +393,40 @@ fn opposite_key(mesh: &CurrentMesh, star: &Star, i: usize) -> u128 {
     u128::from(least) << 64 | u128::from(middle) << 32 | u128::from(most)
 }
 
+impl CurrentMesh {
+    /// Brings the mask of a split from the order of other vertex numbers, which `other` gives, to that of the MT's.
+    /// None if the vertex is not in the mesh or its star is too large.
+    pub(crate) fn reorder_mask(
+        &mut self,
+        vertex: VertexId,
+        mask: u64,
+        other: impl Fn(VertexId) -> u32,
+    ) -> Option<u64> {
+        let mut star = Star::default();
+        let slot = self.slot(vertex)?;
+        self.gather_star(slot, &mut star, |_, _| None::<()>).ok()?;
+        if star.len > MAX_STAR {
+            return None;
+        }
+        let face = |i: usize, number: &dyn Fn(VertexId) -> u32| {
+            let tet = self.tets[star.tets[i] as usize];
+            let rest = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]][star.corner[i] as usize];
+            let mut face = rest.map(|k: usize| number(self.vertex(tet[k])));
+            face.sort_unstable();
+            face
+        };
+        let order = |number: &dyn Fn(VertexId) -> u32| {
+            let mut order: Vec<usize> = (0..star.len).collect();
+            order.sort_unstable_by_key(|&i| face(i, number));
+            order
+        };
+        let theirs = order(&other);
+        let sides = theirs.iter().enumerate().fold(0_u64, |s, (rank, &i)| s | (mask >> rank & 1) << i);
+        let ours = order(&|v: VertexId| v.0);
+        Some(ours.iter().enumerate().fold(0_u64, |m, (rank, &i)| m | (sides >> i & 1) << rank))
+    }
+}
+
 impl FanTriangle {
     /// The near tetrahedron, its corner at the centre of the star, and its corner opposite the triangle.
     #[inline]

@@ -1,0 +1,306 @@
+//! The driver: pick an edge, test it, collapse it, record it.
+
+use super::BuildConfig;
+use super::BuildError;
+use super::BuildProgress;
+use super::BuildResult;
+use super::BuildSummary;
+use super::OnProgress;
+use super::cost::Buckets;
+use super::cost::Evaluator;
+use super::cost::Reference;
+use super::cost::VertexData;
+use super::history;
+use super::history::Collapse;
+use super::plan::Plan;
+use super::plan::Refusal;
+use super::plan::VertexMarks;
+use super::quantize;
+use super::quantize::Quantized;
+use super::work_mesh::WorkMesh;
+use crate::geom::Bounds;
+use crate::mesh;
+use crate::mesh::EDGES;
+use crate::mesh::TetMesh;
+use crate::mt::ErrorCode;
+use crate::mt::MAX_UPDATES;
+use crate::mt::MtInfo;
+use crate::mt::MtKind;
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+/// Builds an edge-based MT of `mesh`, which must be valid: see [`crate::mesh::repair`].
+pub fn edge_mt(mesh: &TetMesh, config: &BuildConfig, progress: OnProgress<'_>) -> Result<BuildResult, BuildError> {
+    if mesh.positions.len() > MAX_UPDATES as usize {
+        return Err(BuildError::TooLarge);
+    }
+    mesh::check(mesh).map_err(BuildError::Mesh)?;
+    let neighbors = mesh::neighbors(&mesh.tets).map_err(BuildError::Mesh)?;
+    let frozen = mesh::topology(&mesh.tets, mesh.positions.len()).map_err(BuildError::Mesh)?.non_manifold;
+    let quantized = quantize::quantize(mesh, config)?;
+    let diagonal = Bounds::of(&mesh.positions).diagonal();
+    let info = MtInfo {
+        kind: MtKind::Edge,
+        lattice: quantized.lattice,
+        fields: quantized.fields.clone(),
+        vertices: mesh.positions.len() as u32,
+        tetrahedra: mesh.tets.len() as u32,
+        updates: 0,
+        displacement_per_error: config.displacement * diagonal,
+    };
+    let work = WorkMesh::new(mesh.tets.clone(), neighbors, mesh.positions.len());
+    let mut builder = Builder::new(work, &quantized, &info, frozen);
+    builder.collapse_all(progress)?;
+    let Builder { mesh: base, data, history, .. } = builder;
+    let depth = data.height.iter().copied().max().unwrap_or(0);
+    let mt = history::edge_mt(info, &base, &data, &history, progress)?;
+    let summary = BuildSummary {
+        vertices: mt.info().vertices,
+        tetrahedra: mt.info().tetrahedra,
+        base_vertices: mt.base().positions.len() as u32,
+        base_tetrahedra: mt.base().tets.len() as u32,
+        updates: mt.updates(),
+        position_bits: mt.info().lattice.bits,
+        depth,
+    };
+    Ok(BuildResult { mt, summary })
+}
+
+/// Errors that nobody tells apart are ordered by other things: depth of the partial order, edge length. Levels of
+/// this ratio apart, up from `FINEST`, group them.
+const LEVEL_RATIO: f64 = 1.3;
+const FINEST: f64 = 1e-4;
+
+/// The order of candidates: error level, then depth, then length; ties by vertex numbers.
+type Key = (u16, u32, u64, u32, u32);
+
+struct Builder<'a> {
+    mesh: WorkMesh,
+    data: VertexData,
+    /// Average gradient of each field at each vertex, in levels per lattice step.
+    gradients: Vec<glam::DVec3>,
+    reference: Reference<'a>,
+    frozen: Vec<bool>,
+    buckets: Buckets,
+    marks: VertexMarks,
+    /// Counts the changes around each vertex.
+    versions: Vec<u32>,
+    queue: BinaryHeap<Reverse<Key>>,
+    /// Edges that could not be collapsed, with the sum of their ends' versions then.
+    blocked: Vec<(u32, u32, u32)>,
+    plan: Plan,
+    evaluator: Evaluator,
+    history: Vec<Collapse>,
+    level_offsets: Vec<i32>,
+}
+
+impl<'a> Builder<'a> {
+    fn new(mesh: WorkMesh, quantized: &'a Quantized, info: &MtInfo, frozen: Vec<bool>) -> Self {
+        let points = quantized.positions.len();
+        let data = VertexData {
+            positions: quantized.positions.clone(),
+            levels: quantized.levels.clone(),
+            error: vec![0.0; points],
+            height: vec![0; points],
+            drift: vec![0.0; points],
+        };
+        let reference = Reference {
+            quantized,
+            points: points as u32,
+            // With no displacement allowed any movement is an infinite error.
+            displacement_per_error: info.displacement_per_error,
+        };
+        Self {
+            gradients: gradients(&mesh, &data, quantized.fields.len()),
+            buckets: Buckets::new(mesh.tets.len(), points),
+            marks: VertexMarks::new(points),
+            versions: vec![0; points],
+            mesh,
+            data,
+            reference,
+            frozen,
+            queue: BinaryHeap::new(),
+            blocked: Vec::new(),
+            plan: Plan::default(),
+            evaluator: Evaluator::default(),
+            history: Vec::new(),
+            level_offsets: Vec::new(),
+        }
+    }
+
+    fn collapse_all(&mut self, progress: OnProgress<'_>) -> Result<(), BuildError> {
+        self.push_all_edges();
+        let mut level = 0;
+        let mut steps = 0_u64;
+        loop {
+            steps += 1;
+            if steps.is_multiple_of(1024) {
+                let done = self.history.len() as u64;
+                let total = u64::from(self.reference.points);
+                if progress(BuildProgress { stage: "collapse", done, total }).is_break() {
+                    return Err(BuildError::Stopped);
+                }
+            }
+            let Some(Reverse(key)) = self.queue.pop() else {
+                if self.retry_blocked(level) {
+                    continue;
+                }
+                return Ok(());
+            };
+            if key.0 > level {
+                // What was in the way at the lower levels may be gone: look again before going on.
+                level = key.0;
+                self.queue.push(Reverse(key));
+                self.retry_blocked(level);
+                continue;
+            }
+            self.try_collapse(key);
+        }
+    }
+
+    fn push_all_edges(&mut self) {
+        let mut edges: Vec<(u32, u32)> = Vec::with_capacity(self.mesh.tets.len() * 6);
+        for tet in &self.mesh.tets {
+            edges.extend(EDGES.map(|[i, j]| (tet[i].min(tet[j]), tet[i].max(tet[j]))));
+        }
+        edges.sort_unstable();
+        edges.dedup();
+        let keys: Vec<Reverse<Key>> = edges.iter().map(|&(a, b)| Reverse(self.predicted_key(a, b))).collect();
+        self.queue = BinaryHeap::from(keys);
+    }
+
+    /// Puts those blocked edges back whose neighbourhood has changed. Tells whether there were any.
+    fn retry_blocked(&mut self, level: u16) -> bool {
+        let mut still = std::mem::take(&mut self.blocked);
+        let before = still.len();
+        still.retain(|&(a, b, versions)| {
+            if !self.mesh.has(a) || !self.mesh.has(b) {
+                return false;
+            }
+            if self.edge_version(a, b) == versions {
+                return true;
+            }
+            let key = self.predicted_key(a, b);
+            self.queue.push(Reverse((key.0.max(level), key.1, key.2, a, b)));
+            false
+        });
+        self.blocked = still;
+        !self.queue.is_empty() && self.blocked.len() < before
+    }
+
+    fn edge_version(&self, a: u32, b: u32) -> u32 {
+        self.versions[a as usize].wrapping_add(self.versions[b as usize])
+    }
+
+    fn key(&self, error: f64, height: u32, a: u32, b: u32) -> Key {
+        let (p, q) = (self.data.positions[a as usize], self.data.positions[b as usize]);
+        let length = (0..3).map(|i| (i64::from(p[i]) - i64::from(q[i])).pow(2) as u64).fold(0, u64::saturating_add);
+        (error_level(error), height, length, a, b)
+    }
+
+    /// A key from what the ends know: second differences of the fields, errors and depths so far.
+    fn predicted_key(&self, a: u32, b: u32) -> Key {
+        let fields = &self.reference.quantized.fields;
+        let (i, j) = (a as usize, b as usize);
+        let [p, q] = [i, j].map(|v| glam::DVec3::from_array(self.data.positions[v].map(f64::from)));
+        let mut error = self.data.error[i].max(self.data.error[j]);
+        for (f, field) in fields.iter().enumerate() {
+            let [u, v] = [i, j].map(|v| v * fields.len() + f);
+            let rise = f64::from(self.data.levels[v] - self.data.levels[u]);
+            let bend = [u, v].map(|w| (rise - self.gradients[w].dot(q - p)).abs()).into_iter().fold(0.0, f64::max);
+            error = error.max(0.5 * bend * field.step / field.range());
+        }
+        self.key(error, self.data.height[i].max(self.data.height[j]) + 1, a, b)
+    }
+
+    fn try_collapse(&mut self, key: Key) {
+        let (a, b) = (key.3, key.4);
+        match self.plan.make(&mut self.mesh, &mut self.marks, &self.data.positions, &self.frozen, a, b) {
+            Ok(()) => {}
+            Err(Refusal::Blocked) => {
+                self.blocked.push((a, b, self.edge_version(a, b)));
+                return;
+            }
+            Err(Refusal::Gone | Refusal::Never) => return,
+        }
+        let Self { plan, mesh, data, buckets, reference, evaluator, .. } = self;
+        let limit = level_error(key.0);
+        let error = evaluator.evaluate(plan, mesh, data, buckets, reference, limit);
+        let exact = self.key(error, self.evaluator.height, a, b);
+        if (exact.0, exact.1) > (key.0, key.1) {
+            self.queue.push(Reverse(exact));
+            return;
+        }
+        self.perform(error);
+    }
+
+    fn perform(&mut self, error: f64) {
+        let code = ErrorCode::at_least(error);
+        let v = self.data.positions.len() as u32;
+        let Self { plan, mesh, data, evaluator, .. } = self;
+        self.history.push(Collapse::new(plan, mesh, code));
+        self.level_offsets.extend_from_slice(&evaluator.level_offsets);
+        data.positions.push(plan.position);
+        data.levels.extend_from_slice(&evaluator.levels);
+        data.error.push(code.error());
+        data.height.push(evaluator.height);
+        data.drift.push(evaluator.drift);
+        evaluator.settle(plan, &mut self.buckets);
+        for f in 0..evaluator.levels.len() {
+            let fields = evaluator.levels.len();
+            let [g, h] = [plan.a, plan.b].map(|w| self.gradients[w as usize * fields + f]);
+            self.gradients.push((g + h) * 0.5);
+        }
+        for &(tet, i, j) in &plan.fan {
+            mesh.close(tet, i as usize, j as usize);
+        }
+        let mut first = crate::mesh::NONE;
+        for (s, _) in &plan.stay {
+            mesh.tets[s.tet as usize][s.corner as usize] = v;
+            first = s.tet;
+        }
+        mesh.incident.push(first);
+        mesh.incident[plan.a as usize] = crate::mesh::NONE;
+        mesh.incident[plan.b as usize] = crate::mesh::NONE;
+        self.marks.push();
+        self.versions.push(0);
+        for i in 0..self.plan.link.len() {
+            let x = self.plan.link[i];
+            self.versions[x as usize] = self.versions[x as usize].wrapping_add(1);
+            let key = self.predicted_key(x, v);
+            self.queue.push(Reverse(key));
+        }
+    }
+}
+
+fn error_level(error: f64) -> u16 {
+    if error <= FINEST {
+        return 0;
+    }
+    ((error / FINEST).ln() / LEVEL_RATIO.ln()).ceil().clamp(1.0, f64::from(u16::MAX)) as u16
+}
+
+/// The largest error of a level.
+fn level_error(level: u16) -> f64 {
+    FINEST * LEVEL_RATIO.powi(i32::from(level))
+}
+
+/// Volume-weighted averages of the tetrahedra's gradients.
+fn gradients(mesh: &WorkMesh, data: &VertexData, fields: usize) -> Vec<glam::DVec3> {
+    let vertices = data.positions.len();
+    let mut sums = vec![glam::DVec3::ZERO; vertices * fields];
+    let mut volumes = vec![0.0; vertices];
+    for tet in &mesh.tets {
+        let [a, b, c, d] = tet.map(|v| glam::DVec3::from_array(data.positions[v as usize].map(f64::from)));
+        let (u, v, w) = (b - a, c - a, d - a);
+        let volume = u.cross(v).dot(w);
+        for f in 0..fields {
+            let [l0, l1, l2, l3] = tet.map(|v| f64::from(data.levels[v as usize * fields + f]));
+            // Six times the volume times the gradient; the volume cancels in the weighted average.
+            let weighted = v.cross(w) * (l1 - l0) + w.cross(u) * (l2 - l0) + u.cross(v) * (l3 - l0);
+            tet.iter().for_each(|&v| sums[v as usize * fields + f] += weighted);
+        }
+        tet.iter().for_each(|&v| volumes[v as usize] += volume);
+    }
+    sums.iter().enumerate().map(|(i, sum)| *sum / f64::max(volumes[i / fields], f64::MIN_POSITIVE)).collect()
+}

@@ -1,0 +1,166 @@
+//! From a tetrahedral mesh to a Multi-Tessellation, offline.
+//!
+//! [`edge_mt`] collapses edges to their midpoints, cheapest first, until nothing can be collapsed any more; the
+//! collapses in reverse are the updates of an edge-based MT [§2.1]. The cost of a collapse is the largest error it
+//! leads to, evaluated exactly at every reference vertex that its star covers. The model is the greedy scheme of
+//! Cignoni, Costanza, Montani, Rocchini, Scopigno (*Simplification of tetrahedral meshes with accurate error
+//! evaluation*, 2000): a cheap prediction orders the candidates, the exact error decides.
+//!
+//! What is promised:
+//! - **Errors** bound the deviation from the input's field at every reference vertex, for all consistent sets, and
+//!   grow along the partial order towards the base mesh.
+//! - **Topology** never changes: the link condition is checked inside and on the boundary, and vertices at which the
+//!   input is not a manifold stay where they are.
+//! - **Geometry**: every tetrahedron is positive on the lattice, exactly. Flat parts of the boundary stay flat and
+//!   straight creases straight (to half a lattice step where they are oblique to the axes); a boundary that moves
+//!   is counted into the error.
+//! - **Determinism**: the same input gives the same MT on every platform.
+//!
+//! Not promised: distant parts of a curved boundary may come to overlap where they were nearer to each other than
+//! the error allows the boundary to move.
+
+mod collapse;
+mod cost;
+mod history;
+mod plan;
+mod quantize;
+mod work_mesh;
+
+pub use collapse::edge_mt;
+
+use crate::mesh::MeshError;
+use crate::mt::EdgeMt;
+use crate::mt::UpdateError;
+use std::fmt;
+use std::ops::ControlFlow;
+
+/// How to build.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BuildConfig {
+    /// Names of the fields to keep, in this order; the first one of the mesh if empty.
+    pub fields: Vec<String>,
+    /// Bits of the position lattice; as few as the thinnest cells allow, at least 16, if not given.
+    pub position_bits: Option<u32>,
+    /// Bits of the field lattices, 1 to 24. Half a step is the error that remains at full resolution.
+    pub field_bits: u32,
+    /// The displacement of the boundary that counts as much as an error of the field's whole range, as a fraction
+    /// of the domain's diagonal.
+    pub displacement: f64,
+}
+
+impl Default for BuildConfig {
+    fn default() -> Self {
+        Self { fields: Vec::new(), position_bits: None, field_bits: 16, displacement: 0.2 }
+    }
+}
+
+/// How far the work has come; sent now and then, so that a caller can show it and stop it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BuildProgress {
+    /// What is being done.
+    pub stage: &'static str,
+    /// How much of it is done.
+    pub done: u64,
+    /// All there is to do, as far as is known.
+    pub total: u64,
+}
+
+/// Receives progress; [`ControlFlow::Break`] stops the work.
+pub type OnProgress<'a> = &'a mut dyn FnMut(BuildProgress) -> ControlFlow<()>;
+
+/// An MT and how it came about.
+#[derive(Clone, Debug)]
+pub struct BuildResult {
+    /// The MT, complete and applied once from base to reference mesh.
+    pub mt: EdgeMt,
+    /// Counts.
+    pub summary: BuildSummary,
+}
+
+/// What came of a build.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct BuildSummary {
+    /// Vertices of the reference mesh.
+    pub vertices: u32,
+    /// Tetrahedra of the reference mesh.
+    pub tetrahedra: u32,
+    /// Vertices of the base mesh.
+    pub base_vertices: u32,
+    /// Tetrahedra of the base mesh.
+    pub base_tetrahedra: u32,
+    /// Updates of the MT.
+    pub updates: u32,
+    /// Bits of the position lattice.
+    pub position_bits: u32,
+    /// Length of the longest chain of updates that depend on each other.
+    pub depth: u32,
+}
+
+/// Why no MT was built.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum BuildError {
+    /// The mesh has no tetrahedra.
+    Empty,
+    /// The mesh has no point field.
+    NoField,
+    /// A wanted field is not there.
+    UnknownField {
+        /// The name asked for.
+        name: String,
+        /// The names that are there.
+        known: Vec<String>,
+    },
+    /// An option is out of its range.
+    Option {
+        /// Its name.
+        name: &'static str,
+        /// What it may be.
+        expected: &'static str,
+    },
+    /// The mesh is not one to build on; repair it first.
+    Mesh(MeshError),
+    /// A coordinate or a field value is not finite.
+    NotFinite {
+        /// The point.
+        point: u32,
+    },
+    /// A tetrahedron is too thin for the lattice.
+    TooThin {
+        /// The cell.
+        cell: u32,
+        /// The bits that were tried last.
+        bits: u32,
+    },
+    /// More vertices than an MT can number.
+    TooLarge,
+    /// The caller stopped the work.
+    Stopped,
+    /// The finished MT failed its own check: a bug in the builder, not in the input.
+    Internal(UpdateError),
+}
+
+impl fmt::Display for BuildError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Empty => write!(f, "the mesh has no tetrahedra"),
+            Self::NoField => write!(f, "the mesh has no point field: an MT needs at least one scalar at its points"),
+            Self::UnknownField { name, known } => {
+                write!(f, "there is no point field '{name}'; the mesh has: {}", known.join(", "))
+            }
+            Self::Option { name, expected } => write!(f, "option {name} must be {expected}"),
+            Self::Mesh(error) => write!(f, "{error}"),
+            Self::NotFinite { point } => write!(f, "point {point} has a coordinate or a value that is not finite"),
+            Self::TooThin { cell, bits } => write!(
+                f,
+                "cell {cell} is too thin for a lattice of {bits} bits: it turns flat or inside out; use more \
+                 position bits (at most 30) or remove the cell"
+            ),
+            Self::TooLarge => write!(f, "the mesh has more than 2^30 points; split it into parts"),
+            Self::Stopped => write!(f, "stopped"),
+            Self::Internal(error) => write!(f, "the built MT is not sound ({error}); please report this"),
+        }
+    }
+}
+
+impl std::error::Error for BuildError {}

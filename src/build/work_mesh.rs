@@ -1,0 +1,97 @@
+//! The mesh that the builder edits: topology only.
+//!
+//! Vertices are numbered as they come: those of the input first, then one for each collapse. Tetrahedra keep their
+//! numbers; those that a collapse removes are marked dead.
+
+use crate::mesh::NONE;
+
+/// A tetrahedral mesh with adjacency, edited by edge collapses.
+pub(super) struct WorkMesh {
+    pub tets: Vec<[u32; 4]>,
+    pub neighbors: Vec<[u32; 4]>,
+    /// A tetrahedron at each vertex; [`NONE`] once the vertex is gone.
+    pub incident: Vec<u32>,
+    pub live_tets: usize,
+    marks: Vec<u32>,
+    epoch: u32,
+}
+
+/// A tetrahedron of a star, and which of its corners is the centre.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct StarTet {
+    pub tet: u32,
+    pub corner: u8,
+}
+
+impl WorkMesh {
+    pub fn new(tets: Vec<[u32; 4]>, neighbors: Vec<[u32; 4]>, vertices: usize) -> Self {
+        let mut incident = vec![NONE; vertices];
+        for (t, tet) in tets.iter().enumerate() {
+            tet.iter().for_each(|&v| incident[v as usize] = t as u32);
+        }
+        let (live_tets, marks) = (tets.len(), vec![0; tets.len()]);
+        Self { tets, neighbors, incident, live_tets, marks, epoch: 0 }
+    }
+
+    /// Whether the vertex is in the mesh.
+    pub fn has(&self, v: u32) -> bool {
+        self.incident[v as usize] != NONE
+    }
+
+    /// Whether the tetrahedron is in the mesh.
+    pub fn is_live(&self, t: u32) -> bool {
+        self.tets[t as usize][0] != NONE
+    }
+
+    /// The tetrahedra around `v` that hang together through faces, unless there are more than `most`.
+    pub fn star(&mut self, v: u32, most: usize, star: &mut Vec<StarTet>) -> bool {
+        self.epoch = self.epoch.wrapping_add(1);
+        if self.epoch == 0 {
+            self.marks.fill(0);
+            self.epoch = 1;
+        }
+        star.clear();
+        self.reach(self.incident[v as usize], v, star);
+        let mut next = 0;
+        while next < star.len() {
+            let StarTet { tet, corner } = star[next];
+            next += 1;
+            for (i, n) in self.neighbors[tet as usize].into_iter().enumerate() {
+                if i != corner as usize && n != NONE && self.marks[n as usize] != self.epoch {
+                    if star.len() == most {
+                        return false;
+                    }
+                    self.reach(n, v, star);
+                }
+            }
+        }
+        true
+    }
+
+    #[inline]
+    fn reach(&mut self, t: u32, v: u32, star: &mut Vec<StarTet>) {
+        self.marks[t as usize] = self.epoch;
+        let tet = self.tets[t as usize];
+        let corner = usize::from(tet[1] == v) | usize::from(tet[2] == v) << 1 | usize::from(tet[3] == v) * 3;
+        star.push(StarTet { tet: t, corner: corner as u8 });
+    }
+
+    /// Removes fan tetrahedron `t`, whose corners `i` and `j` are the ends of the collapsing edge.
+    pub fn close(&mut self, t: u32, i: usize, j: usize) {
+        let (tet, around) = (self.tets[t as usize], self.neighbors[t as usize]);
+        let (beyond_i, beyond_j) = (around[i], around[j]);
+        self.relink(beyond_i, t, beyond_j);
+        self.relink(beyond_j, t, beyond_i);
+        for k in (0..4).filter(|&k| k != i && k != j) {
+            self.incident[tet[k] as usize] = beyond_i;
+        }
+        self.tets[t as usize] = [NONE; 4];
+        self.live_tets -= 1;
+    }
+
+    fn relink(&mut self, t: u32, from: u32, to: u32) {
+        if let Some(n) = self.neighbors[t as usize].iter_mut().find(|n| **n == from) {
+            *n = to;
+        }
+    }
+}
