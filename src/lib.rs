@@ -28,6 +28,7 @@
 #![warn(missing_docs)]
 #![deny(rustdoc::broken_intra_doc_links)]
 
+pub mod format;
 pub mod geom;
 pub mod mesh;
 pub mod mt;
