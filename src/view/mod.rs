@@ -2,6 +2,7 @@
 
 mod colormap;
 mod cutaway;
+pub mod gizmo;
 mod iso;
 
 pub use colormap::{Colormap, VIRIDIS};
