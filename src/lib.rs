@@ -33,4 +33,5 @@ pub mod geom;
 pub mod mesh;
 pub mod mt;
 pub mod refine;
+pub mod session;
 pub mod view;
