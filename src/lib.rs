@@ -28,8 +28,10 @@
 #![warn(missing_docs)]
 #![deny(rustdoc::broken_intra_doc_links)]
 
+pub mod format;
 pub mod geom;
 pub mod mesh;
 pub mod mt;
 pub mod refine;
+pub mod session;
 pub mod view;

@@ -34,3 +34,22 @@ pub struct Request {
     /// At most so many tetrahedra.
     pub max_tets: Option<u32>,
 }
+
+/// What a refinement did, and how good the mesh is now.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RefineStats {
+    /// Vertices of the current mesh.
+    pub vertices: u32,
+    /// Tetrahedra of the current mesh.
+    pub tetrahedra: u32,
+    /// Updates that are applied now.
+    pub applied: u32,
+    /// Updates applied on the way.
+    pub refined: u64,
+    /// Updates undone on the way.
+    pub coarsened: u64,
+    /// The error that is guaranteed in the selected part, as a fraction of the field's range.
+    pub error_bound: f64,
+    /// Whether that is what was asked for; false when the budget or missing data stopped it.
+    pub satisfied: bool,
+}

@@ -1,5 +1,14 @@
 //! What is to be seen, computed on the CPU from slices. Knows no MT.
 
+mod colormap;
+mod cutaway;
+pub mod gizmo;
+mod iso;
+
+pub use colormap::{Colormap, VIRIDIS};
+pub use cutaway::{ClipPlane, Cutaway};
+pub use iso::IsoSurface;
+
 /// A tetrahedral mesh as slices: what the renderer and the isosurface extraction take.
 #[derive(Clone, Copy, Debug)]
 pub struct MeshView<'a> {

@@ -1,0 +1,126 @@
+//! The fixed parts of a file: its header and the heads of its sections.
+
+use super::FormatError;
+
+/// First bytes of every MT file. The high bit, CR LF and Ctrl-Z show transfers that meddle with text.
+pub const MAGIC: [u8; 8] = *b"\x89TLOD\r\n\x1a";
+/// Major and minor version of the files that this module writes.
+pub const VERSION: [u16; 2] = [1, 0];
+/// Bytes of the file header.
+pub const HEADER_BYTES: usize = 32;
+/// Bytes of a section's head.
+pub const HEAD_BYTES: usize = 12;
+/// Bytes of the `ENDF` section, head included.
+pub const END_BYTES: usize = HEAD_BYTES + 12;
+/// Flags that a reader must know.
+const CRITICAL_FLAGS: u32 = 0xFFFF;
+
+/// The header of a file that is `total` bytes long.
+pub fn header(total: u64) -> [u8; HEADER_BYTES] {
+    let mut bytes = [0; HEADER_BYTES];
+    bytes[..8].copy_from_slice(&MAGIC);
+    bytes[8..10].copy_from_slice(&VERSION[0].to_le_bytes());
+    bytes[10..12].copy_from_slice(&VERSION[1].to_le_bytes());
+    bytes[16..24].copy_from_slice(&total.to_le_bytes());
+    let crc = crc32fast::hash(&bytes[..28]);
+    bytes[28..].copy_from_slice(&crc.to_le_bytes());
+    bytes
+}
+
+/// Whether `bytes`, the first of a stream (perhaps not all of them yet), can begin an MT file.
+pub fn may_be_mt(bytes: &[u8]) -> bool {
+    bytes.iter().zip(&MAGIC).all(|(a, b)| a == b)
+}
+
+/// Reads a header: the bytes of the whole file, if the writer knew.
+pub fn parse_header(bytes: &[u8; HEADER_BYTES]) -> Result<Option<u64>, FormatError> {
+    if !may_be_mt(bytes) {
+        return Err(FormatError::NotMt);
+    }
+    let u16_at = |i: usize| u16::from_le_bytes([bytes[i], bytes[i + 1]]);
+    let u32_at = |i: usize| u32_of(&bytes[i..]);
+    if u32_at(28) != crc32fast::hash(&bytes[..28]) {
+        return Err(FormatError::Corrupt { offset: 0, what: "the checksum of the header does not match" });
+    }
+    let found = [u16_at(8), u16_at(10)];
+    if found[0] != VERSION[0] {
+        return Err(FormatError::UnsupportedVersion { found, supported: VERSION });
+    }
+    if u32_at(12) & CRITICAL_FLAGS != 0 {
+        return Err(FormatError::UnsupportedFeature {
+            offset: 12,
+            what: "a flag that this reader does not know",
+        });
+    }
+    let total = u64::from(u32_at(16)) | u64::from(u32_at(20)) << 32;
+    Ok((total != 0).then_some(total))
+}
+
+/// The first four bytes as a number. The callers have them.
+fn u32_of(bytes: &[u8]) -> u32 {
+    u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]])
+}
+
+/// What a section is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Kind(pub [u8; 4]);
+
+impl Kind {
+    pub const INFO: Self = Self(*b"INFO");
+    pub const BASE: Self = Self(*b"BASE");
+    pub const UPDT: Self = Self(*b"UPDT");
+    pub const ENDF: Self = Self(*b"ENDF");
+
+    /// Whether this reader knows what is in the section.
+    pub fn is_known(self) -> bool {
+        [Self::INFO, Self::BASE, Self::UPDT, Self::ENDF].contains(&self)
+    }
+
+    /// Whether a reader that does not know the kind may skip the section.
+    pub fn is_skippable(self) -> bool {
+        self.0[0] & 0x20 != 0
+    }
+}
+
+/// The head of a section.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Head {
+    pub kind: Kind,
+    pub length: u32,
+    pub crc: u32,
+}
+
+impl Head {
+    /// The head for a payload.
+    pub fn new(kind: Kind, payload: &[u8]) -> Self {
+        // Writers check lengths before they come here.
+        let mut head = Self { kind, length: payload.len() as u32, crc: 0 };
+        let mut hasher = head.hasher();
+        hasher.update(payload);
+        head.crc = hasher.finalize();
+        head
+    }
+
+    pub fn parse(bytes: &[u8; HEAD_BYTES]) -> Self {
+        Self {
+            kind: Kind([bytes[0], bytes[1], bytes[2], bytes[3]]),
+            length: u32_of(&bytes[4..]),
+            crc: u32_of(&bytes[8..]),
+        }
+    }
+
+    pub fn to_bytes(self) -> [u8; HEAD_BYTES] {
+        let mut bytes = [0; HEAD_BYTES];
+        bytes[..4].copy_from_slice(&self.kind.0);
+        bytes[4..8].copy_from_slice(&self.length.to_le_bytes());
+        bytes[8..].copy_from_slice(&self.crc.to_le_bytes());
+        bytes
+    }
+
+    /// A checksum that has taken in kind and length and waits for the payload.
+    pub fn hasher(&self) -> crc32fast::Hasher {
+        let mut hasher = crc32fast::Hasher::new();
+        hasher.update(&self.to_bytes()[..8]);
+        hasher
+    }
+}

@@ -1,0 +1,23 @@
+//! The MT file: an MT to bytes, and bytes of any split back to a growing MT. No I/O, no JS.
+//!
+//! [`encode`] and [`encode_to`] write, [`Decoder`] reads. The specification follows.
+//!
+//! ---
+#![doc = include_str!("SPEC.md")]
+
+mod decode;
+mod encode;
+mod error;
+mod header;
+mod limits;
+mod payload;
+mod read;
+mod write;
+
+pub use decode::{Decoder, Progress};
+pub use encode::{EncodeError, EncodeOptions, encode, encode_to};
+pub use error::FormatError;
+pub use limits::Limits;
+
+/// Most updates in one block.
+pub const BLOCK_UPDATES: u32 = 512;

@@ -1,0 +1,292 @@
+//! What is in each kind of section: one writer and one reader a kind, side by side.
+
+use super::BLOCK_UPDATES;
+use super::EncodeError;
+use super::FormatError;
+use super::Limits;
+use super::read::MAX_STRING;
+use super::read::Reader;
+use super::write;
+use crate::geom::Lattice;
+use crate::mt::BaseMesh;
+use crate::mt::BaseMeshError;
+use crate::mt::EdgeMt;
+use crate::mt::ErrorCode;
+use crate::mt::FieldInfo;
+use crate::mt::MtInfo;
+use crate::mt::MtKind;
+use crate::mt::UpdateId;
+use crate::mt::VertexId;
+use crate::mt::VertexSplit;
+use std::collections::BTreeMap;
+
+/// Key and value of each entry, in ascending order of the keys.
+pub type Metadata = Vec<(String, String)>;
+
+/// Largest `INFO` section that is written.
+const MAX_INFO_BYTES: usize = 1 << 20;
+
+/// The number that stands for [`MtKind::Edge`].
+const EDGE: u8 = 0;
+
+pub fn write_info(
+    out: &mut Vec<u8>,
+    info: &MtInfo,
+    metadata: &BTreeMap<String, String>,
+) -> Result<(), EncodeError> {
+    let fits = |text: &str| text.len() <= MAX_STRING as usize;
+    if !info.fields.iter().all(|field| fits(&field.name)) {
+        return Err(EncodeError::TooLong { what: "the name of a field" });
+    }
+    if !metadata.iter().all(|(key, value)| fits(key) && fits(value)) {
+        return Err(EncodeError::TooLong { what: "a metadata key or value" });
+    }
+    out.push(match info.kind {
+        MtKind::Edge => EDGE,
+    });
+    for count in [info.vertices, info.tetrahedra, info.updates] {
+        write::u32(out, count);
+    }
+    for number in info.lattice.origin.into_iter().chain(info.lattice.step) {
+        write::f64(out, number);
+    }
+    out.push(info.lattice.bits as u8);
+    write::f64(out, info.displacement_per_error);
+    out.push(info.fields.len() as u8);
+    for field in &info.fields {
+        write::string(out, &field.name);
+        for number in [field.min, field.max, field.origin, field.step] {
+            write::f64(out, number);
+        }
+        out.push(field.bits as u8);
+    }
+    write::varint(out, metadata.len() as u64);
+    for (key, value) in metadata {
+        write::string(out, key);
+        write::string(out, value);
+    }
+    if out.len() > MAX_INFO_BYTES {
+        return Err(EncodeError::TooLong { what: "the description with all metadata" });
+    }
+    Ok(())
+}
+
+pub fn read_info(mut reader: Reader<'_>) -> Result<(MtInfo, Metadata), FormatError> {
+    if reader.u8()? != EDGE {
+        return Err(reader.corrupt("the kind of MT is not known"));
+    }
+    let [vertices, tetrahedra, updates] = [reader.u32()?, reader.u32()?, reader.u32()?];
+    let lattice = Lattice { origin: reader.f64x3()?, step: reader.f64x3()?, bits: u32::from(reader.u8()?) };
+    let displacement_per_error = reader.f64()?;
+    let count = reader.u8()?;
+    let fields = (0..count).map(|_| read_field(&mut reader)).collect::<Result<_, _>>()?;
+    let metadata = read_metadata(&mut reader)?;
+    reader.end()?;
+    let kind = MtKind::Edge;
+    let info = MtInfo { kind, lattice, fields, vertices, tetrahedra, updates, displacement_per_error };
+    info.check()?;
+    Ok((info, metadata))
+}
+
+fn read_field(reader: &mut Reader<'_>) -> Result<FieldInfo, FormatError> {
+    Ok(FieldInfo {
+        name: reader.string()?.to_owned(),
+        min: reader.f64()?,
+        max: reader.f64()?,
+        origin: reader.f64()?,
+        step: reader.f64()?,
+        bits: u32::from(reader.u8()?),
+    })
+}
+
+fn read_metadata(reader: &mut Reader<'_>) -> Result<Metadata, FormatError> {
+    let count = reader.varint()?;
+    let mut metadata = Metadata::new();
+    for _ in 0..count {
+        let key = reader.string()?;
+        if metadata.last().is_some_and(|(last, _)| last.as_str() >= key) {
+            return Err(reader.corrupt("metadata keys are not in ascending order"));
+        }
+        metadata.push((key.to_owned(), reader.string()?.to_owned()));
+    }
+    Ok(metadata)
+}
+
+/// Appends the differences between neighbouring numbers.
+fn write_deltas(out: &mut Vec<u8>, numbers: impl Iterator<Item = i32>) {
+    let mut last = 0_i32;
+    for number in numbers {
+        write::zigzag(out, number.wrapping_sub(last));
+        last = number;
+    }
+}
+
+/// The next number of a column of differences; `last` is the one before.
+fn read_delta(reader: &mut Reader<'_>, last: &mut i32) -> Result<i32, FormatError> {
+    *last = last.wrapping_add(reader.zigzag()?);
+    Ok(*last)
+}
+
+pub fn write_base(out: &mut Vec<u8>, base: &BaseMesh, fields: usize) {
+    let scratch = &mut Vec::new();
+    write::varint(out, base.positions.len() as u64);
+    write::varint(out, base.tets.len() as u64);
+    write::column(out, scratch, |out| {
+        let mut last = [0_i32; 3];
+        for &position in &base.positions {
+            (0..3).for_each(|i| write::zigzag(out, position[i].wrapping_sub(last[i])));
+            last = position;
+        }
+    });
+    write::column(out, scratch, |out| write_deltas(out, base.tets.iter().flatten().map(|&v| v as i32)));
+    for field in 0..fields {
+        let levels = base.values.iter().skip(field).step_by(fields);
+        write::column(out, scratch, |out| write_deltas(out, levels.copied()));
+    }
+}
+
+pub fn read_base(mut reader: Reader<'_>, info: &MtInfo, limits: &Limits) -> Result<BaseMesh, FormatError> {
+    let fields = info.fields.len();
+    let [vertices, tets] = [reader.varint()?, reader.varint()?];
+    check_counts(info, u64::from(vertices))?;
+    check_memory(info, u64::from(vertices), u64::from(tets), limits)?;
+    let (mut positions, mut corners) = (reader.column()?, reader.column()?);
+    let mut columns = (0..fields).map(|_| reader.column()).collect::<Result<Vec<_>, _>>()?;
+    reader.end()?;
+    // Vectors grow with the bytes that are there: a count alone reserves nothing.
+    let mut base = BaseMesh::default();
+    let mut last = [0; 3];
+    for _ in 0..vertices {
+        for x in &mut last {
+            read_delta(&mut positions, x)?;
+        }
+        base.positions.push(last);
+    }
+    let mut last = 0;
+    for _ in 0..tets {
+        let mut corner = || read_delta(&mut corners, &mut last).map(|v| v as u32);
+        base.tets.push([corner()?, corner()?, corner()?, corner()?]);
+    }
+    let mut levels = vec![0; fields];
+    for _ in 0..vertices {
+        for (level, column) in levels.iter_mut().zip(&mut columns) {
+            read_delta(column, level)?;
+        }
+        base.values.extend_from_slice(&levels);
+    }
+    [positions, corners].into_iter().chain(columns).try_for_each(Reader::end)?;
+    base.check(info)?;
+    Ok(base)
+}
+
+/// A split turns one vertex into two, and vertex numbers are 32-bit words of which one means "none".
+pub fn check_counts(info: &MtInfo, base_vertices: u64) -> Result<(), BaseMeshError> {
+    let updates = u64::from(info.updates);
+    if base_vertices + updates != u64::from(info.vertices) {
+        return Err(BaseMeshError::Info("base vertices and updates do not add up to the reference vertices"));
+    }
+    if base_vertices + 2 * updates >= u64::from(u32::MAX) {
+        return Err(BaseMeshError::Info("more vertices than 32 bits can number"));
+    }
+    Ok(())
+}
+
+/// Whether the complete MT fits the limits: counts are checked against what arrives, so it cannot grow beyond.
+pub fn check_memory(info: &MtInfo, vertices: u64, tets: u64, limits: &Limits) -> Result<(), FormatError> {
+    let fields = info.fields.len() as u64;
+    let needed = vertices * (16 + 4 * fields) + tets * 16 + u64::from(info.updates) * (34 + 4 * fields);
+    if needed > limits.memory_bytes {
+        return Err(FormatError::Limit { what: "the MT in memory", needed, limit: limits.memory_bytes });
+    }
+    Ok(())
+}
+
+/// Writes the updates `first .. end`.
+pub fn write_updates(out: &mut Vec<u8>, mt: &EdgeMt, first: u32, end: u32) {
+    let scratch = &mut Vec::new();
+    let splits = || (first..end).map(|k| mt.split(UpdateId(k)));
+    let newest = (mt.base().positions.len() as u32).wrapping_sub(1);
+    write::varint(out, u64::from(first));
+    write::varint(out, u64::from(end - first));
+    write::column(out, scratch, |out| {
+        for (k, split) in (first..end).zip(splits()) {
+            // `push` has checked that the vertex is older than the update.
+            write::varint(out, u64::from(newest.wrapping_add(2 * k).wrapping_sub(split.vertex.0)));
+        }
+    });
+    write::column(out, scratch, |out| {
+        splits().for_each(|split| split.offset.iter().for_each(|&d| write::zigzag(out, d)));
+    });
+    write::column(out, scratch, |out| splits().for_each(|split| write::varint(out, split.mask)));
+    write::column(out, scratch, |out| write_deltas(out, splits().map(|split| i32::from(split.error.0))));
+    for field in 0..mt.info().fields.len() {
+        write::column(out, scratch, |out| {
+            splits().for_each(|split| write::zigzag(out, split.field_offsets[field]));
+        });
+    }
+}
+
+/// Reads a block of updates into the MT.
+pub fn read_updates(mut reader: Reader<'_>, mt: &mut EdgeMt) -> Result<(), FormatError> {
+    if reader.varint()? != mt.updates() {
+        return Err(reader.corrupt("a block of updates is missing or repeated"));
+    }
+    let count = reader.varint()?;
+    if count == 0 || count > BLOCK_UPDATES {
+        return Err(reader.corrupt("a block holds 1 to 512 updates"));
+    }
+    if count > mt.info().updates - mt.updates() {
+        return Err(reader.corrupt("there are more updates than the description tells"));
+    }
+    let (mut vertices, mut offsets) = (reader.column()?, reader.column()?);
+    let (mut masks, mut errors) = (reader.column()?, reader.column()?);
+    let mut fields = (0..mt.info().fields.len()).map(|_| reader.column()).collect::<Result<Vec<_>, _>>()?;
+    reader.end()?;
+    let mut field_offsets = vec![0; fields.len()];
+    let mut code = 0;
+    for _ in 0..count {
+        for (offset, column) in field_offsets.iter_mut().zip(&mut fields) {
+            *offset = column.zigzag()?;
+        }
+        mt.push(&VertexSplit {
+            vertex: read_vertex(&mut vertices, mt)?,
+            offset: [offsets.zigzag()?, offsets.zigzag()?, offsets.zigzag()?],
+            field_offsets: &field_offsets,
+            mask: masks.varint64()?,
+            error: read_error(&mut errors, &mut code)?,
+        })?;
+    }
+    [vertices, offsets, masks, errors].into_iter().chain(fields).try_for_each(Reader::end)
+}
+
+/// The vertex that the next update splits, told as its distance from the newest.
+fn read_vertex(column: &mut Reader<'_>, mt: &EdgeMt) -> Result<VertexId, FormatError> {
+    let vertices = mt.base().positions.len() as u32 + 2 * mt.updates();
+    let distance = column.varint()?;
+    let vertex = vertices.checked_sub(1).and_then(|newest| newest.checked_sub(distance));
+    vertex.map(VertexId).ok_or_else(|| column.corrupt("an update splits a vertex that is not there yet"))
+}
+
+fn read_error(column: &mut Reader<'_>, last: &mut i32) -> Result<ErrorCode, FormatError> {
+    let code = read_delta(column, last)?;
+    u16::try_from(code).map(ErrorCode).map_err(|_| column.corrupt("an error code has more than 16 bits"))
+}
+
+/// The totals at the end of a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Totals {
+    pub updates: u32,
+    pub sections: u32,
+    /// Checksum of the sections' checksums.
+    pub crc: u32,
+}
+
+pub fn write_end(out: &mut Vec<u8>, totals: Totals) {
+    [totals.updates, totals.sections, totals.crc].into_iter().for_each(|number| write::u32(out, number));
+}
+
+pub fn read_end(mut reader: Reader<'_>) -> Result<Totals, FormatError> {
+    let totals = Totals { updates: reader.u32()?, sections: reader.u32()?, crc: reader.u32()? };
+    reader.end()?;
+    Ok(totals)
+}

@@ -1,0 +1,260 @@
+//! A stream of bytes, the MT it becomes, and the current mesh, as one state machine without I/O.
+//!
+//! Bytes go in with [`Session::feed`], requests with [`Session::refine`]; the mesh comes out as slices with
+//! [`Session::view`] or as a surface with [`Session::isosurface`]. Everything works while the file is still
+//! arriving: a request is then met as far as the updates that are there allow, and made again when more are.
+
+use crate::format::Decoder;
+use crate::format::FormatError;
+use crate::format::Limits;
+use crate::mt::CurrentMesh;
+use crate::mt::EdgeMt;
+use crate::mt::MtInfo;
+use crate::refine::Front;
+use crate::refine::LodCriterion;
+use crate::refine::RefineStats;
+use crate::refine::Request;
+use crate::view::IsoSurface;
+use crate::view::MeshView;
+use std::fmt;
+
+pub use crate::format::Progress;
+
+/// Why a session cannot do what it was asked for. The current mesh is valid all the same.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum SessionError {
+    /// The base mesh has not arrived yet.
+    NotReady,
+    /// The MT has no field of this number.
+    Field {
+        /// The number that was asked for.
+        index: usize,
+        /// How many fields there are.
+        fields: usize,
+    },
+    /// A number in the request cannot be used.
+    Request(&'static str),
+    /// The MT turned out to be damaged when an update was applied.
+    Format(FormatError),
+}
+
+impl fmt::Display for SessionError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotReady => f.write_str("the base mesh has not arrived yet; feed more of the file first"),
+            Self::Field { index, fields } => {
+                write!(f, "there is no field number {index}; the MT has {fields}, counted from 0")
+            }
+            Self::Request(what) => f.write_str(what),
+            Self::Format(error) => write!(f, "{error}"),
+        }
+    }
+}
+
+impl std::error::Error for SessionError {}
+
+/// A decoder, its MT and the current mesh.
+#[derive(Debug, Default)]
+pub struct Session {
+    decoder: Decoder,
+    /// There from the moment the base mesh is.
+    front: Option<Front>,
+    failed: Option<FormatError>,
+    /// Which field is shown.
+    field: usize,
+    shown: Shown,
+    surface: IsoSurface,
+}
+
+/// The current mesh in model units, kept up with the mesh at the cost of what changed.
+#[derive(Debug, Default)]
+struct Shown {
+    positions: Vec<[f32; 3]>,
+    values: Vec<f32>,
+    /// Another field is to be shown: all values are to be set.
+    stale: bool,
+}
+
+impl Session {
+    /// A session that waits for the first byte of a file.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// [`Session::new`] with other limits than the default ones.
+    pub fn with_limits(limits: Limits) -> Self {
+        Self { decoder: Decoder::new(limits), ..Self::default() }
+    }
+
+    /// Takes in the next bytes of the file, however they were cut.
+    ///
+    /// # Errors
+    /// As [`Decoder::feed`], and when the base mesh is not a valid mesh.
+    pub fn feed(&mut self, bytes: &[u8]) -> Result<Progress, FormatError> {
+        if let Some(error) = &self.failed {
+            return Err(error.clone());
+        }
+        let fed = self.decoder.feed(bytes);
+        // The base mesh may have arrived in front of an error.
+        if let (None, Some(mt)) = (&self.front, self.decoder.mt()) {
+            match Front::new(mt) {
+                Ok(front) => self.front = Some(front),
+                Err(error) => {
+                    let error = FormatError::Base(error);
+                    self.failed = Some(error.clone());
+                    return Err(error);
+                }
+            }
+        }
+        fed
+    }
+
+    /// Tells the session that no more bytes come.
+    ///
+    /// # Errors
+    /// As [`Decoder::finish`]; what has arrived stays usable.
+    pub fn finish(&mut self) -> Result<(), FormatError> {
+        match &self.failed {
+            Some(error) => Err(error.clone()),
+            None => self.decoder.finish(),
+        }
+    }
+
+    /// What is known of the MT; none until the base mesh is there.
+    pub fn info(&self) -> Option<&MtInfo> {
+        self.mt().map(EdgeMt::info)
+    }
+
+    /// The MT as far as it has arrived; none until the base mesh is there.
+    pub fn mt(&self) -> Option<&EdgeMt> {
+        self.front.as_ref().and(self.decoder.mt())
+    }
+
+    /// The file's free keys and values.
+    pub fn metadata(&self) -> &[(String, String)] {
+        self.decoder.metadata()
+    }
+
+    /// How far the file has come.
+    pub fn progress(&self) -> Progress {
+        let progress = self.decoder.progress();
+        Progress {
+            ready: self.front.is_some(),
+            complete: progress.complete && self.failed.is_none(),
+            ..progress
+        }
+    }
+
+    /// Changes the current mesh to the coarsest one that satisfies `request`, as far as the data has arrived.
+    ///
+    /// # Errors
+    /// If the request makes no sense for this MT, or the MT turns out to be damaged.
+    pub fn refine(&mut self, request: &Request) -> Result<RefineStats, SessionError> {
+        let (Some(front), Some(mt)) = (&mut self.front, self.decoder.mt()) else {
+            return Err(SessionError::NotReady);
+        };
+        check_request(request, mt.info())?;
+        let criterion = LodCriterion::new(mt.info(), request);
+        let outcome = front
+            .satisfy(mt, &criterion, request.max_tets)
+            .map_err(|error| SessionError::Format(FormatError::Update(error)))?;
+        Ok(RefineStats {
+            vertices: front.mesh().vertex_count() as u32,
+            tetrahedra: front.mesh().tet_count() as u32,
+            applied: front.applied_count(),
+            refined: outcome.refined,
+            coarsened: outcome.coarsened,
+            error_bound: outcome.error.error(),
+            satisfied: outcome.satisfied,
+        })
+    }
+
+    /// Chooses the field that [`Session::view`] and [`Session::isosurface`] show.
+    ///
+    /// # Errors
+    /// If there is no such field, or the fields are not known yet.
+    pub fn set_field(&mut self, index: usize) -> Result<(), SessionError> {
+        let fields = self.info().ok_or(SessionError::NotReady)?.fields.len();
+        if index >= fields {
+            return Err(SessionError::Field { index, fields });
+        }
+        self.shown.stale |= self.field != index;
+        self.field = index;
+        Ok(())
+    }
+
+    /// The current mesh in model units; empty until the base mesh is there.
+    pub fn view(&mut self) -> MeshView<'_> {
+        self.catch_up();
+        view(self.front.as_ref(), &self.shown)
+    }
+
+    /// The isosurface of the current mesh, at a value in units of the field.
+    ///
+    /// # Errors
+    /// If the value is not a finite number, or nothing has arrived yet.
+    pub fn isosurface(&mut self, value: f64) -> Result<&IsoSurface, SessionError> {
+        if self.front.is_none() {
+            return Err(SessionError::NotReady);
+        }
+        if !value.is_finite() {
+            return Err(SessionError::Request("the isovalue must be a finite number"));
+        }
+        self.catch_up();
+        self.surface.extract(&view(self.front.as_ref(), &self.shown), value);
+        Ok(&self.surface)
+    }
+
+    /// The current mesh on the lattices; none until the base mesh is there.
+    pub fn mesh(&self) -> Option<&CurrentMesh> {
+        self.front.as_ref().map(Front::mesh)
+    }
+
+    /// A hash of the current mesh that depends on nothing but the mesh; 0 until the base mesh is there.
+    pub fn hash(&self) -> u64 {
+        self.mesh().map_or(0, CurrentMesh::hash)
+    }
+
+    /// Brings `shown` up to date.
+    fn catch_up(&mut self) {
+        let (Some(front), Some(mt)) = (&mut self.front, self.decoder.mt()) else { return };
+        let changes = front.mesh_mut().take_changes();
+        let (mesh, shown) = (front.mesh(), &mut self.shown);
+        let (lattice, field) = (&mt.info().lattice, &mt.info().fields[self.field]);
+        let slots = mesh.positions().len();
+        shown.positions.resize(slots, [0.0; 3]);
+        shown.values.resize(slots, 0.0);
+        let value_at = |slot: usize| field.value(mesh.levels(slot as u32)[self.field]) as f32;
+        for slot in changes.vertices.into_iter().flatten().map(|slot| slot as usize) {
+            shown.positions[slot] = lattice.point(mesh.positions()[slot]).map(|x| x as f32);
+            shown.values[slot] = value_at(slot);
+        }
+        if std::mem::take(&mut shown.stale) {
+            shown.values.iter_mut().enumerate().for_each(|(slot, value)| *value = value_at(slot));
+        }
+    }
+}
+
+fn view<'a>(front: Option<&'a Front>, shown: &'a Shown) -> MeshView<'a> {
+    let (tets, neighbors) = front.map_or((&[][..], &[][..]), |f| (f.mesh().tets(), f.mesh().neighbors()));
+    MeshView { positions: &shown.positions, field: &shown.values, tets, neighbors }
+}
+
+fn check_request(request: &Request, info: &MtInfo) -> Result<(), SessionError> {
+    let fields = info.fields.len();
+    if request.field >= fields {
+        return Err(SessionError::Field { index: request.field, fields });
+    }
+    if request.error.is_nan() || request.error < 0.0 {
+        return Err(SessionError::Request("the error must be 0 or a positive number"));
+    }
+    if !request.isovalues.iter().all(|value| value.is_finite()) {
+        return Err(SessionError::Request("isovalues must be finite numbers"));
+    }
+    // Written so that NaN is refused; infinite sides are as good as any.
+    if request.roi.is_some_and(|roi| !(0..3).all(|i| roi.min[i] <= roi.max[i])) {
+        return Err(SessionError::Request("every side of the box must be a number, the smaller one first"));
+    }
+    Ok(())
+}

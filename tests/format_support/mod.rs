@@ -1,0 +1,152 @@
+//! MTs for the tests of the file format, made by code.
+#![allow(dead_code, reason = "each test file uses its own part")]
+
+use tetralod::format::{Decoder, EncodeOptions, FormatError, encode};
+use tetralod::geom::Lattice;
+use tetralod::mt::{BaseMesh, EdgeMt, ErrorCode, FieldInfo, MtInfo, MtKind, UpdateId, VertexId, VertexSplit};
+
+/// Offset, choice of vertex, mask and error of an update; made to fit by [`build`].
+pub type Draft = ([i32; 3], u32, u64, u16, Vec<i32>);
+
+pub fn field(name: &str, bits: u32) -> FieldInfo {
+    let largest = f64::from((1_u32 << bits) - 1);
+    FieldInfo { name: name.to_owned(), min: -1.0, max: largest / 2.0 - 1.0, origin: -1.0, step: 0.5, bits }
+}
+
+/// An MT with `tets` separate base tetrahedra, `fields` fields and one update per draft.
+pub fn build(tets: u32, fields: usize, drafts: &[Draft]) -> EdgeMt {
+    let lattice = Lattice { origin: [-1.5, 0.0, 2.0], step: [0.25, 0.5, 1.0], bits: 20 };
+    let corners = [[0, 0, 0], [9, 0, 0], [0, 9, 0], [0, 0, 9]];
+    let vertices = 4 * tets;
+    let base = BaseMesh {
+        positions: (0..tets as i32)
+            .flat_map(|t| corners.map(|c: [i32; 3]| [c[0] + 20 * t, c[1], c[2] + t % 7]))
+            .collect(),
+        values: (0..vertices as i32 * fields as i32).map(|i| i * 37 % 4096).collect(),
+        tets: (0..tets).map(|t| [0, 1, 2, 3].map(|i| 4 * t + i)).collect(),
+    };
+    let names = ["pressure", "Dichte ρ", "", "w"];
+    let info = MtInfo {
+        kind: MtKind::Edge,
+        lattice,
+        fields: (0..fields).map(|f| field(names[f % 4], 12)).collect(),
+        vertices: vertices + drafts.len() as u32,
+        tetrahedra: tets + 3 * drafts.len() as u32,
+        updates: drafts.len() as u32,
+        displacement_per_error: 0.125,
+    };
+    let mut mt = EdgeMt::new(info, base);
+    let mut whole: Vec<u32> = (0..vertices).collect();
+    for (offset, choice, mask, error, field_offsets) in drafts {
+        let vertex = VertexId(whole.swap_remove(*choice as usize % whole.len()));
+        let created = mt.created(UpdateId(mt.updates()));
+        let most = mt.created_by(vertex).map_or(u16::MAX, |u| mt.split(u).error.0);
+        let field_offsets: Vec<i32> = field_offsets.iter().copied().cycle().take(fields).collect();
+        let error = ErrorCode((*error).min(most));
+        let split =
+            VertexSplit { vertex, offset: *offset, field_offsets: &field_offsets, mask: *mask, error };
+        mt.push(&split).expect("drafts are made to fit");
+        whole.extend(created.map(|v| v.0));
+    }
+    mt
+}
+
+/// An MT of `updates` pseudo-random updates.
+pub fn sample(tets: u32, fields: usize, updates: usize) -> EdgeMt {
+    let mut state = 0x9E37_79B9_7F4A_7C15_u64;
+    let mut next = || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        state
+    };
+    let drafts: Vec<Draft> = (0..updates)
+        .map(|k| {
+            let offset = [0; 3].map(|_: i32| (next() % 201) as i32 - 100);
+            let mask = next() >> (next() % 64);
+            let error = 60_000 - (k as u64 * 50_000 / updates as u64) as u16;
+            (offset, next() as u32, mask, error, vec![(next() % 99) as i32 - 49, (next() % 9) as i32])
+        })
+        .collect();
+    build(tets, fields, &drafts)
+}
+
+pub fn options() -> EncodeOptions {
+    let pairs = [("tool", "a test"), ("ключ", "значение"), ("empty", "")];
+    EncodeOptions { metadata: pairs.map(|(k, v)| (k.to_owned(), v.to_owned())).into() }
+}
+
+pub fn bytes_of(mt: &EdgeMt) -> Vec<u8> {
+    encode(mt, &options()).expect("the MT is complete")
+}
+
+/// Decodes a whole file in one piece.
+pub fn decode(bytes: &[u8]) -> Result<EdgeMt, FormatError> {
+    let mut decoder = Decoder::default();
+    decoder.feed(bytes)?;
+    decoder.finish()?;
+    Ok(decoder.into_mt().expect("a complete file has a base mesh"))
+}
+
+/// Whether `part` is `whole` cut off behind some update.
+pub fn is_prefix(part: &EdgeMt, whole: &EdgeMt) -> bool {
+    part.info() == whole.info()
+        && part.base() == whole.base()
+        && part.updates() <= whole.updates()
+        && (0..part.updates()).all(|k| part.split(UpdateId(k)) == whole.split(UpdateId(k)))
+}
+
+/// CRC-32 bit by bit, so that the checksums are checked against their definition.
+pub fn crc32(parts: &[&[u8]]) -> u32 {
+    let mut crc = u32::MAX;
+    for byte in parts.iter().copied().flatten() {
+        crc ^= u32::from(*byte);
+        for _ in 0..8 {
+            crc = if crc & 1 == 1 { crc >> 1 ^ 0xEDB8_8320 } else { crc >> 1 };
+        }
+    }
+    !crc
+}
+
+/// A section as the specification says.
+pub fn section(kind: &[u8; 4], payload: &[u8]) -> Vec<u8> {
+    let length = (payload.len() as u32).to_le_bytes();
+    let crc = crc32(&[kind, &length, payload]).to_le_bytes();
+    [kind.as_slice(), &length, &crc, payload].concat()
+}
+
+/// A header as the specification says.
+pub fn header(version: [u16; 2], flags: u32, total: u64) -> Vec<u8> {
+    let mut bytes = b"\x89TLOD\r\n\x1a".to_vec();
+    version.iter().for_each(|v| bytes.extend(v.to_le_bytes()));
+    bytes.extend(flags.to_le_bytes());
+    bytes.extend(total.to_le_bytes());
+    bytes.extend([0; 4]);
+    let crc = crc32(&[&bytes]).to_le_bytes();
+    bytes.extend(crc);
+    bytes
+}
+
+/// Kinds and payloads of the sections of a file, without `ENDF`.
+pub fn sections(bytes: &[u8]) -> Vec<([u8; 4], Vec<u8>)> {
+    let mut rest = &bytes[32..];
+    let mut sections = Vec::new();
+    while let Some((head, tail)) = rest.split_first_chunk::<12>() {
+        let length = u32::from_le_bytes([head[4], head[5], head[6], head[7]]) as usize;
+        sections.push(([head[0], head[1], head[2], head[3]], tail[..length].to_vec()));
+        rest = &tail[length..];
+    }
+    assert_eq!(sections.pop().expect("every file has an end").0, *b"ENDF");
+    sections
+}
+
+/// A well-framed file of the given sections, with a header and totals that fit.
+pub fn assemble(sections: &[([u8; 4], Vec<u8>)], updates: u32) -> Vec<u8> {
+    let framed: Vec<Vec<u8>> = sections.iter().map(|(kind, payload)| section(kind, payload)).collect();
+    let crcs: Vec<u8> = framed.iter().flat_map(|s| s[8..12].to_vec()).collect();
+    let mut end = updates.to_le_bytes().to_vec();
+    end.extend((framed.len() as u32).to_le_bytes());
+    end.extend(crc32(&[&crcs]).to_le_bytes());
+    let body = [framed.concat(), section(b"ENDF", &end)].concat();
+    [header([1, 0], 0, 32 + body.len() as u64), body].concat()
+}
