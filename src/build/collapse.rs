@@ -22,6 +22,7 @@ use crate::geom::Bounds;
 use crate::mesh;
 use crate::mesh::EDGES;
 use crate::mesh::TetMesh;
+use crate::mesh::Topology;
 use crate::mt::ErrorCode;
 use crate::mt::MAX_UPDATES;
 use crate::mt::MtInfo;
@@ -30,13 +31,17 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 /// Builds an edge-based MT of `mesh`, which must be valid: see [`crate::mesh::repair`].
-pub fn edge_mt(mesh: &TetMesh, config: &BuildConfig, progress: OnProgress<'_>) -> Result<BuildResult, BuildError> {
+pub fn edge_mt(
+    mesh: &TetMesh,
+    config: &BuildConfig,
+    progress: OnProgress<'_>,
+) -> Result<BuildResult, BuildError> {
     if mesh.positions.len() > MAX_UPDATES as usize {
         return Err(BuildError::TooLarge);
     }
     mesh::check(mesh).map_err(BuildError::Mesh)?;
-    let neighbors = mesh::neighbors(&mesh.tets).map_err(BuildError::Mesh)?;
-    let frozen = mesh::topology(&mesh.tets, mesh.positions.len()).map_err(BuildError::Mesh)?.non_manifold;
+    let Topology { neighbors, non_manifold: frozen, .. } =
+        mesh::topology(mesh.positions.len(), &mesh.tets).map_err(BuildError::Mesh)?;
     let quantized = quantize::quantize(mesh, config)?;
     let diagonal = Bounds::of(&mesh.positions).diagonal();
     let info = MtInfo {
@@ -194,7 +199,8 @@ impl<'a> Builder<'a> {
 
     fn key(&self, error: f64, height: u32, a: u32, b: u32) -> Key {
         let (p, q) = (self.data.positions[a as usize], self.data.positions[b as usize]);
-        let length = (0..3).map(|i| (i64::from(p[i]) - i64::from(q[i])).pow(2) as u64).fold(0, u64::saturating_add);
+        let length =
+            (0..3).map(|i| (i64::from(p[i]) - i64::from(q[i])).pow(2) as u64).fold(0, u64::saturating_add);
         (error_level(error), height, length, a, b)
     }
 
@@ -207,7 +213,8 @@ impl<'a> Builder<'a> {
         for (f, field) in fields.iter().enumerate() {
             let [u, v] = [i, j].map(|v| v * fields.len() + f);
             let rise = f64::from(self.data.levels[v] - self.data.levels[u]);
-            let bend = [u, v].map(|w| (rise - self.gradients[w].dot(q - p)).abs()).into_iter().fold(0.0, f64::max);
+            let bend =
+                [u, v].map(|w| (rise - self.gradients[w].dot(q - p)).abs()).into_iter().fold(0.0, f64::max);
             error = error.max(0.5 * bend * field.step / field.range());
         }
         self.key(error, self.data.height[i].max(self.data.height[j]) + 1, a, b)

@@ -103,7 +103,8 @@ impl Evaluator {
         let (inherited, newest) = self.inherit(plan, mesh, data);
         let overshoot = self.overshoot(plan, data, reference);
         self.cells.clear();
-        self.cells.extend(plan.stay.iter().map(|&(s, _)| Cell::new(s.tet, s.corner as usize, plan, mesh, data)));
+        self.cells
+            .extend(plan.stay.iter().map(|&(s, _)| Cell::new(s.tet, s.corner as usize, plan, mesh, data)));
         let step = self.move_boundary(plan, mesh, data, reference);
         let mut error = inherited;
         if newest {
@@ -165,7 +166,8 @@ impl Evaluator {
         let mut largest = 0.0_f64;
         for (f, field) in fields.iter().enumerate() {
             let own = self.levels[f];
-            let (low, high) = plan.link.iter().map(|&v| level(v, f)).fold((own, own), |(l, h), x| (l.min(x), h.max(x)));
+            let (low, high) =
+                plan.link.iter().map(|&v| level(v, f)).fold((own, own), |(l, h), x| (l.min(x), h.max(x)));
             let (a, b) = (level(plan.a, f), level(plan.b, f));
             let beyond = (a.max(b) - high).max(low - a.min(b)).max(0);
             largest = largest.max(f64::from(beyond) * field.step / field.range());
@@ -175,7 +177,13 @@ impl Evaluator {
 
     /// Finds how the boundary moves: sets the drift of the new vertex, returns how far the ends are from the new
     /// boundary.
-    fn move_boundary(&mut self, plan: &Plan, mesh: &WorkMesh, data: &VertexData, reference: &Reference<'_>) -> f64 {
+    fn move_boundary(
+        &mut self,
+        plan: &Plan,
+        mesh: &WorkMesh,
+        data: &VertexData,
+        reference: &Reference<'_>,
+    ) -> f64 {
         self.border.clear();
         self.drift = data.drift[plan.a as usize].max(data.drift[plan.b as usize]);
         if !plan.on_boundary {
@@ -230,7 +238,14 @@ impl Evaluator {
     }
 
     /// Finds the cell for a point, looking at `hint` first, and the error there.
-    fn place(&mut self, point: u32, hint: usize, plan: &Plan, data: &VertexData, reference: &Reference<'_>) -> f64 {
+    fn place(
+        &mut self,
+        point: u32,
+        hint: usize,
+        plan: &Plan,
+        data: &VertexData,
+        reference: &Reference<'_>,
+    ) -> f64 {
         let position = as_vec(reference.quantized.positions[point as usize]);
         let centre = as_vec(plan.position);
         let relative = position - centre;
@@ -253,7 +268,8 @@ impl Evaluator {
         }
         self.moves.push((point, cell as u32));
         let lambda = clamped(lambda);
-        self.field_error(point, cell, lambda, data, reference).max(displaced / reference.displacement_per_error)
+        self.field_error(point, cell, lambda, data, reference)
+            .max(displaced / reference.displacement_per_error)
     }
 
     /// The cell with the boundary triangle nearest to a point outside, the coordinates of the nearest point, and the
@@ -279,7 +295,14 @@ impl Evaluator {
         (found, self.cells[found].barycentric * ((nearest - centre) / step), best.sqrt())
     }
 
-    fn field_error(&self, point: u32, cell: usize, lambda: DVec3, data: &VertexData, reference: &Reference<'_>) -> f64 {
+    fn field_error(
+        &self,
+        point: u32,
+        cell: usize,
+        lambda: DVec3,
+        data: &VertexData,
+        reference: &Reference<'_>,
+    ) -> f64 {
         let fields = &reference.quantized.fields;
         let own = 1.0 - lambda.element_sum();
         let mut largest = 0.0_f64;

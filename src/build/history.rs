@@ -61,7 +61,8 @@ pub(super) fn edge_mt(
     let mut order: Vec<u32> = (0..history.len() as u32).rev().collect();
     order.sort_by_key(|&i| Reverse(history[i as usize].error));
 
-    let mut mesh = CurrentMesh::new(&info, &base_mesh).map_err(|_| BuildError::Internal(UpdateError::Vertex { update: 0, vertex: 0 }))?;
+    let mut mesh = CurrentMesh::new(&info, &base_mesh)
+        .map_err(|_| BuildError::Internal(UpdateError::Vertex { update: 0, vertex: 0 }))?;
     let mut mt = EdgeMt::new(info, base_mesh);
     // The builder's number of each vertex of the MT.
     let mut built: Vec<u32> = vec![0; number.len()];
@@ -92,7 +93,8 @@ pub(super) fn edge_mt(
         let mask = mesh
             .reorder_mask(VertexId(vertex), sides, |v| built[v.0 as usize])
             .ok_or(BuildError::Internal(UpdateError::Mask { update: done as u32 }))?;
-        let split = VertexSplit { vertex: VertexId(vertex), offset, field_offsets: &field_offsets, mask, error };
+        let split =
+            VertexSplit { vertex: VertexId(vertex), offset, field_offsets: &field_offsets, mask, error };
         let update = mt.push(&split).map_err(BuildError::Internal)?;
         mt.announce(&mut mesh, update.0);
         match mt.refine(&mut mesh, update).map_err(BuildError::Internal)? {

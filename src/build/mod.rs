@@ -144,13 +144,17 @@ impl fmt::Display for BuildError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Empty => write!(f, "the mesh has no tetrahedra"),
-            Self::NoField => write!(f, "the mesh has no point field: an MT needs at least one scalar at its points"),
+            Self::NoField => {
+                write!(f, "the mesh has no point field: an MT needs at least one scalar at its points")
+            }
             Self::UnknownField { name, known } => {
                 write!(f, "there is no point field '{name}'; the mesh has: {}", known.join(", "))
             }
             Self::Option { name, expected } => write!(f, "option {name} must be {expected}"),
             Self::Mesh(error) => write!(f, "{error}"),
-            Self::NotFinite { point } => write!(f, "point {point} has a coordinate or a value that is not finite"),
+            Self::NotFinite { point } => {
+                write!(f, "point {point} has a coordinate or a value that is not finite")
+            }
             Self::TooThin { cell, bits } => write!(
                 f,
                 "cell {cell} is too thin for a lattice of {bits} bits: it turns flat or inside out; use more \

@@ -236,14 +236,17 @@ impl Plan {
     /// Whether boundary triangles (a, x, y) and (b, x, y) both exist.
     fn shares_border_triangle(&self, mesh: &WorkMesh) -> bool {
         let edges = |side: u8| {
-            self.stay.iter().filter(move |(_, s)| *s == side).flat_map(move |&(StarTet { tet, corner }, _)| {
-                let (corners, around) = (mesh.tets[tet as usize], mesh.neighbors[tet as usize]);
-                (0..4).filter(move |&k| k != corner as usize && around[k] == NONE).map(move |k| {
-                    let mut rest = (0..4).filter(move |&l| l != k && l != corner as usize).map(|l| corners[l]);
-                    let (x, y) = (rest.next().unwrap_or(NONE), rest.next().unwrap_or(NONE));
-                    (x.min(y), x.max(y))
-                })
-            })
+            self.stay.iter().filter(move |(_, s)| *s == side).flat_map(
+                move |&(StarTet { tet, corner }, _)| {
+                    let (corners, around) = (mesh.tets[tet as usize], mesh.neighbors[tet as usize]);
+                    (0..4).filter(move |&k| k != corner as usize && around[k] == NONE).map(move |k| {
+                        let mut rest =
+                            (0..4).filter(move |&l| l != k && l != corner as usize).map(|l| corners[l]);
+                        let (x, y) = (rest.next().unwrap_or(NONE), rest.next().unwrap_or(NONE));
+                        (x.min(y), x.max(y))
+                    })
+                },
+            )
         };
         edges(0).any(|e| edges(1).any(|f| e == f))
     }

@@ -83,8 +83,9 @@ impl EdgeMt {
     /// Adds the next update.
     ///
     /// # Errors
-    /// The split vertex must exist and be whole, offsets must fit the lattices, and the error must not exceed that
-    /// of the update that made the vertex. What needs the mesh is checked when the update is applied.
+    /// The split vertex must exist and be whole, offsets must fit the lattices, and errors must not grow: updates
+    /// come in the order of falling error, which makes errors monotone along the partial order. What needs the mesh
+    /// is checked when the update is applied.
     pub fn push(&mut self, split: &VertexSplit<'_>) -> Result<UpdateId, UpdateError> {
         let update = self.vertex_of.len() as u32;
         let vertex = split.vertex.0;
@@ -98,7 +99,7 @@ impl EdgeMt {
         if !on_lattice {
             return Err(UpdateError::OffLattice { update });
         }
-        if self.created_by(split.vertex).is_some_and(|u| split.error > self.errors[u.0 as usize]) {
+        if self.errors.last().is_some_and(|&last| split.error > last) {
             return Err(UpdateError::Error { update });
         }
         self.split_of[vertex as usize] = update;

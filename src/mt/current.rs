@@ -10,8 +10,10 @@
 
 use super::BaseMesh;
 use super::BaseMeshError;
+use super::MAX_STAR;
 use super::MtInfo;
 use super::VertexId;
+use super::ring::Ring;
 use crate::mesh::FACES;
 use crate::mesh::NONE;
 use std::ops::Range;
@@ -43,7 +45,10 @@ pub struct CurrentMesh {
     free_tets: Vec<u32>,
     /// `epoch << 6 | index in the star` of the last star that each tetrahedron was in.
     marks: Vec<u32>,
+    /// The same for the vertices of a link.
+    vertex_marks: Vec<u32>,
     epoch: u32,
+    ring: Option<Box<Ring>>,
     changed_vertices: Changes,
     changed_tets: Changes,
     /// The tetrahedra of the stars that updates changed since the list was last cleared; free slots among them.
@@ -82,6 +87,7 @@ pub(crate) enum Gather<T> {
 /// most `MAX_LINK` more lie between them.
 const GATHERED: usize = 128;
 const MARK_BITS: u32 = GATHERED.trailing_zeros();
+const MARK_MASK: u32 = (1 << MARK_BITS) - 1;
 const EPOCHS: u32 = 1 << (32 - MARK_BITS);
 
 impl CurrentMesh {
@@ -114,7 +120,9 @@ impl CurrentMesh {
             free_vertices: Vec::new(),
             free_tets: Vec::new(),
             marks: vec![0; base.tets.len()],
+            vertex_marks: vec![0; vertices],
             epoch: 0,
+            ring: None,
             changed_vertices: Changes::all(vertices),
             changed_tets: Changes::all(base.tets.len()),
             touched: Vec::new(),
@@ -292,6 +300,7 @@ impl CurrentMesh {
         self.labels.pop();
         self.positions.pop();
         self.incident.pop();
+        self.vertex_marks.pop();
         self.levels.truncate(self.labels.len() * self.fields);
     }
 
@@ -326,11 +335,7 @@ impl CurrentMesh {
         star: &mut Star,
         mut look: impl FnMut(&[Labels], &[u32; 4]) -> Option<T>,
     ) -> Result<(), Gather<T>> {
-        self.epoch += 1;
-        if self.epoch == EPOCHS {
-            self.marks.fill(0);
-            self.epoch = 1;
-        }
+        self.next_epoch();
         let first = self.incident[slot as usize];
         star.len = 1;
         star.tets[0] = first;
@@ -361,6 +366,66 @@ impl CurrentMesh {
             }
         }
         Ok(())
+    }
+
+    /// Collects the tetrahedra around the vertex in `slot` with their link, and marks them. False if they are too
+    /// many to be split.
+    #[inline]
+    pub(super) fn gather_ring(&mut self, slot: u32, ring: &mut Ring) -> bool {
+        self.next_epoch();
+        let mark = self.epoch << MARK_BITS;
+        (ring.len, ring.link_len) = (0, 0);
+        let first = self.incident[slot as usize];
+        let mut queued = [0_u32; MAX_STAR];
+        queued[0] = first;
+        let mut queue_len = 1;
+        self.marks[first as usize] = mark;
+        while ring.len < queue_len {
+            let t = queued[ring.len];
+            let (tet, around) = (self.tets[t as usize], self.neighbors[t as usize]);
+            let marks = &mut self.vertex_marks;
+            let numbered = ring.push(t, tet, slot, |v, next| {
+                let old = marks[v as usize];
+                if old & !MARK_MASK == mark {
+                    return (old & MARK_MASK) as usize;
+                }
+                marks[v as usize] = mark | next as u32;
+                next
+            });
+            if !numbered {
+                return false;
+            }
+            for (i, &n) in around.iter().enumerate() {
+                if n == NONE || tet[i] == slot || self.marks[n as usize] & !MARK_MASK == mark {
+                    continue;
+                }
+                if queue_len == MAX_STAR {
+                    return false;
+                }
+                self.marks[n as usize] = mark | queue_len as u32;
+                queued[queue_len] = n;
+                queue_len += 1;
+            }
+        }
+        true
+    }
+
+    fn next_epoch(&mut self) {
+        self.epoch += 1;
+        if self.epoch == EPOCHS {
+            self.marks.fill(0);
+            self.vertex_marks.fill(0);
+            self.epoch = 1;
+        }
+    }
+
+    /// Lends the scratch space for splits.
+    pub(super) fn take_ring(&mut self) -> Box<Ring> {
+        self.ring.take().unwrap_or_default()
+    }
+
+    pub(super) fn put_back_ring(&mut self, ring: Box<Ring>) {
+        self.ring = Some(ring);
     }
 
     /// The index of `t` in the star that was gathered last, if it is in it.
@@ -399,6 +464,7 @@ impl CurrentMesh {
             self.labels.push(Labels { vertex: NONE, split: NONE });
             self.positions.push([0; 3]);
             self.incident.push(NONE);
+            self.vertex_marks.push(0);
             self.levels.resize(self.levels.len() + self.fields, 0);
             self.labels.len() as u32 - 1
         })

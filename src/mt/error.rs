@@ -79,7 +79,7 @@ pub enum UpdateError {
         /// The update.
         update: u32,
     },
-    /// The update's error is larger than that of one it depends on.
+    /// The update's error is larger than that of one before it, or it depends on one that comes later.
     Error {
         /// The update.
         update: u32,
@@ -96,7 +96,9 @@ impl fmt::Display for UpdateError {
             Self::Mask { update } => write!(f, "update {update} does not part the star of its vertex in two"),
             Self::Inverted { update } => write!(f, "update {update} turns a tetrahedron inside out"),
             Self::Star { update } => write!(f, "update {update} meets a star of more than 64 tetrahedra"),
-            Self::Error { update } => write!(f, "update {update} has a larger error than one it depends on"),
+            Self::Error { update } => {
+                write!(f, "update {update} does not come in the order of falling error and of dependence")
+            }
         }
     }
 }

@@ -4,6 +4,7 @@ mod base;
 mod collapse;
 mod current;
 mod error;
+mod ring;
 mod split;
 
 pub use base::{BaseMesh, BaseMeshError, MAX_FIELD_BITS, MAX_UPDATES};

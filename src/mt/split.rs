@@ -25,7 +25,10 @@ use super::VertexId;
 use super::current::Gather;
 use super::current::Labels;
 use super::current::Star;
-use crate::geom::orient3d;
+use super::ring::NO_PARTNER;
+use super::ring::REST;
+use super::ring::Ring;
+use crate::geom::NARROW_BITS;
 use crate::mesh::NONE;
 
 /// What came of the wish to apply an update.
@@ -37,69 +40,58 @@ pub enum Applied {
     Blocked(UpdateId),
 }
 
-/// One triangle of the fan that parts a star, by indices into the star.
-#[derive(Clone, Copy, Default)]
-struct FanTriangle {
-    /// The tetrahedron of side 0.
-    near: u8,
-    /// Its face that is the fan triangle.
-    face: u8,
-    /// The tetrahedron of side 1.
-    far: u8,
-}
-
-/// The fan of a split: its triangles, and which of them meet in the edges from the centre.
-struct Fan {
-    len: usize,
-    triangles: [FanTriangle; MAX_LINK],
-    /// For both link vertices of each triangle, `(c, face) -> REST` order: the triangle on the other side of the
-    /// edge to that vertex, or `NO_PARTNER`.
-    partner: [[u8; 2]; MAX_LINK],
-}
-
-const NO_PARTNER: u8 = u8::MAX;
-
-/// `REST[i][j]`: the two corners other than `i` and `j`, ascending.
-const REST: [[[u8; 2]; 4]; 4] = [
-    [[0, 0], [2, 3], [1, 3], [1, 2]],
-    [[2, 3], [0, 0], [0, 3], [0, 2]],
-    [[1, 3], [0, 3], [0, 0], [0, 1]],
-    [[1, 2], [0, 2], [0, 1], [0, 0]],
-];
-
-/// The two vertices that a split makes: positions and side by side the levels.
-struct Halves {
-    positions: [[i32; 3]; 2],
-}
-
 impl EdgeMt {
     /// Applies update `u` (`u+`, a vertex split) to `mesh`, which must not contain it yet.
     ///
     /// # Errors
     /// If the update does not fit the mesh, which only happens to a damaged MT; the mesh is unchanged then.
     pub(super) fn apply_split(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
-        let (update, split) = (u.0, self.split(u));
-        let Some(p) = mesh.slot(split.vertex) else {
-            let vertex = split.vertex.0;
-            let parent = self.created_by(split.vertex).ok_or(UpdateError::Vertex { update, vertex })?;
-            return Ok(Applied::Blocked(parent));
+        let vertex = self.split(u).vertex;
+        let Some(p) = mesh.slot(vertex) else {
+            let error = UpdateError::Vertex { update: u.0, vertex: vertex.0 };
+            return Ok(Applied::Blocked(self.created_by(vertex).ok_or(error)?));
         };
-        let mut star = Star::default();
-        mesh.gather_star(p, &mut star, |_, _| None::<()>).map_err(|_| UpdateError::Star { update })?;
-        if let Some(first) = smallest_split(mesh, &star, update) {
-            return Ok(Applied::Blocked(UpdateId(first)));
-        }
-        if star.len > MAX_STAR || mesh.is_pinched(p) {
+        let mut ring = mesh.take_ring();
+        let applied = self.split_ring(mesh, u, p, &mut ring);
+        mesh.put_back_ring(ring);
+        applied
+    }
+
+    fn split_ring(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        p: u32,
+        ring: &mut Ring,
+    ) -> Result<Applied, UpdateError> {
+        let update = u.0;
+        if !mesh.gather_ring(p, ring) {
             return Err(UpdateError::Star { update });
         }
-        let sides = sides_in_canonical_order(mesh, &star, split.mask).ok_or(UpdateError::Mask { update })?;
-        let fan = Fan::of(mesh, &star, sides).ok_or(UpdateError::Mask { update })?;
-        let halves = Halves { positions: self.halve(mesh, u, p)? };
+        if let Some(first) = ring.smallest_split(mesh).filter(|&first| first < update) {
+            return Ok(Applied::Blocked(UpdateId(first)));
+        }
+        if ring.link_len > MAX_LINK || mesh.is_pinched(p) {
+            return Err(UpdateError::Star { update });
+        }
+        let damaged = UpdateError::Mask { update };
+        if !ring.find_sides(mesh, self.split(u).mask) || !ring.find_fan(mesh) {
+            return Err(damaged);
+        }
+        let halves = self.halve(mesh, u, p)?;
         if !mesh.is_proven(update) {
-            self.prove(mesh, u, &star, sides, &fan, &halves)?;
+            let wide = self.info().lattice.bits > NARROW_BITS;
+            let sound = if wide {
+                ring.is_positive::<i128>(mesh, halves)
+            } else {
+                ring.is_positive::<i64>(mesh, halves)
+            };
+            if !sound {
+                return Err(UpdateError::Inverted { update });
+            }
             mesh.set_proven(update);
         }
-        self.perform_split(mesh, u, p, &star, sides, &fan, &halves);
+        self.perform_split(mesh, u, p, ring, halves);
         Ok(Applied::Done)
     }
 
@@ -121,82 +113,41 @@ impl EdgeMt {
         Ok(positions)
     }
 
-    /// Checks what only damaged MTs violate: orientation, and errors that grow towards the base.
-    fn prove(
-        &self,
-        mesh: &CurrentMesh,
-        u: UpdateId,
-        star: &Star,
-        sides: u64,
-        fan: &Fan,
-        halves: &Halves,
-    ) -> Result<(), UpdateError> {
-        let error = self.split(u).error;
-        for i in 0..star.len {
-            let tet = mesh.tets[star.tets[i] as usize];
-            let mut corners = tet.map(|v| mesh.positions[v as usize]);
-            corners[star.corner[i] as usize] = halves.positions[(sides >> i & 1) as usize];
-            let [a, b, c, d] = corners;
-            if orient3d(a, b, c, d) <= 0 {
-                return Err(UpdateError::Inverted { update: u.0 });
-            }
-            let parent = tet.iter().filter_map(|&v| self.created_by(mesh.vertex(v))).max();
-            if parent.is_some_and(|p| self.split(p).error < error) {
-                return Err(UpdateError::Error { update: u.0 });
-            }
-        }
-        for triangle in &fan.triangles[..fan.len] {
-            let (tet, c, j) = triangle.corners(mesh, star);
-            let mut corners = tet.map(|v| mesh.positions[v as usize]);
-            (corners[j], corners[c]) = (halves.positions[0], halves.positions[1]);
-            let [a, b, c, d] = corners;
-            if orient3d(a, b, c, d) <= 0 {
-                return Err(UpdateError::Inverted { update: u.0 });
-            }
-        }
-        Ok(())
-    }
-
-    #[expect(clippy::too_many_arguments, reason = "the parts of one plan, made by the caller step by step")]
-    fn perform_split(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        p: u32,
-        star: &Star,
-        sides: u64,
-        fan: &Fan,
-        halves: &Halves,
-    ) {
+    fn perform_split(&self, mesh: &mut CurrentMesh, u: UpdateId, p: u32, ring: &Ring, halves: [[i32; 3]; 2]) {
         let q = mesh.new_vertex();
         self.put_halves(mesh, u, [p, q], halves);
         let mut created = [NONE; MAX_LINK];
-        created[..fan.len].iter_mut().for_each(|t| *t = mesh.new_tet());
-        for (f, triangle) in fan.triangles[..fan.len].iter().enumerate() {
-            let (mut tet, c, j) = triangle.corners(mesh, star);
-            let (near, far, t) =
-                (star.tets[triangle.near as usize], star.tets[triangle.far as usize], created[f]);
+        let created = &mut created[..ring.fan_len];
+        created.iter_mut().for_each(|t| *t = mesh.new_tet());
+        for (f, triangle) in ring.fan[..ring.fan_len].iter().enumerate() {
+            let (i, j, c) = (
+                triangle.near as usize,
+                triangle.face as usize,
+                ring.corner[triangle.near as usize] as usize,
+            );
+            let (near, far, t) = (ring.tets[i], ring.tets[triangle.far as usize], created[f]);
             // v'' goes where v was and v' opposite the fan triangle: the mirror image of the near tetrahedron.
+            let mut tet = ring.verts[i];
             (tet[c], tet[j]) = (q, p);
             mesh.tets[t as usize] = tet;
             let mut around = [NONE; 4];
             (around[c], around[j]) = (near, far);
             let [k, l] = REST[c][j];
             let fan_tet = |partner: u8| if partner == NO_PARTNER { NONE } else { created[partner as usize] };
-            // The face opposite x holds y, and the other way round.
-            around[k as usize] = fan_tet(fan.partner[f][1]);
-            around[l as usize] = fan_tet(fan.partner[f][0]);
+            // The face opposite one link vertex holds the other.
+            around[k as usize] = fan_tet(triangle.partner[1]);
+            around[l as usize] = fan_tet(triangle.partner[0]);
             mesh.neighbors[t as usize] = around;
             mesh.neighbors[near as usize][j] = t;
             mesh.mark_tet(near);
             mesh.relink(far, near, t);
         }
-        mesh.touch(&star.tets[..star.len]);
-        mesh.touch(&created[..fan.len]);
-        for i in 0..star.len {
-            let t = star.tets[i];
-            if sides >> i & 1 == 1 {
-                mesh.tets[t as usize][star.corner[i] as usize] = q;
+        mesh.touch(&ring.tets[..ring.len]);
+        mesh.touch(created);
+        for i in 0..ring.len {
+            let t = ring.tets[i];
+            if ring.sides >> i & 1 == 1 {
+                mesh.tets[t as usize][ring.corner[i] as usize] = q;
                 mesh.mark_tet(t);
                 mesh.incident[q as usize] = t;
             } else {
@@ -207,11 +158,9 @@ impl EdgeMt {
 
     /// Puts `v'` and `v''` with their levels into the slots `[p, q]`; `p` holds `v` so far.
     #[inline]
-    fn put_halves(&self, mesh: &mut CurrentMesh, u: UpdateId, [p, q]: [u32; 2], halves: &Halves) {
+    fn put_halves(&self, mesh: &mut CurrentMesh, u: UpdateId, [p, q]: [u32; 2], halves: [[i32; 3]; 2]) {
         let created = self.created(u);
-        for (slot, vertex, position) in
-            [(p, created[0], halves.positions[0]), (q, created[1], halves.positions[1])]
-        {
+        for (slot, vertex, position) in [(p, created[0], halves[0]), (q, created[1], halves[1])] {
             mesh.put_vertex(slot, self.labels(vertex), position);
         }
         for (f, &offset) in self.split(u).field_offsets.iter().enumerate() {
@@ -358,41 +307,6 @@ fn half(v: i32, d: i32, largest: i64) -> Option<[i32; 2]> {
     (holds(a) && holds(b)).then_some([a as i32, b as i32])
 }
 
-/// The smallest update before `update` that splits a vertex of the star.
-#[inline]
-fn smallest_split(mesh: &CurrentMesh, star: &Star, update: u32) -> Option<u32> {
-    let splits = star.tets[..star.len].iter().flat_map(|&t| mesh.tets[t as usize]);
-    splits.map(|v| mesh.labels[v as usize].split).min().filter(|&s| s < update)
-}
-
-/// The side of each tetrahedron of the star as gathered: bit `i` for `star.tets[i]`. The mask is in canonical
-/// order; none if it has bits beyond the star.
-#[inline]
-fn sides_in_canonical_order(mesh: &CurrentMesh, star: &Star, mask: u64) -> Option<u64> {
-    if star.len < 64 && mask >> star.len != 0 {
-        return None;
-    }
-    let mut keys = [0_u128; MAX_STAR];
-    for (i, key) in keys[..star.len].iter_mut().enumerate() {
-        *key = opposite_key(mesh, star, i) << 8 | i as u128;
-    }
-    keys[..star.len].sort_unstable();
-    let bits = keys[..star.len].iter().enumerate();
-    Some(bits.fold(0, |sides, (rank, key)| sides | (mask >> rank & 1) << (*key & 0xFF)))
-}
-
-/// The sorted vertex numbers of the face opposite the centre, as one number.
-#[inline]
-fn opposite_key(mesh: &CurrentMesh, star: &Star, i: usize) -> u128 {
-    let tet = mesh.tets[star.tets[i] as usize].map(|v| mesh.labels[v as usize].vertex);
-    let [j, k, l] = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]][star.corner[i] as usize];
-    let (a, b, c) = (tet[j], tet[k], tet[l]);
-    let (low, high) = (a.min(b), a.max(b));
-    let (least, most) = (low.min(c), high.max(c));
-    let middle = low.max(c.min(high));
-    u128::from(least) << 64 | u128::from(middle) << 32 | u128::from(most)
-}
-
 impl CurrentMesh {
     /// Brings the mask of a split from the order of other vertex numbers, which `other` gives, to that of the MT's.
     /// None if the vertex is not in the mesh or its star is too large.
@@ -424,113 +338,6 @@ impl CurrentMesh {
         let sides = theirs.iter().enumerate().fold(0_u64, |s, (rank, &i)| s | (mask >> rank & 1) << i);
         let ours = order(&|v: VertexId| v.0);
         Some(ours.iter().enumerate().fold(0_u64, |m, (rank, &i)| m | (sides >> i & 1) << rank))
-    }
-}
-
-impl FanTriangle {
-    /// The near tetrahedron, its corner at the centre of the star, and its corner opposite the triangle.
-    #[inline]
-    fn corners(&self, mesh: &CurrentMesh, star: &Star) -> ([u32; 4], usize, usize) {
-        let tet = mesh.tets[star.tets[self.near as usize] as usize];
-        (tet, star.corner[self.near as usize] as usize, self.face as usize)
-    }
-}
-
-impl Fan {
-    /// The fan between the two sides of a star, if it parts the star as a split must: its triangles follow each
-    /// other around a closed loop of the link, or along one path from border to border of it.
-    #[inline]
-    fn of(mesh: &CurrentMesh, star: &Star, sides: u64) -> Option<Self> {
-        let mut fan = Self {
-            len: 0,
-            triangles: [FanTriangle::default(); MAX_LINK],
-            partner: [[NO_PARTNER; 2]; MAX_LINK],
-        };
-        let mut at_border = false;
-        for i in 0..star.len {
-            let around = mesh.neighbors[star.tets[i] as usize];
-            for j in (0..4).filter(|&j| j != star.corner[i] as usize) {
-                let Some(n) = mesh.in_star(around[j]) else {
-                    at_border = true;
-                    continue;
-                };
-                if sides >> i & 1 == 1 || sides >> n & 1 == 0 {
-                    continue;
-                }
-                *fan.triangles.get_mut(fan.len)? = FanTriangle { near: i as u8, face: j as u8, far: n as u8 };
-                fan.len += 1;
-            }
-        }
-        let loose = fan.find_partners(mesh, star)?;
-        let whole = match loose {
-            0 => fan.walk(0, 0) == fan.len,
-            2 => {
-                let start = (0..fan.len).find(|&f| fan.partner[f].contains(&NO_PARTNER))?;
-                let from = usize::from(fan.partner[start][0] != NO_PARTNER);
-                fan.walk(start, from) == fan.len
-            }
-            _ => false,
-        };
-        let sound = fan.len > 0 && whole && !(at_border && fan.touches_border(mesh, star));
-        sound.then_some(fan)
-    }
-
-    /// Finds, for both link vertices of every triangle, the other triangle there. Returns how many have none;
-    /// none at all if three triangles meet in an edge.
-    #[inline]
-    fn find_partners(&mut self, mesh: &CurrentMesh, star: &Star) -> Option<usize> {
-        let mut ends = [[NONE; 2]; MAX_LINK];
-        let mut loose = 0;
-        for f in 0..self.len {
-            let (tet, c, j) = self.triangles[f].corners(mesh, star);
-            ends[f] = REST[c][j].map(|i| tet[i as usize]);
-            for side in 0..2 {
-                let same = (0..2 * f).find(|&e| ends[e / 2][e % 2] == ends[f][side]);
-                let Some(e) = same else {
-                    loose += 1;
-                    continue;
-                };
-                if self.partner[e / 2][e % 2] != NO_PARTNER {
-                    return None;
-                }
-                self.partner[e / 2][e % 2] = f as u8;
-                self.partner[f][side] = (e / 2) as u8;
-                loose -= 1;
-            }
-        }
-        Some(loose)
-    }
-
-    /// Number of triangles met when going round from triangle `start`, entered at its end `from`.
-    #[inline]
-    fn walk(&self, start: usize, from: usize) -> usize {
-        let (mut at, mut entered, mut count) = (start, from, 0);
-        while count < self.len {
-            count += 1;
-            let next = self.partner[at][1 - entered];
-            if next == NO_PARTNER || next as usize == start {
-                break;
-            }
-            // Two triangles may be each other's partner at both ends; then the walk has just come full circle.
-            let back = if self.partner[next as usize][0] as usize == at { 0 } else { 1 };
-            (at, entered) = (next as usize, back);
-        }
-        count
-    }
-
-    /// Whether an inner edge of the fan lies on the boundary of the mesh: the star would fall into three parts.
-    fn touches_border(&self, mesh: &CurrentMesh, star: &Star) -> bool {
-        let on_border = |x: u32| {
-            (0..star.len).any(|i| {
-                let (tet, around) = (mesh.tets[star.tets[i] as usize], mesh.neighbors[star.tets[i] as usize]);
-                let c = star.corner[i] as usize;
-                (0..4).any(|j| j != c && around[j] == NONE && tet[j] != x && tet.contains(&x))
-            })
-        };
-        (0..self.len).any(|f| {
-            let (tet, c, j) = self.triangles[f].corners(mesh, star);
-            (0..2).any(|e| self.partner[f][e] != NO_PARTNER && on_border(tet[REST[c][j][e] as usize]))
-        })
     }
 }
 
