@@ -30,6 +30,8 @@
 
 pub mod format;
 pub mod geom;
+#[cfg(feature = "build")]
+pub mod io;
 pub mod mesh;
 pub mod mt;
 pub mod refine;
