@@ -29,6 +29,8 @@
 #![deny(rustdoc::broken_intra_doc_links)]
 
 pub mod format;
+#[cfg(feature = "build")]
+pub mod generate;
 pub mod geom;
 #[cfg(feature = "build")]
 pub mod io;
