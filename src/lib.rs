@@ -29,7 +29,11 @@
 #![deny(rustdoc::broken_intra_doc_links)]
 
 pub mod format;
+#[cfg(feature = "build")]
+pub mod generate;
 pub mod geom;
+#[cfg(feature = "build")]
+pub mod io;
 pub mod mesh;
 pub mod mt;
 pub mod refine;

@@ -1,7 +1,17 @@
 //! The vocabulary of tetrahedral meshes: plain arrays, adjacency, validity.
 
+mod adjacency;
+mod check;
+mod error;
+mod kuhn;
+mod repair;
 mod tet_mesh;
 
+pub use adjacency::{MAX_TETS, Topology, neighbors, topology};
+pub use check::check;
+pub use error::MeshError;
+pub use kuhn::kuhn_tets;
+pub use repair::{RepairReport, repair};
 pub use tet_mesh::{Field, Grid, TetMesh};
 
 /// "No tetrahedron": the neighbour across a boundary face.

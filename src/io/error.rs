@@ -1,0 +1,182 @@
+//! Why a file could not be read: where, what and what to do about it.
+
+use std::fmt;
+
+/// A file that could not be read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ReadError {
+    /// The file's name as it was given.
+    pub file: String,
+    /// The section or array; empty when the whole file is meant.
+    pub place: String,
+    /// What is wrong.
+    pub reason: ReadReason,
+}
+
+/// What is wrong with a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum ReadReason {
+    /// The file could not be opened or read.
+    Io(String),
+    /// The content is of no known kind.
+    UnknownFormat,
+    /// The text does not follow the rules of its format.
+    Syntax(String),
+    /// Something that every such file has is not there.
+    Missing(String),
+    /// The file ends, or a section ends, before its data is complete.
+    Truncated {
+        /// Bytes or numbers that are needed.
+        needed: u64,
+        /// Bytes or numbers that are there.
+        found: u64,
+    },
+    /// Compressed or encoded data is damaged.
+    Damaged(String),
+    /// Two counts that must agree do not.
+    Count {
+        /// What is counted.
+        what: String,
+        /// How many there should be.
+        expected: u64,
+        /// How many there are.
+        found: u64,
+    },
+    /// Valid, but not read here.
+    Unsupported {
+        /// What it is.
+        what: String,
+        /// What to do instead.
+        remedy: String,
+    },
+    /// There are cells that are not tetrahedra: VTK cell type and count.
+    NotTetrahedra(Vec<(i64, u64)>),
+    /// A value or coordinate is infinite or not a number.
+    NotFinite {
+        /// The point that it belongs to.
+        point: u64,
+    },
+    /// A cell refers to a point that does not exist.
+    MissingPoint {
+        /// The cell.
+        cell: u64,
+        /// The index it holds.
+        point: i64,
+        /// How many points there are.
+        points: u64,
+    },
+    /// More than this program handles.
+    TooLarge {
+        /// What is counted.
+        what: String,
+        /// The largest number allowed.
+        limit: u64,
+    },
+}
+
+impl std::error::Error for ReadError {}
+
+impl fmt::Display for ReadError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: ", self.file)?;
+        if !self.place.is_empty() {
+            write!(f, "{}: ", self.place)?;
+        }
+        write!(f, "{}", self.reason)
+    }
+}
+
+impl fmt::Display for ReadReason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Io(error) => write!(f, "{error}"),
+            Self::UnknownFormat => write!(
+                f,
+                "not a format that is known here; give VTK XML (.vtu, .vti), legacy VTK (.vtk), or raw samples \
+                 with a .json sidecar"
+            ),
+            Self::Syntax(what) => write!(f, "{what}; the file is damaged or not of this format"),
+            Self::Missing(what) => write!(f, "{what} is missing; write the file again"),
+            Self::Truncated { needed, found } => write!(
+                f,
+                "the data ends too early ({needed} needed, {found} left); the file is cut short or its header \
+                 holds a wrong count"
+            ),
+            Self::Damaged(what) => write!(f, "the data is damaged: {what}; copy or write the file again"),
+            Self::Count { what, expected, found } => write!(
+                f,
+                "{what}: expected {expected}, found {found}; the header and the data disagree, write the file again"
+            ),
+            Self::Unsupported { what, remedy } => write!(f, "{what} cannot be read here; {remedy}"),
+            Self::NotTetrahedra(counts) => {
+                let total: u64 = counts.iter().map(|c| c.1).sum();
+                let list: Vec<String> = counts.iter().map(|&(kind, n)| named_count(kind, n)).collect();
+                write!(
+                    f,
+                    "{total} cells: {}; only tetrahedra are read for now, split or remove the others \
+                     (in ParaView: Tetrahedralize)",
+                    list.join(", ")
+                )
+            }
+            Self::NotFinite { point } => write!(
+                f,
+                "the value at point {point} is infinite or not a number; replace it or leave this array out"
+            ),
+            Self::MissingPoint { cell, point, points } => write!(
+                f,
+                "cell {cell} refers to point {point}, but there are {points} points; the cells and the points \
+                 do not belong together"
+            ),
+            Self::TooLarge { what, limit } => write!(f, "more than {limit} {what}; split the data"),
+        }
+    }
+}
+
+/// Gives a reason its place.
+pub(super) trait At<T> {
+    /// Turns the reason into an error at `place`; [`super::read_bytes`] adds the file.
+    fn at(self, place: impl FnOnce() -> String) -> Result<T, ReadError>;
+}
+
+impl<T> At<T> for Result<T, ReadReason> {
+    fn at(self, place: impl FnOnce() -> String) -> Result<T, ReadError> {
+        self.map_err(|reason| ReadError { file: String::new(), place: place(), reason })
+    }
+}
+
+/// "1 hexahedron", "3 wedges", "2 cells of type 99".
+fn named_count(kind: i64, count: u64) -> String {
+    let (one, many) = match kind {
+        0 => ("empty cell", "empty cells"),
+        1 => ("vertex", "vertices"),
+        2 => ("poly-vertex", "poly-vertices"),
+        3 => ("line", "lines"),
+        4 => ("poly-line", "poly-lines"),
+        5 => ("triangle", "triangles"),
+        6 => ("triangle strip", "triangle strips"),
+        7 => ("polygon", "polygons"),
+        8 => ("pixel", "pixels"),
+        9 => ("quad", "quads"),
+        10 => ("tetrahedron", "tetrahedra"),
+        11 => ("voxel", "voxels"),
+        12 => ("hexahedron", "hexahedra"),
+        13 => ("wedge", "wedges"),
+        14 => ("pyramid", "pyramids"),
+        15 => ("pentagonal prism", "pentagonal prisms"),
+        16 => ("hexagonal prism", "hexagonal prisms"),
+        21 => ("quadratic edge", "quadratic edges"),
+        22 => ("quadratic triangle", "quadratic triangles"),
+        23 => ("quadratic quad", "quadratic quads"),
+        24 => ("quadratic tetrahedron", "quadratic tetrahedra"),
+        25 => ("quadratic hexahedron", "quadratic hexahedra"),
+        26 => ("quadratic wedge", "quadratic wedges"),
+        27 => ("quadratic pyramid", "quadratic pyramids"),
+        29 => ("triquadratic hexahedron", "triquadratic hexahedra"),
+        42 => ("polyhedron", "polyhedra"),
+        71 => ("Lagrange tetrahedron", "Lagrange tetrahedra"),
+        78 => ("Bezier tetrahedron", "Bezier tetrahedra"),
+        _ if count == 1 => return format!("1 cell of type {kind}"),
+        _ => return format!("{count} cells of type {kind}"),
+    };
+    format!("{count} {}", if count == 1 { one } else { many })
+}

@@ -1,0 +1,167 @@
+//! Regular grids: VTK XML image data (`.vti`), and the grid's checks that all grid formats share.
+
+use crate::io::error::At;
+use crate::io::error::ReadError;
+use crate::io::error::ReadReason;
+use crate::io::fields;
+use crate::io::xml::Document;
+use crate::io::xml::Piece;
+use crate::mesh::Field;
+use crate::mesh::Grid;
+use crate::mesh::TetMesh;
+
+/// Most points of a grid: 512³. Its tetrahedra take some 13 GB.
+pub const MAX_GRID_POINTS: u64 = 1 << 27;
+
+/// First and last index along x, y and z.
+type Extent = [i64; 6];
+
+/// A grid that was checked: at least two points along each axis, finite, not too large.
+pub(super) fn checked_grid(dims: [u64; 3], origin: [f64; 3], spacing: [f64; 3]) -> Result<Grid, ReadReason> {
+    if dims.iter().any(|d| *d < 2) {
+        let what = format!("a grid of {} x {} x {} points", dims[0], dims[1], dims[2]);
+        return Err(ReadReason::Unsupported {
+            what,
+            remedy: "give at least two points along each axis".into(),
+        });
+    }
+    let points = dims.iter().try_fold(1_u64, |n, d| n.checked_mul(*d));
+    if points.is_none_or(|n| n > MAX_GRID_POINTS) {
+        return Err(ReadReason::TooLarge { what: "grid points".into(), limit: MAX_GRID_POINTS });
+    }
+    let far = [0, 1, 2].map(|i| origin[i] + spacing[i] * dims[i] as f64);
+    if far.iter().chain(&origin).any(|x| !x.is_finite()) || spacing.iter().any(|s| s.is_nan() || *s <= 0.0) {
+        let what = format!("a grid with spacing {spacing:?} and origin {origin:?}");
+        return Err(ReadReason::Unsupported { what, remedy: "spacing must be positive, both finite".into() });
+    }
+    // Each dimension is at most the number of points.
+    Ok(Grid { dims: dims.map(|d| d as u32), origin, spacing })
+}
+
+/// The mesh of a grid whose fields were read; a grid without any would be a few bytes that claim any size.
+pub(super) fn grid_mesh(grid: Grid, fields: Vec<Field>) -> Result<TetMesh, ReadReason> {
+    if fields.is_empty() {
+        return Err(ReadReason::Missing("an array with a value for every point".into()));
+    }
+    Ok(TetMesh::from_grid(grid, fields))
+}
+
+/// Reads a document of type `ImageData`.
+pub(super) fn read(document: &Document<'_>) -> Result<TetMesh, ReadError> {
+    let whole_place = || "<ImageData>".to_owned();
+    let (grid, whole) = read_grid(document).at(whole_place)?;
+    let parts = document
+        .pieces
+        .iter()
+        .enumerate()
+        .map(|(i, piece)| read_part(document, piece, whole, i))
+        .collect::<Result<Vec<_>, _>>()?;
+    let fields = assemble(parts, whole).at(whole_place)?;
+    grid_mesh(grid, fields).at(whole_place)
+}
+
+/// A piece of a grid: where it is and its fields.
+struct Part {
+    extent: Extent,
+    fields: Vec<Field>,
+}
+
+fn read_part(document: &Document<'_>, piece: &Piece<'_>, whole: Extent, i: usize) -> Result<Part, ReadError> {
+    let place = || format!("piece {i}");
+    let extent = piece.attributes.numbers("Extent").at(place)?.unwrap_or(whole);
+    // No overflow: the piece is inside the grid, whose points were counted.
+    let points = dims_in(extent, whole).at(place)?.iter().product::<u64>() as usize;
+    let mut list = Vec::new();
+    for array in piece.section("PointData").filter(|a| a.number_type().is_some()) {
+        let components = array.components().at(|| array.place())?;
+        let values = document.floats(array, points, components).at(|| array.place())?;
+        fields::append(&mut list, array.name(), components, values).at(|| array.place())?;
+    }
+    if list.is_empty() {
+        return Err(ReadReason::Missing("an array in <PointData>".into())).at(place);
+    }
+    Ok(Part { extent, fields: list })
+}
+
+fn read_grid(document: &Document<'_>) -> Result<(Grid, Extent), ReadReason> {
+    let attributes = &document.dataset;
+    let whole: Extent = attributes
+        .numbers("WholeExtent")?
+        .ok_or_else(|| ReadReason::Missing("attribute WholeExtent".into()))?;
+    let origin = attributes.numbers("Origin")?.unwrap_or([0.0; 3]);
+    let spacing: [f64; 3] = attributes.numbers("Spacing")?.unwrap_or([1.0; 3]);
+    let identity = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+    let direction: [f64; 9] = attributes.numbers("Direction")?.unwrap_or(identity);
+    if direction != identity {
+        let what = format!("a grid turned by Direction=\"{direction:?}\"");
+        return Err(ReadReason::Unsupported { what, remedy: "resample it along the axes".into() });
+    }
+    let dims = dims_in(whole, whole)?;
+    // VTK's origin is the position of index (0, 0, 0), which need not be in the grid.
+    let first: [f64; 3] = [0, 1, 2].map(|i| origin[i] + spacing[i] * whole[2 * i] as f64);
+    Ok((checked_grid(dims, first, spacing)?, whole))
+}
+
+/// How many points `extent` has along each axis; it must lie in `whole`.
+fn dims_in(extent: Extent, whole: Extent) -> Result<[u64; 3], ReadReason> {
+    let outside = || ReadReason::Syntax(format!("extent {extent:?} is empty or not in {whole:?}"));
+    let mut dims = [0; 3];
+    for (i, dim) in dims.iter_mut().enumerate() {
+        let (low, high) = (extent[2 * i], extent[2 * i + 1]);
+        if low < whole[2 * i] || high > whole[2 * i + 1] || low > high {
+            return Err(outside());
+        }
+        *dim = high.abs_diff(low).checked_add(1).ok_or_else(outside)?;
+    }
+    Ok(dims)
+}
+
+/// The fields of the whole grid.
+fn assemble(mut parts: Vec<Part>, whole: Extent) -> Result<Vec<Field>, ReadReason> {
+    if let [part] = parts.as_mut_slice()
+        && part.extent == whole
+    {
+        return Ok(std::mem::take(&mut part.fields));
+    }
+    let whole_dims = dims_in(whole, whole)?.map(|d| d as usize);
+    let points: usize = whole_dims.iter().product();
+    // Only values that were read may size what follows.
+    let read: usize = parts.iter().filter_map(|p| p.fields.first()).map(|f| f.values.len()).sum();
+    let missing = || ReadReason::Missing("a piece of the grid".into());
+    let first = parts.first().filter(|_| read >= points).ok_or_else(missing)?;
+    let mut covered = vec![false; points];
+    let mut fields: Vec<Field> =
+        first.fields.iter().map(|f| Field { name: f.name.clone(), values: vec![0.0; points] }).collect();
+    for part in &parts {
+        place_part(&mut fields, &mut covered, part, whole)?;
+    }
+    if covered.contains(&false) { Err(missing()) } else { Ok(fields) }
+}
+
+/// Copies the values of a piece into the fields of the whole grid.
+fn place_part(
+    fields: &mut [Field],
+    covered: &mut [bool],
+    part: &Part,
+    whole: Extent,
+) -> Result<(), ReadReason> {
+    if part.fields.len() != fields.len()
+        || part.fields.iter().zip(fields.iter()).any(|(a, b)| a.name != b.name)
+    {
+        return Err(ReadReason::Syntax("the pieces do not have the same arrays".into()));
+    }
+    let whole_dims = dims_in(whole, whole)?.map(|d| d as usize);
+    let dims = dims_in(part.extent, whole)?.map(|d| d as usize);
+    let low = [0, 1, 2].map(|i| part.extent[2 * i].abs_diff(whole[2 * i]) as usize);
+    for z in 0..dims[2] {
+        for y in 0..dims[1] {
+            let from = dims[0] * (y + dims[1] * z);
+            let to = low[0] + whole_dims[0] * (low[1] + y + whole_dims[1] * (low[2] + z));
+            covered[to..to + dims[0]].fill(true);
+            for (field, source) in fields.iter_mut().zip(&part.fields) {
+                field.values[to..to + dims[0]].copy_from_slice(&source.values[from..from + dims[0]]);
+            }
+        }
+    }
+    Ok(())
+}

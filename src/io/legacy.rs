@@ -1,0 +1,500 @@
+//! Legacy VTK files (`.vtk`), versions 1.0 to 5.1, ASCII and binary: unstructured grids and structured points.
+//!
+//! Binary numbers are big-endian and start right after the line that announces them. Version 5 lists cells as
+//! offsets and connectivity, older ones as counts followed by indices.
+
+use crate::io::cells;
+use crate::io::error::At;
+use crate::io::error::ReadError;
+use crate::io::error::ReadReason;
+use crate::io::fields;
+use crate::io::image;
+use crate::io::number::NumberType;
+use crate::io::points_from;
+use crate::mesh::Field;
+use crate::mesh::TetMesh;
+
+/// How every legacy file starts.
+pub(super) const MAGIC: &[u8] = b"# vtk DataFile Version ";
+
+/// Reads a legacy VTK file.
+pub(super) fn read(bytes: &[u8]) -> Result<TetMesh, ReadError> {
+    let (mut file, kind) = Reader::open(bytes).at(|| "header".into())?;
+    let mut body = Body::default();
+    while let Some(keyword) = file.next_word().at(|| "body".into())? {
+        let keyword = keyword.to_ascii_lowercase();
+        body.section(&mut file, &keyword).at(|| keyword.to_ascii_uppercase())?;
+    }
+    match kind.as_str() {
+        "unstructured_grid" => body.unstructured(file.version >= 5),
+        _ => body.structured(),
+    }
+}
+
+/// What an array's numbers are.
+#[derive(Clone, Copy)]
+enum Kind {
+    Number(NumberType),
+    /// Eight to a byte in binary files.
+    Bit,
+    /// Not numbers: stepped over.
+    Text,
+}
+
+impl Kind {
+    fn named(name: &str) -> Result<Self, ReadReason> {
+        match name.to_ascii_lowercase().as_str() {
+            "bit" => Ok(Self::Bit),
+            "string" | "utf8_string" => Ok(Self::Text),
+            lower => NumberType::legacy(lower).map(Self::Number).ok_or_else(|| {
+                ReadReason::Syntax(format!("number type \"{}\" is not known", shortened(name)))
+            }),
+        }
+    }
+}
+
+fn shortened(text: &str) -> String {
+    text.chars().take(24).collect()
+}
+
+/// A position in the file.
+struct Reader<'a> {
+    bytes: &'a [u8],
+    at: usize,
+    binary: bool,
+    version: u32,
+}
+
+impl<'a> Reader<'a> {
+    /// Reads the header up to the data set's type, in lower case.
+    fn open(bytes: &'a [u8]) -> Result<(Self, String), ReadReason> {
+        let mut file = Self { bytes, at: MAGIC.len(), binary: false, version: 0 };
+        let version = file.line()?;
+        file.version = version
+            .trim()
+            .split('.')
+            .next()
+            .and_then(|v| v.parse().ok())
+            .filter(|v| (1..=5).contains(v))
+            .ok_or_else(|| ReadReason::Unsupported {
+                what: format!("version \"{}\"", shortened(version.trim())),
+                remedy: "write it as version 1.0 to 5.1".into(),
+            })?;
+        // The title may hold any bytes.
+        file.skip_line();
+        file.binary = match file.word()?.to_ascii_lowercase().as_str() {
+            "ascii" => false,
+            "binary" => true,
+            other => {
+                return Err(ReadReason::Syntax(format!("\"{}\" is not ASCII or BINARY", shortened(other))));
+            }
+        };
+        loop {
+            match file.word()?.to_ascii_lowercase().as_str() {
+                "dataset" => break,
+                // Field data may come before the data set.
+                "field" => _ = file.field_block()?,
+                "metadata" => file.skip_metadata(),
+                other => {
+                    return Err(ReadReason::Syntax(format!("\"{}\" instead of DATASET", shortened(other))));
+                }
+            }
+        }
+        let kind = file.word()?.to_ascii_lowercase();
+        if kind != "unstructured_grid" && kind != "structured_points" {
+            let what = format!("a data set of type {}", shortened(&kind).to_ascii_uppercase());
+            let remedy = "give an unstructured grid of tetrahedra or structured points".into();
+            return Err(ReadReason::Unsupported { what, remedy });
+        }
+        Ok((file, kind))
+    }
+
+    fn rest(&self) -> &'a [u8] {
+        self.bytes.get(self.at..).unwrap_or_default()
+    }
+
+    /// The next word, if there is one.
+    fn next_word(&mut self) -> Result<Option<&'a str>, ReadReason> {
+        let blank = self.rest().iter().take_while(|c| c.is_ascii_whitespace()).count();
+        self.at += blank;
+        if self.rest().is_empty() { Ok(None) } else { self.word().map(Some) }
+    }
+
+    fn word(&mut self) -> Result<&'a str, ReadReason> {
+        let rest = self.rest();
+        let start = rest.iter().position(|c| !c.is_ascii_whitespace()).unwrap_or(rest.len());
+        let length = rest[start..].iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len() - start);
+        self.at += start + length;
+        if length == 0 {
+            return Err(ReadReason::Truncated { needed: 1, found: 0 });
+        }
+        text(&rest[start..start + length])
+    }
+
+    /// The rest of the line, without its end.
+    fn line(&mut self) -> Result<&'a str, ReadReason> {
+        let rest = self.rest();
+        let length = rest.iter().position(|c| *c == b'\n').unwrap_or(rest.len());
+        self.at += (length + 1).min(rest.len());
+        text(&rest[..length])
+    }
+
+    fn skip_line(&mut self) {
+        let rest = self.rest();
+        let length = rest.iter().position(|c| *c == b'\n').map_or(rest.len(), |i| i + 1);
+        self.at += length;
+    }
+
+    fn count(&mut self) -> Result<usize, ReadReason> {
+        let word = self.word()?;
+        word.parse().map_err(|_| ReadReason::Syntax(format!("\"{}\" is not a count", shortened(word))))
+    }
+
+    fn three<T: std::str::FromStr>(&mut self) -> Result<[T; 3], ReadReason> {
+        let words = [self.word()?, self.word()?, self.word()?];
+        let numbers: Result<Vec<T>, _> = words.iter().map(|w| w.parse()).collect();
+        let numbers = numbers.ok().and_then(|n| n.try_into().ok());
+        numbers.ok_or_else(|| ReadReason::Syntax("three numbers expected".into()))
+    }
+
+    /// The next `count` bytes.
+    fn take(&mut self, count: Option<usize>) -> Result<&'a [u8], ReadReason> {
+        let rest = self.rest();
+        let needed = count.unwrap_or(usize::MAX);
+        let found = rest.len() as u64;
+        let taken = rest.get(..needed).ok_or(ReadReason::Truncated { needed: needed as u64, found })?;
+        self.at += needed;
+        Ok(taken)
+    }
+
+    /// `count` numbers of text.
+    fn words<T>(
+        &mut self,
+        count: usize,
+        parse: impl Fn(&str) -> Result<T, ReadReason>,
+    ) -> Result<Vec<T>, ReadReason> {
+        // A number and the space after it are two bytes, so the capacity is bounded by what is there.
+        let mut values = Vec::with_capacity(count.min(self.rest().len() / 2 + 1));
+        for found in 0..count {
+            let Some(word) = self.next_word()? else {
+                return Err(ReadReason::Truncated { needed: count as u64, found: found as u64 });
+            };
+            values.push(parse(word)?);
+        }
+        Ok(values)
+    }
+
+    /// The numbers of an array whose announcing line was read but for its end; `None` for text.
+    fn floats(&mut self, count: Option<usize>, kind: Kind) -> Result<Option<Vec<f64>>, ReadReason> {
+        let count =
+            count.ok_or(ReadReason::Truncated { needed: u64::MAX, found: self.rest().len() as u64 })?;
+        self.skip_line();
+        match kind {
+            Kind::Number(number) if self.binary => {
+                let bytes = self.take(count.checked_mul(number.size()))?;
+                Ok(Some(number.floats(bytes, true)))
+            }
+            Kind::Number(number) => self.words(count, |w| number.parse_float(w)).map(Some),
+            Kind::Bit if self.binary => {
+                let bytes = self.take(Some(count.div_ceil(8)))?;
+                Ok(Some((0..count).map(|i| f64::from(bytes[i / 8] >> (7 - i % 8) & 1)).collect()))
+            }
+            Kind::Bit => self.words(count, |w| NumberType::U8.parse_float(w)).map(Some),
+            Kind::Text => self.skip_texts(count).map(|()| None),
+        }
+    }
+
+    fn integers(&mut self, count: usize, number: NumberType) -> Result<Vec<i64>, ReadReason> {
+        self.skip_line();
+        if self.binary {
+            let bytes = self.take(count.checked_mul(number.size()))?;
+            number.integers(bytes, true)
+        } else {
+            self.words(count, |w| number.parse_integer(w))
+        }
+    }
+
+    /// Steps over texts: a line each, or in binary files each with its length, whose first two bits say how long
+    /// the length itself is.
+    fn skip_texts(&mut self, count: usize) -> Result<(), ReadReason> {
+        for found in 0..count {
+            let Some(first) = self.rest().first() else {
+                return Err(ReadReason::Truncated { needed: count as u64, found: found as u64 });
+            };
+            if !self.binary {
+                self.skip_line();
+                continue;
+            }
+            let header = self.take(Some(8 >> (first >> 6)))?;
+            let length = header[1..].iter().fold(u64::from(header[0] & 0x3f), |n, b| n << 8 | u64::from(*b));
+            self.take(usize::try_from(length).ok())?;
+        }
+        Ok(())
+    }
+
+    /// Steps over a METADATA block, which ends at an empty line.
+    fn skip_metadata(&mut self) {
+        self.skip_line();
+        while !self.rest().is_empty() {
+            let start = self.at;
+            self.skip_line();
+            if self.bytes[start..self.at].trim_ascii().is_empty() {
+                break;
+            }
+        }
+    }
+
+    /// A FIELD block, its keyword read.
+    fn field_block(&mut self) -> Result<Vec<ArrayData>, ReadReason> {
+        self.word()?;
+        let arrays = self.count()?;
+        let mut list = Vec::new();
+        for _ in 0..arrays {
+            let mut name = self.word()?;
+            if name.eq_ignore_ascii_case("metadata") {
+                // What is known of the array before this one.
+                self.skip_metadata();
+                name = self.word()?;
+            }
+            if name == "NULL_ARRAY" {
+                self.skip_line();
+                continue;
+            }
+            let (components, tuples) = (self.count()?, self.count()?);
+            let kind = Kind::named(self.word()?)?;
+            if let Some(values) = self.floats(components.checked_mul(tuples), kind)? {
+                list.push(ArrayData { name: decoded_name(name), components, values });
+            }
+        }
+        Ok(list)
+    }
+}
+
+fn text(bytes: &[u8]) -> Result<&str, ReadReason> {
+    std::str::from_utf8(bytes).map_err(|_| ReadReason::Syntax("binary data where text is expected".into()))
+}
+
+/// Names are written with `%20` for a space and so on.
+fn decoded_name(name: &str) -> String {
+    let mut bytes = Vec::new();
+    let mut rest = name.as_bytes();
+    while let Some((&c, after)) = rest.split_first() {
+        let code = after.get(..2).and_then(|h| std::str::from_utf8(h).ok());
+        match code.filter(|_| c == b'%').and_then(|h| u8::from_str_radix(h, 16).ok()) {
+            Some(code) => {
+                bytes.push(code);
+                rest = &after[2..];
+            }
+            None => {
+                bytes.push(c);
+                rest = after;
+            }
+        }
+    }
+    String::from_utf8(bytes).unwrap_or_else(|_| name.to_owned())
+}
+
+struct ArrayData {
+    name: String,
+    components: usize,
+    values: Vec<f64>,
+}
+
+/// What the attributes that follow belong to.
+#[derive(Clone, Copy, Default, PartialEq)]
+enum Owner {
+    #[default]
+    Nothing,
+    Points(usize),
+    Cells(usize),
+}
+
+/// Everything after the data set's type.
+#[derive(Default)]
+struct Body {
+    positions: Vec<f64>,
+    /// Before version 5 counts and indices; since then indices alone.
+    connectivity: Vec<i64>,
+    /// Since version 5: where each cell starts, and the end.
+    offsets: Vec<i64>,
+    cells: usize,
+    types: Vec<i64>,
+    dims: Option<[u64; 3]>,
+    origin: [f64; 3],
+    spacing: Option<[f64; 3]>,
+    owner: Owner,
+    fields: Vec<Field>,
+}
+
+impl Body {
+    /// Reads the section that `keyword` announces.
+    fn section(&mut self, file: &mut Reader<'_>, keyword: &str) -> Result<(), ReadReason> {
+        match keyword {
+            "points" => {
+                let count = file.count()?;
+                let kind = Kind::named(file.word()?)?;
+                let values = file.floats(count.checked_mul(3), kind)?;
+                self.positions = values.ok_or_else(|| ReadReason::Syntax("points made of text".into()))?;
+            }
+            "cells" => self.cells(file)?,
+            "cell_types" => {
+                let count = file.count()?;
+                self.types = file.integers(count, NumberType::I32)?;
+            }
+            "dimensions" => self.dims = Some(file.three()?),
+            "origin" => self.origin = file.three()?,
+            "spacing" | "aspect_ratio" => self.spacing = Some(file.three()?),
+            "point_data" => self.owner = Owner::Points(file.count()?),
+            "cell_data" => self.owner = Owner::Cells(file.count()?),
+            "metadata" => file.skip_metadata(),
+            "field" => {
+                for array in file.field_block()? {
+                    self.keep(array)?;
+                }
+            }
+            _ => self.attribute(file, keyword)?,
+        }
+        Ok(())
+    }
+
+    fn cells(&mut self, file: &mut Reader<'_>) -> Result<(), ReadReason> {
+        let (count, size) = (file.count()?, file.count()?);
+        if file.version < 5 {
+            self.cells = count;
+            self.connectivity = file.integers(size, NumberType::I32)?;
+            return Ok(());
+        }
+        self.cells = count.saturating_sub(1);
+        for (expected, length) in [("offsets", count), ("connectivity", size)] {
+            let word = file.word()?;
+            if !word.eq_ignore_ascii_case(expected) {
+                let expected = expected.to_ascii_uppercase();
+                return Err(ReadReason::Syntax(format!("\"{}\" instead of {expected}", shortened(word))));
+            }
+            let Kind::Number(number) = Kind::named(file.word()?)? else {
+                return Err(ReadReason::Syntax("indices that are not numbers".into()));
+            };
+            let list = file.integers(length, number)?;
+            *(if expected == "offsets" { &mut self.offsets } else { &mut self.connectivity }) = list;
+        }
+        Ok(())
+    }
+
+    /// Reads a data set attribute, as SCALARS.
+    fn attribute(&mut self, file: &mut Reader<'_>, keyword: &str) -> Result<(), ReadReason> {
+        let owned = match self.owner {
+            Owner::Nothing => 0,
+            Owner::Points(n) | Owner::Cells(n) => n,
+        };
+        let fixed = match keyword {
+            "vectors" | "normals" => Some(3),
+            "tensors" => Some(9),
+            "tensors6" => Some(6),
+            "global_ids" | "pedigree_ids" | "edge_flags" => Some(1),
+            "scalars" | "color_scalars" | "texture_coordinates" | "lookup_table" => None,
+            other => {
+                return Err(ReadReason::Syntax(format!("keyword \"{}\" is not known", shortened(other))));
+            }
+        };
+        let name = decoded_name(file.word()?);
+        let bytes_or_floats = Kind::Number(if file.binary { NumberType::U8 } else { NumberType::F32 });
+        let (components, tuples, kind) = match (keyword, fixed) {
+            (_, Some(components)) => (components, owned, Kind::named(file.word()?)?),
+            ("color_scalars", _) => (file.count()?, owned, bytes_or_floats),
+            ("lookup_table", _) => (4, file.count()?, bytes_or_floats),
+            ("texture_coordinates", _) => (file.count()?, owned, Kind::named(file.word()?)?),
+            _ => {
+                let kind = Kind::named(file.word()?)?;
+                (scalar_components(file)?, owned, kind)
+            }
+        };
+        let values = file.floats(components.checked_mul(tuples), kind)?;
+        match values {
+            Some(values) if keyword != "lookup_table" => self.keep(ArrayData { name, components, values }),
+            _ => Ok(()),
+        }
+    }
+
+    /// Makes fields of an array at points; others are read and left out.
+    fn keep(&mut self, array: ArrayData) -> Result<(), ReadReason> {
+        let Owner::Points(points) = self.owner else { return Ok(()) };
+        if points.checked_mul(array.components) != Some(array.values.len()) {
+            let what = format!("values of \"{}\"", array.name);
+            let expected = (points as u64).saturating_mul(array.components as u64);
+            return Err(ReadReason::Count { what, expected, found: array.values.len() as u64 });
+        }
+        fields::append(&mut self.fields, &array.name, array.components, array.values)
+    }
+
+    fn check_point_data(&self, expected: u64) -> Result<(), ReadReason> {
+        match self.fields.first() {
+            Some(field) if field.values.len() as u64 != expected => {
+                let found = field.values.len() as u64;
+                Err(ReadReason::Count { what: "values a field".into(), expected, found })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn unstructured(self, since_5: bool) -> Result<TetMesh, ReadError> {
+        self.check_point_data(self.positions.len() as u64 / 3).at(|| "POINT_DATA".into())?;
+        let positions = points_from(&self.positions).at(|| "POINTS".into())?;
+        if self.types.len() != self.cells {
+            let (expected, found) = (self.cells as u64, self.types.len() as u64);
+            return Err(ReadReason::Count { what: "cell types".into(), expected, found })
+                .at(|| "CELL_TYPES".into());
+        }
+        cells::only_tetrahedra(&self.types).at(|| "CELL_TYPES".into())?;
+        let list = if since_5 { self.indices_by_offsets() } else { self.indices_by_counts() }
+            .at(|| "CELLS".into())?;
+        let tets = cells::tetrahedra(&list, positions.len(), 0).at(|| "CELLS".into())?;
+        Ok(TetMesh { positions, fields: self.fields, tets, grid: None })
+    }
+
+    fn indices_by_offsets(&self) -> Result<Vec<i64>, ReadReason> {
+        if self.cells > 0 {
+            cells::ends_of_tetrahedra(self.offsets.get(1..).unwrap_or_default())?;
+        }
+        self.expect_connectivity(4)?;
+        Ok(self.connectivity.clone())
+    }
+
+    fn indices_by_counts(&self) -> Result<Vec<i64>, ReadReason> {
+        self.expect_connectivity(5)?;
+        let (cells, _) = self.connectivity.as_chunks::<5>();
+        if let Some(i) = cells.iter().position(|c| c[0] != 4) {
+            return Err(ReadReason::Syntax(format!("tetrahedron {i} does not have four points")));
+        }
+        Ok(cells.iter().flat_map(|c| &c[1..]).copied().collect())
+    }
+
+    fn expect_connectivity(&self, per_cell: usize) -> Result<(), ReadReason> {
+        let (expected, found) = ((per_cell * self.cells) as u64, self.connectivity.len() as u64);
+        if expected == found {
+            return Ok(());
+        }
+        Err(ReadReason::Count { what: "numbers in the cell list".into(), expected, found })
+    }
+
+    fn structured(self) -> Result<TetMesh, ReadError> {
+        let place = || "DIMENSIONS".to_owned();
+        let dims = self.dims.ok_or_else(|| ReadReason::Missing("DIMENSIONS".into())).at(place)?;
+        let grid = image::checked_grid(dims, self.origin, self.spacing.unwrap_or([1.0; 3])).at(place)?;
+        self.check_point_data(dims.iter().product()).at(|| "POINT_DATA".into())?;
+        image::grid_mesh(grid, self.fields).at(|| "POINT_DATA".into())
+    }
+}
+
+/// The number of components after the type of SCALARS, and the LOOKUP_TABLE line, but for its end.
+fn scalar_components(file: &mut Reader<'_>) -> Result<usize, ReadReason> {
+    let line = file.line()?.trim();
+    let components = if line.is_empty() { Ok(1) } else { line.parse() };
+    let components = components
+        .map_err(|_| ReadReason::Syntax(format!("\"{}\" is not a number of components", shortened(line))))?;
+    let word = file.word()?;
+    if !word.eq_ignore_ascii_case("lookup_table") {
+        return Err(ReadReason::Syntax(format!("\"{}\" instead of LOOKUP_TABLE", shortened(word))));
+    }
+    file.word()?;
+    Ok(components)
+}

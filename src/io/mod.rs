@@ -1,0 +1,114 @@
+//! Exchange formats: meshes and grids from files, and back to VTK.
+//!
+//! | format | ending | read | written |
+//! |---|---|---|---|
+//! | VTK XML unstructured grid | `.vtu` | all encodings, several pieces | appended raw, zlib |
+//! | VTK XML image data | `.vti` | all encodings, several pieces | appended raw, zlib |
+//! | legacy VTK, versions 1.0 to 5.1 | `.vtk` | ASCII and binary; unstructured grids, structured points | |
+//! | raw samples | `.raw` + `.json` | any numeric type and byte order | |
+//!
+//! Regular grids are split into tetrahedra, six a cube, and carry their [`Grid`](crate::mesh::Grid).
+//! Point arrays become scalar fields: an array of several components gives one field a component (`name_x`, ...) and
+//! `name_magnitude`. Arrays at cells, and arrays that are not numbers, are left out.
+//! Cells other than tetrahedra are refused. Readers check the file, not the mesh: see [`crate::mesh::repair`].
+
+mod cells;
+mod error;
+mod fields;
+mod image;
+mod legacy;
+mod number;
+mod payload;
+mod raw;
+mod vtu;
+mod write;
+mod xml;
+mod xz;
+
+pub use error::{ReadError, ReadReason};
+pub use image::MAX_GRID_POINTS;
+pub use write::{write_vti, write_vtu};
+
+use std::path::Path;
+
+use crate::io::error::At;
+use crate::mesh::TetMesh;
+
+/// Reads the mesh or grid in the file at `path`; of raw samples either the samples or the sidecar may be given.
+pub fn read(path: &Path) -> Result<TetMesh, ReadError> {
+    let name = path.display().to_string();
+    match lower_extension(path).as_str() {
+        "json" => read_raw_by_sidecar(path, None),
+        "raw" => read_raw_by_sidecar(&path.with_extension("json"), Some(path)),
+        _ => read_bytes(&name, &load(path)?),
+    }
+}
+
+/// Reads a mesh or grid from the bytes of a file; `name` is used in errors alone.
+///
+/// Raw samples come in two files: see [`read_raw`].
+pub fn read_bytes(name: &str, bytes: &[u8]) -> Result<TetMesh, ReadError> {
+    let start = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
+    let result = if bytes.starts_with(legacy::MAGIC) {
+        legacy::read(bytes)
+    } else if start.starts_with(b"<") {
+        read_xml(start)
+    } else {
+        Err(ReadReason::UnknownFormat).at(String::new)
+    };
+    result.map_err(|e| in_file(e, name))
+}
+
+/// Reads raw samples, given their JSON sidecar:
+/// `{"dims": [2, 2, 2], "type": "uint8", "endian": "little", "spacing": [1, 1, 1], "origin": [0, 0, 0], "field": "density"}`,
+/// of which only `dims` and `type` are needed. `name` is used in errors alone.
+pub fn read_raw(name: &str, sidecar: &[u8], samples: &[u8]) -> Result<TetMesh, ReadError> {
+    let mesh = raw::Sidecar::parse(sidecar).and_then(|s| s.mesh(samples));
+    mesh.at(String::new).map_err(|e| in_file(e, name))
+}
+
+fn read_raw_by_sidecar(sidecar_path: &Path, samples_path: Option<&Path>) -> Result<TetMesh, ReadError> {
+    let name = sidecar_path.display().to_string();
+    let sidecar = raw::Sidecar::parse(&load(sidecar_path)?).at(String::new).map_err(|e| in_file(e, &name))?;
+    let samples_path = match (samples_path, &sidecar.file) {
+        (Some(path), _) => path.to_owned(),
+        (None, Some(file)) => sidecar_path.with_file_name(file),
+        (None, None) => sidecar_path.with_extension("raw"),
+    };
+    let samples = load(&samples_path)?;
+    sidecar.mesh(&samples).at(String::new).map_err(|e| in_file(e, &samples_path.display().to_string()))
+}
+
+fn read_xml(bytes: &[u8]) -> Result<TetMesh, ReadError> {
+    let document = xml::Document::parse(bytes)?;
+    match document.kind.as_str() {
+        "UnstructuredGrid" => vtu::read(&document),
+        "ImageData" => image::read(&document),
+        other => {
+            let what = format!("a data set of type {other}");
+            let remedy = "give an UnstructuredGrid of tetrahedra or ImageData".into();
+            Err(ReadReason::Unsupported { what, remedy }).at(String::new)
+        }
+    }
+}
+
+fn load(path: &Path) -> Result<Vec<u8>, ReadError> {
+    let bytes = std::fs::read(path).map_err(|e| ReadReason::Io(e.to_string()));
+    bytes.at(String::new).map_err(|e| in_file(e, &path.display().to_string()))
+}
+
+fn in_file(error: ReadError, name: &str) -> ReadError {
+    ReadError { file: name.to_owned(), ..error }
+}
+
+fn lower_extension(path: &Path) -> String {
+    path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
+}
+
+/// Positions from three coordinates each, all of which must be finite.
+fn points_from(coordinates: &[f64]) -> Result<Vec<[f64; 3]>, ReadReason> {
+    if let Some(at) = coordinates.iter().position(|x| !x.is_finite()) {
+        return Err(ReadReason::NotFinite { point: (at / 3) as u64 });
+    }
+    Ok(coordinates.as_chunks::<3>().0.to_vec())
+}

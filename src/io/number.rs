@@ -1,0 +1,130 @@
+//! Numbers as files hold them: type, byte order, text.
+
+use crate::io::error::ReadReason;
+
+/// The type of the numbers of an array.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum NumberType {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    I64,
+    U64,
+    F32,
+    F64,
+}
+
+/// Decodes `$bytes` as numbers of the primitive type `$t` into a `Vec` of `$into`.
+macro_rules! decoded {
+    ($bytes:expr, $big:expr, $into:ty, $t:ty) => {{
+        let (chunks, _) = $bytes.as_chunks::<{ size_of::<$t>() }>();
+        if $big {
+            chunks.iter().map(|c| <$t>::from_be_bytes(*c) as $into).collect()
+        } else {
+            chunks.iter().map(|c| <$t>::from_le_bytes(*c) as $into).collect()
+        }
+    }};
+}
+
+impl NumberType {
+    /// By the name used in VTK XML files and in sidecars (in any case).
+    pub fn named(name: &str) -> Option<Self> {
+        Some(match name.to_ascii_lowercase().as_str() {
+            "int8" => Self::I8,
+            "uint8" => Self::U8,
+            "int16" => Self::I16,
+            "uint16" => Self::U16,
+            "int32" => Self::I32,
+            "uint32" => Self::U32,
+            "int64" => Self::I64,
+            "uint64" => Self::U64,
+            "float32" => Self::F32,
+            "float64" => Self::F64,
+            _ => return None,
+        })
+    }
+
+    /// By the name used in legacy VTK files, in lower case. VTK writes its ids as 32 bits, `long` as 64.
+    pub fn legacy(name: &str) -> Option<Self> {
+        Some(match name {
+            "char" | "signed_char" => Self::I8,
+            "unsigned_char" => Self::U8,
+            "short" => Self::I16,
+            "unsigned_short" => Self::U16,
+            "int" | "vtkidtype" => Self::I32,
+            "unsigned_int" => Self::U32,
+            "long" | "long_long" => Self::I64,
+            "unsigned_long" | "unsigned_long_long" => Self::U64,
+            "float" => Self::F32,
+            "double" => Self::F64,
+            other => return other.strip_prefix("vtktype").and_then(Self::named),
+        })
+    }
+
+    /// Bytes of one number.
+    pub fn size(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::I64 | Self::U64 | Self::F64 => 8,
+        }
+    }
+
+    /// The numbers in `bytes`; a rest that is shorter than a number is left out.
+    pub fn floats(self, bytes: &[u8], big: bool) -> Vec<f64> {
+        match self {
+            Self::I8 => decoded!(bytes, big, f64, i8),
+            Self::U8 => decoded!(bytes, big, f64, u8),
+            Self::I16 => decoded!(bytes, big, f64, i16),
+            Self::U16 => decoded!(bytes, big, f64, u16),
+            Self::I32 => decoded!(bytes, big, f64, i32),
+            Self::U32 => decoded!(bytes, big, f64, u32),
+            Self::I64 => decoded!(bytes, big, f64, i64),
+            Self::U64 => decoded!(bytes, big, f64, u64),
+            Self::F32 => decoded!(bytes, big, f64, f32),
+            Self::F64 => decoded!(bytes, big, f64, f64),
+        }
+    }
+
+    /// The numbers in `bytes` as indices. Unsigned numbers beyond `i64` wrap to negative ones, which no index is.
+    pub fn integers(self, bytes: &[u8], big: bool) -> Result<Vec<i64>, ReadReason> {
+        Ok(match self {
+            Self::I8 => decoded!(bytes, big, i64, i8),
+            Self::U8 => decoded!(bytes, big, i64, u8),
+            Self::I16 => decoded!(bytes, big, i64, i16),
+            Self::U16 => decoded!(bytes, big, i64, u16),
+            Self::I32 => decoded!(bytes, big, i64, i32),
+            Self::U32 => decoded!(bytes, big, i64, u32),
+            Self::I64 => decoded!(bytes, big, i64, i64),
+            Self::U64 => decoded!(bytes, big, i64, u64),
+            Self::F32 | Self::F64 => return Err(not_integers()),
+        })
+    }
+
+    /// One number from text. Single precision is rounded as such, so that text and binary files agree.
+    pub fn parse_float(self, text: &str) -> Result<f64, ReadReason> {
+        let value = if self == Self::F32 { text.parse::<f32>().map(f64::from) } else { text.parse::<f64>() };
+        value.map_err(|_| not_a_number(text))
+    }
+
+    /// One index from text.
+    pub fn parse_integer(self, text: &str) -> Result<i64, ReadReason> {
+        if matches!(self, Self::F32 | Self::F64) {
+            return Err(not_integers());
+        }
+        text.parse().map_err(|_| not_a_number(text))
+    }
+}
+
+fn not_integers() -> ReadReason {
+    ReadReason::Syntax("indices are stored as floating-point numbers".into())
+}
+
+fn not_a_number(text: &str) -> ReadReason {
+    let shown: String = text.chars().take(24).collect();
+    ReadReason::Syntax(format!("\"{shown}\" is not a number of the stated type"))
+}

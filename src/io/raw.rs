@@ -1,0 +1,83 @@
+//! Raw samples with a JSON sidecar.
+//!
+//! `x.raw` holds the samples alone, x fastest, then y, then z. `x.json` holds `dims` and `type` (as `"uint8"`), and
+//! may hold `file` (the samples' file name, else `x.raw`), `endian` (`"little"`, the default, or `"big"`),
+//! `spacing` (default 1 1 1), `origin` (default 0 0 0) and `field` (the field's name, default `value`).
+
+use serde_json::Value;
+
+use crate::io::error::ReadReason;
+use crate::io::fields;
+use crate::io::image;
+use crate::io::number::NumberType;
+use crate::mesh::Grid;
+use crate::mesh::TetMesh;
+
+/// What a sidecar says.
+pub(super) struct Sidecar {
+    /// Name of the file with the samples, without a folder; `None` if it is named like the sidecar.
+    pub file: Option<String>,
+    grid: Grid,
+    number: NumberType,
+    big: bool,
+    field: String,
+}
+
+impl Sidecar {
+    /// Reads a sidecar.
+    pub fn parse(json: &[u8]) -> Result<Self, ReadReason> {
+        let value: Value =
+            serde_json::from_slice(json).map_err(|e| ReadReason::Syntax(format!("not valid JSON: {e}")))?;
+        let text = |key: &str| value.get(key).and_then(Value::as_str);
+        let dims =
+            three(&value, "dims", Value::as_u64)?.ok_or_else(|| ReadReason::Missing("\"dims\"".into()))?;
+        let spacing = three(&value, "spacing", Value::as_f64)?.unwrap_or([1.0; 3]);
+        let origin = three(&value, "origin", Value::as_f64)?.unwrap_or([0.0; 3]);
+        let kind = text("type").ok_or_else(|| ReadReason::Missing("\"type\"".into()))?;
+        let number = NumberType::named(kind).ok_or_else(|| {
+            ReadReason::Syntax(format!("type \"{kind}\" is not known (use uint8, float32, ...)"))
+        })?;
+        let big = match text("endian") {
+            None | Some("little") => false,
+            Some("big") => true,
+            Some(other) => {
+                return Err(ReadReason::Syntax(format!("endian \"{other}\" is not \"little\" or \"big\"")));
+            }
+        };
+        let file = text("file").map(str::to_owned);
+        if file.as_ref().is_some_and(|f| f.contains(['/', '\\', ':']) || f == "..") {
+            let what = "a \"file\" in another folder".into();
+            return Err(ReadReason::Unsupported { what, remedy: "put both files side by side".into() });
+        }
+        let field = text("field").unwrap_or("value").to_owned();
+        Ok(Self { file, grid: image::checked_grid(dims, origin, spacing)?, number, big, field })
+    }
+
+    /// The mesh of these samples.
+    pub fn mesh(&self, samples: &[u8]) -> Result<TetMesh, ReadReason> {
+        let points: u64 = self.grid.dims.iter().map(|d| u64::from(*d)).product();
+        let expected = points * self.number.size() as u64;
+        if samples.len() as u64 != expected {
+            return Err(ReadReason::Count {
+                what: "bytes of samples".into(),
+                expected,
+                found: samples.len() as u64,
+            });
+        }
+        let mut list = Vec::new();
+        fields::append(&mut list, &self.field, 1, self.number.floats(samples, self.big))?;
+        image::grid_mesh(self.grid, list)
+    }
+}
+
+/// Three numbers of the sidecar, if the key is there.
+fn three<T: Copy>(
+    value: &Value,
+    key: &str,
+    get: impl Fn(&Value) -> Option<T>,
+) -> Result<Option<[T; 3]>, ReadReason> {
+    let Some(found) = value.get(key) else { return Ok(None) };
+    let numbers: Option<Vec<T>> = found.as_array().and_then(|list| list.iter().map(get).collect());
+    let numbers = numbers.and_then(|n| <[T; 3]>::try_from(n).ok());
+    numbers.map(Some).ok_or_else(|| ReadReason::Syntax(format!("\"{key}\" is not a list of three numbers")))
+}

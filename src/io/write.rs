@@ -1,0 +1,145 @@
+//! Writes VTK XML files: version 1.0, little-endian, appended raw data, zlib blocks, 64-bit headers.
+
+use std::fmt::Write as _;
+use std::io;
+use std::io::Write;
+
+use flate2::Compression;
+use flate2::write::ZlibEncoder;
+
+use crate::mesh::Field;
+use crate::mesh::TetMesh;
+
+/// Bytes of a block before compression, as VTK has it.
+const BLOCK: usize = 32768;
+/// VTK's number for a tetrahedron.
+const TETRAHEDRON: u8 = 10;
+
+/// Writes `mesh` as a VTK XML unstructured grid (`.vtu`), with double precision points and fields.
+pub fn write_vtu(mesh: &TetMesh, out: &mut impl Write) -> io::Result<()> {
+    let mut data = Appended::default();
+    let fields = point_data(mesh, &mut data)?;
+    let points = data.append(mesh.positions.as_flattened(), f64::to_le_bytes)?;
+    let connectivity = data.append(mesh.tets.as_flattened(), |v| i64::from(v).to_le_bytes())?;
+    let ends: Vec<i64> = (1..=mesh.tets.len() as i64).map(|i| 4 * i).collect();
+    let offsets = data.append(&ends, i64::to_le_bytes)?;
+    let types = data.append(&vec![TETRAHEDRON; mesh.tets.len()], |v| [v])?;
+    let body = format!(
+        "    <Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n{fields}\
+         \x20     <Points>\n{}      </Points>\n      <Cells>\n{}{}{}      </Cells>\n    </Piece>\n",
+        mesh.positions.len(),
+        mesh.tets.len(),
+        array("Float64", "Points", 3, points),
+        array("Int64", "connectivity", 1, connectivity),
+        array("Int64", "offsets", 1, offsets),
+        array("UInt8", "types", 1, types),
+    );
+    write_file("UnstructuredGrid", "", &body, &data.bytes, out)
+}
+
+/// Writes a mesh that was split from a regular grid as VTK XML image data (`.vti`).
+///
+/// Fails with [`io::ErrorKind::InvalidInput`] if `mesh` has no grid.
+pub fn write_vti(mesh: &TetMesh, out: &mut impl Write) -> io::Result<()> {
+    let Some(grid) = mesh.grid else {
+        let problem = "the mesh is not a regular grid: write it as .vtu";
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, problem));
+    };
+    let mut data = Appended::default();
+    let fields = point_data(mesh, &mut data)?;
+    let last = grid.dims.map(|d| d.saturating_sub(1));
+    let extent = format!("0 {} 0 {} 0 {}", last[0], last[1], last[2]);
+    let three = |v: [f64; 3]| format!("{:?} {:?} {:?}", v[0], v[1], v[2]);
+    let attributes = format!(
+        " WholeExtent=\"{extent}\" Origin=\"{}\" Spacing=\"{}\"",
+        three(grid.origin),
+        three(grid.spacing)
+    );
+    let body = format!("    <Piece Extent=\"{extent}\">\n{fields}    </Piece>\n");
+    write_file("ImageData", &attributes, &body, &data.bytes, out)
+}
+
+fn write_file(kind: &str, attributes: &str, body: &str, data: &[u8], out: &mut impl Write) -> io::Result<()> {
+    write!(
+        out,
+        "<?xml version=\"1.0\"?>\n<VTKFile type=\"{kind}\" version=\"1.0\" byte_order=\"LittleEndian\" \
+         header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n  <{kind}{attributes}>\n{body}  </{kind}>\n\
+         \x20 <AppendedData encoding=\"raw\">\n   _"
+    )?;
+    out.write_all(data)?;
+    out.write_all(b"\n  </AppendedData>\n</VTKFile>\n")
+}
+
+/// The element `<PointData>`, its arrays appended to `data`.
+fn point_data(mesh: &TetMesh, data: &mut Appended) -> io::Result<String> {
+    let points = mesh.positions.len();
+    let mut arrays = String::new();
+    for Field { name, values } in &mesh.fields {
+        if values.len() != points {
+            let problem = format!("field \"{name}\" has {} values for {points} points", values.len());
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, problem));
+        }
+        let offset = data.append(values, f64::to_le_bytes)?;
+        arrays.push_str(&array("Float64", name, 1, offset));
+    }
+    let scalars =
+        mesh.fields.first().map(|f| format!(" Scalars=\"{}\"", escaped(&f.name))).unwrap_or_default();
+    Ok(format!("      <PointData{scalars}>\n{arrays}      </PointData>\n"))
+}
+
+fn array(kind: &str, name: &str, components: usize, offset: usize) -> String {
+    format!(
+        "        <DataArray type=\"{kind}\" Name=\"{}\" NumberOfComponents=\"{components}\" format=\"appended\" \
+         offset=\"{offset}\"/>\n",
+        escaped(name)
+    )
+}
+
+/// Text for an attribute; control characters, which XML cannot hold, become spaces.
+fn escaped(text: &str) -> String {
+    let mut result = String::new();
+    for c in text.chars() {
+        match c {
+            '<' | '>' | '&' | '"' | '\'' => {
+                // Writing to a string cannot fail.
+                _ = write!(result, "&#{};", c as u32);
+            }
+            c if c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}') => result.push(' '),
+            c => result.push(c),
+        }
+    }
+    result
+}
+
+/// The data after the underscore.
+#[derive(Default)]
+struct Appended {
+    bytes: Vec<u8>,
+}
+
+impl Appended {
+    /// Appends an array of `values` in compressed blocks; returns its offset.
+    fn append<T: Copy, const N: usize>(
+        &mut self,
+        values: &[T],
+        encode: impl Fn(T) -> [u8; N],
+    ) -> io::Result<usize> {
+        let offset = self.bytes.len();
+        let per_block = BLOCK / N;
+        let blocks = values.len().div_ceil(per_block);
+        let partial = values.len() % per_block * N;
+        let mut header: Vec<u64> = vec![blocks as u64, BLOCK as u64, partial as u64];
+        let mut packed = Vec::new();
+        for block in values.chunks(per_block) {
+            let plain: Vec<u8> = block.iter().copied().flat_map(&encode).collect();
+            let before = packed.len();
+            let mut encoder = ZlibEncoder::new(&mut packed, Compression::default());
+            encoder.write_all(&plain)?;
+            encoder.finish()?;
+            header.push((packed.len() - before) as u64);
+        }
+        self.bytes.extend(header.iter().flat_map(|n| n.to_le_bytes()));
+        self.bytes.append(&mut packed);
+        Ok(offset)
+    }
+}

@@ -1,0 +1,351 @@
+//! The frame of VTK XML files: pieces, arrays, appended data. What the arrays mean is up to `vtu` and `vti`.
+
+use std::borrow::Cow;
+
+use quick_xml::Reader;
+use quick_xml::XmlVersion;
+use quick_xml::events::BytesStart;
+use quick_xml::events::Event;
+
+use crate::io::error::At;
+use crate::io::error::ReadError;
+use crate::io::error::ReadReason;
+use crate::io::number::NumberType;
+use crate::io::payload;
+use crate::io::payload::Compressor;
+use crate::io::payload::Framing;
+use crate::io::payload::Source;
+
+/// The attributes of an element.
+#[derive(Debug, Default)]
+pub(super) struct Attributes(Vec<(String, String)>);
+
+impl Attributes {
+    /// The value of attribute `name`.
+    pub fn get(&self, name: &str) -> Option<&str> {
+        self.0.iter().find(|(n, _)| n == name).map(|(_, value)| value.trim())
+    }
+
+    /// The value of attribute `name` as a count.
+    pub fn count(&self, name: &str) -> Result<usize, ReadReason> {
+        let text = self.get(name).ok_or_else(|| ReadReason::Missing(format!("attribute {name}")))?;
+        text.parse().map_err(|_| ReadReason::Syntax(format!("attribute {name}=\"{text}\" is not a count")))
+    }
+
+    /// The value of attribute `name` as numbers, if it is there.
+    pub fn numbers<T: std::str::FromStr, const N: usize>(
+        &self,
+        name: &str,
+    ) -> Result<Option<[T; N]>, ReadReason> {
+        let Some(text) = self.get(name) else { return Ok(None) };
+        let parsed: Result<Vec<T>, _> = text.split_ascii_whitespace().map(str::parse).collect();
+        let numbers = parsed.ok().and_then(|v| <[T; N]>::try_from(v).ok());
+        numbers
+            .map(Some)
+            .ok_or_else(|| ReadReason::Syntax(format!("attribute {name}=\"{text}\" is not {N} numbers")))
+    }
+
+    fn of(element: &BytesStart<'_>) -> Result<Self, ReadReason> {
+        let mut list = Vec::new();
+        for attribute in element.attributes() {
+            let attribute = attribute.map_err(|e| ReadReason::Syntax(format!("not well-formed XML: {e}")))?;
+            let value = attribute
+                .normalized_value(XmlVersion::Explicit1_0)
+                .map_err(|e| ReadReason::Syntax(format!("not well-formed XML: {e}")))?;
+            list.push((attribute.key.as_ref().to_owned(), value.into_owned()));
+        }
+        Ok(Self(list))
+    }
+}
+
+/// A `<DataArray>` that was not decoded yet.
+#[derive(Debug)]
+pub(super) struct Array<'a> {
+    /// Name of the enclosing element, as `PointData`.
+    pub section: String,
+    /// Number of the enclosing piece, from 0.
+    pub piece: usize,
+    attributes: Attributes,
+    text: Cow<'a, str>,
+}
+
+impl Array<'_> {
+    /// The array's name; empty if it has none.
+    pub fn name(&self) -> &str {
+        self.attributes.get("Name").unwrap_or_default()
+    }
+
+    /// How to call the array in an error.
+    pub fn place(&self) -> String {
+        format!("piece {}, <{}>, array \"{}\"", self.piece, self.section, self.name())
+    }
+
+    /// Values a tuple; 1 if not stated.
+    pub fn components(&self) -> Result<usize, ReadReason> {
+        match self.attributes.get("NumberOfComponents") {
+            None | Some("") => Ok(1),
+            Some(_) => self.attributes.count("NumberOfComponents"),
+        }
+    }
+
+    /// The number type, or `None` for strings and the like.
+    pub fn number_type(&self) -> Option<NumberType> {
+        self.attributes.get("type").and_then(NumberType::named)
+    }
+}
+
+/// A part of the data set.
+#[derive(Debug)]
+pub(super) struct Piece<'a> {
+    /// Attributes of `<Piece>`.
+    pub attributes: Attributes,
+    /// All arrays of the piece, in the order of the file.
+    pub arrays: Vec<Array<'a>>,
+}
+
+impl<'a> Piece<'a> {
+    /// The arrays of one section.
+    pub fn section(&self, name: &str) -> impl Iterator<Item = &Array<'a>> {
+        self.arrays.iter().filter(move |a| a.section == name)
+    }
+}
+
+/// A VTK XML file, taken apart.
+pub(super) struct Document<'a> {
+    /// The data set's type, as `UnstructuredGrid`.
+    pub kind: String,
+    /// Attributes of the element named like the type.
+    pub dataset: Attributes,
+    /// The parts.
+    pub pieces: Vec<Piece<'a>>,
+    framing: Framing,
+    appended: Option<Appended<'a>>,
+}
+
+struct Appended<'a> {
+    base64: bool,
+    bytes: &'a [u8],
+}
+
+impl<'a> Document<'a> {
+    /// Takes `bytes` apart; arrays are decoded later.
+    pub fn parse(bytes: &'a [u8]) -> Result<Self, ReadError> {
+        let (text, data) = split_appended(bytes).at(|| "<AppendedData>".into())?;
+        let text = std::str::from_utf8(text)
+            .map_err(|_| ReadReason::Syntax("the XML text is not UTF-8".into()))
+            .at(String::new)?;
+        let mut parser = Parser::default();
+        let mut reader = Reader::from_str(text);
+        loop {
+            let event = reader.read_event();
+            let place = || format!("byte {}", reader.buffer_position());
+            let event =
+                event.map_err(|e| ReadReason::Syntax(format!("not well-formed XML: {e}"))).at(place)?;
+            match event {
+                Event::Start(e) => parser.open(&e, true).at(place)?,
+                Event::Empty(e) => parser.open(&e, false).at(place)?,
+                Event::End(_) => _ = parser.stack.pop(),
+                Event::Text(t) => parser.text(t.into_inner()),
+                Event::CData(t) => parser.text(t.into_inner()),
+                Event::Eof => break,
+                _ => {}
+            }
+        }
+        parser.finish(data)
+    }
+
+    /// The values of a numeric array of `tuples` tuples of `components`.
+    pub fn floats(
+        &self,
+        array: &Array<'a>,
+        tuples: usize,
+        components: usize,
+    ) -> Result<Vec<f64>, ReadReason> {
+        self.values(array, tuples, components, NumberType::parse_float, |t, b, big| Ok(t.floats(b, big)))
+    }
+
+    /// The values of an array of `count` indices.
+    pub fn integers(&self, array: &Array<'a>, count: usize) -> Result<Vec<i64>, ReadReason> {
+        self.values(array, count, 1, NumberType::parse_integer, NumberType::integers)
+    }
+
+    fn values<T>(
+        &self,
+        array: &Array<'a>,
+        tuples: usize,
+        components: usize,
+        parse: impl Fn(NumberType, &str) -> Result<T, ReadReason>,
+        decode: impl Fn(NumberType, &[u8], bool) -> Result<Vec<T>, ReadReason>,
+    ) -> Result<Vec<T>, ReadReason> {
+        let number = array.number_type().ok_or_else(|| {
+            let kind = array.attributes.get("type").unwrap_or_default();
+            ReadReason::Unsupported {
+                what: format!("data of type \"{kind}\""),
+                remedy: "use a numeric type".into(),
+            }
+        })?;
+        let needed = tuples.checked_mul(components);
+        let bytes = needed.and_then(|n| n.checked_mul(number.size()));
+        let (Some(needed), Some(bytes)) = (needed, bytes) else {
+            return Err(ReadReason::Truncated { needed: u64::MAX, found: array.text.len() as u64 });
+        };
+        if array.attributes.get("format") == Some("ascii") {
+            return parse_text(&array.text, needed, |token| parse(number, token));
+        }
+        if needed == 0 {
+            return Ok(Vec::new());
+        }
+        let block = payload::read_block(self.source(array)?, self.framing, bytes)?;
+        decode(number, &block, self.framing.big)
+    }
+
+    fn source<'b>(&'b self, array: &'b Array<'a>) -> Result<Source<'b>, ReadReason> {
+        match array.attributes.get("format") {
+            Some("binary") => Ok(Source::base64(array.text.as_bytes())),
+            Some("appended") => {
+                let offset = array.attributes.count("offset")?;
+                let appended =
+                    self.appended.as_ref().ok_or_else(|| ReadReason::Missing("<AppendedData>".into()))?;
+                let bytes = appended.bytes.get(offset..).ok_or(ReadReason::Truncated {
+                    needed: offset as u64,
+                    found: appended.bytes.len() as u64,
+                })?;
+                Ok(if appended.base64 { Source::base64(bytes) } else { Source::Raw(bytes) })
+            }
+            other => {
+                Err(ReadReason::Syntax(format!("format=\"{}\" is not known", other.unwrap_or_default())))
+            }
+        }
+    }
+}
+
+/// Exactly `needed` numbers of white-space separated text.
+fn parse_text<T>(
+    text: &str,
+    needed: usize,
+    parse: impl Fn(&str) -> Result<T, ReadReason>,
+) -> Result<Vec<T>, ReadReason> {
+    let values: Vec<T> = text.split_ascii_whitespace().map(parse).collect::<Result<_, _>>()?;
+    if values.len() != needed {
+        let (expected, found) = (needed as u64, values.len() as u64);
+        return Err(ReadReason::Count { what: "numbers".into(), expected, found });
+    }
+    Ok(values)
+}
+
+/// Splits a file with appended data, which is not XML, into the text up to and including the start tag of
+/// `<AppendedData>` and the bytes after the underscore that marks the data's beginning.
+fn split_appended(bytes: &[u8]) -> Result<(&[u8], &[u8]), ReadReason> {
+    const TAG: &[u8] = b"<AppendedData";
+    let Some(start) = bytes.windows(TAG.len()).position(|w| w == TAG) else { return Ok((bytes, &[])) };
+    let end = bytes[start..].iter().position(|c| *c == b'>').map(|i| start + i + 1);
+    let end = end.ok_or_else(|| ReadReason::Syntax("the tag does not end".into()))?;
+    let (text, rest) = bytes.split_at(end);
+    let data = rest.trim_ascii_start().strip_prefix(b"_");
+    let data = data.ok_or_else(|| ReadReason::Missing("the underscore before the data".into()))?;
+    Ok((text, data))
+}
+
+/// Collects what the reader sees.
+#[derive(Default)]
+struct Parser<'a> {
+    stack: Vec<String>,
+    file: Option<Attributes>,
+    dataset: Option<Attributes>,
+    pieces: Vec<Piece<'a>>,
+    appended: Option<Attributes>,
+}
+
+impl<'a> Parser<'a> {
+    fn open(&mut self, element: &BytesStart<'_>, stays_open: bool) -> Result<(), ReadReason> {
+        let name = element.name().as_ref().to_owned();
+        let parents: Vec<&str> = self.stack.iter().map(String::as_str).collect();
+        match (parents.as_slice(), name.as_str()) {
+            ([], "VTKFile") => self.file = Some(Attributes::of(element)?),
+            ([], other) => return Err(ReadReason::Syntax(format!("the root is <{other}>, not <VTKFile>"))),
+            (["VTKFile"], "AppendedData") => self.appended = Some(Attributes::of(element)?),
+            (["VTKFile"], kind) if Some(kind) == self.kind() => self.dataset = Some(Attributes::of(element)?),
+            (["VTKFile", _], "Piece") => {
+                self.pieces.push(Piece { attributes: Attributes::of(element)?, arrays: Vec::new() });
+            }
+            (["VTKFile", _, "Piece", section], "DataArray") => {
+                let section = (*section).to_owned();
+                let piece = self.pieces.len().saturating_sub(1);
+                let array =
+                    Array { section, piece, attributes: Attributes::of(element)?, text: Cow::Borrowed("") };
+                if let Some(piece) = self.pieces.last_mut() {
+                    piece.arrays.push(array);
+                }
+            }
+            _ => {}
+        }
+        if stays_open {
+            self.stack.push(name);
+        }
+        Ok(())
+    }
+
+    fn kind(&self) -> Option<&str> {
+        self.file.as_ref()?.get("type")
+    }
+
+    fn text(&mut self, text: Cow<'a, str>) {
+        // Elements inside an array (as InformationKey) hold text of their own.
+        let in_array = self.stack.len() == 5 && self.stack[4] == "DataArray" && self.stack[2] == "Piece";
+        let array = self.pieces.last_mut().and_then(|p| p.arrays.last_mut());
+        if let (true, Some(array)) = (in_array, array) {
+            if array.text.trim_ascii().is_empty() {
+                array.text = text;
+            } else if !text.trim_ascii().is_empty() {
+                array.text.to_mut().push_str(&text);
+            }
+        }
+    }
+
+    fn finish(self, data: &'a [u8]) -> Result<Document<'a>, ReadError> {
+        // With appended data, <VTKFile> and <AppendedData> end after the part that was read.
+        let open = if self.appended.is_some() { 2 } else { 0 };
+        if self.stack.len() > open {
+            let what = format!("<{}> does not end", self.stack[open]);
+            return Err(ReadReason::Syntax(what)).at(String::new);
+        }
+        let file = self.file.ok_or_else(|| ReadReason::Missing("<VTKFile>".into())).at(String::new)?;
+        let kind = file.get("type").unwrap_or_default().to_owned();
+        let framing = framing(&file).at(|| "<VTKFile>".into())?;
+        let dataset = self.dataset.ok_or_else(|| ReadReason::Missing(format!("<{kind}>"))).at(String::new)?;
+        let appended =
+            self.appended.map(|a| appended(&a, data)).transpose().at(|| "<AppendedData>".into())?;
+        Ok(Document { kind, dataset, pieces: self.pieces, framing, appended })
+    }
+}
+
+fn appended<'a>(attributes: &Attributes, bytes: &'a [u8]) -> Result<Appended<'a>, ReadReason> {
+    match attributes.get("encoding") {
+        Some("raw") => Ok(Appended { base64: false, bytes }),
+        Some("base64") => Ok(Appended { base64: true, bytes }),
+        other => Err(ReadReason::Syntax(format!("encoding=\"{}\" is not known", other.unwrap_or_default()))),
+    }
+}
+
+fn framing(file: &Attributes) -> Result<Framing, ReadReason> {
+    let unknown =
+        |name: &str, value: &str| Err(ReadReason::Syntax(format!("{name}=\"{value}\" is not known")));
+    let big = match file.get("byte_order") {
+        None | Some("LittleEndian") => false,
+        Some("BigEndian") => true,
+        Some(other) => return unknown("byte_order", other),
+    };
+    let wide = match file.get("header_type") {
+        None | Some("UInt32") => false,
+        Some("UInt64") => true,
+        Some(other) => return unknown("header_type", other),
+    };
+    let compressor = match file.get("compressor") {
+        None | Some("") => None,
+        Some("vtkZLibDataCompressor") => Some(Compressor::Zlib),
+        Some("vtkLZ4DataCompressor") => Some(Compressor::Lz4),
+        Some("vtkLZMADataCompressor") => Some(Compressor::Lzma),
+        Some(other) => return unknown("compressor", other),
+    };
+    Ok(Framing { big, wide, compressor })
+}

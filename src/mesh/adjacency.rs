@@ -1,0 +1,354 @@
+//! Who meets whom: tetrahedra across faces, and the shape of the stars of vertices.
+
+use crate::mesh::FACES;
+use crate::mesh::MeshError;
+use crate::mesh::NONE;
+
+/// Most tetrahedra in a mesh: a face is numbered `4 · tet + i` in 32 bits.
+pub const MAX_TETS: usize = 1 << 30;
+
+/// One side of a face: the face of one tetrahedron.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct HalfFace {
+    /// The face's vertices in increasing order.
+    pub key: [u32; 3],
+    /// `4 · tet + i` for face `i`.
+    code: u32,
+}
+
+impl HalfFace {
+    /// The tetrahedron that this face belongs to.
+    pub fn tet(self) -> u32 {
+        self.code >> 2
+    }
+
+    /// Which of its tetrahedron's faces it is.
+    pub fn face(self) -> usize {
+        (self.code & 3) as usize
+    }
+}
+
+/// The vertices of face `i` of `tet`, in the outward order of [`FACES`].
+pub(crate) fn face_of(tet: [u32; 4], i: usize) -> [u32; 3] {
+    FACES[i].map(|k| tet[k])
+}
+
+/// Whether sorting three different numbers takes an odd number of swaps.
+pub(crate) fn is_odd([a, b, c]: [u32; 3]) -> bool {
+    (a > b) ^ (a > c) ^ (b > c)
+}
+
+/// All faces of `tets`, equal ones side by side, in increasing order of key and then of tetrahedron.
+pub(crate) fn sorted_faces(tets: &[[u32; 4]]) -> Result<Vec<HalfFace>, MeshError> {
+    if tets.len() > MAX_TETS {
+        return Err(MeshError::TooMany { tets: tets.len() });
+    }
+    // Counting sort by the smallest vertex, then a comparison sort inside the short buckets.
+    let largest = tets.iter().flatten().max().copied().unwrap_or(0);
+    let mut shift = 0;
+    while (largest >> shift) as usize > 4 * tets.len() + 64 {
+        // Few tetrahedra with huge indices must not size the table.
+        shift += 1;
+    }
+    let bucket = |key: [u32; 3]| (key[0] >> shift) as usize;
+    let mut starts = vec![0_u32; (largest >> shift) as usize + 2];
+    for face in half_faces(tets) {
+        starts[bucket(face.key) + 1] += 1;
+    }
+    for i in 1..starts.len() {
+        starts[i] += starts[i - 1];
+    }
+    let mut next = starts.clone();
+    let mut sorted = vec![HalfFace { key: [0; 3], code: 0 }; 4 * tets.len()];
+    for face in half_faces(tets) {
+        let slot = &mut next[bucket(face.key)];
+        sorted[*slot as usize] = face;
+        *slot += 1;
+    }
+    for ends in starts.windows(2) {
+        sorted[ends[0] as usize..ends[1] as usize].sort_unstable();
+    }
+    Ok(sorted)
+}
+
+fn half_faces(tets: &[[u32; 4]]) -> impl Iterator<Item = HalfFace> + '_ {
+    (0_u32..).zip(tets).flat_map(|(t, tet)| {
+        (0..4_u32).map(move |i| {
+            let mut key = face_of(*tet, i as usize);
+            key.sort_unstable();
+            HalfFace { key, code: 4 * t + i }
+        })
+    })
+}
+
+/// The groups of equal faces, each with all tetrahedra around it.
+pub(crate) fn face_groups(sorted: &[HalfFace]) -> impl Iterator<Item = &[HalfFace]> {
+    sorted.chunk_by(|a, b| a.key == b.key)
+}
+
+/// The neighbours of each tetrahedron: entry `i` lies across face `i`, or is [`NONE`] at the boundary.
+///
+/// Refuses faces with three or more tetrahedra.
+pub fn neighbors(tets: &[[u32; 4]]) -> Result<Vec<[u32; 4]>, MeshError> {
+    let mut result = vec![[NONE; 4]; tets.len()];
+    for group in face_groups(&sorted_faces(tets)?) {
+        match group {
+            [_] => {}
+            [a, b] => {
+                result[a.tet() as usize][a.face()] = b.tet();
+                result[b.tet() as usize][b.face()] = a.tet();
+            }
+            _ => return Err(crowded(group)),
+        }
+    }
+    Ok(result)
+}
+
+/// The error for a face with three or more tetrahedra.
+pub(crate) fn crowded(group: &[HalfFace]) -> MeshError {
+    MeshError::CrowdedFace { face: group[0].key, tets: group.iter().map(|f| f.tet()).collect() }
+}
+
+/// The shape of a mesh, from its connectivity alone.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Topology {
+    /// The neighbours of each tetrahedron; see [`neighbors`].
+    pub neighbors: Vec<[u32; 4]>,
+    /// Parts that hang together by faces.
+    pub components: usize,
+    /// Faces with one tetrahedron.
+    pub boundary_faces: usize,
+    /// For each point, whether the mesh is *not* a 3-manifold there: the link of the vertex is neither one
+    /// sphere nor one disc. Both ends of a non-manifold edge are marked; unused points are not.
+    pub non_manifold: Vec<bool>,
+}
+
+impl Topology {
+    /// How many vertices are marked as non-manifold.
+    pub fn non_manifold_count(&self) -> usize {
+        self.non_manifold.iter().filter(|&&marked| marked).count()
+    }
+}
+
+/// Works out the [`Topology`] of `tets` over `points` points.
+pub fn topology(points: usize, tets: &[[u32; 4]]) -> Result<Topology, MeshError> {
+    super::check::check_indices(points, tets)?;
+    let neighbors = neighbors(tets)?;
+    let boundary_faces = neighbors.iter().flatten().filter(|&&n| n == NONE).count();
+    let stars = Stars::new(points, tets);
+    let mut scratch = LinkScratch::default();
+    let non_manifold = (0..points)
+        .map(|v| {
+            let star = stars.of(v);
+            !star.is_empty() && !scratch.link_is_sphere_or_disc(v as u32, star, tets, &neighbors)
+        })
+        .collect();
+    Ok(Topology { components: components(&neighbors), boundary_faces, non_manifold, neighbors })
+}
+
+/// The tetrahedra around each vertex, in increasing order.
+struct Stars {
+    starts: Vec<u32>,
+    tets: Vec<u32>,
+}
+
+impl Stars {
+    fn new(points: usize, tets: &[[u32; 4]]) -> Self {
+        let mut starts = vec![0_u32; points + 1];
+        for &v in tets.iter().flatten() {
+            starts[v as usize + 1] += 1;
+        }
+        for i in 1..starts.len() {
+            starts[i] += starts[i - 1];
+        }
+        let mut next = starts.clone();
+        let mut list = vec![0; 4 * tets.len()];
+        for (t, tet) in (0_u32..).zip(tets) {
+            for &v in tet {
+                list[next[v as usize] as usize] = t;
+                next[v as usize] += 1;
+            }
+        }
+        Self { starts, tets: list }
+    }
+
+    fn of(&self, v: usize) -> &[u32] {
+        &self.tets[self.starts[v] as usize..self.starts[v + 1] as usize]
+    }
+}
+
+/// Reused buffers for the links of vertices.
+#[derive(Default)]
+struct LinkScratch {
+    /// Groups of star tetrahedra that hang together by faces at the vertex.
+    tets: Groups,
+    /// Groups of corners of link triangles: one group a link vertex unless the surface is pinched there.
+    corners: Groups,
+    /// The link's vertices.
+    vertices: Vec<u32>,
+}
+
+impl LinkScratch {
+    /// Whether the link of `v` is one surface without pinches, and a sphere or a disc by its Euler number.
+    fn link_is_sphere_or_disc(
+        &mut self,
+        v: u32,
+        star: &[u32],
+        tets: &[[u32; 4]],
+        neighbors: &[[u32; 4]],
+    ) -> bool {
+        self.tets.reset(star.len());
+        self.corners.reset(4 * star.len());
+        self.vertices.clear();
+        // Link edges are the faces at `v`; every inner one is seen from both of its sides.
+        let (mut inner_sides, mut boundary) = (0, 0);
+        for (local, &t) in star.iter().enumerate() {
+            let tet = tets[t as usize];
+            self.vertices.extend(tet.iter().filter(|&&w| w != v));
+            for face in (0..4).filter(|&i| tet[i] != v) {
+                let other = neighbors[t as usize][face];
+                let Ok(other_local) = star.binary_search(&other) else {
+                    boundary += 1;
+                    continue;
+                };
+                inner_sides += 1;
+                self.tets.join(local, other_local);
+                for corner in (0..4).filter(|&k| k != face && tet[k] != v) {
+                    let twin = tets[other as usize].iter().position(|w| *w == tet[corner]);
+                    if let Some(twin) = twin {
+                        self.corners.join(4 * local + corner, 4 * other_local + twin);
+                    }
+                }
+            }
+        }
+        self.vertices.sort_unstable();
+        self.vertices.dedup();
+        // The corner at `v` itself of each tetrahedron is a group of its own: no triangle has it.
+        let corner_groups = self.corners.count - star.len();
+        if self.tets.count != 1 || corner_groups != self.vertices.len() {
+            return false;
+        }
+        let euler = (self.vertices.len() + star.len()) as i64 - (inner_sides / 2 + boundary) as i64;
+        euler == if boundary == 0 { 2 } else { 1 }
+    }
+}
+
+/// Disjoint groups of small numbers.
+#[derive(Default)]
+struct Groups {
+    parents: Vec<u32>,
+    count: usize,
+}
+
+impl Groups {
+    fn reset(&mut self, len: usize) {
+        self.parents.clear();
+        self.parents.extend(0..len as u32);
+        self.count = len;
+    }
+
+    fn root(&mut self, mut i: usize) -> usize {
+        while self.parents[i] as usize != i {
+            self.parents[i] = self.parents[self.parents[i] as usize];
+            i = self.parents[i] as usize;
+        }
+        i
+    }
+
+    fn join(&mut self, a: usize, b: usize) {
+        let (a, b) = (self.root(a), self.root(b));
+        if a != b {
+            self.parents[a.max(b)] = a.min(b) as u32;
+            self.count -= 1;
+        }
+    }
+}
+
+fn components(neighbors: &[[u32; 4]]) -> usize {
+    let mut groups = Groups::default();
+    groups.reset(neighbors.len());
+    for (t, sides) in neighbors.iter().enumerate() {
+        for &n in sides.iter().filter(|&&n| n != NONE) {
+            groups.join(t, n as usize);
+        }
+    }
+    groups.count
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::kuhn_tets;
+
+    fn marked(points: usize, tets: &[[u32; 4]]) -> Vec<usize> {
+        let topology = topology(points, tets).unwrap();
+        (0..points).filter(|&v| topology.non_manifold[v]).collect()
+    }
+
+    #[test]
+    fn neighbors_are_mutual_and_share_the_face() {
+        let tets = kuhn_tets([4, 3, 3]);
+        let neighbors = neighbors(&tets).unwrap();
+        let mut boundary = 0;
+        for (t, sides) in (0_u32..).zip(&neighbors) {
+            for (i, &n) in sides.iter().enumerate() {
+                if n == NONE {
+                    boundary += 1;
+                    continue;
+                }
+                let back = neighbors[n as usize].iter().position(|&x| x == t).unwrap();
+                let (mut a, mut b) = (face_of(tets[t as usize], i), face_of(tets[n as usize], back));
+                assert_ne!(is_odd(a), is_odd(b));
+                a.sort_unstable();
+                b.sort_unstable();
+                assert_eq!(a, b);
+            }
+        }
+        assert_eq!(boundary, 2 * 2 * (3 * 2 + 3 * 2 + 2 * 2));
+    }
+
+    #[test]
+    fn huge_indices_do_not_size_tables() {
+        let m = u32::MAX;
+        let found = neighbors(&[[0, 1, 2, m], [m, 1, 2, m - 7], [7, m - 1, m - 2, m - 3]]).unwrap();
+        assert_eq!(found, [[1, NONE, NONE, NONE], [NONE, NONE, NONE, 0], [NONE; 4]]);
+    }
+
+    #[test]
+    fn crowded_faces_are_refused_with_their_cells() {
+        let error = neighbors(&[[0, 1, 2, 3], [9, 8, 7, 6], [0, 1, 2, 4], [2, 1, 5, 0]]).unwrap_err();
+        assert_eq!(error, MeshError::CrowdedFace { face: [0, 1, 2], tets: vec![0, 2, 3] });
+    }
+
+    #[test]
+    fn a_grid_is_a_manifold_everywhere() {
+        let tets = kuhn_tets([4, 4, 4]);
+        let t = topology(64, &tets).unwrap();
+        assert_eq!((t.components, t.boundary_faces, t.non_manifold_count()), (1, 6 * 9 * 2, 0));
+    }
+
+    #[test]
+    fn tetrahedra_meeting_in_a_vertex_or_an_edge_are_marked_there() {
+        assert_eq!(marked(7, &[[0, 1, 2, 3], [0, 4, 5, 6]]), [0]);
+        assert_eq!(marked(6, &[[0, 1, 2, 3], [0, 1, 4, 5]]), [0, 1]);
+        assert_eq!(marked(5, &[[0, 1, 2, 3], [0, 1, 2, 4]]), [] as [usize; 0]);
+    }
+
+    #[test]
+    fn a_vertex_with_an_annular_link_is_marked() {
+        // Cone over a closed band of triangles: the link of the apex 0 is an annulus.
+        let ring = |i: u32| 1 + i % 4;
+        let top = |i: u32| 5 + i % 4;
+        let tets: Vec<[u32; 4]> = (0..4)
+            .flat_map(|i| [[0, ring(i), ring(i + 1), top(i)], [0, ring(i + 1), top(i + 1), top(i)]])
+            .collect();
+        assert_eq!(marked(9, &tets), [0]);
+    }
+
+    #[test]
+    fn a_pinched_link_is_marked_though_its_star_hangs_together() {
+        // Five tetrahedra around edge 0-1 in two fans that meet again away from the edge.
+        let tets = [[0, 1, 2, 3], [0, 2, 3, 4], [0, 3, 4, 5], [0, 4, 5, 6], [0, 1, 5, 6]];
+        assert_eq!(marked(7, &tets), [0, 1]);
+    }
+}

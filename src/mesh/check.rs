@@ -1,0 +1,192 @@
+//! Is this a valid conforming mesh? And the exact side tests on `f64` that the answer needs.
+
+use robust::Coord;
+use robust::Coord3D;
+
+use crate::mesh::MeshError;
+use crate::mesh::TetMesh;
+use crate::mesh::adjacency::crowded;
+use crate::mesh::adjacency::face_groups;
+use crate::mesh::adjacency::face_of;
+use crate::mesh::adjacency::is_odd;
+use crate::mesh::adjacency::sorted_faces;
+
+/// Checks that `mesh` is valid: fields and indices fit, every tetrahedron is positive (decided exactly), and
+/// every face has at most two tetrahedra, which lie on opposite sides of it.
+///
+/// Vertices and edges where the boundary touches itself are allowed; [`crate::mesh::topology`] marks them.
+pub fn check(mesh: &TetMesh) -> Result<(), MeshError> {
+    check_arrays(mesh)?;
+    let sides = Sides::new(&mesh.positions);
+    for (t, tet) in (0_u32..).zip(&mesh.tets) {
+        match sides.of(*tet) {
+            1 => {}
+            0 => return Err(MeshError::Flat { tet: t }),
+            _ => return Err(MeshError::Inverted { tet: t }),
+        }
+    }
+    for group in face_groups(&sorted_faces(&mesh.tets)?) {
+        match group {
+            [_] => {}
+            [a, b] => {
+                let odd = [a, b].map(|f| is_odd(face_of(mesh.tets[f.tet() as usize], f.face())));
+                if odd[0] == odd[1] {
+                    return Err(MeshError::Folded { tets: [a.tet(), b.tet()] });
+                }
+            }
+            _ => return Err(crowded(group)),
+        }
+    }
+    Ok(())
+}
+
+/// Checks what holds before geometry is looked at: lengths, finite coordinates, indices in range.
+pub(crate) fn check_arrays(mesh: &TetMesh) -> Result<(), MeshError> {
+    if mesh.tets.is_empty() {
+        return Err(MeshError::Empty);
+    }
+    let points = mesh.positions.len();
+    if let Some(field) = mesh.fields.iter().find(|f| f.values.len() != points) {
+        let (field, values) = (field.name.clone(), field.values.len());
+        return Err(MeshError::FieldLength { field, values, points });
+    }
+    if let Some(point) = mesh.positions.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
+        return Err(MeshError::NotFinite { point });
+    }
+    check_indices(points, &mesh.tets)
+}
+
+/// Checks that every tetrahedron refers to existing points.
+pub(crate) fn check_indices(points: usize, tets: &[[u32; 4]]) -> Result<(), MeshError> {
+    if tets.len() > super::MAX_TETS {
+        return Err(MeshError::TooMany { tets: tets.len() });
+    }
+    for (tet, vertices) in (0_u32..).zip(tets) {
+        if let Some(&point) = vertices.iter().find(|&&v| v as usize >= points) {
+            return Err(MeshError::MissingPoint { tet, point, points });
+        }
+    }
+    Ok(())
+}
+
+/// Exact side tests over a set of positions.
+///
+/// Exact as long as no product of coordinate differences underflows; coordinates are scaled by a power of two
+/// (which is exact) so that neither the largest overflows nor, short of a detail 10^-90 of the model's size, the
+/// smallest underflows.
+pub(crate) struct Sides<'a> {
+    positions: &'a [[f64; 3]],
+    scale: f64,
+}
+
+impl<'a> Sides<'a> {
+    /// Side tests over `positions`, all finite.
+    pub fn new(positions: &'a [[f64; 3]]) -> Self {
+        let largest = positions.iter().flatten().fold(0.0_f64, |m, x| m.max(x.abs()));
+        // Ordinary coordinates need no scaling; the bounds leave room for products of three differences.
+        let ordinary = largest == 0.0 || (1e-60..1e90).contains(&largest);
+        Self { positions, scale: if ordinary { 1.0 } else { power_of_two_near(largest.recip()) } }
+    }
+
+    fn point(&self, v: u32) -> [f64; 3] {
+        self.positions[v as usize].map(|x| x * self.scale)
+    }
+
+    /// 1 for a positive tetrahedron, -1 for an inverted one, 0 for a flat one.
+    pub fn of(&self, tet: [u32; 4]) -> i32 {
+        let [a, b, c, d] = tet.map(|v| {
+            let [x, y, z] = self.point(v);
+            Coord3D { x, y, z }
+        });
+        // Shewchuk's sign is positive when `d` lies below `abc`, ours when it lies above.
+        sign(-robust::orient3d(a, b, c, d))
+    }
+
+    /// For a flat tetrahedron, which side of its plane each face looks to (1 or -1); 0 for faces without area.
+    pub fn flat_faces(&self, tet: [u32; 4]) -> [i32; 4] {
+        // Four points of one plane: a projection along an axis either flattens all faces or none of those
+        // that have an area.
+        let project = |u: usize, v: usize| {
+            [0, 1, 2, 3].map(|face| {
+                let [a, b, c] = face_of(tet, face).map(|p| {
+                    let p = self.point(p);
+                    Coord { x: p[u], y: p[v] }
+                });
+                sign(robust::orient2d(a, b, c))
+            })
+        };
+        [(0, 1), (1, 2), (2, 0)]
+            .map(|(u, v)| project(u, v))
+            .into_iter()
+            .find(|s| *s != [0; 4])
+            .unwrap_or([0; 4])
+    }
+}
+
+fn sign(x: f64) -> i32 {
+    if x > 0.0 {
+        1
+    } else if x < 0.0 {
+        -1
+    } else {
+        0
+    }
+}
+
+/// A power of two within a factor of two of `x`, or the closest one to it that is a normal number.
+fn power_of_two_near(x: f64) -> f64 {
+    const EXPONENT: u64 = 0x7ff << 52;
+    f64::from_bits(x.clamp(f64::MIN_POSITIVE, f64::MAX).to_bits() & EXPONENT)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const UNIT: [[f64; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+    #[test]
+    fn the_sign_follows_the_convention() {
+        let sides = Sides::new(&UNIT);
+        assert_eq!(sides.of([0, 1, 2, 3]), 1);
+        assert_eq!(sides.of([1, 0, 2, 3]), -1);
+        assert_eq!(sides.of([0, 1, 2, 2]), 0);
+    }
+
+    #[test]
+    fn signs_are_exact_at_every_scale() {
+        for scale in [1e-300, 1e-120, 1e-30, 1.0, 1e30, 1e120, 1e300] {
+            let at = |z: f64| {
+                let p = [[0.0, 0.0, 0.0], [0.1, 0.0, 0.1], [0.0, 0.1, 0.1], [0.3, 0.3, z]];
+                p.map(|p| p.map(|x| x * scale))
+            };
+            let flat = 0.3 * 2.0 * scale;
+            let up = at(0.6).map(|p| if p[0] == 0.3 * scale { [p[0], p[1], flat.next_up()] } else { p });
+            assert_eq!(Sides::new(&up).of([0, 1, 2, 3]), 1, "scale {scale}");
+            let down = at(0.6).map(|p| if p[0] == 0.3 * scale { [p[0], p[1], 0.5 * scale] } else { p });
+            assert_eq!(Sides::new(&down).of([0, 1, 2, 3]), -1, "scale {scale}");
+        }
+    }
+
+    #[test]
+    fn a_flat_quad_looks_up_with_two_faces_and_down_with_two() {
+        let square = [[0.0, 0.0, 2.0], [1.0, 0.0, 2.0], [1.0, 1.0, 2.0], [0.0, 1.0, 2.0]];
+        let mut faces = Sides::new(&square).flat_faces([0, 1, 2, 3]);
+        faces.sort_unstable();
+        assert_eq!(faces, [-1, -1, 1, 1]);
+        let line = [[0.0; 3], [1.0; 3], [2.0; 3], [3.0; 3]];
+        assert_eq!(Sides::new(&line).flat_faces([0, 1, 2, 3]), [0; 4]);
+    }
+
+    #[test]
+    fn each_defect_is_found() {
+        let good = TetMesh { positions: UNIT.to_vec(), tets: vec![[0, 1, 2, 3]], ..TetMesh::default() };
+        assert_eq!(check(&good), Ok(()));
+        let with = |tets: Vec<[u32; 4]>| check(&TetMesh { tets, ..good.clone() }).unwrap_err();
+        assert_eq!(with(vec![]), MeshError::Empty);
+        assert_eq!(with(vec![[0, 1, 2, 4]]), MeshError::MissingPoint { tet: 0, point: 4, points: 4 });
+        assert_eq!(with(vec![[0, 1, 2, 3], [0, 2, 1, 3]]), MeshError::Inverted { tet: 1 });
+        assert_eq!(with(vec![[0, 1, 2, 2]]), MeshError::Flat { tet: 0 });
+        assert_eq!(with(vec![[0, 1, 2, 3], [1, 2, 0, 3]]), MeshError::Folded { tets: [0, 1] });
+    }
+}

@@ -1,0 +1,129 @@
+//! What can be wrong with a mesh, named by the cells of the file it came from.
+
+use std::fmt;
+
+/// Why a mesh cannot be used. Cells and points are numbered as in the input, from 0.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum MeshError {
+    /// There is no tetrahedron, or none is left.
+    Empty,
+    /// More tetrahedra than the arrays here can index.
+    TooMany {
+        /// How many there are.
+        tets: usize,
+    },
+    /// A field is not as long as the list of points.
+    FieldLength {
+        /// The field's name.
+        field: String,
+        /// How many values it has.
+        values: usize,
+        /// How many points there are.
+        points: usize,
+    },
+    /// A point has an infinite or undefined coordinate.
+    NotFinite {
+        /// The point.
+        point: usize,
+    },
+    /// A tetrahedron refers to a point that does not exist.
+    MissingPoint {
+        /// The cell.
+        tet: u32,
+        /// The index it holds.
+        point: u32,
+        /// How many points there are.
+        points: usize,
+    },
+    /// A tetrahedron has the same vertex twice.
+    RepeatedVertex {
+        /// The cell.
+        tet: u32,
+    },
+    /// A tetrahedron has no volume.
+    Flat {
+        /// The cell.
+        tet: u32,
+    },
+    /// A tetrahedron is turned inside out.
+    Inverted {
+        /// The cell.
+        tet: u32,
+    },
+    /// Three or more tetrahedra share a face.
+    CrowdedFace {
+        /// The face's points.
+        face: [u32; 3],
+        /// The cells, in increasing order.
+        tets: Vec<u32>,
+    },
+    /// Two tetrahedra lie on the same side of the face they share: the mesh is folded there.
+    Folded {
+        /// The cells, in increasing order.
+        tets: [u32; 2],
+    },
+    /// A tetrahedron without volume cannot be dropped without tearing the mesh.
+    InnerFlat {
+        /// The cell.
+        tet: u32,
+        /// How many of its faces are shared with other cells.
+        shared: u32,
+    },
+}
+
+impl fmt::Display for MeshError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Empty => {
+                write!(f, "the mesh has no tetrahedron (left); check that the right file was given")
+            }
+            Self::TooMany { tets } => {
+                write!(f, "{tets} tetrahedra are too many (at most {}); split the mesh", super::MAX_TETS)
+            }
+            Self::FieldLength { field, values, points } => {
+                write!(f, "field \"{field}\" has {values} values for {points} points; give one value a point")
+            }
+            Self::NotFinite { point } => {
+                write!(f, "point {point} has an infinite or undefined coordinate; mend it in the input")
+            }
+            Self::MissingPoint { tet, point, points } => {
+                write!(f, "cell {tet} refers to point {point}, but there are {points} points; mend the input")
+            }
+            Self::RepeatedVertex { tet } => write!(f, "cell {tet} has the same vertex twice; remove it"),
+            Self::Flat { tet } => write!(f, "cell {tet} has no volume; repair the mesh first"),
+            Self::Inverted { tet } => write!(f, "cell {tet} is turned inside out; repair the mesh first"),
+            Self::CrowdedFace { face, tets } => write!(
+                f,
+                "face ({}, {}, {}) is shared by {} cells ({}), but at most two can meet in a face; \
+                 remove overlapping cells",
+                face[0],
+                face[1],
+                face[2],
+                tets.len(),
+                listed(tets)
+            ),
+            Self::Folded { tets: [a, b] } => write!(
+                f,
+                "cells {a} and {b} lie on the same side of the face they share: the mesh is folded there; \
+                 remesh this region"
+            ),
+            Self::InnerFlat { tet, shared } => write!(
+                f,
+                "cell {tet} has no volume and shares {shared} of its faces with other cells, so dropping it \
+                 would tear the mesh; collapse it in a mesh editor or remesh this region"
+            ),
+        }
+    }
+}
+
+impl std::error::Error for MeshError {}
+
+/// The first few of `tets`, as text.
+fn listed(tets: &[u32]) -> String {
+    const SHOWN: usize = 8;
+    let mut text = tets.iter().take(SHOWN).map(u32::to_string).collect::<Vec<_>>().join(", ");
+    if tets.len() > SHOWN {
+        text.push_str(", ...");
+    }
+    text
+}
