@@ -21,7 +21,12 @@ use tetralod::mt::MultiTessellation;
 use tetralod::mt::UpdateId;
 
 fn config(cases: u32, seed: u64) -> ProptestConfig {
-    ProptestConfig { cases, failure_persistence: None, rng_seed: RngSeed::Fixed(seed), ..ProptestConfig::default() }
+    ProptestConfig {
+        cases,
+        failure_persistence: None,
+        rng_seed: RngSeed::Fixed(seed),
+        ..ProptestConfig::default()
+    }
 }
 
 fn domain() -> impl Strategy<Value = Domain> {
@@ -35,8 +40,12 @@ fn domain() -> impl Strategy<Value = Domain> {
 }
 
 fn plan(updates: std::ops::Range<usize>) -> impl Strategy<Value = Plan> {
-    (domain(), any::<u64>(), 1_usize..=3, updates)
-        .prop_map(|(domain, seed, fields, updates)| Plan { domain, seed, fields, updates })
+    (domain(), any::<u64>(), 1_usize..=3, updates).prop_map(|(domain, seed, fields, updates)| Plan {
+        domain,
+        seed,
+        fields,
+        updates,
+    })
 }
 
 /// The mesh, the set it shows, and the oracle's idea of it.
@@ -68,14 +77,21 @@ impl<'a> Walk<'a> {
         match applied.expect("a valid MT") {
             Applied::Done => {
                 assert!(feasible, "{u} was applied though the DAG forbids it");
-                if undo { oracle.coarsen(&mut self.live, u) } else { oracle.refine(&mut self.live, u) }
+                if undo {
+                    oracle.coarsen(&mut self.live, u)
+                } else {
+                    oracle.refine(&mut self.live, u)
+                }
                 self.set[u as usize] = !undo;
             }
             Applied::Blocked(other) => {
                 assert!(!feasible, "{u} was blocked by {other:?} though the DAG allows it");
                 assert_eq!(self.set[other.0 as usize], undo, "{other:?} is not in the way of {u}");
                 let (above, below) = if undo { (u, other.0) } else { (other.0, u) };
-                assert!(oracle.ancestors[below as usize].contains(&above), "{other:?} has nothing to do with {u}");
+                assert!(
+                    oracle.ancestors[below as usize].contains(&above),
+                    "{other:?} has nothing to do with {u}"
+                );
             }
         }
         if self.mt.may_coarsen(&self.mesh, UpdateId(u)) {
@@ -272,7 +288,8 @@ fn replay<T: Clone + Default>(copy: &mut Vec<T>, now: &[T], ranges: &[std::ops::
 fn every_consistent_set_of_tiny_mts() {
     let mut dependent = 0;
     for seed in 0..24 {
-        let domain = [Domain::Cube(1), Domain::Cube(2), Domain::Ell(1), Domain::Ring, Domain::TwoComponents(1)];
+        let domain =
+            [Domain::Cube(1), Domain::Cube(2), Domain::Ell(1), Domain::Ring, Domain::TwoComponents(1)];
         let plan = Plan { domain: domain[seed as usize % 5], seed, fields: 1, updates: 9 };
         let built = build(plan);
         dependent += built.oracle.parents.iter().filter(|p| !p.is_empty()).count();
@@ -310,7 +327,8 @@ fn every_consistent_set_of_tiny_mts() {
 #[test]
 fn labels_tell_creators_and_removers() {
     for seed in 0..12 {
-        let domain = [Domain::Cube(3), Domain::Ell(2), Domain::Ring, Domain::TwoComponents(2)][seed as usize % 4];
+        let domain =
+            [Domain::Cube(3), Domain::Ell(2), Domain::Ring, Domain::TwoComponents(2)][seed as usize % 4];
         let built = build(Plan { domain, seed, fields: 1, updates: 1000 });
         assert!(built.splits.len() > 8, "seed {seed}: {}", built.splits.len());
         let mt = built.edge_mt();

@@ -54,8 +54,10 @@ mod tests {
             for i in 0..343 {
                 let p = DVec3::new((i % 7) as f64 - 3.0, (i / 7 % 7) as f64 - 3.0, (i / 49) as f64 - 3.0);
                 let nearest = p.distance(nearest_on_triangle(p, triangle));
-                let raster = (0..=100).flat_map(|v| (0..=100 - v).map(move |w| (v as f64 / 100.0, w as f64 / 100.0)));
-                let best = raster.map(|(v, w)| p.distance(a + (b - a) * v + (c - a) * w)).fold(f64::MAX, f64::min);
+                let raster =
+                    (0..=100).flat_map(|v| (0..=100 - v).map(move |w| (v as f64 / 100.0, w as f64 / 100.0)));
+                let best =
+                    raster.map(|(v, w)| p.distance(a + (b - a) * v + (c - a) * w)).fold(f64::MAX, f64::min);
                 assert!(nearest <= best + 1e-12 && nearest > best - 0.05, "{triangle:?} {p}");
             }
         }

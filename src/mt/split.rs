@@ -438,7 +438,8 @@ impl FanTriangle {
 
 impl Fan {
     /// The fan between the two sides of a star, if it parts the star as a split must: its triangles follow each
-    /// other around a closed loop of the link, or along one path from border to border of it.
+    /// other around a closed loop of the link, or along one path from border to border of it. On its way the path
+    /// may touch the border: then a side falls into parts, which the fan tetrahedra hold together.
     #[inline]
     fn of(mesh: &CurrentMesh, star: &Star, sides: u64) -> Option<Self> {
         let mut fan = Self {
@@ -446,14 +447,10 @@ impl Fan {
             triangles: [FanTriangle::default(); MAX_LINK],
             partner: [[NO_PARTNER; 2]; MAX_LINK],
         };
-        let mut at_border = false;
         for i in 0..star.len {
             let around = mesh.neighbors[star.tets[i] as usize];
             for j in (0..4).filter(|&j| j != star.corner[i] as usize) {
-                let Some(n) = mesh.in_star(around[j]) else {
-                    at_border = true;
-                    continue;
-                };
+                let Some(n) = mesh.in_star(around[j]) else { continue };
                 if sides >> i & 1 == 1 || sides >> n & 1 == 0 {
                     continue;
                 }
@@ -471,26 +468,30 @@ impl Fan {
             }
             _ => false,
         };
-        let sound = fan.len > 0 && whole && !(at_border && fan.touches_border(mesh, star));
-        sound.then_some(fan)
+        (fan.len > 0 && whole).then_some(fan)
     }
 
     /// Finds, for both link vertices of every triangle, the other triangle there. Returns how many have none;
-    /// none at all if three triangles meet in an edge.
+    /// none at all if three triangles meet in an edge, or two whose tetrahedra would lie on the same side of the
+    /// face between them (around an edge where the mesh is not a manifold).
     #[inline]
     fn find_partners(&mut self, mesh: &CurrentMesh, star: &Star) -> Option<usize> {
         let mut ends = [[NONE; 2]; MAX_LINK];
+        // Whether the corners (v'', v', first end, second end) are an odd permutation of the tetrahedron's.
+        let mut odd = [0; MAX_LINK];
         let mut loose = 0;
         for f in 0..self.len {
             let (tet, c, j) = self.triangles[f].corners(mesh, star);
             ends[f] = REST[c][j].map(|i| tet[i as usize]);
+            odd[f] = (c + j + usize::from(c < j)) & 1;
             for side in 0..2 {
                 let same = (0..2 * f).find(|&e| ends[e / 2][e % 2] == ends[f][side]);
                 let Some(e) = same else {
                     loose += 1;
                     continue;
                 };
-                if self.partner[e / 2][e % 2] != NO_PARTNER {
+                let same_side = (odd[f] ^ side) == (odd[e / 2] ^ e % 2);
+                if self.partner[e / 2][e % 2] != NO_PARTNER || same_side {
                     return None;
                 }
                 self.partner[e / 2][e % 2] = f as u8;
@@ -516,21 +517,6 @@ impl Fan {
             (at, entered) = (next as usize, back);
         }
         count
-    }
-
-    /// Whether an inner edge of the fan lies on the boundary of the mesh: the star would fall into three parts.
-    fn touches_border(&self, mesh: &CurrentMesh, star: &Star) -> bool {
-        let on_border = |x: u32| {
-            (0..star.len).any(|i| {
-                let (tet, around) = (mesh.tets[star.tets[i] as usize], mesh.neighbors[star.tets[i] as usize]);
-                let c = star.corner[i] as usize;
-                (0..4).any(|j| j != c && around[j] == NONE && tet[j] != x && tet.contains(&x))
-            })
-        };
-        (0..self.len).any(|f| {
-            let (tet, c, j) = self.triangles[f].corners(mesh, star);
-            (0..2).any(|e| self.partner[f][e] != NO_PARTNER && on_border(tet[REST[c][j][e] as usize]))
-        })
     }
 }
 

@@ -185,9 +185,8 @@ impl Work {
         let adjacent: BTreeSet<u32> = &self.neighbors(a) | &self.neighbors(b);
         let gone: Vec<[u32; 4]> = self.star[&a].union(&self.star[&b]).copied().collect();
         let kept = gone.iter().filter(|t| !(t.contains(&a) && t.contains(&b)));
-        let star: Vec<([u32; 4], bool)> = kept
-            .map(|t| (t.map(|x| if x == a || x == b { v } else { x }), t.contains(&b)))
-            .collect();
+        let star: Vec<([u32; 4], bool)> =
+            kept.map(|t| (t.map(|x| if x == a || x == b { v } else { x }), t.contains(&b))).collect();
         let small = adjacent.len() - 2 <= 32 && star.len() <= 64;
         if !small
             || self.on_boundary(a) != self.on_boundary(b)

@@ -68,7 +68,11 @@ fn cells(dims: [usize; 3], random: &mut Random, inside: impl Fn([usize; 3]) -> b
     used.dedup();
     let step = (1 << POSITION_BITS) / *dims.iter().max().unwrap_or(&1) as i32;
     let position = |point: usize, random: &mut Random| {
-        let c = [point % (dims[0] + 1), point / (dims[0] + 1) % (dims[1] + 1), point / ((dims[0] + 1) * (dims[1] + 1))];
+        let c = [
+            point % (dims[0] + 1),
+            point / (dims[0] + 1) % (dims[1] + 1),
+            point / ((dims[0] + 1) * (dims[1] + 1)),
+        ];
         let inner = (0..3).all(|i| c[i] > 0 && c[i] < dims[i])
             && (0..8).all(|k| inside([0, 1, 2].map(|i| c[i] - (k >> i & 1))));
         let wobble = if inner { step / 16 } else { 0 };
@@ -88,5 +92,7 @@ fn cells(dims: [usize; 3], random: &mut Random, inside: impl Fn([usize; 3]) -> b
 /// Six times the signed volume.
 pub fn volume6([a, b, c, d]: [[i32; 3]; 4]) -> i128 {
     let [u, v, w] = [b, c, d].map(|p| [0, 1, 2].map(|i| i128::from(p[i]) - i128::from(a[i])));
-    u[0] * (v[1] * w[2] - v[2] * w[1]) + u[1] * (v[2] * w[0] - v[0] * w[2]) + u[2] * (v[0] * w[1] - v[1] * w[0])
+    u[0] * (v[1] * w[2] - v[2] * w[1])
+        + u[1] * (v[2] * w[0] - v[0] * w[2])
+        + u[2] * (v[0] * w[1] - v[1] * w[0])
 }

@@ -38,7 +38,12 @@ pub fn sorted(mut tet: [u32; 4]) -> [u32; 4] {
 }
 
 impl Oracle {
-    pub fn new(positions: Vec<[i32; 3]>, levels: Vec<Vec<i32>>, base: Vec<[u32; 4]>, nodes: Vec<Node>) -> Self {
+    pub fn new(
+        positions: Vec<[i32; 3]>,
+        levels: Vec<Vec<i32>>,
+        base: Vec<[u32; 4]>,
+        nodes: Vec<Node>,
+    ) -> Self {
         let n = nodes.len();
         let (mut creator, mut remover) = (BTreeMap::new(), BTreeMap::new());
         let (mut parents, mut children) = (vec![BTreeSet::new(); n], vec![BTreeSet::new(); n]);
