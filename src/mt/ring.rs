@@ -173,22 +173,28 @@ impl Ring {
     }
 
     /// Finds, for both link vertices of every triangle, the other triangle there. Returns how many have none;
-    /// nothing if three triangles meet in an edge.
+    /// nothing if three triangles meet in an edge, or two whose tetrahedra would lie on the same side of the face
+    /// between them (around an edge where the mesh is not a manifold).
     #[inline]
     fn find_partners(&mut self) -> Option<usize> {
         let mut open = [NO_PARTNER; MAX_LINK];
+        let mut parity = [0; MAX_LINK];
         let mut closed = 0_u32;
         let mut loose = 0;
         for f in 0..self.fan_len {
             let FanTriangle { near, face, .. } = self.fan[f];
-            let ends = REST[self.corner[near as usize] as usize][face as usize];
+            let (c, j) = (self.corner[near as usize] as usize, face as usize);
+            let ends = REST[c][j];
+            // Whether the corners (v'', v', first end, second end) are an odd permutation of the tetrahedron's.
+            let odd = (c + j + usize::from(c < j)) & 1;
             for (side, end) in ends.into_iter().enumerate() {
                 let x = self.local[near as usize][end as usize] as usize;
-                if closed >> x & 1 == 1 {
+                if closed >> x & 1 == 1 || (open[x] != NO_PARTNER && parity[x] == odd ^ side) {
                     return None;
                 }
                 if open[x] == NO_PARTNER {
                     open[x] = (f * 2 + side) as u8;
+                    parity[x] = odd ^ side;
                     loose += 1;
                 } else {
                     let other = open[x] as usize;
