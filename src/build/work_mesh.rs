@@ -72,7 +72,8 @@ impl WorkMesh {
     fn reach(&mut self, t: u32, v: u32, star: &mut Vec<StarTet>) {
         self.marks[t as usize] = self.epoch;
         let tet = self.tets[t as usize];
-        let corner = usize::from(tet[1] == v) | usize::from(tet[2] == v) << 1 | usize::from(tet[3] == v) * 3;
+        let corner =
+            usize::from(tet[1] == v) | (usize::from(tet[2] == v) << 1) | (usize::from(tet[3] == v) * 3);
         star.push(StarTet { tet: t, corner: corner as u8 });
     }
 

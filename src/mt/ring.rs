@@ -85,8 +85,8 @@ impl Ring {
             return false;
         }
         let corner = usize::from(verts[1] == slot)
-            | usize::from(verts[2] == slot) << 1
-            | usize::from(verts[3] == slot) * 3;
+            | (usize::from(verts[2] == slot) << 1)
+            | (usize::from(verts[3] == slot) * 3);
         self.tets[i] = t;
         self.verts[i] = verts;
         self.corner[i] = corner as u8;

@@ -37,12 +37,13 @@ pub fn build(tets: u32, fields: usize, drafts: &[Draft]) -> EdgeMt {
     };
     let mut mt = EdgeMt::new(info, base);
     let mut whole: Vec<u32> = (0..vertices).collect();
+    let mut most = u16::MAX;
     for (offset, choice, mask, error, field_offsets) in drafts {
         let vertex = VertexId(whole.swap_remove(*choice as usize % whole.len()));
         let created = mt.created(UpdateId(mt.updates()));
-        let most = mt.created_by(vertex).map_or(u16::MAX, |u| mt.split(u).error.0);
         let field_offsets: Vec<i32> = field_offsets.iter().copied().cycle().take(fields).collect();
-        let error = ErrorCode((*error).min(most));
+        most = most.min(*error);
+        let error = ErrorCode(most);
         let split =
             VertexSplit { vertex, offset: *offset, field_offsets: &field_offsets, mask: *mask, error };
         mt.push(&split).expect("drafts are made to fit");

@@ -68,12 +68,13 @@ impl Oracle {
         Self { positions, levels, base, nodes, parents, children, ancestors, creator, remover, errors }
     }
 
-    /// Random errors that do not grow from parents to children.
+    /// Random errors that do not grow from one update to the next, and so not from parents to children.
     pub fn choose_errors(&mut self, random: &mut Random) {
-        for u in 0..self.nodes.len() {
-            let bound = self.parents[u].iter().map(|&p| self.errors[p as usize]).min();
-            let bound = bound.unwrap_or(60_000);
-            self.errors[u] = bound - random.below(usize::from(bound) / 8 + 1) as u16;
+        let mut bound = 60_000;
+        for error in &mut self.errors {
+            // Equal errors in a row are as good as falling ones.
+            bound -= random.below(4).saturating_sub(1) as u16 * (bound / 64);
+            *error = bound;
         }
     }
 
