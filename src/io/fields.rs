@@ -6,6 +6,9 @@
 use crate::io::error::ReadReason;
 use crate::mesh::Field;
 
+/// Most fields of a mesh.
+const MAX_FIELDS: usize = 1024;
+
 /// Appends the fields of an array of `components` values a point, checking that all are finite.
 ///
 /// An array without a name is called `field`; a name that is taken gets a number.
@@ -17,6 +20,10 @@ pub(super) fn append(
 ) -> Result<(), ReadReason> {
     if components == 0 {
         return Err(ReadReason::Syntax("an array without components".into()));
+    }
+    // Without points a few bytes can claim any number of components.
+    if fields.len().saturating_add(components) >= MAX_FIELDS {
+        return Err(ReadReason::TooLarge { what: "fields and components".into(), limit: MAX_FIELDS as u64 });
     }
     if let Some(at) = values.iter().position(|v| !v.is_finite()) {
         return Err(ReadReason::NotFinite { point: (at / components) as u64 });

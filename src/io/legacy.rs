@@ -312,12 +312,12 @@ enum Owner {
 /// Everything after the data set's type.
 #[derive(Default)]
 struct Body {
-    positions: Vec<f64>,
+    positions: Option<Vec<f64>>,
     /// Before version 5 counts and indices; since then indices alone.
     connectivity: Vec<i64>,
     /// Since version 5: where each cell starts, and the end.
     offsets: Vec<i64>,
-    cells: usize,
+    cells: Option<usize>,
     types: Vec<i64>,
     dims: Option<[u64; 3]>,
     origin: [f64; 3],
@@ -334,7 +334,8 @@ impl Body {
                 let count = file.count()?;
                 let kind = Kind::named(file.word()?)?;
                 let values = file.floats(count.checked_mul(3), kind)?;
-                self.positions = values.ok_or_else(|| ReadReason::Syntax("points made of text".into()))?;
+                self.positions =
+                    Some(values.ok_or_else(|| ReadReason::Syntax("points made of text".into()))?);
             }
             "cells" => self.cells(file)?,
             "cell_types" => {
@@ -360,11 +361,11 @@ impl Body {
     fn cells(&mut self, file: &mut Reader<'_>) -> Result<(), ReadReason> {
         let (count, size) = (file.count()?, file.count()?);
         if file.version < 5 {
-            self.cells = count;
+            self.cells = Some(count);
             self.connectivity = file.integers(size, NumberType::I32)?;
             return Ok(());
         }
-        self.cells = count.saturating_sub(1);
+        self.cells = Some(count.saturating_sub(1));
         for (expected, length) in [("offsets", count), ("connectivity", size)] {
             let word = file.word()?;
             if !word.eq_ignore_ascii_case(expected) {
@@ -437,43 +438,35 @@ impl Body {
     }
 
     fn unstructured(self, since_5: bool) -> Result<TetMesh, ReadError> {
-        self.check_point_data(self.positions.len() as u64 / 3).at(|| "POINT_DATA".into())?;
-        let positions = points_from(&self.positions).at(|| "POINTS".into())?;
-        if self.types.len() != self.cells {
-            let (expected, found) = (self.cells as u64, self.types.len() as u64);
-            return Err(ReadReason::Count { what: "cell types".into(), expected, found })
-                .at(|| "CELL_TYPES".into());
-        }
+        let missing = |what: &str| ReadReason::Missing(format!("section {what}"));
+        let coordinates = self.positions.as_deref().ok_or_else(|| missing("POINTS")).at(String::new)?;
+        let cells = self.cells.ok_or_else(|| missing("CELLS")).at(String::new)?;
+        self.check_point_data(coordinates.len() as u64 / 3).at(|| "POINT_DATA".into())?;
+        let positions = points_from(coordinates).at(|| "POINTS".into())?;
+        expect("cell types", cells, self.types.len()).at(|| "CELL_TYPES".into())?;
         cells::only_tetrahedra(&self.types).at(|| "CELL_TYPES".into())?;
-        let list = if since_5 { self.indices_by_offsets() } else { self.indices_by_counts() }
-            .at(|| "CELLS".into())?;
-        let tets = cells::tetrahedra(&list, positions.len(), 0).at(|| "CELLS".into())?;
+        let list = if since_5 { self.indices_by_offsets(cells) } else { self.indices_by_counts(cells) };
+        let tets = list.and_then(|l| cells::tetrahedra(&l, positions.len(), 0)).at(|| "CELLS".into())?;
         Ok(TetMesh { positions, fields: self.fields, tets, grid: None })
     }
 
-    fn indices_by_offsets(&self) -> Result<Vec<i64>, ReadReason> {
-        if self.cells > 0 {
-            cells::ends_of_tetrahedra(self.offsets.get(1..).unwrap_or_default())?;
+    fn indices_by_offsets(&self, cells: usize) -> Result<Vec<i64>, ReadReason> {
+        let starts = self.offsets.first();
+        if starts.is_some_and(|s| *s != 0) {
+            return Err(ReadReason::Syntax("the offsets do not start at 0".into()));
         }
-        self.expect_connectivity(4)?;
+        cells::ends_of_tetrahedra(self.offsets.get(1..).unwrap_or_default())?;
+        expect("numbers in the cell list", 4 * cells, self.connectivity.len())?;
         Ok(self.connectivity.clone())
     }
 
-    fn indices_by_counts(&self) -> Result<Vec<i64>, ReadReason> {
-        self.expect_connectivity(5)?;
+    fn indices_by_counts(&self, cells: usize) -> Result<Vec<i64>, ReadReason> {
+        expect("numbers in the cell list", 5 * cells, self.connectivity.len())?;
         let (cells, _) = self.connectivity.as_chunks::<5>();
         if let Some(i) = cells.iter().position(|c| c[0] != 4) {
             return Err(ReadReason::Syntax(format!("tetrahedron {i} does not have four points")));
         }
         Ok(cells.iter().flat_map(|c| &c[1..]).copied().collect())
-    }
-
-    fn expect_connectivity(&self, per_cell: usize) -> Result<(), ReadReason> {
-        let (expected, found) = ((per_cell * self.cells) as u64, self.connectivity.len() as u64);
-        if expected == found {
-            return Ok(());
-        }
-        Err(ReadReason::Count { what: "numbers in the cell list".into(), expected, found })
     }
 
     fn structured(self) -> Result<TetMesh, ReadError> {
@@ -483,6 +476,14 @@ impl Body {
         self.check_point_data(dims.iter().product()).at(|| "POINT_DATA".into())?;
         image::grid_mesh(grid, self.fields).at(|| "POINT_DATA".into())
     }
+}
+
+/// Checks a count. Counts of what was read are far from overflow.
+fn expect(what: &str, expected: usize, found: usize) -> Result<(), ReadReason> {
+    if expected == found {
+        return Ok(());
+    }
+    Err(ReadReason::Count { what: what.into(), expected: expected as u64, found: found as u64 })
 }
 
 /// The number of components after the type of SCALARS, and the LOOKUP_TABLE line, but for its end.

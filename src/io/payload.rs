@@ -127,8 +127,9 @@ pub(super) fn read_block<'a>(
     let blocks = header_number(&mut source, framing)?;
     let block_size = header_number(&mut source, framing)?;
     let last_size = header_number(&mut source, framing)?;
-    let full_blocks = if last_size == 0 { blocks } else { blocks.saturating_sub(1) };
-    let total = full_blocks.checked_mul(block_size).and_then(|n| n.checked_add(last_size));
+    let partial = u64::from(last_size != 0);
+    let full_blocks = blocks.checked_sub(partial);
+    let total = full_blocks.and_then(|n| n.checked_mul(block_size)).and_then(|n| n.checked_add(last_size));
     expect_bytes(total.unwrap_or(u64::MAX), needed)?;
     let mut sizes = Vec::new();
     for _ in 0..blocks {
@@ -137,7 +138,7 @@ pub(super) fn read_block<'a>(
     let mut data = Vec::new();
     for (i, size) in (0_u64..).zip(sizes) {
         let compressed = source.take(to_usize(size)?)?;
-        let expected = to_usize(if i < full_blocks { block_size } else { last_size })?;
+        let expected = to_usize(if i + partial < blocks { block_size } else { last_size })?;
         let before = data.len();
         decompress(compressor, &compressed, expected, &mut data)?;
         if data.len() - before != expected {

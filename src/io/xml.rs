@@ -16,6 +16,9 @@ use crate::io::payload::Compressor;
 use crate::io::payload::Framing;
 use crate::io::payload::Source;
 
+/// Deepest nesting of elements; VTK's files need eight.
+const MAX_DEPTH: usize = 32;
+
 /// The attributes of an element.
 #[derive(Debug, Default)]
 pub(super) struct Attributes(Vec<(String, String)>);
@@ -47,7 +50,7 @@ impl Attributes {
 
     fn of(element: &BytesStart<'_>) -> Result<Self, ReadReason> {
         let mut list = Vec::new();
-        for attribute in element.attributes() {
+        for attribute in element.attributes().with_checks(false) {
             let attribute = attribute.map_err(|e| ReadReason::Syntax(format!("not well-formed XML: {e}")))?;
             let value = attribute
                 .normalized_value(XmlVersion::Explicit1_0)
@@ -278,6 +281,9 @@ impl<'a> Parser<'a> {
                 }
             }
             _ => {}
+        }
+        if self.stack.len() > MAX_DEPTH {
+            return Err(ReadReason::TooLarge { what: "nested elements".into(), limit: MAX_DEPTH as u64 });
         }
         if stays_open {
             self.stack.push(name);

@@ -4,8 +4,8 @@ use crate::mesh::FACES;
 use crate::mesh::MeshError;
 use crate::mesh::NONE;
 
-/// Most tetrahedra in a mesh: a face is numbered `4 · tet + i` in 32 bits.
-pub const MAX_TETS: usize = 1 << 30;
+/// Most tetrahedra in a mesh: its faces, four a tetrahedron, are counted in 32 bits.
+pub const MAX_TETS: usize = (1 << 30) - 1;
 
 /// One side of a face: the face of one tetrahedron.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
