@@ -91,8 +91,12 @@ function openResponse(response, name) {
   return open(name, length === null ? undefined : Number(length), response.body);
 }
 
-function openFile(url) {
-  return open(url, undefined, nodeModule("node:fs").createReadStream(new URL(url)));
+async function openFile(url) {
+  const { promises, createReadStream } = nodeModule("node:fs");
+  const { size } = await promises.stat(new URL(url)).catch((error) => {
+    throw new TetralodError("network", `${url}: ${error.message}`, { cause: error });
+  });
+  return open(url, size, createReadStream(new URL(url)));
 }
 
 function open(name, total, source) {
@@ -118,14 +122,20 @@ function readerIterator(stream) {
 function named(iterator, name) {
   return {
     async next() {
-      const { done, value } = await iterator.next().catch((error) => {
-        if (error?.name === "AbortError") throw error;
-        throw new TetralodError("network", `${name}: ${error?.message ?? error}`, { cause: error });
-      });
+      const { done, value } = await nextOf(iterator, name);
       return done ? { done, value: undefined } : { done: false, value: owned(value, name) };
     },
     return: () => iterator.return?.(),
   };
+}
+
+async function nextOf(iterator, name) {
+  try {
+    return await iterator.next();
+  } catch (error) {
+    if (error?.name === "AbortError") throw error;
+    throw new TetralodError("network", `${name}: ${error?.message ?? error}`, { cause: error });
+  }
 }
 
 function owned(chunk, name) {
