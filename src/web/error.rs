@@ -14,7 +14,10 @@ pub struct WebError {
 impl WebError {
     /// A call that the state of the session does not allow.
     pub fn not_ready() -> Self {
-        Self { code: "not-ready", message: "the base mesh has not arrived yet; wait until `ready`".to_owned() }
+        Self {
+            code: "not-ready",
+            message: "the base mesh has not arrived yet; wait until `ready`".to_owned(),
+        }
     }
 
     /// The option or argument `name` cannot be used.
@@ -47,7 +50,9 @@ impl From<WebError> for JsValue {
 fn format_code(error: &FormatError) -> &'static str {
     match error {
         FormatError::NotMt => "not-mt",
-        FormatError::UnsupportedVersion { .. } | FormatError::UnsupportedFeature { .. } => "unsupported-version",
+        FormatError::UnsupportedVersion { .. } | FormatError::UnsupportedFeature { .. } => {
+            "unsupported-version"
+        }
         FormatError::Corrupt { .. } | FormatError::Update(_) | FormatError::Base(_) => "corrupt",
         FormatError::Truncated { .. } => "truncated",
         FormatError::Limit { .. } => "limit",
@@ -57,7 +62,7 @@ fn format_code(error: &FormatError) -> &'static str {
 fn session_code(error: &SessionError) -> &'static str {
     match error {
         SessionError::NotReady => "not-ready",
+        SessionError::Field { .. } | SessionError::Request(_) => "bad-option",
         SessionError::Format(error) => format_code(error),
-        _ => "bad-option",
     }
 }

@@ -45,7 +45,10 @@ pub fn request(options: &JsValue, info: &MtInfo) -> Result<Request, WebError> {
     let Some(options) = object(options)? else { return Ok(Request::default()) };
     for name in Object::keys(&options).iter().filter_map(|name| name.as_string()) {
         if !NAMES.contains(&name.as_str()) {
-            return Err(WebError::bad_option(&name, format_args!("there is none of this name, only {}", NAMES.join(", "))));
+            return Err(WebError::bad_option(
+                &name,
+                format_args!("there is none of this name, only {}", NAMES.join(", ")),
+            ));
         }
     }
     let field = option(&options, "field")?.map_or(Ok(0), |name: String| field_index(info, &name))?;
@@ -71,7 +74,8 @@ fn object(options: &JsValue) -> Result<Option<Object>, WebError> {
     if options.is_undefined() || options.is_null() {
         return Ok(None);
     }
-    let object = options.dyn_ref::<Object>().ok_or_else(|| WebError::bad_option("options", "must be an object"))?;
+    let object =
+        options.dyn_ref::<Object>().ok_or_else(|| WebError::bad_option("options", "must be an object"))?;
     Ok(Some(object.clone()))
 }
 
@@ -99,7 +103,10 @@ fn error(options: &Object, field: &FieldInfo) -> Result<f64, WebError> {
 fn percentage(text: &str) -> Result<f64, WebError> {
     let number = text.trim().strip_suffix('%').and_then(|number| number.trim_end().parse::<f64>().ok());
     let number = number.ok_or_else(|| {
-        WebError::bad_option("error", format_args!("`{text}` is neither a number nor a percentage such as \"1%\""))
+        WebError::bad_option(
+            "error",
+            format_args!("`{text}` is neither a number nor a percentage such as \"1%\""),
+        )
     })?;
     Ok(number / 100.0)
 }

@@ -19,13 +19,15 @@ use wasm_bindgen::prelude::wasm_bindgen;
 #[wasm_bindgen(typescript_custom_section)]
 const TYPES: &str = r#"
 /** How much of a file has been decoded. */
-export interface CoreProgress {
+export interface Progress {
   /** Whether the base mesh is there, so that meshes can be asked for. */
   ready: boolean;
   /** Whether the whole file is there. */
   complete: boolean;
   /** Bytes taken in. */
   bytes: number;
+  /** Bytes of the whole file, as soon as that is known. */
+  total: number | undefined;
   /** Updates decoded; `info.updates` is how many there will be. */
   updates: number;
 }
@@ -59,6 +61,8 @@ export interface CoreStats {
   /** Size of the current mesh. */
   vertices: number;
   tetrahedra: number;
+  /** Updates that are applied in the current mesh. */
+  applied: number;
   /** Updates applied and undone by this call. */
   refined: number;
   coarsened: number;
@@ -95,7 +99,7 @@ export interface IsoSurface {
 #[wasm_bindgen]
 extern "C" {
     /// Decoding progress as a plain object.
-    #[wasm_bindgen(typescript_type = "CoreProgress")]
+    #[wasm_bindgen(typescript_type = "Progress")]
     pub type JsProgress;
     /// What is known of the MT, or `undefined`.
     #[wasm_bindgen(typescript_type = "MtInfo | undefined")]
@@ -116,6 +120,7 @@ struct ProgressObject {
     ready: bool,
     complete: bool,
     bytes: f64,
+    total: Option<f64>,
     updates: u32,
 }
 
@@ -142,6 +147,7 @@ struct InfoObject<'a> {
 struct StatsObject {
     vertices: u32,
     tetrahedra: u32,
+    applied: f64,
     refined: f64,
     coarsened: f64,
     error_bound: f64,
@@ -151,8 +157,9 @@ struct StatsObject {
 
 /// `progress` for JavaScript.
 pub fn progress(progress: &Progress) -> JsProgress {
-    let Progress { ready, complete, bytes, updates, .. } = *progress;
-    plain(&ProgressObject { ready, complete, bytes: bytes as f64, updates })
+    let Progress { ready, complete, bytes, total, updates } = *progress;
+    let total = total.map(|total| total as f64);
+    plain(&ProgressObject { ready, complete, bytes: bytes as f64, total, updates })
 }
 
 /// `info` for JavaScript.
@@ -178,10 +185,11 @@ fn field(field: &FieldInfo) -> FieldObject<'_> {
 
 /// `stats` for JavaScript; `field` is the one that the errors speak of.
 pub fn stats(stats: &RefineStats, field: &FieldInfo) -> JsStats {
-    let RefineStats { vertices, tetrahedra, refined, coarsened, error_bound, satisfied, .. } = *stats;
+    let RefineStats { vertices, tetrahedra, applied, refined, coarsened, error_bound, satisfied } = *stats;
     plain(&StatsObject {
         vertices,
         tetrahedra,
+        applied: f64::from(applied),
         refined: refined as f64,
         coarsened: coarsened as f64,
         error_bound: error_bound * field.range(),

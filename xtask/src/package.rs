@@ -5,7 +5,7 @@
 
 use std::fs;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 use flate2::Compression;
@@ -78,7 +78,9 @@ fn compile(module: &Module, out: &Path) -> Result<()> {
     let Module { name, features } = module;
     println!("building {name} ({features})");
     let args = ["build", "--package", "tetralod", "--lib", "--profile", "wasm", "--target", shell::WASM];
-    shell::run(shell::cargo(args).args(["--no-default-features", "--features", features]))?;
+    let mut command = shell::cargo(args);
+    command.args(["--no-default-features", "--features", features, "--config", &path_free()?]);
+    shell::run(&mut command)?;
     let wasm = Path::new("target").join(shell::WASM).join("wasm/tetralod.wasm");
     let path = |path: &Path| path.to_string_lossy().into_owned();
     let bindgen =
@@ -87,9 +89,17 @@ fn compile(module: &Module, out: &Path) -> Result<()> {
     optimise(&out.join(format!("{name}_bg.wasm")))
 }
 
+/// Panic messages name source files: the same bytes must come out on every machine, and no home folder in them.
+fn path_free() -> Result<String> {
+    let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
+    let home = home.or_else(|| Some(std::env::home_dir()?.join(".cargo"))).context("there is no home folder")?;
+    let flag = format!("--remap-path-prefix={}=cargo", home.display());
+    Ok(format!("target.{}.rustflags={}", shell::WASM, serde_json::json!([flag])))
+}
+
 fn optimise(wasm: &Path) -> Result<()> {
     let tool = "tests/js/node_modules/binaryen/bin/wasm-opt";
-    let mut command = shell::command("node", [tool, "-O3"]);
+    let mut command = shell::command("node", [tool, "-O3", "--strip-debug", "--strip-producers"]);
     shell::run(command.args(WASM_FEATURES).arg(wasm).arg("-o").arg(wasm))
 }
 
