@@ -68,9 +68,19 @@ pub fn wasm_tests(browser: &Browser, cargo_args: &[&str]) -> Result<Command> {
     let config = format!("target.{}.runner={runner}", shell::WASM);
     let mut command = shell::cargo(["test", "--config", &config, "--target", shell::WASM]);
     command.args(cargo_args).env("CHROMEDRIVER", &browser.driver);
-    command.env("WASM_BINDGEN_TEST_WEBDRIVER_JSON", shell::root().join("webdriver.json"));
+    command.env("WASM_BINDGEN_TEST_WEBDRIVER_JSON", capabilities(browser)?);
     command.envs([("WASM_BINDGEN_TEST_TIMEOUT", "300"), ("WASM_BINDGEN_TEST_DRIVER_TIMEOUT", "60")]);
     Ok(command)
+}
+
+/// `webdriver.json` with the browser that was found, so that all tests run in the same one.
+fn capabilities(browser: &Browser) -> Result<PathBuf> {
+    let text = std::fs::read_to_string("webdriver.json").context("webdriver.json")?;
+    let mut json: serde_json::Value = serde_json::from_str(&text).context("webdriver.json")?;
+    json["goog:chromeOptions"]["binary"] = browser.chromium.to_string_lossy().into();
+    let file = shell::root().join("target/webdriver.json");
+    std::fs::write(&file, json.to_string()).with_context(|| file.display().to_string())?;
+    Ok(file)
 }
 
 /// What cargo calls as `RUNNER test.wasm ARGS...`.

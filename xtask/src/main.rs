@@ -11,6 +11,8 @@ mod serve;
 mod shell;
 mod suite;
 
+use std::process::ExitCode;
+
 use anyhow::{Result, bail};
 
 const USAGE: &str = "\
@@ -21,7 +23,17 @@ usage: cargo xtask COMMAND
   test [STEP...]                 every check, or the named steps; `test --list` names them
   bench [FILE.mt] [--browser]    measure decoding, refinement and isosurfaces; natively, or also in the browser";
 
-fn main() -> Result<()> {
+fn main() -> ExitCode {
+    match run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run() -> Result<()> {
     let args: Vec<String> = std::env::args().skip(1).collect();
     let Some((command, rest)) = args.split_first() else { bail!("{USAGE}") };
     // The test runner is called by cargo from the folder of the package under test, with paths relative to it.

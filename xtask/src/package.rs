@@ -92,7 +92,8 @@ fn compile(module: &Module, out: &Path) -> Result<()> {
 /// Panic messages name source files: the same bytes must come out on every machine, and no home folder in them.
 fn path_free() -> Result<String> {
     let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
-    let home = home.or_else(|| Some(std::env::home_dir()?.join(".cargo"))).context("there is no home folder")?;
+    let home =
+        home.or_else(|| Some(std::env::home_dir()?.join(".cargo"))).context("there is no home folder")?;
     let flag = format!("--remap-path-prefix={}=cargo", home.display());
     Ok(format!("target.{}.rustflags={}", shell::WASM, serde_json::json!([flag])))
 }

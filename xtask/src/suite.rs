@@ -79,7 +79,7 @@ fn clippy() -> Result<()> {
         lint_library(features, &["--target", shell::WASM])?;
     }
     with_fixture(|| {
-        let args = ["clippy", "--package", "tetralod", "--test", "web", "--target", shell::WASM];
+        let args = ["clippy", "--package", "tetralod", "--test", "web*", "--target", shell::WASM];
         shell::run(fixture_env(shell::cargo(args).args(WEB_FEATURES).args(["--", "-D", "warnings"])))
     })
 }
@@ -109,7 +109,7 @@ fn wasm() -> Result<()> {
     let browser = browser::require()?;
     shell::add_wasm_target()?;
     with_fixture(|| {
-        let mut command = browser::wasm_tests(&browser, &["--package", "tetralod", "--test", "web"])?;
+        let mut command = browser::wasm_tests(&browser, &["--package", "tetralod", "--test", "web*"])?;
         shell::run(fixture_env(command.args(WEB_FEATURES)))
     })
 }
