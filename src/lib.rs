@@ -41,3 +41,5 @@ pub mod mt;
 pub mod refine;
 pub mod session;
 pub mod view;
+#[cfg(feature = "web")]
+pub mod web;

@@ -1,4 +1,51 @@
-//! The project's own commands, behind `cargo xtask`.
-fn main() -> anyhow::Result<()> {
-    anyhow::bail!("usage: cargo xtask <demo|test|bench>")
+//! The project's own commands, behind `cargo xtask`: everything that a fresh machine with Rust, Node and git needs to
+//! build the package, show the demo, run every check and measure.
+#![forbid(unsafe_code)]
+
+mod bench;
+mod browser;
+mod demo;
+mod fixture;
+mod package;
+mod serve;
+mod shell;
+mod suite;
+
+use std::process::ExitCode;
+
+use anyhow::{Result, bail};
+
+const USAGE: &str = "\
+usage: cargo xtask COMMAND
+
+  build                          build the npm package into pkg/
+  demo [--port N] [--no-serve]   build everything, make the demo's data, serve the page on localhost
+  test [STEP...]                 every check, or the named steps; `test --list` names them
+  bench [FILE.mt] [--browser]    measure decoding, refinement and isosurfaces; natively, or also in the browser";
+
+fn main() -> ExitCode {
+    match run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run() -> Result<()> {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    let Some((command, rest)) = args.split_first() else { bail!("{USAGE}") };
+    // The test runner is called by cargo from the folder of the package under test, with paths relative to it.
+    if command == browser::RUNNER {
+        return browser::run_wasm_tests(rest);
+    }
+    std::env::set_current_dir(shell::root())?;
+    match command.as_str() {
+        "build" => package::build(rest),
+        "demo" => demo::run(rest),
+        "test" => suite::run(rest),
+        "bench" => bench::run(rest),
+        other => bail!("there is no command `{other}`\n{USAGE}"),
+    }
 }

@@ -1,0 +1,71 @@
+/** The wasm core behind the methods that `MultiTessellation` calls: in a worker, or in the caller's own thread. */
+
+import init, { CoreSession } from "./tetralod_core.js";
+import { TetralodError, reviveError } from "./errors.js";
+import { nodeModule } from "./stream.js";
+
+let loading;
+
+/** Compiles the wasm module once per thread. */
+export function loadCore() {
+  loading ??= load().catch((error) => {
+    loading = undefined;
+    throw new TetralodError("wasm", `the wasm module did not load: ${error?.message ?? error}`, { cause: error });
+  });
+  return loading;
+}
+
+async function load() {
+  const url = new URL("./tetralod_core_bg.wasm", import.meta.url);
+  // Node cannot fetch files; browsers compile while they download.
+  const fs = url.protocol === "file:" ? nodeModule("node:fs/promises") : undefined;
+  return init({ module_or_path: fs ? await fs.readFile(url) : url });
+}
+
+/** The methods of one session, for `serve` or `local`. */
+export function coreMethods() {
+  let session;
+  const refine = (options) => {
+    const start = performance.now();
+    const stats = session.refine(options);
+    return { ...stats, milliseconds: performance.now() - start };
+  };
+  return {
+    async start() {
+      await loadCore();
+      session = new CoreSession();
+    },
+    feed: (bytes) => session.feed(bytes),
+    finish: () => session.finish(),
+    info: () => session.info(),
+    refine: (options) => {
+      const stats = refine(options);
+      return { ...session.mesh(), stats };
+    },
+    setField: (name) => session.setField(name),
+    isosurface: (value) => session.isosurface(value),
+    hash: () => session.hash(),
+    free: () => session?.free(),
+  };
+}
+
+/** The same calls as `Remote` makes, without a worker. */
+export class Local {
+  #methods = coreMethods();
+  #closed = null;
+
+  async call(method, args = []) {
+    if (this.#closed) throw this.#closed;
+    try {
+      return await this.#methods[method](...args);
+    } catch (error) {
+      throw reviveError(error);
+    }
+  }
+
+  close(reason) {
+    if (this.#closed) return;
+    this.#closed = reason;
+    this.#methods.free();
+  }
+}

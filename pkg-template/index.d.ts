@@ -1,0 +1,148 @@
+/**
+ * Very large tetrahedral volumes in a web page: an MT file is streamed, and selective refinement makes from it the
+ * mesh that is needed now.
+ *
+ * ```js
+ * import { MultiTessellation } from "tetralod";
+ *
+ * const mt = await MultiTessellation.open("combustor.mt", { onProgress: (p) => console.log(p.bytes, "of", p.total) });
+ * const coarse = await mt.refine({ error: "5%" });           // while the file is still arriving
+ * await mt.complete;
+ * const sharp = await mt.refine({ error: "0.1%", isovalues: [0.7], maxTets: 500_000 });
+ * const surface = await mt.isosurface(0.7);
+ * mt.free();
+ * ```
+ */
+
+import type { FieldInfo, IsoSurface, Mesh, MtInfo, Progress, CoreStats, RefineOptions } from "./tetralod_core.js";
+
+export type { FieldInfo, IsoSurface, Mesh, MtInfo, Progress, RefineOptions };
+
+/** Everything that an MT can be read from. Bytes in memory are copied, not taken away. */
+export type Source =
+  | string
+  | URL
+  | Request
+  | Response
+  | Blob
+  | ArrayBuffer
+  | ArrayBufferView
+  | ReadableStream<Uint8Array>
+  | AsyncIterable<Uint8Array>;
+
+export interface OpenOptions {
+  /** Ends the download; what is waited for then rejects with the signal's reason, by default an `AbortError`. */
+  signal?: AbortSignal;
+  /** Called after every chunk that has been decoded. */
+  onProgress?: (progress: Progress) => void;
+  /**
+   * Whether decoding and refinement run in a worker of their own (a Web Worker; in Node a `worker_threads` worker), so
+   * that the caller's thread never stalls. Default true. With false everything runs in the caller's thread: simpler to
+   * debug, and enough for scripts.
+   */
+  worker?: boolean;
+}
+
+/** What a refinement did and how good the mesh is now. */
+export interface RefineStats extends CoreStats {
+  /** Time that the refinement took, without making and sending the arrays. */
+  milliseconds: number;
+}
+
+/** The mesh after a refinement, in arrays that belong to the caller. */
+export interface RefineResult extends Mesh {
+  stats: RefineStats;
+}
+
+/**
+ * A volume that is open. Calls are answered in the order in which they were made.
+ */
+export class MultiTessellation {
+  private constructor();
+
+  /**
+   * Opens a volume. Resolves as soon as its base mesh has arrived; the rest goes on arriving, see
+   * {@link MultiTessellation.complete}.
+   *
+   * @example
+   * await MultiTessellation.open("https://example.org/combustor.mt");
+   * @example
+   * await MultiTessellation.open(fileInput.files[0]);
+   * @example
+   * await MultiTessellation.open(await readFile("combustor.mt"), { worker: false });
+   * @throws {TetralodError} when the source cannot be read or is not an MT file
+   */
+  static open(source: Source, options?: OpenOptions): Promise<MultiTessellation>;
+
+  /** What the file says about the volume. */
+  readonly info: MtInfo;
+
+  /** How much has been decoded; a new object after every chunk. */
+  readonly progress: Progress;
+
+  /** Resolves when the whole file has been decoded; rejects when it cannot be. What had arrived stays usable. */
+  readonly complete: Promise<void>;
+
+  /**
+   * Changes the current mesh to the one that is asked for and gives a copy of it. The cost is that of the difference
+   * from the last one. While the file is arriving this does what the data so far allows: `stats.satisfied` tells.
+   *
+   * @example
+   * await mt.refine({ error: "1%" });                                  // within 1 % of the field's range everywhere
+   * @example
+   * await mt.refine({ error: 0.2, field: "T", box: [0, 0, 0, 1, 1, 2] });  // within 0.2 field units in the box
+   * @example
+   * await mt.refine({ isovalues: [0.5], maxTets: 100_000 });           // the best surface for 100,000 tetrahedra
+   */
+  refine(options?: RefineOptions): Promise<RefineResult>;
+
+  /** Chooses the field that isosurfaces follow, without changing the mesh; `refine` with `field` does so too. */
+  setField(name: string): Promise<void>;
+
+  /** The isosurface of the current mesh at `value`, in units of the field. Normals point towards lower values. */
+  isosurface(value: number): Promise<IsoSurface>;
+
+  /** A hash of the current mesh: the same request gives the same hash on every machine. */
+  hash(): Promise<string>;
+
+  /** Ends the download and the worker. Calls under way and later ones reject with code `freed`. */
+  free(): void;
+
+  /** The same as {@link MultiTessellation.free}, for `using mt = await MultiTessellation.open(...)`. */
+  [Symbol.dispose](): void;
+}
+
+/** What went wrong, for programs. */
+export type ErrorCode =
+  /** The source is not of a kind that can be read, or has been read already. */
+  | "bad-source"
+  /** The server could not be reached, answered with an error, or broke off. */
+  | "network"
+  /** The bytes are not an MT file at all. */
+  | "not-mt"
+  /** The file was made by a later version. */
+  | "unsupported-version"
+  /** The file contradicts itself or its checksums. */
+  | "corrupt"
+  /** The file ended too early. */
+  | "truncated"
+  /** The file needs more memory than is allowed. */
+  | "limit"
+  /** An option or argument is unknown or has an impossible value; the message names it. */
+  | "bad-option"
+  /** Nothing has arrived yet that could be asked for. */
+  | "not-ready"
+  /** The object has been freed. */
+  | "freed"
+  /** The wasm module could not be loaded. */
+  | "wasm"
+  /** The browser has no WebGPU, or it gives no adapter (viewer only). */
+  | "webgpu-unavailable"
+  /** A mistake in this package: please report it. */
+  | "internal";
+
+/** The errors of this package. Aborts are not among them: they reject with the signal's own reason. */
+export class TetralodError extends Error {
+  constructor(code: ErrorCode, message: string, options?: ErrorOptions);
+  readonly code: ErrorCode;
+}

@@ -1,0 +1,176 @@
+/**
+ * Everything that an MT can be read from, as one stream of chunks: with abort, with errors that name the source, and
+ * with backpressure (the next chunk is read when the last one has been taken).
+ *
+ * A chunk that comes out of here owns its buffer, so it may be moved into a worker.
+ */
+
+import { TetralodError } from "./errors.js";
+
+/** Bytes in memory are handed on in pieces of this size, so that progress shows and abort works. */
+const PIECE = 1 << 20;
+
+/**
+ * @typedef {object} OpenSource
+ * @property {string} name what to call the source in messages
+ * @property {number | undefined} total its size in bytes where that is known
+ * @property {AsyncIterator<Uint8Array>} chunks
+ */
+
+/**
+ * Opens `source`; for a URL this waits for the response's status.
+ *
+ * @param {import("./index.js").Source} source
+ * @param {AbortSignal} [signal]
+ * @returns {Promise<OpenSource>}
+ */
+export async function openSource(source, signal) {
+  signal?.throwIfAborted();
+  const url = urlOf(source);
+  if (url?.startsWith("file:") && nodeModule("node:fs")) return openFile(url);
+  if (url !== undefined) return openResponse(await request(source, url, signal), url);
+  if (isInstance(source, "Response")) return openResponse(source, source.url || "response");
+  if (isInstance(source, "Blob")) return open("blob", source.size, source.stream());
+  const bytes = bytesOf(source);
+  if (bytes) return { name: "bytes", total: bytes.byteLength, chunks: pieces(bytes) };
+  return open("stream", undefined, source);
+}
+
+/**
+ * Feeds every chunk of `chunks` to `feed` and waits for each before it reads on.
+ *
+ * @param {AsyncIterator<Uint8Array>} chunks
+ * @param {(chunk: Uint8Array) => unknown} feed
+ * @param {AbortSignal} [signal] ends a wait at once; the promise then rejects with the signal's reason
+ */
+export async function pump(chunks, feed, signal) {
+  try {
+    for (;;) {
+      const { done, value } = await abortable(chunks.next(), signal);
+      if (done) return;
+      await abortable(feed(value), signal);
+    }
+  } finally {
+    // Not awaited: a source that hangs must not hold up the error. After the end this does nothing.
+    Promise.resolve(chunks.return?.()).catch(() => {});
+  }
+}
+
+/** `promise`, or the signal's reason as soon as it fires. */
+function abortable(promise, signal) {
+  if (!signal) return promise;
+  return new Promise((resolve, reject) => {
+    const onAbort = () => reject(signal.reason);
+    if (signal.aborted) onAbort();
+    signal.addEventListener("abort", onAbort, { once: true });
+    Promise.resolve(promise)
+      .then(resolve, reject)
+      .finally(() => signal.removeEventListener("abort", onAbort));
+  });
+}
+
+async function request(source, url, signal) {
+  try {
+    return await fetch(source, { signal });
+  } catch (error) {
+    signal?.throwIfAborted();
+    if (error?.name === "AbortError") throw error;
+    throw new TetralodError("network", `${url}: ${error?.cause?.message ?? error.message}`, { cause: error });
+  }
+}
+
+function openResponse(response, name) {
+  if (!response.ok) {
+    response.body?.cancel().catch(() => {});
+    throw new TetralodError("network", `${name}: HTTP ${response.status} ${response.statusText}`.trimEnd());
+  }
+  if (response.bodyUsed || !response.body) throw new TetralodError("bad-source", `${name}: the response has no unread body`);
+  // Under a content encoding the length counts the packed bytes, which never pass through here.
+  const packed = response.headers.get("content-encoding");
+  const length = packed && packed !== "identity" ? null : response.headers.get("content-length");
+  return open(name, length === null ? undefined : Number(length), response.body);
+}
+
+async function openFile(url) {
+  const { promises, createReadStream } = nodeModule("node:fs");
+  const { size } = await promises.stat(new URL(url)).catch((error) => {
+    throw new TetralodError("network", `${url}: ${error.message}`, { cause: error });
+  });
+  return open(url, size, createReadStream(new URL(url)));
+}
+
+function open(name, total, source) {
+  const iterator = iteratorOf(source);
+  if (!iterator) throw new TetralodError("bad-source", `cannot read from ${describe(source)}: ${KINDS}`);
+  return { name, total, chunks: named(iterator, name) };
+}
+
+const KINDS = "give a URL, Request, Response, Blob, ArrayBuffer, Uint8Array, ReadableStream or async iterable of Uint8Array";
+
+function iteratorOf(source) {
+  if (typeof source?.getReader === "function") return readerIterator(source);
+  return source?.[Symbol.asyncIterator]?.() ?? source?.[Symbol.iterator]?.();
+}
+
+/** Not every browser can iterate a stream; every one has readers. */
+function readerIterator(stream) {
+  const reader = stream.getReader();
+  return { next: () => reader.read(), return: () => reader.cancel() };
+}
+
+/** `iterator` with chunks that are checked and own their buffers, and with failures that name the source. */
+function named(iterator, name) {
+  return {
+    async next() {
+      const { done, value } = await nextOf(iterator, name);
+      return done ? { done, value: undefined } : { done: false, value: owned(value, name) };
+    },
+    return: () => iterator.return?.(),
+  };
+}
+
+async function nextOf(iterator, name) {
+  try {
+    return await iterator.next();
+  } catch (error) {
+    if (error?.name === "AbortError") throw error;
+    throw new TetralodError("network", `${name}: ${error?.message ?? error}`, { cause: error });
+  }
+}
+
+function owned(chunk, name) {
+  const bytes = bytesOf(chunk);
+  if (!bytes) throw new TetralodError("bad-source", `${name}: gave ${describe(chunk)} where a Uint8Array belongs`);
+  return bytes.slice();
+}
+
+async function* pieces(bytes) {
+  for (let at = 0; at < bytes.byteLength; at += PIECE) yield bytes.slice(at, at + PIECE);
+}
+
+function bytesOf(value) {
+  if (value instanceof ArrayBuffer) return new Uint8Array(value);
+  if (!ArrayBuffer.isView(value)) return undefined;
+  // A plain Uint8Array over the same bytes: `slice` of a Node Buffer would share its pool.
+  return new Uint8Array(value.buffer, value.byteOffset, value.byteLength);
+}
+
+function urlOf(source) {
+  if (typeof source === "string") return source;
+  if (source instanceof URL) return source.href;
+  return isInstance(source, "Request") ? source.url : undefined;
+}
+
+/** `instanceof` for classes that a runtime may lack. */
+function isInstance(value, name) {
+  return typeof globalThis[name] === "function" && value instanceof globalThis[name];
+}
+
+function describe(value) {
+  return value === null ? "null" : typeof value === "object" ? `a ${value.constructor?.name ?? "object"}` : `a ${typeof value}`;
+}
+
+/** A built-in module of Node, found in a way that no bundler tries to follow; `undefined` elsewhere. */
+export function nodeModule(name) {
+  return globalThis.process?.getBuiltinModule?.(name);
+}

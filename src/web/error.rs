@@ -1,0 +1,68 @@
+//! Errors at the edge to JavaScript: an `Error` with a `code` that programs can act on.
+
+use crate::format::FormatError;
+use crate::session::SessionError;
+use wasm_bindgen::JsValue;
+
+/// A typed error of the core, or a wrong argument, on its way to JavaScript.
+#[derive(Debug)]
+pub struct WebError {
+    code: &'static str,
+    message: String,
+}
+
+impl WebError {
+    /// A call that the state of the session does not allow.
+    pub fn not_ready() -> Self {
+        Self {
+            code: "not-ready",
+            message: "the base mesh has not arrived yet; wait until `ready`".to_owned(),
+        }
+    }
+
+    /// The option or argument `name` cannot be used.
+    pub fn bad_option(name: &str, problem: impl std::fmt::Display) -> Self {
+        Self { code: "bad-option", message: format!("option `{name}`: {problem}") }
+    }
+}
+
+impl From<FormatError> for WebError {
+    fn from(error: FormatError) -> Self {
+        Self { code: format_code(&error), message: error.to_string() }
+    }
+}
+
+impl From<SessionError> for WebError {
+    fn from(error: SessionError) -> Self {
+        Self { code: session_code(&error), message: error.to_string() }
+    }
+}
+
+impl From<WebError> for JsValue {
+    fn from(error: WebError) -> Self {
+        let js = js_sys::Error::new(&error.message);
+        // Setting a property on a fresh ordinary object cannot fail.
+        let _ = js_sys::Reflect::set(&js, &"code".into(), &error.code.into());
+        js.into()
+    }
+}
+
+fn format_code(error: &FormatError) -> &'static str {
+    match error {
+        FormatError::NotMt => "not-mt",
+        FormatError::UnsupportedVersion { .. } | FormatError::UnsupportedFeature { .. } => {
+            "unsupported-version"
+        }
+        FormatError::Corrupt { .. } | FormatError::Update(_) | FormatError::Base(_) => "corrupt",
+        FormatError::Truncated { .. } => "truncated",
+        FormatError::Limit { .. } => "limit",
+    }
+}
+
+fn session_code(error: &SessionError) -> &'static str {
+    match error {
+        SessionError::NotReady => "not-ready",
+        SessionError::Field { .. } | SessionError::Request(_) => "bad-option",
+        SessionError::Format(error) => format_code(error),
+    }
+}

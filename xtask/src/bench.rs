@@ -1,0 +1,94 @@
+//! `cargo xtask bench`: the same benchmark natively and in the browser, side by side.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use serde_json::Value;
+
+use crate::serve::Mount;
+use crate::{browser, demo, fixture, package, serve, shell};
+
+/// Measures `FILE.mt`, or the demo's volume; with `--browser` also in Chromium.
+pub fn run(args: &[String]) -> Result<()> {
+    let (mut file, mut in_browser) = (None, false);
+    for arg in args {
+        match arg.as_str() {
+            "--browser" => in_browser = true,
+            path if !path.starts_with('-') && file.is_none() => file = Some(PathBuf::from(path)),
+            other => bail!("`bench` knows one FILE.mt and --browser, not `{other}`"),
+        }
+    }
+    let file = file.map_or_else(demo::bench_volume, Ok)?;
+    println!("measuring {}", file.display());
+    let native = native(&file)?;
+    let browser = if in_browser { Some(browser(&file)?) } else { None };
+    print(&native, browser.as_deref());
+    Ok(())
+}
+
+type Rates = Vec<(String, f64)>;
+
+fn native(file: &Path) -> Result<Rates> {
+    let tetralod = fixture::tetralod()?;
+    rates(&shell::output(shell::command(tetralod, ["bench"]).arg(file).arg("--json"))?)
+}
+
+/// A page that holds the wasm module alone runs the benchmark; Node starts the browser and prints what it found.
+fn browser(file: &Path) -> Result<Rates> {
+    let browser = browser::require()?;
+    package::build(&[])?;
+    let data = Path::new("target/bench");
+    std::fs::create_dir_all(data)?;
+    std::fs::copy(file, data.join("volume.mt")).with_context(|| file.display().to_string())?;
+    let mounts = [("/pkg/", package::PKG), ("/data/", "target/bench"), ("/", "tests/js/bench")];
+    let mounts =
+        mounts.iter().map(|(prefix, folder)| Mount::new(prefix, folder)).collect::<Result<Vec<_>>>()?;
+    let mut command = shell::command("node", ["tests/js/bench/run.js"]);
+    command.env("TETRALOD_PAGE", serve::start(mounts, 0)?).env("CHROMIUM", browser.chromium);
+    rates(&shell::output(&mut command)?)
+}
+
+/// The numbers of a report such as `{ "decode": { "updates_per_second": 1e6 } }`, as `decode.updates_per_second`.
+fn rates(json: &str) -> Result<Rates> {
+    let report: Value = serde_json::from_str(json).with_context(|| format!("not a report: {json}"))?;
+    let mut rates = Vec::new();
+    collect("", &report, &mut rates);
+    Ok(rates)
+}
+
+fn collect(path: &str, value: &Value, rates: &mut Rates) {
+    match value {
+        Value::Number(number) => rates.push((path.to_owned(), number.as_f64().unwrap_or(f64::NAN))),
+        Value::Object(members) => {
+            for (name, member) in members {
+                let separator = if path.is_empty() { "" } else { "." };
+                collect(&format!("{path}{separator}{name}"), member, rates);
+            }
+        }
+        _ => {}
+    }
+}
+
+fn print(native: &Rates, browser: Option<&[(String, f64)]>) {
+    println!("{:<36} {:>14} {:>14} {:>7}", "", "native", "browser", "ratio");
+    for (name, value) in native {
+        let other = browser.and_then(|rates| rates.iter().find(|(other, _)| other == name));
+        match other {
+            Some((_, other)) => println!("{name:<36} {value:>14.0} {other:>14.0} {:>7.2}", other / value),
+            None => println!("{name:<36} {value:>14.0} {:>14} {:>7}", "-", "-"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::rates;
+
+    #[test]
+    fn nested_numbers_get_dotted_names() {
+        let report = r#"{ "decode": { "updates_per_second": 5 }, "name": "x", "n": 1.5 }"#;
+        let expected = vec![("decode.updates_per_second".to_owned(), 5.0), ("n".to_owned(), 1.5)];
+        assert_eq!(rates(report).unwrap(), expected);
+        assert!(rates("oops").is_err());
+    }
+}

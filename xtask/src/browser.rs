@@ -1,0 +1,96 @@
+//! Chromium with WebGPU: finding it, installing it where that is allowed, and running wasm tests in it.
+
+use std::path::PathBuf;
+use std::process::Command;
+
+use anyhow::{Context, Result, bail, ensure};
+
+use crate::shell;
+
+/// The hidden command that cargo calls for each wasm test binary.
+pub const RUNNER: &str = "wasm-test-runner";
+
+const BROWSERS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
+
+/// A browser and the driver that steers it.
+#[derive(Clone, Debug)]
+pub struct Browser {
+    /// The program to start.
+    pub chromium: PathBuf,
+    /// Its WebDriver server.
+    pub driver: PathBuf,
+}
+
+/// The browser of this machine: the variables CHROMIUM and CHROMEDRIVER, what PATH has, or a fresh installation.
+pub fn require() -> Result<Browser> {
+    if let Some(browser) = find() {
+        return Ok(browser);
+    }
+    install()?;
+    find().context("Chromium was installed but neither `chromium` nor `chromedriver` is in PATH")
+}
+
+fn find() -> Option<Browser> {
+    let given = |name| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_file());
+    let chromium = given("CHROMIUM").or_else(|| BROWSERS.iter().find_map(|name| shell::find(name)))?;
+    let driver = given("CHROMEDRIVER").or_else(|| shell::find("chromedriver"))?;
+    Some(Browser { chromium, driver })
+}
+
+const BY_HAND: &str = "Chromium and chromedriver are needed: install the packages `chromium` and `chromium-driver` \
+                       (Debian; elsewhere any Chromium 113 or later), or set CHROMIUM and CHROMEDRIVER to their paths";
+
+fn install() -> Result<()> {
+    let Some(apt) = shell::find("apt-get") else { bail!(BY_HAND) };
+    let rights: &[&str] = match () {
+        () if shell::output(&mut shell::command("id", ["-u"]))?.trim() == "0" => &[],
+        () if shell::succeeds(&mut shell::command("sudo", ["-n", "true"])) => &["sudo", "-n"],
+        () => bail!(BY_HAND),
+    };
+    println!("installing Chromium with apt");
+    let apt = apt.to_string_lossy();
+    let with_rights = |args: &[&str]| -> Command {
+        let words: Vec<&str> =
+            rights.iter().copied().chain([apt.as_ref()]).chain(args.iter().copied()).collect();
+        let mut command = shell::command(words[0], &words[1..]);
+        command.env("DEBIAN_FRONTEND", "noninteractive");
+        command
+    };
+    shell::run(&mut with_rights(&["update", "-qq"])).context(BY_HAND)?;
+    let packages = ["install", "-y", "-qq", "--no-install-recommends", "chromium", "chromium-driver"];
+    shell::run(&mut with_rights(&packages)).context(BY_HAND)
+}
+
+/// `cargo test` for wasm, with this program as the runner and `browser` as the place to run; not started yet.
+pub fn wasm_tests(browser: &Browser, cargo_args: &[&str]) -> Result<Command> {
+    let this = std::env::current_exe()?;
+    let runner = serde_json::json!([this.to_string_lossy(), RUNNER]);
+    let config = format!("target.{}.runner={runner}", shell::WASM);
+    let mut command = shell::cargo(["test", "--config", &config, "--target", shell::WASM]);
+    command.args(cargo_args).env("CHROMEDRIVER", &browser.driver);
+    command.env("WASM_BINDGEN_TEST_WEBDRIVER_JSON", capabilities(browser)?);
+    command.envs([("WASM_BINDGEN_TEST_TIMEOUT", "300"), ("WASM_BINDGEN_TEST_DRIVER_TIMEOUT", "60")]);
+    Ok(command)
+}
+
+/// `webdriver.json` with the browser that was found, so that all tests run in the same one.
+fn capabilities(browser: &Browser) -> Result<PathBuf> {
+    let text = std::fs::read_to_string("webdriver.json").context("webdriver.json")?;
+    let mut json: serde_json::Value = serde_json::from_str(&text).context("webdriver.json")?;
+    json["goog:chromeOptions"]["binary"] = browser.chromium.to_string_lossy().into();
+    let file = shell::root().join("target/webdriver.json");
+    std::fs::write(&file, json.to_string()).with_context(|| file.display().to_string())?;
+    Ok(file)
+}
+
+/// What cargo calls as `RUNNER test.wasm ARGS...`.
+pub fn run_wasm_tests(args: &[String]) -> Result<()> {
+    // wasm-bindgen's runner takes a file without tests for a success; here it would hide that nothing was run.
+    let file = args.first().context("the runner needs a wasm file")?;
+    let wasm = std::fs::read(file).with_context(|| file.clone())?;
+    ensure!(wasm.windows(7).any(|bytes| bytes == b"__wbgt_"), "{file} holds no test");
+    let name = "wasm-bindgen-test-runner".to_owned();
+    wasm_bindgen_cli::wasm_bindgen_test_runner::run_cli_with_args(
+        std::iter::once(name).chain(args.iter().cloned()),
+    )
+}

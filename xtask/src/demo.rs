@@ -1,0 +1,80 @@
+//! `cargo xtask demo`: the page with its data, from nothing.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::thread;
+
+use anyhow::{Context, Result, bail};
+
+use crate::serve::Mount;
+use crate::{fixture, package, serve, shell};
+
+/// Where the page looks for its volumes.
+const DATA: &str = "www/data";
+
+/// Name, kind of file and size of the generated volumes.
+const VOLUMES: [(&str, &str, &str); 2] = [("bucky", "vti", "65"), ("sphere-flow", "vtu", "24")];
+
+/// Builds all, and serves until interrupted.
+pub fn run(args: &[String]) -> Result<()> {
+    let (mut port, mut serve) = (8080, true);
+    let mut args = args.iter();
+    while let Some(arg) = args.next() {
+        match arg.as_str() {
+            "--no-serve" => serve = false,
+            "--port" => {
+                let value = args.next().context("--port needs a number")?;
+                port = value.parse().with_context(|| format!("--port {value}"))?;
+            }
+            other => bail!("`demo` knows --port N and --no-serve, not `{other}`"),
+        }
+    }
+    package::build(&[])?;
+    make_data()?;
+    if serve { serve_page(port) } else { Ok(()) }
+}
+
+/// The largest of the demo's volumes, made if necessary: also what the benchmark measures.
+pub fn bench_volume() -> Result<PathBuf> {
+    make_data()?;
+    Ok(Path::new(DATA).join("bucky.mt"))
+}
+
+/// Makes the MT files that are missing or older than the program that builds them.
+pub fn make_data() -> Result<()> {
+    let tetralod = fixture::tetralod()?;
+    fs::create_dir_all(DATA)?;
+    for (name, extension, size) in VOLUMES {
+        let mt = Path::new(DATA).join(format!("{name}.mt"));
+        if is_newer(&mt, &tetralod) {
+            continue;
+        }
+        println!("making {}", mt.display());
+        let input = Path::new("target").join(format!("{name}.{extension}"));
+        shell::run(shell::command(&tetralod, ["generate", name, "--size", size, "-o"]).arg(&input))?;
+        // Built beside and moved, so that an interrupted build is not taken for a finished one.
+        let part = Path::new("target").join(format!("{name}.mt"));
+        shell::run(shell::command(&tetralod, ["build"]).arg(&input).arg("-o").arg(&part))?;
+        fs::rename(&part, &mt)?;
+    }
+    Ok(())
+}
+
+fn is_newer(file: &Path, than: &Path) -> bool {
+    let modified = |path: &Path| path.metadata().and_then(|data| data.modified()).ok();
+    matches!((modified(file), modified(than)), (Some(file), Some(than)) if file >= than)
+}
+
+/// Serves the page as a web site would: the package at `pkg/`, everything else from `www/`.
+pub fn start_server(port: u16) -> Result<String> {
+    serve::start(vec![Mount::new("/pkg/", package::PKG)?, Mount::new("/", "www")?], port)
+}
+
+fn serve_page(port: u16) -> Result<()> {
+    // Somebody else on the port is no reason to fail: any other will do.
+    let address = start_server(port).or_else(|_| start_server(0))?;
+    println!("\nThe demo is at {address}   (Ctrl-C ends it)");
+    loop {
+        thread::park();
+    }
+}

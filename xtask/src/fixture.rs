@@ -1,0 +1,76 @@
+//! A small MT and, for a list of requests, the hashes of the meshes that the native program extracts from it. The
+//! tests in Node and in the browser must get the same ones.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use serde_json::{Value, json};
+
+use crate::shell;
+
+/// Where the fixture is made; the wasm tests include its files.
+pub const FOLDER: &str = "target/fixture";
+
+/// Requests as JavaScript makes them. The order matters: the sessions under test go from one mesh to the next.
+fn requests() -> Vec<Value> {
+    vec![
+        json!({ "error": "5%" }),
+        json!({ "error": "0.5%" }),
+        json!({ "error": "0%" }),
+        json!({ "error": "2%", "box": [0, 0, 0, 0.5, 0.5, 0.5] }),
+        json!({ "error": "1%", "isovalues": [0.5] }),
+        json!({ "error": "0.1%", "maxTets": 5000 }),
+        json!({ "error": "100%" }),
+    ]
+}
+
+/// Makes `small.mt` and `hashes.json`, a list of `{ options, hash }`.
+pub fn make() -> Result<()> {
+    let folder = Path::new(FOLDER);
+    fs::create_dir_all(folder)?;
+    let tetralod = tetralod()?;
+    let (grid, mt) = (folder.join("small.vti"), folder.join("small.mt"));
+    shell::run(shell::command(&tetralod, ["generate", "bucky", "--size", "17", "-o"]).arg(&grid))?;
+    shell::run(shell::command(&tetralod, ["build"]).arg(&grid).arg("-o").arg(&mt))?;
+    let hashes: Result<Vec<Value>> =
+        requests().into_iter().map(|options| expectation(&tetralod, &mt, options)).collect();
+    fs::write(folder.join("hashes.json"), serde_json::to_string_pretty(&hashes?)?)?;
+    Ok(())
+}
+
+/// The native command, optimised, built if necessary.
+pub fn tetralod() -> Result<PathBuf> {
+    shell::run(&mut shell::cargo(["build", "--release", "--package", "tetralod", "--bin", "tetralod"]))?;
+    Ok(shell::root().join("target/release").join(format!("tetralod{}", std::env::consts::EXE_SUFFIX)))
+}
+
+fn expectation(tetralod: &Path, mt: &Path, options: Value) -> Result<Value> {
+    let out = Path::new(FOLDER).join("extracted.vtu");
+    let mut command = shell::command(tetralod, ["extract"]);
+    command.arg(mt).args(arguments(&options)).arg("--json").arg("-o").arg(out);
+    let summary: Value = serde_json::from_str(&shell::output(&mut command)?).context("extract --json")?;
+    let hash = summary["hash"].as_str().context("extract --json gives no `hash`")?;
+    let tetrahedra = summary["tetrahedra"].as_u64().context("extract --json gives no `tetrahedra`")?;
+    Ok(json!({ "options": options, "hash": hash, "tetrahedra": tetrahedra }))
+}
+
+/// The options of the package as arguments of `tetralod extract`.
+fn arguments(options: &Value) -> Vec<String> {
+    let mut arguments = Vec::new();
+    let list =
+        |value: &Value| value.as_array().into_iter().flatten().map(Value::to_string).collect::<Vec<_>>();
+    if let Some(error) = options["error"].as_str() {
+        arguments.extend(["--error".to_owned(), error.to_owned()]);
+    }
+    if options["box"].is_array() {
+        arguments.extend(["--box".to_owned(), list(&options["box"]).join(",")]);
+    }
+    for value in list(&options["isovalues"]) {
+        arguments.extend(["--iso".to_owned(), value]);
+    }
+    if options["maxTets"].is_number() {
+        arguments.extend(["--budget".to_owned(), options["maxTets"].to_string()]);
+    }
+    arguments
+}

@@ -1,0 +1,164 @@
+//! `cargo xtask build`: the two wasm modules and the hand-written JavaScript, merged into `pkg/`.
+//!
+//! The core (decoder, refinement, isosurfaces) and the viewer (the same with the renderer) are separate modules, so
+//! that a page which draws by its own means does not download a renderer.
+
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail, ensure};
+use flate2::Compression;
+use flate2::write::GzEncoder;
+
+use crate::shell;
+
+/// Where the package is put together.
+pub const PKG: &str = "pkg";
+
+/// The core must stay this small, gzipped.
+const CORE_LIMIT: usize = 150_000;
+
+struct Module {
+    name: &'static str,
+    features: &'static str,
+}
+
+const MODULES: [Module; 2] = [
+    Module { name: "tetralod_core", features: "web" },
+    Module { name: "tetralod_viewer", features: "web,gpu" },
+];
+
+/// What `wasm-opt` may use: what rustc and wasm-bindgen use already, and nothing beyond.
+const WASM_FEATURES: [&str; 6] = [
+    "--enable-bulk-memory",
+    "--enable-multivalue",
+    "--enable-mutable-globals",
+    "--enable-nontrapping-float-to-int",
+    "--enable-reference-types",
+    "--enable-sign-ext",
+];
+
+/// Builds `pkg/` from nothing and prints the sizes of its wasm files.
+pub fn build(args: &[String]) -> Result<()> {
+    if let Some(arg) = args.first() {
+        bail!("`build` takes no argument, got `{arg}`");
+    }
+    check_versions()?;
+    shell::add_wasm_target()?;
+    shell::install_node_tools()?;
+    let staging = Path::new("target/pkg-staging");
+    remake(staging)?;
+    for module in &MODULES {
+        compile(module, staging)?;
+    }
+    assemble(staging)?;
+    report(Path::new(PKG))
+}
+
+/// wasm-bindgen's macro and its command line speak a private protocol: they must be the same version.
+fn check_versions() -> Result<()> {
+    let lock = fs::read_to_string("Cargo.lock").context("Cargo.lock")?;
+    let (library, tool) = (locked(&lock, "wasm-bindgen")?, locked(&lock, "wasm-bindgen-cli")?);
+    ensure!(
+        library == tool,
+        "Cargo.lock has wasm-bindgen {library} but xtask carries wasm-bindgen-cli {tool}: \
+         set the version in xtask/Cargo.toml to ={library}"
+    );
+    Ok(())
+}
+
+fn locked<'a>(lock: &'a str, package: &str) -> Result<&'a str> {
+    let start = format!("name = \"{package}\"\nversion = \"");
+    let at = lock.find(&start).with_context(|| format!("Cargo.lock has no {package}"))? + start.len();
+    lock[at..].split('"').next().context("Cargo.lock ends inside a version")
+}
+
+fn compile(module: &Module, out: &Path) -> Result<()> {
+    let Module { name, features } = module;
+    println!("building {name} ({features})");
+    let args = ["build", "--package", "tetralod", "--lib", "--profile", "wasm", "--target", shell::WASM];
+    let mut command = shell::cargo(args);
+    command.args(["--no-default-features", "--features", features, "--config", &path_free()?]);
+    shell::run(&mut command)?;
+    let wasm = Path::new("target").join(shell::WASM).join("wasm/tetralod.wasm");
+    let path = |path: &Path| path.to_string_lossy().into_owned();
+    let bindgen =
+        ["wasm-bindgen", "--target", "web", "--out-name", name, "--out-dir", &path(out), &path(&wasm)];
+    wasm_bindgen_cli::wasm_bindgen::run_cli_with_args(bindgen)?;
+    optimise(&out.join(format!("{name}_bg.wasm")))
+}
+
+/// Panic messages name source files: the same bytes must come out on every machine, and no home folder in them.
+fn path_free() -> Result<String> {
+    let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
+    let home =
+        home.or_else(|| Some(std::env::home_dir()?.join(".cargo"))).context("there is no home folder")?;
+    let flag = format!("--remap-path-prefix={}=cargo", home.display());
+    Ok(format!("target.{}.rustflags={}", shell::WASM, serde_json::json!([flag])))
+}
+
+fn optimise(wasm: &Path) -> Result<()> {
+    let tool = "tests/js/node_modules/binaryen/bin/wasm-opt";
+    let mut command = shell::command("node", [tool, "-O3", "--strip-debug", "--strip-producers"]);
+    shell::run(command.args(WASM_FEATURES).arg(wasm).arg("-o").arg(wasm))
+}
+
+/// The package is put together beside `pkg/` and swapped in, so that a failed build leaves the last good one.
+fn assemble(staging: &Path) -> Result<()> {
+    let template = Path::new("pkg-template");
+    for file in files_of(template)? {
+        fs::copy(template.join(&file), staging.join(&file)).with_context(|| format!("copying {file}"))?;
+    }
+    for licence in ["LICENSE-MIT", "LICENSE-APACHE"] {
+        fs::copy(licence, staging.join(licence)).context(licence)?;
+    }
+    check_package_version(staging)?;
+    remake(Path::new(PKG))?;
+    for file in files_of(staging)? {
+        fs::rename(staging.join(&file), Path::new(PKG).join(&file))
+            .with_context(|| format!("moving {file}"))?;
+    }
+    Ok(())
+}
+
+fn check_package_version(staging: &Path) -> Result<()> {
+    let text = fs::read_to_string(staging.join("package.json")).context("pkg-template/package.json")?;
+    let json: serde_json::Value = serde_json::from_str(&text).context("pkg-template/package.json")?;
+    let lock = fs::read_to_string("Cargo.lock").context("Cargo.lock")?;
+    let (npm, cargo) = (json["version"].as_str().unwrap_or_default(), locked(&lock, "tetralod")?);
+    ensure!(npm == cargo, "pkg-template/package.json is version {npm}, the crate is {cargo}");
+    Ok(())
+}
+
+fn files_of(folder: &Path) -> Result<Vec<String>> {
+    let entries = fs::read_dir(folder).with_context(|| folder.display().to_string())?;
+    let names = entries.map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned()));
+    names.collect()
+}
+
+fn remake(folder: &Path) -> Result<()> {
+    if folder.exists() {
+        fs::remove_dir_all(folder).with_context(|| format!("emptying {}", folder.display()))?;
+    }
+    fs::create_dir_all(folder).with_context(|| format!("making {}", folder.display()))
+}
+
+fn report(pkg: &Path) -> Result<()> {
+    println!("{:<28} {:>10} {:>10}", "pkg/", "bytes", "gzipped");
+    for module in &MODULES {
+        let file = format!("{}_bg.wasm", module.name);
+        let bytes = fs::read(pkg.join(&file)).with_context(|| file.clone())?;
+        let gzipped = gzipped(&bytes)?;
+        println!("{file:<28} {:>10} {gzipped:>10}", bytes.len());
+        let too_big = module.features == "web" && gzipped > CORE_LIMIT;
+        ensure!(!too_big, "{file} is {gzipped} bytes gzipped; the limit is {CORE_LIMIT}");
+    }
+    Ok(())
+}
+
+fn gzipped(bytes: &[u8]) -> Result<usize> {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
+    encoder.write_all(bytes)?;
+    Ok(encoder.finish()?.len())
+}

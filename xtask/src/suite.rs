@@ -1,0 +1,177 @@
+//! `cargo xtask test`: every check there is, in order of cost. Each step prints a header and its time; the first that
+//! fails ends the run, and none is left out because something is missing on the machine.
+
+use std::path::Path;
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, ensure};
+
+use crate::{browser, demo, fixture, package, shell};
+
+struct Step {
+    name: &'static str,
+    what: &'static str,
+    run: fn() -> Result<()>,
+}
+
+const STEPS: [Step; 9] = [
+    Step { name: "fmt", what: "formatting", run: fmt },
+    Step { name: "clippy", what: "lints, native and for the browser", run: clippy },
+    Step { name: "doc", what: "documentation without broken links", run: doc },
+    Step { name: "native", what: "unit, integration and documentation tests", run: native },
+    Step { name: "package", what: "the npm package and its size", run: npm_package },
+    Step { name: "wasm", what: "the core and a WebGPU adapter in headless Chromium", run: wasm },
+    Step { name: "js", what: "the package in Node", run: js },
+    Step { name: "consumer", what: "installing and type-checking the packed package", run: consumer },
+    Step { name: "e2e", what: "the demo page in headless Chromium", run: e2e },
+];
+
+/// Runs the steps named in `args`, or all.
+pub fn run(args: &[String]) -> Result<()> {
+    if args.iter().any(|arg| arg == "--list") {
+        for step in &STEPS {
+            println!("{:<10} {}", step.name, step.what);
+        }
+        return Ok(());
+    }
+    if let Some(unknown) = args.iter().find(|name| STEPS.iter().all(|step| step.name != name.as_str())) {
+        anyhow::bail!("there is no step `{unknown}`; `cargo xtask test --list` names them");
+    }
+    let chosen = STEPS.iter().filter(|step| args.is_empty() || args.iter().any(|name| name == step.name));
+    let mut times = Vec::new();
+    for step in chosen {
+        println!("\n=== {}: {}", step.name, step.what);
+        let start = Instant::now();
+        (step.run)().with_context(|| format!("step `{}` failed", step.name))?;
+        println!("--- {}: {:.1} s", step.name, start.elapsed().as_secs_f64());
+        times.push((step.name, start.elapsed()));
+    }
+    summarise(&times);
+    Ok(())
+}
+
+fn summarise(times: &[(&str, Duration)]) {
+    println!("\nall {} steps passed", times.len());
+    for (name, time) in times {
+        println!("{name:<10} {:>7.1} s", time.as_secs_f64());
+    }
+    println!("{:<10} {:>7.1} s", "total", times.iter().map(|(_, time)| time.as_secs_f64()).sum::<f64>());
+}
+
+fn fmt() -> Result<()> {
+    shell::run(&mut shell::cargo(["fmt", "--all", "--", "--check"]))
+}
+
+/// The feature sets that are shipped, and the core alone, which must not need any of them.
+const LIBRARIES: [&str; 4] = ["", "build", "gpu", "cli,gpu"];
+
+/// What goes into the package.
+const WEB_LIBRARIES: [&str; 2] = ["web", "web,gpu"];
+
+fn clippy() -> Result<()> {
+    shell::run(&mut shell::cargo(["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]))?;
+    for features in LIBRARIES {
+        lint_library(features, &[])?;
+    }
+    shell::add_wasm_target()?;
+    for features in WEB_LIBRARIES {
+        lint_library(features, &["--target", shell::WASM])?;
+    }
+    with_fixture(|| {
+        let args = ["clippy", "--package", "tetralod", "--test", "web*", "--target", shell::WASM];
+        shell::run(fixture_env(shell::cargo(args).args(WEB_FEATURES).args(["--", "-D", "warnings"])))
+    })
+}
+
+fn lint_library(features: &str, target: &[&str]) -> Result<()> {
+    let mut command = shell::cargo(["clippy", "--package", "tetralod", "--lib", "--no-default-features"]);
+    shell::run(command.args(["--features", features]).args(target).args(["--", "-D", "warnings"]))
+}
+
+fn doc() -> Result<()> {
+    let mut command =
+        shell::cargo(["doc", "--package", "tetralod", "--lib", "--no-deps", "--features", "gpu,web"]);
+    shell::run(command.env("RUSTDOCFLAGS", "-D warnings"))
+}
+
+fn native() -> Result<()> {
+    shell::run(&mut shell::cargo(["test", "--workspace"]))
+}
+
+fn npm_package() -> Result<()> {
+    package::build(&[])
+}
+
+const WEB_FEATURES: [&str; 3] = ["--no-default-features", "--features", "web,gpu"];
+
+fn wasm() -> Result<()> {
+    let browser = browser::require()?;
+    shell::add_wasm_target()?;
+    with_fixture(|| {
+        let mut command = browser::wasm_tests(&browser, &["--package", "tetralod", "--test", "web*"])?;
+        shell::run(fixture_env(command.args(WEB_FEATURES)))
+    })
+}
+
+fn with_fixture(then: impl FnOnce() -> Result<()>) -> Result<()> {
+    fixture::make().context("making the small MT that the tests use")?;
+    then()
+}
+
+/// The tests find the fixture through this variable.
+fn fixture_env(command: &mut Command) -> &mut Command {
+    command.env("TETRALOD_FIXTURE", shell::root().join(fixture::FOLDER))
+}
+
+fn js() -> Result<()> {
+    with_package()?;
+    with_fixture(|| shell::run(fixture_env(&mut node_test("package.test.js"))))
+}
+
+/// The steps that use the package build it when they are run by themselves on a fresh checkout.
+fn with_package() -> Result<()> {
+    if Path::new(package::PKG).join("package.json").is_file() {
+        return shell::install_node_tools();
+    }
+    package::build(&[])
+}
+
+fn node_test(file: &str) -> Command {
+    shell::command("node", ["--test", "--test-reporter=spec", &format!("tests/js/{file}")])
+}
+
+/// Packs the package as npm would publish it, installs the archive in a project of its own outside the repository's
+/// `node_modules`, and compiles and runs that project.
+fn consumer() -> Result<()> {
+    with_package()?;
+    let (source, project) = (Path::new("tests/js/consumer"), shell::root().join("target/consumer"));
+    if project.exists() {
+        std::fs::remove_dir_all(&project)?;
+    }
+    std::fs::create_dir_all(&project)?;
+    for entry in std::fs::read_dir(source)? {
+        let entry = entry?;
+        std::fs::copy(entry.path(), project.join(entry.file_name()))?;
+    }
+    let folder = project.to_string_lossy().into_owned();
+    let packed = shell::output(
+        shell::npm(["pack", "--silent", "--pack-destination", &folder]).current_dir(package::PKG),
+    )?;
+    let archive = project.join(packed.trim());
+    ensure!(archive.is_file(), "npm pack said `{}` but wrote no such file", packed.trim());
+    let install = ["install", "--no-save", "--offline", "--loglevel=error"];
+    shell::run(shell::npm(install).arg(&archive).current_dir(&project))?;
+    let tsc = shell::root().join("tests/js/node_modules/typescript/bin/tsc");
+    shell::run(shell::command("node", [tsc]).arg("--project").arg(&project))?;
+    with_fixture(|| shell::run(fixture_env(shell::command("node", ["dist/main.js"]).current_dir(&project))))
+}
+
+fn e2e() -> Result<()> {
+    let browser = browser::require()?;
+    with_package()?;
+    demo::make_data()?;
+    let address = demo::start_server(0)?;
+    let mut command = node_test("e2e.test.js");
+    shell::run(command.env("TETRALOD_PAGE", address).env("CHROMIUM", browser.chromium))
+}
