@@ -28,6 +28,8 @@
 #![warn(missing_docs)]
 #![deny(rustdoc::broken_intra_doc_links)]
 
+#[cfg(feature = "build")]
+pub mod build;
 pub mod format;
 #[cfg(feature = "build")]
 pub mod generate;

@@ -201,11 +201,15 @@ fn print(arguments: &Arguments, report: &Report) -> Result<()> {
         ("updates applied", output::count(report.updates_applied)),
         (
             "error bound",
-            format!("{} ({} of the range)", report.error_bound, output::percent(report.relative_error_bound)),
+            format!(
+                "{} ({} of the range)",
+                output::number(report.error_bound),
+                output::percent(report.relative_error_bound)
+            ),
         ),
     ];
     if let Some(error) = report.measured_error {
-        rows.push(("measured error", error.to_string()));
+        rows.push(("measured error", output::number(error)));
     }
     if !report.satisfied {
         rows.push(("", "the budget did not allow the error that was asked for".to_owned()));

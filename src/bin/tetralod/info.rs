@@ -125,7 +125,7 @@ fn print(report: &Report) -> Result<()> {
     let mesh = |vertices: u32, tets: u32| {
         format!("{} vertices, {} tetrahedra", output::count(vertices), output::count(tets))
     };
-    let [x0, y0, z0, x1, y1, z1] = report.bounds;
+    let [x0, y0, z0, x1, y1, z1] = report.bounds.map(output::number);
     let memory = &report.memory;
     let mut rows = vec![
         ("kind", format!("{} collapse", report.kind)),
@@ -149,7 +149,8 @@ fn print(report: &Report) -> Result<()> {
         ("position bits", report.position_bits.to_string()),
     ];
     for field in &report.fields {
-        rows.push(("field", format!("{}: {} to {}, {} bits", field.name, field.min, field.max, field.bits)));
+        let [min, max] = [field.min, field.max].map(output::number);
+        rows.push(("field", format!("{}: {min} to {max}, {} bits", field.name, field.bits)));
     }
     for (key, value) in &report.metadata {
         rows.push((key, value.clone()));

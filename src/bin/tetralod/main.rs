@@ -3,6 +3,7 @@
 //! One file a subcommand, each with its arguments and a `run`. Exit codes: 0 done, 1 failed (or a check failed),
 //! 2 wrong usage, 130 interrupted. Results go to stdout, everything else to stderr.
 
+mod build;
 mod extract;
 mod files;
 mod generate;
@@ -24,6 +25,7 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     Generate(generate::Arguments),
+    Build(build::Arguments),
     Info(info::Arguments),
     Extract(extract::Arguments),
 }
@@ -42,6 +44,7 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
     files::remove_partial_output_on_interrupt()?;
     match command {
         Command::Generate(arguments) => generate::run(&arguments)?,
+        Command::Build(arguments) => build::run(&arguments)?,
         Command::Info(arguments) => info::run(&arguments)?,
         Command::Extract(arguments) => extract::run(&arguments)?,
     }

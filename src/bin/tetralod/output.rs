@@ -28,7 +28,7 @@ pub fn print(text: &str) -> Result<()> {
     }
 }
 
-/// A count with thin groups of three digits: `1 234 567`.
+/// A count in groups of three digits: `1 234 567`.
 pub fn count(number: impl Into<u64>) -> String {
     let digits = number.into().to_string();
     let mut text = String::new();
@@ -63,4 +63,26 @@ pub fn bytes(number: u64) -> String {
 /// A fraction as a percentage, for people.
 pub fn percent(fraction: f64) -> String {
     format!("{:.4} %", fraction * 100.0)
+}
+
+/// A number with six significant digits, for people.
+pub fn number(x: f64) -> String {
+    // Through text, so that the digits dropped leave no trace.
+    let short: f64 = format!("{x:.5e}").parse().unwrap_or(x);
+    let plain = short == 0.0 || (1e-4..1e7).contains(&short.abs());
+    if plain { short.to_string() } else { format!("{short:e}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn people_get_short_numbers() {
+        let numbers = [0.0, -0.1234567, 1234567.8, 9.173761674e-23, -2.5e9, f64::NAN].map(number);
+        assert_eq!(numbers, ["0", "-0.123457", "1234570", "9.17376e-23", "-2.5e9", "NaN"]);
+        assert_eq!([0_u32, 999, 1000, 1_234_567].map(count), ["0", "999", "1 000", "1 234 567"]);
+        assert_eq!([0, 1023, 1536].map(bytes), ["0 bytes", "1023 bytes", "1.5 KiB (1 536 bytes)"]);
+        assert_eq!(percent(0.001), "0.1000 %");
+    }
 }
