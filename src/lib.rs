@@ -36,6 +36,8 @@ pub mod generate;
 pub mod geom;
 #[cfg(feature = "build")]
 pub mod io;
+#[cfg(feature = "build")]
+pub mod measure;
 pub mod mesh;
 pub mod mt;
 pub mod refine;

@@ -6,12 +6,14 @@ mod current;
 mod error;
 mod ring;
 mod split;
+mod stats;
 
 pub use base::{BaseMesh, BaseMeshError, MAX_FIELD_BITS, MAX_UPDATES};
 pub use collapse::{EdgeMt, MAX_LINK, MAX_STAR, VertexSplit};
 pub use current::{CurrentMesh, MeshChanges};
 pub use error::{ErrorCode, UpdateError};
 pub use split::Applied;
+pub use stats::MtStats;
 
 use crate::geom::Lattice;
 

@@ -1,2 +1,52 @@
-/// placeholder
-fn main() {}
+//! The command `tetralod`: builds MT files, looks into them, takes meshes out of them, checks and times them.
+//!
+//! One file a subcommand, each with its arguments and a `run`. Exit codes: 0 done, 1 failed (or a check failed),
+//! 2 wrong usage, 130 interrupted. Results go to stdout, everything else to stderr.
+
+mod build;
+mod extract;
+mod files;
+mod generate;
+mod info;
+mod output;
+
+use clap::Parser;
+use clap::Subcommand;
+use std::process::ExitCode;
+
+/// Very large tetrahedral volumes for web pages: builds, inspects and checks MT files.
+#[derive(Parser)]
+#[command(name = "tetralod", version, arg_required_else_help = true)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Generate(generate::Arguments),
+    Build(build::Arguments),
+    Info(info::Arguments),
+    Extract(extract::Arguments),
+}
+
+fn main() -> ExitCode {
+    match run(Arguments::parse().command) {
+        Ok(code) => code,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(command: Command) -> anyhow::Result<ExitCode> {
+    files::remove_partial_output_on_interrupt()?;
+    match command {
+        Command::Generate(arguments) => generate::run(&arguments)?,
+        Command::Build(arguments) => build::run(&arguments)?,
+        Command::Info(arguments) => info::run(&arguments)?,
+        Command::Extract(arguments) => extract::run(&arguments)?,
+    }
+    Ok(ExitCode::SUCCESS)
+}

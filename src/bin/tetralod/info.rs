@@ -1,0 +1,159 @@
+//! `tetralod info`: what is in an MT file.
+
+use super::files;
+use super::files::Opened;
+use super::output;
+use anyhow::Context;
+use anyhow::Result;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use tetralod::geom::Bounds;
+use tetralod::mt::CurrentMesh;
+use tetralod::mt::EdgeMt;
+use tetralod::mt::MtKind;
+use tetralod::mt::MtStats;
+use tetralod::mt::UpdateId;
+use tetralod::mt::VertexId;
+
+/// Tells what is in an MT file.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// The MT file.
+    file: PathBuf,
+    /// Print a JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+/// The description as programs get it.
+#[derive(Serialize)]
+struct Report {
+    kind: &'static str,
+    vertices: u32,
+    tetrahedra: u32,
+    base_vertices: u32,
+    base_tetrahedra: u32,
+    updates: u32,
+    file_bytes: u64,
+    bytes_per_vertex: f64,
+    memory: Memory,
+    fields: Vec<Field>,
+    /// Of the reference mesh: x0, y0, z0, x1, y1, z1.
+    bounds: [f64; 6],
+    position_bits: u32,
+    depth: u32,
+    arcs_per_node: f64,
+    tets_per_update: f64,
+    metadata: BTreeMap<String, String>,
+}
+
+#[derive(Serialize)]
+struct Field {
+    name: String,
+    min: f64,
+    max: f64,
+    bits: u32,
+}
+
+#[derive(Serialize)]
+struct Memory {
+    /// The compact structure of this MT.
+    compact_bytes: u64,
+    /// The same MT as an explicit structure.
+    explicit_bytes: u64,
+    /// The reference mesh alone, without and with adjacency.
+    indexed_bytes: u64,
+    adjacency_bytes: u64,
+}
+
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let opened = files::open_mt(&arguments.file)?;
+    let report = report(&opened).with_context(|| arguments.file.display().to_string())?;
+    if arguments.json { output::json(&report) } else { print(&report) }
+}
+
+fn report(opened: &Opened) -> Result<Report> {
+    let (mt, info) = (opened.mt()?, opened.info()?);
+    let base_tetrahedra = mt.base().tets.len();
+    let stats = MtStats::of(mt, CurrentMesh::new(info, mt.base())?)?;
+    let kind = match info.kind {
+        MtKind::Edge => "edge",
+    };
+    let field =
+        |f: &tetralod::mt::FieldInfo| Field { name: f.name.clone(), min: f.min, max: f.max, bits: f.bits };
+    let Bounds { min: [x0, y0, z0], max: [x1, y1, z1] } = bounds(mt);
+    Ok(Report {
+        kind,
+        vertices: info.vertices,
+        tetrahedra: info.tetrahedra,
+        base_vertices: mt.base().positions.len() as u32,
+        base_tetrahedra: base_tetrahedra as u32,
+        updates: info.updates,
+        file_bytes: opened.bytes,
+        bytes_per_vertex: opened.bytes as f64 / f64::from(info.vertices.max(1)),
+        memory: Memory {
+            compact_bytes: mt.compact_bytes(),
+            explicit_bytes: stats.explicit_bytes(info),
+            indexed_bytes: info.indexed_bytes(),
+            adjacency_bytes: info.adjacency_bytes(),
+        },
+        fields: info.fields.iter().map(field).collect(),
+        bounds: [x0, y0, z0, x1, y1, z1],
+        position_bits: info.lattice.bits,
+        depth: stats.depth,
+        arcs_per_node: stats.arcs_per_node(),
+        tets_per_update: stats.tets_per_update(base_tetrahedra),
+        metadata: opened.session.metadata().iter().cloned().collect(),
+    })
+}
+
+/// The box around the reference mesh. Positions follow from the updates alone, without any mesh.
+fn bounds(mt: &EdgeMt) -> Bounds {
+    let mut positions = mt.base().positions.clone();
+    for split in (0..mt.updates()).map(|u| mt.split(UpdateId(u))) {
+        let (v, d) = (positions[split.vertex.0 as usize], split.offset);
+        let second = [0, 1, 2].map(|i| v[i] - (d[i] >> 1));
+        positions.extend([[0, 1, 2].map(|i| second[i] + d[i]), second]);
+    }
+    let whole = |v: &u32| mt.split_by(VertexId(*v)).is_none();
+    let reference = (0..positions.len() as u32).filter(whole);
+    reference.fold(Bounds::EMPTY, |b, v| b.with(mt.info().lattice.point(positions[v as usize])))
+}
+
+fn print(report: &Report) -> Result<()> {
+    let mesh = |vertices: u32, tets: u32| {
+        format!("{} vertices, {} tetrahedra", output::count(vertices), output::count(tets))
+    };
+    let [x0, y0, z0, x1, y1, z1] = report.bounds.map(output::number);
+    let memory = &report.memory;
+    let mut rows = vec![
+        ("kind", format!("{} collapse", report.kind)),
+        ("reference mesh", mesh(report.vertices, report.tetrahedra)),
+        ("base mesh", mesh(report.base_vertices, report.base_tetrahedra)),
+        (
+            "updates",
+            format!("{}, at most {} deep", output::count(report.updates), output::count(report.depth)),
+        ),
+        (
+            "",
+            format!("{:.2} tetrahedra, {:.2} arcs per update", report.tets_per_update, report.arcs_per_node),
+        ),
+        ("file size", output::bytes(report.file_bytes)),
+        ("bytes per vertex", format!("{:.2}", report.bytes_per_vertex)),
+        ("in memory", output::bytes(memory.compact_bytes)),
+        ("  explicit", output::bytes(memory.explicit_bytes)),
+        ("reference alone", output::bytes(memory.indexed_bytes)),
+        ("  with adjacency", output::bytes(memory.adjacency_bytes)),
+        ("bounds", format!("({x0}, {y0}, {z0}) to ({x1}, {y1}, {z1})")),
+        ("position bits", report.position_bits.to_string()),
+    ];
+    for field in &report.fields {
+        let [min, max] = [field.min, field.max].map(output::number);
+        rows.push(("field", format!("{}: {min} to {max}, {} bits", field.name, field.bits)));
+    }
+    for (key, value) in &report.metadata {
+        rows.push((key, value.clone()));
+    }
+    output::table(&rows)
+}

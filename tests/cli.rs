@@ -1,0 +1,286 @@
+//! Promise: the command does what its help says, from data to a checked mesh, and fails with a word about which file
+//! and why, leaving nothing half done.
+#![cfg(feature = "cli")]
+
+use serde_json::Value;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+/// A folder of one test, gone when the test is done.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("tetralod-cli-{}-{name}", std::process::id()));
+        fs::create_dir_all(&path).expect("a temporary folder");
+        Self(path)
+    }
+
+    fn path(&self, name: &str) -> String {
+        self.0.join(name).to_str().expect("a name in UTF-8").to_owned()
+    }
+
+    /// Names of the files in it, sorted.
+    fn names(&self) -> Vec<String> {
+        let entries = fs::read_dir(&self.0).expect("the folder is there");
+        let name = |e: std::io::Result<fs::DirEntry>| e.expect("an entry").file_name();
+        let mut names: Vec<_> = entries.map(|e| name(e).to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+fn command(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tetralod"));
+    command.args(arguments).stdin(Stdio::null());
+    command
+}
+
+fn run(arguments: &[&str]) -> Output {
+    command(arguments).output().expect("the command starts")
+}
+
+fn text(bytes: &[u8]) -> &str {
+    std::str::from_utf8(bytes).expect("UTF-8")
+}
+
+/// Runs what must succeed; gives stdout.
+fn good(arguments: &[&str]) -> String {
+    let output = run(arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", text(&output.stderr));
+    text(&output.stdout).to_owned()
+}
+
+/// Runs what must succeed with one JSON object on stdout.
+fn json(arguments: &[&str]) -> Value {
+    let value: Value = serde_json::from_str(&good(arguments)).expect("one JSON value on stdout");
+    assert!(value.is_object());
+    value
+}
+
+/// Runs what must fail with an error that holds all of `words`.
+fn bad(code: i32, arguments: &[&str], words: &[&str]) {
+    let output = run(arguments);
+    let error = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {error}");
+    assert!(output.stdout.is_empty(), "{arguments:?}: errors go to stderr");
+    assert!(error.starts_with("error: ") && !error.contains("panicked"), "{arguments:?}: {error}");
+    for word in words {
+        assert!(error.contains(word), "{arguments:?}: '{word}' is not in: {error}");
+    }
+}
+
+fn number(value: &Value, key: &str) -> f64 {
+    value[key].as_f64().unwrap_or_else(|| panic!("{key} is a number: {value}"))
+}
+
+#[test]
+fn from_data_to_a_checked_mesh() {
+    let folder = Folder::new("chain");
+    for (name, size, input) in [("bucky", "9", "b.vti"), ("sphere-flow", "4", "s.vtu")] {
+        let [input, mt, out] = [input, "a.mt", "out.vtu"].map(|name| folder.path(name));
+        good(&["generate", name, "--size", size, "-o", &input]);
+        let built = json(&["build", &input, "-o", &mt, "--json"]);
+
+        let info = json(&["info", &mt, "--json"]);
+        assert_eq!(info["kind"], "edge");
+        let same =
+            ["vertices", "tetrahedra", "base_vertices", "base_tetrahedra", "updates", "file_bytes", "depth"];
+        for key in same {
+            assert_eq!(info[key], built[key], "{key}");
+        }
+        assert_eq!(number(&info, "file_bytes"), fs::metadata(&mt).expect("it is there").len() as f64);
+        assert_eq!(number(&info, "base_vertices") + number(&info, "updates"), number(&info, "vertices"));
+        assert!(number(&info, "base_vertices") < number(&info, "vertices") / 4.0, "{info}");
+        let memory = &info["memory"];
+        let [compact, explicit] = ["compact_bytes", "explicit_bytes"].map(|key| number(memory, key));
+        assert!(compact < number(memory, "indexed_bytes") && number(memory, "adjacency_bytes") < explicit);
+        assert_eq!(info["bounds"].as_array().map(Vec::len), Some(6));
+        for key in ["position_bits", "arcs_per_node", "tets_per_update", "bytes_per_vertex"] {
+            assert!(number(&info, key) > 0.0, "{key}");
+        }
+        for key in ["min", "max", "bits"] {
+            assert!(info["fields"][0][key].is_number());
+        }
+        assert!(good(&["info", &mt]).contains(info["fields"][0]["name"].as_str().expect("a name")));
+
+        let whole = json(&["extract", &mt, "-o", &out, "--json", "--measure", &input]);
+        assert_eq!(whole["tetrahedra"], info["tetrahedra"]);
+        assert_eq!(whole["vertices"], info["vertices"]);
+        assert_eq!(whole["updates_applied"], info["updates"]);
+        assert_eq!(number(&whole, "error_bound"), 0.0);
+        let range = number(&info["fields"][0], "max") - number(&info["fields"][0], "min");
+        assert!(number(&whole, "measured_error") <= range / 32_768.0, "the lattice of the field: {whole}");
+
+        let mut last = number(&whole, "tetrahedra");
+        for percent in ["1%", "5%", "20%"] {
+            let part = json(&["extract", &mt, "--error", percent, "-o", &out, "--json", "--measure", &input]);
+            let bound: f64 = percent.trim_end_matches('%').parse::<f64>().expect("a number") / 100.0 * range;
+            assert!(number(&part, "error_bound") <= bound);
+            assert!(
+                number(&part, "measured_error") <= number(&part, "error_bound") + range / 32_768.0,
+                "{part}"
+            );
+            assert!(number(&part, "tetrahedra") <= last);
+            last = number(&part, "tetrahedra");
+            let absolute = json(&["extract", &mt, "--error", &bound.to_string(), "-o", &out, "--json"]);
+            assert_eq!(absolute["hash"], part["hash"], "the same in units of the field");
+        }
+        assert!(last < number(&whole, "tetrahedra") / 2.0);
+        let base = json(&["extract", &mt, "--error", "1e9", "-o", &out, "--json"]);
+        assert_eq!((&base["tetrahedra"], &base["updates_applied"]), (&info["base_tetrahedra"], &0.into()));
+        // What was written is a mesh that reads and builds again.
+        let again = json(&["build", &out, "-o", &folder.path("again.mt"), "--json"]);
+        assert_eq!(again["tetrahedra"], base["tetrahedra"]);
+        assert_eq!(again["repaired"], "");
+    }
+}
+
+#[test]
+fn boxes_isovalues_and_budgets_select() {
+    let folder = Folder::new("select");
+    let [input, mt, out] = ["b.vti", "b.mt", "out.vtu"].map(|name| folder.path(name));
+    good(&["generate", "bucky", "--size", "13", "-o", &input]);
+    good(&["build", &input, "-o", &mt, "--quiet"]);
+    let tets = |more: &[&str]| {
+        let result = json(&[&["extract", &mt, "-o", &out, "--json", "--measure", &input], more].concat());
+        assert!(number(&result, "measured_error") <= number(&result, "error_bound") + 1e-4, "{result}");
+        number(&result, "tetrahedra")
+    };
+    let whole = tets(&[]);
+    let corner = tets(&["--box", "0,0,0,0.3,0.3,0.3"]);
+    let nothing = tets(&["--box", "-9,-9,-9,-8,-8,-8"]);
+    assert!(nothing < corner && corner < whole, "{nothing} {corner} {whole}");
+    let surface = tets(&["--iso", "0.5", "--error", "1%"]);
+    let surfaces = tets(&["--iso", "0.5", "--iso", "0.1", "--error", "1%"]);
+    let all = tets(&["--error", "1%"]);
+    assert!(surface < surfaces && surfaces <= all, "{surface} {surfaces} {all}");
+    // Far beyond the field even when it is widened by the largest error.
+    assert_eq!(tets(&["--iso", "-1e6"]), nothing);
+    let budget = tets(&["--budget", "3000"]);
+    assert!(budget <= 3000.0 && budget > 1500.0, "{budget}");
+    assert!(good(&["extract", &mt, "-o", &out, "--budget", "3000"]).contains("budget"));
+}
+
+#[test]
+fn the_same_input_gives_the_same_bytes() {
+    let folder = Folder::new("same");
+    let [input, first, second, out] = ["b.vti", "1.mt", "2.mt", "o.vtu"].map(|name| folder.path(name));
+    good(&["generate", "bucky", "--size", "9", "-o", &input]);
+    let data = fs::read(&input).expect("it is there");
+    good(&["generate", "bucky", "--size", "9", "-o", &input]);
+    assert!(data == fs::read(&input).expect("it is there"));
+    good(&["build", &input, "-o", &first]);
+    // Over an older file, too.
+    fs::write(&second, "old").expect("a file");
+    good(&["build", &input, "-o", &second]);
+    assert!(fs::read(&first).expect("it is there") == fs::read(&second).expect("it is there"));
+    let hash = |mt: &str| json(&["extract", mt, "--error", "2%", "-o", &out, "--json"])["hash"].clone();
+    assert_eq!(hash(&first), hash(&second));
+    assert_eq!(folder.names(), ["1.mt", "2.mt", "b.vti", "o.vtu"], "no partial file stays");
+}
+
+#[test]
+fn failures_name_the_file_and_leave_nothing() {
+    let folder = Folder::new("failures");
+    let [input, mt, none, text, cut, damaged, out] =
+        ["b.vti", "b.mt", "none", "text", "cut.mt", "damaged.mt", "out"].map(|name| folder.path(name));
+    good(&["generate", "bucky", "--size", "7", "-o", &input]);
+    good(&["build", &input, "-o", &mt, "--quiet"]);
+    fs::write(&text, "<!DOCTYPE html>\n<title>404</title>").expect("a file");
+    let mut bytes = fs::read(&mt).expect("it is there");
+    fs::write(&cut, &bytes[..bytes.len() * 2 / 3]).expect("a file");
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    fs::write(&damaged, &bytes).expect("a file");
+    let before = folder.names();
+
+    let away = folder.0.join("no folder").join("out.vtu").to_str().expect("UTF-8").to_owned();
+    for (file, words) in [
+        (&none, "No such file"),
+        (&text, "not an MT file"),
+        (&cut, "ends too early"),
+        (&damaged, "damaged at byte"),
+        (&input, "not an MT file"),
+    ] {
+        bad(1, &["info", file], &[file, words]);
+        bad(1, &["info", file, "--json"], &[file, words]);
+        bad(1, &["extract", file, "-o", &out], &[file, words]);
+    }
+    for file in [&none, &text, &mt] {
+        bad(1, &["build", file, "-o", &out], &[file]);
+        bad(1, &["extract", &mt, "-o", &out, "--measure", file], &[file]);
+    }
+    bad(1, &["build", &input, "-o", &out, "--field", "nothing"], &[&input, "'nothing'", "density"]);
+    bad(1, &["build", &input, "-o", &away], &[&away]);
+    bad(1, &["extract", &mt, "-o", &away], &[&away]);
+    bad(1, &["extract", &mt, "-o", &out, "--field", "nothing"], &[&mt, "'nothing'", "density"]);
+    bad(1, &["generate", "bucky", "--size", "7", "-o", &away], &[&away, "vtu"]);
+    bad(1, &["generate", "bucky", "--size", "1", "-o", &folder.path("x.vti")], &["bucky", "2"]);
+    bad(1, &["generate", "sphere-flow", "--size", "4", "-o", &folder.path("x.vti")], &["x.vti", "vtu"]);
+    assert_eq!(folder.names(), before);
+}
+
+#[test]
+fn wrong_usage_is_told_apart() {
+    for arguments in [
+        &["extract", "a.mt"][..],
+        &["extract", "a.mt", "-o", "b", "--error", "-1"],
+        &["extract", "a.mt", "-o", "b", "--error", "much"],
+        &["extract", "a.mt", "-o", "b", "--error", "NaN%"],
+        &["extract", "a.mt", "-o", "b", "--box", "0,0,0,1,1"],
+        &["extract", "a.mt", "-o", "b", "--box", "0,0,0,1,1,-1"],
+        &["extract", "a.mt", "-o", "b", "--iso", "inf"],
+        &["build", "a.vtu"],
+        &["build", "a.vtu", "-o", "b", "--position-bits", "31"],
+        &["generate", "nothing", "--size", "3", "-o", "b.vtu"],
+        &["dance"],
+    ] {
+        bad(2, arguments, &["--help"]);
+    }
+}
+
+/// Starts a command, waits until `ready`, sends SIGINT, and gives the exit code.
+#[cfg(unix)]
+fn interrupt(arguments: &[&str], ready: impl Fn() -> bool) -> Option<i32> {
+    let quiet = Stdio::null;
+    let mut child = command(arguments).stdout(quiet()).stderr(quiet()).spawn().expect("the command starts");
+    let start = Instant::now();
+    while !ready() {
+        assert!(start.elapsed() < Duration::from_secs(60), "it never got so far");
+        assert!(child.try_wait().expect("a child").is_none(), "it was done too soon");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill is there");
+    assert!(kill.success());
+    child.wait().expect("a child").code()
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_leaves_what_was_there() {
+    let folder = Folder::new("interrupt");
+    let out = folder.path("big.vtu");
+    fs::write(&out, "old").expect("a file");
+    let writing = || folder.names().iter().any(|name| name.ends_with(".partial"));
+    let code = interrupt(&["generate", "bucky", "--size", "64", "-o", &out], writing);
+    assert_eq!(code, Some(130));
+    assert_eq!(folder.names(), ["big.vtu"]);
+    assert_eq!(fs::read(&out).expect("it is there"), b"old");
+
+    let input = folder.path("b.vti");
+    good(&["generate", "bucky", "--size", "48", "-o", &input]);
+    let start = Instant::now();
+    let code = interrupt(&["build", &input, "-o", &out], || start.elapsed() > Duration::from_millis(700));
+    assert_eq!(code, Some(130));
+    assert_eq!(folder.names(), ["b.vti", "big.vtu"]);
+    assert_eq!(fs::read(Path::new(&out)).expect("it is there"), b"old");
+}
