@@ -127,6 +127,19 @@ impl EdgeMt {
         self.vertex_of.len() as u32
     }
 
+    /// Bytes of everything that the MT holds, base mesh and errors included.
+    pub fn bytes(&self) -> u64 {
+        let base = size_of_val(&self.base.positions[..])
+            + size_of_val(&self.base.values[..])
+            + size_of_val(&self.base.tets[..]);
+        let order = size_of_val(&self.split_of[..]) + size_of_val(&self.vertex_of[..]);
+        let nodes = size_of_val(&self.offsets[..])
+            + size_of_val(&self.field_offsets[..])
+            + size_of_val(&self.masks[..])
+            + size_of_val(&self.errors[..]);
+        (base + order + nodes) as u64
+    }
+
     /// The error of update `u`.
     #[inline]
     pub fn error_of(&self, u: UpdateId) -> ErrorCode {

@@ -77,7 +77,7 @@ impl Default for Star {
 /// Why a star was not gathered.
 #[derive(Debug)]
 pub(crate) enum Gather<T> {
-    /// It has more than [`GATHERED`] tetrahedra.
+    /// It has more than [`GATHERED`] tetrahedra, none of which the caller wanted to stop at.
     TooLarge,
     /// The caller's look at a tetrahedron stopped it.
     Stopped(T),
@@ -358,7 +358,10 @@ impl CurrentMesh {
                     continue;
                 }
                 if star.len == GATHERED {
-                    return Err(Gather::TooLarge);
+                    // What stops the caller may be among those not looked at yet.
+                    let rest = star.tets[next..].iter().chain([&n]);
+                    let found = rest.map(|&t| self.tets[t as usize]).find_map(|tet| look(&self.labels, &tet));
+                    return Err(found.map_or(Gather::TooLarge, Gather::Stopped));
                 }
                 self.marks[n as usize] = self.epoch << MARK_BITS | star.len as u32;
                 star.tets[star.len] = n;

@@ -1,19 +1,25 @@
 //! The Multi-Tessellation itself [§2]: what it is made of and what every kind of it can do.
 
 mod base;
+mod check;
 mod collapse;
 mod current;
 mod error;
+mod explicit;
+mod replay;
 mod ring;
 mod split;
 mod stats;
 
 pub use base::{BaseMesh, BaseMeshError, MAX_FIELD_BITS, MAX_UPDATES};
+pub use check::MtFault;
 pub use collapse::{EdgeMt, MAX_LINK, MAX_STAR, VertexSplit};
 pub use current::{CurrentMesh, MeshChanges};
 pub use error::{ErrorCode, UpdateError};
+pub use explicit::ExplicitMt;
+pub use replay::ReplayError;
 pub use split::Applied;
-pub use stats::MtStats;
+pub use stats::{MtStats, stats};
 
 use crate::geom::Lattice;
 

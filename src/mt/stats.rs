@@ -1,159 +1,119 @@
-//! Sizes and depths of an MT, for `info` and for comparison with the paper's Table 1.
+//! What an MT is like and what it costs to store, in the paper's terms [§6, Table 1].
 
-use super::CurrentMesh;
 use super::EdgeMt;
-use super::MtInfo;
-use super::MultiTessellation;
-use super::UpdateError;
-use super::UpdateId;
+use super::explicit::Counts;
+use super::replay::ReplayError;
+use super::replay::replay;
 
-/// The shape of an MT's partial order.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// Numbers about an MT. The storage of the alternatives is by the paper's way of counting: 4 bytes for a
+/// coordinate, a field value or an index, 1 for a counter.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MtStats {
-    /// Length of the longest chain of updates that depend on each other.
-    pub depth: u32,
-    /// Pairs of an update and one that depends on it directly.
-    pub arcs: u64,
-    /// Tetrahedra that appear in at least one mesh of the MT: the paper's `m`.
-    pub tetrahedra: u64,
-    /// Updates.
+    /// Vertices of the reference mesh (the paper's n).
+    pub vertices: u32,
+    /// Tetrahedra of the reference mesh.
+    pub tetrahedra: u32,
+    /// Vertices that appear in any mesh of the MT.
+    pub mt_vertices: u32,
+    /// Tetrahedra that appear in any mesh of the MT (the paper's m).
+    pub mt_tetrahedra: u64,
+    /// Nodes of the DAG.
     pub updates: u32,
+    /// Arcs of the DAG: pairs of an update and a parent of it.
+    pub arcs: u64,
+    /// Updates on the longest path of the DAG.
+    pub depth: u32,
+    /// Most parents of an update.
+    pub max_parents: u32,
+    /// Tetrahedra that all updates remove, together.
+    pub removed: u64,
+    /// Tetrahedra that all updates insert, together.
+    pub inserted: u64,
+    /// Most tetrahedra that an update removes.
+    pub max_removed: u32,
+    /// Most tetrahedra that an update inserts.
+    pub max_inserted: u32,
+    /// What the compact MT really holds.
+    pub compact_bytes: u64,
+    /// The same MT in the explicit structure [§3]: see [`ExplicitMt::bytes`](super::ExplicitMt::bytes).
+    pub explicit_bytes: u64,
+    /// The reference mesh alone: positions, fields and four vertex indices for each tetrahedron.
+    pub indexed_bytes: u64,
+    /// The reference mesh alone, with four neighbours for each tetrahedron as well.
+    pub adjacency_bytes: u64,
 }
 
 impl MtStats {
-    /// Plays an MT from base to reference mesh. `mesh` is its base mesh; see [`CurrentMesh::new`].
-    ///
-    /// # Errors
-    /// If the MT turns out to be damaged.
-    pub fn of(mt: &impl MultiTessellation, mut mesh: CurrentMesh) -> Result<Self, UpdateError> {
-        let mut depths = vec![1_u32; mt.updates() as usize];
-        let mut stats =
-            Self { updates: mt.updates(), tetrahedra: mesh.tet_count() as u64, ..Self::default() };
-        let (mut created, mut children) = (Vec::new(), Vec::new());
-        mt.announce(&mut mesh, 0);
-        mesh.clear_touched();
-        for u in (0..mt.updates()).map(UpdateId) {
-            // Parents come first, so nothing blocks.
-            mt.refine(&mut mesh, u)?;
-            created.clear();
-            created.extend_from_slice(mesh.touched());
-            mesh.clear_touched();
-            created.sort_unstable();
-            created.dedup();
-            children.clear();
-            for tet in created.iter().filter_map(|&t| mesh.tet(t)) {
-                if mt.creator(&mesh, &tet) == Some(u) {
-                    stats.tetrahedra += 1;
-                    children.extend(mt.remover(&mesh, &tet));
-                }
-            }
-            children.sort_unstable();
-            children.dedup();
-            stats.arcs += children.len() as u64;
-            for child in &children {
-                let depth = depths[u.0 as usize] + 1;
-                let deepest = &mut depths[child.0 as usize];
-                *deepest = depth.max(*deepest);
-            }
-        }
-        stats.depth = depths.into_iter().max().unwrap_or(0);
-        Ok(stats)
+    /// Mean number of parents of an update.
+    pub fn arcs_per_update(&self) -> f64 {
+        self.per_update(self.arcs)
     }
 
-    /// Direct dependencies per update.
-    pub fn arcs_per_node(&self) -> f64 {
-        self.arcs as f64 / f64::from(self.updates.max(1))
+    /// Mean number of tetrahedra that an update inserts (the paper: 27 in edge-based MTs, 16 in vertex-based ones).
+    pub fn inserted_per_update(&self) -> f64 {
+        self.per_update(self.inserted)
     }
 
-    /// Tetrahedra that an update creates in refinement, on average; `base` is the size of the base mesh.
-    pub fn tets_per_update(&self, base: usize) -> f64 {
-        (self.tetrahedra - base as u64) as f64 / f64::from(self.updates.max(1))
+    /// Mean number of tetrahedra that an update removes.
+    pub fn removed_per_update(&self) -> f64 {
+        self.per_update(self.removed)
     }
 
-    /// Bytes of the explicit structure [§3], with four bytes a number: 24 a vertex with one field, 28 a tetrahedron.
-    pub fn explicit_bytes(&self, info: &MtInfo) -> u64 {
-        (20 + 4 * info.fields.len() as u64) * u64::from(info.vertices) + 28 * self.tetrahedra
+    fn per_update(&self, total: u64) -> f64 {
+        if self.updates == 0 { 0.0 } else { total as f64 / f64::from(self.updates) }
     }
 }
 
-impl MtInfo {
-    /// Bytes of the reference mesh as an indexed structure [§3]: coordinates, fields, four indices a tetrahedron.
-    pub fn indexed_bytes(&self) -> u64 {
-        (12 + 4 * self.fields.len() as u64) * u64::from(self.vertices) + 16 * u64::from(self.tetrahedra)
-    }
-
-    /// Bytes of the reference mesh as an indexed structure with adjacencies [§3].
-    pub fn adjacency_bytes(&self) -> u64 {
-        self.indexed_bytes() + 16 * u64::from(self.tetrahedra)
-    }
-}
-
-impl EdgeMt {
-    /// Bytes of this structure: 36 and 2 for the error per update with one field, and the base mesh.
-    pub fn compact_bytes(&self) -> u64 {
-        let (fields, base) = (self.info().fields.len() as u64, self.base());
-        u64::from(self.updates()) * (34 + 4 * fields)
-            + base.positions.len() as u64 * (16 + 4 * fields)
-            + base.tets.len() as u64 * 16
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::geom::Lattice;
-    use crate::mt::BaseMesh;
-    use crate::mt::ErrorCode;
-    use crate::mt::FieldInfo;
-    use crate::mt::MtKind;
-    use crate::mt::VertexId;
-    use crate::mt::VertexSplit;
-
-    /// Two tetrahedra at a triangle; the first update splits a corner of it, the second another one.
-    fn chain() -> EdgeMt {
-        let field = FieldInfo { name: "f".into(), min: 0.0, max: 9.0, origin: 0.0, step: 1.0, bits: 4 };
-        let info = MtInfo {
-            kind: MtKind::Edge,
-            lattice: Lattice { origin: [0.0; 3], step: [1.0; 3], bits: 6 },
-            fields: vec![field],
-            vertices: 7,
-            tetrahedra: 4,
-            updates: 2,
-            displacement_per_error: 1.0,
-        };
-        let base = BaseMesh {
-            positions: vec![[8, 8, 8], [16, 8, 8], [8, 16, 8], [8, 8, 16], [8, 8, 0]],
-            values: vec![0; 5],
-            tets: vec![[0, 1, 2, 3], [0, 2, 1, 4]],
-        };
-        let mut mt = EdgeMt::new(info, base);
-        for vertex in [0, 1] {
-            let (vertex, error) = (VertexId(vertex), ErrorCode(9));
-            mt.push(&VertexSplit { vertex, offset: [0, 0, 2], field_offsets: &[0], mask: 0b10, error })
-                .expect("the updates fit");
-        }
-        mt
-    }
-
-    #[test]
-    fn a_chain_of_two_is_counted_right() {
-        let mt = chain();
-        let mesh = CurrentMesh::new(mt.info(), mt.base()).expect("a valid base mesh");
-        let stats = MtStats::of(&mt, mesh).expect("a valid MT");
-        // 2 in the base mesh; the first update makes 3, all around the vertex that the second splits into 4.
-        assert_eq!(stats, MtStats { depth: 2, arcs: 1, tetrahedra: 9, updates: 2 });
-        assert_eq!(stats.tets_per_update(2), 3.5);
-        assert_eq!(stats.arcs_per_node(), 0.5);
-        assert_eq!(stats.explicit_bytes(mt.info()), 24 * 7 + 28 * 9);
-        assert_eq!(mt.info().indexed_bytes(), 16 * 7 + 16 * 4);
-        assert_eq!(mt.info().adjacency_bytes(), 16 * 7 + 32 * 4);
-        assert_eq!(mt.compact_bytes(), 38 * 2 + 20 * 5 + 16 * 2);
-    }
-
-    #[test]
-    fn the_reference_mesh_of_the_paper_has_the_bytes_of_the_paper() {
-        // Smallbucky: 33 points along each side of a grid, its cubes in tetrahedra.
-        let info = MtInfo { vertices: 35_937, tetrahedra: 194_620, ..chain().info().clone() };
-        assert_eq!((info.indexed_bytes(), info.adjacency_bytes()), (3_688_912, 6_802_832));
-    }
+/// Measures an MT by applying all its updates once; holds no more than the mesh and a word per update.
+///
+/// # Errors
+/// If an update cannot be applied.
+pub fn stats(mt: &EdgeMt) -> Result<MtStats, ReplayError> {
+    let (base, fields) = (mt.base(), mt.info().fields.len() as u64);
+    let mut counts = Counts {
+        fields,
+        vertices: base.positions.len() as u64 + 2 * u64::from(mt.updates()),
+        tets: base.tets.len() as u64,
+        updates: u64::from(mt.updates()),
+        removed: 0,
+        arcs: 0,
+    };
+    let (mut depths, mut parents) = (Vec::<u32>::new(), Vec::new());
+    let (mut max_parents, mut max_removed, mut max_inserted) = (0, 0, 0);
+    let mesh = replay(mt, |step| {
+        parents.clear();
+        // A tetrahedron was created together with the youngest of its vertices.
+        let creators = step.removed.iter().map(|tet| tet.iter().copied().fold(0, u32::max));
+        parents.extend(creators.filter_map(|v| mt.created_by(super::VertexId(v))));
+        parents.sort_unstable();
+        parents.dedup();
+        let above = parents.iter().map(|p| depths[p.0 as usize]).max();
+        depths.push(above.unwrap_or(0) + 1);
+        counts.tets += step.inserted.len() as u64;
+        counts.removed += step.removed.len() as u64;
+        counts.arcs += parents.len() as u64;
+        max_parents = max_parents.max(parents.len() as u32);
+        max_removed = max_removed.max(step.removed.len() as u32);
+        max_inserted = max_inserted.max(step.inserted.len() as u32);
+    })?;
+    let (vertices, tetrahedra) = (mesh.vertex_count() as u64, mesh.tet_count() as u64);
+    let indexed_bytes = 16 * tetrahedra + 4 * (3 + fields) * vertices;
+    Ok(MtStats {
+        vertices: vertices as u32,
+        tetrahedra: tetrahedra as u32,
+        mt_vertices: counts.vertices as u32,
+        mt_tetrahedra: counts.tets,
+        updates: mt.updates(),
+        arcs: counts.arcs,
+        depth: depths.iter().copied().max().unwrap_or(0),
+        max_parents,
+        removed: counts.removed,
+        inserted: counts.tets - base.tets.len() as u64,
+        max_removed,
+        max_inserted,
+        compact_bytes: mt.bytes(),
+        explicit_bytes: counts.bytes(),
+        indexed_bytes,
+        adjacency_bytes: indexed_bytes + 16 * tetrahedra,
+    })
 }

@@ -9,12 +9,11 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use tetralod::geom::Bounds;
-use tetralod::mt::CurrentMesh;
 use tetralod::mt::EdgeMt;
 use tetralod::mt::MtKind;
-use tetralod::mt::MtStats;
 use tetralod::mt::UpdateId;
 use tetralod::mt::VertexId;
+use tetralod::mt::stats;
 
 /// Tells what is in an MT file.
 #[derive(clap::Args)]
@@ -76,7 +75,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 fn report(opened: &Opened) -> Result<Report> {
     let (mt, info) = (opened.mt()?, opened.info()?);
     let base_tetrahedra = mt.base().tets.len();
-    let stats = MtStats::of(mt, CurrentMesh::new(info, mt.base())?)?;
+    let stats = stats(mt)?;
     let kind = match info.kind {
         MtKind::Edge => "edge",
     };
@@ -93,17 +92,17 @@ fn report(opened: &Opened) -> Result<Report> {
         file_bytes: opened.bytes,
         bytes_per_vertex: opened.bytes as f64 / f64::from(info.vertices.max(1)),
         memory: Memory {
-            compact_bytes: mt.compact_bytes(),
-            explicit_bytes: stats.explicit_bytes(info),
-            indexed_bytes: info.indexed_bytes(),
-            adjacency_bytes: info.adjacency_bytes(),
+            compact_bytes: stats.compact_bytes,
+            explicit_bytes: stats.explicit_bytes,
+            indexed_bytes: stats.indexed_bytes,
+            adjacency_bytes: stats.adjacency_bytes,
         },
         fields: info.fields.iter().map(field).collect(),
         bounds: [x0, y0, z0, x1, y1, z1],
         position_bits: info.lattice.bits,
         depth: stats.depth,
-        arcs_per_node: stats.arcs_per_node(),
-        tets_per_update: stats.tets_per_update(base_tetrahedra),
+        arcs_per_node: stats.arcs_per_update(),
+        tets_per_update: stats.inserted_per_update(),
         metadata: opened.session.metadata().iter().cloned().collect(),
     })
 }

@@ -1,0 +1,169 @@
+//! Checks an explicit MT: is it what the theory of Multi-Tessellations asks for [§2]?
+
+use super::ExplicitMt;
+use super::UpdateId;
+use super::VertexId;
+use crate::geom::orient3d;
+use crate::mesh::FACES;
+use std::collections::HashMap;
+use std::fmt;
+
+/// What is wrong with an MT. `update` is the first where it shows; none stands for the base mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum MtFault {
+    /// An update comes before one that it depends on, or does not know its parents and children.
+    Order {
+        /// The update.
+        update: UpdateId,
+    },
+    /// An update has a larger error than one that it depends on.
+    Error {
+        /// The update.
+        update: UpdateId,
+    },
+    /// A tetrahedron is flat, inside out, or names a vertex that is not there.
+    Tetrahedron {
+        /// The update that inserts it.
+        update: Option<UpdateId>,
+    },
+    /// A face is shared by more than two tetrahedra, or by two on the same side of it.
+    Face {
+        /// The update that makes it so.
+        update: Option<UpdateId>,
+    },
+    /// What an update inserts does not fill what it removes: it tears the mesh open.
+    Torn {
+        /// The update.
+        update: UpdateId,
+    },
+}
+
+impl fmt::Display for MtFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let place = |update: &Option<UpdateId>| {
+            update.map_or("the base mesh".to_owned(), |u| format!("update {}", u.0))
+        };
+        match self {
+            Self::Order { update } => write!(f, "update {} contradicts the order of the MT", update.0),
+            Self::Error { update } => write!(f, "update {} has a larger error than a parent", update.0),
+            Self::Tetrahedron { update } => {
+                write!(f, "{} has a tetrahedron that is not positive", place(update))
+            }
+            Self::Face { update } => {
+                write!(f, "a face is shared by too many tetrahedra in {}", place(update))
+            }
+            Self::Torn { update } => write!(f, "update {} tears the mesh open", update.0),
+        }
+    }
+}
+
+impl std::error::Error for MtFault {}
+
+/// The faces of a set of tetrahedra: how often each is used from either side.
+#[derive(Default)]
+struct Faces(HashMap<[u32; 3], [u8; 2]>);
+
+impl Faces {
+    /// Adds the faces of a tetrahedron. False if one of them is taken on that side.
+    fn add(&mut self, tet: &[u32; 4]) -> bool {
+        faces(tet).all(|(face, side)| {
+            let uses = self.0.entry(face).or_default();
+            uses[side] = uses[side].saturating_add(1);
+            uses[side] == 1
+        })
+    }
+
+    fn remove(&mut self, tet: &[u32; 4]) {
+        for (face, side) in faces(tet) {
+            let uses = self.0.entry(face).or_default();
+            uses[side] = uses[side].saturating_sub(1);
+            if *uses == [0, 0] {
+                self.0.remove(&face);
+            }
+        }
+    }
+
+    fn has(&self, face: &[u32; 3], side: usize) -> bool {
+        self.0.get(face).is_some_and(|uses| uses[side] > 0)
+    }
+}
+
+/// The four faces: their sorted vertices, and the side of each that the tetrahedron lies on.
+fn faces(tet: &[u32; 4]) -> impl Iterator<Item = ([u32; 3], usize)> + '_ {
+    FACES.iter().map(|face| {
+        let mut sorted = face.map(|i| tet[i]);
+        let mut side = 0;
+        for (i, j) in [(0, 1), (1, 2), (0, 1)] {
+            if sorted[i] > sorted[j] {
+                sorted.swap(i, j);
+                side = 1 - side;
+            }
+        }
+        (sorted, side)
+    })
+}
+
+impl ExplicitMt {
+    /// Checks that parents come first and know their children, that errors do not grow along the DAG, and that every
+    /// mesh on the way from the base to the reference mesh is conforming: positive tetrahedra, at most one on each
+    /// side of every face, and no update that opens a hole inside the domain.
+    ///
+    /// # Errors
+    /// The first fault, coarse to fine.
+    pub fn check(&self) -> Result<(), MtFault> {
+        let mut mesh = Faces::default();
+        self.add_all(self.base(), None, &mut mesh)?;
+        for u in (0..self.updates()).map(UpdateId) {
+            self.check_place(u)?;
+            self.removed(u).iter().for_each(|&t| mesh.remove(&self.tets()[t as usize]));
+            let hollow = self.hollow(u, &mesh);
+            self.add_all(self.inserted(u), Some(u), &mut mesh)?;
+            if hollow.iter().any(|(face, side)| !mesh.has(face, *side)) {
+                return Err(MtFault::Torn { update: u });
+            }
+        }
+        Ok(())
+    }
+
+    fn check_place(&self, u: UpdateId) -> Result<(), MtFault> {
+        let parents = || self.parents(u).iter().map(|&p| UpdateId(p));
+        let in_order = parents().all(|p| p < u && self.children(p).contains(&u.0))
+            && self.children(u).iter().all(|&c| c > u.0 && self.parents(UpdateId(c)).contains(&u.0))
+            && self.removed(u).iter().all(|&t| self.creator(t).is_none_or(|p| parents().any(|q| q == p)));
+        if !in_order {
+            return Err(MtFault::Order { update: u });
+        }
+        if parents().any(|p| self.error(p) < self.error(u)) {
+            return Err(MtFault::Error { update: u });
+        }
+        Ok(())
+    }
+
+    fn add_all(
+        &self,
+        tets: std::ops::Range<u32>,
+        update: Option<UpdateId>,
+        mesh: &mut Faces,
+    ) -> Result<(), MtFault> {
+        for tet in &self.tets()[tets.start as usize..tets.end as usize] {
+            if tet.iter().any(|&v| v >= self.vertices()) {
+                return Err(MtFault::Tetrahedron { update });
+            }
+            let [a, b, c, d] = tet.map(|v| self.position(VertexId(v)));
+            if orient3d(a, b, c, d) <= 0 {
+                return Err(MtFault::Tetrahedron { update });
+            }
+            if !mesh.add(tet) {
+                return Err(MtFault::Face { update });
+            }
+        }
+        Ok(())
+    }
+
+    /// The faces through which what `u+` removes touched what is left, with the side that is empty now.
+    fn hollow(&self, u: UpdateId, rest: &Faces) -> Vec<([u32; 3], usize)> {
+        let removed = self.removed(u).iter().flat_map(|&t| faces(&self.tets()[t as usize]));
+        removed.filter(|(face, side)| rest.has(face, 1 - side)).collect()
+    }
+}
