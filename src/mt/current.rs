@@ -10,7 +10,6 @@
 
 use super::BaseMesh;
 use super::BaseMeshError;
-use super::MAX_STAR;
 use super::MtInfo;
 use super::VertexId;
 use super::ring::Ring;
@@ -377,39 +376,48 @@ impl CurrentMesh {
     pub(super) fn gather_ring(&mut self, slot: u32, ring: &mut Ring) -> bool {
         self.next_epoch();
         let mark = self.epoch << MARK_BITS;
-        (ring.len, ring.link_len) = (0, 0);
         let first = self.incident[slot as usize];
-        let mut queued = [0_u32; MAX_STAR];
-        queued[0] = first;
-        let mut queue_len = 1;
+        ring.tets[0] = first;
         self.marks[first as usize] = mark;
-        while ring.len < queue_len {
-            let t = queued[ring.len];
-            let (tet, around) = (self.tets[t as usize], self.neighbors[t as usize]);
-            let marks = &mut self.vertex_marks;
-            let numbered = ring.push(t, tet, slot, |v, next| {
-                let old = marks[v as usize];
-                if old & !MARK_MASK == mark {
-                    return (old & MARK_MASK) as usize;
-                }
-                marks[v as usize] = mark | next as u32;
-                next
-            });
-            if !numbered {
-                return false;
+        let (mut len, mut queued, mut link_len) = (0, 1, 0);
+        // Which of its neighbours and vertices are new is a coin toss for the processor: the entries after the last
+        // one are written anyway, and counted if they were new.
+        while len < queued {
+            let t = ring.tets[len] as usize;
+            let (tet, around) = (self.tets[t], self.neighbors[t]);
+            let corner = (usize::from(tet[1] == slot))
+                | (usize::from(tet[2] == slot) << 1)
+                | (usize::from(tet[3] == slot) * 3);
+            ring.verts[len] = tet;
+            ring.corner[len] = corner as u8;
+            for k in FACES[corner & 3] {
+                let old = &mut self.vertex_marks[tet[k] as usize];
+                let is_new = *old & !MARK_MASK != mark;
+                *old = if is_new { mark | link_len as u32 } else { *old };
+                ring.local[len][k] = (*old & MARK_MASK) as u8;
+                ring.link[link_len] = tet[k];
+                link_len += usize::from(is_new);
             }
-            for (i, &n) in around.iter().enumerate() {
-                if n == NONE || tet[i] == slot || self.marks[n as usize] & !MARK_MASK == mark {
+            for k in FACES[corner & 3] {
+                let n = around[k];
+                if n == NONE {
                     continue;
                 }
-                if queue_len == MAX_STAR {
-                    return false;
-                }
-                self.marks[n as usize] = mark | queue_len as u32;
-                queued[queue_len] = n;
-                queue_len += 1;
+                let old = &mut self.marks[n as usize];
+                let is_new = *old & !MARK_MASK != mark;
+                *old = if is_new { mark | queued as u32 } else { *old };
+                let Some(place) = ring.tets.get_mut(queued) else {
+                    if is_new {
+                        return false;
+                    }
+                    continue;
+                };
+                *place = n;
+                queued += usize::from(is_new);
             }
+            len += 1;
         }
+        (ring.len, ring.link_len) = (len, link_len);
         true
     }
 
@@ -669,11 +677,17 @@ impl Changes {
     #[inline]
     fn mark(&mut self, entry: u32) {
         let block = entry >> BLOCK_BITS;
-        let word = (block / 64) as usize;
-        if word >= self.blocks.len() {
-            self.blocks.resize(word + 1, 0);
+        let (word, bit) = ((block / 64) as usize, 1 << (block % 64));
+        match self.blocks.get_mut(word) {
+            Some(word) => *word |= bit,
+            None => self.grow(word, bit),
         }
-        self.blocks[word] |= 1 << (block % 64);
+    }
+
+    #[cold]
+    fn grow(&mut self, word: usize, bit: u64) {
+        self.blocks.resize(word + 1, 0);
+        self.blocks[word] = bit;
     }
 
     fn truncate(&mut self, len: usize) {

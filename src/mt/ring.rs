@@ -31,8 +31,9 @@ pub(super) struct FanTriangle {
     pub partner: [u8; 2],
 }
 
-/// The most link vertices that are numbered: a star that is too large to be split is known by then.
-const LINK_CAPACITY: usize = 2 * MAX_LINK;
+/// The most link vertices that are numbered: a star that is too large to be split is known by then. A link of at
+/// most [`MAX_STAR`] triangles that hang together has two more vertices than triangles at most.
+pub(super) const LINK_CAPACITY: usize = 4 * MAX_LINK;
 
 /// Scratch space for a split: a star and its link, the two sides and the fan between them.
 #[derive(Clone, Debug)]
@@ -43,10 +44,10 @@ pub(super) struct Ring {
     /// Which corner of each tetrahedron is the centre.
     pub corner: [u8; MAX_STAR],
     /// The link vertices of each tetrahedron; the centre's entry is unused.
-    local: [[u8; 4]; MAX_STAR],
+    pub local: [[u8; 4]; MAX_STAR],
     pub link_len: usize,
     /// Slots of the link vertices.
-    link: [u32; LINK_CAPACITY],
+    pub link: [u32; LINK_CAPACITY],
     /// Bit `i` is the side of tetrahedron `i`.
     pub sides: u64,
     pub fan_len: usize,
@@ -71,40 +72,6 @@ impl Default for Ring {
 }
 
 impl Ring {
-    /// Adds a tetrahedron around the vertex in `slot`; `link_index` numbers a link vertex, given how many there are.
-    #[inline]
-    pub fn push(
-        &mut self,
-        t: u32,
-        verts: [u32; 4],
-        slot: u32,
-        mut link_index: impl FnMut(u32, usize) -> usize,
-    ) -> bool {
-        let i = self.len;
-        if i == MAX_STAR {
-            return false;
-        }
-        let corner = usize::from(verts[1] == slot)
-            | (usize::from(verts[2] == slot) << 1)
-            | (usize::from(verts[3] == slot) * 3);
-        self.tets[i] = t;
-        self.verts[i] = verts;
-        self.corner[i] = corner as u8;
-        self.len += 1;
-        for k in (0..4).filter(|&k| k != corner) {
-            let index = link_index(verts[k], self.link_len);
-            if index == self.link_len {
-                if index == LINK_CAPACITY {
-                    return false;
-                }
-                self.link[index] = verts[k];
-                self.link_len += 1;
-            }
-            self.local[i][k] = index as u8;
-        }
-        true
-    }
-
     /// The smallest label among the link vertices: the first of their splits.
     #[inline]
     pub fn smallest_split(&self, mesh: &CurrentMesh) -> Option<u32> {
@@ -118,27 +85,23 @@ impl Ring {
         if self.len < 64 && mask >> self.len != 0 {
             return false;
         }
-        let mut by_number = [0_u64; MAX_LINK];
-        let by_number = &mut by_number[..self.link_len];
-        for (i, (key, &v)) in by_number.iter_mut().zip(&self.link).enumerate() {
-            *key = u64::from(mesh.labels[v as usize].vertex) << 8 | i as u64;
+        let mut numbers = [u32::MAX; MAX_LINK];
+        for (number, &v) in numbers.iter_mut().zip(&self.link[..self.link_len]) {
+            *number = mesh.labels[v as usize].vertex;
         }
-        by_number.sort_unstable();
-        let mut rank = [0_u32; MAX_LINK];
-        by_number.iter().enumerate().for_each(|(r, key)| rank[(key & 0xFF) as usize] = r as u32);
-        // Three ranks of five bits, then the index.
-        let mut keys = [0_u32; MAX_STAR];
-        let keys = &mut keys[..self.len];
-        for (i, key) in keys.iter_mut().enumerate() {
-            let [j, k, l] = FACES[self.corner[i] as usize];
-            let [a, b, c] = [j, k, l].map(|k| rank[self.local[i][k] as usize]);
+        let rank = ranks(&numbers, self.link_len);
+        // Three ranks of five bits: as few as that, a whole star is ranked with a handful of vector instructions.
+        let mut keys = [u16::MAX; MAX_STAR];
+        for (i, key) in keys[..self.len].iter_mut().enumerate() {
+            let [j, k, l] = FACES[self.corner[i] as usize & 3];
+            let [a, b, c] = [j, k, l].map(|k| u16::from(rank[self.local[i][k] as usize % MAX_LINK]));
             let (low, high) = (a.min(b), a.max(b));
             let (least, most) = (low.min(c), high.max(c));
-            *key = (least << 10 | low.max(c.min(high)) << 5 | most) << 8 | i as u32;
+            *key = least << 10 | low.max(c.min(high)) << 5 | most;
         }
-        keys.sort_unstable();
-        let bits = keys.iter().enumerate();
-        self.sides = bits.fold(0, |sides, (r, key)| sides | (mask >> r & 1) << (key & 0xFF));
+        let place = ranks(&keys, self.len);
+        self.sides =
+            place[..self.len].iter().enumerate().fold(0, |s, (i, &r)| s | (mask >> (r & 63) & 1) << i);
         true
     }
 
@@ -151,7 +114,7 @@ impl Ring {
         self.fan_len = 0;
         for i in (0..self.len).filter(|i| self.sides >> i & 1 == 0) {
             let around = mesh.neighbors[self.tets[i] as usize];
-            for j in (0..4).filter(|&j| j != self.corner[i] as usize) {
+            for j in FACES[self.corner[i] as usize & 3] {
                 let Some(n) = mesh.in_star(around[j]).filter(|n| self.sides >> n & 1 == 1) else { continue };
                 let triangle =
                     FanTriangle { near: i as u8, face: j as u8, far: n as u8, partner: [NO_PARTNER; 2] };
@@ -256,6 +219,19 @@ impl Ring {
             determinant(mirrored) < zero
         })
     }
+}
+
+/// For each of the first `len` keys, how many keys are smaller. Keys beyond `len` must be the largest there are.
+/// Quadratic, but without a branch: for a few dozen keys that beats sorting.
+#[inline]
+fn ranks<K: Copy + PartialOrd, const N: usize>(keys: &[K; N], len: usize) -> [u8; N] {
+    let mut ranks = [0; N];
+    // Whole vectors are compared, the rest of the array is not looked at.
+    let padded = len.next_multiple_of(8).min(N);
+    for (rank, key) in ranks.iter_mut().zip(&keys[..len]) {
+        *rank = keys[..padded].iter().map(|other| u8::from(other < key)).sum();
+    }
+    ranks
 }
 
 /// Integers that hold the determinants of a lattice: `i64` up to [`crate::geom::NARROW_BITS`], else `i128`.
