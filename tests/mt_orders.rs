@@ -32,7 +32,7 @@ fn config(cases: u32, seed: u64) -> ProptestConfig {
 fn domain() -> impl Strategy<Value = Domain> {
     prop_oneof![
         Just(Domain::SingleTet),
-        (1_usize..=3).prop_map(Domain::Cube),
+        (1_usize..=5).prop_map(Domain::Cube),
         (1_usize..=2).prop_map(Domain::Ell),
         (1_usize..=2).prop_map(Domain::TwoComponents),
         Just(Domain::Ring),
