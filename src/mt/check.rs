@@ -107,7 +107,8 @@ fn faces(tet: &[u32; 4]) -> impl Iterator<Item = ([u32; 3], usize)> + '_ {
 impl ExplicitMt {
     /// Checks that parents come first and know their children, that errors do not grow along the DAG, and that every
     /// mesh on the way from the base to the reference mesh is conforming: positive tetrahedra, at most one on each
-    /// side of every face, and no update that opens a hole inside the domain.
+    /// side of every face. An update inside the domain fills what it empties; one at the boundary may move the
+    /// boundary, but fills whatever lies behind a face that it shares with the rest.
     ///
     /// # Errors
     /// The first fault, coarse to fine.
@@ -116,10 +117,12 @@ impl ExplicitMt {
         self.add_all(self.base(), None, &mut mesh)?;
         for u in (0..self.updates()).map(UpdateId) {
             self.check_place(u)?;
+            let inside = self.bare_faces(self.removed(u).iter().copied(), &mesh) == 0;
             self.removed(u).iter().for_each(|&t| mesh.remove(&self.tets()[t as usize]));
             let hollow = self.hollow(u, &mesh);
             self.add_all(self.inserted(u), Some(u), &mut mesh)?;
-            if hollow.iter().any(|(face, side)| !mesh.has(face, *side)) {
+            let open = hollow.iter().any(|(face, side)| !mesh.has(face, *side));
+            if open || inside && self.bare_faces(self.inserted(u), &mesh) > 0 {
                 return Err(MtFault::Torn { update: u });
             }
         }
@@ -159,6 +162,12 @@ impl ExplicitMt {
             }
         }
         Ok(())
+    }
+
+    /// How many faces of these tetrahedra are on the boundary of the mesh.
+    fn bare_faces(&self, tets: impl Iterator<Item = u32>, mesh: &Faces) -> usize {
+        let all = tets.flat_map(|t| faces(&self.tets()[t as usize]));
+        all.filter(|(face, side)| !mesh.has(face, 1 - side)).count()
     }
 
     /// The faces through which what `u+` removes touched what is left, with the side that is empty now.

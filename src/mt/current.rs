@@ -712,3 +712,59 @@ impl Changes {
         ranges
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::FieldInfo;
+    use super::super::MtKind;
+    use super::*;
+    use crate::geom::Lattice;
+
+    /// `n` tetrahedra around an edge from vertex 0 to vertex 1.
+    fn wheel(n: u32) -> CurrentMesh {
+        let field = FieldInfo { name: "f".into(), min: 0.0, max: 1.0, origin: 0.0, step: 1.0, bits: 1 };
+        let info = MtInfo {
+            kind: MtKind::Edge,
+            lattice: Lattice { origin: [0.0; 3], step: [1.0; 3], bits: 16 },
+            fields: vec![field],
+            vertices: 0,
+            tetrahedra: 0,
+            updates: 0,
+            displacement_per_error: 1.0,
+        };
+        let middle = 1 << 15;
+        let mut positions = vec![[middle, middle, 0], [middle, middle, 100]];
+        positions.extend(
+            (0..n)
+                .map(|i| {
+                    let angle = std::f64::consts::TAU * f64::from(i) / f64::from(n);
+                    [angle.cos(), angle.sin()].map(|x| middle + (x * 30_000.0) as i32)
+                })
+                .map(|[x, y]| [x, y, 0]),
+        );
+        let tets = (0..n).map(|i| [0, 2 + i, 2 + (i + 1) % n, 1]).collect();
+        let base = BaseMesh { values: vec![0; positions.len()], positions, tets };
+        CurrentMesh::new(&info, &base).expect("a valid mesh")
+    }
+
+    #[test]
+    fn a_star_too_large_to_gather_still_tells_what_was_looked_for() {
+        let n = 200;
+        let mut mesh = wheel(n);
+        let start = mesh.incident[0];
+        let distance = |t: u32| ((t + n - start) % n).min((start + n - t) % n);
+        for rim in 0..n {
+            let wanted = |_: &[Labels], tet: &[u32; 4]| tet.contains(&(2 + rim)).then_some(());
+            let found = mesh.gather_star(0, &mut Star::default(), wanted);
+            // 128 tetrahedra and the one too many are those up to 64 steps from the first.
+            if [rim, (rim + n - 1) % n].iter().any(|&t| distance(t) <= 64) {
+                assert!(matches!(found, Err(Gather::Stopped(()))), "{rim}");
+            } else {
+                assert!(matches!(found, Err(Gather::TooLarge)), "{rim}");
+            }
+        }
+        let mut star = Star::default();
+        assert!(wheel(128).gather_star(0, &mut star, |_, _| None::<()>).is_ok());
+        assert_eq!(star.len, 128);
+    }
+}

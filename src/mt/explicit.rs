@@ -251,3 +251,116 @@ impl ExplicitMt {
         self.counts().bytes()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::BaseMesh;
+    use super::super::FieldInfo;
+    use super::super::MtFault;
+    use super::super::MtInfo;
+    use super::super::MtKind;
+    use super::super::VertexSplit;
+    use super::*;
+    use crate::geom::Lattice;
+
+    /// An octahedron around a vertex that is split along z and whose upper half is split along x.
+    fn twice_split() -> ExplicitMt {
+        let field =
+            FieldInfo { name: "f".into(), min: 0.0, max: 1.0, origin: 0.0, step: 1.0 / 255.0, bits: 8 };
+        let info = MtInfo {
+            kind: MtKind::Edge,
+            lattice: Lattice { origin: [0.0; 3], step: [1.0; 3], bits: 8 },
+            fields: vec![field],
+            vertices: 9,
+            tetrahedra: 16,
+            updates: 2,
+            displacement_per_error: 1.0,
+        };
+        let axes = [[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]];
+        let mut positions = vec![[64; 3]];
+        positions.extend(axes.map(|a: [i32; 3]| a.map(|x| 64 + 32 * x)));
+        let ring = [[1, 2], [2, 3], [3, 4], [4, 1]];
+        let mut tets: Vec<[u32; 4]> = ring.map(|[a, b]| [0, a, b, 5]).to_vec();
+        tets.extend(ring.map(|[a, b]| [0, b, a, 6]));
+        let values = (3..10).collect();
+        let mut mt = EdgeMt::new(info, BaseMesh { positions, values, tets });
+        // In order, the faces are 1 2 5, 1 2 6, 1 4 5, 1 4 6, 2 3 5, 2 3 6, 3 4 5, 3 4 6.
+        let along_z = VertexSplit {
+            vertex: VertexId(0),
+            offset: [0, 0, 16],
+            field_offsets: &[3],
+            mask: 0b1010_1010,
+            error: ErrorCode(9),
+        };
+        mt.push(&along_z).expect("a valid split");
+        // The upper half is 7, the lower 8: 1 2 5, 1 2 8, 1 4 5, 1 4 8 go to the side of 1, the rest to that of 3.
+        let along_x = VertexSplit {
+            vertex: VertexId(7),
+            offset: [16, 0, 0],
+            field_offsets: &[-3],
+            mask: 0b1111_0000,
+            error: ErrorCode(5),
+        };
+        mt.push(&along_x).expect("a valid split");
+        ExplicitMt::from_edge(&mt).expect("a valid MT")
+    }
+
+    #[test]
+    fn a_small_mt_is_as_worked_out_by_hand() {
+        let mt = twice_split();
+        assert_eq!(mt.check(), Ok(()));
+        let (first, second) = (UpdateId(0), UpdateId(1));
+        assert_eq!((mt.base(), mt.inserted(first), mt.inserted(second)), (0..8, 8..20, 20..32));
+        assert_eq!(mt.removed(first), [0, 1, 2, 3, 4, 5, 6, 7]);
+        assert_eq!(mt.removed(second).len(), 8);
+        assert_eq!((mt.parents(second), mt.children(first)), (&[0][..], &[1][..]));
+        assert!(mt.parents(first).is_empty() && mt.children(second).is_empty());
+        assert_eq!(
+            [7, 8, 9, 10].map(|v| mt.position(VertexId(v))),
+            [[64, 64, 72], [64, 64, 56], [72, 64, 72], [56, 64, 72]]
+        );
+        assert_eq!([7, 8, 9, 10].map(|v| mt.levels(VertexId(v))[0]), [5, 2, 4, 7]);
+        assert_eq!(mt.extract(&[false, true]), None);
+        assert_eq!(mt.extract(&[true, true]).map(|t| t.len()), Some(16));
+        assert!(mt.is_feasible(&[false, false], first) && !mt.is_feasible(&[false, false], second));
+        assert!(!mt.is_feasible(&[true, true], first) && mt.is_feasible(&[true, true], second));
+        // 11 vertices, 32 tetrahedra, 2 updates with 16 removed tetrahedra and one arc.
+        assert_eq!(mt.bytes(), 11 * 16 + 32 * 16 + 2 * 8 + 16 * 4 + 8);
+    }
+
+    #[test]
+    fn the_check_finds_every_kind_of_fault() {
+        let (first, second) = (UpdateId(0), UpdateId(1));
+        let fault = |spoil: &dyn Fn(&mut ExplicitMt)| {
+            let mut mt = twice_split();
+            spoil(&mut mt);
+            mt.check()
+        };
+        assert_eq!(fault(&|mt| mt.errors.swap(0, 1)), Err(MtFault::Error { update: second }));
+        assert_eq!(fault(&|mt| mt.children = Rows { starts: vec![0; 3], items: vec![] }), {
+            Err(MtFault::Order { update: second })
+        });
+        let no_parents = Rows { starts: vec![0; 3], items: vec![] };
+        assert_eq!(
+            fault(&|mt| (mt.parents, mt.children) = (no_parents.clone(), no_parents.clone())),
+            Err(MtFault::Order { update: second })
+        );
+        assert_eq!(fault(&|mt| mt.tets[3].swap(0, 1)), Err(MtFault::Tetrahedron { update: None }));
+        assert_eq!(fault(&|mt| mt.tets[9].swap(0, 1)), Err(MtFault::Tetrahedron { update: Some(first) }));
+        assert_eq!(fault(&|mt| mt.tets[21][0] = 11), Err(MtFault::Tetrahedron { update: Some(second) }));
+        assert_eq!(fault(&|mt| mt.tets[1] = mt.tets[0]), Err(MtFault::Face { update: None }));
+        // A tetrahedron that stays where new ones go.
+        let stays = |mt: &mut ExplicitMt| {
+            let last = mt.removed.items.pop();
+            mt.removed.starts[2] -= 1;
+            assert!(last.is_some());
+        };
+        assert_eq!(fault(&stays), Err(MtFault::Face { update: Some(second) }));
+        // A new tetrahedron left out: a hole in the middle.
+        let leaves_out = |mt: &mut ExplicitMt| {
+            mt.tets.pop();
+            mt.inserted[2] -= 1;
+        };
+        assert_eq!(fault(&leaves_out), Err(MtFault::Torn { update: second }));
+    }
+}
