@@ -5,6 +5,7 @@ use super::UpdateId;
 use super::VertexId;
 use crate::geom::orient3d;
 use crate::mesh::FACES;
+use std::collections::BTreeSet;
 use std::collections::HashMap;
 use std::fmt;
 
@@ -117,12 +118,14 @@ impl ExplicitMt {
         self.add_all(self.base(), None, &mut mesh)?;
         for u in (0..self.updates()).map(UpdateId) {
             self.check_place(u)?;
-            let inside = self.bare_faces(self.removed(u).iter().copied(), &mesh) == 0;
+            let bare_before = self.bare_faces(self.removed(u).iter().copied(), &mesh);
             self.removed(u).iter().for_each(|&t| mesh.remove(&self.tets()[t as usize]));
             let hollow = self.hollow(u, &mesh);
             self.add_all(self.inserted(u), Some(u), &mut mesh)?;
             let open = hollow.iter().any(|(face, side)| !mesh.has(face, *side));
-            if open || inside && self.bare_faces(self.inserted(u), &mesh) > 0 {
+            let bare = self.bare_faces(self.inserted(u), &mesh);
+            let moves_boundary = !bare_before.is_subset(&bare);
+            if open || !moves_boundary && bare != bare_before {
                 return Err(MtFault::Torn { update: u });
             }
         }
@@ -164,10 +167,10 @@ impl ExplicitMt {
         Ok(())
     }
 
-    /// How many faces of these tetrahedra are on the boundary of the mesh.
-    fn bare_faces(&self, tets: impl Iterator<Item = u32>, mesh: &Faces) -> usize {
+    /// The faces of these tetrahedra that are on the boundary of the mesh, with their sides.
+    fn bare_faces(&self, tets: impl Iterator<Item = u32>, mesh: &Faces) -> BTreeSet<([u32; 3], usize)> {
         let all = tets.flat_map(|t| faces(&self.tets()[t as usize]));
-        all.filter(|(face, side)| !mesh.has(face, 1 - side)).count()
+        all.filter(|(face, side)| !mesh.has(face, 1 - side)).collect()
     }
 
     /// The faces through which what `u+` removes touched what is left, with the side that is empty now.
