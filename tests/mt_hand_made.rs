@@ -2,8 +2,11 @@
 
 mod support;
 
+use support::builder::Plan;
+use support::builder::build;
 use support::compare::live_tets;
 use support::compare::snapshot;
+use support::domains::Domain;
 use support::domains::volume6;
 use tetralod::geom::Lattice;
 use tetralod::mt::Applied;
@@ -210,13 +213,13 @@ fn wheel(n: u32) -> Cone {
 }
 
 #[test]
-fn stars_have_at_most_64_tetrahedra() {
-    for n in [3, 8, 63, 64, 65, 100, 127, 128, 129, 200] {
+fn stars_have_at_most_32_vertices_and_64_tetrahedra() {
+    for n in [3, 8, 30, 31, 32, 33, 63, 64, 65, 100, 127, 128, 129, 200] {
         let cone = wheel(n);
         // One wedge for v'': a path of two triangles through the axis.
         let wedge: Vec<[u32; 3]> = cone.triangles[..n as usize / 2].to_vec();
         let result = cone.split([0, -6, 0], &wedge);
-        if n <= 64 {
+        if n < 32 {
             assert_eq!(result.map(|tets| tets.len()), Ok(n as usize + 2), "{n}");
         } else {
             assert_eq!(result, Err(UpdateError::Star { update: 0 }), "{n}");
@@ -233,4 +236,17 @@ fn a_fan_may_touch_the_border() {
     let cone = Cone { directions, triangles: vec![[1, 2, 3], [1, 3, 4], [1, 4, 5]] };
     let tets = cone.split([-40, -20, 0], &[[1, 3, 4]]).expect("a valid split");
     assert_eq!(tets.len(), 5);
+}
+
+#[test]
+fn a_mesh_that_was_not_told_of_an_update_refuses_it() {
+    let built = build(Plan { domain: Domain::Cube(2), seed: 1, fields: 1, updates: 6 });
+    let mut mt = EdgeMt::new(built.info.clone(), built.base.clone());
+    let mut mesh = CurrentMesh::new(mt.info(), mt.base()).expect("a valid base mesh");
+    mt.push(&built.splits[0].as_update()).expect("a valid update");
+    let before = snapshot(&mesh);
+    assert_eq!(mt.refine(&mut mesh, UpdateId(0)), Err(UpdateError::Unannounced { update: 0 }));
+    assert_eq!(snapshot(&mesh), before);
+    mt.announce(&mut mesh, 0);
+    assert_eq!(mt.refine(&mut mesh, UpdateId(0)), Ok(Applied::Done));
 }

@@ -310,12 +310,11 @@ fn every_consistent_set_of_tiny_mts() {
                 let mut walk = Walk { built: &built, mt, mesh, set: set.clone(), live: live.clone() };
                 walk.step(u);
                 let next = (0..n).fold(0, |bits, u| bits | u32::from(walk.set[u]) << u);
-                if !reached.contains_key(&next) {
-                    reached.insert(next, walk.mesh);
+                let known = reached.entry(next).or_insert_with(|| {
                     todo.push(next);
-                } else {
-                    assert_eq!(reached[&next].hash(), walk.mesh.hash());
-                }
+                    walk.mesh.clone()
+                });
+                assert_eq!(known.hash(), walk.mesh.hash());
             }
         }
         let found: BTreeSet<u32> = reached.keys().copied().collect();

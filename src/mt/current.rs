@@ -767,4 +767,23 @@ mod tests {
         assert!(wheel(128).gather_star(0, &mut star, |_, _| None::<()>).is_ok());
         assert_eq!(star.len, 128);
     }
+
+    #[test]
+    fn marks_of_long_ago_are_forgotten_when_the_epochs_start_again() {
+        let mut mesh = wheel(20);
+        for _ in 0..3 {
+            let mut star = Star::default();
+            assert!(mesh.gather_star(0, &mut star, |_, _| None::<()>).is_ok());
+            assert_eq!((star.len, mesh.epoch), (20, 1));
+            mesh.epoch = EPOCHS - 1;
+        }
+        let mut mesh = wheel(20);
+        for _ in 0..3 {
+            let mut ring = mesh.take_ring();
+            assert!(mesh.gather_ring(0, &mut ring));
+            assert_eq!((ring.len, ring.link_len, mesh.epoch), (20, 21, 1));
+            mesh.put_back_ring(ring);
+            mesh.epoch = EPOCHS - 1;
+        }
+    }
 }

@@ -74,8 +74,14 @@ pub enum UpdateError {
         /// The update.
         update: u32,
     },
-    /// The star of the vertex is larger than an update can describe.
+    /// The star of the vertex is larger than an update can describe, or does not hang together through faces.
     Star {
+        /// The update.
+        update: u32,
+    },
+    /// The update arrived, but the mesh that it is applied to was not told: see
+    /// [`MultiTessellation::announce`](super::MultiTessellation::announce).
+    Unannounced {
         /// The update.
         update: u32,
     },
@@ -95,7 +101,11 @@ impl fmt::Display for UpdateError {
             Self::OffLattice { update } => write!(f, "update {update} leaves the lattice"),
             Self::Mask { update } => write!(f, "update {update} does not part the star of its vertex in two"),
             Self::Inverted { update } => write!(f, "update {update} turns a tetrahedron inside out"),
-            Self::Star { update } => write!(f, "update {update} meets a star of more than 64 tetrahedra"),
+            Self::Star { update } => write!(
+                f,
+                "update {update} meets a star of more than 64 tetrahedra or 32 vertices, or in parts"
+            ),
+            Self::Unannounced { update } => write!(f, "update {update} was not announced to the mesh"),
             Self::Error { update } => {
                 write!(f, "update {update} does not come in the order of falling error and of dependence")
             }

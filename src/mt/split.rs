@@ -44,13 +44,18 @@ impl EdgeMt {
     /// Applies update `u` (`u+`, a vertex split) to `mesh`, which must not contain it yet.
     ///
     /// # Errors
-    /// If the update does not fit the mesh, which only happens to a damaged MT; the mesh is unchanged then.
+    /// If the update does not fit the mesh, which only happens to a damaged MT, or if the mesh was not told of it by
+    /// [`MultiTessellation::announce`]; the mesh is unchanged then.
     pub(super) fn apply_split(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
         let vertex = self.split(u).vertex;
         let Some(p) = mesh.slot(vertex) else {
             let error = UpdateError::Vertex { update: u.0, vertex: vertex.0 };
             return Ok(Applied::Blocked(self.created_by(vertex).ok_or(error)?));
         };
+        if mesh.labels[p as usize].split != u.0 {
+            // The labels of a mesh that was not told of its updates cannot tell what is feasible.
+            return Err(UpdateError::Unannounced { update: u.0 });
+        }
         let mut ring = mesh.take_ring();
         let applied = self.split_ring(mesh, u, p, &mut ring);
         mesh.put_back_ring(ring);
