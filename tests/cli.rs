@@ -110,6 +110,13 @@ fn from_data_to_a_checked_mesh() {
         for key in ["min", "max", "bits"] {
             assert!(info["fields"][0][key].is_number());
         }
+        let bench = json(&["bench", &mt, "--json"]);
+        for part in ["decode", "refine", "coarsen"] {
+            assert!(number(&bench[part], "updates_per_second") > 0.0, "{part}");
+        }
+        for part in ["refine", "isosurface"] {
+            assert!(number(&bench[part], "tets_per_second") > 0.0, "{part}");
+        }
         assert!(good(&["info", &mt]).contains(info["fields"][0]["name"].as_str().expect("a name")));
 
         let whole = json(&["extract", &mt, "-o", &out, "--json", "--measure", &input]);
@@ -214,6 +221,7 @@ fn failures_name_the_file_and_leave_nothing() {
         bad(1, &["info", file], &[file, words]);
         bad(1, &["info", file, "--json"], &[file, words]);
         bad(1, &["extract", file, "-o", &out], &[file, words]);
+        bad(1, &["bench", file], &[file, words]);
     }
     for file in [&none, &text, &mt] {
         bad(1, &["build", file, "-o", &out], &[file]);

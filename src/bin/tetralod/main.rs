@@ -3,6 +3,7 @@
 //! One file a subcommand, each with its arguments and a `run`. Exit codes: 0 done, 1 failed (or a check failed),
 //! 2 wrong usage, 130 interrupted. Results go to stdout, everything else to stderr.
 
+mod bench;
 mod build;
 mod extract;
 mod files;
@@ -28,6 +29,7 @@ enum Command {
     Build(build::Arguments),
     Info(info::Arguments),
     Extract(extract::Arguments),
+    Bench(bench::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -46,6 +48,7 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Generate(arguments) => generate::run(&arguments)?,
         Command::Build(arguments) => build::run(&arguments)?,
         Command::Info(arguments) => info::run(&arguments)?,
+        Command::Bench(arguments) => bench::run(&arguments)?,
         Command::Extract(arguments) => extract::run(&arguments)?,
     }
     Ok(ExitCode::SUCCESS)
