@@ -12,21 +12,23 @@ use crate::session::SessionError;
 /// machine was doing.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BenchReport {
-    /// Updates of the MT.
+    /// Updates that were decoded.
     pub updates: u32,
-    /// Tetrahedra of the reference mesh.
+    /// Updates that were applied and undone: all but those without any error.
+    pub applied: u32,
+    /// Tetrahedra of the finest mesh.
     pub tetrahedra: u32,
     /// Runs that were timed.
     pub runs: u32,
     /// Updates decoded per second, from bytes in memory.
     pub decode_updates: f64,
-    /// Updates applied per second, from the base mesh to the reference mesh, in a mesh that never had them.
+    /// Updates applied per second, from the base mesh to the finest mesh, in a mesh that never had them.
     pub refine_updates: f64,
-    /// Tetrahedra of the reference mesh per second, on the same way.
+    /// Tetrahedra of the finest mesh per second, on the same way.
     pub refine_tets: f64,
-    /// Updates undone per second, from the reference mesh to the base mesh.
+    /// Updates undone per second, from the finest mesh to the base mesh.
     pub coarsen_updates: f64,
-    /// Tetrahedra of the reference mesh searched per second for an isosurface in the middle of the field's range.
+    /// Tetrahedra of the finest mesh searched per second for an isosurface in the middle of the field's range.
     pub isosurface_tets: f64,
 }
 
@@ -40,16 +42,15 @@ pub fn run(bytes: &[u8], clock: &mut dyn FnMut() -> f64, seconds: f64) -> Result
     let mut report = BenchReport::default();
     let end = clock() + seconds;
     while report.runs < MIN_RUNS || clock() < end {
-        let (times, updates, tetrahedra) = once(bytes, clock)?;
+        let times = once(bytes, clock, &mut report)?;
         best = if report.runs == 0 { times } else { best.least(times) };
         report.runs += 1;
-        (report.updates, report.tetrahedra) = (updates, tetrahedra);
     }
     let rate = |count: u32, time: f64| f64::from(count) / time.max(SHORTEST);
     report.decode_updates = rate(report.updates, best.decode);
-    report.refine_updates = rate(report.updates, best.refine);
+    report.refine_updates = rate(report.applied, best.refine);
     report.refine_tets = rate(report.tetrahedra, best.refine);
-    report.coarsen_updates = rate(report.updates, best.coarsen);
+    report.coarsen_updates = rate(report.applied, best.coarsen);
     report.isosurface_tets = rate(report.tetrahedra, best.isosurface);
     Ok(report)
 }
@@ -80,11 +81,15 @@ impl Times {
     }
 }
 
-/// One run: times, updates and tetrahedra.
-fn once(bytes: &[u8], clock: &mut dyn FnMut() -> f64) -> Result<(Times, u32, u32), SessionError> {
+/// One run: its times; the counts go into `report`.
+fn once(
+    bytes: &[u8],
+    clock: &mut dyn FnMut() -> f64,
+    report: &mut BenchReport,
+) -> Result<Times, SessionError> {
     let mut times = Times::default();
     let decoded = timed(clock, &mut times.decode, || decode(bytes)).map_err(SessionError::Format)?;
-    let updates = decoded.map_or(0, |mt| mt.updates());
+    report.updates = decoded.map_or(0, |mt| mt.updates());
     let mut session = Session::new();
     session.feed(bytes).map_err(SessionError::Format)?;
     let middle = session.info().map_or(0.0, |info| 0.5 * (info.fields[0].min + info.fields[0].max));
@@ -94,7 +99,8 @@ fn once(bytes: &[u8], clock: &mut dyn FnMut() -> f64) -> Result<(Times, u32, u32
     timed(clock, &mut times.isosurface, || session.isosurface(middle).map(drop))?;
     let coarsest = Request { error: f64::INFINITY, ..Request::default() };
     timed(clock, &mut times.coarsen, || session.refine(&coarsest))?;
-    Ok((times, updates, finest.tetrahedra))
+    (report.applied, report.tetrahedra) = (finest.applied, finest.tetrahedra);
+    Ok(times)
 }
 
 fn decode(bytes: &[u8]) -> Result<Option<EdgeMt>, FormatError> {
