@@ -43,6 +43,8 @@ pub mod mesh;
 pub mod mt;
 pub mod refine;
 pub mod session;
+#[cfg(feature = "build")]
+pub mod verify;
 pub mod view;
 #[cfg(feature = "web")]
 pub mod web;

@@ -1,0 +1,384 @@
+//! How far is an extracted mesh from the input, at every reference vertex and all over the boundary?
+
+use super::mesh_checks::PlainMesh;
+use super::mesh_checks::PlainReference;
+use super::triangles::Triangles;
+use crate::geom::orient3d;
+use crate::mesh::FACES;
+use crate::mesh::NONE;
+use crate::mesh::TetMesh;
+use crate::mt::MtInfo;
+use crate::refine::Request;
+use glam::DVec3;
+use std::ops::RangeInclusive;
+
+/// The input, prepared for being compared with.
+pub struct Deviation<'a> {
+    info: &'a MtInfo,
+    input: &'a TetMesh,
+    positions: Vec<[i32; 3]>,
+    levels: Vec<i32>,
+    /// The input's values as fractions of each field's range: `values[vertex * fields + f]`.
+    values: Vec<f64>,
+    cells: Cells,
+    boundary: Triangles,
+    boundary_vertices: Vec<u32>,
+    /// Rounding errors of distances.
+    slack: f64,
+}
+
+/// What was found.
+pub struct Measured {
+    /// The largest error as a fraction of what is allowed.
+    pub worst_ratio: f64,
+    pub failures: Vec<String>,
+}
+
+/// Rounding errors of interpolated values, as fractions of the range.
+const VALUE_SLACK: f64 = 1e-9;
+
+/// Failures of one kind that are described for each query.
+const DESCRIBED: usize = 3;
+
+impl<'a> Deviation<'a> {
+    /// Prepares to compare with `input`, which has to be what `info` says.
+    pub fn new(info: &'a MtInfo, input: &'a TetMesh) -> Result<Self, String> {
+        let (points, tets) = (input.positions.len(), input.tets.len());
+        if (points, tets) != (info.vertices as usize, info.tetrahedra as usize) {
+            return Err(format!(
+                "the MT was built from {} vertices and {} tetrahedra, the input has {points} and {tets}: give the \
+                 mesh that it was built from",
+                info.vertices, info.tetrahedra
+            ));
+        }
+        let mut fields = Vec::new();
+        for field in &info.fields {
+            let found = input.fields.iter().find(|f| f.name == field.name && f.values.len() == points);
+            fields.push(&found.ok_or(format!("the input has no field '{}'", field.name))?.values);
+        }
+        let positions: Vec<[i32; 3]> = input.positions.iter().map(|p| info.lattice.nearest(*p)).collect();
+        let each = || (0..points).flat_map(|v| fields.iter().zip(&info.fields).map(move |(f, i)| (f[v], i)));
+        let levels = each().map(|(value, field)| field.nearest(value)).collect();
+        let values = each().map(|(value, field)| value / field.range()).collect();
+        let neighbors = crate::mesh::neighbors(&input.tets).map_err(|error| format!("the input: {error}"))?;
+        let at = |v: u32| DVec3::from(info.lattice.point(positions[v as usize]));
+        let mut faces = Vec::new();
+        for (tet, around) in input.tets.iter().zip(&neighbors) {
+            faces.extend((0..4).filter(|&i| around[i] == NONE).map(|i| FACES[i].map(|j| tet[j])));
+        }
+        let boundary = Triangles::new(faces.iter().map(|face| face.map(at)).collect());
+        let mut boundary_vertices: Vec<u32> = faces.into_iter().flatten().collect();
+        boundary_vertices.sort_unstable();
+        boundary_vertices.dedup();
+        let slack = 1e-9 * crate::geom::Bounds::of(&input.positions).diagonal();
+        let cells = Cells::new(&positions);
+        Ok(Self { info, input, positions, levels, values, cells, boundary, boundary_vertices, slack })
+    }
+
+    /// The input on the lattice.
+    pub fn reference(&self) -> PlainReference<'_> {
+        PlainReference { positions: &self.positions, levels: &self.levels, tets: &self.input.tets }
+    }
+
+    /// Measures `mesh`, the answer to `request`, where the error is to be within `bound`. `errors` are those of
+    /// its tetrahedra.
+    pub fn measure(&self, mesh: &PlainMesh<'_>, errors: &[f64], request: &Request, bound: f64) -> Measured {
+        let fields = self.info.fields.iter();
+        let half_level = fields.map(|f| 0.5 * f.step / f.range()).fold(0.0, f64::max);
+        let allowed = bound.max(half_level) + VALUE_SLACK;
+        let border = Border::of(mesh, self.info);
+        let look = Look { of: self, mesh, border, errors, request, bound, allowed };
+        let mut found = Measured { worst_ratio: 0.0, failures: Vec::new() };
+        look.at_vertices(&mut found);
+        // Where isovalues do not reach, the boundary may be anywhere.
+        if request.isovalues.is_empty() {
+            look.at_extracted_boundary(&mut found);
+            look.at_reference_boundary(&mut found);
+        }
+        found
+    }
+}
+
+/// The comparison with one mesh.
+struct Look<'a> {
+    of: &'a Deviation<'a>,
+    mesh: &'a PlainMesh<'a>,
+    border: Border,
+    errors: &'a [f64],
+    request: &'a Request,
+    bound: f64,
+    allowed: f64,
+}
+
+impl Look<'_> {
+    fn wanted(&self, p: [f64; 3]) -> bool {
+        self.request.roi.is_none_or(|roi| roi.contains(p))
+    }
+
+    /// The error at every reference vertex that is wanted.
+    fn at_vertices(&self, found: &mut Measured) {
+        let points = self.of.positions.len();
+        let mut least = vec![f64::INFINITY; points];
+        for (t, tet) in self.mesh.tets.iter().enumerate() {
+            let corners = tet.map(|v| self.mesh.positions[v as usize]);
+            self.of.cells.between(&corners, |point| {
+                let at = self.of.positions[point as usize];
+                if let Some(weights) = barycentric(corners, at) {
+                    let error = self.error(point, *tet, weights, t);
+                    least[point as usize] = least[point as usize].min(error);
+                }
+            });
+        }
+        let radius = self.radius();
+        let mut failures = Failures::default();
+        for point in (0..points).filter(|&i| self.wanted(self.of.input.positions[i])) {
+            let mut error = least[point];
+            if error > self.allowed {
+                error = error.min(self.error_at_border(point as u32, radius));
+            }
+            found.worst_ratio = found.worst_ratio.max(error / self.allowed);
+            if error > self.allowed {
+                failures.add(|| self.describe(point, least[point], error));
+            }
+        }
+        failures.end("reference vertices", found);
+    }
+
+    fn describe(&self, point: usize, inside: f64, error: f64) -> String {
+        let place = if inside.is_finite() { "inside" } else { "outside" };
+        format!(
+            "reference vertex {point} at {:?}, {place}: error {error}, more than {}",
+            self.of.input.positions[point], self.allowed
+        )
+    }
+
+    /// The largest difference of any field at a reference vertex, interpolated in tetrahedron `t`; 0 if the request
+    /// does not reach it because it is clearly on one side of all isovalues.
+    fn error(&self, point: u32, tet: [u32; 4], weights: [f64; 4], t: usize) -> f64 {
+        if self.is_aside(point, tet, t) {
+            return 0.0;
+        }
+        let fields = &self.of.info.fields;
+        let mut largest = 0.0_f64;
+        for (f, field) in fields.iter().enumerate() {
+            let levels = tet.map(|v| field.value(self.mesh.mesh.levels(v)[f]) / field.range());
+            let value: f64 = levels.iter().zip(weights).map(|(level, w)| level * w).sum();
+            largest = largest.max((value - self.of.values[point as usize * fields.len() + f]).abs());
+        }
+        largest
+    }
+
+    /// Whether a tetrahedron, widened by its error, and the reference vertex are on one side of all isovalues.
+    fn is_aside(&self, point: u32, tet: [u32; 4], t: usize) -> bool {
+        if self.request.isovalues.is_empty() {
+            return false;
+        }
+        let (f, fields) = (self.request.field, &self.of.info.fields);
+        let field = &fields[f];
+        let value = self.of.values[point as usize * fields.len() + f] * field.range();
+        let values = tet.map(|v| field.value(self.mesh.mesh.levels(v)[f]));
+        let margin = self.errors[t] * field.range();
+        let low = values.into_iter().fold(f64::INFINITY, f64::min) - margin;
+        let high = values.into_iter().fold(f64::NEG_INFINITY, f64::max) + margin;
+        self.request.isovalues.iter().all(|&iso| (iso < low && iso < value) || (iso > high && iso > value))
+    }
+
+    /// How far a place of the boundary may be that stands for a reference vertex.
+    fn radius(&self) -> f64 {
+        let largest = if self.request.isovalues.is_empty() {
+            self.allowed
+        } else {
+            // Tetrahedra that isovalues pass by may have any error.
+            self.errors.iter().copied().fold(self.allowed, f64::max)
+        };
+        largest * self.of.info.displacement_per_error + self.of.slack
+    }
+
+    /// The least error with which some place of the boundary stands for a reference vertex.
+    fn error_at_border(&self, point: u32, radius: f64) -> f64 {
+        let p = DVec3::from(self.of.info.lattice.point(self.of.positions[point as usize]));
+        let per_error = self.of.info.displacement_per_error;
+        let mut least = f64::INFINITY;
+        self.border.triangles.within(p, radius, |i, q, distance| {
+            let (t, face) = self.border.faces[i as usize];
+            let tet = self.mesh.tets[t as usize];
+            let away = (distance - self.of.slack).max(0.0);
+            let displaced = if away > 0.0 { away / per_error } else { 0.0 };
+            let own = weights_on(q, self.border.triangles.corners[i as usize]);
+            let weights = tet.map(|v| face.iter().zip(own).find(|(w, _)| **w == v).map_or(0.0, |(_, x)| x));
+            let aside = self.is_aside(point, tet, t as usize) && displaced <= self.errors[t as usize];
+            let error = if aside { 0.0 } else { self.error(point, tet, weights, t as usize).max(displaced) };
+            least = least.min(error);
+        });
+        least
+    }
+
+    /// Whether the extracted boundary stays near that of the input, at its vertices.
+    fn at_extracted_boundary(&self, found: &mut Measured) {
+        let mut vertices: Vec<u32> = self.border.faces.iter().flat_map(|(_, face)| *face).collect();
+        vertices.sort_unstable();
+        vertices.dedup();
+        let mut failures = Failures::default();
+        for v in vertices {
+            let p = self.of.info.lattice.point(self.mesh.positions[v as usize]);
+            self.compare_distance(p, &self.of.boundary, "of the extracted boundary", &mut failures, found);
+        }
+        failures.end("vertices of the extracted boundary", found);
+    }
+
+    /// Whether the boundary of the input stays near the extracted one, at its vertices.
+    fn at_reference_boundary(&self, found: &mut Measured) {
+        let mut failures = Failures::default();
+        for &v in &self.of.boundary_vertices {
+            let p = self.of.info.lattice.point(self.of.positions[v as usize]);
+            self.compare_distance(p, &self.border.triangles, "of the input's boundary", &mut failures, found);
+        }
+        failures.end("vertices of the input's boundary", found);
+    }
+
+    fn compare_distance(
+        &self,
+        p: [f64; 3],
+        other: &Triangles,
+        what: &str,
+        failures: &mut Failures,
+        found: &mut Measured,
+    ) {
+        if !self.wanted(p) {
+            return;
+        }
+        let allowed = self.bound * self.of.info.displacement_per_error + self.of.slack;
+        let distance = other.distance(DVec3::from(p));
+        if self.bound > 0.0 {
+            found.worst_ratio = found.worst_ratio.max(distance / allowed);
+        }
+        if distance > allowed {
+            failures
+                .add(|| format!("vertex {what} at {p:?} is {distance} from the other, more than {allowed}"));
+        }
+    }
+}
+
+/// Failures of one kind: some in full, of the others their number.
+#[derive(Default)]
+struct Failures {
+    described: Vec<String>,
+    count: usize,
+}
+
+impl Failures {
+    fn add(&mut self, describe: impl FnOnce() -> String) {
+        self.count += 1;
+        if self.count <= DESCRIBED {
+            self.described.push(describe());
+        }
+    }
+
+    fn end(mut self, where_: &str, found: &mut Measured) {
+        if self.count > DESCRIBED {
+            self.described.push(format!("so at {} {where_}", self.count));
+        }
+        found.failures.append(&mut self.described);
+    }
+}
+
+/// The boundary of an extracted mesh.
+struct Border {
+    triangles: Triangles,
+    /// The tetrahedron behind each triangle, and the triangle's vertices.
+    faces: Vec<(u32, [u32; 3])>,
+}
+
+impl Border {
+    fn of(mesh: &PlainMesh<'_>, info: &MtInfo) -> Self {
+        let faces: Vec<(u32, [u32; 3])> = mesh.boundary().collect();
+        let at = |v: u32| DVec3::from(info.lattice.point(mesh.positions[v as usize]));
+        let triangles = Triangles::new(faces.iter().map(|(_, face)| face.map(at)).collect());
+        Self { triangles, faces }
+    }
+}
+
+/// The barycentric coordinates of a point on a triangle.
+fn weights_on(q: DVec3, [a, b, c]: [DVec3; 3]) -> [f64; 3] {
+    let normal = (b - a).cross(c - a);
+    let area = normal.length_squared();
+    if area <= 0.0 {
+        return [1.0, 0.0, 0.0];
+    }
+    let v = (q - a).cross(c - a).dot(normal) / area;
+    let w = (b - a).cross(q - a).dot(normal) / area;
+    [1.0 - v - w, v, w]
+}
+
+/// The barycentric coordinates of `p`; none if it is outside the tetrahedron. Which one is decided exactly.
+fn barycentric([a, b, c, d]: [[i32; 3]; 4], p: [i32; 3]) -> Option<[f64; 4]> {
+    let parts = [orient3d(p, b, c, d), orient3d(a, p, c, d), orient3d(a, b, p, d), orient3d(a, b, c, p)];
+    let whole = orient3d(a, b, c, d) as f64;
+    parts.iter().all(|&part| part >= 0).then(|| parts.map(|part| part as f64 / whole))
+}
+
+/// Lattice points sorted into the cells of a regular grid.
+struct Cells {
+    points: Vec<(u32, [i32; 3])>,
+    starts: Vec<u32>,
+    low: [i32; 3],
+    side: [i64; 3],
+    cells: [usize; 3],
+}
+
+/// Points in a cell, on average, if they were spread evenly.
+const CROWD: f64 = 3.0;
+const MAX_CELLS: f64 = 128.0;
+
+impl Cells {
+    fn new(positions: &[[i32; 3]]) -> Self {
+        let low = [0, 1, 2].map(|i| positions.iter().map(|p| p[i]).min().unwrap_or(0));
+        let extent =
+            [0, 1, 2].map(|i| positions.iter().map(|p| i64::from(p[i] - low[i])).max().unwrap_or(0) + 1);
+        let volume: f64 = extent.iter().map(|&e| e as f64).product();
+        let edge = (volume * CROWD / positions.len().max(1) as f64).cbrt();
+        let side =
+            extent.map(|e| ((e as f64 / (e as f64 / edge).clamp(1.0, MAX_CELLS)).ceil() as i64).max(1));
+        let cells = [0, 1, 2].map(|i| (extent[i] / side[i]) as usize + 1);
+        let mut sorted = Self { points: Vec::new(), starts: Vec::new(), low, side, cells };
+        let mut places: Vec<(usize, u32)> =
+            positions.iter().zip(0..).map(|(p, i)| (sorted.index(*p), i)).collect();
+        places.sort_unstable();
+        sorted.starts = vec![0; cells.iter().product::<usize>() + 1];
+        places.iter().for_each(|&(cell, _)| sorted.starts[cell + 1] += 1);
+        (1..sorted.starts.len()).for_each(|i| sorted.starts[i] += sorted.starts[i - 1]);
+        sorted.points = places.into_iter().map(|(_, i)| (i, positions[i as usize])).collect();
+        sorted
+    }
+
+    fn along(&self, axis: usize, x: i32) -> usize {
+        let offset = i64::from(x) - i64::from(self.low[axis]);
+        (offset.max(0) / self.side[axis]).min(self.cells[axis] as i64 - 1) as usize
+    }
+
+    fn index(&self, p: [i32; 3]) -> usize {
+        let [x, y, z] = [0, 1, 2].map(|axis| self.along(axis, p[axis]));
+        (z * self.cells[1] + y) * self.cells[0] + x
+    }
+
+    /// Calls `visit` with all points in the bounds of a tetrahedron.
+    fn between(&self, corners: &[[i32; 3]; 4], mut visit: impl FnMut(u32)) {
+        let low = [0, 1, 2].map(|i| corners.iter().map(|q| q[i]).fold(i32::MAX, i32::min));
+        let high = [0, 1, 2].map(|i| corners.iter().map(|q| q[i]).fold(i32::MIN, i32::max));
+        let range = |axis: usize| -> RangeInclusive<usize> {
+            self.along(axis, low[axis])..=self.along(axis, high[axis])
+        };
+        let [xs, ys, zs] = [range(0), range(1), range(2)];
+        for z in zs {
+            for y in ys.clone() {
+                let row = (z * self.cells[1] + y) * self.cells[0];
+                let cells = self.starts[row + xs.start()] as usize..self.starts[row + xs.end() + 1] as usize;
+                for &(point, p) in &self.points[cells] {
+                    if (0..3).all(|i| low[i] <= p[i] && p[i] <= high[i]) {
+                        visit(point);
+                    }
+                }
+            }
+        }
+    }
+}
