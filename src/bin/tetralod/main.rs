@@ -10,6 +10,7 @@ mod files;
 mod generate;
 mod info;
 mod output;
+mod verify;
 
 use clap::Parser;
 use clap::Subcommand;
@@ -29,6 +30,7 @@ enum Command {
     Build(build::Arguments),
     Info(info::Arguments),
     Extract(extract::Arguments),
+    Verify(verify::Arguments),
     Bench(bench::Arguments),
 }
 
@@ -48,6 +50,7 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Generate(arguments) => generate::run(&arguments)?,
         Command::Build(arguments) => build::run(&arguments)?,
         Command::Info(arguments) => info::run(&arguments)?,
+        Command::Verify(arguments) => return verify::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments)?,
         Command::Extract(arguments) => extract::run(&arguments)?,
     }
