@@ -1,8 +1,12 @@
 //! How far a mesh is from the one that it stands for, measured at every reference vertex.
 //!
 //! A reference vertex is compared with the linear interpolant of the tetrahedron that contains it on the lattice
-//! (decided exactly) or, where the boundary has moved, with that of the nearest boundary triangle. Where several
-//! tetrahedra contain it, the one that fits best counts.
+//! (decided exactly) or, where the boundary has moved, with that of the nearest boundary triangle.
+//!
+//! An MT promises that each reference vertex has *some* place in the mesh, no farther than the boundary may have
+//! moved, where the field is as near as promised. Where the boundary has moved this need not be the nearest place,
+//! nor one in a tetrahedron that happens to contain the vertex. So when [`Part::promise`] is given, places on the
+//! boundary within its distance count as well, and the one that fits best is taken.
 
 use crate::geom::Bounds;
 use crate::geom::nearest_on_triangle;
@@ -33,7 +37,33 @@ pub struct Part {
     pub roi: Option<Bounds>,
     /// Only in tetrahedra in which the field has one of these values; everywhere if empty.
     pub isovalues: Vec<f64>,
+    /// What has been promised, if anything.
+    pub promise: Option<Promise>,
 }
+
+/// What an MT promises of a mesh.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Promise {
+    /// Largest difference of the field, in field units.
+    pub field: f64,
+    /// Largest distance of a reference vertex from the mesh, in model units.
+    pub distance: f64,
+}
+
+impl Promise {
+    /// What a mesh with a relative error of `bound` promises. Half a step of the lattices is added: that is what the
+    /// reference itself was rounded by.
+    pub fn of(info: &MtInfo, field: usize, bound: f64) -> Self {
+        let (field, step) = (&info.fields[field], DVec3::from(info.lattice.step));
+        Self {
+            field: bound * field.range() + 0.5 * field.step * ROUNDING,
+            distance: bound * info.displacement_per_error + 0.5 * step.length() * ROUNDING,
+        }
+    }
+}
+
+/// Allowance for the rounding errors of the measurement itself.
+const ROUNDING: f64 = 1.000_01;
 
 /// What was measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -55,15 +85,22 @@ pub fn deviation(info: &MtInfo, mesh: &CurrentMesh, reference: &Reference<'_>, p
         .iter()
         .zip(reference.values)
         .filter(|(p, _)| wanted(p))
-        .map(|(p, value)| Point { at: info.lattice.nearest(*p), value: *value, inside: false, least: None })
+        .map(|(p, value)| Point {
+            at: info.lattice.nearest(*p),
+            value: *value,
+            inside: false,
+            excused: false,
+            least: None,
+        })
         .collect();
     let mut raster = Raster::new(points, info.lattice.step);
     for tet in mesh.tets() {
         measure.look_inside(*tet, &mut raster);
     }
-    measure.look_outside(&mut raster.points);
+    measure.look_beside(&mut raster);
     let mut largest = Deviation::default();
-    for (field, distance) in raster.points.iter().filter_map(|point| point.least) {
+    let counts = |point: &&Point| !point.excused || measure.is_kept(point);
+    for (field, distance) in raster.points.iter().filter(counts).filter_map(|point| point.least) {
         largest.field = largest.field.max(field);
         largest.distance = largest.distance.max(distance);
         largest.vertices += 1;
@@ -77,6 +114,8 @@ struct Point {
     value: f64,
     /// Whether some tetrahedron contains it.
     inside: bool,
+    /// Whether the promise may be kept by a tetrahedron in a part that is not asked for.
+    excused: bool,
     /// The least deviation found, and the distance at which it was found.
     least: Option<(f64, f64)>,
 }
@@ -131,28 +170,83 @@ impl Measure<'_> {
         });
     }
 
-    /// Compares the points that no tetrahedron contains with the nearest place on the boundary.
-    fn look_outside(&self, points: &mut [Point]) {
-        let outside = points.iter_mut().filter(|point| !point.inside);
-        let mut triangles = None;
-        for point in outside {
-            let triangles = triangles.get_or_insert_with(|| self.boundary());
+    /// Whether what is promised has been found at a point.
+    fn is_kept(&self, point: &Point) -> bool {
+        self.part.promise.is_some_and(|promise| point.least.is_some_and(|(field, _)| field <= promise.field))
+    }
+
+    /// Compares points with places on the boundary: those that no tetrahedron contains, and those for which the
+    /// promise has not been found to be kept.
+    fn look_beside(&self, raster: &mut Raster) {
+        let open = |point: &Point| match self.part.promise {
+            None => !point.inside,
+            Some(_) => (!point.inside || point.least.is_some()) && !self.is_kept(point),
+        };
+        if !raster.points.iter().any(open) {
+            return;
+        }
+        let triangles = self.boundary();
+        if let Some(promise) = self.part.promise {
+            triangles.iter().for_each(|triangle| self.look_around(triangle, promise.distance, raster, open));
+        }
+        for point in raster.points.iter_mut().filter(|point| !point.inside && point.least.is_none()) {
+            self.look_nearest(point, &triangles);
+        }
+    }
+
+    /// Compares a triangle with the points that are no farther from it than `reach`.
+    fn look_around(
+        &self,
+        triangle: &Triangle,
+        reach: f64,
+        raster: &mut Raster,
+        open: impl Fn(&Point) -> bool,
+    ) {
+        let corner = |corner: DVec3| self.info.lattice.nearest(corner.to_array());
+        // One step more for the rounding to the lattice.
+        let low = corner(triangle.low - reach).map(|x| x - 1);
+        let high = corner(triangle.high + reach).map(|x| x + 1);
+        raster.for_each_between(low, high, |point| {
+            if !open(point) {
+                return;
+            }
             let p = DVec3::from(self.info.lattice.point(point.at));
-            let mut nearest: Option<(f64, DVec3, &Triangle)> = None;
-            for triangle in triangles.iter() {
-                let bound = p.distance_squared(p.clamp(triangle.low, triangle.high));
-                if nearest.is_some_and(|(distance, ..)| bound >= distance) {
-                    continue;
-                }
-                let q = nearest_on_triangle(p, triangle.corners);
-                let distance = p.distance_squared(q);
-                if nearest.is_none_or(|(least, ..)| distance < least) {
-                    nearest = Some((distance, q, triangle));
-                }
+            let q = nearest_on_triangle(p, triangle.corners);
+            if p.distance(q) <= reach {
+                self.compare(point, triangle, p, q);
             }
-            if let Some((distance, q, triangle)) = nearest.filter(|(.., triangle)| triangle.spans) {
-                point.least = Some(((triangle.value(q) - point.value).abs(), distance.sqrt()));
+        });
+    }
+
+    /// Compares a point with the nearest place on the boundary.
+    fn look_nearest(&self, point: &mut Point, triangles: &[Triangle]) {
+        let p = DVec3::from(self.info.lattice.point(point.at));
+        let mut nearest: Option<(f64, DVec3, &Triangle)> = None;
+        for triangle in triangles {
+            let bound = p.distance_squared(p.clamp(triangle.low, triangle.high));
+            if nearest.is_some_and(|(distance, ..)| bound >= distance) {
+                continue;
             }
+            let q = nearest_on_triangle(p, triangle.corners);
+            let distance = p.distance_squared(q);
+            if nearest.is_none_or(|(least, ..)| distance < least) {
+                nearest = Some((distance, q, triangle));
+            }
+        }
+        if let Some((_, q, triangle)) = nearest {
+            self.compare(point, triangle, p, q);
+        }
+    }
+
+    /// Compares the point at `p` with the place `q` of a triangle.
+    fn compare(&self, point: &mut Point, triangle: &Triangle, p: DVec3, q: DVec3) {
+        if !triangle.spans {
+            point.excused = true;
+            return;
+        }
+        let deviation = (triangle.value(q) - point.value).abs();
+        if point.least.is_none_or(|(least, _)| deviation < least) {
+            point.least = Some((deviation, p.distance(q)));
         }
     }
 

@@ -110,6 +110,13 @@ fn from_data_to_a_checked_mesh() {
         for key in ["min", "max", "bits"] {
             assert!(info["fields"][0][key].is_number());
         }
+        let bench = json(&["bench", &mt, "--json"]);
+        for part in ["decode", "refine", "coarsen"] {
+            assert!(number(&bench[part], "updates_per_second") > 0.0, "{part}");
+        }
+        for part in ["refine", "isosurface"] {
+            assert!(number(&bench[part], "tets_per_second") > 0.0, "{part}");
+        }
         assert!(good(&["info", &mt]).contains(info["fields"][0]["name"].as_str().expect("a name")));
 
         let whole = json(&["extract", &mt, "-o", &out, "--json", "--measure", &input]);
@@ -137,6 +144,11 @@ fn from_data_to_a_checked_mesh() {
         assert!(last < number(&whole, "tetrahedra") / 2.0);
         let base = json(&["extract", &mt, "--error", "1e9", "-o", &out, "--json"]);
         assert_eq!((&base["tetrahedra"], &base["updates_applied"]), (&info["base_tetrahedra"], &0.into()));
+        let checked = json(&["verify", &mt, "--against", &input, "--json"]);
+        assert_eq!((&checked["valid"], &checked["failures"]), (&true.into(), &Value::Array(vec![])));
+        assert!(number(&checked, "queries") > 5.0);
+        let ratio = number(&checked, "worst_error_ratio");
+        assert!(ratio > 0.5 && ratio <= 1.0, "{checked}");
         // What was written is a mesh that reads and builds again.
         let again = json(&["build", &out, "-o", &folder.path("again.mt"), "--json"]);
         assert_eq!(again["tetrahedra"], base["tetrahedra"]);
@@ -214,10 +226,13 @@ fn failures_name_the_file_and_leave_nothing() {
         bad(1, &["info", file], &[file, words]);
         bad(1, &["info", file, "--json"], &[file, words]);
         bad(1, &["extract", file, "-o", &out], &[file, words]);
+        bad(1, &["bench", file], &[file, words]);
+        bad(1, &["verify", file, "--against", &input], &[file, words]);
     }
     for file in [&none, &text, &mt] {
         bad(1, &["build", file, "-o", &out], &[file]);
         bad(1, &["extract", &mt, "-o", &out, "--measure", file], &[file]);
+        bad(1, &["verify", &mt, "--against", file], &[file]);
     }
     bad(1, &["build", &input, "-o", &out, "--field", "nothing"], &[&input, "'nothing'", "density"]);
     bad(1, &["build", &input, "-o", &away], &[&away]);
@@ -227,6 +242,31 @@ fn failures_name_the_file_and_leave_nothing() {
     bad(1, &["generate", "bucky", "--size", "1", "-o", &folder.path("x.vti")], &["bucky", "2"]);
     bad(1, &["generate", "sphere-flow", "--size", "4", "-o", &folder.path("x.vti")], &["x.vti", "vtu"]);
     assert_eq!(folder.names(), before);
+}
+
+#[test]
+fn a_broken_promise_is_told_by_the_exit_code() {
+    let folder = Folder::new("broken");
+    let [input, other, mt] = ["b.vti", "other.vti", "b.mt"].map(|name| folder.path(name));
+    good(&["generate", "bucky", "--size", "7", "-o", &input]);
+    good(&["generate", "bucky", "--size", "8", "-o", &other]);
+    good(&["build", &input, "-o", &mt, "--quiet"]);
+    assert!(good(&["verify", &mt, "--against", &input]).contains("every promise is kept"));
+    for arguments in
+        [&["verify", &mt, "--against", &other, "--json"][..], &["verify", &mt, "--against", &other]]
+    {
+        let output = run(arguments);
+        assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
+        assert!(output.stderr.is_empty(), "the check was done: {}", text(&output.stderr));
+        let stdout = text(&output.stdout);
+        if arguments.contains(&"--json") {
+            let report: Value = serde_json::from_str(stdout).expect("one JSON value");
+            assert_eq!(report["valid"], false);
+            assert!(report["failures"].as_array().is_some_and(|failures| !failures.is_empty()), "{report}");
+        } else {
+            assert!(stdout.contains("broken"), "{stdout}");
+        }
+    }
 }
 
 #[test]
@@ -240,6 +280,7 @@ fn wrong_usage_is_told_apart() {
         &["extract", "a.mt", "-o", "b", "--box", "0,0,0,1,1,-1"],
         &["extract", "a.mt", "-o", "b", "--iso", "inf"],
         &["build", "a.vtu"],
+        &["verify", "a.mt"],
         &["build", "a.vtu", "-o", "b", "--position-bits", "31"],
         &["generate", "nothing", "--size", "3", "-o", "b.vtu"],
         &["dance"],

@@ -1,7 +1,7 @@
 //! Promise: what is measured is the difference at the reference vertices, inside the mesh and beside it.
 
 use tetralod::geom::{Bounds, Lattice};
-use tetralod::measure::{Part, Reference, deviation};
+use tetralod::measure::{Part, Promise, Reference, deviation};
 use tetralod::mt::{BaseMesh, CurrentMesh, FieldInfo, MtInfo, MtKind};
 
 /// Two tetrahedra above and below a triangle, with values 10 20 30 80 90.
@@ -83,4 +83,28 @@ fn every_point_is_found_however_many_there_are() {
     let (field, distance, vertices) = measure(&points, &Part::default());
     assert_eq!((distance, vertices), (0.0, points.len() as u64));
     assert!(field < 1e-9, "{field}");
+}
+
+#[test]
+fn a_promise_may_be_kept_at_another_place_within_its_reach() {
+    // Beside the tip of the lower tetrahedron's edge; the place with the value 24.375 is nearest.
+    let point = [([16, 8, 7], 20.0)];
+    let promise = |field, distance| Part { promise: Some(Promise { field, distance }), ..Part::default() };
+    let nearest = measure(&point, &Part::default());
+    assert!((nearest.0 - 4.375).abs() < 1e-9);
+    let kept = measure(&point, &promise(1.0, 1.0));
+    assert!(kept.0 < 1.0 && kept.1 > nearest.1 && kept.1 <= 1.0, "{kept:?}");
+    // The tip itself is half a unit away, the places between deviate by more.
+    let broken = measure(&point, &promise(1.0, 0.4));
+    assert!(broken.0 > 1.0, "{broken:?}");
+    assert_eq!(measure(&point, &promise(1.0, 0.1)), nearest, "nothing is so near: the nearest place counts");
+    // Also for a vertex that some tetrahedron contains, here near the outer face.
+    let inside = [([15, 8, 8], 23.0)];
+    assert!((measure(&inside, &Part::default()).0 - 4.25).abs() < 1e-9);
+    let kept = measure(&inside, &promise(1.0, 0.5));
+    assert!(kept.0 < 0.1 && kept.1 > 0.0, "{kept:?}");
+    assert_eq!(measure(&inside, &promise(5.0, 0.5)), (4.25, 0.0, 1), "it is kept where it is");
+    // In the middle of the reach of a part that is not asked for, nothing is held against the mesh.
+    let part = Part { isovalues: vec![85.0], ..promise(1.0, 1.0) };
+    assert_eq!(measure(&[([16, 8, 7], 60.0)], &part).2, 0);
 }

@@ -218,7 +218,14 @@ pub fn write_updates(out: &mut Vec<u8>, mt: &EdgeMt, first: u32, end: u32) {
         splits().for_each(|split| split.offset.iter().for_each(|&d| write::zigzag(out, d)));
     });
     write::column(out, scratch, |out| splits().for_each(|split| write::varint(out, split.mask)));
-    write::column(out, scratch, |out| write_deltas(out, splits().map(|split| i32::from(split.error.0))));
+    write::column(out, scratch, |out| {
+        let mut last = ErrorCode::MAX.0;
+        for ErrorCode(code) in splits().map(|split| split.error) {
+            // `push` has checked that errors do not grow.
+            write::varint(out, u64::from(last.saturating_sub(code)));
+            last = code;
+        }
+    });
     for field in 0..mt.info().fields.len() {
         write::column(out, scratch, |out| {
             splits().for_each(|split| write::zigzag(out, split.field_offsets[field]));
@@ -243,8 +250,9 @@ pub fn read_updates(mut reader: Reader<'_>, mt: &mut EdgeMt) -> Result<(), Forma
     let mut fields = (0..mt.info().fields.len()).map(|_| reader.column()).collect::<Result<Vec<_>, _>>()?;
     reader.end()?;
     let mut field_offsets = vec![0; fields.len()];
-    let mut code = 0;
+    let mut error = ErrorCode::MAX;
     for _ in 0..count {
+        error = read_error(&mut errors, error)?;
         for (offset, column) in field_offsets.iter_mut().zip(&mut fields) {
             *offset = column.zigzag()?;
         }
@@ -253,7 +261,7 @@ pub fn read_updates(mut reader: Reader<'_>, mt: &mut EdgeMt) -> Result<(), Forma
             offset: [offsets.zigzag()?, offsets.zigzag()?, offsets.zigzag()?],
             field_offsets: &field_offsets,
             mask: masks.varint64()?,
-            error: read_error(&mut errors, &mut code)?,
+            error,
         })?;
     }
     [vertices, offsets, masks, errors].into_iter().chain(fields).try_for_each(Reader::end)
@@ -267,9 +275,11 @@ fn read_vertex(column: &mut Reader<'_>, mt: &EdgeMt) -> Result<VertexId, FormatE
     vertex.map(VertexId).ok_or_else(|| column.corrupt("an update splits a vertex that is not there yet"))
 }
 
-fn read_error(column: &mut Reader<'_>, last: &mut i32) -> Result<ErrorCode, FormatError> {
-    let code = read_delta(column, last)?;
-    u16::try_from(code).map(ErrorCode).map_err(|_| column.corrupt("an error code has more than 16 bits"))
+/// The next error, told as the number of codes that it is below the one before.
+fn read_error(column: &mut Reader<'_>, last: ErrorCode) -> Result<ErrorCode, FormatError> {
+    let fall = column.varint()?;
+    let code = u32::from(last.0).checked_sub(fall).and_then(|code| u16::try_from(code).ok());
+    code.map(ErrorCode).ok_or_else(|| column.corrupt("an error is below zero"))
 }
 
 /// The totals at the end of a file.

@@ -93,13 +93,13 @@ fn build(arguments: &Arguments, mesh: &TetMesh) -> Result<BuildResult> {
     bar.set_style(ProgressStyle::with_template(style).context("the style of the progress bar")?);
     let mut stage = "";
     let result = edge_mt(mesh, &config, &mut |progress: BuildProgress| {
+        bar.set_length(progress.total.max(1));
         if progress.stage != stage {
             stage = progress.stage;
             // Every stage has its own speed.
             bar.reset();
             bar.set_message(stage);
         }
-        bar.set_length(progress.total);
         bar.set_position(progress.done);
         ControlFlow::Continue(())
     });

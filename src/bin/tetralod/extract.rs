@@ -12,6 +12,7 @@ use std::str::FromStr;
 use std::time::Instant;
 use tetralod::geom::Bounds;
 use tetralod::measure::Part;
+use tetralod::measure::Promise;
 use tetralod::measure::Reference;
 use tetralod::measure::deviation;
 use tetralod::mesh::Field;
@@ -163,7 +164,9 @@ fn report(
     seconds: f64,
 ) -> Result<Report> {
     let range = opened.info()?.fields[request.field].range();
-    let measured = arguments.measure.as_deref().map(|input| measure(input, request, opened)).transpose()?;
+    let promise = Promise::of(opened.info()?, request.field, stats.error_bound);
+    let measure = |input: &Path| measure(input, request, opened, promise);
+    let measured = arguments.measure.as_deref().map(measure).transpose()?;
     Ok(Report {
         vertices: stats.vertices,
         tetrahedra: stats.tetrahedra,
@@ -178,7 +181,7 @@ fn report(
 }
 
 /// The largest difference from the field of the input at its vertices, in the part that the request selects.
-fn measure(input: &Path, request: &Request, opened: &Opened) -> Result<f64> {
+fn measure(input: &Path, request: &Request, opened: &Opened, promise: Promise) -> Result<f64> {
     let (reference, _) = files::read_mesh(input)?;
     let info = opened.info()?;
     let name = &info.fields[request.field].name;
@@ -188,7 +191,7 @@ fn measure(input: &Path, request: &Request, opened: &Opened) -> Result<f64> {
     })?;
     let reference =
         Reference { positions: &reference.positions, values: &field.values, field: request.field };
-    let part = Part { roi: request.roi, isovalues: request.isovalues.clone() };
+    let part = Part { roi: request.roi, isovalues: request.isovalues.clone(), promise: Some(promise) };
     let mesh = opened.session.mesh().context("there is no mesh")?;
     Ok(deviation(info, mesh, &reference, &part).field)
 }

@@ -107,7 +107,8 @@ fn report(opened: &Opened) -> Result<Report> {
     })
 }
 
-/// The box around the reference mesh. Positions follow from the updates alone, without any mesh.
+/// The box around the reference mesh. Positions follow from the updates alone, without any mesh; that they stay on
+/// the lattice is known once the MT has been replayed.
 fn bounds(mt: &EdgeMt) -> Bounds {
     let mut positions = mt.base().positions.clone();
     for split in (0..mt.updates()).map(|u| mt.split(UpdateId(u))) {

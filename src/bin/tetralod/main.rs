@@ -3,12 +3,14 @@
 //! One file a subcommand, each with its arguments and a `run`. Exit codes: 0 done, 1 failed (or a check failed),
 //! 2 wrong usage, 130 interrupted. Results go to stdout, everything else to stderr.
 
+mod bench;
 mod build;
 mod extract;
 mod files;
 mod generate;
 mod info;
 mod output;
+mod verify;
 
 use clap::Parser;
 use clap::Subcommand;
@@ -28,6 +30,8 @@ enum Command {
     Build(build::Arguments),
     Info(info::Arguments),
     Extract(extract::Arguments),
+    Verify(verify::Arguments),
+    Bench(bench::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -46,6 +50,8 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Generate(arguments) => generate::run(&arguments)?,
         Command::Build(arguments) => build::run(&arguments)?,
         Command::Info(arguments) => info::run(&arguments)?,
+        Command::Verify(arguments) => return verify::run(&arguments),
+        Command::Bench(arguments) => bench::run(&arguments)?,
         Command::Extract(arguments) => extract::run(&arguments)?,
     }
     Ok(ExitCode::SUCCESS)

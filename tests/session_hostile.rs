@@ -1,0 +1,97 @@
+//! Promise: whatever a file with good checksums holds, a session gives valid meshes or typed errors, and ends.
+#![cfg(feature = "build")]
+
+mod format_support;
+
+use format_support::{assemble, sections};
+use proptest::prelude::*;
+use std::ops::ControlFlow;
+use std::sync::LazyLock;
+use tetralod::build::{BuildConfig, edge_mt};
+use tetralod::format::{EncodeOptions, encode};
+use tetralod::generate::by_name;
+use tetralod::geom::Bounds;
+use tetralod::refine::Request;
+use tetralod::session::{Session, SessionError};
+
+/// A small MT as the builder makes it, and its number of updates.
+static FILE: LazyLock<(Vec<u8>, u32)> = LazyLock::new(|| {
+    let mesh = by_name("bucky", 8).expect("a size that is allowed");
+    let built = edge_mt(&mesh, &BuildConfig::default(), &mut |_| ControlFlow::Continue(()));
+    let mt = built.expect("a good mesh").mt;
+    (encode(&mt, &EncodeOptions::default()).expect("a complete MT"), mt.updates())
+});
+
+/// Requests that go up and down, with and without a part and a budget.
+fn requests() -> [Request; 6] {
+    let uniform = |error| Request { error, ..Request::default() };
+    let roi = Some(Bounds { min: [0.1; 3], max: [0.5; 3] });
+    [
+        uniform(0.05),
+        Request { roi, ..uniform(0.0) },
+        Request { isovalues: vec![0.4], ..uniform(0.01) },
+        uniform(0.0),
+        Request { max_tets: Some(500), ..uniform(0.0) },
+        uniform(f64::INFINITY),
+    ]
+}
+
+/// Runs all requests; a mesh that is given out must be valid. True if nothing was found to be wrong.
+fn exercise(bytes: &[u8]) -> bool {
+    let mut session = Session::new();
+    let mut sound = session.feed(bytes).is_ok() & session.finish().is_ok();
+    if session.info().is_none() {
+        return false;
+    }
+    for request in requests() {
+        match session.refine(&request) {
+            Ok(stats) => assert_eq!(stats.tetrahedra as usize, session.view().tets.len()),
+            Err(SessionError::Format(_)) => sound = false,
+            Err(other) => panic!("the requests are good: {other}"),
+        }
+        session.mesh().expect("it is open").check().expect("a valid mesh");
+        let surface = session.isosurface(0.3).expect("it is open");
+        let points = surface.positions.len() as u32;
+        assert!(surface.indices.iter().flatten().all(|&v| v < points));
+    }
+    sound
+}
+
+#[test]
+fn the_file_itself_is_sound() {
+    let (bytes, updates) = &*FILE;
+    assert!(*updates > 400 && exercise(bytes));
+    assert_eq!(&assemble(&sections(bytes), *updates), bytes);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+
+    #[test]
+    fn changes_behind_good_checksums(
+        which in 0..3_usize,
+        changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
+    ) {
+        let (bytes, updates) = &*FILE;
+        let mut sections = sections(bytes);
+        let payload = &mut sections[which].1;
+        for (place, value) in &changes {
+            let place = place.index(payload.len());
+            payload[place] = *value;
+        }
+        exercise(&assemble(&sections, *updates));
+    }
+
+    /// The lengths of columns stay as they are, so most of these decode and fail, if at all, in the mesh.
+    #[test]
+    fn flipped_low_bits_of_updates(flips in prop::collection::vec((any::<prop::sample::Index>(), 0..7_u8), 1..4)) {
+        let (bytes, updates) = &*FILE;
+        let mut sections = sections(bytes);
+        let payload = &mut sections[2].1;
+        for (place, bit) in &flips {
+            let place = place.index(payload.len());
+            payload[place] ^= 1 << bit;
+        }
+        exercise(&assemble(&sections, *updates));
+    }
+}
