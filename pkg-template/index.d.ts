@@ -137,7 +137,7 @@ export type ErrorCode =
   /** The wasm module could not be loaded. */
   | "wasm"
   /** The browser has no WebGPU, or it gives no adapter (viewer only). */
-  | "webgpu-unavailable"
+  | "no-webgpu"
   /** A mistake in this package: please report it. */
   | "internal";
 

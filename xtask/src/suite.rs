@@ -138,7 +138,10 @@ fn with_package() -> Result<()> {
 }
 
 fn node_test(file: &str) -> Command {
-    shell::command("node", ["--test", "--test-reporter=spec", &format!("tests/js/{file}")])
+    shell::command(
+        "node",
+        ["--test", "--test-reporter=spec", "--test-timeout=120000", &format!("tests/js/{file}")],
+    )
 }
 
 /// Packs the package as npm would publish it, installs the archive in a project of its own outside the repository's

@@ -1,0 +1,15 @@
+// What must not compile: an error that the compiler does not report is itself an error here.
+import { MultiTessellation } from "tetralod";
+
+export async function misuse(mt: MultiTessellation): Promise<void> {
+  // @ts-expect-error the constructor is private
+  new MultiTessellation();
+  // @ts-expect-error there is no such option
+  await mt.refine({ eror: 1 });
+  // @ts-expect-error an isovalue is a number
+  await mt.isosurface("high");
+  // @ts-expect-error a number is no source
+  await MultiTessellation.open(7);
+  // @ts-expect-error what is known of a volume cannot be changed
+  mt.info = await mt.info;
+}

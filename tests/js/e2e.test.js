@@ -1,0 +1,185 @@
+// The demo page in a real browser, with WebGPU, on the demo's data. The pictures that it makes are kept in
+// `target/e2e/` to be looked at.
+import assert from "node:assert/strict";
+import { mkdir, writeFile } from "node:fs/promises";
+import { after, before, test } from "node:test";
+import { fileURLToPath } from "node:url";
+import { address, launch } from "./browser.js";
+
+const pictures = new URL("../../target/e2e/", import.meta.url);
+const PATIENCE = 90_000;
+
+let browser;
+
+before(async () => {
+  await mkdir(pictures, { recursive: true });
+  browser = await launch();
+});
+
+after(() => browser?.close());
+
+/** A fresh page with `volume` opened; anything that it complains about is kept. */
+async function open(volume, prepare = async () => {}) {
+  const page = await browser.newPage({ viewport: { width: 1100, height: 760 } });
+  page.complaints = [];
+  page.on("pageerror", (error) => page.complaints.push(String(error)));
+  page.on("console", (message) => message.type() === "error" && page.complaints.push(message.text()));
+  await prepare(page);
+  await page.goto(`${address()}?url=${encodeURIComponent(volume)}`);
+  return page;
+}
+
+const reach = (page, state) =>
+  page.waitForFunction((wanted) => window.tetralodDemo?.state === wanted, state, { timeout: PATIENCE });
+
+const demo = (page, name) => page.evaluate((name) => JSON.parse(JSON.stringify(window.tetralodDemo[name] ?? null)), name);
+
+/** Changes an input as a user does and waits for the refinement that follows. */
+async function setSlider(page, id, value) {
+  await page.evaluate(() => (window.tetralodDemo.stats = undefined));
+  await page.fill(`#${id}`, String(value));
+  await page.waitForFunction(() => window.tetralodDemo.stats, undefined, { timeout: PATIENCE });
+  return demo(page, "stats");
+}
+
+/** A picture of the canvas, kept under `name`; how many colours it has and a hash of it. */
+async function picture(page, name) {
+  await settle(page);
+  const png = await page.locator("#canvas").screenshot({ path: fileURLToPath(new URL(`${name}.png`, pictures)) });
+  return page.evaluate(async (base64) => {
+    const bytes = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
+    const image = await createImageBitmap(new Blob([bytes], { type: "image/png" }));
+    const context = new OffscreenCanvas(image.width, image.height).getContext("2d");
+    context.drawImage(image, 0, 0);
+    const pixels = new Uint32Array(context.getImageData(0, 0, image.width, image.height).data.buffer);
+    const counts = new Map();
+    for (const pixel of pixels) counts.set(pixel, (counts.get(pixel) ?? 0) + 1);
+    const background = Math.max(...counts.values()) / pixels.length;
+    return { colours: counts.size, background, pixels: Array.from(pixels.filter((_, i) => i % 97 === 0)) };
+  }, png.toString("base64"));
+}
+
+/** Waits until no frame has been drawn for a while. */
+async function settle(page) {
+  for (let seen = -1; ; ) {
+    const frames = await demo(page, "frames");
+    if (frames === seen) return;
+    seen = frames;
+    await page.waitForTimeout(400);
+  }
+}
+
+const differing = (a, b) => a.pixels.filter((pixel, i) => pixel !== b.pixels[i]).length / a.pixels.length;
+
+/** Something is drawn, and it is lit: many shades over a part of the canvas. */
+function assertDrawn(seen) {
+  assert.ok(seen.colours > 50, `only ${seen.colours} colours`);
+  assert.ok(seen.background < 0.97, `${(100 * seen.background).toFixed(1)} % of the picture is one colour`);
+}
+
+test("the page streams a volume, draws it, and its settings change mesh and picture", async () => {
+  const page = await open("data/bucky.mt");
+  await reach(page, "complete");
+  const info = await demo(page, "info");
+  assert.ok(info.tetrahedra > 100_000);
+  assert.equal(await demo(page, "receivedBytes"), await demo(page, "totalBytes"));
+
+  const surface = await picture(page, "isosurface");
+  assertDrawn(surface);
+  assert.ok((await demo(page, "frame")).triangles > 500);
+
+  const coarse = await setSlider(page, "error", 90);
+  const fine = await setSlider(page, "error", 40);
+  assert.ok(coarse.tetrahedra < fine.tetrahedra, `${coarse.tetrahedra} < ${fine.tetrahedra}`);
+  assert.ok(fine.relativeErrorBound < coarse.relativeErrorBound);
+  const budgeted = await setSlider(page, "budget", 30);
+  assert.ok(budgeted.tetrahedra < fine.tetrahedra);
+  await setSlider(page, "budget", 100);
+
+  await page.fill("#isovalue", "250");
+  assert.ok(differing(surface, await picture(page, "isovalue")) > 0.01, "the isovalue changes the picture");
+
+  await page.locator("label", { hasText: "Cut-away" }).click();
+  const cut = await picture(page, "cutaway");
+  assertDrawn(cut);
+  assert.ok(differing(surface, cut) > 0.05, "the cut-away is another picture");
+
+  const canvas = await page.locator("#canvas").boundingBox();
+  await page.mouse.move(canvas.x + 20, canvas.y + 20);
+  await page.mouse.down();
+  await page.mouse.move(canvas.x + 160, canvas.y + 60, { steps: 5 });
+  await page.mouse.up();
+  const turned = await picture(page, "turned");
+  assert.ok(differing(cut, turned) > 0.01, "dragging turns the volume");
+  await page.locator("#canvas").focus();
+  await page.keyboard.press("ArrowLeft");
+  assert.ok(differing(turned, await picture(page, "turned-by-key")) > 0.005, "the arrow keys turn the volume");
+
+  await page.screenshot({ path: fileURLToPath(new URL("page.png", pictures)) });
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("the first picture is there before the file is", async () => {
+  const page = await open("data/bucky.mt?throttle=1000000");
+  await page.waitForFunction(() => window.tetralodDemo?.firstFrameBytes, undefined, { timeout: PATIENCE });
+  const [first, state] = [await demo(page, "firstFrameBytes"), await demo(page, "state")];
+  assert.equal(state, "streaming");
+  assertDrawn(await picture(page, "streaming"));
+  const total = await demo(page, "totalBytes");
+  assert.ok(first < total / 2, `${first} of ${total} bytes had arrived`);
+  await reach(page, "complete");
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("every volume of the demo can be shown", async () => {
+  const page = await open("data/sphere-flow.mt");
+  await reach(page, "complete");
+  assertDrawn(await picture(page, "sphere-flow"));
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("a browser without WebGPU gets a message, not a blank page", async () => {
+  const page = await open("data/bucky.mt", (page) =>
+    page.addInitScript(() => Object.defineProperty(Navigator.prototype, "gpu", { get: () => undefined })),
+  );
+  await reach(page, "unsupported");
+  const message = page.locator("#message");
+  assert.ok(await message.isVisible());
+  assert.match(await message.innerText(), /WebGPU/);
+  await page.screenshot({ path: fileURLToPath(new URL("no-webgpu.png", pictures)) });
+  await page.close();
+});
+
+test("a file that is not there, or is no MT, is named", async () => {
+  for (const [file, words] of [["data/none.mt", /none\.mt.*404/], ["style.css", /style\.css.*not an MT file/]]) {
+    const page = await open(file);
+    await reach(page, "failed");
+    assert.match(await page.locator("#message").innerText(), words);
+    await page.close();
+  }
+});
+
+test("the package runs in a worker of the page, without a viewer", async () => {
+  const page = await open("data/bucky.mt");
+  await reach(page, "complete");
+  const seen = await page.evaluate(async () => {
+    const { MultiTessellation } = await import("tetralod");
+    const mt = await MultiTessellation.open("data/bucky.mt");
+    await mt.complete;
+    const { stats, tets } = await mt.refine({ error: "5%", maxTets: 20_000 });
+    const [one, two] = [await mt.hash(), (await mt.refine({ error: "0%" }), await mt.refine({ error: "5%", maxTets: 20_000 }), await mt.hash())];
+    const abort = new AbortController();
+    abort.abort();
+    const aborted = await MultiTessellation.open("data/bucky.mt", { signal: abort.signal }).catch((error) => error.name);
+    mt.free();
+    return { tetrahedra: stats.tetrahedra, length: tets.length, same: one === two, aborted };
+  });
+  assert.ok(seen.tetrahedra > 0 && seen.tetrahedra <= 20_000);
+  assert.equal(seen.length, 4 * seen.tetrahedra);
+  assert.ok(seen.same, "the same request gives the same mesh from wherever one starts");
+  assert.equal(seen.aborted, "AbortError");
+  await page.close();
+});

@@ -1,0 +1,290 @@
+// The built package in Node, on the small MT that `cargo xtask test` makes: TETRALOD_FIXTURE is its folder.
+import assert from "node:assert/strict";
+import { createReadStream } from "node:fs";
+import { readFile } from "node:fs/promises";
+import { createServer } from "node:http";
+import { after, before, describe, test } from "node:test";
+import { pathToFileURL } from "node:url";
+import { MultiTessellation, TetralodError } from "../../pkg/index.js";
+
+const folder = process.env.TETRALOD_FIXTURE;
+assert.ok(folder, "TETRALOD_FIXTURE is not set: run `cargo xtask test js`");
+const path = `${folder}/small.mt`;
+const bytes = new Uint8Array(await readFile(path));
+const cases = JSON.parse(await readFile(`${folder}/hashes.json`, "utf8"));
+
+/** A server whose answers the tests choose; `held` answers stay open until they are released. */
+let server;
+let base;
+const held = new Set();
+
+before(async () => {
+  server = createServer((request, response) => {
+    const { pathname } = new URL(request.url, "http://x");
+    if (pathname === "/good") return response.writeHead(200, { "content-length": bytes.length }).end(bytes);
+    if (pathname === "/page") return response.writeHead(200).end("<!doctype html><title>oops</title>");
+    if (pathname === "/breaks") {
+      response.writeHead(200, { "content-length": bytes.length });
+      response.write(bytes.slice(0, bytes.length >> 1));
+      // Later, because a client may drop what it has not read yet when a connection breaks.
+      return setTimeout(() => response.destroy(), 500);
+    }
+    if (pathname === "/holds") {
+      response.writeHead(200, { "content-length": bytes.length });
+      response.write(bytes.slice(0, bytes.length - 1));
+      held.add(response);
+      return response.on("close", () => held.delete(response));
+    }
+    return response.writeHead(404).end();
+  });
+  await new Promise((resolve) => server.listen(0, "127.0.0.1", resolve));
+  base = `http://127.0.0.1:${server.address().port}`;
+});
+
+after(() => {
+  server.closeAllConnections();
+  server.close();
+});
+
+const rejects = (promise, code, message = /./) =>
+  assert.rejects(promise, (error) => {
+    assert.ok(error instanceof TetralodError, `${error?.stack}`);
+    assert.equal(error.code, code, error.message);
+    assert.match(error.message, message);
+    return true;
+  });
+
+async function* pieces(size) {
+  for (let at = 0; at < bytes.length; at += size) yield bytes.slice(at, at + size);
+}
+
+for (const worker of [true, false]) {
+  describe(worker ? "in a worker" : "in the caller's thread", () => {
+    const open = (source, options) => MultiTessellation.open(source, { worker, ...options });
+
+    test("the meshes are those of the native program", async () => {
+      const mt = await open(bytes);
+      await mt.complete;
+      assert.ok(cases.length >= 5);
+      for (const { options, hash, tetrahedra } of cases) {
+        const { stats, tets } = await mt.refine(options);
+        assert.equal(stats.tetrahedra, tetrahedra, JSON.stringify(options));
+        assert.equal(tets.length, 4 * tetrahedra);
+        assert.equal(await mt.hash(), hash, JSON.stringify(options));
+      }
+      mt.free();
+    });
+
+    test("every kind of source gives the same mesh and leaves the caller's bytes alone", async () => {
+      const sources = {
+        "a URL as text": `${base}/good`,
+        "a URL": new URL(`${base}/good`),
+        "a file URL": pathToFileURL(path),
+        "a request": new Request(`${base}/good`),
+        "a response": await fetch(`${base}/good`),
+        "a blob": new Blob([bytes]),
+        "a buffer": bytes.buffer.slice(),
+        "bytes": bytes,
+        "a Node buffer": Buffer.from(bytes),
+        "a stream": new Blob([bytes]).stream(),
+        "a Node stream": createReadStream(path, { highWaterMark: 100 }),
+        "an async iterable": pieces(13),
+      };
+      const copy = bytes.slice();
+      for (const [name, source] of Object.entries(sources)) {
+        const mt = await open(source);
+        await mt.complete;
+        assert.equal((await mt.refine({ error: 0 })).stats.tetrahedra, mt.info.tetrahedra, name);
+        assert.equal(mt.progress.bytes, bytes.length, name);
+        assert.equal(mt.progress.complete, true, name);
+        mt.free();
+      }
+      assert.deepEqual(bytes, copy);
+    });
+
+    test("arrays are consistent and the mesh is closed", async () => {
+      const mt = await open(bytes);
+      await mt.complete;
+      const { positions, field, tets, neighbors, stats } = await mt.refine({ error: "2%" });
+      assert.ok(positions instanceof Float32Array && field instanceof Float32Array);
+      assert.ok(tets instanceof Uint32Array && neighbors instanceof Uint32Array);
+      assert.equal(positions.length, 3 * stats.vertices);
+      assert.equal(field.length, stats.vertices);
+      assert.equal(neighbors.length, tets.length);
+      assert.ok(stats.satisfied && stats.relativeErrorBound <= 0.02 && stats.milliseconds >= 0);
+      const { min, max } = mt.info.fields[0];
+      assert.ok(Math.abs(stats.errorBound - stats.relativeErrorBound * (max - min)) < 1e-9 * (max - min));
+      for (let t = 0; t < stats.tetrahedra; t++) {
+        for (let i = 0; i < 4; i++) {
+          const other = neighbors[4 * t + i];
+          if (other === 0xffffffff) continue;
+          assert.ok(neighbors.subarray(4 * other, 4 * other + 4).includes(t), "neighbours know each other");
+        }
+      }
+      mt.free();
+    });
+
+    test("an absolute error is the same request as the relative one", async () => {
+      const mt = await open(bytes);
+      await mt.complete;
+      const { min, max } = mt.info.fields[0];
+      await mt.refine({ error: "4%" });
+      const relative = await mt.hash();
+      await mt.refine({ error: 0 });
+      await mt.refine({ error: 0.04 * (max - min) });
+      assert.equal(await mt.hash(), relative);
+      mt.free();
+    });
+
+    test("an isosurface has vertices on it and unit normals", async () => {
+      const mt = await open(bytes);
+      await mt.complete;
+      await mt.refine({ error: "1%" });
+      const { min, max } = mt.info.fields[0];
+      const { positions, normals, indices } = await mt.isosurface((min + max) / 2);
+      assert.ok(indices.length > 0 && indices.length % 3 === 0);
+      assert.equal(normals.length, positions.length);
+      assert.ok(indices.every((index) => 3 * index < positions.length));
+      assert.ok(Math.abs(Math.hypot(...normals.subarray(0, 3)) - 1) < 1e-4);
+      await rejects(mt.isosurface(NaN), "bad-option");
+      await rejects(mt.isosurface("0.5"), "bad-option");
+      mt.free();
+    });
+
+    test("progress is told chunk by chunk", async () => {
+      const seen = [];
+      const mt = await open(pieces(50), { onProgress: (progress) => seen.push(progress) });
+      await mt.complete;
+      assert.ok(seen.length >= bytes.length / 50);
+      assert.ok(seen.every((progress, i) => i === 0 || progress.bytes >= seen[i - 1].bytes));
+      assert.equal(seen.at(-1).complete, true);
+      assert.equal(seen.at(-1).updates, mt.info.updates);
+      assert.deepEqual(seen.at(-1), mt.progress);
+      mt.free();
+    });
+
+    test("the total is known from the first chunk of a download", async () => {
+      const seen = [];
+      const mt = await open(`${base}/good`, { onProgress: (progress) => seen.push(progress) });
+      await mt.complete;
+      assert.equal(seen[0].total, bytes.length);
+      mt.free();
+    });
+
+    test("it works while the file is still arriving, and says what is missing", async () => {
+      let release;
+      const gate = new Promise((resolve) => (release = resolve));
+      async function* slow() {
+        const half = bytes.length >> 1;
+        yield bytes.slice(0, half);
+        await gate;
+        yield bytes.slice(half);
+      }
+      const mt = await open(slow());
+      assert.equal(mt.progress.complete, false);
+      const early = await mt.refine({ error: 0 });
+      assert.ok(early.stats.tetrahedra > 0 && early.stats.tetrahedra < mt.info.tetrahedra);
+      assert.equal(early.stats.satisfied, false);
+      release();
+      await mt.complete;
+      const late = await mt.refine({ error: 0 });
+      assert.equal(late.stats.tetrahedra, mt.info.tetrahedra);
+      assert.equal(late.stats.satisfied, true);
+      mt.free();
+    });
+
+    test("what cannot be opened is refused with a code and the name of the source", async () => {
+      await rejects(open(`${base}/none`), "network", /\/none: HTTP 404/);
+      await rejects(open("http://127.0.0.1:9/closed"), "network", /127\.0\.0\.1:9/);
+      await rejects(open(new URL("file:///no/such.mt")), "network", /no\/such\.mt/);
+      await rejects(open(`${base}/page`), "not-mt", /\/page: /);
+      await rejects(open(bytes.slice(0, 10)), "truncated");
+      await rejects(open(new Uint8Array()), "truncated");
+      await rejects(open(7), "bad-source", /URL, Request/);
+      await rejects(open(null), "bad-source");
+      await rejects(open((async function* () { yield "text"; })()), "bad-source", /string/);
+      const used = await fetch(`${base}/good`);
+      await used.arrayBuffer();
+      await rejects(open(used), "bad-source");
+      await rejects(open(bytes, { onprogress() {} }), "bad-option", /onprogress/);
+    });
+
+    test("a file that breaks off stays usable as far as it came", async () => {
+      const mt = await open(`${base}/breaks`);
+      await rejects(mt.complete, "network", /\/breaks/);
+      assert.ok((await mt.refine({ error: 0 })).stats.tetrahedra > 0);
+      mt.free();
+
+      const cut = await open(bytes.slice(0, bytes.length - 5));
+      await rejects(cut.complete, "truncated");
+      assert.ok((await cut.refine({ error: 0 })).stats.tetrahedra > 0);
+      cut.free();
+    });
+
+    test("a damaged file is reported", async () => {
+      const damaged = bytes.slice();
+      damaged[damaged.length >> 1] ^= 0x10;
+      const mt = await open(damaged).catch((error) => error);
+      if (mt instanceof TetralodError) return assert.equal(mt.code, "corrupt");
+      await rejects(mt.complete, "corrupt", /bytes: /);
+      mt.free();
+    });
+
+    test("options with impossible values are refused by name", async () => {
+      const mt = await open(bytes);
+      await rejects(mt.refine({ eror: 1 }), "bad-option", /`eror`/);
+      await rejects(mt.refine({ error: "lots" }), "bad-option", /`error`/);
+      await rejects(mt.refine({ box: [0, 0, 0] }), "bad-option", /`box`/);
+      await rejects(mt.refine({ field: "no such" }), "bad-option", /no such/);
+      await rejects(mt.refine({ maxTets: -1 }), "bad-option", /`maxTets`/);
+      await rejects(mt.refine(7), "bad-option", /object/);
+      await rejects(mt.setField("no such"), "bad-option", /no such/);
+      assert.ok((await mt.refine({ box: new Float32Array([0, 0, 0, 1, 1, 1]), isovalues: new Float64Array([0.5]) })).stats);
+      mt.free();
+    });
+
+    test("a signal ends the download and the wait for it", async () => {
+      const early = AbortSignal.abort();
+      await assert.rejects(open(bytes, { signal: early }), { name: "AbortError" });
+
+      const abort = new AbortController();
+      const mt = await open(`${base}/holds`, { signal: abort.signal });
+      assert.equal(held.size, 1);
+      abort.abort();
+      await assert.rejects(mt.complete, { name: "AbortError" });
+      assert.ok((await mt.refine({ error: 0 })).stats.tetrahedra > 0, "what arrived stays usable");
+      mt.free();
+      await until(() => held.size === 0, "the connection is closed");
+
+      const waiting = new AbortController();
+      const never = open((async function* () { await new Promise(() => {}); })(), { signal: waiting.signal });
+      waiting.abort(new Error("changed my mind"));
+      await assert.rejects(never, /changed my mind/);
+    });
+
+    test("free ends the download, and all later calls say so", async () => {
+      const mt = await open(`${base}/holds`);
+      const underWay = mt.refine({ error: 0 });
+      mt.free();
+      mt.free();
+      if (worker) await rejects(underWay, "freed");
+      else await underWay.catch((error) => assert.equal(error.code, "freed"));
+      await rejects(mt.complete, "freed");
+      await rejects(mt.refine(), "freed");
+      await rejects(mt.isosurface(0), "freed");
+      await rejects(mt.hash(), "freed");
+      await until(() => held.size === 0, "the connection is closed");
+      const other = await open(bytes);
+      other[Symbol.dispose ?? Symbol.for("Symbol.dispose")]();
+      await rejects(other.hash(), "freed");
+    });
+  });
+}
+
+async function until(condition, what) {
+  for (let i = 0; i < 200; i++) {
+    if (condition()) return;
+    await new Promise((resolve) => setTimeout(resolve, 10));
+  }
+  assert.fail(`waited in vain until ${what}`);
+}
