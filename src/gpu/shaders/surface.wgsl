@@ -1,0 +1,25 @@
+// The lit isosurface, both sides.
+
+struct Vertex {
+    @builtin(position) clip: vec4f,
+    @location(0) position: vec3f,
+    @location(1) normal: vec3f,
+}
+
+@vertex
+fn vs(@location(0) position: vec3f, @location(1) normal: vec3f) -> Vertex {
+    return Vertex(frame.view_projection * vec4f(position, 1.0), position, normal);
+}
+
+@fragment
+fn fs(in: Vertex, @builtin(front_facing) front: bool) -> @location(0) vec4f {
+    let view = normalize(frame.eye.xyz - in.position);
+    let n = normalize(in.normal) * select(-1.0, 1.0, front);
+    let albedo = decode(select(frame.back.rgb, frame.front.rgb, front));
+    let facing = clamp(dot(n, view), 0.0, 1.0);
+    let rim = pow(1.0 - facing, 3.0) * (0.5 + 0.5 * dot(n, frame.up.xyz));
+    let half_way = normalize(view + frame.key_light.xyz);
+    let gloss = pow(max(dot(n, half_way), 0.0), 50.0);
+    let lit = albedo * diffuse(n) + vec3f(0.75, 0.85, 1.0) * (0.22 * rim) + vec3f(0.16 * gloss);
+    return vec4f(encode(lit), 1.0);
+}
