@@ -127,7 +127,7 @@ function draw() {
     const milliseconds = performance.now() - start;
     if (drew) emit("frame", { milliseconds, triangles: viewer.triangles, bytes, ready });
     // The canvas may be hidden just now: then try again with the next refresh.
-    else invalidate();
+    else if (viewer.pending) invalidate();
   } catch (error) {
     // A frame that fails would fail again: wait for a change, or for good if the GPU or the program is gone.
     broken = error?.code === "device-lost" || error?.code === undefined;
@@ -135,9 +135,11 @@ function draw() {
   }
 }
 
-/** Resolves after a frame has been handed to the screen. */
+/** Resolves after a frame has been handed to the screen; soon in any case, since hidden pages have no frames. */
 async function drawn() {
   invalidate();
+  const patience = new Promise((resolve) => setTimeout(resolve, 250));
   // Of two refreshes, the first draws and the second comes after that picture.
-  for (let i = 0; i < 2; i++) await new Promise((resolve) => nextFrame(resolve));
+  const twice = new Promise((resolve) => nextFrame(() => nextFrame(resolve)));
+  await Promise.race([twice, patience]);
 }

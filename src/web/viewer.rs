@@ -268,6 +268,12 @@ impl Viewer {
         }
     }
 
+    /// Whether the picture is out of date.
+    #[wasm_bindgen(getter)]
+    pub fn pending(&self) -> bool {
+        self.stale.picture
+    }
+
     /// Draws if anything has changed since the last frame; says whether it has drawn.
     pub fn frame(&mut self) -> Result<bool, WebError> {
         if !self.stale.picture {
