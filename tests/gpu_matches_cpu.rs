@@ -125,7 +125,7 @@ impl Lights {
         let view = (self.eye - hit.place).normalize();
         let n = hit.data.normalize() * if hit.front { 1.0 } else { -1.0 };
         let albedo = vec(if hit.front { look.front } else { look.back }).map(decode);
-        let rim = (1.0 - n.dot(view).clamp(0.0, 1.0)).powi(3) * (0.5 + 0.5 * n.dot(self.up));
+        let rim = (1.0 - n.dot(view).abs().min(1.0)).powi(3) * (0.5 + 0.5 * n.dot(self.up));
         let gloss = n.dot((view + self.key).normalize()).max(0.0).powi(50);
         let lit = albedo * self.diffuse(n) + DVec3::new(0.75, 0.85, 1.0) * (0.22 * rim) + 0.16 * gloss;
         lit.map(encode)

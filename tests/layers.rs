@@ -83,7 +83,8 @@ fn imports(code: &str) -> BTreeSet<String> {
 fn violations(module: &str, code: &str) -> Vec<String> {
     let allowed = LAYERS.iter().find(|(name, _)| *name == module).map(|(_, allowed)| *allowed);
     let Some(allowed) = allowed else { return vec![format!("module `{module}` is not in the table")] };
-    let forbidden = imports(code).into_iter().filter(|name| name != module && !allowed.contains(&name.as_str()));
+    let forbidden =
+        imports(code).into_iter().filter(|name| name != module && !allowed.contains(&name.as_str()));
     forbidden.map(|name| format!("`{module}` may not import `{name}`")).collect()
 }
 
@@ -91,12 +92,17 @@ fn violations(module: &str, code: &str) -> Vec<String> {
 fn modules_import_only_what_is_below_them() {
     let sources = sources();
     let mut wrong = Vec::new();
-    for Source { module, path, code } in sources.iter().filter(|s| !matches!(s.module.as_str(), "lib" | "bin")) {
+    for Source { module, path, code } in
+        sources.iter().filter(|s| !matches!(s.module.as_str(), "lib" | "bin"))
+    {
         wrong.extend(violations(module, code).into_iter().map(|what| format!("{}: {what}", path.display())));
     }
     assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
     for module in ["geom", "mesh", "mt", "format", "refine", "view", "session", "gpu"] {
-        assert!(sources.iter().any(|s| s.module == module), "`{module}` has no sources: has it been renamed?");
+        assert!(
+            sources.iter().any(|s| s.module == module),
+            "`{module}` has no sources: has it been renamed?"
+        );
     }
 }
 
@@ -114,7 +120,11 @@ fn libraries_of_the_edges_stay_at_the_edges() {
     for Source { module, path, code } in &sources() {
         for (library, places) in EDGES {
             let used = code.contains(&format!("{library}::")) || code.contains(&format!("use {library}"));
-            assert!(!used || places.contains(&module.as_str()), "{}: {library} in `{module}`", path.display());
+            assert!(
+                !used || places.contains(&module.as_str()),
+                "{}: {library} in `{module}`",
+                path.display()
+            );
         }
     }
 }

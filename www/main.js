@@ -5,7 +5,6 @@
  * `state` is "starting", "opening", "streaming", "complete", "failed" or "unsupported".
  */
 
-import { Viewer } from "tetralod/viewer";
 import { attachControls } from "./controls.js";
 
 const $ = (id) => document.getElementById(id);
@@ -26,7 +25,7 @@ const demo = (window.tetralodDemo = {
   totalBytes: undefined,
 });
 
-/** @type {Viewer} */
+/** @type {import("tetralod/viewer").Viewer} */
 let viewer;
 /** What was opened last, for "Try again". */
 let source;
@@ -40,8 +39,11 @@ start();
 
 async function start() {
   try {
+    // Imported here, so that a package that is missing is told like everything else.
+    const { Viewer } = await import("tetralod/viewer");
     viewer = demo.viewer = await Viewer.create(canvas);
   } catch (error) {
+    demo.error = { code: error.code, message: error.message };
     const unsupported = error.code === "no-webgpu";
     demo.state = unsupported ? "unsupported" : "failed";
     $("panel").inert = true;
@@ -194,7 +196,8 @@ function applyCut() {
   const axis = Number($("axis").value);
   const [low, high] = [demo.info.bounds[axis], demo.info.bounds[axis + 3]];
   const at = low + ((high - low) * $("cut").value) / 1000;
-  text("cut-text", `${"xyz"[axis]} ${$("flip").checked ? "<" : ">"} ${short(at)} is cut away`, "cut");
+  const where = Number(at.toPrecision(3));
+  text("cut-text", `${"xyz"[axis]} ${$("flip").checked ? "<" : ">"} ${where} is cut away`, "cut");
   const sign = $("flip").checked ? -1 : 1;
   const normal = [0, 1, 2].map((i) => (i === axis ? sign : 0));
   viewer.setClip({ normal, offset: sign * at });
@@ -315,6 +318,8 @@ function showStats(stats) {
   demo.stats = stats;
   const { info } = demo;
   $("n-current").textContent = count(stats.tetrahedra);
+  const all = info ? ` of ${count(info.updates)}` : "";
+  $("n-applied").textContent = `${count(stats.applied)}${all}`;
   $("n-updates").textContent = `+${count(stats.refined)} −${count(stats.coarsened)}`;
   $("n-refine").textContent = milliseconds(stats.milliseconds);
   const bound = `${(stats.relativeErrorBound * 100).toPrecision(2)} %`;
@@ -354,8 +359,10 @@ function count(n) {
   return n.toLocaleString("en");
 }
 
+/** A field value with as many digits as its range deserves. */
 function short(value) {
-  if (value === 0) return "0";
+  const range = field.max - field.min;
+  if (Math.abs(value) < range * 1e-6) return "0";
   const magnitude = Math.abs(value);
   return magnitude >= 1e5 || magnitude < 1e-3 ? value.toExponential(2) : String(Number(value.toPrecision(4)));
 }

@@ -16,7 +16,8 @@ fn fs(in: Vertex, @builtin(front_facing) front: bool) -> @location(0) vec4f {
     let view = normalize(frame.eye.xyz - in.position);
     let n = normalize(in.normal) * select(-1.0, 1.0, front);
     let albedo = decode(select(frame.back.rgb, frame.front.rgb, front));
-    let facing = clamp(dot(n, view), 0.0, 1.0);
+    // Interpolated normals may look away a little at silhouettes: no more light there than at the very edge.
+    let facing = min(abs(dot(n, view)), 1.0);
     let rim = pow(1.0 - facing, 3.0) * (0.5 + 0.5 * dot(n, frame.up.xyz));
     let half_way = normalize(view + frame.key_light.xyz);
     let gloss = pow(max(dot(n, half_way), 0.0), 50.0);
