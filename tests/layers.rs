@@ -8,14 +8,16 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Each module with what it may import besides itself.
-const LAYERS: [(&str, &[&str]); 11] = [
+const LAYERS: [(&str, &[&str]); 13] = [
     ("geom", &[]),
     ("mesh", &["geom"]),
     ("mt", &["geom", "mesh"]),
+    ("generate", &["geom", "mesh"]),
     ("io", &["geom", "mesh"]),
     ("build", &["geom", "mesh", "mt"]),
     ("format", &["geom", "mesh", "mt"]),
     ("refine", &["geom", "mesh", "mt"]),
+    ("measure", &["geom", "mesh", "mt", "refine"]),
     ("view", &["geom", "mesh"]),
     ("session", &["geom", "mesh", "mt", "format", "refine", "view"]),
     ("gpu", &["geom", "mesh", "view"]),
@@ -29,7 +31,7 @@ const EDGES: [(&str, &[&str]); 6] = [
     ("wasm_bindgen", &["web"]),
     ("js_sys", &["web"]),
     ("web_sys", &["web"]),
-    ("std::fs", &["bin"]),
+    ("std::fs", &["bin", "io"]),
 ];
 
 /// A source file: the module it belongs to, its path, its text without comments.
