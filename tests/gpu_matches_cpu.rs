@@ -164,7 +164,7 @@ fn aspect() -> f64 {
 }
 
 /// What a pixel shows when all of it shows the same kind of thing.
-fn steady<'a>(triangles: &'a [Triangle], camera: &Camera, screen: DVec2) -> Option<Option<Hit>> {
+fn steady(triangles: &[Triangle], camera: &Camera, screen: DVec2) -> Option<Option<Hit>> {
     let at = |dx: f64, dy: f64| {
         let pixel = DVec2::new(dx * 2.0 / f64::from(SIZE[0]), dy * 2.0 / f64::from(SIZE[1]));
         let ray = camera.ray(screen + pixel, aspect());

@@ -87,7 +87,7 @@ fn neighbors(tets: &[[u32; 4]]) -> Vec<[u32; 4]> {
             if let Some((other, j)) = open.remove(&key) {
                 let other: usize = other;
                 neighbors[t][i] = other as u32;
-                neighbors[other][j as usize] = t as u32;
+                neighbors[other][j] = t as u32;
             } else {
                 open.insert(key, (t, i));
             }
