@@ -35,6 +35,8 @@ pub mod format;
 #[cfg(feature = "build")]
 pub mod generate;
 pub mod geom;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 #[cfg(feature = "build")]
 pub mod io;
 #[cfg(feature = "build")]

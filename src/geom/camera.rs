@@ -46,15 +46,21 @@ impl Camera {
         let radius = bounds.diagonal() / 2.0;
         let mut camera =
             Self { target: centre, distance: radius, yaw: -1.05, pitch: 0.42, fov: 0.6, centre, radius };
-        camera.distance = camera.fitting_distance(aspect);
+        camera.distance = camera.fitting_distance(bounds, aspect);
         camera
     }
 
-    /// The distance at which the whole sphere is in view, also where the screen is higher than wide.
-    fn fitting_distance(&self, aspect: f64) -> f64 {
-        let half = self.fov / 2.0;
-        let half_width = (half.tan() * positive(aspect)).atan();
-        self.radius / half.min(half_width).sin()
+    /// The smallest distance at which all corners of `bounds` are in view, and a little more.
+    fn fitting_distance(&self, bounds: &Bounds, aspect: f64) -> f64 {
+        let high = (self.fov / 2.0).tan();
+        let wide = high * positive(aspect);
+        let needed = (0..8).map(|corner: usize| {
+            let place = |axis: usize| if corner >> axis & 1 == 0 { bounds.min } else { bounds.max }[axis];
+            let p = DVec3::new(place(0), place(1), place(2)) - self.target;
+            let across = (p.dot(self.right()).abs() / wide).max(p.dot(self.up()).abs() / high);
+            across - p.dot(self.forward())
+        });
+        needed.fold(self.radius, f64::max) * 1.08
     }
 
     /// Where the camera is.

@@ -38,6 +38,13 @@ impl From<SessionError> for WebError {
     }
 }
 
+#[cfg(feature = "gpu")]
+impl From<crate::gpu::GpuError> for WebError {
+    fn from(error: crate::gpu::GpuError) -> Self {
+        Self { code: gpu_code(&error), message: error.to_string() }
+    }
+}
+
 impl From<WebError> for JsValue {
     fn from(error: WebError) -> Self {
         let js = js_sys::Error::new(&error.message);
@@ -64,5 +71,16 @@ fn session_code(error: &SessionError) -> &'static str {
         SessionError::NotReady => "not-ready",
         SessionError::Field { .. } | SessionError::Request(_) => "bad-option",
         SessionError::Format(error) => format_code(error),
+    }
+}
+
+#[cfg(feature = "gpu")]
+fn gpu_code(error: &crate::gpu::GpuError) -> &'static str {
+    use crate::gpu::GpuError;
+    match error {
+        GpuError::NoAdapter(_) | GpuError::NoDevice(_) | GpuError::NoSurface(_) => "no-webgpu",
+        GpuError::TooLarge { .. } => "too-large",
+        GpuError::DeviceLost(_) => "device-lost",
+        GpuError::Refused(_) => "gpu",
     }
 }

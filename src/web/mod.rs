@@ -5,5 +5,9 @@ mod error;
 mod options;
 mod results;
 mod session;
+#[cfg(all(feature = "gpu", target_arch = "wasm32"))]
+mod viewer;
 
 pub use session::CoreSession;
+#[cfg(all(feature = "gpu", target_arch = "wasm32"))]
+pub use viewer::Viewer;

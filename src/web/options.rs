@@ -111,7 +111,7 @@ fn percentage(text: &str) -> Result<f64, WebError> {
     Ok(number / 100.0)
 }
 
-fn bounds(numbers: &[f64]) -> Result<Bounds, WebError> {
+pub fn bounds(numbers: &[f64]) -> Result<Bounds, WebError> {
     let &[x0, y0, z0, x1, y1, z1] = numbers else {
         return Err(WebError::bad_option("box", "must be six numbers: x0, y0, z0, x1, y1, z1"));
     };

@@ -1,0 +1,132 @@
+import type { CoreStats, MtInfo, RefineOptions, Source } from "./index.js";
+
+export { TetralodError } from "./index.js";
+
+/** How much of a file has arrived. */
+export interface ViewerProgress {
+  /** Whether the base mesh is there. */
+  ready: boolean;
+  /** Whether the whole file is there. */
+  complete: boolean;
+  /** Bytes decoded. */
+  bytes: number;
+  /** Updates decoded. */
+  updates: number;
+  /** Size of the file where it is known. */
+  total: number | undefined;
+}
+
+/** The outcome of a refinement. */
+export interface ViewerStats extends CoreStats {
+  /** How long the refinement took. */
+  milliseconds: number;
+  /** Bytes of the file that had been decoded. */
+  bytes: number;
+}
+
+/** A picture that was drawn. */
+export interface ViewerFrame {
+  /** How long the worker took to extract, upload and issue it. */
+  milliseconds: number;
+  /** Triangles of the isosurface or of the cut-away view. */
+  triangles: number;
+  /** Bytes of the file that had been decoded. */
+  bytes: number;
+  /** Whether it shows a volume yet. */
+  ready: boolean;
+}
+
+/** A volume that has been opened. */
+export interface OpenedVolume {
+  info: MtInfo;
+  /** Its URL or kind. */
+  name: string;
+  /** Its size in bytes where that is known. */
+  total: number | undefined;
+  /** Settles when the whole file is there, or with what went wrong. */
+  finished: Promise<void>;
+}
+
+/** A plane; what lies on the side that `normal` points to is cut away. */
+export interface ClipPlane {
+  normal: [number, number, number];
+  /** `normal · p` of its points. */
+  offset: number;
+}
+
+export interface ViewerEventMap {
+  progress: CustomEvent<ViewerProgress>;
+  stats: CustomEvent<ViewerStats>;
+  frame: CustomEvent<ViewerFrame>;
+  error: CustomEvent<Error>;
+}
+
+/**
+ * Draws an MT on a canvas with WebGPU; decoding, refinement and drawing happen in a worker.
+ *
+ * Calls that come faster than the worker can follow replace each other: the last one wins.
+ *
+ * ```js
+ * const viewer = await Viewer.create(document.querySelector("canvas"));
+ * const { info } = await viewer.open("bucky.mt");
+ * await viewer.refine({ error: "1%" });
+ * await viewer.setIsovalue((info.fields[0].min + info.fields[0].max) / 2);
+ * ```
+ */
+export class Viewer extends EventTarget {
+  private constructor(canvas: HTMLCanvasElement);
+  /** Rejects with code `no-webgpu`, and the reason, where nothing can be drawn. */
+  static check(): Promise<void>;
+  /** Takes the canvas over, for good. Rejects with code `no-webgpu` before it does so where there is no WebGPU. */
+  static create(canvas: HTMLCanvasElement, options?: { signal?: AbortSignal }): Promise<Viewer>;
+
+  /** What is known of the volume; `undefined` until its base mesh is there. */
+  readonly info: MtInfo | undefined;
+  /** The GPU in words. */
+  readonly adapter: string;
+  /** Sixteen evenly spaced colours of the colour map as CSS colours. */
+  readonly palette: string[];
+
+  /** Streams a volume in, in place of the one before; resolves when its base mesh has been drawn. */
+  open(source: Source, options?: { signal?: AbortSignal }): Promise<OpenedVolume>;
+  /** Asks for another mesh; while the file streams in, the mesh follows this request. */
+  refine(options?: RefineOptions): Promise<ViewerStats>;
+  setMode(mode: "iso" | "cutaway"): Promise<void>;
+  /** In field units. */
+  setIsovalue(value: number): Promise<void>;
+  /** `null` cuts nothing away. */
+  setClip(plane: ClipPlane | null): Promise<void>;
+  /** Shows a box, `[x0, y0, z0, x1, y1, z1]`, with handles; `null` hides it. Pass `box` to `refine` to use it. */
+  setRoi(box: ArrayLike<number> | null): Promise<void>;
+
+  /** Turns the model to the right and upwards, in radians. */
+  orbit(right: number, up: number): Promise<void>;
+  /** Multiplies the distance to the model. */
+  zoom(factor: number): Promise<void>;
+  /** Moves the picture by fractions of the canvas's height. */
+  pan(right: number, up: number): Promise<void>;
+  /** Shows the whole model from the front. */
+  home(): Promise<void>;
+
+  /** The handle (0 to 5: lower and upper x, y, z) at a point of the canvas (−1 to 1, y upwards), or −1. */
+  pickRoi(x: number, y: number): Promise<number>;
+  /** Moves a handle under a point; resolves to the box as it is then. */
+  dragRoi(handle: number, x: number, y: number): Promise<number[]>;
+
+  /** A hash of the current mesh, the same wherever the same request was made. */
+  hash(): Promise<string>;
+  /** Ends the worker. */
+  free(): void;
+  [Symbol.dispose](): void;
+
+  addEventListener<K extends keyof ViewerEventMap>(
+    type: K,
+    listener: (event: ViewerEventMap[K]) => void,
+    options?: boolean | AddEventListenerOptions,
+  ): void;
+  addEventListener(
+    type: string,
+    listener: EventListenerOrEventListenerObject | null,
+    options?: boolean | AddEventListenerOptions,
+  ): void;
+}

@@ -1,0 +1,288 @@
+/**
+ * `Viewer`: an MT streamed from anywhere and drawn on a canvas with WebGPU, all of it in a worker.
+ *
+ * Calls that come faster than the worker can follow replace each other: the last one wins, and the promises of all
+ * resolve when it is done.
+ */
+
+import { TetralodError, reviveError } from "./errors.js";
+import { Remote, webEndpoint } from "./rpc.js";
+import { openSource, pump } from "./stream.js";
+
+export { TetralodError } from "./errors.js";
+
+const NO_WEBGPU =
+  "this browser has no WebGPU; use a current Chrome, Edge, Firefox or Safari over https (or on localhost)";
+const NO_ADAPTER =
+  "the browser gives no GPU adapter; allow hardware acceleration in its settings, or update the graphics driver";
+
+/** Calls of which one is under way and one waits; what comes later is merged into the waiting one. */
+class Latest {
+  #run;
+  #merge;
+  #busy = false;
+  #waiting = null;
+
+  constructor(run, merge = (_, next) => next) {
+    this.#run = run;
+    this.#merge = merge;
+  }
+
+  call(value) {
+    if (this.#waiting) {
+      this.#waiting.value = this.#merge(this.#waiting.value, value);
+    } else {
+      this.#waiting = { value, ...deferred() };
+    }
+    const { promise } = this.#waiting;
+    this.#next();
+    return promise;
+  }
+
+  #next() {
+    if (this.#busy || !this.#waiting) return;
+    const { value, resolve, reject } = this.#waiting;
+    this.#waiting = null;
+    this.#busy = true;
+    this.#run(value)
+      .then(resolve, reject)
+      .finally(() => {
+        this.#busy = false;
+        this.#next();
+      });
+  }
+}
+
+function deferred() {
+  let resolve, reject;
+  const promise = new Promise((yes, no) => ([resolve, reject] = [yes, no]));
+  return { promise, resolve, reject };
+}
+
+/** Two sets of changes as one: movements add up, of everything else the later one counts. */
+function mergeUpdates(a, b) {
+  const merged = { ...a, ...b };
+  // Going home forgets the movements before it.
+  if (b.home) {
+    for (const name of ["orbit", "pan", "zoom"]) if (b[name] === undefined) delete merged[name];
+    return merged;
+  }
+  for (const name of ["orbit", "pan"]) {
+    if (a[name] && b[name]) merged[name] = [a[name][0] + b[name][0], a[name][1] + b[name][1]];
+  }
+  if (a.zoom !== undefined && b.zoom !== undefined) merged.zoom = a.zoom * b.zoom;
+  return merged;
+}
+
+export class Viewer extends EventTarget {
+  #remote;
+  #canvas;
+  #observer;
+  #info;
+  #palette;
+  #adapter;
+  #stream = null;
+  #refine = new Latest((options) => this.#remote.call("refine", [options]));
+  #update = new Latest((changes) => this.#remote.call("update", [changes]), mergeUpdates);
+  #drag = new Latest(([handle, x, y]) => this.#remote.call("dragRoi", [handle, x, y]));
+
+  /** Rejects with code `no-webgpu` where nothing can be drawn; resolves to nothing where it can. */
+  static async check() {
+    const gpu = globalThis.navigator?.gpu;
+    if (!gpu) throw new TetralodError("no-webgpu", NO_WEBGPU);
+    const adapter = await gpu.requestAdapter().catch(() => null);
+    if (!adapter) throw new TetralodError("no-webgpu", NO_ADAPTER);
+  }
+
+  /** Takes the canvas over, for good, and starts the worker. */
+  static async create(canvas, { signal } = {}) {
+    signal?.throwIfAborted();
+    if (!(canvas instanceof HTMLCanvasElement)) {
+      throw new TetralodError("bad-option", "`canvas` must be a canvas element");
+    }
+    await Viewer.check();
+    signal?.throwIfAborted();
+    const viewer = new Viewer(canvas);
+    try {
+      await viewer.#start();
+      signal?.throwIfAborted();
+    } catch (error) {
+      viewer.free();
+      throw error;
+    }
+    return viewer;
+  }
+
+  /** @private Use `Viewer.create`. */
+  constructor(canvas) {
+    super();
+    this.#canvas = canvas;
+    const worker = new Worker(new URL("./viewer-worker.js", import.meta.url), { type: "module" });
+    this.#remote = new Remote(webEndpoint(worker), (name, data) => this.#heard(name, data));
+  }
+
+  async #start() {
+    const offscreen = this.#canvas.transferControlToOffscreen();
+    const [width, height] = pixels(this.#canvas.getBoundingClientRect());
+    const created = await this.#remote.call("create", [offscreen, width, height, devicePixelRatio], [offscreen]);
+    this.#adapter = created.adapter;
+    this.#palette = created.palette;
+    this.#observer = new ResizeObserver(([entry]) => {
+      const size = entry.devicePixelContentBoxSize?.[0];
+      const [w, h] = size ? [size.inlineSize, size.blockSize] : pixels(entry.contentRect);
+      this.#change({ size: [Math.max(1, w), Math.max(1, h), devicePixelRatio] });
+    });
+    try {
+      this.#observer.observe(this.#canvas, { box: "device-pixel-content-box" });
+    } catch {
+      // Safari knows no device pixels here.
+      this.#observer.observe(this.#canvas);
+    }
+  }
+
+  #heard(name, data) {
+    if (name === "error") this.#emit("error", reviveError(data));
+    else this.#emit(name, data);
+  }
+
+  #emit(name, detail) {
+    this.dispatchEvent(new CustomEvent(name, { detail }));
+  }
+
+  /** What is known of the volume; `undefined` until its base mesh is there. */
+  get info() {
+    return this.#info;
+  }
+
+  /** The GPU in words. */
+  get adapter() {
+    return this.#adapter;
+  }
+
+  /** Sixteen evenly spaced colours of the colour map as CSS colours, for a legend. */
+  get palette() {
+    const bytes = this.#palette;
+    return Array.from({ length: bytes.length / 4 }, (_, i) => `rgb(${bytes.slice(i * 4, i * 4 + 3).join(" ")})`);
+  }
+
+  /**
+   * Streams a volume in, in place of the one before. Resolves when its base mesh has been drawn; `finished` of the
+   * result when all of it is there.
+   */
+  async open(source, { signal } = {}) {
+    this.#stream?.abort(new DOMException("another volume was opened", "AbortError"));
+    const control = new AbortController();
+    this.#stream = control;
+    const stopped = signal ? AbortSignal.any([signal, control.signal]) : control.signal;
+    const opened = await openSource(source, stopped);
+    await this.#remote.call("clear");
+    stopped.throwIfAborted();
+    this.#info = undefined;
+    const { promise: ready, resolve, reject } = deferred();
+    const finished = this.#read(opened, stopped, resolve);
+    finished.catch(reject);
+    const info = await ready;
+    // A failure after this point rejects `finished`, which nobody may be waiting for.
+    finished.catch((error) => {
+      if (error?.name !== "AbortError") this.#emit("error", error);
+    });
+    return { info, name: opened.name, total: opened.total, finished };
+  }
+
+  async #read({ chunks, total }, signal, ready) {
+    await pump(
+      chunks,
+      async (chunk) => {
+        const { progress, info } = await this.#remote.call("feed", [chunk], [chunk.buffer]);
+        signal.throwIfAborted();
+        if (info) {
+          this.#info = info;
+          ready(info);
+        }
+        this.#emit("progress", { ...progress, total });
+      },
+      signal,
+    );
+    const progress = await this.#remote.call("finish");
+    this.#emit("progress", { ...progress, total: total ?? progress.bytes });
+  }
+
+  /** Asks for another mesh; while the file streams in, the mesh follows this request. */
+  refine(options = {}) {
+    return this.#refine.call(options);
+  }
+
+  #change(changes) {
+    return this.#update.call(changes);
+  }
+
+  /** `"iso"` or `"cutaway"`. */
+  setMode(mode) {
+    return this.#change({ mode });
+  }
+
+  /** The isosurface's value in field units. */
+  setIsovalue(isovalue) {
+    return this.#change({ isovalue });
+  }
+
+  /** Cuts away what lies beyond a plane, `{ normal, offset }`; `null` cuts nothing. */
+  setClip(clip) {
+    return this.#change({ clip: clip ?? null });
+  }
+
+  /** Shows a box with handles; `null` hides it. It is a picture only: pass `box` to `refine` to use it. */
+  setRoi(box) {
+    return this.#change({ roi: box ? Array.from(box) : null });
+  }
+
+  /** Turns the model to the right and upwards, in radians. */
+  orbit(right, up) {
+    return this.#change({ orbit: [right, up] });
+  }
+
+  /** Multiplies the distance to the model. */
+  zoom(factor) {
+    return this.#change({ zoom: factor });
+  }
+
+  /** Moves the picture by fractions of the canvas's height. */
+  pan(right, up) {
+    return this.#change({ pan: [right, up] });
+  }
+
+  /** Shows the whole model from the front. */
+  home() {
+    return this.#change({ home: true });
+  }
+
+  /** The handle of the box at a point (−1 to 1, y upwards), or −1. */
+  pickRoi(x, y) {
+    return this.#remote.call("pickRoi", [x, y]);
+  }
+
+  /** Moves a handle of the box under a point; resolves to the box as it is then. */
+  dragRoi(handle, x, y) {
+    return this.#drag.call([handle, x, y]);
+  }
+
+  /** A hash of the current mesh, the same wherever the same request was made. */
+  hash() {
+    return this.#remote.call("hash");
+  }
+
+  /** Ends the worker. The canvas keeps its last picture and cannot be used again. */
+  free() {
+    this.#stream?.abort(new DOMException("the viewer was freed", "AbortError"));
+    this.#observer?.disconnect();
+    this.#remote.close(new TetralodError("closed", "the viewer was freed"));
+  }
+
+  [Symbol.dispose ?? Symbol.for("Symbol.dispose")]() {
+    this.free();
+  }
+}
+
+function pixels({ width, height }) {
+  return [width, height].map((length) => Math.max(1, Math.round(length * devicePixelRatio)));
+}

@@ -1,0 +1,228 @@
+//! Where the picture goes: a canvas, or an image that can be read back.
+
+use crate::gpu::{Context, GpuError, SAMPLES};
+use std::future::poll_fn;
+use std::sync::{Arc, Mutex};
+use std::task::{Poll, Waker};
+
+pub(super) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+
+/// The place where finished pictures appear, and the multisampled images that they are made in.
+#[derive(Debug)]
+pub(super) struct Target {
+    place: Place,
+    pub(super) size: [u32; 2],
+    pub(super) format: wgpu::TextureFormat,
+    pub(super) samples: wgpu::TextureView,
+    pub(super) depth: wgpu::TextureView,
+}
+
+#[derive(Debug)]
+enum Place {
+    Canvas { surface: wgpu::Surface<'static>, configured: bool },
+    Image(wgpu::Texture),
+}
+
+/// A picture in the making.
+pub(super) enum Picture {
+    Canvas(wgpu::SurfaceTexture),
+    Image(wgpu::Texture),
+}
+
+impl Picture {
+    pub(super) fn view(&self) -> wgpu::TextureView {
+        let texture = match self {
+            Self::Canvas(texture) => &texture.texture,
+            Self::Image(texture) => texture,
+        };
+        texture.create_view(&wgpu::TextureViewDescriptor::default())
+    }
+}
+
+impl Target {
+    pub(super) fn canvas(
+        context: &Context,
+        surface: wgpu::Surface<'static>,
+        size: [u32; 2],
+    ) -> Result<Self, GpuError> {
+        let formats = surface.get_capabilities(&context.adapter).formats;
+        // Shaders encode sRGB themselves, so that canvases and images get the same bytes.
+        let format = formats
+            .iter()
+            .find(|f| matches!(f, wgpu::TextureFormat::Bgra8Unorm | wgpu::TextureFormat::Rgba8Unorm))
+            .copied()
+            .ok_or_else(|| GpuError::NoSurface("it offers no format of 8 bits a channel".to_owned()))?;
+        let size = held(context, size);
+        let place = Place::Canvas { surface, configured: false };
+        Ok(Self::new(context, place, size, format))
+    }
+
+    pub(super) fn image(context: &Context, size: [u32; 2]) -> Self {
+        let (size, format) = (held(context, size), wgpu::TextureFormat::Rgba8Unorm);
+        Self::new(context, Place::Image(picture(context, size, format)), size, format)
+    }
+
+    fn new(context: &Context, place: Place, size: [u32; 2], format: wgpu::TextureFormat) -> Self {
+        let [samples, depth] = attachments(context, size, format);
+        Self { place, size, format, samples, depth }
+    }
+
+    /// Gives the target another size.
+    pub(super) fn resize(&mut self, context: &Context, size: [u32; 2]) {
+        let size = held(context, size);
+        if size == self.size {
+            return;
+        }
+        match &mut self.place {
+            Place::Canvas { configured, .. } => *configured = false,
+            Place::Image(image) => *image = picture(context, size, self.format),
+        }
+        self.size = size;
+        [self.samples, self.depth] = attachments(context, size, self.format);
+    }
+
+    /// The next picture; `None` if there is nothing to draw on just now.
+    pub(super) fn next(&mut self, context: &Context) -> Result<Option<Picture>, GpuError> {
+        let (format, size) = (self.format, self.size);
+        let (surface, configured) = match &mut self.place {
+            Place::Image(image) => return Ok(Some(Picture::Image(image.clone()))),
+            Place::Canvas { surface, configured } => (surface, configured),
+        };
+        // A surface that has changed is configured anew, once; then something else is wrong.
+        for _ in 0..2 {
+            if !*configured {
+                configure(context, surface, format, size)?;
+                *configured = true;
+            }
+            match surface.get_current_texture() {
+                wgpu::CurrentSurfaceTexture::Success(texture) => return Ok(Some(Picture::Canvas(texture))),
+                wgpu::CurrentSurfaceTexture::Suboptimal(texture) => {
+                    *configured = false;
+                    return Ok(Some(Picture::Canvas(texture)));
+                }
+                wgpu::CurrentSurfaceTexture::Timeout | wgpu::CurrentSurfaceTexture::Occluded => {
+                    return Ok(None);
+                }
+                wgpu::CurrentSurfaceTexture::Outdated | wgpu::CurrentSurfaceTexture::Lost => {
+                    *configured = false
+                }
+                wgpu::CurrentSurfaceTexture::Validation => break,
+            }
+        }
+        context.check()?;
+        Err(GpuError::NoSurface("it gives no texture to draw on".to_owned()))
+    }
+
+    /// Reads the image back: `RGBA` bytes, rows from top to bottom.
+    pub(super) async fn read(&self, context: &Context) -> Result<Vec<u8>, GpuError> {
+        let Place::Image(image) = &self.place else {
+            return Err(GpuError::Refused("a canvas is read by the page, not here".to_owned()));
+        };
+        let [width, height] = self.size;
+        // Rows in buffers start at multiples of 256 bytes.
+        let row = (width * 4).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let buffer = context.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("read back"),
+            size: u64::from(row) * u64::from(height),
+            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+            mapped_at_creation: false,
+        });
+        let mut encoder = context.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let layout =
+            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row), rows_per_image: Some(height) };
+        encoder.copy_texture_to_buffer(
+            image.as_image_copy(),
+            wgpu::TexelCopyBufferInfo { buffer: &buffer, layout },
+            image.size(),
+        );
+        context.queue.submit([encoder.finish()]);
+        map(context, &buffer).await?;
+        let refused = |error: wgpu::MapRangeError| GpuError::Refused(error.to_string());
+        let bytes = buffer.slice(..).get_mapped_range().map_err(refused)?;
+        Ok(bytes.chunks_exact(row as usize).flat_map(|r| &r[..width as usize * 4]).copied().collect())
+    }
+}
+
+/// Waits until a buffer can be read.
+async fn map(context: &Context, buffer: &wgpu::Buffer) -> Result<(), GpuError> {
+    type Answer = (Option<Result<(), wgpu::BufferAsyncError>>, Option<Waker>);
+    let shared = Arc::new(Mutex::new(Answer::default()));
+    let answer = shared.clone();
+    buffer.slice(..).map_async(wgpu::MapMode::Read, move |result| {
+        if let Ok(mut place) = answer.lock() {
+            place.0 = Some(result);
+            if let Some(waker) = place.1.take() {
+                waker.wake();
+            }
+        }
+    });
+    // Native devices call back from here, browsers on their own.
+    let failed = |why: String| GpuError::Refused(format!("the picture cannot be read back: {why}"));
+    context.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| failed(e.to_string()))?;
+    let result = poll_fn(|task| match shared.lock() {
+        Ok(mut place) => match place.0.take() {
+            Some(result) => Poll::Ready(result.map_err(|e| failed(e.to_string()))),
+            None => {
+                place.1 = Some(task.waker().clone());
+                Poll::Pending
+            }
+        },
+        Err(poisoned) => Poll::Ready(Err(failed(poisoned.to_string()))),
+    });
+    result.await
+}
+
+fn configure(
+    context: &Context,
+    surface: &wgpu::Surface<'_>,
+    format: wgpu::TextureFormat,
+    [width, height]: [u32; 2],
+) -> Result<(), GpuError> {
+    let mut config = surface
+        .get_default_config(&context.adapter, width, height)
+        .ok_or_else(|| GpuError::NoSurface("this GPU cannot draw on it".to_owned()))?;
+    config.format = format;
+    config.alpha_mode = wgpu::CompositeAlphaMode::Opaque;
+    surface.configure(&context.device, &config);
+    Ok(())
+}
+
+/// `size`, but at least one pixel and at most what the device can draw.
+fn held(context: &Context, size: [u32; 2]) -> [u32; 2] {
+    size.map(|s| s.clamp(1, context.device.limits().max_texture_dimension_2d))
+}
+
+/// The image that a headless renderer draws into.
+fn picture(context: &Context, size: [u32; 2], format: wgpu::TextureFormat) -> wgpu::Texture {
+    let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC;
+    texture(context, "picture", size, format, 1, usage)
+}
+
+/// The multisampled colours and depths.
+fn attachments(context: &Context, size: [u32; 2], format: wgpu::TextureFormat) -> [wgpu::TextureView; 2] {
+    [("samples", format), ("depth", DEPTH)].map(|(label, format)| {
+        let usage = wgpu::TextureUsages::RENDER_ATTACHMENT;
+        let image = texture(context, label, size, format, SAMPLES, usage);
+        image.create_view(&wgpu::TextureViewDescriptor::default())
+    })
+}
+
+fn texture(
+    context: &Context,
+    label: &str,
+    [width, height]: [u32; 2],
+    format: wgpu::TextureFormat,
+    sample_count: u32,
+    usage: wgpu::TextureUsages,
+) -> wgpu::Texture {
+    context.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some(label),
+        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage,
+        view_formats: &[],
+    })
+}

@@ -1,0 +1,115 @@
+//! Draws boxes as lines, with handles on their faces.
+
+use crate::geom::Bounds;
+use crate::gpu::buffers::GrowBuffer;
+use crate::gpu::pipeline::{FrameBinding, Recipe};
+use crate::gpu::types::Line;
+use crate::gpu::{BoxLines, Context, GpuError};
+use crate::view::gizmo::BoxFace;
+
+/// Diameter of a handle in units of the page's layout.
+const HANDLE: f32 = 17.0;
+
+#[derive(Debug)]
+pub(super) struct WirePass {
+    hidden: wgpu::RenderPipeline,
+    seen: wgpu::RenderPipeline,
+    dots: wgpu::RenderPipeline,
+    lines: GrowBuffer<Line>,
+    handles: GrowBuffer<Line>,
+}
+
+impl WirePass {
+    pub(super) fn new(context: &Context, frame: &FrameBinding, format: wgpu::TextureFormat) -> Self {
+        let pipeline = |vertex, fragment, depth| {
+            let buffers = [Some(wgpu::VertexBufferLayout {
+                array_stride: size_of::<Line>() as u64,
+                step_mode: wgpu::VertexStepMode::Instance,
+                attributes: &Line::ATTRIBUTES,
+            })];
+            let recipe = Recipe {
+                shader: "wire",
+                vertex,
+                fragment,
+                buffers: &buffers,
+                depth,
+                writes_depth: false,
+                blends: true,
+            };
+            recipe.cook(context, frame, format)
+        };
+        Self {
+            hidden: pipeline("vs_line", "fs_hidden", wgpu::CompareFunction::Greater),
+            seen: pipeline("vs_line", "fs_line", wgpu::CompareFunction::LessEqual),
+            dots: pipeline("vs_handle", "fs_handle", wgpu::CompareFunction::Always),
+            lines: GrowBuffer::new("lines", wgpu::BufferUsages::VERTEX),
+            handles: GrowBuffer::new("handles", wgpu::BufferUsages::VERTEX),
+        }
+    }
+
+    pub(super) fn update(&mut self, context: &Context, boxes: &[BoxLines]) -> Result<(), GpuError> {
+        let lines: Vec<Line> = boxes.iter().flat_map(edges).collect();
+        let handles: Vec<Line> = boxes.iter().filter(|b| b.handles).flat_map(handles).collect();
+        self.lines.write(context, &lines)?;
+        self.handles.write(context, &handles)
+    }
+
+    pub(super) fn draw(&self, pass: &mut wgpu::RenderPass<'_>) {
+        for (pipeline, items) in
+            [(&self.hidden, &self.lines), (&self.seen, &self.lines), (&self.dots, &self.handles)]
+        {
+            if let Some(slice) = items.slice() {
+                pass.set_pipeline(pipeline);
+                pass.set_vertex_buffer(0, slice);
+                pass.draw(0..6, 0..items.len() as u32);
+            }
+        }
+    }
+}
+
+/// The twelve edges of a box.
+fn edges(lines: &BoxLines) -> impl Iterator<Item = Line> + '_ {
+    let corner = |i: usize| corner(&lines.bounds, i);
+    let pairs = (0..8).flat_map(|i| [1, 2, 4].map(|bit| (i, i | bit))).filter(|(a, b)| a != b);
+    pairs.map(move |(a, b)| Line {
+        from: corner(a),
+        to: corner(b),
+        colour: premultiplied(lines.colour),
+        width: lines.width,
+    })
+}
+
+fn handles(lines: &BoxLines) -> impl Iterator<Item = Line> + '_ {
+    BoxFace::ALL.into_iter().map(|face| {
+        let at = face.handle(&lines.bounds).as_vec3().to_array();
+        Line { from: at, to: at, colour: premultiplied(lines.colour), width: HANDLE }
+    })
+}
+
+fn corner(bounds: &Bounds, i: usize) -> [f32; 3] {
+    [0, 1, 2].map(|axis| if i >> axis & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] } as f32)
+}
+
+fn premultiplied([r, g, b, a]: [f32; 4]) -> [f32; 4] {
+    [r * a, g * a, b * a, a]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_box_has_twelve_edges_and_six_handles() {
+        let bounds = Bounds { min: [0.0; 3], max: [1.0, 2.0, 3.0] };
+        let lines = BoxLines { bounds, colour: [1.0, 0.5, 0.0, 0.5], width: 1.0, handles: true };
+        let edges: Vec<_> = edges(&lines).collect();
+        assert_eq!(edges.len(), 12);
+        for edge in &edges {
+            let moved: Vec<_> = (0..3).filter(|i| edge.from[*i] != edge.to[*i]).collect();
+            assert_eq!(moved.len(), 1, "{edge:?}");
+            assert_eq!(edge.colour, [0.5, 0.25, 0.0, 0.5]);
+            assert_eq!(edges.iter().filter(|other| *other == edge).count(), 1);
+        }
+        assert_eq!(handles(&lines).count(), 6);
+    }
+}

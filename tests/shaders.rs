@@ -1,0 +1,54 @@
+//! Every shader parses, validates, and reads what Rust writes; without a GPU.
+
+use naga::valid::{Capabilities, ValidationFlags, Validator};
+use tetralod::gpu::SHADERS;
+
+fn parsed(name: &str, source: &str) -> naga::Module {
+    naga::front::wgsl::parse_str(source)
+        .unwrap_or_else(|error| panic!("{name}.wgsl: {}", error.emit_to_string(source)))
+}
+
+#[test]
+fn every_shader_is_valid_with_the_plain_capabilities_of_webgpu() {
+    for (name, source) in SHADERS {
+        let module = parsed(name, source);
+        let checked = Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module);
+        checked.unwrap_or_else(|error| panic!("{name}.wgsl: {}", error.emit_to_string(source)));
+        let stages: Vec<_> = module.entry_points.iter().map(|entry| entry.stage).collect();
+        assert!(stages.contains(&naga::ShaderStage::Vertex), "{name} has no vertex stage");
+        assert!(stages.contains(&naga::ShaderStage::Fragment), "{name} has no fragment stage");
+    }
+}
+
+#[test]
+fn the_frame_has_the_layout_that_its_twin_has() {
+    for (name, source) in SHADERS {
+        let module = parsed(name, source);
+        let found = module.types.iter().find(|(_, of)| of.name.as_deref() == Some("Frame"));
+        let Some((_, frame)) = found else { panic!("{name} lost the frame") };
+        let naga::TypeInner::Struct { members, span } = &frame.inner else { panic!("{name}: no struct") };
+        let places: Vec<_> = members.iter().map(|m| (m.name.clone().unwrap_or_default(), m.offset)).collect();
+        let expected = [
+            ("view_projection", 0),
+            ("eye", 64),
+            ("key_light", 80),
+            ("fill_light", 96),
+            ("up", 112),
+            ("viewport", 128),
+            ("range", 144),
+            ("front", 160),
+            ("back", 176),
+            ("sky", 192),
+            ("ground", 208),
+            ("palette", 224),
+        ];
+        assert_eq!(places, expected.map(|(name, offset)| (name.to_owned(), offset)), "{name}");
+        assert_eq!(*span, 480, "{name}");
+    }
+}
+
+#[test]
+fn broken_shaders_would_be_noticed() {
+    let (_, source) = SHADERS[1];
+    assert!(naga::front::wgsl::parse_str(&source.replace("normalize(", "normalise(")).is_err());
+}

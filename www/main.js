@@ -1,0 +1,391 @@
+/**
+ * The demo page: streams a volume, shows it, and turns the settings into requests.
+ *
+ * `?url=FILE` opens another volume. What the page knows is readable as `window.tetralodDemo` (for tests):
+ * `state` is "starting", "opening", "streaming", "complete", "failed" or "unsupported".
+ */
+
+import { attachControls } from "./controls.js";
+
+const $ = (id) => document.getElementById(id);
+const canvas = $("canvas");
+
+const demo = (window.tetralodDemo = {
+  state: "starting",
+  viewer: undefined,
+  info: undefined,
+  stats: undefined,
+  frame: undefined,
+  frames: 0,
+  error: undefined,
+  /** Of the first picture that shows the volume: bytes decoded and milliseconds since the page was opened. */
+  firstFrameBytes: undefined,
+  firstFrameMs: undefined,
+  receivedBytes: 0,
+  totalBytes: undefined,
+});
+
+/** @type {import("tetralod/viewer").Viewer} */
+let viewer;
+/** What was opened last, for "Try again". */
+let source;
+let opening = 0;
+/** Corners of the box, [x0, y0, z0, x1, y1, z1]. */
+let box;
+/** @type {import("tetralod").FieldInfo} */
+let field;
+
+start();
+
+async function start() {
+  try {
+    // Imported here, so that a package that is missing is told like everything else.
+    const { Viewer } = await import("tetralod/viewer");
+    viewer = demo.viewer = await Viewer.create(canvas);
+  } catch (error) {
+    demo.error = { code: error.code, message: error.message };
+    const unsupported = error.code === "no-webgpu";
+    demo.state = unsupported ? "unsupported" : "failed";
+    $("panel").inert = true;
+    $("loading").hidden = true;
+    say(unsupported ? "WebGPU is needed" : "The viewer did not start", error);
+    return;
+  }
+  $("gpu").textContent = viewer.adapter && `Drawn by ${viewer.adapter}`;
+  $("legend-bar").style.background = `linear-gradient(90deg, ${viewer.palette.join(", ")})`;
+  viewer.addEventListener("progress", ({ detail }) => showProgress(detail));
+  viewer.addEventListener("stats", ({ detail }) => showStats(detail));
+  viewer.addEventListener("frame", ({ detail }) => showFrame(detail));
+  viewer.addEventListener("error", ({ detail }) => fail(detail));
+  attachControls(canvas, viewer, { onHome: home, onBox: boxWasDragged });
+  attachSettings();
+  attachFiles();
+  open(new URLSearchParams(location.search).get("url") ?? $("volume").value);
+}
+
+/* Opening and streaming */
+
+async function open(from) {
+  source = from;
+  const mine = ++opening;
+  Object.assign(demo, { state: "opening", error: undefined, info: undefined, stats: undefined });
+  Object.assign(demo, { firstFrameBytes: undefined, firstFrameMs: undefined, receivedBytes: 0, totalBytes: undefined });
+  $("message").hidden = true;
+  $("legend").hidden = true;
+  $("loading").classList.remove("done");
+  $("progress").removeAttribute("value");
+  $("progress-text").textContent = `Opening ${nameOf(from)}…`;
+  try {
+    const opened = await viewer.open(from);
+    if (mine !== opening) return;
+    demo.totalBytes = opened.total;
+    if (demo.state === "opening") demo.state = "streaming";
+    arrive(opened.info);
+    await opened.finished;
+    if (mine !== opening) return;
+    demo.state = "complete";
+    demo.totalBytes ??= demo.receivedBytes;
+    $("loading").classList.add("done");
+  } catch (error) {
+    if (mine === opening && error?.name !== "AbortError") fail(error);
+  }
+}
+
+/** The base mesh is there: fit the settings to it. */
+function arrive(info) {
+  demo.info = info;
+  const select = $("field");
+  select.replaceChildren(...info.fields.map(({ name }) => new Option(name, name)));
+  $("field-row").hidden = info.fields.length < 2;
+  box = inner(info.bounds);
+  chooseField(info.fields[0]);
+  showBox();
+  applyMode();
+  applyCut();
+  applyRoi();
+  refine();
+}
+
+function chooseField(chosen) {
+  field = chosen;
+  $("legend").hidden = false;
+  $("legend-name").textContent = field.name;
+  $("legend-min").textContent = short(field.min);
+  $("legend-max").textContent = short(field.max);
+  applyIsovalue();
+}
+
+/** The middle half of a box. */
+function inner(bounds) {
+  return bounds.map((value, i) => value + (bounds[(i + 3) % 6] - value) / 4);
+}
+
+function fail(error) {
+  demo.error = { code: error.code, message: error.message };
+  // What has arrived stays usable: only a failure before the first picture hides it.
+  demo.state = "failed";
+  $("loading").classList.add("done");
+  $("retry").hidden = error.code === "device-lost" || error.code === "internal";
+  const titles = {
+    network: "The volume could not be fetched",
+    "device-lost": "The GPU was lost; reload the page",
+    truncated: "The file ends too early",
+    "too-large": "The mesh is too large for this GPU",
+  };
+  say(titles[error.code] ?? "The volume could not be shown", error);
+}
+
+function say(title, error) {
+  $("message-title").textContent = title;
+  const words = error.message ?? String(error);
+  $("message-text").textContent = `${words.charAt(0).toUpperCase()}${words.slice(1)}.`;
+  const seen = demo.firstFrameBytes !== undefined;
+  $("message").classList.toggle("beside", seen);
+  $("dismiss").hidden = !seen;
+  $("message").hidden = false;
+}
+
+/* Settings */
+
+const mode = () => document.querySelector("[name=mode]:checked").value;
+
+/** 0 at the left end, then from 0.01 % to 100 % in equal ratios. */
+function errorPercent() {
+  const place = Number($("error").value);
+  return place === 0 ? 0 : 10 ** (-2 + (4 * place) / 100);
+}
+
+/** The number of tetrahedra, or undefined at the right end. */
+function budget() {
+  const place = Number($("budget").value);
+  if (place === 100) return undefined;
+  const most = Math.max(demo.info?.tetrahedra ?? 1e6, 2000);
+  return Number((1000 * (most / 1000) ** (place / 100)).toPrecision(2));
+}
+
+function isovalue() {
+  return field.min + ((field.max - field.min) * $("isovalue").value) / 1000;
+}
+
+function refine() {
+  if (!demo.info) return;
+  const percent = errorPercent();
+  text("error-text", percent === 0 ? "0: the reference mesh" : percentage(percent), "error");
+  text("budget-text", budget() === undefined ? "no limit" : `${count(budget())} tetrahedra`, "budget");
+  const options = { error: `${percent}%`, field: field.name, maxTets: budget() };
+  if ($("roi").checked) options.box = box;
+  if ($("focus").checked) options.isovalues = [isovalue()];
+  viewer.refine(options).catch((error) => {
+    if (error.code === "bad-option") fail(error);
+    else if (error.code !== "closed" && error.code !== "not-ready") fail(error);
+  });
+}
+
+function applyIsovalue() {
+  const value = isovalue();
+  text("isovalue-text", short(value), "isovalue");
+  $("legend-mark").style.left = `${$("isovalue").value / 10}%`;
+  viewer.setIsovalue(value);
+  if ($("focus").checked) refine();
+}
+
+function applyMode() {
+  for (const row of document.querySelectorAll("[data-mode]")) row.hidden = row.dataset.mode !== mode();
+  $("legend-mark").hidden = mode() !== "iso";
+  viewer.setMode(mode());
+}
+
+function applyCut() {
+  if (!demo.info) return;
+  const axis = Number($("axis").value);
+  const [low, high] = [demo.info.bounds[axis], demo.info.bounds[axis + 3]];
+  const at = low + ((high - low) * $("cut").value) / 1000;
+  const where = Math.abs(at) < (high - low) * 1e-4 ? 0 : Number(at.toPrecision(3));
+  text("cut-text", `${"xyz"[axis]} ${$("flip").checked ? "<" : ">"} ${where} is cut away`, "cut");
+  const sign = $("flip").checked ? -1 : 1;
+  const normal = [0, 1, 2].map((i) => (i === axis ? sign : 0));
+  viewer.setClip({ normal, offset: sign * at });
+}
+
+function applyRoi() {
+  const on = $("roi").checked;
+  $("box").hidden = !on;
+  viewer.setRoi(on ? box : null);
+}
+
+function showBox() {
+  for (const input of $("box").querySelectorAll("input")) {
+    if (document.activeElement !== input) input.value = Number(box[input.dataset.i].toPrecision(5));
+  }
+}
+
+function boxWasDragged(moved) {
+  box = moved;
+  showBox();
+  refine();
+}
+
+/** A number was typed: used if it makes a box. */
+function boxWasTyped(input) {
+  const typed = box.slice();
+  typed[input.dataset.i] = input.valueAsNumber;
+  const valid = [0, 1, 2].every((i) => typed[i] <= typed[i + 3]);
+  input.setCustomValidity(valid ? "" : "“from” must not be larger than “to”");
+  input.reportValidity();
+  if (!valid) return;
+  box = typed;
+  applyRoi();
+  refine();
+}
+
+function home() {
+  viewer.home();
+}
+
+function attachSettings() {
+  const on = (id, then, name = "input") => $(id).addEventListener(name, then);
+  $("panel").addEventListener("submit", (event) => event.preventDefault());
+  for (const radio of document.querySelectorAll("[name=mode]")) radio.addEventListener("change", applyMode);
+  on("isovalue", () => field && applyIsovalue());
+  on("cut", applyCut);
+  on("axis", applyCut);
+  on("flip", applyCut);
+  on("error", refine);
+  on("budget", refine);
+  on("focus", refine);
+  on("field", () => {
+    chooseField(demo.info.fields[$("field").selectedIndex]);
+    refine();
+  });
+  on("roi", () => {
+    if (!box) return;
+    applyRoi();
+    refine();
+  });
+  for (const input of $("box").querySelectorAll("input")) {
+    input.addEventListener("input", () => boxWasTyped(input));
+    input.addEventListener("blur", showBox);
+  }
+  on("home", home, "click");
+  on("dismiss", () => ($("message").hidden = true), "click");
+  on("retry", () => open(source), "click");
+}
+
+function attachFiles() {
+  $("volume").addEventListener("change", () => open($("volume").value));
+  $("choose").addEventListener("click", () => $("file").click());
+  $("file").addEventListener("change", () => {
+    const [file] = $("file").files;
+    $("file").value = "";
+    if (file) openFile(file);
+  });
+  const carriesFile = (event) => event.dataTransfer?.types.includes("Files");
+  window.addEventListener("dragover", (event) => {
+    if (!carriesFile(event)) return;
+    event.preventDefault();
+    $("drop").hidden = false;
+  });
+  window.addEventListener("dragleave", (event) => {
+    if (!event.relatedTarget) $("drop").hidden = true;
+  });
+  window.addEventListener("drop", (event) => {
+    $("drop").hidden = true;
+    if (!carriesFile(event)) return;
+    event.preventDefault();
+    const [file] = event.dataTransfer.files;
+    if (file) openFile(file);
+  });
+}
+
+/** A file of the user's own: it stays in the list while the page is open. */
+function openFile(file) {
+  const option = new Option(file.name, "", true, true);
+  $("volume").querySelector("[data-file]")?.remove();
+  option.dataset.file = "";
+  option.disabled = true;
+  $("volume").append(option);
+  open(file);
+}
+
+/* Numbers */
+
+function showProgress({ bytes, total, complete }) {
+  demo.receivedBytes = bytes;
+  const known = total ?? demo.totalBytes;
+  demo.totalBytes ??= total;
+  if (known) $("progress").value = bytes / known;
+  const amount = known ? `${size(bytes)} of ${size(known)}` : size(bytes);
+  $("progress-text").textContent = complete ? `${size(bytes)} received` : amount;
+  $("n-bytes").textContent = complete ? size(bytes) : amount;
+}
+
+function showStats(stats) {
+  demo.stats = stats;
+  const { info } = demo;
+  $("n-current").textContent = count(stats.tetrahedra);
+  const all = info ? ` of ${count(info.updates)}` : "";
+  $("n-applied").textContent = `${count(stats.applied)}${all}`;
+  $("n-updates").textContent = `+${count(stats.refined)} −${count(stats.coarsened)}`;
+  $("n-refine").textContent = milliseconds(stats.milliseconds);
+  const bound = percentage(stats.relativeErrorBound * 100);
+  $("n-error").textContent = bound;
+  if (info) {
+    $("n-reference").textContent = count(info.tetrahedra);
+    $("fill").style.width = `${(100 * stats.tetrahedra) / info.tetrahedra}%`;
+  }
+  announce(`${count(stats.tetrahedra)} tetrahedra, error ${bound}`);
+}
+
+function showFrame(frame) {
+  demo.frame = frame;
+  demo.frames++;
+  if (!frame.ready) return;
+  if (demo.firstFrameBytes === undefined) {
+    demo.firstFrameBytes = frame.bytes;
+    demo.firstFrameMs = performance.now();
+  }
+  $("n-triangles").textContent = count(frame.triangles);
+  $("n-draw").textContent = milliseconds(frame.milliseconds);
+}
+
+/** Tells screen readers, once the numbers have come to rest. */
+function announce(words) {
+  clearTimeout(announce.timer);
+  announce.timer = setTimeout(() => ($("status").textContent = words), 800);
+}
+
+/** Shows what a slider stands for, also to those who do not see it. */
+function text(output, words, slider) {
+  $(output).textContent = words;
+  $(slider).setAttribute("aria-valuetext", words);
+}
+
+function percentage(percent) {
+  if (percent === 0) return "0";
+  return percent < 100 ? `${Number(percent.toPrecision(2))} %` : `${count(Math.round(percent))} %`;
+}
+
+function count(n) {
+  return n.toLocaleString("en");
+}
+
+/** A field value with as many digits as its range deserves. */
+function short(value) {
+  const range = field.max - field.min;
+  if (Math.abs(value) < range * 1e-6) return "0";
+  const magnitude = Math.abs(value);
+  return magnitude >= 1e5 || magnitude < 1e-3 ? value.toExponential(2) : String(Number(value.toPrecision(4)));
+}
+
+function size(bytes) {
+  if (bytes < 1e3) return `${bytes} B`;
+  return bytes < 1e6 ? `${(bytes / 1e3).toFixed(0)} kB` : `${(bytes / 1e6).toFixed(2)} MB`;
+}
+
+function milliseconds(ms) {
+  return `${ms < 10 ? ms.toFixed(1) : ms.toFixed(0)} ms`;
+}
+
+function nameOf(from) {
+  return from.name ?? String(from).split(/[?#]/)[0].split("/").pop();
+}
