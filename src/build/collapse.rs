@@ -71,13 +71,39 @@ pub fn edge_mt(
     Ok(BuildResult { mt, summary })
 }
 
-/// Errors that nobody tells apart are ordered by other things: depth of the partial order, edge length. Levels of
-/// this ratio apart, up from `FINEST`, group them.
-const LEVEL_RATIO: f64 = 1.3;
-const FINEST: f64 = 1e-4;
+/// Errors that nobody tells apart are ordered by other things: depth of the partial order, size of the star, length of
+/// the edge. Below this error nobody cares; above it, levels of half a power of two group them.
+const FINEST: f64 = 2e-4;
+/// Bits of an error's code that do not count for its level.
+const LEVEL_BITS: u32 = 10;
 
-/// The order of candidates: error level, then depth, then length; ties by vertex numbers.
-type Key = (u16, u32, u64, u32, u32);
+/// The order of candidates: error level, then depth plus star size, then length; ties by vertex numbers.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Key {
+    /// From the top: 16 bits of error level, 16 of depth plus star size, 32 of length (squared, as a float); one word,
+    /// so that the queue compares quickly.
+    cost: u64,
+    a: u32,
+    b: u32,
+}
+
+impl Key {
+    fn level(self) -> u16 {
+        (self.cost >> 48) as u16
+    }
+
+    /// Level, depth and star size: what has to be right before the edge is collapsed.
+    fn urgency(self) -> u32 {
+        (self.cost >> 32) as u32
+    }
+
+    fn no_earlier_than(mut self, level: u16) -> Self {
+        if self.level() < level {
+            self.cost = self.cost & ((1 << 48) - 1) | u64::from(level) << 48;
+        }
+        self
+    }
+}
 
 struct Builder<'a> {
     mesh: WorkMesh,
@@ -97,11 +123,15 @@ struct Builder<'a> {
     evaluator: Evaluator,
     history: Vec<Collapse>,
     level_offsets: Vec<i32>,
+    /// Tetrahedra around each vertex.
+    degrees: Vec<u32>,
 }
 
 impl<'a> Builder<'a> {
     fn new(mesh: WorkMesh, quantized: &'a Quantized, info: &MtInfo, frozen: Vec<bool>) -> Self {
         let points = quantized.positions.len();
+        let mut degrees = vec![0; points];
+        mesh.tets.iter().flatten().for_each(|&v| degrees[v as usize] += 1);
         let data = VertexData {
             positions: quantized.positions.clone(),
             levels: quantized.levels.clone(),
@@ -130,6 +160,7 @@ impl<'a> Builder<'a> {
             evaluator: Evaluator::default(),
             history: Vec::new(),
             level_offsets: Vec::new(),
+            degrees,
         }
     }
 
@@ -152,9 +183,9 @@ impl<'a> Builder<'a> {
                 }
                 return Ok(());
             };
-            if key.0 > level {
+            if key.level() > level {
                 // What was in the way at the lower levels may be gone: look again before going on.
-                level = key.0;
+                level = key.level();
                 self.queue.push(Reverse(key));
                 self.retry_blocked(level);
                 continue;
@@ -186,7 +217,7 @@ impl<'a> Builder<'a> {
                 return true;
             }
             let key = self.predicted_key(a, b);
-            self.queue.push(Reverse((key.0.max(level), key.1, key.2, a, b)));
+            self.queue.push(Reverse(key.no_earlier_than(level)));
             false
         });
         self.blocked = still;
@@ -197,11 +228,14 @@ impl<'a> Builder<'a> {
         self.versions[a as usize].wrapping_add(self.versions[b as usize])
     }
 
-    fn key(&self, error: f64, height: u32, a: u32, b: u32) -> Key {
+    fn key(&self, error: f64, height: u32, star: u32, a: u32, b: u32) -> Key {
         let (p, q) = (self.data.positions[a as usize], self.data.positions[b as usize]);
-        let length =
-            (0..3).map(|i| (i64::from(p[i]) - i64::from(q[i])).pow(2) as u64).fold(0, u64::saturating_add);
-        (error_level(error), height, length, a, b)
+        let length: f32 = (0..3).map(|i| (i64::from(p[i]) - i64::from(q[i])) as f32).map(|d| d * d).sum();
+        let second = (height + star).min(u32::from(u16::MAX));
+        // Bits of floats that are not negative compare as the floats do.
+        let cost =
+            u64::from(error_level(error)) << 48 | u64::from(second) << 32 | u64::from(length.to_bits());
+        Key { cost, a, b }
     }
 
     /// A key from what the ends know: second differences of the fields, errors and depths so far.
@@ -217,11 +251,13 @@ impl<'a> Builder<'a> {
                 [u, v].map(|w| (rise - self.gradients[w].dot(q - p)).abs()).into_iter().fold(0.0, f64::max);
             error = error.max(0.5 * bend * field.step / field.range());
         }
-        self.key(error, self.data.height[i].max(self.data.height[j]) + 1, a, b)
+        // About six tetrahedra lie around an edge; they are in both stars and go.
+        let star = (self.degrees[i] + self.degrees[j]).saturating_sub(12);
+        self.key(error, self.data.height[i].max(self.data.height[j]) + 1, star, a, b)
     }
 
     fn try_collapse(&mut self, key: Key) {
-        let (a, b) = (key.3, key.4);
+        let Key { a, b, .. } = key;
         match self.plan.make(&mut self.mesh, &mut self.marks, &self.data.positions, &self.frozen, a, b) {
             Ok(()) => {}
             Err(Refusal::Blocked) => {
@@ -231,10 +267,10 @@ impl<'a> Builder<'a> {
             Err(Refusal::Gone | Refusal::Never) => return,
         }
         let Self { plan, mesh, data, buckets, reference, evaluator, .. } = self;
-        let limit = level_error(key.0);
+        let limit = level_error(key.level());
         let error = evaluator.evaluate(plan, mesh, data, buckets, reference, limit);
-        let exact = self.key(error, self.evaluator.height, a, b);
-        if (exact.0, exact.1) > (key.0, key.1) {
+        let exact = self.key(error, self.evaluator.height, self.plan.stay.len() as u32, a, b);
+        if exact.urgency() > key.urgency() {
             self.queue.push(Reverse(exact));
             return;
         }
@@ -242,7 +278,8 @@ impl<'a> Builder<'a> {
     }
 
     fn perform(&mut self, error: f64) {
-        let code = ErrorCode::at_least(error);
+        // Never zero: a request for no error at all means every update.
+        let code = ErrorCode::at_least(error).max(ErrorCode(1));
         let v = self.data.positions.len() as u32;
         let Self { plan, mesh, data, evaluator, .. } = self;
         self.history.push(Collapse::new(plan, mesh, code));
@@ -258,7 +295,9 @@ impl<'a> Builder<'a> {
             let [g, h] = [plan.a, plan.b].map(|w| self.gradients[w as usize * fields + f]);
             self.gradients.push((g + h) * 0.5);
         }
+        self.degrees.push(plan.stay.len() as u32);
         for &(tet, i, j) in &plan.fan {
+            mesh.tets[tet as usize].iter().for_each(|&v| self.degrees[v as usize] -= 1);
             mesh.close(tet, i as usize, j as usize);
         }
         let mut first = crate::mesh::NONE;
@@ -280,16 +319,16 @@ impl<'a> Builder<'a> {
     }
 }
 
+/// The level of an error. Stored errors are logarithmic, so their codes are; no logarithm is taken, since the libraries
+/// of different platforms round it differently.
 fn error_level(error: f64) -> u16 {
-    if error <= FINEST {
-        return 0;
-    }
-    ((error / FINEST).ln() / LEVEL_RATIO.ln()).ceil().clamp(1.0, f64::from(u16::MAX)) as u16
+    let code = ErrorCode::at_least(error).max(ErrorCode::at_least(FINEST));
+    code.0 >> LEVEL_BITS
 }
 
 /// The largest error of a level.
 fn level_error(level: u16) -> f64 {
-    FINEST * LEVEL_RATIO.powi(i32::from(level))
+    ErrorCode(level << LEVEL_BITS | ((1 << LEVEL_BITS) - 1)).error()
 }
 
 /// Volume-weighted averages of the tetrahedra's gradients.

@@ -71,8 +71,9 @@ struct Cell {
 #[derive(Default)]
 pub(super) struct Evaluator {
     cells: Vec<Cell>,
-    /// Boundary triangles at the centre: the cell, and its two other corners.
-    border: Vec<(u32, [u32; 2])>,
+    /// Boundary triangles of the cells, with [`CENTRE`] for the centre.
+    border: Vec<(u32, [u32; 3])>,
+    border_known: bool,
     old_border: Vec<[u32; 3]>,
     /// Where each point goes: point and cell.
     moves: Vec<(u32, u32)>,
@@ -83,6 +84,9 @@ pub(super) struct Evaluator {
     pub drift: f64,
     pub height: u32,
 }
+
+/// Stands for the new vertex, which has no number yet.
+const CENTRE: u32 = NONE;
 
 /// Barycentric coordinates this far below zero are rounding errors of a point on a face.
 const SLACK: f64 = 1e-9;
@@ -116,14 +120,14 @@ impl Evaluator {
         let fans = plan.fan.iter().map(|&(tet, ..)| (tet, 0));
         for (tet, cell) in stars.chain(fans) {
             for point in buckets.iter(tet) {
-                error = error.max(self.place(point, cell, plan, data, reference));
+                error = error.max(self.place(point, cell, plan, mesh, data, reference));
                 if error > limit {
                     return error;
                 }
             }
         }
         for end in [plan.a, plan.b].into_iter().filter(|&end| end < reference.points) {
-            error = error.max(self.place(end, 0, plan, data, reference));
+            error = error.max(self.place(end, 0, plan, mesh, data, reference));
         }
         error
     }
@@ -184,15 +188,16 @@ impl Evaluator {
         data: &VertexData,
         reference: &Reference<'_>,
     ) -> f64 {
-        self.border.clear();
+        self.border_known = false;
         self.drift = data.drift[plan.a as usize].max(data.drift[plan.b as usize]);
         if !plan.on_boundary {
             return 0.0;
         }
-        self.collect_border(plan, mesh);
+        self.collect_old_border(plan, mesh);
         if self.is_flat(plan, data) {
             return 0.0;
         }
+        self.collect_border(plan, mesh);
         let scaled = |q: [i32; 3]| reference.scaled(q);
         let at = |v: u32| scaled(data.positions[v as usize]);
         let centre = scaled(plan.position);
@@ -200,13 +205,14 @@ impl Evaluator {
             triangles.map(|t| p.distance(nearest_on_triangle(p, t))).fold(f64::INFINITY, f64::min)
         };
         self.drift += nearest(centre, &mut self.old_border.iter().map(|t| t.map(at)));
+        let new = |v: u32| if v == CENTRE { centre } else { at(v) };
         [plan.a, plan.b]
-            .map(|end| nearest(at(end), &mut self.border.iter().map(|&(_, [x, y])| [centre, at(x), at(y)])))
+            .map(|end| nearest(at(end), &mut self.border.iter().map(|(_, t)| t.map(new))))
             .into_iter()
             .fold(0.0, f64::max)
     }
 
-    fn collect_border(&mut self, plan: &Plan, mesh: &WorkMesh) {
+    fn collect_old_border(&mut self, plan: &Plan, mesh: &WorkMesh) {
         self.old_border.clear();
         let mut old = |tet: u32, ends: &[usize]| {
             let (corners, around) = (mesh.tets[tet as usize], mesh.neighbors[tet as usize]);
@@ -219,12 +225,18 @@ impl Evaluator {
         };
         plan.fan.iter().for_each(|&(tet, i, j)| old(tet, &[i as usize, j as usize]));
         plan.stay.iter().for_each(|&(s, _)| old(s.tet, &[s.corner as usize]));
+    }
+
+    /// All boundary triangles of the cells, also those opposite the centre.
+    fn collect_border(&mut self, plan: &Plan, mesh: &WorkMesh) {
+        self.border_known = true;
+        self.border.clear();
         for (i, &(s, _)) in plan.stay.iter().enumerate() {
-            let (corners, around) = (mesh.tets[s.tet as usize], mesh.neighbors[s.tet as usize]);
-            let centre = s.corner as usize;
-            for k in (0..4).filter(|&k| k != centre && around[k] == NONE) {
-                let mut rest = (0..4).filter(|&l| l != k && l != centre).map(|l| corners[l]);
-                self.border.push((i as u32, [rest.next().unwrap_or(NONE), rest.next().unwrap_or(NONE)]));
+            let mut corners = mesh.tets[s.tet as usize];
+            corners[s.corner as usize] = CENTRE;
+            let around = mesh.neighbors[s.tet as usize];
+            for k in (0..4).filter(|&k| around[k] == NONE) {
+                self.border.push((i as u32, crate::mesh::FACES[k].map(|l| corners[l])));
             }
         }
     }
@@ -238,11 +250,13 @@ impl Evaluator {
     }
 
     /// Finds the cell for a point, looking at `hint` first, and the error there.
+    #[expect(clippy::too_many_arguments, reason = "one point in the light of all that evaluate was given")]
     fn place(
         &mut self,
         point: u32,
         hint: usize,
         plan: &Plan,
+        mesh: &WorkMesh,
         data: &VertexData,
         reference: &Reference<'_>,
     ) -> f64 {
@@ -262,9 +276,14 @@ impl Evaluator {
             }
         }
         let mut displaced = 0.0;
-        if depth < -SLACK && !self.border.is_empty() {
-            let nearest = self.nearest_on_border(point, plan, data, reference);
-            (cell, lambda, displaced) = nearest;
+        if depth < -SLACK {
+            if !self.border_known {
+                self.collect_border(plan, mesh);
+            }
+            // Without a boundary nothing is outside; what seems so is rounding.
+            if let Some(nearest) = self.nearest_on_border(point, plan, data, reference) {
+                (cell, lambda, displaced) = nearest;
+            }
         }
         self.moves.push((point, cell as u32));
         let lambda = clamped(lambda);
@@ -280,19 +299,20 @@ impl Evaluator {
         plan: &Plan,
         data: &VertexData,
         reference: &Reference<'_>,
-    ) -> (usize, DVec3, f64) {
+    ) -> Option<(usize, DVec3, f64)> {
         let p = reference.scaled(reference.quantized.positions[point as usize]);
         let centre = reference.scaled(plan.position);
-        let at = |v: u32| reference.scaled(data.positions[v as usize]);
-        let (mut best, mut found, mut nearest) = (f64::INFINITY, 0, centre);
-        for &(cell, [x, y]) in &self.border {
-            let q = nearest_on_triangle(p, [centre, at(x), at(y)]);
+        let at = |v: u32| if v == CENTRE { centre } else { reference.scaled(data.positions[v as usize]) };
+        let (mut best, mut found, mut nearest) = (f64::INFINITY, None, centre);
+        for &(cell, triangle) in &self.border {
+            let q = nearest_on_triangle(p, triangle.map(at));
             if p.distance_squared(q) < best {
-                (best, found, nearest) = (p.distance_squared(q), cell as usize, q);
+                (best, found, nearest) = (p.distance_squared(q), Some(cell as usize), q);
             }
         }
+        let found = found?;
         let step = DVec3::from_array(reference.quantized.lattice.step);
-        (found, self.cells[found].barycentric * ((nearest - centre) / step), best.sqrt())
+        Some((found, self.cells[found].barycentric * ((nearest - centre) / step), best.sqrt()))
     }
 
     fn field_error(
