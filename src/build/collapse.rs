@@ -116,7 +116,11 @@ struct Builder<'a> {
     marks: VertexMarks,
     /// Counts the changes around each vertex.
     versions: Vec<u32>,
+    /// Candidates of the level that is worked on, and of those before.
     queue: BinaryHeap<Reverse<Key>>,
+    level: u16,
+    /// Candidates of later levels.
+    later: Vec<Vec<Key>>,
     /// Edges that could not be collapsed, with the sum of their ends' versions then.
     blocked: Vec<(u32, u32, u32)>,
     plan: Plan,
@@ -155,6 +159,8 @@ impl<'a> Builder<'a> {
             reference,
             frozen,
             queue: BinaryHeap::new(),
+            level: 0,
+            later: Vec::new(),
             blocked: Vec::new(),
             plan: Plan::default(),
             evaluator: Evaluator::default(),
@@ -166,7 +172,6 @@ impl<'a> Builder<'a> {
 
     fn collapse_all(&mut self, progress: OnProgress<'_>) -> Result<(), BuildError> {
         self.push_all_edges();
-        let mut level = 0;
         let mut steps = 0_u64;
         loop {
             steps += 1;
@@ -178,18 +183,11 @@ impl<'a> Builder<'a> {
                 }
             }
             let Some(Reverse(key)) = self.queue.pop() else {
-                if self.retry_blocked(level) {
+                if self.next_level() {
                     continue;
                 }
                 return Ok(());
             };
-            if key.level() > level {
-                // What was in the way at the lower levels may be gone: look again before going on.
-                level = key.level();
-                self.queue.push(Reverse(key));
-                self.retry_blocked(level);
-                continue;
-            }
             self.try_collapse(key);
         }
     }
@@ -201,12 +199,40 @@ impl<'a> Builder<'a> {
         }
         edges.sort_unstable();
         edges.dedup();
-        let keys: Vec<Reverse<Key>> = edges.iter().map(|&(a, b)| Reverse(self.predicted_key(a, b))).collect();
-        self.queue = BinaryHeap::from(keys);
+        for (a, b) in edges {
+            self.push(self.predicted_key(a, b));
+        }
+    }
+
+    /// Puts a candidate where it belongs: into the queue, or aside until its level is reached. Most candidates are
+    /// never reached at the level of their first prediction, so this keeps the queue short.
+    fn push(&mut self, key: Key) {
+        if key.level() <= self.level {
+            self.queue.push(Reverse(key));
+            return;
+        }
+        let level = usize::from(key.level());
+        if level >= self.later.len() {
+            self.later.resize_with(level + 1, Vec::new);
+        }
+        self.later[level].push(key);
+    }
+
+    /// Goes on to the next level that has candidates; what was in the way at the lower ones may be gone, so that is
+    /// looked at again. False if nothing is left to do.
+    fn next_level(&mut self) -> bool {
+        let first = usize::from(self.level) + 1;
+        let next = (first..self.later.len()).find(|&level| !self.later[level].is_empty());
+        if let Some(level) = next {
+            self.level = level as u16;
+            let keys = std::mem::take(&mut self.later[level]);
+            self.queue = keys.into_iter().map(Reverse).collect();
+        }
+        self.retry_blocked() || next.is_some()
     }
 
     /// Puts those blocked edges back whose neighbourhood has changed. Tells whether there were any.
-    fn retry_blocked(&mut self, level: u16) -> bool {
+    fn retry_blocked(&mut self) -> bool {
         let mut still = std::mem::take(&mut self.blocked);
         let before = still.len();
         still.retain(|&(a, b, versions)| {
@@ -216,12 +242,12 @@ impl<'a> Builder<'a> {
             if self.edge_version(a, b) == versions {
                 return true;
             }
-            let key = self.predicted_key(a, b);
-            self.queue.push(Reverse(key.no_earlier_than(level)));
+            let key = self.predicted_key(a, b).no_earlier_than(self.level);
+            self.push(key);
             false
         });
         self.blocked = still;
-        !self.queue.is_empty() && self.blocked.len() < before
+        self.blocked.len() < before
     }
 
     fn edge_version(&self, a: u32, b: u32) -> u32 {
@@ -271,7 +297,7 @@ impl<'a> Builder<'a> {
         let error = evaluator.evaluate(plan, mesh, data, buckets, reference, limit);
         let exact = self.key(error, self.evaluator.height, self.plan.stay.len() as u32, a, b);
         if exact.urgency() > key.urgency() {
-            self.queue.push(Reverse(exact));
+            self.push(exact);
             return;
         }
         self.perform(error);
@@ -314,7 +340,7 @@ impl<'a> Builder<'a> {
             let x = self.plan.link[i];
             self.versions[x as usize] = self.versions[x as usize].wrapping_add(1);
             let key = self.predicted_key(x, v);
-            self.queue.push(Reverse(key));
+            self.push(key);
         }
     }
 }

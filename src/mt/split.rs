@@ -335,14 +335,14 @@ impl CurrentMesh {
             face
         };
         let order = |number: &dyn Fn(VertexId) -> u32| {
-            let mut order: Vec<usize> = (0..star.len).collect();
-            order.sort_unstable_by_key(|&i| face(i, number));
+            let mut order: Vec<([u32; 3], usize)> = (0..star.len).map(|i| (face(i, number), i)).collect();
+            order.sort_unstable();
             order
         };
         let theirs = order(&other);
-        let sides = theirs.iter().enumerate().fold(0_u64, |s, (rank, &i)| s | (mask >> rank & 1) << i);
+        let sides = theirs.iter().enumerate().fold(0_u64, |s, (rank, &(_, i))| s | (mask >> rank & 1) << i);
         let ours = order(&|v: VertexId| v.0);
-        Some(ours.iter().enumerate().fold(0_u64, |m, (rank, &i)| m | (sides >> i & 1) << rank))
+        Some(ours.iter().enumerate().fold(0_u64, |m, (rank, &(_, i))| m | (sides >> i & 1) << rank))
     }
 }
 
