@@ -4,12 +4,18 @@
 //! contains it or, where the boundary has moved, the one with the nearest boundary triangle. A collapse takes it from
 //! a tetrahedron that it removes to one that it creates. So for every consistent set S, some tetrahedron of Σ_S had
 //! the vertex in its bucket, and the error recorded then bounds what Σ_S has there.
+//!
+//! The boundary is kept track of in both directions. A created vertex is compared with the reference boundary itself:
+//! its distance from the mesh before says nothing, as step after step along chords would fill any hollow. And each
+//! reference vertex of the boundary has a second bucket, of the boundary triangle that is nearest to it.
 
 use super::plan::Plan;
 use super::quantize::Quantized;
+use super::skin::Skin;
 use super::work_mesh::WorkMesh;
 use crate::geom::nearest_on_triangle;
 use crate::geom::orient3d;
+use crate::mesh::FACES;
 use crate::mesh::NONE;
 use glam::DMat3;
 use glam::DVec3;
@@ -22,18 +28,32 @@ pub(super) struct VertexData {
     pub error: Vec<f64>,
     /// Length of the longest chain of collapses that led to the vertex.
     pub height: Vec<u32>,
-    /// How far the vertex may lie from the reference boundary, in model units.
-    pub drift: Vec<f64>,
+    /// The triangle of the reference boundary that a boundary vertex is near to; [`NONE`] inside.
+    pub foot: Vec<u32>,
 }
 
-/// The reference vertices inside each tetrahedron, as linked lists.
+/// The reference vertices that belong to each tetrahedron.
 pub(super) struct Buckets {
-    first: Vec<u32>,
-    next: Vec<u32>,
+    /// Those that it stands for.
+    inside: Lists,
+    /// Those of the boundary that its boundary faces stand for.
+    border: Lists,
 }
 
 impl Buckets {
     pub fn new(tets: usize, points: usize) -> Self {
+        Self { inside: Lists::new(tets, points), border: Lists::new(tets, points) }
+    }
+}
+
+/// Disjoint lists of points, one for each tetrahedron.
+struct Lists {
+    first: Vec<u32>,
+    next: Vec<u32>,
+}
+
+impl Lists {
+    fn new(tets: usize, points: usize) -> Self {
         Self { first: vec![NONE; tets], next: vec![NONE; points] }
     }
 
@@ -55,6 +75,7 @@ impl Buckets {
 pub(super) struct Reference<'a> {
     pub quantized: &'a Quantized,
     pub points: u32,
+    pub skin: Skin,
     /// Model units of displacement that count as an error of 1.
     pub displacement_per_error: f64,
 }
@@ -71,16 +92,19 @@ struct Cell {
 #[derive(Default)]
 pub(super) struct Evaluator {
     cells: Vec<Cell>,
-    /// Boundary triangles at the centre: the cell, and its two other corners.
-    border: Vec<(u32, [u32; 2])>,
+    /// Boundary triangles of the star: the cell and its corners, [`NONE`] for the centre. Those at the centre first.
+    border: Vec<(u32, [u32; 3])>,
+    at_centre: usize,
     old_border: Vec<[u32; 3]>,
     /// Where each point goes: point and cell.
     moves: Vec<(u32, u32)>,
+    border_moves: Vec<(u32, u32)>,
     /// The levels of the new vertex.
     pub levels: Vec<i32>,
     /// The levels' offsets.
     pub level_offsets: Vec<i32>,
-    pub drift: f64,
+    /// The triangle of the reference boundary near the new vertex.
+    pub foot: u32,
     pub height: u32,
 }
 
@@ -105,17 +129,24 @@ impl Evaluator {
         self.cells.clear();
         self.cells
             .extend(plan.stay.iter().map(|&(s, _)| Cell::new(s.tet, s.corner as usize, plan, mesh, data)));
-        let step = self.move_boundary(plan, mesh, data, reference);
+        self.collect_border(plan, mesh);
+        let step = self.step_of_boundary(plan, data, reference);
         let mut error = inherited;
         if newest {
             error += overshoot.max(step / reference.displacement_per_error);
         }
-        error = error.max(self.drift / reference.displacement_per_error);
+        self.foot = NONE;
+        if plan.on_boundary {
+            error = error.max(self.move_boundary(plan, data, buckets, reference));
+        }
+        if error > limit {
+            return error;
+        }
         self.moves.clear();
         let stars = plan.stay.iter().enumerate().map(|(i, (s, _))| (s.tet, i));
         let fans = plan.fan.iter().map(|&(tet, ..)| (tet, 0));
         for (tet, cell) in stars.chain(fans) {
-            for point in buckets.iter(tet) {
+            for point in buckets.inside.iter(tet) {
                 error = error.max(self.place(point, cell, plan, data, reference));
                 if error > limit {
                     return error;
@@ -130,9 +161,15 @@ impl Evaluator {
 
     /// Moves the points to the buckets where [`Evaluator::evaluate`] found them to belong.
     pub fn settle(&self, plan: &Plan, buckets: &mut Buckets) {
-        plan.stay.iter().for_each(|(s, _)| buckets.take(s.tet));
-        plan.fan.iter().for_each(|&(tet, ..)| buckets.take(tet));
-        self.moves.iter().for_each(|&(point, cell)| buckets.put(self.cells[cell as usize].tet, point));
+        plan.stay.iter().for_each(|(s, _)| buckets.inside.take(s.tet));
+        plan.fan.iter().for_each(|&(tet, ..)| buckets.inside.take(tet));
+        self.moves.iter().for_each(|&(point, cell)| buckets.inside.put(self.cells[cell as usize].tet, point));
+        if plan.on_boundary {
+            plan.stay.iter().for_each(|(s, _)| buckets.border.take(s.tet));
+            plan.fan.iter().for_each(|&(tet, ..)| buckets.border.take(tet));
+            let moves = self.border_moves.iter();
+            moves.for_each(|&(point, cell)| buckets.border.put(self.cells[cell as usize].tet, point));
+        }
     }
 
     fn halve_levels(&mut self, plan: &Plan, data: &VertexData, reference: &Reference<'_>) {
@@ -175,56 +212,75 @@ impl Evaluator {
         largest * (1.0 + 1e-9)
     }
 
-    /// Finds how the boundary moves: sets the drift of the new vertex, returns how far the ends are from the new
-    /// boundary.
+    /// How far the ends are from the new boundary.
+    fn step_of_boundary(&self, plan: &Plan, data: &VertexData, reference: &Reference<'_>) -> f64 {
+        if !plan.on_boundary || self.is_flat(plan, data) {
+            return 0.0;
+        }
+        let triangles = &self.border[..self.at_centre];
+        let distance = |end: u32| {
+            let p = reference.scaled(data.positions[end as usize]);
+            self.nearest(p, triangles, plan, data, reference).2
+        };
+        distance(plan.a).max(distance(plan.b))
+    }
+
+    /// Finds how the boundary moves: which part of the reference boundary the new vertex is near to, and where the
+    /// reference vertices of the boundary go. Returns the error that the larger of the distances stands for.
     fn move_boundary(
         &mut self,
         plan: &Plan,
-        mesh: &WorkMesh,
         data: &VertexData,
+        buckets: &Buckets,
         reference: &Reference<'_>,
     ) -> f64 {
-        self.border.clear();
-        self.drift = data.drift[plan.a as usize].max(data.drift[plan.b as usize]);
-        if !plan.on_boundary {
-            return 0.0;
+        let centre = reference.scaled(plan.position);
+        let [(foot, mut largest), other] =
+            [plan.a, plan.b].map(|end| reference.skin.walk(centre, data.foot[end as usize]));
+        self.foot = foot;
+        if other.1 < largest {
+            (self.foot, largest) = other;
         }
-        self.collect_border(plan, mesh);
-        if self.is_flat(plan, data) {
-            return 0.0;
+        self.border_moves.clear();
+        let tets = plan.stay.iter().map(|(s, _)| s.tet).chain(plan.fan.iter().map(|&(tet, ..)| tet));
+        let ends = [plan.a, plan.b].into_iter().filter(|&end| end < reference.points);
+        for point in tets.flat_map(|tet| buckets.border.iter(tet)).chain(ends) {
+            let p = reference.scaled(reference.quantized.positions[point as usize]);
+            let (cell, _, distance) = self.nearest(p, &self.border, plan, data, reference);
+            self.border_moves.push((point, cell));
+            largest = largest.max(distance);
         }
-        let scaled = |q: [i32; 3]| reference.scaled(q);
-        let at = |v: u32| scaled(data.positions[v as usize]);
-        let centre = scaled(plan.position);
-        let nearest = |p: DVec3, triangles: &mut dyn Iterator<Item = [DVec3; 3]>| {
-            triangles.map(|t| p.distance(nearest_on_triangle(p, t))).fold(f64::INFINITY, f64::min)
-        };
-        self.drift += nearest(centre, &mut self.old_border.iter().map(|t| t.map(at)));
-        [plan.a, plan.b]
-            .map(|end| nearest(at(end), &mut self.border.iter().map(|&(_, [x, y])| [centre, at(x), at(y)])))
-            .into_iter()
-            .fold(0.0, f64::max)
+        if largest > 0.0 { largest / reference.displacement_per_error } else { 0.0 }
     }
 
+    /// The boundary triangles of the star, before and after.
     fn collect_border(&mut self, plan: &Plan, mesh: &WorkMesh) {
+        self.border.clear();
         self.old_border.clear();
-        let mut old = |tet: u32, ends: &[usize]| {
-            let (corners, around) = (mesh.tets[tet as usize], mesh.neighbors[tet as usize]);
-            for k in (0..4).filter(|k| around[*k] == NONE) {
-                // Triangles at either end: those not opposite the only end that the tetrahedron has.
-                if ends.iter().any(|&end| end != k) {
-                    self.old_border.push(crate::mesh::FACES[k].map(|l| corners[l]));
-                }
+        self.at_centre = 0;
+        if plan.on_boundary {
+            self.collect_border_at_centre(plan, mesh);
+            self.at_centre = self.border.len();
+        }
+        for (i, &(s, _)) in plan.stay.iter().enumerate() {
+            if mesh.neighbors[s.tet as usize][s.corner as usize] == NONE {
+                self.border.push((i as u32, self.cells[i].others));
             }
-        };
-        plan.fan.iter().for_each(|&(tet, i, j)| old(tet, &[i as usize, j as usize]));
-        plan.stay.iter().for_each(|&(s, _)| old(s.tet, &[s.corner as usize]));
+        }
+    }
+
+    fn collect_border_at_centre(&mut self, plan: &Plan, mesh: &WorkMesh) {
+        for &(tet, ..) in &plan.fan {
+            let (corners, around) = (mesh.tets[tet as usize], mesh.neighbors[tet as usize]);
+            let faces = (0..4).filter(|&k| around[k] == NONE);
+            self.old_border.extend(faces.map(|k| FACES[k].map(|l| corners[l])));
+        }
         for (i, &(s, _)) in plan.stay.iter().enumerate() {
             let (corners, around) = (mesh.tets[s.tet as usize], mesh.neighbors[s.tet as usize]);
             let centre = s.corner as usize;
             for k in (0..4).filter(|&k| k != centre && around[k] == NONE) {
-                let mut rest = (0..4).filter(|&l| l != k && l != centre).map(|l| corners[l]);
-                self.border.push((i as u32, [rest.next().unwrap_or(NONE), rest.next().unwrap_or(NONE)]));
+                self.old_border.push(FACES[k].map(|l| corners[l]));
+                self.border.push((i as u32, FACES[k].map(|l| if l == centre { NONE } else { corners[l] })));
             }
         }
     }
@@ -263,8 +319,12 @@ impl Evaluator {
         }
         let mut displaced = 0.0;
         if depth < -SLACK && !self.border.is_empty() {
-            let nearest = self.nearest_on_border(point, plan, data, reference);
-            (cell, lambda, displaced) = nearest;
+            let p = reference.scaled(reference.quantized.positions[point as usize]);
+            let (found, q, distance) = self.nearest(p, &self.border, plan, data, reference);
+            let step = DVec3::from_array(reference.quantized.lattice.step);
+            let to_q = (q - reference.scaled(plan.position)) / step;
+            (cell, lambda, displaced) =
+                (found as usize, self.cells[found as usize].barycentric * to_q, distance);
         }
         self.moves.push((point, cell as u32));
         let lambda = clamped(lambda);
@@ -272,27 +332,26 @@ impl Evaluator {
             .max(displaced / reference.displacement_per_error)
     }
 
-    /// The cell with the boundary triangle nearest to a point outside, the coordinates of the nearest point, and the
-    /// distance in model units.
-    fn nearest_on_border(
+    /// The nearest of some boundary triangles after the collapse: its cell, the nearest point, and the distance.
+    fn nearest(
         &self,
-        point: u32,
+        p: DVec3,
+        triangles: &[(u32, [u32; 3])],
         plan: &Plan,
         data: &VertexData,
         reference: &Reference<'_>,
-    ) -> (usize, DVec3, f64) {
-        let p = reference.scaled(reference.quantized.positions[point as usize]);
-        let centre = reference.scaled(plan.position);
-        let at = |v: u32| reference.scaled(data.positions[v as usize]);
-        let (mut best, mut found, mut nearest) = (f64::INFINITY, 0, centre);
-        for &(cell, [x, y]) in &self.border {
-            let q = nearest_on_triangle(p, [centre, at(x), at(y)]);
-            if p.distance_squared(q) < best {
-                (best, found, nearest) = (p.distance_squared(q), cell as usize, q);
+    ) -> (u32, DVec3, f64) {
+        let at =
+            |v: u32| reference.scaled(if v == NONE { plan.position } else { data.positions[v as usize] });
+        let (mut least, mut found, mut nearest) = (f64::INFINITY, 0, p);
+        for &(cell, corners) in triangles {
+            let q = nearest_on_triangle(p, corners.map(at));
+            let distance = p.distance_squared(q);
+            if distance < least {
+                (least, found, nearest) = (distance, cell, q);
             }
         }
-        let step = DVec3::from_array(reference.quantized.lattice.step);
-        (found, self.cells[found].barycentric * ((nearest - centre) / step), best.sqrt())
+        (found, nearest, least.sqrt())
     }
 
     fn field_error(
@@ -330,7 +389,7 @@ impl Cell {
 
 impl Reference<'_> {
     /// A lattice point in model units, from the lattice's origin.
-    fn scaled(&self, q: [i32; 3]) -> DVec3 {
+    pub fn scaled(&self, q: [i32; 3]) -> DVec3 {
         as_vec(q) * DVec3::from_array(self.quantized.lattice.step)
     }
 }
