@@ -260,7 +260,7 @@ impl<'a> Builder<'a> {
         data.error.push(code.error());
         data.height.push(evaluator.height);
         data.foot.push(evaluator.foot);
-        evaluator.settle(plan, &mut self.buckets);
+        evaluator.settle(plan, data, &mut self.buckets, &self.reference);
         for f in 0..evaluator.levels.len() {
             let fields = evaluator.levels.len();
             let [g, h] = [plan.a, plan.b].map(|w| self.gradients[w as usize * fields + f]);

@@ -95,6 +95,7 @@ pub(super) struct Evaluator {
     /// Boundary triangles of the star: the cell and its corners, [`NONE`] for the centre. Those at the centre first.
     border: Vec<(u32, [u32; 3])>,
     at_centre: usize,
+    flat: bool,
     old_border: Vec<[u32; 3]>,
     /// Where each point goes: point and cell.
     moves: Vec<(u32, u32)>,
@@ -107,6 +108,9 @@ pub(super) struct Evaluator {
     pub foot: u32,
     pub height: u32,
 }
+
+/// Errors below this are far below the smallest that is stored.
+const NO_DISTANCE: f64 = 1e-8;
 
 /// Barycentric coordinates this far below zero are rounding errors of a point on a face.
 const SLACK: f64 = 1e-9;
@@ -130,14 +134,16 @@ impl Evaluator {
         self.cells
             .extend(plan.stay.iter().map(|&(s, _)| Cell::new(s.tet, s.corner as usize, plan, mesh, data)));
         self.collect_border(plan, mesh);
+        self.flat = self.is_flat(plan, data);
         let step = self.step_of_boundary(plan, data, reference);
         let mut error = inherited;
         if newest {
-            error += overshoot.max(step / reference.displacement_per_error);
+            error += overshoot.max(reference.error_of(step));
         }
-        self.foot = NONE;
-        if plan.on_boundary {
-            error = error.max(self.move_boundary(plan, data, buckets, reference));
+        error = error.max(self.find_foot(plan, data, reference));
+        if plan.on_boundary && !self.flat && error <= limit {
+            // Where it is flat, no point of the boundary gets further away than it is.
+            error = error.max(self.place_on_border(plan, data, buckets, reference));
         }
         if error > limit {
             return error;
@@ -160,7 +166,16 @@ impl Evaluator {
     }
 
     /// Moves the points to the buckets where [`Evaluator::evaluate`] found them to belong.
-    pub fn settle(&self, plan: &Plan, buckets: &mut Buckets) {
+    pub fn settle(
+        &mut self,
+        plan: &Plan,
+        data: &VertexData,
+        buckets: &mut Buckets,
+        reference: &Reference<'_>,
+    ) {
+        if plan.on_boundary && self.flat {
+            self.place_on_border(plan, data, buckets, reference);
+        }
         plan.stay.iter().for_each(|(s, _)| buckets.inside.take(s.tet));
         plan.fan.iter().for_each(|&(tet, ..)| buckets.inside.take(tet));
         self.moves.iter().for_each(|&(point, cell)| buckets.inside.put(self.cells[cell as usize].tet, point));
@@ -214,7 +229,7 @@ impl Evaluator {
 
     /// How far the ends are from the new boundary.
     fn step_of_boundary(&self, plan: &Plan, data: &VertexData, reference: &Reference<'_>) -> f64 {
-        if !plan.on_boundary || self.is_flat(plan, data) {
+        if !plan.on_boundary || self.flat {
             return 0.0;
         }
         let triangles = &self.border[..self.at_centre];
@@ -225,23 +240,37 @@ impl Evaluator {
         distance(plan.a).max(distance(plan.b))
     }
 
-    /// Finds how the boundary moves: which part of the reference boundary the new vertex is near to, and where the
-    /// reference vertices of the boundary go. Returns the error that the larger of the distances stands for.
-    fn move_boundary(
+    /// Finds the part of the reference boundary that the new vertex is near to. Returns the error that the distance
+    /// stands for.
+    fn find_foot(&mut self, plan: &Plan, data: &VertexData, reference: &Reference<'_>) -> f64 {
+        self.foot = NONE;
+        if !plan.on_boundary {
+            return 0.0;
+        }
+        let centre = reference.scaled(plan.position);
+        let enough = NO_DISTANCE * reference.displacement_per_error;
+        let (foot, distance) = reference.skin.walk(centre, data.foot[plan.a as usize], enough);
+        self.foot = foot;
+        if distance <= enough {
+            return 0.0;
+        }
+        let (other, less) = reference.skin.walk(centre, data.foot[plan.b as usize], enough);
+        if less < distance {
+            self.foot = other;
+        }
+        reference.error_of(less.min(distance))
+    }
+
+    /// Finds where the reference vertices of the boundary go. Returns the error that the largest distance stands for.
+    fn place_on_border(
         &mut self,
         plan: &Plan,
         data: &VertexData,
         buckets: &Buckets,
         reference: &Reference<'_>,
     ) -> f64 {
-        let centre = reference.scaled(plan.position);
-        let [(foot, mut largest), other] =
-            [plan.a, plan.b].map(|end| reference.skin.walk(centre, data.foot[end as usize]));
-        self.foot = foot;
-        if other.1 < largest {
-            (self.foot, largest) = other;
-        }
         self.border_moves.clear();
+        let mut largest = 0.0_f64;
         let tets = plan.stay.iter().map(|(s, _)| s.tet).chain(plan.fan.iter().map(|&(tet, ..)| tet));
         let ends = [plan.a, plan.b].into_iter().filter(|&end| end < reference.points);
         for point in tets.flat_map(|tet| buckets.border.iter(tet)).chain(ends) {
@@ -250,7 +279,7 @@ impl Evaluator {
             self.border_moves.push((point, cell));
             largest = largest.max(distance);
         }
-        if largest > 0.0 { largest / reference.displacement_per_error } else { 0.0 }
+        reference.error_of(largest)
     }
 
     /// The boundary triangles of the star, before and after.
@@ -328,8 +357,7 @@ impl Evaluator {
         }
         self.moves.push((point, cell as u32));
         let lambda = clamped(lambda);
-        self.field_error(point, cell, lambda, data, reference)
-            .max(displaced / reference.displacement_per_error)
+        self.field_error(point, cell, lambda, data, reference).max(reference.error_of(displaced))
     }
 
     /// The nearest of some boundary triangles after the collapse: its cell, the nearest point, and the distance.
@@ -388,6 +416,11 @@ impl Cell {
 }
 
 impl Reference<'_> {
+    /// What a displacement counts as.
+    fn error_of(&self, distance: f64) -> f64 {
+        if distance > 0.0 { distance / self.displacement_per_error } else { 0.0 }
+    }
+
     /// A lattice point in model units, from the lattice's origin.
     pub fn scaled(&self, q: [i32; 3]) -> DVec3 {
         as_vec(q) * DVec3::from_array(self.quantized.lattice.step)

@@ -38,12 +38,12 @@ impl Skin {
         &self.around[self.starts[v as usize] as usize..self.starts[v as usize + 1] as usize]
     }
 
-    /// Walks from a triangle to ever nearer ones. Returns the last one and its distance from `p`: an upper bound of
-    /// how far `p` is from the boundary.
-    pub fn walk(&self, p: DVec3, from: u32) -> (u32, f64) {
+    /// Walks from a triangle to ever nearer ones, until one is as near as `enough`. Returns the last one and
+    /// its distance from `p`: an upper bound of how far `p` is from the boundary.
+    pub fn walk(&self, p: DVec3, from: u32, enough: f64) -> (u32, f64) {
         let squared = |t: u32| p.distance_squared(nearest_on_triangle(p, self.triangles[t as usize]));
         let (mut best, mut least) = (from, squared(from));
-        loop {
+        while least > enough * enough {
             let here = best;
             for &v in &self.corners[here as usize] {
                 for &t in self.at(v) {
@@ -53,9 +53,10 @@ impl Skin {
                     }
                 }
             }
-            if best == here || least == 0.0 {
-                return (best, least.sqrt());
+            if best == here {
+                break;
             }
         }
+        (best, least.sqrt())
     }
 }
