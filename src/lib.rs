@@ -28,6 +28,7 @@
 #![warn(missing_docs)]
 #![deny(rustdoc::broken_intra_doc_links)]
 
+pub mod bench;
 #[cfg(feature = "build")]
 pub mod build;
 pub mod format;
