@@ -17,6 +17,7 @@ use super::plan::Refusal;
 use super::plan::VertexMarks;
 use super::quantize;
 use super::quantize::Quantized;
+use super::skin::Skin;
 use super::work_mesh::WorkMesh;
 use crate::geom::Bounds;
 use crate::mesh;
@@ -136,16 +137,22 @@ impl<'a> Builder<'a> {
         let points = quantized.positions.len();
         let mut degrees = vec![0; points];
         mesh.tets.iter().flatten().for_each(|&v| degrees[v as usize] += 1);
+        let step = glam::DVec3::from_array(quantized.lattice.step);
+        let scaled = |q: &[i32; 3]| glam::DVec3::from_array(q.map(f64::from)) * step;
+        let places: Vec<glam::DVec3> = quantized.positions.iter().map(scaled).collect();
+        let skin = Skin::new(&mesh.tets, &mesh.neighbors, &places);
+        let foot = |v: u32| skin.at(v).first().copied().unwrap_or(crate::mesh::NONE);
         let data = VertexData {
             positions: quantized.positions.clone(),
             levels: quantized.levels.clone(),
             error: vec![0.0; points],
             height: vec![0; points],
-            drift: vec![0.0; points],
+            foot: (0..points as u32).map(foot).collect(),
         };
         let reference = Reference {
             quantized,
             points: points as u32,
+            skin,
             // With no displacement allowed any movement is an infinite error.
             displacement_per_error: info.displacement_per_error,
         };
@@ -304,7 +311,7 @@ impl<'a> Builder<'a> {
     }
 
     fn perform(&mut self, error: f64) {
-        // Never zero: a request for no error at all means every update.
+        // Never zero: error 0 is to mean the reference mesh, with every update applied.
         let code = ErrorCode::at_least(error).max(ErrorCode(1));
         let v = self.data.positions.len() as u32;
         let Self { plan, mesh, data, evaluator, .. } = self;
@@ -314,8 +321,8 @@ impl<'a> Builder<'a> {
         data.levels.extend_from_slice(&evaluator.levels);
         data.error.push(code.error());
         data.height.push(evaluator.height);
-        data.drift.push(evaluator.drift);
-        evaluator.settle(plan, &mut self.buckets);
+        data.foot.push(evaluator.foot);
+        evaluator.settle(plan, data, &mut self.buckets, &self.reference);
         for f in 0..evaluator.levels.len() {
             let fields = evaluator.levels.len();
             let [g, h] = [plan.a, plan.b].map(|w| self.gradients[w as usize * fields + f]);

@@ -4,12 +4,18 @@
 //! contains it or, where the boundary has moved, the one with the nearest boundary triangle. A collapse takes it from
 //! a tetrahedron that it removes to one that it creates. So for every consistent set S, some tetrahedron of Σ_S had
 //! the vertex in its bucket, and the error recorded then bounds what Σ_S has there.
+//!
+//! The boundary is kept track of in both directions. A created vertex is compared with the reference boundary itself:
+//! its distance from the mesh before says nothing, as step after step along chords would fill any hollow. And each
+//! reference vertex of the boundary has a second bucket, of the boundary triangle that is nearest to it.
 
 use super::plan::Plan;
 use super::quantize::Quantized;
+use super::skin::Skin;
 use super::work_mesh::WorkMesh;
 use crate::geom::nearest_on_triangle;
 use crate::geom::orient3d;
+use crate::mesh::FACES;
 use crate::mesh::NONE;
 use glam::DMat3;
 use glam::DVec3;
@@ -22,18 +28,32 @@ pub(super) struct VertexData {
     pub error: Vec<f64>,
     /// Length of the longest chain of collapses that led to the vertex.
     pub height: Vec<u32>,
-    /// How far the vertex may lie from the reference boundary, in model units.
-    pub drift: Vec<f64>,
+    /// The triangle of the reference boundary that a boundary vertex is near to; [`NONE`] inside.
+    pub foot: Vec<u32>,
 }
 
-/// The reference vertices inside each tetrahedron, as linked lists.
+/// The reference vertices that belong to each tetrahedron.
 pub(super) struct Buckets {
-    first: Vec<u32>,
-    next: Vec<u32>,
+    /// Those that it stands for.
+    inside: Lists,
+    /// Those of the boundary that its boundary faces stand for.
+    border: Lists,
 }
 
 impl Buckets {
     pub fn new(tets: usize, points: usize) -> Self {
+        Self { inside: Lists::new(tets, points), border: Lists::new(tets, points) }
+    }
+}
+
+/// Disjoint lists of points, one for each tetrahedron.
+struct Lists {
+    first: Vec<u32>,
+    next: Vec<u32>,
+}
+
+impl Lists {
+    fn new(tets: usize, points: usize) -> Self {
         Self { first: vec![NONE; tets], next: vec![NONE; points] }
     }
 
@@ -55,6 +75,7 @@ impl Buckets {
 pub(super) struct Reference<'a> {
     pub quantized: &'a Quantized,
     pub points: u32,
+    pub skin: Skin,
     /// Model units of displacement that count as an error of 1.
     pub displacement_per_error: f64,
 }
@@ -71,22 +92,25 @@ struct Cell {
 #[derive(Default)]
 pub(super) struct Evaluator {
     cells: Vec<Cell>,
-    /// Boundary triangles of the cells, with [`CENTRE`] for the centre.
+    /// Boundary triangles of the star: the cell and its corners, [`NONE`] for the centre. Those at the centre first.
     border: Vec<(u32, [u32; 3])>,
-    border_known: bool,
+    at_centre: usize,
+    flat: bool,
     old_border: Vec<[u32; 3]>,
     /// Where each point goes: point and cell.
     moves: Vec<(u32, u32)>,
+    border_moves: Vec<(u32, u32)>,
     /// The levels of the new vertex.
     pub levels: Vec<i32>,
     /// The levels' offsets.
     pub level_offsets: Vec<i32>,
-    pub drift: f64,
+    /// The triangle of the reference boundary near the new vertex.
+    pub foot: u32,
     pub height: u32,
 }
 
-/// Stands for the new vertex, which has no number yet.
-const CENTRE: u32 = NONE;
+/// Errors below this are far below the smallest that is stored.
+const NO_DISTANCE: f64 = 1e-8;
 
 /// Barycentric coordinates this far below zero are rounding errors of a point on a face.
 const SLACK: f64 = 1e-9;
@@ -109,34 +133,58 @@ impl Evaluator {
         self.cells.clear();
         self.cells
             .extend(plan.stay.iter().map(|&(s, _)| Cell::new(s.tet, s.corner as usize, plan, mesh, data)));
-        let step = self.move_boundary(plan, mesh, data, reference);
+        self.collect_border(plan, mesh);
+        self.flat = self.is_flat(plan, data);
+        let step = self.step_of_boundary(plan, data, reference);
         let mut error = inherited;
         if newest {
-            error += overshoot.max(step / reference.displacement_per_error);
+            error += overshoot.max(reference.error_of(step));
         }
-        error = error.max(self.drift / reference.displacement_per_error);
+        error = error.max(self.find_foot(plan, data, reference));
+        if plan.on_boundary && !self.flat && error <= limit {
+            // Where it is flat, no point of the boundary gets further away than it is.
+            error = error.max(self.place_on_border(plan, data, buckets, reference));
+        }
+        if error > limit {
+            return error;
+        }
         self.moves.clear();
         let stars = plan.stay.iter().enumerate().map(|(i, (s, _))| (s.tet, i));
         let fans = plan.fan.iter().map(|&(tet, ..)| (tet, 0));
         for (tet, cell) in stars.chain(fans) {
-            for point in buckets.iter(tet) {
-                error = error.max(self.place(point, cell, plan, mesh, data, reference));
+            for point in buckets.inside.iter(tet) {
+                error = error.max(self.place(point, cell, plan, data, reference));
                 if error > limit {
                     return error;
                 }
             }
         }
         for end in [plan.a, plan.b].into_iter().filter(|&end| end < reference.points) {
-            error = error.max(self.place(end, 0, plan, mesh, data, reference));
+            error = error.max(self.place(end, 0, plan, data, reference));
         }
         error
     }
 
     /// Moves the points to the buckets where [`Evaluator::evaluate`] found them to belong.
-    pub fn settle(&self, plan: &Plan, buckets: &mut Buckets) {
-        plan.stay.iter().for_each(|(s, _)| buckets.take(s.tet));
-        plan.fan.iter().for_each(|&(tet, ..)| buckets.take(tet));
-        self.moves.iter().for_each(|&(point, cell)| buckets.put(self.cells[cell as usize].tet, point));
+    pub fn settle(
+        &mut self,
+        plan: &Plan,
+        data: &VertexData,
+        buckets: &mut Buckets,
+        reference: &Reference<'_>,
+    ) {
+        if plan.on_boundary && self.flat {
+            self.place_on_border(plan, data, buckets, reference);
+        }
+        plan.stay.iter().for_each(|(s, _)| buckets.inside.take(s.tet));
+        plan.fan.iter().for_each(|&(tet, ..)| buckets.inside.take(tet));
+        self.moves.iter().for_each(|&(point, cell)| buckets.inside.put(self.cells[cell as usize].tet, point));
+        if plan.on_boundary {
+            plan.stay.iter().for_each(|(s, _)| buckets.border.take(s.tet));
+            plan.fan.iter().for_each(|&(tet, ..)| buckets.border.take(tet));
+            let moves = self.border_moves.iter();
+            moves.for_each(|&(point, cell)| buckets.border.put(self.cells[cell as usize].tet, point));
+        }
     }
 
     fn halve_levels(&mut self, plan: &Plan, data: &VertexData, reference: &Reference<'_>) {
@@ -179,64 +227,89 @@ impl Evaluator {
         largest * (1.0 + 1e-9)
     }
 
-    /// Finds how the boundary moves: sets the drift of the new vertex, returns how far the ends are from the new
-    /// boundary.
-    fn move_boundary(
-        &mut self,
-        plan: &Plan,
-        mesh: &WorkMesh,
-        data: &VertexData,
-        reference: &Reference<'_>,
-    ) -> f64 {
-        self.border_known = false;
-        self.drift = data.drift[plan.a as usize].max(data.drift[plan.b as usize]);
+    /// How far the ends are from the new boundary.
+    fn step_of_boundary(&self, plan: &Plan, data: &VertexData, reference: &Reference<'_>) -> f64 {
+        if !plan.on_boundary || self.flat {
+            return 0.0;
+        }
+        let triangles = &self.border[..self.at_centre];
+        let distance = |end: u32| {
+            let p = reference.scaled(data.positions[end as usize]);
+            self.nearest(p, triangles, plan, data, reference).2
+        };
+        distance(plan.a).max(distance(plan.b))
+    }
+
+    /// Finds the part of the reference boundary that the new vertex is near to. Returns the error that the distance
+    /// stands for.
+    fn find_foot(&mut self, plan: &Plan, data: &VertexData, reference: &Reference<'_>) -> f64 {
+        self.foot = NONE;
         if !plan.on_boundary {
             return 0.0;
         }
-        self.collect_old_border(plan, mesh);
-        if self.is_flat(plan, data) {
+        let centre = reference.scaled(plan.position);
+        let enough = NO_DISTANCE * reference.displacement_per_error;
+        let (foot, distance) = reference.skin.walk(centre, data.foot[plan.a as usize], enough);
+        self.foot = foot;
+        if distance <= enough {
             return 0.0;
         }
-        self.collect_border(plan, mesh);
-        let scaled = |q: [i32; 3]| reference.scaled(q);
-        let at = |v: u32| scaled(data.positions[v as usize]);
-        let centre = scaled(plan.position);
-        let nearest = |p: DVec3, triangles: &mut dyn Iterator<Item = [DVec3; 3]>| {
-            triangles.map(|t| p.distance(nearest_on_triangle(p, t))).fold(f64::INFINITY, f64::min)
-        };
-        self.drift += nearest(centre, &mut self.old_border.iter().map(|t| t.map(at)));
-        let new = |v: u32| if v == CENTRE { centre } else { at(v) };
-        [plan.a, plan.b]
-            .map(|end| nearest(at(end), &mut self.border.iter().map(|(_, t)| t.map(new))))
-            .into_iter()
-            .fold(0.0, f64::max)
+        let (other, less) = reference.skin.walk(centre, data.foot[plan.b as usize], enough);
+        if less < distance {
+            self.foot = other;
+        }
+        reference.error_of(less.min(distance))
     }
 
-    fn collect_old_border(&mut self, plan: &Plan, mesh: &WorkMesh) {
-        self.old_border.clear();
-        let mut old = |tet: u32, ends: &[usize]| {
-            let (corners, around) = (mesh.tets[tet as usize], mesh.neighbors[tet as usize]);
-            for k in (0..4).filter(|k| around[*k] == NONE) {
-                // Triangles at either end: those not opposite the only end that the tetrahedron has.
-                if ends.iter().any(|&end| end != k) {
-                    self.old_border.push(crate::mesh::FACES[k].map(|l| corners[l]));
-                }
-            }
-        };
-        plan.fan.iter().for_each(|&(tet, i, j)| old(tet, &[i as usize, j as usize]));
-        plan.stay.iter().for_each(|&(s, _)| old(s.tet, &[s.corner as usize]));
+    /// Finds where the reference vertices of the boundary go. Returns the error that the largest distance stands for.
+    fn place_on_border(
+        &mut self,
+        plan: &Plan,
+        data: &VertexData,
+        buckets: &Buckets,
+        reference: &Reference<'_>,
+    ) -> f64 {
+        self.border_moves.clear();
+        let mut largest = 0.0_f64;
+        let tets = plan.stay.iter().map(|(s, _)| s.tet).chain(plan.fan.iter().map(|&(tet, ..)| tet));
+        let ends = [plan.a, plan.b].into_iter().filter(|&end| end < reference.points);
+        for point in tets.flat_map(|tet| buckets.border.iter(tet)).chain(ends) {
+            let p = reference.scaled(reference.quantized.positions[point as usize]);
+            let (cell, _, distance) = self.nearest(p, &self.border, plan, data, reference);
+            self.border_moves.push((point, cell));
+            largest = largest.max(distance);
+        }
+        reference.error_of(largest)
     }
 
-    /// All boundary triangles of the cells, also those opposite the centre.
+    /// The boundary triangles of the star, before and after.
     fn collect_border(&mut self, plan: &Plan, mesh: &WorkMesh) {
-        self.border_known = true;
         self.border.clear();
+        self.old_border.clear();
+        self.at_centre = 0;
+        if plan.on_boundary {
+            self.collect_border_at_centre(plan, mesh);
+            self.at_centre = self.border.len();
+        }
         for (i, &(s, _)) in plan.stay.iter().enumerate() {
-            let mut corners = mesh.tets[s.tet as usize];
-            corners[s.corner as usize] = CENTRE;
-            let around = mesh.neighbors[s.tet as usize];
-            for k in (0..4).filter(|&k| around[k] == NONE) {
-                self.border.push((i as u32, crate::mesh::FACES[k].map(|l| corners[l])));
+            if mesh.neighbors[s.tet as usize][s.corner as usize] == NONE {
+                self.border.push((i as u32, self.cells[i].others));
+            }
+        }
+    }
+
+    fn collect_border_at_centre(&mut self, plan: &Plan, mesh: &WorkMesh) {
+        for &(tet, ..) in &plan.fan {
+            let (corners, around) = (mesh.tets[tet as usize], mesh.neighbors[tet as usize]);
+            let faces = (0..4).filter(|&k| around[k] == NONE);
+            self.old_border.extend(faces.map(|k| FACES[k].map(|l| corners[l])));
+        }
+        for (i, &(s, _)) in plan.stay.iter().enumerate() {
+            let (corners, around) = (mesh.tets[s.tet as usize], mesh.neighbors[s.tet as usize]);
+            let centre = s.corner as usize;
+            for k in (0..4).filter(|&k| k != centre && around[k] == NONE) {
+                self.old_border.push(FACES[k].map(|l| corners[l]));
+                self.border.push((i as u32, FACES[k].map(|l| if l == centre { NONE } else { corners[l] })));
             }
         }
     }
@@ -250,13 +323,11 @@ impl Evaluator {
     }
 
     /// Finds the cell for a point, looking at `hint` first, and the error there.
-    #[expect(clippy::too_many_arguments, reason = "one point in the light of all that evaluate was given")]
     fn place(
         &mut self,
         point: u32,
         hint: usize,
         plan: &Plan,
-        mesh: &WorkMesh,
         data: &VertexData,
         reference: &Reference<'_>,
     ) -> f64 {
@@ -276,43 +347,39 @@ impl Evaluator {
             }
         }
         let mut displaced = 0.0;
-        if depth < -SLACK {
-            if !self.border_known {
-                self.collect_border(plan, mesh);
-            }
-            // Without a boundary nothing is outside; what seems so is rounding.
-            if let Some(nearest) = self.nearest_on_border(point, plan, data, reference) {
-                (cell, lambda, displaced) = nearest;
-            }
+        if depth < -SLACK && !self.border.is_empty() {
+            let p = reference.scaled(reference.quantized.positions[point as usize]);
+            let (found, q, distance) = self.nearest(p, &self.border, plan, data, reference);
+            let step = DVec3::from_array(reference.quantized.lattice.step);
+            let to_q = (q - reference.scaled(plan.position)) / step;
+            (cell, lambda, displaced) =
+                (found as usize, self.cells[found as usize].barycentric * to_q, distance);
         }
         self.moves.push((point, cell as u32));
         let lambda = clamped(lambda);
-        self.field_error(point, cell, lambda, data, reference)
-            .max(displaced / reference.displacement_per_error)
+        self.field_error(point, cell, lambda, data, reference).max(reference.error_of(displaced))
     }
 
-    /// The cell with the boundary triangle nearest to a point outside, the coordinates of the nearest point, and the
-    /// distance in model units.
-    fn nearest_on_border(
+    /// The nearest of some boundary triangles after the collapse: its cell, the nearest point, and the distance.
+    fn nearest(
         &self,
-        point: u32,
+        p: DVec3,
+        triangles: &[(u32, [u32; 3])],
         plan: &Plan,
         data: &VertexData,
         reference: &Reference<'_>,
-    ) -> Option<(usize, DVec3, f64)> {
-        let p = reference.scaled(reference.quantized.positions[point as usize]);
-        let centre = reference.scaled(plan.position);
-        let at = |v: u32| if v == CENTRE { centre } else { reference.scaled(data.positions[v as usize]) };
-        let (mut best, mut found, mut nearest) = (f64::INFINITY, None, centre);
-        for &(cell, triangle) in &self.border {
-            let q = nearest_on_triangle(p, triangle.map(at));
-            if p.distance_squared(q) < best {
-                (best, found, nearest) = (p.distance_squared(q), Some(cell as usize), q);
+    ) -> (u32, DVec3, f64) {
+        let at =
+            |v: u32| reference.scaled(if v == NONE { plan.position } else { data.positions[v as usize] });
+        let (mut least, mut found, mut nearest) = (f64::INFINITY, 0, p);
+        for &(cell, corners) in triangles {
+            let q = nearest_on_triangle(p, corners.map(at));
+            let distance = p.distance_squared(q);
+            if distance < least {
+                (least, found, nearest) = (distance, cell, q);
             }
         }
-        let found = found?;
-        let step = DVec3::from_array(reference.quantized.lattice.step);
-        Some((found, self.cells[found].barycentric * ((nearest - centre) / step), best.sqrt()))
+        (found, nearest, least.sqrt())
     }
 
     fn field_error(
@@ -349,8 +416,13 @@ impl Cell {
 }
 
 impl Reference<'_> {
+    /// What a displacement counts as.
+    fn error_of(&self, distance: f64) -> f64 {
+        if distance > 0.0 { distance / self.displacement_per_error } else { 0.0 }
+    }
+
     /// A lattice point in model units, from the lattice's origin.
-    fn scaled(&self, q: [i32; 3]) -> DVec3 {
+    pub fn scaled(&self, q: [i32; 3]) -> DVec3 {
         as_vec(q) * DVec3::from_array(self.quantized.lattice.step)
     }
 }

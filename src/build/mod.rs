@@ -24,6 +24,7 @@ mod cost;
 mod history;
 mod plan;
 mod quantize;
+mod skin;
 mod work_mesh;
 
 pub use collapse::edge_mt;

@@ -6,7 +6,7 @@ use crate::geom::tet_meets_box;
 use crate::mt::ErrorCode;
 use crate::mt::MtInfo;
 
-/// Says where a mesh is wanted at what error. It must be monotone; see [`crate::refine`].
+/// Says where a mesh is wanted at what error. See [`crate::refine`] for what monotone means.
 pub trait Criterion {
     /// The largest error that is good enough in the selected part.
     fn tolerance(&self) -> ErrorCode;
@@ -18,6 +18,11 @@ pub trait Criterion {
     /// Whether everything is selected, so that [`Criterion::selects`] need not be asked.
     fn is_uniform(&self) -> bool {
         false
+    }
+
+    /// Whether the criterion is monotone. One that is not is answered from the base mesh each time.
+    fn is_monotone(&self) -> bool {
+        true
     }
 
     /// The field whose levels [`Criterion::selects`] wants to see.
@@ -92,6 +97,12 @@ impl Criterion for LodCriterion {
 
     fn is_uniform(&self) -> bool {
         self.roi.is_none() && self.isolevels.is_empty()
+    }
+
+    /// One of the tetrahedra from which another was made meets the box and one passes an isovalue, but it need not
+    /// be the same one.
+    fn is_monotone(&self) -> bool {
+        self.roi.is_none() || self.isolevels.is_empty()
     }
 
     fn field(&self) -> usize {

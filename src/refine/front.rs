@@ -87,16 +87,40 @@ impl Front {
         self.known = mt.updates();
         self.applied.resize(self.known.div_ceil(64) as usize, 0);
         let mut outcome = Outcome::default();
-        let moved = match budget {
-            Some(budget) => Budgeted::new(self, mt, criterion, &mut outcome).run(budget as usize),
-            None if criterion.is_uniform() => self.satisfy_uniform(mt, criterion.tolerance(), &mut outcome),
-            None => self.satisfy_selective(mt, criterion, &mut outcome),
-        };
+        let moved = self.move_to(mt, criterion, budget, &mut outcome);
         self.mesh.compact();
         moved?;
         outcome.error = self.largest_error(mt, criterion);
         outcome.satisfied = outcome.error <= criterion.tolerance();
         Ok(outcome)
+    }
+
+    fn move_to(
+        &mut self,
+        mt: &impl MultiTessellation,
+        criterion: &impl Criterion,
+        budget: Option<u32>,
+        outcome: &mut Outcome,
+    ) -> Result<(), UpdateError> {
+        if !criterion.is_monotone() {
+            self.coarsen_all(mt, outcome)?;
+        }
+        match budget {
+            Some(budget) => Budgeted::new(self, mt, criterion, outcome).run(budget as usize),
+            None if criterion.is_uniform() => self.satisfy_uniform(mt, criterion.tolerance(), outcome),
+            None => self.satisfy_selective(mt, criterion, outcome),
+        }
+    }
+
+    /// Back to the base mesh: children have larger numbers than their parents.
+    fn coarsen_all(&mut self, mt: &impl MultiTessellation, outcome: &mut Outcome) -> Result<(), UpdateError> {
+        for u in (0..self.known).rev().map(UpdateId) {
+            if self.contains(u) {
+                self.coarsen(mt, u, outcome)?;
+                self.mesh.clear_touched();
+            }
+        }
+        Ok(())
     }
 
     /// Errors are monotone, so the wanted set is known outright and its order is that of the numbers.

@@ -8,6 +8,9 @@
 //! update which created it removed. (Errors grow towards the base, the selected part is widened by the error, and
 //! the builder adds to the error of an update by how much its new values overshoot the range of those it replaces.)
 //!
+//! A box and isovalues together are not monotone: updates whose tetrahedra violate may depend on none that does, and
+//! would keep themselves once they are applied. Such a request is answered from the base mesh each time.
+//!
 //! With a budget, updates come in the order of falling error, ties by their number; both run against the partial
 //! order, never with it. The result is the mesh of the smallest error threshold that fits the budget: again it
 //! depends on the request alone.
