@@ -179,7 +179,9 @@ export class Viewer extends EventTarget {
     stopped.throwIfAborted();
     this.#info = undefined;
     const { promise: ready, resolve, reject } = deferred();
-    const finished = this.#read(opened, stopped, resolve);
+    const finished = this.#read(opened, stopped, resolve).catch((error) => {
+      throw naming(opened.name, error);
+    });
     finished.catch(reject);
     const info = await ready;
     // A failure after this point rejects `finished`, which nobody may be waiting for.
@@ -275,12 +277,18 @@ export class Viewer extends EventTarget {
   free() {
     this.#stream?.abort(new DOMException("the viewer was freed", "AbortError"));
     this.#observer?.disconnect();
-    this.#remote.close(new TetralodError("closed", "the viewer was freed"));
+    this.#remote.close(new TetralodError("freed", "the viewer was freed"));
   }
 
   [Symbol.dispose ?? Symbol.for("Symbol.dispose")]() {
     this.free();
   }
+}
+
+/** An error of the file's contents says which file. */
+function naming(name, error) {
+  const named = !(error instanceof TetralodError) || error.code === "freed" || error.message.startsWith(`${name}:`);
+  return named ? error : new TetralodError(error.code, `${name}: ${error.message}`, { cause: error });
 }
 
 function pixels({ width, height }) {

@@ -96,7 +96,21 @@ fn doc() -> Result<()> {
 }
 
 fn native() -> Result<()> {
-    shell::run(&mut shell::cargo(["test", "--workspace"]))
+    shell::run(&mut shell::cargo(["test", "--workspace"]))?;
+    // The renderer against its twin on the CPU. Its output is shown: where there is no Vulkan adapter, not even Mesa's
+    // lavapipe in software (package `mesa-vulkan-drivers`), the tests say that they were skipped.
+    let args = [
+        "test",
+        "--package",
+        "tetralod",
+        "--features",
+        "vulkan",
+        "--test",
+        "shaders",
+        "--test",
+        "gpu_matches_cpu",
+    ];
+    shell::run(shell::cargo(args).args(["--", "--nocapture"]))
 }
 
 fn npm_package() -> Result<()> {
