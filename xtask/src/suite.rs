@@ -140,6 +140,7 @@ fn fixture_env(command: &mut Command) -> &mut Command {
 
 fn js() -> Result<()> {
     with_package()?;
+    shell::run(&mut node_test("latest.test.js"))?;
     with_fixture(|| shell::run(fixture_env(&mut node_test("package.test.js"))))
 }
 
