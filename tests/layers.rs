@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Each module with what it may import besides itself.
-const LAYERS: [(&str, &[&str]); 13] = [
+const LAYERS: [(&str, &[&str]); 15] = [
     ("geom", &[]),
     ("mesh", &["geom"]),
     ("mt", &["geom", "mesh"]),
@@ -17,7 +17,9 @@ const LAYERS: [(&str, &[&str]); 13] = [
     ("build", &["geom", "mesh", "mt"]),
     ("format", &["geom", "mesh", "mt"]),
     ("refine", &["geom", "mesh", "mt"]),
-    ("measure", &["geom", "mesh", "mt", "refine"]),
+    ("measure", &["geom", "mesh", "mt"]),
+    ("verify", &["geom", "mesh", "mt", "refine"]),
+    ("bench", &["mt", "format", "refine", "session"]),
     ("view", &["geom", "mesh"]),
     ("session", &["geom", "mesh", "mt", "format", "refine", "view"]),
     ("gpu", &["geom", "mesh", "view"]),
