@@ -177,7 +177,7 @@ function refine() {
   if ($("focus").checked) options.isovalues = [isovalue()];
   viewer.refine(options).catch((error) => {
     if (error.code === "bad-option") fail(error);
-    else if (error.code !== "closed" && error.code !== "not-ready") fail(error);
+    else if (error.code !== "freed" && error.code !== "not-ready") fail(error);
   });
 }
 
