@@ -138,11 +138,11 @@ export type ErrorCode =
   | "wasm"
   /** The browser has no WebGPU, or it gives no adapter (viewer only). */
   | "no-webgpu"
-  /** The mesh does not fit into the GPU's buffers (viewer only). */
-  | "too-large"
-  /** The GPU is gone, and with it the viewer: create another one on a new canvas (viewer only). */
+  /** The GPU was reset or removed; make a new viewer (viewer only). */
   | "device-lost"
-  /** The GPU refused an operation (viewer only). */
+  /** The mesh is larger than this GPU can hold (viewer only). */
+  | "too-large"
+  /** The GPU refused a command; a mistake in this package, please report it (viewer only). */
   | "gpu"
   /** A mistake in this package: please report it. */
   | "internal";

@@ -134,22 +134,22 @@ export class Viewer extends EventTarget {
     return { info, name: opened.name, total: opened.total, finished };
   }
 
-  async #read({ chunks, total }, signal, ready) {
-    await pump(
-      chunks,
-      async (chunk) => {
-        const { progress, info } = await this.#remote.call("feed", [chunk], [chunk.buffer]);
-        signal.throwIfAborted();
-        if (info) {
-          this.#info = info;
-          ready(info);
-        }
-        this.#emit("progress", { ...progress, total });
-      },
-      signal,
-    );
-    const progress = await this.#remote.call("finish");
-    this.#emit("progress", { ...progress, total: total ?? progress.bytes });
+  async #read(opened, signal, ready) {
+    const { total } = opened;
+    const feed = async (chunk) => {
+      const { progress, info } = await this.#remote.call("feed", [chunk], [chunk.buffer]);
+      signal.throwIfAborted();
+      if (info) {
+        this.#info = info;
+        ready(info);
+      }
+      this.#emit("progress", { ...progress, total });
+    };
+    const finish = async () => {
+      const progress = await this.#remote.call("finish");
+      this.#emit("progress", { ...progress, total: total ?? progress.bytes });
+    };
+    await pump(opened, { feed, finish }, signal);
   }
 
   /** Asks for another mesh; while the file streams in, the mesh follows this request. */

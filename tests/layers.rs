@@ -19,11 +19,11 @@ const LAYERS: [(&str, &[&str]); 15] = [
     ("refine", &["geom", "mesh", "mt"]),
     ("measure", &["geom", "mesh", "mt"]),
     ("verify", &["geom", "mesh", "mt", "refine"]),
-    ("bench", &["mt", "format", "refine", "session"]),
     ("view", &["geom", "mesh"]),
     ("session", &["geom", "mesh", "mt", "format", "refine", "view"]),
+    ("bench", &["format", "mt", "refine", "session"]),
     ("gpu", &["geom", "mesh", "view"]),
-    ("web", &["geom", "mesh", "mt", "format", "refine", "view", "session", "gpu", "io", "build"]),
+    ("web", &["geom", "mesh", "mt", "format", "refine", "view", "session", "bench", "gpu", "io", "build"]),
 ];
 
 /// Libraries of the edges, and the modules that they may appear in.

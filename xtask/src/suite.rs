@@ -155,7 +155,7 @@ fn with_package() -> Result<()> {
 fn node_test(file: &str) -> Command {
     shell::command(
         "node",
-        ["--test", "--test-reporter=spec", "--test-timeout=120000", &format!("tests/js/{file}")],
+        ["--test", "--test-reporter=spec", "--test-timeout=300000", &format!("tests/js/{file}")],
     )
 }
 
