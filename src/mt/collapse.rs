@@ -19,6 +19,7 @@ use super::MtInfo;
 use super::UpdateError;
 use super::UpdateId;
 use super::VertexId;
+use crate::geom::NARROW_BITS;
 use crate::mesh::NONE;
 
 /// Largest number of tetrahedra around a vertex that an update splits.
@@ -57,7 +58,7 @@ pub struct EdgeMt {
     split_of: Vec<u32>,
     /// The vertex that each update splits.
     vertex_of: Vec<u32>,
-    offsets: Vec<[i32; 3]>,
+    offsets: Offsets,
     /// One block of `fields` per update.
     field_offsets: Vec<i32>,
     masks: Vec<u64>,
@@ -68,12 +69,13 @@ impl EdgeMt {
     /// An MT without updates. `base` must fit `info`: see [`BaseMesh::check`](super::BaseMesh::check).
     pub fn new(info: MtInfo, base: BaseMesh) -> Self {
         let split_of = vec![NONE; base.positions.len()];
+        let offsets = Offsets::new(info.lattice.bits);
         Self {
             info,
             base,
             split_of,
             vertex_of: Vec::new(),
-            offsets: Vec::new(),
+            offsets,
             field_offsets: Vec::new(),
             masks: Vec::new(),
             errors: Vec::new(),
@@ -133,7 +135,7 @@ impl EdgeMt {
             + size_of_val(&self.base.values[..])
             + size_of_val(&self.base.tets[..]);
         let order = size_of_val(&self.split_of[..]) + size_of_val(&self.vertex_of[..]);
-        let nodes = size_of_val(&self.offsets[..])
+        let nodes = self.offsets.bytes()
             + size_of_val(&self.field_offsets[..])
             + size_of_val(&self.masks[..])
             + size_of_val(&self.errors[..]);
@@ -155,7 +157,7 @@ impl EdgeMt {
         let (k, fields) = (u.0 as usize, self.info.fields.len());
         VertexSplit {
             vertex: VertexId(self.vertex_of[k]),
-            offset: self.offsets[k],
+            offset: self.offsets.get(k),
             field_offsets: &self.field_offsets[k * fields..][..fields],
             mask: self.masks[k],
             error: self.errors[k],
@@ -179,5 +181,69 @@ impl EdgeMt {
     #[inline]
     pub fn split_by(&self, v: VertexId) -> Option<UpdateId> {
         self.split_of.get(v.0 as usize).filter(|&&s| s != NONE).map(|&s| UpdateId(s))
+    }
+}
+
+/// The offsets of all updates. On lattices of up to [`NARROW_BITS`] bits, three components of 21 bits share a word.
+#[derive(Clone, Debug, PartialEq)]
+enum Offsets {
+    Narrow(Vec<u64>),
+    Wide(Vec<[i32; 3]>),
+}
+
+/// Bits of a component in a shared word: `NARROW_BITS` and the sign.
+const COMPONENT_BITS: u32 = NARROW_BITS + 1;
+
+impl Offsets {
+    fn new(lattice_bits: u32) -> Self {
+        if lattice_bits < NARROW_BITS { Self::Narrow(Vec::new()) } else { Self::Wide(Vec::new()) }
+    }
+
+    fn push(&mut self, offset: [i32; 3]) {
+        match self {
+            Self::Narrow(words) => {
+                let mask = (1_u64 << COMPONENT_BITS) - 1;
+                let [x, y, z] = offset.map(|d| d as u64 & mask);
+                words.push(x | y << COMPONENT_BITS | z << (2 * COMPONENT_BITS));
+            }
+            Self::Wide(offsets) => offsets.push(offset),
+        }
+    }
+
+    #[inline]
+    fn get(&self, k: usize) -> [i32; 3] {
+        match self {
+            // Shifted up to the top of the word and down again, each component brings its sign along.
+            Self::Narrow(words) => [2, 1, 0].map(|above| {
+                let top = words[k] << (64 - 3 * COMPONENT_BITS + above * COMPONENT_BITS);
+                (top as i64 >> (64 - COMPONENT_BITS)) as i32
+            }),
+            Self::Wide(offsets) => offsets[k],
+        }
+    }
+
+    fn bytes(&self) -> usize {
+        match self {
+            Self::Narrow(words) => size_of_val(words.as_slice()),
+            Self::Wide(offsets) => size_of_val(offsets.as_slice()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn offsets_come_back_from_either_form() {
+        for bits in [1, 8, NARROW_BITS - 1, NARROW_BITS, 30] {
+            let largest = 1_i32 << bits;
+            let values = [-largest, 1 - largest, -1, 0, 1, largest - 1, largest];
+            let mut offsets = Offsets::new(bits);
+            let all: Vec<[i32; 3]> =
+                (0..343).map(|i| [values[i % 7], values[i / 7 % 7], values[i / 49]]).collect();
+            all.iter().for_each(|&offset| offsets.push(offset));
+            all.iter().enumerate().for_each(|(k, &offset)| assert_eq!(offsets.get(k), offset));
+        }
     }
 }

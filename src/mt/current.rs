@@ -10,8 +10,10 @@
 
 use super::BaseMesh;
 use super::BaseMeshError;
+use super::MAX_STAR;
 use super::MtInfo;
 use super::VertexId;
+use super::ring::LINK_CAPACITY;
 use super::ring::Ring;
 use crate::mesh::FACES;
 use crate::mesh::NONE;
@@ -370,55 +372,65 @@ impl CurrentMesh {
         Ok(())
     }
 
-    /// Collects the tetrahedra around the vertex in `slot` with their link, and marks them. False if they are too
-    /// many to be split.
+    /// Collects the tetrahedra around the vertex in `slot` with their link, and marks them. Stops at a link vertex
+    /// that an update before `update` splits.
     #[inline]
-    pub(super) fn gather_ring(&mut self, slot: u32, ring: &mut Ring) -> bool {
+    pub(super) fn gather_ring(&mut self, slot: u32, update: u32, ring: &mut Ring) -> Result<(), Gather<u32>> {
         self.next_epoch();
         let mark = self.epoch << MARK_BITS;
         let first = self.incident[slot as usize];
         ring.tets[0] = first;
         self.marks[first as usize] = mark;
         let (mut len, mut queued, mut link_len) = (0, 1, 0);
+        let mut first_split = NONE;
         // Which of its neighbours and vertices are new is a coin toss for the processor: the entries after the last
         // one are written anyway, and counted if they were new.
+        // Lengths stay below the capacities (a star of n tetrahedra that hang together has a link of at most n + 2
+        // vertices), so the remainders change nothing; they spare the compiler its checks.
         while len < queued {
-            let t = ring.tets[len] as usize;
+            let t = ring.tets[len % MAX_STAR] as usize;
             let (tet, around) = (self.tets[t], self.neighbors[t]);
             let corner = (usize::from(tet[1] == slot))
                 | (usize::from(tet[2] == slot) << 1)
                 | (usize::from(tet[3] == slot) * 3);
-            ring.verts[len] = tet;
-            ring.corner[len] = corner as u8;
-            for k in FACES[corner & 3] {
-                let old = &mut self.vertex_marks[tet[k] as usize];
+            let mut local = [0; 4];
+            let face = FACES[corner & 3].map(|k| k & 3);
+            for &k in &face {
+                let v = tet[k];
+                let Some(old) = self.vertex_marks.get_mut(v as usize) else { break };
                 let is_new = *old & !MARK_MASK != mark;
-                *old = if is_new { mark | link_len as u32 } else { *old };
-                ring.local[len][k] = (*old & MARK_MASK) as u8;
-                ring.link[link_len] = tet[k];
+                let own = if is_new { mark | link_len as u32 } else { *old };
+                *old = own;
+                local[k] = (own & MARK_MASK) as u8;
+                ring.link[link_len % LINK_CAPACITY] = v;
                 link_len += usize::from(is_new);
+                first_split = first_split.min(self.labels[v as usize].split);
             }
-            for k in FACES[corner & 3] {
+            if first_split < update {
+                return Err(Gather::Stopped(first_split));
+            }
+            for &k in &face {
                 let n = around[k];
-                if n == NONE {
-                    continue;
-                }
-                let old = &mut self.marks[n as usize];
+                // Also NONE is beyond the array.
+                let Some(old) = self.marks.get_mut(n as usize) else { continue };
                 let is_new = *old & !MARK_MASK != mark;
-                *old = if is_new { mark | queued as u32 } else { *old };
-                let Some(place) = ring.tets.get_mut(queued) else {
+                if queued == MAX_STAR {
                     if is_new {
-                        return false;
+                        return Err(Gather::TooLarge);
                     }
                     continue;
-                };
-                *place = n;
+                }
+                *old = if is_new { mark | queued as u32 } else { *old };
+                ring.tets[queued % MAX_STAR] = n;
                 queued += usize::from(is_new);
             }
+            ring.verts[len % MAX_STAR] = tet;
+            ring.corner[len % MAX_STAR] = corner as u8;
+            ring.local[len % MAX_STAR] = local;
             len += 1;
         }
         (ring.len, ring.link_len) = (len, link_len);
-        true
+        Ok(())
     }
 
     fn next_epoch(&mut self) {

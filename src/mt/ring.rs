@@ -72,12 +72,6 @@ impl Default for Ring {
 }
 
 impl Ring {
-    /// The smallest label among the link vertices: the first of their splits.
-    #[inline]
-    pub fn smallest_split(&self, mesh: &CurrentMesh) -> Option<u32> {
-        self.link[..self.link_len].iter().map(|&v| mesh.labels[v as usize].split).min()
-    }
-
     /// Parts the star by a mask in canonical order: ascending by the sorted vertex numbers of the opposite faces.
     /// False if the mask has bits beyond the star.
     #[inline]
@@ -94,7 +88,7 @@ impl Ring {
         let mut keys = [u16::MAX; MAX_STAR];
         for (i, key) in keys[..self.len].iter_mut().enumerate() {
             let [j, k, l] = FACES[self.corner[i] as usize & 3];
-            let [a, b, c] = [j, k, l].map(|k| u16::from(rank[self.local[i][k] as usize % MAX_LINK]));
+            let [a, b, c] = [j, k, l].map(|k| u16::from(rank[self.local[i][k & 3] as usize % MAX_LINK]));
             let (low, high) = (a.min(b), a.max(b));
             let (least, most) = (low.min(c), high.max(c));
             *key = least << 10 | low.max(c.min(high)) << 5 | most;
@@ -114,7 +108,7 @@ impl Ring {
         self.fan_len = 0;
         for i in (0..self.len).filter(|i| self.sides >> i & 1 == 0) {
             let around = mesh.neighbors[self.tets[i] as usize];
-            for j in FACES[self.corner[i] as usize & 3] {
+            for &j in &FACES[self.corner[i] as usize & 3] {
                 let Some(n) = mesh.in_star(around[j]).filter(|n| self.sides >> n & 1 == 1) else { continue };
                 let triangle =
                     FanTriangle { near: i as u8, face: j as u8, far: n as u8, partner: [NO_PARTNER; 2] };
@@ -201,7 +195,8 @@ impl Ring {
         }
         // The centre followed by the opposite face, outward, is a positive order.
         let corners = |i: usize, side: usize| {
-            FACES[self.corner[i] as usize].map(|k| relative[side][self.local[i][k] as usize])
+            FACES[self.corner[i] as usize & 3]
+                .map(|k| relative[side & 1][self.local[i][k & 3] as usize % MAX_LINK])
         };
         let zero = T::from(0);
         let star = (0..self.len).all(|i| determinant(corners(i, (self.sides >> i & 1) as usize)) > zero);

@@ -71,11 +71,10 @@ impl EdgeMt {
         ring: &mut Ring,
     ) -> Result<Applied, UpdateError> {
         let update = u.0;
-        if !mesh.gather_ring(p, ring) {
-            return Err(UpdateError::Star { update });
-        }
-        if let Some(first) = ring.smallest_split(mesh).filter(|&first| first < update) {
-            return Ok(Applied::Blocked(UpdateId(first)));
+        match mesh.gather_ring(p, update, ring) {
+            Ok(()) => {}
+            Err(Gather::TooLarge) => return Err(UpdateError::Star { update }),
+            Err(Gather::Stopped(first)) => return Ok(Applied::Blocked(UpdateId(first))),
         }
         if ring.link_len > MAX_LINK || mesh.is_pinched(p) {
             return Err(UpdateError::Star { update });
