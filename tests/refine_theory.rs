@@ -165,7 +165,7 @@ fn config(cases: u32) -> ProptestConfig {
 }
 
 proptest! {
-    #![proptest_config(config(40))]
+    #![proptest_config(config(300))]
 
     /// One front is asked for one thing after the other: each answer is the closure, and what the oracle extracts.
     #[test]
@@ -224,7 +224,7 @@ proptest! {
 }
 
 proptest! {
-    #![proptest_config(config(16))]
+    #![proptest_config(config(60))]
 
     /// While updates arrive, what is there is a valid MT: the closure in it, true bounds, and no claim to be done
     /// where data is missing.
