@@ -138,6 +138,12 @@ export type ErrorCode =
   | "wasm"
   /** The browser has no WebGPU, or it gives no adapter (viewer only). */
   | "no-webgpu"
+  /** The GPU was reset or removed; make a new viewer (viewer only). */
+  | "device-lost"
+  /** The mesh is larger than this GPU can hold (viewer only). */
+  | "too-large"
+  /** The GPU refused a command; a mistake in this package, please report it (viewer only). */
+  | "gpu"
   /** A mistake in this package: please report it. */
   | "internal";
 

@@ -107,23 +107,13 @@ export class MultiTessellation {
   }
 
   async #stream(source, signal, starting, onProgress) {
-    const { name, total, chunks } = await openSource(source, signal);
+    const opened = await openSource(source, signal);
     await starting;
-    try {
-      const feed = async (chunk) => onProgress(await this.#core.call("feed", [chunk], [chunk.buffer]), total);
-      await pump(chunks, feed, signal);
-      await onProgress(await this.#core.call("finish"), total);
-    } catch (error) {
-      throw naming(name, error);
-    }
+    const report = (progress) => onProgress(progress, opened.total);
+    const feed = async (chunk) => report(await this.#core.call("feed", [chunk], [chunk.buffer]));
+    const finish = async () => report(await this.#core.call("finish"));
+    await pump(opened, { feed, finish }, signal);
   }
-}
-
-/** Errors of the decoder do not know what was decoded. */
-function naming(name, error) {
-  const named = error.message?.startsWith(`${name}:`);
-  if (!(error instanceof TetralodError) || error.code === "freed" || named) return error;
-  return new TetralodError(error.code, `${name}: ${error.message}`, { cause: error });
 }
 
 /** Options as they can be sent to a worker: typed arrays become lists, everything else goes as it is. */

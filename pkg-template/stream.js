@@ -37,23 +37,35 @@ export async function openSource(source, signal) {
 }
 
 /**
- * Feeds every chunk of `chunks` to `feed` and waits for each before it reads on.
+ * Feeds every chunk to `feed`, waits for each before it reads on, and calls `finish` at the end. Errors of the decoder,
+ * which does not know what it decodes, come out with the name of the source.
  *
- * @param {AsyncIterator<Uint8Array>} chunks
- * @param {(chunk: Uint8Array) => unknown} feed
+ * @param {OpenSource} source
+ * @param {{ feed: (chunk: Uint8Array) => unknown, finish: () => unknown }} sink
  * @param {AbortSignal} [signal] ends a wait at once; the promise then rejects with the signal's reason
  */
-export async function pump(chunks, feed, signal) {
+export async function pump({ name, chunks }, { feed, finish }, signal) {
   try {
     for (;;) {
       const { done, value } = await abortable(chunks.next(), signal);
-      if (done) return;
+      if (done) break;
       await abortable(feed(value), signal);
     }
+    await abortable(finish(), signal);
+  } catch (error) {
+    throw naming(name, error);
   } finally {
     // Not awaited: a source that hangs must not hold up the error. After the end this does nothing.
     Promise.resolve(chunks.return?.()).catch(() => {});
   }
+}
+
+/** What the decoder says of a file. */
+const DECODING = ["not-mt", "unsupported-version", "corrupt", "truncated", "limit"];
+
+function naming(name, error) {
+  if (!(error instanceof TetralodError) || !DECODING.includes(error.code)) return error;
+  return new TetralodError(error.code, `${name}: ${error.message}`, { cause: error });
 }
 
 /** `promise`, or the signal's reason as soon as it fires. */

@@ -5,7 +5,7 @@
  */
 
 import init, { Viewer } from "./tetralod_viewer.js";
-import { flattenError } from "./errors.js";
+import { TetralodError, flattenError } from "./errors.js";
 import { serve, webEndpoint } from "./rpc.js";
 
 /** While a file streams in, the mesh follows it this often (in ms), and at most half of the time is spent on that. */
@@ -27,7 +27,9 @@ const nextFrame =
 
 const emit = serve(webEndpoint(globalThis), {
   async create(canvas, width, height, ratio) {
-    await init();
+    await init().catch((error) => {
+      throw new TetralodError("wasm", `the wasm module did not load: ${error?.message ?? error}`);
+    });
     viewer = await Viewer.create(canvas, width, height, ratio);
     invalidate();
     return { adapter: viewer.adapter(), palette: viewer.palette() };

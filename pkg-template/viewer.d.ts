@@ -1,4 +1,4 @@
-import type { CoreStats, MtInfo, RefineOptions, Source } from "./index.js";
+import type { MtInfo, RefineOptions, RefineStats, Source } from "./index.js";
 
 export { TetralodError } from "./index.js";
 
@@ -17,9 +17,7 @@ export interface ViewerProgress {
 }
 
 /** The outcome of a refinement. */
-export interface ViewerStats extends CoreStats {
-  /** How long the refinement took. */
-  milliseconds: number;
+export interface ViewerStats extends RefineStats {
   /** Bytes of the file that had been decoded. */
   bytes: number;
 }
@@ -115,7 +113,7 @@ export class Viewer extends EventTarget {
 
   /** A hash of the current mesh, the same wherever the same request was made. */
   hash(): Promise<string>;
-  /** Ends the worker. */
+  /** Ends the worker; the canvas keeps its last picture. Calls under way and later ones reject with code `freed`. */
   free(): void;
   [Symbol.dispose](): void;
 

@@ -6,6 +6,7 @@
  */
 
 import { TetralodError, reviveError } from "./errors.js";
+import { Latest, deferred, mergeUpdates } from "./latest.js";
 import { Remote, webEndpoint } from "./rpc.js";
 import { openSource, pump } from "./stream.js";
 
@@ -15,64 +16,6 @@ const NO_WEBGPU =
   "this browser has no WebGPU; use a current Chrome, Edge, Firefox or Safari over https (or on localhost)";
 const NO_ADAPTER =
   "the browser gives no GPU adapter; allow hardware acceleration in its settings, or update the graphics driver";
-
-/** Calls of which one is under way and one waits; what comes later is merged into the waiting one. */
-class Latest {
-  #run;
-  #merge;
-  #busy = false;
-  #waiting = null;
-
-  constructor(run, merge = (_, next) => next) {
-    this.#run = run;
-    this.#merge = merge;
-  }
-
-  call(value) {
-    if (this.#waiting) {
-      this.#waiting.value = this.#merge(this.#waiting.value, value);
-    } else {
-      this.#waiting = { value, ...deferred() };
-    }
-    const { promise } = this.#waiting;
-    this.#next();
-    return promise;
-  }
-
-  #next() {
-    if (this.#busy || !this.#waiting) return;
-    const { value, resolve, reject } = this.#waiting;
-    this.#waiting = null;
-    this.#busy = true;
-    this.#run(value)
-      .then(resolve, reject)
-      .finally(() => {
-        this.#busy = false;
-        this.#next();
-      });
-  }
-}
-
-function deferred() {
-  let resolve, reject;
-  const promise = new Promise((yes, no) => ([resolve, reject] = [yes, no]));
-  return { promise, resolve, reject };
-}
-
-/** Two sets of changes as one: movements add up, of everything else the later one counts. */
-function mergeUpdates(a, b) {
-  const merged = { ...a, ...b };
-  // Going home forgets the movements before it.
-  if (b.home) {
-    for (const name of ["orbit", "pan", "zoom"]) if (b[name] === undefined) delete merged[name];
-    return merged;
-  }
-  for (const name of ["orbit", "pan"]) {
-    if (a[name] && b[name]) merged[name] = [a[name][0] + b[name][0], a[name][1] + b[name][1]];
-  }
-  if (a.zoom !== undefined && b.zoom !== undefined) merged.zoom = a.zoom * b.zoom;
-  return merged;
-}
 
 export class Viewer extends EventTarget {
   #remote;
@@ -179,7 +122,9 @@ export class Viewer extends EventTarget {
     stopped.throwIfAborted();
     this.#info = undefined;
     const { promise: ready, resolve, reject } = deferred();
-    const finished = this.#read(opened, stopped, resolve);
+    const finished = this.#read(opened, stopped, resolve).catch((error) => {
+      throw naming(opened.name, error);
+    });
     finished.catch(reject);
     const info = await ready;
     // A failure after this point rejects `finished`, which nobody may be waiting for.
@@ -189,22 +134,22 @@ export class Viewer extends EventTarget {
     return { info, name: opened.name, total: opened.total, finished };
   }
 
-  async #read({ chunks, total }, signal, ready) {
-    await pump(
-      chunks,
-      async (chunk) => {
-        const { progress, info } = await this.#remote.call("feed", [chunk], [chunk.buffer]);
-        signal.throwIfAborted();
-        if (info) {
-          this.#info = info;
-          ready(info);
-        }
-        this.#emit("progress", { ...progress, total });
-      },
-      signal,
-    );
-    const progress = await this.#remote.call("finish");
-    this.#emit("progress", { ...progress, total: total ?? progress.bytes });
+  async #read(opened, signal, ready) {
+    const { total } = opened;
+    const feed = async (chunk) => {
+      const { progress, info } = await this.#remote.call("feed", [chunk], [chunk.buffer]);
+      signal.throwIfAborted();
+      if (info) {
+        this.#info = info;
+        ready(info);
+      }
+      this.#emit("progress", { ...progress, total });
+    };
+    const finish = async () => {
+      const progress = await this.#remote.call("finish");
+      this.#emit("progress", { ...progress, total: total ?? progress.bytes });
+    };
+    await pump(opened, { feed, finish }, signal);
   }
 
   /** Asks for another mesh; while the file streams in, the mesh follows this request. */
@@ -275,12 +220,18 @@ export class Viewer extends EventTarget {
   free() {
     this.#stream?.abort(new DOMException("the viewer was freed", "AbortError"));
     this.#observer?.disconnect();
-    this.#remote.close(new TetralodError("closed", "the viewer was freed"));
+    this.#remote.close(new TetralodError("freed", "the viewer was freed"));
   }
 
   [Symbol.dispose ?? Symbol.for("Symbol.dispose")]() {
     this.free();
   }
+}
+
+/** An error of the file's contents says which file. */
+function naming(name, error) {
+  const named = !(error instanceof TetralodError) || error.code === "freed" || error.message.startsWith(`${name}:`);
+  return named ? error : new TetralodError(error.code, `${name}: ${error.message}`, { cause: error });
 }
 
 function pixels({ width, height }) {

@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Each module with what it may import besides itself.
-const LAYERS: [(&str, &[&str]); 13] = [
+const LAYERS: [(&str, &[&str]); 15] = [
     ("geom", &[]),
     ("mesh", &["geom"]),
     ("mt", &["geom", "mesh"]),
@@ -17,11 +17,13 @@ const LAYERS: [(&str, &[&str]); 13] = [
     ("build", &["geom", "mesh", "mt"]),
     ("format", &["geom", "mesh", "mt"]),
     ("refine", &["geom", "mesh", "mt"]),
-    ("measure", &["geom", "mesh", "mt", "refine"]),
+    ("measure", &["geom", "mesh", "mt"]),
+    ("verify", &["geom", "mesh", "mt", "refine"]),
     ("view", &["geom", "mesh"]),
     ("session", &["geom", "mesh", "mt", "format", "refine", "view"]),
+    ("bench", &["format", "mt", "refine", "session"]),
     ("gpu", &["geom", "mesh", "view"]),
-    ("web", &["geom", "mesh", "mt", "format", "refine", "view", "session", "gpu", "io", "build"]),
+    ("web", &["geom", "mesh", "mt", "format", "refine", "view", "session", "bench", "gpu", "io", "build"]),
 ];
 
 /// Libraries of the edges, and the modules that they may appear in.

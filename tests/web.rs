@@ -136,3 +136,31 @@ async fn call(object: &JsValue, method: &str) -> JsValue {
     let promise: Promise = method.call0(object).expect("a method without arguments").unchecked_into();
     JsFuture::from(promise).await.expect("a promise that resolves")
 }
+
+#[cfg(feature = "gpu")]
+#[wasm_bindgen_test]
+async fn the_renderer_draws_the_isosurface() {
+    use tetralod::geom::Bounds;
+    use tetralod::geom::Camera;
+    use tetralod::gpu::Look;
+    use tetralod::gpu::Renderer;
+    use tetralod::gpu::Show;
+    use tetralod::refine::Request;
+    use tetralod::session::Session;
+
+    const SIZE: [u32; 2] = [128, 96];
+    let mut session = Session::new();
+    session.feed(MT).expect("the fixture is a good file");
+    session.refine(&Request { error: 0.01, ..Request::default() }).expect("a good request");
+    let mut renderer = Renderer::headless(SIZE).await.expect("WebGPU");
+    let camera = Camera::home(&Bounds { min: [0.0; 3], max: [1.0; 3] }, renderer.aspect());
+    // The ball is warm, the background cool. Empty space between the atoms at 0.5; nothing at all above the maximum.
+    for (value, warm) in [(0.5, 500..4000), (99.0, 0..1)] {
+        renderer.set_surface(session.isosurface(value).expect("a surface")).expect("it fits");
+        assert!(renderer.draw(Show::Surface, &camera, &Look::default()).expect("a picture"));
+        let pixels = renderer.read().await.expect("pixels");
+        assert_eq!(pixels.len(), (SIZE[0] * SIZE[1] * 4) as usize);
+        let seen = pixels.chunks_exact(4).filter(|p| p[0] > p[2].saturating_add(20)).count();
+        assert!(warm.contains(&seen), "{seen} warm pixels at {value}");
+    }
+}

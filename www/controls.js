@@ -31,7 +31,7 @@ export function attachControls(canvas, viewer, { onHome, onBox }) {
   };
 
   const ignore = (error) => {
-    if (error?.code !== "closed") console.warn(error);
+    if (error?.code !== "freed") console.warn(error);
   };
 
   canvas.addEventListener("pointerdown", async (event) => {

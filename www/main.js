@@ -138,7 +138,9 @@ function fail(error) {
 function say(title, error) {
   $("message-title").textContent = title;
   const words = error.message ?? String(error);
-  $("message-text").textContent = `${words.charAt(0).toUpperCase()}${words.slice(1)}.`;
+  // A message that starts with a file's name keeps it as it is.
+  const start = words.includes(": ") ? words.charAt(0) : words.charAt(0).toUpperCase();
+  $("message-text").textContent = `${start}${words.slice(1)}`;
   const seen = demo.firstFrameBytes !== undefined;
   $("message").classList.toggle("beside", seen);
   $("dismiss").hidden = !seen;
@@ -176,8 +178,7 @@ function refine() {
   if ($("roi").checked) options.box = box;
   if ($("focus").checked) options.isovalues = [isovalue()];
   viewer.refine(options).catch((error) => {
-    if (error.code === "bad-option") fail(error);
-    else if (error.code !== "closed" && error.code !== "not-ready") fail(error);
+    if (error.code !== "freed" && error.code !== "not-ready") fail(error);
   });
 }
 
@@ -379,7 +380,7 @@ function short(value) {
 
 function size(bytes) {
   if (bytes < 1e3) return `${bytes} B`;
-  return bytes < 1e6 ? `${(bytes / 1e3).toFixed(0)} kB` : `${(bytes / 1e6).toFixed(2)} MB`;
+  return bytes < 999_500 ? `${(bytes / 1e3).toFixed(0)} kB` : `${(bytes / 1e6).toFixed(2)} MB`;
 }
 
 function milliseconds(ms) {

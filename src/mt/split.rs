@@ -16,6 +16,7 @@ use super::EdgeMt;
 use super::ErrorCode;
 use super::LookAtTet;
 use super::MAX_LINK;
+#[cfg(feature = "build")]
 use super::MAX_STAR;
 use super::MtInfo;
 use super::MultiTessellation;
@@ -312,9 +313,11 @@ fn half(v: i32, d: i32, largest: i64) -> Option<[i32; 2]> {
     (holds(a) && holds(b)).then_some([a as i32, b as i32])
 }
 
+#[cfg(feature = "build")]
 impl CurrentMesh {
     /// Brings the mask of a split from the order of other vertex numbers, which `other` gives, to that of the MT's.
     /// None if the vertex is not in the mesh or its star is too large.
+    #[cfg(feature = "build")]
     pub(crate) fn reorder_mask(
         &mut self,
         vertex: VertexId,

@@ -1,5 +1,6 @@
 //! What JavaScript gets: plain objects and typed arrays that own their memory.
 
+use crate::bench::BenchReport;
 use crate::mt::FieldInfo;
 use crate::mt::MtInfo;
 use crate::mt::MtKind;
@@ -98,6 +99,9 @@ export interface IsoSurface {
 
 #[wasm_bindgen]
 extern "C" {
+    /// The outcome of a benchmark as `tetralod bench --json` gives it.
+    #[wasm_bindgen(typescript_type = "object")]
+    pub type JsBench;
     /// Decoding progress as a plain object.
     #[wasm_bindgen(typescript_type = "Progress")]
     pub type JsProgress;
@@ -232,6 +236,39 @@ fn arrays<T: JsCast, const N: usize>(members: [(&str, JsValue); N]) -> T {
         let _ = Reflect::set(&object, &name.into(), &array);
     }
     object.unchecked_into()
+}
+
+#[derive(Serialize)]
+struct Rate {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    updates_per_second: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tets_per_second: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct BenchObject {
+    updates: u32,
+    tetrahedra: u32,
+    runs: u32,
+    decode: Rate,
+    refine: Rate,
+    coarsen: Rate,
+    isosurface: Rate,
+}
+
+/// `report` with the names of `tetralod bench --json`.
+pub fn bench(report: &BenchReport) -> JsBench {
+    let updates = |rate| Rate { updates_per_second: Some(rate), tets_per_second: None };
+    plain(&BenchObject {
+        updates: report.updates,
+        tetrahedra: report.tetrahedra,
+        runs: report.runs,
+        decode: updates(report.decode_updates),
+        refine: Rate { tets_per_second: Some(report.refine_tets), ..updates(report.refine_updates) },
+        coarsen: updates(report.coarsen_updates),
+        isosurface: Rate { updates_per_second: None, tets_per_second: Some(report.isosurface_tets) },
+    })
 }
 
 /// Numbers, texts and lists of them always convert; `undefined` would stand for a mistake here.

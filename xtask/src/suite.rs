@@ -96,7 +96,21 @@ fn doc() -> Result<()> {
 }
 
 fn native() -> Result<()> {
-    shell::run(&mut shell::cargo(["test", "--workspace"]))
+    shell::run(&mut shell::cargo(["test", "--workspace"]))?;
+    // The renderer against its twin on the CPU. Its output is shown: where there is no Vulkan adapter, not even Mesa's
+    // lavapipe in software (package `mesa-vulkan-drivers`), the tests say that they were skipped.
+    let args = [
+        "test",
+        "--package",
+        "tetralod",
+        "--features",
+        "vulkan",
+        "--test",
+        "shaders",
+        "--test",
+        "gpu_matches_cpu",
+    ];
+    shell::run(shell::cargo(args).args(["--", "--nocapture"]))
 }
 
 fn npm_package() -> Result<()> {
@@ -126,6 +140,7 @@ fn fixture_env(command: &mut Command) -> &mut Command {
 
 fn js() -> Result<()> {
     with_package()?;
+    shell::run(&mut node_test("latest.test.js"))?;
     with_fixture(|| shell::run(fixture_env(&mut node_test("package.test.js"))))
 }
 
@@ -140,7 +155,7 @@ fn with_package() -> Result<()> {
 fn node_test(file: &str) -> Command {
     shell::command(
         "node",
-        ["--test", "--test-reporter=spec", "--test-timeout=120000", &format!("tests/js/{file}")],
+        ["--test", "--test-reporter=spec", "--test-timeout=300000", &format!("tests/js/{file}")],
     )
 }
 

@@ -10,9 +10,9 @@ try {
     const { default: init, bench } = await import("/pkg/tetralod_core.js");
     await init();
     const response = await fetch("/data/volume.mt");
-    return bench(new Uint8Array(await response.arrayBuffer()));
+    return bench(new Uint8Array(await response.arrayBuffer()), 2);
   });
-  console.log(report);
+  console.log(JSON.stringify(report));
 } finally {
   await browser.close();
 }

@@ -1,0 +1,53 @@
+// Calls that replace each other: what the viewer sends to its worker.
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { Latest, mergeUpdates } from "../../pkg/latest.js";
+
+/** A `run` whose calls are settled by hand. */
+function byHand() {
+  const calls = [];
+  const run = (value) => new Promise((resolve, reject) => calls.push({ value, resolve, reject }));
+  return { calls, run };
+}
+
+const soon = () => new Promise((resolve) => setImmediate(resolve));
+
+test("one call is under way, one waits, and the last one wins", async () => {
+  const { calls, run } = byHand();
+  const latest = new Latest(run);
+  const answers = [1, 2, 3, 4].map((value) => latest.call(value));
+  assert.deepEqual(calls.map((call) => call.value), [1]);
+  calls[0].resolve("one");
+  assert.equal(await answers[0], "one");
+  await soon();
+  assert.deepEqual(calls.map((call) => call.value), [1, 4]);
+  calls[1].resolve("four");
+  assert.deepEqual(await Promise.all(answers.slice(1)), ["four", "four", "four"]);
+  const later = latest.call(5);
+  calls[2].resolve("five");
+  assert.equal(await later, "five");
+});
+
+test("a call that fails does not stop the ones after it", async () => {
+  const { calls, run } = byHand();
+  const latest = new Latest(run);
+  const [bad, good] = [latest.call("bad"), latest.call("good")];
+  calls[0].reject(new Error("no"));
+  await assert.rejects(bad, /no/);
+  await soon();
+  calls[1].resolve("yes");
+  assert.equal(await good, "yes");
+});
+
+test("movements that wait add up; of everything else the later one counts", () => {
+  const a = { orbit: [1, 2], zoom: 2, isovalue: 3, roi: null };
+  const b = { orbit: [10, 20], pan: [5, 6], zoom: 0.25, isovalue: 4 };
+  assert.deepEqual(mergeUpdates(a, b), { orbit: [11, 22], pan: [5, 6], zoom: 0.5, isovalue: 4, roi: null });
+  assert.deepEqual(mergeUpdates({ pan: [1, 1] }, { pan: [2, 3], size: [4, 5, 1] }), { pan: [3, 4], size: [4, 5, 1] });
+});
+
+test("going home forgets the movements before it and keeps those after it", () => {
+  const home = mergeUpdates({ orbit: [1, 1], zoom: 3, mode: "iso" }, { home: true });
+  assert.deepEqual(home, { mode: "iso", home: true });
+  assert.deepEqual(mergeUpdates(home, { orbit: [2, 0] }), { mode: "iso", home: true, orbit: [2, 0] });
+});
