@@ -129,7 +129,7 @@ fn another_input_is_found() {
     fails(&mt, &cube(5, &[linear]), "not those of the input");
     let mut moved = mesh.clone();
     moved.positions[40][1] += 0.01;
-    fails(&mt, &moved, "not those of the input");
+    fails(&mt, &moved, "full refinement: the volume");
     let mut differing = mesh.clone();
     differing.fields[0].values[40] += 0.01;
     fails(&mt, &differing, "not those of the input");

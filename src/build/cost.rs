@@ -135,12 +135,15 @@ impl Evaluator {
             .extend(plan.stay.iter().map(|&(s, _)| Cell::new(s.tet, s.corner as usize, plan, mesh, data)));
         self.collect_border(plan, mesh);
         self.flat = self.is_flat(plan, data);
-        let step = self.step_of_boundary(plan, data, reference);
         let mut error = inherited;
         if newest {
-            error += overshoot.max(reference.error_of(step));
+            error += overshoot;
         }
         error = error.max(self.find_foot(plan, data, reference));
+        if newest && error <= limit {
+            let step = reference.error_of(self.step_of_boundary(plan, data, reference));
+            error = error.max(inherited + step);
+        }
         if plan.on_boundary && !self.flat && error <= limit {
             // Where it is flat, no point of the boundary gets further away than it is.
             error = error.max(self.place_on_border(plan, data, buckets, reference));
@@ -233,11 +236,16 @@ impl Evaluator {
             return 0.0;
         }
         let triangles = &self.border[..self.at_centre];
-        let distance = |end: u32| {
-            let p = reference.scaled(data.positions[end as usize]);
-            self.nearest(p, triangles, plan, data, reference).2
-        };
-        distance(plan.a).max(distance(plan.b))
+        let at = |v: u32| reference.scaled(data.positions[v as usize]);
+        let distance = |p: DVec3| self.nearest(p, triangles, plan, data, reference).2;
+        // Between the ends and the link the new boundary may be further away than at either.
+        // The two triangles of an edge have it in opposite directions; one is enough.
+        let edges = self.old_border.iter().flat_map(|&[x, y, z]| [[x, y], [y, z], [z, x]]);
+        let ends = [plan.a, plan.b];
+        let middles = edges
+            .filter(|edge| edge[0] < edge[1] && ends.iter().any(|end| edge.contains(end)))
+            .map(|[x, y]| (at(x) + at(y)) * 0.5);
+        [at(plan.a), at(plan.b)].into_iter().chain(middles).map(distance).fold(0.0, f64::max)
     }
 
     /// Finds the part of the reference boundary that the new vertex is near to. Returns the error that the distance

@@ -379,7 +379,7 @@ impl<'a, M: MultiTessellation, C: Criterion> Budgeted<'a, M, C> {
     /// Undoes the least important updates until the budget is kept. Tells whether `last` was among them.
     fn trim(&mut self, budget: usize, last: Option<UpdateId>) -> Result<bool, UpdateError> {
         let mut reached = false;
-        while self.front.mesh.tet_count() > budget && !reached {
+        while self.front.mesh.tet_count() > budget {
             let Some(Reverse((_, Reverse(u)))) = self.coarsenable.pop() else { break };
             if !self.front.contains(u) {
                 continue;
@@ -389,7 +389,7 @@ impl<'a, M: MultiTessellation, C: Criterion> Budgeted<'a, M, C> {
                 Need::Blocked => {}
                 Need::Asked | Need::Nothing => {
                     self.undo(u)?;
-                    reached = last == Some(u);
+                    reached |= last == Some(u);
                 }
             }
         }

@@ -130,7 +130,7 @@ fn check_full_circle(
     mesh_checks::Shape::of(&deviation.reference()).map_err(|failure| format!("the input: {failure}"))
 }
 
-/// Answers all queries twice, in an order that jumps about, from the mesh that the query before left.
+/// Answers all queries again, in an order that jumps about, from the mesh that the query before left.
 fn walk(
     mt: &EdgeMt,
     mut front: Front,
@@ -141,11 +141,9 @@ fn walk(
 ) -> Result<(), String> {
     let count = queries.len();
     let stride = (count / 3..).find(|&s| s > 0 && coprime(s, count)).unwrap_or(1);
-    for step in 0..2 * count {
-        on_progress((count + step / 2) as u32, 2 * count as u32);
-        // The second round goes backwards, so that every query has other neighbours.
-        let forth = step * stride % count;
-        let i = if step < count { forth } else { count - 1 - forth };
+    for step in 0..count {
+        on_progress((count + step) as u32, 2 * count as u32);
+        let i = step * stride % count;
         satisfy(mt, &mut front, &queries[i])?;
         if front.mesh().hash() != hashes[i] {
             note(report, &queries[i], "the mesh depends on what was asked for before");
