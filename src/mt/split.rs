@@ -316,7 +316,6 @@ fn half(v: i32, d: i32, largest: i64) -> Option<[i32; 2]> {
 impl CurrentMesh {
     /// Brings the mask of a split from the order of other vertex numbers, which `other` gives, to that of the MT's.
     /// None if the vertex is not in the mesh or its star is too large.
-    #[cfg(feature = "build")]
     pub(crate) fn reorder_mask(
         &mut self,
         vertex: VertexId,

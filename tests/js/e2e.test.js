@@ -154,7 +154,7 @@ test("a browser without WebGPU gets a message, not a blank page", async () => {
 });
 
 test("a file that is not there, or is no MT, is named", async () => {
-  for (const [file, words] of [["data/none.mt", /none\.mt.*404/], ["style.css", /style\.css.*not an MT file/]]) {
+  for (const [file, words] of [["data/none.mt", /none\.mt.*404/], ["style.css", /style\.css.*not an MT file/i]]) {
     const page = await open(file);
     await reach(page, "failed");
     assert.match(await page.locator("#message").innerText(), words);
