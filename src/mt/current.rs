@@ -792,7 +792,7 @@ mod tests {
         let mut mesh = wheel(20);
         for _ in 0..3 {
             let mut ring = mesh.take_ring();
-            assert!(mesh.gather_ring(0, &mut ring));
+            assert!(mesh.gather_ring(0, 0, &mut ring).is_ok());
             assert_eq!((ring.len, ring.link_len, mesh.epoch), (20, 21, 1));
             mesh.put_back_ring(ring);
             mesh.epoch = EPOCHS - 1;
