@@ -164,7 +164,7 @@ proptest! {
         prop_assert_eq!(found.adjacency_bytes, (v * vertex + 32 * t) as u64);
         // Forest and numbering: 12 bytes an update; offset, field offsets, mask and error with them.
         let (b, base_tets) = (built.base.positions.len(), built.base.tets.len());
-        let compact = b * (vertex + 4) + 16 * base_tets + n * (12 + 12 + 4 * fields + 8 + 2);
+        let compact = b * (vertex + 4) + 16 * base_tets + n * (12 + 8 + 4 * fields + 8 + 2);
         prop_assert_eq!(found.compact_bytes, compact as u64);
         prop_assert_eq!(mt.bytes(), compact as u64);
     }
