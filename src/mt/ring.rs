@@ -5,6 +5,7 @@ use super::CurrentMesh;
 use super::MAX_LINK;
 use super::MAX_STAR;
 use crate::mesh::FACES;
+use std::iter::Sum;
 use std::ops::{Add, Mul, Sub};
 
 /// "The fan ends here."
@@ -79,21 +80,22 @@ impl Ring {
         if self.len < 64 && mask >> self.len != 0 {
             return false;
         }
-        let mut numbers = [u32::MAX; MAX_LINK];
+        let mut numbers = [i32::MAX; MAX_LINK];
         for (number, &v) in numbers.iter_mut().zip(&self.link[..self.link_len]) {
-            *number = mesh.labels[v as usize].vertex;
+            // Signed numbers compare in one instruction; the shift keeps the order.
+            *number = (mesh.labels[v as usize].vertex ^ 1 << 31) as i32;
         }
-        let rank = ranks(&numbers, self.link_len);
+        let rank: [i32; MAX_LINK] = ranks(&numbers, self.link_len);
         // Three ranks of five bits: as few as that, a whole star is ranked with a handful of vector instructions.
-        let mut keys = [u16::MAX; MAX_STAR];
+        let mut keys = [i16::MAX; MAX_STAR];
         for (i, key) in keys[..self.len].iter_mut().enumerate() {
             let [j, k, l] = FACES[self.corner[i] as usize & 3];
-            let [a, b, c] = [j, k, l].map(|k| u16::from(rank[self.local[i][k & 3] as usize % MAX_LINK]));
+            let [a, b, c] = [j, k, l].map(|k| rank[self.local[i][k & 3] as usize % MAX_LINK] as i16);
             let (low, high) = (a.min(b), a.max(b));
             let (least, most) = (low.min(c), high.max(c));
             *key = least << 10 | low.max(c.min(high)) << 5 | most;
         }
-        let place = ranks(&keys, self.len);
+        let place: [i16; MAX_STAR] = ranks(&keys, self.len);
         self.sides =
             place[..self.len].iter().enumerate().fold(0, |s, (i, &r)| s | (mask >> (r & 63) & 1) << i);
         true
@@ -217,14 +219,13 @@ impl Ring {
 }
 
 /// For each of the first `len` keys, how many keys are smaller. Keys beyond `len` must be the largest there are.
-/// Quadratic, but without a branch: for a few dozen keys that beats sorting.
+/// Quadratic, but without a branch: for a few dozen keys that beats sorting. Counts are as wide as the keys, so that
+/// whole vectors of comparisons are added up.
 #[inline]
-fn ranks<K: Copy + PartialOrd, const N: usize>(keys: &[K; N], len: usize) -> [u8; N] {
-    let mut ranks = [0; N];
-    // Whole vectors are compared, the rest of the array is not looked at.
-    let padded = len.next_multiple_of(8).min(N);
+fn ranks<K: Copy + PartialOrd + From<bool> + Sum, const N: usize>(keys: &[K; N], len: usize) -> [K; N] {
+    let mut ranks = [K::from(false); N];
     for (rank, key) in ranks.iter_mut().zip(&keys[..len]) {
-        *rank = keys[..padded].iter().map(|other| u8::from(other < key)).sum();
+        *rank = keys[..len.next_multiple_of(8).min(N)].iter().map(|other| K::from(other < key)).sum();
     }
     ranks
 }
