@@ -47,6 +47,9 @@ impl fmt::Display for GenerateError {
 }
 
 /// Generates the mesh called `name` (see [`NAMES`]) with `size` points along an edge.
+///
+/// # Errors
+/// If nothing has this name, or it cannot have this size.
 pub fn by_name(name: &str, size: u32) -> Result<TetMesh, GenerateError> {
     match name {
         "bucky" => bucky(size),
@@ -67,6 +70,9 @@ fn check_size(name: &'static str, size: u32, limits: [u32; 2]) -> Result<(), Gen
 ///
 /// The density is the sum of exp(−d²/2σ²), σ = 0.055, over the 60 vertices of a truncated icosahedron of radius
 /// 0.35 around the cube's centre, where d is the distance to the vertex.
+///
+/// # Errors
+/// If `size` is not within 2 to 512.
 pub fn bucky(size: u32) -> Result<TetMesh, GenerateError> {
     const SIGMA: f64 = 0.055;
     check_size("bucky", size, BUCKY_SIZES)?;
@@ -123,6 +129,9 @@ fn truncated_icosahedron() -> [[f64; 3]; 60] {
 /// The mesh fills the box from (−4, −4, −4) to (6, 4, 4) without the sphere, so it is not convex and its boundary
 /// has two parts. Six blocks, one a side of the box, meet without seams; layers get thicker outward. There are
 /// `size` points along an edge of the box and as many layers of points from sphere to box.
+///
+/// # Errors
+/// If `size` is not within 3 to 101.
 pub fn sphere_flow(size: u32) -> Result<TetMesh, GenerateError> {
     check_size("sphere-flow", size, SPHERE_SIZES)?;
     let surface = CubeSurface::new(size);

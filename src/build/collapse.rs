@@ -32,6 +32,12 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 /// Builds an edge-based MT of `mesh`, which must be valid: see [`crate::mesh::repair`].
+///
+/// Works on one thread and calls `progress` now and then.
+///
+/// # Errors
+/// If the mesh is not valid, has none of the wanted fields, or does not fit the lattice; if an option is out of its
+/// range; if `progress` breaks the work off.
 pub fn edge_mt(
     mesh: &TetMesh,
     config: &BuildConfig,

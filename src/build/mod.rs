@@ -40,12 +40,14 @@ use std::ops::ControlFlow;
 pub struct BuildConfig {
     /// Names of the fields to keep, in this order; the first one of the mesh if empty.
     pub fields: Vec<String>,
-    /// Bits of the position lattice; as few as the thinnest cells allow, at least 16, if not given.
+    /// Bits of the position lattice, 1 to 30. If not given: 16 where that keeps every cell positive, else as few as
+    /// do, and two more to spare. No side of the domain is longer than 2^bits steps.
     pub position_bits: Option<u32>,
     /// Bits of the field lattices, 1 to 24. Half a step is the error that remains at full resolution.
     pub field_bits: u32,
     /// The displacement of the boundary that counts as much as an error of the field's whole range, as a fraction
-    /// of the domain's diagonal.
+    /// of the domain's diagonal; not negative. With 0.2, an error of 1 % allows the boundary to move by 0.2 % of the
+    /// diagonal.
     pub displacement: f64,
 }
 
@@ -93,7 +95,7 @@ pub struct BuildSummary {
     pub updates: u32,
     /// Bits of the position lattice.
     pub position_bits: u32,
-    /// Length of the longest chain of updates that depend on each other.
+    /// Length of the longest chain of updates, each of which depends on the one before.
     pub depth: u32,
 }
 

@@ -220,9 +220,9 @@ impl Plan {
                 }
             }
         }
-        // Edges (x, ω): x is next to both ends along the boundary, but a b x is no boundary triangle. This also
-        // rules out boundary triangles (a, x, y) and (b, x, y), as x and y cannot both be ends without ω closing
-        // a sphere.
+        // Edges (x, ω): x is next to both ends along the boundary, but a b x is no boundary triangle.
+        // Triangles (x, y, ω): x and y can pass that test only as the two ends of the fan. The four boundary triangles
+        // then bound a hollow in the shape of a tetrahedron, which the collapse would close.
         let pinches = |v: &u32| {
             let m = marks.get(*v);
             m & BORDER_A != 0 && m & BORDER_B != 0 && m & FAN_END == 0

@@ -83,7 +83,8 @@ fn field_lattice(field: &Field, bits: u32) -> FieldInfo {
     FieldInfo { name: field.name.clone(), min, max, origin: min, step, bits }
 }
 
-/// Puts the points on the coarsest lattice that keeps every cell positive.
+/// Puts the points on a lattice that keeps every cell positive: that of `wanted` bits or, if nothing is wanted, the
+/// coarsest one of at least [`FEWEST_BITS`], with [`SPARE_BITS`] more where it had to be finer.
 fn place(mesh: &TetMesh, wanted: Option<u32>) -> Result<(Lattice, Vec<[i32; 3]>), BuildError> {
     let on = |bits: u32| {
         let lattice = lattice(mesh, bits);

@@ -10,7 +10,7 @@ pub struct Lattice {
     pub origin: [f64; 3],
     /// Distance between neighbouring lattice points along x, y and z, in model units; positive.
     pub step: [f64; 3],
-    /// Integer positions need at most this many bits; see [`crate::geom::WIDE_BITS`].
+    /// Integer positions lie in `0 ..= 2^bits`; 1 to [`WIDE_BITS`](crate::geom::WIDE_BITS).
     pub bits: u32,
 }
 

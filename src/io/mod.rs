@@ -35,6 +35,11 @@ use crate::io::error::At;
 use crate::mesh::TetMesh;
 
 /// Reads the mesh or grid in the file at `path`; of raw samples either the samples or the sidecar may be given.
+///
+/// The kind of a file is told by its content; only `.raw` and `.json` are told by their names.
+///
+/// # Errors
+/// If the file cannot be read, is damaged, or holds what is not read here: see [`ReadReason`].
 pub fn read(path: &Path) -> Result<TetMesh, ReadError> {
     let name = path.display().to_string();
     match lower_extension(path).as_str() {
@@ -47,6 +52,9 @@ pub fn read(path: &Path) -> Result<TetMesh, ReadError> {
 /// Reads a mesh or grid from the bytes of a file; `name` is used in errors alone.
 ///
 /// Raw samples come in two files: see [`read_raw`].
+///
+/// # Errors
+/// As [`read`].
 pub fn read_bytes(name: &str, bytes: &[u8]) -> Result<TetMesh, ReadError> {
     let start = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
     let result = if bytes.starts_with(legacy::MAGIC) {
@@ -61,7 +69,10 @@ pub fn read_bytes(name: &str, bytes: &[u8]) -> Result<TetMesh, ReadError> {
 
 /// Reads raw samples, given their JSON sidecar:
 /// `{"dims": [2, 2, 2], "type": "uint8", "endian": "little", "spacing": [1, 1, 1], "origin": [0, 0, 0], "field": "density"}`,
-/// of which only `dims` and `type` are needed. `name` is used in errors alone.
+/// of which only `dims` and `type` are needed. Samples run x fastest, then y, then z. `name` is used in errors alone.
+///
+/// # Errors
+/// If the sidecar does not say what is needed, or the samples are not as many as it says.
 pub fn read_raw(name: &str, sidecar: &[u8], samples: &[u8]) -> Result<TetMesh, ReadError> {
     let mesh = raw::Sidecar::parse(sidecar).and_then(|s| s.mesh(samples));
     mesh.at(String::new).map_err(|e| in_file(e, name))

@@ -16,6 +16,9 @@ const BLOCK: usize = 32768;
 const TETRAHEDRON: u8 = 10;
 
 /// Writes `mesh` as a VTK XML unstructured grid (`.vtu`), with double precision points and fields.
+///
+/// # Errors
+/// If `out` fails.
 pub fn write_vtu(mesh: &TetMesh, out: &mut impl Write) -> io::Result<()> {
     let mut data = Appended::default();
     let fields = point_data(mesh, &mut data)?;
@@ -39,7 +42,8 @@ pub fn write_vtu(mesh: &TetMesh, out: &mut impl Write) -> io::Result<()> {
 
 /// Writes a mesh that was split from a regular grid as VTK XML image data (`.vti`).
 ///
-/// Fails with [`io::ErrorKind::InvalidInput`] if `mesh` has no grid.
+/// # Errors
+/// With [`io::ErrorKind::InvalidInput`] if `mesh` has no grid, and if `out` fails.
 pub fn write_vti(mesh: &TetMesh, out: &mut impl Write) -> io::Result<()> {
     let Some(grid) = mesh.grid else {
         let problem = "the mesh is not a regular grid: write it as .vtu";

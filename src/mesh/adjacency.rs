@@ -88,7 +88,8 @@ pub(crate) fn face_groups(sorted: &[HalfFace]) -> impl Iterator<Item = &[HalfFac
 
 /// The neighbours of each tetrahedron: entry `i` lies across face `i`, or is [`NONE`] at the boundary.
 ///
-/// Refuses faces with three or more tetrahedra.
+/// # Errors
+/// If three or more tetrahedra share a face, or there are more than [`MAX_TETS`].
 pub fn neighbors(tets: &[[u32; 4]]) -> Result<Vec<[u32; 4]>, MeshError> {
     let mut result = vec![[NONE; 4]; tets.len()];
     for group in face_groups(&sorted_faces(tets)?) {
@@ -131,6 +132,9 @@ impl Topology {
 }
 
 /// Works out the [`Topology`] of `tets` over `points` points.
+///
+/// # Errors
+/// As [`neighbors`], and if a tetrahedron names a point that is not there.
 pub fn topology(points: usize, tets: &[[u32; 4]]) -> Result<Topology, MeshError> {
     super::check::check_indices(points, tets)?;
     let neighbors = neighbors(tets)?;

@@ -15,6 +15,9 @@ use crate::mesh::adjacency::sorted_faces;
 /// every face has at most two tetrahedra, which lie on opposite sides of it.
 ///
 /// Vertices and edges where the boundary touches itself are allowed; [`crate::mesh::topology`] marks them.
+///
+/// # Errors
+/// The first thing that is wrong.
 pub fn check(mesh: &TetMesh) -> Result<(), MeshError> {
     check_arrays(mesh)?;
     let sides = Sides::new(&mesh.positions);

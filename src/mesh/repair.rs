@@ -78,7 +78,8 @@ impl fmt::Display for RepairReport {
 
 /// Mends `mesh` by the rules of this module; the result passes [`crate::mesh::check`].
 ///
-/// Errors number the cells as in `mesh`.
+/// # Errors
+/// If something cannot be mended; cells and points are numbered as in `mesh`.
 pub fn repair(mesh: TetMesh) -> Result<(TetMesh, RepairReport), MeshError> {
     check_arrays(&mesh)?;
     let mut work = Work::new(mesh);

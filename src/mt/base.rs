@@ -46,6 +46,9 @@ impl std::error::Error for BaseMeshError {}
 impl BaseMesh {
     /// Checks everything that refinement relies on: sizes, lattices, orientation. Adjacency is checked where it is
     /// built, by [`CurrentMesh::new`](super::CurrentMesh::new).
+    ///
+    /// # Errors
+    /// The first thing that is wrong.
     pub fn check(&self, info: &MtInfo) -> Result<(), BaseMeshError> {
         info.check()?;
         if self.values.len() != self.positions.len() * info.fields.len() {
@@ -72,7 +75,10 @@ impl BaseMesh {
 }
 
 impl MtInfo {
-    /// Checks that lattices and fields are usable.
+    /// Checks that lattices and fields are usable: finite, not too fine, and in numbers that a file can hold.
+    ///
+    /// # Errors
+    /// The first thing that is not.
     pub fn check(&self) -> Result<(), BaseMeshError> {
         let lattice = &self.lattice;
         let finite = |x: &f64| x.is_finite();

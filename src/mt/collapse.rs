@@ -47,7 +47,8 @@ pub struct VertexSplit<'a> {
     pub error: ErrorCode,
 }
 
-/// A compact edge-based MT: at most 36 bytes per reference vertex and 2 for the error, with one field.
+/// A compact edge-based MT. With one field an update, and so a reference vertex, takes at most 36 bytes and 2 for the
+/// error; the base mesh, which is small, comes on top.
 ///
 /// It grows by [`push`](EdgeMt::push), coarse to fine; every prefix of an MT is an MT.
 #[derive(Clone, Debug, PartialEq)]

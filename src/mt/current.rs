@@ -44,7 +44,7 @@ pub struct CurrentMesh {
     pub(crate) fields: usize,
     free_vertices: Vec<u32>,
     free_tets: Vec<u32>,
-    /// `epoch << 6 | index in the star` of the last star that each tetrahedron was in.
+    /// `epoch << MARK_BITS | index in the star` of the last star that each tetrahedron was in.
     marks: Vec<u32>,
     /// The same for the vertices of a link.
     vertex_marks: Vec<u32>,
@@ -561,7 +561,10 @@ impl CurrentMesh {
     }
 
     /// Checks every identity of the structure: orientation, symmetric adjacency, faces shared by at most two,
-    /// labels, incident tetrahedra. For tests and `verify`; takes time in proportion to the mesh.
+    /// labels, incident tetrahedra. For tests; takes time in proportion to the mesh.
+    ///
+    /// # Errors
+    /// The first identity that does not hold, in words. Nothing that updates do leads there.
     pub fn check(&self) -> Result<(), String> {
         for (t, tet) in self.tets.iter().enumerate().filter(|(_, tet)| tet[0] != NONE) {
             self.check_tet(t, *tet)?;

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// An error bound in 16 bits, rounded up when stored: 0, or `2^-24 ..= 128` in steps of 0.05 %.
+/// An error bound in 16 bits, rounded up when stored: 0, or from 3 · 10^-8 (2^-25) to 128 in steps of at most 0.05 %.
 ///
 /// Errors are relative: 1 is the full range of a field. Codes compare as the errors they stand for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -10,7 +10,7 @@ pub struct ErrorCode(pub u16);
 
 /// Bits of an `f32` below the eleven of the mantissa that a code keeps.
 const DROPPED: u32 = 12;
-/// What the kept bits of 2^-25 are; the code of 2^-24 is then 2^11 + 1 or so, and 0 stays free for zero.
+/// What the kept bits of 2^-25 are. The code of 2^-24 is then 2^11, and the code 0 stays free for zero.
 const BIAS: u32 = (127 - 25) << 11;
 
 impl ErrorCode {
@@ -19,7 +19,7 @@ impl ErrorCode {
     /// The largest error that can be stored; stands for "anything".
     pub const MAX: Self = Self(u16::MAX);
 
-    /// The smallest code whose error is at least `error`; [`ErrorCode::MAX`] for infinities and NaN.
+    /// The smallest code whose error is at least `error`; [`ErrorCode::MAX`] if there is none, and for NaN.
     pub fn at_least(error: f64) -> Self {
         if error <= 0.0 {
             return Self::ZERO;
@@ -33,7 +33,8 @@ impl ErrorCode {
         if Self(code).error() >= error { Self(code) } else { Self(code + 1) }
     }
 
-    /// The largest code whose error is at most `error`: a node is within `error` iff its code is at most this.
+    /// The largest code whose error is at most `error`: a node is within `error` iff its code is at most this. Zero for
+    /// NaN.
     pub fn at_most(error: f64) -> Self {
         if error.is_nan() || error <= 0.0 {
             return Self::ZERO;

@@ -1,4 +1,8 @@
 //! The Multi-Tessellation itself [§2]: what it is made of and what every kind of it can do.
+//!
+//! [`EdgeMt`] is the compact structure that files hold and programs use; [`ExplicitMt`] spells the same MT out, as the
+//! oracle of tests. Both are immutable once they are complete. What changes is the [`CurrentMesh`], to which updates
+//! are applied through the trait [`MultiTessellation`].
 
 mod base;
 mod check;
@@ -53,7 +57,7 @@ pub struct FieldInfo {
     pub origin: f64,
     /// Distance between neighbouring levels; positive, also for a constant field.
     pub step: f64,
-    /// Levels need at most this many bits.
+    /// Levels lie in `0 .. 2^bits`; 1 to 24.
     pub bits: u32,
 }
 
@@ -91,8 +95,9 @@ pub struct MtInfo {
     pub tetrahedra: u32,
     /// Updates of the complete MT.
     pub updates: u32,
-    /// The displacement of the boundary, in model units, that counts as an error of 1. A mesh within error `e`
-    /// has its boundary within `e · displacement_per_error` of every reference vertex.
+    /// The displacement of the boundary, in model units, that counts as an error of 1. A mesh within error `e` comes
+    /// within `e · displacement_per_error` of every reference vertex, and no vertex of its boundary is further than
+    /// that from the boundary of the reference mesh.
     pub displacement_per_error: f64,
 }
 
@@ -125,13 +130,22 @@ pub trait MultiTessellation {
     fn may_coarsen(&self, mesh: &CurrentMesh, u: UpdateId) -> bool;
 
     /// Applies `u+` to a mesh that does not contain `u`, or names a parent that has to come first.
+    ///
+    /// # Errors
+    /// If the MT is damaged; the mesh is unchanged then.
     fn refine(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError>;
 
     /// Applies `u−` to a mesh that contains `u`, or names a child that has to go first.
+    ///
+    /// # Errors
+    /// If `u` was not applied to this mesh by [`Self::refine`]; the mesh is unchanged then.
     fn coarsen(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError>;
 
     /// Shows `look` the tetrahedra that `u+` removes until it returns true, in a mesh that contains `u` and none
-    /// of its children; or names a child that is in the way.
+    /// of its children; or names a child that is in the way. The mesh stays as it is.
+    ///
+    /// # Errors
+    /// If `u` was not applied to this mesh by [`Self::refine`].
     fn look_at_removed(
         &self,
         mesh: &mut CurrentMesh,

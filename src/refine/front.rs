@@ -33,7 +33,7 @@ pub struct Outcome {
     pub coarsened: u64,
     /// The largest error left in the selected part.
     pub error: ErrorCode,
-    /// Whether that is within what was asked for; false when the budget did not allow it.
+    /// Whether that is within what was asked for; false when the budget did not allow it, or data is missing.
     pub satisfied: bool,
 }
 
@@ -46,6 +46,9 @@ fn rank(mt: &impl MultiTessellation, u: UpdateId) -> Rank {
 
 impl Front {
     /// The base mesh of `mt`: no update applied.
+    ///
+    /// # Errors
+    /// If the base mesh is not a valid mesh, or does not fit its description.
     pub fn new(mt: &impl MultiTessellation) -> Result<Self, BaseMeshError> {
         let mesh = CurrentMesh::new(mt.info(), mt.base())?;
         Ok(Self { mesh, applied: Vec::new(), applied_count: 0, known: 0 })

@@ -26,15 +26,17 @@ use crate::geom::Bounds;
 /// What mesh is wanted.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Request {
-    /// Largest error wanted, as a fraction of the field's range (0.01 is 1 %); 0 is the reference mesh.
+    /// Largest error wanted, as a fraction of the field's range (0.01 is 1 %); 0 is the reference mesh, infinity the
+    /// base mesh. It binds all fields of the MT, each relative to its own range. Not negative, not NaN.
     pub error: f64,
-    /// Only inside this box, in model units; everywhere else the coarsest mesh will do.
+    /// Only inside this box, in model units; everywhere else the coarsest mesh will do. None is everywhere.
     pub roi: Option<Bounds>,
-    /// Only where the field passes one of these values (field units); everywhere if empty.
+    /// Only where the field passes one of these values (field units); everywhere if empty. Together with a box: where
+    /// both hold.
     pub isovalues: Vec<f64>,
-    /// Which field the isovalues refer to.
+    /// Which field the isovalues refer to: an index into [`MtInfo::fields`](crate::mt::MtInfo::fields).
     pub field: usize,
-    /// At most so many tetrahedra.
+    /// At most so many tetrahedra, though never fewer than the base mesh has; no limit if none.
     pub max_tets: Option<u32>,
 }
 
@@ -51,7 +53,8 @@ pub struct RefineStats {
     pub refined: u64,
     /// Updates undone on the way.
     pub coarsened: u64,
-    /// The error that is guaranteed in the selected part, as a fraction of the field's range.
+    /// The error that is guaranteed in the selected part, as a fraction of the field's range, at every vertex of the
+    /// reference mesh there. The rounding to the lattices, half a step, is not in it.
     pub error_bound: f64,
     /// Whether that is what was asked for; false when the budget or missing data stopped it.
     pub satisfied: bool,
