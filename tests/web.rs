@@ -38,7 +38,7 @@ fn code(error: impl Into<JsValue>) -> String {
 fn fed(bytes: &[u8], piece: usize) -> CoreSession {
     let mut session = CoreSession::new();
     for bytes in bytes.chunks(piece) {
-        session.feed(bytes).ok().expect("the fixture is a good file");
+        session.feed(bytes).expect("the fixture is a good file");
     }
     session
 }
@@ -51,12 +51,12 @@ fn options(json: &str) -> JsValue {
 fn the_same_requests_give_the_same_hashes_as_natively() {
     for piece in [MT.len(), 1000, 7] {
         let mut session = fed(MT, piece);
-        let end = session.finish().ok().expect("a complete file");
+        let end = session.finish().expect("a complete file");
         assert_eq!(get(&end, "complete"), JsValue::TRUE);
         let cases: Array = options(HASHES).unchecked_into();
         assert!(cases.length() >= 5, "the fixture holds requests");
         for case in cases.iter() {
-            let stats = session.refine(get(&case, "options").unchecked_ref()).ok().expect("a good request");
+            let stats = session.refine(get(&case, "options").unchecked_ref()).expect("a good request");
             let request = JSON::stringify(&case).map(String::from).expect("JSON");
             assert_eq!(number(&stats, "tetrahedra"), number(&case, "tetrahedra"), "{request}");
             assert_eq!(Some(session.hash()), get(&case, "hash").as_string(), "{request}");
@@ -67,8 +67,8 @@ fn the_same_requests_give_the_same_hashes_as_natively() {
 #[wasm_bindgen_test]
 fn arrays_fit_the_stats_and_each_other() {
     let mut session = fed(MT, MT.len());
-    let stats = session.refine(options(r#"{ "error": "1%" }"#).unchecked_ref()).ok().expect("a good request");
-    let mesh = session.mesh().ok().expect("a mesh");
+    let stats = session.refine(options(r#"{ "error": "1%" }"#).unchecked_ref()).expect("a good request");
+    let mesh = session.mesh().expect("a mesh");
     let floats = |name| get(&mesh, name).unchecked_into::<Float32Array>().to_vec();
     let integers = |name| get(&mesh, name).unchecked_into::<Uint32Array>().to_vec();
     let (vertices, tetrahedra) = (number(&stats, "vertices") as usize, number(&stats, "tetrahedra") as usize);
@@ -76,7 +76,7 @@ fn arrays_fit_the_stats_and_each_other() {
     assert_eq!((integers("tets").len(), integers("neighbors").len()), (4 * tetrahedra, 4 * tetrahedra));
     assert!(integers("tets").iter().all(|vertex| (*vertex as usize) < vertices));
     assert!(number(&stats, "relativeErrorBound") <= 0.01);
-    let surface = session.isosurface(0.5).ok().expect("a surface");
+    let surface = session.isosurface(0.5).expect("a surface");
     assert!(get(&surface, "indices").unchecked_into::<Uint32Array>().length() > 0);
 }
 
