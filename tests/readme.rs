@@ -1,68 +1,85 @@
 //! Promise: the commands in README.md work as they stand there, in that order, and answer with the lines shown there.
-//! Values are not compared: they are those of the release, and times those of a machine.
+//!
+//! Values are not compared: they change with the builder, and times with the machine. What is shown is brought up to
+//! date by `TETRALOD_UPDATE_README=1 cargo test --release --test readme`.
 #![cfg(feature = "cli")]
 
 use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-/// A command with the names of the lines that it is said to answer with.
-#[derive(Debug, PartialEq)]
-struct Example {
-    arguments: Vec<String>,
-    answer: Vec<String>,
+const START: &str = "```console";
+const PROMPT: &str = "$ tetralod ";
+
+/// `readme` with what `run` answers to the commands in its blocks of kind `console` in place of what is shown.
+fn answered(readme: &str, mut run: impl FnMut(&str) -> String) -> String {
+    let (mut fresh, mut inside) = (String::new(), false);
+    for line in readme.lines() {
+        if line.starts_with("```") {
+            inside = line == START;
+        }
+        let command = line.strip_prefix(PROMPT).filter(|_| inside);
+        if !inside || line == START || command.is_some() {
+            fresh.extend([line, "\n"]);
+        }
+        fresh.extend(command.map(&mut run));
+    }
+    fresh
 }
 
-/// The commands after `$` in blocks of kind `console`. Smaller data will do.
-fn examples(readme: &str) -> Vec<Example> {
-    let mut examples: Vec<Example> = Vec::new();
-    let mut inside = false;
+/// `readme` with only the first column of the answers shown in it.
+fn without_values(readme: &str) -> String {
+    let mut answer = false;
+    let mut names = String::new();
     for line in readme.lines() {
-        match line.strip_prefix("$ tetralod ") {
-            _ if line.starts_with("```") => inside = line == "```console",
-            Some(command) if inside => {
-                let command = command.replace("--size 33", "--size 9");
-                let arguments = command.split(' ').map(str::to_owned).collect();
-                examples.push(Example { arguments, answer: Vec::new() });
-            }
-            None if inside => examples.last_mut().expect("a command first").answer.extend(name(line)),
-            _ => {}
+        answer = line.starts_with(PROMPT) || answer && !line.starts_with("```");
+        match line.split_once("  ") {
+            // The rest of the row before.
+            Some(("", _)) if answer => {}
+            Some((name, _)) if answer => names.extend([name, "\n"]),
+            _ => names.extend([line, "\n"]),
         }
     }
-    examples
+    names
 }
 
-/// The first column of a line of the answer, if it has one.
-fn name(line: &str) -> Option<String> {
-    let name = line.split("  ").next().unwrap_or_default().trim();
-    (!name.is_empty() && !line.starts_with(' ')).then(|| name.to_owned())
+fn run(command: &str, folder: &Path) -> String {
+    let mut program = Command::new(env!("CARGO_BIN_EXE_tetralod"));
+    let output = program.args(command.split(' ')).current_dir(folder).output().expect("the command starts");
+    assert!(output.status.success(), "{command}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).expect("UTF-8")
 }
 
 #[test]
 fn every_command_works_and_answers_as_shown() {
-    let readme =
-        fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).expect("README.md");
-    let examples = examples(&readme);
-    let shown: Vec<&str> = examples.iter().map(|example| example.arguments[0].as_str()).collect();
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md");
+    let readme = fs::read_to_string(&path).expect("README.md");
     for command in ["generate", "build", "info", "extract", "verify", "bench"] {
-        assert!(shown.contains(&command), "README.md shows no `tetralod {command}`");
+        let example = format!("\n{PROMPT}{command} ");
+        assert!(readme.contains(&example), "README.md shows no `tetralod {command}`");
     }
     let folder = std::env::temp_dir().join(format!("tetralod-readme-{}", std::process::id()));
     fs::create_dir_all(&folder).expect("a temporary folder");
-    for Example { arguments, answer } in &examples {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_tetralod"));
-        let output = command.args(arguments).current_dir(&folder).output().expect("the command starts");
-        let (out, err) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
-        assert!(output.status.success(), "{arguments:?}: {err}");
-        let names: Vec<String> = out.lines().filter_map(name).collect();
-        assert_eq!(&names, answer, "{arguments:?}");
-    }
+    let update = std::env::var_os("TETRALOD_UPDATE_README").is_some();
+    // Smaller data will do for the names.
+    let size = if update { "--size 33" } else { "--size 9" };
+    let fresh = answered(&readme, |command| run(&command.replace("--size 33", size), &folder));
     fs::remove_dir_all(&folder).expect("the folder goes");
+    if update {
+        fs::write(&path, fresh).expect("README.md can be written");
+    } else {
+        assert_eq!(without_values(&readme), without_values(&fresh));
+    }
 }
 
 #[test]
-fn examples_are_found_in_console_blocks_alone() {
-    let readme = "$ tetralod no\n```console\n$ tetralod info a.mt\nkind    edge\n        more\n  sub   x\nfile size  1\n```\nno\n";
-    let arguments = vec!["info".to_owned(), "a.mt".to_owned()];
-    assert_eq!(examples(readme), [Example { arguments, answer: vec!["kind".into(), "file size".into()] }]);
+fn only_answers_are_replaced() {
+    let readme =
+        "a  b\n$ tetralod no\n```console\n$ tetralod yes\nold  1\n    2\n$ tetralod too\n```\nc  d\n";
+    let fresh = answered(readme, |command| format!("{command}  new\n"));
+    let expected =
+        "a  b\n$ tetralod no\n```console\n$ tetralod yes\nyes  new\n$ tetralod too\ntoo  new\n```\nc  d\n";
+    assert_eq!(fresh, expected);
+    let block = "a  b\n```console\n$ tetralod yes\nold  1\n    2\n```\nc  d\n";
+    assert_eq!(without_values(block), "a  b\n```console\n$ tetralod yes\nold\n```\nc  d\n");
 }

@@ -245,7 +245,7 @@ impl ExplicitMt {
     /// Storage by the paper's way of counting: 4 bytes for a coordinate, a field value or an index, 1 for a counter.
     ///
     /// The paper estimates it as 24n + 28m, with n the vertices of the reference mesh and m all tetrahedra of the MT:
-    /// that takes one arc for each tetrahedron, where there are fewer, and does not count the vertices that are in no
+    /// that takes one arc for each tetrahedron, where there are fewer, and does not count the vertices outside the
     /// reference mesh, which edge-based MTs have.
     pub fn bytes(&self) -> u64 {
         self.counts().bytes()
