@@ -62,21 +62,21 @@
 //!
 //! # Modules
 //!
-//! Bytes become an MT in [`format`](mod@format), requests become a mesh in [`refine`], slices of the mesh become surfaces in
-//! [`view`]; [`session`] holds the three together and is what most programs want. [`mt`] is the structure itself,
-//! [`mesh`] and [`geom`] are what it rests on, [`bench`](mod@bench) times it. `ARCHITECTURE.md` has the graph, `src/format/SPEC.md`
-//! (rendered in [`format`](mod@format)) the file.
+//! Bytes become an MT in [`format`](mod@format), requests become a mesh in [`refine`], slices of the mesh become
+//! surfaces in [`view`]; [`session`] holds the three together and is what most programs want. [`mt`] is the structure
+//! itself, [`mesh`] and [`geom`] are what it rests on, [`bench`](mod@bench) times it. `ARCHITECTURE.md` has the graph;
+//! [`format`](mod@format) shows the specification of the file.
 //!
 //! # What holds
 //!
 //! - Every mesh that comes out is a valid conforming mesh: positive tetrahedra, faces shared by at most two, complete
 //!   adjacency.
-//! - [`RefineStats::error_bound`](refine::RefineStats::error_bound) bounds the error at every vertex of the reference mesh
-//!   in the selected part, up to the rounding of the reference itself: half a step of the stated lattices.
+//! - [`RefineStats::error_bound`](refine::RefineStats::error_bound) bounds the error at every vertex of the reference
+//!   mesh in the selected part, up to the rounding of the reference itself: half a step of the stated lattices.
 //! - The same file and request give the same mesh on every platform, whatever was asked for before; the same input
 //!   gives the same file.
-//! - No bytes cause a panic, an endless loop or memory beyond [`Limits`](format::Limits): decoders return typed errors, and
-//!   what was decoded before stays usable.
+//! - No bytes cause a panic, an endless loop or an MT beyond [`Limits`](format::Limits): decoders return typed errors,
+//!   and what was decoded before stays usable.
 //!
 //! # Glossary
 //!

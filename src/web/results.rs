@@ -48,7 +48,7 @@ export interface MtInfo {
   /** The kind of Multi-Tessellation. */
   kind: "edge";
   fields: FieldInfo[];
-  /** `[x0, y0, z0, x1, y1, z1]` in model units. */
+  /** A box that holds every mesh of the volume, and may be larger: `[x0, y0, z0, x1, y1, z1]` in model units. */
   bounds: number[];
   /** Size of the reference mesh, the finest one. */
   vertices: number;
