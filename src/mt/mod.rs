@@ -115,8 +115,8 @@ pub trait MultiTessellation {
     /// Number of updates so far; they are `UpdateId(0) .. UpdateId(updates)`, parents before children.
     fn updates(&self) -> u32;
 
-    /// The error `e(u)` of update `u`: bounds that of every tetrahedron `u+` removes, and of every update that
-    /// depends on `u`.
+    /// The error `e(u)` of update `u`: bounds that of every tetrahedron `u+` removes, and of every update with a
+    /// larger number, so of every one that depends on `u`.
     fn error(&self, u: UpdateId) -> ErrorCode;
 
     /// The update that removes a tetrahedron of the current mesh; none if it belongs to the reference mesh.

@@ -299,15 +299,18 @@ impl Front {
     }
 
     /// The largest error among the selected tetrahedra. Those whose update has not arrived yet have at most the
-    /// error of the update that made them.
+    /// error of the last one that has: errors never grow from one update to the next.
     fn largest_error(&self, mt: &impl MultiTessellation, criterion: &impl Criterion) -> ErrorCode {
-        let complete = mt.updates() >= mt.info().updates;
+        let to_come = match mt.updates() {
+            n if n >= mt.info().updates => ErrorCode::ZERO,
+            0 => ErrorCode::MAX,
+            n => mt.error(UpdateId(n - 1)),
+        };
         let mut largest = ErrorCode::ZERO;
         for tet in self.mesh.tets() {
             let error = match mt.remover(&self.mesh, tet) {
                 Some(u) => mt.error(u),
-                None if complete => ErrorCode::ZERO,
-                None => mt.creator(&self.mesh, tet).map_or(ErrorCode::MAX, |u| mt.error(u)),
+                None => to_come,
             };
             if error > largest && self.selects(criterion, tet, error) {
                 largest = error;
