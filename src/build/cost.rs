@@ -88,6 +88,14 @@ struct Cell {
     tet: u32,
 }
 
+/// A boundary triangle in model units.
+struct Face {
+    corners: [DVec3; 3],
+    normal: DVec3,
+    /// The normal's length, squared.
+    area: f64,
+}
+
 /// Evaluates collapses; holds scratch space.
 #[derive(Default)]
 pub(super) struct Evaluator {
@@ -95,6 +103,8 @@ pub(super) struct Evaluator {
     /// Boundary triangles of the star: the cell and its corners, [`NONE`] for the centre. Those at the centre first.
     border: Vec<(u32, [u32; 3])>,
     at_centre: usize,
+    /// The same triangles in model units with their normals, made when they are first needed.
+    faces: Vec<Face>,
     flat: bool,
     old_border: Vec<[u32; 3]>,
     /// Where each point goes: point and cell.
@@ -231,21 +241,28 @@ impl Evaluator {
     }
 
     /// How far the ends are from the new boundary.
-    fn step_of_boundary(&self, plan: &Plan, data: &VertexData, reference: &Reference<'_>) -> f64 {
+    fn step_of_boundary(&mut self, plan: &Plan, data: &VertexData, reference: &Reference<'_>) -> f64 {
         if !plan.on_boundary || self.flat {
             return 0.0;
         }
-        let triangles = &self.border[..self.at_centre];
         let at = |v: u32| reference.scaled(data.positions[v as usize]);
-        let distance = |p: DVec3| self.nearest(p, triangles, plan, data, reference).2;
+        let mut largest = 0.0_f64;
+        for end in [plan.a, plan.b] {
+            largest = largest.max(self.nearest(at(end), self.at_centre, plan, data, reference).2);
+        }
         // Between the ends and the link the new boundary may be further away than at either.
         // The two triangles of an edge have it in opposite directions; one is enough.
-        let edges = self.old_border.iter().flat_map(|&[x, y, z]| [[x, y], [y, z], [z, x]]);
-        let ends = [plan.a, plan.b];
-        let middles = edges
-            .filter(|edge| edge[0] < edge[1] && ends.iter().any(|end| edge.contains(end)))
-            .map(|[x, y]| (at(x) + at(y)) * 0.5);
-        [at(plan.a), at(plan.b)].into_iter().chain(middles).map(distance).fold(0.0, f64::max)
+        for i in 0..self.old_border.len() {
+            let [x, y, z] = self.old_border[i];
+            for [x, y] in [[x, y], [y, z], [z, x]] {
+                let at_end = [plan.a, plan.b].iter().any(|&end| end == x || end == y);
+                if x < y && at_end {
+                    let middle = (at(x) + at(y)) * 0.5;
+                    largest = largest.max(self.nearest(middle, self.at_centre, plan, data, reference).2);
+                }
+            }
+        }
+        largest
     }
 
     /// Finds the part of the reference boundary that the new vertex is near to. Returns the error that the distance
@@ -283,7 +300,7 @@ impl Evaluator {
         let ends = [plan.a, plan.b].into_iter().filter(|&end| end < reference.points);
         for point in tets.flat_map(|tet| buckets.border.iter(tet)).chain(ends) {
             let p = reference.scaled(reference.quantized.positions[point as usize]);
-            let (cell, _, distance) = self.nearest(p, &self.border, plan, data, reference);
+            let (cell, _, distance) = self.nearest(p, usize::MAX, plan, data, reference);
             self.border_moves.push((point, cell));
             largest = largest.max(distance);
         }
@@ -293,6 +310,7 @@ impl Evaluator {
     /// The boundary triangles of the star, before and after.
     fn collect_border(&mut self, plan: &Plan, mesh: &WorkMesh) {
         self.border.clear();
+        self.faces.clear();
         self.old_border.clear();
         self.at_centre = 0;
         if plan.on_boundary {
@@ -357,7 +375,7 @@ impl Evaluator {
         let mut displaced = 0.0;
         if depth < -SLACK && !self.border.is_empty() {
             let p = reference.scaled(reference.quantized.positions[point as usize]);
-            let (found, q, distance) = self.nearest(p, &self.border, plan, data, reference);
+            let (found, q, distance) = self.nearest(p, usize::MAX, plan, data, reference);
             let step = DVec3::from_array(reference.quantized.lattice.step);
             let to_q = (q - reference.scaled(plan.position)) / step;
             (cell, lambda, displaced) =
@@ -368,26 +386,43 @@ impl Evaluator {
         self.field_error(point, cell, lambda, data, reference).max(reference.error_of(displaced))
     }
 
-    /// The nearest of some boundary triangles after the collapse: its cell, the nearest point, and the distance.
+    /// The nearest of the first `count` boundary triangles after the collapse: its cell, the nearest point, and the
+    /// distance.
     fn nearest(
-        &self,
+        &mut self,
         p: DVec3,
-        triangles: &[(u32, [u32; 3])],
+        count: usize,
         plan: &Plan,
         data: &VertexData,
         reference: &Reference<'_>,
     ) -> (u32, DVec3, f64) {
-        let at =
-            |v: u32| reference.scaled(if v == NONE { plan.position } else { data.positions[v as usize] });
+        if self.faces.is_empty() {
+            self.lay_out_faces(plan, data, reference);
+        }
         let (mut least, mut found, mut nearest) = (f64::INFINITY, 0, p);
-        for &(cell, corners) in triangles {
-            let q = nearest_on_triangle(p, corners.map(at));
+        for (face, &(cell, _)) in self.faces.iter().zip(&self.border).take(count) {
+            // No point of a triangle is nearer than its plane.
+            let height = (p - face.corners[0]).dot(face.normal);
+            if height * height > least * face.area {
+                continue;
+            }
+            let q = nearest_on_triangle(p, face.corners);
             let distance = p.distance_squared(q);
             if distance < least {
                 (least, found, nearest) = (distance, cell, q);
             }
         }
         (found, nearest, least.sqrt())
+    }
+
+    fn lay_out_faces(&mut self, plan: &Plan, data: &VertexData, reference: &Reference<'_>) {
+        let at =
+            |v: u32| reference.scaled(if v == NONE { plan.position } else { data.positions[v as usize] });
+        self.faces.extend(self.border.iter().map(|&(_, triangle)| {
+            let corners = triangle.map(at);
+            let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+            Face { corners, normal, area: normal.length_squared() }
+        }));
     }
 
     fn field_error(
