@@ -133,7 +133,6 @@ struct Builder<'a> {
     plan: Plan,
     evaluator: Evaluator,
     history: Vec<Collapse>,
-    level_offsets: Vec<i32>,
     /// Tetrahedra around each vertex.
     degrees: Vec<u32>,
 }
@@ -178,7 +177,6 @@ impl<'a> Builder<'a> {
             plan: Plan::default(),
             evaluator: Evaluator::default(),
             history: Vec::new(),
-            level_offsets: Vec::new(),
             degrees,
         }
     }
@@ -322,7 +320,6 @@ impl<'a> Builder<'a> {
         let v = self.data.positions.len() as u32;
         let Self { plan, mesh, data, evaluator, .. } = self;
         self.history.push(Collapse::new(plan, mesh, code));
-        self.level_offsets.extend_from_slice(&evaluator.level_offsets);
         data.positions.push(plan.position);
         data.levels.extend_from_slice(&evaluator.levels);
         data.error.push(code.error());

@@ -112,8 +112,6 @@ pub(super) struct Evaluator {
     border_moves: Vec<(u32, u32)>,
     /// The levels of the new vertex.
     pub levels: Vec<i32>,
-    /// The levels' offsets.
-    pub level_offsets: Vec<i32>,
     /// The triangle of the reference boundary near the new vertex.
     pub foot: u32,
     pub height: u32,
@@ -203,10 +201,8 @@ impl Evaluator {
     fn halve_levels(&mut self, plan: &Plan, data: &VertexData, reference: &Reference<'_>) {
         let fields = reference.quantized.fields.len();
         let [a, b] = [plan.a, plan.b].map(|v| &data.levels[v as usize * fields..][..fields]);
-        self.level_offsets.clear();
-        self.level_offsets.extend(a.iter().zip(b).map(|(a, b)| a - b));
         self.levels.clear();
-        self.levels.extend(b.iter().zip(&self.level_offsets).map(|(b, d)| b + (d >> 1)));
+        self.levels.extend(a.iter().zip(b).map(|(a, b)| b + ((a - b) >> 1)));
     }
 
     /// The largest error among the updates that this one will be a parent of, and whether there are any.

@@ -11,7 +11,6 @@ pub(super) struct WorkMesh {
     pub neighbors: Vec<[u32; 4]>,
     /// A tetrahedron at each vertex; [`NONE`] once the vertex is gone.
     pub incident: Vec<u32>,
-    pub live_tets: usize,
     marks: Vec<u32>,
     epoch: u32,
 }
@@ -29,8 +28,8 @@ impl WorkMesh {
         for (t, tet) in tets.iter().enumerate() {
             tet.iter().for_each(|&v| incident[v as usize] = t as u32);
         }
-        let (live_tets, marks) = (tets.len(), vec![0; tets.len()]);
-        Self { tets, neighbors, incident, live_tets, marks, epoch: 0 }
+        let marks = vec![0; tets.len()];
+        Self { tets, neighbors, incident, marks, epoch: 0 }
     }
 
     /// Whether the vertex is in the mesh.
@@ -87,7 +86,6 @@ impl WorkMesh {
             self.incident[tet[k] as usize] = beyond_i;
         }
         self.tets[t as usize] = [NONE; 4];
-        self.live_tets -= 1;
     }
 
     fn relink(&mut self, t: u32, from: u32, to: u32) {
