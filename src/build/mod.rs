@@ -24,6 +24,8 @@ mod cost;
 mod history;
 mod plan;
 mod quantize;
+#[allow(dead_code, reason = "the builders of vertex-based MTs follow")]
+mod sequence;
 mod skin;
 mod work_mesh;
 
