@@ -6,6 +6,9 @@ use super::BuildProgress;
 use super::BuildResult;
 use super::BuildSummary;
 use super::OnProgress;
+use super::agenda::Agenda;
+use super::agenda::Key;
+use super::agenda::level_error;
 use super::cost::Buckets;
 use super::cost::Evaluator;
 use super::cost::Reference;
@@ -28,8 +31,6 @@ use crate::mt::ErrorCode;
 use crate::mt::MAX_UPDATES;
 use crate::mt::MtInfo;
 use crate::mt::MtKind;
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
 
 /// Builds an edge-based MT of `mesh`, which must be valid: see [`crate::mesh::repair`].
 ///
@@ -78,40 +79,6 @@ pub fn edge_mt(
     Ok(BuildResult { mt, summary })
 }
 
-/// Errors that nobody tells apart are ordered by other things: depth of the partial order, size of the star, length of
-/// the edge. Below this error nobody cares; above it, levels of half a power of two group them.
-const FINEST: f64 = 2e-4;
-/// Bits of an error's code that do not count for its level.
-const LEVEL_BITS: u32 = 10;
-
-/// The order of candidates: error level, then depth plus star size, then length; ties by vertex numbers.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Key {
-    /// From the top: 16 bits of error level, 16 of depth plus star size, 32 of length (squared, as a float); one word,
-    /// so that the queue compares quickly.
-    cost: u64,
-    a: u32,
-    b: u32,
-}
-
-impl Key {
-    fn level(self) -> u16 {
-        (self.cost >> 48) as u16
-    }
-
-    /// Level, depth and star size: what has to be right before the edge is collapsed.
-    fn urgency(self) -> u32 {
-        (self.cost >> 32) as u32
-    }
-
-    fn no_earlier_than(mut self, level: u16) -> Self {
-        if self.level() < level {
-            self.cost = self.cost & ((1 << 48) - 1) | u64::from(level) << 48;
-        }
-        self
-    }
-}
-
 struct Builder<'a> {
     mesh: WorkMesh,
     data: VertexData,
@@ -123,11 +90,7 @@ struct Builder<'a> {
     marks: VertexMarks,
     /// Counts the changes around each vertex.
     versions: Vec<u32>,
-    /// Candidates of the level that is worked on, and of those before.
-    queue: BinaryHeap<Reverse<Key>>,
-    level: u16,
-    /// Candidates of later levels.
-    later: Vec<Vec<Key>>,
+    agenda: Agenda,
     /// Edges that could not be collapsed, with the sum of their ends' versions then.
     blocked: Vec<(u32, u32, u32)>,
     plan: Plan,
@@ -162,7 +125,7 @@ impl<'a> Builder<'a> {
             displacement_per_error: info.displacement_per_error,
         };
         Self {
-            gradients: gradients(&mesh, &data, quantized.fields.len()),
+            gradients: quantized.gradients(&mesh.tets),
             buckets: Buckets::new(mesh.tets.len(), points),
             marks: VertexMarks::new(points),
             versions: vec![0; points],
@@ -170,9 +133,7 @@ impl<'a> Builder<'a> {
             data,
             reference,
             frozen,
-            queue: BinaryHeap::new(),
-            level: 0,
-            later: Vec::new(),
+            agenda: Agenda::default(),
             blocked: Vec::new(),
             plan: Plan::default(),
             evaluator: Evaluator::default(),
@@ -193,7 +154,7 @@ impl<'a> Builder<'a> {
                     return Err(BuildError::Stopped);
                 }
             }
-            let Some(Reverse(key)) = self.queue.pop() else {
+            let Some(key) = self.agenda.pop() else {
                 if self.next_level() {
                     continue;
                 }
@@ -211,35 +172,15 @@ impl<'a> Builder<'a> {
         edges.sort_unstable();
         edges.dedup();
         for (a, b) in edges {
-            self.push(self.predicted_key(a, b));
+            self.agenda.push(self.predicted_key(a, b));
         }
-    }
-
-    /// Puts a candidate where it belongs: into the queue, or aside until its level is reached. Most candidates are
-    /// never reached at the level of their first prediction, so this keeps the queue short.
-    fn push(&mut self, key: Key) {
-        if key.level() <= self.level {
-            self.queue.push(Reverse(key));
-            return;
-        }
-        let level = usize::from(key.level());
-        if level >= self.later.len() {
-            self.later.resize_with(level + 1, Vec::new);
-        }
-        self.later[level].push(key);
     }
 
     /// Goes on to the next level that has candidates; what was in the way at the lower ones may be gone, so that is
     /// looked at again. False if nothing is left to do.
     fn next_level(&mut self) -> bool {
-        let first = usize::from(self.level) + 1;
-        let next = (first..self.later.len()).find(|&level| !self.later[level].is_empty());
-        if let Some(level) = next {
-            self.level = level as u16;
-            let keys = std::mem::take(&mut self.later[level]);
-            self.queue = keys.into_iter().map(Reverse).collect();
-        }
-        self.retry_blocked() || next.is_some()
+        let more = self.agenda.next_level();
+        self.retry_blocked() || more
     }
 
     /// Puts those blocked edges back whose neighbourhood has changed. Tells whether there were any.
@@ -253,8 +194,8 @@ impl<'a> Builder<'a> {
             if self.edge_version(a, b) == versions {
                 return true;
             }
-            let key = self.predicted_key(a, b).no_earlier_than(self.level);
-            self.push(key);
+            let key = self.predicted_key(a, b).no_earlier_than(self.agenda.level());
+            self.agenda.push(key);
             false
         });
         self.blocked = still;
@@ -268,11 +209,7 @@ impl<'a> Builder<'a> {
     fn key(&self, error: f64, height: u32, star: u32, a: u32, b: u32) -> Key {
         let (p, q) = (self.data.positions[a as usize], self.data.positions[b as usize]);
         let length: f32 = (0..3).map(|i| (i64::from(p[i]) - i64::from(q[i])) as f32).map(|d| d * d).sum();
-        let second = (height + star).min(u32::from(u16::MAX));
-        // Bits of floats that are not negative compare as the floats do.
-        let cost =
-            u64::from(error_level(error)) << 48 | u64::from(second) << 32 | u64::from(length.to_bits());
-        Key { cost, a, b }
+        Key::new(error, height + star, length, a, b)
     }
 
     /// A key from what the ends know: second differences of the fields, errors and depths so far.
@@ -308,7 +245,7 @@ impl<'a> Builder<'a> {
         let error = evaluator.evaluate(plan, mesh, data, buckets, reference, limit);
         let exact = self.key(error, self.evaluator.height, self.plan.stay.len() as u32, a, b);
         if exact.urgency() > key.urgency() {
-            self.push(exact);
+            self.agenda.push(exact);
             return;
         }
         self.perform(error);
@@ -350,39 +287,7 @@ impl<'a> Builder<'a> {
             let x = self.plan.link[i];
             self.versions[x as usize] = self.versions[x as usize].wrapping_add(1);
             let key = self.predicted_key(x, v);
-            self.push(key);
+            self.agenda.push(key);
         }
     }
-}
-
-/// The level of an error. Stored errors are logarithmic, so their codes are; no logarithm is taken, since the libraries
-/// of different platforms round it differently.
-fn error_level(error: f64) -> u16 {
-    let code = ErrorCode::at_least(error).max(ErrorCode::at_least(FINEST));
-    code.0 >> LEVEL_BITS
-}
-
-/// The largest error of a level.
-fn level_error(level: u16) -> f64 {
-    ErrorCode(level << LEVEL_BITS | ((1 << LEVEL_BITS) - 1)).error()
-}
-
-/// Volume-weighted averages of the tetrahedra's gradients.
-fn gradients(mesh: &WorkMesh, data: &VertexData, fields: usize) -> Vec<glam::DVec3> {
-    let vertices = data.positions.len();
-    let mut sums = vec![glam::DVec3::ZERO; vertices * fields];
-    let mut volumes = vec![0.0; vertices];
-    for tet in &mesh.tets {
-        let [a, b, c, d] = tet.map(|v| glam::DVec3::from_array(data.positions[v as usize].map(f64::from)));
-        let (u, v, w) = (b - a, c - a, d - a);
-        let volume = u.cross(v).dot(w);
-        for f in 0..fields {
-            let [l0, l1, l2, l3] = tet.map(|v| f64::from(data.levels[v as usize * fields + f]));
-            // Six times the volume times the gradient; the volume cancels in the weighted average.
-            let weighted = v.cross(w) * (l1 - l0) + w.cross(u) * (l2 - l0) + u.cross(v) * (l3 - l0);
-            tet.iter().for_each(|&v| sums[v as usize * fields + f] += weighted);
-        }
-        tet.iter().for_each(|&v| volumes[v as usize] += volume);
-    }
-    sums.iter().enumerate().map(|(i, sum)| *sum / f64::max(volumes[i / fields], f64::MIN_POSITIVE)).collect()
 }

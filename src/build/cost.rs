@@ -35,9 +35,9 @@ pub(super) struct VertexData {
 /// The reference vertices that belong to each tetrahedron.
 pub(super) struct Buckets {
     /// Those that it stands for.
-    inside: Lists,
+    pub inside: Lists,
     /// Those of the boundary that its boundary faces stand for.
-    border: Lists,
+    pub border: Lists,
 }
 
 impl Buckets {
@@ -47,7 +47,7 @@ impl Buckets {
 }
 
 /// Disjoint lists of points, one for each tetrahedron.
-struct Lists {
+pub(super) struct Lists {
     first: Vec<u32>,
     next: Vec<u32>,
 }
@@ -57,15 +57,15 @@ impl Lists {
         Self { first: vec![NONE; tets], next: vec![NONE; points] }
     }
 
-    fn take(&mut self, t: u32) {
+    pub fn take(&mut self, t: u32) {
         self.first[t as usize] = NONE;
     }
 
-    fn put(&mut self, t: u32, point: u32) {
+    pub fn put(&mut self, t: u32, point: u32) {
         self.next[point as usize] = std::mem::replace(&mut self.first[t as usize], point);
     }
 
-    fn iter(&self, t: u32) -> impl Iterator<Item = u32> {
+    pub fn iter(&self, t: u32) -> impl Iterator<Item = u32> {
         let step = |p: u32| (p != NONE).then_some(p);
         std::iter::successors(step(self.first[t as usize]), move |&p| step(self.next[p as usize]))
     }
@@ -89,11 +89,36 @@ struct Cell {
 }
 
 /// A boundary triangle in model units.
-struct Face {
+pub(super) struct Face {
     corners: [DVec3; 3],
     normal: DVec3,
     /// The normal's length, squared.
     area: f64,
+}
+
+impl Face {
+    pub fn new(corners: [DVec3; 3]) -> Self {
+        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+        Self { corners, normal, area: normal.length_squared() }
+    }
+}
+
+/// The number of the face nearest to `p`, the nearest point there, and its distance.
+pub(super) fn nearest_face(p: DVec3, faces: &[Face]) -> (usize, DVec3, f64) {
+    let (mut least, mut found, mut nearest) = (f64::INFINITY, 0, p);
+    for (i, face) in faces.iter().enumerate() {
+        // No point of a triangle is nearer than its plane.
+        let height = (p - face.corners[0]).dot(face.normal);
+        if height * height > least * face.area {
+            continue;
+        }
+        let q = nearest_on_triangle(p, face.corners);
+        let distance = p.distance_squared(q);
+        if distance < least {
+            (least, found, nearest) = (distance, i, q);
+        }
+    }
+    (found, nearest, least.sqrt())
 }
 
 /// Evaluates collapses; holds scratch space.
@@ -121,7 +146,7 @@ pub(super) struct Evaluator {
 const NO_DISTANCE: f64 = 1e-8;
 
 /// Barycentric coordinates this far below zero are rounding errors of a point on a face.
-const SLACK: f64 = 1e-9;
+pub(super) const SLACK: f64 = 1e-9;
 
 impl Evaluator {
     /// The error of the planned collapse; any value above `limit` may be returned early once it is exceeded, then
@@ -395,30 +420,14 @@ impl Evaluator {
         if self.faces.is_empty() {
             self.lay_out_faces(plan, data, reference);
         }
-        let (mut least, mut found, mut nearest) = (f64::INFINITY, 0, p);
-        for (face, &(cell, _)) in self.faces.iter().zip(&self.border).take(count) {
-            // No point of a triangle is nearer than its plane.
-            let height = (p - face.corners[0]).dot(face.normal);
-            if height * height > least * face.area {
-                continue;
-            }
-            let q = nearest_on_triangle(p, face.corners);
-            let distance = p.distance_squared(q);
-            if distance < least {
-                (least, found, nearest) = (distance, cell, q);
-            }
-        }
-        (found, nearest, least.sqrt())
+        let (face, q, distance) = nearest_face(p, &self.faces[..count.min(self.faces.len())]);
+        (self.border.get(face).map_or(0, |&(cell, _)| cell), q, distance)
     }
 
     fn lay_out_faces(&mut self, plan: &Plan, data: &VertexData, reference: &Reference<'_>) {
         let at =
             |v: u32| reference.scaled(if v == NONE { plan.position } else { data.positions[v as usize] });
-        self.faces.extend(self.border.iter().map(|&(_, triangle)| {
-            let corners = triangle.map(at);
-            let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
-            Face { corners, normal, area: normal.length_squared() }
-        }));
+        self.faces.extend(self.border.iter().map(|&(_, triangle)| Face::new(triangle.map(at))));
     }
 
     fn field_error(
@@ -456,7 +465,7 @@ impl Cell {
 
 impl Reference<'_> {
     /// What a displacement counts as.
-    fn error_of(&self, distance: f64) -> f64 {
+    pub fn error_of(&self, distance: f64) -> f64 {
         if distance > 0.0 { distance / self.displacement_per_error } else { 0.0 }
     }
 
@@ -466,12 +475,12 @@ impl Reference<'_> {
     }
 }
 
-fn as_vec(q: [i32; 3]) -> DVec3 {
+pub(super) fn as_vec(q: [i32; 3]) -> DVec3 {
     DVec3::from_array(q.map(f64::from))
 }
 
 /// Barycentric coordinates of a point just outside, moved inside.
-fn clamped(lambda: DVec3) -> DVec3 {
+pub(super) fn clamped(lambda: DVec3) -> DVec3 {
     let inside = lambda.max(DVec3::ZERO);
     let sum = inside.element_sum();
     if sum > 1.0 { inside / sum } else { inside }

@@ -19,6 +19,7 @@
 //! Not promised: distant parts of a curved boundary may come to overlap where they were nearer to each other than
 //! the error allows the boundary to move.
 
+mod agenda;
 mod collapse;
 mod cost;
 mod history;

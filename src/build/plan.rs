@@ -62,7 +62,7 @@ impl VertexMarks {
         self.marks.push(0);
     }
 
-    fn start(&mut self) {
+    pub fn start(&mut self) {
         self.epoch += 1;
         if self.epoch == 1 << (32 - FLAG_BITS) {
             self.marks.fill(0);
@@ -70,12 +70,12 @@ impl VertexMarks {
         }
     }
 
-    fn get(&self, v: u32) -> u32 {
+    pub fn get(&self, v: u32) -> u32 {
         let mark = self.marks[v as usize];
         if mark >> FLAG_BITS == self.epoch { mark & ((1 << FLAG_BITS) - 1) } else { 0 }
     }
 
-    fn add(&mut self, v: u32, flag: u32) -> u32 {
+    pub fn add(&mut self, v: u32, flag: u32) -> u32 {
         let old = self.get(v);
         self.marks[v as usize] = self.epoch << FLAG_BITS | old | flag;
         old

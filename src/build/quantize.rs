@@ -11,6 +11,7 @@ use crate::mesh::Grid;
 use crate::mesh::TetMesh;
 use crate::mt::FieldInfo;
 use crate::mt::MAX_FIELD_BITS;
+use glam::DVec3;
 
 /// The fewest position bits that are tried unless the caller says otherwise.
 const FEWEST_BITS: u32 = 16;
@@ -26,6 +27,32 @@ pub(super) struct Quantized {
     pub levels: Vec<i32>,
     /// The input's values in units of levels, not rounded; errors are measured against these.
     pub exact: Vec<f64>,
+}
+
+impl Quantized {
+    /// The average gradient of each field at each point, in levels per lattice step: averages of the tetrahedra's
+    /// gradients, weighted by volume.
+    pub fn gradients(&self, tets: &[[u32; 4]]) -> Vec<DVec3> {
+        let (vertices, fields) = (self.positions.len(), self.fields.len());
+        let mut sums = vec![DVec3::ZERO; vertices * fields];
+        let mut volumes = vec![0.0; vertices];
+        for tet in tets {
+            let [a, b, c, d] = tet.map(|v| DVec3::from_array(self.positions[v as usize].map(f64::from)));
+            let (u, v, w) = (b - a, c - a, d - a);
+            let volume = u.cross(v).dot(w);
+            for f in 0..fields {
+                let [l0, l1, l2, l3] = tet.map(|v| f64::from(self.levels[v as usize * fields + f]));
+                // Six times the volume times the gradient; the volume cancels in the weighted average.
+                let weighted = v.cross(w) * (l1 - l0) + w.cross(u) * (l2 - l0) + u.cross(v) * (l3 - l0);
+                tet.iter().for_each(|&v| sums[v as usize * fields + f] += weighted);
+            }
+            tet.iter().for_each(|&v| volumes[v as usize] += volume);
+        }
+        sums.iter()
+            .enumerate()
+            .map(|(i, sum)| *sum / f64::max(volumes[i / fields], f64::MIN_POSITIVE))
+            .collect()
+    }
 }
 
 pub(super) fn quantize(mesh: &TetMesh, config: &BuildConfig) -> Result<Quantized, BuildError> {

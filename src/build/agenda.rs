@@ -1,0 +1,108 @@
+//! What to simplify next: candidates in the order of error level, depth plus star size, and length.
+
+use crate::mt::ErrorCode;
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+/// Errors that nobody tells apart are ordered by other things: depth of the partial order, size of the star, length of
+/// the edge. Below this error nobody cares; above it, levels of half a power of two group them.
+const FINEST: f64 = 2e-4;
+/// Bits of an error's code that do not count for its level.
+const LEVEL_BITS: u32 = 10;
+
+/// The order of candidates: error level, then depth plus star size, then length; ties by vertex numbers.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Key {
+    /// From the top: 16 bits of error level, 16 of depth plus star size, 32 of length (squared, as a float); one word,
+    /// so that the queue compares quickly.
+    cost: u64,
+    pub a: u32,
+    pub b: u32,
+}
+
+impl Key {
+    /// `second` is depth plus star size.
+    pub fn new(error: f64, second: u32, length: f32, a: u32, b: u32) -> Self {
+        let second = second.min(u32::from(u16::MAX));
+        // Bits of floats that are not negative compare as the floats do.
+        let cost =
+            u64::from(error_level(error)) << 48 | u64::from(second) << 32 | u64::from(length.to_bits());
+        Self { cost, a, b }
+    }
+
+    pub fn level(self) -> u16 {
+        (self.cost >> 48) as u16
+    }
+
+    /// Level, depth and star size: what has to be right before the candidate is carried out.
+    pub fn urgency(self) -> u32 {
+        (self.cost >> 32) as u32
+    }
+
+    pub fn no_earlier_than(mut self, level: u16) -> Self {
+        if self.level() < level {
+            self.cost = self.cost & ((1 << 48) - 1) | u64::from(level) << 48;
+        }
+        self
+    }
+}
+
+/// The candidates.
+#[derive(Default)]
+pub(super) struct Agenda {
+    /// Candidates of the level that is worked on, and of those before.
+    queue: BinaryHeap<Reverse<Key>>,
+    level: u16,
+    /// Candidates of later levels.
+    later: Vec<Vec<Key>>,
+}
+
+impl Agenda {
+    /// The level that is worked on.
+    pub fn level(&self) -> u16 {
+        self.level
+    }
+
+    /// The next candidate of this level.
+    pub fn pop(&mut self) -> Option<Key> {
+        self.queue.pop().map(|Reverse(key)| key)
+    }
+
+    /// Puts a candidate where it belongs: into the queue, or aside until its level is reached. Most candidates are
+    /// never reached at the level of their first prediction, so this keeps the queue short.
+    pub fn push(&mut self, key: Key) {
+        if key.level() <= self.level {
+            self.queue.push(Reverse(key));
+            return;
+        }
+        let level = usize::from(key.level());
+        if level >= self.later.len() {
+            self.later.resize_with(level + 1, Vec::new);
+        }
+        self.later[level].push(key);
+    }
+
+    /// Goes on to the next level that has candidates; false if there is none.
+    pub fn next_level(&mut self) -> bool {
+        let first = usize::from(self.level) + 1;
+        let next = (first..self.later.len()).find(|&level| !self.later[level].is_empty());
+        if let Some(level) = next {
+            self.level = level as u16;
+            let keys = std::mem::take(&mut self.later[level]);
+            self.queue = keys.into_iter().map(Reverse).collect();
+        }
+        next.is_some()
+    }
+}
+
+/// The level of an error. Stored errors are logarithmic, so their codes are; no logarithm is taken, since the libraries
+/// of different platforms round it differently.
+fn error_level(error: f64) -> u16 {
+    let code = ErrorCode::at_least(error).max(ErrorCode::at_least(FINEST));
+    code.0 >> LEVEL_BITS
+}
+
+/// The largest error of a level.
+pub(super) fn level_error(level: u16) -> f64 {
+    ErrorCode(level << LEVEL_BITS | ((1 << LEVEL_BITS) - 1)).error()
+}
