@@ -44,6 +44,16 @@ impl Buckets {
     pub fn new(tets: usize, points: usize) -> Self {
         Self { inside: Lists::new(tets, points), border: Lists::new(tets, points) }
     }
+
+    /// Empties the buckets of a tetrahedron, which may be a new one.
+    pub fn clear(&mut self, t: u32) {
+        for lists in [&mut self.inside, &mut self.border] {
+            if lists.first.len() <= t as usize {
+                lists.first.resize(t as usize + 1, NONE);
+            }
+            lists.take(t);
+        }
+    }
 }
 
 /// Disjoint lists of points, one for each tetrahedron.

@@ -22,7 +22,14 @@
 mod agenda;
 mod collapse;
 mod cost;
+#[allow(dead_code, reason = "the builders of vertex-based MTs follow")]
+mod decimate;
+mod fill_cost;
+mod gift_wrap;
+mod half_edge;
 mod history;
+mod hole;
+mod in_sphere;
 mod plan;
 mod quantize;
 #[allow(dead_code, reason = "the builders of vertex-based MTs follow")]

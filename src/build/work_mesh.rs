@@ -1,16 +1,18 @@
 //! The mesh that the builder edits: topology only.
 //!
 //! Vertices are numbered as they come: those of the input first, then one for each collapse. Tetrahedra keep their
-//! numbers; those that a collapse removes are marked dead.
+//! numbers; those that a collapse removes are marked dead. Removals of vertices use dead numbers again.
 
 use crate::mesh::NONE;
 
-/// A tetrahedral mesh with adjacency, edited by edge collapses.
+/// A tetrahedral mesh with adjacency, edited by edge collapses or vertex removals.
 pub(super) struct WorkMesh {
     pub tets: Vec<[u32; 4]>,
     pub neighbors: Vec<[u32; 4]>,
     /// A tetrahedron at each vertex; [`NONE`] once the vertex is gone.
     pub incident: Vec<u32>,
+    /// Numbers of dead tetrahedra that [`WorkMesh::fresh`] may give away.
+    unused: Vec<u32>,
     marks: Vec<u32>,
     epoch: u32,
 }
@@ -29,7 +31,7 @@ impl WorkMesh {
             tet.iter().for_each(|&v| incident[v as usize] = t as u32);
         }
         let marks = vec![0; tets.len()];
-        Self { tets, neighbors, incident, marks, epoch: 0 }
+        Self { tets, neighbors, incident, unused: Vec::new(), marks, epoch: 0 }
     }
 
     /// Whether the vertex is in the mesh.
@@ -86,6 +88,22 @@ impl WorkMesh {
             self.incident[tet[k] as usize] = beyond_i;
         }
         self.tets[t as usize] = [NONE; 4];
+    }
+
+    /// Takes tetrahedron `t` out; its neighbours are left to the caller.
+    pub fn free(&mut self, t: u32) {
+        self.tets[t as usize] = [NONE; 4];
+        self.unused.push(t);
+    }
+
+    /// The number of a tetrahedron yet to be filled in.
+    pub fn fresh(&mut self) -> u32 {
+        self.unused.pop().unwrap_or_else(|| {
+            self.tets.push([NONE; 4]);
+            self.neighbors.push([NONE; 4]);
+            self.marks.push(0);
+            (self.tets.len() - 1) as u32
+        })
     }
 
     fn relink(&mut self, t: u32, from: u32, to: u32) {

@@ -1,0 +1,338 @@
+//! Vertex-based MTs from fine to coarse: pick a vertex, remove it, record it [§2.2, §5].
+
+use super::BuildConfig;
+use super::BuildError;
+use super::BuildProgress;
+use super::OnProgress;
+use super::agenda::Agenda;
+use super::agenda::Key;
+use super::agenda::level_error;
+use super::cost::Buckets;
+use super::cost::Reference;
+use super::fill_cost::FillCost;
+use super::fill_cost::Legacy;
+use super::fill_cost::Past;
+use super::gift_wrap::GiftWrap;
+use super::half_edge::contract;
+use super::half_edge::keeps_topology;
+use super::hole::Filling;
+use super::hole::Hole;
+use super::plan::VertexMarks;
+use super::quantize;
+use super::quantize::Quantized;
+use super::sequence::Insertion;
+use super::sequence::Sequence;
+use super::skin::Skin;
+use super::work_mesh::StarTet;
+use super::work_mesh::WorkMesh;
+use crate::geom::Bounds;
+use crate::mesh;
+use crate::mesh::NONE;
+use crate::mesh::TetMesh;
+use crate::mesh::Topology;
+use crate::mt::ErrorCode;
+use crate::mt::MAX_UPDATES;
+use glam::DVec3;
+
+/// How the hole of a removed vertex is filled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Criterion {
+    /// By contracting an edge to the end that stays: works in any mesh.
+    HalfEdge,
+    /// By the Delaunay criterion. Vertices of a curved boundary stay.
+    Delaunay,
+}
+
+/// What [`decimate`] hands over.
+pub(super) struct Decimated {
+    pub sequence: Sequence,
+    pub quantized: Quantized,
+    /// Length of the longest chain of insertions, each of which depends on the one before.
+    pub depth: u32,
+    /// Model units of displacement that count as an error of 1.
+    pub displacement_per_error: f64,
+}
+
+/// Removes vertices of `mesh`, cheapest first, until no more can be removed. `mesh` must be valid: see
+/// [`crate::mesh::repair`].
+///
+/// # Errors
+/// As [`super::edge_mt`].
+pub(super) fn decimate(
+    mesh: &TetMesh,
+    config: &BuildConfig,
+    criterion: Criterion,
+    progress: OnProgress<'_>,
+) -> Result<Decimated, BuildError> {
+    if mesh.positions.len() > MAX_UPDATES as usize {
+        return Err(BuildError::TooLarge);
+    }
+    mesh::check(mesh).map_err(BuildError::Mesh)?;
+    let Topology { neighbors, non_manifold, .. } =
+        mesh::topology(mesh.positions.len(), &mesh.tets).map_err(BuildError::Mesh)?;
+    let quantized = quantize::quantize(mesh, config)?;
+    let displacement_per_error = config.displacement * Bounds::of(&mesh.positions).diagonal();
+    let work = WorkMesh::new(mesh.tets.clone(), neighbors, mesh.positions.len());
+    let mut decimator = Decimator::new(work, &quantized, displacement_per_error, non_manifold, criterion);
+    decimator.remove_all(progress)?;
+    let Decimator { mesh: base, past, mut sequence, .. } = decimator;
+    sequence.base = base.tets.iter().copied().filter(|tet| tet[0] != NONE).collect();
+    turn_round(&mut sequence);
+    let depth = past.heights.iter().copied().max().unwrap_or(0);
+    Ok(Decimated { sequence, quantized, depth, displacement_per_error })
+}
+
+/// Makes insertions, coarse to fine, of removals in the order in which they were made.
+fn turn_round(sequence: &mut Sequence) {
+    let all = sequence.tets.len();
+    sequence.tets.reverse();
+    sequence.steps.reverse();
+    for step in &mut sequence.steps {
+        for range in [&mut step.removed, &mut step.inserted] {
+            *range = all - range.end..all - range.start;
+        }
+    }
+}
+
+struct Decimator<'a> {
+    mesh: WorkMesh,
+    /// Average gradient of each field at each vertex, in levels per lattice step.
+    gradients: Vec<DVec3>,
+    reference: Reference<'a>,
+    frozen: Vec<bool>,
+    /// None where holes are filled by contracting edges.
+    gift_wrap: Option<GiftWrap>,
+    criterion: Criterion,
+    buckets: Buckets,
+    marks: VertexMarks,
+    past: Past,
+    /// Counts the changes around each vertex.
+    versions: Vec<u32>,
+    /// The version that a vertex had when it was looked at last.
+    seen: Vec<u32>,
+    agenda: Agenda,
+    /// Vertices that could not be removed, with their versions then.
+    blocked: Vec<(u32, u32)>,
+    hole: Hole,
+    star: Vec<StarTet>,
+    /// Link vertices by what is predicted of contracting the edge to them.
+    ends: Vec<(f64, u32)>,
+    /// The filling that is looked at, and the best one so far.
+    now: Candidate,
+    best: Candidate,
+    slots: Vec<u32>,
+    /// The removals so far: each with the star in `inserted` and the filling in `removed`.
+    sequence: Sequence,
+}
+
+/// A filling and its cost.
+#[derive(Default)]
+struct Candidate {
+    filling: Filling,
+    cost: FillCost,
+    error: f64,
+}
+
+impl<'a> Decimator<'a> {
+    fn new(
+        mesh: WorkMesh,
+        quantized: &'a Quantized,
+        displacement_per_error: f64,
+        frozen: Vec<bool>,
+        criterion: Criterion,
+    ) -> Self {
+        let points = quantized.positions.len();
+        let step = DVec3::from_array(quantized.lattice.step);
+        let scaled = |q: &[i32; 3]| DVec3::from_array(q.map(f64::from)) * step;
+        let places: Vec<DVec3> = quantized.positions.iter().map(scaled).collect();
+        let skin = Skin::new(&mesh.tets, &mesh.neighbors, &places);
+        let wraps = criterion == Criterion::Delaunay;
+        Self {
+            gradients: quantized.gradients(&mesh.tets),
+            reference: Reference { quantized, points: points as u32, skin, displacement_per_error },
+            frozen,
+            gift_wrap: if wraps { GiftWrap::new(&quantized.positions) } else { None },
+            criterion,
+            buckets: Buckets::new(mesh.tets.len(), points),
+            marks: VertexMarks::new(points),
+            past: Past::new(mesh.tets.len()),
+            versions: vec![0; points],
+            seen: vec![u32::MAX; points],
+            agenda: Agenda::default(),
+            blocked: Vec::new(),
+            hole: Hole::default(),
+            star: Vec::new(),
+            ends: Vec::new(),
+            now: Candidate::default(),
+            best: Candidate::default(),
+            slots: Vec::new(),
+            sequence: Sequence::default(),
+            mesh,
+        }
+    }
+
+    fn remove_all(&mut self, progress: OnProgress<'_>) -> Result<(), BuildError> {
+        for v in 0..self.reference.points {
+            if self.mesh.has(v) && !self.frozen[v as usize] {
+                self.agenda.push(Key::new(0.0, 0, 0.0, v, NONE));
+            }
+        }
+        let mut steps = 0_u64;
+        loop {
+            steps += 1;
+            if steps.is_multiple_of(1024) {
+                let done = self.sequence.steps.len() as u64;
+                let total = u64::from(self.reference.points);
+                if progress(BuildProgress { stage: "remove", done, total }).is_break() {
+                    return Err(BuildError::Stopped);
+                }
+            }
+            if let Some(key) = self.agenda.pop() {
+                self.try_remove(key);
+            } else {
+                let more = self.agenda.next_level();
+                if !self.retry_blocked() && !more {
+                    return Ok(());
+                }
+            }
+        }
+    }
+
+    /// Puts those blocked vertices back whose neighbourhood has changed. Tells whether there were any.
+    fn retry_blocked(&mut self) -> bool {
+        let Self { blocked, versions, agenda, .. } = self;
+        let before = blocked.len();
+        blocked.retain(|&(a, version)| {
+            if versions[a as usize] == version {
+                return true;
+            }
+            agenda.push(Key::new(0.0, 0, 0.0, a, NONE).no_earlier_than(agenda.level()));
+            false
+        });
+        blocked.len() < before
+    }
+
+    fn try_remove(&mut self, key: Key) {
+        let a = key.a;
+        let version = self.versions[a as usize];
+        if self.hole.open(&mut self.mesh, &self.reference.quantized.positions, a).is_err() {
+            self.blocked.push((a, version));
+            return;
+        }
+        let legacy = self.past.legacy(&self.hole, &self.reference);
+        let known = self.seen[a as usize] == version && key.b != NONE;
+        self.seen[a as usize] = version;
+        let exact = match self.criterion {
+            Criterion::HalfEdge => self.find_end(key, legacy, known),
+            Criterion::Delaunay => self.wrap(key, legacy),
+        };
+        match exact {
+            None => self.blocked.push((a, version)),
+            Some(exact) if exact.urgency() > key.urgency() => self.agenda.push(exact),
+            Some(_) => self.perform(legacy),
+        }
+    }
+
+    fn key(&self, error: f64, height: u32, b: u32) -> Key {
+        let a = self.hole.a;
+        let length = if b == NONE { 0.0 } else { self.squared_length(a, b) };
+        Key::new(error, height + self.hole.star.len() as u32, length, a, b)
+    }
+
+    fn squared_length(&self, a: u32, b: u32) -> f32 {
+        let [p, q] = [a, b].map(|v| self.reference.quantized.positions[v as usize]);
+        (0..3).map(|i| (i64::from(p[i]) - i64::from(q[i])) as f32).map(|d| d * d).sum()
+    }
+
+    /// Finds the best edge to contract; only the one in `key` if that is `known` to be it. Its filling becomes `best`.
+    fn find_end(&mut self, key: Key, legacy: Legacy, known: bool) -> Option<Key> {
+        self.ends.clear();
+        if known {
+            self.ends.push((0.0, key.b));
+        } else {
+            let ends = self
+                .hole
+                .link
+                .iter()
+                .map(|&b| (predicted(&self.reference, &self.gradients, self.hole.a, b), b));
+            self.ends.extend(ends);
+            self.ends.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+        }
+        let mut found: Option<Key> = None;
+        for i in 0..self.ends.len() {
+            let b = self.ends[i].1;
+            let positions = &self.reference.quantized.positions;
+            if !contract(&self.hole, positions, b, &mut self.now.filling) {
+                continue;
+            }
+            if self.hole.on_boundary() {
+                let Self { hole, mesh, marks, star, .. } = self;
+                if self.frozen[b as usize] || !keeps_topology(hole, mesh, marks, star, b) {
+                    continue;
+                }
+            }
+            let limit = level_error(found.map_or(key.level(), |found| found.level().min(key.level())));
+            let Self { hole, now, buckets, reference, .. } = self;
+            now.error = now.cost.evaluate(hole, &now.filling, legacy, buckets, reference, limit);
+            let exact = self.key(self.now.error, legacy.height, b);
+            if found.is_none_or(|found| exact < found) {
+                found = Some(exact);
+                std::mem::swap(&mut self.now, &mut self.best);
+            }
+        }
+        found
+    }
+
+    /// Fills the hole by the Delaunay criterion; the filling becomes `best`.
+    fn wrap(&mut self, key: Key, legacy: Legacy) -> Option<Key> {
+        let Self { hole, best, buckets, reference, gift_wrap, .. } = self;
+        if !gift_wrap.as_mut()?.fill(hole, &reference.quantized.positions, &mut best.filling) {
+            return None;
+        }
+        let limit = level_error(key.level());
+        best.error = best.cost.evaluate(hole, &best.filling, legacy, buckets, reference, limit);
+        Some(self.key(self.best.error, legacy.height, NONE))
+    }
+
+    fn perform(&mut self, legacy: Legacy) {
+        // Never zero: error 0 is to mean the reference mesh, with every vertex in.
+        let error = ErrorCode::at_least(self.best.error).max(ErrorCode(1)).error();
+        let Self { mesh, hole, best, slots, past, sequence, .. } = self;
+        let start = sequence.tets.len();
+        sequence.tets.extend(hole.star.iter().map(|s| mesh.tets[s.tet as usize]));
+        let middle = sequence.tets.len();
+        sequence.tets.extend_from_slice(&best.filling.tets);
+        let end = sequence.tets.len();
+        let step = best.cost.step;
+        let removal = sequence.steps.len() as u32;
+        sequence.steps.push(Insertion {
+            vertex: hole.a,
+            removed: middle..end,
+            inserted: start..middle,
+            error,
+            step,
+        });
+        hole.replace(mesh, &best.filling, slots);
+        past.errors.push(error);
+        past.heights.push(legacy.height);
+        past.makers.resize(mesh.tets.len(), NONE);
+        slots.iter().for_each(|&t| past.makers[t as usize] = removal);
+        best.cost.settle(hole, &best.filling, &mut self.buckets, &self.reference, slots);
+        for &v in &hole.link {
+            self.versions[v as usize] = self.versions[v as usize].wrapping_add(1);
+        }
+    }
+}
+
+/// The second difference of the fields along an edge that is to be contracted to `b`, as an error.
+fn predicted(reference: &Reference<'_>, gradients: &[DVec3], a: u32, b: u32) -> f64 {
+    let Quantized { positions, levels, fields, .. } = reference.quantized;
+    let [p, q] = [a, b].map(|v| DVec3::from_array(positions[v as usize].map(f64::from)));
+    let mut largest = 0.0_f64;
+    for (f, field) in fields.iter().enumerate() {
+        let [u, v] = [a, b].map(|v| v as usize * fields.len() + f);
+        let rise = f64::from(levels[v] - levels[u]);
+        largest = largest.max((rise - gradients[u].dot(q - p)).abs() * field.step / field.range());
+    }
+    largest
+}

@@ -1,0 +1,302 @@
+//! The exact error of a removal: what the field and the boundary lose when a hole is filled, at every reference vertex
+//! concerned.
+//!
+//! Buckets are those of [`super::cost`]. A removal takes points from tetrahedra that it removes to tetrahedra that it
+//! makes; all other tetrahedra keep theirs, and their errors.
+
+use super::cost::Buckets;
+use super::cost::Face;
+use super::cost::Reference;
+use super::cost::SLACK;
+use super::cost::as_vec;
+use super::cost::clamped;
+use super::cost::nearest_face;
+use super::hole::Filling;
+use super::hole::Hole;
+use crate::mesh::NONE;
+use glam::DMat3;
+use glam::DVec3;
+
+/// What is known of the removals so far.
+#[derive(Default)]
+pub(super) struct Past {
+    /// The removal that made each tetrahedron; [`NONE`] for those of the reference mesh.
+    pub makers: Vec<u32>,
+    /// The error of each removal.
+    pub errors: Vec<f64>,
+    /// Length of the longest chain of removals that ends with each.
+    pub heights: Vec<u32>,
+}
+
+/// What a removal costs whatever fills its hole.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Legacy {
+    /// The largest error among the removals that this one depends on.
+    pub inherited: f64,
+    /// Whether there are any.
+    pub depends: bool,
+    /// The least error of this removal.
+    pub error: f64,
+    /// One more than the longest chain of removals that it depends on.
+    pub height: u32,
+}
+
+/// One tetrahedron of a filling.
+#[derive(Clone, Copy)]
+struct Cell {
+    /// `(λ_1, λ_2, λ_3)` of a point are this times its position relative to corner 0.
+    barycentric: DMat3,
+    origin: DVec3,
+}
+
+/// The cost of one filling, and where the points go; reused from filling to filling.
+#[derive(Default)]
+pub(super) struct FillCost {
+    cells: Vec<Cell>,
+    /// The border of the filling in model units, made when it is first needed.
+    faces: Vec<Face>,
+    flat: bool,
+    /// Where each point goes: point and cell.
+    moves: Vec<(u32, u32)>,
+    border_moves: Vec<(u32, u32)>,
+    /// How far the boundary moves, as an error.
+    pub step: f64,
+}
+
+impl Past {
+    pub fn new(tets: usize) -> Self {
+        Self { makers: vec![NONE; tets], ..Self::default() }
+    }
+
+    /// What the hole's tetrahedra leave to the removal of its vertex.
+    pub fn legacy(&self, hole: &Hole, reference: &Reference<'_>) -> Legacy {
+        let (mut inherited, mut height) = (0.0_f64, 0);
+        for s in &hole.star {
+            let maker = self.makers[s.tet as usize];
+            if maker != NONE {
+                inherited = inherited.max(self.errors[maker as usize]);
+                height = height.max(self.heights[maker as usize]);
+            }
+        }
+        let depends = height > 0;
+        let error = if depends { inherited + overshoot(hole, reference) } else { 0.0 };
+        Legacy { inherited, depends, error, height: height + 1 }
+    }
+}
+
+/// How much the removed vertex exceeds the range of values around it, as a fraction of the field's range.
+/// Added to the inherited error it makes the selection by isovalue monotone.
+fn overshoot(hole: &Hole, reference: &Reference<'_>) -> f64 {
+    let fields = &reference.quantized.fields;
+    let level = |v: u32, f: usize| reference.quantized.levels[v as usize * fields.len() + f];
+    let mut largest = 0.0_f64;
+    for (f, field) in fields.iter().enumerate() {
+        let (low, high) = hole
+            .link
+            .iter()
+            .map(|&v| level(v, f))
+            .fold((i32::MAX, i32::MIN), |(low, high), x| (low.min(x), high.max(x)));
+        let own = level(hole.a, f);
+        let beyond = (own - high).max(low - own).max(0);
+        largest = largest.max(f64::from(beyond) * field.step / field.range());
+    }
+    largest * (1.0 + 1e-9)
+}
+
+impl FillCost {
+    /// The error of the removal with this filling; any value above `limit` may be returned early once it is exceeded,
+    /// then as a lower bound.
+    pub fn evaluate(
+        &mut self,
+        hole: &Hole,
+        filling: &Filling,
+        legacy: Legacy,
+        buckets: &Buckets,
+        reference: &Reference<'_>,
+        limit: f64,
+    ) -> f64 {
+        self.step = 0.0;
+        self.faces.clear();
+        self.moves.clear();
+        let positions = &reference.quantized.positions;
+        self.cells.clear();
+        self.cells
+            .extend(filling.tets.iter().map(|tet| Cell::new(tet.map(|v| as_vec(positions[v as usize])))));
+        let mut error = legacy.error.max(self.place(hole.a, 0, filling, reference).0);
+        if error > limit {
+            return error;
+        }
+        self.flat = !hole.on_boundary() || hole.keeps_boundary(filling, positions);
+        if !self.flat {
+            self.step = reference.error_of(self.step_of_boundary(hole, filling, reference));
+            if legacy.depends {
+                error = error.max(legacy.inherited + self.step);
+            }
+            if error > limit {
+                return error;
+            }
+            error = error.max(self.place_on_border(hole, filling, buckets, reference));
+            if error > limit {
+                return error;
+            }
+            error = error.max(chords(filling, reference));
+        }
+        let mut hint = 0;
+        for s in &hole.star {
+            for point in buckets.inside.iter(s.tet) {
+                let (own, cell) = self.place(point, hint, filling, reference);
+                hint = cell;
+                error = error.max(own);
+                if error > limit {
+                    return error;
+                }
+            }
+        }
+        error
+    }
+
+    /// Moves the points to the buckets where [`FillCost::evaluate`] found them to belong. `slots` are the numbers of the
+    /// new tetrahedra.
+    pub fn settle(
+        &mut self,
+        hole: &Hole,
+        filling: &Filling,
+        buckets: &mut Buckets,
+        reference: &Reference<'_>,
+        slots: &[u32],
+    ) {
+        self.border_moves.clear();
+        let has_border = hole.star.iter().any(|s| buckets.border.iter(s.tet).next().is_some());
+        if has_border || hole.on_boundary() {
+            self.place_on_border(hole, filling, buckets, reference);
+        }
+        let tets = hole.star.iter().map(|s| s.tet).chain(slots.iter().copied());
+        tets.for_each(|t| buckets.clear(t));
+        self.moves.iter().for_each(|&(point, cell)| buckets.inside.put(slots[cell as usize], point));
+        self.border_moves.iter().for_each(|&(point, cell)| buckets.border.put(slots[cell as usize], point));
+    }
+
+    /// How far the old boundary is from the new one.
+    fn step_of_boundary(&mut self, hole: &Hole, filling: &Filling, reference: &Reference<'_>) -> f64 {
+        let at = |v: u32| reference.scaled(reference.quantized.positions[v as usize]);
+        let centre = at(hole.a);
+        let mut largest = self.nearest(centre, filling.moved, filling, reference).2;
+        // Between the vertex and the link the new boundary may be further away than at either. Each edge is the first one
+        // of one triangle.
+        for &[x, _] in &hole.border {
+            let middle = (centre + at(x)) * 0.5;
+            largest = largest.max(self.nearest(middle, filling.moved, filling, reference).2);
+        }
+        largest
+    }
+
+    /// Finds where the reference vertices of the boundary go. Returns the error that the largest distance stands for.
+    fn place_on_border(
+        &mut self,
+        hole: &Hole,
+        filling: &Filling,
+        buckets: &Buckets,
+        reference: &Reference<'_>,
+    ) -> f64 {
+        self.border_moves.clear();
+        let mut largest = 0.0_f64;
+        let own = hole.on_boundary().then_some(hole.a);
+        for point in hole.star.iter().flat_map(|s| buckets.border.iter(s.tet)).chain(own) {
+            let p = reference.scaled(reference.quantized.positions[point as usize]);
+            let (cell, _, distance) = self.nearest(p, usize::MAX, filling, reference);
+            self.border_moves.push((point, cell));
+            largest = largest.max(distance);
+        }
+        reference.error_of(largest)
+    }
+
+    /// The nearest of the first `count` boundary triangles of the filling: its cell, the nearest point, and the distance.
+    fn nearest(
+        &mut self,
+        p: DVec3,
+        count: usize,
+        filling: &Filling,
+        reference: &Reference<'_>,
+    ) -> (u32, DVec3, f64) {
+        if self.faces.is_empty() {
+            let at = |v: u32| reference.scaled(reference.quantized.positions[v as usize]);
+            self.faces.extend(filling.border.iter().map(|&(_, triangle)| Face::new(triangle.map(at))));
+        }
+        let (face, q, distance) = nearest_face(p, &self.faces[..count.min(self.faces.len())]);
+        (filling.border.get(face).map_or(0, |&(cell, _)| cell), q, distance)
+    }
+
+    /// Finds the cell for a point, looking at `hint` first. Returns the error there and the cell.
+    fn place(
+        &mut self,
+        point: u32,
+        hint: usize,
+        filling: &Filling,
+        reference: &Reference<'_>,
+    ) -> (f64, usize) {
+        let position = as_vec(reference.quantized.positions[point as usize]);
+        let (mut cell, mut lambda, mut depth) = (hint, DVec3::ZERO, f64::NEG_INFINITY);
+        let order = std::iter::once(hint).chain((0..self.cells.len()).filter(|&i| i != hint));
+        for i in order {
+            let l = self.cells[i].barycentric * (position - self.cells[i].origin);
+            let inside = l.min_element().min(1.0 - l.element_sum());
+            if inside > depth {
+                (cell, lambda, depth) = (i, l, inside);
+            }
+            if inside >= 0.0 {
+                break;
+            }
+        }
+        let mut displaced = 0.0;
+        if depth < -SLACK && !filling.border.is_empty() {
+            let p = reference.scaled(reference.quantized.positions[point as usize]);
+            let (found, q, distance) = self.nearest(p, usize::MAX, filling, reference);
+            cell = found as usize;
+            let Cell { barycentric, origin } = self.cells[cell];
+            lambda = barycentric * (q / DVec3::from_array(reference.quantized.lattice.step) - origin);
+            displaced = distance;
+        }
+        self.moves.push((point, cell as u32));
+        let error = field_error(point, filling.tets[cell], clamped(lambda), reference);
+        (error.max(reference.error_of(displaced)), cell)
+    }
+}
+
+fn field_error(point: u32, tet: [u32; 4], lambda: DVec3, reference: &Reference<'_>) -> f64 {
+    let fields = &reference.quantized.fields;
+    let own = 1.0 - lambda.element_sum();
+    let mut largest = 0.0_f64;
+    for (f, field) in fields.iter().enumerate() {
+        let [w, x, y, z] = tet.map(|v| f64::from(reference.quantized.levels[v as usize * fields.len() + f]));
+        let value = own * w + lambda.x * x + lambda.y * y + lambda.z * z;
+        let exact = reference.quantized.exact[point as usize * fields.len() + f];
+        largest = largest.max((value - exact).abs() * field.step / field.range());
+    }
+    largest
+}
+
+/// How far the middles of the new boundary triangles and of their edges are from the reference boundary, as an error.
+/// Their corners are on it.
+fn chords(filling: &Filling, reference: &Reference<'_>) -> f64 {
+    let mut largest = 0.0_f64;
+    for &(_, triangle) in &filling.border[..filling.moved] {
+        let [a, b, c] = triangle.map(|v| reference.scaled(reference.quantized.positions[v as usize]));
+        for p in [(a + b + c) / 3.0, (a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5] {
+            let mut least = f64::INFINITY;
+            for v in triangle {
+                if let Some(&from) = reference.skin.at(v).first().filter(|_| least > largest) {
+                    least = least.min(reference.skin.walk(p, from, largest).1);
+                }
+            }
+            largest = largest.max(least);
+        }
+    }
+    reference.error_of(largest)
+}
+
+impl Cell {
+    fn new([w, x, y, z]: [DVec3; 4]) -> Self {
+        // The orientation was found positive, so the matrix is regular.
+        Self { barycentric: DMat3::from_cols(x - w, y - w, z - w).inverse(), origin: w }
+    }
+}
