@@ -336,3 +336,6 @@ fn predicted(reference: &Reference<'_>, gradients: &[DVec3], a: u32, b: u32) -> 
     }
     largest
 }
+
+#[cfg(test)]
+mod tests;
