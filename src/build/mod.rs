@@ -27,6 +27,7 @@ mod decimate;
 mod fill_cost;
 mod gift_wrap;
 mod half_edge;
+mod delaunay;
 mod history;
 mod hole;
 mod in_sphere;
@@ -38,6 +39,7 @@ mod skin;
 mod work_mesh;
 
 pub use collapse::edge_mt;
+pub use delaunay::delaunay;
 
 use crate::mesh::MeshError;
 use crate::mt::EdgeMt;
@@ -145,6 +147,20 @@ pub enum BuildError {
         /// The bits that were tried last.
         bits: u32,
     },
+    /// Fewer than four points, or all of them in one plane.
+    Flat,
+    /// Two points are in the same place.
+    SamePlace {
+        /// The points.
+        points: [u32; 2],
+    },
+    /// More tetrahedra meet at a point than an MT can describe.
+    Crowded {
+        /// The point.
+        point: u32,
+    },
+    /// The mesh is not convex: insertion fills the convex hull of the points.
+    NotConvex,
     /// More vertices than an MT can number.
     TooLarge,
     /// The caller stopped the work.
@@ -172,6 +188,22 @@ impl fmt::Display for BuildError {
                 f,
                 "cell {cell} is too thin for a lattice of {bits} bits: it turns flat or inside out; use more \
                  position bits (at most 30) or remove the cell"
+            ),
+            Self::Flat => {
+                write!(f, "the points do not span a volume: there must be four that are not in one plane")
+            }
+            Self::SamePlace { points: [a, b] } => write!(
+                f,
+                "points {a} and {b} are in the same place on the lattice: remove one, or use more position bits \
+                 (at most 30)"
+            ),
+            Self::Crowded { point } => write!(
+                f,
+                "too many tetrahedra meet around point {point} for a vertex-based MT; use --method decimate"
+            ),
+            Self::NotConvex => write!(
+                f,
+                "the mesh does not fill its convex hull, which insertion would do; use --method decimate"
             ),
             Self::TooLarge => write!(f, "the mesh has more than 2^30 points; split it into parts"),
             Self::Stopped => write!(f, "stopped"),

@@ -10,6 +10,6 @@ mod triangle;
 pub use bounds::Bounds;
 pub use camera::{Camera, Ray};
 pub use lattice::Lattice;
-pub use predicates::{NARROW_BITS, WIDE_BITS, orient3d};
+pub use predicates::{NARROW_BITS, WIDE_BITS, in_conflict, insphere, orient3d};
 pub use tet_box::{LatticeBox, tet_meets_box};
 pub use triangle::nearest_on_triangle;

@@ -43,6 +43,144 @@ fn det_i128(u: [i64; 3], v: [i64; 3], w: [i64; 3]) -> i128 {
         + i128::from(u[0] * v[1] - u[1] * v[0]) * i128::from(w[2])
 }
 
+/// Differences of coordinates up to this many bits let [`insphere`] work in `i64` alone.
+const SHORT_BITS: u32 = 11;
+
+/// Where `e` lies with respect to the sphere through the corners of the positive tetrahedron `(a, b, c, d)`: 1 inside,
+/// −1 outside, 0 on it, exactly. For a negative tetrahedron the signs are swapped.
+///
+/// Coordinates must lie in `0 ..= 2^WIDE_BITS`. Near points are cheap: up to 11 bits apart all is done in `i64`, up to
+/// 20 bits in `i64` but for the last sum; beyond, a floating-point filter (Shewchuk 1997) decides most cases.
+///
+/// ```
+/// use tetralod::geom::insphere;
+/// let [a, b, c, d] = [[0, 0, 0], [2, 0, 0], [0, 2, 0], [0, 0, 2]];
+/// assert_eq!(insphere(a, b, c, d, [1, 1, 1]), 1);
+/// assert_eq!(insphere(a, b, c, d, [2, 2, 2]), 0);
+/// assert_eq!(insphere(a, b, c, d, [3, 2, 2]), -1);
+/// ```
+#[inline]
+pub fn insphere(a: [i32; 3], b: [i32; 3], c: [i32; 3], d: [i32; 3], e: [i32; 3]) -> i32 {
+    let rows = [a, b, c, d].map(|p| [0, 1, 2].map(|i| i64::from(p[i]) - i64::from(e[i])));
+    let largest = rows.iter().flatten().fold(0, |m, x| m | x.unsigned_abs());
+    if largest <= 1 << SHORT_BITS {
+        // Four products of a minor up to 6 · 2^33 and a square up to 3 · 2^22 stay below 2^62.
+        let minors = minors_i64(rows);
+        let sum = (0..4).map(|i| minors[i] * square(rows[i])).sum::<i64>();
+        sum.signum() as i32
+    } else if largest <= 1 << NARROW_BITS {
+        // Minors up to 6 · 2^60 stay below 2^63; they are multiplied into two words.
+        let minors = minors_i64(rows);
+        let sum = (0..4).map(|i| i128::from(minors[i]) * i128::from(square(rows[i]))).sum::<i128>();
+        sum.signum() as i32
+    } else {
+        insphere_far(rows, largest)
+    }
+}
+
+/// Whether a new point `e` is in conflict with the positive tetrahedron `(a, b, c, d)`: inside its sphere or, where it
+/// is on it, inside after an infinitesimal perturbation. The points must be different.
+///
+/// The perturbation lowers the lifted points: each by infinitely more than the next in lexicographic order, so that no
+/// five points stay cospherical and the Delaunay triangulation is unique, without flat tetrahedra (Edelsbrunner and
+/// Mücke 1990; Devillers and Teillaud 2011). The corners of a cube get Kuhn's six tetrahedra.
+#[inline]
+pub fn in_conflict(a: [i32; 3], b: [i32; 3], c: [i32; 3], d: [i32; 3], e: [i32; 3]) -> bool {
+    match insphere(a, b, c, d, e) {
+        0 => perturbed(a, b, c, d, e),
+        sign => sign > 0,
+    }
+}
+
+fn perturbed(a: [i32; 3], b: [i32; 3], c: [i32; 3], d: [i32; 3], e: [i32; 3]) -> bool {
+    let corners = [a, b, c, d];
+    let mut order = [0, 1, 2, 3];
+    order.sort_unstable_by_key(|&i| corners[i]);
+    for i in order {
+        if e < corners[i] {
+            // Lowering `e` itself moves it inside.
+            return true;
+        }
+        // Lowering a corner lowers the sphere's lifted plane on the corner's own side of the opposite face.
+        let mut moved = corners;
+        moved[i] = e;
+        let [a, b, c, d] = moved;
+        match orient3d(a, b, c, d) {
+            0 => {}
+            side => return side < 0,
+        }
+    }
+    true
+}
+
+/// The signed cofactors of the squares in the in-sphere determinant of four rows.
+#[inline]
+fn minors_i64([a, b, c, d]: [[i64; 3]; 4]) -> [i64; 4] {
+    let minor = |u: [i64; 3], v: [i64; 3]| u[0] * v[1] - v[0] * u[1];
+    let (ab, bc, cd, da) = (minor(a, b), minor(b, c), minor(c, d), minor(d, a));
+    let (ac, bd) = (minor(a, c), minor(b, d));
+    [
+        b[2] * cd - c[2] * bd + d[2] * bc,
+        -(c[2] * da + d[2] * ac + a[2] * cd),
+        d[2] * ab + a[2] * bd + b[2] * da,
+        -(a[2] * bc - b[2] * ac + c[2] * ab),
+    ]
+}
+
+#[inline]
+fn square(u: [i64; 3]) -> i64 {
+    u[0] * u[0] + u[1] * u[1] + u[2] * u[2]
+}
+
+/// [`insphere`] for differences of up to 31 bits, `largest` being at least their largest.
+fn insphere_far(rows: [[i64; 3]; 4], largest: u64) -> i32 {
+    let float = insphere_float(rows);
+    // Shewchuk's bound is (16 + 224 ε) ε times the permanent, which is at most 72 m^5.
+    let m = largest as f64;
+    let bound = 1200.0 * (0.5 * f64::EPSILON) * (m * m * m * m * m);
+    if float.abs() > bound {
+        return if float > 0.0 { 1 } else { -1 };
+    }
+    insphere_wide(rows)
+}
+
+fn insphere_float(rows: [[i64; 3]; 4]) -> f64 {
+    // Differences of 31 bits are exact in floating point.
+    let [a, b, c, d] = rows.map(|u| u.map(|x| x as f64));
+    let minor = |u: [f64; 3], v: [f64; 3]| u[0] * v[1] - v[0] * u[1];
+    let square = |u: [f64; 3]| u[0] * u[0] + u[1] * u[1] + u[2] * u[2];
+    let (ab, bc, cd, da) = (minor(a, b), minor(b, c), minor(c, d), minor(d, a));
+    let (ac, bd) = (minor(a, c), minor(b, d));
+    let bcd = b[2] * cd - c[2] * bd + d[2] * bc;
+    let cda = c[2] * da + d[2] * ac + a[2] * cd;
+    let dab = d[2] * ab + a[2] * bd + b[2] * da;
+    let abc = a[2] * bc - b[2] * ac + c[2] * ab;
+    (square(a) * bcd - square(b) * cda) + (square(c) * dab - square(d) * abc)
+}
+
+/// The sign of the determinant for differences of up to 30 bits, in three words.
+fn insphere_wide(rows: [[i64; 3]; 4]) -> i32 {
+    let [a, b, c, d] = rows;
+    // Minors up to 6 · 2^90 times squares up to 3 · 2^60: the low word of each minor is multiplied apart, and two such
+    // products are added and two are taken away, so that neither sum leaves 127 bits.
+    let terms = [
+        (det_i128(b, c, d), a, 1),
+        (det_i128(c, d, a), b, -1),
+        (det_i128(d, a, b), c, 1),
+        (det_i128(a, b, c), d, -1),
+    ];
+    let (mut high, mut low) = (0_i128, 0_i128);
+    for (minor, row, sign) in terms {
+        let square = i128::from(square(row));
+        high += sign * (minor >> 64) * square;
+        low += sign * i128::from(minor as u64) * square;
+    }
+    match high + (low >> 64) {
+        0 => i32::from(low as u64 != 0),
+        sign => sign.signum() as i32,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
