@@ -31,6 +31,8 @@ mod delaunay;
 mod history;
 mod hole;
 mod in_sphere;
+#[allow(dead_code, reason = "the builders of vertex-based MTs follow")]
+mod insert;
 mod plan;
 mod quantize;
 #[allow(dead_code, reason = "the builders of vertex-based MTs follow")]

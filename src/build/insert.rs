@@ -1,0 +1,396 @@
+//! Greedy insertion, coarse to fine: always the reference point with the largest error.
+//!
+//! This is how the paper builds its vertex-based MTs (§5), after Garland and Heckbert's greedy insertion (1995) and
+//! Hamann and Chen's for volumes (1994). Every reference point that is not yet a vertex is in the bucket of a
+//! tetrahedron that contains it. A heap holds the tetrahedra by the largest error in their buckets; an insertion moves
+//! the points of the tetrahedra that it removes to those that it creates.
+
+use super::BuildError;
+use super::BuildProgress;
+use super::OnProgress;
+use super::delaunay::MT_LIMITS;
+use super::delaunay::Triangulation;
+use super::delaunay::extreme_points;
+use super::quantize::Quantized;
+use super::sequence::Insertion;
+use super::sequence::Sequence;
+use crate::geom::NARROW_BITS;
+use crate::geom::orient3d;
+use crate::mesh::NONE;
+use std::collections::BinaryHeap;
+
+/// Errors below this are not told apart: tetrahedra are then taken by size, the largest first, at the point next to
+/// their middle, so that the partial order stays shallow.
+const FINEST: f64 = 2e-4;
+
+/// How often progress is told, in insertions.
+const PROGRESS_STEPS: usize = 1024;
+
+/// Inserts all points of `quantized` into a triangulation of the corners of their hull. `tets` is the reference mesh,
+/// or nothing where there are only points.
+///
+/// # Errors
+/// If the points span no volume or two are equal, if the reference mesh does not fill its convex hull, if more
+/// tetrahedra would have to meet at a point than an MT can describe, or if `progress` breaks the work off.
+pub(super) fn insert(
+    quantized: &Quantized,
+    tets: &[[u32; 4]],
+    progress: OnProgress<'_>,
+) -> Result<Sequence, BuildError> {
+    refuse_duplicates(&quantized.positions)?;
+    let corners = extreme_points(&quantized.positions)?;
+    let mesh = Triangulation::of(&quantized.positions, &corners)?;
+    let base = mesh.finite_tets();
+    if !tets.is_empty() && volume(tets, quantized) != volume(&base, quantized) {
+        return Err(BuildError::NotConvex);
+    }
+    let mut greedy = Greedy::new(mesh, base, quantized);
+    greedy.distribute(&corners);
+    greedy.insert_all(quantized.positions.len() - corners.len(), progress)?;
+    Ok(greedy.sequence)
+}
+
+fn refuse_duplicates(positions: &[[i32; 3]]) -> Result<(), BuildError> {
+    let mut order: Vec<u32> = (0..positions.len() as u32).collect();
+    order.sort_unstable_by_key(|&v| (positions[v as usize], v));
+    match order.windows(2).find(|w| positions[w[0] as usize] == positions[w[1] as usize]) {
+        Some(w) => Err(BuildError::SamePlace { points: [w[0], w[1]] }),
+        None => Ok(()),
+    }
+}
+
+fn volume(tets: &[[u32; 4]], quantized: &Quantized) -> i128 {
+    let six_volume = |tet: &[u32; 4]| {
+        let [a, b, c, d] = tet.map(|v| quantized.positions[v as usize]);
+        orient3d(a, b, c, d)
+    };
+    tets.iter().map(six_volume).sum()
+}
+
+/// What is known of the tetrahedron in a slot.
+#[derive(Clone, Copy)]
+struct Bucket {
+    /// The first of its points; the others follow in [`Greedy::next`].
+    first: u32,
+    /// The largest error of its points.
+    error: f64,
+    /// The point to insert.
+    chosen: u32,
+    /// Counts the tetrahedra that have been in the slot.
+    stamp: u32,
+}
+
+const NO_BUCKET: Bucket = Bucket { first: NONE, error: 0.0, chosen: NONE, stamp: 0 };
+
+/// A tetrahedron in the heap. Those that are gone are known by their stamps.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Candidate {
+    key: u64,
+    slot: u32,
+    stamp: u32,
+}
+
+/// A tetrahedron of the new star.
+#[derive(Clone, Copy)]
+struct Cell {
+    slot: u32,
+    /// Outer normals of its faces at the new vertex, and the cells behind them.
+    sides: [([i64; 3], u32); 3],
+    first: u32,
+    error: f64,
+    worst: u32,
+}
+
+struct Greedy<'a> {
+    mesh: Triangulation,
+    quantized: &'a Quantized,
+    /// Of each field: the part of its range that a level is.
+    weights: Vec<f64>,
+    /// Whether `i64` does for tests of sides.
+    narrow: bool,
+    buckets: Vec<Bucket>,
+    next: Vec<u32>,
+    heap: BinaryHeap<Candidate>,
+    live: usize,
+    /// Which cell of the star each slot holds.
+    cell_of: Vec<u32>,
+    cells: Vec<Cell>,
+    /// The fields' slopes, in levels a step: of each cell all fields.
+    slopes: Vec<[f64; 3]>,
+    sequence: Sequence,
+}
+
+impl<'a> Greedy<'a> {
+    fn new(mesh: Triangulation, base: Vec<[u32; 4]>, quantized: &'a Quantized) -> Self {
+        let points = quantized.positions.len();
+        let largest = (0..points as u32).flat_map(|v| mesh.position(v)).max().unwrap_or(0);
+        Self {
+            quantized,
+            weights: quantized.fields.iter().map(|field| field.step / field.range()).collect(),
+            narrow: largest <= 1 << NARROW_BITS,
+            buckets: vec![NO_BUCKET; mesh.slots()],
+            next: vec![NONE; points],
+            heap: BinaryHeap::new(),
+            live: 0,
+            cell_of: vec![NONE; mesh.slots()],
+            cells: Vec::new(),
+            slopes: Vec::new(),
+            sequence: Sequence { base, ..Sequence::default() },
+            mesh,
+        }
+    }
+
+    /// Puts all points but the corners into the buckets of the base mesh.
+    fn distribute(&mut self, corners: &[u32]) {
+        let mut at = 0;
+        for v in (0..self.next.len() as u32).filter(|v| corners.binary_search(v).is_err()) {
+            at = self.mesh.locate(v, at);
+            self.next[v as usize] = std::mem::replace(&mut self.buckets[at as usize].first, v);
+        }
+        let slots: Vec<u32> = self.mesh.finite_slots().collect();
+        for slot in slots {
+            let apex = self.mesh.tet(slot)[3];
+            self.cells.clear();
+            self.slopes.clear();
+            self.add_cell(slot, apex);
+            let mut v = self.buckets[slot as usize].first;
+            while v != NONE {
+                let after = self.next[v as usize];
+                self.put(v, 0, apex);
+                v = after;
+            }
+            self.settle(0);
+        }
+    }
+
+    fn insert_all(&mut self, count: usize, progress: OnProgress<'_>) -> Result<(), BuildError> {
+        for done in 0..count {
+            if done % PROGRESS_STEPS == 0 {
+                let report =
+                    BuildProgress { stage: "inserting points", done: done as u64, total: count as u64 };
+                if progress(report).is_break() {
+                    return Err(BuildError::Stopped);
+                }
+            }
+            let slot = self.pop();
+            self.insert_worst(slot)?;
+        }
+        Ok(())
+    }
+
+    /// The slot of the tetrahedron with the largest error.
+    fn pop(&mut self) -> u32 {
+        loop {
+            let top = self.heap.pop();
+            assert!(
+                top.is_some(),
+                "every point that is not a vertex is in a bucket, and its tetrahedron in the heap"
+            );
+            let Some(Candidate { slot, stamp, .. }) = top else { continue };
+            if self.buckets[slot as usize].stamp == stamp {
+                return slot;
+            }
+        }
+    }
+
+    fn insert_worst(&mut self, slot: u32) -> Result<(), BuildError> {
+        let v = self.buckets[slot as usize].chosen;
+        self.mesh.insert(v, slot, Some(MT_LIMITS))?;
+        self.record(v);
+        self.lay_out_star(v);
+        self.move_points(v);
+        for cell in 0..self.cells.len() {
+            self.settle(cell);
+        }
+        if self.heap.len() > 4 * self.live + 1024 {
+            self.heap.retain(|c| self.buckets[c.slot as usize].stamp == c.stamp);
+        }
+        Ok(())
+    }
+
+    fn record(&mut self, v: u32) {
+        let start = self.sequence.tets.len();
+        let mut error = 0.0_f64;
+        for &(tet, slot) in self.mesh.removed() {
+            self.sequence.tets.push(tet);
+            error = error.max(self.buckets[slot as usize].error);
+        }
+        let middle = self.sequence.tets.len();
+        let star = self.mesh.star().iter().filter(|&&t| !self.mesh.is_ghost(t));
+        self.sequence.tets.extend(star.map(|&t| self.mesh.tet(t)));
+        let end = self.sequence.tets.len();
+        self.sequence.steps.push(Insertion {
+            vertex: v,
+            removed: start..middle,
+            inserted: middle..end,
+            error,
+            step: 0.0,
+        });
+    }
+
+    fn lay_out_star(&mut self, v: u32) {
+        if self.mesh.slots() > self.buckets.len() {
+            self.buckets.resize(self.mesh.slots(), NO_BUCKET);
+            self.cell_of.resize(self.mesh.slots(), NONE);
+        }
+        self.cells.clear();
+        self.slopes.clear();
+        for i in 0..self.mesh.star().len() {
+            let slot = self.mesh.star()[i];
+            if !self.mesh.is_ghost(slot) {
+                self.cell_of[slot as usize] = self.cells.len() as u32;
+                self.add_cell(slot, v);
+            }
+        }
+        for cell in &mut self.cells {
+            let around = self.mesh.neighbors(cell.slot);
+            for (side, t) in cell.sides.iter_mut().zip(around) {
+                side.1 = if self.mesh.is_ghost(t) { NONE } else { self.cell_of[t as usize] };
+            }
+        }
+    }
+
+    /// Adds a tetrahedron whose last corner is `apex`.
+    fn add_cell(&mut self, slot: u32, apex: u32) {
+        let tet = self.mesh.tet(slot);
+        debug_assert_eq!(tet[3], apex);
+        let origin = self.mesh.position(apex);
+        let arms = [0, 1, 2].map(|k| difference(self.mesh.position(tet[k]), origin));
+        let sides = [[1, 2], [2, 0], [0, 1]].map(|[i, j]| cross(arms[i], arms[j]));
+        let fields = self.quantized.fields.len();
+        let level = |v: u32, f: usize| f64::from(self.quantized.levels[v as usize * fields + f]);
+        let determinant = float_dot(sides[0], arms[0]);
+        for f in 0..fields {
+            let rise = [0, 1, 2].map(|k| (level(tet[k], f) - level(apex, f)) / determinant);
+            self.slopes.push([0, 1, 2].map(|i| (0..3).map(|k| rise[k] * sides[k][i] as f64).sum()));
+        }
+        let sides = sides.map(|normal| (normal, NONE));
+        self.cells.push(Cell { slot, sides, first: NONE, error: -1.0, worst: NONE });
+    }
+
+    /// Moves the points of the removed tetrahedra into the cells that contain them.
+    fn move_points(&mut self, v: u32) {
+        let mut cell = 0;
+        for i in 0..self.mesh.removed().len() {
+            let (_, slot) = self.mesh.removed()[i];
+            let mut p = std::mem::replace(&mut self.buckets[slot as usize], self.emptied(slot)).first;
+            while p != NONE {
+                let after = self.next[p as usize];
+                if p != v {
+                    cell = self.find_cell(p, v, cell);
+                    self.put(p, cell, v);
+                }
+                p = after;
+            }
+        }
+    }
+
+    fn emptied(&mut self, slot: u32) -> Bucket {
+        let old = self.buckets[slot as usize];
+        self.live -= usize::from(old.first != NONE);
+        Bucket { stamp: old.stamp.wrapping_add(1), ..NO_BUCKET }
+    }
+
+    /// The cell of the star of `v` that contains point `p`, walking from `from`.
+    fn find_cell(&self, p: u32, v: u32, from: usize) -> usize {
+        let arm = difference(self.mesh.position(p), self.mesh.position(v));
+        let mut at = from;
+        // Stars need not be Delaunay; where a walk goes astray, all cells are tried.
+        for _ in 0..self.cells.len() {
+            let beyond = self.cells[at].sides.iter().find(|(normal, _)| self.is_beyond(*normal, arm));
+            match beyond {
+                Some(&(_, next)) if next != NONE => at = next as usize,
+                Some(_) => break,
+                None => return at,
+            }
+        }
+        let contains = |cell: &Cell| cell.sides.iter().all(|(normal, _)| !self.is_beyond(*normal, arm));
+        let found = self.cells.iter().position(contains);
+        assert!(found.is_some(), "the star fills all that was removed");
+        found.unwrap_or(0)
+    }
+
+    #[inline]
+    fn is_beyond(&self, normal: [i64; 3], arm: [i64; 3]) -> bool {
+        if self.narrow {
+            normal[0] * arm[0] + normal[1] * arm[1] + normal[2] * arm[2] > 0
+        } else {
+            (0..3).map(|i| i128::from(normal[i]) * i128::from(arm[i])).sum::<i128>() > 0
+        }
+    }
+
+    /// Puts point `p` into a cell with apex `v`.
+    fn put(&mut self, p: u32, cell: usize, v: u32) {
+        let error = self.error_at(p, cell, v);
+        let cell = &mut self.cells[cell];
+        if error > cell.error {
+            (cell.error, cell.worst) = (error, p);
+        }
+        self.next[p as usize] = std::mem::replace(&mut cell.first, p);
+    }
+
+    /// How far the cell's fields are from those of the reference at `p`, as a fraction of their ranges.
+    #[inline]
+    fn error_at(&self, p: u32, cell: usize, v: u32) -> f64 {
+        let arm = difference(self.mesh.position(p), self.mesh.position(v)).map(|x| x as f64);
+        let fields = self.weights.len();
+        let mut largest = 0.0_f64;
+        for (f, weight) in self.weights.iter().enumerate() {
+            let slope = self.slopes[cell * fields + f];
+            let value = f64::from(self.quantized.levels[v as usize * fields + f])
+                + (slope[0] * arm[0] + slope[1] * arm[1] + slope[2] * arm[2]);
+            let exact = self.quantized.exact[p as usize * fields + f];
+            largest = largest.max((value - exact).abs() * weight);
+        }
+        largest
+    }
+
+    /// Hands a cell's points over to its slot, and the slot to the heap.
+    fn settle(&mut self, cell: usize) {
+        let Cell { slot, first, error, worst, sides } = self.cells[cell];
+        let bucket = &mut self.buckets[slot as usize];
+        bucket.stamp = bucket.stamp.wrapping_add(1);
+        bucket.first = first;
+        if first == NONE {
+            return;
+        }
+        self.live += 1;
+        bucket.error = error;
+        bucket.chosen = worst;
+        let stamp = bucket.stamp;
+        let mut key = 1 << 63 | error.to_bits();
+        if error < FINEST {
+            let tet = self.mesh.tet(slot);
+            let arm = difference(self.mesh.position(tet[0]), self.mesh.position(tet[3]));
+            key = float_dot(sides[0].0, arm).abs().to_bits();
+            self.buckets[slot as usize].chosen = self.middle_point(slot);
+        }
+        self.heap.push(Candidate { key, slot, stamp });
+    }
+
+    /// The point of a bucket that is next to the tetrahedron's middle.
+    fn middle_point(&self, slot: u32) -> u32 {
+        let corners = self.mesh.tet(slot).map(|v| self.mesh.position(v));
+        let sum = [0, 1, 2].map(|i| corners.iter().map(|p| i64::from(p[i])).sum::<i64>());
+        let distance = |p: u32| {
+            let q = self.mesh.position(p);
+            (0..3).map(|i| i128::from(4 * i64::from(q[i]) - sum[i]).pow(2)).sum::<i128>()
+        };
+        let start = self.buckets[slot as usize].first;
+        let points =
+            std::iter::successors(Some(start), |&p| Some(self.next[p as usize]).filter(|&p| p != NONE));
+        points.min_by_key(|&p| (distance(p), p)).unwrap_or(start)
+    }
+}
+
+fn difference(p: [i32; 3], q: [i32; 3]) -> [i64; 3] {
+    [0, 1, 2].map(|i| i64::from(p[i]) - i64::from(q[i]))
+}
+
+fn cross(u: [i64; 3], v: [i64; 3]) -> [i64; 3] {
+    [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
+}
+
+fn float_dot(u: [i64; 3], v: [i64; 3]) -> f64 {
+    (0..3).map(|i| u[i] as f64 * v[i] as f64).sum()
+}
