@@ -54,7 +54,7 @@ fn keeps_its_promises(name: &str, mesh: &TetMesh) -> EdgeMt {
     let report = verify::run(&mt, mesh, &mut |_, _| {});
     assert!(report.valid && report.failures.is_empty(), "{name}: {:#?}", report.failures);
     assert!(report.queries >= 30 && report.worst_error_ratio <= 1.0, "{name}: {report:?}");
-    let explicit = ExplicitMt::from_edge(&mt).expect("a valid MT");
+    let explicit = ExplicitMt::of(&mt).expect("a valid MT");
     assert_eq!(explicit.check(), Ok(()), "{name}");
     mt
 }

@@ -38,7 +38,7 @@ fn built_mts_refine_and_coarsen_as_their_explicit_twins() {
         let built =
             edge_mt(&input, &BuildConfig::default(), &mut |_| ControlFlow::Continue(())).expect("a build");
         let mt = built.mt;
-        let explicit = ExplicitMt::from_edge(&mt).expect("a valid MT");
+        let explicit = ExplicitMt::of(&mt).expect("a valid MT");
         assert_eq!(explicit.check(), Ok(()), "{domain:?}");
         let found = stats(&mt).expect("a valid MT");
         assert_eq!(found.depth, built.summary.depth, "{domain:?}");

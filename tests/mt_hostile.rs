@@ -122,7 +122,7 @@ impl<'a> Driver<'a> {
 
 /// Replaying everything is an error at the first update that does not fit, or a valid MT.
 fn assert_replay_is_sound(mt: &EdgeMt) {
-    let explicit = ExplicitMt::from_edge(mt);
+    let explicit = ExplicitMt::of(mt);
     assert_eq!(explicit.is_ok(), stats(mt).is_ok());
     if let Ok(explicit) = explicit {
         assert_eq!(explicit.check(), Ok(()));
@@ -264,7 +264,7 @@ proptest! {
         }
         prop_assert!(CurrentMesh::new(&info, &base).is_err());
         let mt = EdgeMt::new(info, base);
-        prop_assert!(ExplicitMt::from_edge(&mt).is_err() && stats(&mt).is_err());
+        prop_assert!(ExplicitMt::of(&mt).is_err() && stats(&mt).is_err());
     }
 }
 

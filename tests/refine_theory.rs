@@ -47,7 +47,7 @@ impl Subject {
     }
 
     fn of(input: TetMesh, mt: EdgeMt) -> Self {
-        let explicit = ExplicitMt::from_edge(&mt).expect("a valid MT");
+        let explicit = ExplicitMt::of(&mt).expect("a valid MT");
         let mut removers = vec![None; explicit.tets().len()];
         for u in (0..explicit.updates()).map(UpdateId) {
             explicit.removed(u).iter().for_each(|&t| removers[t as usize] = Some(u));

@@ -26,8 +26,8 @@ pub type Metadata = Vec<(String, String)>;
 /// Largest `INFO` section that is written.
 const MAX_INFO_BYTES: usize = 1 << 20;
 
-/// The number that stands for [`MtKind::Edge`].
-const EDGE: u8 = 0;
+/// The number that stands for each kind of MT.
+const KINDS: [MtKind; 3] = [MtKind::Edge, MtKind::Vertex, MtKind::Explicit];
 
 pub fn write_info(
     out: &mut Vec<u8>,
@@ -41,9 +41,7 @@ pub fn write_info(
     if !metadata.iter().all(|(key, value)| fits(key) && fits(value)) {
         return Err(EncodeError::TooLong { what: "a metadata key or value" });
     }
-    out.push(match info.kind {
-        MtKind::Edge => EDGE,
-    });
+    out.push(KINDS.iter().position(|&kind| kind == info.kind).unwrap_or_default() as u8);
     for count in [info.vertices, info.tetrahedra, info.updates] {
         write::u32(out, count);
     }
@@ -72,9 +70,8 @@ pub fn write_info(
 }
 
 pub fn read_info(mut reader: Reader<'_>) -> Result<(MtInfo, Metadata), FormatError> {
-    if reader.u8()? != EDGE {
-        return Err(reader.corrupt("the kind of MT is not known"));
-    }
+    let kind = KINDS.get(usize::from(reader.u8()?)).copied();
+    let kind = kind.ok_or_else(|| reader.corrupt("the kind of MT is not known"))?;
     let [vertices, tetrahedra, updates] = [reader.u32()?, reader.u32()?, reader.u32()?];
     let lattice = Lattice { origin: reader.f64x3()?, step: reader.f64x3()?, bits: u32::from(reader.u8()?) };
     let displacement_per_error = reader.f64()?;
@@ -82,7 +79,6 @@ pub fn read_info(mut reader: Reader<'_>) -> Result<(MtInfo, Metadata), FormatErr
     let fields = (0..count).map(|_| read_field(&mut reader)).collect::<Result<_, _>>()?;
     let metadata = read_metadata(&mut reader)?;
     reader.end()?;
-    let kind = MtKind::Edge;
     let info = MtInfo { kind, lattice, fields, vertices, tetrahedra, updates, displacement_per_error };
     info.check()?;
     Ok((info, metadata))

@@ -136,7 +136,9 @@ impl ExplicitMt {
         let parents = || self.parents(u).iter().map(|&p| UpdateId(p));
         let in_order = parents().all(|p| p < u && self.children(p).contains(&u.0))
             && self.children(u).iter().all(|&c| c > u.0 && self.parents(UpdateId(c)).contains(&u.0))
-            && self.removed(u).iter().all(|&t| self.creator(t).is_none_or(|p| parents().any(|q| q == p)));
+            && self.removed(u).iter().all(|&t| {
+                self.remover(t) == Some(u) && self.creator(t).is_none_or(|p| parents().any(|q| q == p))
+            });
         if !in_order {
             return Err(MtFault::Order { update: u });
         }

@@ -42,6 +42,10 @@ pub struct CurrentMesh {
     /// The slot of each vertex of the MT, [`NONE`] when it is not in the mesh.
     pub(crate) slot_of: Vec<u32>,
     pub(crate) fields: usize,
+    /// What the MT knows each tetrahedron by; without entries for kinds of MT that need none.
+    tags: Vec<u32>,
+    /// For each tag a tetrahedron that has it, [`NONE`] if none does: the last that got it.
+    place_of: Vec<u32>,
     free_vertices: Vec<u32>,
     free_tets: Vec<u32>,
     /// `epoch << MARK_BITS | index in the star` of the last star that each tetrahedron was in.
@@ -87,6 +91,8 @@ pub(crate) enum Gather<T> {
 /// Largest star that is gathered: the two sides of a collapse have at most `MAX_STAR` tetrahedra together, and at
 /// most `MAX_LINK` more lie between them.
 const GATHERED: usize = 128;
+/// Tags from here on are not looked for.
+pub(crate) const FIRST_ANONYMOUS_TAG: u32 = 1 << 31;
 const MARK_BITS: u32 = GATHERED.trailing_zeros();
 const MARK_MASK: u32 = (1 << MARK_BITS) - 1;
 const EPOCHS: u32 = 1 << (32 - MARK_BITS);
@@ -118,6 +124,8 @@ impl CurrentMesh {
             neighbors,
             slot_of: (0..vertices as u32).collect(),
             fields: info.fields.len(),
+            tags: Vec::new(),
+            place_of: Vec::new(),
             free_vertices: Vec::new(),
             free_tets: Vec::new(),
             marks: vec![0; base.tets.len()],
@@ -175,6 +183,60 @@ impl CurrentMesh {
             self.proven.resize(word + 1, 0);
         }
         self.proven[word] |= 1 << (u % 64);
+    }
+
+    /// Gives every tetrahedron a tag: `tags` says which.
+    pub(crate) fn tag_all(&mut self, tags: impl IntoIterator<Item = u32>) {
+        self.tags = vec![NONE; self.tets.len()];
+        for (t, tag) in (0..self.tets.len() as u32).zip(tags) {
+            self.set_tag(t, tag);
+        }
+    }
+
+    /// Whether tetrahedra have tags.
+    #[inline]
+    fn is_tagged(&self) -> bool {
+        !self.tags.is_empty()
+    }
+
+    /// What the MT knows tetrahedron `t` by.
+    #[inline]
+    pub(crate) fn tag(&self, t: u32) -> u32 {
+        self.tags[t as usize]
+    }
+
+    /// Gives tetrahedron `t` a tag. Those of at least [`FIRST_ANONYMOUS_TAG`] are not looked for by
+    /// [`CurrentMesh::tagged`].
+    #[inline]
+    pub(crate) fn set_tag(&mut self, t: u32, tag: u32) {
+        let old = std::mem::replace(&mut self.tags[t as usize], tag);
+        if let Some(place) = self.place_of.get_mut(old as usize).filter(|place| **place == t) {
+            *place = NONE;
+        }
+        if tag < FIRST_ANONYMOUS_TAG {
+            if tag as usize >= self.place_of.len() {
+                self.place_of.resize(tag as usize + 1, NONE);
+            }
+            self.place_of[tag as usize] = t;
+        }
+    }
+
+    /// The tetrahedron that got a tag last, as long as it is in the mesh and has it.
+    #[inline]
+    pub(crate) fn tagged(&self, tag: u32) -> Option<u32> {
+        self.place_of.get(tag as usize).copied().filter(|&t| t != NONE)
+    }
+
+    /// Takes the tag of `from` over to `to`, a free slot.
+    #[inline]
+    fn move_tag(&mut self, from: u32, to: u32) {
+        if self.is_tagged() {
+            let tag = self.tags[from as usize];
+            self.tags[to as usize] = tag;
+            if let Some(place) = self.place_of.get_mut(tag as usize).filter(|place| **place == from) {
+                *place = to;
+            }
+        }
     }
 
     /// Number of tetrahedra.
@@ -236,11 +298,16 @@ impl CurrentMesh {
         while let Some(hole) = self.free_tets.pop() {
             self.fill_tet(hole);
         }
-        // Base vertices keep the first slots for good: a hole is never among them unless every later slot is
-        // free too, so a vertex that moves is one whose star is whole.
+        // In edge-based MTs base vertices keep the first slots for good: a hole is never among them unless every
+        // later slot is free too, so a vertex that moves is one whose star is whole.
+        let mut moves = Vec::new();
         while let Some(hole) = self.free_vertices.pop() {
-            self.fill_vertex(hole);
+            match self.fill_vertex(hole) {
+                Some([from, to]) if !self.is_tagged() => self.rename(from, to),
+                moved => moves.extend(moved),
+            }
         }
+        self.rename_all(&moves);
         self.changed_tets.truncate(self.tets.len());
         self.changed_vertices.truncate(self.labels.len());
     }
@@ -257,6 +324,7 @@ impl CurrentMesh {
         let (tet, around) = (self.tets[from as usize], self.neighbors[from as usize]);
         self.tets[hole as usize] = tet;
         self.neighbors[hole as usize] = around;
+        self.move_tag(from, hole);
         self.changed_tets.mark(hole);
         for n in around {
             if n != NONE {
@@ -273,20 +341,21 @@ impl CurrentMesh {
 
     fn pop_tet(&mut self) {
         self.tets.pop();
+        self.tags.pop();
         self.neighbors.pop();
         self.marks.pop();
     }
 
-    fn fill_vertex(&mut self, hole: u32) {
+    /// Moves the last vertex into a hole, and tells from where to where; its tetrahedra are the caller's to rename.
+    fn fill_vertex(&mut self, hole: u32) -> Option<[u32; 2]> {
         while self.labels.last().is_some_and(|l| l.vertex == NONE) {
             self.pop_vertex();
         }
         let last = self.labels.len() as u32;
         if hole >= last {
-            return;
+            return None;
         }
         let from = last - 1;
-        self.rename(from, hole);
         self.labels[hole as usize] = self.labels[from as usize];
         self.positions[hole as usize] = self.positions[from as usize];
         self.incident[hole as usize] = self.incident[from as usize];
@@ -295,6 +364,7 @@ impl CurrentMesh {
         self.slot_of[self.labels[hole as usize].vertex as usize] = hole;
         self.changed_vertices.mark(hole);
         self.pop_vertex();
+        Some([from, hole])
     }
 
     fn pop_vertex(&mut self) {
@@ -305,9 +375,36 @@ impl CurrentMesh {
         self.levels.truncate(self.labels.len() * self.fields);
     }
 
-    /// Replaces vertex slot `from` by `to` in its whole star, however large.
+    /// Replaces vertex slots in all tetrahedra.
+    fn rename_all(&mut self, moves: &[[u32; 2]]) {
+        let Some(first) = moves.iter().map(|&[from, _]| from).min() else { return };
+        let mut new = Vec::new();
+        for &[from, to] in moves {
+            let at = (from - first) as usize;
+            if at >= new.len() {
+                new.resize(at + 1, NONE);
+            }
+            new[at] = to;
+        }
+        for t in 0..self.tets.len() {
+            for corner in 0..4 {
+                let slot = self.tets[t][corner];
+                let next = |slot: &u32| {
+                    let to = slot.checked_sub(first).and_then(|at| new.get(at as usize)).copied();
+                    to.filter(|&to| to != NONE)
+                };
+                // A vertex may have moved more than once.
+                if let Some(to) = std::iter::successors(next(&slot), next).last() {
+                    self.tets[t][corner] = to;
+                    self.changed_tets.mark(t as u32);
+                }
+            }
+        }
+    }
+
+    /// Replaces vertex slot `from` by `to`, where it is already, in its whole star, however large.
     fn rename(&mut self, from: u32, to: u32) {
-        let mut stack = vec![self.incident[from as usize]];
+        let mut stack = vec![self.incident[to as usize]];
         while let Some(t) = stack.pop() {
             let Some(corner) = self.tets[t as usize].iter().position(|&v| v == from) else { continue };
             self.tets[t as usize][corner] = to;
@@ -468,6 +565,9 @@ impl CurrentMesh {
             self.tets.push([NONE; 4]);
             self.neighbors.push([NONE; 4]);
             self.marks.push(0);
+            if self.is_tagged() {
+                self.tags.push(NONE);
+            }
             self.tets.len() as u32 - 1
         });
         self.changed_tets.mark(t);
@@ -477,6 +577,9 @@ impl CurrentMesh {
     pub(crate) fn free_tet(&mut self, t: u32) {
         self.tets[t as usize] = [NONE; 4];
         self.neighbors[t as usize] = [NONE; 4];
+        if self.is_tagged() {
+            self.set_tag(t, NONE);
+        }
         self.free_tets.push(t);
     }
 
@@ -497,6 +600,13 @@ impl CurrentMesh {
         self.labels[slot as usize] = Labels { vertex: NONE, split: NONE };
         self.incident[slot as usize] = NONE;
         self.free_vertices.push(slot);
+    }
+
+    /// Takes the vertex in a slot, which no tetrahedron has any more, out of the mesh.
+    pub(crate) fn remove_vertex(&mut self, slot: u32) {
+        let vertex = self.labels[slot as usize].vertex;
+        self.slot_of[vertex as usize] = NONE;
+        self.free_vertex(slot);
     }
 
     /// Puts a vertex of the MT into a slot; its levels and incident tetrahedron are the caller's to set.

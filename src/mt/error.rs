@@ -65,6 +65,11 @@ pub enum UpdateError {
         /// The update.
         update: u32,
     },
+    /// What the update inserts does not fit in where it removes something, or it removes what is not there.
+    Cavity {
+        /// The update.
+        update: u32,
+    },
     /// The mask does not part the star of the vertex into two sides.
     Mask {
         /// The update.
@@ -100,6 +105,9 @@ impl fmt::Display for UpdateError {
                 write!(f, "update {update} splits vertex {vertex}, which is not there to be split")
             }
             Self::OffLattice { update } => write!(f, "update {update} leaves the lattice"),
+            Self::Cavity { update } => {
+                write!(f, "update {update} does not fill what it removes, or removes what is not there")
+            }
             Self::Mask { update } => write!(f, "update {update} does not part the star of its vertex in two"),
             Self::Inverted { update } => write!(f, "update {update} turns a tetrahedron inside out"),
             Self::Star { update } => write!(

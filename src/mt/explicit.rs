@@ -7,14 +7,18 @@
 //! Tetrahedra are numbered: first those of the base mesh, then those that update 0 inserts, then those of update 1
 //! and so on. They are positive, in numbers of MT vertices, ascending but for the last two.
 
-use super::EdgeMt;
+use super::BaseMesh;
 use super::ErrorCode;
+use super::MtInfo;
+use super::MtKind;
+use super::MultiTessellation;
+use super::UpdateError;
 use super::UpdateId;
 use super::VertexId;
 use super::replay::ReplayError;
-use super::replay::Step;
 use super::replay::canonical;
 use super::replay::replay;
+use crate::geom::orient3d;
 use crate::mesh::NONE;
 use std::collections::HashMap;
 use std::ops::Range;
@@ -39,21 +43,43 @@ impl Rows {
     fn row(&self, i: usize) -> &[u32] {
         &self.items[self.starts[i] as usize..self.starts[i + 1] as usize]
     }
+
+    fn bytes(&self) -> usize {
+        size_of_val(&self.starts[..]) + size_of_val(&self.items[..])
+    }
+}
+
+/// An update with everything spelled out, on its way into an [`ExplicitMt`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ExplicitUpdate<'a> {
+    /// Positions of the vertices that appear with `u+`; they are numbered as they come, after the base vertices.
+    pub positions: &'a [[i32; 3]],
+    /// Their field levels, vertex by vertex.
+    pub levels: &'a [i32],
+    /// The numbers of the tetrahedra that `u+` removes, in any order.
+    pub removed: &'a [u32],
+    /// The tetrahedra that `u+` inserts, positive, in numbers of vertices.
+    pub inserted: &'a [[u32; 4]],
+    /// Bounds the error of every tetrahedron that `u+` removes, and of all updates that depend on this one.
+    pub error: ErrorCode,
 }
 
 /// An MT with everything spelled out.
+///
+/// It grows by [`push`](ExplicitMt::push), coarse to fine; every prefix of an MT is an MT.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExplicitMt {
-    fields: usize,
+    info: MtInfo,
+    base: BaseMesh,
     positions: Vec<[i32; 3]>,
     levels: Vec<i32>,
     tets: Vec<[u32; 4]>,
-    base_tets: u32,
     /// First inserted tetrahedron of each update, and the end of all.
     inserted: Vec<u32>,
     removed: Rows,
     parents: Rows,
-    children: Rows,
+    /// The update that removes each tetrahedron; [`NONE`] if there is none so far. Children follow from it.
+    remover: Vec<u32>,
     errors: Vec<ErrorCode>,
 }
 
@@ -79,63 +105,123 @@ impl Counts {
     }
 }
 
+/// Most tetrahedra that an explicit MT can number.
+pub(super) const MAX_TETS: usize = 1 << 31;
+
 impl ExplicitMt {
-    /// Spells out an edge-based MT by applying all its updates.
-    ///
-    /// # Errors
-    /// If one of them cannot be applied.
-    pub fn from_edge(mt: &EdgeMt) -> Result<Self, ReplayError> {
-        let base = mt.base();
-        let mut explicit = Self {
-            fields: mt.info().fields.len(),
+    /// An MT without updates. `base` must fit `info`: see [`BaseMesh::check`].
+    pub fn new(info: MtInfo, base: BaseMesh) -> Self {
+        let base_tets = base.tets.len();
+        Self {
+            info,
             positions: base.positions.clone(),
             levels: base.values.clone(),
             tets: base.tets.iter().map(|&tet| canonical(tet)).collect(),
-            base_tets: base.tets.len() as u32,
-            inserted: vec![base.tets.len() as u32],
+            inserted: vec![base_tets as u32],
             removed: Rows::new(),
             parents: Rows::new(),
-            children: Rows::new(),
+            remover: vec![NONE; base_tets],
             errors: Vec::new(),
+            base,
+        }
+    }
+
+    /// Adds the next update.
+    ///
+    /// # Errors
+    /// What it removes must be there, once and in no other update; what it inserts must be positive on the lattice, with
+    /// vertices that are there; errors must not grow. Whether it fits the mesh shows when it is applied.
+    pub fn push(&mut self, new: &ExplicitUpdate<'_>) -> Result<UpdateId, UpdateError> {
+        let update = self.updates();
+        let fields = self.info.fields.len();
+        let holds = new.levels.len() == new.positions.len() * fields
+            && new.positions.iter().zip(new.levels.chunks(fields)).all(|(&p, q)| self.info.holds(p, q));
+        if !holds {
+            return Err(UpdateError::OffLattice { update });
+        }
+        if self.errors.last().is_some_and(|&last| new.error > last) {
+            return Err(UpdateError::Error { update });
+        }
+        let old = self.positions.len();
+        let position = |v: u32| match (v as usize).checked_sub(old) {
+            None => self.positions.get(v as usize).copied(),
+            Some(i) => new.positions.get(i).copied(),
         };
+        for tet in new.inserted {
+            let [Some(a), Some(b), Some(c), Some(d)] = tet.map(position) else {
+                return Err(UpdateError::Cavity { update });
+            };
+            if orient3d(a, b, c, d) <= 0 {
+                return Err(UpdateError::Inverted { update });
+            }
+        }
+        let mut removed = new.removed.to_vec();
+        removed.sort_unstable();
+        let there = removed.iter().all(|&t| self.remover.get(t as usize) == Some(&NONE));
+        let few = self.tets.len() + new.inserted.len() <= MAX_TETS;
+        if !there || !few || removed.windows(2).any(|pair| pair[0] == pair[1]) || new.inserted.is_empty() {
+            return Err(UpdateError::Cavity { update });
+        }
+        let mut parents: Vec<u32> = removed.iter().filter_map(|&t| self.creator(t)).map(|u| u.0).collect();
+        parents.dedup();
+        removed.iter().for_each(|&t| self.remover[t as usize] = update);
+        self.parents.push(parents);
+        self.removed.push(removed);
+        self.positions.extend_from_slice(new.positions);
+        self.levels.extend_from_slice(new.levels);
+        let first = self.tets.len();
+        self.tets.extend(new.inserted.iter().map(|&tet| canonical(tet)));
+        self.tets[first..].sort_unstable();
+        self.remover.resize(self.tets.len(), NONE);
+        self.inserted.push(self.tets.len() as u32);
+        self.errors.push(new.error);
+        Ok(UpdateId(update))
+    }
+
+    /// Spells out an MT of any kind by applying all its updates.
+    ///
+    /// # Errors
+    /// If one of them cannot be applied.
+    pub fn of(mt: &impl MultiTessellation) -> Result<Self, ReplayError> {
+        let info = MtInfo { kind: MtKind::Explicit, ..mt.info().clone() };
+        let mut explicit = Self::new(info, mt.base().clone());
         // The tetrahedra of the current mesh, by their vertices.
         let mut live: HashMap<[u32; 4], u32> = explicit.tets.iter().copied().zip(0..).collect();
+        let mut failed = Ok(UpdateId(0));
         replay(mt, |step| {
-            explicit.add_vertices(mt, step);
-            explicit.add_update(step, &mut live);
-            explicit.errors.push(mt.error_of(step.update));
+            let old = explicit.positions.len() as u32;
+            let newest = step.inserted.iter().flatten().copied().fold(0, u32::max);
+            let (mut positions, mut levels) = (Vec::new(), Vec::new());
+            for slot in (old..newest + 1).filter_map(|v| step.mesh.slot(VertexId(v))) {
+                positions.push(step.mesh.positions()[slot as usize]);
+                levels.extend_from_slice(step.mesh.levels(slot));
+            }
+            let removed: Vec<u32> = step.removed.iter().filter_map(|tet| live.remove(tet)).collect();
+            let first = explicit.tets.len();
+            let pushed = explicit.push(&ExplicitUpdate {
+                positions: &positions,
+                levels: &levels,
+                removed: &removed,
+                inserted: step.inserted,
+                error: mt.error(step.update),
+            });
+            if failed.is_ok() {
+                failed = pushed;
+            }
+            live.extend((first..explicit.tets.len()).map(|t| (explicit.tets[t], t as u32)));
         })?;
-        explicit.find_children();
+        failed?;
         Ok(explicit)
     }
 
-    fn add_vertices(&mut self, mt: &EdgeMt, step: &Step<'_>) {
-        for slot in mt.created(step.update).into_iter().filter_map(|v| step.mesh.slot(v)) {
-            self.positions.push(step.mesh.positions()[slot as usize]);
-            self.levels.extend_from_slice(step.mesh.levels(slot));
-        }
+    /// What is known of the MT as a whole.
+    pub fn info(&self) -> &MtInfo {
+        &self.info
     }
 
-    fn add_update(&mut self, step: &Step<'_>, live: &mut HashMap<[u32; 4], u32>) {
-        let mut removed: Vec<u32> = step.removed.iter().filter_map(|tet| live.remove(tet)).collect();
-        removed.sort_unstable();
-        let mut parents: Vec<u32> = removed.iter().filter_map(|&t| self.creator(t)).map(|u| u.0).collect();
-        parents.dedup();
-        self.parents.push(parents);
-        self.removed.push(removed);
-        let first = self.tets.len();
-        self.tets.extend_from_slice(step.inserted);
-        self.tets[first..].sort_unstable();
-        live.extend((first..self.tets.len()).map(|t| (self.tets[t], t as u32)));
-        self.inserted.push(self.tets.len() as u32);
-    }
-
-    fn find_children(&mut self) {
-        let mut children: Vec<Vec<u32>> = vec![Vec::new(); self.updates() as usize];
-        for u in 0..self.updates() {
-            self.parents.row(u as usize).iter().for_each(|&p| children[p as usize].push(u));
-        }
-        children.into_iter().for_each(|row| self.children.push(row));
+    /// The base mesh as it came; its tetrahedra are the first of [`Self::tets`], in the same order.
+    pub fn base_mesh(&self) -> &BaseMesh {
+        &self.base
     }
 
     /// Number of updates.
@@ -150,7 +236,7 @@ impl ExplicitMt {
 
     /// Number of fields.
     pub fn fields(&self) -> usize {
-        self.fields
+        self.info.fields.len()
     }
 
     /// The position of a vertex on the lattice.
@@ -160,7 +246,7 @@ impl ExplicitMt {
 
     /// The levels of all fields at a vertex.
     pub fn levels(&self, v: VertexId) -> &[i32] {
-        &self.levels[v.0 as usize * self.fields..][..self.fields]
+        &self.levels[v.0 as usize * self.fields()..][..self.fields()]
     }
 
     /// All tetrahedra of the MT, in numbers of its vertices.
@@ -170,7 +256,7 @@ impl ExplicitMt {
 
     /// Which tetrahedra make up the base mesh.
     pub fn base(&self) -> Range<u32> {
-        0..self.base_tets
+        0..self.base.tets.len() as u32
     }
 
     /// Which tetrahedra `u+` inserts.
@@ -189,8 +275,18 @@ impl ExplicitMt {
     }
 
     /// The updates that remove what `u+` inserts, ascending.
-    pub fn children(&self, u: UpdateId) -> &[u32] {
-        self.children.row(u.0 as usize)
+    pub fn children(&self, u: UpdateId) -> Vec<u32> {
+        let mut children: Vec<u32> =
+            self.inserted(u).filter_map(|t| self.remover(t)).map(|child| child.0).collect();
+        children.sort_unstable();
+        children.dedup();
+        children
+    }
+
+    /// The update that removes tetrahedron `t`; none if it belongs to the reference mesh (as far as it is known).
+    #[inline]
+    pub fn remover(&self, t: u32) -> Option<UpdateId> {
+        Some(self.remover[t as usize]).filter(|&u| u != NONE).map(UpdateId)
     }
 
     /// The error of an update.
@@ -223,7 +319,7 @@ impl ExplicitMt {
             return None;
         }
         let mut live = vec![false; self.tets.len()];
-        live[..self.base_tets as usize].fill(true);
+        live[..self.base.tets.len()].fill(true);
         for u in (0..self.updates()).map(UpdateId).filter(|u| set.get(u.0 as usize) == Some(&true)) {
             self.inserted(u).for_each(|t| live[t as usize] = true);
             self.removed(u).iter().for_each(|&t| live[t as usize] = false);
@@ -233,7 +329,7 @@ impl ExplicitMt {
 
     pub(super) fn counts(&self) -> Counts {
         Counts {
-            fields: self.fields as u64,
+            fields: self.fields() as u64,
             vertices: self.positions.len() as u64,
             tets: self.tets.len() as u64,
             updates: u64::from(self.updates()),
@@ -250,15 +346,27 @@ impl ExplicitMt {
     pub fn bytes(&self) -> u64 {
         self.counts().bytes()
     }
+
+    /// Bytes of everything that the MT really holds, base mesh and errors included.
+    pub fn held_bytes(&self) -> u64 {
+        let base = size_of_val(&self.base.positions[..])
+            + size_of_val(&self.base.values[..])
+            + size_of_val(&self.base.tets[..]);
+        let vertices = size_of_val(&self.positions[..]) + size_of_val(&self.levels[..]);
+        let tets = size_of_val(&self.tets[..]) + size_of_val(&self.remover[..]);
+        let nodes = size_of_val(&self.inserted[..])
+            + self.removed.bytes()
+            + self.parents.bytes()
+            + size_of_val(&self.errors[..]);
+        (base + vertices + tets + nodes) as u64
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::BaseMesh;
+    use super::super::EdgeMt;
     use super::super::FieldInfo;
     use super::super::MtFault;
-    use super::super::MtInfo;
-    use super::super::MtKind;
     use super::super::VertexSplit;
     use super::*;
     use crate::geom::Lattice;
@@ -302,7 +410,7 @@ mod tests {
             error: ErrorCode(5),
         };
         mt.push(&along_x).expect("a valid split");
-        ExplicitMt::from_edge(&mt).expect("a valid MT")
+        ExplicitMt::of(&mt).expect("a valid MT")
     }
 
     #[test]
@@ -313,7 +421,7 @@ mod tests {
         assert_eq!((mt.base(), mt.inserted(first), mt.inserted(second)), (0..8, 8..20, 20..32));
         assert_eq!(mt.removed(first), [0, 1, 2, 3, 4, 5, 6, 7]);
         assert_eq!(mt.removed(second).len(), 8);
-        assert_eq!((mt.parents(second), mt.children(first)), (&[0][..], &[1][..]));
+        assert_eq!((mt.parents(second), mt.children(first)), (&[0][..], vec![1]));
         assert!(mt.parents(first).is_empty() && mt.children(second).is_empty());
         assert_eq!(
             [7, 8, 9, 10].map(|v| mt.position(VertexId(v))),
@@ -337,28 +445,25 @@ mod tests {
             mt.check()
         };
         assert_eq!(fault(&|mt| mt.errors.swap(0, 1)), Err(MtFault::Error { update: second }));
-        assert_eq!(fault(&|mt| mt.children = Rows { starts: vec![0; 3], items: vec![] }), {
-            Err(MtFault::Order { update: second })
-        });
+        let removes_nothing = |mt: &mut ExplicitMt| mt.remover.fill(NONE);
+        assert_eq!(fault(&removes_nothing), Err(MtFault::Order { update: first }));
         let no_parents = Rows { starts: vec![0; 3], items: vec![] };
-        assert_eq!(
-            fault(&|mt| (mt.parents, mt.children) = (no_parents.clone(), no_parents.clone())),
-            Err(MtFault::Order { update: second })
-        );
+        assert_eq!(fault(&|mt| mt.parents = no_parents.clone()), Err(MtFault::Order { update: second }));
         assert_eq!(fault(&|mt| mt.tets[3].swap(0, 1)), Err(MtFault::Tetrahedron { update: None }));
         assert_eq!(fault(&|mt| mt.tets[9].swap(0, 1)), Err(MtFault::Tetrahedron { update: Some(first) }));
         assert_eq!(fault(&|mt| mt.tets[21][0] = 11), Err(MtFault::Tetrahedron { update: Some(second) }));
         assert_eq!(fault(&|mt| mt.tets[1] = mt.tets[0]), Err(MtFault::Face { update: None }));
         // A tetrahedron that stays where new ones go.
         let stays = |mt: &mut ExplicitMt| {
-            let last = mt.removed.items.pop();
+            let last = mt.removed.items.pop().expect("a removed tetrahedron");
             mt.removed.starts[2] -= 1;
-            assert!(last.is_some());
+            mt.remover[last as usize] = NONE;
         };
         assert_eq!(fault(&stays), Err(MtFault::Face { update: Some(second) }));
         // A new tetrahedron left out: a hole in the middle.
         let leaves_out = |mt: &mut ExplicitMt| {
             mt.tets.pop();
+            mt.remover.pop();
             mt.inserted[2] -= 1;
         };
         assert_eq!(fault(&leaves_out), Err(MtFault::Torn { update: second }));

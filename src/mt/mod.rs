@@ -4,6 +4,7 @@
 //! oracle of tests. Both are immutable once they are complete. What changes is the [`CurrentMesh`], to which updates
 //! are applied through the trait [`MultiTessellation`].
 
+mod any;
 mod base;
 mod check;
 mod collapse;
@@ -12,15 +13,17 @@ mod error;
 mod explicit;
 mod replay;
 mod ring;
+mod spelled;
 mod split;
 mod stats;
 
+pub use any::Mt;
 pub use base::{BaseMesh, BaseMeshError, MAX_FIELD_BITS, MAX_UPDATES};
 pub use check::MtFault;
 pub use collapse::{EdgeMt, MAX_LINK, MAX_STAR, VertexSplit};
 pub use current::{CurrentMesh, MeshChanges};
 pub use error::{ErrorCode, UpdateError};
-pub use explicit::ExplicitMt;
+pub use explicit::{ExplicitMt, ExplicitUpdate};
 pub use replay::ReplayError;
 pub use split::Applied;
 pub use stats::{MtStats, stats};
@@ -40,6 +43,10 @@ pub struct VertexId(pub u32);
 pub enum MtKind {
     /// Vertex splits whose inverse collapses an edge to its midpoint [§2.1, §4].
     Edge,
+    /// Vertex insertions into star-shaped polyhedra; their inverse removes a vertex [§2.2, §5].
+    Vertex,
+    /// Updates of any kind, every tetrahedron spelled out [§3].
+    Explicit,
 }
 
 /// A scalar field of an MT: name, range, and the lattice that its values live on.
@@ -119,11 +126,45 @@ pub trait MultiTessellation {
     /// larger number, so of every one that depends on `u`.
     fn error(&self, u: UpdateId) -> ErrorCode;
 
-    /// The update that removes a tetrahedron of the current mesh; none if it belongs to the reference mesh.
-    fn remover(&self, mesh: &CurrentMesh, tet: &[u32; 4]) -> Option<UpdateId>;
+    /// Bytes of everything that the MT holds, base mesh and errors included.
+    fn bytes(&self) -> u64;
 
-    /// The update that created a tetrahedron of the current mesh in refinement; none if it is of the base mesh.
-    fn creator(&self, mesh: &CurrentMesh, tet: &[u32; 4]) -> Option<UpdateId>;
+    /// The base mesh as a current mesh that updates of this MT can be applied to.
+    ///
+    /// # Errors
+    /// If the base mesh does not fit its description or is not a valid mesh.
+    fn start(&self) -> Result<CurrentMesh, BaseMeshError> {
+        CurrentMesh::new(self.info(), self.base())
+    }
+
+    /// The update that removes tetrahedron `t` of the current mesh; none if that belongs to the reference mesh (as far
+    /// as it is known).
+    fn remover(&self, mesh: &CurrentMesh, t: u32) -> Option<UpdateId>;
+
+    /// The update that created tetrahedron `t` of the current mesh in refinement; none if it is of the base mesh.
+    fn creator(&self, mesh: &CurrentMesh, t: u32) -> Option<UpdateId>;
+
+    /// Appends the tetrahedra that `u+` removes from a mesh that contains all parents of `u`, but not `u`.
+    ///
+    /// # Errors
+    /// If the MT is damaged, or the mesh is another one.
+    fn find_removed(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        found: &mut Vec<u32>,
+    ) -> Result<(), UpdateError>;
+
+    /// Appends the tetrahedra that `u+` inserted into a mesh that contains `u` and none of its children.
+    ///
+    /// # Errors
+    /// If the MT is damaged, or the mesh is another one.
+    fn find_inserted(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        found: &mut Vec<u32>,
+    ) -> Result<(), UpdateError>;
 
     /// Whether all that `u+` created is still in the mesh, as far as can be told at a glance.
     /// False means that some child of `u` is applied, or `u` is not.

@@ -3,12 +3,9 @@
 use super::Applied;
 use super::BaseMeshError;
 use super::CurrentMesh;
-use super::EdgeMt;
 use super::MultiTessellation;
 use super::UpdateError;
 use super::UpdateId;
-use super::VertexId;
-use super::current::Star;
 use std::fmt;
 
 /// Why the updates of an MT cannot all be applied. Only a damaged or hostile MT leads here.
@@ -49,52 +46,42 @@ pub(super) struct Step<'a> {
     pub update: UpdateId,
     /// The mesh with the update.
     pub mesh: &'a CurrentMesh,
+    /// The updates that created what this one removes, ascending.
+    pub parents: &'a [UpdateId],
     pub removed: &'a [[u32; 4]],
     pub inserted: &'a [[u32; 4]],
 }
 
 /// Applies all updates in their order and shows each to `see`. Returns the reference mesh.
-pub(super) fn replay(mt: &EdgeMt, mut see: impl FnMut(&Step<'_>)) -> Result<CurrentMesh, ReplayError> {
-    let mut mesh = CurrentMesh::new(mt.info(), mt.base())?;
+pub(super) fn replay(
+    mt: &impl MultiTessellation,
+    mut see: impl FnMut(&Step<'_>),
+) -> Result<CurrentMesh, ReplayError> {
+    let mut mesh = mt.start()?;
     mt.announce(&mut mesh, 0);
+    let (mut found, mut parents) = (Vec::new(), Vec::new());
     let (mut removed, mut inserted) = (Vec::new(), Vec::new());
     for update in (0..mt.updates()).map(UpdateId) {
+        found.clear();
+        mt.find_removed(&mut mesh, update, &mut found)?;
         removed.clear();
-        inserted.clear();
-        let vertex = mt.split(update).vertex;
-        collect_star(&mut mesh, update, vertex, &mut removed)?;
+        removed.extend(found.iter().map(|&t| named(&mesh, t)));
+        parents.clear();
+        parents.extend(found.iter().filter_map(|&t| mt.creator(&mesh, t)));
+        parents.sort_unstable();
+        parents.dedup();
         if let Applied::Blocked(_) = mt.refine(&mut mesh, update)? {
             // All updates with smaller numbers are applied, and only those can be in the way.
-            return Err(UpdateError::Vertex { update: update.0, vertex: vertex.0 }.into());
+            return Err(UpdateError::Error { update: update.0 }.into());
         }
         mesh.clear_touched();
-        let [near, far] = mt.created(update);
-        collect_star(&mut mesh, update, near, &mut inserted)?;
-        let of_near = inserted.len();
-        collect_star(&mut mesh, update, far, &mut inserted)?;
-        let mut index = 0;
-        inserted.retain(|tet: &[u32; 4]| {
-            index += 1;
-            index <= of_near || !tet.contains(&near.0)
-        });
-        see(&Step { update, mesh: &mesh, removed: &removed, inserted: &inserted });
+        found.clear();
+        mt.find_inserted(&mut mesh, update, &mut found)?;
+        inserted.clear();
+        inserted.extend(found.iter().map(|&t| named(&mesh, t)));
+        see(&Step { update, mesh: &mesh, parents: &parents, removed: &removed, inserted: &inserted });
     }
     Ok(mesh)
-}
-
-/// Appends the tetrahedra around a vertex of the MT.
-fn collect_star(
-    mesh: &mut CurrentMesh,
-    update: UpdateId,
-    vertex: VertexId,
-    tets: &mut Vec<[u32; 4]>,
-) -> Result<(), UpdateError> {
-    let update = update.0;
-    let slot = mesh.slot(vertex).ok_or(UpdateError::Vertex { update, vertex: vertex.0 })?;
-    let mut star = Star::default();
-    mesh.gather_star(slot, &mut star, |_, _| None::<()>).map_err(|_| UpdateError::Star { update })?;
-    tets.extend(star.tets[..star.len].iter().map(|&t| named(mesh, t)));
-    Ok(())
 }
 
 /// The vertex numbers of tetrahedron `t`, ascending but for the last two, which are swapped if that is what it takes

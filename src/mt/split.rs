@@ -347,6 +347,21 @@ impl CurrentMesh {
     }
 }
 
+/// Appends the tetrahedra around a vertex of the MT.
+fn find_star(
+    mesh: &mut CurrentMesh,
+    u: UpdateId,
+    vertex: VertexId,
+    found: &mut Vec<u32>,
+) -> Result<(), UpdateError> {
+    let update = u.0;
+    let slot = mesh.slot(vertex).ok_or(UpdateError::Vertex { update, vertex: vertex.0 })?;
+    let mut star = Star::default();
+    mesh.gather_star(slot, &mut star, |_, _| None::<()>).map_err(|_| UpdateError::Star { update })?;
+    found.extend_from_slice(&star.tets[..star.len]);
+    Ok(())
+}
+
 impl MultiTessellation for EdgeMt {
     fn info(&self) -> &MtInfo {
         self.info()
@@ -360,20 +375,54 @@ impl MultiTessellation for EdgeMt {
         self.updates()
     }
 
+    fn bytes(&self) -> u64 {
+        self.bytes()
+    }
+
     #[inline]
     fn error(&self, u: UpdateId) -> ErrorCode {
         self.error_of(u)
     }
 
     #[inline]
-    fn remover(&self, mesh: &CurrentMesh, tet: &[u32; 4]) -> Option<UpdateId> {
-        let first = tet.iter().map(|&v| mesh.labels[v as usize].split).min();
+    fn remover(&self, mesh: &CurrentMesh, t: u32) -> Option<UpdateId> {
+        let first = mesh.tets[t as usize].iter().map(|&v| mesh.labels[v as usize].split).min();
         first.filter(|&s| s != NONE).map(UpdateId)
     }
 
     #[inline]
-    fn creator(&self, mesh: &CurrentMesh, tet: &[u32; 4]) -> Option<UpdateId> {
-        tet.iter().filter_map(|&v| self.created_by(mesh.vertex(v))).max()
+    fn creator(&self, mesh: &CurrentMesh, t: u32) -> Option<UpdateId> {
+        mesh.tets[t as usize].iter().filter_map(|&v| self.created_by(mesh.vertex(v))).max()
+    }
+
+    fn find_removed(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        found: &mut Vec<u32>,
+    ) -> Result<(), UpdateError> {
+        find_star(mesh, u, self.split(u).vertex, found)
+    }
+
+    fn find_inserted(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        found: &mut Vec<u32>,
+    ) -> Result<(), UpdateError> {
+        let [near, far] = self.created(u);
+        let start = found.len();
+        find_star(mesh, u, near, found)?;
+        let of_near = found.len();
+        find_star(mesh, u, far, found)?;
+        let near = mesh.slot(near).unwrap_or(NONE);
+        let mut at = 0;
+        found.retain(|&t| {
+            at += 1;
+            // Those at both ends are there already.
+            at <= of_near || at <= start || !mesh.tets[t as usize].contains(&near)
+        });
+        Ok(())
     }
 
     #[inline]

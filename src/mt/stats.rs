@@ -1,6 +1,6 @@
 //! What an MT is like and what it costs to store, in the paper's terms [§6, Table 1].
 
-use super::EdgeMt;
+use super::MultiTessellation;
 use super::explicit::Counts;
 use super::replay::ReplayError;
 use super::replay::replay;
@@ -68,31 +68,28 @@ impl MtStats {
 ///
 /// # Errors
 /// If an update cannot be applied.
-pub fn stats(mt: &EdgeMt) -> Result<MtStats, ReplayError> {
+pub fn stats(mt: &impl MultiTessellation) -> Result<MtStats, ReplayError> {
     let (base, fields) = (mt.base(), mt.info().fields.len() as u64);
     let mut counts = Counts {
         fields,
-        vertices: base.positions.len() as u64 + 2 * u64::from(mt.updates()),
+        vertices: base.positions.len() as u64,
         tets: base.tets.len() as u64,
         updates: u64::from(mt.updates()),
         removed: 0,
         arcs: 0,
     };
-    let (mut depths, mut parents) = (Vec::<u32>::new(), Vec::new());
+    let mut depths = Vec::<u32>::new();
     let (mut max_parents, mut max_removed, mut max_inserted) = (0, 0, 0);
     let mesh = replay(mt, |step| {
-        parents.clear();
-        // A tetrahedron was created together with the youngest of its vertices.
-        let creators = step.removed.iter().map(|tet| tet.iter().copied().fold(0, u32::max));
-        parents.extend(creators.filter_map(|v| mt.created_by(super::VertexId(v))));
-        parents.sort_unstable();
-        parents.dedup();
-        let above = parents.iter().map(|p| depths[p.0 as usize]).max();
+        let above = step.parents.iter().map(|p| depths[p.0 as usize]).max();
         depths.push(above.unwrap_or(0) + 1);
         counts.tets += step.inserted.len() as u64;
         counts.removed += step.removed.len() as u64;
-        counts.arcs += parents.len() as u64;
-        max_parents = max_parents.max(parents.len() as u32);
+        counts.arcs += step.parents.len() as u64;
+        // Vertices are numbered as they come.
+        let newest = step.inserted.iter().flatten().copied().fold(0, u32::max);
+        counts.vertices = counts.vertices.max(u64::from(newest) + 1);
+        max_parents = max_parents.max(step.parents.len() as u32);
         max_removed = max_removed.max(step.removed.len() as u32);
         max_inserted = max_inserted.max(step.inserted.len() as u32);
     })?;

@@ -50,7 +50,7 @@ impl Front {
     /// # Errors
     /// If the base mesh is not a valid mesh, or does not fit its description.
     pub fn new(mt: &impl MultiTessellation) -> Result<Self, BaseMeshError> {
-        let mesh = CurrentMesh::new(mt.info(), mt.base())?;
+        let mesh = mt.start()?;
         Ok(Self { mesh, applied: Vec::new(), applied_count: 0, known: 0 })
     }
 
@@ -193,7 +193,7 @@ impl Front {
     #[inline]
     fn violation(&self, mt: &impl MultiTessellation, criterion: &impl Criterion, t: u32) -> Option<UpdateId> {
         let tet = self.mesh.tet(t)?;
-        let u = mt.remover(&self.mesh, &tet)?;
+        let u = mt.remover(&self.mesh, t)?;
         let error = mt.error(u);
         (error > criterion.tolerance() && self.selects(criterion, &tet, error)).then_some(u)
     }
@@ -307,8 +307,8 @@ impl Front {
             n => mt.error(UpdateId(n - 1)),
         };
         let mut largest = ErrorCode::ZERO;
-        for tet in self.mesh.tets() {
-            let error = match mt.remover(&self.mesh, tet) {
+        for (t, tet) in (0..).zip(self.mesh.tets()) {
+            let error = match mt.remover(&self.mesh, t) {
                 Some(u) => mt.error(u),
                 None => to_come,
             };
@@ -426,8 +426,8 @@ impl<'a, M: MultiTessellation, C: Criterion> Budgeted<'a, M, C> {
     /// The updates that created the tetrahedra just changed.
     fn parents_of_touched(&self) -> Vec<UpdateId> {
         let mesh = &self.front.mesh;
-        let tets = mesh.touched().iter().filter_map(|&t| mesh.tet(t));
-        let mut parents: Vec<UpdateId> = tets.filter_map(|tet| self.mt.creator(mesh, &tet)).collect();
+        let live = mesh.touched().iter().filter(|&&t| mesh.tet(t).is_some());
+        let mut parents: Vec<UpdateId> = live.filter_map(|&t| self.mt.creator(mesh, t)).collect();
         parents.sort_unstable();
         parents.dedup();
         parents

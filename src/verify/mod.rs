@@ -195,11 +195,8 @@ impl Case<'_> {
 
     /// The error of each tetrahedron: that of the update which removes it.
     fn errors(&self, mesh: &PlainMesh<'_>) -> Vec<f64> {
-        let error = |tet: &[u32; 4]| {
-            let removers = tet.iter().filter_map(|&v| self.mt.split_by(mesh.mesh.vertex(v)));
-            removers.min().map_or(0.0, |u| self.mt.error(u).error())
-        };
-        mesh.tets.iter().map(error).collect()
+        let error = |t: u32| self.mt.remover(mesh.mesh, t).map_or(0.0, |u| self.mt.error(u).error());
+        (0..mesh.tets.len() as u32).map(error).collect()
     }
 
     /// Is what refinement says of the mesh true?

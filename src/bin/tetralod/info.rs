@@ -78,6 +78,8 @@ fn report(opened: &Opened) -> Result<Report> {
     let stats = stats(mt)?;
     let kind = match info.kind {
         MtKind::Edge => "edge",
+        MtKind::Vertex => "vertex",
+        MtKind::Explicit => "explicit",
     };
     let field =
         |f: &tetralod::mt::FieldInfo| Field { name: f.name.clone(), min: f.min, max: f.max, bits: f.bits };

@@ -1,0 +1,128 @@
+//! An MT of any kind: what files hold and sessions use, without the caller knowing which.
+
+use super::Applied;
+use super::BaseMesh;
+use super::BaseMeshError;
+use super::CurrentMesh;
+use super::EdgeMt;
+use super::ErrorCode;
+use super::ExplicitMt;
+use super::LookAtTet;
+use super::MtInfo;
+use super::MultiTessellation;
+use super::UpdateError;
+use super::UpdateId;
+
+/// An MT of any kind.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Mt {
+    /// A compact edge-based MT.
+    Edge(EdgeMt),
+    /// An explicit MT.
+    Explicit(ExplicitMt),
+}
+
+/// Does the same to whichever MT it is.
+macro_rules! each {
+    ($mt:expr, $inner:ident => $do:expr) => {
+        match $mt {
+            Mt::Edge($inner) => $do,
+            Mt::Explicit($inner) => $do,
+        }
+    };
+}
+
+impl From<EdgeMt> for Mt {
+    fn from(mt: EdgeMt) -> Self {
+        Self::Edge(mt)
+    }
+}
+
+impl From<ExplicitMt> for Mt {
+    fn from(mt: ExplicitMt) -> Self {
+        Self::Explicit(mt)
+    }
+}
+
+impl MultiTessellation for Mt {
+    fn info(&self) -> &MtInfo {
+        each!(self, mt => mt.info())
+    }
+
+    fn base(&self) -> &BaseMesh {
+        each!(self, mt => MultiTessellation::base(mt))
+    }
+
+    fn updates(&self) -> u32 {
+        each!(self, mt => mt.updates())
+    }
+
+    fn bytes(&self) -> u64 {
+        each!(self, mt => MultiTessellation::bytes(mt))
+    }
+
+    fn start(&self) -> Result<CurrentMesh, BaseMeshError> {
+        each!(self, mt => mt.start())
+    }
+
+    #[inline]
+    fn error(&self, u: UpdateId) -> ErrorCode {
+        each!(self, mt => MultiTessellation::error(mt, u))
+    }
+
+    #[inline]
+    fn remover(&self, mesh: &CurrentMesh, t: u32) -> Option<UpdateId> {
+        each!(self, mt => MultiTessellation::remover(mt, mesh, t))
+    }
+
+    #[inline]
+    fn creator(&self, mesh: &CurrentMesh, t: u32) -> Option<UpdateId> {
+        each!(self, mt => MultiTessellation::creator(mt, mesh, t))
+    }
+
+    #[inline]
+    fn may_coarsen(&self, mesh: &CurrentMesh, u: UpdateId) -> bool {
+        each!(self, mt => mt.may_coarsen(mesh, u))
+    }
+
+    fn refine(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
+        each!(self, mt => mt.refine(mesh, u))
+    }
+
+    fn coarsen(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
+        each!(self, mt => mt.coarsen(mesh, u))
+    }
+
+    fn look_at_removed(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        field: usize,
+        look: LookAtTet<'_>,
+    ) -> Result<Applied, UpdateError> {
+        each!(self, mt => mt.look_at_removed(mesh, u, field, look))
+    }
+
+    fn announce(&self, mesh: &mut CurrentMesh, known: u32) {
+        each!(self, mt => mt.announce(mesh, known));
+    }
+
+    fn find_removed(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        found: &mut Vec<u32>,
+    ) -> Result<(), UpdateError> {
+        each!(self, mt => mt.find_removed(mesh, u, found))
+    }
+
+    fn find_inserted(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        found: &mut Vec<u32>,
+    ) -> Result<(), UpdateError> {
+        each!(self, mt => mt.find_inserted(mesh, u, found))
+    }
+}
