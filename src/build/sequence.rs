@@ -1,5 +1,19 @@
 //! What the builders of vertex-based MTs hand over: vertex insertions, coarse to fine.
 
+use super::BuildError;
+use super::BuildProgress;
+use super::OnProgress;
+use super::quantize::Quantized;
+use crate::mesh::NONE;
+use crate::mt::BaseMesh;
+use crate::mt::ErrorCode;
+use crate::mt::ExplicitMt;
+use crate::mt::ExplicitUpdate;
+use crate::mt::MtInfo;
+use crate::mt::UpdateError;
+use crate::mt::canonical;
+use std::cmp::Reverse;
+use std::collections::HashMap;
 use std::ops::Range;
 
 /// Vertex insertions from a base mesh to a reference mesh, in an order in which they can be carried out.
@@ -28,4 +42,164 @@ pub(super) struct Insertion {
     /// What has to be added to the errors of the insertions that depend on this one before they bound its own from
     /// below: how far the boundary moves, as an error. 0 where the boundary stays.
     pub step: f64,
+}
+
+impl Sequence {
+    /// The MT of these insertions. They come in the order of falling error, as far as equal errors leave it open in
+    /// the order of the sequence: errors are made monotone along the DAG first, so this extends the partial order.
+    pub fn explicit_mt(
+        &self,
+        mut info: MtInfo,
+        quantized: &Quantized,
+        progress: OnProgress<'_>,
+    ) -> Result<ExplicitMt, BuildError> {
+        let arcs = self.arcs()?;
+        let errors = self.monotone_errors(&info, quantized, &arcs);
+        let mut order: Vec<u32> = (0..self.steps.len() as u32).collect();
+        order.sort_by_key(|&i| Reverse(errors[i as usize]));
+        info.updates = order.len() as u32;
+        let fields = info.fields.len();
+        let levels = |v: u32| &quantized.levels[v as usize * fields..][..fields];
+        let mut base = BaseMesh::default();
+        let mut number = vec![NONE; quantized.positions.len()];
+        self.base.iter().flatten().for_each(|&v| number[v as usize] = 0);
+        for v in (0..number.len() as u32).filter(|&v| number[v as usize] == 0).collect::<Vec<_>>() {
+            number[v as usize] = base.positions.len() as u32;
+            base.positions.push(quantized.positions[v as usize]);
+            base.values.extend_from_slice(levels(v));
+        }
+        base.tets = self.base.iter().map(|tet| tet.map(|v| number[v as usize])).collect();
+        let mut mt = ExplicitMt::new(info, base);
+        // The number that each tetrahedron of the sequence has in the MT.
+        let mut ids = vec![NONE; self.tets.len()];
+        for (done, &i) in order.iter().enumerate() {
+            if done % 4096 == 0 {
+                let step = BuildProgress { stage: "order", done: done as u64, total: order.len() as u64 };
+                if progress(step).is_break() {
+                    return Err(BuildError::Stopped);
+                }
+            }
+            let Insertion { vertex, inserted, .. } = &self.steps[i as usize];
+            number[*vertex as usize] = (mt.base_mesh().positions.len() + done) as u32;
+            let sources = &arcs.source[self.steps[i as usize].removed.clone()];
+            let removed: Vec<u32> = sources.iter().map(|source| source.number(&ids)).collect();
+            let name = |tet: [u32; 4]| canonical(tet.map(|v| number[v as usize]));
+            let new: Vec<[u32; 4]> = self.tets[inserted.clone()].iter().map(|&tet| name(tet)).collect();
+            let first = mt.tets().len() as u32;
+            let update = ExplicitUpdate {
+                positions: &[quantized.positions[*vertex as usize]],
+                levels: levels(*vertex),
+                removed: &removed,
+                inserted: &new,
+                error: errors[i as usize],
+            };
+            mt.push(&update).map_err(BuildError::Internal)?;
+            let stored = &mt.tets()[first as usize..];
+            for (at, tet) in inserted.clone().zip(&new) {
+                let place = stored.binary_search(tet).map_err(|_| torn(i))?;
+                ids[at] = first + place as u32;
+            }
+        }
+        Ok(mt)
+    }
+
+    /// Where each removed tetrahedron comes from.
+    fn arcs(&self) -> Result<Arcs, BuildError> {
+        let mut live: HashMap<[u32; 4], Source> =
+            (0..).zip(&self.base).map(|(t, tet)| (sorted(*tet), Source::Base(t))).collect();
+        let mut arcs =
+            Arcs { source: vec![Source::Base(NONE); self.tets.len()], creator: vec![NONE; self.tets.len()] };
+        for (i, step) in (0..).zip(&self.steps) {
+            for at in step.removed.clone() {
+                let source = live.remove(&sorted(self.tets[at])).ok_or_else(|| torn(i))?;
+                arcs.source[at] = source;
+                if let Source::Inserted(from) = source {
+                    arcs.creator[at] = arcs.creator[from];
+                }
+            }
+            for at in step.inserted.clone() {
+                arcs.creator[at] = i;
+                if live.insert(sorted(self.tets[at]), Source::Inserted(at)).is_some() {
+                    return Err(torn(i));
+                }
+            }
+        }
+        Ok(arcs)
+    }
+
+    /// Errors that are at least those of all insertions that depend on each, by so much more that selection by isovalue
+    /// and by box is monotone: see `overshoot` and `step_of_boundary` in the edge builder's costs.
+    fn monotone_errors(&self, info: &MtInfo, quantized: &Quantized, arcs: &Arcs) -> Vec<ErrorCode> {
+        // Never zero: error 0 is to mean the reference mesh, with every update applied.
+        let own = |step: &Insertion| ErrorCode::at_least(step.error).max(ErrorCode(1));
+        let mut errors: Vec<ErrorCode> = self.steps.iter().map(own).collect();
+        for i in (0..self.steps.len()).rev() {
+            let error = errors[i].error();
+            let removed = self.steps[i].removed.clone();
+            let mut parents: Vec<u32> =
+                arcs.creator[removed].iter().copied().filter(|&p| p != NONE).collect();
+            parents.sort_unstable();
+            parents.dedup();
+            for p in parents.into_iter().map(|p| p as usize) {
+                let more = self.overshoot(p, info, quantized).max(self.steps[p].step);
+                errors[p] = errors[p].max(ErrorCode::at_least(error + more));
+            }
+        }
+        errors
+    }
+
+    /// How far the values of an inserted vertex exceed the range of those around it, as a fraction of the field's range.
+    fn overshoot(&self, step: usize, info: &MtInfo, quantized: &Quantized) -> f64 {
+        let Insertion { vertex, inserted, .. } = &self.steps[step];
+        let fields = info.fields.len();
+        let level = |v: u32, f: usize| quantized.levels[v as usize * fields + f];
+        let mut largest = 0.0_f64;
+        for (f, field) in info.fields.iter().enumerate() {
+            let (mut low, mut high) = (i32::MAX, i32::MIN);
+            for &v in self.tets[inserted.clone()].iter().flatten().filter(|&v| v != vertex) {
+                (low, high) = (low.min(level(v, f)), high.max(level(v, f)));
+            }
+            let own = level(*vertex, f);
+            let beyond = (own - high).max(low - own).max(0);
+            largest = largest.max(f64::from(beyond) * field.step / field.range());
+        }
+        largest * (1.0 + 1e-9)
+    }
+}
+
+/// Where a removed tetrahedron comes from.
+#[derive(Clone, Copy, Debug)]
+enum Source {
+    /// The base mesh: its number there.
+    Base(u32),
+    /// An insertion: its place in [`Sequence::tets`].
+    Inserted(usize),
+}
+
+impl Source {
+    /// Its number in the MT.
+    fn number(self, ids: &[u32]) -> u32 {
+        match self {
+            Self::Base(t) => t,
+            Self::Inserted(at) => ids[at],
+        }
+    }
+}
+
+/// What is known of each entry of [`Sequence::tets`].
+struct Arcs {
+    /// Where a removed tetrahedron comes from.
+    source: Vec<Source>,
+    /// Which insertion made it; [`NONE`] for the base mesh.
+    creator: Vec<u32>,
+}
+
+fn sorted(mut tet: [u32; 4]) -> [u32; 4] {
+    tet.sort_unstable();
+    tet
+}
+
+/// A builder's sequence contradicts itself: a bug.
+fn torn(step: u32) -> BuildError {
+    BuildError::Internal(UpdateError::Cavity { update: step })
 }

@@ -12,6 +12,7 @@ use super::MtInfo;
 use super::MultiTessellation;
 use super::UpdateError;
 use super::UpdateId;
+use super::VertexMt;
 
 /// An MT of any kind.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,6 +20,8 @@ use super::UpdateId;
 pub enum Mt {
     /// A compact edge-based MT.
     Edge(EdgeMt),
+    /// A compact vertex-based MT.
+    Vertex(VertexMt),
     /// An explicit MT.
     Explicit(ExplicitMt),
 }
@@ -28,6 +31,7 @@ macro_rules! each {
     ($mt:expr, $inner:ident => $do:expr) => {
         match $mt {
             Mt::Edge($inner) => $do,
+            Mt::Vertex($inner) => $do,
             Mt::Explicit($inner) => $do,
         }
     };
@@ -36,6 +40,12 @@ macro_rules! each {
 impl From<EdgeMt> for Mt {
     fn from(mt: EdgeMt) -> Self {
         Self::Edge(mt)
+    }
+}
+
+impl From<VertexMt> for Mt {
+    fn from(mt: VertexMt) -> Self {
+        Self::Vertex(mt)
     }
 }
 

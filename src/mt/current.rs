@@ -13,6 +13,7 @@ use super::BaseMeshError;
 use super::MAX_STAR;
 use super::MtInfo;
 use super::VertexId;
+use super::insertion::Cavity;
 use super::ring::LINK_CAPACITY;
 use super::ring::Ring;
 use crate::mesh::FACES;
@@ -54,6 +55,7 @@ pub struct CurrentMesh {
     vertex_marks: Vec<u32>,
     epoch: u32,
     ring: Option<Box<Ring>>,
+    cavity: Option<Box<Cavity>>,
     changed_vertices: Changes,
     changed_tets: Changes,
     /// The tetrahedra of the stars that updates changed since the list was last cleared; free slots among them.
@@ -90,7 +92,7 @@ pub(crate) enum Gather<T> {
 
 /// Largest star that is gathered: the two sides of a collapse have at most `MAX_STAR` tetrahedra together, and at
 /// most `MAX_LINK` more lie between them.
-const GATHERED: usize = 128;
+pub(crate) const GATHERED: usize = 128;
 /// Tags from here on are not looked for.
 pub(crate) const FIRST_ANONYMOUS_TAG: u32 = 1 << 31;
 const MARK_BITS: u32 = GATHERED.trailing_zeros();
@@ -132,6 +134,7 @@ impl CurrentMesh {
             vertex_marks: vec![0; vertices],
             epoch: 0,
             ring: None,
+            cavity: None,
             changed_vertices: Changes::all(vertices),
             changed_tets: Changes::all(base.tets.len()),
             touched: Vec::new(),
@@ -537,6 +540,69 @@ impl CurrentMesh {
             self.vertex_marks.fill(0);
             self.epoch = 1;
         }
+    }
+
+    /// Collects the tetrahedra with this tag that hang together with `first`, which has it, and starts a numbering of
+    /// vertices. None if there are more than [`GATHERED`].
+    #[inline]
+    pub(super) fn gather_tagged(
+        &mut self,
+        first: u32,
+        tag: u32,
+        tets: &mut [u32; GATHERED],
+    ) -> Option<usize> {
+        self.next_epoch();
+        let mark = self.epoch << MARK_BITS;
+        self.marks[first as usize] = mark;
+        tets[0] = first;
+        let (mut next, mut len) = (0, 1);
+        while next < len {
+            let around = self.neighbors[tets[next % GATHERED] as usize];
+            next += 1;
+            for n in around {
+                let Some(&own) = self.tags.get(n as usize) else { continue };
+                if own != tag || self.marks[n as usize] == mark {
+                    continue;
+                }
+                if len == GATHERED {
+                    return None;
+                }
+                self.marks[n as usize] = mark;
+                tets[len] = n;
+                len += 1;
+            }
+        }
+        Some(len)
+    }
+
+    /// The number of a vertex, by index into `list`, where it is put if it has none yet. None if that is full.
+    #[inline]
+    pub(super) fn number_vertex(&mut self, slot: u32, list: &mut [u32], len: &mut usize) -> Option<u8> {
+        let mark = self.epoch << MARK_BITS;
+        let old = &mut self.vertex_marks[slot as usize];
+        if *old & !MARK_MASK == mark {
+            return Some((*old & MARK_MASK) as u8);
+        }
+        *list.get_mut(*len)? = slot;
+        *old = mark | *len as u32;
+        *len += 1;
+        Some((*len - 1) as u8)
+    }
+
+    /// The number of a vertex, if it has one.
+    #[inline]
+    pub(super) fn vertex_number(&self, slot: u32) -> Option<u8> {
+        let mark = self.vertex_marks[slot as usize];
+        (mark >> MARK_BITS == self.epoch).then_some((mark & MARK_MASK) as u8)
+    }
+
+    /// Lends the scratch space for insertions.
+    pub(super) fn take_cavity(&mut self) -> Box<Cavity> {
+        self.cavity.take().unwrap_or_default()
+    }
+
+    pub(super) fn put_back_cavity(&mut self, cavity: Box<Cavity>) {
+        self.cavity = Some(cavity);
     }
 
     /// Lends the scratch space for splits.

@@ -6,16 +6,22 @@
 
 mod any;
 mod base;
+mod bits;
 mod check;
 mod collapse;
 mod current;
 mod error;
 mod explicit;
+mod glue;
+mod insertion;
 mod replay;
 mod ring;
 mod spelled;
 mod split;
 mod stats;
+mod vertex;
+#[cfg(feature = "build")]
+mod vertex_from;
 
 pub use any::Mt;
 pub use base::{BaseMesh, BaseMeshError, MAX_FIELD_BITS, MAX_UPDATES};
@@ -25,8 +31,13 @@ pub use current::{CurrentMesh, MeshChanges};
 pub use error::{ErrorCode, UpdateError};
 pub use explicit::{ExplicitMt, ExplicitUpdate};
 pub use replay::ReplayError;
+#[cfg(feature = "build")]
+pub(crate) use replay::canonical;
 pub use split::Applied;
 pub use stats::{MtStats, stats};
+pub use vertex::{MAX_AROUND, MAX_INSERTED, MAX_REMOVED, NodeBits, VertexMt};
+#[cfg(feature = "build")]
+pub use vertex_from::ConvertError;
 
 use crate::geom::Lattice;
 

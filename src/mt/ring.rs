@@ -222,7 +222,10 @@ impl Ring {
 /// Quadratic, but without a branch: for a few dozen keys that beats sorting. Counts are as wide as the keys, so that
 /// whole vectors of comparisons are added up.
 #[inline]
-fn ranks<K: Copy + PartialOrd + From<bool> + Sum, const N: usize>(keys: &[K; N], len: usize) -> [K; N] {
+pub(super) fn ranks<K: Copy + PartialOrd + From<bool> + Sum, const N: usize>(
+    keys: &[K; N],
+    len: usize,
+) -> [K; N] {
     let mut ranks = [K::from(false); N];
     for (rank, key) in ranks.iter_mut().zip(&keys[..len]) {
         *rank = keys[..len.next_multiple_of(8).min(N)].iter().map(|other| K::from(other < key)).sum();

@@ -348,7 +348,7 @@ impl CurrentMesh {
 }
 
 /// Appends the tetrahedra around a vertex of the MT.
-fn find_star(
+pub(super) fn find_star(
     mesh: &mut CurrentMesh,
     u: UpdateId,
     vertex: VertexId,

@@ -1,0 +1,717 @@
+//! Vertex insertion and removal on the current mesh [§5]: the updates of the compact vertex-based MT.
+//!
+//! In the current mesh, the tag of a tetrahedron is the update that removes it. While that update has not arrived, the
+//! tag tells which child of the tetrahedron's creator it will be.
+
+use super::Applied;
+use super::BaseMesh;
+use super::BaseMeshError;
+use super::CurrentMesh;
+use super::ErrorCode;
+use super::LookAtTet;
+use super::MtInfo;
+use super::MultiTessellation;
+use super::UpdateError;
+use super::UpdateId;
+use super::VertexId;
+use super::bits::width_of;
+use super::current::FIRST_ANONYMOUS_TAG;
+use super::current::GATHERED;
+use super::current::Gather;
+use super::current::Labels;
+use super::current::Star;
+use super::glue::Across;
+use super::glue::Close;
+use super::glue::Face;
+use super::glue::Glue;
+use super::glue::turned;
+use super::ring::ranks;
+use super::vertex::COUNT_BITS;
+use super::vertex::MAX_AROUND;
+use super::vertex::MAX_INSERTED;
+use super::vertex::VertexMt;
+use crate::geom::NARROW_BITS;
+use crate::geom::orient3d;
+use crate::mesh::FACES;
+use crate::mesh::NONE;
+
+/// "This edge is on the rim: the face behind it is given up."
+const GIVEN_UP: u32 = 0xFFFF;
+
+/// A face of Π_u with what lies beyond.
+#[derive(Clone, Copy, Debug, Default)]
+struct Wall {
+    /// Its vertices by index into the link, in an order that makes a tetrahedron `(v, corners)` positive.
+    corners: [u8; 3],
+    beyond: u32,
+    /// Which neighbour of the one beyond lies on this side.
+    side: u8,
+}
+
+/// Scratch space for insertions and removals.
+#[derive(Clone, Debug)]
+pub(super) struct Cavity {
+    glue: Glue,
+    star: Star,
+    /// The slots of T_u.
+    tets: [u32; GATHERED],
+    tets_len: usize,
+    walls: [Wall; MAX_INSERTED],
+    walls_len: usize,
+    /// Slots of the vertices of Π_u.
+    link: [u32; MAX_AROUND],
+    link_len: usize,
+    /// The place of each vertex of the link in the order of their labels.
+    order: [i32; MAX_AROUND],
+    /// For a directed edge between two of them the new tetrahedron that has it: `epoch << 16 | tetrahedron << 2 | corner`.
+    edges: Box<[[u32; MAX_AROUND]; MAX_AROUND]>,
+    epoch: u32,
+    /// Across the faces of each new tetrahedron.
+    across: [[u32; 4]; MAX_INSERTED],
+    /// The tags of the new tetrahedra.
+    tags: [u32; MAX_INSERTED],
+}
+
+impl Default for Cavity {
+    fn default() -> Self {
+        Self {
+            glue: Glue::default(),
+            star: Star::default(),
+            tets: [0; GATHERED],
+            tets_len: 0,
+            walls: [Wall::default(); MAX_INSERTED],
+            walls_len: 0,
+            link: [0; MAX_AROUND],
+            link_len: 0,
+            order: [0; MAX_AROUND],
+            edges: Box::new([[0; MAX_AROUND]; MAX_AROUND]),
+            epoch: 0,
+            across: [[NONE; 4]; MAX_INSERTED],
+            tags: [NONE; MAX_INSERTED],
+        }
+    }
+}
+
+impl Cavity {
+    /// Puts a face of tetrahedron `tet` on the list of walls. None if there are too many, or too many vertices.
+    #[inline]
+    fn add_wall(
+        &mut self,
+        mesh: &mut CurrentMesh,
+        tet: &[u32; 4],
+        face: usize,
+        beyond: u32,
+        side: u8,
+    ) -> Option<()> {
+        let mut corners = [0; 3];
+        for (corner, k) in corners.iter_mut().zip(FACES[face]) {
+            *corner = mesh.number_vertex(tet[k], &mut self.link, &mut self.link_len)?;
+        }
+        *self.walls.get_mut(self.walls_len)? = Wall { corners, beyond, side };
+        self.walls_len += 1;
+        Some(())
+    }
+
+    /// Orders the link by the labels of its vertices.
+    #[inline]
+    fn order_link(&mut self, mesh: &CurrentMesh) {
+        let mut labels = [i32::MAX; MAX_AROUND];
+        for (label, &v) in labels.iter_mut().zip(&self.link[..self.link_len]) {
+            // Signed numbers compare in one instruction; the shift keeps the order.
+            *label = (mesh.labels[v as usize].vertex ^ 1 << 31) as i32;
+        }
+        self.order = ranks(&labels, self.link_len);
+    }
+
+    /// The place of each wall in canonical order: ascending by the sorted labels of its vertices.
+    #[inline]
+    fn order_walls(&self) -> [i32; 128] {
+        let mut keys = [i32::MAX; 128];
+        for (key, wall) in keys.iter_mut().zip(&self.walls[..self.walls_len]) {
+            let [a, b, c] = wall.corners.map(|x| self.order[x as usize % MAX_AROUND]);
+            let (low, high) = (a.min(b), a.max(b));
+            let (least, most) = (low.min(c), high.max(c));
+            *key = least << 12 | low.max(c.min(high)) << 6 | most;
+        }
+        ranks(&keys, self.walls_len)
+    }
+
+    /// Finds what lies across the faces of the new tetrahedra that meet at the new vertex. None if the walls do not close.
+    #[inline]
+    fn join_walls(&mut self, rim: &[[u8; 3]]) -> Option<()> {
+        self.epoch += 1;
+        if self.epoch == 1 << 16 {
+            self.edges.as_flattened_mut().fill(0);
+            self.epoch = 1;
+        }
+        let epoch = self.epoch;
+        let edges = &mut *self.edges;
+        let mut put = |a: u8, b: u8, value: u32| {
+            let edge = &mut edges[a as usize % MAX_AROUND][b as usize % MAX_AROUND];
+            let is_new = *edge >> 16 != epoch;
+            *edge = epoch << 16 | value;
+            is_new
+        };
+        for (i, wall) in (0_u32..).zip(&self.walls[..self.walls_len]) {
+            let [a, b, c] = wall.corners;
+            if !(put(b, c, i << 2 | 1) && put(c, a, i << 2 | 2) && put(a, b, i << 2 | 3)) {
+                return None;
+            }
+        }
+        for &[a, b, c] in rim {
+            if !(put(b, c, GIVEN_UP) && put(c, a, GIVEN_UP) && put(a, b, GIVEN_UP)) {
+                return None;
+            }
+        }
+        for (across, wall) in self.across.iter_mut().zip(&self.walls[..self.walls_len]) {
+            let [a, b, c] = wall.corners;
+            for (side, [from, to]) in [[c, b], [a, c], [b, a]].into_iter().enumerate() {
+                let edge = self.edges[from as usize % MAX_AROUND][to as usize % MAX_AROUND];
+                if edge >> 16 != epoch {
+                    return None;
+                }
+                let value = edge & 0xFFFF;
+                across[side + 1] = if value == GIVEN_UP { NONE } else { value >> 2 };
+            }
+        }
+        Some(())
+    }
+
+    /// Whether all tetrahedra of the new star are positive, exactly.
+    #[inline]
+    fn is_star_positive(&self, mesh: &CurrentMesh, centre: [i32; 3], narrow: bool) -> bool {
+        let link = &self.link[..self.link_len];
+        if !narrow {
+            let at = |x: u8| mesh.positions[link[x as usize] as usize];
+            let positive = |wall: &Wall| {
+                let [a, b, c] = wall.corners.map(at);
+                orient3d(centre, a, b, c) > 0
+            };
+            return self.walls[..self.walls_len].iter().all(positive);
+        }
+        let mut relative = [[0_i64; 3]; MAX_AROUND];
+        for (relative, &v) in relative.iter_mut().zip(link) {
+            let position = mesh.positions[v as usize];
+            *relative = [0, 1, 2].map(|k| i64::from(position[k] - centre[k]));
+        }
+        self.walls[..self.walls_len].iter().all(|wall| {
+            let [u, v, w] = wall.corners.map(|x| relative[x as usize % MAX_AROUND]);
+            (u[1] * v[2] - u[2] * v[1]) * w[0]
+                + (u[2] * v[0] - u[0] * v[2]) * w[1]
+                + (u[0] * v[1] - u[1] * v[0]) * w[2]
+                > 0
+        })
+    }
+}
+
+/// Where the parts of a node's shape are.
+#[derive(Clone, Copy, Debug)]
+struct Shape {
+    children: u32,
+    removed: usize,
+    boundary: bool,
+    /// Where the bits are that tell which boundary faces of T_u are given up, and how many.
+    given_up: u64,
+    given_up_len: u32,
+    /// Where the removers of the star are, and how wide.
+    removers: u64,
+    remover_width: u32,
+}
+
+impl VertexMt {
+    #[inline]
+    fn shape(&self, u: UpdateId) -> Shape {
+        let start = self.node_start(u.0);
+        let children = self.children(u);
+        let at = self.links_end(start, children);
+        let removed = self.nodes.get(at, COUNT_BITS) as usize;
+        let boundary = self.nodes.get(at + u64::from(COUNT_BITS), 1) == 1;
+        let mut at = at + u64::from(COUNT_BITS) + 1;
+        let mut given_up_len = 0;
+        if boundary {
+            given_up_len = self.nodes.get(at, COUNT_BITS) as u32;
+            at += u64::from(COUNT_BITS);
+        }
+        Shape {
+            children,
+            removed,
+            boundary,
+            given_up: at,
+            given_up_len,
+            removers: at + u64::from(given_up_len),
+            remover_width: width_of(children),
+        }
+    }
+
+    /// Collects T_u. Tells a parent that has to be applied first, if T_u is not complete.
+    #[inline]
+    fn gather_removed(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        removed: usize,
+        cavity: &mut Cavity,
+    ) -> Result<Applied, UpdateError> {
+        let found = mesh.tagged(u.0).and_then(|first| mesh.gather_tagged(first, u.0, &mut cavity.tets));
+        if found != Some(removed) {
+            let missing = self.parents(u).find(|&p| mesh.slot(self.vertex(p)).is_none());
+            return missing.map(Applied::Blocked).ok_or(UpdateError::Cavity { update: u.0 });
+        }
+        cavity.tets_len = removed;
+        Ok(Applied::Done)
+    }
+
+    fn insert(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        cavity: &mut Cavity,
+    ) -> Result<Applied, UpdateError> {
+        let torn = UpdateError::Cavity { update: u.0 };
+        let shape = self.shape(u);
+        if let blocked @ Applied::Blocked(_) = self.gather_removed(mesh, u, shape.removed, cavity)? {
+            return Ok(blocked);
+        }
+        if mesh.slot(self.vertex(u)).is_some() {
+            return Err(torn);
+        }
+        self.find_walls(mesh, u, &shape, cavity).ok_or(torn.clone())?;
+        let position = self.position(u);
+        if !cavity.is_star_positive(mesh, position, self.info.lattice.bits <= NARROW_BITS) {
+            return Err(UpdateError::Inverted { update: u.0 });
+        }
+        self.find_tags(mesh, u, &shape, cavity)?;
+        self.perform_insertion(mesh, u, position, cavity);
+        Ok(Applied::Done)
+    }
+
+    /// Finds the faces of Π_u and joins the new tetrahedra behind them.
+    #[inline]
+    fn find_walls(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        shape: &Shape,
+        cavity: &mut Cavity,
+    ) -> Option<()> {
+        (cavity.walls_len, cavity.link_len) = (0, 0);
+        let mut bare: Vec<([u32; 3], [u32; 3], usize)> = Vec::new();
+        for i in 0..cavity.tets_len {
+            let t = cavity.tets[i];
+            let (tet, around) = (mesh.tets[t as usize], mesh.neighbors[t as usize]);
+            for (face, &beyond) in around.iter().enumerate() {
+                if beyond == NONE {
+                    if shape.boundary {
+                        let slots = FACES[face].map(|k| tet[k]);
+                        let mut sorted = slots.map(|v| mesh.labels[v as usize].vertex);
+                        sorted.sort_unstable();
+                        bare.push((sorted, slots, face));
+                    } else {
+                        cavity.add_wall(mesh, &tet, face, NONE, 0)?;
+                    }
+                } else if mesh.tag(beyond) != u.0 {
+                    let side = mesh.neighbors[beyond as usize].iter().position(|&n| n == t)?;
+                    cavity.add_wall(mesh, &tet, face, beyond, side as u8)?;
+                }
+            }
+        }
+        let mut rim = Vec::new();
+        if shape.boundary {
+            bare.sort_unstable();
+            if bare.len() != shape.given_up_len as usize {
+                return None;
+            }
+            let mut given_up = Vec::new();
+            for (i, (_, slots, _)) in (0..).zip(bare) {
+                if self.nodes.get(shape.given_up + i, 1) == 1 {
+                    given_up.push(slots);
+                } else {
+                    let [a, b, c] = slots;
+                    // As face 0 of a tetrahedron, whose first corner does not matter.
+                    cavity.add_wall(mesh, &[NONE, a, b, c], 0, NONE, 0)?;
+                }
+            }
+            for slots in given_up {
+                let number = |v: u32| mesh.vertex_number(v);
+                rim.push([number(slots[0])?, number(slots[1])?, number(slots[2])?]);
+            }
+        }
+        // No vertex may be left without a tetrahedron.
+        let tets = &cavity.tets[..cavity.tets_len];
+        let kept =
+            tets.iter().all(|&t| mesh.tets[t as usize].iter().all(|&v| mesh.vertex_number(v).is_some()));
+        if !kept {
+            return None;
+        }
+        cavity.join_walls(&rim)
+    }
+
+    /// Finds which update removes each tetrahedron of the new star.
+    #[inline]
+    fn find_tags(
+        &self,
+        mesh: &CurrentMesh,
+        u: UpdateId,
+        shape: &Shape,
+        cavity: &mut Cavity,
+    ) -> Result<(), UpdateError> {
+        let walls = cavity.walls_len;
+        if shape.children == 0 {
+            cavity.tags[..walls].fill(NONE);
+            return Ok(());
+        }
+        let complete = self.updates() == self.info.updates;
+        let mut children = [NONE; MAX_INSERTED + 1];
+        for i in 1..=shape.children.min(MAX_INSERTED as u32) {
+            children[i as usize] = match self.child(u, i) {
+                Some(child) => child.0,
+                None if complete => return Err(UpdateError::Cavity { update: u.0 }),
+                None => FIRST_ANONYMOUS_TAG | i,
+            };
+        }
+        cavity.order_link(mesh);
+        let places = cavity.order_walls();
+        for (tag, place) in cavity.tags[..walls].iter_mut().zip(places) {
+            let at = shape.removers + place as u64 * u64::from(shape.remover_width);
+            let child = self.nodes.get(at, shape.remover_width) as usize;
+            *tag = *children.get(child).ok_or(UpdateError::Cavity { update: u.0 })?;
+        }
+        Ok(())
+    }
+
+    #[inline]
+    fn perform_insertion(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        position: [i32; 3],
+        cavity: &mut Cavity,
+    ) {
+        let slot = mesh.new_vertex();
+        mesh.put_vertex(slot, Labels { vertex: self.vertex(u).0, split: NONE }, position);
+        let first = slot as usize * mesh.fields;
+        for (f, level) in self.levels(u).enumerate() {
+            mesh.levels[first + f] = level;
+        }
+        let (old, new) = (cavity.tets_len, cavity.walls_len);
+        let mut slots = [NONE; GATHERED];
+        let reused = old.min(new);
+        slots[..reused].copy_from_slice(&cavity.tets[..reused]);
+        slots[reused..new].iter_mut().for_each(|t| *t = mesh.new_tet());
+        for (i, wall) in cavity.walls[..new].iter().enumerate() {
+            let t = slots[i];
+            let [a, b, c] = wall.corners.map(|x| cavity.link[x as usize % MAX_AROUND]);
+            mesh.tets[t as usize] = [slot, a, b, c];
+            let mut around =
+                cavity.across[i].map(|j| if j == NONE { NONE } else { slots[j as usize % GATHERED] });
+            around[0] = wall.beyond;
+            mesh.neighbors[t as usize] = around;
+            if wall.beyond != NONE {
+                mesh.neighbors[wall.beyond as usize][wall.side as usize & 3] = t;
+                mesh.mark_tet(wall.beyond);
+            }
+            mesh.set_tag(t, cavity.tags[i]);
+            mesh.mark_tet(t);
+            [a, b, c].iter().for_each(|&v| mesh.incident[v as usize] = t);
+        }
+        mesh.incident[slot as usize] = slots[0];
+        for &t in &cavity.tets[reused..old] {
+            mesh.free_tet(t);
+        }
+        mesh.touch(&cavity.tets[..old]);
+        mesh.touch(&slots[reused..new]);
+    }
+
+    /// Collects the star of the vertex that `u` inserted and builds T_u from it, in numbers; the mesh stays as it is. Tells
+    /// a child of `u` that has to go first, if there is one.
+    fn rebuild(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        cavity: &mut Cavity,
+    ) -> Result<Applied, UpdateError> {
+        let vertex = self.vertex(u);
+        let torn = UpdateError::Cavity { update: u.0 };
+        let absent = UpdateError::Vertex { update: u.0, vertex: vertex.0 };
+        let slot = mesh.slot(vertex).ok_or(absent.clone())?;
+        let younger = |labels: &[Labels], tet: &[u32; 4]| {
+            tet.iter().map(|&v| labels[v as usize].vertex).find(|&v| v > vertex.0)
+        };
+        match mesh.gather_star(slot, &mut cavity.star, younger) {
+            Ok(()) => {}
+            Err(Gather::TooLarge) => return Err(UpdateError::Star { update: u.0 }),
+            Err(Gather::Stopped(v)) => {
+                return self.inserted_by(VertexId(v)).map(Applied::Blocked).ok_or(absent);
+            }
+        }
+        (cavity.walls_len, cavity.link_len) = (0, 0);
+        for i in 0..cavity.star.len {
+            let (t, corner) = (cavity.star.tets[i], cavity.star.corner[i] as usize);
+            let beyond = mesh.neighbors[t as usize][corner];
+            let back = |n: u32| mesh.neighbors[n as usize].iter().position(|&m| m == t);
+            let side = if beyond == NONE { 0 } else { back(beyond).ok_or(torn.clone())? };
+            let tet = mesh.tets[t as usize];
+            cavity.add_wall(mesh, &tet, corner, beyond, side as u8).ok_or(torn.clone())?;
+        }
+        cavity.order_link(mesh);
+        self.sort(cavity);
+        self.build_removed(u, cavity).ok_or(torn.clone())?;
+        let at = |x: u8| mesh.positions[cavity.link[x as usize % MAX_AROUND] as usize];
+        let positive = cavity.glue.tets[..cavity.glue.len].iter().all(|tet| {
+            let [a, b, c, d] = tet.map(at);
+            orient3d(a, b, c, d) > 0
+        });
+        if positive { Ok(Applied::Done) } else { Err(UpdateError::Inverted { update: u.0 }) }
+    }
+
+    /// Puts link and walls into canonical order.
+    #[inline]
+    fn sort(&self, cavity: &mut Cavity) {
+        let places = cavity.order_walls();
+        let walls = cavity.walls;
+        for (wall, place) in walls[..cavity.walls_len].iter().zip(places) {
+            let corners = turned(wall.corners.map(|x| cavity.order[x as usize % MAX_AROUND] as u8));
+            cavity.walls[place as usize % MAX_INSERTED] = Wall { corners, ..*wall };
+        }
+        let link = cavity.link;
+        for (&v, &place) in link[..cavity.link_len].iter().zip(&cavity.order) {
+            cavity.link[place as usize % MAX_AROUND] = v;
+        }
+    }
+
+    /// Builds T_u from walls in canonical order.
+    #[inline]
+    fn build_removed(&self, u: UpdateId, cavity: &mut Cavity) -> Option<()> {
+        let shape = self.shape(u);
+        let mut faces: [Face; MAX_INSERTED] = [[0; 3]; MAX_INSERTED];
+        for (face, wall) in faces.iter_mut().zip(&cavity.walls[..cavity.walls_len]) {
+            *face = wall.corners;
+        }
+        let vertices = cavity.link_len as u32;
+        let at = shape.removers + cavity.walls_len as u64 * u64::from(shape.remover_width);
+        let mut code = Code::new(at, vertices, shape.boundary);
+        let apex = code.apex_of_all(&self.nodes);
+        let close = |face: Face, of_link: bool| match apex {
+            Some(apex) if !of_link || face.contains(&apex) => Some(Close::Leave),
+            Some(apex) => Some(Close::With(apex)),
+            None => code.close(&self.nodes, face, of_link),
+        };
+        cavity.glue.build(&faces[..cavity.walls_len], !shape.boundary, close)?;
+        (cavity.glue.len == shape.removed).then_some(())
+    }
+
+    fn perform_removal(&self, mesh: &mut CurrentMesh, u: UpdateId, cavity: &mut Cavity) {
+        let Cavity { glue, star, walls, link, .. } = cavity;
+        let (old, new) = (star.len, glue.len);
+        let mut slots = [NONE; GATHERED];
+        let reused = old.min(new);
+        slots[..reused].copy_from_slice(&star.tets[..reused]);
+        mesh.touch(&star.tets[..old]);
+        // Free what is left first: the vertex goes with it.
+        star.tets[reused..old].iter().for_each(|&t| mesh.free_tet(t));
+        slots[reused..new].iter_mut().for_each(|t| *t = mesh.new_tet());
+        mesh.touch(&slots[reused..new]);
+        if let Some(slot) = mesh.slot(self.vertex(u)) {
+            mesh.remove_vertex(slot);
+        }
+        for i in 0..new {
+            let t = slots[i];
+            let tet = glue.tets[i].map(|x| link[x as usize % MAX_AROUND]);
+            mesh.tets[t as usize] = tet;
+            for (side, across) in glue.across[i].iter().enumerate() {
+                mesh.neighbors[t as usize][side] = match *across {
+                    Across::Nothing => NONE,
+                    Across::Inside(j) => slots[j as usize],
+                    Across::Outside(place) => {
+                        let wall = walls[place as usize % MAX_INSERTED];
+                        if wall.beyond != NONE {
+                            mesh.neighbors[wall.beyond as usize][wall.side as usize & 3] = t;
+                            mesh.mark_tet(wall.beyond);
+                        }
+                        wall.beyond
+                    }
+                };
+            }
+            mesh.set_tag(t, u.0);
+            mesh.mark_tet(t);
+            tet.iter().for_each(|&v| mesh.incident[v as usize] = t);
+        }
+    }
+}
+
+/// Reads how the faces inside Π_u are closed.
+pub(super) struct Code {
+    at: u64,
+    /// Vertices of Π_u.
+    vertices: u32,
+    boundary: bool,
+}
+
+impl Code {
+    pub fn new(at: u64, vertices: u32, boundary: bool) -> Self {
+        Self { at, vertices, boundary }
+    }
+
+    fn read(&mut self, nodes: &super::bits::Bits, width: u32) -> u32 {
+        let value = nodes.get(self.at, width) as u32;
+        self.at += u64::from(width);
+        value
+    }
+
+    /// The vertex that all of T_u has, if the code says that there is one.
+    #[inline]
+    fn apex_of_all(&mut self, nodes: &super::bits::Bits) -> Option<u8> {
+        let fan = self.read(nodes, 1) == 1;
+        fan.then(|| self.read(nodes, width_of(self.vertices.saturating_sub(1))) as u8)
+    }
+
+    /// How to close a face. Its own vertices are left out of the count; at the boundary of the domain, one more choice
+    /// for a face inside Π_u is that nothing lies behind it.
+    #[inline]
+    fn close(&mut self, nodes: &super::bits::Bits, face: Face, of_link: bool) -> Option<Close> {
+        let choices = choices(self.vertices, self.boundary, of_link)?;
+        let chosen = self.read(nodes, width_of(choices - 1));
+        if chosen + 3 == self.vertices && self.boundary && !of_link {
+            return Some(Close::Leave);
+        }
+        let mut sorted = face;
+        sorted.sort_unstable();
+        let mut x = chosen as u8;
+        sorted.iter().for_each(|&own| x += u8::from(x >= own));
+        (u32::from(x) < self.vertices).then_some(Close::With(x))
+    }
+}
+
+/// How many ways there are to close a face.
+#[inline]
+pub(super) fn choices(vertices: u32, boundary: bool, of_link: bool) -> Option<u32> {
+    let choices = vertices.checked_sub(3)? + u32::from(boundary && !of_link);
+    (choices > 0).then_some(choices)
+}
+
+impl MultiTessellation for VertexMt {
+    fn info(&self) -> &MtInfo {
+        self.info()
+    }
+
+    fn base(&self) -> &BaseMesh {
+        self.base()
+    }
+
+    fn updates(&self) -> u32 {
+        self.updates()
+    }
+
+    fn bytes(&self) -> u64 {
+        self.bytes()
+    }
+
+    fn start(&self) -> Result<CurrentMesh, BaseMeshError> {
+        let mut mesh = CurrentMesh::new(self.info(), self.base())?;
+        mesh.tag_all(self.base_removers().iter().copied());
+        Ok(mesh)
+    }
+
+    #[inline]
+    fn error(&self, u: UpdateId) -> ErrorCode {
+        self.error_of(u)
+    }
+
+    #[inline]
+    fn remover(&self, mesh: &CurrentMesh, t: u32) -> Option<UpdateId> {
+        Some(mesh.tag(t)).filter(|&u| u < self.updates()).map(UpdateId)
+    }
+
+    #[inline]
+    fn creator(&self, mesh: &CurrentMesh, t: u32) -> Option<UpdateId> {
+        let newest = mesh.tets[t as usize].iter().map(|&v| mesh.labels[v as usize].vertex).max();
+        self.inserted_by(VertexId(newest?))
+    }
+
+    #[inline]
+    fn may_coarsen(&self, mesh: &CurrentMesh, u: UpdateId) -> bool {
+        let incident = mesh.slot(self.vertex(u)).map(|slot| mesh.incident[slot as usize]);
+        incident.is_some_and(|t| self.creator(mesh, t) == Some(u))
+    }
+
+    fn refine(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
+        let mut cavity = mesh.take_cavity();
+        let applied = self.insert(mesh, u, &mut cavity);
+        mesh.put_back_cavity(cavity);
+        applied
+    }
+
+    fn coarsen(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
+        let mut cavity = mesh.take_cavity();
+        let rebuilt = self.rebuild(mesh, u, &mut cavity);
+        if rebuilt == Ok(Applied::Done) {
+            self.perform_removal(mesh, u, &mut cavity);
+        }
+        mesh.put_back_cavity(cavity);
+        rebuilt
+    }
+
+    fn look_at_removed(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        field: usize,
+        look: LookAtTet<'_>,
+    ) -> Result<Applied, UpdateError> {
+        let mut cavity = mesh.take_cavity();
+        let rebuilt = self.rebuild(mesh, u, &mut cavity);
+        if rebuilt == Ok(Applied::Done) {
+            for tet in &cavity.glue.tets[..cavity.glue.len] {
+                let tet = tet.map(|x| cavity.link[x as usize % MAX_AROUND]);
+                if look(&tet.map(|v| mesh.positions[v as usize]), &tet.map(|v| mesh.levels(v)[field])) {
+                    break;
+                }
+            }
+        }
+        mesh.put_back_cavity(cavity);
+        rebuilt
+    }
+
+    fn announce(&self, mesh: &mut CurrentMesh, known: u32) {
+        if known == self.updates() {
+            return;
+        }
+        for t in 0..mesh.tet_slots() as u32 {
+            let tag = mesh.tag(t);
+            if tag == NONE || tag < FIRST_ANONYMOUS_TAG {
+                continue;
+            }
+            let creator = self.creator(mesh, t);
+            if let Some(child) = creator.and_then(|u| self.child(u, tag & !FIRST_ANONYMOUS_TAG)) {
+                mesh.set_tag(t, child.0);
+            }
+        }
+    }
+
+    fn find_removed(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        found: &mut Vec<u32>,
+    ) -> Result<(), UpdateError> {
+        let mut cavity = mesh.take_cavity();
+        let gathered = self.gather_removed(mesh, u, self.shape(u).removed, &mut cavity);
+        if gathered == Ok(Applied::Done) {
+            found.extend_from_slice(&cavity.tets[..cavity.tets_len]);
+        }
+        mesh.put_back_cavity(cavity);
+        match gathered? {
+            Applied::Done => Ok(()),
+            Applied::Blocked(_) => Err(UpdateError::Error { update: u.0 }),
+        }
+    }
+
+    fn find_inserted(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        found: &mut Vec<u32>,
+    ) -> Result<(), UpdateError> {
+        super::split::find_star(mesh, u, self.vertex(u), found)
+    }
+}

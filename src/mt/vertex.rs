@@ -1,0 +1,336 @@
+//! The compact vertex-based Multi-Tessellation [§2.2, §5].
+//!
+//! An update inserts a vertex into a star-shaped polyhedron Π_u: the tetrahedra T_u in it give way to the star of the
+//! vertex. Base vertices are numbered first and update `k` inserts vertex `b + k`, so a tetrahedron was created by its
+//! vertex with the largest number.
+//!
+//! **The partial order** is kept in the loops of Klein and Gumhold [§5, Fig. 4]: the loop of an update is a cyclic list
+//! of the update and its parents. A link tells the next member and which of *its* links goes on; link 0 of an update is
+//! that of its own loop, link `i` belongs to the loop of its `i`-th child. Following link 0 yields the parents, following
+//! link `i` leads to the `i`-th child.
+//!
+//! **A node** holds the vertex and what takes the place of the paper's two tasks:
+//! 1. *Find T_u in the current mesh.* Every tetrahedron knows which update removes it, from the moment it is created:
+//!    the node that creates it tells, for each tetrahedron of its star in canonical order, which child removes it. T_u is
+//!    then what hangs together around any tetrahedron that `u` removes, and complete when its size is the stored one.
+//!    No seed is stored: the last tetrahedron that `u` was found to remove is in T_u when all parents of `u` are applied.
+//! 2. *Build T_u inside Π_u.* The faces of Π_u, and those that come up on the way, are closed one after the other in
+//!    canonical order; the code names the fourth vertex of the tetrahedron behind each, among those of Π_u. When all of
+//!    T_u meets in one vertex, as after a half-edge collapse, the code is that vertex.
+//!
+//! The canonical order of the star is that of the sorted vertex numbers of the faces opposite the new vertex. It is the
+//! same in every consistent set, since the star at the moment of insertion is.
+
+use super::BaseMesh;
+use super::ErrorCode;
+use super::MtInfo;
+use super::UpdateError;
+use super::UpdateId;
+use super::VertexId;
+use super::bits::Bits;
+use super::bits::width_of;
+use crate::mesh::NONE;
+
+/// Most tetrahedra around a vertex when it is inserted.
+pub const MAX_INSERTED: usize = 124;
+
+/// Most vertices around a vertex when it is inserted.
+pub const MAX_AROUND: usize = 64;
+
+/// Most tetrahedra that an insertion removes.
+pub const MAX_REMOVED: usize = 127;
+
+/// Bits of a number of tetrahedra that an insertion removes.
+pub(super) const COUNT_BITS: u32 = 7;
+
+/// A member of a loop, and which of its links goes on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Link {
+    pub node: u32,
+    pub link: u32,
+}
+
+/// How wide the parts of a node are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Widths {
+    pub position: u32,
+    pub node: u32,
+    pub link: u32,
+    /// Position and levels together.
+    pub vertex: u32,
+}
+
+/// A compact vertex-based MT.
+///
+/// It grows by [`push`](VertexMt::push), coarse to fine; every prefix of an MT is an MT.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VertexMt {
+    pub(super) info: MtInfo,
+    base: BaseMesh,
+    base_removers: Vec<u32>,
+    pub(super) widths: Widths,
+    /// All nodes, each padded to units of [`UNIT`] bits.
+    pub(super) nodes: Bits,
+    /// Where each group of [`GROUP`] nodes starts, in bits.
+    groups: Vec<u64>,
+    /// Where each node starts in its group, in units.
+    starts: Vec<u16>,
+    errors: Vec<ErrorCode>,
+    /// Bits of all nodes but for vertices and links.
+    shape_bits: u64,
+}
+
+/// Nodes whose starts are told from a common one: with at most 255 fields a node takes less than 2^14 bits.
+const GROUP: usize = 16;
+/// Nodes start at multiples of so many bits.
+const UNIT: u64 = 4;
+
+/// The bits of one node of a [`VertexMt`]: made by [`VertexMt::node`], stored by [`VertexMt::push`].
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct NodeBits(pub(crate) Bits);
+
+impl VertexMt {
+    /// An MT without updates. `base` must fit `info`: see [`BaseMesh::check`]. `base_removers` tells for each base
+    /// tetrahedron which update removes it, [`u32::MAX`] if none does; `most_children` is the largest number of children
+    /// that an update has, at most [`MAX_INSERTED`].
+    ///
+    /// # Errors
+    /// If the removers are not as many as the base tetrahedra or name an update that `info` does not know.
+    pub fn new(
+        info: MtInfo,
+        base: BaseMesh,
+        base_removers: Vec<u32>,
+        most_children: u32,
+    ) -> Result<Self, UpdateError> {
+        let known = |&u: &u32| u < info.updates || u == NONE;
+        if base_removers.len() != base.tets.len()
+            || !base_removers.iter().all(known)
+            || most_children as usize > MAX_INSERTED
+        {
+            return Err(UpdateError::Cavity { update: 0 });
+        }
+        let position = info.lattice.bits + 1;
+        let levels: u32 = info.fields.iter().map(|field| field.bits).sum();
+        let widths = Widths {
+            position,
+            node: width_of(info.updates.saturating_sub(1)).max(1),
+            link: width_of(most_children).max(1),
+            vertex: 3 * position + levels,
+        };
+        Ok(Self {
+            info,
+            base,
+            base_removers,
+            widths,
+            nodes: Bits::default(),
+            groups: Vec::new(),
+            starts: Vec::new(),
+            errors: Vec::new(),
+            shape_bits: 0,
+        })
+    }
+
+    /// Adds the next update.
+    ///
+    /// # Errors
+    /// The node must be well formed, its vertex on the lattices, its links within the MT, and errors must not grow.
+    /// What needs the mesh is checked when the update is applied.
+    pub fn push(&mut self, node: &NodeBits, error: ErrorCode) -> Result<UpdateId, UpdateError> {
+        let update = self.updates();
+        let bits = &node.0;
+        if update >= self.info.updates {
+            return Err(UpdateError::Cavity { update });
+        }
+        let position = self.position_at(bits, 0);
+        if !position.iter().all(|&x| 0 <= x && x <= 1 << self.info.lattice.bits) {
+            return Err(UpdateError::OffLattice { update });
+        }
+        if self.errors.last().is_some_and(|&last| error > last) {
+            return Err(UpdateError::Error { update });
+        }
+        let children = self.children_at(bits, 0);
+        let links_end = self.links_end(0, children);
+        let sound = children as usize <= MAX_INSERTED
+            && links_end + u64::from(COUNT_BITS) + 2 <= bits.len()
+            && bits.len() < 1 << 15
+            && (0..=children).all(|i| self.link_at(bits, 0, i).node < self.info.updates)
+            && bits.get(links_end, COUNT_BITS) > 0;
+        if !sound {
+            return Err(UpdateError::Cavity { update });
+        }
+        let start = self.nodes.len();
+        if self.starts.len().is_multiple_of(GROUP) {
+            self.groups.push(start);
+        }
+        let group = self.groups[self.starts.len() / GROUP];
+        // A group of nodes of 2^15 bits each is at most 2^17 units; only nodes with very many fields come near.
+        let Ok(offset) = u16::try_from((start - group) / UNIT) else {
+            return Err(UpdateError::Cavity { update });
+        };
+        self.starts.push(offset);
+        self.nodes.extend(bits);
+        self.nodes.pad(UNIT);
+        self.errors.push(error);
+        self.shape_bits += bits.len() - links_end;
+        Ok(UpdateId(update))
+    }
+
+    /// The bits of update `u`, as [`VertexMt::push`] takes them, but for zeros at the end.
+    pub fn node(&self, u: UpdateId) -> NodeBits {
+        let (mut at, end) = (self.node_start(u.0), self.node_end(u.0));
+        let mut bits = Bits::default();
+        while at < end {
+            let width = (end - at).min(32) as u32;
+            bits.push(self.nodes.get(at, width), width);
+            at += u64::from(width);
+        }
+        NodeBits(bits)
+    }
+
+    /// What is known of the MT as a whole.
+    pub fn info(&self) -> &MtInfo {
+        &self.info
+    }
+
+    /// The base mesh.
+    pub fn base(&self) -> &BaseMesh {
+        &self.base
+    }
+
+    /// Which update removes each base tetrahedron; [`u32::MAX`] if none does.
+    pub fn base_removers(&self) -> &[u32] {
+        &self.base_removers
+    }
+
+    /// The largest number of children that the nodes have room for.
+    pub fn most_children(&self) -> u32 {
+        ((1 << self.widths.link) - 1).min(MAX_INSERTED as u32)
+    }
+
+    /// Number of updates so far.
+    pub fn updates(&self) -> u32 {
+        self.starts.len() as u32
+    }
+
+    /// Bytes of everything that the MT holds, base mesh and errors included.
+    pub fn bytes(&self) -> u64 {
+        let base = size_of_val(&self.base.positions[..])
+            + size_of_val(&self.base.values[..])
+            + size_of_val(&self.base.tets[..])
+            + size_of_val(&self.base_removers[..]);
+        let nodes = self.nodes.bytes() + size_of_val(&self.groups[..]) + size_of_val(&self.starts[..]);
+        (base + nodes + size_of_val(&self.errors[..])) as u64
+    }
+
+    /// Bits in all nodes that describe shapes: what a star is made of and removed by, and T_u. The paper's tree of T_u
+    /// and seed take 69 bits a node [§5].
+    pub fn shape_bits(&self) -> u64 {
+        self.shape_bits
+    }
+
+    /// The error of update `u`.
+    #[inline]
+    pub fn error_of(&self, u: UpdateId) -> ErrorCode {
+        self.errors[u.0 as usize]
+    }
+
+    /// The vertex that update `u` inserts.
+    #[inline]
+    pub fn vertex(&self, u: UpdateId) -> VertexId {
+        VertexId(self.base.positions.len() as u32 + u.0)
+    }
+
+    /// The update that inserts `v`; none for a vertex of the base mesh.
+    #[inline]
+    pub fn inserted_by(&self, v: VertexId) -> Option<UpdateId> {
+        v.0.checked_sub(self.base.positions.len() as u32).map(UpdateId)
+    }
+
+    /// The position of the vertex that update `u` inserts.
+    #[inline]
+    pub fn position(&self, u: UpdateId) -> [i32; 3] {
+        self.position_at(&self.nodes, self.node_start(u.0))
+    }
+
+    /// The level of each field at the vertex that update `u` inserts.
+    #[inline]
+    pub fn levels(&self, u: UpdateId) -> impl Iterator<Item = i32> {
+        let mut at = self.node_start(u.0) + u64::from(3 * self.widths.position);
+        self.info.fields.iter().map(move |field| {
+            let level = self.nodes.get(at, field.bits);
+            at += u64::from(field.bits);
+            level as i32
+        })
+    }
+
+    /// The parents of update `u` in the DAG, as far as the loop is sound.
+    pub fn parents(&self, u: UpdateId) -> impl Iterator<Item = UpdateId> {
+        let first = self.link(u.0, 0);
+        let on = move |at: &Link| Some(self.link(at.node, at.link));
+        // An update removes at most as many tetrahedra as there are steps here; a loop that is longer is none.
+        let members = std::iter::successors(Some(first), on).take(MAX_REMOVED);
+        members.take_while(move |at| at.node != u.0 && at.node < self.updates()).map(|at| UpdateId(at.node))
+    }
+
+    /// Number of children of update `u`, also of those that have not arrived yet.
+    #[inline]
+    pub fn children(&self, u: UpdateId) -> u32 {
+        self.children_at(&self.nodes, self.node_start(u.0))
+    }
+
+    /// The `i`-th child of update `u`, counted from 1; none while it has not arrived, and if the loop is not sound.
+    #[inline]
+    pub(super) fn child(&self, u: UpdateId, i: u32) -> Option<UpdateId> {
+        let mut at = Link { node: u.0, link: i };
+        for _ in 0..=MAX_REMOVED {
+            if at.node >= self.updates() {
+                return None;
+            }
+            at = self.link(at.node, at.link);
+            if at.link == 0 {
+                return Some(UpdateId(at.node)).filter(|&child| u < child && child.0 < self.updates());
+            }
+        }
+        None
+    }
+
+    #[inline]
+    fn link(&self, node: u32, link: u32) -> Link {
+        self.link_at(&self.nodes, self.node_start(node), link)
+    }
+
+    /// Where the node of an update starts.
+    #[inline]
+    pub(super) fn node_start(&self, u: u32) -> u64 {
+        self.groups[u as usize / GROUP] + UNIT * u64::from(self.starts[u as usize])
+    }
+
+    fn node_end(&self, u: u32) -> u64 {
+        if u + 1 < self.updates() { self.node_start(u + 1) } else { self.nodes.len() }
+    }
+
+    fn position_at(&self, bits: &Bits, start: u64) -> [i32; 3] {
+        let width = self.widths.position;
+        [0, 1, 2].map(|axis| bits.get(start + u64::from(axis * width), width) as i32)
+    }
+
+    #[inline]
+    fn children_at(&self, bits: &Bits, start: u64) -> u32 {
+        bits.get(start + u64::from(self.widths.vertex), self.widths.link) as u32
+    }
+
+    #[inline]
+    fn link_at(&self, bits: &Bits, start: u64, link: u32) -> Link {
+        let Widths { node, link: width, vertex, .. } = self.widths;
+        let at = start + u64::from(vertex + width) + u64::from(link) * u64::from(node + width);
+        let both = bits.get(at, node + width);
+        Link { node: (both & ((1 << node) - 1)) as u32, link: (both >> node) as u32 }
+    }
+
+    /// Where the shape of a node starts, which is behind its links.
+    #[inline]
+    pub(super) fn links_end(&self, start: u64, children: u32) -> u64 {
+        let Widths { node, link, vertex, .. } = self.widths;
+        start + u64::from(vertex + link) + u64::from(children + 1) * u64::from(node + link)
+    }
+}

@@ -1,0 +1,316 @@
+//! From an explicit MT to the compact vertex-based one, where every update is a vertex insertion.
+
+use super::ExplicitMt;
+use super::MtInfo;
+use super::MtKind;
+use super::NodeBits;
+use super::UpdateError;
+use super::UpdateId;
+use super::VertexId;
+use super::VertexMt;
+use super::bits::Bits;
+use super::bits::width_of;
+use super::glue::Close;
+use super::glue::Face;
+use super::glue::Glue;
+use super::glue::turned;
+use super::insertion::choices;
+use super::vertex::COUNT_BITS;
+use super::vertex::MAX_AROUND;
+use super::vertex::MAX_INSERTED;
+use super::vertex::MAX_REMOVED;
+use crate::mesh::FACES;
+use crate::mesh::NONE;
+use std::collections::HashMap;
+use std::collections::HashSet;
+use std::fmt;
+
+/// Why an MT cannot be had in another structure.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ConvertError {
+    /// An update is not of the kind that the structure is for.
+    Update {
+        /// The update.
+        update: u32,
+        /// What is in the way.
+        what: &'static str,
+    },
+    /// The MT does not hang together.
+    Damaged(UpdateError),
+}
+
+impl fmt::Display for ConvertError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Update { update, what } => write!(f, "update {update} {what}"),
+            Self::Damaged(error) => write!(f, "{error}"),
+        }
+    }
+}
+
+impl std::error::Error for ConvertError {}
+
+impl From<UpdateError> for ConvertError {
+    fn from(error: UpdateError) -> Self {
+        Self::Damaged(error)
+    }
+}
+
+impl VertexMt {
+    /// The compact form of an explicit MT whose updates are vertex insertions.
+    ///
+    /// # Errors
+    /// If an update is no vertex insertion, or a larger one than a node can hold.
+    pub fn from_explicit(mt: &ExplicitMt) -> Result<Self, ConvertError> {
+        let updates = mt.updates();
+        let children: Vec<Vec<u32>> = (0..updates).map(|u| mt.children(UpdateId(u))).collect();
+        let most_children = children.iter().map(Vec::len).max().unwrap_or(0) as u32;
+        let info = MtInfo { kind: MtKind::Vertex, updates, ..mt.info().clone() };
+        let base_removers: Vec<u32> = mt.base().map(|t| mt.remover(t).map_or(NONE, |u| u.0)).collect();
+        let base = mt.base_mesh().clone();
+        let mut compact = Self::new(info, base, base_removers, most_children.min(MAX_INSERTED as u32))?;
+        let mut boundary: HashSet<[u32; 3]> = boundary_faces(mt);
+        let mut writer = Writer { mt, children: &children, glue: Box::default() };
+        for u in (0..updates).map(UpdateId) {
+            let node = writer.node(&compact, u, &mut boundary)?;
+            compact.push(&node, mt.error(u))?;
+        }
+        Ok(compact)
+    }
+}
+
+/// The faces of the base mesh that only one tetrahedron has.
+fn boundary_faces(mt: &ExplicitMt) -> HashSet<[u32; 3]> {
+    let mut faces = HashSet::new();
+    for t in mt.base() {
+        for face in FACES.map(|face| sorted(face.map(|k| mt.tets()[t as usize][k]))) {
+            if !faces.remove(&face) {
+                faces.insert(face);
+            }
+        }
+    }
+    faces
+}
+
+fn sorted(mut face: [u32; 3]) -> [u32; 3] {
+    face.sort_unstable();
+    face
+}
+
+struct Writer<'a> {
+    mt: &'a ExplicitMt,
+    children: &'a [Vec<u32>],
+    glue: Box<Glue>,
+}
+
+/// An insertion in canonical numbers.
+struct Canonical {
+    /// The labels of the vertices of Π_u, ascending.
+    link: Vec<u32>,
+    /// The faces of Π_u in canonical order, and the number of the tetrahedron that each becomes.
+    walls: Vec<(Face, u32)>,
+    /// T_u.
+    removed: Vec<[u8; 4]>,
+    /// The boundary faces of T_u, by sorted labels, and whether each is given up.
+    bare: Vec<([u32; 3], bool)>,
+}
+
+impl Writer<'_> {
+    fn node(
+        &mut self,
+        compact: &VertexMt,
+        u: UpdateId,
+        boundary: &mut HashSet<[u32; 3]>,
+    ) -> Result<NodeBits, ConvertError> {
+        let vertex = compact.vertex(u);
+        let canonical = self.canonical(u, vertex, boundary)?;
+        let mut bits = Bits::default();
+        for x in self.mt.position(vertex) {
+            bits.push(x as u64, compact.widths.position);
+        }
+        for (&level, field) in self.mt.levels(vertex).iter().zip(&compact.info().fields) {
+            bits.push(level as u64, field.bits);
+        }
+        self.write_links(&mut bits, compact, u);
+        self.write_shape(&mut bits, u, &canonical)?;
+        Ok(NodeBits(bits))
+    }
+
+    /// The link that comes behind member `at` of the loop of `owner`, where 0 is the owner and `i` its `i`-th parent.
+    fn next_in_loop(&self, owner: u32, at: usize) -> [u32; 2] {
+        match self.mt.parents(UpdateId(owner)).get(at) {
+            Some(&parent) => [parent, 1 + self.place_of_child(parent, owner)],
+            None => [owner, 0],
+        }
+    }
+
+    fn place_of_child(&self, parent: u32, child: u32) -> u32 {
+        self.children[parent as usize].partition_point(|&c| c < child) as u32
+    }
+
+    fn write_links(&self, bits: &mut Bits, compact: &VertexMt, u: UpdateId) {
+        let widths = compact.widths;
+        let children = &self.children[u.0 as usize];
+        bits.push(children.len() as u64, widths.link);
+        let own = self.next_in_loop(u.0, 0);
+        let of_children = children.iter().map(|&child| {
+            let at = self.mt.parents(UpdateId(child)).partition_point(|&p| p < u.0);
+            self.next_in_loop(child, at + 1)
+        });
+        for [node, link] in std::iter::once(own).chain(of_children) {
+            bits.push(u64::from(node), widths.node);
+            bits.push(u64::from(link), widths.link);
+        }
+    }
+
+    /// Finds canonical numbers and checks that the update is an insertion that fits a node. Moves `boundary` on.
+    fn canonical(
+        &self,
+        u: UpdateId,
+        vertex: VertexId,
+        boundary: &mut HashSet<[u32; 3]>,
+    ) -> Result<Canonical, ConvertError> {
+        let refuse = |what| ConvertError::Update { update: u.0, what };
+        let (mt, v) = (self.mt, vertex.0);
+        let newest = mt.inserted(u).flat_map(|t| mt.tets()[t as usize]).max();
+        let all_at_vertex = mt.inserted(u).all(|t| mt.tets()[t as usize].contains(&v));
+        let removed = || mt.removed(u).iter().map(|&t| mt.tets()[t as usize]);
+        if newest != Some(v) || !all_at_vertex || removed().flatten().any(|w| w == v) {
+            return Err(refuse("is not the insertion of one vertex"));
+        }
+        let mut walls: Vec<([u32; 3], u32)> = Vec::new();
+        for t in mt.inserted(u) {
+            let tet = mt.tets()[t as usize];
+            let corner = tet.iter().position(|&w| w == v).unwrap_or(0);
+            walls.push((FACES[corner].map(|k| tet[k]), t));
+        }
+        walls.sort_unstable_by_key(|(face, _)| sorted(*face));
+        let mut link: Vec<u32> = walls.iter().flat_map(|(face, _)| *face).collect();
+        link.sort_unstable();
+        link.dedup();
+        if walls.len() > MAX_INSERTED || link.len() > MAX_AROUND || mt.removed(u).len() > MAX_REMOVED {
+            return Err(refuse("is too large: it removes more than 127 or inserts more than 124 tetrahedra"));
+        }
+        if removed().flatten().any(|w| link.binary_search(&w).is_err()) {
+            return Err(refuse("takes a vertex away, which the insertion of one does not"));
+        }
+        let number = |w: u32| link.partition_point(|&x| x < w) as u8;
+        let mut bare = Vec::new();
+        let mut uses: HashMap<[u32; 3], u32> = HashMap::new();
+        for tet in removed() {
+            FACES.iter().for_each(|face| *uses.entry(sorted(face.map(|k| tet[k]))).or_default() += 1);
+        }
+        let kept: HashSet<[u32; 3]> = walls.iter().map(|(face, _)| sorted(*face)).collect();
+        for (face, _) in uses.into_iter().filter(|&(face, count)| count == 1 && boundary.contains(&face)) {
+            bare.push((face, !kept.contains(&face)));
+        }
+        bare.sort_unstable();
+        if bare.iter().any(|(_, given_up)| *given_up) {
+            move_boundary(boundary, &bare, &walls, v);
+        } else {
+            bare.clear();
+        }
+        let removed = removed().map(|tet| tet.map(number)).collect();
+        let walls = walls.iter().map(|&(face, t)| (turned(face.map(number)), t)).collect();
+        Ok(Canonical { link, walls, removed, bare })
+    }
+
+    fn write_shape(
+        &mut self,
+        bits: &mut Bits,
+        u: UpdateId,
+        canonical: &Canonical,
+    ) -> Result<(), ConvertError> {
+        bits.push(canonical.removed.len() as u64, COUNT_BITS);
+        let on_boundary = !canonical.bare.is_empty();
+        bits.push(u64::from(on_boundary), 1);
+        if on_boundary {
+            if canonical.bare.len() >= 1 << COUNT_BITS {
+                return Err(ConvertError::Update { update: u.0, what: "has too many faces on the boundary" });
+            }
+            bits.push(canonical.bare.len() as u64, COUNT_BITS);
+            canonical.bare.iter().for_each(|(_, given_up)| bits.push(u64::from(*given_up), 1));
+        }
+        let children = &self.children[u.0 as usize];
+        for (_, t) in &canonical.walls {
+            let remover = self.mt.remover(*t);
+            let child = remover.map_or(0, |c| 1 + children.partition_point(|&x| x < c.0));
+            bits.push(child as u64, width_of(children.len() as u32));
+        }
+        let torn = ConvertError::Update { update: u.0, what: "does not fill the hole that it leaves" };
+        self.write_removed(bits, canonical, on_boundary).ok_or(torn)
+    }
+
+    fn write_removed(&mut self, bits: &mut Bits, canonical: &Canonical, on_boundary: bool) -> Option<()> {
+        let faces: Vec<Face> = canonical.walls.iter().map(|(face, _)| *face).collect();
+        let vertices = canonical.link.len() as u32;
+        // By the face that it stands on: the vertex of the tetrahedron opposite it.
+        let mut behind: HashMap<Face, u8> = HashMap::new();
+        for tet in &canonical.removed {
+            FACES.iter().zip(tet).for_each(|(face, &x)| {
+                behind.insert(turned(face.map(|k| tet[k])), x);
+            });
+        }
+        let in_all = (0..vertices as u8).find(|x| canonical.removed.iter().all(|tet| tet.contains(x)));
+        // All of T_u meets in a vertex, and all faces of Π_u without that vertex have one of its tetrahedra behind them.
+        let fan = in_all.filter(|x| {
+            let free = faces.iter().filter(|face| !face.contains(x));
+            free.clone().count() == canonical.removed.len()
+                && free.clone().all(|face| behind.get(face) == Some(x))
+        });
+        bits.push(u64::from(fan.is_some()), 1);
+        if let Some(apex) = fan {
+            bits.push(u64::from(apex), width_of(vertices - 1));
+        }
+        let written = self.glue.build(&faces, !on_boundary, |face, of_link| {
+            let apex = behind.get(&face).copied();
+            if let Some(fan) = fan {
+                let leave = !of_link || face.contains(&fan);
+                return Some(if leave { Close::Leave } else { Close::With(fan) });
+            }
+            let choices = choices(vertices, on_boundary, of_link)?;
+            let (close, chosen) = match apex {
+                Some(x) => {
+                    let smaller = face.iter().filter(|&&own| own < x).count();
+                    (Close::With(x), u32::from(x) - smaller as u32)
+                }
+                None if on_boundary && !of_link => (Close::Leave, vertices - 3),
+                None => return None,
+            };
+            bits.push(u64::from(chosen), width_of(choices - 1));
+            Some(close)
+        });
+        written?;
+        // What was built must be T_u, whatever the way.
+        let all = |tets: &[[u8; 4]]| {
+            let mut all: Vec<[u8; 4]> = tets.to_vec();
+            all.iter_mut().for_each(|tet| tet.sort_unstable());
+            all.sort_unstable();
+            all
+        };
+        (all(&self.glue.tets[..self.glue.len]) == all(&canonical.removed)).then_some(())
+    }
+}
+
+/// Takes the faces that are given up out of the boundary and puts those in their place in.
+fn move_boundary(
+    boundary: &mut HashSet<[u32; 3]>,
+    bare: &[([u32; 3], bool)],
+    walls: &[([u32; 3], u32)],
+    v: u32,
+) {
+    for (face, _) in bare.iter().filter(|(_, given_up)| *given_up) {
+        boundary.remove(face);
+    }
+    let mut rim: HashSet<[u32; 2]> = HashSet::new();
+    for ([a, b, c], _) in walls {
+        for [x, y] in [[a, b], [b, c], [c, a]] {
+            let edge = [*x.min(y), *x.max(y)];
+            if !rim.remove(&edge) {
+                rim.insert(edge);
+            }
+        }
+    }
+    boundary.extend(rim.into_iter().map(|[x, y]| sorted([x, y, v])));
+}
