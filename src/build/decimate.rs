@@ -36,7 +36,7 @@ use glam::DVec3;
 
 /// How the hole of a removed vertex is filled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Criterion {
+pub enum Criterion {
     /// By contracting an edge to the end that stays: works in any mesh.
     HalfEdge,
     /// By the Delaunay criterion. Vertices of a curved boundary stay.
@@ -265,11 +265,12 @@ impl<'a> Decimator<'a> {
             if !contract(&self.hole, positions, b, &mut self.now.filling) {
                 continue;
             }
-            if self.hole.on_boundary() {
-                let Self { hole, mesh, marks, star, .. } = self;
-                if self.frozen[b as usize] || !keeps_topology(hole, mesh, marks, star, b) {
-                    continue;
-                }
+            // Inside, positive tetrahedra would do if the mesh did not overlap itself; behind a boundary that has moved far
+            // it may.
+            let Self { hole, mesh, marks, star, frozen, .. } = self;
+            let stays = hole.on_boundary() && frozen[b as usize];
+            if stays || !keeps_topology(hole, mesh, marks, star, b) {
+                continue;
             }
             let limit = level_error(found.map_or(key.level(), |found| found.level().min(key.level())));
             let Self { hole, now, buckets, reference, .. } = self;

@@ -35,7 +35,26 @@ pub(super) fn contract(hole: &Hole, positions: &[[i32; 3]], b: u32, filling: &mu
         }
         filling.tets.push([face[0], face[1], face[2], b]);
     }
-    !filling.tets.is_empty() && lay_border(hole, b, filling)
+    !filling.tets.is_empty()
+        && (!hole.on_boundary() || hangs_together(&filling.tets, b))
+        && lay_border(hole, b, filling)
+}
+
+/// Whether these tetrahedra, which all have `b`, hang together through faces. At the boundary the fan between the two ends
+/// may part the hole; an insertion finds what it removes by going through faces.
+fn hangs_together(tets: &[[u32; 4]], b: u32) -> bool {
+    let mut reached = vec![false; tets.len()];
+    let mut stack = vec![0];
+    let mut count = 0;
+    while let Some(i) = stack.pop() {
+        if std::mem::replace(&mut reached[i], true) {
+            continue;
+        }
+        count += 1;
+        let shared = |other: &[u32; 4]| other.iter().filter(|&&v| v != b && tets[i].contains(&v)).count();
+        stack.extend((0..tets.len()).filter(|&j| !reached[j] && shared(&tets[j]) == 2));
+    }
+    count == tets.len()
 }
 
 /// The boundary triangles of a filling. False if one of them would belong to a tetrahedron outside of the hole.
@@ -56,7 +75,7 @@ fn lay_border(hole: &Hole, b: u32, filling: &mut Filling) -> bool {
     true
 }
 
-/// The link condition for an edge along the boundary, with the boundary closed by a cone from a vertex ω outside.
+/// The link condition, with the boundary closed by a cone from a vertex ω outside.
 /// (Dey, Edelsbrunner, Guha, Nekhayev: *Topology preserving edge contraction*, 1999.)
 pub(super) fn keeps_topology(
     hole: &Hole,

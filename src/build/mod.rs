@@ -24,10 +24,10 @@ mod collapse;
 mod cost;
 #[allow(dead_code, reason = "the builders of vertex-based MTs follow")]
 mod decimate;
+mod delaunay;
 mod fill_cost;
 mod gift_wrap;
 mod half_edge;
-mod delaunay;
 mod history;
 mod hole;
 mod in_sphere;
@@ -38,10 +38,12 @@ mod quantize;
 #[allow(dead_code, reason = "the builders of vertex-based MTs follow")]
 mod sequence;
 mod skin;
+mod vertex;
 mod work_mesh;
 
 pub use collapse::edge_mt;
 pub use delaunay::delaunay;
+pub use vertex::{Criterion, decimated_mt};
 
 use crate::mesh::MeshError;
 use crate::mt::EdgeMt;
