@@ -49,9 +49,11 @@ const LARGEST_TABLE: usize = 1024;
 
 /// A face of a zone's boundary.
 #[derive(Clone, Copy)]
-struct LinkFace {
-    /// Its vertices, seen from outside the zone.
-    triangle: [u32; 3],
+pub(super) struct LinkFace {
+    /// Its vertices, counterclockwise from outside the zone.
+    pub triangle: [u32; 3],
+    /// The link's faces across the edges opposite them.
+    pub around: [u32; 3],
     /// The same in local numbers.
     numbers: [u32; 3],
     /// The tetrahedron outside, and which of its faces this is.
@@ -88,6 +90,8 @@ pub(super) struct Triangulation {
     star: Vec<u32>,
     /// Whether every insertion so far took its whole conflict zone.
     exact: bool,
+    /// Whether the plan is cut.
+    is_cut: bool,
     cuts: usize,
     random: u32,
 }
@@ -103,7 +107,7 @@ impl Triangulation {
         for v in order.into_iter().filter(|v| !first.contains(v)) {
             at = mesh.locate(v, at);
             mesh.refuse_duplicate(v, at)?;
-            mesh.insert(v, at, None)?;
+            mesh.insert(v, at);
             at = mesh.star[0];
         }
         Ok(mesh)
@@ -128,6 +132,7 @@ impl Triangulation {
             link: Vec::new(),
             star: Vec::new(),
             exact: true,
+            is_cut: false,
             cuts: 0,
             random: 1,
         };
@@ -231,16 +236,65 @@ impl Triangulation {
     }
 
     /// Inserts a point that tetrahedron `at` contains, or that is in front of the ghost `at`.
-    pub fn insert(&mut self, v: u32, at: u32, limits: Option<Limits>) -> Result<(), BuildError> {
+    fn insert(&mut self, v: u32, at: u32) {
         self.next_epoch();
         self.flood(v, at);
-        if let Some(limits) = limits
-            && !(self.is_within(&limits) && (self.exact || self.is_star_shaped(v)))
-        {
-            self.cut(v, &limits)?;
-        }
+        self.collect_link();
         self.fill(v);
+    }
+
+    /// Plans the insertion of a point that tetrahedron `at` contains: says what would be removed and inserted.
+    /// Only the last plan can be carried out, and only before anything else is done.
+    pub fn plan(&mut self, v: u32, at: u32, limits: &Limits) -> Result<(), BuildError> {
+        self.next_epoch();
+        self.flood(v, at);
+        self.is_cut = !(self.is_within(limits) && (self.exact || self.is_star_shaped(v)));
+        if self.is_cut {
+            self.cut(v, limits)?;
+        }
+        self.collect_link();
+        self.meet();
         Ok(())
+    }
+
+    /// Carries the plan for `v` out.
+    pub fn carry_out(&mut self, v: u32) {
+        self.exact &= !self.is_cut;
+        self.cuts += usize::from(self.is_cut);
+        self.fill(v);
+    }
+
+    /// The zone of the plan: slots of tetrahedra to be removed, and of ghosts.
+    pub fn zone(&self) -> &[u32] {
+        &self.zone
+    }
+
+    /// The star of the plan; after it is carried out, face `i` has made the tetrahedron in slot `star()[i]`.
+    pub fn link(&self) -> &[LinkFace] {
+        &self.link
+    }
+
+    /// Whether a face of the link has the vertex at infinity: what it makes is a ghost.
+    pub fn is_beyond(&self, face: &LinkFace) -> bool {
+        face.triangle.contains(&(self.points.len() as u32))
+    }
+
+    /// Finds which faces of the link meet at its edges.
+    fn meet(&mut self) {
+        let side = self.link.len() / 2 + 2;
+        if self.table.len() < side * side {
+            self.table.resize(side * side, 0);
+        }
+        for (i, face) in (0..).zip(&self.link) {
+            let [x, y, z] = face.numbers.map(|n| n as usize);
+            self.table[y * side + z] = i;
+            self.table[z * side + x] = i;
+            self.table[x * side + y] = i;
+        }
+        for face in &mut self.link {
+            let [x, y, z] = face.numbers.map(|n| n as usize);
+            face.around = [(z, y), (x, z), (y, x)].map(|(a, b)| self.table[a * side + b]);
+        }
     }
 
     fn next_epoch(&mut self) {
@@ -301,7 +355,6 @@ impl Triangulation {
                 self.removed.push((self.tets[t as usize], t));
             }
         }
-        self.collect_link();
         let reused = self.boundary.len().min(self.zone.len());
         self.star.clear();
         self.star.extend_from_slice(&self.zone[..reused]);
@@ -342,7 +395,7 @@ impl Triangulation {
                 }
                 entry[1]
             });
-            self.link.push(LinkFace { triangle, numbers, outer, back });
+            self.link.push(LinkFace { triangle, around: [NONE; 3], numbers, outer, back });
         }
     }
 
@@ -451,8 +504,6 @@ impl Triangulation {
 
     /// Cuts the zone down to a star-shaped part around `v` within the limits.
     fn cut(&mut self, v: u32, limits: &Limits) -> Result<(), BuildError> {
-        self.exact = false;
-        self.cuts += 1;
         let p = self.points[v as usize];
         let mut kept = self.containing(self.zone[0], p);
         let needed = kept.len();

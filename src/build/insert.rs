@@ -90,15 +90,25 @@ struct Candidate {
     stamp: u32,
 }
 
-/// A tetrahedron of the new star.
+/// A tetrahedron of the new star; a ghost has no sides.
 #[derive(Clone, Copy)]
 struct Cell {
-    slot: u32,
+    /// The new vertex comes last.
+    tet: [u32; 4],
     /// Outer normals of its faces at the new vertex, and the cells behind them.
     sides: [([i64; 3], u32); 3],
     first: u32,
     error: f64,
     worst: u32,
+}
+
+const NO_CELL: Cell =
+    Cell { tet: [NONE; 4], sides: [([0; 3], NONE); 3], first: NONE, error: -1.0, worst: NONE };
+
+impl Cell {
+    fn is_ghost(&self) -> bool {
+        self.tet[3] == NONE
+    }
 }
 
 struct Greedy<'a> {
@@ -112,9 +122,10 @@ struct Greedy<'a> {
     next: Vec<u32>,
     heap: BinaryHeap<Candidate>,
     live: usize,
-    /// Which cell of the star each slot holds.
-    cell_of: Vec<u32>,
+    /// The star that is planned, in the order of the link's faces.
     cells: Vec<Cell>,
+    /// The points of the zone, and the cells they go to.
+    moves: Vec<(u32, u32)>,
     /// The fields' slopes, in levels a step: of each cell all fields.
     slopes: Vec<[f64; 3]>,
     sequence: Sequence,
@@ -132,8 +143,8 @@ impl<'a> Greedy<'a> {
             next: vec![NONE; points],
             heap: BinaryHeap::new(),
             live: 0,
-            cell_of: vec![NONE; mesh.slots()],
             cells: Vec::new(),
+            moves: Vec::new(),
             slopes: Vec::new(),
             sequence: Sequence { base, ..Sequence::default() },
             mesh,
@@ -147,19 +158,21 @@ impl<'a> Greedy<'a> {
             at = self.mesh.locate(v, at);
             self.next[v as usize] = std::mem::replace(&mut self.buckets[at as usize].first, v);
         }
-        let slots: Vec<u32> = self.mesh.finite_slots().collect();
+        let slots: Vec<u32> =
+            self.mesh.finite_slots().filter(|&t| self.buckets[t as usize].first != NONE).collect();
         for slot in slots {
-            let apex = self.mesh.tet(slot)[3];
+            let tet = self.mesh.tet(slot);
             self.cells.clear();
             self.slopes.clear();
-            self.add_cell(slot, apex);
-            let mut v = self.buckets[slot as usize].first;
-            while v != NONE {
-                let after = self.next[v as usize];
-                self.put(v, 0, apex);
-                v = after;
+            self.add_cell(tet, [NONE; 3]);
+            let first = self.buckets[slot as usize].first;
+            self.cells[0].first = first;
+            let mut p = first;
+            while p != NONE {
+                self.weigh(p, 0, tet[3]);
+                p = self.next[p as usize];
             }
-            self.settle(0);
+            self.settle(0, slot);
         }
     }
 
@@ -194,18 +207,55 @@ impl<'a> Greedy<'a> {
     }
 
     fn insert_worst(&mut self, slot: u32) -> Result<(), BuildError> {
-        let v = self.buckets[slot as usize].chosen;
-        self.mesh.insert(v, slot, Some(MT_LIMITS))?;
+        let v = self.choose(slot)?;
+        self.prepare(v, slot)?;
+        self.mesh.carry_out(v);
+        if self.mesh.slots() > self.buckets.len() {
+            self.buckets.resize(self.mesh.slots(), NO_BUCKET);
+        }
         self.record(v);
-        self.lay_out_star(v);
-        self.move_points(v);
-        for cell in 0..self.cells.len() {
-            self.settle(cell);
+        for i in 0..self.mesh.removed().len() {
+            self.empty(self.mesh.removed()[i].1);
+        }
+        for i in 0..self.moves.len() {
+            let (p, cell) = self.moves[i];
+            let first = &mut self.cells[cell as usize].first;
+            self.next[p as usize] = std::mem::replace(first, p);
+        }
+        for i in 0..self.cells.len() {
+            if self.cells[i].first != NONE {
+                self.settle(i, self.mesh.star()[i]);
+            }
         }
         if self.heap.len() > 4 * self.live + 1024 {
             self.heap.retain(|c| self.buckets[c.slot as usize].stamp == c.stamp);
         }
         Ok(())
+    }
+
+    fn choose(&mut self, slot: u32) -> Result<u32, BuildError> {
+        Ok(self.buckets[slot as usize].chosen)
+    }
+
+    /// Plans the insertion of `v` and finds where the points go, and the errors there. Returns the largest.
+    fn prepare(&mut self, v: u32, slot: u32) -> Result<f64, BuildError> {
+        self.mesh.plan(v, slot, &MT_LIMITS)?;
+        self.lay_out_star(v);
+        self.moves.clear();
+        let mut cell = self.cells.iter().position(|cell| !cell.is_ghost()).unwrap_or(0);
+        let mut largest = 0.0_f64;
+        for i in 0..self.mesh.zone().len() {
+            let mut p = self.buckets[self.mesh.zone()[i] as usize].first;
+            while p != NONE {
+                if p != v {
+                    cell = self.find_cell(p, v, cell);
+                    self.moves.push((p, cell as u32));
+                    largest = largest.max(self.weigh(p, cell, v));
+                }
+                p = self.next[p as usize];
+            }
+        }
+        Ok(largest)
     }
 
     fn record(&mut self, v: u32) {
@@ -229,31 +279,24 @@ impl<'a> Greedy<'a> {
     }
 
     fn lay_out_star(&mut self, v: u32) {
-        if self.mesh.slots() > self.buckets.len() {
-            self.buckets.resize(self.mesh.slots(), NO_BUCKET);
-            self.cell_of.resize(self.mesh.slots(), NONE);
-        }
         self.cells.clear();
         self.slopes.clear();
-        for i in 0..self.mesh.star().len() {
-            let slot = self.mesh.star()[i];
-            if !self.mesh.is_ghost(slot) {
-                self.cell_of[slot as usize] = self.cells.len() as u32;
-                self.add_cell(slot, v);
+        for i in 0..self.mesh.link().len() {
+            let face = self.mesh.link()[i];
+            if self.mesh.is_beyond(&face) {
+                self.cells.push(NO_CELL);
+                self.slopes.resize(self.cells.len() * self.weights.len(), [0.0; 3]);
+                continue;
             }
-        }
-        for cell in &mut self.cells {
-            let around = self.mesh.neighbors(cell.slot);
-            for (side, t) in cell.sides.iter_mut().zip(around) {
-                side.1 = if self.mesh.is_ghost(t) { NONE } else { self.cell_of[t as usize] };
-            }
+            let [x, y, z] = face.triangle;
+            let [beyond_x, beyond_y, beyond_z] = face.around;
+            self.add_cell([x, z, y, v], [beyond_x, beyond_z, beyond_y]);
         }
     }
 
-    /// Adds a tetrahedron whose last corner is `apex`.
-    fn add_cell(&mut self, slot: u32, apex: u32) {
-        let tet = self.mesh.tet(slot);
-        debug_assert_eq!(tet[3], apex);
+    /// Adds a tetrahedron of the star of its last corner, and the cells across its sides.
+    fn add_cell(&mut self, tet: [u32; 4], around: [u32; 3]) {
+        let apex = tet[3];
         let origin = self.mesh.position(apex);
         let arms = [0, 1, 2].map(|k| difference(self.mesh.position(tet[k]), origin));
         let sides = [[1, 2], [2, 0], [0, 1]].map(|[i, j]| cross(arms[i], arms[j]));
@@ -264,31 +307,14 @@ impl<'a> Greedy<'a> {
             let rise = [0, 1, 2].map(|k| (level(tet[k], f) - level(apex, f)) / determinant);
             self.slopes.push([0, 1, 2].map(|i| (0..3).map(|k| rise[k] * sides[k][i] as f64).sum()));
         }
-        let sides = sides.map(|normal| (normal, NONE));
-        self.cells.push(Cell { slot, sides, first: NONE, error: -1.0, worst: NONE });
+        let sides = [0, 1, 2].map(|k| (sides[k], around[k]));
+        self.cells.push(Cell { tet, sides, ..NO_CELL });
     }
 
-    /// Moves the points of the removed tetrahedra into the cells that contain them.
-    fn move_points(&mut self, v: u32) {
-        let mut cell = 0;
-        for i in 0..self.mesh.removed().len() {
-            let (_, slot) = self.mesh.removed()[i];
-            let mut p = std::mem::replace(&mut self.buckets[slot as usize], self.emptied(slot)).first;
-            while p != NONE {
-                let after = self.next[p as usize];
-                if p != v {
-                    cell = self.find_cell(p, v, cell);
-                    self.put(p, cell, v);
-                }
-                p = after;
-            }
-        }
-    }
-
-    fn emptied(&mut self, slot: u32) -> Bucket {
-        let old = self.buckets[slot as usize];
-        self.live -= usize::from(old.first != NONE);
-        Bucket { stamp: old.stamp.wrapping_add(1), ..NO_BUCKET }
+    fn empty(&mut self, slot: u32) {
+        let bucket = &mut self.buckets[slot as usize];
+        self.live -= usize::from(bucket.first != NONE);
+        *bucket = Bucket { stamp: bucket.stamp.wrapping_add(1), ..NO_BUCKET };
     }
 
     /// The cell of the star of `v` that contains point `p`, walking from `from`.
@@ -299,12 +325,13 @@ impl<'a> Greedy<'a> {
         for _ in 0..self.cells.len() {
             let beyond = self.cells[at].sides.iter().find(|(normal, _)| self.is_beyond(*normal, arm));
             match beyond {
-                Some(&(_, next)) if next != NONE => at = next as usize,
-                Some(_) => break,
+                Some(&(_, next)) => at = next as usize,
                 None => return at,
             }
         }
-        let contains = |cell: &Cell| cell.sides.iter().all(|(normal, _)| !self.is_beyond(*normal, arm));
+        let contains = |cell: &Cell| {
+            !cell.is_ghost() && cell.sides.iter().all(|(normal, _)| !self.is_beyond(*normal, arm))
+        };
         let found = self.cells.iter().position(contains);
         assert!(found.is_some(), "the star fills all that was removed");
         found.unwrap_or(0)
@@ -319,14 +346,14 @@ impl<'a> Greedy<'a> {
         }
     }
 
-    /// Puts point `p` into a cell with apex `v`.
-    fn put(&mut self, p: u32, cell: usize, v: u32) {
+    /// The error at point `p` of a cell with apex `v`, counted into the cell's.
+    fn weigh(&mut self, p: u32, cell: usize, v: u32) -> f64 {
         let error = self.error_at(p, cell, v);
         let cell = &mut self.cells[cell];
         if error > cell.error {
             (cell.error, cell.worst) = (error, p);
         }
-        self.next[p as usize] = std::mem::replace(&mut cell.first, p);
+        error
     }
 
     /// How far the cell's fields are from those of the reference at `p`, as a fraction of their ranges.
@@ -345,22 +372,18 @@ impl<'a> Greedy<'a> {
         largest
     }
 
-    /// Hands a cell's points over to its slot, and the slot to the heap.
-    fn settle(&mut self, cell: usize) {
-        let Cell { slot, first, error, worst, sides } = self.cells[cell];
+    /// Hands a cell's points over to a slot, and the slot to the heap.
+    fn settle(&mut self, cell: usize, slot: u32) {
+        let Cell { tet, first, error, worst, sides } = self.cells[cell];
         let bucket = &mut self.buckets[slot as usize];
         bucket.stamp = bucket.stamp.wrapping_add(1);
         bucket.first = first;
-        if first == NONE {
-            return;
-        }
         self.live += 1;
         bucket.error = error;
         bucket.chosen = worst;
         let stamp = bucket.stamp;
         let mut key = 1 << 63 | error.to_bits();
         if error < FINEST {
-            let tet = self.mesh.tet(slot);
             let arm = difference(self.mesh.position(tet[0]), self.mesh.position(tet[3]));
             key = float_dot(sides[0].0, arm).abs().to_bits();
             self.buckets[slot as usize].chosen = self.middle_point(slot);
