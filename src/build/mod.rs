@@ -22,7 +22,6 @@
 mod agenda;
 mod collapse;
 mod cost;
-#[allow(dead_code, reason = "the builders of vertex-based MTs follow")]
 mod decimate;
 mod delaunay;
 mod fill_cost;
@@ -31,11 +30,9 @@ mod half_edge;
 mod history;
 mod hole;
 mod in_sphere;
-#[allow(dead_code, reason = "the builders of vertex-based MTs follow")]
 mod insert;
 mod plan;
 mod quantize;
-#[allow(dead_code, reason = "the builders of vertex-based MTs follow")]
 mod sequence;
 mod skin;
 mod vertex;
@@ -43,7 +40,7 @@ mod work_mesh;
 
 pub use collapse::edge_mt;
 pub use delaunay::delaunay;
-pub use vertex::{Criterion, decimated_mt};
+pub use vertex::{Criterion, decimated_mt, inserted_mt};
 
 use crate::mesh::MeshError;
 use crate::mt::EdgeMt;

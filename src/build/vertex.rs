@@ -1,34 +1,75 @@
-//! The front door to vertex-based MTs.
+//! Vertex-based MTs, by whichever builder.
 
 use super::BuildConfig;
 use super::BuildError;
-use super::BuildProgress;
 use super::OnProgress;
 use super::decimate;
-pub use super::decimate::Criterion;
+use super::insert;
+use super::quantize;
 use super::quantize::Quantized;
 use super::sequence::Sequence;
+use crate::geom::Bounds;
 use crate::mesh::TetMesh;
 use crate::mt::ExplicitMt;
+use crate::mt::MAX_UPDATES;
 use crate::mt::MtInfo;
 use crate::mt::MtKind;
 
+pub use super::decimate::Criterion;
+
+/// Builds a vertex-based MT of `mesh` by removing vertices, cheapest first, and spells it out: see
+/// [`VertexMt::from_explicit`](crate::mt::VertexMt::from_explicit).
+///
+/// # Errors
+/// As [`edge_mt`](super::edge_mt).
 pub fn decimated_mt(
     mesh: &TetMesh,
     config: &BuildConfig,
     criterion: Criterion,
     progress: OnProgress<'_>,
 ) -> Result<ExplicitMt, BuildError> {
-    let decimated = decimate::decimate(mesh, config, criterion, progress)?;
-    let quantized = &decimated.quantized;
+    let built = decimate::decimate(mesh, config, criterion, progress)?;
+    spell_out(&built.sequence, &built.quantized, built.displacement_per_error, progress)
+}
+
+/// Builds a vertex-based MT of the points of `mesh` by inserting them into a coarse mesh of their convex hull, the one
+/// with the largest error first, and spells it out. The reference mesh is the Delaunay triangulation of the points,
+/// whatever tetrahedra `mesh` has; it may have none.
+///
+/// # Errors
+/// If the tetrahedra of `mesh` do not fill the convex hull of its points, two points coincide on the lattice or they
+/// span no volume; if an option is out of its range; if `progress` breaks the work off.
+pub fn inserted_mt(
+    mesh: &TetMesh,
+    config: &BuildConfig,
+    progress: OnProgress<'_>,
+) -> Result<ExplicitMt, BuildError> {
+    if mesh.positions.len() > MAX_UPDATES as usize {
+        return Err(BuildError::TooLarge);
+    }
+    crate::mesh::check(mesh).map_err(BuildError::Mesh)?;
+    let quantized = quantize::quantize(mesh, config)?;
+    let displacement_per_error = config.displacement * Bounds::of(&mesh.positions).diagonal();
+    let sequence = insert::insert(&quantized, &mesh.tets, progress)?;
+    spell_out(&sequence, &quantized, displacement_per_error, progress)
+}
+
+fn spell_out(
+    sequence: &Sequence,
+    quantized: &Quantized,
+    displacement_per_error: f64,
+    progress: OnProgress<'_>,
+) -> Result<ExplicitMt, BuildError> {
+    let grown: usize = sequence.steps.iter().map(|step| step.inserted.len()).sum();
+    let shrunk: usize = sequence.steps.iter().map(|step| step.removed.len()).sum();
     let info = MtInfo {
         kind: MtKind::Explicit,
         lattice: quantized.lattice,
         fields: quantized.fields.clone(),
-        vertices: mesh.positions.len() as u32,
-        tetrahedra: mesh.tets.len() as u32,
+        vertices: quantized.positions.len() as u32,
+        tetrahedra: (sequence.base.len() + grown - shrunk) as u32,
         updates: 0,
-        displacement_per_error: decimated.displacement_per_error,
+        displacement_per_error,
     };
-    decimated.sequence.explicit_mt(info, quantized, progress)
+    sequence.explicit_mt(info, quantized, progress)
 }

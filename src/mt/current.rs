@@ -542,37 +542,49 @@ impl CurrentMesh {
         }
     }
 
-    /// Collects the tetrahedra with this tag that hang together with `first`, which has it, and starts a numbering of
-    /// vertices. None if there are more than [`GATHERED`].
+    /// Collects the tetrahedra with this tag that hang together with `first`, which has it, and their faces that none of
+    /// them lies behind (tetrahedron, face, what does); starts a numbering of vertices. None if there are more than
+    /// [`GATHERED`].
     #[inline]
     pub(super) fn gather_tagged(
         &mut self,
         first: u32,
         tag: u32,
         tets: &mut [u32; GATHERED],
+        bare: &mut Vec<(u32, u32, u32)>,
     ) -> Option<usize> {
         self.next_epoch();
+        bare.clear();
         let mark = self.epoch << MARK_BITS;
         self.marks[first as usize] = mark;
         tets[0] = first;
         let (mut next, mut len) = (0, 1);
         while next < len {
-            let around = self.neighbors[tets[next % GATHERED] as usize];
+            let t = tets[next % GATHERED];
             next += 1;
-            for n in around {
-                let Some(&own) = self.tags.get(n as usize) else { continue };
-                if own != tag || self.marks[n as usize] == mark {
-                    continue;
+            for (face, n) in (0..).zip(self.neighbors[t as usize]) {
+                // Also NONE is beyond the array.
+                if self.tags.get(n as usize) != Some(&tag) {
+                    bare.push((t, face, n));
+                } else if self.marks[n as usize] != mark {
+                    if len == GATHERED {
+                        return None;
+                    }
+                    self.marks[n as usize] = mark;
+                    tets[len] = n;
+                    len += 1;
                 }
-                if len == GATHERED {
-                    return None;
-                }
-                self.marks[n as usize] = mark;
-                tets[len] = n;
-                len += 1;
             }
         }
         Some(len)
+    }
+
+    /// Which face of tetrahedron `t` its neighbour `towards` lies behind.
+    #[inline]
+    pub(super) fn side_towards(&self, t: u32, towards: u32) -> Option<u8> {
+        let [_, b, c, d] = self.neighbors[t as usize].map(|n| u8::from(n == towards));
+        let found = self.neighbors[t as usize].contains(&towards);
+        found.then_some(b + 2 * c + 3 * d)
     }
 
     /// The number of a vertex, by index into `list`, where it is put if it has none yet. None if that is full.

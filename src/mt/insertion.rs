@@ -25,7 +25,7 @@ use super::glue::Close;
 use super::glue::Face;
 use super::glue::Glue;
 use super::glue::turned;
-use super::ring::ranks;
+use super::ring::rank;
 use super::vertex::COUNT_BITS;
 use super::vertex::MAX_AROUND;
 use super::vertex::MAX_INSERTED;
@@ -56,6 +56,8 @@ pub(super) struct Cavity {
     /// The slots of T_u.
     tets: [u32; GATHERED],
     tets_len: usize,
+    /// Faces of T_u that none of its tetrahedra lies behind: tetrahedron, face, what lies behind.
+    bare: Vec<(u32, u32, u32)>,
     walls: [Wall; MAX_INSERTED],
     walls_len: usize,
     /// Slots of the vertices of Π_u.
@@ -64,8 +66,10 @@ pub(super) struct Cavity {
     /// The place of each vertex of the link in the order of their labels.
     order: [i32; MAX_AROUND],
     /// For a directed edge between two of them the new tetrahedron that has it: `epoch << 16 | tetrahedron << 2 | corner`.
-    edges: Box<[[u32; MAX_AROUND]; MAX_AROUND]>,
+    edges: Box<[u32; MAX_AROUND * MAX_AROUND]>,
     epoch: u32,
+    /// The place of each wall in canonical order.
+    places: [i32; GATHERED],
     /// Across the faces of each new tetrahedron.
     across: [[u32; 4]; MAX_INSERTED],
     /// The tags of the new tetrahedra.
@@ -79,13 +83,15 @@ impl Default for Cavity {
             star: Star::default(),
             tets: [0; GATHERED],
             tets_len: 0,
+            bare: Vec::new(),
             walls: [Wall::default(); MAX_INSERTED],
             walls_len: 0,
             link: [0; MAX_AROUND],
             link_len: 0,
             order: [0; MAX_AROUND],
-            edges: Box::new([[0; MAX_AROUND]; MAX_AROUND]),
+            edges: Box::new([0; MAX_AROUND * MAX_AROUND]),
             epoch: 0,
+            places: [0; GATHERED],
             across: [[NONE; 4]; MAX_INSERTED],
             tags: [NONE; MAX_INSERTED],
         }
@@ -120,61 +126,66 @@ impl Cavity {
             // Signed numbers compare in one instruction; the shift keeps the order.
             *label = (mesh.labels[v as usize].vertex ^ 1 << 31) as i32;
         }
-        self.order = ranks(&labels, self.link_len);
+        rank(&labels, self.link_len, &mut self.order);
     }
 
-    /// The place of each wall in canonical order: ascending by the sorted labels of its vertices.
+    /// Finds the place of each wall in canonical order: ascending by the sorted labels of its vertices.
     #[inline]
-    fn order_walls(&self) -> [i32; 128] {
-        let mut keys = [i32::MAX; 128];
+    fn order_walls(&mut self) {
+        let mut keys = [i32::MAX; GATHERED];
         for (key, wall) in keys.iter_mut().zip(&self.walls[..self.walls_len]) {
             let [a, b, c] = wall.corners.map(|x| self.order[x as usize % MAX_AROUND]);
             let (low, high) = (a.min(b), a.max(b));
             let (least, most) = (low.min(c), high.max(c));
             *key = least << 12 | low.max(c.min(high)) << 6 | most;
         }
-        ranks(&keys, self.walls_len)
+        rank(&keys, self.walls_len, &mut self.places);
     }
 
-    /// Finds what lies across the faces of the new tetrahedra that meet at the new vertex. None if the walls do not close.
+    /// Finds what lies across the faces of the new tetrahedra that meet at the new vertex. `rim` are the faces that are
+    /// given up. None if walls and rim do not close.
     #[inline]
     fn join_walls(&mut self, rim: &[[u8; 3]]) -> Option<()> {
         self.epoch += 1;
         if self.epoch == 1 << 16 {
-            self.edges.as_flattened_mut().fill(0);
+            self.edges.fill(0);
             self.epoch = 1;
         }
-        let epoch = self.epoch;
-        let edges = &mut *self.edges;
-        let mut put = |a: u8, b: u8, value: u32| {
-            let edge = &mut edges[a as usize % MAX_AROUND][b as usize % MAX_AROUND];
-            let is_new = *edge >> 16 != epoch;
-            *edge = epoch << 16 | value;
-            is_new
-        };
-        for (i, wall) in (0_u32..).zip(&self.walls[..self.walls_len]) {
-            let [a, b, c] = wall.corners;
-            if !(put(b, c, i << 2 | 1) && put(c, a, i << 2 | 2) && put(a, b, i << 2 | 3)) {
-                return None;
-            }
-        }
+        let epoch = self.epoch << 16;
+        let (edges, across) = (&mut *self.edges, &mut self.across);
+        let place = |a: u8, b: u8| (usize::from(a) << 6 | usize::from(b)) % (MAX_AROUND * MAX_AROUND);
         for &[a, b, c] in rim {
-            if !(put(b, c, GIVEN_UP) && put(c, a, GIVEN_UP) && put(a, b, GIVEN_UP)) {
-                return None;
-            }
-        }
-        for (across, wall) in self.across.iter_mut().zip(&self.walls[..self.walls_len]) {
-            let [a, b, c] = wall.corners;
-            for (side, [from, to]) in [[c, b], [a, c], [b, a]].into_iter().enumerate() {
-                let edge = self.edges[from as usize % MAX_AROUND][to as usize % MAX_AROUND];
-                if edge >> 16 != epoch {
+            for (from, to) in [(b, c), (c, a), (a, b)] {
+                if std::mem::replace(&mut edges[place(from, to)], epoch | GIVEN_UP) >= epoch {
                     return None;
                 }
-                let value = edge & 0xFFFF;
-                across[side + 1] = if value == GIVEN_UP { NONE } else { value >> 2 };
             }
         }
-        Some(())
+        // Every edge has a wall on either side, or a wall and a face that is given up: counted from both sides, each is
+        // met once. Epochs grow, so what is of this one is not less than its start.
+        let mut met = 0;
+        for (i, wall) in self.walls[..self.walls_len].iter().enumerate() {
+            let [a, b, c] = wall.corners;
+            let mut own = [NONE; 4];
+            for (side, (from, to)) in (1..).zip([(b, c), (c, a), (a, b)]) {
+                let value = epoch | (i as u32) << 2 | side as u32;
+                if std::mem::replace(&mut edges[place(from, to)], value) >= epoch {
+                    return None;
+                }
+                let twin = edges[place(to, from)];
+                if twin >= epoch {
+                    met += 1;
+                    let twin = twin & 0xFFFF;
+                    if twin != GIVEN_UP {
+                        met += 1;
+                        own[side] = twin >> 2;
+                        across[(twin >> 2) as usize % MAX_INSERTED][(twin & 3) as usize] = i as u32;
+                    }
+                }
+            }
+            across[i] = own;
+        }
+        (met == 3 * self.walls_len).then_some(())
     }
 
     /// Whether all tetrahedra of the new star are positive, exactly.
@@ -252,7 +263,8 @@ impl VertexMt {
         removed: usize,
         cavity: &mut Cavity,
     ) -> Result<Applied, UpdateError> {
-        let found = mesh.tagged(u.0).and_then(|first| mesh.gather_tagged(first, u.0, &mut cavity.tets));
+        let Cavity { tets, bare, .. } = cavity;
+        let found = mesh.tagged(u.0).and_then(|first| mesh.gather_tagged(first, u.0, tets, bare));
         if found != Some(removed) {
             let missing = self.parents(u).find(|&p| mesh.slot(self.vertex(p)).is_none());
             return missing.map(Applied::Blocked).ok_or(UpdateError::Cavity { update: u.0 });
@@ -295,34 +307,30 @@ impl VertexMt {
         cavity: &mut Cavity,
     ) -> Option<()> {
         (cavity.walls_len, cavity.link_len) = (0, 0);
-        let mut bare: Vec<([u32; 3], [u32; 3], usize)> = Vec::new();
-        for i in 0..cavity.tets_len {
-            let t = cavity.tets[i];
-            let (tet, around) = (mesh.tets[t as usize], mesh.neighbors[t as usize]);
-            for (face, &beyond) in around.iter().enumerate() {
-                if beyond == NONE {
-                    if shape.boundary {
-                        let slots = FACES[face].map(|k| tet[k]);
-                        let mut sorted = slots.map(|v| mesh.labels[v as usize].vertex);
-                        sorted.sort_unstable();
-                        bare.push((sorted, slots, face));
-                    } else {
-                        cavity.add_wall(mesh, &tet, face, NONE, 0)?;
-                    }
-                } else if mesh.tag(beyond) != u.0 {
-                    let side = mesh.neighbors[beyond as usize].iter().position(|&n| n == t)?;
-                    cavity.add_wall(mesh, &tet, face, beyond, side as u8)?;
-                }
+        let mut outer: Vec<([u32; 3], [u32; 3])> = Vec::new();
+        let bare = std::mem::take(&mut cavity.bare);
+        let mut fits = true;
+        for &(t, face, beyond) in &bare {
+            let tet = mesh.tets[t as usize];
+            if beyond == NONE && shape.boundary {
+                let slots = FACES[face as usize & 3].map(|k| tet[k]);
+                let mut sorted = slots.map(|v| mesh.labels[v as usize].vertex);
+                sorted.sort_unstable();
+                outer.push((sorted, slots));
+                continue;
             }
+            let side = if beyond == NONE { Some(0) } else { mesh.side_towards(beyond, t) };
+            fits &= side.and_then(|side| cavity.add_wall(mesh, &tet, face as usize, beyond, side)).is_some();
         }
+        cavity.bare = bare;
         let mut rim = Vec::new();
         if shape.boundary {
-            bare.sort_unstable();
-            if bare.len() != shape.given_up_len as usize {
+            outer.sort_unstable();
+            if outer.len() != shape.given_up_len as usize {
                 return None;
             }
             let mut given_up = Vec::new();
-            for (i, (_, slots, _)) in (0..).zip(bare) {
+            for (i, (_, slots)) in (0..).zip(outer) {
                 if self.nodes.get(shape.given_up + i, 1) == 1 {
                     given_up.push(slots);
                 } else {
@@ -335,6 +343,9 @@ impl VertexMt {
                 let number = |v: u32| mesh.vertex_number(v);
                 rim.push([number(slots[0])?, number(slots[1])?, number(slots[2])?]);
             }
+        }
+        if !fits {
+            return None;
         }
         // No vertex may be left without a tetrahedron.
         let tets = &cavity.tets[..cavity.tets_len];
@@ -370,8 +381,8 @@ impl VertexMt {
             };
         }
         cavity.order_link(mesh);
-        let places = cavity.order_walls();
-        for (tag, place) in cavity.tags[..walls].iter_mut().zip(places) {
+        cavity.order_walls();
+        for (tag, &place) in cavity.tags[..walls].iter_mut().zip(&cavity.places) {
             let at = shape.removers + place as u64 * u64::from(shape.remover_width);
             let child = self.nodes.get(at, shape.remover_width) as usize;
             *tag = *children.get(child).ok_or(UpdateError::Cavity { update: u.0 })?;
@@ -448,10 +459,10 @@ impl VertexMt {
         for i in 0..cavity.star.len {
             let (t, corner) = (cavity.star.tets[i], cavity.star.corner[i] as usize);
             let beyond = mesh.neighbors[t as usize][corner];
-            let back = |n: u32| mesh.neighbors[n as usize].iter().position(|&m| m == t);
-            let side = if beyond == NONE { 0 } else { back(beyond).ok_or(torn.clone())? };
+            let side = if beyond == NONE { Some(0) } else { mesh.side_towards(beyond, t) };
             let tet = mesh.tets[t as usize];
-            cavity.add_wall(mesh, &tet, corner, beyond, side as u8).ok_or(torn.clone())?;
+            let added = side.and_then(|side| cavity.add_wall(mesh, &tet, corner, beyond, side));
+            added.ok_or(torn.clone())?;
         }
         cavity.order_link(mesh);
         self.sort(cavity);
@@ -467,9 +478,9 @@ impl VertexMt {
     /// Puts link and walls into canonical order.
     #[inline]
     fn sort(&self, cavity: &mut Cavity) {
-        let places = cavity.order_walls();
+        cavity.order_walls();
         let walls = cavity.walls;
-        for (wall, place) in walls[..cavity.walls_len].iter().zip(places) {
+        for (wall, &place) in walls[..cavity.walls_len].iter().zip(&cavity.places) {
             let corners = turned(wall.corners.map(|x| cavity.order[x as usize % MAX_AROUND] as u8));
             cavity.walls[place as usize % MAX_INSERTED] = Wall { corners, ..*wall };
         }

@@ -222,15 +222,23 @@ impl Ring {
 /// Quadratic, but without a branch: for a few dozen keys that beats sorting. Counts are as wide as the keys, so that
 /// whole vectors of comparisons are added up.
 #[inline]
-pub(super) fn ranks<K: Copy + PartialOrd + From<bool> + Sum, const N: usize>(
+fn ranks<K: Copy + PartialOrd + From<bool> + Sum, const N: usize>(keys: &[K; N], len: usize) -> [K; N] {
+    let mut ranks = [K::from(false); N];
+    rank(keys, len, &mut ranks);
+    ranks
+}
+
+/// [`ranks`] into an array that is there.
+#[inline]
+pub(super) fn rank<K: Copy + PartialOrd + From<bool> + Sum, const N: usize>(
     keys: &[K; N],
     len: usize,
-) -> [K; N] {
-    let mut ranks = [K::from(false); N];
+    ranks: &mut [K; N],
+) {
+    let compared = &keys[..len.next_multiple_of(8).min(N)];
     for (rank, key) in ranks.iter_mut().zip(&keys[..len]) {
-        *rank = keys[..len.next_multiple_of(8).min(N)].iter().map(|other| K::from(other < key)).sum();
+        *rank = compared.iter().map(|other| K::from(other < key)).sum();
     }
-    ranks
 }
 
 /// Integers that hold the determinants of a lattice: `i64` up to [`crate::geom::NARROW_BITS`], else `i128`.
