@@ -136,3 +136,60 @@ impl MultiTessellation for Mt {
         each!(self, mt => mt.find_inserted(mesh, u, found))
     }
 }
+
+/// An MT of any kind, borrowed.
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub enum MtRef<'a> {
+    /// A compact edge-based MT.
+    Edge(&'a EdgeMt),
+    /// An explicit MT.
+    Explicit(&'a ExplicitMt),
+}
+
+impl<'a> From<&'a Mt> for MtRef<'a> {
+    fn from(mt: &'a Mt) -> Self {
+        match mt {
+            Mt::Edge(mt) => Self::Edge(mt),
+            Mt::Explicit(mt) => Self::Explicit(mt),
+        }
+    }
+}
+
+impl<'a> From<&'a EdgeMt> for MtRef<'a> {
+    fn from(mt: &'a EdgeMt) -> Self {
+        Self::Edge(mt)
+    }
+}
+
+impl<'a> From<&'a ExplicitMt> for MtRef<'a> {
+    fn from(mt: &'a ExplicitMt) -> Self {
+        Self::Explicit(mt)
+    }
+}
+
+impl MtRef<'_> {
+    /// What is known of the MT as a whole.
+    pub fn info(&self) -> &MtInfo {
+        match self {
+            Self::Edge(mt) => mt.info(),
+            Self::Explicit(mt) => mt.info(),
+        }
+    }
+
+    /// The base mesh.
+    pub fn base(&self) -> &BaseMesh {
+        match self {
+            Self::Edge(mt) => mt.base(),
+            Self::Explicit(mt) => mt.base_mesh(),
+        }
+    }
+
+    /// Number of updates so far.
+    pub fn updates(&self) -> u32 {
+        match self {
+            Self::Edge(mt) => mt.updates(),
+            Self::Explicit(mt) => mt.updates(),
+        }
+    }
+}

@@ -3,10 +3,10 @@
 use super::ExplicitMt;
 use super::UpdateId;
 use super::VertexId;
+use super::taken::Faces;
+use super::taken::faces;
 use crate::geom::orient3d;
-use crate::mesh::FACES;
 use std::collections::BTreeSet;
-use std::collections::HashMap;
 use std::fmt;
 
 /// What is wrong with an MT. `update` is the first where it shows; none stands for the base mesh.
@@ -60,50 +60,6 @@ impl fmt::Display for MtFault {
 }
 
 impl std::error::Error for MtFault {}
-
-/// The faces of a set of tetrahedra: how often each is used from either side.
-#[derive(Default)]
-struct Faces(HashMap<[u32; 3], [u8; 2]>);
-
-impl Faces {
-    /// Adds the faces of a tetrahedron. False if one of them is taken on that side.
-    fn add(&mut self, tet: &[u32; 4]) -> bool {
-        faces(tet).all(|(face, side)| {
-            let uses = self.0.entry(face).or_default();
-            uses[side] = uses[side].saturating_add(1);
-            uses[side] == 1
-        })
-    }
-
-    fn remove(&mut self, tet: &[u32; 4]) {
-        for (face, side) in faces(tet) {
-            let uses = self.0.entry(face).or_default();
-            uses[side] = uses[side].saturating_sub(1);
-            if *uses == [0, 0] {
-                self.0.remove(&face);
-            }
-        }
-    }
-
-    fn has(&self, face: &[u32; 3], side: usize) -> bool {
-        self.0.get(face).is_some_and(|uses| uses[side] > 0)
-    }
-}
-
-/// The four faces: their sorted vertices, and the side of each that the tetrahedron lies on.
-fn faces(tet: &[u32; 4]) -> impl Iterator<Item = ([u32; 3], usize)> + '_ {
-    FACES.iter().map(|face| {
-        let mut sorted = face.map(|i| tet[i]);
-        let mut side = 0;
-        for (i, j) in [(0, 1), (1, 2), (0, 1)] {
-            if sorted[i] > sorted[j] {
-                sorted.swap(i, j);
-                side = 1 - side;
-            }
-        }
-        (sorted, side)
-    })
-}
 
 impl ExplicitMt {
     /// Checks that parents come first and know their children, that errors do not grow along the DAG, and that every

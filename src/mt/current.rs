@@ -16,6 +16,7 @@ use super::VertexId;
 use super::insertion::Cavity;
 use super::ring::LINK_CAPACITY;
 use super::ring::Ring;
+use super::taken::Taken;
 use crate::mesh::FACES;
 use crate::mesh::NONE;
 use std::ops::Range;
@@ -47,6 +48,8 @@ pub struct CurrentMesh {
     tags: Vec<u32>,
     /// For each tag a tetrahedron that has it, [`NONE`] if none does: the last that got it.
     place_of: Vec<u32>,
+    /// What is taken, for kinds of MT whose updates are spelled out.
+    pub(super) taken: Option<Box<Taken>>,
     free_vertices: Vec<u32>,
     free_tets: Vec<u32>,
     /// `epoch << MARK_BITS | index in the star` of the last star that each tetrahedron was in.
@@ -128,6 +131,7 @@ impl CurrentMesh {
             fields: info.fields.len(),
             tags: Vec::new(),
             place_of: Vec::new(),
+            taken: None,
             free_vertices: Vec::new(),
             free_tets: Vec::new(),
             marks: vec![0; base.tets.len()],

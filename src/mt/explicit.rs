@@ -105,7 +105,7 @@ impl Counts {
     }
 }
 
-/// Most tetrahedra that an explicit MT can number.
+/// Most tetrahedra, and most vertices, that an explicit MT can number.
 pub(super) const MAX_TETS: usize = 1 << 31;
 
 impl ExplicitMt {
@@ -158,8 +158,9 @@ impl ExplicitMt {
         let mut removed = new.removed.to_vec();
         removed.sort_unstable();
         let there = removed.iter().all(|&t| self.remover.get(t as usize) == Some(&NONE));
-        let few = self.tets.len() + new.inserted.len() <= MAX_TETS;
-        if !there || !few || removed.windows(2).any(|pair| pair[0] == pair[1]) || new.inserted.is_empty() {
+        let few = self.tets.len() + new.inserted.len() <= MAX_TETS && old + new.positions.len() <= MAX_TETS;
+        let twice = removed.windows(2).any(|pair| pair[0] == pair[1]);
+        if !there || !few || twice || removed.is_empty() || new.inserted.is_empty() {
             return Err(UpdateError::Cavity { update });
         }
         let mut parents: Vec<u32> = removed.iter().filter_map(|&t| self.creator(t)).map(|u| u.0).collect();

@@ -9,6 +9,7 @@ mod base;
 mod bits;
 mod check;
 mod collapse;
+mod convert;
 mod current;
 mod error;
 mod explicit;
@@ -22,11 +23,13 @@ mod stats;
 mod vertex;
 #[cfg(feature = "build")]
 mod vertex_from;
+mod taken;
 
-pub use any::Mt;
+pub use any::{Mt, MtRef};
 pub use base::{BaseMesh, BaseMeshError, MAX_FIELD_BITS, MAX_UPDATES};
 pub use check::MtFault;
 pub use collapse::{EdgeMt, MAX_LINK, MAX_STAR, VertexSplit};
+pub use convert::ConvertError;
 pub use current::{CurrentMesh, MeshChanges};
 pub use error::{ErrorCode, UpdateError};
 pub use explicit::{ExplicitMt, ExplicitUpdate};
@@ -58,6 +61,20 @@ pub enum MtKind {
     Vertex,
     /// Updates of any kind, every tetrahedron spelled out [§3].
     Explicit,
+}
+
+impl MtKind {
+    /// All kinds.
+    pub const ALL: [Self; 3] = [Self::Edge, Self::Vertex, Self::Explicit];
+
+    /// The kind in one word: `edge`, `vertex` or `explicit`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Edge => "edge",
+            Self::Vertex => "vertex",
+            Self::Explicit => "explicit",
+        }
+    }
 }
 
 /// A scalar field of an MT: name, range, and the lattice that its values live on.

@@ -1,5 +1,6 @@
 //! Updates of an explicit MT on the current mesh [§3]: tetrahedra are looked up, and the faces of old and new ones
-//! matched. Slow next to the compact structures, but it works for updates of every kind.
+//! matched. Slow next to the compact structures, but it works for updates of every kind, of any size: an update of n
+//! tetrahedra takes n log n.
 //!
 //! In the current mesh, the tag of a tetrahedron is its number in the MT.
 
@@ -16,7 +17,8 @@ use super::UpdateError;
 use super::UpdateId;
 use super::VertexId;
 use super::current::Labels;
-use crate::mesh::FACES;
+use super::taken::Taken;
+use super::taken::faces;
 use crate::mesh::NONE;
 
 impl ExplicitMt {
@@ -30,7 +32,8 @@ impl ExplicitMt {
     }
 }
 
-/// Replaces the tetrahedra in the slots `old` by those of `mt` that are numbered `new`.
+/// Replaces the tetrahedra in the slots `old` by those of `mt` that are numbered `new`. The mesh stays a mesh, or as
+/// it is: no face is taken twice from one side, and only what was next to the old ones gets other neighbours.
 fn replace(
     mt: &ExplicitMt,
     mesh: &mut CurrentMesh,
@@ -39,67 +42,85 @@ fn replace(
     new: &[u32],
 ) -> Result<(), UpdateError> {
     let torn = UpdateError::Cavity { update };
-    let corners: Vec<[u32; 4]> = new.iter().map(|&t| mt.tets()[t as usize]).collect();
-    let sorted = |mut v: Vec<u32>| {
-        v.sort_unstable();
-        v.dedup();
-        v
-    };
-    let old_vertices =
-        sorted(old.iter().flat_map(|&t| mesh.tets[t as usize]).map(|s| mesh.vertex(s).0).collect());
-    let new_vertices = sorted(corners.iter().flatten().copied().collect());
-    let added: Vec<u32> =
-        new_vertices.iter().copied().filter(|v| old_vertices.binary_search(v).is_err()).collect();
+    let before: Vec<[u32; 4]> =
+        old.iter().map(|&t| mesh.tets[t as usize].map(|slot| mesh.vertex(slot).0)).collect();
+    let after: Vec<[u32; 4]> = new.iter().map(|&t| mt.tets()[t as usize]).collect();
+    let (from, to) = (vertices_of(&before), vertices_of(&after));
+    let gone: Vec<u32> = from.iter().copied().filter(|v| to.binary_search(v).is_err()).collect();
+    let added: Vec<u32> = to.iter().copied().filter(|v| from.binary_search(v).is_err()).collect();
     // A vertex that comes must not be there already: the mesh would touch itself there.
     if added.iter().any(|&v| mesh.slot(VertexId(v)).is_some()) {
         return Err(torn);
     }
-    let gone: Vec<u32> =
-        old_vertices.iter().copied().filter(|v| new_vertices.binary_search(v).is_err()).collect();
-    // Every face of the old tetrahedra that borders on the rest, with what lies beyond.
-    let mut sides: Vec<([u32; 3], u32, usize)> = Vec::new();
-    for (i, tet) in corners.iter().enumerate() {
-        sides.extend((0..4).map(|f| (sorted_face(*tet, f), i as u32, f)));
+    let beyond = beyond(mesh, old, &before).ok_or(torn.clone())?;
+    let Some(mut taken) = mesh.taken.take() else { return Err(torn) };
+    let mut meets = None;
+    if taken.exchange(&before, &after) {
+        // A vertex that goes must not be one of what stays.
+        let torn_off = gone.iter().any(|&v| taken.has_vertex(v));
+        meets = meet(&after, &beyond, &taken).filter(|_| !torn_off);
+        if meets.is_none() {
+            taken.undo(&before, &after);
+        }
     }
-    sides.sort_unstable();
-    let mut beyond: Vec<([u32; 3], u32, usize)> = Vec::new();
-    for &t in old {
-        let (tet, around) = (mesh.tets[t as usize].map(|s| mesh.vertex(s).0), mesh.neighbors[t as usize]);
-        for f in (0..4).filter(|&f| around[f] != NONE && !old.contains(&around[f])) {
-            let back = mesh.neighbors[around[f] as usize].iter().position(|&n| n == t);
-            beyond.push((sorted_face(tet, f), around[f], back.ok_or(torn.clone())?));
+    mesh.taken = Some(taken);
+    perform(mt, mesh, old, new, &meets.ok_or(torn)?, [&gone, &added]);
+    Ok(())
+}
+
+/// The vertices of these tetrahedra, ascending.
+fn vertices_of(tets: &[[u32; 4]]) -> Vec<u32> {
+    let mut vertices = tets.as_flattened().to_vec();
+    vertices.sort_unstable();
+    vertices.dedup();
+    vertices
+}
+
+/// A face seen from a tetrahedron: its sorted vertices and the side that the tetrahedron is on.
+type Side = ([u32; 3], usize);
+
+/// The faces between the tetrahedra in the slots `old`, called `names`, and the rest of the mesh, as seen from the
+/// rest: with the slot there, and which of its neighbours is the old one. Ascending.
+fn beyond(mesh: &CurrentMesh, old: &[u32], names: &[[u32; 4]]) -> Option<Vec<(Side, u32, usize)>> {
+    let mut leave = old.to_vec();
+    leave.sort_unstable();
+    let mut beyond = Vec::new();
+    for (&t, name) in old.iter().zip(names) {
+        for ((face, side), n) in faces(name).zip(mesh.neighbors[t as usize]) {
+            if n != NONE && leave.binary_search(&n).is_err() {
+                let back = mesh.neighbors[n as usize].iter().position(|&other| other == t)?;
+                beyond.push(((face, 1 - side), n, back));
+            }
         }
     }
     beyond.sort_unstable();
-    // What each face of the new tetrahedra meets: another new one, or one beyond.
-    let mut meets = vec![[Meets::Nothing; 4]; new.len()];
-    let mut rest = sides.as_slice();
+    Some(beyond)
+}
+
+/// What every face of the new tetrahedra meets: another new one, one beyond, or nothing. None if they leave a face of
+/// what is beyond bare, or touch what they did not border on. `taken` is that of the mesh with them in it.
+fn meet(new: &[[u32; 4]], beyond: &[(Side, u32, usize)], taken: &Taken) -> Option<Vec<[Meets; 4]>> {
+    let mut sides: Vec<(Side, u32)> = Vec::with_capacity(4 * new.len());
+    for (i, tet) in (0..).zip(new) {
+        sides.extend(faces(tet).map(|side| (side, i)));
+    }
+    sides.sort_unstable();
     let mut outside = 0;
-    while let [(face, i, f), tail @ ..] = rest {
-        let same = 1 + tail.iter().take_while(|(other, ..)| other == face).count();
-        let twin = &rest[..same];
-        rest = &rest[same..];
-        let out = beyond.binary_search_by_key(face, |(other, ..)| *other).ok();
-        match (twin, out) {
-            ([_], None) => {}
-            ([_], Some(at)) => {
-                meets[*i as usize][*f] = Meets::Old(beyond[at].1, beyond[at].2);
+    let mut meets = vec![[Meets::Nothing; 4]; new.len()];
+    for (tet, meets) in new.iter().zip(&mut meets) {
+        for ((face, side), meets) in faces(tet).zip(meets) {
+            let across = (face, 1 - side);
+            if let Ok(at) = sides.binary_search_by_key(&across, |&(side, _)| side) {
+                *meets = Meets::New(sides[at].1);
+            } else if let Ok(at) = beyond.binary_search_by_key(&across, |&(side, ..)| side) {
+                *meets = Meets::Old(beyond[at].1, beyond[at].2);
                 outside += 1;
+            } else if taken.has_face(&face, 1 - side) {
+                return None;
             }
-            ([_, (_, j, g)], None) if is_mirrored(&corners, (*i, *f), (*j, *g)) => {
-                meets[*i as usize][*f] = Meets::New(*j);
-                meets[*j as usize][*g] = Meets::New(*i);
-            }
-            _ => return Err(torn),
         }
     }
-    // The rest of the mesh must find a neighbour wherever it had one, and a vertex that goes must not be its own.
-    let kept = |v: &u32| beyond.iter().any(|(face, ..)| face.contains(v));
-    if outside != beyond.len() || gone.iter().any(kept) {
-        return Err(torn);
-    }
-    perform(mt, mesh, old, new, &meets, [&gone, &added]);
-    Ok(())
+    (outside == beyond.len()).then_some(meets)
 }
 
 /// What lies across a face of a new tetrahedron.
@@ -155,19 +176,6 @@ fn perform(
     mesh.touch(&slots);
 }
 
-fn sorted_face(tet: [u32; 4], f: usize) -> [u32; 3] {
-    let mut face = FACES[f].map(|k| tet[k]);
-    face.sort_unstable();
-    face
-}
-
-/// Whether two tetrahedra see the face that they share from its two sides.
-fn is_mirrored(corners: &[[u32; 4]], (i, f): (u32, usize), (j, g): (u32, usize)) -> bool {
-    let [a, b] = [(i, f), (j, g)].map(|(t, f)| FACES[f].map(|k| corners[t as usize][k]));
-    // An odd permutation of three is a reversal of some rotation.
-    (0..3).any(|r| [b[r], b[(r + 2) % 3], b[(r + 1) % 3]] == a)
-}
-
 impl MultiTessellation for ExplicitMt {
     fn info(&self) -> &MtInfo {
         self.info()
@@ -188,6 +196,7 @@ impl MultiTessellation for ExplicitMt {
     fn start(&self) -> Result<CurrentMesh, BaseMeshError> {
         let mut mesh = CurrentMesh::new(self.info(), self.base_mesh())?;
         mesh.tag_all(ExplicitMt::base(self));
+        mesh.taken = Some(Box::new(Taken::by(&self.base_mesh().tets)));
         Ok(mesh)
     }
 

@@ -1,5 +1,6 @@
 //! What an MT is like and what it costs to store, in the paper's terms [§6, Table 1].
 
+use super::CurrentMesh;
 use super::MultiTessellation;
 use super::explicit::Counts;
 use super::replay::ReplayError;
@@ -41,6 +42,8 @@ pub struct MtStats {
     pub indexed_bytes: u64,
     /// The reference mesh alone, with four neighbours for each tetrahedron as well.
     pub adjacency_bytes: u64,
+    /// The box around the reference mesh, on the lattice: its lowest and its highest corner.
+    pub bounds: [[i32; 3]; 2],
 }
 
 impl MtStats {
@@ -112,5 +115,16 @@ pub fn stats(mt: &impl MultiTessellation) -> Result<MtStats, ReplayError> {
         explicit_bytes: counts.bytes(),
         indexed_bytes,
         adjacency_bytes: indexed_bytes + 16 * tetrahedra,
+        bounds: bounds(&mesh),
     })
+}
+
+/// The box around a mesh; around nothing, a point.
+fn bounds(mesh: &CurrentMesh) -> [[i32; 3]; 2] {
+    let used = (0..mesh.tet_slots() as u32).filter_map(|t| mesh.tet(t)).flatten();
+    let corners = used.map(|slot| mesh.positions()[slot as usize]);
+    let both = corners.map(|p| [p, p]).reduce(|[low, high], [p, _]| {
+        [[0, 1, 2].map(|i| low[i].min(p[i])), [0, 1, 2].map(|i| high[i].max(p[i]))]
+    });
+    both.unwrap_or_default()
 }

@@ -1,0 +1,204 @@
+//! From one kind of MT to another that can hold the same updates.
+
+use super::EdgeMt;
+use super::ExplicitMt;
+use super::MAX_STAR;
+use super::Mt;
+use super::MtInfo;
+use super::MtKind;
+use super::MultiTessellation;
+use super::ReplayError;
+use super::UpdateError;
+use super::UpdateId;
+use super::VertexId;
+use super::VertexSplit;
+use super::replay::canonical;
+use std::fmt;
+
+/// Why an MT cannot be one of another kind.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ConvertError {
+    /// The two kinds are made of different updates.
+    Kinds {
+        /// The kind that it is.
+        from: MtKind,
+        /// The kind that it should become.
+        to: MtKind,
+    },
+    /// An update is not one that the other kind can hold.
+    Update {
+        /// The update.
+        update: u32,
+        /// What is in the way.
+        why: &'static str,
+    },
+    /// The MT is damaged.
+    Damaged(ReplayError),
+}
+
+impl fmt::Display for ConvertError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Kinds { from, to } => write!(
+                f,
+                "an MT of kind {} has other updates than one of kind {}: build it again from the mesh, with \
+                 `--kind {}`",
+                from.name(),
+                to.name(),
+                to.name()
+            ),
+            Self::Update { update, why } => write!(f, "update {update} does not fit the other kind: {why}"),
+            Self::Damaged(error) => write!(f, "the MT is damaged: {error}"),
+        }
+    }
+}
+
+impl std::error::Error for ConvertError {}
+
+impl From<ReplayError> for ConvertError {
+    fn from(error: ReplayError) -> Self {
+        Self::Damaged(error)
+    }
+}
+
+impl Mt {
+    /// The same updates as an MT of another kind.
+    ///
+    /// # Errors
+    /// If that kind cannot hold them.
+    pub fn convert(&self, to: MtKind) -> Result<Self, ConvertError> {
+        let from = self.info().kind;
+        match (self, to) {
+            _ if from == to => Ok(self.clone()),
+            (_, MtKind::Explicit) => Ok(Self::Explicit(ExplicitMt::of(self)?)),
+            (Self::Explicit(mt), MtKind::Edge) => Ok(Self::Edge(EdgeMt::from_explicit(mt)?)),
+            _ => Err(ConvertError::Kinds { from, to }),
+        }
+    }
+}
+
+impl EdgeMt {
+    /// The compact MT of the same updates, all of which must be vertex splits by the midpoint rule that create the
+    /// vertices that come next.
+    ///
+    /// # Errors
+    /// The first update that is not.
+    pub fn from_explicit(explicit: &ExplicitMt) -> Result<Self, ConvertError> {
+        let info = MtInfo { kind: MtKind::Edge, ..explicit.info().clone() };
+        let mut mt = Self::new(info, explicit.base_mesh().clone());
+        for u in (0..explicit.updates()).map(UpdateId) {
+            let refused = |why| ConvertError::Update { update: u.0, why };
+            let split = as_split(explicit, &mt, u).map_err(refused)?;
+            mt.push(&split.borrowed()).map_err(|_| refused("its vertex, offset or error is not allowed"))?;
+        }
+        // Masks tell which tetrahedra a split makes only together with the mesh.
+        let made = ExplicitMt::of(&mt).map_err(not_a_split)?;
+        let differs = |u: &UpdateId| !same(&made, explicit, *u);
+        match (0..explicit.updates()).map(UpdateId).find(differs) {
+            Some(u) => Err(ConvertError::Update { update: u.0, why: NOT_A_SPLIT }),
+            None => Ok(mt),
+        }
+    }
+}
+
+const NOT_A_SPLIT: &str = "it is not the split of a vertex in two";
+
+/// Splits that cannot be applied are not those of the explicit MT.
+fn not_a_split(error: ReplayError) -> ConvertError {
+    use UpdateError as E;
+    let ReplayError::Update(fault) = &error else { return error.into() };
+    let update = match *fault {
+        E::Vertex { update, .. }
+        | E::OffLattice { update }
+        | E::Cavity { update }
+        | E::Mask { update }
+        | E::Inverted { update }
+        | E::Star { update }
+        | E::Unannounced { update }
+        | E::Error { update } => update,
+    };
+    ConvertError::Update { update, why: NOT_A_SPLIT }
+}
+
+/// Whether update `u` is the same in both, by the tetrahedra that it removes and inserts.
+fn same(a: &ExplicitMt, b: &ExplicitMt, u: UpdateId) -> bool {
+    let inserted = |mt: &ExplicitMt| {
+        let range = mt.inserted(u);
+        mt.tets()[range.start as usize..range.end as usize].to_vec()
+    };
+    a.removed(u) == b.removed(u) && inserted(a) == inserted(b)
+}
+
+/// A vertex split that owns its parts.
+struct Split {
+    vertex: VertexId,
+    offset: [i32; 3],
+    field_offsets: Vec<i32>,
+    mask: u64,
+    error: super::ErrorCode,
+}
+
+impl Split {
+    fn borrowed(&self) -> VertexSplit<'_> {
+        let Self { vertex, offset, ref field_offsets, mask, error } = *self;
+        VertexSplit { vertex, offset, field_offsets, mask, error }
+    }
+}
+
+/// Update `u` as a split, as far as its own tetrahedra tell; `mt` holds the ones before it.
+fn as_split(explicit: &ExplicitMt, mt: &EdgeMt, u: UpdateId) -> Result<Split, &'static str> {
+    let removed: Vec<[u32; 4]> = explicit.removed(u).iter().map(|&t| explicit.tets()[t as usize]).collect();
+    let range = explicit.inserted(u);
+    let inserted = &explicit.tets()[range.start as usize..range.end as usize];
+    let created = mt.created(u);
+    let knows = |v: VertexId| v.0 < explicit.vertices() && inserted.iter().any(|tet| tet.contains(&v.0));
+    if !created.into_iter().all(knows) {
+        return Err("it does not create the two vertices that come next");
+    }
+    if removed.len() > MAX_STAR {
+        return Err("it removes more than 64 tetrahedra");
+    }
+    let vertex = vanished(&removed, inserted).ok_or(NOT_A_SPLIT)?;
+    let [near, far] = created;
+    let offset = midpoint(&explicit.position(vertex), &explicit.position(near), &explicit.position(far));
+    let levels = midpoint(explicit.levels(vertex), explicit.levels(near), explicit.levels(far));
+    let (Some(offset), Some(field_offsets)) = (offset, levels) else {
+        return Err("the vertex that it splits is not half way between those that it creates");
+    };
+    let offset = [offset[0], offset[1], offset[2]];
+    let mask = mask(&removed, inserted, vertex.0, far.0);
+    Ok(Split { vertex, offset, field_offsets, mask, error: explicit.error(u) })
+}
+
+/// The one vertex that all removed tetrahedra have and no inserted one.
+fn vanished(removed: &[[u32; 4]], inserted: &[[u32; 4]]) -> Option<VertexId> {
+    let in_all = |v: &&u32| removed.iter().all(|tet| tet.contains(v));
+    let vertex = *removed.first()?.iter().filter(in_all).find(|v| !inserted.as_flattened().contains(v))?;
+    Some(VertexId(vertex))
+}
+
+/// `near − far` of each coordinate or level if `whole` is their midpoint, rounded as splits do.
+fn midpoint(whole: &[i32], near: &[i32], far: &[i32]) -> Option<Vec<i32>> {
+    let halves = near.iter().zip(far).map(|(a, b)| a - b);
+    let offsets: Vec<i32> = halves.collect();
+    let fits = |((v, b), d): ((&i32, &i32), &i32)| *v == b + (d >> 1);
+    whole.iter().zip(far).zip(&offsets).all(fits).then_some(offsets)
+}
+
+/// Bit `i` is 1 where tetrahedron `i` of the star, in the order of the faces opposite `vertex`, goes to `far`.
+fn mask(removed: &[[u32; 4]], inserted: &[[u32; 4]], vertex: u32, far: u32) -> u64 {
+    let mut star: Vec<([u32; 3], bool)> = removed
+        .iter()
+        .map(|tet| {
+            let at_far = canonical(tet.map(|v| if v == vertex { far } else { v }));
+            let mut sorted = *tet;
+            sorted.sort_unstable();
+            let mut rest = sorted.into_iter().filter(|&v| v != vertex);
+            let face = [(); 3].map(|()| rest.next().unwrap_or(vertex));
+            (face, inserted.binary_search(&at_far).is_ok())
+        })
+        .collect();
+    star.sort_unstable();
+    (0..).zip(star).fold(0, |mask, (i, (_, is_far))| mask | u64::from(is_far) << i)
+}
