@@ -3,7 +3,8 @@
 
 use crate::format::Decoder;
 use crate::format::FormatError;
-use crate::mt::EdgeMt;
+use crate::mt::Mt;
+use crate::mt::MultiTessellation;
 use crate::refine::Request;
 use crate::session::Session;
 use crate::session::SessionError;
@@ -103,7 +104,7 @@ fn once(
     Ok(times)
 }
 
-fn decode(bytes: &[u8]) -> Result<Option<EdgeMt>, FormatError> {
+fn decode(bytes: &[u8]) -> Result<Option<Mt>, FormatError> {
     let mut decoder = Decoder::default();
     decoder.feed(bytes)?;
     decoder.finish()?;

@@ -8,8 +8,9 @@ use crate::format::Decoder;
 use crate::format::FormatError;
 use crate::format::Limits;
 use crate::mt::CurrentMesh;
-use crate::mt::EdgeMt;
+use crate::mt::Mt;
 use crate::mt::MtInfo;
+use crate::mt::MultiTessellation;
 use crate::refine::Front;
 use crate::refine::LodCriterion;
 use crate::refine::RefineStats;
@@ -123,11 +124,11 @@ impl Session {
 
     /// What is known of the MT; none until the base mesh is there.
     pub fn info(&self) -> Option<&MtInfo> {
-        self.mt().map(EdgeMt::info)
+        self.mt().map(Mt::info)
     }
 
     /// The MT as far as it has arrived; none until the base mesh is there.
-    pub fn mt(&self) -> Option<&EdgeMt> {
+    pub fn mt(&self) -> Option<&Mt> {
         self.front.as_ref().and(self.decoder.mt())
     }
 

@@ -27,6 +27,7 @@ use crate::mesh;
 use crate::mesh::EDGES;
 use crate::mesh::TetMesh;
 use crate::mesh::Topology;
+use crate::mt::EdgeMt;
 use crate::mt::ErrorCode;
 use crate::mt::MAX_UPDATES;
 use crate::mt::MtInfo;
@@ -43,7 +44,7 @@ pub fn edge_mt(
     mesh: &TetMesh,
     config: &BuildConfig,
     progress: OnProgress<'_>,
-) -> Result<BuildResult, BuildError> {
+) -> Result<BuildResult<EdgeMt>, BuildError> {
     if mesh.positions.len() > MAX_UPDATES as usize {
         return Err(BuildError::TooLarge);
     }

@@ -1,6 +1,7 @@
 //! From a tetrahedral mesh to a Multi-Tessellation, offline.
 //!
-//! [`edge_mt`] collapses edges to their midpoints, cheapest first, until nothing can be collapsed any more; the
+//! [`build`] makes an MT of any kind by any method that goes with it; [`edge_mt`] is the one behind edge-based MTs: it
+//! collapses edges to their midpoints, cheapest first, until nothing can be collapsed any more; the
 //! collapses in reverse are the updates of an edge-based MT [§2.1]. The cost of a collapse is the largest error it
 //! leads to, evaluated exactly at every reference vertex that its star covers. The model is the greedy scheme of
 //! Cignoni, Costanza, Montani, Rocchini, Scopigno (*Simplification of tetrahedral meshes with accurate error
@@ -31,6 +32,7 @@ mod history;
 mod hole;
 mod in_sphere;
 mod insert;
+mod method;
 mod plan;
 mod quantize;
 mod sequence;
@@ -41,9 +43,15 @@ mod work_mesh;
 pub use collapse::edge_mt;
 pub use delaunay::delaunay;
 pub use vertex::{Criterion, decimated_mt, inserted_mt};
+pub use method::Criterion;
+pub use method::Method;
 
 use crate::mesh::MeshError;
-use crate::mt::EdgeMt;
+use crate::mesh::TetMesh;
+use crate::mt::ConvertError;
+use crate::mt::Mt;
+use crate::mt::MtKind;
+use crate::mt::MultiTessellation;
 use crate::mt::UpdateError;
 use std::fmt;
 use std::ops::ControlFlow;
@@ -51,6 +59,12 @@ use std::ops::ControlFlow;
 /// How to build.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BuildConfig {
+    /// The kind of MT.
+    pub kind: MtKind,
+    /// How it is built; not every method makes every kind: see [`BuildConfig::check`].
+    pub method: Method,
+    /// By what criterion vertices are removed or inserted; [`Method::Collapse`] has its own.
+    pub criterion: Criterion,
     /// Names of the fields to keep, in this order; the first one of the mesh if empty.
     pub fields: Vec<String>,
     /// Bits of the position lattice, 1 to 30. If not given: 16 where that keeps every cell positive, else as few as
@@ -66,7 +80,15 @@ pub struct BuildConfig {
 
 impl Default for BuildConfig {
     fn default() -> Self {
-        Self { fields: Vec::new(), position_bits: None, field_bits: 16, displacement: 0.2 }
+        Self {
+            kind: MtKind::Edge,
+            method: Method::Collapse,
+            criterion: Criterion::HalfEdge,
+            fields: Vec::new(),
+            position_bits: None,
+            field_bits: 16,
+            displacement: 0.2,
+        }
     }
 }
 
@@ -86,9 +108,9 @@ pub type OnProgress<'a> = &'a mut dyn FnMut(BuildProgress) -> ControlFlow<()>;
 
 /// An MT and how it came about.
 #[derive(Clone, Debug)]
-pub struct BuildResult {
+pub struct BuildResult<M = Mt> {
     /// The MT, complete and applied once from base to reference mesh.
-    pub mt: EdgeMt,
+    pub mt: M,
     /// Counts.
     pub summary: BuildSummary,
 }
@@ -116,6 +138,20 @@ pub struct BuildSummary {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum BuildError {
+    /// Kind, method and criterion do not go together.
+    Combination {
+        /// The two that do not.
+        which: [&'static str; 2],
+        /// What goes with what.
+        instead: &'static str,
+    },
+    /// No builder makes this yet.
+    NotYet {
+        /// What was asked for.
+        what: &'static str,
+    },
+    /// The MT could not be converted to the kind that was asked for.
+    Convert(ConvertError),
     /// The mesh has no tetrahedra.
     Empty,
     /// The mesh has no point field.
@@ -173,6 +209,11 @@ pub enum BuildError {
 impl fmt::Display for BuildError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::Combination { which: [one, other], instead } => {
+                write!(f, "{one} does not go with {other}: {instead}")
+            }
+            Self::NotYet { what } => write!(f, "{what} cannot be built yet"),
+            Self::Convert(error) => write!(f, "{error}"),
             Self::Empty => write!(f, "the mesh has no tetrahedra"),
             Self::NoField => {
                 write!(f, "the mesh has no point field: an MT needs at least one scalar at its points")
@@ -214,3 +255,33 @@ impl fmt::Display for BuildError {
 }
 
 impl std::error::Error for BuildError {}
+
+/// Builds an MT of `mesh`, which must be valid: see [`crate::mesh::repair`].
+///
+/// Works on one thread and calls `progress` now and then.
+///
+/// # Errors
+/// If the configuration contradicts itself, the mesh is not valid, has none of the wanted fields, or does not fit the
+/// lattice; if `progress` breaks the work off.
+pub fn build(
+    mesh: &TetMesh,
+    config: &BuildConfig,
+    progress: OnProgress<'_>,
+) -> Result<BuildResult, BuildError> {
+    config.check()?;
+    let BuildResult { mt, summary } = match config.method {
+        Method::Collapse => {
+            let BuildResult { mt, summary } = edge_mt(mesh, config, progress)?;
+            BuildResult { mt: Mt::from(mt), summary }
+        }
+        Method::Insert | Method::Decimate => {
+            return Err(BuildError::NotYet { what: "an MT of vertex insertions" });
+        }
+    };
+    let mt = if mt.info().kind == config.kind {
+        mt
+    } else {
+        mt.convert(config.kind).map_err(BuildError::Convert)?
+    };
+    Ok(BuildResult { mt, summary })
+}

@@ -12,8 +12,10 @@ use super::header::parse_header;
 use super::payload;
 use super::payload::Metadata;
 use super::read::Reader;
-use crate::mt::EdgeMt;
+use crate::mt::Mt;
 use crate::mt::MtInfo;
+use crate::mt::MtRef;
+use crate::mt::MultiTessellation;
 
 /// Most bytes that are kept allocated between sections.
 const KEPT_BYTES: usize = 1 << 20;
@@ -66,7 +68,7 @@ pub struct Decoder {
     /// Until the base mesh comes; then it is in the MT.
     info: Option<MtInfo>,
     metadata: Metadata,
-    mt: Option<EdgeMt>,
+    mt: Option<Mt>,
     failed: Option<FormatError>,
 }
 
@@ -123,18 +125,18 @@ impl Decoder {
     }
 
     /// The MT as far as it has arrived; none before the base mesh is there.
-    pub fn mt(&self) -> Option<&EdgeMt> {
+    pub fn mt(&self) -> Option<&Mt> {
         self.mt.as_ref()
     }
 
     /// The MT, without the decoder.
-    pub fn into_mt(self) -> Option<EdgeMt> {
+    pub fn into_mt(self) -> Option<Mt> {
         self.mt
     }
 
     /// What the file tells of itself; none before that section is there.
     pub fn info(&self) -> Option<&MtInfo> {
-        self.mt.as_ref().map(EdgeMt::info).or(self.info.as_ref())
+        self.mt.as_ref().map(Mt::info).or(self.info.as_ref())
     }
 
     /// The file's free keys and values, in ascending order of the keys; empty before that section is there.
@@ -149,7 +151,7 @@ impl Decoder {
             complete: matches!(self.stage, Stage::End) && self.failed.is_none(),
             bytes: self.bytes,
             total: self.total,
-            updates: self.mt.as_ref().map_or(0, EdgeMt::updates),
+            updates: self.mt.as_ref().map_or(0, Mt::updates),
         }
     }
 
@@ -258,9 +260,11 @@ impl Decoder {
             (Kind::BASE, info @ Some(_), None) => {
                 let Some(info) = info.take() else { return Ok(()) };
                 let base = payload::read_base(content, &info, &self.limits)?;
-                self.mt = Some(EdgeMt::new(info, base));
+                self.mt = Some(payload::empty(info, base));
             }
-            (Kind::UPDT, _, Some(mt)) => payload::read_updates(content, mt)?,
+            (kind, _, Some(mt)) if kind == payload::section_of(mt.info().kind) => {
+                payload::read_updates(content, mt, &self.limits)?;
+            }
             (Kind::ENDF, _, Some(_)) => return self.end(content),
             (kind, ..) if kind.is_known() => return Err(content.corrupt("a section is out of place")),
             (kind, ..) if kind.is_skippable() => {}
@@ -277,10 +281,13 @@ impl Decoder {
 
     fn end(&mut self, content: Reader<'_>) -> Result<(), FormatError> {
         let totals = payload::read_end(content)?;
-        let updates = self.mt.as_ref().map_or(0, EdgeMt::updates);
+        let updates = self.mt.as_ref().map_or(0, Mt::updates);
         let expected = self.info().map_or(0, |info| info.updates);
         if totals.updates != updates || updates != expected {
             return Err(self.corrupt("updates are missing"));
+        }
+        if let Some(mt) = &self.mt {
+            payload::check_reference(MtRef::from(mt))?;
         }
         if totals.sections != self.sections || totals.crc != self.chain.clone().finalize() {
             return Err(self.corrupt("sections are missing or repeated"));

@@ -8,7 +8,7 @@ use super::header::header;
 use super::payload;
 use super::payload::Totals;
 use crate::mt::BaseMeshError;
-use crate::mt::EdgeMt;
+use crate::mt::MtRef;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::io;
@@ -70,7 +70,7 @@ impl std::error::Error for EncodeError {
 ///
 /// # Errors
 /// If the MT is not complete, or could not be read back.
-pub fn encode(mt: &EdgeMt, options: &EncodeOptions) -> Result<Vec<u8>, EncodeError> {
+pub fn encode<'a>(mt: impl Into<MtRef<'a>>, options: &EncodeOptions) -> Result<Vec<u8>, EncodeError> {
     let mut bytes = Vec::new();
     encode_to(mt, options, &mut bytes)?;
     Ok(bytes)
@@ -80,11 +80,12 @@ pub fn encode(mt: &EdgeMt, options: &EncodeOptions) -> Result<Vec<u8>, EncodeErr
 ///
 /// # Errors
 /// As [`encode`], and when `writer` fails.
-pub fn encode_to(
-    mt: &EdgeMt,
+pub fn encode_to<'a>(
+    mt: impl Into<MtRef<'a>>,
     options: &EncodeOptions,
     writer: &mut dyn io::Write,
 ) -> Result<u64, EncodeError> {
+    let mt = mt.into();
     check(mt)?;
     // The header tells the size of all, so everything is encoded twice: that is cheaper than keeping it.
     let mut total = HEADER_BYTES as u64;
@@ -101,20 +102,22 @@ pub fn encode_to(
 }
 
 /// What a decoder would refuse must not be written.
-fn check(mt: &EdgeMt) -> Result<(), EncodeError> {
+fn check(mt: MtRef<'_>) -> Result<(), EncodeError> {
     let info = mt.info();
     if mt.updates() != info.updates {
         return Err(EncodeError::Incomplete { updates: mt.updates(), expected: info.updates });
     }
     mt.base().check(info).map_err(EncodeError::Base)?;
-    payload::check_counts(info, mt.base().positions.len() as u64).map_err(EncodeError::Base)
+    payload::check_counts(info, mt.base().positions.len() as u64)
+        .and_then(|()| payload::check_reference(mt))
+        .map_err(EncodeError::Base)
 }
 
 /// Takes the head and the payload of a section.
 type Sink<'a> = &'a mut dyn FnMut(&[u8], &[u8]) -> io::Result<()>;
 
 /// Gives all sections to `sink`, in order.
-fn sections(mt: &EdgeMt, options: &EncodeOptions, sink: Sink<'_>) -> Result<(), EncodeError> {
+fn sections(mt: MtRef<'_>, options: &EncodeOptions, sink: Sink<'_>) -> Result<(), EncodeError> {
     let mut totals = Totals { updates: mt.updates(), sections: 0, crc: 0 };
     let mut chain = crc32fast::Hasher::new();
     let mut put = |kind, payload: &mut Vec<u8>| {
@@ -140,7 +143,7 @@ fn sections(mt: &EdgeMt, options: &EncodeOptions, sink: Sink<'_>) -> Result<(), 
     while first < mt.updates() {
         let end = mt.updates().min(first + BLOCK_UPDATES);
         payload::write_updates(&mut payload, mt, first, end);
-        totals = put(Kind::UPDT, &mut payload)?;
+        totals = put(payload::section_of(mt.info().kind), &mut payload)?;
         first = end;
     }
     payload::write_end(&mut payload, totals);

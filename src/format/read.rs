@@ -24,6 +24,11 @@ impl<'a> Reader<'a> {
         FormatError::Corrupt { offset: self.offset, what }
     }
 
+    /// An error at the current place.
+    pub fn unsupported(&self, what: &'static str) -> FormatError {
+        FormatError::UnsupportedFeature { offset: self.offset, what }
+    }
+
     fn take(&mut self, count: usize) -> Result<&'a [u8]> {
         let Some((head, tail)) = self.bytes.split_at_checked(count) else {
             return Err(self.corrupt("the section is shorter than its content"));

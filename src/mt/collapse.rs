@@ -16,6 +16,7 @@
 use super::BaseMesh;
 use super::ErrorCode;
 use super::MtInfo;
+use super::MtKind;
 use super::UpdateError;
 use super::UpdateId;
 use super::VertexId;
@@ -68,7 +69,8 @@ pub struct EdgeMt {
 
 impl EdgeMt {
     /// An MT without updates. `base` must fit `info`: see [`BaseMesh::check`](super::BaseMesh::check).
-    pub fn new(info: MtInfo, base: BaseMesh) -> Self {
+    pub fn new(mut info: MtInfo, base: BaseMesh) -> Self {
+        info.kind = MtKind::Edge;
         let split_of = vec![NONE; base.positions.len()];
         let offsets = Offsets::new(info.lattice.bits);
         Self {

@@ -4,7 +4,6 @@ use super::EdgeMt;
 use super::ExplicitMt;
 use super::MAX_STAR;
 use super::Mt;
-use super::MtInfo;
 use super::MtKind;
 use super::MultiTessellation;
 use super::ReplayError;
@@ -85,8 +84,7 @@ impl EdgeMt {
     /// # Errors
     /// The first update that is not.
     pub fn from_explicit(explicit: &ExplicitMt) -> Result<Self, ConvertError> {
-        let info = MtInfo { kind: MtKind::Edge, ..explicit.info().clone() };
-        let mut mt = Self::new(info, explicit.base_mesh().clone());
+        let mut mt = Self::new(explicit.info().clone(), explicit.base_mesh().clone());
         for u in (0..explicit.updates()).map(UpdateId) {
             let refused = |why| ConvertError::Update { update: u.0, why };
             let split = as_split(explicit, &mt, u).map_err(refused)?;

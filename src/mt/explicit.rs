@@ -74,6 +74,8 @@ pub struct ExplicitMt {
     positions: Vec<[i32; 3]>,
     levels: Vec<i32>,
     tets: Vec<[u32; 4]>,
+    /// First vertex that appears with each update, and the end of all.
+    created: Vec<u32>,
     /// First inserted tetrahedron of each update, and the end of all.
     inserted: Vec<u32>,
     removed: Rows,
@@ -110,13 +112,15 @@ pub(super) const MAX_TETS: usize = 1 << 31;
 
 impl ExplicitMt {
     /// An MT without updates. `base` must fit `info`: see [`BaseMesh::check`].
-    pub fn new(info: MtInfo, base: BaseMesh) -> Self {
+    pub fn new(mut info: MtInfo, base: BaseMesh) -> Self {
+        info.kind = MtKind::Explicit;
         let base_tets = base.tets.len();
         Self {
             info,
             positions: base.positions.clone(),
             levels: base.values.clone(),
             tets: base.tets.iter().map(|&tet| canonical(tet)).collect(),
+            created: vec![base.positions.len() as u32],
             inserted: vec![base_tets as u32],
             removed: Rows::new(),
             parents: Rows::new(),
@@ -169,6 +173,7 @@ impl ExplicitMt {
         self.parents.push(parents);
         self.removed.push(removed);
         self.positions.extend_from_slice(new.positions);
+        self.created.push(self.positions.len() as u32);
         self.levels.extend_from_slice(new.levels);
         let first = self.tets.len();
         self.tets.extend(new.inserted.iter().map(|&tet| canonical(tet)));
@@ -184,8 +189,7 @@ impl ExplicitMt {
     /// # Errors
     /// If one of them cannot be applied.
     pub fn of(mt: &impl MultiTessellation) -> Result<Self, ReplayError> {
-        let info = MtInfo { kind: MtKind::Explicit, ..mt.info().clone() };
-        let mut explicit = Self::new(info, mt.base().clone());
+        let mut explicit = Self::new(mt.info().clone(), mt.base().clone());
         // The tetrahedra of the current mesh, by their vertices.
         let mut live: HashMap<[u32; 4], u32> = explicit.tets.iter().copied().zip(0..).collect();
         let mut failed = Ok(UpdateId(0));
@@ -258,6 +262,22 @@ impl ExplicitMt {
     /// Which tetrahedra make up the base mesh.
     pub fn base(&self) -> Range<u32> {
         0..self.base.tets.len() as u32
+    }
+
+    /// Which vertices appear with `u+`.
+    pub fn created(&self, u: UpdateId) -> Range<u32> {
+        self.created[u.0 as usize]..self.created[u.0 as usize + 1]
+    }
+
+    /// Vertices and tetrahedra of the reference mesh (as far as it is known).
+    pub fn reference_counts(&self) -> [u32; 2] {
+        let mut used = vec![false; self.positions.len()];
+        let mut tets = 0;
+        for (tet, _) in self.tets.iter().zip(&self.remover).filter(|(_, u)| **u == NONE) {
+            tets += 1;
+            tet.iter().for_each(|&v| used[v as usize] = true);
+        }
+        [used.into_iter().filter(|&used| used).count() as u32, tets]
     }
 
     /// Which tetrahedra `u+` inserts.
@@ -355,7 +375,8 @@ impl ExplicitMt {
             + size_of_val(&self.base.tets[..]);
         let vertices = size_of_val(&self.positions[..]) + size_of_val(&self.levels[..]);
         let tets = size_of_val(&self.tets[..]) + size_of_val(&self.remover[..]);
-        let nodes = size_of_val(&self.inserted[..])
+        let nodes = size_of_val(&self.created[..])
+            + size_of_val(&self.inserted[..])
             + self.removed.bytes()
             + self.parents.bytes()
             + size_of_val(&self.errors[..]);

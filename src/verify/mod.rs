@@ -6,6 +6,7 @@
 //!
 //! What is promised and checked, for uniform requests, boxes, isovalues, combinations and budgets:
 //! - **Full circle**: error 0 gives the reference mesh, tetrahedron for tetrahedron, on the lattice; error ∞ the base.
+//!   Where the MT was built from points, the mesh that it gives at error 0 has those points and no others.
 //! - **Valid meshes**: positive tetrahedra, faces shared by at most two, complete and symmetric adjacency, a closed
 //!   boundary, the reference mesh's Euler number, no vertex without a tetrahedron.
 //! - **Error**: within the bound that is reported, or half a level where that is more, at every selected reference
@@ -19,12 +20,12 @@
 
 mod deviation;
 mod mesh_checks;
+mod points;
 mod queries;
 mod same;
 mod triangles;
 
 use crate::mesh::TetMesh;
-use crate::mt::EdgeMt;
 use crate::mt::ErrorCode;
 use crate::mt::MultiTessellation;
 use crate::refine::Criterion;
@@ -52,11 +53,31 @@ pub struct VerifyReport {
 /// No more failures than this are described.
 pub const MAX_FAILURES: usize = 50;
 
-/// Checks `mt` against `input`, the mesh that it was built from (repaired if need be: [`crate::mesh::repair`]).
+/// What the reference mesh of an MT has in common with the input that it was built from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reference {
+    /// Everything: it is the input, tetrahedron for tetrahedron.
+    Mesh,
+    /// The points, and the volume if the input has tetrahedra: it is a triangulation of the points.
+    Points,
+}
+
+/// Checks `mt` against `input`, what it was built from (repaired if need be: [`crate::mesh::repair`]).
 /// `on_progress` is told how many of how many steps are done.
-pub fn run(mt: &EdgeMt, input: &TetMesh, on_progress: &mut dyn FnMut(u32, u32)) -> VerifyReport {
+pub fn run<M: MultiTessellation>(
+    mt: &M,
+    input: &TetMesh,
+    reference: Reference,
+    on_progress: &mut dyn FnMut(u32, u32),
+) -> VerifyReport {
     let mut report = VerifyReport::default();
-    if let Err(failures) = verify(mt, input, on_progress, &mut report) {
+    let verified = match reference {
+        Reference::Mesh => verify(mt, input, on_progress, &mut report),
+        Reference::Points => {
+            points::triangulated(mt, input).and_then(|mesh| verify(mt, &mesh, on_progress, &mut report))
+        }
+    };
+    if let Err(failures) = verified {
         report.failures.push(failures);
     }
     report.valid = report.failures.is_empty();
@@ -64,8 +85,8 @@ pub fn run(mt: &EdgeMt, input: &TetMesh, on_progress: &mut dyn FnMut(u32, u32)) 
 }
 
 /// Failures that leave nothing more to check are returned, the others noted.
-fn verify(
-    mt: &EdgeMt,
+fn verify<M: MultiTessellation>(
+    mt: &M,
     input: &TetMesh,
     on_progress: &mut dyn FnMut(u32, u32),
     report: &mut VerifyReport,
@@ -80,7 +101,8 @@ fn verify(
         on_progress(i, steps);
         let mut front = base.clone();
         let outcome = satisfy(mt, &mut front, query)?;
-        let case = Case { mt, query, front: &front, outcome: &outcome, criterion: query.criterion(mt) };
+        let case =
+            Case { mt, query, front: &front, outcome: &outcome, criterion: query.criterion(mt.info()) };
         case.check(&base, &reference, &deviation, report);
         hashes.push(front.mesh().hash());
         report.queries += 1;
@@ -88,13 +110,13 @@ fn verify(
     walk(mt, base, &queries, &hashes, on_progress, report)
 }
 
-fn fresh(mt: &EdgeMt) -> Result<Front, String> {
+fn fresh(mt: &impl MultiTessellation) -> Result<Front, String> {
     Front::new(mt).map_err(|error| format!("the base mesh: {error}"))
 }
 
-fn satisfy(mt: &EdgeMt, front: &mut Front, query: &Query) -> Result<Outcome, String> {
+fn satisfy(mt: &impl MultiTessellation, front: &mut Front, query: &Query) -> Result<Outcome, String> {
     let request = &query.request;
-    let outcome = front.satisfy(mt, &query.criterion(mt), request.max_tets);
+    let outcome = front.satisfy(mt, &query.criterion(mt.info()), request.max_tets);
     outcome.map_err(|error| format!("{query}: the MT is damaged: {error}"))
 }
 
@@ -106,7 +128,7 @@ fn note(report: &mut VerifyReport, place: &dyn std::fmt::Display, failure: &str)
 
 /// Refines the base mesh to the reference mesh and coarsens it again. Returns what is to hold of every mesh.
 fn check_full_circle(
-    mt: &EdgeMt,
+    mt: &impl MultiTessellation,
     deviation: &Deviation<'_>,
     report: &mut VerifyReport,
 ) -> Result<mesh_checks::Shape, String> {
@@ -132,7 +154,7 @@ fn check_full_circle(
 
 /// Answers all queries again, in an order that jumps about, from the mesh that the query before left.
 fn walk(
-    mt: &EdgeMt,
+    mt: &impl MultiTessellation,
     mut front: Front,
     queries: &[Query],
     hashes: &[u64],
@@ -161,15 +183,15 @@ fn coprime(mut a: usize, mut b: usize) -> bool {
 }
 
 /// One query and its answer.
-struct Case<'a> {
-    mt: &'a EdgeMt,
+struct Case<'a, M> {
+    mt: &'a M,
     query: &'a Query,
     front: &'a Front,
     outcome: &'a Outcome,
     criterion: LodCriterion,
 }
 
-impl Case<'_> {
+impl<M: MultiTessellation> Case<'_, M> {
     fn check(
         &self,
         base: &Front,

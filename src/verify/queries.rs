@@ -2,7 +2,8 @@
 
 use crate::geom::Bounds;
 use crate::mesh::TetMesh;
-use crate::mt::EdgeMt;
+use crate::mt::MtInfo;
+use crate::mt::MultiTessellation;
 use crate::refine::LodCriterion;
 use crate::refine::Request;
 use std::fmt;
@@ -24,15 +25,15 @@ impl Query {
         Self { name: name.to_owned(), request }
     }
 
-    pub fn criterion(&self, mt: &EdgeMt) -> LodCriterion {
-        LodCriterion::new(mt.info(), &self.request)
+    pub fn criterion(&self, info: &MtInfo) -> LodCriterion {
+        LodCriterion::new(info, &self.request)
     }
 }
 
 const ERRORS: [f64; 5] = [0.0, 0.001, 0.01, 0.05, 0.2];
 
 /// All requests for an MT of `input`.
-pub fn of(mt: &EdgeMt, input: &TetMesh) -> Vec<Query> {
+pub fn of(mt: &impl MultiTessellation, input: &TetMesh) -> Vec<Query> {
     let all = Request::default();
     let mut queries = Vec::new();
     let mut add = |what: &str, request: Request| {

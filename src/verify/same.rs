@@ -41,7 +41,7 @@ fn first_difference(ours: Vec<u64>, theirs: Vec<u64>) -> Option<String> {
 }
 
 /// Six times the volume, exactly.
-fn volume(positions: &[[i32; 3]], tets: &[[u32; 4]]) -> i128 {
+pub fn volume(positions: &[[i32; 3]], tets: &[[u32; 4]]) -> i128 {
     let six = |tet: &[u32; 4]| {
         let [a, b, c, d] = tet.map(|v| positions[v as usize]);
         orient3d(a, b, c, d)

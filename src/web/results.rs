@@ -3,7 +3,6 @@
 use crate::bench::BenchReport;
 use crate::mt::FieldInfo;
 use crate::mt::MtInfo;
-use crate::mt::MtKind;
 use crate::refine::RefineStats;
 use crate::session::Progress;
 use crate::view::IsoSurface;
@@ -45,8 +44,8 @@ export interface FieldInfo {
 
 /** What is known of a volume as soon as it is open. */
 export interface MtInfo {
-  /** The kind of Multi-Tessellation. */
-  kind: "edge";
+  /** The kind of Multi-Tessellation: what its updates are. */
+  kind: "edge" | "vertex" | "explicit";
   fields: FieldInfo[];
   /** A box that holds every mesh of the volume, and may be larger: `[x0, y0, z0, x1, y1, z1]` in model units. */
   bounds: number[];
@@ -168,9 +167,7 @@ pub fn progress(progress: &Progress) -> JsProgress {
 
 /// `info` for JavaScript.
 pub fn info(info: &MtInfo) -> JsInfo {
-    let kind = match info.kind {
-        MtKind::Edge => "edge",
-    };
+    let kind = info.kind.name();
     let MtInfo { vertices, tetrahedra, updates, .. } = *info;
     let fields = info.fields.iter().map(field).collect();
     plain(&InfoObject { kind, fields, bounds: bounds(info), vertices, tetrahedra, updates })

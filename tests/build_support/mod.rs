@@ -66,7 +66,7 @@ pub fn bent(n: u32) -> TetMesh {
 }
 
 /// Builds with all fields.
-pub fn built(mesh: &TetMesh) -> BuildResult {
+pub fn built(mesh: &TetMesh) -> BuildResult<EdgeMt> {
     let fields = mesh.fields.iter().map(|field| field.name.clone()).collect();
     let config = BuildConfig { fields, ..BuildConfig::default() };
     edge_mt(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a valid mesh")

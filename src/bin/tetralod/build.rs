@@ -14,10 +14,12 @@ use tetralod::build::BuildConfig;
 use tetralod::build::BuildProgress;
 use tetralod::build::BuildResult;
 use tetralod::build::BuildSummary;
-use tetralod::build::edge_mt;
+use tetralod::build::Criterion;
+use tetralod::build::Method;
 use tetralod::format::EncodeOptions;
 use tetralod::format::encode_to;
 use tetralod::mesh::TetMesh;
+use tetralod::mt::MtKind;
 
 /// Turns a tetrahedral mesh or a regular grid into an MT file.
 #[derive(clap::Args)]
@@ -27,6 +29,17 @@ pub struct Arguments {
     /// The MT file to write.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
+    /// The kind of MT: edge, vertex or explicit [default: edge].
+    #[arg(long, value_name = "KIND", value_parser = kind)]
+    kind: Option<MtKind>,
+    /// How it is built: collapse (edges, for kind edge), insert or decimate (vertices, for kind vertex); any for kind
+    /// explicit [default: collapse, decimate for kind vertex].
+    #[arg(long, value_name = "METHOD", value_parser = method)]
+    method: Option<Method>,
+    /// By what criterion vertices go or come: delaunay, or half-edge with decimate alone [default: half-edge with
+    /// decimate].
+    #[arg(long, value_name = "CRITERION", value_parser = criterion)]
+    criterion: Option<Criterion>,
     /// A point field to keep (repeatable, in this order); the first one if not given.
     #[arg(long = "field", value_name = "NAME")]
     fields: Vec<String>,
@@ -44,9 +57,37 @@ pub struct Arguments {
     json: bool,
 }
 
+/// The metadata keys under which a file tells how it was built.
+pub const METHOD: &str = "method";
+pub const CRITERION: &str = "criterion";
+
+/// Parses the name of a kind of MT.
+pub fn kind(text: &str) -> Result<MtKind> {
+    named(text, &MtKind::ALL.map(|kind| (kind.name(), kind)))
+}
+
+fn method(text: &str) -> Result<Method> {
+    named(text, &Method::ALL.map(|method| (method.name(), method)))
+}
+
+fn criterion(text: &str) -> Result<Criterion> {
+    named(text, &Criterion::ALL.map(|criterion| (criterion.name(), criterion)))
+}
+
+/// What has this name.
+fn named<T: Copy>(text: &str, all: &[(&str, T)]) -> Result<T> {
+    let found = all.iter().find(|(name, _)| *name == text).map(|&(_, value)| value);
+    let names: Vec<&str> = all.iter().map(|(name, _)| *name).collect();
+    found.with_context(|| format!("it must be one of: {}", names.join(", ")))
+}
+
 /// The summary as programs get it.
 #[derive(Serialize)]
 struct Report {
+    kind: &'static str,
+    method: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    criterion: Option<&'static str>,
     vertices: u32,
     tetrahedra: u32,
     base_vertices: u32,
@@ -62,16 +103,22 @@ struct Report {
 
 pub fn run(arguments: &Arguments) -> Result<()> {
     let start = Instant::now();
-    let (mesh, repaired) = files::read_mesh(&arguments.input)?;
+    let config = config(arguments);
+    let (mesh, repaired) = if config.method.keeps_the_mesh() {
+        files::read_mesh(&arguments.input)?
+    } else {
+        files::read_points(&arguments.input)?
+    };
     let repaired = repaired.to_string();
     if !repaired.is_empty() && !arguments.quiet {
         eprintln!("{}: {repaired}", arguments.input.display());
     }
-    let BuildResult { mt, summary, .. } = build(arguments, &mesh)?;
+    let BuildResult { mt, summary, .. } = build(arguments, &config, &mesh)?;
     drop(mesh);
-    let options = EncodeOptions::default();
+    let told = metadata(&config);
+    let options = EncodeOptions { metadata: told.into_iter().map(|(k, v)| (k.into(), v.into())).collect() };
     let file_bytes = files::write_file(&arguments.output, |out| Ok(encode_to(&mt, &options, out)?))?;
-    let report = report(&summary, file_bytes, start.elapsed().as_secs_f64(), repaired);
+    let report = report(&config, &summary, file_bytes, start.elapsed().as_secs_f64(), repaired);
     match arguments {
         Arguments { json: true, .. } => output::json(&report),
         Arguments { quiet: true, .. } => Ok(()),
@@ -79,20 +126,42 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
 }
 
-fn build(arguments: &Arguments, mesh: &TetMesh) -> Result<BuildResult> {
+/// How to build. Ends the program if the options contradict each other.
+fn config(arguments: &Arguments) -> BuildConfig {
     let default = BuildConfig::default();
+    let kind = arguments.kind.unwrap_or(default.kind);
+    let method = arguments.method.unwrap_or(Method::usual(kind));
     let config = BuildConfig {
+        kind,
+        method,
+        criterion: arguments.criterion.unwrap_or(Criterion::usual(method)),
         fields: arguments.fields.clone(),
         position_bits: arguments.position_bits,
         field_bits: arguments.field_bits.unwrap_or(default.field_bits),
         ..default
     };
+    if let Err(error) = config.check() {
+        super::refuse_usage(&error.to_string());
+    }
+    if method == Method::Collapse && arguments.criterion.is_some() {
+        super::refuse_usage("--criterion goes with --method insert or decimate, not with collapse");
+    }
+    config
+}
+
+/// What the file tells of how it was built.
+fn metadata(config: &BuildConfig) -> Vec<(&'static str, &'static str)> {
+    let criterion = (config.method != Method::Collapse).then_some((CRITERION, config.criterion.name()));
+    criterion.into_iter().chain([(METHOD, config.method.name())]).collect()
+}
+
+fn build(arguments: &Arguments, config: &BuildConfig, mesh: &TetMesh) -> Result<BuildResult> {
     // Drawn on stderr, and only on a terminal.
     let bar = if arguments.quiet { ProgressBar::hidden() } else { ProgressBar::new(0) };
     let style = "{msg:<12} {wide_bar} {percent:>3} %  {pos}/{len}  {elapsed_precise}  about {eta} left";
     bar.set_style(ProgressStyle::with_template(style).context("the style of the progress bar")?);
     let mut stage = "";
-    let result = edge_mt(mesh, &config, &mut |progress: BuildProgress| {
+    let result = tetralod::build::build(mesh, config, &mut |progress: BuildProgress| {
         bar.set_length(progress.total.max(1));
         if progress.stage != stage {
             stage = progress.stage;
@@ -107,8 +176,17 @@ fn build(arguments: &Arguments, mesh: &TetMesh) -> Result<BuildResult> {
     result.with_context(|| arguments.input.display().to_string())
 }
 
-fn report(summary: &BuildSummary, file_bytes: u64, seconds: f64, repaired: String) -> Report {
+fn report(
+    config: &BuildConfig,
+    summary: &BuildSummary,
+    file_bytes: u64,
+    seconds: f64,
+    repaired: String,
+) -> Report {
     Report {
+        kind: config.kind.name(),
+        method: config.method.name(),
+        criterion: (config.method != Method::Collapse).then_some(config.criterion.name()),
         vertices: summary.vertices,
         tetrahedra: summary.tetrahedra,
         base_vertices: summary.base_vertices,

@@ -16,7 +16,7 @@ use std::sync::PoisonError;
 use tetralod::mesh::MeshError;
 use tetralod::mesh::RepairReport;
 use tetralod::mesh::TetMesh;
-use tetralod::mt::EdgeMt;
+use tetralod::mt::Mt;
 use tetralod::mt::MtInfo;
 use tetralod::session::Session;
 
@@ -97,7 +97,7 @@ pub struct Opened {
 }
 
 impl Opened {
-    pub fn mt(&self) -> Result<&EdgeMt> {
+    pub fn mt(&self) -> Result<&Mt> {
         self.session.mt().context("the MT has no base mesh")
     }
 
@@ -132,9 +132,21 @@ fn read_mt(path: &Path) -> Result<Session> {
 /// Reads a mesh and mends what can be mended.
 pub fn read_mesh(path: &Path) -> Result<(TetMesh, RepairReport)> {
     // Read errors name the file themselves.
-    let mesh = tetralod::io::read(path)?;
+    mend(tetralod::io::read(path)?, path)
+}
+
+fn mend(mesh: TetMesh, path: &Path) -> Result<(TetMesh, RepairReport)> {
     let mended: Result<_, MeshError> = tetralod::mesh::repair(mesh);
     mended.with_context(|| path.display().to_string())
+}
+
+/// Reads a mesh as [`read_mesh`], or points without any cell as they are.
+pub fn read_points(path: &Path) -> Result<(TetMesh, RepairReport)> {
+    let mesh = tetralod::io::read(path)?;
+    if mesh.tets.is_empty() {
+        return Ok((mesh, RepairReport::default()));
+    }
+    mend(mesh, path)
 }
 
 /// The number of the field called `name`; the first field without a name.

@@ -8,11 +8,8 @@ use anyhow::Result;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use tetralod::geom::Bounds;
-use tetralod::mt::EdgeMt;
 use tetralod::mt::MtKind;
-use tetralod::mt::UpdateId;
-use tetralod::mt::VertexId;
+use tetralod::mt::MultiTessellation;
 use tetralod::mt::stats;
 
 /// Tells what is in an MT file.
@@ -29,6 +26,9 @@ pub struct Arguments {
 #[derive(Serialize)]
 struct Report {
     kind: &'static str,
+    /// The kind, for people.
+    #[serde(skip)]
+    updates_are: &'static str,
     vertices: u32,
     tetrahedra: u32,
     base_vertices: u32,
@@ -76,16 +76,12 @@ fn report(opened: &Opened) -> Result<Report> {
     let (mt, info) = (opened.mt()?, opened.info()?);
     let base_tetrahedra = mt.base().tets.len();
     let stats = stats(mt)?;
-    let kind = match info.kind {
-        MtKind::Edge => "edge",
-        MtKind::Vertex => "vertex",
-        MtKind::Explicit => "explicit",
-    };
     let field =
         |f: &tetralod::mt::FieldInfo| Field { name: f.name.clone(), min: f.min, max: f.max, bits: f.bits };
-    let Bounds { min: [x0, y0, z0], max: [x1, y1, z1] } = bounds(mt);
+    let [[x0, y0, z0], [x1, y1, z1]] = stats.bounds.map(|corner| info.lattice.point(corner));
     Ok(Report {
-        kind,
+        kind: info.kind.name(),
+        updates_are: words(info.kind),
         vertices: info.vertices,
         tetrahedra: info.tetrahedra,
         base_vertices: mt.base().positions.len() as u32,
@@ -109,18 +105,13 @@ fn report(opened: &Opened) -> Result<Report> {
     })
 }
 
-/// The box around the reference mesh. Positions follow from the updates alone, without any mesh; that they stay on
-/// the lattice is known once the MT has been replayed.
-fn bounds(mt: &EdgeMt) -> Bounds {
-    let mut positions = mt.base().positions.clone();
-    for split in (0..mt.updates()).map(|u| mt.split(UpdateId(u))) {
-        let (v, d) = (positions[split.vertex.0 as usize], split.offset);
-        let second = [0, 1, 2].map(|i| v[i] - (d[i] >> 1));
-        positions.extend([[0, 1, 2].map(|i| second[i] + d[i]), second]);
+/// What the updates of an MT do.
+fn words(kind: MtKind) -> &'static str {
+    match kind {
+        MtKind::Edge => "edge collapse",
+        MtKind::Vertex => "vertex insertion",
+        MtKind::Explicit => "explicit",
     }
-    let whole = |v: &u32| mt.split_by(VertexId(*v)).is_none();
-    let reference = (0..positions.len() as u32).filter(whole);
-    reference.fold(Bounds::EMPTY, |b, v| b.with(mt.info().lattice.point(positions[v as usize])))
 }
 
 fn print(report: &Report) -> Result<()> {
@@ -130,7 +121,7 @@ fn print(report: &Report) -> Result<()> {
     let [x0, y0, z0, x1, y1, z1] = report.bounds.map(output::number);
     let memory = &report.memory;
     let mut rows = vec![
-        ("kind", format!("{} collapse", report.kind)),
+        ("kind", report.updates_are.to_owned()),
         ("reference mesh", mesh(report.vertices, report.tetrahedra)),
         ("base mesh", mesh(report.base_vertices, report.base_tetrahedra)),
         (

@@ -5,6 +5,7 @@
 
 mod bench;
 mod build;
+mod convert;
 mod extract;
 mod files;
 mod generate;
@@ -12,8 +13,10 @@ mod info;
 mod output;
 mod verify;
 
+use clap::CommandFactory;
 use clap::Parser;
 use clap::Subcommand;
+use clap::error::ErrorKind;
 use std::process::ExitCode;
 
 /// Very large tetrahedral volumes for web pages: builds, inspects and checks MT files.
@@ -28,6 +31,7 @@ struct Arguments {
 enum Command {
     Generate(generate::Arguments),
     Build(build::Arguments),
+    Convert(convert::Arguments),
     Info(info::Arguments),
     Extract(extract::Arguments),
     Verify(verify::Arguments),
@@ -49,10 +53,16 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
     match command {
         Command::Generate(arguments) => generate::run(&arguments)?,
         Command::Build(arguments) => build::run(&arguments)?,
+        Command::Convert(arguments) => convert::run(&arguments)?,
         Command::Info(arguments) => info::run(&arguments)?,
         Command::Verify(arguments) => return verify::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments)?,
         Command::Extract(arguments) => extract::run(&arguments)?,
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Ends the program as wrong usage, with a word about what to do instead.
+fn refuse_usage(what: &str) -> ! {
+    Arguments::command().error(ErrorKind::ArgumentConflict, what).exit()
 }

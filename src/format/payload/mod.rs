@@ -1,9 +1,14 @@
-//! What is in each kind of section: one writer and one reader a kind, side by side.
+//! What is in each kind of section: one writer and one reader a kind, side by side. Updates have a file for each kind
+//! of MT.
+
+mod edge;
+mod explicit;
 
 use super::BLOCK_UPDATES;
 use super::EncodeError;
 use super::FormatError;
 use super::Limits;
+use super::header::Kind;
 use super::read::MAX_STRING;
 use super::read::Reader;
 use super::write;
@@ -12,12 +17,13 @@ use crate::mt::BaseMesh;
 use crate::mt::BaseMeshError;
 use crate::mt::EdgeMt;
 use crate::mt::ErrorCode;
+use crate::mt::ExplicitMt;
 use crate::mt::FieldInfo;
+use crate::mt::Mt;
 use crate::mt::MtInfo;
 use crate::mt::MtKind;
-use crate::mt::UpdateId;
-use crate::mt::VertexId;
-use crate::mt::VertexSplit;
+use crate::mt::MtRef;
+use crate::mt::MultiTessellation;
 use std::collections::BTreeMap;
 
 /// Key and value of each entry, in ascending order of the keys.
@@ -26,7 +32,7 @@ pub type Metadata = Vec<(String, String)>;
 /// Largest `INFO` section that is written.
 const MAX_INFO_BYTES: usize = 1 << 20;
 
-/// The number that stands for each kind of MT.
+/// The number that stands for each kind of MT: its place here.
 const KINDS: [MtKind; 3] = [MtKind::Edge, MtKind::Vertex, MtKind::Explicit];
 
 pub fn write_info(
@@ -72,6 +78,9 @@ pub fn write_info(
 pub fn read_info(mut reader: Reader<'_>) -> Result<(MtInfo, Metadata), FormatError> {
     let kind = KINDS.get(usize::from(reader.u8()?)).copied();
     let kind = kind.ok_or_else(|| reader.corrupt("the kind of MT is not known"))?;
+    if kind == MtKind::Vertex {
+        return Err(reader.unsupported("MTs of vertex insertions"));
+    }
     let [vertices, tetrahedra, updates] = [reader.u32()?, reader.u32()?, reader.u32()?];
     let lattice = Lattice { origin: reader.f64x3()?, step: reader.f64x3()?, bits: u32::from(reader.u8()?) };
     let displacement_per_error = reader.f64()?;
@@ -117,6 +126,17 @@ fn write_deltas(out: &mut Vec<u8>, numbers: impl Iterator<Item = i32>) {
     }
 }
 
+/// Appends a column of positions, each told as the difference to the one before.
+fn write_positions(out: &mut Vec<u8>, scratch: &mut Vec<u8>, positions: impl Iterator<Item = [i32; 3]>) {
+    write::column(out, scratch, |out| {
+        let mut last = [0_i32; 3];
+        for position in positions {
+            (0..3).for_each(|i| write::zigzag(out, position[i].wrapping_sub(last[i])));
+            last = position;
+        }
+    });
+}
+
 /// The next number of a column of differences; `last` is the one before.
 fn read_delta(reader: &mut Reader<'_>, last: &mut i32) -> Result<i32, FormatError> {
     *last = last.wrapping_add(reader.zigzag()?);
@@ -127,13 +147,7 @@ pub fn write_base(out: &mut Vec<u8>, base: &BaseMesh, fields: usize) {
     let scratch = &mut Vec::new();
     write::varint(out, base.positions.len() as u64);
     write::varint(out, base.tets.len() as u64);
-    write::column(out, scratch, |out| {
-        let mut last = [0_i32; 3];
-        for &position in &base.positions {
-            (0..3).for_each(|i| write::zigzag(out, position[i].wrapping_sub(last[i])));
-            last = position;
-        }
-    });
+    write_positions(out, scratch, base.positions.iter().copied());
     write::column(out, scratch, |out| write_deltas(out, base.tets.iter().flatten().map(|&v| v as i32)));
     for field in 0..fields {
         let levels = base.values.iter().skip(field).step_by(fields);
@@ -153,9 +167,7 @@ pub fn read_base(mut reader: Reader<'_>, info: &MtInfo, limits: &Limits) -> Resu
     let mut base = BaseMesh::default();
     let mut last = [0; 3];
     for _ in 0..vertices {
-        for x in &mut last {
-            read_delta(&mut positions, x)?;
-        }
+        last.iter_mut().try_for_each(|x| read_delta(&mut positions, x).map(drop))?;
         base.positions.push(last);
     }
     let mut last = 0;
@@ -175,62 +187,62 @@ pub fn read_base(mut reader: Reader<'_>, info: &MtInfo, limits: &Limits) -> Resu
     Ok(base)
 }
 
-/// A split turns one vertex into two, and vertex numbers are 32-bit words of which one means "none".
+/// What a description and a base mesh of so many vertices must be like, by the kind of MT.
 pub fn check_counts(info: &MtInfo, base_vertices: u64) -> Result<(), BaseMeshError> {
-    let updates = u64::from(info.updates);
-    if base_vertices + updates != u64::from(info.vertices) {
-        return Err(BaseMeshError::Info("base vertices and updates do not add up to the reference vertices"));
+    match info.kind {
+        MtKind::Edge => edge::check_counts(info, base_vertices),
+        // How many vertices and tetrahedra there are, every update tells; they are compared at the end.
+        MtKind::Vertex | MtKind::Explicit => Ok(()),
     }
-    if base_vertices + 2 * updates >= u64::from(u32::MAX) {
-        return Err(BaseMeshError::Info("more vertices than 32 bits can number"));
-    }
-    Ok(())
 }
 
-/// Whether the complete MT fits the limits: counts are checked against what arrives, so it cannot grow beyond.
+/// Whether an MT of which so much is known fits the limits. Counts are checked against what arrives, so it cannot grow
+/// beyond; kinds whose updates differ in size check each of these as well.
 pub fn check_memory(info: &MtInfo, vertices: u64, tets: u64, limits: &Limits) -> Result<(), FormatError> {
     let fields = info.fields.len() as u64;
-    let needed = vertices * (16 + 4 * fields) + tets * 16 + u64::from(info.updates) * (34 + 4 * fields);
+    let base = vertices * (16 + 4 * fields) + tets * 16;
+    let updates = match info.kind {
+        MtKind::Edge => edge::update_bytes(fields),
+        MtKind::Vertex | MtKind::Explicit => explicit::least_update_bytes(),
+    };
+    check_bytes(base + u64::from(info.updates) * updates, limits)
+}
+
+fn check_bytes(needed: u64, limits: &Limits) -> Result<(), FormatError> {
     if needed > limits.memory_bytes {
         return Err(FormatError::Limit { what: "the MT in memory", needed, limit: limits.memory_bytes });
     }
     Ok(())
 }
 
+/// An MT without updates, of a kind that can be read.
+pub fn empty(info: MtInfo, base: BaseMesh) -> Mt {
+    match info.kind {
+        MtKind::Edge => EdgeMt::new(info, base).into(),
+        MtKind::Vertex | MtKind::Explicit => ExplicitMt::new(info, base).into(),
+    }
+}
+
+/// The kind of section that an MT's updates are in.
+pub fn section_of(kind: MtKind) -> Kind {
+    match kind {
+        MtKind::Edge => Kind::UPDT,
+        MtKind::Vertex | MtKind::Explicit => Kind::EXPL,
+    }
+}
+
 /// Writes the updates `first .. end`.
-pub fn write_updates(out: &mut Vec<u8>, mt: &EdgeMt, first: u32, end: u32) {
-    let scratch = &mut Vec::new();
-    let splits = || (first..end).map(|k| mt.split(UpdateId(k)));
-    let newest = (mt.base().positions.len() as u32).wrapping_sub(1);
+pub fn write_updates(out: &mut Vec<u8>, mt: MtRef<'_>, first: u32, end: u32) {
     write::varint(out, u64::from(first));
     write::varint(out, u64::from(end - first));
-    write::column(out, scratch, |out| {
-        for (k, split) in (first..end).zip(splits()) {
-            // `push` has checked that the vertex is older than the update.
-            write::varint(out, u64::from(newest.wrapping_add(2 * k).wrapping_sub(split.vertex.0)));
-        }
-    });
-    write::column(out, scratch, |out| {
-        splits().for_each(|split| split.offset.iter().for_each(|&d| write::zigzag(out, d)));
-    });
-    write::column(out, scratch, |out| splits().for_each(|split| write::varint(out, split.mask)));
-    write::column(out, scratch, |out| {
-        let mut last = ErrorCode::MAX.0;
-        for ErrorCode(code) in splits().map(|split| split.error) {
-            // `push` has checked that errors do not grow.
-            write::varint(out, u64::from(last.saturating_sub(code)));
-            last = code;
-        }
-    });
-    for field in 0..mt.info().fields.len() {
-        write::column(out, scratch, |out| {
-            splits().for_each(|split| write::zigzag(out, split.field_offsets[field]));
-        });
+    match mt {
+        MtRef::Edge(mt) => edge::write(out, mt, first, end),
+        MtRef::Explicit(mt) => explicit::write(out, mt, first, end),
     }
 }
 
 /// Reads a block of updates into the MT.
-pub fn read_updates(mut reader: Reader<'_>, mt: &mut EdgeMt) -> Result<(), FormatError> {
+pub fn read_updates(mut reader: Reader<'_>, mt: &mut Mt, limits: &Limits) -> Result<(), FormatError> {
     if reader.varint()? != mt.updates() {
         return Err(reader.corrupt("a block of updates is missing or repeated"));
     }
@@ -238,37 +250,33 @@ pub fn read_updates(mut reader: Reader<'_>, mt: &mut EdgeMt) -> Result<(), Forma
     if count == 0 || count > BLOCK_UPDATES {
         return Err(reader.corrupt("a block holds 1 to 512 updates"));
     }
-    if count > mt.info().updates - mt.updates() {
+    if count > mt.info().updates.saturating_sub(mt.updates()) {
         return Err(reader.corrupt("there are more updates than the description tells"));
     }
-    let (mut vertices, mut offsets) = (reader.column()?, reader.column()?);
-    let (mut masks, mut errors) = (reader.column()?, reader.column()?);
-    let mut fields = (0..mt.info().fields.len()).map(|_| reader.column()).collect::<Result<Vec<_>, _>>()?;
-    reader.end()?;
-    let mut field_offsets = vec![0; fields.len()];
-    let mut error = ErrorCode::MAX;
-    for _ in 0..count {
-        error = read_error(&mut errors, error)?;
-        for (offset, column) in field_offsets.iter_mut().zip(&mut fields) {
-            *offset = column.zigzag()?;
-        }
-        mt.push(&VertexSplit {
-            vertex: read_vertex(&mut vertices, mt)?,
-            offset: [offsets.zigzag()?, offsets.zigzag()?, offsets.zigzag()?],
-            field_offsets: &field_offsets,
-            mask: masks.varint64()?,
-            error,
-        })?;
+    match mt {
+        Mt::Edge(mt) => edge::read(reader, mt, count),
+        Mt::Explicit(mt) => explicit::read(reader, mt, count, limits),
     }
-    [vertices, offsets, masks, errors].into_iter().chain(fields).try_for_each(Reader::end)
 }
 
-/// The vertex that the next update splits, told as its distance from the newest.
-fn read_vertex(column: &mut Reader<'_>, mt: &EdgeMt) -> Result<VertexId, FormatError> {
-    let vertices = mt.base().positions.len() as u32 + 2 * mt.updates();
-    let distance = column.varint()?;
-    let vertex = vertices.checked_sub(1).and_then(|newest| newest.checked_sub(distance));
-    vertex.map(VertexId).ok_or_else(|| column.corrupt("an update splits a vertex that is not there yet"))
+/// Whether a complete MT has the reference mesh that its description tells, as far as that follows without a mesh.
+pub fn check_reference(mt: MtRef<'_>) -> Result<(), BaseMeshError> {
+    match mt {
+        MtRef::Edge(_) => Ok(()),
+        MtRef::Explicit(mt) => explicit::check_reference(mt),
+    }
+}
+
+/// Appends a column of errors, each told as the number of codes that it is below the one before.
+fn write_errors(out: &mut Vec<u8>, scratch: &mut Vec<u8>, errors: impl Iterator<Item = ErrorCode>) {
+    write::column(out, scratch, |out| {
+        let mut last = ErrorCode::MAX.0;
+        for ErrorCode(code) in errors {
+            // `push` has checked that errors do not grow.
+            write::varint(out, u64::from(last.saturating_sub(code)));
+            last = code;
+        }
+    });
 }
 
 /// The next error, told as the number of codes that it is below the one before.
