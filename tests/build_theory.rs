@@ -26,6 +26,7 @@ use tetralod::refine::LodCriterion;
 use tetralod::refine::Outcome;
 use tetralod::refine::Request;
 use tetralod::verify;
+use tetralod::verify::Reference;
 
 fn refined(mt: &EdgeMt, request: &Request) -> (Front, Outcome) {
     let mut front = Front::new(mt).expect("a valid base mesh");
@@ -51,7 +52,7 @@ fn volume(front: &Front) -> i128 {
 /// Builds, verifies, and checks the MT as such. Returns it.
 fn keeps_its_promises(name: &str, mesh: &TetMesh) -> EdgeMt {
     let mt = built(mesh).mt;
-    let report = verify::run(&mt, mesh, &mut |_, _| {});
+    let report = verify::run(&mt, mesh, Reference::Mesh, &mut |_, _| {});
     assert!(report.valid && report.failures.is_empty(), "{name}: {:#?}", report.failures);
     assert!(report.queries >= 30 && report.worst_error_ratio <= 1.0, "{name}: {report:?}");
     let explicit = ExplicitMt::of(&mt).expect("a valid MT");

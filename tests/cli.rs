@@ -201,6 +201,84 @@ fn the_same_input_gives_the_same_bytes() {
 }
 
 #[test]
+fn kinds_are_built_and_converted() {
+    let folder = Folder::new("kinds");
+    let [input, edge, spelled, other, out] =
+        ["b.vti", "e.mt", "x.mt", "o.mt", "o.vtu"].map(|name| folder.path(name));
+    good(&["generate", "bucky", "--size", "9", "-o", &input]);
+    let built = json(&["build", &input, "-o", &edge, "--json"]);
+    assert_eq!(
+        (&built["kind"], &built["method"], built.get("criterion")),
+        (&"edge".into(), &"collapse".into(), None)
+    );
+    let named = ["build", &input, "--kind", "edge", "--method", "collapse", "-o", &other, "--quiet"];
+    assert!(good(&named).is_empty());
+    let bytes = |path: &str| fs::read(path).expect("it is there");
+    assert!(bytes(&edge) == bytes(&other));
+
+    let built = json(&["build", &input, "--kind", "explicit", "-o", &spelled, "--json"]);
+    assert_eq!((&built["kind"], &built["method"]), (&"explicit".into(), &"collapse".into()));
+    let report = json(&["convert", &edge, "--kind", "explicit", "-o", &other, "--json"]);
+    assert_eq!((&report["kind"], &report["from"]), (&"explicit".into(), &"edge".into()));
+    assert!(bytes(&spelled) == bytes(&other), "built as explicit, or converted");
+    let info = json(&["info", &spelled, "--json"]);
+    assert_eq!((&info["kind"], &info["metadata"]["method"]), (&"explicit".into(), &"collapse".into()));
+    assert_eq!(info["memory"]["compact_bytes"], report["memory_bytes"]);
+    for key in ["vertices", "tetrahedra", "updates", "file_bytes", "bytes_per_vertex"] {
+        assert_eq!(info[key], report[key], "{key}");
+    }
+    let of_edge = json(&["info", &edge, "--json"]);
+    for key in
+        ["bounds", "fields", "depth", "arcs_per_node", "tets_per_update", "base_tetrahedra", "metadata"]
+    {
+        assert_eq!(info[key], of_edge[key], "{key}");
+    }
+    assert!(
+        good(&["info", &edge]).contains("edge collapse") && good(&["info", &spelled]).contains("explicit")
+    );
+    let hash = |mt: &str| json(&["extract", mt, "--error", "2%", "-o", &out, "--json"])["hash"].clone();
+    assert_eq!(hash(&edge), hash(&spelled));
+    assert!(good(&["verify", &spelled, "--against", &input]).contains("every promise is kept"));
+    json(&["bench", &spelled, "--json"]);
+
+    assert!(good(&["convert", &spelled, "--kind", "edge", "-o", &other]).contains("edge, was explicit"));
+    assert!(bytes(&edge) == bytes(&other), "there and back");
+    good(&["convert", &edge, "--kind", "edge", "-o", &other, "--quiet"]);
+    assert!(bytes(&edge) == bytes(&other), "nothing to do");
+    let before = folder.names();
+    bad(
+        1,
+        &["convert", &edge, "--kind", "vertex", "-o", &out],
+        &[&edge, "kind edge", "--kind vertex", "build"],
+    );
+    bad(1, &["convert", &input, "--kind", "edge", "-o", &out], &[&input, "not an MT file"]);
+    assert_eq!(folder.names(), before);
+}
+
+#[test]
+fn kinds_methods_and_criteria_that_do_not_go_together_are_refused() {
+    for (options, words) in [
+        (
+            &["--method", "insert"][..],
+            &["kind edge", "method insert", "collapse", "kinds vertex and explicit"][..],
+        ),
+        (&["--kind", "edge", "--method", "decimate"], &["kind edge", "method decimate", "collapse"]),
+        (&["--kind", "vertex", "--method", "collapse"], &["kind vertex", "insert and decimate"]),
+        (&["--kind", "vertex", "--method", "insert", "--criterion", "half-edge"], &["delaunay", "decimate"]),
+        (&["--criterion", "delaunay"], &["--method insert or decimate"]),
+        (&["--kind", "explicit", "--criterion", "half-edge"], &["--method insert or decimate"]),
+        (&["--kind", "face"], &["face", "edge, vertex, explicit"]),
+        (&["--method", "guess"], &["guess", "collapse, insert, decimate"]),
+        (&["--criterion", "none"], &["none", "delaunay, half-edge"]),
+    ] {
+        let arguments = [&["build", "a.vtu", "-o", "b.mt"], options].concat();
+        bad(2, &arguments, words);
+        bad(2, &arguments, &["--help"]);
+    }
+    bad(2, &["convert", "a.mt", "-o", "b.mt"], &["--kind"]);
+}
+
+#[test]
 fn failures_name_the_file_and_leave_nothing() {
     let folder = Folder::new("failures");
     let [input, mt, none, text, cut, damaged, out] =

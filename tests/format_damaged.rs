@@ -2,15 +2,20 @@
 
 mod format_support;
 
-use format_support::{assemble, bytes_of, decode, is_prefix, sample, sections};
+use format_support::{assemble, bytes_of, decode, is_prefix, sample, samples, sections, spelled};
 use proptest::prelude::*;
 use tetralod::format::{Decoder, FormatError, Limits};
-use tetralod::mt::{BaseMeshError, EdgeMt};
+use tetralod::mt::{BaseMeshError, Mt, MultiTessellation, UpdateError};
 
 #[test]
 fn every_flipped_bit_is_detected_and_what_came_before_is_intact() {
-    let mt = sample(2, 2, 520);
-    let bytes = bytes_of(&mt);
+    for mt in [sample(2, 2, 520), spelled(2, 2, 150)] {
+        every_flip_is_detected(&mt);
+    }
+}
+
+fn every_flip_is_detected(mt: &Mt) {
+    let bytes = bytes_of(mt);
     for bit in 0..8 * bytes.len() {
         let mut damaged = bytes.clone();
         damaged[bit / 8] ^= 1 << (bit % 8);
@@ -22,14 +27,17 @@ fn every_flipped_bit_is_detected_and_what_came_before_is_intact() {
             matches!(error, FormatError::NotMt | FormatError::Corrupt { .. } | FormatError::Truncated { .. }),
             "bit {bit}: {error:?}"
         );
-        assert!(decoder.mt().is_none_or(|part| is_prefix(part, &mt)), "bit {bit}");
+        assert!(decoder.mt().is_none_or(|part| is_prefix(part, mt)), "bit {bit}");
     }
 }
 
 #[test]
 fn an_error_stays_and_the_mt_too() {
-    let mt = sample(2, 1, 1200);
-    let mut bytes = bytes_of(&mt);
+    samples(2, 1, 1200).iter().for_each(error_stays);
+}
+
+fn error_stays(mt: &Mt) {
+    let mut bytes = bytes_of(mt);
     let place = bytes.len() * 3 / 4;
     bytes[place] ^= 1;
     let mut decoder = Decoder::default();
@@ -37,14 +45,18 @@ fn an_error_stays_and_the_mt_too() {
     assert_eq!(decoder.feed(&bytes), Err(error.clone()));
     assert_eq!(decoder.feed(&[]), Err(error.clone()));
     assert_eq!(decoder.finish(), Err(error));
-    let updates = decoder.mt().map(EdgeMt::updates);
+    let updates = decoder.mt().map(Mt::updates);
     assert!(updates.is_some_and(|n| n > 0 && n < 1200), "{updates:?}");
     assert!(!decoder.progress().complete);
 }
 
 #[test]
 fn lost_repeated_and_swapped_sections_are_detected() {
-    let bytes = bytes_of(&sample(2, 1, 1500));
+    samples(2, 1, 1500).iter().for_each(sections_are_in_order);
+}
+
+fn sections_are_in_order(mt: &Mt) {
+    let bytes = bytes_of(mt);
     let good = sections(&bytes);
     assert_eq!(assemble(&good, 1500), bytes, "the test writes files as the library does");
     let starts: Vec<usize> = good
@@ -71,10 +83,15 @@ fn lost_repeated_and_swapped_sections_are_detected() {
 
 /// Replaces the payload of the first section of a kind.
 fn with(bytes: &[u8], kind: &[u8; 4], change: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
+    with_updates(bytes, kind, 20, change)
+}
+
+/// The same in a file of so many updates.
+fn with_updates(bytes: &[u8], kind: &[u8; 4], updates: u32, change: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
     let mut sections = sections(bytes);
     let found = sections.iter_mut().find(|(k, _)| k == kind).expect("the section is there");
     change(&mut found.1);
-    assemble(&sections, 20)
+    assemble(&sections, updates)
 }
 
 #[test]
@@ -83,7 +100,7 @@ fn content_with_good_checksums_is_not_trusted() {
     let bytes = bytes_of(&mt);
     let corrupt = |bytes: &[u8]| matches!(decode(bytes), Err(FormatError::Corrupt { .. }));
     let info =
-        |error: &Result<EdgeMt, FormatError>| matches!(error, Err(FormatError::Base(BaseMeshError::Info(_))));
+        |error: &Result<Mt, FormatError>| matches!(error, Err(FormatError::Base(BaseMeshError::Info(_))));
     // Description: kind, then counts, lattice, its bits.
     assert!(corrupt(&with(&bytes, b"INFO", |p| p[0] = 7)));
     assert!(info(&decode(&with(&bytes, b"INFO", |p| p[61] = 31))));
@@ -106,6 +123,43 @@ fn content_with_good_checksums_is_not_trusted() {
     assert!(matches!(decode(&twice), Err(FormatError::Update(_) | FormatError::Corrupt { .. })));
 }
 
+/// Behind two numbers, an `EXPL` section has columns: each a length, then new vertices, positions, removed, inserted.
+#[test]
+fn explicit_content_with_good_checksums_is_not_trusted() {
+    // Two tetrahedra; one update puts a vertex into the first.
+    let bytes = bytes_of(&spelled(2, 1, 1));
+    let base =
+        |found: Result<Mt, FormatError>| matches!(found, Err(FormatError::Base(BaseMeshError::Info(_))));
+    let corrupt = |bytes: &[u8]| matches!(decode(bytes), Err(FormatError::Corrupt { .. }));
+    let explicit = |change: &dyn Fn(&mut Vec<u8>)| with_updates(&bytes, b"EXPL", 1, |p| change(p));
+    let mut removed_at = 0;
+    explicit(&|p| assert_eq!(p[..4], [0, 1, 1, 1]));
+    let _ = explicit(&|p| assert_eq!(&p[5 + usize::from(p[4])..][..3], [2, 1, 1]));
+    for (kind, payload) in sections(&bytes) {
+        if &kind == b"EXPL" {
+            removed_at = 7 + usize::from(payload[4]);
+        }
+    }
+    assert!(base(decode(&with_updates(&bytes, b"INFO", 1, |p| p[1] += 1))), "vertices do not add up");
+    assert!(base(decode(&with_updates(&bytes, b"INFO", 1, |p| p[5] += 1))), "tetrahedra do not add up");
+    assert!(corrupt(&explicit(&|p| p[1] = 2)), "more updates than there are");
+    assert!(corrupt(&explicit(&|p| p[3] = 2)), "a vertex without position");
+    assert!(corrupt(&explicit(&|p| p[removed_at] = 2)), "before the first tetrahedron");
+    // The other tetrahedron: the mesh would refuse that, but the reference mesh has other vertices already.
+    assert!(base(decode(&explicit(&|p| p[removed_at] = 0))));
+    let one_kind_in_another = bytes_of(&sample(2, 1, 1));
+    let mut mixed = sections(&bytes);
+    mixed[2] = sections(&one_kind_in_another)[2].clone();
+    assert!(corrupt(&assemble(&mixed, 1)));
+    let beyond = explicit(&|p| {
+        let at = removed_at + 2;
+        // Four tetrahedra of four numbers follow.
+        assert_eq!(p[at], 4);
+        p[at + 2] = 99;
+    });
+    assert_eq!(decode(&beyond), Err(FormatError::Update(UpdateError::Cavity { update: 0 })));
+}
+
 #[test]
 fn numbers_that_are_too_long_are_refused() {
     let bytes = bytes_of(&sample(1, 1, 20));
@@ -126,6 +180,19 @@ fn limits_hold_before_memory_is_taken() {
     let enough = Limits { section_bytes: 20_000, memory_bytes: 40_000 };
     assert_eq!(feed(enough), Ok(()));
 
+    // Explicit updates tell their size as they come.
+    let mt = spelled(2, 1, 520);
+    let bytes = bytes_of(&mt);
+    let feed = |memory_bytes| {
+        let mut decoder = Decoder::new(Limits { memory_bytes, ..Limits::default() });
+        (decoder.feed(&bytes).map(drop), decoder.mt().map_or(0, Mt::bytes))
+    };
+    let whole = feed(2 * mt.bytes());
+    assert_eq!(whole, (Ok(()), mt.bytes()));
+    let (refused, held) = feed(mt.bytes() / 2);
+    assert!(matches!(refused, Err(FormatError::Limit { .. })), "{refused:?}");
+    assert!(held > 0 && held <= mt.bytes() / 2, "{held}");
+
     // A base mesh that claims 2^31 tetrahedra in a few bytes.
     let claims = with(&bytes_of(&sample(1, 1, 20)), b"BASE", |p| {
         p.splice(1..2, [0x80, 0x80, 0x80, 0x80, 0x08]);
@@ -139,11 +206,12 @@ proptest! {
     /// Behind good checksums anything may stand: no panic, and whatever is accepted is written as it was read.
     #[test]
     fn any_change_behind_good_checksums_is_refused_or_read_faithfully(
+        kind in 0..2_usize,
         which in 0..4_usize,
         changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..4),
         cut in prop::option::of(any::<prop::sample::Index>()),
     ) {
-        let mut sections = sections(&bytes_of(&sample(2, 2, 600)));
+        let mut sections = sections(&bytes_of(&samples(2, 2, 600)[kind]));
         let payload = &mut sections[which].1;
         for (place, value) in &changes {
             let place = place.index(payload.len());

@@ -1,12 +1,14 @@
-//! Promise: version 1 of the format does not change. The worked example of the specification is what is written,
-//! byte for byte, and it is read back.
+//! Promise: version 1 of the format does not change. The worked examples of the specification are what is written,
+//! byte for byte, and they are read back.
 
 mod format_support;
 
 use format_support::{decode, field};
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::geom::Lattice;
-use tetralod::mt::{BaseMesh, EdgeMt, ErrorCode, MtInfo, MtKind, VertexId, VertexSplit};
+use tetralod::mt::{
+    BaseMesh, EdgeMt, ErrorCode, ExplicitMt, ExplicitUpdate, MtInfo, MtKind, VertexId, VertexSplit,
+};
 
 const SPEC: &str = include_str!("../src/format/SPEC.md");
 
@@ -42,22 +44,42 @@ fn options() -> EncodeOptions {
     EncodeOptions { metadata: [("tool".to_owned(), "hand".to_owned())].into() }
 }
 
-/// The bytes in the last code block of the specification; what follows two slashes is a remark.
-fn golden() -> Vec<u8> {
-    let block = SPEC.rsplit("```text\n").next().expect("rsplit gives something");
-    let block = block.split("```").next().expect("split gives something");
-    let digits = block.lines().flat_map(|line| line.split("//").next().unwrap_or("").split_whitespace());
+/// The same base mesh in an explicit MT, whose only update puts a vertex into the tetrahedron.
+fn spelled_example() -> ExplicitMt {
+    let edge = example();
+    let info = MtInfo { vertices: 5, tetrahedra: 4, ..edge.info().clone() };
+    let mut mt = ExplicitMt::new(info, edge.base().clone());
+    let update = ExplicitUpdate {
+        positions: &[[2, 2, 2]],
+        levels: &[15],
+        removed: &[0],
+        inserted: &[[4, 1, 2, 3], [0, 4, 2, 3], [0, 1, 4, 3], [0, 1, 2, 4]],
+        error: ErrorCode(300),
+    };
+    mt.push(&update).expect("the example is an MT");
+    mt
+}
+
+/// The bytes in a code block behind the heading of the examples; what follows two slashes is a remark.
+fn golden(number: usize) -> Vec<u8> {
+    let examples = SPEC.split("## Examples").nth(1).expect("there are examples");
+    let block = examples.split("```text\n").nth(number).and_then(|rest| rest.split("```").next());
+    let lines = block.expect("as many blocks").lines();
+    let digits = lines.flat_map(|line| line.split("//").next().unwrap_or("").split_whitespace());
     digits.map(|d| u8::from_str_radix(d, 16).expect("two hexadecimal digits")).collect()
 }
 
 #[test]
-fn the_example_is_written_as_specified() {
-    let bytes = encode(&example(), &options()).expect("the example is complete");
+fn the_examples_are_written_as_specified() {
     let hex = |bytes: &[u8]| bytes.iter().map(|b| format!("{b:02X} ")).collect::<String>();
-    assert_eq!(hex(&bytes), hex(&golden()));
+    let edge = encode(&example(), &options()).expect("the example is complete");
+    assert_eq!(hex(&edge), hex(&golden(1)));
+    let spelled = encode(&spelled_example(), &EncodeOptions::default()).expect("the example is complete");
+    assert_eq!(hex(&spelled), hex(&golden(2)));
 }
 
 #[test]
-fn the_example_is_read_as_specified() {
-    assert_eq!(decode(&golden()), Ok(example()));
+fn the_examples_are_read_as_specified() {
+    assert_eq!(decode(&golden(1)), Ok(example().into()));
+    assert_eq!(decode(&golden(2)), Ok(spelled_example().into()));
 }

@@ -2,10 +2,10 @@
 
 mod format_support;
 
-use format_support::{Draft, build, bytes_of, decode, options, sample};
+use format_support::{Draft, build, bytes_of, decode, options, sample, samples};
 use proptest::prelude::*;
 use tetralod::format::{BLOCK_UPDATES, Decoder, EncodeError, EncodeOptions, encode, encode_to};
-use tetralod::mt::EdgeMt;
+use tetralod::mt::{EdgeMt, ExplicitMt, Mt, MtInfo, MultiTessellation};
 
 fn draft() -> impl Strategy<Value = Draft> {
     let offset = prop_oneof![-3..=3_i32, -(1 << 20)..=(1 << 20_i32)];
@@ -37,15 +37,19 @@ proptest! {
 fn blocks_of_all_sizes_come_back() {
     let block = BLOCK_UPDATES as usize;
     for updates in [0, 1, block - 1, block, block + 1, 3 * block] {
-        let mt = sample(3, 2, updates);
-        assert_eq!(decode(&bytes_of(&mt)), Ok(mt), "{updates} updates");
+        for mt in samples(3, 2, updates) {
+            assert_eq!(decode(&bytes_of(&mt)), Ok(mt), "{updates} updates");
+        }
     }
 }
 
 #[test]
 fn description_metadata_and_size_come_back() {
-    let mt = sample(2, 3, 600);
-    let bytes = bytes_of(&mt);
+    samples(2, 3, 600).iter().for_each(all_comes_back);
+}
+
+fn all_comes_back(mt: &Mt) {
+    let bytes = bytes_of(mt);
     let mut decoder = Decoder::default();
     let progress = decoder.feed(&bytes).expect("a good file");
     assert_eq!(decoder.info(), Some(mt.info()));
@@ -57,11 +61,12 @@ fn description_metadata_and_size_come_back() {
 
 #[test]
 fn a_writer_gets_the_same_bytes() {
-    let mt = sample(2, 1, 600);
-    let mut written = Vec::new();
-    let size = encode_to(&mt, &options(), &mut written).expect("a vector takes everything");
-    assert_eq!(size, written.len() as u64);
-    assert_eq!(written, bytes_of(&mt));
+    for mt in samples(2, 1, 600) {
+        let mut written = Vec::new();
+        let size = encode_to(&mt, &options(), &mut written).expect("a vector takes everything");
+        assert_eq!(size, written.len() as u64);
+        assert_eq!(written, bytes_of(&mt));
+    }
 }
 
 #[test]
@@ -75,6 +80,11 @@ fn what_could_not_be_read_back_is_not_written() {
     miscounted.updates = 0;
     let miscounted = EdgeMt::new(miscounted, whole.base().clone());
     assert!(matches!(encode(&miscounted, &EncodeOptions::default()), Err(EncodeError::Base(_))));
+
+    let [_, spelled] = samples(1, 1, 5);
+    let other = MtInfo { updates: 0, ..spelled.info().clone() };
+    let other = ExplicitMt::new(other, spelled.base().clone());
+    assert!(matches!(encode(&other, &EncodeOptions::default()), Err(EncodeError::Base(_))));
 
     let metadata = [("key".to_owned(), "x".repeat(70_000))].into();
     assert!(matches!(encode(&whole, &EncodeOptions { metadata }), Err(EncodeError::TooLong { .. })));

@@ -2,13 +2,17 @@
 
 mod format_support;
 
-use format_support::{bytes_of, is_prefix, sample};
+use format_support::{bytes_of, is_prefix, samples};
 use tetralod::format::{Decoder, FormatError};
+use tetralod::mt::Mt;
 
 #[test]
 fn every_prefix_is_a_coarser_mt_and_is_called_truncated() {
-    let mt = sample(3, 2, 700);
-    let bytes = bytes_of(&mt);
+    samples(3, 2, 700).iter().for_each(every_prefix_is_usable);
+}
+
+fn every_prefix_is_usable(mt: &Mt) {
+    let bytes = bytes_of(mt);
     let mut ready_at = None;
     let mut last = 0;
     for length in 0..bytes.len() {
@@ -21,7 +25,7 @@ fn every_prefix_is_a_coarser_mt_and_is_called_truncated() {
         assert_eq!(progress.ready, decoder.mt().is_some());
         if let Some(part) = decoder.mt() {
             ready_at.get_or_insert(length);
-            assert!(is_prefix(part, &mt));
+            assert!(is_prefix(part, mt));
         }
     }
     // Two blocks: the first must have been usable long before the end, the base mesh even sooner.

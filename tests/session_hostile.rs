@@ -7,19 +7,21 @@ use format_support::{assemble, sections};
 use proptest::prelude::*;
 use std::ops::ControlFlow;
 use std::sync::LazyLock;
-use tetralod::build::{BuildConfig, edge_mt};
+use tetralod::build::{BuildConfig, build};
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::generate::by_name;
 use tetralod::geom::Bounds;
+use tetralod::mt::{MtKind, MultiTessellation};
 use tetralod::refine::Request;
 use tetralod::session::{Session, SessionError};
 
-/// A small MT as the builder makes it, and its number of updates.
-static FILE: LazyLock<(Vec<u8>, u32)> = LazyLock::new(|| {
+/// A small MT as the builder makes it, and the same spelled out, each with its number of updates.
+static FILES: LazyLock<[(Vec<u8>, u32); 2]> = LazyLock::new(|| {
     let mesh = by_name("bucky", 8).expect("a size that is allowed");
-    let built = edge_mt(&mesh, &BuildConfig::default(), &mut |_| ControlFlow::Continue(()));
-    let mt = built.expect("a good mesh").mt;
-    (encode(&mt, &EncodeOptions::default()).expect("a complete MT"), mt.updates())
+    let built = build(&mesh, &BuildConfig::default(), &mut |_| ControlFlow::Continue(()));
+    let edge = built.expect("a good mesh").mt;
+    let spelled = edge.convert(MtKind::Explicit).expect("any MT can be spelled out");
+    [edge, spelled].map(|mt| (encode(&mt, &EncodeOptions::default()).expect("a complete MT"), mt.updates()))
 });
 
 /// Requests that go up and down, with and without a part and a budget.
@@ -58,10 +60,11 @@ fn exercise(bytes: &[u8]) -> bool {
 }
 
 #[test]
-fn the_file_itself_is_sound() {
-    let (bytes, updates) = &*FILE;
-    assert!(*updates > 400 && exercise(bytes));
-    assert_eq!(&assemble(&sections(bytes), *updates), bytes);
+fn the_files_themselves_are_sound() {
+    for (bytes, updates) in &*FILES {
+        assert!(*updates > 400 && exercise(bytes));
+        assert_eq!(&assemble(&sections(bytes), *updates), bytes);
+    }
 }
 
 proptest! {
@@ -69,10 +72,11 @@ proptest! {
 
     #[test]
     fn changes_behind_good_checksums(
+        kind in 0..2_usize,
         which in 0..3_usize,
         changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
     ) {
-        let (bytes, updates) = &*FILE;
+        let (bytes, updates) = &FILES[kind];
         let mut sections = sections(bytes);
         let payload = &mut sections[which].1;
         for (place, value) in &changes {
@@ -84,8 +88,11 @@ proptest! {
 
     /// The lengths of columns stay as they are, so most of these decode and fail, if at all, in the mesh.
     #[test]
-    fn flipped_low_bits_of_updates(flips in prop::collection::vec((any::<prop::sample::Index>(), 0..7_u8), 1..4)) {
-        let (bytes, updates) = &*FILE;
+    fn flipped_low_bits_of_updates(
+        kind in 0..2_usize,
+        flips in prop::collection::vec((any::<prop::sample::Index>(), 0..7_u8), 1..4),
+    ) {
+        let (bytes, updates) = &FILES[kind];
         let mut sections = sections(bytes);
         let payload = &mut sections[2].1;
         for (place, bit) in &flips {

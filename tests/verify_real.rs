@@ -11,6 +11,7 @@ use tetralod::mesh::Grid;
 use tetralod::mesh::TetMesh;
 use tetralod::mesh::repair;
 use tetralod::verify;
+use tetralod::verify::Reference;
 
 fn data() -> Option<PathBuf> {
     let data = std::env::var_os("TETRALOD_DATA").map(PathBuf::from);
@@ -28,7 +29,7 @@ fn load(name: &str) -> Option<TetMesh> {
 /// Builds and verifies; the base mesh must have at most so many vertices.
 fn check(name: &str, mesh: &TetMesh, most: u32) {
     let built = built(mesh);
-    let report = verify::run(&built.mt, mesh, &mut |_, _| {});
+    let report = verify::run(&built.mt, mesh, Reference::Mesh, &mut |_, _| {});
     assert!(report.valid && report.queries > 40, "{name}: {:#?}", report.failures);
     assert!(report.worst_error_ratio <= 1.0, "{name}: {}", report.worst_error_ratio);
     let base = built.summary.base_vertices;

@@ -15,11 +15,12 @@ use tetralod::mt::MtInfo;
 use tetralod::mt::UpdateId;
 use tetralod::verify;
 use tetralod::verify::MAX_FAILURES;
+use tetralod::verify::Reference;
 use tetralod::verify::VerifyReport;
 
 fn verified(mt: &EdgeMt, input: &TetMesh) -> VerifyReport {
     let mut last = None;
-    let report = verify::run(mt, input, &mut |done, all| {
+    let report = verify::run(mt, input, Reference::Mesh, &mut |done, all| {
         assert!(done < all && last.is_none_or(|last| last <= done));
         last = Some(done);
     });

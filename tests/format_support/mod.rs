@@ -3,7 +3,10 @@
 
 use tetralod::format::{Decoder, EncodeOptions, FormatError, encode};
 use tetralod::geom::Lattice;
-use tetralod::mt::{BaseMesh, EdgeMt, ErrorCode, FieldInfo, MtInfo, MtKind, UpdateId, VertexId, VertexSplit};
+use tetralod::mt::{
+    BaseMesh, EdgeMt, ErrorCode, ExplicitMt, ExplicitUpdate, FieldInfo, Mt, MtInfo, MtKind, MtRef,
+    MultiTessellation, UpdateId, VertexId, VertexSplit,
+};
 
 /// Offset, choice of vertex, mask and error of an update; made to fit by [`build`].
 pub type Draft = ([i32; 3], u32, u64, u16, Vec<i32>);
@@ -14,7 +17,7 @@ pub fn field(name: &str, bits: u32) -> FieldInfo {
 }
 
 /// An MT with `tets` separate base tetrahedra, `fields` fields and one update per draft.
-pub fn build(tets: u32, fields: usize, drafts: &[Draft]) -> EdgeMt {
+pub fn build(tets: u32, fields: usize, drafts: &[Draft]) -> Mt {
     let lattice = Lattice { origin: [-1.5, 0.0, 2.0], step: [0.25, 0.5, 1.0], bits: 20 };
     let corners = [[0, 0, 0], [9, 0, 0], [0, 9, 0], [0, 0, 9]];
     let vertices = 4 * tets;
@@ -49,18 +52,23 @@ pub fn build(tets: u32, fields: usize, drafts: &[Draft]) -> EdgeMt {
         mt.push(&split).expect("drafts are made to fit");
         whole.extend(created.map(|v| v.0));
     }
-    mt
+    mt.into()
 }
 
-/// An MT of `updates` pseudo-random updates.
-pub fn sample(tets: u32, fields: usize, updates: usize) -> EdgeMt {
+/// Pseudo-random numbers.
+fn numbers() -> impl FnMut() -> u64 {
     let mut state = 0x9E37_79B9_7F4A_7C15_u64;
-    let mut next = || {
+    move || {
         state ^= state << 13;
         state ^= state >> 7;
         state ^= state << 17;
         state
-    };
+    }
+}
+
+/// An edge-based MT of `updates` pseudo-random updates.
+pub fn sample(tets: u32, fields: usize, updates: usize) -> Mt {
+    let mut next = numbers();
     let drafts: Vec<Draft> = (0..updates)
         .map(|k| {
             let offset = [0; 3].map(|_: i32| (next() % 201) as i32 - 100);
@@ -72,17 +80,77 @@ pub fn sample(tets: u32, fields: usize, updates: usize) -> EdgeMt {
     build(tets, fields, &drafts)
 }
 
+/// An explicit MT of `updates` pseudo-random updates: most put a vertex into a tetrahedron, some put tetrahedra in the
+/// place of others that lie elsewhere, which only the mesh would refuse.
+pub fn spelled(tets: u32, fields: usize, updates: usize) -> Mt {
+    let mut next = numbers();
+    let lattice = Lattice { origin: [-1.5, 0.0, 2.0], step: [0.25, 0.5, 1.0], bits: 28 };
+    let info = MtInfo {
+        kind: MtKind::Explicit,
+        lattice,
+        fields: (0..fields).map(|f| field(["p", "q", "r"][f % 3], 12)).collect(),
+        vertices: 4 * tets,
+        tetrahedra: tets,
+        updates: updates as u32,
+        displacement_per_error: 0.125,
+    };
+    let corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]].map(|c: [i32; 3]| c.map(|x| x << 24));
+    let base = BaseMesh {
+        positions: (0..tets)
+            .flat_map(|t| corners.map(|[x, y, z]| [x + (1 << 25) * t as i32, y, z]))
+            .collect(),
+        values: vec![7; 4 * tets as usize * fields],
+        tets: (0..tets).map(|t| [0, 1, 2, 3].map(|i| 4 * t + i)).collect(),
+    };
+    // Twice: the first time to count what the description has to tell.
+    let mut made = ExplicitMt::new(info.clone(), base.clone());
+    let mut live: Vec<u32> = (0..tets).collect();
+    let mut spelled = Vec::new();
+    for k in 0..updates {
+        // Old ones first: they are the large ones.
+        let removed: Vec<u32> = (0..if k % 5 == 4 { 3 } else { 1 }).map(|_| live.remove(0)).collect();
+        let tet = made.tets()[removed[0] as usize];
+        let corners = tet.map(|v| made.position(VertexId(v)));
+        let middle = [0, 1, 2].map(|i| corners.iter().map(|c| c[i] / 4).sum::<i32>());
+        let [a, b, c, d] = tet;
+        let v = made.vertices();
+        let (positions, inserted) = match k % 5 {
+            4 => (vec![], removed.iter().rev().map(|&t| made.tets()[t as usize]).collect()),
+            _ => (vec![middle], vec![[v, b, c, d], [a, v, c, d], [a, b, v, d], [a, b, c, v]]),
+        };
+        let levels: Vec<i32> = (0..positions.len() * fields).map(|_| (next() % 4096) as i32).collect();
+        let error = ErrorCode(60_000 - (k * 50_000 / updates) as u16);
+        let first = made.tets().len() as u32;
+        let (positions, levels, removed, inserted) = (&positions, &levels, &removed, &inserted);
+        made.push(&ExplicitUpdate { positions, levels, removed, inserted, error }).expect("made to fit");
+        live.extend(first..made.tets().len() as u32);
+        spelled.push((positions.clone(), levels.clone(), removed.clone(), inserted.clone(), error));
+    }
+    let [vertices, tetrahedra] = made.reference_counts();
+    let mut mt = ExplicitMt::new(MtInfo { vertices, tetrahedra, ..info }, base);
+    for (positions, levels, removed, inserted, error) in &spelled {
+        let error = *error;
+        mt.push(&ExplicitUpdate { positions, levels, removed, inserted, error }).expect("made to fit");
+    }
+    mt.into()
+}
+
+/// An MT of each kind.
+pub fn samples(tets: u32, fields: usize, updates: usize) -> [Mt; 2] {
+    [sample(tets, fields, updates), spelled(tets, fields, updates)]
+}
+
 pub fn options() -> EncodeOptions {
     let pairs = [("tool", "a test"), ("ключ", "значение"), ("empty", "")];
     EncodeOptions { metadata: pairs.map(|(k, v)| (k.to_owned(), v.to_owned())).into() }
 }
 
-pub fn bytes_of(mt: &EdgeMt) -> Vec<u8> {
+pub fn bytes_of<'a>(mt: impl Into<MtRef<'a>>) -> Vec<u8> {
     encode(mt, &options()).expect("the MT is complete")
 }
 
 /// Decodes a whole file in one piece.
-pub fn decode(bytes: &[u8]) -> Result<EdgeMt, FormatError> {
+pub fn decode(bytes: &[u8]) -> Result<Mt, FormatError> {
     let mut decoder = Decoder::default();
     decoder.feed(bytes)?;
     decoder.finish()?;
@@ -90,11 +158,29 @@ pub fn decode(bytes: &[u8]) -> Result<EdgeMt, FormatError> {
 }
 
 /// Whether `part` is `whole` cut off behind some update.
-pub fn is_prefix(part: &EdgeMt, whole: &EdgeMt) -> bool {
+pub fn is_prefix(part: &Mt, whole: &Mt) -> bool {
+    let same_updates = match (part, whole) {
+        (Mt::Edge(part), Mt::Edge(whole)) => {
+            (0..part.updates()).all(|k| part.split(UpdateId(k)) == whole.split(UpdateId(k)))
+        }
+        (Mt::Explicit(part), Mt::Explicit(whole)) => {
+            let same = |u| {
+                part.created(u) == whole.created(u)
+                    && part.inserted(u) == whole.inserted(u)
+                    && part.removed(u) == whole.removed(u)
+                    && part.error(u) == whole.error(u)
+            };
+            let vertex = |v| part.position(v) == whole.position(v) && part.levels(v) == whole.levels(v);
+            whole.tets().starts_with(part.tets())
+                && (0..part.vertices()).map(VertexId).all(vertex)
+                && (0..part.updates()).map(UpdateId).all(same)
+        }
+        _ => false,
+    };
     part.info() == whole.info()
-        && part.base() == whole.base()
+        && MultiTessellation::base(part) == MultiTessellation::base(whole)
         && part.updates() <= whole.updates()
-        && (0..part.updates()).all(|k| part.split(UpdateId(k)) == whole.split(UpdateId(k)))
+        && same_updates
 }
 
 /// CRC-32 bit by bit, so that the checksums are checked against their definition.
