@@ -3,6 +3,7 @@
 use super::BuildConfig;
 use super::BuildError;
 use super::BuildProgress;
+use super::Criterion;
 use super::OnProgress;
 use super::agenda::Agenda;
 use super::agenda::Key;
@@ -34,21 +35,10 @@ use crate::mt::ErrorCode;
 use crate::mt::MAX_UPDATES;
 use glam::DVec3;
 
-/// How the hole of a removed vertex is filled.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Criterion {
-    /// By contracting an edge to the end that stays: works in any mesh.
-    HalfEdge,
-    /// By the Delaunay criterion. Vertices of a curved boundary stay.
-    Delaunay,
-}
-
 /// What [`decimate`] hands over.
 pub(super) struct Decimated {
     pub sequence: Sequence,
     pub quantized: Quantized,
-    /// Length of the longest chain of insertions, each of which depends on the one before.
-    pub depth: u32,
     /// Model units of displacement that count as an error of 1.
     pub displacement_per_error: f64,
 }
@@ -75,11 +65,10 @@ pub(super) fn decimate(
     let work = WorkMesh::new(mesh.tets.clone(), neighbors, mesh.positions.len());
     let mut decimator = Decimator::new(work, &quantized, displacement_per_error, non_manifold, criterion);
     decimator.remove_all(progress)?;
-    let Decimator { mesh: base, past, mut sequence, .. } = decimator;
+    let Decimator { mesh: base, mut sequence, .. } = decimator;
     sequence.base = base.tets.iter().copied().filter(|tet| tet[0] != NONE).collect();
     turn_round(&mut sequence);
-    let depth = past.heights.iter().copied().max().unwrap_or(0);
-    Ok(Decimated { sequence, quantized, depth, displacement_per_error })
+    Ok(Decimated { sequence, quantized, displacement_per_error })
 }
 
 /// Makes insertions, coarse to fine, of removals in the order in which they were made.

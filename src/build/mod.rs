@@ -42,17 +42,18 @@ mod work_mesh;
 
 pub use collapse::edge_mt;
 pub use delaunay::delaunay;
-pub use vertex::{Criterion, decimated_mt, inserted_mt};
 pub use method::Criterion;
 pub use method::Method;
 
 use crate::mesh::MeshError;
 use crate::mesh::TetMesh;
 use crate::mt::ConvertError;
+use crate::mt::ExplicitMt;
 use crate::mt::Mt;
 use crate::mt::MtKind;
 use crate::mt::MultiTessellation;
 use crate::mt::UpdateError;
+use crate::mt::UpdateId;
 use std::fmt;
 use std::ops::ControlFlow;
 
@@ -145,11 +146,6 @@ pub enum BuildError {
         /// What goes with what.
         instead: &'static str,
     },
-    /// No builder makes this yet.
-    NotYet {
-        /// What was asked for.
-        what: &'static str,
-    },
     /// The MT could not be converted to the kind that was asked for.
     Convert(ConvertError),
     /// The mesh has no tetrahedra.
@@ -212,7 +208,6 @@ impl fmt::Display for BuildError {
             Self::Combination { which: [one, other], instead } => {
                 write!(f, "{one} does not go with {other}: {instead}")
             }
-            Self::NotYet { what } => write!(f, "{what} cannot be built yet"),
             Self::Convert(error) => write!(f, "{error}"),
             Self::Empty => write!(f, "the mesh has no tetrahedra"),
             Self::NoField => {
@@ -274,9 +269,8 @@ pub fn build(
             let BuildResult { mt, summary } = edge_mt(mesh, config, progress)?;
             BuildResult { mt: Mt::from(mt), summary }
         }
-        Method::Insert | Method::Decimate => {
-            return Err(BuildError::NotYet { what: "an MT of vertex insertions" });
-        }
+        Method::Insert => summed_up(vertex::inserted_mt(mesh, config, progress)?),
+        Method::Decimate => summed_up(vertex::decimated_mt(mesh, config, config.criterion, progress)?),
     };
     let mt = if mt.info().kind == config.kind {
         mt
@@ -284,4 +278,24 @@ pub fn build(
         mt.convert(config.kind).map_err(BuildError::Convert)?
     };
     Ok(BuildResult { mt, summary })
+}
+
+/// Adds what is to be told of an MT that is spelled out.
+fn summed_up(mt: ExplicitMt) -> BuildResult {
+    let mut depths: Vec<u32> = Vec::new();
+    for u in (0..mt.updates()).map(UpdateId) {
+        let above = mt.parents(u).iter().map(|&p| depths[p as usize]).max();
+        depths.push(above.unwrap_or(0) + 1);
+    }
+    let info = mt.info();
+    let summary = BuildSummary {
+        vertices: info.vertices,
+        tetrahedra: info.tetrahedra,
+        base_vertices: mt.base_mesh().positions.len() as u32,
+        base_tetrahedra: mt.base_mesh().tets.len() as u32,
+        updates: mt.updates(),
+        position_bits: info.lattice.bits,
+        depth: depths.into_iter().max().unwrap_or(0),
+    };
+    BuildResult { mt: mt.into(), summary }
 }

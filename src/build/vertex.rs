@@ -2,6 +2,7 @@
 
 use super::BuildConfig;
 use super::BuildError;
+use super::Criterion;
 use super::OnProgress;
 use super::decimate;
 use super::insert;
@@ -15,14 +16,12 @@ use crate::mt::MAX_UPDATES;
 use crate::mt::MtInfo;
 use crate::mt::MtKind;
 
-pub use super::decimate::Criterion;
-
 /// Builds a vertex-based MT of `mesh` by removing vertices, cheapest first, and spells it out: see
 /// [`VertexMt::from_explicit`](crate::mt::VertexMt::from_explicit).
 ///
 /// # Errors
 /// As [`edge_mt`](super::edge_mt).
-pub fn decimated_mt(
+pub(super) fn decimated_mt(
     mesh: &TetMesh,
     config: &BuildConfig,
     criterion: Criterion,
@@ -39,7 +38,7 @@ pub fn decimated_mt(
 /// # Errors
 /// If the tetrahedra of `mesh` do not fill the convex hull of its points, two points coincide on the lattice or they
 /// span no volume; if an option is out of its range; if `progress` breaks the work off.
-pub fn inserted_mt(
+pub(super) fn inserted_mt(
     mesh: &TetMesh,
     config: &BuildConfig,
     progress: OnProgress<'_>,

@@ -259,8 +259,7 @@ impl Decoder {
             }
             (Kind::BASE, info @ Some(_), None) => {
                 let Some(info) = info.take() else { return Ok(()) };
-                let base = payload::read_base(content, &info, &self.limits)?;
-                self.mt = Some(payload::empty(info, base));
+                self.mt = Some(payload::read_base(content, info, &self.limits)?);
             }
             (kind, _, Some(mt)) if kind == payload::section_of(mt.info().kind) => {
                 payload::read_updates(content, mt, &self.limits)?;

@@ -137,7 +137,7 @@ fn sections(mt: MtRef<'_>, options: &EncodeOptions, sink: Sink<'_>) -> Result<()
     let mut payload = Vec::new();
     payload::write_info(&mut payload, mt.info(), &options.metadata)?;
     put(Kind::INFO, &mut payload)?;
-    payload::write_base(&mut payload, mt.base(), mt.info().fields.len());
+    payload::write_base(&mut payload, mt);
     let mut totals = put(Kind::BASE, &mut payload)?;
     let mut first = 0;
     while first < mt.updates() {

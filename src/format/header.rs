@@ -69,12 +69,13 @@ impl Kind {
     pub const INFO: Self = Self(*b"INFO");
     pub const BASE: Self = Self(*b"BASE");
     pub const UPDT: Self = Self(*b"UPDT");
+    pub const INSV: Self = Self(*b"INSV");
     pub const EXPL: Self = Self(*b"EXPL");
     pub const ENDF: Self = Self(*b"ENDF");
 
     /// Whether this reader knows what is in the section.
     pub fn is_known(self) -> bool {
-        [Self::INFO, Self::BASE, Self::UPDT, Self::EXPL, Self::ENDF].contains(&self)
+        [Self::INFO, Self::BASE, Self::UPDT, Self::INSV, Self::EXPL, Self::ENDF].contains(&self)
     }
 
     /// Whether a reader that does not know the kind may skip the section.

@@ -24,11 +24,6 @@ impl<'a> Reader<'a> {
         FormatError::Corrupt { offset: self.offset, what }
     }
 
-    /// An error at the current place.
-    pub fn unsupported(&self, what: &'static str) -> FormatError {
-        FormatError::UnsupportedFeature { offset: self.offset, what }
-    }
-
     fn take(&mut self, count: usize) -> Result<&'a [u8]> {
         let Some((head, tail)) = self.bytes.split_at_checked(count) else {
             return Err(self.corrupt("the section is shorter than its content"));
@@ -98,6 +93,11 @@ impl<'a> Reader<'a> {
         }
         let bytes = self.take(length as usize)?;
         std::str::from_utf8(bytes).map_err(|_| self.corrupt("a text is not UTF-8"))
+    }
+
+    /// Whether all bytes are read.
+    pub fn is_empty(&self) -> bool {
+        self.bytes.is_empty()
     }
 
     /// A cursor over the next column.

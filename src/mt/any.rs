@@ -143,6 +143,8 @@ impl MultiTessellation for Mt {
 pub enum MtRef<'a> {
     /// A compact edge-based MT.
     Edge(&'a EdgeMt),
+    /// A compact vertex-based MT.
+    Vertex(&'a VertexMt),
     /// An explicit MT.
     Explicit(&'a ExplicitMt),
 }
@@ -151,6 +153,7 @@ impl<'a> From<&'a Mt> for MtRef<'a> {
     fn from(mt: &'a Mt) -> Self {
         match mt {
             Mt::Edge(mt) => Self::Edge(mt),
+            Mt::Vertex(mt) => Self::Vertex(mt),
             Mt::Explicit(mt) => Self::Explicit(mt),
         }
     }
@@ -159,6 +162,12 @@ impl<'a> From<&'a Mt> for MtRef<'a> {
 impl<'a> From<&'a EdgeMt> for MtRef<'a> {
     fn from(mt: &'a EdgeMt) -> Self {
         Self::Edge(mt)
+    }
+}
+
+impl<'a> From<&'a VertexMt> for MtRef<'a> {
+    fn from(mt: &'a VertexMt) -> Self {
+        Self::Vertex(mt)
     }
 }
 
@@ -173,6 +182,7 @@ impl MtRef<'_> {
     pub fn info(&self) -> &MtInfo {
         match self {
             Self::Edge(mt) => mt.info(),
+            Self::Vertex(mt) => mt.info(),
             Self::Explicit(mt) => mt.info(),
         }
     }
@@ -181,6 +191,7 @@ impl MtRef<'_> {
     pub fn base(&self) -> &BaseMesh {
         match self {
             Self::Edge(mt) => mt.base(),
+            Self::Vertex(mt) => mt.base(),
             Self::Explicit(mt) => mt.base_mesh(),
         }
     }
@@ -189,6 +200,7 @@ impl MtRef<'_> {
     pub fn updates(&self) -> u32 {
         match self {
             Self::Edge(mt) => mt.updates(),
+            Self::Vertex(mt) => mt.updates(),
             Self::Explicit(mt) => mt.updates(),
         }
     }

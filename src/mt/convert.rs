@@ -10,6 +10,7 @@ use super::ReplayError;
 use super::UpdateError;
 use super::UpdateId;
 use super::VertexId;
+use super::VertexMt;
 use super::VertexSplit;
 use super::replay::canonical;
 use std::fmt;
@@ -71,6 +72,7 @@ impl Mt {
         match (self, to) {
             _ if from == to => Ok(self.clone()),
             (_, MtKind::Explicit) => Ok(Self::Explicit(ExplicitMt::of(self)?)),
+            (Self::Explicit(mt), MtKind::Vertex) => Ok(Self::Vertex(VertexMt::from_explicit(mt)?)),
             (Self::Explicit(mt), MtKind::Edge) => Ok(Self::Edge(EdgeMt::from_explicit(mt)?)),
             _ => Err(ConvertError::Kinds { from, to }),
         }

@@ -287,7 +287,7 @@ impl VertexMt {
         if mesh.slot(self.vertex(u)).is_some() {
             return Err(torn);
         }
-        self.find_walls(mesh, u, &shape, cavity).ok_or(torn.clone())?;
+        self.find_walls(mesh, &shape, cavity).ok_or(torn.clone())?;
         let position = self.position(u);
         if !cavity.is_star_positive(mesh, position, self.info.lattice.bits <= NARROW_BITS) {
             return Err(UpdateError::Inverted { update: u.0 });
@@ -299,13 +299,7 @@ impl VertexMt {
 
     /// Finds the faces of Π_u and joins the new tetrahedra behind them.
     #[inline]
-    fn find_walls(
-        &self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        shape: &Shape,
-        cavity: &mut Cavity,
-    ) -> Option<()> {
+    fn find_walls(&self, mesh: &mut CurrentMesh, shape: &Shape, cavity: &mut Cavity) -> Option<()> {
         (cavity.walls_len, cavity.link_len) = (0, 0);
         let mut outer: Vec<([u32; 3], [u32; 3])> = Vec::new();
         let bare = std::mem::take(&mut cavity.bare);

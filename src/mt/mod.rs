@@ -20,10 +20,9 @@ mod ring;
 mod spelled;
 mod split;
 mod stats;
-mod vertex;
-#[cfg(feature = "build")]
-mod vertex_from;
 mod taken;
+mod vertex;
+mod vertex_from;
 
 pub use any::{Mt, MtRef};
 pub use base::{BaseMesh, BaseMeshError, MAX_FIELD_BITS, MAX_UPDATES};
@@ -39,8 +38,6 @@ pub(crate) use replay::canonical;
 pub use split::Applied;
 pub use stats::{MtStats, stats};
 pub use vertex::{MAX_AROUND, MAX_INSERTED, MAX_REMOVED, NodeBits, VertexMt};
-#[cfg(feature = "build")]
-pub use vertex_from::ConvertError;
 
 use crate::geom::Lattice;
 

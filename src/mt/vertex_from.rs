@@ -1,9 +1,11 @@
 //! From an explicit MT to the compact vertex-based one, where every update is a vertex insertion.
 
+use super::ConvertError;
 use super::ExplicitMt;
 use super::MtInfo;
 use super::MtKind;
 use super::NodeBits;
+use super::ReplayError;
 use super::UpdateError;
 use super::UpdateId;
 use super::VertexId;
@@ -23,39 +25,6 @@ use crate::mesh::FACES;
 use crate::mesh::NONE;
 use std::collections::HashMap;
 use std::collections::HashSet;
-use std::fmt;
-
-/// Why an MT cannot be had in another structure.
-#[derive(Clone, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum ConvertError {
-    /// An update is not of the kind that the structure is for.
-    Update {
-        /// The update.
-        update: u32,
-        /// What is in the way.
-        what: &'static str,
-    },
-    /// The MT does not hang together.
-    Damaged(UpdateError),
-}
-
-impl fmt::Display for ConvertError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Update { update, what } => write!(f, "update {update} {what}"),
-            Self::Damaged(error) => write!(f, "{error}"),
-        }
-    }
-}
-
-impl std::error::Error for ConvertError {}
-
-impl From<UpdateError> for ConvertError {
-    fn from(error: UpdateError) -> Self {
-        Self::Damaged(error)
-    }
-}
 
 impl VertexMt {
     /// The compact form of an explicit MT whose updates are vertex insertions.
@@ -69,15 +38,20 @@ impl VertexMt {
         let info = MtInfo { kind: MtKind::Vertex, updates, ..mt.info().clone() };
         let base_removers: Vec<u32> = mt.base().map(|t| mt.remover(t).map_or(NONE, |u| u.0)).collect();
         let base = mt.base_mesh().clone();
-        let mut compact = Self::new(info, base, base_removers, most_children.min(MAX_INSERTED as u32))?;
+        let mut compact =
+            Self::new(info, base, base_removers, most_children.min(MAX_INSERTED as u32)).map_err(damaged)?;
         let mut boundary: HashSet<[u32; 3]> = boundary_faces(mt);
         let mut writer = Writer { mt, children: &children, glue: Box::default() };
         for u in (0..updates).map(UpdateId) {
             let node = writer.node(&compact, u, &mut boundary)?;
-            compact.push(&node, mt.error(u))?;
+            compact.push(&node, mt.error(u)).map_err(damaged)?;
         }
         Ok(compact)
     }
+}
+
+fn damaged(error: UpdateError) -> ConvertError {
+    ConvertError::Damaged(ReplayError::Update(error))
 }
 
 /// The faces of the base mesh that only one tetrahedron has.
@@ -171,13 +145,13 @@ impl Writer<'_> {
         vertex: VertexId,
         boundary: &mut HashSet<[u32; 3]>,
     ) -> Result<Canonical, ConvertError> {
-        let refuse = |what| ConvertError::Update { update: u.0, what };
+        let refuse = |why| ConvertError::Update { update: u.0, why };
         let (mt, v) = (self.mt, vertex.0);
         let newest = mt.inserted(u).flat_map(|t| mt.tets()[t as usize]).max();
         let all_at_vertex = mt.inserted(u).all(|t| mt.tets()[t as usize].contains(&v));
         let removed = || mt.removed(u).iter().map(|&t| mt.tets()[t as usize]);
         if newest != Some(v) || !all_at_vertex || removed().flatten().any(|w| w == v) {
-            return Err(refuse("is not the insertion of one vertex"));
+            return Err(refuse("it is not the insertion of one vertex"));
         }
         let mut walls: Vec<([u32; 3], u32)> = Vec::new();
         for t in mt.inserted(u) {
@@ -190,10 +164,10 @@ impl Writer<'_> {
         link.sort_unstable();
         link.dedup();
         if walls.len() > MAX_INSERTED || link.len() > MAX_AROUND || mt.removed(u).len() > MAX_REMOVED {
-            return Err(refuse("is too large: it removes more than 127 or inserts more than 124 tetrahedra"));
+            return Err(refuse("it removes more than 127 or inserts more than 124 tetrahedra"));
         }
         if removed().flatten().any(|w| link.binary_search(&w).is_err()) {
-            return Err(refuse("takes a vertex away, which the insertion of one does not"));
+            return Err(refuse("it takes a vertex away, which the insertion of one does not"));
         }
         let number = |w: u32| link.partition_point(|&x| x < w) as u8;
         let mut bare = Vec::new();
@@ -211,7 +185,10 @@ impl Writer<'_> {
         } else {
             bare.clear();
         }
-        let removed = removed().map(|tet| tet.map(number)).collect();
+        let removed: Vec<[u8; 4]> = removed().map(|tet| tet.map(number)).collect();
+        if !hangs_together(&removed) {
+            return Err(refuse("what it removes does not hang together through faces"));
+        }
         let walls = walls.iter().map(|&(face, t)| (turned(face.map(number)), t)).collect();
         Ok(Canonical { link, walls, removed, bare })
     }
@@ -227,7 +204,10 @@ impl Writer<'_> {
         bits.push(u64::from(on_boundary), 1);
         if on_boundary {
             if canonical.bare.len() >= 1 << COUNT_BITS {
-                return Err(ConvertError::Update { update: u.0, what: "has too many faces on the boundary" });
+                return Err(ConvertError::Update {
+                    update: u.0,
+                    why: "it has too many faces on the boundary",
+                });
             }
             bits.push(canonical.bare.len() as u64, COUNT_BITS);
             canonical.bare.iter().for_each(|(_, given_up)| bits.push(u64::from(*given_up), 1));
@@ -238,7 +218,7 @@ impl Writer<'_> {
             let child = remover.map_or(0, |c| 1 + children.partition_point(|&x| x < c.0));
             bits.push(child as u64, width_of(children.len() as u32));
         }
-        let torn = ConvertError::Update { update: u.0, what: "does not fill the hole that it leaves" };
+        let torn = ConvertError::Update { update: u.0, why: "it does not fill the hole that it leaves" };
         self.write_removed(bits, canonical, on_boundary).ok_or(torn)
     }
 
@@ -291,6 +271,20 @@ impl Writer<'_> {
         };
         (all(&self.glue.tets[..self.glue.len]) == all(&canonical.removed)).then_some(())
     }
+}
+
+/// Whether one can go from each tetrahedron to each other one through faces.
+fn hangs_together(tets: &[[u8; 4]]) -> bool {
+    let mut reached = vec![false; tets.len()];
+    let mut stack = vec![0];
+    while let Some(i) = stack.pop() {
+        if std::mem::replace(&mut reached[i], true) {
+            continue;
+        }
+        let shared = |other: &[u8; 4]| other.iter().filter(|v| tets[i].contains(v)).count();
+        stack.extend((0..tets.len()).filter(|&j| !reached[j] && shared(&tets[j]) == 3));
+    }
+    reached.into_iter().all(|reached| reached)
 }
 
 /// Takes the faces that are given up out of the boundary and puts those in their place in.

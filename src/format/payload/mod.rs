@@ -3,6 +3,7 @@
 
 mod edge;
 mod explicit;
+mod vertex;
 
 use super::BLOCK_UPDATES;
 use super::EncodeError;
@@ -78,9 +79,6 @@ pub fn write_info(
 pub fn read_info(mut reader: Reader<'_>) -> Result<(MtInfo, Metadata), FormatError> {
     let kind = KINDS.get(usize::from(reader.u8()?)).copied();
     let kind = kind.ok_or_else(|| reader.corrupt("the kind of MT is not known"))?;
-    if kind == MtKind::Vertex {
-        return Err(reader.unsupported("MTs of vertex insertions"));
-    }
     let [vertices, tetrahedra, updates] = [reader.u32()?, reader.u32()?, reader.u32()?];
     let lattice = Lattice { origin: reader.f64x3()?, step: reader.f64x3()?, bits: u32::from(reader.u8()?) };
     let displacement_per_error = reader.f64()?;
@@ -143,7 +141,8 @@ fn read_delta(reader: &mut Reader<'_>, last: &mut i32) -> Result<i32, FormatErro
     Ok(*last)
 }
 
-pub fn write_base(out: &mut Vec<u8>, base: &BaseMesh, fields: usize) {
+pub fn write_base(out: &mut Vec<u8>, mt: MtRef<'_>) {
+    let (base, fields) = (mt.base(), mt.info().fields.len());
     let scratch = &mut Vec::new();
     write::varint(out, base.positions.len() as u64);
     write::varint(out, base.tets.len() as u64);
@@ -153,15 +152,20 @@ pub fn write_base(out: &mut Vec<u8>, base: &BaseMesh, fields: usize) {
         let levels = base.values.iter().skip(field).step_by(fields);
         write::column(out, scratch, |out| write_deltas(out, levels.copied()));
     }
+    if let MtRef::Vertex(mt) = mt {
+        vertex::write_base(out, mt);
+    }
 }
 
-pub fn read_base(mut reader: Reader<'_>, info: &MtInfo, limits: &Limits) -> Result<BaseMesh, FormatError> {
+/// Reads the base mesh, which makes an MT without updates.
+pub fn read_base(mut reader: Reader<'_>, info: MtInfo, limits: &Limits) -> Result<Mt, FormatError> {
     let fields = info.fields.len();
     let [vertices, tets] = [reader.varint()?, reader.varint()?];
-    check_counts(info, u64::from(vertices))?;
-    check_memory(info, u64::from(vertices), u64::from(tets), limits)?;
+    check_counts(&info, u64::from(vertices))?;
+    check_memory(&info, u64::from(vertices), u64::from(tets), limits)?;
     let (mut positions, mut corners) = (reader.column()?, reader.column()?);
     let mut columns = (0..fields).map(|_| reader.column()).collect::<Result<Vec<_>, _>>()?;
+    let removers = if info.kind == MtKind::Vertex { Some(reader.column()?) } else { None };
     reader.end()?;
     // Vectors grow with the bytes that are there: a count alone reserves nothing.
     let mut base = BaseMesh::default();
@@ -183,16 +187,21 @@ pub fn read_base(mut reader: Reader<'_>, info: &MtInfo, limits: &Limits) -> Resu
         base.values.extend_from_slice(&levels);
     }
     [positions, corners].into_iter().chain(columns).try_for_each(Reader::end)?;
-    base.check(info)?;
-    Ok(base)
+    base.check(&info)?;
+    Ok(match (info.kind, removers) {
+        (MtKind::Edge, _) => EdgeMt::new(info, base).into(),
+        (_, Some(removers)) => vertex::read_base(removers, info, base)?.into(),
+        (_, None) => ExplicitMt::new(info, base).into(),
+    })
 }
 
 /// What a description and a base mesh of so many vertices must be like, by the kind of MT.
 pub fn check_counts(info: &MtInfo, base_vertices: u64) -> Result<(), BaseMeshError> {
     match info.kind {
         MtKind::Edge => edge::check_counts(info, base_vertices),
+        MtKind::Vertex => vertex::check_counts(info, base_vertices),
         // How many vertices and tetrahedra there are, every update tells; they are compared at the end.
-        MtKind::Vertex | MtKind::Explicit => Ok(()),
+        MtKind::Explicit => Ok(()),
     }
 }
 
@@ -203,7 +212,8 @@ pub fn check_memory(info: &MtInfo, vertices: u64, tets: u64, limits: &Limits) ->
     let base = vertices * (16 + 4 * fields) + tets * 16;
     let updates = match info.kind {
         MtKind::Edge => edge::update_bytes(fields),
-        MtKind::Vertex | MtKind::Explicit => explicit::least_update_bytes(),
+        MtKind::Vertex => vertex::least_update_bytes(info),
+        MtKind::Explicit => explicit::least_update_bytes(),
     };
     check_bytes(base + u64::from(info.updates) * updates, limits)
 }
@@ -215,19 +225,12 @@ fn check_bytes(needed: u64, limits: &Limits) -> Result<(), FormatError> {
     Ok(())
 }
 
-/// An MT without updates, of a kind that can be read.
-pub fn empty(info: MtInfo, base: BaseMesh) -> Mt {
-    match info.kind {
-        MtKind::Edge => EdgeMt::new(info, base).into(),
-        MtKind::Vertex | MtKind::Explicit => ExplicitMt::new(info, base).into(),
-    }
-}
-
 /// The kind of section that an MT's updates are in.
 pub fn section_of(kind: MtKind) -> Kind {
     match kind {
         MtKind::Edge => Kind::UPDT,
-        MtKind::Vertex | MtKind::Explicit => Kind::EXPL,
+        MtKind::Vertex => Kind::INSV,
+        MtKind::Explicit => Kind::EXPL,
     }
 }
 
@@ -237,6 +240,7 @@ pub fn write_updates(out: &mut Vec<u8>, mt: MtRef<'_>, first: u32, end: u32) {
     write::varint(out, u64::from(end - first));
     match mt {
         MtRef::Edge(mt) => edge::write(out, mt, first, end),
+        MtRef::Vertex(mt) => vertex::write(out, mt, first, end),
         MtRef::Explicit(mt) => explicit::write(out, mt, first, end),
     }
 }
@@ -255,6 +259,7 @@ pub fn read_updates(mut reader: Reader<'_>, mt: &mut Mt, limits: &Limits) -> Res
     }
     match mt {
         Mt::Edge(mt) => edge::read(reader, mt, count),
+        Mt::Vertex(mt) => vertex::read(reader, mt, count, limits),
         Mt::Explicit(mt) => explicit::read(reader, mt, count, limits),
     }
 }
@@ -262,7 +267,7 @@ pub fn read_updates(mut reader: Reader<'_>, mt: &mut Mt, limits: &Limits) -> Res
 /// Whether a complete MT has the reference mesh that its description tells, as far as that follows without a mesh.
 pub fn check_reference(mt: MtRef<'_>) -> Result<(), BaseMeshError> {
     match mt {
-        MtRef::Edge(_) => Ok(()),
+        MtRef::Edge(_) | MtRef::Vertex(_) => Ok(()),
         MtRef::Explicit(mt) => explicit::check_reference(mt),
     }
 }
