@@ -47,7 +47,9 @@ pub(super) fn insert(
     let mut greedy = Greedy::new(mesh, base, quantized);
     greedy.distribute(&corners);
     greedy.insert_all(quantized.positions.len() - corners.len(), progress)?;
-    Ok(greedy.sequence)
+    let Greedy { mut sequence, trace, .. } = greedy;
+    set_thresholds(&mut sequence, &trace);
+    Ok(sequence)
 }
 
 fn refuse_duplicates(positions: &[[i32; 3]]) -> Result<(), BuildError> {
@@ -67,9 +69,56 @@ fn volume(tets: &[[u32; 4]], quantized: &Quantized) -> i128 {
     tets.iter().map(six_volume).sum()
 }
 
+/// Where tetrahedra come from and go to. They have numbers: those of the base mesh come first, then follow the entries
+/// of [`Sequence::tets`]; a tetrahedron's own number is that of the entry that inserts it.
+struct Trace {
+    /// The error of each tetrahedron.
+    errors: Vec<f64>,
+    /// For a tetrahedron of the base mesh or one that is inserted: the step that removes it, or [`NONE`]. For an entry
+    /// that removes: the tetrahedron's own number.
+    links: Vec<u32>,
+}
+
+/// Sets the threshold of each insertion by carrying out just what is needed for less and less error.
+fn set_thresholds(sequence: &mut Sequence, trace: &Trace) {
+    let Sequence { base, steps, .. } = sequence;
+    let base = base.len();
+    let mut needed: BinaryHeap<(u64, u32)> = BinaryHeap::new();
+    let entry = |id: usize| (trace.links[id] != NONE).then(|| (trace.errors[id].to_bits(), id as u32));
+    needed.extend((0..base).filter_map(entry));
+    let mut done = vec![false; steps.len()];
+    let mut level = f64::INFINITY;
+    let mut stack = Vec::new();
+    while let Some((error, id)) = needed.pop() {
+        let step = trace.links[id as usize];
+        if done[step as usize] {
+            continue;
+        }
+        level = level.min(f64::from_bits(error));
+        stack.push(step);
+        while let Some(step) = stack.pop() {
+            if std::mem::replace(&mut done[step as usize], true) {
+                continue;
+            }
+            // The parents follow at the same level; nothing is popped from the heap before all are done.
+            steps[step as usize].threshold = level;
+            for removing in steps[step as usize].removed.clone() {
+                let own = trace.links[base + removing] as usize;
+                if own >= base {
+                    let parent = steps.partition_point(|s| s.inserted.end <= own - base);
+                    stack.push(parent as u32);
+                }
+            }
+            needed.extend(steps[step as usize].inserted.clone().filter_map(|i| entry(base + i)));
+        }
+    }
+}
+
 /// What is known of the tetrahedron in a slot.
 #[derive(Clone, Copy)]
 struct Bucket {
+    /// The tetrahedron's number.
+    number: u32,
     /// The first of its points; the others follow in [`Greedy::next`].
     first: u32,
     /// The largest error of its points.
@@ -80,7 +129,7 @@ struct Bucket {
     stamp: u32,
 }
 
-const NO_BUCKET: Bucket = Bucket { first: NONE, error: 0.0, chosen: NONE, stamp: 0 };
+const NO_BUCKET: Bucket = Bucket { number: NONE, first: NONE, error: 0.0, chosen: NONE, stamp: 0 };
 
 /// A tetrahedron in the heap. Those that are gone are known by their stamps.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -129,6 +178,7 @@ struct Greedy<'a> {
     /// The fields' slopes, in levels a step: of each cell all fields.
     slopes: Vec<[f64; 3]>,
     sequence: Sequence,
+    trace: Trace,
 }
 
 impl<'a> Greedy<'a> {
@@ -146,6 +196,7 @@ impl<'a> Greedy<'a> {
             cells: Vec::new(),
             moves: Vec::new(),
             slopes: Vec::new(),
+            trace: Trace { errors: vec![0.0; base.len()], links: vec![NONE; base.len()] },
             sequence: Sequence { base, ..Sequence::default() },
             mesh,
         }
@@ -158,9 +209,12 @@ impl<'a> Greedy<'a> {
             at = self.mesh.locate(v, at);
             self.next[v as usize] = std::mem::replace(&mut self.buckets[at as usize].first, v);
         }
-        let slots: Vec<u32> =
-            self.mesh.finite_slots().filter(|&t| self.buckets[t as usize].first != NONE).collect();
-        for slot in slots {
+        let slots: Vec<u32> = self.mesh.finite_slots().collect();
+        for (number, slot) in (0..).zip(slots) {
+            self.buckets[slot as usize].number = number;
+            if self.buckets[slot as usize].first == NONE {
+                continue;
+            }
             let tet = self.mesh.tet(slot);
             self.cells.clear();
             self.slopes.clear();
@@ -173,6 +227,7 @@ impl<'a> Greedy<'a> {
                 p = self.next[p as usize];
             }
             self.settle(0, slot);
+            self.trace.errors[number as usize] = self.cells[0].error;
         }
     }
 
@@ -207,13 +262,13 @@ impl<'a> Greedy<'a> {
     }
 
     fn insert_worst(&mut self, slot: u32) -> Result<(), BuildError> {
-        let v = self.choose(slot)?;
+        let v = self.buckets[slot as usize].chosen;
         self.prepare(v, slot)?;
         self.mesh.carry_out(v);
         if self.mesh.slots() > self.buckets.len() {
             self.buckets.resize(self.mesh.slots(), NO_BUCKET);
         }
-        self.record(v);
+        self.record(v)?;
         for i in 0..self.mesh.removed().len() {
             self.empty(self.mesh.removed()[i].1);
         }
@@ -231,10 +286,6 @@ impl<'a> Greedy<'a> {
             self.heap.retain(|c| self.buckets[c.slot as usize].stamp == c.stamp);
         }
         Ok(())
-    }
-
-    fn choose(&mut self, slot: u32) -> Result<u32, BuildError> {
-        Ok(self.buckets[slot as usize].chosen)
     }
 
     /// Plans the insertion of `v` and finds where the points go, and the errors there. Returns the largest.
@@ -258,24 +309,35 @@ impl<'a> Greedy<'a> {
         Ok(largest)
     }
 
-    fn record(&mut self, v: u32) {
+    fn record(&mut self, v: u32) -> Result<(), BuildError> {
+        let step = self.sequence.steps.len() as u32;
         let start = self.sequence.tets.len();
         let mut error = 0.0_f64;
         for &(tet, slot) in self.mesh.removed() {
+            let Bucket { number, error: own, .. } = self.buckets[slot as usize];
+            error = error.max(own);
             self.sequence.tets.push(tet);
-            error = error.max(self.buckets[slot as usize].error);
+            self.trace.errors.push(own);
+            self.trace.links.push(number);
+            self.trace.links[number as usize] = step;
         }
         let middle = self.sequence.tets.len();
-        let star = self.mesh.star().iter().filter(|&&t| !self.mesh.is_ghost(t));
-        self.sequence.tets.extend(star.map(|&t| self.mesh.tet(t)));
+        for (cell, &slot) in self.cells.iter().zip(self.mesh.star()).filter(|(cell, _)| !cell.is_ghost()) {
+            self.buckets[slot as usize].number = self.trace.links.len() as u32;
+            self.sequence.tets.push(cell.tet);
+            self.trace.errors.push(cell.error.max(0.0));
+            self.trace.links.push(NONE);
+        }
         let end = self.sequence.tets.len();
         self.sequence.steps.push(Insertion {
             vertex: v,
             removed: start..middle,
             inserted: middle..end,
             error,
+            threshold: 0.0,
             step: 0.0,
         });
+        if self.trace.links.len() >= NONE as usize { Err(BuildError::TooLarge) } else { Ok(()) }
     }
 
     fn lay_out_star(&mut self, v: u32) {
@@ -314,7 +376,8 @@ impl<'a> Greedy<'a> {
     fn empty(&mut self, slot: u32) {
         let bucket = &mut self.buckets[slot as usize];
         self.live -= usize::from(bucket.first != NONE);
-        *bucket = Bucket { stamp: bucket.stamp.wrapping_add(1), ..NO_BUCKET };
+        bucket.stamp = bucket.stamp.wrapping_add(1);
+        (bucket.first, bucket.error, bucket.chosen) = (NONE, 0.0, NONE);
     }
 
     /// The cell of the star of `v` that contains point `p`, walking from `from`.

@@ -39,6 +39,10 @@ pub(super) struct Insertion {
     pub inserted: Range<usize>,
     /// The largest error of a tetrahedron that it removes, as a fraction of a field's range; it need not be monotone.
     pub error: f64,
+    /// Below which errors the insertion is needed: the largest ε such that the smallest consistent set without a
+    /// tetrahedron of an error above ε holds it. It does not grow from parents to children, so for every ε the
+    /// insertions of a larger threshold are a consistent set, and its mesh is within ε.
+    pub threshold: f64,
     /// What has to be added to the errors of the insertions that depend on this one before they bound its own from
     /// below: how far the boundary moves, as an error. 0 where the boundary stays.
     pub step: f64,
