@@ -48,6 +48,9 @@ pub fn edge_mt(
     if mesh.positions.len() > MAX_UPDATES as usize {
         return Err(BuildError::TooLarge);
     }
+    if mesh.tets.is_empty() {
+        return Err(BuildError::Empty);
+    }
     mesh::check(mesh).map_err(BuildError::Mesh)?;
     let Topology { neighbors, non_manifold: frozen, .. } =
         mesh::topology(mesh.positions.len(), &mesh.tets).map_err(BuildError::Mesh)?;

@@ -154,19 +154,18 @@ impl Triangulation {
 
     /// The slots of the tetrahedra inside the hull.
     pub fn finite_slots(&self) -> impl Iterator<Item = u32> + '_ {
+        self.slots_in_use().filter(|&t| !self.is_ghost(t))
+    }
+
+    fn slots_in_use(&self) -> impl Iterator<Item = u32> + '_ {
         let mut free = vec![false; self.tets.len()];
         self.free.iter().for_each(|&t| free[t as usize] = true);
-        (0..self.tets.len() as u32).filter(move |&t| !free[t as usize] && !self.is_ghost(t))
+        (0..self.tets.len() as u32).filter(move |&t| !free[t as usize])
     }
 
     /// The tetrahedron in a slot.
     pub fn tet(&self, t: u32) -> [u32; 4] {
         self.tets[t as usize]
-    }
-
-    /// The neighbours of the tetrahedron in a slot; they may be ghosts.
-    pub fn neighbors(&self, t: u32) -> [u32; 4] {
-        self.neighbors[t as usize]
     }
 
     /// A bound of the slots in use.
@@ -195,6 +194,7 @@ impl Triangulation {
     }
 
     /// How many zones have been cut.
+    #[cfg(test)]
     pub fn cuts(&self) -> usize {
         self.cuts
     }
@@ -671,18 +671,25 @@ fn bounds(points: &[[i32; 3]]) -> Option<[[i32; 3]; 2]> {
 impl Triangulation {
     /// The vertices at which three or more planes of the hull meet.
     fn extreme_vertices(&self) -> Vec<u32> {
-        let infinite = self.points.len() as u32;
-        let mut free = vec![false; self.tets.len()];
-        self.free.iter().for_each(|&t| free[t as usize] = true);
         let mut faces: Vec<(u32, u32)> = Vec::new();
-        for t in (0..self.tets.len() as u32).filter(|&t| !free[t as usize]) {
-            if self.tets[t as usize][3] == infinite {
-                faces.extend(self.tets[t as usize][..3].iter().map(|&v| (v, t)));
-            }
+        for t in self.slots_in_use().filter(|&t| self.is_ghost(t)) {
+            faces.extend(self.tets[t as usize][..3].iter().map(|&v| (v, t)));
         }
         faces.sort_unstable();
         let around = faces.chunk_by(|a, b| a.0 == b.0);
         around.filter(|around| self.planes(around) >= 3).map(|around| around[0].0).collect()
+    }
+
+    /// The area of the hull with the points in these places.
+    pub fn hull_area(&self, positions: &[[i32; 3]]) -> f64 {
+        let area = |t: u32| {
+            let [a, b, c, _] = self.tets[t as usize];
+            let at = |v: u32| positions[v as usize].map(f64::from);
+            let [u, v] = [b, c].map(|w| [0, 1, 2].map(|i| at(w)[i] - at(a)[i]));
+            let normal = [0, 1, 2].map(|i| u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3]);
+            0.5 * normal.iter().map(|x| x * x).sum::<f64>().sqrt()
+        };
+        self.slots_in_use().filter(|&t| self.is_ghost(t)).map(area).sum()
     }
 
     /// How many planes the hull has at a vertex: 3 stands for any larger number.

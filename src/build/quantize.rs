@@ -55,10 +55,8 @@ impl Quantized {
     }
 }
 
+/// Puts the points on a lattice that keeps the cells positive; there need not be any.
 pub(super) fn quantize(mesh: &TetMesh, config: &BuildConfig) -> Result<Quantized, BuildError> {
-    if mesh.tets.is_empty() {
-        return Err(BuildError::Empty);
-    }
     if !(1..=MAX_FIELD_BITS).contains(&config.field_bits) {
         return Err(BuildError::Option { name: "field-bits", expected: "1 to 24" });
     }

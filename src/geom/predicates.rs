@@ -206,4 +206,114 @@ mod tests {
             }
         }
     }
+
+    /// The slow, plain twin of [`insphere`]: the expansion by minors of Shewchuk's matrix, in integers of any size.
+    #[cfg(not(target_arch = "wasm32"))]
+    fn plain_insphere(corners: [[i32; 3]; 4], e: [i32; 3]) -> i32 {
+        use num_bigint::BigInt;
+        use num_bigint::Sign;
+        let rows: Vec<Vec<BigInt>> = corners
+            .iter()
+            .map(|p| {
+                let mut row: Vec<BigInt> =
+                    (0..3).map(|i| BigInt::from(i64::from(p[i]) - i64::from(e[i]))).collect();
+                row.push(row.iter().map(|x| x * x).sum());
+                row
+            })
+            .collect();
+        let mut sum = BigInt::from(0);
+        for columns in permutations() {
+            let product: BigInt = (0..4).map(|i| rows[i][columns[i]].clone()).product();
+            let swaps = (0..4).flat_map(|j| (0..j).map(move |i| (i, j)));
+            let odd = swaps.filter(|&(i, j)| columns[i] > columns[j]).count() % 2 == 1;
+            sum += if odd { -product } else { product };
+        }
+        // The matrix's determinant is negative inside for tetrahedra that are positive here.
+        match sum.sign() {
+            Sign::Plus => -1,
+            Sign::NoSign => 0,
+            Sign::Minus => 1,
+        }
+    }
+
+    #[cfg(not(target_arch = "wasm32"))]
+    fn permutations() -> impl Iterator<Item = [usize; 4]> {
+        let all = (0..256).map(|code| [code & 3, code >> 2 & 3, code >> 4 & 3, code >> 6]);
+        all.filter(|p| (0..4).all(|k| p.contains(&k)))
+    }
+
+    /// A pseudo-random number below `2^bits` or close to one of the ends.
+    #[cfg(not(target_arch = "wasm32"))]
+    fn number(state: &mut u64, bits: u32) -> i32 {
+        *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        let near = (*state >> 60) as i64;
+        let any = (*state >> 20) as i64 & ((1 << bits) - 1);
+        match *state >> 57 & 3 {
+            0 => near.min(1 << bits) as i32,
+            1 => ((1 << bits) - near).max(0) as i32,
+            _ => any as i32,
+        }
+    }
+
+    #[cfg(not(target_arch = "wasm32"))]
+    #[test]
+    fn insphere_equals_its_plain_twin_on_every_lattice() {
+        let mut state = 1;
+        for bits in [1, 3, SHORT_BITS, SHORT_BITS + 1, NARROW_BITS, NARROW_BITS + 1, 25, WIDE_BITS] {
+            for _ in 0..3000 {
+                let [a, b, c, d, e] = [(); 5].map(|()| [(); 3].map(|()| number(&mut state, bits)));
+                assert_eq!(
+                    insphere(a, b, c, d, e),
+                    plain_insphere([a, b, c, d], e),
+                    "{a:?} {b:?} {c:?} {d:?} {e:?}"
+                );
+                // Corners of a box are cospherical, and their neighbours nearly so.
+                let box_corner = |k: i32| [0, 1, 2].map(|i| if k >> i & 1 == 0 { a[i] } else { b[i] });
+                let codes = [(); 5].map(|()| number(&mut state, 3) & 7);
+                let [p, q, r, s, t] = codes.map(box_corner);
+                assert_eq!(insphere(p, q, r, s, t), 0);
+                let t = [t[0] ^ 1, t[1], t[2]];
+                assert_eq!(
+                    insphere(p, q, r, s, t),
+                    plain_insphere([p, q, r, s], t),
+                    "{p:?} {q:?} {r:?} {s:?} {t:?}"
+                );
+                assert_eq!(
+                    insphere_wide([p, q, r, s].map(|u| [0, 1, 2].map(|i| i64::from(u[i]) - i64::from(t[i])))),
+                    plain_insphere([p, q, r, s], t)
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn perturbation_puts_each_of_five_points_on_a_side_that_fits_the_others() {
+        // For five cospherical points either of the two triangulations of their hull is chosen: the tetrahedra that
+        // are in conflict with the fifth point are not in it, so some are and some are not.
+        let cube = |k: i32| [k & 1, k >> 1 & 1, k >> 2];
+        for code in 0..8_i32.pow(5) {
+            let five = [0, 1, 2, 3, 4].map(|i| code >> (3 * i) & 7);
+            let points = five.map(cube);
+            let distinct = (0..5).all(|i| (0..i).all(|j| five[i] != five[j]));
+            if !distinct {
+                continue;
+            }
+            let tet = |skip: usize| {
+                let mut rest = [[0; 3]; 4];
+                let mut others = (0..5).filter(|&k| k != skip).map(|k| points[k]);
+                rest.fill_with(|| others.next().unwrap_or_default());
+                match orient3d(rest[0], rest[1], rest[2], rest[3]) {
+                    0 => None,
+                    side if side < 0 => Some([rest[1], rest[0], rest[2], rest[3]]),
+                    _ => Some(rest),
+                }
+            };
+            let volume = |empty: bool| -> i128 {
+                let tets = (0..5).filter_map(|skip| tet(skip).map(|t| (t, points[skip])));
+                let chosen = tets.filter(|&([a, b, c, d], e)| in_conflict(a, b, c, d, e) != empty);
+                chosen.map(|([a, b, c, d], _)| orient3d(a, b, c, d)).sum()
+            };
+            assert_eq!(volume(true), volume(false), "{points:?}");
+        }
+    }
 }
