@@ -47,6 +47,9 @@ const SMALL_LINK: usize = 65;
 /// Stars of more vertices are sorted instead.
 const LARGEST_TABLE: usize = 1024;
 
+/// Slots are numbered in 30 bits, and an insertion may need very many at once.
+const MOST_SLOTS: usize = 1 << 29;
+
 /// A face of a zone's boundary.
 #[derive(Clone, Copy)]
 pub(super) struct LinkFace {
@@ -109,6 +112,9 @@ impl Triangulation {
             mesh.refuse_duplicate(v, at)?;
             mesh.insert(v, at);
             at = mesh.star[0];
+            if mesh.slots() > MOST_SLOTS {
+                return Err(BuildError::TooLarge);
+            }
         }
         Ok(mesh)
     }
@@ -597,12 +603,13 @@ impl Triangulation {
     fn free_a_vertex(&mut self, kept: &mut Vec<u32>, protected: &[u32], p: [i32; 3]) -> bool {
         let outside = self.epoch + 1;
         for &t in kept.iter() {
-            for i in 0..4 {
+            let tet = self.tets[t as usize];
+            for (i, face) in FACES.iter().enumerate() {
                 let next = self.neighbors[t as usize][i];
                 let inside = self.marks[next as usize] == self.epoch
                     || (self.is_ghost(next) && self.side(t, i, p) == 0);
                 if !inside {
-                    FACES[i].iter().for_each(|&k| self.local[self.tets[t as usize][k] as usize][0] = outside);
+                    face.iter().for_each(|&k| self.local[tet[k] as usize][0] = outside);
                 }
             }
         }

@@ -209,7 +209,7 @@ impl<'a> Greedy<'a> {
 
     /// Puts all points but the corners into the buckets of the base mesh.
     fn distribute(&mut self, corners: &[u32]) {
-        let mut at = 0;
+        let Some(mut at) = self.mesh.finite_slots().next() else { return };
         for v in (0..self.next.len() as u32).filter(|v| corners.binary_search(v).is_err()) {
             at = self.mesh.locate(v, at);
             self.next[v as usize] = std::mem::replace(&mut self.buckets[at as usize].first, v);
@@ -493,9 +493,10 @@ mod tests {
     use super::super::delaunay::delaunay;
     use super::super::quantize::quantize;
     use super::*;
-    use crate::generate;
+    use crate::geom::WIDE_BITS;
     use crate::geom::in_conflict;
     use crate::mesh::Field;
+    use crate::mesh::Grid;
     use crate::mesh::TetMesh;
     use crate::mesh::kuhn_tets;
     use crate::mesh::neighbors;
@@ -503,7 +504,11 @@ mod tests {
     use std::ops::ControlFlow;
 
     fn inserted(mesh: &TetMesh) -> Result<(Quantized, Sequence), BuildError> {
-        let config = BuildConfig { fields: names(mesh), ..BuildConfig::default() };
+        inserted_on(mesh, None)
+    }
+
+    fn inserted_on(mesh: &TetMesh, bits: Option<u32>) -> Result<(Quantized, Sequence), BuildError> {
+        let config = BuildConfig { fields: names(mesh), position_bits: bits, ..BuildConfig::default() };
         let quantized = quantize(mesh, &config)?;
         let sequence = insert(&quantized, &mesh.tets, &mut |_| ControlFlow::Continue(()))?;
         Ok((quantized, sequence))
@@ -511,6 +516,20 @@ mod tests {
 
     fn names(mesh: &TetMesh) -> Vec<String> {
         mesh.fields.iter().map(|field| field.name.clone()).collect()
+    }
+
+    /// A grid with a field that has a few narrow bumps.
+    fn bumps(size: u32) -> TetMesh {
+        let grid = Grid { dims: [size; 3], origin: [0.0; 3], spacing: [1.0; 3] };
+        let mut mesh = TetMesh::from_grid(grid, Vec::new());
+        let place = |p: &[f64; 3]| p.map(|x| x / f64::from(size - 1));
+        let bump = |p: [f64; 3], c: [f64; 3]| {
+            1.0 / (1.0 + 100.0 * (0..3).map(|i| (p[i] - c[i]).powi(2)).sum::<f64>())
+        };
+        let at = [[0.2, 0.3, 0.4], [0.7, 0.6, 0.1], [0.5, 0.9, 0.8]];
+        let values = mesh.positions.iter().map(|p| at.iter().map(|&c| bump(place(p), c)).sum()).collect();
+        mesh.fields.push(Field { name: "bumps".to_owned(), values });
+        mesh
     }
 
     /// Points that look random, some in one plane, with two fields.
@@ -588,7 +607,7 @@ mod tests {
 
     #[test]
     fn a_grid_is_inserted_into_its_box_until_every_cell_is_there() {
-        let mesh = generate::bucky(9).unwrap();
+        let mesh = bumps(9);
         let (quantized, sequence) = inserted(&mesh).unwrap();
         assert_eq!(sequence.base.len(), 6);
         let wanted: BTreeSet<[u32; 4]> = kuhn_tets([9; 3]).into_iter().map(sorted).collect();
@@ -597,17 +616,30 @@ mod tests {
 
     #[test]
     fn points_without_a_mesh_are_inserted_into_their_hull() {
-        let (quantized, sequence) = inserted(&scattered(400, 40)).unwrap();
-        let last = replayed(&quantized, &sequence);
-        let wanted = delaunay(&quantized.positions).unwrap();
-        assert_eq!(last, wanted.into_iter().map(sorted).collect());
-        let all: Vec<[u32; 4]> = last.into_iter().collect();
-        neighbors(&all).unwrap();
+        for bits in [None, Some(7), Some(WIDE_BITS)] {
+            let (quantized, sequence) = inserted_on(&scattered(400, 40), bits).unwrap();
+            let last = replayed(&quantized, &sequence);
+            let wanted = delaunay(&quantized.positions).unwrap();
+            assert_eq!(last, wanted.into_iter().map(sorted).collect());
+            let all: Vec<[u32; 4]> = last.into_iter().collect();
+            neighbors(&all).unwrap();
+        }
+    }
+
+    #[test]
+    fn a_mesh_that_is_convex_but_for_rounding_is_accepted() {
+        let mut mesh = scattered(400, 40);
+        let places: Vec<[i32; 3]> = mesh.positions.iter().map(|p| p.map(|x| x as i32)).collect();
+        mesh.tets = delaunay(&places).unwrap();
+        assert!(inserted_on(&mesh, Some(12)).is_ok());
+        // Without the tetrahedra around a point it is not convex.
+        mesh.tets.retain(|tet| !tet.contains(&200));
+        assert_eq!(inserted_on(&mesh, Some(12)).err(), Some(BuildError::NotConvex));
     }
 
     #[test]
     fn errors_are_those_of_the_points_in_what_is_removed() {
-        for mesh in [generate::bucky(7).unwrap(), scattered(150, 20)] {
+        for mesh in [bumps(7), scattered(150, 20)] {
             let (quantized, sequence) = inserted(&mesh).unwrap();
             for step in &sequence.steps {
                 let removed = &sequence.tets[step.removed.clone()];
@@ -624,7 +656,7 @@ mod tests {
 
     #[test]
     fn thresholds_select_consistent_sets_within_their_error() {
-        let mesh = generate::bucky(9).unwrap();
+        let mesh = bumps(9);
         let (quantized, sequence) = inserted(&mesh).unwrap();
         for limit in [0.3, 0.1, 0.05, 0.01, 0.002] {
             let mut current: BTreeSet<[u32; 4]> = sequence.base.iter().map(|&tet| sorted(tet)).collect();
@@ -650,7 +682,7 @@ mod tests {
     #[test]
     fn narrow_limits_are_kept_by_leaving_delaunay() {
         let limits = Limits { removed: 24, inserted: 30, link: 17 };
-        for mesh in [generate::bucky(9).unwrap(), scattered(500, 30)] {
+        for mesh in [bumps(9), scattered(500, 30)] {
             let positions = quantize_points(&mesh);
             let corners = extreme_points(&positions).unwrap();
             let mut triangulation = Triangulation::of(&positions, &corners).unwrap();
@@ -707,14 +739,16 @@ mod tests {
     #[test]
     fn what_cannot_be_inserted_is_refused() {
         let error = |mesh: &TetMesh| inserted(mesh).err();
-        assert_eq!(error(&generate::sphere_flow(5).unwrap()), Some(BuildError::NotConvex));
-        let mut twice = generate::bucky(4).unwrap();
+        let mut hollow = bumps(5);
+        hollow.tets.retain(|tet| !tet.contains(&62));
+        assert_eq!(error(&hollow), Some(BuildError::NotConvex));
+        let mut twice = bumps(4);
         twice.grid = None;
         twice.positions.push(twice.positions[21]);
         twice.fields[0].values.push(0.0);
         assert_eq!(error(&twice), Some(BuildError::SamePlace { points: [21, 64] }));
         let stopped = {
-            let mesh = generate::bucky(4).unwrap();
+            let mesh = bumps(4);
             let quantized = quantize(&mesh, &BuildConfig::default()).unwrap();
             insert(&quantized, &mesh.tets, &mut |_| ControlFlow::Break(()))
         };
