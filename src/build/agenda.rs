@@ -5,10 +5,35 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 /// Errors that nobody tells apart are ordered by other things: depth of the partial order, size of the star, length of
-/// the edge. Below this error nobody cares; above it, levels of half a power of two group them.
+/// the edge. Below this error nobody cares; above it, levels group them.
 const FINEST: f64 = 2e-4;
-/// Bits of an error's code that do not count for its level.
-const LEVEL_BITS: u32 = 10;
+
+/// How errors are grouped.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Levels {
+    /// Bits of an error's code that do not count for its level.
+    bits: u32,
+}
+
+impl Levels {
+    /// Half a power of two each.
+    pub const HALVES: Self = Self { bits: 10 };
+    /// A quarter of a power of two each.
+    pub const QUARTERS: Self = Self { bits: 9 };
+
+    /// The level of an error. Stored errors are logarithmic, so their codes are; no logarithm is taken, since the
+    /// libraries of different platforms round it differently.
+    pub fn of(self, error: f64) -> u16 {
+        let code = ErrorCode::at_least(error).max(ErrorCode::at_least(FINEST));
+        code.0 >> self.bits
+    }
+
+    /// The largest error of a level; of the last one, any.
+    pub fn largest(self, level: u16) -> f64 {
+        let code = ErrorCode(level << self.bits | ((1 << self.bits) - 1));
+        if code == ErrorCode::MAX { f64::INFINITY } else { code.error() }
+    }
+}
 
 /// The order of candidates: error level, then depth plus star size, then length; ties by vertex numbers.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -22,11 +47,10 @@ pub(super) struct Key {
 
 impl Key {
     /// `second` is depth plus star size.
-    pub fn new(error: f64, second: u32, length: f32, a: u32, b: u32) -> Self {
+    pub fn new(level: u16, second: u32, length: f32, a: u32, b: u32) -> Self {
         let second = second.min(u32::from(u16::MAX));
         // Bits of floats that are not negative compare as the floats do.
-        let cost =
-            u64::from(error_level(error)) << 48 | u64::from(second) << 32 | u64::from(length.to_bits());
+        let cost = u64::from(level) << 48 | u64::from(second) << 32 | u64::from(length.to_bits());
         Self { cost, a, b }
     }
 
@@ -93,16 +117,4 @@ impl Agenda {
         }
         next.is_some()
     }
-}
-
-/// The level of an error. Stored errors are logarithmic, so their codes are; no logarithm is taken, since the libraries
-/// of different platforms round it differently.
-fn error_level(error: f64) -> u16 {
-    let code = ErrorCode::at_least(error).max(ErrorCode::at_least(FINEST));
-    code.0 >> LEVEL_BITS
-}
-
-/// The largest error of a level.
-pub(super) fn level_error(level: u16) -> f64 {
-    ErrorCode(level << LEVEL_BITS | ((1 << LEVEL_BITS) - 1)).error()
 }

@@ -8,7 +8,7 @@ use super::BuildSummary;
 use super::OnProgress;
 use super::agenda::Agenda;
 use super::agenda::Key;
-use super::agenda::level_error;
+use super::agenda::Levels;
 use super::cost::Buckets;
 use super::cost::Evaluator;
 use super::cost::Reference;
@@ -82,6 +82,9 @@ pub fn edge_mt(
     };
     Ok(BuildResult { mt, summary })
 }
+
+/// How errors are grouped.
+const LEVELS: Levels = Levels::HALVES;
 
 struct Builder<'a> {
     mesh: WorkMesh,
@@ -213,7 +216,7 @@ impl<'a> Builder<'a> {
     fn key(&self, error: f64, height: u32, star: u32, a: u32, b: u32) -> Key {
         let (p, q) = (self.data.positions[a as usize], self.data.positions[b as usize]);
         let length: f32 = (0..3).map(|i| (i64::from(p[i]) - i64::from(q[i])) as f32).map(|d| d * d).sum();
-        Key::new(error, height + star, length, a, b)
+        Key::new(LEVELS.of(error), height + star, length, a, b)
     }
 
     /// A key from what the ends know: second differences of the fields, errors and depths so far.
@@ -245,7 +248,7 @@ impl<'a> Builder<'a> {
             Err(Refusal::Gone | Refusal::Never) => return,
         }
         let Self { plan, mesh, data, buckets, reference, evaluator, .. } = self;
-        let limit = level_error(key.level());
+        let limit = LEVELS.largest(key.level());
         let error = evaluator.evaluate(plan, mesh, data, buckets, reference, limit);
         let exact = self.key(error, self.evaluator.height, self.plan.stay.len() as u32, a, b);
         if exact.urgency() > key.urgency() {

@@ -7,7 +7,7 @@ use super::Criterion;
 use super::OnProgress;
 use super::agenda::Agenda;
 use super::agenda::Key;
-use super::agenda::level_error;
+use super::agenda::Levels;
 use super::cost::Buckets;
 use super::cost::Reference;
 use super::fill_cost::FillCost;
@@ -34,6 +34,9 @@ use crate::mesh::Topology;
 use crate::mt::ErrorCode;
 use crate::mt::MAX_UPDATES;
 use glam::DVec3;
+
+/// How errors are grouped. Finer levels than those of edge collapses give smaller meshes here, and deeper orders.
+const LEVELS: Levels = Levels::QUARTERS;
 
 /// What [`decimate`] hands over.
 pub(super) struct Decimated {
@@ -99,9 +102,11 @@ struct Decimator<'a> {
     versions: Vec<u32>,
     /// The version that a vertex had when it was looked at last.
     seen: Vec<u32>,
+    /// Tetrahedra around each vertex.
+    degrees: Vec<u32>,
     agenda: Agenda,
-    /// Vertices that could not be removed, with their versions then.
-    blocked: Vec<(u32, u32)>,
+    /// The one candidate in the agenda that counts for each vertex.
+    entries: Vec<Option<Key>>,
     hole: Hole,
     star: Vec<StarTet>,
     /// Link vertices by what is predicted of contracting the edge to them.
@@ -135,6 +140,8 @@ impl<'a> Decimator<'a> {
         let scaled = |q: &[i32; 3]| DVec3::from_array(q.map(f64::from)) * step;
         let places: Vec<DVec3> = quantized.positions.iter().map(scaled).collect();
         let skin = Skin::new(&mesh.tets, &mesh.neighbors, &places);
+        let mut degrees = vec![0; points];
+        mesh.tets.iter().flatten().for_each(|&v| degrees[v as usize] += 1);
         let wraps = criterion == Criterion::Delaunay;
         Self {
             gradients: quantized.gradients(&mesh.tets),
@@ -147,8 +154,9 @@ impl<'a> Decimator<'a> {
             past: Past::new(mesh.tets.len()),
             versions: vec![0; points],
             seen: vec![u32::MAX; points],
+            degrees,
             agenda: Agenda::default(),
-            blocked: Vec::new(),
+            entries: vec![None; points],
             hole: Hole::default(),
             star: Vec::new(),
             ends: Vec::new(),
@@ -163,7 +171,7 @@ impl<'a> Decimator<'a> {
     fn remove_all(&mut self, progress: OnProgress<'_>) -> Result<(), BuildError> {
         for v in 0..self.reference.points {
             if self.mesh.has(v) && !self.frozen[v as usize] {
-                self.agenda.push(Key::new(0.0, 0, 0.0, v, NONE));
+                self.push(self.guess(v, 0));
             }
         }
         let mut steps = 0_u64;
@@ -176,39 +184,47 @@ impl<'a> Decimator<'a> {
                     return Err(BuildError::Stopped);
                 }
             }
-            if let Some(key) = self.agenda.pop() {
-                self.try_remove(key);
-            } else {
-                let more = self.agenda.next_level();
-                if !self.retry_blocked() && !more {
-                    return Ok(());
-                }
+            match self.agenda.pop() {
+                Some(key) => self.try_remove(key),
+                None if self.agenda.next_level() => {}
+                None => return Ok(()),
             }
         }
     }
 
-    /// Puts those blocked vertices back whose neighbourhood has changed. Tells whether there were any.
-    fn retry_blocked(&mut self) -> bool {
-        let Self { blocked, versions, agenda, .. } = self;
-        let before = blocked.len();
-        blocked.retain(|&(a, version)| {
-            if versions[a as usize] == version {
-                return true;
-            }
-            agenda.push(Key::new(0.0, 0, 0.0, a, NONE).no_earlier_than(agenda.level()));
-            false
-        });
-        blocked.len() < before
+    /// Makes a candidate the one that counts for its vertex.
+    fn push(&mut self, key: Key) {
+        self.entries[key.a as usize] = Some(key);
+        self.agenda.push(key);
     }
 
+    /// A key to be looked at soon: the error may be that of the level that is worked on.
+    fn guess(&self, a: u32, height: u32) -> Key {
+        let second = height + self.degrees[a as usize];
+        Key::new(self.agenda.level().max(LEVELS.of(0.0)), second, 0.0, a, NONE)
+    }
+
+    /// Looks at a candidate. What cannot be removed is left alone until its neighbourhood changes.
     fn try_remove(&mut self, key: Key) {
         let a = key.a;
+        if self.entries[a as usize] != Some(key) {
+            return;
+        }
+        self.entries[a as usize] = None;
         let version = self.versions[a as usize];
         if self.hole.open(&mut self.mesh, &self.reference.quantized.positions, a).is_err() {
-            self.blocked.push((a, version));
+            return;
+        }
+        if self.hole.star.len() < self.degrees[a as usize] as usize {
+            // What is around it touches itself elsewhere, which only an input that overlaps itself leads to.
             return;
         }
         let legacy = self.past.legacy(&self.hole, &self.reference);
+        let least = LEVELS.of(legacy.error);
+        if least > key.level() {
+            self.push(Key::new(least, legacy.height, 0.0, a, NONE));
+            return;
+        }
         let known = self.seen[a as usize] == version && key.b != NONE;
         self.seen[a as usize] = version;
         let exact = match self.criterion {
@@ -216,16 +232,17 @@ impl<'a> Decimator<'a> {
             Criterion::Delaunay => self.wrap(key, legacy),
         };
         match exact {
-            None => self.blocked.push((a, version)),
-            Some(exact) if exact.urgency() > key.urgency() => self.agenda.push(exact),
+            None => {}
+            Some(exact) if exact.urgency() > key.urgency() => self.push(exact),
             Some(_) => self.perform(legacy),
         }
     }
 
-    fn key(&self, error: f64, height: u32, b: u32) -> Key {
-        let a = self.hole.a;
-        let length = if b == NONE { 0.0 } else { self.squared_length(a, b) };
-        Key::new(error, height + self.hole.star.len() as u32, length, a, b)
+    /// The key of a filling of the hole: among equal errors shallow chains and few tetrahedra come first.
+    fn key(&self, candidate: &Candidate, height: u32, b: u32) -> Key {
+        let length = if b == NONE { 0.0 } else { self.squared_length(self.hole.a, b) };
+        let second = height + candidate.filling.tets.len() as u32;
+        Key::new(LEVELS.of(candidate.error), second, length, self.hole.a, b)
     }
 
     fn squared_length(&self, a: u32, b: u32) -> f32 {
@@ -254,17 +271,17 @@ impl<'a> Decimator<'a> {
             if !contract(&self.hole, positions, b, &mut self.now.filling) {
                 continue;
             }
-            // Inside, positive tetrahedra would do if the mesh did not overlap itself; behind a boundary that has moved far
-            // it may.
-            let Self { hole, mesh, marks, star, frozen, .. } = self;
-            let stays = hole.on_boundary() && frozen[b as usize];
-            if stays || !keeps_topology(hole, mesh, marks, star, b) {
-                continue;
+            if !self.reference.skin.at(b).is_empty() {
+                let Self { hole, mesh, marks, star, frozen, .. } = self;
+                let stays = hole.on_boundary() && frozen[b as usize];
+                if stays || !keeps_topology(hole, mesh, marks, star, b) {
+                    continue;
+                }
             }
-            let limit = level_error(found.map_or(key.level(), |found| found.level().min(key.level())));
+            let limit = LEVELS.largest(found.map_or(key.level(), |found| found.level().min(key.level())));
             let Self { hole, now, buckets, reference, .. } = self;
             now.error = now.cost.evaluate(hole, &now.filling, legacy, buckets, reference, limit);
-            let exact = self.key(self.now.error, legacy.height, b);
+            let exact = self.key(&self.now, legacy.height, b);
             if found.is_none_or(|found| exact < found) {
                 found = Some(exact);
                 std::mem::swap(&mut self.now, &mut self.best);
@@ -279,9 +296,9 @@ impl<'a> Decimator<'a> {
         if !gift_wrap.as_mut()?.fill(hole, &reference.quantized.positions, &mut best.filling) {
             return None;
         }
-        let limit = level_error(key.level());
+        let limit = LEVELS.largest(key.level());
         best.error = best.cost.evaluate(hole, &best.filling, legacy, buckets, reference, limit);
-        Some(self.key(self.best.error, legacy.height, NONE))
+        Some(self.key(&self.best, legacy.height, NONE))
     }
 
     fn perform(&mut self, legacy: Legacy) {
@@ -309,8 +326,21 @@ impl<'a> Decimator<'a> {
         past.makers.resize(mesh.tets.len(), NONE);
         slots.iter().for_each(|&t| past.makers[t as usize] = removal);
         best.cost.settle(hole, &best.filling, &mut self.buckets, &self.reference, slots);
-        for &v in &hole.link {
+        let stars = &sequence.tets[start..middle];
+        stars.iter().flatten().for_each(|&v| self.degrees[v as usize] -= 1);
+        best.filling.tets.iter().flatten().for_each(|&v| self.degrees[v as usize] += 1);
+        self.look_again_around(legacy.height);
+    }
+
+    /// The neighbours have other stars now, and may have become cheaper.
+    fn look_again_around(&mut self, height: u32) {
+        for i in 0..self.hole.link.len() {
+            let v = self.hole.link[i];
             self.versions[v as usize] = self.versions[v as usize].wrapping_add(1);
+            let key = self.guess(v, height + 1);
+            if !self.frozen[v as usize] && self.entries[v as usize].is_none_or(|entry| key < entry) {
+                self.push(key);
+            }
         }
     }
 }

@@ -19,7 +19,8 @@ const LARGEST_STAR: usize = 512;
 /// Fills the hole with tetrahedra at its link vertex `b`: false if one of them were not positive, or the boundary does
 /// not allow it.
 ///
-/// Inside, positive tetrahedra are all it takes: the hole is then star-shaped around `b`, too.
+/// Inside, positive tetrahedra are all it takes: the hole is then star-shaped around `b`, too. Next to the boundary, which
+/// may have come to overlap itself, [`keeps_topology`] has to be asked as well.
 pub(super) fn contract(hole: &Hole, positions: &[[i32; 3]], b: u32, filling: &mut Filling) -> bool {
     filling.clear();
     if hole.on_boundary() && hole.border.iter().flatten().filter(|&&v| v == b).count() != 2 {

@@ -343,3 +343,18 @@ fn the_work_can_be_stopped() {
         assert_eq!(stopped.err(), Some(BuildError::Stopped));
     }
 }
+
+/// Without any allowance each movement of the boundary is an infinite error.
+#[test]
+fn a_boundary_that_may_not_move_costs_all() {
+    let mesh = bent(blocks([4; 3], |_| true));
+    let config = BuildConfig { displacement: 0.0, ..BuildConfig::default() };
+    let result = decimate(&mesh, &config, Criterion::HalfEdge, &mut |_| ControlFlow::Continue(()))
+        .expect("a valid mesh");
+    let mut replay = Replay::new(&result.sequence.base);
+    let moves = |step: &&Insertion| step.step > 0.0;
+    assert!(result.sequence.steps.iter().filter(moves).all(|step| step.error == ErrorCode::MAX.error()));
+    assert!(result.sequence.steps.iter().any(|step| step.step > 0.0));
+    result.sequence.steps.iter().for_each(|step| replay.insert(&result, step));
+    assert_eq!(replay.0.len(), mesh.tets.len());
+}
