@@ -1,5 +1,6 @@
 //! Filling a hole by the Delaunay criterion, tetrahedron by tetrahedron from its faces.
 
+use super::cost::as_vec;
 use super::hole::Filling;
 use super::hole::Hole;
 use super::hole::sorted;
@@ -7,6 +8,7 @@ use super::in_sphere::InSphere;
 use crate::geom::orient3d;
 use crate::mesh::FACES;
 use crate::mesh::NONE;
+use glam::DVec3;
 
 /// The most tetrahedra that fill a hole.
 const MAX_FILLING: usize = 128;
@@ -43,23 +45,30 @@ impl GiftWrap {
         let faces = hole.faces.iter();
         open.extend(faces.map(|&(face, _)| OpenFace { face, key: sorted(face), behind: NONE }));
         while let Some(OpenFace { face, behind, .. }) = open.pop() {
-            let [x, y, z] = face.map(at);
-            if hole.on_boundary() && behind != NONE && hole.in_plane([x, y, z]) {
+            let corners = face.map(at);
+            if hole.on_boundary() && behind != NONE && hole.in_plane(corners) {
                 filling.border.push((behind, face));
                 continue;
             }
-            let mut apex = None;
-            for &v in &hole.link {
-                let p = at(v);
-                let nearer = match apex {
-                    None => true,
-                    Some(best) => spheres.contains([x, y, z, at(best)], p),
+            let pencil = Pencil::new(corners);
+            let mut apex: Option<(u32, Height)> = None;
+            for &v in hole.link.iter().filter(|v| !face.contains(v)) {
+                let height = pencil.height(at(v));
+                let in_front = height.side.sign().unwrap_or_else(|| {
+                    let [x, y, z] = corners;
+                    orient3d(x, y, z, at(v)) > 0
+                });
+                let is_nearer = |(best, lowest): &(u32, Height)| {
+                    height.is_below(lowest).unwrap_or_else(|| {
+                        let [x, y, z] = corners;
+                        spheres.contains([x, y, z, at(*best)], at(v))
+                    })
                 };
-                if orient3d(x, y, z, p) > 0 && nearer {
-                    apex = Some(v);
+                if in_front && apex.as_ref().is_none_or(is_nearer) {
+                    apex = Some((v, height));
                 }
             }
-            let Some(apex) = apex else { return false };
+            let Some((apex, _)) = apex else { return false };
             let t = filling.tets.len();
             if t == MAX_FILLING {
                 return false;
@@ -78,6 +87,85 @@ impl GiftWrap {
         }
         filling.moved = filling.border.len();
         fits(hole, positions, &filling.tets) && lay_border(hole, filling)
+    }
+}
+
+/// The spheres through the corners of a face, in floating point.
+///
+/// Seen from corner x, a sphere through the face and v has its centre at a height over the face that grows with
+/// `(|n|² |v|² − w · v) / (n · v)`: n is the face's normal, and w the vector in its plane for which this is 0 at the corners.
+struct Pencil {
+    origin: DVec3,
+    normal: DVec3,
+    normal_squared: f64,
+    w: DVec3,
+    /// No smaller than the terms that the normal is the sum of, and those of w.
+    normal_terms: f64,
+    w_terms: f64,
+}
+
+/// A number and how far it may be from the exact one.
+#[derive(Clone, Copy)]
+struct Near {
+    value: f64,
+    slack: f64,
+}
+
+/// Where a vertex stands among the spheres of a pencil: `over / side`.
+#[derive(Clone, Copy)]
+struct Height {
+    over: Near,
+    side: Near,
+}
+
+/// Far more than the rounding errors of a few dozen operations, relative to the largest terms.
+const ROUNDING: f64 = 1e-13;
+
+impl Pencil {
+    fn new(corners: [[i32; 3]; 3]) -> Self {
+        let [origin, y, z] = corners.map(as_vec);
+        let (y, z) = (y - origin, z - origin);
+        let normal = y.cross(z);
+        let (yy, zz) = (y.length_squared(), z.length_squared());
+        let w = z.cross(normal) * yy + normal.cross(y) * zz;
+        let normal_terms = (yy * zz).sqrt();
+        let w_terms = normal_terms * (yy * zz.sqrt() + zz * yy.sqrt());
+        Self { origin, normal, normal_squared: normal.length_squared(), w, normal_terms, w_terms }
+    }
+
+    fn height(&self, v: [i32; 3]) -> Height {
+        let v = as_vec(v) - self.origin;
+        let squared = v.length_squared();
+        let length = squared.sqrt();
+        let over = self.normal_squared * squared - self.w.dot(v);
+        let over_terms = self.normal_terms * self.normal_terms * squared + self.w_terms * length;
+        Height {
+            over: Near { value: over, slack: ROUNDING * over_terms },
+            side: Near { value: self.normal.dot(v), slack: ROUNDING * self.normal_terms * length },
+        }
+    }
+}
+
+impl Near {
+    /// Whether it is positive; none if that is too close to tell.
+    fn sign(self) -> Option<bool> {
+        (self.value.abs() > self.slack).then_some(self.value > 0.0)
+    }
+}
+
+impl Height {
+    /// Whether it is below the other, where both are in front of the face; none if that is too close to tell.
+    fn is_below(&self, other: &Self) -> Option<bool> {
+        let (a, b) = (self, other);
+        let slack = a.over.slack * b.side.value.abs()
+            + a.over.value.abs() * b.side.slack
+            + b.over.slack * a.side.value.abs()
+            + b.over.value.abs() * a.side.slack
+            + ROUNDING * (a.over.value * b.side.value).abs()
+            + ROUNDING * (b.over.value * a.side.value).abs()
+            + a.over.slack * b.side.slack
+            + b.over.slack * a.side.slack;
+        Near { value: b.over.value * a.side.value - a.over.value * b.side.value, slack }.sign()
     }
 }
 

@@ -5,7 +5,6 @@ use super::hole::Hole;
 use super::plan::VertexMarks;
 use super::work_mesh::StarTet;
 use super::work_mesh::WorkMesh;
-use crate::geom::orient3d;
 use crate::mesh::NONE;
 
 const NEAR_A: u32 = 1;
@@ -27,14 +26,14 @@ pub(super) fn contract(hole: &Hole, positions: &[[i32; 3]], b: u32, filling: &mu
         // An edge through the inside between two boundary vertices, or from the boundary into the inside.
         return false;
     }
-    let at = |v: u32| positions[v as usize];
-    let p = at(b);
-    for &(face, _) in hole.faces.iter().filter(|(face, _)| !face.contains(&b)) {
-        let [x, y, z] = face.map(at);
-        if orient3d(x, y, z, p) <= 0 {
-            return false;
+    let p = positions[b as usize];
+    for (i, &(face, _)) in hole.faces.iter().enumerate() {
+        if !face.contains(&b) {
+            if !hole.is_seen(i, p) {
+                return false;
+            }
+            filling.tets.push([face[0], face[1], face[2], b]);
         }
-        filling.tets.push([face[0], face[1], face[2], b]);
     }
     !filling.tets.is_empty()
         && (!hole.on_boundary() || hangs_together(&filling.tets, b))

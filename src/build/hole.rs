@@ -3,6 +3,7 @@
 use super::plan::Refusal;
 use super::work_mesh::StarTet;
 use super::work_mesh::WorkMesh;
+use crate::geom::NARROW_BITS;
 use crate::geom::orient3d;
 use crate::mesh::FACES;
 use crate::mesh::NONE;
@@ -27,6 +28,10 @@ pub(super) struct Hole {
     /// The planes of those triangles, if there are no more than two.
     planes: Vec<[[i32; 3]; 3]>,
     many_planes: bool,
+    /// For each of `faces` a corner and the normal.
+    sides: Vec<([i32; 3], [i64; 3])>,
+    /// Whether orientations fit `i64`.
+    narrow: bool,
 }
 
 /// Tetrahedra that fill a hole.
@@ -69,7 +74,38 @@ impl Hole {
             }
         }
         self.find_planes(positions);
+        self.find_sides(positions);
         Ok(())
+    }
+
+    fn find_sides(&mut self, positions: &[[i32; 3]]) {
+        let at = |v: u32| positions[v as usize];
+        let (mut low, mut high) = ([i32::MAX; 3], [i32::MIN; 3]);
+        for p in self.link.iter().map(|&v| at(v)) {
+            low = [0, 1, 2].map(|i| low[i].min(p[i]));
+            high = [0, 1, 2].map(|i| high[i].max(p[i]));
+        }
+        // As in `orient3d`: differences up to 2^20 make sums of products below 2^63.
+        self.narrow = (0..3).all(|i| high[i] - low[i] <= 1 << NARROW_BITS);
+        self.sides.clear();
+        self.sides.extend(self.faces.iter().map(|(face, _)| {
+            let [x, y, z] = face.map(at);
+            let [u, v] = [y, z].map(|p| [0, 1, 2].map(|i| i64::from(p[i] - x[i])));
+            let minor = |i: usize, j: usize| u[i] * v[j] - u[j] * v[i];
+            (x, [minor(1, 2), minor(2, 0), minor(0, 1)])
+        }));
+    }
+
+    /// Whether face `i` and a link vertex at `p` make a positive tetrahedron.
+    pub fn is_seen(&self, i: usize, p: [i32; 3]) -> bool {
+        let (x, n) = self.sides[i];
+        let d = [0, 1, 2].map(|k| i64::from(p[k] - x[k]));
+        if self.narrow {
+            n[0] * d[0] + n[1] * d[1] + n[2] * d[2] > 0
+        } else {
+            let product = |k: usize| i128::from(n[k]) * i128::from(d[k]);
+            product(0) + product(1) + product(2) > 0
+        }
     }
 
     /// Whether the vertex is on the boundary.
