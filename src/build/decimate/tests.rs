@@ -254,11 +254,29 @@ fn is_within(
     tets.iter().any(|tet| fits(*tet, at)) || border.iter().any(beside)
 }
 
+/// How far a reference vertex is from the boundary.
+fn distance(result: &Decimated, border: &[(usize, [u32; 3])], point: u32) -> f64 {
+    let step = DVec3::from_array(result.quantized.lattice.step);
+    let at = |v: u32| DVec3::from_array(result.quantized.positions[v as usize].map(f64::from)) * step;
+    let to = |(_, face): &(usize, [u32; 3])| at(point).distance(nearest_on_triangle(at(point), face.map(at)));
+    border.iter().map(to).fold(f64::INFINITY, f64::min)
+}
+
+fn boundary_vertices(mesh: &TetMesh) -> BTreeSet<u32> {
+    let around = topology(mesh.positions.len(), &mesh.tets).expect("a conforming mesh").neighbors;
+    let faces = |(tet, around): (&[u32; 4], &[u32; 4])| {
+        let (tet, around) = (*tet, *around);
+        (0..4).filter(move |&k| around[k] == NONE).flat_map(move |k| FACES[k].map(|l| tet[l]))
+    };
+    mesh.tets.iter().zip(&around).flat_map(faces).collect()
+}
+
 #[test]
 fn every_reference_vertex_is_within_the_error() {
     for (name, mesh) in domains() {
         for criterion in CRITERIA {
             let result = built(&mesh, criterion);
+            let rim = boundary_vertices(&mesh);
             for bound in [0.003, 0.02, 0.06, 0.15, 0.4] {
                 // Errors are monotone, so that these insertions do not need the others.
                 let mut replay = Replay::new(&result.sequence.base);
@@ -272,6 +290,11 @@ fn every_reference_vertex_is_within_the_error() {
                     border.extend(faces.map(|k| (t, FACES[k].map(|l| tet[l]))));
                 }
                 let allowed = bound * (1.0 + 1e-6) + 1e-5;
+                for &point in &rim {
+                    let distance = distance(&result, &border, point);
+                    let most = bound * result.displacement_per_error + 1e-9;
+                    assert!(distance <= most, "{name} {criterion:?}: boundary point {point} at {bound}");
+                }
                 for point in 0..mesh.positions.len() {
                     let good = is_within(&result, &tets, &border, point, allowed);
                     assert!(good, "{name} {criterion:?}: point {point} at {bound}");
