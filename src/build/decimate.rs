@@ -38,6 +38,10 @@ use glam::DVec3;
 /// How errors are grouped. Finer levels than those of edge collapses give smaller meshes here, and deeper orders.
 const LEVELS: Levels = Levels::QUARTERS;
 
+/// In-sphere tests are exact up to there.
+const TOO_FINE: BuildError =
+    BuildError::Option { name: "criterion", expected: "half-edge on a lattice of more than 23 bits" };
+
 /// What [`decimate`] hands over.
 pub(super) struct Decimated {
     pub sequence: Sequence,
@@ -50,7 +54,7 @@ pub(super) struct Decimated {
 /// [`crate::mesh::repair`].
 ///
 /// # Errors
-/// As [`super::edge_mt`].
+/// As [`super::edge_mt`]; if the lattice is too fine for the Delaunay criterion.
 pub(super) fn decimate(
     mesh: &TetMesh,
     config: &BuildConfig,
@@ -64,9 +68,13 @@ pub(super) fn decimate(
     let Topology { neighbors, non_manifold, .. } =
         mesh::topology(mesh.positions.len(), &mesh.tets).map_err(BuildError::Mesh)?;
     let quantized = quantize::quantize(mesh, config)?;
+    let gift_wrap = match criterion {
+        Criterion::HalfEdge => None,
+        Criterion::Delaunay => Some(GiftWrap::new(&quantized.positions).ok_or(TOO_FINE)?),
+    };
     let displacement_per_error = config.displacement * Bounds::of(&mesh.positions).diagonal();
     let work = WorkMesh::new(mesh.tets.clone(), neighbors, mesh.positions.len());
-    let mut decimator = Decimator::new(work, &quantized, displacement_per_error, non_manifold, criterion);
+    let mut decimator = Decimator::new(work, &quantized, displacement_per_error, non_manifold, gift_wrap);
     decimator.remove_all(progress)?;
     let Decimator { mesh: base, mut sequence, .. } = decimator;
     sequence.base = base.tets.iter().copied().filter(|tet| tet[0] != NONE).collect();
@@ -94,7 +102,6 @@ struct Decimator<'a> {
     frozen: Vec<bool>,
     /// None where holes are filled by contracting edges.
     gift_wrap: Option<GiftWrap>,
-    criterion: Criterion,
     buckets: Buckets,
     marks: VertexMarks,
     past: Past,
@@ -133,7 +140,7 @@ impl<'a> Decimator<'a> {
         quantized: &'a Quantized,
         displacement_per_error: f64,
         frozen: Vec<bool>,
-        criterion: Criterion,
+        gift_wrap: Option<GiftWrap>,
     ) -> Self {
         let points = quantized.positions.len();
         let step = DVec3::from_array(quantized.lattice.step);
@@ -142,13 +149,11 @@ impl<'a> Decimator<'a> {
         let skin = Skin::new(&mesh.tets, &mesh.neighbors, &places);
         let mut degrees = vec![0; points];
         mesh.tets.iter().flatten().for_each(|&v| degrees[v as usize] += 1);
-        let wraps = criterion == Criterion::Delaunay;
         Self {
             gradients: quantized.gradients(&mesh.tets),
             reference: Reference { quantized, points: points as u32, skin, displacement_per_error },
             frozen,
-            gift_wrap: if wraps { GiftWrap::new(&quantized.positions) } else { None },
-            criterion,
+            gift_wrap,
             buckets: Buckets::new(mesh.tets.len(), points),
             marks: VertexMarks::new(points),
             past: Past::new(mesh.tets.len()),
@@ -227,9 +232,9 @@ impl<'a> Decimator<'a> {
         }
         let known = self.seen[a as usize] == version && key.b != NONE;
         self.seen[a as usize] = version;
-        let exact = match self.criterion {
-            Criterion::HalfEdge => self.find_end(key, legacy, known),
-            Criterion::Delaunay => self.wrap(key, legacy),
+        let exact = match self.gift_wrap {
+            None => self.find_end(key, legacy, known),
+            Some(_) => self.wrap(key, legacy),
         };
         match exact {
             None => {}

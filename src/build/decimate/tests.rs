@@ -381,3 +381,13 @@ fn a_boundary_that_may_not_move_costs_all() {
     result.sequence.steps.iter().for_each(|step| replay.insert(&result, step));
     assert_eq!(replay.0.len(), mesh.tets.len());
 }
+
+#[test]
+fn lattices_too_fine_for_spheres_are_refused() {
+    let mesh = bent(blocks([3; 3], |_| true));
+    let config = BuildConfig { position_bits: Some(30), ..BuildConfig::default() };
+    let [half_edge, delaunay] =
+        CRITERIA.map(|c| decimate(&mesh, &config, c, &mut |_| ControlFlow::Continue(())));
+    assert!(half_edge.is_ok_and(|result| !result.sequence.steps.is_empty()));
+    assert!(matches!(delaunay.err(), Some(BuildError::Option { name: "criterion", .. })));
+}
