@@ -14,7 +14,7 @@ use super::MAX_STAR;
 use super::MtInfo;
 use super::VertexId;
 use super::insertion::Cavity;
-use super::ring::LINK_CAPACITY;
+pub(super) use super::ring::LINK_CAPACITY;
 use super::ring::Ring;
 use super::taken::Taken;
 use crate::mesh::FACES;
@@ -96,6 +96,8 @@ pub(crate) enum Gather<T> {
 /// Largest star that is gathered: the two sides of a collapse have at most `MAX_STAR` tetrahedra together, and at
 /// most `MAX_LINK` more lie between them.
 pub(crate) const GATHERED: usize = 128;
+/// Faces of [`GATHERED`] tetrahedra.
+pub(crate) const BARE: usize = 4 * GATHERED;
 /// Tags from here on are not looked for.
 pub(crate) const FIRST_ANONYMOUS_TAG: u32 = 1 << 31;
 const MARK_BITS: u32 = GATHERED.trailing_zeros();
@@ -547,62 +549,74 @@ impl CurrentMesh {
     }
 
     /// Collects the tetrahedra with this tag that hang together with `first`, which has it, and their faces that none of
-    /// them lies behind (tetrahedron, face, what does); starts a numbering of vertices. None if there are more than
-    /// [`GATHERED`].
+    /// them lies behind (tetrahedron, face, what does); starts a numbering of vertices. Returns how many there are of
+    /// both; none if there are more than [`GATHERED`] tetrahedra.
     #[inline]
     pub(super) fn gather_tagged(
         &mut self,
         first: u32,
         tag: u32,
         tets: &mut [u32; GATHERED],
-        bare: &mut Vec<(u32, u32, u32)>,
-    ) -> Option<usize> {
+        bare: &mut [[u32; 3]; BARE],
+    ) -> Option<(usize, usize)> {
         self.next_epoch();
-        bare.clear();
         let mark = self.epoch << MARK_BITS;
         self.marks[first as usize] = mark;
         tets[0] = first;
-        let (mut next, mut len) = (0, 1);
+        let (mut next, mut len, mut bare_len) = (0, 1, 0);
+        // Which neighbours have the tag is a coin toss for the processor: the entries after the last one are written
+        // anyway, and counted if they belong there. Lengths stay below the capacities, so the remainders change nothing.
         while next < len {
             let t = tets[next % GATHERED];
             next += 1;
             for (face, n) in (0..).zip(self.neighbors[t as usize]) {
+                bare[bare_len % BARE] = [t, face, n];
                 // Also NONE is beyond the array.
-                if self.tags.get(n as usize) != Some(&tag) {
-                    bare.push((t, face, n));
-                } else if self.marks[n as usize] != mark {
-                    if len == GATHERED {
+                let (Some(&own), Some(old)) = (self.tags.get(n as usize), self.marks.get_mut(n as usize))
+                else {
+                    bare_len += 1;
+                    continue;
+                };
+                bare_len += usize::from(own != tag);
+                let is_new = (own == tag) & (*old != mark);
+                if len == GATHERED {
+                    if is_new {
                         return None;
                     }
-                    self.marks[n as usize] = mark;
-                    tets[len] = n;
-                    len += 1;
+                    continue;
                 }
+                *old = if is_new { mark } else { *old };
+                tets[len % GATHERED] = n;
+                len += usize::from(is_new);
             }
         }
-        Some(len)
+        Some((len, bare_len))
     }
 
     /// Which face of tetrahedron `t` its neighbour `towards` lies behind.
     #[inline]
     pub(super) fn side_towards(&self, t: u32, towards: u32) -> Option<u8> {
-        let [_, b, c, d] = self.neighbors[t as usize].map(|n| u8::from(n == towards));
-        let found = self.neighbors[t as usize].contains(&towards);
-        found.then_some(b + 2 * c + 3 * d)
+        let [a, b, c, d] = self.neighbors[t as usize].map(|n| u8::from(n == towards));
+        (a | b | c | d != 0).then_some((b + 2 * c + 3 * d) & 3)
     }
 
-    /// The number of a vertex, by index into `list`, where it is put if it has none yet. None if that is full.
+    /// The number of a vertex, by index into `list`, where it is put if it has none yet. The list may be full for at most
+    /// three vertices before that is noticed.
     #[inline]
-    pub(super) fn number_vertex(&mut self, slot: u32, list: &mut [u32], len: &mut usize) -> Option<u8> {
+    pub(super) fn number_vertex(
+        &mut self,
+        slot: u32,
+        list: &mut [u32; LINK_CAPACITY],
+        len: &mut usize,
+    ) -> u8 {
         let mark = self.epoch << MARK_BITS;
         let old = &mut self.vertex_marks[slot as usize];
-        if *old & !MARK_MASK == mark {
-            return Some((*old & MARK_MASK) as u8);
-        }
-        *list.get_mut(*len)? = slot;
-        *old = mark | *len as u32;
-        *len += 1;
-        Some((*len - 1) as u8)
+        let is_new = *old & !MARK_MASK != mark;
+        let own = if is_new { mark | *len as u32 } else { *old };
+        *old = own;
+        list[*len % LINK_CAPACITY] = slot;
+        *len += usize::from(is_new);
+        (own & MARK_MASK) as u8
     }
 
     /// The number of a vertex, if it has one.
@@ -610,6 +624,32 @@ impl CurrentMesh {
     pub(super) fn vertex_number(&self, slot: u32) -> Option<u8> {
         let mark = self.vertex_marks[slot as usize];
         (mark >> MARK_BITS == self.epoch).then_some((mark & MARK_MASK) as u8)
+    }
+
+    /// Whether all corners of a tetrahedron have numbers.
+    #[inline]
+    pub(super) fn have_numbers(&self, tet: &[u32; 4]) -> bool {
+        tet.map(|v| self.vertex_marks[v as usize] >> MARK_BITS == self.epoch) == [true; 4]
+    }
+
+    /// Free or new tetrahedron slots, to be filled by the caller.
+    #[inline]
+    pub(super) fn new_tets(&mut self, slots: &mut [u32]) {
+        let reused = slots.len().min(self.free_tets.len());
+        let (old, new) = slots.split_at_mut(reused);
+        old.iter_mut()
+            .zip(self.free_tets.drain(self.free_tets.len() - reused..))
+            .for_each(|(t, free)| *t = free);
+        let len = self.tets.len();
+        let grown = len + new.len();
+        new.iter_mut().zip(len as u32..).for_each(|(t, next)| *t = next);
+        self.tets.resize(grown, [NONE; 4]);
+        self.neighbors.resize(grown, [NONE; 4]);
+        self.marks.resize(grown, 0);
+        if self.is_tagged() {
+            self.tags.resize(grown, NONE);
+        }
+        slots.iter().for_each(|&t| self.changed_tets.mark(t));
     }
 
     /// Lends the scratch space for insertions.

@@ -15,9 +15,11 @@ use super::UpdateError;
 use super::UpdateId;
 use super::VertexId;
 use super::bits::width_of;
+use super::current::BARE;
 use super::current::FIRST_ANONYMOUS_TAG;
 use super::current::GATHERED;
 use super::current::Gather;
+use super::current::LINK_CAPACITY;
 use super::current::Labels;
 use super::current::Star;
 use super::glue::Across;
@@ -36,7 +38,10 @@ use crate::mesh::FACES;
 use crate::mesh::NONE;
 
 /// "This edge is on the rim: the face behind it is given up."
-const GIVEN_UP: u32 = 0xFFFF;
+const GIVEN_UP: u32 = 0xFF;
+
+/// Room for the new slots, and for [`GIVEN_UP`].
+const SLOTS: usize = 256;
 
 /// A face of Π_u with what lies beyond.
 #[derive(Clone, Copy, Debug, Default)]
@@ -57,15 +62,16 @@ pub(super) struct Cavity {
     tets: [u32; GATHERED],
     tets_len: usize,
     /// Faces of T_u that none of its tetrahedra lies behind: tetrahedron, face, what lies behind.
-    bare: Vec<(u32, u32, u32)>,
+    bare: Box<[[u32; 3]; BARE]>,
+    bare_len: usize,
     walls: [Wall; MAX_INSERTED],
     walls_len: usize,
     /// Slots of the vertices of Π_u.
-    link: [u32; MAX_AROUND],
+    link: [u32; LINK_CAPACITY],
     link_len: usize,
     /// The place of each vertex of the link in the order of their labels.
     order: [i32; MAX_AROUND],
-    /// For a directed edge between two of them the new tetrahedron that has it: `epoch << 16 | tetrahedron << 2 | corner`.
+    /// For a directed edge between two of them the new tetrahedron that has it: `epoch << 16 | tetrahedron`.
     edges: Box<[u32; MAX_AROUND * MAX_AROUND]>,
     epoch: u32,
     /// The place of each wall in canonical order.
@@ -83,10 +89,11 @@ impl Default for Cavity {
             star: Star::default(),
             tets: [0; GATHERED],
             tets_len: 0,
-            bare: Vec::new(),
+            bare: Box::new([[0; 3]; BARE]),
+            bare_len: 0,
             walls: [Wall::default(); MAX_INSERTED],
             walls_len: 0,
-            link: [0; MAX_AROUND],
+            link: [0; LINK_CAPACITY],
             link_len: 0,
             order: [0; MAX_AROUND],
             edges: Box::new([0; MAX_AROUND * MAX_AROUND]),
@@ -109,13 +116,11 @@ impl Cavity {
         beyond: u32,
         side: u8,
     ) -> Option<()> {
-        let mut corners = [0; 3];
-        for (corner, k) in corners.iter_mut().zip(FACES[face]) {
-            *corner = mesh.number_vertex(tet[k], &mut self.link, &mut self.link_len)?;
-        }
+        let corners =
+            FACES[face & 3].map(|k| mesh.number_vertex(tet[k & 3], &mut self.link, &mut self.link_len));
         *self.walls.get_mut(self.walls_len)? = Wall { corners, beyond, side };
         self.walls_len += 1;
-        Some(())
+        (self.link_len <= MAX_AROUND).then_some(())
     }
 
     /// Orders the link by the labels of its vertices.
@@ -151,41 +156,30 @@ impl Cavity {
             self.edges.fill(0);
             self.epoch = 1;
         }
+        // Epochs grow, so what is of this one is not less than its start.
         let epoch = self.epoch << 16;
-        let (edges, across) = (&mut *self.edges, &mut self.across);
+        let edges = &mut *self.edges;
         let place = |a: u8, b: u8| (usize::from(a) << 6 | usize::from(b)) % (MAX_AROUND * MAX_AROUND);
+        let mut twice = false;
         for &[a, b, c] in rim {
             for (from, to) in [(b, c), (c, a), (a, b)] {
-                if std::mem::replace(&mut edges[place(from, to)], epoch | GIVEN_UP) >= epoch {
-                    return None;
-                }
+                twice |= std::mem::replace(&mut edges[place(from, to)], epoch | GIVEN_UP) >= epoch;
             }
         }
-        // Every edge has a wall on either side, or a wall and a face that is given up: counted from both sides, each is
-        // met once. Epochs grow, so what is of this one is not less than its start.
-        let mut met = 0;
-        for (i, wall) in self.walls[..self.walls_len].iter().enumerate() {
+        for (i, wall) in (0_u32..).zip(&self.walls[..self.walls_len]) {
             let [a, b, c] = wall.corners;
-            let mut own = [NONE; 4];
-            for (side, (from, to)) in (1..).zip([(b, c), (c, a), (a, b)]) {
-                let value = epoch | (i as u32) << 2 | side as u32;
-                if std::mem::replace(&mut edges[place(from, to)], value) >= epoch {
-                    return None;
-                }
-                let twin = edges[place(to, from)];
-                if twin >= epoch {
-                    met += 1;
-                    let twin = twin & 0xFFFF;
-                    if twin != GIVEN_UP {
-                        met += 1;
-                        own[side] = twin >> 2;
-                        across[(twin >> 2) as usize % MAX_INSERTED][(twin & 3) as usize] = i as u32;
-                    }
-                }
+            for (from, to) in [(b, c), (c, a), (a, b)] {
+                twice |= std::mem::replace(&mut edges[place(from, to)], epoch | i) >= epoch;
             }
-            across[i] = own;
         }
-        (met == 3 * self.walls_len).then_some(())
+        let mut open = false;
+        for (across, wall) in self.across.iter_mut().zip(&self.walls[..self.walls_len]) {
+            let [a, b, c] = wall.corners;
+            let [b, c, d] = [(c, b), (a, c), (b, a)].map(|(from, to)| edges[place(from, to)]);
+            open |= b.min(c).min(d) < epoch;
+            *across = [NONE, b & 0xFFFF, c & 0xFFFF, d & 0xFFFF];
+        }
+        (!twice && !open).then_some(())
     }
 
     /// Whether all tetrahedra of the new star are positive, exactly.
@@ -264,12 +258,13 @@ impl VertexMt {
         cavity: &mut Cavity,
     ) -> Result<Applied, UpdateError> {
         let Cavity { tets, bare, .. } = cavity;
-        let found = mesh.tagged(u.0).and_then(|first| mesh.gather_tagged(first, u.0, tets, bare));
-        if found != Some(removed) {
+        let gathered = mesh.tagged(u.0).and_then(|first| mesh.gather_tagged(first, u.0, tets, bare));
+        let (found, bare_len) = gathered.unwrap_or((0, 0));
+        if found != removed {
             let missing = self.parents(u).find(|&p| mesh.slot(self.vertex(p)).is_none());
             return missing.map(Applied::Blocked).ok_or(UpdateError::Cavity { update: u.0 });
         }
-        cavity.tets_len = removed;
+        (cavity.tets_len, cavity.bare_len) = (removed, bare_len);
         Ok(Applied::Done)
     }
 
@@ -302,9 +297,9 @@ impl VertexMt {
     fn find_walls(&self, mesh: &mut CurrentMesh, shape: &Shape, cavity: &mut Cavity) -> Option<()> {
         (cavity.walls_len, cavity.link_len) = (0, 0);
         let mut outer: Vec<([u32; 3], [u32; 3])> = Vec::new();
-        let bare = std::mem::take(&mut cavity.bare);
         let mut fits = true;
-        for &(t, face, beyond) in &bare {
+        for i in 0..cavity.bare_len {
+            let [t, face, beyond] = cavity.bare[i];
             let tet = mesh.tets[t as usize];
             if beyond == NONE && shape.boundary {
                 let slots = FACES[face as usize & 3].map(|k| tet[k]);
@@ -314,9 +309,9 @@ impl VertexMt {
                 continue;
             }
             let side = if beyond == NONE { Some(0) } else { mesh.side_towards(beyond, t) };
-            fits &= side.and_then(|side| cavity.add_wall(mesh, &tet, face as usize, beyond, side)).is_some();
+            fits &= side.is_some();
+            cavity.add_wall(mesh, &tet, face as usize, beyond, side.unwrap_or(0))?;
         }
-        cavity.bare = bare;
         let mut rim = Vec::new();
         if shape.boundary {
             outer.sort_unstable();
@@ -343,9 +338,7 @@ impl VertexMt {
         }
         // No vertex may be left without a tetrahedron.
         let tets = &cavity.tets[..cavity.tets_len];
-        let kept =
-            tets.iter().all(|&t| mesh.tets[t as usize].iter().all(|&v| mesh.vertex_number(v).is_some()));
-        if !kept {
+        if tets.iter().any(|&t| !mesh.have_numbers(&mesh.tets[t as usize])) {
             return None;
         }
         cavity.join_walls(&rim)
@@ -399,17 +392,16 @@ impl VertexMt {
             mesh.levels[first + f] = level;
         }
         let (old, new) = (cavity.tets_len, cavity.walls_len);
-        let mut slots = [NONE; GATHERED];
+        let mut slots = [NONE; SLOTS];
         let reused = old.min(new);
         slots[..reused].copy_from_slice(&cavity.tets[..reused]);
-        slots[reused..new].iter_mut().for_each(|t| *t = mesh.new_tet());
+        mesh.new_tets(&mut slots[reused..new]);
         for (i, wall) in cavity.walls[..new].iter().enumerate() {
             let t = slots[i];
             let [a, b, c] = wall.corners.map(|x| cavity.link[x as usize % MAX_AROUND]);
             mesh.tets[t as usize] = [slot, a, b, c];
-            let mut around =
-                cavity.across[i].map(|j| if j == NONE { NONE } else { slots[j as usize % GATHERED] });
-            around[0] = wall.beyond;
+            let [_, b_side, c_side, d_side] = cavity.across[i].map(|j| slots[j as usize % SLOTS]);
+            let around = [wall.beyond, b_side, c_side, d_side];
             mesh.neighbors[t as usize] = around;
             if wall.beyond != NONE {
                 mesh.neighbors[wall.beyond as usize][wall.side as usize & 3] = t;
