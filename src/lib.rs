@@ -10,7 +10,7 @@
 #![cfg_attr(feature = "build", doc = "```")]
 #![cfg_attr(not(feature = "build"), doc = "```ignore")]
 //! use std::ops::ControlFlow;
-//! use tetralod::build::{BuildConfig, edge_mt};
+//! use tetralod::build::{BuildConfig, build};
 //! use tetralod::format::{EncodeOptions, encode};
 //! use tetralod::refine::Request;
 //! use tetralod::session::Session;
@@ -22,7 +22,7 @@
 //! assert!(repaired.is_empty());
 //!
 //! // Once, offline: its MT, and the bytes of the MT file.
-//! let built = edge_mt(&mesh, &BuildConfig::default(), &mut |_| ControlFlow::Continue(()))?;
+//! let built = build(&mesh, &BuildConfig::default(), &mut |_| ControlFlow::Continue(()))?;
 //! let bytes = encode(&built.mt, &EncodeOptions::default())?;
 //!
 //! // Wherever it is wanted: bytes go in, in pieces of any size, and the first meshes come out before the last byte.

@@ -54,7 +54,7 @@ fn run(command: &str, folder: &Path) -> String {
 fn every_command_works_and_answers_as_shown() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md");
     let readme = fs::read_to_string(&path).expect("README.md");
-    for command in ["generate", "build", "info", "extract", "verify", "bench"] {
+    for command in ["generate", "build", "convert", "info", "extract", "verify", "bench"] {
         let example = format!("\n{PROMPT}{command} ");
         assert!(readme.contains(&example), "README.md shows no `tetralod {command}`");
     }
