@@ -134,7 +134,7 @@ impl ExplicitMt {
     ///
     /// # Errors
     /// What it removes must be there, once and in no other update; what it inserts must be positive on the lattice, with
-    /// vertices that are there; errors must not grow. Whether it fits the mesh shows when it is applied.
+    /// vertices that are new or of what it removes; errors must not grow. Whether it fits the mesh shows when it is applied.
     pub fn push(&mut self, new: &ExplicitUpdate<'_>) -> Result<UpdateId, UpdateError> {
         let update = self.updates();
         let fields = self.info.fields.len();
@@ -165,6 +165,12 @@ impl ExplicitMt {
         let few = self.tets.len() + new.inserted.len() <= MAX_TETS && old + new.positions.len() <= MAX_TETS;
         let twice = removed.windows(2).any(|pair| pair[0] == pair[1]);
         if !there || !few || twice || removed.is_empty() || new.inserted.is_empty() {
+            return Err(UpdateError::Cavity { update });
+        }
+        let mut corners: Vec<u32> = removed.iter().flat_map(|&t| self.tets[t as usize]).collect();
+        corners.sort_unstable();
+        let at_hand = |v: &u32| *v as usize >= old || corners.binary_search(v).is_ok();
+        if !new.inserted.iter().flatten().all(at_hand) {
             return Err(UpdateError::Cavity { update });
         }
         let mut parents: Vec<u32> = removed.iter().filter_map(|&t| self.creator(t)).map(|u| u.0).collect();

@@ -16,6 +16,7 @@ use crate::mt::ExplicitMt;
 use crate::mt::ExplicitUpdate;
 use crate::mt::UpdateId;
 use crate::mt::VertexId;
+use std::ops::Range;
 
 /// Bytes that every update takes in memory, however small it is: one removed and one inserted tetrahedron.
 pub fn least_update_bytes() -> u64 {
@@ -60,17 +61,30 @@ pub fn write(out: &mut Vec<u8>, mt: &ExplicitMt, first: u32, end: u32) {
     }
 }
 
-/// The first two corners of a tetrahedron ascend, and are the lowest; the tetrahedra ascend, too.
+/// Corners are told by their places among the vertices at hand, which ascend. The first two corners of a tetrahedron
+/// ascend, too, and are the lowest; so do the tetrahedra.
 fn write_inserted(out: &mut Vec<u8>, mt: &ExplicitMt, u: UpdateId) {
     let range = mt.inserted(u);
+    let vertices = at_hand(mt, mt.removed(u), mt.created(u));
     write::varint(out, range.len() as u64);
     let mut last = 0;
-    for &[a, b, c, d] in &mt.tets()[range.start as usize..range.end as usize] {
+    for tet in &mt.tets()[range.start as usize..range.end as usize] {
+        // `push` has checked that they are at hand.
+        let [a, b, c, d] = tet.map(|v| vertices.partition_point(|&other| other < v));
         for step in [a - last, b - a, c - b, d - b] {
-            write::varint(out, u64::from(step));
+            write::varint(out, step as u64);
         }
         last = a;
     }
+}
+
+/// The vertices that an update can use: those of what it removes, and those that appear with it; ascending.
+fn at_hand(mt: &ExplicitMt, removed: &[u32], created: Range<u32>) -> Vec<u32> {
+    let mut vertices: Vec<u32> = removed.iter().flat_map(|&t| mt.tets()[t as usize]).collect();
+    vertices.sort_unstable();
+    vertices.dedup();
+    vertices.extend(created);
+    vertices
 }
 
 /// The columns of a block that are read update by update.
@@ -139,7 +153,9 @@ impl Parts {
             self.levels.extend_from_slice(&self.level);
         }
         self.read_removed(&mut columns.removed, mt.tets().len() as u32)?;
-        self.read_inserted(&mut columns.inserted)
+        let first = mt.vertices();
+        let vertices = at_hand(mt, &self.removed, first..first + self.positions.len() as u32);
+        self.read_inserted(&mut columns.inserted, &vertices)
     }
 
     fn read_removed(&mut self, column: &mut Reader<'_>, mut above: u32) -> Result<(), FormatError> {
@@ -153,17 +169,21 @@ impl Parts {
         Ok(())
     }
 
-    fn read_inserted(&mut self, column: &mut Reader<'_>) -> Result<(), FormatError> {
+    fn read_inserted(&mut self, column: &mut Reader<'_>, vertices: &[u32]) -> Result<(), FormatError> {
         self.inserted.clear();
         let mut last = 0;
         for _ in 0..column.varint()? {
-            let mut next = |from: u32| {
-                let step = column.varint()?;
-                from.checked_add(step).ok_or_else(|| column.corrupt("a vertex is beyond 32 bits"))
+            let mut next = |from: usize| {
+                let place = from + column.varint()? as usize;
+                let vertex = vertices.get(place).copied();
+                let unknown = "an update uses a vertex that is neither new nor of what it removes";
+                vertex.map(|v| (place, v)).ok_or_else(|| column.corrupt(unknown))
             };
-            last = next(last)?;
-            let second = next(last)?;
-            self.inserted.push([last, second, next(second)?, next(second)?]);
+            let (first, a) = next(last)?;
+            let (second, b) = next(first)?;
+            let [(_, c), (_, d)] = [next(second)?, next(second)?];
+            self.inserted.push([a, b, c, d]);
+            last = first;
         }
         Ok(())
     }
