@@ -55,6 +55,9 @@ fn explicit(built: &Built) -> ExplicitMt {
     ExplicitMt::of(&built.edge_mt()).expect("a valid MT")
 }
 
+/// Positions and levels at the corners of a tetrahedron.
+type Seen = ([[i32; 3]; 4], [i32; 4]);
+
 /// One MT and its current mesh.
 struct Walk<M> {
     mt: M,
@@ -89,7 +92,7 @@ impl<M: MultiTessellation> Walk<M> {
     }
 
     /// What criteria are shown of the tetrahedra that `u+` removed, in any order.
-    fn look(&mut self, u: UpdateId, field: usize) -> Option<Vec<([[i32; 3]; 4], [i32; 4])>> {
+    fn look(&mut self, u: UpdateId, field: usize) -> Option<Vec<Seen>> {
         let mut seen = Vec::new();
         let mut look = |corners: &[[i32; 3]; 4], levels: &[i32; 4]| {
             let mut both = [0, 1, 2, 3].map(|i| (corners[i], levels[i]));

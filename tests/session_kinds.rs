@@ -54,12 +54,11 @@ fn ends(bytes: &[u8]) -> Vec<usize> {
 fn streamed(files: &[Vec<u8>; 2], piece: usize, order: &[prop::sample::Index]) {
     let mut order = order.iter().cycle();
     let mut sessions = [Session::new(), Session::new()];
-    let ends = [0, 1].map(|i| ends(&files[i]));
-    assert_eq!(ends[0].len(), ends[1].len(), "as many blocks");
+    let [of_edge, of_spelled] = files.each_ref().map(|bytes| ends(bytes));
+    assert_eq!(of_edge.len(), of_spelled.len(), "as many blocks");
     let mut starts = [0, 0];
-    for section in 0..ends[0].len() {
-        for i in 0..2 {
-            let end = ends[i][section];
+    for ends in of_edge.into_iter().zip(of_spelled).map(<[usize; 2]>::from) {
+        for (i, end) in ends.into_iter().enumerate() {
             for piece in files[i][starts[i]..end].chunks(piece) {
                 sessions[i].feed(piece).expect("a good file");
             }
