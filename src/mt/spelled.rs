@@ -76,20 +76,25 @@ fn vertices_of(tets: &[[u32; 4]]) -> Vec<u32> {
     vertices
 }
 
-/// A face seen from a tetrahedron: its sorted vertices and the side that the tetrahedron is on.
-type Side = ([u32; 3], usize);
+/// A face seen from a tetrahedron, as a number: its sorted vertices, and in the last bit the side that the tetrahedron
+/// is on.
+type Side = u128;
+
+fn side_of(([a, b, c], side): ([u32; 3], usize)) -> Side {
+    u128::from(a) << 65 | u128::from(b) << 33 | u128::from(c) << 1 | side as u128
+}
 
 /// The faces between the tetrahedra in the slots `old`, called `names`, and the rest of the mesh, as seen from the
 /// rest: with the slot there, and which of its neighbours is the old one. Ascending.
-fn beyond(mesh: &CurrentMesh, old: &[u32], names: &[[u32; 4]]) -> Option<Vec<(Side, u32, usize)>> {
+fn beyond(mesh: &CurrentMesh, old: &[u32], names: &[[u32; 4]]) -> Option<Vec<(Side, u32, u32)>> {
     let mut leave = old.to_vec();
     leave.sort_unstable();
     let mut beyond = Vec::new();
     for (&t, name) in old.iter().zip(names) {
-        for ((face, side), n) in faces(name).zip(mesh.neighbors[t as usize]) {
+        for (face, n) in faces(name).zip(mesh.neighbors[t as usize]) {
             if n != NONE && leave.binary_search(&n).is_err() {
-                let back = mesh.neighbors[n as usize].iter().position(|&other| other == t)?;
-                beyond.push(((face, 1 - side), n, back));
+                let back = (0..).zip(mesh.neighbors[n as usize]).find(|(_, other)| *other == t)?.0;
+                beyond.push((side_of(face) ^ 1, n, back));
             }
         }
     }
@@ -99,28 +104,42 @@ fn beyond(mesh: &CurrentMesh, old: &[u32], names: &[[u32; 4]]) -> Option<Vec<(Si
 
 /// What every face of the new tetrahedra meets: another new one, one beyond, or nothing. None if they leave a face of
 /// what is beyond bare, or touch what they did not border on. `taken` is that of the mesh with them in it.
-fn meet(new: &[[u32; 4]], beyond: &[(Side, u32, usize)], taken: &Taken) -> Option<Vec<[Meets; 4]>> {
-    let mut sides: Vec<(Side, u32)> = Vec::with_capacity(4 * new.len());
-    for (i, tet) in (0..).zip(new) {
-        sides.extend(faces(tet).map(|side| (side, i)));
+fn meet(new: &[[u32; 4]], beyond: &[(Side, u32, u32)], taken: &Taken) -> Option<Vec<[Meets; 4]>> {
+    let mut sides: Vec<(Side, usize)> = Vec::with_capacity(4 * new.len());
+    for tet in new {
+        sides.extend((sides.len()..).zip(faces(tet)).map(|(place, face)| (side_of(face), place)));
     }
     sides.sort_unstable();
-    let mut outside = 0;
     let mut meets = vec![[Meets::Nothing; 4]; new.len()];
-    for (tet, meets) in new.iter().zip(&mut meets) {
-        for ((face, side), meets) in faces(tet).zip(meets) {
-            let across = (face, 1 - side);
-            if let Ok(at) = sides.binary_search_by_key(&across, |&(side, _)| side) {
-                *meets = Meets::New(sides[at].1);
-            } else if let Ok(at) = beyond.binary_search_by_key(&across, |&(side, ..)| side) {
-                *meets = Meets::Old(beyond[at].1, beyond[at].2);
-                outside += 1;
-            } else if taken.has_face(&face, 1 - side) {
-                return None;
+    let (mut rest, mut outside) = (sides.as_slice(), beyond);
+    while let [(side, place), tail @ ..] = rest {
+        let across = side ^ 1;
+        rest = tail;
+        // No side is taken twice, so the two of a face follow each other.
+        if let [(other, at), after @ ..] = tail
+            && *other == across
+        {
+            meets[place / 4][place % 4] = Meets::New((at / 4) as u32);
+            meets[at / 4][at % 4] = Meets::New((place / 4) as u32);
+            rest = after;
+            continue;
+        }
+        match outside {
+            [(found, n, back), after @ ..] if *found == across => {
+                meets[place / 4][place % 4] = Meets::Old(*n, *back);
+                outside = after;
+            }
+            // Those beyond that are passed over stay bare.
+            [(found, ..), ..] if *found < across => return None,
+            _ => {
+                let (face, side) = faces(&new[place / 4]).nth(place % 4)?;
+                if taken.has_face(&face, 1 - side) {
+                    return None;
+                }
             }
         }
     }
-    (outside == beyond.len()).then_some(meets)
+    outside.is_empty().then_some(meets)
 }
 
 /// What lies across a face of a new tetrahedron.
@@ -131,7 +150,7 @@ enum Meets {
     /// Another new tetrahedron.
     New(u32),
     /// A slot that stays, and which of its neighbours it is.
-    Old(u32, usize),
+    Old(u32, u32),
 }
 
 fn perform(
@@ -165,7 +184,7 @@ fn perform(
                 Meets::Nothing => NONE,
                 Meets::New(i) => slots[i as usize],
                 Meets::Old(n, at) => {
-                    mesh.neighbors[n as usize][at] = t;
+                    mesh.neighbors[n as usize][at as usize] = t;
                     mesh.mark_tet(n);
                     n
                 }
