@@ -91,9 +91,13 @@ async function open(from) {
   }
 }
 
+/** What the updates of each kind of MT are. */
+const KINDS = { edge: "vertex splits", vertex: "vertex insertions", explicit: "spelled out" };
+
 /** The base mesh is there: fit the settings to it. */
 function arrive(info) {
   demo.info = info;
+  $("n-kind").textContent = KINDS[info.kind] ?? info.kind;
   const select = $("field");
   select.replaceChildren(...info.fields.map(({ name }) => new Option(name, name)));
   $("field-row").hidden = info.fields.length < 2;

@@ -301,6 +301,10 @@ impl<'a> Decimator<'a> {
         if !gift_wrap.as_mut()?.fill(hole, &reference.quantized.positions, &mut best.filling) {
             return None;
         }
+        // A removal must make the mesh smaller: a finer mesh is then a larger one, which budgets rely on.
+        if best.filling.tets.len() >= hole.star.len() {
+            return None;
+        }
         let limit = LEVELS.largest(key.level());
         best.error = best.cost.evaluate(hole, &best.filling, legacy, buckets, reference, limit);
         Some(self.key(&self.best, legacy.height, NONE))

@@ -86,7 +86,7 @@ impl GiftWrap {
             }
         }
         filling.moved = filling.border.len();
-        fits(hole, positions, &filling.tets) && lay_border(hole, filling)
+        fits(hole, positions, &filling.tets) && fits_border(hole, filling) && lay_border(hole, filling)
     }
 }
 
@@ -182,6 +182,28 @@ fn fits(hole: &Hole, positions: &[[i32; 3]], tets: &[[u32; 4]]) -> bool {
     };
     let whole: i128 = hole.faces.iter().map(|&([x, y, z], _)| six([x, y, z, hole.a])).sum();
     whole == tets.iter().copied().map(six).sum()
+}
+
+/// Whether the triangles that take the place of those at the removed vertex have the same rim. Where the boundary turns
+/// inwards, its planes go on inside the hole, and triangles there look like boundary to one that only knows planes.
+fn fits_border(hole: &Hole, filling: &Filling) -> bool {
+    let faces = || filling.border[..filling.moved].iter().map(|(_, face)| *face);
+    let mut keys: Vec<[u32; 3]> = faces().map(sorted).collect();
+    keys.sort_unstable();
+    if keys.windows(2).any(|pair| pair[0] == pair[1]) {
+        return false;
+    }
+    let mut edges: Vec<[u32; 2]> = faces().flat_map(|[x, y, z]| [[x, y], [y, z], [z, x]]).collect();
+    edges.sort_unstable();
+    if edges.windows(2).any(|pair| pair[0] == pair[1]) {
+        return false;
+    }
+    let mut rim: Vec<[u32; 2]> =
+        edges.iter().copied().filter(|&[x, y]| edges.binary_search(&[y, x]).is_err()).collect();
+    rim.sort_unstable();
+    let mut wanted = hole.border.clone();
+    wanted.sort_unstable();
+    rim == wanted
 }
 
 /// The triangles of the filling that were on the boundary before.

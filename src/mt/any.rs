@@ -76,6 +76,10 @@ impl MultiTessellation for Mt {
         each!(self, mt => mt.start())
     }
 
+    fn always_grows(&self) -> bool {
+        each!(self, mt => MultiTessellation::always_grows(mt))
+    }
+
     #[inline]
     fn error(&self, u: UpdateId) -> ErrorCode {
         each!(self, mt => MultiTessellation::error(mt, u))

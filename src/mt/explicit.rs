@@ -83,6 +83,8 @@ pub struct ExplicitMt {
     /// The update that removes each tetrahedron; [`NONE`] if there is none so far. Children follow from it.
     remover: Vec<u32>,
     errors: Vec<ErrorCode>,
+    /// Whether every update so far inserts more tetrahedra than it removes.
+    pub(super) always_grows: bool,
 }
 
 /// What an explicit MT consists of, in numbers.
@@ -126,6 +128,7 @@ impl ExplicitMt {
             parents: Rows::new(),
             remover: vec![NONE; base_tets],
             errors: Vec::new(),
+            always_grows: true,
             base,
         }
     }
@@ -186,6 +189,7 @@ impl ExplicitMt {
         self.tets[first..].sort_unstable();
         self.remover.resize(self.tets.len(), NONE);
         self.inserted.push(self.tets.len() as u32);
+        self.always_grows &= new.inserted.len() > new.removed.len();
         self.errors.push(new.error);
         Ok(UpdateId(update))
     }

@@ -150,8 +150,8 @@ impl Glue {
         self.tets[t] = tet;
         self.across[t] = [Across::Nothing; 4];
         self.connect(at, t, 0);
-        for side in 1..4 {
-            let own = turned(FACES[side].map(|k| tet[k]));
+        for (side, face) in FACES.iter().enumerate().skip(1) {
+            let own = turned(face.map(|k| tet[k]));
             let slot = self.find(own);
             if self.is_taken(slot) {
                 let other = (self.places[slot] & 0xFFFF) as usize;

@@ -609,6 +609,10 @@ impl MultiTessellation for VertexMt {
         Ok(mesh)
     }
 
+    fn always_grows(&self) -> bool {
+        self.always_grows
+    }
+
     #[inline]
     fn error(&self, u: UpdateId) -> ErrorCode {
         self.error_of(u)

@@ -147,6 +147,9 @@ pub trait MultiTessellation {
     /// Number of updates so far; they are `UpdateId(0) .. UpdateId(updates)`, parents before children.
     fn updates(&self) -> u32;
 
+    /// Whether every update inserts more tetrahedra than it removes: a larger consistent set then has a larger mesh.
+    fn always_grows(&self) -> bool;
+
     /// The error `e(u)` of update `u`: bounds that of every tetrahedron `u+` removes, and of every update with a
     /// larger number, so of every one that depends on `u`.
     fn error(&self, u: UpdateId) -> ErrorCode;

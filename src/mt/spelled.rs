@@ -219,6 +219,10 @@ impl MultiTessellation for ExplicitMt {
         Ok(mesh)
     }
 
+    fn always_grows(&self) -> bool {
+        self.always_grows
+    }
+
     fn error(&self, u: UpdateId) -> ErrorCode {
         ExplicitMt::error(self, u)
     }

@@ -379,6 +379,11 @@ impl MultiTessellation for EdgeMt {
         self.bytes()
     }
 
+    /// A split adds the tetrahedra of its fan.
+    fn always_grows(&self) -> bool {
+        true
+    }
+
     #[inline]
     fn error(&self, u: UpdateId) -> ErrorCode {
         self.error_of(u)

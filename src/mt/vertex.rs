@@ -68,6 +68,8 @@ pub struct VertexMt {
     pub(super) info: MtInfo,
     base: BaseMesh,
     base_removers: Vec<u32>,
+    /// Whether every insertion inserts more tetrahedra than it removes.
+    pub(super) always_grows: bool,
     pub(super) widths: Widths,
     /// All nodes, each padded to units of [`UNIT`] bits.
     pub(super) nodes: Bits,
@@ -118,7 +120,8 @@ impl NodeBits {
 impl VertexMt {
     /// An MT without updates. `base` must fit `info`: see [`BaseMesh::check`]. `base_removers` tells for each base
     /// tetrahedron which update removes it, [`u32::MAX`] if none does; `most_children` is the largest number of children
-    /// that an update has, at most [`MAX_INSERTED`].
+    /// that an update has, at most [`MAX_INSERTED`]; `always_grows` whether every insertion inserts more tetrahedra than
+    /// it removes.
     ///
     /// # Errors
     /// If the removers are not as many as the base tetrahedra or name an update that `info` does not know.
@@ -127,6 +130,7 @@ impl VertexMt {
         base: BaseMesh,
         base_removers: Vec<u32>,
         most_children: u32,
+        always_grows: bool,
     ) -> Result<Self, UpdateError> {
         let known = |&u: &u32| u < info.updates || u == NONE;
         if base_removers.len() != base.tets.len()
@@ -147,6 +151,7 @@ impl VertexMt {
             info,
             base,
             base_removers,
+            always_grows,
             widths,
             nodes: Bits::default(),
             groups: Vec::new(),

@@ -39,7 +39,8 @@ impl VertexMt {
         let base_removers: Vec<u32> = mt.base().map(|t| mt.remover(t).map_or(NONE, |u| u.0)).collect();
         let base = mt.base_mesh().clone();
         let mut compact =
-            Self::new(info, base, base_removers, most_children.min(MAX_INSERTED as u32)).map_err(damaged)?;
+            Self::new(info, base, base_removers, most_children.min(MAX_INSERTED as u32), mt.always_grows)
+                .map_err(damaged)?;
         let mut boundary: HashSet<[u32; 3]> = boundary_faces(mt);
         let mut writer = Writer { mt, children: &children, glue: Box::default() };
         for u in (0..updates).map(UpdateId) {

@@ -105,7 +105,9 @@ impl Front {
         budget: Option<u32>,
         outcome: &mut Outcome,
     ) -> Result<(), UpdateError> {
-        if !criterion.is_monotone() {
+        // Where updates may make the mesh smaller, several thresholds fit a budget with larger ones between them: only
+        // from the base mesh is the first one found for sure.
+        if !criterion.is_monotone() || budget.is_some() && !mt.always_grows() {
             self.coarsen_all(mt, outcome)?;
         }
         match budget {

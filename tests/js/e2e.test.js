@@ -133,12 +133,28 @@ test("the first picture is there before the file is", async () => {
   await page.close();
 });
 
-test("every volume of the demo can be shown", async () => {
-  const page = await open("data/sphere-flow.mt");
-  await reach(page, "complete");
-  assertDrawn(await picture(page, "sphere-flow"));
-  assert.deepEqual(page.complaints, []);
-  await page.close();
+test("every volume of the demo can be shown, of whatever kind it is", async () => {
+  const seen = {};
+  for (const [name, kind] of [
+    ["sphere-flow", "edge"],
+    ["sphere-flow-vertex", "vertex"],
+    ["bucky-explicit", "explicit"],
+  ]) {
+    const page = await open(`data/${name}.mt`);
+    await reach(page, "complete");
+    assert.equal((await demo(page, "info")).kind, kind);
+    assertDrawn(await picture(page, name));
+    const coarse = await setSlider(page, "error", 90);
+    seen[name] = await setSlider(page, "error", 0);
+    assert.ok(coarse.tetrahedra < seen[name].tetrahedra, name);
+    seen[name].picture = await picture(page, `${name}-reference`);
+    await page.screenshot({ path: fileURLToPath(new URL(`page-${name}.png`, pictures)) });
+    assert.deepEqual(page.complaints, []);
+    await page.close();
+  }
+  // Built from the same mesh, both kinds have the same reference mesh: up to the lattice, one picture.
+  assert.equal(seen["sphere-flow"].tetrahedra, seen["sphere-flow-vertex"].tetrahedra);
+  assert.ok(differing(seen["sphere-flow"].picture, seen["sphere-flow-vertex"].picture) < 0.02);
 });
 
 test("a browser without WebGPU gets a message, not a blank page", async () => {

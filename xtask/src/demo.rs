@@ -12,8 +12,22 @@ use crate::{fixture, package, serve, shell};
 /// Where the page looks for its volumes.
 const DATA: &str = "www/data";
 
-/// Name, kind of file and size of the generated volumes.
-const VOLUMES: [(&str, &str, &str); 2] = [("bucky", "vti", "65"), ("sphere-flow", "vtu", "24")];
+/// A volume of the demo: the name of its MT file, and how its data is generated and built.
+struct Volume {
+    name: &'static str,
+    data: &'static str,
+    extension: &'static str,
+    size: &'static str,
+    kind: &'static str,
+}
+
+/// One of each kind of MT: the page opens all alike.
+const VOLUMES: [Volume; 4] = [
+    Volume { name: "bucky", data: "bucky", extension: "vti", size: "65", kind: "edge" },
+    Volume { name: "sphere-flow", data: "sphere-flow", extension: "vtu", size: "24", kind: "edge" },
+    Volume { name: "sphere-flow-vertex", data: "sphere-flow", extension: "vtu", size: "24", kind: "vertex" },
+    Volume { name: "bucky-explicit", data: "bucky", extension: "vti", size: "17", kind: "explicit" },
+];
 
 /// Builds all, and serves until interrupted.
 pub fn run(args: &[String]) -> Result<()> {
@@ -44,17 +58,17 @@ pub fn bench_volume() -> Result<PathBuf> {
 pub fn make_data() -> Result<()> {
     let tetralod = fixture::tetralod()?;
     fs::create_dir_all(DATA)?;
-    for (name, extension, size) in VOLUMES {
+    for Volume { name, data, extension, size, kind } in VOLUMES {
         let mt = Path::new(DATA).join(format!("{name}.mt"));
         if is_newer(&mt, &tetralod) {
             continue;
         }
         println!("making {}", mt.display());
         let input = Path::new("target").join(format!("{name}.{extension}"));
-        shell::run(shell::command(&tetralod, ["generate", name, "--size", size, "-o"]).arg(&input))?;
+        shell::run(shell::command(&tetralod, ["generate", data, "--size", size, "-o"]).arg(&input))?;
         // Built beside and moved, so that an interrupted build is not taken for a finished one.
         let part = Path::new("target").join(format!("{name}.mt"));
-        shell::run(shell::command(&tetralod, ["build"]).arg(&input).arg("-o").arg(&part))?;
+        shell::run(shell::command(&tetralod, ["build", "--kind", kind]).arg(&input).arg("-o").arg(&part))?;
         fs::rename(&part, &mt)?;
     }
     Ok(())

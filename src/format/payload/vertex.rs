@@ -12,6 +12,7 @@ use crate::mt::BaseMesh;
 use crate::mt::BaseMeshError;
 use crate::mt::ErrorCode;
 use crate::mt::MtInfo;
+use crate::mt::MultiTessellation;
 use crate::mt::NodeBits;
 use crate::mt::UpdateId;
 use crate::mt::VertexMt;
@@ -40,10 +41,11 @@ pub fn check_counts(info: &MtInfo, base_vertices: u64) -> Result<(), BaseMeshErr
     Ok(())
 }
 
-/// Writes the column that follows those of the base mesh: how many children an update has at most, and which update
-/// removes each base tetrahedron.
+/// Writes the column that follows those of the base mesh: whether every update makes the mesh larger, how many children
+/// an update has at most, and which update removes each base tetrahedron.
 pub fn write_base(out: &mut Vec<u8>, mt: &VertexMt) {
     write::column(out, &mut Vec::new(), |out| {
+        write::varint(out, u64::from(mt.always_grows()));
         write::varint(out, u64::from(mt.most_children()));
         // NONE becomes 0.
         mt.base_removers().iter().for_each(|u| write::varint(out, u64::from(u.wrapping_add(1))));
@@ -52,6 +54,11 @@ pub fn write_base(out: &mut Vec<u8>, mt: &VertexMt) {
 
 /// Reads that column.
 pub fn read_base(mut column: Reader<'_>, info: MtInfo, base: BaseMesh) -> Result<VertexMt, FormatError> {
+    let always_grows = match column.varint()? {
+        0 => false,
+        1 => true,
+        _ => return Err(column.corrupt("whether updates make the mesh larger is neither 0 nor 1")),
+    };
     let most_children = column.varint()?;
     let mut removers = Vec::new();
     for _ in 0..base.tets.len() {
@@ -62,7 +69,7 @@ pub fn read_base(mut column: Reader<'_>, info: MtInfo, base: BaseMesh) -> Result
     }
     let damaged = column.corrupt("a base tetrahedron is removed by an update that there is not");
     column.end()?;
-    VertexMt::new(info, base, removers, most_children).map_err(|_| damaged)
+    VertexMt::new(info, base, removers, most_children, always_grows).map_err(|_| damaged)
 }
 
 /// Writes the columns of the updates `first .. end`.
