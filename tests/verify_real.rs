@@ -5,11 +5,18 @@
 mod build_support;
 
 use build_support::built;
+use std::ops::ControlFlow;
 use std::path::PathBuf;
+use tetralod::build::BuildConfig;
+use tetralod::build::Criterion;
+use tetralod::build::Method;
+use tetralod::build::build;
 use tetralod::io;
 use tetralod::mesh::Grid;
 use tetralod::mesh::TetMesh;
 use tetralod::mesh::repair;
+use tetralod::mt::MtKind;
+use tetralod::mt::MultiTessellation;
 use tetralod::verify;
 use tetralod::verify::Reference;
 
@@ -26,14 +33,32 @@ fn load(name: &str) -> Option<TetMesh> {
     Some(repair(mesh).expect("a mesh that can be repaired").0)
 }
 
-/// Builds and verifies; the base mesh must have at most so many vertices.
+/// Builds and verifies MTs of all kinds; the base mesh of the edge-based one must have at most so many vertices.
 fn check(name: &str, mesh: &TetMesh, most: u32) {
     let built = built(mesh);
-    let report = verify::run(&built.mt, mesh, Reference::Mesh, &mut |_, _| {});
-    assert!(report.valid && report.queries > 40, "{name}: {:#?}", report.failures);
-    assert!(report.worst_error_ratio <= 1.0, "{name}: {}", report.worst_error_ratio);
+    keeps_promises(&format!("{name}, edge"), &built.mt, mesh, Reference::Mesh);
     let base = built.summary.base_vertices;
     assert!(base <= most, "{name}: {base} vertices in the base mesh");
+    for (method, criterion) in [
+        (Method::Decimate, Criterion::HalfEdge),
+        (Method::Decimate, Criterion::Delaunay),
+        (Method::Insert, Criterion::Delaunay),
+    ] {
+        // Insertion fills the convex hull; of these meshes, only the grids do.
+        if method == Method::Insert && mesh.grid.is_none() {
+            continue;
+        }
+        let config = BuildConfig { kind: MtKind::Vertex, method, criterion, ..BuildConfig::default() };
+        let mt = build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt;
+        let reference = if method.keeps_the_mesh() { Reference::Mesh } else { Reference::Points };
+        keeps_promises(&format!("{name}, {} {}", method.name(), criterion.name()), &mt, mesh, reference);
+    }
+}
+
+fn keeps_promises(name: &str, mt: &impl MultiTessellation, mesh: &TetMesh, reference: Reference) {
+    let report = verify::run(mt, mesh, reference, &mut |_, _| {});
+    assert!(report.valid && report.queries > 40, "{name}: {:#?}", report.failures);
+    assert!(report.worst_error_ratio <= 1.0, "{name}: {}", report.worst_error_ratio);
 }
 
 fn file(name: &str, most: u32) {
