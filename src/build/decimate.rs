@@ -38,10 +38,6 @@ use glam::DVec3;
 /// How errors are grouped. Finer levels than those of edge collapses give smaller meshes here, and deeper orders.
 const LEVELS: Levels = Levels::QUARTERS;
 
-/// In-sphere tests are exact up to there.
-const TOO_FINE: BuildError =
-    BuildError::Option { name: "criterion", expected: "half-edge on a lattice of more than 23 bits" };
-
 /// What [`decimate`] hands over.
 pub(super) struct Decimated {
     pub sequence: Sequence,
@@ -54,7 +50,7 @@ pub(super) struct Decimated {
 /// [`crate::mesh::repair`].
 ///
 /// # Errors
-/// As [`super::edge_mt`]; if the lattice is too fine for the Delaunay criterion.
+/// As [`super::edge_mt`].
 pub(super) fn decimate(
     mesh: &TetMesh,
     config: &BuildConfig,
@@ -70,7 +66,7 @@ pub(super) fn decimate(
     let quantized = quantize::quantize(mesh, config)?;
     let gift_wrap = match criterion {
         Criterion::HalfEdge => None,
-        Criterion::Delaunay => Some(GiftWrap::new(&quantized.positions).ok_or(TOO_FINE)?),
+        Criterion::Delaunay => Some(GiftWrap::new(&quantized.positions)),
     };
     let displacement_per_error = config.displacement * Bounds::of(&mesh.positions).diagonal();
     let work = WorkMesh::new(mesh.tets.clone(), neighbors, mesh.positions.len());

@@ -718,7 +718,7 @@ impl Triangulation {
 }
 
 /// The points relative to a corner of their bounding box, without the factors of two that they share.
-fn shifted(points: &[[i32; 3]]) -> Vec<[i32; 3]> {
+pub(super) fn shifted(points: &[[i32; 3]]) -> Vec<[i32; 3]> {
     let Some([low, _]) = bounds(points) else { return Vec::new() };
     let moved = points.iter().map(|p| [0, 1, 2].map(|i| p[i] - low[i]));
     let digits = moved.clone().flatten().fold(0, |all, x| all | x);

@@ -1,10 +1,11 @@
 //! Filling a hole by the Delaunay criterion, tetrahedron by tetrahedron from its faces.
 
 use super::cost::as_vec;
+use super::delaunay::shifted;
 use super::hole::Filling;
 use super::hole::Hole;
 use super::hole::sorted;
-use super::in_sphere::InSphere;
+use crate::geom::in_conflict;
 use crate::geom::orient3d;
 use crate::mesh::FACES;
 use crate::mesh::NONE;
@@ -15,7 +16,8 @@ const MAX_FILLING: usize = 128;
 
 /// Fills holes; holds scratch space.
 pub(super) struct GiftWrap {
-    spheres: InSphere,
+    /// Near each other where the lattice allows it: small numbers make in-sphere tests cheap.
+    points: Vec<[i32; 3]>,
     /// Faces that still need a tetrahedron on the side to which they are positive.
     open: Vec<OpenFace>,
 }
@@ -28,9 +30,8 @@ struct OpenFace {
 }
 
 impl GiftWrap {
-    /// None if the lattice is too fine for it.
-    pub fn new(positions: &[[i32; 3]]) -> Option<Self> {
-        Some(Self { spheres: InSphere::new(positions)?, open: Vec::new() })
+    pub fn new(positions: &[[i32; 3]]) -> Self {
+        Self { points: shifted(positions), open: Vec::new() }
     }
 
     /// Fills a hole: false if the Delaunay tetrahedra of its vertices do not fit it, or its boundary is curved.
@@ -39,17 +40,18 @@ impl GiftWrap {
         if !hole.is_flat() {
             return false;
         }
-        let Self { spheres, open } = self;
-        let at = |v: u32| positions[v as usize];
+        let Self { points, open } = self;
+        let at = |v: u32| points[v as usize];
         open.clear();
         let faces = hole.faces.iter();
         open.extend(faces.map(|&(face, _)| OpenFace { face, key: sorted(face), behind: NONE }));
         while let Some(OpenFace { face, behind, .. }) = open.pop() {
-            let corners = face.map(at);
-            if hole.on_boundary() && behind != NONE && hole.in_plane(corners) {
+            let in_plane = || hole.in_plane(face.map(|v| positions[v as usize]));
+            if hole.on_boundary() && behind != NONE && in_plane() {
                 filling.border.push((behind, face));
                 continue;
             }
+            let corners = face.map(at);
             let pencil = Pencil::new(corners);
             let mut apex: Option<(u32, Height)> = None;
             for &v in hole.link.iter().filter(|v| !face.contains(v)) {
@@ -61,7 +63,7 @@ impl GiftWrap {
                 let is_nearer = |(best, lowest): &(u32, Height)| {
                     height.is_below(lowest).unwrap_or_else(|| {
                         let [x, y, z] = corners;
-                        spheres.contains([x, y, z, at(*best)], at(v))
+                        in_conflict(x, y, z, at(*best), at(v))
                     })
                 };
                 if in_front && apex.as_ref().is_none_or(is_nearer) {

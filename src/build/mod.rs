@@ -30,7 +30,6 @@ mod gift_wrap;
 mod half_edge;
 mod history;
 mod hole;
-mod in_sphere;
 mod insert;
 mod method;
 mod plan;
