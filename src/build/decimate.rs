@@ -322,7 +322,6 @@ impl<'a> Decimator<'a> {
             removed: middle..end,
             inserted: start..middle,
             error,
-            threshold: error,
             step,
         });
         hole.replace(mesh, &best.filling, slots);

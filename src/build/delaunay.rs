@@ -95,7 +95,6 @@ pub(super) struct Triangulation {
     exact: bool,
     /// Whether the plan is cut.
     is_cut: bool,
-    cuts: usize,
     random: u32,
 }
 
@@ -139,7 +138,6 @@ impl Triangulation {
             star: Vec::new(),
             exact: true,
             is_cut: false,
-            cuts: 0,
             random: 1,
         };
         for face in FACES {
@@ -197,12 +195,6 @@ impl Triangulation {
     /// The slots of the star that the last insertion made; some may be ghosts.
     pub fn star(&self) -> &[u32] {
         &self.star
-    }
-
-    /// How many zones have been cut.
-    #[cfg(test)]
-    pub fn cuts(&self) -> usize {
-        self.cuts
     }
 
     /// A tetrahedron that contains the point, walking from `from`; a ghost if the point is outside. The mesh must be
@@ -266,7 +258,6 @@ impl Triangulation {
     /// Carries the plan for `v` out.
     pub fn carry_out(&mut self, v: u32) {
         self.exact &= !self.is_cut;
-        self.cuts += usize::from(self.is_cut);
         self.fill(v);
     }
 

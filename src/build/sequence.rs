@@ -13,7 +13,6 @@ use crate::mt::MtInfo;
 use crate::mt::UpdateError;
 use crate::mt::canonical;
 use std::cmp::Reverse;
-use std::collections::HashMap;
 use std::ops::Range;
 
 /// Vertex insertions from a base mesh to a reference mesh, in an order in which they can be carried out.
@@ -39,10 +38,6 @@ pub(super) struct Insertion {
     pub inserted: Range<usize>,
     /// The largest error of a tetrahedron that it removes, as a fraction of a field's range; it need not be monotone.
     pub error: f64,
-    /// Below which errors the insertion is needed: the largest ε such that the smallest consistent set without a
-    /// tetrahedron of an error above ε holds it. It does not grow from parents to children, so for every ε the
-    /// insertions of a larger threshold are a consistent set, and its mesh is within ε.
-    pub threshold: f64,
     /// What has to be added to the errors of the insertions that depend on this one before they bound its own from
     /// below: how far the boundary moves, as an error. 0 where the boundary stays.
     pub step: f64,
@@ -57,7 +52,7 @@ impl Sequence {
         quantized: &Quantized,
         progress: OnProgress<'_>,
     ) -> Result<ExplicitMt, BuildError> {
-        let arcs = self.arcs()?;
+        let arcs = self.arcs(quantized.positions.len())?;
         let errors = self.monotone_errors(&info, quantized, &arcs);
         let mut order: Vec<u32> = (0..self.steps.len() as u32).collect();
         order.sort_by_key(|&i| Reverse(errors[i as usize]));
@@ -107,26 +102,33 @@ impl Sequence {
         Ok(mt)
     }
 
-    /// Where each removed tetrahedron comes from.
-    fn arcs(&self) -> Result<Arcs, BuildError> {
-        let mut live: HashMap<[u32; 4], Source> =
-            (0..).zip(&self.base).map(|(t, tet)| (sorted(*tet), Source::Base(t))).collect();
+    /// Where each removed tetrahedron comes from. Insertions are never undone, and all that one inserts is around its
+    /// vertex: so a tetrahedron comes from the insertion of its newest vertex.
+    fn arcs(&self, points: usize) -> Result<Arcs, BuildError> {
+        let mut base: Vec<([u32; 4], u32)> = self.base.iter().map(|&tet| sorted(tet)).zip(0..).collect();
+        base.sort_unstable();
+        let mut step_of = vec![NONE; points];
         let mut arcs =
             Arcs { source: vec![Source::Base(NONE); self.tets.len()], creator: vec![NONE; self.tets.len()] };
+        let mut gone = vec![false; self.tets.len()];
         for (i, step) in (0..).zip(&self.steps) {
             for at in step.removed.clone() {
-                let source = live.remove(&sorted(self.tets[at])).ok_or_else(|| torn(i))?;
-                arcs.source[at] = source;
-                if let Source::Inserted(from) = source {
-                    arcs.creator[at] = arcs.creator[from];
-                }
-            }
-            for at in step.inserted.clone() {
-                arcs.creator[at] = i;
-                if live.insert(sorted(self.tets[at]), Source::Inserted(at)).is_some() {
+                let tet = sorted(self.tets[at]);
+                let newest = tet.map(|v| step_of[v as usize]).into_iter().filter(|&s| s != NONE).max();
+                let Some(creator) = newest else {
+                    let found = base.binary_search_by_key(&tet, |entry| entry.0).map_err(|_| torn(i))?;
+                    arcs.source[at] = Source::Base(base[found].1);
+                    continue;
+                };
+                let mut candidates = self.steps[creator as usize].inserted.clone();
+                let from = candidates.find(|&from| sorted(self.tets[from]) == tet).ok_or_else(|| torn(i))?;
+                if std::mem::replace(&mut gone[from], true) {
                     return Err(torn(i));
                 }
+                arcs.source[at] = Source::Inserted(from);
+                arcs.creator[at] = creator;
             }
+            step_of[step.vertex as usize] = i;
         }
         Ok(arcs)
     }
@@ -137,16 +139,18 @@ impl Sequence {
         // Never zero: error 0 is to mean the reference mesh, with every update applied.
         let own = |step: &Insertion| ErrorCode::at_least(step.error).max(ErrorCode(1));
         let mut errors: Vec<ErrorCode> = self.steps.iter().map(own).collect();
+        let mut parents: Vec<u32> = Vec::new();
+        let step = |i: usize| self.overshoot(i, info, quantized).max(self.steps[i].step);
+        let more: Vec<f64> = (0..self.steps.len()).map(step).collect();
         for i in (0..self.steps.len()).rev() {
             let error = errors[i].error();
             let removed = self.steps[i].removed.clone();
-            let mut parents: Vec<u32> =
-                arcs.creator[removed].iter().copied().filter(|&p| p != NONE).collect();
+            parents.clear();
+            parents.extend(arcs.creator[removed].iter().filter(|&&p| p != NONE));
             parents.sort_unstable();
             parents.dedup();
-            for p in parents.into_iter().map(|p| p as usize) {
-                let more = self.overshoot(p, info, quantized).max(self.steps[p].step);
-                errors[p] = errors[p].max(ErrorCode::at_least(error + more));
+            for p in parents.iter().map(|&p| p as usize) {
+                errors[p] = errors[p].max(ErrorCode::at_least(error + more[p]));
             }
         }
         errors
@@ -190,11 +194,11 @@ impl Source {
     }
 }
 
-/// What is known of each entry of [`Sequence::tets`].
+/// What is known of each entry of [`Sequence::tets`] that is removed.
 struct Arcs {
     /// Where a removed tetrahedron comes from.
     source: Vec<Source>,
-    /// Which insertion made it; [`NONE`] for the base mesh.
+    /// Which insertion made a removed tetrahedron; [`NONE`] for the base mesh.
     creator: Vec<u32>,
 }
 
