@@ -7,6 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
+use tetralod::mesh::{Field, TetMesh};
 
 /// A folder of one test, gone when the test is done.
 struct Folder(PathBuf);
@@ -253,6 +254,79 @@ fn kinds_are_built_and_converted() {
     );
     bad(1, &["convert", &input, "--kind", "edge", "-o", &out], &[&input, "not an MT file"]);
     assert_eq!(folder.names(), before);
+}
+
+/// Points that look random, in a ball, with a smooth field.
+fn ball(count: usize) -> TetMesh {
+    let mut state = 11_u64;
+    let mut next = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 40) as f64 / f64::from(1 << 23) - 1.0
+    };
+    let mut positions: Vec<[f64; 3]> = Vec::new();
+    while positions.len() < count {
+        let p = [next(), next(), next()];
+        if p.iter().map(|x| x * x).sum::<f64>() < 1.0 {
+            positions.push(p);
+        }
+    }
+    let values = positions.iter().map(|[x, y, z]| x * y + 1.0 / (0.2 + z * z)).collect();
+    TetMesh { positions, fields: vec![Field { name: "hill".to_owned(), values }], ..TetMesh::default() }
+}
+
+/// A legacy file of the points alone, with the cells that `cells` writes.
+fn legacy_points(mesh: &TetMesh, data_set: &str, cells: &str) -> String {
+    let count = mesh.positions.len();
+    let lines = |numbers: &[f64]| numbers.iter().map(|x| format!("{x:?}\n")).collect::<String>();
+    format!(
+        "# vtk DataFile Version 3.0\npoints\nASCII\nDATASET {data_set}\nPOINTS {count} double\n{}{cells}\
+         POINT_DATA {count}\nSCALARS hill double\nLOOKUP_TABLE default\n{}",
+        lines(mesh.positions.as_flattened()),
+        lines(&mesh.fields[0].values)
+    )
+}
+
+#[test]
+fn points_alone_are_inserted() {
+    let folder = Folder::new("points");
+    let [xml, vertices, poly, mt, other, out] =
+        ["p.vtu", "v.vtk", "p.vtk", "p.mt", "o.mt", "o.vtu"].map(|name| folder.path(name));
+    let ball = ball(700);
+    tetralod::io::write_vtu(&ball, &mut fs::File::create(&xml).expect("a file")).expect("it is written");
+    let all: String = (0..700).map(|i| format!(" {i}")).collect();
+    let one: String = (0..700).map(|i| format!("1 {i}\n")).collect();
+    let cells = format!("CELLS 700 1400\n{one}CELL_TYPES 700\n{}", "1\n".repeat(700));
+    fs::write(&vertices, legacy_points(&ball, "UNSTRUCTURED_GRID", &cells)).expect("a file");
+    let cells = format!("VERTICES 1 701\n700{all}\n");
+    fs::write(&poly, legacy_points(&ball, "POLYDATA", &cells)).expect("a file");
+
+    let insert = ["--kind", "vertex", "--method", "insert", "--quiet", "-o"];
+    good(&[&["build", &xml], &insert[..], &[&mt]].concat());
+    for input in [&vertices, &poly] {
+        good(&[&["build", input], &insert[..], &[&other]].concat());
+        assert!(fs::read(&mt).expect("an MT") == fs::read(&other).expect("an MT"), "{input}");
+    }
+    assert_eq!(number(&json(&["info", &mt, "--json"]), "vertices"), 700.0);
+    assert!(good(&["verify", &mt, "--against", &xml]).contains("every promise is kept"));
+    let part = json(&["extract", &mt, "--error", "5%", "-o", &out, "--json", "--measure", &xml]);
+    assert!(number(&part, "measured_error") <= number(&part, "error_bound"), "{part}");
+
+    let before = folder.names();
+    for method in [&["--kind", "edge"][..], &["--kind", "vertex"]] {
+        let arguments = [&["build", &xml, "-o", &other], method].concat();
+        bad(1, &arguments, &[&xml, "points", "--method insert"]);
+    }
+    assert_eq!(folder.names(), before);
+}
+
+#[test]
+fn insertion_refuses_what_it_would_fill_up() {
+    let folder = Folder::new("hollow");
+    let [input, mt] = ["s.vtu", "s.mt"].map(|name| folder.path(name));
+    good(&["generate", "sphere-flow", "--size", "4", "-o", &input]);
+    let arguments = ["build", &input, "--kind", "vertex", "--method", "insert", "-o", &mt];
+    bad(1, &arguments, &[&input, "convex hull", "--method decimate"]);
+    assert_eq!(folder.names(), ["s.vtu"]);
 }
 
 #[test]

@@ -60,6 +60,9 @@ pub(super) fn decimate(
     if mesh.positions.len() > MAX_UPDATES as usize {
         return Err(BuildError::TooLarge);
     }
+    if mesh.tets.is_empty() {
+        return Err(BuildError::Empty);
+    }
     mesh::check(mesh).map_err(BuildError::Mesh)?;
     let Topology { neighbors, non_manifold, .. } =
         mesh::topology(mesh.positions.len(), &mesh.tets).map_err(BuildError::Mesh)?;

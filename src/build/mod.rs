@@ -208,7 +208,9 @@ impl fmt::Display for BuildError {
                 write!(f, "{one} does not go with {other}: {instead}")
             }
             Self::Convert(error) => write!(f, "{error}"),
-            Self::Empty => write!(f, "the mesh has no tetrahedra"),
+            Self::Empty => {
+                write!(f, "the mesh has no tetrahedra; --method insert builds from points alone")
+            }
             Self::NoField => {
                 write!(f, "the mesh has no point field: an MT needs at least one scalar at its points")
             }

@@ -55,7 +55,7 @@ impl Quantized {
     }
 }
 
-/// Puts the points on a lattice that keeps the cells positive; there need not be any.
+/// Puts the points on a lattice that keeps the cells positive or, where there are none, the points apart.
 pub(super) fn quantize(mesh: &TetMesh, config: &BuildConfig) -> Result<Quantized, BuildError> {
     if !(1..=MAX_FIELD_BITS).contains(&config.field_bits) {
         return Err(BuildError::Option { name: "field-bits", expected: "1 to 24" });
@@ -108,9 +108,29 @@ fn field_lattice(field: &Field, bits: u32) -> FieldInfo {
     FieldInfo { name: field.name.clone(), min, max, origin: min, step, bits }
 }
 
+/// Puts points without cells on the coarsest lattice of at least [`FEWEST_BITS`] that keeps them apart. Where the finest
+/// does not, two are in the same place in the input.
+fn place_points(mesh: &TetMesh) -> (Lattice, Vec<[i32; 3]>) {
+    let on = |bits: u32| {
+        let lattice = lattice(mesh, bits);
+        let positions: Vec<[i32; 3]> = mesh.positions.iter().map(|&p| lattice.nearest(p)).collect();
+        (lattice, positions)
+    };
+    let is_apart = |positions: &[[i32; 3]]| {
+        let mut sorted = positions.to_vec();
+        sorted.sort_unstable();
+        sorted.windows(2).all(|pair| pair[0] != pair[1])
+    };
+    let found = (FEWEST_BITS..WIDE_BITS).map(on).find(|(_, positions)| is_apart(positions));
+    found.unwrap_or_else(|| on(WIDE_BITS))
+}
+
 /// Puts the points on a lattice that keeps every cell positive: that of `wanted` bits or, if nothing is wanted, the
 /// coarsest one of at least [`FEWEST_BITS`], with [`SPARE_BITS`] more where it had to be finer.
 fn place(mesh: &TetMesh, wanted: Option<u32>) -> Result<(Lattice, Vec<[i32; 3]>), BuildError> {
+    if mesh.tets.is_empty() && wanted.is_none() {
+        return Ok(place_points(mesh));
+    }
     let on = |bits: u32| {
         let lattice = lattice(mesh, bits);
         let positions: Vec<[i32; 3]> = mesh.positions.iter().map(|&p| lattice.nearest(p)).collect();

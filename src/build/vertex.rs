@@ -10,6 +10,7 @@ use super::quantize;
 use super::quantize::Quantized;
 use super::sequence::Sequence;
 use crate::geom::Bounds;
+use crate::mesh;
 use crate::mesh::TetMesh;
 use crate::mt::ExplicitMt;
 use crate::mt::MAX_UPDATES;
@@ -46,7 +47,9 @@ pub(super) fn inserted_mt(
     if mesh.positions.len() > MAX_UPDATES as usize {
         return Err(BuildError::TooLarge);
     }
-    crate::mesh::check(mesh).map_err(BuildError::Mesh)?;
+    if !mesh.tets.is_empty() {
+        mesh::check(mesh).map_err(BuildError::Mesh)?;
+    }
     let quantized = quantize::quantize(mesh, config)?;
     let displacement_per_error = config.displacement * Bounds::of(&mesh.positions).diagonal();
     let sequence = insert::insert(&quantized, &mesh.tets, progress)?;

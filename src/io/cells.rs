@@ -6,6 +6,13 @@ use crate::io::error::ReadReason;
 
 /// VTK's number for a tetrahedron.
 const TETRAHEDRON: i64 = 10;
+/// And for cells that say no more than that there are points.
+const VERTICES: [i64; 2] = [1, 2];
+
+/// Whether the cells are vertices and poly-vertices alone, as of data sets that are only points.
+pub(super) fn are_points(types: &[i64]) -> bool {
+    types.iter().all(|t| VERTICES.contains(t))
+}
 
 /// Refuses cell types other than tetrahedra, all of them counted.
 pub(super) fn only_tetrahedra(types: &[i64]) -> Result<(), ReadReason> {

@@ -1,4 +1,5 @@
-//! Legacy VTK files (`.vtk`), versions 1.0 to 5.1, ASCII and binary: unstructured grids and structured points.
+//! Legacy VTK files (`.vtk`), versions 1.0 to 5.1, ASCII and binary: unstructured grids, structured points, and poly data
+//! that is points alone.
 //!
 //! Binary numbers are big-endian and start right after the line that announces them. Version 5 lists cells as
 //! offsets and connectivity, older ones as counts followed by indices.
@@ -27,6 +28,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<TetMesh, ReadError> {
     }
     match kind.as_str() {
         "unstructured_grid" => body.unstructured(file.version >= 5),
+        "polydata" => body.points(),
         _ => body.structured(),
     }
 }
@@ -101,7 +103,7 @@ impl<'a> Reader<'a> {
             }
         }
         let kind = file.word()?.to_ascii_lowercase();
-        if kind != "unstructured_grid" && kind != "structured_points" {
+        if !["unstructured_grid", "structured_points", "polydata"].contains(&kind.as_str()) {
             let what = format!("a data set of type {}", shortened(&kind).to_ascii_uppercase());
             let remedy = "give an unstructured grid of tetrahedra or structured points".into();
             return Err(ReadReason::Unsupported { what, remedy });
@@ -342,6 +344,16 @@ impl Body {
                 let count = file.count()?;
                 self.types = file.integers(count, NumberType::I32)?;
             }
+            // Only poly data has these.
+            "vertices" => {
+                self.cells(file)?;
+                self.cells = None;
+            }
+            "lines" | "polygons" | "triangle_strips" => {
+                let what = format!("a data set of type POLYDATA with {}", keyword.to_ascii_uppercase());
+                let remedy = "give an unstructured grid of tetrahedra, or points alone".into();
+                return Err(ReadReason::Unsupported { what, remedy });
+            }
             "dimensions" => self.dims = Some(file.three()?),
             "origin" => self.origin = file.three()?,
             "spacing" | "aspect_ratio" => self.spacing = Some(file.three()?),
@@ -437,13 +449,28 @@ impl Body {
         }
     }
 
-    fn unstructured(self, since_5: bool) -> Result<TetMesh, ReadError> {
-        let missing = |what: &str| ReadReason::Missing(format!("section {what}"));
+    fn checked_positions(&self) -> Result<Vec<[f64; 3]>, ReadError> {
         let coordinates = self.positions.as_deref().ok_or_else(|| missing("POINTS")).at(String::new)?;
-        let cells = self.cells.ok_or_else(|| missing("CELLS")).at(String::new)?;
         self.check_point_data(coordinates.len() as u64 / 3).at(|| "POINT_DATA".into())?;
-        let positions = points_from(coordinates).at(|| "POINTS".into())?;
+        points_from(coordinates).at(|| "POINTS".into())
+    }
+
+    fn points(self) -> Result<TetMesh, ReadError> {
+        Ok(TetMesh {
+            positions: self.checked_positions()?,
+            fields: self.fields,
+            tets: Vec::new(),
+            grid: None,
+        })
+    }
+
+    fn unstructured(self, since_5: bool) -> Result<TetMesh, ReadError> {
+        let cells = self.cells.ok_or_else(|| missing("CELLS")).at(String::new)?;
+        let positions = self.checked_positions()?;
         expect("cell types", cells, self.types.len()).at(|| "CELL_TYPES".into())?;
+        if cells > 0 && cells::are_points(&self.types) {
+            return Ok(TetMesh { positions, fields: self.fields, tets: Vec::new(), grid: None });
+        }
         cells::only_tetrahedra(&self.types).at(|| "CELL_TYPES".into())?;
         let list = if since_5 { self.indices_by_offsets(cells) } else { self.indices_by_counts(cells) };
         let tets = list.and_then(|l| cells::tetrahedra(&l, positions.len(), 0)).at(|| "CELLS".into())?;
@@ -476,6 +503,10 @@ impl Body {
         self.check_point_data(dims.iter().product()).at(|| "POINT_DATA".into())?;
         image::grid_mesh(grid, self.fields).at(|| "POINT_DATA".into())
     }
+}
+
+fn missing(section: &str) -> ReadReason {
+    ReadReason::Missing(format!("section {section}"))
 }
 
 /// Checks a count. Counts of what was read are far from overflow.

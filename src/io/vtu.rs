@@ -1,4 +1,5 @@
-//! VTK XML unstructured grids (`.vtu`), all encodings, any number of pieces.
+//! VTK XML unstructured grids (`.vtu`), all encodings, any number of pieces. Vertices as cells are left out: what has no
+//! others is a mesh of points without tetrahedra.
 
 use crate::io::cells;
 use crate::io::error::At;
@@ -88,6 +89,9 @@ fn read_cells(
     };
     let types = find("types")?;
     let kinds = document.integers(types, cells).at(|| types.place())?;
+    if cells::are_points(&kinds) {
+        return Ok(Vec::new());
+    }
     cells::only_tetrahedra(&kinds).at(|| types.place())?;
     let offsets = find("offsets")?;
     let ends = document.integers(offsets, cells).at(|| offsets.place())?;

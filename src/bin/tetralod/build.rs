@@ -24,7 +24,7 @@ use tetralod::mt::MtKind;
 /// Turns a tetrahedral mesh or a regular grid into an MT file.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// Mesh or grid: .vtu, .vti, .vtk, or .raw with a .json beside it.
+    /// Mesh or grid: .vtu, .vti, .vtk, or .raw with a .json beside it; points without cells for --method insert.
     input: PathBuf,
     /// The MT file to write.
     #[arg(short, long, value_name = "FILE")]

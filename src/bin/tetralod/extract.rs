@@ -182,7 +182,7 @@ fn report(
 
 /// The largest difference from the field of the input at its vertices, in the part that the request selects.
 fn measure(input: &Path, request: &Request, opened: &Opened, promise: Promise) -> Result<f64> {
-    let (reference, _) = files::read_mesh(input)?;
+    let reference = files::read_reference(input, opened)?;
     let info = opened.info()?;
     let name = &info.fields[request.field].name;
     let field = reference.fields.iter().find(|field| field.name == *name);

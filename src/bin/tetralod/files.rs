@@ -1,7 +1,9 @@
 //! Files in and out: MT files are streamed in, outputs appear whole or not at all.
 
+use super::build::METHOD;
 use anyhow::Context;
 use anyhow::Result;
+use anyhow::bail;
 use std::fs;
 use std::fs::File;
 use std::io;
@@ -13,12 +15,14 @@ use std::path::PathBuf;
 use std::sync::Mutex;
 use std::sync::MutexGuard;
 use std::sync::PoisonError;
+use tetralod::build::Method;
 use tetralod::mesh::MeshError;
 use tetralod::mesh::RepairReport;
 use tetralod::mesh::TetMesh;
 use tetralod::mt::Mt;
 use tetralod::mt::MtInfo;
 use tetralod::session::Session;
+use tetralod::verify::Reference;
 
 /// Bytes that are read at a time.
 const CHUNK: usize = 1 << 20;
@@ -104,6 +108,14 @@ impl Opened {
     pub fn info(&self) -> Result<&MtInfo> {
         self.session.info().context("the MT has no description")
     }
+
+    /// What its reference mesh has in common with the input, by what the builder wrote into the file.
+    pub fn reference(&self) -> Reference {
+        let mut metadata = self.session.metadata().iter();
+        let method = metadata.find(|(key, _)| key == METHOD).map(|(_, value)| value.as_str());
+        let found = Method::ALL.into_iter().find(|m| Some(m.name()) == method);
+        if found.is_none_or(Method::keeps_the_mesh) { Reference::Mesh } else { Reference::Points }
+    }
 }
 
 /// Opens an MT file.
@@ -132,7 +144,14 @@ fn read_mt(path: &Path) -> Result<Session> {
 /// Reads a mesh and mends what can be mended.
 pub fn read_mesh(path: &Path) -> Result<(TetMesh, RepairReport)> {
     // Read errors name the file themselves.
-    mend(tetralod::io::read(path)?, path)
+    let mesh = tetralod::io::read(path)?;
+    if mesh.tets.is_empty() && !mesh.positions.is_empty() {
+        bail!(
+            "{}: there are points but no tetrahedra; build --kind vertex --method insert makes an MT of points alone",
+            path.display()
+        );
+    }
+    mend(mesh, path)
 }
 
 fn mend(mesh: TetMesh, path: &Path) -> Result<(TetMesh, RepairReport)> {
@@ -147,6 +166,15 @@ pub fn read_points(path: &Path) -> Result<(TetMesh, RepairReport)> {
         return Ok((mesh, RepairReport::default()));
     }
     mend(mesh, path)
+}
+
+/// Reads what the MT was built from: a mesh or, where no more is needed, points.
+pub fn read_reference(path: &Path, opened: &Opened) -> Result<TetMesh> {
+    let read = match opened.reference() {
+        Reference::Mesh => read_mesh(path)?,
+        Reference::Points => read_points(path)?,
+    };
+    Ok(read.0)
 }
 
 /// The number of the field called `name`; the first field without a name.

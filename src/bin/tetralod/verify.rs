@@ -1,8 +1,6 @@
 //! `tetralod verify`: does an MT file keep its promises?
 
-use super::build::METHOD;
 use super::files;
-use super::files::Opened;
 use super::output;
 use anyhow::Result;
 use indicatif::ProgressBar;
@@ -10,9 +8,7 @@ use indicatif::ProgressStyle;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use tetralod::build::Method;
 use tetralod::verify;
-use tetralod::verify::Reference;
 use tetralod::verify::VerifyReport;
 
 /// Checks every promise of an MT file against the mesh that it was built from; exit code 1 if one is broken.
@@ -20,7 +16,7 @@ use tetralod::verify::VerifyReport;
 pub struct Arguments {
     /// The MT file.
     file: PathBuf,
-    /// The mesh that it was built from.
+    /// The mesh, or the points, that it was built from.
     #[arg(long, value_name = "INPUT")]
     against: PathBuf,
     /// Print a JSON object.
@@ -38,11 +34,8 @@ struct Report<'a> {
 
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let opened = files::open_mt(&arguments.file)?;
-    let reference = reference(&opened);
-    let input = match reference {
-        Reference::Mesh => files::read_mesh(&arguments.against)?.0,
-        Reference::Points => files::read_points(&arguments.against)?.0,
-    };
+    let reference = opened.reference();
+    let input = files::read_reference(&arguments.against, &opened)?;
     // Drawn on stderr, and only on a terminal.
     let bar = ProgressBar::new(1);
     bar.set_style(ProgressStyle::with_template("{wide_bar} {percent:>3} %  about {eta} left")?);
@@ -57,14 +50,6 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         print(&report)?
     }
     Ok(if report.valid { ExitCode::SUCCESS } else { ExitCode::FAILURE })
-}
-
-/// What is to be the same, by what the builder wrote into the file.
-fn reference(opened: &Opened) -> Reference {
-    let mut metadata = opened.session.metadata().iter();
-    let method = metadata.find(|(key, _)| key == METHOD).map(|(_, value)| value.as_str());
-    let found = Method::ALL.into_iter().find(|m| Some(m.name()) == method);
-    if found.is_none_or(Method::keeps_the_mesh) { Reference::Mesh } else { Reference::Points }
 }
 
 fn print_json(report: &VerifyReport) -> Result<()> {
