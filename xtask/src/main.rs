@@ -3,6 +3,7 @@
 #![forbid(unsafe_code)]
 
 mod bench;
+mod bench_build;
 mod browser;
 mod demo;
 mod fixture;
@@ -21,7 +22,8 @@ usage: cargo xtask COMMAND
   build                          build the npm package into pkg/
   demo [--port N] [--no-serve]   build everything, make the demo's data, serve the page on localhost
   test [STEP...]                 every check, or the named steps; `test --list` names them
-  bench [FILE.mt] [--browser]    measure decoding, refinement and isosurfaces; natively, or also in the browser";
+  bench [FILE.mt] [--browser]    measure decoding, refinement and isosurfaces; natively, or also in the browser
+  bench --build [--large]        measure triangulation, insertion and the kinds of MT side by side";
 
 fn main() -> ExitCode {
     match run() {

@@ -1,4 +1,4 @@
-//! `tetralod bench`: how fast this machine is with an MT file.
+//! `tetralod bench`: how fast this machine is with an MT file, or at Delaunay triangulation.
 
 use super::output;
 use anyhow::Context;
@@ -13,7 +13,11 @@ use tetralod::bench;
 #[derive(clap::Args)]
 pub struct Arguments {
     /// The MT file.
-    file: PathBuf,
+    #[arg(required_unless_present = "delaunay")]
+    file: Option<PathBuf>,
+    /// Time the Delaunay triangulation of a grid and of random points instead.
+    #[arg(long, conflicts_with = "file")]
+    delaunay: bool,
     /// Print a JSON object.
     #[arg(long)]
     json: bool,
@@ -49,9 +53,22 @@ struct Tets {
     tets_per_second: f64,
 }
 
+/// Triangulation, without the mesh of tetrahedra that is made of it.
+#[derive(Serialize)]
+struct Delaunay {
+    /// 33³ points.
+    grid: Tets,
+    /// 100,000 points.
+    random: Tets,
+}
+
+const GRID: i32 = 33;
+const RANDOM: usize = 100_000;
+
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let name = || arguments.file.display().to_string();
-    let bytes = fs::read(&arguments.file).with_context(name)?;
+    let Some(file) = &arguments.file else { return run_delaunay(arguments) };
+    let name = || file.display().to_string();
+    let bytes = fs::read(file).with_context(name)?;
     let start = Instant::now();
     let mut clock = || start.elapsed().as_secs_f64();
     let found = bench::run(&bytes, &mut clock, TIME).with_context(name)?;
@@ -65,6 +82,42 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         isosurface: Tets { tets_per_second: found.isosurface_tets },
     };
     if arguments.json { output::json(&report) } else { print(&report) }
+}
+
+fn run_delaunay(arguments: &Arguments) -> Result<()> {
+    let grid: Vec<[i32; 3]> =
+        (0..GRID.pow(3)).map(|i| [i % GRID, i / GRID % GRID, i / (GRID * GRID)]).collect();
+    let report = Delaunay { grid: triangulate(&grid)?, random: triangulate(&random_points(RANDOM))? };
+    if arguments.json {
+        return output::json(&report);
+    }
+    let rate = |tets: &Tets| format!("{} tetrahedra per second", output::count(tets.tets_per_second as u64));
+    output::table(&[("grid", rate(&report.grid)), ("random points", rate(&report.random))])
+}
+
+/// The fastest of several runs, as of all benchmarks.
+fn triangulate(points: &[[i32; 3]]) -> Result<Tets> {
+    let mut fastest = 0.0_f64;
+    let begin = Instant::now();
+    while begin.elapsed().as_secs_f64() < TIME {
+        let start = Instant::now();
+        let tets = tetralod::build::delaunay(points)?;
+        fastest = fastest.max(tets.len() as f64 / start.elapsed().as_secs_f64());
+    }
+    Ok(Tets { tets_per_second: fastest })
+}
+
+/// Points that look random on a lattice of 20 bits, each once.
+fn random_points(count: usize) -> Vec<[i32; 3]> {
+    let mut state = 1_u64;
+    let mut next = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 44) as i32
+    };
+    let mut points: Vec<[i32; 3]> = (0..count).map(|_| [next(), next(), next()]).collect();
+    points.sort_unstable();
+    points.dedup();
+    points
 }
 
 fn print(report: &Report) -> Result<()> {
