@@ -24,7 +24,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<TetMesh, ReadError> {
     let mut body = Body::default();
     while let Some(keyword) = file.next_word().at(|| "body".into())? {
         let keyword = keyword.to_ascii_lowercase();
-        body.section(&mut file, &keyword).at(|| keyword.to_ascii_uppercase())?;
+        body.section(&mut file, &keyword).at(|| shortened(&keyword).to_ascii_uppercase())?;
     }
     match kind.as_str() {
         "unstructured_grid" => body.unstructured(file.version >= 5),
