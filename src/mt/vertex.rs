@@ -78,7 +78,7 @@ pub struct VertexMt {
     /// Where each node starts in its group, in units.
     starts: Vec<u16>,
     errors: Vec<ErrorCode>,
-    /// Bits of all nodes but for vertices and links.
+    /// Bits of all nodes, padding included, but for vertices and links.
     shape_bits: u64,
 }
 
@@ -202,7 +202,7 @@ impl VertexMt {
         self.nodes.extend(bits);
         self.nodes.pad(UNIT);
         self.errors.push(error);
-        self.shape_bits += bits.len() - links_end;
+        self.shape_bits += self.nodes.len() - start - links_end;
         Ok(UpdateId(update))
     }
 
@@ -253,7 +253,7 @@ impl VertexMt {
         (base + nodes + size_of_val(&self.errors[..])) as u64
     }
 
-    /// Bits in all nodes that describe shapes: what a star is made of and removed by, and T_u. The paper's tree of T_u
+    /// Bits in all nodes that describe shapes: what a star is made of and removed by, T_u, and what fills up the last unit. The paper's tree of T_u
     /// and seed take 69 bits a node [§5].
     pub fn shape_bits(&self) -> u64 {
         self.shape_bits
