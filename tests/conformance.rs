@@ -246,7 +246,7 @@ fn any_order(how: How) {
 /// of them is tried.
 fn every_consistent_set(how: How) {
     let (mut sets, mut whole) = (0, 0);
-    for (cells, seed) in [([2, 1, 1], 0), ([2, 2, 1], 1), ([2, 2, 2], 2), ([9, 1, 1], 3), ([4, 3, 2], 4)] {
+    for (cells, seed) in [([2, 1, 1], 0), ([2, 2, 1], 1), ([2, 2, 2], 2), ([9, 1, 1], 3), ([5, 5, 4], 4)] {
         let waves: fn([f64; 3]) -> f64 = |p| (5.0 * p[0] + 3.0 * p[1]).sin() + p[2] * p[1];
         let mesh = build_support::blocks(cells, &[waves, build_support::hilly], |_| true);
         let input = Input { name: "a few cells", mesh, position_bits: None, flat: true, convex: true };
@@ -256,7 +256,7 @@ fn every_consistent_set(how: How) {
         whole += u32::from(first == 0);
         sets += visit_all(&subject, first, &mut Random(seed));
     }
-    assert!(sets > 500 && whole > 0, "{sets} sets of {whole} whole MTs");
+    assert!(sets > 150 && whole > 0, "{sets} sets of {whole} whole MTs");
 }
 
 /// Visits every consistent set that holds all updates before `first`, tries everything from there, and counts them.
@@ -433,5 +433,42 @@ fn within_errors(subject: &Subject, sets: usize, random: &mut Random) {
             &walk.mesh,
             epsilon.error(),
         );
+    }
+}
+
+/// Where the boundary is curved, or a corner is cut, a vertex comes to lie outside what was there: faces of the boundary
+/// are given up. The suite above would be worth little if such updates did not occur in it.
+#[test]
+fn insertions_that_move_the_boundary_occur_and_are_undone_exactly() {
+    for (how, least) in [(HALF_EDGE, 30), (DELAUNAY, 5)] {
+        let mut moving = 0;
+        for subject in subjects(how).filter(|subject| !subject.input.flat) {
+            let mut walk = Walk::new(&subject, subject.mt.clone());
+            for u in (0..subject.mt.updates()).map(UpdateId) {
+                let before = walk.mesh.hash();
+                assert_eq!(walk.toggle(u.0), Applied::Done);
+                if !subject.given_up(u).is_empty() {
+                    moving += 1;
+                    let with = walk.mesh.hash();
+                    assert_eq!(walk.toggle(u.0), Applied::Done);
+                    assert_eq!((walk.mesh.check(), walk.mesh.hash()), (Ok(()), before));
+                    assert_eq!(walk.toggle(u.0), Applied::Done);
+                    assert_eq!((walk.mesh.check(), walk.mesh.hash()), (Ok(()), with));
+                }
+            }
+        }
+        assert!(moving >= least, "{how:?}: {moving}");
+    }
+}
+
+/// What the builder spells out is what the compact MT makes of it: the two come about in different ways.
+#[test]
+fn the_compact_mt_is_the_one_that_the_builder_spelled_out() {
+    for how in [HALF_EDGE, DELAUNAY, INSERTED] {
+        for subject in subjects(how) {
+            let spelled = How { kind: tetralod::mt::MtKind::Explicit, ..how };
+            let built = spelled.build(&subject.input.mesh, subject.input.position_bits);
+            assert_eq!(Mt::from(subject.explicit), built, "{how:?}: {}", subject.input.name);
+        }
     }
 }
