@@ -296,11 +296,12 @@ impl VertexMt {
 
     /// The parents of update `u` in the DAG, as far as the loop is sound.
     pub fn parents(&self, u: UpdateId) -> impl Iterator<Item = UpdateId> {
-        let first = self.link(u.0, 0);
-        let on = move |at: &Link| Some(self.link(at.node, at.link));
+        // The loop ends where it began; a parent that is not older is none.
+        let parent = move |at: Link| Some(at).filter(|at| at.node < u.0);
+        let on = move |at: &Link| parent(self.link(at.node, at.link));
         // An update removes at most as many tetrahedra as there are steps here; a loop that is longer is none.
-        let members = std::iter::successors(Some(first), on).take(MAX_REMOVED);
-        members.take_while(move |at| at.node != u.0 && at.node < self.updates()).map(|at| UpdateId(at.node))
+        let members = std::iter::successors(parent(self.link(u.0, 0)), on).take(MAX_REMOVED);
+        members.map(|at| UpdateId(at.node))
     }
 
     /// Number of children of update `u`, also of those that have not arrived yet.

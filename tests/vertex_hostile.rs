@@ -1,0 +1,321 @@
+//! Damaged and hostile vertex-based MTs: every call ends, with a typed error or with a valid mesh, and an error changes
+//! nothing.
+#![cfg(feature = "build")]
+
+mod build_support;
+mod conformance_support;
+mod format_support;
+mod support;
+mod vertex_support;
+
+use conformance_support::DELAUNAY;
+use conformance_support::HALF_EDGE;
+use conformance_support::How;
+use conformance_support::empty;
+use conformance_support::grow;
+use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
+use std::collections::BTreeMap;
+use std::sync::LazyLock;
+use support::compare::snapshot;
+use support::random::Random;
+use tetralod::geom::Bounds;
+use tetralod::mesh::TetMesh;
+use tetralod::mt::Applied;
+use tetralod::mt::CurrentMesh;
+use tetralod::mt::ExplicitMt;
+use tetralod::mt::Mt;
+use tetralod::mt::MultiTessellation;
+use tetralod::mt::UpdateError;
+use tetralod::mt::UpdateId;
+use tetralod::mt::stats;
+use tetralod::refine::Front;
+use tetralod::refine::LodCriterion;
+use tetralod::refine::Request;
+use vertex_support::Node;
+use vertex_support::Parts;
+
+fn config(cases: u32, seed: u64) -> ProptestConfig {
+    let rng_seed = RngSeed::Fixed(seed);
+    ProptestConfig { cases, failure_persistence: None, rng_seed, ..ProptestConfig::default() }
+}
+
+fn small(how: How, mesh: &TetMesh) -> Parts {
+    Parts::of(&how.build(mesh, None))
+}
+
+/// Good MTs to damage: flat and curved boundaries, one and more components.
+static GOOD: LazyLock<Vec<Parts>> = LazyLock::new(|| {
+    let waves: fn([f64; 3]) -> f64 = |p| (7.0 * p[1]).sin() + p[2];
+    let apart = build_support::blocks([5, 2, 2], &[waves], |c| c[0] != 2);
+    let ring = build_support::blocks([3, 3, 1], &[waves, build_support::hilly], |c| c[0] != 1 || c[1] != 1);
+    let mut good = Vec::new();
+    for how in [HALF_EDGE, DELAUNAY] {
+        for mesh in [&build_support::cube(3, &[waves]), &build_support::bent(4), &apart, &ring] {
+            good.push(small(how, mesh));
+        }
+    }
+    assert!(good.iter().any(|parts| parts.nodes.iter().any(|node| node.given_up.is_some())));
+    good
+});
+
+/// Forces updates in and out as a refinement engine does, and checks what must hold after every call.
+struct Driver<'a> {
+    mt: &'a Mt,
+    mesh: CurrentMesh,
+    set: Vec<bool>,
+    done: [usize; 2],
+    errors: Vec<(UpdateError, bool)>,
+}
+
+impl<'a> Driver<'a> {
+    fn new(mt: &'a Mt) -> Self {
+        let mut mesh = mt.start().expect("a valid base mesh");
+        mt.announce(&mut mesh, 0);
+        assert_eq!(mesh.check(), Ok(()));
+        Self { mt, mesh, set: vec![false; mt.updates() as usize], done: [0; 2], errors: Vec::new() }
+    }
+
+    fn force(&mut self, u: u32) {
+        let wanted = !self.set[u as usize];
+        let mut stack = vec![u];
+        while let Some(&next) = stack.last() {
+            match self.call(next, wanted) {
+                Ok(Applied::Done) => drop(stack.pop()),
+                Ok(Applied::Blocked(UpdateId(other))) => {
+                    assert!((other as usize) < self.set.len());
+                    assert_ne!(self.set[other as usize], wanted, "{other} is not in the way of {next}");
+                    // Parents have smaller numbers, children larger ones, or the MT is damaged.
+                    if if wanted { other > next } else { other < next } {
+                        return;
+                    }
+                    stack.push(other);
+                }
+                Err(error) => {
+                    self.errors.push((error, wanted));
+                    return;
+                }
+            }
+        }
+    }
+
+    fn call(&mut self, u: u32, refine: bool) -> Result<Applied, UpdateError> {
+        let before = snapshot(&self.mesh);
+        let id = UpdateId(u);
+        if !refine {
+            let looked = self.mt.look_at_removed(&mut self.mesh, id, 0, &mut |_, _| false);
+            assert_eq!(snapshot(&self.mesh), before);
+            assert!(looked.is_ok() || self.mt.coarsen(&mut self.mesh.clone(), id).is_err());
+        }
+        let result =
+            if refine { self.mt.refine(&mut self.mesh, id) } else { self.mt.coarsen(&mut self.mesh, id) };
+        assert_eq!(self.mesh.check(), Ok(()), "update {u}, refine: {refine}");
+        if result == Ok(Applied::Done) {
+            self.set[u as usize] = refine;
+            self.done[usize::from(refine)] += 1;
+        } else {
+            assert_eq!(snapshot(&self.mesh), before, "nothing was done, yet the mesh has changed");
+        }
+        result
+    }
+
+    fn rummage(&mut self, steps: usize, random: &mut Random) {
+        for _ in 0..if self.set.is_empty() { 0 } else { steps } {
+            let u = random.below(self.set.len()) as u32;
+            match random.below(4) {
+                0 => drop(self.call(u, !self.set[u as usize])),
+                _ => self.force(u),
+            }
+            for t in (0..self.mesh.tet_slots() as u32).filter(|&t| self.mesh.tet(t).is_some()) {
+                let _ = (self.mt.remover(&self.mesh, t), self.mt.creator(&self.mesh, t));
+            }
+            if random.once_in(9) {
+                self.mesh.compact();
+                assert_eq!(self.mesh.check(), Ok(()));
+            }
+        }
+        for u in (0..self.set.len() as u32).rev() {
+            if self.set[u as usize]
+                && let Err(error) = self.call(u, false)
+            {
+                self.errors.push((error, false));
+            }
+        }
+    }
+}
+
+/// What else is done with MTs: replay, conversion, requests. All of it ends.
+fn use_it(mt: &Mt, random: &mut Random) {
+    let explicit = ExplicitMt::of(mt);
+    assert_eq!(explicit.is_ok(), stats(mt).is_ok());
+    if let Ok(explicit) = explicit {
+        assert_eq!(explicit.check(), Ok(()));
+        if let Ok(back) = Mt::from(explicit.clone()).convert(tetralod::mt::MtKind::Vertex) {
+            assert_eq!(ExplicitMt::of(&back).as_ref(), Ok(&explicit));
+        }
+    }
+    let mut front = Front::new(mt).expect("a valid base mesh");
+    let half = Bounds { min: [0.0; 3], max: [0.6; 3] };
+    for _ in 0..4 {
+        let request = Request {
+            error: [0.0, 0.05, 0.3][random.below(3)],
+            roi: random.once_in(2).then_some(half),
+            isovalues: if random.once_in(2) { vec![0.3] } else { Vec::new() },
+            field: 0,
+            max_tets: random.once_in(3).then_some(60),
+        };
+        let criterion = LodCriterion::new(mt.info(), &request);
+        let _ = front.satisfy(mt, &criterion, request.max_tets);
+        assert_eq!(front.mesh().check(), Ok(()));
+    }
+}
+
+/// The MT arrives in pieces while it is used.
+fn receive(mt: &Mt, random: &mut Random) {
+    let mut part = empty(mt);
+    let mut mesh = part.start().expect("a valid base mesh");
+    while part.updates() < mt.updates() {
+        let known = part.updates();
+        let most = (mt.updates() - known) as usize;
+        (0..1 + random.below(most)).for_each(|_| grow(&mut part, mt));
+        part.announce(&mut mesh, known);
+        for _ in 0..8 {
+            let u = UpdateId(random.below(part.updates() as usize) as u32);
+            let _ = if random.once_in(3) { part.coarsen(&mut mesh, u) } else { part.refine(&mut mesh, u) };
+            assert_eq!(mesh.check(), Ok(()));
+        }
+    }
+}
+
+/// Changes a node in one of many ways.
+fn damage(nodes: &mut [Node], k: usize, random: &mut Random) {
+    let updates = nodes.len();
+    let other = nodes[random.below(updates)].clone();
+    let node = &mut nodes[k];
+    let links = node.links.len();
+    match random.below(14) {
+        0 => node.links[random.below(links)] = [random.below(updates) as u64, random.below(links) as u64],
+        1 => node.links[random.below(links)][0] = random.below(updates) as u64,
+        2 => node.links[random.below(links)][1] = random.bits(),
+        // A loop of its own.
+        3 => {
+            let i = random.below(links);
+            node.links[i] = [k as u64, i as u64];
+        }
+        4 => node.links.truncate(1 + random.below(links)),
+        5 => node.links.push([random.below(updates) as u64, random.below(3) as u64]),
+        6 => node.removed = (node.removed as i64 + i64::from(random.between(-2, 2))).max(1) as u64,
+        7 => node.removed = 1 + random.below(127) as u64,
+        8 => {
+            node.given_up = match node.given_up.take() {
+                Some(_) => None,
+                None => Some((0..random.below(9)).map(|_| random.once_in(2)).collect()),
+            }
+        }
+        9 => match &mut node.given_up {
+            Some(given_up) if !given_up.is_empty() => {
+                let i = random.below(given_up.len());
+                given_up[i] = !given_up[i];
+            }
+            _ => node.rest = other.rest,
+        },
+        10 => node.rest.0.iter_mut().for_each(|bit| *bit ^= random.once_in(12)),
+        11 => node.rest.0.truncate(random.below(node.rest.0.len() + 1)),
+        12 => node.position = other.position,
+        _ => node.position[random.below(3)] ^= 1 << random.below(16),
+    }
+}
+
+fn try_all(mt: &Mt, random: &mut Random, steps: usize) -> (Vec<(UpdateError, bool)>, [usize; 2]) {
+    use_it(mt, random);
+    receive(mt, random);
+    let mut driver = Driver::new(mt);
+    driver.rummage(steps, random);
+    (driver.errors, driver.done)
+}
+
+#[test]
+fn nodes_can_be_taken_apart_and_put_together() {
+    for parts in GOOD.iter() {
+        let mt = parts.decode(&parts.bits()).expect("as it was");
+        assert_eq!(parts.file(&parts.bits()), parts.file(&Parts::of(&mt).bits()));
+        let (errors, _) = try_all(&mt, &mut Random(1), 20);
+        assert_eq!(errors, []);
+    }
+}
+
+proptest! {
+    #![proptest_config(config(400, 5))]
+
+    /// Some nodes are damaged.
+    #[test]
+    fn damaged_nodes(which in 0_usize..8, seed in any::<u64>()) {
+        let mut random = Random(seed);
+        let mut parts = GOOD[which].clone();
+        for _ in 0..=random.below(3) {
+            let k = random.below(parts.nodes.len());
+            damage(&mut parts.nodes, k, &mut random);
+        }
+        if let Ok(mt) = parts.decode(&parts.bits()) {
+            try_all(&mt, &mut random, 40);
+        }
+    }
+
+    /// Whatever bits.
+    #[test]
+    fn flipped_bits(which in 0_usize..8, seed in any::<u64>(), share in 10_usize..2000) {
+        let mut random = Random(seed);
+        let parts = &GOOD[which];
+        let mut nodes = parts.bits();
+        nodes.iter_mut().for_each(|node| node.0.iter_mut().for_each(|bit| *bit ^= random.once_in(share)));
+        if let Ok(mt) = parts.decode(&nodes) {
+            try_all(&mt, &mut random, 40);
+        }
+    }
+
+    /// Base tetrahedra are removed by others than they should be.
+    #[test]
+    fn other_removers(which in 0_usize..8, seed in any::<u64>()) {
+        let mut random = Random(seed);
+        let mut parts = GOOD[which].clone();
+        for _ in 0..=random.below(4) {
+            let t = random.below(parts.removers.len());
+            parts.removers[t] = random.below(parts.nodes.len() + 1) as u64;
+        }
+        if let Ok(mt) = parts.decode(&parts.bits()) {
+            try_all(&mt, &mut random, 40);
+        }
+    }
+}
+
+/// The hostile tests reach every kind of error that a damaged vertex-based MT can give, in both directions, and apply
+/// updates all the same.
+#[test]
+fn hostile_tests_reach_all_errors() {
+    let mut seen: BTreeMap<String, usize> = BTreeMap::new();
+    let mut applied = [0; 2];
+    for seed in 0..600 {
+        let mut random = Random(seed);
+        let mut parts = GOOD[random.below(GOOD.len())].clone();
+        let k = random.below(parts.nodes.len());
+        damage(&mut parts.nodes, k, &mut random);
+        let mut note = |error: &UpdateError, when: &str| {
+            let kind = format!("{error:?}").split(' ').next().unwrap_or_default().to_owned();
+            *seen.entry(format!("{kind} {when}")).or_default() += 1;
+        };
+        match parts.decode(&parts.bits()) {
+            Ok(mt) => {
+                let mut driver = Driver::new(&mt);
+                driver.rummage(20, &mut random);
+                driver.errors.iter().for_each(|(e, refine)| note(e, if *refine { "in" } else { "out" }));
+                applied = [0, 1].map(|i| applied[i] + driver.done[i]);
+            }
+            Err(tetralod::format::FormatError::Update(error)) => note(&error, "pushed"),
+            Err(error) => panic!("{error:?}"),
+        }
+    }
+    println!("{seen:?} {applied:?}");
+    let all = ["Cavity in", "Inverted in", "Cavity out", "Cavity pushed", "OffLattice pushed"];
+    assert!(all.iter().all(|kind| seen.contains_key(*kind)), "{seen:?}");
+    assert!(applied.iter().all(|&n| n > 5000), "{applied:?}");
+}
