@@ -18,13 +18,20 @@ use proptest::test_runner::RngSeed;
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 use support::compare::snapshot;
+use support::domains::volume6;
 use support::random::Random;
 use tetralod::geom::Bounds;
+use tetralod::geom::Lattice;
 use tetralod::mesh::TetMesh;
 use tetralod::mt::Applied;
+use tetralod::mt::BaseMesh;
 use tetralod::mt::CurrentMesh;
+use tetralod::mt::ErrorCode;
 use tetralod::mt::ExplicitMt;
+use tetralod::mt::ExplicitUpdate;
 use tetralod::mt::Mt;
+use tetralod::mt::MtInfo;
+use tetralod::mt::MtKind;
 use tetralod::mt::MultiTessellation;
 use tetralod::mt::UpdateError;
 use tetralod::mt::UpdateId;
@@ -32,6 +39,7 @@ use tetralod::mt::stats;
 use tetralod::refine::Front;
 use tetralod::refine::LodCriterion;
 use tetralod::refine::Request;
+use vertex_support::BitString;
 use vertex_support::Node;
 use vertex_support::Parts;
 
@@ -150,7 +158,7 @@ fn use_it(mt: &Mt, random: &mut Random) {
     assert_eq!(explicit.is_ok(), stats(mt).is_ok());
     if let Ok(explicit) = explicit {
         assert_eq!(explicit.check(), Ok(()));
-        if let Ok(back) = Mt::from(explicit.clone()).convert(tetralod::mt::MtKind::Vertex) {
+        if let Ok(back) = Mt::from(explicit.clone()).convert(MtKind::Vertex) {
             assert_eq!(ExplicitMt::of(&back).as_ref(), Ok(&explicit));
         }
     }
@@ -196,7 +204,7 @@ fn damage(nodes: &mut [Node], k: usize, random: &mut Random) {
     match random.below(14) {
         0 => node.links[random.below(links)] = [random.below(updates) as u64, random.below(links) as u64],
         1 => node.links[random.below(links)][0] = random.below(updates) as u64,
-        2 => node.links[random.below(links)][1] = random.bits(),
+        2 => node.links[random.below(links)] = [random.bits(), random.bits()],
         // A loop of its own.
         3 => {
             let i = random.below(links);
@@ -245,7 +253,7 @@ fn nodes_can_be_taken_apart_and_put_together() {
 }
 
 proptest! {
-    #![proptest_config(config(400, 5))]
+    #![proptest_config(config(250, 5))]
 
     /// Some nodes are damaged.
     #[test]
@@ -294,7 +302,7 @@ proptest! {
 fn hostile_tests_reach_all_errors() {
     let mut seen: BTreeMap<String, usize> = BTreeMap::new();
     let mut applied = [0; 2];
-    for seed in 0..600 {
+    for seed in 0..300 {
         let mut random = Random(seed);
         let mut parts = GOOD[random.below(GOOD.len())].clone();
         let k = random.below(parts.nodes.len());
@@ -314,8 +322,87 @@ fn hostile_tests_reach_all_errors() {
             Err(error) => panic!("{error:?}"),
         }
     }
-    println!("{seen:?} {applied:?}");
     let all = ["Cavity in", "Inverted in", "Cavity out", "Cavity pushed", "OffLattice pushed"];
     assert!(all.iter().all(|kind| seen.contains_key(*kind)), "{seen:?}");
-    assert!(applied.iter().all(|&n| n > 5000), "{applied:?}");
+    assert!(applied.iter().all(|&n| n > 2000), "{applied:?}");
+}
+
+/// A base mesh with one update, which removes the tetrahedra before `removed` and inserts a vertex at `position`.
+fn one_insertion(
+    positions: &[[i32; 3]],
+    tets: &[[u32; 4]],
+    removed: u32,
+    position: [i32; 3],
+    walls: &[[u32; 3]],
+) -> Parts {
+    let field = format_support::field("f", 8);
+    let lattice = Lattice { origin: [0.0; 3], step: [1.0; 3], bits: 8 };
+    let info = MtInfo {
+        kind: MtKind::Explicit,
+        lattice,
+        fields: vec![field],
+        vertices: positions.len() as u32 + 1,
+        tetrahedra: tets.len() as u32 - removed + walls.len() as u32,
+        updates: 1,
+        displacement_per_error: 1.0,
+    };
+    let values = vec![0; positions.len()];
+    let mut all = positions.to_vec();
+    all.push(position);
+    let turned = |[a, b, c, d]: [u32; 4]| {
+        let volume = volume6([a, b, c, d].map(|v| all[v as usize]));
+        if volume > 0 { [a, b, c, d] } else { [b, a, c, d] }
+    };
+    let tets = tets.iter().copied().map(turned).collect();
+    let mut mt = ExplicitMt::new(info, BaseMesh { positions: positions.to_vec(), values, tets });
+    let new = positions.len() as u32;
+    let inserted: Vec<[u32; 4]> = walls.iter().map(|&[a, b, c]| turned([a, b, c, new])).collect();
+    let removed: Vec<u32> = (0..removed).collect();
+    let update = ExplicitUpdate {
+        positions: &[position],
+        levels: &[0],
+        removed: &removed,
+        inserted: &inserted,
+        error: ErrorCode(9),
+    };
+    mt.push(&update).expect("made to fit");
+    Parts::of(&Mt::from(mt).convert(MtKind::Vertex).expect("an insertion"))
+}
+
+/// Six corners around the middle, the last two above and below.
+const OCTAHEDRON: [[i32; 3]; 6] =
+    [[96, 64, 64], [64, 96, 64], [32, 64, 64], [64, 32, 64], [64, 64, 96], [64, 64, 32]];
+const RING: [[u32; 2]; 4] = [[0, 1], [1, 2], [2, 3], [3, 0]];
+
+/// All of its faces.
+fn octahedron_walls() -> Vec<[u32; 3]> {
+    RING.iter().flat_map(|&[a, b]| [[a, b, 4], [a, b, 5]]).collect()
+}
+
+/// What an update removed is what comes back, or nothing: an octahedron has three diagonals, and a code that names
+/// another one than that which was there leads to faces that the rest of the mesh, where it overlaps, has already.
+#[test]
+fn what_comes_back_is_what_was_there() {
+    let mut positions = OCTAHEDRON.to_vec();
+    positions.push([64, 70, 120]);
+    let mut tets: Vec<[u32; 4]> = RING.map(|[a, b]| [a, b, 4, 5]).to_vec();
+    // It overlaps the octahedron, and has one face of its other halves.
+    tets.push([0, 2, 1, 6]);
+    let good = one_insertion(&positions, &tets, 4, [64; 3], &octahedron_walls());
+    for apex in 0..8 {
+        let mut parts = good.clone();
+        assert_eq!(parts.nodes[0].rest.take(1), 1, "all of them have the upper and the lower corner");
+        parts.nodes[0].rest = BitString::default();
+        parts.nodes[0].rest.push(1 | apex << 1, 4);
+        let mt = parts.decode(&parts.bits()).expect("well formed");
+        let mut driver = Driver::new(&mt);
+        let base = driver.mesh.hash();
+        assert_eq!(driver.call(0, true), Ok(Applied::Done));
+        let undone = driver.call(0, false);
+        if apex == 4 || apex == 5 {
+            assert_eq!((undone, driver.mesh.hash()), (Ok(Applied::Done), base));
+        } else {
+            assert_eq!(undone, Err(UpdateError::Cavity { update: 0 }), "apex {apex}");
+        }
+    }
 }

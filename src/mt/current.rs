@@ -26,7 +26,8 @@ use std::ops::Range;
 pub(crate) struct Labels {
     /// Which vertex of the MT it is; [`NONE`] in a free slot.
     pub vertex: u32,
-    /// The update that splits it, [`NONE`] if nothing does (yet).
+    /// In edge-based MTs the update that splits it, [`NONE`] if nothing does (yet); in vertex-based ones a fingerprint
+    /// of what its insertion removed.
     pub split: u32,
 }
 

@@ -80,6 +80,30 @@ pub(super) struct Cavity {
     across: [[u32; 4]; MAX_INSERTED],
     /// The tags of the new tetrahedra.
     tags: [u32; MAX_INSERTED],
+    /// Of T_u.
+    fingerprint: Fingerprint,
+}
+
+/// A hash of the tetrahedra that an insertion removed, which stays with the vertex. What the removal of the vertex puts
+/// back must have the same one. So a mesh is always one that insertions alone lead to; a code that names other
+/// tetrahedra than those which were there could make ones that the rest of the mesh, if it overlaps, has already.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Fingerprint(u32);
+
+impl Fingerprint {
+    /// What a vertex contributes, by its label.
+    #[inline]
+    fn of_vertex(label: u32) -> u32 {
+        let x = label.wrapping_mul(0x9E37_79B1);
+        (x ^ x >> 15).wrapping_mul(0x85EB_CA77)
+    }
+
+    /// Takes in a tetrahedron, given the sum of what its vertices contribute.
+    #[inline]
+    fn add(&mut self, sum: u32) {
+        let x = (sum ^ sum >> 16).wrapping_mul(0xC2B2_AE3D);
+        self.0 = self.0.wrapping_add(x ^ x >> 13);
+    }
 }
 
 impl Default for Cavity {
@@ -101,6 +125,7 @@ impl Default for Cavity {
             places: [0; GATHERED],
             across: [[NONE; 4]; MAX_INSERTED],
             tags: [NONE; MAX_INSERTED],
+            fingerprint: Fingerprint::default(),
         }
     }
 }
@@ -121,6 +146,27 @@ impl Cavity {
         *self.walls.get_mut(self.walls_len)? = Wall { corners, beyond, side };
         self.walls_len += 1;
         (self.link_len <= MAX_AROUND).then_some(())
+    }
+
+    /// What each vertex of the link contributes to a fingerprint.
+    #[inline]
+    fn prints(&self, mesh: &CurrentMesh) -> [u32; MAX_AROUND] {
+        let mut prints = [0; MAX_AROUND];
+        for (print, &v) in prints.iter_mut().zip(&self.link[..self.link_len]) {
+            *print = Fingerprint::of_vertex(mesh.labels[v as usize].vertex);
+        }
+        prints
+    }
+
+    /// Finds the fingerprint of the tetrahedra that were built.
+    #[inline]
+    fn fingerprint_built(&mut self, mesh: &CurrentMesh) {
+        let prints = self.prints(mesh);
+        self.fingerprint = Fingerprint::default();
+        for tet in &self.glue.tets[..self.glue.len] {
+            let of_corners = tet.iter().map(|&x| prints[x as usize % MAX_AROUND]);
+            self.fingerprint.add(of_corners.fold(0, u32::wrapping_add));
+        }
     }
 
     /// Orders the link by the labels of its vertices.
@@ -336,10 +382,16 @@ impl VertexMt {
         if !fits {
             return None;
         }
-        // No vertex may be left without a tetrahedron.
-        let tets = &cavity.tets[..cavity.tets_len];
-        if tets.iter().any(|&t| !mesh.have_numbers(&mesh.tets[t as usize])) {
-            return None;
+        let prints = cavity.prints(mesh);
+        cavity.fingerprint = Fingerprint::default();
+        for &t in &cavity.tets[..cavity.tets_len] {
+            let mut sum = 0_u32;
+            for v in mesh.tets[t as usize] {
+                // No vertex may be left without a tetrahedron.
+                let number = mesh.vertex_number(v)?;
+                sum = sum.wrapping_add(prints[number as usize % MAX_AROUND]);
+            }
+            cavity.fingerprint.add(sum);
         }
         cavity.join_walls(&rim)
     }
@@ -386,7 +438,8 @@ impl VertexMt {
         cavity: &mut Cavity,
     ) {
         let slot = mesh.new_vertex();
-        mesh.put_vertex(slot, Labels { vertex: self.vertex(u).0, split: NONE }, position);
+        let labels = Labels { vertex: self.vertex(u).0, split: cavity.fingerprint.0 };
+        mesh.put_vertex(slot, labels, position);
         let first = slot as usize * mesh.fields;
         for (f, level) in self.levels(u).enumerate() {
             mesh.levels[first + f] = level;
@@ -453,6 +506,10 @@ impl VertexMt {
         cavity.order_link(mesh);
         self.sort(cavity);
         self.build_removed(u, cavity).ok_or(torn.clone())?;
+        cavity.fingerprint_built(mesh);
+        if cavity.fingerprint.0 != mesh.labels[slot as usize].split {
+            return Err(torn);
+        }
         let at = |x: u8| mesh.positions[cavity.link[x as usize % MAX_AROUND] as usize];
         let positive = cavity.glue.tets[..cavity.glue.len].iter().all(|tet| {
             let [a, b, c, d] = tet.map(at);
