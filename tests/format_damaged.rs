@@ -2,14 +2,14 @@
 
 mod format_support;
 
-use format_support::{assemble, bytes_of, decode, is_prefix, sample, samples, sections, spelled};
+use format_support::{assemble, bytes_of, decode, inserted, is_prefix, sample, samples, sections, spelled};
 use proptest::prelude::*;
 use tetralod::format::{Decoder, FormatError, Limits};
 use tetralod::mt::{BaseMeshError, Mt, MultiTessellation};
 
 #[test]
 fn every_flipped_bit_is_detected_and_what_came_before_is_intact() {
-    for mt in [sample(2, 2, 520), spelled(2, 2, 150)] {
+    for mt in [sample(2, 2, 520), spelled(2, 2, 150), inserted(2, 2, 150)] {
         every_flip_is_detected(&mt);
     }
 }
@@ -160,6 +160,44 @@ fn explicit_content_with_good_checksums_is_not_trusted() {
     assert!(corrupt(&beyond), "a vertex that is not at hand");
 }
 
+/// Behind two numbers, an `INSV` section has columns: lengths, nodes and errors. The last column of `BASE` tells the
+/// most children, then removers.
+#[test]
+fn vertex_content_with_good_checksums_is_not_trusted() {
+    let mt = inserted(2, 1, 3);
+    let bytes = bytes_of(&mt);
+    let corrupt = |bytes: &[u8]| matches!(decode(bytes), Err(FormatError::Corrupt { .. }));
+    let base =
+        |found: Result<Mt, FormatError>| matches!(found, Err(FormatError::Base(BaseMeshError::Info(_))));
+    let nodes = |change: &dyn Fn(&mut Vec<u8>)| with_updates(&bytes, b"INSV", 3, |p| change(p));
+    let removers = |change: &dyn Fn(&mut [u8])| {
+        with_updates(&bytes, b"BASE", 3, |p| {
+            let at = p.len() - 4;
+            // Three bytes: one child at most, then the updates that remove the two tetrahedra.
+            assert_eq!(p[at..], [3, 1, 1, 2]);
+            change(&mut p[at + 1..]);
+        })
+    };
+    assert!(decode(&removers(&|_| {})).is_ok());
+    assert!(corrupt(&removers(&|p| p[1] = 4)), "removed by an update that there is not");
+    assert!(corrupt(&removers(&|p| p[0] = 125)), "more children than an update can have");
+    assert!(base(decode(&with_updates(&bytes, b"INFO", 3, |p| p[1] += 1))), "vertices do not add up");
+    assert!(corrupt(&nodes(&|p| p[0] = 1)), "the first update is missing");
+    assert!(corrupt(&nodes(&|p| p[1] = 4)), "more updates than there are");
+    assert_eq!(decode(&nodes(&|_| {})), Ok(mt));
+    nodes(&|p| assert_eq!(p[2], 3, "three lengths"));
+    assert!(corrupt(&nodes(&|p| p[3] += 2)), "the last node is longer than what there is");
+    assert!(decode(&nodes(&|p| p[5] -= 1)).is_err(), "something is left");
+    let cut = nodes(&|p| {
+        let at = 6 + usize::from(p[6]);
+        p[6] -= 1;
+        p.remove(at);
+    });
+    assert!(corrupt(&cut), "a byte is missing");
+    let off = nodes(&|p| p[7..11].fill(255));
+    assert_eq!(decode(&off), Err(FormatError::Update(UpdateError::OffLattice { update: 0 })));
+}
+
 #[test]
 fn numbers_that_are_too_long_are_refused() {
     let bytes = bytes_of(&sample(1, 1, 20));
@@ -193,6 +231,18 @@ fn limits_hold_before_memory_is_taken() {
     assert!(matches!(refused, Err(FormatError::Limit { .. })), "{refused:?}");
     assert!(held > 0 && held <= mt.bytes() / 2, "{held}");
 
+    // So do nodes.
+    let mt = inserted(2, 1, 520);
+    let bytes = bytes_of(&mt);
+    let feed = |memory_bytes| {
+        let mut decoder = Decoder::new(Limits { memory_bytes, ..Limits::default() });
+        (decoder.feed(&bytes).map(drop), decoder.mt().map_or(0, Mt::bytes))
+    };
+    assert_eq!(feed(2 * mt.bytes()), (Ok(()), mt.bytes()));
+    let (refused, held) = feed(mt.bytes() * 3 / 4);
+    assert!(matches!(refused, Err(FormatError::Limit { .. })), "{refused:?}");
+    assert!(held <= mt.bytes() * 3 / 4, "{held}");
+
     // A base mesh that claims 2^31 tetrahedra in a few bytes.
     let claims = with(&bytes_of(&sample(1, 1, 20)), b"BASE", |p| {
         p.splice(1..2, [0x80, 0x80, 0x80, 0x80, 0x08]);
@@ -206,7 +256,7 @@ proptest! {
     /// Behind good checksums anything may stand: no panic, and whatever is accepted is written as it was read.
     #[test]
     fn any_change_behind_good_checksums_is_refused_or_read_faithfully(
-        kind in 0..2_usize,
+        kind in 0..3_usize,
         which in 0..4_usize,
         changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..4),
         cut in prop::option::of(any::<prop::sample::Index>()),

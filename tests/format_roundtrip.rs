@@ -81,7 +81,7 @@ fn what_could_not_be_read_back_is_not_written() {
     let miscounted = EdgeMt::new(miscounted, whole.base().clone());
     assert!(matches!(encode(&miscounted, &EncodeOptions::default()), Err(EncodeError::Base(_))));
 
-    let [_, spelled] = samples(1, 1, 5);
+    let [_, spelled, _] = samples(1, 1, 5);
     let other = MtInfo { updates: 0, ..spelled.info().clone() };
     let other = ExplicitMt::new(other, spelled.base().clone());
     assert!(matches!(encode(&other, &EncodeOptions::default()), Err(EncodeError::Base(_))));

@@ -135,9 +135,41 @@ pub fn spelled(tets: u32, fields: usize, updates: usize) -> Mt {
     mt.into()
 }
 
+/// A vertex-based MT of `updates` insertions, each into one tetrahedron.
+pub fn inserted(tets: u32, fields: usize, updates: usize) -> Mt {
+    let mut next = numbers();
+    let spelled = spelled(tets, fields, 0);
+    let vertices = 4 * tets + updates as u32;
+    let info = MtInfo { vertices, updates: updates as u32, ..spelled.info().clone() };
+    let mut made = ExplicitMt::new(info, spelled.base().clone());
+    let mut live: Vec<u32> = (0..tets).collect();
+    for k in 0..updates {
+        // Old ones first: they are the large ones.
+        let tet = made.tets()[live[0] as usize];
+        let corners = tet.map(|v| made.position(VertexId(v)));
+        let middle = [0, 1, 2].map(|i| corners.iter().map(|c| c[i] / 4).sum::<i32>());
+        let [a, b, c, d] = tet;
+        let v = made.vertices();
+        let removed = [live.remove(0)];
+        let levels: Vec<i32> = (0..fields).map(|_| (next() % 4096) as i32).collect();
+        let first = made.tets().len() as u32;
+        let update = ExplicitUpdate {
+            positions: &[middle],
+            levels: &levels,
+            removed: &removed,
+            inserted: &[[v, b, c, d], [a, v, c, d], [a, b, v, d], [a, b, c, v]],
+            error: ErrorCode(60_000 - (k * 50_000 / updates) as u16),
+        };
+        made.push(&update).expect("made to fit");
+        live.extend(first..made.tets().len() as u32);
+    }
+    let mt = Mt::from(made).convert(MtKind::Vertex);
+    mt.expect("insertions")
+}
+
 /// An MT of each kind.
-pub fn samples(tets: u32, fields: usize, updates: usize) -> [Mt; 2] {
-    [sample(tets, fields, updates), spelled(tets, fields, updates)]
+pub fn samples(tets: u32, fields: usize, updates: usize) -> [Mt; 3] {
+    [sample(tets, fields, updates), spelled(tets, fields, updates), inserted(tets, fields, updates)]
 }
 
 pub fn options() -> EncodeOptions {
@@ -162,6 +194,10 @@ pub fn is_prefix(part: &Mt, whole: &Mt) -> bool {
     let same_updates = match (part, whole) {
         (Mt::Edge(part), Mt::Edge(whole)) => {
             (0..part.updates()).all(|k| part.split(UpdateId(k)) == whole.split(UpdateId(k)))
+        }
+        (Mt::Vertex(part), Mt::Vertex(whole)) => {
+            let same = |u| part.node(u) == whole.node(u) && part.error_of(u) == whole.error_of(u);
+            part.base_removers() == whole.base_removers() && (0..part.updates()).map(UpdateId).all(same)
         }
         (Mt::Explicit(part), Mt::Explicit(whole)) => {
             let same = |u| {
