@@ -7,7 +7,7 @@ use format_support::{decode, field};
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::geom::Lattice;
 use tetralod::mt::{
-    BaseMesh, EdgeMt, ErrorCode, ExplicitMt, ExplicitUpdate, MtInfo, MtKind, VertexId, VertexSplit,
+    BaseMesh, EdgeMt, ErrorCode, ExplicitMt, ExplicitUpdate, Mt, MtInfo, MtKind, VertexId, VertexSplit,
 };
 
 const SPEC: &str = include_str!("../src/format/SPEC.md");
@@ -60,6 +60,11 @@ fn spelled_example() -> ExplicitMt {
     mt
 }
 
+/// The same update in a vertex-based MT.
+fn inserted_example() -> Mt {
+    Mt::from(spelled_example()).convert(MtKind::Vertex).expect("an insertion")
+}
+
 /// The bytes in a code block behind the heading of the examples; what follows two slashes is a remark.
 fn golden(number: usize) -> Vec<u8> {
     let examples = SPEC.split("## Examples").nth(1).expect("there are examples");
@@ -76,10 +81,13 @@ fn the_examples_are_written_as_specified() {
     assert_eq!(hex(&edge), hex(&golden(1)));
     let spelled = encode(&spelled_example(), &EncodeOptions::default()).expect("the example is complete");
     assert_eq!(hex(&spelled), hex(&golden(2)));
+    let inserted = encode(&inserted_example(), &EncodeOptions::default()).expect("the example is complete");
+    assert_eq!(hex(&inserted), hex(&golden(3)));
 }
 
 #[test]
 fn the_examples_are_read_as_specified() {
     assert_eq!(decode(&golden(1)), Ok(example().into()));
     assert_eq!(decode(&golden(2)), Ok(spelled_example().into()));
+    assert_eq!(decode(&golden(3)), Ok(inserted_example()));
 }
