@@ -22,6 +22,18 @@ wasm_bindgen_test_configure!(run_in_browser);
 const MT: &[u8] = include_bytes!(concat!(env!("TETRALOD_FIXTURE"), "/small.mt"));
 const HASHES: &str = include_str!(concat!(env!("TETRALOD_FIXTURE"), "/hashes.json"));
 
+/// MTs of the other kinds, each with its hashes.
+const OTHERS: [(&[u8], &str); 2] = [
+    (
+        include_bytes!(concat!(env!("TETRALOD_FIXTURE"), "/small-vertex.mt")),
+        include_str!(concat!(env!("TETRALOD_FIXTURE"), "/hashes-vertex.json")),
+    ),
+    (
+        include_bytes!(concat!(env!("TETRALOD_FIXTURE"), "/small-explicit.mt")),
+        include_str!(concat!(env!("TETRALOD_FIXTURE"), "/hashes-explicit.json")),
+    ),
+];
+
 fn get(object: &JsValue, name: &str) -> JsValue {
     Reflect::get(object, &name.into()).expect("an object")
 }
@@ -50,17 +62,29 @@ fn options(json: &str) -> JsValue {
 #[wasm_bindgen_test]
 fn the_same_requests_give_the_same_hashes_as_natively() {
     for piece in [MT.len(), 1000, 7] {
-        let mut session = fed(MT, piece);
-        let end = session.finish().expect("a complete file");
-        assert_eq!(get(&end, "complete"), JsValue::TRUE);
-        let cases: Array = options(HASHES).unchecked_into();
-        assert!(cases.length() >= 5, "the fixture holds requests");
-        for case in cases.iter() {
-            let stats = session.refine(get(&case, "options").unchecked_ref()).expect("a good request");
-            let request = JSON::stringify(&case).map(String::from).expect("JSON");
-            assert_eq!(number(&stats, "tetrahedra"), number(&case, "tetrahedra"), "{request}");
-            assert_eq!(Some(session.hash()), get(&case, "hash").as_string(), "{request}");
-        }
+        same_hashes(MT, HASHES, piece);
+    }
+}
+
+#[wasm_bindgen_test]
+fn mts_of_the_other_kinds_do_as_well() {
+    for (mt, hashes) in OTHERS {
+        same_hashes(mt, hashes, mt.len());
+        same_hashes(mt, hashes, 1000);
+    }
+}
+
+fn same_hashes(mt: &[u8], hashes: &str, piece: usize) {
+    let mut session = fed(mt, piece);
+    let end = session.finish().expect("a complete file");
+    assert_eq!(get(&end, "complete"), JsValue::TRUE);
+    let cases: Array = options(hashes).unchecked_into();
+    assert!(cases.length() >= 5, "the fixture holds requests");
+    for case in cases.iter() {
+        let stats = session.refine(get(&case, "options").unchecked_ref()).expect("a good request");
+        let request = JSON::stringify(&case).map(String::from).expect("JSON");
+        assert_eq!(number(&stats, "tetrahedra"), number(&case, "tetrahedra"), "{request}");
+        assert_eq!(Some(session.hash()), get(&case, "hash").as_string(), "{request}");
     }
 }
 

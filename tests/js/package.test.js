@@ -75,6 +75,18 @@ for (const worker of [true, false]) {
       mt.free();
     });
 
+    test("the meshes of other kinds of MT are those of the native program, too", async () => {
+      for (const kind of ["vertex", "explicit"]) {
+        const mt = await open(new Uint8Array(await readFile(`${folder}/small-${kind}.mt`)));
+        await mt.complete;
+        for (const { options, hash } of JSON.parse(await readFile(`${folder}/hashes-${kind}.json`, "utf8"))) {
+          await mt.refine(options);
+          assert.equal(await mt.hash(), hash, `${kind}: ${JSON.stringify(options)}`);
+        }
+        mt.free();
+      }
+    });
+
     test("every kind of source gives the same mesh and leaves the caller's bytes alone", async () => {
       const sources = {
         "a URL as text": `${base}/good`,

@@ -25,17 +25,32 @@ fn requests() -> Vec<Value> {
     ]
 }
 
-/// Makes `small.mt` and `hashes.json`, a list of `{ options, hash }`.
+/// The files beside `small.mt`, of the other kinds, and how they are built.
+const OTHERS: [(&str, &[&str]); 2] =
+    [("vertex", &["--kind", "vertex"]), ("explicit", &["--kind", "explicit"])];
+
+/// Makes `small.mt` and `hashes.json`, a list of `{ options, hash }`; and the same for the other kinds of MT, with the
+/// kind in the names.
 pub fn make() -> Result<()> {
     let folder = Path::new(FOLDER);
     fs::create_dir_all(folder)?;
     let tetralod = tetralod()?;
     let (grid, mt) = (folder.join("small.vti"), folder.join("small.mt"));
     shell::run(shell::command(&tetralod, ["generate", "bucky", "--size", "17", "-o"]).arg(&grid))?;
-    shell::run(shell::command(&tetralod, ["build"]).arg(&grid).arg("-o").arg(&mt))?;
-    let hashes: Result<Vec<Value>> =
-        requests().into_iter().map(|options| expectation(&tetralod, &mt, options)).collect();
-    fs::write(folder.join("hashes.json"), serde_json::to_string_pretty(&hashes?)?)?;
+    make_one(&tetralod, &grid, &mt, &folder.join("hashes.json"), &[])?;
+    for (kind, arguments) in OTHERS {
+        let [mt, hashes] = [format!("small-{kind}.mt"), format!("hashes-{kind}.json")];
+        make_one(&tetralod, &grid, &folder.join(mt), &folder.join(hashes), arguments)?;
+    }
+    Ok(())
+}
+
+/// Builds an MT and tells the hashes of its meshes.
+fn make_one(tetralod: &Path, grid: &Path, mt: &Path, hashes: &Path, arguments: &[&str]) -> Result<()> {
+    shell::run(shell::command(tetralod, ["build"]).arg(grid).args(arguments).arg("-o").arg(mt))?;
+    let expected: Result<Vec<Value>> =
+        requests().into_iter().map(|options| expectation(tetralod, mt, options)).collect();
+    fs::write(hashes, serde_json::to_string_pretty(&expected?)?)?;
     Ok(())
 }
 
