@@ -334,7 +334,7 @@ fn one_insertion(
     removed: u32,
     position: [i32; 3],
     walls: &[[u32; 3]],
-) -> Parts {
+) -> Mt {
     let field = format_support::field("f", 8);
     let lattice = Lattice { origin: [0.0; 3], step: [1.0; 3], bits: 8 };
     let info = MtInfo {
@@ -366,7 +366,7 @@ fn one_insertion(
         error: ErrorCode(9),
     };
     mt.push(&update).expect("made to fit");
-    Parts::of(&Mt::from(mt).convert(MtKind::Vertex).expect("an insertion"))
+    mt.into()
 }
 
 /// Six corners around the middle, the last two above and below.
@@ -389,6 +389,7 @@ fn what_comes_back_is_what_was_there() {
     // It overlaps the octahedron, and has one face of its other halves.
     tets.push([0, 2, 1, 6]);
     let good = one_insertion(&positions, &tets, 4, [64; 3], &octahedron_walls());
+    let good = Parts::of(&good.convert(MtKind::Vertex).expect("an insertion"));
     for apex in 0..8 {
         let mut parts = good.clone();
         assert_eq!(parts.nodes[0].rest.take(1), 1, "all of them have the upper and the lower corner");
@@ -405,4 +406,26 @@ fn what_comes_back_is_what_was_there() {
             assert_eq!(undone, Err(UpdateError::Cavity { update: 0 }), "apex {apex}");
         }
     }
+}
+
+/// `n` tetrahedra around an upright edge, and a vertex put into its middle.
+fn wheel(n: u32) -> Mt {
+    let mut positions = vec![[128, 128, 0], [128, 128, 200]];
+    positions.extend((0..n).map(|i| {
+        let angle = std::f64::consts::TAU * f64::from(i) / f64::from(n);
+        [128 + (120.0 * angle.cos()) as i32, 128 + (120.0 * angle.sin()) as i32, 100]
+    }));
+    let rim: Vec<[u32; 2]> = (0..n).map(|i| [2 + i, 2 + (i + 1) % n]).collect();
+    let tets: Vec<[u32; 4]> = rim.iter().map(|&[a, b]| [0, 1, a, b]).collect();
+    let walls: Vec<[u32; 3]> = rim.iter().flat_map(|&[a, b]| [[a, b, 0], [a, b, 1]]).collect();
+    one_insertion(&positions, &tets, n, [128, 128, 100], &walls)
+}
+
+#[test]
+fn the_largest_star_is_one_of_124_tetrahedra_and_64_vertices() {
+    let largest = wheel(62).convert(MtKind::Vertex).expect("as large as can be");
+    let (errors, done) = try_all(&largest, &mut Random(1), 20);
+    assert_eq!(errors, []);
+    assert!(done[0] > 3 && done[0] == done[1], "{done:?}");
+    assert!(wheel(63).convert(MtKind::Vertex).is_err());
 }
