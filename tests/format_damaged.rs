@@ -161,7 +161,7 @@ fn explicit_content_with_good_checksums_is_not_trusted() {
 }
 
 /// Behind two numbers, an `INSV` section has columns: lengths, nodes and errors. The last column of `BASE` tells the
-/// most children, then removers.
+/// whether updates make the mesh larger, the most children, then removers.
 #[test]
 fn vertex_content_with_good_checksums_is_not_trusted() {
     let mt = inserted(2, 1, 3);
@@ -172,10 +172,10 @@ fn vertex_content_with_good_checksums_is_not_trusted() {
     let nodes = |change: &dyn Fn(&mut Vec<u8>)| with_updates(&bytes, b"INSV", 3, |p| change(p));
     let removers = |change: &dyn Fn(&mut [u8])| {
         with_updates(&bytes, b"BASE", 3, |p| {
-            let at = p.len() - 4;
-            // Three bytes: one child at most, then the updates that remove the two tetrahedra.
-            assert_eq!(p[at..], [3, 1, 1, 2]);
-            change(&mut p[at + 1..]);
+            let at = p.len() - 5;
+            // Four bytes: all make the mesh larger, one child at most, then the updates that remove the two tetrahedra.
+            assert_eq!(p[at..], [4, 1, 1, 1, 2]);
+            change(&mut p[at + 2..]);
         })
     };
     assert!(decode(&removers(&|_| {})).is_ok());

@@ -385,13 +385,13 @@ impl VertexMt {
         let prints = cavity.prints(mesh);
         cavity.fingerprint = Fingerprint::default();
         for &t in &cavity.tets[..cavity.tets_len] {
-            let mut sum = 0_u32;
-            for v in mesh.tets[t as usize] {
-                // No vertex may be left without a tetrahedron.
-                let number = mesh.vertex_number(v)?;
-                sum = sum.wrapping_add(prints[number as usize % MAX_AROUND]);
+            let tet = mesh.tets[t as usize];
+            // No vertex may be left without a tetrahedron.
+            if !mesh.have_numbers(&tet) {
+                return None;
             }
-            cavity.fingerprint.add(sum);
+            let print = |v: u32| prints[usize::from(mesh.vertex_number(v).unwrap_or(0)) % MAX_AROUND];
+            cavity.fingerprint.add(tet.map(print).into_iter().fold(0, u32::wrapping_add));
         }
         cavity.join_walls(&rim)
     }

@@ -253,9 +253,11 @@ pub fn empty(mt: &Mt) -> Mt {
     let (info, base) = (mt.info().clone(), mt.base().clone());
     match mt {
         Mt::Edge(_) => EdgeMt::new(info, base).into(),
-        Mt::Vertex(mt) => VertexMt::new(info, base, mt.base_removers().to_vec(), mt.most_children())
-            .expect("the same base mesh")
-            .into(),
+        Mt::Vertex(mt) => {
+            VertexMt::new(info, base, mt.base_removers().to_vec(), mt.most_children(), mt.always_grows())
+                .expect("the same base mesh")
+                .into()
+        }
         Mt::Explicit(_) => ExplicitMt::new(info, base).into(),
         _ => unreachable!("there are no others"),
     }

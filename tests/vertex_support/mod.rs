@@ -100,6 +100,8 @@ pub struct Parts {
     info_section: Vec<u8>,
     /// `BASE` up to its last column.
     pub base: Vec<u8>,
+    /// Whether every update makes the mesh larger.
+    pub grows: u64,
     pub most_children: u64,
     /// The update that removes each base tetrahedron, and one more; 0 for none.
     pub removers: Vec<u64>,
@@ -154,13 +156,14 @@ impl Parts {
         let last = column(&mut rest);
         assert!(rest.is_empty());
         let mut last = last.as_slice();
-        let most_children = varint(&mut last);
+        let (grows, most_children) = (varint(&mut last), varint(&mut last));
         let removers = (0..tets).map(|_| varint(&mut last)).collect();
         assert!(last.is_empty());
         let mut parts = Self {
             info: mt.info().clone(),
             info_section,
             base,
+            grows,
             most_children,
             removers,
             nodes: Vec::new(),
@@ -209,6 +212,7 @@ impl Parts {
     /// The file with other bits in the nodes, of which there must be as many.
     pub fn file(&self, nodes: &[BitString]) -> Vec<u8> {
         let mut last = Vec::new();
+        push_varint(&mut last, self.grows);
         push_varint(&mut last, self.most_children);
         self.removers.iter().for_each(|&u| push_varint(&mut last, u));
         let mut base = self.base.clone();
