@@ -5,7 +5,7 @@ mod format_support;
 use format_support::{assemble, bytes_of, decode, inserted, is_prefix, sample, samples, sections, spelled};
 use proptest::prelude::*;
 use tetralod::format::{Decoder, FormatError, Limits};
-use tetralod::mt::{BaseMeshError, Mt, MultiTessellation};
+use tetralod::mt::{BaseMeshError, Mt, MultiTessellation, UpdateError};
 
 #[test]
 fn every_flipped_bit_is_detected_and_what_came_before_is_intact() {
