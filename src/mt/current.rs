@@ -627,10 +627,13 @@ impl CurrentMesh {
         (mark >> MARK_BITS == self.epoch).then_some((mark & MARK_MASK) as u8)
     }
 
-    /// Whether all corners of a tetrahedron have numbers.
+    /// The numbers of a tetrahedron's corners, if all have one.
     #[inline]
-    pub(super) fn have_numbers(&self, tet: &[u32; 4]) -> bool {
-        tet.map(|v| self.vertex_marks[v as usize] >> MARK_BITS == self.epoch) == [true; 4]
+    pub(super) fn corner_numbers(&self, tet: &[u32; 4]) -> Option<[u8; 4]> {
+        let marks = tet.map(|v| self.vertex_marks[v as usize]);
+        let epoch = self.epoch << MARK_BITS;
+        let differing = marks.iter().fold(0, |bits, mark| bits | (mark ^ epoch));
+        (differing <= MARK_MASK).then_some(marks.map(|mark| (mark & MARK_MASK) as u8))
     }
 
     /// Free or new tetrahedron slots, to be filled by the caller.

@@ -387,11 +387,9 @@ impl VertexMt {
         for &t in &cavity.tets[..cavity.tets_len] {
             let tet = mesh.tets[t as usize];
             // No vertex may be left without a tetrahedron.
-            if !mesh.have_numbers(&tet) {
-                return None;
-            }
-            let print = |v: u32| prints[usize::from(mesh.vertex_number(v).unwrap_or(0)) % MAX_AROUND];
-            cavity.fingerprint.add(tet.map(print).into_iter().fold(0, u32::wrapping_add));
+            let numbers = mesh.corner_numbers(&tet)?;
+            let prints = numbers.map(|x| prints[usize::from(x) % MAX_AROUND]);
+            cavity.fingerprint.add(prints.into_iter().fold(0, u32::wrapping_add));
         }
         cavity.join_walls(&rim)
     }
@@ -510,6 +508,7 @@ impl VertexMt {
         if cavity.fingerprint.0 != mesh.labels[slot as usize].split {
             return Err(torn);
         }
+        // Other tetrahedra may have the same fingerprint by intent; none may be inside out.
         let at = |x: u8| mesh.positions[cavity.link[x as usize % MAX_AROUND] as usize];
         let positive = cavity.glue.tets[..cavity.glue.len].iter().all(|tet| {
             let [a, b, c, d] = tet.map(at);
