@@ -8,6 +8,7 @@ mod browser;
 mod demo;
 mod fixture;
 mod package;
+mod paper;
 mod serve;
 mod shell;
 mod suite;
@@ -23,7 +24,8 @@ usage: cargo xtask COMMAND
   demo [--port N] [--no-serve]   build everything, make the demo's data, serve the page on localhost
   test [STEP...]                 every check, or the named steps; `test --list` names them
   bench [FILE.mt] [--browser]    measure decoding, refinement and isosurfaces; natively, or also in the browser
-  bench --build [--large]        measure triangulation, insertion and the kinds of MT side by side";
+  bench --build [--large]        measure triangulation, insertion and the kinds of MT side by side
+  paper                          do the paper's experiments again and write docs/paper.md with plots and pictures";
 
 fn main() -> ExitCode {
     match run() {
@@ -48,6 +50,7 @@ fn run() -> Result<()> {
         "demo" => demo::run(rest),
         "test" => suite::run(rest),
         "bench" => bench::run(rest),
+        "paper" => paper::run(rest),
         other => bail!("there is no command `{other}`\n{USAGE}"),
     }
 }

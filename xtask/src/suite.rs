@@ -71,6 +71,8 @@ const WEB_LIBRARIES: [&str; 2] = ["web", "web,gpu"];
 
 fn clippy() -> Result<()> {
     shell::run(&mut shell::cargo(["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]))?;
+    let pictures = ["clippy", "--package", "paper", "--features", "pictures", "--", "-D", "warnings"];
+    shell::run(&mut shell::cargo(pictures))?;
     for features in LIBRARIES {
         lint_library(features, &[])?;
     }

@@ -1,0 +1,168 @@
+//! Figures 6 and 7: the same isosurface out of a uniform mesh and out of one of variable resolution.
+
+use anyhow::Context;
+use anyhow::Result;
+use tetralod::geom::Bounds;
+use tetralod::mt::Mt;
+use tetralod::mt::MultiTessellation;
+use tetralod::refine::Request;
+use tetralod::view::IsoSurface;
+
+use crate::markdown::Table;
+use crate::markdown::count;
+use crate::markdown::percent;
+use crate::model::DataSet;
+use crate::model::Recipe;
+use crate::published::Caption;
+use crate::query::Shown;
+use crate::query::tetrahedra;
+
+/// Two meshes of one MT that show one isosurface.
+pub struct Pair {
+    pub isovalue: f64,
+    /// The part that the variable mesh is fine in, if it is a box.
+    pub roi: Option<Bounds>,
+    pub uniform: Shown,
+    pub variable: Shown,
+}
+
+/// Figure 6: fine everywhere, and fine where the field passes the isovalue.
+pub fn around_isovalue(mt: &Mt, error: f64, facets: u64) -> Result<Pair> {
+    let uniform = Shown::of(mt, &Request { error, ..Request::default() })?;
+    let isovalue = isovalue_with(mt, &uniform, facets)?;
+    let request = Request { error, isovalues: vec![isovalue], ..Request::default() };
+    Ok(Pair { isovalue, roi: None, variable: Shown::of(mt, &request)?, uniform })
+}
+
+/// Figure 7: the reference mesh, and one that is as fine in that octant of the domain that is nearest to whoever looks
+/// at it: right, in front, above.
+pub fn in_an_octant(mt: &Mt, isovalue: f64) -> Result<Pair> {
+    let uniform = Shown::of(mt, &Request::default())?;
+    let roi = octant(&domain(&uniform));
+    let variable = Shown::of(mt, &Request { roi: Some(roi), ..Request::default() })?;
+    Ok(Pair { isovalue, roi: Some(roi), uniform, variable })
+}
+
+fn domain(shown: &Shown) -> Bounds {
+    Bounds::of(&shown.view().positions.iter().map(|p| p.map(f64::from)).collect::<Vec<_>>())
+}
+
+fn octant(domain: &Bounds) -> Bounds {
+    let middle = [0, 1, 2].map(|i| (domain.min[i] + domain.max[i]) / 2.0);
+    Bounds { min: [middle[0], domain.min[1], middle[2]], max: [domain.max[0], middle[1], domain.max[2]] }
+}
+
+/// The box in the middle of a domain whose sides are `side` times as long.
+fn in_the_middle(domain: &Bounds, side: f64) -> Bounds {
+    let (extent, shift) = (domain.extent(), (1.0 - side) / 2.0);
+    let min = [0, 1, 2].map(|i| domain.min[i] + shift * extent[i]);
+    Bounds { min, max: [0, 1, 2].map(|i| min[i] + side * extent[i]) }
+}
+
+/// What boxes cost with one MT.
+pub struct Boxed {
+    pub recipe: Recipe,
+    /// Tetrahedra of the mesh that is fine everywhere, in the octant, in the middle; by [`BOX_ERRORS`].
+    pub tets: Vec<[u64; 3]>,
+}
+
+/// At which errors boxes are asked for.
+const BOX_ERRORS: [f64; 2] = [0.0, 0.01];
+/// The sides of the box in the middle, as a part of the domain's.
+const MIDDLE: f64 = 1.0 / 16.0;
+
+/// Asks all MTs of a data set for boxes.
+pub fn boxes(data: &DataSet) -> Result<Vec<Boxed>> {
+    let domain = Bounds::of(&data.reference.positions);
+    let regions = [None, Some(octant(&domain)), Some(in_the_middle(&domain, MIDDLE))];
+    let mut all = Vec::new();
+    for model in &data.models {
+        let mut tets = Vec::new();
+        for error in BOX_ERRORS {
+            let mut sizes = [0; 3];
+            for (size, roi) in sizes.iter_mut().zip(regions) {
+                *size = tetrahedra(&model.mt, &Request { error, roi, ..Request::default() })?;
+            }
+            tets.push(sizes);
+        }
+        all.push(Boxed { recipe: model.recipe, tets });
+    }
+    Ok(all)
+}
+
+/// What boxes cost, as a table.
+pub fn box_table(all: &[Boxed]) -> String {
+    let mut heads = vec!["MT".to_owned()];
+    for error in BOX_ERRORS.map(percent) {
+        heads.extend(["everywhere", "octant", "middle"].map(|place| format!("{place}, {error}")));
+    }
+    let mut table = Table::new(&heads.iter().map(String::as_str).collect::<Vec<_>>(), 1);
+    for Boxed { recipe, tets } in all {
+        let cells = tets.iter().flat_map(|&[whole, octant, middle]| {
+            let part = |tets: u64| format!("{} ({:.2})", count(tets), tets as f64 / whole.max(1) as f64);
+            [count(whole), part(octant), part(middle)]
+        });
+        table.row(&std::iter::once(recipe.name().to_owned()).chain(cells).collect::<Vec<_>>());
+    }
+    table.finish()
+}
+
+/// The multiple of a hundredth at which the isosurface has most nearly so many facets.
+fn isovalue_with(mt: &Mt, shown: &Shown, facets: u64) -> Result<f64> {
+    let field = mt.info().fields.first().context("an MT has a field")?;
+    let hundredth = |x: f64| (x * 100.0).floor() as i64;
+    let values = (hundredth(field.min) + 1..=hundredth(field.max)).map(|i| i as f64 / 100.0);
+    values.min_by_key(|&v| shown.facets(v).abs_diff(facets)).context("a field with values")
+}
+
+impl Pair {
+    /// Whether both meshes have the same isosurface, triangle for triangle.
+    pub fn same_surface(&self) -> bool {
+        let triangles = |shown: &Shown| {
+            let mut surface = IsoSurface::new();
+            surface.extract(&shown.view(), self.isovalue);
+            let place = |v: u32| surface.positions[v as usize].map(f32::to_bits);
+            let sorted = |t: &[u32; 3]| {
+                let mut corners = t.map(place);
+                corners.sort_unstable();
+                corners
+            };
+            let mut all: Vec<_> = surface.indices.iter().map(sorted).collect();
+            all.sort_unstable();
+            all
+        };
+        triangles(&self.uniform) == triangles(&self.variable)
+    }
+
+    /// Our numbers under the paper's.
+    pub fn table(&self, theirs: &Caption) -> String {
+        let mut table = Table::new(
+            &[
+                "",
+                "uniform, tets",
+                "variable, tets",
+                "variable ÷ uniform",
+                "uniform, facets",
+                "variable, facets",
+            ],
+            1,
+        );
+        let row = |name: &str, tets: [u64; 2], facets: [Option<u64>; 2]| {
+            let facets = facets.map(|f| f.map_or(String::new(), count));
+            let ratio = format!("{:.2}", tets[1] as f64 / tets[0].max(1) as f64);
+            [&[name.to_owned(), count(tets[0]), count(tets[1]), ratio][..], &facets[..]].concat()
+        };
+        table.row(&row(
+            "*paper*",
+            [theirs.uniform_tets, theirs.variable_tets],
+            [Some(theirs.uniform_facets), theirs.variable_facets],
+        ));
+        let shown = [&self.uniform, &self.variable];
+        table.row(&row(
+            "here",
+            shown.map(Shown::tetrahedra),
+            shown.map(|shown| Some(shown.facets(self.isovalue))),
+        ));
+        table.finish()
+    }
+}

@@ -1,0 +1,167 @@
+//! The experiments of Danovaro, De Floriani, Magillo, Puppo, *Data Structures for 3D Multi-Tessellations: an
+//! Overview* (2003), section 6, done again: `cargo xtask paper` writes `docs/paper.md` with everything in it.
+//!
+//! The page is a function of the code and the data: the same on every run.
+#![forbid(unsafe_code)]
+
+mod chart;
+mod figure8;
+mod figures;
+mod greedy;
+mod markdown;
+mod model;
+mod own;
+#[cfg(feature = "pictures")]
+mod pictures;
+mod published;
+mod query;
+mod report;
+mod table1;
+
+use anyhow::Context;
+use anyhow::Result;
+use anyhow::bail;
+use std::fs;
+use std::path::Path;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use tetralod::mesh::TetMesh;
+
+use crate::figure8::Curves;
+use crate::figures::Boxed;
+use crate::figures::Pair;
+use crate::greedy::Needs;
+use crate::model::DataSet;
+use crate::model::Recipe;
+use crate::own::Own;
+use crate::table1::Row;
+
+/// Points along an edge of the generated bucky ball, as many as Smallbucky has.
+const SIZE: u32 = 33;
+
+/// What the page is made of.
+pub struct Findings {
+    pub rows: Vec<Row>,
+    /// Data sets that were not there.
+    pub missing: Vec<&'static str>,
+    pub figure_6: Pair,
+    pub figure_7: Pair,
+    pub uniform: Curves,
+    pub variable: Curves,
+    pub needs: Vec<Needs>,
+    pub own: Vec<Own>,
+    pub boxes: Vec<Boxed>,
+}
+
+fn main() -> ExitCode {
+    match run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run() -> Result<()> {
+    let mut args = std::env::args_os().skip(1);
+    let (Some(folder), None) = (args.next(), args.next()) else { bail!("usage: paper FOLDER") };
+    let data = std::env::var_os("TETRALOD_DATA").map(PathBuf::from);
+    let mesh = tetralod::generate::bucky(SIZE)?;
+    let findings = findings("bucky, generated", &mesh, data.as_deref())?;
+    write(&findings, Path::new(&folder))
+}
+
+/// Does all experiments on a grid, and those of Table 1 on the data sets in a folder, too.
+fn findings(name: &str, mesh: &TetMesh, data: Option<&Path>) -> Result<Findings> {
+    let bucky = DataSet::by_insertion(name, mesh, &[Recipe::Edge, Recipe::Delaunay, Recipe::HalfEdge])?;
+    let mut rows = table1::rows(&bucky)?;
+    let figure_6 =
+        figures::around_isovalue(&bucky.model(Recipe::Insert).mt, 0.001, published::FIGURE_6.uniform_facets)?;
+    let figure_7 = figures::in_an_octant(&bucky.model(Recipe::Edge).mt, figure_6.isovalue)?;
+    let boxes = figures::boxes(&bucky)?;
+    let uniform = figure8::curves(&bucky, None)?;
+    let variable = figure8::curves(&bucky, Some(figure_6.isovalue))?;
+    let needs = greedy::needs(&bucky)?;
+    let own = own::own(&bucky)?;
+    drop(bucky);
+    let missing = others(data, &mut rows)?;
+    Ok(Findings { rows, missing, figure_6, figure_7, uniform, variable, needs, own, boxes })
+}
+
+/// Adds the rows of the data sets that have to be there already, one in memory at a time; gives those that are not.
+fn others(folder: Option<&Path>, rows: &mut Vec<Row>) -> Result<Vec<&'static str>> {
+    let mut missing = Vec::new();
+    for name in ["bucky.vti", "bluntfin_clean.vtu", "combustor.vtu"] {
+        let Some(path) = folder.map(|folder| folder.join(name)).filter(|path| path.is_file()) else {
+            missing.push(name);
+            continue;
+        };
+        let mesh = model::load(&path)?;
+        let data = if mesh.grid.is_some() {
+            DataSet::by_insertion(name, &mesh, &[Recipe::Edge])?
+        } else {
+            DataSet::of_mesh(name, mesh, &[Recipe::Edge, Recipe::HalfEdge])?
+        };
+        rows.extend(table1::rows(&data)?);
+    }
+    Ok(missing)
+}
+
+/// Writes the page, its plots and, where it can be done, its pictures.
+fn write(findings: &Findings, folder: &Path) -> Result<()> {
+    let figures = folder.join("paper");
+    fs::create_dir_all(&figures).with_context(|| figures.display().to_string())?;
+    let save = |path: PathBuf, text: String| {
+        fs::write(&path, text).with_context(|| format!("{} could not be written", path.display()))
+    };
+    save(figures.join("figure-8-uniform.svg"), findings.uniform.chart())?;
+    save(figures.join("figure-8-variable.svg"), findings.variable.chart())?;
+    save(folder.join("paper.md"), report::page(findings))?;
+    pictures(findings, &figures)
+}
+
+#[cfg(feature = "pictures")]
+fn pictures(findings: &Findings, folder: &Path) -> Result<()> {
+    let Some(mut painter) = pictures::Painter::new()? else {
+        eprintln!(
+            "no Vulkan adapter, not even Mesa's lavapipe (package mesa-vulkan-drivers): the pictures stay as they are"
+        );
+        return Ok(());
+    };
+    eprintln!("pictures on {}", painter.description());
+    painter.draw(&findings.figure_6, 6, folder)?;
+    painter.draw(&findings.figure_7, 7, folder)
+}
+
+#[cfg(not(feature = "pictures"))]
+fn pictures(_: &Findings, _: &Path) -> Result<()> {
+    eprintln!("built without pictures: they stay as they are");
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_small_volume_gives_a_page() {
+        let mesh = tetralod::generate::bucky(9).unwrap();
+        let all = findings("small", &mesh, None).unwrap();
+        assert_eq!(all.rows.len(), Recipe::ALL.len());
+        for curves in [&all.uniform, &all.variable] {
+            // At error 0 a uniform mesh is the reference mesh, and a larger error never needs more.
+            let whole = |sizes: &Vec<u64>| curves.variable || sizes[0] == curves.reference;
+            assert!(curves.curves.iter().all(|(_, sizes)| whole(sizes) && sizes.is_sorted_by(|a, b| a >= b)));
+            assert!(curves.chart().ends_with("</svg>\n"));
+        }
+        let kept = |need: &greedy::Need| need.measured <= need.error + 1e-4;
+        assert!(all.needs.iter().flat_map(|needs| &needs.errors).all(kept));
+        for pair in [&all.figure_6, &all.figure_7] {
+            assert!(pair.variable.tetrahedra() <= pair.uniform.tetrahedra());
+        }
+        let page = report::page(&all);
+        assert_eq!(page.matches(table1::NOT_HERE).count(), 2 * 3, "three data sets in two tables");
+        assert_eq!(page, report::page(&findings("small", &mesh, None).unwrap()), "the same on every run");
+    }
+}

@@ -1,0 +1,134 @@
+//! The data sets and their MTs, built as the paper built its own.
+
+use anyhow::Context;
+use anyhow::Result;
+use std::ops::ControlFlow;
+use std::path::Path;
+use tetralod::build;
+use tetralod::build::BuildConfig;
+use tetralod::build::Criterion;
+use tetralod::build::Method;
+use tetralod::mesh::Field;
+use tetralod::mesh::Grid;
+use tetralod::mesh::TetMesh;
+use tetralod::mesh::repair;
+use tetralod::mt::CurrentMesh;
+use tetralod::mt::Mt;
+use tetralod::mt::MtInfo;
+use tetralod::mt::MtKind;
+use tetralod::mt::MultiTessellation;
+use tetralod::refine::Request;
+
+use crate::query;
+
+/// How an MT is made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Recipe {
+    /// Midpoint edge collapses, cheapest first.
+    Edge,
+    /// Greedy insertion from a box of six tetrahedra: the paper's way for its vertex-based MT.
+    Insert,
+    /// Vertices removed, cheapest first, and the hole filled by Delaunay tetrahedra.
+    Delaunay,
+    /// Vertices removed by moving them onto a neighbour.
+    HalfEdge,
+}
+
+impl Recipe {
+    pub const ALL: [Self; 4] = [Self::Edge, Self::Insert, Self::Delaunay, Self::HalfEdge];
+
+    /// Kind of MT and how it is made, in a few words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Edge => "edge, collapse",
+            Self::Insert => "vertex, insertion",
+            Self::Delaunay => "vertex, decimation (Delaunay)",
+            Self::HalfEdge => "vertex, decimation (half-edge)",
+        }
+    }
+
+    fn config(self) -> BuildConfig {
+        let (kind, method, criterion) = match self {
+            Self::Edge => (MtKind::Edge, Method::Collapse, Criterion::HalfEdge),
+            Self::Insert => (MtKind::Vertex, Method::Insert, Criterion::Delaunay),
+            Self::Delaunay => (MtKind::Vertex, Method::Decimate, Criterion::Delaunay),
+            Self::HalfEdge => (MtKind::Vertex, Method::Decimate, Criterion::HalfEdge),
+        };
+        BuildConfig { kind, method, criterion, ..BuildConfig::default() }
+    }
+}
+
+/// An MT and how it was made.
+pub struct Model {
+    pub recipe: Recipe,
+    pub mt: Mt,
+}
+
+impl Model {
+    pub fn build(recipe: Recipe, mesh: &TetMesh) -> Result<Self> {
+        eprintln!("  {} ...", recipe.name());
+        let built = build::build(mesh, &recipe.config(), &mut |_| ControlFlow::Continue(()));
+        Ok(Self { recipe, mt: built.with_context(|| recipe.name())?.mt })
+    }
+}
+
+/// A data set with the MTs of one reference mesh.
+pub struct DataSet {
+    pub name: String,
+    pub reference: TetMesh,
+    pub models: Vec<Model>,
+}
+
+impl DataSet {
+    /// The paper's way: points are inserted, and the mesh that this ends with is what the other MTs are made of.
+    pub fn by_insertion(name: &str, points: &TetMesh, others: &[Recipe]) -> Result<Self> {
+        eprintln!("{name}");
+        let inserted = Model::build(Recipe::Insert, points)?;
+        let reference = finest(&inserted.mt, points.grid)?;
+        let mut models = vec![inserted];
+        for &recipe in others {
+            models.push(Model::build(recipe, &reference)?);
+        }
+        Ok(Self { name: name.to_owned(), reference, models })
+    }
+
+    /// A mesh that is there already.
+    pub fn of_mesh(name: &str, mesh: TetMesh, recipes: &[Recipe]) -> Result<Self> {
+        eprintln!("{name}");
+        let models: Result<Vec<Model>> = recipes.iter().map(|&r| Model::build(r, &mesh)).collect();
+        Ok(Self { name: name.to_owned(), models: models?, reference: mesh })
+    }
+
+    /// The MT that was made by a recipe of this data set.
+    pub fn model(&self, recipe: Recipe) -> &Model {
+        let found = self.models.iter().find(|model| model.recipe == recipe);
+        found.expect("a recipe that the data set was made with")
+    }
+}
+
+/// A mesh from a file, fit to be built on.
+pub fn load(path: &Path) -> Result<TetMesh> {
+    let mesh = tetralod::io::read(path)?;
+    Ok(repair(mesh).with_context(|| path.display().to_string())?.0)
+}
+
+/// The reference mesh of an MT. `grid` is that of its points, if they are on one.
+fn finest(mt: &Mt, grid: Option<Grid>) -> Result<TetMesh> {
+    let front = query::front(mt, &Request::default())?;
+    Ok(TetMesh { grid, ..in_model_units(mt.info(), front.mesh()) })
+}
+
+/// A current mesh as a mesh of its own.
+fn in_model_units(info: &MtInfo, mesh: &CurrentMesh) -> TetMesh {
+    let slots = 0..mesh.positions().len() as u32;
+    let field = |(f, field): (usize, &tetralod::mt::FieldInfo)| Field {
+        name: field.name.clone(),
+        values: slots.clone().map(|slot| field.value(mesh.levels(slot)[f])).collect(),
+    };
+    TetMesh {
+        positions: mesh.positions().iter().map(|&q| info.lattice.point(q)).collect(),
+        fields: info.fields.iter().enumerate().map(field).collect(),
+        tets: mesh.tets().to_vec(),
+        grid: None,
+    }
+}

@@ -1,0 +1,131 @@
+//! Pictures of meshes, drawn by the crate's renderer on whatever Vulkan there is: Mesa's lavapipe will do.
+
+use anyhow::Context;
+use anyhow::Result;
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::Path;
+use std::pin::pin;
+use std::task;
+use std::task::Poll;
+use std::task::Waker;
+use tetralod::geom::Bounds;
+use tetralod::geom::Camera;
+use tetralod::gpu::BoxLines;
+use tetralod::gpu::GpuError;
+use tetralod::gpu::Look;
+use tetralod::gpu::Renderer;
+use tetralod::gpu::Show;
+use tetralod::view::ClipPlane;
+use tetralod::view::Cutaway;
+use tetralod::view::IsoSurface;
+
+use crate::figures::Pair;
+use crate::query::Shown;
+
+/// Width and height of a picture in pixels.
+const SIZE: [u32; 2] = [640, 640];
+
+/// The background.
+const PAPER: [f32; 3] = [0.98; 3];
+
+/// Draws what is asked for; none where there is no adapter.
+pub struct Painter {
+    renderer: Renderer,
+}
+
+impl Painter {
+    /// # Errors
+    /// If there is an adapter that cannot be used.
+    pub fn new() -> Result<Option<Self>> {
+        match wait(Renderer::headless(SIZE)) {
+            Ok(renderer) => Ok(Some(Self { renderer })),
+            Err(GpuError::NoAdapter(_)) => Ok(None),
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    /// The adapter in words.
+    pub fn description(&self) -> String {
+        self.renderer.description()
+    }
+
+    /// Draws the pictures of a figure into `folder`; the page shows them by the same names.
+    pub fn draw(&mut self, pair: &Pair, figure: u32, folder: &Path) -> Result<()> {
+        let path = |mesh: &str, what: &str| folder.join(format!("figure-{figure}-{mesh}-{what}.png"));
+        self.mesh(&pair.uniform, pair, &path("uniform", "mesh"))?;
+        self.mesh(&pair.variable, pair, &path("variable", "mesh"))?;
+        self.surface(&pair.uniform, pair, &path("uniform", "surface"))?;
+        if !pair.same_surface() {
+            self.surface(&pair.variable, pair, &path("variable", "surface"))?;
+        }
+        Ok(())
+    }
+
+    /// The isosurface with the edges of its facets.
+    fn surface(&mut self, shown: &Shown, pair: &Pair, path: &Path) -> Result<()> {
+        let mut surface = IsoSurface::new();
+        surface.extract(&shown.view(), pair.isovalue);
+        // Facets drawn as faces of tetrahedra are: flat, with outlines.
+        let mut facets = Cutaway::new();
+        facets.positions = surface.indices.iter().flatten().map(|&v| surface.positions[v as usize]).collect();
+        facets.values = vec![0.8; facets.positions.len()];
+        self.renderer.set_cutaway(&facets)?;
+        self.picture(shown, pair, [0.0, 1.0], 0.6, path)
+    }
+
+    /// The tetrahedra behind a plane through the middle of the domain, or of the box.
+    fn mesh(&mut self, shown: &Shown, pair: &Pair, path: &Path) -> Result<()> {
+        let view = shown.view();
+        let bounds = pair.roi.unwrap_or_else(|| bounds(shown));
+        let middle = (bounds.min[1] + bounds.max[1]) / 2.0;
+        let mut cutaway = Cutaway::new();
+        cutaway.cut(&view, &ClipPlane { normal: [0.0, -1.0, 0.0], offset: -middle as f32 });
+        self.renderer.set_cutaway(&cutaway)?;
+        let low = view.field.iter().copied().fold(f32::INFINITY, f32::min);
+        let high = view.field.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        // The dark end of the colours would hide the edges.
+        self.picture(shown, pair, [low - 0.8 * (high - low), high], 0.97, path)
+    }
+
+    fn picture(&mut self, shown: &Shown, pair: &Pair, range: [f32; 2], zoom: f64, path: &Path) -> Result<()> {
+        let line = |bounds, colour, width| BoxLines { bounds, colour, width, handles: false };
+        let domain = bounds(shown);
+        let mut boxes = vec![line(domain, [0.45, 0.48, 0.52, 1.0], 1.0)];
+        boxes.extend(pair.roi.map(|roi| line(roi, [0.85, 0.2, 0.1, 1.0], 2.0)));
+        self.renderer.set_boxes(&boxes)?;
+        let mut camera = Camera::home(&domain, self.renderer.aspect());
+        camera.zoom(zoom);
+        let look = Look { range, sky: PAPER, ground: PAPER, pixel_ratio: 0.6, ..Look::default() };
+        self.renderer.draw(Show::Cutaway, &camera, &look)?;
+        let pixels = wait(self.renderer.read())?;
+        save(&pixels, self.renderer.size(), path).with_context(|| path.display().to_string())
+    }
+}
+
+fn bounds(shown: &Shown) -> Bounds {
+    Bounds::of(&shown.view().positions.iter().map(|p| p.map(f64::from)).collect::<Vec<_>>())
+}
+
+/// Writes a picture without its opacity, which is full everywhere.
+fn save(rgba: &[u8], [width, height]: [u32; 2], path: &Path) -> Result<()> {
+    let rgb: Vec<u8> = rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
+    let mut encoder = png::Encoder::new(BufWriter::new(File::create(path)?), width, height);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::High);
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(&rgb)?;
+    Ok(writer.finish()?)
+}
+
+/// Runs a future that makes progress whenever it is asked to, as those of native devices do.
+fn wait<T>(future: impl Future<Output = T>) -> T {
+    let mut future = pin!(future);
+    loop {
+        if let Poll::Ready(value) = future.as_mut().poll(&mut task::Context::from_waker(Waker::noop())) {
+            return value;
+        }
+        std::thread::yield_now();
+    }
+}

@@ -1,0 +1,81 @@
+//! Meshes out of an MT, and what is counted on them.
+
+use anyhow::Context;
+use anyhow::Result;
+use anyhow::ensure;
+use tetralod::measure::Part;
+use tetralod::measure::Reference;
+use tetralod::measure::deviation;
+use tetralod::mesh::TetMesh;
+use tetralod::mt::Mt;
+use tetralod::mt::MultiTessellation;
+use tetralod::refine::Front;
+use tetralod::refine::LodCriterion;
+use tetralod::refine::Request;
+use tetralod::view::IsoSurface;
+use tetralod::view::MeshView;
+
+/// The coarsest mesh of `mt` that satisfies `request`.
+pub fn front(mt: &Mt, request: &Request) -> Result<Front> {
+    let mut front = Front::new(mt)?;
+    let criterion = LodCriterion::new(mt.info(), request);
+    let outcome = front.satisfy(mt, &criterion, request.max_tets)?;
+    ensure!(outcome.satisfied || request.max_tets.is_some(), "a complete MT satisfies every request");
+    Ok(front)
+}
+
+/// How many tetrahedra that mesh has.
+pub fn tetrahedra(mt: &Mt, request: &Request) -> Result<u64> {
+    Ok(front(mt, request)?.mesh().tet_count() as u64)
+}
+
+/// A mesh as the view takes it.
+pub struct Shown {
+    positions: Vec<[f32; 3]>,
+    values: Vec<f32>,
+    tets: Vec<[u32; 4]>,
+    neighbors: Vec<[u32; 4]>,
+}
+
+impl Shown {
+    pub fn of(mt: &Mt, request: &Request) -> Result<Self> {
+        let front = front(mt, request)?;
+        let (info, mesh) = (mt.info(), front.mesh());
+        let field = info.fields.first().context("an MT has a field")?;
+        let value = |slot: usize| field.value(mesh.levels(slot as u32)[0]) as f32;
+        Ok(Self {
+            positions: mesh.positions().iter().map(|&q| info.lattice.point(q).map(|x| x as f32)).collect(),
+            values: (0..mesh.positions().len()).map(value).collect(),
+            tets: mesh.tets().to_vec(),
+            neighbors: mesh.neighbors().to_vec(),
+        })
+    }
+
+    pub fn view(&self) -> MeshView<'_> {
+        MeshView {
+            positions: &self.positions,
+            field: &self.values,
+            tets: &self.tets,
+            neighbors: &self.neighbors,
+        }
+    }
+
+    pub fn tetrahedra(&self) -> u64 {
+        self.tets.len() as u64
+    }
+
+    /// Triangles of the isosurface.
+    pub fn facets(&self, isovalue: f64) -> u64 {
+        let mut surface = IsoSurface::new();
+        surface.extract(&self.view(), isovalue);
+        surface.indices.len() as u64
+    }
+}
+
+/// The largest error at the vertices of `reference`, measured, as a fraction of the field's range.
+pub fn measured(mt: &Mt, front: &Front, reference: &TetMesh) -> Result<f64> {
+    let field = mt.info().fields.first().context("an MT has a field")?;
+    let values = reference.fields.iter().find(|f| f.name == field.name).context("a field of the mesh")?;
+    let reference = Reference { positions: &reference.positions, values: &values.values, field: 0 };
+    Ok(deviation(mt.info(), front.mesh(), &reference, &Part::default()).field / field.range())
+}
