@@ -72,6 +72,7 @@ impl MultiTessellation for Mt {
         each!(self, mt => MultiTessellation::bytes(mt))
     }
 
+    #[inline(never)]
     fn start(&self) -> Result<CurrentMesh, BaseMeshError> {
         each!(self, mt => mt.start())
     }
@@ -100,14 +101,17 @@ impl MultiTessellation for Mt {
         each!(self, mt => mt.may_coarsen(mesh, u))
     }
 
+    #[inline(never)]
     fn refine(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
         each!(self, mt => mt.refine(mesh, u))
     }
 
+    #[inline(never)]
     fn coarsen(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
         each!(self, mt => mt.coarsen(mesh, u))
     }
 
+    #[inline(never)]
     fn look_at_removed(
         &self,
         mesh: &mut CurrentMesh,
@@ -118,10 +122,12 @@ impl MultiTessellation for Mt {
         each!(self, mt => mt.look_at_removed(mesh, u, field, look))
     }
 
+    #[inline(never)]
     fn announce(&self, mesh: &mut CurrentMesh, known: u32) {
         each!(self, mt => mt.announce(mesh, known));
     }
 
+    #[inline(never)]
     fn find_removed(
         &self,
         mesh: &mut CurrentMesh,
@@ -131,6 +137,7 @@ impl MultiTessellation for Mt {
         each!(self, mt => mt.find_removed(mesh, u, found))
     }
 
+    #[inline(never)]
     fn find_inserted(
         &self,
         mesh: &mut CurrentMesh,

@@ -351,7 +351,9 @@ impl VertexMt {
                 let slots = FACES[face as usize & 3].map(|k| tet[k]);
                 let mut sorted = slots.map(|v| mesh.labels[v as usize].vertex);
                 sorted.sort_unstable();
-                outer.push((sorted, slots));
+                // Kept in order as they come: they are few.
+                let at = outer.partition_point(|other| *other < (sorted, slots));
+                outer.insert(at, (sorted, slots));
                 continue;
             }
             let side = if beyond == NONE { Some(0) } else { mesh.side_towards(beyond, t) };
@@ -360,7 +362,6 @@ impl VertexMt {
         }
         let mut rim = Vec::new();
         if shape.boundary {
-            outer.sort_unstable();
             if outer.len() != shape.given_up_len as usize {
                 return None;
             }
@@ -627,10 +628,10 @@ impl Code {
         if chosen + 3 == self.vertices && self.boundary && !of_link {
             return Some(Close::Leave);
         }
-        let mut sorted = face;
-        sorted.sort_unstable();
+        // The least vertex comes first.
+        let [a, b, c] = face;
         let mut x = chosen as u8;
-        sorted.iter().for_each(|&own| x += u8::from(x >= own));
+        [a, b.min(c), b.max(c)].iter().for_each(|&own| x += u8::from(x >= own));
         (u32::from(x) < self.vertices).then_some(Close::With(x))
     }
 }

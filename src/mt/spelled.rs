@@ -105,34 +105,35 @@ fn beyond(mesh: &CurrentMesh, old: &[u32], names: &[[u32; 4]]) -> Option<Vec<(Si
 /// What every face of the new tetrahedra meets: another new one, one beyond, or nothing. None if they leave a face of
 /// what is beyond bare, or touch what they did not border on. `taken` is that of the mesh with them in it.
 fn meet(new: &[[u32; 4]], beyond: &[(Side, u32, u32)], taken: &Taken) -> Option<Vec<[Meets; 4]>> {
-    let mut sides: Vec<(Side, usize)> = Vec::with_capacity(4 * new.len());
-    for tet in new {
-        sides.extend((sides.len()..).zip(faces(tet)).map(|(place, face)| (side_of(face), place)));
+    let mut sides: Vec<(Side, u32, u32)> = Vec::with_capacity(4 * new.len());
+    for (t, tet) in (0..).zip(new) {
+        sides.extend((0..).zip(faces(tet)).map(|(face, side)| (side_of(side), t, face)));
     }
     sides.sort_unstable();
     let mut meets = vec![[Meets::Nothing; 4]; new.len()];
     let (mut rest, mut outside) = (sides.as_slice(), beyond);
-    while let [(side, place), tail @ ..] = rest {
+    while let [(side, t, face), tail @ ..] = rest {
         let across = side ^ 1;
         rest = tail;
         // No side is taken twice, so the two of a face follow each other.
-        if let [(other, at), after @ ..] = tail
+        let (own, face) = (*t as usize, *face as usize);
+        if let [(other, at, other_face), after @ ..] = tail
             && *other == across
         {
-            meets[place / 4][place % 4] = Meets::New((at / 4) as u32);
-            meets[at / 4][at % 4] = Meets::New((place / 4) as u32);
+            meets[own][face] = Meets::New(*at);
+            meets[*at as usize][*other_face as usize] = Meets::New(*t);
             rest = after;
             continue;
         }
         match outside {
             [(found, n, back), after @ ..] if *found == across => {
-                meets[place / 4][place % 4] = Meets::Old(*n, *back);
+                meets[own][face] = Meets::Old(*n, *back);
                 outside = after;
             }
             // Those beyond that are passed over stay bare.
             [(found, ..), ..] if *found < across => return None,
             _ => {
-                let (face, side) = faces(&new[place / 4]).nth(place % 4)?;
+                let (face, side) = faces(&new[own]).nth(face)?;
                 if taken.has_face(&face, 1 - side) {
                     return None;
                 }

@@ -429,9 +429,9 @@ impl<'a, M: MultiTessellation, C: Criterion> Budgeted<'a, M, C> {
     fn parents_of_touched(&self) -> Vec<UpdateId> {
         let mesh = &self.front.mesh;
         let live = mesh.touched().iter().filter(|&&t| mesh.tet(t).is_some());
-        let mut parents: Vec<UpdateId> = live.filter_map(|&t| self.mt.creator(mesh, t)).collect();
+        let mut parents: Vec<u32> = live.filter_map(|&t| self.mt.creator(mesh, t)).map(|u| u.0).collect();
         parents.sort_unstable();
         parents.dedup();
-        parents
+        parents.into_iter().map(UpdateId).collect()
     }
 }
