@@ -246,6 +246,7 @@ proptest! {
             prop_assert_eq!(&applied(&front, &part.mt), &part.closure(&criterion));
             prop_assert_eq!(front.mesh().check(), Ok(()));
             let whole = subject.closure(&criterion);
+            // Those that have not arrived are behind the ones that have.
             let missing = whole.iter().skip(updates as usize).any(|&s| s);
             prop_assert!(!(outcome.satisfied && missing), "satisfied with {updates} updates: {request:?}");
             prop_assert_eq!(outcome.satisfied, outcome.error.error() <= request.error);

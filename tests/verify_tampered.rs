@@ -157,6 +157,7 @@ fn flipped_diagonal(mesh: &TetMesh) -> TetMesh {
     // Two tetrahedra (a, b, c, d) and (a, c, b, e) that lie on two sides of abc, in a quad of the boundary: flip the
     // diagonal of the quad that two boundary faces make.
     for (i, &first) in mesh.tets.iter().enumerate() {
+        // Each pair once: the ones before were the first of theirs.
         for (j, &second) in mesh.tets.iter().enumerate().skip(i + 1) {
             let shared: Vec<u32> = first.iter().copied().filter(|v| second.contains(v)).collect();
             let apexes: Vec<u32> = [first, second]

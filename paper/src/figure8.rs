@@ -48,6 +48,7 @@ impl Curves {
     /// two was not made.
     pub fn saved(&self, recipe: Recipe, than: Recipe) -> Option<f64> {
         let sizes = |r: Recipe| self.curves.iter().find(|(other, _)| *other == r).map(|(_, sizes)| sizes);
+        // The first error is 0, where every MT gives the whole reference mesh: nothing to compare.
         let shares = sizes(recipe)?.iter().zip(sizes(than)?).skip(1);
         let shares: Vec<f64> = shares.map(|(&a, &b)| 1.0 - a as f64 / b.max(1) as f64).collect();
         Some(shares.iter().sum::<f64>() / shares.len().max(1) as f64)

@@ -64,6 +64,7 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<()> {
+    // The first argument is the program itself.
     let mut args = std::env::args_os().skip(1);
     let (Some(folder), None) = (args.next(), args.next()) else { bail!("usage: paper FOLDER") };
     let data = std::env::var_os("TETRALOD_DATA").map(PathBuf::from);

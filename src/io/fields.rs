@@ -34,6 +34,7 @@ pub(super) fn append(
         return Ok(());
     }
     for c in 0..components {
+        // Tuples lie one behind the other; this component starts at its own place in the first.
         let values = values.iter().skip(c).step_by(components).copied().collect();
         let name = format!("{name}_{}", component_name(components, c));
         fields.push(Field { name: free_name(fields, &name), values });

@@ -175,6 +175,7 @@ impl Work {
         let mut repeats = vec![false; self.mesh.tets.len()];
         let apex = |f: &HalfFace| self.mesh.tets[f.tet() as usize][f.face()];
         for group in face_groups(&sorted_faces(&self.mesh.tets)?) {
+            // The first of a group repeats nothing: each is compared with those before it.
             for (i, face) in group.iter().enumerate().skip(1) {
                 // Groups are short except in broken meshes, where looking at the first few is enough to refuse.
                 let earlier = &group[..i.min(16)];

@@ -38,6 +38,7 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<()> {
+    // The first argument is the program itself.
     let args: Vec<String> = std::env::args().skip(1).collect();
     let Some((command, rest)) = args.split_first() else { bail!("{USAGE}") };
     // The test runner is called by cargo from the folder of the package under test, with paths relative to it.

@@ -149,6 +149,7 @@ pub fn write_base(out: &mut Vec<u8>, mt: MtRef<'_>) {
     write_positions(out, scratch, base.positions.iter().copied());
     write::column(out, scratch, |out| write_deltas(out, base.tets.iter().flatten().map(|&v| v as i32)));
     for field in 0..fields {
+        // Levels are stored vertex by vertex; a column has one field of each, from its own place in the first vertex on.
         let levels = base.values.iter().skip(field).step_by(fields);
         write::column(out, scratch, |out| write_deltas(out, levels.copied()));
     }
