@@ -67,6 +67,7 @@ async function start() {
 
 async function open(from) {
   source = from;
+  showInList(from);
   const mine = ++opening;
   Object.assign(demo, { state: "opening", error: undefined, info: undefined, stats: undefined });
   Object.assign(demo, { firstFrameBytes: undefined, firstFrameMs: undefined, receivedBytes: 0, totalBytes: undefined });
@@ -282,7 +283,7 @@ function attachFiles() {
   $("file").addEventListener("change", () => {
     const [file] = $("file").files;
     $("file").value = "";
-    if (file) openFile(file);
+    if (file) open(file);
   });
   const carriesFile = (event) => event.dataTransfer?.types.includes("Files");
   window.addEventListener("dragover", (event) => {
@@ -298,18 +299,23 @@ function attachFiles() {
     if (!carriesFile(event)) return;
     event.preventDefault();
     const [file] = event.dataTransfer.files;
-    if (file) openFile(file);
+    if (file) open(file);
   });
 }
 
-/** A file of the user's own: it stays in the list while the page is open. */
-function openFile(file) {
-  const option = new Option(file.name, "", true, true);
-  $("volume").querySelector("[data-file]")?.remove();
-  option.dataset.file = "";
+/** Names in the list of volumes what is open; a file or a URL that is not on it is added, in the place of the last. */
+function showInList(from) {
+  const list = $("volume");
+  const listed = [...list.options].find(({ value }) => value && value === from);
+  if (listed) {
+    listed.selected = true;
+    return;
+  }
+  list.querySelector("[data-other]")?.remove();
+  const option = new Option(nameOf(from), "", true, true);
+  option.dataset.other = "";
   option.disabled = true;
-  $("volume").append(option);
-  open(file);
+  list.append(option);
 }
 
 /* Numbers */

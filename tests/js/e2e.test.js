@@ -135,14 +135,15 @@ test("the first picture is there before the file is", async () => {
 
 test("every volume of the demo can be shown, of whatever kind it is", async () => {
   const seen = {};
-  for (const [name, kind] of [
-    ["sphere-flow", "edge"],
-    ["sphere-flow-vertex", "vertex"],
-    ["bucky-explicit", "explicit"],
+  for (const [name, kind, title] of [
+    ["sphere-flow", "edge", "Flow past a sphere"],
+    ["sphere-flow-vertex", "vertex", "Flow past a sphere, by vertex insertion"],
+    ["bucky-explicit", "explicit", "Small bucky ball, explicit"],
   ]) {
     const page = await open(`data/${name}.mt`);
     await reach(page, "complete");
     assert.equal((await demo(page, "info")).kind, kind);
+    assert.equal(await page.locator("#volume option:checked").innerText(), title);
     assertDrawn(await picture(page, name));
     const coarse = await setSlider(page, "error", 90);
     seen[name] = await setSlider(page, "error", 0);
