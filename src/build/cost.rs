@@ -131,6 +131,24 @@ pub(super) fn nearest_face(p: DVec3, faces: &[Face]) -> (usize, DVec3, f64) {
     (found, nearest, least.sqrt())
 }
 
+/// Which of so many tetrahedra a point lies in, or is least outside of: its barycentric coordinates there but for the
+/// first one, which `barycentric` gives, and how deep inside it lies. The one called `hint` is looked at first.
+pub(super) fn locate(cells: usize, hint: usize, barycentric: impl Fn(usize) -> DVec3) -> (usize, DVec3, f64) {
+    let (mut cell, mut lambda, mut depth) = (hint, DVec3::ZERO, f64::NEG_INFINITY);
+    let order = std::iter::once(hint).chain((0..cells).filter(|&i| i != hint));
+    for i in order {
+        let l = barycentric(i);
+        let inside = l.min_element().min(1.0 - l.element_sum());
+        if inside > depth {
+            (cell, lambda, depth) = (i, l, inside);
+        }
+        if inside >= 0.0 {
+            break;
+        }
+    }
+    (cell, lambda, depth)
+}
+
 /// Evaluates collapses; holds scratch space.
 #[derive(Default)]
 pub(super) struct Evaluator {
@@ -389,20 +407,9 @@ impl Evaluator {
         reference: &Reference<'_>,
     ) -> f64 {
         let position = as_vec(reference.quantized.positions[point as usize]);
-        let centre = as_vec(plan.position);
-        let relative = position - centre;
-        let (mut cell, mut lambda, mut depth) = (hint, DVec3::ZERO, f64::NEG_INFINITY);
-        let order = std::iter::once(hint).chain((0..self.cells.len()).filter(|&i| i != hint));
-        for i in order {
-            let l = self.cells[i].barycentric * relative;
-            let inside = l.min_element().min(1.0 - l.element_sum());
-            if inside > depth {
-                (cell, lambda, depth) = (i, l, inside);
-            }
-            if inside >= 0.0 {
-                break;
-            }
-        }
+        let relative = position - as_vec(plan.position);
+        let (mut cell, mut lambda, depth) =
+            locate(self.cells.len(), hint, |i| self.cells[i].barycentric * relative);
         let mut displaced = 0.0;
         if depth < -SLACK && !self.border.is_empty() {
             let p = reference.scaled(reference.quantized.positions[point as usize]);
@@ -448,17 +455,11 @@ impl Evaluator {
         data: &VertexData,
         reference: &Reference<'_>,
     ) -> f64 {
-        let fields = &reference.quantized.fields;
-        let own = 1.0 - lambda.element_sum();
-        let mut largest = 0.0_f64;
-        for (f, field) in fields.iter().enumerate() {
-            let [x, y, z] =
-                self.cells[cell].others.map(|v| f64::from(data.levels[v as usize * fields.len() + f]));
-            let value = own * f64::from(self.levels[f]) + lambda.x * x + lambda.y * y + lambda.z * z;
-            let exact = reference.quantized.exact[point as usize * fields.len() + f];
-            largest = largest.max((value - exact).abs() * field.step / field.range());
-        }
-        largest
+        let fields = reference.quantized.fields.len();
+        reference.quantized.deviation(point, lambda, |f| {
+            let [x, y, z] = self.cells[cell].others.map(|v| data.levels[v as usize * fields + f]);
+            [self.levels[f], x, y, z]
+        })
     }
 }
 

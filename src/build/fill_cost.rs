@@ -10,6 +10,7 @@ use super::cost::Reference;
 use super::cost::SLACK;
 use super::cost::as_vec;
 use super::cost::clamped;
+use super::cost::locate;
 use super::cost::nearest_face;
 use super::hole::Filling;
 use super::hole::Hole;
@@ -79,28 +80,10 @@ impl Past {
             }
         }
         let depends = height > 0;
-        let error = if depends { inherited + overshoot(hole, reference) } else { 0.0 };
+        let overshoot = || reference.quantized.overshoot(hole.a, &hole.link);
+        let error = if depends { inherited + overshoot() } else { 0.0 };
         Legacy { inherited, depends, error, height: height + 1 }
     }
-}
-
-/// How much the removed vertex exceeds the range of values around it, as a fraction of the field's range.
-/// Added to the inherited error it makes the selection by isovalue monotone.
-fn overshoot(hole: &Hole, reference: &Reference<'_>) -> f64 {
-    let fields = &reference.quantized.fields;
-    let level = |v: u32, f: usize| reference.quantized.levels[v as usize * fields.len() + f];
-    let mut largest = 0.0_f64;
-    for (f, field) in fields.iter().enumerate() {
-        let (low, high) = hole
-            .link
-            .iter()
-            .map(|&v| level(v, f))
-            .fold((i32::MAX, i32::MIN), |(low, high), x| (low.min(x), high.max(x)));
-        let own = level(hole.a, f);
-        let beyond = (own - high).max(low - own).max(0);
-        largest = largest.max(f64::from(beyond) * field.step / field.range());
-    }
-    largest * (1.0 + 1e-9)
 }
 
 impl FillCost {
@@ -235,18 +218,10 @@ impl FillCost {
         reference: &Reference<'_>,
     ) -> (f64, usize) {
         let position = as_vec(reference.quantized.positions[point as usize]);
-        let (mut cell, mut lambda, mut depth) = (hint, DVec3::ZERO, f64::NEG_INFINITY);
-        let order = std::iter::once(hint).chain((0..self.cells.len()).filter(|&i| i != hint));
-        for i in order {
-            let l = self.cells[i].barycentric * (position - self.cells[i].origin);
-            let inside = l.min_element().min(1.0 - l.element_sum());
-            if inside > depth {
-                (cell, lambda, depth) = (i, l, inside);
-            }
-            if inside >= 0.0 {
-                break;
-            }
-        }
+        let (mut cell, mut lambda, depth) = locate(self.cells.len(), hint, |i| {
+            let Cell { barycentric, origin } = self.cells[i];
+            barycentric * (position - origin)
+        });
         let mut displaced = 0.0;
         if depth < -SLACK && !filling.border.is_empty() {
             let p = reference.scaled(reference.quantized.positions[point as usize]);
@@ -257,22 +232,11 @@ impl FillCost {
             displaced = distance;
         }
         self.moves.push((point, cell as u32));
-        let error = field_error(point, filling.tets[cell], clamped(lambda), reference);
+        let quantized = reference.quantized;
+        let error = quantized
+            .deviation(point, clamped(lambda), |f| filling.tets[cell].map(|v| quantized.level(v, f)));
         (error.max(reference.error_of(displaced)), cell)
     }
-}
-
-fn field_error(point: u32, tet: [u32; 4], lambda: DVec3, reference: &Reference<'_>) -> f64 {
-    let fields = &reference.quantized.fields;
-    let own = 1.0 - lambda.element_sum();
-    let mut largest = 0.0_f64;
-    for (f, field) in fields.iter().enumerate() {
-        let [w, x, y, z] = tet.map(|v| f64::from(reference.quantized.levels[v as usize * fields.len() + f]));
-        let value = own * w + lambda.x * x + lambda.y * y + lambda.z * z;
-        let exact = reference.quantized.exact[point as usize * fields.len() + f];
-        largest = largest.max((value - exact).abs() * field.step / field.range());
-    }
-    largest
 }
 
 /// How far the middles of the new boundary triangles and of their edges are from the reference boundary, as an error.

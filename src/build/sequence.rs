@@ -53,7 +53,7 @@ impl Sequence {
         progress: OnProgress<'_>,
     ) -> Result<ExplicitMt, BuildError> {
         let arcs = self.arcs(quantized.positions.len())?;
-        let errors = self.monotone_errors(&info, quantized, &arcs);
+        let errors = self.monotone_errors(quantized, &arcs);
         let mut order: Vec<u32> = (0..self.steps.len() as u32).collect();
         order.sort_by_key(|&i| Reverse(errors[i as usize]));
         info.updates = order.len() as u32;
@@ -134,13 +134,17 @@ impl Sequence {
     }
 
     /// Errors that are at least those of all insertions that depend on each, by so much more that selection by isovalue
-    /// and by box is monotone: see `overshoot` and `step_of_boundary` in the edge builder's costs.
-    fn monotone_errors(&self, info: &MtInfo, quantized: &Quantized, arcs: &Arcs) -> Vec<ErrorCode> {
+    /// and by box is monotone: see [`Quantized::overshoot`], and `step_of_boundary` in the builders' costs.
+    fn monotone_errors(&self, quantized: &Quantized, arcs: &Arcs) -> Vec<ErrorCode> {
         // Never zero: error 0 is to mean the reference mesh, with every update applied.
         let own = |step: &Insertion| ErrorCode::at_least(step.error).max(ErrorCode(1));
         let mut errors: Vec<ErrorCode> = self.steps.iter().map(own).collect();
         let mut parents: Vec<u32> = Vec::new();
-        let step = |i: usize| self.overshoot(i, info, quantized).max(self.steps[i].step);
+        let step = |i: usize| {
+            let Insertion { vertex, inserted, step, .. } = &self.steps[i];
+            let around = self.tets[inserted.clone()].iter().flatten().filter(|&v| v != vertex);
+            quantized.overshoot(*vertex, around).max(*step)
+        };
         let more: Vec<f64> = (0..self.steps.len()).map(step).collect();
         for i in (0..self.steps.len()).rev() {
             let error = errors[i].error();
@@ -154,24 +158,6 @@ impl Sequence {
             }
         }
         errors
-    }
-
-    /// How far the values of an inserted vertex exceed the range of those around it, as a fraction of the field's range.
-    fn overshoot(&self, step: usize, info: &MtInfo, quantized: &Quantized) -> f64 {
-        let Insertion { vertex, inserted, .. } = &self.steps[step];
-        let fields = info.fields.len();
-        let level = |v: u32, f: usize| quantized.levels[v as usize * fields + f];
-        let mut largest = 0.0_f64;
-        for (f, field) in info.fields.iter().enumerate() {
-            let (mut low, mut high) = (i32::MAX, i32::MIN);
-            for &v in self.tets[inserted.clone()].iter().flatten().filter(|&v| v != vertex) {
-                (low, high) = (low.min(level(v, f)), high.max(level(v, f)));
-            }
-            let own = level(*vertex, f);
-            let beyond = (own - high).max(low - own).max(0);
-            largest = largest.max(f64::from(beyond) * field.step / field.range());
-        }
-        largest * (1.0 + 1e-9)
     }
 }
 
