@@ -20,10 +20,10 @@ use conformance_support::grow;
 use conformance_support::inputs;
 use conformance_support::random_input;
 use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
 use std::collections::HashMap;
 use support::domains::Domain;
 use support::random::Random;
+use support::strategies::config;
 use tetralod::geom::Bounds;
 use tetralod::mt::Applied;
 use tetralod::mt::CurrentMesh;
@@ -67,7 +67,7 @@ macro_rules! conformance {
             }
 
             proptest! {
-                #![proptest_config(config(12))]
+                #![proptest_config(config(12, 7))]
 
                 #[test]
                 fn random_fields_on_random_domains(
@@ -89,11 +89,6 @@ conformance! {
     vertex_by_delaunay_removal: DELAUNAY,
     vertex_by_delaunay_insertion: INSERTED,
     explicit_of_vertex: SPELLED_VERTEX,
-}
-
-fn config(cases: u32) -> ProptestConfig {
-    let rng_seed = RngSeed::Fixed(7);
-    ProptestConfig { cases, failure_persistence: None, rng_seed, ..ProptestConfig::default() }
 }
 
 fn domain(how: How) -> BoxedStrategy<Domain> {

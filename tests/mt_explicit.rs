@@ -3,7 +3,6 @@
 mod support;
 
 use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
 use std::collections::BTreeSet;
 use support::builder::Built;
 use support::builder::Plan;
@@ -13,36 +12,13 @@ use support::domains::Domain;
 use support::domains::volume6;
 use support::oracle::sorted;
 use support::random::Random;
+use support::strategies::config;
+use support::strategies::plan;
 use tetralod::mt::ExplicitMt;
 use tetralod::mt::MultiTessellation;
 use tetralod::mt::UpdateId;
 use tetralod::mt::VertexId;
 use tetralod::mt::stats;
-
-fn config(cases: u32, seed: u64) -> ProptestConfig {
-    ProptestConfig {
-        cases,
-        failure_persistence: None,
-        rng_seed: RngSeed::Fixed(seed),
-        ..ProptestConfig::default()
-    }
-}
-
-fn plan(updates: std::ops::Range<usize>) -> impl Strategy<Value = Plan> {
-    let domain = prop_oneof![
-        Just(Domain::SingleTet),
-        (1_usize..=4).prop_map(Domain::Cube),
-        (1_usize..=2).prop_map(Domain::Ell),
-        (1_usize..=3).prop_map(Domain::TwoComponents),
-        Just(Domain::Ring),
-    ];
-    (domain, any::<u64>(), 1_usize..=3, updates).prop_map(|(domain, seed, fields, updates)| Plan {
-        domain,
-        seed,
-        fields,
-        updates,
-    })
-}
 
 fn explicit(built: &Built) -> ExplicitMt {
     ExplicitMt::of(&built.edge_mt()).expect("a valid MT")
@@ -66,7 +42,7 @@ proptest! {
 
     /// Vertices, tetrahedra, updates and arcs are those that the builder recorded.
     #[test]
-    fn is_what_the_builder_recorded(plan in plan(0..400)) {
+    fn is_what_the_builder_recorded(plan in plan(4, 3, 0..400)) {
         let built = build(plan);
         let (oracle, explicit) = (&built.oracle, explicit(&built));
         prop_assert_eq!(explicit.check(), Ok(()));
@@ -103,7 +79,7 @@ proptest! {
 
     /// Σ_S, consistency and feasibility are the oracle's, for random walks over sets, and for random sets.
     #[test]
-    fn extracts_what_the_oracle_extracts(plan in plan(1..60), seed in any::<u64>()) {
+    fn extracts_what_the_oracle_extracts(plan in plan(4, 3, 1..60), seed in any::<u64>()) {
         let built = build(plan);
         let (oracle, explicit) = (&built.oracle, explicit(&built));
         let mut random = Random(seed);
@@ -127,7 +103,7 @@ proptest! {
 
     /// The numbers of `stats` are those counted from the records.
     #[test]
-    fn stats_count_the_records(plan in plan(0..400)) {
+    fn stats_count_the_records(plan in plan(4, 3, 0..400)) {
         let built = build(plan);
         let (oracle, mt) = (&built.oracle, built.edge_mt());
         let found = stats(&mt).expect("a valid MT");
@@ -171,7 +147,7 @@ proptest! {
 
     /// The mesh's own remover and creator of each tetrahedron are those of the DAG.
     #[test]
-    fn the_mesh_knows_removers_and_creators(plan in plan(0..60), seed in any::<u64>()) {
+    fn the_mesh_knows_removers_and_creators(plan in plan(4, 3, 0..60), seed in any::<u64>()) {
         let built = build(plan);
         let (mt, oracle) = (built.edge_mt(), &built.oracle);
         let mut mesh = fresh_mesh(&mt);

@@ -3,7 +3,6 @@
 mod support;
 
 use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
 use support::builder::Built;
 use support::builder::Plan;
 use support::builder::Split;
@@ -11,6 +10,7 @@ use support::builder::build;
 use support::compare::snapshot;
 use support::domains::Domain;
 use support::random::Random;
+use support::strategies::config;
 use tetralod::mt::Applied;
 use tetralod::mt::BaseMesh;
 use tetralod::mt::BaseMeshError;
@@ -21,15 +21,6 @@ use tetralod::mt::MultiTessellation;
 use tetralod::mt::UpdateError;
 use tetralod::mt::UpdateId;
 use tetralod::mt::stats;
-
-fn config(cases: u32, seed: u64) -> ProptestConfig {
-    ProptestConfig {
-        cases,
-        failure_persistence: None,
-        rng_seed: RngSeed::Fixed(seed),
-        ..ProptestConfig::default()
-    }
-}
 
 /// Forces updates in and out as a refinement engine does, and checks what must hold after every call.
 struct Driver<'a> {

@@ -4,13 +4,14 @@
 mod support;
 
 use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
 use support::builder::Built;
 use support::builder::Plan;
 use support::builder::build;
 use support::domains::Domain;
 use support::domains::volume6;
 use support::random::Random;
+use support::strategies::config;
+use support::strategies::plan;
 use tetralod::mt::Applied;
 use tetralod::mt::ConvertError;
 use tetralod::mt::CurrentMesh;
@@ -25,31 +26,6 @@ use tetralod::mt::UpdateError;
 use tetralod::mt::UpdateId;
 use tetralod::mt::VertexId;
 use tetralod::mt::stats;
-
-fn config(cases: u32, seed: u64) -> ProptestConfig {
-    ProptestConfig {
-        cases,
-        failure_persistence: None,
-        rng_seed: RngSeed::Fixed(seed),
-        ..ProptestConfig::default()
-    }
-}
-
-fn plan(updates: std::ops::Range<usize>) -> impl Strategy<Value = Plan> {
-    let domain = prop_oneof![
-        Just(Domain::SingleTet),
-        (1_usize..=5).prop_map(Domain::Cube),
-        (1_usize..=2).prop_map(Domain::Ell),
-        (1_usize..=2).prop_map(Domain::TwoComponents),
-        Just(Domain::Ring),
-    ];
-    (domain, any::<u64>(), 1_usize..=3, updates).prop_map(|(domain, seed, fields, updates)| Plan {
-        domain,
-        seed,
-        fields,
-        updates,
-    })
-}
 
 fn explicit(built: &Built) -> ExplicitMt {
     ExplicitMt::of(&built.edge_mt()).expect("a valid MT")
@@ -111,7 +87,7 @@ proptest! {
 
     /// Random updates forwards and backwards: both structures allow the same ones and make the same mesh.
     #[test]
-    fn both_structures_make_the_same_meshes(plan in plan(1..300), seed in any::<u64>()) {
+    fn both_structures_make_the_same_meshes(plan in plan(5, 2, 1..300), seed in any::<u64>()) {
         let built = build(plan);
         prop_assume!(!built.splits.is_empty());
         let (mut edge, mut spelled) = (Walk::new(built.edge_mt()), Walk::new(explicit(&built)));
@@ -150,7 +126,7 @@ proptest! {
 
     /// Spelled out and turned back, an edge-based MT is what it was.
     #[test]
-    fn an_edge_mt_comes_back_from_the_explicit_one(plan in plan(0..300)) {
+    fn an_edge_mt_comes_back_from_the_explicit_one(plan in plan(5, 2, 0..300)) {
         let edge = Mt::from(build(plan).edge_mt());
         let spelled = edge.convert(MtKind::Explicit).expect("a valid MT");
         prop_assert_eq!(spelled.info().kind, MtKind::Explicit);
@@ -165,7 +141,7 @@ proptest! {
     /// What the structure really holds is within the paper's estimate [§3], by all vertices and tetrahedra of the MT;
     /// the base mesh, which is small, is held twice.
     #[test]
-    fn explicit_bytes_are_within_the_estimate(plan in plan(0..300)) {
+    fn explicit_bytes_are_within_the_estimate(plan in plan(5, 2, 0..300)) {
         let mt = explicit(&build(Plan { fields: 1, ..plan }));
         let base = mt.base_mesh();
         let twice = 16 * (base.positions.len() + base.tets.len());

@@ -3,7 +3,6 @@
 mod support;
 
 use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
 use std::collections::BTreeMap;
 use std::collections::BTreeSet;
 use support::builder::Built;
@@ -14,39 +13,13 @@ use support::compare::fresh_mesh;
 use support::compare::snapshot;
 use support::domains::Domain;
 use support::random::Random;
+use support::strategies::config;
+use support::strategies::plan;
 use tetralod::mt::Applied;
 use tetralod::mt::CurrentMesh;
 use tetralod::mt::EdgeMt;
 use tetralod::mt::MultiTessellation;
 use tetralod::mt::UpdateId;
-
-fn config(cases: u32, seed: u64) -> ProptestConfig {
-    ProptestConfig {
-        cases,
-        failure_persistence: None,
-        rng_seed: RngSeed::Fixed(seed),
-        ..ProptestConfig::default()
-    }
-}
-
-fn domain() -> impl Strategy<Value = Domain> {
-    prop_oneof![
-        Just(Domain::SingleTet),
-        (1_usize..=6).prop_map(Domain::Cube),
-        (1_usize..=2).prop_map(Domain::Ell),
-        (1_usize..=2).prop_map(Domain::TwoComponents),
-        Just(Domain::Ring),
-    ]
-}
-
-fn plan(updates: std::ops::Range<usize>) -> impl Strategy<Value = Plan> {
-    (domain(), any::<u64>(), 1_usize..=3, updates).prop_map(|(domain, seed, fields, updates)| Plan {
-        domain,
-        seed,
-        fields,
-        updates,
-    })
-}
 
 /// The mesh, the set it shows, and the oracle's idea of it.
 struct Walk<'a> {
@@ -109,7 +82,7 @@ proptest! {
 
     /// All splits in label order make the reference mesh, all collapses in reverse the base mesh.
     #[test]
-    fn straight_down_and_up_again(plan in plan(0..200)) {
+    fn straight_down_and_up_again(plan in plan(6, 2, 0..200)) {
         let built = build(plan);
         let mut walk = Walk::new(&built);
         let start = walk.mesh.hash();
@@ -134,7 +107,7 @@ proptest! {
     /// Random interleaved splits and collapses: after every step the mesh is the oracle's, feasibility by labels is
     /// feasibility in the DAG, and the hash depends on the set alone.
     #[test]
-    fn small_meshes_at_random(plan in plan(0..14), steps in 0_usize..600, seed in any::<u64>()) {
+    fn small_meshes_at_random(plan in plan(6, 2, 0..14), steps in 0_usize..600, seed in any::<u64>()) {
         let built = build(plan);
         prop_assume!(!built.splits.is_empty());
         let mut walk = Walk::new(&built);
@@ -160,7 +133,7 @@ proptest! {
 
     /// The same on larger meshes with phases that mostly refine or mostly coarsen, compared every now and then.
     #[test]
-    fn large_meshes_in_waves(plan in plan(100..1000), seed in any::<u64>()) {
+    fn large_meshes_in_waves(plan in plan(6, 2, 100..1000), seed in any::<u64>()) {
         let built = build(plan);
         prop_assume!(!built.splits.is_empty());
         let mut walk = Walk::new(&built);
@@ -191,7 +164,7 @@ proptest! {
     /// A copy that is kept up to date by the changed ranges alone holds the same after every compaction. Few updates
     /// between the copies, many blocks of entries: nothing is told by accident.
     #[test]
-    fn changes_tell_everything(plan in plan(0..2000), seed in any::<u64>()) {
+    fn changes_tell_everything(plan in plan(6, 2, 0..2000), seed in any::<u64>()) {
         let built = build(plan);
         let mut walk = Walk::new(&built);
         let mut random = Random(seed);
@@ -223,7 +196,7 @@ proptest! {
 
     /// Updates that arrive one by one, with refinement in between, end in the same meshes.
     #[test]
-    fn streamed_updates_are_the_same_updates(plan in plan(0..300), seed in any::<u64>()) {
+    fn streamed_updates_are_the_same_updates(plan in plan(6, 2, 0..300), seed in any::<u64>()) {
         let built = build(plan);
         let mut random = Random(seed);
         let mut mt = EdgeMt::new(built.info.clone(), built.base.clone());

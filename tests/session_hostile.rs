@@ -2,17 +2,17 @@
 #![cfg(feature = "build")]
 
 mod format_support;
+mod session_support;
 
 use format_support::{assemble, sections};
 use proptest::prelude::*;
+use session_support::requests;
 use std::ops::ControlFlow;
 use std::sync::LazyLock;
 use tetralod::build::{BuildConfig, build};
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::generate::by_name;
-use tetralod::geom::Bounds;
 use tetralod::mt::{MtKind, MultiTessellation};
-use tetralod::refine::Request;
 use tetralod::session::{Session, SessionError};
 
 /// A small MT as the builder makes it, and the same spelled out, each with its number of updates.
@@ -23,20 +23,6 @@ static FILES: LazyLock<[(Vec<u8>, u32); 2]> = LazyLock::new(|| {
     let spelled = edge.convert(MtKind::Explicit).expect("any MT can be spelled out");
     [edge, spelled].map(|mt| (encode(&mt, &EncodeOptions::default()).expect("a complete MT"), mt.updates()))
 });
-
-/// Requests that go up and down, with and without a part and a budget.
-fn requests() -> [Request; 6] {
-    let uniform = |error| Request { error, ..Request::default() };
-    let roi = Some(Bounds { min: [0.1; 3], max: [0.5; 3] });
-    [
-        uniform(0.05),
-        Request { roi, ..uniform(0.0) },
-        Request { isovalues: vec![0.4], ..uniform(0.01) },
-        uniform(0.0),
-        Request { max_tets: Some(500), ..uniform(0.0) },
-        uniform(f64::INFINITY),
-    ]
-}
 
 /// Runs all requests; a mesh that is given out must be valid. True if nothing was found to be wrong.
 fn exercise(bytes: &[u8]) -> bool {

@@ -3,31 +3,18 @@
 
 mod build_support;
 mod format_support;
+mod session_support;
 
 use build_support::{bent, built, cube, hilly, linear};
 use format_support::sections;
 use proptest::prelude::*;
+use session_support::requests;
 use tetralod::format::{EncodeOptions, encode};
-use tetralod::geom::Bounds;
 use tetralod::mesh::TetMesh;
 use tetralod::mt::{Mt, MtKind, MultiTessellation};
 use tetralod::refine::Request;
 use tetralod::session::Session;
 use tetralod::verify::{self, Reference};
-
-fn requests() -> [Request; 7] {
-    let uniform = |error| Request { error, ..Request::default() };
-    let roi = Some(Bounds { min: [0.1; 3], max: [0.5; 3] });
-    [
-        uniform(0.05),
-        Request { roi, ..uniform(0.0) },
-        Request { isovalues: vec![0.4], ..uniform(0.01) },
-        uniform(0.0),
-        Request { max_tets: Some(500), ..uniform(0.0) },
-        uniform(0.002),
-        uniform(f64::INFINITY),
-    ]
-}
 
 /// The MT as it was built, and spelled out.
 fn both(mesh: &TetMesh) -> [Mt; 2] {

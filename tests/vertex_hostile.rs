@@ -14,12 +14,12 @@ use conformance_support::How;
 use conformance_support::empty;
 use conformance_support::grow;
 use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 use support::compare::snapshot;
 use support::domains::volume6;
 use support::random::Random;
+use support::strategies::config;
 use tetralod::geom::Bounds;
 use tetralod::geom::Lattice;
 use tetralod::mesh::TetMesh;
@@ -42,11 +42,6 @@ use tetralod::refine::Request;
 use vertex_support::BitString;
 use vertex_support::Node;
 use vertex_support::Parts;
-
-fn config(cases: u32, seed: u64) -> ProptestConfig {
-    let rng_seed = RngSeed::Fixed(seed);
-    ProptestConfig { cases, failure_persistence: None, rng_seed, ..ProptestConfig::default() }
-}
 
 fn small(how: How, mesh: &TetMesh) -> Parts {
     Parts::of(&how.build(mesh, None))

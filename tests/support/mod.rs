@@ -8,3 +8,4 @@ pub mod compare;
 pub mod domains;
 pub mod oracle;
 pub mod random;
+pub mod strategies;
