@@ -94,11 +94,11 @@ fn once(
     let mut session = Session::new();
     session.feed(bytes).map_err(SessionError::Format)?;
     let middle = session.info().map_or(0.0, |info| 0.5 * (info.fields[0].min + info.fields[0].max));
-    let finest = timed(clock, &mut times.refine, || session.refine(&Request::default()))?;
+    let finest = timed(clock, &mut times.refine, || session.refine(&Request::within(0.0)))?;
     // The view follows the mesh at its own cost, which is not that of the surface.
     session.view();
     timed(clock, &mut times.isosurface, || session.isosurface(middle).map(drop))?;
-    let coarsest = Request { error: f64::INFINITY, ..Request::default() };
+    let coarsest = Request::within(f64::INFINITY);
     timed(clock, &mut times.coarsen, || session.refine(&coarsest))?;
     (report.applied, report.tetrahedra) = (finest.applied, finest.tetrahedra);
     Ok(times)

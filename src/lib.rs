@@ -29,12 +29,12 @@
 //! let mut session = Session::new();
 //! let (first, rest) = bytes.split_at(bytes.len() / 2);
 //! session.feed(first)?;
-//! let early = session.refine(&Request { error: 0.01, ..Request::default() })?;
+//! let early = session.refine(&Request::within(0.01))?;
 //! session.feed(rest)?;
 //! session.finish()?;
 //!
 //! // Within 1 % of the field's range at every vertex of the reference mesh.
-//! let stats = session.refine(&Request { error: 0.01, ..Request::default() })?;
+//! let stats = session.refine(&Request::within(0.01))?;
 //! assert!(stats.satisfied && stats.error_bound <= 0.01);
 //! assert!(early.tetrahedra < stats.tetrahedra && stats.tetrahedra < built.summary.tetrahedra);
 //!

@@ -11,13 +11,20 @@ use crate::mt::CurrentMesh;
 use crate::mt::Mt;
 use crate::mt::MtInfo;
 use crate::mt::MultiTessellation;
+use crate::refine::Criterion;
 use crate::refine::Front;
+use crate::refine::GoOn;
 use crate::refine::LodCriterion;
+use crate::refine::Need;
+use crate::refine::Outcome;
+use crate::refine::Part;
 use crate::refine::RefineStats;
 use crate::refine::Request;
+use crate::refine::RequestError;
 use crate::view::IsoSurface;
 use crate::view::MeshView;
 use std::fmt;
+use std::sync::Arc;
 
 pub use crate::format::Progress;
 
@@ -27,15 +34,10 @@ pub use crate::format::Progress;
 pub enum SessionError {
     /// The base mesh has not arrived yet.
     NotReady,
-    /// The MT has no field of this number.
-    Field {
-        /// The number that was asked for.
-        index: usize,
-        /// How many fields there are.
-        fields: usize,
-    },
-    /// A number in the request cannot be used.
-    Request(&'static str),
+    /// The request makes no sense for this MT.
+    Request(RequestError),
+    /// The isovalue is not a finite number.
+    Isovalue,
     /// The MT turned out to be damaged when an update was applied.
     Format(FormatError),
 }
@@ -44,10 +46,8 @@ impl fmt::Display for SessionError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NotReady => f.write_str("the base mesh has not arrived yet; feed more of the file first"),
-            Self::Field { index, fields } => {
-                write!(f, "there is no field number {index}; the MT has {fields}, counted from 0")
-            }
-            Self::Request(what) => f.write_str(what),
+            Self::Request(error) => write!(f, "{error}"),
+            Self::Isovalue => f.write_str("the isovalue must be a finite number"),
             Self::Format(error) => write!(f, "{error}"),
         }
     }
@@ -62,6 +62,8 @@ pub struct Session {
     /// There from the moment the base mesh is.
     front: Option<Front>,
     failed: Option<FormatError>,
+    /// What was asked for last.
+    request: Request,
     /// Which field is shown.
     field: usize,
     shown: Shown,
@@ -152,22 +154,60 @@ impl Session {
     /// # Errors
     /// If the request makes no sense for this MT, or the MT turns out to be damaged.
     pub fn refine(&mut self, request: &Request) -> Result<RefineStats, SessionError> {
+        self.aim(request)?;
+        self.step(&mut |_| true)
+    }
+
+    /// Tells what mesh is wanted from now on, for [`Session::step`] to make it.
+    ///
+    /// # Errors
+    /// If the request makes no sense for this MT; what was wanted before is then wanted still.
+    pub fn aim(&mut self, request: &Request) -> Result<(), SessionError> {
+        self.aim_with(request, &[])
+    }
+
+    /// [`Session::aim`] with criteria of the caller's own beside the needs of `request`: see
+    /// [`Custom`](crate::refine::Custom).
+    ///
+    /// # Errors
+    /// As [`Session::aim`].
+    pub fn aim_with(&mut self, request: &Request, custom: &[Arc<dyn Criterion>]) -> Result<(), SessionError> {
         let (Some(front), Some(mt)) = (&mut self.front, self.decoder.mt()) else {
             return Err(SessionError::NotReady);
         };
-        check_request(request, mt.info())?;
-        let criterion = LodCriterion::new(mt.info(), request);
-        let outcome = front
-            .satisfy(mt, &criterion, request.max_tets)
-            .map_err(|error| SessionError::Format(FormatError::Update(error)))?;
+        request.check(mt.info()).map_err(SessionError::Request)?;
+        let own = LodCriterion::new(mt.info(), request);
+        let criterion = custom.iter().fold(own, |all, one| all.and(Arc::clone(one)));
+        front.aim(mt, Arc::new(criterion), request.budget);
+        self.request.clone_from(request);
+        Ok(())
+    }
+
+    /// Goes on towards the mesh that [`Session::aim`] was told, until it is there or `go_on` says no, which is asked after
+    /// every update. The mesh is valid then and within the budget, whether it is done or not.
+    ///
+    /// # Errors
+    /// If nothing has arrived yet, or the MT turns out to be damaged.
+    pub fn step(&mut self, go_on: GoOn<'_>) -> Result<RefineStats, SessionError> {
+        let (Some(front), Some(mt)) = (&mut self.front, self.decoder.mt()) else {
+            return Err(SessionError::NotReady);
+        };
+        let outcome =
+            front.step(mt, go_on).map_err(|error| SessionError::Format(FormatError::Update(error)))?;
+        let bounds = if outcome.done { bounds(front, mt, &self.request, &outcome) } else { Vec::new() };
         Ok(RefineStats {
             vertices: front.mesh().vertex_count() as u32,
             tetrahedra: front.mesh().tet_count() as u32,
             applied: front.applied_count(),
             refined: outcome.refined,
             coarsened: outcome.coarsened,
+            forced: outcome.forced,
+            judged: outcome.judged,
             error_bound: outcome.error.error(),
+            excess: outcome.excess,
+            bounds,
             satisfied: outcome.satisfied,
+            done: outcome.done,
         })
     }
 
@@ -178,7 +218,7 @@ impl Session {
     pub fn set_field(&mut self, index: usize) -> Result<(), SessionError> {
         let fields = self.info().ok_or(SessionError::NotReady)?.fields.len();
         if index >= fields {
-            return Err(SessionError::Field { index, fields });
+            return Err(SessionError::Request(RequestError::Field { index, fields }));
         }
         self.shown.stale |= self.field != index;
         self.field = index;
@@ -200,7 +240,7 @@ impl Session {
             return Err(SessionError::NotReady);
         }
         if !value.is_finite() {
-            return Err(SessionError::Request("the isovalue must be a finite number"));
+            return Err(SessionError::Isovalue);
         }
         self.catch_up();
         self.surface.extract(&view(self.front.as_ref(), &self.shown), value);
@@ -242,20 +282,20 @@ fn view<'a>(front: Option<&'a Front>, shown: &'a Shown) -> MeshView<'a> {
     MeshView { positions: &shown.positions, field: &shown.values, tets, neighbors }
 }
 
-fn check_request(request: &Request, info: &MtInfo) -> Result<(), SessionError> {
-    let fields = info.fields.len();
-    if request.field >= fields {
-        return Err(SessionError::Field { index: request.field, fields });
-    }
-    if request.error.is_nan() || request.error < 0.0 {
-        return Err(SessionError::Request("the error must be 0 or a positive number"));
-    }
-    if !request.isovalues.iter().all(|value| value.is_finite()) {
-        return Err(SessionError::Request("isovalues must be finite numbers"));
-    }
-    // Written so that NaN is refused; infinite sides are as good as any.
-    if request.roi.is_some_and(|roi| !(0..3).all(|i| roi.min[i] <= roi.max[i])) {
-        return Err(SessionError::Request("every side of the box must be a number, the smaller one first"));
-    }
-    Ok(())
+/// For each need the error that is guaranteed where it counts.
+fn bounds(front: &Front, mt: &Mt, request: &Request, outcome: &Outcome) -> Vec<f64> {
+    let error = outcome.error.error();
+    let bound = |need: &Need| {
+        if outcome.satisfied {
+            let of_field = !matches!(need.part, Part::View(_) | Part::Transfer(_));
+            return if of_field { need.error.min(error) } else { need.error };
+        }
+        let alone = LodCriterion::new(mt.info(), &need.clone().into());
+        let (error, excess) = front.largest_violation(mt, &alone);
+        match need.part {
+            Part::View(_) | Part::Transfer(_) => need.error * excess,
+            _ => error.error(),
+        }
+    };
+    request.needs.iter().map(bound).collect()
 }

@@ -31,12 +31,12 @@ use tetralod::verify::Reference;
 fn refined(mt: &EdgeMt, request: &Request) -> (Front, Outcome) {
     let mut front = Front::new(mt).expect("a valid base mesh");
     let criterion = LodCriterion::new(mt.info(), request);
-    let outcome = front.satisfy(mt, &criterion, request.max_tets).expect("a valid MT");
+    let outcome = front.satisfy(mt, &criterion, request.budget).expect("a valid MT");
     (front, outcome)
 }
 
 fn uniform(error: f64) -> Request {
-    Request { error, ..Request::default() }
+    Request::within(error)
 }
 
 /// Six times the volume on the lattice.
@@ -152,7 +152,7 @@ fn a_larger_budget_is_never_worse() {
     let mut last = f64::INFINITY;
     for part in 0..=20 {
         let budget = least + (all - least) * part / 20;
-        let (front, outcome) = refined(&mt, &Request { max_tets: Some(budget), ..Request::default() });
+        let (front, outcome) = refined(&mt, &Request::within(0.0).at_most(budget));
         assert!(front.mesh().tet_count() <= budget as usize);
         assert!(outcome.error.error() <= last, "{budget}: {} after {last}", outcome.error.error());
         assert_eq!(outcome.satisfied, outcome.error.error() == 0.0);

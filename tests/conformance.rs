@@ -31,9 +31,12 @@ use tetralod::mt::ErrorCode;
 use tetralod::mt::Mt;
 use tetralod::mt::MultiTessellation;
 use tetralod::mt::UpdateId;
+use tetralod::refine::Budget;
 use tetralod::refine::Front;
 use tetralod::refine::LodCriterion;
+use tetralod::refine::Need;
 use tetralod::refine::Outcome;
+use tetralod::refine::Region;
 use tetralod::refine::Request;
 
 macro_rules! conformance {
@@ -138,7 +141,7 @@ impl<'a> Walk<'a> {
         let feasible = subject.explicit.is_feasible(set, id);
         let before = mesh.hash();
         if undo {
-            let looked = mt.look_at_removed(mesh, id, 0, &mut |_, _| false).expect("a valid MT");
+            let looked = mt.look_at_removed(mesh, id, &mut |_, _| false).expect("a valid MT");
             assert_eq!(looked == Applied::Done, feasible);
             assert!(mt.may_coarsen(mesh, id) || !feasible);
         } else {
@@ -290,7 +293,7 @@ fn visit_all(subject: &Subject, first: u32, random: &mut Random) -> usize {
 
 fn satisfy(front: &mut Front, mt: &impl MultiTessellation, request: &Request) -> Outcome {
     let criterion = LodCriterion::new(mt.info(), request);
-    front.satisfy(mt, &criterion, request.max_tets).expect("a valid MT")
+    front.satisfy(mt, &criterion, request.budget).expect("a valid MT")
 }
 
 /// Any request that makes sense for the subject.
@@ -305,12 +308,13 @@ fn random_request(subject: &Subject, random: &mut Random) -> Request {
     let field = (part(0.0, 0.999) * info.fields.len() as f64) as usize;
     let isovalue = info.fields[field].min + part(0.0, 1.0) * info.fields[field].range();
     let budget = (part(0.0, 1.1) * f64::from(info.tetrahedra)) as u32;
+    let error = [0.0, 0.002, 0.02, 0.1, 0.3, f64::INFINITY][random.below(6)];
+    let roi = random.once_in(2).then_some(Region::Box(roi));
+    let isovalues = if random.once_in(2) { vec![isovalue] } else { Vec::new() };
+    let tets = random.once_in(4).then_some(budget);
     Request {
-        error: [0.0, 0.002, 0.02, 0.1, 0.3, f64::INFINITY][random.below(6)],
-        roi: random.once_in(2).then_some(roi),
-        isovalues: if random.once_in(2) { vec![isovalue] } else { Vec::new() },
-        field,
-        max_tets: random.once_in(4).then_some(budget),
+        needs: vec![Need::within(error).limited(roi, field, &isovalues)],
+        budget: Budget { tets, ..Budget::default() },
     }
 }
 
@@ -333,9 +337,9 @@ fn requests(how: How) {
             assert_eq!((alone.error, alone.satisfied), (outcome.error, outcome.satisfied));
             assert_eq!(fresh.mesh().hash(), front.mesh().hash(), "what was asked before shows: {request:?}");
         }
-        satisfy(&mut front, &subject.mt, &Request { error: f64::INFINITY, ..Request::default() });
+        satisfy(&mut front, &subject.mt, &Request::within(f64::INFINITY));
         assert_eq!(front.mesh().hash(), base);
-        satisfy(&mut front, &subject.mt, &Request::default());
+        satisfy(&mut front, &subject.mt, &Request::within(0.0));
         assert_eq!(front.mesh().tet_count(), subject.mt.info().tetrahedra as usize);
         assert_eq!(front.mesh().vertex_count(), subject.mt.info().vertices as usize);
     }
@@ -362,7 +366,7 @@ fn arrivals(how: How) {
             subject.assert_is(&walk.mt, front.mesh(), &set);
         }
         assert_eq!(walk.mt, subject.mt);
-        let outcome = satisfy(&mut front, &walk.mt, &Request::default());
+        let outcome = satisfy(&mut front, &walk.mt, &Request::within(0.0));
         assert!(outcome.satisfied);
         subject.assert_is(&subject.mt, front.mesh(), &vec![true; whole as usize]);
         walk.go_back(&mut random);

@@ -70,13 +70,14 @@ impl<M: MultiTessellation> Walk<M> {
     /// What criteria are shown of the tetrahedra that `u+` removed, in any order.
     fn look(&mut self, u: UpdateId, field: usize) -> Option<Vec<Seen>> {
         let mut seen = Vec::new();
-        let mut look = |corners: &[[i32; 3]; 4], levels: &[i32; 4]| {
+        let mut look = |corners: &[[i32; 3]; 4], levels: &dyn Fn(usize) -> [i32; 4]| {
+            let levels = levels(field);
             let mut both = [0, 1, 2, 3].map(|i| (corners[i], levels[i]));
             both.sort_unstable();
             seen.push((both.map(|(p, _)| p), both.map(|(_, q)| q)));
             false
         };
-        let looked = self.mt.look_at_removed(&mut self.mesh, u, field, &mut look);
+        let looked = self.mt.look_at_removed(&mut self.mesh, u, &mut look);
         seen.sort_unstable();
         (looked.expect("a valid MT") == Applied::Done).then_some(seen)
     }

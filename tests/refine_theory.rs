@@ -25,11 +25,15 @@ use tetralod::mt::ErrorCode;
 use tetralod::mt::ExplicitMt;
 use tetralod::mt::UpdateId;
 use tetralod::mt::VertexId;
+use tetralod::refine::Budget;
 use tetralod::refine::Criterion;
 use tetralod::refine::Front;
 use tetralod::refine::LodCriterion;
+use tetralod::refine::Need;
 use tetralod::refine::Outcome;
+use tetralod::refine::Region;
 use tetralod::refine::Request;
+use tetralod::refine::TetLook;
 
 /// An MT, its input and its oracle.
 struct Subject {
@@ -79,8 +83,9 @@ impl Subject {
         let error = self.explicit.error(u);
         let tet = self.explicit.tets()[t as usize].map(VertexId);
         let corners = tet.map(|v| self.explicit.position(v));
-        let levels = tet.map(|v| self.explicit.levels(v)[criterion.field()]);
-        (error > criterion.tolerance() && criterion.selects(&corners, &levels, error)).then_some(u)
+        let levels = |field: usize| tet.map(|v| self.explicit.levels(v)[field]);
+        let look = TetLook { corners: &corners, levels: &levels, error, update: u };
+        criterion.judge(&look).asks().then_some(u)
     }
 
     fn fresh(&self) -> Front {
@@ -89,7 +94,7 @@ impl Subject {
 
     fn satisfy(&self, front: &mut Front, request: &Request) -> Outcome {
         let criterion = LodCriterion::new(self.mt.info(), request);
-        front.satisfy(&self.mt, &criterion, request.max_tets).expect("a valid MT")
+        front.satisfy(&self.mt, &criterion, request.budget).expect("a valid MT")
     }
 }
 
@@ -139,8 +144,9 @@ impl Wish {
         });
         let value = |part: &f64| info.fields[field].min + part * info.fields[field].range();
         let max_tets = self.budget.map(|part| (part * f64::from(info.tetrahedra)) as u32);
-        let isovalues = self.isovalues.iter().map(value).collect();
-        Request { error: self.error, roi, isovalues, field, max_tets }
+        let isovalues: Vec<f64> = self.isovalues.iter().map(value).collect();
+        let need = Need::within(self.error).limited(roi.map(Region::Box), field, &isovalues);
+        Request { needs: vec![need], budget: Budget { tets: max_tets, ..Budget::default() } }
     }
 }
 
@@ -184,7 +190,7 @@ proptest! {
             let live: BTreeSet<_> = live.iter().map(|&t| sorted(subject.explicit.tets()[t as usize])).collect();
             prop_assert_eq!(tets(front.mesh()), live);
             prop_assert_eq!(front.mesh().check(), Ok(()));
-            prop_assert!(outcome.satisfied && outcome.error.error() <= request.error);
+            prop_assert!(outcome.satisfied && outcome.error.error() <= request.needs[0].error);
             let mut other = subject.fresh();
             subject.satisfy(&mut other, &request);
             prop_assert_eq!(other.mesh().hash(), front.mesh().hash());
@@ -208,12 +214,12 @@ proptest! {
             prop_assert_eq!(applied(&front, &subject.mt), applied(&other, &subject.mt), "{:?}", request);
             prop_assert_eq!((outcome.error, outcome.satisfied), (alone.error, alone.satisfied));
             prop_assert_eq!(front.mesh().check(), Ok(()));
-            prop_assert_eq!(outcome.satisfied, outcome.error.error() <= request.error);
+            prop_assert_eq!(outcome.satisfied, outcome.error.error() <= request.needs[0].error);
             let unlimited = subject.closure(&LodCriterion::new(subject.mt.info(), &request));
             let set = applied(&front, &subject.mt);
             prop_assert!(set.iter().zip(&unlimited).all(|(s, u)| *u || !s), "more than was asked for");
             let needed = subject.explicit.extract(&unlimited).expect("a consistent set").len();
-            match request.max_tets.map(|b| b as usize) {
+            match request.budget.tets.map(|b| b as usize) {
                 Some(budget) if budget < needed => {
                     prop_assert!(front.mesh().tet_count() <= budget.max(least));
                 }
@@ -249,8 +255,8 @@ proptest! {
             // Those that have not arrived are behind the ones that have.
             let missing = whole.iter().skip(updates as usize).any(|&s| s);
             prop_assert!(!(outcome.satisfied && missing), "satisfied with {updates} updates: {request:?}");
-            prop_assert_eq!(outcome.satisfied, outcome.error.error() <= request.error);
-            let everywhere = Request { error: request.error, ..Request::default() };
+            prop_assert_eq!(outcome.satisfied, outcome.error.error() <= request.needs[0].error);
+            let everywhere = Request::within(request.needs[0].error);
             let outcome = part.satisfy(&mut front, &everywhere);
             within_bound(subject, &front, outcome.error);
         }
@@ -285,7 +291,7 @@ fn the_bounds_are_true_and_not_far_off() {
     for subject in SUBJECTS.iter() {
         let mut front = subject.fresh();
         for error in [0.0, 0.0001, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3, f64::INFINITY] {
-            let outcome = subject.satisfy(&mut front, &Request { error, ..Request::default() });
+            let outcome = subject.satisfy(&mut front, &Request::within(error));
             assert!(outcome.satisfied);
             within_bound(subject, &front, outcome.error);
         }
@@ -296,14 +302,14 @@ fn the_bounds_are_true_and_not_far_off() {
 fn a_box_costs_less_than_everything() {
     let subject = &SUBJECTS[0];
     let mut front = subject.fresh();
-    subject.satisfy(&mut front, &Request::default());
+    subject.satisfy(&mut front, &Request::within(0.0));
     let all = front.mesh().tet_count();
     assert_eq!(all, subject.input.tets.len());
-    let roi = Some(Bounds { min: [0.0; 3], max: [0.1; 3] });
-    subject.satisfy(&mut front, &Request { roi, ..Request::default() });
+    let roi = Bounds { min: [0.0; 3], max: [0.1; 3] };
+    subject.satisfy(&mut front, &Need::within(0.0).inside(roi).into());
     let some = front.mesh().tet_count();
     assert!(some < all * 9 / 10, "{some} of {all}");
-    let outside = Some(Bounds { min: [5.0; 3], max: [6.0; 3] });
-    let outcome = subject.satisfy(&mut front, &Request { roi: outside, ..Request::default() });
+    let outside = Bounds { min: [5.0; 3], max: [6.0; 3] };
+    let outcome = subject.satisfy(&mut front, &Need::within(0.0).inside(outside).into());
     assert_eq!((front.applied_count(), outcome.error, outcome.satisfied), (0, ErrorCode::ZERO, true));
 }

@@ -3,7 +3,9 @@
 use tetralod::format::{EncodeOptions, FormatError, encode};
 use tetralod::geom::{Bounds, Lattice};
 use tetralod::mt::{BaseMesh, EdgeMt, ErrorCode, FieldInfo, MtInfo, MtKind, VertexId, VertexSplit};
+use tetralod::refine::Need;
 use tetralod::refine::Request;
+use tetralod::refine::RequestError;
 use tetralod::session::{Session, SessionError};
 
 fn field(name: &str) -> FieldInfo {
@@ -48,7 +50,7 @@ fn opened() -> Session {
 }
 
 fn uniform(error: f64) -> Request {
-    Request { error, ..Request::default() }
+    Request::within(error)
 }
 
 #[test]
@@ -121,7 +123,7 @@ fn surfaces_come_from_the_current_mesh() {
     let fine = session.isosurface(50.0).expect("a value in the range").indices.len();
     assert!(coarse > 0 && fine > 0);
     assert_eq!(session.isosurface(1e9).expect("a value out of the range").indices.len(), 0);
-    assert!(matches!(session.isosurface(f64::NAN), Err(SessionError::Request(_))));
+    assert!(matches!(session.isosurface(f64::NAN), Err(SessionError::Isovalue)));
 }
 
 #[test]
@@ -132,16 +134,19 @@ fn requests_without_sense_are_refused() {
     let requests = [
         uniform(f64::NAN),
         uniform(-0.1),
-        Request { roi: Some(side), ..Request::default() },
-        Request { roi: Some(nan), ..Request::default() },
-        Request { isovalues: vec![f64::INFINITY], ..Request::default() },
+        Need::within(0.0).inside(side).into(),
+        Need::within(0.0).inside(nan).into(),
+        Need::within(0.0).around(0, &[f64::INFINITY]).into(),
     ];
     for request in requests {
         assert!(matches!(session.refine(&request), Err(SessionError::Request(_))), "{request:?}");
     }
-    let field = Request { field: 2, ..Request::default() };
-    assert_eq!(session.refine(&field), Err(SessionError::Field { index: 2, fields: 2 }));
-    assert_eq!(session.set_field(2), Err(SessionError::Field { index: 2, fields: 2 }));
+    let field = Need::within(0.0).around(2, &[0.5]).into();
+    assert_eq!(
+        session.refine(&field),
+        Err(SessionError::Request(RequestError::Field { index: 2, fields: 2 }))
+    );
+    assert_eq!(session.set_field(2), Err(SessionError::Request(RequestError::Field { index: 2, fields: 2 })));
 }
 
 #[test]

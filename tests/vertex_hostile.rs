@@ -36,8 +36,11 @@ use tetralod::mt::MultiTessellation;
 use tetralod::mt::UpdateError;
 use tetralod::mt::UpdateId;
 use tetralod::mt::stats;
+use tetralod::refine::Budget;
 use tetralod::refine::Front;
 use tetralod::refine::LodCriterion;
+use tetralod::refine::Need;
+use tetralod::refine::Region;
 use tetralod::refine::Request;
 use vertex_support::BitString;
 use vertex_support::Node;
@@ -106,7 +109,7 @@ impl<'a> Driver<'a> {
         let before = snapshot(&self.mesh);
         let id = UpdateId(u);
         if !refine {
-            let looked = self.mt.look_at_removed(&mut self.mesh, id, 0, &mut |_, _| false);
+            let looked = self.mt.look_at_removed(&mut self.mesh, id, &mut |_, _| false);
             assert_eq!(snapshot(&self.mesh), before);
             assert!(looked.is_ok() || self.mt.coarsen(&mut self.mesh.clone(), id).is_err());
         }
@@ -160,15 +163,13 @@ fn use_it(mt: &Mt, random: &mut Random) {
     let mut front = Front::new(mt).expect("a valid base mesh");
     let half = Bounds { min: [0.0; 3], max: [0.6; 3] };
     for _ in 0..4 {
-        let request = Request {
-            error: [0.0, 0.05, 0.3][random.below(3)],
-            roi: random.once_in(2).then_some(half),
-            isovalues: if random.once_in(2) { vec![0.3] } else { Vec::new() },
-            field: 0,
-            max_tets: random.once_in(3).then_some(60),
-        };
+        let roi = random.once_in(2).then_some(Region::Box(half));
+        let isovalues = if random.once_in(2) { vec![0.3] } else { Vec::new() };
+        let need = Need::within([0.0, 0.05, 0.3][random.below(3)]).limited(roi, 0, &isovalues);
+        let tets = random.once_in(3).then_some(60);
+        let request = Request { needs: vec![need], budget: Budget { tets, ..Budget::default() } };
         let criterion = LodCriterion::new(mt.info(), &request);
-        let _ = front.satisfy(mt, &criterion, request.max_tets);
+        let _ = front.satisfy(mt, &criterion, request.budget);
         assert_eq!(front.mesh().check(), Ok(()));
     }
 }

@@ -175,7 +175,7 @@ async fn the_renderer_draws_the_isosurface() {
     const SIZE: [u32; 2] = [128, 96];
     let mut session = Session::new();
     session.feed(MT).expect("the fixture is a good file");
-    session.refine(&Request { error: 0.01, ..Request::default() }).expect("a good request");
+    session.refine(&Request::within(0.01)).expect("a good request");
     let mut renderer = Renderer::headless(SIZE).await.expect("WebGPU");
     let camera = Camera::home(&Bounds { min: [0.0; 3], max: [1.0; 3] }, renderer.aspect());
     // The ball is warm, the background cool. Empty space between the atoms at 0.5; nothing at all above the maximum.

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use tetralod::mt::MultiTessellation;
-use tetralod::refine::Request;
+use tetralod::refine::Need;
 
 use crate::chart::Chart;
 use crate::chart::Marker;
@@ -32,7 +32,7 @@ pub struct Curves {
 pub fn curves(data: &DataSet, isovalue: Option<f64>) -> Result<Curves> {
     let isovalues: Vec<f64> = isovalue.into_iter().collect();
     let curve = |model: &Model| -> Result<(Recipe, Vec<u64>)> {
-        let request = |error| Request { error, isovalues: isovalues.clone(), ..Request::default() };
+        let request = |error| Need::within(error).limited(None, 0, &isovalues).into();
         let sizes = FIGURE_8_ERRORS.iter().map(|&e| crate::query::tetrahedra(&model.mt, &request(e)));
         Ok((model.recipe, sizes.collect::<Result<_>>()?))
     };

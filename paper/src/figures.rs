@@ -5,6 +5,8 @@ use anyhow::Result;
 use tetralod::geom::Bounds;
 use tetralod::mt::Mt;
 use tetralod::mt::MultiTessellation;
+use tetralod::refine::Need;
+use tetralod::refine::Region;
 use tetralod::refine::Request;
 use tetralod::view::IsoSurface;
 
@@ -28,18 +30,18 @@ pub struct Pair {
 
 /// Figure 6: fine everywhere, and fine where the field passes the isovalue.
 pub fn around_isovalue(mt: &Mt, error: f64, facets: u64) -> Result<Pair> {
-    let uniform = Shown::of(mt, &Request { error, ..Request::default() })?;
+    let uniform = Shown::of(mt, &Request::within(error))?;
     let isovalue = isovalue_with(mt, &uniform, facets)?;
-    let request = Request { error, isovalues: vec![isovalue], ..Request::default() };
+    let request = Need::within(error).around(0, &[isovalue]).into();
     Ok(Pair { isovalue, roi: None, variable: Shown::of(mt, &request)?, uniform })
 }
 
 /// Figure 7: the reference mesh, and one that is as fine in that octant of the domain that is nearest to whoever looks
 /// at it: right, in front, above.
 pub fn in_an_octant(mt: &Mt, isovalue: f64) -> Result<Pair> {
-    let uniform = Shown::of(mt, &Request::default())?;
+    let uniform = Shown::of(mt, &Request::within(0.0))?;
     let roi = octant(&domain(&uniform));
-    let variable = Shown::of(mt, &Request { roi: Some(roi), ..Request::default() })?;
+    let variable = Shown::of(mt, &Need::within(0.0).inside(roi).into())?;
     Ok(Pair { isovalue, roi: Some(roi), uniform, variable })
 }
 
@@ -81,7 +83,8 @@ pub fn boxes(data: &DataSet) -> Result<Vec<Boxed>> {
         for error in BOX_ERRORS {
             let mut sizes = [0; 3];
             for (size, roi) in sizes.iter_mut().zip(regions) {
-                *size = tetrahedra(&model.mt, &Request { error, roi, ..Request::default() })?;
+                *size =
+                    tetrahedra(&model.mt, &Need::within(error).limited(roi.map(Region::Box), 0, &[]).into())?;
             }
             tets.push(sizes);
         }

@@ -41,7 +41,7 @@ pub fn needs(data: &DataSet) -> Result<Vec<Needs>> {
         eprintln!("  {}: measuring", model.recipe.name());
         let mut found = Vec::new();
         for error in errors() {
-            let front = query::front(&model.mt, &Request { error, ..Request::default() })?;
+            let front = query::front(&model.mt, &Request::within(error))?;
             found.push(Need {
                 error,
                 promised: front.mesh().tet_count() as u64,

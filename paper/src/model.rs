@@ -114,7 +114,7 @@ pub fn load(path: &Path) -> Result<TetMesh> {
 
 /// The reference mesh of an MT. `grid` is that of its points, if they are on one.
 fn finest(mt: &Mt, grid: Option<Grid>) -> Result<TetMesh> {
-    let front = query::front(mt, &Request::default())?;
+    let front = query::front(mt, &Request::within(0.0))?;
     Ok(TetMesh { grid, ..in_model_units(mt.info(), front.mesh()) })
 }
 

@@ -19,8 +19,8 @@ use tetralod::view::MeshView;
 pub fn front(mt: &Mt, request: &Request) -> Result<Front> {
     let mut front = Front::new(mt)?;
     let criterion = LodCriterion::new(mt.info(), request);
-    let outcome = front.satisfy(mt, &criterion, request.max_tets)?;
-    ensure!(outcome.satisfied || request.max_tets.is_some(), "a complete MT satisfies every request");
+    let outcome = front.satisfy(mt, &criterion, request.budget)?;
+    ensure!(outcome.satisfied || !request.budget.is_unlimited(), "a complete MT satisfies every request");
     Ok(front)
 }
 

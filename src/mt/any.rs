@@ -116,10 +116,9 @@ impl MultiTessellation for Mt {
         &self,
         mesh: &mut CurrentMesh,
         u: UpdateId,
-        field: usize,
         look: LookAtTet<'_>,
     ) -> Result<Applied, UpdateError> {
-        each!(self, mt => mt.look_at_removed(mesh, u, field, look))
+        each!(self, mt => mt.look_at_removed(mesh, u, look))
     }
 
     #[inline(never)]

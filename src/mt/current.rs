@@ -62,7 +62,8 @@ pub struct CurrentMesh {
     cavity: Option<Box<Cavity>>,
     changed_vertices: Changes,
     changed_tets: Changes,
-    /// The tetrahedra of the stars that updates changed since the list was last cleared; free slots among them.
+    /// The tetrahedra of the stars that updates changed since the list was last cleared, and where others were moved;
+    /// free slots among them.
     touched: Vec<u32>,
     /// Updates that have been applied before and so need not be checked again: their stars are always the same.
     proven: Vec<u64>,
@@ -336,6 +337,7 @@ impl CurrentMesh {
         self.neighbors[hole as usize] = around;
         self.move_tag(from, hole);
         self.changed_tets.mark(hole);
+        self.touched.push(hole);
         for n in around {
             if n != NONE {
                 self.relink(n, from, hole);
@@ -776,6 +778,22 @@ impl CurrentMesh {
             vertices: self.changed_vertices.take(self.labels.len()),
             tets: self.changed_tets.take(self.tets.len()),
         }
+    }
+
+    /// Bytes that the mesh holds, by capacity.
+    pub fn bytes(&self) -> u64 {
+        let four =
+            [&self.incident, &self.slot_of, &self.tags, &self.place_of, &self.marks, &self.vertex_marks]
+                .iter()
+                .map(|v| v.capacity())
+                .sum::<usize>();
+        let bytes = 4
+            * (four + self.levels.capacity() + self.free_vertices.capacity() + self.free_tets.capacity())
+            + 8 * self.labels.capacity()
+            + 12 * self.positions.capacity()
+            + 16 * (self.tets.capacity() + self.neighbors.capacity())
+            + 8 * self.proven.capacity();
+        bytes as u64
     }
 
     /// A hash of the mesh that depends neither on slots nor on the order of updates: equal sets of tetrahedra with

@@ -713,7 +713,6 @@ impl MultiTessellation for VertexMt {
         &self,
         mesh: &mut CurrentMesh,
         u: UpdateId,
-        field: usize,
         look: LookAtTet<'_>,
     ) -> Result<Applied, UpdateError> {
         let mut cavity = mesh.take_cavity();
@@ -721,7 +720,8 @@ impl MultiTessellation for VertexMt {
         if rebuilt == Ok(Applied::Done) {
             for tet in &cavity.glue.tets[..cavity.glue.len] {
                 let tet = tet.map(|x| cavity.link[x as usize % MAX_AROUND]);
-                if look(&tet.map(|v| mesh.positions[v as usize]), &tet.map(|v| mesh.levels(v)[field])) {
+                let levels = |field: usize| tet.map(|v| mesh.levels(v)[field]);
+                if look(&tet.map(|v| mesh.positions[v as usize]), &levels) {
                     break;
                 }
             }

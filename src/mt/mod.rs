@@ -133,8 +133,8 @@ pub struct MtInfo {
     pub displacement_per_error: f64,
 }
 
-/// A tetrahedron as criteria see it: positions and levels of one field at its corners, on the lattices.
-pub type LookAtTet<'a> = &'a mut dyn FnMut(&[[i32; 3]; 4], &[i32; 4]) -> bool;
+/// Sees a tetrahedron: positions at its corners and, by field, levels there, on the lattices. True ends the show.
+pub type LookAtTet<'a> = &'a mut dyn FnMut(&[[i32; 3]; 4], &dyn Fn(usize) -> [i32; 4]) -> bool;
 
 /// What selective refinement needs of a Multi-Tessellation of any kind [§2.3].
 pub trait MultiTessellation {
@@ -219,7 +219,6 @@ pub trait MultiTessellation {
         &self,
         mesh: &mut CurrentMesh,
         u: UpdateId,
-        field: usize,
         look: LookAtTet<'_>,
     ) -> Result<Applied, UpdateError>;
 

@@ -265,7 +265,6 @@ impl MultiTessellation for ExplicitMt {
         &self,
         mesh: &mut CurrentMesh,
         u: UpdateId,
-        field: usize,
         look: LookAtTet<'_>,
     ) -> Result<Applied, UpdateError> {
         if let Some(child) = self.child_in_the_way(mesh, u)? {
@@ -273,7 +272,8 @@ impl MultiTessellation for ExplicitMt {
         }
         for &t in self.removed(u) {
             let tet = self.tets()[t as usize].map(VertexId);
-            if look(&tet.map(|v| self.position(v)), &tet.map(|v| self.levels(v)[field])) {
+            let levels = |field: usize| tet.map(|v| self.levels(v)[field]);
+            if look(&tet.map(|v| self.position(v)), &levels) {
                 break;
             }
         }

@@ -253,13 +253,11 @@ impl EdgeMt {
         Ok(Ok(slots))
     }
 
-    /// Shows `look` the tetrahedra that `u+` removes, in a mesh that contains `u`: their corners' positions and
-    /// levels of `field`, until it returns true.
+    /// Shows `look` the tetrahedra that `u+` removes, in a mesh that contains `u`, until it returns true.
     pub(super) fn look_at_coarse_star(
         &self,
         mesh: &mut CurrentMesh,
         u: UpdateId,
-        field: usize,
         look: LookAtTet<'_>,
     ) -> Result<Applied, UpdateError> {
         let (mut near, mut far) = (Star::default(), Star::default());
@@ -270,7 +268,6 @@ impl EdgeMt {
         let split = self.split(u);
         let b = mesh.positions[q as usize];
         let position = [0, 1, 2].map(|i| b[i] + (split.offset[i] >> 1));
-        let level = mesh.levels(q)[field] + (split.field_offsets[field] >> 1);
         for (star, centre, other) in [(&near, p, q), (&far, q, p)] {
             for &t in &star.tets[..star.len] {
                 let tet = mesh.tets[t as usize];
@@ -278,7 +275,10 @@ impl EdgeMt {
                     continue;
                 }
                 let corners = tet.map(|v| if v == centre { position } else { mesh.positions[v as usize] });
-                let levels = tet.map(|v| if v == centre { level } else { mesh.levels(v)[field] });
+                let levels = |field: usize| {
+                    let level = mesh.levels(q)[field] + (split.field_offsets[field] >> 1);
+                    tet.map(|v| if v == centre { level } else { mesh.levels(v)[field] })
+                };
                 if look(&corners, &levels) {
                     return Ok(Applied::Done);
                 }
@@ -447,10 +447,9 @@ impl MultiTessellation for EdgeMt {
         &self,
         mesh: &mut CurrentMesh,
         u: UpdateId,
-        field: usize,
         look: LookAtTet<'_>,
     ) -> Result<Applied, UpdateError> {
-        self.look_at_coarse_star(mesh, u, field, look)
+        self.look_at_coarse_star(mesh, u, look)
     }
 
     fn announce(&self, mesh: &mut CurrentMesh, known: u32) {

@@ -1,23 +1,101 @@
-//! Is this tetrahedron fine enough? Pure functions of a tetrahedron and an error.
+//! Is this tetrahedron fine enough? Functions of a tetrahedron and the error that its removal has.
 
+use super::Need;
+use super::Part;
 use super::Request;
-use crate::geom::LatticeBox;
-use crate::geom::tet_meets_box;
+use super::Values;
+use super::camera::Camera;
+use super::palette::Palette;
+use super::shape::Shape;
+use crate::geom::Lattice;
 use crate::mt::ErrorCode;
 use crate::mt::MtInfo;
+use crate::mt::UpdateId;
+use glam::DVec3;
+use std::any::Any;
+use std::fmt;
+use std::sync::Arc;
+
+/// A tetrahedron of the MT as criteria see it.
+#[derive(Clone, Copy)]
+pub struct TetLook<'a> {
+    /// Positions of its corners on the lattice.
+    pub corners: &'a [[i32; 3]; 4],
+    /// Levels of a field at its corners.
+    pub levels: &'a dyn Fn(usize) -> [i32; 4],
+    /// The error of the update that removes it.
+    pub error: ErrorCode,
+    /// That update.
+    pub update: UpdateId,
+}
+
+/// What a criterion says of a tetrahedron.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Verdict {
+    /// How often its error exceeds what is wanted there: above 1 it violates the request and the update that removes it has
+    /// to be applied; the larger, the more urgent under a budget.
+    pub excess: f64,
+    /// How far the criterion may move (see [`Criterion::distance`]) before the tetrahedron can begin or cease to violate it.
+    /// Any smaller number is right as well.
+    pub slack: f64,
+}
+
+impl Verdict {
+    /// What no criterion of the same kind will ever ask for.
+    pub const NEVER: Self = Self { excess: 0.0, slack: f64::INFINITY };
+
+    /// Whether the tetrahedron violates the request.
+    #[inline]
+    pub fn asks(self) -> bool {
+        self.excess > 1.0
+    }
+
+    /// What two criteria say together, of which one violation is enough: that lasts as long as the last one, and begins with
+    /// the first.
+    #[inline]
+    #[must_use]
+    pub fn or(self, other: Self) -> Self {
+        match (self.asks(), other.asks()) {
+            (true, false) => self,
+            (false, true) => other,
+            (asks, _) => Self {
+                excess: self.excess.max(other.excess),
+                slack: if asks { self.slack.max(other.slack) } else { self.slack.min(other.slack) },
+            },
+        }
+    }
+}
 
 /// Says where a mesh is wanted at what error. See [`crate::refine`] for what monotone means.
-pub trait Criterion {
-    /// The largest error that is good enough in the selected part.
-    fn tolerance(&self) -> ErrorCode;
+pub trait Criterion: Any + fmt::Debug + Send + Sync {
+    /// Judges a tetrahedron. The result depends on nothing but `tet` and the criterion.
+    fn judge(&self, tet: &TetLook<'_>) -> Verdict;
 
-    /// Whether a tetrahedron whose removal has this error belongs to the selected part. `levels` are those of
-    /// [`Criterion::field`].
-    fn selects(&self, corners: &[[i32; 3]; 4], levels: &[i32; 4], error: ErrorCode) -> bool;
+    /// [`Criterion::judge`] with an excess that tells how urgent a violation is, so that violations can be compared. Asked
+    /// for under a budget only, since it may cost more.
+    fn rank(&self, tet: &TetLook<'_>) -> Verdict {
+        self.judge(tet)
+    }
 
-    /// Whether everything is selected, so that [`Criterion::selects`] need not be asked.
-    fn is_uniform(&self) -> bool {
+    /// Judges many tetrahedra at once, each as [`Criterion::judge`] would; for criteria that are
+    /// [batched](Criterion::is_batched).
+    fn judge_all(&self, tets: &[TetLook<'_>]) -> Vec<Verdict> {
+        tets.iter().map(|tet| self.judge(tet)).collect()
+    }
+
+    /// Whether many tetrahedra at once are much cheaper to judge than one by one.
+    fn is_batched(&self) -> bool {
         false
+    }
+
+    /// The error asked for everywhere, if nothing else is asked for.
+    fn uniform(&self) -> Option<ErrorCode> {
+        None
+    }
+
+    /// The largest error that can be left anywhere where something is wanted, if that can be told.
+    fn tolerance(&self) -> ErrorCode {
+        ErrorCode::MAX
     }
 
     /// Whether the criterion is monotone. One that is not is answered from the base mesh each time.
@@ -25,87 +103,356 @@ pub trait Criterion {
         true
     }
 
-    /// The field whose levels [`Criterion::selects`] wants to see.
-    fn field(&self) -> usize {
-        0
+    /// How far this criterion is from the one that was in force before, in the unit of [`Verdict::slack`]. Infinity is always
+    /// right, and makes every tetrahedron be judged again.
+    fn distance(&self, before: &dyn Criterion) -> f64 {
+        let _ = before;
+        f64::INFINITY
     }
 }
 
-/// The criterion of a [`Request`]: an error bound, in a box and around isovalues.
+/// The criterion of a [`Request`]: the union of its needs.
 #[derive(Clone, Debug)]
 pub struct LodCriterion {
-    tolerance: ErrorCode,
-    /// The region of interest in lattice units.
-    roi: Option<[[f64; 2]; 3]>,
-    /// Lattice units per unit of error, by which the region is widened: the boundary may be off by that much.
-    roi_margin: [f64; 3],
-    /// Isovalues in levels.
-    isolevels: Vec<f64>,
-    /// Levels per unit of error.
-    level_margin: f64,
-    field: usize,
+    frame: Frame,
+    atoms: Vec<Atom>,
+    custom: Vec<Arc<dyn Criterion>>,
+    monotone: bool,
 }
 
-impl LodCriterion {
-    /// The criterion of `request` for an MT. A field that is not there is the caller's to refuse.
-    pub fn new(info: &MtInfo, request: &Request) -> Self {
-        let lattice = &info.lattice;
-        let field = &info.fields[request.field.min(info.fields.len() - 1)];
-        let to_lattice = |x: f64, axis: usize| (x - lattice.origin[axis]) / lattice.step[axis];
+/// The domain: criteria compute in model units from its middle.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Frame {
+    lattice: Lattice,
+    pub middle: DVec3,
+    /// From the lattice to there.
+    shift: DVec3,
+    step: DVec3,
+    /// No point of a mesh is further from the middle.
+    pub reach: f64,
+    /// The displacement that counts as an error of 1.
+    pub displacement: f64,
+    /// Updates of the MT.
+    updates: f64,
+    /// By how much regions are widened for the first update beyond what its error demands. It falls to 0 for the last one, by
+    /// more than rounding can amount to from one update to the next: parents have smaller numbers than their children, so
+    /// what is asked for is asked for in spite of rounding wherever a child is.
+    guard: f64,
+}
+
+/// Rounding of the functions of shapes is below this part of the domain's size.
+const ROUNDING: f64 = 1.0 / (1_u64 << 44) as f64;
+
+impl Frame {
+    fn new(info: &MtInfo) -> Self {
+        let lattice = info.lattice;
+        let step = DVec3::from(lattice.step);
+        let size = step * f64::from(1_u32 << lattice.bits);
+        let middle = DVec3::from(lattice.origin) + 0.5 * size;
+        let reach = 0.5 * size.length();
+        let updates = f64::from(info.updates.max(1));
         Self {
-            tolerance: ErrorCode::at_most(request.error),
-            roi: request.roi.map(|roi| {
-                [0, 1, 2].map(|i| [to_lattice(roi.min[i], i).floor(), to_lattice(roi.max[i], i).ceil()])
-            }),
-            roi_margin: lattice.step.map(|step| info.displacement_per_error / step),
-            isolevels: request.isovalues.iter().map(|v| (v - field.origin) / field.step).collect(),
-            level_margin: field.range() / field.step,
-            field: request.field,
+            lattice,
+            middle,
+            shift: -0.5 * size,
+            step,
+            reach,
+            displacement: info.displacement_per_error,
+            updates,
+            guard: 4.0 * ROUNDING * updates * reach,
         }
     }
 
-    fn roi_meets(&self, roi: [[f64; 2]; 3], corners: &[[i32; 3]; 4], error: f64) -> bool {
-        // Casts saturate; i32 coordinates are far inside, so a saturated side is as good as an infinite one.
-        let widened = |axis: usize, side: f64| {
-            let margin = (error * self.roi_margin[axis]).ceil();
-            (roi[axis][usize::from(side > 0.0)] + side * margin) as i32
-        };
-        let lattice_box =
-            LatticeBox { min: [0, 1, 2].map(|i| widened(i, -1.0)), max: [0, 1, 2].map(|i| widened(i, 1.0)) };
-        tet_meets_box(corners, &lattice_box)
+    /// Corners in model units, from the middle.
+    #[inline]
+    pub fn place(&self, corners: &[[i32; 3]; 4]) -> [DVec3; 4] {
+        corners.map(|q| {
+            let q = DVec3::new(f64::from(q[0]), f64::from(q[1]), f64::from(q[2]));
+            self.shift + self.step * q
+        })
     }
 
-    fn iso_passes(&self, levels: &[i32; 4], error: f64) -> bool {
-        // Half a level: the reference values themselves were rounded to levels.
-        let margin = error * self.level_margin + 0.5;
-        let low = f64::from(levels.iter().copied().fold(i32::MAX, i32::min)) - margin;
-        let high = f64::from(levels.iter().copied().fold(i32::MIN, i32::max)) + margin;
-        self.isolevels.iter().any(|&iso| low <= iso && iso <= high)
+    /// How far from a region a tetrahedron may be and still count: as far as its error may have displaced it.
+    #[inline]
+    pub fn margin(&self, tet: &TetLook<'_>) -> f64 {
+        tet.error.error() * self.displacement + self.guard * (1.0 - f64::from(tet.update.0) / self.updates)
+    }
+}
+
+/// One need, with what it compares worked out. A need with several ranges of values becomes several atoms.
+#[derive(Clone, Debug)]
+enum Atom {
+    Field(FieldAtom),
+    View { pixels: f64, camera: Camera },
+    Transfer { error: f64, palette: Palette },
+}
+
+/// The error of the field, in a region, around values, or both.
+#[derive(Clone, Debug)]
+struct FieldAtom {
+    tolerance: ErrorCode,
+    shape: Option<Shape>,
+    values: Option<Range>,
+}
+
+/// A range of a field, in levels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Range {
+    field: usize,
+    low: f64,
+    high: f64,
+    /// Levels of the field's whole range: by so much an error of 1 widens the range.
+    levels: f64,
+}
+
+/// The smallest error that a ratio is taken with: below the smallest one that can be stored, so that any error violates an
+/// error of 0.
+const LEAST_ERROR: f64 = 1.0 / (1_u64 << 26) as f64;
+
+/// A scale on which a factor of 2 is a distance of 1, without a logarithm: exact at powers of 2, linear between them.
+/// Distances on it are sums of parts, whatever lies between. `x` is positive and finite.
+pub(super) fn octaves(x: f64) -> f64 {
+    x.to_bits() as f64 / (1_u64 << 52) as f64
+}
+
+impl LodCriterion {
+    /// The criterion of `request` for an MT. A field that is not there is the caller's to refuse, and the budget is another
+    /// matter.
+    pub fn new(info: &MtInfo, request: &Request) -> Self {
+        let frame = Frame::new(info);
+        let monotone = !request.needs.iter().any(|need| matches!(need.part, Part::Both(..)));
+        let atoms = request.needs.iter().flat_map(|need| atoms(info, &frame, need)).collect();
+        Self { frame, atoms, custom: Vec::new(), monotone }
+    }
+
+    /// Adds a need that a criterion of the caller's own tells.
+    #[must_use]
+    pub fn and(mut self, custom: Arc<dyn Criterion>) -> Self {
+        self.monotone &= custom.is_monotone();
+        self.custom.push(custom);
+        self
+    }
+
+    #[inline]
+    fn union(&self, tet: &TetLook<'_>, ranked: bool) -> Verdict {
+        let corners = self.frame.place(tet.corners);
+        let mut union = Verdict::NEVER;
+        for atom in &self.atoms {
+            union = union.or(atom.judge(&self.frame, tet, &corners, ranked));
+        }
+        for custom in &self.custom {
+            union = union.or(if ranked { custom.rank(tet) } else { custom.judge(tet) });
+        }
+        union
+    }
+}
+
+fn atoms(info: &MtInfo, frame: &Frame, need: &Need) -> Vec<Atom> {
+    let tolerance = ErrorCode::at_most(need.error);
+    let field = |shape: Option<Shape>, values| Atom::Field(FieldAtom { tolerance, shape, values });
+    let ranges = |values: &Values| {
+        let field = values.field.min(info.fields.len() - 1);
+        let info = &info.fields[field];
+        let level = move |value: f64| (value - info.origin) / info.step;
+        let levels = info.range() / info.step;
+        let range = move |r: &[f64; 2]| Some(Range { field, low: level(r[0]), high: level(r[1]), levels });
+        values.ranges.iter().map(range).collect::<Vec<_>>()
+    };
+    match &need.part {
+        Part::Everywhere => vec![field(None, None)],
+        Part::Region(region) => vec![field(Some(Shape::new(region, frame.middle)), None)],
+        Part::Values(values) => ranges(values).into_iter().map(|range| field(None, range)).collect(),
+        Part::Both(region, values) => {
+            let shape = Shape::new(region, frame.middle);
+            ranges(values).into_iter().map(|range| field(Some(shape.clone()), range)).collect()
+        }
+        Part::View(view) => vec![Atom::View { pixels: need.error, camera: Camera::new(view, frame) }],
+        Part::Transfer(transfer) => {
+            let field = &info.fields[transfer.field.min(info.fields.len() - 1)];
+            vec![Atom::Transfer { error: need.error, palette: Palette::new(transfer, field) }]
+        }
     }
 }
 
 impl Criterion for LodCriterion {
+    #[inline]
+    fn judge(&self, tet: &TetLook<'_>) -> Verdict {
+        self.union(tet, false)
+    }
+
+    fn rank(&self, tet: &TetLook<'_>) -> Verdict {
+        self.union(tet, true)
+    }
+
+    fn judge_all(&self, tets: &[TetLook<'_>]) -> Vec<Verdict> {
+        let own = |tet: &TetLook<'_>| {
+            let corners = self.frame.place(tet.corners);
+            let atoms = self.atoms.iter().map(|atom| atom.judge(&self.frame, tet, &corners, true));
+            atoms.fold(Verdict::NEVER, Verdict::or)
+        };
+        let mut verdicts: Vec<Verdict> = tets.iter().map(own).collect();
+        for custom in &self.custom {
+            verdicts.iter_mut().zip(custom.judge_all(tets)).for_each(|(all, one)| *all = all.or(one));
+        }
+        verdicts
+    }
+
+    fn is_batched(&self) -> bool {
+        self.custom.iter().any(|custom| custom.is_batched())
+    }
+
+    fn uniform(&self) -> Option<ErrorCode> {
+        let everywhere = |atom: &Atom| match atom {
+            Atom::Field(FieldAtom { tolerance, shape: None, values: None }) => Some(*tolerance),
+            _ => None,
+        };
+        let all: Option<Vec<_>> = self.atoms.iter().map(everywhere).collect();
+        let all = all.filter(|_| self.custom.is_empty())?;
+        Some(all.into_iter().min().unwrap_or(ErrorCode::MAX))
+    }
+
     fn tolerance(&self) -> ErrorCode {
-        self.tolerance
+        let of = |atom: &Atom| if let Atom::Field(atom) = atom { atom.tolerance } else { ErrorCode::MAX };
+        let own = self.atoms.iter().map(of).max().unwrap_or(ErrorCode::ZERO);
+        self.custom.iter().fold(own, |largest, custom| largest.max(custom.tolerance()))
     }
 
-    fn selects(&self, corners: &[[i32; 3]; 4], levels: &[i32; 4], error: ErrorCode) -> bool {
-        let error = error.error();
-        (self.isolevels.is_empty() || self.iso_passes(levels, error))
-            && self.roi.is_none_or(|roi| self.roi_meets(roi, corners, error))
-    }
-
-    fn is_uniform(&self) -> bool {
-        self.roi.is_none() && self.isolevels.is_empty()
-    }
-
-    /// One of the tetrahedra from which another was made meets the box and one passes an isovalue, but it need not
+    /// One of the tetrahedra from which another was made meets the region and one takes a value of the range, but it need not
     /// be the same one.
     fn is_monotone(&self) -> bool {
-        self.roi.is_none() || self.isolevels.is_empty()
+        self.monotone
     }
 
-    fn field(&self) -> usize {
-        self.field
+    fn distance(&self, before: &dyn Criterion) -> f64 {
+        let before: &dyn Any = before;
+        let Some(before) = before.downcast_ref::<Self>() else { return f64::INFINITY };
+        let same = self.frame == before.frame
+            && self.atoms.len() == before.atoms.len()
+            && self.custom.len() == before.custom.len();
+        if !same {
+            return f64::INFINITY;
+        }
+        let pairs = self.atoms.iter().zip(&before.atoms);
+        let own = pairs.map(|(a, b)| a.distance(b, &self.frame));
+        let custom = self.custom.iter().zip(&before.custom);
+        let custom = custom.map(|(a, b)| if Arc::ptr_eq(a, b) { 0.0 } else { a.distance(&**b) });
+        own.chain(custom).fold(0.0, f64::max)
+    }
+}
+
+impl Atom {
+    #[inline]
+    fn judge(&self, frame: &Frame, tet: &TetLook<'_>, corners: &[DVec3; 4], ranked: bool) -> Verdict {
+        match self {
+            Self::Field(atom) => atom.judge(frame, tet, corners),
+            Self::View { pixels, camera } => camera.judge(frame, tet, corners, *pixels, ranked),
+            Self::Transfer { error, palette } => {
+                let change = palette.change(&(tet.levels)(palette.field), tet.error.error());
+                let (change, error) = (change, error.max(LEAST_ERROR));
+                if change <= 0.0 {
+                    return Verdict::NEVER;
+                }
+                Verdict { excess: change / error, slack: (octaves(change) - octaves(error)).abs() }
+            }
+        }
+    }
+
+    fn distance(&self, before: &Self, frame: &Frame) -> f64 {
+        match (self, before) {
+            (Self::Field(a), Self::Field(b)) => a.distance(b, frame),
+            (Self::View { pixels: p, camera: a }, Self::View { pixels: q, camera: b }) => {
+                a.distance(*p, b, *q, frame)
+            }
+            (Self::Transfer { error: e, palette: a }, Self::Transfer { error: f, palette: b }) if a == b => {
+                (octaves(e.max(LEAST_ERROR)) - octaves(f.max(LEAST_ERROR))).abs()
+            }
+            _ => f64::INFINITY,
+        }
+    }
+}
+
+/// Errors have codes that are 2^11 to the octave.
+const CODES_PER_OCTAVE: f64 = 2048.0;
+
+fn octaves_between(a: ErrorCode, b: ErrorCode) -> f64 {
+    f64::from(a.0.abs_diff(b.0)) / CODES_PER_OCTAVE
+}
+
+impl FieldAtom {
+    #[inline]
+    fn judge(&self, frame: &Frame, tet: &TetLook<'_>, corners: &[DVec3; 4]) -> Verdict {
+        let exceeds = tet.error > self.tolerance;
+        let mut conditions = Conditions::new();
+        conditions.add(exceeds, octaves_between(tet.error, self.tolerance));
+        if let Some(range) = &self.values {
+            let inside = range.inside(&(tet.levels)(range.field), tet.error.error());
+            conditions.add(inside >= 0.0, inside.abs() / range.levels);
+        }
+        // The dearest comes last, and only where it can matter.
+        if let Some(shape) = &self.shape {
+            let margin = frame.margin(tet);
+            let outside = shape.least(corners, margin);
+            conditions.add(outside <= margin, (outside - margin).abs() / frame.reach);
+        }
+        if !conditions.all {
+            return Verdict { excess: 0.0, slack: conditions.missing };
+        }
+        let excess = tet.error.error() / self.tolerance.error().max(LEAST_ERROR);
+        Verdict { excess, slack: conditions.held }
+    }
+
+    fn distance(&self, before: &Self, frame: &Frame) -> f64 {
+        let errors = octaves_between(self.tolerance, before.tolerance);
+        let shapes = match (&self.shape, &before.shape) {
+            (None, None) => 0.0,
+            (Some(a), Some(b)) => a.difference(b, frame.reach) / frame.reach,
+            _ => f64::INFINITY,
+        };
+        let values = match (&self.values, &before.values) {
+            (None, None) => 0.0,
+            (Some(a), Some(b)) if (a.field, a.levels) == (b.field, b.levels) => {
+                (a.low - b.low).abs().max((a.high - b.high).abs()) / a.levels
+            }
+            _ => f64::INFINITY,
+        };
+        // Sides at the same infinity differ by NaN, which `max` passes over.
+        errors.max(shapes).max(values)
+    }
+}
+
+/// Conditions that must all hold: how long that lasts, or how long until it can be.
+struct Conditions {
+    all: bool,
+    /// The least that any one which holds can lose.
+    held: f64,
+    /// The most that any one which does not hold lacks.
+    missing: f64,
+}
+
+impl Conditions {
+    fn new() -> Self {
+        Self { all: true, held: f64::INFINITY, missing: 0.0 }
+    }
+
+    #[inline]
+    fn add(&mut self, holds: bool, slack: f64) {
+        if holds {
+            self.held = self.held.min(slack);
+        } else {
+            self.all = false;
+            self.missing = self.missing.max(slack);
+        }
+    }
+}
+
+impl Range {
+    /// By how many levels the values of a tetrahedron reach into the range, widened by the error; negative if they do not.
+    #[inline]
+    fn inside(&self, levels: &[i32; 4], error: f64) -> f64 {
+        // Half a level: the reference values themselves were rounded to levels.
+        let margin = error * self.levels + 0.5;
+        let low = f64::from(levels[0].min(levels[1]).min(levels[2].min(levels[3])));
+        let high = f64::from(levels[0].max(levels[1]).max(levels[2].max(levels[3])));
+        margin - (low - self.high).max(self.low - high)
     }
 }

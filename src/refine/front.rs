@@ -1,6 +1,11 @@
 //! The front: which updates are applied, and how it moves when the request changes.
 
+use super::Budget;
 use super::Criterion;
+use super::TetLook;
+use super::Verdict;
+use super::ranked::Ranked;
+use super::watch::Waiting;
 use crate::mt::Applied;
 use crate::mt::BaseMeshError;
 use crate::mt::CurrentMesh;
@@ -8,41 +13,77 @@ use crate::mt::ErrorCode;
 use crate::mt::MultiTessellation;
 use crate::mt::UpdateError;
 use crate::mt::UpdateId;
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use std::sync::Arc;
 
 /// A consistent set of updates and its current mesh.
 ///
-/// [`Front::satisfy`] moves it to the set that a criterion asks for; what comes out is the same as from the base
-/// mesh, whatever was asked for before.
+/// [`Front::aim`] tells it what is wanted and [`Front::step`] brings it there, all at once or little by little;
+/// [`Front::satisfy`] does both. What comes out is the same as from the base mesh, whatever was asked for before. What it
+/// costs grows with the difference between the meshes, not with their size, as long as the request changes by little.
 #[derive(Clone, Debug)]
 pub struct Front {
-    mesh: CurrentMesh,
+    pub(super) mesh: CurrentMesh,
     applied: Vec<u64>,
     applied_count: u32,
     /// How many updates of the MT the mesh knows of.
     known: u32,
+    goal: Option<Goal>,
+    /// How far criteria have moved in all.
+    now: f64,
+    /// Whether `tets` and `leaves` account for the whole mesh.
+    watched: bool,
+    /// Tetrahedra that do not violate the criterion, by when they may.
+    pub(super) tets: Waiting,
+    /// Applied updates without applied children, by when nothing may ask for them any more; others that have got children
+    /// since among them.
+    pub(super) leaves: Waiting,
+    /// Updates that tetrahedra ask for, the first one last, each with the tetrahedron and for how long that asks.
+    pending: Vec<Asked>,
+    /// Tetrahedra whose update may not have arrived yet.
+    unknown: Vec<u32>,
+    pub(super) ranked: Ranked,
 }
 
-/// What [`Front::satisfy`] did.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug)]
+struct Goal {
+    criterion: Arc<dyn Criterion>,
+    budget: Budget,
+    /// Whether the front is there, as far as the MT is known.
+    reached: bool,
+    /// The answer, once it is.
+    outcome: Outcome,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Asked {
+    update: UpdateId,
+    tet: u32,
+    slack: f64,
+}
+
+/// What has been done on the way to a goal, and how good the mesh is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Outcome {
     /// Updates applied on the way.
     pub refined: u64,
+    /// Those of them that nothing asked for when they were applied, but an update that depends on them.
+    pub forced: u64,
     /// Updates undone on the way.
     pub coarsened: u64,
-    /// The largest error left in the selected part.
+    /// Tetrahedra and updates that were judged on the way.
+    pub judged: u64,
+    /// Whether the front is where it was to go, as far as budget and data allow. The rest means something only then.
+    pub done: bool,
+    /// The largest error left in the selected part; [`ErrorCode::MAX`] where the criterion does not measure it so.
     pub error: ErrorCode,
-    /// Whether that is within what was asked for; false when the budget did not allow it, or data is missing.
+    /// How often the error exceeds what is wanted, at most; not above 1 if the request is satisfied.
+    pub excess: f64,
+    /// Whether the mesh is what was asked for; false when the budget did not allow it, or data is missing.
     pub satisfied: bool,
 }
 
-/// The importance of an update: larger errors first, ties coarse to fine. Parents rank before their children.
-type Rank = (ErrorCode, Reverse<UpdateId>);
-
-fn rank(mt: &impl MultiTessellation, u: UpdateId) -> Rank {
-    (mt.error(u), Reverse(u))
-}
+/// A bound on what [`Front::step`] does: told of what has been done so far, says whether to go on.
+pub type GoOn<'a> = &'a mut dyn FnMut(&Outcome) -> bool;
 
 impl Front {
     /// The base mesh of `mt`: no update applied.
@@ -50,11 +91,23 @@ impl Front {
     /// # Errors
     /// If the base mesh is not a valid mesh, or does not fit its description.
     pub fn new(mt: &impl MultiTessellation) -> Result<Self, BaseMeshError> {
-        let mesh = mt.start()?;
-        Ok(Self { mesh, applied: Vec::new(), applied_count: 0, known: 0 })
+        Ok(Self {
+            mesh: mt.start()?,
+            applied: Vec::new(),
+            applied_count: 0,
+            known: 0,
+            goal: None,
+            now: 0.0,
+            watched: false,
+            tets: Waiting::default(),
+            leaves: Waiting::default(),
+            pending: Vec::new(),
+            unknown: Vec::new(),
+            ranked: Ranked::default(),
+        })
     }
 
-    /// The current mesh; packed after [`Front::satisfy`].
+    /// The current mesh; packed.
     pub fn mesh(&self) -> &CurrentMesh {
         &self.mesh
     }
@@ -75,50 +128,159 @@ impl Front {
         self.applied.get(u.0 as usize / 64).is_some_and(|w| w >> (u.0 % 64) & 1 == 1)
     }
 
-    /// Moves to the smallest consistent set that satisfies `criterion`; with a `budget` of tetrahedra, to the one
-    /// of the smallest error threshold that fits, but never below the base mesh.
+    /// Bytes of the queues that say what has to be judged again, and of the set of applied updates. The mesh itself holds
+    /// [`CurrentMesh::bytes`].
+    pub fn queue_bytes(&self) -> u64 {
+        let own = 8 * self.applied.capacity()
+            + size_of::<Asked>() * self.pending.capacity()
+            + 4 * self.unknown.capacity();
+        own as u64 + self.tets.bytes() + self.leaves.bytes() + self.ranked.bytes()
+    }
+
+    /// Moves to the smallest consistent set that satisfies `criterion`; with a budget, to the one of the smallest excess that
+    /// fits, but never below the base mesh.
     ///
     /// # Errors
     /// If the MT turns out to be damaged. The mesh is then valid still, but no answer to the request.
     pub fn satisfy(
         &mut self,
         mt: &impl MultiTessellation,
-        criterion: &impl Criterion,
-        budget: Option<u32>,
+        criterion: &(impl Criterion + Clone),
+        budget: Budget,
     ) -> Result<Outcome, UpdateError> {
+        self.aim(mt, Arc::new(criterion.clone()), budget);
+        self.step(mt, &mut |_| true)
+    }
+
+    /// Tells what is wanted from now on. Nothing moves before [`Front::step`].
+    pub fn aim(&mut self, mt: &impl MultiTessellation, criterion: Arc<dyn Criterion>, budget: Budget) {
+        let before = self.goal.take();
+        let distance = before.as_ref().map_or(f64::INFINITY, |goal| criterion.distance(&*goal.criterion));
+        let same = distance == 0.0 && before.as_ref().is_some_and(|goal| goal.budget == budget);
+        match before {
+            Some(goal) if same => self.goal = Some(goal),
+            _ => {
+                let outcome = Outcome::default();
+                self.goal = Some(Goal { criterion, budget, reached: false, outcome });
+                self.move_watch(distance);
+                self.ranked.clear();
+            }
+        }
+        self.learn(mt);
+    }
+
+    /// The criterion has moved: verdicts whose slack is used up are void.
+    fn move_watch(&mut self, distance: f64) {
+        // Those judged for the last goal only.
+        for asked in std::mem::take(&mut self.pending) {
+            self.tets.open(asked.tet);
+        }
+        let next = self.now + distance;
+        let monotone = self.goal.as_ref().is_none_or(|goal| goal.criterion.is_monotone());
+        if self.watched && monotone && next.is_finite() {
+            self.tets.advance(self.now, next);
+            self.leaves.advance(self.now, next);
+            self.now = next;
+        } else {
+            self.forget_watch();
+        }
+    }
+
+    pub(super) fn forget_watch(&mut self) {
+        self.watched = false;
+        self.tets.clear();
+        self.leaves.clear();
+        self.pending.clear();
+        self.unknown.clear();
+    }
+
+    /// Takes note of updates that have arrived.
+    fn learn(&mut self, mt: &impl MultiTessellation) {
+        if mt.updates() == self.known && !self.applied.is_empty() {
+            return;
+        }
         mt.announce(&mut self.mesh, self.known);
         self.known = mt.updates();
-        self.applied.resize(self.known.div_ceil(64) as usize, 0);
-        let mut outcome = Outcome::default();
-        let moved = self.move_to(mt, criterion, budget, &mut outcome);
-        self.mesh.compact();
-        moved?;
-        outcome.error = self.largest_error(mt, criterion);
-        outcome.satisfied = outcome.error <= criterion.tolerance();
+        self.applied.resize(self.known.div_ceil(64).max(1) as usize, 0);
+        for t in std::mem::take(&mut self.unknown) {
+            self.tets.open(t);
+        }
+        self.ranked.clear();
+        if let Some(goal) = &mut self.goal {
+            goal.reached = false;
+        }
+    }
+
+    /// Goes on towards what [`Front::aim`] was told, until it is reached or `go_on` says no; that is asked after every update
+    /// with those that it depends on. Without a goal nothing happens. The mesh is packed and within the budget afterwards.
+    ///
+    /// What is reached does not depend on the steps. On the way there the mesh is refined first, the coarsest parts before
+    /// the others, and coarsened then; under a budget the other way round.
+    ///
+    /// # Errors
+    /// As [`Front::satisfy`].
+    pub fn step(&mut self, mt: &impl MultiTessellation, go_on: GoOn<'_>) -> Result<Outcome, UpdateError> {
+        self.learn(mt);
+        let Some(mut goal) = self.goal.take() else { return Ok(Outcome::default()) };
+        // What was done for an earlier call does not count again.
+        let answer = Outcome { refined: 0, forced: 0, coarsened: 0, judged: 0, ..goal.outcome };
+        goal.outcome = if goal.reached { answer } else { Outcome::default() };
+        if !goal.reached {
+            let moved = self.go(mt, &mut goal, go_on);
+            self.pack();
+            if let Err(error) = moved {
+                // Where this leaves the front nobody knows: the next goal starts from a look at everything.
+                self.forget_watch();
+                self.ranked.clear();
+                return Err(error);
+            }
+            if goal.reached {
+                self.report(mt, &mut goal);
+            }
+        }
+        let outcome = goal.outcome;
+        self.goal = Some(goal);
         Ok(outcome)
     }
 
-    fn move_to(
+    /// Fills the holes of the mesh; what moves is judged again where it is then.
+    fn pack(&mut self) {
+        self.mesh.clear_touched();
+        self.mesh.compact();
+        self.ranked.note_moved(self.mesh.touched());
+        self.open_touched();
+    }
+
+    /// Whether the goal is reached is noted in it.
+    fn go(
         &mut self,
         mt: &impl MultiTessellation,
-        criterion: &impl Criterion,
-        budget: Option<u32>,
-        outcome: &mut Outcome,
+        goal: &mut Goal,
+        go_on: GoOn<'_>,
     ) -> Result<(), UpdateError> {
+        let Goal { criterion, budget, outcome, .. } = goal;
         // Where updates may make the mesh smaller, several thresholds fit a budget with larger ones between them: only
         // from the base mesh is the first one found for sure.
-        if !criterion.is_monotone() || budget.is_some() && !mt.always_grows() {
+        let restarts = !criterion.is_monotone() || !budget.is_unlimited() && !mt.always_grows();
+        if restarts && !self.watched && !self.ranked.is_running() {
             self.coarsen_all(mt, outcome)?;
         }
-        match budget {
-            Some(budget) => Budgeted::new(self, mt, criterion, outcome).run(budget as usize),
-            None if criterion.is_uniform() => self.satisfy_uniform(mt, criterion.tolerance(), outcome),
-            None => self.satisfy_selective(mt, criterion, outcome),
-        }
+        let uniform = criterion.uniform().filter(|_| budget.is_unlimited());
+        let done = match uniform {
+            Some(tolerance) => {
+                self.forget_watch();
+                self.satisfy_uniform(mt, tolerance, outcome, go_on)?
+            }
+            None if budget.is_unlimited() => self.converge(mt, &**criterion, outcome, go_on)?,
+            None => self.ranked_converge(mt, &**criterion, *budget, outcome, go_on)?,
+        };
+        goal.reached = done;
+        Ok(())
     }
 
     /// Back to the base mesh: children have larger numbers than their parents.
     fn coarsen_all(&mut self, mt: &impl MultiTessellation, outcome: &mut Outcome) -> Result<(), UpdateError> {
+        self.forget_watch();
         for u in (0..self.known).rev().map(UpdateId) {
             if self.contains(u) {
                 self.coarsen(mt, u, outcome)?;
@@ -134,110 +296,226 @@ impl Front {
         mt: &impl MultiTessellation,
         tolerance: ErrorCode,
         outcome: &mut Outcome,
-    ) -> Result<(), UpdateError> {
+        go_on: GoOn<'_>,
+    ) -> Result<bool, UpdateError> {
         for u in (0..self.known).rev().map(UpdateId) {
             if mt.error(u) <= tolerance && self.contains(u) {
                 self.coarsen(mt, u, outcome)?;
                 self.mesh.clear_touched();
+                if !go_on(outcome) {
+                    return Ok(false);
+                }
             }
         }
         for u in (0..self.known).map(UpdateId) {
             if mt.error(u) > tolerance && !self.contains(u) {
                 self.refine(mt, u, outcome)?;
                 self.mesh.clear_touched();
+                if !go_on(outcome) {
+                    return Ok(false);
+                }
             }
         }
-        Ok(())
+        Ok(true)
     }
 
-    fn satisfy_selective(
+    /// Refines until no tetrahedron violates the criterion, then undoes what nothing asks for.
+    fn converge(
         &mut self,
         mt: &impl MultiTessellation,
-        criterion: &impl Criterion,
+        criterion: &dyn Criterion,
         outcome: &mut Outcome,
-    ) -> Result<(), UpdateError> {
-        self.coarsen_unneeded(mt, criterion, outcome, |_| {})?;
-        let mut open: Vec<u32> = (0..self.mesh.tet_slots() as u32).rev().collect();
-        while let Some(t) = open.pop() {
-            if let Some(u) = self.violation(mt, criterion, t) {
-                self.force(mt, u, outcome, |_| {})?;
-                open.extend(self.mesh.touched());
-                self.mesh.clear_touched();
+        go_on: GoOn<'_>,
+    ) -> Result<bool, UpdateError> {
+        self.watch_all(mt);
+        loop {
+            while let Some(asked) = self.next_asked(mt, criterion, outcome) {
+                if self.contains(asked.update) {
+                    continue;
+                }
+                self.force(mt, asked.update, outcome)?;
+                // It is a leaf now; those that it forced are none.
+                self.leaves.defer(asked.update.0, asked.slack);
+                self.open_touched();
+                if !go_on(outcome) {
+                    return Ok(false);
+                }
+            }
+            let Some(u) = self.leaves.next().map(UpdateId) else { return Ok(true) };
+            if self.coarsen_unless_needed(mt, criterion, u, outcome)? && !go_on(outcome) {
+                return Ok(false);
             }
         }
-        Ok(())
     }
 
-    /// Undoes all applied updates that nothing asks for. `kept` is told of those that are asked for themselves and
-    /// have no child applied. Children have larger numbers, so one pass downwards is enough.
-    fn coarsen_unneeded(
+    /// Makes sure that everything is either judged or going to be.
+    fn watch_all(&mut self, mt: &impl MultiTessellation) {
+        if self.watched {
+            return;
+        }
+        self.forget_watch();
+        for t in 0..self.mesh.tet_slots() as u32 {
+            self.tets.open(t);
+        }
+        for u in (0..self.known).map(UpdateId) {
+            if self.contains(u) && mt.may_coarsen(&self.mesh, u) {
+                self.leaves.open(u.0);
+            }
+        }
+        self.watched = true;
+    }
+
+    /// The next update that a tetrahedron asks for. All open tetrahedra are judged before the first one is forced, so that
+    /// those which several updates change are judged once.
+    fn next_asked(
         &mut self,
         mt: &impl MultiTessellation,
-        criterion: &impl Criterion,
+        criterion: &dyn Criterion,
         outcome: &mut Outcome,
-        mut kept: impl FnMut(UpdateId),
-    ) -> Result<(), UpdateError> {
-        for u in (0..self.known).rev().map(UpdateId) {
-            if !self.contains(u) || !mt.may_coarsen(&self.mesh, u) {
+    ) -> Option<Asked> {
+        if self.pending.is_empty() && !self.tets.is_settled() {
+            if criterion.is_batched() {
+                self.judge_batch(mt, criterion, outcome);
+            } else {
+                while let Some(t) = self.tets.next() {
+                    self.judge_open(mt, criterion, t, outcome);
+                }
+            }
+            // Parents have smaller numbers: in this order few updates are forced by others that wait too.
+            self.pending.sort_unstable_by(|a, b| b.update.cmp(&a.update));
+        }
+        self.pending.pop()
+    }
+
+    fn judge_open(
+        &mut self,
+        mt: &impl MultiTessellation,
+        criterion: &dyn Criterion,
+        t: u32,
+        outcome: &mut Outcome,
+    ) {
+        let Some(tet) = self.mesh.tet(t) else { return };
+        let Some(update) = mt.remover(&self.mesh, t) else {
+            if self.known < mt.info().updates {
+                self.unknown.push(t);
+            }
+            return;
+        };
+        let error = mt.error(update);
+        let verdict = see(&self.mesh, &tet, error, update, |look| criterion.judge(look));
+        outcome.judged += 1;
+        self.take_verdict(t, update, verdict);
+    }
+
+    fn take_verdict(&mut self, tet: u32, update: UpdateId, verdict: Verdict) {
+        if verdict.asks() {
+            self.pending.push(Asked { update, tet, slack: verdict.slack });
+        } else {
+            self.tets.defer(tet, verdict.slack);
+        }
+    }
+
+    fn judge_batch(&mut self, mt: &impl MultiTessellation, criterion: &dyn Criterion, outcome: &mut Outcome) {
+        let mut open = Vec::new();
+        while let Some(t) = self.tets.next() {
+            let Some(tet) = self.mesh.tet(t) else { continue };
+            match mt.remover(&self.mesh, t) {
+                Some(u) => open.push((t, u, tet.map(|v| self.mesh.positions[v as usize]), tet)),
+                None => self.unknown.push(t),
+            }
+        }
+        let mesh = &self.mesh;
+        let levels: Vec<_> =
+            open.iter().map(|&(.., tet)| move |f: usize| tet.map(|v| mesh.levels(v)[f])).collect();
+        let mut looks = Vec::with_capacity(open.len());
+        for ((_, update, corners, _), levels) in open.iter().zip(&levels) {
+            looks.push(TetLook { corners, levels, error: mt.error(*update), update: *update });
+        }
+        let verdicts = criterion.judge_all(&looks);
+        outcome.judged += looks.len() as u64;
+        let taken: Vec<_> = open.iter().zip(verdicts).map(|(&(t, u, ..), verdict)| (t, u, verdict)).collect();
+        for (t, u, verdict) in taken {
+            self.take_verdict(t, u, verdict);
+        }
+    }
+
+    /// Undoes an update that nothing asks for and none depends on; tells whether it did.
+    fn coarsen_unless_needed(
+        &mut self,
+        mt: &impl MultiTessellation,
+        criterion: &dyn Criterion,
+        u: UpdateId,
+        outcome: &mut Outcome,
+    ) -> Result<bool, UpdateError> {
+        if !self.contains(u) || !mt.may_coarsen(&self.mesh, u) {
+            return Ok(false);
+        }
+        outcome.judged += 1;
+        match self.need(mt, criterion, u, false)? {
+            // It is looked at again when the child that is in the way is undone.
+            None => Ok(false),
+            Some(verdict) if verdict.asks() => {
+                self.leaves.defer(u.0, verdict.slack);
+                Ok(false)
+            }
+            Some(_) => {
+                self.coarsen(mt, u, outcome)?;
+                self.open_parents(mt);
+                self.open_touched();
+                Ok(true)
+            }
+        }
+    }
+
+    /// The updates that created the tetrahedra which have come back may have no children any more.
+    fn open_parents(&mut self, mt: &impl MultiTessellation) {
+        for i in 0..self.mesh.touched().len() {
+            let t = self.mesh.touched()[i];
+            if self.mesh.tet(t).is_none() {
                 continue;
             }
-            match self.need(mt, criterion, u)? {
-                Need::Asked => kept(u),
-                Need::Blocked => {}
-                Need::Nothing => self.coarsen(mt, u, outcome)?,
+            if let Some(parent) = mt.creator(&self.mesh, t) {
+                self.leaves.open(parent.0);
             }
-            self.mesh.clear_touched();
         }
-        Ok(())
     }
 
-    /// The update that has to remove tetrahedron `t`, if it violates the criterion.
-    #[inline]
-    fn violation(&self, mt: &impl MultiTessellation, criterion: &impl Criterion, t: u32) -> Option<UpdateId> {
-        let tet = self.mesh.tet(t)?;
-        let u = mt.remover(&self.mesh, t)?;
-        let error = mt.error(u);
-        (error > criterion.tolerance() && self.selects(criterion, &tet, error)).then_some(u)
-    }
-
-    #[inline]
-    fn selects(&self, criterion: &impl Criterion, tet: &[u32; 4], error: ErrorCode) -> bool {
-        if criterion.is_uniform() {
-            return true;
+    fn open_touched(&mut self) {
+        if self.watched {
+            for i in 0..self.mesh.touched().len() {
+                self.tets.open(self.mesh.touched()[i]);
+            }
         }
-        let corners = tet.map(|v| self.mesh.positions()[v as usize]);
-        let levels = tet.map(|v| self.mesh.levels(v)[criterion.field()]);
-        criterion.selects(&corners, &levels, error)
+        self.mesh.clear_touched();
     }
 
-    /// What an applied update is there for.
-    fn need(
+    /// What the criterion says of the tetrahedra that an applied update removed, taken together: it is there for its own
+    /// sake if one of them asks for it. None if a child is in the way.
+    pub(super) fn need(
         &mut self,
         mt: &impl MultiTessellation,
-        criterion: &impl Criterion,
+        criterion: &dyn Criterion,
         u: UpdateId,
-    ) -> Result<Need, UpdateError> {
+        ranked: bool,
+    ) -> Result<Option<Verdict>, UpdateError> {
         let error = mt.error(u);
-        let mut asked = false;
-        let mut look = |corners: &[[i32; 3]; 4], levels: &[i32; 4]| {
-            asked = error > criterion.tolerance()
-                && (criterion.is_uniform() || criterion.selects(corners, levels, error));
-            asked
+        let mut all = Verdict { excess: 0.0, slack: f64::INFINITY };
+        let mut look = |corners: &[[i32; 3]; 4], levels: &dyn Fn(usize) -> [i32; 4]| {
+            let look = TetLook { corners, levels, error, update: u };
+            let one = if ranked { criterion.rank(&look) } else { criterion.judge(&look) };
+            all = all.or(one);
+            false
         };
-        Ok(match mt.look_at_removed(&mut self.mesh, u, criterion.field(), &mut look)? {
-            Applied::Blocked(_) => Need::Blocked,
-            Applied::Done if asked => Need::Asked,
-            Applied::Done => Need::Nothing,
-        })
+        let looked = mt.look_at_removed(&mut self.mesh, u, &mut look)?;
+        Ok((looked == Applied::Done).then_some(all))
     }
 
-    /// Applies `u` and all that it depends on, telling `done` of each in turn.
-    fn force(
+    /// Applies `u` and all that it depends on.
+    pub(super) fn force(
         &mut self,
         mt: &impl MultiTessellation,
         u: UpdateId,
         outcome: &mut Outcome,
-        mut done: impl FnMut(UpdateId),
     ) -> Result<(), UpdateError> {
         let mut stack = vec![u];
         while let Some(&top) = stack.last() {
@@ -245,8 +523,8 @@ impl Front {
                 Applied::Done => {
                     self.note(top, true);
                     outcome.refined += 1;
-                    done(top);
                     stack.pop();
+                    outcome.forced += u64::from(!stack.is_empty());
                 }
                 // Numbers fall from child to parent, so this ends.
                 Applied::Blocked(parent) if parent < top => stack.push(parent),
@@ -274,7 +552,7 @@ impl Front {
 
     /// Undoes `u`, none of whose children is applied.
     #[inline]
-    fn coarsen(
+    pub(super) fn coarsen(
         &mut self,
         mt: &impl MultiTessellation,
         u: UpdateId,
@@ -300,138 +578,73 @@ impl Front {
         }
     }
 
-    /// The largest error among the selected tetrahedra. Those whose update has not arrived yet have at most the
-    /// error of the last one that has: errors never grow from one update to the next.
-    fn largest_error(&self, mt: &impl MultiTessellation, criterion: &impl Criterion) -> ErrorCode {
-        let to_come = match mt.updates() {
+    /// Works out how good the mesh is, which is packed.
+    fn report(&self, mt: &impl MultiTessellation, goal: &mut Goal) {
+        let complete = self.known >= mt.info().updates;
+        let satisfied = goal.budget.is_unlimited() || self.ranked.is_satisfied();
+        let criterion = &*goal.criterion;
+        let (error, excess) = if complete && satisfied {
+            (criterion.tolerance().min(self.largest_to_come(mt)), 1.0)
+        } else {
+            self.largest_violation(mt, criterion)
+        };
+        let satisfied = excess <= 1.0;
+        let error = if satisfied { error.max(ErrorCode::ZERO).min(criterion.tolerance()) } else { error };
+        goal.outcome = Outcome { done: true, error, excess, satisfied, ..goal.outcome };
+    }
+
+    /// No update that is not applied has a larger error: errors fall with the numbers.
+    fn largest_to_come(&self, mt: &impl MultiTessellation) -> ErrorCode {
+        let gap = self.applied.iter().position(|&word| word != u64::MAX);
+        let first = gap.map_or(self.known, |word| (word as u32) * 64 + self.applied[word].trailing_ones());
+        if first < self.known { mt.error(UpdateId(first)) } else { self.to_come(mt) }
+    }
+
+    /// What updates that have not arrived can have for errors: those never grow from one update to the next.
+    fn to_come(&self, mt: &impl MultiTessellation) -> ErrorCode {
+        match self.known {
             n if n >= mt.info().updates => ErrorCode::ZERO,
             0 => ErrorCode::MAX,
             n => mt.error(UpdateId(n - 1)),
-        };
-        let mut largest = ErrorCode::ZERO;
+        }
+    }
+
+    /// The largest error and the largest excess of all tetrahedra that violate the criterion; the largest that can be left
+    /// and 1 if none does. Takes time in proportion to the mesh.
+    pub fn largest_violation(
+        &self,
+        mt: &impl MultiTessellation,
+        criterion: &dyn Criterion,
+    ) -> (ErrorCode, f64) {
+        let to_come = self.to_come(mt);
+        let mut largest = (ErrorCode::ZERO, 1.0);
         for (t, tet) in (0..).zip(self.mesh.tets()) {
-            let error = match mt.remover(&self.mesh, t) {
-                Some(u) => mt.error(u),
-                None => to_come,
-            };
-            if error > largest && self.selects(criterion, tet, error) {
-                largest = error;
+            let update = mt.remover(&self.mesh, t);
+            let error = update.map_or(to_come, |u| mt.error(u));
+            // The last number there can be: nothing is added to what is wanted.
+            let update = update.unwrap_or(UpdateId(mt.info().updates));
+            let verdict = see(&self.mesh, tet, error, update, |look| criterion.rank(look));
+            if verdict.asks() {
+                largest = (largest.0.max(error), f64::max(largest.1, verdict.excess));
             }
+        }
+        if largest.1 <= 1.0 {
+            largest.0 = criterion.tolerance().min(self.largest_to_come(mt));
         }
         largest
     }
 }
 
-/// What an applied update is there for.
-enum Need {
-    /// The request asks for it.
-    Asked,
-    /// A child depends on it.
-    Blocked,
-    /// Nothing: it can be undone.
-    Nothing,
-}
-
-/// One run under a budget: two queues over the front, as in the paper. The most important violation is forced; when
-/// that exceeds the budget, the least important of what the request asks for is undone.
-struct Budgeted<'a, M, C> {
-    front: &'a mut Front,
-    mt: &'a M,
-    criterion: &'a C,
-    outcome: &'a mut Outcome,
-    /// Violating tetrahedra by the rank of the update that removes them.
-    refinable: BinaryHeap<(Rank, u32)>,
-    /// Applied updates that may be without applied children, least important first.
-    coarsenable: BinaryHeap<Reverse<Rank>>,
-}
-
-impl<'a, M: MultiTessellation, C: Criterion> Budgeted<'a, M, C> {
-    fn new(front: &'a mut Front, mt: &'a M, criterion: &'a C, outcome: &'a mut Outcome) -> Self {
-        Self { front, mt, criterion, outcome, refinable: BinaryHeap::new(), coarsenable: BinaryHeap::new() }
-    }
-
-    fn run(mut self, budget: usize) -> Result<(), UpdateError> {
-        let Self { front, mt, criterion, outcome, coarsenable, .. } = &mut self;
-        front.coarsen_unneeded(*mt, *criterion, outcome, |u| coarsenable.push(Reverse(rank(*mt, u))))?;
-        for t in 0..self.front.mesh.tet_slots() as u32 {
-            self.push_violation(t);
-        }
-        self.trim(budget, None)?;
-        while let Some((u, t)) = self.refinable.pop().map(|((_, Reverse(u)), t)| (u, t)) {
-            if self.front.violation(self.mt, self.criterion, t) != Some(u) {
-                continue;
-            }
-            let Self { front, mt, outcome, coarsenable, .. } = &mut self;
-            front.force(*mt, u, outcome, |done| coarsenable.push(Reverse(rank(*mt, done))))?;
-            self.push_touched();
-            if self.trim(budget, Some(u))? {
-                break;
-            }
-        }
-        Ok(())
-    }
-
-    fn push_violation(&mut self, t: u32) {
-        if let Some(u) = self.front.violation(self.mt, self.criterion, t) {
-            self.refinable.push((rank(self.mt, u), t));
-        }
-    }
-
-    fn push_touched(&mut self) {
-        for i in 0..self.front.mesh.touched().len() {
-            self.push_violation(self.front.mesh.touched()[i]);
-        }
-        self.front.mesh.clear_touched();
-    }
-
-    /// Undoes the least important updates until the budget is kept. Tells whether `last` was among them.
-    fn trim(&mut self, budget: usize, last: Option<UpdateId>) -> Result<bool, UpdateError> {
-        let mut reached = false;
-        while self.front.mesh.tet_count() > budget {
-            let Some(Reverse((_, Reverse(u)))) = self.coarsenable.pop() else { break };
-            if !self.front.contains(u) {
-                continue;
-            }
-            match self.front.need(self.mt, self.criterion, u)? {
-                // It comes back when the child that is in the way goes.
-                Need::Blocked => {}
-                Need::Asked | Need::Nothing => {
-                    self.undo(u)?;
-                    reached |= last == Some(u);
-                }
-            }
-        }
-        Ok(reached)
-    }
-
-    /// Undoes `u` and whatever was there only for its sake.
-    fn undo(&mut self, u: UpdateId) -> Result<(), UpdateError> {
-        let mut idle = vec![u];
-        while let Some(u) = idle.pop() {
-            if !self.front.contains(u) {
-                continue;
-            }
-            self.front.coarsen(self.mt, u, self.outcome)?;
-            let parents = self.parents_of_touched();
-            self.push_touched();
-            for parent in parents {
-                match self.front.need(self.mt, self.criterion, parent)? {
-                    Need::Blocked => {}
-                    Need::Asked => self.coarsenable.push(Reverse(rank(self.mt, parent))),
-                    Need::Nothing => idle.push(parent),
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// The updates that created the tetrahedra just changed.
-    fn parents_of_touched(&self) -> Vec<UpdateId> {
-        let mesh = &self.front.mesh;
-        let live = mesh.touched().iter().filter(|&&t| mesh.tet(t).is_some());
-        let mut parents: Vec<u32> = live.filter_map(|&t| self.mt.creator(mesh, t)).map(|u| u.0).collect();
-        parents.sort_unstable();
-        parents.dedup();
-        parents.into_iter().map(UpdateId).collect()
-    }
+/// Shows a tetrahedron of the mesh to `judge`.
+#[inline]
+pub(super) fn see(
+    mesh: &CurrentMesh,
+    tet: &[u32; 4],
+    error: ErrorCode,
+    update: UpdateId,
+    judge: impl FnOnce(&TetLook<'_>) -> Verdict,
+) -> Verdict {
+    let corners = tet.map(|v| mesh.positions[v as usize]);
+    let levels = |field: usize| tet.map(|v| mesh.levels(v)[field]);
+    judge(&TetLook { corners: &corners, levels: &levels, error, update })
 }

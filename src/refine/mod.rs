@@ -1,47 +1,48 @@
 //! Selective refinement [§2.3]: from a request to the coarsest mesh that satisfies it.
 //!
-//! A request says how accurate the mesh must be, and where. A tetrahedron of the current mesh *violates* it when the
-//! update that removes it has a larger error than asked for and the tetrahedron meets the selected part. That update
-//! is then forced, its parents first, until no tetrahedron violates. The set of updates this leads to is the
-//! smallest consistent set that satisfies the request; it does not depend on the order of work or on the mesh that
-//! one starts from, because criteria are *monotone*: when a tetrahedron violates, so does one of those that the
-//! update which created it removed. (Errors grow towards the base, the selected part is widened by the error, and
-//! the builder adds to the error of an update by how much its new values overshoot the range of those it replaces.)
+//! A [`Request`] says how accurate the mesh must be, and where: the union of some [`Need`]s. A tetrahedron of the current
+//! mesh *violates* it when the update that removes it has a larger error than asked for and the tetrahedron meets the
+//! selected part. That update is then forced, its parents first, until no tetrahedron violates. The set of updates this
+//! leads to is the smallest consistent set that satisfies the request; it does not depend on the order of work or on the
+//! mesh that one starts from, because criteria are *monotone*: when a tetrahedron violates, so does one of those that the
+//! update which created it removed. (Errors grow towards the base, the selected part is widened by the error, and the
+//! builder adds to the error of an update by how much its new values overshoot the range of those it replaces. What is
+//! selected is always told by the place or value at which a function is least, never by a bounding volume, so that the
+//! tetrahedron of the parent which holds that place is selected too.)
 //!
-//! A box and isovalues together are not monotone: updates whose tetrahedra violate may depend on none that does, and
-//! would keep themselves once they are applied. Such a request is answered from the base mesh each time.
+//! A region and values together ([`Part::Both`]) are not monotone: updates whose tetrahedra violate may depend on none that
+//! does, and would keep themselves once they are applied. Such a request is answered from the base mesh each time it changes.
 //!
-//! With a budget, updates come in the order of falling error, ties by their number; both run against the partial
-//! order, never with it. The result is the mesh of the smallest error threshold that fits the budget: again it
-//! depends on the request alone.
+//! **Budgets.** Each violation has an excess, its error as a multiple of what is wanted there. With a budget the mesh is
+//! that of all updates above a threshold of excess, ties by their number; both run against the partial order, never with
+//! it. The threshold is the smallest one that fits: no mesh within the budget has a smaller largest excess.
+//!
+//! **Small changes.** Each verdict comes with a slack: how far the request may move before it can change. [`Front`] judges
+//! again what has used up its slack, and nothing else, so that the cost of a request grows with what it changes.
+//!
+//! **Steps.** [`Front::step`] stops whenever it is told to, with a valid mesh, and goes on from there.
 
+mod camera;
 mod criterion;
+mod custom;
 mod front;
+mod game;
+mod palette;
+mod ranked;
+mod request;
+mod shape;
+mod watch;
 
-pub use criterion::{Criterion, LodCriterion};
-pub use front::{Front, Outcome};
+pub use criterion::{Criterion, LodCriterion, TetLook, Verdict};
+pub use custom::Custom;
+pub use front::{Front, GoOn, Outcome};
+pub use request::{Budget, Need, Part, Region, Request, RequestError, Transfer, Values, View};
 
-use crate::geom::Bounds;
-
-/// What mesh is wanted.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Request {
-    /// Largest error wanted, as a fraction of the field's range (0.01 is 1 %); 0 is the reference mesh, infinity the
-    /// base mesh. It binds all fields of the MT, each relative to its own range. Not negative, not NaN.
-    pub error: f64,
-    /// Only inside this box, in model units; everywhere else the coarsest mesh will do. None is everywhere.
-    pub roi: Option<Bounds>,
-    /// Only where the field passes one of these values (field units); everywhere if empty. Together with a box: where
-    /// both hold.
-    pub isovalues: Vec<f64>,
-    /// Which field the isovalues refer to: an index into [`MtInfo::fields`](crate::mt::MtInfo::fields).
-    pub field: usize,
-    /// At most so many tetrahedra, though never fewer than the base mesh has; no limit if none.
-    pub max_tets: Option<u32>,
-}
+/// The most planes that a [`Region::Convex`] can have.
+pub const MAX_PLANES: usize = 16;
 
 /// What a refinement did, and how good the mesh is now.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct RefineStats {
     /// Vertices of the current mesh.
     pub vertices: u32,
@@ -53,9 +54,20 @@ pub struct RefineStats {
     pub refined: u64,
     /// Updates undone on the way.
     pub coarsened: u64,
+    /// Those of the updates applied on the way that were there only because others depend on them.
+    pub forced: u64,
+    /// Tetrahedra and updates whose place in the request was looked at on the way.
+    pub judged: u64,
     /// The error that is guaranteed in the selected part, as a fraction of the field's range, at every vertex of the
-    /// reference mesh there. The rounding to the lattices, half a step, is not in it.
+    /// reference mesh there. The rounding to the lattices, half a step, is not in it. With several needs, the largest one of
+    /// those that measure the field.
     pub error_bound: f64,
-    /// Whether that is what was asked for; false when the budget or missing data stopped it.
+    /// How often the error exceeds what was asked for, at most; not above 1 if the request is satisfied.
+    pub excess: f64,
+    /// For each need the error that is guaranteed where it counts, in its own unit.
+    pub bounds: Vec<f64>,
+    /// Whether the mesh is what was asked for; false when the budget or missing data stopped it, or there is more to do.
     pub satisfied: bool,
+    /// Whether there is nothing more to do, as far as budget and data allow. Otherwise the bounds are not known yet.
+    pub done: bool,
 }

@@ -1,5 +1,6 @@
 //! How far is an extracted mesh from the input, at every reference vertex and all over the boundary?
 
+use super::Wish;
 use super::mesh_checks::PlainMesh;
 use super::mesh_checks::PlainReference;
 use super::triangles::Triangles;
@@ -8,7 +9,6 @@ use crate::mesh::FACES;
 use crate::mesh::NONE;
 use crate::mesh::TetMesh;
 use crate::mt::MtInfo;
-use crate::refine::Request;
 use glam::DVec3;
 use std::ops::RangeInclusive;
 
@@ -82,7 +82,7 @@ impl<'a> Deviation<'a> {
 
     /// Measures `mesh`, the answer to `request`, where the error is to be within `bound`. `errors` are those of
     /// its tetrahedra.
-    pub fn measure(&self, mesh: &PlainMesh<'_>, errors: &[f64], request: &Request, bound: f64) -> Measured {
+    pub fn measure(&self, mesh: &PlainMesh<'_>, errors: &[f64], request: &Wish, bound: f64) -> Measured {
         let fields = self.info.fields.iter();
         let half_level = fields.map(|f| 0.5 * f.step / f.range()).fold(0.0, f64::max);
         let allowed = bound.max(half_level) + VALUE_SLACK;
@@ -105,7 +105,7 @@ struct Look<'a> {
     mesh: &'a PlainMesh<'a>,
     border: Border,
     errors: &'a [f64],
-    request: &'a Request,
+    request: &'a Wish,
     bound: f64,
     allowed: f64,
 }

@@ -32,10 +32,11 @@ use crate::refine::Criterion;
 use crate::refine::Front;
 use crate::refine::LodCriterion;
 use crate::refine::Outcome;
-use crate::refine::Request;
+use crate::refine::TetLook;
 use deviation::Deviation;
 use mesh_checks::PlainMesh;
 use queries::Query;
+use queries::Wish;
 
 /// What came of a verification.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -101,8 +102,9 @@ fn verify<M: MultiTessellation>(
         on_progress(i, steps);
         let mut front = base.clone();
         let outcome = satisfy(mt, &mut front, query)?;
-        let case =
-            Case { mt, query, front: &front, outcome: &outcome, criterion: query.criterion(mt.info()) };
+        let exact = Wish { error: 0.0, ..query.wish.clone() };
+        let everything = LodCriterion::new(mt.info(), &exact.request());
+        let case = Case { mt, query, front: &front, outcome: &outcome, everything };
         case.check(&base, &reference, &deviation, report);
         hashes.push(front.mesh().hash());
         report.queries += 1;
@@ -115,8 +117,7 @@ fn fresh(mt: &impl MultiTessellation) -> Result<Front, String> {
 }
 
 fn satisfy(mt: &impl MultiTessellation, front: &mut Front, query: &Query) -> Result<Outcome, String> {
-    let request = &query.request;
-    let outcome = front.satisfy(mt, &query.criterion(mt.info()), request.max_tets);
+    let outcome = front.satisfy(mt, &query.criterion(mt.info()), query.wish.budget());
     outcome.map_err(|error| format!("{query}: the MT is damaged: {error}"))
 }
 
@@ -134,7 +135,7 @@ fn check_full_circle(
 ) -> Result<mesh_checks::Shape, String> {
     let mut front = fresh(mt)?;
     let base = front.mesh().hash();
-    let full = Query::new("full refinement", Request::default());
+    let full = Query::new("full refinement", Wish::default());
     let outcome = satisfy(mt, &mut front, &full)?;
     if !outcome.satisfied || outcome.error != ErrorCode::ZERO || front.applied_count() != mt.updates() {
         let (applied, all) = (front.applied_count(), mt.updates());
@@ -144,7 +145,7 @@ fn check_full_circle(
     if let Err(failure) = same::check(&extracted, &deviation.reference()) {
         note(report, &full, &failure);
     }
-    let none = Query::new("full coarsening", Request { error: f64::INFINITY, ..Request::default() });
+    let none = Query::new("full coarsening", Wish { error: f64::INFINITY, ..Wish::default() });
     satisfy(mt, &mut front, &none)?;
     if front.applied_count() != 0 || front.mesh().hash() != base {
         note(report, &none, "what is left is not the base mesh");
@@ -188,7 +189,8 @@ struct Case<'a, M> {
     query: &'a Query,
     front: &'a Front,
     outcome: &'a Outcome,
-    criterion: LodCriterion,
+    /// The same part with an error of 0: asks wherever there is any error at all.
+    everything: LodCriterion,
 }
 
 impl<M: MultiTessellation> Case<'_, M> {
@@ -206,7 +208,7 @@ impl<M: MultiTessellation> Case<'_, M> {
         }
         let checks = [self.check_answer(&mesh), self.check_budget(&mesh, base)];
         checks.iter().filter_map(|c| c.as_ref().err()).for_each(|failure| note(report, self.query, failure));
-        let measured = deviation.measure(&mesh, &self.errors(&mesh), &self.query.request, self.bound());
+        let measured = deviation.measure(&mesh, &self.errors(&mesh), &self.query.wish, self.bound());
         report.worst_error_ratio = report.worst_error_ratio.max(measured.worst_ratio);
         measured.failures.iter().for_each(|failure| note(report, self.query, failure));
     }
@@ -223,24 +225,26 @@ impl<M: MultiTessellation> Case<'_, M> {
 
     /// Is what refinement says of the mesh true?
     fn check_answer(&self, mesh: &PlainMesh<'_>) -> Result<(), String> {
-        let field = self.query.request.field;
         let mut largest = 0.0_f64;
-        for (tet, error) in mesh.tets.iter().zip(self.errors(mesh)) {
+        for (t, tet) in (0..).zip(mesh.tets) {
+            let Some(update) = self.mt.remover(mesh.mesh, t) else { continue };
             let corners = tet.map(|v| mesh.positions[v as usize]);
-            let levels = tet.map(|v| mesh.mesh.levels(v)[field]);
-            if error > largest && self.criterion.selects(&corners, &levels, ErrorCode::at_most(error)) {
-                largest = error;
+            let levels = |field: usize| tet.map(|v| mesh.mesh.levels(v)[field]);
+            let error = self.mt.error(update);
+            let look = TetLook { corners: &corners, levels: &levels, error, update };
+            if error.error() > largest && self.everything.judge(&look).asks() {
+                largest = error.error();
             }
         }
         let (reported, satisfied) = (self.bound(), self.outcome.satisfied);
         if largest > reported {
             return Err(format!("the error bound is {largest}, not {reported} as reported"));
         }
-        if satisfied != (largest <= self.query.request.error) {
+        if satisfied != (largest <= self.query.wish.error) {
             let answer = if satisfied { "satisfied" } else { "not satisfied" };
             return Err(format!("reported as {answer}, with an error bound of {largest}"));
         }
-        if !satisfied && self.query.request.max_tets.is_none() {
+        if !satisfied && self.query.wish.max_tets.is_none() {
             return Err(format!("nothing stood in the way, but the error bound is {largest}"));
         }
         Ok(())
@@ -248,7 +252,7 @@ impl<M: MultiTessellation> Case<'_, M> {
 
     fn check_budget(&self, mesh: &PlainMesh<'_>, base: &Front) -> Result<(), String> {
         let least = base.mesh().tet_count();
-        match self.query.request.max_tets {
+        match self.query.wish.max_tets {
             Some(budget) if mesh.tets.len() > (budget as usize).max(least) => {
                 Err(format!("{} tetrahedra, more than the budget and the base mesh", mesh.tets.len()))
             }

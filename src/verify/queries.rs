@@ -4,14 +4,40 @@ use crate::geom::Bounds;
 use crate::mesh::TetMesh;
 use crate::mt::MtInfo;
 use crate::mt::MultiTessellation;
+use crate::refine::Budget;
 use crate::refine::LodCriterion;
+use crate::refine::Need;
+use crate::refine::Region;
 use crate::refine::Request;
 use std::fmt;
 
 /// A request with a name.
 pub struct Query {
     pub name: String,
-    pub request: Request,
+    pub wish: Wish,
+}
+
+/// A request in the terms that the errors are measured in.
+#[derive(Clone, Debug, Default)]
+pub struct Wish {
+    /// A fraction of the field's range.
+    pub error: f64,
+    pub roi: Option<Bounds>,
+    pub isovalues: Vec<f64>,
+    pub field: usize,
+    pub max_tets: Option<u32>,
+}
+
+impl Wish {
+    pub fn budget(&self) -> Budget {
+        Budget { tets: self.max_tets, ..Budget::default() }
+    }
+
+    pub fn request(&self) -> Request {
+        let need = Need::within(self.error);
+        let need = need.limited(self.roi.map(Region::Box), self.field, &self.isovalues);
+        Request { needs: vec![need], budget: self.budget() }
+    }
 }
 
 impl fmt::Display for Query {
@@ -21,12 +47,12 @@ impl fmt::Display for Query {
 }
 
 impl Query {
-    pub fn new(name: &str, request: Request) -> Self {
-        Self { name: name.to_owned(), request }
+    pub fn new(name: &str, wish: Wish) -> Self {
+        Self { name: name.to_owned(), wish }
     }
 
     pub fn criterion(&self, info: &MtInfo) -> LodCriterion {
-        LodCriterion::new(info, &self.request)
+        LodCriterion::new(info, &self.wish.request())
     }
 }
 
@@ -34,20 +60,20 @@ const ERRORS: [f64; 5] = [0.0, 0.001, 0.01, 0.05, 0.2];
 
 /// All requests for an MT of `input`.
 pub fn of(mt: &impl MultiTessellation, input: &TetMesh) -> Vec<Query> {
-    let all = Request::default();
+    let all = Wish::default();
     let mut queries = Vec::new();
-    let mut add = |what: &str, request: Request| {
-        let percent = 100.0 * request.error;
-        let budget = request.max_tets.map_or(String::new(), |b| format!(", at most {b} tetrahedra"));
-        queries.push(Query::new(&format!("{what}, error {percent} %{budget}"), request));
+    let mut add = |what: &str, wish: Wish| {
+        let percent = 100.0 * wish.error;
+        let budget = wish.max_tets.map_or(String::new(), |b| format!(", at most {b} tetrahedra"));
+        queries.push(Query::new(&format!("{what}, error {percent} %{budget}"), wish));
     };
     for error in ERRORS.into_iter().chain([f64::INFINITY]) {
-        add("uniform", Request { error, ..all.clone() });
+        add("uniform", Wish { error, ..all.clone() });
     }
     let boxes = boxes(input);
     for (i, (name, roi)) in boxes.iter().enumerate() {
         for error in [0.0, ERRORS[i % 4 + 1], ERRORS[(i + 2) % 4 + 1]] {
-            add(name, Request { error, roi: Some(*roi), ..all.clone() });
+            add(name, Wish { error, roi: Some(*roi), ..all.clone() });
         }
     }
     let sizes = [mt.base().tets.len(), mt.info().tetrahedra as usize];
@@ -58,23 +84,23 @@ pub fn of(mt: &impl MultiTessellation, input: &TetMesh) -> Vec<Query> {
         for (i, &value) in quantiles.iter().enumerate() {
             let name = format!("{} = {value}", info.name);
             for error in [ERRORS[i % 4], ERRORS[i % 4 + 1]] {
-                add(&name, Request { error, isovalues: vec![value], field: f, ..all.clone() });
+                add(&name, Wish { error, isovalues: vec![value], field: f, ..all.clone() });
             }
             let (roi_name, roi) = &boxes[i % boxes.len()];
-            let both = Request { roi: Some(*roi), isovalues: vec![value], field: f, ..all.clone() };
-            add(&format!("{roi_name} and {name}"), Request { error: 0.001, ..both.clone() });
-            add(&format!("{roi_name} and {name}"), Request { max_tets: part(20), ..both });
+            let both = Wish { roi: Some(*roi), isovalues: vec![value], field: f, ..all.clone() };
+            add(&format!("{roi_name} and {name}"), Wish { error: 0.001, ..both.clone() });
+            add(&format!("{roi_name} and {name}"), Wish { max_tets: part(20), ..both });
         }
-        let several = Request { isovalues: quantiles, field: f, ..all.clone() };
-        add(&format!("{} at all quantiles", info.name), Request { error: 0.01, ..several.clone() });
-        add(&format!("{} at all quantiles", info.name), Request { max_tets: part(5), ..several });
+        let several = Wish { isovalues: quantiles, field: f, ..all.clone() };
+        add(&format!("{} at all quantiles", info.name), Wish { error: 0.01, ..several.clone() });
+        add(&format!("{} at all quantiles", info.name), Wish { max_tets: part(5), ..several });
     }
     for max_tets in [Some(0), part(100), part(10), part(2), Some(u32::MAX)] {
-        add("uniform", Request { max_tets, ..all.clone() });
+        add("uniform", Wish { max_tets, ..all.clone() });
     }
-    add("uniform", Request { error: 0.01, max_tets: part(50), ..all.clone() });
+    add("uniform", Wish { error: 0.01, max_tets: part(50), ..all.clone() });
     for (name, roi) in &boxes {
-        add(name, Request { roi: Some(*roi), max_tets: part(30), ..all.clone() });
+        add(name, Wish { roi: Some(*roi), max_tets: part(30), ..all.clone() });
     }
     queries
 }

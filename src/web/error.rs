@@ -69,7 +69,7 @@ fn format_code(error: &FormatError) -> &'static str {
 fn session_code(error: &SessionError) -> &'static str {
     match error {
         SessionError::NotReady => "not-ready",
-        SessionError::Field { .. } | SessionError::Request(_) => "bad-option",
+        SessionError::Request(_) | SessionError::Isovalue => "bad-option",
         SessionError::Format(error) => format_code(error),
     }
 }

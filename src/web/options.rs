@@ -4,6 +4,9 @@ use super::error::WebError;
 use crate::geom::Bounds;
 use crate::mt::FieldInfo;
 use crate::mt::MtInfo;
+use crate::refine::Budget;
+use crate::refine::Need;
+use crate::refine::Region;
 use crate::refine::Request;
 use js_sys::Object;
 use serde::de::DeserializeOwned;
@@ -40,9 +43,9 @@ extern "C" {
 
 const NAMES: [&str; 5] = ["error", "box", "isovalues", "field", "maxTets"];
 
-/// The request that `options` describes for the MT of `info`.
-pub fn request(options: &JsValue, info: &MtInfo) -> Result<Request, WebError> {
-    let Some(options) = object(options)? else { return Ok(Request::default()) };
+/// The request that `options` describes for the MT of `info`, and the field that it speaks of.
+pub fn request(options: &JsValue, info: &MtInfo) -> Result<(Request, usize), WebError> {
+    let Some(options) = object(options)? else { return Ok((Request::within(0.0), 0)) };
     for name in Object::keys(&options).iter().filter_map(|name| name.as_string()) {
         if !NAMES.contains(&name.as_str()) {
             return Err(WebError::bad_option(
@@ -52,13 +55,11 @@ pub fn request(options: &JsValue, info: &MtInfo) -> Result<Request, WebError> {
         }
     }
     let field = option(&options, "field")?.map_or(Ok(0), |name: String| field_index(info, &name))?;
-    Ok(Request {
-        error: error(&options, &info.fields[field])?,
-        roi: option(&options, "box")?.map(|numbers: Vec<f64>| bounds(&numbers)).transpose()?,
-        isovalues: isovalues(&options)?,
-        field,
-        max_tets: max_tets(&options)?,
-    })
+    let roi = option(&options, "box")?.map(|numbers: Vec<f64>| bounds(&numbers)).transpose()?;
+    let need = Need::within(error(&options, &info.fields[field])?);
+    let need = need.limited(roi.map(Region::Box), field, &isovalues(&options)?);
+    let budget = Budget { tets: max_tets(&options)?, ..Budget::default() };
+    Ok((Request { needs: vec![need], budget }, field))
 }
 
 /// The index of the field `name`.

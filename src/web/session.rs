@@ -47,10 +47,10 @@ impl CoreSession {
 
     /// Changes the current mesh to what `options` asks for, as far as the data has arrived.
     pub fn refine(&mut self, options: &RefineOptions) -> Result<JsStats, WebError> {
-        let request = options::request(options, self.known()?)?;
-        self.session.set_field(request.field)?;
+        let (request, field) = options::request(options, self.known()?)?;
+        self.session.set_field(field)?;
         let stats = self.session.refine(&request)?;
-        Ok(results::stats(&stats, &self.known()?.fields[request.field]))
+        Ok(results::stats(&stats, &self.known()?.fields[field]))
     }
 
     /// The field that `mesh` carries and `isosurface` follows.

@@ -144,13 +144,13 @@ impl Viewer {
 
     /// Changes the current mesh to what `options` asks for, as far as the data has arrived.
     pub fn refine(&mut self, options: &RefineOptions) -> Result<JsStats, WebError> {
-        let request = options::request(options, self.known()?)?;
-        self.session.set_field(request.field)?;
-        self.field = request.field;
+        let (request, field) = options::request(options, self.known()?)?;
+        self.session.set_field(field)?;
+        self.field = field;
         let stats = self.session.refine(&request)?;
         self.set_range();
         self.stale = Stale { boxes: self.stale.boxes, ..Stale::MESH };
-        Ok(results::stats(&stats, &self.known()?.fields[request.field]))
+        Ok(results::stats(&stats, &self.known()?.fields[field]))
     }
 
     /// A hash of the current mesh, the same wherever the same request was made.

@@ -19,7 +19,10 @@ use tetralod::mesh::Field;
 use tetralod::mesh::TetMesh;
 use tetralod::mt::CurrentMesh;
 use tetralod::mt::MtInfo;
+use tetralod::refine::Budget;
+use tetralod::refine::Need;
 use tetralod::refine::RefineStats;
+use tetralod::refine::Region;
 use tetralod::refine::Request;
 
 /// Takes the mesh out of an MT file that is as coarse as a request allows.
@@ -124,7 +127,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let start = Instant::now();
     let stats = opened.session.refine(&request).with_context(name)?;
     let seconds = start.elapsed().as_secs_f64();
-    let report = report(arguments, &request, &opened, &stats, seconds)?;
+    let report = report(arguments, &opened, &stats, seconds)?;
     let mesh = reference_units(opened.info()?, opened.session.mesh().context("there is no mesh")?);
     files::write_file(&arguments.output, |out| Ok(tetralod::io::write_vtu(&mesh, out)?))?;
     if arguments.json { output::json(&report) } else { print(arguments, &report) }
@@ -132,13 +135,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 
 fn request(arguments: &Arguments, info: &MtInfo) -> Result<Request> {
     let field = files::field_index(info, arguments.field.as_deref())?;
-    Ok(Request {
-        error: arguments.error.relative(info.fields[field].range()),
-        roi: arguments.roi,
-        isovalues: arguments.isovalues.clone(),
-        field,
-        max_tets: arguments.budget,
-    })
+    let need = Need::within(arguments.error.relative(info.fields[field].range()));
+    let need = need.limited(arguments.roi.map(Region::Box), field, &arguments.isovalues);
+    Ok(Request { needs: vec![need], budget: Budget { tets: arguments.budget, ..Budget::default() } })
 }
 
 /// The current mesh in the units of the model and of all its fields.
@@ -156,16 +155,12 @@ fn reference_units(info: &MtInfo, mesh: &CurrentMesh) -> TetMesh {
     }
 }
 
-fn report(
-    arguments: &Arguments,
-    request: &Request,
-    opened: &Opened,
-    stats: &RefineStats,
-    seconds: f64,
-) -> Result<Report> {
-    let range = opened.info()?.fields[request.field].range();
-    let promise = Promise::of(opened.info()?, request.field, stats.error_bound);
-    let measure = |input: &Path| measure(input, request, opened, promise);
+fn report(arguments: &Arguments, opened: &Opened, stats: &RefineStats, seconds: f64) -> Result<Report> {
+    let info = opened.info()?;
+    let field = files::field_index(info, arguments.field.as_deref())?;
+    let range = info.fields[field].range();
+    let promise = Promise::of(info, field, stats.error_bound);
+    let measure = |input: &Path| measure(input, arguments, field, opened, promise);
     let measured = arguments.measure.as_deref().map(measure).transpose()?;
     Ok(Report {
         vertices: stats.vertices,
@@ -181,17 +176,22 @@ fn report(
 }
 
 /// The largest difference from the field of the input at its vertices, in the part that the request selects.
-fn measure(input: &Path, request: &Request, opened: &Opened, promise: Promise) -> Result<f64> {
+fn measure(
+    input: &Path,
+    arguments: &Arguments,
+    number: usize,
+    opened: &Opened,
+    promise: Promise,
+) -> Result<f64> {
     let reference = files::read_reference(input, opened)?;
     let info = opened.info()?;
-    let name = &info.fields[request.field].name;
+    let name = &info.fields[number].name;
     let field = reference.fields.iter().find(|field| field.name == *name);
     let field = field.with_context(|| {
         format!("{}: there is no field '{name}'; give the mesh that the MT was built from", input.display())
     })?;
-    let reference =
-        Reference { positions: &reference.positions, values: &field.values, field: request.field };
-    let part = Part { roi: request.roi, isovalues: request.isovalues.clone(), promise: Some(promise) };
+    let reference = Reference { positions: &reference.positions, values: &field.values, field: number };
+    let part = Part { roi: arguments.roi, isovalues: arguments.isovalues.clone(), promise: Some(promise) };
     let mesh = opened.session.mesh().context("there is no mesh")?;
     Ok(deviation(info, mesh, &reference, &part).field)
 }

@@ -1,0 +1,175 @@
+//! What a camera sees: its pyramid of vision, and how large an error looks.
+
+use super::View;
+use super::criterion::Frame;
+use super::criterion::TetLook;
+use super::criterion::Verdict;
+use super::game::Rows;
+use super::shape::Plane;
+use glam::DMat4;
+use glam::DVec2;
+use glam::DVec3;
+use glam::DVec4;
+
+/// A camera in model units, seen from the middle of the domain.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Camera {
+    /// What bounds the picture, normals outwards.
+    sides: [Plane; 4],
+    depth: Depth,
+}
+
+/// How the size of things on the screen depends on their depth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Depth {
+    /// Things look smaller with their distance from this plane.
+    Perspective {
+        plane: Plane,
+        /// Pixels · depth of a thing of length 1.
+        pixels: f64,
+    },
+    /// They do not: pixels of a thing of length 1.
+    Parallel { pixels: f64 },
+}
+
+/// Depths that urgency is told by are this close to each other: 2^(-1/16).
+const STEP: f64 = 0.957_603_280_698_573_6;
+/// So many of them are told apart: down to 2^-24 of the largest depth.
+const STEPS: usize = 24 * 16;
+
+impl Camera {
+    pub fn new(view: &View, frame: &Frame) -> Self {
+        let [x, y, _, w] = rows(&DMat4::from_cols_array(&view.matrix));
+        let outwards = |row: DVec4| Plane::new(-row.truncate(), row.w, frame.middle);
+        let sides = [w + x, w - x, w + y, w - y].map(outwards);
+        let half = DVec2::from(view.viewport) / 2.0;
+        let (right, up, along) = (x.truncate(), y.truncate(), w.truncate());
+        // What a coordinate on the screen, x / w, changes by along a way: (x - (x / w) w) / w, where |x / w| <= 1.
+        let steepest = |axis: DVec3| (axis - along).length().max((axis + along).length());
+        let pixels = (half.x * steepest(right)).max(half.y * steepest(up));
+        let depth = if along.length() > 0.0 {
+            let plane = Plane::new(along, -w.w, frame.middle);
+            Depth::Perspective { plane, pixels: pixels / along.length() }
+        } else {
+            Depth::Parallel { pixels: pixels / w.w.abs() }
+        };
+        Self { sides, depth }
+    }
+
+    /// Whether `tet` is in the picture and its error looks larger than `pixels`: whether some of its points lie in the
+    /// pyramid of vision up to the depth at which the error has that size.
+    pub fn judge(
+        &self,
+        frame: &Frame,
+        tet: &TetLook<'_>,
+        corners: &[DVec3; 4],
+        pixels: f64,
+        ranked: bool,
+    ) -> Verdict {
+        let length = tet.error.error() * frame.displacement;
+        if length <= 0.0 {
+            return Verdict::NEVER;
+        }
+        let margin = frame.margin(tet);
+        let seen = |threshold: f64, limit: Option<(&Plane, f64)>| {
+            let mut rows = Rows::new();
+            for plane in &self.sides {
+                rows.push(plane.distances(corners));
+            }
+            if let Some((plane, limit)) = limit {
+                rows.push(plane.distances(corners).map(|depth| depth - limit));
+            }
+            rows.least(threshold)
+        };
+        match &self.depth {
+            Depth::Parallel { pixels: scale } => {
+                let excess = length * scale / pixels;
+                if excess <= 1.0 {
+                    // Another scale is far away, but the same one will never ask.
+                    return Verdict::NEVER;
+                }
+                let outside = seen(margin, None);
+                let slack = (outside - margin).abs() / frame.reach;
+                Verdict { excess: if outside <= margin { excess } else { 0.0 }, slack }
+            }
+            Depth::Perspective { plane, pixels: scale } => {
+                let deepest = self.deepest(frame);
+                let limit = (length * scale / pixels).min(2.0 * deepest);
+                let outside = seen(margin, Some((plane, limit)));
+                let slack = (outside - margin).abs() / frame.reach;
+                if outside > margin {
+                    return Verdict { excess: 0.0, slack };
+                }
+                if !ranked {
+                    return Verdict { excess: 2.0, slack };
+                }
+                // The nearest depth on a fixed scale: the same for all tetrahedra, so that a larger error at the same place is
+                // never the less urgent.
+                let at = |step: usize| deepest * power(step);
+                let (mut near, mut far) = (0, STEPS);
+                while near + 1 < far {
+                    let middle = usize::midpoint(near, far);
+                    let is_seen = seen(margin, Some((plane, at(middle)))) <= margin;
+                    *(if is_seen { &mut near } else { &mut far }) = middle;
+                }
+                let excess = length * scale / (pixels.max(f64::MIN_POSITIVE) * at(near)) / STEP;
+                Verdict { excess: excess.clamp(1.0 + f64::EPSILON, f64::MAX), slack }
+            }
+        }
+    }
+
+    /// No point of the domain is further away, and the camera need not be inside.
+    fn deepest(&self, frame: &Frame) -> f64 {
+        match &self.depth {
+            Depth::Perspective { plane, .. } => (2.0 * frame.reach - plane.offset).max(frame.reach),
+            Depth::Parallel { .. } => frame.reach,
+        }
+    }
+
+    /// How far this camera is from another one, in parts of the domain's reach.
+    pub fn distance(&self, pixels: f64, other: &Self, other_pixels: f64, frame: &Frame) -> f64 {
+        let sides = self.sides.iter().zip(&other.sides);
+        let turned = sides.fold(0.0, |m: f64, (a, b)| m.max(a.difference(b, frame.reach)));
+        let depths = match (&self.depth, &other.depth) {
+            (Depth::Perspective { plane: a, pixels: p }, Depth::Perspective { plane: b, pixels: q }) => {
+                // A limit is the error's length times such a scale, or twice the largest depth where that is less.
+                let (s, t) = (p / pixels, q / other_pixels);
+                let scaled = if s == t {
+                    0.0
+                } else if s.max(t).is_finite() {
+                    (s - t).abs() / s.max(t)
+                } else {
+                    f64::INFINITY
+                };
+                let deepest = self.deepest(frame).max(other.deepest(frame));
+                3.0 * a.difference(b, frame.reach) + 2.0 * deepest * scaled
+            }
+            (Depth::Parallel { pixels: p }, Depth::Parallel { pixels: q })
+                if p / pixels == q / other_pixels =>
+            {
+                0.0
+            }
+            _ => f64::INFINITY,
+        };
+        turned.max(depths) / frame.reach
+    }
+}
+
+/// The rows of a matrix.
+fn rows(matrix: &DMat4) -> [DVec4; 4] {
+    let transposed = matrix.transpose();
+    [transposed.x_axis, transposed.y_axis, transposed.z_axis, transposed.w_axis]
+}
+
+/// [`STEP`] to a power, by squaring: multiplications round alike everywhere.
+fn power(mut exponent: usize) -> f64 {
+    let (mut result, mut base) = (1.0, STEP);
+    while exponent > 0 {
+        if exponent & 1 == 1 {
+            result *= base;
+        }
+        base *= base;
+        exponent >>= 1;
+    }
+    result
+}

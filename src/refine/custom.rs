@@ -1,0 +1,56 @@
+//! Criteria of the caller's own.
+
+use super::Criterion;
+use super::TetLook;
+use super::Verdict;
+use std::fmt;
+
+/// A criterion that a closure tells: how often the error of a tetrahedron exceeds what is wanted there (see
+/// [`Verdict::excess`]).
+///
+/// Nobody knows how such a criterion changes from one request to the next, so everything is judged again each time; add it
+/// to other needs with [`LodCriterion::and`](super::LodCriterion::and).
+///
+/// ```
+/// use tetralod::refine::Custom;
+/// // Within 1 % of the range left of x = 1000 on the lattice: some corner is there, or the tetrahedron is cut by the plane.
+/// let left = Custom::new(|tet| {
+///     let wanted = tet.corners.iter().any(|corner| corner[0] <= 1000);
+///     if wanted { tet.error.error() / 0.01 } else { 0.0 }
+/// });
+/// ```
+pub struct Custom<F> {
+    excess: F,
+    monotone: bool,
+}
+
+impl<F: Fn(&TetLook<'_>) -> f64 + Send + Sync + 'static> Custom<F> {
+    /// A criterion that is answered from the base mesh each time, as any closure can be.
+    pub fn new(excess: F) -> Self {
+        Self { excess, monotone: false }
+    }
+
+    /// A criterion that the caller knows to be monotone (see [`crate::refine`]): it is answered from the mesh that is there.
+    /// If it is not, the mesh may depend on what was asked for before; it satisfies the criterion all the same.
+    pub fn monotone(excess: F) -> Self {
+        Self { excess, monotone: true }
+    }
+}
+
+impl<F> fmt::Debug for Custom<F> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Custom").field("monotone", &self.monotone).finish_non_exhaustive()
+    }
+}
+
+impl<F: Fn(&TetLook<'_>) -> f64 + Send + Sync + 'static> Criterion for Custom<F> {
+    fn judge(&self, tet: &TetLook<'_>) -> Verdict {
+        let excess = (self.excess)(tet);
+        // NaN asks for nothing. As nobody knows how long that is so, it is looked at again with every change.
+        Verdict { excess: if excess > 0.0 { excess } else { 0.0 }, slack: 0.0 }
+    }
+
+    fn is_monotone(&self) -> bool {
+        self.monotone
+    }
+}

@@ -1,0 +1,268 @@
+//! Refinement under a budget: two queues over the front, as in the paper [§2.3].
+//!
+//! The most urgent violation is forced; when that exceeds the budget, the least urgent of what is applied is undone. This
+//! stops when the two meet: when what was forced last is what has to go. The mesh is then that of all updates above a
+//! threshold of urgency, the smallest threshold that fits. No set within the budget has a smaller largest excess, since each
+//! set with that excess contains this one; so no exchange can improve it.
+
+use super::Budget;
+use super::Criterion;
+use super::Front;
+use super::GoOn;
+use super::Outcome;
+use super::front::see;
+use crate::mt::MultiTessellation;
+use crate::mt::UpdateError;
+use crate::mt::UpdateId;
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+/// The urgency of an update: larger excess first, ties coarse to fine. Parents rank before their children.
+type Rank = (u64, Reverse<UpdateId>);
+
+/// Excesses are not negative, so their bits compare as they do.
+fn rank(excess: f64, u: UpdateId) -> Rank {
+    (excess.to_bits(), Reverse(u))
+}
+
+/// The two queues, kept between the steps to one goal.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Ranked {
+    state: State,
+    /// Violating tetrahedra by the rank of the update that removes them.
+    refinable: BinaryHeap<(Rank, u32)>,
+    /// Applied updates that may be without applied children, least urgent first.
+    coarsenable: BinaryHeap<Reverse<Rank>>,
+    /// Tetrahedra that packing the mesh has moved since the queues were looked at.
+    moved: Vec<u32>,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum State {
+    /// The queues are empty.
+    #[default]
+    Idle,
+    /// They hold what there is.
+    Running,
+    /// Nothing violates the criterion.
+    Satisfied,
+    /// The budget allows no more.
+    Limited,
+}
+
+impl Ranked {
+    pub fn clear(&mut self) {
+        self.state = State::Idle;
+        self.refinable.clear();
+        self.coarsenable.clear();
+        self.moved.clear();
+    }
+
+    /// Tetrahedra have moved to these slots.
+    pub fn note_moved(&mut self, slots: &[u32]) {
+        if self.is_running() {
+            self.moved.extend_from_slice(slots);
+        }
+    }
+
+    pub fn is_running(&self) -> bool {
+        self.state == State::Running
+    }
+
+    pub fn is_satisfied(&self) -> bool {
+        self.state == State::Satisfied
+    }
+
+    pub fn bytes(&self) -> u64 {
+        let refinable = self.refinable.capacity() * size_of::<(Rank, u32)>();
+        (refinable + self.coarsenable.capacity() * size_of::<Rank>()) as u64
+    }
+}
+
+impl Front {
+    /// Moves to the mesh of the smallest excess that fits the budget. True when it is there.
+    pub(super) fn ranked_converge(
+        &mut self,
+        mt: &impl MultiTessellation,
+        criterion: &dyn Criterion,
+        budget: Budget,
+        outcome: &mut Outcome,
+        go_on: GoOn<'_>,
+    ) -> Result<bool, UpdateError> {
+        if !self.ranked.is_running() {
+            self.fill_queues(mt, criterion, outcome)?;
+            self.trim(mt, criterion, budget, None, outcome)?;
+        }
+        for t in std::mem::take(&mut self.ranked.moved) {
+            self.push_violation(mt, criterion, t, outcome);
+        }
+        while let Some(((_, Reverse(u)), t)) = self.ranked.refinable.pop() {
+            if self.contains(u) || self.mesh.tet(t).is_none() || mt.remover(&self.mesh, t) != Some(u) {
+                continue;
+            }
+            self.force(mt, u, outcome)?;
+            // What it forced is blocked by it, and comes back when it goes.
+            self.push_leaf(mt, criterion, u, outcome)?;
+            self.push_touched(mt, criterion, outcome);
+            if self.trim(mt, criterion, budget, Some(u), outcome)? {
+                self.ranked.clear();
+                self.ranked.state = State::Limited;
+                return Ok(true);
+            }
+            if !go_on(outcome) {
+                return Ok(false);
+            }
+        }
+        self.ranked.clear();
+        self.ranked.state = State::Satisfied;
+        Ok(true)
+    }
+
+    /// Fills both queues with what there is, and undoes what nothing asks for on the way.
+    fn fill_queues(
+        &mut self,
+        mt: &impl MultiTessellation,
+        criterion: &dyn Criterion,
+        outcome: &mut Outcome,
+    ) -> Result<(), UpdateError> {
+        self.forget_watch();
+        self.ranked.clear();
+        self.ranked.state = State::Running;
+        // Children have larger numbers, so one pass downwards sees each after all that depend on it.
+        for u in (0..mt.updates()).rev().map(UpdateId) {
+            if self.contains(u) && mt.may_coarsen(&self.mesh, u) {
+                self.rank_or_undo(mt, criterion, u, outcome)?;
+                self.mesh.clear_touched();
+            }
+        }
+        for t in 0..self.mesh.tet_slots() as u32 {
+            self.push_violation(mt, criterion, t, outcome);
+        }
+        Ok(())
+    }
+
+    /// Queues an update for coarsening if something asks for it, and undoes it if nothing does. Neither if a child is in
+    /// the way.
+    fn rank_or_undo(
+        &mut self,
+        mt: &impl MultiTessellation,
+        criterion: &dyn Criterion,
+        u: UpdateId,
+        outcome: &mut Outcome,
+    ) -> Result<(), UpdateError> {
+        outcome.judged += 1;
+        match self.need(mt, criterion, u, true)? {
+            None => {}
+            Some(verdict) if verdict.asks() => {
+                self.ranked.coarsenable.push(Reverse(rank(verdict.excess, u)));
+            }
+            Some(_) => self.coarsen(mt, u, outcome)?,
+        }
+        Ok(())
+    }
+
+    /// Queues an update that is without children for coarsening.
+    fn push_leaf(
+        &mut self,
+        mt: &impl MultiTessellation,
+        criterion: &dyn Criterion,
+        u: UpdateId,
+        outcome: &mut Outcome,
+    ) -> Result<(), UpdateError> {
+        outcome.judged += 1;
+        if let Some(verdict) = self.need(mt, criterion, u, true)? {
+            self.ranked.coarsenable.push(Reverse(rank(verdict.excess, u)));
+        }
+        Ok(())
+    }
+
+    fn push_violation(
+        &mut self,
+        mt: &impl MultiTessellation,
+        criterion: &dyn Criterion,
+        t: u32,
+        outcome: &mut Outcome,
+    ) {
+        let Some(tet) = self.mesh.tet(t) else { return };
+        let Some(u) = mt.remover(&self.mesh, t) else { return };
+        outcome.judged += 1;
+        let verdict = see(&self.mesh, &tet, mt.error(u), u, |look| criterion.rank(look));
+        if verdict.asks() {
+            self.ranked.refinable.push((rank(verdict.excess, u), t));
+        }
+    }
+
+    fn push_touched(
+        &mut self,
+        mt: &impl MultiTessellation,
+        criterion: &dyn Criterion,
+        outcome: &mut Outcome,
+    ) {
+        for i in 0..self.mesh.touched().len() {
+            self.push_violation(mt, criterion, self.mesh.touched()[i], outcome);
+        }
+        self.mesh.clear_touched();
+    }
+
+    /// Undoes the least urgent updates until the budget is kept. Tells whether `last` was among them.
+    fn trim(
+        &mut self,
+        mt: &impl MultiTessellation,
+        criterion: &dyn Criterion,
+        budget: Budget,
+        last: Option<UpdateId>,
+        outcome: &mut Outcome,
+    ) -> Result<bool, UpdateError> {
+        let mut reached = false;
+        while !budget.holds(self.mesh.vertex_count(), self.mesh.tet_count()) {
+            let Some(Reverse((_, Reverse(u)))) = self.ranked.coarsenable.pop() else { break };
+            if !self.contains(u) || self.need(mt, criterion, u, false)?.is_none() {
+                // With a child it comes back when that goes.
+                continue;
+            }
+            self.undo(mt, criterion, u, outcome)?;
+            reached |= last == Some(u);
+        }
+        Ok(reached)
+    }
+
+    /// Undoes `u` and whatever was there only for its sake.
+    fn undo(
+        &mut self,
+        mt: &impl MultiTessellation,
+        criterion: &dyn Criterion,
+        u: UpdateId,
+        outcome: &mut Outcome,
+    ) -> Result<(), UpdateError> {
+        let mut idle = vec![u];
+        while let Some(u) = idle.pop() {
+            if !self.contains(u) {
+                continue;
+            }
+            self.coarsen(mt, u, outcome)?;
+            let parents = self.parents_of_touched(mt);
+            self.push_touched(mt, criterion, outcome);
+            for parent in parents {
+                outcome.judged += 1;
+                match self.need(mt, criterion, parent, true)? {
+                    None => {}
+                    Some(verdict) if verdict.asks() => {
+                        self.ranked.coarsenable.push(Reverse(rank(verdict.excess, parent)));
+                    }
+                    Some(_) => idle.push(parent),
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The updates that created the tetrahedra just changed.
+    fn parents_of_touched(&self, mt: &impl MultiTessellation) -> Vec<UpdateId> {
+        let mesh = &self.mesh;
+        let live = mesh.touched().iter().filter(|&&t| mesh.tet(t).is_some());
+        let mut parents: Vec<u32> = live.filter_map(|&t| mt.creator(mesh, t)).map(|u| u.0).collect();
+        parents.sort_unstable();
+        parents.dedup();
+        parents.into_iter().map(UpdateId).collect()
+    }
+}

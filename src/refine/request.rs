@@ -1,0 +1,392 @@
+//! What mesh is wanted: needs, and a budget.
+
+use super::MAX_PLANES;
+use crate::geom::Bounds;
+use crate::mt::MtInfo;
+use std::fmt;
+
+/// What mesh is wanted: the coarsest one that meets every need, as far as the budget allows.
+///
+/// ```
+/// use tetralod::geom::Bounds;
+/// use tetralod::refine::{Need, Region, Request};
+/// let roi = Region::from(Bounds { min: [0.0; 3], max: [1.0, 1.0, 2.0] });
+/// // Within 5 % of the field's range everywhere, within 0.1 % in a box; with 100,000 tetrahedra at most.
+/// let request = Request::within(0.05).and(Need::within(0.001).inside(roi)).at_most(100_000);
+/// assert_eq!(request.needs.len(), 2);
+/// ```
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Request {
+    /// What the mesh is needed for; it is made to suit all of them. Without any, the base mesh will do.
+    pub needs: Vec<Need>,
+    /// How large the mesh may become.
+    pub budget: Budget,
+}
+
+/// A part of the volume and the error that the mesh may have there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Need {
+    /// The largest error that is good enough, in the unit of `part`; 0 is the reference mesh, infinity asks for nothing.
+    /// Not negative, not NaN.
+    pub error: f64,
+    /// Where that counts, and how the error is measured.
+    pub part: Part,
+}
+
+/// Where a need counts, and how it measures the error.
+///
+/// In all but the last two the error is that of the field: a fraction of its range (0.01 is 1 %), which binds all fields
+/// of the MT, each relative to its own range.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Part {
+    /// The whole volume.
+    Everywhere,
+    /// What lies in a region.
+    Region(Region),
+    /// Where a field takes values of a range; an isovalue is a range of one value.
+    Values(Values),
+    /// Where a field takes values of a range inside a region. The one combination that is not monotone, see
+    /// [`crate::refine`].
+    Both(Region, Values),
+    /// What a camera sees; the error is in pixels: the displacement that the field's error counts as
+    /// ([`MtInfo::displacement_per_error`](crate::mt::MtInfo::displacement_per_error)), as large as it can look.
+    View(View),
+    /// What a transfer function makes visible; the error is one of colour and opacity, 0 to 1, see [`Transfer`].
+    Transfer(Transfer),
+}
+
+/// Values of a field that matter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Values {
+    /// Which field: an index into [`MtInfo::fields`](crate::mt::MtInfo::fields).
+    pub field: usize,
+    /// Ranges in field units, the smaller value first; both ends count.
+    pub ranges: Vec<[f64; 2]>,
+}
+
+/// A convex region of space, in model units; its boundary belongs to it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Region {
+    /// A box along the axes.
+    Box(Bounds),
+    /// A box of any orientation: its centre and, in three directions at right angles, the way from there to a face.
+    OrientedBox {
+        /// The middle.
+        centre: [f64; 3],
+        /// From the centre to the middles of three faces. None of length 0.
+        halves: [[f64; 3]; 3],
+    },
+    /// A ball.
+    Sphere {
+        /// Its centre.
+        centre: [f64; 3],
+        /// Its radius; not negative.
+        radius: f64,
+    },
+    /// All points with `normal · p <= offset`.
+    HalfSpace {
+        /// Points out of the half-space; of any length but 0.
+        normal: [f64; 3],
+        /// In units of the length of `normal`.
+        offset: f64,
+    },
+    /// What is close to a plane: all points with `|normal · p - offset| <= thickness / 2 · |normal|`.
+    Slab {
+        /// At a right angle to the plane; of any length but 0.
+        normal: [f64; 3],
+        /// In units of the length of `normal`.
+        offset: f64,
+        /// In model units; 0 is the plane itself.
+        thickness: f64,
+    },
+    /// What lies behind all of some planes `[nx, ny, nz, d]`: all points with `n · p <= d`. At most
+    /// [`MAX_PLANES`](crate::refine::MAX_PLANES).
+    Convex(Vec<[f64; 4]>),
+}
+
+impl From<Bounds> for Region {
+    fn from(bounds: Bounds) -> Self {
+        Self::Box(bounds)
+    }
+}
+
+/// A camera, as renderers have it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// From model space to clip space, column by column as WebGPU and three.js store it: `clip = matrix · (x, y, z, 1)`,
+    /// visible where `|clip.x| <= clip.w` and `|clip.y| <= clip.w`. Perspective or parallel; depth does not count.
+    pub matrix: [f64; 16],
+    /// Width and height of the picture in pixels.
+    pub viewport: [f64; 2],
+}
+
+/// A transfer function: the colour and opacity of each value of a field, linear between its points and constant beyond.
+///
+/// An error `e` of the field can make the renderer show the colour of a value up to `e` away. What counts is how much
+/// that changes the picture: the largest change of any of the four channels (colours weighted by opacity) that a value
+/// in the tetrahedron can suffer. Along a ray through the whole model this accumulates to at most the need's error.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Transfer {
+    /// Which field: an index into [`MtInfo::fields`](crate::mt::MtInfo::fields).
+    pub field: usize,
+    /// Values in field units, ascending, each with its `[red, green, blue, opacity]` of 0 to 1; at least one.
+    pub points: Vec<(f64, [f64; 4])>,
+    /// The way through the model, as a fraction of its diagonal, along which the opacities are what they say; positive.
+    pub unit_length: f64,
+}
+
+/// Limits of the mesh. It never gets smaller than the base mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Budget {
+    /// At most so many tetrahedra.
+    pub tets: Option<u32>,
+    /// At most so many vertices.
+    pub vertices: Option<u32>,
+    /// At most so many bytes of output: 32 a tetrahedron (vertices and neighbours), 16 a vertex (position and value).
+    pub bytes: Option<u64>,
+}
+
+impl Budget {
+    /// Whether there is no limit.
+    pub fn is_unlimited(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Whether a mesh of this size is within all limits.
+    #[inline]
+    pub fn holds(&self, vertices: usize, tets: usize) -> bool {
+        self.tets.is_none_or(|most| tets <= most as usize)
+            && self.vertices.is_none_or(|most| vertices <= most as usize)
+            && self.bytes.is_none_or(|most| 32 * tets as u64 + 16 * vertices as u64 <= most)
+    }
+}
+
+impl Request {
+    /// The field within `error` of the reference, as a fraction of its range, everywhere. 0 is the reference mesh.
+    pub fn within(error: f64) -> Self {
+        Need::within(error).into()
+    }
+
+    /// Another need beside those that are there.
+    #[must_use]
+    pub fn and(mut self, need: Need) -> Self {
+        self.needs.push(need);
+        self
+    }
+
+    /// At most so many tetrahedra.
+    #[must_use]
+    pub fn at_most(mut self, tets: u32) -> Self {
+        self.budget.tets = Some(tets);
+        self
+    }
+}
+
+impl From<Need> for Request {
+    fn from(need: Need) -> Self {
+        Self { needs: vec![need], budget: Budget::default() }
+    }
+}
+
+impl Need {
+    /// The field within `error` of the reference, as a fraction of its range, everywhere.
+    pub fn within(error: f64) -> Self {
+        Self { error, part: Part::Everywhere }
+    }
+
+    /// What a camera sees, within so many pixels.
+    pub fn seen(view: View, pixels: f64) -> Self {
+        Self { error: pixels, part: Part::View(view) }
+    }
+
+    /// What a transfer function shows, within so much of colour and opacity.
+    pub fn shown(transfer: Transfer, error: f64) -> Self {
+        Self { error, part: Part::Transfer(transfer) }
+    }
+
+    /// Only inside `region`. In views and transfer functions this replaces the part.
+    #[must_use]
+    pub fn inside(mut self, region: impl Into<Region>) -> Self {
+        let region = region.into();
+        self.part = match self.part {
+            Part::Values(values) | Part::Both(_, values) => Part::Both(region, values),
+            _ => Part::Region(region),
+        };
+        self
+    }
+
+    /// Only where field number `field` passes one of these values. In views and transfer functions this replaces the part.
+    #[must_use]
+    pub fn around(self, field: usize, isovalues: &[f64]) -> Self {
+        self.between(field, isovalues.iter().map(|&v| [v, v]).collect())
+    }
+
+    /// Only inside `region`, if there is one, and only around these values of a field, if there are any.
+    #[must_use]
+    pub fn limited(self, region: Option<Region>, field: usize, isovalues: &[f64]) -> Self {
+        let inside = region.into_iter().fold(self, Self::inside);
+        if isovalues.is_empty() { inside } else { inside.around(field, isovalues) }
+    }
+
+    /// Only where field number `field` takes a value of one of these ranges.
+    #[must_use]
+    pub fn between(mut self, field: usize, ranges: Vec<[f64; 2]>) -> Self {
+        let values = Values { field, ranges };
+        self.part = match self.part {
+            Part::Region(region) | Part::Both(region, _) => Part::Both(region, values),
+            _ => Part::Values(values),
+        };
+        self
+    }
+}
+
+/// Why a request makes no sense.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum RequestError {
+    /// The MT has no field of this number.
+    Field {
+        /// The number that was asked for.
+        index: usize,
+        /// How many fields there are.
+        fields: usize,
+    },
+    /// A number in a need cannot be used.
+    Need {
+        /// Which need, counted from 0.
+        need: usize,
+        /// What must hold.
+        problem: &'static str,
+    },
+}
+
+impl fmt::Display for RequestError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Field { index, fields } => {
+                write!(f, "there is no field number {index}; the MT has {fields}, counted from 0")
+            }
+            Self::Need { need, problem } => write!(f, "need number {need}: {problem}"),
+        }
+    }
+}
+
+impl std::error::Error for RequestError {}
+
+impl Request {
+    /// Whether the request makes sense for an MT.
+    ///
+    /// # Errors
+    /// The first need that does not, and why.
+    pub fn check(&self, info: &MtInfo) -> Result<(), RequestError> {
+        for (i, need) in self.needs.iter().enumerate() {
+            let field = match &need.part {
+                Part::Values(values) | Part::Both(_, values) => Some(values.field),
+                Part::Transfer(transfer) => Some(transfer.field),
+                _ => None,
+            };
+            let fields = info.fields.len();
+            if let Some(index) = field.filter(|&index| index >= fields) {
+                return Err(RequestError::Field { index, fields });
+            }
+            need.check().map_err(|problem| RequestError::Need { need: i, problem })?;
+        }
+        Ok(())
+    }
+}
+
+fn hold(condition: bool, problem: &'static str) -> Result<(), &'static str> {
+    if condition { Ok(()) } else { Err(problem) }
+}
+
+fn are_finite<'a>(numbers: impl IntoIterator<Item = &'a f64>) -> bool {
+    numbers.into_iter().all(|x| x.is_finite())
+}
+
+impl Need {
+    fn check(&self) -> Result<(), &'static str> {
+        // Written so that NaN is refused.
+        hold(self.error >= 0.0, "the error must be 0 or a positive number")?;
+        match &self.part {
+            Part::Everywhere => Ok(()),
+            Part::Region(region) => region.check(),
+            Part::Values(values) => values.check(),
+            Part::Both(region, values) => region.check().and_then(|()| values.check()),
+            Part::View(view) => view.check(),
+            Part::Transfer(transfer) => transfer.check(),
+        }
+    }
+}
+
+impl Values {
+    fn check(&self) -> Result<(), &'static str> {
+        let is_range = |r: &[f64; 2]| r[0] <= r[1] && r[0] < f64::INFINITY && r[1] > f64::NEG_INFINITY;
+        hold(
+            self.ranges.iter().all(is_range),
+            "isovalues must be numbers, and ranges have the smaller one first",
+        )
+    }
+}
+
+impl View {
+    fn check(&self) -> Result<(), &'static str> {
+        hold(are_finite(&self.matrix), "the matrix of the camera must be of finite numbers")?;
+        let row = |i: usize| [0, 1, 2].map(|column| self.matrix[4 * column + i]);
+        let is_zero = |row: [f64; 3]| row.iter().all(|&x| x == 0.0);
+        let degenerate = is_zero(row(0)) || is_zero(row(1)) || is_zero(row(3)) && self.matrix[15] == 0.0;
+        hold(!degenerate, "the matrix of the camera must map space to a picture")?;
+        let sized = self.viewport.iter().all(|&x| x > 0.0 && x.is_finite());
+        hold(sized, "the width and height of the picture must be positive")
+    }
+}
+
+impl Transfer {
+    fn check(&self) -> Result<(), &'static str> {
+        hold(!self.points.is_empty(), "a transfer function has at least one point")?;
+        let ascending = self.points.windows(2).all(|pair| pair[0].0 <= pair[1].0);
+        hold(
+            ascending && self.points.iter().all(|point| point.0.is_finite()),
+            "the values of a transfer function must be finite and ascend",
+        )?;
+        let colours = self.points.iter().flat_map(|point| point.1);
+        hold(
+            colours.into_iter().all(|x| (0.0..=1.0).contains(&x)),
+            "the colours and opacities of a transfer function must lie between 0 and 1",
+        )?;
+        hold(self.unit_length > 0.0 && self.unit_length.is_finite(), "the unit length must be positive")
+    }
+}
+
+impl Region {
+    fn check(&self) -> Result<(), &'static str> {
+        let has_length = |v: &[f64; 3]| are_finite(v) && v.iter().any(|&x| x != 0.0);
+        match self {
+            // Infinite sides are as good as any.
+            Self::Box(b) => hold(
+                (0..3).all(|i| b.min[i] <= b.max[i]),
+                "every side of the box must be a number, the smaller one first",
+            ),
+            Self::OrientedBox { centre, halves } => hold(
+                are_finite(centre) && halves.iter().all(has_length),
+                "an oriented box has a finite centre and three vectors of some length",
+            ),
+            Self::Sphere { centre, radius } => hold(
+                are_finite(centre) && *radius >= 0.0,
+                "a sphere has a finite centre and a radius that is not negative",
+            ),
+            Self::HalfSpace { normal, offset } => hold(
+                has_length(normal) && !offset.is_nan(),
+                "a half-space has a normal of some length and an offset",
+            ),
+            Self::Slab { normal, offset, thickness } => hold(
+                has_length(normal) && offset.is_finite() && *thickness >= 0.0,
+                "a slab has a normal of some length, a finite offset and a thickness that is not negative",
+            ),
+            Self::Convex(planes) => {
+                hold(planes.len() <= MAX_PLANES, "a region of planes has at most 16 of them")?;
+                let is_plane = |p: &[f64; 4]| has_length(&[p[0], p[1], p[2]]) && !p[3].is_nan();
+                hold(planes.iter().all(is_plane), "each plane has a normal of some length and an offset")
+            }
+        }
+    }
+}

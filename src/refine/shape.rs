@@ -1,0 +1,144 @@
+//! Convex regions as functions: how far a tetrahedron is outside, or how deep inside.
+
+use super::MAX_PLANES;
+use super::Region;
+use super::game::Rows;
+use crate::geom::nearest_on_triangle;
+use crate::mesh::FACES;
+use glam::DVec3;
+
+/// A region as the set where a convex function is at most zero; the function changes no faster than the place.
+/// In model units, from the middle of the domain.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Shape {
+    /// The greatest of some distances from planes.
+    Planes(Vec<Plane>),
+    /// The distance from a ball.
+    Ball { centre: DVec3, radius: f64 },
+}
+
+/// The distance from a plane, positive on the side that its unit normal points to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Plane {
+    pub normal: DVec3,
+    pub offset: f64,
+}
+
+impl Plane {
+    /// `normal · p <= offset` in model units, seen from `origin`; a normal of no length makes the plane that all lies
+    /// behind or nothing does.
+    pub fn new(normal: DVec3, offset: f64, origin: DVec3) -> Self {
+        let length = normal.length();
+        let from_origin = offset - normal.dot(origin);
+        if length > 0.0 && length.is_finite() {
+            Self { normal: normal / length, offset: from_origin / length }
+        } else {
+            Self { normal: DVec3::ZERO, offset: from_origin }
+        }
+    }
+
+    #[inline]
+    pub fn distances(&self, corners: &[DVec3; 4]) -> [f64; 4] {
+        corners.map(|p| self.normal.dot(p) - self.offset)
+    }
+
+    /// How much the distance of a point at most `reach` from the origin can differ from that of `other`.
+    pub fn difference(&self, other: &Self, reach: f64) -> f64 {
+        (self.normal - other.normal).length() * reach + (self.offset - other.offset).abs()
+    }
+}
+
+impl Shape {
+    /// `region` seen from `origin`.
+    pub fn new(region: &Region, origin: DVec3) -> Self {
+        let plane = |normal: [f64; 3], offset: f64| Plane::new(normal.into(), offset, origin);
+        match region {
+            Region::Box(bounds) => {
+                let sides = DVec3::AXES.into_iter().enumerate().flat_map(|(i, axis)| {
+                    [plane((-axis).into(), -bounds.min[i]), plane(axis.into(), bounds.max[i])]
+                });
+                Self::Planes(sides.collect())
+            }
+            Region::OrientedBox { centre, halves } => {
+                let centre = DVec3::from(*centre);
+                let sides = halves.iter().map(|&half| DVec3::from(half)).flat_map(|half| {
+                    let to_face = half.length_squared();
+                    [half, -half].map(|n| plane(n.into(), n.dot(centre) + to_face))
+                });
+                Self::Planes(sides.collect())
+            }
+            Region::Sphere { centre, radius } => {
+                Self::Ball { centre: DVec3::from(*centre) - origin, radius: *radius }
+            }
+            Region::HalfSpace { normal, offset } => Self::Planes(vec![plane(*normal, *offset)]),
+            Region::Slab { normal, offset, thickness } => {
+                let half = 0.5 * thickness * DVec3::from(*normal).length();
+                let other = normal.map(|x| -x);
+                Self::Planes(vec![plane(*normal, offset + half), plane(other, half - offset)])
+            }
+            Region::Convex(planes) => Self::Planes(
+                planes.iter().take(MAX_PLANES).map(|&[x, y, z, d]| plane([x, y, z], d)).collect(),
+            ),
+        }
+    }
+
+    /// The least value of the function over a tetrahedron, so far as that decides whether it exceeds `threshold`: a value on
+    /// the same side and no further from it.
+    #[inline]
+    pub fn least(&self, corners: &[DVec3; 4], threshold: f64) -> f64 {
+        match self {
+            Self::Planes(planes) => {
+                let mut rows = Rows::new();
+                for plane in planes {
+                    let values = plane.distances(corners);
+                    // One plane with all corners beyond it is enough.
+                    let nearest = values.iter().fold(f64::INFINITY, |m, &v| m.min(v));
+                    if nearest > threshold {
+                        return nearest;
+                    }
+                    // A side at infinity bounds nothing.
+                    if nearest > f64::NEG_INFINITY {
+                        rows.push(values);
+                    }
+                }
+                rows.least(threshold)
+            }
+            Self::Ball { centre, radius } => {
+                let nearest = corners.iter().fold(f64::INFINITY, |m, p| m.min(p.distance(*centre)));
+                if nearest - radius <= threshold {
+                    nearest - radius
+                } else {
+                    distance(corners, *centre) - radius
+                }
+            }
+        }
+    }
+
+    /// How much the function can differ from that of `other` at points at most `reach` from the origin.
+    pub fn difference(&self, other: &Self, reach: f64) -> f64 {
+        match (self, other) {
+            (Self::Planes(a), Self::Planes(b)) if a.len() == b.len() => {
+                a.iter().zip(b).fold(0.0, |m, (a, b)| m.max(a.difference(b, reach)))
+            }
+            (Self::Ball { centre: a, radius: r }, Self::Ball { centre: b, radius: s }) => {
+                a.distance(*b) + (r - s).abs()
+            }
+            _ => f64::INFINITY,
+        }
+    }
+}
+
+/// The distance of a point from a tetrahedron; 0 inside.
+fn distance(corners: &[DVec3; 4], p: DVec3) -> f64 {
+    let mut outside = false;
+    let mut nearest = f64::INFINITY;
+    for face in FACES {
+        let [a, b, c] = face.map(|i| corners[i]);
+        // The normal points outwards.
+        if (b - a).cross(c - a).dot(p - a) > 0.0 {
+            outside = true;
+            nearest = nearest.min(nearest_on_triangle(p, [a, b, c]).distance(p));
+        }
+    }
+    if outside { nearest } else { 0.0 }
+}
