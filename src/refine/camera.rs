@@ -129,7 +129,7 @@ impl Camera {
     /// How far this camera is from another one, in parts of the domain's reach.
     pub fn distance(&self, pixels: f64, other: &Self, other_pixels: f64, frame: &Frame) -> f64 {
         let sides = self.sides.iter().zip(&other.sides);
-        let turned = sides.fold(0.0, |m: f64, (a, b)| m.max(a.difference(b, frame.reach)));
+        let turned = sides.fold(0.0, |m: f64, (a, b)| m.max(a.difference(b, frame.half)));
         let depths = match (&self.depth, &other.depth) {
             (Depth::Perspective { plane: a, pixels: p }, Depth::Perspective { plane: b, pixels: q }) => {
                 // A limit is the error's length times such a scale, or twice the largest depth where that is less.
@@ -142,7 +142,8 @@ impl Camera {
                     f64::INFINITY
                 };
                 let deepest = self.deepest(frame).max(other.deepest(frame));
-                3.0 * a.difference(b, frame.reach) + 2.0 * deepest * scaled
+                let moved = (a.offset - b.offset).abs();
+                a.difference(b, frame.half) + 2.0 * moved + 2.0 * deepest * scaled
             }
             (Depth::Parallel { pixels: p }, Depth::Parallel { pixels: q })
                 if p / pixels == q / other_pixels =>

@@ -130,6 +130,8 @@ pub(super) struct Frame {
     step: DVec3,
     /// No point of a mesh is further from the middle.
     pub reach: f64,
+    /// Nor along the axes than this.
+    pub half: DVec3,
     /// The displacement that counts as an error of 1.
     pub displacement: f64,
     /// Updates of the MT.
@@ -157,6 +159,7 @@ impl Frame {
             shift: -0.5 * size,
             step,
             reach,
+            half: 0.5 * size,
             displacement: info.displacement_per_error,
             updates,
             guard: 4.0 * ROUNDING * updates * reach,
@@ -209,10 +212,10 @@ struct Range {
 /// error of 0.
 const LEAST_ERROR: f64 = 1.0 / (1_u64 << 26) as f64;
 
-/// A scale on which a factor of 2 is a distance of 1, without a logarithm: exact at powers of 2, linear between them.
+/// A scale on which a factor of 2 is a distance of [`OCTAVE`], without a logarithm: exact at powers of 2, linear between them.
 /// Distances on it are sums of parts, whatever lies between. `x` is positive and finite.
 pub(super) fn octaves(x: f64) -> f64 {
-    x.to_bits() as f64 / (1_u64 << 52) as f64
+    OCTAVE * (x.to_bits() as f64 / (1_u64 << 52) as f64)
 }
 
 impl LodCriterion {
@@ -371,11 +374,13 @@ impl Atom {
     }
 }
 
-/// Errors have codes that are 2^11 to the octave.
-const CODES_PER_OCTAVE: f64 = 2048.0;
+/// Errors have codes that are 2^11 to the octave. An octave is as much as sixteen ways through the domain: regions move often,
+/// tolerances seldom, and what waits for the one is not to be woken by the other.
+const CODES: f64 = 2048.0 / OCTAVE;
+const OCTAVE: f64 = 16.0;
 
 fn octaves_between(a: ErrorCode, b: ErrorCode) -> f64 {
-    f64::from(a.0.abs_diff(b.0)) / CODES_PER_OCTAVE
+    f64::from(a.0.abs_diff(b.0)) / CODES
 }
 
 impl FieldAtom {
@@ -405,7 +410,7 @@ impl FieldAtom {
         let errors = octaves_between(self.tolerance, before.tolerance);
         let shapes = match (&self.shape, &before.shape) {
             (None, None) => 0.0,
-            (Some(a), Some(b)) => a.difference(b, frame.reach) / frame.reach,
+            (Some(a), Some(b)) => a.difference(b, frame.half) / frame.reach,
             _ => f64::INFINITY,
         };
         let values = match (&self.values, &before.values) {

@@ -28,8 +28,6 @@ pub struct Front {
     /// How many updates of the MT the mesh knows of.
     known: u32,
     goal: Option<Goal>,
-    /// How far criteria have moved in all.
-    now: f64,
     /// Whether `tets` and `leaves` account for the whole mesh.
     watched: bool,
     /// Tetrahedra that do not violate the criterion, by when they may.
@@ -82,6 +80,9 @@ pub struct Outcome {
     pub satisfied: bool,
 }
 
+/// A violation that lasts so long need not be outdone by another one.
+const LONG: f64 = 1.0 / 16.0;
+
 /// A bound on what [`Front::step`] does: told of what has been done so far, says whether to go on.
 pub type GoOn<'a> = &'a mut dyn FnMut(&Outcome) -> bool;
 
@@ -97,7 +98,6 @@ impl Front {
             applied_count: 0,
             known: 0,
             goal: None,
-            now: 0.0,
             watched: false,
             tets: Waiting::default(),
             leaves: Waiting::default(),
@@ -175,12 +175,10 @@ impl Front {
         for asked in std::mem::take(&mut self.pending) {
             self.tets.open(asked.tet);
         }
-        let next = self.now + distance;
         let monotone = self.goal.as_ref().is_none_or(|goal| goal.criterion.is_monotone());
-        if self.watched && monotone && next.is_finite() {
-            self.tets.advance(self.now, next);
-            self.leaves.advance(self.now, next);
-            self.now = next;
+        if self.watched && monotone && distance.is_finite() {
+            self.tets.advance(distance);
+            self.leaves.advance(distance);
         } else {
             self.forget_watch();
         }
@@ -377,6 +375,7 @@ impl Front {
             if criterion.is_batched() {
                 self.judge_batch(mt, criterion, outcome);
             } else {
+                self.tets.sort();
                 while let Some(t) = self.tets.next() {
                     self.judge_open(mt, criterion, t, outcome);
                 }
@@ -458,10 +457,17 @@ impl Front {
                 self.leaves.defer(u.0, verdict.slack);
                 Ok(false)
             }
-            Some(_) => {
+            Some(verdict) => {
                 self.coarsen(mt, u, outcome)?;
                 self.open_parents(mt);
-                self.open_touched();
+                // What has come back has just been judged.
+                for i in 0..self.mesh.touched().len() {
+                    let t = self.mesh.touched()[i];
+                    if self.mesh.tet(t).is_some() {
+                        self.tets.defer(t, verdict.slack);
+                    }
+                }
+                self.mesh.clear_touched();
                 Ok(true)
             }
         }
@@ -504,7 +510,7 @@ impl Front {
             let look = TetLook { corners, levels, error, update: u };
             let one = if ranked { criterion.rank(&look) } else { criterion.judge(&look) };
             all = all.or(one);
-            false
+            !ranked && one.asks() && one.slack > LONG
         };
         let looked = mt.look_at_removed(&mut self.mesh, u, &mut look)?;
         Ok((looked == Applied::Done).then_some(all))

@@ -42,9 +42,9 @@ impl Plane {
         corners.map(|p| self.normal.dot(p) - self.offset)
     }
 
-    /// How much the distance of a point at most `reach` from the origin can differ from that of `other`.
-    pub fn difference(&self, other: &Self, reach: f64) -> f64 {
-        (self.normal - other.normal).length() * reach + (self.offset - other.offset).abs()
+    /// How much the distance of a point in the box from `-reach` to `reach` can differ from that of `other`.
+    pub fn difference(&self, other: &Self, reach: DVec3) -> f64 {
+        (self.normal - other.normal).abs().dot(reach) + (self.offset - other.offset).abs()
     }
 }
 
@@ -114,8 +114,8 @@ impl Shape {
         }
     }
 
-    /// How much the function can differ from that of `other` at points at most `reach` from the origin.
-    pub fn difference(&self, other: &Self, reach: f64) -> f64 {
+    /// How much the function can differ from that of `other` at points in the box from `-reach` to `reach`.
+    pub fn difference(&self, other: &Self, reach: DVec3) -> f64 {
         match (self, other) {
             (Self::Planes(a), Self::Planes(b)) if a.len() == b.len() => {
                 a.iter().zip(b).fold(0.0, |m, (a, b)| m.max(a.difference(b, reach)))

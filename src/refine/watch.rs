@@ -1,28 +1,35 @@
 //! What has to be judged again, and when: tetrahedra and updates wait until the criterion has moved far enough.
 //!
 //! A criterion moves by [`Criterion::distance`](super::Criterion::distance) from one request to the next; a verdict holds
-//! until it has moved by the verdict's slack. What waits is kept by the power of two below its slack, and looked at again
-//! whenever the way that the criterion has gone passes a multiple of that power: never too late, and after half the slack on
-//! average. Deferred lists of priorities in ROAM (Duchaineau et al. 1997) are the idea behind this.
+//! until it has moved by the verdict's slack. What waits is kept in wheels, one for each power of two of slack, whose slots
+//! are an eighth of that wide: it is judged again when the way that the criterion has gone comes to the slot that its slack
+//! ends in, so never too late and by at most an eighth of its slack too early, at a constant cost each time. Deferred lists of
+//! priorities in ROAM (Duchaineau et al. 1997) and timing wheels (Varghese and Lauck 1987) are the ideas behind this.
 
-/// Slacks from 2^-24 to 2^3 are told apart.
-const LEVELS: usize = 28;
-/// The exponent of the first level.
+/// Slacks from 2^-24 to 2^4 are told apart.
+const WHEELS: i32 = 28;
+/// The exponent of the first wheel.
 const FIRST: i32 = -24;
+/// log2 of how many slots a slack is from now, at least; at most it is twice that.
+const FINE: i32 = 3;
+/// Slots of a wheel: more than any slack in it can be away.
+const SLOTS: usize = 4 << FINE;
 /// To be judged: in [`Waiting::open`].
-const OPEN: u8 = 254;
+const OPEN: u16 = u16::MAX - 1;
 /// Not waiting for anything.
-const NOWHERE: u8 = 255;
+const NOWHERE: u16 = u16::MAX;
 
 /// Things, known by number, that wait to be judged again.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Waiting {
-    /// The level of each thing, or [`OPEN`] or [`NOWHERE`].
-    place: Vec<u8>,
-    /// What waits in each level, with entries that have moved on since.
-    levels: [Vec<u32>; LEVELS],
+    /// The slot of each thing, or [`OPEN`] or [`NOWHERE`].
+    place: Vec<u16>,
+    /// What waits in each slot of each wheel, with entries that have moved on since.
+    slots: Vec<Vec<u32>>,
     /// What is to be judged now; here, too, entries may have moved on.
     open: Vec<u32>,
+    /// How far the criterion has moved in all.
+    now: f64,
 }
 
 impl Waiting {
@@ -50,74 +57,100 @@ impl Waiting {
         None
     }
 
+    /// Brings what is to be judged into the order of its numbers: what was made together lies together in memory.
+    pub fn sort(&mut self) {
+        self.open.sort_unstable();
+    }
+
     /// Whether nothing is to be judged.
     pub fn is_settled(&self) -> bool {
         self.open.is_empty()
     }
 
-    /// Has thing `id`, whose place in nothing else, judged again when the criterion has moved by `slack`.
+    /// Has thing `id` judged again before the criterion has moved by more than `slack`.
     #[inline]
     pub fn defer(&mut self, id: u32, slack: f64) {
-        let level = level(slack);
+        let slot = self.slot(slack);
         if self.place.len() <= id as usize {
             self.place.resize(id as usize + 1, NOWHERE);
         }
         let place = &mut self.place[id as usize];
-        if *place == level {
-            // It is in that list already, and so looked at early enough.
+        // If it is there already, that is early enough.
+        if *place == slot {
             return;
         }
-        *place = level;
-        if let Some(list) = self.levels.get_mut(level as usize) {
-            list.push(id);
+        *place = slot;
+        if slot != NOWHERE {
+            if self.slots.is_empty() {
+                self.slots.resize(WHEELS as usize * SLOTS, Vec::new());
+            }
+            self.slots[slot as usize].push(id);
         }
     }
 
-    /// The criterion moves on, from the place `from` on its way to `to`.
-    pub fn advance(&mut self, from: f64, to: f64) {
-        for level in 0..LEVELS {
-            let width = power(FIRST + level as i32);
-            // The first level has what could change at any moment.
-            if (level == 0 && to > from) || (to / width).floor() > (from / width).floor() {
-                self.flush(level);
+    /// The slot in which a slack that begins now ends.
+    #[inline]
+    fn slot(&self, slack: f64) -> u16 {
+        if slack == f64::INFINITY {
+            return NOWHERE;
+        }
+        // NaN must not wait long.
+        let slack = if slack.is_nan() { 0.0 } else { slack };
+        let exponent = (slack.to_bits() >> 52 & 0x7ff) as i32 - 1023;
+        let wheel = (exponent - FIRST).clamp(0, WHEELS - 1);
+        let per_slot = power(FINE - FIRST - wheel);
+        // A slack that is too large for the last wheel ends in it all the same.
+        let end = self.now + slack.min(power(FIRST + wheel + 1));
+        let first = (self.now * per_slot) as u64;
+        // What is too small for the first wheel can end at any moment: that is the slot which begins next.
+        let slot = ((end * per_slot) as u64).max(first + 1);
+        (wheel as usize * SLOTS + slot as usize % SLOTS) as u16
+    }
+
+    /// The criterion moves on by `distance`, which is finite: what waits for less is to be judged.
+    pub fn advance(&mut self, distance: f64) {
+        let (from, to) = (self.now, self.now + distance);
+        self.now = to;
+        if self.slots.is_empty() || distance <= 0.0 {
+            return;
+        }
+        for wheel in 0..WHEELS {
+            let per_slot = power(FINE - FIRST - wheel);
+            let (first, last) = ((from * per_slot) as u64, (to * per_slot) as u64);
+            // In the first wheel the next slot has what could change at any moment.
+            let last = if wheel == 0 { last.max(first + 1) } else { last };
+            let turned = (last - first).min(SLOTS as u64);
+            for slot in (0..turned).map(|i| (last - i) as usize % SLOTS) {
+                self.flush(wheel as usize * SLOTS + slot);
             }
         }
     }
 
-    fn flush(&mut self, level: usize) {
-        let mut list = std::mem::take(&mut self.levels[level]);
+    fn flush(&mut self, slot: usize) {
+        let mut list = std::mem::take(&mut self.slots[slot]);
         for id in list.drain(..) {
-            if self.place[id as usize] == level as u8 {
+            if self.place[id as usize] == slot as u16 {
                 self.open(id);
             }
         }
-        // Its memory is used again.
-        self.levels[level] = list;
+        // Its memory is used again, unless it was much.
+        if list.capacity() <= 1 << 12 {
+            self.slots[slot] = list;
+        }
     }
 
     /// Forgets everything.
     pub fn clear(&mut self) {
         self.place.clear();
         self.open.clear();
-        self.levels.iter_mut().for_each(Vec::clear);
+        self.slots.iter_mut().for_each(Vec::clear);
     }
 
     /// Bytes held.
     pub fn bytes(&self) -> u64 {
-        let lists: usize = self.levels.iter().chain([&self.open]).map(Vec::capacity).sum();
-        (self.place.capacity() + 4 * lists) as u64
+        let lists: usize = self.slots.iter().chain([&self.open]).map(Vec::capacity).sum();
+        (2 * self.place.capacity() + 4 * lists + self.slots.capacity() * size_of::<Vec<u32>>()) as u64
     }
-}
-
-/// The level of a slack: the largest power of two that is not above it, by its exponent.
-#[inline]
-fn level(slack: f64) -> u8 {
-    if slack == f64::INFINITY {
-        return NOWHERE;
-    }
-    let exponent = (slack.to_bits() >> 52 & 0x7ff) as i32 - 1023;
-    // The exponent of NaN is the largest, but it must not wait long.
-    if slack.is_nan() { 0 } else { (exponent - FIRST).clamp(0, LEVELS as i32 - 1) as u8 }
 }
 
 /// 2 to the power of `exponent`.
@@ -140,7 +173,7 @@ mod tests {
         for step in 0..3000 {
             let next = now + 1e-3 + f64::from(step % 7) * 1e-4;
             // Whoever's slack ends on this step is judged on it.
-            waiting.advance(now, next);
+            waiting.advance(next - now);
             let mut seen = vec![false; slacks.len()];
             while let Some(id) = waiting.next() {
                 seen[id as usize] = true;
@@ -149,13 +182,13 @@ mod tests {
                 waiting.defer(id, slacks[id as usize]);
             }
             for id in 0..slacks.len() {
-                assert!(seen[id] || next - since[id] < slacks[id], "{id} at {next}");
+                assert!(seen[id] || next - since[id] <= slacks[id] + 1e-12, "{id} at {next}");
             }
             now = next;
         }
         for (&slack, &looks) in slacks.iter().zip(&looks) {
             let fewest = now / slack.max(1.3e-3);
-            assert!(f64::from(looks) <= 4.0 * fewest + 2.0, "{looks} looks with a slack of {slack}");
+            assert!(f64::from(looks) <= 1.3 * fewest + 2.0, "{looks} looks with a slack of {slack}");
         }
     }
 
@@ -164,9 +197,9 @@ mod tests {
         let mut waiting = Waiting::default();
         waiting.defer(3, f64::INFINITY);
         waiting.defer(5, f64::NAN);
-        waiting.advance(0.0, 1e-9);
+        waiting.advance(1e-9);
         assert_eq!((waiting.next(), waiting.next()), (Some(5), None));
-        waiting.advance(1e-9, 1e9);
+        waiting.advance(1e9);
         assert!(waiting.is_settled());
     }
 }
