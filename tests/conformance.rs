@@ -327,7 +327,10 @@ fn requests(how: How) {
         for _ in 0..60 {
             let request = random_request(&subject, &mut random);
             let outcome = satisfy(&mut front, &subject.mt, &request);
-            assert_eq!(satisfy(&mut spelled, &subject.explicit, &request), outcome, "{request:?}");
+            // How much had to be looked at is each structure's own affair.
+            let judged = outcome.judged;
+            let other = Outcome { judged, ..satisfy(&mut spelled, &subject.explicit, &request) };
+            assert_eq!(other, outcome, "{request:?}");
             let set: Vec<bool> = (0..subject.mt.updates()).map(|u| front.contains(UpdateId(u))).collect();
             assert!((0..subject.mt.updates()).all(|u| spelled.contains(UpdateId(u)) == set[u as usize]));
             subject.assert_is(&subject.mt, front.mesh(), &set);

@@ -19,7 +19,7 @@ use std::sync::Arc;
 /// A tetrahedron of the MT as criteria see it.
 #[derive(Clone, Copy)]
 pub struct TetLook<'a> {
-    /// Positions of its corners on the lattice.
+    /// Positions of its corners on the lattice, in any positive order: what a criterion says must not depend on which.
     pub corners: &'a [[i32; 3]; 4],
     /// Levels of a field at its corners.
     pub levels: &'a dyn Fn(usize) -> [i32; 4],
