@@ -1,6 +1,10 @@
 //! How fast this machine decodes, refines, coarsens and cuts an MT, on one thread. The clock comes from outside, so
 //! that the same code runs natively and in a browser.
 
+mod coherent;
+
+pub use coherent::{Coherent, Walks};
+
 use crate::format::Decoder;
 use crate::format::FormatError;
 use crate::mt::Mt;
@@ -31,6 +35,8 @@ pub struct BenchReport {
     pub coarsen_updates: f64,
     /// Tetrahedra of the finest mesh searched per second for an isosurface in the middle of the field's range.
     pub isosurface_tets: f64,
+    /// Requests that change a little from frame to frame; these are not the fastest, but what is usual.
+    pub coherent: Walks,
 }
 
 /// Times the MT file `bytes`. `clock` gives seconds since any fixed moment; at least three runs are made, and more
@@ -47,6 +53,9 @@ pub fn run(bytes: &[u8], clock: &mut dyn FnMut() -> f64, seconds: f64) -> Result
         best = if report.runs == 0 { times } else { best.least(times) };
         report.runs += 1;
     }
+    let mut session = Session::new();
+    session.feed(bytes).map_err(SessionError::Format)?;
+    report.coherent = coherent::walks(&mut session, clock)?;
     let rate = |count: u32, time: f64| f64::from(count) / time.max(SHORTEST);
     report.decode_updates = rate(report.updates, best.decode);
     report.refine_updates = rate(report.applied, best.refine);

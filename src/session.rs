@@ -252,6 +252,12 @@ impl Session {
         self.front.as_ref().map(Front::mesh)
     }
 
+    /// Bytes that the current mesh takes with its adjacency, its form in model units, and the queues of refinement.
+    pub fn mesh_bytes(&self) -> u64 {
+        let shown = 12 * self.shown.positions.capacity() + 4 * self.shown.values.capacity();
+        self.front.as_ref().map_or(0, |front| front.mesh().bytes() + front.queue_bytes()) + shown as u64
+    }
+
     /// A hash of the current mesh that depends on nothing but the mesh; 0 until the base mesh is there.
     pub fn hash(&self) -> u64 {
         self.mesh().map_or(0, CurrentMesh::hash)

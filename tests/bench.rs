@@ -33,6 +33,12 @@ fn rates_are_counts_over_seconds() {
     assert!(near(report.refine_tets, report.tetrahedra), "{report:?}");
     assert!(near(report.coarsen_updates, report.updates), "{report:?}");
     assert!(near(report.isosurface_tets, report.tetrahedra), "{report:?}");
+    for walk in [report.coherent.roi, report.coherent.iso, report.coherent.view] {
+        let times = [walk.median_ms, walk.p95_ms, walk.cold_ms];
+        assert!(times.iter().all(|ms| (ms - 1.0).abs() < 1e-6), "{walk:?}");
+        assert!(walk.tetrahedra >= mt.base().tets.len() as u32 && walk.bytes_per_tet > 36.0, "{walk:?}");
+    }
+    assert!(report.coherent.roi.cold_updates > 0);
 }
 
 #[test]

@@ -21,7 +21,7 @@ const LAYERS: [(&str, &[&str]); 15] = [
     ("verify", &["geom", "mesh", "mt", "refine"]),
     ("view", &["geom", "mesh"]),
     ("session", &["geom", "mesh", "mt", "format", "refine", "view"]),
-    ("bench", &["format", "mt", "refine", "session"]),
+    ("bench", &["geom", "format", "mt", "refine", "session"]),
     ("gpu", &["geom", "mesh", "view"]),
     ("web", &["geom", "mesh", "mt", "format", "refine", "view", "session", "bench", "gpu", "io", "build"]),
 ];

@@ -186,7 +186,8 @@ fn field(field: &FieldInfo) -> FieldObject<'_> {
 
 /// `stats` for JavaScript; `field` is the one that the errors speak of.
 pub fn stats(stats: &RefineStats, field: &FieldInfo) -> JsStats {
-    let RefineStats { vertices, tetrahedra, applied, refined, coarsened, error_bound, satisfied } = *stats;
+    let RefineStats { vertices, tetrahedra, applied, refined, coarsened, error_bound, satisfied, .. } =
+        *stats;
     plain(&StatsObject {
         vertices,
         tetrahedra,
@@ -252,6 +253,26 @@ struct BenchObject {
     refine: Rate,
     coarsen: Rate,
     isosurface: Rate,
+    coherent: CoherentObject,
+}
+
+#[derive(Serialize)]
+struct CoherentObject {
+    #[serde(rename = "box")]
+    roi: WalkObject,
+    iso: WalkObject,
+    view: WalkObject,
+}
+
+#[derive(Serialize)]
+struct WalkObject {
+    median_ms: f64,
+    p95_ms: f64,
+    cold_ms: f64,
+}
+
+fn walk(walk: &crate::bench::Coherent) -> WalkObject {
+    WalkObject { median_ms: walk.median_ms, p95_ms: walk.p95_ms, cold_ms: walk.cold_ms }
 }
 
 /// `report` with the names of `tetralod bench --json`.
@@ -265,6 +286,11 @@ pub fn bench(report: &BenchReport) -> JsBench {
         refine: Rate { tets_per_second: Some(report.refine_tets), ..updates(report.refine_updates) },
         coarsen: updates(report.coarsen_updates),
         isosurface: Rate { updates_per_second: None, tets_per_second: Some(report.isosurface_tets) },
+        coherent: CoherentObject {
+            roi: walk(&report.coherent.roi),
+            iso: walk(&report.coherent.iso),
+            view: walk(&report.coherent.view),
+        },
     })
 }
 

@@ -79,10 +79,17 @@ fn print(native: &Rates, browser: Option<&[(String, f64)]>) {
     for (name, value) in native {
         let other = browser.and_then(|rates| rates.iter().find(|(other, _)| other == name));
         match other {
-            Some((_, other)) => println!("{name:<36} {value:>14.0} {other:>14.0} {:>7.2}", other / value),
-            None => println!("{name:<36} {value:>14.0} {:>14} {:>7}", "-", "-"),
+            Some((_, other)) => {
+                println!("{name:<36} {:>14} {:>14} {:>7.2}", short(*value), short(*other), other / value)
+            }
+            None => println!("{name:<36} {:>14} {:>14} {:>7}", short(*value), "-", "-"),
         }
     }
+}
+
+/// Small numbers are milliseconds and bytes.
+fn short(value: f64) -> String {
+    if value.abs() < 1000.0 && value.fract() != 0.0 { format!("{value:.2}") } else { format!("{value:.0}") }
 }
 
 #[cfg(test)]

@@ -35,6 +35,36 @@ struct Report {
     refine: Refine,
     coarsen: Updates,
     isosurface: Tets,
+    coherent: Coherent,
+    bytes_per_tet: f64,
+}
+
+/// Requests that change a little from frame to frame.
+#[derive(Serialize)]
+struct Coherent {
+    #[serde(rename = "box")]
+    roi: Walk,
+    iso: Walk,
+    view: Walk,
+}
+
+#[derive(Serialize)]
+struct Walk {
+    median_ms: f64,
+    p95_ms: f64,
+    cold_ms: f64,
+    updates: u64,
+    cold_updates: u64,
+    tetrahedra: u32,
+    bytes_per_tet: f64,
+}
+
+impl From<bench::Coherent> for Walk {
+    fn from(walk: bench::Coherent) -> Self {
+        let bench::Coherent { median_ms, p95_ms, cold_ms, updates, cold_updates, tetrahedra, bytes_per_tet } =
+            walk;
+        Self { median_ms, p95_ms, cold_ms, updates, cold_updates, tetrahedra, bytes_per_tet }
+    }
 }
 
 #[derive(Serialize)]
@@ -80,8 +110,19 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         refine: Refine { updates_per_second: found.refine_updates, tets_per_second: found.refine_tets },
         coarsen: Updates { updates_per_second: found.coarsen_updates },
         isosurface: Tets { tets_per_second: found.isosurface_tets },
+        coherent: Coherent {
+            roi: found.coherent.roi.into(),
+            iso: found.coherent.iso.into(),
+            view: found.coherent.view.into(),
+        },
+        bytes_per_tet: bytes_per_tet(&found.coherent),
     };
     if arguments.json { output::json(&report) } else { print(&report) }
+}
+
+/// The most of the three: where the mesh is small beside the MT, so are what it knows of the MT's vertices and updates.
+fn bytes_per_tet(walks: &bench::Walks) -> f64 {
+    walks.roi.bytes_per_tet.max(walks.iso.bytes_per_tet).max(walks.view.bytes_per_tet)
 }
 
 fn run_delaunay(arguments: &Arguments) -> Result<()> {
@@ -121,6 +162,12 @@ fn random_points(count: usize) -> Vec<[i32; 3]> {
 }
 
 fn print(report: &Report) -> Result<()> {
+    let walk = |walk: &Walk| {
+        let Walk { median_ms, p95_ms, cold_ms, updates, .. } = walk;
+        format!(
+            "{median_ms:.2} ms a frame of {updates} updates, 95 % within {p95_ms:.2} ms; from the base mesh {cold_ms:.1} ms"
+        )
+    };
     let rate =
         |per_second: f64, what: &str| format!("{} {what} per second", output::count(per_second as u64));
     output::table(&[
@@ -129,6 +176,10 @@ fn print(report: &Report) -> Result<()> {
         ("", rate(report.refine.tets_per_second, "tetrahedra")),
         ("coarsen", rate(report.coarsen.updates_per_second, "updates")),
         ("isosurface", rate(report.isosurface.tets_per_second, "tetrahedra")),
+        ("moving box", walk(&report.coherent.roi)),
+        ("moving isovalue", walk(&report.coherent.iso)),
+        ("turning camera", walk(&report.coherent.view)),
+        ("memory", format!("{:.0} bytes a tetrahedron of the mesh", report.bytes_per_tet)),
         ("", format!("the fastest of {} runs on one thread", report.runs)),
     ])
 }
