@@ -52,6 +52,16 @@ struct Goal {
     outcome: Outcome,
 }
 
+/// How far [`Front::converge`] has come.
+enum Way {
+    /// All the way.
+    Done,
+    /// It was told to stop.
+    Paused,
+    /// The budget is exceeded.
+    Full,
+}
+
 #[derive(Clone, Copy, Debug)]
 struct Asked {
     update: UpdateId,
@@ -269,7 +279,14 @@ impl Front {
                 self.forget_watch();
                 self.satisfy_uniform(mt, tolerance, outcome, go_on)?
             }
-            None if budget.is_unlimited() => self.converge(mt, &**criterion, outcome, go_on)?,
+            // Most budgets are there for safety: while they leave room, nothing needs to be compared.
+            None if budget.is_unlimited() || !restarts && self.ranked.has_room() => {
+                match self.converge(mt, &**criterion, *budget, outcome, go_on)? {
+                    Way::Done => true,
+                    Way::Paused => false,
+                    Way::Full => self.ranked_converge(mt, &**criterion, *budget, outcome, go_on)?,
+                }
+            }
             None => self.ranked_converge(mt, &**criterion, *budget, outcome, go_on)?,
         };
         goal.reached = done;
@@ -317,15 +334,25 @@ impl Front {
         Ok(true)
     }
 
-    /// Refines until no tetrahedron violates the criterion, then undoes what nothing asks for.
+    /// Refines until no tetrahedron violates the criterion, and undoes what nothing asks for: afterwards, or first if there is a
+    /// budget. Then what is left is asked for, and the mesh only grows to what it is in the end.
     fn converge(
         &mut self,
         mt: &impl MultiTessellation,
         criterion: &dyn Criterion,
+        budget: Budget,
         outcome: &mut Outcome,
         go_on: GoOn<'_>,
-    ) -> Result<bool, UpdateError> {
+    ) -> Result<Way, UpdateError> {
         self.watch_all(mt);
+        if !budget.is_unlimited() {
+            while let Some(u) = self.leaves.next().map(UpdateId) {
+                self.coarsen_unless_needed(mt, criterion, u, outcome)?;
+            }
+            if !budget.holds(self.mesh.vertex_count(), self.mesh.tet_count()) {
+                return Ok(Way::Full);
+            }
+        }
         loop {
             while let Some(asked) = self.next_asked(mt, criterion, outcome) {
                 if self.contains(asked.update) {
@@ -335,13 +362,16 @@ impl Front {
                 // It is a leaf now; those that it forced are none.
                 self.leaves.defer(asked.update.0, asked.slack);
                 self.open_touched();
+                if !budget.holds(self.mesh.vertex_count(), self.mesh.tet_count()) {
+                    return Ok(Way::Full);
+                }
                 if !go_on(outcome) {
-                    return Ok(false);
+                    return Ok(Way::Paused);
                 }
             }
-            let Some(u) = self.leaves.next().map(UpdateId) else { return Ok(true) };
+            let Some(u) = self.leaves.next().map(UpdateId) else { return Ok(Way::Done) };
             if self.coarsen_unless_needed(mt, criterion, u, outcome)? && !go_on(outcome) {
-                return Ok(false);
+                return Ok(Way::Paused);
             }
         }
     }
@@ -587,7 +617,7 @@ impl Front {
     /// Works out how good the mesh is, which is packed.
     fn report(&self, mt: &impl MultiTessellation, goal: &mut Goal) {
         let complete = self.known >= mt.info().updates;
-        let satisfied = goal.budget.is_unlimited() || self.ranked.is_satisfied();
+        let satisfied = goal.budget.is_unlimited() || self.ranked.has_room();
         let criterion = &*goal.criterion;
         let (error, excess) = if complete && satisfied {
             (criterion.tolerance().min(self.largest_to_come(mt)), 1.0)

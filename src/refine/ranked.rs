@@ -51,8 +51,11 @@ enum State {
 }
 
 impl Ranked {
+    /// Forgets the queues. Whether the budget had room for the last request is remembered: as like as not it is so again.
     pub fn clear(&mut self) {
-        self.state = State::Idle;
+        if self.state == State::Running {
+            self.state = State::Idle;
+        }
         self.refinable.clear();
         self.coarsenable.clear();
         self.moved.clear();
@@ -69,8 +72,9 @@ impl Ranked {
         self.state == State::Running
     }
 
-    pub fn is_satisfied(&self) -> bool {
-        self.state == State::Satisfied
+    /// Whether the budget allowed all that was asked for last, as far as is known.
+    pub fn has_room(&self) -> bool {
+        matches!(self.state, State::Idle | State::Satisfied)
     }
 
     pub fn bytes(&self) -> u64 {
