@@ -15,7 +15,9 @@ use super::MtInfo;
 use super::VertexId;
 use super::insertion::Cavity;
 pub(super) use super::ring::LINK_CAPACITY;
+use super::ring::RING_CAPACITY;
 use super::ring::Ring;
+use super::ring::TURN;
 use super::taken::Taken;
 use crate::mesh::FACES;
 use crate::mesh::NONE;
@@ -429,11 +431,9 @@ impl CurrentMesh {
     /// Makes neighbour `t` of `from` a neighbour of `to` instead.
     #[inline]
     pub(crate) fn relink(&mut self, t: u32, from: u32, to: u32) {
-        for n in &mut self.neighbors[t as usize] {
-            if *n == from {
-                *n = to;
-            }
-        }
+        let around = &mut self.neighbors[t as usize];
+        // A choice for each, not a branch.
+        *around = around.map(|n| if n == from { to } else { n });
         self.changed_tets.mark(t);
     }
 
@@ -481,65 +481,92 @@ impl CurrentMesh {
         Ok(())
     }
 
-    /// Collects the tetrahedra around the vertex in `slot` with their link, and marks them. Stops at a link vertex
-    /// that an update before `update` splits.
+    /// Collects the tetrahedra around the vertex in `slot` with their link, and marks them. Stops if an update before
+    /// `update` splits a link vertex.
     #[inline]
     pub(super) fn gather_ring(&mut self, slot: u32, update: u32, ring: &mut Ring) -> Result<(), Gather<u32>> {
         self.next_epoch();
-        let mark = self.epoch << MARK_BITS;
         let first = self.incident[slot as usize];
+        let (tet, around) = (self.tets[first as usize], self.neighbors[first as usize]);
+        let (mut len, mut queued, mut first_split) = (0, 1, NONE);
+        ring.link_len = 0;
+        // As if the first tetrahedron had been found through one of its faces.
+        let centre = corner_of(&tet, slot);
+        let [_, through, k, l] = TURN[4 * centre + (centre + 1) % 4].map(|corner| corner as usize & 3);
+        let a = self.number(tet[k], ring, &mut first_split);
+        let b = self.number(tet[l], ring, &mut first_split);
+        self.marks[first as usize] = self.epoch << MARK_BITS;
         ring.tets[0] = first;
-        self.marks[first as usize] = mark;
-        let (mut len, mut queued, mut link_len) = (0, 1, 0);
-        let mut first_split = NONE;
-        // Which of its neighbours and vertices are new is a coin toss for the processor: the entries after the last
-        // one are written anyway, and counted if they were new.
-        // Lengths stay below the capacities (a star of n tetrahedra that hang together has a link of at most n + 2
-        // vertices), so the remainders change nothing; they spare the compiler its checks.
+        ring.link_of[0] = a << 8 | b << 16;
+        ring.beside[0] = self.follow(around[through], [first, 0], b << 8 | a << 16, ring, &mut queued);
         while len < queued {
-            let t = ring.tets[len % MAX_STAR] as usize;
-            let (tet, around) = (self.tets[t], self.neighbors[t]);
-            let corner = (usize::from(tet[1] == slot))
-                | (usize::from(tet[2] == slot) << 1)
-                | (usize::from(tet[3] == slot) * 3);
-            let mut local = [0; 4];
-            let face = FACES[corner & 3].map(|k| k & 3);
-            for &k in &face {
-                let v = tet[k];
-                let Some(old) = self.vertex_marks.get_mut(v as usize) else { break };
-                let is_new = *old & !MARK_MASK != mark;
-                let own = if is_new { mark | link_len as u32 } else { *old };
-                *old = own;
-                local[k] = (own & MARK_MASK) as u8;
-                ring.link[link_len % LINK_CAPACITY] = v;
-                link_len += usize::from(is_new);
-                first_split = first_split.min(self.labels[v as usize].split);
+            if queued as usize > MAX_STAR {
+                return Err(Gather::TooLarge);
             }
-            if first_split < update {
-                return Err(Gather::Stopped(first_split));
-            }
-            for &k in &face {
-                let n = around[k];
-                // Also NONE is beyond the array.
-                let Some(old) = self.marks.get_mut(n as usize) else { continue };
-                let is_new = *old & !MARK_MASK != mark;
-                if queued == MAX_STAR {
-                    if is_new {
-                        return Err(Gather::TooLarge);
-                    }
-                    continue;
-                }
-                *old = if is_new { mark | queued as u32 } else { *old };
-                ring.tets[queued % MAX_STAR] = n;
-                queued += usize::from(is_new);
-            }
-            ring.verts[len % MAX_STAR] = tet;
-            ring.corner[len % MAX_STAR] = corner as u8;
-            ring.local[len % MAX_STAR] = local;
+            let place = len as usize % RING_CAPACITY;
+            let t = ring.tets[place];
+            let (tet, around) = (self.tets[t as usize], self.neighbors[t as usize]);
+            let from = if len == 0 { through } else { corner_of(&around, ring.from[place]) };
+            let turn = TURN[(4 * corner_of(&tet, slot) + from) % 16];
+            let [_, own, k, l] = turn.map(|corner| corner as usize & 3);
+            let x = self.number(tet[own], ring, &mut first_split);
+            let link = ring.link_of[place] | x;
+            let beyond_k = self.follow(around[k], [t, len], x << 8 | link & 0xFF_0000, ring, &mut queued);
+            let beyond_l = self.follow(around[l], [t, len], link & 0xFF00 | x << 16, ring, &mut queued);
+            ring.turn[place] = turn;
+            ring.link_of[place] = link;
+            ring.beside[place] |= beyond_k << 8 | beyond_l << 16;
             len += 1;
         }
-        (ring.len, ring.link_len) = (len, link_len);
-        Ok(())
+        ring.len = len as usize;
+        if first_split < update { Err(Gather::Stopped(first_split)) } else { Ok(()) }
+    }
+
+    /// The index of tetrahedron `n` in the ring, found through a face of `t` with the index `behind`; that index again
+    /// if there is none.
+    ///
+    /// Whether it is new is a coin toss for the processor: the entry after the last one is written anyway, and counted if
+    /// it was new. Lengths stay below the capacities, so the remainders change nothing.
+    #[inline(always)]
+    fn follow(
+        &mut self,
+        n: u32,
+        [t, behind]: [u32; 2],
+        shared: u32,
+        ring: &mut Ring,
+        queued: &mut u32,
+    ) -> u32 {
+        // Also NONE is beyond the array.
+        let Some(old) = self.marks.get_mut(n as usize) else { return behind };
+        let mark = self.epoch << MARK_BITS;
+        let is_new = *old & !MARK_MASK != mark;
+        let own = if is_new { mark | *queued } else { *old };
+        *old = own;
+        let place = *queued as usize % RING_CAPACITY;
+        ring.tets[place] = n;
+        ring.from[place] = t;
+        ring.link_of[place] = shared;
+        ring.beside[place] = behind;
+        *queued += u32::from(is_new);
+        own & MARK_MASK
+    }
+
+    /// The index of a link vertex in the ring, where it is put if it is new.
+    #[inline(always)]
+    fn number(&mut self, v: u32, ring: &mut Ring, first_split: &mut u32) -> u32 {
+        let mark = self.epoch << MARK_BITS;
+        let old = &mut self.vertex_marks[v as usize];
+        let is_new = *old & !MARK_MASK != mark;
+        let own = if is_new { mark | ring.link_len as u32 } else { *old };
+        *old = own;
+        let place = ring.link_len % LINK_CAPACITY;
+        let labels = self.labels[v as usize];
+        ring.link[place] = v;
+        // The shift keeps the order.
+        ring.numbers[place] = (labels.vertex ^ 1 << 31) as i32;
+        ring.link_len += usize::from(is_new);
+        *first_split = labels.split.min(*first_split);
+        own & MARK_MASK
     }
 
     fn next_epoch(&mut self) {
@@ -674,16 +701,6 @@ impl CurrentMesh {
 
     pub(super) fn put_back_ring(&mut self, ring: Box<Ring>) {
         self.ring = Some(ring);
-    }
-
-    /// The index of `t` in the star that was gathered last, if it is in it.
-    #[inline]
-    pub(crate) fn in_star(&self, t: u32) -> Option<usize> {
-        if t == NONE {
-            return None;
-        }
-        let mark = self.marks[t as usize];
-        (mark >> MARK_BITS == self.epoch).then_some((mark & (GATHERED as u32 - 1)) as usize)
     }
 
     /// A free or new tetrahedron slot, to be filled by the caller.
@@ -866,6 +883,12 @@ impl CurrentMesh {
         }
         Ok(())
     }
+}
+
+/// Where a value is in an array that holds it once, without a branch.
+#[inline(always)]
+fn corner_of(array: &[u32; 4], value: u32) -> usize {
+    usize::from(array[1] == value) | usize::from(array[2] == value) << 1 | usize::from(array[3] == value) * 3
 }
 
 /// A finaliser that spreads every input bit over the word (the constants are those of SplitMix64).

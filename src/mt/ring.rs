@@ -4,98 +4,134 @@
 use super::CurrentMesh;
 use super::MAX_LINK;
 use super::MAX_STAR;
+use crate::geom::orient3d;
 use crate::mesh::FACES;
-use std::iter::Sum;
-use std::ops::{Add, Mul, Sub};
+use std::ops::AddAssign;
 
-/// "The fan ends here."
-pub(super) const NO_PARTNER: u8 = u8::MAX;
+/// "The fan ends here": no index of a fan triangle, but one of an array of [`FAN_CAPACITY`].
+pub(super) const NO_PARTNER: u8 = FAN_CAPACITY as u8 - 1;
 
-/// `REST[i][j]`: the two corners other than `i` and `j`, ascending.
-pub(super) const REST: [[[u8; 2]; 4]; 4] = [
-    [[0, 0], [2, 3], [1, 3], [1, 2]],
-    [[2, 3], [0, 0], [0, 3], [0, 2]],
-    [[1, 3], [0, 3], [0, 0], [0, 1]],
-    [[1, 2], [0, 2], [0, 1], [0, 0]],
-];
+/// `TURN[4 * i + j]`: corners `i` and `j` of a tetrahedron and the other two, such that the last three see the first
+/// as the vertices of its opposite face in [`FACES`] do: an even permutation.
+pub(super) const TURN: [[u8; 4]; 16] = turns();
 
-/// One triangle of the fan that parts a star, by indices into the ring.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct FanTriangle {
-    /// The tetrahedron of side 0.
-    pub near: u8,
-    /// Its face that is the fan triangle.
-    pub face: u8,
-    /// The tetrahedron of side 1.
-    pub far: u8,
-    /// At both link vertices, in the order of [`REST`], the triangle that shares the edge to it.
-    pub partner: [u8; 2],
+const fn turns() -> [[u8; 4]; 16] {
+    let mut turns = [[0; 4]; 16];
+    let mut at = 0;
+    while at < 12 {
+        let (i, k) = (at / 3, at % 3);
+        let face = FACES[i];
+        turns[4 * i + face[k]] = [i as u8, face[k] as u8, face[(k + 1) % 3] as u8, face[(k + 2) % 3] as u8];
+        at += 1;
+    }
+    turns
 }
 
-/// The most link vertices that are numbered: a star that is too large to be split is known by then. A link of at
-/// most [`MAX_STAR`] triangles that hang together has two more vertices than triangles at most.
+/// One triangle of the fan that parts a star.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct FanTriangle {
+    /// The tetrahedra of sides 0 and 1, by index into the ring.
+    pub near: u8,
+    pub far: u8,
+    /// In the tetrahedron of side 0, the face that is the fan triangle and the corners at its two link vertices, which
+    /// follow each other as the triangles of the fan do.
+    pub corners: [u8; 3],
+    /// The two link vertices.
+    pub ends: [u8; 2],
+}
+
+/// The most tetrahedra and link vertices that are numbered: a star that is too large to be split is known by then. A
+/// link of triangles that hang together has at most two more vertices than triangles.
 pub(super) const LINK_CAPACITY: usize = 4 * MAX_LINK;
+/// A star may be too large by two before that is noticed.
+pub(super) const RING_CAPACITY: usize = 2 * MAX_STAR;
+/// A fan may be too long by three before that is noticed.
+pub(super) const FAN_CAPACITY: usize = 2 * MAX_LINK;
 
 /// Scratch space for a split: a star and its link, the two sides and the fan between them.
+///
+/// The link is a surface: each tetrahedron but the first was found through a face of the one before, and so shares two
+/// link vertices with it. Seen from outside, its link triangle is `own`, the vertex that is not shared, and the two
+/// shared ones in order; `turn` has the corners at the centre and at these three.
 #[derive(Clone, Debug)]
 pub(super) struct Ring {
     pub len: usize,
-    pub tets: [u32; MAX_STAR],
-    pub verts: [[u32; 4]; MAX_STAR],
-    /// Which corner of each tetrahedron is the centre.
-    pub corner: [u8; MAX_STAR],
-    /// The link vertices of each tetrahedron; the centre's entry is unused.
-    pub local: [[u8; 4]; MAX_STAR],
+    pub tets: [u32; RING_CAPACITY],
+    /// The tetrahedron through which each was found.
+    pub from: [u32; RING_CAPACITY],
+    /// Which corners of each tetrahedron are the centre and the three link vertices.
+    pub turn: [[u8; 4]; RING_CAPACITY],
+    /// The link vertices of each tetrahedron, one a byte from the lowest.
+    pub link_of: [u32; RING_CAPACITY],
+    /// For each link vertex the tetrahedron across the face opposite to it, in the same form; where there is none, the
+    /// tetrahedron itself.
+    pub beside: [u32; RING_CAPACITY],
     pub link_len: usize,
     /// Slots of the link vertices.
     pub link: [u32; LINK_CAPACITY],
+    /// Vertex numbers of the link vertices, as signed numbers of the same order: these compare in one instruction.
+    pub numbers: [i32; LINK_CAPACITY],
     /// Bit `i` is the side of tetrahedron `i`.
     pub sides: u64,
     pub fan_len: usize,
-    pub fan: [FanTriangle; MAX_LINK],
+    pub fan: [FanTriangle; FAN_CAPACITY],
+    /// The fan triangle that ends at each link vertex, and that which begins there.
+    pub before: [u8; MAX_LINK],
+    pub after: [u8; MAX_LINK],
+    /// The link vertices as seen from `v'` and from `v''`.
+    seen: [[[f64; 3]; MAX_LINK]; 2],
 }
 
 impl Default for Ring {
     fn default() -> Self {
         Self {
             len: 0,
-            tets: [0; MAX_STAR],
-            verts: [[0; 4]; MAX_STAR],
-            corner: [0; MAX_STAR],
-            local: [[0; 4]; MAX_STAR],
+            tets: [0; RING_CAPACITY],
+            from: [0; RING_CAPACITY],
+            turn: [[0; 4]; RING_CAPACITY],
+            link_of: [0; RING_CAPACITY],
+            beside: [0; RING_CAPACITY],
             link_len: 0,
             link: [0; LINK_CAPACITY],
+            numbers: [0; LINK_CAPACITY],
             sides: 0,
             fan_len: 0,
-            fan: [FanTriangle::default(); MAX_LINK],
+            fan: [FanTriangle::default(); FAN_CAPACITY],
+            before: [0; MAX_LINK],
+            after: [0; MAX_LINK],
+            seen: [[[0.0; 3]; MAX_LINK]; 2],
         }
     }
+}
+
+/// Three indices that share a word.
+#[inline]
+fn three(word: u32) -> [usize; 3] {
+    [0, 8, 16].map(|shift| (word >> shift & 0xFF) as usize)
 }
 
 impl Ring {
     /// Parts the star by a mask in canonical order: ascending by the sorted vertex numbers of the opposite faces.
     /// False if the mask has bits beyond the star.
     #[inline]
-    pub fn find_sides(&mut self, mesh: &CurrentMesh, mask: u64) -> bool {
+    pub fn find_sides(&mut self, mask: u64) -> bool {
         if self.len < 64 && mask >> self.len != 0 {
             return false;
         }
         let mut numbers = [i32::MAX; MAX_LINK];
-        for (number, &v) in numbers.iter_mut().zip(&self.link[..self.link_len]) {
-            // Signed numbers compare in one instruction; the shift keeps the order.
-            *number = (mesh.labels[v as usize].vertex ^ 1 << 31) as i32;
-        }
-        let rank: [i32; MAX_LINK] = ranks(&numbers, self.link_len);
+        numbers[..self.link_len].copy_from_slice(&self.numbers[..self.link_len]);
+        let mut order = [0; MAX_LINK];
+        rank(&numbers, self.link_len, &mut order);
         // Three ranks of five bits: as few as that, a whole star is ranked with a handful of vector instructions.
         let mut keys = [i16::MAX; MAX_STAR];
-        for (i, key) in keys[..self.len].iter_mut().enumerate() {
-            let [j, k, l] = FACES[self.corner[i] as usize & 3];
-            let [a, b, c] = [j, k, l].map(|k| rank[self.local[i][k & 3] as usize % MAX_LINK] as i16);
+        for (key, &link) in keys.iter_mut().zip(&self.link_of[..self.len]) {
+            let [a, b, c] = three(link).map(|x| order[x % MAX_LINK] as i16);
             let (low, high) = (a.min(b), a.max(b));
             let (least, most) = (low.min(c), high.max(c));
             *key = least << 10 | low.max(c.min(high)) << 5 | most;
         }
-        let place: [i16; MAX_STAR] = ranks(&keys, self.len);
+        let mut place = [0; MAX_STAR];
+        rank(&keys, self.len, &mut place);
         self.sides =
             place[..self.len].iter().enumerate().fold(0, |s, (i, &r)| s | (mask >> (r & 63) & 1) << i);
         true
@@ -105,154 +141,132 @@ impl Ring {
     /// around a closed loop of the link, or along one path. A path ends at the border of the link, since around an
     /// inner vertex of the link the sides change an even number of times. On its way it may touch the border: the
     /// fan tetrahedra hold the parts of that side together.
+    ///
+    /// Side 0 lies on the same hand of every step of that way. Where two steps leave from a link vertex, or two arrive,
+    /// three triangles meet in an edge, or two whose tetrahedra would lie on the same side of the face between them
+    /// (around an edge where the mesh is not a manifold).
     #[inline]
-    pub fn find_fan(&mut self, mesh: &CurrentMesh) -> bool {
+    pub fn find_fan(&mut self) -> bool {
         self.fan_len = 0;
-        for i in (0..self.len).filter(|i| self.sides >> i & 1 == 0) {
-            let around = mesh.neighbors[self.tets[i] as usize];
-            for &j in &FACES[self.corner[i] as usize & 3] {
-                let Some(n) = mesh.in_star(around[j]).filter(|n| self.sides >> n & 1 == 1) else { continue };
-                let triangle =
-                    FanTriangle { near: i as u8, face: j as u8, far: n as u8, partner: [NO_PARTNER; 2] };
-                let Some(place) = self.fan.get_mut(self.fan_len) else { return false };
-                *place = triangle;
-                self.fan_len += 1;
+        (self.before, self.after) = ([NO_PARTNER; MAX_LINK], [NO_PARTNER; MAX_LINK]);
+        let (mut left, mut reached, mut twice) = (0_u32, 0_u32, 0_u32);
+        let mut rest = !self.sides & u64::MAX >> (64 - self.len);
+        while rest != 0 {
+            let i = rest.trailing_zeros() as usize;
+            rest &= rest - 1;
+            let beside = three(self.beside[i]);
+            let ([_, j, k, l], [a, b, c]) = (self.turn[i], three(self.link_of[i]).map(|x| x as u8));
+            // Whether a face is of the fan is a coin toss for the processor: the triangle after the last one is written
+            // anyway, and counted if it belongs there.
+            for (far, corners, ends) in [
+                (beside[0], [j, k, l], [b, c]),
+                (beside[1], [k, l, j], [c, a]),
+                (beside[2], [l, j, k], [a, b]),
+            ] {
+                self.fan[self.fan_len % FAN_CAPACITY] =
+                    FanTriangle { near: i as u8, far: far as u8, corners, ends };
+                self.fan_len += (self.sides >> (far & 63) & 1) as usize;
+            }
+            if self.fan_len > MAX_LINK {
+                return false;
             }
         }
-        let Some(loose) = self.find_partners() else { return false };
-        let start = match loose {
-            0 => 0,
-            2 => {
-                let ends_here = |f: &FanTriangle| f.partner.contains(&NO_PARTNER);
-                self.fan[..self.fan_len].iter().position(ends_here).unwrap_or(0)
-            }
-            _ => return false,
-        };
-        self.fan_len > 0 && self.walk(start) == self.fan_len
-    }
-
-    /// Finds, for both link vertices of every triangle, the other triangle there. Returns how many have none;
-    /// nothing if three triangles meet in an edge, or two whose tetrahedra would lie on the same side of the face
-    /// between them (around an edge where the mesh is not a manifold).
-    #[inline]
-    fn find_partners(&mut self) -> Option<usize> {
-        let mut open = [NO_PARTNER; MAX_LINK];
-        let mut parity = [0; MAX_LINK];
-        let mut closed = 0_u32;
-        let mut loose = 0;
-        for f in 0..self.fan_len {
-            let FanTriangle { near, face, .. } = self.fan[f];
-            let (c, j) = (self.corner[near as usize] as usize, face as usize);
-            let ends = REST[c][j];
-            // Whether the corners (v'', v', first end, second end) are an odd permutation of the tetrahedron's.
-            let odd = (c + j + usize::from(c < j)) & 1;
-            for (side, end) in ends.into_iter().enumerate() {
-                let x = self.local[near as usize][end as usize] as usize;
-                if closed >> x & 1 == 1 || (open[x] != NO_PARTNER && parity[x] == odd ^ side) {
-                    return None;
-                }
-                if open[x] == NO_PARTNER {
-                    open[x] = (f * 2 + side) as u8;
-                    parity[x] = odd ^ side;
-                    loose += 1;
-                } else {
-                    let other = open[x] as usize;
-                    self.fan[other / 2].partner[other % 2] = f as u8;
-                    self.fan[f].partner[side] = (other / 2) as u8;
-                    closed |= 1 << x;
-                    loose -= 1;
-                }
-            }
+        for (f, triangle) in (0..).zip(&self.fan[..self.fan_len]) {
+            let [start, end] = triangle.ends.map(|x| x as usize % MAX_LINK);
+            self.after[start] = f;
+            self.before[end] = f;
+            twice |= left & 1 << start | reached & 1 << end;
+            left |= 1 << start;
+            reached |= 1 << end;
         }
-        Some(loose)
+        let start = left & !reached;
+        let first = if start == 0 { 0 } else { self.after[start.trailing_zeros() as usize] };
+        twice == 0
+            && (left ^ reached).count_ones() <= 2
+            && self.fan_len > 0
+            && self.walk(first) == self.fan_len
     }
 
     /// Number of triangles met when going along the fan from `start`: once around, or to the end.
     #[inline]
-    fn walk(&self, start: usize) -> usize {
-        let mut entered =
-            usize::from(self.fan[start].partner[0] != NO_PARTNER && self.fan[start].partner[1] == NO_PARTNER);
+    fn walk(&self, start: u8) -> usize {
         let (mut at, mut count) = (start, 0);
         while count < self.fan_len {
             count += 1;
-            let next = self.fan[at].partner[1 - entered];
-            if next == NO_PARTNER || next as usize == start {
+            at = self.after[self.fan[at as usize % FAN_CAPACITY].ends[1] as usize % MAX_LINK];
+            if at == NO_PARTNER || at == start {
                 break;
             }
-            entered = usize::from(self.fan[next as usize].partner[0] as usize != at);
-            at = next as usize;
         }
         count
     }
 
     /// Whether all tetrahedra after the split are positive, given the positions of `v'` and `v''`; exactly.
     #[inline]
-    pub fn is_positive<T: Exact>(&self, mesh: &CurrentMesh, halves: [[i32; 3]; 2]) -> bool {
-        let difference = |p: [i32; 3], q: [i32; 3]| [0, 1, 2].map(|k| T::from(p[k] - q[k]));
-        let mut relative = [[[T::from(0); 3]; MAX_LINK]; 2];
-        for (i, &v) in self.link[..self.link_len].iter().enumerate() {
+    pub fn is_positive(&mut self, mesh: &CurrentMesh, halves: [[i32; 3]; 2], lattice_bits: u32) -> bool {
+        let difference = |p: [i32; 3], q: [i32; 3]| [0, 1, 2].map(|k| f64::from(p[k] - q[k]));
+        for (i, &v) in self.link[..self.link_len.min(MAX_LINK)].iter().enumerate() {
             let position = mesh.positions[v as usize];
-            relative[0][i] = difference(position, halves[0]);
-            relative[1][i] = difference(position, halves[1]);
+            self.seen[0][i] = difference(position, halves[0]);
+            self.seen[1][i] = difference(position, halves[1]);
         }
+        let doubt = doubt(lattice_bits);
+        let corner = |side: usize, x: usize| self.seen[side][x % MAX_LINK];
         // The centre followed by the opposite face, outward, is a positive order.
-        let corners = |i: usize, side: usize| {
-            FACES[self.corner[i] as usize & 3]
-                .map(|k| relative[side & 1][self.local[i][k & 3] as usize % MAX_LINK])
-        };
-        let zero = T::from(0);
-        let star = (0..self.len).all(|i| determinant(corners(i, (self.sides >> i & 1) as usize)) > zero);
-        // With v'' in place of its outer corner, a near tetrahedron is the fan tetrahedron mirrored.
+        let star = (0..self.len).all(|i| {
+            let side = (self.sides >> i & 1) as usize;
+            is_positive(three(self.link_of[i]).map(|x| corner(side, x)), doubt)
+        });
+        // v' sees v'' beyond the fan triangle, whose ends turn the other way round than in the tetrahedron of side 0.
         let across = difference(halves[1], halves[0]);
         star && self.fan[..self.fan_len].iter().all(|triangle| {
-            let i = triangle.near as usize;
-            let mut mirrored = corners(i, 0);
-            let face = FACES[self.corner[i] as usize];
-            for (place, k) in mirrored.iter_mut().zip(face) {
-                if k == triangle.face as usize {
-                    *place = across;
-                }
-            }
-            determinant(mirrored) < zero
+            let [a, b] = triangle.ends.map(|x| corner(0, x as usize));
+            is_positive([across, b, a], doubt)
         })
     }
 }
 
-/// For each of the first `len` keys, how many keys are smaller. Keys beyond `len` must be the largest there are.
-/// Quadratic, but without a branch: for a few dozen keys that beats sorting. Counts are as wide as the keys, so that
-/// whole vectors of comparisons are added up.
+/// For each of the first `len` keys, how many keys are smaller. Keys beyond `len` must be the largest there are, and
+/// their ranks mean nothing. Quadratic, but without a branch: for a few dozen keys that beats sorting. Eight keys at a
+/// time are compared with one, and counts are as wide as the keys: whole vectors are added up.
 #[inline]
-fn ranks<K: Copy + PartialOrd + From<bool> + Sum, const N: usize>(keys: &[K; N], len: usize) -> [K; N] {
-    let mut ranks = [K::from(false); N];
-    rank(keys, len, &mut ranks);
-    ranks
-}
-
-/// [`ranks`] into an array that is there.
-#[inline]
-pub(super) fn rank<K: Copy + PartialOrd + From<bool> + Sum, const N: usize>(
+pub(super) fn rank<K: Copy + PartialOrd + From<bool> + AddAssign, const N: usize>(
     keys: &[K; N],
     len: usize,
     ranks: &mut [K; N],
 ) {
-    let compared = &keys[..len.next_multiple_of(8).min(N)];
-    for (rank, key) in ranks.iter_mut().zip(&keys[..len]) {
-        *rank = compared.iter().map(|other| K::from(other < key)).sum();
+    const { assert!(N.is_multiple_of(LANES)) };
+    let eights = keys.chunks_exact(LANES).take(len.div_ceil(LANES));
+    for (ranks, lanes) in ranks.chunks_exact_mut(LANES).zip(eights) {
+        let mut counts = [K::from(false); LANES];
+        for key in &keys[..len] {
+            for (count, other) in counts.iter_mut().zip(lanes) {
+                *count += K::from(key < other);
+            }
+        }
+        ranks.copy_from_slice(&counts);
     }
 }
 
-/// Integers that hold the determinants of a lattice: `i64` up to [`crate::geom::NARROW_BITS`], else `i128`.
-pub(super) trait Exact:
-    Copy + PartialOrd + From<i32> + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
-{
+const LANES: usize = 8;
+
+/// Below this, the sign of a determinant in floating-point numbers is in doubt. With differences `d` of `b` bits and
+/// the unit `e = 2^-53`, an error is at most `32 e d^3`; up to 16 bits all that comes up is a whole number below 2^53.
+fn doubt(lattice_bits: u32) -> f64 {
+    if lattice_bits <= 16 { 0.0 } else { (1_u64 << (3 * lattice_bits - 48).min(63)) as f64 }
 }
 
-impl Exact for i64 {}
-impl Exact for i128 {}
-
+/// Whether three whole vectors are right-handed, exactly.
 #[inline]
-fn determinant<T: Exact>([u, v, w]: [[T; 3]; 3]) -> T {
-    (u[1] * v[2] - u[2] * v[1]) * w[0]
+fn is_positive([u, v, w]: [[f64; 3]; 3], doubt: f64) -> bool {
+    let determinant = (u[1] * v[2] - u[2] * v[1]) * w[0]
         + (u[2] * v[0] - u[0] * v[2]) * w[1]
-        + (u[0] * v[1] - u[1] * v[0]) * w[2]
+        + (u[0] * v[1] - u[1] * v[0]) * w[2];
+    determinant > doubt || determinant >= -doubt && is_positive_exactly([u, v, w])
+}
+
+#[cold]
+fn is_positive_exactly(vectors: [[f64; 3]; 3]) -> bool {
+    let [u, v, w] = vectors.map(|u| u.map(|x| x as i32));
+    orient3d([0; 3], u, v, w) > 0
 }

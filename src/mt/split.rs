@@ -26,10 +26,9 @@ use super::VertexId;
 use super::current::Gather;
 use super::current::Labels;
 use super::current::Star;
-use super::ring::NO_PARTNER;
-use super::ring::REST;
+use super::ring::FAN_CAPACITY;
+use super::ring::RING_CAPACITY;
 use super::ring::Ring;
-use crate::geom::NARROW_BITS;
 use crate::mesh::NONE;
 
 /// What came of the wish to apply an update.
@@ -79,19 +78,12 @@ impl EdgeMt {
         if ring.link_len > MAX_LINK || mesh.is_pinched(p) {
             return Err(UpdateError::Star { update });
         }
-        let damaged = UpdateError::Mask { update };
-        if !ring.find_sides(mesh, self.split(u).mask) || !ring.find_fan(mesh) {
-            return Err(damaged);
+        if !ring.find_sides(self.split(u).mask) || !ring.find_fan() {
+            return Err(UpdateError::Mask { update });
         }
         let halves = self.halve(mesh, u, p)?;
         if !mesh.is_proven(update) {
-            let wide = self.info().lattice.bits > NARROW_BITS;
-            let sound = if wide {
-                ring.is_positive::<i128>(mesh, halves)
-            } else {
-                ring.is_positive::<i64>(mesh, halves)
-            };
-            if !sound {
+            if !ring.is_positive(mesh, halves, self.info().lattice.bits) {
                 return Err(UpdateError::Inverted { update });
             }
             mesh.set_proven(update);
@@ -121,43 +113,38 @@ impl EdgeMt {
     fn perform_split(&self, mesh: &mut CurrentMesh, u: UpdateId, p: u32, ring: &Ring, halves: [[i32; 3]; 2]) {
         let q = mesh.new_vertex();
         self.put_halves(mesh, u, [p, q], halves);
-        let mut created = [NONE; MAX_LINK];
-        let created = &mut created[..ring.fan_len];
-        created.iter_mut().for_each(|t| *t = mesh.new_tet());
-        for (f, triangle) in ring.fan[..ring.fan_len].iter().enumerate() {
-            let (i, j, c) = (
-                triangle.near as usize,
-                triangle.face as usize,
-                ring.corner[triangle.near as usize] as usize,
-            );
-            let (near, far, t) = (ring.tets[i], ring.tets[triangle.far as usize], created[f]);
+        let mut created = [NONE; FAN_CAPACITY];
+        mesh.new_tets(&mut created[..ring.fan_len]);
+        for (triangle, &t) in ring.fan[..ring.fan_len].iter().zip(&created) {
+            let i = triangle.near as usize % RING_CAPACITY;
+            let (near, far) = (ring.tets[i], ring.tets[triangle.far as usize % RING_CAPACITY]);
+            let centre = ring.turn[i][0] as usize & 3;
+            let [j, k, l] = triangle.corners.map(|corner| corner as usize & 3);
             // v'' goes where v was and v' opposite the fan triangle: the mirror image of the near tetrahedron.
-            let mut tet = ring.verts[i];
-            (tet[c], tet[j]) = (q, p);
+            let mut tet = mesh.tets[near as usize];
+            (tet[centre], tet[j]) = (q, p);
             mesh.tets[t as usize] = tet;
-            let mut around = [NONE; 4];
-            (around[c], around[j]) = (near, far);
-            let [k, l] = REST[c][j];
-            let fan_tet = |partner: u8| if partner == NO_PARTNER { NONE } else { created[partner as usize] };
+            let [start, end] = triangle.ends.map(|x| x as usize % MAX_LINK);
             // The face opposite one link vertex holds the other.
-            around[k as usize] = fan_tet(triangle.partner[1]);
-            around[l as usize] = fan_tet(triangle.partner[0]);
+            let mut around = [NONE; 4];
+            (around[centre], around[j]) = (near, far);
+            around[k] = created[ring.after[end] as usize % FAN_CAPACITY];
+            around[l] = created[ring.before[start] as usize % FAN_CAPACITY];
             mesh.neighbors[t as usize] = around;
             mesh.neighbors[near as usize][j] = t;
             mesh.mark_tet(near);
             mesh.relink(far, near, t);
         }
         mesh.touch(&ring.tets[..ring.len]);
-        mesh.touch(created);
-        for i in 0..ring.len {
-            let t = ring.tets[i];
-            if ring.sides >> i & 1 == 1 {
-                mesh.tets[t as usize][ring.corner[i] as usize] = q;
-                mesh.mark_tet(t);
-                mesh.incident[q as usize] = t;
-            } else {
-                mesh.incident[p as usize] = t;
-            }
+        mesh.touch(&created[..ring.fan_len]);
+        mesh.incident[p as usize] = ring.tets[(!ring.sides).trailing_zeros() as usize % RING_CAPACITY];
+        mesh.incident[q as usize] = ring.tets[ring.sides.trailing_zeros() as usize % RING_CAPACITY];
+        let mut rest = ring.sides;
+        while rest != 0 {
+            let i = rest.trailing_zeros() as usize;
+            rest &= rest - 1;
+            mesh.tets[ring.tets[i] as usize][ring.turn[i][0] as usize & 3] = q;
+            mesh.mark_tet(ring.tets[i]);
         }
     }
 
@@ -296,8 +283,8 @@ fn close_fan(mesh: &mut CurrentMesh, t: u32, i: usize, j: usize, p: u32) {
     mesh.relink(far, t, near);
     mesh.relink(near, t, far);
     mesh.incident[p as usize] = near;
-    for k in REST[i][j] {
-        mesh.incident[tet[k as usize] as usize] = near;
+    for v in tet.into_iter().filter(|&v| v != tet[i] && v != tet[j]) {
+        mesh.incident[v as usize] = near;
     }
     mesh.free_tet(t);
 }
