@@ -14,6 +14,8 @@ use super::MAX_STAR;
 use super::MtInfo;
 use super::VertexId;
 use super::insertion::Cavity;
+use super::ring::HALF_CAPACITY;
+use super::ring::HalfStar;
 pub(super) use super::ring::LINK_CAPACITY;
 use super::ring::RING_CAPACITY;
 use super::ring::Ring;
@@ -569,6 +571,55 @@ impl CurrentMesh {
         own & MARK_MASK
     }
 
+    /// Collects the tetrahedra around the vertex in `slot`, as [`CurrentMesh::gather_ring`] does, and tells the largest
+    /// number of a vertex of theirs; also if the star is too large and they are not all there are.
+    #[inline]
+    pub(super) fn gather_half(&mut self, slot: u32, half: &mut HalfStar) -> u32 {
+        self.next_epoch();
+        let first = self.incident[slot as usize];
+        let (tet, around) = (self.tets[first as usize], self.neighbors[first as usize]);
+        let mut newest = tet.iter().fold(0, |newest, &v| self.labels[v as usize].vertex.max(newest));
+        self.marks[first as usize] = self.epoch << MARK_BITS;
+        half.tets[0] = first;
+        let (mut len, mut queued) = (1, 1);
+        let centre = corner_of(&tet, slot);
+        for k in [1, 2, 3] {
+            self.follow_half(around[(centre + k) % 4], first, half, &mut queued);
+        }
+        while len < queued && queued <= GATHERED {
+            let place = len % HALF_CAPACITY;
+            let t = half.tets[place];
+            let (tet, around) = (self.tets[t as usize], self.neighbors[t as usize]);
+            let from = corner_of(&around, half.from[place]);
+            let turn = TURN[(4 * corner_of(&tet, slot) + from) % 16];
+            let [_, own, k, l] = turn.map(|corner| corner as usize & 3);
+            newest = self.labels[tet[own] as usize].vertex.max(newest);
+            self.follow_half(around[k], t, half, &mut queued);
+            self.follow_half(around[l], t, half, &mut queued);
+            len += 1;
+        }
+        half.len = queued;
+        if queued > GATHERED { newest.max(self.newest_of(half.tets())) } else { newest }
+    }
+
+    #[inline(always)]
+    fn follow_half(&mut self, n: u32, t: u32, half: &mut HalfStar, queued: &mut usize) {
+        // Also NONE is beyond the array.
+        let Some(old) = self.marks.get_mut(n as usize) else { return };
+        let is_new = *old >> MARK_BITS != self.epoch;
+        *old = self.epoch << MARK_BITS;
+        half.tets[*queued % HALF_CAPACITY] = n;
+        half.from[*queued % HALF_CAPACITY] = t;
+        *queued += usize::from(is_new);
+    }
+
+    /// The largest number of a vertex of these tetrahedra.
+    #[cold]
+    fn newest_of(&self, tets: &[u32]) -> u32 {
+        let vertices = tets.iter().flat_map(|&t| self.tets[t as usize]);
+        vertices.map(|v| self.labels[v as usize].vertex).max().unwrap_or(0)
+    }
+
     fn next_epoch(&mut self) {
         self.epoch += 1;
         if self.epoch == EPOCHS {
@@ -887,7 +938,7 @@ impl CurrentMesh {
 
 /// Where a value is in an array that holds it once, without a branch.
 #[inline(always)]
-fn corner_of(array: &[u32; 4], value: u32) -> usize {
+pub(super) fn corner_of(array: &[u32; 4], value: u32) -> usize {
     usize::from(array[1] == value) | usize::from(array[2] == value) << 1 | usize::from(array[3] == value) * 3
 }
 

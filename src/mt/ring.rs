@@ -4,6 +4,7 @@
 use super::CurrentMesh;
 use super::MAX_LINK;
 use super::MAX_STAR;
+use super::current::GATHERED;
 use crate::geom::orient3d;
 use crate::mesh::FACES;
 use std::ops::AddAssign;
@@ -48,7 +49,7 @@ pub(super) const RING_CAPACITY: usize = 2 * MAX_STAR;
 /// A fan may be too long by three before that is noticed.
 pub(super) const FAN_CAPACITY: usize = 2 * MAX_LINK;
 
-/// Scratch space for a split: a star and its link, the two sides and the fan between them.
+/// Scratch space for a split: a star and its link, the two sides and the fan between them; and for a collapse.
 ///
 /// The link is a surface: each tetrahedron but the first was found through a face of the one before, and so shares two
 /// link vertices with it. Seen from outside, its link triangle is `own`, the vertex that is not shared, and the two
@@ -80,6 +81,8 @@ pub(super) struct Ring {
     pub after: [u8; MAX_LINK],
     /// The link vertices as seen from `v'` and from `v''`.
     seen: [[[f64; 3]; MAX_LINK]; 2],
+    /// For a collapse: the stars of `v'` and `v''`.
+    pub halves: [HalfStar; 2],
 }
 
 impl Default for Ring {
@@ -100,7 +103,40 @@ impl Default for Ring {
             before: [0; MAX_LINK],
             after: [0; MAX_LINK],
             seen: [[[0.0; 3]; MAX_LINK]; 2],
+            halves: [HalfStar::default(), HalfStar::default()],
         }
+    }
+}
+
+/// The tetrahedra around one of the two vertices of an edge that is to be collapsed.
+#[derive(Clone, Debug)]
+pub(super) struct HalfStar {
+    pub len: usize,
+    pub tets: [u32; HALF_CAPACITY],
+    /// The tetrahedron through which each was found.
+    pub from: [u32; HALF_CAPACITY],
+}
+
+/// A star may be too large by three before that is noticed.
+pub(super) const HALF_CAPACITY: usize = 2 * GATHERED;
+
+impl Default for HalfStar {
+    fn default() -> Self {
+        Self { len: 0, tets: [0; HALF_CAPACITY], from: [0; HALF_CAPACITY] }
+    }
+}
+
+impl HalfStar {
+    /// Those that were gathered.
+    #[inline]
+    pub fn tets(&self) -> &[u32] {
+        &self.tets[..self.len.min(HALF_CAPACITY)]
+    }
+
+    /// Whether there are more than [`GATHERED`].
+    #[inline]
+    pub fn is_too_large(&self) -> bool {
+        self.len > GATHERED
     }
 }
 

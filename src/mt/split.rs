@@ -23,12 +23,17 @@ use super::MultiTessellation;
 use super::UpdateError;
 use super::UpdateId;
 use super::VertexId;
+use super::VertexSplit;
+use super::current::GATHERED;
 use super::current::Gather;
 use super::current::Labels;
 use super::current::Star;
+use super::current::corner_of;
 use super::ring::FAN_CAPACITY;
+use super::ring::HalfStar;
 use super::ring::RING_CAPACITY;
 use super::ring::Ring;
+use super::ring::TURN;
 use crate::mesh::NONE;
 
 /// What came of the wish to apply an update.
@@ -47,7 +52,8 @@ impl EdgeMt {
     /// If the update does not fit the mesh, which only happens to a damaged MT, or if the mesh was not told of it by
     /// [`MultiTessellation::announce`]; the mesh is unchanged then.
     pub(super) fn apply_split(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
-        let vertex = self.split(u).vertex;
+        let split = self.split(u);
+        let vertex = split.vertex;
         let Some(p) = mesh.slot(vertex) else {
             let error = UpdateError::Vertex { update: u.0, vertex: vertex.0 };
             return Ok(Applied::Blocked(self.created_by(vertex).ok_or(error)?));
@@ -57,7 +63,7 @@ impl EdgeMt {
             return Err(UpdateError::Unannounced { update: u.0 });
         }
         let mut ring = mesh.take_ring();
-        let applied = self.split_ring(mesh, u, p, &mut ring);
+        let applied = self.split_ring(mesh, u, &split, p, &mut ring);
         mesh.put_back_ring(ring);
         applied
     }
@@ -66,6 +72,7 @@ impl EdgeMt {
         &self,
         mesh: &mut CurrentMesh,
         u: UpdateId,
+        split: &VertexSplit<'_>,
         p: u32,
         ring: &mut Ring,
     ) -> Result<Applied, UpdateError> {
@@ -78,23 +85,28 @@ impl EdgeMt {
         if ring.link_len > MAX_LINK || mesh.is_pinched(p) {
             return Err(UpdateError::Star { update });
         }
-        if !ring.find_sides(self.split(u).mask) || !ring.find_fan() {
+        if !ring.find_sides(split.mask) || !ring.find_fan() {
             return Err(UpdateError::Mask { update });
         }
-        let halves = self.halve(mesh, u, p)?;
+        let halves = self.halve(mesh, u, split, p)?;
         if !mesh.is_proven(update) {
             if !ring.is_positive(mesh, halves, self.info().lattice.bits) {
                 return Err(UpdateError::Inverted { update });
             }
             mesh.set_proven(update);
         }
-        self.perform_split(mesh, u, p, ring, halves);
+        self.perform_split(mesh, u, split, p, ring, halves);
         Ok(Applied::Done)
     }
 
     /// Positions of `v'` and `v''`, checked against the lattices like the levels.
-    fn halve(&self, mesh: &CurrentMesh, u: UpdateId, p: u32) -> Result<[[i32; 3]; 2], UpdateError> {
-        let split = self.split(u);
+    fn halve(
+        &self,
+        mesh: &CurrentMesh,
+        u: UpdateId,
+        split: &VertexSplit<'_>,
+        p: u32,
+    ) -> Result<[[i32; 3]; 2], UpdateError> {
         let off = UpdateError::OffLattice { update: u.0 };
         let largest = 1_i64 << self.info().lattice.bits;
         let mut positions = [[0; 3]; 2];
@@ -110,9 +122,17 @@ impl EdgeMt {
         Ok(positions)
     }
 
-    fn perform_split(&self, mesh: &mut CurrentMesh, u: UpdateId, p: u32, ring: &Ring, halves: [[i32; 3]; 2]) {
+    fn perform_split(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        split: &VertexSplit<'_>,
+        p: u32,
+        ring: &Ring,
+        halves: [[i32; 3]; 2],
+    ) {
         let q = mesh.new_vertex();
-        self.put_halves(mesh, u, [p, q], halves);
+        self.put_halves(mesh, u, split, [p, q], halves);
         let mut created = [NONE; FAN_CAPACITY];
         mesh.new_tets(&mut created[..ring.fan_len]);
         for (triangle, &t) in ring.fan[..ring.fan_len].iter().zip(&created) {
@@ -150,12 +170,19 @@ impl EdgeMt {
 
     /// Puts `v'` and `v''` with their levels into the slots `[p, q]`; `p` holds `v` so far.
     #[inline]
-    fn put_halves(&self, mesh: &mut CurrentMesh, u: UpdateId, [p, q]: [u32; 2], halves: [[i32; 3]; 2]) {
+    fn put_halves(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        split: &VertexSplit<'_>,
+        [p, q]: [u32; 2],
+        halves: [[i32; 3]; 2],
+    ) {
         let created = self.created(u);
         for (slot, vertex, position) in [(p, created[0], halves[0]), (q, created[1], halves[1])] {
             mesh.put_vertex(slot, self.labels(vertex), position);
         }
-        for (f, &offset) in self.split(u).field_offsets.iter().enumerate() {
+        for (f, &offset) in split.field_offsets.iter().enumerate() {
             let [at_p, at_q] = [p, q].map(|slot| slot as usize * mesh.fields + f);
             mesh.levels[at_q] = mesh.levels[at_p] - (offset >> 1);
             mesh.levels[at_p] = mesh.levels[at_q] + offset;
@@ -172,46 +199,58 @@ impl EdgeMt {
     /// # Errors
     /// Never for an update that was applied to this mesh by [`Self::apply_split`].
     pub(super) fn apply_collapse(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
-        let (mut near, mut far) = (Star::default(), Star::default());
-        let [p, q] = match self.collapsible(mesh, u, &mut near, &mut far)? {
+        let mut ring = mesh.take_ring();
+        let applied = self.collapse_ring(mesh, u, &mut ring);
+        mesh.put_back_ring(ring);
+        applied
+    }
+
+    fn collapse_ring(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        ring: &mut Ring,
+    ) -> Result<Applied, UpdateError> {
+        let [p, q] = match self.collapsible(mesh, u, ring)? {
             Ok(slots) => slots,
             Err(child) => return Ok(Applied::Blocked(child)),
         };
-        mesh.touch(&near.tets[..near.len]);
-        mesh.touch(&far.tets[..far.len]);
-        for &t in &far.tets[..far.len] {
+        let [near, far] = &ring.halves;
+        mesh.touch(near.tets());
+        mesh.touch(far.tets());
+        let mut fan = [NONE; GATHERED];
+        let mut fan_len = 0;
+        for &t in far.tets() {
             let tet = mesh.tets[t as usize];
-            let at = |slot: u32| tet.iter().position(|&v| v == slot);
-            let (at_p, at_q) = (at(p), at(q));
-            match (at_p, at_q) {
-                (Some(i), Some(j)) => close_fan(mesh, t, i, j, p),
-                (None, Some(j)) => {
-                    mesh.tets[t as usize][j] = p;
-                    mesh.mark_tet(t);
-                }
-                _ => {}
-            }
+            // Which are of the fan is a coin toss for the processor.
+            let at_both = tet.iter().fold(false, |found, &v| found | (v == p));
+            mesh.tets[t as usize] = tet.map(|v| if (v == q) & !at_both { p } else { v });
+            mesh.mark_tet(t);
+            fan[fan_len % GATHERED] = t;
+            fan_len += usize::from(at_both);
         }
-        for (f, &offset) in self.split(u).field_offsets.iter().enumerate() {
+        fan[..fan_len].iter().for_each(|&t| close_fan(mesh, t, [p, q]));
+        let split = self.split(u);
+        for (f, &offset) in split.field_offsets.iter().enumerate() {
             mesh.levels[p as usize * mesh.fields + f] =
                 mesh.levels[q as usize * mesh.fields + f] + (offset >> 1);
         }
-        let (b, offset) = (mesh.positions[q as usize], self.split(u).offset);
+        let (b, offset) = (mesh.positions[q as usize], split.offset);
         let position = [0, 1, 2].map(|i| b[i] + (offset[i] >> 1));
         let far_vertex = mesh.labels[q as usize].vertex;
         mesh.slot_of[far_vertex as usize] = NONE;
         mesh.free_vertex(q);
-        mesh.put_vertex(p, self.labels(self.split(u).vertex), position);
+        mesh.put_vertex(p, self.labels(split.vertex), position);
         Ok(Applied::Done)
     }
 
-    /// The slots of `v'` and `v''` if update `u` can be undone, with their stars; else a child that is in the way.
+    /// The slots of `v'` and `v''` if update `u` can be undone, with their stars in the ring; else a child that is in
+    /// the way.
     fn collapsible(
         &self,
         mesh: &mut CurrentMesh,
         u: UpdateId,
-        near: &mut Star,
-        far: &mut Star,
+        ring: &mut Ring,
     ) -> Result<Result<[u32; 2], UpdateId>, UpdateError> {
         let update = u.0;
         let mut slots = [NONE; 2];
@@ -222,19 +261,15 @@ impl EdgeMt {
                 (None, None) => return Err(UpdateError::Vertex { update, vertex: vertex.0 }),
             }
         }
-        // A vertex born after u next to v' or v'' was made by an update that depends on u.
-        let born_after = self.created(u)[1].0 + 1;
-        for (slot, star) in slots.into_iter().zip([near, far]) {
-            let younger = |labels: &[Labels], tet: &[u32; 4]| {
-                tet.iter().map(|&v| labels[v as usize].vertex).find(|&v| v >= born_after)
-            };
-            match mesh.gather_star(slot, star, younger) {
-                Ok(()) => {}
-                Err(Gather::TooLarge) => return Err(UpdateError::Star { update }),
-                Err(Gather::Stopped(vertex)) => {
-                    let child = self.created_by(VertexId(vertex));
-                    return Ok(Err(child.ok_or(UpdateError::Vertex { update, vertex })?));
-                }
+        for (slot, half) in slots.into_iter().zip(&mut ring.halves) {
+            let newest = mesh.gather_half(slot, half);
+            // A vertex born after u next to v' or v'' was made by an update that depends on u.
+            if newest > self.created(u)[1].0 {
+                let child = self.created_by(VertexId(newest));
+                return Ok(Err(child.ok_or(UpdateError::Vertex { update, vertex: newest })?));
+            }
+            if half.is_too_large() {
+                return Err(UpdateError::Star { update });
             }
         }
         Ok(Ok(slots))
@@ -247,17 +282,28 @@ impl EdgeMt {
         u: UpdateId,
         look: LookAtTet<'_>,
     ) -> Result<Applied, UpdateError> {
-        let (mut near, mut far) = (Star::default(), Star::default());
-        let [p, q] = match self.collapsible(mesh, u, &mut near, &mut far)? {
-            Ok(slots) => slots,
-            Err(child) => return Ok(Applied::Blocked(child)),
-        };
+        let mut ring = mesh.take_ring();
+        let found = self.collapsible(mesh, u, &mut ring);
+        if let Ok(Ok(slots)) = found {
+            self.look_at_halves(mesh, u, slots, &ring.halves, look);
+        }
+        mesh.put_back_ring(ring);
+        Ok(found?.map_or_else(Applied::Blocked, |_| Applied::Done))
+    }
+
+    fn look_at_halves(
+        &self,
+        mesh: &CurrentMesh,
+        u: UpdateId,
+        [p, q]: [u32; 2],
+        [near, far]: &[HalfStar; 2],
+        look: LookAtTet<'_>,
+    ) {
         let split = self.split(u);
         let b = mesh.positions[q as usize];
         let position = [0, 1, 2].map(|i| b[i] + (split.offset[i] >> 1));
-        for (star, centre, other) in [(&near, p, q), (&far, q, p)] {
-            for &t in &star.tets[..star.len] {
-                let tet = mesh.tets[t as usize];
+        for (half, centre, other) in [(near, p, q), (far, q, p)] {
+            for tet in half.tets().iter().map(|&t| mesh.tets[t as usize]) {
                 if tet.contains(&other) {
                     continue;
                 }
@@ -267,23 +313,23 @@ impl EdgeMt {
                     tet.map(|v| if v == centre { level } else { mesh.levels(v)[field] })
                 };
                 if look(&corners, &levels) {
-                    return Ok(Applied::Done);
+                    return;
                 }
             }
         }
-        Ok(Applied::Done)
     }
 }
 
-/// Removes fan tetrahedron `t`, whose corners `i` and `j` are `v'` (in slot `p`) and `v''`: its two neighbours at
-/// the fan triangle become neighbours of each other.
-fn close_fan(mesh: &mut CurrentMesh, t: u32, i: usize, j: usize, p: u32) {
+/// Removes fan tetrahedron `t`, which has both `v'` and `v''`, in slots `[p, q]`: its two neighbours at the fan
+/// triangle become neighbours of each other.
+#[inline]
+fn close_fan(mesh: &mut CurrentMesh, t: u32, [p, q]: [u32; 2]) {
     let (tet, around) = (mesh.tets[t as usize], mesh.neighbors[t as usize]);
+    let [i, j, k, l] = TURN[(4 * corner_of(&tet, p) + corner_of(&tet, q)) % 16].map(|c| c as usize & 3);
     let (far, near) = (around[i], around[j]);
     mesh.relink(far, t, near);
     mesh.relink(near, t, far);
-    mesh.incident[p as usize] = near;
-    for v in tet.into_iter().filter(|&v| v != tet[i] && v != tet[j]) {
+    for v in [p, tet[k], tet[l]] {
         mesh.incident[v as usize] = near;
     }
     mesh.free_tet(t);
