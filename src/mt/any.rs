@@ -122,6 +122,11 @@ impl MultiTessellation for Mt {
     }
 
     #[inline(never)]
+    fn site(&self, mesh: &CurrentMesh, u: UpdateId) -> [i32; 3] {
+        each!(self, mt => mt.site(mesh, u))
+    }
+
+    #[inline(never)]
     fn announce(&self, mesh: &mut CurrentMesh, known: u32) {
         each!(self, mt => mt.announce(mesh, known));
     }

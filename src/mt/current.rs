@@ -512,6 +512,9 @@ impl CurrentMesh {
             let turn = TURN[(4 * corner_of(&tet, slot) + from) % 16];
             let [_, own, k, l] = turn.map(|corner| corner as usize & 3);
             let x = self.number(tet[own], ring, &mut first_split);
+            if first_split < update {
+                return Err(Gather::Stopped(first_split));
+            }
             let link = ring.link_of[place] | x;
             let beyond_k = self.follow(around[k], [t, len], x << 8 | link & 0xFF_0000, ring, &mut queued);
             let beyond_l = self.follow(around[l], [t, len], link & 0xFF00 | x << 16, ring, &mut queued);
@@ -521,7 +524,7 @@ impl CurrentMesh {
             len += 1;
         }
         ring.len = len as usize;
-        if first_split < update { Err(Gather::Stopped(first_split)) } else { Ok(()) }
+        Ok(())
     }
 
     /// The index of tetrahedron `n` in the ring, found through a face of `t` with the index `behind`; that index again
@@ -572,9 +575,10 @@ impl CurrentMesh {
     }
 
     /// Collects the tetrahedra around the vertex in `slot`, as [`CurrentMesh::gather_ring`] does, and tells the largest
-    /// number of a vertex of theirs; also if the star is too large and they are not all there are.
+    /// number of a vertex of theirs. Stops at one that is larger than `largest`; where the star is too large, those that
+    /// were found are searched all the same.
     #[inline]
-    pub(super) fn gather_half(&mut self, slot: u32, half: &mut HalfStar) -> u32 {
+    pub(super) fn gather_half(&mut self, slot: u32, largest: u32, half: &mut HalfStar) -> u32 {
         self.next_epoch();
         let first = self.incident[slot as usize];
         let (tet, around) = (self.tets[first as usize], self.neighbors[first as usize]);
@@ -586,7 +590,7 @@ impl CurrentMesh {
         for k in [1, 2, 3] {
             self.follow_half(around[(centre + k) % 4], first, half, &mut queued);
         }
-        while len < queued && queued <= GATHERED {
+        while len < queued && queued <= GATHERED && newest <= largest {
             let place = len % HALF_CAPACITY;
             let t = half.tets[place];
             let (tet, around) = (self.tets[t as usize], self.neighbors[t as usize]);

@@ -730,6 +730,10 @@ impl MultiTessellation for VertexMt {
         rebuilt
     }
 
+    fn site(&self, _: &CurrentMesh, u: UpdateId) -> [i32; 3] {
+        self.position(u)
+    }
+
     fn announce(&self, mesh: &mut CurrentMesh, known: u32) {
         if known == self.updates() {
             return;

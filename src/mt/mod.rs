@@ -222,6 +222,10 @@ pub trait MultiTessellation {
         look: LookAtTet<'_>,
     ) -> Result<Applied, UpdateError>;
 
+    /// Where in the model update `u` takes place, as well as the mesh can tell: what lies side by side is quicker done one
+    /// after the other. Any answer will do.
+    fn site(&self, mesh: &CurrentMesh, u: UpdateId) -> [i32; 3];
+
     /// Tells the mesh of updates that have arrived since it last knew of `known` of them.
     fn announce(&self, mesh: &mut CurrentMesh, known: u32);
 }

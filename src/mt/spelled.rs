@@ -280,6 +280,10 @@ impl MultiTessellation for ExplicitMt {
         Ok(Applied::Done)
     }
 
+    fn site(&self, _: &CurrentMesh, _: UpdateId) -> [i32; 3] {
+        [0; 3]
+    }
+
     fn announce(&self, _: &mut CurrentMesh, _: u32) {}
 
     fn find_removed(

@@ -262,9 +262,10 @@ impl EdgeMt {
             }
         }
         for (slot, half) in slots.into_iter().zip(&mut ring.halves) {
-            let newest = mesh.gather_half(slot, half);
             // A vertex born after u next to v' or v'' was made by an update that depends on u.
-            if newest > self.created(u)[1].0 {
+            let own = self.created(u)[1].0;
+            let newest = mesh.gather_half(slot, own, half);
+            if newest > own {
                 let child = self.created_by(VertexId(newest));
                 return Ok(Err(child.ok_or(UpdateError::Vertex { update, vertex: newest })?));
             }
@@ -483,6 +484,22 @@ impl MultiTessellation for EdgeMt {
         look: LookAtTet<'_>,
     ) -> Result<Applied, UpdateError> {
         self.look_at_coarse_star(mesh, u, look)
+    }
+
+    fn site(&self, mesh: &CurrentMesh, u: UpdateId) -> [i32; 3] {
+        // One of the vertices that the one to be split comes from, or of those that come from what it becomes.
+        let (mut above, mut below) = (Some(u), Some(u));
+        while above.is_some() || below.is_some() {
+            let coarse = above.map(|u| self.split(u).vertex);
+            let fine = below.map(|u| self.created(u)[0]);
+            if let Some(slot) = [coarse, fine].into_iter().flatten().find_map(|v| mesh.slot(v)) {
+                return mesh.positions[slot as usize];
+            }
+            // Numbers fall on the way up and rise on the way down.
+            above = coarse.and_then(|v| self.created_by(v));
+            below = fine.and_then(|v| self.split_by(v));
+        }
+        [0; 3]
     }
 
     fn announce(&self, mesh: &mut CurrentMesh, known: u32) {

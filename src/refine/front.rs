@@ -5,6 +5,8 @@ use super::Criterion;
 use super::TetLook;
 use super::Verdict;
 use super::ranked::Ranked;
+use super::sweep::Window;
+use super::sweep::window_size;
 use super::watch::Waiting;
 use crate::mt::Applied;
 use crate::mt::BaseMeshError;
@@ -293,19 +295,13 @@ impl Front {
         Ok(())
     }
 
-    /// Back to the base mesh: children have larger numbers than their parents.
+    /// Back to the base mesh.
     fn coarsen_all(&mut self, mt: &impl MultiTessellation, outcome: &mut Outcome) -> Result<(), UpdateError> {
         self.forget_watch();
-        for u in (0..self.known).rev().map(UpdateId) {
-            if self.contains(u) {
-                self.coarsen(mt, u, outcome)?;
-                self.mesh.clear_touched();
-            }
-        }
-        Ok(())
+        self.sweep(mt, 0, false, outcome, &mut |_| true).map(drop)
     }
 
-    /// Errors are monotone, so the wanted set is known outright and its order is that of the numbers.
+    /// Errors fall from one update to the next: the wanted set is a prefix.
     fn satisfy_uniform(
         &mut self,
         mt: &impl MultiTessellation,
@@ -313,25 +309,86 @@ impl Front {
         outcome: &mut Outcome,
         go_on: GoOn<'_>,
     ) -> Result<bool, UpdateError> {
-        for u in (0..self.known).rev().map(UpdateId) {
-            if mt.error(u) <= tolerance && self.contains(u) {
-                self.coarsen(mt, u, outcome)?;
-                self.mesh.clear_touched();
-                if !go_on(outcome) {
-                    return Ok(false);
-                }
-            }
+        let mut wanted = (0, self.known);
+        while wanted.0 < wanted.1 {
+            let middle = wanted.0.midpoint(wanted.1);
+            if mt.error(UpdateId(middle)) > tolerance { wanted.0 = middle + 1 } else { wanted.1 = middle }
         }
-        for u in (0..self.known).map(UpdateId) {
-            if mt.error(u) > tolerance && !self.contains(u) {
-                self.refine(mt, u, outcome)?;
-                self.mesh.clear_touched();
+        Ok(self.sweep(mt, wanted.0, false, outcome, go_on)?
+            && self.sweep(mt, wanted.0, true, outcome, go_on)?)
+    }
+
+    /// Applies all updates before `end`, or undoes all from there on: windows by number, in each by place. What is in the
+    /// way of one is done before it. False if it was told to stop.
+    fn sweep(
+        &mut self,
+        mt: &impl MultiTessellation,
+        end: u32,
+        applied: bool,
+        outcome: &mut Outcome,
+        go_on: GoOn<'_>,
+    ) -> Result<bool, UpdateError> {
+        let mut window = Window::default();
+        let mut done = 0;
+        let all = if applied { end } else { self.known - end };
+        while done < all {
+            window.updates.clear();
+            let size = window_size(self.applied_count);
+            while done < all && window.updates.len() < size {
+                let u = UpdateId(if applied { done } else { self.known - 1 - done });
+                if self.contains(u) != applied {
+                    window.updates.push(u);
+                }
+                done += self.alike(u, applied);
+            }
+            window.sort(mt, &self.mesh);
+            for &u in &window.updates {
+                self.turn(mt, u, applied, outcome)?;
                 if !go_on(outcome) {
                     return Ok(false);
                 }
             }
         }
         Ok(true)
+    }
+
+    /// How many updates a sweep goes on by from `u`: a whole word of them at once where there is nothing to do.
+    fn alike(&self, u: UpdateId, applied: bool) -> u32 {
+        let begins = u.0 % 64 == if applied { 0 } else { 63 };
+        let nothing = if applied { u64::MAX } else { 0 };
+        if begins && self.applied[u.0 as usize / 64] == nothing { 64 } else { 1 }
+    }
+
+    /// Applies or undoes `u` and before it what is in the way.
+    fn turn(
+        &mut self,
+        mt: &impl MultiTessellation,
+        u: UpdateId,
+        applied: bool,
+        outcome: &mut Outcome,
+    ) -> Result<(), UpdateError> {
+        let mut next = Some(u).filter(|&u| self.contains(u) != applied);
+        let mut waiting = Vec::new();
+        while let Some(u) = next {
+            let turned = if applied { mt.refine(&mut self.mesh, u) } else { mt.coarsen(&mut self.mesh, u) }?;
+            next = match turned {
+                Applied::Done => {
+                    self.note(u, applied);
+                    *(if applied { &mut outcome.refined } else { &mut outcome.coarsened }) += 1;
+                    self.mesh.clear_touched();
+                    waiting.pop()
+                }
+                // Numbers fall from child to parent, so this ends.
+                Applied::Blocked(other)
+                    if other != u && (other < u) == applied && self.contains(other) != applied =>
+                {
+                    waiting.push(u);
+                    Some(other)
+                }
+                Applied::Blocked(_) => return Err(UpdateError::Error { update: u.0 }),
+            };
+        }
+        Ok(())
     }
 
     /// Refines until no tetrahedron violates the criterion, and undoes what nothing asks for: afterwards, or first if there is a
@@ -567,22 +624,6 @@ impl Front {
                 Applied::Blocked(_) => return Err(UpdateError::Error { update: top.0 }),
             }
         }
-        Ok(())
-    }
-
-    /// Applies `u`, whose parents are applied.
-    #[inline]
-    fn refine(
-        &mut self,
-        mt: &impl MultiTessellation,
-        u: UpdateId,
-        outcome: &mut Outcome,
-    ) -> Result<(), UpdateError> {
-        match mt.refine(&mut self.mesh, u)? {
-            Applied::Done => self.note(u, true),
-            Applied::Blocked(_) => return Err(UpdateError::Error { update: u.0 }),
-        }
-        outcome.refined += 1;
         Ok(())
     }
 

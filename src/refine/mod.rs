@@ -31,6 +31,7 @@ mod palette;
 mod ranked;
 mod request;
 mod shape;
+mod sweep;
 mod watch;
 
 pub use criterion::{Criterion, LodCriterion, TetLook, Verdict};
