@@ -264,6 +264,32 @@ impl CurrentMesh {
         self.labels.len() - self.free_vertices.len()
     }
 
+    /// Heap bytes of everything that the mesh holds: entries that are there, not what is reserved for more.
+    pub fn bytes(&self) -> u64 {
+        let vertices = size_of_val(&self.labels[..])
+            + size_of_val(&self.positions[..])
+            + size_of_val(&self.levels[..])
+            + size_of_val(&self.incident[..])
+            + size_of_val(&self.vertex_marks[..])
+            + size_of_val(&self.free_vertices[..]);
+        let tets = size_of_val(&self.tets[..])
+            + size_of_val(&self.neighbors[..])
+            + size_of_val(&self.tags[..])
+            + size_of_val(&self.marks[..])
+            + size_of_val(&self.free_tets[..])
+            + size_of_val(&self.touched[..]);
+        let of_the_mt = size_of_val(&self.slot_of[..])
+            + size_of_val(&self.place_of[..])
+            + size_of_val(&self.proven[..])
+            + size_of_val(&self.pinched[..])
+            + self.taken.as_ref().map_or(0, |taken| taken.bytes());
+        let changes =
+            size_of_val(&self.changed_vertices.blocks[..]) + size_of_val(&self.changed_tets.blocks[..]);
+        let scratch = self.ring.as_ref().map_or(0, |ring| size_of_val(&**ring))
+            + self.cavity.as_ref().map_or(0, |cavity| size_of_val(&**cavity));
+        (vertices + tets + of_the_mt + changes + scratch) as u64
+    }
+
     /// Number of tetrahedron slots, holes included; see [`CurrentMesh::tet`].
     pub fn tet_slots(&self) -> usize {
         self.tets.len()

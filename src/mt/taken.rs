@@ -100,6 +100,11 @@ pub(crate) struct Taken {
 }
 
 impl Taken {
+    /// Heap bytes, with the room that the hash table keeps free.
+    pub fn bytes(&self) -> usize {
+        self.faces.0.capacity() * (size_of::<([u32; 3], [u8; 2])>() + 1) + size_of_val(&self.around[..])
+    }
+
     /// What these tetrahedra take.
     pub fn by(tets: &[[u32; 4]]) -> Self {
         let mut taken = Self::default();
