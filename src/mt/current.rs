@@ -969,7 +969,9 @@ impl CurrentMesh {
 /// Where a value is in an array that holds it once, without a branch.
 #[inline(always)]
 pub(super) fn corner_of(array: &[u32; 4], value: u32) -> usize {
-    usize::from(array[1] == value) | usize::from(array[2] == value) << 1 | usize::from(array[3] == value) * 3
+    usize::from(array[1] == value)
+        | usize::from(array[2] == value) << 1
+        | (usize::from(array[3] == value) * 3)
 }
 
 /// A finaliser that spreads every input bit over the word (the constants are those of SplitMix64).
