@@ -254,7 +254,7 @@ impl Session {
 
     /// Bytes that the current mesh takes with its adjacency, its form in model units, and the queues of refinement.
     pub fn mesh_bytes(&self) -> u64 {
-        let shown = 12 * self.shown.positions.capacity() + 4 * self.shown.values.capacity();
+        let shown = 12 * self.shown.positions.len() + 4 * self.shown.values.len();
         self.front.as_ref().map_or(0, |front| front.mesh().bytes() + front.queue_bytes()) + shown as u64
     }
 

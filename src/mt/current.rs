@@ -878,22 +878,6 @@ impl CurrentMesh {
         }
     }
 
-    /// Bytes that the mesh holds, by capacity.
-    pub fn bytes(&self) -> u64 {
-        let four =
-            [&self.incident, &self.slot_of, &self.tags, &self.place_of, &self.marks, &self.vertex_marks]
-                .iter()
-                .map(|v| v.capacity())
-                .sum::<usize>();
-        let bytes = 4
-            * (four + self.levels.capacity() + self.free_vertices.capacity() + self.free_tets.capacity())
-            + 8 * self.labels.capacity()
-            + 12 * self.positions.capacity()
-            + 16 * (self.tets.capacity() + self.neighbors.capacity())
-            + 8 * self.proven.capacity();
-        bytes as u64
-    }
-
     /// A hash of the mesh that depends neither on slots nor on the order of updates: equal sets of tetrahedra with
     /// equal vertices, positions and levels have equal hashes, on every platform.
     pub fn hash(&self) -> u64 {

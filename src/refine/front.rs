@@ -140,12 +140,11 @@ impl Front {
         self.applied.get(u.0 as usize / 64).is_some_and(|w| w >> (u.0 % 64) & 1 == 1)
     }
 
-    /// Bytes of the queues that say what has to be judged again, and of the set of applied updates. The mesh itself holds
-    /// [`CurrentMesh::bytes`].
+    /// Heap bytes of the queues that say what has to be judged again, and of the set of applied updates: entries that are there,
+    /// not what is reserved for more. The mesh itself has [`CurrentMesh::bytes`].
     pub fn queue_bytes(&self) -> u64 {
-        let own = 8 * self.applied.capacity()
-            + size_of::<Asked>() * self.pending.capacity()
-            + 4 * self.unknown.capacity();
+        let own =
+            size_of_val(&self.applied[..]) + size_of_val(&self.pending[..]) + size_of_val(&self.unknown[..]);
         own as u64 + self.tets.bytes() + self.leaves.bytes() + self.ranked.bytes()
     }
 

@@ -78,8 +78,8 @@ impl Ranked {
     }
 
     pub fn bytes(&self) -> u64 {
-        let refinable = self.refinable.capacity() * size_of::<(Rank, u32)>();
-        (refinable + self.coarsenable.capacity() * size_of::<Rank>()) as u64
+        let refinable = self.refinable.len() * size_of::<(Rank, u32)>();
+        (refinable + self.coarsenable.len() * size_of::<Rank>()) as u64
     }
 }
 

@@ -146,10 +146,10 @@ impl Waiting {
         self.slots.iter_mut().for_each(Vec::clear);
     }
 
-    /// Bytes held.
+    /// Bytes of what there is, not of what is reserved for more.
     pub fn bytes(&self) -> u64 {
-        let lists: usize = self.slots.iter().chain([&self.open]).map(Vec::capacity).sum();
-        (2 * self.place.capacity() + 4 * lists + self.slots.capacity() * size_of::<Vec<u32>>()) as u64
+        let lists: usize = self.slots.iter().chain([&self.open]).map(Vec::len).sum();
+        (2 * self.place.len() + 4 * lists + size_of_val(&self.slots[..])) as u64
     }
 }
 
