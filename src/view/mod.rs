@@ -1,13 +1,18 @@
 //! What is to be seen, computed on the CPU from slices. Knows no MT.
 
+mod boundary;
 mod colormap;
 mod cutaway;
 pub mod gizmo;
 mod iso;
+mod patches;
+mod slice;
 
+pub use boundary::{BoundarySurface, area, is_closed};
 pub use colormap::{Colormap, VIRIDIS};
 pub use cutaway::{ClipPlane, Cutaway};
 pub use iso::IsoSurface;
+pub use slice::{Plane, Slice, SurfaceChanges};
 
 /// A tetrahedral mesh as slices: what the renderer and the isosurface extraction take.
 #[derive(Clone, Copy, Debug)]

@@ -1,0 +1,96 @@
+//! The boundary of a mesh as a surface of its own.
+
+use crate::mesh::FACES;
+use crate::mesh::NONE;
+use crate::view::MeshView;
+use glam::DVec3;
+
+/// The faces without neighbour, with the points that they need and no others; the memory is used again.
+///
+/// Triangles face outwards and come in the order of their tetrahedra; vertices in the order in which triangles name
+/// them.
+#[derive(Clone, Debug, Default)]
+pub struct BoundarySurface {
+    /// Vertices, in model units.
+    pub positions: Vec<[f32; 3]>,
+    /// The field's value at each vertex.
+    pub values: Vec<f32>,
+    /// Triangles, counter-clockwise when seen from outside.
+    pub indices: Vec<[u32; 3]>,
+    /// Which point of the mesh each vertex is.
+    pub points: Vec<u32>,
+    /// Per point of the mesh its vertex; all [`NONE`] between two extractions.
+    vertex_of: Vec<u32>,
+}
+
+impl BoundarySurface {
+    /// Nothing yet.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Replaces the surface by the boundary of `mesh`. Costs one pass over the neighbours.
+    ///
+    /// # Panics
+    /// If the mesh names a point that it does not have.
+    pub fn extract(&mut self, mesh: &MeshView<'_>) {
+        self.indices.clear();
+        self.points.clear();
+        self.vertex_of.resize(mesh.positions.len(), NONE);
+        for (tet, around) in mesh.tets.iter().zip(mesh.neighbors) {
+            // A free slot has neither corners nor neighbours.
+            for face in
+                FACES.iter().zip(around).filter(|(_, n)| **n == NONE && tet[0] != NONE).map(|(face, _)| face)
+            {
+                let triangle = face.map(|i| self.vertex(tet[i]));
+                self.indices.push(triangle);
+            }
+        }
+        self.positions.clear();
+        self.positions.extend(self.points.iter().map(|p| mesh.positions[*p as usize]));
+        self.values.clear();
+        self.values.extend(self.points.iter().map(|p| mesh.field[*p as usize]));
+        self.points.iter().for_each(|p| self.vertex_of[*p as usize] = NONE);
+    }
+
+    fn vertex(&mut self, point: u32) -> u32 {
+        let vertex = &mut self.vertex_of[point as usize];
+        if *vertex == NONE {
+            *vertex = self.points.len() as u32;
+            self.points.push(point);
+        }
+        *vertex
+    }
+
+    /// The surface's area, in square model units.
+    pub fn area(&self) -> f64 {
+        area(&self.positions, &self.indices)
+    }
+
+    /// Whether every directed side has as many opposite ones: true for the boundary of a mesh that conforms.
+    pub fn is_closed(&self) -> bool {
+        is_closed(&self.indices)
+    }
+}
+
+/// The area of indexed triangles.
+///
+/// # Panics
+/// If a triangle names a vertex that is not there.
+pub fn area(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> f64 {
+    let corner = |v: u32| DVec3::from(positions[v as usize].map(f64::from));
+    let of = |t: &[u32; 3]| (corner(t[1]) - corner(t[0])).cross(corner(t[2]) - corner(t[0])).length();
+    0.5 * triangles.iter().map(of).fold(0.0, |sum, area| sum + area)
+}
+
+/// Whether every directed side of indexed triangles has as many opposite ones.
+pub fn is_closed(triangles: &[[u32; 3]]) -> bool {
+    let sides = triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+    // The smaller end first, then whether that turned the side around.
+    let mut sides: Vec<(u32, u32, bool)> = sides.map(|[a, b]| (a.min(b), a.max(b), a > b)).collect();
+    sides.sort_unstable();
+    sides.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)).all(|same| {
+        let turned = same.iter().filter(|side| side.2).count();
+        2 * turned == same.len()
+    })
+}
