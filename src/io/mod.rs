@@ -6,6 +6,11 @@
 //! | VTK XML image data | `.vti` | all encodings, several pieces | appended raw, zlib |
 //! | legacy VTK, versions 1.0 to 5.1 | `.vtk` | ASCII and binary; unstructured grids, structured points | |
 //! | raw samples | `.raw` + `.json` | any numeric type and byte order | |
+//! | VTK XML poly data | `.vtp` | | appended raw, zlib |
+//! | STL | `.stl` | | binary, triangles alone |
+//! | PLY | `.ply` | | binary, little-endian |
+//! | Wavefront | `.obj` | | without fields |
+//! | table | `.csv` | | |
 //!
 //! Regular grids are split into tetrahedra, six a cube, and carry their [`Grid`](crate::mesh::Grid).
 //! Point arrays become scalar fields: an array of several components gives one field a component (`name_x`, ...) and
@@ -20,6 +25,7 @@ mod legacy;
 mod number;
 mod payload;
 mod raw;
+mod surface;
 mod vtu;
 mod write;
 mod xml;
@@ -27,6 +33,7 @@ mod xz;
 
 pub use error::{ReadError, ReadReason};
 pub use image::MAX_GRID_POINTS;
+pub use surface::{PolyData, write_csv, write_obj, write_ply, write_stl, write_vtp};
 pub use write::{write_vti, write_vtu};
 
 use std::path::Path;

@@ -63,7 +63,13 @@ pub fn write_vti(mesh: &TetMesh, out: &mut impl Write) -> io::Result<()> {
     write_file("ImageData", &attributes, &body, &data.bytes, out)
 }
 
-fn write_file(kind: &str, attributes: &str, body: &str, data: &[u8], out: &mut impl Write) -> io::Result<()> {
+pub(super) fn write_file(
+    kind: &str,
+    attributes: &str,
+    body: &str,
+    data: &[u8],
+    out: &mut impl Write,
+) -> io::Result<()> {
     write!(
         out,
         "<?xml version=\"1.0\"?>\n<VTKFile type=\"{kind}\" version=\"1.0\" byte_order=\"LittleEndian\" \
@@ -91,7 +97,7 @@ fn point_data(mesh: &TetMesh, data: &mut Appended) -> io::Result<String> {
     Ok(format!("      <PointData{scalars}>\n{arrays}      </PointData>\n"))
 }
 
-fn array(kind: &str, name: &str, components: usize, offset: usize) -> String {
+pub(super) fn array(kind: &str, name: &str, components: usize, offset: usize) -> String {
     format!(
         "        <DataArray type=\"{kind}\" Name=\"{}\" NumberOfComponents=\"{components}\" format=\"appended\" \
          offset=\"{offset}\"/>\n",
@@ -100,7 +106,7 @@ fn array(kind: &str, name: &str, components: usize, offset: usize) -> String {
 }
 
 /// Text for an attribute; control characters, which XML cannot hold, become spaces.
-fn escaped(text: &str) -> String {
+pub(super) fn escaped(text: &str) -> String {
     let mut result = String::new();
     for c in text.chars() {
         match c {
@@ -117,13 +123,13 @@ fn escaped(text: &str) -> String {
 
 /// The data after the underscore.
 #[derive(Default)]
-struct Appended {
-    bytes: Vec<u8>,
+pub(super) struct Appended {
+    pub(super) bytes: Vec<u8>,
 }
 
 impl Appended {
     /// Appends an array of `values` in compressed blocks; returns its offset.
-    fn append<T: Copy, const N: usize>(
+    pub(super) fn append<T: Copy, const N: usize>(
         &mut self,
         values: &[T],
         encode: impl Fn(T) -> [u8; N],
