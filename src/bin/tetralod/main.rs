@@ -10,7 +10,12 @@ mod extract;
 mod files;
 mod generate;
 mod info;
+mod isosurface;
 mod output;
+mod poly;
+mod query;
+mod slice;
+mod surface;
 mod verify;
 
 use clap::CommandFactory;
@@ -34,6 +39,9 @@ enum Command {
     Convert(convert::Arguments),
     Info(info::Arguments),
     Extract(extract::Arguments),
+    Isosurface(isosurface::Arguments),
+    Slice(slice::Arguments),
+    Surface(surface::Arguments),
     Verify(verify::Arguments),
     Bench(bench::Arguments),
 }
@@ -58,6 +66,9 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Verify(arguments) => return verify::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments)?,
         Command::Extract(arguments) => extract::run(&arguments)?,
+        Command::Isosurface(arguments) => isosurface::run(&arguments)?,
+        Command::Slice(arguments) => slice::run(&arguments)?,
+        Command::Surface(arguments) => surface::run(&arguments)?,
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -1,0 +1,90 @@
+//! `tetralod isosurface`: surfaces on which a field has a value.
+
+use super::output;
+use super::poly::Target;
+use super::query::Query;
+use super::query::Summary;
+use anyhow::Result;
+use serde::Serialize;
+use std::path::PathBuf;
+use std::time::Instant;
+use tetralod::io::PolyData;
+use tetralod::view::area;
+use tetralod::view::is_closed;
+
+/// Writes isosurfaces: where the field has the values given with --iso.
+///
+/// The mesh is refined around these values alone, to the error that is asked for.
+#[derive(clap::Args)]
+#[command(after_help = "Example: tetralod isosurface engine.mt --iso 0.3 --iso 0.6 --error 1% -o engine.vtp")]
+pub struct Arguments {
+    /// The MT file.
+    file: PathBuf,
+    #[command(flatten)]
+    query: Query,
+    /// The surface to write: .vtp, .stl, .ply, .obj, or .csv for its points.
+    #[arg(short, long, value_name = "FILE")]
+    output: Target,
+    /// Print the result as a JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+/// The result as programs get it; the area is in square model units.
+#[derive(Serialize)]
+struct Report {
+    isovalues: Vec<f64>,
+    points: usize,
+    triangles: usize,
+    area: f64,
+    /// Whether the surfaces have no border.
+    closed: bool,
+    #[serde(flatten)]
+    mesh: Summary,
+    seconds: f64,
+}
+
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let isovalues = arguments.query.isovalues();
+    if isovalues.is_empty() {
+        super::refuse_usage("isosurface needs a value: give --iso V, in units of the field");
+    }
+    let mut answer = arguments.query.answer(&arguments.file)?;
+    let start = Instant::now();
+    let mut data = PolyData::default();
+    let mut values = Vec::new();
+    for &value in isovalues {
+        let surface = answer.opened.session.isosurface(value)?;
+        let first = data.positions.len() as u32;
+        data.positions.extend_from_slice(&surface.positions);
+        data.normals.extend_from_slice(&surface.normals);
+        data.triangles.extend(surface.indices.iter().map(|t| t.map(|v| v + first)));
+        values.resize(data.positions.len(), value as f32);
+    }
+    let seconds = start.elapsed().as_secs_f64();
+    data.fields.push((answer.summary.field.clone(), values));
+    arguments.output.write(&data)?;
+    let report = Report {
+        isovalues: isovalues.to_vec(),
+        points: data.positions.len(),
+        triangles: data.triangles.len(),
+        area: area(&data.positions, &data.triangles),
+        closed: is_closed(&data.triangles),
+        mesh: answer.summary,
+        seconds,
+    };
+    if arguments.json { output::json(&report) } else { print(arguments, &report) }
+}
+
+fn print(arguments: &Arguments, report: &Report) -> Result<()> {
+    let mut rows = vec![
+        ("file", arguments.output.path.display().to_string()),
+        ("points", output::count(report.points as u64)),
+        ("triangles", output::count(report.triangles as u64)),
+        ("area", output::number(report.area)),
+        ("border", if report.closed { "none" } else { "where the mesh ends" }.to_owned()),
+    ];
+    rows.extend(report.mesh.rows());
+    rows.push(("time", format!("{:.3} s", report.seconds)));
+    output::table(&rows)
+}

@@ -1,0 +1,91 @@
+//! Where surfaces, lines and points go: a file whose ending says of what format it is.
+
+use super::files;
+use anyhow::Result;
+use std::path::Path;
+use std::path::PathBuf;
+use std::str::FromStr;
+use tetralod::io::PolyData;
+use tetralod::io::write_csv;
+use tetralod::io::write_obj;
+use tetralod::io::write_ply;
+use tetralod::io::write_stl;
+use tetralod::io::write_vtp;
+
+/// A file to write, of a format that is known.
+#[derive(Clone, Debug)]
+pub struct Target {
+    pub path: PathBuf,
+    format: Format,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Format {
+    Vtp,
+    Stl,
+    Ply,
+    Obj,
+    Csv,
+}
+
+impl FromStr for Target {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let path = PathBuf::from(text);
+        let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+        let format = match ending.as_str() {
+            "vtp" => Format::Vtp,
+            "stl" => Format::Stl,
+            "ply" => Format::Ply,
+            "obj" => Format::Obj,
+            "csv" => Format::Csv,
+            _ => return Err("the file's name must end in .vtp, .stl, .ply, .obj or .csv".to_owned()),
+        };
+        Ok(Self { path, format })
+    }
+}
+
+impl Target {
+    /// Writes a surface; a table gets its points.
+    pub fn write(&self, data: &PolyData) -> Result<()> {
+        match self.format {
+            Format::Csv => self.write_table(&points_table(data)),
+            _ => files::write_file(&self.path, |out| {
+                Ok(match self.format {
+                    Format::Vtp => write_vtp(data, out)?,
+                    Format::Stl => write_stl(data, out)?,
+                    Format::Ply => write_ply(data, out)?,
+                    Format::Obj | Format::Csv => write_obj(data, out)?,
+                })
+            }),
+        }
+    }
+
+    /// Writes `data`, or `table` if the file is one.
+    pub fn write_either(&self, data: &PolyData, table: &[(String, Vec<f64>)]) -> Result<()> {
+        if self.format == Format::Csv { self.write_table(table) } else { self.write(data) }
+    }
+
+    fn write_table(&self, table: &[(String, Vec<f64>)]) -> Result<()> {
+        write_table(&self.path, table)
+    }
+}
+
+/// Writes a table as comma-separated values.
+pub fn write_table(path: &Path, table: &[(String, Vec<f64>)]) -> Result<()> {
+    files::write_file(path, |out| Ok(write_csv(table, out)?))
+}
+
+fn points_table(data: &PolyData) -> Vec<(String, Vec<f64>)> {
+    let column = |points: &[[f32; 3]], i: usize| points.iter().map(|p| f64::from(p[i])).collect();
+    let mut table: Vec<_> =
+        (0..3).map(|i| (["x", "y", "z"][i].to_owned(), column(&data.positions, i))).collect();
+    if !data.normals.is_empty() {
+        table.extend((0..3).map(|i| (["nx", "ny", "nz"][i].to_owned(), column(&data.normals, i))));
+    }
+    for (name, values) in &data.fields {
+        table.push((name.clone(), values.iter().map(|v| f64::from(*v)).collect()));
+    }
+    table
+}

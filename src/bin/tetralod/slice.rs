@@ -1,0 +1,113 @@
+//! `tetralod slice`: the mesh in a plane.
+
+use super::output;
+use super::poly::Target;
+use super::query::Query;
+use super::query::Summary;
+use super::query::parse_number;
+use super::query::parse_numbers;
+use anyhow::Result;
+use serde::Serialize;
+use std::path::PathBuf;
+use std::time::Instant;
+use tetralod::io::PolyData;
+use tetralod::view::Plane;
+use tetralod::view::Slice;
+use tetralod::view::area;
+
+/// Writes the section of the mesh with a plane, with the field interpolated in it.
+#[derive(clap::Args)]
+#[command(
+    after_help = "Examples: tetralod slice engine.mt --plane z=0.5 --error 1% -o slice.vtp\n          \
+                        tetralod slice engine.mt --plane 1,1,0,12.5 --edges -o slice.obj"
+)]
+pub struct Arguments {
+    /// The MT file.
+    file: PathBuf,
+    /// The plane: x=D, y=D or z=D, or the points p with n · p = D; in model units.
+    #[arg(long, value_name = "nx,ny,nz,D", value_parser = parse_plane, allow_hyphen_values = true)]
+    plane: Plane,
+    /// Also write the edges of the mesh's cells in the plane, as lines.
+    #[arg(long)]
+    edges: bool,
+    #[command(flatten)]
+    query: Query,
+    /// The surface to write: .vtp, .stl (without edges), .ply, .obj, or .csv for its points.
+    #[arg(short, long, value_name = "FILE")]
+    output: Target,
+    /// Print the result as a JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+fn parse_plane(text: &str) -> Result<Plane, String> {
+    if let Some((axis, offset)) = text.split_once('=') {
+        let axis = ["x", "y", "z"].iter().position(|name| *name == axis.trim());
+        let axis = axis.ok_or_else(|| format!("'{text}' is not x=, y= or z= and a number"))?;
+        let mut normal = [0.0; 3];
+        normal[axis] = 1.0;
+        return Ok(Plane { normal, offset: parse_number(offset)? });
+    }
+    let [x, y, z, offset] = parse_numbers(text, "a plane")?;
+    if [x, y, z] == [0.0; 3] {
+        return Err("the normal of a plane is not 0,0,0".to_owned());
+    }
+    Ok(Plane { normal: [x, y, z], offset })
+}
+
+/// The result as programs get it; the area is in square model units.
+#[derive(Serialize)]
+struct Report {
+    points: usize,
+    triangles: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    edges: Option<usize>,
+    area: f64,
+    #[serde(flatten)]
+    mesh: Summary,
+    seconds: f64,
+}
+
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let mut answer = arguments.query.answer(&arguments.file)?;
+    let start = Instant::now();
+    let mut slice = Slice::new();
+    slice.extract(&answer.opened.session.view(), &arguments.plane);
+    let mut edges = Vec::new();
+    if arguments.edges {
+        slice.cell_edges(&mut edges);
+    }
+    let seconds = start.elapsed().as_secs_f64();
+    let data = PolyData {
+        positions: slice.positions().to_vec(),
+        normals: Vec::new(),
+        fields: vec![(answer.summary.field.clone(), slice.values().to_vec())],
+        triangles: slice.indices().to_vec(),
+        lines: edges.iter().map(|edge| edge.to_vec()).collect(),
+    };
+    arguments.output.write(&data)?;
+    let report = Report {
+        points: data.positions.len(),
+        triangles: data.triangles.len(),
+        edges: arguments.edges.then_some(edges.len()),
+        area: area(&data.positions, &data.triangles),
+        mesh: answer.summary,
+        seconds,
+    };
+    if arguments.json { output::json(&report) } else { print(arguments, &report) }
+}
+
+fn print(arguments: &Arguments, report: &Report) -> Result<()> {
+    let mut rows = vec![
+        ("file", arguments.output.path.display().to_string()),
+        ("points", output::count(report.points as u64)),
+        ("triangles", output::count(report.triangles as u64)),
+    ];
+    if let Some(edges) = report.edges {
+        rows.push(("cell edges", output::count(edges as u64)));
+    }
+    rows.push(("area", output::number(report.area)));
+    rows.extend(report.mesh.rows());
+    rows.push(("time", format!("{:.3} s", report.seconds)));
+    output::table(&rows)
+}

@@ -1,0 +1,87 @@
+//! Runs the command `tetralod` in a folder of its own.
+#![allow(dead_code, reason = "every test binary uses a part of it")]
+
+use serde_json::Value;
+use std::fs;
+use std::path::PathBuf;
+use std::process::Command;
+use std::process::Output;
+use std::process::Stdio;
+
+/// A folder of one test, gone when the test is done.
+pub struct Folder(PathBuf);
+
+impl Folder {
+    pub fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("tetralod-cli-{}-{name}", std::process::id()));
+        fs::create_dir_all(&path).expect("a temporary folder");
+        Self(path)
+    }
+
+    pub fn path(&self, name: &str) -> String {
+        self.0.join(name).to_str().expect("a name in UTF-8").to_owned()
+    }
+
+    /// Names of the files in it, sorted.
+    pub fn names(&self) -> Vec<String> {
+        let entries = fs::read_dir(&self.0).expect("the folder is there");
+        let name = |e: std::io::Result<fs::DirEntry>| e.expect("an entry").file_name();
+        let mut names: Vec<_> = entries.map(|e| name(e).to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+fn run(arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tetralod"));
+    command.args(arguments).stdin(Stdio::null()).output().expect("the command starts")
+}
+
+fn text(bytes: &[u8]) -> &str {
+    std::str::from_utf8(bytes).expect("UTF-8")
+}
+
+/// Runs what must succeed; gives stdout.
+pub fn good(arguments: &[&str]) -> String {
+    let output = run(arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", text(&output.stderr));
+    text(&output.stdout).to_owned()
+}
+
+/// Runs what must succeed with one JSON object on stdout.
+pub fn json(arguments: &[&str]) -> Value {
+    let value: Value = serde_json::from_str(&good(arguments)).expect("one JSON value on stdout");
+    assert!(value.is_object());
+    value
+}
+
+/// Runs what must fail with an error that holds all of `words`.
+pub fn bad(code: i32, arguments: &[&str], words: &[&str]) {
+    let output = run(arguments);
+    let error = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {error}");
+    assert!(output.stdout.is_empty(), "{arguments:?}: errors go to stderr");
+    assert!(error.starts_with("error: ") && !error.contains("panicked"), "{arguments:?}: {error}");
+    for word in words {
+        assert!(error.contains(word), "{arguments:?}: '{word}' is not in: {error}");
+    }
+}
+
+pub fn number(value: &Value, key: &str) -> f64 {
+    value[key].as_f64().unwrap_or_else(|| panic!("{key} is a number: {value}"))
+}
+
+/// The names and the rows of a table; an empty place is NaN.
+pub fn table(path: &str) -> (Vec<String>, Vec<Vec<f64>>) {
+    let text = fs::read_to_string(path).expect("a table");
+    let mut lines = text.lines();
+    let names = lines.next().expect("a line of names").split(',').map(str::to_owned).collect();
+    let number = |word: &str| if word.is_empty() { f64::NAN } else { word.parse().expect("a number") };
+    (names, lines.map(|line| line.split(',').map(number).collect()).collect())
+}
