@@ -6,13 +6,19 @@ mod cutaway;
 pub mod gizmo;
 mod iso;
 mod patches;
+mod probe;
 mod slice;
+mod stats;
+mod stream;
 
 pub use boundary::{BoundarySurface, area, is_closed};
 pub use colormap::{Colormap, VIRIDIS};
 pub use cutaway::{ClipPlane, Cutaway};
 pub use iso::IsoSurface;
+pub use probe::{Place, Probe, Span};
 pub use slice::{Plane, Slice, SurfaceChanges};
+pub use stats::{FieldStats, Histogram};
+pub use stream::{StreamEnd, StreamPoint, Streamline, TraceOptions, Tracer};
 
 /// A tetrahedral mesh as slices: what the renderer and the isosurface extraction take.
 #[derive(Clone, Copy, Debug)]

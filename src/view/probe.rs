@@ -1,0 +1,494 @@
+//! Where points and lines are in a mesh, and what the field is there.
+//!
+//! A point is found by walking through neighbours towards it. Where the walk ends at the boundary, which in a domain
+//! that is not convex need not mean that the point is outside, a grid of boxes over the mesh tells; it is made when it
+//! is needed first. All decisions are exact (Shewchuk 1997) for the coordinates given.
+//!
+//! What holds: a point of the domain, its boundary included, is found, and one outside is not; of several tetrahedra
+//! that meet at a point the one with the smallest number is taken.
+
+use crate::mesh::FACES;
+use crate::mesh::NONE;
+use crate::view::MeshView;
+use robust::Coord3D;
+
+/// Pieces of a line that are shorter than this fraction of it are left out, and gaps are closed: rounding makes them
+/// where a line passes through points and edges of the mesh.
+const SHORTEST: f64 = 1e-12;
+
+/// Steps of a walk before it is given up: exact, it ends in every mesh that is usual, but can be led in a circle.
+const MOST_STEPS: u32 = 10_000;
+
+/// Tetrahedra that are looked at for a good start of a walk.
+const STARTS: usize = 16;
+
+/// A place in a tetrahedron.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    /// The tetrahedron.
+    pub tet: u32,
+    /// Barycentric coordinates: not negative, 1 in sum.
+    pub weights: [f64; 4],
+}
+
+impl Place {
+    /// The value of the mesh's own field.
+    ///
+    /// # Panics
+    /// If the mesh has no such tetrahedron.
+    pub fn value(&self, mesh: &MeshView<'_>) -> f64 {
+        self.interpolate(mesh, mesh.field)
+    }
+
+    /// The value of any field, given by one number a point.
+    ///
+    /// # Panics
+    /// If the mesh has no such tetrahedron, or the field too few numbers.
+    pub fn interpolate(&self, mesh: &MeshView<'_>, field: &[f32]) -> f64 {
+        let values = mesh.tets[self.tet as usize].map(|p| f64::from(field[p as usize]));
+        (0..4).map(|i| self.weights[i] * values[i]).sum()
+    }
+}
+
+/// The part of a line in one tetrahedron. Fields are linear in between.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Span {
+    /// Where the line enters, as a fraction of its length.
+    pub from: f64,
+    /// Where it leaves.
+    pub to: f64,
+    /// The place where it enters.
+    pub entry: Place,
+    /// The place where it leaves, in the same tetrahedron.
+    pub exit: Place,
+}
+
+/// Finds places in a mesh.
+#[derive(Clone, Debug)]
+pub struct Probe<'a> {
+    mesh: MeshView<'a>,
+    /// Where the last point was.
+    last: u32,
+    grid: Option<Grid>,
+}
+
+impl<'a> Probe<'a> {
+    /// A probe for this mesh.
+    pub fn new(mesh: MeshView<'a>) -> Self {
+        Self { mesh, last: 0, grid: None }
+    }
+
+    /// The mesh that is probed.
+    pub fn mesh(&self) -> &MeshView<'a> {
+        &self.mesh
+    }
+
+    /// Makes the grid now, which pays when there are more points than about a hundredth of the tetrahedra, or when
+    /// they are scattered. Costs two passes over the mesh.
+    pub fn make_grid(&mut self) {
+        if self.grid.is_none() {
+            self.grid = Some(Grid::new(&self.mesh));
+        }
+    }
+
+    /// The place of a point; none outside. Points near to the one before are found soonest.
+    ///
+    /// # Panics
+    /// If the mesh names a point or a neighbour that it does not have.
+    pub fn locate(&mut self, p: [f64; 3]) -> Option<Place> {
+        if !p.iter().all(|x| x.is_finite()) || self.mesh.tets.is_empty() {
+            return None;
+        }
+        let walked = self.start(p).and_then(|start| self.walk(start, p));
+        let found = match walked {
+            Some(tet) => Some(self.smallest(tet, p)),
+            None => {
+                self.make_grid();
+                let candidates = self.grid.as_ref().map_or(&[][..], |grid| grid.at(p));
+                candidates.iter().copied().find(|&t| self.sides(t, p).is_some_and(|sides| is_inside(&sides)))
+            }
+        };
+        let tet = found?;
+        self.last = tet;
+        let sides = self.sides(tet, p)?;
+        Some(Place { tet, weights: weights(sides) })
+    }
+
+    /// The parts of the segment between two points, in order from the first; between them, and at the ends, there are
+    /// gaps where the segment is outside. A part that lies in a face or an edge is given for one of its tetrahedra.
+    ///
+    /// # Panics
+    /// If the mesh names a point that it does not have.
+    pub fn line(&self, from: [f64; 3], to: [f64; 3]) -> Vec<Span> {
+        if from == to || !from.iter().chain(&to).all(|x| x.is_finite()) {
+            return Vec::new();
+        }
+        let mut parts: Vec<(f64, f64, u32)> = Vec::new();
+        let mut clip = |t: u32| {
+            if let Some((enter, leave)) = self.ends(t, from, to).and_then(|ends| clipped(&ends)) {
+                parts.push((enter, leave, t));
+            }
+        };
+        match &self.grid {
+            Some(grid) => grid.along(from, to).into_iter().for_each(clip),
+            None => {
+                let near = NearLine::new(from, to);
+                (0..)
+                    .zip(self.mesh.tets)
+                    .filter(|(_, tet)| near.meets(&self.mesh, tet))
+                    .for_each(|(t, _)| clip(t));
+            }
+        }
+        parts.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
+        let mut spans: Vec<Span> = Vec::new();
+        for (enter, leave, t) in parts {
+            let done = spans.last().map_or(f64::NEG_INFINITY, |span| span.to);
+            let enter = if enter - done <= SHORTEST { done } else { enter };
+            if leave - enter > SHORTEST {
+                spans.extend(self.span(t, from, to, [enter, leave]));
+            }
+        }
+        spans
+    }
+
+    fn span(&self, tet: u32, from: [f64; 3], to: [f64; 3], [enter, leave]: [f64; 2]) -> Option<Span> {
+        let ends = self.ends(tet, from, to)?;
+        let place = |s: f64| Place { tet, weights: weights(ends.map(|[a, b]| a + s * (b - a))) };
+        Some(Span { from: enter, to: leave, entry: place(enter), exit: place(leave) })
+    }
+
+    /// The best of a few tetrahedra to start a walk from (Mücke, Saias, Zhu 1996).
+    fn start(&self, p: [f64; 3]) -> Option<u32> {
+        let count = self.mesh.tets.len();
+        let distance = |t: u32| {
+            let corner =
+                self.mesh.tets.get(t as usize).and_then(|tet| self.mesh.positions.get(tet[0] as usize));
+            let corner = corner.map(|q| q.map(f64::from))?;
+            Some((0..3).map(|i| (p[i] - corner[i]) * (p[i] - corner[i])).sum::<f64>())
+        };
+        let others = (0..STARTS).map(|i| (i * count / STARTS) as u32);
+        let mut best: Option<(f64, u32)> = None;
+        for t in std::iter::once(self.last).chain(others) {
+            if let Some(d) = distance(t).filter(|d| best.is_none_or(|(least, _)| *d < least)) {
+                best = Some((d, t));
+            }
+        }
+        best.map(|(_, t)| t)
+    }
+
+    /// Walks towards a point; none if that ended at the boundary or nowhere.
+    fn walk(&self, start: u32, p: [f64; 3]) -> Option<u32> {
+        let mut t = start;
+        for step in 0..MOST_STEPS {
+            let sides = self.sides(t, p)?;
+            let around = self.mesh.neighbors[t as usize];
+            // Which of several ways is taken changes from step to step, against circles.
+            let turn = step.wrapping_mul(0x9e37_79b9) >> 30;
+            let ways = (0..4).map(|k| (k + turn as usize) % 4);
+            let mut beyond = ways.filter(|&i| sides[i] > 0.0).peekable();
+            if beyond.peek().is_none() {
+                return is_inside(&sides).then_some(t);
+            }
+            t = beyond.map(|i| around[i]).find(|n| *n != NONE)?;
+        }
+        None
+    }
+
+    /// The smallest of the tetrahedra that hold the point and hang together there.
+    fn smallest(&self, tet: u32, p: [f64; 3]) -> u32 {
+        let mut found = vec![tet];
+        let mut next = 0;
+        while let Some(&t) = found.get(next) {
+            next += 1;
+            let Some(sides) = self.sides(t, p) else { continue };
+            let around = self.mesh.neighbors[t as usize];
+            for n in (0..4).filter(|&i| sides[i] == 0.0 && around[i] != NONE).map(|i| around[i]) {
+                if !found.contains(&n) && self.sides(n, p).is_some_and(|sides| is_inside(&sides)) {
+                    found.push(n);
+                }
+            }
+        }
+        found.into_iter().min().unwrap_or(tet)
+    }
+
+    /// On which side of each face a point is: positive outside, with the exact sign; none for a tetrahedron that
+    /// single precision has made flat or turned inside out: the others cover its place.
+    fn sides(&self, t: u32, p: [f64; 3]) -> Option<[f64; 4]> {
+        let tet = self.proper(t)?;
+        Some([0, 1, 2, 3].map(|i| self.side(FACES[i].map(|k| tet[k]), p)))
+    }
+
+    /// The same for both ends of a segment.
+    fn ends(&self, t: u32, from: [f64; 3], to: [f64; 3]) -> Option<[[f64; 2]; 4]> {
+        let tet = self.proper(t)?;
+        Some([0, 1, 2, 3].map(|i| [from, to].map(|p| self.side(FACES[i].map(|k| tet[k]), p))))
+    }
+
+    fn proper(&self, t: u32) -> Option<[u32; 4]> {
+        let tet = *self.mesh.tets.get(t as usize)?;
+        if tet[0] == NONE {
+            return None;
+        }
+        let [a, b, c, d] = tet.map(|v| self.mesh.positions[v as usize].map(f64::from));
+        (orient(a, b, c, d) > 0.0).then_some(tet)
+    }
+
+    /// On which side of a face a point is. Seen from the neighbour, the same number with the other sign: the corners
+    /// are taken in ascending order.
+    fn side(&self, face: [u32; 3], p: [f64; 3]) -> f64 {
+        let mut sorted = face;
+        sorted.sort_unstable();
+        let [a, b, c] = sorted.map(|v| self.mesh.positions[v as usize].map(f64::from));
+        let is_even = [[0, 1, 2], [1, 2, 0], [2, 0, 1]].iter().any(|turn| turn.map(|k| face[k]) == sorted);
+        let side = orient(a, b, c, p);
+        if is_even { side } else { -side }
+    }
+}
+
+/// Six times the volume of a tetrahedron, with the exact sign.
+fn orient(a: [f64; 3], b: [f64; 3], c: [f64; 3], d: [f64; 3]) -> f64 {
+    let coord = |[x, y, z]: [f64; 3]| Coord3D { x, y, z };
+    -robust::orient3d(coord(a), coord(b), coord(c), coord(d))
+}
+
+fn is_inside(sides: &[f64; 4]) -> bool {
+    sides.iter().all(|side| *side <= 0.0)
+}
+
+/// Barycentric coordinates from the sides of the faces opposite each corner.
+fn weights(sides: [f64; 4]) -> [f64; 4] {
+    let parts = sides.map(|side| (-side).max(0.0));
+    let sum: f64 = parts.iter().sum();
+    if sum > 0.0 { parts.map(|part| part / sum) } else { [0.25; 4] }
+}
+
+/// The part of a segment that is inside, given the sides of its ends; none if it is not longer than a point.
+fn clipped(ends: &[[f64; 2]; 4]) -> Option<(f64, f64)> {
+    let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
+    for &[a, b] in ends {
+        if a > 0.0 && b > 0.0 {
+            return None;
+        }
+        if a > 0.0 {
+            enter = enter.max(a / (a - b));
+        } else if b > 0.0 {
+            leave = leave.min(a / (a - b));
+        }
+    }
+    (enter < leave).then_some((enter, leave))
+}
+
+/// A quick look whether a tetrahedron may meet a segment: by boxes.
+struct NearLine {
+    min: [f64; 3],
+    max: [f64; 3],
+    from: [f64; 3],
+    /// Two planes that hold the segment, as normals.
+    normals: [[f64; 3]; 2],
+    /// What rounding may do to a distance from the planes.
+    margin: [f64; 2],
+}
+
+impl NearLine {
+    fn new(from: [f64; 3], to: [f64; 3]) -> Self {
+        let d = [0, 1, 2].map(|i| to[i] - from[i]);
+        // The two planes through the segment along the axes in which it is shortest.
+        let long = (0..3).fold(0, |long, i| if d[i].abs() > d[long].abs() { i } else { long });
+        let normals = [(long + 1) % 3, (long + 2) % 3].map(|short| {
+            let mut n = [0.0; 3];
+            n[short] = d[long];
+            n[long] = -d[short];
+            n
+        });
+        let largest = from.iter().chain(&to).fold(0.0_f64, |m, x| m.max(x.abs()));
+        let margin = normals.map(|n| 1e-14 * largest * n.iter().map(|x| x.abs()).sum::<f64>());
+        Self {
+            min: [0, 1, 2].map(|i| from[i].min(to[i])),
+            max: [0, 1, 2].map(|i| from[i].max(to[i])),
+            from,
+            normals,
+            margin,
+        }
+    }
+
+    fn meets(&self, mesh: &MeshView<'_>, tet: &[u32; 4]) -> bool {
+        if tet[0] == NONE {
+            return false;
+        }
+        let corners = tet.map(|v| mesh.positions[v as usize].map(f64::from));
+        let in_box = (0..3).all(|i| {
+            corners.iter().any(|p| p[i] <= self.max[i]) && corners.iter().any(|p| p[i] >= self.min[i])
+        });
+        in_box
+            && (0..2).all(|k| {
+                let [n, margin] = [self.normals[k], [self.margin[k]; 3]];
+                let heights = corners.map(|p| (0..3).map(|i| n[i] * (p[i] - self.from[i])).sum::<f64>());
+                // Corners far away round more coarsely.
+                let far = corners.as_flattened().iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+                let slack = margin[0] + 1e-14 * far * n.iter().map(|x| x.abs()).sum::<f64>();
+                heights.iter().any(|h| *h <= slack) && heights.iter().any(|h| *h >= -slack)
+            })
+    }
+}
+
+/// Boxes of equal size over a mesh, with the tetrahedra whose own boxes meet each.
+#[derive(Clone, Debug)]
+struct Grid {
+    min: [f64; 3],
+    max: [f64; 3],
+    /// Boxes per model unit.
+    scale: [f64; 3],
+    dims: [usize; 3],
+    /// Where the tetrahedra of each box start in `tets`.
+    starts: Vec<u32>,
+    tets: Vec<u32>,
+}
+
+impl Grid {
+    /// Tetrahedra for each box, roughly.
+    const PER_BOX: usize = 4;
+    /// Boxes that a tetrahedron may be in, on average.
+    const MOST_BOXES: u64 = 24;
+
+    fn new(mesh: &MeshView<'_>) -> Self {
+        let mut grid = Self::empty(mesh);
+        let wanted = (mesh.tets.len() / Self::PER_BOX).max(1) as f64;
+        let mut boxes = wanted;
+        loop {
+            grid.set_dims(boxes);
+            let entries: u64 = mesh.tets.iter().map(|tet| grid.count(mesh, tet)).sum();
+            if entries <= Self::MOST_BOXES * mesh.tets.len() as u64 || boxes <= 1.0 {
+                break;
+            }
+            // A few large tetrahedra are in too many small boxes.
+            boxes = (boxes / 4.0).floor();
+        }
+        grid.fill(mesh);
+        grid
+    }
+
+    fn empty(mesh: &MeshView<'_>) -> Self {
+        let (mut min, mut max) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for &v in mesh.tets.iter().filter(|tet| tet[0] != NONE).flatten() {
+            let p = mesh.positions[v as usize].map(f64::from);
+            (0..3).for_each(|i| {
+                min[i] = min[i].min(p[i]);
+                max[i] = max[i].max(p[i]);
+            });
+        }
+        Self { min, max, scale: [0.0; 3], dims: [1; 3], starts: Vec::new(), tets: Vec::new() }
+    }
+
+    /// About so many boxes, about as long as wide. Found by doubling the number along the axis where boxes are longest.
+    fn set_dims(&mut self, boxes: f64) {
+        let extent = [0, 1, 2].map(|i| self.max[i] - self.min[i]);
+        let mut dims = [1_usize; 3];
+        while (dims.iter().product::<usize>() as f64) < boxes {
+            let size = [0, 1, 2].map(|i| extent[i] / dims[i] as f64);
+            let long = (0..3).fold(0, |long, i| if size[i] > size[long] { i } else { long });
+            dims[long] *= 2;
+        }
+        self.dims = dims;
+        self.scale = [0, 1, 2].map(|i| if extent[i] > 0.0 { dims[i] as f64 / extent[i] } else { 0.0 });
+    }
+
+    /// The box that a coordinate is in, the nearest one outside; this never decreases as the coordinate grows.
+    fn place(&self, x: f64, i: usize) -> usize {
+        // The cast saturates.
+        (((x - self.min[i]) * self.scale[i]) as usize).min(self.dims[i] - 1)
+    }
+
+    /// The boxes that a tetrahedron may be in.
+    fn range(&self, mesh: &MeshView<'_>, tet: &[u32; 4]) -> [[usize; 2]; 3] {
+        let corners = tet.map(|v| mesh.positions[v as usize]);
+        [0, 1, 2].map(|i| {
+            let low = corners.iter().fold(f32::INFINITY, |m, p| m.min(p[i]));
+            let high = corners.iter().fold(f32::NEG_INFINITY, |m, p| m.max(p[i]));
+            [self.place(f64::from(low), i), self.place(f64::from(high), i)]
+        })
+    }
+
+    fn count(&self, mesh: &MeshView<'_>, tet: &[u32; 4]) -> u64 {
+        if tet[0] == NONE {
+            return 0;
+        }
+        self.range(mesh, tet).iter().map(|[low, high]| (high - low + 1) as u64).product()
+    }
+
+    fn fill(&mut self, mesh: &MeshView<'_>) {
+        let tets = || (0..).zip(mesh.tets).filter(|(_, tet)| tet[0] != NONE);
+        let mut starts = vec![0_u32; self.dims.iter().product::<usize>() + 1];
+        for (_, tet) in tets() {
+            self.each_box(self.range(mesh, tet), |b| starts[b + 1] += 1);
+        }
+        (1..starts.len()).for_each(|b| starts[b] += starts[b - 1]);
+        let mut next = starts.clone();
+        let mut entries = vec![0_u32; starts.last().map_or(0, |end| *end as usize)];
+        for (t, tet) in tets() {
+            self.each_box(self.range(mesh, tet), |b| {
+                entries[next[b] as usize] = t;
+                next[b] += 1;
+            });
+        }
+        (self.starts, self.tets) = (starts, entries);
+    }
+
+    fn each_box(&self, range: [[usize; 2]; 3], mut see: impl FnMut(usize)) {
+        let [x, y, z] = range;
+        for k in z[0]..=z[1] {
+            for j in y[0]..=y[1] {
+                (x[0]..=x[1]).for_each(|i| see((k * self.dims[1] + j) * self.dims[0] + i));
+            }
+        }
+    }
+
+    fn in_box(&self, b: usize) -> &[u32] {
+        &self.tets[self.starts[b] as usize..self.starts[b + 1] as usize]
+    }
+
+    /// The tetrahedra that a point may be in, in ascending order.
+    fn at(&self, p: [f64; 3]) -> &[u32] {
+        if !(0..3).all(|i| self.min[i] <= p[i] && p[i] <= self.max[i]) {
+            return &[];
+        }
+        let [i, j, k] = [0, 1, 2].map(|axis| self.place(p[axis], axis));
+        self.in_box((k * self.dims[1] + j) * self.dims[0] + i)
+    }
+
+    /// The tetrahedra that a segment may meet, in ascending order.
+    fn along(&self, from: [f64; 3], to: [f64; 3]) -> Vec<u32> {
+        let mut found = Vec::new();
+        let d = [0, 1, 2].map(|i| to[i] - from[i]);
+        let long = (0..3).fold(0, |long, i| {
+            if (d[i] * self.scale[i]).abs() > (d[long] * self.scale[long]).abs() { i } else { long }
+        });
+        let mut ends = [from[long], to[long]];
+        ends.sort_unstable_by(f64::total_cmp);
+        if ends[1] < self.min[long] || ends[0] > self.max[long] {
+            return found;
+        }
+        for layer in self.place(ends[0], long)..=self.place(ends[1], long) {
+            // The part of the segment in this layer of boxes, and a little more.
+            let s = [layer as f64 - 1e-6, layer as f64 + 1.0 + 1e-6].map(|x| {
+                let x =
+                    if self.scale[long] > 0.0 { self.min[long] + x / self.scale[long] } else { from[long] };
+                if d[long] == 0.0 { x } else { ((x - from[long]) / d[long]).clamp(0.0, 1.0) }
+            });
+            let s = if d[long] == 0.0 { [0.0, 1.0] } else { s };
+            let range = [0, 1, 2].map(|i| {
+                let mut x = s.map(|s| from[i] + s * d[i]);
+                x.sort_unstable_by(f64::total_cmp);
+                let slack = 1e-12 * (from[i].abs() + to[i].abs());
+                if i == long {
+                    [layer, layer]
+                } else {
+                    [self.place(x[0] - slack, i), self.place(x[1] + slack, i)]
+                }
+            });
+            self.each_box(range, |b| found.extend_from_slice(self.in_box(b)));
+        }
+        found.sort_unstable();
+        found.dedup();
+        found
+    }
+}
