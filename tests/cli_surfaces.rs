@@ -150,3 +150,123 @@ fn what_cannot_be_done_is_refused_with_a_reason() {
     bad(1, &["slice", &mt, "--plane", "z=0.5", "--edges", "-o", &folder.path("o.stl")], &["o.stl", ".vtp"]);
     assert_eq!(folder.names(), before);
 }
+
+#[test]
+fn points_have_their_values() {
+    let folder = Folder::new("points");
+    let mt = box_mt(&folder);
+    let points = ["--point", "0.3,0.4,0.5", "--point", "3,0,0", "--point", "2,1,1"];
+    let report = json(&[&["probe", &mt, "--json"], &points[..]].concat());
+    assert_eq!((number(&report, "points"), number(&report, "outside")), (3.0, 1.0));
+    let values = report["values"].as_array().expect("one each");
+    assert!(near(number(&values[0], "ramp"), 0.6) && near(number(&values[2], "ramp"), 3.0), "{report}");
+    assert!(values[1].is_null() && number(&values[0], "hill") > 0.0);
+    assert!(good(&[&["probe", &mt], &points[..]].concat()).contains("ramp at 0.3,0.4,0.5"));
+
+    let [input, out, lines] = ["in.csv", "out.csv", "out.vtp"].map(|name| folder.path(name));
+    fs::write(&input, "x,y,z,name\n0.25,0.5,0.75,a\n-1,0,0,b\n 1 , 1 , 1 ,c\n").expect("a file");
+    let report = json(&["probe", &mt, "--points", &input, "-o", &out, "--json"]);
+    assert_eq!((number(&report, "points"), number(&report, "outside")), (3.0, 1.0));
+    let (names, rows) = table(&out);
+    assert_eq!(names, ["x", "y", "z", "tetrahedron", "ramp", "hill", "v_x", "v_y", "v_z"]);
+    assert!(near(rows[0][4], 0.5) && rows[1][4].is_nan() && near(rows[2][4], 2.0), "{rows:?}");
+    // The points of a mesh are all inside it.
+    let report = json(&["probe", &mt, "--points", &folder.path("box.vti"), "-o", &lines, "--json"]);
+    assert_eq!((number(&report, "points"), number(&report, "outside")), (17.0 * 81.0, 0.0));
+    fs::write(&input, "x,y,z\n1,2\n").expect("a file");
+    bad(1, &["probe", &mt, "--points", &input], &["in.csv", "line 2", "3 numbers"]);
+    bad(2, &["probe", &mt], &["--point"]);
+    bad(2, &["probe", &mt, "--point", "1,2,3", "--line", "0,0,0,1,1,1"], &["--point", "--line"]);
+    bad(2, &["probe", &mt, "--point", "1,2,3", "--samples", "3"], &["--line"]);
+}
+
+#[test]
+fn lines_have_their_profile() {
+    let folder = Folder::new("lines");
+    let mt = box_mt(&folder);
+    let [out, lines] = ["out.csv", "out.obj"].map(|name| folder.path(name));
+    let line = ["probe", &mt, "--error", "2%", "--line", "-1,0.3,0.2,3,0.5,0.7", "--json", "-o"];
+    let report = json(&[&line[..], &[&out]].concat());
+    let whole = number(&report, "length");
+    assert!(
+        near(whole, (16.0_f64 + 0.04 + 0.25).sqrt()) && near(number(&report, "length_inside"), 0.5 * whole)
+    );
+    let (names, rows) = table(&out);
+    assert_eq!(names[..5], ["distance", "x", "y", "z", "tetrahedron"]);
+    assert!(rows.len() % 2 == 0 && rows.is_sorted_by(|a, b| a[0] <= b[0]));
+    let error = number(&report, "relative_error_bound") * 4.0 + 1e-3;
+    assert!(rows.iter().all(|row| (row[1] + 2.0 * row[2] - row[3] - row[5]).abs() <= error), "{rows:?}");
+    json(&[&line[..], &[&lines]].concat());
+    assert!(fs::read_to_string(&lines).expect("text").lines().any(|line| line.starts_with("l ")));
+
+    let report = json(&[&line[..], &[&out, "--samples", "41"]].concat());
+    let (_, rows) = table(&out);
+    assert_eq!((rows.len(), number(&report, "points")), (41, 41.0));
+    let inside = rows.iter().filter(|row| !row[5].is_nan()).count() as f64;
+    assert!((19.0..=21.0).contains(&inside) && inside + number(&report, "outside") == 41.0);
+}
+
+#[test]
+fn streamlines_follow_the_field() {
+    let folder = Folder::new("stream");
+    let mt = box_mt(&folder);
+    let [out, lines] = ["out.csv", "out.vtp"].map(|name| folder.path(name));
+    let seeds = ["streamlines", &mt, "--seeds", "1.1,0.5,0.3,1.4,0.5,0.3,4", "--seed", "5,5,5", "--vector"];
+    let report = json(&[&seeds[..], &["v", "--length", "2", "-o", &out, "--json"]].concat());
+    assert_eq!(["seeds", "outside", "lines"].map(|key| number(&report, key)), [5.0, 1.0, 4.0]);
+    assert_eq!(report["ends"]["length"], 8, "both ways: {report}");
+    let (names, rows) = table(&out);
+    assert_eq!(names[..6], ["line", "time", "x", "y", "z", "speed"]);
+    assert_eq!(rows.len() as f64, number(&report, "points"));
+    for row in &rows {
+        let radius = ((row[2] - 1.0).powi(2) + (row[3] - 0.5).powi(2)).sqrt();
+        assert!(
+            (radius - (1.1 + 0.1 * row[0] - 1.0)).abs() < 1e-3 && (row[5] - radius).abs() < 1e-3,
+            "{row:?}"
+        );
+    }
+    let forward = ["v_x,v_y,v_z", "--direction", "forward", "--length", "2", "-o", &lines, "--json"];
+    let report = json(&[&seeds[..], &forward[..]].concat());
+    assert_eq!(report["ends"]["length"], 4);
+    assert!(good(&[&seeds[..], &["v", "-o", &lines]].concat()).contains("seeds"));
+    let before = folder.names();
+    bad(1, &[&seeds[..], &["w", "-o", &lines]].concat(), &["'w'", "v_x"]);
+    bad(1, &[&seeds[..], &["v", "-o", &folder.path("x.stl")]].concat(), &["x.stl", "triangles"]);
+    bad(2, &["streamlines", &mt, "--vector", "v", "-o", &lines], &["--seed"]);
+    assert_eq!(folder.names(), before);
+}
+
+#[test]
+fn statistics_are_those_of_the_box() {
+    let folder = Folder::new("stats");
+    let mt = box_mt(&folder);
+    let [input, out] = ["box.vti", "out.csv"].map(|name| folder.path(name));
+    let report = json(&["stats", &mt, "--reference", &input, "-o", &out, "--json"]);
+    // x + 2 y - z over the box: mean 1 + 1 - 1/2, variance (4 + 4 + 1) / 12.
+    for (key, expected) in
+        [("volume", 2.0), ("integral", 3.0), ("mean", 1.5), ("standard_deviation", 0.75_f64.sqrt())]
+    {
+        assert!(near(number(&report, key), expected), "{key}: {report}");
+        assert!(near(number(&report["reference"], key), expected), "{key}: {report}");
+    }
+    for key in ["volume_error", "integral_error", "mean_error", "histogram_error"] {
+        assert!(number(&report["reference"], key).abs() < 1e-3, "{key}: {report}");
+    }
+    let (names, rows) = table(&out);
+    assert_eq!((names.len(), rows.len()), (3, 10));
+    assert!((rows.iter().map(|row| row[2]).sum::<f64>() - 2.0).abs() < 1e-9);
+
+    let narrow = ["stats", &mt, "--field", "hill", "--bins", "4", "--range", "2,5", "--json"];
+    let report = json(&narrow);
+    let bins = &report["histogram"];
+    let volumes: f64 =
+        bins["volumes"].as_array().expect("four").iter().filter_map(serde_json::Value::as_f64).sum();
+    assert!(number(bins, "below") > 0.0 && number(bins, "above") > 0.0);
+    assert!((volumes + number(bins, "below") + number(bins, "above") - 2.0).abs() < 1e-9);
+    assert!(good(&["stats", &mt, "--reference", &input]).contains("histogram"));
+    // The coarse mesh is off by something, and says by how much.
+    let coarse = json(&["stats", &mt, "--field", "hill", "--error", "30%", "--reference", &input, "--json"]);
+    assert!(number(&coarse["reference"], "integral_error") != 0.0);
+    bad(2, &["stats", &mt, "--range", "5,2"], &["--range"]);
+    bad(2, &["stats", &mt, "--bins", "0"], &["--bins"]);
+}

@@ -13,8 +13,11 @@ mod info;
 mod isosurface;
 mod output;
 mod poly;
+mod probe;
 mod query;
 mod slice;
+mod stats;
+mod streamlines;
 mod surface;
 mod verify;
 
@@ -42,6 +45,9 @@ enum Command {
     Isosurface(isosurface::Arguments),
     Slice(slice::Arguments),
     Surface(surface::Arguments),
+    Probe(probe::Arguments),
+    Streamlines(streamlines::Arguments),
+    Stats(stats::Arguments),
     Verify(verify::Arguments),
     Bench(bench::Arguments),
 }
@@ -69,6 +75,9 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Isosurface(arguments) => isosurface::run(&arguments)?,
         Command::Slice(arguments) => slice::run(&arguments)?,
         Command::Surface(arguments) => surface::run(&arguments)?,
+        Command::Probe(arguments) => probe::run(&arguments)?,
+        Command::Streamlines(arguments) => streamlines::run(&arguments)?,
+        Command::Stats(arguments) => stats::run(&arguments)?,
     }
     Ok(ExitCode::SUCCESS)
 }

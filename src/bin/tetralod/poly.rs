@@ -52,12 +52,13 @@ impl Target {
         match self.format {
             Format::Csv => self.write_table(&points_table(data)),
             _ => files::write_file(&self.path, |out| {
-                Ok(match self.format {
+                match self.format {
                     Format::Vtp => write_vtp(data, out)?,
                     Format::Stl => write_stl(data, out)?,
                     Format::Ply => write_ply(data, out)?,
                     Format::Obj | Format::Csv => write_obj(data, out)?,
-                })
+                }
+                Ok(())
             }),
         }
     }
