@@ -221,7 +221,7 @@ fn follow(walk: &mut Walk, plane: &Plane) {
     let mut largest = 0;
     for round in 0..60 {
         let refine = round / 10 % 2 == 0;
-        let count = [1, 3, 20, walk.updates()][walk.random(4)];
+        let count = [1, 2, 3, 5, 20, walk.updates()][walk.random(6)];
         let changes = if round == 30 { walk.refine_all() } else { walk.change(count, refine) };
         slice.update(&walk.view(), &changes.vertices, &changes.tets);
         let fresh = cut(&walk.view(), plane);
@@ -240,14 +240,20 @@ fn follow(walk: &mut Walk, plane: &Plane) {
 }
 
 #[test]
-fn another_field_is_a_change_of_all_points() {
+fn values_may_change_where_tetrahedra_do_not() {
     let mut scene = Scene::ball(6);
     let plane = plane([1.0, 0.2, 0.1], 0.6);
     let mut slice = cut(&scene.view(), &plane);
-    scene.field = scene.positions.iter().map(|p| linear(*p)).collect();
     let points = scene.positions.len() as u32;
-    slice.update(&scene.view(), std::slice::from_ref(&(0..points)), &[]);
-    assert_eq!(as_set(&slice), as_set(&cut(&scene.view(), &plane)));
+    // Part by part, then another field altogether.
+    for (i, range) in [0..0, 100..150, 200..240, 0..100, 0..points].into_iter().enumerate() {
+        for p in range.clone().map(|p| p as usize) {
+            scene.field[p] = linear(scene.positions[p]) * (1.0 + i as f32);
+            scene.positions[p][0] += if i < 4 { 0.01 * (p % 7) as f32 } else { 0.0 };
+        }
+        slice.update(&scene.view(), std::slice::from_ref(&range), &[]);
+        assert_eq!(as_set(&slice), as_set(&cut(&scene.view(), &plane)), "{range:?}");
+    }
 }
 
 #[test]

@@ -46,29 +46,63 @@ const CASES: [&[usize]; 16] = [
     &[],
 ];
 
+/// On which side of a surface a point is: bits, so that those of a tetrahedron can be put together.
+pub(super) mod side {
+    /// Below: inside.
+    pub const INSIDE: u8 = 1;
+    /// In the surface itself.
+    pub const TOUCHED: u8 = 2;
+    /// Above: outside.
+    pub const OUTSIDE: u8 = 4;
+    /// Neither: a point that is no number is in no piece.
+    pub const NOWHERE: u8 = 8;
+
+    /// The side of a point at this height above the surface.
+    pub fn of(height: f64) -> u8 {
+        if height < 0.0 {
+            INSIDE
+        } else if height > 0.0 {
+            OUTSIDE
+        } else if height == 0.0 {
+            TOUCHED
+        } else {
+            NOWHERE
+        }
+    }
+
+    /// Whether a tetrahedron whose corners have these sides, put together, may have a piece.
+    pub fn may_pass(all: u8) -> bool {
+        // Nothing inside leaves faces at the bottom of the domain.
+        all & TOUCHED != 0 && all & OUTSIDE != 0 || all & INSIDE != 0 && all & (TOUCHED | OUTSIDE) != 0
+    }
+}
+
 impl Polygon {
-    /// The piece of the surface at height 0 in a tetrahedron with these heights: what is lower is inside, a corner of
-    /// height 0 is used itself. A face that lies in the surface belongs to the tetrahedron below it or, at the bottom
-    /// of the domain, to the one above.
-    pub fn of(tet: [u32; 4], heights: [f64; 4], neighbors: [u32; 4]) -> Self {
-        let case = heights.iter().rev().fold(0, |case, h| case << 1 | usize::from(*h < 0.0));
+    /// The piece of the surface in a tetrahedron whose corners have these sides; a touched corner is used itself. A
+    /// face that lies in the surface belongs to the tetrahedron below it or, at the bottom of the domain, to the one
+    /// above.
+    pub fn of(tet: [u32; 4], sides: [u8; 4], neighbors: [u32; 4]) -> Self {
+        if sides.contains(&side::NOWHERE) {
+            return Self::default();
+        }
+        let case = sides.iter().rev().fold(0, |case, s| case << 1 | usize::from(*s == side::INSIDE));
         if case == 0 {
-            return Self::of_floor(tet, heights, neighbors);
+            return Self::of_floor(tet, sides, neighbors);
         }
         let mut polygon = Self::default();
         for &edge in CASES[case] {
             let [a, b] = EDGES[edge];
             let [inside, outside] = if case >> a & 1 == 1 { [a, b] } else { [b, a] };
-            let touched = heights[outside] == 0.0;
+            let touched = sides[outside] == side::TOUCHED;
             polygon.push([tet[if touched { outside } else { inside }], tet[outside]]);
         }
         polygon.closed()
     }
 
     /// A face of the domain's boundary that lies in the surface, with nothing below it.
-    fn of_floor(tet: [u32; 4], heights: [f64; 4], neighbors: [u32; 4]) -> Self {
-        let touched = heights.iter().filter(|h| **h == 0.0).count();
-        let top = heights.iter().position(|h| *h != 0.0);
+    fn of_floor(tet: [u32; 4], sides: [u8; 4], neighbors: [u32; 4]) -> Self {
+        let touched = sides.iter().filter(|s| **s == side::TOUCHED).count();
+        let top = sides.iter().position(|s| *s != side::TOUCHED);
         match top {
             Some(top) if touched == 3 && neighbors[top] == NONE => {
                 let mut polygon = Self::default();
@@ -238,6 +272,11 @@ impl Patches {
         [vertices, self.changed_triangles.take(self.triangles.len())]
     }
 
+    /// Whether a tetrahedron has a piece.
+    pub fn has_piece(&self, t: u32) -> bool {
+        self.head(t).is_some()
+    }
+
     fn head(&self, t: u32) -> Option<u32> {
         self.heads.get(t as usize).copied().filter(|head| *head != NONE)
     }
@@ -354,11 +393,17 @@ impl Watch {
         }
     }
 
-    /// Finds the tetrahedra that have changed, or have a corner that has, given where to look.
+    /// Finds the tetrahedra that have changed, or have a corner that has, given where to look, as far as they `matter`.
     ///
     /// Of a point that has changed those tetrahedra are found that hang together through faces at the point; where a
     /// mesh is pinched, the others must be among the changed ones.
-    pub fn look(&mut self, mesh: &MeshView<'_>, points: &[Range<u32>], tets: &[Range<u32>]) {
+    pub fn look(
+        &mut self,
+        mesh: &MeshView<'_>,
+        points: &[Range<u32>],
+        tets: &[Range<u32>],
+        matter: impl Fn(u32) -> bool,
+    ) {
         self.dirty.clear();
         self.marks.resize(mesh.tets.len().div_ceil(64), 0);
         self.visited.resize(mesh.tets.len().div_ceil(64), 0);
@@ -367,14 +412,16 @@ impl Watch {
         self.seen.resize(mesh.positions.len(), [0; 4]);
         for t in within(tets, mesh.tets.len()) {
             self.set_incident(mesh, t);
-            self.add(t);
+            if matter(t) {
+                self.add(t);
+            }
         }
         for p in within(points, mesh.positions.len()) {
             let bits = bits_of(mesh, p as usize);
             let old = std::mem::replace(&mut self.seen[p as usize], bits);
             // The tetrahedra around a new point are new themselves.
             if old != bits && (p as usize) < known {
-                self.add_star(mesh, p);
+                self.add_star(mesh, p, &matter);
             }
         }
         for t in &self.dirty {
@@ -394,8 +441,8 @@ impl Watch {
         }
     }
 
-    /// Finds the tetrahedra around a point. When the one that is remembered is gone or has lost the point, so have all.
-    fn add_star(&mut self, mesh: &MeshView<'_>, point: u32) {
+    /// Adds the tetrahedra around a point. When the one that is remembered is gone or has lost the point, so have all.
+    fn add_star(&mut self, mesh: &MeshView<'_>, point: u32, matter: impl Fn(u32) -> bool) {
         let has_point = |t: u32| mesh.tets.get(t as usize).is_some_and(|tet| tet.contains(&point));
         let mut star = std::mem::take(&mut self.star);
         star.extend(
@@ -404,7 +451,9 @@ impl Watch {
         let mut next = 0;
         while let Some(&t) = star.get(next) {
             next += 1;
-            self.add(t);
+            if matter(t) {
+                self.add(t);
+            }
             for n in mesh.neighbors[t as usize] {
                 if n != NONE && has_point(n) && set(&mut self.visited, n) {
                     star.push(n);

@@ -1,8 +1,8 @@
 //! Where points and lines are in a mesh, and what the field is there.
 //!
 //! A point is found by walking through neighbours towards it. Where the walk ends at the boundary, which in a domain
-//! that is not convex need not mean that the point is outside, a grid of boxes over the mesh tells; it is made when it
-//! is needed first. All decisions are exact (Shewchuk 1997) for the coordinates given.
+//! that is not convex need not mean that the point is outside, all tetrahedra are asked or, when that happens more
+//! often, a grid of boxes over the mesh. All decisions are exact (Shewchuk 1997) for the coordinates given.
 //!
 //! What holds: a point of the domain, its boundary included, is found, and one outside is not; of several tetrahedra
 //! that meet at a point the one with the smallest number is taken.
@@ -18,6 +18,12 @@ const SHORTEST: f64 = 1e-12;
 
 /// Steps of a walk before it is given up: exact, it ends in every mesh that is usual, but can be led in a circle.
 const MOST_STEPS: u32 = 10_000;
+
+/// Steps from the place before, after which a grid is the shorter way.
+const NEAR_STEPS: u32 = 12;
+
+/// Points that are looked for in all tetrahedra before a grid is made.
+const MOST_SCANS: u32 = 8;
 
 /// Tetrahedra that are looked at for a good start of a walk.
 const STARTS: usize = 16;
@@ -70,12 +76,14 @@ pub struct Probe<'a> {
     /// Where the last point was.
     last: u32,
     grid: Option<Grid>,
+    /// Points that the walk has not found.
+    scans: u32,
 }
 
 impl<'a> Probe<'a> {
     /// A probe for this mesh.
     pub fn new(mesh: MeshView<'a>) -> Self {
-        Self { mesh, last: 0, grid: None }
+        Self { mesh, last: 0, grid: None, scans: 0 }
     }
 
     /// The mesh that is probed.
@@ -99,19 +107,38 @@ impl<'a> Probe<'a> {
         if !p.iter().all(|x| x.is_finite()) || self.mesh.tets.is_empty() {
             return None;
         }
-        let walked = self.start(p).and_then(|start| self.walk(start, p));
-        let found = match walked {
-            Some(tet) => Some(self.smallest(tet, p)),
-            None => {
-                self.make_grid();
-                let candidates = self.grid.as_ref().map_or(&[][..], |grid| grid.at(p));
-                candidates.iter().copied().find(|&t| self.sides(t, p).is_some_and(|sides| is_inside(&sides)))
-            }
-        };
-        let tet = found?;
+        let tet = self.find(p)?;
         self.last = tet;
         let sides = self.sides(tet, p)?;
         Some(Place { tet, weights: weights(sides) })
+    }
+
+    fn find(&mut self, p: [f64; 3]) -> Option<u32> {
+        if let Some(tet) = self.walk(self.last, p, NEAR_STEPS) {
+            return Some(self.smallest(tet, p));
+        }
+        if let Some(grid) = &self.grid {
+            return self.first_of(grid.at(p), p).map(|tet| self.smallest(tet, p));
+        }
+        if let Some(tet) = self.start(p).and_then(|start| self.walk(start, p, MOST_STEPS)) {
+            return Some(self.smallest(tet, p));
+        }
+        self.scans += 1;
+        if self.scans > MOST_SCANS {
+            self.make_grid();
+        }
+        let near = NearLine::new(&self.mesh, p, p);
+        let mut candidates = (0..self.mesh.tets.len() as u32).filter(|&t| near.meets(&self.mesh, t));
+        candidates.find(|&t| self.holds(t, p)).map(|tet| self.smallest(tet, p))
+    }
+
+    fn first_of(&self, candidates: &[u32], p: [f64; 3]) -> Option<u32> {
+        candidates.iter().copied().find(|&t| self.holds(t, p))
+    }
+
+    fn holds(&self, t: u32, p: [f64; 3]) -> bool {
+        let Some(tet) = self.proper(t) else { return false };
+        (0..4).all(|i| self.side(FACES[i].map(|k| tet[k]), p) <= 0.0)
     }
 
     /// The parts of the segment between two points, in order from the first; between them, and at the ends, there are
@@ -132,11 +159,8 @@ impl<'a> Probe<'a> {
         match &self.grid {
             Some(grid) => grid.along(from, to).into_iter().for_each(clip),
             None => {
-                let near = NearLine::new(from, to);
-                (0..)
-                    .zip(self.mesh.tets)
-                    .filter(|(_, tet)| near.meets(&self.mesh, tet))
-                    .for_each(|(t, _)| clip(t));
+                let near = NearLine::new(&self.mesh, from, to);
+                (0..self.mesh.tets.len() as u32).filter(|&t| near.meets(&self.mesh, t)).for_each(&mut clip);
             }
         }
         parts.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
@@ -176,20 +200,32 @@ impl<'a> Probe<'a> {
         best.map(|(_, t)| t)
     }
 
-    /// Walks towards a point; none if that ended at the boundary or nowhere.
-    fn walk(&self, start: u32, p: [f64; 3]) -> Option<u32> {
-        let mut t = start;
-        for step in 0..MOST_STEPS {
-            let sides = self.sides(t, p)?;
+    /// Walks towards a point; none if that ended at the boundary or nowhere, or takes too many steps.
+    fn walk(&self, start: u32, p: [f64; 3], most_steps: u32) -> Option<u32> {
+        let (mut t, mut from) = (start, NONE);
+        for step in 0..most_steps {
+            let tet = self.mesh.tets.get(t as usize).filter(|tet| tet[0] != NONE)?;
             let around = self.mesh.neighbors[t as usize];
             // Which of several ways is taken changes from step to step, against circles.
-            let turn = step.wrapping_mul(0x9e37_79b9) >> 30;
-            let ways = (0..4).map(|k| (k + turn as usize) % 4);
-            let mut beyond = ways.filter(|&i| sides[i] > 0.0).peekable();
-            if beyond.peek().is_none() {
-                return is_inside(&sides).then_some(t);
+            let turn = (step.wrapping_mul(0x9e37_79b9) >> 30) as usize;
+            let (mut next, mut is_outside) = (NONE, false);
+            for i in (0..4).map(|k| (k + turn) % 4).filter(|&i| around[i] != from || from == NONE) {
+                if self.side(FACES[i].map(|k| tet[k]), p) > 0.0 {
+                    is_outside = true;
+                    next = around[i];
+                    if next != NONE {
+                        break;
+                    }
+                }
             }
-            t = beyond.map(|i| around[i]).find(|n| *n != NONE)?;
+            if !is_outside {
+                // Not so behind a tetrahedron that is inside out.
+                return self.holds(t, p).then_some(t);
+            }
+            if next == NONE {
+                return None;
+            }
+            (from, t) = (t, next);
         }
         None
     }
@@ -203,7 +239,7 @@ impl<'a> Probe<'a> {
             let Some(sides) = self.sides(t, p) else { continue };
             let around = self.mesh.neighbors[t as usize];
             for n in (0..4).filter(|&i| sides[i] == 0.0 && around[i] != NONE).map(|i| around[i]) {
-                if !found.contains(&n) && self.sides(n, p).is_some_and(|sides| is_inside(&sides)) {
+                if !found.contains(&n) && self.holds(n, p) {
                     found.push(n);
                 }
             }
@@ -251,10 +287,6 @@ fn orient(a: [f64; 3], b: [f64; 3], c: [f64; 3], d: [f64; 3]) -> f64 {
     -robust::orient3d(coord(a), coord(b), coord(c), coord(d))
 }
 
-fn is_inside(sides: &[f64; 4]) -> bool {
-    sides.iter().all(|side| *side <= 0.0)
-}
-
 /// Barycentric coordinates from the sides of the faces opposite each corner.
 fn weights(sides: [f64; 4]) -> [f64; 4] {
     let parts = sides.map(|side| (-side).max(0.0));
@@ -278,56 +310,43 @@ fn clipped(ends: &[[f64; 2]; 4]) -> Option<(f64, f64)> {
     (enter < leave).then_some((enter, leave))
 }
 
-/// A quick look whether a tetrahedron may meet a segment: by boxes.
+/// A quick look whether a tetrahedron may meet a segment. Each point of the mesh has a bit for every plane around the
+/// segment that it lies beyond; a tetrahedron whose corners have one in common is apart.
 struct NearLine {
-    min: [f64; 3],
-    max: [f64; 3],
-    from: [f64; 3],
-    /// Two planes that hold the segment, as normals.
-    normals: [[f64; 3]; 2],
-    /// What rounding may do to a distance from the planes.
-    margin: [f64; 2],
+    beyond: Vec<u16>,
 }
 
 impl NearLine {
-    fn new(from: [f64; 3], to: [f64; 3]) -> Self {
+    fn new(mesh: &MeshView<'_>, from: [f64; 3], to: [f64; 3]) -> Self {
         let d = [0, 1, 2].map(|i| to[i] - from[i]);
-        // The two planes through the segment along the axes in which it is shortest.
+        // Two planes through the segment, along the axes in which it is shortest.
         let long = (0..3).fold(0, |long, i| if d[i].abs() > d[long].abs() { i } else { long });
-        let normals = [(long + 1) % 3, (long + 2) % 3].map(|short| {
-            let mut n = [0.0; 3];
-            n[short] = d[long];
-            n[long] = -d[short];
-            n
-        });
-        let largest = from.iter().chain(&to).fold(0.0_f64, |m, x| m.max(x.abs()));
-        let margin = normals.map(|n| 1e-14 * largest * n.iter().map(|x| x.abs()).sum::<f64>());
-        Self {
-            min: [0, 1, 2].map(|i| from[i].min(to[i])),
-            max: [0, 1, 2].map(|i| from[i].max(to[i])),
-            from,
-            normals,
-            margin,
-        }
+        let slanted = |p: [f64; 3], short: usize| {
+            let [a, b] = [d[long] * (p[short] - from[short]), d[short] * (p[long] - from[long])];
+            // What rounding may have done.
+            (a - b, 1e-15 * (a.abs() + b.abs()))
+        };
+        let beyond = |p: &[f32; 3]| {
+            let p = p.map(f64::from);
+            let mut bits = 0;
+            let mut bit = |is_beyond: bool| bits = bits << 1 | u16::from(is_beyond);
+            for i in 0..3 {
+                bit(p[i] < from[i].min(to[i]));
+                bit(p[i] > from[i].max(to[i]));
+            }
+            for short in [(long + 1) % 3, (long + 2) % 3] {
+                let (height, slack) = slanted(p, short);
+                bit(height < -slack);
+                bit(height > slack);
+            }
+            bits
+        };
+        Self { beyond: mesh.positions.iter().map(beyond).collect() }
     }
 
-    fn meets(&self, mesh: &MeshView<'_>, tet: &[u32; 4]) -> bool {
-        if tet[0] == NONE {
-            return false;
-        }
-        let corners = tet.map(|v| mesh.positions[v as usize].map(f64::from));
-        let in_box = (0..3).all(|i| {
-            corners.iter().any(|p| p[i] <= self.max[i]) && corners.iter().any(|p| p[i] >= self.min[i])
-        });
-        in_box
-            && (0..2).all(|k| {
-                let [n, margin] = [self.normals[k], [self.margin[k]; 3]];
-                let heights = corners.map(|p| (0..3).map(|i| n[i] * (p[i] - self.from[i])).sum::<f64>());
-                // Corners far away round more coarsely.
-                let far = corners.as_flattened().iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-                let slack = margin[0] + 1e-14 * far * n.iter().map(|x| x.abs()).sum::<f64>();
-                heights.iter().any(|h| *h <= slack) && heights.iter().any(|h| *h >= -slack)
-            })
+    fn meets(&self, mesh: &MeshView<'_>, t: u32) -> bool {
+        let tet = mesh.tets[t as usize];
+        tet[0] != NONE && tet.iter().fold(u16::MAX, |common, v| common & self.beyond[*v as usize]) == 0
     }
 }
 

@@ -9,10 +9,12 @@
 //!   side of a triangle has its opposite.
 //! - After [`Slice::update`] the triangles are those that [`Slice::extract`] would give, in another order.
 
+use crate::mesh::NONE;
 use crate::view::MeshView;
 use crate::view::patches::Patches;
 use crate::view::patches::Polygon;
 use crate::view::patches::Watch;
+use crate::view::patches::side;
 use crate::view::patches::within;
 use std::ops::Range;
 
@@ -53,10 +55,11 @@ pub struct Slice {
     plane: Option<Plane>,
     positions: Vec<[f32; 3]>,
     values: Vec<f32>,
-    /// Of each point of the mesh.
-    heights: Vec<f64>,
+    /// Of each point of the mesh, the side of the plane that it is on.
+    sides: Vec<u8>,
     patches: Patches,
-    watch: Watch,
+    /// Once the mesh has changed: what it was.
+    watch: Option<Watch>,
 }
 
 impl Slice {
@@ -104,40 +107,53 @@ impl Slice {
     /// If the mesh names a point that it does not have.
     pub fn extract(&mut self, mesh: &MeshView<'_>, plane: &Plane) {
         self.plane = Some(*plane);
-        self.watch.reset(mesh);
-        self.patches.clear(mesh.positions.len(), mesh.tets.len());
-        self.positions.clear();
-        self.values.clear();
-        self.heights.clear();
-        self.heights.extend(mesh.positions.iter().map(|p| plane.height(*p)));
-        for t in 0..mesh.tets.len() as u32 {
-            add(&mut self.patches, &self.heights, mesh, t);
-        }
-        self.place(mesh);
+        self.watch = None;
+        self.cut(mesh, plane);
     }
 
     /// Brings the section with the same plane up to date, given in which ranges points (or their values) and
     /// tetrahedra (or their neighbours) have changed since; does nothing before the first [`Slice::extract`].
     ///
-    /// Costs what changed. Wider ranges than needed cost a little more and change nothing else.
+    /// The first time after [`Slice::extract`], and where most of the mesh has changed, this costs a pass over the
+    /// mesh; else what changed. Wider ranges than needed cost a little more and change nothing else.
     ///
     /// # Panics
     /// If the mesh names a point or a neighbour that it does not have.
     pub fn update(&mut self, mesh: &MeshView<'_>, points: &[Range<u32>], tets: &[Range<u32>]) {
         let Some(plane) = self.plane else { return };
-        self.watch.look(mesh, points, tets);
-        self.heights.resize(mesh.positions.len(), 0.0);
-        for p in within(points, mesh.positions.len()) {
-            self.heights[p as usize] = plane.height(mesh.positions[p as usize]);
+        let most = is_most(points, mesh.positions.len()) || is_most(tets, mesh.tets.len());
+        match &mut self.watch {
+            Some(watch) if !most => {
+                self.sides.resize(mesh.positions.len(), side::NOWHERE);
+                for p in within(points, mesh.positions.len()) {
+                    self.sides[p as usize] = side::of(plane.height(mesh.positions[p as usize]));
+                }
+                let (sides, patches) = (&self.sides, &mut self.patches);
+                watch.look(mesh, points, tets, |t| patches.has_piece(t) || may_pass(sides, mesh, t));
+                // All pieces go before the first comes, so that no old vertex is taken for a new one.
+                patches.remove(&watch.dirty, mesh.tets.len());
+                patches.resize(mesh.positions.len(), mesh.tets.len());
+                watch.dirty.iter().for_each(|t| add(patches, sides, mesh, *t));
+                patches.repack();
+                self.place(mesh, &plane);
+            }
+            watch => {
+                watch.get_or_insert_default().reset(mesh);
+                self.cut(mesh, &plane);
+            }
         }
-        // All pieces go before the first comes, so that no old vertex is taken for a new one.
-        self.patches.remove(&self.watch.dirty, mesh.tets.len());
-        self.patches.resize(mesh.positions.len(), mesh.tets.len());
-        for t in &self.watch.dirty {
-            add(&mut self.patches, &self.heights, mesh, *t);
+    }
+
+    fn cut(&mut self, mesh: &MeshView<'_>, plane: &Plane) {
+        self.patches.clear(mesh.positions.len(), mesh.tets.len());
+        self.positions.clear();
+        self.values.clear();
+        self.sides.clear();
+        self.sides.extend(mesh.positions.iter().map(|p| side::of(plane.height(*p))));
+        for t in 0..mesh.tets.len() as u32 {
+            add(&mut self.patches, &self.sides, mesh, t);
         }
-        self.patches.repack();
-        self.place(mesh);
+        self.place(mesh, plane);
     }
 
     /// Which parts of the arrays have changed since this was last asked.
@@ -147,32 +163,38 @@ impl Slice {
     }
 
     /// Sets the positions and values of new vertices.
-    fn place(&mut self, mesh: &MeshView<'_>) {
+    fn place(&mut self, mesh: &MeshView<'_>, plane: &Plane) {
         self.positions.resize(self.patches.vertex_count(), [0.0; 3]);
         self.values.resize(self.patches.vertex_count(), 0.0);
-        let Self { positions, values, heights, patches, .. } = self;
+        let Self { positions, values, patches, .. } = self;
         patches.place_fresh(|v, crossing| {
             let [a, b] = crossing.map(|p| p as usize);
-            let t = if a == b { 0.0 } else { heights[a] / (heights[a] - heights[b]) };
-            let between = |x: f32, y: f32| (f64::from(x) + t * (f64::from(y) - f64::from(x))) as f32;
             let (p, q) = (mesh.positions[a], mesh.positions[b]);
+            let [low, high] = [p, q].map(|p| plane.height(p));
+            let t = if a == b { 0.0 } else { low / (low - high) };
+            let between = |x: f32, y: f32| (f64::from(x) + t * (f64::from(y) - f64::from(x))) as f32;
             positions[v] = [0, 1, 2].map(|i| between(p[i], q[i]));
             values[v] = between(mesh.field[a], mesh.field[b]);
         });
     }
 }
 
-fn add(patches: &mut Patches, heights: &[f64], mesh: &MeshView<'_>, t: u32) {
+/// Whether ranges are more than half of so many entries.
+fn is_most(ranges: &[Range<u32>], len: usize) -> bool {
+    ranges.iter().fold(0_usize, |sum, range| sum.saturating_add(range.len())) > len / 2
+}
+
+/// Whether a tetrahedron may have a piece. A free slot has no corners.
+fn may_pass(sides: &[u8], mesh: &MeshView<'_>, t: u32) -> bool {
     let tet = mesh.tets[t as usize];
-    // A free slot has no corners and so no heights.
-    let height = |p: u32| heights.get(p as usize).copied().unwrap_or(f64::INFINITY);
-    let heights = tet.map(height);
-    let (mut low, mut high) = (heights[0], heights[0]);
-    for h in heights {
-        low = low.min(h);
-        high = high.max(h);
-    }
-    if low <= 0.0 && high >= 0.0 {
-        patches.add(t, &Polygon::of(tet, heights, mesh.neighbors[t as usize]).reversed());
+    tet[0] != NONE && side::may_pass(tet.iter().fold(0, |all, p| all | sides[*p as usize]))
+}
+
+/// Adds the piece of a tetrahedron, if it has one.
+fn add(patches: &mut Patches, sides: &[u8], mesh: &MeshView<'_>, t: u32) {
+    if may_pass(sides, mesh, t) {
+        let (tet, around) = (mesh.tets[t as usize], mesh.neighbors[t as usize]);
+        let polygon = Polygon::of(tet, tet.map(|p| sides[p as usize]), around);
+        patches.add(t, &polygon.reversed());
     }
 }
