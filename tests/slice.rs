@@ -3,6 +3,7 @@
 
 mod build_support;
 mod scenes;
+mod session_support;
 mod walk_support;
 
 use build_support::bent;
@@ -10,8 +11,12 @@ use build_support::cube;
 use build_support::hilly;
 use build_support::linear as linear_field;
 use scenes::Scene;
+use session_support::requests;
 use std::collections::BTreeMap;
 use std::collections::BTreeSet;
+use tetralod::format::EncodeOptions;
+use tetralod::format::encode;
+use tetralod::session::Session;
 use tetralod::view::BoundarySurface;
 use tetralod::view::MeshView;
 use tetralod::view::Plane;
@@ -20,6 +25,7 @@ use tetralod::view::area;
 use tetralod::view::is_closed;
 use walk_support::KINDS;
 use walk_support::Walk;
+use walk_support::changed;
 
 fn linear([x, y, z]: [f32; 3]) -> f32 {
     x + 2.0 * y - 3.0 * z
@@ -237,6 +243,32 @@ fn follow(walk: &mut Walk, plane: &Plane) {
     let all = std::slice::from_ref(&(0..u32::MAX));
     slice.update(&walk.view(), all, all);
     assert_eq!(as_set(&slice), as_set(&cut(&walk.view(), plane)));
+}
+
+#[test]
+fn a_slice_follows_a_session_from_request_to_request() {
+    let built = build_support::built(&cube(11, &[hilly, linear_field]));
+    let mut session = Session::new();
+    session.feed(&encode(&built.mt, &EncodeOptions::default()).expect("a complete MT")).expect("a good file");
+    let plane = plane([0.3, -0.4, 1.0], 0.45);
+    let mut slice = cut(&session.view(), &plane);
+    let (requests, mut state) = (requests(), 3_usize);
+    let mut sizes = BTreeSet::new();
+    for _ in 0..60 {
+        state = state.wrapping_mul(1_103_515_245).wrapping_add(12_345);
+        let before = session.view();
+        let (positions, values) = (before.positions.to_vec(), before.field.to_vec());
+        let (tets, neighbors) = (before.tets.to_vec(), before.neighbors.to_vec());
+        session.set_field(state >> 20 & 1).expect("there are two");
+        session.refine(&requests[(state >> 16) % requests.len()]).expect("a good request");
+        let now = session.view();
+        let points = [changed(&positions, now.positions), changed(&values, now.field)].concat();
+        let cells = [changed(&tets, now.tets), changed(&neighbors, now.neighbors)].concat();
+        slice.update(&now, &points, &cells);
+        assert_eq!(as_set(&slice), as_set(&cut(&now, &plane)));
+        sizes.insert(slice.indices().len());
+    }
+    assert!(sizes.len() > 3, "{sizes:?}");
 }
 
 #[test]

@@ -2,6 +2,7 @@
 #![allow(dead_code, reason = "every test binary uses a part of it")]
 
 use std::ops::ControlFlow;
+use std::ops::Range;
 use tetralod::build::BuildConfig;
 use tetralod::build::Criterion;
 use tetralod::build::Method;
@@ -15,6 +16,13 @@ use tetralod::mt::MtKind;
 use tetralod::mt::MultiTessellation;
 use tetralod::mt::UpdateId;
 use tetralod::view::MeshView;
+
+/// The blocks of 64 entries in which two states of an array differ, as ranges of the new one.
+pub fn changed<T: PartialEq>(old: &[T], new: &[T]) -> Vec<Range<u32>> {
+    let blocks = (0..new.len()).step_by(64).map(|start| start..(start + 64).min(new.len()));
+    let differing = blocks.filter(|block| old.get(block.clone()) != Some(&new[block.clone()]));
+    differing.map(|block| block.start as u32..block.end as u32).collect()
+}
 
 /// Every kind of MT with a way to build it.
 pub const KINDS: [(MtKind, Method); 4] = [
