@@ -96,8 +96,12 @@ fn points_are_found_inside_and_not_outside() {
                 assert!((place.value(&view) - linear(p)).abs() < 1e-5);
             }
         }
-        for corner in &scene.positions {
-            assert!(walking.locate(corner.map(f64::from)).is_some());
+        let corners: Vec<[f64; 3]> = scene.positions.iter().map(|p| p.map(f64::from)).collect();
+        let places = Probe::new(view).locate_all(&corners);
+        for (corner, place) in corners.iter().zip(&places) {
+            let place = place.expect("a point of the mesh");
+            assert_eq!(walking.locate(*corner), Some(place));
+            assert_eq!(place.weights.iter().filter(|w| **w == 0.0).count(), 3, "{place:?}");
         }
         assert!(walking.locate([f64::NAN, 0.5, 0.5]).is_none());
         assert!(walking.locate([0.5, f64::INFINITY, 0.5]).is_none());

@@ -11,6 +11,7 @@ use crate::mesh::FACES;
 use crate::mesh::NONE;
 use crate::view::MeshView;
 use robust::Coord3D;
+use std::collections::BTreeSet;
 
 /// Pieces of a line that are shorter than this fraction of it are left out, and gaps are closed: rounding makes them
 /// where a line passes through points and edges of the mesh.
@@ -91,8 +92,8 @@ impl<'a> Probe<'a> {
         &self.mesh
     }
 
-    /// Makes the grid now, which pays when there are more points than about a hundredth of the tetrahedra, or when
-    /// they are scattered. Costs two passes over the mesh.
+    /// Makes the grid now: from then on scattered points are found in less time. Costs a few passes over the mesh, as
+    /// much as some ten thousand points.
     pub fn make_grid(&mut self) {
         if self.grid.is_none() {
             self.grid = Some(Grid::new(&self.mesh));
@@ -111,6 +112,17 @@ impl<'a> Probe<'a> {
         self.last = tet;
         let sides = self.sides(tet, p)?;
         Some(Place { tet, weights: weights(sides) })
+    }
+
+    /// The places of many points, with a grid if that pays.
+    ///
+    /// # Panics
+    /// As [`Probe::locate`].
+    pub fn locate_all(&mut self, points: &[[f64; 3]]) -> Vec<Option<Place>> {
+        if points.len() > self.mesh.tets.len() / 64 {
+            self.make_grid();
+        }
+        points.iter().map(|p| self.locate(*p)).collect()
     }
 
     fn find(&mut self, p: [f64; 3]) -> Option<u32> {
@@ -232,19 +244,19 @@ impl<'a> Probe<'a> {
 
     /// The smallest of the tetrahedra that hold the point and hang together there.
     fn smallest(&self, tet: u32, p: [f64; 3]) -> u32 {
-        let mut found = vec![tet];
-        let mut next = 0;
-        while let Some(&t) = found.get(next) {
-            next += 1;
+        let mut found = BTreeSet::from([tet]);
+        let mut stack = vec![tet];
+        while let Some(t) = stack.pop() {
             let Some(sides) = self.sides(t, p) else { continue };
             let around = self.mesh.neighbors[t as usize];
             for n in (0..4).filter(|&i| sides[i] == 0.0 && around[i] != NONE).map(|i| around[i]) {
                 if !found.contains(&n) && self.holds(n, p) {
-                    found.push(n);
+                    found.insert(n);
+                    stack.push(n);
                 }
             }
         }
-        found.into_iter().min().unwrap_or(tet)
+        found.first().copied().unwrap_or(tet)
     }
 
     /// On which side of each face a point is: positive outside, with the exact sign; none for a tetrahedron that

@@ -138,11 +138,9 @@ fn look(arguments: &Arguments, mesh: MeshView<'_>) -> Result<Samples> {
         Some(path) => read_points(path)?,
         None => arguments.what.points.clone(),
     };
-    if points.len() > mesh.tets.len() / 100 {
-        probe.make_grid();
-    }
-    let sample = |position: [f64; 3]| Sample { position, distance: None, place: probe.locate(position) };
-    Ok(Samples { samples: points.into_iter().map(sample).collect(), ..Samples::default() })
+    let places = probe.locate_all(&points);
+    let sample = |(position, place)| Sample { position, distance: None, place };
+    Ok(Samples { samples: points.into_iter().zip(places).map(sample).collect(), ..Samples::default() })
 }
 
 fn at([from, to]: [[f64; 3]; 2], s: f64) -> [f64; 3] {
