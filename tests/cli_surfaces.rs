@@ -95,9 +95,10 @@ fn a_slice_is_the_section_of_the_box() {
         let report = json(&["slice", &mt, "--plane", plane, "--field", "ramp", "-o", &out, "--json"]);
         assert!(near(number(&report, "area"), area), "{plane}: {report}");
         let (names, rows) = table(&out);
-        assert_eq!(names, ["x", "y", "z", "ramp"]);
+        assert_eq!(names, ["x", "y", "z", "ramp", "hill", "v_x", "v_y", "v_z"]);
         for row in rows {
             assert!((row[0] + 2.0 * row[1] - row[2] - row[3]).abs() < 1e-3, "{row:?}");
+            assert!((0.5 - row[1] - row[5]).abs() < 1e-3 && (row[0] - 1.0 - row[6]).abs() < 1e-3, "{row:?}");
         }
     }
     let obj = folder.path("slice.obj");
@@ -131,6 +132,7 @@ fn isosurfaces_have_their_values_and_the_boundary_its_area() {
     assert_eq!(ramp["closed"], false);
     let surface = json(&["surface", &mt, "--error", "3%", "-o", &out, "--json"]);
     assert!(near(number(&surface, "area"), 10.0) && surface["closed"] == true, "{surface}");
+    assert_eq!(table(&out).0, ["x", "y", "z", "ramp", "hill", "v_x", "v_y", "v_z"]);
 }
 
 #[test]

@@ -239,6 +239,9 @@ fn follow(walk: &mut Walk, plane: &Plane) {
         assert!(again.vertices.is_empty() && again.triangles.is_empty());
     }
     assert!(largest > 50, "there was something to cut");
+    let (view, named) = (walk.view(), slice.indices().iter().flatten());
+    let again = slice.interpolate(&view, view.field);
+    named.for_each(|&v| assert_eq!(again[v as usize], slice.values()[v as usize]));
     // Ranges that are too wide do no harm.
     let all = std::slice::from_ref(&(0..u32::MAX));
     slice.update(&walk.view(), all, all);

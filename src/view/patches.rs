@@ -266,6 +266,13 @@ impl Patches {
         }
     }
 
+    /// Lets `see` every vertex that is not free.
+    pub fn each_vertex(&self, mut see: impl FnMut(usize, Crossing)) {
+        for (v, vertex) in self.vertices.iter().enumerate().filter(|(_, vertex)| vertex.uses > 0) {
+            see(v, vertex.crossing);
+        }
+    }
+
     /// What has changed since this was last asked: vertices and triangles.
     pub fn take_changes(&mut self) -> [Vec<Range<u32>>; 2] {
         let vertices = self.changed_vertices.take(self.vertices.len());

@@ -11,6 +11,7 @@
 
 use crate::mesh::NONE;
 use crate::view::MeshView;
+use crate::view::patches::Crossing;
 use crate::view::patches::Patches;
 use crate::view::patches::Polygon;
 use crate::view::patches::Watch;
@@ -76,6 +77,20 @@ impl Slice {
     /// The field's value at each vertex.
     pub fn values(&self) -> &[f32] {
         &self.values
+    }
+
+    /// The value at each vertex of another field of the mesh that was sliced, given by one number a point.
+    ///
+    /// # Panics
+    /// If there are fewer points or numbers than in the mesh that was sliced.
+    pub fn interpolate(&self, mesh: &MeshView<'_>, field: &[f32]) -> Vec<f32> {
+        let mut values = vec![0.0; self.positions.len()];
+        if let Some(plane) = &self.plane {
+            self.patches.each_vertex(|v, crossing| {
+                values[v] = value(field, crossing, fraction(plane, mesh, crossing));
+            });
+        }
+        values
     }
 
     /// Triangles, counter-clockwise when seen from where the normal points to.
@@ -168,15 +183,26 @@ impl Slice {
         self.values.resize(self.patches.vertex_count(), 0.0);
         let Self { positions, values, patches, .. } = self;
         patches.place_fresh(|v, crossing| {
-            let [a, b] = crossing.map(|p| p as usize);
-            let (p, q) = (mesh.positions[a], mesh.positions[b]);
-            let [low, high] = [p, q].map(|p| plane.height(p));
-            let t = if a == b { 0.0 } else { low / (low - high) };
-            let between = |x: f32, y: f32| (f64::from(x) + t * (f64::from(y) - f64::from(x))) as f32;
-            positions[v] = [0, 1, 2].map(|i| between(p[i], q[i]));
-            values[v] = between(mesh.field[a], mesh.field[b]);
+            let [p, q] = crossing.map(|point| mesh.positions[point as usize]);
+            let t = fraction(plane, mesh, crossing);
+            positions[v] = [0, 1, 2].map(|i| between(p[i], q[i], t));
+            values[v] = value(mesh.field, crossing, t);
         });
     }
+}
+
+/// How far a crossing is from the end below to the end above, 0 to 1.
+fn fraction(plane: &Plane, mesh: &MeshView<'_>, crossing: Crossing) -> f64 {
+    let [low, high] = crossing.map(|point| plane.height(mesh.positions[point as usize]));
+    if crossing[0] == crossing[1] { 0.0 } else { low / (low - high) }
+}
+
+fn value(field: &[f32], [a, b]: Crossing, t: f64) -> f32 {
+    between(field[a as usize], field[b as usize], t)
+}
+
+fn between(x: f32, y: f32, t: f64) -> f32 {
+    (f64::from(x) + t * (f64::from(y) - f64::from(x))) as f32
 }
 
 /// Whether ranges are more than half of so many entries.

@@ -1,6 +1,7 @@
 //! `tetralod isosurface`: surfaces on which a field has a value.
 
 use super::output;
+use super::poly::Amount;
 use super::poly::Target;
 use super::query::Query;
 use super::query::Summary;
@@ -9,7 +10,6 @@ use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
 use tetralod::io::PolyData;
-use tetralod::view::area;
 use tetralod::view::is_closed;
 
 /// Writes isosurfaces: where the field has the values given with --iso.
@@ -30,13 +30,12 @@ pub struct Arguments {
     json: bool,
 }
 
-/// The result as programs get it; the area is in square model units.
+/// The result as programs get it.
 #[derive(Serialize)]
 struct Report {
     isovalues: Vec<f64>,
-    points: usize,
-    triangles: usize,
-    area: f64,
+    #[serde(flatten)]
+    surface: Amount,
     /// Whether the surfaces have no border.
     closed: bool,
     #[serde(flatten)]
@@ -66,9 +65,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     arguments.output.write(&data)?;
     let report = Report {
         isovalues: isovalues.to_vec(),
-        points: data.positions.len(),
-        triangles: data.triangles.len(),
-        area: area(&data.positions, &data.triangles),
+        surface: Amount::of(&data),
         closed: is_closed(&data.triangles),
         mesh: answer.summary,
         seconds,
@@ -77,13 +74,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 }
 
 fn print(arguments: &Arguments, report: &Report) -> Result<()> {
-    let mut rows = vec![
-        ("file", arguments.output.path.display().to_string()),
-        ("points", output::count(report.points as u64)),
-        ("triangles", output::count(report.triangles as u64)),
-        ("area", output::number(report.area)),
-        ("border", if report.closed { "none" } else { "where the mesh ends" }.to_owned()),
-    ];
+    let mut rows = report.surface.rows(&arguments.output);
+    rows.push(("border", if report.closed { "none" } else { "where the mesh ends" }.to_owned()));
     rows.extend(report.mesh.rows());
     rows.push(("time", format!("{:.3} s", report.seconds)));
     output::table(&rows)

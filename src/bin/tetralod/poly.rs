@@ -1,7 +1,9 @@
 //! Where surfaces, lines and points go: a file whose ending says of what format it is.
 
 use super::files;
+use super::output;
 use anyhow::Result;
+use serde::Serialize;
 use std::path::Path;
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -11,6 +13,7 @@ use tetralod::io::write_obj;
 use tetralod::io::write_ply;
 use tetralod::io::write_stl;
 use tetralod::io::write_vtp;
+use tetralod::view::area;
 
 /// A file to write, of a format that is known.
 #[derive(Clone, Debug)]
@@ -70,6 +73,34 @@ impl Target {
 
     fn write_table(&self, table: &[(String, Vec<f64>)]) -> Result<()> {
         write_table(&self.path, table)
+    }
+}
+
+/// How much of a surface there is, as programs get it; the area is in square model units.
+#[derive(Serialize)]
+pub struct Amount {
+    points: usize,
+    triangles: usize,
+    area: f64,
+}
+
+impl Amount {
+    pub fn of(data: &PolyData) -> Self {
+        Self {
+            points: data.positions.len(),
+            triangles: data.triangles.len(),
+            area: area(&data.positions, &data.triangles),
+        }
+    }
+
+    /// The same for people.
+    pub fn rows(&self, target: &Target) -> Vec<(&'static str, String)> {
+        vec![
+            ("file", target.path.display().to_string()),
+            ("points", output::count(self.points as u64)),
+            ("triangles", output::count(self.triangles as u64)),
+            ("area", output::number(self.area)),
+        ]
     }
 }
 

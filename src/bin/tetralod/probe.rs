@@ -111,7 +111,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let mut answer = arguments.query.answer(&arguments.file)?;
     let start = Instant::now();
     let fields = answer.all_values()?;
-    let names: Vec<String> = answer.opened.info()?.fields.iter().map(|field| field.name.clone()).collect();
+    let names = answer.field_names()?;
     let mesh = answer.opened.session.view();
     let found = look(arguments, mesh)?;
     let seconds = start.elapsed().as_secs_f64();

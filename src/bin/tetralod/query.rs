@@ -112,11 +112,16 @@ pub struct Answer {
 
 impl Answer {
     /// One of the fields at the vertices of the mesh.
-    pub fn values(&self, field: usize) -> Result<Vec<f32>> {
+    fn values(&self, field: usize) -> Result<Vec<f32>> {
         let info = &self.opened.info()?.fields[field];
         let mesh = self.opened.session.mesh().context("there is no mesh")?;
         let slots = 0..mesh.positions().len() as u32;
         Ok(slots.map(|slot| info.value(mesh.levels(slot)[field]) as f32).collect())
+    }
+
+    /// The names of all fields, in the order of the MT.
+    pub fn field_names(&self) -> Result<Vec<String>> {
+        Ok(self.opened.info()?.fields.iter().map(|field| field.name.clone()).collect())
     }
 
     /// All fields at the vertices of the mesh, in the order of the MT.

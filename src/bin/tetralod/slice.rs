@@ -1,6 +1,7 @@
 //! `tetralod slice`: the mesh in a plane.
 
 use super::output;
+use super::poly::Amount;
 use super::poly::Target;
 use super::query::Query;
 use super::query::Summary;
@@ -13,9 +14,8 @@ use std::time::Instant;
 use tetralod::io::PolyData;
 use tetralod::view::Plane;
 use tetralod::view::Slice;
-use tetralod::view::area;
 
-/// Writes the section of the mesh with a plane, with the field interpolated in it.
+/// Writes the section of the mesh with a plane, with all fields interpolated in it.
 #[derive(clap::Args)]
 #[command(
     after_help = "Examples: tetralod slice engine.mt --plane z=0.5 --error 1% -o slice.vtp\n          \
@@ -55,14 +55,13 @@ fn parse_plane(text: &str) -> Result<Plane, String> {
     Ok(Plane { normal: [x, y, z], offset })
 }
 
-/// The result as programs get it; the area is in square model units.
+/// The result as programs get it.
 #[derive(Serialize)]
 struct Report {
-    points: usize,
-    triangles: usize,
+    #[serde(flatten)]
+    surface: Amount,
     #[serde(skip_serializing_if = "Option::is_none")]
     edges: Option<usize>,
-    area: f64,
     #[serde(flatten)]
     mesh: Summary,
     seconds: f64,
@@ -70,43 +69,35 @@ struct Report {
 
 pub fn run(arguments: &Arguments) -> Result<()> {
     let mut answer = arguments.query.answer(&arguments.file)?;
+    let (names, fields) = (answer.field_names()?, answer.all_values()?);
+    let mesh = answer.opened.session.view();
     let start = Instant::now();
     let mut slice = Slice::new();
-    slice.extract(&answer.opened.session.view(), &arguments.plane);
+    slice.extract(&mesh, &arguments.plane);
     let mut edges = Vec::new();
     if arguments.edges {
         slice.cell_edges(&mut edges);
     }
     let seconds = start.elapsed().as_secs_f64();
+    let values = fields.iter().map(|field| slice.interpolate(&mesh, field));
     let data = PolyData {
         positions: slice.positions().to_vec(),
         normals: Vec::new(),
-        fields: vec![(answer.summary.field.clone(), slice.values().to_vec())],
+        fields: names.into_iter().zip(values).collect(),
         triangles: slice.indices().to_vec(),
         lines: edges.iter().map(|edge| edge.to_vec()).collect(),
     };
     arguments.output.write(&data)?;
-    let report = Report {
-        points: data.positions.len(),
-        triangles: data.triangles.len(),
-        edges: arguments.edges.then_some(edges.len()),
-        area: area(&data.positions, &data.triangles),
-        mesh: answer.summary,
-        seconds,
-    };
+    let edges = arguments.edges.then_some(edges.len());
+    let report = Report { surface: Amount::of(&data), edges, mesh: answer.summary, seconds };
     if arguments.json { output::json(&report) } else { print(arguments, &report) }
 }
 
 fn print(arguments: &Arguments, report: &Report) -> Result<()> {
-    let mut rows = vec![
-        ("file", arguments.output.path.display().to_string()),
-        ("points", output::count(report.points as u64)),
-        ("triangles", output::count(report.triangles as u64)),
-    ];
+    let mut rows = report.surface.rows(&arguments.output);
     if let Some(edges) = report.edges {
         rows.push(("cell edges", output::count(edges as u64)));
     }
-    rows.push(("area", output::number(report.area)));
     rows.extend(report.mesh.rows());
     rows.push(("time", format!("{:.3} s", report.seconds)));
     output::table(&rows)

@@ -161,7 +161,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let info = answer.opened.info()?;
     let components =
         components(&info.fields, &arguments.vector).with_context(|| arguments.file.display().to_string())?;
-    let names: Vec<String> = info.fields.iter().map(|field| field.name.clone()).collect();
+    let names = answer.field_names()?;
     let start = Instant::now();
     let fields = answer.all_values()?;
     let mesh = answer.opened.session.view();

@@ -1,6 +1,7 @@
 //! `tetralod surface`: the boundary of the mesh.
 
 use super::output;
+use super::poly::Amount;
 use super::poly::Target;
 use super::query::Query;
 use super::query::Summary;
@@ -11,7 +12,8 @@ use std::time::Instant;
 use tetralod::io::PolyData;
 use tetralod::view::BoundarySurface;
 
-/// Writes the boundary of the mesh: the faces of tetrahedra behind which there is nothing, facing outwards.
+/// Writes the boundary of the mesh: the faces of tetrahedra behind which there is nothing, facing outwards, with all
+/// fields.
 #[derive(clap::Args)]
 #[command(after_help = "Example: tetralod surface engine.mt --error 5% -o engine.stl")]
 pub struct Arguments {
@@ -27,12 +29,11 @@ pub struct Arguments {
     json: bool,
 }
 
-/// The result as programs get it; the area is in square model units.
+/// The result as programs get it.
 #[derive(Serialize)]
 struct Report {
-    points: usize,
-    triangles: usize,
-    area: f64,
+    #[serde(flatten)]
+    surface: Amount,
     closed: bool,
     #[serde(flatten)]
     mesh: Summary,
@@ -41,37 +42,24 @@ struct Report {
 
 pub fn run(arguments: &Arguments) -> Result<()> {
     let mut answer = arguments.query.answer(&arguments.file)?;
+    let (names, fields) = (answer.field_names()?, answer.all_values()?);
     let start = Instant::now();
     let mut surface = BoundarySurface::new();
     surface.extract(&answer.opened.session.view());
     let seconds = start.elapsed().as_secs_f64();
-    let (area, closed) = (surface.area(), surface.is_closed());
-    let data = PolyData {
-        positions: surface.positions,
-        fields: vec![(answer.summary.field.clone(), surface.values)],
-        triangles: surface.indices,
-        ..PolyData::default()
-    };
+    let closed = surface.is_closed();
+    let values = |field: &Vec<f32>| surface.points.iter().map(|p| field[*p as usize]).collect();
+    let fields = names.into_iter().zip(fields.iter().map(values)).collect();
+    let data =
+        PolyData { positions: surface.positions, fields, triangles: surface.indices, ..PolyData::default() };
     arguments.output.write(&data)?;
-    let report = Report {
-        points: data.positions.len(),
-        triangles: data.triangles.len(),
-        area,
-        closed,
-        mesh: answer.summary,
-        seconds,
-    };
+    let report = Report { surface: Amount::of(&data), closed, mesh: answer.summary, seconds };
     if arguments.json { output::json(&report) } else { print(arguments, &report) }
 }
 
 fn print(arguments: &Arguments, report: &Report) -> Result<()> {
-    let mut rows = vec![
-        ("file", arguments.output.path.display().to_string()),
-        ("points", output::count(report.points as u64)),
-        ("triangles", output::count(report.triangles as u64)),
-        ("area", output::number(report.area)),
-        ("closed", if report.closed { "yes" } else { "no" }.to_owned()),
-    ];
+    let mut rows = report.surface.rows(&arguments.output);
+    rows.push(("closed", if report.closed { "yes" } else { "no" }.to_owned()));
     rows.extend(report.mesh.rows());
     rows.push(("time", format!("{:.3} s", report.seconds)));
     output::table(&rows)
