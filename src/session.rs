@@ -8,6 +8,7 @@ use crate::format::Decoder;
 use crate::format::FormatError;
 use crate::format::Limits;
 use crate::mt::CurrentMesh;
+use crate::mt::MeshChanges;
 use crate::mt::Mt;
 use crate::mt::MtInfo;
 use crate::mt::MultiTessellation;
@@ -23,7 +24,10 @@ use crate::refine::Request;
 use crate::refine::RequestError;
 use crate::view::IsoSurface;
 use crate::view::MeshView;
+use crate::view::NormalKind;
+use crate::view::SurfaceChanges;
 use std::fmt;
+use std::ops::Range;
 use std::sync::Arc;
 
 pub use crate::format::Progress;
@@ -68,6 +72,8 @@ pub struct Session {
     field: usize,
     shown: Shown,
     surface: IsoSurface,
+    /// What has changed in what is shown since the surface was last asked for; kept from then on.
+    behind: Option<MeshChanges>,
 }
 
 /// The current mesh in model units, kept up with the mesh at the cost of what changed.
@@ -236,15 +242,35 @@ impl Session {
     /// # Errors
     /// If the value is not a finite number, or nothing has arrived yet.
     pub fn isosurface(&mut self, value: f64) -> Result<&IsoSurface, SessionError> {
+        self.isosurfaces(&[value])
+    }
+
+    /// The isosurfaces of the current mesh at several values, in units of the field, as one. When it is asked for
+    /// again it costs what has changed; see [`IsoSurface::update`].
+    ///
+    /// # Errors
+    /// If a value is not a finite number, or nothing has arrived yet.
+    pub fn isosurfaces(&mut self, values: &[f64]) -> Result<&IsoSurface, SessionError> {
         if self.front.is_none() {
             return Err(SessionError::NotReady);
         }
-        if !value.is_finite() {
+        if !values.iter().all(|value| value.is_finite()) {
             return Err(SessionError::Isovalue);
         }
         self.catch_up();
-        self.surface.extract(&view(self.front.as_ref(), &self.shown), value);
+        let MeshChanges { vertices, tets } = self.behind.replace(MeshChanges::default()).unwrap_or_default();
+        self.surface.update(&view(self.front.as_ref(), &self.shown), values, &vertices, &tets);
         Ok(&self.surface)
+    }
+
+    /// Chooses what the normals of isosurfaces are made of.
+    pub fn set_normal_kind(&mut self, kind: NormalKind) {
+        self.surface.set_normal_kind(kind);
+    }
+
+    /// What was written in the arrays of the isosurface since the last call; see [`IsoSurface::take_changes`].
+    pub fn take_surface_changes(&mut self) -> SurfaceChanges {
+        self.surface.take_changes()
     }
 
     /// The current mesh on the lattices; none until the base mesh is there.
@@ -273,6 +299,13 @@ impl Session {
         shown.positions.resize(slots, [0.0; 3]);
         shown.values.resize(slots, 0.0);
         let value_at = |slot: usize| field.value(mesh.levels(slot as u32)[self.field]) as f32;
+        if let Some(behind) = &mut self.behind {
+            join(&mut behind.tets, &changes.tets);
+            join(&mut behind.vertices, &changes.vertices);
+            if shown.stale {
+                behind.vertices = Vec::from_iter([0..slots as u32]);
+            }
+        }
         for slot in changes.vertices.into_iter().flatten().map(|slot| slot as usize) {
             shown.positions[slot] = lattice.point(mesh.positions()[slot]).map(|x| x as f32);
             shown.values[slot] = value_at(slot);
@@ -281,6 +314,22 @@ impl Session {
             shown.values.iter_mut().enumerate().for_each(|(slot, value)| *value = value_at(slot));
         }
     }
+}
+
+/// Adds ranges to ranges that are in ascending order and do not meet, and keeps them so.
+fn join(ranges: &mut Vec<Range<u32>>, more: &[Range<u32>]) {
+    if more.is_empty() {
+        return;
+    }
+    ranges.extend_from_slice(more);
+    ranges.sort_unstable_by_key(|range| range.start);
+    ranges.dedup_by(|next, last| {
+        let meets = next.start <= last.end;
+        if meets {
+            last.end = last.end.max(next.end);
+        }
+        meets
+    });
 }
 
 fn view<'a>(front: Option<&'a Front>, shown: &'a Shown) -> MeshView<'a> {

@@ -15,10 +15,23 @@ pub use boundary::{BoundarySurface, area, is_closed};
 pub use colormap::{Colormap, VIRIDIS};
 pub use cutaway::{ClipPlane, Cutaway};
 pub use iso::IsoSurface;
+pub use iso::NormalKind;
 pub use probe::{Place, Probe, Span};
-pub use slice::{Plane, Slice, SurfaceChanges};
+pub use slice::{Plane, Slice};
 pub use stats::{FieldStats, Histogram};
 pub use stream::{StreamEnd, StreamPoint, Streamline, TraceOptions, Tracer};
+
+use std::ops::Range;
+
+/// What has changed of a surface since that was last asked: ranges in ascending order. Beyond the ends of the arrays
+/// everything is gone.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct SurfaceChanges {
+    /// Changed ranges of vertices.
+    pub vertices: Vec<Range<u32>>,
+    /// Changed ranges of triangles.
+    pub triangles: Vec<Range<u32>>,
+}
 
 /// A tetrahedral mesh as slices: what the renderer and the isosurface extraction take.
 #[derive(Clone, Copy, Debug)]

@@ -11,6 +11,7 @@
 
 use crate::mesh::NONE;
 use crate::view::MeshView;
+use crate::view::SurfaceChanges;
 use crate::view::patches::Crossing;
 use crate::view::patches::Patches;
 use crate::view::patches::Polygon;
@@ -39,15 +40,6 @@ impl Plane {
         let [x, y, z] = [0, 1, 2].map(|i| self.normal[i] * f64::from(p[i]));
         x + y + z - self.offset
     }
-}
-
-/// Which parts of a surface's arrays have changed.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct SurfaceChanges {
-    /// Changed ranges of vertices.
-    pub vertices: Vec<Range<u32>>,
-    /// Changed ranges of triangles.
-    pub triangles: Vec<Range<u32>>,
 }
 
 /// The section of a mesh with a plane.

@@ -1,0 +1,173 @@
+//! Gradients of the field at points: the mean over the tetrahedra around a point, each with its volume as weight.
+//!
+//! The terms are always added in the order of the tetrahedra, whichever way they are found, so that a gradient
+//! depends on the mesh alone to the last bit.
+
+use super::cut;
+use super::cut::WANTED;
+use super::known::Known;
+use crate::mesh::NONE;
+use crate::view::MeshView;
+
+/// Gradients of some of the points.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Gradients {
+    /// Per point its place in the other two, or `NONE`.
+    slots: Vec<u32>,
+    points: Vec<u32>,
+    /// The gradient; while it is summed, six times volume · gradient and six times the volume.
+    means: Vec<[f64; 4]>,
+}
+
+/// With fewer points than tetrahedra / this, their stars are looked up one by one.
+const FEW: usize = 160;
+
+impl Gradients {
+    /// Forgets everything; there are `points` points from now on.
+    pub fn clear(&mut self, points: usize) {
+        self.means.clear();
+        for point in self.points.drain(..) {
+            self.slots[point as usize] = NONE;
+        }
+        self.slots.resize(points, NONE);
+    }
+
+    /// Forgets the points that go.
+    pub fn resize(&mut self, points: usize) {
+        for point in points..self.slots.len() {
+            self.forget(point as u32);
+        }
+        self.slots.resize(points, NONE);
+    }
+
+    /// Whether the gradient at a point is known.
+    pub fn has(&self, point: u32) -> bool {
+        self.slots.get(point as usize).is_some_and(|slot| *slot != NONE)
+    }
+
+    /// Forgets the gradient at a point.
+    pub fn forget(&mut self, point: u32) {
+        let Some(slot) = self.slots.get_mut(point as usize).filter(|slot| **slot != NONE) else { return };
+        let hole = std::mem::replace(slot, NONE) as usize;
+        self.points.swap_remove(hole);
+        self.means.swap_remove(hole);
+        if let Some(moved) = self.points.get(hole) {
+            self.slots[*moved as usize] = hole as u32;
+        }
+    }
+
+    /// The gradient at a point that was [summed](Self::sum).
+    #[inline]
+    pub fn at(&self, point: u32) -> [f64; 3] {
+        let [x, y, z, _] = self.means[self.slots[point as usize] as usize];
+        [x, y, z]
+    }
+
+    /// Makes the gradients at `points` known, as far as they are not. With what is `known` of the mesh, few points
+    /// cost no pass over it. `sides` is scratch space.
+    pub fn sum(
+        &mut self,
+        mesh: &MeshView<'_>,
+        points: impl Iterator<Item = u32>,
+        known: Option<&mut Known>,
+        sides: &mut Vec<u8>,
+    ) {
+        let start = self.points.len();
+        for point in points {
+            let slot = &mut self.slots[point as usize];
+            if *slot == NONE {
+                *slot = self.points.len() as u32;
+                self.points.push(point);
+            }
+        }
+        self.means.resize(self.points.len(), [0.0; 4]);
+        let new = self.points.len() - start;
+        if new == 0 {
+            return;
+        }
+        let mut found = Vec::new();
+        match known {
+            Some(known) if new < mesh.tets.len() / FEW => {
+                let mut lost = Vec::new();
+                for slot in start..self.points.len() {
+                    let point = self.points[slot];
+                    if known.star(mesh, point, &mut found) {
+                        found.sort_unstable();
+                        self.means[slot] = found.iter().fold([0.0; 4], |sum, t| add(sum, weighted(mesh, *t)));
+                    } else {
+                        lost.push(point);
+                    }
+                }
+                if !lost.is_empty() {
+                    self.pass(mesh, &lost, sides, &mut found);
+                }
+            }
+            _ => {
+                let points = std::mem::take(&mut self.points);
+                self.pass(mesh, &points[start..], sides, &mut found);
+                self.points = points;
+            }
+        }
+        for mean in &mut self.means[start..] {
+            let volume = mean[3];
+            *mean = mean.map(|x| if volume > 0.0 { x / volume } else { 0.0 });
+        }
+    }
+
+    /// Sums the gradients at `points` in one pass over the mesh.
+    fn pass(&mut self, mesh: &MeshView<'_>, points: &[u32], sides: &mut Vec<u8>, found: &mut Vec<u32>) {
+        sides.clear();
+        sides.resize(mesh.positions.len(), 0);
+        points.iter().for_each(|point| sides[*point as usize] = WANTED);
+        found.clear();
+        cut::find_wanted(mesh.tets, sides, found);
+        for t in found {
+            let term = weighted(mesh, *t);
+            for point in mesh.tets[*t as usize] {
+                if sides[point as usize] != 0 {
+                    let sum = &mut self.means[self.slots[point as usize] as usize];
+                    *sum = add(*sum, term);
+                }
+            }
+        }
+    }
+}
+
+fn add(a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]]
+}
+
+/// Six times volume · gradient, and six times the volume, of one tetrahedron.
+fn weighted(mesh: &MeshView<'_>, t: u32) -> [f64; 4] {
+    let tet = mesh.tets[t as usize];
+    let [a, b, c, d] = tet.map(|p| mesh.positions[p as usize].map(f64::from));
+    let [fa, fb, fc, fd] = tet.map(|p| f64::from(mesh.field[p as usize]));
+    let (u, v, w) = (sub(b, a), sub(c, a), sub(d, a));
+    let (p, q, r) = (fb - fa, fc - fa, fd - fa);
+    // p v x w + q w x u + r u x v, with two products instead of three.
+    let uv = cross(u, v);
+    let rest = cross([0, 1, 2].map(|i| p * v[i] - q * u[i]), w);
+    let g = |i: usize| rest[i] + r * uv[i];
+    [g(0), g(1), g(2), dot(w, uv)]
+}
+
+pub(super) fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// `v` at length 1; `None` if it has no direction.
+pub(super) fn unit(v: [f64; 3]) -> Option<[f32; 3]> {
+    // Divided by the largest component first, so that tiny and huge gradients do not leave the range of `f64`.
+    let largest = v.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+    let v = v.map(|x| x / largest);
+    let length = dot(v, v).sqrt();
+    (length.is_finite() && length > 0.0).then(|| v.map(|x| (x / length) as f32))
+}

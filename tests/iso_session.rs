@@ -1,0 +1,123 @@
+//! Promise: the surface of a session that goes from request to request is that of its mesh, whatever was before, for
+//! MTs of every kind.
+#![cfg(feature = "build")]
+
+mod build_support;
+mod conformance_support;
+mod support;
+
+use build_support::bent;
+use build_support::cube;
+use build_support::hilly;
+use build_support::linear;
+use conformance_support::DELAUNAY;
+use conformance_support::EDGE;
+use conformance_support::HALF_EDGE;
+use conformance_support::INSERTED;
+use conformance_support::SPELLED_EDGE;
+use conformance_support::SPELLED_VERTEX;
+use std::collections::BTreeMap;
+use support::random::Random;
+use tetralod::format::EncodeOptions;
+use tetralod::format::encode;
+use tetralod::geom::Bounds;
+use tetralod::refine::Request;
+use tetralod::session::Session;
+use tetralod::view::IsoSurface;
+use tetralod::view::NormalKind;
+
+type Corner = [u32; 6];
+
+/// The triangles as bits of positions and normals, each from its least corner on, in order.
+fn triangles(surface: &IsoSurface) -> Vec<[Corner; 3]> {
+    let corner = |v: u32| {
+        let ([x, y, z], [a, b, c]) = (surface.positions[v as usize], surface.normals[v as usize]);
+        [x, y, z, a, b, c].map(f32::to_bits)
+    };
+    let turned = |t: &[u32; 3]| {
+        let [a, b, c] = t.map(corner);
+        [[a, b, c], [b, c, a], [c, a, b]].into_iter().min().expect("three")
+    };
+    let mut all: Vec<_> = surface.indices.iter().map(turned).collect();
+    all.sort_unstable();
+    all
+}
+
+/// A request that is a little, or much, away from the one before.
+fn next(request: &Request, random: &mut Random) -> Request {
+    let mut next = request.clone();
+    match random.below(6) {
+        0 => next.error = [0.0, 0.002, 0.01, 0.05, f64::INFINITY][random.below(5)],
+        1 => next.isovalues = (0..random.below(3)).map(|_| random.below(10) as f64 / 10.0).collect(),
+        2 => next.max_tets = random.once_in(2).then(|| 50 + random.below(900) as u32),
+        _ => {
+            let low = [0; 3].map(|_| random.below(100) as f64 / 100.0);
+            next.roi = Some(Bounds { min: low, max: low.map(|x| x + 0.4) });
+        }
+    }
+    next
+}
+
+/// Every directed edge that is not at the border of the domain has as many opposite ones.
+fn assert_closed(surface: &IsoSurface, inside: impl Fn([f32; 3]) -> bool) {
+    let mut edges = BTreeMap::new();
+    for [a, b, c] in &surface.indices {
+        for edge in [[*a, *b], [*b, *c], [*c, *a]] {
+            *edges.entry(edge).or_insert(0) += 1;
+        }
+    }
+    for ([a, b], count) in &edges {
+        let is_inside = [a, b].iter().any(|v| inside(surface.positions[**v as usize]));
+        assert!(!is_inside || edges.get(&[*b, *a]) == Some(count), "edge {a}-{b}");
+    }
+}
+
+#[test]
+fn the_surface_follows_every_kind_of_mt_from_request_to_request() {
+    let in_cube = |p: [f32; 3]| p.iter().all(|x| 0.001 < *x && *x < 0.999);
+    for how in [EDGE, SPELLED_EDGE, HALF_EDGE, DELAUNAY, INSERTED, SPELLED_VERTEX] {
+        for (is_cube, mesh) in [(true, cube(7, &[hilly, linear])), (false, bent(6))] {
+            if how == INSERTED && !is_cube {
+                continue;
+            }
+            let bytes = encode(&how.build(&mesh, None), &EncodeOptions::default()).expect("a complete MT");
+            let mut session = Session::new();
+            session.feed(&bytes).expect("a good file");
+            let mut random = Random(7);
+            let mut request = Request::default();
+            let mut values = vec![0.3];
+            for step in 0..60 {
+                session.refine(&request).expect("a good request");
+                if is_cube && step % 17 == 16 {
+                    session.set_field(step / 17 % 2).expect("it has two");
+                }
+                let found = session.isosurfaces(&values).expect("it is open").clone();
+                let mut wanted = IsoSurface::new();
+                wanted.extract_all(&session.view(), &values);
+                assert!(triangles(&found) == triangles(&wanted), "{how:?}, step {step}: {request:?}");
+                if is_cube {
+                    assert_closed(&found, in_cube);
+                }
+                request = next(&request, &mut random);
+                if random.once_in(6) {
+                    values = (0..1 + random.below(3)).map(|_| random.below(10) as f64 / 10.0).collect();
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn who_asks_for_smooth_normals_gets_them() {
+    let bytes = encode(&EDGE.build(&cube(6, &[hilly]), None), &EncodeOptions::default()).expect("complete");
+    let mut session = Session::new();
+    session.feed(&bytes).expect("a good file");
+    session.refine(&Request::default()).expect("a good request");
+    let by_gradient = session.isosurface(0.3).expect("it is open").normals.clone();
+    session.set_normal_kind(NormalKind::Smooth);
+    let smooth = session.isosurface(0.3).expect("it is open").normals.clone();
+    assert_eq!(by_gradient.len(), smooth.len());
+    assert!(by_gradient != smooth);
+    let changes = session.take_surface_changes();
+    assert_eq!(changes.vertices, [0..smooth.len() as u32]);
+}
