@@ -303,7 +303,8 @@ impl Session {
             join(&mut behind.tets, &changes.tets);
             join(&mut behind.vertices, &changes.vertices);
             if shown.stale {
-                behind.vertices = Vec::from_iter([0..slots as u32]);
+                behind.vertices.clear();
+                behind.vertices.push(0..slots as u32);
             }
         }
         for slot in changes.vertices.into_iter().flatten().map(|slot| slot as usize) {
