@@ -7,8 +7,10 @@
     ~/vtk/bin/python benches/vtk_contour.py FILE.mt...
 
 Both sides get the finest mesh of the MT file, points and field as 32-bit floats, and make triangles with shared
-vertices and normals. VTK: merged points, sequential processing, normals, no interpolated attributes. Ours: gradient
-normals; `extract` knows nothing of the mesh, `sweep` is a session whose isovalue moves by 0.5 % of the range a frame.
+vertices and normals. VTK: merged points, sequential processing, normals, no interpolated attributes. `smooth` is
+ours with normals out of the triangles, as those of VTK are, and `gradient` with normals out of the field, both from a
+mesh of which nothing is known; `sweep` is a session with gradient normals whose isovalue moves by 0.5 % of the range a
+frame.
 Ours runs natively and as wasm in Node (WASI). Numbers are millions of tetrahedra per second at the median run; the
 processes take turns in several rounds, so that what else the machine does hits all of them.
 """
@@ -49,8 +51,8 @@ def run_ours(command, file, runs, fractions):
     command = [str(x) for x in [*command, file, runs, *fractions]]
     found = []
     for line in subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines():
-        tets, value, triangles, vertices, _, extract, _, sweep = line.split()
-        times = {"extract": extract, "sweep": sweep}
+        tets, value, triangles, vertices, _, extract, _, smooth, _, sweep = line.split()
+        times = {"gradient": extract, "smooth": smooth, "sweep": sweep}
         times = {kind: [float(x) for x in times[kind].split(",")] for kind in times}
         found.append((int(tets), float(value), int(triangles), int(vertices), times))
     return found
@@ -134,12 +136,12 @@ def compare(file, fractions, options, native, in_node, folder):
                     entry.setdefault(f"{name} {kind}", []).extend(times)
     tets = found[0][0]
     print(f"\n{file.name}: {tets} tetrahedra; millions of them per second, and how many times VTK that is")
-    columns = ["native extract", "native sweep", "wasm extract", "wasm sweep"]
-    print(f"{'isovalue':>8} {'triangles':>9} {'VTK tris':>9} {'VTK':>7}" + "".join(f"{c:>21}" for c in columns))
+    columns = [f"{name} {kind}" for name in ("native", "wasm") for kind in ("smooth", "gradient", "sweep")]
+    print(f"{'isovalue':>8} {'triangles':>9} {'VTK tris':>9} {'VTK':>7}" + "".join(f"{c:>17}" for c in columns))
     for fraction in fractions:
         entry = all_times[fraction]
         rate = {k: tets / statistics.median(entry[k]) / 1e6 for k in ["VTK", *columns]}
-        cells = "".join(f"{rate[c]:>13.1f} {rate[c] / rate['VTK']:>6.2f}x" for c in columns)
+        cells = "".join(f"{rate[c]:>10.1f} {rate[c] / rate['VTK']:>5.2f}x" for c in columns)
         print(f"{fraction:>8} {entry['sizes'][0]:>9} {entry['sizes'][2]:>9} {rate['VTK']:>7.1f}{cells}")
     sys.stdout.flush()
 

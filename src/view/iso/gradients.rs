@@ -3,6 +3,8 @@
 //! The terms are always added in the order of the tetrahedra, whichever way they are found, so that a gradient
 //! depends on the mesh alone to the last bit.
 
+use super::NO_NORMAL;
+use super::crossings::Crossing;
 use super::cut;
 use super::cut::WANTED;
 use super::known::Known;
@@ -20,7 +22,7 @@ pub(super) struct Gradients {
 }
 
 /// With fewer points than tetrahedra / this, their stars are looked up one by one.
-const FEW: usize = 160;
+const FEW: usize = 300;
 
 impl Gradients {
     /// Forgets everything; there are `points` points from now on.
@@ -56,11 +58,12 @@ impl Gradients {
         }
     }
 
-    /// The gradient at a point that was [summed](Self::sum).
+    /// The normal at a crossing, the fraction `t` along its edge: the gradients at its ends, which must have been
+    /// [summed](Self::sum), interpolated; [`NO_NORMAL`] if they cancel.
     #[inline]
-    pub fn at(&self, point: u32) -> [f64; 3] {
-        let [x, y, z, _] = self.means[self.slots[point as usize] as usize];
-        [x, y, z]
+    pub fn normal(&self, crossing: &Crossing, t: f64) -> [f32; 3] {
+        let [g, h] = crossing.ends.map(|end| self.means[self.slots[end as usize] as usize]);
+        unit([0, 1, 2].map(|i| -(g[i] + t * (h[i] - g[i])))).unwrap_or(NO_NORMAL)
     }
 
     /// Makes the gradients at `points` known, as far as they are not. With what is `known` of the mesh, few points
@@ -92,8 +95,7 @@ impl Gradients {
                 for slot in start..self.points.len() {
                     let point = self.points[slot];
                     if known.star(mesh, point, &mut found) {
-                        found.sort_unstable();
-                        self.means[slot] = found.iter().fold([0.0; 4], |sum, t| add(sum, weighted(mesh, *t)));
+                        self.means[slot] = sum_of(mesh, &mut found);
                     } else {
                         lost.push(point);
                     }
@@ -108,10 +110,14 @@ impl Gradients {
                 self.points = points;
             }
         }
-        for mean in &mut self.means[start..] {
-            let volume = mean[3];
-            *mean = mean.map(|x| if volume > 0.0 { x / volume } else { 0.0 });
-        }
+        self.means[start..].iter_mut().for_each(divide);
+    }
+
+    /// Sets the gradient anew at a point where it is known, from the tetrahedra around it.
+    pub fn set(&mut self, mesh: &MeshView<'_>, point: u32, star: &mut [u32]) {
+        let mean = &mut self.means[self.slots[point as usize] as usize];
+        *mean = sum_of(mesh, star);
+        divide(mean);
     }
 
     /// Sums the gradients at `points` in one pass over the mesh.
@@ -131,6 +137,18 @@ impl Gradients {
             }
         }
     }
+}
+
+/// The sum over a star, which gets sorted for it.
+fn sum_of(mesh: &MeshView<'_>, star: &mut [u32]) -> [f64; 4] {
+    star.sort_unstable();
+    star.iter().fold([0.0; 4], |sum, t| add(sum, weighted(mesh, *t)))
+}
+
+/// Makes the mean of a sum.
+fn divide(mean: &mut [f64; 4]) {
+    let volume = mean[3];
+    *mean = mean.map(|x| if volume > 0.0 { x / volume } else { 0.0 });
 }
 
 fn add(a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
@@ -164,8 +182,19 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 /// `v` at length 1; `None` if it has no direction.
+#[inline]
 pub(super) fn unit(v: [f64; 3]) -> Option<[f32; 3]> {
-    // Divided by the largest component first, so that tiny and huge gradients do not leave the range of `f64`.
+    let square = dot(v, v);
+    if square > 1e-200 && square < 1e200 {
+        let scale = 1.0 / square.sqrt();
+        return Some(v.map(|x| (x * scale) as f32));
+    }
+    unit_of_extreme(v)
+}
+
+/// The same for a vector whose square may leave the range of `f64`: it is divided by its largest component first.
+#[cold]
+fn unit_of_extreme(v: [f64; 3]) -> Option<[f32; 3]> {
     let largest = v.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
     let v = v.map(|x| x / largest);
     let length = dot(v, v).sqrt();

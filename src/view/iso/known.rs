@@ -56,6 +56,11 @@ impl Bits {
         new
     }
 
+    #[inline]
+    pub fn has(&self, i: u32) -> bool {
+        self.0.get(i as usize / 64).is_some_and(|word| word >> (i % 64) & 1 == 1)
+    }
+
     /// Takes out all of `list`, which must hold at least what is in.
     pub fn clear(&mut self, list: &[u32]) {
         list.iter().for_each(|i| self.0[*i as usize / 64] = 0);
@@ -89,6 +94,11 @@ impl Known {
     pub fn blocks_at(&self, value: f32) -> impl Iterator<Item = usize> {
         let spans = move |range: &[f32; 2]| range[0] < value && range[1] >= value;
         self.ranges.iter().enumerate().filter(move |(_, range)| spans(range)).map(|(block, _)| block)
+    }
+
+    /// Whether so many blocks are passed by `value` that looking for them is not worth while.
+    pub fn is_passed_widely(&self, value: f32) -> bool {
+        2 * self.blocks_at(value).count() > self.ranges.len()
     }
 
     /// Number of tetrahedra when it last caught up.
@@ -215,19 +225,15 @@ impl Known {
         while let Some(t) = found.get(next).map(|t| *t as usize) {
             next += 1;
             for (corner, n) in mesh.tets[t].into_iter().zip(mesh.neighbors[t]) {
-                if corner != point && has(n) && self.seen.insert(n) {
+                // Most have been seen; only the others are looked at.
+                if corner != point && !self.seen.has(n) && has(n) {
+                    self.seen.insert(n);
                     found.push(n);
                 }
             }
         }
         self.seen.clear(found);
         found.len() == count as usize
-    }
-}
-
-impl Bits {
-    pub fn has(&self, i: u32) -> bool {
-        self.0.get(i as usize / 64).is_some_and(|word| word >> (i % 64) & 1 == 1)
     }
 }
 

@@ -161,7 +161,7 @@ impl IsoSurface {
             self.march(mesh, which);
         }
         self.place(mesh);
-        self.set_normals(mesh);
+        self.mend_normals();
         self.changed_vertices.mark_all(self.positions.len());
         self.changed_triangles.mark_all(self.indices.len());
     }
@@ -169,7 +169,7 @@ impl IsoSurface {
     /// Finds the tetrahedra that are cut at `value`.
     fn find_cut(&mut self, mesh: &MeshView<'_>, value: f32) {
         self.cut.clear();
-        if let Some(known) = &self.known {
+        if let Some(known) = self.known.as_ref().filter(|known| !known.is_passed_widely(value)) {
             for block in known.blocks_at(value) {
                 let first = block * cut::BLOCK;
                 let tets = &mesh.tets[first..mesh.tets.len().min(first + cut::BLOCK)];
@@ -196,43 +196,28 @@ impl IsoSurface {
         }
     }
 
-    /// Sets the positions of the vertices.
+    /// Sets all that belongs to the vertices, but for the normals that [`Self::mend_normals`] gives.
     fn place(&mut self, mesh: &MeshView<'_>) {
-        let isovalues = &self.isovalues;
-        self.values.extend(self.crossings.list.iter().map(|crossing| isovalues[crossing.which as usize]));
-        self.positions.extend(
-            self.crossings.list.iter().zip(&self.values).map(|(crossing, value)| {
-                crossing.place(mesh.positions, crossing.fraction(mesh.field, *value))
-            }),
-        );
-    }
-
-    /// Sets the normals of all vertices.
-    fn set_normals(&mut self, mesh: &MeshView<'_>) {
-        if self.kind == NormalKind::Gradient {
-            let ends = self.crossings.list.iter().flat_map(|crossing| crossing.ends);
-            self.gradients.sum(mesh, ends, self.known.as_deref_mut(), &mut self.sides);
-            let vertices = 0..self.positions.len();
-            let normals = vertices.map(|v| self.gradient_normal(mesh, v).unwrap_or([0.0; 3]));
-            self.normals = normals.collect();
-        } else {
-            self.normals.resize(self.positions.len(), [0.0; 3]);
+        let Self { positions, normals, values, isovalues, crossings, gradients, .. } = self;
+        let by_gradient = self.kind == NormalKind::Gradient;
+        if by_gradient {
+            let ends = crossings.list.iter().flat_map(|crossing| crossing.ends);
+            gradients.sum(mesh, ends, self.known.as_deref_mut(), &mut self.sides);
         }
-        self.mend_normals();
-    }
-
-    /// Interpolates the gradients along the edge of vertex `v`.
-    #[inline]
-    fn gradient_normal(&self, mesh: &MeshView<'_>, v: usize) -> Option<[f32; 3]> {
-        let crossing = &self.crossings.list[v];
-        let t = crossing.fraction(mesh.field, self.values[v]);
-        let [g, h] = crossing.ends.map(|end| self.gradients.at(end));
-        unit([0, 1, 2].map(|i| -(g[i] + t * (h[i] - g[i]))))
+        let count = crossings.list.len();
+        (positions.reserve(count), normals.reserve(count), values.reserve(count));
+        for crossing in &crossings.list {
+            let value = isovalues[crossing.which as usize];
+            let t = crossing.fraction(mesh.field, value);
+            values.push(value);
+            positions.push(crossing.place(mesh.positions, t));
+            normals.push(if by_gradient { gradients.normal(crossing, t) } else { NO_NORMAL });
+        }
     }
 
     /// Gives vertices without a normal the mean direction of their triangles, or +z as last resort.
     fn mend_normals(&mut self) {
-        if !self.normals.contains(&[0.0; 3]) {
+        if !self.normals.contains(&NO_NORMAL) {
             return;
         }
         let mut sums = vec![[0.0; 3]; self.normals.len()];
@@ -242,7 +227,7 @@ impl IsoSurface {
                 (0..3).for_each(|i| sums[*v as usize][i] += area[i]);
             }
         }
-        for (normal, sum) in self.normals.iter_mut().zip(sums).filter(|(normal, _)| **normal == [0.0; 3]) {
+        for (normal, sum) in self.normals.iter_mut().zip(sums).filter(|(normal, _)| **normal == NO_NORMAL) {
             *normal = unit(sum).unwrap_or(UP);
         }
     }
@@ -253,6 +238,9 @@ impl IsoSurface {
         cross(sub(b, a), sub(c, a))
     }
 }
+
+/// In place of a normal that cannot be told.
+const NO_NORMAL: [f32; 3] = [0.0; 3];
 
 /// The normal of a vertex that has no other.
 const UP: [f32; 3] = [0.0, 0.0, 1.0];

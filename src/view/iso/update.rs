@@ -5,6 +5,7 @@
 //! the second one; from then on tetrahedra that have changed are cut anew, and nothing else is.
 
 use super::IsoSurface;
+use super::NO_NORMAL;
 use super::NormalKind;
 use super::State;
 use super::UP;
@@ -187,17 +188,21 @@ impl IsoSurface {
             links.fan(*v).for_each(|triangle| renew.add_vertices(self.indices[triangle as usize]));
         }
         if self.kind == NormalKind::Gradient {
-            self.forget_gradients(mesh, dirty, links, &mut renew);
+            self.renew_gradients(mesh, dirty, links, &mut renew);
             let list = &self.crossings.list;
             let ends = renew.vertices.iter().flat_map(|v| list[*v as usize].ends);
             self.gradients.sum(mesh, ends, self.known.as_deref_mut(), &mut self.sides);
         }
         for &v in &renew.vertices {
-            let normal = match self.kind {
-                NormalKind::Gradient => self.gradient_normal(mesh, v as usize),
-                NormalKind::Smooth => None,
-            };
-            let normal = normal.unwrap_or_else(|| self.fan_normal(links, v));
+            let mut normal = NO_NORMAL;
+            if self.kind == NormalKind::Gradient {
+                let crossing = &self.crossings.list[v as usize];
+                let t = crossing.fraction(mesh.field, self.values[v as usize]);
+                normal = self.gradients.normal(crossing, t);
+            }
+            if normal == NO_NORMAL {
+                normal = self.fan_normal(links, v);
+            }
             let before = std::mem::replace(&mut self.normals[v as usize], normal);
             if before.map(f32::to_bits) != normal.map(f32::to_bits) {
                 self.changed_vertices.mark(v);
@@ -205,10 +210,11 @@ impl IsoSurface {
         }
     }
 
-    /// Forgets gradients that are not what they were, and adds the vertices that used them.
-    fn forget_gradients(&mut self, mesh: &MeshView<'_>, dirty: &Dirty, links: &Links, renew: &mut Edit) {
+    /// Sets gradients anew that are not what they were, and adds the vertices that use them.
+    fn renew_gradients(&mut self, mesh: &MeshView<'_>, dirty: &Dirty, links: &Links, renew: &mut Edit) {
         self.gradients.resize(mesh.positions.len());
         let Some(known) = &mut self.known else { return };
+        let list = &self.crossings.list;
         let mut star = Vec::new();
         let mut lost = Bits::default();
         let mut any_lost = false;
@@ -216,20 +222,27 @@ impl IsoSurface {
             if !self.gradients.has(point) {
                 continue;
             }
-            self.gradients.forget(point);
             if !known.star(mesh, point, &mut star) {
+                self.gradients.forget(point);
                 lost.insert(point);
                 any_lost = true;
                 continue;
             }
+            let mut is_used = false;
             for v in star.iter().flat_map(|t| links.triangles(*t)).flat_map(|t| self.indices[t as usize]) {
-                if self.crossings.list[v as usize].ends.contains(&point) {
+                if list[v as usize].ends.contains(&point) {
+                    is_used = true;
                     renew.add_vertices([v; 3]);
                 }
             }
+            if is_used {
+                self.gradients.set(mesh, point, &mut star);
+            } else {
+                self.gradients.forget(point);
+            }
         }
         if any_lost {
-            for (v, crossing) in (0..).zip(&self.crossings.list) {
+            for (v, crossing) in (0..).zip(list) {
                 if links.is_used(v) && crossing.ends.iter().any(|end| lost.has(*end)) {
                     renew.add_vertices([v; 3]);
                 }
