@@ -29,6 +29,9 @@ struct Star {
     count: u32,
 }
 
+/// Of so many points one is many.
+const MANY: usize = 32;
+
 /// What has really changed.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Dirty {
@@ -101,11 +104,6 @@ impl Known {
         2 * self.blocks_at(value).count() > self.ranges.len()
     }
 
-    /// Number of tetrahedra when it last caught up.
-    pub fn tet_count(&self) -> usize {
-        self.tets.len()
-    }
-
     /// Follows the mesh, of which only entries in these ranges and at the ends of the arrays may have changed.
     pub fn catch_up(
         &mut self,
@@ -170,6 +168,8 @@ impl Known {
                 moved.push(p);
             }
         }
+        // Then one pass costs less than all the walks.
+        let many = moved.len() > new / MANY;
         let mut in_dirty = Bits::default();
         for t in &dirty.tets {
             in_dirty.insert(*t);
@@ -178,7 +178,7 @@ impl Known {
         let mut lost = Bits::default();
         let mut any_lost = false;
         for p in &moved {
-            if self.star(mesh, *p, &mut star) {
+            if !many && self.star(mesh, *p, &mut star) {
                 dirty.tets.extend(star.iter().filter(|t| in_dirty.insert(**t)));
             } else {
                 any_lost = true;

@@ -76,6 +76,8 @@ pub struct IsoSurface {
     /// Scratch: tetrahedra that are cut.
     cut: Vec<u32>,
     state: State,
+    /// How many tetrahedra the mesh had that came last.
+    tets: usize,
     known: Option<Box<Known>>,
     /// Only there when there is `known`; its lists may be behind by whole extractions, but not by parts of them.
     links: Option<Box<Links>>,
@@ -146,6 +148,7 @@ impl IsoSurface {
         let points = mesh.positions.len();
         self.isovalues = isovalues;
         self.state = State::Of(points, mesh.tets.len());
+        self.tets = mesh.tets.len();
         self.links = None;
         self.positions.clear();
         self.normals.clear();

@@ -20,6 +20,11 @@ use crate::mesh::NONE;
 use crate::view::MeshView;
 use std::ops::Range;
 
+/// A mesh of a size that differs by more than this part is another mesh.
+const SIMILAR: usize = 4;
+/// When more than this part of the tetrahedra has changed, a new extraction costs less.
+const LITTLE: usize = 8;
+
 /// What happens to a surface in one update.
 #[derive(Debug, Default)]
 struct Edit {
@@ -47,8 +52,9 @@ impl IsoSurface {
     /// or update only in these ranges of points and tetrahedra, and in what lies beyond the ends of shorter or longer
     /// arrays.
     ///
-    /// What it costs goes with what has changed: the ranges, and the stars of points that differ. Another isovalue,
-    /// or another kind of normals, is extracted anew, where the field passes it.
+    /// What it costs goes with what has changed: the ranges, which are compared with a copy, and the stars of points
+    /// that differ. Another isovalue, or another kind of normals, is extracted anew, where the field passes it; so is
+    /// everything when more than an eighth has changed.
     ///
     /// # Panics
     /// If the mesh names a point that it does not have.
@@ -62,22 +68,23 @@ impl IsoSurface {
         let isovalues = distinct(values);
         let was = self.state;
         let now = State::Of(mesh.positions.len(), mesh.tets.len());
-        let changed = length(changed_tets).max(length(changed_vertices));
-        let same = self.isovalues == isovalues;
-        if changed == 0 && same && was == now {
+        let same = self.isovalues == isovalues && was != State::Stale;
+        if same && was == now && changed_vertices.is_empty() && changed_tets.is_empty() {
             return;
         }
-        let much = changed > mesh.tets.len() / 2;
-        let Some(mut known) = self.known.take().filter(|_| !much) else {
+        let old_tets = self.tets;
+        let new_tets = mesh.tets.len();
+        let is_similar = old_tets.abs_diff(new_tets) <= new_tets / SIMILAR;
+        let Some(mut known) = self.known.take().filter(|_| is_similar) else {
             self.rebuild(mesh, isovalues);
-            self.known = (was != State::New && !much).then(|| Box::new(Known::new(mesh)));
+            self.known = (was != State::New && is_similar).then(|| Box::new(Known::new(mesh)));
             return;
         };
-        let old_tets = known.tet_count();
         let dirty = known.catch_up(mesh, changed_vertices, changed_tets);
         self.known = Some(known);
-        if same && was != State::Stale {
+        if same && dirty.tets.len() <= new_tets / LITTLE {
             self.state = now;
+            self.tets = new_tets;
             self.splice(mesh, old_tets, &dirty);
         } else {
             dirty.points.iter().for_each(|point| self.gradients.forget(*point));
@@ -276,8 +283,4 @@ impl IsoSurface {
             self.changed_vertices.mark(v);
         }
     }
-}
-
-fn length(ranges: &[Range<u32>]) -> usize {
-    ranges.iter().map(ExactSizeIterator::len).sum()
 }
