@@ -50,7 +50,12 @@ def build(target, flags):
 def run_ours(command, file, runs, fractions):
     command = [str(x) for x in [*command, file, runs, *fractions]]
     found = []
-    for line in subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines():
+    # Node 20 may crash on the way out of a long WASI program. What was printed by then is whole, or too short.
+    done = subprocess.run(command, capture_output=True, text=True)
+    lines = done.stdout.splitlines()
+    if len(lines) < len(fractions):
+        sys.exit(f"{command} failed: {done.stderr}")
+    for line in lines:
         tets, value, triangles, vertices, _, extract, _, smooth, _, sweep = line.split()
         times = {"gradient": extract, "smooth": smooth, "sweep": sweep}
         times = {kind: [float(x) for x in times[kind].split(",")] for kind in times}

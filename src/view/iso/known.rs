@@ -10,7 +10,7 @@ use crate::view::MeshView;
 use std::ops::Range;
 
 /// Per 64 tetrahedra the smallest and the largest value; per tetrahedron and per point a copy; per point a
-/// tetrahedron and how many there are. 16.1 bytes a tetrahedron and 24 bytes a point, and a bit for each.
+/// tetrahedron and how many there are. 16.3 bytes a tetrahedron and 24 bytes a point.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Known {
     tets: Vec<[u32; 4]>,

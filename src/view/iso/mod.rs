@@ -53,8 +53,9 @@ pub enum NormalKind {
 /// All surfaces are in the same arrays; [`IsoSurface::values`] tells which is which, and no triangle has vertices of
 /// two.
 ///
-/// Takes 45 bytes a vertex, 16 a triangle and 9 a point of the mesh, and 36 for every point next to the surface. Once
-/// [`IsoSurface::update`] follows a mesh, 20.1 bytes a tetrahedron, 24 a point, 4 a vertex and 16 a triangle more.
+/// Takes at most 56 bytes a vertex and 16 a triangle, 5 a point of the mesh, 36 for every point next to the surface and 4
+/// for every tetrahedron that is cut. Once [`IsoSurface::update`] follows a mesh, 20.3 bytes a tetrahedron, 24 a point, 4
+/// a vertex and 16 a triangle more.
 #[derive(Clone, Debug, Default)]
 pub struct IsoSurface {
     /// Vertices, in model units.
@@ -79,7 +80,7 @@ pub struct IsoSurface {
     /// How many tetrahedra the mesh had that came last.
     tets: usize,
     known: Option<Box<Known>>,
-    /// Only there when there is `known`; its lists may be behind by whole extractions, but not by parts of them.
+    /// There from the first edit after an extraction on.
     links: Option<Box<Links>>,
     changed_vertices: Marks,
     changed_triangles: Marks,
