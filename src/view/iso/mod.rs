@@ -209,7 +209,9 @@ impl IsoSurface {
             gradients.sum(mesh, ends, self.known.as_deref_mut(), &mut self.sides);
         }
         let count = crossings.list.len();
-        (positions.reserve(count), normals.reserve(count), values.reserve(count));
+        positions.reserve(count);
+        normals.reserve(count);
+        values.reserve(count);
         for crossing in &crossings.list {
             let value = isovalues[crossing.which as usize];
             let t = crossing.fraction(mesh.field, value);
