@@ -35,8 +35,8 @@ pub struct Reference<'a> {
 pub struct Part {
     /// Only at vertices in this box.
     pub roi: Option<Bounds>,
-    /// Only in tetrahedra in which the field has one of these values; everywhere if empty.
-    pub isovalues: Vec<f64>,
+    /// Only in tetrahedra in which the field has a value of one of these ranges; everywhere if empty.
+    pub ranges: Vec<[f64; 2]>,
     /// What has been promised, if anything.
     pub promise: Option<Promise>,
 }
@@ -147,8 +147,8 @@ impl Measure<'_> {
     fn spans(&self, values: [f64; 4]) -> bool {
         let low = values.into_iter().fold(f64::INFINITY, f64::min);
         let high = values.into_iter().fold(f64::NEG_INFINITY, f64::max);
-        let isovalues = &self.part.isovalues;
-        isovalues.is_empty() || isovalues.iter().any(|&iso| low <= iso && iso <= high)
+        let ranges = &self.part.ranges;
+        ranges.is_empty() || ranges.iter().any(|&[from, to]| low <= to && from <= high)
     }
 
     fn look_inside(&self, tet: [u32; 4], raster: &mut Raster) {

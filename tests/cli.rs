@@ -183,6 +183,172 @@ fn boxes_isovalues_and_budgets_select() {
     assert!(good(&["extract", &mt, "-o", &out, "--budget", "3000"]).contains("budget"));
 }
 
+/// A camera at `eye` that looks along z from below, as a file has it.
+fn camera(eye: [f64; 3], viewport: [u32; 2], pixels: f64) -> Value {
+    let [x, y, z] = eye;
+    let matrix = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, -x, -y, -z, -z];
+    serde_json::json!({ "matrix": matrix, "viewport": viewport, "pixels": pixels })
+}
+
+/// Options for the same mesh give the same mesh; others give another one.
+#[test]
+fn every_part_can_be_asked_for_in_two_ways() {
+    let folder = Folder::new("parts");
+    let [input, mt, out, view, colours] =
+        ["b.vti", "b.mt", "out.vtu", "view.json", "colours.json"].map(|name| folder.path(name));
+    good(&["generate", "bucky", "--size", "11", "-o", &input]);
+    good(&["build", &input, "-o", &mt, "--quiet"]);
+    fs::write(&view, camera([0.5, 0.5, -0.2], [800, 600], 20.0).to_string()).expect("a file");
+    let points = serde_json::json!([[0.2, 0, 0, 0, 0], [0.6, 1, 0.5, 0, 0.8]]);
+    let transfer =
+        serde_json::json!({ "points": points, "unit_length": 0.5, "field": "density", "error": 0.02 });
+    fs::write(&colours, transfer.to_string()).expect("a file");
+    let extract = |more: &[&str]| json(&[&["extract", &mt, "-o", &out, "--json"], more].concat());
+    let whole = extract(&[]);
+    let of_view = ["--need", &format!("view={view}; pixels=20")];
+    let of_colours = ["--need", &format!("transfer={colours};colour-error=2%")];
+    for (plain, grouped) in [
+        (&["--box", "0,0,0,0.3,0.3,0.3"][..], &["--need", "box=0,0,0,0.3,0.3,0.3"][..]),
+        (
+            &["--obox", "0.2,0.2,0.2,0.1,0.1,0,-0.1,0.1,0,0,0,0.1"],
+            &["--need", "obox = 0.2,0.2,0.2,0.1,0.1,0,-0.1,0.1,0,0,0,0.1;"],
+        ),
+        (&["--sphere", "0.5,0.5,0.5,0.1"], &["--need", "sphere=0.5,0.5,0.5,0.1; error=0%"]),
+        (&["--half-space", "-1,0,0,-0.9"], &["--convex", "-1,0,0,-0.9"]),
+        (&["--slab", "0,0,2,1,0.05"], &["--convex", "0,0,1,0.525,0,0,-1,-0.475"]),
+        (&["--iso", "0.5", "--error", "1%"], &["--need", "error=1%; range=0.5,0.5"]),
+        (&["--range", "0.7,0.8", "--range", "-1,-0.5"], &["--need", "range=0.7,0.8;range=-1,-0.5"]),
+        (
+            &["--sphere", "0.5,0.5,0.5,0.2", "--iso", "0.5", "--error", "0.5%"],
+            &["--need", "sphere=0.5,0.5,0.5,0.2;iso=0.5;error=0.5%;field=density"],
+        ),
+        (&["--view", &view], &of_view),
+        (&["--transfer", &colours], &of_colours),
+        (&["--error", "3%"], &["--outside", "3%"]),
+    ] {
+        let [plain_mesh, grouped_mesh] = [plain, grouped].map(extract);
+        assert_eq!(plain_mesh["hash"], grouped_mesh["hash"], "{plain:?}");
+        assert!(number(&plain_mesh, "tetrahedra") < number(&whole, "tetrahedra"), "{plain:?}: {plain_mesh}");
+        assert!(number(&plain_mesh, "updates_applied") > 0.0, "{plain:?}: {plain_mesh}");
+        assert_eq!((&plain_mesh["satisfied"], &plain_mesh["done"]), (&true.into(), &true.into()));
+        let need = &plain_mesh["needs"][0];
+        assert!(number(need, "bound") <= number(need, "asked"), "{need}");
+    }
+    let asked = |mesh: &Value| mesh["needs"][0]["asked"].as_f64();
+    let unit = |mesh: &Value| mesh["needs"][0]["unit"].clone();
+    let seen = extract(&["--view", &view, "--pixels", "30"]);
+    assert_eq!((asked(&seen), unit(&seen)), (Some(30.0), "pixels".into()));
+    let shown = extract(&["--transfer", &colours]);
+    assert_eq!((asked(&shown), unit(&shown)), (Some(0.02), "colour".into()));
+    let matrix = camera([0.5, 0.5, -0.2], [800, 600], 20.0)["matrix"].to_string();
+    let matrix = matrix.trim_matches(['[', ']']);
+    let given = extract(&["--matrix", matrix, "--viewport", "800,600", "--pixels", "30"]);
+    assert_eq!(given["hash"], seen["hash"]);
+}
+
+#[test]
+fn several_needs_are_all_met() {
+    let folder = Folder::new("union");
+    let [input, mt, out] = ["b.vti", "b.mt", "out.vtu"].map(|name| folder.path(name));
+    good(&["generate", "bucky", "--size", "13", "-o", &input]);
+    good(&["build", &input, "-o", &mt, "--quiet"]);
+    let extract = |more: &[&str]| {
+        let result = json(&[&["extract", &mt, "-o", &out, "--json", "--measure", &input], more].concat());
+        assert!(number(&result, "measured_error") <= number(&result, "error_bound") + 1e-4, "{result}");
+        result
+    };
+    let tets = |more: &[&str]| number(&extract(more), "tetrahedra");
+    let [left, right] = ["0,0,0,0.1,0.1,0.1", "0.9,0.9,0.9,1,1,1"];
+    let both = extract(&["--box", left, "--box", right]);
+    assert_eq!(both["needs"].as_array().map(Vec::len), Some(2));
+    let [one, other] = [left, right].map(|roi| tets(&["--box", roi]));
+    let all = number(&both, "tetrahedra");
+    assert!(all > one && all > other && all < one + other, "{one} {other} {all}");
+    let around = extract(&["--box", left, "--outside", "2%"]);
+    assert!(number(&around, "tetrahedra") > one.max(tets(&["--error", "2%"])), "{around}");
+    let grouped = extract(&["--error", "2%", "--need", &format!("box={left}")]);
+    assert_eq!(grouped["hash"], around["hash"], "an error without a part is one everywhere");
+    let text = good(&["extract", &mt, "-o", &out, "--box", left, "--outside", "2%"]);
+    assert!(text.contains("box 0,0,0") && text.contains("everywhere") && text.contains("wanted"), "{text}");
+}
+
+#[test]
+fn budgets_and_steps_stop_with_a_valid_mesh() {
+    let folder = Folder::new("budgets");
+    let [input, mt, out, again] = ["b.vti", "b.mt", "out.vtu", "again.mt"].map(|name| folder.path(name));
+    good(&["generate", "bucky", "--size", "13", "-o", &input]);
+    good(&["build", &input, "-o", &mt, "--quiet"]);
+    let extract = |more: &[&str]| json(&[&["extract", &mt, "-o", &out, "--json"], more].concat());
+    let mut bound = f64::INFINITY;
+    for most in ["800", "1200", "1600"] {
+        let result = extract(&["--max-vertices", most, "--iso", "0.5"]);
+        assert!(number(&result, "vertices") <= most.parse().expect("a number"), "{result}");
+        assert!(number(&result, "error_bound") <= bound, "a larger budget, a larger error: {result}");
+        bound = number(&result, "error_bound");
+    }
+    let result = extract(&["--max-bytes", "96K"]);
+    let bytes = 32.0 * number(&result, "tetrahedra") + 16.0 * number(&result, "vertices");
+    assert!(bytes <= 96.0 * 1024.0 && bytes > 80.0 * 1024.0, "{result}");
+    assert_eq!((&result["satisfied"], &result["done"]), (&false.into(), &true.into()));
+    let need = &result["needs"][0];
+    assert!(number(need, "bound") > 0.0 && number(&result, "excess") > 1.0, "{result}");
+    for (stop, refined) in [(["--max-updates", "10"], 1.0), (["--max-ms", "0"], 1.0)] {
+        let result = extract(&stop);
+        assert_eq!((&result["satisfied"], &result["done"]), (&false.into(), &false.into()));
+        assert!(number(&result, "refined") >= refined && result["error_bound"].is_null(), "{result}");
+        // A mesh like any other.
+        json(&["build", &out, "-o", &again, "--json"]);
+    }
+    let whole = extract(&["--max-ms", "1e6", "--max-updates", "1000000000"]);
+    assert_eq!(whole["hash"], extract(&[])["hash"]);
+    let text = good(&["extract", &mt, "-o", &out, "--max-updates", "10"]);
+    assert!(text.contains("stopped before") && text.contains("not known yet"), "{text}");
+}
+
+#[test]
+fn nonsense_in_a_query_is_refused() {
+    let folder = Folder::new("nonsense");
+    let [input, mt, out, view, text] =
+        ["b.vti", "b.mt", "out.vtu", "view.json", "text"].map(|name| folder.path(name));
+    good(&["generate", "bucky", "--size", "7", "-o", &input]);
+    good(&["build", &input, "-o", &mt, "--quiet"]);
+    fs::write(&view, "{\"matrix\": [1, 2], \"viewport\": [1, 1]}").expect("a file");
+    fs::write(&text, "{\"points\": [[0, 0, 0, 0, 2]]}").expect("a file");
+    for (options, words) in [
+        (&["--sphere", "1,2,3"][..], &["--sphere", "4 numbers"][..]),
+        (&["--sphere", "1,2,3,-1"], &["radius"]),
+        (&["--obox", "0,0,0,1,0,0,1,1,0,0,0,1"], &["right angles"]),
+        (&["--slab", "0,0,0,1,1"], &["normal"]),
+        (&["--half-space", "0,0,0,1"], &["normal"]),
+        (&["--convex", "1,0,0"], &["4 numbers"]),
+        (&["--range", "2,1"], &["smaller"]),
+        (&["--iso", "nan"], &["nan"]),
+        (&["--need", "ball=1"], &["ball", "sphere"]),
+        (&["--need", "box"], &["key=value"]),
+        (&["--need", "error=1;error=2"], &["twice"]),
+        (&["--pixels", "2"], &["view"]),
+        (&["--colour-error", "2%"], &["transfer"]),
+        (&["--matrix", "1,2"], &["16 numbers"]),
+        (&["--matrix", "1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1"], &["--viewport"]),
+        (&["--viewport", "1,1"], &["--matrix"]),
+        (&["--view", &view, "--error", "1%"], &["--outside"]),
+        (&["--max-bytes", "12X"], &["'X'", "K, M and G"]),
+        (&["--max-ms=-1"], &["negative"]),
+        (&["--budget=-1"], &["--budget"]),
+    ] {
+        bad(2, &[&["extract", &mt, "-o", &out], options].concat(), words);
+    }
+    for (options, words) in [
+        (&["--view", &view][..], &[&view[..], "16"][..]),
+        (&["--view", "none.json"], &["none.json", "No such file"]),
+        (&["--transfer", &text], &[&mt, "need number 0", "0 and 1"]),
+        (&["--need", "iso=1;field=nothing"], &[&mt, "'nothing'", "density"]),
+    ] {
+        bad(1, &[&["extract", &mt, "-o", &out], options].concat(), words);
+    }
+    assert!(!fs::exists(&out).expect("a folder"));
+}
+
 #[test]
 fn the_same_input_gives_the_same_bytes() {
     let folder = Folder::new("same");

@@ -61,7 +61,7 @@ fn outside_the_nearest_place_on_the_boundary_counts() {
 fn only_the_selected_part_counts() {
     let points =
         [([8, 8, 9], 13.0), ([8, 8, 7], 7.0), ([16, 8, 9], 23.0), ([16, 8, 7], 17.0), ([8, 16, 8], 30.0)];
-    let iso = |value: f64| Part { isovalues: vec![value], ..Part::default() };
+    let iso = |value: f64| Part { ranges: vec![[value; 2]], ..Part::default() };
     assert_eq!(measure(&points, &iso(95.0)).2, 0);
     // Only the lower tetrahedron has the value 85: two points in it, and one beside it.
     assert_eq!(measure(&points, &iso(85.0)).2, 3);
@@ -105,6 +105,6 @@ fn a_promise_may_be_kept_at_another_place_within_its_reach() {
     assert!(kept.0 < 0.1 && kept.1 > 0.0, "{kept:?}");
     assert_eq!(measure(&inside, &promise(5.0, 0.5)), (4.25, 0.0, 1), "it is kept where it is");
     // In the middle of the reach of a part that is not asked for, nothing is held against the mesh.
-    let part = Part { isovalues: vec![85.0], ..promise(1.0, 1.0) };
+    let part = Part { ranges: vec![[85.0; 2]], ..promise(1.0, 1.0) };
     assert_eq!(measure(&[([16, 8, 7], 60.0)], &part).2, 0);
 }

@@ -3,6 +3,7 @@
 use super::MAX_PLANES;
 use crate::geom::Bounds;
 use crate::mt::MtInfo;
+use glam::DVec3;
 use std::fmt;
 
 /// What mesh is wanted: the coarsest one that meets every need, as far as the budget allows.
@@ -107,6 +108,27 @@ pub enum Region {
 impl From<Bounds> for Region {
     fn from(bounds: Bounds) -> Self {
         Self::Box(bounds)
+    }
+}
+
+impl Region {
+    /// Whether a point lies in the region.
+    pub fn contains(&self, p: [f64; 3]) -> bool {
+        let p = DVec3::from(p);
+        match self {
+            Self::Box(bounds) => bounds.contains(p.to_array()),
+            Self::OrientedBox { centre, halves } => halves.iter().all(|&half| {
+                let half = DVec3::from(half);
+                (p - DVec3::from(*centre)).dot(half).abs() <= half.length_squared()
+            }),
+            Self::Sphere { centre, radius } => p.distance(DVec3::from(*centre)) <= *radius,
+            Self::HalfSpace { normal, offset } => p.dot(DVec3::from(*normal)) <= *offset,
+            Self::Slab { normal, offset, thickness } => {
+                let normal = DVec3::from(*normal);
+                (p.dot(normal) - offset).abs() <= 0.5 * thickness * normal.length()
+            }
+            Self::Convex(planes) => planes.iter().all(|&[x, y, z, d]| p.dot(DVec3::new(x, y, z)) <= d),
+        }
     }
 }
 

@@ -11,6 +11,7 @@ mod files;
 mod generate;
 mod info;
 mod isosurface;
+mod needs;
 mod output;
 mod poly;
 mod probe;

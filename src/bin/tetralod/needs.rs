@@ -1,0 +1,442 @@
+//! Needs as they are written on the command line and in files, and what they mean for an MT.
+
+use super::files;
+use super::output;
+use super::query::parse_bounds;
+use super::query::parse_list;
+use super::query::parse_number;
+use super::query::parse_numbers;
+use anyhow::Context;
+use anyhow::Result;
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use std::fs;
+use std::path::Path;
+use std::path::PathBuf;
+use std::str::FromStr;
+use tetralod::mt::MtInfo;
+use tetralod::refine::MAX_PLANES;
+use tetralod::refine::Need;
+use tetralod::refine::Part;
+use tetralod::refine::Region;
+use tetralod::refine::Transfer;
+use tetralod::refine::Values;
+use tetralod::refine::View;
+
+/// An error in units of a field, or as a fraction of its range.
+#[derive(Clone, Copy, Debug)]
+pub enum Tolerance {
+    Absolute(f64),
+    Relative(f64),
+}
+
+impl FromStr for Tolerance {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (number, relative) = percentage(text)?;
+        if number < 0.0 {
+            return Err("an error is not negative".to_owned());
+        }
+        Ok(if relative { Self::Relative(number / 100.0) } else { Self::Absolute(number) })
+    }
+}
+
+impl Tolerance {
+    /// As a fraction of the field's range.
+    pub fn relative(self, range: f64) -> f64 {
+        match self {
+            Self::Absolute(error) => error / range,
+            Self::Relative(error) => error,
+        }
+    }
+}
+
+/// A number, and whether % stands behind it.
+fn percentage(text: &str) -> Result<(f64, bool), String> {
+    match text.trim().strip_suffix('%') {
+        Some(number) => Ok((parse_number(number)?, true)),
+        None => Ok((parse_number(text)?, false)),
+    }
+}
+
+/// A camera, and where it is described.
+#[derive(Clone, Debug)]
+pub enum Camera {
+    File(PathBuf),
+    Given(View),
+}
+
+/// Needs of one error: inside each of the regions where the field has one of the values, what each camera sees, and what
+/// each transfer function shows. Without any of these, everywhere.
+#[derive(Clone, Debug, Default)]
+pub struct Group {
+    pub error: Option<Tolerance>,
+    pub regions: Vec<Region>,
+    pub ranges: Vec<[f64; 2]>,
+    pub field: Option<String>,
+    pub cameras: Vec<Camera>,
+    pub pixels: Option<f64>,
+    pub transfers: Vec<PathBuf>,
+    pub colour_error: Option<f64>,
+}
+
+/// A need and what it is called.
+pub struct Wanted {
+    pub name: String,
+    pub need: Need,
+}
+
+/// Units of errors.
+pub const RELATIVE: &str = "relative";
+pub const PIXELS: &str = "pixels";
+const COLOUR: &str = "colour";
+
+/// The unit of a need's error.
+pub fn unit(need: &Need) -> &'static str {
+    match need.part {
+        Part::View(_) => PIXELS,
+        Part::Transfer(_) => COLOUR,
+        _ => RELATIVE,
+    }
+}
+
+impl FromStr for Group {
+    type Err = String;
+
+    /// Reads `key=value; key=value; ...`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let mut group = Self::default();
+        for part in text.split(';').map(str::trim).filter(|part| !part.is_empty()) {
+            let (key, value) =
+                part.split_once('=').ok_or_else(|| format!("'{part}' is not of the form key=value"))?;
+            let key = key.trim();
+            group.set(key, value.trim()).map_err(|wrong| format!("{key}: {wrong}"))?;
+        }
+        group.check()?;
+        Ok(group)
+    }
+}
+
+/// Sets what may be said once.
+fn once<T>(place: &mut Option<T>, value: T) -> Result<(), String> {
+    match place.replace(value) {
+        None => Ok(()),
+        Some(_) => Err("is there twice".to_owned()),
+    }
+}
+
+impl Group {
+    fn set(&mut self, key: &str, value: &str) -> Result<(), String> {
+        match key {
+            "box" => self.regions.push(parse_box(value)?),
+            "obox" => self.regions.push(parse_oriented_box(value)?),
+            "sphere" => self.regions.push(parse_sphere(value)?),
+            "half-space" => self.regions.push(parse_half_space(value)?),
+            "slab" => self.regions.push(parse_slab(value)?),
+            "convex" => self.regions.push(parse_convex(value)?),
+            "iso" => self.ranges.push(parse_number(value).map(|v| [v, v])?),
+            "range" => self.ranges.push(parse_range(value)?),
+            "view" => self.cameras.push(Camera::File(value.into())),
+            "transfer" => self.transfers.push(value.into()),
+            "field" => once(&mut self.field, value.to_owned())?,
+            "error" => once(&mut self.error, value.parse()?)?,
+            "pixels" => once(&mut self.pixels, parse_size(value)?)?,
+            "colour-error" => once(&mut self.colour_error, parse_share(value)?)?,
+            _ => {
+                return Err(
+                    "is no key; there are box, obox, sphere, half-space, slab, convex, iso, range, field, \
+                            error, view, pixels, transfer and colour-error"
+                        .to_owned(),
+                );
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether it says nothing about where the mesh is needed.
+    pub fn is_bare(&self) -> bool {
+        !self.is_limited() && self.cameras.is_empty() && self.transfers.is_empty()
+    }
+
+    pub fn has_error(&self) -> bool {
+        self.error.is_some()
+    }
+
+    /// Whether there are regions or values.
+    fn is_limited(&self) -> bool {
+        !self.regions.is_empty() || !self.ranges.is_empty()
+    }
+
+    /// Errors that nothing goes with are mistakes.
+    pub fn check(&self) -> Result<(), String> {
+        let wrong = if self.pixels.is_some() && self.cameras.is_empty() {
+            "pixels are the error of a view; there is none"
+        } else if self.colour_error.is_some() && self.transfers.is_empty() {
+            "colour-error is the error of a transfer function; there is none"
+        } else if self.error.is_some() && !self.is_limited() && !self.is_bare() {
+            "the error is that of regions and values; views have pixels, transfer functions a colour-error, and \
+             --outside says how accurate the mesh is elsewhere"
+        } else {
+            return Ok(());
+        };
+        Err(wrong.to_owned())
+    }
+
+    /// Adds the needs; `field` is the field's name if the group has none.
+    pub fn add_to(&self, info: &MtInfo, field: Option<&str>, wanted: &mut Vec<Wanted>) -> Result<()> {
+        let field = files::field_index(info, self.field.as_deref().or(field))?;
+        if self.is_bare() || self.is_limited() {
+            self.add_limited(info, field, wanted);
+        }
+        for camera in &self.cameras {
+            let (view, pixels, name) = read_camera(camera)?;
+            let need = Need::seen(view, self.pixels.or(pixels).unwrap_or(1.0));
+            wanted.push(Wanted { name, need });
+        }
+        for path in &self.transfers {
+            let file: TransferFile = read_json(path)?;
+            let name = file.field.as_deref();
+            let field = if name.is_some() { files::field_index(info, name)? } else { field };
+            let error = self.colour_error.or(file.error).unwrap_or(0.01);
+            let colour = |[value, r, g, b, opacity]: [f64; 5]| (value, [r, g, b, opacity]);
+            let points = file.points.into_iter().map(colour).collect();
+            let transfer = Transfer { field, points, unit_length: file.unit_length };
+            wanted.push(Wanted {
+                name: format!("transfer {}", path.display()),
+                need: Need::shown(transfer, error),
+            });
+        }
+        Ok(())
+    }
+
+    fn add_limited(&self, info: &MtInfo, field: usize, wanted: &mut Vec<Wanted>) {
+        let error = self.error.map_or(0.0, |error| error.relative(info.fields[field].range()));
+        let values = (!self.ranges.is_empty()).then(|| Values { field, ranges: self.ranges.clone() });
+        let of_values = values.as_ref().map(|values| describe_values(info, values));
+        let mut add = |region: Option<&Region>| {
+            let (part, name) = match (region, &values, &of_values) {
+                (None, Some(values), Some(name)) => (Part::Values(values.clone()), name.clone()),
+                (Some(region), Some(values), Some(name)) => {
+                    let part = Part::Both(region.clone(), values.clone());
+                    (part, format!("{}, {name}", describe_region(region)))
+                }
+                (Some(region), ..) => (Part::Region(region.clone()), describe_region(region)),
+                (None, ..) => (Part::Everywhere, "everywhere".to_owned()),
+            };
+            wanted.push(Wanted { name, need: Need { error, part } });
+        };
+        if self.regions.is_empty() {
+            add(None);
+        } else {
+            self.regions.iter().for_each(|region| add(Some(region)));
+        }
+    }
+}
+
+fn describe_values(info: &MtInfo, values: &Values) -> String {
+    let say = |[a, b]: &[f64; 2]| {
+        if a == b { output::number(*a) } else { format!("{} to {}", output::number(*a), output::number(*b)) }
+    };
+    let ranges: Vec<String> = values.ranges.iter().map(say).collect();
+    format!("{} at {}", info.fields[values.field].name, ranges.join(", "))
+}
+
+fn describe_region(region: &Region) -> String {
+    let list = |numbers: &[f64]| numbers.iter().map(|x| output::number(*x)).collect::<Vec<_>>().join(",");
+    match region {
+        Region::Box(b) => format!("box {},{}", list(&b.min), list(&b.max)),
+        Region::OrientedBox { centre, halves } => {
+            format!("oriented box {},{}", list(centre), list(halves.as_flattened()))
+        }
+        Region::Sphere { centre, radius } => format!("sphere {},{}", list(centre), output::number(*radius)),
+        Region::HalfSpace { normal, offset } => {
+            format!("half-space {},{}", list(normal), output::number(*offset))
+        }
+        Region::Slab { normal, offset, thickness } => {
+            format!("slab {},{}", list(normal), list(&[*offset, *thickness]))
+        }
+        Region::Convex(planes) => format!("convex {}", list(planes.as_flattened())),
+    }
+}
+
+/// A camera's file.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ViewFile {
+    matrix: [f64; 16],
+    viewport: [f64; 2],
+    pixels: Option<f64>,
+}
+
+/// A transfer function's file: `[value, red, green, blue, opacity]` a point.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TransferFile {
+    points: Vec<[f64; 5]>,
+    #[serde(alias = "unitLength", default = "whole")]
+    unit_length: f64,
+    field: Option<String>,
+    error: Option<f64>,
+}
+
+fn whole() -> f64 {
+    1.0
+}
+
+fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T> {
+    let name = || path.display().to_string();
+    let text = fs::read_to_string(path).with_context(name)?;
+    serde_json::from_str(&text).with_context(name)
+}
+
+/// The camera, the error if its file has one, and its name.
+fn read_camera(camera: &Camera) -> Result<(View, Option<f64>, String)> {
+    match camera {
+        Camera::Given(view) => Ok((*view, None, "view".to_owned())),
+        Camera::File(path) => {
+            let ViewFile { matrix, viewport, pixels } = read_json(path)?;
+            Ok((View { matrix, viewport }, pixels, format!("view {}", path.display())))
+        }
+    }
+}
+
+pub fn parse_box(text: &str) -> Result<Region, String> {
+    parse_bounds(text).map(Region::Box)
+}
+
+/// Refuses a direction of no length.
+fn direction(v: [f64; 3], what: &str) -> Result<[f64; 3], String> {
+    if v == [0.0; 3] { Err(format!("{what} is not 0,0,0")) } else { Ok(v) }
+}
+
+pub fn parse_oriented_box(text: &str) -> Result<Region, String> {
+    let numbers: [f64; 12] = parse_numbers(text, "an oriented box")?;
+    let vector = |i: usize| [numbers[3 * i], numbers[3 * i + 1], numbers[3 * i + 2]];
+    let halves = [vector(1), vector(2), vector(3)];
+    for (i, a) in halves.into_iter().enumerate() {
+        direction(a, "the way from the centre to a face")?;
+        let b = halves[(i + 1) % 3];
+        let [dot, aa, bb] = [[a, b], [a, a], [b, b]].map(|[u, v]| u[0] * v[0] + u[1] * v[1] + u[2] * v[2]);
+        if dot.abs() > 1e-6 * (aa * bb).sqrt() {
+            return Err("the vectors of an oriented box are at right angles to each other".to_owned());
+        }
+    }
+    Ok(Region::OrientedBox { centre: vector(0), halves })
+}
+
+pub fn parse_sphere(text: &str) -> Result<Region, String> {
+    let [x, y, z, radius] = parse_numbers(text, "a sphere")?;
+    if radius < 0.0 {
+        return Err("a radius is not negative".to_owned());
+    }
+    Ok(Region::Sphere { centre: [x, y, z], radius })
+}
+
+pub fn parse_half_space(text: &str) -> Result<Region, String> {
+    let [x, y, z, offset] = parse_numbers(text, "a half-space")?;
+    Ok(Region::HalfSpace { normal: direction([x, y, z], "a normal")?, offset })
+}
+
+pub fn parse_slab(text: &str) -> Result<Region, String> {
+    let [x, y, z, offset, thickness] = parse_numbers(text, "a slab")?;
+    if thickness < 0.0 {
+        return Err("a thickness is not negative".to_owned());
+    }
+    Ok(Region::Slab { normal: direction([x, y, z], "a normal")?, offset, thickness })
+}
+
+pub fn parse_convex(text: &str) -> Result<Region, String> {
+    let numbers = parse_list(text)?;
+    let (planes, rest) = numbers.as_chunks::<4>();
+    if !rest.is_empty() || planes.len() > MAX_PLANES {
+        return Err(format!("there are 4 numbers a plane and at most {MAX_PLANES} planes"));
+    }
+    planes.iter().try_for_each(|&[x, y, z, _]| direction([x, y, z], "a normal").map(drop))?;
+    Ok(Region::Convex(planes.to_vec()))
+}
+
+pub fn parse_range(text: &str) -> Result<[f64; 2], String> {
+    let [low, high] = parse_numbers(text, "a range")?;
+    if low > high { Err("a range has its smaller value first".to_owned()) } else { Ok([low, high]) }
+}
+
+pub fn parse_matrix(text: &str) -> Result<[f64; 16], String> {
+    parse_numbers(text, "a matrix")
+}
+
+pub fn parse_viewport(text: &str) -> Result<[f64; 2], String> {
+    let size: [f64; 2] = parse_numbers(text, "a viewport")?;
+    if size.iter().all(|&x| x > 0.0) {
+        Ok(size)
+    } else {
+        Err("a viewport has some width and height".to_owned())
+    }
+}
+
+/// A number that is not negative.
+pub fn parse_size(text: &str) -> Result<f64, String> {
+    let number = parse_number(text)?;
+    if number >= 0.0 { Ok(number) } else { Err(format!("'{text}' is negative")) }
+}
+
+/// A part of 1, or a percentage.
+pub fn parse_share(text: &str) -> Result<f64, String> {
+    let (number, percent) = percentage(text)?;
+    let share = if percent { number / 100.0 } else { number };
+    if share >= 0.0 { Ok(share) } else { Err(format!("'{text}' is negative")) }
+}
+
+/// A number of bytes; K, M and G stand for powers of 1024.
+pub fn parse_bytes(text: &str) -> Result<u64, String> {
+    let text = text.trim();
+    let digits = text.trim_end_matches(|c: char| !c.is_ascii_digit() && c != '.');
+    let shift = match text[digits.len()..].trim() {
+        "" | "B" => 0,
+        "K" | "k" | "KiB" => 10,
+        "M" | "MiB" => 20,
+        "G" | "GiB" => 30,
+        unit => return Err(format!("'{unit}' is no unit of bytes; there are K, M and G")),
+    };
+    let number = parse_size(digits)? * f64::from(1_u32 << shift);
+    // The largest number of bytes that a float still counts one by one.
+    if number <= (1_u64 << 53) as f64 { Ok(number as u64) } else { Err(format!("'{text}' is too much")) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_have_units() {
+        let read = |text: &str| parse_bytes(text).ok();
+        assert_eq!(
+            ["17", "2K", "1.5M", "3 G", "1MiB"].map(read),
+            [Some(17), Some(2048), Some(3 << 19), Some(3 << 30), Some(1 << 20)]
+        );
+        assert_eq!(["", "K", "1T", "-1", "1e300G", "1 2"].map(read), [None; 6]);
+    }
+
+    #[test]
+    fn a_need_is_read_from_keys_and_values() {
+        let group: Group = "box=0,0,0,1,1,1; iso = -0.5;range=1,2; error=1%".parse().expect("a need");
+        assert_eq!(group.regions.len(), 1);
+        assert_eq!(group.ranges, [[-0.5, -0.5], [1.0, 2.0]]);
+        assert!(matches!(group.error, Some(Tolerance::Relative(x)) if x == 0.01));
+        for (text, words) in [
+            ("box", "key=value"),
+            ("cube=1", "is no key"),
+            ("box=1,2", "6 numbers"),
+            ("error=1;error=2", "twice"),
+            ("pixels=1", "there is none"),
+            ("colour-error=1%;iso=1", "there is none"),
+            ("view=a.json;error=1", "outside"),
+            ("slab=0,0,0,1,1", "0,0,0"),
+            ("obox=0,0,0,1,0,0,1,1,0,0,0,1", "right angles"),
+            ("range=2,1", "smaller"),
+        ] {
+            let wrong = text.parse::<Group>().expect_err(text);
+            assert!(wrong.contains(words), "{text}: {wrong}");
+        }
+    }
+}
