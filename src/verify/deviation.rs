@@ -1,14 +1,18 @@
 //! How far is an extracted mesh from the input, at every reference vertex and all over the boundary?
 
-use super::Wish;
 use super::mesh_checks::PlainMesh;
 use super::mesh_checks::PlainReference;
+use super::parts::Ask;
+use super::parts::change;
+use super::parts::is_aside;
 use super::triangles::Triangles;
 use crate::geom::orient3d;
 use crate::mesh::FACES;
 use crate::mesh::NONE;
 use crate::mesh::TetMesh;
 use crate::mt::MtInfo;
+use crate::refine::Need;
+use crate::refine::Part;
 use glam::DVec3;
 use std::ops::RangeInclusive;
 
@@ -33,9 +37,6 @@ pub struct Measured {
     pub worst_ratio: f64,
     pub failures: Vec<String>,
 }
-
-/// Rounding errors of interpolated values, as fractions of the range.
-const VALUE_SLACK: f64 = 1e-9;
 
 /// Failures of one kind that are described for each query.
 const DESCRIBED: usize = 3;
@@ -80,18 +81,20 @@ impl<'a> Deviation<'a> {
         PlainReference { positions: &self.positions, levels: &self.levels, tets: &self.input.tets }
     }
 
-    /// Measures `mesh`, the answer to `request`, where the error is to be within `bound`. `errors` are those of
-    /// its tetrahedra.
-    pub fn measure(&self, mesh: &PlainMesh<'_>, errors: &[f64], request: &Wish, bound: f64) -> Measured {
-        let fields = self.info.fields.iter();
-        let half_level = fields.map(|f| 0.5 * f.step / f.range()).fold(0.0, f64::max);
-        let allowed = bound.max(half_level) + VALUE_SLACK;
+    /// What each of the needs asks of the reference vertices; `bounds` are what is guaranteed.
+    pub fn asks<'n>(&self, needs: &'n [Need], bounds: &[f64]) -> Vec<Ask<'n>> {
+        needs.iter().zip(bounds).map(|(need, &bound)| Ask::new(self.info, self.input, need, bound)).collect()
+    }
+
+    /// Measures `mesh` where it is asked for. `errors` are those of its tetrahedra.
+    pub fn measure(&self, mesh: &PlainMesh<'_>, errors: &[f64], asks: &[Ask<'_>]) -> Measured {
         let border = Border::of(mesh, self.info);
-        let look = Look { of: self, mesh, border, errors, request, bound, allowed };
+        let largest = errors.iter().copied().fold(0.0, f64::max);
+        let look = Look { of: self, mesh, border, errors, largest, asks };
         let mut found = Measured { worst_ratio: 0.0, failures: Vec::new() };
         look.at_vertices(&mut found);
-        // Where isovalues do not reach, the boundary may be anywhere.
-        if request.isovalues.is_empty() {
+        // Elsewhere the boundary may be anywhere.
+        if asks.iter().any(|ask| matches!(ask.need.part, Part::Everywhere | Part::Region(_))) {
             look.at_extracted_boundary(&mut found);
             look.at_reference_boundary(&mut found);
         }
@@ -105,110 +108,115 @@ struct Look<'a> {
     mesh: &'a PlainMesh<'a>,
     border: Border,
     errors: &'a [f64],
-    request: &'a Wish,
-    bound: f64,
-    allowed: f64,
+    /// Of the errors.
+    largest: f64,
+    asks: &'a [Ask<'a>],
+}
+
+/// A place in the mesh that may stand for a reference vertex.
+struct Place {
+    tet: u32,
+    weights: [f64; 4],
+    /// Its distance from the vertex, as the error that it counts as.
+    displaced: f64,
 }
 
 impl Look<'_> {
-    fn wanted(&self, p: [f64; 3]) -> bool {
-        self.request.roi.is_none_or(|roi| roi.contains(p))
-    }
-
     /// The error at every reference vertex that is wanted.
     fn at_vertices(&self, found: &mut Measured) {
         let points = self.of.positions.len();
-        let mut least = vec![f64::INFINITY; points];
-        for (t, tet) in self.mesh.tets.iter().enumerate() {
+        // For each need and vertex, the least part of what is allowed.
+        let mut least = vec![f64::INFINITY; points * self.asks.len()];
+        for (t, tet) in (0..).zip(self.mesh.tets) {
             let corners = tet.map(|v| self.mesh.positions[v as usize]);
             self.of.cells.between(&corners, |point| {
-                let at = self.of.positions[point as usize];
-                if let Some(weights) = barycentric(corners, at) {
-                    let error = self.error(point, *tet, weights, t);
-                    least[point as usize] = least[point as usize].min(error);
+                let least = &mut least[point as usize * self.asks.len()..][..self.asks.len()];
+                let asked = |ask: &Ask<'_>| ask.allowed[point as usize] < f64::INFINITY;
+                if !self.asks.iter().any(asked) {
+                    return;
+                }
+                let Some(weights) = barycentric(corners, self.of.positions[point as usize]) else { return };
+                let place = Place { tet: t, weights, displaced: 0.0 };
+                for (ask, least) in self.asks.iter().zip(least).filter(|(ask, _)| asked(ask)) {
+                    *least = least.min(self.ratio(ask, point, &place));
                 }
             });
         }
-        let radius = self.radius();
-        let mut failures = Failures::default();
-        for point in (0..points).filter(|&i| self.wanted(self.of.input.positions[i])) {
-            let mut error = least[point];
-            if error > self.allowed {
-                error = error.min(self.error_at_border(point as u32, radius));
+        for (k, ask) in self.asks.iter().enumerate() {
+            let mut failures = Failures::default();
+            for point in (0..points).filter(|&point| ask.allowed[point] < f64::INFINITY) {
+                let inside = least[point * self.asks.len() + k];
+                let ratio =
+                    if inside > 1.0 { inside.min(self.ratio_at_border(ask, point as u32)) } else { inside };
+                found.worst_ratio = found.worst_ratio.max(ratio);
+                if ratio > 1.0 {
+                    failures.add(|| self.describe(ask, point, inside, ratio));
+                }
             }
-            found.worst_ratio = found.worst_ratio.max(error / self.allowed);
-            if error > self.allowed {
-                failures.add(|| self.describe(point, least[point], error));
-            }
+            failures.end("reference vertices", found);
         }
-        failures.end("reference vertices", found);
     }
 
-    fn describe(&self, point: usize, inside: f64, error: f64) -> String {
+    fn describe(&self, ask: &Ask<'_>, point: usize, inside: f64, ratio: f64) -> String {
         let place = if inside.is_finite() { "inside" } else { "outside" };
+        let unit = if ask.is_of_colour() { "change of colour" } else { "error" };
+        let allowed = ask.allowed[point];
         format!(
-            "reference vertex {point} at {:?}, {place}: error {error}, more than {}",
-            self.of.input.positions[point], self.allowed
+            "reference vertex {point} at {:?}, {place}: {unit} {}, more than {allowed}",
+            self.of.input.positions[point],
+            ratio * allowed
         )
     }
 
-    /// The largest difference of any field at a reference vertex, interpolated in tetrahedron `t`; 0 if the request
-    /// does not reach it because it is clearly on one side of all isovalues.
-    fn error(&self, point: u32, tet: [u32; 4], weights: [f64; 4], t: usize) -> f64 {
-        if self.is_aside(point, tet, t) {
-            return 0.0;
-        }
+    /// The error with which a place stands for a reference vertex, as a part of what is allowed; 0 if the need does not reach
+    /// it because it is clearly on one side of all values.
+    fn ratio(&self, ask: &Ask<'_>, point: u32, place: &Place) -> f64 {
         let fields = &self.of.info.fields;
-        let mut largest = 0.0_f64;
-        for (f, field) in fields.iter().enumerate() {
-            let levels = tet.map(|v| field.value(self.mesh.mesh.levels(v)[f]) / field.range());
-            let value: f64 = levels.iter().zip(weights).map(|(level, w)| level * w).sum();
-            largest = largest.max((value - self.of.values[point as usize * fields.len() + f]).abs());
+        let tet = self.mesh.tets[place.tet as usize];
+        let known = &self.of.values[point as usize * fields.len()..][..fields.len()];
+        let error = self.errors[place.tet as usize];
+        let near = place.displaced <= error;
+        if let Some(values) = ask.values() {
+            let (info, value) = (&fields[values.field], known[values.field] * fields[values.field].range());
+            if near && is_aside(info, values, self.mesh, tet, error, value) {
+                return 0.0;
+            }
         }
-        largest
-    }
-
-    /// Whether a tetrahedron, widened by its error, and the reference vertex are on one side of all isovalues.
-    fn is_aside(&self, point: u32, tet: [u32; 4], t: usize) -> bool {
-        if self.request.isovalues.is_empty() {
-            return false;
-        }
-        let (f, fields) = (self.request.field, &self.of.info.fields);
-        let field = &fields[f];
-        let value = self.of.values[point as usize * fields.len() + f] * field.range();
-        let values = tet.map(|v| field.value(self.mesh.mesh.levels(v)[f]));
-        let margin = self.errors[t] * field.range();
-        let low = values.into_iter().fold(f64::INFINITY, f64::min) - margin;
-        let high = values.into_iter().fold(f64::NEG_INFINITY, f64::max) + margin;
-        self.request.isovalues.iter().all(|&iso| (iso < low && iso < value) || (iso > high && iso > value))
-    }
-
-    /// How far a place of the boundary may be that stands for a reference vertex.
-    fn radius(&self) -> f64 {
-        let largest = if self.request.isovalues.is_empty() {
-            self.allowed
-        } else {
-            // Tetrahedra that isovalues pass by may have any error.
-            self.errors.iter().copied().fold(self.allowed, f64::max)
+        let shown = |f: usize| {
+            let value = |v: u32| fields[f].value(self.mesh.mesh.levels(v)[f]) / fields[f].range();
+            tet.iter().zip(place.weights).map(|(&v, w)| value(v) * w).sum::<f64>()
         };
-        largest * self.of.info.displacement_per_error + self.of.slack
+        let found = if let Part::Transfer(transfer) = &ask.need.part {
+            let (f, info) = (transfer.field, &fields[transfer.field]);
+            let range = info.range();
+            if near { change(info, transfer, known[f] * range, shown(f) * range) } else { f64::INFINITY }
+        } else {
+            (0..fields.len()).map(|f| (shown(f) - known[f]).abs()).fold(place.displaced, f64::max)
+        };
+        found / ask.allowed[point as usize]
     }
 
-    /// The least error with which some place of the boundary stands for a reference vertex.
-    fn error_at_border(&self, point: u32, radius: f64) -> f64 {
+    /// The least part of what is allowed with which some place of the boundary stands for a reference vertex.
+    fn ratio_at_border(&self, ask: &Ask<'_>, point: u32) -> f64 {
         let p = DVec3::from(self.of.info.lattice.point(self.of.positions[point as usize]));
         let per_error = self.of.info.displacement_per_error;
+        let allowed = ask.allowed[point as usize];
+        // Tetrahedra that values pass by, or whose colour does not matter, may have any error.
+        let reach = match &ask.need.part {
+            Part::Transfer(_) => self.largest,
+            Part::Values(_) | Part::Both(..) => allowed.max(self.largest),
+            Part::View(_) => allowed.min(self.largest),
+            Part::Everywhere | Part::Region(_) => allowed,
+        };
         let mut least = f64::INFINITY;
-        self.border.triangles.within(p, radius, |i, q, distance| {
+        self.border.triangles.within(p, reach * per_error + self.of.slack, |i, q, distance| {
             let (t, face) = self.border.faces[i as usize];
             let tet = self.mesh.tets[t as usize];
             let away = (distance - self.of.slack).max(0.0);
             let displaced = if away > 0.0 { away / per_error } else { 0.0 };
             let own = weights_on(q, self.border.triangles.corners[i as usize]);
             let weights = tet.map(|v| face.iter().zip(own).find(|(w, _)| **w == v).map_or(0.0, |(_, x)| x));
-            let aside = self.is_aside(point, tet, t as usize) && displaced <= self.errors[t as usize];
-            let error = if aside { 0.0 } else { self.error(point, tet, weights, t as usize).max(displaced) };
-            least = least.min(error);
+            least = least.min(self.ratio(ask, point, &Place { tet: t, weights, displaced }));
         });
         least
     }
@@ -244,12 +252,14 @@ impl Look<'_> {
         failures: &mut Failures,
         found: &mut Measured,
     ) {
-        if !self.wanted(p) {
+        let binding = self.asks.iter().filter(|ask| ask.binds_boundary_at(p));
+        let bound = binding.map(|ask| ask.bound).fold(f64::INFINITY, f64::min);
+        if bound == f64::INFINITY {
             return;
         }
-        let allowed = self.bound * self.of.info.displacement_per_error + self.of.slack;
+        let allowed = bound * self.of.info.displacement_per_error + self.of.slack;
         let distance = other.distance(DVec3::from(p));
-        if self.bound > 0.0 {
+        if bound > 0.0 {
             found.worst_ratio = found.worst_ratio.max(distance / allowed);
         }
         if distance > allowed {

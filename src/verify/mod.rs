@@ -4,22 +4,26 @@
 //! measured at every reference vertex, and every request is answered twice, from the base mesh and from whatever
 //! mesh the request before it left.
 //!
-//! What is promised and checked, for uniform requests, boxes, isovalues, combinations and budgets:
+//! What is promised and checked, for regions, values, views, transfer functions, their unions, and budgets:
 //! - **Full circle**: error 0 gives the reference mesh, tetrahedron for tetrahedron, on the lattice; error ∞ the base.
 //!   Where the MT was built from points, the mesh that it gives at error 0 has those points and no others.
 //! - **Valid meshes**: positive tetrahedra, faces shared by at most two, complete and symmetric adjacency, a closed
 //!   boundary, the reference mesh's Euler number, no vertex without a tetrahedron.
-//! - **Error**: within the bound that is reported, or half a level where that is more, at every selected reference
-//!   vertex. Where the boundary has moved, a place on it that is near enough counts: a displacement `d` is an error
-//!   of `d / displacement_per_error`.
+//! - **Error**: within the bound of each need, or half a level where that is more, at every reference vertex in its part.
+//!   Where the boundary has moved, a place on it that is near enough counts: a displacement `d` is an error
+//!   of `d / displacement_per_error`. In a view, the error is compared with the one that fills the pixels at that vertex; with a
+//!   transfer function, the colour of the interpolated value with that of the vertex.
 //! - **Boundary**: no vertex of the extracted boundary is further from the reference boundary than the bound allows.
-//! - **Isovalues**: a reference vertex whose error is larger lies on the same side of every isovalue as all of its
+//! - **Isovalues**: a reference vertex whose error is larger lies on the same side of every range of values as all of its
 //!   tetrahedron, so no part of an isosurface is missed and none is shown that is less accurate than asked for.
-//! - **Answers**: `satisfied` and the bound are true, budgets are kept, and the same request gives the same mesh
-//!   whatever was asked for before.
+//! - **Answers**: `satisfied` and the bounds are true, budgets are kept, a larger budget never has a larger excess, and the
+//!   same request gives the same mesh whatever was asked for before and in whatever steps it is answered; asking for it
+//!   again changes nothing.
+//! - **Steps**: between them the mesh is valid and within the budget.
 
 mod deviation;
 mod mesh_checks;
+mod parts;
 mod points;
 mod queries;
 mod same;
@@ -31,12 +35,15 @@ use crate::mt::MultiTessellation;
 use crate::refine::Criterion;
 use crate::refine::Front;
 use crate::refine::LodCriterion;
+use crate::refine::Need;
 use crate::refine::Outcome;
+use crate::refine::Part;
+use crate::refine::Request;
 use crate::refine::TetLook;
 use deviation::Deviation;
 use mesh_checks::PlainMesh;
 use queries::Query;
-use queries::Wish;
+use std::sync::Arc;
 
 /// What came of a verification.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -98,18 +105,35 @@ fn verify<M: MultiTessellation>(
     let queries = queries::of(mt, input);
     let steps = 2 * queries.len() as u32;
     let mut hashes = Vec::with_capacity(queries.len());
+    let mut excesses = Vec::with_capacity(queries.len());
     for (i, query) in (0..).zip(&queries) {
         on_progress(i, steps);
         let mut front = base.clone();
         let outcome = satisfy(mt, &mut front, query)?;
-        let exact = Wish { error: 0.0, ..query.wish.clone() };
-        let everything = LodCriterion::new(mt.info(), &exact.request());
-        let case = Case { mt, query, front: &front, outcome: &outcome, everything };
-        case.check(&base, &reference, &deviation, report);
+        Case { mt, query, front: &front, outcome: &outcome }.check(&base, &reference, &deviation, report);
         hashes.push(front.mesh().hash());
+        excesses.push(outcome.excess);
         report.queries += 1;
     }
-    walk(mt, base, &queries, &hashes, on_progress, report)
+    check_monotone(&queries, &excesses, report);
+    let walk = Walk { mt, base: &base, shape: &reference, steps: Steps(1) };
+    walk.run(&queries, &hashes, on_progress, report)
+}
+
+/// Of two requests that differ in their budgets alone, the one that allows more must not be answered worse.
+fn check_monotone(queries: &[Query], excesses: &[f64], report: &mut VerifyReport) {
+    let most = |limit: Option<u64>| limit.unwrap_or(u64::MAX);
+    for (small, less) in queries.iter().zip(excesses) {
+        for (large, more) in queries.iter().zip(excesses) {
+            let [a, b] = [small, large].map(|query| &query.request.budget);
+            let allows = most(a.tets.map(u64::from)) <= most(b.tets.map(u64::from))
+                && most(a.vertices.map(u64::from)) <= most(b.vertices.map(u64::from))
+                && most(a.bytes) <= most(b.bytes);
+            if allows && more > less && small.request.needs == large.request.needs {
+                note(report, large, &format!("an excess of {more}, but one of {less} with a smaller budget"));
+            }
+        }
+    }
 }
 
 fn fresh(mt: &impl MultiTessellation) -> Result<Front, String> {
@@ -117,7 +141,7 @@ fn fresh(mt: &impl MultiTessellation) -> Result<Front, String> {
 }
 
 fn satisfy(mt: &impl MultiTessellation, front: &mut Front, query: &Query) -> Result<Outcome, String> {
-    let outcome = front.satisfy(mt, &query.criterion(mt.info()), query.wish.budget());
+    let outcome = front.satisfy(mt, &query.criterion(mt.info()), query.request.budget);
     outcome.map_err(|error| format!("{query}: the MT is damaged: {error}"))
 }
 
@@ -135,7 +159,7 @@ fn check_full_circle(
 ) -> Result<mesh_checks::Shape, String> {
     let mut front = fresh(mt)?;
     let base = front.mesh().hash();
-    let full = Query::new("full refinement", Wish::default());
+    let full = Query::new("full refinement", Request::within(0.0));
     let outcome = satisfy(mt, &mut front, &full)?;
     if !outcome.satisfied || outcome.error != ErrorCode::ZERO || front.applied_count() != mt.updates() {
         let (applied, all) = (front.applied_count(), mt.updates());
@@ -145,7 +169,7 @@ fn check_full_circle(
     if let Err(failure) = same::check(&extracted, &deviation.reference()) {
         note(report, &full, &failure);
     }
-    let none = Query::new("full coarsening", Wish { error: f64::INFINITY, ..Wish::default() });
+    let none = Query::new("full coarsening", Request::within(f64::INFINITY));
     satisfy(mt, &mut front, &none)?;
     if front.applied_count() != 0 || front.mesh().hash() != base {
         note(report, &none, "what is left is not the base mesh");
@@ -153,27 +177,89 @@ fn check_full_circle(
     mesh_checks::Shape::of(&deviation.reference()).map_err(|failure| format!("the input: {failure}"))
 }
 
-/// Answers all queries again, in an order that jumps about, from the mesh that the query before left.
-fn walk(
-    mt: &impl MultiTessellation,
-    mut front: Front,
-    queries: &[Query],
-    hashes: &[u64],
-    on_progress: &mut dyn FnMut(u32, u32),
-    report: &mut VerifyReport,
-) -> Result<(), String> {
-    let count = queries.len();
-    let stride = (count / 3..).find(|&s| s > 0 && coprime(s, count)).unwrap_or(1);
-    for step in 0..count {
-        on_progress((count + step) as u32, 2 * count as u32);
-        let i = step * stride % count;
-        satisfy(mt, &mut front, &queries[i])?;
-        if front.mesh().hash() != hashes[i] {
-            note(report, &queries[i], "the mesh depends on what was asked for before");
-            front = fresh(mt)?;
-        }
+/// Answers all queries again, in an order that jumps about, each from the mesh that the query before left, in steps.
+struct Walk<'a, M> {
+    mt: &'a M,
+    base: &'a Front,
+    shape: &'a mesh_checks::Shape,
+    steps: Steps,
+}
+
+/// Lengths of steps, from one update to all of them; the same on every run.
+struct Steps(u64);
+
+impl Steps {
+    fn next(&mut self) -> u64 {
+        // Xorshift (Marsaglia 2003).
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        1 << (self.0 % 16)
     }
-    Ok(())
+}
+
+/// Steps that a request is answered in, at most.
+const MOST_STEPS: u32 = 5;
+
+impl<M: MultiTessellation> Walk<'_, M> {
+    fn run(
+        mut self,
+        queries: &[Query],
+        hashes: &[u64],
+        on_progress: &mut dyn FnMut(u32, u32),
+        report: &mut VerifyReport,
+    ) -> Result<(), String> {
+        let count = queries.len();
+        let stride = (count / 3..).find(|&s| s > 0 && coprime(s, count)).unwrap_or(1);
+        let mut front = self.base.clone();
+        for step in 0..count {
+            on_progress((count + step) as u32, 2 * count as u32);
+            let i = step * stride % count;
+            let query = &queries[i];
+            self.answer(&mut front, query, report)?;
+            if front.mesh().hash() != hashes[i] {
+                note(report, query, "the mesh depends on what was asked for before");
+                front = self.base.clone();
+                continue;
+            }
+            let again = satisfy(self.mt, &mut front, query)?;
+            if again.refined + again.coarsened > 0 || front.mesh().hash() != hashes[i] {
+                note(report, query, "asked for again, the mesh changes");
+            }
+        }
+        Ok(())
+    }
+
+    fn answer(&mut self, front: &mut Front, query: &Query, report: &mut VerifyReport) -> Result<(), String> {
+        front.aim(self.mt, Arc::new(query.criterion(self.mt.info())), query.request.budget);
+        for step in 1..=MOST_STEPS {
+            let most = if step < MOST_STEPS { self.steps.next() } else { u64::MAX };
+            let outcome = front
+                .step(self.mt, &mut |done| done.refined + done.coarsened < most)
+                .map_err(|error| format!("{query}: the MT is damaged: {error}"))?;
+            if outcome.done {
+                return Ok(());
+            }
+            let mesh = PlainMesh::of(front.mesh());
+            let checked = check_budget(query, &mesh, self.base);
+            // Looking at all of the mesh takes time: once for each request is enough.
+            let checked = if step > 1 { checked } else { checked.and_then(|()| mesh.check(self.shape)) };
+            if let Err(failure) = checked {
+                note(report, query, &format!("between steps, {failure}"));
+            }
+        }
+        note(report, query, "stopped although nothing stood in the way");
+        Ok(())
+    }
+}
+
+fn check_budget(query: &Query, mesh: &PlainMesh<'_>, base: &Front) -> Result<(), String> {
+    let (vertices, tets) = (mesh.positions.len(), mesh.tets.len());
+    let is_base = tets == base.mesh().tet_count() && vertices == base.mesh().vertex_count();
+    if is_base || query.request.budget.holds(vertices, tets) {
+        return Ok(());
+    }
+    Err(format!("{tets} tetrahedra and {vertices} vertices, more than the budget and the base mesh"))
 }
 
 fn coprime(mut a: usize, mut b: usize) -> bool {
@@ -189,9 +275,10 @@ struct Case<'a, M> {
     query: &'a Query,
     front: &'a Front,
     outcome: &'a Outcome,
-    /// The same part with an error of 0: asks wherever there is any error at all.
-    everything: LodCriterion,
 }
+
+/// Errors that are smaller than this, in whatever unit, are judged as this: ratios to 0 mean nothing.
+const LEAST: f64 = 1.0 / (1_u64 << 20) as f64;
 
 impl<M: MultiTessellation> Case<'_, M> {
     fn check(
@@ -206,15 +293,31 @@ impl<M: MultiTessellation> Case<'_, M> {
         if let Err(failure) = mesh.check(reference) {
             return note(report, self.query, &failure);
         }
-        let checks = [self.check_answer(&mesh), self.check_budget(&mesh, base)];
+        let checks = [self.check_answer(&mesh), check_budget(self.query, &mesh, base)];
         checks.iter().filter_map(|c| c.as_ref().err()).for_each(|failure| note(report, self.query, failure));
-        let measured = deviation.measure(&mesh, &self.errors(&mesh), &self.query.wish, self.bound());
+        let needs = &self.query.request.needs;
+        let bounds: Vec<f64> = needs.iter().map(|need| self.bound(need, &mesh)).collect();
+        let asks = deviation.asks(needs, &bounds);
+        let measured = deviation.measure(&mesh, &self.errors(&mesh), &asks);
         report.worst_error_ratio = report.worst_error_ratio.max(measured.worst_ratio);
         measured.failures.iter().for_each(|failure| note(report, self.query, failure));
     }
 
-    fn bound(&self) -> f64 {
-        self.outcome.error.error()
+    /// What is guaranteed where a need counts, in its unit.
+    fn bound(&self, need: &Need, mesh: &PlainMesh<'_>) -> f64 {
+        let reported = self.outcome.error.error();
+        match need.part {
+            Part::View(_) | Part::Transfer(_) => {
+                if self.outcome.satisfied {
+                    return need.error;
+                }
+                let judged = Need { error: need.error.max(LEAST), part: need.part.clone() };
+                judged.error * self.largest(mesh, judged.into()).1
+            }
+            _ if self.outcome.satisfied => reported.min(need.error),
+            _ if self.query.request.needs.len() == 1 => reported,
+            _ => self.largest(mesh, need.clone().into()).0.max(ErrorCode::at_most(need.error)).error(),
+        }
     }
 
     /// The error of each tetrahedron: that of the update which removes it.
@@ -223,40 +326,53 @@ impl<M: MultiTessellation> Case<'_, M> {
         (0..mesh.tets.len() as u32).map(error).collect()
     }
 
-    /// Is what refinement says of the mesh true?
-    fn check_answer(&self, mesh: &PlainMesh<'_>) -> Result<(), String> {
-        let mut largest = 0.0_f64;
+    /// The largest error and the largest excess of all tetrahedra that violate a request; 0 and 1 if none does.
+    fn largest(&self, mesh: &PlainMesh<'_>, request: Request) -> (ErrorCode, f64) {
+        let criterion = LodCriterion::new(self.mt.info(), &request);
+        let mut largest = (ErrorCode::ZERO, 1.0);
         for (t, tet) in (0..).zip(mesh.tets) {
             let Some(update) = self.mt.remover(mesh.mesh, t) else { continue };
             let corners = tet.map(|v| mesh.positions[v as usize]);
             let levels = |field: usize| tet.map(|v| mesh.mesh.levels(v)[field]);
             let error = self.mt.error(update);
-            let look = TetLook { corners: &corners, levels: &levels, error, update };
-            if error.error() > largest && self.everything.judge(&look).asks() {
-                largest = error.error();
+            let verdict = criterion.rank(&TetLook { corners: &corners, levels: &levels, error, update });
+            if verdict.asks() {
+                largest = (largest.0.max(error), f64::max(largest.1, verdict.excess));
             }
         }
-        let (reported, satisfied) = (self.bound(), self.outcome.satisfied);
-        if largest > reported {
-            return Err(format!("the error bound is {largest}, not {reported} as reported"));
-        }
-        if satisfied != (largest <= self.query.wish.error) {
-            let answer = if satisfied { "satisfied" } else { "not satisfied" };
-            return Err(format!("reported as {answer}, with an error bound of {largest}"));
-        }
-        if !satisfied && self.query.wish.max_tets.is_none() {
-            return Err(format!("nothing stood in the way, but the error bound is {largest}"));
-        }
-        Ok(())
+        largest
     }
 
-    fn check_budget(&self, mesh: &PlainMesh<'_>, base: &Front) -> Result<(), String> {
-        let least = base.mesh().tet_count();
-        match self.query.wish.max_tets {
-            Some(budget) if mesh.tets.len() > (budget as usize).max(least) => {
-                Err(format!("{} tetrahedra, more than the budget and the base mesh", mesh.tets.len()))
-            }
-            _ => Ok(()),
+    /// Is what refinement says of the mesh true?
+    fn check_answer(&self, mesh: &PlainMesh<'_>) -> Result<(), String> {
+        let request = &self.query.request;
+        let Outcome { error: reported, excess, satisfied, done, .. } = *self.outcome;
+        if !done {
+            return Err("stopped although nothing stood in the way".to_owned());
         }
+        let (_, violation) =
+            self.largest(mesh, Request { needs: request.needs.clone(), ..Request::default() });
+        if satisfied != (violation <= 1.0) || satisfied && excess > 1.0 {
+            let answer = if satisfied { "satisfied" } else { "not satisfied" };
+            return Err(format!("reported as {answer}, with an excess of {violation}"));
+        }
+        if !satisfied && excess < violation {
+            return Err(format!("the excess is {violation}, not {excess} as reported"));
+        }
+        if !satisfied && request.budget.is_unlimited() {
+            return Err(format!("nothing stood in the way, but the excess is {violation}"));
+        }
+        let of_field = |need: &&Need| !matches!(need.part, Part::View(_) | Part::Transfer(_));
+        let exact = |need: &Need| Need { error: 0.0, part: need.part.clone() };
+        let needs: Vec<Need> = request.needs.iter().filter(of_field).map(exact).collect();
+        let (largest, _) = self.largest(mesh, Request { needs, ..Request::default() });
+        if largest > reported {
+            return Err(format!(
+                "the error bound is {}, not {} as reported",
+                largest.error(),
+                reported.error()
+            ));
+        }
+        Ok(())
     }
 }

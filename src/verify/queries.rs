@@ -2,6 +2,7 @@
 
 use crate::geom::Bounds;
 use crate::mesh::TetMesh;
+use crate::mt::FieldInfo;
 use crate::mt::MtInfo;
 use crate::mt::MultiTessellation;
 use crate::refine::Budget;
@@ -9,35 +10,15 @@ use crate::refine::LodCriterion;
 use crate::refine::Need;
 use crate::refine::Region;
 use crate::refine::Request;
+use crate::refine::Transfer;
+use crate::refine::View;
+use glam::DVec3;
 use std::fmt;
 
 /// A request with a name.
 pub struct Query {
     pub name: String,
-    pub wish: Wish,
-}
-
-/// A request in the terms that the errors are measured in.
-#[derive(Clone, Debug, Default)]
-pub struct Wish {
-    /// A fraction of the field's range.
-    pub error: f64,
-    pub roi: Option<Bounds>,
-    pub isovalues: Vec<f64>,
-    pub field: usize,
-    pub max_tets: Option<u32>,
-}
-
-impl Wish {
-    pub fn budget(&self) -> Budget {
-        Budget { tets: self.max_tets, ..Budget::default() }
-    }
-
-    pub fn request(&self) -> Request {
-        let need = Need::within(self.error);
-        let need = need.limited(self.roi.map(Region::Box), self.field, &self.isovalues);
-        Request { needs: vec![need], budget: self.budget() }
-    }
+    pub request: Request,
 }
 
 impl fmt::Display for Query {
@@ -47,12 +28,12 @@ impl fmt::Display for Query {
 }
 
 impl Query {
-    pub fn new(name: &str, wish: Wish) -> Self {
-        Self { name: name.to_owned(), wish }
+    pub fn new(name: &str, request: impl Into<Request>) -> Self {
+        Self { name: name.to_owned(), request: request.into() }
     }
 
     pub fn criterion(&self, info: &MtInfo) -> LodCriterion {
-        LodCriterion::new(info, &self.wish.request())
+        LodCriterion::new(info, &self.request)
     }
 }
 
@@ -60,56 +41,163 @@ const ERRORS: [f64; 5] = [0.0, 0.001, 0.01, 0.05, 0.2];
 
 /// All requests for an MT of `input`.
 pub fn of(mt: &impl MultiTessellation, input: &TetMesh) -> Vec<Query> {
-    let all = Wish::default();
-    let mut queries = Vec::new();
-    let mut add = |what: &str, wish: Wish| {
-        let percent = 100.0 * wish.error;
-        let budget = wish.max_tets.map_or(String::new(), |b| format!(", at most {b} tetrahedra"));
-        queries.push(Query::new(&format!("{what}, error {percent} %{budget}"), wish));
+    let mut queries = Queries {
+        all: Vec::new(),
+        boxes: boxes(input),
+        regions: regions(input),
+        views: views(input),
+        sizes: [mt.base().tets.len() as u64, u64::from(mt.info().tetrahedra)],
     };
-    for error in ERRORS.into_iter().chain([f64::INFINITY]) {
-        add("uniform", Wish { error, ..all.clone() });
-    }
-    let boxes = boxes(input);
-    for (i, (name, roi)) in boxes.iter().enumerate() {
-        for error in [0.0, ERRORS[i % 4 + 1], ERRORS[(i + 2) % 4 + 1]] {
-            add(name, Wish { error, roi: Some(*roi), ..all.clone() });
+    queries.add_uniform();
+    queries.add_boxes();
+    for (f, info) in mt.info().fields.iter().enumerate() {
+        let values = input.fields.iter().find(|field| field.name == info.name);
+        if let Some(values) = values {
+            queries.add_values(f, info, &quantiles(&values.values));
         }
     }
-    let sizes = [mt.base().tets.len(), mt.info().tetrahedra as usize];
-    let part = |k: usize| Some((sizes[0] + (sizes[1] - sizes[0].min(sizes[1])) / k) as u32);
-    for (f, info) in mt.info().fields.iter().enumerate() {
-        let Some(values) = input.fields.iter().find(|field| field.name == info.name) else { continue };
-        let quantiles = quantiles(&values.values);
+    queries.add_regions();
+    queries.add_views();
+    if let Some(info) = mt.info().fields.last() {
+        queries.add_unions(mt.info().fields.len() - 1, info);
+    }
+    queries.all
+}
+
+struct Queries {
+    all: Vec<Query>,
+    boxes: [(&'static str, Bounds); 4],
+    regions: [(&'static str, Region); 5],
+    views: [(&'static str, View); 3],
+    /// Tetrahedra of the base and of the reference mesh.
+    sizes: [u64; 2],
+}
+
+impl Queries {
+    /// So many tetrahedra that the mesh has grown from the base by one part in `k`.
+    fn part(&self, k: u64) -> u32 {
+        let [base, all] = self.sizes;
+        (base + all.saturating_sub(base) / k) as u32
+    }
+
+    fn add(&mut self, what: &str, request: impl Into<Request>) {
+        let request = request.into();
+        let errors: Vec<String> = request.needs.iter().map(|need| need.error.to_string()).collect();
+        let Budget { tets, vertices, bytes } = request.budget;
+        let limit =
+            |most: Option<u64>, of: &str| most.map_or(String::new(), |n| format!(", at most {n} {of}"));
+        let name = format!(
+            "{what}, error {}{}{}{}",
+            errors.join(" and "),
+            limit(tets.map(u64::from), "tetrahedra"),
+            limit(vertices.map(u64::from), "vertices"),
+            limit(bytes, "bytes")
+        );
+        self.all.push(Query { name, request });
+    }
+
+    fn add_uniform(&mut self) {
+        for error in ERRORS.into_iter().chain([f64::INFINITY]) {
+            self.add("uniform", Need::within(error));
+        }
+        for budget in [0, self.part(100), self.part(10), self.part(2), u32::MAX] {
+            self.add("uniform", Request::within(0.0).at_most(budget));
+        }
+        self.add("uniform", Request::within(0.01).at_most(self.part(50)));
+    }
+
+    fn add_boxes(&mut self) {
+        for (i, (name, roi)) in self.boxes.into_iter().enumerate() {
+            for error in [0.0, ERRORS[i % 4 + 1]] {
+                self.add(name, Need::within(error).inside(roi));
+            }
+            self.add(name, Request::from(Need::within(0.0).inside(roi)).at_most(self.part(30)));
+        }
+    }
+
+    fn add_values(&mut self, field: usize, info: &FieldInfo, quantiles: &[f64]) {
         for (i, &value) in quantiles.iter().enumerate() {
             let name = format!("{} = {value}", info.name);
-            for error in [ERRORS[i % 4], ERRORS[i % 4 + 1]] {
-                add(&name, Wish { error, isovalues: vec![value], field: f, ..all.clone() });
+            let around = |error: f64| Need::within(error).around(field, &[value]);
+            self.add(&name, around(ERRORS[i % 4]));
+            let (roi_name, roi) = self.boxes[i % self.boxes.len()];
+            let both = format!("{roi_name} and {name}");
+            self.add(&both, around(0.001).inside(roi));
+            if i % 2 == 0 {
+                self.add(&both, Request::from(around(0.0).inside(roi)).at_most(self.part(20)));
             }
-            let (roi_name, roi) = &boxes[i % boxes.len()];
-            let both = Wish { roi: Some(*roi), isovalues: vec![value], field: f, ..all.clone() };
-            add(&format!("{roi_name} and {name}"), Wish { error: 0.001, ..both.clone() });
-            add(&format!("{roi_name} and {name}"), Wish { max_tets: part(20), ..both });
         }
-        let several = Wish { isovalues: quantiles, field: f, ..all.clone() };
-        add(&format!("{} at all quantiles", info.name), Wish { error: 0.01, ..several.clone() });
-        add(&format!("{} at all quantiles", info.name), Wish { max_tets: part(5), ..several });
+        let several = |error: f64| Need::within(error).around(field, quantiles);
+        let name = format!("{} at all quantiles", info.name);
+        self.add(&name, several(0.01));
+        self.add(&name, Request::from(several(0.0)).at_most(self.part(5)));
+        let at = |part: f64| info.min + part * info.range();
+        let bands = vec![[at(0.3), at(0.4)], [at(0.9), f64::INFINITY]];
+        self.add(&format!("two bands of {}", info.name), Need::within(0.005).between(field, bands));
     }
-    for max_tets in [Some(0), part(100), part(10), part(2), Some(u32::MAX)] {
-        add("uniform", Wish { max_tets, ..all.clone() });
+
+    fn add_regions(&mut self) {
+        for (i, (name, region)) in self.regions.clone().into_iter().enumerate() {
+            self.add(name, Need::within(ERRORS[i % 3]).inside(region));
+        }
     }
-    add("uniform", Wish { error: 0.01, max_tets: part(50), ..all.clone() });
-    for (name, roi) in &boxes {
-        add(name, Wish { roi: Some(*roi), max_tets: part(30), ..all.clone() });
+
+    fn add_views(&mut self) {
+        let views = self.views;
+        for (name, view) in views {
+            self.add(name, Need::seen(view, 2.0));
+        }
+        let (name, view) = views[0];
+        for k in [20, 5] {
+            let bytes = Some(40 * u64::from(self.part(k)));
+            let budget = Budget { bytes, ..Budget::default() };
+            self.add(name, Request { budget, ..Need::seen(view, 0.5).into() });
+        }
     }
-    queries
+
+    /// Colours of a field, and needs of several kinds at once.
+    fn add_unions(&mut self, field: usize, info: &FieldInfo) {
+        let at = |part: f64| info.min + part * info.range();
+        let [clear, red, white] = [[0.0; 4], [1.0, 0.2, 0.0, 0.4], [1.0, 1.0, 1.0, 0.9]];
+        let ramp = vec![(at(0.2), clear), (at(0.5), red), (at(0.8), white), (at(0.9), clear)];
+        let step = vec![(at(0.4), clear), (at(0.4), red)];
+        let shown =
+            |points: &[(f64, [f64; 4])]| Transfer { field, points: points.to_vec(), unit_length: 0.5 };
+        let (ramp, step) = (shown(&ramp), shown(&step));
+        self.add("ramps of colour", Need::shown(ramp.clone(), 0.05));
+        self.add("a step of colour", Need::shown(step, 0.1));
+        let tight = Request::from(Need::shown(ramp.clone(), 0.0)).at_most(self.part(10));
+        self.add("ramps of colour", tight);
+
+        let ((_, corner), (_, middle)) = (self.boxes[0], self.boxes[1]);
+        let [ball, .., slab] = self.regions.clone().map(|(_, region)| region);
+        let view = self.views[1].1;
+        let two = Request::within(0.05).and(Need::within(0.0).inside(corner));
+        self.add("everywhere and a box", two.clone().and(Need::within(0.002).inside(middle)));
+        let around = Need::within(0.01).around(field, &[at(0.6)]);
+        let kinds = Request::from(Need::within(0.001).inside(ball)).and(around).and(Need::seen(view, 4.0));
+        self.add("a ball, a value and a view", kinds.clone());
+        let colours = Request::from(Need::shown(ramp, 0.1)).and(Need::within(0.0).inside(slab));
+        self.add("ramps of colour and a region", colours);
+        for k in [40, 8] {
+            let vertices = Some(self.part(k) / 5);
+            let budget = Budget { vertices, ..Budget::default() };
+            self.add("a ball, a value and a view", Request { budget, ..kinds.clone() });
+        }
+        self.add("everywhere and a box", two.at_most(self.part(15)));
+    }
+}
+
+/// A place in a box, by fractions of its sides.
+fn place(whole: &Bounds, part: [f64; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|i| whole.min[i] + part[i] * (whole.max[i] - whole.min[i]))
 }
 
 /// A corner, the middle, a plane through the middle and a single vertex.
 fn boxes(input: &TetMesh) -> [(&'static str, Bounds); 4] {
     let whole = Bounds::of(&input.positions);
-    let at = |part: [f64; 3]| [0, 1, 2].map(|i| whole.min[i] + part[i] * (whole.max[i] - whole.min[i]));
-    let between = |low: [f64; 3], high: [f64; 3]| Bounds { min: at(low), max: at(high) };
+    let between =
+        |low: [f64; 3], high: [f64; 3]| Bounds { min: place(&whole, low), max: place(&whole, high) };
     let vertex = input.positions[input.positions.len() / 3];
     [
         ("box in a corner", between([-0.1; 3], [0.4, 0.3, 0.5])),
@@ -117,6 +205,64 @@ fn boxes(input: &TetMesh) -> [(&'static str, Bounds); 4] {
         ("plane", between([0.0, 0.0, 0.55], [1.0, 1.0, 0.55])),
         ("one vertex", Bounds { min: vertex, max: vertex }),
     ]
+}
+
+/// One of each shape that is no box along the axes.
+fn regions(input: &TetMesh) -> [(&'static str, Region); 5] {
+    let whole = Bounds::of(&input.positions);
+    let size = 0.1 * whole.diagonal();
+    let [centre, side] = [place(&whole, [0.4, 0.6, 0.5]), place(&whole, [0.8, 0.3, 0.4])];
+    let along = |normal: [f64; 3], p: [f64; 3]| DVec3::from(normal).dot(DVec3::from(p));
+    let halves = [[0.8, 0.6, 0.0], [-0.3, 0.4, 0.0], [0.0, 0.0, 1.2]].map(|v: [f64; 3]| v.map(|x| x * size));
+    let [tilted, across] = [[1.0, 2.0, -1.0], [-2.0, 1.0, 0.5]];
+    let plane = |n: [f64; 3], p: [f64; 3]| [n[0], n[1], n[2], along(n, p)];
+    [
+        ("ball", Region::Sphere { centre, radius: 1.5 * size }),
+        ("oriented box", Region::OrientedBox { centre: side, halves }),
+        ("half-space", Region::HalfSpace { normal: tilted, offset: along(tilted, place(&whole, [0.15; 3])) }),
+        (
+            "wedge",
+            Region::Convex(vec![
+                plane(tilted, centre),
+                plane(across, centre),
+                plane([0.0, 0.0, 1.0], place(&whole, [0.5; 3])),
+            ]),
+        ),
+        ("slab", Region::Slab { normal: across, offset: along(across, side), thickness: 0.2 * size }),
+    ]
+}
+
+/// A camera in front of the volume, one inside it, and one that sees a part of it without perspective.
+fn views(input: &TetMesh) -> [(&'static str, View); 3] {
+    let whole = Bounds::of(&input.positions);
+    let size = whole.diagonal();
+    let at = |part: [f64; 3]| DVec3::from(place(&whole, part));
+    let viewport = [1280.0, 720.0];
+    let way = DVec3::new(0.6, -0.75, 0.3);
+    let far = perspective(at([0.5; 3]) - 1.1 * size * way, way, 2.2, viewport);
+    let near = perspective(at([0.45, 0.5, 0.3]), DVec3::new(0.3, 0.4, 0.5), 1.5, viewport);
+    let [x, y, z] = (at([0.7, 0.4, 0.5]) * 6.0 / size).to_array();
+    let scale = 6.0 / size;
+    // Looks along z: columns.
+    let parallel = [
+        [scale, 0.0, 0.0, 0.0],
+        [0.0, 1.5 * scale, 0.0, 0.0],
+        [0.0, 0.0, scale, 0.0],
+        [-x, -1.5 * y, -z, 1.0],
+    ];
+    let parallel = View { matrix: std::array::from_fn(|i| parallel[i / 4][i % 4]), viewport };
+    [("view from outside", far), ("view from inside", near), ("parallel view", parallel)]
+}
+
+/// A camera at `eye` that looks along `way`, z up; `zoom` is the distance at which the picture is 2 units high.
+fn perspective(eye: DVec3, way: DVec3, zoom: f64, viewport: [f64; 2]) -> View {
+    let forward = way.normalize();
+    let right = forward.cross(DVec3::Z).normalize();
+    let up = right.cross(forward);
+    let rows = [right * (zoom * viewport[1] / viewport[0]), up * zoom, forward, forward];
+    let column = |axis: usize| rows.map(|row| row[axis]);
+    let columns = [column(0), column(1), column(2), rows.map(|row| -row.dot(eye))];
+    View { matrix: std::array::from_fn(|i| columns[i / 4][i % 4]), viewport }
 }
 
 /// Values that split the field's values into parts of equal size, and two at the ends of the range.
