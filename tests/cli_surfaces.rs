@@ -258,7 +258,7 @@ fn statistics_are_those_of_the_box() {
     assert_eq!((names.len(), rows.len()), (3, 10));
     assert!((rows.iter().map(|row| row[2]).sum::<f64>() - 2.0).abs() < 1e-9);
 
-    let narrow = ["stats", &mt, "--field", "hill", "--bins", "4", "--range", "2,5", "--json"];
+    let narrow = ["stats", &mt, "--field", "hill", "--bins", "4", "--bin-range", "2,5", "--json"];
     let report = json(&narrow);
     let bins = &report["histogram"];
     let volumes: f64 =
@@ -269,6 +269,6 @@ fn statistics_are_those_of_the_box() {
     // The coarse mesh is off by something, and says by how much.
     let coarse = json(&["stats", &mt, "--field", "hill", "--error", "30%", "--reference", &input, "--json"]);
     assert!(number(&coarse["reference"], "integral_error") != 0.0);
-    bad(2, &["stats", &mt, "--range", "5,2"], &["--range"]);
+    bad(2, &["stats", &mt, "--bin-range", "5,2"], &["--bin-range"]);
     bad(2, &["stats", &mt, "--bins", "0"], &["--bins"]);
 }

@@ -21,6 +21,9 @@ use support::random::Random;
 use tetralod::format::EncodeOptions;
 use tetralod::format::encode;
 use tetralod::geom::Bounds;
+use tetralod::refine::Budget;
+use tetralod::refine::Need;
+use tetralod::refine::Region;
 use tetralod::refine::Request;
 use tetralod::session::Session;
 use tetralod::view::IsoSurface;
@@ -43,13 +46,29 @@ fn triangles(surface: &IsoSurface) -> Vec<[Corner; 3]> {
     all
 }
 
+/// What the random requests ask for.
+#[derive(Clone, Default)]
+struct Wish {
+    error: f64,
+    isovalues: Vec<f64>,
+    roi: Option<Bounds>,
+    tets: Option<u32>,
+}
+
+impl Wish {
+    fn request(&self) -> Request {
+        let need = Need::within(self.error).limited(self.roi.map(Region::Box), 0, &self.isovalues);
+        Request { needs: vec![need], budget: Budget { tets: self.tets, ..Budget::default() } }
+    }
+}
+
 /// A request that is a little, or much, away from the one before.
-fn next(request: &Request, random: &mut Random) -> Request {
-    let mut next = request.clone();
+fn next(wish: &Wish, random: &mut Random) -> Wish {
+    let mut next = wish.clone();
     match random.below(6) {
         0 => next.error = [0.0, 0.002, 0.01, 0.05, f64::INFINITY][random.below(5)],
         1 => next.isovalues = (0..random.below(3)).map(|_| random.below(10) as f64 / 10.0).collect(),
-        2 => next.max_tets = random.once_in(2).then(|| 50 + random.below(900) as u32),
+        2 => next.tets = random.once_in(2).then(|| 50 + random.below(900) as u32),
         _ => {
             let low = [0; 3].map(|_| random.below(100) as f64 / 100.0);
             next.roi = Some(Bounds { min: low, max: low.map(|x| x + 0.4) });
@@ -84,21 +103,25 @@ fn the_surface_follows_every_kind_of_mt_from_request_to_request() {
             let mut session = Session::new();
             session.feed(&bytes).expect("a good file");
             let mut random = Random(7);
-            let mut request = Request::default();
+            let mut wish = Wish::default();
             let mut values = vec![0.3];
             for step in 0..60 {
-                session.refine(&request).expect("a good request");
+                session.refine(&wish.request()).expect("a good request");
                 if is_cube && step % 17 == 16 {
                     session.set_field(step / 17 % 2).expect("it has two");
                 }
                 let found = session.isosurfaces(&values).expect("it is open").clone();
                 let mut wanted = IsoSurface::new();
                 wanted.extract_all(&session.view(), &values);
-                assert!(triangles(&found) == triangles(&wanted), "{how:?}, step {step}: {request:?}");
+                assert!(
+                    triangles(&found) == triangles(&wanted),
+                    "{how:?}, step {step}: {:?}",
+                    wish.request()
+                );
                 if is_cube {
                     assert_closed(&found, in_cube);
                 }
-                request = next(&request, &mut random);
+                wish = next(&wish, &mut random);
                 if random.once_in(6) {
                     values = (0..1 + random.below(3)).map(|_| random.below(10) as f64 / 10.0).collect();
                 }
@@ -112,7 +135,7 @@ fn who_asks_for_smooth_normals_gets_them() {
     let bytes = encode(&EDGE.build(&cube(6, &[hilly]), None), &EncodeOptions::default()).expect("complete");
     let mut session = Session::new();
     session.feed(&bytes).expect("a good file");
-    session.refine(&Request::default()).expect("a good request");
+    session.refine(&Request::within(0.0)).expect("a good request");
     let by_gradient = session.isosurface(0.3).expect("it is open").normals.clone();
     session.set_normal_kind(NormalKind::Smooth);
     let smooth = session.isosurface(0.3).expect("it is open").normals.clone();

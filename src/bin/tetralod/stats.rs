@@ -28,8 +28,8 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value = "10", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     bins: u32,
     /// Where the first bin starts and the last one ends, in units of the field; the field's range if not given.
-    #[arg(long, value_name = "low,high", value_parser = parse_range, allow_hyphen_values = true)]
-    range: Option<[f64; 2]>,
+    #[arg(long = "bin-range", value_name = "low,high", value_parser = parse_range, allow_hyphen_values = true)]
+    bin_range: Option<[f64; 2]>,
     /// Compare with this mesh: the one that the MT was built from.
     #[arg(long, value_name = "INPUT")]
     reference: Option<PathBuf>,
@@ -126,7 +126,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     // A constant field is a range, too.
     let whole =
         if field.min < field.max { [field.min, field.max] } else { [field.min - 0.5, field.min + 0.5] };
-    let range = arguments.range.unwrap_or(whole);
+    let range = arguments.bin_range.unwrap_or(whole);
     let start = Instant::now();
     let sums = of_mesh(&answer, Sums::new(arguments.bins, range))?;
     let seconds = start.elapsed().as_secs_f64();
