@@ -72,8 +72,10 @@ pub struct Session {
     field: usize,
     shown: Shown,
     surface: IsoSurface,
-    /// What has changed in what is shown since the surface was last asked for; kept from then on.
-    behind: Option<MeshChanges>,
+    /// What has changed in what is shown since the surface was last asked for.
+    behind: Behind,
+    /// What has changed in it since [`Session::take_changes`] was last called.
+    copied: Behind,
 }
 
 /// The current mesh in model units, kept up with the mesh at the cost of what changed.
@@ -237,6 +239,15 @@ impl Session {
         view(self.front.as_ref(), &self.shown)
     }
 
+    /// Which entries of [`Session::view`] have changed since the last call: ranges of points and of tetrahedra in ascending
+    /// order, with some entries among them that have not. What lies beyond the ends of the arrays is gone. The first call
+    /// tells of everything. Points change too when another field is shown.
+    pub fn take_changes(&mut self) -> MeshChanges {
+        self.catch_up();
+        let MeshView { positions, tets, .. } = view(self.front.as_ref(), &self.shown);
+        self.copied.take(positions.len(), tets.len())
+    }
+
     /// The isosurface of the current mesh, at a value in units of the field.
     ///
     /// # Errors
@@ -258,8 +269,9 @@ impl Session {
             return Err(SessionError::Isovalue);
         }
         self.catch_up();
-        let MeshChanges { vertices, tets } = self.behind.replace(MeshChanges::default()).unwrap_or_default();
-        self.surface.update(&view(self.front.as_ref(), &self.shown), values, &vertices, &tets);
+        let mesh = view(self.front.as_ref(), &self.shown);
+        let MeshChanges { vertices, tets } = self.behind.take(mesh.positions.len(), mesh.tets.len());
+        self.surface.update(&mesh, values, &vertices, &tets);
         Ok(&self.surface)
     }
 
@@ -299,14 +311,8 @@ impl Session {
         shown.positions.resize(slots, [0.0; 3]);
         shown.values.resize(slots, 0.0);
         let value_at = |slot: usize| field.value(mesh.levels(slot as u32)[self.field]) as f32;
-        if let Some(behind) = &mut self.behind {
-            join(&mut behind.tets, &changes.tets);
-            join(&mut behind.vertices, &changes.vertices);
-            if shown.stale {
-                behind.vertices.clear();
-                behind.vertices.push(0..slots as u32);
-            }
-        }
+        self.behind.add(&changes, shown.stale);
+        self.copied.add(&changes, shown.stale);
         for slot in changes.vertices.into_iter().flatten().map(|slot| slot as usize) {
             shown.positions[slot] = lattice.point(mesh.positions()[slot]).map(|x| x as f32);
             shown.values[slot] = value_at(slot);
@@ -317,20 +323,61 @@ impl Session {
     }
 }
 
-/// Adds ranges to ranges that are in ascending order and do not meet, and keeps them so.
-fn join(ranges: &mut Vec<Range<u32>>, more: &[Range<u32>]) {
-    if more.is_empty() {
-        return;
-    }
-    ranges.extend_from_slice(more);
-    ranges.sort_unstable_by_key(|range| range.start);
-    ranges.dedup_by(|next, last| {
-        let meets = next.start <= last.end;
-        if meets {
-            last.end = last.end.max(next.end);
+/// What has changed since somebody last asked, so that they need not look at everything.
+#[derive(Debug, Default)]
+struct Behind {
+    /// Kept from the first time on.
+    since: Option<MeshChanges>,
+}
+
+impl Behind {
+    /// More has changed; `all` if every point has.
+    fn add(&mut self, changes: &MeshChanges, all: bool) {
+        let Some(since) = &mut self.since else { return };
+        join(&mut since.tets, &changes.tets);
+        if all {
+            since.vertices.clear();
+            since.vertices.push(0..u32::MAX);
+        } else {
+            join(&mut since.vertices, &changes.vertices);
         }
-        meets
-    });
+    }
+
+    /// What has changed in a mesh of so many points and tetrahedra; the first time, everything.
+    fn take(&mut self, points: usize, tets: usize) -> MeshChanges {
+        let mut all = MeshChanges::default();
+        all.vertices.push(0..u32::MAX);
+        all.tets.push(0..u32::MAX);
+        let mut changes = self.since.replace(MeshChanges::default()).unwrap_or(all);
+        clip(&mut changes.vertices, points as u32);
+        clip(&mut changes.tets, tets as u32);
+        changes
+    }
+}
+
+/// Adds the ranges `more` to `ranges`; both are in ascending order, and so is what comes out.
+fn join(ranges: &mut Vec<Range<u32>>, more: &[Range<u32>]) {
+    let mut old = std::mem::take(ranges).into_iter().peekable();
+    let mut new = more.iter().cloned().peekable();
+    loop {
+        let from_old = match (old.peek(), new.peek()) {
+            (Some(a), Some(b)) => a.start <= b.start,
+            (a, _) => a.is_some(),
+        };
+        let Some(next) = (if from_old { old.next() } else { new.next() }) else { return };
+        match ranges.last_mut() {
+            Some(last) if next.start <= last.end => last.end = last.end.max(next.end),
+            _ => ranges.push(next),
+        }
+    }
+}
+
+/// Takes away what is beyond `len`.
+fn clip(ranges: &mut Vec<Range<u32>>, len: u32) {
+    ranges.retain(|range| range.start < len);
+    if let Some(last) = ranges.last_mut() {
+        last.end = last.end.min(len);
+    }
 }
 
 fn view<'a>(front: Option<&'a Front>, shown: &'a Shown) -> MeshView<'a> {
