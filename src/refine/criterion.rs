@@ -112,7 +112,7 @@ pub trait Criterion: Any + fmt::Debug + Send + Sync {
 }
 
 /// The criterion of a [`Request`]: the union of its needs.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct LodCriterion {
     frame: Frame,
     atoms: Vec<Atom>,
@@ -459,5 +459,11 @@ impl Range {
         let low = f64::from(levels[0].min(levels[1]).min(levels[2].min(levels[3])));
         let high = f64::from(levels[0].max(levels[1]).max(levels[2].max(levels[3])));
         margin - (low - self.high).max(self.low - high)
+    }
+}
+
+impl fmt::Debug for LodCriterion {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("LodCriterion").field("atoms", &self.atoms.len()).finish_non_exhaustive()
     }
 }
