@@ -10,6 +10,7 @@ use crate::gpu::wire::WirePass;
 use crate::gpu::{BoxLines, Context, GpuError, Look};
 use crate::view::Cutaway;
 use crate::view::IsoSurface;
+use std::ops::Range;
 
 /// Which view of the mesh is drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -108,6 +109,20 @@ impl Renderer {
     /// If it is too large for the device; then none is shown.
     pub fn set_surface(&mut self, surface: &IsoSurface) -> Result<(), GpuError> {
         self.surface.update(&self.context, surface)
+    }
+
+    /// Makes the isosurface `surface`, which differs from the one that is there only in these ranges of vertices and of
+    /// triangles, and in what lies beyond its ends. What is uploaded is that, so the cost goes with what has changed.
+    ///
+    /// # Errors
+    /// If it is too large for the device; then none is shown, and [`Renderer::set_surface`] has to come next.
+    pub fn update_surface(
+        &mut self,
+        surface: &IsoSurface,
+        vertices: &[Range<u32>],
+        triangles: &[Range<u32>],
+    ) -> Result<(), GpuError> {
+        self.surface.update_ranges(&self.context, surface, vertices, triangles)
     }
 
     /// Replaces the cut-away faces.

@@ -4,6 +4,7 @@ use crate::gpu::buffers::GrowBuffer;
 use crate::gpu::pipeline::{FrameBinding, Recipe, packed};
 use crate::gpu::{Context, GpuError};
 use crate::view::IsoSurface;
+use std::ops::Range;
 
 #[derive(Debug)]
 pub(super) struct SurfacePass {
@@ -39,6 +40,21 @@ impl SurfacePass {
         self.positions.write(context, &surface.positions)?;
         self.normals.write(context, &surface.normals)?;
         self.indices.write(context, &surface.indices)
+    }
+
+    /// The same with what differs from the surface that is there: ranges of vertices and of triangles.
+    pub(super) fn update_ranges(
+        &mut self,
+        context: &Context,
+        surface: &IsoSurface,
+        vertices: &[Range<u32>],
+        triangles: &[Range<u32>],
+    ) -> Result<(), GpuError> {
+        let updated = self.positions.update(context, &surface.positions, vertices);
+        let updated = updated.and_then(|()| self.normals.update(context, &surface.normals, vertices));
+        let updated = updated.and_then(|()| self.indices.update(context, &surface.indices, triangles));
+        // If something does not fit, old triangles must not draw from it.
+        updated.or_else(|error| self.indices.write(context, &[]).and(Err(error)))
     }
 
     pub(super) fn draw(&self, pass: &mut wgpu::RenderPass<'_>) {
