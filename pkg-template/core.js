@@ -2,6 +2,7 @@
 
 import init, { CoreSession } from "./tetralod_core.js";
 import { TetralodError, reviveError } from "./errors.js";
+import { received } from "./options.js";
 import { nodeModule } from "./stream.js";
 
 let loading;
@@ -25,10 +26,12 @@ async function load() {
 /** The methods of one session, for `serve` or `local`. */
 export function coreMethods() {
   let session;
-  const refine = (options) => {
+  /** Goes on for so many milliseconds and updates, and gives the mesh that is there then, or what has changed in it. */
+  const step = (milliseconds, updates, deltas) => {
     const start = performance.now();
-    const stats = session.refine(options);
-    return { ...stats, milliseconds: performance.now() - start };
+    const stats = session.step(milliseconds, updates);
+    stats.milliseconds = performance.now() - start;
+    return { ...(deltas ? session.delta() : session.mesh()), stats };
   };
   return {
     async start() {
@@ -38,10 +41,12 @@ export function coreMethods() {
     feed: (bytes) => session.feed(bytes),
     finish: () => session.finish(),
     info: () => session.info(),
-    refine: (options) => {
-      const stats = refine(options);
-      return { ...session.mesh(), stats };
+    async refine(options, deltas) {
+      session.aim(await received(options));
+      return step(Infinity, Infinity, deltas);
     },
+    aim: async (options) => session.aim(await received(options)),
+    step,
     setField: (name) => session.setField(name),
     isosurface: (value) => session.isosurface(value),
     hash: () => session.hash(),
@@ -59,7 +64,8 @@ export class Local {
     try {
       return await this.#methods[method](...args);
     } catch (error) {
-      throw reviveError(error);
+      // What was under way when the session was freed fails in some way of its own.
+      throw this.#closed ?? reviveError(error);
     }
   }
 

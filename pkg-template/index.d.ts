@@ -14,9 +14,42 @@
  * ```
  */
 
-import type { FieldInfo, IsoSurface, Mesh, MtInfo, Progress, CoreStats, RefineOptions } from "./tetralod_core.js";
+import type {
+  CoreStats,
+  FieldError,
+  FieldInfo,
+  IsoSurface,
+  Mesh,
+  MeshChanges,
+  MeshDelta,
+  MtInfo,
+  Need,
+  Progress,
+  RefineOptions,
+  TetBatch,
+  TransferOptions,
+  Vector,
+  ViewOptions,
+  Where,
+} from "./tetralod_core.js";
 
-export type { FieldInfo, IsoSurface, Mesh, MtInfo, Progress, RefineOptions };
+export type {
+  FieldError,
+  FieldInfo,
+  IsoSurface,
+  Mesh,
+  MeshChanges,
+  MeshDelta,
+  MtInfo,
+  Need,
+  Progress,
+  RefineOptions,
+  TetBatch,
+  TransferOptions,
+  Vector,
+  ViewOptions,
+  Where,
+};
 
 /** Everything that an MT can be read from. Bytes in memory are copied, not taken away. */
 export type Source =
@@ -43,9 +76,9 @@ export interface OpenOptions {
   worker?: boolean;
 }
 
-/** What a refinement did and how good the mesh is now. */
+/** What a refinement, or a step of one, did and how good the mesh is now. */
 export interface RefineStats extends CoreStats {
-  /** Time that the refinement took, without making and sending the arrays. */
+  /** Time that it took, without making and sending the arrays. */
   milliseconds: number;
 }
 
@@ -53,6 +86,36 @@ export interface RefineStats extends CoreStats {
 export interface RefineResult extends Mesh {
   stats: RefineStats;
 }
+
+/** What a refinement changed. */
+export interface RefineDelta extends MeshDelta {
+  stats: RefineStats;
+}
+
+/** How far each step of a refinement goes. */
+export interface StepOptions {
+  /** About so many milliseconds. Default 8, or no limit if `updates` is given. */
+  budgetMs?: number;
+  /** So many updates. Default: no limit. */
+  updates?: number;
+  /** Ends the loop between two steps: it throws the signal's reason. The mesh stays as it is then. */
+  signal?: AbortSignal;
+}
+
+/** The mesh of no tetrahedra: what {@link applyChanges} begins with where nothing has been handed out before. */
+export function emptyMesh(): Mesh;
+
+/**
+ * Makes of `mesh` the mesh that `delta` leads to, and returns it. The arrays are written where `delta.changes` says; those
+ * that are too short are replaced by others with room to grow, so look at them through `mesh` each time.
+ *
+ * A delta leads on from the mesh that was handed out right before it, whole or as a delta; others are refused.
+ *
+ * @example
+ * const mesh = emptyMesh();
+ * applyChanges(mesh, await mt.refine({ error: "1%" }, { deltas: true }));
+ */
+export function applyChanges(mesh: Mesh, delta: MeshDelta): Mesh;
 
 /**
  * A volume that is open. Calls are answered in the order in which they were made.
@@ -93,8 +156,38 @@ export class MultiTessellation {
    * await mt.refine({ error: 0.2, field: "T", box: [0, 0, 0, 1, 1, 2] });  // within 0.2 field units in the box
    * @example
    * await mt.refine({ isovalues: [0.5], maxTets: 100_000 });           // the best surface for 100,000 tetrahedra
+   * @example
+   * await mt.refine({                                                  // coarse everywhere, fine in two places
+   *   error: "5%",
+   *   needs: [
+   *     { error: "0.5%", sphere: { center: [0, 0, 1], radius: 0.2 } },
+   *     { error: "1%", slab: { normal: [0, 0, 1], offset: 0.5 } },
+   *   ],
+   * });
+   * @example
+   * const matrix = camera.projectionMatrix.clone().multiply(camera.matrixWorldInverse);  // three.js
+   * await mt.refine({ view: { matrix, viewport: [width, height], pixels: 1, outside: "10%" }, maxTets: 500_000 });
+   *
+   * With `deltas` only what has changed since a mesh was last handed out is sent, for {@link applyChanges}.
    */
-  refine(options?: RefineOptions): Promise<RefineResult>;
+  refine(options?: RefineOptions, how?: { deltas?: false }): Promise<RefineResult>;
+  refine(options: RefineOptions | undefined, how: { deltas: true }): Promise<RefineDelta>;
+
+  /**
+   * The same in steps, each of which gives a mesh that is valid and within the budget. The loop ends when the mesh is the
+   * one that was asked for (`stats.done`), when another one is asked for by `refine` or `refineSteps`, or when it is left.
+   *
+   * @example
+   * const mesh = emptyMesh();
+   * for await (const step of mt.refineSteps({ error: "0.1%" }, { budgetMs: 4, deltas: true })) {
+   *   draw(applyChanges(mesh, step), step.changes);
+   * }
+   */
+  refineSteps(options?: RefineOptions, how?: StepOptions & { deltas?: false }): AsyncGenerator<RefineResult, void, void>;
+  refineSteps(
+    options: RefineOptions | undefined,
+    how: StepOptions & { deltas: true },
+  ): AsyncGenerator<RefineDelta, void, void>;
 
   /** Chooses the field that isosurfaces follow, without changing the mesh; `refine` with `field` does so too. */
   setField(name: string): Promise<void>;

@@ -2,14 +2,17 @@
  * tetralod: very large tetrahedral volumes, streamed and refined where it counts. See README.md.
  */
 
+import { applyChanges, emptyMesh } from "./changes.js";
 import { Local } from "./core.js";
 import { TetralodError } from "./errors.js";
+import { sendable } from "./options.js";
 import { Remote, nodeEndpoint, webEndpoint } from "./rpc.js";
 import { nodeModule, openSource, pump } from "./stream.js";
 
-export { TetralodError };
+export { TetralodError, applyChanges, emptyMesh };
 
 const OPEN_OPTIONS = ["signal", "onProgress", "worker"];
+const STEP_OPTIONS = ["budgetMs", "updates", "deltas", "signal"];
 
 /** A volume that is open: it can be refined while the rest of it is still arriving. */
 export class MultiTessellation {
@@ -18,15 +21,15 @@ export class MultiTessellation {
   #progress = { ready: false, complete: false, bytes: 0, total: undefined, updates: 0 };
   #complete;
   #stop = new AbortController();
+  #inWorker;
+  /** Counts the meshes that were asked for: each one replaces those before it. */
+  #goal = 0;
 
   static async open(source, options = {}) {
-    for (const name of Object.keys(options)) {
-      if (OPEN_OPTIONS.includes(name)) continue;
-      throw new TetralodError("bad-option", `option \`${name}\`: there is none of this name, only ${OPEN_OPTIONS.join(", ")}`);
-    }
+    checkNames(options, OPEN_OPTIONS);
     const { signal, onProgress = () => {}, worker = true } = options;
     signal?.throwIfAborted();
-    const mt = new MultiTessellation(worker ? startWorker() : new Local());
+    const mt = new MultiTessellation(worker ? startWorker() : new Local(), Boolean(worker));
     try {
       await mt.#begin(source, signal, onProgress);
     } catch (error) {
@@ -37,8 +40,9 @@ export class MultiTessellation {
   }
 
   /** @private use `MultiTessellation.open` */
-  constructor(core) {
+  constructor(core, inWorker) {
     this.#core = core;
+    this.#inWorker = inWorker;
   }
 
   get info() {
@@ -53,8 +57,27 @@ export class MultiTessellation {
     return this.#complete;
   }
 
-  async refine(options = {}) {
-    return this.#core.call("refine", [plain(options)]);
+  async refine(options = {}, how = {}) {
+    checkNames(how, ["deltas"]);
+    const sent = sendable(options, this.#inWorker);
+    this.#goal++;
+    return this.#core.call("refine", [sent, Boolean(how.deltas)]);
+  }
+
+  async *refineSteps(options = {}, how = {}) {
+    checkNames(how, STEP_OPTIONS);
+    const { budgetMs = how.updates === undefined ? 8 : Infinity, updates = Infinity, deltas = false, signal } = how;
+    checkAmount("budgetMs", budgetMs, 0);
+    checkAmount("updates", updates, 1);
+    signal?.throwIfAborted();
+    const goal = ++this.#goal;
+    await this.#core.call("aim", [sendable(options, this.#inWorker)]);
+    for (let done = false; !done && goal === this.#goal; ) {
+      signal?.throwIfAborted();
+      const step = await this.#core.call("step", [budgetMs, updates, Boolean(deltas)]);
+      yield step;
+      done = step.stats.done;
+    }
   }
 
   async setField(name) {
@@ -116,11 +139,16 @@ export class MultiTessellation {
   }
 }
 
-/** Options as they can be sent to a worker: typed arrays become lists, everything else goes as it is. */
-function plain(options) {
-  if (typeof options !== "object" || options === null) return options;
-  const list = (value) => (ArrayBuffer.isView(value) ? Array.from(value) : value);
-  return Object.fromEntries(Object.entries(options).map(([name, value]) => [name, list(value)]));
+function checkNames(options, names) {
+  for (const name of Object.keys(options)) {
+    if (names.includes(name)) continue;
+    throw new TetralodError("bad-option", `option \`${name}\`: there is none of this name, only ${names.join(", ")}`);
+  }
+}
+
+function checkAmount(name, value, least) {
+  if (typeof value === "number" && value >= least) return;
+  throw new TetralodError("bad-option", `option \`${name}\`: must be a number of at least ${least}`);
 }
 
 function startWorker() {

@@ -1,25 +1,38 @@
 /**
  * The worker behind `Viewer`: decodes, refines and draws, so that the page never waits for any of it.
  *
- * Frames are drawn when something has changed, at most one for each refresh of the screen.
+ * Frames are drawn when something has changed, at most one for each refresh of the screen. The mesh follows what is asked
+ * for in steps between them, so that the camera waits for a step at most.
  */
 
 import init, { Viewer } from "./tetralod_viewer.js";
 import { TetralodError, flattenError } from "./errors.js";
+import { received } from "./options.js";
 import { serve, webEndpoint } from "./rpc.js";
 
 /** While a file streams in, the mesh follows it this often (in ms), and at most half of the time is spent on that. */
 const FOLLOW = 120;
+/** A step is as long as the last picture took, but not shorter or longer than this (in ms). */
+const STEP = [6, 30];
+/** Hidden pages have no frames: their meshes follow in steps this far apart (in ms). */
+const HIDDEN = 200;
 
 /** @type {Viewer | undefined} */
 let viewer;
-/** What `refine` was last asked for; applied again as data arrives. */
+/** What `refine` was last asked for, and whether the viewer knows of it: it cannot before the base mesh is there. */
 let request = {};
-/** Set once `refine` has been asked for or the base mesh has come. */
+let aimed = false;
+/** Counts what was asked for; steps tell for which one they are. */
+let goal = 0;
+/** What has been done for it: the sums of the steps' numbers. */
+let total = {};
+/** When the mesh was last what was asked for, and how long that had taken. */
 let lastRefine = { end: -Infinity, took: 0 };
+let drawing = 0;
 let bytes = 0;
 let ready = false;
 let frameAsked = false;
+let hidden;
 let broken = false;
 
 const nextFrame =
@@ -38,6 +51,7 @@ const emit = serve(webEndpoint(globalThis), {
   clear() {
     viewer.clear();
     request = {};
+    aimed = false;
     bytes = 0;
     ready = false;
     lastRefine = { end: -Infinity, took: 0 };
@@ -53,6 +67,7 @@ const emit = serve(webEndpoint(globalThis), {
     ready = true;
     const due = performance.now() - lastRefine.end > Math.max(FOLLOW, 2 * lastRefine.took);
     if (first || due) follow();
+    if (first) stepAll();
     if (!first) return { progress };
     await drawn();
     return { progress, info: { ...viewer.info(), bounds: Array.from(viewer.bounds()) } };
@@ -64,9 +79,11 @@ const emit = serve(webEndpoint(globalThis), {
     return progress;
   },
 
-  refine(options) {
-    request = options;
-    return refine();
+  /** Resolves at once: steps towards the mesh are told as `stats`, with the number that this resolves to. */
+  async aim(options) {
+    request = await received(options);
+    aim();
+    return goal;
   },
 
   /** Applies what has been set since the last call, in one go. */
@@ -94,39 +111,73 @@ const emit = serve(webEndpoint(globalThis), {
   hash: () => viewer.hash(),
 });
 
-/** Refines, and tells how long it took. */
-function refine() {
-  const start = performance.now();
-  const result = viewer.refine(request);
-  const end = performance.now();
-  lastRefine = { end, took: end - start };
-  const stats = { ...result, milliseconds: end - start, bytes };
-  emit("stats", stats);
+/** Has the viewer aim at the request; throws if that cannot be met. */
+function aim() {
+  viewer.aim(request);
+  aimed = true;
+  goal++;
+  total = { refined: 0, coarsened: 0, forced: 0, judged: 0, milliseconds: 0 };
   invalidate();
-  return stats;
 }
 
-/** Applies the last request to what has arrived since; a request that cannot be kept is told, not thrown. */
+/** Applies the last request to what has arrived since; a request that cannot be met is told, not thrown. */
 function follow() {
   try {
-    refine();
+    if (!aimed) aim();
+    viewer.aimAgain();
+    invalidate();
   } catch (error) {
     emit("error", flattenError(error));
   }
 }
 
+/** Goes on towards the mesh that is wanted, for about so many milliseconds, and tells how far that came. */
+function step(budget) {
+  const start = performance.now();
+  try {
+    const stats = viewer.step(budget);
+    const end = performance.now();
+    stats.milliseconds = end - start;
+    for (const name of Object.keys(total)) total[name] += stats[name];
+    if (stats.done) lastRefine = { end, took: total.milliseconds };
+    emit("stats", { ...stats, ...total, bytes, goal });
+    if (stats.done) Object.keys(total).forEach((name) => (total[name] = 0));
+  } catch (error) {
+    emit("failed", { goal, error: flattenError(error) });
+  }
+}
+
+/** Steps until nothing is left to do: for the first picture. */
+function stepAll() {
+  while (viewer.moving) step(Infinity);
+}
+
 function invalidate() {
-  if (frameAsked || broken) return;
+  if (broken) return;
+  if (ready && viewer.moving) hidden ??= setTimeout(stepUnseen, HIDDEN);
+  if (frameAsked) return;
   frameAsked = true;
   nextFrame(draw);
 }
 
+/** No frame came: the page is hidden, or slow. */
+function stepUnseen() {
+  hidden = undefined;
+  if (broken || !ready || !viewer.moving) return;
+  step(HIDDEN / 4);
+  hidden = setTimeout(stepUnseen, HIDDEN / 4);
+}
+
 function draw() {
   frameAsked = false;
+  clearTimeout(hidden);
+  hidden = undefined;
+  if (ready && viewer.moving) step(Math.min(Math.max(drawing, STEP[0]), STEP[1]));
   try {
     const start = performance.now();
     const drew = viewer.frame();
     const milliseconds = performance.now() - start;
+    if (drew) drawing = milliseconds;
     if (drew) emit("frame", { milliseconds, triangles: viewer.triangles, bytes, ready });
     // The canvas may be hidden just now: then try again with the next refresh.
     else if (viewer.pending) invalidate();
@@ -135,6 +186,7 @@ function draw() {
     broken = error?.code === "device-lost" || error?.code === undefined;
     emit("error", flattenError(error));
   }
+  if (ready && viewer.moving) invalidate();
 }
 
 /** Resolves after a frame has been handed to the screen; soon in any case, since hidden pages have no frames. */

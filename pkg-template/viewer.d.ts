@@ -1,4 +1,4 @@
-import type { MtInfo, RefineOptions, RefineStats, Source } from "./index.js";
+import type { MtInfo, Need, RefineOptions, RefineStats, Source, ViewOptions } from "./index.js";
 
 export { TetralodError } from "./index.js";
 
@@ -16,7 +16,24 @@ export interface ViewerProgress {
   total: number | undefined;
 }
 
-/** The outcome of a refinement. */
+/**
+ * What the viewer's mesh is to be. A view without `matrix` and `viewport` is that of the viewer's own camera: the mesh
+ * follows it.
+ */
+export interface ViewerRefineOptions extends Omit<RefineOptions, "view" | "needs" | "where"> {
+  view?: OwnView | ViewOptions;
+  needs?: readonly (Omit<Need, "view"> & { view?: OwnView | ViewOptions })[];
+  /** The URL of a module whose default export is the function. */
+  where?: string | URL;
+}
+
+/** What the viewer's own camera sees. */
+export type OwnView = Pick<ViewOptions, "pixels" | "outside">;
+
+/**
+ * How far the mesh is towards what was asked for last: all that was done for it so far. The mesh changes in steps of some
+ * milliseconds between the frames; with the last one `done` is true.
+ */
 export interface ViewerStats extends RefineStats {
   /** Bytes of the file that had been decoded. */
   bytes: number;
@@ -87,8 +104,14 @@ export class Viewer extends EventTarget {
 
   /** Streams a volume in, in place of the one before; resolves when its base mesh has been drawn. */
   open(source: Source, options?: { signal?: AbortSignal }): Promise<OpenedVolume>;
-  /** Asks for another mesh; while the file streams in, the mesh follows this request. */
-  refine(options?: RefineOptions): Promise<ViewerStats>;
+  /**
+   * Asks for another mesh. While the file streams in, and with the camera's own view while that moves, the mesh follows
+   * this request. Resolves when the mesh has been made; calls that were replaced meanwhile, together with the later one.
+   *
+   * @example
+   * await viewer.refine({ view: { pixels: 1, outside: "10%" }, maxTets: 300_000 });
+   */
+  refine(options?: ViewerRefineOptions): Promise<ViewerStats>;
   setMode(mode: "iso" | "cutaway"): Promise<void>;
   /** In field units. */
   setIsovalue(value: number): Promise<void>;

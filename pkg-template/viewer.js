@@ -7,6 +7,7 @@
 
 import { TetralodError, reviveError } from "./errors.js";
 import { Latest, deferred, mergeUpdates } from "./latest.js";
+import { sendable } from "./options.js";
 import { Remote, webEndpoint } from "./rpc.js";
 import { openSource, pump } from "./stream.js";
 
@@ -25,7 +26,9 @@ export class Viewer extends EventTarget {
   #palette;
   #adapter;
   #stream = null;
-  #refine = new Latest((options) => this.#remote.call("refine", [options]));
+  #aim = new Latest((options) => this.#remote.call("aim", [options]));
+  /** Those who wait for a mesh, by the number of what they asked for. */
+  #waiting = [];
   #update = new Latest((changes) => this.#remote.call("update", [changes]), mergeUpdates);
   #drag = new Latest(([handle, x, y]) => this.#remote.call("dragRoi", [handle, x, y]));
 
@@ -84,8 +87,22 @@ export class Viewer extends EventTarget {
   }
 
   #heard(name, data) {
-    if (name === "error") this.#emit("error", reviveError(data));
-    else this.#emit(name, data);
+    if (name === "error") return this.#emit("error", reviveError(data));
+    if (name === "failed") return this.#failed(data.goal, reviveError(data.error));
+    this.#emit(name, data);
+    if (name === "stats" && data.done) this.#settle(data.goal, ({ resolve }) => resolve(data));
+  }
+
+  #failed(goal, error) {
+    if (!this.#settle(goal, ({ reject }) => reject(error))) this.#emit("error", error);
+  }
+
+  /** Answers those who wait for this or for what it has replaced; whether anybody did. */
+  #settle(goal, how) {
+    const settled = this.#waiting.filter((waiting) => waiting.goal <= goal);
+    this.#waiting = this.#waiting.filter((waiting) => waiting.goal > goal);
+    settled.forEach(how);
+    return settled.length > 0;
   }
 
   #emit(name, detail) {
@@ -152,9 +169,15 @@ export class Viewer extends EventTarget {
     await pump(opened, { feed, finish }, signal);
   }
 
-  /** Asks for another mesh; while the file streams in, the mesh follows this request. */
-  refine(options = {}) {
-    return this.#refine.call(options);
+  /**
+   * Asks for another mesh; while the file streams in, and with `view` while the camera moves, the mesh follows this
+   * request. Resolves when the mesh has been made; calls that were replaced meanwhile, with the later one.
+   */
+  async refine(options = {}) {
+    const goal = await this.#aim.call(sendable(options, true));
+    const waiting = { goal, ...deferred() };
+    this.#waiting.push(waiting);
+    return waiting.promise;
   }
 
   #change(changes) {
@@ -220,7 +243,9 @@ export class Viewer extends EventTarget {
   free() {
     this.#stream?.abort(new DOMException("the viewer was freed", "AbortError"));
     this.#observer?.disconnect();
-    this.#remote.close(new TetralodError("freed", "the viewer was freed"));
+    const freed = new TetralodError("freed", "the viewer was freed");
+    this.#remote.close(freed);
+    this.#settle(Infinity, ({ reject }) => reject(freed));
   }
 
   [Symbol.dispose ?? Symbol.for("Symbol.dispose")]() {

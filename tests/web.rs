@@ -105,6 +105,60 @@ fn arrays_fit_the_stats_and_each_other() {
 }
 
 #[wasm_bindgen_test]
+fn steps_and_deltas_lead_to_the_same_mesh() {
+    let mut session = fed(MT, MT.len());
+    session.refine(options(r#"{ "error": "2%" }"#).unchecked_ref()).expect("a good request");
+    let whole = session.hash();
+    session.refine(options(r#"{ "error": "100%" }"#).unchecked_ref()).expect("a good request");
+    let mut copy: Vec<u32> = Vec::new();
+    session.aim(options(r#"{ "error": "2%" }"#).unchecked_ref()).expect("a good request");
+    for step in 0.. {
+        assert!(step < 10_000, "it ends");
+        let stats = session.step(f64::INFINITY, 100.0).expect("a good MT");
+        let delta = session.delta().expect("a mesh");
+        let [ranges, tets] = [get(&get(&delta, "changes"), "tets"), get(&delta, "tets")]
+            .map(|array| array.unchecked_into::<Uint32Array>().to_vec());
+        copy.resize(4 * number(&delta, "tetCount") as usize, 0);
+        let mut at = 0;
+        for range in ranges.chunks_exact(2) {
+            let range = 4 * range[0] as usize..4 * range[1] as usize;
+            copy[range.clone()].copy_from_slice(&tets[at..at + range.len()]);
+            at += range.len();
+        }
+        if get(&stats, "done") == JsValue::TRUE {
+            break;
+        }
+    }
+    assert_eq!(session.hash(), whole);
+    let mesh = session.mesh().expect("a mesh");
+    assert_eq!(get(&mesh, "tets").unchecked_into::<Uint32Array>().to_vec(), copy);
+}
+
+#[wasm_bindgen_test]
+fn a_function_tells_where_the_mesh_is_wanted() {
+    let mut session = fed(MT, MT.len());
+    let asked = |body: &str| {
+        let options = options("{}");
+        let function = Function::new_with_args("batch", body);
+        Reflect::set(&options, &"where".into(), &function).expect("an object");
+        options
+    };
+    let all = asked("return batch.errors.map((error) => error / 1e-9)");
+    let stats = session.refine(all.unchecked_ref()).expect("a good request");
+    assert_eq!(number(&stats, "tetrahedra"), number(&session.info().expect("it is there"), "tetrahedra"));
+    let none = asked("return new Float32Array(batch.count)");
+    let stats = session.refine(none.unchecked_ref()).expect("a good request");
+    assert_eq!(number(&stats, "applied"), 0.0);
+    for (wrong, words) in [("throw new Error('mine')", "mine"), ("return [1, 2]", "one number for each")] {
+        let error: JsValue = session.refine(asked(wrong).unchecked_ref()).err().expect(wrong).into();
+        let message = get(&error, "message").as_string().unwrap_or_default();
+        assert!(message.contains("`where`") && message.contains(words), "{message}");
+        assert_eq!(code(error), "bad-option");
+    }
+    session.refine(options("{}").unchecked_ref()).expect("it is usable still");
+}
+
+#[wasm_bindgen_test]
 fn broken_files_and_requests_are_refused_with_a_code() {
     let mut early = CoreSession::new();
     assert_eq!(code(early.mesh().err().expect("refused")), "not-ready");
@@ -133,6 +187,10 @@ fn broken_files_and_requests_are_refused_with_a_code() {
         (r#"{ "field": 1 }"#, "field"),
         (r#"{ "maxTets": 0 }"#, "maxTets"),
         (r#"{ "maxTets": "many" }"#, "maxTets"),
+        (r#"{ "needs": [{ "eror": 1 }] }"#, "needs[0].eror"),
+        (r#"{ "needs": [{ "sphere": { "center": [0, 0, 0] } }] }"#, "needs[0].sphere.radius"),
+        (r#"{ "view": { "pixels": 1 } }"#, "view.matrix"),
+        (r#"{ "where": "here" }"#, "where"),
         ("7", "options"),
     ] {
         let error = session.refine(options(wrong).unchecked_ref()).err().expect(wrong);

@@ -1,17 +1,11 @@
 //! The benchmark of the command line, for the browser: `cargo xtask bench --browser` sets both side by side.
 
+use super::aim::now;
 use super::error::WebError;
 use super::results;
 use super::results::JsBench;
 use crate::bench;
 use wasm_bindgen::prelude::wasm_bindgen;
-
-#[wasm_bindgen]
-extern "C" {
-    /// Milliseconds, finer than `Date` gives them.
-    #[wasm_bindgen(js_namespace = performance, js_name = now)]
-    fn now() -> f64;
-}
 
 /// Times the MT file `bytes` for about `seconds`.
 #[wasm_bindgen(js_name = bench)]

@@ -21,7 +21,7 @@ impl WebError {
     }
 
     /// The option or argument `name` cannot be used.
-    pub fn bad_option(name: &str, problem: impl std::fmt::Display) -> Self {
+    pub fn bad_option(name: &str, problem: &str) -> Self {
         Self { code: "bad-option", message: format!("option `{name}`: {problem}") }
     }
 }

@@ -1,17 +1,21 @@
 //! What JavaScript gets: plain objects and typed arrays that own their memory.
 
+use super::options::Asked;
 use crate::bench::BenchReport;
+use crate::bench::Coherent;
 use crate::mt::FieldInfo;
+use crate::mt::MeshChanges;
 use crate::mt::MtInfo;
 use crate::refine::RefineStats;
 use crate::session::Progress;
 use crate::view::IsoSurface;
 use crate::view::MeshView;
+use js_sys::Array;
 use js_sys::Float32Array;
 use js_sys::Object;
 use js_sys::Reflect;
 use js_sys::Uint32Array;
-use serde::Serialize;
+use std::ops::Range;
 use wasm_bindgen::JsCast;
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -66,11 +70,53 @@ export interface CoreStats {
   /** Updates applied and undone by this call. */
   refined: number;
   coarsened: number;
-  /** Guaranteed largest error where it counts, in field units, and relative to the field's range. */
+  /** Updates that were applied only because others depend on them, and tetrahedra and updates that were looked at. */
+  forced: number;
+  judged: number;
+  /**
+   * Guaranteed largest error where it counts, in field units, and relative to the field's range: of the needs that ask
+   * for an error of the field, the largest.
+   */
   errorBound: number;
   relativeErrorBound: number;
-  /** False where `maxTets`, or data that has not arrived yet, kept the mesh from what was asked for. */
+  /**
+   * The error that is guaranteed for each need: in field units, in pixels for views, of colour and opacity for transfer
+   * functions. In the order of the request, `outside` of a view behind it. Empty until `done`.
+   */
+  bounds: number[];
+  /** How often an error exceeds what was asked for, at most; not above 1 if the request is satisfied. */
+  excess: number;
+  /** False where a budget, or data that has not arrived yet, kept the mesh from what was asked for. */
   satisfied: boolean;
+  /** False while there is more to do: only in the steps of `refineSteps`, and the bounds are not known then. */
+  done: boolean;
+}
+
+/**
+ * Where a mesh differs from the one that was handed out before: ranges `[start, end, start, end, …]` of vertices and of
+ * tetrahedra, ascending. What lies beyond the ends of the arrays is gone. Meshes are numbered as they are handed out,
+ * whole or as deltas; number 0 is the one without tetrahedra.
+ */
+export interface MeshChanges {
+  /** The number of the mesh that was handed out before. */
+  from: number;
+  /** The number of this one. */
+  to: number;
+  vertices: Uint32Array;
+  tets: Uint32Array;
+}
+
+/** Only what has changed in a mesh. `applyChanges` makes the mesh of it. */
+export interface MeshDelta {
+  /** Size of the mesh. */
+  vertexCount: number;
+  tetCount: number;
+  changes: MeshChanges;
+  /** The arrays of {@link Mesh}, of which only the ranges are there, one behind the other. */
+  positions: Float32Array;
+  field: Float32Array;
+  tets: Uint32Array;
+  neighbors: Uint32Array;
 }
 
 /** A conforming tetrahedral mesh with one value per vertex. */
@@ -83,6 +129,8 @@ export interface Mesh {
   tets: Uint32Array;
   /** Four tetrahedra a tetrahedron: the i-th lies across from its i-th vertex; 0xffffffff at the boundary. */
   neighbors: Uint32Array;
+  /** Where this mesh differs from the one that was handed out before. */
+  changes: MeshChanges;
 }
 
 /** Triangles of an isosurface. */
@@ -113,64 +161,37 @@ extern "C" {
     /// A mesh as typed arrays.
     #[wasm_bindgen(typescript_type = "Mesh")]
     pub type JsMesh;
+    /// What has changed in a mesh, as typed arrays.
+    #[wasm_bindgen(typescript_type = "MeshDelta")]
+    pub type JsDelta;
     /// A surface as typed arrays.
     #[wasm_bindgen(typescript_type = "IsoSurface")]
     pub type JsIsoSurface;
 }
 
-#[derive(Serialize)]
-struct ProgressObject {
-    ready: bool,
-    complete: bool,
-    bytes: f64,
-    total: Option<f64>,
-    updates: u32,
-}
-
-#[derive(Serialize)]
-struct FieldObject<'a> {
-    name: &'a str,
-    min: f64,
-    max: f64,
-    bits: u32,
-}
-
-#[derive(Serialize)]
-struct InfoObject<'a> {
-    kind: &'static str,
-    fields: Vec<FieldObject<'a>>,
-    bounds: [f64; 6],
-    vertices: u32,
-    tetrahedra: u32,
-    updates: u32,
-}
-
-#[derive(Serialize)]
-#[serde(rename_all = "camelCase")]
-struct StatsObject {
-    vertices: u32,
-    tetrahedra: u32,
-    applied: f64,
-    refined: f64,
-    coarsened: f64,
-    error_bound: f64,
-    relative_error_bound: f64,
-    satisfied: bool,
-}
-
 /// `progress` for JavaScript.
 pub fn progress(progress: &Progress) -> JsProgress {
     let Progress { ready, complete, bytes, total, updates } = *progress;
-    let total = total.map(|total| total as f64);
-    plain(&ProgressObject { ready, complete, bytes: bytes as f64, total, updates })
+    object(&[
+        ("ready", ready.into()),
+        ("complete", complete.into()),
+        ("bytes", (bytes as f64).into()),
+        ("total", total.map(|total| total as f64).into()),
+        ("updates", updates.into()),
+    ])
 }
 
 /// `info` for JavaScript.
 pub fn info(info: &MtInfo) -> JsInfo {
-    let kind = info.kind.name();
-    let MtInfo { vertices, tetrahedra, updates, .. } = *info;
-    let fields = info.fields.iter().map(field).collect();
-    plain(&InfoObject { kind, fields, bounds: bounds(info), vertices, tetrahedra, updates })
+    let fields: Array = info.fields.iter().map(field).collect();
+    object(&[
+        ("kind", info.kind.name().into()),
+        ("fields", fields.into()),
+        ("bounds", list(&bounds(info))),
+        ("vertices", info.vertices.into()),
+        ("tetrahedra", info.tetrahedra.into()),
+        ("updates", info.updates.into()),
+    ])
 }
 
 /// The box of the position lattice: it holds every mesh of the MT.
@@ -180,39 +201,93 @@ fn bounds(info: &MtInfo) -> [f64; 6] {
     [x0, y0, z0, x1, y1, z1]
 }
 
-fn field(field: &FieldInfo) -> FieldObject<'_> {
-    FieldObject { name: &field.name, min: field.min, max: field.max, bits: field.bits }
+fn field(field: &FieldInfo) -> Object {
+    object(&[
+        ("name", field.name.as_str().into()),
+        ("min", field.min.into()),
+        ("max", field.max.into()),
+        ("bits", field.bits.into()),
+    ])
 }
 
-/// `stats` for JavaScript; `field` is the one that the errors speak of.
-pub fn stats(stats: &RefineStats, field: &FieldInfo) -> JsStats {
-    let RefineStats { vertices, tetrahedra, applied, refined, coarsened, error_bound, satisfied, .. } =
-        *stats;
-    plain(&StatsObject {
-        vertices,
-        tetrahedra,
-        applied: f64::from(applied),
-        refined: refined as f64,
-        coarsened: coarsened as f64,
-        error_bound: error_bound * field.range(),
-        relative_error_bound: error_bound,
-        satisfied,
-    })
+/// `stats` for JavaScript, in the units of what was asked for.
+pub fn stats(stats: &RefineStats, info: &MtInfo, asked: &Asked) -> JsStats {
+    let field = &info.fields[asked.field];
+    let bounds: Vec<f64> = stats.bounds.iter().zip(&asked.units).map(|(bound, unit)| bound * unit).collect();
+    object(&[
+        ("vertices", stats.vertices.into()),
+        ("tetrahedra", stats.tetrahedra.into()),
+        ("applied", stats.applied.into()),
+        ("refined", (stats.refined as f64).into()),
+        ("coarsened", (stats.coarsened as f64).into()),
+        ("forced", (stats.forced as f64).into()),
+        ("judged", (stats.judged as f64).into()),
+        ("errorBound", (stats.error_bound * field.range()).into()),
+        ("relativeErrorBound", stats.error_bound.into()),
+        ("bounds", list(&bounds)),
+        ("excess", stats.excess.into()),
+        ("satisfied", stats.satisfied.into()),
+        ("done", stats.done.into()),
+    ])
+}
+
+/// What has changed in a mesh since one was handed out before, and the number of this one.
+pub struct Changes {
+    pub ranges: MeshChanges,
+    pub to: u32,
 }
 
 /// A copy of `mesh` outside wasm memory.
-pub fn mesh(mesh: &MeshView<'_>) -> JsMesh {
-    arrays([
+pub fn mesh(mesh: &MeshView<'_>, changes: &Changes) -> JsMesh {
+    object(&[
         ("positions", floats(mesh.positions.as_flattened())),
         ("field", floats(mesh.field)),
         ("tets", integers(mesh.tets.as_flattened())),
         ("neighbors", integers(mesh.neighbors.as_flattened())),
+        ("changes", ranges(changes)),
     ])
+}
+
+/// A copy of those parts of `mesh` that have changed.
+pub fn delta(mesh: &MeshView<'_>, changes: &Changes) -> JsDelta {
+    let MeshChanges { vertices, tets } = &changes.ranges;
+    object(&[
+        ("vertexCount", mesh.positions.len().into()),
+        ("tetCount", mesh.tets.len().into()),
+        ("changes", ranges(changes)),
+        ("positions", floats(&parts(mesh.positions.as_flattened(), vertices, 3))),
+        ("field", floats(&parts(mesh.field, vertices, 1))),
+        ("tets", integers(&parts(mesh.tets.as_flattened(), tets, 4))),
+        ("neighbors", integers(&parts(mesh.neighbors.as_flattened(), tets, 4))),
+    ])
+}
+
+fn ranges(changes: &Changes) -> JsValue {
+    let flat = |ranges: &[Range<u32>]| {
+        integers(&ranges.iter().flat_map(|range| [range.start, range.end]).collect::<Vec<_>>())
+    };
+    let MeshChanges { vertices, tets } = &changes.ranges;
+    let all: Object = object(&[
+        ("from", (changes.to - 1).into()),
+        ("to", changes.to.into()),
+        ("vertices", flat(vertices)),
+        ("tets", flat(tets)),
+    ]);
+    all.into()
+}
+
+/// The ranges of items of `size` numbers, one behind the other.
+fn parts<T: Copy>(numbers: &[T], ranges: &[Range<u32>], size: usize) -> Vec<T> {
+    let mut parts = Vec::with_capacity(size * ranges.iter().map(Range::len).sum::<usize>());
+    for range in ranges {
+        parts.extend_from_slice(&numbers[size * range.start as usize..size * range.end as usize]);
+    }
+    parts
 }
 
 /// A copy of `surface` outside wasm memory.
 pub fn iso_surface(surface: &IsoSurface) -> JsIsoSurface {
-    arrays([
+    object(&[
         ("positions", floats(surface.positions.as_flattened())),
         ("normals", floats(surface.normals.as_flattened())),
         ("indices", integers(surface.indices.as_flattened())),
@@ -227,74 +302,46 @@ fn integers(values: &[u32]) -> JsValue {
     Uint32Array::from(values).into()
 }
 
-fn arrays<T: JsCast, const N: usize>(members: [(&str, JsValue); N]) -> T {
+fn list(values: &[f64]) -> JsValue {
+    values.iter().map(|value| JsValue::from(*value)).collect::<Array>().into()
+}
+
+/// A plain object with these members.
+pub fn object<T: JsCast>(members: &[(&str, JsValue)]) -> T {
     let object = Object::new();
-    for (name, array) in members {
+    for (name, value) in members {
         // Setting a property on a fresh ordinary object cannot fail.
-        let _ = Reflect::set(&object, &name.into(), &array);
+        let _ = Reflect::set(&object, &(*name).into(), value);
     }
     object.unchecked_into()
 }
 
-#[derive(Serialize)]
-struct Rate {
-    #[serde(skip_serializing_if = "Option::is_none")]
-    updates_per_second: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    tets_per_second: Option<f64>,
-}
-
-#[derive(Serialize)]
-struct BenchObject {
-    updates: u32,
-    tetrahedra: u32,
-    runs: u32,
-    decode: Rate,
-    refine: Rate,
-    coarsen: Rate,
-    isosurface: Rate,
-    coherent: CoherentObject,
-}
-
-#[derive(Serialize)]
-struct CoherentObject {
-    #[serde(rename = "box")]
-    roi: WalkObject,
-    iso: WalkObject,
-    view: WalkObject,
-}
-
-#[derive(Serialize)]
-struct WalkObject {
-    median_ms: f64,
-    p95_ms: f64,
-    cold_ms: f64,
-}
-
-fn walk(walk: &crate::bench::Coherent) -> WalkObject {
-    WalkObject { median_ms: walk.median_ms, p95_ms: walk.p95_ms, cold_ms: walk.cold_ms }
-}
-
 /// `report` with the names of `tetralod bench --json`.
 pub fn bench(report: &BenchReport) -> JsBench {
-    let updates = |rate| Rate { updates_per_second: Some(rate), tets_per_second: None };
-    plain(&BenchObject {
-        updates: report.updates,
-        tetrahedra: report.tetrahedra,
-        runs: report.runs,
-        decode: updates(report.decode_updates),
-        refine: Rate { tets_per_second: Some(report.refine_tets), ..updates(report.refine_updates) },
-        coarsen: updates(report.coarsen_updates),
-        isosurface: Rate { updates_per_second: None, tets_per_second: Some(report.isosurface_tets) },
-        coherent: CoherentObject {
-            roi: walk(&report.coherent.roi),
-            iso: walk(&report.coherent.iso),
-            view: walk(&report.coherent.view),
-        },
-    })
+    let rates = |updates: Option<f64>, tets: Option<f64>| -> JsValue {
+        let rate = |name, rate: Option<f64>| rate.map(|rate| (name, JsValue::from(rate)));
+        let given = [rate("updates_per_second", updates), rate("tets_per_second", tets)];
+        let rates: Object = object(&given.into_iter().flatten().collect::<Vec<_>>());
+        rates.into()
+    };
+    let walks = &report.coherent;
+    let coherent: Object =
+        object(&[("box", walk(&walks.roi)), ("iso", walk(&walks.iso)), ("view", walk(&walks.view))]);
+    object(&[
+        ("updates", report.updates.into()),
+        ("tetrahedra", report.tetrahedra.into()),
+        ("runs", report.runs.into()),
+        ("decode", rates(Some(report.decode_updates), None)),
+        ("refine", rates(Some(report.refine_updates), Some(report.refine_tets))),
+        ("coarsen", rates(Some(report.coarsen_updates), None)),
+        ("isosurface", rates(None, Some(report.isosurface_tets))),
+        ("coherent", coherent.into()),
+    ])
 }
 
-/// Numbers, texts and lists of them always convert; `undefined` would stand for a mistake here.
-fn plain<T: JsCast>(value: &impl Serialize) -> T {
-    serde_wasm_bindgen::to_value(value).unwrap_or(JsValue::UNDEFINED).unchecked_into()
+fn walk(walk: &Coherent) -> JsValue {
+    let Coherent { median_ms, p95_ms, cold_ms, .. } = *walk;
+    let walk: Object =
+        object(&[("median_ms", median_ms.into()), ("p95_ms", p95_ms.into()), ("cold_ms", cold_ms.into())]);
+    walk.into()
 }

@@ -1,9 +1,13 @@
 //! The class that the package's worker holds: one MT being decoded, and its current mesh.
 
+use super::aim;
 use super::error::WebError;
 use super::options;
+use super::options::Asked;
 use super::options::RefineOptions;
 use super::results;
+use super::results::Changes;
+use super::results::JsDelta;
 use super::results::JsInfo;
 use super::results::JsIsoSurface;
 use super::results::JsMesh;
@@ -18,6 +22,9 @@ use wasm_bindgen::prelude::wasm_bindgen;
 #[derive(Default)]
 pub struct CoreSession {
     session: Session,
+    asked: Asked,
+    /// How many meshes have been handed out.
+    handed: u32,
 }
 
 #[wasm_bindgen]
@@ -47,10 +54,20 @@ impl CoreSession {
 
     /// Changes the current mesh to what `options` asks for, as far as the data has arrived.
     pub fn refine(&mut self, options: &RefineOptions) -> Result<JsStats, WebError> {
-        let (request, field) = options::request(options, self.known()?)?;
-        self.session.set_field(field)?;
-        let stats = self.session.refine(&request)?;
-        Ok(results::stats(&stats, &self.known()?.fields[field]))
+        self.aim(options)?;
+        self.step(f64::INFINITY, f64::INFINITY)
+    }
+
+    /// Tells which mesh is wanted from now on, for `step` to make it.
+    pub fn aim(&mut self, options: &RefineOptions) -> Result<(), WebError> {
+        self.asked = aim::aim(&mut self.session, options, None)?;
+        Ok(())
+    }
+
+    /// Goes on towards that mesh for about so many milliseconds or so many updates, whichever comes first.
+    pub fn step(&mut self, milliseconds: f64, updates: f64) -> Result<JsStats, WebError> {
+        let stats = aim::step(&mut self.session, milliseconds, updates)?;
+        Ok(results::stats(&stats, self.known()?, &self.asked))
     }
 
     /// The field that `mesh` carries and `isosurface` follows.
@@ -60,10 +77,16 @@ impl CoreSession {
         Ok(self.session.set_field(index)?)
     }
 
-    /// The current mesh.
+    /// The current mesh, and what has changed in it since `mesh` or `delta` was last called.
     pub fn mesh(&mut self) -> Result<JsMesh, WebError> {
-        self.known()?;
-        Ok(results::mesh(&self.session.view()))
+        let changes = self.changes()?;
+        Ok(results::mesh(&self.session.view(), &changes))
+    }
+
+    /// Of the current mesh only what has changed since `mesh` or `delta` was last called.
+    pub fn delta(&mut self) -> Result<JsDelta, WebError> {
+        let changes = self.changes()?;
+        Ok(results::delta(&self.session.view(), &changes))
     }
 
     /// The isosurface of the current mesh at `value`, in field units.
@@ -74,6 +97,13 @@ impl CoreSession {
     /// A hash of the current mesh, the same wherever the same request was made.
     pub fn hash(&self) -> String {
         format!("{:016x}", self.session.hash())
+    }
+
+    /// What has changed since a mesh was last handed out; another one is handed out with it.
+    fn changes(&mut self) -> Result<Changes, WebError> {
+        self.known()?;
+        self.handed += 1;
+        Ok(Changes { ranges: self.session.take_changes(), to: self.handed })
     }
 
     fn known(&self) -> Result<&MtInfo, WebError> {

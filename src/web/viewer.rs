@@ -1,11 +1,14 @@
 //! The class that the viewer's worker holds: a session, a renderer on a canvas, and what the user has set.
 //!
 //! Nothing is computed before it is drawn: setters only note what is out of date, [`Viewer::frame`] brings it up to
-//! date and draws if anything has changed. Screen points are given in normalised coordinates, as in
+//! date and draws if anything has changed. The mesh follows what is asked for in short steps between the frames
+//! ([`Viewer::step`]), so that the camera never waits for it. Screen points are given in normalised coordinates, as in
 //! [`Camera`](crate::geom::Camera).
 
+use super::aim;
 use super::error::WebError;
 use super::options;
+use super::options::Asked;
 use super::options::RefineOptions;
 use super::results;
 use super::results::JsInfo;
@@ -18,6 +21,8 @@ use crate::gpu::Look;
 use crate::gpu::Renderer;
 use crate::gpu::Show;
 use crate::mt::MtInfo;
+use crate::refine::Part;
+use crate::refine::View;
 use crate::session::Session;
 use crate::view::ClipPlane;
 use crate::view::Cutaway;
@@ -40,7 +45,11 @@ pub struct Viewer {
     look: Look,
     camera: Camera,
     show: Show,
-    field: usize,
+    asked: Asked,
+    /// What the camera saw when the needs that follow it were last told.
+    seen: View,
+    /// Whether the mesh is not yet the one that was asked for.
+    moving: bool,
     isovalue: Option<f64>,
     clip: ClipPlane,
     cutaway: Cutaway,
@@ -82,7 +91,9 @@ impl Viewer {
             look: Look { pixel_ratio: ratio, ..Look::default() },
             camera,
             show: Show::default(),
-            field: 0,
+            asked: Asked::default(),
+            seen: View { matrix: [0.0; 16], viewport: [1.0; 2] },
+            moving: false,
             isovalue: None,
             clip: ClipPlane::NOTHING,
             cutaway: Cutaway::new(),
@@ -107,7 +118,8 @@ impl Viewer {
     /// Forgets the volume, for another one; what the user has set about the view goes with it.
     pub fn clear(&mut self) -> Result<(), WebError> {
         self.session = Session::default();
-        (self.bounds, self.roi, self.isovalue, self.field) = (None, None, None, 0);
+        (self.bounds, self.roi, self.isovalue) = (None, None, None);
+        (self.asked, self.moving) = (Asked::default(), false);
         self.clip = ClipPlane::NOTHING;
         self.cutaway = Cutaway::new();
         self.surface_triangles = 0;
@@ -142,15 +154,41 @@ impl Viewer {
         self.bounds.map_or_else(Box::default, |bounds| flat(&bounds))
     }
 
-    /// Changes the current mesh to what `options` asks for, as far as the data has arrived.
-    pub fn refine(&mut self, options: &RefineOptions) -> Result<JsStats, WebError> {
-        let (request, field) = options::request(options, self.known()?)?;
-        self.session.set_field(field)?;
-        self.field = field;
-        let stats = self.session.refine(&request)?;
+    /// Tells which mesh is wanted from now on, for `step` to make it. Views without a matrix follow the camera.
+    pub fn aim(&mut self, options: &RefineOptions) -> Result<(), WebError> {
+        let seen = self.view();
+        let asked = aim::aim(&mut self.session, options, Some(&seen))?;
+        if asked.field != self.asked.field {
+            self.stale = Stale { boxes: self.stale.boxes, ..Stale::MESH };
+        }
+        (self.asked, self.seen, self.moving) = (asked, seen, true);
         self.set_range();
-        self.stale = Stale { boxes: self.stale.boxes, ..Stale::MESH };
-        Ok(results::stats(&stats, &self.known()?.fields[field]))
+        Ok(())
+    }
+
+    /// More of the file has come, and with it perhaps what was asked for.
+    #[wasm_bindgen(js_name = aimAgain)]
+    pub fn aim_again(&mut self) {
+        self.moving = self.session.info().is_some();
+    }
+
+    /// Whether `step` has something to do.
+    #[wasm_bindgen(getter)]
+    pub fn moving(&self) -> bool {
+        self.moving || !self.asked.follows.is_empty() && self.view() != self.seen
+    }
+
+    /// Goes on towards the mesh that is wanted for about so many milliseconds.
+    pub fn step(&mut self, milliseconds: f64) -> Result<JsStats, WebError> {
+        // What fails would fail again: it is not tried before something else is asked for.
+        self.moving = false;
+        self.follow_camera()?;
+        let stats = aim::step(&mut self.session, milliseconds, f64::INFINITY)?;
+        self.moving = !stats.done;
+        if stats.refined + stats.coarsened > 0 {
+            self.stale = Stale { boxes: self.stale.boxes, ..Stale::MESH };
+        }
+        Ok(results::stats(&stats, self.known()?, &self.asked))
     }
 
     /// A hash of the current mesh, the same wherever the same request was made.
@@ -313,6 +351,25 @@ impl Viewer {
         Ok(())
     }
 
+    /// What the camera sees.
+    fn view(&self) -> View {
+        let matrix = self.camera.view_projection(self.renderer.aspect()).to_cols_array().map(f64::from);
+        View { matrix, viewport: self.renderer.size().map(f64::from) }
+    }
+
+    /// Tells the needs that follow the camera where it is.
+    fn follow_camera(&mut self) -> Result<(), WebError> {
+        let seen = self.view();
+        if self.asked.follows.is_empty() || seen == self.seen {
+            return Ok(());
+        }
+        self.seen = seen;
+        for &need in &self.asked.follows {
+            self.asked.request.needs[need].part = Part::View(seen);
+        }
+        Ok(self.session.aim_with(&self.asked.request, &self.asked.custom)?)
+    }
+
     /// The base mesh is there: look at it.
     fn arrive(&mut self) {
         let positions = self.session.view().positions;
@@ -324,7 +381,7 @@ impl Viewer {
     }
 
     fn set_range(&mut self) {
-        if let Some(field) = self.session.info().and_then(|info| info.fields.get(self.field)) {
+        if let Some(field) = self.session.info().and_then(|info| info.fields.get(self.asked.field)) {
             self.look.range = [field.min as f32, field.max as f32];
         }
     }

@@ -143,7 +143,10 @@ fn fixture_env(command: &mut Command) -> &mut Command {
 fn js() -> Result<()> {
     with_package()?;
     shell::run(&mut node_test("latest.test.js"))?;
-    with_fixture(|| shell::run(fixture_env(&mut node_test("package.test.js"))))
+    with_fixture(|| {
+        shell::run(fixture_env(&mut node_test("package.test.js")))?;
+        shell::run(fixture_env(&mut node_test("steps.test.js")))
+    })
 }
 
 /// The steps that use the package build it when they are run by themselves on a fresh checkout.

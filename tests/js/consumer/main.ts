@@ -2,13 +2,18 @@
 import {
   MultiTessellation,
   TetralodError,
+  applyChanges,
+  emptyMesh,
   type ErrorCode,
   type IsoSurface,
+  type Mesh,
   type MtInfo,
+  type Need,
   type OpenOptions,
   type RefineOptions,
   type RefineResult,
   type Source,
+  type Where,
 } from "tetralod";
 
 declare const process: { env: Record<string, string | undefined>; exitCode: number };
@@ -29,6 +34,25 @@ const positions: Float32Array = mesh.positions;
 const surface: IsoSurface = await mt.isosurface((info.fields[0]!.min + info.fields[0]!.max) / 2);
 const hash: string = await mt.hash();
 
+// What three.js has, without three.js.
+const matrix = { elements: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 1, -0.5, -0.5, 1, 1] };
+const probe: Need = { error: "2%", sphere: { center: { x: 0.5, y: 0.5, z: 0.5 }, radius: 0.2 } };
+const copy: Mesh = emptyMesh();
+let steps = 0;
+const seen: RefineOptions = { view: { matrix, viewport: [640, 480], pixels: 4, outside: "20%" }, needs: [probe] };
+for await (const step of mt.refineSteps(seen, { budgetMs: 2, deltas: true })) {
+  applyChanges(copy, step);
+  steps++;
+}
+const whole: RefineResult = await mt.refine(seen);
+const followed = copy.tets.length === whole.tets.length && copy.tets.every((vertex, i) => vertex === whole.tets[i]);
+
+const local = await MultiTessellation.open(source, { worker: false });
+await local.complete;
+const where: Where = ({ errors }) => errors.map((error) => error / 0.1);
+const asked = await local.refine({ where });
+local.free();
+
 const failed: ErrorCode | undefined = await mt.refine({ error: -1 }).then(
   () => undefined,
   (error: unknown) => (error instanceof TetralodError ? error.code : undefined),
@@ -41,6 +65,10 @@ const good =
   mesh.tets.length === 4 * mesh.stats.tetrahedra &&
   surface.indices.length % 3 === 0 &&
   /^[0-9a-f]{16}$/.test(hash) &&
+  steps > 0 &&
+  followed &&
+  whole.stats.bounds.length === 3 &&
+  asked.stats.satisfied &&
   failed === "bad-option";
 console.log(`${info.vertices} vertices, ${mesh.stats.tetrahedra} tetrahedra extracted, hash ${hash}`);
 if (!good) throw new Error("the installed package does not do what its types say");

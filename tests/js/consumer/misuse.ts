@@ -6,6 +6,12 @@ export async function misuse(mt: MultiTessellation): Promise<void> {
   new MultiTessellation();
   // @ts-expect-error there is no such option
   await mt.refine({ eror: 1 });
+  // @ts-expect-error a need has no budget
+  await mt.refine({ needs: [{ maxTets: 1 }] });
+  // @ts-expect-error a view has a viewport
+  await mt.refine({ view: { matrix: new Float32Array(16), pixels: 1 } });
+  // @ts-expect-error a delta is no mesh
+  (await mt.refine({}, { deltas: true })) satisfies import("tetralod").RefineResult;
   // @ts-expect-error an isovalue is a number
   await mt.isosurface("high");
   // @ts-expect-error a number is no source

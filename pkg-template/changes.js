@@ -1,0 +1,66 @@
+/** Copies of a mesh that are kept up with what has changed. */
+
+import { TetralodError } from "./errors.js";
+
+/** The arrays of a mesh, and how many numbers a vertex or a tetrahedron has in each. */
+const ARRAYS = [
+  ["positions", "vertices", 3],
+  ["field", "vertices", 1],
+  ["tets", "tets", 4],
+  ["neighbors", "tets", 4],
+];
+
+/** A mesh of no tetrahedra, for `applyChanges` to begin with. */
+export function emptyMesh() {
+  return {
+    positions: new Float32Array(),
+    field: new Float32Array(),
+    tets: new Uint32Array(),
+    neighbors: new Uint32Array(),
+    changes: { from: 0, to: 0, vertices: new Uint32Array(), tets: new Uint32Array() },
+  };
+}
+
+/**
+ * Makes of `mesh` the mesh that `delta` leads to, and returns it. Its arrays are written where `delta.changes` says; those
+ * that are too short are replaced by others with room to grow.
+ */
+export function applyChanges(mesh, delta) {
+  const [is, wanted] = [mesh.changes.to, delta.changes.from];
+  if (is !== wanted) {
+    const problem = `the delta leads on from mesh number ${wanted}, and this is number ${is}`;
+    throw new TetralodError("bad-option", `applyChanges: ${problem}`);
+  }
+  const count = { vertices: delta.vertexCount, tets: delta.tetCount };
+  for (const [name, kind, size] of ARRAYS) {
+    const array = resized(mesh[name], size * count[kind]);
+    copyRanges(array, delta[name], delta.changes[kind], size);
+    mesh[name] = array;
+  }
+  mesh.changes = delta.changes;
+  return mesh;
+}
+
+/** `array` with `length` numbers: in the same memory, or moved to a larger one. */
+function resized(array, length) {
+  if (array.length === length) return array;
+  const { BYTES_PER_ELEMENT: bytes, byteOffset, buffer } = array;
+  const room = (buffer.byteLength - byteOffset) / bytes;
+  if (length <= room) return new array.constructor(buffer, byteOffset, length);
+  const larger = new array.constructor(Math.max(length, 2 * room));
+  larger.set(array);
+  return larger.subarray(0, length);
+}
+
+function copyRanges(target, source, ranges, size) {
+  let at = 0;
+  for (let i = 0; i < ranges.length; i += 2) {
+    const [start, end] = [size * ranges[i], size * ranges[i + 1]];
+    const part = source.subarray(at, at + end - start);
+    if (end > target.length || part.length < end - start) {
+      throw new TetralodError("bad-option", "applyChanges: the ranges do not fit the arrays");
+    }
+    target.set(part, start);
+    at += end - start;
+  }
+}
