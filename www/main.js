@@ -14,7 +14,11 @@ const demo = (window.tetralodDemo = {
   state: "starting",
   viewer: undefined,
   info: undefined,
+  /** Of the last mesh that was finished, and of the last step towards one. */
   stats: undefined,
+  step: undefined,
+  /** What the viewer was last asked for. */
+  request: undefined,
   frame: undefined,
   frames: 0,
   error: undefined,
@@ -155,11 +159,20 @@ function say(title, error) {
 /* Settings */
 
 const mode = () => document.querySelector("[name=mode]:checked").value;
+const aim = () => document.querySelector("[name=aim]:checked").value;
+
+/** Places of the error's slider: what is good enough where a view asks for more is coarser. */
+const errorPlaces = { field: 50, view: 78 };
 
 /** 0 at the left end, then from 0.01 % to 100 % in equal ratios. */
 function errorPercent() {
   const place = Number($("error").value);
   return place === 0 ? 0 : 10 ** (-2 + (4 * place) / 100);
+}
+
+/** From a quarter of a pixel to 64 pixels in equal ratios. */
+function errorPixels() {
+  return Number((0.25 * 256 ** ($("pixels").value / 100)).toPrecision(2));
 }
 
 /** The number of tetrahedra, or undefined at the right end. */
@@ -179,9 +192,11 @@ function refine() {
   const percent = errorPercent();
   text("error-text", percent === 0 ? "0: the reference mesh" : percentage(percent), "error");
   text("budget-text", budget() === undefined ? "no limit" : `${count(budget())} tetrahedra`, "budget");
-  const options = { error: `${percent}%`, field: field.name, maxTets: budget() };
-  if ($("roi").checked) options.box = box;
+  text("pixels-text", pixels(errorPixels()), "pixels");
+  const options = { error: `${percent}%`, field: field.name, maxTets: budget(), ...part() };
   if ($("focus").checked) options.isovalues = [isovalue()];
+  if (aim() === "view") options.needs = [{ view: { pixels: errorPixels() } }];
+  demo.request = options;
   viewer.refine(options).catch((error) => {
     if (error.code !== "freed" && error.code !== "not-ready") fail(error);
   });
@@ -201,22 +216,55 @@ function applyMode() {
   viewer.setMode(mode());
 }
 
+/** The plane of the cut. */
+function plane() {
+  const axis = Number($("axis").value);
+  const [low, high] = [demo.info.bounds[axis], demo.info.bounds[axis + 3]];
+  const sign = $("flip").checked ? -1 : 1;
+  const normal = [0, 1, 2].map((i) => (i === axis ? sign : 0));
+  return { normal, offset: sign * (low + ((high - low) * $("cut").value) / 1000) };
+}
+
 function applyCut() {
   if (!demo.info) return;
   const axis = Number($("axis").value);
   const [low, high] = [demo.info.bounds[axis], demo.info.bounds[axis + 3]];
-  const at = low + ((high - low) * $("cut").value) / 1000;
+  const { normal, offset } = plane();
+  const at = normal[axis] * offset;
   const where = Math.abs(at) < (high - low) * 1e-4 ? 0 : Number(at.toPrecision(3));
   text("cut-text", `${"xyz"[axis]} ${$("flip").checked ? "<" : ">"} ${where} is cut away`, "cut");
-  const sign = $("flip").checked ? -1 : 1;
-  const normal = [0, 1, 2].map((i) => (i === axis ? sign : 0));
-  viewer.setClip({ normal, offset: sign * at });
+  viewer.setClip({ normal, offset });
+  if ($("part").value === "cut") refine();
+}
+
+/** The part of space that the error counts in. */
+function part() {
+  const center = [0, 1, 2].map((i) => (box[i] + box[i + 3]) / 2);
+  const radius = Math.min(...[0, 1, 2].map((i) => box[i + 3] - box[i])) / 2;
+  switch ($("part").value) {
+    case "box":
+      return { box };
+    case "ball":
+      return { sphere: { center, radius } };
+    case "cut":
+      return { slab: plane() };
+    default:
+      return {};
+  }
 }
 
 function applyRoi() {
-  const on = $("roi").checked;
+  const on = ["box", "ball"].includes($("part").value);
   $("box").hidden = !on;
   viewer.setRoi(on ? box : null);
+}
+
+function applyAim() {
+  const view = aim() === "view";
+  for (const row of document.querySelectorAll("[data-aim]")) row.hidden = !view;
+  $("error-label").textContent = view ? "Error elsewhere" : "Error";
+  $("error").value = errorPlaces[aim()];
+  refine();
 }
 
 function showBox() {
@@ -256,14 +304,19 @@ function attachSettings() {
   on("cut", applyCut);
   on("axis", applyCut);
   on("flip", applyCut);
-  on("error", refine);
+  for (const radio of document.querySelectorAll("[name=aim]")) radio.addEventListener("change", applyAim);
+  on("error", () => {
+    errorPlaces[aim()] = $("error").value;
+    refine();
+  });
+  on("pixels", refine);
   on("budget", refine);
   on("focus", refine);
   on("field", () => {
     chooseField(demo.info.fields[$("field").selectedIndex]);
     refine();
   });
-  on("roi", () => {
+  on("part", () => {
     if (!box) return;
     applyRoi();
     refine();
@@ -331,19 +384,26 @@ function showProgress({ bytes, total, complete }) {
 }
 
 function showStats(stats) {
-  demo.stats = stats;
+  demo.step = stats;
   const { info } = demo;
   $("n-current").textContent = count(stats.tetrahedra);
   const all = info ? ` of ${count(info.updates)}` : "";
   $("n-applied").textContent = `${count(stats.applied)}${all}`;
   $("n-updates").textContent = `+${count(stats.refined)} −${count(stats.coarsened)}`;
-  $("n-refine").textContent = milliseconds(stats.milliseconds);
-  const bound = percentage(stats.relativeErrorBound * 100);
-  $("n-error").textContent = bound;
+  $("n-refine").textContent = `${milliseconds(stats.milliseconds)}${stats.done ? "" : "…"}`;
   if (info) {
     $("n-reference").textContent = count(info.tetrahedra);
     $("fill").style.width = `${(100 * stats.tetrahedra) / info.tetrahedra}%`;
   }
+  // On the way there no error is guaranteed yet.
+  if (!stats.done) return;
+  demo.stats = stats;
+  const bound = percentage(stats.relativeErrorBound * 100);
+  $("n-error").textContent = bound;
+  $("budget-note").textContent = stats.satisfied || budget() === undefined ? BUDGET_NOTE : achieved(stats);
+  const seen = stats.bounds[1];
+  $("n-pixels").textContent = seen === undefined ? "–" : pixels(seen);
+  $("n-pixels").classList.toggle("short", seen > errorPixels());
   announce(`${count(stats.tetrahedra)} tetrahedra, error ${bound}`);
 }
 
@@ -357,6 +417,14 @@ function showFrame(frame) {
   }
   $("n-triangles").textContent = count(frame.triangles);
   $("n-draw").textContent = milliseconds(frame.milliseconds);
+}
+
+const BUDGET_NOTE = "The mesh may have at most so many tetrahedra";
+
+/** What the budget allows instead of what was asked for. */
+function achieved({ relativeErrorBound, bounds }) {
+  const seen = bounds[1] === undefined ? "" : ` and ${pixels(bounds[1])} on screen`;
+  return `The best mesh of so many tetrahedra: within ${percentage(relativeErrorBound * 100)}${seen}`;
 }
 
 /** Tells screen readers, once the numbers have come to rest. */
@@ -374,6 +442,10 @@ function text(output, words, slider) {
 function percentage(percent) {
   if (percent === 0) return "0";
   return percent < 100 ? `${Number(percent.toPrecision(2))} %` : `${count(Math.round(percent))} %`;
+}
+
+function pixels(n) {
+  return `${Number(n.toPrecision(2))} ${n === 1 ? "pixel" : "pixels"}`;
 }
 
 function count(n) {

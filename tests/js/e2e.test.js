@@ -59,11 +59,11 @@ async function picture(page, name) {
   }, png.toString("base64"));
 }
 
-/** Waits until no frame has been drawn for a while. */
+/** Waits until no frame has been drawn for a while, and the mesh is what was asked for. */
 async function settle(page) {
   for (let seen = -1; ; ) {
-    const frames = await demo(page, "frames");
-    if (frames === seen) return;
+    const [frames, step] = [await demo(page, "frames"), await demo(page, "step")];
+    if (frames === seen && step?.done !== false) return;
     seen = frames;
     await page.waitForTimeout(400);
   }
@@ -179,24 +179,110 @@ test("a file that is not there, or is no MT, is named", async () => {
   }
 });
 
+test("the mesh follows the camera, and stays within its budget", async () => {
+  const page = await open("data/bucky.mt");
+  await reach(page, "complete");
+  await settle(page);
+  const before = await demo(page, "stats");
+  await page.evaluate(() => (window.tetralodDemo.stats = undefined));
+  await page.locator("label", { hasText: "For the view" }).click();
+  await page.waitForFunction(() => window.tetralodDemo.stats, undefined, { timeout: PATIENCE });
+  const seen = await setSlider(page, "pixels", 20);
+  assert.ok(seen.satisfied && seen.bounds.length === 2 && seen.bounds[1] <= 0.76, JSON.stringify(seen));
+  assertDrawn(await picture(page, "view"));
+  await page.screenshot({ path: fileURLToPath(new URL("page-view.png", pictures)) });
+
+  // Close up, what is seen needs more and the rest less: without another request.
+  const canvas = await page.locator("#canvas").boundingBox();
+  await page.mouse.move(canvas.x + canvas.width / 2, canvas.y + canvas.height / 2);
+  await page.evaluate(() => (window.tetralodDemo.stats = undefined));
+  for (let i = 0; i < 6; i++) await page.mouse.wheel(0, -240);
+  await page.waitForFunction(() => window.tetralodDemo.stats, undefined, { timeout: PATIENCE });
+  await settle(page);
+  const near = await demo(page, "stats");
+  assert.ok(near.satisfied && near.tetrahedra !== seen.tetrahedra, `${near.tetrahedra} and ${seen.tetrahedra}`);
+  assertDrawn(await picture(page, "view-near"));
+
+  // What the camera's way has led to is what a new request gives from elsewhere.
+  await page.locator("#canvas").focus();
+  for (const key of ["ArrowLeft", "ArrowUp", "ArrowLeft", "+", "ArrowRight"]) await page.keyboard.press(key);
+  await settle(page);
+  const hashes = await page.evaluate(async () => {
+    const { viewer, request } = window.tetralodDemo;
+    const followed = await viewer.hash();
+    await viewer.refine({ error: "20%" });
+    await viewer.refine(request);
+    return [followed, await viewer.hash()];
+  });
+  assert.equal(hashes[0], hashes[1]);
+
+  const budgeted = await setSlider(page, "budget", 40);
+  assert.ok(!budgeted.satisfied && budgeted.tetrahedra < near.tetrahedra && budgeted.bounds[1] > 0.76);
+  await page.screenshot({ path: fileURLToPath(new URL("page-view-budget.png", pictures)) });
+  await setSlider(page, "budget", 100);
+
+  await page.locator("label", { hasText: "For the field" }).click();
+  await settle(page);
+  assert.equal((await demo(page, "stats")).tetrahedra, before.tetrahedra);
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("the parts of space that the page offers are refined", async () => {
+  const page = await open("data/bucky.mt");
+  await reach(page, "complete");
+  const everywhere = await setSlider(page, "error", 20);
+  const sizes = {};
+  for (const part of ["box", "ball", "cut"]) {
+    await page.evaluate(() => (window.tetralodDemo.stats = undefined));
+    await page.selectOption("#part", part);
+    await page.waitForFunction(() => window.tetralodDemo.stats, undefined, { timeout: PATIENCE });
+    sizes[part] = (await demo(page, "stats")).tetrahedra;
+    assert.ok(sizes[part] < everywhere.tetrahedra, part);
+    await page.locator("label", { hasText: "Cut-away" }).click();
+    await settle(page);
+    await page.screenshot({ path: fileURLToPath(new URL(`page-part-${part}.png`, pictures)) });
+  }
+  assert.ok(sizes.ball < sizes.box, "the ball is in the box");
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
 test("the package runs in a worker of the page, without a viewer", async () => {
   const page = await open("data/bucky.mt");
   await reach(page, "complete");
   const seen = await page.evaluate(async () => {
-    const { MultiTessellation } = await import("tetralod");
+    const { MultiTessellation, applyChanges } = await import("tetralod");
     const mt = await MultiTessellation.open("data/bucky.mt");
     await mt.complete;
     const { stats, tets } = await mt.refine({ error: "5%", maxTets: 20_000 });
     const [one, two] = [await mt.hash(), (await mt.refine({ error: "0%" }), await mt.refine({ error: "5%", maxTets: 20_000 }), await mt.hash())];
+    // Deltas over a walk of a box, in steps and whole.
+    const at = (place) => place.map((x, i) => mt.info.bounds[i] + x * (mt.info.bounds[i + 3] - mt.info.bounds[i]));
+    const mesh = await mt.refine({ error: "100%" });
+    let followed = true;
+    for (let i = 0; i < 12; i++) {
+      const [lower, upper] = [[0.1 + 0.05 * i, 0.2, 0.2], [0.3 + 0.05 * i, 0.5, 0.5]];
+      const options = { error: "0.5%", box: [...at(lower), ...at(upper)] };
+      const how = { deltas: true, updates: 200 + 500 * i };
+      for await (const step of mt.refineSteps(options, how)) applyChanges(mesh, step);
+      if (i % 3 > 0) continue;
+      const full = await mt.refine(options);
+      mesh.changes = full.changes;
+      for (const name of ["positions", "field", "tets", "neighbors"]) {
+        followed &&= full[name].length === mesh[name].length && full[name].every((x, i) => x === mesh[name][i]);
+      }
+    }
     const abort = new AbortController();
     abort.abort();
     const aborted = await MultiTessellation.open("data/bucky.mt", { signal: abort.signal }).catch((error) => error.name);
     mt.free();
-    return { tetrahedra: stats.tetrahedra, length: tets.length, same: one === two, aborted };
+    return { tetrahedra: stats.tetrahedra, length: tets.length, same: one === two, followed, aborted };
   });
   assert.ok(seen.tetrahedra > 0 && seen.tetrahedra <= 20_000);
   assert.equal(seen.length, 4 * seen.tetrahedra);
   assert.ok(seen.same, "the same request gives the same mesh from wherever one starts");
+  assert.ok(seen.followed, "deltas add up to the mesh");
   assert.equal(seen.aborted, "AbortError");
   await page.close();
 });
