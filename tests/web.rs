@@ -246,3 +246,43 @@ async fn the_renderer_draws_the_isosurface() {
         assert!(warm.contains(&seen), "{seen} warm pixels at {value}");
     }
 }
+
+/// Told only what has changed, the renderer draws what it draws of the whole surface.
+#[cfg(feature = "gpu")]
+#[wasm_bindgen_test]
+async fn a_surface_is_kept_up_by_what_has_changed() {
+    use tetralod::geom::Bounds;
+    use tetralod::geom::Camera;
+    use tetralod::gpu::Look;
+    use tetralod::gpu::Renderer;
+    use tetralod::gpu::Show;
+    use tetralod::refine::Need;
+    use tetralod::refine::Request;
+    use tetralod::session::Session;
+
+    const SIZE: [u32; 2] = [96, 96];
+    let mut session = Session::new();
+    session.feed(MT).expect("the fixture is a good file");
+    let mut whole = Renderer::headless(SIZE).await.expect("WebGPU");
+    let mut parts = Renderer::headless(SIZE).await.expect("WebGPU");
+    let camera = Camera::home(&Bounds { min: [0.0; 3], max: [1.0; 3] }, whole.aspect());
+    for i in 0..10_u32 {
+        let low = 0.08 * f64::from(i);
+        let near = Bounds { min: [low, 0.2, 0.2], max: [low + 0.25, 0.8, 0.8] };
+        let request = Request::within(0.1).and(Need::within(0.004).inside(near));
+        let request = if i == 6 { Request::default() } else { request };
+        session.refine(&request).expect("a good request");
+        let value = if i < 8 { 0.5 } else { 0.55 };
+        session.isosurface(value).expect("a surface");
+        let changes = session.take_surface_changes();
+        let surface = session.isosurface(value).expect("a surface");
+        whole.set_surface(surface).expect("it fits");
+        parts.update_surface(surface, &changes.vertices, &changes.triangles).expect("it fits");
+        let mut pictures = Vec::new();
+        for renderer in [&mut whole, &mut parts] {
+            assert!(renderer.draw(Show::Surface, &camera, &Look::default()).expect("a picture"));
+            pictures.push(renderer.read().await.expect("pixels"));
+        }
+        assert_eq!(pictures[0], pictures[1], "step {i}");
+    }
+}

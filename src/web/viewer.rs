@@ -59,6 +59,8 @@ pub struct Viewer {
     stale: Stale,
     /// Triangles of the isosurface that the renderer has.
     surface_triangles: usize,
+    /// Whether the renderer has all of that surface, so that changes of it are enough.
+    surface_fits: bool,
 }
 
 /// What the next frame must bring up to date.
@@ -101,6 +103,7 @@ impl Viewer {
             roi: None,
             stale: Stale { picture: true, ..Stale::default() },
             surface_triangles: 0,
+            surface_fits: false,
             renderer,
         })
     }
@@ -122,7 +125,7 @@ impl Viewer {
         (self.asked, self.moving) = (Asked::default(), false);
         self.clip = ClipPlane::NOTHING;
         self.cutaway = Cutaway::new();
-        self.surface_triangles = 0;
+        (self.surface_triangles, self.surface_fits) = (0, false);
         self.renderer.set_surface(&crate::view::IsoSurface::new())?;
         self.renderer.set_cutaway(&self.cutaway)?;
         self.stale = Stale { boxes: true, picture: true, ..Stale::default() };
@@ -336,9 +339,19 @@ impl Viewer {
             Show::Surface if self.stale.surface => {
                 let [low, high] = self.look.range;
                 let middle = f64::midpoint(f64::from(low), f64::from(high));
-                let surface = self.session.isosurface(self.isovalue.unwrap_or(middle))?;
+                let value = self.isovalue.unwrap_or(middle);
+                self.session.isosurface(value)?;
+                let changes = self.session.take_surface_changes();
+                // Asked for again, it is as it was.
+                let surface = self.session.isosurface(value)?;
                 self.surface_triangles = surface.indices.len();
-                self.renderer.set_surface(surface)?;
+                // What did not fit was written in part, and is written as a whole when it fits again.
+                if std::mem::replace(&mut self.surface_fits, false) {
+                    self.renderer.update_surface(surface, &changes.vertices, &changes.triangles)?;
+                } else {
+                    self.renderer.set_surface(surface)?;
+                }
+                self.surface_fits = true;
                 self.stale.surface = false;
             }
             Show::Cutaway if self.stale.cutaway => {
