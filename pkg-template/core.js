@@ -48,7 +48,14 @@ export function coreMethods() {
     aim: async (options) => session.aim(await received(options)),
     step,
     setField: (name) => session.setField(name),
-    isosurface: (value) => session.isosurface(value),
+    isosurface: (values, smooth) => session.isosurfaces(values, smooth),
+    slice: (normal, offset) => session.slice(normal, offset),
+    surface: () => session.surface(),
+    probe: (points) => session.probe(points),
+    line: (from, to) => session.line(from, to),
+    streamlines: ([x, y, z], seeds, backward, maxLength, maxSteps) =>
+      session.streamlines(x, y, z, seeds, backward, maxLength, maxSteps),
+    stats: (bins, low, high) => session.stats(bins, low, high),
     hash: () => session.hash(),
     free: () => session?.free(),
   };

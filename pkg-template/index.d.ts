@@ -18,7 +18,9 @@ import type {
   CoreStats,
   FieldError,
   FieldInfo,
+  FieldStats,
   IsoSurface,
+  LineProfile,
   Mesh,
   MeshChanges,
   MeshDelta,
@@ -26,6 +28,9 @@ import type {
   Need,
   Progress,
   RefineOptions,
+  Slice,
+  Streamline,
+  Surface,
   TetBatch,
   TransferOptions,
   Vector,
@@ -36,7 +41,9 @@ import type {
 export type {
   FieldError,
   FieldInfo,
+  FieldStats,
   IsoSurface,
+  LineProfile,
   Mesh,
   MeshChanges,
   MeshDelta,
@@ -44,6 +51,9 @@ export type {
   Need,
   Progress,
   RefineOptions,
+  Slice,
+  Streamline,
+  Surface,
   TetBatch,
   TransferOptions,
   Vector,
@@ -192,8 +202,50 @@ export class MultiTessellation {
   /** Chooses the field that isosurfaces follow, without changing the mesh; `refine` with `field` does so too. */
   setField(name: string): Promise<void>;
 
-  /** The isosurface of the current mesh at `value`, in units of the field. Normals point towards lower values. */
-  isosurface(value: number): Promise<IsoSurface>;
+  /**
+   * The isosurface of the current mesh at one value or several, in units of the field, with the value of each vertex. Normals
+   * point towards lower values: they are those of the field's gradient, or with `"smooth"` of the triangles.
+   *
+   * @example
+   * const { positions, normals, indices } = await mt.isosurface(0.7);
+   */
+  isosurface(
+    values: number | ArrayLike<number>,
+    how?: { normals?: "gradient" | "smooth" },
+  ): Promise<IsoSurface & { values: Float32Array }>;
+
+  /**
+   * The section of the current mesh with the plane of all points with `normal · p = offset`, facing the way the normal points.
+   *
+   * @example
+   * const cut = await mt.slice([0, 0, 1], 2.5);                       // z = 2.5
+   */
+  slice(normal: ArrayLike<number>, offset: number): Promise<Slice>;
+
+  /** The boundary of the current mesh, facing outwards. */
+  surface(): Promise<Surface>;
+
+  /** The field at some points, three coordinates each, in model units; NaN outside of the mesh. */
+  probe(points: ArrayLike<number>): Promise<Float64Array>;
+
+  /** The field along a line, in parts that are linear. */
+  line(from: ArrayLike<number>, to: ArrayLike<number>): Promise<LineProfile>;
+
+  /**
+   * The streamlines from some seeds, three coordinates each, through the vector field whose components are three fields;
+   * `undefined` for seeds outside of the mesh. `maxLength` is in model units.
+   *
+   * @example
+   * const lines = await mt.streamlines(["u", "v", "w"], [0, 0, 0, 1, 0, 0]);
+   */
+  streamlines(
+    fields: [string, string, string],
+    seeds: ArrayLike<number>,
+    how?: { backward?: boolean; maxLength?: number; maxSteps?: number },
+  ): Promise<(Streamline | undefined)[]>;
+
+  /** Volume, integral, mean and a histogram by volume (100 bins over the field's range, if not said otherwise). */
+  stats(how?: { bins?: number; range?: ArrayLike<number> }): Promise<FieldStats>;
 
   /** A hash of the current mesh: the same request gives the same hash on every machine. */
   hash(): Promise<string>;

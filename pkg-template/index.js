@@ -84,9 +84,50 @@ export class MultiTessellation {
     await this.#core.call("setField", [name]);
   }
 
-  async isosurface(value) {
-    if (typeof value !== "number") throw new TetralodError("bad-option", "isosurface: the value must be a number");
-    return this.#core.call("isosurface", [value]);
+  async isosurface(values, how = {}) {
+    checkNames(how, ["normals"]);
+    const { normals = "gradient" } = how;
+    if (normals !== "gradient" && normals !== "smooth") {
+      throw new TetralodError("bad-option", 'option `normals`: must be "gradient" or "smooth"');
+    }
+    const list = typeof values === "number" ? [values] : values;
+    return this.#core.call("isosurface", [numbers("isosurface", list), normals === "smooth"]);
+  }
+
+  async slice(normal, offset) {
+    checkNumber("offset", offset);
+    return this.#core.call("slice", [numbers("normal", normal), offset]);
+  }
+
+  async surface() {
+    return this.#core.call("surface");
+  }
+
+  async probe(points) {
+    return this.#core.call("probe", [numbers("points", points)]);
+  }
+
+  async line(from, to) {
+    return this.#core.call("line", [numbers("from", from), numbers("to", to)]);
+  }
+
+  async streamlines(fields, seeds, how = {}) {
+    checkNames(how, ["backward", "maxLength", "maxSteps"]);
+    const { backward = false, maxLength = Infinity, maxSteps = 10_000 } = how;
+    if (!Array.isArray(fields) || fields.length !== 3 || fields.some((name) => typeof name !== "string")) {
+      throw new TetralodError("bad-option", "streamlines: a vector field is the names of three fields");
+    }
+    checkAmount("maxLength", maxLength, 0);
+    checkAmount("maxSteps", maxSteps, 1);
+    return this.#core.call("streamlines", [fields, numbers("seeds", seeds), Boolean(backward), maxLength, maxSteps]);
+  }
+
+  async stats(how = {}) {
+    checkNames(how, ["bins", "range"]);
+    const { bins = 100, range = [NaN, NaN] } = how;
+    checkAmount("bins", bins, 1);
+    if (range?.length !== 2) throw new TetralodError("bad-option", "option `range`: must be two numbers");
+    return this.#core.call("stats", [bins, range[0], range[1]]);
   }
 
   async hash() {
@@ -149,6 +190,19 @@ function checkNames(options, names) {
 function checkAmount(name, value, least) {
   if (typeof value === "number" && value >= least) return;
   throw new TetralodError("bad-option", `option \`${name}\`: must be a number of at least ${least}`);
+}
+
+/** A list of numbers, as wasm takes it; which numbers will do is its to say. */
+function numbers(name, list) {
+  const isList = Array.isArray(list) || (ArrayBuffer.isView(list) && !(list instanceof DataView));
+  if (!isList || !Array.prototype.every.call(list, (number) => typeof number === "number")) {
+    throw new TetralodError("bad-option", `option \`${name}\`: must be a list of numbers`);
+  }
+  return Float64Array.from(list);
+}
+
+function checkNumber(name, number) {
+  if (typeof number !== "number") throw new TetralodError("bad-option", `option \`${name}\`: must be a number`);
 }
 
 function startWorker() {

@@ -25,6 +25,8 @@ use crate::refine::RequestError;
 use crate::view::IsoSurface;
 use crate::view::MeshView;
 use crate::view::NormalKind;
+use crate::view::Plane;
+use crate::view::Slice;
 use crate::view::SurfaceChanges;
 use std::fmt;
 use std::ops::Range;
@@ -76,6 +78,9 @@ pub struct Session {
     behind: Behind,
     /// What has changed in it since [`Session::take_changes`] was last called.
     copied: Behind,
+    slice: Slice,
+    /// The plane of the slice, and what has changed since that was last asked for.
+    sliced: (Option<Plane>, Behind),
 }
 
 /// The current mesh in model units, kept up with the mesh at the cost of what changed.
@@ -275,6 +280,41 @@ impl Session {
         Ok(&self.surface)
     }
 
+    /// The section of the current mesh with a plane. When it is asked for again with the same plane it costs what has changed;
+    /// see [`Slice::update`].
+    ///
+    /// # Errors
+    /// If nothing has arrived yet.
+    pub fn slice(&mut self, plane: &Plane) -> Result<&Slice, SessionError> {
+        if self.front.is_none() {
+            return Err(SessionError::NotReady);
+        }
+        self.catch_up();
+        let mesh = view(self.front.as_ref(), &self.shown);
+        let (before, behind) = &mut self.sliced;
+        let MeshChanges { vertices, tets } = behind.take(mesh.positions.len(), mesh.tets.len());
+        if before.replace(*plane) == Some(*plane) {
+            self.slice.update(&mesh, &vertices, &tets);
+        } else {
+            self.slice.extract(&mesh, plane);
+        }
+        Ok(&self.slice)
+    }
+
+    /// One of the fields at the vertices of the current mesh, in field units; empty if there is no such field.
+    pub fn values(&self, field: usize) -> Vec<f32> {
+        let (Some(mesh), Some(info)) = (self.mesh(), self.info().and_then(|info| info.fields.get(field)))
+        else {
+            return Vec::new();
+        };
+        (0..mesh.positions().len() as u32).map(|slot| info.value(mesh.levels(slot)[field]) as f32).collect()
+    }
+
+    /// The field that is shown.
+    pub fn field(&self) -> usize {
+        self.field
+    }
+
     /// Chooses what the normals of isosurfaces are made of.
     pub fn set_normal_kind(&mut self, kind: NormalKind) {
         self.surface.set_normal_kind(kind);
@@ -313,6 +353,7 @@ impl Session {
         let value_at = |slot: usize| field.value(mesh.levels(slot as u32)[self.field]) as f32;
         self.behind.add(&changes, shown.stale);
         self.copied.add(&changes, shown.stale);
+        self.sliced.1.add(&changes, shown.stale);
         for slot in changes.vertices.into_iter().flatten().map(|slot| slot as usize) {
             shown.positions[slot] = lattice.point(mesh.positions()[slot]).map(|x| x as f32);
             shown.values[slot] = value_at(slot);

@@ -8,6 +8,7 @@ mod error;
 mod options;
 mod results;
 mod session;
+mod tools;
 #[cfg(all(feature = "gpu", target_arch = "wasm32"))]
 mod viewer;
 

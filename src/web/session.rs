@@ -99,6 +99,10 @@ impl CoreSession {
         format!("{:016x}", self.session.hash())
     }
 
+    pub(super) fn session_mut(&mut self) -> &mut Session {
+        &mut self.session
+    }
+
     /// What has changed since a mesh was last handed out; another one is handed out with it.
     fn changes(&mut self) -> Result<Changes, WebError> {
         self.known()?;
@@ -106,7 +110,7 @@ impl CoreSession {
         Ok(Changes { ranges: self.session.take_changes(), to: self.handed })
     }
 
-    fn known(&self) -> Result<&MtInfo, WebError> {
+    pub(super) fn known(&self) -> Result<&MtInfo, WebError> {
         self.session.info().ok_or_else(WebError::not_ready)
     }
 }

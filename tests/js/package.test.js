@@ -54,6 +54,17 @@ const rejects = (promise, code, message = /./) =>
     return true;
   });
 
+/** The area of triangles. */
+function area({ positions, indices }) {
+  let sum = 0;
+  for (let i = 0; i < indices.length; i += 3) {
+    const [a, b, c] = [0, 1, 2].map((k) => positions.subarray(3 * indices[i + k], 3 * indices[i + k] + 3));
+    const [u, v] = [b, c].map((p) => [0, 1, 2].map((axis) => p[axis] - a[axis]));
+    sum += Math.hypot(u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]) / 2;
+  }
+  return sum;
+}
+
 async function* pieces(size) {
   for (let at = 0; at < bytes.length; at += size) yield bytes.slice(at, at + size);
 }
@@ -145,6 +156,75 @@ for (const worker of [true, false]) {
       await mt.refine({ error: 0 });
       await mt.refine({ error: 0.04 * (max - min) });
       assert.equal(await mt.hash(), relative);
+      mt.free();
+    });
+
+    test("sections, boundary, probes, lines, streamlines and sums agree with one another on a unit cube", async () => {
+      const mt = await open(bytes);
+      await mt.complete;
+      await mt.refine({ error: "0.5%" });
+      const near = (a, b, within) => assert.ok(Math.abs(a - b) <= within, `${a} is not ${b}`);
+      const [x0, y0, z0, x1, y1, z1] = mt.info.bounds;
+      const [dx, dy, dz] = [x1 - x0, y1 - y0, z1 - z0];
+      const z = z0 + 0.43 * dz;
+
+      const cut = await mt.slice([0, 0, 2], 2 * z);
+      near(area(cut), dx * dy, 1e-4 * dx * dy);
+      for (let v = 2; v < cut.positions.length; v += 3) near(cut.positions[v], z, 1e-5 * dz);
+      assert.equal(cut.values.length, cut.positions.length / 3);
+      assert.ok(cut.edges.length > cut.indices.length / 2 && cut.edges.length % 2 === 0);
+      const probed = await mt.probe(cut.positions);
+      for (let v = 0; v < probed.length; v++) {
+        // On the boundary a point may be a rounding error outside.
+        if (!Number.isNaN(probed[v])) near(probed[v], cut.values[v], 1e-4);
+      }
+      // Asked for again, after another mesh, it is the section of that.
+      await mt.refine({ error: "3%" });
+      near(area(await mt.slice([0, 0, 2], 2 * z)), dx * dy, 1e-4 * dx * dy);
+
+      const surface = await mt.surface();
+      near(area(surface), 2 * (dx * dy + dy * dz + dz * dx), 1e-4);
+
+      const { at, values, tets } = await mt.line([x0 - dx, y0 + dy / 2, z], [x1 + dx, y0 + dy / 2, z]);
+      near(at[0], 1 / 3, 1e-6);
+      near(at.at(-1), 2 / 3, 1e-6);
+      assert.equal(values.length, 2 * tets.length);
+      const middle = await mt.probe([x0 + dx / 2, y0 + dy / 2, z, x0 - dx, y0, z]);
+      assert.ok(Number.isNaN(middle[1]), "outside");
+      const part = at.findIndex((t, i) => i % 2 === 0 && t <= 0.5 && at[i + 1] >= 0.5);
+      const t = (0.5 - at[part]) / (at[part + 1] - at[part]);
+      near(values[part] + t * (values[part + 1] - values[part]), middle[0], 1e-5);
+
+      const stats = await mt.stats({ bins: 16 });
+      near(stats.volume, dx * dy * dz, 1e-6);
+      near(stats.mean * stats.volume, stats.integral, 1e-9);
+      near([...stats.histogram, stats.below, stats.above].reduce((a, b) => a + b), stats.volume, 1e-9);
+      assert.equal(stats.edges.length, 17);
+
+      const { name } = mt.info.fields[0];
+      const [line, none] = await mt.streamlines([name, name, name], [x0 + dx / 3, y0 + dy / 3, z, x0 - 1, y0, z]);
+      assert.equal(none, undefined);
+      assert.equal(line.positions.length, 3 * line.times.length);
+      // All three components are the same number.
+      const step = (axis) => line.positions[line.positions.length - 3 + axis] - line.positions[axis];
+      near(step(0), step(1), 1e-9);
+      near(step(0), step(2), 1e-9);
+
+      const both = await mt.isosurface([0.4, 0.6], { normals: "smooth" });
+      const [one, other] = [await mt.isosurface(0.4), await mt.isosurface(0.6)];
+      assert.equal(both.indices.length, one.indices.length + other.indices.length);
+      assert.deepEqual([...new Set(both.values)].sort(), [...new Float32Array([0.4, 0.6])]);
+
+      await rejects(mt.slice([0, 0, 0], 1), "bad-option");
+      await rejects(mt.slice([0, 0, 1], NaN), "bad-option");
+      await rejects(mt.probe([1, 2]), "bad-option");
+      await rejects(mt.probe("1, 2, 3"), "bad-option");
+      await rejects(mt.line([0, 0, 0], [1, 1]), "bad-option");
+      await rejects(mt.streamlines([name, name], [0, 0, 0]), "bad-option");
+      await rejects(mt.streamlines([name, name, "none"], [0, 0, 0]), "bad-option", /none/);
+      await rejects(mt.stats({ bins: 0 }), "bad-option");
+      await rejects(mt.stats({ range: [1, 0] }), "bad-option");
+      await rejects(mt.isosurface(0.5, { normals: "flat" }), "bad-option");
       mt.free();
     });
 

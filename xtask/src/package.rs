@@ -16,9 +16,9 @@ use crate::shell;
 /// Where the package is put together.
 pub const PKG: &str = "pkg";
 
-/// The core must stay this small, gzipped: it answers every kind of request for every kind of MT, about half of which is
-/// the MTs and their files. Formatting and parsing of floats, for one, would add a fifth.
-const CORE_LIMIT: usize = 180_000;
+/// The core must stay this small, gzipped: it answers every kind of request for every kind of MT, and cuts, probes and sums up
+/// what it has; about a third is the MTs and their files. Formatting and parsing of floats, for one, would add a fifth.
+const CORE_LIMIT: usize = 220_000;
 
 struct Module {
     name: &'static str,

@@ -1,0 +1,286 @@
+//! What can be got out of the current mesh besides itself: surfaces, sections, values along lines, sums.
+
+use super::error::WebError;
+use super::options::field_index;
+use super::results::JsIsoSurface;
+use super::results::iso_surface;
+use super::session::CoreSession;
+use crate::view::BoundarySurface;
+use crate::view::FieldStats;
+use crate::view::Histogram;
+use crate::view::NormalKind;
+use crate::view::Plane;
+use crate::view::Probe;
+use crate::view::Streamline;
+use crate::view::TraceOptions;
+use crate::view::Tracer;
+use js_sys::Array;
+use js_sys::Float32Array;
+use js_sys::Float64Array;
+use js_sys::Object;
+use js_sys::Reflect;
+use js_sys::Uint32Array;
+use wasm_bindgen::JsCast;
+use wasm_bindgen::JsValue;
+use wasm_bindgen::prelude::wasm_bindgen;
+
+#[wasm_bindgen(typescript_custom_section)]
+const TYPES: &str = r#"
+/** Triangles with one value a vertex. */
+export interface Surface {
+  /** Three coordinates a vertex. */
+  positions: Float32Array;
+  /** One value a vertex, in field units. */
+  values: Float32Array;
+  /** Three vertices a triangle, counter-clockwise when seen from the side that they face. */
+  indices: Uint32Array;
+}
+
+/** The mesh in a plane. */
+export interface Slice extends Surface {
+  /** Two vertices an edge of a cell. */
+  edges: Uint32Array;
+}
+
+/** A field along a line: linear in each of the parts, which are in the order of the line; gaps are outside of the domain. */
+export interface LineProfile {
+  /** Where each part begins and ends, as fractions of the line: two numbers a part. */
+  at: Float64Array;
+  /** The values there: two a part, in field units. */
+  values: Float64Array;
+  /** The tetrahedron of each part. */
+  tets: Uint32Array;
+}
+
+/** A line that follows a vector field. */
+export interface Streamline {
+  /** Three coordinates a point; the seed is the first. */
+  positions: Float64Array;
+  /** When a particle that starts at the seed is there. */
+  times: Float64Array;
+  /** The value of the chosen field at each point, in field units. */
+  values: Float64Array;
+  /** Why it ends. */
+  end: "boundary" | "stagnation" | "length" | "steps";
+}
+
+/** Sums over the mesh; exact for a field that is linear in each tetrahedron. */
+export interface FieldStats {
+  /** In model units, cubed. */
+  volume: number;
+  /** The field's integral, its mean and its standard deviation by volume, in field units. */
+  integral: number;
+  mean: number;
+  deviation: number;
+  /** Smallest and largest value. */
+  min: number;
+  max: number;
+  /** The volume of each bin of the histogram, and below the first and above the last one. */
+  histogram: Float64Array;
+  below: number;
+  above: number;
+  /** Ends of the bins: one more than there are bins. */
+  edges: Float64Array;
+}
+"#;
+
+#[wasm_bindgen]
+extern "C" {
+    /// A surface as typed arrays.
+    #[wasm_bindgen(typescript_type = "Surface")]
+    pub type JsSurface;
+    /// A section as typed arrays.
+    #[wasm_bindgen(typescript_type = "Slice")]
+    pub type JsSlice;
+    /// A field along a line.
+    #[wasm_bindgen(typescript_type = "LineProfile")]
+    pub type JsProfile;
+    /// Streamlines, or `undefined` for seeds outside.
+    #[wasm_bindgen(typescript_type = "(Streamline | undefined)[]")]
+    pub type JsStreamlines;
+    /// Sums over the mesh.
+    #[wasm_bindgen(typescript_type = "FieldStats")]
+    pub type JsStats;
+}
+
+/// The most bins of a histogram.
+const MOST_BINS: u32 = 1 << 20;
+
+#[wasm_bindgen]
+impl CoreSession {
+    /// The isosurfaces of the current mesh at some values, as one; with normals of the field's gradient or of the triangles.
+    pub fn isosurfaces(&mut self, values: &[f64], smooth: bool) -> Result<JsIsoSurface, WebError> {
+        let session = self.session_mut();
+        session.set_normal_kind(if smooth { NormalKind::Smooth } else { NormalKind::Gradient });
+        let surface = session.isosurfaces(values)?;
+        let js = iso_surface(surface);
+        set(js.as_ref(), "values", &Float32Array::from(&surface.values[..]));
+        Ok(js)
+    }
+
+    /// The section of the current mesh with the plane `normal · p = offset`.
+    pub fn slice(&mut self, normal: &[f64], offset: f64) -> Result<JsSlice, WebError> {
+        let normal = point(normal, "normal")?;
+        if normal == [0.0; 3] || !offset.is_finite() {
+            return Err(WebError::bad_option(
+                "plane",
+                "must have a normal of some length and a finite offset",
+            ));
+        }
+        let slice = self.session_mut().slice(&Plane { normal, offset })?;
+        let js = surface(slice.positions(), slice.values(), slice.indices());
+        let mut edges = Vec::new();
+        slice.cell_edges(&mut edges);
+        set(&js, "edges", &Uint32Array::from(edges.as_flattened()));
+        Ok(js.unchecked_into())
+    }
+
+    /// The boundary of the current mesh.
+    pub fn surface(&mut self) -> Result<JsSurface, WebError> {
+        self.known()?;
+        let mut boundary = BoundarySurface::new();
+        boundary.extract(&self.session_mut().view());
+        Ok(surface(&boundary.positions, &boundary.values, &boundary.indices).unchecked_into())
+    }
+
+    /// The field at some points, three coordinates each; NaN outside of the mesh.
+    pub fn probe(&mut self, points: &[f64]) -> Result<Vec<f64>, WebError> {
+        self.known()?;
+        let points = all_points(points, "points")?;
+        let mut probe = Probe::new(self.session_mut().view());
+        let places = probe.locate_all(points);
+        Ok(places.iter().map(|p| p.map_or(f64::NAN, |p| p.value(probe.mesh()))).collect())
+    }
+
+    /// The field along a line.
+    pub fn line(&mut self, from: &[f64], to: &[f64]) -> Result<JsProfile, WebError> {
+        self.known()?;
+        let (from, to) = (point(from, "from")?, point(to, "to")?);
+        let probe = Probe::new(self.session_mut().view());
+        let spans = probe.line(from, to);
+        let at: Vec<f64> = spans.iter().flat_map(|span| [span.from, span.to]).collect();
+        let ends = spans.iter().flat_map(|span| [span.entry, span.exit]);
+        let values: Vec<f64> = ends.map(|place| place.value(probe.mesh())).collect();
+        let tets: Vec<u32> = spans.iter().map(|span| span.entry.tet).collect();
+        let js = Object::new();
+        set(&js, "at", &Float64Array::from(&at[..]));
+        set(&js, "values", &Float64Array::from(&values[..]));
+        set(&js, "tets", &Uint32Array::from(&tets[..]));
+        Ok(js.unchecked_into())
+    }
+
+    /// The streamlines from some seeds, three coordinates each, through the vector field of three fields.
+    #[allow(clippy::too_many_arguments, reason = "JavaScript names them")]
+    pub fn streamlines(
+        &mut self,
+        x: &str,
+        y: &str,
+        z: &str,
+        seeds: &[f64],
+        backward: bool,
+        max_length: f64,
+        max_steps: f64,
+    ) -> Result<JsStreamlines, WebError> {
+        let info = self.known()?;
+        let mut fields = [0; 3];
+        for (field, name) in fields.iter_mut().zip([x, y, z]) {
+            *field = field_index(info, name)?;
+        }
+        let seeds = all_points(seeds, "seeds")?;
+        if max_length.is_nan() || max_steps.is_nan() {
+            return Err(WebError::bad_option("maxLength", "must be a number, and `maxSteps` too"));
+        }
+        // The cast saturates.
+        let options =
+            TraceOptions { backward, max_length, max_steps: max_steps as u32, ..TraceOptions::default() };
+        let session = self.session_mut();
+        let vectors = fields.map(|field| session.values(field));
+        let mesh = session.view();
+        let mut tracer = Tracer::new(mesh, vectors.each_ref().map(|v| &v[..]));
+        let line = |seed: &[f64; 3]| {
+            let line = tracer.trace(*seed, &options);
+            line.map_or(JsValue::UNDEFINED, |line| streamline(&line, mesh.field, mesh.tets))
+        };
+        Ok(seeds.iter().map(line).collect::<Array>().unchecked_into())
+    }
+
+    /// Sums over the current mesh, and a histogram by volume of so many bins from `low` to `high`.
+    pub fn stats(&mut self, bins: u32, low: f64, high: f64) -> Result<JsStats, WebError> {
+        let field = self.session_mut().field();
+        let info = &self.known()?.fields[field];
+        let low = if low.is_nan() { info.min } else { low };
+        let high = if high.is_nan() { info.min + info.range() } else { high };
+        let sound = low < high && low.is_finite() && high.is_finite();
+        if !sound || bins == 0 || bins > MOST_BINS {
+            return Err(WebError::bad_option(
+                "range",
+                "must be two finite numbers, the smaller first, in 1 to 2^20 bins",
+            ));
+        }
+        let mesh = self.session_mut().view();
+        let stats = FieldStats::of(&mesh);
+        let mut histogram = Histogram::new(low, high, bins as usize);
+        histogram.add_mesh(&mesh);
+        let [min, max] = stats.range();
+        let [below, above] = histogram.outside();
+        let js = Object::new();
+        let numbers = [
+            ("volume", stats.volume()),
+            ("integral", stats.integral()),
+            ("mean", stats.mean()),
+            ("deviation", stats.deviation()),
+            ("min", min),
+            ("max", max),
+            ("below", below),
+            ("above", above),
+        ];
+        numbers.iter().for_each(|(name, number)| set(&js, name, &JsValue::from_f64(*number)));
+        let edges: Vec<f64> = (0..=bins as usize).map(|b| histogram.edge(b)).collect();
+        set(&js, "histogram", &Float64Array::from(&histogram.volumes()[..]));
+        set(&js, "edges", &Float64Array::from(&edges[..]));
+        Ok(js.unchecked_into())
+    }
+}
+
+fn surface(positions: &[[f32; 3]], values: &[f32], indices: &[[u32; 3]]) -> Object {
+    let js = Object::new();
+    set(&js, "positions", &Float32Array::from(positions.as_flattened()));
+    set(&js, "values", &Float32Array::from(values));
+    set(&js, "indices", &Uint32Array::from(indices.as_flattened()));
+    js
+}
+
+fn streamline(line: &Streamline, field: &[f32], tets: &[[u32; 4]]) -> JsValue {
+    let positions: Vec<f64> = line.points.iter().flat_map(|point| point.position).collect();
+    let times: Vec<f64> = line.points.iter().map(|point| point.time).collect();
+    let value = |tet: u32, weights: [f64; 4]| {
+        let values = tets[tet as usize].map(|p| f64::from(field[p as usize]));
+        (0..4).map(|i| weights[i] * values[i]).sum()
+    };
+    let values: Vec<f64> =
+        line.points.iter().map(|point| value(point.place.tet, point.place.weights)).collect();
+    let js = Object::new();
+    set(&js, "positions", &Float64Array::from(&positions[..]));
+    set(&js, "times", &Float64Array::from(&times[..]));
+    set(&js, "values", &Float64Array::from(&values[..]));
+    set(&js, "end", &line.end.name().into());
+    js.into()
+}
+
+/// Setting a property on a fresh ordinary object cannot fail.
+fn set(object: &JsValue, name: &str, value: &JsValue) {
+    let _ = Reflect::set(object, &name.into(), value);
+}
+
+fn point(numbers: &[f64], name: &str) -> Result<[f64; 3], WebError> {
+    match numbers {
+        &[x, y, z] if [x, y, z].iter().all(|number| number.is_finite()) => Ok([x, y, z]),
+        _ => Err(WebError::bad_option(name, "must be three finite numbers")),
+    }
+}
+
+fn all_points<'a>(numbers: &'a [f64], name: &str) -> Result<&'a [[f64; 3]], WebError> {
+    let (points, rest) = numbers.as_chunks::<3>();
+    let sound = rest.is_empty() && numbers.iter().all(|number| number.is_finite());
+    if sound { Ok(points) } else { Err(WebError::bad_option(name, "must be three finite numbers a point")) }
+}
