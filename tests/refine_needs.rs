@@ -14,6 +14,7 @@ use tetralod::geom::Bounds;
 use tetralod::geom::Camera;
 use tetralod::mt::ErrorCode;
 use tetralod::mt::UpdateId;
+use tetralod::refine::ANY;
 use tetralod::refine::Budget;
 use tetralod::refine::Criterion;
 use tetralod::refine::Custom;
@@ -266,7 +267,7 @@ struct LodScaled {
 impl Criterion for LodScaled {
     fn judge(&self, tet: &TetLook<'_>) -> Verdict {
         let verdict = self.criterion.rank(tet);
-        Verdict { excess: if verdict.excess >= self.by { 2.0 } else { 0.0 }, slack: 0.0 }
+        Verdict { excess: if verdict.excess >= self.by { 2.0 } else { 0.0 }, slack: 0.0, dial: ANY }
     }
 }
 
@@ -308,7 +309,8 @@ proptest! {
         let level = |f: usize| levels.map(|x| (x * f64::from((1 << info.fields[f].bits) - 1)) as i32);
         let look = TetLook { corners: &corners, levels: &level, error: ErrorCode::at_least(error * error), update: UpdateId(3) };
         let [old, new] = [&before, &after].map(|criterion| criterion.judge(&look));
-        let distance = after.distance(&before);
+        let distance = after.turned(&before, old.dial);
+        prop_assert!(distance <= after.distance(&before));
         prop_assert!(old.asks() == new.asks() || old.slack <= distance, "{:?} {:?} {}", old, new, distance);
         prop_assert_eq!(old.asks(), before.rank(&look).asks());
         prop_assert_eq!(before.distance(&before), 0.0);

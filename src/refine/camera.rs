@@ -1,9 +1,11 @@
 //! What a camera sees: its pyramid of vision, and how large an error looks.
 
 use super::View;
+use super::criterion::ANY;
 use super::criterion::Frame;
 use super::criterion::TetLook;
 use super::criterion::Verdict;
+use super::criterion::dial_of;
 use super::game::Rows;
 use super::shape::Plane;
 use glam::DMat4;
@@ -79,7 +81,7 @@ impl Camera {
             if let Some((plane, limit)) = limit {
                 rows.push(plane.distances(corners).map(|depth| depth - limit));
             }
-            rows.least(threshold)
+            rows.least_by(threshold)
         };
         match &self.depth {
             Depth::Parallel { pixels: scale } => {
@@ -88,20 +90,20 @@ impl Camera {
                     // Another scale is far away, but the same one will never ask.
                     return Verdict::NEVER;
                 }
-                let outside = seen(margin, None);
+                let (outside, side) = seen(margin, None);
                 let slack = (outside - margin).abs() / frame.reach;
-                Verdict { excess: if outside <= margin { excess } else { 0.0 }, slack }
+                Verdict { excess: if outside <= margin { excess } else { 0.0 }, slack, dial: dial_of(side) }
             }
             Depth::Perspective { plane, pixels: scale } => {
                 let deepest = self.deepest(frame);
                 let limit = (length * scale / pixels).min(2.0 * deepest);
-                let outside = seen(margin, Some((plane, limit)));
+                let (outside, side) = seen(margin, Some((plane, limit)));
                 let slack = (outside - margin).abs() / frame.reach;
                 if outside > margin {
-                    return Verdict { excess: 0.0, slack };
+                    return Verdict { excess: 0.0, slack, dial: dial_of(side) };
                 }
                 if !ranked {
-                    return Verdict { excess: 2.0, slack };
+                    return Verdict { excess: 2.0, slack, dial: ANY };
                 }
                 // The nearest depth on a fixed scale: the same for all tetrahedra, so that a larger error at the same place is
                 // never the less urgent.
@@ -109,11 +111,11 @@ impl Camera {
                 let (mut near, mut far) = (0, STEPS);
                 while near + 1 < far {
                     let middle = usize::midpoint(near, far);
-                    let is_seen = seen(margin, Some((plane, at(middle)))) <= margin;
+                    let is_seen = seen(margin, Some((plane, at(middle)))).0 <= margin;
                     *(if is_seen { &mut near } else { &mut far }) = middle;
                 }
                 let excess = length * scale / (pixels.max(f64::MIN_POSITIVE) * at(near)) / STEP;
-                Verdict { excess: excess.clamp(1.0 + f64::EPSILON, f64::MAX), slack }
+                Verdict { excess: excess.clamp(1.0 + f64::EPSILON, f64::MAX), slack, dial: ANY }
             }
         }
     }
@@ -126,11 +128,25 @@ impl Camera {
         }
     }
 
+    /// How much nearer a side of the pyramid of vision may have come, by its number, or with number 4 the depth up to which
+    /// errors look large.
+    pub fn turned(&self, pixels: f64, before: &Self, before_pixels: f64, frame: &Frame, side: usize) -> f64 {
+        if let (Some(a), Some(b)) = (self.sides.get(side), before.sides.get(side)) {
+            return a.approach(b, frame.half) / frame.reach;
+        }
+        self.depth_difference(pixels, before, before_pixels, frame) / frame.reach
+    }
+
     /// How far this camera is from another one, in parts of the domain's reach.
     pub fn distance(&self, pixels: f64, other: &Self, other_pixels: f64, frame: &Frame) -> f64 {
         let sides = self.sides.iter().zip(&other.sides);
         let turned = sides.fold(0.0, |m: f64, (a, b)| m.max(a.difference(b, frame.half)));
-        let depths = match (&self.depth, &other.depth) {
+        turned.max(self.depth_difference(pixels, other, other_pixels, frame)) / frame.reach
+    }
+
+    /// How much the functions of the two that tell by the depth whether an error looks large can differ.
+    fn depth_difference(&self, pixels: f64, other: &Self, other_pixels: f64, frame: &Frame) -> f64 {
+        match (&self.depth, &other.depth) {
             (Depth::Perspective { plane: a, pixels: p }, Depth::Perspective { plane: b, pixels: q }) => {
                 // A limit is the error's length times such a scale, or twice the largest depth where that is less.
                 let (s, t) = (p / pixels, q / other_pixels);
@@ -151,8 +167,7 @@ impl Camera {
                 0.0
             }
             _ => f64::INFINITY,
-        };
-        turned.max(depths) / frame.reach
+        }
     }
 }
 

@@ -38,11 +38,23 @@ pub struct Verdict {
     /// How far the criterion may move (see [`Criterion::distance`]) before the tetrahedron can begin or cease to violate it.
     /// Any smaller number is right as well.
     pub slack: f64,
+    /// Which movement counts: [`ANY`], or one of the criterion's own, up to [`DIALS`] - 1.
+    pub dial: u8,
 }
+
+/// Any movement of the criterion.
+pub const ANY: u8 = 0;
+/// So many sorts of movement can be told apart.
+pub const DIALS: usize = 8;
+/// Planes of regions, and what a camera's picture ends at, move apart from each other: this and the next ones.
+const PLANES: u8 = 1;
+const PLANE_DIALS: usize = 6;
+/// Tolerances do.
+const TOLERANCE: u8 = 7;
 
 impl Verdict {
     /// What no criterion of the same kind will ever ask for.
-    pub const NEVER: Self = Self { excess: 0.0, slack: f64::INFINITY };
+    pub const NEVER: Self = Self { excess: 0.0, slack: f64::INFINITY, dial: ANY };
 
     /// Whether the tetrahedron violates the request.
     #[inline]
@@ -58,9 +70,12 @@ impl Verdict {
         match (self.asks(), other.asks()) {
             (true, false) => self,
             (false, true) => other,
+            (false, false) if other.slack == f64::INFINITY && other.excess == 0.0 => self,
+            (false, false) if self.slack == f64::INFINITY && self.excess == 0.0 => other,
             (asks, _) => Self {
                 excess: self.excess.max(other.excess),
                 slack: if asks { self.slack.max(other.slack) } else { self.slack.min(other.slack) },
+                dial: if self.dial == other.dial { self.dial } else { ANY },
             },
         }
     }
@@ -108,6 +123,12 @@ pub trait Criterion: Any + fmt::Debug + Send + Sync {
     fn distance(&self, before: &dyn Criterion) -> f64 {
         let _ = before;
         f64::INFINITY
+    }
+
+    /// The part of that distance which counts for verdicts of one [`Verdict::dial`].
+    fn turned(&self, before: &dyn Criterion, dial: u8) -> f64 {
+        let _ = dial;
+        self.distance(before)
     }
 }
 
@@ -341,6 +362,17 @@ impl Criterion for LodCriterion {
         let custom = custom.map(|(a, b)| if Arc::ptr_eq(a, b) { 0.0 } else { a.distance(&**b) });
         own.chain(custom).fold(0.0, f64::max)
     }
+
+    fn turned(&self, before: &dyn Criterion, dial: u8) -> f64 {
+        let any: &dyn Any = before;
+        match any.downcast_ref::<Self>() {
+            Some(other) if dial != ANY && self.custom.is_empty() && self.atoms.len() == other.atoms.len() => {
+                let pairs = self.atoms.iter().zip(&other.atoms);
+                pairs.fold(0.0, |m, (a, b)| f64::max(m, a.turned(b, &self.frame, dial)))
+            }
+            _ => self.distance(before),
+        }
+    }
 }
 
 impl Atom {
@@ -355,8 +387,20 @@ impl Atom {
                 if change <= 0.0 {
                     return Verdict::NEVER;
                 }
-                Verdict { excess: change / error, slack: (octaves(change) - octaves(error)).abs() }
+                let slack = (octaves(change) - octaves(error)).abs();
+                Verdict { excess: change / error, slack, dial: ANY }
             }
+        }
+    }
+
+    /// The part of the distance that counts for one dial; not [`ANY`].
+    fn turned(&self, before: &Self, frame: &Frame, dial: u8) -> f64 {
+        match (self, before) {
+            (Self::Field(a), Self::Field(b)) => a.turned(b, frame, dial),
+            (Self::View { pixels: p, camera: a }, Self::View { pixels: q, camera: b }) => {
+                a.turned(*p, b, *q, frame, usize::from(dial - PLANES))
+            }
+            _ => self.distance(before, frame),
         }
     }
 
@@ -374,6 +418,11 @@ impl Atom {
     }
 }
 
+/// The dial of a plane.
+pub(super) fn dial_of(plane: Option<usize>) -> u8 {
+    plane.map_or(ANY, |plane| PLANES + (plane % PLANE_DIALS) as u8)
+}
+
 /// Errors have codes that are 2^11 to the octave. An octave is as much as sixteen ways through the domain: regions move often,
 /// tolerances seldom, and what waits for the one is not to be woken by the other.
 const CODES: f64 = 2048.0 / OCTAVE;
@@ -388,22 +437,34 @@ impl FieldAtom {
     fn judge(&self, frame: &Frame, tet: &TetLook<'_>, corners: &[DVec3; 4]) -> Verdict {
         let exceeds = tet.error > self.tolerance;
         let mut conditions = Conditions::new();
-        conditions.add(exceeds, octaves_between(tet.error, self.tolerance));
+        conditions.add(exceeds, octaves_between(tet.error, self.tolerance), TOLERANCE);
         if let Some(range) = &self.values {
             let inside = range.inside(&(tet.levels)(range.field), tet.error.error());
-            conditions.add(inside >= 0.0, inside.abs() / range.levels);
+            conditions.add(inside >= 0.0, inside.abs() / range.levels, ANY);
         }
         // The dearest comes last, and only where it can matter.
         if let Some(shape) = &self.shape {
             let margin = frame.margin(tet);
-            let outside = shape.least(corners, margin);
-            conditions.add(outside <= margin, (outside - margin).abs() / frame.reach);
+            let (outside, plane) = shape.least(corners, margin);
+            conditions.add(outside <= margin, (outside - margin).abs() / frame.reach, dial_of(plane));
         }
         if !conditions.all {
-            return Verdict { excess: 0.0, slack: conditions.missing };
+            return Verdict { excess: 0.0, slack: conditions.missing, dial: conditions.dial };
         }
         let excess = tet.error.error() / self.tolerance.error().max(LEAST_ERROR);
-        Verdict { excess, slack: conditions.held }
+        Verdict { excess, slack: conditions.held, dial: ANY }
+    }
+
+    fn turned(&self, before: &Self, frame: &Frame, dial: u8) -> f64 {
+        if dial == TOLERANCE {
+            return octaves_between(self.tolerance, before.tolerance);
+        }
+        match (&self.shape, &before.shape) {
+            (Some(a), Some(b)) => {
+                a.approach(b, frame.half, usize::from(dial - PLANES), PLANE_DIALS) / frame.reach
+            }
+            _ => 0.0,
+        }
     }
 
     fn distance(&self, before: &Self, frame: &Frame) -> f64 {
@@ -430,22 +491,25 @@ struct Conditions {
     all: bool,
     /// The least that any one which holds can lose.
     held: f64,
-    /// The most that any one which does not hold lacks.
+    /// The most that any one which does not hold lacks, and what it waits for.
     missing: f64,
+    dial: u8,
 }
 
 impl Conditions {
     fn new() -> Self {
-        Self { all: true, held: f64::INFINITY, missing: 0.0 }
+        Self { all: true, held: f64::INFINITY, missing: 0.0, dial: ANY }
     }
 
     #[inline]
-    fn add(&mut self, holds: bool, slack: f64) {
+    fn add(&mut self, holds: bool, slack: f64, dial: u8) {
         if holds {
             self.held = self.held.min(slack);
         } else {
+            if self.all || slack > self.missing {
+                (self.missing, self.dial) = (slack, dial);
+            }
             self.all = false;
-            self.missing = self.missing.max(slack);
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Criteria of the caller's own.
 
+use super::ANY;
 use super::Criterion;
 use super::TetLook;
 use super::Verdict;
@@ -47,7 +48,7 @@ impl<F: Fn(&TetLook<'_>) -> f64 + Send + Sync + 'static> Criterion for Custom<F>
     fn judge(&self, tet: &TetLook<'_>) -> Verdict {
         let excess = (self.excess)(tet);
         // NaN asks for nothing. As nobody knows how long that is so, it is looked at again with every change.
-        Verdict { excess: if excess > 0.0 { excess } else { 0.0 }, slack: 0.0 }
+        Verdict { excess: if excess > 0.0 { excess } else { 0.0 }, slack: 0.0, dial: ANY }
     }
 
     fn is_monotone(&self) -> bool {

@@ -1,7 +1,9 @@
 //! The front: which updates are applied, and how it moves when the request changes.
 
+use super::ANY;
 use super::Budget;
 use super::Criterion;
+use super::DIALS;
 use super::TetLook;
 use super::Verdict;
 use super::ranked::Ranked;
@@ -68,7 +70,7 @@ enum Way {
 struct Asked {
     update: UpdateId,
     tet: u32,
-    slack: f64,
+    verdict: Verdict,
 }
 
 /// What has been done on the way to a goal, and how good the mesh is.
@@ -91,6 +93,9 @@ pub struct Outcome {
     /// Whether the mesh is what was asked for; false when the budget did not allow it, or data is missing.
     pub satisfied: bool,
 }
+
+/// Tetrahedra that are judged together.
+const AT_ONCE: usize = 64;
 
 /// A violation that lasts so long need not be outdone by another one.
 const LONG: f64 = 1.0 / 16.0;
@@ -167,31 +172,34 @@ impl Front {
     pub fn aim(&mut self, mt: &impl MultiTessellation, criterion: Arc<dyn Criterion>, budget: Budget) {
         let before = self.goal.take();
         let distance = before.as_ref().map_or(f64::INFINITY, |goal| criterion.distance(&*goal.criterion));
-        let same = distance == 0.0 && before.as_ref().is_some_and(|goal| goal.budget == budget);
         match before {
-            Some(goal) if same => self.goal = Some(goal),
-            _ => {
+            Some(goal) if distance == 0.0 && goal.budget == budget => self.goal = Some(goal),
+            before => {
+                self.move_watch(distance, &*criterion, before.as_ref().map(|goal| &*goal.criterion));
+                self.ranked.clear();
                 let outcome = Outcome::default();
                 self.goal = Some(Goal { criterion, budget, reached: false, outcome });
-                self.move_watch(distance);
-                self.ranked.clear();
             }
         }
         self.learn(mt);
     }
 
     /// The criterion has moved: verdicts whose slack is used up are void.
-    fn move_watch(&mut self, distance: f64) {
+    fn move_watch(&mut self, distance: f64, criterion: &dyn Criterion, before: Option<&dyn Criterion>) {
         // Those judged for the last goal only.
         for asked in std::mem::take(&mut self.pending) {
             self.tets.open(asked.tet);
         }
-        let monotone = self.goal.as_ref().is_none_or(|goal| goal.criterion.is_monotone());
-        if self.watched && monotone && distance.is_finite() {
-            self.tets.advance(distance);
-            self.leaves.advance(distance);
-        } else {
-            self.forget_watch();
+        match before {
+            Some(before) if self.watched && criterion.is_monotone() && distance.is_finite() => {
+                for dial in 0..DIALS as u8 {
+                    let moved =
+                        if dial == ANY { distance } else { criterion.turned(before, dial).min(distance) };
+                    self.tets.advance(moved, dial);
+                    self.leaves.advance(moved, dial);
+                }
+            }
+            _ => self.forget_watch(),
         }
     }
 
@@ -416,7 +424,7 @@ impl Front {
                 }
                 self.force(mt, asked.update, outcome)?;
                 // It is a leaf now; those that it forced are none.
-                self.leaves.defer(asked.update.0, asked.slack);
+                self.leaves.defer(asked.update.0, asked.verdict.slack, asked.verdict.dial);
                 self.open_touched();
                 if !budget.holds(self.mesh.vertex_count(), self.mesh.tet_count()) {
                     return Ok(Way::Full);
@@ -462,9 +470,7 @@ impl Front {
                 self.judge_batch(mt, criterion, outcome);
             } else {
                 self.tets.sort();
-                while let Some(t) = self.tets.next() {
-                    self.judge_open(mt, criterion, t, outcome);
-                }
+                self.judge_open(mt, criterion, outcome);
             }
             // Parents have smaller numbers: in this order few updates are forced by others that wait too.
             self.pending.sort_unstable_by(|a, b| b.update.cmp(&a.update));
@@ -472,31 +478,38 @@ impl Front {
         self.pending.pop()
     }
 
-    fn judge_open(
-        &mut self,
-        mt: &impl MultiTessellation,
-        criterion: &dyn Criterion,
-        t: u32,
-        outcome: &mut Outcome,
-    ) {
-        let Some(tet) = self.mesh.tet(t) else { return };
-        let Some(update) = mt.remover(&self.mesh, t) else {
-            if self.known < mt.info().updates {
-                self.unknown.push(t);
+    /// Judges all open tetrahedra, some at a time: what they need is fetched from all over the memory for all of them before
+    /// the first is judged.
+    fn judge_open(&mut self, mt: &impl MultiTessellation, criterion: &dyn Criterion, outcome: &mut Outcome) {
+        let mut fetched = Vec::with_capacity(AT_ONCE);
+        while !self.tets.is_settled() {
+            fetched.clear();
+            while fetched.len() < AT_ONCE {
+                let Some(t) = self.tets.next() else { break };
+                let Some(tet) = self.mesh.tet(t) else { continue };
+                match mt.remover(&self.mesh, t) {
+                    Some(u) => {
+                        fetched.push((t, tet, u, mt.error(u), tet.map(|v| self.mesh.positions[v as usize])));
+                    }
+                    None if self.known < mt.info().updates => self.unknown.push(t),
+                    None => {}
+                }
             }
-            return;
-        };
-        let error = mt.error(update);
-        let verdict = see(&self.mesh, &tet, error, update, |look| criterion.judge(look));
-        outcome.judged += 1;
-        self.take_verdict(t, update, verdict);
+            outcome.judged += fetched.len() as u64;
+            for (t, tet, update, error, corners) in &fetched {
+                let levels = |field: usize| tet.map(|v| self.mesh.levels(v)[field]);
+                let look = TetLook { corners, levels: &levels, error: *error, update: *update };
+                let verdict = criterion.judge(&look);
+                self.take_verdict(*t, *update, verdict);
+            }
+        }
     }
 
     fn take_verdict(&mut self, tet: u32, update: UpdateId, verdict: Verdict) {
         if verdict.asks() {
-            self.pending.push(Asked { update, tet, slack: verdict.slack });
+            self.pending.push(Asked { update, tet, verdict });
         } else {
-            self.tets.defer(tet, verdict.slack);
+            self.tets.defer(tet, verdict.slack, verdict.dial);
         }
     }
 
@@ -540,7 +553,7 @@ impl Front {
             // It is looked at again when the child that is in the way is undone.
             None => Ok(false),
             Some(verdict) if verdict.asks() => {
-                self.leaves.defer(u.0, verdict.slack);
+                self.leaves.defer(u.0, verdict.slack, verdict.dial);
                 Ok(false)
             }
             Some(verdict) => {
@@ -550,7 +563,7 @@ impl Front {
                 for i in 0..self.mesh.touched().len() {
                     let t = self.mesh.touched()[i];
                     if self.mesh.tet(t).is_some() {
-                        self.tets.defer(t, verdict.slack);
+                        self.tets.defer(t, verdict.slack, verdict.dial);
                     }
                 }
                 self.mesh.clear_touched();
@@ -591,7 +604,7 @@ impl Front {
         ranked: bool,
     ) -> Result<Option<Verdict>, UpdateError> {
         let error = mt.error(u);
-        let mut all = Verdict { excess: 0.0, slack: f64::INFINITY };
+        let mut all = Verdict::NEVER;
         let mut look = |corners: &[[i32; 3]; 4], levels: &dyn Fn(usize) -> [i32; 4]| {
             let look = TetLook { corners, levels, error, update: u };
             let one = if ranked { criterion.rank(&look) } else { criterion.judge(&look) };

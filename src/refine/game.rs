@@ -29,16 +29,28 @@ impl Rows {
     /// value on the same side of `threshold` and no further from it. Without functions, minus infinity.
     #[inline]
     pub fn least(&self, threshold: f64) -> f64 {
+        self.least_by(threshold).0
+    }
+
+    /// The same, and if one function alone decides that it exceeds `threshold`, which.
+    #[inline]
+    pub fn least_by(&self, threshold: f64) -> (f64, Option<usize>) {
         let rows = &self.values[..self.len];
         // Some function is at least so much at all corners.
-        let low = rows.iter().fold(f64::NEG_INFINITY, |l, row| l.max(smallest(row)));
+        let (mut low, mut by) = (f64::NEG_INFINITY, 0);
+        for (k, row) in rows.iter().enumerate() {
+            let least = smallest(row);
+            if least > low {
+                (low, by) = (least, k);
+            }
+        }
         if low > threshold || rows.is_empty() {
-            return low;
+            return (low, Some(by));
         }
         // At some corner all functions are at most so much.
         let worst = |i: usize| rows.iter().fold(f64::NEG_INFINITY, |m, row| m.max(row[i]));
         let high = (0..4).fold(f64::INFINITY, |m, i| m.min(worst(i)));
-        if high <= threshold { high } else { self.solve(low, high) }
+        (if high <= threshold { high } else { self.solve(low, high) }, None)
     }
 
     /// The value of the matrix game in which one player names a function and the other a point of the tetrahedron, by the

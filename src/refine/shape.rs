@@ -46,6 +46,11 @@ impl Plane {
     pub fn difference(&self, other: &Self, reach: DVec3) -> f64 {
         (self.normal - other.normal).abs().dot(reach) + (self.offset - other.offset).abs()
     }
+
+    /// By how much the distance of such a point can have become less than it was from `before`.
+    pub fn approach(&self, before: &Self, reach: DVec3) -> f64 {
+        (self.normal - before.normal).abs().dot(reach) + (self.offset - before.offset).max(0.0)
+    }
 }
 
 impl Shape {
@@ -83,34 +88,47 @@ impl Shape {
     }
 
     /// The least value of the function over a tetrahedron, so far as that decides whether it exceeds `threshold`: a value on
-    /// the same side and no further from it.
+    /// the same side and no further from it. If one plane alone decides that it does, which.
     #[inline]
-    pub fn least(&self, corners: &[DVec3; 4], threshold: f64) -> f64 {
+    pub fn least(&self, corners: &[DVec3; 4], threshold: f64) -> (f64, Option<usize>) {
         match self {
             Self::Planes(planes) => {
                 let mut rows = Rows::new();
-                for plane in planes {
+                let mut furthest = (f64::NEG_INFINITY, 0);
+                for (k, plane) in planes.iter().enumerate() {
                     let values = plane.distances(corners);
-                    // One plane with all corners beyond it is enough.
+                    // One plane with all corners beyond it is enough; the one that is furthest lasts longest.
                     let nearest = values.iter().fold(f64::INFINITY, |m, &v| m.min(v));
-                    if nearest > threshold {
-                        return nearest;
+                    if nearest > furthest.0 {
+                        furthest = (nearest, k);
                     }
                     // A side at infinity bounds nothing.
                     if nearest > f64::NEG_INFINITY {
                         rows.push(values);
                     }
                 }
-                rows.least(threshold)
+                if furthest.0 > threshold {
+                    return (furthest.0, Some(furthest.1));
+                }
+                (rows.least(threshold), None)
             }
             Self::Ball { centre, radius } => {
                 let nearest = corners.iter().fold(f64::INFINITY, |m, p| m.min(p.distance(*centre)));
-                if nearest - radius <= threshold {
-                    nearest - radius
-                } else {
-                    distance(corners, *centre) - radius
-                }
+                let outside =
+                    if nearest - radius <= threshold { nearest } else { distance(corners, *centre) };
+                (outside - radius, None)
             }
+        }
+    }
+
+    /// By how much planes whose number leaves the remainder `k` by `n` can have come nearer than they were in `before`.
+    pub fn approach(&self, before: &Self, reach: DVec3, k: usize, n: usize) -> f64 {
+        match (self, before) {
+            (Self::Planes(a), Self::Planes(b)) if a.len() == b.len() => {
+                let pairs = a.iter().zip(b).skip(k).step_by(n);
+                pairs.fold(0.0, |m, (a, b)| m.max(a.approach(b, reach)))
+            }
+            _ => self.difference(before, reach),
         }
     }
 

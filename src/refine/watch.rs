@@ -6,6 +6,8 @@
 //! ends in, so never too late and by at most an eighth of its slack too early, at a constant cost each time. Deferred lists of
 //! priorities in ROAM (Duchaineau et al. 1997) and timing wheels (Varghese and Lauck 1987) are the ideas behind this.
 
+use super::DIALS;
+
 /// Slacks from 2^-24 to 2^4 are told apart.
 const WHEELS: i32 = 28;
 /// The exponent of the first wheel.
@@ -14,6 +16,8 @@ const FIRST: i32 = -24;
 const FINE: i32 = 3;
 /// Slots of a wheel: more than any slack in it can be away.
 const SLOTS: usize = 4 << FINE;
+/// Slots of a dial.
+const DIAL: usize = WHEELS as usize * SLOTS;
 /// To be judged: in [`Waiting::open`].
 const OPEN: u16 = u16::MAX - 1;
 /// Not waiting for anything.
@@ -28,8 +32,8 @@ pub(super) struct Waiting {
     slots: Vec<Vec<u32>>,
     /// What is to be judged now; here, too, entries may have moved on.
     open: Vec<u32>,
-    /// How far the criterion has moved in all.
-    now: f64,
+    /// How far the criterion has moved in all, by dial.
+    now: [f64; DIALS],
 }
 
 impl Waiting {
@@ -67,10 +71,10 @@ impl Waiting {
         self.open.is_empty()
     }
 
-    /// Has thing `id` judged again before the criterion has moved by more than `slack`.
+    /// Has thing `id` judged again before that has moved by more than `slack` which the dial stands for.
     #[inline]
-    pub fn defer(&mut self, id: u32, slack: f64) {
-        let slot = self.slot(slack);
+    pub fn defer(&mut self, id: u32, slack: f64, dial: u8) {
+        let slot = self.slot(slack, usize::from(dial) % DIALS);
         if self.place.len() <= id as usize {
             self.place.resize(id as usize + 1, NOWHERE);
         }
@@ -82,7 +86,7 @@ impl Waiting {
         *place = slot;
         if slot != NOWHERE {
             if self.slots.is_empty() {
-                self.slots.resize(WHEELS as usize * SLOTS, Vec::new());
+                self.slots.resize(DIALS * DIAL, Vec::new());
             }
             self.slots[slot as usize].push(id);
         }
@@ -90,7 +94,7 @@ impl Waiting {
 
     /// The slot in which a slack that begins now ends.
     #[inline]
-    fn slot(&self, slack: f64) -> u16 {
+    fn slot(&self, slack: f64, dial: usize) -> u16 {
         if slack == f64::INFINITY {
             return NOWHERE;
         }
@@ -100,17 +104,19 @@ impl Waiting {
         let wheel = (exponent - FIRST).clamp(0, WHEELS - 1);
         let per_slot = power(FINE - FIRST - wheel);
         // A slack that is too large for the last wheel ends in it all the same.
-        let end = self.now + slack.min(power(FIRST + wheel + 1));
-        let first = (self.now * per_slot) as u64;
+        let now = self.now[dial];
+        let end = now + slack.min(power(FIRST + wheel + 1));
+        let first = (now * per_slot) as u64;
         // What is too small for the first wheel can end at any moment: that is the slot which begins next.
         let slot = ((end * per_slot) as u64).max(first + 1);
-        (wheel as usize * SLOTS + slot as usize % SLOTS) as u16
+        (dial * DIAL + wheel as usize * SLOTS + slot as usize % SLOTS) as u16
     }
 
-    /// The criterion moves on by `distance`, which is finite: what waits for less is to be judged.
-    pub fn advance(&mut self, distance: f64) {
-        let (from, to) = (self.now, self.now + distance);
-        self.now = to;
+    /// A dial moves on by `distance`, which is finite: what waits for less is to be judged.
+    pub fn advance(&mut self, distance: f64, dial: u8) {
+        let dial = usize::from(dial) % DIALS;
+        let (from, to) = (self.now[dial], self.now[dial] + distance);
+        self.now[dial] = to;
         if self.slots.is_empty() || distance <= 0.0 {
             return;
         }
@@ -121,7 +127,7 @@ impl Waiting {
             let last = if wheel == 0 { last.max(first + 1) } else { last };
             let turned = (last - first).min(SLOTS as u64);
             for slot in (0..turned).map(|i| (last - i) as usize % SLOTS) {
-                self.flush(wheel as usize * SLOTS + slot);
+                self.flush(dial * DIAL + wheel as usize * SLOTS + slot);
             }
         }
     }
@@ -168,18 +174,18 @@ mod tests {
         let mut waiting = Waiting::default();
         let mut since = vec![0.0; slacks.len()];
         let mut looks = vec![0; slacks.len()];
-        slacks.iter().enumerate().for_each(|(id, &slack)| waiting.defer(id as u32, slack));
+        slacks.iter().enumerate().for_each(|(id, &slack)| waiting.defer(id as u32, slack, 2));
         let mut now = 0.0;
         for step in 0..3000 {
             let next = now + 1e-3 + f64::from(step % 7) * 1e-4;
             // Whoever's slack ends on this step is judged on it.
-            waiting.advance(next - now);
+            waiting.advance(next - now, 2);
             let mut seen = vec![false; slacks.len()];
             while let Some(id) = waiting.next() {
                 seen[id as usize] = true;
                 looks[id as usize] += 1;
                 since[id as usize] = next;
-                waiting.defer(id, slacks[id as usize]);
+                waiting.defer(id, slacks[id as usize], 2);
             }
             for id in 0..slacks.len() {
                 assert!(seen[id] || next - since[id] <= slacks[id] + 1e-12, "{id} at {next}");
@@ -195,11 +201,13 @@ mod tests {
     #[test]
     fn what_can_never_change_is_never_looked_at() {
         let mut waiting = Waiting::default();
-        waiting.defer(3, f64::INFINITY);
-        waiting.defer(5, f64::NAN);
-        waiting.advance(1e-9);
+        waiting.defer(3, f64::INFINITY, 0);
+        waiting.defer(5, f64::NAN, 0);
+        waiting.advance(1e-9, 1);
+        assert!(waiting.is_settled(), "another dial");
+        waiting.advance(1e-9, 0);
         assert_eq!((waiting.next(), waiting.next()), (Some(5), None));
-        waiting.advance(1e9);
+        waiting.advance(1e9, 0);
         assert!(waiting.is_settled());
     }
 }
