@@ -698,8 +698,8 @@ impl Front {
         }
     }
 
-    /// The largest error and the largest excess of all tetrahedra that violate the criterion; the largest that can be left
-    /// and 1 if none does. Takes time in proportion to the mesh.
+    /// The largest error that can be left where something is wanted, and the largest excess of all tetrahedra that violate the
+    /// criterion; 1 if none does. Takes time in proportion to the mesh.
     pub fn largest_violation(
         &self,
         mt: &impl MultiTessellation,
@@ -717,10 +717,8 @@ impl Front {
                 largest = (largest.0.max(error), f64::max(largest.1, verdict.excess));
             }
         }
-        if largest.1 <= 1.0 {
-            largest.0 = criterion.tolerance().min(self.largest_to_come(mt));
-        }
-        largest
+        // What violates nothing is within the tolerance: with several needs, that of another one may be larger.
+        (largest.0.max(criterion.tolerance().min(self.largest_to_come(mt))), largest.1)
     }
 }
 
