@@ -426,6 +426,9 @@ fn view<'a>(front: Option<&'a Front>, shown: &'a Shown) -> MeshView<'a> {
     MeshView { positions: &shown.positions, field: &shown.values, tets, neighbors }
 }
 
+/// A pixel and a colour of which an excess is a meaningful multiple.
+const LEAST_MULTIPLIED: f64 = 1.0 / (1 << 20) as f64;
+
 /// For each need the error that is guaranteed where it counts.
 fn bounds(front: &Front, mt: &Mt, request: &Request, outcome: &Outcome) -> Vec<f64> {
     let error = outcome.error.error();
@@ -434,12 +437,12 @@ fn bounds(front: &Front, mt: &Mt, request: &Request, outcome: &Outcome) -> Vec<f
             let of_field = !matches!(need.part, Part::View(_) | Part::Transfer(_));
             return if of_field { need.error.min(error) } else { need.error };
         }
-        let alone = LodCriterion::new(mt.info(), &need.clone().into());
-        let (error, excess) = front.largest_violation(mt, &alone);
-        match need.part {
-            Part::View(_) | Part::Transfer(_) => need.error * excess,
-            _ => error.error(),
-        }
+        let measured = matches!(need.part, Part::View(_) | Part::Transfer(_));
+        // No multiple of 0 says how large an error is.
+        let asked = if measured { need.error.max(LEAST_MULTIPLIED) } else { need.error };
+        let alone = Need { error: asked, part: need.part.clone() };
+        let (error, excess) = front.largest_violation(mt, &LodCriterion::new(mt.info(), &alone.into()));
+        if measured { asked * excess } else { error.error() }
     };
     request.needs.iter().map(bound).collect()
 }

@@ -275,7 +275,8 @@ fn several_needs_are_all_met() {
 #[test]
 fn budgets_and_steps_stop_with_a_valid_mesh() {
     let folder = Folder::new("budgets");
-    let [input, mt, out, again] = ["b.vti", "b.mt", "out.vtu", "again.mt"].map(|name| folder.path(name));
+    let [input, mt, out, again, view] =
+        ["b.vti", "b.mt", "out.vtu", "again.mt", "view.json"].map(|name| folder.path(name));
     good(&["generate", "bucky", "--size", "13", "-o", &input]);
     good(&["build", &input, "-o", &mt, "--quiet"]);
     let extract = |more: &[&str]| json(&[&["extract", &mt, "-o", &out, "--json"], more].concat());
@@ -292,6 +293,11 @@ fn budgets_and_steps_stop_with_a_valid_mesh() {
     assert_eq!((&result["satisfied"], &result["done"]), (&false.into(), &true.into()));
     let need = &result["needs"][0];
     assert!(number(need, "bound") > 0.0 && number(&result, "excess") > 1.0, "{result}");
+    let eye = camera([0.5, 0.5, -0.2], [800, 600], 0.0);
+    fs::write(&view, eye.to_string()).expect("a file");
+    let seen = extract(&["--view", &view, "--budget", "3000"]);
+    let need = &seen["needs"][0];
+    assert!(number(need, "asked") == 0.0 && number(need, "bound") > 1.0, "pixels that are left: {seen}");
     for (stop, refined) in [(["--max-updates", "10"], 1.0), (["--max-ms", "0"], 1.0)] {
         let result = extract(&stop);
         assert_eq!((&result["satisfied"], &result["done"]), (&false.into(), &false.into()));
