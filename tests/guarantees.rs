@@ -185,6 +185,28 @@ fn nothing_outside_of_a_region_is_asked_for() {
     }
 }
 
+/// Under a budget some needs are met and others are not: what is reported holds for all of them.
+#[test]
+fn the_error_of_needs_that_are_met_is_reported_too() {
+    let mesh = generate::bucky(11).expect("a valid size");
+    let whole = Bounds::of(&mesh.positions);
+    let corner = Bounds { min: whole.min, max: [0, 1, 2].map(|i| whole.min[i] + 0.3 * whole.extent()[i]) };
+    for (name, how) in KINDS {
+        let mt = how.build(&mesh, None);
+        let everywhere = Request::within(0.2);
+        let least = refined(&mt, &everywhere).mesh().tet_count() as u32;
+        let request = everywhere.and(Need::within(0.0).inside(corner)).at_most(least + least / 4);
+        let criterion = LodCriterion::new(mt.info(), &request);
+        let mut front = Front::new(&mt).expect("a valid base mesh");
+        let outcome = front.satisfy(&mt, &criterion, request.budget).expect("a valid MT");
+        assert!(!outcome.satisfied, "{name}: the budget is too large for this test");
+        let mesh = front.mesh();
+        let removers = (0..mesh.tets().len() as u32).filter_map(|t| mt.remover(mesh, t));
+        let largest = removers.map(|u| mt.error(u)).max();
+        assert!(largest <= Some(outcome.error), "{name}: {largest:?} of {:?}", outcome.error);
+    }
+}
+
 /// The updates that the partial order forces, kind by kind.
 #[test]
 fn forced_updates_of_each_kind() {
