@@ -13,6 +13,11 @@ use tetralod::mt::BaseMesh;
 use tetralod::mt::EdgeMt;
 use tetralod::mt::MtInfo;
 use tetralod::mt::UpdateId;
+use tetralod::refine::Need;
+use tetralod::refine::Region;
+use tetralod::refine::Request;
+use tetralod::refine::Transfer;
+use tetralod::refine::View;
 use tetralod::verify;
 use tetralod::verify::MAX_FAILURES;
 use tetralod::verify::Reference;
@@ -59,6 +64,56 @@ fn errors_that_are_too_small_are_found() {
     fails(&halved, &mesh, "reference vertex");
     let equal = tampered(&mt, |_, parts| parts.error = 1);
     fails(&equal, &mesh, "more than");
+}
+
+/// Every kind of need has its own measure, and none is blind.
+#[test]
+fn errors_that_are_too_small_are_found_by_needs_of_any_kind() {
+    let mesh = cube(9, &[hilly]);
+    let mt = built(&mesh).mt;
+    let lowered = tampered(&mt, |_, parts| parts.error = parts.error.saturating_sub(4 * 2048).max(1));
+    let centre = [0.3, 0.4, 0.6];
+    let ball = Region::Sphere { centre, radius: 0.3 };
+    let halves = [[0.3, 0.3, 0.0], [-0.2, 0.2, 0.0], [0.0, 0.0, 0.3]];
+    let planes = vec![[1.0, 0.0, 0.0, 0.6], [-1.0, 1.0, 0.0, 0.5]];
+    let camera = |pixels: f64| {
+        // Along z, from below.
+        let rows = [[1.0, 0.0, 0.0, -0.3], [0.0, 1.0, 0.0, -0.4], [0.0, 0.0, 1.0, 0.5], [0.0, 0.0, 1.0, 0.5]];
+        let matrix = std::array::from_fn(|i| rows[i % 4][i / 4]);
+        Need::seen(View { matrix, viewport: [400.0, 400.0] }, pixels)
+    };
+    let ramp = vec![(0.2, [0.0; 4]), (0.8, [1.0, 0.5, 0.2, 1.0])];
+    let colours = Transfer { field: 0, points: ramp, unit_length: 1.0 };
+    let inside = |region: Region| Need::within(0.02).inside(region);
+    for (need, words) in [
+        (inside(ball.clone()), "error"),
+        (inside(Region::OrientedBox { centre, halves }), "error"),
+        (inside(Region::HalfSpace { normal: [1.0, 1.0, 0.0], offset: 0.7 }), "error"),
+        (inside(Region::Slab { normal: [0.0, 1.0, 0.0], offset: 0.4, thickness: 0.2 }), "error"),
+        (inside(Region::Convex(planes)), "error"),
+        (Need::within(0.02).between(0, vec![[0.3, 0.6]]), "error"),
+        (inside(ball).around(0, &[0.5]), "error"),
+        (camera(2.0), "error"),
+        (Need::shown(colours, 0.03), "change of colour"),
+    ] {
+        let requests = [Request::from(need.clone()), Request::within(0.5).and(need)];
+        for request in requests {
+            let verified = |mt: &EdgeMt| {
+                verify::run_requests(
+                    mt,
+                    &mesh,
+                    Reference::Mesh,
+                    std::slice::from_ref(&request),
+                    &mut |_, _| {},
+                )
+            };
+            let [good, bad] = [&mt, &lowered].map(verified);
+            assert!(good.valid && good.queries == 1, "{request:?}: {:?}", good.failures);
+            assert!(!bad.valid && bad.worst_error_ratio > 1.0, "{request:?}: {:?}", bad.failures);
+            let told = |f: &String| f.contains("reference vertex") && f.contains(words);
+            assert!(bad.failures.iter().any(told), "{request:?}: {:?}", bad.failures);
+        }
+    }
 }
 
 #[test]

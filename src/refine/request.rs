@@ -113,6 +113,15 @@ impl From<Bounds> for Region {
 
 impl Region {
     /// Whether a point lies in the region.
+    ///
+    /// ```
+    /// use tetralod::refine::Region;
+    /// let slab = Region::Slab { normal: [0.0, 0.0, 2.0], offset: 6.0, thickness: 1.0 };
+    /// assert!(slab.contains([7.0, -8.0, 3.5]) && !slab.contains([0.0, 0.0, 3.6]));
+    /// let halves = [[1.0, 1.0, 0.0], [-2.0, 2.0, 0.0], [0.0, 0.0, 3.0]];
+    /// let turned = Region::OrientedBox { centre: [1.0; 3], halves };
+    /// assert!(turned.contains([-0.9, 2.9, 3.9]) && !turned.contains([2.9, 2.9, 1.0]));
+    /// ```
     pub fn contains(&self, p: [f64; 3]) -> bool {
         let p = DVec3::from(p);
         match self {

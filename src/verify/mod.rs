@@ -70,20 +70,41 @@ pub enum Reference {
     Points,
 }
 
-/// Checks `mt` against `input`, what it was built from (repaired if need be: [`crate::mesh::repair`]).
-/// `on_progress` is told how many of how many steps are done.
+/// Checks `mt` against `input`, what it was built from (repaired if need be: [`crate::mesh::repair`]), with requests of every
+/// kind. `on_progress` is told how many of how many steps are done.
 pub fn run<M: MultiTessellation>(
     mt: &M,
     input: &TetMesh,
     reference: Reference,
     on_progress: &mut dyn FnMut(u32, u32),
 ) -> VerifyReport {
+    with(mt, input, reference, &|input| queries::of(mt, input), on_progress)
+}
+
+/// [`run`] with requests of the caller's own.
+pub fn run_requests<M: MultiTessellation>(
+    mt: &M,
+    input: &TetMesh,
+    reference: Reference,
+    requests: &[Request],
+    on_progress: &mut dyn FnMut(u32, u32),
+) -> VerifyReport {
+    let named = |(i, request): (usize, &Request)| Query::new(&format!("request {i}"), request.clone());
+    with(mt, input, reference, &|_| requests.iter().enumerate().map(named).collect(), on_progress)
+}
+
+fn with<M: MultiTessellation>(
+    mt: &M,
+    input: &TetMesh,
+    reference: Reference,
+    queries: &dyn Fn(&TetMesh) -> Vec<Query>,
+    on_progress: &mut dyn FnMut(u32, u32),
+) -> VerifyReport {
     let mut report = VerifyReport::default();
+    let mut check = |input: &TetMesh| verify(mt, input, &queries(input), on_progress, &mut report);
     let verified = match reference {
-        Reference::Mesh => verify(mt, input, on_progress, &mut report),
-        Reference::Points => {
-            points::triangulated(mt, input).and_then(|mesh| verify(mt, &mesh, on_progress, &mut report))
-        }
+        Reference::Mesh => check(input),
+        Reference::Points => points::triangulated(mt, input).and_then(|mesh| check(&mesh)),
     };
     if let Err(failures) = verified {
         report.failures.push(failures);
@@ -96,17 +117,17 @@ pub fn run<M: MultiTessellation>(
 fn verify<M: MultiTessellation>(
     mt: &M,
     input: &TetMesh,
+    queries: &[Query],
     on_progress: &mut dyn FnMut(u32, u32),
     report: &mut VerifyReport,
 ) -> Result<(), String> {
     let deviation = Deviation::new(mt.info(), input)?;
     let base = fresh(mt)?;
     let reference = check_full_circle(mt, &deviation, report)?;
-    let queries = queries::of(mt, input);
     let steps = 2 * queries.len() as u32;
     let mut hashes = Vec::with_capacity(queries.len());
     let mut excesses = Vec::with_capacity(queries.len());
-    for (i, query) in (0..).zip(&queries) {
+    for (i, query) in (0..).zip(queries) {
         on_progress(i, steps);
         let mut front = base.clone();
         let outcome = satisfy(mt, &mut front, query)?;
@@ -115,9 +136,9 @@ fn verify<M: MultiTessellation>(
         excesses.push(outcome.excess);
         report.queries += 1;
     }
-    check_monotone(&queries, &excesses, report);
+    check_monotone(queries, &excesses, report);
     let walk = Walk { mt, base: &base, shape: &reference, steps: Steps(1) };
-    walk.run(&queries, &hashes, on_progress, report)
+    walk.run(queries, &hashes, on_progress, report)
 }
 
 /// Of two requests that differ in their budgets alone, the one that allows more must not be answered worse.
