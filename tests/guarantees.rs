@@ -43,6 +43,8 @@ use tetralod::refine::Request;
 use tetralod::refine::TetLook;
 use tetralod::refine::Transfer;
 use tetralod::refine::View;
+use tetralod::verify;
+use tetralod::verify::Reference;
 
 const KINDS: [(&str, How); 4] =
     [("edge", EDGE), ("half-edge", HALF_EDGE), ("Delaunay", DELAUNAY), ("insertion", INSERTED)];
@@ -182,6 +184,21 @@ fn nothing_outside_of_a_region_is_asked_for() {
                 });
                 assert!(near, "{name}: {u:?} is far away");
             }
+        }
+    }
+}
+
+/// Requests of every kind, on domains of every shape with one and two fields, in MTs of every kind.
+#[test]
+fn verification_finds_every_promise_kept() {
+    for (name, how) in KINDS {
+        for input in inputs() {
+            let Some(subject) = Subject::new(how, input) else { continue };
+            let keeps = how.method.keeps_the_mesh();
+            let reference = if keeps { Reference::Mesh } else { Reference::Points };
+            let report = verify::run(&subject.mt, &subject.input.mesh, reference, &mut |_, _| {});
+            assert!(report.valid, "{name}, {}: {:#?}", subject.input.name, report.failures);
+            assert!(report.queries > 50 && report.worst_error_ratio > 0.3, "{name}: {report:?}");
         }
     }
 }
