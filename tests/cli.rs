@@ -249,7 +249,7 @@ fn every_part_can_be_asked_for_in_two_ways() {
 #[test]
 fn several_needs_are_all_met() {
     let folder = Folder::new("union");
-    let [input, mt, out] = ["b.vti", "b.mt", "out.vtu"].map(|name| folder.path(name));
+    let [input, mt, out, view] = ["b.vti", "b.mt", "out.vtu", "view.json"].map(|name| folder.path(name));
     good(&["generate", "bucky", "--size", "13", "-o", &input]);
     good(&["build", &input, "-o", &mt, "--quiet"]);
     let extract = |more: &[&str]| {
@@ -266,6 +266,9 @@ fn several_needs_are_all_met() {
     assert!(all > one && all > other && all < one + other, "{one} {other} {all}");
     let around = extract(&["--box", left, "--outside", "2%"]);
     assert!(number(&around, "tetrahedra") > one.max(tets(&["--error", "2%"])), "{around}");
+    fs::write(&view, camera([0.5, 0.5, -0.2], [800, 600], 50.0).to_string()).expect("a file");
+    let seen = extract(&["--view", &view, "--box", left, "--error", "1%"]);
+    assert!(number(&seen, "relative_error_bound") <= 0.01, "that of the need that measures it: {seen}");
     let grouped = extract(&["--error", "2%", "--need", &format!("box={left}")]);
     assert_eq!(grouped["hash"], around["hash"], "an error without a part is one everywhere");
     let text = good(&["extract", &mt, "-o", &out, "--box", left, "--outside", "2%"]);

@@ -108,7 +108,7 @@ pub trait Criterion: Any + fmt::Debug + Send + Sync {
         None
     }
 
-    /// The largest error that can be left anywhere where something is wanted, if that can be told.
+    /// The largest error that can be left anywhere where the error of the field is what is wanted, if that can be told.
     fn tolerance(&self) -> ErrorCode {
         ErrorCode::MAX
     }
@@ -336,8 +336,9 @@ impl Criterion for LodCriterion {
     }
 
     fn tolerance(&self) -> ErrorCode {
-        let of = |atom: &Atom| if let Atom::Field(atom) = atom { atom.tolerance } else { ErrorCode::MAX };
-        let own = self.atoms.iter().map(of).max().unwrap_or(ErrorCode::ZERO);
+        let of = |atom: &Atom| if let Atom::Field(atom) = atom { Some(atom.tolerance) } else { None };
+        let unmeasured = if self.atoms.is_empty() { ErrorCode::ZERO } else { ErrorCode::MAX };
+        let own = self.atoms.iter().filter_map(of).max().unwrap_or(unmeasured);
         self.custom.iter().fold(own, |largest, custom| largest.max(custom.tolerance()))
     }
 
