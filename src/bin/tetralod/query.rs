@@ -43,80 +43,83 @@ camera.json:  {\"matrix\": [16 numbers: clip from model space, column by column]
 colours.json: {\"points\": [[value, red, green, blue, opacity], ...], \"unit_length\": 0.1, \"field\": \"name\"}; colours and
               opacities 0 to 1, the opacity that of a way of unit_length times the model's diagonal";
 
+/// Headings of the help.
+const WHAT: &str = "What mesh";
+const LIMITS: &str = "How large, how long";
+
 /// The mesh to work on: as coarse as these options allow.
 #[derive(clap::Args)]
-#[command(next_help_heading = "What mesh")]
 pub struct Query {
     /// Largest error, in units of the field, or with % of its range; 0 is the reference mesh [default: 0]
-    #[arg(long, value_name = "E|E%", allow_hyphen_values = true)]
+    #[arg(long, value_name = "E|E%", allow_hyphen_values = true, help_heading = WHAT)]
     error: Option<Tolerance>,
     /// Only inside this box, in model units; everywhere else as coarse as possible (regions are repeatable: their union).
-    #[arg(long = "box", value_name = "x0,y0,z0,x1,y1,z1", value_parser = needs::parse_box, allow_hyphen_values = true)]
+    #[arg(long = "box", value_name = "x0,y0,z0,x1,y1,z1", value_parser = needs::parse_box, allow_hyphen_values = true, help_heading = WHAT)]
     boxes: Vec<Region>,
     /// Only inside this oriented box: its centre, and three vectors at right angles from there to the middles of faces.
-    #[arg(long = "obox", value_name = "cx,cy,cz,ax,…,bx,…,cx,…", value_parser = needs::parse_oriented_box, allow_hyphen_values = true)]
+    #[arg(long = "obox", value_name = "cx,cy,cz,ax,…,bx,…,cx,…", value_parser = needs::parse_oriented_box, allow_hyphen_values = true, help_heading = WHAT)]
     oriented_boxes: Vec<Region>,
     /// Only inside this ball: centre and radius.
-    #[arg(long = "sphere", value_name = "x,y,z,r", value_parser = needs::parse_sphere, allow_hyphen_values = true)]
+    #[arg(long = "sphere", value_name = "x,y,z,r", value_parser = needs::parse_sphere, allow_hyphen_values = true, help_heading = WHAT)]
     spheres: Vec<Region>,
     /// Only where n · p <= d.
-    #[arg(long = "half-space", value_name = "nx,ny,nz,d", value_parser = needs::parse_half_space, allow_hyphen_values = true)]
+    #[arg(long = "half-space", value_name = "nx,ny,nz,d", value_parser = needs::parse_half_space, allow_hyphen_values = true, help_heading = WHAT)]
     half_spaces: Vec<Region>,
     /// Only within t / 2 of the plane n · p = d.
-    #[arg(long = "slab", value_name = "nx,ny,nz,d,t", value_parser = needs::parse_slab, allow_hyphen_values = true)]
+    #[arg(long = "slab", value_name = "nx,ny,nz,d,t", value_parser = needs::parse_slab, allow_hyphen_values = true, help_heading = WHAT)]
     slabs: Vec<Region>,
     /// Only where n · p <= d for all of these planes, at most 16.
-    #[arg(long = "convex", value_name = "nx,ny,nz,d,nx,…", value_parser = needs::parse_convex, allow_hyphen_values = true)]
+    #[arg(long = "convex", value_name = "nx,ny,nz,d,nx,…", value_parser = needs::parse_convex, allow_hyphen_values = true, help_heading = WHAT)]
     convexes: Vec<Region>,
     /// Only where the field passes this value, in units of the field (repeatable).
-    #[arg(long = "iso", value_name = "V", value_parser = parse_number, allow_hyphen_values = true)]
+    #[arg(long = "iso", value_name = "V", value_parser = parse_number, allow_hyphen_values = true, help_heading = WHAT)]
     isovalues: Vec<f64>,
     /// Only where the field has a value from a to b, in units of the field (repeatable).
-    #[arg(long = "range", value_name = "a,b", value_parser = needs::parse_range, allow_hyphen_values = true)]
+    #[arg(long = "range", value_name = "a,b", value_parser = needs::parse_range, allow_hyphen_values = true, help_heading = WHAT)]
     ranges: Vec<[f64; 2]>,
     /// The field that all values are of; the first one if not given.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = WHAT)]
     field: Option<String>,
     /// What a camera sees, within --pixels: a file with its matrix and viewport (repeatable).
-    #[arg(long = "view", value_name = "FILE.json")]
+    #[arg(long = "view", value_name = "FILE.json", help_heading = WHAT)]
     views: Vec<PathBuf>,
     /// The same without a file: 16 numbers, column by column, from model space to clip space.
-    #[arg(long, value_name = "m0,…,m15", value_parser = needs::parse_matrix, allow_hyphen_values = true, requires = "viewport")]
+    #[arg(long, value_name = "m0,…,m15", value_parser = needs::parse_matrix, allow_hyphen_values = true, requires = "viewport", help_heading = WHAT)]
     matrix: Option<[f64; 16]>,
     /// Width and height of the picture in pixels, for --matrix.
-    #[arg(long, value_name = "w,h", value_parser = needs::parse_viewport, requires = "matrix")]
+    #[arg(long, value_name = "w,h", value_parser = needs::parse_viewport, requires = "matrix", help_heading = WHAT)]
     viewport: Option<[f64; 2]>,
     /// Largest error on the screen in pixels, for --view and --matrix [default: what the file says, or 1]
-    #[arg(long, value_name = "P", value_parser = needs::parse_size)]
+    #[arg(long, value_name = "P", value_parser = needs::parse_size, help_heading = WHAT)]
     pixels: Option<f64>,
     /// What a transfer function makes visible, within --colour-error: a file with its points (repeatable).
-    #[arg(long = "transfer", value_name = "FILE.json")]
+    #[arg(long = "transfer", value_name = "FILE.json", help_heading = WHAT)]
     transfers: Vec<PathBuf>,
     /// Largest change of colour or opacity, 0 to 1 or with %, for --transfer [default: what the file says, or 1%]
-    #[arg(long, value_name = "C|C%", value_parser = needs::parse_share)]
+    #[arg(long, value_name = "C|C%", value_parser = needs::parse_share, help_heading = WHAT)]
     colour_error: Option<f64>,
     /// Besides, everywhere within this error, in units of the field, or with % of its range.
-    #[arg(long, value_name = "E|E%", allow_hyphen_values = true)]
+    #[arg(long, value_name = "E|E%", allow_hyphen_values = true, help_heading = WHAT)]
     outside: Option<Tolerance>,
     /// Another need beside those of the options above, with its own error: 'key=value; key=value; …', the keys being box,
     /// obox, sphere, half-space, slab, convex, iso, range, field, error, view, pixels, transfer and colour-error
     /// (repeatable: the mesh suits all needs).
-    #[arg(long = "need", value_name = "K=V;…", allow_hyphen_values = true)]
+    #[arg(long = "need", value_name = "K=V;…", allow_hyphen_values = true, help_heading = WHAT)]
     needs: Vec<Group>,
     /// At most so many tetrahedra; the best mesh that fits, but never less than the base mesh.
-    #[arg(long, value_name = "N", help_heading = "How large, how long")]
+    #[arg(long, value_name = "N", help_heading = LIMITS)]
     budget: Option<u32>,
     /// At most so many vertices.
-    #[arg(long, value_name = "N", help_heading = "How large, how long")]
+    #[arg(long, value_name = "N", help_heading = LIMITS)]
     max_vertices: Option<u32>,
     /// At most so many bytes, 32 a tetrahedron and 16 a vertex; K, M and G are KiB, MiB and GiB.
-    #[arg(long, value_name = "N[K|M|G]", value_parser = needs::parse_bytes, help_heading = "How large, how long")]
+    #[arg(long, value_name = "N[K|M|G]", value_parser = needs::parse_bytes, help_heading = LIMITS)]
     max_bytes: Option<u64>,
     /// Stop refining after so many milliseconds: a valid mesh, but an unfinished one, and not the same each time.
-    #[arg(long, value_name = "MS", value_parser = needs::parse_size, help_heading = "How large, how long")]
+    #[arg(long, value_name = "MS", value_parser = needs::parse_size, help_heading = LIMITS)]
     max_ms: Option<f64>,
     /// Stop after so many updates: a valid mesh, but an unfinished one.
-    #[arg(long, value_name = "N", help_heading = "How large, how long")]
+    #[arg(long, value_name = "N", help_heading = LIMITS)]
     max_updates: Option<u64>,
 }
 
