@@ -188,7 +188,7 @@ export class MultiTessellation {
    * one that was asked for (`stats.done`), when another one is asked for by `refine` or `refineSteps`, or when it is left.
    *
    * @example
-   * const mesh = emptyMesh();
+   * const mesh = await mt.refine({ error: "5%" });
    * for await (const step of mt.refineSteps({ error: "0.1%" }, { budgetMs: 4, deltas: true })) {
    *   draw(applyChanges(mesh, step), step.changes);
    * }

@@ -445,6 +445,8 @@ function percentage(percent) {
 }
 
 function pixels(n) {
+  // Where the camera is inside what would have to be refined, there is no bound.
+  if (n > 9999) return "any number of pixels";
   return `${Number(n.toPrecision(2))} ${n === 1 ? "pixel" : "pixels"}`;
 }
 

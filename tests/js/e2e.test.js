@@ -196,7 +196,7 @@ test("the mesh follows the camera, and stays within its budget", async () => {
   const canvas = await page.locator("#canvas").boundingBox();
   await page.mouse.move(canvas.x + canvas.width / 2, canvas.y + canvas.height / 2);
   await page.evaluate(() => (window.tetralodDemo.stats = undefined));
-  for (let i = 0; i < 6; i++) await page.mouse.wheel(0, -240);
+  for (let i = 0; i < 3; i++) await page.mouse.wheel(0, -240);
   await page.waitForFunction(() => window.tetralodDemo.stats, undefined, { timeout: PATIENCE });
   await settle(page);
   const near = await demo(page, "stats");

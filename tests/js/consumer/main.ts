@@ -37,7 +37,7 @@ const hash: string = await mt.hash();
 // What three.js has, without three.js.
 const matrix = { elements: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 1, -0.5, -0.5, 1, 1] };
 const probe: Need = { error: "2%", sphere: { center: { x: 0.5, y: 0.5, z: 0.5 }, radius: 0.2 } };
-const copy: Mesh = emptyMesh();
+const copy: Mesh = await mt.refine({ error: "50%" });
 let steps = 0;
 const seen: RefineOptions = { view: { matrix, viewport: [640, 480], pixels: 4, outside: "20%" }, needs: [probe] };
 for await (const step of mt.refineSteps(seen, { budgetMs: 2, deltas: true })) {
@@ -50,7 +50,8 @@ const followed = copy.tets.length === whole.tets.length && copy.tets.every((vert
 const local = await MultiTessellation.open(source, { worker: false });
 await local.complete;
 const where: Where = ({ errors }) => errors.map((error) => error / 0.1);
-const asked = await local.refine({ where });
+const asked = await local.refine({ where }, { deltas: true });
+const told: Mesh = applyChanges(emptyMesh(), asked);
 local.free();
 
 const failed: ErrorCode | undefined = await mt.refine({ error: -1 }).then(
@@ -69,6 +70,7 @@ const good =
   followed &&
   whole.stats.bounds.length === 3 &&
   asked.stats.satisfied &&
+  told.tets.length === 4 * asked.tetCount &&
   failed === "bad-option";
 console.log(`${info.vertices} vertices, ${mesh.stats.tetrahedra} tetrahedra extracted, hash ${hash}`);
 if (!good) throw new Error("the installed package does not do what its types say");
