@@ -29,8 +29,14 @@ async function open(volume, prepare = async () => {}) {
   return page;
 }
 
-const reach = (page, state) =>
-  page.waitForFunction((wanted) => window.tetralodDemo?.state === wanted, state, { timeout: PATIENCE });
+/** Waits for a state of the page; where it stands instead is told. */
+async function reach(page, state) {
+  const reached = page.waitForFunction((wanted) => window.tetralodDemo?.state === wanted, state, { timeout: PATIENCE });
+  await reached.catch(async () => {
+    const { viewer, ...found } = await page.evaluate(() => ({ ...window.tetralodDemo, viewer: undefined }));
+    assert.fail(`the page is not ${state}: ${JSON.stringify(found)} ${page.complaints}`);
+  });
+}
 
 const demo = (page, name) => page.evaluate((name) => JSON.parse(JSON.stringify(window.tetralodDemo[name] ?? null)), name);
 
