@@ -473,7 +473,7 @@ impl Front {
                 self.judge_open(mt, criterion, outcome);
             }
             // Parents have smaller numbers: in this order few updates are forced by others that wait too.
-            self.pending.sort_unstable_by(|a, b| b.update.cmp(&a.update));
+            self.pending.sort_unstable_by_key(|asked| std::cmp::Reverse(asked.update));
         }
         self.pending.pop()
     }
