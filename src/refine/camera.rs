@@ -91,14 +91,14 @@ impl Camera {
                     return Verdict::NEVER;
                 }
                 let (outside, side) = seen(margin, None);
-                let slack = (outside - margin).abs() / frame.reach;
+                let slack = (outside - margin).abs() / away(corners, frame);
                 Verdict { excess: if outside <= margin { excess } else { 0.0 }, slack, dial: dial_of(side) }
             }
             Depth::Perspective { plane, pixels: scale } => {
                 let deepest = self.deepest(frame);
                 let limit = (length * scale / pixels).min(2.0 * deepest);
                 let (outside, side) = seen(margin, Some((plane, limit)));
-                let slack = (outside - margin).abs() / frame.reach;
+                let slack = (outside - margin).abs() / away(corners, frame);
                 if outside > margin {
                     return Verdict { excess: 0.0, slack, dial: dial_of(side) };
                 }
@@ -128,24 +128,26 @@ impl Camera {
         }
     }
 
-    /// How much nearer a side of the pyramid of vision may have come, by its number, or with number 4 the depth up to which
-    /// errors look large.
+    /// How far a side of the pyramid of vision, by its number, or with number 4 the depth up to which errors look large, is from
+    /// that of another camera; in the unit of [`Camera::distance`].
     pub fn turned(&self, pixels: f64, before: &Self, before_pixels: f64, frame: &Frame, side: usize) -> f64 {
-        if let (Some(a), Some(b)) = (self.sides.get(side), before.sides.get(side)) {
-            return a.approach(b, frame.half) / frame.reach;
+        match (self.sides.get(side), before.sides.get(side)) {
+            (Some(a), Some(b)) => a.turn(b, nearest(frame)),
+            _ => self.depth_turned(pixels, before, before_pixels, frame),
         }
-        self.depth_difference(pixels, before, before_pixels, frame) / frame.reach
     }
 
-    /// How far this camera is from another one, in parts of the domain's reach.
+    /// How far this camera is from another one: by what part of its distance from the middle of the domain, or of [`nearest`],
+    /// a point can change its place in the picture or its depth. A camera that turns around the model moves points in its
+    /// middle less than others.
     pub fn distance(&self, pixels: f64, other: &Self, other_pixels: f64, frame: &Frame) -> f64 {
         let sides = self.sides.iter().zip(&other.sides);
-        let turned = sides.fold(0.0, |m: f64, (a, b)| m.max(a.difference(b, frame.half)));
-        turned.max(self.depth_difference(pixels, other, other_pixels, frame)) / frame.reach
+        let turned = sides.fold(0.0, |m: f64, (a, b)| m.max(a.turn(b, nearest(frame))));
+        turned.max(self.depth_turned(pixels, other, other_pixels, frame))
     }
 
-    /// How much the functions of the two that tell by the depth whether an error looks large can differ.
-    fn depth_difference(&self, pixels: f64, other: &Self, other_pixels: f64, frame: &Frame) -> f64 {
+    /// The same for the functions that tell by the depth whether an error looks large.
+    fn depth_turned(&self, pixels: f64, other: &Self, other_pixels: f64, frame: &Frame) -> f64 {
         match (&self.depth, &other.depth) {
             (Depth::Perspective { plane: a, pixels: p }, Depth::Perspective { plane: b, pixels: q }) => {
                 // A limit is the error's length times such a scale, or twice the largest depth where that is less.
@@ -159,7 +161,7 @@ impl Camera {
                 };
                 let deepest = self.deepest(frame).max(other.deepest(frame));
                 let moved = (a.offset - b.offset).abs();
-                a.difference(b, frame.half) + 2.0 * moved + 2.0 * deepest * scaled
+                a.turn(b, nearest(frame)) + (2.0 * moved + 2.0 * deepest * scaled) / nearest(frame)
             }
             (Depth::Parallel { pixels: p }, Depth::Parallel { pixels: q })
                 if p / pixels == q / other_pixels =>
@@ -169,6 +171,17 @@ impl Camera {
             _ => f64::INFINITY,
         }
     }
+}
+
+/// Points nearer to the middle of the domain are taken to be so far from it.
+fn nearest(frame: &Frame) -> f64 {
+    0.5 * frame.reach
+}
+
+/// How far a tetrahedron reaches from the middle of the domain, but at least [`nearest`].
+fn away(corners: &[DVec3; 4], frame: &Frame) -> f64 {
+    let furthest = corners.iter().fold(0.0, |m: f64, p| m.max(p.length_squared()));
+    furthest.sqrt().max(nearest(frame))
 }
 
 /// The rows of a matrix.

@@ -47,6 +47,12 @@ impl Plane {
         (self.normal - other.normal).abs().dot(reach) + (self.offset - other.offset).abs()
     }
 
+    /// By what part of its distance from the origin, or of `least` if it is nearer, the distance of a point can differ from that
+    /// of `other`.
+    pub fn turn(&self, other: &Self, least: f64) -> f64 {
+        (self.normal - other.normal).length() + (self.offset - other.offset).abs() / least
+    }
+
     /// By how much the distance of such a point can have become less than it was from `before`.
     pub fn approach(&self, before: &Self, reach: DVec3) -> f64 {
         (self.normal - before.normal).abs().dot(reach) + (self.offset - before.offset).max(0.0)
