@@ -4,6 +4,7 @@ use super::error::WebError;
 use crate::geom::Lattice;
 use crate::mt::FieldInfo;
 use crate::mt::MtInfo;
+use crate::refine::ANY;
 use crate::refine::Criterion;
 use crate::refine::TetLook;
 use crate::refine::Verdict;
@@ -121,7 +122,7 @@ impl Criterion for Callback {
                 FUNCTIONS.with_borrow_mut(|functions| functions.failure = Some(problem));
                 Vec::new()
             });
-            verdicts.extend(excesses.into_iter().map(|excess| Verdict { excess, slack: 0.0 }));
+            verdicts.extend(excesses.into_iter().map(|excess| Verdict { excess, slack: 0.0, dial: ANY }));
         }
         // A function that fails asks for nothing from then on; its failure is told when the step ends.
         verdicts.resize(tets.len(), Verdict::NEVER);
