@@ -377,7 +377,8 @@ impl Criterion for LodCriterion {
 }
 
 impl Atom {
-    #[inline]
+    // Once for all who ask: it is large.
+    #[inline(never)]
     fn judge(&self, frame: &Frame, tet: &TetLook<'_>, corners: &[DVec3; 4], ranked: bool) -> Verdict {
         match self {
             Self::Field(atom) => atom.judge(frame, tet, corners),
