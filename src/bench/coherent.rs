@@ -77,10 +77,10 @@ fn walk(
         let mut time = 0.0;
         let stats = timed(clock, &mut time, || session.refine(&request))?;
         times.push(time);
-        updates.push(stats.refined + stats.coarsened);
+        updates.push((stats.refined + stats.coarsened) as f64);
     }
-    times.sort_by(f64::total_cmp);
-    updates.sort_unstable();
+    sort(&mut times);
+    sort(&mut updates);
     let ms = |seconds: f64| 1e3 * seconds;
     let part = |of_all: f64| (of_all * f64::from(FRAMES - 1)) as usize;
     let tetrahedra = session.mesh().map_or(0, |mesh| mesh.tet_count() as u32);
@@ -88,11 +88,22 @@ fn walk(
         median_ms: ms(times[part(0.5)]),
         p95_ms: ms(times[part(0.95)]),
         cold_ms: ms(cold),
-        updates: updates[part(0.5)],
+        updates: updates[part(0.5)] as u64,
         cold_updates,
         tetrahedra,
         bytes_per_tet: session.mesh_bytes() as f64 / f64::from(tetrahedra.max(1)),
     })
+}
+
+/// Sorts some dozens of numbers; the library's sorts would take kilobytes in the browser for that.
+fn sort(numbers: &mut [f64]) {
+    for end in 1..numbers.len() {
+        let mut at = end;
+        while at > 0 && numbers[at] < numbers[at - 1] {
+            numbers.swap(at, at - 1);
+            at -= 1;
+        }
+    }
 }
 
 /// The place at these fractions of the domain's extent.
