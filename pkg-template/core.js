@@ -53,8 +53,8 @@ export function coreMethods() {
     surface: () => session.surface(),
     probe: (points) => session.probe(points),
     line: (from, to) => session.line(from, to),
-    streamlines: ([x, y, z], seeds, backward, maxLength, maxSteps) =>
-      session.streamlines(x, y, z, seeds, backward, maxLength, maxSteps),
+    streamlines: (fields, seeds, backward, maxLength, maxSteps) =>
+      session.streamlines(fields, seeds, backward, maxLength, maxSteps),
     stats: (bins, low, high) => session.stats(bins, low, high),
     hash: () => session.hash(),
     free: () => session?.free(),

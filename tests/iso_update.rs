@@ -1,15 +1,13 @@
 //! Promise: a surface that follows a changing mesh is the one that is extracted from scratch, bit for bit, whatever
 //! the changes, and what it says of its own changes is all there is.
 
-#[allow(dead_code, reason = "a part of it is used")]
-#[path = "support/random.rs"]
-mod random;
 mod scenes;
+mod support;
 
-use random::Random;
 use scenes::Scene;
 use scenes::distance_to_centre;
 use std::ops::Range;
+use support::random::Random;
 use tetralod::mesh::NONE;
 use tetralod::view::IsoSurface;
 use tetralod::view::MeshView;

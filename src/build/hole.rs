@@ -151,7 +151,7 @@ impl Hole {
         for (i, _) in filling.tets.iter().enumerate() {
             slots.push(self.star.get(i).map_or_else(|| mesh.fresh(), |s| s.tet));
         }
-        // The filling has taken over the first slots of the star; those that it does not need are free now.
+        // The filling lives in the first slots of the star, which must stay taken; those behind them are nobody's now.
         self.star.iter().skip(filling.tets.len()).for_each(|s| mesh.free(s.tet));
         mesh.incident[self.a as usize] = NONE;
         // Faces that wait for the tetrahedron on their other side: which tetrahedron has them, and where.

@@ -150,7 +150,7 @@ impl Glue {
         self.tets[t] = tet;
         self.across[t] = [Across::Nothing; 4];
         self.connect(at, t, 0);
-        // Face 0, opposite `x`, is the open face that was closed just now.
+        // Face 0, opposite `x`, is the open face that was closed just now, and linked by `connect`; these are the others.
         for (side, face) in FACES.iter().enumerate().skip(1) {
             let own = turned(face.map(|k| tet[k]));
             let slot = self.find(own);

@@ -131,6 +131,7 @@ impl Shape {
     pub fn approach(&self, before: &Self, reach: DVec3, k: usize, n: usize) -> f64 {
         match (self, before) {
             (Self::Planes(a), Self::Planes(b)) if a.len() == b.len() => {
+                // Each plane counts to one remainder alone: the others pass over it, and their own calls see it.
                 let pairs = a.iter().zip(b).skip(k).step_by(n);
                 pairs.fold(0.0, |m, (a, b)| m.max(a.approach(b, reach)))
             }

@@ -170,22 +170,19 @@ impl CoreSession {
     }
 
     /// The streamlines from some seeds, three coordinates each, through the vector field of three fields.
-    #[allow(clippy::too_many_arguments, reason = "JavaScript names them")]
     pub fn streamlines(
         &mut self,
-        x: &str,
-        y: &str,
-        z: &str,
+        names: Vec<String>,
         seeds: &[f64],
         backward: bool,
         max_length: f64,
         max_steps: f64,
     ) -> Result<JsStreamlines, WebError> {
         let info = self.known()?;
-        let mut fields = [0; 3];
-        for (field, name) in fields.iter_mut().zip([x, y, z]) {
-            *field = field_index(info, name)?;
-        }
+        let fields = names.iter().map(|name| field_index(info, name)).collect::<Result<Vec<_>, _>>()?;
+        let fields: [usize; 3] = fields
+            .try_into()
+            .map_err(|_| WebError::bad_option("fields", "a vector field is the names of three fields"))?;
         let seeds = all_points(seeds, "seeds")?;
         if max_length.is_nan() || max_steps.is_nan() {
             return Err(WebError::bad_option("maxLength", "must be a number, and `maxSteps` too"));

@@ -14,6 +14,7 @@ use tetralod::view::IsoSurface;
 use tetralod::view::NormalKind;
 
 fn main() -> Result<(), Box<dyn Error>> {
+    // The first argument is the program itself.
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [file, runs, fractions @ ..] = arguments.as_slice() else {
         return Err("contour FILE.mt RUNS FRACTION...".into());
