@@ -2,86 +2,22 @@
 //! and why, leaving nothing half done.
 #![cfg(feature = "cli")]
 
+mod cli_support;
+
+use cli_support::Folder;
+use cli_support::bad;
+use cli_support::command;
+use cli_support::good;
+use cli_support::json;
+use cli_support::number;
+use cli_support::run;
+use cli_support::text;
 use serde_json::Value;
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::path::Path;
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 use tetralod::mesh::{Field, TetMesh};
-
-/// A folder of one test, gone when the test is done.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("tetralod-cli-{}-{name}", std::process::id()));
-        fs::create_dir_all(&path).expect("a temporary folder");
-        Self(path)
-    }
-
-    fn path(&self, name: &str) -> String {
-        self.0.join(name).to_str().expect("a name in UTF-8").to_owned()
-    }
-
-    /// Names of the files in it, sorted.
-    fn names(&self) -> Vec<String> {
-        let entries = fs::read_dir(&self.0).expect("the folder is there");
-        let name = |e: std::io::Result<fs::DirEntry>| e.expect("an entry").file_name();
-        let mut names: Vec<_> = entries.map(|e| name(e).to_string_lossy().into_owned()).collect();
-        names.sort();
-        names
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.0);
-    }
-}
-
-fn command(arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tetralod"));
-    command.args(arguments).stdin(Stdio::null());
-    command
-}
-
-fn run(arguments: &[&str]) -> Output {
-    command(arguments).output().expect("the command starts")
-}
-
-fn text(bytes: &[u8]) -> &str {
-    std::str::from_utf8(bytes).expect("UTF-8")
-}
-
-/// Runs what must succeed; gives stdout.
-fn good(arguments: &[&str]) -> String {
-    let output = run(arguments);
-    assert!(output.status.success(), "{arguments:?}: {}", text(&output.stderr));
-    text(&output.stdout).to_owned()
-}
-
-/// Runs what must succeed with one JSON object on stdout.
-fn json(arguments: &[&str]) -> Value {
-    let value: Value = serde_json::from_str(&good(arguments)).expect("one JSON value on stdout");
-    assert!(value.is_object());
-    value
-}
-
-/// Runs what must fail with an error that holds all of `words`.
-fn bad(code: i32, arguments: &[&str], words: &[&str]) {
-    let output = run(arguments);
-    let error = text(&output.stderr);
-    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {error}");
-    assert!(output.stdout.is_empty(), "{arguments:?}: errors go to stderr");
-    assert!(error.starts_with("error: ") && !error.contains("panicked"), "{arguments:?}: {error}");
-    for word in words {
-        assert!(error.contains(word), "{arguments:?}: '{word}' is not in: {error}");
-    }
-}
-
-fn number(value: &Value, key: &str) -> f64 {
-    value[key].as_f64().unwrap_or_else(|| panic!("{key} is a number: {value}"))
-}
 
 #[test]
 fn from_data_to_a_checked_mesh() {
@@ -542,7 +478,7 @@ fn failures_name_the_file_and_leave_nothing() {
     fs::write(&damaged, &bytes).expect("a file");
     let before = folder.names();
 
-    let away = folder.0.join("no folder").join("out.vtu").to_str().expect("UTF-8").to_owned();
+    let away = folder.path("no folder/out.vtu");
     for (file, words) in [
         (&none, "No such file"),
         (&text, "not an MT file"),

@@ -73,6 +73,21 @@ struct Asked {
     verdict: Verdict,
 }
 
+/// A tetrahedron that is to be judged, with what that takes.
+struct Open {
+    t: u32,
+    tet: [u32; 4],
+    update: UpdateId,
+    error: ErrorCode,
+    corners: [[i32; 3]; 4],
+}
+
+impl Open {
+    fn look<'a>(&'a self, levels: &'a dyn Fn(usize) -> [i32; 4]) -> TetLook<'a> {
+        TetLook { corners: &self.corners, levels, error: self.error, update: self.update }
+    }
+}
+
 /// What has been done on the way to a goal, and how good the mesh is.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Outcome {
@@ -483,26 +498,37 @@ impl Front {
     fn judge_open(&mut self, mt: &impl MultiTessellation, criterion: &dyn Criterion, outcome: &mut Outcome) {
         let mut fetched = Vec::with_capacity(AT_ONCE);
         while !self.tets.is_settled() {
-            fetched.clear();
-            while fetched.len() < AT_ONCE {
-                let Some(t) = self.tets.next() else { break };
-                let Some(tet) = self.mesh.tet(t) else { continue };
-                match mt.remover(&self.mesh, t) {
-                    Some(u) => {
-                        fetched.push((t, tet, u, mt.error(u), tet.map(|v| self.mesh.positions[v as usize])));
-                    }
-                    None if self.known < mt.info().updates => self.unknown.push(t),
-                    None => {}
-                }
-            }
-            outcome.judged += fetched.len() as u64;
-            for (t, tet, update, error, corners) in &fetched {
-                let levels = |field: usize| tet.map(|v| self.mesh.levels(v)[field]);
-                let look = TetLook { corners, levels: &levels, error: *error, update: *update };
-                let verdict = criterion.judge(&look);
-                self.take_verdict(*t, *update, verdict);
+            self.fetch_open(mt, AT_ONCE, &mut fetched, outcome);
+            for open in &fetched {
+                let levels = |field: usize| open.tet.map(|v| self.mesh.levels(v)[field]);
+                let verdict = criterion.judge(&open.look(&levels));
+                self.take_verdict(open.t, open.update, verdict);
             }
         }
+    }
+
+    /// Takes at most so many open tetrahedra to be judged, in place of those in `fetched`.
+    fn fetch_open(
+        &mut self,
+        mt: &impl MultiTessellation,
+        most: usize,
+        fetched: &mut Vec<Open>,
+        outcome: &mut Outcome,
+    ) {
+        fetched.clear();
+        while fetched.len() < most {
+            let Some(t) = self.tets.next() else { break };
+            let Some(tet) = self.mesh.tet(t) else { continue };
+            match mt.remover(&self.mesh, t) {
+                Some(update) => {
+                    let corners = tet.map(|v| self.mesh.positions[v as usize]);
+                    fetched.push(Open { t, tet, update, error: mt.error(update), corners });
+                }
+                None if self.known < mt.info().updates => self.unknown.push(t),
+                None => {}
+            }
+        }
+        outcome.judged += fetched.len() as u64;
     }
 
     fn take_verdict(&mut self, tet: u32, update: UpdateId, verdict: Verdict) {
@@ -513,27 +539,18 @@ impl Front {
         }
     }
 
+    /// Judges all open tetrahedra at once.
     fn judge_batch(&mut self, mt: &impl MultiTessellation, criterion: &dyn Criterion, outcome: &mut Outcome) {
-        let mut open = Vec::new();
-        while let Some(t) = self.tets.next() {
-            let Some(tet) = self.mesh.tet(t) else { continue };
-            match mt.remover(&self.mesh, t) {
-                Some(u) => open.push((t, u, tet.map(|v| self.mesh.positions[v as usize]), tet)),
-                None => self.unknown.push(t),
-            }
-        }
+        let mut fetched = Vec::new();
+        self.fetch_open(mt, usize::MAX, &mut fetched, outcome);
         let mesh = &self.mesh;
         let levels: Vec<_> =
-            open.iter().map(|&(.., tet)| move |f: usize| tet.map(|v| mesh.levels(v)[f])).collect();
-        let mut looks = Vec::with_capacity(open.len());
-        for ((_, update, corners, _), levels) in open.iter().zip(&levels) {
-            looks.push(TetLook { corners, levels, error: mt.error(*update), update: *update });
-        }
+            fetched.iter().map(|open| move |f: usize| open.tet.map(|v| mesh.levels(v)[f])).collect();
+        let looks: Vec<TetLook<'_>> =
+            fetched.iter().zip(&levels).map(|(open, levels)| open.look(levels)).collect();
         let verdicts = criterion.judge_all(&looks);
-        outcome.judged += looks.len() as u64;
-        let taken: Vec<_> = open.iter().zip(verdicts).map(|(&(t, u, ..), verdict)| (t, u, verdict)).collect();
-        for (t, u, verdict) in taken {
-            self.take_verdict(t, u, verdict);
+        for (open, verdict) in fetched.iter().zip(verdicts) {
+            self.take_verdict(open.t, open.update, verdict);
         }
     }
 
@@ -574,15 +591,8 @@ impl Front {
 
     /// The updates that created the tetrahedra which have come back may have no children any more.
     fn open_parents(&mut self, mt: &impl MultiTessellation) {
-        for i in 0..self.mesh.touched().len() {
-            let t = self.mesh.touched()[i];
-            if self.mesh.tet(t).is_none() {
-                continue;
-            }
-            if let Some(parent) = mt.creator(&self.mesh, t) {
-                self.leaves.open(parent.0);
-            }
-        }
+        let Self { mesh, leaves, .. } = self;
+        creators_of_touched(mesh, mt).for_each(|parent| leaves.open(parent.0));
     }
 
     fn open_touched(&mut self) {
@@ -720,6 +730,15 @@ impl Front {
         // What violates nothing is within the tolerance: with several needs, that of another one may be larger.
         (largest.0.max(criterion.tolerance().min(self.largest_to_come(mt))), largest.1)
     }
+}
+
+/// The updates that created the tetrahedra just changed, as often as they did.
+pub(super) fn creators_of_touched<'a>(
+    mesh: &'a CurrentMesh,
+    mt: &'a impl MultiTessellation,
+) -> impl Iterator<Item = UpdateId> + 'a {
+    let live = mesh.touched().iter().filter(|&&t| mesh.tet(t).is_some());
+    live.filter_map(|&t| mt.creator(mesh, t))
 }
 
 /// Shows a tetrahedron of the mesh to `judge`.

@@ -10,6 +10,7 @@ use super::Criterion;
 use super::Front;
 use super::GoOn;
 use super::Outcome;
+use super::front::creators_of_touched;
 use super::front::see;
 use crate::mt::MultiTessellation;
 use crate::mt::UpdateError;
@@ -105,8 +106,8 @@ impl Front {
                 continue;
             }
             self.force(mt, u, outcome)?;
-            // What it forced is blocked by it, and comes back when it goes.
-            self.push_leaf(mt, criterion, u, outcome)?;
+            // A tetrahedron asked for it, so it is queued. What it forced is blocked by it, and comes back when it goes.
+            self.is_idle(mt, criterion, u, outcome)?;
             self.push_touched(mt, criterion, outcome);
             if self.trim(mt, criterion, budget, Some(u), outcome)? {
                 self.ranked.clear();
@@ -135,7 +136,9 @@ impl Front {
         // Children have larger numbers, so one pass downwards sees each after all that depend on it.
         for u in (0..mt.updates()).rev().map(UpdateId) {
             if self.contains(u) && mt.may_coarsen(&self.mesh, u) {
-                self.rank_or_undo(mt, criterion, u, outcome)?;
+                if self.is_idle(mt, criterion, u, outcome)? {
+                    self.coarsen(mt, u, outcome)?;
+                }
                 self.mesh.clear_touched();
             }
         }
@@ -145,39 +148,21 @@ impl Front {
         Ok(())
     }
 
-    /// Queues an update for coarsening if something asks for it, and undoes it if nothing does. Neither if a child is in
-    /// the way.
-    fn rank_or_undo(
+    /// Queues an update for coarsening if something asks for it. True if nothing does, neither the request nor a child: then it
+    /// is idle and can be undone.
+    fn is_idle(
         &mut self,
         mt: &impl MultiTessellation,
         criterion: &dyn Criterion,
         u: UpdateId,
         outcome: &mut Outcome,
-    ) -> Result<(), UpdateError> {
+    ) -> Result<bool, UpdateError> {
         outcome.judged += 1;
-        match self.need(mt, criterion, u, true)? {
-            None => {}
-            Some(verdict) if verdict.asks() => {
-                self.ranked.coarsenable.push(Reverse(rank(verdict.excess, u)));
-            }
-            Some(_) => self.coarsen(mt, u, outcome)?,
-        }
-        Ok(())
-    }
-
-    /// Queues an update that is without children for coarsening.
-    fn push_leaf(
-        &mut self,
-        mt: &impl MultiTessellation,
-        criterion: &dyn Criterion,
-        u: UpdateId,
-        outcome: &mut Outcome,
-    ) -> Result<(), UpdateError> {
-        outcome.judged += 1;
-        if let Some(verdict) = self.need(mt, criterion, u, true)? {
+        let Some(verdict) = self.need(mt, criterion, u, true)? else { return Ok(false) };
+        if verdict.asks() {
             self.ranked.coarsenable.push(Reverse(rank(verdict.excess, u)));
         }
-        Ok(())
+        Ok(!verdict.asks())
     }
 
     fn push_violation(
@@ -247,13 +232,8 @@ impl Front {
             let parents = self.parents_of_touched(mt);
             self.push_touched(mt, criterion, outcome);
             for parent in parents {
-                outcome.judged += 1;
-                match self.need(mt, criterion, parent, true)? {
-                    None => {}
-                    Some(verdict) if verdict.asks() => {
-                        self.ranked.coarsenable.push(Reverse(rank(verdict.excess, parent)));
-                    }
-                    Some(_) => idle.push(parent),
+                if self.is_idle(mt, criterion, parent, outcome)? {
+                    idle.push(parent);
                 }
             }
         }
@@ -262,9 +242,7 @@ impl Front {
 
     /// The updates that created the tetrahedra just changed.
     fn parents_of_touched(&self, mt: &impl MultiTessellation) -> Vec<UpdateId> {
-        let mesh = &self.mesh;
-        let live = mesh.touched().iter().filter(|&&t| mesh.tet(t).is_some());
-        let mut parents: Vec<u32> = live.filter_map(|&t| mt.creator(mesh, t)).map(|u| u.0).collect();
+        let mut parents: Vec<u32> = creators_of_touched(&self.mesh, mt).map(|u| u.0).collect();
         parents.sort_unstable();
         parents.dedup();
         parents.into_iter().map(UpdateId).collect()

@@ -1,6 +1,7 @@
 //! What is to be seen, computed on the CPU from slices. Knows no MT.
 
 mod boundary;
+mod cases;
 mod colormap;
 mod cutaway;
 pub mod gizmo;

@@ -11,6 +11,7 @@ use crate::mesh::EDGES;
 use crate::mesh::FACES;
 use crate::mesh::NONE;
 use crate::view::MeshView;
+use crate::view::cases::CASES;
 use std::ops::Range;
 
 /// Where a surface crosses an edge of the mesh: the end inside and the end outside, or twice the same point if the
@@ -24,27 +25,6 @@ pub(super) struct Polygon {
     corners: [Crossing; 4],
     len: usize,
 }
-
-/// The crossed edges of each of the 16 cases, in an order that turns counter-clockwise when seen from the inside;
-/// bit `i` of the case is set when vertex `i` is inside.
-const CASES: [&[usize]; 16] = [
-    &[],
-    &[0, 2, 1],
-    &[0, 3, 4],
-    &[1, 3, 4, 2],
-    &[1, 5, 3],
-    &[2, 5, 3, 0],
-    &[0, 1, 5, 4],
-    &[2, 5, 4],
-    &[2, 4, 5],
-    &[0, 4, 5, 1],
-    &[3, 5, 2, 0],
-    &[1, 3, 5],
-    &[1, 2, 4, 3],
-    &[0, 4, 3],
-    &[0, 1, 2],
-    &[],
-];
 
 /// On which side of a surface a point is: bits, so that those of a tetrahedron can be put together.
 pub(super) mod side {

@@ -38,12 +38,18 @@ impl Drop for Folder {
     }
 }
 
-fn run(arguments: &[&str]) -> Output {
+/// The command with these arguments and nothing on stdin.
+pub fn command(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_tetralod"));
-    command.args(arguments).stdin(Stdio::null()).output().expect("the command starts")
+    command.args(arguments).stdin(Stdio::null());
+    command
 }
 
-fn text(bytes: &[u8]) -> &str {
+pub fn run(arguments: &[&str]) -> Output {
+    command(arguments).output().expect("the command starts")
+}
+
+pub fn text(bytes: &[u8]) -> &str {
     std::str::from_utf8(bytes).expect("UTF-8")
 }
 

@@ -50,18 +50,15 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     let mut answer = arguments.query.answer(&arguments.file)?;
     let start = Instant::now();
-    let mut data = PolyData::default();
-    let mut values = Vec::new();
-    for &value in isovalues {
-        let surface = answer.opened.session.isosurface(value)?;
-        let first = data.positions.len() as u32;
-        data.positions.extend_from_slice(&surface.positions);
-        data.normals.extend_from_slice(&surface.normals);
-        data.triangles.extend(surface.indices.iter().map(|t| t.map(|v| v + first)));
-        values.resize(data.positions.len(), value as f32);
-    }
+    let surface = answer.opened.session.isosurfaces(isovalues)?;
     let seconds = start.elapsed().as_secs_f64();
-    data.fields.push((answer.summary.field.clone(), values));
+    let data = PolyData {
+        positions: surface.positions.clone(),
+        normals: surface.normals.clone(),
+        fields: vec![(answer.summary.field.clone(), surface.values.clone())],
+        triangles: surface.indices.clone(),
+        ..PolyData::default()
+    };
     arguments.output.write(&data)?;
     let report = Report {
         isovalues: isovalues.to_vec(),

@@ -321,14 +321,6 @@ impl NeedReport {
 }
 
 impl Answer {
-    /// One of the fields at the vertices of the mesh.
-    fn values(&self, field: usize) -> Result<Vec<f32>> {
-        let info = &self.opened.info()?.fields[field];
-        let mesh = self.opened.session.mesh().context("there is no mesh")?;
-        let slots = 0..mesh.positions().len() as u32;
-        Ok(slots.map(|slot| info.value(mesh.levels(slot)[field]) as f32).collect())
-    }
-
     /// The names of all fields, in the order of the MT.
     pub fn field_names(&self) -> Result<Vec<String>> {
         Ok(self.opened.info()?.fields.iter().map(|field| field.name.clone()).collect())
@@ -336,7 +328,7 @@ impl Answer {
 
     /// All fields at the vertices of the mesh, in the order of the MT.
     pub fn all_values(&self) -> Result<Vec<Vec<f32>>> {
-        (0..self.opened.info()?.fields.len()).map(|field| self.values(field)).collect()
+        Ok((0..self.opened.info()?.fields.len()).map(|field| self.opened.session.values(field)).collect())
     }
 }
 

@@ -3,27 +3,7 @@
 use super::crossings::Crossings;
 use crate::mesh::EDGES;
 use crate::mesh::NONE;
-
-/// The crossed edges of each of the 16 cases, in an order that turns counter-clockwise when seen from the inside;
-/// bit `i` of the case is set when vertex `i` is inside. Four edges make a quadrilateral.
-const CASES: [&[usize]; 16] = [
-    &[],
-    &[0, 2, 1],
-    &[0, 3, 4],
-    &[1, 3, 4, 2],
-    &[1, 5, 3],
-    &[2, 5, 3, 0],
-    &[0, 1, 5, 4],
-    &[2, 5, 4],
-    &[2, 4, 5],
-    &[0, 4, 5, 1],
-    &[3, 5, 2, 0],
-    &[1, 3, 5],
-    &[1, 2, 4, 3],
-    &[0, 4, 3],
-    &[0, 1, 2],
-    &[],
-];
+use crate::view::cases::CASES;
 
 /// The corners that the crossed edges of each case run between, the one inside first; padded with the first edge.
 const CORNERS: [[[u8; 2]; 4]; 16] = {
