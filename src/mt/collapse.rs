@@ -56,6 +56,8 @@ pub struct VertexSplit<'a> {
 pub struct EdgeMt {
     info: MtInfo,
     base: BaseMesh,
+    /// Whether masks and field offsets are told as what is wrong with guesses: see [`EdgeMt::coded`].
+    is_coded: bool,
     /// `s(v)` for every vertex so far, [`NONE`] while nothing splits it.
     split_of: Vec<u32>,
     /// The vertex that each update splits.
@@ -76,6 +78,7 @@ impl EdgeMt {
         Self {
             info,
             base,
+            is_coded: false,
             split_of,
             vertex_of: Vec::new(),
             offsets,
@@ -83,6 +86,18 @@ impl EdgeMt {
             masks: Vec::new(),
             errors: Vec::new(),
         }
+    }
+
+    /// [`EdgeMt::new`] in the form that files have: the masks and the field offsets of splits are not what they are, but
+    /// what is wrong with the guesses that the star allows when the split is applied. Bit `i` of a mask then says that
+    /// the guess for the `i`-th tetrahedron is wrong, counted from the one whose side is the least certain.
+    pub fn coded(info: MtInfo, base: BaseMesh) -> Self {
+        Self { is_coded: true, ..Self::new(info, base) }
+    }
+
+    /// Whether this is the form that files have.
+    pub fn is_coded(&self) -> bool {
+        self.is_coded
     }
 
     /// Adds the next update.
@@ -98,9 +113,11 @@ impl EdgeMt {
             return Err(UpdateError::Vertex { update, vertex });
         }
         let fits = |offset: i32, bits: u32| offset.unsigned_abs() <= 1 << bits;
+        // A guess may be as wrong as two offsets differ.
+        let spare = u32::from(self.is_coded);
         let on_lattice = split.offset.iter().all(|&d| fits(d, self.info.lattice.bits))
             && split.field_offsets.len() == self.info.fields.len()
-            && split.field_offsets.iter().zip(&self.info.fields).all(|(&d, field)| fits(d, field.bits));
+            && split.field_offsets.iter().zip(&self.info.fields).all(|(&d, field)| fits(d, field.bits + spare));
         if !on_lattice {
             return Err(UpdateError::OffLattice { update });
         }

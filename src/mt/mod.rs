@@ -15,6 +15,7 @@ mod error;
 mod explicit;
 mod glue;
 mod insertion;
+mod predict;
 mod replay;
 mod ring;
 mod spelled;

@@ -83,6 +83,8 @@ pub(super) struct Ring {
     seen: [[[f64; 3]; MAX_LINK]; 2],
     /// For a collapse: the stars of `v'` and `v''`.
     pub halves: [HalfStar; 2],
+    /// Scratch space for the offsets of the fields.
+    pub field_offsets: Vec<i32>,
 }
 
 impl Default for Ring {
@@ -104,6 +106,7 @@ impl Default for Ring {
             after: [0; MAX_LINK],
             seen: [[[0.0; 3]; MAX_LINK]; 2],
             halves: [HalfStar::default(), HalfStar::default()],
+            field_offsets: Vec::new(),
         }
     }
 }
@@ -142,7 +145,7 @@ impl HalfStar {
 
 /// Three indices that share a word.
 #[inline]
-fn three(word: u32) -> [usize; 3] {
+pub(super) fn three(word: u32) -> [usize; 3] {
     [0, 8, 16].map(|shift| (word >> shift & 0xFF) as usize)
 }
 

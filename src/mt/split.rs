@@ -29,6 +29,7 @@ use super::current::Gather;
 use super::current::Labels;
 use super::current::Star;
 use super::current::corner_of;
+use super::predict::Link;
 use super::ring::FAN_CAPACITY;
 use super::ring::HalfStar;
 use super::ring::RING_CAPACITY;
@@ -63,7 +64,11 @@ impl EdgeMt {
             return Err(UpdateError::Unannounced { update: u.0 });
         }
         let mut ring = mesh.take_ring();
-        let applied = self.split_ring(mesh, u, &split, p, &mut ring);
+        let mut field_offsets = std::mem::take(&mut ring.field_offsets);
+        field_offsets.clear();
+        field_offsets.extend_from_slice(split.field_offsets);
+        let applied = self.split_ring(mesh, u, &split, p, &mut ring, &mut field_offsets);
+        ring.field_offsets = field_offsets;
         mesh.put_back_ring(ring);
         applied
     }
@@ -75,6 +80,7 @@ impl EdgeMt {
         split: &VertexSplit<'_>,
         p: u32,
         ring: &mut Ring,
+        field_offsets: &mut [i32],
     ) -> Result<Applied, UpdateError> {
         let update = u.0;
         match mesh.gather_ring(p, update, ring) {
@@ -85,9 +91,19 @@ impl EdgeMt {
         if ring.link_len > MAX_LINK || mesh.is_pinched(p) {
             return Err(UpdateError::Star { update });
         }
-        if !ring.find_sides(split.mask) || !ring.find_fan() {
+        let parted = if self.is_coded() {
+            let link = Link::new(ring, mesh, mesh.positions[p as usize], split.offset);
+            link.guess_levels(ring, mesh, p, split.offset, &self.info().fields, |field, guess| {
+                field_offsets[field] = field_offsets[field].saturating_add(guess);
+            });
+            link.part(ring, split.mask)
+        } else {
+            ring.find_sides(split.mask)
+        };
+        if !parted || !ring.find_fan() {
             return Err(UpdateError::Mask { update });
         }
+        let split = &VertexSplit { field_offsets, ..*split };
         let halves = self.halve(mesh, u, split, p)?;
         if !mesh.is_proven(update) {
             if !ring.is_positive(mesh, halves, self.info().lattice.bits) {
@@ -231,9 +247,9 @@ impl EdgeMt {
         }
         fan[..fan_len].iter().for_each(|&t| close_fan(mesh, t, [p, q]));
         let split = self.split(u);
-        for (f, &offset) in split.field_offsets.iter().enumerate() {
-            mesh.levels[p as usize * mesh.fields + f] =
-                mesh.levels[q as usize * mesh.fields + f] + (offset >> 1);
+        for f in 0..mesh.fields {
+            let [at_p, at_q] = [p, q].map(|slot| slot as usize * mesh.fields + f);
+            mesh.levels[at_p] = midway(mesh.levels[at_p], mesh.levels[at_q]);
         }
         let (b, offset) = (mesh.positions[q as usize], split.offset);
         let position = [0, 1, 2].map(|i| b[i] + (offset[i] >> 1));
@@ -310,7 +326,7 @@ impl EdgeMt {
                 }
                 let corners = tet.map(|v| if v == centre { position } else { mesh.positions[v as usize] });
                 let levels = |field: usize| {
-                    let level = mesh.levels(q)[field] + (split.field_offsets[field] >> 1);
+                    let level = midway(mesh.levels(p)[field], mesh.levels(q)[field]);
                     tet.map(|v| if v == centre { level } else { mesh.levels(v)[field] })
                 };
                 if look(&corners, &levels) {
@@ -336,6 +352,12 @@ fn close_fan(mesh: &mut CurrentMesh, t: u32, [p, q]: [u32; 2]) {
     mesh.free_tet(t);
 }
 
+/// The level of `v` between those of `v'` and `v''`, which do not differ by more than 2^24.
+#[inline]
+fn midway(a: i32, b: i32) -> i32 {
+    b + ((a - b) >> 1)
+}
+
 /// The two halves `[a, b]` of lattice value `v` under offset `d`: `b = v − (d >> 1)`, `a = b + d`, both in
 /// `0 ..= largest`.
 #[inline]
@@ -344,6 +366,38 @@ fn half(v: i32, d: i32, largest: i64) -> Option<[i32; 2]> {
     let a = b + i64::from(d);
     let holds = |x: i64| 0 <= x && x <= largest;
     (holds(a) && holds(b)).then_some([a as i32, b as i32])
+}
+
+impl EdgeMt {
+    /// What a file has to tell of update `u` of an MT that is not coded: the places of the star where the guess of the side
+    /// is wrong; the errors of the guesses of the field offsets are appended to `residuals`. The mesh must be about to
+    /// apply `u`, with all parents there.
+    ///
+    /// # Errors
+    /// If the update does not fit the mesh.
+    pub(crate) fn residuals(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        residuals: &mut Vec<i32>,
+    ) -> Result<u64, UpdateError> {
+        let (split, update) = (self.split(u), u.0);
+        let vertex = UpdateError::Vertex { update, vertex: split.vertex.0 };
+        let p = mesh.slot(split.vertex).ok_or(vertex)?;
+        let mut ring = mesh.take_ring();
+        let gathered = mesh.gather_ring(p, update, &mut ring).is_ok();
+        let wrong = if gathered && ring.link_len <= MAX_LINK && ring.find_sides(split.mask) {
+            let link = Link::new(&ring, mesh, mesh.positions[p as usize], split.offset);
+            link.guess_levels(&ring, mesh, p, split.offset, &self.info().fields, |field, guess| {
+                residuals.push(split.field_offsets[field] - guess);
+            });
+            Ok(link.wrong(&ring, ring.sides))
+        } else {
+            Err(UpdateError::Star { update })
+        };
+        mesh.put_back_ring(ring);
+        wrong
+    }
 }
 
 #[cfg(feature = "build")]
