@@ -55,6 +55,14 @@ impl From<ExplicitMt> for Mt {
     }
 }
 
+impl Mt {
+    /// Tells that no update which is still to come has a larger error than this; until then, any may come. Means
+    /// nothing once all are here.
+    pub fn set_to_come(&mut self, bound: ErrorCode) {
+        each!(self, mt => mt.set_to_come(bound));
+    }
+}
+
 impl MultiTessellation for Mt {
     fn info(&self) -> &MtInfo {
         each!(self, mt => mt.info())
@@ -84,6 +92,10 @@ impl MultiTessellation for Mt {
     #[inline]
     fn error(&self, u: UpdateId) -> ErrorCode {
         each!(self, mt => MultiTessellation::error(mt, u))
+    }
+
+    fn to_come(&self) -> ErrorCode {
+        each!(self, mt => mt.to_come())
     }
 
     #[inline]

@@ -1,8 +1,14 @@
 //! Checks an explicit MT: is it what the theory of Multi-Tessellations asks for [§2]?
 
 use super::ExplicitMt;
+#[cfg(feature = "build")]
+use super::MultiTessellation;
+#[cfg(feature = "build")]
+use super::ReplayError;
 use super::UpdateId;
 use super::VertexId;
+#[cfg(feature = "build")]
+use super::replay::replay;
 use super::taken::Faces;
 use super::taken::faces;
 use crate::geom::orient3d;
@@ -60,6 +66,23 @@ impl fmt::Display for MtFault {
 }
 
 impl std::error::Error for MtFault {}
+
+/// Checks that the errors of an MT do not grow along the partial order, by applying all its updates. Returns the first
+/// update with a larger error than a parent, if there is one.
+///
+/// # Errors
+/// If an update cannot be applied.
+#[cfg(feature = "build")]
+pub fn check_errors(mt: &impl MultiTessellation) -> Result<Option<MtFault>, ReplayError> {
+    let mut fault = None;
+    replay(mt, |step| {
+        let own = mt.error(step.update);
+        if fault.is_none() && step.parents.iter().any(|&parent| mt.error(parent) < own) {
+            fault = Some(MtFault::Error { update: step.update });
+        }
+    })?;
+    Ok(fault)
+}
 
 impl ExplicitMt {
     /// Checks that parents come first and know their children, that errors do not grow along the DAG, and that every

@@ -67,6 +67,7 @@ pub struct EdgeMt {
     field_offsets: Vec<i32>,
     masks: Vec<u64>,
     errors: Vec<ErrorCode>,
+    to_come: ErrorCode,
 }
 
 impl EdgeMt {
@@ -85,6 +86,7 @@ impl EdgeMt {
             field_offsets: Vec::new(),
             masks: Vec::new(),
             errors: Vec::new(),
+            to_come: ErrorCode::MAX,
         }
     }
 
@@ -103,9 +105,8 @@ impl EdgeMt {
     /// Adds the next update.
     ///
     /// # Errors
-    /// The split vertex must exist and be whole, offsets must fit the lattices, and errors must not grow: updates
-    /// come in the order of falling error, which makes errors monotone along the partial order. What needs the mesh
-    /// is checked when the update is applied.
+    /// The split vertex must exist and be whole, and offsets must fit the lattices. What needs the mesh is checked when
+    /// the update is applied; that errors do not grow along the partial order is the caller's to see to.
     pub fn push(&mut self, split: &VertexSplit<'_>) -> Result<UpdateId, UpdateError> {
         let update = self.vertex_of.len() as u32;
         let vertex = split.vertex.0;
@@ -121,9 +122,6 @@ impl EdgeMt {
         if !on_lattice {
             return Err(UpdateError::OffLattice { update });
         }
-        if self.errors.last().is_some_and(|&last| split.error > last) {
-            return Err(UpdateError::Error { update });
-        }
         self.split_of[vertex as usize] = update;
         self.split_of.extend([NONE, NONE]);
         self.vertex_of.push(vertex);
@@ -132,6 +130,17 @@ impl EdgeMt {
         self.masks.push(split.mask);
         self.errors.push(split.error);
         Ok(UpdateId(update))
+    }
+
+    /// Tells that no update which is still to come has a larger error than this; until then, any may come. Means
+    /// nothing once all are here.
+    pub fn set_to_come(&mut self, bound: ErrorCode) {
+        self.to_come = if self.updates() == self.info.updates { ErrorCode::MAX } else { bound };
+    }
+
+    /// No update that is not here has a larger error.
+    pub fn to_come(&self) -> ErrorCode {
+        if self.updates() >= self.info.updates { ErrorCode::ZERO } else { self.to_come }
     }
 
     /// What is known of the MT as a whole.

@@ -83,6 +83,7 @@ pub struct ExplicitMt {
     /// The update that removes each tetrahedron; [`NONE`] if there is none so far. Children follow from it.
     remover: Vec<u32>,
     errors: Vec<ErrorCode>,
+    to_come: ErrorCode,
     /// Whether every update so far inserts more tetrahedra than it removes.
     pub(super) always_grows: bool,
 }
@@ -128,6 +129,7 @@ impl ExplicitMt {
             parents: Rows::new(),
             remover: vec![NONE; base_tets],
             errors: Vec::new(),
+            to_come: ErrorCode::MAX,
             always_grows: true,
             base,
         }
@@ -137,7 +139,8 @@ impl ExplicitMt {
     ///
     /// # Errors
     /// What it removes must be there, once and in no other update; what it inserts must be positive on the lattice, with
-    /// vertices that are new or of what it removes; errors must not grow. Whether it fits the mesh shows when it is applied.
+    /// vertices that are new or of what it removes. Whether it fits the mesh shows when it is applied; that errors do not grow
+    /// along the partial order, [`ExplicitMt::check`] tells.
     pub fn push(&mut self, new: &ExplicitUpdate<'_>) -> Result<UpdateId, UpdateError> {
         let update = self.updates();
         let fields = self.info.fields.len();
@@ -145,9 +148,6 @@ impl ExplicitMt {
             && new.positions.iter().zip(new.levels.chunks(fields)).all(|(&p, q)| self.info.holds(p, q));
         if !holds {
             return Err(UpdateError::OffLattice { update });
-        }
-        if self.errors.last().is_some_and(|&last| new.error > last) {
-            return Err(UpdateError::Error { update });
         }
         let old = self.positions.len();
         let position = |v: u32| match (v as usize).checked_sub(old) {
@@ -227,6 +227,17 @@ impl ExplicitMt {
         })?;
         failed?;
         Ok(explicit)
+    }
+
+    /// Tells that no update which is still to come has a larger error than this; until then, any may come. Means
+    /// nothing once all are here.
+    pub fn set_to_come(&mut self, bound: ErrorCode) {
+        self.to_come = if self.updates() == self.info.updates { ErrorCode::MAX } else { bound };
+    }
+
+    /// No update that is not here has a larger error.
+    pub fn to_come(&self) -> ErrorCode {
+        if self.updates() >= self.info.updates { ErrorCode::ZERO } else { self.to_come }
     }
 
     /// What is known of the MT as a whole.

@@ -675,6 +675,10 @@ impl MultiTessellation for VertexMt {
         self.error_of(u)
     }
 
+    fn to_come(&self) -> ErrorCode {
+        self.to_come()
+    }
+
     #[inline]
     fn remover(&self, mesh: &CurrentMesh, t: u32) -> Option<UpdateId> {
         Some(mesh.tag(t)).filter(|&u| u < self.updates()).map(UpdateId)

@@ -28,6 +28,8 @@ mod vertex_from;
 pub use any::{Mt, MtRef};
 pub use base::{BaseMesh, BaseMeshError, MAX_FIELD_BITS, MAX_UPDATES};
 pub use check::MtFault;
+#[cfg(feature = "build")]
+pub use check::check_errors;
 pub use collapse::{EdgeMt, MAX_LINK, MAX_STAR, VertexSplit};
 pub use convert::ConvertError;
 pub use current::{CurrentMesh, MeshChanges};
@@ -151,9 +153,12 @@ pub trait MultiTessellation {
     /// Whether every update inserts more tetrahedra than it removes: a larger consistent set then has a larger mesh.
     fn always_grows(&self) -> bool;
 
-    /// The error `e(u)` of update `u`: bounds that of every tetrahedron `u+` removes, and of every update with a
-    /// larger number, so of every one that depends on `u`.
+    /// The error `e(u)` of update `u`: bounds that of every tetrahedron `u+` removes, and of every update that depends
+    /// on `u`. Numbers say nothing of it. Only a damaged or hostile MT breaks this.
     fn error(&self, u: UpdateId) -> ErrorCode;
+
+    /// No update that is not here (yet) has a larger error; [`ErrorCode::ZERO`] if all are.
+    fn to_come(&self) -> ErrorCode;
 
     /// Bytes of everything that the MT holds, base mesh and errors included.
     fn bytes(&self) -> u64;

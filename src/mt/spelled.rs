@@ -228,6 +228,10 @@ impl MultiTessellation for ExplicitMt {
         ExplicitMt::error(self, u)
     }
 
+    fn to_come(&self) -> ErrorCode {
+        self.to_come()
+    }
+
     fn remover(&self, mesh: &CurrentMesh, t: u32) -> Option<UpdateId> {
         ExplicitMt::remover(self, mesh.tag(t))
     }

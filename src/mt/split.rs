@@ -477,6 +477,10 @@ impl MultiTessellation for EdgeMt {
         self.error_of(u)
     }
 
+    fn to_come(&self) -> ErrorCode {
+        self.to_come()
+    }
+
     #[inline]
     fn remover(&self, mesh: &CurrentMesh, t: u32) -> Option<UpdateId> {
         let first = mesh.tets[t as usize].iter().map(|&v| mesh.labels[v as usize].split).min();

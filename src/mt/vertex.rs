@@ -78,6 +78,7 @@ pub struct VertexMt {
     /// Where each node starts in its group, in units.
     starts: Vec<u16>,
     errors: Vec<ErrorCode>,
+    to_come: ErrorCode,
     /// Bits of all nodes, padding included, but for vertices and links.
     shape_bits: u64,
 }
@@ -157,6 +158,7 @@ impl VertexMt {
             groups: Vec::new(),
             starts: Vec::new(),
             errors: Vec::new(),
+            to_come: ErrorCode::MAX,
             shape_bits: 0,
         })
     }
@@ -164,8 +166,8 @@ impl VertexMt {
     /// Adds the next update.
     ///
     /// # Errors
-    /// The node must be well formed, its vertex on the lattices, its links within the MT, and errors must not grow.
-    /// What needs the mesh is checked when the update is applied.
+    /// The node must be well formed, its vertex on the lattices, and its links within the MT. What needs the mesh is
+    /// checked when the update is applied; that errors do not grow along the partial order is the caller's to see to.
     pub fn push(&mut self, node: &NodeBits, error: ErrorCode) -> Result<UpdateId, UpdateError> {
         let update = self.updates();
         let bits = &node.0;
@@ -175,9 +177,6 @@ impl VertexMt {
         let position = self.position_at(bits, 0);
         if !position.iter().all(|&x| 0 <= x && x <= 1 << self.info.lattice.bits) {
             return Err(UpdateError::OffLattice { update });
-        }
-        if self.errors.last().is_some_and(|&last| error > last) {
-            return Err(UpdateError::Error { update });
         }
         let children = self.children_at(bits, 0);
         let links_end = self.links_end(0, children);
@@ -216,6 +215,17 @@ impl VertexMt {
             at += u64::from(width);
         }
         NodeBits(bits)
+    }
+
+    /// Tells that no update which is still to come has a larger error than this; until then, any may come. Means
+    /// nothing once all are here.
+    pub fn set_to_come(&mut self, bound: ErrorCode) {
+        self.to_come = if self.updates() == self.info.updates { ErrorCode::MAX } else { bound };
+    }
+
+    /// No update that is not here has a larger error.
+    pub fn to_come(&self) -> ErrorCode {
+        if self.updates() >= self.info.updates { ErrorCode::ZERO } else { self.to_come }
     }
 
     /// What is known of the MT as a whole.

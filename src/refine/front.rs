@@ -17,6 +17,7 @@ use crate::mt::ErrorCode;
 use crate::mt::MultiTessellation;
 use crate::mt::UpdateError;
 use crate::mt::UpdateId;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// A consistent set of updates and its current mesh.
@@ -31,6 +32,9 @@ pub struct Front {
     applied_count: u32,
     /// How many updates of the MT the mesh knows of.
     known: u32,
+    /// The least and the largest error of those that share [`CHUNK_WORDS`] words of `applied`: whole chunks are passed
+    /// over by these.
+    chunks: Vec<[ErrorCode; 2]>,
     goal: Option<Goal>,
     /// Whether `tets` and `leaves` account for the whole mesh.
     watched: bool,
@@ -109,6 +113,35 @@ pub struct Outcome {
     pub satisfied: bool,
 }
 
+/// Words of the set of applied updates whose errors are summed up.
+const CHUNK_WORDS: usize = 8;
+
+/// The updates that a sweep which undoes others leaves applied.
+struct Staying {
+    /// Those with a larger error.
+    tolerance: ErrorCode,
+    /// Those on which such updates depend, as far as they were found; no bits where errors are monotone.
+    others: Vec<u64>,
+}
+
+impl Staying {
+    fn has(&self, mt: &impl MultiTessellation, u: UpdateId) -> bool {
+        let found = self.others.get(u.0 as usize / 64).is_some_and(|word| word >> (u.0 % 64) & 1 == 1);
+        found || mt.error(u) > self.tolerance
+    }
+
+    #[cold]
+    fn add(&mut self, updates: &[UpdateId]) {
+        for u in updates {
+            let word = u.0 as usize / 64;
+            if word >= self.others.len() {
+                self.others.resize(word + 1, 0);
+            }
+            self.others[word] |= 1 << (u.0 % 64);
+        }
+    }
+}
+
 /// Tetrahedra that are judged together.
 const AT_ONCE: usize = 64;
 
@@ -129,6 +162,7 @@ impl Front {
             applied: Vec::new(),
             applied_count: 0,
             known: 0,
+            chunks: Vec::new(),
             goal: None,
             watched: false,
             tets: Waiting::default(),
@@ -232,14 +266,28 @@ impl Front {
             return;
         }
         mt.announce(&mut self.mesh, self.known);
+        self.sum_up(mt, self.known..mt.updates());
         self.known = mt.updates();
         self.applied.resize(self.known.div_ceil(64).max(1) as usize, 0);
+        self.chunks.resize(self.applied.len().div_ceil(CHUNK_WORDS), [ErrorCode::MAX, ErrorCode::ZERO]);
         for t in std::mem::take(&mut self.unknown) {
             self.tets.open(t);
         }
         self.ranked.clear();
         if let Some(goal) = &mut self.goal {
             goal.reached = false;
+        }
+    }
+
+    /// Takes note of the errors of updates that have arrived.
+    fn sum_up(&mut self, mt: &impl MultiTessellation, updates: Range<u32>) {
+        for u in updates {
+            let chunk = u as usize / (64 * CHUNK_WORDS);
+            if chunk >= self.chunks.len() {
+                self.chunks.resize(chunk + 1, [ErrorCode::MAX, ErrorCode::ZERO]);
+            }
+            let (error, [least, largest]) = (mt.error(UpdateId(u)), self.chunks[chunk]);
+            self.chunks[chunk] = [least.min(error), largest.max(error)];
         }
     }
 
@@ -320,10 +368,11 @@ impl Front {
     /// Back to the base mesh.
     fn coarsen_all(&mut self, mt: &impl MultiTessellation, outcome: &mut Outcome) -> Result<(), UpdateError> {
         self.forget_watch();
-        self.sweep(mt, 0, false, outcome, &mut |_| true).map(drop)
+        self.sweep(mt, ErrorCode::MAX, false, outcome, &mut |_| true).map(drop)
     }
 
-    /// Errors fall from one update to the next: the wanted set is a prefix.
+    /// Undoes all updates within the tolerance and applies the others. Which these are, errors tell without a look at the
+    /// mesh; they are monotone along the partial order, so no update is in the way of what is undone.
     fn satisfy_uniform(
         &mut self,
         mt: &impl MultiTessellation,
@@ -331,41 +380,35 @@ impl Front {
         outcome: &mut Outcome,
         go_on: GoOn<'_>,
     ) -> Result<bool, UpdateError> {
-        let mut wanted = (0, self.known);
-        while wanted.0 < wanted.1 {
-            let middle = wanted.0.midpoint(wanted.1);
-            if mt.error(UpdateId(middle)) > tolerance { wanted.0 = middle + 1 } else { wanted.1 = middle }
-        }
-        Ok(self.sweep(mt, wanted.0, false, outcome, go_on)?
-            && self.sweep(mt, wanted.0, true, outcome, go_on)?)
+        Ok(self.sweep(mt, tolerance, false, outcome, go_on)?
+            && self.sweep(mt, tolerance, true, outcome, go_on)?)
     }
 
-    /// Applies all updates before `end`, or undoes all from there on: windows by number, in each by place. What is in the
+    /// Applies all updates beyond the tolerance, or undoes all within it: windows by number, in each by place. What is in the
     /// way of one is done before it. False if it was told to stop.
     fn sweep(
         &mut self,
         mt: &impl MultiTessellation,
-        end: u32,
+        tolerance: ErrorCode,
         applied: bool,
         outcome: &mut Outcome,
         go_on: GoOn<'_>,
     ) -> Result<bool, UpdateError> {
         let mut window = Window::default();
+        let mut staying = Staying { tolerance, others: Vec::new() };
+        let words = self.applied.len();
         let mut done = 0;
-        let all = if applied { end } else { self.known - end };
-        while done < all {
+        while done < words {
             window.updates.clear();
             let size = window_size(self.applied_count);
-            while done < all && window.updates.len() < size {
-                let u = UpdateId(if applied { done } else { self.known - 1 - done });
-                if self.contains(u) != applied {
-                    window.updates.push(u);
-                }
-                done += self.alike(u, applied);
+            while done < words && window.updates.len() < size {
+                let word = if applied { done } else { words - 1 - done };
+                self.push_unlike(mt, tolerance, word, applied, &mut window.updates);
+                done += 1;
             }
             window.sort(mt, &self.mesh);
             for &u in &window.updates {
-                self.turn(mt, u, applied, outcome)?;
+                self.turn(mt, u, applied, &mut staying, outcome)?;
                 if !go_on(outcome) {
                     return Ok(false);
                 }
@@ -374,19 +417,38 @@ impl Front {
         Ok(true)
     }
 
-    /// How many updates a sweep goes on by from `u`: a whole word of them at once where there is nothing to do.
-    fn alike(&self, u: UpdateId, applied: bool) -> u32 {
-        let begins = u.0 % 64 == if applied { 0 } else { 63 };
-        let nothing = if applied { u64::MAX } else { 0 };
-        if begins && self.applied[u.0 as usize / 64] == nothing { 64 } else { 1 }
+    /// Appends the updates of a word that a sweep has to apply, by rising number, or to undo, by falling number.
+    fn push_unlike(
+        &self,
+        mt: &impl MultiTessellation,
+        tolerance: ErrorCode,
+        word: usize,
+        applied: bool,
+        updates: &mut Vec<UpdateId>,
+    ) {
+        let [least, largest] = self.chunks[word / CHUNK_WORDS];
+        let mut rest = if applied { !self.applied[word] } else { self.applied[word] };
+        if rest == 0 || (if applied { largest <= tolerance } else { least > tolerance }) {
+            return;
+        }
+        while rest != 0 {
+            let bit = if applied { rest.trailing_zeros() } else { 63 - rest.leading_zeros() };
+            rest &= !(1 << bit);
+            let u = UpdateId(64 * word as u32 + bit);
+            if u.0 < self.known && (mt.error(u) > tolerance) == applied {
+                updates.push(u);
+            }
+        }
     }
 
-    /// Applies or undoes `u` and before it what is in the way.
+    /// Applies or undoes `u` and before it what is in the way. What has to stay for the sake of another update does so,
+    /// which happens where errors grow along the partial order.
     fn turn(
         &mut self,
         mt: &impl MultiTessellation,
         u: UpdateId,
         applied: bool,
+        staying: &mut Staying,
         outcome: &mut Outcome,
     ) -> Result<(), UpdateError> {
         let mut next = Some(u).filter(|&u| self.contains(u) != applied);
@@ -405,6 +467,10 @@ impl Front {
                     if other != u && (other < u) == applied && self.contains(other) != applied =>
                 {
                     waiting.push(u);
+                    if !applied && staying.has(mt, other) {
+                        staying.add(&waiting);
+                        return Ok(());
+                    }
                     Some(other)
                 }
                 Applied::Blocked(_) => return Err(UpdateError::Error { update: u.0 }),
@@ -683,7 +749,7 @@ impl Front {
         let satisfied = goal.budget.is_unlimited() || self.ranked.has_room();
         let criterion = &*goal.criterion;
         let (error, excess) = if complete && satisfied {
-            (criterion.tolerance().min(self.largest_to_come(mt)), 1.0)
+            (self.within(mt, criterion), 1.0)
         } else {
             self.largest_violation(mt, criterion)
         };
@@ -692,20 +758,23 @@ impl Front {
         goal.outcome = Outcome { done: true, error, excess, satisfied, ..goal.outcome };
     }
 
-    /// No update that is not applied has a larger error: errors fall with the numbers.
-    fn largest_to_come(&self, mt: &impl MultiTessellation) -> ErrorCode {
-        let gap = self.applied.iter().position(|&word| word != u64::MAX);
-        let first = gap.map_or(self.known, |word| (word as u32) * 64 + self.applied[word].trailing_ones());
-        if first < self.known { mt.error(UpdateId(first)) } else { self.to_come(mt) }
-    }
-
-    /// What updates that have not arrived can have for errors: those never grow from one update to the next.
-    fn to_come(&self, mt: &impl MultiTessellation) -> ErrorCode {
-        match self.known {
-            n if n >= mt.info().updates => ErrorCode::ZERO,
-            0 => ErrorCode::MAX,
-            n => mt.error(UpdateId(n - 1)),
+    /// No update that is not applied has a larger error; one of at least `enough` is as good as any.
+    fn largest_left(&self, mt: &impl MultiTessellation, enough: ErrorCode) -> ErrorCode {
+        let mut found = mt.to_come();
+        for (chunk, words) in self.applied.chunks(CHUNK_WORDS).enumerate() {
+            if found >= enough {
+                break;
+            }
+            if self.chunks[chunk][1] <= found {
+                continue;
+            }
+            for (i, &word) in words.iter().enumerate() {
+                let first = 64 * (chunk * CHUNK_WORDS + i) as u32;
+                let left = (0..64).filter(|bit| word >> bit & 1 == 0).map(|bit| UpdateId(first + bit));
+                found = left.filter(|u| u.0 < self.known).map(|u| mt.error(u)).fold(found, ErrorCode::max);
+            }
         }
+        found
     }
 
     /// The largest error that can be left where something is wanted, and the largest excess of all tetrahedra that violate the
@@ -715,7 +784,7 @@ impl Front {
         mt: &impl MultiTessellation,
         criterion: &dyn Criterion,
     ) -> (ErrorCode, f64) {
-        let to_come = self.to_come(mt);
+        let to_come = mt.to_come();
         let mut largest = (ErrorCode::ZERO, 1.0);
         for (t, tet) in (0..).zip(self.mesh.tets()) {
             let update = mt.remover(&self.mesh, t);
@@ -728,7 +797,13 @@ impl Front {
             }
         }
         // What violates nothing is within the tolerance: with several needs, that of another one may be larger.
-        (largest.0.max(criterion.tolerance().min(self.largest_to_come(mt))), largest.1)
+        (largest.0.max(self.within(mt, criterion)), largest.1)
+    }
+
+    /// The error that is left where nothing violates the criterion.
+    fn within(&self, mt: &impl MultiTessellation, criterion: &dyn Criterion) -> ErrorCode {
+        let tolerance = criterion.tolerance();
+        self.largest_left(mt, tolerance).min(tolerance)
     }
 }
 

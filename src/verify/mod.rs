@@ -7,6 +7,7 @@
 //! What is promised and checked, for regions, values, views, transfer functions, their unions, and budgets:
 //! - **Full circle**: error 0 gives the reference mesh, tetrahedron for tetrahedron, on the lattice; error ∞ the base.
 //!   Where the MT was built from points, the mesh that it gives at error 0 has those points and no others.
+//! - **Order**: the error of an update is at least that of every update that depends on it.
 //! - **Valid meshes**: positive tetrahedra, faces shared by at most two, complete and symmetric adjacency, a closed
 //!   boundary, the reference mesh's Euler number, no vertex without a tetrahedron.
 //! - **Error**: within the bound of each need, or half a level where that is more, at every reference vertex in its part.
@@ -32,6 +33,7 @@ mod triangles;
 use crate::mesh::TetMesh;
 use crate::mt::ErrorCode;
 use crate::mt::MultiTessellation;
+use crate::mt::check_errors;
 use crate::refine::Criterion;
 use crate::refine::Front;
 use crate::refine::LodCriterion;
@@ -124,6 +126,7 @@ fn verify<M: MultiTessellation>(
     let deviation = Deviation::new(mt.info(), input)?;
     let base = fresh(mt)?;
     let reference = check_full_circle(mt, &deviation, report)?;
+    check_order(mt, report);
     let steps = 2 * queries.len() as u32;
     let mut hashes = Vec::with_capacity(queries.len());
     let mut excesses = Vec::with_capacity(queries.len());
@@ -196,6 +199,16 @@ fn check_full_circle(
         note(report, &none, "what is left is not the base mesh");
     }
     mesh_checks::Shape::of(&deviation.reference()).map_err(|failure| format!("the input: {failure}"))
+}
+
+/// Refinement relies on errors that do not grow from an update to those that depend on it.
+fn check_order(mt: &impl MultiTessellation, report: &mut VerifyReport) {
+    let place = &"errors along the partial order";
+    match check_errors(mt) {
+        Ok(None) => {}
+        Ok(Some(fault)) => note(report, place, &fault.to_string()),
+        Err(error) => note(report, place, &error.to_string()),
+    }
 }
 
 /// Answers all queries again, in an order that jumps about, each from the mesh that the query before left, in steps.

@@ -1,6 +1,8 @@
 //! MTs with their oracles, for tests of refinement.
 #![allow(dead_code, reason = "every test binary uses a part of it")]
 
+pub mod orders;
+
 use super::build_support::bent;
 use super::build_support::blocks;
 use super::build_support::built;

@@ -74,6 +74,7 @@ pub fn read(mut reader: Reader<'_>, mt: &mut EdgeMt, count: u32) -> Result<(), F
             error,
         })?;
     }
+    mt.set_to_come(error);
     [vertices, offsets, masks, errors].into_iter().chain(fields).try_for_each(Reader::end)
 }
 

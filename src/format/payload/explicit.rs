@@ -135,6 +135,7 @@ pub fn read(
         check_bytes(mt.held_bytes() + grows, limits)?;
         mt.push(&ExplicitUpdate { positions, levels, removed, inserted, error })?;
     }
+    mt.set_to_come(error);
     let Columns { created, positions, removed, inserted, errors, fields } = columns;
     [created, positions, removed, inserted, errors].into_iter().chain(fields).try_for_each(Reader::end)
 }

@@ -273,23 +273,23 @@ pub fn check_reference(mt: MtRef<'_>) -> Result<(), BaseMeshError> {
     }
 }
 
-/// Appends a column of errors, each told as the number of codes that it is below the one before.
+/// Appends a column of errors, each told as the number of codes that it is below the one before; round the end of
+/// the codes where it is above.
 fn write_errors(out: &mut Vec<u8>, scratch: &mut Vec<u8>, errors: impl Iterator<Item = ErrorCode>) {
     write::column(out, scratch, |out| {
         let mut last = ErrorCode::MAX.0;
         for ErrorCode(code) in errors {
-            // `push` has checked that errors do not grow.
-            write::varint(out, u64::from(last.saturating_sub(code)));
+            write::varint(out, u64::from(last.wrapping_sub(code)));
             last = code;
         }
     });
 }
 
-/// The next error, told as the number of codes that it is below the one before.
+/// The next error, told as [`write_errors`] does.
 fn read_error(column: &mut Reader<'_>, last: ErrorCode) -> Result<ErrorCode, FormatError> {
-    let fall = column.varint()?;
-    let code = u32::from(last.0).checked_sub(fall).and_then(|code| u16::try_from(code).ok());
-    code.map(ErrorCode).ok_or_else(|| column.corrupt("an error is below zero"))
+    let fall = u16::try_from(column.varint()?).ok();
+    let code = fall.map(|fall| ErrorCode(last.0.wrapping_sub(fall)));
+    code.ok_or_else(|| column.corrupt("an error is out of its range"))
 }
 
 /// The totals at the end of a file.

@@ -120,6 +120,7 @@ pub fn read(
         check_bytes(mt.bytes() + bits / 8 + 16, limits)?;
         mt.push(&node, error)?;
     }
+    mt.set_to_come(error);
     if all.len() - at >= 8 || all.get(at, 8) != 0 {
         return Err(nodes.corrupt("something follows the last node"));
     }
