@@ -8,6 +8,7 @@ use crate::format::Decoder;
 use crate::format::FormatError;
 use crate::format::Limits;
 use crate::mt::CurrentMesh;
+use crate::mt::ErrorCode;
 use crate::mt::MeshChanges;
 use crate::mt::Mt;
 use crate::mt::MtInfo;
@@ -435,12 +436,16 @@ fn bounds(front: &Front, mt: &Mt, request: &Request, outcome: &Outcome) -> Vec<f
     let bound = |need: &Need| {
         if outcome.satisfied {
             let of_field = !matches!(need.part, Part::View(_) | Part::Transfer(_));
-            return if of_field { need.error.min(error) } else { need.error };
+            let left = need
+                .measured_field()
+                .filter(|_| of_field && mt.info().fields.len() > 1)
+                .map(|field| front.largest_left(mt, Some(field), ErrorCode::at_least(need.error)).error());
+            return if of_field { need.error.min(left.unwrap_or(error)) } else { need.error };
         }
         let measured = matches!(need.part, Part::View(_) | Part::Transfer(_));
         // No multiple of 0 says how large an error is.
         let asked = if measured { need.error.max(LEAST_MULTIPLIED) } else { need.error };
-        let alone = Need { error: asked, part: need.part.clone() };
+        let alone = Need { error: asked, ..need.clone() };
         let (error, excess) = front.largest_violation(mt, &LodCriterion::new(mt.info(), &alone.into()));
         if measured { asked * excess } else { error.error() }
     };

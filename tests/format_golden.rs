@@ -34,7 +34,7 @@ fn example() -> EdgeMt {
         offset: [2, 0, -1],
         field_offsets: &[-3],
         mask: 1,
-        error: ErrorCode(300),
+        errors: &[ErrorCode(300)],
     };
     mt.push(&split).expect("the example is an MT");
     mt
@@ -54,7 +54,7 @@ fn spelled_example() -> ExplicitMt {
         levels: &[15],
         removed: &[0],
         inserted: &[[4, 1, 2, 3], [0, 4, 2, 3], [0, 1, 4, 3], [0, 1, 2, 4]],
-        error: ErrorCode(300),
+        errors: &[ErrorCode(300)],
     };
     mt.push(&update).expect("the example is an MT");
     mt

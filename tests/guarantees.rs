@@ -112,7 +112,8 @@ fn asked(explicit: &ExplicitMt, criterion: &LodCriterion) -> Vec<bool> {
         let tet = explicit.tets()[t as usize].map(VertexId);
         let corners = tet.map(|v| explicit.position(v));
         let levels = |field: usize| tet.map(|v| explicit.levels(v)[field]);
-        let look = TetLook { corners: &corners, levels: &levels, error: explicit.error(u), update: u };
+        let (error, errors) = (explicit.error(u), explicit.errors(u));
+        let look = TetLook { corners: &corners, levels: &levels, error, errors, update: u };
         criterion.judge(&look).asks()
     };
     let updates = (0..explicit.updates()).map(UpdateId);

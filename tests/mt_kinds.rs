@@ -167,7 +167,13 @@ fn octahedron(push: impl FnOnce(&mut ExplicitMt)) -> ExplicitMt {
 }
 
 fn update<'a>(positions: &'a [[i32; 3]], removed: &'a [u32], inserted: &'a [[u32; 4]]) -> ExplicitUpdate<'a> {
-    ExplicitUpdate { positions, levels: &[0; 8][..positions.len()], removed, inserted, error: ErrorCode(9) }
+    ExplicitUpdate {
+        positions,
+        levels: &[0; 8][..positions.len()],
+        removed,
+        inserted,
+        errors: &[ErrorCode(9)],
+    }
 }
 
 /// The tetrahedra, turned round where they are inside out.
@@ -209,7 +215,7 @@ fn updates_that_are_not_even_updates_are_refused() {
     let mut growing = None;
     octahedron(|mt| {
         mt.push(&update(&[], &[0], &[[0, 1, 2, 5]])).expect("good so far");
-        let larger = ExplicitUpdate { error: ErrorCode(10), ..update(&[], &[1], &[[0, 2, 3, 5]]) };
+        let larger = ExplicitUpdate { errors: &[ErrorCode(10)], ..update(&[], &[1], &[[0, 2, 3, 5]]) };
         growing = Some(mt.push(&larger));
     });
     assert_eq!(growing, Some(Ok(UpdateId(1))), "numbers say nothing of errors");

@@ -307,7 +307,9 @@ proptest! {
         let after = criterion(&moved);
         let corners = tetrahedron(subject, &numbers);
         let level = |f: usize| levels.map(|x| (x * f64::from((1 << info.fields[f].bits) - 1)) as i32);
-        let look = TetLook { corners: &corners, levels: &level, error: ErrorCode::at_least(error * error), update: UpdateId(3) };
+        let error = ErrorCode::at_least(error * error);
+        let errors = &[error; 3];
+        let look = TetLook { corners: &corners, levels: &level, error, errors, update: UpdateId(3) };
         let [old, new] = [&before, &after].map(|criterion| criterion.judge(&look));
         let distance = after.turned(&before, old.dial);
         prop_assert!(distance <= after.distance(&before));

@@ -78,7 +78,8 @@ fn the_order_of_the_updates_does_not_show_in_any_mesh() {
 fn with_errors(mt: &EdgeMt, error: &mut dyn FnMut(UpdateId) -> ErrorCode) -> EdgeMt {
     let mut other = EdgeMt::new(mt.info().clone(), mt.base().clone());
     for u in (0..mt.updates()).map(UpdateId) {
-        other.push(&VertexSplit { error: error(u), ..mt.split(u) }).expect("errors are not looked at");
+        let errors = vec![error(u); mt.info().fields.len()];
+        other.push(&VertexSplit { errors: &errors, ..mt.split(u) }).expect("errors are not looked at");
     }
     other
 }

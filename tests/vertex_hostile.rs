@@ -359,7 +359,7 @@ fn one_insertion(
         levels: &[0],
         removed: &removed,
         inserted: &inserted,
-        error: ErrorCode(9),
+        errors: &[ErrorCode(9)],
     };
     mt.push(&update).expect("made to fit");
     mt.into()

@@ -13,6 +13,7 @@ use super::cost::Buckets;
 use super::cost::Evaluator;
 use super::cost::Reference;
 use super::cost::VertexData;
+use super::cost::largest;
 use super::history;
 use super::history::Collapse;
 use super::plan::Plan;
@@ -120,7 +121,7 @@ impl<'a> Builder<'a> {
         let data = VertexData {
             positions: quantized.positions.clone(),
             levels: quantized.levels.clone(),
-            error: vec![0.0; points],
+            errors: vec![0.0; points * quantized.fields.len()],
             height: vec![0; points],
             foot: (0..points as u32).map(foot).collect(),
         };
@@ -224,7 +225,8 @@ impl<'a> Builder<'a> {
         let fields = &self.reference.quantized.fields;
         let (i, j) = (a as usize, b as usize);
         let [p, q] = [i, j].map(|v| glam::DVec3::from_array(self.data.positions[v].map(f64::from)));
-        let mut error = self.data.error[i].max(self.data.error[j]);
+        let errors = |v: usize| largest(&self.data.errors[v * fields.len()..][..fields.len()]);
+        let mut error = errors(i).max(errors(j));
         for (f, field) in fields.iter().enumerate() {
             let [u, v] = [i, j].map(|v| v * fields.len() + f);
             let rise = f64::from(self.data.levels[v] - self.data.levels[u]);
@@ -255,18 +257,19 @@ impl<'a> Builder<'a> {
             self.agenda.push(exact);
             return;
         }
-        self.perform(error);
+        self.perform();
     }
 
-    fn perform(&mut self, error: f64) {
+    fn perform(&mut self) {
         // Never zero: error 0 is to mean the reference mesh, with every update applied.
-        let code = ErrorCode::at_least(error).max(ErrorCode(1));
+        let stored = |error: &f64| ErrorCode::at_least(*error).max(ErrorCode(1));
+        let code = stored(&largest(&self.evaluator.errors));
         let v = self.data.positions.len() as u32;
         let Self { plan, mesh, data, evaluator, .. } = self;
         self.history.push(Collapse::new(plan, mesh, code));
         data.positions.push(plan.position);
         data.levels.extend_from_slice(&evaluator.levels);
-        data.error.push(code.error());
+        data.errors.extend(evaluator.errors.iter().map(|error| stored(error).error()));
         data.height.push(evaluator.height);
         data.foot.push(evaluator.foot);
         evaluator.settle(plan, data, &mut self.buckets, &self.reference);

@@ -24,8 +24,8 @@ use glam::DVec3;
 pub(super) struct VertexData {
     pub positions: Vec<[i32; 3]>,
     pub levels: Vec<i32>,
-    /// The error of the update whose collapse made the vertex; 0 for reference vertices.
-    pub error: Vec<f64>,
+    /// `errors[vertex * fields + f]`: those of the update whose collapse made the vertex; 0 for reference vertices.
+    pub errors: Vec<f64>,
     /// Length of the longest chain of collapses that led to the vertex.
     pub height: Vec<u32>,
     /// The triangle of the reference boundary that a boundary vertex is near to; [`NONE`] inside.
@@ -165,9 +165,23 @@ pub(super) struct Evaluator {
     border_moves: Vec<(u32, u32)>,
     /// The levels of the new vertex.
     pub levels: Vec<i32>,
+    /// The error of each field.
+    pub errors: Vec<f64>,
+    /// The largest error of each field among the updates that this one will be a parent of.
+    inherited: Vec<f64>,
     /// The triangle of the reference boundary near the new vertex.
     pub foot: u32,
     pub height: u32,
+}
+
+/// Raises the errors of all fields to at least this.
+pub(super) fn raise(errors: &mut [f64], least: f64) {
+    errors.iter_mut().for_each(|error| *error = error.max(least));
+}
+
+/// The largest error of all fields.
+pub(super) fn largest(errors: &[f64]) -> f64 {
+    errors.iter().copied().fold(0.0, f64::max)
 }
 
 /// Errors below this are far below the smallest that is stored.
@@ -177,7 +191,7 @@ const NO_DISTANCE: f64 = 1e-8;
 pub(super) const SLACK: f64 = 1e-9;
 
 impl Evaluator {
-    /// The error of the planned collapse; any value above `limit` may be returned early once it is exceeded, then
+    /// The error of the planned collapse, the largest one of all fields; any value above `limit` may be returned early once it is exceeded, then
     /// as a lower bound.
     pub fn evaluate(
         &mut self,
@@ -189,26 +203,28 @@ impl Evaluator {
         limit: f64,
     ) -> f64 {
         self.halve_levels(plan, data, reference);
-        let (inherited, newest) = self.inherit(plan, mesh, data);
-        let overshoot = self.overshoot(plan, data, reference);
+        let newest = self.inherit(plan, mesh, data);
         self.cells.clear();
         self.cells
             .extend(plan.stay.iter().map(|&(s, _)| Cell::new(s.tet, s.corner as usize, plan, mesh, data)));
         self.collect_border(plan, mesh);
         self.flat = self.is_flat(plan, data);
-        let mut error = inherited;
         if newest {
-            error += overshoot;
+            self.add_overshoot(plan, data, reference);
         }
-        error = error.max(self.find_foot(plan, data, reference));
-        if newest && error <= limit {
+        let foot = self.find_foot(plan, data, reference);
+        raise(&mut self.errors, foot);
+        if newest && largest(&self.errors) <= limit {
             let step = reference.error_of(self.step_of_boundary(plan, data, reference));
-            error = error.max(inherited + step);
+            let Self { errors, inherited, .. } = self;
+            errors.iter_mut().zip(inherited).for_each(|(error, own)| *error = error.max(*own + step));
         }
-        if plan.on_boundary && !self.flat && error <= limit {
+        if plan.on_boundary && !self.flat && largest(&self.errors) <= limit {
             // Where it is flat, no point of the boundary gets further away than it is.
-            error = error.max(self.place_on_border(plan, data, buckets, reference));
+            let border = self.place_on_border(plan, data, buckets, reference);
+            raise(&mut self.errors, border);
         }
+        let mut error = largest(&self.errors);
         if error > limit {
             return error;
         }
@@ -258,35 +274,37 @@ impl Evaluator {
         self.levels.extend(a.iter().zip(b).map(|(a, b)| b + ((a - b) >> 1)));
     }
 
-    /// The largest error among the updates that this one will be a parent of, and whether there are any.
+    /// Starts with the errors of the updates that this one will be a parent of; tells whether there are any.
     /// A tetrahedron was made by the collapse that made its newest vertex.
-    fn inherit(&mut self, plan: &Plan, mesh: &WorkMesh, data: &VertexData) -> (f64, bool) {
-        let (mut error, mut height) = (0.0_f64, 0);
+    fn inherit(&mut self, plan: &Plan, mesh: &WorkMesh, data: &VertexData) -> bool {
+        let (fields, mut height) = (self.levels.len(), 0);
+        self.inherited.clear();
+        self.inherited.resize(fields, 0.0);
         let stay = plan.stay.iter().map(|(s, _)| s.tet);
         for tet in stay.chain(plan.fan.iter().map(|&(tet, ..)| tet)) {
             let newest = mesh.tets[tet as usize].into_iter().fold(0, u32::max) as usize;
-            error = error.max(data.error[newest]);
+            let errors = &data.errors[newest * fields..][..fields];
+            self.inherited.iter_mut().zip(errors).for_each(|(error, made)| *error = error.max(*made));
             height = height.max(data.height[newest]);
         }
         self.height = height + 1;
-        (error, height > 0)
+        self.errors.clone_from(&self.inherited);
+        height > 0
     }
 
-    /// How much the ends exceed the range of values around the new vertex, as a fraction of the field's range.
-    /// Added to the inherited error it makes the selection by isovalue monotone.
-    fn overshoot(&self, plan: &Plan, data: &VertexData, reference: &Reference<'_>) -> f64 {
+    /// Adds how much the ends exceed the range of values around the new vertex, as a fraction of the field's range: this
+    /// makes the selection by isovalue monotone.
+    fn add_overshoot(&mut self, plan: &Plan, data: &VertexData, reference: &Reference<'_>) {
         let fields = &reference.quantized.fields;
         let level = |v: u32, f: usize| data.levels[v as usize * fields.len() + f];
-        let mut largest = 0.0_f64;
         for (f, field) in fields.iter().enumerate() {
             let own = self.levels[f];
             let (low, high) =
                 plan.link.iter().map(|&v| level(v, f)).fold((own, own), |(l, h), x| (l.min(x), h.max(x)));
             let (a, b) = (level(plan.a, f), level(plan.b, f));
             let beyond = (a.max(b) - high).max(low - a.min(b)).max(0);
-            largest = largest.max(f64::from(beyond) * field.step / field.range());
+            self.errors[f] += f64::from(beyond) * field.step / field.range() * (1.0 + 1e-9);
         }
-        largest * (1.0 + 1e-9)
     }
 
     /// How far the ends are from the new boundary.
@@ -421,7 +439,9 @@ impl Evaluator {
         }
         self.moves.push((point, cell as u32));
         let lambda = clamped(lambda);
-        self.field_error(point, cell, lambda, data, reference).max(reference.error_of(displaced))
+        let displaced = reference.error_of(displaced);
+        raise(&mut self.errors, displaced);
+        self.deviate(point, cell, lambda, data, reference).max(displaced)
     }
 
     /// The nearest of the first `count` boundary triangles after the collapse: its cell, the nearest point, and the
@@ -447,8 +467,8 @@ impl Evaluator {
         self.faces.extend(self.border.iter().map(|&(_, triangle)| Face::new(triangle.map(at))));
     }
 
-    fn field_error(
-        &self,
+    fn deviate(
+        &mut self,
         point: u32,
         cell: usize,
         lambda: DVec3,
@@ -456,10 +476,12 @@ impl Evaluator {
         reference: &Reference<'_>,
     ) -> f64 {
         let fields = reference.quantized.fields.len();
-        reference.quantized.deviation(point, lambda, |f| {
-            let [x, y, z] = self.cells[cell].others.map(|v| data.levels[v as usize * fields + f]);
-            [self.levels[f], x, y, z]
-        })
+        let Self { cells, levels, errors, .. } = self;
+        let corners = |f: usize| {
+            let [x, y, z] = cells[cell].others.map(|v| data.levels[v as usize * fields + f]);
+            [levels[f], x, y, z]
+        };
+        reference.quantized.deviation(point, lambda, corners, errors)
     }
 }
 

@@ -10,6 +10,7 @@ use super::agenda::Key;
 use super::agenda::Levels;
 use super::cost::Buckets;
 use super::cost::Reference;
+use super::cost::largest;
 use super::fill_cost::FillCost;
 use super::fill_cost::Legacy;
 use super::fill_cost::Past;
@@ -224,7 +225,7 @@ impl<'a> Decimator<'a> {
             return;
         }
         let legacy = self.past.legacy(&self.hole, &self.reference);
-        let least = LEVELS.of(legacy.error);
+        let least = LEVELS.of(largest(&legacy.errors));
         if least > key.level() {
             self.push(Key::new(least, legacy.height, 0.0, a, NONE));
             return;
@@ -232,13 +233,13 @@ impl<'a> Decimator<'a> {
         let known = self.seen[a as usize] == version && key.b != NONE;
         self.seen[a as usize] = version;
         let exact = match self.gift_wrap {
-            None => self.find_end(key, legacy, known),
-            Some(_) => self.wrap(key, legacy),
+            None => self.find_end(key, &legacy, known),
+            Some(_) => self.wrap(key, &legacy),
         };
         match exact {
             None => {}
             Some(exact) if exact.urgency() > key.urgency() => self.push(exact),
-            Some(_) => self.perform(legacy),
+            Some(_) => self.perform(&legacy),
         }
     }
 
@@ -255,7 +256,7 @@ impl<'a> Decimator<'a> {
     }
 
     /// Finds the best edge to contract; only the one in `key` if that is `known` to be it. Its filling becomes `best`.
-    fn find_end(&mut self, key: Key, legacy: Legacy, known: bool) -> Option<Key> {
+    fn find_end(&mut self, key: Key, legacy: &Legacy, known: bool) -> Option<Key> {
         self.ends.clear();
         if known {
             self.ends.push((0.0, key.b));
@@ -295,7 +296,7 @@ impl<'a> Decimator<'a> {
     }
 
     /// Fills the hole by the Delaunay criterion; the filling becomes `best`.
-    fn wrap(&mut self, key: Key, legacy: Legacy) -> Option<Key> {
+    fn wrap(&mut self, key: Key, legacy: &Legacy) -> Option<Key> {
         let Self { hole, best, buckets, reference, gift_wrap, .. } = self;
         if !gift_wrap.as_mut()?.fill(hole, &reference.quantized.positions, &mut best.filling) {
             return None;
@@ -309,9 +310,10 @@ impl<'a> Decimator<'a> {
         Some(self.key(&self.best, legacy.height, NONE))
     }
 
-    fn perform(&mut self, legacy: Legacy) {
+    fn perform(&mut self, legacy: &Legacy) {
         // Never zero: error 0 is to mean the reference mesh, with every vertex in.
-        let error = ErrorCode::at_least(self.best.error).max(ErrorCode(1)).error();
+        let stored = |error: &f64| ErrorCode::at_least(*error).max(ErrorCode(1)).error();
+        let errors: Vec<f64> = self.best.cost.errors.iter().map(stored).collect();
         let Self { mesh, hole, best, slots, past, sequence, .. } = self;
         let start = sequence.tets.len();
         sequence.tets.extend(hole.star.iter().map(|s| mesh.tets[s.tet as usize]));
@@ -324,11 +326,11 @@ impl<'a> Decimator<'a> {
             vertex: hole.a,
             removed: middle..end,
             inserted: start..middle,
-            error,
+            errors: errors.clone(),
             step,
         });
         hole.replace(mesh, &best.filling, slots);
-        past.errors.push(error);
+        past.errors.extend(errors);
         past.heights.push(legacy.height);
         past.makers.resize(mesh.tets.len(), NONE);
         slots.iter().for_each(|&t| past.makers[t as usize] = removal);

@@ -10,8 +10,10 @@ use super::cost::Reference;
 use super::cost::SLACK;
 use super::cost::as_vec;
 use super::cost::clamped;
+use super::cost::largest;
 use super::cost::locate;
 use super::cost::nearest_face;
+use super::cost::raise;
 use super::hole::Filling;
 use super::hole::Hole;
 use crate::mesh::NONE;
@@ -23,21 +25,21 @@ use glam::DVec3;
 pub(super) struct Past {
     /// The removal that made each tetrahedron; [`NONE`] for those of the reference mesh.
     pub makers: Vec<u32>,
-    /// The error of each removal.
+    /// The errors of each removal, field by field.
     pub errors: Vec<f64>,
     /// Length of the longest chain of removals that ends with each.
     pub heights: Vec<u32>,
 }
 
 /// What a removal costs whatever fills its hole.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Legacy {
-    /// The largest error among the removals that this one depends on.
-    pub inherited: f64,
+    /// The largest error of each field among the removals that this one depends on.
+    pub inherited: Vec<f64>,
     /// Whether there are any.
     pub depends: bool,
-    /// The least error of this removal.
-    pub error: f64,
+    /// The least error of this removal in each field.
+    pub errors: Vec<f64>,
     /// One more than the longest chain of removals that it depends on.
     pub height: u32,
 }
@@ -62,6 +64,8 @@ pub(super) struct FillCost {
     border_moves: Vec<(u32, u32)>,
     /// How far the boundary moves, as an error.
     pub step: f64,
+    /// The error of each field.
+    pub errors: Vec<f64>,
 }
 
 impl Past {
@@ -71,18 +75,23 @@ impl Past {
 
     /// What the hole's tetrahedra leave to the removal of its vertex.
     pub fn legacy(&self, hole: &Hole, reference: &Reference<'_>) -> Legacy {
-        let (mut inherited, mut height) = (0.0_f64, 0);
+        let fields = reference.quantized.fields.len();
+        let (mut inherited, mut height) = (vec![0.0_f64; fields], 0);
         for s in &hole.star {
             let maker = self.makers[s.tet as usize];
             if maker != NONE {
-                inherited = inherited.max(self.errors[maker as usize]);
+                let errors = &self.errors[maker as usize * fields..][..fields];
+                inherited.iter_mut().zip(errors).for_each(|(error, made)| *error = error.max(*made));
                 height = height.max(self.heights[maker as usize]);
             }
         }
         let depends = height > 0;
-        let overshoot = || reference.quantized.overshoot(hole.a, &hole.link);
-        let error = if depends { inherited + overshoot() } else { 0.0 };
-        Legacy { inherited, depends, error, height: height + 1 }
+        let mut errors = inherited.clone();
+        if depends {
+            let overshoot = |f: usize| reference.quantized.overshoot(hole.a, &hole.link, f);
+            errors.iter_mut().enumerate().for_each(|(f, error)| *error += overshoot(f));
+        }
+        Legacy { inherited, depends, errors, height: height + 1 }
     }
 }
 
@@ -93,7 +102,7 @@ impl FillCost {
         &mut self,
         hole: &Hole,
         filling: &Filling,
-        legacy: Legacy,
+        legacy: &Legacy,
         buckets: &Buckets,
         reference: &Reference<'_>,
         limit: f64,
@@ -105,25 +114,30 @@ impl FillCost {
         self.cells.clear();
         self.cells
             .extend(filling.tets.iter().map(|tet| Cell::new(tet.map(|v| as_vec(positions[v as usize])))));
-        let mut error = legacy.error.max(self.place(hole.a, 0, filling, reference).0);
-        if error > limit {
-            return error;
+        self.errors.clone_from(&legacy.errors);
+        self.place(hole.a, 0, filling, reference);
+        if largest(&self.errors) > limit {
+            return largest(&self.errors);
         }
         self.flat = !hole.on_boundary() || hole.keeps_boundary(filling, positions);
         if !self.flat {
             self.step = reference.error_of(self.step_of_boundary(hole, filling, reference));
             if legacy.depends {
-                error = error.max(legacy.inherited + self.step);
+                let Self { errors, step, .. } = self;
+                let inherited = errors.iter_mut().zip(&legacy.inherited);
+                inherited.for_each(|(error, own)| *error = error.max(*own + *step));
             }
-            if error > limit {
-                return error;
+            if largest(&self.errors) > limit {
+                return largest(&self.errors);
             }
-            error = error.max(self.place_on_border(hole, filling, buckets, reference));
-            if error > limit {
-                return error;
+            let border = self.place_on_border(hole, filling, buckets, reference);
+            raise(&mut self.errors, border);
+            if largest(&self.errors) > limit {
+                return largest(&self.errors);
             }
-            error = error.max(chords(filling, reference));
+            raise(&mut self.errors, chords(filling, reference));
         }
+        let mut error = largest(&self.errors);
         let mut hint = 0;
         for s in &hole.star {
             for point in buckets.inside.iter(s.tet) {
@@ -233,9 +247,11 @@ impl FillCost {
         }
         self.moves.push((point, cell as u32));
         let quantized = reference.quantized;
-        let error = quantized
-            .deviation(point, clamped(lambda), |f| filling.tets[cell].map(|v| quantized.level(v, f)));
-        (error.max(reference.error_of(displaced)), cell)
+        let displaced = reference.error_of(displaced);
+        raise(&mut self.errors, displaced);
+        let corners = |f: usize| filling.tets[cell].map(|v| quantized.level(v, f));
+        let error = quantized.deviation(point, clamped(lambda), corners, &mut self.errors);
+        (error.max(displaced), cell)
     }
 }
 

@@ -24,6 +24,7 @@ pub(super) struct Collapse {
     ends: [u32; 2],
     /// Sides of the star in ascending order of the builder's sorted numbers of the opposite faces.
     sides: u64,
+    /// The largest one of all fields.
     error: ErrorCode,
 }
 
@@ -69,6 +70,7 @@ pub(super) fn edge_mt(
     number.iter().enumerate().filter(|(_, v)| **v != NONE).for_each(|(i, &v)| built[v as usize] = i as u32);
     let mut next = mt.base().positions.len() as u32;
     let mut field_offsets = vec![0; fields];
+    let mut errors = vec![ErrorCode::ZERO; fields];
     for (done, &i) in order.iter().enumerate() {
         if done % 4096 == 0 {
             let step = BuildProgress { stage: "order", done: done as u64, total: history.len() as u64 };
@@ -76,7 +78,7 @@ pub(super) fn edge_mt(
                 return Err(BuildError::Stopped);
             }
         }
-        let Collapse { ends: [a, b], sides, error } = history[i as usize];
+        let Collapse { ends: [a, b], sides, .. } = history[i as usize];
         let vertex = number[points + i as usize];
         for end in [a, b] {
             number[end as usize] = next;
@@ -86,6 +88,8 @@ pub(super) fn edge_mt(
             built[next as usize] = end;
             next += 1;
         }
+        let stored = &data.errors[(points + i as usize) * fields..][..fields];
+        errors.iter_mut().zip(stored).for_each(|(code, &error)| *code = ErrorCode::at_least(error));
         for (f, offset) in field_offsets.iter_mut().enumerate() {
             *offset = data.levels[a as usize * fields + f] - data.levels[b as usize * fields + f];
         }
@@ -93,8 +97,13 @@ pub(super) fn edge_mt(
         let mask = mesh
             .reorder_mask(VertexId(vertex), sides, |v| built[v.0 as usize])
             .ok_or(BuildError::Internal(UpdateError::Mask { update: done as u32 }))?;
-        let split =
-            VertexSplit { vertex: VertexId(vertex), offset, field_offsets: &field_offsets, mask, error };
+        let split = VertexSplit {
+            vertex: VertexId(vertex),
+            offset,
+            field_offsets: &field_offsets,
+            mask,
+            errors: &errors,
+        };
         let update = mt.push(&split).map_err(BuildError::Internal)?;
         mt.announce(&mut mesh, update.0);
         match mt.refine(&mut mesh, update).map_err(BuildError::Internal)? {

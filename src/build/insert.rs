@@ -128,6 +128,8 @@ struct Greedy<'a> {
     /// Whether `i64` does for tests of sides.
     narrow: bool,
     buckets: Vec<Bucket>,
+    /// The largest error of each field at the points of each tetrahedron; without entries where there is one field alone.
+    field_errors: Vec<f64>,
     next: Vec<u32>,
     heap: BinaryHeap<Candidate>,
     live: usize,
@@ -149,6 +151,7 @@ impl<'a> Greedy<'a> {
             weights: quantized.fields.iter().map(|field| field.step / field.range()).collect(),
             narrow: largest <= 1 << NARROW_BITS,
             buckets: vec![NO_BUCKET; mesh.slots()],
+            field_errors: Vec::new(),
             next: vec![NONE; points],
             heap: BinaryHeap::new(),
             live: 0,
@@ -267,9 +270,16 @@ impl<'a> Greedy<'a> {
 
     fn record(&mut self, v: u32) {
         let start = self.sequence.tets.len();
-        let mut error = 0.0_f64;
+        let fields = self.weights.len();
+        let mut errors = vec![0.0_f64; fields];
         for &(tet, slot) in self.mesh.removed() {
-            error = error.max(self.buckets[slot as usize].error);
+            let own = match fields {
+                1 => std::slice::from_ref(&self.buckets[slot as usize].error),
+                _ => {
+                    self.field_errors.get(slot as usize * fields..(slot as usize + 1) * fields).unwrap_or(&[])
+                }
+            };
+            errors.iter_mut().zip(own).for_each(|(error, own)| *error = error.max(*own));
             self.sequence.tets.push(tet);
         }
         let middle = self.sequence.tets.len();
@@ -277,7 +287,7 @@ impl<'a> Greedy<'a> {
         self.sequence.tets.extend(inserted.map(|cell| cell.tet));
         let end = self.sequence.tets.len();
         let (removed, inserted) = (start..middle, middle..end);
-        self.sequence.steps.push(Insertion { vertex: v, removed, inserted, error, step: 0.0 });
+        self.sequence.steps.push(Insertion { vertex: v, removed, inserted, errors, step: 0.0 });
     }
 
     fn lay_out_star(&mut self, v: u32) {
@@ -318,6 +328,9 @@ impl<'a> Greedy<'a> {
         self.live -= usize::from(bucket.first != NONE);
         bucket.stamp = bucket.stamp.wrapping_add(1);
         (bucket.first, bucket.error, bucket.chosen) = (NONE, 0.0, NONE);
+        let fields = self.weights.len();
+        let errors = self.field_errors.get_mut(slot as usize * fields..(slot as usize + 1) * fields);
+        errors.into_iter().flatten().for_each(|error| *error = 0.0);
     }
 
     /// The cell of the star of `v` that contains point `p`, walking from `from`.
@@ -362,22 +375,24 @@ impl<'a> Greedy<'a> {
     /// How far the cell's fields are from those of the reference at `p`, as a fraction of their ranges.
     #[inline]
     fn error_at(&self, p: u32, cell: usize, v: u32) -> f64 {
+        (0..self.weights.len()).fold(0.0, |largest, f| largest.max(self.field_error_at(p, cell, v, f)))
+    }
+
+    #[inline]
+    fn field_error_at(&self, p: u32, cell: usize, v: u32, f: usize) -> f64 {
         let arm = difference(self.mesh.position(p), self.mesh.position(v)).map(|x| x as f64);
         let fields = self.weights.len();
-        let mut largest = 0.0_f64;
-        for (f, weight) in self.weights.iter().enumerate() {
-            let slope = self.slopes[cell * fields + f];
-            let value = f64::from(self.quantized.levels[v as usize * fields + f])
-                + (slope[0] * arm[0] + slope[1] * arm[1] + slope[2] * arm[2]);
-            let exact = self.quantized.exact[p as usize * fields + f];
-            largest = largest.max((value - exact).abs() * weight);
-        }
-        largest
+        let slope = self.slopes[cell * fields + f];
+        let value = f64::from(self.quantized.levels[v as usize * fields + f])
+            + (slope[0] * arm[0] + slope[1] * arm[1] + slope[2] * arm[2]);
+        let exact = self.quantized.exact[p as usize * fields + f];
+        (value - exact).abs() * self.weights[f]
     }
 
     /// Hands a cell's points over to a slot, and the slot to the heap.
     fn settle(&mut self, cell: usize, slot: u32) {
         let Cell { tet, first, error, worst, sides } = self.cells[cell];
+        self.settle_fields(cell, slot);
         let bucket = &mut self.buckets[slot as usize];
         bucket.stamp = bucket.stamp.wrapping_add(1);
         bucket.first = first;
@@ -392,6 +407,27 @@ impl<'a> Greedy<'a> {
             self.buckets[slot as usize].chosen = self.middle_point(slot);
         }
         self.heap.push(Candidate { key, slot, stamp });
+    }
+
+    /// The same for the errors of the fields, where there are several.
+    fn settle_fields(&mut self, cell: usize, slot: u32) {
+        let (fields, at) = (self.weights.len(), slot as usize * self.weights.len());
+        if fields == 1 {
+            return;
+        }
+        if self.field_errors.len() < at + fields {
+            self.field_errors.resize(at + fields, 0.0);
+        }
+        let v = self.cells[cell].tet[3];
+        let mut p = self.cells[cell].first;
+        let mut errors = vec![0.0_f64; fields];
+        while p != NONE {
+            for (f, error) in errors.iter_mut().enumerate() {
+                *error = error.max(self.field_error_at(p, cell, v, f));
+            }
+            p = self.next[p as usize];
+        }
+        self.field_errors[at..at + fields].copy_from_slice(&errors);
     }
 
     /// The point of a bucket that is next to the tetrahedron's middle.
@@ -583,7 +619,8 @@ mod tests {
                 // A point on a face is in the bucket of one side; with exact fields both give the same error but for
                 // rounding, as they agree on the face.
                 assert!(
-                    step.error <= all * (1.0 + 1e-9) + 1e-12 && step.error >= inner * (1.0 - 1e-9) - 1e-12
+                    super::super::cost::largest(&step.errors) <= all * (1.0 + 1e-9) + 1e-12
+                        && super::super::cost::largest(&step.errors) >= inner * (1.0 - 1e-9) - 1e-12
                 );
             }
         }

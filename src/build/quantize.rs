@@ -35,30 +35,36 @@ impl Quantized {
         self.levels[v as usize * self.fields.len() + f]
     }
 
-    /// How far the values at `v` exceed the range of those at the points around it, as a fraction of the field's range.
-    /// Added to inherited errors it makes the selection by isovalue monotone.
-    pub fn overshoot<'a>(&self, v: u32, around: impl IntoIterator<Item = &'a u32> + Clone) -> f64 {
-        let mut largest = 0.0_f64;
-        for (f, field) in self.fields.iter().enumerate() {
-            let levels = around.clone().into_iter().map(|&w| self.level(w, f));
-            let (low, high) = levels.fold((i32::MAX, i32::MIN), |(low, high), x| (low.min(x), high.max(x)));
-            let own = self.level(v, f);
-            let beyond = (own - high).max(low - own).max(0);
-            largest = largest.max(f64::from(beyond) * field.step / field.range());
-        }
-        largest * (1.0 + 1e-9)
+    /// How far the value of field `f` at `v` exceeds the range of those at the points around it, as a fraction of the
+    /// field's range. Added to inherited errors it makes the selection by isovalue monotone.
+    pub fn overshoot<'a>(&self, v: u32, around: impl IntoIterator<Item = &'a u32>, f: usize) -> f64 {
+        let field = &self.fields[f];
+        let levels = around.into_iter().map(|&w| self.level(w, f));
+        let (low, high) = levels.fold((i32::MAX, i32::MIN), |(low, high), x| (low.min(x), high.max(x)));
+        let own = self.level(v, f);
+        let beyond = (own - high).max(low - own).max(0);
+        f64::from(beyond) * field.step / field.range() * (1.0 + 1e-9)
     }
 
-    /// The largest deviation, as a fraction of a field's range, of the values that are interpolated at a point from the
-    /// true ones. `lambda` has its barycentric coordinates but for the first one, `corners` gives the levels of a field.
-    pub fn deviation(&self, point: u32, lambda: DVec3, corners: impl Fn(usize) -> [i32; 4]) -> f64 {
+    /// Raises the error of each field to the deviation, as a fraction of its range, of the value that is interpolated at a
+    /// point from the true one; returns the largest of these deviations. `lambda` has the point's barycentric coordinates
+    /// but for the first one, `corners` gives the levels of a field.
+    pub fn deviation(
+        &self,
+        point: u32,
+        lambda: DVec3,
+        corners: impl Fn(usize) -> [i32; 4],
+        errors: &mut [f64],
+    ) -> f64 {
         let own = 1.0 - lambda.element_sum();
         let mut largest = 0.0_f64;
         for (f, field) in self.fields.iter().enumerate() {
             let [w, x, y, z] = corners(f).map(f64::from);
             let value = own * w + lambda.x * x + lambda.y * y + lambda.z * z;
             let exact = self.exact[point as usize * self.fields.len() + f];
-            largest = largest.max((value - exact).abs() * field.step / field.range());
+            let error = (value - exact).abs() * field.step / field.range();
+            errors[f] = errors[f].max(error);
+            largest = largest.max(error);
         }
         largest
     }

@@ -36,8 +36,9 @@ pub(super) struct Insertion {
     pub removed: Range<usize>,
     /// Which it inserts: all tetrahedra at the vertex.
     pub inserted: Range<usize>,
-    /// The largest error of a tetrahedron that it removes, as a fraction of a field's range; it need not be monotone.
-    pub error: f64,
+    /// For each field the largest error of a tetrahedron that it removes, as a fraction of the field's range; they need not
+    /// be monotone.
+    pub errors: Vec<f64>,
     /// What has to be added to the errors of the insertions that depend on this one before they bound its own from
     /// below: how far the boundary moves, as an error. 0 where the boundary stays.
     pub step: f64,
@@ -55,9 +56,10 @@ impl Sequence {
         let arcs = self.arcs(quantized.positions.len())?;
         let errors = self.monotone_errors(quantized, &arcs);
         let mut order: Vec<u32> = (0..self.steps.len() as u32).collect();
-        order.sort_by_key(|&i| Reverse(errors[i as usize]));
-        info.updates = order.len() as u32;
         let fields = info.fields.len();
+        let errors_of = |i: u32| &errors[i as usize * fields..][..fields];
+        order.sort_by_key(|&i| Reverse(errors_of(i).iter().max()));
+        info.updates = order.len() as u32;
         let levels = |v: u32| &quantized.levels[v as usize * fields..][..fields];
         let mut base = BaseMesh::default();
         let mut number = vec![NONE; quantized.positions.len()];
@@ -90,7 +92,7 @@ impl Sequence {
                 levels: levels(*vertex),
                 removed: &removed,
                 inserted: &new,
-                error: errors[i as usize],
+                errors: errors_of(i),
             };
             mt.push(&update).map_err(BuildError::Internal)?;
             let stored = &mt.tets()[first as usize..];
@@ -133,28 +135,31 @@ impl Sequence {
         Ok(arcs)
     }
 
-    /// Errors that are at least those of all insertions that depend on each, by so much more that selection by isovalue
+    /// Errors by insertion and field that are at least those of all insertions that depend on each, by so much more that selection by isovalue
     /// and by box is monotone: see [`Quantized::overshoot`], and `step_of_boundary` in the builders' costs.
     fn monotone_errors(&self, quantized: &Quantized, arcs: &Arcs) -> Vec<ErrorCode> {
         // Never zero: error 0 is to mean the reference mesh, with every update applied.
-        let own = |step: &Insertion| ErrorCode::at_least(step.error).max(ErrorCode(1));
-        let mut errors: Vec<ErrorCode> = self.steps.iter().map(own).collect();
+        let own = |error: &f64| ErrorCode::at_least(*error).max(ErrorCode(1));
+        let mut errors: Vec<ErrorCode> = self.steps.iter().flat_map(|step| &step.errors).map(own).collect();
         let mut parents: Vec<u32> = Vec::new();
-        let step = |i: usize| {
-            let Insertion { vertex, inserted, step, .. } = &self.steps[i];
+        let fields = quantized.fields.len();
+        let step = |at: usize| {
+            let Insertion { vertex, inserted, step, .. } = &self.steps[at / fields];
             let around = self.tets[inserted.clone()].iter().flatten().filter(|&v| v != vertex);
-            quantized.overshoot(*vertex, around).max(*step)
+            quantized.overshoot(*vertex, around, at % fields).max(*step)
         };
-        let more: Vec<f64> = (0..self.steps.len()).map(step).collect();
+        let more: Vec<f64> = (0..errors.len()).map(step).collect();
         for i in (0..self.steps.len()).rev() {
-            let error = errors[i].error();
             let removed = self.steps[i].removed.clone();
             parents.clear();
             parents.extend(arcs.creator[removed].iter().filter(|&&p| p != NONE));
             parents.sort_unstable();
             parents.dedup();
             for p in parents.iter().map(|&p| p as usize) {
-                errors[p] = errors[p].max(ErrorCode::at_least(error + more[p]));
+                for (own, above) in (i * fields..(i + 1) * fields).zip(p * fields..) {
+                    let least = ErrorCode::at_least(errors[own].error() + more[above]);
+                    errors[above] = errors[above].max(least);
+                }
             }
         }
         errors

@@ -94,6 +94,11 @@ impl MultiTessellation for Mt {
         each!(self, mt => MultiTessellation::error(mt, u))
     }
 
+    #[inline]
+    fn errors(&self, u: UpdateId) -> &[ErrorCode] {
+        each!(self, mt => MultiTessellation::errors(mt, u))
+    }
+
     fn to_come(&self) -> ErrorCode {
         each!(self, mt => mt.to_come())
     }

@@ -76,8 +76,9 @@ impl std::error::Error for MtFault {}
 pub fn check_errors(mt: &impl MultiTessellation) -> Result<Option<MtFault>, ReplayError> {
     let mut fault = None;
     replay(mt, |step| {
-        let own = mt.error(step.update);
-        if fault.is_none() && step.parents.iter().any(|&parent| mt.error(parent) < own) {
+        let own = mt.errors(step.update);
+        let exceeds = |parent: &UpdateId| own.iter().zip(mt.errors(*parent)).any(|(own, above)| own > above);
+        if fault.is_none() && step.parents.iter().any(exceeds) {
             fault = Some(MtFault::Error { update: step.update });
         }
     })?;
@@ -121,7 +122,8 @@ impl ExplicitMt {
         if !in_order {
             return Err(MtFault::Order { update: u });
         }
-        if parents().any(|p| self.error(p) < self.error(u)) {
+        let exceeds = |p: UpdateId| self.errors(u).iter().zip(self.errors(p)).any(|(own, above)| own > above);
+        if parents().any(exceeds) {
             return Err(MtFault::Error { update: u });
         }
         Ok(())

@@ -20,6 +20,7 @@ use super::MtKind;
 use super::UpdateError;
 use super::UpdateId;
 use super::VertexId;
+use super::errors::Errors;
 use crate::geom::NARROW_BITS;
 use crate::mesh::NONE;
 
@@ -44,8 +45,9 @@ pub struct VertexSplit<'a> {
     /// Bit `i` is 0 where tetrahedron `i` of the star goes to `v'`, 1 where it goes to `v''`. The star is in
     /// ascending order of the sorted vertex numbers of the faces opposite the vertex.
     pub mask: u64,
-    /// Bounds the error of every tetrahedron that the split removes, and of all updates that depend on this one.
-    pub error: ErrorCode,
+    /// Field by field, what bounds the error of every tetrahedron that the split removes, and of all updates that depend on
+    /// this one.
+    pub errors: &'a [ErrorCode],
 }
 
 /// A compact edge-based MT. With one field an update, and so a reference vertex, takes at most 36 bytes and 2 for the
@@ -66,7 +68,7 @@ pub struct EdgeMt {
     /// One block of `fields` per update.
     field_offsets: Vec<i32>,
     masks: Vec<u64>,
-    errors: Vec<ErrorCode>,
+    errors: Errors,
     to_come: ErrorCode,
 }
 
@@ -76,6 +78,7 @@ impl EdgeMt {
         info.kind = MtKind::Edge;
         let split_of = vec![NONE; base.positions.len()];
         let offsets = Offsets::new(info.lattice.bits);
+        let errors = Errors::new(info.fields.len());
         Self {
             info,
             base,
@@ -85,7 +88,7 @@ impl EdgeMt {
             offsets,
             field_offsets: Vec::new(),
             masks: Vec::new(),
-            errors: Vec::new(),
+            errors,
             to_come: ErrorCode::MAX,
         }
     }
@@ -105,7 +108,7 @@ impl EdgeMt {
     /// Adds the next update.
     ///
     /// # Errors
-    /// The split vertex must exist and be whole, and offsets must fit the lattices. What needs the mesh is checked when
+    /// The split vertex must exist and be whole, offsets must fit the lattices, and each field has an error. What needs the mesh is checked when
     /// the update is applied; that errors do not grow along the partial order is the caller's to see to.
     pub fn push(&mut self, split: &VertexSplit<'_>) -> Result<UpdateId, UpdateError> {
         let update = self.vertex_of.len() as u32;
@@ -122,13 +125,15 @@ impl EdgeMt {
         if !on_lattice {
             return Err(UpdateError::OffLattice { update });
         }
+        if !self.errors.push(split.errors) {
+            return Err(UpdateError::Error { update });
+        }
         self.split_of[vertex as usize] = update;
         self.split_of.extend([NONE, NONE]);
         self.vertex_of.push(vertex);
         self.offsets.push(split.offset);
         self.field_offsets.extend_from_slice(split.field_offsets);
         self.masks.push(split.mask);
-        self.errors.push(split.error);
         Ok(UpdateId(update))
     }
 
@@ -167,14 +172,20 @@ impl EdgeMt {
         let nodes = self.offsets.bytes()
             + size_of_val(&self.field_offsets[..])
             + size_of_val(&self.masks[..])
-            + size_of_val(&self.errors[..]);
+            + self.errors.bytes();
         (base + order + nodes) as u64
     }
 
-    /// The error of update `u`.
+    /// The error of update `u`: the largest one of all fields.
     #[inline]
     pub fn error_of(&self, u: UpdateId) -> ErrorCode {
-        self.errors[u.0 as usize]
+        self.errors.largest(u.0 as usize)
+    }
+
+    /// The error of update `u` in each field.
+    #[inline]
+    pub fn errors_of(&self, u: UpdateId) -> &[ErrorCode] {
+        self.errors.of(u.0 as usize)
     }
 
     /// What update `u` does.
@@ -189,7 +200,7 @@ impl EdgeMt {
             offset: self.offsets.get(k),
             field_offsets: &self.field_offsets[k * fields..][..fields],
             mask: self.masks[k],
-            error: self.errors[k],
+            errors: self.errors.of(k),
         }
     }
 

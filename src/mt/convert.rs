@@ -136,13 +136,13 @@ struct Split {
     offset: [i32; 3],
     field_offsets: Vec<i32>,
     mask: u64,
-    error: super::ErrorCode,
+    errors: Vec<super::ErrorCode>,
 }
 
 impl Split {
     fn borrowed(&self) -> VertexSplit<'_> {
-        let Self { vertex, offset, ref field_offsets, mask, error } = *self;
-        VertexSplit { vertex, offset, field_offsets, mask, error }
+        let Self { vertex, offset, ref field_offsets, mask, ref errors } = *self;
+        VertexSplit { vertex, offset, field_offsets, mask, errors }
     }
 }
 
@@ -168,7 +168,7 @@ fn as_split(explicit: &ExplicitMt, mt: &EdgeMt, u: UpdateId) -> Result<Split, &'
     };
     let offset = [offset[0], offset[1], offset[2]];
     let mask = mask(&removed, inserted, vertex.0, far.0);
-    Ok(Split { vertex, offset, field_offsets, mask, error: explicit.error(u) })
+    Ok(Split { vertex, offset, field_offsets, mask, errors: explicit.errors(u).to_vec() })
 }
 
 /// The one vertex that all removed tetrahedra have and no inserted one.

@@ -91,7 +91,7 @@ pub enum UpdateError {
         /// The update.
         update: u32,
     },
-    /// The update depends on one that comes later.
+    /// The update depends on one that comes later, or has not an error for each field.
     Error {
         /// The update.
         update: u32,
@@ -116,7 +116,7 @@ impl fmt::Display for UpdateError {
             ),
             Self::Unannounced { update } => write!(f, "update {update} was not announced to the mesh"),
             Self::Error { update } => {
-                write!(f, "update {update} does not come after those that it depends on")
+                write!(f, "update {update} does not come after those it depends on, or lacks errors")
             }
         }
     }

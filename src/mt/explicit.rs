@@ -15,6 +15,7 @@ use super::MultiTessellation;
 use super::UpdateError;
 use super::UpdateId;
 use super::VertexId;
+use super::errors::Errors;
 use super::replay::ReplayError;
 use super::replay::canonical;
 use super::replay::replay;
@@ -60,8 +61,9 @@ pub struct ExplicitUpdate<'a> {
     pub removed: &'a [u32],
     /// The tetrahedra that `u+` inserts, positive, in numbers of vertices.
     pub inserted: &'a [[u32; 4]],
-    /// Bounds the error of every tetrahedron that `u+` removes, and of all updates that depend on this one.
-    pub error: ErrorCode,
+    /// Field by field, what bounds the error of every tetrahedron that `u+` removes, and of all updates that depend on this
+    /// one.
+    pub errors: &'a [ErrorCode],
 }
 
 /// An MT with everything spelled out.
@@ -82,7 +84,7 @@ pub struct ExplicitMt {
     parents: Rows,
     /// The update that removes each tetrahedron; [`NONE`] if there is none so far. Children follow from it.
     remover: Vec<u32>,
-    errors: Vec<ErrorCode>,
+    errors: Errors,
     to_come: ErrorCode,
     /// Whether every update so far inserts more tetrahedra than it removes.
     pub(super) always_grows: bool,
@@ -118,6 +120,7 @@ impl ExplicitMt {
     pub fn new(mut info: MtInfo, base: BaseMesh) -> Self {
         info.kind = MtKind::Explicit;
         let base_tets = base.tets.len();
+        let errors = Errors::new(info.fields.len());
         Self {
             info,
             positions: base.positions.clone(),
@@ -128,7 +131,7 @@ impl ExplicitMt {
             removed: Rows::new(),
             parents: Rows::new(),
             remover: vec![NONE; base_tets],
-            errors: Vec::new(),
+            errors,
             to_come: ErrorCode::MAX,
             always_grows: true,
             base,
@@ -176,6 +179,9 @@ impl ExplicitMt {
         if !new.inserted.iter().flatten().all(at_hand) {
             return Err(UpdateError::Cavity { update });
         }
+        if !self.errors.push(new.errors) {
+            return Err(UpdateError::Error { update });
+        }
         let mut parents: Vec<u32> = removed.iter().filter_map(|&t| self.creator(t)).map(|u| u.0).collect();
         parents.dedup();
         removed.iter().for_each(|&t| self.remover[t as usize] = update);
@@ -190,7 +196,6 @@ impl ExplicitMt {
         self.remover.resize(self.tets.len(), NONE);
         self.inserted.push(self.tets.len() as u32);
         self.always_grows &= new.inserted.len() > new.removed.len();
-        self.errors.push(new.error);
         Ok(UpdateId(update))
     }
 
@@ -218,7 +223,7 @@ impl ExplicitMt {
                 levels: &levels,
                 removed: &removed,
                 inserted: step.inserted,
-                error: mt.error(step.update),
+                errors: mt.errors(step.update),
             });
             if failed.is_ok() {
                 failed = pushed;
@@ -331,9 +336,14 @@ impl ExplicitMt {
         Some(self.remover[t as usize]).filter(|&u| u != NONE).map(UpdateId)
     }
 
-    /// The error of an update.
+    /// The error of an update: the largest one of all fields.
     pub fn error(&self, u: UpdateId) -> ErrorCode {
-        self.errors[u.0 as usize]
+        self.errors.largest(u.0 as usize)
+    }
+
+    /// The error of an update in each field.
+    pub fn errors(&self, u: UpdateId) -> &[ErrorCode] {
+        self.errors.of(u.0 as usize)
     }
 
     /// The update that inserts tetrahedron `t`; none if it belongs to the base mesh.
@@ -400,7 +410,7 @@ impl ExplicitMt {
             + size_of_val(&self.inserted[..])
             + self.removed.bytes()
             + self.parents.bytes()
-            + size_of_val(&self.errors[..]);
+            + self.errors.bytes();
         (base + vertices + tets + nodes) as u64
     }
 }
@@ -441,7 +451,7 @@ mod tests {
             offset: [0, 0, 16],
             field_offsets: &[3],
             mask: 0b1010_1010,
-            error: ErrorCode(9),
+            errors: &[ErrorCode(9)],
         };
         mt.push(&along_z).expect("a valid split");
         // The upper half is 7, the lower 8: 1 2 5, 1 2 8, 1 4 5, 1 4 8 go to the side of 1, the rest to that of 3.
@@ -450,7 +460,7 @@ mod tests {
             offset: [16, 0, 0],
             field_offsets: &[-3],
             mask: 0b1111_0000,
-            error: ErrorCode(5),
+            errors: &[ErrorCode(5)],
         };
         mt.push(&along_x).expect("a valid split");
         ExplicitMt::of(&mt).expect("a valid MT")
@@ -487,7 +497,7 @@ mod tests {
             spoil(&mut mt);
             mt.check()
         };
-        assert_eq!(fault(&|mt| mt.errors.swap(0, 1)), Err(MtFault::Error { update: second }));
+        assert_eq!(fault(&|mt| mt.errors.swap()), Err(MtFault::Error { update: second }));
         let removes_nothing = |mt: &mut ExplicitMt| mt.remover.fill(NONE);
         assert_eq!(fault(&removes_nothing), Err(MtFault::Order { update: first }));
         let no_parents = Rows { starts: vec![0; 3], items: vec![] };

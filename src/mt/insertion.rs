@@ -675,6 +675,11 @@ impl MultiTessellation for VertexMt {
         self.error_of(u)
     }
 
+    #[inline]
+    fn errors(&self, u: UpdateId) -> &[ErrorCode] {
+        self.errors_of(u)
+    }
+
     fn to_come(&self) -> ErrorCode {
         self.to_come()
     }

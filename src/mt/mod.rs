@@ -12,6 +12,7 @@ mod collapse;
 mod convert;
 mod current;
 mod error;
+mod errors;
 mod explicit;
 mod glue;
 mod insertion;
@@ -154,8 +155,19 @@ pub trait MultiTessellation {
     fn always_grows(&self) -> bool;
 
     /// The error `e(u)` of update `u`: bounds that of every tetrahedron `u+` removes, and of every update that depends
-    /// on `u`. Numbers say nothing of it. Only a damaged or hostile MT breaks this.
+    /// on `u`. Numbers say nothing of it. Only a damaged or hostile MT breaks this. With several fields it is the largest
+    /// one of theirs.
     fn error(&self, u: UpdateId) -> ErrorCode;
+
+    /// The error of update `u` in each field. Every one of them has the displacement of the boundary in it, and what is
+    /// said of [`MultiTessellation::error`] holds for it alone.
+    fn errors(&self, u: UpdateId) -> &[ErrorCode];
+
+    /// The error of update `u` in field `field`, which must be one that the MT has.
+    #[inline]
+    fn error_of_field(&self, u: UpdateId, field: usize) -> ErrorCode {
+        self.errors(u)[field]
+    }
 
     /// No update that is not here (yet) has a larger error; [`ErrorCode::ZERO`] if all are.
     fn to_come(&self) -> ErrorCode;

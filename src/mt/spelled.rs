@@ -228,6 +228,10 @@ impl MultiTessellation for ExplicitMt {
         ExplicitMt::error(self, u)
     }
 
+    fn errors(&self, u: UpdateId) -> &[ErrorCode] {
+        ExplicitMt::errors(self, u)
+    }
+
     fn to_come(&self) -> ErrorCode {
         self.to_come()
     }

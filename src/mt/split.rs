@@ -477,6 +477,11 @@ impl MultiTessellation for EdgeMt {
         self.error_of(u)
     }
 
+    #[inline]
+    fn errors(&self, u: UpdateId) -> &[ErrorCode] {
+        self.errors_of(u)
+    }
+
     fn to_come(&self) -> ErrorCode {
         self.to_come()
     }

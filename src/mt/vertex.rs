@@ -29,6 +29,7 @@ use super::UpdateId;
 use super::VertexId;
 use super::bits::Bits;
 use super::bits::width_of;
+use super::errors::Errors;
 use crate::mesh::NONE;
 
 /// Most tetrahedra around a vertex when it is inserted.
@@ -77,7 +78,7 @@ pub struct VertexMt {
     groups: Vec<u64>,
     /// Where each node starts in its group, in units.
     starts: Vec<u16>,
-    errors: Vec<ErrorCode>,
+    errors: Errors,
     to_come: ErrorCode,
     /// Bits of all nodes, padding included, but for vertices and links.
     shape_bits: u64,
@@ -140,6 +141,7 @@ impl VertexMt {
         {
             return Err(UpdateError::Cavity { update: 0 });
         }
+        let errors = Errors::new(info.fields.len());
         let position = info.lattice.bits + 1;
         let levels: u32 = info.fields.iter().map(|field| field.bits).sum();
         let widths = Widths {
@@ -157,7 +159,7 @@ impl VertexMt {
             nodes: Bits::default(),
             groups: Vec::new(),
             starts: Vec::new(),
-            errors: Vec::new(),
+            errors,
             to_come: ErrorCode::MAX,
             shape_bits: 0,
         })
@@ -166,9 +168,9 @@ impl VertexMt {
     /// Adds the next update.
     ///
     /// # Errors
-    /// The node must be well formed, its vertex on the lattices, and its links within the MT. What needs the mesh is
+    /// The node must be well formed, its vertex on the lattices, and its links within the MT; each field has an error. What needs the mesh is
     /// checked when the update is applied; that errors do not grow along the partial order is the caller's to see to.
-    pub fn push(&mut self, node: &NodeBits, error: ErrorCode) -> Result<UpdateId, UpdateError> {
+    pub fn push(&mut self, node: &NodeBits, errors: &[ErrorCode]) -> Result<UpdateId, UpdateError> {
         let update = self.updates();
         let bits = &node.0;
         if update >= self.info.updates {
@@ -197,10 +199,12 @@ impl VertexMt {
         let Ok(offset) = u16::try_from((start - group) / UNIT) else {
             return Err(UpdateError::Cavity { update });
         };
+        if !self.errors.push(errors) {
+            return Err(UpdateError::Error { update });
+        }
         self.starts.push(offset);
         self.nodes.extend(bits);
         self.nodes.pad(UNIT);
-        self.errors.push(error);
         self.shape_bits += self.nodes.len() - start - links_end;
         Ok(UpdateId(update))
     }
@@ -260,7 +264,7 @@ impl VertexMt {
             + size_of_val(&self.base.tets[..])
             + size_of_val(&self.base_removers[..]);
         let nodes = self.nodes.bytes() + size_of_val(&self.groups[..]) + size_of_val(&self.starts[..]);
-        (base + nodes + size_of_val(&self.errors[..])) as u64
+        (base + nodes + self.errors.bytes()) as u64
     }
 
     /// Bits in all nodes that describe shapes: what a star is made of and removed by, T_u, and what fills up the last unit. The paper's tree of T_u
@@ -269,10 +273,16 @@ impl VertexMt {
         self.shape_bits
     }
 
-    /// The error of update `u`.
+    /// The error of update `u`: the largest one of all fields.
     #[inline]
     pub fn error_of(&self, u: UpdateId) -> ErrorCode {
-        self.errors[u.0 as usize]
+        self.errors.largest(u.0 as usize)
+    }
+
+    /// The error of update `u` in each field.
+    #[inline]
+    pub fn errors_of(&self, u: UpdateId) -> &[ErrorCode] {
+        self.errors.of(u.0 as usize)
     }
 
     /// The vertex that update `u` inserts.

@@ -45,7 +45,7 @@ impl VertexMt {
         let mut writer = Writer { mt, children: &children, glue: Box::default() };
         for u in (0..updates).map(UpdateId) {
             let node = writer.node(&compact, u, &mut boundary)?;
-            compact.push(&node, mt.error(u)).map_err(damaged)?;
+            compact.push(&node, mt.errors(u)).map_err(damaged)?;
         }
         Ok(compact)
     }

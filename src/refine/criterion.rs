@@ -23,10 +23,20 @@ pub struct TetLook<'a> {
     pub corners: &'a [[i32; 3]; 4],
     /// Levels of a field at its corners.
     pub levels: &'a dyn Fn(usize) -> [i32; 4],
-    /// The error of the update that removes it.
+    /// The error of the update that removes it: the largest one of all fields.
     pub error: ErrorCode,
+    /// The same for each field.
+    pub errors: &'a [ErrorCode],
     /// That update.
     pub update: UpdateId,
+}
+
+impl TetLook<'_> {
+    /// The error of the update that removes it in one field, or the largest one of all.
+    #[inline]
+    pub fn error_of(&self, field: Option<usize>) -> ErrorCode {
+        field.and_then(|f| self.errors.get(f)).copied().unwrap_or(self.error)
+    }
 }
 
 /// What a criterion says of a tetrahedron.
@@ -103,8 +113,13 @@ pub trait Criterion: Any + fmt::Debug + Send + Sync {
         false
     }
 
-    /// The error asked for everywhere, if nothing else is asked for.
-    fn uniform(&self) -> Option<ErrorCode> {
+    /// The errors asked for everywhere, if nothing else is asked for.
+    fn uniform(&self) -> Option<Vec<Tolerance>> {
+        None
+    }
+
+    /// The field whose errors the criterion asks for, if it is one alone.
+    fn field(&self) -> Option<usize> {
         None
     }
 
@@ -130,6 +145,15 @@ pub trait Criterion: Any + fmt::Debug + Send + Sync {
         let _ = dial;
         self.distance(before)
     }
+}
+
+/// An error that is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Tolerance {
+    /// Of which field; of all of them if none.
+    pub field: Option<usize>,
+    /// The error that is good enough.
+    pub error: ErrorCode,
 }
 
 /// The criterion of a [`Request`]: the union of its needs.
@@ -205,7 +229,15 @@ impl Frame {
 
 /// One need, with what it compares worked out. A need with several ranges of values becomes several atoms.
 #[derive(Clone, Debug)]
-enum Atom {
+struct Atom {
+    /// The field whose error counts, if it is not the largest one of all.
+    field: Option<usize>,
+    ask: Ask,
+}
+
+/// What an atom asks for.
+#[derive(Clone, Debug)]
+enum Ask {
     Field(FieldAtom),
     View { pixels: f64, camera: Camera },
     Transfer { error: f64, palette: Palette },
@@ -223,6 +255,8 @@ struct FieldAtom {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Range {
     field: usize,
+    /// The same, where there are others.
+    error_of: Option<usize>,
     low: f64,
     high: f64,
     /// Levels of the field's whole range: by so much an error of 1 widens the range.
@@ -273,13 +307,18 @@ impl LodCriterion {
 
 fn atoms(info: &MtInfo, frame: &Frame, need: &Need) -> Vec<Atom> {
     let tolerance = ErrorCode::at_most(need.error);
-    let field = |shape: Option<Shape>, values| Atom::Field(FieldAtom { tolerance, shape, values });
+    // A single field's error is the largest.
+    let error_of = |field: Option<usize>| field.filter(|_| info.fields.len() > 1);
+    let atom = |ask: Ask| Atom { field: error_of(need.measured_field()), ask };
+    let field = |shape: Option<Shape>, values| atom(Ask::Field(FieldAtom { tolerance, shape, values }));
     let ranges = |values: &Values| {
         let field = values.field.min(info.fields.len() - 1);
+        let error_of = error_of(Some(field));
         let info = &info.fields[field];
         let level = move |value: f64| (value - info.origin) / info.step;
         let levels = info.range() / info.step;
-        let range = move |r: &[f64; 2]| Some(Range { field, low: level(r[0]), high: level(r[1]), levels });
+        let range =
+            move |r: &[f64; 2]| Some(Range { field, error_of, low: level(r[0]), high: level(r[1]), levels });
         values.ranges.iter().map(range).collect::<Vec<_>>()
     };
     match &need.part {
@@ -290,10 +329,10 @@ fn atoms(info: &MtInfo, frame: &Frame, need: &Need) -> Vec<Atom> {
             let shape = Shape::new(region, frame.middle);
             ranges(values).into_iter().map(|range| field(Some(shape.clone()), range)).collect()
         }
-        Part::View(view) => vec![Atom::View { pixels: need.error, camera: Camera::new(view, frame) }],
+        Part::View(view) => vec![atom(Ask::View { pixels: need.error, camera: Camera::new(view, frame) })],
         Part::Transfer(transfer) => {
             let field = &info.fields[transfer.field.min(info.fields.len() - 1)];
-            vec![Atom::Transfer { error: need.error, palette: Palette::new(transfer, field) }]
+            vec![atom(Ask::Transfer { error: need.error, palette: Palette::new(transfer, field) })]
         }
     }
 }
@@ -325,18 +364,25 @@ impl Criterion for LodCriterion {
         self.custom.iter().any(|custom| custom.is_batched())
     }
 
-    fn uniform(&self) -> Option<ErrorCode> {
-        let everywhere = |atom: &Atom| match atom {
-            Atom::Field(FieldAtom { tolerance, shape: None, values: None }) => Some(*tolerance),
+    fn uniform(&self) -> Option<Vec<Tolerance>> {
+        let everywhere = |atom: &Atom| match atom.ask {
+            Ask::Field(FieldAtom { tolerance: error, shape: None, values: None }) => {
+                Some(Tolerance { field: atom.field, error })
+            }
             _ => None,
         };
         let all: Option<Vec<_>> = self.atoms.iter().map(everywhere).collect();
-        let all = all.filter(|_| self.custom.is_empty())?;
-        Some(all.into_iter().min().unwrap_or(ErrorCode::MAX))
+        all.filter(|_| self.custom.is_empty())
+    }
+
+    fn field(&self) -> Option<usize> {
+        let first = self.atoms.first()?.field?;
+        let alone = self.custom.is_empty() && self.atoms.iter().all(|atom| atom.field == Some(first));
+        alone.then_some(first)
     }
 
     fn tolerance(&self) -> ErrorCode {
-        let of = |atom: &Atom| if let Atom::Field(atom) = atom { Some(atom.tolerance) } else { None };
+        let of = |atom: &Atom| if let Ask::Field(ask) = &atom.ask { Some(ask.tolerance) } else { None };
         let unmeasured = if self.atoms.is_empty() { ErrorCode::ZERO } else { ErrorCode::MAX };
         let own = self.atoms.iter().filter_map(of).max().unwrap_or(unmeasured);
         self.custom.iter().fold(own, |largest, custom| largest.max(custom.tolerance()))
@@ -380,10 +426,17 @@ impl Atom {
     // Once for all who ask: it is large.
     #[inline(never)]
     fn judge(&self, frame: &Frame, tet: &TetLook<'_>, corners: &[DVec3; 4], ranked: bool) -> Verdict {
-        match self {
-            Self::Field(atom) => atom.judge(frame, tet, corners),
-            Self::View { pixels, camera } => camera.judge(frame, tet, corners, *pixels, ranked),
-            Self::Transfer { error, palette } => {
+        let narrowed;
+        let tet = if self.field.is_none() {
+            tet
+        } else {
+            narrowed = TetLook { error: tet.error_of(self.field), ..*tet };
+            &narrowed
+        };
+        match &self.ask {
+            Ask::Field(atom) => atom.judge(frame, tet, corners),
+            Ask::View { pixels, camera } => camera.judge(frame, tet, corners, *pixels, ranked),
+            Ask::Transfer { error, palette } => {
                 let change = palette.change(&(tet.levels)(palette.field), tet.error.error());
                 let (change, error) = (change, error.max(LEAST_ERROR));
                 if change <= 0.0 {
@@ -397,9 +450,12 @@ impl Atom {
 
     /// The part of the distance that counts for one dial; not [`ANY`].
     fn turned(&self, before: &Self, frame: &Frame, dial: u8) -> f64 {
-        match (self, before) {
-            (Self::Field(a), Self::Field(b)) => a.turned(b, frame, dial),
-            (Self::View { pixels: p, camera: a }, Self::View { pixels: q, camera: b }) => {
+        if self.field != before.field {
+            return f64::INFINITY;
+        }
+        match (&self.ask, &before.ask) {
+            (Ask::Field(a), Ask::Field(b)) => a.turned(b, frame, dial),
+            (Ask::View { pixels: p, camera: a }, Ask::View { pixels: q, camera: b }) => {
                 a.turned(*p, b, *q, frame, usize::from(dial - PLANES))
             }
             _ => self.distance(before, frame),
@@ -407,12 +463,15 @@ impl Atom {
     }
 
     fn distance(&self, before: &Self, frame: &Frame) -> f64 {
-        match (self, before) {
-            (Self::Field(a), Self::Field(b)) => a.distance(b, frame),
-            (Self::View { pixels: p, camera: a }, Self::View { pixels: q, camera: b }) => {
+        if self.field != before.field {
+            return f64::INFINITY;
+        }
+        match (&self.ask, &before.ask) {
+            (Ask::Field(a), Ask::Field(b)) => a.distance(b, frame),
+            (Ask::View { pixels: p, camera: a }, Ask::View { pixels: q, camera: b }) => {
                 a.distance(*p, b, *q, frame)
             }
-            (Self::Transfer { error: e, palette: a }, Self::Transfer { error: f, palette: b }) if a == b => {
+            (Ask::Transfer { error: e, palette: a }, Ask::Transfer { error: f, palette: b }) if a == b => {
                 (octaves(e.max(LEAST_ERROR)) - octaves(f.max(LEAST_ERROR))).abs()
             }
             _ => f64::INFINITY,
@@ -441,7 +500,7 @@ impl FieldAtom {
         let mut conditions = Conditions::new();
         conditions.add(exceeds, octaves_between(tet.error, self.tolerance), TOLERANCE);
         if let Some(range) = &self.values {
-            let inside = range.inside(&(tet.levels)(range.field), tet.error.error());
+            let inside = range.inside(&(tet.levels)(range.field), tet.error_of(range.error_of).error());
             conditions.add(inside >= 0.0, inside.abs() / range.levels, ANY);
         }
         // The dearest comes last, and only where it can matter.

@@ -5,6 +5,7 @@ use super::Budget;
 use super::Criterion;
 use super::DIALS;
 use super::TetLook;
+use super::Tolerance;
 use super::Verdict;
 use super::ranked::Ranked;
 use super::sweep::Window;
@@ -78,17 +79,19 @@ struct Asked {
 }
 
 /// A tetrahedron that is to be judged, with what that takes.
-struct Open {
+struct Open<'a> {
     t: u32,
     tet: [u32; 4],
     update: UpdateId,
     error: ErrorCode,
+    errors: &'a [ErrorCode],
     corners: [[i32; 3]; 4],
 }
 
-impl Open {
+impl Open<'_> {
     fn look<'a>(&'a self, levels: &'a dyn Fn(usize) -> [i32; 4]) -> TetLook<'a> {
-        TetLook { corners: &self.corners, levels, error: self.error, update: self.update }
+        let Self { corners, error, errors, update, .. } = self;
+        TetLook { corners, levels, error: *error, errors, update: *update }
     }
 }
 
@@ -105,7 +108,8 @@ pub struct Outcome {
     pub judged: u64,
     /// Whether the front is where it was to go, as far as budget and data allow. The rest means something only then.
     pub done: bool,
-    /// The largest error left in the selected part; [`ErrorCode::MAX`] where the criterion does not measure it so.
+    /// The largest error left in the selected part, of the field that each need measures; [`ErrorCode::MAX`] where the
+    /// criterion does not measure it so.
     pub error: ErrorCode,
     /// How often the error exceeds what is wanted, at most; not above 1 if the request is satisfied.
     pub excess: f64,
@@ -117,17 +121,45 @@ pub struct Outcome {
 const CHUNK_WORDS: usize = 8;
 
 /// The updates that a sweep which undoes others leaves applied.
-struct Staying {
-    /// Those with a larger error.
-    tolerance: ErrorCode,
+struct Staying<'a> {
+    wanted: Wanted<'a>,
     /// Those on which such updates depend, as far as they were found; no bits where errors are monotone.
     others: Vec<u64>,
 }
 
-impl Staying {
+/// The updates that are asked for everywhere, by their errors alone.
+#[derive(Clone, Copy)]
+struct Wanted<'a> {
+    tolerances: &'a [Tolerance],
+    /// What all of them have a larger error than.
+    least: ErrorCode,
+    /// What has a larger error than this is wanted for sure.
+    sure: ErrorCode,
+}
+
+impl<'a> Wanted<'a> {
+    fn new(tolerances: &'a [Tolerance]) -> Self {
+        let least = tolerances.iter().map(|t| t.error).min();
+        // One field may have a small error where another has a large one.
+        let sure = tolerances.iter().filter(|t| t.field.is_none()).map(|t| t.error).min();
+        Self { tolerances, least: least.unwrap_or(ErrorCode::MAX), sure: sure.unwrap_or(ErrorCode::MAX) }
+    }
+
+    #[inline]
+    fn has(&self, mt: &impl MultiTessellation, u: UpdateId) -> bool {
+        let error = mt.error(u);
+        error > self.sure || error > self.least && self.has_of_field(mt, u)
+    }
+
+    fn has_of_field(&self, mt: &impl MultiTessellation, u: UpdateId) -> bool {
+        self.tolerances.iter().any(|t| t.field.is_some_and(|field| mt.error_of_field(u, field) > t.error))
+    }
+}
+
+impl Staying<'_> {
     fn has(&self, mt: &impl MultiTessellation, u: UpdateId) -> bool {
         let found = self.others.get(u.0 as usize / 64).is_some_and(|word| word >> (u.0 % 64) & 1 == 1);
-        found || mt.error(u) > self.tolerance
+        found || self.wanted.has(mt, u)
     }
 
     #[cold]
@@ -347,9 +379,9 @@ impl Front {
         }
         let uniform = criterion.uniform().filter(|_| budget.is_unlimited());
         let done = match uniform {
-            Some(tolerance) => {
+            Some(tolerances) => {
                 self.forget_watch();
-                self.satisfy_uniform(mt, tolerance, outcome, go_on)?
+                self.satisfy_uniform(mt, Wanted::new(&tolerances), outcome, go_on)?
             }
             // Most budgets are there for safety: while they leave room, nothing needs to be compared.
             None if budget.is_unlimited() || !restarts && self.ranked.has_room() => {
@@ -368,34 +400,33 @@ impl Front {
     /// Back to the base mesh.
     fn coarsen_all(&mut self, mt: &impl MultiTessellation, outcome: &mut Outcome) -> Result<(), UpdateError> {
         self.forget_watch();
-        self.sweep(mt, ErrorCode::MAX, false, outcome, &mut |_| true).map(drop)
+        self.sweep(mt, Wanted::new(&[]), false, outcome, &mut |_| true).map(drop)
     }
 
-    /// Undoes all updates within the tolerance and applies the others. Which these are, errors tell without a look at the
+    /// Undoes all updates within the tolerances and applies the others. Which these are, errors tell without a look at the
     /// mesh; they are monotone along the partial order, so no update is in the way of what is undone.
     fn satisfy_uniform(
         &mut self,
         mt: &impl MultiTessellation,
-        tolerance: ErrorCode,
+        wanted: Wanted<'_>,
         outcome: &mut Outcome,
         go_on: GoOn<'_>,
     ) -> Result<bool, UpdateError> {
-        Ok(self.sweep(mt, tolerance, false, outcome, go_on)?
-            && self.sweep(mt, tolerance, true, outcome, go_on)?)
+        Ok(self.sweep(mt, wanted, false, outcome, go_on)? && self.sweep(mt, wanted, true, outcome, go_on)?)
     }
 
-    /// Applies all updates beyond the tolerance, or undoes all within it: windows by number, in each by place. What is in the
-    /// way of one is done before it. False if it was told to stop.
+    /// Applies all updates that are wanted, or undoes all others: windows by number, in each by place. What is in the way of
+    /// one is done before it. False if it was told to stop.
     fn sweep(
         &mut self,
         mt: &impl MultiTessellation,
-        tolerance: ErrorCode,
+        wanted: Wanted<'_>,
         applied: bool,
         outcome: &mut Outcome,
         go_on: GoOn<'_>,
     ) -> Result<bool, UpdateError> {
         let mut window = Window::default();
-        let mut staying = Staying { tolerance, others: Vec::new() };
+        let mut staying = Staying { wanted, others: Vec::new() };
         let words = self.applied.len();
         let mut done = 0;
         while done < words {
@@ -403,7 +434,7 @@ impl Front {
             let size = window_size(self.applied_count);
             while done < words && window.updates.len() < size {
                 let word = if applied { done } else { words - 1 - done };
-                self.push_unlike(mt, tolerance, word, applied, &mut window.updates);
+                self.push_unlike(mt, wanted, word, applied, &mut window.updates);
                 done += 1;
             }
             window.sort(mt, &self.mesh);
@@ -421,21 +452,21 @@ impl Front {
     fn push_unlike(
         &self,
         mt: &impl MultiTessellation,
-        tolerance: ErrorCode,
+        wanted: Wanted<'_>,
         word: usize,
         applied: bool,
         updates: &mut Vec<UpdateId>,
     ) {
         let [least, largest] = self.chunks[word / CHUNK_WORDS];
         let mut rest = if applied { !self.applied[word] } else { self.applied[word] };
-        if rest == 0 || (if applied { largest <= tolerance } else { least > tolerance }) {
+        if rest == 0 || (if applied { largest <= wanted.least } else { least > wanted.sure }) {
             return;
         }
         while rest != 0 {
             let bit = if applied { rest.trailing_zeros() } else { 63 - rest.leading_zeros() };
             rest &= !(1 << bit);
             let u = UpdateId(64 * word as u32 + bit);
-            if u.0 < self.known && (mt.error(u) > tolerance) == applied {
+            if u.0 < self.known && wanted.has(mt, u) == applied {
                 updates.push(u);
             }
         }
@@ -448,7 +479,7 @@ impl Front {
         mt: &impl MultiTessellation,
         u: UpdateId,
         applied: bool,
-        staying: &mut Staying,
+        staying: &mut Staying<'_>,
         outcome: &mut Outcome,
     ) -> Result<(), UpdateError> {
         let mut next = Some(u).filter(|&u| self.contains(u) != applied);
@@ -574,11 +605,11 @@ impl Front {
     }
 
     /// Takes at most so many open tetrahedra to be judged, in place of those in `fetched`.
-    fn fetch_open(
+    fn fetch_open<'a>(
         &mut self,
-        mt: &impl MultiTessellation,
+        mt: &'a impl MultiTessellation,
         most: usize,
-        fetched: &mut Vec<Open>,
+        fetched: &mut Vec<Open<'a>>,
         outcome: &mut Outcome,
     ) {
         fetched.clear();
@@ -588,7 +619,8 @@ impl Front {
             match mt.remover(&self.mesh, t) {
                 Some(update) => {
                     let corners = tet.map(|v| self.mesh.positions[v as usize]);
-                    fetched.push(Open { t, tet, update, error: mt.error(update), corners });
+                    let (error, errors) = (mt.error(update), mt.errors(update));
+                    fetched.push(Open { t, tet, update, error, errors, corners });
                 }
                 None if self.known < mt.info().updates => self.unknown.push(t),
                 None => {}
@@ -679,10 +711,10 @@ impl Front {
         u: UpdateId,
         ranked: bool,
     ) -> Result<Option<Verdict>, UpdateError> {
-        let error = mt.error(u);
+        let (error, errors) = (mt.error(u), mt.errors(u));
         let mut all = Verdict::NEVER;
         let mut look = |corners: &[[i32; 3]; 4], levels: &dyn Fn(usize) -> [i32; 4]| {
-            let look = TetLook { corners, levels, error, update: u };
+            let look = TetLook { corners, levels, error, errors, update: u };
             let one = if ranked { criterion.rank(&look) } else { criterion.judge(&look) };
             all = all.or(one);
             !ranked && one.asks() && one.slack > LONG
@@ -758,8 +790,15 @@ impl Front {
         goal.outcome = Outcome { done: true, error, excess, satisfied, ..goal.outcome };
     }
 
-    /// No update that is not applied has a larger error; one of at least `enough` is as good as any.
-    fn largest_left(&self, mt: &impl MultiTessellation, enough: ErrorCode) -> ErrorCode {
+    /// No update that is not applied, here or not, has a larger error in this field, or in all of them if it is none. What
+    /// is at least `enough` is as good as any.
+    pub fn largest_left(
+        &self,
+        mt: &impl MultiTessellation,
+        field: Option<usize>,
+        enough: ErrorCode,
+    ) -> ErrorCode {
+        let error = |u: UpdateId| field.map_or_else(|| mt.error(u), |field| mt.error_of_field(u, field));
         let mut found = mt.to_come();
         for (chunk, words) in self.applied.chunks(CHUNK_WORDS).enumerate() {
             if found >= enough {
@@ -771,7 +810,7 @@ impl Front {
             for (i, &word) in words.iter().enumerate() {
                 let first = 64 * (chunk * CHUNK_WORDS + i) as u32;
                 let left = (0..64).filter(|bit| word >> bit & 1 == 0).map(|bit| UpdateId(first + bit));
-                found = left.filter(|u| u.0 < self.known).map(|u| mt.error(u)).fold(found, ErrorCode::max);
+                found = left.filter(|u| u.0 < self.known).map(error).fold(found, ErrorCode::max);
             }
         }
         found
@@ -784,15 +823,18 @@ impl Front {
         mt: &impl MultiTessellation,
         criterion: &dyn Criterion,
     ) -> (ErrorCode, f64) {
-        let to_come = mt.to_come();
+        let field = criterion.field();
+        let to_come = vec![mt.to_come(); mt.info().fields.len()];
         let mut largest = (ErrorCode::ZERO, 1.0);
         for (t, tet) in (0..).zip(self.mesh.tets()) {
             let update = mt.remover(&self.mesh, t);
-            let error = update.map_or(to_come, |u| mt.error(u));
+            let (error, errors) =
+                update.map_or((mt.to_come(), &to_come[..]), |u| (mt.error(u), mt.errors(u)));
             // The last number there can be: nothing is added to what is wanted.
             let update = update.unwrap_or(UpdateId(mt.info().updates));
-            let verdict = see(&self.mesh, tet, error, update, |look| criterion.rank(look));
+            let verdict = see(&self.mesh, tet, error, errors, update, |look| criterion.rank(look));
             if verdict.asks() {
+                let error = field.and_then(|field| errors.get(field)).copied().unwrap_or(error);
                 largest = (largest.0.max(error), f64::max(largest.1, verdict.excess));
             }
         }
@@ -803,7 +845,7 @@ impl Front {
     /// The error that is left where nothing violates the criterion.
     fn within(&self, mt: &impl MultiTessellation, criterion: &dyn Criterion) -> ErrorCode {
         let tolerance = criterion.tolerance();
-        self.largest_left(mt, tolerance).min(tolerance)
+        self.largest_left(mt, criterion.field(), tolerance).min(tolerance)
     }
 }
 
@@ -822,10 +864,11 @@ pub(super) fn see(
     mesh: &CurrentMesh,
     tet: &[u32; 4],
     error: ErrorCode,
+    errors: &[ErrorCode],
     update: UpdateId,
     judge: impl FnOnce(&TetLook<'_>) -> Verdict,
 ) -> Verdict {
     let corners = tet.map(|v| mesh.positions[v as usize]);
     let levels = |field: usize| tet.map(|v| mesh.levels(v)[field]);
-    judge(&TetLook { corners: &corners, levels: &levels, error, update })
+    judge(&TetLook { corners: &corners, levels: &levels, error, errors, update })
 }

@@ -34,7 +34,7 @@ mod shape;
 mod sweep;
 mod watch;
 
-pub use criterion::{ANY, Criterion, DIALS, LodCriterion, TetLook, Verdict};
+pub use criterion::{ANY, Criterion, DIALS, LodCriterion, TetLook, Tolerance, Verdict};
 pub use custom::Custom;
 pub use front::{Front, GoOn, Outcome};
 pub use request::{Budget, Need, Part, Region, Request, RequestError, Transfer, Values, View};

@@ -175,7 +175,7 @@ impl Front {
         let Some(tet) = self.mesh.tet(t) else { return };
         let Some(u) = mt.remover(&self.mesh, t) else { return };
         outcome.judged += 1;
-        let verdict = see(&self.mesh, &tet, mt.error(u), u, |look| criterion.rank(look));
+        let verdict = see(&self.mesh, &tet, mt.error(u), mt.errors(u), u, |look| criterion.rank(look));
         if verdict.asks() {
             self.ranked.refinable.push((rank(verdict.excess, u), t));
         }

@@ -30,14 +30,17 @@ pub struct Need {
     /// The largest error that is good enough, in the unit of `part`; 0 is the reference mesh, infinity asks for nothing.
     /// Not negative, not NaN.
     pub error: f64,
+    /// Which field's error counts. If none is named it is that of the field which `part` names, and the largest one of all
+    /// fields where that names none, too. A transfer function always measures its own field.
+    pub field: Option<usize>,
     /// Where that counts, and how the error is measured.
     pub part: Part,
 }
 
 /// Where a need counts, and how it measures the error.
 ///
-/// In all but the last two the error is that of the field: a fraction of its range (0.01 is 1 %), which binds all fields
-/// of the MT, each relative to its own range.
+/// In all but the last two the error is that of a field: a fraction of its range (0.01 is 1 %). Which field, the need says
+/// ([`Need::of_field`]) or the part; if neither does, it binds all fields of the MT, each relative to its own range.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Part {
     /// The whole volume.
@@ -222,17 +225,33 @@ impl From<Need> for Request {
 impl Need {
     /// The field within `error` of the reference, as a fraction of its range, everywhere.
     pub fn within(error: f64) -> Self {
-        Self { error, part: Part::Everywhere }
+        Self { error, field: None, part: Part::Everywhere }
     }
 
     /// What a camera sees, within so many pixels.
     pub fn seen(view: View, pixels: f64) -> Self {
-        Self { error: pixels, part: Part::View(view) }
+        Self { error: pixels, field: None, part: Part::View(view) }
     }
 
     /// What a transfer function shows, within so much of colour and opacity.
     pub fn shown(transfer: Transfer, error: f64) -> Self {
-        Self { error, part: Part::Transfer(transfer) }
+        Self { error, field: None, part: Part::Transfer(transfer) }
+    }
+
+    /// Only the error of field number `field` counts.
+    #[must_use]
+    pub fn of_field(mut self, field: usize) -> Self {
+        self.field = Some(field);
+        self
+    }
+
+    /// The field whose error counts; the largest one of all fields if there is none.
+    pub fn measured_field(&self) -> Option<usize> {
+        match &self.part {
+            Part::Transfer(transfer) => Some(transfer.field),
+            Part::Values(values) | Part::Both(_, values) => self.field.or(Some(values.field)),
+            Part::Everywhere | Part::Region(_) | Part::View(_) => self.field,
+        }
     }
 
     /// Only inside `region`. In views and transfer functions this replaces the part.
@@ -311,13 +330,13 @@ impl Request {
     /// The first need that does not, and why.
     pub fn check(&self, info: &MtInfo) -> Result<(), RequestError> {
         for (i, need) in self.needs.iter().enumerate() {
-            let field = match &need.part {
+            let named = match &need.part {
                 Part::Values(values) | Part::Both(_, values) => Some(values.field),
                 Part::Transfer(transfer) => Some(transfer.field),
                 _ => None,
             };
             let fields = info.fields.len();
-            if let Some(index) = field.filter(|&index| index >= fields) {
+            if let Some(index) = named.max(need.field).filter(|&index| index >= fields) {
                 return Err(RequestError::Field { index, fields });
             }
             need.check().map_err(|problem| RequestError::Need { need: i, problem })?;

@@ -87,9 +87,9 @@ impl<'a> Deviation<'a> {
     }
 
     /// Measures `mesh` where it is asked for. `errors` are those of its tetrahedra.
-    pub fn measure(&self, mesh: &PlainMesh<'_>, errors: &[f64], asks: &[Ask<'_>]) -> Measured {
+    pub fn measure(&self, mesh: &PlainMesh<'_>, errors: &TetErrors, asks: &[Ask<'_>]) -> Measured {
         let border = Border::of(mesh, self.info);
-        let largest = errors.iter().copied().fold(0.0, f64::max);
+        let largest = errors.of.iter().copied().fold(0.0, f64::max);
         let look = Look { of: self, mesh, border, errors, largest, asks };
         let mut found = Measured { worst_ratio: 0.0, failures: Vec::new() };
         look.at_vertices(&mut found);
@@ -102,12 +102,27 @@ impl<'a> Deviation<'a> {
     }
 }
 
+/// The errors of the tetrahedra of a mesh.
+pub struct TetErrors {
+    /// Numbers for each of them.
+    pub stride: usize,
+    /// For each the largest one of all fields, and that of each field.
+    pub of: Vec<f64>,
+}
+
+impl TetErrors {
+    /// The error of a tetrahedron in one field, or the largest one of all.
+    fn of(&self, tet: u32, field: Option<usize>) -> f64 {
+        self.of[tet as usize * self.stride + field.map_or(0, |field| field + 1)]
+    }
+}
+
 /// The comparison with one mesh.
 struct Look<'a> {
     of: &'a Deviation<'a>,
     mesh: &'a PlainMesh<'a>,
     border: Border,
-    errors: &'a [f64],
+    errors: &'a TetErrors,
     /// Of the errors.
     largest: f64,
     asks: &'a [Ask<'a>],
@@ -174,7 +189,8 @@ impl Look<'_> {
         let fields = &self.of.info.fields;
         let tet = self.mesh.tets[place.tet as usize];
         let known = &self.of.values[point as usize * fields.len()..][..fields.len()];
-        let error = self.errors[place.tet as usize];
+        let named = ask.values().map(|values| values.field).or(ask.need.measured_field());
+        let error = self.errors.of(place.tet, named);
         let near = place.displaced <= error;
         if let Some(values) = ask.values() {
             let (info, value) = (&fields[values.field], known[values.field] * fields[values.field].range());
@@ -191,7 +207,8 @@ impl Look<'_> {
             let range = info.range();
             if near { change(info, transfer, known[f] * range, shown(f) * range) } else { f64::INFINITY }
         } else {
-            (0..fields.len()).map(|f| (shown(f) - known[f]).abs()).fold(place.displaced, f64::max)
+            let measured = ask.need.measured_field().map_or(0..fields.len(), |field| field..field + 1);
+            measured.map(|f| (shown(f) - known[f]).abs()).fold(place.displaced, f64::max)
         };
         found / ask.allowed[point as usize]
     }

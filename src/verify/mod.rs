@@ -43,6 +43,7 @@ use crate::refine::Part;
 use crate::refine::Request;
 use crate::refine::TetLook;
 use deviation::Deviation;
+use deviation::TetErrors;
 use mesh_checks::PlainMesh;
 use queries::Query;
 use std::sync::Arc;
@@ -345,7 +346,7 @@ impl<M: MultiTessellation> Case<'_, M> {
                 if self.outcome.satisfied {
                     return need.error;
                 }
-                let judged = Need { error: need.error.max(LEAST), part: need.part.clone() };
+                let judged = Need { error: need.error.max(LEAST), ..need.clone() };
                 judged.error * self.largest(mesh, judged.into()).1
             }
             _ if self.outcome.satisfied => reported.min(need.error),
@@ -355,9 +356,19 @@ impl<M: MultiTessellation> Case<'_, M> {
     }
 
     /// The error of each tetrahedron: that of the update which removes it.
-    fn errors(&self, mesh: &PlainMesh<'_>) -> Vec<f64> {
-        let error = |t: u32| self.mt.remover(mesh.mesh, t).map_or(0.0, |u| self.mt.error(u).error());
-        (0..mesh.tets.len() as u32).map(error).collect()
+    fn errors(&self, mesh: &PlainMesh<'_>) -> TetErrors {
+        let fields = self.mt.info().fields.len();
+        let mut errors = TetErrors { stride: fields + 1, of: Vec::new() };
+        for t in 0..mesh.tets.len() as u32 {
+            match self.mt.remover(mesh.mesh, t) {
+                None => errors.of.resize(errors.of.len() + fields + 1, 0.0),
+                Some(u) => {
+                    errors.of.push(self.mt.error(u).error());
+                    errors.of.extend(self.mt.errors(u).iter().map(|error| error.error()));
+                }
+            }
+        }
+        errors
     }
 
     /// The largest error and the largest excess of all tetrahedra that violate a request; 0 and 1 if none does.
@@ -368,9 +379,11 @@ impl<M: MultiTessellation> Case<'_, M> {
             let Some(update) = self.mt.remover(mesh.mesh, t) else { continue };
             let corners = tet.map(|v| mesh.positions[v as usize]);
             let levels = |field: usize| tet.map(|v| mesh.mesh.levels(v)[field]);
-            let error = self.mt.error(update);
-            let verdict = criterion.rank(&TetLook { corners: &corners, levels: &levels, error, update });
+            let (error, errors) = (self.mt.error(update), self.mt.errors(update));
+            let look = TetLook { corners: &corners, levels: &levels, error, errors, update };
+            let verdict = criterion.rank(&look);
             if verdict.asks() {
+                let error = look.error_of(criterion.field());
                 largest = (largest.0.max(error), f64::max(largest.1, verdict.excess));
             }
         }
@@ -397,9 +410,11 @@ impl<M: MultiTessellation> Case<'_, M> {
             return Err(format!("nothing stood in the way, but the excess is {violation}"));
         }
         let of_field = |need: &&Need| !matches!(need.part, Part::View(_) | Part::Transfer(_));
-        let exact = |need: &Need| Need { error: 0.0, part: need.part.clone() };
-        let needs: Vec<Need> = request.needs.iter().filter(of_field).map(exact).collect();
-        let (largest, _) = self.largest(mesh, Request { needs, ..Request::default() });
+        let exact = |need: &Need| Need { error: 0.0, ..need.clone() };
+        // Each need by itself: they may measure different fields.
+        let alone = |need: Need| self.largest(mesh, need.into()).0;
+        let needs = request.needs.iter().filter(of_field).map(exact);
+        let largest = needs.map(alone).fold(ErrorCode::ZERO, ErrorCode::max);
         if largest > reported {
             return Err(format!(
                 "the error bound is {}, not {} as reported",

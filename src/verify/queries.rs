@@ -56,6 +56,9 @@ pub fn of(mt: &impl MultiTessellation, input: &TetMesh) -> Vec<Query> {
             queries.add_values(f, info, &quantiles(&values.values));
         }
     }
+    if mt.info().fields.len() > 1 {
+        mt.info().fields.iter().enumerate().for_each(|(f, info)| queries.add_field(f, info));
+    }
     queries.add_regions();
     queries.add_views();
     if let Some(info) = mt.info().fields.last() {
@@ -153,6 +156,16 @@ impl Queries {
             let budget = Budget { bytes, ..Budget::default() };
             self.add(name, Request { budget, ..Need::seen(view, 0.5).into() });
         }
+    }
+
+    /// Needs of one field among several.
+    fn add_field(&mut self, field: usize, info: &FieldInfo) {
+        let (name, roi) = self.boxes[field % self.boxes.len()];
+        let only = |error: f64| Need::within(error).of_field(field);
+        self.add(&format!("{} alone", info.name), only(ERRORS[field % 3 + 1]));
+        self.add(&format!("{} alone, {name}", info.name), only(ERRORS[field % 2]).inside(roi));
+        self.add(&format!("{} alone", info.name), Request::from(only(0.0)).at_most(self.part(10)));
+        self.add(&format!("{} exactly, all coarsely", info.name), Request::within(0.1).and(only(0.002)));
     }
 
     /// Colours of a field, and needs of several kinds at once.

@@ -257,7 +257,7 @@ impl Parser<'_> {
             options.stands_alone("transfer", &[])?;
             let error = options.error("error", 1.0)?.unwrap_or(0.0);
             let part = Part::Transfer(transfer.transfer(field)?);
-            return self.push(options, "transfer", Need { error, part }, 1.0);
+            return self.push(options, "transfer", Need { error, field: None, part }, 1.0);
         }
         let info = &self.info.fields[field];
         let mut need = Need::within(options.error("error", info.range())?.unwrap_or(0.0));

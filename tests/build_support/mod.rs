@@ -10,6 +10,7 @@ use tetralod::mesh::Grid;
 use tetralod::mesh::TetMesh;
 use tetralod::mesh::repair;
 use tetralod::mt::EdgeMt;
+use tetralod::mt::ErrorCode;
 use tetralod::mt::UpdateId;
 use tetralod::mt::VertexSplit;
 
@@ -78,6 +79,7 @@ pub struct Parts {
     pub offset: [i32; 3],
     pub field_offsets: Vec<i32>,
     pub mask: u64,
+    /// Of the first field; the others change along with it.
     pub error: u16,
 }
 
@@ -85,17 +87,20 @@ pub struct Parts {
 pub fn tampered(mt: &EdgeMt, mut change: impl FnMut(u32, &mut Parts)) -> EdgeMt {
     let mut other = EdgeMt::new(mt.info().clone(), mt.base().clone());
     for u in 0..mt.updates() {
-        let VertexSplit { vertex, offset, field_offsets, mask, error } = mt.split(UpdateId(u));
-        let mut parts = Parts { offset, field_offsets: field_offsets.to_vec(), mask, error: error.0 };
+        let VertexSplit { vertex, offset, field_offsets, mask, errors } = mt.split(UpdateId(u));
+        let mut parts = Parts { offset, field_offsets: field_offsets.to_vec(), mask, error: errors[0].0 };
         change(u, &mut parts);
+        let shift = i32::from(parts.error) - i32::from(errors[0].0);
+        let shifted = |code: &ErrorCode| ErrorCode((i32::from(code.0) + shift).clamp(0, 65_535) as u16);
+        let errors: Vec<ErrorCode> = errors.iter().map(shifted).collect();
         let split = VertexSplit {
             vertex,
             offset: parts.offset,
             field_offsets: &parts.field_offsets,
             mask: parts.mask,
-            error: tetralod::mt::ErrorCode(parts.error),
+            errors: &errors,
         };
-        other.push(&split).expect("the change keeps the order of errors");
+        other.push(&split).expect("the change keeps what can be seen without a mesh");
     }
     other
 }

@@ -268,7 +268,7 @@ pub fn grow(part: &mut Mt, whole: &Mt) {
     let u = UpdateId(part.updates());
     let pushed = match (part, whole) {
         (Mt::Edge(part), Mt::Edge(whole)) => part.push(&whole.split(u)),
-        (Mt::Vertex(part), Mt::Vertex(whole)) => part.push(&whole.node(u), whole.error_of(u)),
+        (Mt::Vertex(part), Mt::Vertex(whole)) => part.push(&whole.node(u), whole.errors_of(u)),
         (Mt::Explicit(part), Mt::Explicit(whole)) => {
             let created = whole.created(u).map(VertexId);
             let positions: Vec<[i32; 3]> = created.clone().map(|v| whole.position(v)).collect();
@@ -279,7 +279,7 @@ pub fn grow(part: &mut Mt, whole: &Mt) {
                 levels: &levels,
                 removed: whole.removed(u),
                 inserted: &whole.tets()[range.start as usize..range.end as usize],
-                error: whole.error(u),
+                errors: whole.errors(u),
             })
         }
         _ => panic!("two kinds"),

@@ -46,9 +46,9 @@ pub fn build(tets: u32, fields: usize, drafts: &[Draft]) -> Mt {
         let created = mt.created(UpdateId(mt.updates()));
         let field_offsets: Vec<i32> = field_offsets.iter().copied().cycle().take(fields).collect();
         most = most.min(*error);
-        let error = ErrorCode(most);
+        let errors = &vec![ErrorCode(most); fields];
         let split =
-            VertexSplit { vertex, offset: *offset, field_offsets: &field_offsets, mask: *mask, error };
+            VertexSplit { vertex, offset: *offset, field_offsets: &field_offsets, mask: *mask, errors };
         mt.push(&split).expect("drafts are made to fit");
         whole.extend(created.map(|v| v.0));
     }
@@ -120,17 +120,18 @@ pub fn spelled(tets: u32, fields: usize, updates: usize) -> Mt {
         };
         let levels: Vec<i32> = (0..positions.len() * fields).map(|_| (next() % 4096) as i32).collect();
         let error = ErrorCode(60_000 - (k * 50_000 / updates) as u16);
+        let errors = &vec![error; fields];
         let first = made.tets().len() as u32;
         let (positions, levels, removed, inserted) = (&positions, &levels, &removed, &inserted);
-        made.push(&ExplicitUpdate { positions, levels, removed, inserted, error }).expect("made to fit");
+        made.push(&ExplicitUpdate { positions, levels, removed, inserted, errors }).expect("made to fit");
         live.extend(first..made.tets().len() as u32);
         spelled.push((positions.clone(), levels.clone(), removed.clone(), inserted.clone(), error));
     }
     let [vertices, tetrahedra] = made.reference_counts();
     let mut mt = ExplicitMt::new(MtInfo { vertices, tetrahedra, ..info }, base);
     for (positions, levels, removed, inserted, error) in &spelled {
-        let error = *error;
-        mt.push(&ExplicitUpdate { positions, levels, removed, inserted, error }).expect("made to fit");
+        let errors = &vec![*error; fields];
+        mt.push(&ExplicitUpdate { positions, levels, removed, inserted, errors }).expect("made to fit");
     }
     mt.into()
 }
@@ -158,7 +159,7 @@ pub fn inserted(tets: u32, fields: usize, updates: usize) -> Mt {
             levels: &levels,
             removed: &removed,
             inserted: &[[v, b, c, d], [a, v, c, d], [a, b, v, d], [a, b, c, v]],
-            error: ErrorCode(60_000 - (k * 50_000 / updates) as u16),
+            errors: &vec![ErrorCode(60_000 - (k * 50_000 / updates) as u16); fields],
         };
         made.push(&update).expect("made to fit");
         live.extend(first..made.tets().len() as u32);
@@ -196,7 +197,7 @@ pub fn is_prefix(part: &Mt, whole: &Mt) -> bool {
             (0..part.updates()).all(|k| part.split(UpdateId(k)) == whole.split(UpdateId(k)))
         }
         (Mt::Vertex(part), Mt::Vertex(whole)) => {
-            let same = |u| part.node(u) == whole.node(u) && part.error_of(u) == whole.error_of(u);
+            let same = |u| part.node(u) == whole.node(u) && part.errors_of(u) == whole.errors_of(u);
             part.base_removers() == whole.base_removers() && (0..part.updates()).map(UpdateId).all(same)
         }
         (Mt::Explicit(part), Mt::Explicit(whole)) => {

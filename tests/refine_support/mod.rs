@@ -69,11 +69,11 @@ impl Subject {
 
     fn violation(&self, criterion: &impl Criterion, t: u32) -> Option<UpdateId> {
         let u = self.removers[t as usize]?;
-        let error = self.explicit.error(u);
+        let (error, errors) = (self.explicit.error(u), self.explicit.errors(u));
         let tet = self.explicit.tets()[t as usize].map(VertexId);
         let corners = tet.map(|v| self.explicit.position(v));
         let levels = |field: usize| tet.map(|v| self.explicit.levels(v)[field]);
-        let look = TetLook { corners: &corners, levels: &levels, error, update: u };
+        let look = TetLook { corners: &corners, levels: &levels, error, errors, update: u };
         criterion.judge(&look).asks().then_some(u)
     }
 

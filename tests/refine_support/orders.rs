@@ -46,13 +46,13 @@ pub fn reordered(subject: &Subject, order: &[UpdateId]) -> Subject {
         let renamed = |t: u32| old.tets()[t as usize].map(|v| vertex[v as usize]);
         let inserted: Vec<[u32; 4]> = old.inserted(u).map(renamed).collect();
         let first = new.tets().len() as u32;
-        let error = old.error(u);
+        let errors = old.errors(u);
         let update = ExplicitUpdate {
             positions: &positions,
             levels: &levels,
             removed: &removed,
             inserted: &inserted,
-            error,
+            errors,
         };
         new.push(&update).expect("a topological order");
         // It sorts what is inserted.

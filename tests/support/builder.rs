@@ -35,7 +35,8 @@ impl Split {
             offset: self.offset,
             field_offsets: &self.field_offsets,
             mask: self.mask,
-            error: ErrorCode(self.error),
+            // A test may forget them.
+            errors: vec![ErrorCode(self.error); self.field_offsets.len()].leak(),
         }
     }
 }

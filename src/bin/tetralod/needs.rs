@@ -224,7 +224,7 @@ impl Group {
                 (Some(region), ..) => (Part::Region(region.clone()), describe_region(region)),
                 (None, ..) => (Part::Everywhere, "everywhere".to_owned()),
             };
-            wanted.push(Wanted { name, need: Need { error, part } });
+            wanted.push(Wanted { name, need: Need { error, field: None, part } });
         };
         if self.regions.is_empty() {
             add(None);

@@ -191,12 +191,12 @@ fn errors_follow_the_dependencies() {
             for (i, step) in sequence.steps.iter().enumerate() {
                 for &tet in &sequence.tets[step.removed.clone()] {
                     if let Some(&parent) = makers.get(&sorted(tet)) {
-                        let least = step.error + sequence.steps[parent].step;
-                        assert!(sequence.steps[parent].error >= least, "{name} {criterion:?}");
+                        let least = largest(&step.errors) + sequence.steps[parent].step;
+                        assert!(largest(&sequence.steps[parent].errors) >= least, "{name} {criterion:?}");
                     }
                 }
-                let error = ErrorCode::at_least(step.error);
-                assert!(error > ErrorCode::ZERO && error.error() == step.error, "as it is stored");
+                let error = ErrorCode::at_least(largest(&step.errors));
+                assert!(error > ErrorCode::ZERO && error.error() == largest(&step.errors), "as it is stored");
                 for &tet in &sequence.tets[step.inserted.clone()] {
                     makers.insert(sorted(tet), i);
                 }
@@ -276,7 +276,7 @@ fn every_reference_vertex_is_within_the_error() {
             for bound in [0.003, 0.02, 0.06, 0.15, 0.4] {
                 // Errors are monotone, so that these insertions do not need the others.
                 let mut replay = Replay::new(&result.sequence.base);
-                let wanted = result.sequence.steps.iter().filter(|step| step.error > bound);
+                let wanted = result.sequence.steps.iter().filter(|step| largest(&step.errors) > bound);
                 wanted.for_each(|step| replay.insert(&result, step));
                 let tets = replay.tets();
                 let around = topology(mesh.positions.len(), &tets).expect("a conforming mesh").neighbors;
@@ -329,7 +329,12 @@ fn bases_are_small_and_boxes_keep_their_volume() {
         assert!(result.sequence.base.len() < 20, "{criterion:?}: {}", result.sequence.base.len());
         let whole = six_volumes(&result, &mesh.tets);
         let mut replay = Replay::new(&result.sequence.base);
-        result.sequence.steps.iter().filter(|step| step.error > 0.05).for_each(|s| replay.insert(&result, s));
+        result
+            .sequence
+            .steps
+            .iter()
+            .filter(|step| largest(&step.errors) > 0.05)
+            .for_each(|s| replay.insert(&result, s));
         assert!(replay.0.len() < mesh.tets.len() * 3 / 4);
         assert_eq!(six_volumes(&result, &replay.tets()), whole);
     }
@@ -372,7 +377,14 @@ fn a_boundary_that_may_not_move_costs_all() {
         .expect("a valid mesh");
     let mut replay = Replay::new(&result.sequence.base);
     let moves = |step: &&Insertion| step.step > 0.0;
-    assert!(result.sequence.steps.iter().filter(moves).all(|step| step.error == ErrorCode::MAX.error()));
+    assert!(
+        result
+            .sequence
+            .steps
+            .iter()
+            .filter(moves)
+            .all(|step| largest(&step.errors) == ErrorCode::MAX.error())
+    );
     assert!(result.sequence.steps.iter().any(|step| step.step > 0.0));
     result.sequence.steps.iter().for_each(|step| replay.insert(&result, step));
     assert_eq!(replay.0.len(), mesh.tets.len());

@@ -1,6 +1,7 @@
 //! `UPDT`: a block of vertex splits.
 
-use super::read_error;
+use super::largest;
+use super::read_errors;
 use super::write_errors;
 use crate::format::FormatError;
 use crate::format::read::Reader;
@@ -45,7 +46,7 @@ pub fn write(out: &mut Vec<u8>, mt: &EdgeMt, first: u32, end: u32) {
         splits().for_each(|split| split.offset.iter().for_each(|&d| write::zigzag(out, d)));
     });
     write::column(out, scratch, |out| splits().for_each(|split| write::varint(out, split.mask)));
-    write_errors(out, scratch, splits().map(|split| split.error));
+    write_errors(out, scratch, splits().map(|split| split.errors));
     for field in 0..mt.info().fields.len() {
         write::column(out, scratch, |out| {
             splits().for_each(|split| write::zigzag(out, split.field_offsets[field]));
@@ -60,9 +61,9 @@ pub fn read(mut reader: Reader<'_>, mt: &mut EdgeMt, count: u32) -> Result<(), F
     let mut fields = (0..mt.info().fields.len()).map(|_| reader.column()).collect::<Result<Vec<_>, _>>()?;
     reader.end()?;
     let mut field_offsets = vec![0; fields.len()];
-    let mut error = ErrorCode::MAX;
+    let mut last = vec![ErrorCode::MAX; fields.len()];
     for _ in 0..count {
-        error = read_error(&mut errors, error)?;
+        read_errors(&mut errors, &mut last)?;
         for (offset, column) in field_offsets.iter_mut().zip(&mut fields) {
             *offset = column.zigzag()?;
         }
@@ -71,10 +72,10 @@ pub fn read(mut reader: Reader<'_>, mt: &mut EdgeMt, count: u32) -> Result<(), F
             offset: [offsets.zigzag()?, offsets.zigzag()?, offsets.zigzag()?],
             field_offsets: &field_offsets,
             mask: masks.varint64()?,
-            error,
+            errors: &last,
         })?;
     }
-    mt.set_to_come(error);
+    mt.set_to_come(largest(&last));
     [vertices, offsets, masks, errors].into_iter().chain(fields).try_for_each(Reader::end)
 }
 

@@ -1,8 +1,9 @@
 //! `EXPL`: a block of updates that are spelled out.
 
 use super::check_bytes;
+use super::largest;
 use super::read_delta;
-use super::read_error;
+use super::read_errors;
 use super::write_deltas;
 use super::write_errors;
 use super::write_positions;
@@ -54,7 +55,7 @@ pub fn write(out: &mut Vec<u8>, mt: &ExplicitMt, first: u32, end: u32) {
         }
     });
     write::column(out, scratch, |out| updates().for_each(|u| write_inserted(out, mt, u)));
-    write_errors(out, scratch, updates().map(|u| mt.error(u)));
+    write_errors(out, scratch, updates().map(|u| mt.errors(u)));
     for field in 0..mt.fields() {
         let levels = updates().flat_map(created).map(|v| mt.levels(v)[field]);
         write::column(out, scratch, |out| write_deltas(out, levels));
@@ -126,16 +127,16 @@ pub fn read(
     };
     reader.end()?;
     let mut parts = Parts { level: vec![0; mt.fields()], ..Parts::default() };
-    let mut error = ErrorCode::MAX;
+    let mut last = vec![ErrorCode::MAX; mt.fields()];
     for _ in 0..count {
-        error = read_error(&mut columns.errors, error)?;
+        read_errors(&mut columns.errors, &mut last)?;
         parts.read(&mut columns, mt)?;
         let Parts { positions, levels, removed, inserted, .. } = &parts;
         let grows = bytes_of(positions.len(), mt.fields(), removed.len(), inserted.len());
         check_bytes(mt.held_bytes() + grows, limits)?;
-        mt.push(&ExplicitUpdate { positions, levels, removed, inserted, error })?;
+        mt.push(&ExplicitUpdate { positions, levels, removed, inserted, errors: &last })?;
     }
-    mt.set_to_come(error);
+    mt.set_to_come(largest(&last));
     let Columns { created, positions, removed, inserted, errors, fields } = columns;
     [created, positions, removed, inserted, errors].into_iter().chain(fields).try_for_each(Reader::end)
 }

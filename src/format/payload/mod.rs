@@ -273,23 +273,34 @@ pub fn check_reference(mt: MtRef<'_>) -> Result<(), BaseMeshError> {
     }
 }
 
-/// Appends a column of errors, each told as the number of codes that it is below the one before; round the end of
-/// the codes where it is above.
-fn write_errors(out: &mut Vec<u8>, scratch: &mut Vec<u8>, errors: impl Iterator<Item = ErrorCode>) {
+/// Appends a column of errors, those of all fields of an update together, each told as the number of codes that it is
+/// below the one before; round the end of the codes where it is above.
+fn write_errors<'a>(out: &mut Vec<u8>, scratch: &mut Vec<u8>, errors: impl Iterator<Item = &'a [ErrorCode]>) {
     write::column(out, scratch, |out| {
-        let mut last = ErrorCode::MAX.0;
-        for ErrorCode(code) in errors {
-            write::varint(out, u64::from(last.wrapping_sub(code)));
-            last = code;
+        let mut last: &[ErrorCode] = &[];
+        for errors in errors {
+            for (f, error) in errors.iter().enumerate() {
+                let before = last.get(f).copied().unwrap_or(ErrorCode::MAX);
+                write::varint(out, u64::from(before.0.wrapping_sub(error.0)));
+            }
+            last = errors;
         }
     });
 }
 
-/// The next error, told as [`write_errors`] does.
-fn read_error(column: &mut Reader<'_>, last: ErrorCode) -> Result<ErrorCode, FormatError> {
-    let fall = u16::try_from(column.varint()?).ok();
-    let code = fall.map(|fall| ErrorCode(last.0.wrapping_sub(fall)));
-    code.ok_or_else(|| column.corrupt("an error is out of its range"))
+/// The errors of the next update in the place of those of the one before, told as [`write_errors`] does.
+fn read_errors(column: &mut Reader<'_>, errors: &mut [ErrorCode]) -> Result<(), FormatError> {
+    for error in errors {
+        let fall = u16::try_from(column.varint()?);
+        let fall = fall.map_err(|_| column.corrupt("an error is out of its range"))?;
+        error.0 = error.0.wrapping_sub(fall);
+    }
+    Ok(())
+}
+
+/// The largest error of an update.
+fn largest(errors: &[ErrorCode]) -> ErrorCode {
+    errors.iter().copied().fold(ErrorCode::ZERO, ErrorCode::max)
 }
 
 /// The totals at the end of a file.

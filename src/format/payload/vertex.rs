@@ -1,7 +1,8 @@
 //! `INSV`: a block of vertex insertions, and what the base mesh tells besides itself.
 
 use super::check_bytes;
-use super::read_error;
+use super::largest;
+use super::read_errors;
 use super::write_errors;
 use crate::format::FormatError;
 use crate::format::Limits;
@@ -86,7 +87,7 @@ pub fn write(out: &mut Vec<u8>, mt: &VertexMt, first: u32, end: u32) {
     write::column(out, scratch, |out| {
         out.extend((0..nodes.len()).step_by(8).map(|at| nodes.get(at, 8) as u8));
     });
-    write_errors(out, scratch, updates().map(|u| mt.error_of(u)));
+    write_errors(out, scratch, updates().map(|u| mt.errors_of(u)));
 }
 
 /// Reads `count` updates into the MT.
@@ -102,10 +103,10 @@ pub fn read(
     while !nodes.is_empty() {
         all.push(u64::from(nodes.u8()?), 8);
     }
-    let (mut at, mut error) = (0, ErrorCode::MAX);
+    let (mut at, mut last) = (0, vec![ErrorCode::MAX; mt.info().fields.len()]);
     let mut node = NodeBits::default();
     for _ in 0..count {
-        error = read_error(&mut errors, error)?;
+        read_errors(&mut errors, &mut last)?;
         let units = lengths.varint()?;
         let bits = u64::from(units * UNIT);
         if units > MAX_UNITS || at + bits > all.len() {
@@ -118,9 +119,9 @@ pub fn read(
         }
         at += bits;
         check_bytes(mt.bytes() + bits / 8 + 16, limits)?;
-        mt.push(&node, error)?;
+        mt.push(&node, &last)?;
     }
-    mt.set_to_come(error);
+    mt.set_to_come(largest(&last));
     if all.len() - at >= 8 || all.get(at, 8) != 0 {
         return Err(nodes.corrupt("something follows the last node"));
     }
