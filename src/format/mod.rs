@@ -5,6 +5,7 @@
 //! ---
 #![doc = include_str!("SPEC.md")]
 
+mod coder;
 mod decode;
 mod encode;
 mod error;

@@ -95,6 +95,21 @@ impl<'a> Reader<'a> {
         std::str::from_utf8(bytes).map_err(|_| self.corrupt("a text is not UTF-8"))
     }
 
+    /// The next `count` pieces of `size` bytes.
+    pub fn bytes(&mut self, count: usize, size: usize) -> Result<&'a [u8]> {
+        match count.checked_mul(size) {
+            Some(bytes) => self.take(bytes),
+            None => Err(self.corrupt("the section is shorter than its content")),
+        }
+    }
+
+    /// All bytes that are left.
+    pub fn rest(&mut self) -> &'a [u8] {
+        let rest = std::mem::take(&mut self.bytes);
+        self.offset += rest.len() as u64;
+        rest
+    }
+
     /// Whether all bytes are read.
     pub fn is_empty(&self) -> bool {
         self.bytes.is_empty()

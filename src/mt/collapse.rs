@@ -121,7 +121,11 @@ impl EdgeMt {
         let spare = u32::from(self.is_coded);
         let on_lattice = split.offset.iter().all(|&d| fits(d, self.info.lattice.bits))
             && split.field_offsets.len() == self.info.fields.len()
-            && split.field_offsets.iter().zip(&self.info.fields).all(|(&d, field)| fits(d, field.bits + spare));
+            && split
+                .field_offsets
+                .iter()
+                .zip(&self.info.fields)
+                .all(|(&d, field)| fits(d, field.bits + spare));
         if !on_lattice {
             return Err(UpdateError::OffLattice { update });
         }

@@ -3,6 +3,7 @@
 use super::Criterion;
 use super::Decimated;
 use super::decimate;
+use super::largest;
 use crate::build::BuildConfig;
 use crate::build::BuildError;
 use crate::build::sequence::Insertion;

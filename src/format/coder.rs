@@ -1,0 +1,586 @@
+//! Symbols and plain bits to bytes and back: what coded sections are made of.
+//!
+//! A symbol comes out of an alphabet in a *context*; each context has a table of how often each of its symbols occurs in
+//! the whole file, in units of 2^-12. The tables are in the file (section `MODL`), so that every coded section can be read
+//! by itself. Symbols are coded by asymmetric numeral systems (Duda 2013; the coder is that of the crate `constriction`),
+//! the bits that no table can foretell stand beside them as they are.
+//!
+//! What is written is described once, to a [`Put`]: at first to [`Counts`], which makes the tables, then to a [`Writer`].
+
+use super::FormatError;
+use super::read::Reader;
+use super::write;
+use constriction::stream::Code;
+use constriction::stream::Decode;
+use constriction::stream::Encode;
+use constriction::stream::model::DecoderModel;
+use constriction::stream::model::EncoderModel;
+use constriction::stream::model::EntropyModel;
+use constriction::stream::stack::SmallAnsCoder;
+use std::num::NonZeroU16;
+
+/// Bits of a probability.
+const PRECISION: usize = 12;
+/// What the counts of a context add up to.
+const WHOLE: u32 = 1 << PRECISION;
+
+/// A row of contexts with one alphabet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Family {
+    /// Number of the first context in the file.
+    pub first: u32,
+    pub contexts: u32,
+    /// Letters of the alphabet.
+    pub symbols: u32,
+    /// For numbers: bits below the leading one that belong to the symbol.
+    pub kept: u32,
+}
+
+impl Family {
+    /// The family behind another one.
+    pub const fn after(self, contexts: u32, symbols: u32) -> Self {
+        Self { first: self.first + self.contexts, contexts, symbols, kept: 0 }
+    }
+
+    /// The family behind another one, for numbers of at most 32 bits.
+    pub const fn numbers_after(self, contexts: u32, kept: u32) -> Self {
+        let symbols = (33 - kept) << kept;
+        Self { first: self.first + self.contexts, contexts, symbols, kept }
+    }
+
+    /// In front of the first one.
+    pub const NONE: Self = Self { first: 0, contexts: 0, symbols: 0, kept: 0 };
+
+    /// The number of one of its contexts; those beyond the last are the last.
+    fn context(self, which: u32) -> usize {
+        (self.first + which.min(self.contexts - 1)) as usize
+    }
+}
+
+/// Where symbols and bits go.
+pub trait Put {
+    /// Puts a symbol of a context.
+    fn symbol(&mut self, family: Family, which: u32, symbol: u32);
+
+    /// Puts the low `width` bits of a number, at most 32.
+    fn bits(&mut self, value: u32, width: u32);
+
+    /// Puts a number: how long it is and its first bits as a symbol, the others as they are.
+    fn number(&mut self, family: Family, which: u32, value: u32) {
+        let (symbol, low) = split(family.kept, value);
+        self.symbol(family, which, symbol);
+        self.bits(value, low);
+    }
+
+    /// Puts a signed number: its size, and its sign if it has one.
+    fn signed(&mut self, family: Family, which: u32, value: i32) {
+        self.number(family, which, value.unsigned_abs());
+        if value != 0 {
+            self.bits(u32::from(value < 0), 1);
+        }
+    }
+}
+
+/// The symbol of a number, and how many of its low bits stand beside it.
+fn split(kept: u32, value: u32) -> (u32, u32) {
+    if value >> kept == 0 {
+        return (value, 0);
+    }
+    let low = value.ilog2() - kept;
+    (((low + 1) << kept) + (value >> low & ((1 << kept) - 1)), low)
+}
+
+/// How often each symbol of each context occurs.
+#[derive(Debug, Default)]
+pub struct Counts(Vec<Vec<u32>>);
+
+impl Put for Counts {
+    fn symbol(&mut self, family: Family, which: u32, symbol: u32) {
+        let context = family.context(which);
+        if context >= self.0.len() {
+            self.0.resize_with(context + 1, Vec::new);
+        }
+        let counts = &mut self.0[context];
+        if symbol as usize >= counts.len() {
+            counts.resize(symbol as usize + 1, 0);
+        }
+        counts[symbol as usize] = counts[symbol as usize].saturating_add(1);
+    }
+
+    fn bits(&mut self, _: u32, _: u32) {}
+}
+
+/// The symbols of one context with where the share of each begins; those that do not occur are left out.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+struct Table {
+    symbols: Vec<u16>,
+    /// One more than there are symbols; the last one is [`WHOLE`].
+    starts: Vec<u16>,
+    /// For each of [`GUIDES`] equal parts of the whole, the symbol at its beginning.
+    guides: Vec<u16>,
+}
+
+/// Parts of the whole that a search starts from.
+const GUIDES: usize = 64;
+
+impl Table {
+    /// Shares in proportion to counts, none of them zero that has a count.
+    fn new(counts: &[u32]) -> Self {
+        let total: u64 = counts.iter().map(|&count| u64::from(count)).sum();
+        let used = (0..).zip(counts).filter(|(_, count)| **count > 0);
+        let mut shares: Vec<(u16, u32)> = used
+            .map(|(symbol, &count)| {
+                let share = u64::from(count) * u64::from(WHOLE) / total;
+                (symbol, (share as u32).max(1))
+            })
+            .collect();
+        // The largest share takes what rounding leaves over, and gives what is missing.
+        loop {
+            let sum: u32 = shares.iter().map(|(_, share)| share).sum();
+            let Some(largest) = shares.iter_mut().max_by_key(|(symbol, share)| (*share, !symbol)) else {
+                break;
+            };
+            if sum <= WHOLE {
+                largest.1 += WHOLE - sum;
+                break;
+            }
+            largest.1 -= (sum - WHOLE).min(largest.1.div_ceil(2));
+        }
+        Self::of(&shares)
+    }
+
+    /// From shares that add up to the whole.
+    fn of(shares: &[(u16, u32)]) -> Self {
+        let mut table = Self { starts: vec![0], ..Self::default() };
+        let mut end = 0;
+        for &(symbol, share) in shares {
+            table.symbols.push(symbol);
+            end += share;
+            table.starts.push(end as u16);
+        }
+        let mut at = 0;
+        table.guides = (0..GUIDES)
+            .map(|part| {
+                let quantile = (part * (WHOLE as usize / GUIDES)) as u16;
+                while at + 1 < table.symbols.len() && table.starts[at + 1] <= quantile {
+                    at += 1;
+                }
+                at as u16
+            })
+            .collect();
+        table
+    }
+
+    /// The only symbol, if there is just one: it needs no coding.
+    fn only(&self) -> Option<u32> {
+        if self.symbols.len() == 1 { Some(u32::from(self.symbols[0])) } else { None }
+    }
+
+    fn share(&self, at: usize) -> NonZeroU16 {
+        // Shares are never zero.
+        NonZeroU16::new(self.starts[at + 1].wrapping_sub(self.starts[at])).unwrap_or(NonZeroU16::MIN)
+    }
+}
+
+impl EntropyModel<PRECISION> for &Table {
+    type Symbol = u16;
+    type Probability = u16;
+}
+
+impl DecoderModel<PRECISION> for &Table {
+    #[inline]
+    fn quantile_function(&self, quantile: u16) -> (u16, u16, NonZeroU16) {
+        let mut at = usize::from(self.guides[usize::from(quantile) * GUIDES >> PRECISION]);
+        while self.starts[at + 1] <= quantile {
+            at += 1;
+        }
+        (self.symbols[at], self.starts[at], self.share(at))
+    }
+}
+
+impl EncoderModel<PRECISION> for &Table {
+    fn left_cumulative_and_probability(
+        &self,
+        symbol: impl std::borrow::Borrow<u16>,
+    ) -> Option<(u16, NonZeroU16)> {
+        let at = self.symbols.binary_search(symbol.borrow()).ok()?;
+        Some((self.starts[at], self.share(at)))
+    }
+}
+
+/// The tables of all contexts.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Models(Vec<Table>);
+
+impl Models {
+    pub fn new(counts: &Counts) -> Self {
+        Self(
+            counts
+                .0
+                .iter()
+                .map(|counts| if counts.is_empty() { Table::default() } else { Table::new(counts) })
+                .collect(),
+        )
+    }
+
+    /// Bytes in memory.
+    pub fn bytes(&self) -> u64 {
+        self.0.iter().map(|table| (4 * table.symbols.len() + 2 * table.guides.len()) as u64).sum()
+    }
+
+    /// Appends the tables: for each context how many symbols it has, then each symbol as the distance from the one before, and
+    /// its share but for the last one.
+    pub fn write(&self, out: &mut Vec<u8>) {
+        write::varint(out, self.0.len() as u64);
+        let mut bits = BitWriter::default();
+        for table in &self.0 {
+            bits.gamma(table.symbols.len() as u32);
+            let mut next = 0;
+            for (at, &symbol) in table.symbols.iter().enumerate() {
+                bits.gamma(u32::from(symbol) - next);
+                next = u32::from(symbol) + 1;
+                if at + 1 < table.symbols.len() {
+                    bits.gamma(u32::from(table.share(at).get()) - 1);
+                }
+            }
+        }
+        out.extend_from_slice(&bits.finish());
+    }
+
+    /// Reads the tables of `families`.
+    pub fn read(mut reader: Reader<'_>, families: &[Family]) -> Result<Self, FormatError> {
+        let count = reader.varint()?;
+        let most = families.last().map_or(0, |last| last.first + last.contexts);
+        if count > most {
+            return Err(reader.corrupt("there are more contexts than are known"));
+        }
+        let mut bits = BitReader::new(reader.rest());
+        let mut tables = Vec::new();
+        for context in 0..count {
+            let family = families.iter().find(|family| context < family.first + family.contexts);
+            let table = Self::read_table(&mut bits, family.map_or(0, |family| family.symbols));
+            tables.push(table.ok_or_else(|| reader.corrupt("a table of frequencies is damaged"))?);
+        }
+        if !bits.is_at_end() {
+            return Err(reader.corrupt("bytes are left over behind the tables"));
+        }
+        Ok(Self(tables))
+    }
+
+    fn read_table(bits: &mut BitReader<'_>, alphabet: u32) -> Option<Table> {
+        let count = bits.gamma()?;
+        if count == 0 {
+            return Some(Table::default());
+        }
+        let (mut shares, mut next, mut left) = (Vec::new(), 0_u32, WHOLE);
+        for at in 0..count {
+            let symbol = next.checked_add(bits.gamma()?)?;
+            next = symbol + 1;
+            let share = if at + 1 < count { bits.gamma()?.checked_add(1)? } else { left };
+            left = left.checked_sub(share).filter(|_| share > 0)?;
+            shares.push((u16::try_from(symbol).ok().filter(|_| symbol < alphabet)?, share));
+        }
+        (left == 0).then(|| Table::of(&shares))
+    }
+}
+
+/// Writes a coded section: see [`Source`].
+pub struct Writer<'a> {
+    models: &'a Models,
+    symbols: Vec<(u32, u16)>,
+    bits: BitWriter,
+}
+
+impl Put for Writer<'_> {
+    fn symbol(&mut self, family: Family, which: u32, symbol: u32) {
+        self.symbols.push((family.context(which) as u32, symbol as u16));
+    }
+
+    fn bits(&mut self, value: u32, width: u32) {
+        self.bits.push(value, width);
+    }
+}
+
+impl<'a> Writer<'a> {
+    /// A writer by tables that were made from the counts of all that is to be written.
+    pub fn new(models: &'a Models) -> Self {
+        Self { models, symbols: Vec::new(), bits: BitWriter::default() }
+    }
+
+    /// Appends all that was put.
+    pub fn finish(self, out: &mut Vec<u8>) {
+        let mut coder = SmallAnsCoder::new();
+        // The coder is a stack: what is to come out first goes in last.
+        for &(context, symbol) in self.symbols.iter().rev() {
+            let table = &self.models.0[context as usize];
+            if table.only().is_none() {
+                let coded = coder.encode_symbol(symbol, table);
+                debug_assert!(coded.is_ok(), "the tables were made from these symbols");
+            }
+        }
+        let Ok(words) = coder.into_compressed();
+        write::varint(out, words.len() as u64);
+        words.iter().for_each(|word| out.extend_from_slice(&word.to_le_bytes()));
+        out.extend_from_slice(&self.bits.finish());
+    }
+}
+
+/// Reads a coded section: the varint of how many 16-bit words there are, these words, then the plain bits.
+pub struct Source<'a> {
+    models: &'a Models,
+    coder: SmallAnsCoder,
+    bits: BitReader<'a>,
+    reader: Reader<'a>,
+}
+
+impl<'a> Source<'a> {
+    pub fn new(mut reader: Reader<'a>, models: &'a Models) -> Result<Self, FormatError> {
+        let count = reader.varint()?;
+        let bytes = reader.bytes(count as usize, 2)?;
+        let words = bytes.chunks_exact(2).map(|pair| u16::from_le_bytes([pair[0], pair[1]])).collect();
+        let coder = SmallAnsCoder::from_compressed(words)
+            .map_err(|_| reader.corrupt("coded symbols end with a zero"))?;
+        let bits = BitReader::new(reader.rest());
+        Ok(Self { models, coder, bits, reader })
+    }
+
+    /// An error in this section.
+    pub fn corrupt(&self, what: &'static str) -> FormatError {
+        self.reader.corrupt(what)
+    }
+
+    /// The next symbol.
+    #[inline]
+    pub fn symbol(&mut self, family: Family, which: u32) -> Result<u32, FormatError> {
+        let Some(table) = self.models.0.get(family.context(which)).filter(|table| !table.symbols.is_empty())
+        else {
+            return Err(self.corrupt("a symbol has no table of frequencies"));
+        };
+        if let Some(only) = table.only() {
+            return Ok(only);
+        }
+        match self.coder.decode_symbol(table) {
+            Ok(symbol) => Ok(u32::from(symbol)),
+            Err(_) => Err(self.corrupt("a coded symbol is damaged")),
+        }
+    }
+
+    /// The next `width` bits, at most 32.
+    #[inline]
+    pub fn bits(&mut self, width: u32) -> Result<u32, FormatError> {
+        match self.bits.take(width) {
+            Some(value) => Ok(value),
+            None => Err(self.corrupt("the section is shorter than its content")),
+        }
+    }
+
+    /// A number, as [`Put::number`] puts it.
+    #[inline]
+    pub fn number(&mut self, family: Family, which: u32) -> Result<u32, FormatError> {
+        let symbol = self.symbol(family, which)?;
+        let kept = family.kept;
+        if symbol >> kept == 0 {
+            return Ok(symbol);
+        }
+        // Symbols are within their alphabet, so this has at most 32 bits.
+        let low = (symbol >> kept) - 1;
+        let top = (1 << kept) | (symbol & ((1 << kept) - 1));
+        Ok(top << low | self.bits(low)?)
+    }
+
+    /// A signed number, as [`Put::signed`] puts it.
+    #[inline]
+    pub fn signed(&mut self, family: Family, which: u32) -> Result<i32, FormatError> {
+        let size = self.number(family, which)?;
+        if size == 0 {
+            return Ok(0);
+        }
+        let size = i32::try_from(size).map_err(|_| self.corrupt("a number has more than 32 bits"))?;
+        Ok(if self.bits(1)? == 0 { size } else { -size })
+    }
+
+    /// Everything must have been read.
+    pub fn end(self) -> Result<(), FormatError> {
+        if self.coder.state() == 0 && self.bits.is_at_end() {
+            Ok(())
+        } else {
+            Err(self.corrupt("something is left over in a coded section"))
+        }
+    }
+}
+
+/// Bits to bytes, the least significant bit of a byte first.
+#[derive(Debug, Default)]
+struct BitWriter {
+    bytes: Vec<u8>,
+    /// Bits that do not fill a byte yet.
+    open: u64,
+    count: u32,
+}
+
+impl BitWriter {
+    fn push(&mut self, value: u32, width: u32) {
+        let value = u64::from(value) & ((1 << width) - 1);
+        self.open |= value << self.count;
+        self.count += width;
+        while self.count >= 8 {
+            self.bytes.push(self.open as u8);
+            self.open >>= 8;
+            self.count -= 8;
+        }
+    }
+
+    /// A number in Elias' gamma code of one more (1975): as many zeros as `value + 1` has bits beyond the first, a one,
+    /// these bits.
+    fn gamma(&mut self, value: u32) {
+        let low = (u64::from(value) + 1).ilog2();
+        self.push(0, low);
+        self.push(1, 1);
+        self.push((value + 1) & ((1 << low) - 1), low);
+    }
+
+    fn finish(mut self) -> Vec<u8> {
+        if self.count > 0 {
+            self.bytes.push(self.open as u8);
+        }
+        self.bytes
+    }
+}
+
+/// Bytes to bits.
+#[derive(Debug)]
+struct BitReader<'a> {
+    bytes: &'a [u8],
+    open: u64,
+    count: u32,
+}
+
+impl<'a> BitReader<'a> {
+    fn new(bytes: &'a [u8]) -> Self {
+        Self { bytes, open: 0, count: 0 }
+    }
+
+    #[inline]
+    fn take(&mut self, width: u32) -> Option<u32> {
+        while self.count < width {
+            if let Some((word, rest)) = self.bytes.split_first_chunk::<4>().filter(|_| self.count <= 32) {
+                self.open |= u64::from(u32::from_le_bytes(*word)) << self.count;
+                (self.bytes, self.count) = (rest, self.count + 32);
+            } else {
+                let (&byte, rest) = self.bytes.split_first()?;
+                self.open |= u64::from(byte) << self.count;
+                (self.bytes, self.count) = (rest, self.count + 8);
+            }
+        }
+        let value = self.open & ((1 << width) - 1);
+        self.open >>= width;
+        self.count -= width;
+        Some(value as u32)
+    }
+
+    /// The inverse of [`BitWriter::gamma`], for numbers below 2^16.
+    fn gamma(&mut self) -> Option<u32> {
+        let mut low = 0;
+        while self.take(1)? == 0 {
+            low += 1;
+            if low > 16 {
+                return None;
+            }
+        }
+        Some((1 << low | self.take(low)?) - 1)
+    }
+
+    /// Whether nothing is left but zeros that fill a byte.
+    fn is_at_end(&self) -> bool {
+        self.bytes.is_empty() && self.count < 8 && self.open == 0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SMALL: Family = Family::NONE.after(2, 5);
+    const NUMBERS: Family = SMALL.numbers_after(3, 2);
+    const FAMILIES: [Family; 2] = [SMALL, NUMBERS];
+
+    fn put(out: &mut impl Put, numbers: &[u32]) {
+        for (i, &x) in (0..).zip(numbers) {
+            out.symbol(SMALL, i % 2, x % 5);
+            out.number(NUMBERS, x % 3, x);
+            out.signed(NUMBERS, 2, (x as i32).max(-i32::MAX));
+            out.bits(x, i % 33);
+        }
+    }
+
+    fn numbers() -> Vec<u32> {
+        let mut x = 0x9E37_79B9_7F4A_7C15_u64;
+        (0..3000)
+            .map(|i| {
+                x ^= x << 7;
+                x ^= x >> 9;
+                (x >> 32) as u32 >> (i * 7 % 33).min(31)
+            })
+            .chain([0, u32::MAX, i32::MAX as u32])
+            .collect()
+    }
+
+    #[test]
+    fn all_comes_back_and_nothing_is_left_over() -> Result<(), FormatError> {
+        let all = numbers();
+        let mut counts = Counts::default();
+        put(&mut counts, &all);
+        let models = Models::new(&counts);
+        let (mut tables, mut bytes) = (Vec::new(), Vec::new());
+        models.write(&mut tables);
+        let read = Models::read(Reader::new(&tables, 0), &FAMILIES)?;
+        assert_eq!(read, models);
+        let mut writer = Writer::new(&models);
+        put(&mut writer, &all);
+        writer.finish(&mut bytes);
+        let mut source = Source::new(Reader::new(&bytes, 0), &read)?;
+        for (i, &x) in (0..).zip(&all) {
+            assert_eq!(source.symbol(SMALL, i % 2)?, x % 5);
+            assert_eq!(source.number(NUMBERS, x % 3)?, x);
+            assert_eq!(source.signed(NUMBERS, 2)?, (x as i32).max(-i32::MAX));
+            assert_eq!(source.bits(i % 33)?, x & ((1_u64 << (i % 33)) - 1) as u32);
+        }
+        source.end()
+    }
+
+    #[test]
+    fn what_is_cut_off_or_left_over_is_noticed() -> Result<(), FormatError> {
+        let all = numbers();
+        let mut counts = Counts::default();
+        put(&mut counts, &all);
+        let models = Models::new(&counts);
+        let mut bytes = Vec::new();
+        let mut writer = Writer::new(&models);
+        put(&mut writer, &all[..10]);
+        writer.finish(&mut bytes);
+        // Not all symbols are read.
+        let mut source = Source::new(Reader::new(&bytes, 0), &models)?;
+        source.symbol(SMALL, 0)?;
+        assert!(source.end().is_err());
+        // Tables of other contexts, and such that do not add up.
+        let mut tables = Vec::new();
+        models.write(&mut tables);
+        assert!(Models::read(Reader::new(&tables, 0), &FAMILIES[..1]).is_err());
+        for cut in 0..tables.len() {
+            assert!(Models::read(Reader::new(&tables[..cut], 0), &FAMILIES).is_err());
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn shares_follow_counts_and_add_up() {
+        for counts in
+            [vec![1], vec![1, 0, 1], vec![1_000_000, 1, 1], vec![1; 300], vec![u32::MAX, u32::MAX, 5]]
+        {
+            let table = Table::new(&counts);
+            assert_eq!(u32::from(table.starts[table.symbols.len()]), WHOLE);
+            assert_eq!(table.symbols.len(), counts.iter().filter(|count| **count > 0).count());
+            assert!((0..table.symbols.len()).all(|at| table.starts[at] < table.starts[at + 1]));
+        }
+    }
+}
