@@ -107,7 +107,8 @@ pub(super) fn edge_mt(
         let update = mt.push(&split).map_err(BuildError::Internal)?;
         mt.announce(&mut mesh, update.0);
         match mt.refine(&mut mesh, update).map_err(BuildError::Internal)? {
-            Applied::Done => {}
+            // Nobody asks what was touched.
+            Applied::Done => mesh.clear_touched(),
             Applied::Blocked(_) => return Err(BuildError::Internal(UpdateError::Error { update: update.0 })),
         }
     }

@@ -13,6 +13,7 @@ use super::MultiTessellation;
 use super::UpdateError;
 use super::UpdateId;
 use super::VertexMt;
+use std::ops::Range;
 
 /// An MT of any kind.
 #[derive(Clone, Debug, PartialEq)]
@@ -74,6 +75,19 @@ impl MultiTessellation for Mt {
 
     fn updates(&self) -> u32 {
         each!(self, mt => mt.updates())
+    }
+
+    #[inline]
+    fn has(&self, u: UpdateId) -> bool {
+        each!(self, mt => mt.has(u))
+    }
+
+    fn present(&self) -> u32 {
+        each!(self, mt => mt.present())
+    }
+
+    fn page_updates(&self, page: u32) -> Range<u32> {
+        each!(self, mt => mt.page_updates(page))
     }
 
     fn bytes(&self) -> u64 {
@@ -144,8 +158,12 @@ impl MultiTessellation for Mt {
     }
 
     #[inline(never)]
-    fn announce(&self, mesh: &mut CurrentMesh, known: u32) {
-        each!(self, mt => mt.announce(mesh, known));
+    fn reveal(&self, mesh: &mut CurrentMesh, updates: Range<u32>) {
+        each!(self, mt => mt.reveal(mesh, updates));
+    }
+
+    fn conceal(&self, mesh: &mut CurrentMesh, updates: Range<u32>) {
+        each!(self, mt => mt.conceal(mesh, updates));
     }
 
     #[inline(never)]

@@ -17,12 +17,15 @@ use super::BaseMesh;
 use super::ErrorCode;
 use super::MtInfo;
 use super::MtKind;
+use super::PAGE_BITS;
+use super::PageError;
 use super::UpdateError;
 use super::UpdateId;
 use super::VertexId;
 use super::errors::Errors;
 use crate::geom::NARROW_BITS;
 use crate::mesh::NONE;
+use std::ops::Range;
 
 /// Largest number of tetrahedra around a vertex that an update splits.
 pub const MAX_STAR: usize = 64;
@@ -53,51 +56,111 @@ pub struct VertexSplit<'a> {
 /// A compact edge-based MT. With one field an update, and so a reference vertex, takes at most 36 bytes and 2 for the
 /// error; the base mesh, which is small, comes on top.
 ///
-/// It grows by [`push`](EdgeMt::push), coarse to fine; every prefix of an MT is an MT.
+/// It grows by [`push`](EdgeMt::push), coarse to fine; every prefix of an MT is an MT. Or else it comes and goes in pages of
+/// updates, by [`insert_page`](EdgeMt::insert_page) and [`remove_page`](EdgeMt::remove_page): every set of pages that holds
+/// with each page all those on which it depends is an MT, too.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EdgeMt {
     info: MtInfo,
     base: BaseMesh,
     /// Whether masks and field offsets are told as what is wrong with guesses: see [`EdgeMt::coded`].
     is_coded: bool,
-    /// `s(v)` for every vertex so far, [`NONE`] while nothing splits it.
-    split_of: Vec<u32>,
-    /// The vertex that each update splits.
-    vertex_of: Vec<u32>,
-    offsets: Offsets,
-    /// One block of `fields` per update.
-    field_offsets: Vec<i32>,
-    masks: Vec<u64>,
-    errors: Errors,
+    /// `s(v)` for the vertices of the base mesh, [`WHOLE`] while nothing splits them.
+    base_splits: Vec<i32>,
+    /// The last one is here.
+    pages: Vec<Option<Page>>,
+    /// log2 of the updates of a page.
+    page_bits: u32,
+    record: Record,
+    /// How many updates are here.
+    present: u32,
     to_come: ErrorCode,
+}
+
+/// Updates that come and go together, each with all that belongs to it side by side.
+#[derive(Clone, Debug, PartialEq)]
+struct Page {
+    words: Vec<i32>,
+    errors: Errors,
+}
+
+/// What the words of an update are: the vertex that it splits, `s(v')`, `s(v'')`, two for the mask, the offset, and one for
+/// the offset in each field.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Record {
+    /// Words of the offset: 2, or 3 on fine lattices.
+    offset: usize,
+    /// Words of an update.
+    len: usize,
+}
+
+/// `s(v)` of a vertex that nothing splits.
+const WHOLE: i32 = NONE as i32;
+
+const VERTEX: usize = 0;
+const SPLITS: usize = 1;
+const MASK: usize = 3;
+const OFFSET: usize = 5;
+
+/// Pages have at most 2 to this power of updates.
+const MAX_PAGE_BITS: u32 = 16;
+
+impl Record {
+    fn new(info: &MtInfo) -> Self {
+        let offset = if info.lattice.bits < NARROW_BITS { 2 } else { 3 };
+        Self { offset, len: OFFSET + offset + info.fields.len() }
+    }
+
+    fn push(self, words: &mut Vec<i32>, split: &VertexSplit<'_>) {
+        let halves = |word: u64| [word as i32, (word >> 32) as i32];
+        words.extend([split.vertex.0 as i32, WHOLE, WHOLE]);
+        words.extend(halves(split.mask));
+        if self.offset == 2 {
+            words.extend(halves(pack(split.offset)));
+        } else {
+            words.extend(split.offset);
+        }
+        words.extend_from_slice(split.field_offsets);
+    }
+
+    #[inline]
+    fn offset(self, words: &[i32]) -> [i32; 3] {
+        if self.offset == 2 { unpack(two(words, OFFSET)) } else { [0, 1, 2].map(|axis| words[OFFSET + axis]) }
+    }
+}
+
+#[inline]
+fn two(words: &[i32], at: usize) -> u64 {
+    u64::from(words[at] as u32) | u64::from(words[at + 1] as u32) << 32
 }
 
 impl EdgeMt {
     /// An MT without updates. `base` must fit `info`: see [`BaseMesh::check`](super::BaseMesh::check).
-    pub fn new(mut info: MtInfo, base: BaseMesh) -> Self {
+    pub fn new(info: MtInfo, base: BaseMesh) -> Self {
+        Self::with_page_bits(info, base, PAGE_BITS)
+    }
+
+    /// [`EdgeMt::new`] with pages of `2^bits` updates, of `2^16` at most.
+    pub fn with_page_bits(mut info: MtInfo, base: BaseMesh, bits: u32) -> Self {
         info.kind = MtKind::Edge;
-        let split_of = vec![NONE; base.positions.len()];
-        let offsets = Offsets::new(info.lattice.bits);
-        let errors = Errors::new(info.fields.len());
         Self {
-            info,
+            base_splits: vec![WHOLE; base.positions.len()],
             base,
             is_coded: false,
-            split_of,
-            vertex_of: Vec::new(),
-            offsets,
-            field_offsets: Vec::new(),
-            masks: Vec::new(),
-            errors,
+            pages: Vec::new(),
+            page_bits: bits.min(MAX_PAGE_BITS),
+            record: Record::new(&info),
+            present: 0,
             to_come: ErrorCode::MAX,
+            info,
         }
     }
 
-    /// [`EdgeMt::new`] in the form that files have: the masks and the field offsets of splits are not what they are, but
+    /// [`EdgeMt::with_page_bits`] in the form that files have: the masks and the field offsets of splits are not what they are, but
     /// what is wrong with the guesses that the star allows when the split is applied. Bit `i` of a mask then says that
     /// the guess for the `i`-th tetrahedron is wrong, counted from the one whose side is the least certain.
-    pub fn coded(info: MtInfo, base: BaseMesh) -> Self {
-        Self { is_coded: true, ..Self::new(info, base) }
+    pub fn coded(info: MtInfo, base: BaseMesh, page_bits: u32) -> Self {
+        Self { is_coded: true, ..Self::with_page_bits(info, base, page_bits) }
     }
 
     /// Whether this is the form that files have.
@@ -105,17 +168,37 @@ impl EdgeMt {
         self.is_coded
     }
 
-    /// Adds the next update.
+    /// Adds the next update, behind all that are here.
     ///
     /// # Errors
-    /// The split vertex must exist and be whole, offsets must fit the lattices, and each field has an error. What needs the mesh is checked when
-    /// the update is applied; that errors do not grow along the partial order is the caller's to see to.
+    /// The split vertex must exist and be whole, offsets must fit the lattices, and each field has an error. What needs the
+    /// mesh is checked when the update is applied; that errors do not grow along the partial order is the caller's to see
+    /// to.
     pub fn push(&mut self, split: &VertexSplit<'_>) -> Result<UpdateId, UpdateError> {
-        let update = self.vertex_of.len() as u32;
+        let update = self.updates();
+        self.check(update, split)?;
         let vertex = split.vertex.0;
-        if self.split_of.get(vertex as usize) != Some(&NONE) {
+        if self.split_word(split.vertex).map(|word| *word) != Some(WHOLE) {
             return Err(UpdateError::Vertex { update, vertex });
         }
+        if update as usize >> self.page_bits == self.pages.len() {
+            let page = self.new_page(update);
+            self.pages.push(Some(page));
+        }
+        let Some(Some(page)) = self.pages.last_mut() else { return Err(UpdateError::Missing { update }) };
+        if !page.errors.push(split.errors) {
+            return Err(UpdateError::Error { update });
+        }
+        self.record.push(&mut page.words, split);
+        if let Some(word) = self.split_word(split.vertex) {
+            *word = update as i32;
+        }
+        self.present += 1;
+        Ok(UpdateId(update))
+    }
+
+    /// What can be told of an update by itself.
+    fn check(&self, update: u32, split: &VertexSplit<'_>) -> Result<(), UpdateError> {
         let fits = |offset: i32, bits: u32| offset.unsigned_abs() <= 1 << bits;
         // A guess may be as wrong as two offsets differ.
         let spare = u32::from(self.is_coded);
@@ -129,27 +212,145 @@ impl EdgeMt {
         if !on_lattice {
             return Err(UpdateError::OffLattice { update });
         }
-        if !self.errors.push(split.errors) {
-            return Err(UpdateError::Error { update });
-        }
-        self.split_of[vertex as usize] = update;
-        self.split_of.extend([NONE, NONE]);
-        self.vertex_of.push(vertex);
-        self.offsets.push(split.offset);
-        self.field_offsets.extend_from_slice(split.field_offsets);
-        self.masks.push(split.mask);
-        Ok(UpdateId(update))
+        if split.errors.len() == self.info.fields.len() { Ok(()) } else { Err(UpdateError::Error { update }) }
     }
 
-    /// Tells that no update which is still to come has a larger error than this; until then, any may come. Means
-    /// nothing once all are here.
+    /// A page that begins with update `first`.
+    fn new_page(&self, first: u32) -> Page {
+        let most = self.info.updates.saturating_sub(first).min(1 << self.page_bits) as usize;
+        Page {
+            words: Vec::with_capacity(most * self.record.len),
+            errors: Errors::with_capacity(self.info.fields.len(), most),
+        }
+    }
+
+    /// Adds all updates of a page, of any that is not here. The pages on which it depends must be here; those that follow
+    /// from the vertices that it splits are looked for, others are the caller's to know.
+    ///
+    /// # Errors
+    /// If the page is not a whole one of this MT, is here already, depends on a page that is not, or has an update that
+    /// [`EdgeMt::push`] would refuse. The MT is as it was then.
+    pub fn insert_page(&mut self, page: u32, splits: &[VertexSplit<'_>]) -> Result<(), PageError> {
+        let updates = self.page_updates(page);
+        if updates.is_empty() {
+            return Err(PageError::Beyond { page });
+        }
+        if self.pages.get(page as usize).is_some_and(Option::is_some) {
+            return Err(PageError::Present { page });
+        }
+        if splits.len() != updates.len() {
+            return Err(PageError::Length { page, expected: updates.len() as u32 });
+        }
+        let mut new = self.new_page(updates.start);
+        for (update, split) in updates.clone().zip(splits) {
+            self.check(update, split)?;
+            self.check_vertex(page, update, split.vertex)?;
+            if !new.errors.push(split.errors) {
+                return Err(UpdateError::Error { update }.into());
+            }
+            self.record.push(&mut new.words, split);
+        }
+        if page as usize >= self.pages.len() {
+            self.pages.resize_with(page as usize + 1, || None);
+        }
+        self.pages[page as usize] = Some(new);
+        self.present += updates.len() as u32;
+        for (k, (update, split)) in updates.zip(splits).enumerate() {
+            match self.split_word(split.vertex) {
+                Some(word) if *word == WHOLE => *word = update as i32,
+                _ => {
+                    self.drop_page(page, &splits[..k]);
+                    return Err(UpdateError::Vertex { update, vertex: split.vertex.0 }.into());
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether the vertex that an update of a new page splits is, or is going to be, there before it.
+    fn check_vertex(&self, page: u32, update: u32, vertex: VertexId) -> Result<(), PageError> {
+        let Some(creator) = self.created_by(vertex) else { return Ok(()) };
+        let other = creator.0 >> self.page_bits;
+        if creator.0 >= update {
+            return Err(UpdateError::Vertex { update, vertex: vertex.0 }.into());
+        }
+        if other == page || self.has(creator) { Ok(()) } else { Err(PageError::Needs { page, other }) }
+    }
+
+    /// Takes the updates of a page away, none of which may be applied to a mesh that is still in use; that mesh must have
+    /// been told before, by [`Front::leave`](crate::refine::Front::leave). What depends on the page must have gone before.
+    ///
+    /// # Errors
+    /// If the page is not here, or another one that is splits a vertex of it. The MT is as it was then.
+    pub fn remove_page(&mut self, page: u32) -> Result<(), PageError> {
+        let Some(Some(leaving)) = self.pages.get(page as usize) else {
+            return Err(PageError::Absent { page });
+        };
+        let splits = leaving.words.chunks(self.record.len).flat_map(|words| &words[SPLITS..MASK]);
+        let mut others = splits.filter(|split| **split != WHOLE).map(|split| *split as u32 >> self.page_bits);
+        if let Some(other) = others.find(|other| *other != page) {
+            return Err(PageError::Needed { page, other });
+        }
+        let vertices = leaving.words.chunks(self.record.len).map(|words| VertexId(words[VERTEX] as u32));
+        let vertices: Vec<VertexId> = vertices.collect();
+        vertices.into_iter().for_each(|v| self.unsplit(v));
+        self.forget_page(page);
+        Ok(())
+    }
+
+    /// Takes a page away of which so many splits have been noted.
+    fn drop_page(&mut self, page: u32, noted: &[VertexSplit<'_>]) {
+        noted.iter().for_each(|split| self.unsplit(split.vertex));
+        self.forget_page(page);
+    }
+
+    fn unsplit(&mut self, vertex: VertexId) {
+        if let Some(word) = self.split_word(vertex) {
+            *word = WHOLE;
+        }
+    }
+
+    fn forget_page(&mut self, page: u32) {
+        if let Some(gone) = self.pages[page as usize].take() {
+            self.present -= (gone.words.len() / self.record.len) as u32;
+        }
+        while self.pages.last().is_some_and(Option::is_none) {
+            self.pages.pop();
+        }
+    }
+
+    /// Whether update `u` is here.
+    #[inline]
+    pub fn has(&self, u: UpdateId) -> bool {
+        !self.words(u).is_empty()
+    }
+
+    /// How many updates are here.
+    pub fn present(&self) -> u32 {
+        self.present
+    }
+
+    /// Whether the page is here.
+    pub fn has_page(&self, page: u32) -> bool {
+        self.pages.get(page as usize).is_some_and(Option::is_some)
+    }
+
+    /// The updates of page `page`; none if there is no such page.
+    pub fn page_updates(&self, page: u32) -> Range<u32> {
+        let first = u64::from(page) << self.page_bits;
+        let end = u64::from(self.info.updates);
+        first.min(end) as u32..(first + (1 << self.page_bits)).min(end) as u32
+    }
+
+    /// Tells that no update which is not here has a larger error than this; until then, any may have. Means nothing once
+    /// all are here.
     pub fn set_to_come(&mut self, bound: ErrorCode) {
-        self.to_come = if self.updates() == self.info.updates { ErrorCode::MAX } else { bound };
+        self.to_come = if self.present == self.info.updates { ErrorCode::MAX } else { bound };
     }
 
     /// No update that is not here has a larger error.
     pub fn to_come(&self) -> ErrorCode {
-        if self.updates() >= self.info.updates { ErrorCode::ZERO } else { self.to_come }
+        if self.present >= self.info.updates { ErrorCode::ZERO } else { self.to_come }
     }
 
     /// What is known of the MT as a whole.
@@ -162,9 +363,15 @@ impl EdgeMt {
         &self.base
     }
 
-    /// Number of updates so far.
+    /// Number of updates so far, those between them that are not here included.
     pub fn updates(&self) -> u32 {
-        self.vertex_of.len() as u32
+        match self.pages.last() {
+            Some(Some(page)) => {
+                let before = (self.pages.len() - 1) << self.page_bits;
+                (before + page.words.len() / self.record.len) as u32
+            }
+            _ => 0,
+        }
     }
 
     /// Bytes of everything that the MT holds, base mesh and errors included.
@@ -172,40 +379,73 @@ impl EdgeMt {
         let base = size_of_val(&self.base.positions[..])
             + size_of_val(&self.base.values[..])
             + size_of_val(&self.base.tets[..]);
-        let order = size_of_val(&self.split_of[..]) + size_of_val(&self.vertex_of[..]);
-        let nodes = self.offsets.bytes()
-            + size_of_val(&self.field_offsets[..])
-            + size_of_val(&self.masks[..])
-            + self.errors.bytes();
+        let order = size_of_val(&self.base_splits[..]) + size_of_val(&self.pages[..]);
+        let pages = self.pages.iter().flatten();
+        let nodes: usize = pages.map(|page| size_of_val(&page.words[..]) + page.errors.bytes()).sum();
         (base + order + nodes) as u64
     }
 
-    /// The error of update `u`: the largest one of all fields.
     #[inline]
-    pub fn error_of(&self, u: UpdateId) -> ErrorCode {
-        self.errors.largest(u.0 as usize)
+    fn page_of(&self, u: u32) -> Option<&Page> {
+        self.pages.get((u >> self.page_bits) as usize)?.as_ref()
     }
 
-    /// The error of update `u` in each field.
+    /// The place of an update in its page.
+    #[inline]
+    fn place(&self, u: u32) -> usize {
+        (u & ((1 << self.page_bits) - 1)) as usize
+    }
+
+    /// The words of an update; none if it is not here.
+    #[inline]
+    fn words(&self, u: UpdateId) -> &[i32] {
+        let start = self.place(u.0) * self.record.len;
+        let words = self.page_of(u.0).and_then(|page| page.words.get(start..start + self.record.len));
+        words.unwrap_or_default()
+    }
+
+    /// Where it is noted what splits a vertex; none if what creates it is not here.
+    fn split_word(&mut self, v: VertexId) -> Option<&mut i32> {
+        let Some(i) = v.0.checked_sub(self.base_splits.len() as u32) else {
+            return self.base_splits.get_mut(v.0 as usize);
+        };
+        let at = self.place(i / 2) * self.record.len + SPLITS + i as usize % 2;
+        self.pages.get_mut((i / 2 >> self.page_bits) as usize)?.as_mut()?.words.get_mut(at)
+    }
+
+    /// The error of update `u`, the largest one of all fields; [`ErrorCode::ZERO`] if it is not here.
+    #[inline]
+    pub fn error_of(&self, u: UpdateId) -> ErrorCode {
+        self.page_of(u.0).map_or(ErrorCode::ZERO, |page| page.errors.largest(self.place(u.0)))
+    }
+
+    /// The error of update `u` in each field; nothing if it is not here.
     #[inline]
     pub fn errors_of(&self, u: UpdateId) -> &[ErrorCode] {
-        self.errors.of(u.0 as usize)
+        self.page_of(u.0).map_or(&[], |page| page.errors.of(self.place(u.0)))
     }
 
     /// What update `u` does.
     ///
     /// # Panics
-    /// If the MT has no update `u`.
+    /// If the MT has no update `u`, or not here.
     #[inline]
     pub fn split(&self, u: UpdateId) -> VertexSplit<'_> {
-        let (k, fields) = (u.0 as usize, self.info.fields.len());
+        let words = self.words(u);
         VertexSplit {
-            vertex: VertexId(self.vertex_of[k]),
-            offset: self.offsets.get(k),
-            field_offsets: &self.field_offsets[k * fields..][..fields],
-            mask: self.masks[k],
-            errors: self.errors.of(k),
+            vertex: VertexId(words[VERTEX] as u32),
+            offset: self.record.offset(words),
+            field_offsets: &words[OFFSET + self.record.offset..],
+            mask: two(words, MASK),
+            errors: self.errors_of(u),
         }
+    }
+
+    /// `s(v')` and `s(v'')` of the vertices that update `u`, which is here, creates.
+    #[inline]
+    pub(super) fn splits_of_created(&self, u: UpdateId) -> [u32; 2] {
+        let words = self.words(u);
+        [words[SPLITS] as u32, words[SPLITS + 1] as u32]
     }
 
     /// The vertices `v'` and `v''` that update `u` creates.
@@ -224,54 +464,31 @@ impl EdgeMt {
     /// `s(v)`: the update that splits `v`; none for a vertex of the reference mesh (as far as it is known).
     #[inline]
     pub fn split_by(&self, v: VertexId) -> Option<UpdateId> {
-        self.split_of.get(v.0 as usize).filter(|&&s| s != NONE).map(|&s| UpdateId(s))
+        let split = match v.0.checked_sub(self.base_splits.len() as u32) {
+            None => self.base_splits.get(v.0 as usize),
+            Some(i) => self.words(UpdateId(i / 2)).get(SPLITS + i as usize % 2),
+        };
+        split.filter(|&&s| s != WHOLE).map(|&s| UpdateId(s as u32))
     }
-}
-
-/// The offsets of all updates. On lattices of up to [`NARROW_BITS`] bits, three components of 21 bits share a word.
-#[derive(Clone, Debug, PartialEq)]
-enum Offsets {
-    Narrow(Vec<u64>),
-    Wide(Vec<[i32; 3]>),
 }
 
 /// Bits of a component in a shared word: `NARROW_BITS` and the sign.
 const COMPONENT_BITS: u32 = NARROW_BITS + 1;
 
-impl Offsets {
-    fn new(lattice_bits: u32) -> Self {
-        if lattice_bits < NARROW_BITS { Self::Narrow(Vec::new()) } else { Self::Wide(Vec::new()) }
-    }
+/// Three components on a lattice of less than [`NARROW_BITS`] bits in one word.
+fn pack(offset: [i32; 3]) -> u64 {
+    let mask = (1_u64 << COMPONENT_BITS) - 1;
+    let [x, y, z] = offset.map(|d| d as u64 & mask);
+    x | y << COMPONENT_BITS | z << (2 * COMPONENT_BITS)
+}
 
-    fn push(&mut self, offset: [i32; 3]) {
-        match self {
-            Self::Narrow(words) => {
-                let mask = (1_u64 << COMPONENT_BITS) - 1;
-                let [x, y, z] = offset.map(|d| d as u64 & mask);
-                words.push(x | y << COMPONENT_BITS | z << (2 * COMPONENT_BITS));
-            }
-            Self::Wide(offsets) => offsets.push(offset),
-        }
-    }
-
-    #[inline]
-    fn get(&self, k: usize) -> [i32; 3] {
-        match self {
-            // Shifted up to the top of the word and down again, each component brings its sign along.
-            Self::Narrow(words) => [2, 1, 0].map(|above| {
-                let top = words[k] << (64 - 3 * COMPONENT_BITS + above * COMPONENT_BITS);
-                (top as i64 >> (64 - COMPONENT_BITS)) as i32
-            }),
-            Self::Wide(offsets) => offsets[k],
-        }
-    }
-
-    fn bytes(&self) -> usize {
-        match self {
-            Self::Narrow(words) => size_of_val(words.as_slice()),
-            Self::Wide(offsets) => size_of_val(offsets.as_slice()),
-        }
-    }
+#[inline]
+fn unpack(word: u64) -> [i32; 3] {
+    // Shifted up to the top of the word and down again, each component brings its sign along.
+    [2, 1, 0].map(|above| {
+        let top = word << (64 - 3 * COMPONENT_BITS + above * COMPONENT_BITS);
+        (top as i64 >> (64 - COMPONENT_BITS)) as i32
+    })
 }
 
 #[cfg(test)]
@@ -279,15 +496,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn offsets_come_back_from_either_form() {
-        for bits in [1, 8, NARROW_BITS - 1, NARROW_BITS, 30] {
+    fn offsets_come_back_from_a_word() {
+        for bits in [1, 8, NARROW_BITS - 1] {
             let largest = 1_i32 << bits;
             let values = [-largest, 1 - largest, -1, 0, 1, largest - 1, largest];
-            let mut offsets = Offsets::new(bits);
-            let all: Vec<[i32; 3]> =
-                (0..343).map(|i| [values[i % 7], values[i / 7 % 7], values[i / 49]]).collect();
-            all.iter().for_each(|&offset| offsets.push(offset));
-            all.iter().enumerate().for_each(|(k, &offset)| assert_eq!(offsets.get(k), offset));
+            for i in 0..343 {
+                let offset = [values[i % 7], values[i / 7 % 7], values[i / 49]];
+                assert_eq!(unpack(pack(offset)), offset);
+            }
         }
     }
 }

@@ -115,6 +115,7 @@ fn not_a_split(error: ReplayError) -> ConvertError {
         | E::Mask { update }
         | E::Inverted { update }
         | E::Star { update }
+        | E::Missing { update }
         | E::Unannounced { update }
         | E::Error { update } => update,
     };

@@ -12,6 +12,7 @@ use super::BaseMesh;
 use super::BaseMeshError;
 use super::MAX_STAR;
 use super::MtInfo;
+use super::Sparse;
 use super::VertexId;
 use super::insertion::Cavity;
 use super::ring::HALF_CAPACITY;
@@ -47,7 +48,7 @@ pub struct CurrentMesh {
     pub(crate) tets: Vec<[u32; 4]>,
     pub(crate) neighbors: Vec<[u32; 4]>,
     /// The slot of each vertex of the MT, [`NONE`] when it is not in the mesh.
-    pub(crate) slot_of: Vec<u32>,
+    pub(super) slot_of: Sparse<u32>,
     pub(crate) fields: usize,
     /// What the MT knows each tetrahedron by; without entries for kinds of MT that need none.
     tags: Vec<u32>,
@@ -128,6 +129,8 @@ impl CurrentMesh {
         if let Some(v) = incident.iter().position(|&t| t == NONE) {
             return Err(BaseMeshError::Vertex(v as u32));
         }
+        let mut slot_of = Sparse::new(NONE);
+        (0..vertices as u32).for_each(|v| slot_of.set(v, v));
         let mut mesh = Self {
             labels: (0..vertices as u32).map(|vertex| Labels { vertex, split: NONE }).collect(),
             positions: base.positions.clone(),
@@ -135,7 +138,7 @@ impl CurrentMesh {
             incident,
             tets: base.tets.clone(),
             neighbors,
-            slot_of: (0..vertices as u32).collect(),
+            slot_of,
             fields: info.fields.len(),
             tags: Vec::new(),
             place_of: Vec::new(),
@@ -198,6 +201,20 @@ impl CurrentMesh {
             self.proven.resize(word + 1, 0);
         }
         self.proven[word] |= 1 << (u % 64);
+    }
+
+    /// Updates from this one on are to be checked again: what was not known of when they were applied may have to come
+    /// before them.
+    pub(crate) fn forget_proven(&mut self, from: u32) {
+        self.proven.truncate((from as usize).div_ceil(64));
+        if let Some(word) = self.proven.get_mut(from as usize / 64) {
+            *word &= (1 << (from % 64)) - 1;
+        }
+    }
+
+    /// Forgets memory of vertices that are not in the mesh.
+    pub(super) fn forget_vertices(&mut self, vertices: Range<u32>) {
+        self.slot_of.forget(vertices);
     }
 
     /// Gives every tetrahedron a tag: `tags` says which.
@@ -278,7 +295,7 @@ impl CurrentMesh {
             + size_of_val(&self.marks[..])
             + size_of_val(&self.free_tets[..])
             + size_of_val(&self.touched[..]);
-        let of_the_mt = size_of_val(&self.slot_of[..])
+        let of_the_mt = self.slot_of.bytes()
             + size_of_val(&self.place_of[..])
             + size_of_val(&self.proven[..])
             + size_of_val(&self.pinched[..])
@@ -331,7 +348,7 @@ impl CurrentMesh {
     /// The slot of a vertex of the MT, if it is in the mesh.
     #[inline]
     pub fn slot(&self, vertex: VertexId) -> Option<u32> {
-        self.slot_of.get(vertex.0 as usize).copied().filter(|&s| s != NONE)
+        Some(self.slot_of.get(vertex.0)).filter(|&s| s != NONE)
     }
 
     /// Moves the last entries into the holes that coarsening left, so that all arrays are packed.
@@ -403,7 +420,7 @@ impl CurrentMesh {
         self.incident[hole as usize] = self.incident[from as usize];
         let fields = self.fields;
         self.levels.copy_within(from as usize * fields..(from as usize + 1) * fields, hole as usize * fields);
-        self.slot_of[self.labels[hole as usize].vertex as usize] = hole;
+        self.slot_of.set(self.labels[hole as usize].vertex, hole);
         self.changed_vertices.mark(hole);
         self.pop_vertex();
         Some([from, hole])
@@ -831,7 +848,7 @@ impl CurrentMesh {
     /// Takes the vertex in a slot, which no tetrahedron has any more, out of the mesh.
     pub(crate) fn remove_vertex(&mut self, slot: u32) {
         let vertex = self.labels[slot as usize].vertex;
-        self.slot_of[vertex as usize] = NONE;
+        self.slot_of.set(vertex, NONE);
         self.free_vertex(slot);
     }
 
@@ -840,12 +857,9 @@ impl CurrentMesh {
     pub(crate) fn put_vertex(&mut self, slot: u32, labels: Labels, position: [i32; 3]) {
         let old = std::mem::replace(&mut self.labels[slot as usize], labels).vertex;
         if old != NONE {
-            self.slot_of[old as usize] = NONE;
+            self.slot_of.set(old, NONE);
         }
-        if self.slot_of.len() <= labels.vertex as usize {
-            self.slot_of.resize(labels.vertex as usize + 1, NONE);
-        }
-        self.slot_of[labels.vertex as usize] = slot;
+        self.slot_of.set(labels.vertex, slot);
         self.positions[slot as usize] = position;
         self.changed_vertices.mark(slot);
     }
@@ -853,6 +867,25 @@ impl CurrentMesh {
     #[inline]
     pub(crate) fn touch(&mut self, tets: &[u32]) {
         self.touched.extend_from_slice(tets);
+    }
+
+    /// Touches the tetrahedra around the vertex in `slot`, however many, as far as they hang together through faces.
+    pub(super) fn touch_star(&mut self, slot: u32) {
+        self.next_epoch();
+        let first = self.incident[slot as usize];
+        self.marks[first as usize] = self.epoch << MARK_BITS;
+        let mut next = self.touched.len();
+        self.touched.push(first);
+        while let Some(&t) = self.touched.get(next) {
+            next += 1;
+            let (corner, around) = (corner_of(&self.tets[t as usize], slot), self.neighbors[t as usize]);
+            for (i, n) in around.into_iter().enumerate() {
+                if i != corner && n != NONE && self.marks[n as usize] >> MARK_BITS != self.epoch {
+                    self.marks[n as usize] = self.epoch << MARK_BITS;
+                    self.touched.push(n);
+                }
+            }
+        }
     }
 
     /// Tetrahedra that updates changed since [`CurrentMesh::clear_touched`]; some may be gone.
@@ -915,7 +948,7 @@ impl CurrentMesh {
             return Err("two tetrahedra share a face but are not neighbours".into());
         }
         for (slot, labels) in self.labels.iter().enumerate().filter(|(_, l)| l.vertex != NONE) {
-            if self.slot_of[labels.vertex as usize] != slot as u32 {
+            if self.slot_of.get(labels.vertex) != slot as u32 {
                 return Err(format!("vertex {} is not in its slot {slot}", labels.vertex));
             }
             let t = self.incident[slot];

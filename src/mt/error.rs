@@ -91,6 +91,11 @@ pub enum UpdateError {
         /// The update.
         update: u32,
     },
+    /// The update is not here.
+    Missing {
+        /// The update.
+        update: u32,
+    },
     /// The update depends on one that comes later, or has not an error for each field.
     Error {
         /// The update.
@@ -114,6 +119,7 @@ impl fmt::Display for UpdateError {
                 f,
                 "update {update} meets a star of more than 64 tetrahedra or 32 vertices, or in parts"
             ),
+            Self::Missing { update } => write!(f, "update {update} is not here"),
             Self::Unannounced { update } => write!(f, "update {update} was not announced to the mesh"),
             Self::Error { update } => {
                 write!(f, "update {update} does not come after those it depends on, or lacks errors")
@@ -123,6 +129,76 @@ impl fmt::Display for UpdateError {
 }
 
 impl std::error::Error for UpdateError {}
+
+/// Why a page of updates cannot come or go; the MT is as it was.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum PageError {
+    /// The MT has no such page.
+    Beyond {
+        /// The page.
+        page: u32,
+    },
+    /// The page is here already.
+    Present {
+        /// The page.
+        page: u32,
+    },
+    /// The page is not here.
+    Absent {
+        /// The page.
+        page: u32,
+    },
+    /// The page has another number of updates.
+    Length {
+        /// The page.
+        page: u32,
+        /// Updates that it has.
+        expected: u32,
+    },
+    /// Another page, on which this one depends, is not here.
+    Needs {
+        /// The page.
+        page: u32,
+        /// What it depends on.
+        other: u32,
+    },
+    /// Another page that is here depends on this one.
+    Needed {
+        /// The page.
+        page: u32,
+        /// What depends on it.
+        other: u32,
+    },
+    /// One of the updates cannot be stored.
+    Update(UpdateError),
+}
+
+impl fmt::Display for PageError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Beyond { page } => write!(f, "there is no page {page}"),
+            Self::Present { page } => write!(f, "page {page} is here already"),
+            Self::Absent { page } => write!(f, "page {page} is not here"),
+            Self::Length { page, expected } => {
+                write!(f, "page {page} has {expected} updates, no other number")
+            }
+            Self::Needs { page, other } => {
+                write!(f, "page {page} depends on page {other}, which is not here")
+            }
+            Self::Needed { page, other } => write!(f, "page {other} is here and depends on page {page}"),
+            Self::Update(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for PageError {}
+
+impl From<UpdateError> for PageError {
+    fn from(error: UpdateError) -> Self {
+        Self::Update(error)
+    }
+}
 
 #[cfg(test)]
 mod tests {

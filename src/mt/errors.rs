@@ -13,7 +13,13 @@ pub(super) struct Errors {
 impl Errors {
     /// No updates yet, in an MT of so many fields.
     pub fn new(fields: usize) -> Self {
-        Self { stride: if fields == 1 { 1 } else { fields + 1 }, codes: Vec::new() }
+        Self::with_capacity(fields, 0)
+    }
+
+    /// The same with room for so many updates.
+    pub fn with_capacity(fields: usize, updates: usize) -> Self {
+        let stride = if fields == 1 { 1 } else { fields + 1 };
+        Self { stride, codes: Vec::with_capacity(stride * updates) }
     }
 
     /// Adds those of the next update. False if they are not one for each field.

@@ -36,6 +36,7 @@ use crate::geom::NARROW_BITS;
 use crate::geom::orient3d;
 use crate::mesh::FACES;
 use crate::mesh::NONE;
+use std::ops::Range;
 
 /// "This edge is on the rim: the face behind it is given up."
 const GIVEN_UP: u32 = 0xFF;
@@ -744,18 +745,22 @@ impl MultiTessellation for VertexMt {
         [0; 3]
     }
 
-    fn announce(&self, mesh: &mut CurrentMesh, known: u32) {
-        if known == self.updates() {
+    fn reveal(&self, mesh: &mut CurrentMesh, updates: Range<u32>) {
+        if updates.is_empty() {
             return;
         }
         for t in 0..mesh.tet_slots() as u32 {
             let tag = mesh.tag(t);
             if tag == NONE || tag < FIRST_ANONYMOUS_TAG {
+                if updates.contains(&tag) {
+                    mesh.touch(&[t]);
+                }
                 continue;
             }
             let creator = self.creator(mesh, t);
             if let Some(child) = creator.and_then(|u| self.child(u, tag & !FIRST_ANONYMOUS_TAG)) {
                 mesh.set_tag(t, child.0);
+                mesh.touch(&[t]);
             }
         }
     }

@@ -19,6 +19,7 @@ mod insertion;
 mod predict;
 mod replay;
 mod ring;
+mod sparse;
 mod spelled;
 mod split;
 mod stats;
@@ -34,16 +35,19 @@ pub use check::check_errors;
 pub use collapse::{EdgeMt, MAX_LINK, MAX_STAR, VertexSplit};
 pub use convert::ConvertError;
 pub use current::{CurrentMesh, MeshChanges};
+pub use error::PageError;
 pub use error::{ErrorCode, UpdateError};
 pub use explicit::{ExplicitMt, ExplicitUpdate};
 pub use replay::ReplayError;
 #[cfg(feature = "build")]
 pub(crate) use replay::canonical;
+pub(crate) use sparse::Sparse;
 pub use split::Applied;
 pub use stats::{MtStats, stats};
 pub use vertex::{MAX_AROUND, MAX_INSERTED, MAX_REMOVED, NodeBits, VertexMt};
 
 use crate::geom::Lattice;
+use std::ops::Range;
 
 /// Index of an update (a node of the MT) in coarse-to-fine order: parents come before their children.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -116,6 +120,9 @@ impl FieldInfo {
     }
 }
 
+/// log2 of the updates of a page, unless somebody says otherwise.
+pub const PAGE_BITS: u32 = 10;
+
 /// What is known of an MT before its updates arrive.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MtInfo {
@@ -148,25 +155,44 @@ pub trait MultiTessellation {
     /// The base mesh.
     fn base(&self) -> &BaseMesh;
 
-    /// Number of updates so far; they are `UpdateId(0) .. UpdateId(updates)`, parents before children.
+    /// Number of updates so far; they are `UpdateId(0) .. UpdateId(updates)`, parents before children. Where updates come
+    /// in pages, some of these may not be here: see [`MultiTessellation::has`].
     fn updates(&self) -> u32;
+
+    /// Whether update `u` is here.
+    #[inline]
+    fn has(&self, u: UpdateId) -> bool {
+        u.0 < self.updates()
+    }
+
+    /// How many updates are here.
+    fn present(&self) -> u32 {
+        self.updates()
+    }
+
+    /// The updates of page `page`: those that come and go together.
+    fn page_updates(&self, page: u32) -> Range<u32> {
+        let first = u64::from(page) << PAGE_BITS;
+        let end = u64::from(self.info().updates);
+        first.min(end) as u32..(first + (1 << PAGE_BITS)).min(end) as u32
+    }
 
     /// Whether every update inserts more tetrahedra than it removes: a larger consistent set then has a larger mesh.
     fn always_grows(&self) -> bool;
 
     /// The error `e(u)` of update `u`: bounds that of every tetrahedron `u+` removes, and of every update that depends
     /// on `u`. Numbers say nothing of it. Only a damaged or hostile MT breaks this. With several fields it is the largest
-    /// one of theirs.
+    /// one of theirs. [`ErrorCode::ZERO`] if the update is not here.
     fn error(&self, u: UpdateId) -> ErrorCode;
 
     /// The error of update `u` in each field. Every one of them has the displacement of the boundary in it, and what is
-    /// said of [`MultiTessellation::error`] holds for it alone.
+    /// said of [`MultiTessellation::error`] holds for it alone. Nothing if the update is not here.
     fn errors(&self, u: UpdateId) -> &[ErrorCode];
 
-    /// The error of update `u` in field `field`, which must be one that the MT has.
+    /// The error of update `u` in field `field`; [`ErrorCode::ZERO`] if either is not here.
     #[inline]
     fn error_of_field(&self, u: UpdateId, field: usize) -> ErrorCode {
-        self.errors(u)[field]
+        self.errors(u).get(field).copied().unwrap_or(ErrorCode::ZERO)
     }
 
     /// No update that is not here (yet) has a larger error; [`ErrorCode::ZERO`] if all are.
@@ -245,5 +271,14 @@ pub trait MultiTessellation {
     fn site(&self, mesh: &CurrentMesh, u: UpdateId) -> [i32; 3];
 
     /// Tells the mesh of updates that have arrived since it last knew of `known` of them.
-    fn announce(&self, mesh: &mut CurrentMesh, known: u32);
+    fn announce(&self, mesh: &mut CurrentMesh, known: u32) {
+        self.reveal(mesh, known..self.updates());
+    }
+
+    /// Tells the mesh that these updates have arrived, as far as they are here. The tetrahedra that they remove are among
+    /// the touched ones then.
+    fn reveal(&self, mesh: &mut CurrentMesh, updates: Range<u32>);
+
+    /// Tells the mesh that these updates, none of which is applied, will not be here any more.
+    fn conceal(&self, _: &mut CurrentMesh, _: Range<u32>) {}
 }

@@ -20,6 +20,7 @@ use super::current::Labels;
 use super::taken::Taken;
 use super::taken::faces;
 use crate::mesh::NONE;
+use std::ops::Range;
 
 impl ExplicitMt {
     /// The slots of these tetrahedra, which must all be in the mesh.
@@ -292,7 +293,13 @@ impl MultiTessellation for ExplicitMt {
         [0; 3]
     }
 
-    fn announce(&self, _: &mut CurrentMesh, _: u32) {}
+    fn reveal(&self, mesh: &mut CurrentMesh, updates: Range<u32>) {
+        for t in updates.flat_map(|u| self.removed(UpdateId(u))) {
+            if let Some(slot) = mesh.tagged(*t) {
+                mesh.touch(&[slot]);
+            }
+        }
+    }
 
     fn find_removed(
         &self,

@@ -36,6 +36,7 @@ use super::ring::RING_CAPACITY;
 use super::ring::Ring;
 use super::ring::TURN;
 use crate::mesh::NONE;
+use std::ops::Range;
 
 /// What came of the wish to apply an update.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,6 +54,9 @@ impl EdgeMt {
     /// If the update does not fit the mesh, which only happens to a damaged MT, or if the mesh was not told of it by
     /// [`MultiTessellation::announce`]; the mesh is unchanged then.
     pub(super) fn apply_split(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
+        if !self.has(u) {
+            return Err(UpdateError::Missing { update: u.0 });
+        }
         let split = self.split(u);
         let vertex = split.vertex;
         let Some(p) = mesh.slot(vertex) else {
@@ -194,9 +198,10 @@ impl EdgeMt {
         [p, q]: [u32; 2],
         halves: [[i32; 3]; 2],
     ) {
-        let created = self.created(u);
-        for (slot, vertex, position) in [(p, created[0], halves[0]), (q, created[1], halves[1])] {
-            mesh.put_vertex(slot, self.labels(vertex), position);
+        let (created, splits) = (self.created(u), self.splits_of_created(u));
+        for (i, slot) in [p, q].into_iter().enumerate() {
+            let labels = Labels { vertex: created[i].0, split: splits[i] };
+            mesh.put_vertex(slot, labels, halves[i]);
         }
         for (f, &offset) in split.field_offsets.iter().enumerate() {
             let [at_p, at_q] = [p, q].map(|slot| slot as usize * mesh.fields + f);
@@ -254,7 +259,7 @@ impl EdgeMt {
         let (b, offset) = (mesh.positions[q as usize], split.offset);
         let position = [0, 1, 2].map(|i| b[i] + (offset[i] >> 1));
         let far_vertex = mesh.labels[q as usize].vertex;
-        mesh.slot_of[far_vertex as usize] = NONE;
+        mesh.slot_of.set(far_vertex, NONE);
         mesh.free_vertex(q);
         mesh.put_vertex(p, self.labels(split.vertex), position);
         Ok(Applied::Done)
@@ -269,6 +274,9 @@ impl EdgeMt {
         ring: &mut Ring,
     ) -> Result<Result<[u32; 2], UpdateId>, UpdateError> {
         let update = u.0;
+        if !self.has(u) {
+            return Err(UpdateError::Missing { update });
+        }
         let mut slots = [NONE; 2];
         for (slot, vertex) in slots.iter_mut().zip(self.created(u)) {
             match (mesh.slot(vertex), self.split_by(vertex)) {
@@ -463,6 +471,19 @@ impl MultiTessellation for EdgeMt {
         self.updates()
     }
 
+    #[inline]
+    fn has(&self, u: UpdateId) -> bool {
+        self.has(u)
+    }
+
+    fn present(&self) -> u32 {
+        self.present()
+    }
+
+    fn page_updates(&self, page: u32) -> Range<u32> {
+        self.page_updates(page)
+    }
+
     fn bytes(&self) -> u64 {
         self.bytes()
     }
@@ -503,6 +524,9 @@ impl MultiTessellation for EdgeMt {
         u: UpdateId,
         found: &mut Vec<u32>,
     ) -> Result<(), UpdateError> {
+        if !self.has(u) {
+            return Err(UpdateError::Missing { update: u.0 });
+        }
         find_star(mesh, u, self.split(u).vertex, found)
     }
 
@@ -565,11 +589,24 @@ impl MultiTessellation for EdgeMt {
         [0; 3]
     }
 
-    fn announce(&self, mesh: &mut CurrentMesh, known: u32) {
-        for u in (known..self.updates()).map(UpdateId) {
+    fn reveal(&self, mesh: &mut CurrentMesh, updates: Range<u32>) {
+        for u in updates.map(UpdateId).filter(|u| self.has(*u)) {
             if let Some(slot) = mesh.slot(self.split(u).vertex) {
                 mesh.labels[slot as usize].split = u.0;
+                mesh.touch_star(slot);
             }
+        }
+    }
+
+    fn conceal(&self, mesh: &mut CurrentMesh, updates: Range<u32>) {
+        for u in updates.clone().map(UpdateId).filter(|u| self.has(*u)) {
+            if let Some(slot) = mesh.slot(self.split(u).vertex) {
+                mesh.labels[slot as usize].split = NONE;
+            }
+        }
+        if !updates.is_empty() {
+            let [first, end] = [updates.start, updates.end].map(|u| self.created(UpdateId(u))[0].0);
+            mesh.forget_vertices(first..end);
         }
     }
 }

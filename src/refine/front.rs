@@ -46,8 +46,6 @@ pub struct Front {
     pub(super) leaves: Waiting,
     /// Updates that tetrahedra ask for, the first one last, each with the tetrahedron and for how long that asks.
     pending: Vec<Asked>,
-    /// Tetrahedra whose update may not have arrived yet.
-    unknown: Vec<u32>,
     pub(super) ranked: Ranked,
 }
 
@@ -115,6 +113,18 @@ pub struct Outcome {
     pub excess: f64,
     /// Whether the mesh is what was asked for; false when the budget did not allow it, or data is missing.
     pub satisfied: bool,
+    /// Whether data is missing: some tetrahedron violates the request as far as is known, and what may remove it is not here.
+    pub missing: bool,
+}
+
+/// What violates a criterion.
+struct Violations {
+    /// The largest error that can be left where something is wanted.
+    error: ErrorCode,
+    /// The largest excess; 1 if nothing violates it.
+    excess: f64,
+    /// Whether what may remove one of the tetrahedra is not here.
+    missing: bool,
 }
 
 /// Words of the set of applied updates whose errors are summed up.
@@ -200,7 +210,6 @@ impl Front {
             tets: Waiting::default(),
             leaves: Waiting::default(),
             pending: Vec::new(),
-            unknown: Vec::new(),
             ranked: Ranked::default(),
         })
     }
@@ -230,7 +239,7 @@ impl Front {
     /// not what is reserved for more. The mesh itself has [`CurrentMesh::bytes`].
     pub fn queue_bytes(&self) -> u64 {
         let own =
-            size_of_val(&self.applied[..]) + size_of_val(&self.pending[..]) + size_of_val(&self.unknown[..]);
+            size_of_val(&self.applied[..]) + size_of_val(&self.pending[..]) + size_of_val(&self.chunks[..]);
         own as u64 + self.tets.bytes() + self.leaves.bytes() + self.ranked.bytes()
     }
 
@@ -289,26 +298,60 @@ impl Front {
         self.tets.clear();
         self.leaves.clear();
         self.pending.clear();
-        self.unknown.clear();
     }
 
     /// Takes note of updates that have arrived.
     fn learn(&mut self, mt: &impl MultiTessellation) {
-        if mt.updates() == self.known && !self.applied.is_empty() {
+        if mt.updates() <= self.known && !self.applied.is_empty() {
             return;
         }
-        mt.announce(&mut self.mesh, self.known);
-        self.sum_up(mt, self.known..mt.updates());
-        self.known = mt.updates();
+        let arrived = self.known..mt.updates();
+        self.known = arrived.end;
         self.applied.resize(self.known.div_ceil(64).max(1) as usize, 0);
         self.chunks.resize(self.applied.len().div_ceil(CHUNK_WORDS), [ErrorCode::MAX, ErrorCode::ZERO]);
-        for t in std::mem::take(&mut self.unknown) {
-            self.tets.open(t);
-        }
+        self.take_in(mt, arrived);
+    }
+
+    /// Tells the mesh of updates that have arrived. What they remove is judged again, and nothing else.
+    fn take_in(&mut self, mt: &impl MultiTessellation, updates: Range<u32>) {
+        self.sum_up(mt, updates.clone());
+        mt.reveal(&mut self.mesh, updates);
+        self.open_touched();
+        self.begin_again();
+    }
+
+    /// The goal is another one with what is here now.
+    fn begin_again(&mut self) {
         self.ranked.clear();
         if let Some(goal) = &mut self.goal {
             goal.reached = false;
         }
+    }
+
+    /// Takes note that a page of updates has come to the MT, with all on which it depends. Updates that are not here are no
+    /// updates: a mesh is what was asked for as far as those that are here go. Needs not be told of updates that came by
+    /// `push`, behind all others.
+    pub fn arrived(&mut self, mt: &impl MultiTessellation, page: u32) {
+        let (updates, known) = (mt.page_updates(page), self.known);
+        self.learn(mt);
+        if updates.start < known {
+            self.mesh.forget_proven(updates.start);
+            self.take_in(mt, updates);
+        }
+    }
+
+    /// Gets ready for a page of updates to be taken from the MT, which has to follow at once. False if that must not be, since
+    /// one of them is applied.
+    pub fn leave(&mut self, mt: &impl MultiTessellation, page: u32) -> bool {
+        let updates = mt.page_updates(page);
+        if updates.clone().any(|u| self.contains(UpdateId(u))) {
+            return false;
+        }
+        mt.conceal(&mut self.mesh, updates.clone());
+        self.leaves.forget(updates.clone());
+        self.pending.retain(|asked| !updates.contains(&asked.update.0));
+        self.begin_again();
+        true
     }
 
     /// Takes note of the errors of updates that have arrived.
@@ -622,7 +665,7 @@ impl Front {
                     let (error, errors) = (mt.error(update), mt.errors(update));
                     fetched.push(Open { t, tet, update, error, errors, corners });
                 }
-                None if self.known < mt.info().updates => self.unknown.push(t),
+                // If its update is not here, it is judged when that arrives.
                 None => {}
             }
         }
@@ -777,17 +820,17 @@ impl Front {
 
     /// Works out how good the mesh is, which is packed.
     fn report(&self, mt: &impl MultiTessellation, goal: &mut Goal) {
-        let complete = self.known >= mt.info().updates;
+        let complete = mt.present() >= mt.info().updates;
         let satisfied = goal.budget.is_unlimited() || self.ranked.has_room();
         let criterion = &*goal.criterion;
-        let (error, excess) = if complete && satisfied {
-            (self.within(mt, criterion), 1.0)
+        let Violations { error, excess, missing } = if complete && satisfied {
+            Violations { error: self.within(mt, criterion), excess: 1.0, missing: false }
         } else {
-            self.largest_violation(mt, criterion)
+            self.violations(mt, criterion)
         };
         let satisfied = excess <= 1.0;
         let error = if satisfied { error.max(ErrorCode::ZERO).min(criterion.tolerance()) } else { error };
-        goal.outcome = Outcome { done: true, error, excess, satisfied, ..goal.outcome };
+        goal.outcome = Outcome { done: true, error, excess, satisfied, missing, ..goal.outcome };
     }
 
     /// No update that is not applied, here or not, has a larger error in this field, or in all of them if it is none. What
@@ -823,11 +866,18 @@ impl Front {
         mt: &impl MultiTessellation,
         criterion: &dyn Criterion,
     ) -> (ErrorCode, f64) {
+        let Violations { error, excess, .. } = self.violations(mt, criterion);
+        (error, excess)
+    }
+
+    fn violations(&self, mt: &impl MultiTessellation, criterion: &dyn Criterion) -> Violations {
         let field = criterion.field();
         let to_come = vec![mt.to_come(); mt.info().fields.len()];
-        let mut largest = (ErrorCode::ZERO, 1.0);
+        let incomplete = mt.present() < mt.info().updates;
+        let mut all = Violations { error: ErrorCode::ZERO, excess: 1.0, missing: false };
         for (t, tet) in (0..).zip(self.mesh.tets()) {
             let update = mt.remover(&self.mesh, t);
+            let missing = update.is_none() && incomplete;
             let (error, errors) =
                 update.map_or((mt.to_come(), &to_come[..]), |u| (mt.error(u), mt.errors(u)));
             // The last number there can be: nothing is added to what is wanted.
@@ -835,11 +885,14 @@ impl Front {
             let verdict = see(&self.mesh, tet, error, errors, update, |look| criterion.rank(look));
             if verdict.asks() {
                 let error = field.and_then(|field| errors.get(field)).copied().unwrap_or(error);
-                largest = (largest.0.max(error), f64::max(largest.1, verdict.excess));
+                all.error = all.error.max(error);
+                all.excess = all.excess.max(verdict.excess);
+                all.missing |= missing;
             }
         }
         // What violates nothing is within the tolerance: with several needs, that of another one may be larger.
-        (largest.0.max(self.within(mt, criterion)), largest.1)
+        all.error = all.error.max(self.within(mt, criterion));
+        all
     }
 
     /// The error that is left where nothing violates the criterion.

@@ -7,6 +7,8 @@
 //! priorities in ROAM (Duchaineau et al. 1997) and timing wheels (Varghese and Lauck 1987) are the ideas behind this.
 
 use super::DIALS;
+use crate::mt::Sparse;
+use std::ops::Range;
 
 /// Slacks from 2^-24 to 2^4 are told apart.
 const WHEELS: i32 = 28;
@@ -24,10 +26,10 @@ const OPEN: u16 = u16::MAX - 1;
 const NOWHERE: u16 = u16::MAX;
 
 /// Things, known by number, that wait to be judged again.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Waiting {
     /// The slot of each thing, or [`OPEN`] or [`NOWHERE`].
-    place: Vec<u16>,
+    place: Sparse<u16>,
     /// What waits in each slot of each wheel, with entries that have moved on since.
     slots: Vec<Vec<u32>>,
     /// What is to be judged now; here, too, entries may have moved on.
@@ -36,15 +38,18 @@ pub(super) struct Waiting {
     now: [f64; DIALS],
 }
 
+impl Default for Waiting {
+    fn default() -> Self {
+        Self { place: Sparse::new(NOWHERE), slots: Vec::new(), open: Vec::new(), now: [0.0; DIALS] }
+    }
+}
+
 impl Waiting {
     /// Has thing `id` judged.
     #[inline]
     pub fn open(&mut self, id: u32) {
-        if self.place.len() <= id as usize {
-            self.place.resize(id as usize + 1, NOWHERE);
-        }
-        if self.place[id as usize] != OPEN {
-            self.place[id as usize] = OPEN;
+        if self.place.get(id) != OPEN {
+            self.place.set(id, OPEN);
             self.open.push(id);
         }
     }
@@ -53,8 +58,8 @@ impl Waiting {
     #[inline]
     pub fn next(&mut self) -> Option<u32> {
         while let Some(id) = self.open.pop() {
-            if self.place[id as usize] == OPEN {
-                self.place[id as usize] = NOWHERE;
+            if self.place.get(id) == OPEN {
+                self.place.set(id, NOWHERE);
                 return Some(id);
             }
         }
@@ -75,15 +80,11 @@ impl Waiting {
     #[inline]
     pub fn defer(&mut self, id: u32, slack: f64, dial: u8) {
         let slot = self.slot(slack, usize::from(dial) % DIALS);
-        if self.place.len() <= id as usize {
-            self.place.resize(id as usize + 1, NOWHERE);
-        }
-        let place = &mut self.place[id as usize];
         // If it is there already, that is early enough.
-        if *place == slot {
+        if self.place.get(id) == slot {
             return;
         }
-        *place = slot;
+        self.place.set(id, slot);
         if slot != NOWHERE {
             if self.slots.is_empty() {
                 self.slots.resize(DIALS * DIAL, Vec::new());
@@ -135,7 +136,7 @@ impl Waiting {
     fn flush(&mut self, slot: usize) {
         let mut list = std::mem::take(&mut self.slots[slot]);
         for id in list.drain(..) {
-            if self.place[id as usize] == slot as u16 {
+            if self.place.get(id) == slot as u16 {
                 self.open(id);
             }
         }
@@ -143,6 +144,11 @@ impl Waiting {
         if list.capacity() <= 1 << 12 {
             self.slots[slot] = list;
         }
+    }
+
+    /// Forgets things whose numbers are in a range.
+    pub fn forget(&mut self, range: Range<u32>) {
+        self.place.forget(range);
     }
 
     /// Forgets everything.
@@ -155,7 +161,7 @@ impl Waiting {
     /// Bytes of what there is, not of what is reserved for more.
     pub fn bytes(&self) -> u64 {
         let lists: usize = self.slots.iter().chain([&self.open]).map(Vec::len).sum();
-        (2 * self.place.len() + 4 * lists + size_of_val(&self.slots[..])) as u64
+        (self.place.bytes() + 4 * lists + size_of_val(&self.slots[..])) as u64
     }
 }
 
