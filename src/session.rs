@@ -4,6 +4,7 @@
 //! [`Session::view`] or as a surface with [`Session::isosurface`]. Everything works while the file is still
 //! arriving: a request is then met as far as the updates that are there allow, and made again when more are.
 
+use crate::format::DecodeOptions;
 use crate::format::Decoder;
 use crate::format::FormatError;
 use crate::format::Limits;
@@ -101,7 +102,8 @@ impl Session {
 
     /// [`Session::new`] with other limits than the default ones.
     pub fn with_limits(limits: Limits) -> Self {
-        Self { decoder: Decoder::new(limits), ..Self::default() }
+        let options = DecodeOptions { limits, ..DecodeOptions::default() };
+        Self { decoder: Decoder::new(options), ..Self::default() }
     }
 
     /// Takes in the next bytes of the file, however they were cut.

@@ -32,6 +32,7 @@ mod history;
 mod hole;
 mod insert;
 mod method;
+mod order;
 mod plan;
 mod quantize;
 mod sequence;

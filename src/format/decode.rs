@@ -1,7 +1,11 @@
 //! Bytes of any split to a growing MT.
 
+use super::BlockInfo;
 use super::FormatError;
+use super::Index;
 use super::Limits;
+use super::coder::Models;
+use super::coder::Source;
 use super::header::END_BYTES;
 use super::header::HEAD_BYTES;
 use super::header::HEADER_BYTES;
@@ -10,12 +14,23 @@ use super::header::Kind;
 use super::header::may_be_mt;
 use super::header::parse_header;
 use super::payload;
+use super::payload::BaseParts;
 use super::payload::Metadata;
+use super::payload::edge;
+use super::payload::edge::FieldPart;
+use super::payload::edge::Splits;
 use super::read::Reader;
+use crate::mt::EdgeMt;
+use crate::mt::ErrorCode;
 use crate::mt::Mt;
 use crate::mt::MtInfo;
+use crate::mt::MtKind;
 use crate::mt::MtRef;
 use crate::mt::MultiTessellation;
+use crate::mt::PageError;
+use crate::mt::VertexId;
+use crate::mt::VertexSplit;
+use std::ops::Range;
 
 /// Most bytes that are kept allocated between sections.
 const KEPT_BYTES: usize = 1 << 20;
@@ -50,13 +65,28 @@ enum Stage {
     End,
 }
 
+/// How a file is to be read.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct DecodeOptions {
+    /// What it may take.
+    pub limits: Limits,
+    /// The fields that are wanted, by name; all if none is named. Files of edge-based MTs have every field in sections of
+    /// its own, and those of others need not be fetched; the other kinds come with all fields.
+    pub fields: Vec<String>,
+    /// Whether blocks are going to come by [`Decoder::take_block`], so that not all of them need to fit the limits at
+    /// once.
+    pub in_parts: bool,
+}
+
 /// Turns the bytes of an MT file, pushed in pieces of any size, into an MT that grows section by section.
 ///
 /// Only the section in flight is kept as bytes. Every section's checksum is verified before its content is used.
 /// After an error the MT stays usable as far as it came, and all further bytes give the same error.
+///
+/// The blocks of an edge-based MT may also come in another order, each as a whole: see [`Decoder::take_block`].
 #[derive(Debug)]
 pub struct Decoder {
-    limits: Limits,
+    options: DecodeOptions,
     stage: Stage,
     /// What has arrived of the header, of a head, or of a section.
     buffer: Vec<u8>,
@@ -65,33 +95,113 @@ pub struct Decoder {
     sections: u32,
     /// Over the checksums of all sections.
     chain: crc32fast::Hasher,
-    /// Until the base mesh comes; then it is in the MT.
-    info: Option<MtInfo>,
     metadata: Metadata,
+    head: FileHead,
     mt: Option<Mt>,
+    /// The number of the block that comes next.
+    next_block: u32,
+    block: Option<OpenBlock>,
     failed: Option<FormatError>,
+}
+
+/// What comes in front of the blocks.
+#[derive(Debug, Default)]
+struct FileHead {
+    /// With all fields of the file.
+    info: Option<MtInfo>,
+    /// Which of them are wanted.
+    wanted: Vec<usize>,
+    index: Option<Index>,
+    /// Where the index ends in the file.
+    index_end: u64,
+    models: Option<Models>,
+    /// Until all wanted fields are there; then it is in the MT.
+    base: Option<BaseParts>,
+    /// How many fields' levels of the base mesh have been seen.
+    base_fields: usize,
+}
+
+impl FileHead {
+    /// The description of the MT with the fields that are wanted.
+    fn wanted_info(&self) -> Option<MtInfo> {
+        let info = self.info.as_ref()?;
+        let fields = self.wanted.iter().filter_map(|&f| info.fields.get(f).cloned()).collect();
+        Some(MtInfo { fields, ..info.clone() })
+    }
+
+    /// The place among the wanted fields of a field of the file.
+    fn place(&self, field: usize) -> Option<usize> {
+        self.wanted.iter().position(|&wanted| wanted == field)
+    }
+
+    fn fields(&self) -> usize {
+        self.info.as_ref().map_or(0, |info| info.fields.len())
+    }
+}
+
+impl FileHead {
+    /// Reads the next field of a block.
+    fn read_field(
+        &self,
+        open: &mut OpenBlock,
+        mut content: Reader<'_>,
+        expected: Option<usize>,
+    ) -> Result<(), FormatError> {
+        let [block, field] = [content.varint()?, content.varint()?];
+        let expected = expected.unwrap_or(open.seen);
+        if block != open.block || field as usize != expected {
+            return Err(content.corrupt("a field of a block is missing or repeated"));
+        }
+        open.seen = expected + 1;
+        let (Some(place), Some(models)) = (self.place(expected), &self.models) else { return Ok(()) };
+        let mut source = Source::new(content, models)?;
+        open.fields[place] = Some(edge::read_field(&mut source, open.updates.len() as u32)?);
+        source.end()
+    }
+
+    /// The largest error that an update can have which is not in the MT.
+    fn largest_of_others(&self, mt: &EdgeMt) -> ErrorCode {
+        let Some(index) = &self.index else { return ErrorCode::MAX };
+        let absent = (0..).zip(&index.blocks).filter(|(page, _)| !mt.has_page(*page));
+        let errors = absent.flat_map(|(_, block)| self.wanted.iter().map(|&field| block.errors[field]));
+        errors.max().unwrap_or(ErrorCode::ZERO)
+    }
+}
+
+/// A block of which not all has arrived.
+#[derive(Debug)]
+struct OpenBlock {
+    block: u32,
+    updates: Range<u32>,
+    splits: Splits,
+    /// How many fields have been seen.
+    seen: usize,
+    /// The wanted ones of them.
+    fields: Vec<Option<FieldPart>>,
 }
 
 impl Default for Decoder {
     fn default() -> Self {
-        Self::new(Limits::default())
+        Self::new(DecodeOptions::default())
     }
 }
 
 impl Decoder {
     /// A decoder at the start of a file.
-    pub fn new(limits: Limits) -> Self {
+    pub fn new(options: DecodeOptions) -> Self {
         Self {
-            limits,
+            options,
             stage: Stage::Header,
             buffer: Vec::new(),
             bytes: 0,
             total: None,
             sections: 0,
             chain: crc32fast::Hasher::new(),
-            info: None,
             metadata: Metadata::new(),
+            head: FileHead::default(),
             mt: None,
+            next_block: 0,
+            block: None,
             failed: None,
         }
     }
@@ -134,9 +244,101 @@ impl Decoder {
         self.mt
     }
 
-    /// What the file tells of itself; none before that section is there.
+    /// What the file tells of itself, with all of its fields; none before that section is there.
     pub fn info(&self) -> Option<&MtInfo> {
-        self.mt.as_ref().map(Mt::info).or(self.info.as_ref())
+        self.head.info.as_ref()
+    }
+
+    /// What is in which block; none before that section is there. Errors and ranges are those of all fields of the file.
+    pub fn index(&self) -> Option<&Index> {
+        self.head.index.as_ref()
+    }
+
+    /// The numbers of the fields of the file that the MT has, in its order.
+    pub fn wanted_fields(&self) -> &[usize] {
+        &self.head.wanted
+    }
+
+    /// The bytes of the file that hold a block with the wanted fields, in ranges that do not touch; empty if there is no such
+    /// block.
+    pub fn block_ranges(&self, block: u32) -> Vec<Range<u64>> {
+        let mut ranges: Vec<Range<u64>> = Vec::new();
+        let Some(index) = &self.head.index else { return ranges };
+        let Some(info) = index.blocks.get(block as usize) else { return ranges };
+        let before: u64 = index.blocks[..block as usize].iter().map(BlockInfo::len).sum();
+        let mut at = self.head.index_end + index.shared + before;
+        for (part, &length) in info.lengths.iter().enumerate() {
+            let end = at + u64::from(length);
+            if part == 0 || self.head.place(part - 1).is_some() {
+                match ranges.last_mut() {
+                    Some(last) if last.end == at => last.end = end,
+                    _ => ranges.push(at..end),
+                }
+            }
+            at = end;
+        }
+        ranges
+    }
+
+    /// Takes in a whole block of an edge-based MT: the bytes of [`Decoder::block_ranges`], one after the other. The blocks on
+    /// which it depends must be there. Afterwards no more bytes can be fed in the order of the file.
+    ///
+    /// # Errors
+    /// When the bytes are damaged, or the block cannot be taken now; nothing has changed then.
+    pub fn take_block(&mut self, block: u32, bytes: &[u8]) -> Result<(), FormatError> {
+        let offset = self.block_ranges(block).first().map_or(0, |range| range.start);
+        let corrupt = |what| FormatError::Corrupt { offset, what };
+        let (Some(Mt::Edge(_)), Some(info)) = (&self.mt, self.head.info.as_ref()) else {
+            return Err(corrupt("there is no base mesh that blocks could be added to one by one"));
+        };
+        let (fields, kinds) = (info.fields.len(), [Kind::UPDT, Kind::FLDU]);
+        let mut open = None;
+        let mut rest = bytes;
+        for part in (0..=fields).filter(|&part| part == 0 || self.head.place(part - 1).is_some()) {
+            let at = offset + (bytes.len() - rest.len()) as u64;
+            let Some((head, behind)) = rest.split_first_chunk::<HEAD_BYTES>() else {
+                return Err(corrupt("a block is shorter than the index tells"));
+            };
+            let head = Head::parse(head);
+            let Some((payload, behind)) = behind.split_at_checked(head.length as usize) else {
+                return Err(corrupt("a block is shorter than the index tells"));
+            };
+            if head.kind != kinds[usize::from(part > 0)] || Head::new(head.kind, payload).crc != head.crc {
+                return Err(FormatError::Corrupt {
+                    offset: at,
+                    what: "the checksum of a section does not match",
+                });
+            }
+            let content = Reader::new(payload, at + HEAD_BYTES as u64);
+            if part == 0 {
+                open = Some(self.read_splits(content, Some(block))?);
+            } else if let Some(open) = &mut open {
+                self.head.read_field(open, content, Some(part - 1))?;
+            }
+            rest = behind;
+        }
+        if !rest.is_empty() {
+            return Err(corrupt("a block is longer than the index tells"));
+        }
+        match open {
+            Some(open) => self.insert(open),
+            None => Err(corrupt("a block is shorter than the index tells")),
+        }
+    }
+
+    /// Takes the updates of a block away, none of which may be applied to a mesh.
+    ///
+    /// # Errors
+    /// If the block is not there, or another one depends on it.
+    pub fn drop_block(&mut self, block: u32) -> Result<(), PageError> {
+        match &mut self.mt {
+            Some(Mt::Edge(mt)) => {
+                mt.remove_page(block)?;
+                mt.set_to_come(self.head.largest_of_others(mt));
+                Ok(())
+            }
+            _ => Err(PageError::Absent { page: block }),
+        }
     }
 
     /// The file's free keys and values, in ascending order of the keys; empty before that section is there.
@@ -151,7 +353,7 @@ impl Decoder {
             complete: matches!(self.stage, Stage::End) && self.failed.is_none(),
             bytes: self.bytes,
             total: self.total,
-            updates: self.mt.as_ref().map_or(0, Mt::updates),
+            updates: self.mt.as_ref().map_or(0, Mt::present),
         }
     }
 
@@ -207,7 +409,7 @@ impl Decoder {
         if self.total.is_some_and(|total| end + rest > total) {
             return Err(self.corrupt("a section runs past the end of the file"));
         }
-        let (needed, limit) = (u64::from(head.length), self.limits.section_bytes);
+        let (needed, limit) = (u64::from(head.length), self.options.limits.section_bytes);
         if head.kind.is_known() && needed > limit {
             return Err(FormatError::Limit { what: "one section", needed, limit });
         }
@@ -249,24 +451,23 @@ impl Decoder {
 
     /// Uses a whole, verified section.
     fn open(&mut self, head: Head, content: Reader<'_>) -> Result<(), FormatError> {
-        match (head.kind, &mut self.info, &mut self.mt) {
-            (Kind::INFO, info @ None, None) => {
-                let (found, metadata) = payload::read_info(content)?;
-                // Refuse at once what cannot fit, not after half of it has been fetched.
-                payload::check_memory(&found, 0, 0, &self.limits)?;
-                *info = Some(found);
-                self.metadata = metadata;
+        let out_of_place = || content.corrupt("a section is out of place");
+        match head.kind {
+            Kind::INFO => self.open_info(content)?,
+            Kind::INDX => self.open_index(content)?,
+            Kind::MODL => self.open_models(content)?,
+            Kind::BASE => self.open_base(content)?,
+            Kind::FLDB => self.open_base_field(content)?,
+            Kind::UPDT if self.block.is_none() => {
+                let open = self.read_splits(content, None)?;
+                self.next_block += 1;
+                self.block = Some(open);
             }
-            (Kind::BASE, info @ Some(_), None) => {
-                let Some(info) = info.take() else { return Ok(()) };
-                self.mt = Some(payload::read_base(content, info, &self.limits)?);
-            }
-            (kind, _, Some(mt)) if kind == payload::section_of(mt.info().kind) => {
-                payload::read_updates(content, mt, &self.limits)?;
-            }
-            (Kind::ENDF, _, Some(_)) => return self.end(content),
-            (kind, ..) if kind.is_known() => return Err(content.corrupt("a section is out of place")),
-            (kind, ..) if kind.is_skippable() => {}
+            Kind::FLDU => self.open_field(content)?,
+            Kind::INSV | Kind::EXPL => self.open_columns(head.kind, content)?,
+            Kind::ENDF if self.mt.is_some() && self.block.is_none() => return self.end(content),
+            kind if kind.is_known() => return Err(out_of_place()),
+            kind if kind.is_skippable() => {}
             _ => {
                 let offset = self.bytes - u64::from(head.length) - HEAD_BYTES as u64;
                 let what = "a kind of section that this reader does not know";
@@ -278,9 +479,167 @@ impl Decoder {
         Ok(())
     }
 
+    fn open_info(&mut self, content: Reader<'_>) -> Result<(), FormatError> {
+        if self.head.info.is_some() {
+            return Err(content.corrupt("a section is out of place"));
+        }
+        let (info, metadata) = payload::read_info(content)?;
+        let names = &self.options.fields;
+        if let Some(name) = names.iter().find(|name| !info.fields.iter().any(|field| field.name == **name)) {
+            let known = info.fields.iter().map(|field| field.name.clone()).collect();
+            return Err(FormatError::Field { name: name.clone(), known });
+        }
+        let all = names.is_empty() || info.kind != MtKind::Edge;
+        let is_wanted = |f: &usize| all || names.contains(&info.fields[*f].name);
+        self.head.wanted = (0..info.fields.len()).filter(is_wanted).collect();
+        if !self.options.in_parts {
+            // Refuse at once what cannot fit, not after half of it has been fetched.
+            payload::check_memory(&info, 0, 0, &self.options.limits)?;
+        }
+        self.head.info = Some(info);
+        self.metadata = metadata;
+        Ok(())
+    }
+
+    fn open_index(&mut self, content: Reader<'_>) -> Result<(), FormatError> {
+        let FileHead { info: Some(info), index: index @ None, .. } = &mut self.head else {
+            return Err(content.corrupt("a section is out of place"));
+        };
+        let parts = if info.kind == MtKind::Edge { 1 + info.fields.len() } else { 1 };
+        *index = Some(Index::read(content, info, parts)?);
+        self.head.index_end = self.bytes;
+        Ok(())
+    }
+
+    fn open_models(&mut self, content: Reader<'_>) -> Result<(), FormatError> {
+        let FileHead { index: Some(_), models: models @ None, .. } = &mut self.head else {
+            return Err(content.corrupt("a section is out of place"));
+        };
+        *models = Some(Models::read(content, &payload::families())?);
+        Ok(())
+    }
+
+    fn open_base(&mut self, content: Reader<'_>) -> Result<(), FormatError> {
+        let in_place = self.head.base.is_none() && self.head.base_fields == 0 && self.mt.is_none();
+        let FileHead { info: Some(info), models: Some(models), base, .. } = &mut self.head else {
+            return Err(content.corrupt("a section is out of place"));
+        };
+        if !in_place {
+            return Err(content.corrupt("a section is out of place"));
+        }
+        let limits = if self.options.in_parts { &Limits::NONE } else { &self.options.limits };
+        *base = Some(payload::read_base(content, info, models, limits)?);
+        Ok(())
+    }
+
+    fn open_base_field(&mut self, mut content: Reader<'_>) -> Result<(), FormatError> {
+        let field = self.head.base_fields;
+        let had_base = self.head.base.is_some() || self.mt.is_some();
+        if !had_base || field >= self.head.fields() || content.varint()? as usize != field {
+            return Err(content.corrupt("a section is out of place"));
+        }
+        self.head.base_fields += 1;
+        let is_wanted = self.head.place(field).is_some();
+        if let FileHead { base: Some(base), models: Some(models), .. } = &mut self.head {
+            if is_wanted {
+                base.read_field(content, models)?;
+            }
+        }
+        if self.head.base.as_ref().is_some_and(|base| base.fields() == self.head.wanted.len()) {
+            let bits = self.head.index.as_ref().map_or(0, |index| index.block_bits);
+            if let (Some(base), Some(info)) = (self.head.base.take(), self.head.wanted_info()) {
+                self.mt = Some(base.start(info, bits)?);
+            }
+        }
+        Ok(())
+    }
+
+    /// The updates of a block that comes next, or of the one that is expected.
+    fn next_updates(
+        &self,
+        content: &mut Reader<'_>,
+        expected: Option<u32>,
+    ) -> Result<(u32, Range<u32>), FormatError> {
+        let (Some(index), Some(info)) = (&self.head.index, &self.head.info) else {
+            return Err(content.corrupt("a section is out of place"));
+        };
+        let in_place = self.mt.is_some() && self.head.base_fields == info.fields.len();
+        let block = content.varint()?;
+        if !in_place && expected.is_none() || block != expected.unwrap_or(self.next_block) {
+            return Err(content.corrupt("a block of updates is missing or repeated"));
+        }
+        let updates = index.updates(block, info.updates);
+        if updates.is_empty() {
+            return Err(content.corrupt("there are more updates than the description tells"));
+        }
+        Ok((block, updates))
+    }
+
+    fn read_splits(&self, mut content: Reader<'_>, expected: Option<u32>) -> Result<OpenBlock, FormatError> {
+        let (block, updates) = self.next_updates(&mut content, expected)?;
+        let (Some(Mt::Edge(mt)), Some(models)) = (&self.mt, &self.head.models) else {
+            return Err(content.corrupt("a section is out of place"));
+        };
+        let mut source = Source::new(content, models)?;
+        let splits = edge::read(&mut source, mt, updates.start, updates.len() as u32)?;
+        source.end()?;
+        let fields = self.head.wanted.iter().map(|_| None).collect();
+        Ok(OpenBlock { block, updates, splits, seen: 0, fields })
+    }
+
+    fn open_field(&mut self, content: Reader<'_>) -> Result<(), FormatError> {
+        let Some(mut open) = self.block.take() else {
+            return Err(content.corrupt("a section is out of place"));
+        };
+        self.head.read_field(&mut open, content, None)?;
+        if open.seen < self.head.fields() {
+            self.block = Some(open);
+            return Ok(());
+        }
+        self.insert(open)
+    }
+
+    /// Adds a block that is complete.
+    fn insert(&mut self, open: OpenBlock) -> Result<(), FormatError> {
+        let Some(Mt::Edge(mt)) = &mut self.mt else { return Ok(()) };
+        let OpenBlock { block, splits, fields, .. } = open;
+        let fields: Vec<FieldPart> = fields.into_iter().flatten().collect();
+        let count = splits.vertices.len();
+        let residuals: Vec<i32> =
+            (0..count).flat_map(|k| fields.iter().map(move |field| field.residuals[k])).collect();
+        let errors: Vec<ErrorCode> =
+            (0..count).flat_map(|k| fields.iter().map(move |field| field.errors[k])).collect();
+        let stride = fields.len().max(1);
+        let parts = residuals.chunks(stride).zip(errors.chunks(stride));
+        let all: Vec<VertexSplit<'_>> = (0..count)
+            .zip(parts)
+            .map(|(k, (field_offsets, errors))| VertexSplit {
+                vertex: VertexId(splits.vertices[k]),
+                offset: splits.offsets[k],
+                field_offsets,
+                mask: splits.masks[k],
+                errors,
+            })
+            .collect();
+        mt.insert_page(block, &all)?;
+        mt.set_to_come(self.head.largest_of_others(mt));
+        Ok(())
+    }
+
+    fn open_columns(&mut self, kind: Kind, mut content: Reader<'_>) -> Result<(), FormatError> {
+        let (_, updates) = self.next_updates(&mut content, None)?;
+        match &mut self.mt {
+            Some(mt) if kind == payload::section_of(mt.info().kind) => {
+                self.next_block += 1;
+                payload::read_columns(content, mt, updates.len() as u32, &self.options.limits)
+            }
+            _ => Err(content.corrupt("a section is out of place")),
+        }
+    }
+
     fn end(&mut self, content: Reader<'_>) -> Result<(), FormatError> {
         let totals = payload::read_end(content)?;
-        let updates = self.mt.as_ref().map_or(0, Mt::updates);
+        let updates = self.mt.as_ref().map_or(0, Mt::present);
         let expected = self.info().map_or(0, |info| info.updates);
         if totals.updates != updates || updates != expected {
             return Err(self.corrupt("updates are missing"));

@@ -1,24 +1,46 @@
 //! An MT to bytes: the same MT and options give the same bytes everywhere.
 
-use super::BLOCK_UPDATES;
+use super::coder::Counts;
+use super::coder::Models;
+use super::coder::Writer;
+use super::header::END_BYTES;
+use super::header::HEAD_BYTES;
 use super::header::HEADER_BYTES;
 use super::header::Head;
 use super::header::Kind;
 use super::header::header;
 use super::payload;
 use super::payload::Totals;
+use super::payload::edge;
+use super::payload::index::Index;
+use super::payload::index::MAX_BLOCK_BITS;
+use super::payload::index::MIN_BLOCK_BITS;
+use super::survey::Survey;
+use super::write;
 use crate::mt::BaseMeshError;
 use crate::mt::MtRef;
+use crate::mt::UpdateError;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::io;
 
 /// What goes into a file besides the MT.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EncodeOptions {
+    /// log2 of the updates of a block, 4 to 16: the least that a client can fetch of the file by itself.
+    pub block_bits: u32,
     /// Free keys and values, kept as they are. What is here makes the bytes: leave out dates and paths.
     pub metadata: BTreeMap<String, String>,
 }
+
+impl Default for EncodeOptions {
+    fn default() -> Self {
+        Self { block_bits: BLOCK_BITS, metadata: BTreeMap::new() }
+    }
+}
+
+/// log2 of the updates of a block, unless the caller says otherwise.
+pub const BLOCK_BITS: u32 = 11;
 
 /// Why an MT cannot be written.
 #[derive(Debug)]
@@ -31,6 +53,13 @@ pub enum EncodeError {
         /// Updates that the description tells.
         expected: u32,
     },
+    /// No block can have so many updates.
+    Blocks {
+        /// log2 of the updates asked for.
+        bits: u32,
+    },
+    /// An update of the MT cannot be applied.
+    Update(UpdateError),
     /// Something is longer than the file can say.
     TooLong {
         /// What it is.
@@ -49,6 +78,8 @@ impl fmt::Display for EncodeError {
                 f,
                 "the MT has {updates} of the {expected} updates that its description tells; write it when it is complete"
             ),
+            Self::Blocks { bits } => write!(f, "a block cannot hold 2^{bits} updates; choose 4 to 16"),
+            Self::Update(error) => write!(f, "the MT is damaged: {error}"),
             Self::TooLong { what } => write!(f, "{what} is too long for an MT file; shorten it"),
             Self::Base(_) => f.write_str("the MT cannot be written"),
             Self::Write(_) => f.write_str("the MT file could not be written"),
@@ -76,7 +107,7 @@ pub fn encode<'a>(mt: impl Into<MtRef<'a>>, options: &EncodeOptions) -> Result<V
     Ok(bytes)
 }
 
-/// Writes an MT file, section by section: it is never in memory as a whole. Returns its size in bytes.
+/// Writes an MT file. Returns its size in bytes.
 ///
 /// # Errors
 /// As [`encode`], and when `writer` fails.
@@ -86,26 +117,41 @@ pub fn encode_to<'a>(
     writer: &mut dyn io::Write,
 ) -> Result<u64, EncodeError> {
     let mt = mt.into();
-    check(mt)?;
-    // The header tells the size of all, so everything is encoded twice: that is cheaper than keeping it.
-    let mut total = HEADER_BYTES as u64;
-    sections(mt, options, &mut |head, payload| {
-        total += head.len() as u64 + payload.len() as u64;
-        Ok(())
-    })?;
-    writer.write_all(&header(total)).map_err(EncodeError::Write)?;
-    sections(mt, options, &mut |head, payload| {
-        writer.write_all(head).and_then(|()| writer.write_all(payload))
-    })?;
+    check(mt, options)?;
+    let Survey { blocks, coded } = Survey::of(mt, options.block_bits)?;
+    let mt = coded.as_ref().map_or(mt, MtRef::Edge);
+    let mut index = Index { block_bits: options.block_bits, shared: 0, blocks };
+    index.round(mt.info());
+    let sections = sections(mt, &options.metadata, &mut index)?;
+    let mut total = HEADER_BYTES as u64 + END_BYTES as u64;
+    let mut totals = Totals { updates: mt.updates(), sections: sections.len() as u32, crc: 0 };
+    let mut chain = crc32fast::Hasher::new();
+    for section in &sections {
+        total += section.len();
+        chain.update(&section.head.crc.to_le_bytes());
+    }
+    totals.crc = chain.finalize();
+    let mut end = Vec::new();
+    payload::write_end(&mut end, totals);
+    let end = Section::new(Kind::ENDF, end)?;
+    let mut put = |bytes: &[u8]| writer.write_all(bytes).map_err(EncodeError::Write);
+    put(&header(total))?;
+    for section in sections.iter().chain([&end]) {
+        put(&section.head.to_bytes())?;
+        put(&section.payload)?;
+    }
     writer.flush().map_err(EncodeError::Write)?;
     Ok(total)
 }
 
 /// What a decoder would refuse must not be written.
-fn check(mt: MtRef<'_>) -> Result<(), EncodeError> {
+fn check(mt: MtRef<'_>, options: &EncodeOptions) -> Result<(), EncodeError> {
+    if !(MIN_BLOCK_BITS..=MAX_BLOCK_BITS).contains(&options.block_bits) {
+        return Err(EncodeError::Blocks { bits: options.block_bits });
+    }
     let info = mt.info();
-    if mt.updates() != info.updates {
-        return Err(EncodeError::Incomplete { updates: mt.updates(), expected: info.updates });
+    if mt.updates() != info.updates || mt.present() != info.updates {
+        return Err(EncodeError::Incomplete { updates: mt.present(), expected: info.updates });
     }
     mt.base().check(info).map_err(EncodeError::Base)?;
     payload::check_counts(info, mt.base().positions.len() as u64)
@@ -113,40 +159,118 @@ fn check(mt: MtRef<'_>) -> Result<(), EncodeError> {
         .map_err(EncodeError::Base)
 }
 
-/// Takes the head and the payload of a section.
-type Sink<'a> = &'a mut dyn FnMut(&[u8], &[u8]) -> io::Result<()>;
+/// A section that is ready to be written.
+struct Section {
+    head: Head,
+    payload: Vec<u8>,
+}
 
-/// Gives all sections to `sink`, in order.
-fn sections(mt: MtRef<'_>, options: &EncodeOptions, sink: Sink<'_>) -> Result<(), EncodeError> {
-    let mut totals = Totals { updates: mt.updates(), sections: 0, crc: 0 };
-    let mut chain = crc32fast::Hasher::new();
-    let mut put = |kind, payload: &mut Vec<u8>| {
-        if u32::try_from(payload.len()).is_err() {
+impl Section {
+    fn new(kind: Kind, payload: Vec<u8>) -> Result<Self, EncodeError> {
+        if u32::try_from(payload.len() + HEAD_BYTES).is_err() {
             return Err(EncodeError::TooLong { what: "a section of more than 4 GiB" });
         }
-        let head = Head::new(kind, payload);
-        if kind != Kind::ENDF {
-            chain.update(&head.crc.to_le_bytes());
-            totals.sections += 1;
-        }
-        sink(&head.to_bytes(), payload).map_err(EncodeError::Write)?;
-        payload.clear();
-        totals.crc = chain.clone().finalize();
-        Ok(totals)
-    };
-    let mut payload = Vec::new();
-    payload::write_info(&mut payload, mt.info(), &options.metadata)?;
-    put(Kind::INFO, &mut payload)?;
-    payload::write_base(&mut payload, mt);
-    let mut totals = put(Kind::BASE, &mut payload)?;
-    let mut first = 0;
-    while first < mt.updates() {
-        let end = mt.updates().min(first + BLOCK_UPDATES);
-        payload::write_updates(&mut payload, mt, first, end);
-        totals = put(payload::section_of(mt.info().kind), &mut payload)?;
-        first = end;
+        Ok(Self { head: Head::new(kind, &payload), payload })
     }
-    payload::write_end(&mut payload, totals);
-    put(Kind::ENDF, &mut payload)?;
+
+    /// A section that begins with some bytes, the rest of which is coded.
+    fn coded(
+        kind: Kind,
+        head: &[u32],
+        models: &Models,
+        put: impl FnOnce(&mut Writer<'_>),
+    ) -> Result<Self, EncodeError> {
+        let mut payload = Vec::new();
+        head.iter().for_each(|&number| write::varint(&mut payload, u64::from(number)));
+        let mut writer = Writer::new(models);
+        put(&mut writer);
+        writer.finish(&mut payload);
+        Self::new(kind, payload)
+    }
+
+    /// Bytes with the head.
+    fn len(&self) -> u64 {
+        (HEAD_BYTES + self.payload.len()) as u64
+    }
+}
+
+/// All sections but the last. Lengths are entered into the index.
+fn sections(
+    mt: MtRef<'_>,
+    metadata: &BTreeMap<String, String>,
+    index: &mut Index,
+) -> Result<Vec<Section>, EncodeError> {
+    let fields = mt.info().fields.len();
+    let models = Models::new(&count(mt, index));
+    let mut shared = Vec::new();
+    let mut payload = Vec::new();
+    models.write(&mut payload);
+    shared.push(Section::new(Kind::MODL, payload)?);
+    let mut payload = Vec::new();
+    payload::write_base_head(&mut payload, mt);
+    let mut writer = Writer::new(&models);
+    payload::put_base(&mut writer, mt);
+    writer.finish(&mut payload);
+    shared.push(Section::new(Kind::BASE, payload)?);
+    for field in 0..fields {
+        shared.push(Section::coded(Kind::FLDB, &[field as u32], &models, |out| {
+            payload::put_base_field(out, mt, field);
+        })?);
+    }
+    index.shared = shared.iter().map(Section::len).sum();
+    let mut blocks = Vec::new();
+    for block in 0..index.blocks.len() {
+        let before = blocks.len();
+        put_block(mt, block as u32, index, &models, &mut blocks)?;
+        index.blocks[block].lengths = blocks[before..].iter().map(|section| section.len() as u32).collect();
+    }
+    let mut payload = Vec::new();
+    payload::write_info(&mut payload, mt.info(), metadata)?;
+    let info = Section::new(Kind::INFO, payload)?;
+    let mut payload = Vec::new();
+    index.write(&mut payload, mt.info());
+    let index = Section::new(Kind::INDX, payload)?;
+    Ok([info, index].into_iter().chain(shared).chain(blocks).collect())
+}
+
+/// How often each symbol of a file occurs.
+fn count(mt: MtRef<'_>, index: &Index) -> Counts {
+    let mut counts = Counts::default();
+    payload::put_base(&mut counts, mt);
+    let fields = mt.info().fields.len();
+    (0..fields).for_each(|field| payload::put_base_field(&mut counts, mt, field));
+    if let MtRef::Edge(mt) = mt {
+        for block in 0..index.blocks.len() as u32 {
+            let updates = index.updates(block, mt.updates());
+            edge::put(&mut counts, mt, updates.start, updates.end);
+            (0..fields).for_each(|f| edge::put_field(&mut counts, mt, updates.start, updates.end, f));
+        }
+    }
+    counts
+}
+
+/// Appends the sections of a block.
+fn put_block(
+    mt: MtRef<'_>,
+    block: u32,
+    index: &Index,
+    models: &Models,
+    sections: &mut Vec<Section>,
+) -> Result<(), EncodeError> {
+    let updates = index.updates(block, mt.updates());
+    let MtRef::Edge(edge) = mt else {
+        let mut payload = Vec::new();
+        payload::write_columns(&mut payload, mt, block, updates);
+        sections.push(Section::new(payload::section_of(mt.info().kind), payload)?);
+        return Ok(());
+    };
+    sections.push(Section::coded(Kind::UPDT, &[block], models, |out| {
+        edge::put(out, edge, updates.start, updates.end);
+    })?);
+    for field in 0..mt.info().fields.len() {
+        sections.push(Section::coded(Kind::FLDU, &[block, field as u32], models, |out| {
+            edge::put_field(out, edge, updates.start, updates.end, field);
+        })?);
+    }
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! What can be wrong with an MT file, each with where and what to do.
 
 use crate::mt::BaseMeshError;
+use crate::mt::PageError;
 use crate::mt::UpdateError;
 use std::fmt;
 
@@ -45,6 +46,15 @@ pub enum FormatError {
         /// How much is allowed.
         limit: u64,
     },
+    /// The file has no field of a name that was asked for.
+    Field {
+        /// The name.
+        name: String,
+        /// The names of those that there are.
+        known: Vec<String>,
+    },
+    /// A block does not belong where it was put.
+    Page(PageError),
     /// An update cannot be part of an MT.
     Update(UpdateError),
     /// The base mesh or the description cannot be used.
@@ -81,6 +91,10 @@ impl fmt::Display for FormatError {
                 "the MT file needs {needed} bytes for {what}, {limit} are allowed; raise the limit or build a \
                  smaller file"
             ),
+            Self::Field { name, known } => {
+                write!(f, "the MT file has no field '{name}'; it has: {}", known.join(", "))
+            }
+            Self::Page(error) => write!(f, "the MT file is damaged: {error}; {AGAIN}"),
             Self::Update(error) => write!(f, "the MT file is damaged: {error}; {AGAIN}"),
             Self::Base(error) => write!(f, "the MT file is damaged: {error}; {AGAIN}"),
         }
@@ -93,6 +107,15 @@ impl std::error::Error for FormatError {}
 impl From<UpdateError> for FormatError {
     fn from(error: UpdateError) -> Self {
         Self::Update(error)
+    }
+}
+
+impl From<PageError> for FormatError {
+    fn from(error: PageError) -> Self {
+        match error {
+            PageError::Update(error) => Self::Update(error),
+            error => Self::Page(error),
+        }
     }
 }
 

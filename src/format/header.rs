@@ -5,7 +5,7 @@ use super::FormatError;
 /// First bytes of every MT file. The high bit, CR LF and Ctrl-Z show transfers that meddle with text.
 pub const MAGIC: [u8; 8] = *b"\x89TLOD\r\n\x1a";
 /// Major and minor version of the files that this module writes.
-pub const VERSION: [u16; 2] = [1, 0];
+pub const VERSION: [u16; 2] = [2, 0];
 /// Bytes of the file header.
 pub const HEADER_BYTES: usize = 32;
 /// Bytes of a section's head.
@@ -67,7 +67,11 @@ pub struct Kind(pub [u8; 4]);
 
 impl Kind {
     pub const INFO: Self = Self(*b"INFO");
+    pub const INDX: Self = Self(*b"INDX");
+    pub const MODL: Self = Self(*b"MODL");
     pub const BASE: Self = Self(*b"BASE");
+    pub const FLDB: Self = Self(*b"FLDB");
+    pub const FLDU: Self = Self(*b"FLDU");
     pub const UPDT: Self = Self(*b"UPDT");
     pub const INSV: Self = Self(*b"INSV");
     pub const EXPL: Self = Self(*b"EXPL");
@@ -75,7 +79,9 @@ impl Kind {
 
     /// Whether this reader knows what is in the section.
     pub fn is_known(self) -> bool {
-        [Self::INFO, Self::BASE, Self::UPDT, Self::INSV, Self::EXPL, Self::ENDF].contains(&self)
+        let head = [Self::INFO, Self::INDX, Self::MODL, Self::BASE, Self::FLDB];
+        let blocks = [Self::UPDT, Self::FLDU, Self::INSV, Self::EXPL, Self::ENDF];
+        head.contains(&self) || blocks.contains(&self)
     }
 
     /// Whether a reader that does not know the kind may skip the section.

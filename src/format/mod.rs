@@ -13,12 +13,11 @@ mod header;
 mod limits;
 mod payload;
 mod read;
+mod survey;
 mod write;
 
-pub use decode::{Decoder, Progress};
-pub use encode::{EncodeError, EncodeOptions, encode, encode_to};
+pub use decode::{DecodeOptions, Decoder, Progress};
+pub use encode::{BLOCK_BITS, EncodeError, EncodeOptions, encode, encode_to};
 pub use error::FormatError;
 pub use limits::Limits;
-
-/// Most updates in one block.
-pub const BLOCK_UPDATES: u32 = 512;
+pub use payload::index::{BlockInfo, Index};

@@ -254,4 +254,13 @@ impl MtRef<'_> {
             Self::Explicit(mt) => mt.updates(),
         }
     }
+
+    /// How many updates are here.
+    pub fn present(&self) -> u32 {
+        match self {
+            Self::Edge(mt) => mt.present(),
+            Self::Vertex(mt) => mt.updates(),
+            Self::Explicit(mt) => mt.updates(),
+        }
+    }
 }

@@ -43,6 +43,12 @@ impl ErrorCode {
         if code.error() > error { Self(code.0 - 1) } else { code }
     }
 
+    /// The next code that is a multiple of 256, or this one: an eighth of a power of two or less above. Builders store no
+    /// others, so that an error takes few bits in a file.
+    pub fn coarse(self) -> Self {
+        Self(self.0.checked_next_multiple_of(1 << 8).unwrap_or(u16::MAX))
+    }
+
     /// The error this code stands for.
     pub fn error(self) -> f64 {
         if self.0 == 0 { 0.0 } else { f64::from(f32::from_bits((u32::from(self.0) + BIAS) << DROPPED)) }

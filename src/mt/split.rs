@@ -411,11 +411,12 @@ impl EdgeMt {
 #[cfg(feature = "build")]
 impl CurrentMesh {
     /// Brings the mask of a split from the order of other vertex numbers, which `other` gives, to that of the MT's.
-    /// None if the vertex is not in the mesh or its star is too large.
+    /// The two sides change places if they `turn`. None if the vertex is not in the mesh or its star is too large.
     pub(crate) fn reorder_mask(
         &mut self,
         vertex: VertexId,
         mask: u64,
+        turn: bool,
         other: impl Fn(VertexId) -> u32,
     ) -> Option<u64> {
         let mut star = Star::default();
@@ -437,7 +438,9 @@ impl CurrentMesh {
             order
         };
         let theirs = order(&other);
-        let sides = theirs.iter().enumerate().fold(0_u64, |s, (rank, &(_, i))| s | (mask >> rank & 1) << i);
+        let turn = u64::from(turn);
+        let side = |rank: usize| (mask >> rank & 1) ^ turn;
+        let sides = theirs.iter().enumerate().fold(0_u64, |s, (rank, &(_, i))| s | side(rank) << i);
         let ours = order(&|v: VertexId| v.0);
         Some(ours.iter().enumerate().fold(0_u64, |m, (rank, &(_, i))| m | (sides >> i & 1) << rank))
     }

@@ -116,7 +116,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let BuildResult { mt, summary, .. } = build(arguments, &config, &mesh)?;
     drop(mesh);
     let told = metadata(&config);
-    let options = EncodeOptions { metadata: told.into_iter().map(|(k, v)| (k.into(), v.into())).collect() };
+    let metadata = told.into_iter().map(|(k, v)| (k.into(), v.into())).collect();
+    let options = EncodeOptions { metadata, ..EncodeOptions::default() };
     let file_bytes = files::write_file(&arguments.output, |out| Ok(encode_to(&mt, &options, out)?))?;
     let report = report(&config, &summary, file_bytes, start.elapsed().as_secs_f64(), repaired);
     match arguments {

@@ -53,7 +53,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let from = opened.info()?.kind;
     let converted = opened.mt()?.convert(arguments.kind);
     let mt = converted.with_context(|| arguments.file.display().to_string())?;
-    let options = EncodeOptions { metadata: opened.session.metadata().iter().cloned().collect() };
+    let metadata = opened.session.metadata().iter().cloned().collect();
+    let options = EncodeOptions { metadata, ..EncodeOptions::default() };
     let file_bytes = files::write_file(&arguments.output, |out| Ok(encode_to(&mt, &options, out)?))?;
     let info = mt.info();
     let report = Report {

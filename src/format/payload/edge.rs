@@ -1,22 +1,65 @@
-//! `UPDT`: a block of vertex splits.
+//! `UPDT` of an edge-based MT: a block of vertex splits, and `FLDU`: what they do to one field.
+//!
+//! Nothing here needs a mesh. Masks and field offsets are what is wrong with the guesses made when a split is applied, see
+//! [`EdgeMt::coded`]; vertices are told as a forest: a split is listed with the split in the same block that created its
+//! vertex, or else among the roots.
 
-use super::largest;
-use super::read_errors;
-use super::write_errors;
+use super::base;
 use crate::format::FormatError;
-use crate::format::read::Reader;
-use crate::format::write;
+use crate::format::coder::Family;
+use crate::format::coder::Put;
+use crate::format::coder::Source;
 use crate::mt::BaseMeshError;
 use crate::mt::EdgeMt;
 use crate::mt::ErrorCode;
 use crate::mt::MtInfo;
 use crate::mt::UpdateId;
 use crate::mt::VertexId;
-use crate::mt::VertexSplit;
+use std::collections::BTreeMap;
+
+/// Distances from the vertex of one root to that of the next.
+pub const GAP: Family = base::LAST.numbers_after(1, 1);
+/// The runs that the roots are in.
+pub const RUN: Family = GAP.numbers_after(1, 3);
+/// Which of the two vertices that a split creates are split in the same block.
+pub const CHILDREN: Family = RUN.after(1, 4);
+/// How many runs later that is, beyond the next.
+pub const RISE: Family = CHILDREN.numbers_after(1, 3);
+/// Components of offsets, by the length of the same component one split higher.
+pub const OFFSET: Family = RISE.numbers_after(34, 2);
+/// One more than the last place where a guess of sides is wrong.
+pub const LAST_WRONG: Family = OFFSET.after(1, 65);
+/// Whether the guess is wrong at a place before that.
+pub const WRONG: Family = LAST_WRONG.after(WRONG_ROWS * WRONG_COLUMNS, 2);
+/// How far the upper byte of an error is below the largest of its block, by that of the split before.
+pub const ERROR: Family = WRONG.after(16, 256);
+/// What is wrong with the guess of a field's offset, by error.
+pub const LEVEL: Family = ERROR.numbers_after(128, 1);
+
+const WRONG_ROWS: u32 = 12;
+const WRONG_COLUMNS: u32 = 11;
+
+/// The context for place `place` in front of the last wrong one, `last`.
+fn wrong_context(last: u32, place: u32) -> u32 {
+    let row = match last {
+        0..=8 => last.saturating_sub(1),
+        9..=12 => 8,
+        13..=16 => 9,
+        17..=24 => 10,
+        _ => 11,
+    };
+    let column = match place {
+        0..=7 => place,
+        8..=11 => 8,
+        12..=15 => 9,
+        _ => 10,
+    };
+    row * WRONG_COLUMNS + column
+}
 
 /// Bytes that an update takes in memory.
 pub fn update_bytes(fields: u64) -> u64 {
-    34 + 4 * fields
+    34 + 6 * fields
 }
 
 /// A split turns one vertex into two, and vertex numbers are 32-bit words of which one means "none".
@@ -31,58 +74,227 @@ pub fn check_counts(info: &MtInfo, base_vertices: u64) -> Result<(), BaseMeshErr
     Ok(())
 }
 
-/// Writes the columns of the updates `first .. end`.
-pub fn write(out: &mut Vec<u8>, mt: &EdgeMt, first: u32, end: u32) {
-    let scratch = &mut Vec::new();
-    let splits = || (first..end).map(|k| mt.split(UpdateId(k)));
-    let newest = (mt.base().positions.len() as u32).wrapping_sub(1);
-    write::column(out, scratch, |out| {
-        for (k, split) in (first..end).zip(splits()) {
-            // `push` has checked that the vertex is older than the update.
-            write::varint(out, u64::from(newest.wrapping_add(2 * k).wrapping_sub(split.vertex.0)));
-        }
-    });
-    write::column(out, scratch, |out| {
-        splits().for_each(|split| split.offset.iter().for_each(|&d| write::zigzag(out, d)));
-    });
-    write::column(out, scratch, |out| splits().for_each(|split| write::varint(out, split.mask)));
-    write_errors(out, scratch, splits().map(|split| split.errors));
-    for field in 0..mt.info().fields.len() {
-        write::column(out, scratch, |out| {
-            splits().for_each(|split| write::zigzag(out, split.field_offsets[field]));
-        });
+/// The splits of a block without what they do to fields.
+#[derive(Clone, Debug, Default)]
+pub struct Splits {
+    pub vertices: Vec<u32>,
+    pub offsets: Vec<[i32; 3]>,
+    pub masks: Vec<u64>,
+}
+
+/// What splits of a block do to one field.
+#[derive(Clone, Debug, Default)]
+pub struct FieldPart {
+    pub errors: Vec<ErrorCode>,
+    pub residuals: Vec<i32>,
+}
+
+/// The vertices that splits before the block have created, and those of the base mesh.
+fn vertices_before(mt: &EdgeMt, first: u32) -> u32 {
+    mt.base().positions.len() as u32 + 2 * first
+}
+
+/// For each split of a block the run that it is in: within a run vertices ascend, and none is created in it.
+fn runs(mt: &EdgeMt, first: u32, vertices: &[u32]) -> Vec<u32> {
+    let old = vertices_before(mt, first);
+    let (mut runs, mut run, mut last) = (Vec::with_capacity(vertices.len()), 0, None);
+    for &v in vertices {
+        let is_new_run = last.is_some_and(|last| v <= last)
+            || v.checked_sub(old).is_some_and(|at| runs.get(at as usize / 2) == Some(&run));
+        run += u32::from(is_new_run);
+        last = Some(v);
+        runs.push(run);
+    }
+    runs
+}
+
+/// Puts the splits `first .. end` of a coded MT.
+pub fn put(out: &mut impl Put, mt: &EdgeMt, first: u32, end: u32) {
+    let vertices: Vec<u32> = (first..end).map(|k| mt.split(UpdateId(k)).vertex.0).collect();
+    put_vertices(out, mt, first, &vertices);
+    let leads = |k| mt.split(UpdateId(k)).offset.into_iter().find(|&d| d != 0).is_none_or(|d| d > 0);
+    let all_lead = (first..end).all(leads);
+    out.bits(u32::from(all_lead), 1);
+    for k in first..end {
+        let split = mt.split(UpdateId(k));
+        let above = mt.created_by(split.vertex).map(|u| mt.split(u).offset);
+        put_offset(out, above, split.offset, all_lead);
+        put_mask(out, split.mask);
     }
 }
 
-/// Reads `count` updates into the MT.
-pub fn read(mut reader: Reader<'_>, mt: &mut EdgeMt, count: u32) -> Result<(), FormatError> {
-    let (mut vertices, mut offsets) = (reader.column()?, reader.column()?);
-    let (mut masks, mut errors) = (reader.column()?, reader.column()?);
-    let mut fields = (0..mt.info().fields.len()).map(|_| reader.column()).collect::<Result<Vec<_>, _>>()?;
-    reader.end()?;
-    let mut field_offsets = vec![0; fields.len()];
-    let mut last = vec![ErrorCode::MAX; fields.len()];
+fn put_vertices(out: &mut impl Put, mt: &EdgeMt, first: u32, vertices: &[u32]) {
+    let old = vertices_before(mt, first);
+    let runs = runs(mt, first, vertices);
+    let mut roots: Vec<(u32, u32)> = Vec::new();
+    let mut run_of = BTreeMap::new();
+    for (&v, &run) in vertices.iter().zip(&runs) {
+        if v < old {
+            roots.push((v, run));
+        } else {
+            run_of.insert(v, run);
+        }
+    }
+    roots.sort_unstable();
+    out.bits(roots.len() as u32, 32);
+    let mut next = 0;
+    for (v, run) in roots {
+        out.number(GAP, 0, v - next);
+        out.number(RUN, 0, run);
+        next = v + 1;
+    }
+    for (at, &run) in (0..).zip(&runs) {
+        let children = [0, 1].map(|half| run_of.get(&(old + 2 * at + half)));
+        let mask = u32::from(children[0].is_some()) | u32::from(children[1].is_some()) << 1;
+        out.symbol(CHILDREN, 0, mask);
+        for child in children.into_iter().flatten() {
+            out.number(RISE, 0, child - run - 1);
+        }
+    }
+}
+
+/// The context of one component of an offset, by that of the split above.
+fn offset_context(above: Option<[i32; 3]>, axis: usize) -> u32 {
+    above.map_or(33, |offset| u32::BITS - offset[axis].unsigned_abs().leading_zeros())
+}
+
+fn put_offset(out: &mut impl Put, above: Option<[i32; 3]>, offset: [i32; 3], leads: bool) {
+    let mut has_sign = !leads;
+    for (axis, d) in offset.into_iter().enumerate() {
+        out.number(OFFSET, offset_context(above, axis), d.unsigned_abs());
+        if d != 0 && has_sign {
+            out.bits(u32::from(d < 0), 1);
+        }
+        has_sign |= d != 0;
+    }
+}
+
+fn put_mask(out: &mut impl Put, mask: u64) {
+    let last = u64::BITS - mask.leading_zeros();
+    out.symbol(LAST_WRONG, 0, last);
+    for place in 0..last.saturating_sub(1) {
+        out.symbol(WRONG, wrong_context(last, place), (mask >> place & 1) as u32);
+    }
+}
+
+/// Puts what the splits `first .. end` of a coded MT do to a field.
+pub fn put_field(out: &mut impl Put, mt: &EdgeMt, first: u32, end: u32, field: usize) {
+    let codes = || (first..end).map(|k| mt.split(UpdateId(k)).errors[field].0);
+    let (largest, is_fine) =
+        codes().fold((0, false), |(largest, fine), code| (largest.max(code >> 8), fine || code & 0xFF != 0));
+    out.bits(u32::from(largest), 8);
+    out.bits(u32::from(is_fine), 1);
+    let mut before = 0;
+    for (k, code) in (first..end).zip(codes()) {
+        let fall = u32::from(largest - (code >> 8));
+        out.symbol(ERROR, before, fall);
+        if is_fine {
+            out.bits(u32::from(code & 0xFF), 8);
+        }
+        before = fall;
+        out.signed(LEVEL, u32::from(code >> 9), mt.split(UpdateId(k)).field_offsets[field]);
+    }
+}
+
+/// Reads the splits `first .. first + count`; the blocks in which their vertices were created must be in the MT.
+pub fn read(source: &mut Source<'_>, mt: &EdgeMt, first: u32, count: u32) -> Result<Splits, FormatError> {
+    let mut splits = Splits { vertices: read_vertices(source, mt, first, count)?, ..Splits::default() };
+    let leads = source.bits(1)? == 1;
+    let old = vertices_before(mt, first);
+    for at in 0..splits.vertices.len() {
+        let v = splits.vertices[at];
+        let above = match v.checked_sub(old) {
+            Some(inside) => splits.offsets.get(inside as usize / 2).copied(),
+            None => mt.created_by(VertexId(v)).map(|u| mt.split(u).offset),
+        };
+        let offset = read_offset(source, above, leads)?;
+        splits.offsets.push(offset);
+        splits.masks.push(read_mask(source)?);
+    }
+    Ok(splits)
+}
+
+fn read_vertices(
+    source: &mut Source<'_>,
+    mt: &EdgeMt,
+    first: u32,
+    count: u32,
+) -> Result<Vec<u32>, FormatError> {
+    let old = vertices_before(mt, first);
+    let roots = source.bits(32)?;
+    if roots > count {
+        return Err(source.corrupt("a block has more roots than splits"));
+    }
+    // What is known to come in each run.
+    let mut waiting: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    let mut next = 0_u32;
+    for _ in 0..roots {
+        let v = next.checked_add(source.number(GAP, 0)?).filter(|&v| v < old);
+        let v = v.ok_or_else(|| source.corrupt("an update splits a vertex that is not there yet"))?;
+        waiting.entry(source.number(RUN, 0)?).or_default().push(v);
+        next = v + 1;
+    }
+    let mut vertices = Vec::new();
+    while let Some((run, mut ready)) = waiting.pop_first() {
+        ready.sort_unstable();
+        for v in ready {
+            if vertices.len() as u32 >= count {
+                return Err(source.corrupt("a block has more splits than it tells"));
+            }
+            let created = old + 2 * vertices.len() as u32;
+            vertices.push(v);
+            let children = source.symbol(CHILDREN, 0)?;
+            for half in (0..2).filter(|half| children >> half & 1 == 1) {
+                let rise = source.number(RISE, 0)?;
+                let child = run.checked_add(rise).and_then(|run| run.checked_add(1));
+                let child = child.ok_or_else(|| source.corrupt("a run has too large a number"))?;
+                waiting.entry(child).or_default().push(created + half);
+            }
+        }
+    }
+    if vertices.len() as u32 != count {
+        return Err(source.corrupt("a block has fewer splits than it tells"));
+    }
+    Ok(vertices)
+}
+
+fn read_offset(
+    source: &mut Source<'_>,
+    above: Option<[i32; 3]>,
+    leads: bool,
+) -> Result<[i32; 3], FormatError> {
+    let (mut offset, mut has_sign) = ([0; 3], !leads);
+    for (axis, d) in offset.iter_mut().enumerate() {
+        let size = source.number(OFFSET, offset_context(above, axis))?;
+        let size = i32::try_from(size).map_err(|_| source.corrupt("an offset has more than 32 bits"))?;
+        let is_negative = size != 0 && has_sign && source.bits(1)? == 1;
+        *d = if is_negative { -size } else { size };
+        has_sign |= size != 0;
+    }
+    Ok(offset)
+}
+
+fn read_mask(source: &mut Source<'_>) -> Result<u64, FormatError> {
+    let last = source.symbol(LAST_WRONG, 0)?;
+    let mut mask = if last == 0 { 0 } else { 1 << (last - 1) };
+    for place in 0..last.saturating_sub(1) {
+        mask |= u64::from(source.symbol(WRONG, wrong_context(last, place))?) << place;
+    }
+    Ok(mask)
+}
+
+/// Reads what the `count` splits of a block do to a field.
+pub fn read_field(source: &mut Source<'_>, count: u32) -> Result<FieldPart, FormatError> {
+    let largest = source.bits(8)?;
+    let is_fine = source.bits(1)? == 1;
+    let (mut part, mut before) = (FieldPart::default(), 0);
     for _ in 0..count {
-        read_errors(&mut errors, &mut last)?;
-        for (offset, column) in field_offsets.iter_mut().zip(&mut fields) {
-            *offset = column.zigzag()?;
-        }
-        mt.push(&VertexSplit {
-            vertex: read_vertex(&mut vertices, mt)?,
-            offset: [offsets.zigzag()?, offsets.zigzag()?, offsets.zigzag()?],
-            field_offsets: &field_offsets,
-            mask: masks.varint64()?,
-            errors: &last,
-        })?;
+        let fall = source.symbol(ERROR, before)?;
+        let upper = largest.checked_sub(fall).ok_or_else(|| source.corrupt("an error is below zero"))?;
+        let lower = if is_fine { source.bits(8)? } else { 0 };
+        before = fall;
+        part.errors.push(ErrorCode((upper << 8 | lower) as u16));
+        part.residuals.push(source.signed(LEVEL, upper >> 1)?);
     }
-    mt.set_to_come(largest(&last));
-    [vertices, offsets, masks, errors].into_iter().chain(fields).try_for_each(Reader::end)
-}
-
-/// The vertex that the next update splits, told as its distance from the newest.
-fn read_vertex(column: &mut Reader<'_>, mt: &EdgeMt) -> Result<VertexId, FormatError> {
-    let vertices = mt.base().positions.len() as u32 + 2 * mt.updates();
-    let distance = column.varint()?;
-    let vertex = vertices.checked_sub(1).and_then(|newest| newest.checked_sub(distance));
-    vertex.map(VertexId).ok_or_else(|| column.corrupt("an update splits a vertex that is not there yet"))
+    Ok(part)
 }

@@ -1,14 +1,19 @@
 //! What is in each kind of section: one writer and one reader a kind, side by side. Updates have a file for each kind
 //! of MT.
 
-mod edge;
+mod base;
+pub mod edge;
 mod explicit;
+pub mod index;
 mod vertex;
 
-use super::BLOCK_UPDATES;
 use super::EncodeError;
 use super::FormatError;
 use super::Limits;
+use super::coder::Family;
+use super::coder::Models;
+use super::coder::Put;
+use super::coder::Source;
 use super::header::Kind;
 use super::read::MAX_STRING;
 use super::read::Reader;
@@ -24,8 +29,8 @@ use crate::mt::Mt;
 use crate::mt::MtInfo;
 use crate::mt::MtKind;
 use crate::mt::MtRef;
-use crate::mt::MultiTessellation;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Key and value of each entry, in ascending order of the keys.
 pub type Metadata = Vec<(String, String)>;
@@ -141,59 +146,99 @@ fn read_delta(reader: &mut Reader<'_>, last: &mut i32) -> Result<i32, FormatErro
     Ok(*last)
 }
 
-pub fn write_base(out: &mut Vec<u8>, mt: MtRef<'_>) {
-    let (base, fields) = (mt.base(), mt.info().fields.len());
-    let scratch = &mut Vec::new();
-    write::varint(out, base.positions.len() as u64);
-    write::varint(out, base.tets.len() as u64);
-    write_positions(out, scratch, base.positions.iter().copied());
-    write::column(out, scratch, |out| write_deltas(out, base.tets.iter().flatten().map(|&v| v as i32)));
-    for field in 0..fields {
-        // Levels are stored vertex by vertex; a column has one field of each, from its own place in the first vertex on.
-        let levels = base.values.iter().skip(field).step_by(fields);
-        write::column(out, scratch, |out| write_deltas(out, levels.copied()));
+/// All families of contexts that there are.
+pub fn families() -> Vec<Family> {
+    let edge = [edge::GAP, edge::RUN, edge::CHILDREN, edge::RISE, edge::OFFSET, edge::LAST_WRONG];
+    let rest = [edge::WRONG, edge::ERROR, edge::LEVEL, BASE_LEVEL];
+    base::FAMILIES.into_iter().chain(edge).chain(rest).collect()
+}
+
+/// Differences between the levels of base vertices.
+const BASE_LEVEL: Family = edge::LEVEL.numbers_after(1, 2);
+
+/// Puts what is coded of the base mesh.
+pub fn put_base(out: &mut impl Put, mt: MtRef<'_>) {
+    base::put(out, mt.base());
+}
+
+/// Puts the levels of one field at the base vertices.
+pub fn put_base_field(out: &mut impl Put, mt: MtRef<'_>, field: usize) {
+    let mut last = 0;
+    for &level in mt.base().values.iter().skip(field).step_by(mt.info().fields.len()) {
+        out.signed(BASE_LEVEL, 0, level - last);
+        last = level;
     }
+}
+
+/// Appends what stands in front of the coded part of a `BASE` section.
+pub fn write_base_head(out: &mut Vec<u8>, mt: MtRef<'_>) {
+    write::varint(out, mt.base().positions.len() as u64);
+    write::varint(out, mt.base().tets.len() as u64);
     if let MtRef::Vertex(mt) = mt {
         vertex::write_base(out, mt);
     }
 }
 
-/// Reads the base mesh, which makes an MT without updates.
-pub fn read_base(mut reader: Reader<'_>, info: MtInfo, limits: &Limits) -> Result<Mt, FormatError> {
-    let fields = info.fields.len();
+/// A base mesh whose levels have not all arrived.
+#[derive(Debug, Default)]
+pub struct BaseParts {
+    base: BaseMesh,
+    /// What files of vertex-based MTs tell besides.
+    removers: Vec<u8>,
+    levels: Vec<Vec<i32>>,
+}
+
+/// Reads a `BASE` section.
+pub fn read_base(
+    mut reader: Reader<'_>,
+    info: &MtInfo,
+    models: &Models,
+    limits: &Limits,
+) -> Result<BaseParts, FormatError> {
     let [vertices, tets] = [reader.varint()?, reader.varint()?];
-    check_counts(&info, u64::from(vertices))?;
-    check_memory(&info, u64::from(vertices), u64::from(tets), limits)?;
-    let (mut positions, mut corners) = (reader.column()?, reader.column()?);
-    let mut columns = (0..fields).map(|_| reader.column()).collect::<Result<Vec<_>, _>>()?;
-    let removers = if info.kind == MtKind::Vertex { Some(reader.column()?) } else { None };
-    reader.end()?;
-    // Vectors grow with the bytes that are there: a count alone reserves nothing.
-    let mut base = BaseMesh::default();
-    let mut last = [0; 3];
-    for _ in 0..vertices {
-        last.iter_mut().try_for_each(|x| read_delta(&mut positions, x).map(drop))?;
-        base.positions.push(last);
+    check_counts(info, u64::from(vertices))?;
+    check_memory(info, u64::from(vertices), u64::from(tets), limits)?;
+    let mut parts = BaseParts::default();
+    if info.kind == MtKind::Vertex {
+        parts.removers = reader.column()?.rest().to_vec();
     }
-    let mut last = 0;
-    for _ in 0..tets {
-        let mut corner = || read_delta(&mut corners, &mut last).map(|v| v as u32);
-        base.tets.push([corner()?, corner()?, corner()?, corner()?]);
+    let mut source = Source::new(reader, models)?;
+    parts.base = base::read(&mut source, vertices, tets)?;
+    source.end()?;
+    Ok(parts)
+}
+
+impl BaseParts {
+    /// Fields that have arrived.
+    pub fn fields(&self) -> usize {
+        self.levels.len()
     }
-    let mut levels = vec![0; fields];
-    for _ in 0..vertices {
-        for (level, column) in levels.iter_mut().zip(&mut columns) {
-            read_delta(column, level)?;
+
+    /// Reads the levels of the next field.
+    pub fn read_field(&mut self, reader: Reader<'_>, models: &Models) -> Result<(), FormatError> {
+        let mut source = Source::new(reader, models)?;
+        let (mut levels, mut last) = (Vec::new(), 0_i32);
+        for _ in 0..self.base.positions.len() {
+            last = last.wrapping_add(source.signed(BASE_LEVEL, 0)?);
+            levels.push(last);
         }
-        base.values.extend_from_slice(&levels);
+        source.end()?;
+        self.levels.push(levels);
+        Ok(())
     }
-    [positions, corners].into_iter().chain(columns).try_for_each(Reader::end)?;
-    base.check(&info)?;
-    Ok(match (info.kind, removers) {
-        (MtKind::Edge, _) => EdgeMt::new(info, base).into(),
-        (_, Some(removers)) => vertex::read_base(removers, info, base)?.into(),
-        (_, None) => ExplicitMt::new(info, base).into(),
-    })
+
+    /// The MT without updates, when all levels are there.
+    pub fn start(self, info: MtInfo, block_bits: u32) -> Result<Mt, FormatError> {
+        let Self { mut base, removers, levels } = self;
+        let vertices = base.positions.len();
+        base.values = (0..vertices).flat_map(|v| levels.iter().map(move |levels| levels[v])).collect();
+        base.check(&info)?;
+        Ok(match info.kind {
+            MtKind::Edge => EdgeMt::coded(info, base, block_bits).into(),
+            MtKind::Vertex => vertex::read_base(Reader::new(&removers, 0), info, base)?.into(),
+            MtKind::Explicit => ExplicitMt::new(info, base).into(),
+        })
+    }
 }
 
 /// What a description and a base mesh of so many vertices must be like, by the kind of MT.
@@ -235,31 +280,25 @@ pub fn section_of(kind: MtKind) -> Kind {
     }
 }
 
-/// Writes the updates `first .. end`.
-pub fn write_updates(out: &mut Vec<u8>, mt: MtRef<'_>, first: u32, end: u32) {
-    write::varint(out, u64::from(first));
-    write::varint(out, u64::from(end - first));
+/// What a section of updates begins with: the number of the block, and in sections of one field which.
+fn write_block_head(out: &mut Vec<u8>, block: u32) {
+    write::varint(out, u64::from(block));
+}
+
+/// Appends the shared section of a block of an MT that is not edge-based.
+pub fn write_columns(out: &mut Vec<u8>, mt: MtRef<'_>, block: u32, Range { start, end }: Range<u32>) {
+    write_block_head(out, block);
     match mt {
-        MtRef::Edge(mt) => edge::write(out, mt, first, end),
-        MtRef::Vertex(mt) => vertex::write(out, mt, first, end),
-        MtRef::Explicit(mt) => explicit::write(out, mt, first, end),
+        MtRef::Edge(_) => {}
+        MtRef::Vertex(mt) => vertex::write(out, mt, start, end),
+        MtRef::Explicit(mt) => explicit::write(out, mt, start, end),
     }
 }
 
-/// Reads a block of updates into the MT.
-pub fn read_updates(mut reader: Reader<'_>, mt: &mut Mt, limits: &Limits) -> Result<(), FormatError> {
-    if reader.varint()? != mt.updates() {
-        return Err(reader.corrupt("a block of updates is missing or repeated"));
-    }
-    let count = reader.varint()?;
-    if count == 0 || count > BLOCK_UPDATES {
-        return Err(reader.corrupt("a block holds 1 to 512 updates"));
-    }
-    if count > mt.info().updates.saturating_sub(mt.updates()) {
-        return Err(reader.corrupt("there are more updates than the description tells"));
-    }
+/// Reads what [`write_columns`] writes behind the number of the block.
+pub fn read_columns(reader: Reader<'_>, mt: &mut Mt, count: u32, limits: &Limits) -> Result<(), FormatError> {
     match mt {
-        Mt::Edge(mt) => edge::read(reader, mt, count),
+        Mt::Edge(_) => Ok(()),
         Mt::Vertex(mt) => vertex::read(reader, mt, count, limits),
         Mt::Explicit(mt) => explicit::read(reader, mt, count, limits),
     }

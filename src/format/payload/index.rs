@@ -1,0 +1,176 @@
+//! `INDX`: what is in each block and where, so that a client can fetch just the blocks that it needs.
+
+use crate::format::FormatError;
+use crate::format::read::Reader;
+use crate::format::write;
+use crate::mt::ErrorCode;
+use crate::mt::MtInfo;
+use std::ops::Range;
+
+/// Most blocks that a block may depend on directly, so that an index is not larger than its file.
+const MAX_PARENTS: u32 = 1 << 20;
+
+/// What the index of a file tells of one block of updates.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct BlockInfo {
+    /// Bytes of its sections, heads included: what all fields share, then field by field.
+    pub lengths: Vec<u32>,
+    /// A box on the lattice that holds all tetrahedra that its updates remove or insert: least and largest corner.
+    pub bounds: [[i32; 3]; 2],
+    /// For each field the largest error of its updates, or a little more.
+    pub errors: Vec<ErrorCode>,
+    /// For each field the least and the largest level in the tetrahedra that its updates remove or insert, or a little
+    /// less and more.
+    pub ranges: Vec<[i32; 2]>,
+    /// The blocks that it depends on directly, ascending; all come before it.
+    pub parents: Vec<u32>,
+}
+
+impl BlockInfo {
+    /// Bytes of all its sections.
+    pub fn len(&self) -> u64 {
+        self.lengths.iter().map(|&length| u64::from(length)).sum()
+    }
+
+    /// Whether it has no sections, which no block of a file is like.
+    pub fn is_empty(&self) -> bool {
+        self.lengths.is_empty()
+    }
+}
+
+/// The index of a file.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Index {
+    /// log2 of the updates of a block; the last one may have fewer.
+    pub block_bits: u32,
+    /// Bytes of the sections between the index and the first block.
+    pub shared: u64,
+    /// The blocks, coarse to fine.
+    pub blocks: Vec<BlockInfo>,
+}
+
+impl Index {
+    /// The updates of a block of an MT of so many.
+    pub fn updates(&self, block: u32, updates: u32) -> Range<u32> {
+        let first = u64::from(block) << self.block_bits;
+        let end = u64::from(updates);
+        first.min(end) as u32..(first + (1 << self.block_bits)).min(end) as u32
+    }
+
+    /// Widens what is told of the blocks to what the file can say.
+    pub fn round(&mut self, info: &MtInfo) {
+        let (space, levels) = (shift(info.lattice.bits), info.fields.iter().map(|field| shift(field.bits)));
+        let levels: Vec<u32> = levels.collect();
+        for block in &mut self.blocks {
+            for axis in 0..3 {
+                block.bounds[0][axis] = block.bounds[0][axis] >> space << space;
+                block.bounds[1][axis] = (((block.bounds[1][axis] - 1).max(0) >> space) + 1) << space;
+            }
+            for (range, &level) in block.ranges.iter_mut().zip(&levels) {
+                range[0] = range[0] >> level << level;
+                range[1] = (((range[1] - 1).max(0) >> level) + 1) << level;
+            }
+            for error in &mut block.errors {
+                *error = ErrorCode(error.0.checked_next_multiple_of(1 << 8).unwrap_or(u16::MAX));
+            }
+        }
+    }
+
+    /// Appends the index; [`Index::round`] must have been called.
+    pub fn write(&self, out: &mut Vec<u8>, info: &MtInfo) {
+        out.push(self.block_bits as u8);
+        write::varint(out, self.shared);
+        write::varint(out, self.blocks.len() as u64);
+        let space = shift(info.lattice.bits);
+        for (at, block) in (0..).zip(&self.blocks) {
+            block.lengths.iter().for_each(|&length| write::varint(out, u64::from(length)));
+            let [low, high] = block.bounds;
+            for (low, high) in low.into_iter().zip(high) {
+                write::varint(out, (low >> space) as u64);
+                write::varint(out, ((high - low) >> space) as u64);
+            }
+            for ((field, error), [low, high]) in info.fields.iter().zip(&block.errors).zip(&block.ranges) {
+                out.push(error.0.div_ceil(1 << 8).min(0xFF) as u8);
+                let level = shift(field.bits);
+                write::varint(out, (low >> level) as u64);
+                write::varint(out, ((high - low) >> level) as u64);
+            }
+            // From the newest one back: most are near.
+            write::varint(out, block.parents.len() as u64);
+            let mut next: u32 = at;
+            for &parent in block.parents.iter().rev() {
+                write::varint(out, u64::from(next - 1 - parent));
+                next = parent;
+            }
+        }
+    }
+
+    /// Reads the index of an MT.
+    pub fn read(mut reader: Reader<'_>, info: &MtInfo, parts: usize) -> Result<Self, FormatError> {
+        let block_bits = u32::from(reader.u8()?);
+        if !(MIN_BLOCK_BITS..=MAX_BLOCK_BITS).contains(&block_bits) {
+            return Err(reader.corrupt("a block must hold 2^4 to 2^16 updates"));
+        }
+        let shared = reader.varint64()?;
+        let count = reader.varint()?;
+        if u64::from(count) != u64::from(info.updates).div_ceil(1 << block_bits) {
+            return Err(reader.corrupt("the index does not have as many blocks as there are updates for"));
+        }
+        let mut index = Self { block_bits, shared, blocks: Vec::new() };
+        for at in 0..count {
+            index.blocks.push(read_block(&mut reader, info, parts, at)?);
+        }
+        reader.end()?;
+        Ok(index)
+    }
+}
+
+/// What block sizes may be.
+pub const MIN_BLOCK_BITS: u32 = 4;
+pub const MAX_BLOCK_BITS: u32 = 16;
+
+/// The index tells places on a lattice of so many bits to eight.
+fn shift(bits: u32) -> u32 {
+    bits.saturating_sub(8)
+}
+
+fn read_block(
+    reader: &mut Reader<'_>,
+    info: &MtInfo,
+    parts: usize,
+    at: u32,
+) -> Result<BlockInfo, FormatError> {
+    let mut block = BlockInfo::default();
+    for _ in 0..parts {
+        block.lengths.push(reader.varint()?);
+    }
+    let mut span = |reader: &mut Reader<'_>, bits: u32| -> Result<[i32; 2], FormatError> {
+        let (low, size) = (reader.varint()?, reader.varint()?);
+        let high = u64::from(low) + u64::from(size);
+        if high > 1 << bits.min(8) {
+            return Err(reader.corrupt("a block lies outside its lattice"));
+        }
+        Ok([low, high as u32].map(|x| (x << shift(bits)) as i32))
+    };
+    for axis in 0..3 {
+        let [low, high] = span(reader, info.lattice.bits)?;
+        (block.bounds[0][axis], block.bounds[1][axis]) = (low, high);
+    }
+    for field in &info.fields {
+        let upper = reader.u8()?;
+        block.errors.push(ErrorCode(if upper == 0xFF { u16::MAX } else { u16::from(upper) << 8 }));
+        block.ranges.push(span(reader, field.bits)?);
+    }
+    let count = reader.varint()?;
+    if count > at.min(MAX_PARENTS) {
+        return Err(reader.corrupt("a block depends on more blocks than come before it"));
+    }
+    let mut next = at;
+    for _ in 0..count {
+        let parent = next.checked_sub(1).and_then(|last| last.checked_sub(reader.varint().ok()?));
+        next = parent.ok_or_else(|| reader.corrupt("a block depends on one that does not come before it"))?;
+        block.parents.push(next);
+    }
+    block.parents.reverse();
+    Ok(block)
+}

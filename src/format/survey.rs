@@ -1,0 +1,120 @@
+//! A run through an MT from the base to the reference mesh, for what its file tells of each block.
+
+use super::EncodeError;
+use super::payload::index::BlockInfo;
+use crate::mt::Applied;
+use crate::mt::CurrentMesh;
+use crate::mt::EdgeMt;
+use crate::mt::MtRef;
+use crate::mt::MultiTessellation;
+use crate::mt::UpdateError;
+use crate::mt::UpdateId;
+use crate::mt::VertexSplit;
+use std::collections::BTreeSet;
+
+/// What a run through an MT has found.
+pub struct Survey {
+    /// The blocks of `2^block_bits` updates; their lengths are not known yet.
+    pub blocks: Vec<BlockInfo>,
+    /// An edge-based MT in the form that files have, if it was not in that form.
+    pub coded: Option<EdgeMt>,
+}
+
+impl Survey {
+    pub fn of(mt: MtRef<'_>, block_bits: u32) -> Result<Self, EncodeError> {
+        match mt {
+            MtRef::Edge(mt) => survey_edge(mt, block_bits),
+            MtRef::Vertex(mt) => Ok(Self { blocks: run(mt, block_bits, &mut |_, _| Ok(()))?, coded: None }),
+            MtRef::Explicit(mt) => Ok(Self { blocks: run(mt, block_bits, &mut |_, _| Ok(()))?, coded: None }),
+        }
+    }
+}
+
+fn survey_edge(mt: &EdgeMt, block_bits: u32) -> Result<Survey, EncodeError> {
+    if mt.is_coded() {
+        return Ok(Survey { blocks: run(mt, block_bits, &mut |_, _| Ok(()))?, coded: None });
+    }
+    let mut coded = EdgeMt::coded(mt.info().clone(), mt.base().clone(), block_bits);
+    let mut residuals = Vec::new();
+    let blocks = run(mt, block_bits, &mut |mesh, u| {
+        residuals.clear();
+        let mask = mt.residuals(mesh, u, &mut residuals)?;
+        coded.push(&VertexSplit { mask, field_offsets: &residuals, ..mt.split(u) }).map(drop)
+    })?;
+    Ok(Survey { blocks, coded: Some(coded) })
+}
+
+/// Called before each update with the mesh that has all of its parents.
+type Before<'a> = &'a mut dyn FnMut(&mut CurrentMesh, UpdateId) -> Result<(), UpdateError>;
+
+fn run(
+    mt: &impl MultiTessellation,
+    block_bits: u32,
+    before: Before<'_>,
+) -> Result<Vec<BlockInfo>, EncodeError> {
+    let mut mesh = mt.start().map_err(EncodeError::Base)?;
+    mt.announce(&mut mesh, 0);
+    let mut blocks = Vec::new();
+    let mut first = 0;
+    while first < mt.updates() {
+        let end = mt.updates().min(first + (1 << block_bits));
+        let block = survey_block(mt, &mut mesh, first..end, block_bits, before);
+        blocks.push(block.map_err(EncodeError::Update)?);
+        first = end;
+    }
+    Ok(blocks)
+}
+
+fn survey_block(
+    mt: &impl MultiTessellation,
+    mesh: &mut CurrentMesh,
+    updates: std::ops::Range<u32>,
+    block_bits: u32,
+    before: Before<'_>,
+) -> Result<BlockInfo, UpdateError> {
+    let fields = mt.info().fields.len();
+    let mut block = BlockInfo {
+        bounds: [[i32::MAX; 3], [i32::MIN; 3]],
+        errors: vec![crate::mt::ErrorCode::ZERO; fields],
+        ranges: vec![[i32::MAX, i32::MIN]; fields],
+        ..BlockInfo::default()
+    };
+    let own = updates.start >> block_bits;
+    let mut parents = BTreeSet::new();
+    let mut tets = Vec::new();
+    for u in updates.map(UpdateId) {
+        before(mesh, u)?;
+        for (f, error) in block.errors.iter_mut().enumerate() {
+            *error = (*error).max(mt.error_of_field(u, f));
+        }
+        tets.clear();
+        mt.find_removed(mesh, u, &mut tets)?;
+        parents.extend(tets.iter().filter_map(|&t| mt.creator(mesh, t)).map(|p| p.0 >> block_bits));
+        widen(&mut block, mesh, &tets);
+        match mt.refine(mesh, u)? {
+            Applied::Done => {}
+            Applied::Blocked(_) => return Err(UpdateError::Error { update: u.0 }),
+        }
+        mesh.clear_touched();
+        tets.clear();
+        mt.find_inserted(mesh, u, &mut tets)?;
+        widen(&mut block, mesh, &tets);
+    }
+    parents.remove(&own);
+    block.parents = parents.into_iter().collect();
+    Ok(block)
+}
+
+/// Takes tetrahedra of the mesh into the bounds of a block.
+fn widen(block: &mut BlockInfo, mesh: &CurrentMesh, tets: &[u32]) {
+    for v in tets.iter().filter_map(|&t| mesh.tet(t)).flatten() {
+        let position = mesh.positions()[v as usize];
+        for axis in 0..3 {
+            block.bounds[0][axis] = block.bounds[0][axis].min(position[axis]);
+            block.bounds[1][axis] = block.bounds[1][axis].max(position[axis]);
+        }
+        for (range, &level) in block.ranges.iter_mut().zip(mesh.levels(v)) {
+            *range = [range[0].min(level), range[1].max(level)];
+        }
+    }
+}
