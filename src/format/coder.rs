@@ -284,6 +284,42 @@ impl Models {
     }
 }
 
+/// Adds up what coded symbols and bits take, by the context of the symbol that they belong to.
+#[derive(Debug)]
+pub struct Measure<'a> {
+    models: &'a Models,
+    /// In bits.
+    costs: Vec<f64>,
+    last: usize,
+}
+
+impl<'a> Measure<'a> {
+    pub fn new(models: &'a Models) -> Self {
+        Self { models, costs: vec![0.0; models.0.len()], last: 0 }
+    }
+
+    /// Bits that a family takes.
+    pub fn bits_of(&self, family: Family) -> f64 {
+        let range = family.first as usize..(family.first + family.contexts) as usize;
+        self.costs.iter().enumerate().filter(|(context, _)| range.contains(context)).map(|(_, cost)| cost).sum()
+    }
+}
+
+impl Put for Measure<'_> {
+    fn symbol(&mut self, family: Family, which: u32, symbol: u32) {
+        self.last = family.context(which);
+        let share = (&self.models.0[self.last]).left_cumulative_and_probability(symbol as u16);
+        let share = share.map_or(WHOLE as f64, |(_, share)| f64::from(share.get()));
+        self.costs[self.last] += (f64::from(WHOLE) / share).log2();
+    }
+
+    fn bits(&mut self, _: u32, width: u32) {
+        if let Some(cost) = self.costs.get_mut(self.last) {
+            *cost += f64::from(width);
+        }
+    }
+}
+
 /// Writes a coded section: see [`Source`].
 pub struct Writer<'a> {
     models: &'a Models,

@@ -1,7 +1,9 @@
 //! An MT to bytes: the same MT and options give the same bytes everywhere.
 
 use super::coder::Counts;
+use super::coder::Measure;
 use super::coder::Models;
+use super::coder::Put;
 use super::coder::Writer;
 use super::header::END_BYTES;
 use super::header::HEAD_BYTES;
@@ -236,17 +238,45 @@ fn sections(
 /// How often each symbol of a file occurs.
 fn count(mt: MtRef<'_>, index: &Index) -> Counts {
     let mut counts = Counts::default();
-    payload::put_base(&mut counts, mt);
+    put_all(&mut counts, mt, index.block_bits);
+    counts
+}
+
+/// Puts all that is coded of a file.
+fn put_all(out: &mut impl Put, mt: MtRef<'_>, block_bits: u32) {
+    payload::put_base(out, mt);
     let fields = mt.info().fields.len();
-    (0..fields).for_each(|field| payload::put_base_field(&mut counts, mt, field));
+    (0..fields).for_each(|field| payload::put_base_field(out, mt, field));
     if let MtRef::Edge(mt) = mt {
-        for block in 0..index.blocks.len() as u32 {
-            let updates = index.updates(block, mt.updates());
-            edge::put(&mut counts, mt, updates.start, updates.end);
-            (0..fields).for_each(|f| edge::put_field(&mut counts, mt, updates.start, updates.end, f));
+        let mut first = 0;
+        while first < mt.updates() {
+            let end = mt.updates().min(first + (1 << block_bits));
+            edge::put(out, mt, first, end);
+            (0..fields).for_each(|f| edge::put_field(out, mt, first, end, f));
+            first = end;
         }
     }
-    counts
+}
+
+/// What the coded bytes of the file of an MT tell, part by part: names and bytes. Only for MTs that came from a file.
+pub fn breakdown(mt: MtRef<'_>, block_bits: u32) -> Vec<(&'static str, f64)> {
+    let mut counts = Counts::default();
+    put_all(&mut counts, mt, block_bits);
+    let models = Models::new(&counts);
+    let mut measure = Measure::new(&models);
+    put_all(&mut measure, mt, block_bits);
+    let mut parts: Vec<(&'static str, f64)> = Vec::new();
+    for (name, family) in payload::parts() {
+        let bytes = measure.bits_of(family) / 8.0;
+        match parts.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, sum)) => *sum += bytes,
+            None => parts.push((name, bytes)),
+        }
+    }
+    let mut tables = Vec::new();
+    models.write(&mut tables);
+    parts.push(("tables", tables.len() as f64));
+    parts
 }
 
 /// Appends the sections of a block.

@@ -17,7 +17,7 @@ mod survey;
 mod write;
 
 pub use decode::{DecodeOptions, Decoder, Progress};
-pub use encode::{BLOCK_BITS, EncodeError, EncodeOptions, encode, encode_to};
+pub use encode::{BLOCK_BITS, EncodeError, EncodeOptions, breakdown, encode, encode_to};
 pub use error::FormatError;
 pub use limits::Limits;
 pub use payload::index::{BlockInfo, Index};

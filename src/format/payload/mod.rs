@@ -148,9 +148,25 @@ fn read_delta(reader: &mut Reader<'_>, last: &mut i32) -> Result<i32, FormatErro
 
 /// All families of contexts that there are.
 pub fn families() -> Vec<Family> {
-    let edge = [edge::GAP, edge::RUN, edge::CHILDREN, edge::RISE, edge::OFFSET, edge::LAST_WRONG];
-    let rest = [edge::WRONG, edge::ERROR, edge::LEVEL, BASE_LEVEL];
-    base::FAMILIES.into_iter().chain(edge).chain(rest).collect()
+    parts().into_iter().map(|(_, family)| family).collect()
+}
+
+/// All families, with a name for what they tell.
+pub fn parts() -> Vec<(&'static str, Family)> {
+    let base = base::FAMILIES.into_iter().map(|family| ("base mesh", family));
+    let edge = [
+        ("partial order", edge::GAP),
+        ("partial order", edge::RUN),
+        ("partial order", edge::CHILDREN),
+        ("partial order", edge::RISE),
+        ("offsets", edge::OFFSET),
+        ("masks", edge::LAST_WRONG),
+        ("masks", edge::WRONG),
+        ("errors", edge::ERROR),
+        ("levels", edge::LEVEL),
+        ("base mesh", BASE_LEVEL),
+    ];
+    base.chain(edge).collect()
 }
 
 /// Differences between the levels of base vertices.
