@@ -97,7 +97,7 @@ pub fn bucky(size: u32) -> Result<TetMesh, GenerateError> {
             values.iter_mut().zip(fx).for_each(|(value, fx)| *value += factor * fx);
         }
     }
-    Ok(TetMesh::from_grid(grid, vec![Field { name: "density".into(), values }]))
+    Ok(TetMesh::from_grid(grid, vec![Field::new("density", values)]))
 }
 
 /// The vertices of a truncated icosahedron of radius 0.35 around (0.5, 0.5, 0.5): the cyclic permutations of
@@ -149,11 +149,8 @@ pub fn sphere_flow(size: u32) -> Result<TetMesh, GenerateError> {
     }
     let speed: Vec<f64> = positions.iter().map(|p| flow_speed(*p)).collect();
     let pressure = speed.iter().map(|v| 1.0 - v * v).collect();
-    let fields = vec![
-        Field { name: "pressure".into(), values: pressure },
-        Field { name: "speed".into(), values: speed },
-    ];
-    Ok(TetMesh { positions, fields, tets, grid: None })
+    let fields = vec![Field::new("pressure", pressure), Field::new("speed", speed)];
+    Ok(TetMesh { positions, fields, tets, ..TetMesh::default() })
 }
 
 /// The three tetrahedra of the prism over the outward triangle `t`, between the layers that start at `low` and

@@ -382,7 +382,7 @@ fn ball(count: usize) -> TetMesh {
         }
     }
     let values = positions.iter().map(|[x, y, z]| x * y + 1.0 / (0.2 + z * z)).collect();
-    TetMesh { positions, fields: vec![Field { name: "hill".to_owned(), values }], ..TetMesh::default() }
+    TetMesh { positions, fields: vec![Field::new("hill", values)], ..TetMesh::default() }
 }
 
 /// A legacy file of the points alone, with the cells that `cells` writes.

@@ -21,7 +21,7 @@ fn box_mt(folder: &Folder) -> String {
     let mut mesh = TetMesh::from_grid(grid, Vec::new());
     let mut field = |name: &str, f: fn([f64; 3]) -> f64| {
         let values = mesh.positions.iter().map(|p| f(*p)).collect();
-        mesh.fields.push(Field { name: name.to_owned(), values });
+        mesh.fields.push(Field::new(name, values));
     };
     field("ramp", |[x, y, z]| x + 2.0 * y - z);
     field("hill", |[x, y, z]| 1.0 / (0.1 + (x - 1.0).powi(2) + (y - 0.5).powi(2) + (z - 0.5).powi(2)));

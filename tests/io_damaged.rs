@@ -126,7 +126,7 @@ fn counts_that_lie_do_not_size_anything() {
     }
     assert!(matches!(
         edited("NumberOfComponents=\"2\"", "NumberOfComponents=\"1000000000000\""),
-        ReadReason::Count { .. }
+        ReadReason::TooLarge { .. }
     ));
     for (file, from, to) in [
         (sample_points_vtk(true), "DIMENSIONS 4 3 2", "DIMENSIONS 4000 3000 2000"),

@@ -109,7 +109,7 @@ fn vti_in_pieces_that_overlap() {
     let part = |low: usize, high: usize| {
         let values: Vec<f64> =
             (0..24).filter(|i| (low..=high).contains(&(i % 4))).map(|i| all.fields[0].values[i]).collect();
-        let arrays = vec![Array::new("PointData", "density", "Float32", 1, &values)];
+        let arrays = vec![Array::new("PointData", "density", "Int32", 1, &values)];
         (format!("Extent=\"{low} {high} 0 2 0 1\""), arrays)
     };
     let dataset = "WholeExtent=\"0 3 0 2 0 1\" Origin=\"1 2 -3\" Spacing=\"0.5 1 0.25\"";
@@ -173,8 +173,9 @@ fn legacy_attributes_of_every_kind() {
 
 #[test]
 fn raw_samples_of_every_type() {
-    let mesh = grid_sample();
+    let mut mesh = grid_sample();
     for kind in TYPES {
+        mesh.fields[0].integer = !kind.starts_with("Float");
         for (endian, big) in [("little", false), ("big", true)] {
             let samples = numbers(kind, &mesh.fields[0].values, big);
             let sidecar = sample_sidecar(&kind.to_lowercase(), endian);

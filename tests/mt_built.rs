@@ -24,7 +24,7 @@ fn mesh(domain: Domain, random: &mut Random) -> TetMesh {
     let plain = domain.mesh(random);
     let positions: Vec<[f64; 3]> = plain.positions.iter().map(|p| p.map(f64::from)).collect();
     let values = positions.iter().map(|[x, y, z]| (x / 200.0).sin() + y * z / 1e6).collect();
-    TetMesh { positions, fields: vec![Field { name: "f".into(), values }], tets: plain.tets, grid: None }
+    TetMesh { positions, fields: vec![Field::new("f", values)], tets: plain.tets, ..TetMesh::default() }
 }
 
 #[test]

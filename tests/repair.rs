@@ -37,7 +37,7 @@ fn soup() -> impl Strategy<Value = TetMesh> {
             let values = (0..positions.len()).map(|i| i as f64).collect();
             let points = positions.len() as u32;
             let tets = tets.into_iter().map(|t| t.map(|v| v % points)).collect();
-            TetMesh { positions, fields: vec![Field { name: "f".into(), values }], tets, grid: None }
+            TetMesh { positions, fields: vec![Field::new("f", values)], tets, ..TetMesh::default() }
         })
 }
 

@@ -121,14 +121,14 @@ fn finest(mt: &Mt, grid: Option<Grid>) -> Result<TetMesh> {
 /// A current mesh as a mesh of its own.
 fn in_model_units(info: &MtInfo, mesh: &CurrentMesh) -> TetMesh {
     let slots = 0..mesh.positions().len() as u32;
-    let field = |(f, field): (usize, &tetralod::mt::FieldInfo)| Field {
-        name: field.name.clone(),
-        values: slots.clone().map(|slot| field.value(mesh.levels(slot)[f])).collect(),
+    let field = |(f, field): (usize, &tetralod::mt::FieldInfo)| {
+        let values = slots.clone().map(|slot| field.value(mesh.levels(slot)[f])).collect();
+        Field::new(field.name.clone(), values)
     };
     TetMesh {
         positions: mesh.positions().iter().map(|&q| info.lattice.point(q)).collect(),
         fields: info.fields.iter().enumerate().map(field).collect(),
         tets: mesh.tets().to_vec(),
-        grid: None,
+        ..TetMesh::default()
     }
 }

@@ -499,7 +499,7 @@ mod tests {
         };
         let at = [[0.2, 0.3, 0.4], [0.7, 0.6, 0.1], [0.5, 0.9, 0.8]];
         let values = mesh.positions.iter().map(|p| at.iter().map(|&c| bump(place(p), c)).sum()).collect();
-        mesh.fields.push(Field { name: "bumps".to_owned(), values });
+        mesh.fields.push(Field::new("bumps", values));
         mesh
     }
 
@@ -516,8 +516,8 @@ mod tests {
         let bumps = positions.iter().map(|p| p.iter().map(|x| (x * 0.2).sin()).sum()).collect();
         let slope = positions.iter().map(|p| p[0] - 0.5 * p[1]).collect();
         let fields = [("bumps", bumps), ("slope", slope)];
-        let fields = fields.map(|(name, values)| Field { name: name.to_owned(), values }).to_vec();
-        TetMesh { positions, fields, tets: Vec::new(), grid: None }
+        let fields = fields.map(|(name, values)| Field::new(name, values)).to_vec();
+        TetMesh { positions, fields, tets: Vec::new(), ..TetMesh::default() }
     }
 
     fn sorted(mut tet: [u32; 4]) -> [u32; 4] {

@@ -56,6 +56,11 @@ pub enum ReadReason {
         /// The point that it belongs to.
         point: u64,
     },
+    /// A value of a field at cells is infinite or not a number.
+    NotFiniteCell {
+        /// The cell that it belongs to.
+        cell: u64,
+    },
     /// A cell refers to a point that does not exist.
     MissingPoint {
         /// The cell.
@@ -121,6 +126,10 @@ impl fmt::Display for ReadReason {
             Self::NotFinite { point } => write!(
                 f,
                 "the value at point {point} is infinite or not a number; replace it or leave this array out"
+            ),
+            Self::NotFiniteCell { cell } => write!(
+                f,
+                "the value at cell {cell} is infinite or not a number; replace it or leave this array out"
             ),
             Self::MissingPoint { cell, point, points } => write!(
                 f,

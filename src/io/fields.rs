@@ -1,50 +1,144 @@
-//! Point arrays as scalar fields.
+//! Arrays as scalar fields.
 //!
 //! An array with one component becomes a field of its name. One with several becomes a field for each component,
 //! named `name_x` and so on, and `name_magnitude`, the length of the vector.
 
 use crate::io::error::ReadReason;
 use crate::mesh::Field;
+use crate::mesh::VectorPart;
 
 /// Most fields of a mesh.
 const MAX_FIELDS: usize = 1024;
 
-/// Appends the fields of an array of `components` values a point, checking that all are finite.
-///
-/// An array without a name is called `field`; a name that is taken gets a number.
-pub(super) fn append(
-    fields: &mut Vec<Field>,
-    name: &str,
+/// Collects the fields of a mesh (or a piece of one) at its points, or at its cells.
+#[derive(Default)]
+pub(super) struct Collector<'a> {
+    /// Names of the fields to keep, as users give them; all if none.
+    wanted: Option<&'a [String]>,
+    /// Every name that an array has taken, wanted or not: what a field is called does not depend on what is wanted.
+    names: Vec<String>,
+    /// How many fields came with the last array.
+    last: usize,
+    pub fields: Vec<Field>,
+}
+
+/// The fields that an array becomes, without values yet, and how many components it has.
+pub(super) struct Claim {
+    fields: Vec<Field>,
     components: usize,
-    values: Vec<f64>,
-) -> Result<(), ReadReason> {
-    if components == 0 {
-        return Err(ReadReason::Syntax("an array without components".into()));
+    /// Which of the fields are wanted.
+    wanted: Vec<bool>,
+}
+
+impl<'a> Collector<'a> {
+    pub fn new(wanted: Option<&'a [String]>) -> Self {
+        Self { wanted, ..Self::default() }
     }
-    // Without points a few bytes can claim any number of components.
-    if fields.len().saturating_add(components) >= MAX_FIELDS {
-        return Err(ReadReason::TooLarge { what: "fields and components".into(), limit: MAX_FIELDS as u64 });
+
+    /// Takes the names for the fields of an array of `components` values a point; none if no such field is wanted, so that
+    /// the array need not be decoded.
+    ///
+    /// An array without a name is called `field`; a name that is taken gets a number.
+    pub fn claim(&mut self, name: &str, components: usize) -> Result<Option<Claim>, ReadReason> {
+        if components == 0 {
+            return Err(ReadReason::Syntax("an array without components".into()));
+        }
+        // Without points a few bytes can claim any number of components.
+        if self.names.len().saturating_add(components) >= MAX_FIELDS {
+            return Err(ReadReason::TooLarge {
+                what: "fields and components".into(),
+                limit: MAX_FIELDS as u64,
+            });
+        }
+        self.last = 0;
+        let name = self.free_name(if name.is_empty() { "field" } else { name });
+        let part = |component| Some(VectorPart { name: name.clone(), component });
+        let fields: Vec<Field> = if components == 1 {
+            vec![Field::new(self.take_name(&name), Vec::new())]
+        } else {
+            let mut fields = Vec::new();
+            for c in 0..components {
+                let own = self.take_name(&format!("{name}_{}", component_name(components, c)));
+                // A vector has at most 255 components that tell which they are.
+                let vector = u8::try_from(c).ok().and_then(|c| part(Some(c)));
+                fields.push(Field { vector, ..Field::new(own, Vec::new()) });
+            }
+            let own = self.take_name(&format!("{name}_magnitude"));
+            fields.push(Field { vector: part(None), ..Field::new(own, Vec::new()) });
+            fields
+        };
+        let is_wanted =
+            |field: &Field| self.wanted.is_none_or(|names| names.iter().any(|name| field.answers_to(name)));
+        let wanted: Vec<bool> = fields.iter().map(is_wanted).collect();
+        Ok(wanted.contains(&true).then_some(Claim { fields, components, wanted }))
     }
-    if let Some(at) = values.iter().position(|v| !v.is_finite()) {
-        return Err(ReadReason::NotFinite { point: (at / components) as u64 });
+
+    /// Appends the fields of an array, checking that all values are finite.
+    pub fn fill(
+        &mut self,
+        claim: Claim,
+        values: Vec<f64>,
+        integer: bool,
+        unit: &str,
+    ) -> Result<(), ReadReason> {
+        let Claim { fields, components, wanted } = claim;
+        let at = |at: usize| Err(ReadReason::NotFinite { point: at as u64 });
+        if let Some(found) = values.iter().position(|v| !v.is_finite()) {
+            return at(found / components);
+        }
+        for (c, (mut field, _)) in
+            fields.into_iter().zip(wanted).enumerate().filter(|(_, (_, wanted))| *wanted)
+        {
+            field.unit = unit.to_owned();
+            field.integer = integer && c < components;
+            field.values = if c == components {
+                values.chunks_exact(components).map(length).collect()
+            } else {
+                // Tuples lie one behind the other; this component starts at its own place in the first.
+                values.iter().skip(c).step_by(components).copied().collect()
+            };
+            if let Some(found) = field.values.iter().position(|v| !v.is_finite()) {
+                return at(found);
+            }
+            self.fields.push(field);
+            self.last += 1;
+        }
+        Ok(())
     }
-    let name = free_name(fields, if name.is_empty() { "field" } else { name });
-    if components == 1 {
-        fields.push(Field { name, values });
-        return Ok(());
+
+    /// Appends the fields of an array without their values.
+    pub fn keep_names(&mut self, claim: Claim) {
+        self.fields.extend(claim.fields);
     }
-    for c in 0..components {
-        // Tuples lie one behind the other; this component starts at its own place in the first.
-        let values = values.iter().skip(c).step_by(components).copied().collect();
-        let name = format!("{name}_{}", component_name(components, c));
-        fields.push(Field { name: free_name(fields, &name), values });
+
+    /// Tells the unit of the array that came last.
+    pub fn set_unit_of_last(&mut self, unit: &str) {
+        self.fields.iter_mut().rev().take(self.last).for_each(|field| field.unit = unit.to_owned());
+        self.last = 0;
     }
-    let values: Vec<f64> = values.chunks_exact(components).map(length).collect();
-    if let Some(at) = values.iter().position(|v| !v.is_finite()) {
-        return Err(ReadReason::NotFinite { point: at as u64 });
+
+    /// What comes next does not belong to the last array.
+    pub fn forget_last(&mut self) {
+        self.last = 0;
     }
-    fields.push(Field { name: free_name(fields, &format!("{name}_magnitude")), values });
-    Ok(())
+
+    fn take_name(&mut self, name: &str) -> String {
+        let name = self.free_name(name);
+        self.names.push(name.clone());
+        name
+    }
+
+    fn free_name(&self, name: &str) -> String {
+        let taken = |name: &str| self.names.iter().any(|n| n == name);
+        if !taken(name) {
+            return name.to_owned();
+        }
+        // One of the first `len + 1` numbers is free.
+        (2..self.names.len() + 3)
+            .map(|i| format!("{name}_{i}"))
+            .find(|n| !taken(n))
+            .unwrap_or_else(|| name.to_owned())
+    }
 }
 
 /// Length of a vector, without overflow on the way.
@@ -56,7 +150,8 @@ fn length(vector: &[f64]) -> f64 {
     largest * vector.iter().map(|x| (x / largest) * (x / largest)).sum::<f64>().sqrt()
 }
 
-fn component_name(components: usize, c: usize) -> String {
+/// What a component of so many is called.
+pub(super) fn component_name(components: usize, c: usize) -> String {
     const AXES: [&str; 3] = ["x", "y", "z"];
     const SYMMETRIC: [&str; 6] = ["xx", "yy", "zz", "xy", "yz", "xz"];
     match components {
@@ -67,45 +162,61 @@ fn component_name(components: usize, c: usize) -> String {
     }
 }
 
-fn free_name(fields: &[Field], name: &str) -> String {
-    let taken = |name: &str| fields.iter().any(|f| f.name == name);
-    if !taken(name) {
-        return name.to_owned();
-    }
-    // One of the first `len + 1` numbers is free.
-    (2..fields.len() + 3)
-        .map(|i| format!("{name}_{i}"))
-        .find(|n| !taken(n))
-        .unwrap_or_else(|| name.to_owned())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn append(
+        to: &mut Collector<'_>,
+        name: &str,
+        components: usize,
+        values: Vec<f64>,
+    ) -> Result<(), ReadReason> {
+        match to.claim(name, components)? {
+            Some(claim) => to.fill(claim, values, true, "m"),
+            None => Ok(()),
+        }
+    }
+
+    fn names<'a>(of: &'a Collector<'_>) -> Vec<&'a str> {
+        of.fields.iter().map(|f| f.name.as_str()).collect()
+    }
+
     #[test]
     fn vectors_become_components_and_magnitude() {
-        let mut fields = Vec::new();
-        append(&mut fields, "v", 3, vec![3.0, 4.0, 12.0, 0.0, 0.0, 0.0]).unwrap();
-        let names: Vec<&str> = fields.iter().map(|f| f.name.as_str()).collect();
-        assert_eq!(names, ["v_x", "v_y", "v_z", "v_magnitude"]);
-        assert_eq!(fields[1].values, [4.0, 0.0]);
-        assert_eq!(fields[3].values, [13.0, 0.0]);
+        let mut all = Collector::default();
+        append(&mut all, "v", 3, vec![3.0, 4.0, 12.0, 0.0, 0.0, 0.0]).unwrap();
+        assert_eq!(names(&all), ["v_x", "v_y", "v_z", "v_magnitude"]);
+        assert_eq!(all.fields[1].values, [4.0, 0.0]);
+        assert_eq!(all.fields[3].values, [13.0, 0.0]);
+        assert_eq!(all.fields[2].vector, Some(VectorPart { name: "v".into(), component: Some(2) }));
+        assert_eq!((all.fields[2].integer, all.fields[3].integer), (true, false));
+        assert!(all.fields.iter().all(|field| field.unit == "m"));
     }
 
     #[test]
     fn names_stay_different() {
-        let mut fields = Vec::new();
+        let mut all = Collector::default();
         for _ in 0..3 {
-            append(&mut fields, "", 1, vec![0.0]).unwrap();
+            append(&mut all, "", 1, vec![0.0]).unwrap();
         }
-        let names: Vec<&str> = fields.iter().map(|f| f.name.as_str()).collect();
-        assert_eq!(names, ["field", "field_2", "field_3"]);
+        assert_eq!(names(&all), ["field", "field_2", "field_3"]);
+    }
+
+    #[test]
+    fn what_is_not_wanted_is_left_out_and_changes_no_name() {
+        let wanted = ["v".to_owned(), "w_magnitude".to_owned(), "s_2".to_owned()];
+        let mut some = Collector::new(Some(&wanted));
+        append(&mut some, "s", 1, vec![f64::NAN]).unwrap();
+        append(&mut some, "v", 2, vec![3.0, 4.0]).unwrap();
+        append(&mut some, "w", 2, vec![3.0, 4.0]).unwrap();
+        append(&mut some, "s", 1, vec![7.0]).unwrap();
+        assert_eq!(names(&some), ["v_x", "v_y", "w_magnitude", "s_2"]);
     }
 
     #[test]
     fn values_that_are_not_finite_name_their_point() {
-        let error = append(&mut Vec::new(), "v", 2, vec![0.0, 0.0, 1.0, f64::NAN]).unwrap_err();
+        let error = append(&mut Collector::default(), "v", 2, vec![0.0, 0.0, 1.0, f64::NAN]).unwrap_err();
         assert_eq!(error, ReadReason::NotFinite { point: 1 });
     }
 }

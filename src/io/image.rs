@@ -1,9 +1,11 @@
 //! Regular grids: VTK XML image data (`.vti`), and the grid's checks that all grid formats share.
 
+use crate::io::CellData;
+use crate::io::ReadOptions;
 use crate::io::error::At;
 use crate::io::error::ReadError;
 use crate::io::error::ReadReason;
-use crate::io::fields;
+use crate::io::vtu;
 use crate::io::xml::Document;
 use crate::io::xml::Piece;
 use crate::mesh::Field;
@@ -38,26 +40,63 @@ pub(super) fn checked_grid(dims: [u64; 3], origin: [f64; 3], spacing: [f64; 3]) 
     Ok(Grid { dims: dims.map(|d| d as u32), origin, spacing })
 }
 
-/// The mesh of a grid whose fields were read; a grid without any would be a few bytes that claim any size.
-pub(super) fn grid_mesh(grid: Grid, fields: Vec<Field>) -> Result<TetMesh, ReadReason> {
-    if fields.is_empty() {
+/// The mesh of a grid whose fields at points and at cubes were read; a grid without any would be a few bytes that claim
+/// any size.
+pub(super) fn grid_mesh(grid: Grid, fields: Vec<Field>, cubes: Vec<Field>) -> Result<TetMesh, ReadReason> {
+    if fields.is_empty() && cubes.iter().all(|field| field.values.is_empty()) {
         return Err(ReadReason::Missing("an array with a value for every point".into()));
     }
-    Ok(TetMesh::from_grid(grid, fields))
+    let mut mesh = TetMesh::from_grid(grid, fields);
+    mesh.cell_fields = cubes;
+    for field in &mut mesh.cell_fields {
+        // The tetrahedra of a cube follow one another.
+        field.values = field.values.iter().flat_map(|&value| [value; 6]).collect();
+    }
+    Ok(mesh)
 }
 
 /// Reads a document of type `ImageData`.
-pub(super) fn read(document: &Document<'_>) -> Result<TetMesh, ReadError> {
+pub(super) fn read(document: &Document<'_>, options: &ReadOptions) -> Result<TetMesh, ReadError> {
     let whole_place = || "<ImageData>".to_owned();
     let (grid, whole) = read_grid(document).at(whole_place)?;
-    let parts = document
-        .pieces
-        .iter()
-        .enumerate()
-        .map(|(i, piece)| read_part(document, piece, whole, i))
-        .collect::<Result<Vec<_>, _>>()?;
+    let (mut parts, mut cubes) = (Vec::new(), Vec::new());
+    for (i, piece) in document.pieces.iter().enumerate() {
+        parts.push(read_part(document, piece, whole, i, options)?);
+        if options.cells == CellData::Values {
+            cubes.extend(read_cubes(document, piece, whole, i, options)?);
+        }
+    }
     let fields = assemble(parts, whole).at(whole_place)?;
-    grid_mesh(grid, fields).at(whole_place)
+    let cubes = match document.pieces.first() {
+        _ if cubes.iter().any(|part| !part.fields.is_empty()) => {
+            assemble(cubes, cubes_of(whole)).at(whole_place)?
+        }
+        Some(piece) if options.cells == CellData::Names => vtu::name_fields(piece, "CellData", options)?,
+        _ => Vec::new(),
+    };
+    grid_mesh(grid, fields, cubes).at(whole_place)
+}
+
+/// The first and last cube along each axis of a box of points.
+fn cubes_of(mut extent: Extent) -> Extent {
+    [1, 3, 5].into_iter().for_each(|i| extent[i] = extent[i].saturating_sub(1));
+    extent
+}
+
+/// The fields at the cubes of a piece; none if it is flat.
+fn read_cubes(
+    document: &Document<'_>,
+    piece: &Piece<'_>,
+    whole: Extent,
+    i: usize,
+    options: &ReadOptions,
+) -> Result<Option<Part>, ReadError> {
+    let place = || format!("piece {i}");
+    let extent = cubes_of(piece.attributes.numbers("Extent").at(place)?.unwrap_or(whole));
+    let Ok(dims) = dims_in(extent, cubes_of(whole)) else { return Ok(None) };
+    let cubes = dims.iter().product::<u64>() as usize;
+    let fields = vtu::read_fields(document, piece, "CellData", cubes, options).map_err(vtu::at_cell)?;
+    Ok(Some(Part { extent, fields }))
 }
 
 /// A piece of a grid: where it is and its fields.
@@ -66,21 +105,22 @@ struct Part {
     fields: Vec<Field>,
 }
 
-fn read_part(document: &Document<'_>, piece: &Piece<'_>, whole: Extent, i: usize) -> Result<Part, ReadError> {
+fn read_part(
+    document: &Document<'_>,
+    piece: &Piece<'_>,
+    whole: Extent,
+    i: usize,
+    options: &ReadOptions,
+) -> Result<Part, ReadError> {
     let place = || format!("piece {i}");
     let extent = piece.attributes.numbers("Extent").at(place)?.unwrap_or(whole);
     // No overflow: the piece is inside the grid, whose points were counted.
     let points = dims_in(extent, whole).at(place)?.iter().product::<u64>() as usize;
-    let mut list = Vec::new();
-    for array in piece.section("PointData").filter(|a| a.number_type().is_some()) {
-        let components = array.components().at(|| array.place())?;
-        let values = document.floats(array, points, components).at(|| array.place())?;
-        fields::append(&mut list, array.name(), components, values).at(|| array.place())?;
-    }
-    if list.is_empty() {
+    let fields = vtu::read_fields(document, piece, "PointData", points, options)?;
+    if fields.is_empty() && options.cells != CellData::Values {
         return Err(ReadReason::Missing("an array in <PointData>".into())).at(place);
     }
-    Ok(Part { extent, fields: list })
+    Ok(Part { extent, fields })
 }
 
 fn read_grid(document: &Document<'_>) -> Result<(Grid, Extent), ReadReason> {
@@ -125,13 +165,22 @@ fn assemble(mut parts: Vec<Part>, whole: Extent) -> Result<Vec<Field>, ReadReaso
     }
     let whole_dims = dims_in(whole, whole)?.map(|d| d as usize);
     let points: usize = whole_dims.iter().product();
+    if parts.iter().all(|part| part.fields.is_empty()) {
+        return Ok(Vec::new());
+    }
     // Only values that were read may size what follows.
     let read: usize = parts.iter().filter_map(|p| p.fields.first()).map(|f| f.values.len()).sum();
     let missing = || ReadReason::Missing("a piece of the grid".into());
     let first = parts.first().filter(|_| read >= points).ok_or_else(missing)?;
     let mut covered = vec![false; points];
-    let mut fields: Vec<Field> =
-        first.fields.iter().map(|f| Field { name: f.name.clone(), values: vec![0.0; points] }).collect();
+    let empty = |f: &Field| Field {
+        values: vec![0.0; points],
+        unit: f.unit.clone(),
+        vector: f.vector.clone(),
+        integer: parts.iter().flat_map(|p| &p.fields).all(|g| g.name != f.name || g.integer),
+        ..Field::new(f.name.clone(), Vec::new())
+    };
+    let mut fields: Vec<Field> = first.fields.iter().map(empty).collect();
     for part in &parts {
         place_part(&mut fields, &mut covered, part, whole)?;
     }

@@ -4,11 +4,13 @@
 //! Binary numbers are big-endian and start right after the line that announces them. Version 5 lists cells as
 //! offsets and connectivity, older ones as counts followed by indices.
 
+use crate::io::CellData;
+use crate::io::ReadOptions;
 use crate::io::cells;
 use crate::io::error::At;
 use crate::io::error::ReadError;
 use crate::io::error::ReadReason;
-use crate::io::fields;
+use crate::io::fields::Collector;
 use crate::io::image;
 use crate::io::number::NumberType;
 use crate::io::points_from;
@@ -19,18 +21,27 @@ use crate::mesh::TetMesh;
 pub(super) const MAGIC: &[u8] = b"# vtk DataFile Version ";
 
 /// Reads a legacy VTK file.
-pub(super) fn read(bytes: &[u8]) -> Result<TetMesh, ReadError> {
-    let (mut file, kind) = Reader::open(bytes).at(|| "header".into())?;
-    let mut body = Body::default();
+pub(super) fn read(bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadError> {
+    let (mut file, kind, time) = Reader::open(bytes).at(|| "header".into())?;
+    let mut body = Body::new(options, time);
     while let Some(keyword) = file.next_word().at(|| "body".into())? {
         let keyword = keyword.to_ascii_lowercase();
         body.section(&mut file, &keyword).at(|| shortened(&keyword).to_ascii_uppercase())?;
     }
-    match kind.as_str() {
-        "unstructured_grid" => body.unstructured(file.version >= 5),
-        "polydata" => body.points(),
-        _ => body.structured(),
-    }
+    let time = body.time;
+    let mut mesh = match kind.as_str() {
+        "unstructured_grid" => body.unstructured(file.version >= 5)?,
+        "polydata" => body.points()?,
+        _ => body.structured()?,
+    };
+    mesh.fields.iter_mut().chain(&mut mesh.cell_fields).for_each(|field| field.time = time);
+    Ok(mesh)
+}
+
+/// The time in the arrays of the whole data set, as VTK tells it.
+fn time_in(arrays: &[ArrayData]) -> Option<f64> {
+    let array = arrays.iter().find(|array| array.name == "TimeValue")?;
+    array.values.first().copied().filter(|time| time.is_finite())
 }
 
 /// What an array's numbers are.
@@ -55,6 +66,16 @@ impl Kind {
     }
 }
 
+impl Kind {
+    fn is_integer(self) -> bool {
+        match self {
+            Self::Number(number) => number.is_integer(),
+            Self::Bit => true,
+            Self::Text => false,
+        }
+    }
+}
+
 fn shortened(text: &str) -> String {
     text.chars().take(24).collect()
 }
@@ -68,8 +89,9 @@ struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    /// Reads the header up to the data set's type, in lower case.
-    fn open(bytes: &'a [u8]) -> Result<(Self, String), ReadReason> {
+    /// Reads the header up to the data set's type, in lower case, and the time that the data set is of.
+    fn open(bytes: &'a [u8]) -> Result<(Self, String, Option<f64>), ReadReason> {
+        let mut time = None;
         let mut file = Self { bytes, at: MAGIC.len(), binary: false, version: 0 };
         let version = file.line()?;
         file.version = version
@@ -95,8 +117,8 @@ impl<'a> Reader<'a> {
             match file.word()?.to_ascii_lowercase().as_str() {
                 "dataset" => break,
                 // Field data may come before the data set.
-                "field" => _ = file.field_block()?,
-                "metadata" => file.skip_metadata(),
+                "field" => time = time_in(&file.field_block()?).or(time),
+                "metadata" => _ = file.metadata(),
                 other => {
                     return Err(ReadReason::Syntax(format!("\"{}\" instead of DATASET", shortened(other))));
                 }
@@ -108,7 +130,7 @@ impl<'a> Reader<'a> {
             let remedy = "give an unstructured grid of tetrahedra or structured points".into();
             return Err(ReadReason::Unsupported { what, remedy });
         }
-        Ok((file, kind))
+        Ok((file, kind, time))
     }
 
     fn rest(&self) -> &'a [u8] {
@@ -234,16 +256,26 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Steps over a METADATA block, which ends at an empty line.
-    fn skip_metadata(&mut self) {
+    /// Reads a METADATA block, which ends at an empty line; returns the unit of the array before it, if it tells one.
+    fn metadata(&mut self) -> Option<String> {
+        let mut unit = None;
+        let mut is_unit = false;
         self.skip_line();
         while !self.rest().is_empty() {
             let start = self.at;
             self.skip_line();
-            if self.bytes[start..self.at].trim_ascii().is_empty() {
+            let line = self.bytes[start..self.at].trim_ascii();
+            if line.is_empty() {
                 break;
             }
+            let text = std::str::from_utf8(line).unwrap_or_default();
+            match text.split_once(' ') {
+                Some(("NAME", key)) => is_unit = key.starts_with("UNITS_LABEL "),
+                Some(("DATA", value)) if is_unit => unit = Some(decoded_name(value.trim())),
+                _ => {}
+            }
         }
+        unit
     }
 
     /// A FIELD block, its keyword read.
@@ -255,7 +287,8 @@ impl<'a> Reader<'a> {
             let mut name = self.word()?;
             if name.eq_ignore_ascii_case("metadata") {
                 // What is known of the array before this one.
-                self.skip_metadata();
+                let unit = self.metadata().unwrap_or_default();
+                list.last_mut().into_iter().for_each(|array: &mut ArrayData| array.unit.clone_from(&unit));
                 name = self.word()?;
             }
             if name == "NULL_ARRAY" {
@@ -265,7 +298,9 @@ impl<'a> Reader<'a> {
             let (components, tuples) = (self.count()?, self.count()?);
             let kind = Kind::named(self.word()?)?;
             if let Some(values) = self.floats(components.checked_mul(tuples), kind)? {
-                list.push(ArrayData { name: decoded_name(name), components, values });
+                let name = decoded_name(name);
+                let integer = kind.is_integer();
+                list.push(ArrayData { name, components, values, integer, unit: String::new() });
             }
         }
         Ok(list)
@@ -300,20 +335,20 @@ struct ArrayData {
     name: String,
     components: usize,
     values: Vec<f64>,
+    integer: bool,
+    unit: String,
 }
 
 /// What the attributes that follow belong to.
-#[derive(Clone, Copy, Default, PartialEq)]
+#[derive(Clone, Copy, PartialEq)]
 enum Owner {
-    #[default]
     Nothing,
     Points(usize),
     Cells(usize),
 }
 
 /// Everything after the data set's type.
-#[derive(Default)]
-struct Body {
+struct Body<'a> {
     positions: Option<Vec<f64>>,
     /// Before version 5 counts and indices; since then indices alone.
     connectivity: Vec<i64>,
@@ -325,12 +360,36 @@ struct Body {
     origin: [f64; 3],
     spacing: Option<[f64; 3]>,
     owner: Owner,
-    fields: Vec<Field>,
+    fields: Collector<'a>,
+    cell_fields: Collector<'a>,
+    cell_data: CellData,
+    time: Option<f64>,
 }
 
-impl Body {
+impl<'a> Body<'a> {
+    fn new(options: &'a ReadOptions, time: Option<f64>) -> Self {
+        Self {
+            positions: None,
+            connectivity: Vec::new(),
+            offsets: Vec::new(),
+            cells: None,
+            types: Vec::new(),
+            dims: None,
+            origin: [0.0; 3],
+            spacing: None,
+            owner: Owner::Nothing,
+            fields: Collector::new(options.fields.as_deref()),
+            cell_fields: Collector::new(options.fields.as_deref()),
+            cell_data: options.cells,
+            time,
+        }
+    }
+
     /// Reads the section that `keyword` announces.
     fn section(&mut self, file: &mut Reader<'_>, keyword: &str) -> Result<(), ReadReason> {
+        if keyword != "metadata" {
+            self.last_fields().forget_last();
+        }
         match keyword {
             "points" => {
                 let count = file.count()?;
@@ -359,9 +418,16 @@ impl Body {
             "spacing" | "aspect_ratio" => self.spacing = Some(file.three()?),
             "point_data" => self.owner = Owner::Points(file.count()?),
             "cell_data" => self.owner = Owner::Cells(file.count()?),
-            "metadata" => file.skip_metadata(),
+            "metadata" => {
+                let unit = file.metadata();
+                unit.iter().for_each(|unit| self.last_fields().set_unit_of_last(unit));
+            }
             "field" => {
-                for array in file.field_block()? {
+                let arrays = file.field_block()?;
+                if self.owner == Owner::Nothing {
+                    self.time = time_in(&arrays).or(self.time);
+                }
+                for array in arrays {
                     self.keep(array)?;
                 }
             }
@@ -422,31 +488,56 @@ impl Body {
             }
         };
         let values = file.floats(components.checked_mul(tuples), kind)?;
+        let integer = kind.is_integer();
         match values {
-            Some(values) if keyword != "lookup_table" => self.keep(ArrayData { name, components, values }),
-            _ => Ok(()),
-        }
-    }
-
-    /// Makes fields of an array at points; others are read and left out.
-    fn keep(&mut self, array: ArrayData) -> Result<(), ReadReason> {
-        let Owner::Points(points) = self.owner else { return Ok(()) };
-        if points.checked_mul(array.components) != Some(array.values.len()) {
-            let what = format!("values of \"{}\"", array.name);
-            let expected = (points as u64).saturating_mul(array.components as u64);
-            return Err(ReadReason::Count { what, expected, found: array.values.len() as u64 });
-        }
-        fields::append(&mut self.fields, &array.name, array.components, array.values)
-    }
-
-    fn check_point_data(&self, expected: u64) -> Result<(), ReadReason> {
-        match self.fields.first() {
-            Some(field) if field.values.len() as u64 != expected => {
-                let found = field.values.len() as u64;
-                Err(ReadReason::Count { what: "values a field".into(), expected, found })
+            Some(values) if keyword != "lookup_table" => {
+                self.keep(ArrayData { name, components, values, integer, unit: String::new() })
             }
             _ => Ok(()),
         }
+    }
+
+    /// The fields of the owner of what was read last.
+    fn last_fields(&mut self) -> &mut Collector<'a> {
+        if matches!(self.owner, Owner::Cells(_)) { &mut self.cell_fields } else { &mut self.fields }
+    }
+
+    /// Makes fields of an array at points and, if they are asked for, at cells; others are read and left out.
+    fn keep(&mut self, array: ArrayData) -> Result<(), ReadReason> {
+        let (fields, tuples, values) = match self.owner {
+            Owner::Points(points) => (&mut self.fields, points, true),
+            Owner::Cells(cells) if self.cell_data != CellData::LeaveOut => {
+                (&mut self.cell_fields, cells, self.cell_data == CellData::Values)
+            }
+            _ => return Ok(()),
+        };
+        let ArrayData { name, components, values: numbers, integer, unit } = array;
+        if tuples.checked_mul(components) != Some(numbers.len()) {
+            let what = format!("values of \"{name}\"");
+            let expected = (tuples as u64).saturating_mul(components as u64);
+            return Err(ReadReason::Count { what, expected, found: numbers.len() as u64 });
+        }
+        let Some(claim) = fields.claim(&name, components)? else { return Ok(()) };
+        if !values {
+            fields.keep_names(claim);
+            return Ok(());
+        }
+        fields.fill(claim, numbers, integer, &unit).map_err(|reason| match (self.owner, reason) {
+            (Owner::Cells(_), ReadReason::NotFinite { point }) => ReadReason::NotFiniteCell { cell: point },
+            (_, reason) => reason,
+        })
+    }
+
+    fn check_point_data(&self, expected: u64) -> Result<(), ReadReason> {
+        check_values(&self.fields, expected)
+    }
+
+    /// The fields at cells, of which there are `cells`.
+    fn take_cell_fields(&mut self, cells: usize) -> Result<Vec<Field>, ReadReason> {
+        if self.cell_data == CellData::Values {
+            check_values(&self.cell_fields, cells as u64)?;
+        }
+        Ok(std::mem::take(&mut self.cell_fields.fields))
     }
 
     fn checked_positions(&self) -> Result<Vec<[f64; 3]>, ReadError> {
@@ -456,25 +547,21 @@ impl Body {
     }
 
     fn points(self) -> Result<TetMesh, ReadError> {
-        Ok(TetMesh {
-            positions: self.checked_positions()?,
-            fields: self.fields,
-            tets: Vec::new(),
-            grid: None,
-        })
+        Ok(TetMesh { positions: self.checked_positions()?, fields: self.fields.fields, ..TetMesh::default() })
     }
 
-    fn unstructured(self, since_5: bool) -> Result<TetMesh, ReadError> {
+    fn unstructured(mut self, since_5: bool) -> Result<TetMesh, ReadError> {
         let cells = self.cells.ok_or_else(|| missing("CELLS")).at(String::new)?;
         let positions = self.checked_positions()?;
         expect("cell types", cells, self.types.len()).at(|| "CELL_TYPES".into())?;
         if cells > 0 && cells::are_points(&self.types) {
-            return Ok(TetMesh { positions, fields: self.fields, tets: Vec::new(), grid: None });
+            return Ok(TetMesh { positions, fields: self.fields.fields, ..TetMesh::default() });
         }
         cells::only_tetrahedra(&self.types).at(|| "CELL_TYPES".into())?;
         let list = if since_5 { self.indices_by_offsets(cells) } else { self.indices_by_counts(cells) };
         let tets = list.and_then(|l| cells::tetrahedra(&l, positions.len(), 0)).at(|| "CELLS".into())?;
-        Ok(TetMesh { positions, fields: self.fields, tets, grid: None })
+        let cell_fields = self.take_cell_fields(cells).at(|| "CELL_DATA".into())?;
+        Ok(TetMesh { positions, fields: self.fields.fields, tets, cell_fields, ..TetMesh::default() })
     }
 
     fn indices_by_offsets(&self, cells: usize) -> Result<Vec<i64>, ReadReason> {
@@ -496,12 +583,25 @@ impl Body {
         Ok(cells.iter().flat_map(|c| &c[1..]).copied().collect())
     }
 
-    fn structured(self) -> Result<TetMesh, ReadError> {
+    fn structured(mut self) -> Result<TetMesh, ReadError> {
         let place = || "DIMENSIONS".to_owned();
         let dims = self.dims.ok_or_else(|| ReadReason::Missing("DIMENSIONS".into())).at(place)?;
         let grid = image::checked_grid(dims, self.origin, self.spacing.unwrap_or([1.0; 3])).at(place)?;
         self.check_point_data(dims.iter().product()).at(|| "POINT_DATA".into())?;
-        image::grid_mesh(grid, self.fields).at(|| "POINT_DATA".into())
+        // Fewer cubes than points, which were counted.
+        let cubes = dims.iter().map(|d| d - 1).product::<u64>() as usize;
+        let cell_fields = self.take_cell_fields(cubes).at(|| "CELL_DATA".into())?;
+        image::grid_mesh(grid, self.fields.fields, cell_fields).at(|| "POINT_DATA".into())
+    }
+}
+
+fn check_values(fields: &Collector<'_>, expected: u64) -> Result<(), ReadReason> {
+    match fields.fields.first() {
+        Some(field) if field.values.len() as u64 != expected => {
+            let found = field.values.len() as u64;
+            Err(ReadReason::Count { what: "values a field".into(), expected, found })
+        }
+        _ => Ok(()),
     }
 }
 

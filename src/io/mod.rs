@@ -14,7 +14,9 @@
 //!
 //! Regular grids are split into tetrahedra, six a cube, and carry their [`Grid`](crate::mesh::Grid).
 //! Point arrays become scalar fields: an array of several components gives one field a component (`name_x`, ...) and
-//! `name_magnitude`. Arrays at cells, and arrays that are not numbers, are left out.
+//! `name_magnitude`. Units and times are kept where the file tells them. Arrays at cells are read where that is asked
+//! for ([`ReadOptions::cells`]), arrays that are not numbers are left out.
+//! Time steps come in several files, which a `.pvd` may list: see [`steps`].
 //! Cells other than tetrahedra are refused. Readers check the file, not the mesh: see [`crate::mesh::repair`].
 
 mod cells;
@@ -24,6 +26,7 @@ mod image;
 mod legacy;
 mod number;
 mod payload;
+mod pvd;
 mod raw;
 mod surface;
 mod vtu;
@@ -33,6 +36,8 @@ mod xz;
 
 pub use error::{ReadError, ReadReason};
 pub use image::MAX_GRID_POINTS;
+pub use pvd::Step;
+pub use pvd::steps;
 pub use surface::{PolyData, write_csv, write_obj, write_ply, write_stl, write_vtp};
 pub use write::{write_vti, write_vtu};
 
@@ -41,6 +46,28 @@ use std::path::Path;
 use crate::io::error::At;
 use crate::mesh::TetMesh;
 
+/// What to read of a file.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ReadOptions {
+    /// Names of the fields to keep, a vector's name for all its components; all if none. Others take no memory, and may
+    /// hold values that are not finite.
+    pub fields: Option<Vec<String>>,
+    /// What to do with fields at cells.
+    pub cells: CellData,
+}
+
+/// What to do with fields at cells.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum CellData {
+    /// Leave them out.
+    #[default]
+    LeaveOut,
+    /// Keep their names alone, so that one who asks for them can be told what to do.
+    Names,
+    /// Read them: see [`TetMesh::cells_to_points`].
+    Values,
+}
+
 /// Reads the mesh or grid in the file at `path`; of raw samples either the samples or the sidecar may be given.
 ///
 /// The kind of a file is told by its content; only `.raw` and `.json` are told by their names.
@@ -48,11 +75,19 @@ use crate::mesh::TetMesh;
 /// # Errors
 /// If the file cannot be read, is damaged, or holds what is not read here: see [`ReadReason`].
 pub fn read(path: &Path) -> Result<TetMesh, ReadError> {
+    read_with(path, &ReadOptions::default())
+}
+
+/// Reads what is wanted of the mesh or grid in the file at `path`, otherwise as [`read`].
+///
+/// # Errors
+/// As [`read`]; a field that is wanted and not there is no error.
+pub fn read_with(path: &Path, options: &ReadOptions) -> Result<TetMesh, ReadError> {
     let name = path.display().to_string();
     match lower_extension(path).as_str() {
         "json" => read_raw_by_sidecar(path, None),
         "raw" => read_raw_by_sidecar(&path.with_extension("json"), Some(path)),
-        _ => read_bytes(&name, &load(path)?),
+        _ => read_bytes_with(&name, &load(path)?, options),
     }
 }
 
@@ -63,11 +98,19 @@ pub fn read(path: &Path) -> Result<TetMesh, ReadError> {
 /// # Errors
 /// As [`read`].
 pub fn read_bytes(name: &str, bytes: &[u8]) -> Result<TetMesh, ReadError> {
+    read_bytes_with(name, bytes, &ReadOptions::default())
+}
+
+/// Reads what is wanted from the bytes of a file, otherwise as [`read_bytes`].
+///
+/// # Errors
+/// As [`read_with`].
+pub fn read_bytes_with(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadError> {
     let start = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
     let result = if bytes.starts_with(legacy::MAGIC) {
-        legacy::read(bytes)
+        legacy::read(bytes, options)
     } else if start.starts_with(b"<") {
-        read_xml(start)
+        read_xml(start, options)
     } else {
         Err(ReadReason::UnknownFormat).at(String::new)
     };
@@ -97,17 +140,25 @@ fn read_raw_by_sidecar(sidecar_path: &Path, samples_path: Option<&Path>) -> Resu
     sidecar.mesh(&samples).at(String::new).map_err(|e| in_file(e, &samples_path.display().to_string()))
 }
 
-fn read_xml(bytes: &[u8]) -> Result<TetMesh, ReadError> {
+fn read_xml(bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadError> {
     let document = xml::Document::parse(bytes)?;
-    match document.kind.as_str() {
-        "UnstructuredGrid" => vtu::read(&document),
-        "ImageData" => image::read(&document),
+    let mut mesh = match document.kind.as_str() {
+        "UnstructuredGrid" => vtu::read(&document, options)?,
+        "ImageData" => image::read(&document, options)?,
+        "Collection" => {
+            let what = "a list of time steps as one mesh".into();
+            let remedy = "give a file that it lists, or use `tetralod build`, which takes all of them".into();
+            return Err(ReadReason::Unsupported { what, remedy }).at(String::new);
+        }
         other => {
             let what = format!("a data set of type {other}");
             let remedy = "give an UnstructuredGrid of tetrahedra or ImageData".into();
-            Err(ReadReason::Unsupported { what, remedy }).at(String::new)
+            return Err(ReadReason::Unsupported { what, remedy }).at(String::new);
         }
-    }
+    };
+    let time = document.time();
+    mesh.fields.iter_mut().chain(&mut mesh.cell_fields).for_each(|field| field.time = time);
+    Ok(mesh)
 }
 
 fn load(path: &Path) -> Result<Vec<u8>, ReadError> {

@@ -64,6 +64,11 @@ impl NumberType {
         })
     }
 
+    /// Whether its numbers are integers.
+    pub fn is_integer(self) -> bool {
+        !matches!(self, Self::F32 | Self::F64)
+    }
+
     /// Bytes of one number.
     pub fn size(self) -> usize {
         match self {

@@ -2,14 +2,15 @@
 //!
 //! `x.raw` holds the samples alone, x fastest, then y, then z. `x.json` holds `dims` and `type` (as `"uint8"`), and
 //! may hold `file` (the samples' file name, else `x.raw`), `endian` (`"little"`, the default, or `"big"`),
-//! `spacing` (default 1 1 1), `origin` (default 0 0 0) and `field` (the field's name, default `value`).
+//! `spacing` (default 1 1 1), `origin` (default 0 0 0), `field` (the field's name, default `value`) and `unit` (of its
+//! values).
 
 use serde_json::Value;
 
 use crate::io::error::ReadReason;
-use crate::io::fields;
 use crate::io::image;
 use crate::io::number::NumberType;
+use crate::mesh::Field;
 use crate::mesh::Grid;
 use crate::mesh::TetMesh;
 
@@ -21,6 +22,7 @@ pub(super) struct Sidecar {
     number: NumberType,
     big: bool,
     field: String,
+    unit: String,
 }
 
 impl Sidecar {
@@ -50,7 +52,8 @@ impl Sidecar {
             return Err(ReadReason::Unsupported { what, remedy: "put both files side by side".into() });
         }
         let field = text("field").unwrap_or("value").to_owned();
-        Ok(Self { file, grid: image::checked_grid(dims, origin, spacing)?, number, big, field })
+        let unit = text("unit").unwrap_or_default().to_owned();
+        Ok(Self { file, grid: image::checked_grid(dims, origin, spacing)?, number, big, field, unit })
     }
 
     /// The mesh of these samples.
@@ -64,9 +67,16 @@ impl Sidecar {
                 found: samples.len() as u64,
             });
         }
-        let mut list = Vec::new();
-        fields::append(&mut list, &self.field, 1, self.number.floats(samples, self.big))?;
-        image::grid_mesh(self.grid, list)
+        let values = self.number.floats(samples, self.big);
+        if let Some(at) = values.iter().position(|v| !v.is_finite()) {
+            return Err(ReadReason::NotFinite { point: at as u64 });
+        }
+        let field = Field {
+            unit: self.unit.clone(),
+            integer: self.number.is_integer(),
+            ..Field::new(self.field.clone(), values)
+        };
+        image::grid_mesh(self.grid, vec![field], Vec::new())
     }
 }
 

@@ -1,11 +1,13 @@
 //! VTK XML unstructured grids (`.vtu`), all encodings, any number of pieces. Vertices as cells are left out: what has no
 //! others is a mesh of points without tetrahedra.
 
+use crate::io::CellData;
+use crate::io::ReadOptions;
 use crate::io::cells;
 use crate::io::error::At;
 use crate::io::error::ReadError;
 use crate::io::error::ReadReason;
-use crate::io::fields;
+use crate::io::fields::Collector;
 use crate::io::points_from;
 use crate::io::xml::Array;
 use crate::io::xml::Document;
@@ -14,10 +16,10 @@ use crate::mesh::Field;
 use crate::mesh::TetMesh;
 
 /// Reads a document of type `UnstructuredGrid`. The points of different pieces stay different points.
-pub(super) fn read(document: &Document<'_>) -> Result<TetMesh, ReadError> {
+pub(super) fn read(document: &Document<'_>, options: &ReadOptions) -> Result<TetMesh, ReadError> {
     let mut mesh = TetMesh::default();
     for (i, piece) in document.pieces.iter().enumerate() {
-        let part = read_piece(document, piece, i, mesh.positions.len())?;
+        let part = read_piece(document, piece, i, mesh.positions.len(), options)?;
         join(&mut mesh, part, i == 0).at(|| format!("piece {i}, <PointData>"))?;
     }
     Ok(mesh)
@@ -28,6 +30,7 @@ fn read_piece(
     piece: &Piece<'_>,
     number: usize,
     first: usize,
+    options: &ReadOptions,
 ) -> Result<TetMesh, ReadError> {
     let place = || format!("piece {number}");
     let points = piece.attributes.count("NumberOfPoints").at(place)?;
@@ -40,13 +43,60 @@ fn read_piece(
         .at(place)?;
     let tets = read_cells(document, piece, number, cells, points, first)?;
     let positions = read_points(document, piece, number, points)?;
-    let mut list = Vec::new();
-    for array in piece.section("PointData").filter(|a| a.number_type().is_some()) {
+    let fields = read_fields(document, piece, "PointData", points, options)?;
+    // Where all cells were left out, so is what is known of them.
+    let (cell_data, cells) =
+        if tets.len() < cells { (CellData::LeaveOut, 0) } else { (options.cells, cells) };
+    let cell_fields = match cell_data {
+        CellData::LeaveOut => Vec::new(),
+        CellData::Names => name_fields(piece, "CellData", options)?,
+        CellData::Values => read_fields(document, piece, "CellData", cells, options).map_err(at_cell)?,
+    };
+    Ok(TetMesh { positions, fields, tets, grid: None, cell_fields })
+}
+
+/// The fields in a section of a piece, each of `tuples` values.
+pub(super) fn read_fields(
+    document: &Document<'_>,
+    piece: &Piece<'_>,
+    section: &str,
+    tuples: usize,
+    options: &ReadOptions,
+) -> Result<Vec<Field>, ReadError> {
+    let mut collector = Collector::new(options.fields.as_deref());
+    for array in piece.section(section) {
+        let Some(number) = array.number_type() else { continue };
         let components = array.components().at(|| array.place())?;
-        let values = document.floats(array, points, components).at(|| array.place())?;
-        fields::append(&mut list, array.name(), components, values).at(|| array.place())?;
+        let Some(claim) = collector.claim(array.name(), components).at(|| array.place())? else { continue };
+        let values = document.floats(array, tuples, components).at(|| array.place())?;
+        collector.fill(claim, values, number.is_integer(), array.unit()).at(|| array.place())?;
     }
-    Ok(TetMesh { positions, fields: list, tets, grid: None })
+    Ok(collector.fields)
+}
+
+/// The same fields without their values.
+pub(super) fn name_fields(
+    piece: &Piece<'_>,
+    section: &str,
+    options: &ReadOptions,
+) -> Result<Vec<Field>, ReadError> {
+    let mut collector = Collector::new(options.fields.as_deref());
+    for array in piece.section(section).filter(|array| array.number_type().is_some()) {
+        let components = array.components().at(|| array.place())?;
+        if let Some(claim) = collector.claim(array.name(), components).at(|| array.place())? {
+            collector.keep_names(claim);
+        }
+    }
+    Ok(collector.fields)
+}
+
+/// A point that is named in an error about a field at cells is a cell.
+pub(super) fn at_cell(error: ReadError) -> ReadError {
+    let reason = match error.reason {
+        ReadReason::NotFinite { point } => ReadReason::NotFiniteCell { cell: point },
+        other => other,
+    };
+    ReadError { reason, ..error }
 }
 
 fn read_points(
@@ -108,19 +158,26 @@ fn join(mesh: &mut TetMesh, part: TetMesh, is_first: bool) -> Result<(), ReadRea
         *mesh = part;
         return Ok(());
     }
-    if let Some(extra) = part.fields.iter().find(|f| !mesh.fields.iter().any(|g| g.name == f.name)) {
+    join_fields(&mut mesh.fields, &part.fields)?;
+    join_fields(&mut mesh.cell_fields, &part.cell_fields)?;
+    mesh.positions.extend(part.positions);
+    mesh.tets.extend(part.tets);
+    Ok(())
+}
+
+fn join_fields(fields: &mut [Field], more: &[Field]) -> Result<(), ReadReason> {
+    if let Some(extra) = more.iter().find(|f| !fields.iter().any(|g| g.name == f.name)) {
         return Err(ReadReason::Missing(format!(
             "array \"{}\", which this piece has, in an earlier piece",
             extra.name
         )));
     }
-    for Field { name, values } in &mut mesh.fields {
-        let same = part.fields.iter().find(|f| f.name == *name);
+    for Field { name, values, integer, .. } in fields {
+        let same = more.iter().find(|f| f.name == *name);
         let same =
             same.ok_or_else(|| ReadReason::Missing(format!("array \"{name}\", which earlier pieces have,")))?;
         values.extend_from_slice(&same.values);
+        *integer &= same.integer;
     }
-    mesh.positions.extend(part.positions);
-    mesh.tets.extend(part.tets);
     Ok(())
 }

@@ -7,11 +7,14 @@ use std::io::Write;
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
 
+use crate::io::fields;
 use crate::mesh::Field;
 use crate::mesh::TetMesh;
 
 /// Bytes of a block before compression, as VTK has it.
 const BLOCK: usize = 32768;
+/// Largest integer up to which `f64` holds all.
+const MAX_EXACT_INTEGER: f64 = 9_007_199_254_740_992.0;
 /// VTK's number for a tetrahedron.
 const TETRAHEDRON: u8 = 10;
 
@@ -21,15 +24,16 @@ const TETRAHEDRON: u8 = 10;
 /// If `out` fails.
 pub fn write_vtu(mesh: &TetMesh, out: &mut impl Write) -> io::Result<()> {
     let mut data = Appended::default();
-    let fields = point_data(mesh, &mut data)?;
+    let arrays = point_data(mesh, &mut data)?;
     let points = data.append(mesh.positions.as_flattened(), f64::to_le_bytes)?;
     let connectivity = data.append(mesh.tets.as_flattened(), |v| i64::from(v).to_le_bytes())?;
     let ends: Vec<i64> = (1..=mesh.tets.len() as i64).map(|i| 4 * i).collect();
     let offsets = data.append(&ends, i64::to_le_bytes)?;
     let types = data.append(&vec![TETRAHEDRON; mesh.tets.len()], |v| [v])?;
     let body = format!(
-        "    <Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n{fields}\
+        "{}    <Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n{arrays}\
          \x20     <Points>\n{}      </Points>\n      <Cells>\n{}{}{}      </Cells>\n    </Piece>\n",
+        field_data(mesh),
         mesh.positions.len(),
         mesh.tets.len(),
         array("Float64", "Points", 3, points),
@@ -50,7 +54,7 @@ pub fn write_vti(mesh: &TetMesh, out: &mut impl Write) -> io::Result<()> {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, problem));
     };
     let mut data = Appended::default();
-    let fields = point_data(mesh, &mut data)?;
+    let arrays = point_data(mesh, &mut data)?;
     let last = grid.dims.map(|d| d.saturating_sub(1));
     let extent = format!("0 {} 0 {} 0 {}", last[0], last[1], last[2]);
     let three = |v: [f64; 3]| format!("{:?} {:?} {:?}", v[0], v[1], v[2]);
@@ -59,7 +63,7 @@ pub fn write_vti(mesh: &TetMesh, out: &mut impl Write) -> io::Result<()> {
         three(grid.origin),
         three(grid.spacing)
     );
-    let body = format!("    <Piece Extent=\"{extent}\">\n{fields}    </Piece>\n");
+    let body = format!("{}    <Piece Extent=\"{extent}\">\n{arrays}    </Piece>\n", field_data(mesh));
     write_file("ImageData", &attributes, &body, &data.bytes, out)
 }
 
@@ -80,21 +84,102 @@ pub(super) fn write_file(
     out.write_all(b"\n  </AppendedData>\n</VTKFile>\n")
 }
 
-/// The element `<PointData>`, its arrays appended to `data`.
+/// The element `<PointData>`, its arrays appended to `data`. Components that follow one another become a vector again, and
+/// its length, which follows from them, is left out.
 fn point_data(mesh: &TetMesh, data: &mut Appended) -> io::Result<String> {
     let points = mesh.positions.len();
-    let mut arrays = String::new();
-    for Field { name, values } in &mesh.fields {
-        if values.len() != points {
-            let problem = format!("field \"{name}\" has {} values for {points} points", values.len());
-            return Err(io::Error::new(io::ErrorKind::InvalidInput, problem));
-        }
-        let offset = data.append(values, f64::to_le_bytes)?;
-        arrays.push_str(&array("Float64", name, 1, offset));
+    if let Some(Field { name, values, .. }) = mesh.fields.iter().find(|f| f.values.len() != points) {
+        let problem = format!("field \"{name}\" has {} values for {points} points", values.len());
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, problem));
     }
-    let scalars =
-        mesh.fields.first().map(|f| format!(" Scalars=\"{}\"", escaped(&f.name))).unwrap_or_default();
+    let mut arrays = String::new();
+    let mut scalars = None;
+    let mut vectors: Vec<(&str, Option<f64>)> = Vec::new();
+    let mut rest = mesh.fields.as_slice();
+    while let Some(first) = rest.first() {
+        let (array, behind) = rest.split_at(components(rest));
+        rest = behind;
+        let vector = first.vector.as_ref().map(|vector| vector.name.as_str());
+        let name = match vector {
+            Some(vector) if array.len() > 1 => {
+                vectors.push((vector, first.time));
+                vector
+            }
+            Some(vector) if is_length(first) && vectors.contains(&(vector, first.time)) => continue,
+            _ => &first.name,
+        };
+        let name = name_at_time(mesh, first, name);
+        arrays.push_str(&point_array(array, &name, data)?);
+        if array.len() == 1 && scalars.is_none() {
+            scalars = Some(name);
+        }
+    }
+    let scalars = scalars.map(|name| format!(" Scalars=\"{}\"", escaped(&name))).unwrap_or_default();
     Ok(format!("      <PointData{scalars}>\n{arrays}      </PointData>\n"))
+}
+
+fn is_length(field: &Field) -> bool {
+    field.vector.as_ref().is_some_and(|vector| vector.component.is_none())
+}
+
+/// How many of the first fields are the components of one vector, named as a reader would name them; else 1.
+fn components(fields: &[Field]) -> usize {
+    let Some((first, Some(vector))) = fields.first().map(|f| (f, &f.vector)) else { return 1 };
+    let follows = |(c, field): (usize, &Field)| {
+        let part = field.vector.as_ref().filter(|part| part.name == vector.name && field.time == first.time);
+        part.and_then(|part| part.component).is_some_and(|component| usize::from(component) == c)
+    };
+    let count = fields.iter().enumerate().take_while(|&each| follows(each)).count();
+    let named = |(c, field): (usize, &Field)| {
+        field.name == format!("{}_{}", vector.name, fields::component_name(count, c))
+    };
+    if count > 1 && fields.iter().take(count).enumerate().all(named) { count } else { 1 }
+}
+
+/// A name for one of several time steps.
+fn name_at_time(mesh: &TetMesh, field: &Field, name: &str) -> String {
+    let several = mesh.fields.iter().any(|f| f.name == field.name && f.time != field.time);
+    match field.time {
+        Some(time) if several => format!("{name}@{time:?}"),
+        _ => name.to_owned(),
+    }
+}
+
+/// An array of these components.
+fn point_array(fields: &[Field], name: &str, data: &mut Appended) -> io::Result<String> {
+    let points = fields.first().map_or(0, |field| field.values.len());
+    let values: Vec<f64> =
+        (0..points).flat_map(|i| fields.iter().map(move |field| field.values[i])).collect();
+    // Integers beyond this were rounded when they were read.
+    let fits = |v: &f64| v.fract() == 0.0 && v.abs() <= MAX_EXACT_INTEGER;
+    let (kind, offset) = if fields.iter().all(|field| field.integer) && values.iter().all(fits) {
+        ("Int64", data.append(&values, |v| (v as i64).to_le_bytes())?)
+    } else {
+        ("Float64", data.append(&values, f64::to_le_bytes)?)
+    };
+    let element = array(kind, name, fields.len(), offset);
+    let unit = fields.first().map_or("", |field| field.unit.as_str());
+    if unit.is_empty() {
+        return Ok(element);
+    }
+    let open = element.trim_end().trim_end_matches("/>");
+    let key = format!(
+        "<InformationKey name=\"UNITS_LABEL\" location=\"vtkDataArray\">{}</InformationKey>",
+        escaped(unit)
+    );
+    Ok(format!("{open}>{key}</DataArray>\n"))
+}
+
+/// The time of all fields, if it is the same, as an element `<FieldData>`.
+fn field_data(mesh: &TetMesh) -> String {
+    let time = mesh.fields.first().and_then(|field| field.time);
+    match time.filter(|_| mesh.fields.iter().all(|field| field.time == time)) {
+        Some(time) => format!(
+            "    <FieldData>\n      <DataArray type=\"Float64\" Name=\"TimeValue\" NumberOfTuples=\"1\" \
+             format=\"ascii\">{time:?}</DataArray>\n    </FieldData>\n"
+        ),
+        None => String::new(),
+    }
 }
 
 pub(super) fn array(kind: &str, name: &str, components: usize, offset: usize) -> String {

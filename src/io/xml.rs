@@ -48,7 +48,7 @@ impl Attributes {
             .ok_or_else(|| ReadReason::Syntax(format!("attribute {name}=\"{text}\" is not {N} numbers")))
     }
 
-    fn of(element: &BytesStart<'_>) -> Result<Self, ReadReason> {
+    pub fn of(element: &BytesStart<'_>) -> Result<Self, ReadReason> {
         let mut list = Vec::new();
         for attribute in element.attributes().with_checks(false) {
             let attribute = attribute.map_err(|e| ReadReason::Syntax(format!("not well-formed XML: {e}")))?;
@@ -70,9 +70,17 @@ pub(super) struct Array<'a> {
     pub piece: usize,
     attributes: Attributes,
     text: Cow<'a, str>,
+    /// The unit, if an `<InformationKey>` tells it.
+    unit: String,
 }
 
 impl Array<'_> {
+    /// The unit of the values; empty if it is not told. VTK has a key for it, others write an attribute.
+    pub fn unit(&self) -> &str {
+        let told = ["Unit", "Units", "unit", "units"].into_iter().find_map(|name| self.attributes.get(name));
+        told.unwrap_or(&self.unit).trim()
+    }
+
     /// The array's name; empty if it has none.
     pub fn name(&self) -> &str {
         self.attributes.get("Name").unwrap_or_default()
@@ -121,6 +129,8 @@ pub(super) struct Document<'a> {
     pub dataset: Attributes,
     /// The parts.
     pub pieces: Vec<Piece<'a>>,
+    /// The arrays of the whole data set.
+    field_data: Vec<Array<'a>>,
     framing: Framing,
     appended: Option<Appended<'a>>,
 }
@@ -155,6 +165,13 @@ impl<'a> Document<'a> {
             }
         }
         parser.finish(data)
+    }
+
+    /// The time that the data set is of, as VTK tells it; none if that is not a finite number.
+    pub fn time(&self) -> Option<f64> {
+        let array = self.field_data.iter().find(|array| array.name() == "TimeValue")?;
+        let time = self.floats(array, 1, 1).ok()?.first().copied();
+        time.filter(|time| time.is_finite())
     }
 
     /// The values of a numeric array of `tuples` tuples of `components`.
@@ -256,8 +273,14 @@ struct Parser<'a> {
     file: Option<Attributes>,
     dataset: Option<Attributes>,
     pieces: Vec<Piece<'a>>,
+    field_data: Vec<Array<'a>>,
     appended: Option<Attributes>,
+    /// Whether the last `<InformationKey>` is that of a unit.
+    in_unit: bool,
 }
+
+/// VTK's key for the unit of an array.
+const UNIT_KEY: &str = "UNITS_LABEL";
 
 impl<'a> Parser<'a> {
     fn open(&mut self, element: &BytesStart<'_>, stays_open: bool) -> Result<(), ReadReason> {
@@ -272,13 +295,17 @@ impl<'a> Parser<'a> {
                 self.pieces.push(Piece { attributes: Attributes::of(element)?, arrays: Vec::new() });
             }
             (["VTKFile", _, "Piece", section], "DataArray") => {
-                let section = (*section).to_owned();
-                let piece = self.pieces.len().saturating_sub(1);
-                let array =
-                    Array { section, piece, attributes: Attributes::of(element)?, text: Cow::Borrowed("") };
+                let array = self.new_array((*section).to_owned(), element)?;
                 if let Some(piece) = self.pieces.last_mut() {
                     piece.arrays.push(array);
                 }
+            }
+            (["VTKFile", _, "FieldData"], "DataArray") => {
+                let array = self.new_array("FieldData".to_owned(), element)?;
+                self.field_data.push(array);
+            }
+            (["VTKFile", _, "Piece", _, "DataArray"], "InformationKey") => {
+                self.in_unit = Attributes::of(element)?.get("name") == Some(UNIT_KEY);
             }
             _ => {}
         }
@@ -295,16 +322,30 @@ impl<'a> Parser<'a> {
         self.file.as_ref()?.get("type")
     }
 
+    fn new_array(&self, section: String, element: &BytesStart<'_>) -> Result<Array<'a>, ReadReason> {
+        let piece = self.pieces.len().saturating_sub(1);
+        let attributes = Attributes::of(element)?;
+        Ok(Array { section, piece, attributes, text: Cow::Borrowed(""), unit: String::new() })
+    }
+
     fn text(&mut self, text: Cow<'a, str>) {
-        // Elements inside an array (as InformationKey) hold text of their own.
-        let in_array = self.stack.len() == 5 && self.stack[4] == "DataArray" && self.stack[2] == "Piece";
-        let array = self.pieces.last_mut().and_then(|p| p.arrays.last_mut());
-        if let (true, Some(array)) = (in_array, array) {
-            if array.text.trim_ascii().is_empty() {
-                array.text = text;
-            } else if !text.trim_ascii().is_empty() {
-                array.text.to_mut().push_str(&text);
+        let parents: Vec<&str> = self.stack.iter().map(String::as_str).collect();
+        let of_piece = self.pieces.last_mut().and_then(|p| p.arrays.last_mut());
+        // Elements inside an array hold text of their own.
+        let array = match parents.as_slice() {
+            ["VTKFile", _, "Piece", _, "DataArray"] => of_piece,
+            ["VTKFile", _, "FieldData", "DataArray"] => self.field_data.last_mut(),
+            ["VTKFile", _, "Piece", _, "DataArray", "InformationKey"] if self.in_unit => {
+                of_piece.into_iter().for_each(|array| array.unit.push_str(&text));
+                return;
             }
+            _ => return,
+        };
+        let Some(array) = array else { return };
+        if array.text.trim_ascii().is_empty() {
+            array.text = text;
+        } else if !text.trim_ascii().is_empty() {
+            array.text.to_mut().push_str(&text);
         }
     }
 
@@ -321,7 +362,8 @@ impl<'a> Parser<'a> {
         let dataset = self.dataset.ok_or_else(|| ReadReason::Missing(format!("<{kind}>"))).at(String::new)?;
         let appended =
             self.appended.map(|a| appended(&a, data)).transpose().at(|| "<AppendedData>".into())?;
-        Ok(Document { kind, dataset, pieces: self.pieces, framing, appended })
+        let (pieces, field_data) = (self.pieces, self.field_data);
+        Ok(Document { kind, dataset, pieces, field_data, framing, appended })
     }
 }
 

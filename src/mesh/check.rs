@@ -53,6 +53,11 @@ pub(crate) fn check_arrays(mesh: &TetMesh) -> Result<(), MeshError> {
         let (field, values) = (field.name.clone(), field.values.len());
         return Err(MeshError::FieldLength { field, values, points });
     }
+    let cells = mesh.tets.len();
+    if let Some(field) = mesh.cell_fields.iter().find(|f| ![0, cells].contains(&f.values.len())) {
+        let (field, values) = (field.name.clone(), field.values.len());
+        return Err(MeshError::CellFieldLength { field, values, cells });
+    }
     if let Some(point) = mesh.positions.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
         return Err(MeshError::NotFinite { point });
     }

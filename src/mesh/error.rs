@@ -21,6 +21,15 @@ pub enum MeshError {
         /// How many points there are.
         points: usize,
     },
+    /// A field at the cells is not as long as the list of cells.
+    CellFieldLength {
+        /// The field's name.
+        field: String,
+        /// How many values it has.
+        values: usize,
+        /// How many cells there are.
+        cells: usize,
+    },
     /// A point has an infinite or undefined coordinate.
     NotFinite {
         /// The point.
@@ -82,6 +91,9 @@ impl fmt::Display for MeshError {
             }
             Self::FieldLength { field, values, points } => {
                 write!(f, "field \"{field}\" has {values} values for {points} points; give one value a point")
+            }
+            Self::CellFieldLength { field, values, cells } => {
+                write!(f, "field \"{field}\" has {values} values for {cells} cells; give one value a cell")
             }
             Self::NotFinite { point } => {
                 write!(f, "point {point} has an infinite or undefined coordinate; mend it in the input")

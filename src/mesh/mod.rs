@@ -1,10 +1,12 @@
 //! The vocabulary of tetrahedral meshes: plain arrays, adjacency, validity.
 
 mod adjacency;
+mod cell_data;
 mod check;
 mod error;
 mod kuhn;
 mod repair;
+mod series;
 mod tet_mesh;
 
 pub use adjacency::{MAX_TETS, Topology, neighbors, topology};
@@ -12,7 +14,8 @@ pub use check::check;
 pub use error::MeshError;
 pub use kuhn::kuhn_tets;
 pub use repair::{RepairReport, repair};
-pub use tet_mesh::{Field, Grid, TetMesh};
+pub use series::StepError;
+pub use tet_mesh::{Field, Grid, TetMesh, VectorPart};
 
 /// "No tetrahedron": the neighbour across a boundary face.
 pub const NONE: u32 = u32::MAX;

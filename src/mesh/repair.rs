@@ -118,10 +118,14 @@ impl Work {
             if keep(t, self.mesh.tets[t]) {
                 self.mesh.tets[kept] = self.mesh.tets[t];
                 self.cells[kept] = self.cells[t];
+                for field in self.mesh.cell_fields.iter_mut().filter(|f| !f.values.is_empty()) {
+                    field.values[kept] = field.values[t];
+                }
                 kept += 1;
             }
         }
         self.mesh.tets.truncate(kept);
+        self.mesh.cell_fields.iter_mut().for_each(|field| field.values.truncate(kept));
         self.cells.truncate(kept);
         before - kept
     }
@@ -314,8 +318,8 @@ mod tests {
 
     fn mesh(positions: &[[f64; 3]], tets: &[[u32; 4]]) -> TetMesh {
         let values = (0..positions.len()).map(|i| i as f64).collect();
-        let fields = vec![Field { name: "f".into(), values }];
-        TetMesh { positions: positions.to_vec(), tets: tets.to_vec(), fields, grid: None }
+        let fields = vec![Field::new("f", values)];
+        TetMesh { positions: positions.to_vec(), tets: tets.to_vec(), fields, ..TetMesh::default() }
     }
 
     fn repaired(positions: &[[f64; 3]], tets: &[[u32; 4]]) -> (TetMesh, RepairReport) {
@@ -376,6 +380,15 @@ mod tests {
         let (out, report) = repaired(&SQUARE[..5], &[SLIVER, BELOW[0], BELOW[1]]);
         assert_eq!(report, RepairReport { flat_tets: 1, ..RepairReport::default() });
         assert_eq!(out.tets, BELOW);
+    }
+
+    #[test]
+    fn fields_at_cells_follow_their_cells() {
+        let mut input = mesh(&SQUARE[..5], &[BELOW[0], SLIVER, BELOW[1], BELOW[0]]);
+        input.cell_fields = vec![Field::new("m", vec![1.0, 2.0, 3.0, 4.0]), Field::new("named", Vec::new())];
+        let (out, _) = repair(input).unwrap();
+        assert_eq!(out.cell_fields[0].values, [1.0, 3.0]);
+        assert!(out.cell_fields[1].values.is_empty());
     }
 
     #[test]

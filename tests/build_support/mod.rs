@@ -40,7 +40,7 @@ pub fn blocks(cells: [u32; 3], fields: &[fn([f64; 3]) -> f64], inside: impl Fn([
     mesh.grid = mesh.grid.filter(|_| whole);
     for (i, field) in fields.iter().enumerate() {
         let values = mesh.positions.iter().map(|p| field(*p)).collect();
-        mesh.fields.push(Field { name: format!("f{i}"), values });
+        mesh.fields.push(Field::new(format!("f{i}"), values));
     }
     repair(mesh).expect("cells of a grid").0
 }

@@ -103,10 +103,10 @@ fn slab() -> TetMesh {
 pub fn random_input(domain: Domain, fields: usize, random: &mut Random) -> Input {
     let plain = domain.mesh(random);
     let positions: Vec<[f64; 3]> = plain.positions.iter().map(|p| p.map(f64::from)).collect();
-    let mut mesh = TetMesh { positions, fields: Vec::new(), tets: plain.tets, grid: None };
+    let mut mesh = TetMesh { positions, fields: Vec::new(), tets: plain.tets, ..TetMesh::default() };
     for f in 0..fields {
         let values = mesh.positions.iter().map(|_| f64::from(random.between(-500, 500))).collect();
-        mesh.fields.push(Field { name: format!("f{f}"), values });
+        mesh.fields.push(Field::new(format!("f{f}"), values));
     }
     let convex = matches!(domain, Domain::Cube(_) | Domain::SingleTet);
     // The lattice of the domain itself: no rounding, so that its flat sides are flat.

@@ -9,6 +9,7 @@ use base64::engine::general_purpose::STANDARD;
 use tetralod::mesh::Field;
 use tetralod::mesh::Grid;
 use tetralod::mesh::TetMesh;
+use tetralod::mesh::VectorPart;
 
 /// The folder of real data sets, if this run has one; says so if not.
 pub fn real_data() -> Option<PathBuf> {
@@ -220,11 +221,16 @@ pub fn sample() -> TetMesh {
     let mut mesh = TetMesh::from_grid(grid, Vec::new());
     let values = |f: fn(f64) -> f64| (0..12).map(|i| f(f64::from(i))).collect();
     mesh.fields = vec![
-        Field { name: "scalar <&> \"1\"".into(), values: values(|i| i * 0.375 - 2.0) },
-        Field { name: "v_x".into(), values: values(|i| 3.0 * i) },
-        Field { name: "v_y".into(), values: values(|i| -4.0 * i) },
-        Field { name: "v_magnitude".into(), values: values(|i| 5.0 * i) },
+        Field::new("scalar <&> \"1\"", values(|i| i * 0.375 - 2.0)),
+        Field::new("v_x", values(|i| 3.0 * i)),
+        Field::new("v_y", values(|i| -4.0 * i)),
+        Field::new("v_magnitude", values(|i| 5.0 * i)),
     ];
+    // They are written as an array of integers.
+    for (field, component) in mesh.fields[1..].iter_mut().zip([Some(0), Some(1), None]) {
+        field.vector = Some(VectorPart { name: "v".into(), component });
+        field.integer = component.is_some();
+    }
     mesh.grid = None;
     mesh
 }
@@ -330,7 +336,7 @@ pub fn sample_vtk(version: &str, binary: bool) -> Vec<u8> {
 pub fn grid_sample() -> TetMesh {
     let grid = Grid { dims: [4, 3, 2], origin: [1.0, 2.0, -3.0], spacing: [0.5, 1.0, 0.25] };
     let values = (0..24).map(f64::from).collect();
-    TetMesh::from_grid(grid, vec![Field { name: "density".into(), values }])
+    TetMesh::from_grid(grid, vec![Field { integer: true, ..Field::new("density", values) }])
 }
 
 /// [`grid_sample`] as a `.vti` file.

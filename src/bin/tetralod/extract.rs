@@ -73,11 +73,9 @@ fn reference_units(info: &MtInfo, mesh: &CurrentMesh) -> TetMesh {
         |f: usize| slots.clone().map(move |slot| info.fields[f].value(mesh.levels(slot)[f])).collect();
     TetMesh {
         positions: mesh.positions().iter().map(|&q| info.lattice.point(q)).collect(),
-        fields: (0..info.fields.len())
-            .map(|f| Field { name: info.fields[f].name.clone(), values: values(f) })
-            .collect(),
+        fields: (0..info.fields.len()).map(|f| Field::new(info.fields[f].name.clone(), values(f))).collect(),
         tets: mesh.tets().to_vec(),
-        grid: None,
+        ..TetMesh::default()
     }
 }
 

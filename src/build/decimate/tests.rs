@@ -50,7 +50,7 @@ fn blocks(cells: [u32; 3], inside: impl Fn([u32; 3]) -> bool) -> TetMesh {
     mesh.grid = None;
     for (name, field) in [("hilly", hilly as fn([f64; 3]) -> f64), ("wavy", wavy)] {
         let values = mesh.positions.iter().map(|p| field(*p)).collect();
-        mesh.fields.push(Field { name: name.into(), values });
+        mesh.fields.push(Field::new(name, values));
     }
     repair(mesh).expect("cells of a grid").0
 }

@@ -1,0 +1,125 @@
+//! Lists of time steps: ParaView's collections (`.pvd`).
+
+use std::path::Component;
+use std::path::Path;
+use std::path::PathBuf;
+
+use quick_xml::Reader;
+use quick_xml::events::Event;
+
+use crate::io::error::At;
+use crate::io::error::ReadError;
+use crate::io::error::ReadReason;
+use crate::io::in_file;
+use crate::io::load;
+use crate::io::lower_extension;
+use crate::io::xml::Attributes;
+
+/// A file that holds one time step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Step {
+    /// The file.
+    pub path: PathBuf,
+    /// The time, if the list tells it; the file may, too.
+    pub time: Option<f64>,
+}
+
+/// The time steps that the file at `path` stands for: those that it lists if it is a `.pvd`, in ascending order, else
+/// itself alone.
+///
+/// # Errors
+/// If the list cannot be read, is damaged or empty, or has several files for one time.
+pub fn steps(path: &Path) -> Result<Vec<Step>, ReadError> {
+    if lower_extension(path) != "pvd" {
+        return Ok(vec![Step { path: path.to_owned(), time: None }]);
+    }
+    let listed = load(path).and_then(|bytes| parse(&bytes).at(String::new));
+    let listed = listed.map_err(|error| in_file(error, &path.display().to_string()))?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let step = |(time, file): (f64, String)| Step { path: folder.join(file), time: Some(time) };
+    Ok(listed.into_iter().map(step).collect())
+}
+
+/// Times and files, in ascending order.
+fn parse(bytes: &[u8]) -> Result<Vec<(f64, String)>, ReadReason> {
+    let not_xml = |what: String| ReadReason::Syntax(format!("not well-formed XML: {what}"));
+    let text = std::str::from_utf8(bytes).map_err(|_| ReadReason::Syntax("the text is not UTF-8".into()))?;
+    let mut reader = Reader::from_str(text);
+    let (mut depth, mut listed) = (0_u32, Vec::new());
+    let mut is_list = false;
+    loop {
+        let event = reader.read_event().map_err(|error| not_xml(error.to_string()))?;
+        match &event {
+            Event::Start(element) | Event::Empty(element) => {
+                let name = element.name().as_ref().to_owned();
+                is_list |= depth == 1 && name == "Collection";
+                if is_list && name == "DataSet" {
+                    listed.push(entry(&Attributes::of(element)?)?);
+                }
+                depth += u32::from(matches!(event, Event::Start(_)));
+            }
+            Event::End(_) => depth = depth.saturating_sub(1),
+            Event::Eof => break,
+            _ => {}
+        }
+    }
+    if depth > 0 {
+        return Err(not_xml("an element does not end".into()));
+    }
+    if listed.is_empty() {
+        return Err(ReadReason::Missing("an entry <DataSet>".into()));
+    }
+    listed.sort_by(|a, b| a.0.total_cmp(&b.0));
+    if let Some(pair) = listed.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+        let what = format!("time {} with more than one file", pair[0].0);
+        let remedy = "merge the parts of each time step into one file".into();
+        return Err(ReadReason::Unsupported { what, remedy });
+    }
+    Ok(listed)
+}
+
+/// The time and the file of an entry, which must lie in the list's folder or below.
+fn entry(attributes: &Attributes) -> Result<(f64, String), ReadReason> {
+    let missing = |name: &str| ReadReason::Missing(format!("attribute {name} of <DataSet>"));
+    let file = attributes.get("file").ok_or_else(|| missing("file"))?;
+    let time = attributes.get("timestep").ok_or_else(|| missing("timestep"))?;
+    let time = time.parse().ok().filter(|time: &f64| time.is_finite());
+    let time = time.ok_or_else(|| ReadReason::Syntax("a timestep is not a number".into()))?;
+    let below = |part: Component<'_>| matches!(part, Component::Normal(_) | Component::CurDir);
+    if file.is_empty() || !Path::new(file).components().all(below) {
+        let what = format!("a <DataSet> in another folder (\"{file}\")");
+        let remedy = "put the files beside the list or below it".into();
+        return Err(ReadReason::Unsupported { what, remedy });
+    }
+    // Zero has two signs, which would not sort as equal.
+    Ok((time + 0.0, file.to_owned()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn list(entries: &str) -> Result<Vec<(f64, String)>, ReadReason> {
+        parse(format!("<VTKFile type=\"Collection\"><Collection>{entries}</Collection></VTKFile>").as_bytes())
+    }
+
+    #[test]
+    fn steps_come_in_order_of_time() {
+        let entries = "<DataSet timestep=\"1.5\" part=\"0\" file=\"b/1.vtu\"/>\
+                       <DataSet timestep=\"-0.5\" group=\"\" file=\"0.vtu\"></DataSet>";
+        assert_eq!(list(entries).unwrap(), [(-0.5, "0.vtu".into()), (1.5, "b/1.vtu".into())]);
+    }
+
+    #[test]
+    fn lists_that_do_not_say_what_is_needed_are_refused() {
+        let refused = |entries: &str| list(entries).unwrap_err().to_string();
+        assert!(refused("").contains("DataSet"));
+        assert!(refused("<DataSet timestep=\"0\"/>").contains("file"));
+        assert!(refused("<DataSet timestep=\"nan\" file=\"a.vtu\"/>").contains("timestep"));
+        assert!(refused("<DataSet timestep=\"0\" file=\"../a.vtu\"/>").contains("beside"));
+        assert!(refused("<DataSet timestep=\"0\" file=\"/a.vtu\"/>").contains("beside"));
+        let twice = "<DataSet timestep=\"0\" file=\"a.vtu\"/><DataSet timestep=\"-0\" file=\"b.vtu\"/>";
+        assert!(refused(twice).contains("merge"));
+        assert!(refused("<DataSet").contains("XML"));
+    }
+}

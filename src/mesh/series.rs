@@ -1,0 +1,153 @@
+//! Time steps over one mesh.
+
+use std::fmt;
+
+use crate::mesh::NONE;
+use crate::mesh::TetMesh;
+
+/// Why two meshes are not time steps over one mesh. Cells and points are numbered as in the input, from 0.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum StepError {
+    /// They do not have as many points.
+    Points {
+        /// Points of the first step and of this one.
+        counts: [usize; 2],
+    },
+    /// They do not have as many cells.
+    Cells {
+        /// Cells of the first step and of this one.
+        counts: [usize; 2],
+    },
+    /// A point that cells use has moved.
+    Moved {
+        /// The first such point.
+        point: usize,
+    },
+    /// A cell has other points.
+    Cell {
+        /// The first such cell.
+        cell: usize,
+    },
+    /// They do not have the same fields.
+    Field {
+        /// The first one that only one of them has.
+        name: String,
+    },
+}
+
+impl fmt::Display for StepError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Points { counts: [first, this] } => {
+                write!(f, "the first time step has {first} points, this one {this}")?;
+            }
+            Self::Cells { counts: [first, this] } => {
+                write!(f, "the first time step has {first} cells, this one {this}")?;
+            }
+            Self::Moved { point } => write!(f, "point {point} is not where it is in the first time step")?,
+            Self::Cell { cell } => write!(f, "cell {cell} has other points than in the first time step")?,
+            Self::Field { name } => {
+                return write!(
+                    f,
+                    "field \"{name}\" is in some time steps alone; choose fields that all of them have"
+                );
+            }
+        }
+        write!(f, "; time steps must share one mesh: build an MT of each instead")
+    }
+}
+
+impl std::error::Error for StepError {}
+
+impl TetMesh {
+    /// Appends the fields of another time step. Both are meshes as they were read: of what [`repair`](crate::mesh::repair)
+    /// mends later, how cells are turned and where points are that no cell uses may differ.
+    ///
+    /// # Errors
+    /// The first difference between the meshes; this one is unchanged then.
+    pub fn add_step(&mut self, step: Self) -> Result<(), StepError> {
+        self.same_mesh(&step)?;
+        let names = |mesh: &Self| -> Vec<(bool, String)> {
+            let points = mesh.fields.iter().map(|f| (false, f.name.clone()));
+            points.chain(mesh.cell_fields.iter().map(|f| (true, f.name.clone()))).collect()
+        };
+        let (known, new) = (names(self), names(&step));
+        let only =
+            |of: &[(bool, String)], not: &[(bool, String)]| of.iter().find(|n| !not.contains(n)).cloned();
+        if let Some((_, name)) = only(&new, &known).or_else(|| only(&known, &new)) {
+            return Err(StepError::Field { name });
+        }
+        self.fields.extend(step.fields);
+        self.cell_fields.extend(step.cell_fields.into_iter().filter(|f| !f.values.is_empty()));
+        Ok(())
+    }
+
+    fn same_mesh(&self, step: &Self) -> Result<(), StepError> {
+        if self.positions.len() != step.positions.len() {
+            return Err(StepError::Points { counts: [self.positions.len(), step.positions.len()] });
+        }
+        if self.tets.len() != step.tets.len() {
+            return Err(StepError::Cells { counts: [self.tets.len(), step.tets.len()] });
+        }
+        let sorted = |mut tet: [u32; 4]| {
+            tet.sort_unstable();
+            tet
+        };
+        let mut pairs = self.tets.iter().zip(&step.tets);
+        if let Some(cell) = pairs.position(|(a, b)| a != b && sorted(*a) != sorted(*b)) {
+            return Err(StepError::Cell { cell });
+        }
+        let mut moved: Vec<u32> = (0..self.positions.len() as u32).collect();
+        for (number, (a, b)) in moved.iter_mut().zip(self.positions.iter().zip(&step.positions)) {
+            if a == b {
+                *number = NONE;
+            }
+        }
+        let first = if self.tets.is_empty() {
+            moved.into_iter().find(|&v| v != NONE)
+        } else {
+            let used = self.tets.iter().flatten().filter_map(|&v| moved.get(v as usize).copied());
+            used.filter(|&v| v != NONE).min()
+        };
+        first.map_or(Ok(()), |point| Err(StepError::Moved { point: point as usize }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::Field;
+    use crate::mesh::Grid;
+
+    fn step(time: f64) -> TetMesh {
+        let grid = Grid { dims: [2, 2, 2], origin: [0.0; 3], spacing: [1.0; 3] };
+        let field = Field { time: Some(time), ..Field::new("p", vec![time; 8]) };
+        TetMesh { grid: None, ..TetMesh::from_grid(grid, vec![field]) }
+    }
+
+    #[test]
+    fn steps_over_one_mesh_become_fields_of_one_name() {
+        let mut mesh = step(0.0);
+        let mut turned = step(0.5);
+        turned.tets[2].swap(0, 3);
+        mesh.add_step(turned).unwrap();
+        let told: Vec<_> = mesh.fields.iter().map(|f| (f.name.as_str(), f.time)).collect();
+        assert_eq!(told, [("p", Some(0.0)), ("p", Some(0.5))]);
+    }
+
+    #[test]
+    fn the_first_difference_is_named() {
+        let refused = |change: fn(&mut TetMesh)| {
+            let (mut mesh, mut other) = (step(0.0), step(1.0));
+            change(&mut other);
+            let error = mesh.add_step(other).unwrap_err();
+            assert_eq!(mesh, step(0.0));
+            error
+        };
+        assert_eq!(refused(|m| m.positions[5][1] = 2.0), StepError::Moved { point: 5 });
+        assert_eq!(refused(|m| m.tets.swap(1, 2)), StepError::Cell { cell: 1 });
+        assert_eq!(refused(|m| m.tets.truncate(5)), StepError::Cells { counts: [6, 5] });
+        assert_eq!(refused(|m| m.positions.push([0.0; 3])), StepError::Points { counts: [8, 9] });
+        assert_eq!(refused(|m| m.fields[0].name = "q".into()), StepError::Field { name: "q".into() });
+    }
+}
