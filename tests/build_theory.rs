@@ -11,6 +11,7 @@ use build_support::linear;
 use std::ops::ControlFlow;
 use tetralod::build::BuildConfig;
 use tetralod::build::BuildError;
+use tetralod::build::FieldPrecision;
 use tetralod::build::edge_mt;
 use tetralod::format::EncodeOptions;
 use tetralod::format::encode;
@@ -188,7 +189,8 @@ fn what_cannot_be_built_is_refused() {
     let few = BuildConfig { position_bits: Some(1), ..default() };
     assert!(matches!(refusal(&bent(5), few), BuildError::TooThin { bits: 1, .. }));
     for (position_bits, field_bits) in [(Some(0), 16), (Some(31), 16), (None, 0), (None, 25)] {
-        let config = BuildConfig { position_bits, field_bits, ..default() };
+        let field_precision = FieldPrecision::Bits(field_bits);
+        let config = BuildConfig { position_bits, field_precision, ..default() };
         assert!(matches!(refusal(&good, config), BuildError::Option { .. }));
     }
     let mut inverted = good.clone();

@@ -22,6 +22,7 @@ fn example() -> EdgeMt {
         tetrahedra: 2,
         updates: 1,
         displacement_per_error: 2.0,
+        quantization: 0.0,
     };
     let base = BaseMesh {
         positions: vec![[1, 0, 0], [9, 0, 0], [0, 8, 0], [0, 0, 8]],

@@ -6,7 +6,15 @@ use tetralod::mt::{BaseMesh, CurrentMesh, FieldInfo, MtInfo, MtKind};
 
 /// Two tetrahedra above and below a triangle, with values 10 20 30 80 90.
 fn mesh() -> (MtInfo, CurrentMesh) {
-    let field = FieldInfo { name: "f".into(), min: 0.0, max: 100.0, origin: 0.0, step: 1.0, bits: 7 };
+    let field = FieldInfo {
+        name: "f".into(),
+        min: 0.0,
+        max: 100.0,
+        origin: 0.0,
+        step: 1.0,
+        bits: 7,
+        ..FieldInfo::default()
+    };
     let info = MtInfo {
         kind: MtKind::Edge,
         lattice: Lattice { origin: [-4.0; 3], step: [0.5; 3], bits: 6 },
@@ -15,6 +23,7 @@ fn mesh() -> (MtInfo, CurrentMesh) {
         tetrahedra: 2,
         updates: 0,
         displacement_per_error: 1.0,
+        quantization: 0.0,
     };
     let base = BaseMesh {
         positions: vec![[8, 8, 8], [16, 8, 8], [8, 16, 8], [8, 8, 16], [8, 8, 0]],

@@ -33,8 +33,15 @@ struct Cone {
 
 impl Cone {
     fn info(&self) -> MtInfo {
-        let field =
-            FieldInfo { name: "f".into(), min: 0.0, max: 1.0, origin: 0.0, step: 1.0 / 255.0, bits: 8 };
+        let field = FieldInfo {
+            name: "f".into(),
+            min: 0.0,
+            max: 1.0,
+            origin: 0.0,
+            step: 1.0 / 255.0,
+            bits: 8,
+            ..FieldInfo::default()
+        };
         MtInfo {
             kind: MtKind::Edge,
             lattice: Lattice { origin: [0.0; 3], step: [1.0; 3], bits: 10 },
@@ -43,6 +50,7 @@ impl Cone {
             tetrahedra: 0,
             updates: 1,
             displacement_per_error: 1.0,
+            quantization: 0.0,
         }
     }
 

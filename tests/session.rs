@@ -9,7 +9,15 @@ use tetralod::refine::RequestError;
 use tetralod::session::{Session, SessionError};
 
 fn field(name: &str) -> FieldInfo {
-    FieldInfo { name: name.to_owned(), min: 0.0, max: 100.0, origin: 0.0, step: 1.0, bits: 8 }
+    FieldInfo {
+        name: name.to_owned(),
+        min: 0.0,
+        max: 100.0,
+        origin: 0.0,
+        step: 1.0,
+        bits: 8,
+        ..FieldInfo::default()
+    }
 }
 
 /// Two tetrahedra above and below a triangle. The first update splits a corner of the triangle upwards and
@@ -23,6 +31,7 @@ fn two_splits(last_mask: u64) -> EdgeMt {
         tetrahedra: 4,
         updates: 2,
         displacement_per_error: 1.0,
+        quantization: 0.0,
     };
     let base = BaseMesh {
         positions: vec![[8, 8, 8], [16, 8, 8], [8, 16, 8], [8, 8, 16], [8, 8, 0]],

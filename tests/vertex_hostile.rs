@@ -341,6 +341,7 @@ fn one_insertion(
         tetrahedra: tets.len() as u32 - removed + walls.len() as u32,
         updates: 1,
         displacement_per_error: 1.0,
+        quantization: 0.0,
     };
     let values = vec![0; positions.len()];
     let mut all = positions.to_vec();

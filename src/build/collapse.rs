@@ -9,6 +9,7 @@ use super::OnProgress;
 use super::agenda::Agenda;
 use super::agenda::Key;
 use super::agenda::Levels;
+use super::choice;
 use super::cost::Buckets;
 use super::cost::Evaluator;
 use super::cost::Reference;
@@ -65,13 +66,14 @@ pub fn edge_mt(
         tetrahedra: mesh.tets.len() as u32,
         updates: 0,
         displacement_per_error: config.displacement * diagonal,
+        quantization: quantized.quantization,
     };
     let work = WorkMesh::new(mesh.tets.clone(), neighbors, mesh.positions.len());
     let mut builder = Builder::new(work, &quantized, &info, frozen);
     builder.collapse_all(progress)?;
     let Builder { mesh: base, data, history, .. } = builder;
     let depth = data.height.iter().copied().max().unwrap_or(0);
-    let mt = history::edge_mt(info, &base, &data, &history, progress)?;
+    let (mt, vertices) = history::edge_mt(info, &base, &data, &history, progress)?;
     let summary = BuildSummary {
         vertices: mt.info().vertices,
         tetrahedra: mt.info().tetrahedra,
@@ -81,7 +83,8 @@ pub fn edge_mt(
         position_bits: mt.info().lattice.bits,
         depth,
     };
-    Ok(BuildResult { mt, summary })
+    let exact = choice::exact_values(mesh, config, &vertices)?;
+    Ok(BuildResult { mt, summary, vertices, exact })
 }
 
 /// How errors are grouped.
@@ -106,6 +109,8 @@ struct Builder<'a> {
     history: Vec<Collapse>,
     /// Tetrahedra around each vertex.
     degrees: Vec<u32>,
+    /// What the lattices round off, as an error.
+    floors: Vec<f64>,
 }
 
 impl<'a> Builder<'a> {
@@ -147,6 +152,7 @@ impl<'a> Builder<'a> {
             evaluator: Evaluator::default(),
             history: Vec::new(),
             degrees,
+            floors: quantize::floors(info),
         }
     }
 
@@ -262,14 +268,16 @@ impl<'a> Builder<'a> {
 
     fn perform(&mut self) {
         // Never zero: error 0 is to mean the reference mesh, with every update applied.
-        let stored = |error: &f64| ErrorCode::at_least(*error).max(ErrorCode(1));
-        let code = stored(&largest(&self.evaluator.errors));
+        let stored = |error: &f64, floor: &f64| ErrorCode::at_least(error.max(*floor)).max(ErrorCode(1));
+        let errors = self.evaluator.errors.iter().zip(&self.floors);
+        let errors: Vec<ErrorCode> = errors.map(|(error, floor)| stored(error, floor)).collect();
+        let code = errors.iter().copied().fold(ErrorCode::ZERO, ErrorCode::max);
         let v = self.data.positions.len() as u32;
         let Self { plan, mesh, data, evaluator, .. } = self;
         self.history.push(Collapse::new(plan, mesh, code));
         data.positions.push(plan.position);
         data.levels.extend_from_slice(&evaluator.levels);
-        data.errors.extend(evaluator.errors.iter().map(|error| stored(error).error()));
+        data.errors.extend(errors.iter().map(|code| code.error()));
         data.height.push(evaluator.height);
         data.foot.push(evaluator.foot);
         evaluator.settle(plan, data, &mut self.buckets, &self.reference);

@@ -50,14 +50,15 @@ impl Collapse {
     }
 }
 
-/// The MT of a history, with its updates in the order that [`Updates::order`] gives them.
+/// The MT of a history, with its updates in the order that [`Updates::order`] gives them, and its vertex for each reference
+/// point.
 pub(super) fn edge_mt(
     mut info: MtInfo,
     base: &WorkMesh,
     data: &VertexData,
     history: &[Collapse],
     progress: OnProgress<'_>,
-) -> Result<EdgeMt, BuildError> {
+) -> Result<(EdgeMt, Vec<VertexId>), BuildError> {
     info.updates = history.len() as u32;
     // Errors are monotone, so this extends the partial order, as far as equal errors leave it open by the collapses
     // reversed.
@@ -66,7 +67,7 @@ pub(super) fn edge_mt(
     let replay = Replay { base, data, history };
     let bits = info.lattice.bits;
     let mut found = Found::default();
-    let first = replay.make(info.clone(), &falling, Some(&mut found), progress)?;
+    let (first, _) = replay.make(info.clone(), &falling, Some(&mut found), progress)?;
     let updates = Updates {
         base: first.base().positions.len() as u32,
         vertices: &found.vertices,
@@ -126,7 +127,7 @@ impl Replay<'_> {
         order: &[u32],
         mut found: Option<&mut Found>,
         progress: OnProgress<'_>,
-    ) -> Result<EdgeMt, BuildError> {
+    ) -> Result<(EdgeMt, Vec<VertexId>), BuildError> {
         let (data, history) = (self.data, self.history);
         let (points, fields) = (info.vertices as usize, info.fields.len());
         let (base_mesh, mut number) = number_base(self.base, data, fields);
@@ -199,7 +200,8 @@ impl Replay<'_> {
                 }
             }
         }
-        Ok(mt)
+        number.truncate(points);
+        Ok((mt, number.into_iter().map(VertexId).collect()))
     }
 }
 

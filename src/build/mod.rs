@@ -21,6 +21,7 @@
 //! the error allows the boundary to move.
 
 mod agenda;
+mod choice;
 mod collapse;
 mod cost;
 mod decimate;
@@ -33,7 +34,9 @@ mod hole;
 mod insert;
 mod method;
 mod order;
+mod place;
 mod plan;
+mod precision;
 mod quantize;
 mod sequence;
 mod skin;
@@ -48,12 +51,14 @@ pub use method::Method;
 use crate::mesh::MeshError;
 use crate::mesh::TetMesh;
 use crate::mt::ConvertError;
+use crate::mt::Exact;
 use crate::mt::ExplicitMt;
 use crate::mt::Mt;
 use crate::mt::MtKind;
 use crate::mt::MultiTessellation;
 use crate::mt::UpdateError;
 use crate::mt::UpdateId;
+use crate::mt::VertexId;
 use std::fmt;
 use std::ops::ControlFlow;
 
@@ -66,13 +71,26 @@ pub struct BuildConfig {
     pub method: Method,
     /// By what criterion vertices are removed or inserted; [`Method::Collapse`] has its own.
     pub criterion: Criterion,
-    /// Names of the fields to keep, in this order; the first one of the mesh if empty.
+    /// Names of the fields to keep, in this order; a vector's name stands for its components. Of a time series all steps
+    /// are kept. The first field of the mesh if empty.
     pub fields: Vec<String>,
-    /// Bits of the position lattice, 1 to 30. If not given: 16 where that keeps every cell positive, else as few as
-    /// do, and two more to spare. No side of the domain is longer than 2^bits steps.
+    /// Keep all fields but the lengths of vectors, which follow from their components; those that are named come first.
+    pub all_fields: bool,
+    /// Bits of the position lattice, 1 to 30. If neither these nor a tolerance are given: 16 where that keeps every cell
+    /// positive, else as few as do, and two more to spare. No side of the domain is longer than 2^bits steps.
     pub position_bits: Option<u32>,
-    /// Bits of the field lattices, 1 to 24. Half a step is the error that remains at full resolution.
-    pub field_bits: u32,
+    /// How far the lattice may move a point, in model units: as few bits are taken as keep within it, and every cell
+    /// positive.
+    pub position_tolerance: Option<f64>,
+    /// How finely fields are kept. Fields of integers whose range fits 24 bits are exact unless they are named in
+    /// [`BuildConfig::precision_of`].
+    pub field_precision: FieldPrecision,
+    /// How finely fields, or vectors, of these names are kept.
+    pub precision_of: Vec<(String, FieldPrecision)>,
+    /// Names of fields, or vectors, of which the exact values are kept as well.
+    pub lossless: Vec<String>,
+    /// Keep the exact values of all fields.
+    pub all_lossless: bool,
     /// The displacement of the boundary that counts as much as an error of the field's whole range, as a fraction
     /// of the domain's diagonal; not negative. With 0.2, an error of 1 % allows the boundary to move by 0.2 % of the
     /// diagonal.
@@ -86,11 +104,27 @@ impl Default for BuildConfig {
             method: Method::Collapse,
             criterion: Criterion::HalfEdge,
             fields: Vec::new(),
+            all_fields: false,
             position_bits: None,
-            field_bits: 16,
+            position_tolerance: None,
+            field_precision: FieldPrecision::Bits(16),
+            precision_of: Vec::new(),
+            lossless: Vec::new(),
+            all_lossless: false,
             displacement: 0.2,
         }
     }
+}
+
+/// How finely the values of a field are kept; what is lost remains as an error at full resolution.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FieldPrecision {
+    /// By a lattice of so many bits, 1 to 24.
+    Bits(u32),
+    /// By as few bits as keep each value within so many units of the field.
+    Units(f64),
+    /// By as few bits as keep each value within this fraction of the field's range.
+    Fraction(f64),
 }
 
 /// How far the work has come; sent now and then, so that a caller can show it and stop it.
@@ -114,6 +148,10 @@ pub struct BuildResult<M = Mt> {
     pub mt: M,
     /// Counts.
     pub summary: BuildSummary,
+    /// The MT's vertex for each point of the mesh.
+    pub vertices: Vec<VertexId>,
+    /// The exact values of the fields that are wanted without loss, in the order of the MT's fields.
+    pub exact: Vec<Exact>,
 }
 
 /// What came of a build.
@@ -159,6 +197,28 @@ pub enum BuildError {
         /// The names that are there.
         known: Vec<String>,
     },
+    /// A wanted field is one at cells.
+    CellField {
+        /// Its name.
+        name: String,
+    },
+    /// More fields than an MT can have.
+    TooManyFields {
+        /// How many are wanted.
+        fields: usize,
+    },
+    /// The values of a field are too far apart to subtract them.
+    WideRange {
+        /// The field.
+        field: String,
+    },
+    /// The finest lattice moves positions, or values, further than it may.
+    Tolerance {
+        /// The field; none if positions are meant.
+        field: Option<String>,
+        /// How far it moves them.
+        reached: f64,
+    },
     /// An option is out of its range.
     Option {
         /// Its name.
@@ -177,8 +237,10 @@ pub enum BuildError {
     TooThin {
         /// The cell.
         cell: u32,
-        /// The bits that were tried last.
+        /// The bits that were asked for, or tried last.
         bits: u32,
+        /// The fewest bits that keep all cells positive, if it is not one of those.
+        enough: Option<u32>,
     },
     /// Fewer than four points, or all of them in one plane.
     Flat,
@@ -223,10 +285,34 @@ impl fmt::Display for BuildError {
             Self::NotFinite { point } => {
                 write!(f, "point {point} has a coordinate or a value that is not finite")
             }
-            Self::TooThin { cell, bits } => write!(
+            Self::CellField { name } => write!(
                 f,
-                "cell {cell} is too thin for a lattice of {bits} bits: it turns flat or inside out; use more \
-                 position bits (at most 30) or remove the cell"
+                "'{name}' is a field at cells, and an MT has fields at points: --cell-to-point makes one of the other"
+            ),
+            Self::TooManyFields { fields } => {
+                write!(f, "{fields} fields and time steps are too many (at most 255); name those to keep")
+            }
+            Self::WideRange { field } => {
+                write!(f, "the values of field '{field}' are too far apart; scale them down")
+            }
+            Self::Tolerance { field: Some(field), reached } => write!(
+                f,
+                "24 bits keep the values of field '{field}' within {reached:e}, no closer; use a larger \
+                 --field-tolerance, or --lossless"
+            ),
+            Self::Tolerance { field: None, reached } => write!(
+                f,
+                "30 bits keep the positions within {reached:e}, no closer; use a larger --position-tolerance"
+            ),
+            Self::TooThin { cell, bits, enough: Some(enough) } => write!(
+                f,
+                "cell {cell} is too thin for a lattice of {bits} bits: it turns flat or inside out; use {enough} \
+                 position bits"
+            ),
+            Self::TooThin { cell, bits, enough: None } => write!(
+                f,
+                "cell {cell} is too thin for a lattice of {bits} bits: it turns flat or inside out, and no lattice of at \
+                 most 30 bits keeps all cells; remove the cell"
             ),
             Self::Flat => {
                 write!(f, "the points do not span a volume: there must be four that are not in one plane")
@@ -266,24 +352,31 @@ pub fn build(
     progress: OnProgress<'_>,
 ) -> Result<BuildResult, BuildError> {
     config.check()?;
-    let BuildResult { mt, summary } = match config.method {
+    let BuildResult { mt, summary, vertices, exact } = match config.method {
         Method::Collapse => {
-            let BuildResult { mt, summary } = edge_mt(mesh, config, progress)?;
-            BuildResult { mt: Mt::from(mt), summary }
+            let BuildResult { mt, summary, vertices, exact } = edge_mt(mesh, config, progress)?;
+            BuildResult { mt: Mt::from(mt), summary, vertices, exact }
         }
-        Method::Insert => summed_up(vertex::inserted_mt(mesh, config, progress)?),
-        Method::Decimate => summed_up(vertex::decimated_mt(mesh, config, config.criterion, progress)?),
+        Method::Insert => summed_up(mesh, config, vertex::inserted_mt(mesh, config, progress)?)?,
+        Method::Decimate => {
+            summed_up(mesh, config, vertex::decimated_mt(mesh, config, config.criterion, progress)?)?
+        }
     };
+    // Conversions keep the numbers of the vertices.
     let mt = if mt.info().kind == config.kind {
         mt
     } else {
         mt.convert(config.kind).map_err(BuildError::Convert)?
     };
-    Ok(BuildResult { mt, summary })
+    Ok(BuildResult { mt, summary, vertices, exact })
 }
 
 /// Adds what is to be told of an MT that is spelled out.
-fn summed_up(mt: ExplicitMt) -> BuildResult {
+fn summed_up(
+    mesh: &TetMesh,
+    config: &BuildConfig,
+    (mt, vertices): (ExplicitMt, Vec<VertexId>),
+) -> Result<BuildResult, BuildError> {
     let mut depths: Vec<u32> = Vec::new();
     for u in (0..mt.updates()).map(UpdateId) {
         let above = mt.parents(u).iter().map(|&p| depths[p as usize]).max();
@@ -299,5 +392,6 @@ fn summed_up(mt: ExplicitMt) -> BuildResult {
         position_bits: info.lattice.bits,
         depth: depths.into_iter().max().unwrap_or(0),
     };
-    BuildResult { mt: mt.into(), summary }
+    let exact = choice::exact_values(mesh, config, &vertices)?;
+    Ok(BuildResult { mt: mt.into(), summary, vertices, exact })
 }

@@ -2,21 +2,17 @@
 
 use super::BuildConfig;
 use super::BuildError;
-use crate::geom::Bounds;
+use super::choice;
+use super::place;
+use super::place::Placed;
+use super::precision;
 use crate::geom::Lattice;
 use crate::geom::WIDE_BITS;
-use crate::geom::orient3d;
 use crate::mesh::Field;
-use crate::mesh::Grid;
 use crate::mesh::TetMesh;
 use crate::mt::FieldInfo;
-use crate::mt::MAX_FIELD_BITS;
+use crate::mt::MtInfo;
 use glam::DVec3;
-
-/// The fewest position bits that are tried unless the caller says otherwise.
-const FEWEST_BITS: u32 = 16;
-/// Bits added to the fewest that keep every cell positive, so that thin cells keep their shape, too.
-const SPARE_BITS: u32 = 2;
 
 /// The reference mesh on its lattices.
 pub(super) struct Quantized {
@@ -27,6 +23,8 @@ pub(super) struct Quantized {
     pub levels: Vec<i32>,
     /// The input's values in units of levels, not rounded; errors are measured against these.
     pub exact: Vec<f64>,
+    /// How far the lattice moves a point at most: see [`MtInfo::quantization`](crate::mt::MtInfo::quantization).
+    pub quantization: f64,
 }
 
 impl Quantized {
@@ -96,34 +94,24 @@ impl Quantized {
 
 /// Puts the points on a lattice that keeps the cells positive or, where there are none, the points apart.
 pub(super) fn quantize(mesh: &TetMesh, config: &BuildConfig) -> Result<Quantized, BuildError> {
-    if !(1..=MAX_FIELD_BITS).contains(&config.field_bits) {
-        return Err(BuildError::Option { name: "field-bits", expected: "1 to 24" });
-    }
     if config.position_bits.is_some_and(|bits| !(1..=WIDE_BITS).contains(&bits)) {
         return Err(BuildError::Option { name: "position-bits", expected: "1 to 30" });
     }
-    let chosen = choose_fields(mesh, config)?;
+    let chosen = choice::fields(mesh, config)?;
     check_finite(mesh, &chosen)?;
-    let (lattice, positions) = place(mesh, config.position_bits)?;
-    let fields: Vec<FieldInfo> = chosen.iter().map(|field| field_lattice(field, config.field_bits)).collect();
+    let Placed { lattice, positions } = place::place(mesh, config)?;
+    let fields = precision::field_lattices(&chosen, config)?;
     let per_point = |i: usize| chosen.iter().zip(&fields).map(move |(field, info)| (field.values[i], info));
     let points = 0..mesh.positions.len();
     let levels = points.clone().flat_map(|i| per_point(i).map(|(value, info)| info.nearest(value))).collect();
     let exact = points.flat_map(|i| per_point(i).map(|(x, info)| (x - info.origin) / info.step)).collect();
-    Ok(Quantized { lattice, fields, positions, levels, exact })
+    let quantization = place::largest_move(mesh, &lattice, &positions);
+    Ok(Quantized { lattice, fields, positions, levels, exact, quantization })
 }
 
-fn choose_fields<'a>(mesh: &'a TetMesh, config: &BuildConfig) -> Result<Vec<&'a Field>, BuildError> {
-    if config.fields.is_empty() {
-        return Ok(vec![mesh.fields.first().ok_or(BuildError::NoField)?]);
-    }
-    let find = |name: &String| {
-        mesh.fields.iter().find(|field| field.name == *name).ok_or_else(|| BuildError::UnknownField {
-            name: name.clone(),
-            known: mesh.fields.iter().map(|field| field.name.clone()).collect(),
-        })
-    };
-    config.fields.iter().map(find).collect()
+/// The error that is left at full resolution, of whichever field has the largest.
+pub(super) fn floors(info: &MtInfo) -> Vec<f64> {
+    (0..info.fields.len()).map(|f| info.floor(f)).collect()
 }
 
 fn check_finite(mesh: &TetMesh, fields: &[&Field]) -> Result<(), BuildError> {
@@ -135,84 +123,4 @@ fn check_finite(mesh: &TetMesh, fields: &[&Field]) -> Result<(), BuildError> {
         Some(point) => Err(BuildError::NotFinite { point: point as u32 }),
         None => Ok(()),
     }
-}
-
-fn field_lattice(field: &Field, bits: u32) -> FieldInfo {
-    let (min, max) = field
-        .values
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &x| (low.min(x), high.max(x)));
-    let range = if max > min { max - min } else { 1.0 };
-    let step = range / f64::from((1_u32 << bits) - 1);
-    FieldInfo { name: field.name.clone(), min, max, origin: min, step, bits }
-}
-
-/// Puts points without cells on the coarsest lattice of at least [`FEWEST_BITS`] that keeps them apart. Where the finest
-/// does not, two are in the same place in the input.
-fn place_points(mesh: &TetMesh) -> (Lattice, Vec<[i32; 3]>) {
-    let on = |bits: u32| {
-        let lattice = lattice(mesh, bits);
-        let positions: Vec<[i32; 3]> = mesh.positions.iter().map(|&p| lattice.nearest(p)).collect();
-        (lattice, positions)
-    };
-    let is_apart = |positions: &[[i32; 3]]| {
-        let mut sorted = positions.to_vec();
-        sorted.sort_unstable();
-        sorted.windows(2).all(|pair| pair[0] != pair[1])
-    };
-    let found = (FEWEST_BITS..WIDE_BITS).map(on).find(|(_, positions)| is_apart(positions));
-    found.unwrap_or_else(|| on(WIDE_BITS))
-}
-
-/// Puts the points on a lattice that keeps every cell positive: that of `wanted` bits or, if nothing is wanted, the
-/// coarsest one of at least [`FEWEST_BITS`], with [`SPARE_BITS`] more where it had to be finer.
-fn place(mesh: &TetMesh, wanted: Option<u32>) -> Result<(Lattice, Vec<[i32; 3]>), BuildError> {
-    if mesh.tets.is_empty() && wanted.is_none() {
-        return Ok(place_points(mesh));
-    }
-    let on = |bits: u32| {
-        let lattice = lattice(mesh, bits);
-        let positions: Vec<[i32; 3]> = mesh.positions.iter().map(|&p| lattice.nearest(p)).collect();
-        let flat = mesh.tets.iter().position(|tet| {
-            let [a, b, c, d] = tet.map(|v| positions[v as usize]);
-            orient3d(a, b, c, d) <= 0
-        });
-        (lattice, positions, flat)
-    };
-    let fewest = wanted.unwrap_or(FEWEST_BITS);
-    let mut bits = fewest;
-    loop {
-        let (lattice, positions, flat) = on(bits);
-        match flat {
-            None if bits > fewest && bits + SPARE_BITS <= WIDE_BITS => {
-                let (finer, moved, still_flat) = on(bits + SPARE_BITS);
-                return Ok(if still_flat.is_none() { (finer, moved) } else { (lattice, positions) });
-            }
-            None => return Ok((lattice, positions)),
-            Some(cell) if wanted.is_some() || bits == WIDE_BITS => {
-                return Err(BuildError::TooThin { cell: cell as u32, bits });
-            }
-            Some(_) => bits += 1,
-        }
-    }
-}
-
-/// The lattice of `bits` over the mesh: on the points of a regular grid, else with equal steps along all axes.
-fn lattice(mesh: &TetMesh, bits: u32) -> Lattice {
-    if let Some(lattice) = mesh.grid.and_then(|grid| grid_lattice(&grid, bits)) {
-        return lattice;
-    }
-    let bounds = Bounds::of(&mesh.positions);
-    let largest = bounds.extent().into_iter().fold(0.0, f64::max);
-    let step = if largest > 0.0 { largest / f64::from(1_u32 << bits) } else { 1.0 };
-    Lattice { origin: bounds.min, step: [step; 3], bits }
-}
-
-/// A lattice that holds every point of the grid exactly, with as many steps to a cell as a power of two can be.
-fn grid_lattice(grid: &Grid, bits: u32) -> Option<Lattice> {
-    let cells = grid.dims.iter().map(|n| n.saturating_sub(1)).max().filter(|&n| n > 0)?;
-    let needed = u32::BITS - (cells - 1).leading_zeros();
-    let spare = bits.checked_sub(needed)?;
-    let step = grid.spacing.map(|s| s / f64::from(1_u32 << spare));
-    Some(Lattice { origin: grid.origin, step, bits })
 }

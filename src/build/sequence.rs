@@ -3,6 +3,7 @@
 use super::BuildError;
 use super::BuildProgress;
 use super::OnProgress;
+use super::quantize;
 use super::quantize::Quantized;
 use crate::mesh::NONE;
 use crate::mt::BaseMesh;
@@ -11,6 +12,7 @@ use crate::mt::ExplicitMt;
 use crate::mt::ExplicitUpdate;
 use crate::mt::MtInfo;
 use crate::mt::UpdateError;
+use crate::mt::VertexId;
 use crate::mt::canonical;
 use std::cmp::Reverse;
 use std::ops::Range;
@@ -45,16 +47,16 @@ pub(super) struct Insertion {
 }
 
 impl Sequence {
-    /// The MT of these insertions. They come in the order of falling error, as far as equal errors leave it open in
+    /// The MT of these insertions, and its vertex for each reference point. They come in the order of falling error, as far as equal errors leave it open in
     /// the order of the sequence: errors are made monotone along the DAG first, so this extends the partial order.
     pub fn explicit_mt(
         &self,
         mut info: MtInfo,
         quantized: &Quantized,
         progress: OnProgress<'_>,
-    ) -> Result<ExplicitMt, BuildError> {
+    ) -> Result<(ExplicitMt, Vec<VertexId>), BuildError> {
         let arcs = self.arcs(quantized.positions.len())?;
-        let errors = self.monotone_errors(quantized, &arcs);
+        let errors = self.monotone_errors(quantized, &arcs, &quantize::floors(&info));
         let mut order: Vec<u32> = (0..self.steps.len() as u32).collect();
         let fields = info.fields.len();
         let errors_of = |i: u32| &errors[i as usize * fields..][..fields];
@@ -101,7 +103,7 @@ impl Sequence {
                 ids[at] = first + place as u32;
             }
         }
-        Ok(mt)
+        Ok((mt, number.into_iter().map(VertexId).collect()))
     }
 
     /// Where each removed tetrahedron comes from. Insertions are never undone, and all that one inserts is around its
@@ -137,12 +139,15 @@ impl Sequence {
 
     /// Errors by insertion and field that are at least those of all insertions that depend on each, by so much more that selection by isovalue
     /// and by box is monotone: see [`Quantized::overshoot`], and `step_of_boundary` in the builders' costs.
-    fn monotone_errors(&self, quantized: &Quantized, arcs: &Arcs) -> Vec<ErrorCode> {
+    fn monotone_errors(&self, quantized: &Quantized, arcs: &Arcs, floors: &[f64]) -> Vec<ErrorCode> {
         // Never zero: error 0 is to mean the reference mesh, with every update applied.
-        let own = |error: &f64| ErrorCode::at_least(*error).max(ErrorCode(1));
-        let mut errors: Vec<ErrorCode> = self.steps.iter().flat_map(|step| &step.errors).map(own).collect();
-        let mut parents: Vec<u32> = Vec::new();
         let fields = quantized.fields.len();
+        let own = |(at, error): (usize, &f64)| {
+            ErrorCode::at_least(error.max(floors[at % fields])).max(ErrorCode(1))
+        };
+        let all = self.steps.iter().flat_map(|step| &step.errors).enumerate();
+        let mut errors: Vec<ErrorCode> = all.map(own).collect();
+        let mut parents: Vec<u32> = Vec::new();
         let step = |at: usize| {
             let Insertion { vertex, inserted, step, .. } = &self.steps[at / fields];
             let around = self.tets[inserted.clone()].iter().flatten().filter(|&v| v != vertex);

@@ -16,6 +16,7 @@ use crate::mt::ExplicitMt;
 use crate::mt::MAX_UPDATES;
 use crate::mt::MtInfo;
 use crate::mt::MtKind;
+use crate::mt::VertexId;
 
 /// Builds a vertex-based MT of `mesh` by removing vertices, cheapest first, and spells it out: see
 /// [`VertexMt::from_explicit`](crate::mt::VertexMt::from_explicit).
@@ -27,7 +28,7 @@ pub(super) fn decimated_mt(
     config: &BuildConfig,
     criterion: Criterion,
     progress: OnProgress<'_>,
-) -> Result<ExplicitMt, BuildError> {
+) -> Result<(ExplicitMt, Vec<VertexId>), BuildError> {
     let built = decimate::decimate(mesh, config, criterion, progress)?;
     spell_out(&built.sequence, &built.quantized, built.displacement_per_error, progress)
 }
@@ -43,7 +44,7 @@ pub(super) fn inserted_mt(
     mesh: &TetMesh,
     config: &BuildConfig,
     progress: OnProgress<'_>,
-) -> Result<ExplicitMt, BuildError> {
+) -> Result<(ExplicitMt, Vec<VertexId>), BuildError> {
     if mesh.positions.len() > MAX_UPDATES as usize {
         return Err(BuildError::TooLarge);
     }
@@ -61,7 +62,7 @@ fn spell_out(
     quantized: &Quantized,
     displacement_per_error: f64,
     progress: OnProgress<'_>,
-) -> Result<ExplicitMt, BuildError> {
+) -> Result<(ExplicitMt, Vec<VertexId>), BuildError> {
     let grown: usize = sequence.steps.iter().map(|step| step.inserted.len()).sum();
     let shrunk: usize = sequence.steps.iter().map(|step| step.removed.len()).sum();
     let info = MtInfo {
@@ -72,6 +73,7 @@ fn spell_out(
         tetrahedra: (sequence.base.len() + grown - shrunk) as u32,
         updates: 0,
         displacement_per_error,
+        quantization: quantized.quantization,
     };
     sequence.explicit_mt(info, quantized, progress)
 }

@@ -301,7 +301,12 @@ impl<'a> Measure<'a> {
     /// Bits that a family takes.
     pub fn bits_of(&self, family: Family) -> f64 {
         let range = family.first as usize..(family.first + family.contexts) as usize;
-        self.costs.iter().enumerate().filter(|(context, _)| range.contains(context)).map(|(_, cost)| cost).sum()
+        self.costs
+            .iter()
+            .enumerate()
+            .filter(|(context, _)| range.contains(context))
+            .map(|(_, cost)| cost)
+            .sum()
     }
 }
 

@@ -96,9 +96,20 @@ impl MtInfo {
             if !numbers.iter().all(finite) || field.step <= 0.0 || field.min > field.max {
                 return Err(BaseMeshError::Info("field ranges must be finite, their steps positive"));
             }
+            if !field.quantization.is_finite()
+                || field.quantization < 0.0
+                || !field.time.is_none_or(f64::is_finite)
+            {
+                return Err(BaseMeshError::Info(
+                    "times must be finite, and what lattices round off not negative",
+                ));
+            }
             if field.bits == 0 || field.bits > MAX_FIELD_BITS {
                 return Err(BaseMeshError::Info("field bits must be 1 to 24"));
             }
+        }
+        if !self.quantization.is_finite() || self.quantization < 0.0 {
+            return Err(BaseMeshError::Info("what the lattice rounds off must be finite and not negative"));
         }
         if !self.displacement_per_error.is_finite() || self.displacement_per_error < 0.0 {
             return Err(BaseMeshError::Info("the displacement per error must be finite and not negative"));

@@ -1114,7 +1114,15 @@ mod tests {
 
     /// `n` tetrahedra around an edge from vertex 0 to vertex 1.
     fn wheel(n: u32) -> CurrentMesh {
-        let field = FieldInfo { name: "f".into(), min: 0.0, max: 1.0, origin: 0.0, step: 1.0, bits: 1 };
+        let field = FieldInfo {
+            name: "f".into(),
+            min: 0.0,
+            max: 1.0,
+            origin: 0.0,
+            step: 1.0,
+            bits: 1,
+            ..FieldInfo::default()
+        };
         let info = MtInfo {
             kind: MtKind::Edge,
             lattice: Lattice { origin: [0.0; 3], step: [1.0; 3], bits: 16 },
@@ -1123,6 +1131,7 @@ mod tests {
             tetrahedra: 0,
             updates: 0,
             displacement_per_error: 1.0,
+            quantization: 0.0,
         };
         let middle = 1 << 15;
         let mut positions = vec![[middle, middle, 0], [middle, middle, 100]];

@@ -426,8 +426,15 @@ mod tests {
 
     /// An octahedron around a vertex that is split along z and whose upper half is split along x.
     fn twice_split() -> ExplicitMt {
-        let field =
-            FieldInfo { name: "f".into(), min: 0.0, max: 1.0, origin: 0.0, step: 1.0 / 255.0, bits: 8 };
+        let field = FieldInfo {
+            name: "f".into(),
+            min: 0.0,
+            max: 1.0,
+            origin: 0.0,
+            step: 1.0 / 255.0,
+            bits: 8,
+            ..FieldInfo::default()
+        };
         let info = MtInfo {
             kind: MtKind::Edge,
             lattice: Lattice { origin: [0.0; 3], step: [1.0; 3], bits: 8 },
@@ -436,6 +443,7 @@ mod tests {
             tetrahedra: 16,
             updates: 2,
             displacement_per_error: 1.0,
+            quantization: 0.0,
         };
         let axes = [[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]];
         let mut positions = vec![[64; 3]];

@@ -13,6 +13,7 @@ mod convert;
 mod current;
 mod error;
 mod errors;
+mod exact;
 mod explicit;
 mod glue;
 mod insertion;
@@ -37,6 +38,8 @@ pub use convert::ConvertError;
 pub use current::{CurrentMesh, MeshChanges};
 pub use error::PageError;
 pub use error::{ErrorCode, UpdateError};
+pub use exact::Exact;
+pub use exact::ExactValues;
 pub use explicit::{ExplicitMt, ExplicitUpdate};
 pub use replay::ReplayError;
 #[cfg(feature = "build")]
@@ -47,6 +50,8 @@ pub use stats::{MtStats, stats};
 pub use vertex::{MAX_AROUND, MAX_INSERTED, MAX_REMOVED, NodeBits, VertexMt};
 
 use crate::geom::Lattice;
+use crate::mesh::Field;
+use crate::mesh::VectorPart;
 use std::ops::Range;
 
 /// Index of an update (a node of the MT) in coarse-to-fine order: parents come before their children.
@@ -84,14 +89,15 @@ impl MtKind {
 
 /// A scalar field of an MT: name, range, and the lattice that its values live on.
 ///
-/// The value of lattice level `q` is `origin + step · q`.
+/// The value of lattice level `q` is `origin + step · q`. Time steps of one field are fields of one name with different
+/// times; they have one range and one lattice.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FieldInfo {
     /// The field's name.
     pub name: String,
-    /// Smallest value over the reference vertices, in field units.
+    /// Smallest value over the reference vertices and all time steps, in field units.
     pub min: f64,
-    /// Largest value over the reference vertices, in field units.
+    /// Largest value over the reference vertices and all time steps, in field units.
     pub max: f64,
     /// Value of level 0.
     pub origin: f64,
@@ -99,9 +105,41 @@ pub struct FieldInfo {
     pub step: f64,
     /// Levels lie in `0 .. 2^bits`; 1 to 24.
     pub bits: u32,
+    /// The unit of the values; empty if it is not known.
+    pub unit: String,
+    /// Which part of a vector or tensor the field is, if it is one.
+    pub vector: Option<VectorPart>,
+    /// The time that the values are of, if it is known.
+    pub time: Option<f64>,
+    /// The largest difference between a reference vertex's value on the lattice and the input's, in field units, rounded
+    /// up; 0 if all are exact.
+    pub quantization: f64,
+}
+
+/// A nameless field of one bit, for `..FieldInfo::default()`.
+impl Default for FieldInfo {
+    fn default() -> Self {
+        Self {
+            name: String::new(),
+            min: 0.0,
+            max: 1.0,
+            origin: 0.0,
+            step: 1.0,
+            bits: 1,
+            unit: String::new(),
+            vector: None,
+            time: None,
+            quantization: 0.0,
+        }
+    }
 }
 
 impl FieldInfo {
+    /// Whether this is, by name and time, a field of the mesh that the MT was built from.
+    pub fn is_of(&self, field: &Field) -> bool {
+        self.name == field.name && (self.time.is_none() || self.time == field.time)
+    }
+
     /// The value of level `q`.
     #[inline]
     pub fn value(&self, q: i32) -> f64 {
@@ -142,6 +180,23 @@ pub struct MtInfo {
     /// within `e · displacement_per_error` of every reference vertex, and no vertex of its boundary is further than
     /// that from the boundary of the reference mesh.
     pub displacement_per_error: f64,
+    /// The largest distance between a reference vertex on the lattice and in the input, in model units, rounded up; 0 if
+    /// all are exact.
+    pub quantization: f64,
+}
+
+impl MtInfo {
+    /// The error of field `field` that is left when every update is applied, as a fraction of its range: what the
+    /// lattices round off. Positions count as displacements of the boundary do, not at all where any displacement would
+    /// be an infinite error. No error of an update is smaller.
+    pub fn floor(&self, field: usize) -> f64 {
+        let moved = if self.displacement_per_error > 0.0 {
+            self.quantization / self.displacement_per_error
+        } else {
+            0.0
+        };
+        self.fields.get(field).map_or(moved, |f| moved.max(f.quantization / f.range()))
+    }
 }
 
 /// Sees a tetrahedron: positions at its corners and, by field, levels there, on the lattices. True ends the show.

@@ -54,7 +54,7 @@ impl<'a> Deviation<'a> {
         }
         let mut fields = Vec::new();
         for field in &info.fields {
-            let found = input.fields.iter().find(|f| f.name == field.name && f.values.len() == points);
+            let found = input.fields.iter().find(|f| field.is_of(f) && f.values.len() == points);
             fields.push(&found.ok_or(format!("the input has no field '{}'", field.name))?.values);
         }
         let positions: Vec<[i32; 3]> = input.positions.iter().map(|p| info.lattice.nearest(*p)).collect();

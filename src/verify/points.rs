@@ -19,7 +19,7 @@ pub fn triangulated(mt: &impl MultiTessellation, input: &TetMesh) -> Result<TetM
     let places: Vec<[i32; 3]> = input.positions.iter().map(|p| info.lattice.nearest(*p)).collect();
     let mut levels: Vec<Vec<i32>> = vec![Vec::new(); places.len()];
     for field in &info.fields {
-        let found = input.fields.iter().find(|f| f.name == field.name && f.values.len() == places.len());
+        let found = input.fields.iter().find(|f| field.is_of(f) && f.values.len() == places.len());
         let values = &found.ok_or(format!("the input has no field '{}'", field.name))?.values;
         levels.iter_mut().zip(values).for_each(|(levels, &value)| levels.push(field.nearest(value)));
     }

@@ -51,7 +51,7 @@ pub fn of(mt: &impl MultiTessellation, input: &TetMesh) -> Vec<Query> {
     queries.add_uniform();
     queries.add_boxes();
     for (f, info) in mt.info().fields.iter().enumerate() {
-        let values = input.fields.iter().find(|field| field.name == info.name);
+        let values = input.fields.iter().find(|field| info.is_of(field));
         if let Some(values) = values {
             queries.add_values(f, info, &quantiles(&values.values));
         }

@@ -13,7 +13,15 @@ pub type Draft = ([i32; 3], u32, u64, u16, Vec<i32>);
 
 pub fn field(name: &str, bits: u32) -> FieldInfo {
     let largest = f64::from((1_u32 << bits) - 1);
-    FieldInfo { name: name.to_owned(), min: -1.0, max: largest / 2.0 - 1.0, origin: -1.0, step: 0.5, bits }
+    FieldInfo {
+        name: name.to_owned(),
+        min: -1.0,
+        max: largest / 2.0 - 1.0,
+        origin: -1.0,
+        step: 0.5,
+        bits,
+        ..FieldInfo::default()
+    }
 }
 
 /// An MT with `tets` separate base tetrahedra, `fields` fields and one update per draft.
@@ -37,6 +45,7 @@ pub fn build(tets: u32, fields: usize, drafts: &[Draft]) -> Mt {
         tetrahedra: tets + 3 * drafts.len() as u32,
         updates: drafts.len() as u32,
         displacement_per_error: 0.125,
+        quantization: 0.0,
     };
     let mut mt = EdgeMt::new(info, base);
     let mut whole: Vec<u32> = (0..vertices).collect();
@@ -93,6 +102,7 @@ pub fn spelled(tets: u32, fields: usize, updates: usize) -> Mt {
         tetrahedra: tets,
         updates: updates as u32,
         displacement_per_error: 0.125,
+        quantization: 0.0,
     };
     let corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]].map(|c: [i32; 3]| c.map(|x| x << 24));
     let base = BaseMesh {

@@ -312,6 +312,7 @@ fn info(reference: (usize, usize), fields: usize, updates: usize) -> MtInfo {
         origin: 0.0,
         step: 1.0 / 255.0,
         bits: FIELD_BITS,
+        ..FieldInfo::default()
     };
     MtInfo {
         kind: MtKind::Edge,
@@ -321,5 +322,6 @@ fn info(reference: (usize, usize), fields: usize, updates: usize) -> MtInfo {
         tetrahedra: reference.1 as u32,
         updates: updates as u32,
         displacement_per_error: 1.0,
+        quantization: 0.0,
     }
 }

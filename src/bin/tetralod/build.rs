@@ -1,6 +1,8 @@
 //! `tetralod build`: a mesh to an MT file.
 
 use super::files;
+use super::input;
+use super::input::Wanted;
 use super::output;
 use anyhow::Context;
 use anyhow::Result;
@@ -15,17 +17,23 @@ use tetralod::build::BuildProgress;
 use tetralod::build::BuildResult;
 use tetralod::build::BuildSummary;
 use tetralod::build::Criterion;
+use tetralod::build::FieldPrecision;
 use tetralod::build::Method;
 use tetralod::format::EncodeOptions;
 use tetralod::format::encode_to;
+use tetralod::io::CellData;
+use tetralod::mesh::Field;
+use tetralod::mesh::RepairReport;
 use tetralod::mesh::TetMesh;
 use tetralod::mt::MtKind;
 
 /// Turns a tetrahedral mesh or a regular grid into an MT file.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// Mesh or grid: .vtu, .vti, .vtk, or .raw with a .json beside it; points without cells for --method insert.
-    input: PathBuf,
+    /// Mesh or grid: .vtu, .vti, .vtk, or .raw with a .json beside it; points without cells for --method insert. Several,
+    /// or a .pvd, are time steps over one mesh.
+    #[arg(required = true, value_name = "INPUT")]
+    inputs: Vec<PathBuf>,
     /// The MT file to write.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
@@ -40,15 +48,37 @@ pub struct Arguments {
     /// decimate].
     #[arg(long, value_name = "CRITERION", value_parser = criterion)]
     criterion: Option<Criterion>,
-    /// A point field to keep (repeatable, in this order); the first one if not given.
+    /// A field to keep (repeatable, in this order), or a vector with all its components; the first field if not given.
     #[arg(long = "field", value_name = "NAME")]
     fields: Vec<String>,
+    /// Keep all fields but the lengths of vectors.
+    #[arg(long)]
+    all_fields: bool,
+    /// Turn fields at cells into fields at points: the mean of the cells around, weighted by volume.
+    #[arg(long)]
+    cell_to_point: bool,
+    /// The unit of a field or vector (repeatable).
+    #[arg(long = "unit", value_name = "NAME=UNIT", value_parser = last_pair)]
+    units: Vec<(String, String)>,
+    /// An entry for the file's metadata (repeatable).
+    #[arg(long = "meta", value_name = "KEY=VALUE", value_parser = first_pair)]
+    metadata: Vec<(String, String)>,
     /// Bits of the position lattice, 1 to 30; as few as the thinnest cells allow, at least 16, if not given.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=30))]
     position_bits: Option<u32>,
-    /// Bits of the field lattices, 1 to 24 [default: 16].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=24))]
-    field_bits: Option<u32>,
+    /// How far positions may be rounded, in the units of the model: as few bits as keep within it.
+    #[arg(long, value_name = "X", conflicts_with = "position_bits")]
+    position_tolerance: Option<f64>,
+    /// Bits of the field lattices, of all fields or (repeatable) of one, 1 to 24 [default: 16; integers are exact].
+    #[arg(long, value_name = "[NAME=]N", value_parser = bits)]
+    field_bits: Vec<Precision>,
+    /// How far the values of all fields or (repeatable) of one may be rounded, in its units or in % of its range: as few
+    /// bits as keep within it.
+    #[arg(long, value_name = "[NAME=]X[%]", value_parser = tolerance)]
+    field_tolerance: Vec<Precision>,
+    /// Keep the exact values of all fields or (repeatable) of one.
+    #[arg(long, value_name = "NAME", num_args = 0..=1, require_equals = true, default_missing_value = "")]
+    lossless: Vec<String>,
     /// No progress bar and no summary.
     #[arg(short, long)]
     quiet: bool,
@@ -64,6 +94,51 @@ pub const CRITERION: &str = "criterion";
 /// Parses the name of a kind of MT.
 pub fn kind(text: &str) -> Result<MtKind> {
     named(text, &MtKind::ALL.map(|kind| (kind.name(), kind)))
+}
+
+/// How finely the values of a field are kept, or of all without a name.
+#[derive(Clone, Debug)]
+struct Precision {
+    name: Option<String>,
+    precision: FieldPrecision,
+}
+
+fn bits(text: &str) -> Result<Precision> {
+    let (name, number) = named_number(text);
+    let bits = number.parse().ok().filter(|bits| (1..=24).contains(bits));
+    let bits = bits.context("it must be 1 to 24, or NAME= and that")?;
+    Ok(Precision { name, precision: FieldPrecision::Bits(bits) })
+}
+
+fn tolerance(text: &str) -> Result<Precision> {
+    let (name, number) = named_number(text);
+    let (number, unit): (&str, fn(f64) -> FieldPrecision) = match number.strip_suffix('%') {
+        Some(percent) => (percent, |x| FieldPrecision::Fraction(x / 100.0)),
+        None => (number, FieldPrecision::Units),
+    };
+    let number = number.trim().parse().ok().filter(|x: &f64| *x >= 0.0 && x.is_finite());
+    let number = number.context("it must be a number, or a percentage as 1%, or NAME= and that")?;
+    Ok(Precision { name, precision: unit(number) })
+}
+
+/// The name in front of the last `=`, if there is one, and what comes behind it.
+fn named_number(text: &str) -> (Option<String>, &str) {
+    text.rsplit_once('=').map_or((None, text), |(name, number)| (Some(name.to_owned()), number))
+}
+
+/// Names may hold `=`, units do not.
+fn last_pair(text: &str) -> Result<(String, String)> {
+    let (name, unit) = text.rsplit_once('=').context("it must be NAME=UNIT")?;
+    Ok((name.to_owned(), unit.to_owned()))
+}
+
+/// Keys do not hold `=`, values may.
+fn first_pair(text: &str) -> Result<(String, String)> {
+    let (key, value) = text.split_once('=').context("it must be KEY=VALUE")?;
+    if key.is_empty() || [METHOD, CRITERION].contains(&key) {
+        anyhow::bail!("a key must not be empty, '{METHOD}' or '{CRITERION}'");
+    }
+    Ok((key.to_owned(), value.to_owned()))
 }
 
 fn method(text: &str) -> Result<Method> {
@@ -104,19 +179,15 @@ struct Report {
 pub fn run(arguments: &Arguments) -> Result<()> {
     let start = Instant::now();
     let config = config(arguments);
-    let (mesh, repaired) = if config.method.keeps_the_mesh() {
-        files::read_mesh(&arguments.input)?
-    } else {
-        files::read_points(&arguments.input)?
-    };
+    let (mesh, repaired) = read(arguments, &config)?;
     let repaired = repaired.to_string();
     if !repaired.is_empty() && !arguments.quiet {
-        eprintln!("{}: {repaired}", arguments.input.display());
+        eprintln!("{}: {repaired}", arguments.inputs[0].display());
     }
     let BuildResult { mt, summary, .. } = build(arguments, &config, &mesh)?;
     drop(mesh);
-    let told = metadata(&config);
-    let metadata = told.into_iter().map(|(k, v)| (k.into(), v.into())).collect();
+    let told = metadata(&config).into_iter().map(|(k, v)| (k.to_owned(), v.to_owned()));
+    let metadata = told.chain(arguments.metadata.iter().cloned()).collect();
     let options = EncodeOptions { metadata, ..EncodeOptions::default() };
     let file_bytes = files::write_file(&arguments.output, |out| Ok(encode_to(&mt, &options, out)?))?;
     let report = report(&config, &summary, file_bytes, start.elapsed().as_secs_f64(), repaired);
@@ -127,18 +198,56 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
 }
 
+/// Reads what is wanted of the input.
+fn read(arguments: &Arguments, config: &BuildConfig) -> Result<(TetMesh, RepairReport)> {
+    let cells = if arguments.cell_to_point { CellData::Values } else { CellData::Names };
+    let wanted = Wanted { names: &config.fields, all: config.all_fields, cells };
+    let (mut mesh, repaired) = input::read(&arguments.inputs, &wanted)?;
+    if config.method.keeps_the_mesh() {
+        input::expect_cells(&mesh, &arguments.inputs[0])?;
+    }
+    for (name, unit) in &arguments.units {
+        let is_meant = |field: &&mut Field| {
+            field.name == *name || field.vector.as_ref().is_some_and(|vector| vector.name == *name)
+        };
+        let mut found = 0;
+        mesh.fields.iter_mut().filter(is_meant).for_each(|field| {
+            field.unit.clone_from(unit);
+            found += 1;
+        });
+        if found == 0 {
+            anyhow::bail!("--unit {name}={unit}: there is no field '{name}'");
+        }
+    }
+    Ok((mesh, repaired))
+}
+
 /// How to build. Ends the program if the options contradict each other.
 fn config(arguments: &Arguments) -> BuildConfig {
     let default = BuildConfig::default();
     let kind = arguments.kind.unwrap_or(default.kind);
     let method = arguments.method.unwrap_or(Method::usual(kind));
+    let precision: Vec<&Precision> = arguments.field_bits.iter().chain(&arguments.field_tolerance).collect();
+    let for_all: Vec<FieldPrecision> =
+        precision.iter().filter(|p| p.name.is_none()).map(|p| p.precision).collect();
+    if for_all.len() > 1 {
+        super::refuse_usage(
+            "--field-bits and --field-tolerance without a name are for all fields: give one of them",
+        );
+    }
+    let of_one = |p: &&Precision| p.name.clone().map(|name| (name, p.precision));
     let config = BuildConfig {
         kind,
         method,
         criterion: arguments.criterion.unwrap_or(Criterion::usual(method)),
         fields: arguments.fields.clone(),
+        all_fields: arguments.all_fields,
         position_bits: arguments.position_bits,
-        field_bits: arguments.field_bits.unwrap_or(default.field_bits),
+        position_tolerance: arguments.position_tolerance,
+        field_precision: for_all.first().copied().unwrap_or(default.field_precision),
+        precision_of: precision.iter().filter_map(of_one).collect(),
+        lossless: arguments.lossless.iter().filter(|name| !name.is_empty()).cloned().collect(),
+        all_lossless: arguments.lossless.iter().any(String::is_empty),
         ..default
     };
     if let Err(error) = config.check() {
@@ -174,7 +283,7 @@ fn build(arguments: &Arguments, config: &BuildConfig, mesh: &TetMesh) -> Result<
         ControlFlow::Continue(())
     });
     bar.finish_and_clear();
-    result.with_context(|| arguments.input.display().to_string())
+    result.with_context(|| arguments.inputs[0].display().to_string())
 }
 
 fn report(

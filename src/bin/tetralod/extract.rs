@@ -18,6 +18,7 @@ use tetralod::measure::deviation;
 use tetralod::mesh::Field;
 use tetralod::mesh::TetMesh;
 use tetralod::mt::CurrentMesh;
+use tetralod::mt::FieldInfo;
 use tetralod::mt::MtInfo;
 use tetralod::refine;
 
@@ -71,9 +72,13 @@ fn reference_units(info: &MtInfo, mesh: &CurrentMesh) -> TetMesh {
     let slots = 0..mesh.positions().len() as u32;
     let values =
         |f: usize| slots.clone().map(move |slot| info.fields[f].value(mesh.levels(slot)[f])).collect();
+    let field = |(f, info): (usize, &FieldInfo)| {
+        let FieldInfo { name, unit, vector, time, .. } = info.clone();
+        Field { name, values: values(f), unit, vector, time, integer: false }
+    };
     TetMesh {
         positions: mesh.positions().iter().map(|&q| info.lattice.point(q)).collect(),
-        fields: (0..info.fields.len()).map(|f| Field::new(info.fields[f].name.clone(), values(f))).collect(),
+        fields: info.fields.iter().enumerate().map(field).collect(),
         tets: mesh.tets().to_vec(),
         ..TetMesh::default()
     }
@@ -83,10 +88,10 @@ fn reference_units(info: &MtInfo, mesh: &CurrentMesh) -> TetMesh {
 /// if there are no such needs.
 fn measure(input: &Path, answer: &Answer) -> Result<Option<f64>> {
     let opened = &answer.opened;
-    let reference = files::read_reference(input, opened)?;
+    let reference = files::read_reference(&[input.to_owned()], opened)?;
     let info = opened.info()?;
     let name = &info.fields[answer.field].name;
-    let field = reference.fields.iter().find(|field| field.name == *name);
+    let field = reference.fields.iter().find(|field| info.fields[answer.field].is_of(field));
     let field = field.with_context(|| {
         format!("{}: there is no field '{name}'; give the mesh that the MT was built from", input.display())
     })?;

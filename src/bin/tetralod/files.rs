@@ -1,9 +1,10 @@
 //! Files in and out: MT files are streamed in, outputs appear whole or not at all.
 
 use super::build::METHOD;
+use super::input;
+use super::input::Wanted;
 use anyhow::Context;
 use anyhow::Result;
-use anyhow::bail;
 use std::fs;
 use std::fs::File;
 use std::io;
@@ -16,7 +17,7 @@ use std::sync::Mutex;
 use std::sync::MutexGuard;
 use std::sync::PoisonError;
 use tetralod::build::Method;
-use tetralod::mesh::MeshError;
+use tetralod::io::CellData;
 use tetralod::mesh::RepairReport;
 use tetralod::mesh::TetMesh;
 use tetralod::mt::Mt;
@@ -143,38 +144,20 @@ fn read_mt(path: &Path) -> Result<Session> {
 
 /// Reads a mesh and mends what can be mended.
 pub fn read_mesh(path: &Path) -> Result<(TetMesh, RepairReport)> {
-    // Read errors name the file themselves.
-    let mesh = tetralod::io::read(path)?;
-    if mesh.tets.is_empty() && !mesh.positions.is_empty() {
-        bail!(
-            "{}: there are points but no tetrahedra; build --kind vertex --method insert makes an MT of points alone",
-            path.display()
-        );
+    let wanted = Wanted { names: &[], all: true, cells: CellData::LeaveOut };
+    let (mesh, report) = input::read(&[path.to_owned()], &wanted)?;
+    input::expect_cells(&mesh, path)?;
+    Ok((mesh, report))
+}
+
+/// Reads what the MT was built from: time steps of a mesh or, where no more is needed, of points.
+pub fn read_reference(paths: &[PathBuf], opened: &Opened) -> Result<TetMesh> {
+    let names: Vec<String> = opened.info()?.fields.iter().map(|field| field.name.clone()).collect();
+    let (mesh, _) = input::read(paths, &Wanted { names: &names, all: false, cells: CellData::Values })?;
+    if let (Reference::Mesh, Some(path)) = (opened.reference(), paths.first()) {
+        input::expect_cells(&mesh, path)?;
     }
-    mend(mesh, path)
-}
-
-fn mend(mesh: TetMesh, path: &Path) -> Result<(TetMesh, RepairReport)> {
-    let mended: Result<_, MeshError> = tetralod::mesh::repair(mesh);
-    mended.with_context(|| path.display().to_string())
-}
-
-/// Reads a mesh as [`read_mesh`], or points without any cell as they are.
-pub fn read_points(path: &Path) -> Result<(TetMesh, RepairReport)> {
-    let mesh = tetralod::io::read(path)?;
-    if mesh.tets.is_empty() {
-        return Ok((mesh, RepairReport::default()));
-    }
-    mend(mesh, path)
-}
-
-/// Reads what the MT was built from: a mesh or, where no more is needed, points.
-pub fn read_reference(path: &Path, opened: &Opened) -> Result<TetMesh> {
-    let read = match opened.reference() {
-        Reference::Mesh => read_mesh(path)?,
-        Reference::Points => read_points(path)?,
-    };
-    Ok(read.0)
+    Ok(mesh)
 }
 
 /// The number of the field called `name`; the first field without a name.

@@ -8,6 +8,8 @@ use anyhow::Result;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use tetralod::mesh::VectorPart;
+use tetralod::mt::FieldInfo;
 use tetralod::mt::MtKind;
 use tetralod::mt::MultiTessellation;
 use tetralod::mt::stats;
@@ -41,6 +43,8 @@ struct Report {
     /// Of the reference mesh: x0, y0, z0, x1, y1, z1.
     bounds: [f64; 6],
     position_bits: u32,
+    /// How far the lattice moves a vertex at most, in model units.
+    position_quantization: f64,
     depth: u32,
     arcs_per_node: f64,
     tets_per_update: f64,
@@ -50,9 +54,27 @@ struct Report {
 #[derive(Serialize)]
 struct Field {
     name: String,
+    #[serde(skip_serializing_if = "String::is_empty")]
+    unit: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    vector: Option<Vector>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    time: Option<f64>,
     min: f64,
     max: f64,
     bits: u32,
+    /// How far the lattice rounds a value at most, in field units.
+    quantization: f64,
+    /// The error that is left at full resolution, as a fraction of the range.
+    floor: f64,
+}
+
+/// Which part of a vector a field is; its length if no component is told.
+#[derive(Serialize)]
+struct Vector {
+    name: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    component: Option<u8>,
 }
 
 #[derive(Serialize)]
@@ -76,8 +98,11 @@ fn report(opened: &Opened) -> Result<Report> {
     let (mt, info) = (opened.mt()?, opened.info()?);
     let base_tetrahedra = mt.base().tets.len();
     let stats = stats(mt)?;
-    let field =
-        |f: &tetralod::mt::FieldInfo| Field { name: f.name.clone(), min: f.min, max: f.max, bits: f.bits };
+    let field = |(number, field): (usize, &FieldInfo)| {
+        let FieldInfo { name, unit, vector, time, min, max, bits, quantization, .. } = field.clone();
+        let vector = vector.map(|VectorPart { name, component }| Vector { name, component });
+        Field { name, unit, vector, time, min, max, bits, quantization, floor: info.floor(number) }
+    };
     let [[x0, y0, z0], [x1, y1, z1]] = stats.bounds.map(|corner| info.lattice.point(corner));
     Ok(Report {
         kind: info.kind.name(),
@@ -95,9 +120,10 @@ fn report(opened: &Opened) -> Result<Report> {
             indexed_bytes: stats.indexed_bytes,
             adjacency_bytes: stats.adjacency_bytes,
         },
-        fields: info.fields.iter().map(field).collect(),
+        fields: info.fields.iter().enumerate().map(field).collect(),
         bounds: [x0, y0, z0, x1, y1, z1],
         position_bits: info.lattice.bits,
+        position_quantization: info.quantization,
         depth: stats.depth,
         arcs_per_node: stats.arcs_per_update(),
         tets_per_update: stats.inserted_per_update(),
@@ -112,6 +138,33 @@ fn words(kind: MtKind) -> &'static str {
         MtKind::Vertex => "vertex insertion",
         MtKind::Explicit => "explicit",
     }
+}
+
+fn rounded(by: f64) -> String {
+    if by == 0.0 { "exact".to_owned() } else { format!("rounded by at most {}", output::number(by)) }
+}
+
+/// A field for people, all its time steps in one row.
+fn field_row(steps: &[Field]) -> String {
+    let Field { name, unit, vector, time, min, max, bits, .. } = &steps[0];
+    let part = match vector {
+        Some(Vector { name, component: Some(component) }) => format!(" (component {component} of {name})"),
+        Some(Vector { name, component: None }) => format!(" (length of {name})"),
+        None => String::new(),
+    };
+    let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+    let [min, max] = [*min, *max].map(output::number);
+    let worst = rounded(steps.iter().map(|step| step.quantization).fold(0.0, f64::max));
+    let last = steps.last().and_then(|step| step.time);
+    let time = match (*time, last) {
+        (Some(first), Some(last)) if steps.len() > 1 => {
+            let [first, last] = [first, last].map(output::number);
+            format!("; {} times from {first} to {last}", steps.len())
+        }
+        (Some(time), _) => format!("; time {}", output::number(time)),
+        _ => String::new(),
+    };
+    format!("{name}{part}: {min} to {max}{unit}, {bits} bits, {worst}{time}")
 }
 
 fn print(report: &Report) -> Result<()> {
@@ -139,12 +192,10 @@ fn print(report: &Report) -> Result<()> {
         ("reference alone", output::bytes(memory.indexed_bytes)),
         ("  with adjacency", output::bytes(memory.adjacency_bytes)),
         ("bounds", format!("({x0}, {y0}, {z0}) to ({x1}, {y1}, {z1})")),
-        ("position bits", report.position_bits.to_string()),
+        ("position bits", format!("{}, {}", report.position_bits, rounded(report.position_quantization))),
     ];
-    for field in &report.fields {
-        let [min, max] = [field.min, field.max].map(output::number);
-        rows.push(("field", format!("{}: {min} to {max}, {} bits", field.name, field.bits)));
-    }
+    let steps = |a: &Field, b: &Field| a.name == b.name;
+    rows.extend(report.fields.chunk_by(steps).map(|steps| ("field", field_row(steps))));
     for (key, value) in &report.metadata {
         rows.push((key, value.clone()));
     }

@@ -10,6 +10,7 @@ mod extract;
 mod files;
 mod generate;
 mod info;
+mod input;
 mod isosurface;
 mod needs;
 mod output;
@@ -39,7 +40,7 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     Generate(generate::Arguments),
-    Build(build::Arguments),
+    Build(Box<build::Arguments>),
     Convert(convert::Arguments),
     Info(info::Arguments),
     Extract(Box<extract::Arguments>),

@@ -16,9 +16,9 @@ use tetralod::verify::VerifyReport;
 pub struct Arguments {
     /// The MT file.
     file: PathBuf,
-    /// The mesh, or the points, that it was built from.
-    #[arg(long, value_name = "INPUT")]
-    against: PathBuf,
+    /// The mesh, or the points, that it was built from (repeatable: time steps).
+    #[arg(long, value_name = "INPUT", required = true)]
+    against: Vec<PathBuf>,
     /// Print a JSON object.
     #[arg(long)]
     json: bool,

@@ -19,6 +19,7 @@ use super::read::MAX_STRING;
 use super::read::Reader;
 use super::write;
 use crate::geom::Lattice;
+use crate::mesh::VectorPart;
 use crate::mt::BaseMesh;
 use crate::mt::BaseMeshError;
 use crate::mt::EdgeMt;
@@ -47,8 +48,9 @@ pub fn write_info(
     metadata: &BTreeMap<String, String>,
 ) -> Result<(), EncodeError> {
     let fits = |text: &str| text.len() <= MAX_STRING as usize;
-    if !info.fields.iter().all(|field| fits(&field.name)) {
-        return Err(EncodeError::TooLong { what: "the name of a field" });
+    let vector_fits = |field: &FieldInfo| field.vector.as_ref().is_none_or(|vector| fits(&vector.name));
+    if !info.fields.iter().all(|field| fits(&field.name) && fits(&field.unit) && vector_fits(field)) {
+        return Err(EncodeError::TooLong { what: "the name or the unit of a field" });
     }
     if !metadata.iter().all(|(key, value)| fits(key) && fits(value)) {
         return Err(EncodeError::TooLong { what: "a metadata key or value" });
@@ -75,6 +77,7 @@ pub fn write_info(
         write::string(out, key);
         write::string(out, value);
     }
+    write_more(out, info);
     if out.len() > MAX_INFO_BYTES {
         return Err(EncodeError::TooLong { what: "the description with all metadata" });
     }
@@ -90,10 +93,76 @@ pub fn read_info(mut reader: Reader<'_>) -> Result<(MtInfo, Metadata), FormatErr
     let count = reader.u8()?;
     let fields = (0..count).map(|_| read_field(&mut reader)).collect::<Result<_, _>>()?;
     let metadata = read_metadata(&mut reader)?;
+    let mut info = MtInfo {
+        kind,
+        lattice,
+        fields,
+        vertices,
+        tetrahedra,
+        updates,
+        displacement_per_error,
+        quantization: 0.0,
+    };
+    read_more(&mut reader, &mut info)?;
     reader.end()?;
-    let info = MtInfo { kind, lattice, fields, vertices, tetrahedra, updates, displacement_per_error };
     info.check()?;
     Ok((info, metadata))
+}
+
+/// Set in the flags of a field that is a part of a vector, and that is its length; and of a field of a known time.
+const OF_VECTOR: u8 = 1;
+const IS_LENGTH: u8 = 2;
+const HAS_TIME: u8 = 4;
+
+/// Appends what the first writers did not know, unless there is none of it.
+fn write_more(out: &mut Vec<u8>, info: &MtInfo) {
+    let knows_no_more = |field: &FieldInfo| {
+        field.unit.is_empty() && field.vector.is_none() && field.time.is_none() && field.quantization == 0.0
+    };
+    if info.quantization == 0.0 && info.fields.iter().all(knows_no_more) {
+        return;
+    }
+    write::f64(out, info.quantization);
+    for field in &info.fields {
+        write::f64(out, field.quantization);
+        write::string(out, &field.unit);
+        let component = field.vector.as_ref().map(|vector| vector.component);
+        let of_vector = match component {
+            None => 0,
+            Some(None) => OF_VECTOR | IS_LENGTH,
+            Some(Some(_)) => OF_VECTOR,
+        };
+        out.push(of_vector | if field.time.is_some() { HAS_TIME } else { 0 });
+        if let Some(VectorPart { name, component }) = &field.vector {
+            write::string(out, name);
+            out.extend(component);
+        }
+        field.time.iter().for_each(|&time| write::f64(out, time));
+    }
+}
+
+fn read_more(reader: &mut Reader<'_>, info: &mut MtInfo) -> Result<(), FormatError> {
+    if reader.is_empty() {
+        return Ok(());
+    }
+    info.quantization = reader.f64()?;
+    for field in &mut info.fields {
+        field.quantization = reader.f64()?;
+        field.unit = reader.string()?.to_owned();
+        let flags = reader.u8()?;
+        if flags & !(OF_VECTOR | IS_LENGTH | HAS_TIME) != 0 || flags & (OF_VECTOR | IS_LENGTH) == IS_LENGTH {
+            return Err(reader.corrupt("the flags of a field are not known"));
+        }
+        if flags & OF_VECTOR != 0 {
+            let name = reader.string()?.to_owned();
+            let component = if flags & IS_LENGTH == 0 { Some(reader.u8()?) } else { None };
+            field.vector = Some(VectorPart { name, component });
+        }
+        if flags & HAS_TIME != 0 {
+            field.time = Some(reader.f64()?);
+        }
+    }
+    Ok(())
 }
 
 fn read_field(reader: &mut Reader<'_>) -> Result<FieldInfo, FormatError> {
@@ -104,6 +173,7 @@ fn read_field(reader: &mut Reader<'_>) -> Result<FieldInfo, FormatError> {
         origin: reader.f64()?,
         step: reader.f64()?,
         bits: u32::from(reader.u8()?),
+        ..FieldInfo::default()
     })
 }
 

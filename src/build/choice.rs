@@ -1,0 +1,87 @@
+//! Which fields of a mesh are kept, and which of them bit for bit.
+
+use super::BuildConfig;
+use super::BuildError;
+use crate::mesh::Field;
+use crate::mesh::TetMesh;
+use crate::mt::Exact;
+use crate::mt::VertexId;
+
+/// Most fields of an MT.
+const MAX_FIELDS: usize = 255;
+
+/// The fields to keep, the time steps of each one behind the other.
+pub(super) fn fields<'a>(mesh: &'a TetMesh, config: &BuildConfig) -> Result<Vec<&'a Field>, BuildError> {
+    let mut chosen: Vec<&Field> = Vec::new();
+    let mut add = |field: &'a Field| {
+        // A field that is asked for twice, by its own name and by its vector's, is there once.
+        if !chosen.iter().any(|&c| std::ptr::eq(c, field)) {
+            chosen.push(field);
+        }
+    };
+    for name in &config.fields {
+        let found: Vec<&Field> = in_steps(mesh, |field| field.answers_to(name));
+        if found.is_empty() {
+            return Err(unknown(mesh, name));
+        }
+        found.into_iter().for_each(&mut add);
+    }
+    if config.all_fields {
+        let is_length = |field: &Field| field.vector.as_ref().is_some_and(|v| v.component.is_none());
+        in_steps(mesh, |field| !is_length(field)).into_iter().for_each(&mut add);
+    } else if config.fields.is_empty()
+        && let Some(first) = mesh.fields.first()
+    {
+        in_steps(mesh, |field| field.name == first.name).into_iter().for_each(&mut add);
+    }
+    if chosen.is_empty() {
+        let at_cells = mesh.cell_fields.first().map(|field| field.name.clone());
+        return Err(at_cells.map_or(BuildError::NoField, |name| BuildError::CellField { name }));
+    }
+    if chosen.len() > MAX_FIELDS {
+        return Err(BuildError::TooManyFields { fields: chosen.len() });
+    }
+    let names = config.lossless.iter().chain(config.precision_of.iter().map(|(name, _)| name));
+    for name in names {
+        if !chosen.iter().any(|field| field.answers_to(name)) {
+            let known = chosen.iter().map(|field| field.name.clone()).collect();
+            return Err(BuildError::UnknownField { name: name.clone(), known });
+        }
+    }
+    Ok(chosen)
+}
+
+/// The fields for which `wanted` holds in the order of the mesh, but the time steps of each one behind the other.
+fn in_steps(mesh: &TetMesh, wanted: impl Fn(&Field) -> bool) -> Vec<&Field> {
+    let mut names: Vec<&str> = Vec::new();
+    for field in mesh.fields.iter().filter(|field| wanted(field)) {
+        if !names.contains(&field.name.as_str()) {
+            names.push(&field.name);
+        }
+    }
+    names.into_iter().flat_map(|name| mesh.fields.iter().filter(move |field| field.name == name)).collect()
+}
+
+fn unknown(mesh: &TetMesh, name: &str) -> BuildError {
+    if mesh.cell_fields.iter().any(|field| field.answers_to(name)) {
+        return BuildError::CellField { name: name.to_owned() };
+    }
+    let mut known: Vec<String> = mesh.fields.iter().map(|field| field.name.clone()).collect();
+    known.dedup();
+    BuildError::UnknownField { name: name.to_owned(), known }
+}
+
+/// The exact values of the fields that are wanted without loss; `vertices` has the MT's vertex for each point.
+pub(super) fn exact_values(
+    mesh: &TetMesh,
+    config: &BuildConfig,
+    vertices: &[VertexId],
+) -> Result<Vec<Exact>, BuildError> {
+    let is_wanted =
+        |field: &Field| config.all_lossless || config.lossless.iter().any(|name| field.answers_to(name));
+    let table = |(number, field): (usize, &Field)| {
+        Exact::new(number, vertices.iter().copied().zip(field.values.iter().copied()).collect())
+    };
+    let chosen = fields(mesh, config)?;
+    Ok(chosen.into_iter().enumerate().filter(|(_, field)| is_wanted(field)).map(table).collect())
+}

@@ -1,0 +1,149 @@
+//! The lattice of the positions: as coarse as what is asked for and the cells allow.
+
+use super::BuildConfig;
+use super::BuildError;
+use crate::geom::Bounds;
+use crate::geom::Lattice;
+use crate::geom::WIDE_BITS;
+use crate::geom::orient3d;
+use crate::mesh::Grid;
+use crate::mesh::TetMesh;
+
+/// The fewest position bits that are tried unless the caller says otherwise.
+const FEWEST_BITS: u32 = 16;
+/// Bits added to the fewest that keep every cell positive, so that thin cells keep their shape, too.
+const SPARE_BITS: u32 = 2;
+
+/// Points on a lattice.
+pub(super) struct Placed {
+    pub lattice: Lattice,
+    pub positions: Vec<[i32; 3]>,
+}
+
+/// Puts the points on a lattice that keeps every cell positive or, where there are none, the points apart:
+/// - of as many bits as are asked for;
+/// - the coarsest one that keeps every point within the tolerance that is asked for;
+/// - if nothing is asked for, the coarsest one of at least [`FEWEST_BITS`], with [`SPARE_BITS`] more where it had to be
+///   finer.
+pub(super) fn place(mesh: &TetMesh, config: &BuildConfig) -> Result<Placed, BuildError> {
+    match (config.position_bits, config.position_tolerance) {
+        (Some(_), Some(_)) => {
+            Err(BuildError::Option { name: "position-tolerance", expected: "given without position-bits" })
+        }
+        (Some(bits), None) => with_bits(mesh, bits),
+        (None, Some(tolerance)) => within(mesh, tolerance),
+        (None, None) => by_cells(mesh),
+    }
+}
+
+/// How far the lattice moves a point at most, in model units, rounded up.
+pub(super) fn largest_move(mesh: &TetMesh, lattice: &Lattice, positions: &[[i32; 3]]) -> f64 {
+    let moves = mesh.positions.iter().zip(positions).map(|(&p, &q)| distance(p, lattice.point(q)));
+    moves.fold(0.0, f64::max)
+}
+
+/// The distance, a little too large rather than too small; 0 only between equal points.
+fn distance(p: [f64; 3], q: [f64; 3]) -> f64 {
+    let away = [0, 1, 2].map(|i| (p[i] - q[i]).abs());
+    let largest = away.into_iter().fold(0.0, f64::max);
+    if largest == 0.0 {
+        return 0.0;
+    }
+    let squares: f64 = away.into_iter().map(|x| (x / largest) * (x / largest)).sum();
+    (largest * squares.sqrt() * (1.0 + 8.0 * f64::EPSILON)).next_up()
+}
+
+fn with_bits(mesh: &TetMesh, bits: u32) -> Result<Placed, BuildError> {
+    let placed = on(mesh, bits);
+    match flat_cell(mesh, &placed) {
+        // Points in one place are the business of those who build from points.
+        None => Ok(placed),
+        Some(cell) => {
+            let enough = (bits + 1..=WIDE_BITS).find(|&bits| flat_cell(mesh, &on(mesh, bits)).is_none());
+            Err(BuildError::TooThin { cell, bits, enough })
+        }
+    }
+}
+
+fn within(mesh: &TetMesh, tolerance: f64) -> Result<Placed, BuildError> {
+    if tolerance.is_nan() || tolerance < 0.0 {
+        return Err(BuildError::Option { name: "position-tolerance", expected: "a number of at least 0" });
+    }
+    // The first point that is too far away is usually among the first of all.
+    let is_near = |placed: &Placed| {
+        let mut pairs = mesh.positions.iter().zip(&placed.positions);
+        pairs.all(|(&p, &q)| distance(p, placed.lattice.point(q)) <= tolerance)
+    };
+    let near =
+        (1..=WIDE_BITS).map(|bits| on(mesh, bits)).find(|placed| is_near(placed) && fits(mesh, placed));
+    near.ok_or_else(|| {
+        let finest = on(mesh, WIDE_BITS);
+        let reached = largest_move(mesh, &finest.lattice, &finest.positions);
+        match flat_cell(mesh, &finest) {
+            Some(cell) if reached <= tolerance => BuildError::TooThin { cell, bits: WIDE_BITS, enough: None },
+            _ => BuildError::Tolerance { field: None, reached },
+        }
+    })
+}
+
+fn by_cells(mesh: &TetMesh) -> Result<Placed, BuildError> {
+    let found = (FEWEST_BITS..=WIDE_BITS).map(|bits| on(mesh, bits)).find(|placed| fits(mesh, placed));
+    let Some(placed) = found else {
+        let finest = on(mesh, WIDE_BITS);
+        return match flat_cell(mesh, &finest) {
+            Some(cell) => Err(BuildError::TooThin { cell, bits: WIDE_BITS, enough: None }),
+            // Two points are in the same place in the input.
+            None => Ok(finest),
+        };
+    };
+    let bits = placed.lattice.bits;
+    if mesh.tets.is_empty() || bits == FEWEST_BITS || bits + SPARE_BITS > WIDE_BITS {
+        return Ok(placed);
+    }
+    let finer = on(mesh, bits + SPARE_BITS);
+    Ok(if fits(mesh, &finer) { finer } else { placed })
+}
+
+fn on(mesh: &TetMesh, bits: u32) -> Placed {
+    let lattice = lattice(mesh, bits);
+    Placed { lattice, positions: mesh.positions.iter().map(|&p| lattice.nearest(p)).collect() }
+}
+
+/// Whether every cell is positive or, where there are none, all points are apart.
+fn fits(mesh: &TetMesh, placed: &Placed) -> bool {
+    if !mesh.tets.is_empty() {
+        return flat_cell(mesh, placed).is_none();
+    }
+    let mut sorted = placed.positions.clone();
+    sorted.sort_unstable();
+    sorted.windows(2).all(|pair| pair[0] != pair[1])
+}
+
+/// The first cell that is not positive.
+fn flat_cell(mesh: &TetMesh, placed: &Placed) -> Option<u32> {
+    let flat = |tet: &[u32; 4]| {
+        let [a, b, c, d] = tet.map(|v| placed.positions[v as usize]);
+        orient3d(a, b, c, d) <= 0
+    };
+    mesh.tets.iter().position(flat).map(|cell| cell as u32)
+}
+
+/// The lattice of `bits` over the mesh: on the points of a regular grid, else with equal steps along all axes.
+fn lattice(mesh: &TetMesh, bits: u32) -> Lattice {
+    if let Some(lattice) = mesh.grid.and_then(|grid| grid_lattice(&grid, bits)) {
+        return lattice;
+    }
+    let bounds = Bounds::of(&mesh.positions);
+    let largest = bounds.extent().into_iter().fold(0.0, f64::max);
+    let step = if largest > 0.0 { largest / f64::from(1_u32 << bits) } else { 1.0 };
+    Lattice { origin: bounds.min, step: [step; 3], bits }
+}
+
+/// A lattice that holds every point of the grid exactly, with as many steps to a cell as a power of two can be.
+fn grid_lattice(grid: &Grid, bits: u32) -> Option<Lattice> {
+    let cells = grid.dims.iter().map(|n| n.saturating_sub(1)).max().filter(|&n| n > 0)?;
+    let needed = u32::BITS - (cells - 1).leading_zeros();
+    let spare = bits.checked_sub(needed)?;
+    let step = grid.spacing.map(|s| s / f64::from(1_u32 << spare));
+    Some(Lattice { origin: grid.origin, step, bits })
+}
