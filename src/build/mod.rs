@@ -287,7 +287,7 @@ impl fmt::Display for BuildError {
             }
             Self::CellField { name } => write!(
                 f,
-                "'{name}' is a field at cells, and an MT has fields at points: --cell-to-point makes one of the other"
+                "'{name}' is a field at cells, but an MT has fields at points: --cell-to-point turns those at cells into such"
             ),
             Self::TooManyFields { fields } => {
                 write!(f, "{fields} fields and time steps are too many (at most 255); name those to keep")

@@ -22,8 +22,7 @@ impl TetMesh {
             field.values = self.mean_of_cells(&field.values, &volumes);
             field.integer = false;
             // Time steps share a name.
-            let taken = |f: &Field| f.name == field.name && f.time == field.time;
-            if self.fields.iter().any(taken) {
+            while self.fields.iter().any(|f| f.name == field.name && f.time == field.time) {
                 field.name.push_str("_cells");
                 field.vector = None;
             }

@@ -3,6 +3,7 @@
 
 use tetralod::format::{Decoder, EncodeOptions, FormatError, encode};
 use tetralod::geom::Lattice;
+use tetralod::mesh::VectorPart;
 use tetralod::mt::{
     BaseMesh, EdgeMt, ErrorCode, ExplicitMt, ExplicitUpdate, FieldInfo, Mt, MtInfo, MtKind, MtRef,
     MultiTessellation, UpdateId, VertexId, VertexSplit,
@@ -24,6 +25,17 @@ pub fn field(name: &str, bits: u32) -> FieldInfo {
     }
 }
 
+/// A field that tells all there is, or a part of it, or no more than it must.
+fn told_more(number: usize, field: FieldInfo) -> FieldInfo {
+    let vector = |component| Some(VectorPart { name: "U".into(), component });
+    match number {
+        0 => field,
+        1 => FieldInfo { unit: "m/s".into(), vector: vector(Some(1)), ..field },
+        2 => FieldInfo { time: Some(-2.5), vector: vector(None), quantization: 0.25, ..field },
+        _ => FieldInfo { time: Some(0.0), ..field },
+    }
+}
+
 /// An MT with `tets` separate base tetrahedra, `fields` fields and one update per draft.
 pub fn build(tets: u32, fields: usize, drafts: &[Draft]) -> Mt {
     let lattice = Lattice { origin: [-1.5, 0.0, 2.0], step: [0.25, 0.5, 1.0], bits: 20 };
@@ -40,12 +52,12 @@ pub fn build(tets: u32, fields: usize, drafts: &[Draft]) -> Mt {
     let info = MtInfo {
         kind: MtKind::Edge,
         lattice,
-        fields: (0..fields).map(|f| field(names[f % 4], 12)).collect(),
+        fields: (0..fields).map(|f| told_more(f, field(names[f % 4], 12))).collect(),
         vertices: vertices + drafts.len() as u32,
         tetrahedra: tets + 3 * drafts.len() as u32,
         updates: drafts.len() as u32,
         displacement_per_error: 0.125,
-        quantization: 0.0,
+        quantization: if fields == 2 { 0.0 } else { 0.0625 },
     };
     let mut mt = EdgeMt::new(info, base);
     let mut whole: Vec<u32> = (0..vertices).collect();
