@@ -5,6 +5,8 @@ mod io_support;
 
 use io_support::*;
 use tetralod::io;
+use tetralod::io::CellData;
+use tetralod::io::ReadOptions;
 use tetralod::io::ReadReason;
 use tetralod::mesh;
 use tetralod::mesh::TetMesh;
@@ -50,12 +52,17 @@ fn every_truncation_is_refused_or_harmless() {
 
 #[test]
 fn no_bit_flip_panics_and_no_mesh_is_inconsistent() {
+    let everything = ReadOptions { fields: None, cells: CellData::Values };
     for (name, mut file, _) in files() {
         for bit in 0..8 * file.len() {
             file[bit / 8] ^= 1 << (bit % 8);
-            if let Ok(found) = io::read_bytes(&name, &file) {
+            if let Ok(found) = io::read_bytes_with(&name, &file, &everything) {
                 for field in &found.fields {
                     assert_eq!(field.values.len(), found.positions.len(), "{name} bit {bit}");
+                    assert!(field.values.iter().all(|v| v.is_finite()), "{name} bit {bit}");
+                }
+                for field in &found.cell_fields {
+                    assert_eq!(field.values.len(), found.tets.len(), "{name} bit {bit}");
                     assert!(field.values.iter().all(|v| v.is_finite()), "{name} bit {bit}");
                 }
                 let points = found.positions.len() as u32;

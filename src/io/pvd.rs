@@ -122,4 +122,18 @@ mod tests {
         assert!(refused(twice).contains("merge"));
         assert!(refused("<DataSet").contains("XML"));
     }
+
+    #[test]
+    fn no_cut_and_no_bit_flip_panics() {
+        let file = b"<VTKFile type=\"Collection\"><Collection><DataSet timestep=\"0.5\" file=\"a/b.vtu\"/>\
+                     </Collection></VTKFile>";
+        (0..file.len()).for_each(|length| drop(parse(&file[..length])));
+        for bit in 0..8 * file.len() {
+            let mut flipped = file.to_vec();
+            flipped[bit / 8] ^= 1 << (bit % 8);
+            for (time, path) in parse(&flipped).unwrap_or_default() {
+                assert!(time.is_finite() && !Path::new(&path).is_absolute() && !path.contains(".."));
+            }
+        }
+    }
 }
