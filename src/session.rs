@@ -223,6 +223,7 @@ impl Session {
             excess: outcome.excess,
             bounds,
             satisfied: outcome.satisfied,
+            missing: outcome.missing,
             done: outcome.done,
         })
     }

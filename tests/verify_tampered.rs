@@ -120,7 +120,7 @@ fn errors_that_are_too_small_are_found_by_needs_of_any_kind() {
 fn a_single_error_that_is_too_small_is_found() {
     let mesh = cube(6, &[hilly]);
     let mt = built(&mesh).mt;
-    let first = mt.split(UpdateId(0)).error.0;
+    let first = mt.split(UpdateId(0)).errors[0].0;
     // The last update of a third, lowered to the smallest error of all: it must go to the end to keep the order.
     let lowered = tampered(&mt, |u, parts| {
         if u > mt.updates() / 3 {

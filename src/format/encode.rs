@@ -152,7 +152,7 @@ fn check(mt: MtRef<'_>, options: &EncodeOptions) -> Result<(), EncodeError> {
         return Err(EncodeError::Blocks { bits: options.block_bits });
     }
     let info = mt.info();
-    if mt.updates() != info.updates || mt.present() != info.updates {
+    if mt.present() != info.updates {
         return Err(EncodeError::Incomplete { updates: mt.present(), expected: info.updates });
     }
     mt.base().check(info).map_err(EncodeError::Base)?;

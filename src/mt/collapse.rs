@@ -72,6 +72,8 @@ pub struct EdgeMt {
     /// log2 of the updates of a page.
     page_bits: u32,
     record: Record,
+    /// The end of the last page that is here.
+    updates: u32,
     /// How many updates are here.
     present: u32,
     to_come: ErrorCode,
@@ -113,12 +115,13 @@ impl Record {
 
     fn push(self, words: &mut Vec<i32>, split: &VertexSplit<'_>) {
         let halves = |word: u64| [word as i32, (word >> 32) as i32];
-        words.extend([split.vertex.0 as i32, WHOLE, WHOLE]);
-        words.extend(halves(split.mask));
+        let (vertex, [low, high]) = (split.vertex.0 as i32, halves(split.mask));
         if self.offset == 2 {
-            words.extend(halves(pack(split.offset)));
+            let [x, y] = halves(pack(split.offset));
+            words.extend_from_slice(&[vertex, WHOLE, WHOLE, low, high, x, y]);
         } else {
-            words.extend(split.offset);
+            let [x, y, z] = split.offset;
+            words.extend_from_slice(&[vertex, WHOLE, WHOLE, low, high, x, y, z]);
         }
         words.extend_from_slice(split.field_offsets);
     }
@@ -132,6 +135,15 @@ impl Record {
 #[inline]
 fn two(words: &[i32], at: usize) -> u64 {
     u64::from(words[at] as u32) | u64::from(words[at + 1] as u32) << 32
+}
+
+impl Page {
+    /// Adds the next update, which has been checked.
+    fn push(&mut self, record: Record, split: &VertexSplit<'_>) {
+        let complete = self.errors.push(split.errors);
+        assert!(complete, "each field has an error: that is checked");
+        record.push(&mut self.words, split);
+    }
 }
 
 impl EdgeMt {
@@ -150,6 +162,7 @@ impl EdgeMt {
             pages: Vec::new(),
             page_bits: bits.min(MAX_PAGE_BITS),
             record: Record::new(&info),
+            updates: 0,
             present: 0,
             to_come: ErrorCode::MAX,
             info,
@@ -175,24 +188,22 @@ impl EdgeMt {
     /// mesh is checked when the update is applied; that errors do not grow along the partial order is the caller's to see
     /// to.
     pub fn push(&mut self, split: &VertexSplit<'_>) -> Result<UpdateId, UpdateError> {
-        let update = self.updates();
+        let update = self.updates;
         self.check(update, split)?;
         let vertex = split.vertex.0;
-        if self.split_word(split.vertex).map(|word| *word) != Some(WHOLE) {
-            return Err(UpdateError::Vertex { update, vertex });
+        match self.split_word(split.vertex) {
+            Some(word) if *word == WHOLE => *word = update as i32,
+            _ => return Err(UpdateError::Vertex { update, vertex }),
         }
         if update as usize >> self.page_bits == self.pages.len() {
             let page = self.new_page(update);
             self.pages.push(Some(page));
         }
-        let Some(Some(page)) = self.pages.last_mut() else { return Err(UpdateError::Missing { update }) };
-        if !page.errors.push(split.errors) {
-            return Err(UpdateError::Error { update });
+        // The last page is here.
+        if let Some(Some(page)) = self.pages.last_mut() {
+            page.push(self.record, split);
         }
-        self.record.push(&mut page.words, split);
-        if let Some(word) = self.split_word(split.vertex) {
-            *word = update as i32;
-        }
+        self.updates += 1;
         self.present += 1;
         Ok(UpdateId(update))
     }
@@ -245,16 +256,14 @@ impl EdgeMt {
         for (update, split) in updates.clone().zip(splits) {
             self.check(update, split)?;
             self.check_vertex(page, update, split.vertex)?;
-            if !new.errors.push(split.errors) {
-                return Err(UpdateError::Error { update }.into());
-            }
-            self.record.push(&mut new.words, split);
+            new.push(self.record, split);
         }
         if page as usize >= self.pages.len() {
             self.pages.resize_with(page as usize + 1, || None);
         }
         self.pages[page as usize] = Some(new);
         self.present += updates.len() as u32;
+        self.updates = self.updates.max(updates.end);
         for (k, (update, split)) in updates.zip(splits).enumerate() {
             match self.split_word(split.vertex) {
                 Some(word) if *word == WHOLE => *word = update as i32,
@@ -317,6 +326,13 @@ impl EdgeMt {
         while self.pages.last().is_some_and(Option::is_none) {
             self.pages.pop();
         }
+        self.updates = match self.pages.last() {
+            Some(Some(last)) => {
+                let before = (self.pages.len() - 1) << self.page_bits;
+                (before + last.words.len() / self.record.len) as u32
+            }
+            _ => 0,
+        };
     }
 
     /// Whether update `u` is here.
@@ -365,13 +381,7 @@ impl EdgeMt {
 
     /// Number of updates so far, those between them that are not here included.
     pub fn updates(&self) -> u32 {
-        match self.pages.last() {
-            Some(Some(page)) => {
-                let before = (self.pages.len() - 1) << self.page_bits;
-                (before + page.words.len() / self.record.len) as u32
-            }
-            _ => 0,
-        }
+        self.updates
     }
 
     /// Bytes of everything that the MT holds, base mesh and errors included.
@@ -410,7 +420,7 @@ impl EdgeMt {
             return self.base_splits.get_mut(v.0 as usize);
         };
         let at = self.place(i / 2) * self.record.len + SPLITS + i as usize % 2;
-        self.pages.get_mut((i / 2 >> self.page_bits) as usize)?.as_mut()?.words.get_mut(at)
+        self.pages.get_mut(((i / 2) >> self.page_bits) as usize)?.as_mut()?.words.get_mut(at)
     }
 
     /// The error of update `u`, the largest one of all fields; [`ErrorCode::ZERO`] if it is not here.

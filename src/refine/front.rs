@@ -659,15 +659,11 @@ impl Front {
         while fetched.len() < most {
             let Some(t) = self.tets.next() else { break };
             let Some(tet) = self.mesh.tet(t) else { continue };
-            match mt.remover(&self.mesh, t) {
-                Some(update) => {
-                    let corners = tet.map(|v| self.mesh.positions[v as usize]);
-                    let (error, errors) = (mt.error(update), mt.errors(update));
-                    fetched.push(Open { t, tet, update, error, errors, corners });
-                }
-                // If its update is not here, it is judged when that arrives.
-                None => {}
-            }
+            // If its update is not here, it is judged when that arrives.
+            let Some(update) = mt.remover(&self.mesh, t) else { continue };
+            let corners = tet.map(|v| self.mesh.positions[v as usize]);
+            let (error, errors) = (mt.error(update), mt.errors(update));
+            fetched.push(Open { t, tet, update, error, errors, corners });
         }
         outcome.judged += fetched.len() as u64;
     }

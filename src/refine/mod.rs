@@ -20,6 +20,10 @@
 //! **Small changes.** Each verdict comes with a slack: how far the request may move before it can change. [`Front`] judges
 //! again what has used up its slack, and nothing else, so that the cost of a request grows with what it changes.
 //!
+//! **What is not here.** Updates that are not here are no updates: the mesh is the smallest that satisfies the request as far as
+//! those that are here go, and the answer tells whether more would be needed. When some arrive, what they remove is judged again;
+//! what leaves must not be applied ([`Front::arrived`], [`Front::leave`]).
+//!
 //! **Steps.** [`Front::step`] stops whenever it is told to, with a valid mesh, and goes on from there.
 
 mod camera;
@@ -69,6 +73,8 @@ pub struct RefineStats {
     pub bounds: Vec<f64>,
     /// Whether the mesh is what was asked for; false when the budget or missing data stopped it, or there is more to do.
     pub satisfied: bool,
+    /// Whether data is missing: some tetrahedron violates the request as far as is known, and what may remove it is not here.
+    pub missing: bool,
     /// Whether there is nothing more to do, as far as budget and data allow. Otherwise the bounds are not known yet.
     pub done: bool,
 }
