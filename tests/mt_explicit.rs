@@ -140,9 +140,12 @@ proptest! {
         prop_assert_eq!(found.adjacency_bytes, (v * vertex + 32 * t) as u64);
         // Forest and numbering: 12 bytes an update; offset, field offsets, mask and error with them.
         let (b, base_tets) = (built.base.positions.len(), built.base.tets.len());
-        let compact = b * (vertex + 4) + 16 * base_tets + n * (12 + 8 + 4 * fields + 8 + 2);
-        prop_assert_eq!(found.compact_bytes, compact as u64);
-        prop_assert_eq!(mt.bytes(), compact as u64);
+        let errors = if fields == 1 { 2 } else { 2 * (fields + 1) };
+        let compact = b * (vertex + 4) + 16 * base_tets + n * (12 + 8 + 4 * fields + 8 + errors);
+        // And an entry for each page, of 1024 updates at most.
+        let pages = mt.bytes() - compact as u64;
+        prop_assert!(pages <= 64 * n.div_ceil(1024) as u64, "{pages}");
+        prop_assert_eq!(found.compact_bytes, mt.bytes());
     }
 
     /// The mesh's own remover and creator of each tetrahedron are those of the DAG.
