@@ -56,6 +56,7 @@
 //! |---|---|---|
 //! | `build` | modules `io`, `generate`, `build`, `measure`, `verify` | making MTs, natively or in wasm |
 //! | `cli` (default) | `build` and the command `tetralod` | the command line |
+//! | `serve` (default) | its subcommand `serve` | files for pages on your own machine |
 //! | `gpu` | module `gpu`: the renderer on wgpu, with WebGPU as its only backend | pages; add a backend of wgpu for native use |
 //! | `vulkan` | `gpu` with wgpu's Vulkan backend | testing the renderer without a browser |
 //! | `web` | module `web`: the JavaScript API, with `gpu` also the viewer | `wasm32-unknown-unknown` |

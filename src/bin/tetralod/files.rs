@@ -29,7 +29,7 @@ use tetralod::verify::Reference;
 const CHUNK: usize = 1 << 20;
 
 /// Exit code after Ctrl-C, as shells have it.
-const INTERRUPTED: i32 = 130;
+pub const INTERRUPTED: i32 = 130;
 
 /// The unfinished output, if there is one. Whoever holds the lock decides what becomes of it.
 static PARTIAL: Mutex<Option<PathBuf>> = Mutex::new(None);

@@ -17,6 +17,8 @@ mod output;
 mod poly;
 mod probe;
 mod query;
+#[cfg(feature = "serve")]
+mod serve;
 mod slice;
 mod stats;
 mod streamlines;
@@ -52,6 +54,19 @@ enum Command {
     Stats(Box<stats::Arguments>),
     Verify(verify::Arguments),
     Bench(bench::Arguments),
+    #[cfg(feature = "serve")]
+    Serve(serve::Arguments),
+}
+
+impl Command {
+    /// Whether it has a handler of its own for Ctrl-C; there can be only one.
+    fn ends_by_itself(&self) -> bool {
+        #[cfg(feature = "serve")]
+        if let Self::Serve(_) = self {
+            return true;
+        }
+        false
+    }
 }
 
 fn main() -> ExitCode {
@@ -65,7 +80,9 @@ fn main() -> ExitCode {
 }
 
 fn run(command: Command) -> anyhow::Result<ExitCode> {
-    files::remove_partial_output_on_interrupt()?;
+    if !command.ends_by_itself() {
+        files::remove_partial_output_on_interrupt()?;
+    }
     match command {
         Command::Generate(arguments) => generate::run(&arguments)?,
         Command::Build(arguments) => build::run(&arguments)?,
@@ -80,6 +97,8 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Probe(arguments) => probe::run(&arguments)?,
         Command::Streamlines(arguments) => streamlines::run(&arguments)?,
         Command::Stats(arguments) => stats::run(&arguments)?,
+        #[cfg(feature = "serve")]
+        Command::Serve(arguments) => serve::run(&arguments)?,
     }
     Ok(ExitCode::SUCCESS)
 }
