@@ -121,6 +121,7 @@ pub mod mesh;
 pub mod mt;
 pub mod refine;
 pub mod session;
+pub mod stream;
 #[cfg(feature = "build")]
 pub mod verify;
 pub mod view;

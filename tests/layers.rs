@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Each module with what it may import besides itself.
-const LAYERS: [(&str, &[&str]); 15] = [
+const LAYERS: [(&str, &[&str]); 16] = [
     ("geom", &[]),
     ("mesh", &["geom"]),
     ("mt", &["geom", "mesh"]),
@@ -20,10 +20,17 @@ const LAYERS: [(&str, &[&str]); 15] = [
     ("measure", &["geom", "mesh", "mt"]),
     ("verify", &["geom", "mesh", "mt", "refine"]),
     ("view", &["geom", "mesh"]),
+    ("stream", &[]),
     ("session", &["geom", "mesh", "mt", "format", "refine", "view"]),
     ("bench", &["geom", "format", "mt", "refine", "session"]),
     ("gpu", &["geom", "mesh", "view"]),
-    ("web", &["geom", "mesh", "mt", "format", "refine", "view", "session", "bench", "gpu", "io", "build"]),
+    (
+        "web",
+        &[
+            "geom", "mesh", "mt", "format", "refine", "view", "session", "stream", "bench", "gpu", "io",
+            "build",
+        ],
+    ),
 ];
 
 /// Libraries of the edges, and the modules that they may appear in.

@@ -1,0 +1,594 @@
+//! Decides which bytes to ask for next, and takes what comes.
+//!
+//! The loader does no I/O and knows no time: a driver tells it what happens, and when, and does what it says. So one
+//! machine serves pages, programs and tests, and every fault of a network can be played to it. What it holds to:
+//! the bytes that come out are those of one version of the file; never more than
+//! [`max_requests`](LoaderOptions::max_requests) requests are open or waiting to be tried again; no byte is asked for
+//! that is held or on its way; nobody waits for ever: in the end there are bytes or a [`StreamError`].
+
+use super::answer::Answer;
+use super::answer::Head;
+use super::answer::UNKNOWN;
+use super::error::StreamError;
+use super::held::Held;
+use super::range_set::RangeSet;
+use std::collections::VecDeque;
+use std::ops::Range;
+
+/// How a loader goes about its work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LoaderOptions {
+    /// Most requests at a time.
+    pub max_requests: usize,
+    /// Unwanted bytes that are rather fetched than asked around.
+    pub gap: u64,
+    /// Most bytes in one request.
+    pub max_request_bytes: u64,
+    /// How often the same bytes are asked for again without success.
+    pub retries: u32,
+    /// The wait before the first such try, in milliseconds; each one after waits twice as long.
+    pub backoff_ms: u64,
+    /// The longest such wait.
+    pub max_backoff_ms: u64,
+    /// How long a request may bring nothing, in milliseconds.
+    pub timeout_ms: u64,
+    /// Seed of the jitter, which keeps clients from trying again in step.
+    pub seed: u64,
+}
+
+impl Default for LoaderOptions {
+    /// Six requests of up to 4 MiB over gaps of up to 16 KiB; five more tries, after 0.5 s to 10 s; 30 s of silence.
+    fn default() -> Self {
+        Self {
+            max_requests: 6,
+            gap: 16 << 10,
+            max_request_bytes: 4 << 20,
+            retries: 5,
+            backoff_ms: 500,
+            max_backoff_ms: 10_000,
+            timeout_ms: 30_000,
+            seed: 0,
+        }
+    }
+}
+
+/// Bytes that are wanted, and how much.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Wanted {
+    /// Which bytes. What lies beyond the end of the file comes out shorter.
+    pub range: Range<u64>,
+    /// Higher comes first.
+    pub priority: f32,
+}
+
+/// What the driver is to do.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Action {
+    /// Ask for these bytes.
+    Fetch {
+        /// The name of the request in all that is told of it.
+        id: u32,
+        /// The bytes.
+        range: Range<u64>,
+        /// For `If-Match`, where sending that costs nothing (in a page it costs a preflight); answers are checked anyway.
+        if_match: Option<String>,
+    },
+    /// Drop this request; nothing needs to be told of it any more.
+    Cancel {
+        /// Its name.
+        id: u32,
+    },
+    /// Nothing to do before this time, unless something happens.
+    Wait {
+        /// In milliseconds, by the clock that the driver tells.
+        until_ms: u64,
+    },
+}
+
+/// How a request failed that did not get to its end.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Failure {
+    /// No connection, or one that was cut; with what is known of it.
+    Network(String),
+    /// The browser refused (CORS).
+    Blocked,
+    /// Nothing came for too long.
+    Timeout,
+}
+
+/// What has been asked and has come so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Traffic {
+    /// Requests that were made.
+    pub requests: u64,
+    /// Bytes that came.
+    pub received: u64,
+    /// Of those, bytes that were wanted.
+    pub used: u64,
+}
+
+/// See the [module](self).
+#[derive(Debug, Default)]
+pub struct Loader {
+    options: LoaderOptions,
+    /// What has not come out yet: most important first, then by place; no range twice.
+    wanted: Vec<Wanted>,
+    /// Bytes of `wanted` that are not held.
+    needed: RangeSet,
+    /// Bytes of `wanted` that are.
+    held: Held,
+    ready: VecDeque<(Range<u64>, Vec<u8>)>,
+    requests: Vec<Request>,
+    pauses: Vec<Pause>,
+    cancelled: Vec<u32>,
+    file: Version,
+    /// Whether the server has answered with a range, or with the whole file instead.
+    ranges: Option<bool>,
+    error: Option<StreamError>,
+    traffic: Traffic,
+    /// Of jitter.
+    drawn: u64,
+    last_id: u32,
+}
+
+/// A request under way.
+#[derive(Debug)]
+struct Request {
+    id: u32,
+    asked: Range<u64>,
+    /// The next byte of the body, and its end.
+    body: Range<u64>,
+    answered: bool,
+    /// Bytes of it that were wanted.
+    used: u64,
+    /// Tries before it that brought nothing.
+    strikes: u32,
+    deadline: u64,
+}
+
+/// The rest of a request that failed: it keeps its place among the requests until it is asked for again.
+#[derive(Debug)]
+struct Pause {
+    range: Range<u64>,
+    strikes: u32,
+    until: u64,
+}
+
+/// What tells one version of the file from another.
+#[derive(Debug, Default)]
+struct Version {
+    total: Option<u64>,
+    /// No byte from here on, as far as is known without `total`.
+    end: Option<u64>,
+    etag: Option<String>,
+    modified: Option<String>,
+}
+
+impl Version {
+    fn end(&self) -> u64 {
+        self.total.or(self.end).unwrap_or(UNKNOWN)
+    }
+
+    /// `range` without what lies beyond the end.
+    fn clip(&self, range: &Range<u64>) -> Range<u64> {
+        let end = self.end();
+        range.start.min(end)..range.end.min(end)
+    }
+
+    /// Takes over what `head` tells; an error if that is of another version.
+    fn learn(&mut self, head: &Head) -> Result<(), StreamError> {
+        agree(&mut self.total, head.total())?;
+        let tag = head.strong_etag();
+        let same = tag.is_some() && tag == self.etag.as_deref();
+        agree(&mut self.etag, tag.map(str::to_owned))?;
+        // Servers behind one address may disagree in the date of the same bytes.
+        if same { Ok(()) } else { agree(&mut self.modified, head.last_modified.map(str::to_owned)) }
+    }
+}
+
+fn agree<T: PartialEq>(known: &mut Option<T>, told: Option<T>) -> Result<(), StreamError> {
+    match (&known, told) {
+        (_, None) => Ok(()),
+        (Some(known), Some(told)) => (*known == told).then_some(()).ok_or(StreamError::Changed),
+        (None, told) => {
+            *known = told;
+            Ok(())
+        }
+    }
+}
+
+impl Loader {
+    /// A loader of one file.
+    pub fn new(options: LoaderOptions) -> Self {
+        Self { options, drawn: options.seed, ..Self::default() }
+    }
+
+    /// Says which ranges are wanted from now on, all of them: what is missing in `wanted` is not wanted any more.
+    ///
+    /// A range comes out once. One that has come out is fetched again if it is still in the list: leave it out.
+    pub fn want(&mut self, wanted: &[Wanted]) {
+        self.wanted = wanted.to_vec();
+        let ready = &self.ready;
+        self.wanted.retain(|wanted| ready.iter().all(|(range, _)| *range != wanted.range));
+        let key = |wanted: &Wanted| (wanted.range.start, wanted.range.end);
+        self.wanted.sort_unstable_by(|a, b| b.priority.total_cmp(&a.priority).then(key(a).cmp(&key(b))));
+        let all = self.all_wanted();
+        self.held.keep(&all);
+        self.needed = all;
+        for range in self.held.ranges() {
+            self.needed.remove(&range);
+        }
+        self.deliver(&(0..UNKNOWN));
+    }
+
+    /// What to do now; `None` and `Wait` mean nothing until something happens, `Wait` not after its time either.
+    pub fn next(&mut self, now_ms: u64) -> Option<Action> {
+        self.time_out(now_ms);
+        self.drop_useless(now_ms);
+        if let Some(id) = self.cancelled.pop() {
+            return Some(Action::Cancel { id });
+        }
+        if self.error.is_some() {
+            return None;
+        }
+        if let Some((range, strikes)) = self.choose(now_ms) {
+            return Some(self.fetch(range, strikes, now_ms));
+        }
+        let deadlines = self.requests.iter().map(|request| request.deadline);
+        let until_ms = deadlines.chain(self.pauses.iter().map(|pause| pause.until)).min()?;
+        Some(Action::Wait { until_ms })
+    }
+
+    /// The head of an answer has come.
+    pub fn head(&mut self, id: u32, now_ms: u64, head: &Head) {
+        let Some(at) = self.position(id) else { return };
+        let request = &mut self.requests[at];
+        request.deadline = now_ms.saturating_add(self.options.timeout_ms);
+        request.answered = true;
+        let judged = head.judge(&request.asked);
+        let judged = judged.and_then(|answer| self.file.learn(head).map(|()| answer));
+        match judged {
+            Ok(Answer::Part(part)) => {
+                self.requests[at].body = part;
+                self.ranges = Some(true);
+                self.end_at(self.file.end());
+            }
+            Ok(Answer::Whole(end)) => self.take_whole(at, end),
+            Ok(Answer::Beyond(end)) => {
+                self.requests.swap_remove(at);
+                // Its body, if any, says nothing.
+                self.cancelled.push(id);
+                self.end_at(end);
+            }
+            Err(error) => {
+                let request = self.requests.swap_remove(at);
+                self.cancelled.push(id);
+                let after = head.retry_after_seconds.map(|seconds| seconds.saturating_mul(1000));
+                self.stumble(request, error, now_ms, after.unwrap_or(0));
+            }
+        }
+    }
+
+    /// Bytes of the body have come.
+    pub fn data(&mut self, id: u32, now_ms: u64, bytes: &[u8]) {
+        let Some(at) = self.position(id) else { return };
+        let request = &mut self.requests[at];
+        self.traffic.received += bytes.len() as u64;
+        if !request.answered {
+            return;
+        }
+        request.deadline = now_ms.saturating_add(self.options.timeout_ms);
+        let start = request.body.start;
+        let room = request.body.end - start;
+        let taken = usize::try_from(room).map_or(bytes.len(), |room| room.min(bytes.len()));
+        request.body.start += taken as u64;
+        let chunk = start..request.body.start;
+        let done = request.body.start == request.body.end;
+        let used = self.store(&chunk, &bytes[..taken]);
+        self.requests[at].used += used;
+        self.traffic.used += used;
+        if done {
+            self.finish(at, now_ms);
+            if taken < bytes.len() {
+                self.cancelled.push(id);
+            }
+        }
+        if used > 0 {
+            self.deliver(&chunk);
+        }
+    }
+
+    /// The body has ended.
+    pub fn end(&mut self, id: u32, now_ms: u64) {
+        let Some(at) = self.position(id) else { return };
+        let request = self.requests.swap_remove(at);
+        if request.answered && request.body.end == UNKNOWN {
+            let end = request.body.start;
+            match agree(&mut self.file.total, Some(end)) {
+                Ok(()) => self.end_at(end),
+                Err(error) => self.fail(error),
+            }
+        } else {
+            self.stumble(request, StreamError::Network("an answer ended too early".to_owned()), now_ms, 0);
+        }
+    }
+
+    /// The request has failed.
+    pub fn failed(&mut self, id: u32, now_ms: u64, failure: Failure) {
+        let Some(at) = self.position(id) else { return };
+        let request = self.requests.swap_remove(at);
+        let error = match failure {
+            Failure::Network(detail) => StreamError::Network(detail),
+            Failure::Blocked => StreamError::Blocked,
+            Failure::Timeout => StreamError::Timeout,
+        };
+        self.stumble(request, error, now_ms, 0);
+    }
+
+    /// A range that is complete: as it was wanted, with its bytes, fewer where it reaches beyond the end of the file.
+    pub fn take(&mut self) -> Option<(Range<u64>, Vec<u8>)> {
+        self.ready.pop_front()
+    }
+
+    /// Why nothing comes any more. What was complete before can still be taken.
+    pub fn error(&self) -> Option<&StreamError> {
+        self.error.as_ref()
+    }
+
+    /// Tries again after an error, from the beginning if the file had changed.
+    pub fn retry(&mut self) {
+        if self.error.take() == Some(StreamError::Changed) {
+            self.file = Version::default();
+            self.held = Held::default();
+            self.needed = self.all_wanted();
+        }
+    }
+
+    /// The size of the file, once it is known.
+    pub fn total(&self) -> Option<u64> {
+        self.file.total
+    }
+
+    /// What names this version of the file: its strong entity tag or, failing that, its date.
+    pub fn version(&self) -> Option<&str> {
+        self.file.etag.as_deref().or(self.file.modified.as_deref())
+    }
+
+    /// Whether the server gives ranges; where it does not, everything passes by from the start for whatever is wanted.
+    pub fn serves_ranges(&self) -> Option<bool> {
+        self.ranges
+    }
+
+    /// Whether all that was wanted has come.
+    pub fn is_idle(&self) -> bool {
+        self.wanted.is_empty()
+    }
+
+    /// What has been asked and has come so far.
+    pub fn traffic(&self) -> Traffic {
+        self.traffic
+    }
+
+    /// Bytes that wait for the rest of their range, and complete ones that nobody has taken.
+    pub fn held_bytes(&self) -> u64 {
+        self.held.len() + self.ready.iter().map(|(_, bytes)| bytes.len() as u64).sum::<u64>()
+    }
+
+    fn position(&self, id: u32) -> Option<usize> {
+        self.requests.iter().position(|request| request.id == id)
+    }
+
+    fn all_wanted(&self) -> RangeSet {
+        RangeSet::of(self.wanted.iter().map(|wanted| self.file.clip(&wanted.range)).collect())
+    }
+
+    /// Keeps of `chunk` what is wanted and not held; says how much that is.
+    fn store(&mut self, chunk: &Range<u64>, bytes: &[u8]) -> u64 {
+        let (mut rest, mut used) = (chunk.clone(), 0);
+        while let Some(part) = self.needed.first_in(&rest) {
+            let place = |at: u64| (at - chunk.start) as usize;
+            self.held.put(part.start, &bytes[place(part.start)..place(part.end)]);
+            self.needed.remove(&part);
+            used += part.end - part.start;
+            rest.start = part.end;
+        }
+        used
+    }
+
+    /// Hands out what is complete now that the bytes of `touched` are there or known not to exist.
+    fn deliver(&mut self, touched: &Range<u64>) {
+        let Self { wanted, needed, held, ready, file, .. } = self;
+        let mut done = Vec::new();
+        wanted.retain(|wanted| {
+            let range = file.clip(&wanted.range);
+            if wanted.range.start > touched.end
+                || touched.start > wanted.range.end
+                || needed.first_in(&range).is_some()
+            {
+                return true;
+            }
+            // The same range may have been wanted twice.
+            if ready.iter().all(|(ready, _)| *ready != wanted.range) {
+                ready.push_back((wanted.range.clone(), held.get(&range)));
+            }
+            done.push(range);
+            false
+        });
+        self.let_go(done);
+    }
+
+    /// Drops the bytes of `done`, except those that other ranges still wait for.
+    fn let_go(&mut self, done: Vec<Range<u64>>) {
+        if done.is_empty() {
+            return;
+        }
+        let mut gone = RangeSet::of(done);
+        for wanted in &self.wanted {
+            gone.remove(&wanted.range);
+        }
+        let mut keep = RangeSet::of(self.held.ranges().collect());
+        for range in gone.iter() {
+            keep.remove(range);
+        }
+        self.held.keep(&keep);
+    }
+
+    /// There are no bytes from `end` on.
+    fn end_at(&mut self, end: u64) {
+        if self.file.total.is_none() {
+            self.file.end = Some(end.min(self.file.end()));
+        }
+        self.needed.remove(&(self.file.end()..UNKNOWN));
+        self.deliver(&(0..UNKNOWN));
+    }
+
+    /// The server sends all of the file: one request is enough.
+    fn take_whole(&mut self, at: usize, end: u64) {
+        self.ranges = Some(false);
+        let mut request = self.requests.swap_remove(at);
+        let end = end.min(self.file.end());
+        request.body = 0..end;
+        self.cancelled.extend(self.requests.drain(..).map(|other| other.id));
+        self.pauses.clear();
+        if end > 0 {
+            self.requests.push(request);
+        }
+        if end != UNKNOWN {
+            self.end_at(end);
+        }
+    }
+
+    /// Requests that have been silent for too long are dropped and tried again.
+    fn time_out(&mut self, now: u64) {
+        while let Some(at) = self.requests.iter().position(|request| request.deadline <= now) {
+            let request = self.requests.swap_remove(at);
+            self.cancelled.push(request.id);
+            self.stumble(request, StreamError::Timeout, now, 0);
+        }
+    }
+
+    /// Drops requests that bring nothing more that is wanted. Pauses stay for their time: a list that changes often
+    /// must not make a client ask a server in trouble more often.
+    fn drop_useless(&mut self, now: u64) {
+        let Self { requests, needed, cancelled, pauses, .. } = self;
+        requests.retain(|request| {
+            let useful = needed.first_in(&request.body).is_some();
+            if !useful {
+                cancelled.push(request.id);
+            }
+            useful
+        });
+        pauses.retain(|pause| pause.until > now || needed.first_in(&pause.range).is_some());
+    }
+
+    /// The next range to ask for, with the tries behind it.
+    fn choose(&mut self, now: u64) -> Option<(Range<u64>, u32)> {
+        while let Some(due) = self.pauses.iter().position(|pause| pause.until <= now) {
+            let pause = self.pauses.swap_remove(due);
+            if let Some(range) = self.plan(Some(&pause.range)) {
+                return Some((range, pause.strikes));
+            }
+        }
+        // Until the server has shown that it gives ranges, several requests might fetch the file several times.
+        let most = if self.ranges == Some(true) { self.options.max_requests.max(1) } else { 1 };
+        let room = self.requests.len() + self.pauses.len() < most;
+        if room { self.plan(None).map(|range| (range, 0)) } else { None }
+    }
+
+    /// The range to ask for: of what is in `within`, or from the most important bytes on.
+    fn plan(&self, within: Option<&Range<u64>>) -> Option<Range<u64>> {
+        let mut free = self.needed.clone();
+        for range in self.under_way() {
+            free.remove(&range);
+        }
+        if self.ranges == Some(false) {
+            return free.hull();
+        }
+        let first = match within {
+            Some(range) => free.first_in(range),
+            None => self.wanted.iter().find_map(|wanted| free.first_in(&wanted.range)),
+        };
+        Some(self.grown(first?.start, &free))
+    }
+
+    /// The body of a request is there; that of a part may be less than was asked for.
+    fn finish(&mut self, at: usize, now: u64) {
+        let request = self.requests.swap_remove(at);
+        if request.body.end < request.asked.end.min(self.file.end()) {
+            // Allowed, but a server that gives a few bytes each time gets us nowhere.
+            self.stumble(request, StreamError::WrongRange("a small part of it".to_owned()), now, 0);
+        }
+    }
+
+    /// What is on its way or will be tried again.
+    fn under_way(&self) -> impl Iterator<Item = Range<u64>> {
+        let requests = self.requests.iter().map(|request| request.body.clone());
+        requests.chain(self.pauses.iter().map(|pause| pause.range.clone()))
+    }
+
+    /// The range from `start` over what is free, and over gaps that are small and not held or on their way.
+    ///
+    /// It grows forwards alone: what is before the most important bytes would come before them.
+    fn grown(&self, start: u64, free: &RangeSet) -> Range<u64> {
+        let limit = start.saturating_add(self.options.max_request_bytes.max(1));
+        let mut grown = start..start;
+        while let Some(next) = free.first_in(&(grown.end..limit)) {
+            let gap = grown.end..next.start;
+            if gap.end - gap.start > self.options.gap || self.is_busy(&gap) {
+                break;
+            }
+            grown.end = next.end;
+        }
+        grown
+    }
+
+    fn is_busy(&self, gap: &Range<u64>) -> bool {
+        let mut busy = self.held.ranges().chain(self.under_way());
+        busy.any(|range| range.start < gap.end && gap.start < range.end)
+    }
+
+    fn fetch(&mut self, range: Range<u64>, strikes: u32, now: u64) -> Action {
+        self.last_id = self.last_id.wrapping_add(1);
+        let id = self.last_id;
+        let deadline = now.saturating_add(self.options.timeout_ms);
+        let (asked, body) = (range.clone(), range.clone());
+        self.requests.push(Request { id, asked, body, answered: false, used: 0, strikes, deadline });
+        self.traffic.requests += 1;
+        Action::Fetch { id, range, if_match: self.file.etag.clone() }
+    }
+
+    /// Deals with a request that failed: its rest is asked for again, at once if it had got on, else after a while.
+    fn stumble(&mut self, request: Request, error: StreamError, now: u64, at_least_ms: u64) {
+        let enough = (16 << 10).min((request.asked.end - request.asked.start) / 8).max(1);
+        let strikes = if request.used >= enough { 0 } else { request.strikes + 1 };
+        if strikes > self.options.retries || !error.may_pass() {
+            return self.fail(error);
+        }
+        let wait = if strikes == 0 { 0 } else { self.backoff(strikes).max(at_least_ms.min(60_000)) };
+        // Of a whole file the beginning has passed by, but only the wanted part of it is held.
+        let range =
+            if self.ranges == Some(false) { 0..UNKNOWN } else { request.body.start..request.asked.end };
+        self.pauses.push(Pause { range, strikes, until: now.saturating_add(wait) });
+    }
+
+    /// Twice as long for each strike, and up to half of that less by chance.
+    fn backoff(&mut self, strikes: u32) -> u64 {
+        let doubled = self.options.backoff_ms.saturating_mul(1 << (strikes - 1).min(20));
+        let longest = doubled.min(self.options.max_backoff_ms);
+        longest - self.random() % (longest / 2 + 1)
+    }
+
+    /// SplitMix64 (Steele, Lea, Flood 2014).
+    fn random(&mut self) -> u64 {
+        self.drawn = self.drawn.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let x = (self.drawn ^ self.drawn >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        let x = (x ^ x >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
+        x ^ x >> 31
+    }
+
+    fn fail(&mut self, error: StreamError) {
+        self.cancelled.extend(self.requests.drain(..).map(|request| request.id));
+        self.pauses.clear();
+        self.error = Some(error);
+    }
+}

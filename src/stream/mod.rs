@@ -1,0 +1,24 @@
+//! Byte ranges of a file that is somewhere else: what is wanted now, how much, and how to come by it.
+//!
+//! [`Loader`] decides and a driver does. [`Source`] is what native programs see of both: [`FileSource`] over a file,
+//! `HttpSource` (feature `http`) over a server. In pages `ranges.js` of the package drives the same loader. Nothing
+//! here knows what the bytes mean.
+
+mod answer;
+mod error;
+mod held;
+mod loader;
+mod range_set;
+mod source;
+
+pub use answer::Head;
+pub use error::StreamError;
+pub use loader::Action;
+pub use loader::Failure;
+pub use loader::Loader;
+pub use loader::LoaderOptions;
+pub use loader::Traffic;
+pub use loader::Wanted;
+pub use source::Arrived;
+pub use source::FileSource;
+pub use source::Source;

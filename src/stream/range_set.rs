@@ -1,0 +1,93 @@
+//! Sets of bytes of a file, as ranges.
+
+use std::ops::Range;
+
+/// Ranges in order, none empty, with something between any two.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct RangeSet {
+    ranges: Vec<Range<u64>>,
+}
+
+impl RangeSet {
+    /// The union of `ranges`, in any order.
+    pub fn of(mut ranges: Vec<Range<u64>>) -> Self {
+        ranges.retain(|range| range.start < range.end);
+        ranges.sort_unstable_by_key(|range| range.start);
+        let mut merged: Vec<Range<u64>> = Vec::new();
+        for range in ranges {
+            match merged.last_mut() {
+                Some(last) if range.start <= last.end => last.end = last.end.max(range.end),
+                _ => merged.push(range),
+            }
+        }
+        Self { ranges: merged }
+    }
+
+    /// Takes the bytes of `range` out.
+    pub fn remove(&mut self, range: &Range<u64>) {
+        if range.start >= range.end {
+            return;
+        }
+        let from = self.ranges.partition_point(|found| found.end <= range.start);
+        let to = self.ranges.partition_point(|found| found.start < range.end);
+        if from >= to {
+            return;
+        }
+        let before = self.ranges[from].start..range.start;
+        let after = range.end..self.ranges[to - 1].end;
+        self.ranges.splice(from..to, [before, after].into_iter().filter(|rest| rest.start < rest.end));
+    }
+
+    /// The first run of bytes that are in the set and in `range`.
+    pub fn first_in(&self, range: &Range<u64>) -> Option<Range<u64>> {
+        let found = self.ranges.get(self.ranges.partition_point(|found| found.end <= range.start))?;
+        let part = found.start.max(range.start)..found.end.min(range.end);
+        (part.start < part.end).then_some(part)
+    }
+
+    /// From the first to behind the last byte.
+    pub fn hull(&self) -> Option<Range<u64>> {
+        Some(self.ranges.first()?.start..self.ranges.last()?.end)
+    }
+
+    /// The ranges, in order.
+    pub fn iter(&self) -> std::slice::Iter<'_, Range<u64>> {
+        self.ranges.iter()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn members(set: &RangeSet) -> Vec<u64> {
+        set.iter().flat_map(Clone::clone).collect()
+    }
+
+    #[test]
+    fn sets_of_up_to_three_ranges_agree_with_sets_of_numbers() {
+        let ranges: Vec<_> = (0..6).flat_map(|a| (a..6).map(move |b| a..b)).collect();
+        for a in &ranges {
+            for b in &ranges {
+                let both = RangeSet::of(vec![a.clone(), b.clone()]);
+                let expected: Vec<u64> = (0..6).filter(|x| a.contains(x) || b.contains(x)).collect();
+                assert_eq!(members(&both), expected, "{a:?} and {b:?}");
+                let hull = expected.first().map(|first| *first..expected[expected.len() - 1] + 1);
+                assert_eq!(both.hull(), hull);
+                assert!(both.iter().zip(both.iter().skip(1)).all(|(x, y)| x.end < y.start));
+                for c in &ranges {
+                    let mut less = both.clone();
+                    less.remove(c);
+                    let left: Vec<u64> = expected.iter().copied().filter(|x| !c.contains(x)).collect();
+                    assert_eq!(members(&less), left, "{both:?} without {c:?}");
+                    let inside: Vec<u64> = expected.iter().copied().filter(|x| c.contains(x)).collect();
+                    let first = both.first_in(c);
+                    assert_eq!(first.as_ref().map(|run| run.start), inside.first().copied());
+                    assert!(first.is_none_or(
+                        |run| run.clone().all(|x| inside.contains(&x)) && !inside.contains(&run.end)
+                    ));
+                }
+            }
+        }
+    }
+}

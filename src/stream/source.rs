@@ -1,0 +1,99 @@
+//! Where bytes come from, for native programs: one interface for files and servers.
+
+use super::error::StreamError;
+use super::loader::Wanted;
+use std::io::Read;
+use std::io::Seek;
+use std::io::SeekFrom;
+use std::ops::Range;
+use std::time::Duration;
+
+/// A range that was wanted, with its bytes: fewer where it reaches beyond the end of the file.
+pub type Arrived = (Range<u64>, Vec<u8>);
+
+/// Something that ranges of bytes can be had from.
+pub trait Source {
+    /// Says which ranges are wanted from now on, all of them; each comes out once.
+    fn want(&mut self, wanted: &[Wanted]);
+
+    /// The next range that is complete: waits up to `patience` for it. `None` if there is none by then, or none wanted.
+    fn next(&mut self, patience: Duration) -> Result<Option<Arrived>, StreamError>;
+
+    /// The size of the whole, once it is known.
+    fn total(&self) -> Option<u64>;
+}
+
+/// Ranges of whatever can be read and sought: a file that is open, bytes in memory.
+#[derive(Debug)]
+pub struct FileSource<R> {
+    reader: R,
+    total: u64,
+    /// The most important last.
+    wanted: Vec<Wanted>,
+}
+
+impl<R: Read + Seek> FileSource<R> {
+    /// Takes over `reader`.
+    pub fn new(mut reader: R) -> Result<Self, StreamError> {
+        let total = reader.seek(SeekFrom::End(0)).map_err(unreadable)?;
+        Ok(Self { reader, total, wanted: Vec::new() })
+    }
+
+    fn read(&mut self, range: &Range<u64>) -> Result<Vec<u8>, StreamError> {
+        let range = range.start.min(self.total)..range.end.min(self.total);
+        let length = range.end.saturating_sub(range.start);
+        let mut bytes = Vec::new();
+        self.reader.seek(SeekFrom::Start(range.start)).map_err(unreadable)?;
+        self.reader.by_ref().take(length).read_to_end(&mut bytes).map_err(unreadable)?;
+        // What was there when it was opened is gone: the file is being written to.
+        if (bytes.len() as u64) < length { Err(StreamError::Changed) } else { Ok(bytes) }
+    }
+}
+
+fn unreadable(error: std::io::Error) -> StreamError {
+    StreamError::Unreadable(error.to_string())
+}
+
+impl<R: Read + Seek> Source for FileSource<R> {
+    fn want(&mut self, wanted: &[Wanted]) {
+        self.wanted = wanted.to_vec();
+        self.wanted.sort_by(|a, b| a.priority.total_cmp(&b.priority).then(b.range.start.cmp(&a.range.start)));
+    }
+
+    fn next(&mut self, _patience: Duration) -> Result<Option<Arrived>, StreamError> {
+        let Some(wanted) = self.wanted.pop() else { return Ok(None) };
+        let bytes = self.read(&wanted.range)?;
+        self.wanted.retain(|other| other.range != wanted.range);
+        Ok(Some((wanted.range, bytes)))
+    }
+
+    fn total(&self) -> Option<u64> {
+        Some(self.total)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Cursor;
+
+    #[test]
+    fn ranges_of_a_file_come_in_the_order_of_their_importance() {
+        let mut source = FileSource::new(Cursor::new(b"0123456789".to_vec())).expect("it can be read");
+        let wanted = |range, priority| Wanted { range, priority };
+        source.want(&[
+            wanted(7..99, 0.0),
+            wanted(2..4, 1.0),
+            wanted(0..1, 1.0),
+            wanted(2..4, 0.5),
+            wanted(50..60, 0.0),
+        ]);
+        let mut next = || source.next(Duration::ZERO).expect("no error");
+        assert_eq!(next(), Some((0..1, b"0".to_vec())));
+        assert_eq!(next(), Some((2..4, b"23".to_vec())));
+        assert_eq!(next(), Some((7..99, b"789".to_vec())));
+        assert_eq!(next(), Some((50..60, Vec::new())));
+        assert_eq!(next(), None);
+        assert_eq!(source.total(), Some(10));
+    }
+}
