@@ -34,13 +34,14 @@ const LAYERS: [(&str, &[&str]); 16] = [
 ];
 
 /// Libraries of the edges, and the modules that they may appear in.
-const EDGES: [(&str, &[&str]); 6] = [
+const EDGES: [(&str, &[&str]); 7] = [
     ("wgpu", &["gpu", "web"]),
     ("bytemuck", &["gpu"]),
     ("wasm_bindgen", &["web"]),
     ("js_sys", &["web"]),
     ("web_sys", &["web"]),
-    ("std::fs", &["bin", "io"]),
+    ("std::fs", &["bin", "io", "stream"]),
+    ("ureq", &["stream"]),
 ];
 
 /// A source file: the module it belongs to, its path, its text without comments.

@@ -5,14 +5,24 @@
 //! here knows what the bytes mean.
 
 mod answer;
+#[cfg(feature = "http")]
+mod cache;
 mod error;
 mod held;
+#[cfg(feature = "http")]
+mod http;
 mod loader;
 mod range_set;
 mod source;
 
 pub use answer::Head;
+#[cfg(feature = "http")]
+pub use cache::CacheFolder;
 pub use error::StreamError;
+#[cfg(feature = "http")]
+pub use http::HttpOptions;
+#[cfg(feature = "http")]
+pub use http::HttpSource;
 pub use loader::Action;
 pub use loader::Failure;
 pub use loader::Loader;

@@ -1,0 +1,376 @@
+//! The loader over HTTP, for native programs: a thread for each request, and a channel.
+
+use super::answer::Head;
+use super::cache::Cache;
+use super::cache::CacheFolder;
+use super::error::StreamError;
+use super::loader::Action;
+use super::loader::Failure;
+use super::loader::Loader;
+use super::loader::LoaderOptions;
+use super::loader::Traffic;
+use super::loader::Wanted;
+use super::source::Arrived;
+use super::source::Source;
+use std::collections::VecDeque;
+use std::io::Read;
+use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::sync::atomic::Ordering;
+use std::sync::mpsc;
+use std::sync::mpsc::Receiver;
+use std::sync::mpsc::SyncSender;
+use std::thread;
+use std::time::Duration;
+use std::time::Instant;
+use ureq::Agent;
+use ureq::Body;
+use ureq::ResponseExt;
+use ureq::http::Response;
+use ureq::http::header;
+
+/// Bytes that are read at a time.
+const CHUNK: usize = 64 << 10;
+
+/// Events that may wait before the threads do.
+const WAITING: usize = 32;
+
+/// How a server is asked.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct HttpOptions {
+    /// How requests are made and tried again.
+    pub loader: LoaderOptions,
+    /// Headers that go along with each, such as `Authorization`.
+    pub headers: Vec<(String, String)>,
+    /// Where ranges are kept for the next time, if anywhere.
+    pub cache: Option<CacheFolder>,
+}
+
+/// Ranges of a file on a server.
+///
+/// Time passes for it only while [`next`](Source::next) waits: a program that computes for a while must not find its
+/// requests timed out when it comes back.
+#[derive(Debug)]
+pub struct HttpSource {
+    loader: Loader,
+    options: HttpOptions,
+    client: Client,
+    /// Where the file was asked for, and where redirects led to.
+    given: String,
+    led_to: String,
+    events: Receiver<Event>,
+    sender: SyncSender<Event>,
+    open: Vec<(u32, Arc<AtomicBool>)>,
+    /// What has been found in the cache.
+    found: VecDeque<Arrived>,
+    cache: Option<Cache>,
+    clock: Duration,
+}
+
+/// Something that happened to the request of that number.
+#[derive(Debug)]
+struct Event(u32, What);
+
+#[derive(Debug)]
+enum What {
+    Head(Box<OwnedHead>),
+    Data(Vec<u8>),
+    End,
+    Failed(Failure),
+}
+
+/// What a [`Head`] borrows, where it was asked for, and where redirects led to.
+#[derive(Debug)]
+struct OwnedHead {
+    asked: String,
+    led_to: String,
+    status: u16,
+    fields: [Option<String>; 7],
+}
+
+/// In the order of `OwnedHead::fields`.
+const FIELDS: [header::HeaderName; 7] = [
+    header::CONTENT_RANGE,
+    header::CONTENT_LENGTH,
+    header::CONTENT_ENCODING,
+    header::CONTENT_TYPE,
+    header::ETAG,
+    header::LAST_MODIFIED,
+    header::RETRY_AFTER,
+];
+
+impl OwnedHead {
+    fn of(asked: &str, response: &Response<Body>) -> Self {
+        let field = |name| Some(response.headers().get(name)?.to_str().ok()?.to_owned());
+        let (asked, led_to) = (asked.to_owned(), response.get_uri().to_string());
+        Self { asked, led_to, status: response.status().as_u16(), fields: FIELDS.map(field) }
+    }
+
+    fn head(&self) -> Head<'_> {
+        let [range, length, encoding, kind, etag, modified, retry] =
+            self.fields.each_ref().map(Option::as_deref);
+        let number = |text: Option<&str>| text?.trim().parse().ok();
+        Head {
+            status: self.status,
+            content_range: range,
+            content_length: number(length),
+            content_encoding: encoding,
+            decoded: false,
+            content_type: kind,
+            etag,
+            last_modified: modified,
+            retry_after_seconds: number(retry),
+        }
+    }
+}
+
+impl HttpSource {
+    /// Ranges of the file at `url`; nothing is asked before something is wanted.
+    pub fn new(url: &str, options: HttpOptions) -> Self {
+        let (sender, events) = mpsc::sync_channel(WAITING);
+        Self {
+            loader: Loader::new(options.loader),
+            client: Client::new(&options),
+            options,
+            given: url.to_owned(),
+            led_to: url.to_owned(),
+            events,
+            sender,
+            open: Vec::new(),
+            found: VecDeque::new(),
+            cache: None,
+            clock: Duration::ZERO,
+        }
+    }
+
+    /// What has been asked and has come over the network.
+    pub fn traffic(&self) -> Traffic {
+        self.loader.traffic()
+    }
+
+    /// Whether the server gives ranges; where it does not, everything passes by from the start for whatever is wanted.
+    pub fn serves_ranges(&self) -> Option<bool> {
+        self.loader.serves_ranges()
+    }
+
+    /// Tries again after an error, from the beginning if the file had changed.
+    pub fn retry(&mut self) {
+        self.loader.retry();
+        self.cache = None;
+    }
+
+    fn now(&self) -> u64 {
+        u64::try_from(self.clock.as_millis()).unwrap_or(u64::MAX)
+    }
+
+    /// Does what the loader says; gives the time up to which there is nothing more to do.
+    fn obey(&mut self) -> Option<u64> {
+        loop {
+            match self.loader.next(self.now())? {
+                Action::Wait { until_ms } => return Some(until_ms),
+                Action::Cancel { id } => self.open.retain(|(open, cancelled)| {
+                    if *open == id {
+                        cancelled.store(true, Ordering::Relaxed);
+                    }
+                    *open != id
+                }),
+                Action::Fetch { id, range, if_match } => self.fetch(id, range, if_match),
+            }
+        }
+    }
+
+    fn fetch(&mut self, id: u32, range: Range<u64>, if_match: Option<String>) {
+        let cancelled = Arc::new(AtomicBool::new(false));
+        self.open.push((id, Arc::clone(&cancelled)));
+        let (client, url, sender) = (self.client.clone(), self.led_to.clone(), self.sender.clone());
+        let run = move || {
+            client.run(&url, range, if_match, &mut |what| {
+                !cancelled.load(Ordering::Relaxed) && sender.send(Event(id, what)).is_ok()
+            })
+        };
+        if let Err(error) = thread::Builder::new().name("tetralod-http".to_owned()).spawn(run) {
+            self.loader.failed(id, self.now(), Failure::Network(error.to_string()));
+        }
+    }
+
+    fn take_in(&mut self, Event(id, what): Event) {
+        let now = self.now();
+        match what {
+            What::Head(head) => self.take_head(id, &head),
+            What::Data(bytes) => self.loader.data(id, now, &bytes),
+            What::End => self.loader.end(id, now),
+            What::Failed(failure) => self.loader.failed(id, now, failure),
+        }
+        if self.cache.is_none()
+            && let Some(folder) = &self.options.cache
+            && let Some(version) = self.loader.version()
+        {
+            self.cache = Some(Cache::open(folder, &self.given, version));
+        }
+    }
+
+    fn take_head(&mut self, id: u32, head: &OwnedHead) {
+        if matches!(head.status, 401 | 403 | 404 | 410) && head.asked != self.given {
+            // Addresses that redirects lead to may be good for a while only.
+            if self.led_to == head.asked {
+                self.led_to.clone_from(&self.given);
+            }
+            let expired = Failure::Network(format!("HTTP {} where a redirect led to", head.status));
+            return self.loader.failed(id, self.now(), expired);
+        }
+        self.loader.head(id, self.now(), &head.head());
+        if matches!(head.status, 200 | 206) {
+            self.led_to.clone_from(&head.led_to);
+        }
+    }
+
+    fn take(&mut self) -> Option<Arrived> {
+        if let Some(found) = self.found.pop_front() {
+            return Some(found);
+        }
+        let arrived = self.loader.take()?;
+        if let Some(cache) = &mut self.cache {
+            cache.put(&arrived.0, &arrived.1);
+        }
+        Some(arrived)
+    }
+
+    /// What comes first: something complete, an error, or the end of patience.
+    fn wait(&mut self, patience: Duration) -> Result<Option<Arrived>, StreamError> {
+        let end = self.clock + patience;
+        loop {
+            while let Ok(event) = self.events.try_recv() {
+                self.take_in(event);
+            }
+            if let Some(arrived) = self.take() {
+                return Ok(Some(arrived));
+            }
+            let until = self.obey();
+            if let Some(error) = self.loader.error() {
+                return Err(error.clone());
+            }
+            let Some(until) = until else { return Ok(None) };
+            if self.clock >= end {
+                return Ok(None);
+            }
+            let until = end.min(Duration::from_millis(until));
+            let start = Instant::now();
+            // At least a moment, for times are rounded.
+            let left = until.saturating_sub(self.clock).max(Duration::from_millis(1));
+            let event = self.events.recv_timeout(left);
+            self.clock += start.elapsed().min(left);
+            if let Ok(event) = event {
+                self.take_in(event);
+            }
+        }
+    }
+}
+
+impl Source for HttpSource {
+    fn want(&mut self, wanted: &[Wanted]) {
+        let Some(cache) = &mut self.cache else { return self.loader.want(wanted) };
+        let mut missing = Vec::new();
+        for wanted in wanted {
+            match cache.get(&wanted.range) {
+                Some(bytes) if self.found.iter().all(|(range, _)| *range != wanted.range) => {
+                    self.found.push_back((wanted.range.clone(), bytes));
+                }
+                Some(_) => {}
+                None => missing.push(wanted.clone()),
+            }
+        }
+        self.loader.want(&missing);
+    }
+
+    fn next(&mut self, patience: Duration) -> Result<Option<Arrived>, StreamError> {
+        self.wait(patience)
+    }
+
+    fn total(&self) -> Option<u64> {
+        self.loader.total()
+    }
+}
+
+impl Drop for HttpSource {
+    fn drop(&mut self) {
+        for (_, cancelled) in &self.open {
+            cancelled.store(true, Ordering::Relaxed);
+        }
+    }
+}
+
+/// Makes requests; its copies share their connections.
+#[derive(Clone, Debug)]
+struct Client {
+    agent: Agent,
+    headers: Arc<[(String, String)]>,
+}
+
+impl Client {
+    fn new(options: &HttpOptions) -> Self {
+        // The loader gives up first; the thread must not stay for ever.
+        let patience = Some(Duration::from_millis(options.loader.timeout_ms.saturating_add(1000)));
+        let config = Agent::config_builder()
+            .http_status_as_error(false)
+            .max_redirects(8)
+            .timeout_resolve(patience)
+            .timeout_connect(patience)
+            .timeout_recv_response(patience)
+            .timeout_per_read(patience)
+            .max_idle_connections_per_host(options.loader.max_requests)
+            .user_agent(concat!("tetralod/", env!("CARGO_PKG_VERSION")))
+            .accept_encoding("identity");
+        Self { agent: config.build().new_agent(), headers: options.headers.clone().into() }
+    }
+
+    /// One request from beginning to end; `tell` says whether anybody still wants to know.
+    fn run(
+        &self,
+        url: &str,
+        range: Range<u64>,
+        if_match: Option<String>,
+        tell: &mut dyn FnMut(What) -> bool,
+    ) {
+        // Without an end where it is not known: some servers read numbers as 32 or 53 bits.
+        let last = if range.end == u64::MAX { String::new() } else { (range.end - 1).to_string() };
+        let mut request = self.agent.get(url).header(header::RANGE, format!("bytes={}-{last}", range.start));
+        for (name, value) in self.headers.iter() {
+            request = request.header(name, value);
+        }
+        if let Some(tag) = if_match {
+            request = request.header(header::IF_MATCH, tag);
+        }
+        let response = match request.call() {
+            Ok(response) => response,
+            Err(error) => {
+                tell(What::Failed(failure(&error)));
+                return;
+            }
+        };
+        if !tell(What::Head(Box::new(OwnedHead::of(url, &response)))) {
+            return;
+        }
+        let mut body = response.into_body().into_reader();
+        let mut chunk = vec![0; CHUNK];
+        loop {
+            let what = match body.read(&mut chunk) {
+                Ok(0) => What::End,
+                Ok(count) => What::Data(chunk[..count].to_vec()),
+                Err(error) if error.kind() == std::io::ErrorKind::Interrupted => continue,
+                Err(error) => What::Failed(failure(&ureq::Error::from(error))),
+            };
+            let last = !matches!(what, What::Data(_));
+            if !tell(what) || last {
+                return;
+            }
+        }
+    }
+}
+
+fn failure(error: &ureq::Error) -> Failure {
+    match error {
+        ureq::Error::Timeout(_) => Failure::Timeout,
+        other => Failure::Network(other.to_string()),
+    }
+}
