@@ -263,6 +263,12 @@ export type ErrorCode =
   | "bad-source"
   /** The server could not be reached, answered with an error, or broke off. */
   | "network"
+  /** The server does not let pages of this origin read the file; the message says what it must send. */
+  | "cors"
+  /** The server sends something else than the bytes of the file; the message says what to change there. */
+  | "server"
+  /** The file on the server was replaced while it was being read. */
+  | "changed"
   /** The bytes are not an MT file at all. */
   | "not-mt"
   /** The file was made by a later version. */

@@ -583,3 +583,40 @@ fn events_of_requests_that_are_over_change_nothing() {
     assert_eq!(loader.take(), Some((100..110, bytes(100..110))));
     assert!(loader.is_idle());
 }
+
+#[test]
+fn many_small_ranges_take_few_requests_in_any_order_of_importance() {
+    let (count, size) = (10_000u64, 64u64);
+    let options = LoaderOptions { gap: 0, max_request_bytes: 1 << 14, ..LoaderOptions::default() };
+    for shuffled in [false, true] {
+        let mut loader = Loader::new(options);
+        let mut random = Random(7);
+        let mut list: Vec<_> = (0..count)
+            .map(|k| wanted(k * size..(k + 1) * size, if shuffled { random.below(1000) as f32 } else { 0.0 }))
+            .collect();
+        loader.want(&list);
+        let mut came = 0;
+        let mut open = Vec::new();
+        loop {
+            open.extend(fetches(&mut loader, 0));
+            if open.is_empty() {
+                break;
+            }
+            let (id, range) = open.remove(0);
+            let whole = format!("bytes {}-{}/{}", range.start, range.end - 1, count * size);
+            loader.head(id, 0, &Head { content_range: Some(&whole), ..GOOD });
+            loader.data(id, 0, &vec![0; (range.end - range.start) as usize]);
+            came +=
+                std::iter::from_fn(|| loader.take()).map(|(range, _)| range.end - range.start).sum::<u64>();
+            // A viewer says anew what it wants for every picture.
+            list.retain(|wanted| wanted.range.start < range.start || wanted.range.end > range.end);
+            list.reverse();
+            loader.want(&list);
+            while loader.take().is_some() {}
+        }
+        let traffic = loader.traffic();
+        assert_eq!((came, traffic.received, traffic.used), (count * size, count * size, count * size));
+        let least = (count * size).div_ceil(options.max_request_bytes);
+        assert!(traffic.requests <= least * if shuffled { 4 } else { 1 }, "{} of {least}", traffic.requests);
+    }
+}

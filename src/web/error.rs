@@ -2,6 +2,7 @@
 
 use crate::format::FormatError;
 use crate::session::SessionError;
+use crate::stream::StreamError;
 use wasm_bindgen::JsValue;
 
 /// A typed error of the core, or a wrong argument, on its way to JavaScript.
@@ -38,6 +39,12 @@ impl From<SessionError> for WebError {
     }
 }
 
+impl From<&StreamError> for WebError {
+    fn from(error: &StreamError) -> Self {
+        Self { code: stream_code(error), message: error.to_string() }
+    }
+}
+
 #[cfg(feature = "gpu")]
 impl From<crate::gpu::GpuError> for WebError {
     fn from(error: crate::gpu::GpuError) -> Self {
@@ -71,6 +78,16 @@ fn session_code(error: &SessionError) -> &'static str {
         SessionError::NotReady => "not-ready",
         SessionError::Request(_) | SessionError::Isovalue => "bad-option",
         SessionError::Format(error) => format_code(error),
+    }
+}
+
+fn stream_code(error: &StreamError) -> &'static str {
+    match error {
+        StreamError::Status(_) | StreamError::Network(_) | StreamError::Timeout => "network",
+        StreamError::Blocked => "cors",
+        StreamError::Changed => "changed",
+        StreamError::WebPage | StreamError::Encoded(_) | StreamError::WrongRange(_) => "server",
+        StreamError::Unreadable(_) => "network",
     }
 }
 

@@ -5,6 +5,7 @@ mod aim;
 mod bench;
 mod callback;
 mod error;
+mod loader;
 mod options;
 mod results;
 mod session;
@@ -12,6 +13,7 @@ mod tools;
 #[cfg(all(feature = "gpu", target_arch = "wasm32"))]
 mod viewer;
 
+pub use loader::RangeLoader;
 pub use session::CoreSession;
 #[cfg(all(feature = "gpu", target_arch = "wasm32"))]
 pub use viewer::Viewer;

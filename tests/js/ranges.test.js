@@ -1,0 +1,295 @@
+// Ranges over fetch, from a server that misbehaves: the right bytes come, or an error that says what to do about it, after
+// a bounded number of requests.
+import assert from "node:assert/strict";
+import { createServer } from "node:http";
+import { after, before, test } from "node:test";
+import { gzipSync } from "node:zlib";
+import { loadCore } from "../../pkg/core.js";
+import { Ranges } from "../../pkg/ranges.js";
+import { RangeLoader } from "../../pkg/tetralod_core.js";
+
+const SIZE = 200_000;
+const file = new Uint8Array(SIZE).map((_, at) => (at * 7 + (at >> 8) * 31 + (at >> 16) * 101) & 255);
+const WANTED = [[0, 1000], [1200, 50_000], [60_000, 60_010], [100_000, 160_000], [199_000, SIZE + 7]];
+
+let server;
+let base;
+/** What answers now, and what it has been asked. */
+let answer;
+let asked = [];
+
+before(async () => {
+  await loadCore();
+  server = createServer((request, response) => {
+    const [, start, last] = /^bytes=(\d+)-(\d*)$/.exec(request.headers.range);
+    const range = { start: Number(start), end: Math.min(last ? Number(last) + 1 : SIZE, SIZE), number: asked.length };
+    asked.push({ ...range, path: request.url, headers: request.headers });
+    answer({ ...range, path: request.url }, response);
+  });
+  await new Promise((resolve) => server.listen(0, "127.0.0.1", resolve));
+  base = `http://127.0.0.1:${server.address().port}/file.mt`;
+});
+
+after(() => {
+  server.closeAllConnections();
+  server.close();
+});
+
+const headers = ({ start, end }, more = {}) => ({
+  "content-range": `bytes ${start}-${end - 1}/${SIZE}`,
+  "content-length": end - start,
+  etag: '"one"',
+  ...more,
+});
+
+function good(range, response) {
+  response.writeHead(206, headers(range)).end(file.slice(range.start, range.end));
+}
+
+/** Fetches ranges; gives them as `[start, end, bytes]` when all are there. */
+function fetchAll(wanted, options = {}, url = base) {
+  const got = [];
+  let ranges;
+  const all = new Promise((resolve, reject) => {
+    const onRange = (start, end, bytes) => {
+      got.push([start, end, bytes]);
+      if (got.length === wanted.length) resolve({ got, ranges });
+    };
+    const quick = { retries: 3, backoffMs: 10, timeoutMs: 400, maxRequestBytes: 30_000, gap: 500 };
+    ranges = new Ranges(RangeLoader, url, { onRange, onError: reject }, { ...quick, ...options });
+    ranges.want(wanted.flatMap(([start, end]) => [start, end, -start]));
+  });
+  return all.finally(() => options.open || ranges.close());
+}
+
+/** All comes, every byte of it right, in at most so many requests. */
+async function works(most, handler, options) {
+  answer = handler;
+  asked = [];
+  const { got } = await fetchAll(WANTED, options);
+  const expected = new Map(WANTED.map(([start, end]) => [`${start}-${end}`, file.slice(start, end)]));
+  for (const [start, end, bytes] of got) assert.deepEqual(bytes, expected.get(`${start}-${end}`));
+  assert.equal(new Set(got.map(([start]) => start)).size, WANTED.length, "each comes once");
+  assert.ok(asked.length <= most, `${asked.length} requests`);
+}
+
+/** It ends with an error, after at most so many requests. */
+async function fails(most, code, message, handler, options) {
+  answer = handler;
+  asked = [];
+  await assert.rejects(fetchAll(WANTED, options), (error) => {
+    assert.equal(error.name, "TetralodError", error.stack);
+    assert.equal(error.code, code, error.message);
+    assert.match(error.message, message);
+    assert.ok(error.message.includes(base));
+    return true;
+  });
+  assert.ok(asked.length <= most, `${asked.length} requests`);
+}
+
+test("a good server is asked for little more than is wanted", async () => {
+  await works(8, good);
+  assert.equal(asked[0].headers["accept-encoding"], "identity");
+  const total = asked.reduce((sum, { start, end }) => sum + end - start, 0);
+  const wanted = WANTED.reduce((sum, [start, end]) => sum + Math.min(end, SIZE) - start, 0);
+  assert.ok(total <= wanted + 500, `${total} of ${wanted}`);
+});
+
+test("cut connections are taken up where they ended", async () => {
+  await works(32, (range, response) => {
+    response.writeHead(206, headers(range));
+    response.write(file.slice(range.start, Math.min(range.end, range.start + 9000)));
+    // Later, because a client may drop what it has not read yet when a connection breaks.
+    if (range.end - range.start > 9000) setTimeout(() => response.destroy(), 30);
+    else response.end();
+  });
+  assert.ok(asked.some(({ start }) => start === 9000));
+});
+
+test("a server that only ever cuts is given up", async () => {
+  await fails(40, "network", /check the address/, (range, response) => {
+    response.writeHead(206, headers(range)).flushHeaders();
+    response.destroy();
+  });
+  await fails(4, "network", /check the address/, (range, response) => response.destroy());
+});
+
+test("a server that hangs is given up or recovers, slow drips are waited for", async () => {
+  await fails(4, "network", /sends nothing any more/, () => {});
+  await works(9, (range, response) => {
+    if (range.number !== 1) return good(range, response);
+    response.writeHead(206, headers(range));
+    response.write(file.slice(range.start, range.start + 10));
+  });
+  answer = (range, response) => {
+    response.writeHead(206, headers(range));
+    let at = range.start;
+    const drip = setInterval(() => {
+      response.write(file.slice(at, Math.min(at + 100, range.end)));
+      at += 100;
+      if (at < range.end) return;
+      clearInterval(drip);
+      response.end();
+    }, 60);
+  };
+  asked = [];
+  const { got } = await fetchAll([[0, 1000]]);
+  assert.deepEqual(got[0][2], file.slice(0, 1000));
+  assert.equal(asked.length, 1);
+});
+
+test("server errors pass or are reported", async () => {
+  for (const status of [500, 502, 503, 429]) {
+    await works(12, (range, response) => {
+      if (range.number % 3 === 1) response.writeHead(status, { "retry-after": 0 }).end("oops");
+      else good(range, response);
+    });
+  }
+  await fails(4, "network", /HTTP 500/, (_, response) => response.writeHead(500).end());
+  await fails(1, "network", /HTTP 404.*address/, (_, response) => response.writeHead(404).end());
+});
+
+test("answers with another range are not taken", async () => {
+  const wrong = ({ start, end }, response) => good({ start: start + 1, end: end + 1 }, response);
+  await fails(4, "server", /another part.*bytes 1-30000/, wrong);
+  await works(10, (range, response) => (range.number === 2 ? wrong : good)(range, response));
+});
+
+test("a server without ranges is read once, compressed or not", async () => {
+  await works(1, (_, response) => response.writeHead(200, { "content-length": SIZE }).end(file));
+  await works(1, (_, response) => response.writeHead(200).end(file));
+  const packed = { "content-encoding": "gzip" };
+  await works(1, (_, response) => response.writeHead(200, packed).end(gzipSync(file)));
+  await works(2, (range, response) => {
+    response.writeHead(200, { "content-length": SIZE });
+    if (range.number > 0) return response.end(file);
+    response.write(file.slice(0, 120_000));
+    setTimeout(() => response.destroy(), 100);
+  });
+});
+
+test("compressed ranges and web pages are refused with advice", async () => {
+  await fails(1, "server", /compression off/, (range, response) => {
+    response.writeHead(206, { ...headers(range), "content-encoding": "gzip", "content-length": 20 }).end(new Uint8Array(20));
+  });
+  await fails(1, "server", /404/, (_, response) => response.writeHead(200, { "content-type": "text/html" }).end("<p>"));
+});
+
+test("a file that changes is noticed, and can be read anew", async () => {
+  const changed = (range, response) => response.writeHead(206, headers(range, { etag: '"two"' })).end(file.slice(range.start, range.end));
+  await fails(8, "changed", /replaced/, (range, response) => (range.number ? changed : good)(range, response));
+  answer = good;
+  const errors = [];
+  const first = await fetchAll([[0, 10]], { open: true });
+  answer = changed;
+  await new Promise((resolve, reject) => {
+    const ranges = new Ranges(
+      RangeLoader,
+      base,
+      {
+        onRange: (start, end, bytes) => {
+          assert.deepEqual(bytes, file.slice(start, end));
+          if (start === 0) answer = good;
+          if (start === 0) return ranges.want([100_000, 100_010, 0]);
+          ranges.close();
+          resolve();
+        },
+        onError: (error) => {
+          errors.push(error.code);
+          if (errors.length > 1) return reject(error);
+          ranges.retry();
+        },
+      },
+      { maxRequestBytes: 100 },
+    );
+    ranges.want([0, 10, 0]);
+  });
+  assert.deepEqual(errors, ["changed"]);
+  first.ranges.close();
+});
+
+test("redirects are followed once, and again when they expire", async () => {
+  await works(14, (range, response) => {
+    if (range.path === "/file.mt") return response.writeHead(302, { location: `/elsewhere-${range.number}` }).end();
+    if (range.path === "/elsewhere-0" && range.number > 3) return response.writeHead(403).end();
+    return good(range, response);
+  });
+  const firsts = asked.filter(({ path }) => path === "/file.mt").length;
+  assert.ok(firsts > 1 && firsts < asked.length / 2, `redirected ${firsts} times`);
+});
+
+test("no server is reported", async () => {
+  const other = createServer();
+  await new Promise((resolve) => other.listen(0, "127.0.0.1", resolve));
+  const url = `http://127.0.0.1:${other.address().port}/x`;
+  await new Promise((resolve) => other.close(resolve));
+  await assert.rejects(fetchAll(WANTED, {}, url), { code: "network", message: /ECONNREFUSED/ });
+});
+
+test("what is wanted no longer is cancelled, and nothing comes after the end", async () => {
+  let closed = 0;
+  answer = (range, response) => {
+    if (range.start < 100_000) return good(range, response);
+    response.on("close", () => (closed += 1));
+  };
+  asked = [];
+  const { ranges } = await fetchAll([[0, 10]], { open: true });
+  ranges.want([100_000, 100_100, 1]);
+  while (asked.length < 2) await new Promise((resolve) => setTimeout(resolve, 5));
+  ranges.want([]);
+  while (closed < 1) await new Promise((resolve) => setTimeout(resolve, 5));
+  assert.deepEqual([ranges.total, ranges.servesRanges, ranges.traffic.requests], [SIZE, true, 2]);
+  ranges.want([100_000, 100_100, 1]);
+  ranges.close();
+  ranges.want([0, 1, 0]);
+  assert.equal(ranges.total, undefined);
+});
+
+test("what was fetched once is kept for the next time", async () => {
+  // Node has no Cache Storage: as much of one as is needed.
+  const stores = new Map();
+  globalThis.caches = {
+    async open(name) {
+      if (!stores.has(name)) stores.set(name, new Map());
+      const store = stores.get(name);
+      return {
+        keys: async () => [...store.keys()].map((url) => new Request(url)),
+        match: async (url) => store.get(url)?.clone(),
+        put: async (url, response) => void store.set(url, response),
+        delete: async (url) => store.delete(url),
+      };
+    },
+  };
+  try {
+    let tag = '"one"';
+    answer = (range, response) => response.writeHead(206, headers(range, { etag: tag })).end(file.slice(range.start, range.end));
+    const bytes = async () => {
+      const { ranges } = await fetchAll([[0, 10]], { cache: "mt", open: true });
+      await new Promise((resolve) => setTimeout(resolve, 20));
+      ranges.close();
+      // The first range of a session always comes from the server: it tells which version that has.
+      const before = asked.length;
+      const got = new Map();
+      let second;
+      await new Promise((resolve, reject) => {
+        const onRange = (start, end, bytes) => {
+          got.set(start, bytes);
+          if (start === 0 && got.size === 1) setTimeout(() => second.want(WANTED.slice(1).flatMap(([a, b]) => [a, b, 0])), 20);
+          if (got.size === WANTED.length) resolve();
+        };
+        second = new Ranges(RangeLoader, base, { onRange, onError: reject }, { cache: "mt" });
+        second.want([0, 1000, 0]);
+      });
+      second.close();
+      for (const [start, end] of WANTED) assert.deepEqual(got.get(start), file.slice(start, end));
+      return asked.slice(before).reduce((sum, { start, end }) => sum + end - start, 0);
+    };
+    assert.ok((await bytes()) > 100_000);
+    assert.equal(await bytes(), 1000);
+    tag = '"two"';
+    assert.ok((await bytes()) > 100_000);
+    assert.ok([...stores.get("mt").keys()].every((url) => url.includes("two")));
+  } finally {
+    delete globalThis.caches;
+  }
+});
