@@ -138,7 +138,7 @@ fn parse_range(text: &str) -> Option<(Option<Range<u64>>, Option<u64>)> {
 
 /// The beginning of a header, for a message.
 fn short(text: &str) -> String {
-    text.chars().take(80).collect()
+    text.get(..text.len().min(80)).unwrap_or("illegible").to_owned()
 }
 
 #[cfg(test)]

@@ -111,7 +111,7 @@ pub struct Traffic {
 #[derive(Debug, Default)]
 pub struct Loader {
     options: LoaderOptions,
-    /// What has not come out yet: most important first, then by place; no range twice.
+    /// What has not come out yet.
     wanted: Vec<Wanted>,
     /// Bytes of `wanted` that are not held.
     needed: RangeSet,
@@ -210,8 +210,6 @@ impl Loader {
         self.wanted = wanted.to_vec();
         let ready = &self.ready;
         self.wanted.retain(|wanted| ready.iter().all(|(range, _)| *range != wanted.range));
-        let key = |wanted: &Wanted| (wanted.range.start, wanted.range.end);
-        self.wanted.sort_unstable_by(|a, b| b.priority.total_cmp(&a.priority).then(key(a).cmp(&key(b))));
         let all = self.all_wanted();
         self.held.keep(&all);
         self.needed = all;
@@ -506,9 +504,24 @@ impl Loader {
         }
         let first = match within {
             Some(range) => free.first_in(range),
-            None => self.wanted.iter().find_map(|wanted| free.first_in(&wanted.range)),
+            None => self.most_important(&free),
         };
         Some(self.grown(first?.start, &free))
+    }
+
+    /// The first free bytes of the range that is wanted most, the first such range in the file.
+    fn most_important(&self, free: &RangeSet) -> Option<Range<u64>> {
+        let mut best: Option<(f32, Range<u64>)> = None;
+        for wanted in &self.wanted {
+            let Some(part) = free.first_in(&wanted.range) else { continue };
+            let better = |(priority, first): &(f32, Range<u64>)| {
+                wanted.priority > *priority || wanted.priority == *priority && part.start < first.start
+            };
+            if best.as_ref().is_none_or(better) {
+                best = Some((wanted.priority, part));
+            }
+        }
+        best.map(|(_, part)| part)
     }
 
     /// The body of a request is there; that of a part may be less than was asked for.

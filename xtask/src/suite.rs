@@ -64,7 +64,7 @@ fn fmt() -> Result<()> {
 }
 
 /// The feature sets that are shipped, and the core alone, which must not need any of them.
-const LIBRARIES: [&str; 4] = ["", "build", "gpu", "cli,gpu"];
+const LIBRARIES: [&str; 5] = ["", "build", "gpu", "http", "cli,gpu"];
 
 /// What goes into the package.
 const WEB_LIBRARIES: [&str; 2] = ["web", "web,gpu"];
@@ -99,6 +99,8 @@ fn doc() -> Result<()> {
 
 fn native() -> Result<()> {
     shell::run(&mut shell::cargo(["test", "--workspace"]))?;
+    let servers = ["test", "--package", "tetralod", "--features", "http", "--lib", "--test", "stream_*"];
+    shell::run(&mut shell::cargo(servers))?;
     // The renderer against its twin on the CPU. Its output is shown: where there is no Vulkan adapter, not even Mesa's
     // lavapipe in software (package `mesa-vulkan-drivers`), the tests say that they were skipped.
     let args = [
@@ -143,6 +145,7 @@ fn fixture_env(command: &mut Command) -> &mut Command {
 fn js() -> Result<()> {
     with_package()?;
     shell::run(&mut node_test("latest.test.js"))?;
+    shell::run(&mut node_test("ranges.test.js"))?;
     with_fixture(|| {
         shell::run(fixture_env(&mut node_test("package.test.js")))?;
         shell::run(fixture_env(&mut node_test("steps.test.js")))
@@ -195,6 +198,7 @@ fn e2e() -> Result<()> {
     with_package()?;
     demo::make_data()?;
     let address = demo::start_server(0)?;
+    shell::run(node_test("ranges-browser.test.js").env("CHROMIUM", &browser.chromium))?;
     let mut command = node_test("e2e.test.js");
     shell::run(command.env("TETRALOD_PAGE", address).env("CHROMIUM", browser.chromium))
 }
