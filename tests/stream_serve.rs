@@ -221,3 +221,29 @@ fn it_ends_well_when_it_is_asked_to() {
         assert!(TcpStream::connect(&server.address).is_err());
     }
 }
+
+#[test]
+#[cfg(feature = "http")]
+fn the_project_s_own_client_gets_along_with_it() {
+    use std::time::Duration;
+    use tetralod::stream::HttpOptions;
+    use tetralod::stream::HttpSource;
+    use tetralod::stream::Source;
+    use tetralod::stream::StreamError;
+    use tetralod::stream::Wanted;
+
+    let (folder, www) = folder("serve-client");
+    let server = Server::start(&[&www]);
+    let mut source = HttpSource::new(&format!("http://{}/digits.mt", server.address), HttpOptions::default());
+    let wanted = |range| [Wanted { range, priority: 0.0 }];
+    source.want(&wanted(2..5));
+    assert_eq!(source.next(Duration::from_secs(20)), Ok(Some((2..5, b"234".to_vec()))));
+    assert_eq!((source.total(), source.serves_ranges()), (Some(10), Some(true)));
+    fs::write(folder.path("www/digits.mt"), "abcdefghijk").expect("a file");
+    source.want(&wanted(2..5));
+    assert_eq!(source.next(Duration::from_secs(20)), Err(StreamError::Changed));
+    source.retry();
+    assert_eq!(source.next(Duration::from_secs(20)), Ok(Some((2..5, b"cde".to_vec()))));
+    source.want(&wanted(5..50));
+    assert_eq!(source.next(Duration::from_secs(20)), Ok(Some((5..50, b"fghijk".to_vec()))));
+}
