@@ -3,13 +3,14 @@
 use super::BuildError;
 use super::BuildProgress;
 use super::OnProgress;
+use super::base::Numbered;
+use super::base::number_base;
 use super::cost::VertexData;
 use super::order::Updates;
 use super::plan::Plan;
 use super::work_mesh::WorkMesh;
 use crate::mesh::NONE;
 use crate::mt::Applied;
-use crate::mt::BaseMesh;
 use crate::mt::CurrentMesh;
 use crate::mt::EdgeMt;
 use crate::mt::ErrorCode;
@@ -130,7 +131,10 @@ impl Replay<'_> {
     ) -> Result<(EdgeMt, Vec<VertexId>), BuildError> {
         let (data, history) = (self.data, self.history);
         let (points, fields) = (info.vertices as usize, info.fields.len());
-        let (base_mesh, mut number) = number_base(self.base, data, fields);
+        let live = (0..self.base.tets.len() as u32).filter(|&t| self.base.is_live(t));
+        let tets: Vec<[u32; 4]> = live.map(|t| self.base.tets[t as usize]).collect();
+        let Numbered { mesh: base_mesh, mut number, .. } =
+            number_base(&data.positions, &data.levels, fields, &tets);
         let mut mesh = CurrentMesh::new(&info, &base_mesh)
             .map_err(|_| BuildError::Internal(UpdateError::Vertex { update: 0, vertex: 0 }))?;
         let mut mt = EdgeMt::new(info, base_mesh);
@@ -203,19 +207,4 @@ impl Replay<'_> {
         number.truncate(points);
         Ok((mt, number.into_iter().map(VertexId).collect()))
     }
-}
-
-/// The base mesh, and the MT's number for each of the builder's vertices ([`NONE`] while it has none).
-fn number_base(base: &WorkMesh, data: &VertexData, fields: usize) -> (BaseMesh, Vec<u32>) {
-    let mut number = vec![NONE; data.positions.len()];
-    let mut mesh = BaseMesh::default();
-    for v in (0..data.positions.len() as u32).filter(|&v| base.has(v)) {
-        number[v as usize] = mesh.positions.len() as u32;
-        mesh.positions.push(data.positions[v as usize]);
-        mesh.values.extend_from_slice(&data.levels[v as usize * fields..][..fields]);
-    }
-    for t in (0..base.tets.len() as u32).filter(|&t| base.is_live(t)) {
-        mesh.tets.push(base.tets[t as usize].map(|v| number[v as usize]));
-    }
-    (mesh, number)
 }

@@ -21,6 +21,7 @@
 //! the error allows the boundary to move.
 
 mod agenda;
+mod base;
 mod choice;
 mod collapse;
 mod cost;

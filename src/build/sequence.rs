@@ -3,10 +3,11 @@
 use super::BuildError;
 use super::BuildProgress;
 use super::OnProgress;
+use super::base::Numbered;
+use super::base::number_base;
 use super::quantize;
 use super::quantize::Quantized;
 use crate::mesh::NONE;
-use crate::mt::BaseMesh;
 use crate::mt::ErrorCode;
 use crate::mt::ExplicitMt;
 use crate::mt::ExplicitUpdate;
@@ -63,16 +64,12 @@ impl Sequence {
         order.sort_by_key(|&i| Reverse(errors_of(i).iter().max()));
         info.updates = order.len() as u32;
         let levels = |v: u32| &quantized.levels[v as usize * fields..][..fields];
-        let mut base = BaseMesh::default();
-        let mut number = vec![NONE; quantized.positions.len()];
-        self.base.iter().flatten().for_each(|&v| number[v as usize] = 0);
-        for v in (0..number.len() as u32).filter(|&v| number[v as usize] == 0).collect::<Vec<_>>() {
-            number[v as usize] = base.positions.len() as u32;
-            base.positions.push(quantized.positions[v as usize]);
-            base.values.extend_from_slice(levels(v));
-        }
-        base.tets = self.base.iter().map(|tet| tet.map(|v| number[v as usize])).collect();
-        let mut mt = ExplicitMt::new(info, base);
+        let Numbered { mesh, mut number, places } =
+            number_base(&quantized.positions, &quantized.levels, fields, &self.base);
+        // The number that each base tetrahedron of the sequence has in the MT.
+        let mut base_ids = vec![NONE; places.len()];
+        (0..).zip(&places).for_each(|(t, &place)| base_ids[place as usize] = t);
+        let mut mt = ExplicitMt::new(info, mesh);
         // The number that each tetrahedron of the sequence has in the MT.
         let mut ids = vec![NONE; self.tets.len()];
         for (done, &i) in order.iter().enumerate() {
@@ -85,7 +82,7 @@ impl Sequence {
             let Insertion { vertex, inserted, .. } = &self.steps[i as usize];
             number[*vertex as usize] = (mt.base_mesh().positions.len() + done) as u32;
             let sources = &arcs.source[self.steps[i as usize].removed.clone()];
-            let removed: Vec<u32> = sources.iter().map(|source| source.number(&ids)).collect();
+            let removed: Vec<u32> = sources.iter().map(|source| source.number(&base_ids, &ids)).collect();
             let name = |tet: [u32; 4]| canonical(tet.map(|v| number[v as usize]));
             let new: Vec<[u32; 4]> = self.tets[inserted.clone()].iter().map(|&tet| name(tet)).collect();
             let first = mt.tets().len() as u32;
@@ -174,7 +171,7 @@ impl Sequence {
 /// Where a removed tetrahedron comes from.
 #[derive(Clone, Copy, Debug)]
 enum Source {
-    /// The base mesh: its number there.
+    /// The base mesh: its place in [`Sequence::base`].
     Base(u32),
     /// An insertion: its place in [`Sequence::tets`].
     Inserted(usize),
@@ -182,9 +179,9 @@ enum Source {
 
 impl Source {
     /// Its number in the MT.
-    fn number(self, ids: &[u32]) -> u32 {
+    fn number(self, base_ids: &[u32], ids: &[u32]) -> u32 {
         match self {
-            Self::Base(t) => t,
+            Self::Base(place) => base_ids[place as usize],
             Self::Inserted(at) => ids[at],
         }
     }
