@@ -65,9 +65,10 @@ impl Cache {
     /// Keeps the bytes of `range`, if there is room.
     pub fn put(&mut self, range: &Range<u64>, bytes: &[u8]) {
         let size = bytes.len() as u64 + 4;
-        if size <= self.room && self.write(range, bytes).is_ok() {
+        let key = (range.start, range.end);
+        if size <= self.room && !self.known.contains(&key) && self.write(range, bytes).is_ok() {
             self.room -= size;
-            self.known.insert((range.start, range.end));
+            self.known.insert(key);
         }
     }
 

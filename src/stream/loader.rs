@@ -1,10 +1,4 @@
 //! Decides which bytes to ask for next, and takes what comes.
-//!
-//! The loader does no I/O and knows no time: a driver tells it what happens, and when, and does what it says. So one
-//! machine serves pages, programs and tests, and every fault of a network can be played to it. What it holds to:
-//! the bytes that come out are those of one version of the file; never more than
-//! [`max_requests`](LoaderOptions::max_requests) requests are open or waiting to be tried again; no byte is asked for
-//! that is held or on its way; nobody waits for ever: in the end there are bytes or a [`StreamError`].
 
 use super::answer::Answer;
 use super::answer::Head;
@@ -107,7 +101,13 @@ pub struct Traffic {
     pub used: u64,
 }
 
-/// See the [module](self).
+/// Decides which bytes of a file to ask for next, and takes what comes.
+///
+/// It does no I/O and knows no time: a driver tells it what happens, and when, and does what it says. So one machine
+/// serves pages, programs and tests, and every fault of a network can be played to it. What it holds to: the bytes
+/// that come out are those of one version of the file; never more than
+/// [`max_requests`](LoaderOptions::max_requests) requests are open or waiting to be tried again; no byte is asked for
+/// that is held or on its way; nobody waits for ever: in the end there are bytes or a [`StreamError`].
 #[derive(Debug, Default)]
 pub struct Loader {
     options: LoaderOptions,
