@@ -266,9 +266,9 @@ impl Decoder {
         let Some(index) = &self.head.index else { return ranges };
         let Some(info) = index.blocks.get(block as usize) else { return ranges };
         let before: u64 = index.blocks[..block as usize].iter().map(BlockInfo::len).sum();
-        let mut at = self.head.index_end + index.shared + before;
+        let Some(mut at) = self.head_end().and_then(|end| end.checked_add(before)) else { return ranges };
         for (part, &length) in info.lengths.iter().enumerate() {
-            let end = at + u64::from(length);
+            let Some(end) = at.checked_add(u64::from(length)) else { return Vec::new() };
             if part == 0 || self.head.place(part - 1).is_some() {
                 match ranges.last_mut() {
                     Some(last) if last.end == at => last.end = end,
@@ -278,6 +278,30 @@ impl Decoder {
             at = end;
         }
         ranges
+    }
+
+    /// Where the blocks begin in the file, or a byte behind where less is known; none before the index is there.
+    pub fn head_end(&self) -> Option<u64> {
+        let index = self.head.index.as_ref()?;
+        self.head.index_end.checked_add(index.shared)
+    }
+
+    /// Whether all is there that comes in front of the blocks, and these may come in any order.
+    pub fn takes_blocks(&self) -> bool {
+        matches!(self.mt, Some(Mt::Edge(_))) && self.head.base_fields == self.head.fields()
+    }
+
+    /// The block of which a range of [`Decoder::block_ranges`] begins at this byte of the file.
+    pub fn block_at(&self, start: u64) -> Option<u32> {
+        let index = self.head.index.as_ref()?;
+        let behind = start.checked_sub(self.head_end()?)?;
+        let mut end = 0_u64;
+        let block = index.blocks.iter().position(|block| {
+            end = end.saturating_add(block.len());
+            behind < end
+        })?;
+        let block = block as u32;
+        self.block_ranges(block).iter().any(|range| range.start == start).then_some(block)
     }
 
     /// Takes in a whole block of an edge-based MT: the bytes of [`Decoder::block_ranges`], one after the other. The blocks on
@@ -359,6 +383,10 @@ impl Decoder {
 
     fn take_in(&mut self, mut bytes: &[u8]) -> Result<(), FormatError> {
         while !bytes.is_empty() {
+            if self.options.in_parts && self.takes_blocks() {
+                // The blocks come by themselves.
+                return Ok(());
+            }
             match &self.stage {
                 Stage::Header => self.take_header(&mut bytes)?,
                 Stage::Head => self.take_head(&mut bytes)?,

@@ -369,6 +369,18 @@ impl EdgeMt {
         if self.present >= self.info.updates { ErrorCode::ZERO } else { self.to_come }
     }
 
+    /// Bytes of the updates that are here.
+    pub fn page_bytes(&self) -> u64 {
+        u64::from(self.present) * Self::update_bytes(&self.info)
+    }
+
+    /// Bytes that an update of an MT takes.
+    pub fn update_bytes(info: &MtInfo) -> u64 {
+        let fields = info.fields.len();
+        let errors = if fields == 1 { 1 } else { fields + 1 };
+        (Record::new(info).len * size_of::<i32>() + errors * size_of::<ErrorCode>()) as u64
+    }
+
     /// What is known of the MT as a whole.
     pub fn info(&self) -> &MtInfo {
         &self.info

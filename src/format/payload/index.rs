@@ -144,7 +144,7 @@ fn read_block(
     for _ in 0..parts {
         block.lengths.push(reader.varint()?);
     }
-    let mut span = |reader: &mut Reader<'_>, bits: u32| -> Result<[i32; 2], FormatError> {
+    let span = |reader: &mut Reader<'_>, bits: u32| -> Result<[i32; 2], FormatError> {
         let (low, size) = (reader.varint()?, reader.varint()?);
         let high = u64::from(low) + u64::from(size);
         if high > 1 << bits.min(8) {

@@ -4,6 +4,10 @@
 //! [`Session::view`] or as a surface with [`Session::isosurface`]. Everything works while the file is still
 //! arriving: a request is then met as far as the updates that are there allow, and made again when more are.
 
+mod blocks;
+
+pub use blocks::{BlockProgress, WantedBytes};
+
 use crate::format::DecodeOptions;
 use crate::format::Decoder;
 use crate::format::FormatError;
@@ -30,6 +34,7 @@ use crate::view::NormalKind;
 use crate::view::Plane;
 use crate::view::Slice;
 use crate::view::SurfaceChanges;
+use blocks::Blocks;
 use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
@@ -69,6 +74,8 @@ pub struct Session {
     decoder: Decoder,
     /// There from the moment the base mesh is.
     front: Option<Front>,
+    /// For a file that comes in parts.
+    blocks: Option<Blocks>,
     failed: Option<FormatError>,
     /// What was asked for last.
     request: Request,
@@ -194,8 +201,10 @@ impl Session {
         request.check(mt.info()).map_err(SessionError::Request)?;
         let own = LodCriterion::new(mt.info(), request);
         let criterion = custom.iter().fold(own, |all, one| all.and(Arc::clone(one)));
-        front.aim(mt, Arc::new(criterion), request.budget);
+        let criterion: Arc<dyn Criterion> = Arc::new(criterion);
+        front.aim(mt, Arc::clone(&criterion), request.budget);
         self.request.clone_from(request);
+        self.plan_for(criterion);
         Ok(())
     }
 
@@ -210,6 +219,10 @@ impl Session {
         };
         let outcome =
             front.step(mt, go_on).map_err(|error| SessionError::Format(FormatError::Update(error)))?;
+        self.after_step().map_err(SessionError::Format)?;
+        let (Some(front), Some(mt)) = (&self.front, self.decoder.mt()) else {
+            return Err(SessionError::NotReady);
+        };
         let bounds = if outcome.done { bounds(front, mt, &self.request, &outcome) } else { Vec::new() };
         Ok(RefineStats {
             vertices: front.mesh().vertex_count() as u32,

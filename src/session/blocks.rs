@@ -1,0 +1,389 @@
+//! A file elsewhere, of which a session keeps only the blocks that its request needs.
+//!
+//! [`Session::in_parts`] starts such a session. It opens nothing: [`Session::wanted`] says which bytes of the file it wants
+//! next, most important first, and [`Session::take`] takes them, in whatever order they come. Blocks that the request does
+//! not need any more go when the room that the session may take is short.
+
+use super::Session;
+use crate::format::DecodeOptions;
+use crate::format::Decoder;
+use crate::format::FormatError;
+use crate::format::Progress;
+use crate::mt::EdgeMt;
+use crate::mt::ErrorCode;
+use crate::mt::Mt;
+use crate::mt::MtInfo;
+use crate::mt::MtKind;
+use crate::mt::UpdateId;
+use crate::refine::Criterion;
+use crate::refine::TetLook;
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// Bytes of a file that are wanted.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WantedBytes {
+    /// Which ones. They may reach beyond the end of the file.
+    pub range: Range<u64>,
+    /// How much: the more the block lowers the excess of the error for each of its bytes, the higher.
+    pub priority: f64,
+}
+
+/// How a session that keeps blocks stands.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct BlockProgress {
+    /// Blocks of the file.
+    pub blocks: u32,
+    /// Blocks that are here.
+    pub here: u32,
+    /// Blocks that the request needs, as far as the index tells.
+    pub needed: u32,
+    /// Blocks of those that are not to be fetched because there is no room for them.
+    pub left_out: u32,
+    /// Bytes in memory of the blocks that are here, and of what waits to be put together.
+    pub bytes: u64,
+}
+
+/// How many bytes are asked for at first: as a rule more than stands in front of the blocks of a small file.
+const FIRST_BYTES: u64 = 1 << 16;
+
+/// How many bytes are asked for at a time where the file has to be read from end to end.
+const LATER_BYTES: u64 = 1 << 20;
+
+/// What a session knows of blocks.
+#[derive(Debug)]
+pub(super) struct Blocks {
+    /// Bytes that blocks may take in memory.
+    room: u64,
+    /// How far the file has been read in order.
+    fed: u64,
+    /// What has come of blocks that are not complete, by where it begins.
+    pieces: BTreeMap<u64, Vec<u8>>,
+    /// Complete blocks that wait for others.
+    waiting: BTreeMap<u32, Vec<u8>>,
+    /// What is to be here, most important first, as far as there is room.
+    plan: Vec<(f64, u32)>,
+    needed: u32,
+    left_out: u32,
+    /// The number of the plan in which each block was needed last.
+    last_needed: Vec<u32>,
+    plans: u32,
+    /// The criterion of the request.
+    criterion: Option<Arc<dyn Criterion>>,
+}
+
+impl Session {
+    /// A session for a file that comes in parts, whose blocks may take so many bytes in memory. Files of MTs that are not
+    /// edge-based are wanted as a whole.
+    pub fn in_parts(options: DecodeOptions, room: u64) -> Self {
+        let decoder = Decoder::new(DecodeOptions { in_parts: true, ..options });
+        let blocks = Blocks {
+            room,
+            fed: 0,
+            pieces: BTreeMap::new(),
+            waiting: BTreeMap::new(),
+            plan: Vec::new(),
+            needed: 0,
+            left_out: 0,
+            last_needed: Vec::new(),
+            plans: 0,
+            criterion: None,
+        };
+        Self { decoder, blocks: Some(blocks), ..Self::default() }
+    }
+
+    /// Which bytes of the file are wanted next, most important first; none when all is here that the request needs. Only for
+    /// sessions [in parts](Session::in_parts).
+    pub fn wanted(&self) -> Vec<WantedBytes> {
+        let Some(blocks) = &self.blocks else { return Vec::new() };
+        if let Some(end) = self.head_missing(blocks) {
+            return vec![WantedBytes { range: blocks.fed..end, priority: f64::MAX }];
+        }
+        let Some(Mt::Edge(mt)) = self.decoder.mt() else { return Vec::new() };
+        let mut wanted = Vec::new();
+        for &(priority, block) in &blocks.plan {
+            if mt.has_page(block) || blocks.waiting.contains_key(&block) {
+                continue;
+            }
+            let ranges = self.decoder.block_ranges(block).into_iter();
+            let missing = ranges.filter(|range| !blocks.pieces.contains_key(&range.start));
+            wanted.extend(missing.map(|range| WantedBytes { range, priority }));
+        }
+        wanted
+    }
+
+    /// Up to where the file is still to be read in order; none when that is done.
+    fn head_missing(&self, blocks: &Blocks) -> Option<u64> {
+        let is_edge = self.decoder.info().is_none_or(|info| info.kind == MtKind::Edge);
+        if !is_edge {
+            return (!self.decoder.progress().complete).then_some(blocks.fed + LATER_BYTES);
+        }
+        match self.decoder.head_end() {
+            Some(end) if blocks.fed >= end => None,
+            Some(end) => Some(end),
+            None => Some(blocks.fed + FIRST_BYTES),
+        }
+    }
+
+    /// Takes in bytes that were [wanted](Session::wanted): exactly one of the ranges, or less of it at the end of the file.
+    /// What nobody wants any more is passed over.
+    ///
+    /// # Errors
+    /// When the bytes are damaged. What was there before stays usable.
+    pub fn take(&mut self, start: u64, bytes: &[u8]) -> Result<Progress, FormatError> {
+        let Some(blocks) = &self.blocks else { return Ok(self.progress()) };
+        if self.head_missing(blocks).is_some() {
+            if start == blocks.fed {
+                let end = start + bytes.len() as u64;
+                self.feed(bytes)?;
+                if let Some(blocks) = &mut self.blocks {
+                    let is_done = self.decoder.takes_blocks();
+                    blocks.fed =
+                        self.decoder.head_end().filter(|_| is_done).map_or(end, |head| head.max(start));
+                }
+                self.plan();
+            }
+            return Ok(self.progress());
+        }
+        let Some(block) = self.decoder.block_at(start) else { return Ok(self.progress()) };
+        let ranges = self.decoder.block_ranges(block);
+        let fits = ranges.iter().any(|range| range.start == start && range.end - start == bytes.len() as u64);
+        let is_here = matches!(self.decoder.mt(), Some(Mt::Edge(mt)) if mt.has_page(block));
+        if !fits || is_here {
+            return Ok(self.progress());
+        }
+        let Some(blocks) = &mut self.blocks else { return Ok(self.progress()) };
+        blocks.pieces.insert(start, bytes.to_vec());
+        if ranges.iter().all(|range| blocks.pieces.contains_key(&range.start)) {
+            let parts: Vec<Vec<u8>> =
+                ranges.iter().filter_map(|range| blocks.pieces.remove(&range.start)).collect();
+            blocks.waiting.insert(block, parts.concat());
+            self.insert_waiting()?;
+        }
+        Ok(self.progress())
+    }
+
+    /// Puts blocks into the MT whose parents are all there.
+    fn insert_waiting(&mut self) -> Result<(), FormatError> {
+        let mut next = self.next_complete();
+        while let Some(block) = next {
+            if !self.has_room_for(block) {
+                self.make_room();
+            }
+            if !self.has_room_for(block) {
+                // When the mesh has followed the request, more can go.
+                break;
+            }
+            let bytes = self.blocks.as_mut().and_then(|blocks| blocks.waiting.remove(&block));
+            self.decoder.take_block(block, &bytes.unwrap_or_default())?;
+            if let (Some(front), Some(mt)) = (&mut self.front, self.decoder.mt()) {
+                front.arrived(mt, block);
+            }
+            next = self.next_complete();
+        }
+        Ok(())
+    }
+
+    /// Whether a block can come without anything going.
+    fn has_room_for(&self, block: u32) -> bool {
+        let (Some(blocks), Some(index)) = (&self.blocks, self.decoder.index()) else { return false };
+        let Some(Mt::Edge(mt)) = self.decoder.mt() else { return false };
+        let new = page_bytes(mt.info(), index.updates(block, mt.info().updates).len());
+        mt.page_bytes() + new <= blocks.room
+    }
+
+    /// A block that waits for no other one.
+    fn next_complete(&self) -> Option<u32> {
+        let (blocks, index) = (self.blocks.as_ref()?, self.decoder.index()?);
+        let Some(Mt::Edge(mt)) = self.decoder.mt() else { return None };
+        let ready = |block: &&u32| {
+            let parents = index.blocks.get(**block as usize).map_or(&[][..], |info| &info.parents);
+            parents.iter().all(|&parent| mt.has_page(parent))
+        };
+        blocks.waiting.keys().find(ready).copied()
+    }
+
+    /// How the blocks stand.
+    pub fn block_progress(&self) -> BlockProgress {
+        let (Some(blocks), Some(Mt::Edge(mt))) = (&self.blocks, self.decoder.mt()) else {
+            return BlockProgress::default();
+        };
+        let count = self.decoder.index().map_or(0, |index| index.blocks.len() as u32);
+        BlockProgress {
+            blocks: count,
+            here: (0..count).filter(|&block| mt.has_page(block)).count() as u32,
+            needed: blocks.needed,
+            left_out: blocks.left_out,
+            bytes: blocks.bytes_beside() + mt.page_bytes(),
+        }
+    }
+
+    /// The request is another one: works out what it needs.
+    pub(super) fn plan_for(&mut self, criterion: Arc<dyn Criterion>) {
+        if let Some(blocks) = &mut self.blocks {
+            blocks.criterion = Some(criterion);
+            self.plan();
+        }
+    }
+
+    fn plan(&mut self) {
+        let (Some(blocks), Some(index)) = (&mut self.blocks, self.decoder.index()) else { return };
+        let (Some(Mt::Edge(mt)), Some(criterion)) = (self.decoder.mt(), &blocks.criterion) else { return };
+        let wanted_fields = self.decoder.wanted_fields();
+        let count = index.blocks.len();
+        blocks.plans += 1;
+        blocks.last_needed.resize(count, 0);
+        let mut priorities: Vec<f64> = vec![0.0; count];
+        for at in (0..count).rev() {
+            let info = &index.blocks[at];
+            let errors: Vec<ErrorCode> = wanted_fields.iter().map(|&f| info.errors[f]).collect();
+            let ranges: Vec<[i32; 2]> = wanted_fields.iter().map(|&f| info.ranges[f]).collect();
+            let first = index.updates(at as u32, mt.info().updates).start;
+            let excess = excess(&**criterion, info.bounds, &errors, &ranges, first);
+            if excess > 1.0 {
+                // Infinite where any error is too much: then the largest errors come first.
+                let largest = errors.iter().copied().max().unwrap_or(ErrorCode::ZERO).error();
+                let gain = if excess.is_finite() { excess } else { largest.max(f64::MIN_POSITIVE) };
+                priorities[at] = priorities[at].max(gain / info.len() as f64);
+            }
+            if priorities[at] > 0.0 {
+                blocks.last_needed[at] = blocks.plans;
+                for &parent in &info.parents {
+                    priorities[parent as usize] = priorities[parent as usize].max(priorities[at]);
+                }
+            }
+        }
+        let mut plan: Vec<(f64, u32)> =
+            (0..).zip(&priorities).filter(|(_, p)| **p > 0.0).map(|(block, &p)| (p, block)).collect();
+        // What a block depends on is as important and has a smaller number.
+        plan.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        blocks.needed = plan.len() as u32;
+        let mut taken = 0;
+        let room = blocks.room;
+        plan.retain(|&(_, block)| {
+            taken += page_bytes(mt.info(), index.updates(block, mt.info().updates).len());
+            taken <= room
+        });
+        blocks.left_out = blocks.needed - plan.len() as u32;
+        blocks.plan = plan;
+        let is_planned = |block: u32| blocks.plan.iter().any(|&(_, planned)| planned == block);
+        blocks.waiting.retain(|&block, _| is_planned(block));
+        let decoder = &self.decoder;
+        blocks.pieces.retain(|&start, _| decoder.block_at(start).is_some_and(is_planned));
+    }
+
+    /// The mesh has moved: what it does not need any more may go, and what waited for that may come.
+    pub(super) fn after_step(&mut self) -> Result<(), FormatError> {
+        if self.blocks.is_some() {
+            self.make_room();
+            self.insert_waiting()?;
+        }
+        Ok(())
+    }
+
+    /// Lets blocks go that the request does not need, those first that have not been needed for longest, until what is here
+    /// and what is wanted fit the room. Those of which an update is applied stay, and what these depend on.
+    fn make_room(&mut self) {
+        let (Some(blocks), Some(Mt::Edge(mt)), Some(index)) =
+            (&self.blocks, self.decoder.mt(), self.decoder.index())
+        else {
+            return;
+        };
+        let mut planned = vec![false; index.blocks.len()];
+        let mut coming = 0;
+        for &(_, block) in &blocks.plan {
+            planned[block as usize] = true;
+            if !mt.has_page(block) {
+                coming += page_bytes(mt.info(), index.updates(block, mt.info().updates).len());
+            }
+        }
+        let mut excess = (mt.page_bytes() + coming).saturating_sub(blocks.room);
+        let mut order: Vec<(u32, u32)> = (0..index.blocks.len() as u32)
+            .filter(|&block| mt.has_page(block) && !planned[block as usize])
+            .map(|block| (blocks.last_needed.get(block as usize).copied().unwrap_or(0), block))
+            .collect();
+        // Of the same age, children before parents.
+        order.sort_unstable_by_key(|&(age, block)| (age, std::cmp::Reverse(block)));
+        let mut held = vec![0_u32; index.blocks.len()];
+        for block in (0..index.blocks.len() as u32).filter(|&block| mt.has_page(block)) {
+            index.blocks[block as usize].parents.iter().for_each(|&parent| held[parent as usize] += 1);
+        }
+        let mut leaving = Vec::new();
+        // Parents may be older than their children: then they are looked at again when these are gone.
+        let mut is_moving = true;
+        while excess > 0 && is_moving {
+            is_moving = false;
+            for &(_, block) in &order {
+                if excess == 0 || held[block as usize] > 0 || leaving.contains(&block) {
+                    continue;
+                }
+                let updates = index.updates(block, mt.info().updates);
+                if self
+                    .front
+                    .as_ref()
+                    .is_some_and(|front| updates.clone().any(|u| front.contains(UpdateId(u))))
+                {
+                    continue;
+                }
+                excess = excess.saturating_sub(page_bytes(mt.info(), updates.len()));
+                index.blocks[block as usize].parents.iter().for_each(|&parent| held[parent as usize] -= 1);
+                leaving.push(block);
+                is_moving = true;
+            }
+        }
+        for block in leaving {
+            let may_go = match (&mut self.front, self.decoder.mt()) {
+                (Some(front), Some(mt)) => front.leave(mt, block),
+                _ => false,
+            };
+            // Both have been checked above, so neither refuses.
+            if !may_go || self.decoder.drop_block(block).is_err() {
+                break;
+            }
+        }
+    }
+}
+
+impl Blocks {
+    /// Bytes of what waits to be put together.
+    fn bytes_beside(&self) -> u64 {
+        let all = self.pieces.values().chain(self.waiting.values());
+        all.map(|bytes| bytes.len() as u64).sum()
+    }
+}
+
+/// Bytes that so many updates take in memory.
+fn page_bytes(info: &MtInfo, updates: usize) -> u64 {
+    updates as u64 * EdgeMt::update_bytes(info)
+}
+
+/// How often the error in a block exceeds what is wanted, at most: that of a box full of the worst that the block holds.
+fn excess(
+    criterion: &dyn Criterion,
+    [low, high]: [[i32; 3]; 2],
+    errors: &[ErrorCode],
+    ranges: &[[i32; 2]],
+    first: u32,
+) -> f64 {
+    let error = errors.iter().copied().max().unwrap_or(ErrorCode::ZERO);
+    let corner =
+        |bits: usize| [0, 1, 2].map(|axis| if bits >> axis & 1 == 0 { low[axis] } else { high[axis] });
+    // Every other corner has the least and the largest level, so that each tetrahedron has both.
+    let levels = |field: usize| {
+        let [low, high] = ranges.get(field).copied().unwrap_or_default();
+        [low, high, low, high]
+    };
+    // The six tetrahedra around the diagonal of the box (Kuhn 1960).
+    let mut largest = 0.0_f64;
+    for [a, b] in [[0, 1], [1, 2], [2, 0], [0, 2], [2, 1], [1, 0]] {
+        let path = [0, 1 << a, 1 << a | 1 << b, 7];
+        // Three of the paths turn left and three right; tetrahedra are positive.
+        let is_even = (b + 3 - a) % 3 == 1;
+        let corners = if is_even { path } else { [path[0], path[1], path[3], path[2]] }.map(corner);
+        let update = UpdateId(first);
+        let look = TetLook { corners: &corners, levels: &levels, error, errors, update };
+        largest = largest.max(criterion.rank(&look).excess);
+    }
+    largest
+}
