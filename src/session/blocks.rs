@@ -143,6 +143,7 @@ impl Session {
                         self.decoder.head_end().filter(|_| is_done).map_or(end, |head| head.max(start));
                 }
                 self.plan();
+                self.take_surplus(start, bytes)?;
             }
             return Ok(self.progress());
         }
@@ -162,6 +163,29 @@ impl Session {
             self.insert_waiting()?;
         }
         Ok(self.progress())
+    }
+
+    /// Whole blocks may have come with what stands in front of them.
+    fn take_surplus(&mut self, start: u64, bytes: &[u8]) -> Result<(), FormatError> {
+        let (Some(head), true) = (self.decoder.head_end(), self.decoder.takes_blocks()) else {
+            return Ok(());
+        };
+        let end = start + bytes.len() as u64;
+        let mut block = 0;
+        loop {
+            let ranges = self.decoder.block_ranges(block);
+            if !ranges.last().is_some_and(|last| last.end <= end && ranges[0].start >= head.max(start)) {
+                return Ok(());
+            }
+            let part =
+                |range: &Range<u64>| &bytes[(range.start - start) as usize..(range.end - start) as usize];
+            let whole: Vec<u8> = ranges.iter().flat_map(part).copied().collect();
+            if let Some(blocks) = &mut self.blocks {
+                blocks.waiting.insert(block, whole);
+            }
+            block += 1;
+            self.insert_waiting()?;
+        }
     }
 
     /// Puts blocks into the MT whose parents are all there.
