@@ -16,6 +16,8 @@ use tetralod::build::Criterion;
 use tetralod::build::FieldPrecision;
 use tetralod::build::Method;
 use tetralod::build::build;
+use tetralod::format::EncodeOptions;
+use tetralod::format::encode;
 use tetralod::mesh::Field;
 use tetralod::mesh::TetMesh;
 use tetralod::mesh::VectorPart;
@@ -26,6 +28,8 @@ use tetralod::mt::MtKind;
 use tetralod::mt::MultiTessellation;
 use tetralod::mt::UpdateId;
 use tetralod::mt::VertexId;
+use tetralod::refine::Request;
+use tetralod::session::Session;
 
 /// Every kind with every way to build it.
 const WAYS: [(MtKind, Method, Criterion); 8] = [
@@ -110,6 +114,20 @@ fn exact_values_come_back_at_every_point_of_every_kind() {
         for table in &exact {
             assert!(table.vertices.is_sorted() && table.vertices.len() == points, "{what}");
             assert!(ids.iter().all(|&id| full.slot(id).is_none() || table.get(id).is_some()), "{what}");
+        }
+        // And they come back from a file.
+        let file = encode(&mt, &EncodeOptions { exact, ..EncodeOptions::default() }).expect("a sound MT");
+        let mut session = Session::new();
+        session.feed(&file).expect("a sound file");
+        session.refine(&Request::within(0.0)).expect("a sensible request");
+        let read: Vec<Vec<f64>> = (0..3).map(|field| session.exact_values(field)).collect();
+        let mesh_read = session.mesh().expect("it is complete");
+        for (point, &vertex) in vertices.iter().enumerate() {
+            let slot =
+                mesh_read.slot(vertex).unwrap_or_else(|| panic!("{what}: {vertex:?} is not in the mesh"));
+            for (values, field) in read.iter().zip(&mesh.fields) {
+                assert_eq!(values[slot as usize].to_bits(), field.values[point].to_bits(), "{what}");
+            }
         }
     }
 }

@@ -19,6 +19,7 @@ use super::payload::Metadata;
 use super::payload::edge;
 use super::payload::edge::FieldPart;
 use super::payload::edge::Splits;
+use super::payload::exact::Corrections;
 use super::read::Reader;
 use crate::mt::EdgeMt;
 use crate::mt::ErrorCode;
@@ -101,6 +102,8 @@ pub struct Decoder {
     /// The number of the block that comes next.
     next_block: u32,
     block: Option<OpenBlock>,
+    /// Exact values, by the field's number in the file.
+    exact: Vec<(usize, Corrections)>,
     failed: Option<FormatError>,
 }
 
@@ -202,6 +205,7 @@ impl Decoder {
             mt: None,
             next_block: 0,
             block: None,
+            exact: Vec::new(),
             failed: None,
         }
     }
@@ -493,6 +497,7 @@ impl Decoder {
             }
             Kind::FLDU => self.open_field(content)?,
             Kind::INSV | Kind::EXPL => self.open_columns(head.kind, content)?,
+            Kind::EXACT if self.mt.is_some() && self.block.is_none() => self.open_exact(content)?,
             Kind::ENDF if self.mt.is_some() && self.block.is_none() => return self.end(content),
             kind if kind.is_known() => return Err(out_of_place()),
             kind if kind.is_skippable() => {}
@@ -652,6 +657,30 @@ impl Decoder {
         mt.insert_page(block, &all)?;
         mt.set_to_come(self.head.largest_of_others(mt));
         Ok(())
+    }
+
+    fn open_exact(&mut self, mut content: Reader<'_>) -> Result<(), FormatError> {
+        let (field, precision, count) = (content.varint()? as usize, content.varint()?, content.varint()?);
+        let (FileHead { info: Some(info), models: Some(models), .. }, 0 | 1) = (&self.head, precision) else {
+            return Err(content.corrupt("a section is out of place"));
+        };
+        let is_new = self.exact.iter().all(|(known, _)| *known < field);
+        if field >= info.fields.len() || !is_new || count > info.vertices {
+            return Err(content.corrupt("exact values are not those of a field"));
+        }
+        if self.head.place(field).is_some() {
+            let mut source = Source::new(content, models)?;
+            let corrections = Corrections::read(&mut source, precision == 0, count)?;
+            source.end()?;
+            self.exact.push((field, corrections));
+        }
+        Ok(())
+    }
+
+    /// The exact values of a wanted field, by its place among these, if they have arrived.
+    pub fn exact(&self, place: usize) -> Option<&Corrections> {
+        let field = self.head.wanted.get(place)?;
+        self.exact.iter().find(|(known, _)| known == field).map(|(_, corrections)| corrections)
     }
 
     fn open_columns(&mut self, kind: Kind, mut content: Reader<'_>) -> Result<(), FormatError> {

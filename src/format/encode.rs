@@ -14,30 +14,35 @@ use super::header::header;
 use super::payload;
 use super::payload::Totals;
 use super::payload::edge;
+use super::payload::exact::Corrections;
 use super::payload::index::Index;
 use super::payload::index::MAX_BLOCK_BITS;
 use super::payload::index::MIN_BLOCK_BITS;
 use super::survey::Survey;
 use super::write;
 use crate::mt::BaseMeshError;
+use crate::mt::Exact;
 use crate::mt::MtRef;
 use crate::mt::UpdateError;
+use crate::mt::VertexId;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::io;
 
 /// What goes into a file besides the MT.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct EncodeOptions {
     /// log2 of the updates of a block, 4 to 16: the least that a client can fetch of the file by itself.
     pub block_bits: u32,
+    /// Exact values of fields at the vertices of the reference mesh.
+    pub exact: Vec<Exact>,
     /// Free keys and values, kept as they are. What is here makes the bytes: leave out dates and paths.
     pub metadata: BTreeMap<String, String>,
 }
 
 impl Default for EncodeOptions {
     fn default() -> Self {
-        Self { block_bits: BLOCK_BITS, metadata: BTreeMap::new() }
+        Self { block_bits: BLOCK_BITS, exact: Vec::new(), metadata: BTreeMap::new() }
     }
 }
 
@@ -62,6 +67,11 @@ pub enum EncodeError {
     },
     /// An update of the MT cannot be applied.
     Update(UpdateError),
+    /// Exact values are given for a field or a vertex that the reference mesh does not have.
+    Exact {
+        /// The field.
+        field: usize,
+    },
     /// Something is longer than the file can say.
     TooLong {
         /// What it is.
@@ -82,6 +92,9 @@ impl fmt::Display for EncodeError {
             ),
             Self::Blocks { bits } => write!(f, "a block cannot hold 2^{bits} updates; choose 4 to 16"),
             Self::Update(error) => write!(f, "the MT is damaged: {error}"),
+            Self::Exact { field } => {
+                write!(f, "the exact values of field {field} are not those of the reference mesh")
+            }
             Self::TooLong { what } => write!(f, "{what} is too long for an MT file; shorten it"),
             Self::Base(_) => f.write_str("the MT cannot be written"),
             Self::Write(_) => f.write_str("the MT file could not be written"),
@@ -120,11 +133,12 @@ pub fn encode_to<'a>(
 ) -> Result<u64, EncodeError> {
     let mt = mt.into();
     check(mt, options)?;
-    let Survey { blocks, coded } = Survey::of(mt, options.block_bits)?;
+    let Survey { blocks, coded, reference } = Survey::of(mt, options.block_bits)?;
     let mt = coded.as_ref().map_or(mt, MtRef::Edge);
     let mut index = Index { block_bits: options.block_bits, shared: 0, blocks };
     index.round(mt.info());
-    let sections = sections(mt, &options.metadata, &mut index)?;
+    let exact = corrections(mt, &options.exact, &reference)?;
+    let sections = sections(mt, &options.metadata, &mut index, &exact)?;
     let mut total = HEADER_BYTES as u64 + END_BYTES as u64;
     let mut totals = Totals { updates: mt.updates(), sections: sections.len() as u32, crc: 0 };
     let mut chain = crc32fast::Hasher::new();
@@ -201,9 +215,13 @@ fn sections(
     mt: MtRef<'_>,
     metadata: &BTreeMap<String, String>,
     index: &mut Index,
+    exact: &[(u32, Corrections)],
 ) -> Result<Vec<Section>, EncodeError> {
     let fields = mt.info().fields.len();
-    let models = Models::new(&count(mt, index));
+    let mut counts = Counts::default();
+    put_all(&mut counts, mt, index.block_bits);
+    exact.iter().for_each(|(_, corrections)| corrections.put(&mut counts));
+    let models = Models::new(&counts);
     let mut shared = Vec::new();
     let mut payload = Vec::new();
     models.write(&mut payload);
@@ -226,6 +244,10 @@ fn sections(
         put_block(mt, block as u32, index, &models, &mut blocks)?;
         index.blocks[block].lengths = blocks[before..].iter().map(|section| section.len() as u32).collect();
     }
+    for (field, corrections) in exact {
+        let head = [*field, u32::from(!corrections.is_single()), corrections.count()];
+        blocks.push(Section::coded(Kind::EXACT, &head, &models, |out| corrections.put(out))?);
+    }
     let mut payload = Vec::new();
     payload::write_info(&mut payload, mt.info(), metadata)?;
     let info = Section::new(Kind::INFO, payload)?;
@@ -235,11 +257,24 @@ fn sections(
     Ok([info, index].into_iter().chain(shared).chain(blocks).collect())
 }
 
-/// How often each symbol of a file occurs.
-fn count(mt: MtRef<'_>, index: &Index) -> Counts {
-    let mut counts = Counts::default();
-    put_all(&mut counts, mt, index.block_bits);
-    counts
+/// What is to be written of exact values: by field, ascending.
+fn corrections(
+    mt: MtRef<'_>,
+    exact: &[Exact],
+    reference: &[(u32, Vec<i32>)],
+) -> Result<Vec<(u32, Corrections)>, EncodeError> {
+    let mut all = Vec::new();
+    for exact in exact {
+        let of_level = |vertex: VertexId| {
+            let place = reference.binary_search_by_key(&vertex.0, |(v, _)| *v).ok()?;
+            let field = mt.info().fields.get(exact.field)?;
+            Some(field.value(*reference[place].1.get(exact.field)?))
+        };
+        let corrections = Corrections::new(exact, of_level);
+        all.push((exact.field as u32, corrections.ok_or(EncodeError::Exact { field: exact.field })?));
+    }
+    all.sort_by_key(|(field, _)| *field);
+    Ok(all)
 }
 
 /// Puts all that is coded of a file.

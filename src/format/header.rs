@@ -75,12 +75,14 @@ impl Kind {
     pub const UPDT: Self = Self(*b"UPDT");
     pub const INSV: Self = Self(*b"INSV");
     pub const EXPL: Self = Self(*b"EXPL");
+    /// Exact values: those who do not know it do without.
+    pub const EXACT: Self = Self(*b"fldx");
     pub const ENDF: Self = Self(*b"ENDF");
 
     /// Whether this reader knows what is in the section.
     pub fn is_known(self) -> bool {
         let head = [Self::INFO, Self::INDX, Self::MODL, Self::BASE, Self::FLDB];
-        let blocks = [Self::UPDT, Self::FLDU, Self::INSV, Self::EXPL, Self::ENDF];
+        let blocks = [Self::UPDT, Self::FLDU, Self::INSV, Self::EXPL, Self::EXACT, Self::ENDF];
         head.contains(&self) || blocks.contains(&self)
     }
 

@@ -20,4 +20,5 @@ pub use decode::{DecodeOptions, Decoder, Progress};
 pub use encode::{BLOCK_BITS, EncodeError, EncodeOptions, breakdown, encode, encode_to};
 pub use error::FormatError;
 pub use limits::Limits;
+pub use payload::exact::Corrections;
 pub use payload::index::{BlockInfo, Index};

@@ -18,40 +18,38 @@ pub struct Survey {
     pub blocks: Vec<BlockInfo>,
     /// An edge-based MT in the form that files have, if it was not in that form.
     pub coded: Option<EdgeMt>,
+    /// For each vertex of the reference mesh, ascending, its number and its levels.
+    pub reference: Vec<(u32, Vec<i32>)>,
 }
 
 impl Survey {
     pub fn of(mt: MtRef<'_>, block_bits: u32) -> Result<Self, EncodeError> {
         match mt {
             MtRef::Edge(mt) => survey_edge(mt, block_bits),
-            MtRef::Vertex(mt) => Ok(Self { blocks: run(mt, block_bits, &mut |_, _| Ok(()))?, coded: None }),
-            MtRef::Explicit(mt) => Ok(Self { blocks: run(mt, block_bits, &mut |_, _| Ok(()))?, coded: None }),
+            MtRef::Vertex(mt) => run(mt, block_bits, &mut |_, _| Ok(())),
+            MtRef::Explicit(mt) => run(mt, block_bits, &mut |_, _| Ok(())),
         }
     }
 }
 
 fn survey_edge(mt: &EdgeMt, block_bits: u32) -> Result<Survey, EncodeError> {
     if mt.is_coded() {
-        return Ok(Survey { blocks: run(mt, block_bits, &mut |_, _| Ok(()))?, coded: None });
+        return run(mt, block_bits, &mut |_, _| Ok(()));
     }
     let mut coded = EdgeMt::coded(mt.info().clone(), mt.base().clone(), block_bits);
     let mut residuals = Vec::new();
-    let blocks = run(mt, block_bits, &mut |mesh, u| {
+    let survey = run(mt, block_bits, &mut |mesh, u| {
         residuals.clear();
         let mask = mt.residuals(mesh, u, &mut residuals)?;
         coded.push(&VertexSplit { mask, field_offsets: &residuals, ..mt.split(u) }).map(drop)
     })?;
-    Ok(Survey { blocks, coded: Some(coded) })
+    Ok(Survey { coded: Some(coded), ..survey })
 }
 
 /// Called before each update with the mesh that has all of its parents.
 type Before<'a> = &'a mut dyn FnMut(&mut CurrentMesh, UpdateId) -> Result<(), UpdateError>;
 
-fn run(
-    mt: &impl MultiTessellation,
-    block_bits: u32,
-    before: Before<'_>,
-) -> Result<Vec<BlockInfo>, EncodeError> {
+fn run(mt: &impl MultiTessellation, block_bits: u32, before: Before<'_>) -> Result<Survey, EncodeError> {
     let mut mesh = mt.start().map_err(EncodeError::Base)?;
     mt.announce(&mut mesh, 0);
     let mut blocks = Vec::new();
@@ -62,7 +60,12 @@ fn run(
         blocks.push(block.map_err(EncodeError::Update)?);
         first = end;
     }
-    Ok(blocks)
+    mesh.compact();
+    let slots = 0..mesh.positions().len() as u32;
+    let mut reference: Vec<(u32, Vec<i32>)> =
+        slots.map(|slot| (mesh.vertex(slot).0, mesh.levels(slot).to_vec())).collect();
+    reference.sort_unstable();
+    Ok(Survey { blocks, coded: None, reference })
 }
 
 fn survey_block(

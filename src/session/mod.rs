@@ -327,6 +327,23 @@ impl Session {
         (0..mesh.positions().len() as u32).map(|slot| info.value(mesh.levels(slot)[field]) as f32).collect()
     }
 
+    /// One of the fields at the vertices of the current mesh in double precision: exact at vertices of the reference mesh if
+    /// the file keeps exact values, else the values of the levels; empty if there is no such field. Exact values come last in
+    /// a file, and only where it is read as a whole.
+    pub fn exact_values(&self, field: usize) -> Vec<f64> {
+        let (Some(mesh), Some(info)) = (self.mesh(), self.info().and_then(|info| info.fields.get(field)))
+        else {
+            return Vec::new();
+        };
+        let corrections = self.decoder.exact(field);
+        let value = |slot: u32| {
+            let of_level = info.value(mesh.levels(slot)[field]);
+            let exact = corrections.and_then(|all| all.value(mesh.vertex(slot), of_level));
+            exact.unwrap_or(of_level)
+        };
+        (0..mesh.positions().len() as u32).map(value).collect()
+    }
+
     /// The field that is shown.
     pub fn field(&self) -> usize {
         self.field

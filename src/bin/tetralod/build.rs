@@ -184,11 +184,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if !repaired.is_empty() && !arguments.quiet {
         eprintln!("{}: {repaired}", arguments.inputs[0].display());
     }
-    let BuildResult { mt, summary, .. } = build(arguments, &config, &mesh)?;
+    let BuildResult { mt, summary, exact, .. } = build(arguments, &config, &mesh)?;
     drop(mesh);
     let told = metadata(&config).into_iter().map(|(k, v)| (k.to_owned(), v.to_owned()));
     let metadata = told.chain(arguments.metadata.iter().cloned()).collect();
-    let options = EncodeOptions { metadata, ..EncodeOptions::default() };
+    let options = EncodeOptions { metadata, exact, ..EncodeOptions::default() };
     let file_bytes = files::write_file(&arguments.output, |out| Ok(encode_to(&mt, &options, out)?))?;
     let report = report(&config, &summary, file_bytes, start.elapsed().as_secs_f64(), repaired);
     match arguments {

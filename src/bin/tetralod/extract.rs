@@ -21,6 +21,7 @@ use tetralod::mt::CurrentMesh;
 use tetralod::mt::FieldInfo;
 use tetralod::mt::MtInfo;
 use tetralod::refine;
+use tetralod::session::Session;
 
 /// Takes the mesh out of an MT file that is as coarse as a request allows.
 #[derive(clap::Args)]
@@ -56,7 +57,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let answer = arguments.query.answer(&arguments.file)?;
     let opened = &answer.opened;
     let measured = arguments.measure.as_deref().map(|input| measure(input, &answer)).transpose()?;
-    let mesh = reference_units(opened.info()?, opened.session.mesh().context("there is no mesh")?);
+    let mesh = opened.session.mesh().context("there is no mesh")?;
+    let mesh = reference_units(&opened.session, opened.info()?, mesh);
     files::write_file(&arguments.output, |out| Ok(tetralod::io::write_vtu(&mesh, out)?))?;
     let report = Report {
         mesh: &answer.summary,
@@ -68,13 +70,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 }
 
 /// The current mesh in the units of the model and of all its fields.
-fn reference_units(info: &MtInfo, mesh: &CurrentMesh) -> TetMesh {
-    let slots = 0..mesh.positions().len() as u32;
-    let values =
-        |f: usize| slots.clone().map(move |slot| info.fields[f].value(mesh.levels(slot)[f])).collect();
+fn reference_units(session: &Session, info: &MtInfo, mesh: &CurrentMesh) -> TetMesh {
     let field = |(f, info): (usize, &FieldInfo)| {
         let FieldInfo { name, unit, vector, time, .. } = info.clone();
-        Field { name, values: values(f), unit, vector, time, integer: false }
+        Field { name, values: session.exact_values(f), unit, vector, time, integer: false }
     };
     TetMesh {
         positions: mesh.positions().iter().map(|&q| info.lattice.point(q)).collect(),

@@ -3,6 +3,7 @@
 
 mod base;
 pub mod edge;
+pub mod exact;
 mod explicit;
 pub mod index;
 mod vertex;
@@ -235,6 +236,8 @@ pub fn parts() -> Vec<(&'static str, Family)> {
         ("errors", edge::ERROR),
         ("levels", edge::LEVEL),
         ("base mesh", BASE_LEVEL),
+        ("exact values", exact::GAP),
+        ("exact values", exact::LENGTH),
     ];
     base.chain(edge).collect()
 }
