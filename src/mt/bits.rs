@@ -50,6 +50,15 @@ impl Bits {
         }
     }
 
+    /// Appends the bits `start .. end` of another string.
+    pub fn copy(&mut self, other: &Self, mut start: u64, end: u64) {
+        while start < end {
+            let width = (end - start).min(32) as u32;
+            self.push(other.get(start, width), width);
+            start += u64::from(width);
+        }
+    }
+
     /// Appends zeros until the length is a multiple of `unit`.
     pub fn pad(&mut self, unit: u64) {
         let missing = self.len.next_multiple_of(unit) - self.len;

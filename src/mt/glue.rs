@@ -51,7 +51,7 @@ const OF_LINK: u8 = 4;
 
 /// Scratch space, and the tetrahedra that were built last.
 #[derive(Clone, Debug)]
-pub(super) struct Glue {
+pub(crate) struct Glue {
     open: [OpenFace; OPEN_FACES],
     open_len: usize,
     /// Open faces by their vertices: `epoch << 16 | index`.

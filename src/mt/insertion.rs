@@ -274,8 +274,14 @@ impl VertexMt {
     #[inline]
     fn shape(&self, u: UpdateId) -> Shape {
         let start = self.node_start(u.0);
-        let children = self.children(u);
-        let at = self.links_end(start, children);
+        // While the MT grows, links and removers are elsewhere.
+        let (at, children) = match &self.growing {
+            Some(_) => (start + u64::from(self.widths.vertex), 0),
+            None => {
+                let children = self.children(u);
+                (self.links_end(start, children), children)
+            }
+        };
         let removed = self.nodes.get(at, COUNT_BITS) as usize;
         let boundary = self.nodes.get(at + u64::from(COUNT_BITS), 1) == 1;
         let mut at = at + u64::from(COUNT_BITS) + 1;
@@ -406,8 +412,16 @@ impl VertexMt {
         cavity: &mut Cavity,
     ) -> Result<(), UpdateError> {
         let walls = cavity.walls_len;
-        if shape.children == 0 {
+        if shape.children == 0 && self.growing.is_none() {
             cavity.tags[..walls].fill(NONE);
+            return Ok(());
+        }
+        cavity.order_link(mesh);
+        cavity.order_walls();
+        if let Some(growing) = &self.growing {
+            for (tag, &place) in cavity.tags[..walls].iter_mut().zip(&cavity.places) {
+                *tag = growing.remover(u.0, place as usize).unwrap_or(FIRST_ANONYMOUS_TAG | place as u32);
+            }
             return Ok(());
         }
         let complete = self.updates() == self.info.updates;
@@ -416,17 +430,43 @@ impl VertexMt {
             children[i as usize] = match self.child(u, i) {
                 Some(child) => child.0,
                 None if complete => return Err(UpdateError::Cavity { update: u.0 }),
-                None => FIRST_ANONYMOUS_TAG | i,
+                None => FIRST_ANONYMOUS_TAG,
             };
         }
-        cavity.order_link(mesh);
-        cavity.order_walls();
         for (tag, &place) in cavity.tags[..walls].iter_mut().zip(&cavity.places) {
             let at = shape.removers + place as u64 * u64::from(shape.remover_width);
             let child = self.nodes.get(at, shape.remover_width) as usize;
-            *tag = *children.get(child).ok_or(UpdateError::Cavity { update: u.0 })?;
+            let child = *children.get(child).ok_or(UpdateError::Cavity { update: u.0 })?;
+            *tag = if child == FIRST_ANONYMOUS_TAG { child | place as u32 } else { child };
         }
         Ok(())
+    }
+
+    /// The update that removes the tetrahedron at a place of the star that update `u` makes, if it is here.
+    fn remover_at(&self, u: UpdateId, place: u32) -> Option<u32> {
+        if let Some(growing) = &self.growing {
+            return growing.remover(u.0, place as usize);
+        }
+        let shape = self.shape(u);
+        let at = shape.removers + u64::from(place * shape.remover_width);
+        let child = self.nodes.get(at, shape.remover_width) as u32;
+        self.child(u, child).filter(|_| child > 0).map(|child| child.0)
+    }
+
+    /// Which faces of T_u on the boundary are given up, in the order of their sorted vertices; empty if none is.
+    pub(crate) fn given_up(&self, u: UpdateId) -> Vec<bool> {
+        let shape = self.shape(u);
+        let count = if shape.boundary { u64::from(shape.given_up_len) } else { 0 };
+        (0..count).map(|i| self.nodes.get(shape.given_up + i, 1) == 1).collect()
+    }
+
+    /// Where the code of T_u starts in a node without removers, given where its shape does.
+    pub(super) fn code_start(&self, shape_start: u64) -> u64 {
+        let at = shape_start + u64::from(COUNT_BITS) + 1;
+        if self.nodes.get(at - 1, 1) == 0 {
+            return at;
+        }
+        at + u64::from(COUNT_BITS) + self.nodes.get(at, COUNT_BITS)
     }
 
     #[inline]
@@ -663,7 +703,12 @@ impl MultiTessellation for VertexMt {
 
     fn start(&self) -> Result<CurrentMesh, BaseMeshError> {
         let mut mesh = CurrentMesh::new(self.info(), self.base())?;
-        mesh.tag_all(self.base_removers().iter().copied());
+        let anonymous = self.growing.is_some();
+        mesh.tag_all(
+            (0..)
+                .zip(self.base_removers())
+                .map(|(t, &u)| if anonymous && u == NONE { FIRST_ANONYMOUS_TAG | t } else { u }),
+        );
         Ok(mesh)
     }
 
@@ -757,9 +802,13 @@ impl MultiTessellation for VertexMt {
                 }
                 continue;
             }
-            let creator = self.creator(mesh, t);
-            if let Some(child) = creator.and_then(|u| self.child(u, tag & !FIRST_ANONYMOUS_TAG)) {
-                mesh.set_tag(t, child.0);
+            let place = tag & !FIRST_ANONYMOUS_TAG;
+            let remover = match self.creator(mesh, t) {
+                Some(u) => self.remover_at(u, place),
+                None => self.base_removers().get(place as usize).copied().filter(|&u| u != NONE),
+            };
+            if let Some(u) = remover {
+                mesh.set_tag(t, u);
                 mesh.touch(&[t]);
             }
         }

@@ -27,6 +27,7 @@ mod stats;
 mod taken;
 mod vertex;
 mod vertex_from;
+mod vertex_grow;
 
 pub use any::{Mt, MtRef};
 pub use base::{BaseMesh, BaseMeshError, MAX_FIELD_BITS, MAX_UPDATES};
@@ -41,6 +42,7 @@ pub use error::{ErrorCode, UpdateError};
 pub use exact::Exact;
 pub use exact::ExactValues;
 pub use explicit::{ExplicitMt, ExplicitUpdate};
+pub(crate) use glue::Glue;
 pub use replay::ReplayError;
 #[cfg(feature = "build")]
 pub(crate) use replay::canonical;
@@ -48,6 +50,7 @@ pub(crate) use sparse::Sparse;
 pub use split::Applied;
 pub use stats::{MtStats, stats};
 pub use vertex::{MAX_AROUND, MAX_INSERTED, MAX_REMOVED, NodeBits, VertexMt};
+pub(crate) use vertex_grow::Insertion;
 
 use crate::geom::Lattice;
 use crate::mesh::Field;

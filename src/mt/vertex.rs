@@ -30,6 +30,7 @@ use super::VertexId;
 use super::bits::Bits;
 use super::bits::width_of;
 use super::errors::Errors;
+use super::vertex_grow::Growing;
 use crate::mesh::NONE;
 
 /// Most tetrahedra around a vertex when it is inserted.
@@ -67,8 +68,8 @@ pub(super) struct Widths {
 #[derive(Clone, Debug, PartialEq)]
 pub struct VertexMt {
     pub(super) info: MtInfo,
-    base: BaseMesh,
-    base_removers: Vec<u32>,
+    pub(super) base: BaseMesh,
+    pub(super) base_removers: Vec<u32>,
     /// Whether every insertion inserts more tetrahedra than it removes.
     pub(super) always_grows: bool,
     pub(super) widths: Widths,
@@ -82,6 +83,8 @@ pub struct VertexMt {
     to_come: ErrorCode,
     /// Bits of all nodes, padding included, but for vertices and links.
     shape_bits: u64,
+    /// While the nodes have neither links nor removers: what is instead of them.
+    pub(super) growing: Option<Box<Growing>>,
 }
 
 /// Nodes whose starts are told from a common one: with at most 255 fields a node takes less than 2^14 bits.
@@ -162,6 +165,7 @@ impl VertexMt {
             errors,
             to_come: ErrorCode::MAX,
             shape_bits: 0,
+            growing: None,
         })
     }
 
@@ -186,11 +190,20 @@ impl VertexMt {
             && links_end + u64::from(COUNT_BITS) + 2 <= bits.len()
             && bits.len() < 1 << 15
             && (0..=children).all(|i| self.link_at(bits, 0, i).node < self.info.updates)
-            && bits.get(links_end, COUNT_BITS) > 0;
+            && bits.get(links_end, COUNT_BITS) > 0
+            && self.growing.is_none();
         if !sound {
             return Err(UpdateError::Cavity { update });
         }
         let start = self.nodes.len();
+        self.store(bits, errors)?;
+        self.shape_bits += self.nodes.len() - start - links_end;
+        Ok(UpdateId(update))
+    }
+
+    /// Adds the bits of a node, and its errors.
+    pub(super) fn store(&mut self, bits: &Bits, errors: &[ErrorCode]) -> Result<(), UpdateError> {
+        let (update, start) = (self.updates(), self.nodes.len());
         if self.starts.len().is_multiple_of(GROUP) {
             self.groups.push(start);
         }
@@ -205,11 +218,11 @@ impl VertexMt {
         self.starts.push(offset);
         self.nodes.extend(bits);
         self.nodes.pad(UNIT);
-        self.shape_bits += self.nodes.len() - start - links_end;
-        Ok(UpdateId(update))
+        Ok(())
     }
 
-    /// The bits of update `u`, as [`VertexMt::push`] takes them, but for zeros at the end.
+    /// The bits of update `u`, as [`VertexMt::push`] takes them, but for zeros at the end; of an MT that was read from a file once all
+    /// of it is here.
     pub fn node(&self, u: UpdateId) -> NodeBits {
         let (mut at, end) = (self.node_start(u.0), self.node_end(u.0));
         let mut bits = Bits::default();
@@ -264,7 +277,8 @@ impl VertexMt {
             + size_of_val(&self.base.tets[..])
             + size_of_val(&self.base_removers[..]);
         let nodes = self.nodes.bytes() + size_of_val(&self.groups[..]) + size_of_val(&self.starts[..]);
-        (base + nodes + self.errors.bytes()) as u64
+        let growing = self.growing.as_ref().map_or(0, |growing| growing.bytes());
+        (base + nodes + growing + self.errors.bytes()) as u64
     }
 
     /// Bits in all nodes that describe shapes: what a star is made of and removed by, T_u, and what fills up the last unit. The paper's tree of T_u
@@ -320,13 +334,18 @@ impl VertexMt {
         let parent = move |at: Link| Some(at).filter(|at| at.node < u.0);
         let on = move |at: &Link| parent(self.link(at.node, at.link));
         // An update removes at most as many tetrahedra as there are steps here; a loop that is longer is none.
-        let members = std::iter::successors(parent(self.link(u.0, 0)), on).take(MAX_REMOVED);
-        members.map(|at| UpdateId(at.node))
+        let first = if self.growing.is_none() { parent(self.link(u.0, 0)) } else { None };
+        let members = std::iter::successors(first, on).take(MAX_REMOVED);
+        let known = self.growing.as_ref().map_or(&[][..], |growing| growing.parents(u.0));
+        known.iter().copied().chain(members.map(|at| at.node)).map(UpdateId)
     }
 
     /// Number of children of update `u`, also of those that have not arrived yet.
     #[inline]
     pub fn children(&self, u: UpdateId) -> u32 {
+        if let Some(growing) = &self.growing {
+            return growing.children(u.0).len() as u32;
+        }
         self.children_at(&self.nodes, self.node_start(u.0))
     }
 
@@ -357,7 +376,7 @@ impl VertexMt {
         self.groups[u as usize / GROUP] + UNIT * u64::from(self.starts[u as usize])
     }
 
-    fn node_end(&self, u: u32) -> u64 {
+    pub(super) fn node_end(&self, u: u32) -> u64 {
         if u + 1 < self.updates() { self.node_start(u + 1) } else { self.nodes.len() }
     }
 

@@ -80,15 +80,15 @@ struct Writer<'a> {
 }
 
 /// An insertion in canonical numbers.
-struct Canonical {
+pub(super) struct Canonical {
     /// The labels of the vertices of Π_u, ascending.
-    link: Vec<u32>,
+    pub link: Vec<u32>,
     /// The faces of Π_u in canonical order, and the number of the tetrahedron that each becomes.
-    walls: Vec<(Face, u32)>,
+    pub walls: Vec<(Face, u32)>,
     /// T_u.
-    removed: Vec<[u8; 4]>,
+    pub removed: Vec<[u8; 4]>,
     /// The boundary faces of T_u, by sorted labels, and whether each is given up.
-    bare: Vec<([u32; 3], bool)>,
+    pub bare: Vec<([u32; 3], bool)>,
 }
 
 impl Writer<'_> {
@@ -200,19 +200,8 @@ impl Writer<'_> {
         u: UpdateId,
         canonical: &Canonical,
     ) -> Result<(), ConvertError> {
-        bits.push(canonical.removed.len() as u64, COUNT_BITS);
-        let on_boundary = !canonical.bare.is_empty();
-        bits.push(u64::from(on_boundary), 1);
-        if on_boundary {
-            if canonical.bare.len() >= 1 << COUNT_BITS {
-                return Err(ConvertError::Update {
-                    update: u.0,
-                    why: "it has too many faces on the boundary",
-                });
-            }
-            bits.push(canonical.bare.len() as u64, COUNT_BITS);
-            canonical.bare.iter().for_each(|(_, given_up)| bits.push(u64::from(*given_up), 1));
-        }
+        let on_boundary = write_given_up(bits, canonical)
+            .ok_or(ConvertError::Update { update: u.0, why: "it has too many faces on the boundary" })?;
         let children = &self.children[u.0 as usize];
         for (_, t) in &canonical.walls {
             let remover = self.mt.remover(*t);
@@ -220,58 +209,77 @@ impl Writer<'_> {
             bits.push(child as u64, width_of(children.len() as u32));
         }
         let torn = ConvertError::Update { update: u.0, why: "it does not fill the hole that it leaves" };
-        self.write_removed(bits, canonical, on_boundary).ok_or(torn)
+        write_removed(&mut self.glue, bits, canonical, on_boundary).ok_or(torn)
     }
+}
 
-    fn write_removed(&mut self, bits: &mut Bits, canonical: &Canonical, on_boundary: bool) -> Option<()> {
-        let faces: Vec<Face> = canonical.walls.iter().map(|(face, _)| *face).collect();
-        let vertices = canonical.link.len() as u32;
-        // By the face that it stands on: the vertex of the tetrahedron opposite it.
-        let mut behind: HashMap<Face, u8> = HashMap::new();
-        for tet in &canonical.removed {
-            FACES.iter().zip(tet).for_each(|(face, &x)| {
-                behind.insert(turned(face.map(|k| tet[k])), x);
-            });
+/// Appends how many tetrahedra are removed, and which of their faces on the boundary are given up. Tells whether there are
+/// any; none if there are too many.
+pub(super) fn write_given_up(bits: &mut Bits, canonical: &Canonical) -> Option<bool> {
+    bits.push(canonical.removed.len() as u64, COUNT_BITS);
+    let on_boundary = !canonical.bare.is_empty();
+    bits.push(u64::from(on_boundary), 1);
+    if on_boundary {
+        if canonical.bare.len() >= 1 << COUNT_BITS {
+            return None;
         }
-        let in_all = (0..vertices as u8).find(|x| canonical.removed.iter().all(|tet| tet.contains(x)));
-        // All of T_u meets in a vertex, and all faces of Π_u without that vertex have one of its tetrahedra behind them.
-        let fan = in_all.filter(|x| {
-            let free = faces.iter().filter(|face| !face.contains(x));
-            free.clone().count() == canonical.removed.len()
-                && free.clone().all(|face| behind.get(face) == Some(x))
-        });
-        bits.push(u64::from(fan.is_some()), 1);
-        if let Some(apex) = fan {
-            bits.push(u64::from(apex), width_of(vertices - 1));
-        }
-        let written = self.glue.build(&faces, !on_boundary, |face, of_link| {
-            let apex = behind.get(&face).copied();
-            if let Some(fan) = fan {
-                let leave = !of_link || face.contains(&fan);
-                return Some(if leave { Close::Leave } else { Close::With(fan) });
-            }
-            let choices = choices(vertices, on_boundary, of_link)?;
-            let (close, chosen) = match apex {
-                Some(x) => {
-                    let smaller = face.iter().filter(|&&own| own < x).count();
-                    (Close::With(x), u32::from(x) - smaller as u32)
-                }
-                None if on_boundary && !of_link => (Close::Leave, vertices - 3),
-                None => return None,
-            };
-            bits.push(u64::from(chosen), width_of(choices - 1));
-            Some(close)
-        });
-        written?;
-        // What was built must be T_u, whatever the way.
-        let all = |tets: &[[u8; 4]]| {
-            let mut all: Vec<[u8; 4]> = tets.to_vec();
-            all.iter_mut().for_each(|tet| tet.sort_unstable());
-            all.sort_unstable();
-            all
-        };
-        (all(&self.glue.tets[..self.glue.len]) == all(&canonical.removed)).then_some(())
+        bits.push(canonical.bare.len() as u64, COUNT_BITS);
+        canonical.bare.iter().for_each(|(_, given_up)| bits.push(u64::from(*given_up), 1));
     }
+    Some(on_boundary)
+}
+
+/// Appends how T_u fills Π_u.
+pub(super) fn write_removed(
+    glue: &mut Glue,
+    bits: &mut Bits,
+    canonical: &Canonical,
+    on_boundary: bool,
+) -> Option<()> {
+    let faces: Vec<Face> = canonical.walls.iter().map(|(face, _)| *face).collect();
+    let vertices = canonical.link.len() as u32;
+    // By the face that it stands on: the vertex of the tetrahedron opposite it.
+    let sides = |tet: &[u8; 4]| [0, 1, 2, 3].map(|i| (turned(FACES[i].map(|k| tet[k])), tet[i]));
+    let mut behind: Vec<(Face, u8)> = canonical.removed.iter().flat_map(sides).collect();
+    behind.sort_unstable();
+    let behind = |face: &Face| behind.binary_search_by_key(face, |entry| entry.0).ok().map(|at| behind[at].1);
+    let in_all = (0..vertices as u8).find(|x| canonical.removed.iter().all(|tet| tet.contains(x)));
+    // All of T_u meets in a vertex, and all faces of Π_u without that vertex have one of its tetrahedra behind them.
+    let fan = in_all.filter(|x| {
+        let free = faces.iter().filter(|face| !face.contains(x));
+        free.clone().count() == canonical.removed.len() && free.clone().all(|face| behind(face) == Some(*x))
+    });
+    bits.push(u64::from(fan.is_some()), 1);
+    if let Some(apex) = fan {
+        bits.push(u64::from(apex), width_of(vertices - 1));
+    }
+    let written = glue.build(&faces, !on_boundary, |face, of_link| {
+        let apex = behind(&face);
+        if let Some(fan) = fan {
+            let leave = !of_link || face.contains(&fan);
+            return Some(if leave { Close::Leave } else { Close::With(fan) });
+        }
+        let choices = choices(vertices, on_boundary, of_link)?;
+        let (close, chosen) = match apex {
+            Some(x) => {
+                let smaller = face.iter().filter(|&&own| own < x).count();
+                (Close::With(x), u32::from(x) - smaller as u32)
+            }
+            None if on_boundary && !of_link => (Close::Leave, vertices - 3),
+            None => return None,
+        };
+        bits.push(u64::from(chosen), width_of(choices - 1));
+        Some(close)
+    });
+    written?;
+    // What was built must be T_u, whatever the way.
+    let all = |tets: &[[u8; 4]]| {
+        let mut all: Vec<[u8; 4]> = tets.to_vec();
+        all.iter_mut().for_each(|tet| tet.sort_unstable());
+        all.sort_unstable();
+        all
+    };
+    (all(&glue.tets[..glue.len]) == all(&canonical.removed)).then_some(())
 }
 
 /// Whether one can go from each tetrahedron to each other one through faces.

@@ -6,6 +6,7 @@ pub mod edge;
 pub mod exact;
 mod explicit;
 pub mod index;
+mod insertions;
 mod vertex;
 
 use super::EncodeError;

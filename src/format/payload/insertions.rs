@@ -1,0 +1,751 @@
+//! Vertex insertions, coded by what the mesh to which they are applied lets expect of them.
+//!
+//! Writer and reader apply every update to a mesh of their own. An insertion is told by a vertex near it, where it lies as
+//! seen from there, and which tetrahedra around it give way: these are reached face by face, starting from the one that
+//! the new vertex lies in. Who is parent of whom, what the node of the update says of its star, and how what it
+//! removes is built again follow from that.
+
+use super::base;
+use super::check_bytes;
+use super::largest;
+use crate::format::FormatError;
+use crate::format::Limits;
+use crate::format::coder::Family;
+use crate::format::coder::Put;
+use crate::format::coder::Source;
+use crate::geom::insphere;
+use crate::geom::orient3d;
+use crate::mesh::FACES;
+use crate::mesh::NONE;
+use crate::mt::Applied;
+use crate::mt::BaseMesh;
+use crate::mt::BaseMeshError;
+use crate::mt::CurrentMesh;
+use crate::mt::ErrorCode;
+use crate::mt::Glue;
+use crate::mt::Insertion;
+use crate::mt::MAX_FIELD_BITS;
+use crate::mt::MAX_REMOVED;
+use crate::mt::MtInfo;
+use crate::mt::MultiTessellation;
+use crate::mt::UpdateError;
+use crate::mt::UpdateId;
+use crate::mt::VertexMt;
+
+/// By how many codes an error is below the one before.
+const ERROR: Family = base::LAST.numbers_after(1, 2);
+/// Whether all that is removed has the near vertex.
+const FAN: Family = ERROR.after(1, 2);
+/// How a coordinate differs from that of the near vertex: bits of the difference next to those of what is usual.
+const OFFSET: Family = FAN.after(4, 112);
+/// Which of the tetrahedra that the new vertex lies in, as seen from the near one, is the first that is removed.
+const SEED: Family = OFFSET.after(1, 9);
+/// Whether a tetrahedron is removed.
+const GROW: Family = SEED.after(108, 2);
+/// Whether a face of the boundary is given up that the new vertex sees.
+const GIVEN_UP: Family = GROW.after(1, 2);
+/// Whether the level is about as far off as the error allows.
+const FAR: Family = GIVEN_UP.after(20, 2);
+/// How much less than the error it is off, then.
+const SHORT: Family = FAR.numbers_after(1, 0);
+/// How far the level is from what is expected.
+const LEVEL: Family = SHORT.numbers_after(40, 1);
+/// The last family of vertex insertions.
+pub const LAST: Family = LEVEL;
+
+/// The last [`SEED`]: none of them, its place is told.
+const ELSEWHERE: u32 = 8;
+
+/// Most tetrahedra around a near vertex.
+const MOST_AROUND: usize = 4096;
+
+/// [`OFFSET`] of a difference with as many bits as usual.
+const OFFSET_BIAS: u32 = 40;
+
+/// What writer and reader know when they come to an update: kept from block to block.
+#[derive(Debug)]
+pub struct State {
+    mesh: CurrentMesh,
+    /// All coordinates are multiples of these.
+    grain: [i32; 3],
+    /// Errors of the update before.
+    errors: Vec<ErrorCode>,
+    glue: Box<Glue>,
+    /// The tetrahedra around the near vertex.
+    star: Vec<u32>,
+    /// The other vertices of these.
+    link: Vec<u32>,
+    /// What is removed.
+    removed: Vec<u32>,
+    given_up: Vec<[u32; 2]>,
+    /// By tetrahedron and by vertex: `epoch` if it is in the star or the link, one more if it is removed, two more if it is
+    /// not.
+    tet_marks: Vec<u32>,
+    vertex_marks: Vec<u32>,
+    epoch: u32,
+}
+
+/// Puts what is to be known of all insertions: whether each makes the mesh larger, and the grain of the coordinates.
+pub fn put_head(out: &mut impl Put, mt: &VertexMt) {
+    out.bits(u32::from(mt.always_grows()), 1);
+    grain(mt).iter().for_each(|&x| out.bits(x as u32, 31));
+}
+
+/// Reads that, which makes an MT without updates.
+pub fn read_head(
+    source: &mut Source<'_>,
+    info: MtInfo,
+    base: BaseMesh,
+) -> Result<(VertexMt, State), FormatError> {
+    let always_grows = source.bits(1)? == 1;
+    let mut grain = [0; 3];
+    for x in &mut grain {
+        *x = source.bits(31)? as i32;
+    }
+    if grain.iter().any(|&x| x < 1) {
+        return Err(source.corrupt("coordinates are multiples of nothing"));
+    }
+    let mt = VertexMt::growing(info, base, always_grows)?;
+    let state = State::new(&mt, grain)?;
+    Ok((mt, state))
+}
+
+/// The largest numbers that all coordinates are multiples of.
+fn grain(mt: &VertexMt) -> [i32; 3] {
+    let mut grain = [0_u32; 3];
+    let inserted = (0..mt.updates()).map(|u| mt.position(UpdateId(u)));
+    for position in mt.base().positions.iter().copied().chain(inserted) {
+        for (grain, x) in grain.iter_mut().zip(position) {
+            let mut rest = x.unsigned_abs();
+            while rest > 0 {
+                (*grain, rest) = (rest, *grain % rest);
+            }
+        }
+    }
+    grain.map(|x| i32::try_from(x).unwrap_or(1).max(1))
+}
+
+/// Puts the updates `first .. end`, which follow those that were put with this state before.
+///
+/// # Errors
+/// If the MT is damaged, or an update removes what does not hang together.
+pub fn put(
+    out: &mut impl Put,
+    mt: &VertexMt,
+    first: u32,
+    end: u32,
+    state: &mut State,
+) -> Result<(), UpdateError> {
+    (first..end).try_for_each(|u| put_update(out, mt, UpdateId(u), state))
+}
+
+fn put_update(out: &mut impl Put, mt: &VertexMt, u: UpdateId, state: &mut State) -> Result<(), UpdateError> {
+    let torn = UpdateError::Cavity { update: u.0 };
+    for (before, &error) in state.errors.iter_mut().zip(mt.errors_of(u)) {
+        out.number(ERROR, 0, u32::from(before.0.wrapping_sub(error.0)));
+        *before = error;
+    }
+    let mut removed = Vec::new();
+    mt.find_removed(&mut state.mesh, u, &mut removed)?;
+    let position = mt.position(u);
+    let (near, fan) = state.near(&removed, position).ok_or(torn.clone())?;
+    out.symbol(FAN, 0, u32::from(fan));
+    put_one_of(out, near, state.mesh.positions().len() as u32);
+    put_position(out, state, near, position);
+    let cone = state.cone(near, position);
+    let seed = match cone.iter().take(ELSEWHERE as usize).position(|t| removed.contains(t)) {
+        Some(at) => {
+            out.symbol(SEED, 0, at as u32);
+            cone[at]
+        }
+        None => {
+            out.symbol(SEED, 0, ELSEWHERE);
+            state.sort_star();
+            let at = state.star.iter().position(|t| removed.contains(t)).ok_or(torn.clone())?;
+            put_one_of(out, at as u32, state.star.len() as u32);
+            state.star[at]
+        }
+    };
+    state.grow(seed, fan.then_some(near), position, &mut |t, context| {
+        let is_removed = removed.contains(&t);
+        out.symbol(GROW, context, u32::from(is_removed));
+        Ok::<_, UpdateError>(is_removed)
+    })?;
+    if state.removed.len() != removed.len() || !removed.iter().all(|t| state.removed.contains(t)) {
+        return Err(torn);
+    }
+    let given_up = mt.given_up(u);
+    state.list_given_up(position, &mut |place| {
+        let is_given_up = given_up.get(place).copied().unwrap_or(false);
+        out.symbol(GIVEN_UP, 0, u32::from(is_given_up));
+        Ok::<_, UpdateError>(is_given_up)
+    })?;
+    put_levels(out, mt, u, state, position);
+    match mt.refine(&mut state.mesh, u)? {
+        Applied::Done => state.settle(u.0),
+        Applied::Blocked(_) => return Err(torn),
+    }
+    Ok(())
+}
+
+/// Puts a number below `count`, all of which are equally likely, with as few bits as that takes.
+fn put_one_of(out: &mut impl Put, value: u32, count: u32) {
+    let (width, short) = one_of(count);
+    if value < short {
+        out.bits(value, width);
+    } else {
+        out.bits((value + short) >> 1, width);
+        out.bits(value + short, 1);
+    }
+}
+
+/// How many bits all numbers below `count` take, and how many of them take no more than that.
+fn one_of(count: u32) -> (u32, u32) {
+    let width = count.max(1).ilog2();
+    (width, (2 << width) - count.max(1))
+}
+
+/// Along an axis, what is expected of a new vertex near `near`: the usual difference, the context, and what the difference
+/// is told from.
+fn usual(state: &State, near: u32, axis: usize) -> (u32, u32, i32) {
+    let positions = state.mesh.positions();
+    let (origin, grain) = (i64::from(positions[near as usize][axis]), i64::from(state.grain[axis]));
+    let (mut sum, mut size, mut level) = (0, 0, 1);
+    for &v in &state.link {
+        let difference = i64::from(positions[v as usize][axis]) - origin;
+        sum += difference;
+        size += difference.abs();
+        level += u32::from(difference == 0);
+    }
+    let count = grain * state.link.len().max(1) as i64;
+    let context = [0, 0, 1, 2, 2, 3][level.min(5) as usize];
+    // Towards the middle of the star, unless some of it lies level with the near vertex.
+    let from = if context == 0 { sum / (2 * count) } else { 0 };
+    (bits_of((size / count) as u32), context, from as i32)
+}
+
+fn bits_of(x: u32) -> u32 {
+    u32::BITS - x.leading_zeros()
+}
+
+fn put_position(out: &mut impl Put, state: &State, near: u32, position: [i32; 3]) {
+    for axis in 0..3 {
+        let (size, context, from) = usual(state, near, axis);
+        let offset = position[axis].wrapping_sub(state.mesh.positions()[near as usize][axis]);
+        let residual = (offset / state.grain[axis]).wrapping_sub(from);
+        let length = residual.unsigned_abs();
+        let bits = bits_of(length);
+        if bits == 0 {
+            out.symbol(OFFSET, context, 0);
+            continue;
+        }
+        let low = bits.saturating_sub(2);
+        let second = if bits > 1 { length >> low & 1 } else { 0 };
+        out.symbol(OFFSET, context, OFFSET_BIAS + 2 * bits + second - 2 * size);
+        out.bits(length, low);
+        out.bits(u32::from(residual < 0), 1);
+    }
+}
+
+fn put_levels(out: &mut impl Put, mt: &VertexMt, u: UpdateId, state: &State, position: [i32; 3]) {
+    let home = state.home(position);
+    for (f, level) in mt.levels(u).enumerate() {
+        let expected = state.expected(mt.info(), &home, f);
+        let (bound, context) = bound(mt.info(), f, state.errors[f], &home);
+        let residual = level - expected;
+        let length = residual.unsigned_abs();
+        if bound > LEAST_FAR {
+            let far = length >= bound - bound / 64 && length <= bound + 1;
+            out.symbol(FAR, bits_of(bound), u32::from(far));
+            if far {
+                out.number(SHORT, 0, bound + 1 - length);
+                out.bits(u32::from(residual < 0), 1);
+                continue;
+            }
+        }
+        out.signed(LEVEL, context, residual);
+    }
+}
+
+/// Above this many levels it is worth a symbol whether the level is as far off as the error allows.
+const LEAST_FAR: u32 = 3;
+
+/// How many levels the error of an update is, and the context of the level.
+fn bound(info: &MtInfo, field: usize, error: ErrorCode, home: &Home) -> (u32, u32) {
+    let field = &info.fields[field];
+    let levels = (error.error() * field.range() / field.step).floor() as u32;
+    // There are not more levels than that.
+    let levels = levels.min(1 << MAX_FIELD_BITS);
+    (levels, bits_of(levels).min(19) + if home.outside { 20 } else { 0 })
+}
+
+/// Reads `count` updates into the MT.
+pub fn read(
+    source: &mut Source<'_>,
+    mt: &mut VertexMt,
+    count: u32,
+    state: &mut State,
+    limits: &Limits,
+) -> Result<(), FormatError> {
+    for _ in 0..count {
+        read_update(source, mt, state)?;
+        check_bytes(mt.bytes() + state.mesh.bytes(), limits)?;
+    }
+    mt.set_to_come(largest(&state.errors));
+    Ok(())
+}
+
+fn read_update(source: &mut Source<'_>, mt: &mut VertexMt, state: &mut State) -> Result<(), FormatError> {
+    for error in &mut state.errors {
+        let fall = u16::try_from(source.number(ERROR, 0)?);
+        let fall = fall.map_err(|_| source.corrupt("an error is out of its range"))?;
+        error.0 = error.0.wrapping_sub(fall);
+    }
+    let fan = source.symbol(FAN, 0)? == 1;
+    let near = read_one_of(source, state.mesh.positions().len() as u32)?;
+    if !state.gather(near) {
+        return Err(source.corrupt("a vertex is inserted next to one with too many tetrahedra"));
+    }
+    let position = read_position(source, mt.info(), state, near)?;
+    let cone = state.cone(near, position);
+    let seed = match source.symbol(SEED, 0)? {
+        ELSEWHERE => {
+            state.sort_star();
+            let at = read_one_of(source, state.star.len() as u32)?;
+            state.star.get(at as usize).copied()
+        }
+        at => cone.get(at as usize).copied(),
+    };
+    let nothing = "an update removes a tetrahedron that is not there";
+    let seed = seed.ok_or_else(|| source.corrupt(nothing))?;
+    state.grow(seed, fan.then_some(near), position, &mut |_, context| {
+        Ok::<_, FormatError>(source.symbol(GROW, context)? == 1)
+    })?;
+    state.list_given_up(position, &mut |_| Ok::<_, FormatError>(source.symbol(GIVEN_UP, 0)? == 1))?;
+    let levels = read_levels(source, mt.info(), state, position)?;
+    let State { mesh, glue, removed, given_up, errors, .. } = state;
+    let insertion = Insertion { position, levels: &levels, removed, given_up, errors };
+    let update = mt.insert_into(mesh, glue, &insertion)?;
+    state.settle(update.0);
+    Ok(())
+}
+
+fn read_one_of(source: &mut Source<'_>, count: u32) -> Result<u32, FormatError> {
+    let (width, short) = one_of(count);
+    let value = source.bits(width)?;
+    Ok(if value < short { value } else { 2 * value + source.bits(1)? - short })
+}
+
+fn read_position(
+    source: &mut Source<'_>,
+    info: &MtInfo,
+    state: &State,
+    near: u32,
+) -> Result<[i32; 3], FormatError> {
+    let mut position = state.mesh.positions()[near as usize];
+    for (axis, x) in position.iter_mut().enumerate() {
+        let (size, context, from) = usual(state, near, axis);
+        let symbol = source.symbol(OFFSET, context)?;
+        let mut residual = 0;
+        if symbol > 0 {
+            let twice = (symbol + 2 * size).wrapping_sub(OFFSET_BIAS);
+            let (bits, second) = (twice / 2, twice & 1);
+            if !(1..=31).contains(&bits) || second > 0 && bits == 1 {
+                return Err(source.corrupt("a vertex is off the lattice"));
+            }
+            let low = bits.saturating_sub(2);
+            let top = if bits == 1 { 1 } else { 2 | second };
+            residual = (top << low | source.bits(low)?) as i32;
+            residual = if source.bits(1)? == 1 { -residual } else { residual };
+        }
+        *x = residual.wrapping_add(from).wrapping_mul(state.grain[axis]).wrapping_add(*x);
+    }
+    if !position.iter().all(|&x| 0 <= x && x <= 1 << info.lattice.bits) {
+        return Err(source.corrupt("a vertex is off the lattice"));
+    }
+    Ok(position)
+}
+
+fn read_levels(
+    source: &mut Source<'_>,
+    info: &MtInfo,
+    state: &State,
+    position: [i32; 3],
+) -> Result<Vec<i32>, FormatError> {
+    let home = state.home(position);
+    let mut levels = Vec::with_capacity(info.fields.len());
+    for f in 0..info.fields.len() {
+        let expected = state.expected(info, &home, f);
+        let (bound, context) = bound(info, f, state.errors[f], &home);
+        let far = bound > LEAST_FAR && source.symbol(FAR, bits_of(bound))? == 1;
+        let residual = if far {
+            // Levels have few bits: what is not below 2^31 is off the lattice in any case.
+            let length = (bound + 1).wrapping_sub(source.number(SHORT, 0)?) as i32;
+            if source.bits(1)? == 1 { length.wrapping_neg() } else { length }
+        } else {
+            source.signed(LEVEL, context)?
+        };
+        levels.push(expected.wrapping_add(residual));
+    }
+    Ok(levels)
+}
+
+/// The tetrahedron whose levels the new vertex is compared with.
+struct Home {
+    tet: [u32; 4],
+    /// What each corner counts.
+    weights: [f64; 4],
+    /// Whether the vertex lies outside.
+    outside: bool,
+}
+
+impl State {
+    /// At the start of an MT, to put all of its updates.
+    ///
+    /// # Errors
+    /// If the base mesh is not usable.
+    pub fn of(mt: &VertexMt) -> Result<Self, BaseMeshError> {
+        Self::new(mt, grain(mt))
+    }
+
+    fn new(mt: &VertexMt, grain: [i32; 3]) -> Result<Self, BaseMeshError> {
+        Ok(Self {
+            mesh: mt.start()?,
+            grain,
+            errors: vec![ErrorCode::MAX; mt.info().fields.len()],
+            glue: Box::default(),
+            star: Vec::new(),
+            link: Vec::new(),
+            removed: Vec::new(),
+            given_up: Vec::new(),
+            tet_marks: Vec::new(),
+            vertex_marks: Vec::new(),
+            epoch: 0,
+        })
+    }
+
+    fn next_epoch(&mut self) {
+        if self.epoch > u32::MAX - 6 {
+            self.tet_marks.fill(0);
+            self.vertex_marks.fill(0);
+            self.epoch = 0;
+        }
+        // Three marks are in use.
+        self.epoch += 3;
+        self.tet_marks.resize(self.mesh.tet_slots(), 0);
+        self.vertex_marks.resize(self.mesh.positions().len(), 0);
+    }
+
+    /// Finds the tetrahedra around a vertex, as far as they hang together through faces, and their other vertices. False if
+    /// there are too many.
+    fn gather(&mut self, near: u32) -> bool {
+        self.next_epoch();
+        self.star.clear();
+        self.link.clear();
+        let Some(&first) = self.mesh.incident.get(near as usize).filter(|&&t| t != NONE) else {
+            return false;
+        };
+        self.vertex_marks[near as usize] = self.epoch;
+        self.tet_marks[first as usize] = self.epoch;
+        self.star.push(first);
+        let mut next = 0;
+        while let Some(&t) = self.star.get(next) {
+            next += 1;
+            let tet = self.mesh.tets()[t as usize];
+            for (v, n) in tet.into_iter().zip(self.mesh.neighbors()[t as usize]) {
+                if std::mem::replace(&mut self.vertex_marks[v as usize], self.epoch) != self.epoch {
+                    self.link.push(v);
+                }
+                if v != near
+                    && n != NONE
+                    && std::mem::replace(&mut self.tet_marks[n as usize], self.epoch) != self.epoch
+                {
+                    self.star.push(n);
+                }
+            }
+            if self.star.len() > MOST_AROUND {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// Chooses the vertex to tell an insertion from, and gathers what is around it; and tells whether all that is removed
+    /// is at it.
+    fn near(&mut self, removed: &[u32], position: [i32; 3]) -> Option<(u32, bool)> {
+        let tets: Vec<[u32; 4]> = removed.iter().map(|&t| self.mesh.tets()[t as usize]).collect();
+        let mut vertices = tets.as_flattened().to_vec();
+        vertices.sort_unstable();
+        vertices.dedup();
+        let distance = |v: u32| {
+            let other = self.mesh.positions()[v as usize];
+            (0..3).map(|k| (i64::from(other[k]) - i64::from(position[k])).pow(2)).sum::<i64>()
+        };
+        // Those that all have come first.
+        let rank = |v: u32| (!tets.iter().all(|tet| tet.contains(&v)), distance(v), v);
+        let mut ranked: Vec<(bool, i64, u32)> = vertices.into_iter().map(rank).collect();
+        ranked.sort_unstable();
+        ranked.into_iter().find_map(|(apart, _, v)| {
+            let fits = self.gather(v) && self.star.iter().any(|t| removed.contains(t));
+            fits.then_some((v, !apart))
+        })
+    }
+
+    fn corners(&self, face: [u32; 3]) -> [[i32; 3]; 3] {
+        face.map(|v| self.mesh.positions()[v as usize])
+    }
+
+    /// Whether the tetrahedron is on the inner side of its face `k` as seen from `position`; what lies in the plane is not.
+    fn sees(&self, tet: [u32; 4], k: usize, position: [i32; 3]) -> bool {
+        let [a, b, c] = self.corners(FACES[k].map(|i| tet[i]));
+        orient3d(a, b, c, position) < 0
+    }
+
+    fn sorted(&self, t: u32) -> [u32; 4] {
+        let mut tet = self.mesh.tets()[t as usize];
+        tet.sort_unstable();
+        tet
+    }
+
+    /// The tetrahedra around the near vertex that `position` is in the direction of, by their sorted vertices.
+    fn cone(&self, near: u32, position: [i32; 3]) -> Vec<u32> {
+        let is_towards = |&t: &u32| {
+            let tet = self.mesh.tets()[t as usize];
+            (0..4).filter(|&k| tet[k] != near).all(|k| {
+                let [a, b, c] = self.corners(FACES[k].map(|i| tet[i]));
+                orient3d(a, b, c, position) <= 0
+            })
+        };
+        let mut cone: Vec<u32> = self.star.iter().copied().filter(is_towards).collect();
+        cone.sort_unstable_by_key(|&t| self.sorted(t));
+        cone
+    }
+
+    fn sort_star(&mut self) {
+        let mut star = std::mem::take(&mut self.star);
+        star.sort_unstable_by_key(|&t| self.sorted(t));
+        self.star = star;
+    }
+
+    /// Finds what is removed, from its first tetrahedron on. What lies behind a face that the new vertex does not see has to
+    /// be; `decide` is asked for the rest, with the context. With a vertex `fan`, all has it. Stops
+    /// when there is too much.
+    fn grow<E>(
+        &mut self,
+        seed: u32,
+        fan: Option<u32>,
+        position: [i32; 3],
+        decide: &mut dyn FnMut(u32, u32) -> Result<bool, E>,
+    ) -> Result<(), E> {
+        let [yes, no] = [self.epoch + 1, self.epoch + 2];
+        self.removed.clear();
+        self.removed.push(seed);
+        self.tet_marks[seed as usize] = yes;
+        let mut next = 0;
+        while let Some(&t) = self.removed.get(next).filter(|_| self.removed.len() <= MAX_REMOVED) {
+            next += 1;
+            let tet = self.mesh.tets()[t as usize];
+            let is_near = u32::from(self.sphere(tet, position) > 0);
+            let mut order = [0, 1, 2, 3];
+            order.sort_unstable_by_key(|&k| tet[k]);
+            for k in order {
+                let n = self.mesh.neighbors()[t as usize][k];
+                let mark = self.tet_marks.get(n as usize).copied().unwrap_or(no);
+                if mark == yes || mark == no || !self.may_have(n, fan, position) {
+                    continue;
+                }
+                let is_removed =
+                    !self.sees(tet, k, position) || decide(n, 2 * self.grow_context(n, position) + is_near)?;
+                self.tet_marks[n as usize] = if is_removed { yes } else { no };
+                if is_removed {
+                    self.removed.push(n);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether a tetrahedron has the vertex that all have, if there is one; the face opposite it must be seen then, unless it
+    /// is on the boundary.
+    fn may_have(&self, t: u32, fan: Option<u32>, position: [i32; 3]) -> bool {
+        let Some(fan) = fan else { return true };
+        let tet = self.mesh.tets()[t as usize];
+        let Some(k) = tet.iter().position(|&v| v == fan) else { return false };
+        self.mesh.neighbors()[t as usize][k] == NONE || self.sees(tet, k, position)
+    }
+
+    /// Where a point lies with respect to the sphere of a tetrahedron: 1 inside.
+    fn sphere(&self, tet: [u32; 4], position: [i32; 3]) -> i32 {
+        let [a, b, c, d] = tet.map(|v| self.mesh.positions()[v as usize]);
+        insphere(a, b, c, d, position)
+    }
+
+    /// Half the context of whether a tetrahedron is removed: 0 to 53.
+    fn grow_context(&self, t: u32, position: [i32; 3]) -> u32 {
+        let [yes, no] = [self.epoch + 1, self.epoch + 2];
+        let tet = self.mesh.tets()[t as usize];
+        let around = self.mesh.neighbors()[t as usize];
+        let marked = |mark: u32| {
+            around.iter().filter(|&&n| self.tet_marks.get(n as usize) == Some(&mark)).count() as u32
+        };
+        let hidden = (0..4).filter(|&k| !self.sees(tet, k, position)).count() as u32;
+        let sphere = (self.sphere(tet, position) + 1) as u32;
+        let known = marked(yes).clamp(1, 3) - 1;
+        ((sphere * 3 + known) * 3 + hidden.min(3).saturating_sub(1)) * 2 + marked(no).min(1)
+    }
+
+    /// Finds the faces on the boundary that are given up: those that the new vertex does not see, and such as `decide` says, given
+    /// their places by sorted vertices.
+    fn list_given_up<E>(
+        &mut self,
+        position: [i32; 3],
+        decide: &mut dyn FnMut(usize) -> Result<bool, E>,
+    ) -> Result<(), E> {
+        self.given_up.clear();
+        let mut bare: Vec<([u32; 3], [u32; 2])> = Vec::new();
+        for &t in &self.removed {
+            let tet = self.mesh.tets()[t as usize];
+            for (k, &n) in (0..).zip(&self.mesh.neighbors()[t as usize]) {
+                if n == NONE {
+                    let mut face = FACES[k as usize].map(|i| tet[i]);
+                    face.sort_unstable();
+                    bare.push((face, [t, k]));
+                }
+            }
+        }
+        bare.sort_unstable();
+        for (place, (_, [t, k])) in bare.into_iter().enumerate() {
+            let tet = self.mesh.tets()[t as usize];
+            if !self.sees(tet, k as usize, position) || decide(place)? {
+                self.given_up.push([t, k]);
+            }
+        }
+        Ok(())
+    }
+
+    /// The removed tetrahedron that the new vertex lies in; or is least far out of, for its size.
+    fn home(&self, position: [i32; 3]) -> Home {
+        let mut best = Home { tet: [0; 4], weights: [0.0; 4], outside: true };
+        let mut most = f64::NEG_INFINITY;
+        for &t in &self.removed {
+            let tet = self.mesh.tets()[t as usize];
+            let weights = [0, 1, 2, 3].map(|k| {
+                let [a, b, c] = self.corners(FACES[k].map(|i| tet[i]));
+                -(orient3d(a, b, c, position) as f64)
+            });
+            let whole: f64 = weights.iter().sum();
+            let weights = weights.map(|weight| weight / whole);
+            let least = weights.iter().fold(f64::INFINITY, |least, &weight| least.min(weight));
+            if least > most {
+                most = least;
+                best = Home { tet, weights, outside: least < 0.0 };
+                if !best.outside {
+                    break;
+                }
+            }
+        }
+        best
+    }
+
+    /// The level that is expected of the new vertex.
+    fn expected(&self, info: &MtInfo, home: &Home, field: usize) -> i32 {
+        let mut level = 0.5;
+        for (v, weight) in home.tet.into_iter().zip(home.weights) {
+            level += weight * f64::from(self.mesh.levels(v)[field]);
+        }
+        (level.floor() as i32).clamp(0, (1 << info.fields[field].bits) - 1)
+    }
+
+    /// After update `u` has been applied.
+    fn settle(&mut self, u: u32) {
+        self.mesh.clear_touched();
+        if u % 4096 == 0 {
+            self.mesh.take_changes();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::format::coder::Counts;
+    use crate::format::coder::Models;
+    use crate::format::coder::Writer;
+    use crate::format::read::Reader;
+    use crate::geom::Lattice;
+    use crate::geom::in_conflict;
+    use crate::mesh::kuhn_tets;
+    use crate::mt::ExplicitMt;
+    use crate::mt::ExplicitUpdate;
+    use crate::mt::FieldInfo;
+    use crate::mt::MtKind;
+
+    /// Coded blocks of so many updates.
+    const BLOCK: u32 = 50;
+
+
+    struct Coded {
+        models: Models,
+        head: Vec<u8>,
+        blocks: Vec<Vec<u8>>,
+    }
+
+    fn coded(mt: &VertexMt, size: u32) -> Result<Coded, FormatError> {
+        let mut counts = Counts::default();
+        put_head(&mut counts, mt);
+        let mut state = State::of(mt)?;
+        put(&mut counts, mt, 0, mt.updates(), &mut state)?;
+        let models = Models::new(&counts);
+        let mut writer = Writer::new(&models);
+        put_head(&mut writer, mt);
+        let mut head = Vec::new();
+        writer.finish(&mut head);
+        let mut state = State::of(mt)?;
+        let mut blocks = Vec::new();
+        for first in (0..mt.updates()).step_by(size as usize) {
+            let mut writer = Writer::new(&models);
+            put(&mut writer, mt, first, mt.updates().min(first + size), &mut state)?;
+            let mut block = Vec::new();
+            writer.finish(&mut block);
+            blocks.push(block);
+        }
+        Ok(Coded { models, head, blocks })
+    }
+
+    fn decoded(coded: &Coded, info: &MtInfo, base: &BaseMesh, size: u32) -> Result<VertexMt, FormatError> {
+        let mut source = Source::new(Reader::new(&coded.head, 0), &coded.models)?;
+        let (mut mt, mut state) = read_head(&mut source, info.clone(), base.clone())?;
+        source.end()?;
+        for block in &coded.blocks {
+            let mut source = Source::new(Reader::new(block, 0), &coded.models)?;
+            let count = size.min(info.updates - mt.updates());
+            read(&mut source, &mut mt, count, &mut state, &Limits::default())?;
+            source.end()?;
+        }
+        Ok(mt)
+    }
+
+    #[test]
+    fn measure() {
+        for path in std::env::var("BASES").unwrap_or_default().split_whitespace() {
+            let mut decoder = crate::format::Decoder::default();
+            decoder.feed(&std::fs::read(path).unwrap()).unwrap();
+            let crate::mt::Mt::Vertex(mt) = decoder.into_mt().unwrap() else { panic!() };
+            let coded = coded(&mt, 512).unwrap();
+            let mut tables = Vec::new();
+            coded.models.write(&mut tables);
+            let blocks: usize = coded.blocks.iter().map(Vec::len).sum();
+            let n = mt.updates() as usize;
+            let start = std::time::Instant::now();
+            let again = decoded(&coded, mt.info(), mt.base(), 512).unwrap();
+            let time = start.elapsed().as_secs_f64();
+            println!(
+                "{path}: {n} updates, tables {} blocks {blocks}: {:.3} bytes each; {:.0} updates/s",
+                tables.len(),
+                (tables.len() + blocks) as f64 / n as f64,
+                n as f64 / time
+            );
+            assert!(again == mt);
+        }
+    }
+}

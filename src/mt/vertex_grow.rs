@@ -1,0 +1,293 @@
+//! A compact vertex-based MT that grows by what its updates remove, without being told of their children.
+//!
+//! Nodes name their children, which come later. So until all updates are here, parents, children and removers are kept
+//! beside the nodes; then they move into them.
+
+use super::Applied;
+use super::BaseMesh;
+use super::CurrentMesh;
+use super::ErrorCode;
+use super::MtInfo;
+use super::MultiTessellation;
+use super::NodeBits;
+use super::UpdateError;
+use super::UpdateId;
+use super::VertexMt;
+use super::bits::Bits;
+use super::bits::width_of;
+use super::current::FIRST_ANONYMOUS_TAG;
+use super::glue::Glue;
+use super::glue::turned;
+use super::vertex::MAX_AROUND;
+use super::vertex::MAX_INSERTED;
+use super::vertex::MAX_REMOVED;
+use super::vertex_from::Canonical;
+use super::vertex_from::write_given_up;
+use super::vertex_from::write_removed;
+use crate::mesh::FACES;
+use crate::mesh::NONE;
+
+/// What is kept beside the nodes.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Growing {
+    /// Where the parents of each update end.
+    parents_end: Vec<u32>,
+    parents: Vec<u32>,
+    /// Ascending, since they come in that order.
+    children: Vec<Vec<u32>>,
+    /// Where the removers of each update end.
+    removers_end: Vec<u64>,
+    /// For each tetrahedron of a star, in canonical order, which child removes it, counted from 1; 0 while none does.
+    removers: Vec<u8>,
+    /// Bits that each node was padded with.
+    padding: Vec<u8>,
+}
+
+impl Growing {
+    pub fn parents(&self, u: u32) -> &[u32] {
+        let start = u.checked_sub(1).map_or(0, |before| self.parents_end[before as usize]);
+        &self.parents[start as usize..self.parents_end[u as usize] as usize]
+    }
+
+    pub fn children(&self, u: u32) -> &[u32] {
+        &self.children[u as usize]
+    }
+
+    fn removers_start(&self, u: u32) -> usize {
+        u.checked_sub(1).map_or(0, |before| self.removers_end[before as usize]) as usize
+    }
+
+    fn removers(&self, u: u32) -> &[u8] {
+        &self.removers[self.removers_start(u)..self.removers_end[u as usize] as usize]
+    }
+
+    /// The update that removes the tetrahedron at a place of a star, if it is here.
+    pub fn remover(&self, u: u32, place: usize) -> Option<u32> {
+        let child = *self.removers(u).get(place)?;
+        self.children(u).get(usize::from(child).checked_sub(1)?).copied()
+    }
+
+    pub fn bytes(&self) -> usize {
+        // There are as many parents as children.
+        2 * size_of_val(&self.parents[..])
+            + size_of_val(&self.parents_end[..])
+            + size_of_val(&self.children[..])
+            + size_of_val(&self.removers_end[..])
+            + self.removers.len()
+            + self.padding.len()
+    }
+
+    /// The member of the loop of `owner` behind the `at`-th one, where 0 is the owner and `i` its `i`-th parent; and which of its
+    /// links goes on.
+    fn next_in_loop(&self, owner: u32, at: usize) -> [u32; 2] {
+        match self.parents(owner).get(at) {
+            Some(&parent) => {
+                let place = self.children(parent).partition_point(|&child| child < owner);
+                [parent, 1 + place as u32]
+            }
+            None => [owner, 0],
+        }
+    }
+}
+
+/// The next update of an MT that grows: the insertion of a vertex into a mesh with all updates so far.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Insertion<'a> {
+    pub position: [i32; 3],
+    pub levels: &'a [i32],
+    /// The slots of the tetrahedra that give way.
+    pub removed: &'a [u32],
+    /// Slot and face of those of their faces on the boundary that are given up.
+    pub given_up: &'a [[u32; 2]],
+    pub errors: &'a [ErrorCode],
+}
+
+impl VertexMt {
+    /// An MT without updates that grows by [`VertexMt::insert_into`]. `base` must fit `info`.
+    ///
+    /// # Errors
+    /// If the base mesh has too many tetrahedra.
+    pub(crate) fn growing(info: MtInfo, base: BaseMesh, always_grows: bool) -> Result<Self, UpdateError> {
+        let removers = vec![NONE; base.tets.len()];
+        let complete = info.updates == 0;
+        let mut mt = Self::new(info, base, removers, 0, always_grows)?;
+        mt.growing = (!complete).then(Box::default);
+        Ok(mt)
+    }
+
+    /// Adds the next update and applies it to `mesh`, which has all updates so far and started from this MT.
+    ///
+    /// # Errors
+    /// If the update is not the insertion of a vertex into this mesh, or larger than a node can hold. Neither the MT nor the mesh
+    /// can be used any further then.
+    pub(crate) fn insert_into(
+        &mut self,
+        mesh: &mut CurrentMesh,
+        glue: &mut Glue,
+        new: &Insertion<'_>,
+    ) -> Result<UpdateId, UpdateError> {
+        let update = self.updates();
+        let torn = UpdateError::Cavity { update };
+        if self.growing.is_none() || update >= self.info.updates || new.removed.len() > MAX_REMOVED {
+            return Err(torn);
+        }
+        if !self.info.holds(new.position, new.levels) {
+            return Err(UpdateError::OffLattice { update });
+        }
+        let creators = self.take_away(mesh, new).ok_or(torn.clone())?;
+        let canonical = canonical(mesh, update, new).ok_or(torn.clone())?;
+        let mut bits = Bits::default();
+        new.position.iter().for_each(|&x| bits.push(x as u64, self.widths.position));
+        for (&level, field) in new.levels.iter().zip(&self.info.fields) {
+            bits.push(level as u64, field.bits);
+        }
+        let on_boundary = write_given_up(&mut bits, &canonical).ok_or(torn.clone())?;
+        write_removed(glue, &mut bits, &canonical, on_boundary).ok_or(torn.clone())?;
+        self.add_node(&bits, new.errors)?;
+        self.note_parents(update, &creators, canonical.walls.len());
+        match self.refine(mesh, UpdateId(update))? {
+            Applied::Done => {}
+            Applied::Blocked(_) => return Err(torn),
+        }
+        if self.updates() == self.info.updates {
+            self.pack()?;
+        }
+        Ok(UpdateId(update))
+    }
+
+    /// Marks the removed tetrahedra as such. Tells for each which update created it, and its place among what that one created, or in the
+    /// base mesh. None if one of them was removed before.
+    fn take_away(&self, mesh: &mut CurrentMesh, new: &Insertion<'_>) -> Option<Vec<(Option<u32>, u32)>> {
+        let update = self.updates();
+        let take = |&t: &u32| {
+            mesh.tet(t)?;
+            let tag = mesh.tag(t);
+            if tag < FIRST_ANONYMOUS_TAG || tag == NONE {
+                return None;
+            }
+            let creator = self.creator(mesh, t).map(|u| u.0);
+            mesh.set_tag(t, update);
+            Some((creator, tag & !FIRST_ANONYMOUS_TAG))
+        };
+        new.removed.iter().map(take).collect()
+    }
+
+    /// Lists update `u` with its parents, given what it removes; and makes room for what will remove the `inserted`
+    /// tetrahedra of its star.
+    fn note_parents(&mut self, u: u32, creators: &[(Option<u32>, u32)], inserted: usize) {
+        let Some(growing) = &mut self.growing else { return };
+        let first = growing.parents.len();
+        for &(creator, place) in creators {
+            let Some(parent) = creator else {
+                self.base_removers[place as usize] = u;
+                continue;
+            };
+            let children = &mut growing.children[parent as usize];
+            if children.last() != Some(&u) {
+                children.push(u);
+                growing.parents.push(parent);
+            }
+            let child = children.len() as u8;
+            let at = growing.removers_start(parent) + place as usize;
+            growing.removers[at] = child;
+        }
+        growing.parents[first..].sort_unstable();
+        growing.parents_end.push(growing.parents.len() as u32);
+        growing.children.push(Vec::new());
+        growing.removers.resize(growing.removers.len() + inserted, 0);
+        growing.removers_end.push(growing.removers.len() as u64);
+    }
+
+    /// Adds the bits of a node without links and removers.
+    fn add_node(&mut self, bits: &Bits, errors: &[ErrorCode]) -> Result<(), UpdateError> {
+        let before = self.nodes.len();
+        self.store(bits, errors)?;
+        let padding = self.nodes.len() - before - bits.len();
+        if let Some(growing) = &mut self.growing {
+            growing.padding.push(padding as u8);
+        }
+        Ok(())
+    }
+
+    /// Moves links and removers into the nodes, once all updates are here.
+    fn pack(&mut self) -> Result<(), UpdateError> {
+        let Some(growing) = self.growing.take() else { return Ok(()) };
+        let most_children = growing.children.iter().map(Vec::len).max().unwrap_or(0) as u32;
+        let (base, removers) = (std::mem::take(&mut self.base), std::mem::take(&mut self.base_removers));
+        let mut packed = Self::new(self.info.clone(), base, removers, most_children, self.always_grows)?;
+        for u in 0..self.updates() {
+            let node = self.packed_node(&growing, &packed, u);
+            packed.push(&node, self.errors_of(UpdateId(u)))?;
+        }
+        *self = packed;
+        Ok(())
+    }
+
+    fn packed_node(&self, growing: &Growing, packed: &Self, u: u32) -> NodeBits {
+        let mut bits = Bits::default();
+        let start = self.node_start(u);
+        let end = self.node_end(u) - u64::from(growing.padding[u as usize]);
+        let vertex_end = start + u64::from(self.widths.vertex);
+        bits.copy(&self.nodes, start, vertex_end);
+        let (widths, children) = (packed.widths, growing.children(u));
+        bits.push(children.len() as u64, widths.link);
+        let of_children = children.iter().map(|&child| {
+            let at = growing.parents(child).partition_point(|&parent| parent < u);
+            growing.next_in_loop(child, at + 1)
+        });
+        for [node, link] in std::iter::once(growing.next_in_loop(u, 0)).chain(of_children) {
+            bits.push(u64::from(node), widths.node);
+            bits.push(u64::from(link), widths.link);
+        }
+        let code = self.code_start(vertex_end);
+        bits.copy(&self.nodes, vertex_end, code);
+        let width = width_of(children.len() as u32);
+        growing.removers(u).iter().for_each(|&child| bits.push(u64::from(child), width));
+        bits.copy(&self.nodes, code, end);
+        NodeBits(bits)
+    }
+}
+
+/// The insertion in canonical numbers; the removed tetrahedra have the tag `update`. None if it is too large.
+fn canonical(mesh: &CurrentMesh, update: u32, new: &Insertion<'_>) -> Option<Canonical> {
+    let label = |slot: u32| mesh.vertex(slot).0;
+    let mut walls: Vec<([u32; 3], [u32; 3])> = Vec::new();
+    let mut bare = Vec::new();
+    for &t in new.removed {
+        let tet = mesh.tets()[t as usize];
+        for (k, n) in (0..).zip(mesh.neighbors()[t as usize]) {
+            if n != NONE && mesh.tag(n) == update {
+                continue;
+            }
+            let face = FACES[k as usize].map(|k| label(tet[k]));
+            let mut sorted = face;
+            sorted.sort_unstable();
+            let given_up = n == NONE && new.given_up.contains(&[t, k]);
+            if n == NONE {
+                bare.push((sorted, given_up));
+            }
+            if !given_up {
+                walls.push((sorted, face));
+            }
+        }
+    }
+    bare.sort_unstable();
+    if new.given_up.is_empty() {
+        bare.clear();
+    }
+    walls.sort_unstable();
+    let mut link: Vec<u32> = walls.iter().flat_map(|(face, _)| *face).collect();
+    link.sort_unstable();
+    link.dedup();
+    if walls.len() > MAX_INSERTED || link.len() > MAX_AROUND {
+        return None;
+    }
+    let number = |v: u32| link.binary_search(&v).ok().map(|place| place as u8);
+    let mut removed = Vec::with_capacity(new.removed.len());
+    for &t in new.removed {
+        let [a, b, c, d] = mesh.tets()[t as usize].map(label);
+        removed.push([number(a)?, number(b)?, number(c)?, number(d)?]);
+    }
+    let walls = walls.iter().map(|(_, face)| (turned(face.map(|v| number(v).unwrap_or(0))), NONE)).collect();
+    Some(Canonical { link, walls, removed, bare })
+}
