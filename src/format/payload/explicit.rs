@@ -25,7 +25,7 @@ pub fn least_update_bytes() -> u64 {
 }
 
 /// Bytes that an update takes in memory, at most.
-fn bytes_of(vertices: usize, fields: usize, removed: usize, inserted: usize) -> u64 {
+pub fn bytes_of(vertices: usize, fields: usize, removed: usize, inserted: usize) -> u64 {
     let vertex = 12 + 4 * fields;
     // What is removed names a parent each, at most.
     (18 + vertices * vertex + 8 * removed + 20 * inserted) as u64
@@ -80,7 +80,7 @@ fn write_inserted(out: &mut Vec<u8>, mt: &ExplicitMt, u: UpdateId) {
 }
 
 /// The vertices that an update can use: those of what it removes, and those that appear with it; ascending.
-fn at_hand(mt: &ExplicitMt, removed: &[u32], created: Range<u32>) -> Vec<u32> {
+pub fn at_hand(mt: &ExplicitMt, removed: &[u32], created: Range<u32>) -> Vec<u32> {
     let mut vertices: Vec<u32> = removed.iter().flat_map(|&t| mt.tets()[t as usize]).collect();
     vertices.sort_unstable();
     vertices.dedup();

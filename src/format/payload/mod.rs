@@ -7,6 +7,7 @@ pub mod exact;
 mod explicit;
 pub mod index;
 mod insertions;
+mod spelled;
 mod vertex;
 
 use super::EncodeError;

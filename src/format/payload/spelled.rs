@@ -1,0 +1,204 @@
+//! Updates that are spelled out, coded: numbers with a context for each kind of number.
+
+use super::check_bytes;
+use super::explicit::at_hand;
+use super::explicit::bytes_of;
+use super::insertions;
+use super::largest;
+use crate::format::FormatError;
+use crate::format::Limits;
+use crate::format::coder::Family;
+use crate::format::coder::Put;
+use crate::format::coder::Source;
+use crate::mt::ErrorCode;
+use crate::mt::ExplicitMt;
+use crate::mt::ExplicitUpdate;
+use crate::mt::UpdateId;
+use crate::mt::VertexId;
+
+/// By how many codes an error is below the one before.
+const ERROR: Family = insertions::LAST.numbers_after(1, 2);
+/// How many vertices are created; how many tetrahedra removed; how many inserted.
+const COUNT: Family = ERROR.numbers_after(3, 3);
+/// A coordinate less that of the vertex before, by axis.
+const STEP: Family = COUNT.numbers_after(3, 1);
+/// A level less that of the vertex before.
+const LEVEL: Family = STEP.numbers_after(1, 1);
+/// How far below the one before, or the newest one, a removed tetrahedron is.
+const REMOVED: Family = LEVEL.numbers_after(2, 2);
+/// Steps between the corners of inserted tetrahedra.
+const CORNER: Family = REMOVED.numbers_after(4, 4);
+/// The last family of updates that are spelled out.
+pub const LAST: Family = CORNER;
+
+/// Puts the updates `first .. end`.
+pub fn put(out: &mut impl Put, mt: &ExplicitMt, first: u32, end: u32) {
+    let mut errors = vec![ErrorCode::MAX; mt.fields()];
+    let (mut position, mut levels) = ([0; 3], vec![0; mt.fields()]);
+    for u in (first..end).map(UpdateId) {
+        for (before, &error) in errors.iter_mut().zip(mt.errors(u)) {
+            out.number(ERROR, 0, u32::from(before.0.wrapping_sub(error.0)));
+            *before = error;
+        }
+        let created = mt.created(u);
+        out.number(COUNT, 0, created.len() as u32);
+        for v in created.map(VertexId) {
+            for (k, (before, x)) in (0..).zip(position.iter_mut().zip(mt.position(v))) {
+                out.signed(STEP, k, x.wrapping_sub(*before));
+                *before = x;
+            }
+            for (before, &level) in levels.iter_mut().zip(mt.levels(v)) {
+                out.signed(LEVEL, 0, level.wrapping_sub(*before));
+                *before = level;
+            }
+        }
+        put_removed(out, mt, u);
+        put_inserted(out, mt, u);
+    }
+}
+
+/// Backwards from the newest; the MT has checked that they are there, and sorted them.
+fn put_removed(out: &mut impl Put, mt: &ExplicitMt, u: UpdateId) {
+    out.number(COUNT, 1, mt.removed(u).len() as u32);
+    let newest = mt.inserted(u).start;
+    let mut above = newest;
+    for &t in mt.removed(u).iter().rev() {
+        out.number(REMOVED, u32::from(above < newest), above - 1 - t);
+        above = t;
+    }
+}
+
+/// Corners are told by their places among the vertices at hand, which ascend. The first two corners of a tetrahedron
+/// ascend, too, and are the lowest; so do the tetrahedra.
+fn put_inserted(out: &mut impl Put, mt: &ExplicitMt, u: UpdateId) {
+    let range = mt.inserted(u);
+    let vertices = at_hand(mt, mt.removed(u), mt.created(u));
+    out.number(COUNT, 2, range.len() as u32);
+    let mut last = 0;
+    for tet in &mt.tets()[range.start as usize..range.end as usize] {
+        // The MT has checked that they are at hand.
+        let [a, b, c, d] = tet.map(|v| vertices.partition_point(|&other| other < v));
+        for (k, step) in (0..).zip([a - last, b - a, c - b, d - b]) {
+            out.number(CORNER, k, step as u32);
+        }
+        last = a;
+    }
+}
+
+/// What has been read of an update; reused from one to the next.
+struct Parts {
+    positions: Vec<[i32; 3]>,
+    levels: Vec<i32>,
+    removed: Vec<u32>,
+    inserted: Vec<[u32; 4]>,
+    errors: Vec<ErrorCode>,
+    /// The last vertex of the update before.
+    position: [i32; 3],
+    level: Vec<i32>,
+}
+
+/// Reads `count` updates into the MT.
+pub fn read(
+    source: &mut Source<'_>,
+    mt: &mut ExplicitMt,
+    count: u32,
+    limits: &Limits,
+) -> Result<(), FormatError> {
+    let mut parts = Parts {
+        positions: Vec::new(),
+        levels: Vec::new(),
+        removed: Vec::new(),
+        inserted: Vec::new(),
+        errors: vec![ErrorCode::MAX; mt.fields()],
+        position: [0; 3],
+        level: vec![0; mt.fields()],
+    };
+    for _ in 0..count {
+        parts.read(source, mt, limits)?;
+        let Parts { positions, levels, removed, inserted, errors, .. } = &parts;
+        mt.push(&ExplicitUpdate { positions, levels, removed, inserted, errors })?;
+    }
+    mt.set_to_come(largest(&parts.errors));
+    Ok(())
+}
+
+impl Parts {
+    /// Reads an update. Symbols may take no bits, so what the counts make of it is held within the limits.
+    fn read(&mut self, source: &mut Source<'_>, mt: &ExplicitMt, limits: &Limits) -> Result<(), FormatError> {
+        for error in &mut self.errors {
+            let fall = u16::try_from(source.number(ERROR, 0)?);
+            let fall = fall.map_err(|_| source.corrupt("an error is out of its range"))?;
+            error.0 = error.0.wrapping_sub(fall);
+        }
+        let fits = |vertices: u32, removed: u32, inserted: u32| {
+            let [vertices, removed, inserted] = [vertices, removed, inserted].map(|count| count as usize);
+            check_bytes(mt.held_bytes() + bytes_of(vertices, mt.fields(), removed, inserted), limits)
+        };
+        let created = source.number(COUNT, 0)?;
+        fits(created, 0, 0)?;
+        self.read_created(source, created)?;
+        let removed = source.number(COUNT, 1)?;
+        fits(created, removed, 0)?;
+        self.read_removed(source, removed, mt.tets().len() as u32)?;
+        let first = mt.vertices();
+        let Some(end) = first.checked_add(created) else {
+            return Err(source.corrupt("there are more vertices than 32 bits can number"));
+        };
+        let vertices = at_hand(mt, &self.removed, first..end);
+        let inserted = source.number(COUNT, 2)?;
+        fits(created, removed, inserted)?;
+        self.read_inserted(source, inserted, &vertices)
+    }
+
+    fn read_created(&mut self, source: &mut Source<'_>, count: u32) -> Result<(), FormatError> {
+        self.positions.clear();
+        self.levels.clear();
+        for _ in 0..count {
+            for (k, x) in (0..).zip(&mut self.position) {
+                *x = x.wrapping_add(source.signed(STEP, k)?);
+            }
+            self.positions.push(self.position);
+            for level in &mut self.level {
+                *level = level.wrapping_add(source.signed(LEVEL, 0)?);
+            }
+            self.levels.extend_from_slice(&self.level);
+        }
+        Ok(())
+    }
+
+    fn read_removed(&mut self, source: &mut Source<'_>, count: u32, newest: u32) -> Result<(), FormatError> {
+        self.removed.clear();
+        let mut above = newest;
+        for _ in 0..count {
+            let distance = source.number(REMOVED, u32::from(above < newest))?;
+            let t = above.checked_sub(1).and_then(|newest| newest.checked_sub(distance));
+            above = t.ok_or_else(|| source.corrupt("an update removes a tetrahedron that is not there"))?;
+            self.removed.push(above);
+        }
+        Ok(())
+    }
+
+    fn read_inserted(
+        &mut self,
+        source: &mut Source<'_>,
+        count: u32,
+        vertices: &[u32],
+    ) -> Result<(), FormatError> {
+        self.inserted.clear();
+        let mut last = 0;
+        for _ in 0..count {
+            let mut next = |corner: u32, from: usize| {
+                let place = from.saturating_add(source.number(CORNER, corner)? as usize);
+                let unknown = "an update uses a vertex that is neither new nor of what it removes";
+                let vertex = vertices.get(place).copied();
+                vertex.map(|v| (place, v)).ok_or_else(|| source.corrupt(unknown))
+            };
+            let (first, a) = next(0, last)?;
+            let (second, b) = next(1, first)?;
+            let [(_, c), (_, d)] = [next(2, second)?, next(3, second)?];
+            self.inserted.push([a, b, c, d]);
+            last = first;
+        }
+        Ok(())
+    }
+}
