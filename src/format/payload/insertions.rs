@@ -666,7 +666,7 @@ impl State {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::format::coder::Counts;
     use crate::format::coder::Models;
@@ -700,7 +700,7 @@ mod tests {
     }
 
     /// A grid with points inserted into it by the Delaunay criterion, some of them on its sides and edges.
-    fn delaunay(points: u32) -> VertexMt {
+    pub fn delaunay(points: u32) -> VertexMt {
         let side = |i: u32| [i % 3, i / 3 % 3, i / 9].map(|k| 32 * k as i32);
         let mut positions: Vec<[i32; 3]> = (0..27).map(side).collect();
         let levels = |positions: &[[i32; 3]]| -> Vec<i32> {

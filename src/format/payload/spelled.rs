@@ -202,3 +202,70 @@ impl Parts {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::insertions::tests::delaunay;
+    use super::*;
+    use crate::format::coder::Counts;
+    use crate::format::coder::Models;
+    use crate::format::coder::Writer;
+    use crate::format::read::Reader;
+    use crate::mt::MtInfo;
+    use crate::mt::MtKind;
+
+    fn sample() -> ExplicitMt {
+        let mt = ExplicitMt::of(&delaunay(80)).unwrap();
+        assert_eq!(mt.info().kind, MtKind::Explicit);
+        mt
+    }
+
+    fn coded(mt: &ExplicitMt) -> (Models, [Vec<u8>; 2]) {
+        let mut counts = Counts::default();
+        put(&mut counts, mt, 0, 60);
+        put(&mut counts, mt, 60, mt.updates());
+        let models = Models::new(&counts);
+        let blocks = [(0, 60), (60, mt.updates())].map(|(first, end)| {
+            let mut writer = Writer::new(&models);
+            put(&mut writer, mt, first, end);
+            let mut block = Vec::new();
+            writer.finish(&mut block);
+            block
+        });
+        (models, blocks)
+    }
+
+    fn decoded(
+        models: &Models,
+        blocks: &[Vec<u8>],
+        mt: &ExplicitMt,
+        limits: Limits,
+    ) -> Result<ExplicitMt, FormatError> {
+        let mut new = ExplicitMt::new(MtInfo::clone(mt.info()), mt.base_mesh().clone());
+        for block in blocks {
+            let mut source = Source::new(Reader::new(block, 0), models)?;
+            let count = 60.min(mt.updates() - new.updates());
+            read(&mut source, &mut new, count, &limits)?;
+            source.end()?;
+        }
+        Ok(new)
+    }
+
+    #[test]
+    fn all_comes_back_and_damage_does_no_harm() {
+        let mt = sample();
+        let (models, blocks) = coded(&mt);
+        assert!(decoded(&models, &blocks, &mt, Limits::default()).as_ref() == Ok(&mt));
+        for cut in 0..blocks[0].len() {
+            assert!(decoded(&models, &[blocks[0][..cut].to_vec()], &mt, Limits::default()).is_err());
+        }
+        for bit in 0..8 * blocks[0].len() {
+            let mut damaged = blocks.clone();
+            damaged[0][bit / 8] ^= 1 << (bit % 8);
+            assert!(decoded(&models, &damaged, &mt, Limits::default()).as_ref() != Ok(&mt));
+        }
+        let limits = Limits { memory_bytes: mt.held_bytes() / 2, ..Limits::default() };
+        let refused = decoded(&models, &blocks, &mt, limits);
+        assert!(matches!(refused, Err(FormatError::Limit { .. })));
+    }
+}
