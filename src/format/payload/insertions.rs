@@ -13,6 +13,7 @@ use crate::format::Limits;
 use crate::format::coder::Family;
 use crate::format::coder::Put;
 use crate::format::coder::Source;
+use crate::geom::NARROW_BITS;
 use crate::geom::insphere;
 use crate::geom::orient3d;
 use crate::mesh::FACES;
@@ -70,6 +71,8 @@ pub struct State {
     grain: [i32; 3],
     /// Errors of the update before.
     errors: Vec<ErrorCode>,
+    /// Whether orientations fit 64 bits.
+    narrow: bool,
     glue: Box<Glue>,
     /// The tetrahedra around the near vertex.
     star: Vec<u32>,
@@ -390,6 +393,15 @@ fn read_levels(
     Ok(levels)
 }
 
+/// How a point and a tetrahedron lie to each other.
+#[derive(Clone, Copy)]
+struct View {
+    /// Whether the point is on the inner side of each face.
+    seen: [bool; 4],
+    /// Where the point is with respect to the sphere: 1 inside, -1 outside, 0 on it.
+    sphere: i32,
+}
+
 /// The tetrahedron whose levels the new vertex is compared with.
 struct Home {
     tet: [u32; 4],
@@ -413,6 +425,7 @@ impl State {
             mesh: mt.start()?,
             grain,
             errors: vec![ErrorCode::MAX; mt.info().fields.len()],
+            narrow: mt.info().lattice.bits <= NARROW_BITS,
             glue: Box::default(),
             star: Vec::new(),
             link: Vec::new(),
@@ -491,14 +504,24 @@ impl State {
         })
     }
 
-    fn corners(&self, face: [u32; 3]) -> [[i32; 3]; 3] {
-        face.map(|v| self.mesh.positions()[v as usize])
+    /// Six times the volume between a point and face `k` of a tetrahedron, rounded; its sign, positive on the side of the tetrahedron,
+    /// is exact.
+    fn inward(&self, tet: [u32; 4], k: usize, position: [i32; 3]) -> f64 {
+        let [a, b, c] = FACES[k].map(|i| self.mesh.positions()[tet[i] as usize]);
+        if !self.narrow {
+            return -orient3d(a, b, c, position) as f64;
+        }
+        // Components up to 2^20 make minors up to 2^41 and a sum of three products up to 3 · 2^61 < 2^63.
+        let [u, v, w] = [a, b, c].map(|p| [0, 1, 2].map(|i| i64::from(p[i] - position[i])));
+        let volume = (u[1] * v[2] - u[2] * v[1]) * w[0]
+            + (u[2] * v[0] - u[0] * v[2]) * w[1]
+            + (u[0] * v[1] - u[1] * v[0]) * w[2];
+        volume as f64
     }
 
-    /// Whether the tetrahedron is on the inner side of its face `k` as seen from `position`; what lies in the plane is not.
+    /// Whether the point lies on the inner side of face `k` of a tetrahedron, not in its plane.
     fn sees(&self, tet: [u32; 4], k: usize, position: [i32; 3]) -> bool {
-        let [a, b, c] = self.corners(FACES[k].map(|i| tet[i]));
-        orient3d(a, b, c, position) < 0
+        self.inward(tet, k, position) > 0.0
     }
 
     fn sorted(&self, t: u32) -> [u32; 4] {
@@ -511,10 +534,7 @@ impl State {
     fn cone(&self, near: u32, position: [i32; 3]) -> Vec<u32> {
         let is_towards = |&t: &u32| {
             let tet = self.mesh.tets()[t as usize];
-            (0..4).filter(|&k| tet[k] != near).all(|k| {
-                let [a, b, c] = self.corners(FACES[k].map(|i| tet[i]));
-                orient3d(a, b, c, position) <= 0
-            })
+            (0..4).filter(|&k| tet[k] != near).all(|k| self.inward(tet, k, position) >= 0.0)
         };
         let mut cone: Vec<u32> = self.star.iter().copied().filter(is_towards).collect();
         cone.sort_unstable_by_key(|&t| self.sorted(t));
@@ -541,11 +561,12 @@ impl State {
         self.removed.clear();
         self.removed.push(seed);
         self.tet_marks[seed as usize] = yes;
+        let mut views = vec![self.view(seed, position)];
         let mut next = 0;
         while let Some(&t) = self.removed.get(next).filter(|_| self.removed.len() <= MAX_REMOVED) {
+            let view = views[next];
             next += 1;
             let tet = self.mesh.tets()[t as usize];
-            let is_near = u32::from(self.sphere(tet, position) > 0);
             let mut order = [0, 1, 2, 3];
             order.sort_unstable_by_key(|&k| tet[k]);
             for k in order {
@@ -554,11 +575,13 @@ impl State {
                 if mark == yes || mark == no || !self.may_have(n, fan, position) {
                     continue;
                 }
-                let is_removed =
-                    !self.sees(tet, k, position) || decide(n, 2 * self.grow_context(n, position) + is_near)?;
+                let beyond = self.view(n, position);
+                let context = 2 * self.grow_context(n, beyond) + u32::from(view.sphere > 0);
+                let is_removed = !view.seen[k] || decide(n, context)?;
                 self.tet_marks[n as usize] = if is_removed { yes } else { no };
                 if is_removed {
                     self.removed.push(n);
+                    views.push(beyond);
                 }
             }
         }
@@ -574,24 +597,26 @@ impl State {
         self.mesh.neighbors()[t as usize][k] == NONE || self.sees(tet, k, position)
     }
 
-    /// Where a point lies with respect to the sphere of a tetrahedron: 1 inside.
-    fn sphere(&self, tet: [u32; 4], position: [i32; 3]) -> i32 {
+    fn view(&self, t: u32, position: [i32; 3]) -> View {
+        let tet = self.mesh.tets()[t as usize];
         let [a, b, c, d] = tet.map(|v| self.mesh.positions()[v as usize]);
-        insphere(a, b, c, d, position)
+        View {
+            seen: [0, 1, 2, 3].map(|k| self.sees(tet, k, position)),
+            sphere: insphere(a, b, c, d, position),
+        }
     }
 
     /// Half the context of whether a tetrahedron is removed: 0 to 53.
-    fn grow_context(&self, t: u32, position: [i32; 3]) -> u32 {
+    fn grow_context(&self, t: u32, view: View) -> u32 {
         let [yes, no] = [self.epoch + 1, self.epoch + 2];
-        let tet = self.mesh.tets()[t as usize];
         let around = self.mesh.neighbors()[t as usize];
         let marked = |mark: u32| {
             around.iter().filter(|&&n| self.tet_marks.get(n as usize) == Some(&mark)).count() as u32
         };
-        let hidden = (0..4).filter(|&k| !self.sees(tet, k, position)).count() as u32;
-        let sphere = (self.sphere(tet, position) + 1) as u32;
+        let hidden = view.seen.iter().filter(|seen| !**seen).count() as u32;
         let known = marked(yes).clamp(1, 3) - 1;
-        ((sphere * 3 + known) * 3 + hidden.min(3).saturating_sub(1)) * 2 + marked(no).min(1)
+        let shape = (view.sphere + 1) as u32 * 3 + known;
+        (shape * 3 + hidden.clamp(1, 3) - 1) * 2 + marked(no).min(1)
     }
 
     /// Finds the faces on the boundary that are given up: those that the new vertex does not see, and such as `decide` says, given
@@ -629,10 +654,7 @@ impl State {
         let mut most = f64::NEG_INFINITY;
         for &t in &self.removed {
             let tet = self.mesh.tets()[t as usize];
-            let weights = [0, 1, 2, 3].map(|k| {
-                let [a, b, c] = self.corners(FACES[k].map(|i| tet[i]));
-                -(orient3d(a, b, c, position) as f64)
-            });
+            let weights = [0, 1, 2, 3].map(|k| self.inward(tet, k, position));
             let whole: f64 = weights.iter().sum();
             let weights = weights.map(|weight| weight / whole);
             let least = weights.iter().fold(f64::INFINITY, |least, &weight| least.min(weight));
