@@ -223,11 +223,6 @@ impl Models {
         )
     }
 
-    /// Bytes in memory.
-    pub fn bytes(&self) -> u64 {
-        self.0.iter().map(|table| (4 * table.symbols.len() + 2 * table.guides.len()) as u64).sum()
-    }
-
     /// Appends the tables: for each context how many symbols it has, then each symbol as the distance from the one before, and
     /// its share but for the last one.
     pub fn write(&self, out: &mut Vec<u8>) {

@@ -16,6 +16,7 @@ use super::header::parse_header;
 use super::payload;
 use super::payload::BaseParts;
 use super::payload::Metadata;
+use super::payload::State;
 use super::payload::edge;
 use super::payload::edge::FieldPart;
 use super::payload::edge::Splits;
@@ -99,6 +100,8 @@ pub struct Decoder {
     metadata: Metadata,
     head: FileHead,
     mt: Option<Mt>,
+    /// For a vertex-based MT, what its updates are read with.
+    state: Option<State>,
     /// The number of the block that comes next.
     next_block: u32,
     block: Option<OpenBlock>,
@@ -203,6 +206,7 @@ impl Decoder {
             metadata: Metadata::new(),
             head: FileHead::default(),
             mt: None,
+            state: None,
             next_block: 0,
             block: None,
             exact: Vec::new(),
@@ -545,10 +549,10 @@ impl Decoder {
     }
 
     fn open_models(&mut self, content: Reader<'_>) -> Result<(), FormatError> {
-        let FileHead { index: Some(_), models: models @ None, .. } = &mut self.head else {
+        let FileHead { info: Some(info), index: Some(_), models: models @ None, .. } = &mut self.head else {
             return Err(content.corrupt("a section is out of place"));
         };
-        *models = Some(Models::read(content, &payload::families())?);
+        *models = Some(Models::read(content, &payload::families(info.kind))?);
         Ok(())
     }
 
@@ -581,7 +585,8 @@ impl Decoder {
         if self.head.base.as_ref().is_some_and(|base| base.fields() == self.head.wanted.len()) {
             let bits = self.head.index.as_ref().map_or(0, |index| index.block_bits);
             if let (Some(base), Some(info)) = (self.head.base.take(), self.head.wanted_info()) {
-                self.mt = Some(base.start(info, bits)?);
+                let (mt, state) = base.start(info, bits)?;
+                (self.mt, self.state) = (Some(mt), state);
             }
         }
         Ok(())
@@ -688,7 +693,11 @@ impl Decoder {
         match &mut self.mt {
             Some(mt) if kind == payload::section_of(mt.info().kind) => {
                 self.next_block += 1;
-                payload::read_columns(content, mt, updates.len() as u32, &self.options.limits)
+                let Some(models) = &self.head.models else { return Ok(()) };
+                let mut source = Source::new(content, models)?;
+                let count = updates.len() as u32;
+                payload::read_updates(&mut source, mt, count, self.state.as_mut(), &self.options.limits)?;
+                source.end()
             }
             _ => Err(content.corrupt("a section is out of place")),
         }
@@ -711,6 +720,7 @@ impl Decoder {
             return Err(self.corrupt("the file is shorter than its header tells"));
         }
         self.stage = Stage::End;
+        self.state = None;
         Ok(())
     }
 }

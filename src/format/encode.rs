@@ -12,6 +12,7 @@ use super::header::Head;
 use super::header::Kind;
 use super::header::header;
 use super::payload;
+use super::payload::State;
 use super::payload::Totals;
 use super::payload::edge;
 use super::payload::exact::Corrections;
@@ -219,7 +220,7 @@ fn sections(
 ) -> Result<Vec<Section>, EncodeError> {
     let fields = mt.info().fields.len();
     let mut counts = Counts::default();
-    put_all(&mut counts, mt, index.block_bits);
+    put_all(&mut counts, mt, index.block_bits)?;
     exact.iter().for_each(|(_, corrections)| corrections.put(&mut counts));
     let models = Models::new(&counts);
     let mut shared = Vec::new();
@@ -239,9 +240,10 @@ fn sections(
     }
     index.shared = shared.iter().map(Section::len).sum();
     let mut blocks = Vec::new();
+    let mut state = payload::start_state(mt).map_err(EncodeError::Base)?;
     for block in 0..index.blocks.len() {
         let before = blocks.len();
-        put_block(mt, block as u32, index, &models, &mut blocks)?;
+        put_block(mt, block as u32, index, &models, state.as_mut(), &mut blocks)?;
         index.blocks[block].lengths = blocks[before..].iter().map(|section| section.len() as u32).collect();
     }
     for (field, corrections) in exact {
@@ -278,30 +280,38 @@ fn corrections(
 }
 
 /// Puts all that is coded of a file.
-fn put_all(out: &mut impl Put, mt: MtRef<'_>, block_bits: u32) {
+fn put_all(out: &mut impl Put, mt: MtRef<'_>, block_bits: u32) -> Result<(), EncodeError> {
     payload::put_base(out, mt);
     let fields = mt.info().fields.len();
     (0..fields).for_each(|field| payload::put_base_field(out, mt, field));
-    if let MtRef::Edge(mt) = mt {
-        let mut first = 0;
-        while first < mt.updates() {
-            let end = mt.updates().min(first + (1 << block_bits));
+    let mut state = payload::start_state(mt).map_err(EncodeError::Base)?;
+    let mut first = 0;
+    while first < mt.updates() {
+        let end = mt.updates().min(first + (1 << block_bits));
+        if let MtRef::Edge(mt) = mt {
             edge::put(out, mt, first, end);
             (0..fields).for_each(|f| edge::put_field(out, mt, first, end, f));
-            first = end;
+        } else {
+            payload::put_updates(out, mt, first..end, state.as_mut()).map_err(EncodeError::Update)?;
         }
+        first = end;
     }
+    Ok(())
 }
 
-/// What the coded bytes of the file of an MT tell, part by part: names and bytes. Only for MTs that came from a file.
-pub fn breakdown(mt: MtRef<'_>, block_bits: u32) -> Vec<(&'static str, f64)> {
+/// What the coded bytes of the file of an MT tell, part by part: names and bytes. Only for MTs that came from a file; exact
+/// values are not among them.
+///
+/// # Errors
+/// If the MT is damaged.
+pub fn breakdown(mt: MtRef<'_>, block_bits: u32) -> Result<Vec<(&'static str, f64)>, EncodeError> {
     let mut counts = Counts::default();
-    put_all(&mut counts, mt, block_bits);
+    put_all(&mut counts, mt, block_bits)?;
     let models = Models::new(&counts);
     let mut measure = Measure::new(&models);
-    put_all(&mut measure, mt, block_bits);
+    put_all(&mut measure, mt, block_bits)?;
     let mut parts: Vec<(&'static str, f64)> = Vec::new();
-    for (name, family) in payload::parts() {
+    for (name, family) in payload::parts(mt.info().kind) {
         let bytes = measure.bits_of(family) / 8.0;
         match parts.iter_mut().find(|(known, _)| *known == name) {
             Some((_, sum)) => *sum += bytes,
@@ -311,7 +321,7 @@ pub fn breakdown(mt: MtRef<'_>, block_bits: u32) -> Vec<(&'static str, f64)> {
     let mut tables = Vec::new();
     models.write(&mut tables);
     parts.push(("tables", tables.len() as f64));
-    parts
+    Ok(parts)
 }
 
 /// Appends the sections of a block.
@@ -320,14 +330,17 @@ fn put_block(
     block: u32,
     index: &Index,
     models: &Models,
+    state: Option<&mut State>,
     sections: &mut Vec<Section>,
 ) -> Result<(), EncodeError> {
     let updates = index.updates(block, mt.updates());
     let MtRef::Edge(edge) = mt else {
-        let mut payload = Vec::new();
-        payload::write_columns(&mut payload, mt, block, updates);
-        sections.push(Section::new(payload::section_of(mt.info().kind), payload)?);
-        return Ok(());
+        let kind = payload::section_of(mt.info().kind);
+        let mut done = Ok(());
+        sections.push(Section::coded(kind, &[block], models, |out| {
+            done = payload::put_updates(out, mt, updates, state);
+        })?);
+        return done.map_err(EncodeError::Update);
     };
     sections.push(Section::coded(Kind::UPDT, &[block], models, |out| {
         edge::put(out, edge, updates.start, updates.end);

@@ -17,11 +17,6 @@ impl Bits {
         size_of_val(&self.words[..])
     }
 
-    pub fn clear(&mut self) {
-        self.words.clear();
-        self.len = 0;
-    }
-
     /// Appends the low `width` bits of `value`; `width` is at most 64.
     pub fn push(&mut self, value: u64, width: u32) {
         let value = value & low(width);

@@ -15,7 +15,7 @@ pub(super) type Face = [u8; 3];
 
 /// What lies across a face of a tetrahedron of T_u.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub(super) enum Across {
+pub(crate) enum Across {
     /// Nothing: the boundary of the domain.
     #[default]
     Nothing,
@@ -27,7 +27,7 @@ pub(super) enum Across {
 
 /// What the caller says of an open face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Close {
+pub(crate) enum Close {
     /// The fourth vertex of the tetrahedron behind it.
     With(u8),
     /// Another tetrahedron closes it, or nothing does.

@@ -96,32 +96,6 @@ const UNIT: u64 = 4;
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct NodeBits(pub(super) Bits);
 
-impl NodeBits {
-    /// Number of bits.
-    pub(crate) fn len(&self) -> u64 {
-        self.0.len()
-    }
-
-    /// Appends the low `width` bits of `value`, at most 64.
-    pub(crate) fn push(&mut self, value: u64, width: u32) {
-        self.0.push(value, width);
-    }
-
-    /// Appends all bits of another one.
-    pub(crate) fn extend(&mut self, other: &Self) {
-        self.0.extend(&other.0);
-    }
-
-    /// The `width` bits at `at`, at most 57; zeros beyond the end.
-    pub(crate) fn get(&self, at: u64, width: u32) -> u64 {
-        self.0.get(at, width)
-    }
-
-    pub(crate) fn clear(&mut self) {
-        self.0.clear();
-    }
-}
-
 impl VertexMt {
     /// An MT without updates. `base` must fit `info`: see [`BaseMesh::check`]. `base_removers` tells for each base
     /// tetrahedron which update removes it, [`u32::MAX`] if none does; `most_children` is the largest number of children

@@ -36,6 +36,19 @@ pub const ERROR: Family = WRONG.after(16, 256);
 /// What is wrong with the guess of a field's offset, by error.
 pub const LEVEL: Family = ERROR.numbers_after(128, 1);
 
+/// All families, with names for what they tell.
+pub const PARTS: [(&str, Family); 9] = [
+    ("partial order", GAP),
+    ("partial order", RUN),
+    ("partial order", CHILDREN),
+    ("partial order", RISE),
+    ("offsets", OFFSET),
+    ("masks", LAST_WRONG),
+    ("masks", WRONG),
+    ("errors", ERROR),
+    ("levels", LEVEL),
+];
+
 const WRONG_ROWS: u32 = 12;
 const WRONG_COLUMNS: u32 = 11;
 

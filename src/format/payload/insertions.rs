@@ -54,6 +54,19 @@ const LEVEL: Family = SHORT.numbers_after(40, 1);
 /// The last family of vertex insertions.
 pub const LAST: Family = LEVEL;
 
+/// All families, with names for what they tell.
+pub const PARTS: [(&str, Family); 9] = [
+    ("errors", ERROR),
+    ("partial order", FAN),
+    ("positions", OFFSET),
+    ("partial order", SEED),
+    ("partial order", GROW),
+    ("partial order", GIVEN_UP),
+    ("levels", FAR),
+    ("levels", SHORT),
+    ("levels", LEVEL),
+];
+
 /// The last [`SEED`]: none of them, its place is told.
 const ELSEWHERE: u32 = 8;
 
@@ -62,6 +75,24 @@ const MOST_AROUND: usize = 4096;
 
 /// [`OFFSET`] of a difference with as many bits as usual.
 const OFFSET_BIAS: u32 = 40;
+
+/// Bytes that every update takes in memory: a vertex, its own loop, the size of what it removes.
+pub fn least_update_bytes(info: &MtInfo) -> u64 {
+    let levels: u64 = info.fields.iter().map(|field| u64::from(field.bits)).sum();
+    (3 * u64::from(info.lattice.bits) + levels + 9) / 8 + 4
+}
+
+/// An insertion adds one vertex.
+pub fn check_counts(info: &MtInfo, base_vertices: u64) -> Result<(), BaseMeshError> {
+    let vertices = base_vertices + u64::from(info.updates);
+    if vertices != u64::from(info.vertices) {
+        return Err(BaseMeshError::Info("base vertices and updates do not add up to the reference vertices"));
+    }
+    if vertices >= u64::from(u32::MAX) {
+        return Err(BaseMeshError::Info("more vertices than 32 bits can number"));
+    }
+    Ok(())
+}
 
 /// What writer and reader know when they come to an update: kept from block to block.
 #[derive(Debug)]
@@ -94,12 +125,15 @@ pub fn put_head(out: &mut impl Put, mt: &VertexMt) {
     grain(mt).iter().for_each(|&x| out.bits(x as u32, 31));
 }
 
-/// Reads that, which makes an MT without updates.
-pub fn read_head(
-    source: &mut Source<'_>,
-    info: MtInfo,
-    base: BaseMesh,
-) -> Result<(VertexMt, State), FormatError> {
+/// What is to be known of all insertions.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Head {
+    always_grows: bool,
+    grain: [i32; 3],
+}
+
+/// Reads that.
+pub fn read_head(source: &mut Source<'_>) -> Result<Head, FormatError> {
     let always_grows = source.bits(1)? == 1;
     let mut grain = [0; 3];
     for x in &mut grain {
@@ -108,8 +142,13 @@ pub fn read_head(
     if grain.iter().any(|&x| x < 1) {
         return Err(source.corrupt("coordinates are multiples of nothing"));
     }
-    let mt = VertexMt::growing(info, base, always_grows)?;
-    let state = State::new(&mt, grain)?;
+    Ok(Head { always_grows, grain })
+}
+
+/// An MT without updates, and what to read its updates with.
+pub fn start(info: MtInfo, base: BaseMesh, head: Head) -> Result<(VertexMt, State), FormatError> {
+    let mt = VertexMt::growing(info, base, head.always_grows)?;
+    let state = State::new(&mt, head.grain)?;
     Ok((mt, state))
 }
 

@@ -4,11 +4,9 @@
 mod base;
 pub mod edge;
 pub mod exact;
-mod explicit;
 pub mod index;
 mod insertions;
 mod spelled;
-mod vertex;
 
 use super::EncodeError;
 use super::FormatError;
@@ -33,6 +31,8 @@ use crate::mt::Mt;
 use crate::mt::MtInfo;
 use crate::mt::MtKind;
 use crate::mt::MtRef;
+use crate::mt::UpdateError;
+pub use insertions::State;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -193,55 +193,21 @@ fn read_metadata(reader: &mut Reader<'_>) -> Result<Metadata, FormatError> {
     Ok(metadata)
 }
 
-/// Appends the differences between neighbouring numbers.
-fn write_deltas(out: &mut Vec<u8>, numbers: impl Iterator<Item = i32>) {
-    let mut last = 0_i32;
-    for number in numbers {
-        write::zigzag(out, number.wrapping_sub(last));
-        last = number;
-    }
+/// All families of contexts that files of a kind of MT may have, in the order of their contexts.
+pub fn families(kind: MtKind) -> Vec<Family> {
+    parts(kind).into_iter().map(|(_, family)| family).collect()
 }
 
-/// Appends a column of positions, each told as the difference to the one before.
-fn write_positions(out: &mut Vec<u8>, scratch: &mut Vec<u8>, positions: impl Iterator<Item = [i32; 3]>) {
-    write::column(out, scratch, |out| {
-        let mut last = [0_i32; 3];
-        for position in positions {
-            (0..3).for_each(|i| write::zigzag(out, position[i].wrapping_sub(last[i])));
-            last = position;
-        }
-    });
-}
-
-/// The next number of a column of differences; `last` is the one before.
-fn read_delta(reader: &mut Reader<'_>, last: &mut i32) -> Result<i32, FormatError> {
-    *last = last.wrapping_add(reader.zigzag()?);
-    Ok(*last)
-}
-
-/// All families of contexts that there are.
-pub fn families() -> Vec<Family> {
-    parts().into_iter().map(|(_, family)| family).collect()
-}
-
-/// All families, with a name for what they tell.
-pub fn parts() -> Vec<(&'static str, Family)> {
+/// The same, with a name for what each tells.
+pub fn parts(kind: MtKind) -> Vec<(&'static str, Family)> {
     let base = base::FAMILIES.into_iter().map(|family| ("base mesh", family));
-    let edge = [
-        ("partial order", edge::GAP),
-        ("partial order", edge::RUN),
-        ("partial order", edge::CHILDREN),
-        ("partial order", edge::RISE),
-        ("offsets", edge::OFFSET),
-        ("masks", edge::LAST_WRONG),
-        ("masks", edge::WRONG),
-        ("errors", edge::ERROR),
-        ("levels", edge::LEVEL),
-        ("base mesh", BASE_LEVEL),
-        ("exact values", exact::GAP),
-        ("exact values", exact::LENGTH),
-    ];
-    base.chain(edge).collect()
+    let own: &[(&str, Family)] = match kind {
+        MtKind::Edge => &edge::PARTS,
+        MtKind::Vertex => &insertions::PARTS,
+        MtKind::Explicit => &spelled::PARTS,
+    };
+    let last = [("base mesh", BASE_LEVEL), ("exact values", exact::GAP), ("exact values", exact::LENGTH)];
+    base.chain(own.iter().copied()).chain(last).collect()
 }
 
 /// Differences between the levels of base vertices.
@@ -250,6 +216,9 @@ const BASE_LEVEL: Family = edge::LEVEL.numbers_after(1, 2);
 /// Puts what is coded of the base mesh.
 pub fn put_base(out: &mut impl Put, mt: MtRef<'_>) {
     base::put(out, mt.base());
+    if let MtRef::Vertex(mt) = mt {
+        insertions::put_head(out, mt);
+    }
 }
 
 /// Puts the levels of one field at the base vertices.
@@ -265,9 +234,6 @@ pub fn put_base_field(out: &mut impl Put, mt: MtRef<'_>, field: usize) {
 pub fn write_base_head(out: &mut Vec<u8>, mt: MtRef<'_>) {
     write::varint(out, mt.base().positions.len() as u64);
     write::varint(out, mt.base().tets.len() as u64);
-    if let MtRef::Vertex(mt) = mt {
-        vertex::write_base(out, mt);
-    }
 }
 
 /// A base mesh whose levels have not all arrived.
@@ -275,7 +241,7 @@ pub fn write_base_head(out: &mut Vec<u8>, mt: MtRef<'_>) {
 pub struct BaseParts {
     base: BaseMesh,
     /// What files of vertex-based MTs tell besides.
-    removers: Vec<u8>,
+    insertions: insertions::Head,
     levels: Vec<Vec<i32>>,
 }
 
@@ -289,12 +255,11 @@ pub fn read_base(
     let [vertices, tets] = [reader.varint()?, reader.varint()?];
     check_counts(info, u64::from(vertices))?;
     check_memory(info, u64::from(vertices), u64::from(tets), limits)?;
-    let mut parts = BaseParts::default();
-    if info.kind == MtKind::Vertex {
-        parts.removers = reader.column()?.rest().to_vec();
-    }
     let mut source = Source::new(reader, models)?;
-    parts.base = base::read(&mut source, vertices, tets)?;
+    let mut parts = BaseParts { base: base::read(&mut source, vertices, tets)?, ..BaseParts::default() };
+    if info.kind == MtKind::Vertex {
+        parts.insertions = insertions::read_head(&mut source)?;
+    }
     source.end()?;
     Ok(parts)
 }
@@ -319,15 +284,18 @@ impl BaseParts {
     }
 
     /// The MT without updates, when all levels are there.
-    pub fn start(self, info: MtInfo, block_bits: u32) -> Result<Mt, FormatError> {
-        let Self { mut base, removers, levels } = self;
+    pub fn start(self, info: MtInfo, block_bits: u32) -> Result<(Mt, Option<State>), FormatError> {
+        let Self { mut base, insertions, levels } = self;
         let vertices = base.positions.len();
         base.values = (0..vertices).flat_map(|v| levels.iter().map(move |levels| levels[v])).collect();
         base.check(&info)?;
         Ok(match info.kind {
-            MtKind::Edge => EdgeMt::coded(info, base, block_bits).into(),
-            MtKind::Vertex => vertex::read_base(Reader::new(&removers, 0), info, base)?.into(),
-            MtKind::Explicit => ExplicitMt::new(info, base).into(),
+            MtKind::Edge => (EdgeMt::coded(info, base, block_bits).into(), None),
+            MtKind::Vertex => {
+                let (mt, state) = insertions::start(info, base, insertions)?;
+                (mt.into(), Some(state))
+            }
+            MtKind::Explicit => (ExplicitMt::new(info, base).into(), None),
         })
     }
 }
@@ -336,7 +304,7 @@ impl BaseParts {
 pub fn check_counts(info: &MtInfo, base_vertices: u64) -> Result<(), BaseMeshError> {
     match info.kind {
         MtKind::Edge => edge::check_counts(info, base_vertices),
-        MtKind::Vertex => vertex::check_counts(info, base_vertices),
+        MtKind::Vertex => insertions::check_counts(info, base_vertices),
         // How many vertices and tetrahedra there are, every update tells; they are compared at the end.
         MtKind::Explicit => Ok(()),
     }
@@ -349,8 +317,8 @@ pub fn check_memory(info: &MtInfo, vertices: u64, tets: u64, limits: &Limits) ->
     let base = vertices * (16 + 4 * fields) + tets * 16;
     let updates = match info.kind {
         MtKind::Edge => edge::update_bytes(fields),
-        MtKind::Vertex => vertex::least_update_bytes(info),
-        MtKind::Explicit => explicit::least_update_bytes(),
+        MtKind::Vertex => insertions::least_update_bytes(info),
+        MtKind::Explicit => spelled::least_update_bytes(),
     };
     check_bytes(base + u64::from(info.updates) * updates, limits)
 }
@@ -371,27 +339,40 @@ pub fn section_of(kind: MtKind) -> Kind {
     }
 }
 
-/// What a section of updates begins with: the number of the block, and in sections of one field which.
-fn write_block_head(out: &mut Vec<u8>, block: u32) {
-    write::varint(out, u64::from(block));
-}
-
-/// Appends the shared section of a block of an MT that is not edge-based.
-pub fn write_columns(out: &mut Vec<u8>, mt: MtRef<'_>, block: u32, Range { start, end }: Range<u32>) {
-    write_block_head(out, block);
-    match mt {
-        MtRef::Edge(_) => {}
-        MtRef::Vertex(mt) => vertex::write(out, mt, start, end),
-        MtRef::Explicit(mt) => explicit::write(out, mt, start, end),
+/// Puts the updates of an MT that is not edge-based; `state` goes from one block to the next.
+pub fn put_updates(
+    out: &mut impl Put,
+    mt: MtRef<'_>,
+    Range { start, end }: Range<u32>,
+    state: Option<&mut State>,
+) -> Result<(), UpdateError> {
+    match (mt, state) {
+        (MtRef::Vertex(mt), Some(state)) => insertions::put(out, mt, start, end, state),
+        (MtRef::Explicit(mt), _) => {
+            spelled::put(out, mt, start, end);
+            Ok(())
+        }
+        _ => Ok(()),
     }
 }
 
-/// Reads what [`write_columns`] writes behind the number of the block.
-pub fn read_columns(reader: Reader<'_>, mt: &mut Mt, count: u32, limits: &Limits) -> Result<(), FormatError> {
-    match mt {
-        Mt::Edge(_) => Ok(()),
-        Mt::Vertex(mt) => vertex::read(reader, mt, count, limits),
-        Mt::Explicit(mt) => explicit::read(reader, mt, count, limits),
+/// Where the updates of an MT begin to be put.
+pub fn start_state(mt: MtRef<'_>) -> Result<Option<State>, BaseMeshError> {
+    if let MtRef::Vertex(mt) = mt { State::of(mt).map(Some) } else { Ok(None) }
+}
+
+/// Reads what [`put_updates`] puts.
+pub fn read_updates(
+    source: &mut Source<'_>,
+    mt: &mut Mt,
+    count: u32,
+    state: Option<&mut State>,
+    limits: &Limits,
+) -> Result<(), FormatError> {
+    match (mt, state) {
+        (Mt::Vertex(mt), Some(state)) => insertions::read(source, mt, count, state, limits),
+        (Mt::Explicit(mt), _) => spelled::read(source, mt, count, limits),
+        _ => Ok(()),
     }
 }
 
@@ -399,33 +380,8 @@ pub fn read_columns(reader: Reader<'_>, mt: &mut Mt, count: u32, limits: &Limits
 pub fn check_reference(mt: MtRef<'_>) -> Result<(), BaseMeshError> {
     match mt {
         MtRef::Edge(_) | MtRef::Vertex(_) => Ok(()),
-        MtRef::Explicit(mt) => explicit::check_reference(mt),
+        MtRef::Explicit(mt) => spelled::check_reference(mt),
     }
-}
-
-/// Appends a column of errors, those of all fields of an update together, each told as the number of codes that it is
-/// below the one before; round the end of the codes where it is above.
-fn write_errors<'a>(out: &mut Vec<u8>, scratch: &mut Vec<u8>, errors: impl Iterator<Item = &'a [ErrorCode]>) {
-    write::column(out, scratch, |out| {
-        let mut last: &[ErrorCode] = &[];
-        for errors in errors {
-            for (f, error) in errors.iter().enumerate() {
-                let before = last.get(f).copied().unwrap_or(ErrorCode::MAX);
-                write::varint(out, u64::from(before.0.wrapping_sub(error.0)));
-            }
-            last = errors;
-        }
-    });
-}
-
-/// The errors of the next update in the place of those of the one before, told as [`write_errors`] does.
-fn read_errors(column: &mut Reader<'_>, errors: &mut [ErrorCode]) -> Result<(), FormatError> {
-    for error in errors {
-        let fall = u16::try_from(column.varint()?);
-        let fall = fall.map_err(|_| column.corrupt("an error is out of its range"))?;
-        error.0 = error.0.wrapping_sub(fall);
-    }
-    Ok(())
 }
 
 /// The largest error of an update.

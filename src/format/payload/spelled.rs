@@ -1,8 +1,6 @@
 //! Updates that are spelled out, coded: numbers with a context for each kind of number.
 
 use super::check_bytes;
-use super::explicit::at_hand;
-use super::explicit::bytes_of;
 use super::insertions;
 use super::largest;
 use crate::format::FormatError;
@@ -10,11 +8,13 @@ use crate::format::Limits;
 use crate::format::coder::Family;
 use crate::format::coder::Put;
 use crate::format::coder::Source;
+use crate::mt::BaseMeshError;
 use crate::mt::ErrorCode;
 use crate::mt::ExplicitMt;
 use crate::mt::ExplicitUpdate;
 use crate::mt::UpdateId;
 use crate::mt::VertexId;
+use std::ops::Range;
 
 /// By how many codes an error is below the one before.
 const ERROR: Family = insertions::LAST.numbers_after(1, 2);
@@ -28,8 +28,45 @@ const LEVEL: Family = STEP.numbers_after(1, 1);
 const REMOVED: Family = LEVEL.numbers_after(2, 2);
 /// Steps between the corners of inserted tetrahedra.
 const CORNER: Family = REMOVED.numbers_after(4, 4);
-/// The last family of updates that are spelled out.
-pub const LAST: Family = CORNER;
+/// All families, with names for what they tell.
+pub const PARTS: [(&str, Family); 6] = [
+    ("errors", ERROR),
+    ("partial order", COUNT),
+    ("positions", STEP),
+    ("levels", LEVEL),
+    ("partial order", REMOVED),
+    ("tetrahedra", CORNER),
+];
+
+/// Bytes that every update takes in memory, however small it is: one removed and one inserted tetrahedron.
+pub fn least_update_bytes() -> u64 {
+    bytes_of(0, 0, 1, 1)
+}
+
+/// Bytes that an update takes in memory, at most.
+pub fn bytes_of(vertices: usize, fields: usize, removed: usize, inserted: usize) -> u64 {
+    let vertex = 12 + 4 * fields;
+    // What is removed names a parent each, at most.
+    (18 + vertices * vertex + 8 * removed + 20 * inserted) as u64
+}
+
+/// The vertices that an update can use: those of what it removes, and those that appear with it; ascending.
+pub fn at_hand(mt: &ExplicitMt, removed: &[u32], created: Range<u32>) -> Vec<u32> {
+    let mut vertices: Vec<u32> = removed.iter().flat_map(|&t| mt.tets()[t as usize]).collect();
+    vertices.sort_unstable();
+    vertices.dedup();
+    vertices.extend(created);
+    vertices
+}
+
+/// The reference mesh must have as many vertices and tetrahedra as the description tells.
+pub fn check_reference(mt: &ExplicitMt) -> Result<(), BaseMeshError> {
+    let info = mt.info();
+    if mt.reference_counts() != [info.vertices, info.tetrahedra] {
+        return Err(BaseMeshError::Info("the reference mesh has another size than the description tells"));
+    }
+    Ok(())
+}
 
 /// Puts the updates `first .. end`.
 pub fn put(out: &mut impl Put, mt: &ExplicitMt, first: u32, end: u32) {
