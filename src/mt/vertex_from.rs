@@ -238,27 +238,25 @@ pub(super) fn write_removed(
 ) -> Option<()> {
     let faces: Vec<Face> = canonical.walls.iter().map(|(face, _)| *face).collect();
     let vertices = canonical.link.len() as u32;
+    let shared = |x: &u8| canonical.removed.iter().all(|tet| tet.contains(x));
+    let in_all = (0..vertices as u8).find(shared);
+    // All of T_u meets in a vertex, and all faces of Π_u without that vertex have one of its tetrahedra behind them.
+    let fan = in_all.filter(|&x| is_fan(&faces, &canonical.removed, x));
+    bits.push(u64::from(fan.is_some()), 1);
+    if let Some(apex) = fan {
+        bits.push(u64::from(apex), width_of(vertices - 1));
+    }
+    if fan.is_some() {
+        // These are the tetrahedra, whatever the way.
+        return Some(());
+    }
     // By the face that it stands on: the vertex of the tetrahedron opposite it.
     let sides = |tet: &[u8; 4]| [0, 1, 2, 3].map(|i| (turned(FACES[i].map(|k| tet[k])), tet[i]));
     let mut behind: Vec<(Face, u8)> = canonical.removed.iter().flat_map(sides).collect();
     behind.sort_unstable();
     let behind = |face: &Face| behind.binary_search_by_key(face, |entry| entry.0).ok().map(|at| behind[at].1);
-    let in_all = (0..vertices as u8).find(|x| canonical.removed.iter().all(|tet| tet.contains(x)));
-    // All of T_u meets in a vertex, and all faces of Π_u without that vertex have one of its tetrahedra behind them.
-    let fan = in_all.filter(|x| {
-        let free = faces.iter().filter(|face| !face.contains(x));
-        free.clone().count() == canonical.removed.len() && free.clone().all(|face| behind(face) == Some(*x))
-    });
-    bits.push(u64::from(fan.is_some()), 1);
-    if let Some(apex) = fan {
-        bits.push(u64::from(apex), width_of(vertices - 1));
-    }
     let written = glue.build(&faces, !on_boundary, |face, of_link| {
         let apex = behind(&face);
-        if let Some(fan) = fan {
-            let leave = !of_link || face.contains(&fan);
-            return Some(if leave { Close::Leave } else { Close::With(fan) });
-        }
         let choices = choices(vertices, on_boundary, of_link)?;
         let (close, chosen) = match apex {
             Some(x) => {
@@ -280,6 +278,21 @@ pub(super) fn write_removed(
         all
     };
     (all(&glue.tets[..glue.len]) == all(&canonical.removed)).then_some(())
+}
+
+/// Whether the tetrahedra are those that `x` makes with the faces, which are turned and in canonical order, that do not have
+/// it.
+fn is_fan(faces: &[Face], tets: &[[u8; 4]], x: u8) -> bool {
+    let key = |face: &Face| {
+        let [a, b, c] = *face;
+        [a, b.min(c), b.max(c)]
+    };
+    let stands_on_one = |tet: &[u8; 4]| {
+        let Some(i) = tet.iter().position(|&corner| corner == x) else { return false };
+        let own = turned(FACES[i].map(|k| tet[k]));
+        faces.binary_search_by_key(&key(&own), key).is_ok_and(|at| faces[at] == own)
+    };
+    faces.iter().filter(|face| !face.contains(&x)).count() == tets.len() && tets.iter().all(stands_on_one)
 }
 
 /// Whether one can go from each tetrahedron to each other one through faces.

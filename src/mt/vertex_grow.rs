@@ -251,7 +251,7 @@ impl VertexMt {
 /// The insertion in canonical numbers; the removed tetrahedra have the tag `update`. None if it is too large.
 fn canonical(mesh: &CurrentMesh, update: u32, new: &Insertion<'_>) -> Option<Canonical> {
     let label = |slot: u32| mesh.vertex(slot).0;
-    let mut walls: Vec<([u32; 3], [u32; 3])> = Vec::new();
+    let mut walls: Vec<([u32; 3], [u32; 3])> = Vec::with_capacity(2 * new.removed.len() + 2);
     let mut bare = Vec::new();
     for &t in new.removed {
         let tet = mesh.tets()[t as usize];

@@ -600,7 +600,8 @@ impl State {
         self.removed.clear();
         self.removed.push(seed);
         self.tet_marks[seed as usize] = yes;
-        let mut views = vec![self.view(seed, position)];
+        let mut views = Vec::with_capacity(32);
+        views.push(self.view(seed, position));
         let mut next = 0;
         while let Some(&t) = self.removed.get(next).filter(|_| self.removed.len() <= MAX_REMOVED) {
             let view = views[next];
