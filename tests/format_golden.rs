@@ -10,7 +10,7 @@ use tetralod::mt::{
     BaseMesh, EdgeMt, ErrorCode, ExplicitMt, ExplicitUpdate, Mt, MtInfo, MtKind, VertexId, VertexSplit,
 };
 
-const SPEC: &str = include_str!("../src/format/SPEC.md");
+const SPEC: &str = include_str!("../docs/format.md");
 
 /// The example: one tetrahedron, one field of 8 bits, one update.
 fn example() -> EdgeMt {

@@ -3,7 +3,7 @@
 //! [`encode`] and [`encode_to`] write, [`Decoder`] reads. The specification follows.
 //!
 //! ---
-#![doc = include_str!("SPEC.md")]
+#![doc = include_str!("../../docs/format.md")]
 
 mod coder;
 mod decode;

@@ -1,0 +1,150 @@
+//! A slow, plain reader of edge-based MT files, written from `docs/format.md` alone. It uses nothing of the crate, and
+//! stops at whatever is wrong.
+
+mod coded;
+pub mod growth;
+pub mod plain;
+pub mod splits;
+pub mod wire;
+
+use coded::BASE_LEVEL;
+use coded::Coded;
+use growth::Growth;
+use splits::Split;
+use std::collections::BTreeSet;
+use std::collections::HashMap;
+use std::ops::Range;
+use wire::Bytes;
+use wire::Index;
+use wire::Info;
+use wire::Section;
+
+/// A file, decoded as far as that needs no mesh.
+pub struct File {
+    pub info: Info,
+    pub index: Index,
+    pub base: Growth,
+    /// By field, then by vertex.
+    pub base_levels: Vec<Vec<i32>>,
+    pub splits: HashMap<u32, Split>,
+    /// Where each block is in the file.
+    pub blocks: Vec<Range<usize>>,
+}
+
+/// Reads a whole file. Blocks are read in an order that `choose` makes of those that can be read next, given only the
+/// blocks on which they depend.
+pub fn read(file: &[u8], mut choose: impl FnMut(&[u32]) -> u32) -> File {
+    let sections = wire::sections(file);
+    let (end, front) = sections.split_last().expect("sections");
+    let mut known = front.iter().filter(|section| section.kind[0] & 0x20 == 0);
+    let mut next = |kind: &[u8; 4]| {
+        let section = known.next().expect("a section");
+        assert_eq!(&section.kind, kind);
+        section
+    };
+    let info = wire::info(next(b"INFO").payload);
+    assert_eq!(info.kind, 0, "this reader knows edge-based files only");
+    let section = next(b"INDX");
+    let (index, index_end) = (wire::index(section.payload, &info), section.range[1]);
+    let tables = coded::tables(next(b"MODL").payload);
+    let mut payload = next(b"BASE").payload;
+    let [vertices, tets] = [payload.varint(), payload.varint()];
+    assert_eq!(vertices + info.updates, info.vertices);
+    let mut coded = Coded::new(payload, &tables);
+    let base = growth::read(&mut coded, vertices as usize, tets as usize);
+    coded.end();
+    let mut base_levels = Vec::new();
+    for field in 0..info.fields.len() {
+        let mut payload = next(b"FLDB").payload;
+        assert_eq!(payload.varint() as usize, field);
+        let mut coded = Coded::new(payload, &tables);
+        let mut level = 0;
+        let levels = (0..vertices).map(|_| {
+            level += coded.signed(BASE_LEVEL, 0);
+            level
+        });
+        base_levels.push(levels.collect());
+        coded.end();
+    }
+    let mut parts_of: Vec<Vec<Bytes<'_>>> = Vec::new();
+    let (mut at, mut blocks) = (index_end + index.between, Vec::new());
+    for (block, entry) in (0..).zip(&index.blocks) {
+        let (start, mut parts) = (at as usize, Vec::new());
+        for (part, length) in (0..).zip(&entry.lengths) {
+            let section = next(if part == 0 { b"UPDT" } else { b"FLDU" });
+            assert_eq!(section.range, [at, at + u64::from(*length)]);
+            at = section.range[1];
+            let mut payload = section.payload;
+            assert_eq!(payload.varint(), block);
+            assert!(part == 0 || payload.varint() == part - 1);
+            parts.push(payload);
+        }
+        parts_of.push(parts);
+        blocks.push(start..at as usize);
+    }
+    assert!(known.next().is_none());
+    check_end(end, front, &info);
+    let mut file = File { info, index, base, base_levels, splits: HashMap::new(), blocks };
+    let mut left: BTreeSet<u32> = (0..parts_of.len() as u32).collect();
+    let mut closures: HashMap<u32, BTreeSet<u32>> = HashMap::new();
+    while !left.is_empty() {
+        let is_ready =
+            |block: &u32| file.index.blocks[*block as usize].parents.iter().all(|p| !left.contains(p));
+        let ready: Vec<u32> = left.iter().copied().filter(is_ready).collect();
+        let block = choose(&ready);
+        assert!(left.remove(&block));
+        let mut closure = BTreeSet::new();
+        for parent in &file.index.blocks[block as usize].parents {
+            closure.insert(*parent);
+            closure.extend(&closures[parent]);
+        }
+        file.read_block(&tables, block, &parts_of[block as usize], &closure);
+        closures.insert(block, closure);
+    }
+    file
+}
+
+fn check_end(end: &Section<'_>, front: &[Section<'_>], info: &Info) {
+    assert_eq!(&end.kind, b"ENDF");
+    let mut payload = end.payload;
+    assert_eq!(payload.u32(), info.updates);
+    assert_eq!(payload.u32() as usize, front.len());
+    let chain: Vec<u8> = front.iter().flat_map(|section| section.crc.to_le_bytes()).collect();
+    assert_eq!(payload.u32(), wire::crc32(&chain));
+    payload.end();
+}
+
+impl File {
+    /// The block of an update.
+    pub fn block_of(&self, k: u32) -> u32 {
+        k >> self.index.block_bits
+    }
+
+    /// Decodes a block knowing no more than what the index says it depends on.
+    fn read_block(
+        &mut self,
+        tables: &[Vec<(u32, u32)>],
+        block: u32,
+        parts: &[Bytes<'_>],
+        closure: &BTreeSet<u32>,
+    ) {
+        let updates = self.index.updates(block, &self.info);
+        let is_known = |k: &u32| closure.contains(&(k >> self.index.block_bits));
+        let known = self.splits.iter().filter(|(k, _)| is_known(k)).map(|(&k, split)| (k, split.clone()));
+        let known = known.collect();
+        let mut coded = Coded::new(parts[0], tables);
+        let mut splits =
+            splits::shared(&mut coded, self.base.positions.len() as u32, updates.clone(), &known);
+        coded.end();
+        for part in &parts[1..] {
+            let mut coded = Coded::new(*part, tables);
+            for (split, (error, residual)) in splits.iter_mut().zip(splits::field(&mut coded, updates.len()))
+            {
+                split.errors.push(error);
+                split.residuals.push(residual);
+            }
+            coded.end();
+        }
+        self.splits.extend(updates.zip(splits));
+    }
+}
