@@ -1,94 +1,133 @@
-//! Promise: version 1 of the format does not change. The worked examples of the specification are what is written,
-//! byte for byte, and they are read back.
+//! Promise: version 2 of the format does not change. What these small MTs are written as, byte for byte, is kept in
+//! `tests/golden`, and is read back; files of other versions are told apart.
 
 mod format_support;
+mod support;
 
-use format_support::{decode, field};
-use tetralod::format::{EncodeOptions, encode};
+use format_support::assert_same;
+use format_support::decode;
+use format_support::field;
+use std::fmt::Write;
+use tetralod::format::EncodeOptions;
+use tetralod::format::FormatError;
+use tetralod::format::encode;
 use tetralod::geom::Lattice;
-use tetralod::mt::{
-    BaseMesh, EdgeMt, ErrorCode, ExplicitMt, ExplicitUpdate, Mt, MtInfo, MtKind, VertexId, VertexSplit,
-};
+use tetralod::mt::BaseMesh;
+use tetralod::mt::EdgeMt;
+use tetralod::mt::ErrorCode;
+use tetralod::mt::ExplicitMt;
+use tetralod::mt::ExplicitUpdate;
+use tetralod::mt::Mt;
+use tetralod::mt::MtInfo;
+use tetralod::mt::MtKind;
+use tetralod::mt::MultiTessellation;
+use tetralod::mt::VertexId;
+use tetralod::mt::VertexSplit;
 
-const SPEC: &str = include_str!("../docs/format.md");
-
-/// The example: one tetrahedron, one field of 8 bits, one update.
-fn example() -> EdgeMt {
+/// Two tetrahedra on one face, with one field of 8 bits; there are going to be `updates` updates.
+fn start(kind: MtKind, [vertices, tetrahedra, updates]: [u32; 3]) -> (MtInfo, BaseMesh) {
     let info = MtInfo {
-        kind: MtKind::Edge,
-        lattice: Lattice { origin: [0.0; 3], step: [0.5; 3], bits: 4 },
+        kind,
+        lattice: Lattice { origin: [0.0; 3], step: [0.5; 3], bits: 5 },
         fields: vec![field("p", 8)],
-        vertices: 5,
-        tetrahedra: 2,
-        updates: 1,
+        vertices,
+        tetrahedra,
+        updates,
         displacement_per_error: 2.0,
         quantization: 0.0,
     };
     let base = BaseMesh {
-        positions: vec![[1, 0, 0], [9, 0, 0], [0, 8, 0], [0, 0, 8]],
-        values: vec![10, 20, 30, 200],
-        tets: vec![[0, 1, 2, 3]],
+        positions: vec![[0, 8, 8], [16, 8, 8], [8, 8, 20], [8, 0, 8], [8, 20, 8]],
+        values: vec![10, 20, 30, 200, 40],
+        tets: vec![[0, 1, 2, 3], [1, 0, 2, 4]],
     };
+    (info, base)
+}
+
+/// Splits of a vertex on the edge that both tetrahedra have, and of one of its halves.
+fn edge_example() -> Mt {
+    let (info, base) = start(MtKind::Edge, [7, 4, 2]);
     let mut mt = EdgeMt::new(info, base);
-    let split = VertexSplit {
-        vertex: VertexId(0),
-        offset: [2, 0, -1],
-        field_offsets: &[-3],
-        mask: 1,
-        errors: &[ErrorCode(300)],
-    };
-    mt.push(&split).expect("the example is an MT");
-    mt
+    let splits = [(0, [0, -3, -1], -3, 0b10, 300), (5, [0, 1, 0], 2, 0b01, 299)];
+    for (vertex, offset, level, mask, error) in splits {
+        let split = VertexSplit {
+            vertex: VertexId(vertex),
+            offset,
+            field_offsets: &[level],
+            mask,
+            errors: &[ErrorCode(error)],
+        };
+        mt.push(&split).expect("the example is an MT");
+    }
+    mt.into()
 }
 
-fn options() -> EncodeOptions {
-    EncodeOptions { metadata: [("tool".to_owned(), "hand".to_owned())].into() }
-}
-
-/// The same base mesh in an explicit MT, whose only update puts a vertex into the tetrahedron.
-fn spelled_example() -> ExplicitMt {
-    let edge = example();
-    let info = MtInfo { vertices: 5, tetrahedra: 4, ..edge.info().clone() };
-    let mut mt = ExplicitMt::new(info, edge.base().clone());
+/// The only update puts a vertex into the first tetrahedron.
+fn explicit_example() -> Mt {
+    let (info, base) = start(MtKind::Explicit, [6, 5, 1]);
+    let mut mt = ExplicitMt::new(info, base);
     let update = ExplicitUpdate {
-        positions: &[[2, 2, 2]],
+        positions: &[[8, 6, 11]],
         levels: &[15],
         removed: &[0],
-        inserted: &[[4, 1, 2, 3], [0, 4, 2, 3], [0, 1, 4, 3], [0, 1, 2, 4]],
+        inserted: &[[5, 1, 2, 3], [0, 5, 2, 3], [0, 1, 5, 3], [0, 1, 2, 5]],
         errors: &[ErrorCode(300)],
     };
     mt.push(&update).expect("the example is an MT");
-    mt
+    mt.into()
 }
 
 /// The same update in a vertex-based MT.
-fn inserted_example() -> Mt {
-    Mt::from(spelled_example()).convert(MtKind::Vertex).expect("an insertion")
+fn vertex_example() -> Mt {
+    explicit_example().convert(MtKind::Vertex).expect("an insertion")
 }
 
-/// The bytes in a code block behind the heading of the examples; what follows two slashes is a remark.
-fn golden(number: usize) -> Vec<u8> {
-    let examples = SPEC.split("## Examples").nth(1).expect("there are examples");
-    let block = examples.split("```text\n").nth(number).and_then(|rest| rest.split("```").next());
-    let lines = block.expect("as many blocks").lines();
-    let digits = lines.flat_map(|line| line.split("//").next().unwrap_or("").split_whitespace());
+fn options() -> EncodeOptions {
+    let metadata = [("tool".to_owned(), "hand".to_owned())].into();
+    EncodeOptions { metadata, ..EncodeOptions::default() }
+}
+
+/// Bytes from pairs of hexadecimal digits; what follows two slashes is a remark.
+fn bytes_of(text: &str) -> Vec<u8> {
+    let digits = text.lines().flat_map(|line| line.split("//").next().unwrap_or("").split_whitespace());
     digits.map(|d| u8::from_str_radix(d, 16).expect("two hexadecimal digits")).collect()
 }
 
-#[test]
-fn the_examples_are_written_as_specified() {
-    let hex = |bytes: &[u8]| bytes.iter().map(|b| format!("{b:02X} ")).collect::<String>();
-    let edge = encode(&example(), &options()).expect("the example is complete");
-    assert_eq!(hex(&edge), hex(&golden(1)));
-    let spelled = encode(&spelled_example(), &EncodeOptions::default()).expect("the example is complete");
-    assert_eq!(hex(&spelled), hex(&golden(2)));
-    let inserted = encode(&inserted_example(), &EncodeOptions::default()).expect("the example is complete");
-    assert_eq!(hex(&inserted), hex(&golden(3)));
+/// The inverse, 32 bytes a line.
+fn text_of(bytes: &[u8]) -> String {
+    let mut text = String::new();
+    for line in bytes.chunks(32) {
+        let digits: Vec<String> = line.iter().map(|byte| format!("{byte:02X}")).collect();
+        writeln!(text, "{}", digits.join(" ")).expect("a string takes everything");
+    }
+    text
 }
 
 #[test]
-fn the_examples_are_read_as_specified() {
-    assert_eq!(decode(&golden(1)), Ok(example().into()));
-    assert_eq!(decode(&golden(2)), Ok(spelled_example().into()));
-    assert_eq!(decode(&golden(3)), Ok(inserted_example()));
+fn the_examples_are_written_and_read_as_ever() {
+    let examples = [
+        (edge_example(), include_str!("golden/v2-edge.hex")),
+        (explicit_example(), include_str!("golden/v2-explicit.hex")),
+        (vertex_example(), include_str!("golden/v2-vertex.hex")),
+    ];
+    let mut changes = String::new();
+    for (mt, golden) in examples {
+        let golden = bytes_of(golden);
+        let found = encode(&mt, &options()).expect("the example is complete");
+        if found == golden {
+            assert_same(&decode(&golden).expect("a good file"), &mt);
+        } else {
+            write!(changes, "{}:\n{}\n", mt.info().kind.name(), text_of(&found)).expect("a string");
+        }
+    }
+    assert!(changes.is_empty(), "these are written as other bytes now:\n{changes}");
+}
+
+#[test]
+fn files_of_the_first_version_are_told_apart() {
+    let found = decode(&bytes_of(include_str!("golden/v1-edge.hex")));
+    let error = found.expect_err("version 1 is no longer read");
+    assert_eq!(error, FormatError::UnsupportedVersion { found: [1, 0], supported: [2, 0] });
+    let text = error.to_string();
+    assert!(text.contains("1.0") && text.contains("build the file again"), "{text}");
 }

@@ -1,51 +1,84 @@
 //! Promise: what is decoded is what was encoded, and the same MT gives the same bytes.
 
 mod format_support;
+mod support;
 
-use format_support::{Draft, build, bytes_of, decode, options, sample, samples};
+use format_support::assert_same;
+use format_support::bytes_in_blocks;
+use format_support::bytes_of;
+use format_support::coded;
+use format_support::decode;
+use format_support::inserted;
+use format_support::options;
+use format_support::planned;
+use format_support::sample;
+use format_support::samples;
+use format_support::spelled;
 use proptest::prelude::*;
-use tetralod::format::{BLOCK_UPDATES, Decoder, EncodeError, EncodeOptions, encode, encode_to};
-use tetralod::mt::{EdgeMt, ExplicitMt, Mt, MtInfo, MultiTessellation};
+use support::strategies::config;
+use support::strategies::plan;
+use tetralod::format::BLOCK_BITS;
+use tetralod::format::Decoder;
+use tetralod::format::EncodeError;
+use tetralod::format::EncodeOptions;
+use tetralod::format::encode;
+use tetralod::format::encode_to;
+use tetralod::mt::EdgeMt;
+use tetralod::mt::ExplicitMt;
+use tetralod::mt::Mt;
+use tetralod::mt::MtInfo;
+use tetralod::mt::MtKind;
+use tetralod::mt::MultiTessellation;
+use tetralod::mt::UpdateId;
+use tetralod::mt::VertexSplit;
 
-fn draft() -> impl Strategy<Value = Draft> {
-    let offset = prop_oneof![-3..=3_i32, -(1 << 20)..=(1 << 20_i32)];
-    let level = prop_oneof![-3..=3_i32, -4096..=4096_i32];
-    (
-        prop::array::uniform3(offset),
-        any::<u32>(),
-        prop_oneof![any::<u64>(), 0..256_u64],
-        any::<u16>(),
-        prop::collection::vec(level, 3),
-    )
+/// The file of an MT gives an MT of the same updates, and that the same file.
+fn comes_back(mt: &Mt, block_bits: u32) {
+    let bytes = bytes_in_blocks(mt, block_bits);
+    let found = decode(&bytes).expect("a good file");
+    assert_same(mt, &found);
+    assert!(bytes_in_blocks(mt, block_bits) == bytes, "other bytes for the same MT");
+    assert!(bytes_in_blocks(&found, block_bits) == bytes, "other bytes for what was read");
+    if !matches!(mt, Mt::Edge(_)) {
+        assert!(found == *mt, "these kinds come back as they were");
+    }
 }
 
 proptest! {
+    #![proptest_config(config(48, 23))]
+
     #[test]
-    fn any_mt_comes_back(
-        tets in 1..6_u32,
-        fields in 1..4_usize,
-        drafts in prop::collection::vec(draft(), 0..700),
-    ) {
-        let mt = build(tets, fields, &drafts);
-        let bytes = bytes_of(&mt);
-        prop_assert_eq!(decode(&bytes), Ok(mt.clone()));
-        prop_assert_eq!(bytes_of(&mt), bytes);
+    fn any_mt_comes_back(plan in plan(4, 2, 0..80), block_bits in 4..8_u32) {
+        let mt = Mt::from(planned(plan));
+        comes_back(&mt, block_bits);
+        comes_back(&mt.convert(MtKind::Explicit).expect("a valid MT"), block_bits);
+    }
+
+    #[test]
+    fn any_insertions_come_back(tets in 1..4_u32, fields in 1..=3_usize, updates in 0..200_usize) {
+        comes_back(&inserted(tets, fields, updates), 4);
     }
 }
 
 #[test]
 fn blocks_of_all_sizes_come_back() {
-    let block = BLOCK_UPDATES as usize;
-    for updates in [0, 1, block - 1, block, block + 1, 3 * block] {
-        for mt in samples(3, 2, updates) {
-            assert_eq!(decode(&bytes_of(&mt)), Ok(mt), "{updates} updates");
+    for updates in [0, 1, 15, 16, 17, 48, 255, 256, 257] {
+        for mt in samples(2, updates) {
+            [4, 8, 16].iter().for_each(|&bits| comes_back(&mt, bits));
         }
     }
 }
 
 #[test]
+fn splits_come_back_from_a_file_as_they_were() {
+    let mt = sample(3, 600);
+    let spelled = coded(&mt).convert(MtKind::Explicit).expect("a valid MT");
+    assert!(spelled.convert(MtKind::Edge) == Ok(mt));
+}
+
+#[test]
 fn description_metadata_and_size_come_back() {
-    samples(2, 3, 600).iter().for_each(all_comes_back);
+    samples(3, 600).iter().for_each(all_comes_back);
 }
 
 fn all_comes_back(mt: &Mt) {
@@ -53,6 +86,8 @@ fn all_comes_back(mt: &Mt) {
     let mut decoder = Decoder::default();
     let progress = decoder.feed(&bytes).expect("a good file");
     assert_eq!(decoder.info(), Some(mt.info()));
+    assert_eq!(decoder.mt().map(|mt| mt.info()), Some(mt.info()));
+    assert_eq!(decoder.wanted_fields(), [0, 1, 2]);
     assert!(decoder.metadata().iter().cloned().eq(options().metadata));
     assert!(progress.ready && progress.complete);
     assert_eq!((progress.bytes, progress.updates), (bytes.len() as u64, 600));
@@ -61,7 +96,7 @@ fn all_comes_back(mt: &Mt) {
 
 #[test]
 fn a_writer_gets_the_same_bytes() {
-    for mt in samples(2, 1, 600) {
+    for mt in samples(1, 600) {
         let mut written = Vec::new();
         let size = encode_to(&mt, &options(), &mut written).expect("a vector takes everything");
         assert_eq!(size, written.len() as u64);
@@ -71,21 +106,38 @@ fn a_writer_gets_the_same_bytes() {
 
 #[test]
 fn what_could_not_be_read_back_is_not_written() {
-    let whole = sample(1, 1, 5);
+    let plain = EncodeOptions::default();
+    let Mt::Edge(whole) = sample(1, 5) else { panic!("edge-based") };
     let part = EdgeMt::new(whole.info().clone(), whole.base().clone());
-    let incomplete = encode(&part, &EncodeOptions::default());
+    let incomplete = encode(&part, &plain);
     assert!(matches!(incomplete, Err(EncodeError::Incomplete { updates: 0, expected: 5 })));
 
     let mut miscounted = whole.info().clone();
     miscounted.updates = 0;
     let miscounted = EdgeMt::new(miscounted, whole.base().clone());
-    assert!(matches!(encode(&miscounted, &EncodeOptions::default()), Err(EncodeError::Base(_))));
+    assert!(matches!(encode(&miscounted, &plain), Err(EncodeError::Base(_))));
 
-    let [_, spelled, _] = samples(1, 1, 5);
+    let spelled = spelled(1, 5);
     let other = MtInfo { updates: 0, ..spelled.info().clone() };
-    let other = ExplicitMt::new(other, spelled.base().clone());
-    assert!(matches!(encode(&other, &EncodeOptions::default()), Err(EncodeError::Base(_))));
+    let other = ExplicitMt::new(other, MultiTessellation::base(&spelled).clone());
+    assert!(matches!(encode(&other, &plain), Err(EncodeError::Base(_))));
 
     let metadata = [("key".to_owned(), "x".repeat(70_000))].into();
-    assert!(matches!(encode(&whole, &EncodeOptions { metadata }), Err(EncodeError::TooLong { .. })));
+    let wordy = EncodeOptions { metadata, ..plain.clone() };
+    assert!(matches!(encode(&whole, &wordy), Err(EncodeError::TooLong { .. })));
+
+    for block_bits in [0, 3, 17, 32, u32::MAX] {
+        let odd = EncodeOptions { block_bits, ..plain.clone() };
+        assert!(matches!(encode(&whole, &odd), Err(EncodeError::Blocks { bits }) if bits == block_bits));
+    }
+    assert!((4..=16).contains(&BLOCK_BITS));
+
+    // Updates that no mesh takes: all goes to one side, and more than there is.
+    let mut damaged = EdgeMt::new(whole.info().clone(), whole.base().clone());
+    for u in (0..whole.updates()).map(UpdateId) {
+        let split = whole.split(u);
+        damaged.push(&VertexSplit { mask: u64::MAX, ..split }).expect("only a mesh can tell");
+    }
+    let refused = encode(&damaged, &plain);
+    assert!(matches!(refused, Err(EncodeError::Update(_))), "{refused:?}");
 }

@@ -1,16 +1,35 @@
-//! MTs for the tests of the file format, made by code.
+//! MTs for the tests of the file format, made by code, and files taken apart and put together as the specification says.
 #![allow(dead_code, reason = "each test file uses its own part")]
 
-use tetralod::format::{Decoder, EncodeOptions, FormatError, encode};
+use super::support::builder::Plan;
+use super::support::builder::build;
+use super::support::domains::Domain;
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+use tetralod::format::DecodeOptions;
+use tetralod::format::Decoder;
+use tetralod::format::EncodeOptions;
+use tetralod::format::FormatError;
+use tetralod::format::Limits;
+use tetralod::format::encode;
 use tetralod::geom::Lattice;
 use tetralod::mesh::VectorPart;
-use tetralod::mt::{
-    BaseMesh, EdgeMt, ErrorCode, ExplicitMt, ExplicitUpdate, FieldInfo, Mt, MtInfo, MtKind, MtRef,
-    MultiTessellation, UpdateId, VertexId, VertexSplit,
-};
-
-/// Offset, choice of vertex, mask and error of an update; made to fit by [`build`].
-pub type Draft = ([i32; 3], u32, u64, u16, Vec<i32>);
+use tetralod::mt::Applied;
+use tetralod::mt::BaseMesh;
+use tetralod::mt::CurrentMesh;
+use tetralod::mt::EdgeMt;
+use tetralod::mt::ErrorCode;
+use tetralod::mt::ExplicitMt;
+use tetralod::mt::ExplicitUpdate;
+use tetralod::mt::FieldInfo;
+use tetralod::mt::Mt;
+use tetralod::mt::MtInfo;
+use tetralod::mt::MtKind;
+use tetralod::mt::MtRef;
+use tetralod::mt::MultiTessellation;
+use tetralod::mt::UpdateId;
+use tetralod::mt::VertexId;
+use tetralod::mt::VertexSplit;
 
 pub fn field(name: &str, bits: u32) -> FieldInfo {
     let largest = f64::from((1_u32 << bits) - 1);
@@ -26,7 +45,8 @@ pub fn field(name: &str, bits: u32) -> FieldInfo {
 }
 
 /// A field that tells all there is, or a part of it, or no more than it must.
-fn told_more(number: usize, field: FieldInfo) -> FieldInfo {
+fn told_more(number: usize, bits: u32) -> FieldInfo {
+    let field = field(["pressure", "Dichte ρ", "", "w"][number % 4], bits);
     let vector = |component| Some(VectorPart { name: "U".into(), component });
     match number {
         0 => field,
@@ -36,44 +56,39 @@ fn told_more(number: usize, field: FieldInfo) -> FieldInfo {
     }
 }
 
-/// An MT with `tets` separate base tetrahedra, `fields` fields and one update per draft.
-pub fn build(tets: u32, fields: usize, drafts: &[Draft]) -> Mt {
-    let lattice = Lattice { origin: [-1.5, 0.0, 2.0], step: [0.25, 0.5, 1.0], bits: 20 };
-    let corners = [[0, 0, 0], [9, 0, 0], [0, 9, 0], [0, 0, 9]];
-    let vertices = 4 * tets;
-    let base = BaseMesh {
-        positions: (0..tets as i32)
-            .flat_map(|t| corners.map(|c: [i32; 3]| [c[0] + 20 * t, c[1], c[2] + t % 7]))
-            .collect(),
-        values: (0..vertices as i32 * fields as i32).map(|i| i * 37 % 4096).collect(),
-        tets: (0..tets).map(|t| [0, 1, 2, 3].map(|i| 4 * t + i)).collect(),
-    };
-    let names = ["pressure", "Dichte ρ", "", "w"];
-    let info = MtInfo {
-        kind: MtKind::Edge,
-        lattice,
-        fields: (0..fields).map(|f| told_more(f, field(names[f % 4], 12))).collect(),
-        vertices: vertices + drafts.len() as u32,
-        tetrahedra: tets + 3 * drafts.len() as u32,
-        updates: drafts.len() as u32,
-        displacement_per_error: 0.125,
-        quantization: if fields == 2 { 0.0 } else { 0.0625 },
-    };
-    let mut mt = EdgeMt::new(info, base);
-    let mut whole: Vec<u32> = (0..vertices).collect();
-    let mut most = u16::MAX;
-    for (offset, choice, mask, error, field_offsets) in drafts {
-        let vertex = VertexId(whole.swap_remove(*choice as usize % whole.len()));
-        let created = mt.created(UpdateId(mt.updates()));
-        let field_offsets: Vec<i32> = field_offsets.iter().copied().cycle().take(fields).collect();
-        most = most.min(*error);
-        let errors = &vec![ErrorCode(most); fields];
-        let split =
-            VertexSplit { vertex, offset: *offset, field_offsets: &field_offsets, mask: *mask, errors };
-        mt.push(&split).expect("drafts are made to fit");
-        whole.extend(created.map(|v| v.0));
+/// A random edge-based MT as [`build`] makes it, whose fields tell more and have errors of their own.
+pub fn planned(plan: Plan) -> EdgeMt {
+    let built = build(plan);
+    let mut info = built.info;
+    info.lattice = Lattice { origin: [-1.5, 0.0, 2.0], step: [0.25, 0.5, 1.0], ..info.lattice };
+    info.fields = (0..plan.fields).map(|f| told_more(f, info.fields[f].bits)).collect();
+    info.displacement_per_error = 0.125;
+    info.quantization = if plan.fields == 2 { 0.0 } else { 0.0625 };
+    let mut mt = EdgeMt::new(info, built.base);
+    for split in &built.splits {
+        let below = |f: usize| ErrorCode(split.error.saturating_sub(300 * f as u16));
+        let errors: Vec<ErrorCode> = (0..plan.fields).map(below).collect();
+        let split = VertexSplit { errors: &errors, ..split.as_update() };
+        mt.push(&split).expect("the builder makes valid updates");
     }
-    mt.into()
+    mt
+}
+
+/// An edge-based MT of exactly so many random updates. Made once a process.
+pub fn sample(fields: usize, updates: usize) -> Mt {
+    static MADE: Mutex<BTreeMap<[usize; 2], EdgeMt>> = Mutex::new(BTreeMap::new());
+    let mut made = MADE.lock().unwrap_or_else(|broken| broken.into_inner());
+    let mt = made.entry([fields, updates]).or_insert_with(|| {
+        let cells = (2..).find(|n| n * n * n > updates).unwrap_or(2);
+        planned(Plan { domain: Domain::Cube(cells), seed: updates as u64, fields, updates })
+    });
+    assert_eq!(mt.updates() as usize, updates, "the cube is large enough");
+    mt.clone().into()
+}
+
+/// The same as an explicit MT.
+pub fn spelled(fields: usize, updates: usize) -> Mt {
+    sample(fields, updates).convert(MtKind::Explicit).expect("a valid MT")
 }
 
 /// Pseudo-random numbers.
@@ -87,32 +102,17 @@ fn numbers() -> impl FnMut() -> u64 {
     }
 }
 
-/// An edge-based MT of `updates` pseudo-random updates.
-pub fn sample(tets: u32, fields: usize, updates: usize) -> Mt {
+/// An explicit MT of `tets` separate tetrahedra, each of whose updates puts a vertex into one.
+pub fn insertions(tets: u32, fields: usize, updates: usize) -> ExplicitMt {
     let mut next = numbers();
-    let drafts: Vec<Draft> = (0..updates)
-        .map(|k| {
-            let offset = [0; 3].map(|_: i32| (next() % 201) as i32 - 100);
-            let mask = next() >> (next() % 64);
-            let error = 60_000 - (k as u64 * 50_000 / updates as u64) as u16;
-            (offset, next() as u32, mask, error, vec![(next() % 99) as i32 - 49, (next() % 9) as i32])
-        })
-        .collect();
-    build(tets, fields, &drafts)
-}
-
-/// An explicit MT of `updates` pseudo-random updates: most put a vertex into a tetrahedron, some put tetrahedra in the
-/// place of others that lie elsewhere, which only the mesh would refuse.
-pub fn spelled(tets: u32, fields: usize, updates: usize) -> Mt {
-    let mut next = numbers();
-    let lattice = Lattice { origin: [-1.5, 0.0, 2.0], step: [0.25, 0.5, 1.0], bits: 28 };
+    let n = updates as u32;
     let info = MtInfo {
         kind: MtKind::Explicit,
-        lattice,
+        lattice: Lattice { origin: [-1.5, 0.0, 2.0], step: [0.25, 0.5, 1.0], bits: 28 },
         fields: (0..fields).map(|f| field(["p", "q", "r"][f % 3], 12)).collect(),
-        vertices: 4 * tets,
-        tetrahedra: tets,
-        updates: updates as u32,
+        vertices: 4 * tets + n,
+        tetrahedra: tets + 3 * n,
+        updates: n,
         displacement_per_error: 0.125,
         quantization: 0.0,
     };
@@ -124,56 +124,16 @@ pub fn spelled(tets: u32, fields: usize, updates: usize) -> Mt {
         values: vec![7; 4 * tets as usize * fields],
         tets: (0..tets).map(|t| [0, 1, 2, 3].map(|i| 4 * t + i)).collect(),
     };
-    // Twice: the first time to count what the description has to tell.
-    let mut made = ExplicitMt::new(info.clone(), base.clone());
+    let mut made = ExplicitMt::new(info, base);
     let mut live: Vec<u32> = (0..tets).collect();
-    let mut spelled = Vec::new();
     for k in 0..updates {
         // Old ones first: they are the large ones.
-        let removed: Vec<u32> = (0..if k % 5 == 4 { 3 } else { 1 }).map(|_| live.remove(0)).collect();
+        let removed = [live.remove(0)];
         let tet = made.tets()[removed[0] as usize];
         let corners = tet.map(|v| made.position(VertexId(v)));
         let middle = [0, 1, 2].map(|i| corners.iter().map(|c| c[i] / 4).sum::<i32>());
         let [a, b, c, d] = tet;
         let v = made.vertices();
-        let (positions, inserted) = match k % 5 {
-            4 => (vec![], removed.iter().rev().map(|&t| made.tets()[t as usize]).collect()),
-            _ => (vec![middle], vec![[v, b, c, d], [a, v, c, d], [a, b, v, d], [a, b, c, v]]),
-        };
-        let levels: Vec<i32> = (0..positions.len() * fields).map(|_| (next() % 4096) as i32).collect();
-        let error = ErrorCode(60_000 - (k * 50_000 / updates) as u16);
-        let errors = &vec![error; fields];
-        let first = made.tets().len() as u32;
-        let (positions, levels, removed, inserted) = (&positions, &levels, &removed, &inserted);
-        made.push(&ExplicitUpdate { positions, levels, removed, inserted, errors }).expect("made to fit");
-        live.extend(first..made.tets().len() as u32);
-        spelled.push((positions.clone(), levels.clone(), removed.clone(), inserted.clone(), error));
-    }
-    let [vertices, tetrahedra] = made.reference_counts();
-    let mut mt = ExplicitMt::new(MtInfo { vertices, tetrahedra, ..info }, base);
-    for (positions, levels, removed, inserted, error) in &spelled {
-        let errors = &vec![*error; fields];
-        mt.push(&ExplicitUpdate { positions, levels, removed, inserted, errors }).expect("made to fit");
-    }
-    mt.into()
-}
-
-/// A vertex-based MT of `updates` insertions, each into one tetrahedron.
-pub fn inserted(tets: u32, fields: usize, updates: usize) -> Mt {
-    let mut next = numbers();
-    let spelled = spelled(tets, fields, 0);
-    let vertices = 4 * tets + updates as u32;
-    let info = MtInfo { vertices, updates: updates as u32, ..spelled.info().clone() };
-    let mut made = ExplicitMt::new(info, spelled.base().clone());
-    let mut live: Vec<u32> = (0..tets).collect();
-    for k in 0..updates {
-        // Old ones first: they are the large ones.
-        let tet = made.tets()[live[0] as usize];
-        let corners = tet.map(|v| made.position(VertexId(v)));
-        let middle = [0, 1, 2].map(|i| corners.iter().map(|c| c[i] / 4).sum::<i32>());
-        let [a, b, c, d] = tet;
-        let v = made.vertices();
-        let removed = [live.remove(0)];
         let levels: Vec<i32> = (0..fields).map(|_| (next() % 4096) as i32).collect();
         let first = made.tets().len() as u32;
         let update = ExplicitUpdate {
@@ -186,22 +146,39 @@ pub fn inserted(tets: u32, fields: usize, updates: usize) -> Mt {
         made.push(&update).expect("made to fit");
         live.extend(first..made.tets().len() as u32);
     }
-    let mt = Mt::from(made).convert(MtKind::Vertex);
+    made
+}
+
+/// The same as a vertex-based MT.
+pub fn inserted(tets: u32, fields: usize, updates: usize) -> Mt {
+    let mt = Mt::from(insertions(tets, fields, updates)).convert(MtKind::Vertex);
     mt.expect("insertions")
 }
 
 /// An MT of each kind.
-pub fn samples(tets: u32, fields: usize, updates: usize) -> [Mt; 3] {
-    [sample(tets, fields, updates), spelled(tets, fields, updates), inserted(tets, fields, updates)]
+pub fn samples(fields: usize, updates: usize) -> [Mt; 3] {
+    [sample(fields, updates), spelled(fields, updates), inserted(2, fields, updates)]
 }
 
+/// Small blocks, so that small MTs have many.
 pub fn options() -> EncodeOptions {
     let pairs = [("tool", "a test"), ("ключ", "значение"), ("empty", "")];
-    EncodeOptions { metadata: pairs.map(|(k, v)| (k.to_owned(), v.to_owned())).into() }
+    let metadata = pairs.map(|(k, v)| (k.to_owned(), v.to_owned())).into();
+    EncodeOptions { block_bits: 8, metadata, ..EncodeOptions::default() }
 }
 
 pub fn bytes_of<'a>(mt: impl Into<MtRef<'a>>) -> Vec<u8> {
     encode(mt, &options()).expect("the MT is complete")
+}
+
+/// The same with blocks of `2^block_bits` updates.
+pub fn bytes_in_blocks<'a>(mt: impl Into<MtRef<'a>>, block_bits: u32) -> Vec<u8> {
+    encode(mt, &EncodeOptions { block_bits, ..options() }).expect("the MT is complete")
+}
+
+/// A decoder with limits.
+pub fn within(limits: Limits) -> Decoder {
+    Decoder::new(DecodeOptions { limits, ..DecodeOptions::default() })
 }
 
 /// Decodes a whole file in one piece.
@@ -210,6 +187,60 @@ pub fn decode(bytes: &[u8]) -> Result<Mt, FormatError> {
     decoder.feed(bytes)?;
     decoder.finish()?;
     Ok(decoder.into_mt().expect("a complete file has a base mesh"))
+}
+
+/// An MT in the form that its file has.
+pub fn coded(mt: &Mt) -> Mt {
+    decode(&bytes_of(mt)).expect("a good file")
+}
+
+/// Positions and levels at the corners of a tetrahedron, with the numbers of its vertices.
+type Seen = [(VertexId, [i32; 3], Vec<i32>); 4];
+
+fn seen(mesh: &CurrentMesh, found: &[u32]) -> Vec<Seen> {
+    let corner = |v: u32| (mesh.vertex(v), mesh.positions()[v as usize], mesh.levels(v).to_vec());
+    let mut tets: Vec<Seen> = found
+        .iter()
+        .map(|&t| {
+            let mut tet = mesh.tet(t).expect("it was found").map(corner);
+            tet.sort();
+            tet
+        })
+        .collect();
+    tets.sort();
+    tets
+}
+
+/// Applies all updates in order, and shows for each what it removed and inserted.
+fn replayed(mt: &impl MultiTessellation, mut each: impl FnMut(UpdateId, [Vec<Seen>; 2])) -> CurrentMesh {
+    let mut mesh = mt.start().expect("a valid base mesh");
+    mt.announce(&mut mesh, 0);
+    for u in (0..mt.updates()).map(UpdateId) {
+        let (mut removed, mut found) = (Vec::new(), Vec::new());
+        mt.find_removed(&mut mesh, u, &mut removed).expect("a valid MT");
+        let removed = seen(&mesh, &removed);
+        assert_eq!(mt.refine(&mut mesh, u), Ok(Applied::Done), "{u:?}");
+        mt.find_inserted(&mut mesh, u, &mut found).expect("a valid MT");
+        each(u, [removed, seen(&mesh, &found)]);
+    }
+    mesh
+}
+
+/// Asserts that two MTs have the same description, base mesh and errors, and that every update does the same in both.
+pub fn assert_same(a: &impl MultiTessellation, b: &impl MultiTessellation) {
+    assert_eq!((a.info(), a.base(), a.updates()), (b.info(), b.base(), b.updates()));
+    let mut steps = Vec::new();
+    let mesh = replayed(a, |u, step| steps.push((a.errors(u).to_vec(), step)));
+    let mut expected = steps.into_iter();
+    let other = replayed(b, |u, step| {
+        assert!(expected.next() == Some((b.errors(u).to_vec(), step)), "{u:?} does something else");
+    });
+    assert_eq!(mesh.check(), Ok(()));
+    let live = |mesh: &CurrentMesh| {
+        let slots: Vec<u32> = (0..mesh.tet_slots() as u32).filter(|&t| mesh.tet(t).is_some()).collect();
+        seen(mesh, &slots)
+    };
+    assert!(live(&mesh) == live(&other), "the reference meshes differ");
 }
 
 /// Whether `part` is `whole` cut off behind some update.
@@ -294,5 +325,5 @@ pub fn assemble(sections: &[([u8; 4], Vec<u8>)], updates: u32) -> Vec<u8> {
     end.extend((framed.len() as u32).to_le_bytes());
     end.extend(crc32(&[&crcs]).to_le_bytes());
     let body = [framed.concat(), section(b"ENDF", &end)].concat();
-    [header([1, 0], 0, 32 + body.len() as u64), body].concat()
+    [header([2, 0], 0, 32 + body.len() as u64), body].concat()
 }
