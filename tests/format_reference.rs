@@ -44,7 +44,7 @@ use tetralod::mt::VertexSplit;
 
 fn options(block_bits: u32) -> EncodeOptions {
     let metadata = [("tool".to_owned(), "hand".to_owned()), ("a".to_owned(), String::new())];
-    EncodeOptions { block_bits, metadata: metadata.into() }
+    EncodeOptions { block_bits, exact: Vec::new(), metadata: metadata.into() }
 }
 
 /// Reads a file both ways, block by block.
@@ -264,6 +264,30 @@ fn built_mts_are_read_alike() {
     compare(&encode(&mt, &options(6)).expect("an MT"));
 }
 
+#[test]
+fn exact_values_are_read_alike() {
+    let mut flow = generate::sphere_flow(4).expect("a small size");
+    // One field of single precision, one of double.
+    flow.fields[0].values.iter_mut().for_each(|x| *x = f64::from(*x as f32));
+    let config = BuildConfig { all_fields: true, all_lossless: true, ..BuildConfig::default() };
+    let built = edge_mt(&flow, &config, &mut |_| ControlFlow::Continue(())).expect("a valid mesh");
+    assert_eq!(built.exact.len(), 2);
+    let options = EncodeOptions { exact: built.exact.clone(), ..options(5) };
+    let bytes = encode(&built.mt, &options).expect("an MT");
+    compare(&bytes);
+    let file = reader::read(&bytes, |ready| ready[0]);
+    let mesh = refined(&file, |ready| ready[0]);
+    for (ours, theirs) in file.exact.iter().zip(&built.exact) {
+        let field = &file.info.fields[ours.field as usize];
+        assert_eq!(ours.corrections.len(), file.info.vertices as usize);
+        for &(vertex, correction) in &ours.corrections {
+            let level = f64::from(mesh.levels[&vertex][ours.field as usize]);
+            let value = ours.value(field.origin + field.step * level, correction);
+            assert_eq!(Some(value.to_bits()), theirs.get(VertexId(vertex)).map(f64::to_bits));
+        }
+    }
+}
+
 /// The same MT with more of a description, and errors that fill all their bits.
 fn told_more(mt: &EdgeMt) -> EdgeMt {
     let mut info = mt.info().clone();
@@ -429,7 +453,7 @@ fn the_example_is_written_and_read_as_specified() {
     };
     mt.push(&split).expect("the example is an MT");
     let metadata = [("tool".to_owned(), "hand".to_owned())].into();
-    let bytes = encode(&mt, &EncodeOptions { block_bits: 4, metadata }).expect("an MT");
+    let bytes = encode(&mt, &EncodeOptions { block_bits: 4, exact: Vec::new(), metadata }).expect("an MT");
     let hex = |bytes: &[u8]| bytes.iter().map(|b| format!("{b:02X} ")).collect::<String>();
     assert_eq!(hex(&bytes), hex(&example()));
     compare(&example());

@@ -72,10 +72,12 @@ pub const WRONG: Row = symbols(68, 132, 2);
 pub const ERROR: Row = symbols(200, 16, 256);
 pub const LEVEL: Row = numbers(216, 128, 1);
 pub const BASE_LEVEL: Row = numbers(344, 1, 2);
+pub const VALUE_GAP: Row = numbers(345, 1, 1);
+pub const VALUE_BITS: Row = symbols(346, 2, 65);
 
-const ROWS: [Row; 15] = [
+const ROWS: [Row; 17] = [
     BEHIND, SEED, LENGTH, STEP, RANK, GAP, RUN, CHILDREN, RISE, OFFSET, LAST_WRONG, WRONG, ERROR, LEVEL,
-    BASE_LEVEL,
+    BASE_LEVEL, VALUE_GAP, VALUE_BITS,
 ];
 
 /// Symbols with their shares.

@@ -2,6 +2,7 @@
 //! stops at whatever is wrong.
 
 mod coded;
+pub mod exact;
 pub mod growth;
 pub mod plain;
 pub mod splits;
@@ -9,6 +10,7 @@ pub mod wire;
 
 use coded::BASE_LEVEL;
 use coded::Coded;
+use exact::Exact;
 use growth::Growth;
 use splits::Split;
 use std::collections::BTreeSet;
@@ -27,6 +29,7 @@ pub struct File {
     /// By field, then by vertex.
     pub base_levels: Vec<Vec<i32>>,
     pub splits: HashMap<u32, Split>,
+    pub exact: Vec<Exact>,
     /// Where each block is in the file.
     pub blocks: Vec<Range<usize>>,
 }
@@ -83,8 +86,11 @@ pub fn read(file: &[u8], mut choose: impl FnMut(&[u32]) -> u32) -> File {
         blocks.push(start..at as usize);
     }
     assert!(known.next().is_none());
+    let values = front.iter().filter(|section| &section.kind == b"fldx");
+    let exact: Vec<Exact> = values.map(|section| exact::read(section.payload, &tables)).collect();
+    assert!(exact.windows(2).all(|pair| pair[0].field < pair[1].field));
     check_end(end, front, &info);
-    let mut file = File { info, index, base, base_levels, splits: HashMap::new(), blocks };
+    let mut file = File { info, index, base, base_levels, splits: HashMap::new(), exact, blocks };
     let mut left: BTreeSet<u32> = (0..parts_of.len() as u32).collect();
     let mut closures: HashMap<u32, BTreeSet<u32>> = HashMap::new();
     while !left.is_empty() {
