@@ -146,10 +146,8 @@ impl<'a> Coded<'a> {
             let share = u64::from(share);
             if q < start + share {
                 self.state = self.state / 4096 * share + q - start;
-                if self.state < 1 << 16 {
-                    if let Some(word) = self.words.pop() {
-                        self.state = self.state << 16 | u64::from(word);
-                    }
+                if let Some(word) = self.words.pop_if(|_| self.state < 1 << 16) {
+                    self.state = self.state << 16 | u64::from(word);
                 }
                 return symbol;
             }
