@@ -1,8 +1,9 @@
 /** The wasm core behind the methods that `MultiTessellation` calls: in a worker, or in the caller's own thread. */
 
-import init, { CoreSession } from "./tetralod_core.js";
+import init, { CoreSession, RangeLoader } from "./tetralod_core.js";
 import { TetralodError, reviveError } from "./errors.js";
 import { received } from "./options.js";
+import { Parts } from "./parts.js";
 import { nodeModule } from "./stream.js";
 
 let loading;
@@ -23,30 +24,95 @@ async function load() {
   return init({ module_or_path: fs ? await fs.readFile(url) : url });
 }
 
-/** The methods of one session, for `serve` or `local`. */
-export function coreMethods() {
+/** The methods that wait for bytes, beside which others are answered. */
+export const WAITING = ["openParts", "reach", "settled", "arrived"];
+
+/** What adds up over the steps of a refinement. */
+const SUMS = ["refined", "coarsened", "forced", "judged", "milliseconds"];
+
+/** The methods of one session, for `serve` or `Local`; `emit` tells what nobody asked for. */
+export function coreMethods(emit) {
   let session;
-  /** Goes on for so many milliseconds and updates, and gives the mesh that is there then, or what has changed in it. */
-  const step = (milliseconds, updates, deltas) => {
+  /** @type {Parts | undefined} */
+  let parts;
+  /** Counts the meshes that were asked for. */
+  let goal = 0;
+  const aim = (options) => {
+    session.aim(options);
+    goal++;
+    parts?.turn();
+  };
+  /** One step; `more` says whether there is more to do, now or when more has come. */
+  const advance = (milliseconds, updates) => {
     const start = performance.now();
+    parts?.look();
+    const here = parts && session.blocks().here;
     const stats = session.step(milliseconds, updates);
     stats.milliseconds = performance.now() - start;
-    return { ...(deltas ? session.delta() : session.mesh()), stats };
+    if (!parts) return { stats, more: !stats.done };
+    // Where there was no room for blocks, there may be now.
+    const { here: now } = session.blocks();
+    parts.follow();
+    if (now !== here || parts.hasNews) stats.done = false;
+    return { stats, more: !stats.done || parts.isWaiting };
   };
+  /** Goes on with all that is here. */
+  const advanceAll = () => {
+    let all;
+    let step;
+    do {
+      step = advance(Infinity, Infinity);
+      if (all) for (const name of SUMS) step.stats[name] += all[name];
+      all = step.stats;
+    } while (!step.stats.done);
+    return step;
+  };
+  /** The mesh as it is now, or what has changed in it, after a step. */
+  const result = ({ stats, more }, deltas) => ({ ...(deltas ? session.delta() : session.mesh()), stats, more });
   return {
-    async start() {
+    async start(fields) {
       await loadCore();
-      session = new CoreSession();
+      session = new CoreSession(fields);
+    },
+    /** Opens a file in parts; resolves to nothing where the server gives no ranges, and otherwise when the base mesh is there. */
+    async openParts(url, { fields, memory, ...options }) {
+      await loadCore();
+      session = new CoreSession(fields, memory);
+      parts = new Parts(RangeLoader, session, url, options, (progress) => emit("progress", progress));
+      if (await parts.begin()) return { info: session.info(), progress: parts.progress };
+      session.free();
+      [session, parts] = [undefined, undefined];
+      return undefined;
     },
     feed: (bytes) => session.feed(bytes),
     finish: () => session.finish(),
     info: () => session.info(),
     async refine(options, deltas) {
-      session.aim(await received(options));
-      return step(Infinity, Infinity, deltas);
+      aim(await received(options));
+      return result(advanceAll(), deltas);
     },
-    aim: async (options) => session.aim(await received(options)),
-    step,
+    /** The same when all has come that it needs. */
+    async reach(options, deltas) {
+      aim(await received(options));
+      const mine = goal;
+      let step = advanceAll();
+      while (step.more) {
+        const before = step.stats;
+        await parts.settled();
+        if (mine !== goal) break;
+        step = advanceAll();
+        for (const name of SUMS) step.stats[name] += before[name];
+      }
+      if (mine === goal) return result(step, deltas);
+      throw new TetralodError("replaced", "another mesh was asked for before all had come that this one needs");
+    },
+    aim: async (options) => aim(await received(options)),
+    step: (milliseconds, updates, deltas) => result(advance(milliseconds, updates), deltas),
+    settled: () => parts.settled(),
+    arrived: () => parts.arrived(),
+    retry: () => parts.retry(),
+    /** Ends the fetching; the mesh stays usable. */
+    halt: () => parts?.close(new TetralodError("freed", "the download was ended")),
     setField: (name) => session.setField(name),
     isosurface: (values, smooth) => session.isosurfaces(values, smooth),
     slice: (normal, offset) => session.slice(normal, offset),
@@ -57,14 +123,22 @@ export function coreMethods() {
       session.streamlines(fields, seeds, backward, maxLength, maxSteps),
     stats: (bins, low, high) => session.stats(bins, low, high),
     hash: () => session.hash(),
-    free: () => session?.free(),
+    free() {
+      parts?.close(new TetralodError("freed", "this MultiTessellation has been freed"));
+      session?.free();
+    },
   };
 }
 
 /** The same calls as `Remote` makes, without a worker. */
 export class Local {
-  #methods = coreMethods();
+  #methods;
   #closed = null;
+
+  /** @param {(name: string, data: any) => void} [onEvent] gets what the session tells unasked */
+  constructor(onEvent = () => {}) {
+    this.#methods = coreMethods(onEvent);
+  }
 
   async call(method, args = []) {
     if (this.#closed) throw this.#closed;

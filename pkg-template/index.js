@@ -5,13 +5,14 @@
 import { applyChanges, emptyMesh } from "./changes.js";
 import { Local } from "./core.js";
 import { TetralodError } from "./errors.js";
-import { sendable } from "./options.js";
+import { openOptions, sendable } from "./options.js";
 import { Remote, nodeEndpoint, webEndpoint } from "./rpc.js";
-import { nodeModule, openSource, pump } from "./stream.js";
+import { abortable, nodeModule, openSource, pump, rangesOf } from "./stream.js";
 
 export { TetralodError, applyChanges, emptyMesh };
 
 const OPEN_OPTIONS = ["signal", "onProgress", "worker"];
+const NO_RETRY = "only what is fetched in parts can go on: open it again";
 const STEP_OPTIONS = ["budgetMs", "updates", "deltas", "signal"];
 
 /** A volume that is open: it can be refined while the rest of it is still arriving. */
@@ -19,19 +20,23 @@ export class MultiTessellation {
   #core;
   #info;
   #progress = { ready: false, complete: false, bytes: 0, total: undefined, updates: 0 };
+  /** For a stream, when it has ended; nothing for a file in parts. */
   #complete;
+  #onProgress;
   #stop = new AbortController();
   #inWorker;
   /** Counts the meshes that were asked for: each one replaces those before it. */
   #goal = 0;
 
   static async open(source, options = {}) {
-    checkNames(options, OPEN_OPTIONS);
-    const { signal, onProgress = () => {}, worker = true } = options;
+    const { signal, onProgress = () => {}, worker = true, ...how } = options;
+    const fetching = openOptions(how, OPEN_OPTIONS);
     signal?.throwIfAborted();
-    const mt = new MultiTessellation(worker ? startWorker() : new Local(), Boolean(worker));
+    let mt;
+    const onEvent = (_, progress) => mt.#tell(progress);
+    mt = new MultiTessellation(worker ? startWorker(onEvent) : new Local(onEvent), Boolean(worker), onProgress);
     try {
-      await mt.#begin(source, signal, onProgress);
+      await mt.#begin(source, signal, fetching);
     } catch (error) {
       mt.#close(error);
       throw error;
@@ -40,9 +45,10 @@ export class MultiTessellation {
   }
 
   /** @private use `MultiTessellation.open` */
-  constructor(core, inWorker) {
+  constructor(core, inWorker, onProgress) {
     this.#core = core;
     this.#inWorker = inWorker;
+    this.#onProgress = onProgress;
   }
 
   get info() {
@@ -54,14 +60,26 @@ export class MultiTessellation {
   }
 
   get complete() {
-    return this.#complete;
+    if (this.#complete) return this.#complete;
+    const settled = this.#wait("settled");
+    settled.catch(() => {});
+    return settled;
+  }
+
+  async retry() {
+    if (this.#complete) throw new TetralodError("bad-source", NO_RETRY);
+    await this.#wait("retry");
   }
 
   async refine(options = {}, how = {}) {
-    checkNames(how, ["deltas"]);
+    checkNames(how, ["deltas", "complete"]);
+    const { deltas = false, complete = false } = how;
     const sent = sendable(options, this.#inWorker);
     this.#goal++;
-    return this.#core.call("refine", [sent, Boolean(how.deltas)]);
+    if (complete && this.#complete) await this.#complete;
+    const method = complete && !this.#complete ? "reach" : "refine";
+    const { more, ...result } = await this.#wait(method, [sent, Boolean(deltas)], method === "reach");
+    return result;
   }
 
   async *refineSteps(options = {}, how = {}) {
@@ -74,14 +92,16 @@ export class MultiTessellation {
     await this.#core.call("aim", [sendable(options, this.#inWorker)]);
     for (let done = false; !done && goal === this.#goal; ) {
       signal?.throwIfAborted();
-      const step = await this.#core.call("step", [budgetMs, updates, Boolean(deltas)]);
+      const { more, ...step } = await this.#core.call("step", [budgetMs, updates, Boolean(deltas)]);
       yield step;
-      done = step.stats.done;
+      done = !more;
+      if (!more || !step.stats.done || goal !== this.#goal) continue;
+      await abortable(this.#wait("arrived"), signal);
     }
   }
 
-  async setField(name) {
-    await this.#core.call("setField", [name]);
+  async setField(field) {
+    await this.#core.call("setField", [field]);
   }
 
   async isosurface(values, how = {}) {
@@ -147,31 +167,60 @@ export class MultiTessellation {
     this.#core.close(reason);
   }
 
-  /** Resolves when the base mesh is there; the rest of the stream goes on behind `complete`. */
-  async #begin(source, outer, onProgress) {
+  /** A call that may wait for bytes: the end of the download ends the wait. */
+  #wait(method, args = [], waits = true) {
+    const called = this.#core.call(method, args);
+    return waits ? abortable(called, this.#stop.signal) : called;
+  }
+
+  #tell(progress) {
+    this.#progress = progress;
+    this.#onProgress(progress);
+  }
+
+  /** Resolves when the base mesh is there; the rest comes behind `complete`, or when it is needed. */
+  async #begin(source, outer, fetching) {
     const forward = () => this.#stop.abort(outer.reason);
     outer?.addEventListener("abort", forward, { once: true });
+    const ranges = fetching.whole ? undefined : rangesOf(source, fetching);
+    if (ranges && (await this.#beginParts({ ...fetching, ...ranges }))) return;
+    await this.#beginStream(source, fetching, () => outer?.removeEventListener("abort", forward));
+  }
+
+  /** Whether the file comes in parts. */
+  async #beginParts({ url, whole, ...options }) {
+    const opened = await this.#wait("openParts", [url, options]);
+    if (!opened) return false;
+    this.#info = opened.info;
+    if (!this.#progress.ready) this.#tell(opened.progress);
+    this.#stop.signal.addEventListener("abort", () => this.#core.call("halt").catch(() => {}), { once: true });
+    return true;
+  }
+
+  async #beginStream(source, fetching, then) {
     const { signal } = this.#stop;
-    const starting = this.#core.call("start");
+    const starting = this.#core.call("start", [fetching.fields]);
     starting.catch(() => {});
     let isReady;
     const ready = new Promise((resolve) => (isReady = resolve));
-    this.#complete = this.#stream(source, signal, starting, async (progress, total) => {
-      this.#progress = { ...progress, total: progress.total ?? total };
+    const onProgress = async (progress, total) => {
       if (progress.ready && !this.#info) {
         this.#info = await this.#core.call("info");
         isReady();
       }
-      onProgress(this.#progress);
-    }).finally(() => outer?.removeEventListener("abort", forward));
+      this.#tell({ ...progress, total: progress.total ?? total });
+    };
+    this.#complete = this.#stream(source, fetching, starting, onProgress).finally(then);
     // Whoever does not wait for the end must not get an unhandled rejection for it.
     this.#complete.catch(() => {});
+    signal.throwIfAborted();
     await Promise.race([ready, this.#complete]);
     if (!this.#info) throw new TetralodError("truncated", "the file ended before its base mesh");
   }
 
-  async #stream(source, signal, starting, onProgress) {
-    const opened = await openSource(source, signal);
+  async #stream(source, fetching, starting, onProgress) {
+    const { signal } = this.#stop;
+    const opened = await openSource(source, signal, fetching);
     await starting;
     const report = (progress) => onProgress(progress, opened.total);
     const feed = async (chunk) => report(await this.#core.call("feed", [chunk], [chunk.buffer]));
@@ -205,8 +254,8 @@ function checkNumber(name, number) {
   if (typeof number !== "number") throw new TetralodError("bad-option", `option \`${name}\`: must be a number`);
 }
 
-function startWorker() {
+function startWorker(onEvent) {
   const node = nodeModule("node:worker_threads");
-  if (node) return new Remote(nodeEndpoint(new node.Worker(new URL("./worker.js", import.meta.url))));
-  return new Remote(webEndpoint(new Worker(new URL("./worker.js", import.meta.url), { type: "module" })));
+  if (node) return new Remote(nodeEndpoint(new node.Worker(new URL("./worker.js", import.meta.url))), onEvent);
+  return new Remote(webEndpoint(new Worker(new URL("./worker.js", import.meta.url), { type: "module" })), onEvent);
 }

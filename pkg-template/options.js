@@ -2,6 +2,30 @@
 
 import { TetralodError } from "./errors.js";
 
+/** How a source is read: what `MultiTessellation.open` and `Viewer.open` have in common. */
+const READING = ["fields", "memory", "cache", "whole", "headers", "credentials", "retries", "backoffMs", "timeoutMs"];
+
+/** Bytes that the blocks of a file may take in memory, unless somebody says otherwise. */
+const MEMORY = 512 * 2 ** 20;
+
+/** The options of `READING`, checked, with their defaults; `others` are names that are handled elsewhere. */
+export function openOptions(options, others) {
+  const refuse = (name, problem) => {
+    throw new TetralodError("bad-option", `option \`${name}\`: ${problem}`);
+  };
+  for (const name of Object.keys(options)) {
+    if (!READING.includes(name)) refuse(name, `there is none of this name, only ${[...others, ...READING].join(", ")}`);
+  }
+  const { fields = [], memory = MEMORY, cache, retries, backoffMs, timeoutMs } = options;
+  const isText = (value) => typeof value === "string";
+  if (!Array.isArray(fields) || !fields.every(isText)) refuse("fields", "must be a list of names");
+  if (cache !== undefined && !isText(cache)) refuse("cache", "must be the name of a cache");
+  for (const [name, amount] of Object.entries({ memory, retries, backoffMs, timeoutMs })) {
+    if (amount !== undefined && !(amount >= 0)) refuse(name, "must be a number that is not negative");
+  }
+  return { ...options, fields, memory };
+}
+
 const NO_FUNCTION =
   "option `where`: a function cannot be sent to a worker; open with `worker: false`, or give the URL of a module " +
   "whose default export is the function";

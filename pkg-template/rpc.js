@@ -98,12 +98,16 @@ export class Remote {
  *
  * @param {Endpoint} endpoint
  * @param {Record<string, (...args: any[]) => any>} methods
+ * @param {string[]} [beside] names of methods that wait for something: calls that come later do not wait for them
  * @returns {(name: string, data: any) => void} emits an event that the caller did not ask for
  */
-export function serve(endpoint, methods) {
+export function serve(endpoint, methods, beside = []) {
   let queue = Promise.resolve();
   endpoint.onMessage((message) => {
-    queue = queue.then(() => answer(endpoint, methods, message));
+    queue = queue.then(() => {
+      const answered = answer(endpoint, methods, message);
+      return beside.includes(message.method) ? undefined : answered;
+    });
   });
   return (event, data) => endpoint.post({ event, data }, buffersOf(data));
 }

@@ -22,13 +22,14 @@ const PIECE = 1 << 20;
  *
  * @param {import("./index.js").Source} source
  * @param {AbortSignal} [signal]
+ * @param {{ headers?: HeadersInit, credentials?: RequestCredentials }} [along] goes along with a request
  * @returns {Promise<OpenSource>}
  */
-export async function openSource(source, signal) {
+export async function openSource(source, signal, { headers, credentials } = {}) {
   signal?.throwIfAborted();
   const url = urlOf(source);
   if (url?.startsWith("file:") && nodeModule("node:fs")) return openFile(url);
-  if (url !== undefined) return openResponse(await request(source, url, signal), url);
+  if (url !== undefined) return openResponse(await request(source, url, { signal, headers, credentials }), url);
   if (isInstance(source, "Response")) return openResponse(source, source.url || "response");
   if (isInstance(source, "Blob")) return open("blob", source.size, source.stream());
   const bytes = bytesOf(source);
@@ -69,7 +70,7 @@ function naming(name, error) {
 }
 
 /** `promise`, or the signal's reason as soon as it fires. */
-function abortable(promise, signal) {
+export function abortable(promise, signal) {
   if (!signal) return promise;
   return new Promise((resolve, reject) => {
     const onAbort = () => reject(signal.reason);
@@ -81,11 +82,13 @@ function abortable(promise, signal) {
   });
 }
 
-async function request(source, url, signal) {
+async function request(source, url, options) {
   try {
-    return await fetch(source, { signal });
+    // A Request keeps what is not said otherwise; undefined would say otherwise.
+    const said = Object.entries(options).filter(([, value]) => value !== undefined);
+    return await fetch(source, Object.fromEntries(said));
   } catch (error) {
-    signal?.throwIfAborted();
+    options.signal?.throwIfAborted();
     if (error?.name === "AbortError") throw error;
     throw new TetralodError("network", `${url}: ${error?.cause?.message ?? error.message}`, { cause: error });
   }
@@ -165,6 +168,31 @@ function bytesOf(value) {
   if (!ArrayBuffer.isView(value)) return undefined;
   // A plain Uint8Array over the same bytes: `slice` of a Node Buffer would share its pool.
   return new Uint8Array(value.buffer, value.byteOffset, value.byteLength);
+}
+
+/**
+ * What `Ranges` needs to fetch `source` in parts, if that is a file on a server: its address, and what goes along.
+ *
+ * @returns {{ url: string, headers?: [string, string][], credentials?: RequestCredentials } | undefined}
+ */
+export function rangesOf(source, { headers, credentials } = {}) {
+  const given = urlOf(source);
+  const url = given === undefined ? "" : absolute(given);
+  if (!/^https?:/.test(url)) return undefined;
+  const request = isInstance(source, "Request") ? source : undefined;
+  if (request && request.method !== "GET") return undefined;
+  const own = new Headers(request?.headers);
+  new Headers(headers).forEach((value, name) => own.set(name, value));
+  return { url, headers: [...own], credentials: credentials ?? request?.credentials };
+}
+
+/** `url` as it means the same in a worker; as it is where it means nothing. */
+function absolute(url) {
+  try {
+    return new URL(url, globalThis.location?.href).href;
+  } catch {
+    return url;
+  }
 }
 
 function urlOf(source) {

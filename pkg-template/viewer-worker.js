@@ -5,20 +5,25 @@
  * for in steps between them, so that the camera waits for a step at most.
  */
 
-import init, { Viewer } from "./tetralod_viewer.js";
+import init, { RangeLoader, Viewer } from "./tetralod_viewer.js";
 import { TetralodError, flattenError } from "./errors.js";
 import { received } from "./options.js";
+import { Parts } from "./parts.js";
 import { serve, webEndpoint } from "./rpc.js";
 
 /** While a file streams in, the mesh follows it this often (in ms), and at most half of the time is spent on that. */
 const FOLLOW = 120;
 /** A step is as long as the last picture took, but not shorter or longer than this (in ms). */
 const STEP = [6, 30];
+/** How much of a file is asked for first. */
+const FIRST_BYTES = 1 << 16;
 /** Hidden pages have no frames: their meshes follow in steps this far apart (in ms). */
 const HIDDEN = 200;
 
 /** @type {Viewer | undefined} */
 let viewer;
+/** What fetches the blocks of a file that comes in parts. @type {Parts | undefined} */
+let parts;
 /** What `refine` was last asked for, and whether the viewer knows of it: it cannot before the base mesh is there. */
 let request = {};
 let aimed = false;
@@ -32,13 +37,15 @@ let drawing = 0;
 let bytes = 0;
 let ready = false;
 let frameAsked = false;
+/** The mesh is going to follow what has come. */
+let following;
 let hidden;
 let broken = false;
 
 const nextFrame =
   typeof requestAnimationFrame === "function" ? requestAnimationFrame : (then) => setTimeout(then, 16);
 
-const emit = serve(webEndpoint(globalThis), {
+const methods = {
   async create(canvas, width, height, ratio) {
     await init().catch((error) => {
       throw new TetralodError("wasm", `the wasm module did not load: ${error?.message ?? error}`);
@@ -48,14 +55,9 @@ const emit = serve(webEndpoint(globalThis), {
     return { adapter: viewer.adapter(), palette: viewer.palette() };
   },
 
-  clear() {
-    viewer.clear();
-    request = {};
-    aimed = false;
-    bytes = 0;
-    ready = false;
-    lastRefine = { end: -Infinity, took: 0 };
-    invalidate();
+  clear(fields) {
+    methods.halt();
+    clear(fields);
   },
 
   /** Takes a chunk; the answer to the one that brings the base mesh waits until the first picture is out. */
@@ -71,6 +73,46 @@ const emit = serve(webEndpoint(globalThis), {
     if (!first) return { progress };
     await drawn();
     return { progress, info: { ...viewer.info(), bounds: Array.from(viewer.bounds()) } };
+  },
+
+  /**
+   * Opens a file in parts; resolves to nothing where the server gives no ranges, and otherwise when it has been drawn. What
+   * is shown stays until the first bytes are here.
+   */
+  async openParts(url, { fields, memory, ...options }) {
+    methods.halt();
+    let begun = false;
+    const session = {
+      wanted: () => (begun ? viewer.wanted() : Float64Array.of(0, FIRST_BYTES, 1)),
+      take(start, bytes) {
+        if (!begun) clear(fields, memory);
+        begun = true;
+        return viewer.take(start, bytes);
+      },
+      blocks: () => viewer.blocks(),
+    };
+    const onError = (error) => ready && begun && emit("error", flattenError(error));
+    const mine = (parts = new Parts(RangeLoader, session, url, options, partsCame, onError));
+    const served = await mine.begin();
+    if (mine !== parts) throw new TetralodError("replaced", "another volume was opened");
+    if (!served) {
+      parts = undefined;
+      return undefined;
+    }
+    ready = true;
+    invalidate();
+    await drawn();
+    return { progress: mine.progress, info: { ...viewer.info(), bounds: Array.from(viewer.bounds()) } };
+  },
+
+  /** Resolves when all has come that the mesh needs. */
+  settled: () => parts?.settled(),
+
+  retry: () => parts?.retry(),
+
+  halt() {
+    parts?.close(new TetralodError("replaced", "the download was ended"));
+    parts = undefined;
   },
 
   finish() {
@@ -109,11 +151,40 @@ const emit = serve(webEndpoint(globalThis), {
   },
 
   hash: () => viewer.hash(),
-});
+};
+const emit = serve(webEndpoint(globalThis), methods, ["openParts", "settled"]);
+
+/** Blocks have come: the mesh follows them as it follows a stream. */
+function partsCame(progress) {
+  bytes = progress.bytes;
+  emit("progress", progress);
+  if (!ready || !aimed) return;
+  const wait = Math.max(FOLLOW, 2 * lastRefine.took) - (performance.now() - lastRefine.end);
+  following ??= setTimeout(followParts, Math.max(wait, 0));
+}
+
+function followParts() {
+  following = undefined;
+  if (!parts || !ready || !aimed) return;
+  viewer.aimAgain();
+  invalidate();
+}
+
+/** Makes place for another volume. */
+function clear(fields, memory) {
+  viewer.clear(fields, memory);
+  request = {};
+  aimed = false;
+  bytes = 0;
+  ready = false;
+  lastRefine = { end: -Infinity, took: 0 };
+  invalidate();
+}
 
 /** Has the viewer aim at the request; throws if that cannot be met. */
 function aim() {
   viewer.aim(request);
+  parts?.turn();
   aimed = true;
   goal++;
   total = { refined: 0, coarsened: 0, forced: 0, judged: 0, milliseconds: 0 };
@@ -135,12 +206,16 @@ function follow() {
 function step(budget) {
   const start = performance.now();
   try {
+    const here = parts && viewer.blocks().here;
     const stats = viewer.step(budget);
     const end = performance.now();
+    parts?.follow();
+    // Where there was no room for blocks, there may be now. A view that follows the camera may want others.
+    if (parts && stats.done && viewer.blocks().here !== here) viewer.aimAgain();
     stats.milliseconds = end - start;
     for (const name of Object.keys(total)) total[name] += stats[name];
     if (stats.done) lastRefine = { end, took: total.milliseconds };
-    emit("stats", { ...stats, ...total, bytes, goal });
+    emit("stats", { ...stats, ...total, bytes, goal, blocks: parts && viewer.blocks() });
     if (stats.done) Object.keys(total).forEach((name) => (total[name] = 0));
   } catch (error) {
     emit("failed", { goal, error: flattenError(error) });

@@ -7,9 +7,9 @@
 
 import { TetralodError, reviveError } from "./errors.js";
 import { Latest, deferred, mergeUpdates } from "./latest.js";
-import { sendable } from "./options.js";
+import { openOptions, sendable } from "./options.js";
 import { Remote, webEndpoint } from "./rpc.js";
-import { openSource, pump } from "./stream.js";
+import { abortable, openSource, pump, rangesOf } from "./stream.js";
 
 export { TetralodError } from "./errors.js";
 
@@ -26,6 +26,8 @@ export class Viewer extends EventTarget {
   #palette;
   #adapter;
   #stream = null;
+  /** For a file in parts: resolves when a mesh is asked for. */
+  #aimed;
   #aim = new Latest((options) => this.#remote.call("aim", [options]));
   /** Those who wait for a mesh, by the number of what they asked for. */
   #waiting = [];
@@ -129,13 +131,17 @@ export class Viewer extends EventTarget {
    * Streams a volume in, in place of the one before. Resolves when its base mesh has been drawn; `finished` of the
    * result when all of it is there.
    */
-  async open(source, { signal } = {}) {
+  async open(source, { signal, ...how } = {}) {
+    const fetching = openOptions(how, ["signal"]);
     this.#stream?.abort(new DOMException("another volume was opened", "AbortError"));
     const control = new AbortController();
     this.#stream = control;
     const stopped = signal ? AbortSignal.any([signal, control.signal]) : control.signal;
-    const opened = await openSource(source, stopped);
-    await this.#remote.call("clear");
+    const ranges = fetching.whole ? undefined : rangesOf(source, fetching);
+    const inParts = ranges && (await this.#openParts({ ...fetching, ...ranges }, stopped));
+    if (inParts) return inParts;
+    const opened = await openSource(source, stopped, fetching);
+    await this.#remote.call("clear", [fetching.fields]);
     stopped.throwIfAborted();
     this.#info = undefined;
     const { promise: ready, resolve, reject } = deferred();
@@ -149,6 +155,30 @@ export class Viewer extends EventTarget {
       if (error?.name !== "AbortError") this.#emit("error", error);
     });
     return { info, name: opened.name, total: opened.total, finished };
+  }
+
+  async #openParts({ url, whole, ...options }, signal) {
+    const { promise, resolve } = deferred();
+    signal.addEventListener("abort", () => this.#remote.call("halt").catch(() => {}), { once: true });
+    const opened = await abortable(this.#remote.call("openParts", [url, options]), signal);
+    if (!opened) return undefined;
+    this.#info = opened.info;
+    this.#aimed = resolve;
+    const finished = abortable(promise.then(() => this.settled()), signal);
+    // The worker tells what goes wrong by itself.
+    finished.catch(() => {});
+    this.#emit("progress", opened.progress);
+    return { info: opened.info, name: url, total: opened.progress.total, finished };
+  }
+
+  /** Of a file that is fetched in parts: resolves when all has come that the mesh needs now. */
+  async settled() {
+    await this.#remote.call("settled");
+  }
+
+  /** Goes on after an error of the network. */
+  async retry() {
+    await this.#remote.call("retry");
   }
 
   async #read(opened, signal, ready) {
@@ -175,6 +205,7 @@ export class Viewer extends EventTarget {
    */
   async refine(options = {}) {
     const goal = await this.#aim.call(sendable(options, true));
+    this.#aimed?.();
     const waiting = { goal, ...deferred() };
     this.#waiting.push(waiting);
     return waiting.promise;

@@ -1,8 +1,9 @@
 /** The worker that holds one session. Runs in browsers and, as a `worker_threads` worker, in Node. */
 
-import { coreMethods } from "./core.js";
+import { WAITING, coreMethods } from "./core.js";
 import { nodeEndpoint, serve, webEndpoint } from "./rpc.js";
 import { nodeModule } from "./stream.js";
 
 const parent = nodeModule("node:worker_threads")?.parentPort;
-serve(parent ? nodeEndpoint(parent) : webEndpoint(globalThis), coreMethods());
+const methods = coreMethods((name, data) => emit(name, data));
+const emit = serve(parent ? nodeEndpoint(parent) : webEndpoint(globalThis), methods, WAITING);

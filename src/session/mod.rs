@@ -109,7 +109,11 @@ impl Session {
 
     /// [`Session::new`] with other limits than the default ones.
     pub fn with_limits(limits: Limits) -> Self {
-        let options = DecodeOptions { limits, ..DecodeOptions::default() };
+        Self::with_options(DecodeOptions { limits, ..DecodeOptions::default() })
+    }
+
+    /// [`Session::new`] with other options than the default ones.
+    pub fn with_options(options: DecodeOptions) -> Self {
         Self { decoder: Decoder::new(options), ..Self::default() }
     }
 
@@ -232,7 +236,7 @@ impl Session {
             coarsened: outcome.coarsened,
             forced: outcome.forced,
             judged: outcome.judged,
-            error_bound: outcome.error.error(),
+            error_bound: outcome.error.error().max(floor(mt.info(), &self.request)),
             excess: outcome.excess,
             bounds,
             satisfied: outcome.satisfied,
@@ -463,6 +467,20 @@ fn view<'a>(front: Option<&'a Front>, shown: &'a Shown) -> MeshView<'a> {
 /// A pixel and a colour of which an excess is a meaningful multiple.
 const LEAST_MULTIPLIED: f64 = 1.0 / (1 << 20) as f64;
 
+/// What the lattices round off of the fields that `request` asks for: no mesh is closer to the input.
+fn floor(info: &MtInfo, request: &Request) -> f64 {
+    request.needs.iter().fold(0.0, |most, need| most.max(need_floor(info, need)))
+}
+
+/// The same for one need; views and transfer functions ask for other things than an error of a field.
+fn need_floor(info: &MtInfo, need: &Need) -> f64 {
+    if matches!(need.part, Part::View(_) | Part::Transfer(_)) {
+        return 0.0;
+    }
+    let fields = need.measured_field().map_or(0..info.fields.len(), |field| field..field + 1);
+    fields.fold(0.0, |most, field| most.max(info.floor(field)))
+}
+
 /// For each need the error that is guaranteed where it counts.
 fn bounds(front: &Front, mt: &Mt, request: &Request, outcome: &Outcome) -> Vec<f64> {
     let error = outcome.error.error();
@@ -473,14 +491,15 @@ fn bounds(front: &Front, mt: &Mt, request: &Request, outcome: &Outcome) -> Vec<f
                 .measured_field()
                 .filter(|_| of_field && mt.info().fields.len() > 1)
                 .map(|field| front.largest_left(mt, Some(field), ErrorCode::at_least(need.error)).error());
-            return if of_field { need.error.min(left.unwrap_or(error)) } else { need.error };
+            let bound = if of_field { need.error.min(left.unwrap_or(error)) } else { return need.error };
+            return bound.max(need_floor(mt.info(), need));
         }
         let measured = matches!(need.part, Part::View(_) | Part::Transfer(_));
         // No multiple of 0 says how large an error is.
         let asked = if measured { need.error.max(LEAST_MULTIPLIED) } else { need.error };
         let alone = Need { error: asked, ..need.clone() };
         let (error, excess) = front.largest_violation(mt, &LodCriterion::new(mt.info(), &alone.into()));
-        if measured { asked * excess } else { error.error() }
+        if measured { asked * excess } else { error.error().max(need_floor(mt.info(), need)) }
     };
     request.needs.iter().map(bound).collect()
 }

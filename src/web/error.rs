@@ -67,7 +67,11 @@ fn format_code(error: &FormatError) -> &'static str {
         FormatError::UnsupportedVersion { .. } | FormatError::UnsupportedFeature { .. } => {
             "unsupported-version"
         }
-        FormatError::Corrupt { .. } | FormatError::Update(_) | FormatError::Base(_) => "corrupt",
+        FormatError::Corrupt { .. }
+        | FormatError::Update(_)
+        | FormatError::Base(_)
+        | FormatError::Page(_) => "corrupt",
+        FormatError::Field { .. } => "bad-option",
         FormatError::Truncated { .. } => "truncated",
         FormatError::Limit { .. } => "limit",
     }

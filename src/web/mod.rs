@@ -7,6 +7,7 @@ mod callback;
 mod error;
 mod loader;
 mod options;
+mod parts;
 mod results;
 mod session;
 mod tools;

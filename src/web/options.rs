@@ -64,8 +64,8 @@ export interface Need {
    * and opacity, 0 to 1 or a percentage, along a ray through the whole model.
    */
   error?: FieldError;
-  /** The name of the field that the need speaks of. Default: the field of the request. */
-  field?: string;
+  /** The field that the need speaks of: its name, or its number in `info.fields`. Default: the field of the request. */
+  field?: string | number;
   /** Only tetrahedra that meet this box count: `[x0, y0, z0, x1, y1, z1]`, or the `Box3` of three.js. */
   box?: ArrayLike<number> | { readonly min: Vector; readonly max: Vector };
   /** Only what meets this ball counts. */
@@ -108,8 +108,11 @@ export type Where = (batch: TetBatch) => ArrayLike<number>;
  * Every option may be left out, and names that are not listed here are refused.
  */
 export interface RefineOptions extends Need {
-  /** The name of the field that errors and values speak of and that the mesh carries. Default: the first. */
-  field?: string;
+  /**
+   * The field that errors and values speak of and that the mesh carries: its name (the first time step of that name), or
+   * its number in `info.fields`. Default: the first.
+   */
+  field?: string | number;
   /** More needs. If they are given and nothing else is, they are the only ones. */
   needs?: readonly Need[];
   /**
@@ -169,7 +172,7 @@ pub struct Asked {
 pub fn asked(options: &JsValue, info: &MtInfo, own: Option<&View>) -> Result<Asked, WebError> {
     let mut parser = Parser { info, own, asked: Asked::default() };
     if options.is_undefined() || options.is_null() {
-        parser.asked.request = Request::within(0.0);
+        parser.asked.request = parser.of_field(Need::within(0.0), 0).into();
         parser.asked.units.push(info.fields[0].range());
         return Ok(parser.asked);
     }
@@ -192,9 +195,23 @@ pub fn asked(options: &JsValue, info: &MtInfo, own: Option<&View>) -> Result<Ask
     Ok(parser.asked)
 }
 
-/// The index of the field `name`.
-pub fn field_index(info: &MtInfo, name: &str) -> Result<usize, WebError> {
-    named_field(info, name).map_err(|problem| WebError::bad_option("field", &problem))
+/// The index of a field that is named, or given by that index.
+pub fn field_index(info: &MtInfo, field: &JsValue) -> Result<usize, WebError> {
+    known_field(info, field).map_err(|problem| WebError::bad_option("field", &problem))
+}
+
+fn known_field(info: &MtInfo, field: &JsValue) -> Result<usize, String> {
+    if let Some(name) = field.as_string() {
+        return named_field(info, &name);
+    }
+    let number = field.as_f64().ok_or("must be a text or a number")?;
+    let index = number as usize;
+    // Casts saturate, and what is no number becomes 0.
+    if index as f64 == number && index < info.fields.len() {
+        Ok(index)
+    } else {
+        Err(format!("there are fields 0 to {}", info.fields.len() - 1))
+    }
 }
 
 fn named_field(info: &MtInfo, name: &str) -> Result<usize, String> {
@@ -246,6 +263,11 @@ impl Parser<'_> {
         Ok(())
     }
 
+    /// `need` of one field, where there are others.
+    fn of_field(&self, need: Need, field: usize) -> Need {
+        if self.info.fields.len() > 1 { need.of_field(field) } else { need }
+    }
+
     /// The need that `options` describe.
     fn need(&mut self, options: &Options) -> Result<(), WebError> {
         let field = options.field(self.info)?.unwrap_or(self.asked.field);
@@ -260,7 +282,8 @@ impl Parser<'_> {
             return self.push(options, "transfer", Need { error, field: None, part }, 1.0);
         }
         let info = &self.info.fields[field];
-        let mut need = Need::within(options.error("error", info.range())?.unwrap_or(0.0));
+        let mut need =
+            self.of_field(Need::within(options.error("error", info.range())?.unwrap_or(0.0)), field);
         let mut name = "error";
         if let Some((kind, region)) = options.region()? {
             name = kind;
@@ -287,10 +310,10 @@ impl Parser<'_> {
         if !(pixels.is_finite() && pixels >= 0.0) {
             return Err(view.refuse("pixels", "must be a finite number that is not negative"));
         }
-        self.push(view, "matrix", Need::seen(camera, pixels), 1.0)?;
+        self.push(view, "matrix", self.of_field(Need::seen(camera, pixels), field), 1.0)?;
         let range = self.info.fields[field].range();
         match view.error("outside", range)? {
-            Some(error) => self.push(view, "outside", Need::within(error), range),
+            Some(error) => self.push(view, "outside", self.of_field(Need::within(error), field), range),
             None => Ok(()),
         }
     }
@@ -429,8 +452,7 @@ impl Options {
 
     fn field(&self, info: &MtInfo) -> Result<Option<usize>, WebError> {
         let Some(value) = self.get("field") else { return Ok(None) };
-        let name = value.as_string().ok_or_else(|| self.refuse("field", "must be a text"))?;
-        named_field(info, &name).map(Some).map_err(|problem| self.refuse("field", &problem))
+        known_field(info, &value).map(Some).map_err(|problem| self.refuse("field", &problem))
     }
 
     /// An error as a part of `range`.

@@ -3,7 +3,6 @@
 use super::options::Asked;
 use crate::bench::BenchReport;
 use crate::bench::Coherent;
-use crate::mt::FieldInfo;
 use crate::mt::MeshChanges;
 use crate::mt::MtInfo;
 use crate::refine::RefineStats;
@@ -34,6 +33,8 @@ export interface Progress {
   total: number | undefined;
   /** Updates decoded; `info.updates` is how many there will be. */
   updates: number;
+  /** Of a file that is fetched in parts: how its blocks stand. */
+  blocks?: BlockProgress;
 }
 
 /** A scalar field of the volume. */
@@ -44,6 +45,28 @@ export interface FieldInfo {
   max: number;
   /** Bits that a value takes on its lattice. */
   bits: number;
+  /** The unit of the values; empty if it is not known. */
+  unit: string;
+  /** The time that the values are of. Time steps of one field are fields of one name. */
+  time: number | undefined;
+  /** Which component of which vector or tensor the field is, from 0, if it is one; without a number its length. */
+  vector: { name: string; component: number | undefined } | undefined;
+  /** The error that is left in the reference mesh, in field units: what storing it rounds off. No bound is smaller. */
+  floor: number;
+}
+
+/** How the blocks of a file stand of which only those come that are needed. */
+export interface BlockProgress {
+  /** Blocks of the file. */
+  all: number;
+  /** Blocks that are here. */
+  here: number;
+  /** Blocks that the request needs, as far as the file's index tells. */
+  needed: number;
+  /** Those of them that are not fetched because there is no room for them. */
+  leftOut: number;
+  /** Bytes of memory that the blocks take. */
+  bytes: number;
 }
 
 /** What is known of a volume as soon as it is open. */
@@ -88,6 +111,8 @@ export interface CoreStats {
   excess: number;
   /** False where a budget, or data that has not arrived yet, kept the mesh from what was asked for. */
   satisfied: boolean;
+  /** Whether the mesh is not yet what was asked for because data is on its way. */
+  missing: boolean;
   /** False while there is more to do: only in the steps of `refineSteps`, and the bounds are not known then. */
   done: boolean;
 }
@@ -183,7 +208,7 @@ pub fn progress(progress: &Progress) -> JsProgress {
 
 /// `info` for JavaScript.
 pub fn info(info: &MtInfo) -> JsInfo {
-    let fields: Array = info.fields.iter().map(field).collect();
+    let fields: Array = (0..info.fields.len()).map(|index| field(info, index)).collect();
     object(&[
         ("kind", info.kind.name().into()),
         ("fields", fields.into()),
@@ -201,12 +226,22 @@ fn bounds(info: &MtInfo) -> [f64; 6] {
     [x0, y0, z0, x1, y1, z1]
 }
 
-fn field(field: &FieldInfo) -> Object {
+fn field(info: &MtInfo, index: usize) -> Object {
+    let field = &info.fields[index];
+    let vector = field.vector.as_ref().map(|part| -> JsValue {
+        let vector: Object =
+            object(&[("name", part.name.as_str().into()), ("component", part.component.into())]);
+        vector.into()
+    });
     object(&[
         ("name", field.name.as_str().into()),
         ("min", field.min.into()),
         ("max", field.max.into()),
         ("bits", field.bits.into()),
+        ("unit", field.unit.as_str().into()),
+        ("time", field.time.into()),
+        ("vector", vector.into()),
+        ("floor", (info.floor(index) * field.range()).into()),
     ])
 }
 
@@ -227,6 +262,7 @@ pub fn stats(stats: &RefineStats, info: &MtInfo, asked: &Asked) -> JsStats {
         ("bounds", list(&bounds)),
         ("excess", stats.excess.into()),
         ("satisfied", stats.satisfied.into()),
+        ("missing", stats.missing.into()),
         ("done", stats.done.into()),
     ])
 }

@@ -5,6 +5,8 @@ use super::error::WebError;
 use super::options;
 use super::options::Asked;
 use super::options::RefineOptions;
+use super::parts;
+use super::parts::JsBlocks;
 use super::results;
 use super::results::Changes;
 use super::results::JsDelta;
@@ -15,6 +17,7 @@ use super::results::JsProgress;
 use super::results::JsStats;
 use crate::mt::MtInfo;
 use crate::session::Session;
+use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 /// A decoder, its MT and the current mesh.
@@ -23,16 +26,35 @@ use wasm_bindgen::prelude::wasm_bindgen;
 pub struct CoreSession {
     session: Session,
     asked: Asked,
+    /// Whether the file comes in parts.
+    in_parts: bool,
     /// How many meshes have been handed out.
     handed: u32,
 }
 
 #[wasm_bindgen]
 impl CoreSession {
-    /// An empty session.
+    /// An empty session for the fields of these names, or for all if none is named. With `room` the file comes in parts:
+    /// `wanted` tells which, `take` takes them, and those that are not needed go when they take more bytes than that.
     #[wasm_bindgen(constructor)]
-    pub fn new() -> Self {
-        Self::default()
+    pub fn new(fields: Vec<String>, room: Option<f64>) -> Self {
+        Self { session: parts::session(fields, room), in_parts: room.is_some(), ..Self::default() }
+    }
+
+    /// Start, end and priority of each range of bytes that is wanted of a file that comes in parts.
+    pub fn wanted(&self) -> Vec<f64> {
+        parts::wanted(&self.session)
+    }
+
+    /// Takes one of these ranges, or less of it at the end of the file.
+    pub fn take(&mut self, start: f64, bytes: &[u8]) -> Result<JsProgress, WebError> {
+        let progress = self.session.take(start as u64, bytes)?;
+        Ok(results::progress(&progress))
+    }
+
+    /// How the blocks stand.
+    pub fn blocks(&self) -> JsBlocks {
+        parts::blocks(&self.session)
     }
 
     /// Takes the next bytes of the file, however they were cut.
@@ -66,14 +88,15 @@ impl CoreSession {
 
     /// Goes on towards that mesh for about so many milliseconds or so many updates, whichever comes first.
     pub fn step(&mut self, milliseconds: f64, updates: f64) -> Result<JsStats, WebError> {
-        let stats = aim::step(&mut self.session, milliseconds, updates)?;
+        let mut stats = aim::step(&mut self.session, milliseconds, updates)?;
+        stats.missing &= parts::is_coming(&self.session, self.in_parts);
         Ok(results::stats(&stats, self.known()?, &self.asked))
     }
 
-    /// The field that `mesh` carries and `isosurface` follows.
+    /// The field that `mesh` carries and `isosurface` follows, by name or number.
     #[wasm_bindgen(js_name = setField)]
-    pub fn set_field(&mut self, name: &str) -> Result<(), WebError> {
-        let index = options::field_index(self.known()?, name)?;
+    pub fn set_field(&mut self, field: &JsValue) -> Result<(), WebError> {
+        let index = options::field_index(self.known()?, field)?;
         Ok(self.session.set_field(index)?)
     }
 

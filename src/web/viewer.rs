@@ -10,6 +10,8 @@ use super::error::WebError;
 use super::options;
 use super::options::Asked;
 use super::options::RefineOptions;
+use super::parts;
+use super::parts::JsBlocks;
 use super::results;
 use super::results::JsInfo;
 use super::results::JsProgress;
@@ -23,6 +25,7 @@ use crate::gpu::Show;
 use crate::mt::MtInfo;
 use crate::refine::Part;
 use crate::refine::View;
+use crate::session::Progress;
 use crate::session::Session;
 use crate::view::ClipPlane;
 use crate::view::Cutaway;
@@ -41,6 +44,8 @@ const ROI_COLOUR: [f32; 4] = [0.36, 0.86, 1.0, 1.0];
 #[wasm_bindgen]
 pub struct Viewer {
     session: Session,
+    /// Whether the file comes in parts.
+    in_parts: bool,
     renderer: Renderer,
     look: Look,
     camera: Camera,
@@ -90,6 +95,7 @@ impl Viewer {
         let camera = Camera::home(&Bounds::EMPTY, renderer.aspect());
         Ok(Self {
             session: Session::default(),
+            in_parts: false,
             look: Look { pixel_ratio: ratio, ..Look::default() },
             camera,
             show: Show::default(),
@@ -118,9 +124,11 @@ impl Viewer {
         self.look.colormap.table::<16>().concat()
     }
 
-    /// Forgets the volume, for another one; what the user has set about the view goes with it.
-    pub fn clear(&mut self) -> Result<(), WebError> {
-        self.session = Session::default();
+    /// Forgets the volume, for another one; what the user has set about the view goes with it. The arguments are those of
+    /// `CoreSession`.
+    pub fn clear(&mut self, fields: Vec<String>, room: Option<f64>) -> Result<(), WebError> {
+        self.session = parts::session(fields, room);
+        self.in_parts = room.is_some();
         (self.bounds, self.roi, self.isovalue) = (None, None, None);
         (self.asked, self.moving) = (Asked::default(), false);
         self.clip = ClipPlane::NOTHING;
@@ -135,10 +143,23 @@ impl Viewer {
     /// Takes the next bytes of the file, however they were cut.
     pub fn feed(&mut self, bytes: &[u8]) -> Result<JsProgress, WebError> {
         let progress = self.session.feed(bytes)?;
-        if progress.ready && self.bounds.is_none() {
-            self.arrive();
-        }
-        Ok(results::progress(&progress))
+        Ok(self.arrived(&progress))
+    }
+
+    /// Start, end and priority of each range of bytes that is wanted of a file that comes in parts.
+    pub fn wanted(&self) -> Vec<f64> {
+        parts::wanted(&self.session)
+    }
+
+    /// Takes one of these ranges, or less of it at the end of the file.
+    pub fn take(&mut self, start: f64, bytes: &[u8]) -> Result<JsProgress, WebError> {
+        let progress = self.session.take(start as u64, bytes)?;
+        Ok(self.arrived(&progress))
+    }
+
+    /// How the blocks stand.
+    pub fn blocks(&self) -> JsBlocks {
+        parts::blocks(&self.session)
     }
 
     /// The file has ended: refuses one that was cut short.
@@ -186,7 +207,8 @@ impl Viewer {
         // What fails would fail again: it is not tried before something else is asked for.
         self.moving = false;
         self.follow_camera()?;
-        let stats = aim::step(&mut self.session, milliseconds, f64::INFINITY)?;
+        let mut stats = aim::step(&mut self.session, milliseconds, f64::INFINITY)?;
+        stats.missing &= parts::is_coming(&self.session, self.in_parts);
         self.moving = !stats.done;
         if stats.refined + stats.coarsened > 0 {
             self.stale = Stale { boxes: self.stale.boxes, ..Stale::MESH };
@@ -381,6 +403,14 @@ impl Viewer {
             self.asked.request.needs[need].part = Part::View(seen);
         }
         Ok(self.session.aim_with(&self.asked.request, &self.asked.custom)?)
+    }
+
+    /// Bytes have come.
+    fn arrived(&mut self, progress: &Progress) -> JsProgress {
+        if progress.ready && self.bounds.is_none() {
+            self.arrive();
+        }
+        results::progress(progress)
     }
 
     /// The base mesh is there: look at it.
