@@ -6,15 +6,15 @@
  * import { MultiTessellation } from "tetralod";
  *
  * const mt = await MultiTessellation.open("combustor.mt", { onProgress: (p) => console.log(p.bytes, "of", p.total) });
- * const coarse = await mt.refine({ error: "5%" });           // while the file is still arriving
- * await mt.complete;
- * const sharp = await mt.refine({ error: "0.1%", isovalues: [0.7], maxTets: 500_000 });
+ * const coarse = await mt.refine({ error: "5%" });           // as far as what has arrived allows
+ * const sharp = await mt.refine({ error: "0.1%", isovalues: [0.7], maxTets: 500_000 }, { complete: true });
  * const surface = await mt.isosurface(0.7);
  * mt.free();
  * ```
  */
 
 import type {
+  BlockProgress,
   CoreStats,
   FieldError,
   FieldInfo,
@@ -39,6 +39,7 @@ import type {
 } from "./tetralod_core.js";
 
 export type {
+  BlockProgress,
   FieldError,
   FieldInfo,
   FieldStats,
@@ -73,10 +74,40 @@ export type Source =
   | ReadableStream<Uint8Array>
   | AsyncIterable<Uint8Array>;
 
-export interface OpenOptions {
+/** How a source is read. */
+export interface ReadOptions {
+  /**
+   * Names of the fields that are wanted; the others are not downloaded, where the file is fetched in parts, and are not
+   * there. Default: all.
+   */
+  fields?: readonly string[];
+  /**
+   * Bytes of memory for the blocks of a file that is fetched in parts. When they are used up, blocks that are not needed
+   * any more go; needed ones that do not fit are not fetched (`progress.blocks.leftOut`). Default: 512 MiB.
+   */
+  memory?: number;
+  /** The name of a cache (Cache Storage) in which the parts are kept for the next time. Default: none. */
+  cache?: string;
+  /** Whether to download the file as a whole, front to back. Default: only where the server gives no byte ranges. */
+  whole?: boolean;
+  /** Headers that go along with every request for a URL; servers of other origins must allow them. */
+  headers?: HeadersInit;
+  /** Whether cookies go along: as for `fetch`. */
+  credentials?: RequestCredentials;
+  /** How often a part is asked for again when a request fails. Default: 5. */
+  retries?: number;
+  /** Milliseconds before the first of these; each later one waits about twice as long. Default: 500. */
+  backoffMs?: number;
+  /** A request without a byte for so many milliseconds has failed. Default: 30000. */
+  timeoutMs?: number;
+  /** So many bytes that are not wanted are rather fetched than asked around. Default: 16384. */
+  gap?: number;
+}
+
+export interface OpenOptions extends ReadOptions {
   /** Ends the download; what is waited for then rejects with the signal's reason, by default an `AbortError`. */
   signal?: AbortSignal;
-  /** Called after every chunk that has been decoded. */
+  /** Called whenever something has arrived and been decoded. */
   onProgress?: (progress: Progress) => void;
   /**
    * Whether decoding and refinement run in a worker of their own (a Web Worker; in Node a `worker_threads` worker), so
@@ -134,8 +165,11 @@ export class MultiTessellation {
   private constructor();
 
   /**
-   * Opens a volume. Resolves as soon as its base mesh has arrived; the rest goes on arriving, see
-   * {@link MultiTessellation.complete}.
+   * Opens a volume. Resolves as soon as its base mesh has arrived.
+   *
+   * A URL (text, `URL`, or a `Request` that gets) of `http` or `https` is fetched in parts, by byte ranges: just those
+   * blocks that the request needs, most important first. Where the server gives no ranges, with `whole`, and from all
+   * other sources the rest goes on arriving as a stream.
    *
    * @example
    * await MultiTessellation.open("https://example.org/combustor.mt");
@@ -150,15 +184,32 @@ export class MultiTessellation {
   /** What the file says about the volume. */
   readonly info: MtInfo;
 
-  /** How much has been decoded; a new object after every chunk. */
+  /** How much has arrived and been decoded; a new object each time. */
   readonly progress: Progress;
 
-  /** Resolves when the whole file has been decoded; rejects when it cannot be. What had arrived stays usable. */
+  /**
+   * Of a stream: resolves when the whole file has been decoded.
+   *
+   * Of a file that is fetched in parts: another promise each time it is read, that resolves when all is here that the
+   * request needs that was made last; before the first one that is at once. Waiting for it does not change the mesh:
+   * call `refine` afterwards, or use its `complete`.
+   *
+   * Rejects with what ended the download; what had arrived stays usable.
+   */
   readonly complete: Promise<void>;
 
   /**
+   * Goes on with a file that is fetched in parts after an error, which all that waits rejects with until then.
+   *
+   * @throws {TetralodError} `changed` if the file was replaced on the server, `bad-source` if it is a stream: open it again
+   */
+  retry(): Promise<void>;
+
+  /**
    * Changes the current mesh to the one that is asked for and gives a copy of it. The cost is that of the difference
-   * from the last one. While the file is arriving this does what the data so far allows: `stats.satisfied` tells.
+   * from the last one. It does at once what the data that is here allows; `stats.missing` tells whether more is on its way.
+   * With `complete` it resolves when all has arrived that the request needs, and rejects with `replaced` if another mesh is
+   * asked for before that, or with what ended the download.
    *
    * @example
    * await mt.refine({ error: "1%" });                                  // within 1 % of the field's range everywhere
@@ -180,12 +231,13 @@ export class MultiTessellation {
    *
    * With `deltas` only what has changed since a mesh was last handed out is sent, for {@link applyChanges}.
    */
-  refine(options?: RefineOptions, how?: { deltas?: false }): Promise<RefineResult>;
-  refine(options: RefineOptions | undefined, how: { deltas: true }): Promise<RefineDelta>;
+  refine(options?: RefineOptions, how?: { deltas?: false; complete?: boolean }): Promise<RefineResult>;
+  refine(options: RefineOptions | undefined, how: { deltas: true; complete?: boolean }): Promise<RefineDelta>;
 
   /**
    * The same in steps, each of which gives a mesh that is valid and within the budget. The loop ends when the mesh is the
    * one that was asked for (`stats.done`), when another one is asked for by `refine` or `refineSteps`, or when it is left.
+   * Of a file that is fetched in parts it goes on as blocks arrive, and throws what ends the download.
    *
    * @example
    * const mesh = await mt.refine({ error: "5%" });
@@ -199,8 +251,11 @@ export class MultiTessellation {
     how: StepOptions & { deltas: true },
   ): AsyncGenerator<RefineDelta, void, void>;
 
-  /** Chooses the field that isosurfaces follow, without changing the mesh; `refine` with `field` does so too. */
-  setField(name: string): Promise<void>;
+  /**
+   * Chooses the field that isosurfaces follow, by name or by number in `info.fields`, without changing the mesh; `refine`
+   * with `field` does so too.
+   */
+  setField(field: string | number): Promise<void>;
 
   /**
    * The isosurface of the current mesh at one value or several, in units of the field, with the value of each vertex. Normals
@@ -281,6 +336,8 @@ export type ErrorCode =
   | "limit"
   /** An option or argument is unknown or has an impossible value; the message names it. */
   | "bad-option"
+  /** Another mesh, or in the viewer another volume, was asked for before all had come that this one needs. */
+  | "replaced"
   /** Nothing has arrived yet that could be asked for. */
   | "not-ready"
   /** The object has been freed. */

@@ -3,7 +3,8 @@
 import { TetralodError } from "./errors.js";
 
 /** How a source is read: what `MultiTessellation.open` and `Viewer.open` have in common. */
-const READING = ["fields", "memory", "cache", "whole", "headers", "credentials", "retries", "backoffMs", "timeoutMs"];
+const NETWORK = ["headers", "credentials", "retries", "backoffMs", "timeoutMs", "gap"];
+const READING = ["fields", "memory", "cache", "whole", ...NETWORK];
 
 /** Bytes that the blocks of a file may take in memory, unless somebody says otherwise. */
 const MEMORY = 512 * 2 ** 20;
@@ -16,11 +17,11 @@ export function openOptions(options, others) {
   for (const name of Object.keys(options)) {
     if (!READING.includes(name)) refuse(name, `there is none of this name, only ${[...others, ...READING].join(", ")}`);
   }
-  const { fields = [], memory = MEMORY, cache, retries, backoffMs, timeoutMs } = options;
+  const { fields = [], memory = MEMORY, cache, retries, backoffMs, timeoutMs, gap } = options;
   const isText = (value) => typeof value === "string";
   if (!Array.isArray(fields) || !fields.every(isText)) refuse("fields", "must be a list of names");
   if (cache !== undefined && !isText(cache)) refuse("cache", "must be the name of a cache");
-  for (const [name, amount] of Object.entries({ memory, retries, backoffMs, timeoutMs })) {
+  for (const [name, amount] of Object.entries({ memory, retries, backoffMs, timeoutMs, gap })) {
     if (amount !== undefined && !(amount >= 0)) refuse(name, "must be a number that is not negative");
   }
   return { ...options, fields, memory };

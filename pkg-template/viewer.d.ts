@@ -1,4 +1,13 @@
-import type { MtInfo, Need, RefineOptions, RefineStats, Source, ViewOptions } from "./index.js";
+import type {
+  BlockProgress,
+  MtInfo,
+  Need,
+  ReadOptions,
+  RefineOptions,
+  RefineStats,
+  Source,
+  ViewOptions,
+} from "./index.js";
 
 export { TetralodError } from "./index.js";
 
@@ -14,6 +23,8 @@ export interface ViewerProgress {
   updates: number;
   /** Size of the file where it is known. */
   total: number | undefined;
+  /** Of a file that is fetched in parts: how its blocks stand. */
+  blocks?: BlockProgress;
 }
 
 /**
@@ -37,6 +48,8 @@ export type OwnView = Pick<ViewOptions, "pixels" | "outside">;
 export interface ViewerStats extends RefineStats {
   /** Bytes of the file that had been decoded. */
   bytes: number;
+  /** Of a file that is fetched in parts: how its blocks stand. */
+  blocks?: BlockProgress;
 }
 
 /** A picture that was drawn. */
@@ -58,7 +71,10 @@ export interface OpenedVolume {
   name: string;
   /** Its size in bytes where that is known. */
   total: number | undefined;
-  /** Settles when the whole file is there, or with what went wrong. */
+  /**
+   * Settles when the whole file is there, or with what went wrong; of a file that is fetched in parts, when all is there
+   * that the first request needs.
+   */
   finished: Promise<void>;
 }
 
@@ -102,8 +118,15 @@ export class Viewer extends EventTarget {
   /** Sixteen evenly spaced colours of the colour map as CSS colours. */
   readonly palette: string[];
 
-  /** Streams a volume in, in place of the one before; resolves when its base mesh has been drawn. */
-  open(source: Source, options?: { signal?: AbortSignal }): Promise<OpenedVolume>;
+  /**
+   * Opens a volume in place of the one before; resolves when its base mesh has been drawn. URLs are fetched in parts where
+   * the server gives byte ranges: the mesh follows the blocks as they arrive.
+   */
+  open(source: Source, options?: ReadOptions & { signal?: AbortSignal }): Promise<OpenedVolume>;
+  /** Of a file that is fetched in parts: resolves when all has come that the mesh needs, rejects with what prevents it. */
+  settled(): Promise<void>;
+  /** Goes on with such a file after an error. Rejects with `changed` if it was replaced on the server: open it again. */
+  retry(): Promise<void>;
   /**
    * Asks for another mesh. While the file streams in, and with the camera's own view while that moves, the mesh follows
    * this request. Resolves when the mesh has been made; calls that were replaced meanwhile, together with the later one.

@@ -179,7 +179,10 @@ impl CoreSession {
         max_steps: f64,
     ) -> Result<JsStreamlines, WebError> {
         let info = self.known()?;
-        let fields = names.iter().map(|name| field_index(info, &name.as_str().into())).collect::<Result<Vec<_>, _>>()?;
+        let fields = names
+            .iter()
+            .map(|name| field_index(info, &name.as_str().into()))
+            .collect::<Result<Vec<_>, _>>()?;
         let fields: [usize; 3] = fields
             .try_into()
             .map_err(|_| WebError::bad_option("fields", "a vector field is the names of three fields"))?;

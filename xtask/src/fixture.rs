@@ -42,7 +42,15 @@ pub fn make() -> Result<()> {
         let [mt, hashes] = [format!("small-{kind}.mt"), format!("hashes-{kind}.json")];
         make_one(&tetralod, &grid, &folder.join(mt), &folder.join(hashes), arguments)?;
     }
-    Ok(())
+    make_blocks(&tetralod, folder)
+}
+
+/// Makes `blocks.mt`, a file of hundreds of blocks.
+fn make_blocks(tetralod: &Path, folder: &Path) -> Result<()> {
+    let (grid, mt) = (folder.join("blocks.vti"), folder.join("blocks.mt"));
+    shell::run(shell::command(tetralod, ["generate", "bucky", "--size", "33", "-o"]).arg(&grid))?;
+    let build = ["build", "--quiet", "--block-updates", "64", "-o"];
+    shell::run(shell::command(tetralod, build).arg(mt).arg(grid))
 }
 
 /// Builds an MT and tells the hashes of its meshes.

@@ -148,6 +148,7 @@ fn js() -> Result<()> {
     shell::run(&mut node_test("ranges.test.js"))?;
     with_fixture(|| {
         shell::run(fixture_env(&mut node_test("package.test.js")))?;
+        shell::run(fixture_env(&mut node_test("parts.test.js")))?;
         shell::run(fixture_env(&mut node_test("steps.test.js")))
     })
 }

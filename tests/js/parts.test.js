@@ -1,0 +1,342 @@
+// Files on servers that are fetched in parts: the meshes are those of the whole file, at fewer bytes, whatever the server
+// does; or there is an error that says what to do about it, and the mesh stays valid.
+import assert from "node:assert/strict";
+import { readFile } from "node:fs/promises";
+import { createServer } from "node:http";
+import { after, before, beforeEach, describe, test } from "node:test";
+import { MultiTessellation, TetralodError } from "../../pkg/index.js";
+
+const folder = process.env.TETRALOD_FIXTURE;
+assert.ok(folder, "TETRALOD_FIXTURE is not set: run `cargo xtask test js`");
+/** Hundreds of blocks. */
+const bytes = new Uint8Array(await readFile(`${folder}/blocks.mt`));
+/** Small parts of the model. */
+const REQUESTS = [
+  { error: "2%", box: [0.1, 0.1, 0.1, 0.3, 0.3, 0.3] },
+  { error: "1%", isovalues: [0.2] },
+  { error: "0.5%", box: [0.6, 0.6, 0.6, 0.8, 0.8, 0.8] },
+];
+/** Blocks of this file are much smaller than those of others, and servers near by. */
+const QUICK = { retries: 3, backoffMs: 5, timeoutMs: 2000, gap: 256 };
+
+let server;
+let base;
+/** What answers now, and what it has been asked and has sent. */
+let answer;
+let asked = [];
+let sent = 0;
+
+before(async () => {
+  server = createServer((request, response) => {
+    const [, start, last] = /^bytes=(\d+)-(\d*)$/.exec(request.headers.range ?? "") ?? [];
+    const range = start !== undefined && {
+      start: Number(start),
+      end: Math.min(last ? Number(last) + 1 : bytes.length, bytes.length),
+    };
+    asked.push({ ...range, headers: request.headers });
+    const number = asked.length - 1;
+    for (const name of ["write", "end"]) {
+      const own = response[name].bind(response);
+      response[name] = (chunk, ...rest) => {
+        sent += chunk?.length ?? 0;
+        return own(chunk, ...rest);
+      };
+    }
+    answer({ ...range, number, headers: request.headers }, response);
+  });
+  await new Promise((resolve) => server.listen(0, "127.0.0.1", resolve));
+  base = `http://127.0.0.1:${server.address().port}/model.mt`;
+});
+
+beforeEach(() => {
+  answer = good;
+  asked = [];
+  sent = 0;
+});
+
+after(() => {
+  server.closeAllConnections();
+  server.close();
+});
+
+function head({ start, end }, response, tag = '"one"') {
+  const range = `bytes ${start}-${end - 1}/${bytes.length}`;
+  response.writeHead(206, { "content-range": range, "content-length": end - start, etag: tag });
+}
+
+function good(range, response) {
+  head(range, response);
+  response.end(bytes.slice(range.start, range.end));
+}
+
+function whole(_, response) {
+  response.writeHead(200, { "content-length": bytes.length }).end(bytes);
+}
+
+const rejects = (promise, code, message = /./) =>
+  assert.rejects(promise, (error) => {
+    assert.ok(error instanceof TetralodError, `${error?.stack}`);
+    assert.equal(error.code, code, error.message);
+    assert.match(error.message, message);
+    return true;
+  });
+
+/** The hash of each request's mesh from the whole file. */
+const hashes = await (async () => {
+  const mt = await MultiTessellation.open(bytes, { worker: false });
+  await mt.complete;
+  const hashes = [];
+  for (const request of REQUESTS) {
+    await mt.refine(request);
+    hashes.push(await mt.hash());
+  }
+  mt.free();
+  return hashes;
+})();
+
+/** All faces of the mesh are shared by two tetrahedra that know each other, or on the boundary. */
+function checkMesh({ tets, neighbors, positions, stats }) {
+  assert.equal(tets.length, 4 * stats.tetrahedra);
+  assert.equal(positions.length, 3 * stats.vertices);
+  for (let t = 0; t < stats.tetrahedra; t++) {
+    for (let i = 0; i < 4; i++) {
+      const other = neighbors[4 * t + i];
+      if (other !== 0xffffffff) assert.ok(neighbors.subarray(4 * other, 4 * other + 4).includes(t));
+    }
+  }
+}
+
+for (const worker of [true, false]) {
+  describe(worker ? "in a worker" : "in the caller's thread", () => {
+    const open = (options) => MultiTessellation.open(base, { worker, ...QUICK, ...options });
+
+    test("a request fetches what it needs and gives the mesh of the whole file", async () => {
+      const seen = [];
+      const mt = await open({ onProgress: (progress) => seen.push(progress) });
+      assert.ok(mt.progress.blocks.all > 200, `${mt.progress.blocks.all} blocks`);
+      assert.ok(sent < bytes.length / 3, "the base mesh and the index come first");
+      assert.equal(mt.progress.total, bytes.length);
+      const first = await mt.refine(REQUESTS[0], { complete: true });
+      checkMesh(first);
+      assert.deepEqual([first.stats.satisfied, first.stats.missing, first.stats.done], [true, false, true]);
+      assert.equal(first.more, undefined);
+      assert.equal(await mt.hash(), hashes[0]);
+      assert.ok(sent < bytes.length / 2, `${sent} of ${bytes.length}`);
+      for (const [i, request] of REQUESTS.entries()) {
+        await mt.refine(request, { complete: true });
+        assert.equal(await mt.hash(), hashes[i], `request ${i}`);
+      }
+      assert.ok(sent < 0.8 * bytes.length, `${sent} of ${bytes.length}`);
+      const { blocks } = mt.progress;
+      assert.ok(blocks.here >= blocks.needed && blocks.here < blocks.all && blocks.leftOut === 0);
+      assert.ok(seen.every((progress, i) => i === 0 || progress.bytes >= seen[i - 1].bytes));
+      await mt.complete;
+      const before = sent;
+      await mt.refine(REQUESTS[0], { complete: true });
+      assert.equal(sent, before, "what is here is not fetched again");
+      mt.free();
+    });
+
+    test("what is here is given at once, and says that more is on its way", async () => {
+      const mt = await open();
+      let release;
+      const gate = new Promise((resolve) => (release = resolve));
+      answer = async (range, response) => {
+        await gate;
+        good(range, response);
+      };
+      const early = await mt.refine(REQUESTS[0]);
+      checkMesh(early);
+      assert.deepEqual([early.stats.satisfied, early.stats.missing], [false, true]);
+      release();
+      await mt.complete;
+      const late = await mt.refine(REQUESTS[0]);
+      assert.deepEqual([late.stats.satisfied, late.stats.missing], [true, false]);
+      assert.equal(await mt.hash(), hashes[0]);
+      mt.free();
+    });
+
+    test("steps go on as blocks arrive", async () => {
+      const mt = await open();
+      answer = (range, response) => setTimeout(() => good(range, response), 10);
+      let steps = 0;
+      let last;
+      for await (const step of mt.refineSteps(REQUESTS[1], { budgetMs: 50 })) {
+        assert.ok(!last || last.stats.missing || !last.stats.done || mt.progress.blocks.needed > 0);
+        last = step;
+        steps++;
+      }
+      assert.ok(steps > 1, `${steps} steps`);
+      assert.ok(last.stats.done && last.stats.satisfied && !last.stats.missing);
+      assert.equal(await mt.hash(), hashes[1]);
+      mt.free();
+    });
+
+    test("another request replaces the one before, and what only that needed is cancelled", async () => {
+      const mt = await open();
+      let closed = 0;
+      const held = [];
+      answer = (range, response) => {
+        held.push(range);
+        response.on("close", () => closed++);
+      };
+      const replaced = mt.refine(REQUESTS[0], { complete: true });
+      replaced.catch(() => {});
+      await until(() => held.length > 0, "something is asked for");
+      answer = good;
+      const second = mt.refine(REQUESTS[2], { complete: true });
+      await rejects(replaced, "replaced");
+      checkMesh(await second);
+      assert.equal(await mt.hash(), hashes[2]);
+      await until(() => closed > 0, "a request is cancelled");
+      mt.free();
+    });
+
+    test("a small memory holds what fits, and other requests find room again", async () => {
+      const mt = await open({ memory: 300_000 });
+      for (const round of [0, 1]) {
+        for (const [i, request] of REQUESTS.entries()) {
+          const mesh = await mt.refine(request, { complete: true });
+          checkMesh(mesh);
+          assert.equal(mesh.stats.missing, false);
+          const { leftOut, needed } = mt.progress.blocks;
+          assert.equal(mesh.stats.satisfied, leftOut === 0 || mesh.stats.satisfied, `${round} ${i} ${leftOut}/${needed}`);
+          if (leftOut === 0) assert.equal(await mt.hash(), hashes[i]);
+        }
+      }
+      mt.free();
+    });
+
+    test("cut connections and server errors pass", async () => {
+      answer = (range, response) => {
+        if (range.number % 4 === 1) return response.writeHead(503, { "retry-after": 0 }).end();
+        if (range.number % 4 === 2) return response.destroy();
+        if (range.number % 4 === 3 && range.end - range.start > 1000) {
+          head(range, response);
+          response.write(bytes.slice(range.start, range.start + 900));
+          return setTimeout(() => response.destroy(), 20);
+        }
+        return good(range, response);
+      };
+      const mt = await open();
+      for (const [i, request] of REQUESTS.entries()) {
+        checkMesh(await mt.refine(request, { complete: true }));
+        assert.equal(await mt.hash(), hashes[i]);
+      }
+      mt.free();
+    });
+
+    test("a server that fails for good is reported, and gone on with when it is back", async () => {
+      const mt = await open();
+      answer = (_, response) => response.writeHead(500).end();
+      await rejects(mt.refine(REQUESTS[0], { complete: true }), "network", /model\.mt: .*500/);
+      await rejects(mt.complete, "network");
+      const meanwhile = await mt.refine(REQUESTS[0]);
+      checkMesh(meanwhile);
+      assert.equal(meanwhile.stats.satisfied, false);
+      const steps = mt.refineSteps(REQUESTS[0]);
+      await rejects((async () => { for await (const step of steps) checkMesh(step); })(), "network");
+      answer = good;
+      await mt.retry();
+      await mt.refine(REQUESTS[0], { complete: true });
+      assert.equal(await mt.hash(), hashes[0]);
+      mt.free();
+    });
+
+    test("a file that changes is noticed: the mesh stays, and nothing of both is mixed", async () => {
+      const mt = await open();
+      await mt.refine(REQUESTS[0], { complete: true });
+      answer = (range, response) => {
+        head(range, response, '"two"');
+        response.end(bytes.slice(range.start, range.end).reverse());
+      };
+      await rejects(mt.refine(REQUESTS[2], { complete: true }), "changed", /replaced/);
+      checkMesh(await mt.refine(REQUESTS[0]));
+      assert.equal(await mt.hash(), hashes[0]);
+      await rejects(mt.retry(), "changed");
+      mt.free();
+    });
+
+    test("damaged blocks are refused, and come when they are sound again", async () => {
+      const mt = await open();
+      answer = (range, response) => {
+        head(range, response);
+        response.end(bytes.slice(range.start, range.end).map((byte) => byte ^ 1));
+      };
+      await rejects(mt.refine(REQUESTS[0], { complete: true }), "corrupt", /model\.mt: /);
+      checkMesh(await mt.refine(REQUESTS[0]));
+      answer = good;
+      await mt.retry();
+      checkMesh(await mt.refine(REQUESTS[0], { complete: true }));
+      assert.equal(await mt.hash(), hashes[0]);
+      mt.free();
+    });
+
+    test("where there are no ranges, or the whole is wanted, the file comes as a stream", async () => {
+      answer = whole;
+      const mt = await open();
+      await mt.complete;
+      assert.equal(mt.progress.complete, true);
+      assert.equal(mt.progress.blocks, undefined);
+      await rejects(mt.retry(), "bad-source");
+      mt.free();
+
+      asked = [];
+      const streamed = await open({ whole: true, headers: { "x-key": "open" } });
+      const mesh = await streamed.refine(REQUESTS[0], { complete: true });
+      checkMesh(mesh);
+      assert.equal(await streamed.hash(), hashes[0]);
+      assert.deepEqual(asked.map(({ start }) => start), [undefined]);
+      assert.equal(asked[0].headers["x-key"], "open");
+      streamed.free();
+    });
+
+    test("headers go along, and URLs and requests do as well as text", async () => {
+      for (const source of [new URL(base), new Request(base, { headers: { "x-key": "open" } })]) {
+        asked = [];
+        const headers = source instanceof URL ? { "x-key": "open" } : undefined;
+        const mt = await MultiTessellation.open(source, { worker, headers });
+        await mt.refine(REQUESTS[0], { complete: true });
+        assert.equal(await mt.hash(), hashes[0]);
+        assert.ok(asked.every(({ headers, start }) => headers["x-key"] === "open" && start !== undefined));
+        mt.free();
+      }
+    });
+
+    test("fields are chosen by name, and told with what is known of them", async () => {
+      const [{ name, floor, unit, time, vector }] = (await open({ fields: [] })).info.fields;
+      assert.ok(floor >= 0 && floor < 0.01);
+      assert.deepEqual([unit, time, vector], ["", undefined, undefined]);
+      const mt = await open({ fields: [name] });
+      const { stats } = await mt.refine({ ...REQUESTS[0], field: 0 }, { complete: true });
+      assert.ok(stats.errorBound >= floor, "no bound is below what storing rounds off");
+      await mt.setField(0);
+      await rejects(mt.setField(1), "bad-option", /0 to 0/);
+      mt.free();
+      await rejects(open({ fields: ["none"] }), "bad-option", /none/);
+      await rejects(open({ fields: "p" }), "bad-option", /`fields`/);
+      await rejects(open({ memory: "much" }), "bad-option", /`memory`/);
+    });
+
+    test("a signal ends the fetching, and what has come stays usable", async () => {
+      const abort = new AbortController();
+      const mt = await open({ signal: abort.signal });
+      answer = () => {};
+      const never = mt.refine(REQUESTS[0], { complete: true });
+      abort.abort();
+      await assert.rejects(never, { name: "AbortError" });
+      await assert.rejects(mt.complete, { name: "AbortError" });
+      checkMesh(await mt.refine(REQUESTS[0]));
+      mt.free();
+      await rejects(mt.refine(REQUESTS[0]), "freed");
+    });
+  });
+}
+
+async function until(condition, what) {
+  for (let i = 0; i < 300; i++) {
+    if (condition()) return;
+    await new Promise((resolve) => setTimeout(resolve, 10));
+  }
+  assert.fail(`waited in vain until ${what}`);
+}
