@@ -57,7 +57,7 @@
 //! | `build` | modules `io`, `generate`, `build`, `measure`, `verify` | making MTs, natively or in wasm |
 //! | `cli` (default) | `build` and the command `tetralod` | the command line |
 //! | `serve` (default) | its subcommand `serve` | files for pages on your own machine |
-//! | `http` | `stream::HttpSource` | MT files on servers, in native programs |
+//! | `http` (default) | `stream::HttpSource` | MT files on servers, in native programs and on the command line |
 //! | `gpu` | module `gpu`: the renderer on wgpu, with WebGPU as its only backend | pages; add a backend of wgpu for native use |
 //! | `vulkan` | `gpu` with wgpu's Vulkan backend | testing the renderer without a browser |
 //! | `web` | module `web`: the JavaScript API, with `gpu` also the viewer | `wasm32-unknown-unknown` |
@@ -67,7 +67,7 @@
 //! Bytes become an MT in [`format`](mod@format), requests become a mesh in [`refine`], slices of the mesh become
 //! surfaces in [`view`]; [`session`] holds the three together and is what most programs want. [`mt`] is the structure
 //! itself, [`mesh`] and [`geom`] are what it rests on, [`bench`](mod@bench) times it; [`stream`] brings byte ranges of files
-//! that are elsewhere. `ARCHITECTURE.md` has the graph;
+//! that are elsewhere, and [`client`] a session those that it needs. `ARCHITECTURE.md` has the graph;
 //! [`format`](mod@format) shows the specification of the file.
 //!
 //! # What holds
@@ -109,6 +109,7 @@
 pub mod bench;
 #[cfg(feature = "build")]
 pub mod build;
+pub mod client;
 pub mod format;
 #[cfg(feature = "build")]
 pub mod generate;

@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Each module with what it may import besides itself.
-const LAYERS: [(&str, &[&str]); 16] = [
+const LAYERS: [(&str, &[&str]); 17] = [
     ("geom", &[]),
     ("mesh", &["geom"]),
     ("mt", &["geom", "mesh"]),
@@ -22,6 +22,7 @@ const LAYERS: [(&str, &[&str]); 16] = [
     ("view", &["geom", "mesh"]),
     ("stream", &[]),
     ("session", &["geom", "mesh", "mt", "format", "refine", "view"]),
+    ("client", &["format", "refine", "session", "stream"]),
     ("bench", &["geom", "format", "mt", "refine", "session"]),
     ("gpu", &["geom", "mesh", "view"]),
     (

@@ -73,7 +73,7 @@ pub fn edge_mt(
     builder.collapse_all(progress)?;
     let Builder { mesh: base, data, history, .. } = builder;
     let depth = data.height.iter().copied().max().unwrap_or(0);
-    let (mt, vertices) = history::edge_mt(info, &base, &data, &history, progress)?;
+    let (mt, vertices) = history::edge_mt(info, &base, &data, &history, config.block_bits, progress)?;
     let summary = BuildSummary {
         vertices: mt.info().vertices,
         tetrahedra: mt.info().tetrahedra,

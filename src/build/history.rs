@@ -22,9 +22,6 @@ use crate::mt::VertexId;
 use crate::mt::VertexSplit;
 use std::cmp::Reverse;
 
-/// log2 of the updates of a block; files are usually cut into blocks of that size.
-const BLOCK_BITS: u32 = 11;
-
 /// One collapse in the builder's own numbers: the `i`-th one makes vertex `points + i`.
 pub(super) struct Collapse {
     ends: [u32; 2],
@@ -52,12 +49,13 @@ impl Collapse {
 }
 
 /// The MT of a history, with its updates in the order that [`Updates::order`] gives them, and its vertex for each reference
-/// point.
+/// point. Blocks have `2^block_bits` updates, 4 to 16 bits.
 pub(super) fn edge_mt(
     mut info: MtInfo,
     base: &WorkMesh,
     data: &VertexData,
     history: &[Collapse],
+    block_bits: u32,
     progress: OnProgress<'_>,
 ) -> Result<(EdgeMt, Vec<VertexId>), BuildError> {
     info.updates = history.len() as u32;
@@ -77,7 +75,8 @@ pub(super) fn edge_mt(
         sites: &found.sites,
         bits,
     };
-    let order: Vec<u32> = updates.order(BLOCK_BITS).into_iter().map(|u| falling[u as usize]).collect();
+    let order: Vec<u32> =
+        updates.order(block_bits.clamp(4, 16)).into_iter().map(|u| falling[u as usize]).collect();
     drop(first);
     replay.make(info, &order, None, progress)
 }

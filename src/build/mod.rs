@@ -96,6 +96,9 @@ pub struct BuildConfig {
     /// of the domain's diagonal; not negative. With 0.2, an error of 1 % allows the boundary to move by 0.2 % of the
     /// diagonal.
     pub displacement: f64,
+    /// log2 of the updates that files are going to have in a block, 4 to 16: within a block of an edge-based MT updates are
+    /// numbered so that they take few bits. Encode with the same.
+    pub block_bits: u32,
 }
 
 impl Default for BuildConfig {
@@ -113,6 +116,7 @@ impl Default for BuildConfig {
             lossless: Vec::new(),
             all_lossless: false,
             displacement: 0.2,
+            block_bits: 11,
         }
     }
 }

@@ -20,7 +20,6 @@ use crate::mt::MtInfo;
 use crate::mt::MultiTessellation;
 use crate::refine::Criterion;
 use crate::refine::Front;
-use crate::refine::GoOn;
 use crate::refine::LodCriterion;
 use crate::refine::Need;
 use crate::refine::Outcome;
@@ -40,6 +39,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 pub use crate::format::Progress;
+pub use crate::refine::GoOn;
 
 /// Why a session cannot do what it was asked for. The current mesh is valid all the same.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -159,6 +159,11 @@ impl Session {
     /// The MT as far as it has arrived; none until the base mesh is there.
     pub fn mt(&self) -> Option<&Mt> {
         self.front.as_ref().and(self.decoder.mt())
+    }
+
+    /// The decoder: what the file tells of its blocks.
+    pub fn decoder(&self) -> &Decoder {
+        &self.decoder
     }
 
     /// The file's free keys and values.

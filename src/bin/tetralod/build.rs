@@ -79,6 +79,9 @@ pub struct Arguments {
     /// Keep the exact values of all fields or (repeatable) of one.
     #[arg(long, value_name = "NAME", num_args = 0..=1, require_equals = true, default_missing_value = "")]
     lossless: Vec<String>,
+    /// Updates in a block, the least that can be fetched of the file by itself: a power of two, 16 to 65536 [default: 2048].
+    #[arg(long, value_name = "N", value_parser = block_bits)]
+    block_updates: Option<u32>,
     /// No progress bar and no summary.
     #[arg(short, long)]
     quiet: bool,
@@ -119,6 +122,13 @@ fn tolerance(text: &str) -> Result<Precision> {
     let number = number.trim().parse().ok().filter(|x: &f64| *x >= 0.0 && x.is_finite());
     let number = number.context("it must be a number, or a percentage as 1%, or NAME= and that")?;
     Ok(Precision { name, precision: unit(number) })
+}
+
+/// log2 of the updates of a block.
+fn block_bits(text: &str) -> Result<u32> {
+    let updates: Option<u32> = text.trim().parse().ok();
+    let updates = updates.filter(|n| n.is_power_of_two() && (16..=1 << 16).contains(n));
+    Ok(updates.context("it must be a power of two from 16 to 65536")?.ilog2())
 }
 
 /// The name in front of the last `=`, if there is one, and what comes behind it.
@@ -188,7 +198,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     drop(mesh);
     let told = metadata(&config).into_iter().map(|(k, v)| (k.to_owned(), v.to_owned()));
     let metadata = told.chain(arguments.metadata.iter().cloned()).collect();
-    let options = EncodeOptions { metadata, exact, ..EncodeOptions::default() };
+    let options = EncodeOptions { block_bits: config.block_bits, exact, metadata };
     let file_bytes = files::write_file(&arguments.output, |out| Ok(encode_to(&mt, &options, out)?))?;
     let report = report(&config, &summary, file_bytes, start.elapsed().as_secs_f64(), repaired);
     match arguments {
@@ -248,6 +258,7 @@ fn config(arguments: &Arguments) -> BuildConfig {
         precision_of: precision.iter().filter_map(of_one).collect(),
         lossless: arguments.lossless.iter().filter(|name| !name.is_empty()).cloned().collect(),
         all_lossless: arguments.lossless.iter().any(String::is_empty),
+        block_bits: arguments.block_updates.unwrap_or(default.block_bits),
         ..default
     };
     if let Err(error) = config.check() {

@@ -17,7 +17,7 @@ use tetralod::mt::MultiTessellation;
 /// it was made of.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// The MT file.
+    /// The MT file, or its http(s) address.
     file: PathBuf,
     /// The MT file to write.
     #[arg(short, long, value_name = "FILE")]

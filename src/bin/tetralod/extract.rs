@@ -27,7 +27,7 @@ use tetralod::session::Session;
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Arguments {
-    /// The MT file.
+    /// The MT file, or its http(s) address.
     file: PathBuf,
     #[command(flatten)]
     query: Query,

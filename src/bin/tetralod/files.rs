@@ -1,32 +1,46 @@
-//! Files in and out: MT files are streamed in, outputs appear whole or not at all.
+//! Files in and out: MT files are read as far as they are needed, from disk or from a server; outputs appear whole or not at all.
 
 use super::build::METHOD;
 use super::input;
-use super::input::Wanted;
+use super::input::Wanted as WantedFields;
 use anyhow::Context;
 use anyhow::Result;
 use std::fs;
 use std::fs::File;
-use std::io;
 use std::io::BufWriter;
-use std::io::Read;
+use std::io::Cursor;
 use std::io::Write;
 use std::path::Path;
 use std::path::PathBuf;
 use std::sync::Mutex;
 use std::sync::MutexGuard;
 use std::sync::PoisonError;
+use std::time::Duration;
 use tetralod::build::Method;
+use tetralod::client::Client;
+use tetralod::client::ClientOptions;
 use tetralod::io::CellData;
 use tetralod::mesh::RepairReport;
 use tetralod::mesh::TetMesh;
 use tetralod::mt::Mt;
 use tetralod::mt::MtInfo;
 use tetralod::session::Session;
+use tetralod::stream::Arrived;
+use tetralod::stream::FileSource;
+#[cfg(feature = "http")]
+use tetralod::stream::HttpOptions;
+#[cfg(feature = "http")]
+use tetralod::stream::HttpSource;
+use tetralod::stream::Source;
+use tetralod::stream::StreamError;
+use tetralod::stream::Wanted;
 use tetralod::verify::Reference;
 
 /// Bytes that are read at a time.
-const CHUNK: usize = 1 << 20;
+const CHUNK: u64 = 1 << 20;
+
+/// How long is waited for a server at a time.
+const PATIENCE: Duration = Duration::from_secs(1);
 
 /// Exit code after Ctrl-C, as shells have it.
 pub const INTERRUPTED: i32 = 130;
@@ -95,13 +109,22 @@ fn partial_path(path: &Path) -> Result<PathBuf> {
     Ok(path.with_file_name(partial))
 }
 
-/// An MT file that was read as a whole.
+/// An MT file: all of it, or what was needed.
 pub struct Opened {
     pub session: Session,
+    /// Of the file.
     pub bytes: u64,
+    /// Those that were read.
+    pub read: u64,
 }
 
 impl Opened {
+    /// What a client has.
+    pub fn of(client: Client<Bytes>) -> Self {
+        let read = client.fetched();
+        Self { bytes: client.total().unwrap_or(read), read, session: client.into_session() }
+    }
+
     pub fn mt(&self) -> Result<&Mt> {
         self.session.mt().context("the MT has no base mesh")
     }
@@ -119,32 +142,87 @@ impl Opened {
     }
 }
 
-/// Opens an MT file.
-pub fn open_mt(path: &Path) -> Result<Opened> {
-    let session = read_mt(path).with_context(|| path.display().to_string())?;
-    let bytes = session.progress().bytes;
-    Ok(Opened { session, bytes })
+/// Bytes of a file here or on a server.
+pub struct Bytes(Box<dyn Source>);
+
+impl Source for Bytes {
+    fn want(&mut self, wanted: &[Wanted]) {
+        self.0.want(wanted);
+    }
+
+    fn next(&mut self, patience: Duration) -> Result<Option<Arrived>, StreamError> {
+        self.0.next(patience)
+    }
+
+    fn total(&self) -> Option<u64> {
+        self.0.total()
+    }
 }
 
-fn read_mt(path: &Path) -> Result<Session> {
-    let mut file = File::open(path)?;
+impl Bytes {
+    /// Of a path, or of an address that begins with `http://` or `https://`.
+    fn of(path: &Path) -> Result<Self> {
+        if let Some(url) = url(path) {
+            return Self::of_server(url);
+        }
+        if fs::metadata(path)?.is_file() {
+            return Ok(Self(Box::new(FileSource::new(File::open(path)?)?)));
+        }
+        // Pipes cannot be sought in.
+        Ok(Self(Box::new(FileSource::new(Cursor::new(fs::read(path)?))?)))
+    }
+
+    #[cfg(feature = "http")]
+    fn of_server(url: &str) -> Result<Self> {
+        Ok(Self(Box::new(HttpSource::new(url, HttpOptions::default()))))
+    }
+
+    #[cfg(not(feature = "http"))]
+    fn of_server(_: &str) -> Result<Self> {
+        anyhow::bail!("this `tetralod` reads no files on servers; build it with the feature `http`")
+    }
+}
+
+/// The address, if a path is one.
+fn url(path: &Path) -> Option<&str> {
+    path.to_str().filter(|text| ["http://", "https://"].iter().any(|scheme| text.starts_with(scheme)))
+}
+
+/// Opens an MT file of which only what is needed is read.
+pub fn open_parts(path: &Path) -> Result<Client<Bytes>> {
+    Ok(Client::open(Bytes::of(path)?, ClientOptions::default())?)
+}
+
+/// Opens an MT file and reads all of it.
+pub fn open_mt(path: &Path) -> Result<Opened> {
+    let session = Bytes::of(path).and_then(read_mt).with_context(|| path.display().to_string())?;
+    let bytes = session.progress().bytes;
+    Ok(Opened { session, bytes, read: bytes })
+}
+
+fn read_mt(mut source: Bytes) -> Result<Session> {
     let mut session = Session::new();
-    let mut chunk = vec![0; CHUNK];
+    let mut at = 0;
     loop {
-        match file.read(&mut chunk) {
-            Ok(0) => break,
-            Ok(count) => session.feed(&chunk[..count]).map(drop)?,
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            Err(error) => return Err(error.into()),
+        let range = at..at + CHUNK;
+        source.want(&[Wanted { range: range.clone(), priority: 0.0 }]);
+        let bytes = loop {
+            if let Some((_, bytes)) = source.next(PATIENCE)? {
+                break bytes;
+            }
+        };
+        session.feed(&bytes)?;
+        at += bytes.len() as u64;
+        if at < range.end {
+            session.finish()?;
+            return Ok(session);
         }
     }
-    session.finish()?;
-    Ok(session)
 }
 
 /// Reads a mesh and mends what can be mended.
 pub fn read_mesh(path: &Path) -> Result<(TetMesh, RepairReport)> {
-    let wanted = Wanted { names: &[], all: true, cells: CellData::LeaveOut };
+    let wanted = WantedFields { names: &[], all: true, cells: CellData::LeaveOut };
     let (mesh, report) = input::read(&[path.to_owned()], &wanted)?;
     input::expect_cells(&mesh, path)?;
     Ok((mesh, report))
@@ -153,7 +231,7 @@ pub fn read_mesh(path: &Path) -> Result<(TetMesh, RepairReport)> {
 /// Reads what the MT was built from: time steps of a mesh or, where no more is needed, of points.
 pub fn read_reference(paths: &[PathBuf], opened: &Opened) -> Result<TetMesh> {
     let names: Vec<String> = opened.info()?.fields.iter().map(|field| field.name.clone()).collect();
-    let (mesh, _) = input::read(paths, &Wanted { names: &names, all: false, cells: CellData::Values })?;
+    let (mesh, _) = input::read(paths, &WantedFields { names: &names, all: false, cells: CellData::Values })?;
     if let (Reference::Mesh, Some(path)) = (opened.reference(), paths.first()) {
         input::expect_cells(&mesh, path)?;
     }

@@ -8,6 +8,8 @@ use anyhow::Result;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use tetralod::format;
+use tetralod::format::BlockInfo;
 use tetralod::mesh::VectorPart;
 use tetralod::mt::FieldInfo;
 use tetralod::mt::MtKind;
@@ -17,7 +19,7 @@ use tetralod::mt::stats;
 /// Tells what is in an MT file.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// The MT file.
+    /// The MT file, or its http(s) address.
     file: PathBuf,
     /// Print a JSON object.
     #[arg(long)]
@@ -38,6 +40,9 @@ struct Report {
     updates: u32,
     file_bytes: u64,
     bytes_per_vertex: f64,
+    blocks: Blocks,
+    /// What the bytes of the file tell, as far as that is coded in common, and all others.
+    breakdown: Vec<FilePart>,
     memory: Memory,
     fields: Vec<Field>,
     /// Of the reference mesh: x0, y0, z0, x1, y1, z1.
@@ -77,6 +82,27 @@ struct Vector {
     component: Option<u8>,
 }
 
+/// What can be fetched of the file by itself.
+#[derive(Serialize)]
+struct Blocks {
+    count: usize,
+    updates_per_block: u32,
+    /// From the start of the file to the end of the index.
+    index_bytes: u64,
+    /// From the start of the file to its first block.
+    head_bytes: u64,
+    largest_bytes: u64,
+    parents_per_block: f64,
+}
+
+/// Some of the bytes of the file.
+#[derive(Serialize)]
+struct FilePart {
+    name: &'static str,
+    bytes: f64,
+    bytes_per_vertex: f64,
+}
+
 #[derive(Serialize)]
 struct Memory {
     /// The compact structure of this MT.
@@ -114,6 +140,8 @@ fn report(opened: &Opened) -> Result<Report> {
         updates: info.updates,
         file_bytes: opened.bytes,
         bytes_per_vertex: opened.bytes as f64 / f64::from(info.vertices.max(1)),
+        blocks: blocks(opened)?,
+        breakdown: breakdown(opened)?,
         memory: Memory {
             compact_bytes: stats.compact_bytes,
             explicit_bytes: stats.explicit_bytes,
@@ -129,6 +157,40 @@ fn report(opened: &Opened) -> Result<Report> {
         tets_per_update: stats.inserted_per_update(),
         metadata: opened.session.metadata().iter().cloned().collect(),
     })
+}
+
+fn blocks(opened: &Opened) -> Result<Blocks> {
+    let decoder = opened.session.decoder();
+    let index = decoder.index().context("the file has no index")?;
+    let head_bytes = decoder.head_end().unwrap_or(0);
+    let parents: usize = index.blocks.iter().map(|block| block.parents.len()).sum();
+    Ok(Blocks {
+        count: index.blocks.len(),
+        updates_per_block: 1 << index.block_bits,
+        index_bytes: head_bytes.saturating_sub(index.shared),
+        head_bytes,
+        largest_bytes: index.blocks.iter().map(BlockInfo::len).max().unwrap_or(0),
+        parents_per_block: parents as f64 / index.blocks.len().max(1) as f64,
+    })
+}
+
+fn breakdown(opened: &Opened) -> Result<Vec<FilePart>> {
+    let decoder = opened.session.decoder();
+    let index = decoder.index().context("the file has no index")?;
+    let index_bytes = decoder.head_end().unwrap_or(0).saturating_sub(index.shared);
+    let mut parts = format::breakdown(opened.mt()?.into(), index.block_bits);
+    parts.push(("header, description and index", index_bytes as f64));
+    let known: f64 = parts.iter().map(|(_, bytes)| bytes).sum();
+    let rest = match opened.info()?.kind {
+        MtKind::Edge => "heads and ends of sections",
+        MtKind::Vertex | MtKind::Explicit => "updates",
+    };
+    parts.push((rest, opened.bytes as f64 - known));
+    parts.retain(|(_, bytes)| *bytes != 0.0);
+    let vertices = f64::from(opened.info()?.vertices.max(1));
+    let part =
+        |(name, bytes): (&'static str, f64)| FilePart { name, bytes, bytes_per_vertex: bytes / vertices };
+    Ok(parts.into_iter().map(part).collect())
 }
 
 /// What the updates of an MT do.
@@ -167,6 +229,11 @@ fn field_row(steps: &[Field]) -> String {
     format!("{name}{part}: {min} to {max}{unit}, {bits} bits, {worst}{time}")
 }
 
+fn part_row(part: &FilePart, file_bytes: u64) -> String {
+    let share = output::percent(part.bytes / file_bytes.max(1) as f64);
+    format!("{}: {:.2} per vertex ({share})", part.name, part.bytes_per_vertex)
+}
+
 fn print(report: &Report) -> Result<()> {
     let mesh = |vertices: u32, tets: u32| {
         format!("{} vertices, {} tetrahedra", output::count(vertices), output::count(tets))
@@ -187,6 +254,24 @@ fn print(report: &Report) -> Result<()> {
         ),
         ("file size", output::bytes(report.file_bytes)),
         ("bytes per vertex", format!("{:.2}", report.bytes_per_vertex)),
+        (
+            "blocks",
+            format!(
+                "{} of {} updates, up to {} each",
+                report.blocks.count,
+                report.blocks.updates_per_block,
+                output::bytes(report.blocks.largest_bytes)
+            ),
+        ),
+        (
+            "in front of them",
+            format!(
+                "{}; to the end of the index {} ({} of the file)",
+                output::bytes(report.blocks.head_bytes),
+                output::bytes(report.blocks.index_bytes),
+                output::percent(report.blocks.index_bytes as f64 / report.file_bytes.max(1) as f64)
+            ),
+        ),
         ("in memory", output::bytes(memory.compact_bytes)),
         ("  explicit", output::bytes(memory.explicit_bytes)),
         ("reference alone", output::bytes(memory.indexed_bytes)),
@@ -196,6 +281,7 @@ fn print(report: &Report) -> Result<()> {
     ];
     let steps = |a: &Field, b: &Field| a.name == b.name;
     rows.extend(report.fields.chunk_by(steps).map(|steps| ("field", field_row(steps))));
+    rows.extend(report.breakdown.iter().map(|part| ("bytes of", part_row(part, report.file_bytes))));
     for (key, value) in &report.metadata {
         rows.push((key, value.clone()));
     }

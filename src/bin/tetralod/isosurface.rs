@@ -18,7 +18,7 @@ use tetralod::view::is_closed;
 #[derive(clap::Args)]
 #[command(after_help = "Example: tetralod isosurface engine.mt --iso 0.3 --iso 0.6 --error 1% -o engine.vtp")]
 pub struct Arguments {
-    /// The MT file.
+    /// The MT file, or its http(s) address.
     file: PathBuf,
     #[command(flatten)]
     query: Query,

@@ -27,7 +27,7 @@ use tetralod::view::Span;
                         tetralod probe engine.mt --line 0,0,0,1,1,1 -o profile.csv\n          \
                         tetralod probe engine.mt --points sensors.csv -o values.csv")]
 pub struct Arguments {
-    /// The MT file.
+    /// The MT file, or its http(s) address.
     file: PathBuf,
     #[command(flatten)]
     what: What,

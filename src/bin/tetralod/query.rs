@@ -43,6 +43,9 @@ camera.json:  {\"matrix\": [16 numbers: clip from model space, column by column]
 colours.json: {\"points\": [[value, red, green, blue, opacity], ...], \"unit_length\": 0.1, \"field\": \"name\"}; colours and
               opacities 0 to 1, the opacity that of a way of unit_length times the model's diagonal";
 
+/// How long is waited for a server at a time.
+const PATIENCE: Duration = Duration::from_secs(1);
+
 /// Headings of the help.
 const WHAT: &str = "What mesh";
 const LIMITS: &str = "How large, how long";
@@ -187,13 +190,16 @@ impl Query {
             super::refuse_usage(&wrong.to_string());
         }
         let name = || file.display().to_string();
-        let mut opened = files::open_mt(file)?;
-        let wanted = self.wanted(opened.info()?).with_context(name)?;
-        let field = files::field_index(opened.info()?, self.field.as_deref()).with_context(name)?;
+        let mut client = files::open_parts(file).with_context(name)?;
+        let info = client.session().info().context("the MT has no description").with_context(name)?;
+        let wanted = self.wanted(info).with_context(name)?;
+        let field = files::field_index(info, self.field.as_deref()).with_context(name)?;
         let needs = wanted.iter().map(|wanted| wanted.need.clone()).collect();
         let request = Request { needs, budget: self.budget() };
+        client.aim(&request).with_context(name)?;
+        while !client.fetch(PATIENCE).with_context(name)? {}
+        let mut opened = Opened::of(client);
         let start = Instant::now();
-        opened.session.aim(&request).with_context(name)?;
         let deadline = self.max_ms.map(|ms| Duration::from_secs_f64(ms / 1000.0));
         let mut go_on = |done: &Outcome| {
             self.max_updates.is_none_or(|most| done.refined + done.coarsened < most)
@@ -202,7 +208,7 @@ impl Query {
         let stats = opened.session.step(&mut go_on).with_context(name)?;
         let seconds = start.elapsed().as_secs_f64();
         opened.session.set_field(field).with_context(name)?;
-        let summary = summary(opened.info()?, field, &stats, &wanted);
+        let summary = summary(&opened, field, &stats, &wanted)?;
         Ok(Answer { opened, field, wanted, stats, seconds, summary })
     }
 }
@@ -240,6 +246,9 @@ pub struct Summary {
     pub coarsened: u64,
     pub forced: u64,
     pub judged: u64,
+    /// Bytes of the file that were read: where blocks of it are not needed, not all.
+    pub bytes_read: u64,
+    pub file_bytes: u64,
 }
 
 /// What was asked for in one need, and what is guaranteed.
@@ -253,7 +262,7 @@ pub struct NeedReport {
     pub bound: Option<f64>,
 }
 
-fn summary(info: &MtInfo, field: usize, stats: &RefineStats, wanted: &[Wanted]) -> Summary {
+fn summary(opened: &Opened, field: usize, stats: &RefineStats, wanted: &[Wanted]) -> Result<Summary> {
     let known = |value: f64| (stats.done && value.is_finite()).then_some(value);
     let report = |(i, wanted): (usize, &Wanted)| NeedReport {
         need: wanted.name.clone(),
@@ -261,8 +270,8 @@ fn summary(info: &MtInfo, field: usize, stats: &RefineStats, wanted: &[Wanted]) 
         asked: wanted.need.error,
         bound: stats.bounds.get(i).copied().and_then(known),
     };
-    let field = &info.fields[field];
-    Summary {
+    let field = &opened.info()?.fields[field];
+    Ok(Summary {
         field: field.name.clone(),
         vertices: stats.vertices,
         tetrahedra: stats.tetrahedra,
@@ -277,7 +286,9 @@ fn summary(info: &MtInfo, field: usize, stats: &RefineStats, wanted: &[Wanted]) 
         coarsened: stats.coarsened,
         forced: stats.forced,
         judged: stats.judged,
-    }
+        bytes_read: opened.read,
+        file_bytes: opened.bytes,
+    })
 }
 
 impl Summary {
@@ -299,6 +310,10 @@ impl Summary {
         // One need of the field says no more than the bound.
         if self.needs.len() > 1 || self.needs.iter().any(|need| need.unit != needs::RELATIVE) {
             rows.extend(self.needs.iter().map(|need| ("need", need.sentence())));
+        }
+        if self.bytes_read < self.file_bytes {
+            let [read, all] = [self.bytes_read, self.file_bytes].map(output::bytes);
+            rows.push(("read", format!("{read} of {all}")));
         }
         if !self.done {
             rows.push(("", "stopped before it was done".to_owned()));

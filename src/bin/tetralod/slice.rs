@@ -22,7 +22,7 @@ use tetralod::view::Slice;
                         tetralod slice engine.mt --plane 1,1,0,12.5 --edges -o slice.obj"
 )]
 pub struct Arguments {
-    /// The MT file.
+    /// The MT file, or its http(s) address.
     file: PathBuf,
     /// The plane: x=D, y=D or z=D, or the points p with n · p = D; in model units.
     #[arg(long, value_name = "nx,ny,nz,D", value_parser = parse_plane, allow_hyphen_values = true)]

@@ -22,7 +22,7 @@ use tetralod::view::Histogram;
 #[command(after_help = "Examples: tetralod stats engine.mt --error 1% --bins 20\n          \
                         tetralod stats engine.mt --error 1% --reference engine.vtu -o histogram.csv")]
 pub struct Arguments {
-    /// The MT file.
+    /// The MT file, or its http(s) address.
     file: PathBuf,
     /// Number of bins of the histogram.
     #[arg(long, value_name = "N", default_value = "10", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]

@@ -28,7 +28,7 @@ use tetralod::view::Tracer;
     after_help = "Example: tetralod streamlines flow.mt --vector velocity --seeds 0,0,0,0,0,1,20 -o lines.vtp"
 )]
 pub struct Arguments {
-    /// The MT file.
+    /// The MT file, or its http(s) address.
     file: PathBuf,
     /// The vector field: the name that its components begin with, or the three names of the components.
     #[arg(long, value_name = "NAME|X,Y,Z")]

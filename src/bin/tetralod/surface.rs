@@ -17,7 +17,7 @@ use tetralod::view::BoundarySurface;
 #[derive(clap::Args)]
 #[command(after_help = "Example: tetralod surface engine.mt --error 5% -o engine.stl")]
 pub struct Arguments {
-    /// The MT file.
+    /// The MT file, or its http(s) address.
     file: PathBuf,
     #[command(flatten)]
     query: Query,

@@ -14,7 +14,7 @@ use tetralod::verify::VerifyReport;
 /// Checks every promise of an MT file against the mesh that it was built from; exit code 1 if one is broken.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// The MT file.
+    /// The MT file, or its http(s) address.
     file: PathBuf,
     /// The mesh, or the points, that it was built from (repeatable: time steps).
     #[arg(long, value_name = "INPUT", required = true)]
