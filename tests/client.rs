@@ -1,13 +1,15 @@
 //! Promise: a client fetches what a request needs and no more, and its mesh is that of a session with the whole file.
 
-mod support;
+#[path = "support/random.rs"]
+#[allow(dead_code, reason = "other tests use the rest of it")]
+mod random;
 
+use random::Random;
 use std::cell::Cell;
 use std::io::Cursor;
 use std::ops::ControlFlow;
 use std::rc::Rc;
 use std::time::Duration;
-use support::random::Random;
 use tetralod::build::BuildConfig;
 use tetralod::build::build;
 use tetralod::client::Client;

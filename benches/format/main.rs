@@ -1,0 +1,29 @@
+//! What MT files cost: bytes beside other forms of the same meshes, what requests need of them by ranges, and a model larger
+//! than the memory for it. Prints Markdown; `cargo xtask bench --format` puts it together as docs/benchmarks.md.
+
+#[path = "../../tests/guarantee_support/mod.rs"]
+mod guarantee_support;
+
+mod requests;
+mod sets;
+mod table;
+mod walk;
+
+use std::error::Error;
+
+/// Whatever goes wrong: this is a tool, it says so and ends.
+pub type Result<T> = std::result::Result<T, Box<dyn Error>>;
+
+fn main() -> Result<()> {
+    // Cargo adds `--bench`.
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
+    match &arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        ["table", inputs @ ..] => table::run(&sets::all(inputs)?),
+        ["requests", inputs @ ..] => requests::run(&sets::all(inputs)?),
+        ["walk", file] => walk::run(file.as_ref()),
+        ["make", size, file] => sets::make(size.parse()?, file.as_ref()),
+        // `cargo test --all-targets` runs it without any.
+        [] => Ok(()),
+        other => Err(format!("no such benchmark: {other:?}").into()),
+    }
+}

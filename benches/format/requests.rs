@@ -1,0 +1,182 @@
+//! How much of a file requests need: the first useful picture, and a box at full resolution.
+
+use super::Result;
+use super::guarantee_support::Interpolant;
+use super::guarantee_support::Mesh;
+use super::guarantee_support::Surface;
+use super::sets;
+use super::sets::Set;
+use std::io::Cursor;
+use tetralod::client::Client;
+use tetralod::client::ClientOptions;
+use tetralod::geom::Bounds;
+use tetralod::mt::MtKind;
+use tetralod::refine::Need;
+use tetralod::refine::RefineStats;
+use tetralod::refine::Request;
+use tetralod::session::Session;
+use tetralod::stream::FileSource;
+
+/// Fewest tetrahedra of a set whose first picture is measured.
+const LARGE: usize = 150_000;
+
+/// Shares of the file, in percent, after which a prefix is looked at.
+const LADDER: [f64; 12] = [1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 50.0, 75.0, 100.0];
+
+type Reader = Client<FileSource<Cursor<Vec<u8>>>>;
+
+pub fn run(sets: &[Set]) -> Result<()> {
+    let mut pictures = Vec::new();
+    let mut boxes = Vec::new();
+    for set in sets {
+        eprintln!("{}", set.name);
+        let file = sets::file(&set.mesh, MtKind::Edge)?;
+        if set.mesh.tets.len() > LARGE {
+            pictures.push(picture(set, &file)?);
+        }
+        boxes.extend(corners(set, &file)?);
+    }
+    println!(
+        "| set | file KB | prefix: guaranteed % | prefix: measured % | error % | Hausdorff % | ranges: guaranteed % | error % | Hausdorff % |"
+    );
+    println!("|---|--:|--:|--:|--:|--:|--:|--:|--:|");
+    pictures.iter().for_each(|row| println!("{row}"));
+    println!("\n## A box at full resolution\n");
+    println!("| set | box | file fetched % | updates applied % | blocks needed | blocks |");
+    println!("|---|---|--:|--:|--:|--:|");
+    boxes.iter().for_each(|row| println!("{row}"));
+    Ok(())
+}
+
+fn open(file: &[u8]) -> Result<Reader> {
+    Ok(Client::open(FileSource::new(Cursor::new(file.to_vec()))?, ClientOptions::default())?)
+}
+
+/// The isosurface at the middle value, and what it is held against.
+struct Reference {
+    mesh: Mesh,
+    surface: Surface,
+    iso: f64,
+    range: f64,
+    diagonal: f64,
+}
+
+/// Percent of the range of the field, and of the diagonal.
+#[derive(Clone, Copy)]
+struct Accuracy {
+    field: f64,
+    distance: f64,
+}
+
+impl Reference {
+    fn of(session: &Session, diagonal: f64) -> Result<Self> {
+        let (info, mesh) = (session.info().ok_or("no MT")?, session.mesh().ok_or("no mesh")?);
+        let mesh = Mesh::of(info, mesh);
+        let field = &info.fields[0];
+        let iso = 0.5 * (field.min + field.max);
+        Ok(Self { surface: Surface::of(&mesh, iso), mesh, iso, range: field.range(), diagonal })
+    }
+
+    /// The error of the field along both isosurfaces, and the distance of each from the other.
+    fn compare(&self, session: &Session) -> Result<Accuracy> {
+        let (info, mesh) = (session.info().ok_or("no MT")?, session.mesh().ok_or("no mesh")?);
+        let mesh = Mesh::of(info, mesh);
+        let surface = Surface::of(&mesh, self.iso);
+        let along = |surface: &Surface, mesh: &Mesh| {
+            let field = Interpolant::new(mesh);
+            let values = surface.points.iter().filter_map(|&p| field.at(p));
+            values.map(|value| (value - self.iso).abs()).fold(0.0, f64::max)
+        };
+        let field = along(&self.surface, &mesh).max(along(&surface, &self.mesh));
+        let distance = surface.distance_to(&self.surface).max(self.surface.distance_to(&surface));
+        Ok(Accuracy { field: 100.0 * field / self.range, distance: 100.0 * distance / self.diagonal })
+    }
+}
+
+fn percent_of(part: u64, file: &[u8]) -> f64 {
+    100.0 * part as f64 / file.len() as f64
+}
+
+fn picture(set: &Set, file: &[u8]) -> Result<String> {
+    let mut whole = Session::new();
+    whole.feed(file)?;
+    whole.refine(&Request::within(0.0))?;
+    let reference = Reference::of(&whole, Bounds::of(&set.mesh.positions).diagonal())?;
+    let request: Request = Need::within(0.01).around(0, &[reference.iso]).into();
+    let least = whole.refine(&request)?;
+    let mut client = open(file)?;
+    let stats = client.refine(&request)?;
+    assert!(stats.satisfied && client.session().hash() == whole.hash(), "the same mesh by ranges");
+    let ranges = percent_of(client.fetched(), file);
+    let exact = reference.compare(client.session())?;
+    let (guaranteed, measured, found) = in_order(file, &request, &reference, &least)?;
+    Ok(format!(
+        "| {} | {} | {guaranteed:.1} | {measured:.0} | {:.2} | {:.2} | {ranges:.1} | {:.2} | {:.2} |",
+        set.name,
+        file.len() / 1000,
+        found.field,
+        found.distance,
+        exact.field,
+        exact.distance
+    ))
+}
+
+/// How much of the file has to be read in its order until the mesh is that of the request, and until both distances are
+/// measured to be within 1 %, at the steps of the ladder.
+fn in_order(
+    file: &[u8],
+    request: &Request,
+    reference: &Reference,
+    least: &RefineStats,
+) -> Result<(f64, f64, Accuracy)> {
+    let mut session = Session::new();
+    let mut measured = None;
+    let mut guaranteed = None;
+    // In steps of a quarter of a percent.
+    let step = file.len() / 400 + 1;
+    for (at, piece) in file.chunks(step).enumerate() {
+        session.feed(piece)?;
+        let share = percent_of((at * step + piece.len()) as u64, file);
+        if session.mesh().is_none() {
+            continue;
+        }
+        let stats = session.refine(request)?;
+        if guaranteed.is_none() && stats.applied == least.applied {
+            guaranteed = Some(share);
+        }
+        let before = percent_of((at * step) as u64, file);
+        if measured.is_none() && LADDER.iter().any(|&rung| before < rung && share >= rung - 1e-9) {
+            let found = reference.compare(&session)?;
+            if found.field <= 1.0 && found.distance <= 1.0 {
+                measured = Some((share, found));
+            }
+        }
+        if let (Some(guaranteed), Some((measured, found))) = (guaranteed, measured) {
+            return Ok((guaranteed, measured, found));
+        }
+    }
+    Ok((guaranteed.unwrap_or(f64::NAN), f64::NAN, Accuracy { field: f64::NAN, distance: f64::NAN }))
+}
+
+/// Boxes of a quarter of each side.
+fn corners(set: &Set, file: &[u8]) -> Result<Vec<String>> {
+    let whole = Bounds::of(&set.mesh.positions);
+    let at = |part: f64| [0, 1, 2].map(|i| whole.min[i] + part * (whole.max[i] - whole.min[i]));
+    let mut rows = Vec::new();
+    for (name, part) in [("low", 0.1), ("middle", 0.375), ("high", 0.65)] {
+        let region = Bounds { min: at(part), max: at(part + 0.25) };
+        let mut client = open(file)?;
+        let stats = client.refine(&Need::within(0.0).inside(region).into())?;
+        let updates = client.session().info().map_or(1, |info| info.updates.max(1));
+        let progress = client.session().block_progress();
+        rows.push(format!(
+            "| {} | {name} | {:.1} | {:.1} | {} | {} |",
+            set.name,
+            percent_of(client.fetched(), file),
+            100.0 * f64::from(stats.applied) / f64::from(updates),
+            progress.needed,
+            progress.blocks
+        ));
+    }
+    Ok(rows)
+}

@@ -1,0 +1,156 @@
+//! A walk through a model ten times as large as the room for it.
+
+use super::Result;
+use std::cell::Cell;
+use std::fs;
+use std::fs::File;
+use std::path::Path;
+use std::rc::Rc;
+use std::time::Duration;
+use std::time::Instant;
+use tetralod::client::Client;
+use tetralod::client::ClientOptions;
+use tetralod::geom::Bounds;
+use tetralod::mt::EdgeMt;
+use tetralod::refine::Need;
+use tetralod::refine::Request;
+use tetralod::refine::View;
+use tetralod::session::Session;
+use tetralod::stream::Arrived;
+use tetralod::stream::FileSource;
+use tetralod::stream::Source;
+use tetralod::stream::StreamError;
+use tetralod::stream::Wanted;
+
+/// Requests of a walk.
+const STOPS: u32 = 60;
+
+/// How many times as large as the room the MT is.
+const TIMES: u64 = 10;
+
+/// Counts what a file is asked for.
+struct Counted {
+    file: FileSource<File>,
+    ranges: Rc<Cell<u64>>,
+}
+
+impl Source for Counted {
+    fn want(&mut self, wanted: &[Wanted]) {
+        self.file.want(wanted);
+    }
+
+    fn next(&mut self, patience: Duration) -> std::result::Result<Option<Arrived>, StreamError> {
+        let arrived = self.file.next(patience)?;
+        self.ranges.set(self.ranges.get() + u64::from(arrived.is_some()));
+        Ok(arrived)
+    }
+
+    fn total(&self) -> Option<u64> {
+        self.file.total()
+    }
+}
+
+pub fn run(path: &Path) -> Result<()> {
+    let file_bytes = fs::metadata(path)?.len();
+    let ranges = Rc::new(Cell::new(0));
+    let open = |room: u64| -> Result<Client<Counted>> {
+        let source = Counted { file: FileSource::new(File::open(path)?)?, ranges: Rc::clone(&ranges) };
+        Ok(Client::open(source, ClientOptions { room, ..ClientOptions::default() })?)
+    };
+    let first = open(0)?;
+    let info = first.session().info().ok_or("no MT")?.clone();
+    drop(first);
+    ranges.set(0);
+    let all = EdgeMt::update_bytes(&info) * u64::from(info.updates);
+    let room = all / TIMES;
+    let start = Instant::now();
+    let mut client = open(room)?;
+    let (mut most, mut most_beside, mut left_out, mut satisfied, mut largest) = (0, 0, 0, 0, 0);
+    for stop in 0..STOPS {
+        client.aim(&request(client.session(), stop)?)?;
+        let stats = loop {
+            let step = client.step(Duration::ZERO, &mut |_| true)?;
+            let progress = client.session().block_progress();
+            most = most.max(progress.bytes);
+            if step.complete {
+                break step.stats;
+            }
+        };
+        client.session().mesh().ok_or("no mesh")?.check()?;
+        let progress = client.session().block_progress();
+        left_out += u32::from(progress.left_out > 0);
+        satisfied += u32::from(stats.satisfied);
+        largest = largest.max(stats.tetrahedra);
+        most_beside = most_beside.max(client.session().mesh_bytes());
+    }
+    let mega = |bytes: u64| format!("{:.1} MB", bytes as f64 / 1e6);
+    println!("| | |\n|---|--:|");
+    println!("| vertices of the reference mesh | {} |", info.vertices);
+    println!("| tetrahedra of the reference mesh | {} |", info.tetrahedra);
+    println!("| file | {} |", mega(file_bytes));
+    println!("| all updates in memory | {} |", mega(all));
+    println!("| room | {} |", mega(room));
+    println!("| most that blocks took | {} |", mega(most));
+    println!("| most that the current mesh took beside them | {} |", mega(most_beside));
+    println!("| tetrahedra of the largest mesh | {largest} |");
+    println!("| largest memory of the process | {} |", peak().map_or("not known".to_owned(), mega));
+    println!("| requests of the walk | {STOPS} |");
+    println!("| … met in full | {satisfied} |");
+    println!("| … of which blocks were left out for lack of room | {left_out} |");
+    println!("| ranges read | {} |", ranges.get());
+    println!(
+        "| bytes read | {} ({:.1} times the file) |",
+        mega(client.fetched()),
+        client.fetched() as f64 / file_bytes as f64
+    );
+    println!("| time, with the checks of all meshes | {:.0} s |", start.elapsed().as_secs_f64());
+    Ok(())
+}
+
+/// Boxes, isovalues and views in turn, each a little farther on.
+fn request(session: &Session, stop: u32) -> Result<Request> {
+    let info = session.info().ok_or("no MT")?;
+    let size = f64::from(1_u32 << info.lattice.bits);
+    let lattice = &info.lattice;
+    let at = |p: [f64; 3]| [0, 1, 2].map(|i| lattice.origin[i] + lattice.step[i] * size * p[i]);
+    let turn = f64::from(stop) / f64::from(STOPS);
+    Ok(match stop % 3 {
+        0 => {
+            let min = [0.8 * turn, 0.8 * (1.0 - turn), 0.4];
+            let region = Bounds { min: at(min), max: at(min.map(|x| x + 0.12)) };
+            Need::within(0.002).inside(region).into()
+        }
+        1 => {
+            let field = &info.fields[0];
+            Need::within(0.02).around(0, &[field.min + (0.2 + 0.6 * turn) * field.range()]).into()
+        }
+        _ => {
+            let angle = std::f64::consts::TAU * turn;
+            let eye = at([0.5 + 0.8 * angle.cos(), 0.5 + 0.8 * angle.sin(), 0.5]);
+            Need::seen(towards(eye, at([0.5; 3])), 3.0).into()
+        }
+    })
+}
+
+/// A camera that looks from one place to another, both at the same height.
+fn towards(eye: [f64; 3], aim: [f64; 3]) -> View {
+    let viewport = [1280.0, 720.0];
+    let way = [aim[0] - eye[0], aim[1] - eye[1]];
+    let length = way[0].hypot(way[1]);
+    let [x, y] = way.map(|d| d / length);
+    let row = |axis: [f64; 3], scale: f64| {
+        let along: f64 = (0..3).map(|i| axis[i] * eye[i]).sum();
+        [axis[0] * scale, axis[1] * scale, axis[2] * scale, -along * scale]
+    };
+    let wide = 1.7 * viewport[1] / viewport[0];
+    let rows =
+        [row([y, -x, 0.0], wide), row([0.0, 0.0, 1.0], 1.7), row([x, y, 0.0], 1.0), row([x, y, 0.0], 1.0)];
+    View { matrix: std::array::from_fn(|i| rows[i % 4][i / 4]), viewport }
+}
+
+/// The most memory that the process ever had, where the system tells.
+fn peak() -> Option<u64> {
+    let text = fs::read_to_string("/proc/self/status").ok()?;
+    let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    line.trim().trim_end_matches("kB").trim().parse::<u64>().ok().map(|kilo| 1024 * kilo)
+}
