@@ -437,7 +437,7 @@ impl<'a> Source<'a> {
 
     /// Everything must have been read.
     pub fn end(self) -> Result<(), FormatError> {
-        if self.coder.state() == 0 && self.bits.is_at_end() {
+        if self.coder.state() == 0 && self.coder.bulk().is_empty() && self.bits.is_at_end() {
             Ok(())
         } else {
             Err(self.corrupt("something is left over in a coded section"))

@@ -178,14 +178,10 @@ fn breakdown(opened: &Opened) -> Result<Vec<FilePart>> {
     let decoder = opened.session.decoder();
     let index = decoder.index().context("the file has no index")?;
     let index_bytes = decoder.head_end().unwrap_or(0).saturating_sub(index.shared);
-    let mut parts = format::breakdown(opened.mt()?.into(), index.block_bits);
+    let mut parts = format::breakdown(opened.mt()?.into(), index.block_bits)?;
     parts.push(("header, description and index", index_bytes as f64));
     let known: f64 = parts.iter().map(|(_, bytes)| bytes).sum();
-    let rest = match opened.info()?.kind {
-        MtKind::Edge => "heads and ends of sections",
-        MtKind::Vertex | MtKind::Explicit => "updates",
-    };
-    parts.push((rest, opened.bytes as f64 - known));
+    parts.push(("heads and ends of sections", opened.bytes as f64 - known));
     parts.retain(|(_, bytes)| *bytes != 0.0);
     let vertices = f64::from(opened.info()?.vertices.max(1));
     let part =
