@@ -4,6 +4,7 @@
 mod build_support;
 mod format_support;
 mod session_support;
+mod support;
 
 use build_support::{bent, built, cube, hilly, linear};
 use format_support::sections;

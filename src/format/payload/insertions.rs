@@ -744,7 +744,7 @@ pub(super) mod tests {
 
     /// A cube of 6 bits with two fields.
     fn info() -> MtInfo {
-        let field = FieldInfo { name: String::new(), min: 0.0, max: 255.0, origin: 0.0, step: 1.0, bits: 8 };
+        let field = FieldInfo { max: 255.0, step: 1.0, bits: 8, ..FieldInfo::default() };
         MtInfo {
             kind: MtKind::Explicit,
             lattice: Lattice { origin: [0.0; 3], step: [1.0; 3], bits: 6 },
@@ -753,6 +753,7 @@ pub(super) mod tests {
             tetrahedra: 0,
             updates: 0,
             displacement_per_error: 0.0,
+            quantization: 0.0,
         }
     }
 
@@ -842,7 +843,8 @@ pub(super) mod tests {
 
     fn decoded(coded: &Coded, info: &MtInfo, base: &BaseMesh, size: u32) -> Result<VertexMt, FormatError> {
         let mut source = Source::new(Reader::new(&coded.head, 0), &coded.models)?;
-        let (mut mt, mut state) = read_head(&mut source, info.clone(), base.clone())?;
+        let known = read_head(&mut source)?;
+        let (mut mt, mut state) = start(info.clone(), base.clone(), known)?;
         source.end()?;
         for block in &coded.blocks {
             let mut source = Source::new(Reader::new(block, 0), &coded.models)?;
@@ -870,11 +872,8 @@ pub(super) mod tests {
     fn what_has_come_is_an_mt() -> Result<(), FormatError> {
         let whole = delaunay(120);
         let Coded { models, head, blocks } = coded(&whole, 10)?;
-        let (mut mt, mut state) = read_head(
-            &mut Source::new(Reader::new(&head, 0), &models)?,
-            whole.info().clone(),
-            whole.base().clone(),
-        )?;
+        let known = read_head(&mut Source::new(Reader::new(&head, 0), &models)?)?;
+        let (mut mt, mut state) = start(whole.info().clone(), whole.base().clone(), known)?;
         // One mesh follows; at every stage another one is taken back to the base, and there again.
         let mut mesh = mt.start()?;
         let mut reference = whole.start()?;
