@@ -531,7 +531,7 @@ impl Decoder {
         self.head.wanted = (0..info.fields.len()).filter(is_wanted).collect();
         if !self.options.in_parts {
             // Refuse at once what cannot fit, not after half of it has been fetched.
-            payload::check_memory(&info, 0, 0, &self.options.limits)?;
+            payload::check_memory(&info, [0; 2], info.updates, &self.options.limits)?;
         }
         self.head.info = Some(info);
         self.metadata = metadata;
@@ -564,8 +564,8 @@ impl Decoder {
         if !in_place {
             return Err(content.corrupt("a section is out of place"));
         }
-        let limits = if self.options.in_parts { &Limits::NONE } else { &self.options.limits };
-        *base = Some(payload::read_base(content, info, models, limits)?);
+        let updates = if self.options.in_parts { 0 } else { info.updates };
+        *base = Some(payload::read_base(content, info, models, updates, &self.options.limits)?);
         Ok(())
     }
 

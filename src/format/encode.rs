@@ -229,9 +229,14 @@ fn sections(
     shared.push(Section::new(Kind::MODL, payload)?);
     let mut payload = Vec::new();
     payload::write_base_head(&mut payload, mt);
+    let head = payload.len();
     let mut writer = Writer::new(&models);
     payload::put_base(&mut writer, mt);
     writer.finish(&mut payload);
+    let counts = [mt.base().positions.len() as u64, mt.base().tets.len() as u64];
+    if !payload::is_backed(counts, payload.len() - head) {
+        return Err(EncodeError::TooLong { what: "a base mesh that is told in so few bytes" });
+    }
     shared.push(Section::new(Kind::BASE, payload)?);
     for field in 0..fields {
         shared.push(Section::coded(Kind::FLDB, &[field as u32], &models, |out| {

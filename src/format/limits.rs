@@ -9,11 +9,6 @@ pub struct Limits {
     pub memory_bytes: u64,
 }
 
-impl Limits {
-    /// No caps at all.
-    pub(super) const NONE: Self = Self { section_bytes: u64::MAX, memory_bytes: u64::MAX };
-}
-
 impl Default for Limits {
     /// 256 MiB a section; 16 GiB in all, 2 GiB where pointers have 32 bits (WebAssembly).
     fn default() -> Self {

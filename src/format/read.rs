@@ -110,6 +110,11 @@ impl<'a> Reader<'a> {
         rest
     }
 
+    /// Bytes that are left.
+    pub fn len(&self) -> usize {
+        self.bytes.len()
+    }
+
     /// Whether all bytes are read.
     pub fn is_empty(&self) -> bool {
         self.bytes.is_empty()

@@ -26,6 +26,9 @@ pub struct BlockInfo {
     pub parents: Vec<u32>,
 }
 
+/// Far more than what stands between index and blocks can take, and far less than places in a file can be.
+const MAX_SHARED: u64 = 1 << 48;
+
 impl BlockInfo {
     /// Bytes of all its sections.
     pub fn len(&self) -> u64 {
@@ -112,6 +115,9 @@ impl Index {
             return Err(reader.corrupt("a block must hold 2^4 to 2^16 updates"));
         }
         let shared = reader.varint64()?;
+        if shared > MAX_SHARED {
+            return Err(reader.corrupt("what the blocks share is longer than sections can be"));
+        }
         let count = reader.varint()?;
         if u64::from(count) != u64::from(info.updates).div_ceil(1 << block_bits) {
             return Err(reader.corrupt("the index does not have as many blocks as there are updates for"));

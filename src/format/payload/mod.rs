@@ -245,16 +245,30 @@ pub struct BaseParts {
     levels: Vec<Vec<i32>>,
 }
 
-/// Reads a `BASE` section.
+/// Vertices and tetrahedra that a byte of a base mesh can stand for at most. Symbols may take no bits: without this, a few
+/// bytes could claim what fills all memory that is allowed.
+const MOST_IN_A_BYTE: u64 = 4096;
+
+/// Whether the bytes of a base mesh can tell so much.
+pub fn is_backed([vertices, tets]: [u64; 2], bytes: usize) -> bool {
+    vertices + tets <= MOST_IN_A_BYTE * (bytes as u64 + 1)
+}
+
+/// Reads a `BASE` section of an MT of which so many updates are going to be in memory at once.
 pub fn read_base(
     mut reader: Reader<'_>,
     info: &MtInfo,
     models: &Models,
+    updates: u32,
     limits: &Limits,
 ) -> Result<BaseParts, FormatError> {
     let [vertices, tets] = [reader.varint()?, reader.varint()?];
     check_counts(info, u64::from(vertices))?;
-    check_memory(info, u64::from(vertices), u64::from(tets), limits)?;
+    let counts = [vertices, tets].map(u64::from);
+    check_memory(info, counts, updates, limits)?;
+    if !is_backed(counts, reader.len()) {
+        return Err(reader.corrupt("the base mesh claims more than its bytes can tell"));
+    }
     let mut source = Source::new(reader, models)?;
     let mut parts = BaseParts { base: base::read(&mut source, vertices, tets)?, ..BaseParts::default() };
     if info.kind == MtKind::Vertex {
@@ -310,17 +324,22 @@ pub fn check_counts(info: &MtInfo, base_vertices: u64) -> Result<(), BaseMeshErr
     }
 }
 
-/// Whether an MT of which so much is known fits the limits. Counts are checked against what arrives, so it cannot grow
-/// beyond; kinds whose updates differ in size check each of these as well.
-pub fn check_memory(info: &MtInfo, vertices: u64, tets: u64, limits: &Limits) -> Result<(), FormatError> {
+/// Whether an MT with so many base vertices, base tetrahedra and updates fits the limits. Counts are checked against what
+/// arrives, so it cannot grow beyond; kinds whose updates differ in size check each of these as well.
+pub fn check_memory(
+    info: &MtInfo,
+    [vertices, tets]: [u64; 2],
+    updates: u32,
+    limits: &Limits,
+) -> Result<(), FormatError> {
     let fields = info.fields.len() as u64;
     let base = vertices * (16 + 4 * fields) + tets * 16;
-    let updates = match info.kind {
+    let each = match info.kind {
         MtKind::Edge => edge::update_bytes(fields),
         MtKind::Vertex => insertions::least_update_bytes(info),
         MtKind::Explicit => spelled::least_update_bytes(),
     };
-    check_bytes(base + u64::from(info.updates) * updates, limits)
+    check_bytes(base + u64::from(updates) * each, limits)
 }
 
 fn check_bytes(needed: u64, limits: &Limits) -> Result<(), FormatError> {
