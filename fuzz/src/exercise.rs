@@ -1,0 +1,248 @@
+//! What each fuzz target does with its input. The tests of regressions do the same: see `tests/format_regressions.rs`.
+//!
+//! Nothing here may panic but for a bug: errors are answers, too. Where an input begins with a script, its bytes say what to
+//! do when; the file follows.
+
+use tetralod::format::DecodeOptions;
+use tetralod::format::Decoder;
+use tetralod::format::Limits;
+use tetralod::geom::Bounds;
+use tetralod::io;
+use tetralod::mt::Mt;
+use tetralod::mt::MtInfo;
+use tetralod::mt::MultiTessellation;
+use tetralod::refine::Front;
+use tetralod::refine::LodCriterion;
+use tetralod::refine::Need;
+use tetralod::refine::Request;
+use tetralod::session::Session;
+
+/// Bytes of a script.
+pub const SCRIPT: usize = 16;
+/// Bytes in front of the first section, and of the head of each.
+const HEADER: usize = 32;
+const HEAD: usize = 12;
+
+/// Small enough for many runs a second.
+fn limits() -> Limits {
+    Limits { section_bytes: 1 << 20, memory_bytes: 16 << 20 }
+}
+
+/// Does with an input what the target of this name does; false if there is none.
+pub fn run(target: &str, input: &[u8]) -> bool {
+    match target {
+        "decode" => decode(input),
+        "decode_fixed" => decode_fixed(input),
+        "index" => index(input),
+        "refine" => refine(input),
+        "import" => import(input),
+        _ => return false,
+    }
+    true
+}
+
+fn with_script(input: &[u8]) -> Option<(&[u8; SCRIPT], &[u8])> {
+    input.split_first_chunk::<SCRIPT>()
+}
+
+/// Bytes in pieces as the script says, to a decoder.
+pub fn decode(input: &[u8]) {
+    if let Some((script, file)) = with_script(input) {
+        feed(script, file);
+    }
+}
+
+/// The same behind good checksums.
+pub fn decode_fixed(input: &[u8]) {
+    if let Some((script, file)) = with_script(input) {
+        feed(script, &repaired(file));
+    }
+}
+
+fn feed(script: &[u8; SCRIPT], file: &[u8]) {
+    let mut decoder = Decoder::new(DecodeOptions { limits: limits(), ..DecodeOptions::default() });
+    let mut fed = Ok(());
+    for piece in pieces(script, file) {
+        let before = decoder.progress();
+        fed = decoder.feed(piece).map(drop);
+        let after = decoder.progress();
+        assert!(after.updates >= before.updates && after.bytes >= before.bytes);
+        if fed.is_err() {
+            assert_eq!(decoder.feed(piece).map(drop), fed);
+            break;
+        }
+    }
+    let mut whole = Decoder::new(DecodeOptions { limits: limits(), ..DecodeOptions::default() });
+    assert_eq!(whole.feed(file).map(drop), fed, "pieces make a difference");
+    assert_eq!(whole.finish(), decoder.finish());
+    let present = |decoder: &Decoder| decoder.mt().map(|mt| mt.present());
+    assert_eq!(present(&whole), present(&decoder));
+}
+
+/// Pieces of the lengths in the script, again and again.
+fn pieces<'a>(script: &'a [u8; SCRIPT], mut file: &'a [u8]) -> impl Iterator<Item = &'a [u8]> {
+    let mut lengths = script.iter().cycle();
+    std::iter::from_fn(move || {
+        let length = lengths.next().map_or(1, |&byte| 1 + usize::from(byte) * usize::from(byte) / 4);
+        let (piece, rest) = file.split_at(length.min(file.len()));
+        file = rest;
+        (!piece.is_empty()).then_some(piece)
+    })
+}
+
+/// Opens a file, takes its blocks in the order of the script, and refines while they come and go.
+pub fn index(input: &[u8]) {
+    let Some((script, file)) = with_script(input) else { return };
+    let file = repaired(file);
+    let mut decoder =
+        Decoder::new(DecodeOptions { limits: limits(), in_parts: true, ..DecodeOptions::default() });
+    for piece in file.chunks(64) {
+        if decoder.feed(piece).is_err() {
+            return;
+        }
+        if decoder.mt().is_some() {
+            break;
+        }
+    }
+    let Some(mut front) = decoder.mt().and_then(|mt| Front::new(mt).ok()) else { return };
+    let blocks = decoder.index().map_or(0, |index| index.blocks.len() as u32);
+    for (step, &byte) in script.iter().cycle().take(4 * SCRIPT).enumerate() {
+        let block = (u32::from(byte) + step as u32 / SCRIPT as u32 * 5) % (blocks + 1);
+        if byte & 0xC0 == 0xC0 {
+            leave(&mut decoder, &mut front, block);
+        } else if parents_are_here(&decoder, block) {
+            arrive(&mut decoder, &mut front, block, &file);
+        }
+        let Some(mt) = decoder.mt() else { return };
+        let criterion = LodCriterion::new(mt.info(), &request(byte, mt.info()));
+        let _ = front.satisfy(mt, &criterion, Default::default());
+        assert_eq!(front.mesh().check(), Ok(()));
+    }
+}
+
+fn parents_are_here(decoder: &Decoder, block: u32) -> bool {
+    let (Some(index), Some(Mt::Edge(mt))) = (decoder.index(), decoder.mt()) else { return false };
+    let info = index.blocks.get(block as usize);
+    info.is_some_and(|info| info.parents.iter().all(|&parent| mt.has_page(parent)))
+}
+
+fn arrive(decoder: &mut Decoder, front: &mut Front, block: u32, file: &[u8]) {
+    let ranges = decoder.block_ranges(block);
+    let part = |range: &std::ops::Range<u64>| {
+        let place = |x: u64| usize::try_from(x).unwrap_or(usize::MAX).min(file.len());
+        &file[place(range.start)..place(range.end)]
+    };
+    let bytes: Vec<u8> = ranges.iter().flat_map(part).copied().collect();
+    let before = decoder.mt().map(|mt| mt.present());
+    match decoder.take_block(block, &bytes) {
+        Ok(()) => {
+            if let Some(mt) = decoder.mt() {
+                front.arrived(mt, block);
+            }
+        }
+        Err(_) => assert_eq!(before, decoder.mt().map(|mt| mt.present()), "nothing changes"),
+    }
+}
+
+fn leave(decoder: &mut Decoder, front: &mut Front, block: u32) {
+    let Some(Mt::Edge(mt)) = decoder.mt() else { return };
+    let needed = decoder.index().is_some_and(|index| {
+        (0..).zip(&index.blocks).any(|(other, info)| mt.has_page(other) && info.parents.contains(&block))
+    });
+    if mt.has_page(block) && !needed && front.leave(mt, block) {
+        // One that a lying index did not tell of may depend on it.
+        if decoder.drop_block(block).is_err()
+            && let Some(mt) = decoder.mt()
+        {
+            front.arrived(mt, block);
+        }
+    }
+}
+
+/// A request out of one byte.
+fn request(byte: u8, info: &MtInfo) -> Request {
+    let part = f64::from(byte & 0x1F) / 32.0;
+    let side = |x: f64| [0, 1, 2].map(|i| info.lattice.origin[i] + x * info.lattice.step[i] * 1024.0);
+    let value = info.fields[0].min + part * info.fields[0].range();
+    match byte >> 5 & 3 {
+        0 => Request::within(part * part * part),
+        1 => Need::within(0.0).inside(Bounds { min: side(part / 2.0), max: side(part / 2.0 + 0.3) }).into(),
+        2 => Need::within(0.01).around(0, &[value]).into(),
+        _ => Request::within(0.0).at_most(100 * u32::from(byte & 0x1F)),
+    }
+}
+
+/// A file in pieces to a session that is asked for something after each. Its mesh is valid at all times.
+pub fn refine(input: &[u8]) {
+    let Some((script, file)) = with_script(input) else { return };
+    let file = repaired(file);
+    let mut session = Session::with_limits(limits());
+    let mut requests = script.iter().rev().cycle();
+    for (at, piece) in pieces(script, &file).enumerate() {
+        let went_on = session.feed(piece).is_ok();
+        if at < 64 || !went_on {
+            ask(&mut session, requests.next().copied().unwrap_or_default());
+        }
+        if !went_on {
+            break;
+        }
+    }
+    let _ = session.finish();
+    script.iter().for_each(|&byte| ask(&mut session, byte));
+}
+
+fn ask(session: &mut Session, byte: u8) {
+    let Some(request) = session.mesh().and(session.info()).map(|info| request(byte, info)) else { return };
+    let _ = session.refine(&request);
+    if let Some(mesh) = session.mesh() {
+        assert_eq!(mesh.check(), Ok(()));
+    }
+}
+
+/// A mesh in an exchange format, told by its content; of raw samples the sidecar up to a zero, then the samples.
+pub fn import(input: &[u8]) {
+    let options = io::ReadOptions { cells: io::CellData::Values, ..io::ReadOptions::default() };
+    let _ = io::read_bytes_with("input", input, &options);
+    if let Some(at) = input.iter().position(|&byte| byte == 0) {
+        let _ = io::read_raw("input.json", &input[..at], &input[at + 1..]);
+    }
+}
+
+/// A file with lengths and checksums put right, as far as it looks like one.
+pub fn repaired(file: &[u8]) -> Vec<u8> {
+    let mut bytes = file.to_vec();
+    if bytes.len() < HEADER {
+        return bytes;
+    }
+    let (mut at, mut sections, mut chain) = (HEADER, 0_u32, crc32fast::Hasher::new());
+    let updates: [u8; 4] =
+        bytes.get(HEADER + HEAD + 9..HEADER + HEAD + 13).map_or([0; 4], |x| [x[0], x[1], x[2], x[3]]);
+    while at + HEAD <= bytes.len() {
+        let is_end = bytes[at..at + 4] == *b"ENDF";
+        let length =
+            u32::from_le_bytes([bytes[at + 4], bytes[at + 5], bytes[at + 6], bytes[at + 7]]) as usize;
+        let length = length.min(bytes.len() - at - HEAD);
+        bytes[at + 4..at + 8].copy_from_slice(&(length as u32).to_le_bytes());
+        let payload = at + HEAD;
+        if is_end && length >= 12 {
+            bytes[payload..payload + 4].copy_from_slice(&updates);
+            bytes[payload + 4..payload + 8].copy_from_slice(&sections.to_le_bytes());
+            bytes[payload + 8..payload + 12].copy_from_slice(&chain.clone().finalize().to_le_bytes());
+        }
+        let mut hasher = crc32fast::Hasher::new();
+        hasher.update(&bytes[at..at + 8]);
+        hasher.update(&bytes[payload..payload + length]);
+        let crc = hasher.finalize().to_le_bytes();
+        bytes[at + 8..at + 12].copy_from_slice(&crc);
+        chain.update(&crc);
+        sections += 1;
+        at = payload + length;
+    }
+    bytes[..12].copy_from_slice(b"\x89TLOD\r\n\x1a\x02\x00\x00\x00");
+    bytes[12..16].fill(0);
+    let total = bytes.len() as u64;
+    bytes[16..24].copy_from_slice(&total.to_le_bytes());
+    let crc = crc32fast::hash(&bytes[..28]).to_le_bytes();
+    bytes[28..32].copy_from_slice(&crc);
+    bytes
+}

@@ -1,0 +1,93 @@
+//! Writes the inputs that fuzzing starts from, made by code, into `corpus/<target>/`.
+
+use std::error::Error;
+use std::fs;
+use std::ops::ControlFlow;
+use std::path::Path;
+use tetralod::build::BuildConfig;
+use tetralod::build::Method;
+use tetralod::build::build;
+use tetralod::format::EncodeOptions;
+use tetralod::format::encode;
+use tetralod::generate::by_name;
+use tetralod::io;
+use tetralod::mt::Mt;
+use tetralod::mt::MtKind;
+use tetralod_fuzz::exercise::SCRIPT;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus");
+    let scripts = [[40; SCRIPT], [0, 1, 2, 3, 60, 5, 36, 97, 200, 66, 10, 11, 193, 13, 74, 15], [255; SCRIPT]];
+    for (name, bytes) in mts()? {
+        for (which, script) in scripts.iter().enumerate() {
+            let input = [&script[..], &bytes].concat();
+            for target in ["decode", "decode_fixed", "index", "refine"] {
+                if target != "index" || name.starts_with("edge") {
+                    write(&corpus.join(target), &format!("{name}-{which}"), &input)?;
+                }
+            }
+        }
+    }
+    for (name, bytes) in meshes()? {
+        write(&corpus.join("import"), &name, &bytes)?;
+    }
+    Ok(())
+}
+
+fn write(folder: &Path, name: &str, bytes: &[u8]) -> Result<(), Box<dyn Error>> {
+    fs::create_dir_all(folder)?;
+    Ok(fs::write(folder.join(name), bytes)?)
+}
+
+/// Small files of all kinds, in several block sizes.
+fn mts() -> Result<Vec<(String, Vec<u8>)>, Box<dyn Error>> {
+    let mut files = Vec::new();
+    let mut put = |name: &str, mt: &Mt, block_bits: u32| -> Result<(), Box<dyn Error>> {
+        let options = EncodeOptions { block_bits, ..EncodeOptions::default() };
+        files.push((format!("{name}-{block_bits}"), encode(mt, &options)?));
+        Ok(())
+    };
+    for (model, size) in [("bucky", 4), ("bucky", 6), ("sphere-flow", 5)] {
+        let mesh = by_name(model, size)?;
+        let all = BuildConfig { all_fields: true, ..BuildConfig::default() };
+        let edge = build(&mesh, &all, &mut |_| ControlFlow::Continue(()))?.mt;
+        put(&format!("edge-{model}-{size}"), &edge, 4)?;
+        put(&format!("edge-{model}-{size}"), &edge, 8)?;
+        put(&format!("explicit-{model}-{size}"), &edge.convert(MtKind::Explicit)?, 4)?;
+        let vertex = BuildConfig { kind: MtKind::Vertex, method: Method::usual(MtKind::Vertex), ..all };
+        if let Ok(built) = build(&mesh, &vertex, &mut |_| ControlFlow::Continue(())) {
+            put(&format!("vertex-{model}-{size}"), &built.mt, 5)?;
+        }
+    }
+    Ok(files)
+}
+
+/// Small meshes in every format that is read.
+fn meshes() -> Result<Vec<(String, Vec<u8>)>, Box<dyn Error>> {
+    let mesh = by_name("bucky", 3)?;
+    let mut files = Vec::new();
+    let mut bytes = Vec::new();
+    io::write_vtu(&mesh, &mut bytes)?;
+    files.push(("mesh.vtu".into(), bytes));
+    let mut bytes = Vec::new();
+    io::write_vti(&mesh, &mut bytes)?;
+    files.push(("grid.vti".into(), bytes));
+    let ascii = "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n0 0 0 1 0 0 0 1 0 0 0 1\n\
+                 CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\nPOINT_DATA 4\nSCALARS p float 1\nLOOKUP_TABLE default\n1 2 3 4\n\
+                 VECTORS U float\n1 0 0 1 0 0 1 0 0 1 0 0\n";
+    files.push(("ascii.vtk".into(), ascii.into()));
+    let grid = "# vtk DataFile Version 3.0\nt\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 2 2 2\nORIGIN 0 0 0\nSPACING 1 1 1\n\
+                POINT_DATA 8\nSCALARS p float 1\nLOOKUP_TABLE default\n1 2 3 4 5 6 7 8\n";
+    files.push(("grid.vtk".into(), grid.into()));
+    let plain = "<VTKFile type=\"UnstructuredGrid\" version=\"0.1\" byte_order=\"LittleEndian\"><UnstructuredGrid>\
+                 <Piece NumberOfPoints=\"4\" NumberOfCells=\"1\"><PointData><DataArray type=\"Float32\" Name=\"p\" \
+                 format=\"ascii\">1 2 3 4</DataArray></PointData><Points><DataArray type=\"Float32\" \
+                 NumberOfComponents=\"3\" format=\"ascii\">0 0 0 1 0 0 0 1 0 0 0 1</DataArray></Points><Cells>\
+                 <DataArray type=\"Int32\" Name=\"connectivity\" format=\"ascii\">0 1 2 3</DataArray><DataArray \
+                 type=\"Int32\" Name=\"offsets\" format=\"ascii\">4</DataArray><DataArray type=\"UInt8\" Name=\"types\" \
+                 format=\"ascii\">10</DataArray></Cells></Piece></UnstructuredGrid></VTKFile>";
+    files.push(("plain.vtu".into(), plain.into()));
+    let sidecar = "{\"dims\": [2, 2, 2], \"type\": \"uint8\", \"endian\": \"little\", \"spacing\": [1, 1, 1], \"origin\": [0, 0, 0], \"field\": \"p\"}\0abcdefgh";
+    files.push(("samples.raw".into(), sidecar.into()));
+    Ok(files)
+}
