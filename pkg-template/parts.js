@@ -49,6 +49,7 @@ export class Parts {
     this.#url = url;
     this.#onChange = onChange;
     const sink = {
+      onServer: (servesRanges) => servesRanges || this.#turnAway(),
       onRange: (start, end, bytes) => this.#take(start, bytes),
       onError: (error) => {
         this.#fail(error);
@@ -96,12 +97,14 @@ export class Parts {
     return any;
   }
 
+  /** Without ranges each look at the file would be one at all of it. */
+  #turnAway() {
+    this.close();
+    this.#begun.resolve(false);
+  }
+
   #take(start, bytes) {
     if (this.#closed || this.#failure) return;
-    if (!this.#progress?.ready && this.#ranges.servesRanges === false) {
-      this.close();
-      return this.#begun.resolve(false);
-    }
     if (start === 0) this.#first = bytes;
     this.#bytes += bytes.length;
     this.#give(start, bytes);

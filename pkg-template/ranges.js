@@ -40,6 +40,8 @@ const LATE = 100;
  * @typedef {object} RangesSink
  * @property {(start: number, end: number, bytes: Uint8Array) => void} onRange takes a range that was wanted: once, with
  *   fewer bytes where it reaches beyond the end of the file. May call `want`.
+ * @property {(servesRanges: boolean) => void} [onServer] hears once, before any range, whether the server gives ranges. May
+ *   call `close`.
  * @property {(error: TetralodError) => void} onError nothing comes any more, until `retry` is called
  */
 
@@ -63,6 +65,7 @@ export class Ranges {
   #wanted = [];
   #failed = false;
   #closed = false;
+  #knowsServer = false;
 
   /**
    * @param {typeof import("./tetralod_core.js").RangeLoader} RangeLoader of a wasm module that is loaded
@@ -162,6 +165,7 @@ export class Ranges {
   #go() {
     if (this.#closed) return;
     this.#learn();
+    if (this.#closed) return;
     for (let range; (range = this.#loader.take()); ) {
       const { start, end, bytes } = range;
       this.#kept?.put([start, end], bytes);
@@ -198,8 +202,13 @@ export class Ranges {
     }
   }
 
-  /** Opens the cache as soon as it is known which version of the file the server has. */
+  /** What the first answer tells: whether there are ranges, and of which version of the file, which opens the cache. */
   #learn() {
+    if (!this.#knowsServer && this.servesRanges !== undefined) {
+      this.#knowsServer = true;
+      this.#sink.onServer?.(this.servesRanges);
+      if (this.#closed) return;
+    }
     const { cache } = this.#options;
     if (this.#kept || !cache || !globalThis.caches) return;
     const version = this.#loader.version();

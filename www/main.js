@@ -27,6 +27,8 @@ const demo = (window.tetralodDemo = {
   firstFrameMs: undefined,
   receivedBytes: 0,
   totalBytes: undefined,
+  /** Of a file that is fetched in parts: blocks that are here, and others. */
+  blocks: undefined,
 });
 
 /** @type {import("tetralod/viewer").Viewer} */
@@ -38,6 +40,8 @@ let opening = 0;
 let box;
 /** @type {import("tetralod").FieldInfo} */
 let field;
+/** Fields by name: the numbers of their time steps, or one. @type {Map<string, number[]>} */
+let fields = new Map();
 
 start();
 
@@ -75,6 +79,7 @@ async function open(from) {
   const mine = ++opening;
   Object.assign(demo, { state: "opening", error: undefined, info: undefined, stats: undefined });
   Object.assign(demo, { firstFrameBytes: undefined, firstFrameMs: undefined, receivedBytes: 0, totalBytes: undefined });
+  demo.blocks = undefined;
   $("message").hidden = true;
   $("legend").hidden = true;
   $("loading").classList.remove("done");
@@ -96,6 +101,22 @@ async function open(from) {
   }
 }
 
+/** Goes on with what is open, if it comes in blocks and is still the same file; otherwise opens it again. */
+async function retry() {
+  if (!demo.info || !demo.blocks || demo.error?.code === "changed") return open(source);
+  $("message").hidden = true;
+  demo.error = undefined;
+  demo.state = "streaming";
+  const mine = opening;
+  try {
+    await viewer.retry();
+    await viewer.settled();
+    if (mine === opening && demo.state === "streaming") demo.state = "complete";
+  } catch (error) {
+    if (mine === opening && demo.state === "streaming") fail(error);
+  }
+}
+
 /** What the updates of each kind of MT are. */
 const KINDS = { edge: "vertex splits", vertex: "vertex insertions", explicit: "spelled out" };
 
@@ -103,11 +124,14 @@ const KINDS = { edge: "vertex splits", vertex: "vertex insertions", explicit: "s
 function arrive(info) {
   demo.info = info;
   $("n-kind").textContent = KINDS[info.kind] ?? info.kind;
-  const select = $("field");
-  select.replaceChildren(...info.fields.map(({ name }) => new Option(name, name)));
-  $("field-row").hidden = info.fields.length < 2;
+  fields = new Map();
+  info.fields.forEach(({ name }, number) => fields.set(name, [...(fields.get(name) ?? []), number]));
+  for (const steps of fields.values()) steps.sort((a, b) => info.fields[a].time - info.fields[b].time);
+  $("field").replaceChildren(...[...fields.keys()].map((name) => new Option(name, name)));
+  $("field-row").hidden = fields.size < 2;
+  $("time").value = 0;
   box = inner(info.bounds);
-  chooseField(info.fields[0]);
+  chooseField();
   showBox();
   applyMode();
   applyCut();
@@ -115,10 +139,15 @@ function arrive(info) {
   refine();
 }
 
-function chooseField(chosen) {
-  field = chosen;
+/** Takes the field and the time step that the settings name. */
+function chooseField() {
+  const steps = fields.get($("field").value);
+  $("time").max = steps.length - 1;
+  $("time-row").hidden = steps.length < 2;
+  field = demo.info.fields[steps[$("time").value]];
+  if (field.time !== undefined) text("time-text", String(Number(field.time.toPrecision(6))), "time");
   $("legend").hidden = false;
-  $("legend-name").textContent = field.name;
+  $("legend-name").textContent = field.unit ? `${field.name} in ${field.unit}` : field.name;
   $("legend-min").textContent = short(field.min);
   $("legend-max").textContent = short(field.max);
   applyIsovalue();
@@ -137,6 +166,9 @@ function fail(error) {
   $("retry").hidden = error.code === "device-lost" || error.code === "internal";
   const titles = {
     network: "The volume could not be fetched",
+    cors: "The server does not let this page read the volume",
+    server: "The server does not send the volume as it is",
+    changed: "The volume was replaced on the server",
     "device-lost": "The GPU was lost; reload the page",
     truncated: "The file ends too early",
     "too-large": "The mesh is too large for this GPU",
@@ -193,7 +225,7 @@ function refine() {
   text("error-text", percent === 0 ? "0: the reference mesh" : percentage(percent), "error");
   text("budget-text", budget() === undefined ? "no limit" : `${count(budget())} tetrahedra`, "budget");
   text("pixels-text", pixels(errorPixels()), "pixels");
-  const options = { error: `${percent}%`, field: field.name, maxTets: budget(), ...part() };
+  const options = { error: `${percent}%`, field: demo.info.fields.indexOf(field), maxTets: budget(), ...part() };
   if ($("focus").checked) options.isovalues = [isovalue()];
   if (aim() === "view") options.needs = [{ view: { pixels: errorPixels() } }];
   demo.request = options;
@@ -204,7 +236,7 @@ function refine() {
 
 function applyIsovalue() {
   const value = isovalue();
-  text("isovalue-text", short(value), "isovalue");
+  text("isovalue-text", `${short(value)} ${field.unit}`.trim(), "isovalue");
   $("legend-mark").style.left = `${$("isovalue").value / 10}%`;
   viewer.setIsovalue(value);
   if ($("focus").checked) refine();
@@ -312,10 +344,12 @@ function attachSettings() {
   on("pixels", refine);
   on("budget", refine);
   on("focus", refine);
-  on("field", () => {
-    chooseField(demo.info.fields[$("field").selectedIndex]);
-    refine();
-  });
+  for (const id of ["field", "time"]) {
+    on(id, () => {
+      chooseField();
+      refine();
+    });
+  }
   on("part", () => {
     if (!box) return;
     applyRoi();
@@ -327,7 +361,7 @@ function attachSettings() {
   }
   on("home", home, "click");
   on("dismiss", () => ($("message").hidden = true), "click");
-  on("retry", () => open(source), "click");
+  on("retry", retry, "click");
 }
 
 function attachFiles() {
@@ -373,14 +407,25 @@ function showInList(from) {
 
 /* Numbers */
 
-function showProgress({ bytes, total, complete }) {
+function showProgress({ bytes, total, complete, blocks }) {
   demo.receivedBytes = bytes;
+  demo.blocks = blocks;
+  if (blocks) return showBlocks(blocks, bytes);
   const known = total ?? demo.totalBytes;
   demo.totalBytes ??= total;
   if (known) $("progress").value = bytes / known;
   const amount = known ? `${size(bytes)} of ${size(known)}` : size(bytes);
   $("progress-text").textContent = complete ? `${size(bytes)} received` : amount;
   $("n-bytes").textContent = complete ? size(bytes) : amount;
+}
+
+/** Of a file in parts just what the mesh needs is fetched. */
+function showBlocks({ here, all, needed, leftOut }, bytes) {
+  if (needed > 0) $("progress").value = Math.min(here / needed, 1);
+  const words = `${count(here)} of ${count(all)} blocks`;
+  $("progress-text").textContent = words;
+  const room = leftOut > 0 ? `; no room for ${count(leftOut)}` : "";
+  $("n-bytes").textContent = `${words}, ${size(bytes)}${room}`;
 }
 
 function showStats(stats) {
