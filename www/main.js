@@ -14,7 +14,7 @@ const demo = (window.tetralodDemo = {
   state: "starting",
   viewer: undefined,
   info: undefined,
-  /** Of the last mesh that was finished, and of the last step towards one. */
+  /** Of the last mesh that was finished with all the data that it needs, and of the last step towards one. */
   stats: undefined,
   step: undefined,
   /** What the viewer was last asked for. */
@@ -442,7 +442,8 @@ function showStats(stats) {
   }
   // On the way there no error is guaranteed yet.
   if (!stats.done) return;
-  demo.stats = stats;
+  // Nor is that what was asked for, while more is on its way.
+  if (!stats.missing) demo.stats = stats;
   const bound = percentage(stats.relativeErrorBound * 100);
   $("n-error").textContent = bound;
   $("budget-note").textContent = stats.satisfied || budget() === undefined ? BUDGET_NOTE : achieved(stats);

@@ -9,7 +9,11 @@ import { MultiTessellation, TetralodError } from "../../pkg/index.js";
 const folder = process.env.TETRALOD_FIXTURE;
 assert.ok(folder, "TETRALOD_FIXTURE is not set: run `cargo xtask test js`");
 /** Hundreds of blocks. */
-const bytes = new Uint8Array(await readFile(`${folder}/blocks.mt`));
+const blocks = new Uint8Array(await readFile(`${folder}/blocks.mt`));
+/** With two fields. */
+const fields = new Uint8Array(await readFile(`${folder}/fields.mt`));
+/** What the server has. */
+let bytes = blocks;
 /** Small parts of the model. */
 const REQUESTS = [
   { error: "2%", box: [0.1, 0.1, 0.1, 0.3, 0.3, 0.3] },
@@ -50,6 +54,7 @@ before(async () => {
 
 beforeEach(() => {
   answer = good;
+  bytes = blocks;
   asked = [];
   sent = 0;
 });
@@ -316,6 +321,32 @@ for (const worker of [true, false]) {
       await rejects(open({ fields: ["none"] }), "bad-option", /none/);
       await rejects(open({ fields: "p" }), "bad-option", /`fields`/);
       await rejects(open({ memory: "much" }), "bad-option", /`memory`/);
+    });
+
+    test("of several fields just the wanted ones are fetched, each with an error of its own", async () => {
+      bytes = fields;
+      const fetched = {};
+      for (const names of [["pressure", "speed"], ["speed"]]) {
+        const before = sent;
+        const mt = await open({ fields: names, gap: 0 });
+        assert.deepEqual(mt.info.fields.map(({ name }) => name), names);
+        for (const [number, { name, min, max, floor }] of mt.info.fields.entries()) {
+          assert.ok(floor > 0 && floor < 1e-3 * (max - min));
+          const { stats } = await mt.refine({ error: "4%", field: number }, { complete: true });
+          assert.ok(stats.satisfied && stats.relativeErrorBound <= 0.04);
+          const byNumber = await mt.hash();
+          await mt.refine({ error: "4%", field: name }, { complete: true });
+          assert.equal(await mt.hash(), byNumber);
+        }
+        const { floor } = mt.info.fields.at(-1);
+        const exact = await mt.refine({ error: 0, field: "speed" }, { complete: true });
+        assert.equal(exact.stats.tetrahedra, mt.info.tetrahedra);
+        assert.ok(exact.stats.errorBound >= floor && exact.stats.bounds[0] >= floor, "what storing rounds off counts");
+        fetched[names.length] = sent - before;
+        mt.free();
+      }
+      // What stands in front of the blocks comes as a whole.
+      assert.ok(fetched[1] < 0.95 * fetched[2], JSON.stringify(fetched));
     });
 
     test("a signal ends the fetching, and what has come stays usable", async () => {

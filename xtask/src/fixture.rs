@@ -45,12 +45,17 @@ pub fn make() -> Result<()> {
     make_blocks(&tetralod, folder)
 }
 
-/// Makes `blocks.mt`, a file of hundreds of blocks.
+/// Makes `blocks.mt`, a file of hundreds of blocks, and `fields.mt`, one of two fields.
 fn make_blocks(tetralod: &Path, folder: &Path) -> Result<()> {
-    let (grid, mt) = (folder.join("blocks.vti"), folder.join("blocks.mt"));
-    shell::run(shell::command(tetralod, ["generate", "bucky", "--size", "33", "-o"]).arg(&grid))?;
-    let build = ["build", "--quiet", "--block-updates", "64", "-o"];
-    shell::run(shell::command(tetralod, build).arg(mt).arg(grid))
+    for (name, data, size, extension) in
+        [("blocks", "bucky", "33", "vti"), ("fields", "sphere-flow", "14", "vtu")]
+    {
+        let [mesh, mt] = [extension, "mt"].map(|extension| folder.join(format!("{name}.{extension}")));
+        shell::run(shell::command(tetralod, ["generate", data, "--size", size, "-o"]).arg(&mesh))?;
+        let build = ["build", "--quiet", "--all-fields", "--block-updates", "64", "-o"];
+        shell::run(shell::command(tetralod, build).arg(mt).arg(mesh))?;
+    }
+    Ok(())
 }
 
 /// Builds an MT and tells the hashes of its meshes.
