@@ -6,13 +6,14 @@ use anyhow::{Context, Result, bail};
 use serde_json::Value;
 
 use crate::serve::Mount;
-use crate::{bench_build, browser, demo, fixture, package, serve, shell};
+use crate::{bench_build, bench_format, browser, demo, fixture, package, serve, shell};
 
-/// Measures `FILE.mt`, or the demo's volume; with `--browser` also in Chromium. With `--build`, the builders instead.
+/// Measures `FILE.mt`, or the demo's volume; with `--browser` also in Chromium. With `--build`, the builders instead, with `--format` the files.
 pub fn run(args: &[String]) -> Result<()> {
     match args {
         [build] if build == "--build" => return bench_build::run(false),
         [build, large] if build == "--build" && large == "--large" => return bench_build::run(true),
+        [format] if format == "--format" => return bench_format::run(),
         _ => {}
     }
     let (mut file, mut in_browser) = (None, false);
@@ -20,7 +21,9 @@ pub fn run(args: &[String]) -> Result<()> {
         match arg.as_str() {
             "--browser" => in_browser = true,
             path if !path.starts_with('-') && file.is_none() => file = Some(PathBuf::from(path)),
-            other => bail!("`bench` knows one FILE.mt and --browser, or --build [--large], not `{other}`"),
+            other => {
+                bail!("`bench` knows one FILE.mt and --browser, --build [--large] or --format, not `{other}`")
+            }
         }
     }
     let file = file.map_or_else(demo::bench_volume, Ok)?;

@@ -4,6 +4,7 @@
 
 mod bench;
 mod bench_build;
+mod bench_format;
 mod browser;
 mod demo;
 mod fixture;
@@ -25,6 +26,7 @@ usage: cargo xtask COMMAND
   test [STEP...]                 every check, or the named steps; `test --list` names them
   bench [FILE.mt] [--browser]    measure decoding, refinement and isosurfaces; natively, or also in the browser
   bench --build [--large]        measure triangulation, insertion and the kinds of MT side by side
+  bench --format                 measure MT files and what requests need of them; writes docs/benchmarks.md
   paper                          do the paper's experiments again and write docs/paper.md with plots and pictures";
 
 fn main() -> ExitCode {

@@ -1,0 +1,88 @@
+//! `cargo xtask bench --format`: what MT files cost and what requests need of them; writes `docs/benchmarks.md`.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+
+use crate::shell;
+
+const PAGE: &str = "docs/benchmarks.md";
+
+/// Generated volumes in the tables, by points along a side, and the one of the walk.
+const SIZES: [u32; 2] = [33, 65];
+const LARGE: u32 = 97;
+
+const HEAD: &str = "\
+# Benchmarks of MT files
+
+Written by `cargo xtask bench --format`, over the data sets in the folder that `TETRALOD_DATA` names and generated volumes.
+Bytes are the same on every machine; speeds are of the machine that it ran on.
+
+## Bytes
+
+Bytes per vertex of the reference mesh, with one field. *bits* are those of the position lattice: 16, or more where thin
+cells need them; fields have 16. *raw* are positions and field as 32-bit floats and tetrahedra as four 32-bit numbers; *xz*
+is what `xz -9` makes of these arrays, *shuffled* of their columns as differences, byte by byte, without loss: on grids in
+their natural order these differences are nearly all the same. *as given* is the file of the data set, which may hold
+more than this one field. All MT files hold the whole Multi-Tessellation, not the reference mesh alone. *index* is the share of
+header, description and index in the edge-based file; *decode* are million updates a second on one thread, the fastest of five
+runs. Only sets of up to 100 000 points were built as vertex-based MTs, by half-edge collapses.
+";
+
+const PICTURE: &str = "
+## The first useful picture
+
+The isosurface at the middle value within 1 % of the field's range, on sets above 150 000 tetrahedra. *guaranteed*: the share of
+the file after which the mesh is that of the request, read in the order of the file or only the ranges that it needs.
+*measured*: the share, of some steps, after which the error of the field along both isosurfaces (reference and extracted) and
+their Hausdorff distance, in percent of the range and of the diagonal, are measured to be at most 1 %; both are told beside it.
+The goal is 5 %.
+
+";
+
+const BOXES: &str = "Boxes of a quarter of each side, a 64th of the box around the model, with error 0. The share of the updates that are applied is \
+what the partial order makes necessary: no way to cut the file into blocks can do with less. The goal is 10 % of the file.\n\n";
+
+const WALK: &str = "
+## A model ten times as large as the room
+
+Boxes, isovalues and views in turn, through a client whose blocks may take a tenth of what all updates take in memory. Every
+mesh was checked to be valid.
+
+";
+
+/// Measures, and writes the page. Takes the sets of `TETRALOD_DATA`, if that is there.
+pub fn run() -> Result<()> {
+    let data = std::env::var_os("TETRALOD_DATA").map(PathBuf::from);
+    let mut inputs: Vec<String> = SIZES.iter().map(|size| format!("bucky:{size}")).collect();
+    for folder in data.iter().flat_map(|data| [data.clone(), data.join("native")]) {
+        inputs.push(folder.display().to_string());
+    }
+    let table = bench("table", &inputs)?;
+    let requests = bench("requests", &inputs)?;
+    let requests = requests
+        .replace("## A box at full resolution\n\n", &format!("## A box at full resolution\n\n{BOXES}"));
+    let large = Path::new("target/bench").join(format!("bucky{LARGE}.mt"));
+    fs::create_dir_all("target/bench")?;
+    if !large.exists() {
+        bench("make", &[LARGE.to_string(), absolute(&large)?])?;
+    }
+    // A process of its own, for its memory is measured.
+    let walk = bench("walk", &[absolute(&large)?])?;
+    let about = format!("The generated volume of {LARGE}³ points.\n\n");
+    let page = [HEAD, "\n", &table, PICTURE, &requests, WALK, &about, &walk].concat();
+    fs::write(PAGE, page).with_context(|| PAGE.to_owned())?;
+    println!("wrote {PAGE}");
+    Ok(())
+}
+
+/// Cargo runs benchmarks in the folder of their package.
+fn absolute(path: &Path) -> Result<String> {
+    Ok(shell::root().join(path).to_str().context("the folder has a name that is not UTF-8")?.to_owned())
+}
+
+fn bench(what: &str, arguments: &[String]) -> Result<String> {
+    let mut command = shell::cargo(["bench", "--package", "tetralod", "--bench", "format", "--", what]);
+    shell::output(command.args(arguments))
+}
