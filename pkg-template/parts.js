@@ -117,6 +117,7 @@ export class Parts {
       this.#count++;
     } catch (error) {
       const known = reviveError(error);
+      this.#ranges.forget();
       this.#ranges.want([]);
       this.#fail(new TetralodError(known.code, `${this.#url}: ${known.message}`, { cause: error }));
     }

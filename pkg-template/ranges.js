@@ -66,6 +66,7 @@ export class Ranges {
   #failed = false;
   #closed = false;
   #knowsServer = false;
+  #forgets = false;
 
   /**
    * @param {typeof import("./tetralod_core.js").RangeLoader} RangeLoader of a wasm module that is loaded
@@ -99,8 +100,16 @@ export class Ranges {
     if (this.#closed) return;
     this.#loader.retry();
     this.#kept = undefined;
+    this.#forgets = false;
     this.#failed = false;
     this.#ask();
+  }
+
+  /** What came is damaged: the cache may hold it, and is not used until `retry`. */
+  forget() {
+    this.#kept?.clear();
+    this.#kept = undefined;
+    this.#forgets = true;
   }
 
   /** The size of the file, once it is known. */
@@ -168,9 +177,12 @@ export class Ranges {
     if (this.#closed) return;
     for (let range; (range = this.#loader.take()); ) {
       const { start, end, bytes } = range;
-      this.#kept?.put([start, end], bytes);
+      const kept = this.#kept;
+      // A copy at once: whoever takes the range may move it to another thread.
+      const copy = kept && bytes.slice();
       if (this.#noMore([start, end])) this.#sink.onRange(start, end, bytes);
       if (this.#closed) return;
+      if (kept === this.#kept) kept?.put([start, end], copy);
     }
     try {
       this.#obey();
@@ -210,7 +222,7 @@ export class Ranges {
       if (this.#closed) return;
     }
     const { cache } = this.#options;
-    if (this.#kept || !cache || !globalThis.caches) return;
+    if (this.#kept || this.#forgets || !cache || !globalThis.caches) return;
     const version = this.#loader.version();
     if (version === undefined) return;
     this.#kept = new Kept(cache, this.#url, version);
@@ -349,11 +361,15 @@ class Kept {
     return undefined;
   }
 
+  clear() {
+    for (const key of this.#keys) this.#cache.delete(key).catch(() => {});
+    this.#keys.clear();
+  }
+
   put(range, bytes) {
     if (!this.#cache) return;
     const key = this.#key(range);
-    // A copy at once: whoever takes the range may move it to another thread.
-    const response = new Response(bytes.slice(), { headers: { "content-length": String(bytes.length) } });
+    const response = new Response(bytes, { headers: { "content-length": String(bytes.length) } });
     this.#cache.put(key, response).then(() => this.#keys.add(key)).catch(() => {});
   }
 }

@@ -60,9 +60,12 @@ fn from_data_to_a_checked_mesh() {
         assert_eq!(whole["tetrahedra"], info["tetrahedra"]);
         assert_eq!(whole["vertices"], info["vertices"]);
         assert_eq!(whole["updates_applied"], info["updates"]);
-        assert_eq!(number(&whole, "error_bound"), 0.0);
         let range = number(&info["fields"][0], "max") - number(&info["fields"][0], "min");
         assert!(number(&whole, "measured_error") <= range / 32_768.0, "the lattice of the field: {whole}");
+        assert!(
+            number(&whole, "measured_error") <= number(&whole, "error_bound"),
+            "what it rounds off: {whole}"
+        );
 
         let mut last = number(&whole, "tetrahedra");
         for percent in ["1%", "5%", "20%"] {

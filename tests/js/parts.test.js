@@ -364,6 +364,43 @@ for (const worker of [true, false]) {
   });
 }
 
+test("damage is not kept in the cache", async () => {
+  // Node has no Cache Storage: as much of one as is needed.
+  const store = new Map();
+  globalThis.caches = {
+    open: async () => ({
+      keys: async () => [...store.keys()].map((url) => new Request(url)),
+      match: async (url) => store.get(url)?.clone(),
+      put: async (url, response) => void store.set(url, response),
+      delete: async (url) => store.delete(url),
+    }),
+  };
+  try {
+    const open = () => MultiTessellation.open(base, { worker: false, cache: "mt", ...QUICK });
+    const mt = await open();
+    answer = (range, response) => {
+      head(range, response);
+      response.end(bytes.slice(range.start, range.end).map((byte) => byte ^ 1));
+    };
+    await rejects(mt.refine(REQUESTS[2], { complete: true }), "corrupt");
+    answer = good;
+    await mt.retry();
+    await mt.refine(REQUESTS[2], { complete: true });
+    assert.equal(await mt.hash(), hashes[2]);
+    mt.free();
+    const before = sent;
+    const other = await open();
+    // The cache opens beside.
+    await new Promise((resolve) => setTimeout(resolve, 50));
+    await other.refine(REQUESTS[2], { complete: true });
+    assert.equal(await other.hash(), hashes[2]);
+    assert.ok(sent - before < 0.5 * before, "most comes from the cache");
+    other.free();
+  } finally {
+    delete globalThis.caches;
+  }
+});
+
 async function until(condition, what) {
   for (let i = 0; i < 300; i++) {
     if (condition()) return;
