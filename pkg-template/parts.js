@@ -151,7 +151,9 @@ export class Parts {
   get progress() {
     const { ready = false, complete = false, updates = 0 } = this.#progress ?? {};
     const total = this.#ranges.total ?? this.#progress?.total;
-    return { ready, complete, bytes: this.#bytes, total, updates, blocks: this.#session.blocks() };
+    const blocks = this.#session.blocks();
+    // Only edge-based MTs have blocks.
+    return { ready, complete, bytes: this.#bytes, total, updates, blocks: blocks.all > 0 ? blocks : undefined };
   }
 
   /** Whether there is more to come. */

@@ -215,7 +215,7 @@ function step(budget) {
     stats.milliseconds = end - start;
     for (const name of Object.keys(total)) total[name] += stats[name];
     if (stats.done) lastRefine = { end, took: total.milliseconds };
-    emit("stats", { ...stats, ...total, bytes, goal, blocks: parts && viewer.blocks() });
+    emit("stats", { ...stats, ...total, bytes, goal, blocks: parts?.progress.blocks });
     if (stats.done) Object.keys(total).forEach((name) => (total[name] = 0));
   } catch (error) {
     emit("failed", { goal, error: flattenError(error) });

@@ -128,7 +128,7 @@ test("the page streams a volume, draws it, and its settings change mesh and pict
 });
 
 test("the first picture is there before the file is", async () => {
-  const page = await open("data/bucky.mt?throttle=1000000");
+  const page = await open("data/bucky.mt?throttle=100000");
   await page.waitForFunction(() => window.tetralodDemo?.firstFrameBytes, undefined, { timeout: PATIENCE });
   const [first, state] = [await demo(page, "firstFrameBytes"), await demo(page, "state")];
   assert.equal(state, "streaming");
@@ -261,9 +261,9 @@ test("the package runs in a worker of the page, without a viewer", async () => {
   const seen = await page.evaluate(async () => {
     const { MultiTessellation, applyChanges } = await import("tetralod");
     const mt = await MultiTessellation.open("data/bucky.mt");
-    await mt.complete;
-    const { stats, tets } = await mt.refine({ error: "5%", maxTets: 20_000 });
-    const [one, two] = [await mt.hash(), (await mt.refine({ error: "0%" }), await mt.refine({ error: "5%", maxTets: 20_000 }), await mt.hash())];
+    const all = { complete: true };
+    const { stats, tets } = await mt.refine({ error: "5%", maxTets: 20_000 }, all);
+    const [one, two] = [await mt.hash(), (await mt.refine({ error: "0%" }, all), await mt.refine({ error: "5%", maxTets: 20_000 }, all), await mt.hash())];
     // Deltas over a walk of a box, in steps and whole.
     const at = (place) => place.map((x, i) => mt.info.bounds[i] + x * (mt.info.bounds[i + 3] - mt.info.bounds[i]));
     const mesh = await mt.refine({ error: "100%" });
