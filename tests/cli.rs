@@ -171,7 +171,8 @@ fn every_part_can_be_asked_for_in_two_ways() {
         assert!(number(&plain_mesh, "updates_applied") > 0.0, "{plain:?}: {plain_mesh}");
         assert_eq!((&plain_mesh["satisfied"], &plain_mesh["done"]), (&true.into(), &true.into()));
         let need = &plain_mesh["needs"][0];
-        assert!(number(need, "bound") <= number(need, "asked"), "{need}");
+        // What the lattices round off stays.
+        assert!(number(need, "bound") <= number(need, "asked").max(1e-4), "{need}");
     }
     let asked = |mesh: &Value| mesh["needs"][0]["asked"].as_f64();
     let unit = |mesh: &Value| mesh["needs"][0]["unit"].clone();
