@@ -118,16 +118,16 @@ fn request(session: &Session, stop: u32) -> Result<Request> {
         0 => {
             let min = [0.8 * turn, 0.8 * (1.0 - turn), 0.4];
             let region = Bounds { min: at(min), max: at(min.map(|x| x + 0.12)) };
-            Need::within(0.002).inside(region).into()
+            Need::within(0.01).inside(region).into()
         }
         1 => {
             let field = &info.fields[0];
-            Need::within(0.02).around(0, &[field.min + (0.2 + 0.6 * turn) * field.range()]).into()
+            Need::within(0.06).around(0, &[field.min + (0.2 + 0.6 * turn) * field.range()]).into()
         }
         _ => {
             let angle = std::f64::consts::TAU * turn;
             let eye = at([0.5 + 0.8 * angle.cos(), 0.5 + 0.8 * angle.sin(), 0.5]);
-            Need::seen(towards(eye, at([0.5; 3])), 3.0).into()
+            Need::seen(towards(eye, at([0.5; 3])), 10.0).into()
         }
     })
 }
