@@ -77,17 +77,19 @@ impl Reference {
         Ok(Self { surface: Surface::of(&mesh, iso), mesh, iso, range: field.range(), diagonal })
     }
 
-    /// The error of the field along both isosurfaces, and the distance of each from the other.
+    /// The distance of both surfaces from each other, and the error of the field: by how much it is on the wrong side of the
+    /// isovalue at the ends of an edge that the reference surface crosses.
     fn compare(&self, session: &Session) -> Result<Accuracy> {
         let (info, mesh) = (session.info().ok_or("no MT")?, session.mesh().ok_or("no mesh")?);
         let mesh = Mesh::of(info, mesh);
         let surface = Surface::of(&mesh, self.iso);
-        let along = |surface: &Surface, mesh: &Mesh| {
-            let field = Interpolant::new(mesh);
-            let values = surface.points.iter().filter_map(|&p| field.at(p));
-            values.map(|value| (value - self.iso).abs()).fold(0.0, f64::max)
-        };
-        let field = along(&self.surface, &mesh).max(along(&surface, &self.mesh));
+        let values = Interpolant::new(&mesh);
+        let mut field = 0.0_f64;
+        for edge in &self.surface.edges {
+            let [low, high] = edge.map(|v| values.at(self.mesh.positions[v as usize]));
+            let above = low.map_or(0.0, |low| low - self.iso);
+            field = field.max(above).max(high.map_or(0.0, |high| self.iso - high));
+        }
         let distance = surface.distance_to(&self.surface).max(self.surface.distance_to(&surface));
         Ok(Accuracy { field: 100.0 * field / self.range, distance: 100.0 * distance / self.diagonal })
     }

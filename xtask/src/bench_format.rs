@@ -35,9 +35,9 @@ const PICTURE: &str = "
 
 The isosurface at the middle value within 1 % of the field's range, on sets above 150 000 tetrahedra. *guaranteed*: the share of
 the file after which the mesh is that of the request, read in the order of the file or only the ranges that it needs.
-*measured*: the share, of some steps, after which the error of the field along both isosurfaces (reference and extracted) and
-their Hausdorff distance, in percent of the range and of the diagonal, are measured to be at most 1 %; both are told beside it.
-The goal is 5 %.
+*measured*: the share, of some steps, after which the error of the field (by how much it is on the wrong side of the value at the
+ends of edges that the reference isosurface crosses, in percent of the range) and the Hausdorff distance (in percent of the
+diagonal) are measured to be at most 1 %; both are told beside it. The goal is 5 %.
 
 ";
 
