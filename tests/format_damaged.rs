@@ -249,7 +249,7 @@ fn limits_hold_before_memory_is_taken() {
         assert!(matches!(feed(tight), Err(FormatError::Limit { limit: 300, .. })));
         let tight = Limits { memory_bytes: 5000, ..Limits::default() };
         assert!(matches!(feed(tight), Err(FormatError::Limit { limit: 5000, .. })));
-        let roomy = Limits { section_bytes: 100_000, memory_bytes: 2 * MultiTessellation::bytes(&mt) };
+        let roomy = Limits { section_bytes: 100_000, memory_bytes: 16 * MultiTessellation::bytes(&mt) };
         assert_eq!(feed(roomy), Ok(()));
         // Kinds whose updates differ in size tell it as they come; the others are refused at once.
         let half = MultiTessellation::bytes(&mt) * 3 / 4;

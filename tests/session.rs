@@ -159,16 +159,54 @@ fn requests_without_sense_are_refused() {
     assert_eq!(session.set_field(2), Err(SessionError::Request(RequestError::Field { index: 2, fields: 2 })));
 }
 
+/// The file with one bit of the first section of a kind flipped, and all checksums as if that were right.
+fn flipped(file: &[u8], kind: &[u8; 4], bit: usize) -> Option<Vec<u8>> {
+    let mut bytes = file.to_vec();
+    let (mut at, mut chain, mut is_done) = (32, crc32fast::Hasher::new(), false);
+    while at < bytes.len() {
+        let length = u32::from_le_bytes(bytes[at + 4..at + 8].try_into().ok()?) as usize;
+        let end = at + 12 + length;
+        if &bytes[at..at + 4] == kind && !is_done {
+            let byte = bytes[at + 12..end].get_mut(bit / 8)?;
+            *byte ^= 1 << (bit % 8);
+            is_done = true;
+        }
+        if &bytes[at..at + 4] == b"ENDF" {
+            let crc = chain.clone().finalize();
+            bytes[end - 4..end].copy_from_slice(&crc.to_le_bytes());
+        }
+        let mut hasher = crc32fast::Hasher::new();
+        hasher.update(&bytes[at..at + 8]);
+        hasher.update(&bytes[at + 12..end]);
+        let crc = hasher.finalize().to_le_bytes();
+        bytes[at + 8..at + 12].copy_from_slice(&crc);
+        chain.update(&crc);
+        at = end;
+    }
+    is_done.then_some(bytes)
+}
+
 #[test]
 fn damage_that_only_shows_in_the_mesh_leaves_a_valid_mesh() {
-    let bytes = encode(&two_splits(0b111), &EncodeOptions::default()).expect("the MT is complete");
-    let mut session = Session::new();
-    session.feed(&bytes).expect("the damage is not in the bytes");
-    let error = session.refine(&uniform(0.0)).expect_err("a mask that parts nothing");
-    assert!(matches!(error, SessionError::Format(FormatError::Update(_))), "{error:?}");
-    session.mesh().expect("it is open").check().expect("a valid mesh");
-    let stats = session.refine(&uniform(1.0)).expect("the base mesh is sound");
-    assert_eq!(stats.tetrahedra, 2);
+    assert!(encode(&two_splits(0b111), &EncodeOptions::default()).is_err(), "a mask that parts nothing");
+    let file = bytes();
+    assert_eq!(flipped(&file, b"UPDT", 0).map(|bytes| bytes.len()), Some(file.len()));
+    let mut found = 0;
+    let kinds = [b"MODL", b"UPDT", b"FLDU", b"FLDB"];
+    let file = &file;
+    for damaged in kinds.into_iter().flat_map(|kind| (0..).map_while(move |bit| flipped(file, kind, bit))) {
+        let mut session = Session::new();
+        if session.feed(&damaged).is_err() {
+            continue;
+        }
+        let Err(error) = session.refine(&uniform(0.0)) else { continue };
+        assert!(matches!(error, SessionError::Format(FormatError::Update(_))), "{error:?}");
+        session.mesh().expect("it is open").check().expect("a valid mesh");
+        let stats = session.refine(&uniform(1.0)).expect("the base mesh is sound");
+        assert_eq!(stats.tetrahedra, 2);
+        found += 1;
+    }
+    assert!(found > 0, "some damage is not in the bytes");
 }
 
 #[test]
@@ -177,12 +215,17 @@ fn a_base_mesh_that_is_no_mesh_is_refused_for_good() {
     let mut base = good.base().clone();
     base.tets.push([0, 1, 2, 3]);
     let info = MtInfo { vertices: 5, updates: 0, ..good.info().clone() };
-    let bytes =
-        encode(&EdgeMt::new(info, base), &EncodeOptions::default()).expect("every tetrahedron is positive");
-    let mut session = Session::new();
-    let error = session.feed(&bytes).expect_err("the same tetrahedron twice");
-    assert!(matches!(error, FormatError::Base(_)));
-    assert_eq!(session.feed(&[]), Err(error.clone()));
-    assert_eq!(session.finish(), Err(error));
-    assert!(session.info().is_none() && !session.progress().complete);
+    let refused = encode(&EdgeMt::new(info, base), &EncodeOptions::default());
+    assert!(refused.is_err(), "the same tetrahedron twice");
+    let (file, mut found) = (bytes(), 0);
+    for bit in 0.. {
+        let Some(damaged) = flipped(&file, b"BASE", bit) else { break };
+        let mut session = Session::new();
+        let Err(error @ FormatError::Base(_)) = session.feed(&damaged) else { continue };
+        assert_eq!(session.feed(&[]), Err(error.clone()));
+        assert_eq!(session.finish(), Err(error));
+        assert!(session.info().is_none() && !session.progress().complete);
+        found += 1;
+    }
+    assert!(found > 0, "some damage makes another mesh");
 }

@@ -28,14 +28,18 @@ fn bytes_of(mt: &Mt) -> Vec<u8> {
     encode(mt, &EncodeOptions::default()).expect("a complete MT")
 }
 
-/// Where each section of a file ends.
+/// Where each section of a file ends; the sections of a block are taken together.
 fn ends(bytes: &[u8]) -> Vec<usize> {
+    let sections = sections(bytes);
     let mut end = 32;
-    let ends = sections(bytes).into_iter().map(|(_, payload)| {
+    let mut ends = Vec::new();
+    for (at, (_, payload)) in sections.iter().enumerate() {
         end += 12 + payload.len();
-        end
-    });
-    ends.chain([bytes.len()]).collect()
+        if sections.get(at + 1).is_none_or(|(next, _)| next != b"FLDU") {
+            ends.push(end);
+        }
+    }
+    ends.into_iter().chain([bytes.len()]).collect()
 }
 
 /// Feeds both files section by section, each in pieces, and makes requests in between.

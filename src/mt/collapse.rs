@@ -351,6 +351,11 @@ impl EdgeMt {
         self.pages.get(page as usize).is_some_and(Option::is_some)
     }
 
+    /// The page that update `u` belongs to.
+    pub(crate) fn page_of_update(&self, u: u32) -> u32 {
+        u >> self.page_bits
+    }
+
     /// The updates of page `page`; none if there is no such page.
     pub fn page_updates(&self, page: u32) -> Range<u32> {
         let first = u64::from(page) << self.page_bits;

@@ -250,8 +250,14 @@ pub fn is_prefix(part: &Mt, whole: &Mt) -> bool {
             (0..part.updates()).all(|k| part.split(UpdateId(k)) == whole.split(UpdateId(k)))
         }
         (Mt::Vertex(part), Mt::Vertex(whole)) => {
-            let same = |u| part.node(u) == whole.node(u) && part.errors_of(u) == whole.errors_of(u);
-            part.base_removers() == whole.base_removers() && (0..part.updates()).map(UpdateId).all(same)
+            // Nodes are made when all updates are there; until then what they tell is kept beside them.
+            let same = |u| {
+                part.position(u) == whole.position(u)
+                    && part.levels(u).eq(whole.levels(u))
+                    && part.parents(u).eq(whole.parents(u))
+                    && part.errors_of(u) == whole.errors_of(u)
+            };
+            (0..part.updates()).map(UpdateId).all(same)
         }
         (Mt::Explicit(part), Mt::Explicit(whole)) => {
             let same = |u| {

@@ -13,6 +13,7 @@ use crate::mt::BaseMeshError;
 use crate::mt::EdgeMt;
 use crate::mt::ErrorCode;
 use crate::mt::MtInfo;
+use crate::mt::PageError;
 use crate::mt::UpdateId;
 use crate::mt::VertexId;
 use std::collections::BTreeMap;
@@ -218,13 +219,23 @@ pub fn read(source: &mut Source<'_>, mt: &EdgeMt, first: u32, count: u32) -> Res
         let v = splits.vertices[at];
         let above = match v.checked_sub(old) {
             Some(inside) => splits.offsets.get(inside as usize / 2).copied(),
-            None => mt.created_by(VertexId(v)).map(|u| mt.split(u).offset),
+            None => offset_above(mt, first, VertexId(v))?,
         };
         let offset = read_offset(source, above, leads)?;
         splits.offsets.push(offset);
         splits.masks.push(read_mask(source)?);
     }
     Ok(splits)
+}
+
+/// The offset of the split that created a vertex before block `first` began; none for a vertex of the base mesh.
+fn offset_above(mt: &EdgeMt, first: u32, vertex: VertexId) -> Result<Option<[i32; 3]>, FormatError> {
+    let Some(creator) = mt.created_by(vertex) else { return Ok(None) };
+    if mt.has(creator) {
+        return Ok(Some(mt.split(creator).offset));
+    }
+    let [page, other] = [first, creator.0].map(|u| mt.page_of_update(u));
+    Err(FormatError::Page(PageError::Needs { page, other }))
 }
 
 fn read_vertices(
