@@ -103,7 +103,7 @@ fn memory_stays_within_the_room() {
     let random = &mut Random(8);
     let mut whole = Session::new();
     whole.feed(&file).expect("a sound file");
-    let all = whole.mt().map_or(0, |mt| tetralod::mt::MultiTessellation::bytes(mt));
+    let all = whole.mt().map_or(0, tetralod::mt::MultiTessellation::bytes);
     let room = all / 3;
     let mut server = Server { file: &file, given: 0 };
     let mut session = Session::in_parts(DecodeOptions::default(), room);

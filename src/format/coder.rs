@@ -190,7 +190,7 @@ impl EntropyModel<PRECISION> for &Table {
 impl DecoderModel<PRECISION> for &Table {
     #[inline]
     fn quantile_function(&self, quantile: u16) -> (u16, u16, NonZeroU16) {
-        let mut at = usize::from(self.guides[usize::from(quantile) * GUIDES >> PRECISION]);
+        let mut at = usize::from(self.guides[(usize::from(quantile) * GUIDES) >> PRECISION]);
         while self.starts[at + 1] <= quantile {
             at += 1;
         }

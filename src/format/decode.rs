@@ -577,10 +577,8 @@ impl Decoder {
         }
         self.head.base_fields += 1;
         let is_wanted = self.head.place(field).is_some();
-        if let FileHead { base: Some(base), models: Some(models), .. } = &mut self.head {
-            if is_wanted {
-                base.read_field(content, models)?;
-            }
+        if let (true, FileHead { base: Some(base), models: Some(models), .. }) = (is_wanted, &mut self.head) {
+            base.read_field(content, models)?;
         }
         if self.head.base.as_ref().is_some_and(|base| base.fields() == self.head.wanted.len()) {
             let bits = self.head.index.as_ref().map_or(0, |index| index.block_bits);

@@ -112,9 +112,9 @@ fn survey_block(
 fn widen(block: &mut BlockInfo, mesh: &CurrentMesh, tets: &[u32]) {
     for v in tets.iter().filter_map(|&t| mesh.tet(t)).flatten() {
         let position = mesh.positions()[v as usize];
-        for axis in 0..3 {
-            block.bounds[0][axis] = block.bounds[0][axis].min(position[axis]);
-            block.bounds[1][axis] = block.bounds[1][axis].max(position[axis]);
+        let [low, high] = &mut block.bounds;
+        for ((low, high), x) in low.iter_mut().zip(high).zip(position) {
+            (*low, *high) = ((*low).min(x), (*high).max(x));
         }
         for (range, &level) in block.ranges.iter_mut().zip(mesh.levels(v)) {
             *range = [range[0].min(level), range[1].max(level)];

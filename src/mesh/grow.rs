@@ -2,7 +2,9 @@
 //! does: what the connectivity of a base mesh is told by. (Szymczak and Rossignac 1999; Gumhold, Guthe and Strasser 1999.)
 
 use super::FACES;
+#[cfg(any(feature = "build", test))]
 use super::NONE;
+#[cfg(any(feature = "build", test))]
 use super::neighbors;
 use crate::geom::orient3d;
 
@@ -248,6 +250,7 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 /// The order in which a mesh grows.
+#[cfg(any(feature = "build", test))]
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct GrowthOrder {
     /// The new number of each vertex; [`NONE`] where no tetrahedron has it.
@@ -260,6 +263,7 @@ pub(crate) struct GrowthOrder {
     pub tets: Vec<[u32; 4]>,
 }
 
+#[cfg(any(feature = "build", test))]
 impl GrowthOrder {
     /// The new number of a vertex, which it gets when it is asked for first.
     fn number(&mut self, growth: &mut Growth, positions: &[[i32; 3]], v: u32) -> u32 {
@@ -279,6 +283,7 @@ impl GrowthOrder {
 
 /// Numbers vertices and orders tetrahedra as they come when the mesh grows over its faces from its first tetrahedron. What is in that order
 /// already stays as it is. `tets` must be those of a mesh, positive, and name no vertex beyond `positions`.
+#[cfg(any(feature = "build", test))]
 pub(crate) fn growth_order(positions: &[[i32; 3]], tets: &[[u32; 4]]) -> GrowthOrder {
     // A mesh has no face of three tetrahedra; without neighbours, each one stays where it is.
     let neighbors = neighbors(tets).unwrap_or_else(|_| vec![[NONE; 4]; tets.len()]);

@@ -13,7 +13,9 @@ mod tet_mesh;
 pub use adjacency::{MAX_TETS, Topology, neighbors, topology};
 pub use check::check;
 pub use error::MeshError;
-pub(crate) use grow::{Gate, Growth, growth_order};
+#[cfg(any(feature = "build", test))]
+pub(crate) use grow::growth_order;
+pub(crate) use grow::{Gate, Growth};
 pub use kuhn::kuhn_tets;
 pub use repair::{RepairReport, repair};
 pub use series::StepError;

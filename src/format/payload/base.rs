@@ -1,7 +1,7 @@
 //! The base mesh: how it grows over its faces, and where its vertices are.
 //!
 //! Tetrahedra come in the order in which a mesh grows from its first one, and vertices in the order in which they come
-//! with them: see [`growth_order`](crate::mesh::growth_order), by which builders number them. A mesh that is in another
+//! with them: see `mesh::growth_order`, by which builders number them. A mesh that is in another
 //! order comes back as it was, too, but takes far more bits.
 
 use crate::format::FormatError;
@@ -280,7 +280,7 @@ fn add_vertex(
     vertices: u32,
     position: [i32; 3],
 ) -> Result<u32, FormatError> {
-    if !position.iter().all(|&x| 0 <= x && x <= 1 << WIDE_BITS) {
+    if !position.iter().all(|x| (0..=1 << WIDE_BITS).contains(x)) {
         return Err(source.corrupt("a vertex of the base mesh is off the lattice"));
     }
     if growth.positions.len() >= vertices as usize {

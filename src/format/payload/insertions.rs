@@ -271,9 +271,9 @@ fn bits_of(x: u32) -> u32 {
 }
 
 fn put_position(out: &mut impl Put, state: &State, near: u32, position: [i32; 3]) {
-    for axis in 0..3 {
+    for (axis, x) in position.into_iter().enumerate() {
         let (size, context, from) = usual(state, near, axis);
-        let offset = position[axis].wrapping_sub(state.mesh.positions()[near as usize][axis]);
+        let offset = x.wrapping_sub(state.mesh.positions()[near as usize][axis]);
         let residual = (offset / state.grain[axis]).wrapping_sub(from);
         let length = residual.unsigned_abs();
         let bits = bits_of(length);
@@ -721,7 +721,7 @@ impl State {
     /// After update `u` has been applied.
     fn settle(&mut self, u: u32) {
         self.mesh.clear_touched();
-        if u % 4096 == 0 {
+        if u.is_multiple_of(4096) {
             self.mesh.take_changes();
         }
     }
