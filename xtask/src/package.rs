@@ -19,8 +19,9 @@ pub const PKG: &str = "pkg";
 /// The core must stay this small, gzipped: it answers every kind of request for every kind of MT, and cuts, probes and sums up
 /// what it has; about a third is the MTs and their files. Formatting and parsing of floats, for one, would add a fifth.
 /// Without the second version of the file it was 217 kB; entropy-coded blocks with their index, several fields, pages that
-/// come and go, the plan of what to fetch, and the loader of byte ranges made it 289 kB.
-const CORE_LIMIT: usize = 295_000;
+/// come and go, the plan of what to fetch, and the loader of byte ranges made it 289 kB; the mesh that coded insertions are read
+/// with, and exact values, 324 kB.
+const CORE_LIMIT: usize = 330_000;
 
 struct Module {
     name: &'static str,
