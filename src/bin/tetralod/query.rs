@@ -311,10 +311,8 @@ impl Summary {
         if self.needs.len() > 1 || self.needs.iter().any(|need| need.unit != needs::RELATIVE) {
             rows.extend(self.needs.iter().map(|need| ("need", need.sentence())));
         }
-        if self.bytes_read < self.file_bytes {
-            let [read, all] = [self.bytes_read, self.file_bytes].map(output::bytes);
-            rows.push(("read", format!("{read} of {all}")));
-        }
+        let [read, all] = [self.bytes_read, self.file_bytes].map(output::bytes);
+        rows.push(("read", format!("{read} of {all}")));
         if !self.done {
             rows.push(("", "stopped before it was done".to_owned()));
         } else if !self.satisfied {
