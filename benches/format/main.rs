@@ -15,7 +15,7 @@ use std::error::Error;
 pub type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
 fn main() -> Result<()> {
-    // Cargo adds `--bench`.
+    // The first argument is the program itself; Cargo adds `--bench`.
     let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
     match &arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["table", inputs @ ..] => table::run(&sets::all(inputs)?),

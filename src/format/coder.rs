@@ -172,7 +172,7 @@ impl Table {
     }
 
     /// The only symbol, if there is just one: it needs no coding.
-    fn only(&self) -> Option<u32> {
+    fn sole_symbol(&self) -> Option<u32> {
         if self.symbols.len() == 1 { Some(u32::from(self.symbols[0])) } else { None }
     }
 
@@ -349,7 +349,7 @@ impl<'a> Writer<'a> {
         // The coder is a stack: what is to come out first goes in last.
         for &(context, symbol) in self.symbols.iter().rev() {
             let table = &self.models.0[context as usize];
-            if table.only().is_none() {
+            if table.sole_symbol().is_none() {
                 let coded = coder.encode_symbol(symbol, table);
                 debug_assert!(coded.is_ok(), "the tables were made from these symbols");
             }
@@ -392,7 +392,7 @@ impl<'a> Source<'a> {
         else {
             return Err(self.corrupt("a symbol has no table of frequencies"));
         };
-        if let Some(only) = table.only() {
+        if let Some(only) = table.sole_symbol() {
             return Ok(only);
         }
         match self.coder.decode_symbol(table) {

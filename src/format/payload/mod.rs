@@ -224,6 +224,7 @@ pub fn put_base(out: &mut impl Put, mt: MtRef<'_>) {
 /// Puts the levels of one field at the base vertices.
 pub fn put_base_field(out: &mut impl Put, mt: MtRef<'_>, field: usize) {
     let mut last = 0;
+    // Levels stand vertex by vertex; those of this field begin at its own place in the first one.
     for &level in mt.base().values.iter().skip(field).step_by(mt.info().fields.len()) {
         out.signed(BASE_LEVEL, 0, level - last);
         last = level;
