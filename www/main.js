@@ -410,6 +410,7 @@ function showInList(from) {
 function showProgress({ bytes, total, complete, blocks }) {
   demo.receivedBytes = bytes;
   demo.blocks = blocks;
+  document.querySelectorAll(".of-blocks").forEach((part) => (part.hidden = !blocks));
   if (blocks) return showBlocks(blocks, bytes);
   const known = total ?? demo.totalBytes;
   demo.totalBytes ??= total;
@@ -422,10 +423,10 @@ function showProgress({ bytes, total, complete, blocks }) {
 /** Of a file in parts just what the mesh needs is fetched. */
 function showBlocks({ here, all, needed, leftOut }, bytes) {
   if (needed > 0) $("progress").value = Math.min(here / needed, 1);
-  const words = `${count(here)} of ${count(all)} blocks`;
-  $("progress-text").textContent = words;
-  const room = leftOut > 0 ? `; no room for ${count(leftOut)}` : "";
-  $("n-bytes").textContent = `${words}, ${size(bytes)}${room}`;
+  $("progress-text").textContent = `${count(here)} of ${count(all)} blocks`;
+  const room = leftOut > 0 ? `, no room for ${count(leftOut)}` : "";
+  $("n-blocks").textContent = `${count(here)} of ${count(all)}${room}`;
+  $("n-bytes").textContent = size(bytes);
 }
 
 function showStats(stats) {

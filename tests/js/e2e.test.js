@@ -137,7 +137,14 @@ test("the page streams a volume, draws it, and its settings change mesh and pict
   await page.keyboard.press("ArrowLeft");
   assert.ok(differing(turned, await picture(page, "turned-by-key")) > 0.005, "the arrow keys turn the volume");
 
+  const panel = await page.evaluate(() => {
+    const { scrollWidth, clientWidth } = document.querySelector(".panel");
+    return scrollWidth - clientWidth;
+  });
+  assert.ok(panel <= 0, `the settings are ${panel} pixels wider than their column`);
   await page.screenshot({ path: fileURLToPath(new URL("page.png", pictures)) });
+  await page.locator("#n-blocks").scrollIntoViewIfNeeded();
+  await page.screenshot({ path: fileURLToPath(new URL("page-numbers.png", pictures)) });
   assert.deepEqual(page.complaints, []);
   await page.close();
 });
