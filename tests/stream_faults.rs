@@ -29,8 +29,10 @@ use tetralod::stream::Wanted;
 
 const SIZE: u64 = 200_000;
 
+/// Noise, as what is well packed is.
 fn byte(at: u64) -> u8 {
-    (at.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 56) as u8
+    let mixed = at.wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    ((mixed ^ mixed >> 29).wrapping_mul(0xBF58_476D_1CE4_E5B9) >> 56) as u8
 }
 
 fn bytes(range: Range<u64>) -> Vec<u8> {
@@ -212,7 +214,7 @@ fn fails(
 ) -> StreamError {
     let server = Server::start(answers);
     let error = fetch_with(&server.url, options(), &WANTED).map(drop).expect_err("an error");
-    assert!(server.requests() <= most, "{} requests", server.requests());
+    assert!(server.requests() <= most, "{} requests: {error:?}", server.requests());
     error
 }
 
@@ -343,12 +345,39 @@ fn a_server_without_ranges_is_read_once() {
 }
 
 #[test]
-fn compressed_answers_are_refused_with_advice() {
-    for status in ["200 OK", "206 Partial Content"] {
-        let error = fails(1, move |_| vec![head(status, "Content-Encoding: gzip\r\n"), Send(vec![31, 139])]);
-        assert_eq!(error, StreamError::Encoded("gzip".to_owned()));
+fn parts_of_packed_bytes_are_refused_with_advice() {
+    let packed = packed();
+    let refused = |coding: &'static str| {
+        let packed = packed.clone();
+        let error = fails(2, move |asked| {
+            let part = &packed[asked.range.start as usize..asked.range.end as usize];
+            let (last, total) = (asked.range.end - 1, packed.len());
+            let place = format!("Content-Range: bytes {}-{last}/{total}\r\n", asked.range.start);
+            let length = format!("Content-Length: {}\r\n", part.len());
+            let fields = format!("Content-Encoding: {coding}\r\n{place}{length}");
+            vec![head("206 Partial Content", &fields), Send(part.to_vec())]
+        });
+        assert_eq!(error, StreamError::Encoded(coding.to_owned()));
         assert!(error.to_string().contains("switch compression off"));
-    }
+    };
+    // One that is unpacked on the way as far as that goes, and one that is not.
+    refused("gzip");
+    refused("zstd");
+}
+
+#[test]
+fn a_file_that_is_packed_as_a_whole_is_unpacked() {
+    let packed = packed();
+    works(1, move |_| vec![head("200 OK", "Content-Encoding: gzip\r\n"), Send(packed.clone())]);
+    let error = fails(1, |_| vec![head("200 OK", "Content-Encoding: zstd\r\n"), Send(vec![40, 181])]);
+    assert_eq!(error, StreamError::Encoded("zstd".to_owned()));
+}
+
+/// The whole file as gzip; its bytes are noise, so it is no shorter.
+fn packed() -> Vec<u8> {
+    let mut packer = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+    packer.write_all(&bytes(0..SIZE)).expect("it is memory");
+    packer.finish().expect("it is memory")
 }
 
 #[test]
@@ -393,7 +422,8 @@ fn a_file_that_changes_is_noticed() {
 
 #[test]
 fn redirects_are_followed_once_and_again_when_they_expire() {
-    let server = works(FEW + 4, |asked| match asked.path.as_str() {
+    // For each range at most the expired address, the given one, and where that leads now.
+    let server = works(3 * FEW, |asked| match asked.path.as_str() {
         "/file.mt" => {
             let to = format!("Location: /elsewhere-{}\r\nContent-Length: 0\r\n", asked.number);
             vec![head("302 Found", &to)]

@@ -101,6 +101,7 @@ const FIELDS: [header::HeaderName; 7] = [
 ];
 
 impl OwnedHead {
+    /// Packed answers are unpacked on the way, and their head says neither that nor the length any more.
     fn of(asked: &str, response: &Response<Body>) -> Self {
         let field = |name| Some(response.headers().get(name)?.to_str().ok()?.to_owned());
         let (asked, led_to) = (asked.to_owned(), response.get_uri().to_string());
@@ -371,6 +372,7 @@ impl Client {
 fn failure(error: &ureq::Error) -> Failure {
     match error {
         ureq::Error::Timeout(_) => Failure::Timeout,
+        ureq::Error::Decompress(encoding, _) => Failure::Encoded((*encoding).to_owned()),
         other => Failure::Network(other.to_string()),
     }
 }

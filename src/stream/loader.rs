@@ -86,6 +86,8 @@ pub enum Failure {
     Network(String),
     /// The browser refused (CORS).
     Blocked,
+    /// What came was packed in this way, and cannot be unpacked: a part of packed bytes, most likely.
+    Encoded(String),
     /// Nothing came for too long.
     Timeout,
 }
@@ -318,6 +320,7 @@ impl Loader {
         let error = match failure {
             Failure::Network(detail) => StreamError::Network(detail),
             Failure::Blocked => StreamError::Blocked,
+            Failure::Encoded(encoding) => StreamError::Encoded(encoding),
             Failure::Timeout => StreamError::Timeout,
         };
         self.stumble(request, error, now_ms, 0);
