@@ -53,6 +53,7 @@ fn edge_example() -> Mt {
         let split = VertexSplit {
             vertex: VertexId(vertex),
             offset,
+            edge: 0,
             field_offsets: &[level],
             mask,
             errors: &[ErrorCode(error)],

@@ -470,6 +470,7 @@ fn the_example_is_written_and_read_as_specified() {
     let split = VertexSplit {
         vertex: VertexId(0),
         offset: [0, 0, 2],
+        edge: 0,
         field_offsets: &[-3],
         mask: 0b10,
         errors: &[ErrorCode(300)],

@@ -15,20 +15,26 @@ use format_support::sample;
 use format_support::samples;
 use format_support::spelled;
 use proptest::prelude::*;
+use std::ops::ControlFlow;
 use support::strategies::config;
 use support::strategies::plan;
+use tetralod::build::BuildConfig;
+use tetralod::build::build;
 use tetralod::format::BLOCK_BITS;
 use tetralod::format::Decoder;
 use tetralod::format::EncodeError;
 use tetralod::format::EncodeOptions;
 use tetralod::format::encode;
 use tetralod::format::encode_to;
+use tetralod::generate;
+use tetralod::geom::WIDE_BITS;
 use tetralod::mt::EdgeMt;
 use tetralod::mt::ExplicitMt;
 use tetralod::mt::Mt;
 use tetralod::mt::MtInfo;
 use tetralod::mt::MtKind;
 use tetralod::mt::MultiTessellation;
+use tetralod::mt::UpdateError;
 use tetralod::mt::UpdateId;
 use tetralod::mt::VertexSplit;
 
@@ -140,4 +146,41 @@ fn what_could_not_be_read_back_is_not_written() {
     }
     let refused = encode(&damaged, &plain);
     assert!(matches!(refused, Err(EncodeError::Update(_))), "{refused:?}");
+}
+
+#[test]
+fn offsets_come_back_on_lattices_of_all_widths() {
+    for bits in [8, 12, 16, 17, 18, 19, 20, 24, WIDE_BITS] {
+        let config = BuildConfig { position_bits: Some(bits), ..BuildConfig::default() };
+        let mesh = generate::bucky(6).expect("a small size");
+        let built = build(&mesh, &config, &mut |_| ControlFlow::Continue(())).expect("an MT");
+        let mt = built.mt;
+        comes_back(&mt, 5);
+        let Mt::Edge(coded) = coded(&mt) else { panic!("edge-based") };
+        let edges = (0..coded.updates()).filter(|&u| coded.split(UpdateId(u)).edge != 0).count();
+        assert!(0 < edges && edges < coded.updates() as usize, "{edges} offsets are told by edges");
+    }
+}
+
+#[test]
+fn offsets_are_not_counted_from_edges_that_are_not_there() {
+    let Mt::Edge(mt) = sample(1, 40) else { panic!("edge-based") };
+    let copy = |mut to: EdgeMt, count: u32, edge: u8| {
+        for u in (0..count - 1).map(UpdateId) {
+            to.push(&mt.split(u)).expect("an update of the MT");
+        }
+        let last = mt.split(UpdateId(count - 1));
+        to.push(&VertexSplit { edge, ..last }).map(|_| to)
+    };
+    let empty = || EdgeMt::new(mt.info().clone(), mt.base().clone());
+    let told = || EdgeMt::coded(mt.info().clone(), mt.base().clone(), 5);
+    assert_eq!(copy(empty(), 3, 1), Err(UpdateError::Edge { update: 2 }));
+    assert_eq!(copy(told(), 3, 128), Err(UpdateError::Edge { update: 2 }));
+    // How many edges there are only the mesh can tell.
+    let far = copy(told(), 1, 127).expect("seven bits");
+    let mut mesh = far.start().expect("a base mesh");
+    far.announce(&mut mesh, 0);
+    let tets = mesh.tets().to_vec();
+    assert_eq!(far.refine(&mut mesh, UpdateId(0)), Err(UpdateError::Edge { update: 0 }));
+    assert_eq!(mesh.tets(), tets, "the mesh is as it was");
 }

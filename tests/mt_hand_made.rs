@@ -84,7 +84,14 @@ impl Cone {
         let mask = bits.fold(0, |mask, (i, face)| mask | u64::from(far.contains(face)) << i);
         let mut mt = EdgeMt::new(self.info(), self.base());
         let error = ErrorCode(1);
-        mt.push(&VertexSplit { vertex: VertexId(0), offset, field_offsets: &[5], mask, errors: &[error] })?;
+        mt.push(&VertexSplit {
+            vertex: VertexId(0),
+            offset,
+            edge: 0,
+            field_offsets: &[5],
+            mask,
+            errors: &[error],
+        })?;
         let mut mesh = CurrentMesh::new(mt.info(), mt.base()).expect("a valid base mesh");
         mt.announce(&mut mesh, 0);
         let (before, hash) = (snapshot(&mesh), mesh.hash());

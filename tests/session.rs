@@ -41,8 +41,14 @@ fn two_splits(last_mask: u64) -> EdgeMt {
     let mut mt = EdgeMt::new(info, base);
     for (vertex, mask, error) in [(0, 0b10, 3000), (1, last_mask, 2000)] {
         let (vertex, error) = (VertexId(vertex), ErrorCode(error));
-        let split =
-            VertexSplit { vertex, offset: [0, 0, 2], field_offsets: &[6, -6], mask, errors: &[error; 2] };
+        let split = VertexSplit {
+            vertex,
+            offset: [0, 0, 2],
+            edge: 0,
+            field_offsets: &[6, -6],
+            mask,
+            errors: &[error; 2],
+        };
         mt.push(&split).expect("both updates fit");
     }
     mt

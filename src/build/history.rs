@@ -186,6 +186,7 @@ impl Replay<'_> {
             let split = VertexSplit {
                 vertex: VertexId(vertex),
                 offset: difference(a, b),
+                edge: 0,
                 field_offsets: &field_offsets,
                 mask,
                 errors: &errors,

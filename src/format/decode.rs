@@ -651,7 +651,8 @@ impl Decoder {
             .zip(parts)
             .map(|(k, (field_offsets, errors))| VertexSplit {
                 vertex: VertexId(splits.vertices[k]),
-                offset: splits.offsets[k],
+                offset: splits.offsets[k].0,
+                edge: splits.offsets[k].1,
                 field_offsets,
                 mask: splits.masks[k],
                 errors,

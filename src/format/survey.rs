@@ -9,7 +9,6 @@ use crate::mt::MtRef;
 use crate::mt::MultiTessellation;
 use crate::mt::UpdateError;
 use crate::mt::UpdateId;
-use crate::mt::VertexSplit;
 use std::collections::BTreeSet;
 
 /// What a run through an MT has found.
@@ -38,11 +37,8 @@ fn survey_edge(mt: &EdgeMt, block_bits: u32) -> Result<Survey, EncodeError> {
     }
     let mut coded = EdgeMt::coded(mt.info().clone(), mt.base().clone(), block_bits);
     let mut residuals = Vec::new();
-    let survey = run(mt, block_bits, &mut |mesh, u| {
-        residuals.clear();
-        let mask = mt.residuals(mesh, u, &mut residuals)?;
-        coded.push(&VertexSplit { mask, field_offsets: &residuals, ..mt.split(u) }).map(drop)
-    })?;
+    let survey =
+        run(mt, block_bits, &mut |mesh, u| coded.push(&mt.told(mesh, u, &mut residuals)?).map(drop))?;
     Ok(Survey { coded: Some(coded), ..survey })
 }
 

@@ -23,7 +23,6 @@ use super::UpdateError;
 use super::UpdateId;
 use super::VertexId;
 use super::errors::Errors;
-use crate::geom::NARROW_BITS;
 use crate::mesh::NONE;
 use std::ops::Range;
 
@@ -43,6 +42,9 @@ pub struct VertexSplit<'a> {
     pub vertex: VertexId,
     /// `v' − v''` in lattice steps.
     pub offset: [i32; 3],
+    /// In the form that files have, which edge of the link `offset` is counted from, from 1 on; 0 for none. See
+    /// [`EdgeMt::coded`].
+    pub edge: u8,
     /// `v' − v''` in levels, field by field.
     pub field_offsets: &'a [i32],
     /// Bit `i` is 0 where tetrahedron `i` of the star goes to `v'`, 1 where it goes to `v''`. The star is in
@@ -90,8 +92,11 @@ struct Page {
 /// the offset in each field.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Record {
-    /// Words of the offset: 2, or 3 on fine lattices.
+    /// Words of the offset and the edge that it is counted from: 2 where they share them, 3 on fine lattices if there is no
+    /// such edge, else 4.
     offset: usize,
+    /// Bits of a component of the offset where components share words.
+    component: u32,
     /// Words of an update.
     len: usize,
 }
@@ -108,27 +113,44 @@ const OFFSET: usize = 5;
 const MAX_PAGE_BITS: u32 = 16;
 
 impl Record {
-    fn new(info: &MtInfo) -> Self {
-        let offset = if info.lattice.bits < NARROW_BITS { 2 } else { 3 };
-        Self { offset, len: OFFSET + offset + info.fields.len() }
+    fn new(info: &MtInfo, is_coded: bool) -> Self {
+        // Coded, seven bits are left for the edge.
+        let component = if is_coded { 19 } else { 21 };
+        let wide = if is_coded { 4 } else { 3 };
+        // An offset has at most 2^bits, included, and a sign.
+        let offset = if info.lattice.bits + 2 <= component { 2 } else { wide };
+        Self { offset, component, len: OFFSET + offset + info.fields.len() }
+    }
+
+    /// Bytes of an update, its errors included.
+    fn bytes(self, info: &MtInfo) -> u64 {
+        let fields = info.fields.len();
+        let errors = if fields == 1 { 1 } else { fields + 1 };
+        (self.len * size_of::<i32>() + errors * size_of::<ErrorCode>()) as u64
     }
 
     fn push(self, words: &mut Vec<i32>, split: &VertexSplit<'_>) {
         let halves = |word: u64| [word as i32, (word >> 32) as i32];
         let (vertex, [low, high]) = (split.vertex.0 as i32, halves(split.mask));
-        if self.offset == 2 {
-            let [x, y] = halves(pack(split.offset));
-            words.extend_from_slice(&[vertex, WHOLE, WHOLE, low, high, x, y]);
-        } else {
-            let [x, y, z] = split.offset;
-            words.extend_from_slice(&[vertex, WHOLE, WHOLE, low, high, x, y, z]);
+        words.extend_from_slice(&[vertex, WHOLE, WHOLE, low, high]);
+        let [x, y, z] = split.offset;
+        match self.offset {
+            2 => words.extend_from_slice(&halves(pack(split.offset, split.edge, self.component))),
+            3 => words.extend_from_slice(&[x, y, z]),
+            _ => words.extend_from_slice(&[x, y, z, i32::from(split.edge)]),
         }
         words.extend_from_slice(split.field_offsets);
     }
 
+    /// The offset and the edge that it is counted from.
     #[inline]
-    fn offset(self, words: &[i32]) -> [i32; 3] {
-        if self.offset == 2 { unpack(two(words, OFFSET)) } else { [0, 1, 2].map(|axis| words[OFFSET + axis]) }
+    fn offset(self, words: &[i32]) -> ([i32; 3], u8) {
+        let three = || [0, 1, 2].map(|axis| words[OFFSET + axis]);
+        match self.offset {
+            2 => unpack(two(words, OFFSET), self.component),
+            3 => (three(), 0),
+            _ => (three(), words[OFFSET + 3] as u8),
+        }
     }
 }
 
@@ -153,15 +175,19 @@ impl EdgeMt {
     }
 
     /// [`EdgeMt::new`] with pages of `2^bits` updates, of `2^16` at most.
-    pub fn with_page_bits(mut info: MtInfo, base: BaseMesh, bits: u32) -> Self {
+    pub fn with_page_bits(info: MtInfo, base: BaseMesh, bits: u32) -> Self {
+        Self::empty(info, base, bits, false)
+    }
+
+    fn empty(mut info: MtInfo, base: BaseMesh, bits: u32, is_coded: bool) -> Self {
         info.kind = MtKind::Edge;
         Self {
             base_splits: vec![WHOLE; base.positions.len()],
             base,
-            is_coded: false,
+            is_coded,
             pages: Vec::new(),
             page_bits: bits.min(MAX_PAGE_BITS),
-            record: Record::new(&info),
+            record: Record::new(&info, is_coded),
             updates: 0,
             present: 0,
             to_come: ErrorCode::MAX,
@@ -169,11 +195,13 @@ impl EdgeMt {
         }
     }
 
-    /// [`EdgeMt::with_page_bits`] in the form that files have: the masks and the field offsets of splits are not what they are, but
-    /// what is wrong with the guesses that the star allows when the split is applied. Bit `i` of a mask then says that
+    /// [`EdgeMt::with_page_bits`] in the form that files have: what splits do is told by the star that they meet when they are
+    /// applied. Offsets are what is to be added to the step along an edge of the link, if `edge` names one; those are
+    /// counted from the one whose ends have the largest numbers, and taken in the direction in which the first coordinate that
+    /// changes grows. Masks and field offsets are what is wrong with the guesses that the star allows: bit `i` of a mask says that
     /// the guess for the `i`-th tetrahedron is wrong, counted from the one whose side is the least certain.
     pub fn coded(info: MtInfo, base: BaseMesh, page_bits: u32) -> Self {
-        Self { is_coded: true, ..Self::with_page_bits(info, base, page_bits) }
+        Self::empty(info, base, page_bits, true)
     }
 
     /// Whether this is the form that files have.
@@ -222,6 +250,9 @@ impl EdgeMt {
                 .all(|(&d, field)| fits(d, field.bits + spare));
         if !on_lattice {
             return Err(UpdateError::OffLattice { update });
+        }
+        if split.edge != 0 && (!self.is_coded || u32::from(split.edge) >= 1 << EDGE_BITS) {
+            return Err(UpdateError::Edge { update });
         }
         if split.errors.len() == self.info.fields.len() { Ok(()) } else { Err(UpdateError::Error { update }) }
     }
@@ -376,14 +407,12 @@ impl EdgeMt {
 
     /// Bytes of the updates that are here.
     pub fn page_bytes(&self) -> u64 {
-        u64::from(self.present) * Self::update_bytes(&self.info)
+        u64::from(self.present) * self.record.bytes(&self.info)
     }
 
-    /// Bytes that an update of an MT takes.
+    /// Bytes that an update of an MT takes in the form that files have.
     pub fn update_bytes(info: &MtInfo) -> u64 {
-        let fields = info.fields.len();
-        let errors = if fields == 1 { 1 } else { fields + 1 };
-        (Record::new(info).len * size_of::<i32>() + errors * size_of::<ErrorCode>()) as u64
+        Record::new(info, true).bytes(info)
     }
 
     /// What is known of the MT as a whole.
@@ -459,9 +488,11 @@ impl EdgeMt {
     #[inline]
     pub fn split(&self, u: UpdateId) -> VertexSplit<'_> {
         let words = self.words(u);
+        let (offset, edge) = self.record.offset(words);
         VertexSplit {
             vertex: VertexId(words[VERTEX] as u32),
-            offset: self.record.offset(words),
+            offset,
+            edge,
             field_offsets: &words[OFFSET + self.record.offset..],
             mask: two(words, MASK),
             errors: self.errors_of(u),
@@ -499,23 +530,25 @@ impl EdgeMt {
     }
 }
 
-/// Bits of a component in a shared word: `NARROW_BITS` and the sign.
-const COMPONENT_BITS: u32 = NARROW_BITS + 1;
+/// Bits of the number of an edge of a link, which has at most 112: three for each of [`MAX_STAR`](super::MAX_STAR)
+/// triangles, of which two share each but the at most [`MAX_LINK`] on the border.
+const EDGE_BITS: u32 = 7;
 
-/// Three components on a lattice of less than [`NARROW_BITS`] bits in one word.
-fn pack(offset: [i32; 3]) -> u64 {
-    let mask = (1_u64 << COMPONENT_BITS) - 1;
+/// Three components of so many bits in one word, and the number of an edge above them.
+fn pack(offset: [i32; 3], edge: u8, bits: u32) -> u64 {
+    let mask = (1_u64 << bits) - 1;
     let [x, y, z] = offset.map(|d| d as u64 & mask);
-    x | y << COMPONENT_BITS | z << (2 * COMPONENT_BITS)
+    x | y << bits | z << (2 * bits) | u64::from(edge) << (3 * bits)
 }
 
 #[inline]
-fn unpack(word: u64) -> [i32; 3] {
+fn unpack(word: u64, bits: u32) -> ([i32; 3], u8) {
     // Shifted up to the top of the word and down again, each component brings its sign along.
-    [2, 1, 0].map(|above| {
-        let top = word << (64 - 3 * COMPONENT_BITS + above * COMPONENT_BITS);
-        (top as i64 >> (64 - COMPONENT_BITS)) as i32
-    })
+    let offset = [2, 1, 0].map(|above| {
+        let top = word << (64 - 3 * bits + above * bits);
+        (top as i64 >> (64 - bits)) as i32
+    });
+    (offset, (word >> (3 * bits)) as u8)
 }
 
 #[cfg(test)]
@@ -524,12 +557,13 @@ mod tests {
 
     #[test]
     fn offsets_come_back_from_a_word() {
-        for bits in [1, 8, NARROW_BITS - 1] {
-            let largest = 1_i32 << bits;
-            let values = [-largest, 1 - largest, -1, 0, 1, largest - 1, largest];
-            for i in 0..343 {
-                let offset = [values[i % 7], values[i / 7 % 7], values[i / 49]];
-                assert_eq!(unpack(pack(offset)), offset);
+        for (bits, most_edges) in [(21, 0), (19, 127)] {
+            for largest in [2, 1 << 8, 1_i32 << (bits - 2)] {
+                let values = [-largest, 1 - largest, -1, 0, 1, largest - 1, largest];
+                for (i, edge) in (0..343).zip((0..=most_edges).cycle()) {
+                    let offset = [values[i % 7], values[i / 7 % 7], values[i / 49]];
+                    assert_eq!(unpack(pack(offset, edge, bits), bits), (offset, edge));
+                }
             }
         }
     }

@@ -113,6 +113,7 @@ fn not_a_split(error: ReplayError) -> ConvertError {
         | E::OffLattice { update }
         | E::Cavity { update }
         | E::Mask { update }
+        | E::Edge { update }
         | E::Inverted { update }
         | E::Star { update }
         | E::Missing { update }
@@ -143,7 +144,7 @@ struct Split {
 impl Split {
     fn borrowed(&self) -> VertexSplit<'_> {
         let Self { vertex, offset, ref field_offsets, mask, ref errors } = *self;
-        VertexSplit { vertex, offset, field_offsets, mask, errors }
+        VertexSplit { vertex, offset, edge: 0, field_offsets, mask, errors }
     }
 }
 

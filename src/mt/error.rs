@@ -81,6 +81,11 @@ pub enum UpdateError {
         /// The update.
         update: u32,
     },
+    /// The offset is told by an edge that the link of the vertex does not have.
+    Edge {
+        /// The update.
+        update: u32,
+    },
     /// The update would make a tetrahedron that is flat or turned inside out.
     Inverted {
         /// The update.
@@ -120,6 +125,9 @@ impl fmt::Display for UpdateError {
                 write!(f, "update {update} does not fill what it removes, or removes what is not there")
             }
             Self::Mask { update } => write!(f, "update {update} does not part the star of its vertex in two"),
+            Self::Edge { update } => {
+                write!(f, "update {update} is told by an edge that is not in the link of its vertex")
+            }
             Self::Inverted { update } => write!(f, "update {update} turns a tetrahedron inside out"),
             Self::Star { update } => write!(
                 f,

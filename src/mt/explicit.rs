@@ -457,6 +457,7 @@ mod tests {
         let along_z = VertexSplit {
             vertex: VertexId(0),
             offset: [0, 0, 16],
+            edge: 0,
             field_offsets: &[3],
             mask: 0b1010_1010,
             errors: &[ErrorCode(9)],
@@ -466,6 +467,7 @@ mod tests {
         let along_x = VertexSplit {
             vertex: VertexId(7),
             offset: [16, 0, 0],
+            edge: 0,
             field_offsets: &[-3],
             mask: 0b1111_0000,
             errors: &[ErrorCode(5)],

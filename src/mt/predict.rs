@@ -4,7 +4,8 @@
 //! the file; only where the guess is wrong has to be stored. All of it is the basic arithmetic of doubles, in an order
 //! that vertex numbers fix, and so the same on every platform. `docs/format.md` gives it as formulas.
 //!
-//! **Sides.** A tetrahedron of the star goes rather to the end of the offset that it lies towards. Those of which
+//! **Offsets.** Edges of the link often have the length and the direction of the edge that comes, so files may tell which one,
+//! and by how much the offset differs from the step along it. **Sides.** A tetrahedron of the star goes rather to the end of the offset that it lies towards. Those of which
 //! that is most certain are decided first, and each of the others follows the majority of its neighbours that are
 //! decided. **Levels.** The field is taken to be linear: its gradient is that of least squares over the link, near
 //! vertices counting more.
@@ -21,7 +22,7 @@ use super::ring::three;
 pub(super) struct Link {
     /// For each vertex of the link its place in ascending order of vertex numbers.
     order: [i32; MAX_LINK],
-    /// The vectors from the centre to the vertices of the link.
+    /// The vectors from the centre to the vertices of the link; whole numbers.
     spokes: [[f64; 3]; MAX_LINK],
     /// Their squared lengths.
     squares: [f64; MAX_LINK],
@@ -30,8 +31,8 @@ pub(super) struct Link {
 }
 
 impl Link {
-    /// Looks at the link of the vertex at `centre`, whose halves are to be `offset` apart.
-    pub fn new(ring: &Ring, mesh: &CurrentMesh, centre: [i32; 3], offset: [i32; 3]) -> Self {
+    /// Looks at the link of the vertex at `centre`.
+    pub fn new(ring: &Ring, mesh: &CurrentMesh, centre: [i32; 3]) -> Self {
         let mut link = Self {
             order: [0; MAX_LINK],
             spokes: [[0.0; 3]; MAX_LINK],
@@ -42,18 +43,88 @@ impl Link {
         let mut numbers = [i32::MAX; MAX_LINK];
         numbers[..count].copy_from_slice(&ring.numbers[..count]);
         rank(&numbers, count, &mut link.order);
-        let offset = offset.map(i64::from);
         for (i, &slot) in ring.link[..count].iter().enumerate() {
             let position = mesh.positions[slot as usize];
             let spoke = [0, 1, 2].map(|k| i64::from(position[k]) - i64::from(centre[k]));
-            // Both sums are below 2^63: coordinates have at most 30 bits, offsets 31.
+            // Below 2^63: coordinates have at most 30 bits.
             let square: i64 = spoke.iter().map(|x| x * x).sum();
-            let product: i64 = spoke.iter().zip(offset).map(|(x, d)| x * d).sum();
             link.spokes[i] = spoke.map(|x| x as f64);
             link.squares[i] = square.max(1) as f64;
-            link.along[i] = product as f64 / link.squares[i].sqrt();
         }
         link
+    }
+
+    /// The halves of the vertex are to be `offset` apart: what follows is guessed from that.
+    pub fn aim(&mut self, ring: &Ring, offset: [i32; 3]) {
+        let offset = offset.map(i64::from);
+        let count = ring.link_len.min(MAX_LINK);
+        for (i, along) in self.along[..count].iter_mut().enumerate() {
+            // Below 2^63: coordinates have at most 30 bits, offsets 31.
+            let product: i64 = self.spokes[i].iter().zip(offset).map(|(x, d)| *x as i64 * d).sum();
+            *along = product as f64 / self.squares[i].sqrt();
+        }
+    }
+
+    /// For each link vertex, by its place in ascending order, a bit for each place before it that an edge of the link leads to.
+    fn edges(&self, ring: &Ring) -> [u32; MAX_LINK] {
+        let mut edges = [0_u32; MAX_LINK];
+        for &corners in &ring.link_of[..ring.len.min(MAX_STAR)] {
+            let [low, middle, most] =
+                sorted(three(corners).map(|x| self.order[x % MAX_LINK] as usize % MAX_LINK));
+            edges[middle] |= 1 << low;
+            edges[most] |= 1 << low | 1 << middle;
+        }
+        edges
+    }
+
+    /// The step along the edge of the link with that number, counted from 1, in the direction in which the first coordinate
+    /// that changes grows. None if there is no such edge. Edges descend by the places of their ends, the larger one first.
+    pub fn step(&self, ring: &Ring, edge: u8) -> Option<[i32; 3]> {
+        let edges = self.edges(ring);
+        let mut left = u32::from(edge);
+        for (most, &others) in edges.iter().enumerate().rev() {
+            if left > others.count_ones() {
+                left -= others.count_ones();
+                continue;
+            }
+            let mut others = others;
+            for _ in 1..left {
+                others ^= 1 << others.checked_ilog2()?;
+            }
+            return Some(self.along_edge(ring, most, others.checked_ilog2()? as usize));
+        }
+        None
+    }
+
+    /// The step between the link vertices at two places, in the direction in which the first coordinate that changes grows.
+    fn along_edge(&self, ring: &Ring, a: usize, b: usize) -> [i32; 3] {
+        let places = self.by_number(ring.link_len.min(MAX_LINK));
+        let [a, b] = [a, b].map(|place| self.spokes[places[place] as usize % MAX_LINK]);
+        // Coordinates have at most 30 bits.
+        let step = [0, 1, 2].map(|k| (a[k] - b[k]) as i32);
+        let is_back = step.into_iter().find(|&d| d != 0).is_some_and(|d| d < 0);
+        if is_back { step.map(|d| -d) } else { step }
+    }
+
+    /// An offset as files tell it: what is to be added to the step along an edge, and the number of that; or the offset and 0.
+    pub fn told_offset(&self, ring: &Ring, offset: [i32; 3], bits: u32) -> ([i32; 3], u8) {
+        // What is not counted from an edge has no sign in its first component.
+        let (mut told, mut least) = ((offset, 0), (length(offset) - 8).saturating_sub(EDGE_COSTS));
+        let mut number = 0_u8;
+        for (most, mut others) in self.edges(ring).into_iter().enumerate().rev() {
+            while let Some(other) = others.checked_ilog2() {
+                others ^= 1 << other;
+                // There are at most 112.
+                number = number.saturating_add(1);
+                let step = self.along_edge(ring, most, other as usize);
+                let rest = [0, 1, 2].map(|k| offset[k].saturating_sub(step[k]));
+                let fits = rest.iter().all(|d| d.unsigned_abs() <= 1 << bits);
+                if fits && length(rest) < least {
+                    (told, least) = ((rest, number), length(rest));
+                }
+            }
+        }
+        told
     }
 
     /// The order in which the sides of the star are told, the least certain first, and a bit for each tetrahedron that
@@ -183,6 +254,18 @@ impl Link {
             tell(field, (sum as i32).clamp(-largest, largest));
         }
     }
+}
+
+/// What the number of an edge takes in a file, in eighths of a bit; found by trying on several sets.
+const EDGE_COSTS: u32 = 76;
+
+/// About how much a vector takes in a file, in eighths of a bit.
+fn length(vector: [i32; 3]) -> u32 {
+    let length = |d: i32| {
+        let x = 2 * u64::from(d.unsigned_abs()) + 1;
+        8 * x.ilog2() + ((x << 3) >> x.ilog2() & 7) as u32
+    };
+    vector.map(length).iter().sum()
 }
 
 /// In ascending order.

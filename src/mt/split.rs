@@ -95,9 +95,15 @@ impl EdgeMt {
         if ring.link_len > MAX_LINK || mesh.is_pinched(p) {
             return Err(UpdateError::Star { update });
         }
+        let mut offset = split.offset;
         let parted = if self.is_coded() {
-            let link = Link::new(ring, mesh, mesh.positions[p as usize], split.offset);
-            link.guess_levels(ring, mesh, p, split.offset, &self.info().fields, |field, guess| {
+            let mut link = Link::new(ring, mesh, mesh.positions[p as usize]);
+            if split.edge != 0 {
+                let step = link.step(ring, split.edge).ok_or(UpdateError::Edge { update })?;
+                offset = [0, 1, 2].map(|k| step[k].saturating_add(offset[k]));
+            }
+            link.aim(ring, offset);
+            link.guess_levels(ring, mesh, p, offset, &self.info().fields, |field, guess| {
                 field_offsets[field] = field_offsets[field].saturating_add(guess);
             });
             link.part(ring, split.mask)
@@ -107,7 +113,7 @@ impl EdgeMt {
         if !parted || !ring.find_fan() {
             return Err(UpdateError::Mask { update });
         }
-        let split = &VertexSplit { field_offsets, ..*split };
+        let split = &VertexSplit { offset, field_offsets, ..*split };
         let halves = self.halve(mesh, u, split, p)?;
         if !mesh.is_proven(update) {
             if !ring.is_positive(mesh, halves, self.info().lattice.bits) {
@@ -251,17 +257,15 @@ impl EdgeMt {
             fan_len += usize::from(at_both);
         }
         fan[..fan_len].iter().for_each(|&t| close_fan(mesh, t, [p, q]));
-        let split = self.split(u);
         for f in 0..mesh.fields {
             let [at_p, at_q] = [p, q].map(|slot| slot as usize * mesh.fields + f);
             mesh.levels[at_p] = midway(mesh.levels[at_p], mesh.levels[at_q]);
         }
-        let (b, offset) = (mesh.positions[q as usize], split.offset);
-        let position = [0, 1, 2].map(|i| b[i] + (offset[i] >> 1));
+        let position = middle(mesh, [p, q]);
         let far_vertex = mesh.labels[q as usize].vertex;
         mesh.slot_of.set(far_vertex, NONE);
         mesh.free_vertex(q);
-        mesh.put_vertex(p, self.labels(split.vertex), position);
+        mesh.put_vertex(p, self.labels(self.split(u).vertex), position);
         Ok(Applied::Done)
     }
 
@@ -310,39 +314,38 @@ impl EdgeMt {
         let mut ring = mesh.take_ring();
         let found = self.collapsible(mesh, u, &mut ring);
         if let Ok(Ok(slots)) = found {
-            self.look_at_halves(mesh, u, slots, &ring.halves, look);
+            look_at_halves(mesh, slots, &ring.halves, look);
         }
         mesh.put_back_ring(ring);
         Ok(found?.map_or_else(Applied::Blocked, |_| Applied::Done))
     }
+}
 
-    fn look_at_halves(
-        &self,
-        mesh: &CurrentMesh,
-        u: UpdateId,
-        [p, q]: [u32; 2],
-        [near, far]: &[HalfStar; 2],
-        look: LookAtTet<'_>,
-    ) {
-        let split = self.split(u);
-        let b = mesh.positions[q as usize];
-        let position = [0, 1, 2].map(|i| b[i] + (split.offset[i] >> 1));
-        for (half, centre, other) in [(near, p, q), (far, q, p)] {
-            for tet in half.tets().iter().map(|&t| mesh.tets[t as usize]) {
-                if tet.contains(&other) {
-                    continue;
-                }
-                let corners = tet.map(|v| if v == centre { position } else { mesh.positions[v as usize] });
-                let levels = |field: usize| {
-                    let level = midway(mesh.levels(p)[field], mesh.levels(q)[field]);
-                    tet.map(|v| if v == centre { level } else { mesh.levels(v)[field] })
-                };
-                if look(&corners, &levels) {
-                    return;
-                }
+/// Shows `look` the tetrahedra of two half stars as they were before their centres came apart, until it returns true.
+fn look_at_halves(mesh: &CurrentMesh, [p, q]: [u32; 2], [near, far]: &[HalfStar; 2], look: LookAtTet<'_>) {
+    let position = middle(mesh, [p, q]);
+    for (half, centre, other) in [(near, p, q), (far, q, p)] {
+        for tet in half.tets().iter().map(|&t| mesh.tets[t as usize]) {
+            if tet.contains(&other) {
+                continue;
+            }
+            let corners = tet.map(|v| if v == centre { position } else { mesh.positions[v as usize] });
+            let levels = |field: usize| {
+                let level = midway(mesh.levels(p)[field], mesh.levels(q)[field]);
+                tet.map(|v| if v == centre { level } else { mesh.levels(v)[field] })
+            };
+            if look(&corners, &levels) {
+                return;
             }
         }
     }
+}
+
+/// Where the vertex lies that became those in slots `[p, q]`.
+#[inline]
+fn middle(mesh: &CurrentMesh, [p, q]: [u32; 2]) -> [i32; 3] {
+    let [a, b] = [p, q].map(|slot| mesh.positions[slot as usize]);
+    [0, 1, 2].map(|k| midway(a[k], b[k]))
 }
 
 /// Removes fan tetrahedron `t`, which has both `v'` and `v''`, in slots `[p, q]`: its two neighbours at the fan
@@ -360,7 +363,7 @@ fn close_fan(mesh: &mut CurrentMesh, t: u32, [p, q]: [u32; 2]) {
     mesh.free_tet(t);
 }
 
-/// The level of `v` between those of `v'` and `v''`, which do not differ by more than 2^24.
+/// The level, or the coordinate, of `v` between those of `v'` and `v''`, which are not below 0.
 #[inline]
 fn midway(a: i32, b: i32) -> i32 {
     b + ((a - b) >> 1)
@@ -377,34 +380,37 @@ fn half(v: i32, d: i32, largest: i64) -> Option<[i32; 2]> {
 }
 
 impl EdgeMt {
-    /// What a file has to tell of update `u` of an MT that is not coded: the places of the star where the guess of the side
-    /// is wrong; the errors of the guesses of the field offsets are appended to `residuals`. The mesh must be about to
-    /// apply `u`, with all parents there.
+    /// Update `u` of an MT that is not coded as a file tells it, with `residuals` for what is wrong with the guesses of the field
+    /// offsets. The mesh must be about to apply `u`, with all parents there.
     ///
     /// # Errors
     /// If the update does not fit the mesh.
-    pub(crate) fn residuals(
-        &self,
+    pub(crate) fn told<'a>(
+        &'a self,
         mesh: &mut CurrentMesh,
         u: UpdateId,
-        residuals: &mut Vec<i32>,
-    ) -> Result<u64, UpdateError> {
+        residuals: &'a mut Vec<i32>,
+    ) -> Result<VertexSplit<'a>, UpdateError> {
+        residuals.clear();
         let (split, update) = (self.split(u), u.0);
         let vertex = UpdateError::Vertex { update, vertex: split.vertex.0 };
         let p = mesh.slot(split.vertex).ok_or(vertex)?;
         let mut ring = mesh.take_ring();
         let gathered = mesh.gather_ring(p, update, &mut ring).is_ok();
-        let wrong = if gathered && ring.link_len <= MAX_LINK && ring.find_sides(split.mask) {
-            let link = Link::new(&ring, mesh, mesh.positions[p as usize], split.offset);
+        let told = if gathered && ring.link_len <= MAX_LINK && ring.find_sides(split.mask) {
+            let mut link = Link::new(&ring, mesh, mesh.positions[p as usize]);
+            let (offset, edge) = link.told_offset(&ring, split.offset, self.info().lattice.bits);
+            link.aim(&ring, split.offset);
             link.guess_levels(&ring, mesh, p, split.offset, &self.info().fields, |field, guess| {
                 residuals.push(split.field_offsets[field] - guess);
             });
-            Ok(link.wrong(&ring, ring.sides))
+            let mask = link.wrong(&ring, ring.sides);
+            Ok(VertexSplit { offset, edge, mask, field_offsets: residuals, ..split })
         } else {
             Err(UpdateError::Star { update })
         };
         mesh.put_back_ring(ring);
-        wrong
+        told
     }
 }
 

@@ -87,7 +87,7 @@ pub struct Parts {
 pub fn tampered(mt: &EdgeMt, mut change: impl FnMut(u32, &mut Parts)) -> EdgeMt {
     let mut other = EdgeMt::new(mt.info().clone(), mt.base().clone());
     for u in 0..mt.updates() {
-        let VertexSplit { vertex, offset, field_offsets, mask, errors } = mt.split(UpdateId(u));
+        let VertexSplit { vertex, offset, edge, field_offsets, mask, errors } = mt.split(UpdateId(u));
         let mut parts = Parts { offset, field_offsets: field_offsets.to_vec(), mask, error: errors[0].0 };
         change(u, &mut parts);
         let shift = i32::from(parts.error) - i32::from(errors[0].0);
@@ -96,6 +96,7 @@ pub fn tampered(mt: &EdgeMt, mut change: impl FnMut(u32, &mut Parts)) -> EdgeMt 
         let split = VertexSplit {
             vertex,
             offset: parts.offset,
+            edge,
             field_offsets: &parts.field_offsets,
             mask: parts.mask,
             errors: &errors,

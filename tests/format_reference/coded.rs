@@ -66,18 +66,19 @@ pub const GAP: Row = numbers(29, 1, 1);
 pub const RUN: Row = numbers(30, 1, 3);
 pub const CHILDREN: Row = symbols(31, 1, 4);
 pub const RISE: Row = numbers(32, 1, 3);
-pub const OFFSET: Row = numbers(33, 34, 2);
-pub const LAST_WRONG: Row = symbols(67, 1, 65);
-pub const WRONG: Row = symbols(68, 132, 2);
-pub const ERROR: Row = symbols(200, 16, 256);
-pub const LEVEL: Row = numbers(216, 128, 1);
-pub const BASE_LEVEL: Row = numbers(344, 1, 2);
-pub const VALUE_GAP: Row = numbers(345, 1, 1);
-pub const VALUE_BITS: Row = symbols(346, 2, 65);
+pub const EDGE: Row = numbers(33, 3, 3);
+pub const OFFSET: Row = numbers(36, 68, 2);
+pub const LAST_WRONG: Row = symbols(104, 1, 65);
+pub const WRONG: Row = symbols(105, 132, 2);
+pub const ERROR: Row = symbols(237, 16, 256);
+pub const LEVEL: Row = numbers(253, 128, 1);
+pub const BASE_LEVEL: Row = numbers(381, 1, 2);
+pub const VALUE_GAP: Row = numbers(382, 1, 1);
+pub const VALUE_BITS: Row = symbols(383, 2, 65);
 
-const ROWS: [Row; 17] = [
-    BEHIND, SEED, LENGTH, STEP, RANK, GAP, RUN, CHILDREN, RISE, OFFSET, LAST_WRONG, WRONG, ERROR, LEVEL,
-    BASE_LEVEL, VALUE_GAP, VALUE_BITS,
+const ROWS: [Row; 18] = [
+    BEHIND, SEED, LENGTH, STEP, RANK, GAP, RUN, CHILDREN, RISE, EDGE, OFFSET, LAST_WRONG, WRONG, ERROR,
+    LEVEL, BASE_LEVEL, VALUE_GAP, VALUE_BITS,
 ];
 
 /// Symbols with their shares.

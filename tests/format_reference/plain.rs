@@ -69,7 +69,8 @@ impl Mesh {
             })
             .collect();
         assert!(star.len() <= 64 && link.len() <= 32);
-        let guess = Guess::new(self, v, &link, split.offset);
+        let offset = self.offset(split, &star, &link);
+        let guess = Guess::new(self, v, &link, offset);
         let sides = guess.sides(&star, split.mask);
         let (near, far) =
             (file.base.positions.len() as u32 + 2 * k, file.base.positions.len() as u32 + 2 * k + 1);
@@ -84,8 +85,8 @@ impl Mesh {
                 levels.iter().zip(&file.info.fields).all(|(&q, field)| (0..1 << field.bits).contains(&q))
             );
         }
-        let far_position = [0, 1, 2].map(|i| self.positions[&v][i] - (split.offset[i] >> 1));
-        let near_position = [0, 1, 2].map(|i| far_position[i] + split.offset[i]);
+        let far_position = [0, 1, 2].map(|i| self.positions[&v][i] - (offset[i] >> 1));
+        let near_position = [0, 1, 2].map(|i| far_position[i] + offset[i]);
         for position in [near_position, far_position] {
             assert!(position.iter().all(|q| (0..=1 << file.info.bits).contains(q)));
         }
@@ -123,6 +124,27 @@ impl Mesh {
             assert!(volume(tet.map(|w| self.positions[&w])) > 0, "update {k} turns {tet:?} inside out");
         }
         [removed, inserted]
+    }
+
+    /// The offset of a split, with the step along the edge that it is counted from.
+    fn offset(&self, split: &Split, star: &[Corner], link: &[u32]) -> [i32; 3] {
+        if split.edge == 0 {
+            return split.offset;
+        }
+        let mut edges: Vec<[usize; 2]> = star
+            .iter()
+            .flat_map(|corner| {
+                let [i, j, l] = corner.link;
+                [[j, i], [l, i], [l, j]]
+            })
+            .collect();
+        edges.sort_unstable();
+        edges.dedup();
+        edges.reverse();
+        let [m, i] = edges[split.edge as usize - 1].map(|place| self.positions[&link[place]]);
+        let step = [0, 1, 2].map(|k| m[k] - i[k]);
+        let step = if step < [0, 0, 0] { step.map(|d| -d) } else { step };
+        [0, 1, 2].map(|k| split.offset[k] + step[k])
     }
 
     /// Forgets a vertex that has been split.

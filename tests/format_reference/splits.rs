@@ -2,6 +2,7 @@
 
 use super::coded::CHILDREN;
 use super::coded::Coded;
+use super::coded::EDGE;
 use super::coded::ERROR;
 use super::coded::GAP;
 use super::coded::LAST_WRONG;
@@ -19,6 +20,8 @@ use std::ops::Range;
 pub struct Split {
     pub vertex: u32,
     pub offset: [i32; 3],
+    /// Of the link, counted from 1; 0 is none.
+    pub edge: u32,
     pub mask: u64,
     /// By field.
     pub errors: Vec<u16>,
@@ -38,15 +41,17 @@ pub fn shared(
     let mut splits: Vec<Split> = Vec::new();
     for vertex in vertices {
         let above = if vertex >= old {
-            Some(splits[(vertex - old) as usize / 2].offset)
+            Some(&splits[(vertex - old) as usize / 2])
         } else if vertex >= base_vertices {
-            Some(known[&((vertex - base_vertices) / 2)].offset)
+            Some(&known[&((vertex - base_vertices) / 2)])
         } else {
             None
         };
-        let offset = offset(coded, above, leads);
+        let edge = coded.number(EDGE, above.map_or(2, |above| above.edge.min(1)));
+        assert!(edge <= 255);
+        let offset = offset(coded, above, edge, leads);
         let mask = mask(coded);
-        splits.push(Split { vertex, offset, mask, ..Split::default() });
+        splits.push(Split { vertex, offset, edge, mask, ..Split::default() });
     }
     splits
 }
@@ -79,13 +84,14 @@ fn vertices(coded: &mut Coded<'_>, old: u32, count: usize) -> Vec<u32> {
     vertices
 }
 
-fn offset(coded: &mut Coded<'_>, above: Option<[i32; 3]>, leads: bool) -> [i32; 3] {
+fn offset(coded: &mut Coded<'_>, above: Option<&Split>, edge: u32, leads: bool) -> [i32; 3] {
     let mut offset = [0; 3];
     for axis in 0..3 {
-        let which = above.map_or(33, |above| len(above[axis].unsigned_abs()));
+        let which = above.map_or(33, |above| len(above.offset[axis].unsigned_abs()));
+        let which = if edge > 0 { 34 + which } else { which };
         let size = coded.number(OFFSET, which) as i32;
         let is_first = offset[..axis] == [0, 0, 0][..axis];
-        let has_sign = size != 0 && !(leads && is_first);
+        let has_sign = size != 0 && !(leads && is_first && edge == 0);
         offset[axis] = if has_sign && coded.bits(1) == 1 { -size } else { size };
     }
     offset

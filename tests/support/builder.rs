@@ -33,6 +33,7 @@ impl Split {
         VertexSplit {
             vertex: VertexId(self.vertex),
             offset: self.offset,
+            edge: 0,
             field_offsets: &self.field_offsets,
             mask: self.mask,
             // A test may forget them.

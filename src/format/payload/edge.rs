@@ -26,8 +26,10 @@ pub const RUN: Family = GAP.numbers_after(1, 3);
 pub const CHILDREN: Family = RUN.after(1, 4);
 /// How many runs later that is, beyond the next.
 pub const RISE: Family = CHILDREN.numbers_after(1, 3);
-/// Components of offsets, by the length of the same component one split higher.
-pub const OFFSET: Family = RISE.numbers_after(34, 2);
+/// The edge of the link that an offset is counted from, by whether that one split higher is from one.
+pub const EDGE: Family = RISE.numbers_after(3, 3);
+/// Components of offsets, by the length of the same component one split higher; apart for those counted from an edge.
+pub const OFFSET: Family = EDGE.numbers_after(68, 2);
 /// One more than the last place where a guess of sides is wrong.
 pub const LAST_WRONG: Family = OFFSET.after(1, 65);
 /// Whether the guess is wrong at a place before that.
@@ -38,11 +40,12 @@ pub const ERROR: Family = WRONG.after(16, 256);
 pub const LEVEL: Family = ERROR.numbers_after(128, 1);
 
 /// All families, with names for what they tell.
-pub const PARTS: [(&str, Family); 9] = [
+pub const PARTS: [(&str, Family); 10] = [
     ("partial order", GAP),
     ("partial order", RUN),
     ("partial order", CHILDREN),
     ("partial order", RISE),
+    ("offsets", EDGE),
     ("offsets", OFFSET),
     ("masks", LAST_WRONG),
     ("masks", WRONG),
@@ -73,7 +76,7 @@ fn wrong_context(last: u32, place: u32) -> u32 {
 
 /// Bytes that an update takes in memory.
 pub fn update_bytes(fields: u64) -> u64 {
-    34 + 6 * fields
+    38 + 6 * fields
 }
 
 /// A split turns one vertex into two, and vertex numbers are 32-bit words of which one means "none".
@@ -92,7 +95,8 @@ pub fn check_counts(info: &MtInfo, base_vertices: u64) -> Result<(), BaseMeshErr
 #[derive(Clone, Debug, Default)]
 pub struct Splits {
     pub vertices: Vec<u32>,
-    pub offsets: Vec<[i32; 3]>,
+    /// With the edges that they are counted from.
+    pub offsets: Vec<Offset>,
     pub masks: Vec<u64>,
 }
 
@@ -126,13 +130,16 @@ fn runs(mt: &EdgeMt, first: u32, vertices: &[u32]) -> Vec<u32> {
 pub fn put(out: &mut impl Put, mt: &EdgeMt, first: u32, end: u32) {
     let vertices: Vec<u32> = (first..end).map(|k| mt.split(UpdateId(k)).vertex.0).collect();
     put_vertices(out, mt, first, &vertices);
-    let leads = |k| mt.split(UpdateId(k)).offset.into_iter().find(|&d| d != 0).is_none_or(|d| d > 0);
+    let leads = |k| {
+        let split = mt.split(UpdateId(k));
+        split.edge != 0 || split.offset.into_iter().find(|&d| d != 0).is_none_or(|d| d > 0)
+    };
     let all_lead = (first..end).all(leads);
     out.bits(u32::from(all_lead), 1);
     for k in first..end {
         let split = mt.split(UpdateId(k));
-        let above = mt.created_by(split.vertex).map(|u| mt.split(u).offset);
-        put_offset(out, above, split.offset, all_lead);
+        let above = mt.created_by(split.vertex).map(|u| told_offset(mt, u));
+        put_offset(out, above, (split.offset, split.edge), all_lead);
         put_mask(out, split.mask);
     }
 }
@@ -167,15 +174,30 @@ fn put_vertices(out: &mut impl Put, mt: &EdgeMt, first: u32, vertices: &[u32]) {
     }
 }
 
-/// The context of one component of an offset, by that of the split above.
-fn offset_context(above: Option<[i32; 3]>, axis: usize) -> u32 {
-    above.map_or(33, |offset| u32::BITS - offset[axis].unsigned_abs().leading_zeros())
+/// An offset, and the edge of the link that it is counted from.
+pub type Offset = ([i32; 3], u8);
+
+fn told_offset(mt: &EdgeMt, u: UpdateId) -> Offset {
+    let split = mt.split(u);
+    (split.offset, split.edge)
 }
 
-fn put_offset(out: &mut impl Put, above: Option<[i32; 3]>, offset: [i32; 3], leads: bool) {
-    let mut has_sign = !leads;
+/// The context of the edge of an offset, by that of the split above.
+fn edge_context(above: Option<Offset>) -> u32 {
+    above.map_or(2, |(_, edge)| u32::from(edge != 0))
+}
+
+/// The context of one component of an offset that is counted from `edge`, by that of the split above.
+fn offset_context(above: Option<Offset>, edge: u8, axis: usize) -> u32 {
+    let length = above.map_or(33, |(offset, _)| u32::BITS - offset[axis].unsigned_abs().leading_zeros());
+    length + if edge == 0 { 0 } else { 34 }
+}
+
+fn put_offset(out: &mut impl Put, above: Option<Offset>, (offset, edge): Offset, leads: bool) {
+    out.number(EDGE, edge_context(above), u32::from(edge));
+    let mut has_sign = !leads || edge != 0;
     for (axis, d) in offset.into_iter().enumerate() {
-        out.number(OFFSET, offset_context(above, axis), d.unsigned_abs());
+        out.number(OFFSET, offset_context(above, edge, axis), d.unsigned_abs());
         if d != 0 && has_sign {
             out.bits(u32::from(d < 0), 1);
         }
@@ -229,10 +251,10 @@ pub fn read(source: &mut Source<'_>, mt: &EdgeMt, first: u32, count: u32) -> Res
 }
 
 /// The offset of the split that created a vertex before block `first` began; none for a vertex of the base mesh.
-fn offset_above(mt: &EdgeMt, first: u32, vertex: VertexId) -> Result<Option<[i32; 3]>, FormatError> {
+fn offset_above(mt: &EdgeMt, first: u32, vertex: VertexId) -> Result<Option<Offset>, FormatError> {
     let Some(creator) = mt.created_by(vertex) else { return Ok(None) };
     if mt.has(creator) {
-        return Ok(Some(mt.split(creator).offset));
+        return Ok(Some(told_offset(mt, creator)));
     }
     let [page, other] = [first, creator.0].map(|u| mt.page_of_update(u));
     Err(FormatError::Page(PageError::Needs { page, other }))
@@ -282,20 +304,18 @@ fn read_vertices(
     Ok(vertices)
 }
 
-fn read_offset(
-    source: &mut Source<'_>,
-    above: Option<[i32; 3]>,
-    leads: bool,
-) -> Result<[i32; 3], FormatError> {
-    let (mut offset, mut has_sign) = ([0; 3], !leads);
+fn read_offset(source: &mut Source<'_>, above: Option<Offset>, leads: bool) -> Result<Offset, FormatError> {
+    let edge = u8::try_from(source.number(EDGE, edge_context(above))?);
+    let edge = edge.map_err(|_| source.corrupt("an offset is counted from an edge that no link has"))?;
+    let (mut offset, mut has_sign) = ([0; 3], !leads || edge != 0);
     for (axis, d) in offset.iter_mut().enumerate() {
-        let size = source.number(OFFSET, offset_context(above, axis))?;
+        let size = source.number(OFFSET, offset_context(above, edge, axis))?;
         let size = i32::try_from(size).map_err(|_| source.corrupt("an offset has more than 32 bits"))?;
         let is_negative = size != 0 && has_sign && source.bits(1)? == 1;
         *d = if is_negative { -size } else { size };
         has_sign |= size != 0;
     }
-    Ok(offset)
+    Ok((offset, edge))
 }
 
 fn read_mask(source: &mut Source<'_>) -> Result<u64, FormatError> {
