@@ -32,6 +32,10 @@ pub const MAX_STAR: usize = 64;
 /// Largest number of vertices around a vertex that an update splits.
 pub const MAX_LINK: usize = 32;
 
+/// Largest number of an edge of a link that an offset can be counted from: seven bits of an update's record name it. Links that
+/// close up have at most 96 edges.
+pub const MAX_EDGE: u8 = 127;
+
 /// One update of an edge-based MT: how a vertex becomes two.
 ///
 /// With `v` the position of the vertex, `D` the offset and `>>` a floor shift, the new vertices lie at
@@ -42,7 +46,7 @@ pub struct VertexSplit<'a> {
     pub vertex: VertexId,
     /// `v' − v''` in lattice steps.
     pub offset: [i32; 3],
-    /// In the form that files have, which edge of the link `offset` is counted from, from 1 on; 0 for none. See
+    /// In the form that files have, which edge of the link `offset` is counted from, 1 to [`MAX_EDGE`]; 0 for none. See
     /// [`EdgeMt::coded`].
     pub edge: u8,
     /// `v' − v''` in levels, field by field.
@@ -251,7 +255,7 @@ impl EdgeMt {
         if !on_lattice {
             return Err(UpdateError::OffLattice { update });
         }
-        if split.edge != 0 && (!self.is_coded || u32::from(split.edge) >= 1 << EDGE_BITS) {
+        if split.edge > if self.is_coded { MAX_EDGE } else { 0 } {
             return Err(UpdateError::Edge { update });
         }
         if split.errors.len() == self.info.fields.len() { Ok(()) } else { Err(UpdateError::Error { update }) }
@@ -529,10 +533,6 @@ impl EdgeMt {
         split.filter(|&&s| s != WHOLE).map(|&s| UpdateId(s as u32))
     }
 }
-
-/// Bits of the number of an edge of a link, which has at most 112: three for each of [`MAX_STAR`](super::MAX_STAR)
-/// triangles, of which two share each but the at most [`MAX_LINK`] on the border.
-const EDGE_BITS: u32 = 7;
 
 /// Three components of so many bits in one word, and the number of an edge above them.
 fn pack(offset: [i32; 3], edge: u8, bits: u32) -> u64 {

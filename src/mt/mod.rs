@@ -34,7 +34,7 @@ pub use base::{BaseMesh, BaseMeshError, MAX_FIELD_BITS, MAX_UPDATES};
 pub use check::MtFault;
 #[cfg(feature = "build")]
 pub use check::check_errors;
-pub use collapse::{EdgeMt, MAX_LINK, MAX_STAR, VertexSplit};
+pub use collapse::{EdgeMt, MAX_EDGE, MAX_LINK, MAX_STAR, VertexSplit};
 pub use convert::ConvertError;
 pub use current::{CurrentMesh, MeshChanges};
 pub use error::PageError;

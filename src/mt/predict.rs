@@ -12,6 +12,7 @@
 
 use super::CurrentMesh;
 use super::FieldInfo;
+use super::MAX_EDGE;
 use super::MAX_LINK;
 use super::MAX_STAR;
 use super::ring::Ring;
@@ -109,13 +110,16 @@ impl Link {
     /// An offset as files tell it: what is to be added to the step along an edge, and the number of that; or the offset and 0.
     pub fn told_offset(&self, ring: &Ring, offset: [i32; 3], bits: u32) -> ([i32; 3], u8) {
         // What is not counted from an edge has no sign in its first component.
-        let (mut told, mut least) = ((offset, 0), (length(offset) - 8).saturating_sub(EDGE_COSTS));
-        let mut number = 0_u8;
+        let (mut told, mut least) = ((offset, 0), length(offset).saturating_sub(8 + EDGE_COSTS));
+        let mut number = 0;
         for (most, mut others) in self.edges(ring).into_iter().enumerate().rev() {
             while let Some(other) = others.checked_ilog2() {
                 others ^= 1 << other;
-                // There are at most 112.
-                number = number.saturating_add(1);
+                // A link that closes up has 96 edges at most; others may have a few that cannot be named.
+                if number == MAX_EDGE {
+                    return told;
+                }
+                number += 1;
                 let step = self.along_edge(ring, most, other as usize);
                 let rest = [0, 1, 2].map(|k| offset[k].saturating_sub(step[k]));
                 let fits = rest.iter().all(|d| d.unsigned_abs() <= 1 << bits);

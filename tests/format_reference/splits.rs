@@ -48,7 +48,7 @@ pub fn shared(
             None
         };
         let edge = coded.number(EDGE, above.map_or(2, |above| above.edge.min(1)));
-        assert!(edge <= 255);
+        assert!(edge <= 127);
         let offset = offset(coded, above, edge, leads);
         let mask = mask(coded);
         splits.push(Split { vertex, offset, edge, mask, ..Split::default() });

@@ -12,6 +12,7 @@ use crate::format::coder::Source;
 use crate::mt::BaseMeshError;
 use crate::mt::EdgeMt;
 use crate::mt::ErrorCode;
+use crate::mt::MAX_EDGE;
 use crate::mt::MtInfo;
 use crate::mt::PageError;
 use crate::mt::UpdateId;
@@ -305,8 +306,9 @@ fn read_vertices(
 }
 
 fn read_offset(source: &mut Source<'_>, above: Option<Offset>, leads: bool) -> Result<Offset, FormatError> {
-    let edge = u8::try_from(source.number(EDGE, edge_context(above))?);
-    let edge = edge.map_err(|_| source.corrupt("an offset is counted from an edge that no link has"))?;
+    let edge = u8::try_from(source.number(EDGE, edge_context(above))?).ok().filter(|&edge| edge <= MAX_EDGE);
+    let edge =
+        edge.ok_or_else(|| source.corrupt("an offset is counted from an edge that cannot be named"))?;
     let (mut offset, mut has_sign) = ([0; 3], !leads || edge != 0);
     for (axis, d) in offset.iter_mut().enumerate() {
         let size = source.number(OFFSET, offset_context(above, edge, axis))?;
