@@ -2,13 +2,19 @@
 //! slow as a network (`?throttle=BYTES_PER_SECOND`), so that streaming can be seen and tested.
 
 use std::fs::File;
-use std::io::{self, Read, Seek, SeekFrom};
+use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
+use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::Duration;
 
-use anyhow::{Context, Result, anyhow};
-use tiny_http::{Header, Method, Request, Response, Server, StatusCode};
+use anyhow::{Context, Result};
+
+/// Browsers connect ahead of time; such a connection is not kept for ever.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// The head of a request may have so many bytes.
+const LONGEST_HEAD: u64 = 64 << 10;
 
 /// Requests below `prefix` are answered from `folder`.
 #[derive(Clone, Debug)]
@@ -27,72 +33,98 @@ impl Mount {
 
 /// Starts to serve `mounts` (the first whose prefix fits answers) and returns the address with a final slash.
 /// Port 0 takes any free one.
+///
+/// Each connection has a thread and one request. In a pool of threads that stay with their connections, one can wait for
+/// another to end; that kept pages from starting.
 pub fn start(mounts: Vec<Mount>, port: u16) -> Result<String> {
-    let server = Server::http(("127.0.0.1", port)).map_err(|error| anyhow!("port {port}: {error}"))?;
-    let address = server.server_addr().to_ip().context("the server has no address")?;
+    let listener = TcpListener::bind(("127.0.0.1", port)).with_context(|| format!("port {port}"))?;
+    let address = listener.local_addr()?;
     thread::spawn(move || {
-        for request in server.incoming_requests() {
+        for stream in listener.incoming().flatten() {
             let mounts = mounts.clone();
-            thread::spawn(move || answer(request, &mounts));
+            // A client that went away is no concern of the server.
+            thread::spawn(move || answer(&stream, &mounts).ok());
         }
     });
     Ok(format!("http://{address}/"))
 }
 
-fn answer(request: Request, mounts: &[Mount]) {
-    let reply = reply(&request, mounts);
-    // A client that went away is no concern of the server.
-    let _ = match reply {
-        Ok(response) => request.respond(response),
-        Err(status) => {
-            request.respond(headers(Response::empty(status).with_data(io::empty(), Some(0)), "text/plain"))
-        }
-    };
+/// What matters of the head of a request.
+struct Request {
+    method: String,
+    url: String,
+    range: Option<String>,
 }
 
-type Body = Throttled<io::Take<File>>;
-
-fn reply(request: &Request, mounts: &[Mount]) -> Result<Response<Body>, StatusCode> {
-    if !matches!(request.method(), Method::Get | Method::Head) {
-        return Err(StatusCode(405));
+fn answer(mut stream: &TcpStream, mounts: &[Mount]) -> io::Result<()> {
+    stream.set_read_timeout(Some(PATIENCE))?;
+    let Some(request) = read_head(&mut BufReader::new(stream.take(LONGEST_HEAD)))? else { return Ok(()) };
+    let (status, fields, body) = match reply(&request, mounts) {
+        Ok(reply) => (reply.status, reply.fields, Some(reply.body)),
+        Err(status) => (status, "Content-Type: text/plain\r\nContent-Length: 0\r\n".to_owned(), None),
+    };
+    let common = "Accept-Ranges: bytes\r\nCache-Control: no-cache\r\nX-Content-Type-Options: nosniff\r\n";
+    // The reason may be empty.
+    write!(stream, "HTTP/1.1 {status} \r\n{fields}{common}Connection: close\r\n\r\n")?;
+    match body {
+        Some(mut body) if request.method != "HEAD" => io::copy(&mut body, &mut stream).map(drop),
+        _ => Ok(()),
     }
-    let (path, query) = request.url().split_once('?').unwrap_or((request.url(), ""));
-    let path = locate(path, mounts).ok_or(StatusCode(404))?;
-    let mut file = File::open(&path).map_err(|_| StatusCode(404))?;
-    let size = file.metadata().map_err(|_| StatusCode(500))?.len();
-    let wanted = request.headers().iter().find(|header| header.field.equiv("Range"));
-    let range = wanted.map_or(Range::Whole, |header| parse_range(header.value.as_str(), size));
+}
+
+/// None if the connection ends before there is a request.
+fn read_head(reader: &mut impl BufRead) -> io::Result<Option<Request>> {
+    let mut line = String::new();
+    reader.read_line(&mut line)?;
+    let mut words = line.split(' ').map(str::to_owned);
+    let (Some(method), Some(url)) = (words.next(), words.next()) else { return Ok(None) };
+    let mut request = Request { method, url, range: None };
+    loop {
+        line.clear();
+        if reader.read_line(&mut line)? == 0 {
+            return Ok(None);
+        }
+        match line.trim_end().split_once(':') {
+            None => return Ok(Some(request)),
+            Some((name, value)) if name.eq_ignore_ascii_case("range") => {
+                request.range = Some(value.trim().to_owned());
+            }
+            Some(_) => {}
+        }
+    }
+}
+
+struct Reply {
+    status: u16,
+    /// Each with its end of line.
+    fields: String,
+    body: Throttled<io::Take<File>>,
+}
+
+/// The answer, or the status of an empty one.
+fn reply(request: &Request, mounts: &[Mount]) -> Result<Reply, u16> {
+    if !matches!(request.method.as_str(), "GET" | "HEAD") {
+        return Err(405);
+    }
+    let (path, query) = request.url.split_once('?').unwrap_or((&request.url, ""));
+    let path = locate(path, mounts).ok_or(404_u16)?;
+    let mut file = File::open(&path).map_err(|_| 404_u16)?;
+    let size = file.metadata().map_err(|_| 500_u16)?.len();
+    let range = request.range.as_ref().map_or(Range::Whole, |value| parse_range(value, size));
     let (status, start, length) = match range {
         Range::Whole => (200, 0, size),
         Range::Part { start, end } => (206, start, end - start),
         Range::Unsatisfiable => (416, 0, 0),
     };
-    file.seek(SeekFrom::Start(start)).map_err(|_| StatusCode(500))?;
+    file.seek(SeekFrom::Start(start)).map_err(|_| 500_u16)?;
     let body = Throttled { inner: file.take(length), bytes_per_second: throttle(query) };
-    let mut response =
-        Response::new(StatusCode(status), Vec::new(), body, usize::try_from(length).ok(), None);
-    match range {
-        Range::Whole => {}
-        Range::Part { start, end } => {
-            response.add_header(header("Content-Range", &format!("bytes {start}-{}/{size}", end - 1)));
-        }
-        Range::Unsatisfiable => response.add_header(header("Content-Range", &format!("bytes */{size}"))),
-    }
-    Ok(headers(response, media_type(&path)))
-}
-
-fn headers<R: Read>(response: Response<R>, media_type: &str) -> Response<R> {
-    response
-        // Chunked transfer would hide the length that progress bars need.
-        .with_chunked_threshold(usize::MAX)
-        .with_header(header("Content-Type", media_type))
-        .with_header(header("Accept-Ranges", "bytes"))
-        .with_header(header("Cache-Control", "no-cache"))
-        .with_header(header("X-Content-Type-Options", "nosniff"))
-}
-
-fn header(name: &str, value: &str) -> Header {
-    Header::from_bytes(name, value).expect("header names and values here are plain ASCII")
+    let place = match range {
+        Range::Whole => String::new(),
+        Range::Part { start, end } => format!("Content-Range: bytes {start}-{}/{size}\r\n", end - 1),
+        Range::Unsatisfiable => format!("Content-Range: bytes */{size}\r\n"),
+    };
+    let fields = format!("Content-Type: {}\r\nContent-Length: {length}\r\n{place}", media_type(&path));
+    Ok(Reply { status, fields, body })
 }
 
 /// The file that `path` names, only if it lies inside its mount.
@@ -191,8 +223,6 @@ impl<R: Read> Read for Throttled<R> {
 
 #[cfg(test)]
 mod tests {
-    use std::io::{BufRead, BufReader, Write};
-    use std::net::TcpStream;
     use std::time::Instant;
 
     use super::*;
@@ -280,6 +310,15 @@ mod tests {
             std::os::unix::fs::symlink(folder.join("secret"), link).unwrap();
         }
         assert_eq!(get(&server, "/link", None).0, 404);
+    }
+
+    #[test]
+    fn connections_that_wait_do_not_keep_others_waiting() {
+        let server = serve("idle");
+        let address = server.trim_start_matches("http://").trim_end_matches('/');
+        let idle: Vec<TcpStream> = (0..40).map(|_| TcpStream::connect(address).unwrap()).collect();
+        assert_eq!(get(&server, "/digits", None).2, "0123456789");
+        drop(idle);
     }
 
     #[test]
