@@ -76,21 +76,55 @@ pub const BASE_LEVEL: Row = numbers(381, 1, 2);
 pub const VALUE_GAP: Row = numbers(382, 1, 1);
 pub const VALUE_BITS: Row = symbols(383, 2, 65);
 
-const ROWS: [Row; 18] = [
-    BEHIND, SEED, LENGTH, STEP, RANK, GAP, RUN, CHILDREN, RISE, EDGE, OFFSET, LAST_WRONG, WRONG, ERROR,
-    LEVEL, BASE_LEVEL, VALUE_GAP, VALUE_BITS,
+/// In the place of those from `GAP` to `LEVEL`, in files of kind 1 and 2.
+pub const FALL: Row = numbers(29, 1, 2);
+pub const FAN: Row = symbols(30, 1, 2);
+pub const DISTANCE: Row = symbols(31, 4, 112);
+pub const SEED_PLACE: Row = symbols(35, 1, 9);
+pub const GROW: Row = symbols(36, 108, 2);
+pub const GIVEN_UP: Row = symbols(144, 1, 2);
+pub const FAR: Row = symbols(145, 20, 2);
+pub const SHORT: Row = numbers(165, 1, 0);
+pub const INSERTION_LEVEL: Row = numbers(166, 40, 1);
+pub const SPELLED_FALL: Row = numbers(206, 1, 2);
+pub const COUNT: Row = numbers(207, 3, 3);
+pub const DIFFERENCE: Row = numbers(210, 3, 1);
+pub const LEVEL_DIFFERENCE: Row = numbers(213, 1, 1);
+pub const REMOVED: Row = numbers(214, 2, 2);
+pub const CORNER: Row = numbers(216, 4, 4);
+
+const BOTH: [Row; 8] = [BEHIND, SEED, LENGTH, STEP, RANK, BASE_LEVEL, VALUE_GAP, VALUE_BITS];
+const OF_SPLITS: [Row; 10] = [GAP, RUN, CHILDREN, RISE, EDGE, OFFSET, LAST_WRONG, WRONG, ERROR, LEVEL];
+const OF_OTHERS: [Row; 15] = [
+    FALL,
+    FAN,
+    DISTANCE,
+    SEED_PLACE,
+    GROW,
+    GIVEN_UP,
+    FAR,
+    SHORT,
+    INSERTION_LEVEL,
+    SPELLED_FALL,
+    COUNT,
+    DIFFERENCE,
+    LEVEL_DIFFERENCE,
+    REMOVED,
+    CORNER,
 ];
 
 /// Symbols with their shares.
-type Table = Vec<(u32, u32)>;
+pub type Table = Vec<(u32, u32)>;
 
-/// Reads the tables of all contexts.
-pub fn tables(mut bytes: Bytes<'_>) -> Vec<Table> {
+/// Reads the tables of all contexts of a file of a kind.
+pub fn tables(mut bytes: Bytes<'_>, kind: u8) -> Vec<Table> {
     let count = bytes.varint();
+    assert!(count <= VALUE_BITS.first + VALUE_BITS.contexts);
     let mut bits = Bits::new(bytes.0);
+    let rows = BOTH.iter().chain(if kind == 0 { OF_SPLITS.iter() } else { OF_OTHERS.iter() });
     let tables = (0..count).map(|context| {
-        let row = ROWS.iter().find(|row| (row.first..row.first + row.contexts).contains(&context));
-        table(&mut bits, row.expect("a known context").letters)
+        let row = rows.clone().find(|row| (row.first..row.first + row.contexts).contains(&context));
+        table(&mut bits, row.map_or(0, |row| row.letters))
     });
     let tables = tables.collect();
     bits.end();
@@ -170,6 +204,17 @@ impl<'a> Coded<'a> {
     pub fn signed(&mut self, row: Row, which: u32) -> i32 {
         let size = i32::try_from(self.number(row, which)).expect("31 bits");
         if size != 0 && self.bits(1) == 1 { -size } else { size }
+    }
+
+    /// A number below `n`, in plain bits.
+    pub fn one_of(&mut self, n: u32) -> u32 {
+        let m = n.max(1);
+        let w = len(m) - 1;
+        let s = (2 << w) - m;
+        let x = self.bits(w);
+        let x = if x < s { x } else { 2 * x + self.bits(1) - s };
+        assert!(x < n);
+        x
     }
 
     pub fn end(self) {

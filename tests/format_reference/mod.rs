@@ -1,17 +1,25 @@
-//! A slow, plain reader of edge-based MT files, written from `docs/format.md` alone. It uses nothing of the crate, and
-//! stops at whatever is wrong.
+//! A slow, plain reader of MT files, written from `docs/format.md` alone. It uses nothing of the crate, and stops at whatever is
+//! wrong.
+#![allow(dead_code, reason = "each test file uses its own part")]
 
+pub mod change;
 mod coded;
 pub mod exact;
 pub mod growth;
+pub mod insertions;
 pub mod plain;
+pub mod spelled;
 pub mod splits;
 pub mod wire;
 
+use change::Change;
 use coded::BASE_LEVEL;
 use coded::Coded;
+use coded::Table;
 use exact::Exact;
 use growth::Growth;
+use insertions::Start;
+use spelled::Spelled;
 use splits::Split;
 use std::collections::BTreeSet;
 use std::collections::HashMap;
@@ -25,7 +33,10 @@ use wire::Section;
 pub struct File {
     pub info: Info,
     pub index: Index,
+    tables: Vec<Table>,
     pub base: Growth,
+    /// In files of kind 1.
+    pub start: Option<Start>,
     /// By field, then by vertex.
     pub base_levels: Vec<Vec<i32>>,
     pub splits: HashMap<u32, Split>,
@@ -34,9 +45,11 @@ pub struct File {
     pub blocks: Vec<Range<usize>>,
 }
 
-/// Reads a whole file. Blocks are read in an order that `choose` makes of those that can be read next, given only the
-/// blocks on which they depend.
-pub fn read(file: &[u8], mut choose: impl FnMut(&[u32]) -> u32) -> File {
+/// The sections of each block.
+pub type Parts<'a> = Vec<Vec<Bytes<'a>>>;
+
+/// Reads a whole file but for what is in its blocks.
+pub fn open(file: &[u8]) -> (File, Parts<'_>) {
     let sections = wire::sections(file);
     let (end, front) = sections.split_last().expect("sections");
     let mut known = front.iter().filter(|section| section.kind[0] & 0x20 == 0);
@@ -46,15 +59,15 @@ pub fn read(file: &[u8], mut choose: impl FnMut(&[u32]) -> u32) -> File {
         section
     };
     let info = wire::info(next(b"INFO").payload);
-    assert_eq!(info.kind, 0, "this reader knows edge-based files only");
     let section = next(b"INDX");
     let (index, index_end) = (wire::index(section.payload, &info), section.range[1]);
-    let tables = coded::tables(next(b"MODL").payload);
+    let tables = coded::tables(next(b"MODL").payload, info.kind);
     let mut payload = next(b"BASE").payload;
     let [vertices, tets] = [payload.varint(), payload.varint()];
-    assert_eq!(vertices + info.updates, info.vertices);
+    assert!(info.kind == 2 || vertices + info.updates == info.vertices);
     let mut coded = Coded::new(payload, &tables);
     let base = growth::read(&mut coded, vertices as usize, tets as usize);
+    let start = (info.kind == 1).then(|| insertions::start(&mut coded));
     coded.end();
     let mut base_levels = Vec::new();
     for field in 0..info.fields.len() {
@@ -69,12 +82,13 @@ pub fn read(file: &[u8], mut choose: impl FnMut(&[u32]) -> u32) -> File {
         base_levels.push(levels.collect());
         coded.end();
     }
-    let mut parts_of: Vec<Vec<Bytes<'_>>> = Vec::new();
+    let mut parts_of = Parts::new();
     let (mut at, mut blocks) = (index_end + index.between, Vec::new());
+    let kind = [b"UPDT", b"INSV", b"EXPL"][usize::from(info.kind)];
     for (block, entry) in (0..).zip(&index.blocks) {
         let (start, mut parts) = (at as usize, Vec::new());
         for (part, length) in (0..).zip(&entry.lengths) {
-            let section = next(if part == 0 { b"UPDT" } else { b"FLDU" });
+            let section = next(if part == 0 { kind } else { b"FLDU" });
             assert_eq!(section.range, [at, at + u64::from(*length)]);
             at = section.range[1];
             let mut payload = section.payload;
@@ -90,7 +104,15 @@ pub fn read(file: &[u8], mut choose: impl FnMut(&[u32]) -> u32) -> File {
     let exact: Vec<Exact> = values.map(|section| exact::read(section.payload, &tables)).collect();
     assert!(exact.windows(2).all(|pair| pair[0].field < pair[1].field));
     check_end(end, front, &info);
-    let mut file = File { info, index, base, base_levels, splits: HashMap::new(), exact, blocks };
+    let splits = HashMap::new();
+    (File { info, index, tables, base, start, base_levels, splits, exact, blocks }, parts_of)
+}
+
+/// Reads a whole file of kind 0. Blocks are read in an order that `choose` makes of those that can be read next, given only
+/// the blocks on which they depend.
+pub fn read(file: &[u8], mut choose: impl FnMut(&[u32]) -> u32) -> File {
+    let (mut file, parts_of) = open(file);
+    assert_eq!(file.info.kind, 0, "a file of another kind");
     let mut left: BTreeSet<u32> = (0..parts_of.len() as u32).collect();
     let mut closures: HashMap<u32, BTreeSet<u32>> = HashMap::new();
     while !left.is_empty() {
@@ -104,10 +126,34 @@ pub fn read(file: &[u8], mut choose: impl FnMut(&[u32]) -> u32) -> File {
             closure.insert(*parent);
             closure.extend(&closures[parent]);
         }
-        file.read_block(&tables, block, &parts_of[block as usize], &closure);
+        file.read_block(block, &parts_of[block as usize], &closure);
         closures.insert(block, closure);
     }
     file
+}
+
+/// Reads the blocks of a file of kind 1 or 2: the updates in order.
+pub fn changes(file: &File, parts: &Parts<'_>) -> Vec<Change> {
+    let mut changes = Vec::new();
+    let mut each = |read: &mut dyn FnMut(&mut Coded<'_>, usize) -> Vec<Change>| {
+        for (block, parts) in (0..).zip(parts) {
+            let mut coded = Coded::new(parts[0], &file.tables);
+            changes.extend(read(&mut coded, file.index.updates(block, &file.info).len()));
+            coded.end();
+        }
+    };
+    match file.info.kind {
+        1 => {
+            let mut mesh = insertions::Mesh::new(file);
+            each(&mut |coded, updates| (0..updates).map(|_| mesh.update(coded)).collect());
+        }
+        2 => {
+            let mut spelled = Spelled::new(file);
+            each(&mut |coded, updates| spelled.block(coded, updates));
+        }
+        kind => panic!("a file of kind {kind}"),
+    }
+    changes
 }
 
 fn check_end(end: &Section<'_>, front: &[Section<'_>], info: &Info) {
@@ -127,23 +173,17 @@ impl File {
     }
 
     /// Decodes a block knowing no more than what the index says it depends on.
-    fn read_block(
-        &mut self,
-        tables: &[Vec<(u32, u32)>],
-        block: u32,
-        parts: &[Bytes<'_>],
-        closure: &BTreeSet<u32>,
-    ) {
+    fn read_block(&mut self, block: u32, parts: &[Bytes<'_>], closure: &BTreeSet<u32>) {
         let updates = self.index.updates(block, &self.info);
         let is_known = |k: &u32| closure.contains(&(k >> self.index.block_bits));
         let known = self.splits.iter().filter(|(k, _)| is_known(k)).map(|(&k, split)| (k, split.clone()));
         let known = known.collect();
-        let mut coded = Coded::new(parts[0], tables);
+        let mut coded = Coded::new(parts[0], &self.tables);
         let mut splits =
             splits::shared(&mut coded, self.base.positions.len() as u32, updates.clone(), &known);
         coded.end();
         for part in &parts[1..] {
-            let mut coded = Coded::new(*part, tables);
+            let mut coded = Coded::new(*part, &self.tables);
             for (split, (error, residual)) in splits.iter_mut().zip(splits::field(&mut coded, updates.len()))
             {
                 split.errors.push(error);
