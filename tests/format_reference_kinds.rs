@@ -196,18 +196,27 @@ fn precise(position_bits: u32, field_bits: u32) -> BuildConfig {
 #[test]
 fn built_mts_are_read_alike() {
     let bucky = generate::bucky(6).expect("a small size");
+    let mut symbols = BTreeSet::new();
     for how in METHODS {
         for (bits, config) in [(5, BuildConfig::default()), (4, precise(6, 5)), (16, precise(30, 24))] {
-            compare(&bytes_in_blocks(&built(&bucky, how, config), bits));
+            let (file, _) = compare(&bytes_in_blocks(&built(&bucky, how, config), bits));
+            symbols.extend(file.symbols());
         }
     }
     // Not convex: there is no inserting into it.
     let flow = generate::sphere_flow(4).expect("a small size");
     for how in &METHODS[..2] {
         let mt = built(&flow, *how, precise(14, 12));
-        compare(&bytes_in_blocks(&mt, 6));
+        symbols.extend(compare(&bytes_in_blocks(&mt, 6)).0.symbols());
         compare(&bytes_in_blocks(&mt.convert(MtKind::Explicit).expect("a valid MT"), 6));
     }
+    // All that the page knows occurs: with and without fans, seeds out of the cone, refused tetrahedra and faces of the boundary,
+    // levels that are far off, and homes that the vertex is outside of.
+    let occurs = |context| symbols.iter().any(|symbol| symbol.0 == context);
+    assert!((29..36).all(occurs) && (36..144).filter(|context| occurs(*context)).count() > 50);
+    assert!([(30, 0), (30, 1), (35, 8), (144, 0), (144, 1)].iter().all(|symbol| symbols.contains(symbol)));
+    assert!(symbols.range((145, 1)..(165, 2)).any(|symbol| symbol.1 == 1) && occurs(165));
+    assert!((166..186).any(occurs) && (186..206).any(occurs));
 }
 
 /// Cubes of which parts are missing: what is left meets in faces, edges and vertices.
@@ -243,17 +252,40 @@ fn parts_that_meet_in_edges_and_vertices_are_read_alike() {
 fn levels_halfway_are_rounded_alike() {
     for size in [5, 6, 7] {
         let mut mesh = generate::bucky(size).expect("a small size");
-        let linear = |weights: [f64; 3]| {
-            let value = move |p: &[f64; 3]| 6.0 * (p[0] * weights[0] + p[1] * weights[1] + p[2] * weights[2]);
-            mesh.positions.iter().map(value).collect::<Vec<f64>>()
-        };
-        let values = [[1.0, 0.0, 0.0], [1.0, 2.0, 3.0], [7.0, -5.0, 3.0]].map(linear);
-        mesh.fields =
-            ["x", "sum", "difference"].iter().zip(values).map(|(name, v)| Field::new(*name, v)).collect();
+        linear_fields(&mut mesh);
         for how in METHODS {
             for (position_bits, field_bits) in [(8, 4), (12, 9), (23, 24)] {
                 compare(&bytes_in_blocks(&built(&mesh, how, precise(position_bits, field_bits)), 5));
             }
+        }
+    }
+}
+
+fn linear_fields(mesh: &mut TetMesh) {
+    let fields = [("x", [1.0, 0.0, 0.0]), ("sum", [1.0, 2.0, 3.0]), ("difference", [7.0, -5.0, 3.0])];
+    let linear = |weights: [f64; 3]| {
+        let value = |p: &[f64; 3]| 6.0 * (p[0] * weights[0] + p[1] * weights[1] + p[2] * weights[2]);
+        mesh.positions.iter().map(value).collect::<Vec<f64>>()
+    };
+    mesh.fields = fields.map(|(name, weights)| Field::new(name, linear(weights))).into();
+}
+
+/// Planes on which the field is the same, in which vertices are anywhere: volumes are beyond what doubles hold.
+#[test]
+fn volumes_of_many_bits_are_rounded_alike() {
+    let mut random = Random(17);
+    for size in [5, 6, 7, 9] {
+        let mut mesh = generate::bucky(size).expect("a small size");
+        linear_fields(&mut mesh);
+        mesh.fields.truncate(1);
+        let on_rim = |x: f64| x == 0.0 || x == 1.0;
+        for axis in [1, 2] {
+            for p in mesh.positions.iter_mut().filter(|p| !on_rim(p[axis])) {
+                p[axis] += 0.02 * f64::from(random.between(-1000, 1000)) / 1000.0;
+            }
+        }
+        for field_bits in [1, 2, 3] {
+            compare(&bytes_in_blocks(&built(&mesh, METHODS[0], precise(30, field_bits)), 9));
         }
     }
 }
@@ -279,6 +311,8 @@ fn golden_files_are_read_as_ever() {
     }
 }
 
+type Alter = fn(&mut File);
+
 /// A reader that does not find what is wrong proves nothing.
 #[test]
 fn a_changed_formula_would_be_noticed() {
@@ -287,7 +321,7 @@ fn a_changed_formula_would_be_noticed() {
     let (file, parts) = reader::open(&bytes);
     let right = reader::changes(&file, &parts);
     // What a formula of the page is fed with, by its step.
-    let alterations: [(&str, fn(&mut File)); 5] = [
+    let alterations: [(&str, Alter); 5] = [
         ("2 and 3", |file| file.base.positions[0][0] ^= 1),
         ("3", |file| file.start.as_mut().expect("kind 1").grain[1] += 1),
         ("7, expected", |file| file.base_levels[0][0] ^= 4),

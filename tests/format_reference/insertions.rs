@@ -250,31 +250,31 @@ impl<'a> Mesh<'a> {
         faces
     }
 
+    /// The vertices and weights from which levels are expected, and 1 if the new vertex is outside.
+    fn home(&self, grown: &Grown) -> ([(u32, f64); 4], u32) {
+        let mut best = (f64::NEG_INFINITY, [(0, 0.0); 4]);
+        for &t in &grown.taken {
+            let exact = self.volumes(t, grown.v);
+            let volumes = exact.map(|volume| volume as f64);
+            let sum = volumes[0] + volumes[1] + volumes[2] + volumes[3];
+            let corners = [0, 1, 2, 3].map(|corner| (self.tets[t][corner], volumes[corner] / sum));
+            if exact.iter().all(|volume| *volume >= 0) {
+                return (corners, 0);
+            }
+            let least = corners.iter().map(|(_, weight)| *weight).fold(f64::INFINITY, f64::min);
+            if sum != 0.0 && least > best.0 {
+                best = (least, corners);
+            }
+        }
+        (best.1, 1)
+    }
+
     fn levels(&self, coded: &mut Coded<'_>, grown: &Grown) -> Vec<i32> {
-        let weights: Vec<[f64; 4]> = grown
-            .taken
-            .iter()
-            .map(|&t| {
-                let volumes = self.volumes(t, grown.v).map(|volume| volume as f64);
-                let sum: f64 = volumes.iter().sum();
-                assert!(sum > 0.0, "too flat for doubles");
-                volumes.map(|volume| volume / sum)
-            })
-            .collect();
-        let least = |weights: &[f64; 4]| weights.iter().copied().fold(f64::INFINITY, f64::min);
-        let is_in = |&t: &usize| self.volumes(t, grown.v).iter().all(|&volume| volume >= 0);
-        let inside = grown.taken.iter().position(is_in);
-        let outside = u32::from(inside.is_none());
-        let home = inside.unwrap_or_else(|| {
-            let farther = |best: usize, next: usize| least(&weights[next]) > least(&weights[best]);
-            let best = (0..weights.len()).reduce(|best, next| if farther(best, next) { next } else { best });
-            best.expect("a tetrahedron")
-        });
-        let tet = self.tets[grown.taken[home]];
+        let (home, outside) = self.home(grown);
         let fields = self.info.fields.iter().enumerate();
         let levels = fields.map(|(f, field)| {
             let mut sum = 0.5;
-            for (weight, v) in weights[home].iter().zip(tet) {
+            for (v, weight) in home {
                 sum += weight * f64::from(self.levels[v as usize][f]);
             }
             let most = (1 << field.bits) - 1;
@@ -321,7 +321,7 @@ fn rest(coded: &mut Coded<'_>, q: u32) -> i64 {
     let size = if length == 1 {
         1
     } else {
-        i64::from(2 | q % 2) << (length - 2) | i64::from(coded.bits(length - 2))
+        i64::from(2 + q % 2) << (length - 2) | i64::from(coded.bits(length - 2))
     };
     if coded.bits(1) == 1 { -size } else { size }
 }

@@ -172,6 +172,14 @@ impl File {
         k >> self.index.block_bits
     }
 
+    /// Contexts and symbols that occur in them.
+    pub fn symbols(&self) -> BTreeSet<(u32, u32)> {
+        let of_context = |(context, table): (u32, &Table)| {
+            table.iter().map(move |&(symbol, _)| (context, symbol)).collect::<Vec<_>>()
+        };
+        (0..).zip(&self.tables).flat_map(of_context).collect()
+    }
+
     /// Decodes a block knowing no more than what the index says it depends on.
     fn read_block(&mut self, block: u32, parts: &[Bytes<'_>], closure: &BTreeSet<u32>) {
         let updates = self.index.updates(block, &self.info);
