@@ -191,15 +191,7 @@ fn compare_meshes(mesh: &plain::Mesh, current: &CurrentMesh) {
 
 #[test]
 fn random_mts_are_read_alike() {
-    let domains = [
-        Domain::SingleTet,
-        Domain::Cube(2),
-        Domain::Cube(3),
-        Domain::Ell(1),
-        Domain::TwoComponents(2),
-        Domain::Ring,
-    ];
-    for (seed, domain) in (0..).zip(domains) {
+    for (seed, domain) in (0..).zip(Domain::SMALL) {
         for fields in 1..4 {
             let built = build(Plan { domain, seed: 31 * seed + fields as u64, fields, updates: 1000 });
             compare(&encode(&built.edge_mt(), &options(4)).expect("an MT"));

@@ -143,15 +143,7 @@ fn check_history(file: &File, changes: &[Change]) {
 
 #[test]
 fn random_mts_that_are_spelled_out_are_read_alike() {
-    let domains = [
-        Domain::SingleTet,
-        Domain::Cube(2),
-        Domain::Cube(3),
-        Domain::Ell(1),
-        Domain::TwoComponents(2),
-        Domain::Ring,
-    ];
-    for (seed, domain) in (0..).zip(domains) {
+    for (seed, domain) in (0..).zip(Domain::SMALL) {
         for fields in 1..4 {
             let plan = Plan { domain, seed: 29 * seed + fields as u64, fields, updates: 1000 };
             let mt = Mt::from(planned(plan)).convert(MtKind::Explicit).expect("a valid MT");

@@ -1,5 +1,10 @@
 //! Promise: a session turns bytes into meshes while they arrive, and says what it cannot do.
 
+mod format_support;
+mod support;
+
+use format_support::assemble;
+use format_support::sections;
 use tetralod::format::{EncodeOptions, FormatError, encode};
 use tetralod::geom::{Bounds, Lattice};
 use tetralod::mt::{BaseMesh, EdgeMt, ErrorCode, FieldInfo, MtInfo, MtKind, VertexId, VertexSplit};
@@ -167,29 +172,10 @@ fn requests_without_sense_are_refused() {
 
 /// The file with one bit of the first section of a kind flipped, and all checksums as if that were right.
 fn flipped(file: &[u8], kind: &[u8; 4], bit: usize) -> Option<Vec<u8>> {
-    let mut bytes = file.to_vec();
-    let (mut at, mut chain, mut is_done) = (32, crc32fast::Hasher::new(), false);
-    while at < bytes.len() {
-        let length = u32::from_le_bytes(bytes[at + 4..at + 8].try_into().ok()?) as usize;
-        let end = at + 12 + length;
-        if &bytes[at..at + 4] == kind && !is_done {
-            let byte = bytes[at + 12..end].get_mut(bit / 8)?;
-            *byte ^= 1 << (bit % 8);
-            is_done = true;
-        }
-        if &bytes[at..at + 4] == b"ENDF" {
-            let crc = chain.clone().finalize();
-            bytes[end - 4..end].copy_from_slice(&crc.to_le_bytes());
-        }
-        let mut hasher = crc32fast::Hasher::new();
-        hasher.update(&bytes[at..at + 8]);
-        hasher.update(&bytes[at + 12..end]);
-        let crc = hasher.finalize().to_le_bytes();
-        bytes[at + 8..at + 12].copy_from_slice(&crc);
-        chain.update(&crc);
-        at = end;
-    }
-    is_done.then_some(bytes)
+    let mut parts = sections(file);
+    let (_, payload) = parts.iter_mut().find(|(other, _)| other == kind)?;
+    *payload.get_mut(bit / 8)? ^= 1 << (bit % 8);
+    Some(assemble(&parts, 2))
 }
 
 #[test]

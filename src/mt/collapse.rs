@@ -255,7 +255,8 @@ impl EdgeMt {
         if !on_lattice {
             return Err(UpdateError::OffLattice { update });
         }
-        if split.edge > if self.is_coded { MAX_EDGE } else { 0 } {
+        let most_edge = if self.is_coded { MAX_EDGE } else { 0 };
+        if split.edge > most_edge {
             return Err(UpdateError::Edge { update });
         }
         if split.errors.len() == self.info.fields.len() { Ok(()) } else { Err(UpdateError::Error { update }) }

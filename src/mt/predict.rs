@@ -4,11 +4,11 @@
 //! the file; only where the guess is wrong has to be stored. All of it is the basic arithmetic of doubles, in an order
 //! that vertex numbers fix, and so the same on every platform. `docs/format.md` gives it as formulas.
 //!
-//! **Offsets.** Edges of the link often have the length and the direction of the edge that comes, so files may tell which one,
-//! and by how much the offset differs from the step along it. **Sides.** A tetrahedron of the star goes rather to the end of the offset that it lies towards. Those of which
-//! that is most certain are decided first, and each of the others follows the majority of its neighbours that are
-//! decided. **Levels.** The field is taken to be linear: its gradient is that of least squares over the link, near
-//! vertices counting more.
+//! **Offsets.** Edges of the link often have the length and the direction of the edge that comes, so files may tell which
+//! one, and by how much the offset differs from the step along it. **Sides.** A tetrahedron of the star goes rather to the
+//! end of the offset that it lies towards. Those of which that is most certain are decided first, and each of the others
+//! follows the majority of its neighbours that are decided. **Levels.** The field is taken to be linear: its gradient is
+//! that of least squares over the link, near vertices counting more.
 
 use super::CurrentMesh;
 use super::FieldInfo;
@@ -66,41 +66,36 @@ impl Link {
         }
     }
 
-    /// For each link vertex, by its place in ascending order, a bit for each place before it that an edge of the link leads to.
-    fn edges(&self, ring: &Ring) -> [u32; MAX_LINK] {
-        let mut edges = [0_u32; MAX_LINK];
+    /// The edges of the link as files count them: the places of their two ends, the larger one first, in descending order.
+    fn edges(&self, ring: &Ring) -> impl Iterator<Item = [usize; 2]> + use<> {
+        // For each place a bit for each smaller one that an edge leads to.
+        let mut ends = [0_u32; MAX_LINK];
         for &corners in &ring.link_of[..ring.len.min(MAX_STAR)] {
             let [low, middle, most] =
                 sorted(three(corners).map(|x| self.order[x % MAX_LINK] as usize % MAX_LINK));
-            edges[middle] |= 1 << low;
-            edges[most] |= 1 << low | 1 << middle;
+            ends[middle] |= 1 << low;
+            ends[most] |= 1 << low | 1 << middle;
         }
-        edges
+        (0..MAX_LINK).rev().flat_map(move |most| {
+            let mut others = ends[most];
+            std::iter::from_fn(move || {
+                let other = others.checked_ilog2()?;
+                others ^= 1 << other;
+                Some([most, other as usize])
+            })
+        })
     }
 
     /// The step along the edge of the link with that number, counted from 1, in the direction in which the first coordinate
-    /// that changes grows. None if there is no such edge. Edges descend by the places of their ends, the larger one first.
+    /// that changes grows. None if there is no such edge.
     pub fn step(&self, ring: &Ring, edge: u8) -> Option<[i32; 3]> {
-        let edges = self.edges(ring);
-        let mut left = u32::from(edge);
-        for (most, &others) in edges.iter().enumerate().rev() {
-            if left > others.count_ones() {
-                left -= others.count_ones();
-                continue;
-            }
-            let mut others = others;
-            for _ in 1..left {
-                others ^= 1 << others.checked_ilog2()?;
-            }
-            return Some(self.along_edge(ring, most, others.checked_ilog2()? as usize));
-        }
-        None
+        let ends = self.edges(ring).nth(usize::from(edge).checked_sub(1)?)?;
+        Some(self.step_between(&self.by_number(ring.link_len.min(MAX_LINK)), ends))
     }
 
-    /// The step between the link vertices at two places, in the direction in which the first coordinate that changes grows.
-    fn along_edge(&self, ring: &Ring, a: usize, b: usize) -> [i32; 3] {
-        let places = self.by_number(ring.link_len.min(MAX_LINK));
-        let [a, b] = [a, b].map(|place| self.spokes[places[place] as usize % MAX_LINK]);
+    /// The step between the link vertices at two places, whose indices `places` has, in that direction.
+    fn step_between(&self, places: &[u8; MAX_LINK], ends: [usize; 2]) -> [i32; 3] {
+        let [a, b] = ends.map(|place| self.spokes[places[place] as usize % MAX_LINK]);
         // Coordinates have at most 30 bits.
         let step = [0, 1, 2].map(|k| (a[k] - b[k]) as i32);
         let is_back = step.into_iter().find(|&d| d != 0).is_some_and(|d| d < 0);
@@ -109,23 +104,16 @@ impl Link {
 
     /// An offset as files tell it: what is to be added to the step along an edge, and the number of that; or the offset and 0.
     pub fn told_offset(&self, ring: &Ring, offset: [i32; 3], bits: u32) -> ([i32; 3], u8) {
+        let places = self.by_number(ring.link_len.min(MAX_LINK));
         // What is not counted from an edge has no sign in its first component.
         let (mut told, mut least) = ((offset, 0), length(offset).saturating_sub(8 + EDGE_COSTS));
-        let mut number = 0;
-        for (most, mut others) in self.edges(ring).into_iter().enumerate().rev() {
-            while let Some(other) = others.checked_ilog2() {
-                others ^= 1 << other;
-                // A link that closes up has 96 edges at most; others may have a few that cannot be named.
-                if number == MAX_EDGE {
-                    return told;
-                }
-                number += 1;
-                let step = self.along_edge(ring, most, other as usize);
-                let rest = [0, 1, 2].map(|k| offset[k].saturating_sub(step[k]));
-                let fits = rest.iter().all(|d| d.unsigned_abs() <= 1 << bits);
-                if fits && length(rest) < least {
-                    (told, least) = ((rest, number), length(rest));
-                }
+        // A link that closes up has 96 edges at most; others may have a few that cannot be named.
+        for (number, ends) in (1..=MAX_EDGE).zip(self.edges(ring)) {
+            let step = self.step_between(&places, ends);
+            let rest = [0, 1, 2].map(|k| offset[k].saturating_sub(step[k]));
+            let fits = rest.iter().all(|d| d.unsigned_abs() <= 1 << bits);
+            if fits && length(rest) < least {
+                (told, least) = ((rest, number), length(rest));
             }
         }
         told

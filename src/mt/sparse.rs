@@ -52,6 +52,7 @@ impl<T: Copy + PartialEq> Sparse<T> {
             return;
         }
         let (first, last) = (range.start >> PART_BITS, (range.end - 1) >> PART_BITS);
+        // Parts before that of the first entry, and behind that of the last, have none of the range: they keep what they hold.
         let parts = self.parts.iter_mut().enumerate().skip(first as usize);
         for (at, part) in parts.take((last - first + 1) as usize) {
             let Some(entries) = part else { continue };

@@ -14,22 +14,7 @@ let browser;
 before(async () => {
   await mkdir(pictures, { recursive: true });
   browser = await launch();
-  await warmUp();
 });
-
-/**
- * Starts the browser's GPU process, which draws in software here: now and then it never answers the first page of a browser that
- * asks for a device. Pages after that have to get theirs without help.
- */
-async function warmUp() {
-  const page = await browser.newPage();
-  await page.goto(`${address()}style.css`);
-  await page.evaluate(() => {
-    const device = navigator.gpu?.requestAdapter().then((adapter) => adapter?.requestDevice());
-    return Promise.race([device?.then((device) => device?.destroy()), new Promise((done) => setTimeout(done, 20_000))]);
-  });
-  await page.close();
-}
 
 after(() => browser?.close());
 

@@ -28,6 +28,10 @@ pub struct PlainMesh {
 }
 
 impl Domain {
+    /// One of each shape, and a second cube; small ones.
+    pub const SMALL: [Self; 6] =
+        [Self::SingleTet, Self::Cube(2), Self::Cube(3), Self::Ell(1), Self::TwoComponents(2), Self::Ring];
+
     /// The mesh of the domain; inner vertices are moved a little.
     pub fn mesh(self, random: &mut Random) -> PlainMesh {
         let everywhere = |_: [usize; 3]| true;
