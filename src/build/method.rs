@@ -41,7 +41,7 @@ impl Method {
     pub fn usual(kind: MtKind) -> Self {
         match kind {
             MtKind::Edge | MtKind::Explicit => Self::Collapse,
-            MtKind::Vertex => Self::Decimate,
+            MtKind::Vertex | MtKind::HalfEdge => Self::Decimate,
         }
     }
 
@@ -92,6 +92,15 @@ impl BuildConfig {
             (MtKind::Vertex, Method::Collapse) => refuse(
                 ["kind vertex", "method collapse"],
                 "MTs of kind vertex are built by methods insert and decimate; method collapse builds kinds edge and \
+                 explicit",
+            ),
+            (MtKind::HalfEdge, Method::Collapse | Method::Insert) => refuse(
+                ["kind half-edge", if self.method == Method::Insert { "method insert" } else { "method collapse" }],
+                "MTs of kind half-edge are built by method decimate with criterion half-edge",
+            ),
+            (MtKind::HalfEdge, Method::Decimate) if self.criterion != Criterion::HalfEdge => refuse(
+                ["kind half-edge", "criterion delaunay"],
+                "MTs of kind half-edge are built with criterion half-edge; criterion delaunay builds kinds vertex and \
                  explicit",
             ),
             (_, Method::Insert) if self.criterion != Criterion::Delaunay => refuse(

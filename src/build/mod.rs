@@ -54,6 +54,7 @@ use crate::mesh::TetMesh;
 use crate::mt::ConvertError;
 use crate::mt::Exact;
 use crate::mt::ExplicitMt;
+use crate::mt::HalfEdgeMt;
 use crate::mt::Mt;
 use crate::mt::MtKind;
 use crate::mt::MultiTessellation;
@@ -368,10 +369,13 @@ pub fn build(
         }
     };
     // Conversions keep the numbers of the vertices.
-    let mt = if mt.info().kind == config.kind {
-        mt
-    } else {
-        mt.convert(config.kind).map_err(BuildError::Convert)?
+    let mt = match mt {
+        Mt::Explicit(explicit) if config.kind == MtKind::HalfEdge => {
+            let bits = config.block_bits.clamp(4, 16);
+            HalfEdgeMt::from_explicit(&explicit, bits).map_err(BuildError::Convert)?.into()
+        }
+        mt if mt.info().kind == config.kind => mt,
+        mt => mt.convert(config.kind).map_err(BuildError::Convert)?,
     };
     Ok(BuildResult { mt, summary, vertices, exact })
 }

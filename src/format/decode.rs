@@ -16,22 +16,17 @@ use super::header::parse_header;
 use super::payload;
 use super::payload::BaseParts;
 use super::payload::Metadata;
+use super::payload::Shared;
 use super::payload::State;
-use super::payload::edge;
 use super::payload::edge::FieldPart;
-use super::payload::edge::Splits;
 use super::payload::exact::Corrections;
 use super::read::Reader;
-use crate::mt::EdgeMt;
 use crate::mt::ErrorCode;
 use crate::mt::Mt;
 use crate::mt::MtInfo;
-use crate::mt::MtKind;
 use crate::mt::MtRef;
 use crate::mt::MultiTessellation;
 use crate::mt::PageError;
-use crate::mt::VertexId;
-use crate::mt::VertexSplit;
 use std::ops::Range;
 
 /// Most bytes that are kept allocated between sections.
@@ -161,14 +156,14 @@ impl FileHead {
         open.seen = expected + 1;
         let (Some(place), Some(models)) = (self.place(expected), &self.models) else { return Ok(()) };
         let mut source = Source::new(content, models)?;
-        open.fields[place] = Some(edge::read_field(&mut source, open.updates.len() as u32)?);
+        open.fields[place] = Some(open.shared.read_field(&mut source, open.updates.len() as u32)?);
         source.end()
     }
 
     /// The largest error that an update can have which is not in the MT.
-    fn largest_of_others(&self, mt: &EdgeMt) -> ErrorCode {
+    fn largest_of_others(&self, has_page: impl Fn(u32) -> bool) -> ErrorCode {
         let Some(index) = &self.index else { return ErrorCode::MAX };
-        let absent = (0..).zip(&index.blocks).filter(|(page, _)| !mt.has_page(*page));
+        let absent = (0..).zip(&index.blocks).filter(|(page, _)| !has_page(*page));
         let errors = absent.flat_map(|(_, block)| self.wanted.iter().map(|&field| block.errors[field]));
         errors.max().unwrap_or(ErrorCode::ZERO)
     }
@@ -179,7 +174,7 @@ impl FileHead {
 struct OpenBlock {
     block: u32,
     updates: Range<u32>,
-    splits: Splits,
+    shared: Shared,
     /// How many fields have been seen.
     seen: usize,
     /// The wanted ones of them.
@@ -296,7 +291,7 @@ impl Decoder {
 
     /// Whether all is there that comes in front of the blocks, and these may come in any order.
     pub fn takes_blocks(&self) -> bool {
-        matches!(self.mt, Some(Mt::Edge(_))) && self.head.base_fields == self.head.fields()
+        matches!(self.mt, Some(Mt::Edge(_) | Mt::HalfEdge(_))) && self.head.base_fields == self.head.fields()
     }
 
     /// The block of which a range of [`Decoder::block_ranges`] begins at this byte of the file.
@@ -320,10 +315,11 @@ impl Decoder {
     pub fn take_block(&mut self, block: u32, bytes: &[u8]) -> Result<(), FormatError> {
         let offset = self.block_ranges(block).first().map_or(0, |range| range.start);
         let corrupt = |what| FormatError::Corrupt { offset, what };
-        let (Some(Mt::Edge(_)), Some(info)) = (&self.mt, self.head.info.as_ref()) else {
+        let info = self.head.info.as_ref().filter(|info| info.kind.is_paged());
+        let (Some(_), Some(info)) = (&self.mt, info) else {
             return Err(corrupt("there is no base mesh that blocks could be added to one by one"));
         };
-        let (fields, kinds) = (info.fields.len(), [Kind::UPDT, Kind::FLDU]);
+        let (fields, kinds) = (info.fields.len(), [payload::section_of(info.kind), Kind::FLDU]);
         let mut open = None;
         let mut rest = bytes;
         for part in (0..=fields).filter(|&part| part == 0 || self.head.place(part - 1).is_some()) {
@@ -343,7 +339,7 @@ impl Decoder {
             }
             let content = Reader::new(payload, at + HEAD_BYTES as u64);
             if part == 0 {
-                open = Some(self.read_splits(content, Some(block))?);
+                open = Some(self.read_shared(content, Some(block))?);
             } else if let Some(open) = &mut open {
                 self.head.read_field(open, content, Some(part - 1))?;
             }
@@ -366,7 +362,12 @@ impl Decoder {
         match &mut self.mt {
             Some(Mt::Edge(mt)) => {
                 mt.remove_page(block)?;
-                mt.set_to_come(self.head.largest_of_others(mt));
+                mt.set_to_come(self.head.largest_of_others(|page| mt.has_page(page)));
+                Ok(())
+            }
+            Some(Mt::HalfEdge(mt)) => {
+                mt.remove_page(block)?;
+                mt.set_to_come(self.head.largest_of_others(|page| mt.has_page(page)));
                 Ok(())
             }
             _ => Err(PageError::Absent { page: block }),
@@ -494,8 +495,12 @@ impl Decoder {
             Kind::MODL => self.open_models(content)?,
             Kind::BASE => self.open_base(content)?,
             Kind::FLDB => self.open_base_field(content)?,
-            Kind::UPDT if self.block.is_none() => {
-                let open = self.read_splits(content, None)?;
+            Kind::UPDT | Kind::HALF if self.block.is_none() => {
+                let expected = self.head.info.as_ref().map(|info| payload::section_of(info.kind));
+                if expected != Some(head.kind) {
+                    return Err(out_of_place());
+                }
+                let open = self.read_shared(content, None)?;
                 self.next_block += 1;
                 self.block = Some(open);
             }
@@ -526,7 +531,7 @@ impl Decoder {
             let known = info.fields.iter().map(|field| field.name.clone()).collect();
             return Err(FormatError::Field { name: name.clone(), known });
         }
-        let all = names.is_empty() || info.kind != MtKind::Edge;
+        let all = names.is_empty() || !info.kind.is_paged();
         let is_wanted = |f: &usize| all || names.contains(&info.fields[*f].name);
         self.head.wanted = (0..info.fields.len()).filter(is_wanted).collect();
         if !self.options.in_parts {
@@ -542,7 +547,7 @@ impl Decoder {
         let FileHead { info: Some(info), index: index @ None, .. } = &mut self.head else {
             return Err(content.corrupt("a section is out of place"));
         };
-        let parts = if info.kind == MtKind::Edge { 1 + info.fields.len() } else { 1 };
+        let parts = if info.kind.is_paged() { 1 + info.fields.len() } else { 1 };
         *index = Some(Index::read(content, info, parts)?);
         self.head.index_end = self.bytes;
         Ok(())
@@ -558,6 +563,7 @@ impl Decoder {
 
     fn open_base(&mut self, content: Reader<'_>) -> Result<(), FormatError> {
         let in_place = self.head.base.is_none() && self.head.base_fields == 0 && self.mt.is_none();
+        let bits = self.head.index.as_ref().map_or(0, |index| index.block_bits);
         let FileHead { info: Some(info), models: Some(models), base, .. } = &mut self.head else {
             return Err(content.corrupt("a section is out of place"));
         };
@@ -565,7 +571,7 @@ impl Decoder {
             return Err(content.corrupt("a section is out of place"));
         }
         let updates = if self.options.in_parts { 0 } else { info.updates };
-        *base = Some(payload::read_base(content, info, models, updates, &self.options.limits)?);
+        *base = Some(payload::read_base(content, info, models, updates, bits, &self.options.limits)?);
         Ok(())
     }
 
@@ -583,7 +589,12 @@ impl Decoder {
         if self.head.base.as_ref().is_some_and(|base| base.fields() == self.head.wanted.len()) {
             let bits = self.head.index.as_ref().map_or(0, |index| index.block_bits);
             if let (Some(base), Some(info)) = (self.head.base.take(), self.head.wanted_info()) {
-                let (mt, state) = base.start(info, bits)?;
+                let (mut mt, state) = base.start(info, bits)?;
+                if let (Mt::HalfEdge(mt), Some(index)) = (&mut mt, &self.head.index) {
+                    let wanted = &self.head.wanted;
+                    let of_block = |block: &BlockInfo| wanted.iter().map(|&f| block.errors[f]).collect::<Vec<_>>();
+                    mt.set_page_bounds(index.blocks.iter().flat_map(of_block).collect());
+                }
                 (self.mt, self.state) = (Some(mt), state);
             }
         }
@@ -611,16 +622,16 @@ impl Decoder {
         Ok((block, updates))
     }
 
-    fn read_splits(&self, mut content: Reader<'_>, expected: Option<u32>) -> Result<OpenBlock, FormatError> {
+    fn read_shared(&self, mut content: Reader<'_>, expected: Option<u32>) -> Result<OpenBlock, FormatError> {
         let (block, updates) = self.next_updates(&mut content, expected)?;
-        let (Some(Mt::Edge(mt)), Some(models)) = (&self.mt, &self.head.models) else {
+        let (Some(mt), Some(models)) = (&self.mt, &self.head.models) else {
             return Err(content.corrupt("a section is out of place"));
         };
         let mut source = Source::new(content, models)?;
-        let splits = edge::read(&mut source, mt, updates.start, updates.len() as u32)?;
+        let shared = Shared::read(&mut source, mt, updates.clone(), &self.options.limits)?;
         source.end()?;
         let fields = self.head.wanted.iter().map(|_| None).collect();
-        Ok(OpenBlock { block, updates, splits, seen: 0, fields })
+        Ok(OpenBlock { block, updates, shared, seen: 0, fields })
     }
 
     fn open_field(&mut self, content: Reader<'_>) -> Result<(), FormatError> {
@@ -637,29 +648,15 @@ impl Decoder {
 
     /// Adds a block that is complete.
     fn insert(&mut self, open: OpenBlock) -> Result<(), FormatError> {
-        let Some(Mt::Edge(mt)) = &mut self.mt else { return Ok(()) };
-        let OpenBlock { block, splits, fields, .. } = open;
+        let OpenBlock { block, shared, fields, .. } = open;
         let fields: Vec<FieldPart> = fields.into_iter().flatten().collect();
-        let count = splits.vertices.len();
-        let residuals: Vec<i32> =
-            (0..count).flat_map(|k| fields.iter().map(move |field| field.residuals[k])).collect();
-        let errors: Vec<ErrorCode> =
-            (0..count).flat_map(|k| fields.iter().map(move |field| field.errors[k])).collect();
-        let stride = fields.len().max(1);
-        let parts = residuals.chunks(stride).zip(errors.chunks(stride));
-        let all: Vec<VertexSplit<'_>> = (0..count)
-            .zip(parts)
-            .map(|(k, (field_offsets, errors))| VertexSplit {
-                vertex: VertexId(splits.vertices[k]),
-                offset: splits.offsets[k].0,
-                edge: splits.offsets[k].1,
-                field_offsets,
-                mask: splits.masks[k],
-                errors,
-            })
-            .collect();
-        mt.insert_page(block, &all)?;
-        mt.set_to_come(self.head.largest_of_others(mt));
+        let Some(mt) = &mut self.mt else { return Ok(()) };
+        shared.insert(mt, block, &fields)?;
+        match mt {
+            Mt::Edge(mt) => mt.set_to_come(self.head.largest_of_others(|page| mt.has_page(page))),
+            Mt::HalfEdge(mt) => mt.set_to_come(self.head.largest_of_others(|page| mt.has_page(page))),
+            _ => {}
+        }
         Ok(())
     }
 

@@ -14,7 +14,6 @@ use super::header::header;
 use super::payload;
 use super::payload::State;
 use super::payload::Totals;
-use super::payload::edge;
 use super::payload::exact::Corrections;
 use super::payload::index::Index;
 use super::payload::index::MAX_BLOCK_BITS;
@@ -135,7 +134,7 @@ pub fn encode_to<'a>(
     let mt = mt.into();
     check(mt, options)?;
     let Survey { blocks, coded, reference } = Survey::of(mt, options.block_bits)?;
-    let mt = coded.as_ref().map_or(mt, MtRef::Edge);
+    let mt = coded.as_ref().map_or(mt, MtRef::from);
     let mut index = Index { block_bits: options.block_bits, shared: 0, blocks };
     index.round(mt.info());
     let exact = corrections(mt, &options.exact, &reference)?;
@@ -293,9 +292,9 @@ fn put_all(out: &mut impl Put, mt: MtRef<'_>, block_bits: u32) -> Result<(), Enc
     let mut first = 0;
     while first < mt.updates() {
         let end = mt.updates().min(first + (1 << block_bits));
-        if let MtRef::Edge(mt) = mt {
-            edge::put(out, mt, first, end);
-            (0..fields).for_each(|f| edge::put_field(out, mt, first, end, f));
+        if mt.info().kind.is_paged() {
+            payload::put_shared(out, mt, first..end);
+            (0..fields).for_each(|f| payload::put_field(out, mt, first..end, f));
         } else {
             payload::put_updates(out, mt, first..end, state.as_mut()).map_err(EncodeError::Update)?;
         }
@@ -339,20 +338,20 @@ fn put_block(
     sections: &mut Vec<Section>,
 ) -> Result<(), EncodeError> {
     let updates = index.updates(block, mt.updates());
-    let MtRef::Edge(edge) = mt else {
-        let kind = payload::section_of(mt.info().kind);
+    let kind = payload::section_of(mt.info().kind);
+    if !mt.info().kind.is_paged() {
         let mut done = Ok(());
         sections.push(Section::coded(kind, &[block], models, |out| {
             done = payload::put_updates(out, mt, updates, state);
         })?);
         return done.map_err(EncodeError::Update);
-    };
-    sections.push(Section::coded(Kind::UPDT, &[block], models, |out| {
-        edge::put(out, edge, updates.start, updates.end);
+    }
+    sections.push(Section::coded(kind, &[block], models, |out| {
+        payload::put_shared(out, mt, updates.clone());
     })?);
     for field in 0..mt.info().fields.len() {
         sections.push(Section::coded(Kind::FLDU, &[block, field as u32], models, |out| {
-            edge::put_field(out, edge, updates.start, updates.end, field);
+            payload::put_field(out, mt, updates.clone(), field);
         })?);
     }
     Ok(())

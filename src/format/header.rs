@@ -5,7 +5,9 @@ use super::FormatError;
 /// First bytes of every MT file. The high bit, CR LF and Ctrl-Z show transfers that meddle with text.
 pub const MAGIC: [u8; 8] = *b"\x89TLOD\r\n\x1a";
 /// Major and minor version of the files that this module writes.
-pub const VERSION: [u16; 2] = [2, 0];
+pub const VERSION: [u16; 2] = [3, 0];
+/// The oldest major version that is read: files of version 2 are those of version 3 without half-edge MTs.
+const OLDEST: u16 = 2;
 /// Bytes of the file header.
 pub const HEADER_BYTES: usize = 32;
 /// Bytes of a section's head.
@@ -43,7 +45,7 @@ pub fn parse_header(bytes: &[u8; HEADER_BYTES]) -> Result<Option<u64>, FormatErr
         return Err(FormatError::Corrupt { offset: 0, what: "the checksum of the header does not match" });
     }
     let found = [u16_at(8), u16_at(10)];
-    if found[0] != VERSION[0] {
+    if !(OLDEST..=VERSION[0]).contains(&found[0]) {
         return Err(FormatError::UnsupportedVersion { found, supported: VERSION });
     }
     if u32_at(12) & CRITICAL_FLAGS != 0 {
@@ -75,6 +77,7 @@ impl Kind {
     pub const UPDT: Self = Self(*b"UPDT");
     pub const INSV: Self = Self(*b"INSV");
     pub const EXPL: Self = Self(*b"EXPL");
+    pub const HALF: Self = Self(*b"HALF");
     /// Exact values: those who do not know it do without.
     pub const EXACT: Self = Self(*b"fldx");
     pub const ENDF: Self = Self(*b"ENDF");
@@ -82,7 +85,7 @@ impl Kind {
     /// Whether this reader knows what is in the section.
     pub fn is_known(self) -> bool {
         let head = [Self::INFO, Self::INDX, Self::MODL, Self::BASE, Self::FLDB];
-        let blocks = [Self::UPDT, Self::FLDU, Self::INSV, Self::EXPL, Self::EXACT, Self::ENDF];
+        let blocks = [Self::UPDT, Self::HALF, Self::FLDU, Self::INSV, Self::EXPL, Self::EXACT, Self::ENDF];
         head.contains(&self) || blocks.contains(&self)
     }
 

@@ -5,6 +5,8 @@ use super::payload::index::BlockInfo;
 use crate::mt::Applied;
 use crate::mt::CurrentMesh;
 use crate::mt::EdgeMt;
+use crate::mt::HalfEdgeMt;
+use crate::mt::Mt;
 use crate::mt::MtRef;
 use crate::mt::MultiTessellation;
 use crate::mt::UpdateError;
@@ -15,8 +17,8 @@ use std::collections::BTreeSet;
 pub struct Survey {
     /// The blocks of `2^block_bits` updates; their lengths are not known yet.
     pub blocks: Vec<BlockInfo>,
-    /// An edge-based MT in the form that files have, if it was not in that form.
-    pub coded: Option<EdgeMt>,
+    /// The MT in the form that files have, if it was not in that form.
+    pub coded: Option<Mt>,
     /// For each vertex of the reference mesh, ascending, its number and its levels.
     pub reference: Vec<(u32, Vec<i32>)>,
 }
@@ -26,6 +28,7 @@ impl Survey {
         match mt {
             MtRef::Edge(mt) => survey_edge(mt, block_bits),
             MtRef::Vertex(mt) => run(mt, block_bits, &mut |_, _| Ok(())),
+            MtRef::HalfEdge(mt) => survey_half_edge(mt, block_bits),
             MtRef::Explicit(mt) => run(mt, block_bits, &mut |_, _| Ok(())),
         }
     }
@@ -39,7 +42,16 @@ fn survey_edge(mt: &EdgeMt, block_bits: u32) -> Result<Survey, EncodeError> {
     let mut residuals = Vec::new();
     let survey =
         run(mt, block_bits, &mut |mesh, u| coded.push(&mt.told(mesh, u, &mut residuals)?).map(drop))?;
-    Ok(Survey { coded: Some(coded), ..survey })
+    Ok(Survey { coded: Some(coded.into()), ..survey })
+}
+
+/// Blocks are pages, and do not tell on which others they depend: each can be used without.
+fn survey_half_edge(mt: &HalfEdgeMt, block_bits: u32) -> Result<Survey, EncodeError> {
+    let coded = (mt.page_bits() != block_bits).then(|| mt.in_pages(block_bits));
+    let coded = coded.transpose().map_err(EncodeError::Update)?.map(Mt::from);
+    let mut survey = run(mt, block_bits, &mut |_, _| Ok(()))?;
+    survey.blocks.iter_mut().for_each(|block| block.parents.clear());
+    Ok(Survey { coded, ..survey })
 }
 
 /// Called before each update with the mesh that has all of its parents.

@@ -7,6 +7,7 @@ use super::CurrentMesh;
 use super::EdgeMt;
 use super::ErrorCode;
 use super::ExplicitMt;
+use super::HalfEdgeMt;
 use super::LookAtTet;
 use super::MtInfo;
 use super::MultiTessellation;
@@ -23,6 +24,8 @@ pub enum Mt {
     Edge(EdgeMt),
     /// A compact vertex-based MT.
     Vertex(VertexMt),
+    /// A compact half-edge MT.
+    HalfEdge(HalfEdgeMt),
     /// An explicit MT.
     Explicit(ExplicitMt),
 }
@@ -33,6 +36,7 @@ macro_rules! each {
         match $mt {
             Mt::Edge($inner) => $do,
             Mt::Vertex($inner) => $do,
+            Mt::HalfEdge($inner) => $do,
             Mt::Explicit($inner) => $do,
         }
     };
@@ -50,6 +54,12 @@ impl From<VertexMt> for Mt {
     }
 }
 
+impl From<HalfEdgeMt> for Mt {
+    fn from(mt: HalfEdgeMt) -> Self {
+        Self::HalfEdge(mt)
+    }
+}
+
 impl From<ExplicitMt> for Mt {
     fn from(mt: ExplicitMt) -> Self {
         Self::Explicit(mt)
@@ -61,6 +71,44 @@ impl Mt {
     /// nothing once all are here.
     pub fn set_to_come(&mut self, bound: ErrorCode) {
         each!(self, mt => mt.set_to_come(bound));
+    }
+}
+
+impl Mt {
+    /// Whether pages of updates can come and go one by one.
+    pub fn is_paged(&self) -> bool {
+        matches!(self, Self::Edge(_) | Self::HalfEdge(_))
+    }
+
+    /// Whether a page is here. False for kinds without pages.
+    pub fn has_page(&self, page: u32) -> bool {
+        match self {
+            Self::Edge(mt) => mt.has_page(page),
+            Self::HalfEdge(mt) => mt.has_page(page),
+            _ => false,
+        }
+    }
+
+    /// Bytes of the pages that are here.
+    pub fn page_bytes(&self) -> u64 {
+        match self {
+            Self::Edge(mt) => mt.page_bytes(),
+            Self::HalfEdge(mt) => mt.page_bytes(),
+            _ => 0,
+        }
+    }
+
+    /// Bytes that an update of a page takes in memory, or most likely does.
+    pub fn update_bytes(&self) -> u64 {
+        match self {
+            Self::HalfEdge(mt) => HalfEdgeMt::usual_update_bytes(mt.info()),
+            mt => EdgeMt::update_bytes(mt.info()),
+        }
+    }
+
+    /// Whether a page can be used only when those on which it depends are here.
+    pub fn needs_parents(&self) -> bool {
+        !matches!(self, Self::HalfEdge(_))
     }
 }
 
@@ -120,6 +168,20 @@ impl MultiTessellation for Mt {
     #[inline]
     fn remover(&self, mesh: &CurrentMesh, t: u32) -> Option<UpdateId> {
         each!(self, mt => MultiTessellation::remover(mt, mesh, t))
+    }
+
+    #[inline]
+    fn awaited(&self, mesh: &CurrentMesh, t: u32) -> Option<UpdateId> {
+        each!(self, mt => mt.awaited(mesh, t))
+    }
+
+    fn awaited_errors(&self, mesh: &CurrentMesh, t: u32) -> Option<&[ErrorCode]> {
+        each!(self, mt => mt.awaited_errors(mesh, t))
+    }
+
+    #[inline]
+    fn start_at(&self, mesh: &mut CurrentMesh, t: u32) {
+        each!(self, mt => mt.start_at(mesh, t));
     }
 
     #[inline]
@@ -195,6 +257,8 @@ pub enum MtRef<'a> {
     Edge(&'a EdgeMt),
     /// A compact vertex-based MT.
     Vertex(&'a VertexMt),
+    /// A compact half-edge MT.
+    HalfEdge(&'a HalfEdgeMt),
     /// An explicit MT.
     Explicit(&'a ExplicitMt),
 }
@@ -204,6 +268,7 @@ impl<'a> From<&'a Mt> for MtRef<'a> {
         match mt {
             Mt::Edge(mt) => Self::Edge(mt),
             Mt::Vertex(mt) => Self::Vertex(mt),
+            Mt::HalfEdge(mt) => Self::HalfEdge(mt),
             Mt::Explicit(mt) => Self::Explicit(mt),
         }
     }
@@ -221,6 +286,12 @@ impl<'a> From<&'a VertexMt> for MtRef<'a> {
     }
 }
 
+impl<'a> From<&'a HalfEdgeMt> for MtRef<'a> {
+    fn from(mt: &'a HalfEdgeMt) -> Self {
+        Self::HalfEdge(mt)
+    }
+}
+
 impl<'a> From<&'a ExplicitMt> for MtRef<'a> {
     fn from(mt: &'a ExplicitMt) -> Self {
         Self::Explicit(mt)
@@ -233,6 +304,7 @@ impl MtRef<'_> {
         match self {
             Self::Edge(mt) => mt.info(),
             Self::Vertex(mt) => mt.info(),
+            Self::HalfEdge(mt) => mt.info(),
             Self::Explicit(mt) => mt.info(),
         }
     }
@@ -242,6 +314,7 @@ impl MtRef<'_> {
         match self {
             Self::Edge(mt) => mt.base(),
             Self::Vertex(mt) => mt.base(),
+            Self::HalfEdge(mt) => mt.base(),
             Self::Explicit(mt) => mt.base_mesh(),
         }
     }
@@ -251,6 +324,7 @@ impl MtRef<'_> {
         match self {
             Self::Edge(mt) => mt.updates(),
             Self::Vertex(mt) => mt.updates(),
+            Self::HalfEdge(mt) => mt.updates(),
             Self::Explicit(mt) => mt.updates(),
         }
     }
@@ -259,6 +333,7 @@ impl MtRef<'_> {
     pub fn present(&self) -> u32 {
         match self {
             Self::Edge(mt) => mt.present(),
+            Self::HalfEdge(mt) => mt.present(),
             Self::Vertex(mt) => mt.updates(),
             Self::Explicit(mt) => mt.updates(),
         }

@@ -2,6 +2,7 @@
 
 use super::EdgeMt;
 use super::ExplicitMt;
+use super::HalfEdgeMt;
 use super::MAX_STAR;
 use super::Mt;
 use super::MtKind;
@@ -73,6 +74,9 @@ impl Mt {
             _ if from == to => Ok(self.clone()),
             (_, MtKind::Explicit) => Ok(Self::Explicit(ExplicitMt::of(self)?)),
             (Self::Explicit(mt), MtKind::Vertex) => Ok(Self::Vertex(VertexMt::from_explicit(mt)?)),
+            (Self::Explicit(mt), MtKind::HalfEdge) => {
+                Ok(Self::HalfEdge(HalfEdgeMt::from_explicit(mt, super::PAGE_BITS)?))
+            }
             (Self::Explicit(mt), MtKind::Edge) => Ok(Self::Edge(EdgeMt::from_explicit(mt)?)),
             _ => Err(ConvertError::Kinds { from, to }),
         }

@@ -14,6 +14,8 @@ use super::MAX_STAR;
 use super::MtInfo;
 use super::Sparse;
 use super::VertexId;
+use super::half_edge_apply::Scratch;
+use super::half_edge_star::KnownStars;
 use super::insertion::Cavity;
 use super::ring::HALF_CAPACITY;
 use super::ring::HalfStar;
@@ -52,6 +54,10 @@ pub struct CurrentMesh {
     pub(crate) fields: usize,
     /// What the MT knows each tetrahedron by; without entries for kinds of MT that need none.
     tags: Vec<u32>,
+    /// For kinds of MT that need it: bit `i` tells that the update which removes the tetrahedron removes its face `i`, too.
+    inner: Vec<u8>,
+    /// Whether every vertex that is not of the base mesh has a star whose tetrahedra hang together through faces.
+    whole_stars: bool,
     /// For each tag a tetrahedron that has it, [`NONE`] if none does: the last that got it.
     place_of: Vec<u32>,
     /// What is taken, for kinds of MT whose updates are spelled out.
@@ -65,6 +71,9 @@ pub struct CurrentMesh {
     epoch: u32,
     ring: Option<Box<Ring>>,
     cavity: Option<Box<Cavity>>,
+    scratch: Option<Box<Scratch>>,
+    /// For half-edge MTs.
+    pub(super) stars: KnownStars,
     changed_vertices: Changes,
     changed_tets: Changes,
     /// The tetrahedra of the stars that updates changed since the list was last cleared, and where others were moved;
@@ -141,6 +150,8 @@ impl CurrentMesh {
             slot_of,
             fields: info.fields.len(),
             tags: Vec::new(),
+            inner: Vec::new(),
+            whole_stars: false,
             place_of: Vec::new(),
             taken: None,
             free_vertices: Vec::new(),
@@ -150,6 +161,8 @@ impl CurrentMesh {
             epoch: 0,
             ring: None,
             cavity: None,
+            scratch: None,
+            stars: KnownStars::default(),
             changed_vertices: Changes::all(vertices),
             changed_tets: Changes::all(base.tets.len()),
             touched: Vec::new(),
@@ -225,6 +238,29 @@ impl CurrentMesh {
         }
     }
 
+    /// Gives every tetrahedron a tag and says which of its faces go with it. Every vertex that updates insert must have a
+    /// star whose tetrahedra hang together through faces.
+    pub(super) fn mark_all(&mut self, marks: impl IntoIterator<Item = (u32, u8)>) {
+        let (tags, inner): (Vec<u32>, Vec<u8>) = marks.into_iter().unzip();
+        self.tag_all(tags);
+        self.inner = inner;
+        self.inner.resize(self.tets.len(), 0);
+        self.whole_stars = true;
+    }
+
+    /// Which faces of tetrahedron `t` the update that removes it removes, too.
+    #[inline]
+    pub(super) fn inner(&self, t: u32) -> u8 {
+        self.inner[t as usize]
+    }
+
+    /// Gives tetrahedron `t` a tag, and says which of its faces go with it.
+    #[inline]
+    pub(super) fn set_mark(&mut self, t: u32, tag: u32, inner: u8) {
+        self.set_tag(t, tag);
+        self.inner[t as usize] = inner;
+    }
+
     /// Whether tetrahedra have tags.
     #[inline]
     fn is_tagged(&self) -> bool {
@@ -265,6 +301,9 @@ impl CurrentMesh {
         if self.is_tagged() {
             let tag = self.tags[from as usize];
             self.tags[to as usize] = tag;
+            if self.whole_stars {
+                self.inner[to as usize] = self.inner[from as usize];
+            }
             if let Some(place) = self.place_of.get_mut(tag as usize).filter(|place| **place == from) {
                 *place = to;
             }
@@ -292,6 +331,7 @@ impl CurrentMesh {
         let tets = size_of_val(&self.tets[..])
             + size_of_val(&self.neighbors[..])
             + size_of_val(&self.tags[..])
+            + size_of_val(&self.inner[..])
             + size_of_val(&self.marks[..])
             + size_of_val(&self.free_tets[..])
             + size_of_val(&self.touched[..]);
@@ -303,8 +343,9 @@ impl CurrentMesh {
         let changes =
             size_of_val(&self.changed_vertices.blocks[..]) + size_of_val(&self.changed_tets.blocks[..]);
         let scratch = self.ring.as_ref().map_or(0, |ring| size_of_val(&**ring))
-            + self.cavity.as_ref().map_or(0, |cavity| size_of_val(&**cavity));
-        (vertices + tets + of_the_mt + changes + scratch) as u64
+            + self.cavity.as_ref().map_or(0, |cavity| size_of_val(&**cavity))
+            + self.scratch.as_ref().map_or(0, |scratch| size_of_val(&**scratch));
+        (vertices + tets + of_the_mt + changes + scratch) as u64 + self.stars.bytes()
     }
 
     /// Number of tetrahedron slots, holes included; see [`CurrentMesh::tet`].
@@ -361,7 +402,7 @@ impl CurrentMesh {
         let mut moves = Vec::new();
         while let Some(hole) = self.free_vertices.pop() {
             match self.fill_vertex(hole) {
-                Some([from, to]) if !self.is_tagged() => self.rename(from, to),
+                Some([from, to]) if !self.is_tagged() || self.whole_stars => self.rename(from, to),
                 moved => moves.extend(moved),
             }
         }
@@ -401,6 +442,7 @@ impl CurrentMesh {
     fn pop_tet(&mut self) {
         self.tets.pop();
         self.tags.pop();
+        self.inner.pop();
         self.neighbors.pop();
         self.marks.pop();
     }
@@ -667,7 +709,41 @@ impl CurrentMesh {
         vertices.map(|v| self.labels[v as usize].vertex).max().unwrap_or(0)
     }
 
-    fn next_epoch(&mut self) {
+    /// The number that tetrahedron `t` has got since [`Self::next_epoch`]; if it has none it gets `number`, below
+    /// [`GATHERED`].
+    #[inline]
+    pub(super) fn number_tet(&mut self, t: u32, number: u32) -> Option<u32> {
+        let mark = self.epoch << MARK_BITS;
+        let old = std::mem::replace(&mut self.marks[t as usize], mark | number);
+        if old & !MARK_MASK != mark {
+            return None;
+        }
+        self.marks[t as usize] = old;
+        Some(old & MARK_MASK)
+    }
+
+    /// The number that tetrahedron `t` has got since [`Self::next_epoch`], if it has one.
+    #[inline]
+    pub(super) fn tet_number(&self, t: u32) -> Option<u32> {
+        let mark = self.marks[t as usize];
+        (mark >> MARK_BITS == self.epoch).then_some(mark & MARK_MASK)
+    }
+
+    /// The number that the vertex in `slot` has got since [`Self::next_epoch`]; if it has none it gets `number`, below
+    /// [`GATHERED`].
+    #[inline]
+    pub(super) fn number_slot(&mut self, slot: u32, number: u32) -> Option<u32> {
+        let mark = self.epoch << MARK_BITS;
+        let old = std::mem::replace(&mut self.vertex_marks[slot as usize], mark | number);
+        if old & !MARK_MASK != mark {
+            return None;
+        }
+        self.vertex_marks[slot as usize] = old;
+        Some(old & MARK_MASK)
+    }
+
+    /// Forgets all marks and numbers of tetrahedra and vertices.
+    pub(super) fn next_epoch(&mut self) {
         self.epoch += 1;
         if self.epoch == EPOCHS {
             self.marks.fill(0);
@@ -780,6 +856,9 @@ impl CurrentMesh {
         if self.is_tagged() {
             self.tags.resize(grown, NONE);
         }
+        if self.whole_stars {
+            self.inner.resize(grown, 0);
+        }
         slots.iter().for_each(|&t| self.changed_tets.mark(t));
     }
 
@@ -790,6 +869,24 @@ impl CurrentMesh {
 
     pub(super) fn put_back_cavity(&mut self, cavity: Box<Cavity>) {
         self.cavity = Some(cavity);
+    }
+
+    /// Lends the scratch space of half-edge insertions.
+    pub(super) fn take_scratch(&mut self) -> Box<Scratch> {
+        self.scratch.take().unwrap_or_default()
+    }
+
+    pub(super) fn put_back_scratch(&mut self, scratch: Box<Scratch>) {
+        self.scratch = Some(scratch);
+    }
+
+    /// Makes `t` the tetrahedron that [`Self::tagged`] finds for its tag.
+    #[inline]
+    pub(super) fn place_tag(&mut self, t: u32) {
+        let tag = self.tags[t as usize];
+        if let Some(place) = self.place_of.get_mut(tag as usize) {
+            *place = t;
+        }
     }
 
     /// Lends the scratch space for splits.
@@ -810,6 +907,9 @@ impl CurrentMesh {
             self.marks.push(0);
             if self.is_tagged() {
                 self.tags.push(NONE);
+            }
+            if self.whole_stars {
+                self.inner.push(0);
             }
             self.tets.len() as u32 - 1
         });

@@ -16,6 +16,10 @@ mod errors;
 mod exact;
 mod explicit;
 mod glue;
+mod half_edge;
+mod half_edge_apply;
+mod half_edge_from;
+mod half_edge_star;
 mod insertion;
 mod predict;
 mod replay;
@@ -43,6 +47,10 @@ pub use exact::Exact;
 pub use exact::ExactValues;
 pub use explicit::{ExplicitMt, ExplicitUpdate};
 pub(crate) use glue::Glue;
+pub use half_edge::BaseMark;
+pub use half_edge::ForestChild;
+pub use half_edge::HalfEdgeMt;
+pub use half_edge::HalfEdgeUpdate;
 pub use replay::ReplayError;
 #[cfg(feature = "build")]
 pub(crate) use replay::canonical;
@@ -72,19 +80,28 @@ pub enum MtKind {
     Edge,
     /// Vertex insertions into star-shaped polyhedra; their inverse removes a vertex [§2.2, §5].
     Vertex,
+    /// Vertex insertions whose inverse collapses a vertex onto a neighbour, stored so that any part can be read without
+    /// the rest.
+    HalfEdge,
     /// Updates of any kind, every tetrahedron spelled out [§3].
     Explicit,
 }
 
 impl MtKind {
     /// All kinds.
-    pub const ALL: [Self; 3] = [Self::Edge, Self::Vertex, Self::Explicit];
+    pub const ALL: [Self; 4] = [Self::HalfEdge, Self::Edge, Self::Vertex, Self::Explicit];
 
-    /// The kind in one word: `edge`, `vertex` or `explicit`.
+    /// Whether MTs of this kind can come in pages of updates: see [`Mt::is_paged`].
+    pub fn is_paged(self) -> bool {
+        matches!(self, Self::Edge | Self::HalfEdge)
+    }
+
+    /// The kind in one word: `half-edge`, `edge`, `vertex` or `explicit`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Edge => "edge",
             Self::Vertex => "vertex",
+            Self::HalfEdge => "half-edge",
             Self::Explicit => "explicit",
         }
     }
@@ -270,6 +287,20 @@ pub trait MultiTessellation {
     /// The update that removes tetrahedron `t` of the current mesh; none if that belongs to the reference mesh (as far
     /// as it is known).
     fn remover(&self, mesh: &CurrentMesh, t: u32) -> Option<UpdateId>;
+
+    /// The update that removes tetrahedron `t` of the current mesh where that is known although the update is not here.
+    fn awaited(&self, _: &CurrentMesh, _: u32) -> Option<UpdateId> {
+        None
+    }
+
+    /// What bounds the errors of the update that removes tetrahedron `t`, field by field, where that update is not here; zeros
+    /// if it is known that there is none. None where nothing is known.
+    fn awaited_errors(&self, _: &CurrentMesh, _: u32) -> Option<&[ErrorCode]> {
+        None
+    }
+
+    /// Says that the update which removes tetrahedron `t` is going to be applied, if it can be.
+    fn start_at(&self, _: &mut CurrentMesh, _: u32) {}
 
     /// The update that created tetrahedron `t` of the current mesh in refinement; none if it is of the base mesh.
     fn creator(&self, mesh: &CurrentMesh, t: u32) -> Option<UpdateId>;

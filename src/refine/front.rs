@@ -18,6 +18,8 @@ use crate::mt::ErrorCode;
 use crate::mt::MultiTessellation;
 use crate::mt::UpdateError;
 use crate::mt::UpdateId;
+use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -46,7 +48,18 @@ pub struct Front {
     pub(super) leaves: Waiting,
     /// Updates that tetrahedra ask for, the first one last, each with the tetrahedron and for how long that asks.
     pending: Vec<Asked>,
+    /// Updates that are not here but that something waits for, each with a tetrahedron: the update removes it, or what removes
+    /// it depends on the update.
+    pub(super) awaiting: BTreeSet<(u32, u32)>,
     pub(super) ranked: Ranked,
+}
+
+/// What came of the wish to apply an update with all that it depends on.
+pub(super) enum Forced {
+    /// It is applied.
+    Applied,
+    /// It depends on an update that is not here. These others have been applied on the way to it.
+    Awaits(UpdateId, Vec<UpdateId>),
 }
 
 #[derive(Clone, Debug)]
@@ -210,6 +223,7 @@ impl Front {
             tets: Waiting::default(),
             leaves: Waiting::default(),
             pending: Vec::new(),
+            awaiting: BTreeSet::new(),
             ranked: Ranked::default(),
         })
     }
@@ -298,6 +312,7 @@ impl Front {
         self.tets.clear();
         self.leaves.clear();
         self.pending.clear();
+        self.awaiting.clear();
     }
 
     /// Takes note of updates that have arrived.
@@ -315,6 +330,10 @@ impl Front {
     /// Tells the mesh of updates that have arrived. What they remove is judged again, and nothing else.
     fn take_in(&mut self, mt: &impl MultiTessellation, updates: Range<u32>) {
         self.sum_up(mt, updates.clone());
+        while let Some(&(u, t)) = self.awaiting.range((updates.start, 0)..(updates.end, 0)).next() {
+            self.awaiting.remove(&(u, t));
+            self.tets.open(t);
+        }
         mt.reveal(&mut self.mesh, updates);
         self.open_touched();
         self.begin_again();
@@ -528,8 +547,17 @@ impl Front {
         let mut next = Some(u).filter(|&u| self.contains(u) != applied);
         let mut waiting = Vec::new();
         while let Some(u) = next {
-            let turned = if applied { mt.refine(&mut self.mesh, u) } else { mt.coarsen(&mut self.mesh, u) }?;
-            next = match turned {
+            let turned = if applied { mt.refine(&mut self.mesh, u) } else { mt.coarsen(&mut self.mesh, u) };
+            // What depends on an update that is not here is as if it were not here itself.
+            let is_cut_off = match &turned {
+                Ok(Applied::Blocked(other)) => applied && *other < u && !mt.has(*other),
+                Err(UpdateError::Missing { .. }) => applied && mt.present() < mt.info().updates,
+                _ => false,
+            };
+            if is_cut_off {
+                return Ok(());
+            }
+            next = match turned? {
                 Applied::Done => {
                     self.note(u, applied);
                     *(if applied { &mut outcome.refined } else { &mut outcome.coarsened }) += 1;
@@ -577,9 +605,18 @@ impl Front {
                 if self.contains(asked.update) {
                     continue;
                 }
-                self.force(mt, asked.update, outcome)?;
-                // It is a leaf now; those that it forced are none.
-                self.leaves.defer(asked.update.0, asked.verdict.slack, asked.verdict.dial);
+                mt.start_at(&mut self.mesh, asked.tet);
+                match self.force(mt, asked.update, outcome)? {
+                    // It is a leaf now; those that it forced are none.
+                    Forced::Applied => {
+                        self.leaves.defer(asked.update.0, asked.verdict.slack, asked.verdict.dial);
+                    }
+                    // Nothing may ask for what was forced in vain.
+                    Forced::Awaits(absent, forced) => {
+                        forced.iter().for_each(|u| self.leaves.open(u.0));
+                        self.awaiting.insert((absent.0, asked.tet));
+                    }
+                }
                 self.open_touched();
                 if !budget.holds(self.mesh.vertex_count(), self.mesh.tet_count()) {
                     return Ok(Way::Full);
@@ -660,7 +697,11 @@ impl Front {
             let Some(t) = self.tets.next() else { break };
             let Some(tet) = self.mesh.tet(t) else { continue };
             // If its update is not here, it is judged when that arrives.
-            let Some(update) = mt.remover(&self.mesh, t) else { continue };
+            let Some(update) = mt.remover(&self.mesh, t) else {
+                let awaited = mt.awaited(&self.mesh, t);
+                self.awaiting.extend(awaited.map(|u| (u.0, t)));
+                continue;
+            };
             let corners = tet.map(|v| self.mesh.positions[v as usize]);
             let (error, errors) = (mt.error(update), mt.errors(update));
             fetched.push(Open { t, tet, update, error, errors, corners });
@@ -762,14 +803,15 @@ impl Front {
         Ok((looked == Applied::Done).then_some(all))
     }
 
-    /// Applies `u` and all that it depends on.
+    /// Applies `u` and all that it depends on, unless something of that is not here.
     pub(super) fn force(
         &mut self,
         mt: &impl MultiTessellation,
         u: UpdateId,
         outcome: &mut Outcome,
-    ) -> Result<(), UpdateError> {
+    ) -> Result<Forced, UpdateError> {
         let mut stack = vec![u];
+        let mut forced = Vec::new();
         while let Some(&top) = stack.last() {
             match mt.refine(&mut self.mesh, top)? {
                 Applied::Done => {
@@ -777,13 +819,15 @@ impl Front {
                     outcome.refined += 1;
                     stack.pop();
                     outcome.forced += u64::from(!stack.is_empty());
+                    forced.push(top);
                 }
                 // Numbers fall from child to parent, so this ends.
-                Applied::Blocked(parent) if parent < top => stack.push(parent),
+                Applied::Blocked(parent) if parent < top && mt.has(parent) => stack.push(parent),
+                Applied::Blocked(parent) if parent < top => return Ok(Forced::Awaits(parent, forced)),
                 Applied::Blocked(_) => return Err(UpdateError::Error { update: top.0 }),
             }
         }
-        Ok(())
+        Ok(Forced::Applied)
     }
 
     /// Undoes `u`, none of whose children is applied.
@@ -866,16 +910,54 @@ impl Front {
         (error, excess)
     }
 
+    /// The pages that are not here but hold what removes a tetrahedron that violates the criterion, as far as what is known of
+    /// the page tells, or what such an update depends on; each with the largest excess. Only what the mesh shows at once:
+    /// more may be demanded when these have come. Ascending.
+    pub fn demanded_pages(
+        &self,
+        mt: &impl MultiTessellation,
+        criterion: &dyn Criterion,
+        page_of: impl Fn(UpdateId) -> u32,
+    ) -> BTreeMap<u32, f64> {
+        let mut pages = BTreeMap::new();
+        let mut demand = |absent: UpdateId, t: u32| {
+            let Some(tet) = self.mesh.tet(t) else { return };
+            let update = mt.remover(&self.mesh, t);
+            let errors = update.map(|u| mt.errors(u)).or_else(|| mt.awaited_errors(&self.mesh, t));
+            let Some(errors) = errors else { return };
+            let error = errors.iter().copied().fold(ErrorCode::ZERO, ErrorCode::max);
+            let verdict =
+                see(&self.mesh, &tet, error, errors, update.unwrap_or(absent), |look| criterion.rank(look));
+            if verdict.asks() {
+                let largest = pages.entry(page_of(absent)).or_insert(0.0_f64);
+                *largest = largest.max(verdict.excess);
+            }
+        };
+        if self.watched {
+            self.awaiting.iter().for_each(|&(u, t)| demand(UpdateId(u), t));
+        } else {
+            let slots = 0..self.mesh.tet_slots() as u32;
+            slots.filter_map(|t| mt.awaited(&self.mesh, t).map(|u| (u, t))).for_each(|(u, t)| demand(u, t));
+            self.awaiting.iter().for_each(|&(u, t)| demand(UpdateId(u), t));
+        }
+        pages
+    }
+
     fn violations(&self, mt: &impl MultiTessellation, criterion: &dyn Criterion) -> Violations {
+        // Where no budget is in the way, what violates the criterion waits for something.
+        let unlimited = self.ranked.has_room();
         let field = criterion.field();
         let to_come = vec![mt.to_come(); mt.info().fields.len()];
         let incomplete = mt.present() < mt.info().updates;
         let mut all = Violations { error: ErrorCode::ZERO, excess: 1.0, missing: false };
         for (t, tet) in (0..).zip(self.mesh.tets()) {
             let update = mt.remover(&self.mesh, t);
-            let missing = update.is_none() && incomplete;
-            let (error, errors) =
-                update.map_or((mt.to_come(), &to_come[..]), |u| (mt.error(u), mt.errors(u)));
+            let missing = incomplete && (update.is_none() || unlimited);
+            let (error, errors) = match (update, mt.awaited_errors(&self.mesh, t)) {
+                (Some(u), _) => (mt.error(u), mt.errors(u)),
+                (None, Some(errors)) => (errors.iter().copied().fold(ErrorCode::ZERO, ErrorCode::max), errors),
+                (None, None) => (mt.to_come(), &to_come[..]),
+            };
             // The last number there can be: nothing is added to what is wanted.
             let update = update.unwrap_or(UpdateId(mt.info().updates));
             let verdict = see(&self.mesh, tet, error, errors, update, |look| criterion.rank(look));

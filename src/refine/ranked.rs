@@ -10,6 +10,7 @@ use super::Criterion;
 use super::Front;
 use super::GoOn;
 use super::Outcome;
+use super::front::Forced;
 use super::front::creators_of_touched;
 use super::front::see;
 use crate::mt::MultiTessellation;
@@ -105,7 +106,17 @@ impl Front {
             if self.contains(u) || self.mesh.tet(t).is_none() || mt.remover(&self.mesh, t) != Some(u) {
                 continue;
             }
-            self.force(mt, u, outcome)?;
+            mt.start_at(&mut self.mesh, t);
+            if let Forced::Awaits(absent, forced) = self.force(mt, u, outcome)? {
+                self.awaiting.insert((absent.0, t));
+                self.push_touched(mt, criterion, outcome);
+                for u in forced.into_iter().rev() {
+                    if self.contains(u) && self.is_idle(mt, criterion, u, outcome)? {
+                        self.undo(mt, criterion, u, outcome)?;
+                    }
+                }
+                continue;
+            }
             // A tetrahedron asked for it, so it is queued. What it forced is blocked by it, and comes back when it goes.
             self.is_idle(mt, criterion, u, outcome)?;
             self.push_touched(mt, criterion, outcome);

@@ -8,14 +8,14 @@ use super::Session;
 use crate::format::DecodeOptions;
 use crate::format::Decoder;
 use crate::format::FormatError;
+use crate::format::Index;
 use crate::format::Progress;
-use crate::mt::EdgeMt;
 use crate::mt::ErrorCode;
 use crate::mt::Mt;
-use crate::mt::MtInfo;
-use crate::mt::MtKind;
+use crate::mt::MultiTessellation;
 use crate::mt::UpdateId;
 use crate::refine::Criterion;
+use crate::refine::Front;
 use crate::refine::TetLook;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -46,7 +46,7 @@ pub struct BlockProgress {
 }
 
 /// How many bytes are asked for at first: as a rule more than stands in front of the blocks of a small file.
-const FIRST_BYTES: u64 = 1 << 16;
+const FIRST_BYTES: u64 = 1 << 14;
 
 /// How many bytes are asked for at a time where the file has to be read from end to end.
 const LATER_BYTES: u64 = 1 << 20;
@@ -100,7 +100,7 @@ impl Session {
         if let Some(end) = self.head_missing(blocks) {
             return vec![WantedBytes { range: blocks.fed..end, priority: f64::MAX }];
         }
-        let Some(Mt::Edge(mt)) = self.decoder.mt() else { return Vec::new() };
+        let Some(mt) = self.decoder.mt().filter(|mt| mt.is_paged()) else { return Vec::new() };
         let mut wanted = Vec::new();
         for &(priority, block) in &blocks.plan {
             if mt.has_page(block) || blocks.waiting.contains_key(&block) {
@@ -115,8 +115,8 @@ impl Session {
 
     /// Up to where the file is still to be read in order; none when that is done.
     fn head_missing(&self, blocks: &Blocks) -> Option<u64> {
-        let is_edge = self.decoder.info().is_none_or(|info| info.kind == MtKind::Edge);
-        if !is_edge {
+        let is_paged = self.decoder.info().is_none_or(|info| info.kind.is_paged());
+        if !is_paged {
             return (!self.decoder.progress().complete).then_some(blocks.fed + LATER_BYTES);
         }
         match self.decoder.head_end() {
@@ -150,7 +150,7 @@ impl Session {
         let Some(block) = self.decoder.block_at(start) else { return Ok(self.progress()) };
         let ranges = self.decoder.block_ranges(block);
         let fits = ranges.iter().any(|range| range.start == start && range.end - start == bytes.len() as u64);
-        let is_here = matches!(self.decoder.mt(), Some(Mt::Edge(mt)) if mt.has_page(block));
+        let is_here = self.decoder.mt().is_some_and(|mt| mt.has_page(block));
         if !fits || is_here {
             return Ok(self.progress());
         }
@@ -212,15 +212,15 @@ impl Session {
     /// Whether a block can come without anything going.
     fn has_room_for(&self, block: u32) -> bool {
         let (Some(blocks), Some(index)) = (&self.blocks, self.decoder.index()) else { return false };
-        let Some(Mt::Edge(mt)) = self.decoder.mt() else { return false };
-        let new = page_bytes(mt.info(), index.updates(block, mt.info().updates).len());
+        let Some(mt) = self.decoder.mt() else { return false };
+        let new = page_bytes(mt, index.updates(block, mt.info().updates).len());
         mt.page_bytes() + new <= blocks.room
     }
 
     /// A block that waits for no other one.
     fn next_complete(&self) -> Option<u32> {
         let (blocks, index) = (self.blocks.as_ref()?, self.decoder.index()?);
-        let Some(Mt::Edge(mt)) = self.decoder.mt() else { return None };
+        let mt = self.decoder.mt()?;
         let ready = |block: &&u32| {
             let parents = index.blocks.get(**block as usize).map_or(&[][..], |info| &info.parents);
             parents.iter().all(|&parent| mt.has_page(parent))
@@ -230,9 +230,8 @@ impl Session {
 
     /// How the blocks stand.
     pub fn block_progress(&self) -> BlockProgress {
-        let (Some(blocks), Some(Mt::Edge(mt))) = (&self.blocks, self.decoder.mt()) else {
-            return BlockProgress::default();
-        };
+        let paged = self.decoder.mt().filter(|mt| mt.is_paged());
+        let (Some(blocks), Some(mt)) = (&self.blocks, paged) else { return BlockProgress::default() };
         let count = self.decoder.index().map_or(0, |index| index.blocks.len() as u32);
         BlockProgress {
             blocks: count,
@@ -251,42 +250,32 @@ impl Session {
         }
     }
 
+    /// Works out which blocks the request needs.
     fn plan(&mut self) {
         let (Some(blocks), Some(index)) = (&mut self.blocks, self.decoder.index()) else { return };
-        let (Some(Mt::Edge(mt)), Some(criterion)) = (self.decoder.mt(), &blocks.criterion) else { return };
-        let wanted_fields = self.decoder.wanted_fields();
-        let count = index.blocks.len();
+        let (Some(mt), Some(criterion)) = (self.decoder.mt(), &blocks.criterion) else { return };
         blocks.plans += 1;
-        blocks.last_needed.resize(count, 0);
-        let mut priorities: Vec<f64> = vec![0.0; count];
-        for at in (0..count).rev() {
-            let info = &index.blocks[at];
-            let errors: Vec<ErrorCode> = wanted_fields.iter().map(|&f| info.errors[f]).collect();
-            let ranges: Vec<[i32; 2]> = wanted_fields.iter().map(|&f| info.ranges[f]).collect();
-            let first = index.updates(at as u32, mt.info().updates).start;
-            let excess = excess(&**criterion, info.bounds, &errors, &ranges, first);
-            if excess > 1.0 {
-                // Infinite where any error is too much: then the largest errors come first.
-                let largest = errors.iter().copied().max().unwrap_or(ErrorCode::ZERO).error();
-                let gain = if excess.is_finite() { excess } else { largest.max(f64::MIN_POSITIVE) };
-                priorities[at] = priorities[at].max(gain / info.len() as f64);
-            }
-            if priorities[at] > 0.0 {
-                blocks.last_needed[at] = blocks.plans;
-                for &parent in &info.parents {
-                    priorities[parent as usize] = priorities[parent as usize].max(priorities[at]);
-                }
-            }
-        }
-        let mut plan: Vec<(f64, u32)> =
-            (0..).zip(&priorities).filter(|(_, p)| **p > 0.0).map(|(block, &p)| (p, block)).collect();
+        blocks.last_needed.resize(index.blocks.len(), 0);
+        let fields = self.decoder.wanted_fields();
+        let mut plan = match &self.front {
+            Some(front) if !mt.needs_parents() => plan_by_mesh(front, mt, &**criterion, index, fields),
+            _ => plan_by_index(mt, &**criterion, index, fields),
+        };
+        plan.iter().for_each(|&(_, block)| blocks.last_needed[block as usize] = blocks.plans);
         // What a block depends on is as important and has a smaller number.
         plan.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         blocks.needed = plan.len() as u32;
-        let mut taken = 0;
+        // Pages with applied updates do not go: what comes has to fit beside them.
+        let mut taken = match &self.front {
+            Some(front) if !mt.needs_parents() => (0..index.blocks.len() as u32)
+                .filter(|&block| mt.has_page(block) && is_in_use(front, index, mt, block))
+                .map(|block| page_bytes(mt, index.updates(block, mt.info().updates).len()))
+                .sum(),
+            _ => 0,
+        };
         let room = blocks.room;
         plan.retain(|&(_, block)| {
-            taken += page_bytes(mt.info(), index.updates(block, mt.info().updates).len());
+            taken += page_bytes(mt, index.updates(block, mt.info().updates).len());
             taken <= room
         });
         blocks.left_out = blocks.needed - plan.len() as u32;
@@ -300,6 +289,10 @@ impl Session {
     /// The mesh has moved: what it does not need any more may go, and what waited for that may come.
     pub(super) fn after_step(&mut self) -> Result<(), FormatError> {
         if self.blocks.is_some() {
+            if self.decoder.mt().is_some_and(|mt| !mt.needs_parents()) {
+                // The mesh shows now what else it needs.
+                self.plan();
+            }
             self.make_room();
             self.insert_waiting()?;
         }
@@ -309,8 +302,7 @@ impl Session {
     /// Lets blocks go that the request does not need, those first that have not been needed for longest, until what is here
     /// and what is wanted fit the room. Those of which an update is applied stay, and what these depend on.
     fn make_room(&mut self) {
-        let (Some(blocks), Some(Mt::Edge(mt)), Some(index)) =
-            (&self.blocks, self.decoder.mt(), self.decoder.index())
+        let (Some(blocks), Some(mt), Some(index)) = (&self.blocks, self.decoder.mt(), self.decoder.index())
         else {
             return;
         };
@@ -319,7 +311,7 @@ impl Session {
         for &(_, block) in &blocks.plan {
             planned[block as usize] = true;
             if !mt.has_page(block) {
-                coming += page_bytes(mt.info(), index.updates(block, mt.info().updates).len());
+                coming += page_bytes(mt, index.updates(block, mt.info().updates).len());
             }
         }
         let mut excess = (mt.page_bytes() + coming).saturating_sub(blocks.room);
@@ -343,14 +335,10 @@ impl Session {
                     continue;
                 }
                 let updates = index.updates(block, mt.info().updates);
-                if self
-                    .front
-                    .as_ref()
-                    .is_some_and(|front| updates.clone().any(|u| front.contains(UpdateId(u))))
-                {
+                if self.front.as_ref().is_some_and(|front| is_in_use(front, index, mt, block)) {
                     continue;
                 }
-                excess = excess.saturating_sub(page_bytes(mt.info(), updates.len()));
+                excess = excess.saturating_sub(page_bytes(mt, updates.len()));
                 index.blocks[block as usize].parents.iter().for_each(|&parent| held[parent as usize] -= 1);
                 leaving.push(block);
                 is_moving = true;
@@ -378,8 +366,79 @@ impl Blocks {
 }
 
 /// Bytes that so many updates take in memory.
-fn page_bytes(info: &MtInfo, updates: usize) -> u64 {
-    updates as u64 * EdgeMt::update_bytes(info)
+fn page_bytes(mt: &Mt, updates: usize) -> u64 {
+    updates as u64 * mt.update_bytes()
+}
+
+/// Whether an update of a block is applied.
+fn is_in_use(front: &Front, index: &Index, mt: &Mt, block: u32) -> bool {
+    index.updates(block, mt.info().updates).any(|u| front.contains(UpdateId(u)))
+}
+
+/// What a block promises for each of its bytes, given how often the error that it lowers exceeds what is wanted.
+fn priority(excess: f64, errors: &[ErrorCode], bytes: u64) -> f64 {
+    // Infinite where any error is too much: then the largest errors come first.
+    let largest = errors.iter().copied().max().unwrap_or(ErrorCode::ZERO).error();
+    let gain = if excess.is_finite() { excess } else { largest.max(f64::MIN_POSITIVE) };
+    gain / bytes as f64
+}
+
+/// The blocks in whose boxes something may violate the request, and those that they depend on.
+fn plan_by_index(mt: &Mt, criterion: &dyn Criterion, index: &Index, fields: &[usize]) -> Vec<(f64, u32)> {
+    let count = index.blocks.len();
+    let mut priorities: Vec<f64> = vec![0.0; count];
+    for at in (0..count).rev() {
+        let info = &index.blocks[at];
+        let errors: Vec<ErrorCode> = fields.iter().map(|&f| info.errors[f]).collect();
+        let ranges: Vec<[i32; 2]> = fields.iter().map(|&f| info.ranges[f]).collect();
+        let first = index.updates(at as u32, mt.info().updates).start;
+        let excess = excess(criterion, info.bounds, &errors, &ranges, first);
+        if excess > 1.0 {
+            priorities[at] = priorities[at].max(priority(excess, &errors, info.len()));
+        }
+        if priorities[at] > 0.0 {
+            for &parent in &info.parents {
+                priorities[parent as usize] = priorities[parent as usize].max(priorities[at]);
+            }
+        }
+    }
+    (0..).zip(&priorities).filter(|(_, p)| **p > 0.0).map(|(block, &p)| (p, block)).collect()
+}
+
+/// The blocks that are here and in use, and those that hold what tetrahedra of the mesh ask for.
+fn plan_by_mesh(
+    front: &Front,
+    mt: &Mt,
+    criterion: &dyn Criterion,
+    index: &Index,
+    fields: &[usize],
+) -> Vec<(f64, u32)> {
+    let errors_of = |block: u32| -> Vec<ErrorCode> {
+        let errors = &index.blocks[block as usize].errors;
+        fields.iter().map(|&f| errors[f]).collect()
+    };
+    if let Some(tolerances) = criterion.uniform() {
+        let asks = |errors: &[ErrorCode]| {
+            tolerances.iter().any(|tolerance| match tolerance.field {
+                Some(field) => errors.get(field).is_some_and(|&error| error > tolerance.error),
+                None => errors.iter().any(|&error| error > tolerance.error),
+            })
+        };
+        let blocks = (0..index.blocks.len() as u32).map(|block| (block, errors_of(block)));
+        let needed = blocks.filter(|(_, errors)| asks(errors));
+        return needed
+            .map(|(block, errors)| {
+                (priority(f64::INFINITY, &errors, index.blocks[block as usize].len()), block)
+            })
+            .collect();
+    }
+    let demanded = front.demanded_pages(mt, criterion, |u| u.0 >> index.block_bits);
+    let known = demanded.into_iter().filter(|(block, _)| (*block as usize) < index.blocks.len());
+    known
+        .map(|(block, excess)| {
+            (priority(excess, &errors_of(block), index.blocks[block as usize].len()), block)
+        })
+        .collect()
 }
 
 /// How often the error in a block exceeds what is wanted, at most: that of a box full of the worst that the block holds.

@@ -195,6 +195,7 @@ fn words(kind: MtKind) -> &'static str {
     match kind {
         MtKind::Edge => "edge collapse",
         MtKind::Vertex => "vertex insertion",
+        MtKind::HalfEdge => "half-edge insertion",
         MtKind::Explicit => "explicit",
     }
 }

@@ -101,7 +101,7 @@ pub struct Splits {
     pub masks: Vec<u64>,
 }
 
-/// What splits of a block do to one field.
+/// What updates of a block do to one field.
 #[derive(Clone, Debug, Default)]
 pub struct FieldPart {
     pub errors: Vec<ErrorCode>,
@@ -216,20 +216,33 @@ fn put_mask(out: &mut impl Put, mask: u64) {
 
 /// Puts what the splits `first .. end` of a coded MT do to a field.
 pub fn put_field(out: &mut impl Put, mt: &EdgeMt, first: u32, end: u32, field: usize) {
-    let codes = || (first..end).map(|k| mt.split(UpdateId(k)).errors[field].0);
+    put_changes(out, [ERROR, LEVEL], (first..end).map(UpdateId), |u| {
+        let split = mt.split(u);
+        (split.errors[field], split.field_offsets[field])
+    });
+}
+
+/// Puts errors and residuals of levels, update by update, by the families of both.
+pub fn put_changes(
+    out: &mut impl Put,
+    [error, level]: [Family; 2],
+    updates: impl Iterator<Item = UpdateId> + Clone,
+    change: impl Fn(UpdateId) -> (ErrorCode, i32),
+) {
+    let codes = updates.clone().map(|u| change(u).0.0);
     let (largest, is_fine) =
-        codes().fold((0, false), |(largest, fine), code| (largest.max(code >> 8), fine || code & 0xFF != 0));
+        codes.fold((0, false), |(largest, fine), code| (largest.max(code >> 8), fine || code & 0xFF != 0));
     out.bits(u32::from(largest), 8);
     out.bits(u32::from(is_fine), 1);
     let mut before = 0;
-    for (k, code) in (first..end).zip(codes()) {
+    for (ErrorCode(code), residual) in updates.map(change) {
         let fall = u32::from(largest - (code >> 8));
-        out.symbol(ERROR, before, fall);
+        out.symbol(error, before, fall);
         if is_fine {
             out.bits(u32::from(code & 0xFF), 8);
         }
         before = fall;
-        out.signed(LEVEL, u32::from(code >> 9), mt.split(UpdateId(k)).field_offsets[field]);
+        out.signed(level, u32::from(code >> 9), residual);
     }
 }
 
@@ -329,18 +342,22 @@ fn read_mask(source: &mut Source<'_>) -> Result<u64, FormatError> {
     Ok(mask)
 }
 
-/// Reads what the `count` splits of a block do to a field.
-pub fn read_field(source: &mut Source<'_>, count: u32) -> Result<FieldPart, FormatError> {
+/// Reads what [`put_changes`] puts of `count` updates.
+pub fn read_changes(
+    source: &mut Source<'_>,
+    [error, level]: [Family; 2],
+    count: u32,
+) -> Result<FieldPart, FormatError> {
     let largest = source.bits(8)?;
     let is_fine = source.bits(1)? == 1;
     let (mut part, mut before) = (FieldPart::default(), 0);
     for _ in 0..count {
-        let fall = source.symbol(ERROR, before)?;
+        let fall = source.symbol(error, before)?;
         let upper = largest.checked_sub(fall).ok_or_else(|| source.corrupt("an error is below zero"))?;
         let lower = if is_fine { source.bits(8)? } else { 0 };
         before = fall;
         part.errors.push(ErrorCode((upper << 8 | lower) as u16));
-        part.residuals.push(source.signed(LEVEL, upper >> 1)?);
+        part.residuals.push(source.signed(level, upper >> 1)?);
     }
     Ok(part)
 }

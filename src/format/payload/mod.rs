@@ -4,6 +4,7 @@
 mod base;
 pub mod edge;
 pub mod exact;
+pub mod half_edge;
 pub mod index;
 mod insertions;
 mod spelled;
@@ -27,11 +28,18 @@ use crate::mt::EdgeMt;
 use crate::mt::ErrorCode;
 use crate::mt::ExplicitMt;
 use crate::mt::FieldInfo;
+use crate::mt::HalfEdgeMt;
+use crate::mt::HalfEdgeUpdate;
 use crate::mt::Mt;
 use crate::mt::MtInfo;
 use crate::mt::MtKind;
 use crate::mt::MtRef;
+use crate::mt::PageError;
 use crate::mt::UpdateError;
+use crate::mt::VertexId;
+use crate::mt::VertexSplit;
+use edge::FieldPart;
+use edge::Splits;
 pub use insertions::State;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -43,7 +51,7 @@ pub type Metadata = Vec<(String, String)>;
 const MAX_INFO_BYTES: usize = 1 << 20;
 
 /// The number that stands for each kind of MT: its place here.
-const KINDS: [MtKind; 3] = [MtKind::Edge, MtKind::Vertex, MtKind::Explicit];
+const KINDS: [MtKind; 4] = [MtKind::Edge, MtKind::Vertex, MtKind::Explicit, MtKind::HalfEdge];
 
 pub fn write_info(
     out: &mut Vec<u8>,
@@ -204,6 +212,7 @@ pub fn parts(kind: MtKind) -> Vec<(&'static str, Family)> {
     let own: &[(&str, Family)] = match kind {
         MtKind::Edge => &edge::PARTS,
         MtKind::Vertex => &insertions::PARTS,
+        MtKind::HalfEdge => &half_edge::PARTS,
         MtKind::Explicit => &spelled::PARTS,
     };
     let last = [("base mesh", BASE_LEVEL), ("exact values", exact::GAP), ("exact values", exact::LENGTH)];
@@ -216,8 +225,10 @@ const BASE_LEVEL: Family = edge::LEVEL.numbers_after(1, 2);
 /// Puts what is coded of the base mesh.
 pub fn put_base(out: &mut impl Put, mt: MtRef<'_>) {
     base::put(out, mt.base());
-    if let MtRef::Vertex(mt) = mt {
-        insertions::put_head(out, mt);
+    match mt {
+        MtRef::Vertex(mt) => insertions::put_head(out, mt),
+        MtRef::HalfEdge(mt) => half_edge::put_head(out, mt),
+        _ => {}
     }
 }
 
@@ -243,6 +254,8 @@ pub struct BaseParts {
     base: BaseMesh,
     /// What files of vertex-based MTs tell besides.
     insertions: insertions::Head,
+    /// What files of half-edge MTs tell besides.
+    half_edge: half_edge::BaseHead,
     levels: Vec<Vec<i32>>,
 }
 
@@ -261,6 +274,7 @@ pub fn read_base(
     info: &MtInfo,
     models: &Models,
     updates: u32,
+    block_bits: u32,
     limits: &Limits,
 ) -> Result<BaseParts, FormatError> {
     let [vertices, tets] = [reader.varint()?, reader.varint()?];
@@ -274,6 +288,10 @@ pub fn read_base(
     let mut parts = BaseParts { base: base::read(&mut source, vertices, tets)?, ..BaseParts::default() };
     if info.kind == MtKind::Vertex {
         parts.insertions = insertions::read_head(&mut source)?;
+    }
+    if info.kind == MtKind::HalfEdge {
+        let counts = [vertices, tets].map(|count| count as usize);
+        parts.half_edge = half_edge::read_head(&mut source, info, counts, block_bits, limits)?;
     }
     source.end()?;
     Ok(parts)
@@ -300,7 +318,7 @@ impl BaseParts {
 
     /// The MT without updates, when all levels are there.
     pub fn start(self, info: MtInfo, block_bits: u32) -> Result<(Mt, Option<State>), FormatError> {
-        let Self { mut base, insertions, levels } = self;
+        let Self { mut base, insertions, half_edge, levels } = self;
         let vertices = base.positions.len();
         base.values = (0..vertices).flat_map(|v| levels.iter().map(move |levels| levels[v])).collect();
         base.check(&info)?;
@@ -309,6 +327,10 @@ impl BaseParts {
             MtKind::Vertex => {
                 let (mt, state) = insertions::start(info, base, insertions)?;
                 (mt.into(), Some(state))
+            }
+            MtKind::HalfEdge => {
+                let half_edge::BaseHead { marks, children } = half_edge;
+                (HalfEdgeMt::new(info, base, marks, &children, block_bits)?.into(), None)
             }
             MtKind::Explicit => (ExplicitMt::new(info, base).into(), None),
         })
@@ -320,6 +342,7 @@ pub fn check_counts(info: &MtInfo, base_vertices: u64) -> Result<(), BaseMeshErr
     match info.kind {
         MtKind::Edge => edge::check_counts(info, base_vertices),
         MtKind::Vertex => insertions::check_counts(info, base_vertices),
+        MtKind::HalfEdge => half_edge::check_counts(info, base_vertices),
         // How many vertices and tetrahedra there are, every update tells; they are compared at the end.
         MtKind::Explicit => Ok(()),
     }
@@ -338,6 +361,7 @@ pub fn check_memory(
     let each = match info.kind {
         MtKind::Edge => edge::update_bytes(fields),
         MtKind::Vertex => insertions::least_update_bytes(info),
+        MtKind::HalfEdge => half_edge::least_update_bytes(fields),
         MtKind::Explicit => spelled::least_update_bytes(),
     };
     check_bytes(base + u64::from(updates) * each, limits)
@@ -355,7 +379,97 @@ pub fn section_of(kind: MtKind) -> Kind {
     match kind {
         MtKind::Edge => Kind::UPDT,
         MtKind::Vertex => Kind::INSV,
+        MtKind::HalfEdge => Kind::HALF,
         MtKind::Explicit => Kind::EXPL,
+    }
+}
+
+/// Puts the updates of a block of an MT that has sections for fields, without what they do to these.
+pub fn put_shared(out: &mut impl Put, mt: MtRef<'_>, Range { start, end }: Range<u32>) {
+    match mt {
+        MtRef::Edge(mt) => edge::put(out, mt, start, end),
+        MtRef::HalfEdge(mt) => half_edge::put(out, mt, start, end),
+        _ => {}
+    }
+}
+
+/// Puts what the updates of such a block do to a field.
+pub fn put_field(out: &mut impl Put, mt: MtRef<'_>, Range { start, end }: Range<u32>, field: usize) {
+    match mt {
+        MtRef::Edge(mt) => edge::put_field(out, mt, start, end, field),
+        MtRef::HalfEdge(mt) => half_edge::put_field(out, mt, start, end, field),
+        _ => {}
+    }
+}
+
+/// The updates of a block of an MT that has sections for fields, without what they do to these.
+#[derive(Debug)]
+pub enum Shared {
+    Splits(Splits),
+    Insertions(half_edge::Insertions),
+}
+
+impl Shared {
+    /// Reads what [`put_shared`] puts.
+    pub fn read(
+        source: &mut Source<'_>,
+        mt: &Mt,
+        Range { start, end }: Range<u32>,
+        limits: &Limits,
+    ) -> Result<Self, FormatError> {
+        match mt {
+            Mt::Edge(mt) => edge::read(source, mt, start, end - start).map(Self::Splits),
+            Mt::HalfEdge(mt) => {
+                half_edge::read(source, mt.info(), mt.page_bits(), start..end, limits).map(Self::Insertions)
+            }
+            _ => Err(source.corrupt("a section is out of place")),
+        }
+    }
+
+    /// Reads what the `count` updates of the block do to a field.
+    pub fn read_field(&self, source: &mut Source<'_>, count: u32) -> Result<FieldPart, FormatError> {
+        match self {
+            Self::Splits(_) => edge::read_changes(source, [edge::ERROR, edge::LEVEL], count),
+            Self::Insertions(_) => half_edge::read_field(source, count),
+        }
+    }
+
+    /// Adds the updates to an MT as a page.
+    pub fn insert(self, mt: &mut Mt, page: u32, fields: &[FieldPart]) -> Result<(), PageError> {
+        let count = fields.first().map_or(0, |field| field.residuals.len());
+        let residuals: Vec<i32> =
+            (0..count).flat_map(|k| fields.iter().map(move |field| field.residuals[k])).collect();
+        let errors: Vec<ErrorCode> =
+            (0..count).flat_map(|k| fields.iter().map(move |field| field.errors[k])).collect();
+        let stride = fields.len().max(1);
+        let changes = (0..count).zip(residuals.chunks(stride).zip(errors.chunks(stride)));
+        match (self, mt) {
+            (Self::Splits(splits), Mt::Edge(mt)) => {
+                let all: Vec<VertexSplit<'_>> = changes
+                    .map(|(k, (field_offsets, errors))| VertexSplit {
+                        vertex: VertexId(splits.vertices[k]),
+                        offset: splits.offsets[k].0,
+                        edge: splits.offsets[k].1,
+                        field_offsets,
+                        mask: splits.masks[k],
+                        errors,
+                    })
+                    .collect();
+                mt.insert_page(page, &all)
+            }
+            (Self::Insertions(insertions), Mt::HalfEdge(mt)) => {
+                let updates: Vec<HalfEdgeUpdate<'_>> = changes
+                    .map(|(k, (level_residuals, errors))| HalfEdgeUpdate {
+                        children: &insertions.children[k],
+                        level_residuals,
+                        star: &insertions.stars[k],
+                        errors,
+                    })
+                    .collect();
+                mt.insert_page(page, &updates)
+            }
+            _ => Err(PageError::Absent { page }),
+        }
     }
 }
 
@@ -399,7 +513,7 @@ pub fn read_updates(
 /// Whether a complete MT has the reference mesh that its description tells, as far as that follows without a mesh.
 pub fn check_reference(mt: MtRef<'_>) -> Result<(), BaseMeshError> {
     match mt {
-        MtRef::Edge(_) | MtRef::Vertex(_) => Ok(()),
+        MtRef::Edge(_) | MtRef::Vertex(_) | MtRef::HalfEdge(_) => Ok(()),
         MtRef::Explicit(mt) => spelled::check_reference(mt),
     }
 }

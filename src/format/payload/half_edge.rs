@@ -1,0 +1,370 @@
+//! `HALF` of a half-edge MT: a block of vertex insertions, without what they do to fields.
+//!
+//! Nothing here needs a mesh, or another block. The vertex forest is told from the near vertex down: each update lists the
+//! updates whose near vertex is its own. What removes the tetrahedra of its star is told as residuals: see
+//! `mt/half_edge_star.rs`.
+
+use super::base;
+use super::edge;
+use super::edge::FieldPart;
+use crate::format::FormatError;
+use crate::format::Limits;
+use crate::format::coder::Family;
+use crate::format::coder::Put;
+use crate::format::coder::Source;
+use crate::mesh::NONE;
+use crate::mt::BaseMark;
+use crate::mt::BaseMeshError;
+use crate::mt::ErrorCode;
+use crate::mt::ForestChild;
+use crate::mt::HalfEdgeMt;
+use crate::mt::MtInfo;
+use crate::mt::UpdateId;
+use std::ops::Range;
+
+/// One more than the update that removes a base tetrahedron.
+pub const REMOVER: Family = base::LAST.numbers_after(1, 1);
+/// Which faces of a base tetrahedron go with it.
+pub const BASE_INNER: Family = REMOVER.after(1, 16);
+/// How many forest children a vertex has.
+pub const CHILDREN: Family = BASE_INNER.numbers_after(1, 2);
+/// How many other blocks have been named since the block of a child was named last, 0 for a new one.
+pub const BLOCK: Family = CHILDREN.numbers_after(1, 2);
+/// How far a new block lies behind that of the near vertex, or behind the last new one.
+pub const NEW_BLOCK: Family = BLOCK.numbers_after(1, 1);
+/// Distances between children in a block.
+pub const GAP: Family = NEW_BLOCK.numbers_after(1, 2);
+/// Components of offsets: the first by the length of the last offset, the others by that of those before.
+pub const OFFSET: Family = GAP.numbers_after(3 * LENGTHS, 2);
+/// How many symbols a star has.
+pub const SYMBOLS: Family = OFFSET.after(1, 256);
+/// The symbols by their number and place.
+pub const SYMBOL: Family = SYMBOLS.after(ROWS * COLUMNS, 16);
+/// How many bits a star has.
+pub const BITS: Family = SYMBOL.numbers_after(1, 4);
+/// The bits by their number and place.
+pub const BIT: Family = BITS.after(ROWS * COLUMNS, 2);
+/// How far the upper byte of an error is below the largest of its block, by that of the update before.
+pub const ERROR: Family = BIT.after(16, 256);
+/// Residuals of levels, by error.
+pub const LEVEL: Family = ERROR.numbers_after(128, 1);
+
+/// Lengths of offsets in bits that are told apart; what is longer is as long as the last.
+const LENGTHS: u32 = 22;
+
+/// All families, with names for what they tell.
+pub const PARTS: [(&str, Family); 13] = [
+    ("base mesh", REMOVER),
+    ("base mesh", BASE_INNER),
+    ("partial order", CHILDREN),
+    ("partial order", BLOCK),
+    ("partial order", NEW_BLOCK),
+    ("partial order", GAP),
+    ("offsets", OFFSET),
+    ("removers", SYMBOLS),
+    ("removers", SYMBOL),
+    ("inner faces", BITS),
+    ("inner faces", BIT),
+    ("errors", ERROR),
+    ("levels", LEVEL),
+];
+
+// Families of what all kinds have follow those of edge-based MTs.
+const _: () = assert!(LEVEL.first + LEVEL.contexts <= super::BASE_LEVEL.first);
+
+const ROWS: u32 = 8;
+const COLUMNS: u32 = 8;
+
+/// The context for place `place` of `count`.
+fn place_context(count: u32, place: u32) -> u32 {
+    let row = match count {
+        0..=1 => 0,
+        2 => 1,
+        3..=4 => 2,
+        5..=6 => 3,
+        7..=9 => 4,
+        10..=13 => 5,
+        14..=19 => 6,
+        _ => 7,
+    };
+    let column = match place {
+        0..=2 => place,
+        3..=4 => 3,
+        5..=7 => 4,
+        8..=11 => 5,
+        12..=16 => 6,
+        _ => 7,
+    };
+    row * COLUMNS + column
+}
+
+/// Bytes that an update takes in memory, at least.
+pub fn least_update_bytes(fields: u64) -> u64 {
+    8 + 6 * fields
+}
+
+/// Every update inserts one vertex.
+pub fn check_counts(info: &MtInfo, base_vertices: u64) -> Result<(), BaseMeshError> {
+    if base_vertices + u64::from(info.updates) != u64::from(info.vertices) {
+        return Err(BaseMeshError::Info("vertices are not as many as base vertices and updates"));
+    }
+    Ok(())
+}
+
+/// Where forest children are told relative to: the blocks named so far, the last first, each with the last child in it.
+#[derive(Default)]
+struct Named {
+    blocks: Vec<(u32, u32)>,
+    newest: u32,
+    length: u32,
+}
+
+impl Named {
+    fn behind(block: u32) -> Self {
+        Self { blocks: Vec::new(), newest: block, length: 0 }
+    }
+
+    /// Makes a block the one that was named last.
+    fn to_front(&mut self, at: usize) {
+        self.blocks[..=at].rotate_right(1);
+    }
+}
+
+fn length(d: i32) -> u32 {
+    (u32::BITS - d.unsigned_abs().leading_zeros()).min(LENGTHS - 1)
+}
+
+fn zigzag(gap: i64) -> u32 {
+    ((gap << 1) ^ (gap >> 63)) as u32
+}
+
+fn unzigzag(code: u32) -> i64 {
+    i64::from(code >> 1) ^ -i64::from(code & 1)
+}
+
+fn put_children(out: &mut impl Put, named: &mut Named, children: &[ForestChild], block_bits: u32) {
+    out.number(CHILDREN, 0, children.len() as u32);
+    for child in children {
+        let block = child.update >> block_bits;
+        let known = named.blocks.iter().position(|&(known, _)| known == block);
+        out.number(BLOCK, 0, known.map_or(0, |at| at as u32 + 1));
+        match known {
+            Some(at) => {
+                let gap = i64::from(child.update) - i64::from(named.blocks[at].1) - 1;
+                out.number(GAP, 0, zigzag(gap));
+                named.to_front(at);
+            }
+            None => {
+                out.number(NEW_BLOCK, 0, zigzag(i64::from(block) - i64::from(named.newest)));
+                out.bits(child.update & ((1 << block_bits) - 1), block_bits);
+                named.newest = block;
+                named.blocks.insert(0, (block, 0));
+            }
+        }
+        named.blocks[0].1 = child.update;
+        put_offset(out, named, child.offset);
+    }
+}
+
+fn put_offset(out: &mut impl Put, named: &mut Named, offset: [i32; 3]) {
+    let mut context = named.length;
+    let mut longest = 0;
+    for (axis, d) in (0..).zip(offset) {
+        out.signed(OFFSET, context, d);
+        longest = longest.max(length(d));
+        context = LENGTHS * (axis + 1) + longest;
+    }
+    named.length = longest;
+}
+
+fn read_offset(source: &mut Source<'_>, named: &mut Named) -> Result<[i32; 3], FormatError> {
+    let mut context = named.length;
+    let (mut offset, mut longest) = ([0; 3], 0);
+    for (axis, d) in (0..).zip(&mut offset) {
+        *d = source.signed(OFFSET, context)?;
+        longest = longest.max(length(*d));
+        context = LENGTHS * (axis + 1) + longest;
+    }
+    named.length = longest;
+    Ok(offset)
+}
+
+fn read_children(
+    source: &mut Source<'_>,
+    named: &mut Named,
+    block_bits: u32,
+    most: u32,
+) -> Result<Vec<ForestChild>, FormatError> {
+    let count = source.number(CHILDREN, 0)?;
+    if count > most {
+        return Err(source.corrupt("a vertex has more children than there are updates"));
+    }
+    let mut children = Vec::new();
+    for _ in 0..count {
+        let at = source.number(BLOCK, 0)? as usize;
+        let wrong = |source: &Source<'_>| source.corrupt("a child is no update of the MT");
+        let update = if at == 0 {
+            let block = i64::from(named.newest) + unzigzag(source.number(NEW_BLOCK, 0)?);
+            let place = source.bits(block_bits)?;
+            let block = u32::try_from(block).ok().filter(|block| u64::from(*block) << block_bits < 1 << 32);
+            let block = block.ok_or_else(|| wrong(source))?;
+            named.newest = block;
+            named.blocks.insert(0, (block, 0));
+            block << block_bits | place
+        } else {
+            let gap = unzigzag(source.number(GAP, 0)?);
+            let &(_, last) = named.blocks.get(at - 1).ok_or_else(|| wrong(source))?;
+            named.to_front(at - 1);
+            u32::try_from(i64::from(last) + 1 + gap).map_err(|_| wrong(source))?
+        };
+        named.blocks[0].1 = update;
+        children.push(ForestChild { update, offset: read_offset(source, named)? });
+    }
+    Ok(children)
+}
+
+/// Puts what removes the base tetrahedra, and the forest children of the base vertices.
+pub fn put_head(out: &mut impl Put, mt: &HalfEdgeMt) {
+    for mark in mt.base_marks() {
+        out.number(REMOVER, 0, mark.remover.wrapping_add(1));
+        if mark.remover != NONE {
+            out.symbol(BASE_INNER, 0, u32::from(mark.inner));
+        }
+    }
+    let mut named = Named::behind(0);
+    for v in 0..mt.base().positions.len() as u32 {
+        put_children(out, &mut named, mt.children_of(crate::mt::VertexId(v)), mt.page_bits());
+    }
+}
+
+/// Forest children that can be held. Symbols may take no bits, so what arrives does not bound their number.
+fn most_children(info: &MtInfo, limits: &Limits) -> u32 {
+    let held = limits.memory_bytes / size_of::<ForestChild>() as u64;
+    info.updates.min(u32::try_from(held).unwrap_or(u32::MAX))
+}
+
+/// What stands in front of the updates besides the base mesh.
+#[derive(Clone, Debug, Default)]
+pub struct BaseHead {
+    pub marks: Vec<BaseMark>,
+    pub children: Vec<Vec<ForestChild>>,
+}
+
+/// Reads what [`put_head`] puts.
+pub fn read_head(
+    source: &mut Source<'_>,
+    info: &MtInfo,
+    [vertices, tets]: [usize; 2],
+    block_bits: u32,
+    limits: &Limits,
+) -> Result<BaseHead, FormatError> {
+    let mut head = BaseHead::default();
+    for _ in 0..tets {
+        let remover = source.number(REMOVER, 0)?.wrapping_sub(1);
+        let inner = if remover == NONE { 0 } else { source.symbol(BASE_INNER, 0)? as u8 };
+        head.marks.push(BaseMark { remover, inner });
+    }
+    let (mut named, mut left) = (Named::behind(0), most_children(info, limits));
+    for _ in 0..vertices {
+        let children = read_children(source, &mut named, block_bits, left)?;
+        left -= children.len() as u32;
+        head.children.push(children);
+    }
+    Ok(head)
+}
+
+fn put_star(out: &mut impl Put, star: &[u8]) {
+    let (count, rest) = star.split_first().map_or((0, star), |(&count, rest)| (count, rest));
+    out.symbol(SYMBOLS, 0, u32::from(count));
+    let (symbols, bits) = rest.split_at(usize::from(count));
+    for (place, &symbol) in (0..).zip(symbols) {
+        out.symbol(SYMBOL, place_context(u32::from(count), place), u32::from(symbol));
+    }
+    let used = bits.iter().rposition(|&byte| byte != 0).map_or(0, |last| {
+        8 * last as u32 + u8::BITS - bits[last].leading_zeros()
+    });
+    out.number(BITS, 0, used);
+    for place in 0..used.saturating_sub(1) {
+        let bit = bits[place as usize / 8] >> (place % 8) & 1;
+        out.symbol(BIT, place_context(used, place), u32::from(bit));
+    }
+}
+
+/// Most bits that the star of an update can have: three faces of each tetrahedron.
+const MOST_BITS: u32 = 3 * 128;
+
+fn read_star(source: &mut Source<'_>, star: &mut Vec<u8>) -> Result<(), FormatError> {
+    let count = source.symbol(SYMBOLS, 0)?;
+    star.push(count as u8);
+    for place in 0..count {
+        star.push(source.symbol(SYMBOL, place_context(count, place))? as u8);
+    }
+    let used = source.number(BITS, 0)?;
+    if used > MOST_BITS {
+        return Err(source.corrupt("a star has more faces than it can have"));
+    }
+    let mut byte = 0_u8;
+    for place in 0..used {
+        let bit = place + 1 == used || source.symbol(BIT, place_context(used, place))? == 1;
+        byte |= u8::from(bit) << (place % 8);
+        if place % 8 == 7 || place + 1 == used {
+            star.push(byte);
+            byte = 0;
+        }
+    }
+    if star.len() == 1 && count == 0 {
+        star.clear();
+    }
+    Ok(())
+}
+
+/// Puts the updates `first .. end`, which are a block.
+pub fn put(out: &mut impl Put, mt: &HalfEdgeMt, first: u32, end: u32) {
+    let mut named = Named::behind(first >> mt.page_bits());
+    for update in (first..end).filter_map(|u| mt.update(UpdateId(u))) {
+        put_children(out, &mut named, update.children, mt.page_bits());
+        put_star(out, update.star);
+    }
+}
+
+/// Updates of a block, without what they do to fields.
+#[derive(Clone, Debug, Default)]
+pub struct Insertions {
+    pub children: Vec<Vec<ForestChild>>,
+    pub stars: Vec<Vec<u8>>,
+}
+
+/// Reads updates that are a block.
+pub fn read(
+    source: &mut Source<'_>,
+    info: &MtInfo,
+    block_bits: u32,
+    updates: Range<u32>,
+    limits: &Limits,
+) -> Result<Insertions, FormatError> {
+    let mut insertions = Insertions::default();
+    let (mut named, mut left) = (Named::behind(updates.start >> block_bits), most_children(info, limits));
+    for _ in updates {
+        let children = read_children(source, &mut named, block_bits, left)?;
+        left -= children.len() as u32;
+        insertions.children.push(children);
+        let mut star = Vec::new();
+        read_star(source, &mut star)?;
+        insertions.stars.push(star);
+    }
+    Ok(insertions)
+}
+
+/// Puts what the updates `first .. end` do to a field.
+pub fn put_field(out: &mut impl Put, mt: &HalfEdgeMt, first: u32, end: u32, field: usize) {
+    let all = (first..end).map(UpdateId);
+    edge::put_changes(out, [ERROR, LEVEL], all, |u| {
+        // Whoever writes an MT has all of its updates.
+        mt.update(u).map_or((ErrorCode::ZERO, 0), |update| (update.errors[field], update.level_residuals[field]))
+    });
+}
+
+/// Reads what the `count` updates of a block do to a field.
+pub fn read_field(source: &mut Source<'_>, count: u32) -> Result<FieldPart, FormatError> {
+    edge::read_changes(source, [ERROR, LEVEL], count)
+}

@@ -1,0 +1,774 @@
+//! Insertion and removal of vertices of a [`HalfEdgeMt`] on the current mesh.
+//!
+//! In the current mesh the tag of a tetrahedron is the update that removes it, and its inner faces are those that go with
+//! it. Insertion keeps the slots of T_u, removal those of the star without the near vertex.
+
+use super::Applied;
+use super::BaseMesh;
+use super::BaseMeshError;
+use super::CurrentMesh;
+use super::ErrorCode;
+use super::LookAtTet;
+use super::MtInfo;
+use super::MultiTessellation;
+use super::UpdateError;
+use super::UpdateId;
+use super::VertexId;
+use super::current::GATHERED;
+use super::current::Gather;
+use super::current::Labels;
+use super::current::Star;
+use super::current::corner_of;
+use super::half_edge::HalfEdgeMt;
+use super::half_edge_star::StarCode;
+use super::half_edge_star::spread;
+use crate::geom::orient3d;
+use crate::mesh::NONE;
+use std::ops::Range;
+
+/// Most tetrahedra of a star, and most vertices of its link.
+pub(super) const MOST: usize = GATHERED;
+
+/// Stands for the new vertex among the corners of a [`NewTet`].
+pub(super) const NEW: u8 = 0xFF;
+
+/// No tetrahedron of the new star.
+pub(super) const NO_ENTRY: u8 = 0xFF;
+
+/// A tetrahedron of the star that an insertion makes.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct NewTet {
+    /// Its corners by index into the link, [`NEW`] for the new vertex; positive.
+    pub corners: [u8; 4],
+    /// Across each face that has the new vertex, the tetrahedron of the star, [`NO_ENTRY`] at the boundary.
+    pub across: [u8; 4],
+    /// Which corner is the new vertex.
+    pub own: u8,
+    /// What lies across the face opposite the new vertex.
+    pub beyond: u32,
+    /// The slot of T_u that it takes, or along whose face it fills the gap.
+    pub source: u32,
+    /// The update that removes it.
+    pub remover: u32,
+    /// Which faces go with it.
+    pub inner: u8,
+}
+
+/// Scratch space for insertions and removals.
+#[derive(Clone, Debug)]
+pub(super) struct Scratch {
+    /// T_u.
+    removed: [u32; MOST],
+    removed_len: usize,
+    /// The star: first what takes the slots of T_u in its order, then what fills the gaps.
+    pub star: [NewTet; MOST],
+    pub star_len: usize,
+    /// Slots of the vertices of Π_u; the near vertex is the first.
+    pub link: [u32; MOST],
+    pub link_len: usize,
+    /// Around the edge from the near to the new vertex: a link vertex, a gap, and the corner of that opposite the face
+    /// which has the vertex.
+    ends: Vec<(u8, u8, u8)>,
+    pub levels: Vec<i32>,
+    gathered: Star,
+    /// The star in canonical order: a hash of the labels of each tetrahedron, and its place.
+    pub sorted: Vec<(u64, u8)>,
+    /// A hash of the label of each vertex of the link; then that of the new vertex.
+    pub hashes: Vec<u64>,
+    pub code: StarCode,
+}
+
+impl Default for Scratch {
+    fn default() -> Self {
+        Self {
+            removed: [0; MOST],
+            removed_len: 0,
+            star: [NewTet::default(); MOST],
+            star_len: 0,
+            link: [0; MOST],
+            link_len: 0,
+            ends: Vec::new(),
+            levels: Vec::new(),
+            gathered: Star::default(),
+            sorted: Vec::new(),
+            hashes: Vec::new(),
+            code: StarCode::default(),
+        }
+    }
+}
+
+/// A tetrahedron at a vertex, and which of its corners that is.
+type AtVertex = (u32, usize);
+
+impl HalfEdgeMt {
+    /// Collects T_u, or tells what has to be applied first.
+    fn collect_removed(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        scratch: &mut Scratch,
+    ) -> Result<Applied, UpdateError> {
+        let update = u.0;
+        let torn = UpdateError::Cavity { update };
+        if !self.has(u) {
+            return Err(UpdateError::Missing { update });
+        }
+        let near = self.near(u).ok_or(UpdateError::Missing { update })?;
+        let Some(slot) = mesh.slot(near) else {
+            let before = self.inserted_by(near).ok_or(torn)?;
+            return Ok(Applied::Blocked(before));
+        };
+        if mesh.slot(self.vertex(u)).is_some() {
+            return Err(torn);
+        }
+        let first = match mesh.tagged(update) {
+            Some(t) => t,
+            None => match self.find_tagged(mesh, u, slot)? {
+                Ok(t) => t,
+                Err(blocking) => return Ok(Applied::Blocked(blocking)),
+            },
+        };
+        mesh.next_epoch();
+        mesh.number_tet(first, 0);
+        scratch.removed[0] = first;
+        let (mut next, mut len) = (0, 1);
+        while next < len {
+            let t = scratch.removed[next];
+            let (tet, around, inner) = (mesh.tets[t as usize], mesh.neighbors[t as usize], mesh.inner(t));
+            let at = corner_of(&tet, slot);
+            if tet[at] != slot {
+                return Err(torn);
+            }
+            for (face, &n) in around.iter().enumerate() {
+                if face == at || inner >> face & 1 == 0 || n == NONE {
+                    continue;
+                }
+                let tag = mesh.tag(n);
+                if tag != update {
+                    if tag >= update {
+                        return Err(torn);
+                    }
+                    mesh.place_tag(n);
+                    return Ok(Applied::Blocked(UpdateId(tag)));
+                }
+                if len == MOST {
+                    return Err(torn);
+                }
+                if mesh.number_tet(n, len as u32).is_none() {
+                    scratch.removed[len] = n;
+                    len += 1;
+                }
+            }
+            next += 1;
+        }
+        scratch.removed_len = len;
+        scratch.link[0] = slot;
+        Ok(Applied::Done)
+    }
+
+    /// A tetrahedron of T_u, if one is in the mesh; else what has to be applied before one can be.
+    #[cold]
+    fn find_tagged(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        slot: u32,
+    ) -> Result<Result<u32, UpdateId>, UpdateError> {
+        let star = mesh.all_around(slot);
+        if let Some(&(t, _)) = star.iter().find(|&&(t, _)| mesh.tag(t) == u.0) {
+            return Ok(Ok(t));
+        }
+        let torn = UpdateError::Cavity { update: u.0 };
+        let near = self.near(u).ok_or(torn.clone())?;
+        let child = self.children_of(near).iter().find(|child| child.update == u.0).ok_or(torn.clone())?;
+        // T_u will hold the direction in which the new vertex lies: what does so now has to go first. At the boundary none
+        // may hold it; then the one that is the least off.
+        let before = |&&(t, _): &&AtVertex| mesh.tag(t) < u.0;
+        let off = |&&(t, at): &&AtVertex| (mesh.off_by(t, at, child.offset), mesh.tag(t));
+        let found = star.iter().filter(before).min_by(|a, b| {
+            let (a, b) = (off(a), off(b));
+            a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))
+        });
+        Ok(Err(UpdateId(mesh.tag(found.ok_or(torn)?.0))))
+    }
+
+    /// Finds the star that the insertion makes, whose T_u has been collected.
+    fn find_star(&self, mesh: &mut CurrentMesh, scratch: &mut Scratch) -> Option<()> {
+        let slot = scratch.link[0];
+        mesh.number_slot(slot, 0);
+        scratch.link_len = 1;
+        scratch.ends.clear();
+        let moved = scratch.removed_len;
+        scratch.star_len = moved;
+        for i in 0..moved {
+            let t = scratch.removed[i];
+            let (tet, around, inner) = (mesh.tets[t as usize], mesh.neighbors[t as usize], mesh.inner(t));
+            let mut corners = [0; 4];
+            for (corner, &v) in corners.iter_mut().zip(&tet) {
+                *corner = scratch.number(mesh, v)?;
+            }
+            let at = corner_of(&tet, slot);
+            let mut new = NewTet { corners, own: at as u8, beyond: around[at], source: t, ..NewTet::default() };
+            new.corners[at] = NEW;
+            new.across = [NO_ENTRY; 4];
+            for face in (0..4).filter(|&face| face != at) {
+                let n = around[face];
+                let behind = if n == NONE { None } else { mesh.tet_number(n) };
+                if inner >> face & 1 == 1 {
+                    if n != NONE {
+                        new.across[face] = behind? as u8;
+                    }
+                    continue;
+                }
+                // A face that stays must not have tetrahedra of T_u on both sides.
+                if behind.is_some() {
+                    return None;
+                }
+                new.across[face] = scratch.add_gap(i as u8, &corners, [at, face], n, t)?;
+            }
+            scratch.star[i] = new;
+        }
+        scratch.close_ring()
+    }
+
+    /// Positions and levels of the new vertex.
+    fn place_vertex(
+        &self,
+        mesh: &CurrentMesh,
+        u: UpdateId,
+        scratch: &mut Scratch,
+    ) -> Result<[i32; 3], UpdateError> {
+        let off = UpdateError::OffLattice { update: u.0 };
+        let near = mesh.vertex(scratch.link[0]);
+        let children = self.children_of(near);
+        let at = children.binary_search_by_key(&u.0, |child| child.update).map_err(|_| off.clone())?;
+        let centre = mesh.positions[scratch.link[0] as usize];
+        let offset = children[at].offset;
+        let position = [0, 1, 2].map(|k| centre[k].saturating_add(offset[k]));
+        let residuals = self.update(u).ok_or(UpdateError::Missing { update: u.0 })?.level_residuals;
+        scratch.predict_levels(mesh, position);
+        for (level, residual) in scratch.levels.iter_mut().zip(residuals) {
+            *level = level.saturating_add(*residual);
+        }
+        if self.info().holds(position, &scratch.levels) { Ok(position) } else { Err(off) }
+    }
+
+    /// Gets ready to insert the vertex of `u`: star, position and levels are in the scratch space then, but not yet what
+    /// removes the star.
+    pub(super) fn prepare(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        scratch: &mut Scratch,
+    ) -> Result<Result<[i32; 3], UpdateId>, UpdateError> {
+        if let Applied::Blocked(before) = self.collect_removed(mesh, u, scratch)? {
+            return Ok(Err(before));
+        }
+        self.find_star(mesh, scratch).ok_or(UpdateError::Cavity { update: u.0 })?;
+        let position = self.place_vertex(mesh, u, scratch)?;
+        if !mesh.is_proven(u.0) {
+            if !scratch.is_positive(mesh, position) {
+                return Err(UpdateError::Inverted { update: u.0 });
+            }
+            mesh.set_proven(u.0);
+        }
+        Ok(Ok(position))
+    }
+
+    fn insert(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        scratch: &mut Scratch,
+    ) -> Result<Applied, UpdateError> {
+        let position = match self.prepare(mesh, u, scratch)? {
+            Ok(position) => position,
+            Err(before) => return Ok(Applied::Blocked(before)),
+        };
+        scratch.sort_star(mesh, self.vertex(u).0);
+        if !mesh.stars.recall(u.0, scratch) {
+            self.find_removers(mesh, u, position, scratch).ok_or(UpdateError::Mask { update: u.0 })?;
+            mesh.stars.keep(u.0, scratch);
+        }
+        self.perform_insertion(mesh, u, position, scratch);
+        Ok(Applied::Done)
+    }
+
+    pub(super) fn perform_insertion(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        position: [i32; 3],
+        scratch: &mut Scratch,
+    ) {
+        let slot = mesh.new_vertex();
+        mesh.put_vertex(slot, Labels { vertex: self.vertex(u).0, split: NONE }, position);
+        let first = slot as usize * mesh.fields;
+        mesh.levels[first..first + scratch.levels.len()].copy_from_slice(&scratch.levels);
+        let (moved, all) = (scratch.removed_len, scratch.star_len);
+        let mut slots = [NONE; MOST];
+        slots[..moved].copy_from_slice(&scratch.removed[..moved]);
+        mesh.new_tets(&mut slots[moved..all]);
+        let near = scratch.link[0];
+        let slot_of = |entry: u8| if entry == NO_ENTRY { NONE } else { slots[entry as usize % MOST] };
+        for (i, new) in scratch.star[..all].iter().enumerate() {
+            let t = slots[i];
+            let own = new.own as usize & 3;
+            let tet = new.corners.map(|x| if x == NEW { slot } else { scratch.link[x as usize % MOST] });
+            let mut around = new.across.map(slot_of);
+            around[own] = new.beyond;
+            mesh.tets[t as usize] = tet;
+            mesh.neighbors[t as usize] = around;
+            if i >= moved {
+                if new.beyond != NONE {
+                    mesh.relink(new.beyond, new.source, t);
+                }
+                tet.iter().for_each(|&v| mesh.incident[v as usize] = t);
+            }
+            mesh.set_mark(t, new.remover, new.inner);
+            mesh.mark_tet(t);
+        }
+        mesh.incident[slot as usize] = slots[0];
+        mesh.incident[near as usize] = slots[moved];
+        mesh.touch(&slots[..all]);
+    }
+
+    /// Collects the star of the vertex that `u` inserted. Tells its slot and that of the near vertex, or a child of `u` that
+    /// has to go first.
+    fn collect_inserted(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        star: &mut Star,
+    ) -> Result<Result<[u32; 2], UpdateId>, UpdateError> {
+        let vertex = self.vertex(u).0;
+        let absent = UpdateError::Vertex { update: u.0, vertex };
+        let slot = mesh.slot(VertexId(vertex)).ok_or(absent.clone())?;
+        let younger = |labels: &[Labels], tet: &[u32; 4]| {
+            tet.iter().map(|&v| labels[v as usize].vertex).find(|&v| v > vertex)
+        };
+        match mesh.gather_star(slot, star, younger) {
+            Ok(()) => {}
+            Err(Gather::TooLarge) => return Err(UpdateError::Star { update: u.0 }),
+            Err(Gather::Stopped(v)) => return Ok(Err(self.inserted_by(VertexId(v)).ok_or(absent)?)),
+        }
+        let near = self.near(u).and_then(|near| mesh.slot(near)).ok_or(absent)?;
+        Ok(Ok([slot, near]))
+    }
+
+    fn remove(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        scratch: &mut Scratch,
+    ) -> Result<Applied, UpdateError> {
+        let star = &mut scratch.gathered;
+        let [slot, near] = match self.collect_inserted(mesh, u, star)? {
+            Ok(slots) => slots,
+            Err(child) => return Ok(Applied::Blocked(child)),
+        };
+        let (mut gone, mut gone_len) = ([NONE; MOST], 0);
+        for (&t, &at) in star.tets[..star.len].iter().zip(&star.corner) {
+            let (mut tet, mut around) = (mesh.tets[t as usize], mesh.neighbors[t as usize]);
+            if tet.contains(&near) {
+                gone[gone_len] = t;
+                gone_len += 1;
+                continue;
+            }
+            let at = at as usize & 3;
+            tet[at] = near;
+            let mut inner = 0;
+            for face in (0..4).filter(|&face| face != at) {
+                let n = around[face];
+                // A tetrahedron at the edge to the near vertex fills a gap; what lies beyond it is the neighbour again.
+                let gap = if n == NONE { None } else { Some(mesh.tets[n as usize]) };
+                match gap.filter(|gap| gap.contains(&near) && gap.contains(&slot)) {
+                    Some(gap) => {
+                        let beyond = mesh.neighbors[n as usize][corner_of(&gap, slot)];
+                        around[face] = beyond;
+                        if beyond != NONE {
+                            mesh.relink(beyond, n, t);
+                        }
+                    }
+                    None => inner |= 1 << face,
+                }
+            }
+            mesh.tets[t as usize] = tet;
+            mesh.neighbors[t as usize] = around;
+            mesh.set_mark(t, u.0, inner);
+            mesh.mark_tet(t);
+            tet.iter().for_each(|&v| mesh.incident[v as usize] = t);
+        }
+        mesh.touch(&star.tets[..star.len]);
+        gone[..gone_len].iter().for_each(|&t| mesh.free_tet(t));
+        mesh.remove_vertex(slot);
+        Ok(Applied::Done)
+    }
+}
+
+impl Scratch {
+    /// The index of a vertex in the link, where it is put if it is new.
+    #[inline]
+    fn number(&mut self, mesh: &mut CurrentMesh, v: u32) -> Option<u8> {
+        let next = self.link_len;
+        if let Some(known) = mesh.number_slot(v, next as u32) {
+            return Some(known as u8);
+        }
+        // One less than all numbers, so that a mark never overflows.
+        *self.link.get_mut(next).filter(|_| next + 1 < MOST)? = v;
+        self.link_len += 1;
+        Some(next as u8)
+    }
+
+    /// Adds the tetrahedron that fills the gap behind a face of tetrahedron `t` of T_u, whose corner `at` is the near vertex.
+    #[inline]
+    fn add_gap(
+        &mut self,
+        of: u8,
+        corners: &[u8; 4],
+        [at, face]: [usize; 2],
+        beyond: u32,
+        t: u32,
+    ) -> Option<u8> {
+        let place = self.star_len;
+        if place == MOST {
+            return None;
+        }
+        let mut new = NewTet { corners: *corners, own: face as u8, beyond, source: t, ..NewTet::default() };
+        new.corners[face] = NEW;
+        new.across = [NO_ENTRY; 4];
+        new.across[at] = of;
+        for corner in (0..4).filter(|&k| k != at && k != face) {
+            // The face opposite this corner has the other one.
+            let other = 6 - at - face - corner;
+            self.ends.push((corners[other], place as u8, corner as u8));
+        }
+        self.star[place] = new;
+        self.star_len += 1;
+        Some(place as u8)
+    }
+
+    /// Joins the tetrahedra around the edge from the near to the new vertex. They must close up, or run from boundary to
+    /// boundary, in one piece.
+    fn close_ring(&mut self) -> Option<()> {
+        let gaps = self.ends.len() / 2;
+        if gaps == 0 {
+            return None;
+        }
+        self.ends.sort_unstable();
+        let (mut open, mut i) = (0, 0);
+        while i < self.ends.len() {
+            let (v, gap, corner) = self.ends[i];
+            let next = self.ends.get(i + 1).filter(|next| next.0 == v);
+            let Some(&(_, other, side)) = next else {
+                open += 1;
+                i += 1;
+                continue;
+            };
+            if self.ends.get(i + 2).is_some_and(|third| third.0 == v) {
+                return None;
+            }
+            self.star[gap as usize % MOST].across[corner as usize & 3] = other;
+            self.star[other as usize % MOST].across[side as usize & 3] = gap;
+            i += 2;
+        }
+        if open != 0 && open != 2 {
+            return None;
+        }
+        // From one end, or from anywhere, all must be met.
+        let first = self.ends[0].1;
+        let (mut met, mut from, mut at) = (1, NO_ENTRY, first);
+        if open == 2 {
+            let lone = |i: usize| {
+                let v = self.ends[i].0;
+                let same = |j: Option<usize>| j.and_then(|j| self.ends.get(j)).is_some_and(|e| e.0 == v);
+                !same(i.checked_sub(1)) && !same(Some(i + 1))
+            };
+            at = self.ends[(0..self.ends.len()).find(|&i| lone(i))?].1;
+        }
+        let start = at;
+        loop {
+            let NewTet { corners, across, own, .. } = self.star[at as usize % MOST];
+            let next = (0..4).filter(|&k| k != own as usize && corners[k] != 0).map(|k| across[k]);
+            let Some(next) = next.filter(|&n| n != NO_ENTRY && n != from).min() else { break };
+            if next == start {
+                break;
+            }
+            (from, at) = (at, next);
+            met += 1;
+            if met > gaps {
+                return None;
+            }
+        }
+        (met == gaps).then_some(())
+    }
+
+    /// Puts the star into canonical order.
+    pub fn sort_star(&mut self, mesh: &CurrentMesh, vertex: u32) {
+        self.hashes.clear();
+        self.hashes.extend(self.link[..self.link_len].iter().map(|&slot| spread(mesh.vertex(slot).0)));
+        self.hashes.push(spread(vertex));
+        self.sorted.clear();
+        for (new, i) in self.star[..self.star_len].iter().zip(0..) {
+            let sum = new.corners.iter().fold(0, |sum: u64, &corner| {
+                sum.wrapping_add(self.hashes[if corner == NEW { self.link_len } else { corner as usize }])
+            });
+            self.sorted.push((sum, i));
+        }
+        self.sorted.sort_unstable();
+    }
+
+    /// Whether all tetrahedra of the star are positive with the new vertex at `position`.
+    fn is_positive(&self, mesh: &CurrentMesh, position: [i32; 3]) -> bool {
+        self.star[..self.star_len].iter().all(|new| {
+            let [a, b, c, d] = new.corners.map(|x| match x {
+                NEW => position,
+                x => mesh.positions[self.link[x as usize % MOST] as usize],
+            });
+            orient3d(a, b, c, d) > 0
+        })
+    }
+
+    /// Predicts the levels of a vertex at `position` from those around it: means by inverse squared distance, in whole
+    /// numbers, so that the order of the link does not matter.
+    pub fn predict_levels(&mut self, mesh: &CurrentMesh, position: [i32; 3]) {
+        let squared = |v: u32| {
+            let p = mesh.positions[v as usize];
+            (0..3).map(|k| i128::from(p[k]) - i128::from(position[k])).map(|d| d * d).sum::<i128>()
+        };
+        let link = &self.link[..self.link_len];
+        let largest = link.iter().map(|&v| squared(v)).max().unwrap_or(1).max(1);
+        let mut total = 0_i128;
+        self.levels.clear();
+        self.levels.resize(mesh.fields, 0);
+        let mut sums = [0_i128; 8];
+        let few = mesh.fields <= sums.len();
+        let mut many = if few { Vec::new() } else { vec![0_i128; mesh.fields] };
+        let sums = if few { &mut sums[..mesh.fields] } else { &mut many[..] };
+        for &v in link {
+            let weight = (largest << WEIGHT_BITS) / squared(v).max(1);
+            total += weight;
+            for (sum, &level) in sums.iter_mut().zip(mesh.levels(v)) {
+                *sum += weight * i128::from(level);
+            }
+        }
+        for (level, sum) in self.levels.iter_mut().zip(sums) {
+            *level = ((2 * *sum + total) / (2 * total.max(1))) as i32;
+        }
+    }
+}
+
+/// Weights of the vertices around a new one have at least so many bits.
+const WEIGHT_BITS: u32 = 8;
+
+impl CurrentMesh {
+    /// All tetrahedra around the vertex in `slot`, however many, each with the corner that it is.
+    fn all_around(&mut self, slot: u32) -> Vec<AtVertex> {
+        self.next_epoch();
+        let first = self.incident[slot as usize];
+        let mut star = vec![(first, corner_of(&self.tets[first as usize], slot))];
+        self.number_tet(first, 0);
+        let mut next = 0;
+        while let Some(&(t, at)) = star.get(next) {
+            next += 1;
+            for (face, n) in self.neighbors[t as usize].into_iter().enumerate() {
+                if face != at && n != NONE && self.number_tet(n, 0).is_none() {
+                    star.push((n, corner_of(&self.tets[n as usize], slot)));
+                }
+            }
+        }
+        star
+    }
+
+    /// How far a direction from corner `at` of tetrahedron `t` leaves it: 0 if it does not, else the largest sine of an angle with
+    /// a face.
+    fn off_by(&self, t: u32, at: usize, direction: [i32; 3]) -> f64 {
+        let corners = self.tets[t as usize].map(|v| self.positions[v as usize]);
+        let apart = |k: usize| [0, 1, 2].map(|i| f64::from(corners[k][i]) - f64::from(corners[at][i]));
+        let [d0, d1, d2] = direction.map(f64::from);
+        let length = |v: [f64; 3]| (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
+        let mut worst = 0.0_f64;
+        for face in (0..4).filter(|&face| face != at) {
+            let mut others = (0..4).filter(|&k| k != at && k != face);
+            let (Some(i), Some(j)) = (others.next(), others.next()) else { continue };
+            let (a, b, inside) = (apart(i), apart(j), apart(face));
+            let normal = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+            let dot = |v: [f64; 3]| normal[0] * v[0] + normal[1] * v[1] + normal[2] * v[2];
+            let side = if dot(inside) < 0.0 { -1.0 } else { 1.0 };
+            let sine = side * dot([d0, d1, d2]) / (length(normal) * length([d0, d1, d2])).max(1e-300);
+            worst = worst.max(-sine);
+        }
+        worst
+    }
+}
+
+impl MultiTessellation for HalfEdgeMt {
+    fn info(&self) -> &MtInfo {
+        self.info()
+    }
+
+    fn base(&self) -> &BaseMesh {
+        self.base()
+    }
+
+    fn updates(&self) -> u32 {
+        self.updates()
+    }
+
+    #[inline]
+    fn has(&self, u: UpdateId) -> bool {
+        self.has(u)
+    }
+
+    fn present(&self) -> u32 {
+        self.present()
+    }
+
+    fn page_updates(&self, page: u32) -> Range<u32> {
+        self.page_updates(page)
+    }
+
+    fn bytes(&self) -> u64 {
+        self.bytes()
+    }
+
+    fn start(&self) -> Result<CurrentMesh, BaseMeshError> {
+        let mut mesh = CurrentMesh::new(self.info(), self.base())?;
+        mesh.mark_all(self.base_marks().iter().map(|mark| (mark.remover, mark.inner)));
+        Ok(mesh)
+    }
+
+    /// Each fills at least one gap.
+    fn always_grows(&self) -> bool {
+        true
+    }
+
+    #[inline]
+    fn error(&self, u: UpdateId) -> ErrorCode {
+        self.error_of(u)
+    }
+
+    #[inline]
+    fn errors(&self, u: UpdateId) -> &[ErrorCode] {
+        self.errors_of(u)
+    }
+
+    fn to_come(&self) -> ErrorCode {
+        self.to_come()
+    }
+
+    #[inline]
+    fn remover(&self, mesh: &CurrentMesh, t: u32) -> Option<UpdateId> {
+        Some(UpdateId(mesh.tag(t))).filter(|&u| self.has(u))
+    }
+
+    #[inline]
+    fn awaited(&self, mesh: &CurrentMesh, t: u32) -> Option<UpdateId> {
+        Some(UpdateId(mesh.tag(t))).filter(|&u| u.0 != NONE && !self.has(u))
+    }
+
+    fn awaited_errors(&self, mesh: &CurrentMesh, t: u32) -> Option<&[ErrorCode]> {
+        match mesh.tag(t) {
+            NONE => Some(self.no_errors()),
+            u if self.has(UpdateId(u)) => None,
+            u => Some(self.bounds_of(UpdateId(u))),
+        }
+    }
+
+    #[inline]
+    fn start_at(&self, mesh: &mut CurrentMesh, t: u32) {
+        mesh.place_tag(t);
+    }
+
+    #[inline]
+    fn creator(&self, mesh: &CurrentMesh, t: u32) -> Option<UpdateId> {
+        let newest = mesh.tets[t as usize].iter().map(|&v| mesh.labels[v as usize].vertex).max();
+        self.inserted_by(VertexId(newest?))
+    }
+
+    #[inline]
+    fn may_coarsen(&self, mesh: &CurrentMesh, u: UpdateId) -> bool {
+        let incident = mesh.slot(self.vertex(u)).map(|slot| mesh.incident[slot as usize]);
+        incident.is_some_and(|t| self.creator(mesh, t) == Some(u))
+    }
+
+    fn refine(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
+        let mut scratch = mesh.take_scratch();
+        let applied = self.insert(mesh, u, &mut scratch);
+        mesh.put_back_scratch(scratch);
+        applied
+    }
+
+    fn coarsen(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
+        let mut scratch = mesh.take_scratch();
+        let applied = self.remove(mesh, u, &mut scratch);
+        mesh.put_back_scratch(scratch);
+        applied
+    }
+
+    fn look_at_removed(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        look: LookAtTet<'_>,
+    ) -> Result<Applied, UpdateError> {
+        let mut scratch = mesh.take_scratch();
+        let star = &mut scratch.gathered;
+        let found = self.collect_inserted(mesh, u, star);
+        if let Ok(Ok([slot, near])) = found {
+            let tets = star.tets[..star.len].iter().map(|&t| mesh.tets[t as usize]);
+            for tet in tets.filter(|tet| !tet.contains(&near)) {
+                let tet = tet.map(|v| if v == slot { near } else { v });
+                let levels = |field: usize| tet.map(|v| mesh.levels(v)[field]);
+                if look(&tet.map(|v| mesh.positions[v as usize]), &levels) {
+                    break;
+                }
+            }
+        }
+        mesh.put_back_scratch(scratch);
+        Ok(found?.map_or_else(Applied::Blocked, |_| Applied::Done))
+    }
+
+    /// All alike, so that numbers decide: to find out that an insertion has to wait costs as much as most of it.
+    fn site(&self, _: &CurrentMesh, _: UpdateId) -> [i32; 3] {
+        [0; 3]
+    }
+
+    /// Tetrahedra know what removes them from the moment they are created: whoever waits for an update asks
+    /// [`MultiTessellation::awaited`].
+    fn reveal(&self, _: &mut CurrentMesh, _: Range<u32>) {}
+
+    fn conceal(&self, mesh: &mut CurrentMesh, updates: Range<u32>) {
+        let vertices = updates.start..updates.end;
+        let base = self.vertex(UpdateId(0)).0;
+        mesh.forget_vertices(vertices.start + base..vertices.end + base);
+        mesh.stars.forget(updates);
+    }
+
+    fn find_removed(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        found: &mut Vec<u32>,
+    ) -> Result<(), UpdateError> {
+        let mut scratch = mesh.take_scratch();
+        let collected = self.collect_removed(mesh, u, &mut scratch);
+        if collected == Ok(Applied::Done) {
+            found.extend_from_slice(&scratch.removed[..scratch.removed_len]);
+        }
+        mesh.put_back_scratch(scratch);
+        match collected? {
+            Applied::Done => Ok(()),
+            Applied::Blocked(_) => Err(UpdateError::Error { update: u.0 }),
+        }
+    }
+
+    fn find_inserted(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        found: &mut Vec<u32>,
+    ) -> Result<(), UpdateError> {
+        super::split::find_star(mesh, u, self.vertex(u), found)
+    }
+}

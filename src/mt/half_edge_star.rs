@@ -1,0 +1,558 @@
+//! Which updates remove the tetrahedra of a new star, and which faces go with them, as residuals against predictions.
+//!
+//! A tetrahedron that update `u` creates is removed by a later update whose near vertex is one of its corners, or by none.
+//! The candidates are the forest children of its corners after `u`. Candidate `c` with near vertex `x` tends to remove the
+//! tetrahedra at `x` that lie in its direction: the cosine between the direction to the inserted vertex and that to the
+//! centre of the tetrahedron gives a weight. The symbol of a tetrahedron is the rank of its remover among the candidates,
+//! and of "none", by falling weight. Symbols come in the order of rising certainty, and zeros at the end are left out.
+//!
+//! A face at the near vertex goes with the tetrahedron (it is *inner*) if the same update removes what lies behind, or if
+//! it is of the boundary and the new vertex takes its place. Most cases follow: what is behind within the star is known,
+//! and a face that hides the new vertex from the tetrahedron cannot stay. For the rest a bit says whether the guess, by
+//! the angle at which the new vertex lies over the face, is wrong; bits come in the same order, zeros at the end left out.
+//!
+//! All of this is the same in every consistent set, for the star is: positions are integers, sums of floating-point
+//! numbers have a fixed order, and ties are broken by labels.
+
+use super::CurrentMesh;
+use super::Sparse;
+use super::UpdateId;
+use super::half_edge::ForestChild;
+use super::half_edge::HalfEdgeMt;
+use super::half_edge_apply::MOST;
+use super::half_edge_apply::NEW;
+use super::half_edge_apply::NO_ENTRY;
+use super::half_edge_apply::NewTet;
+use super::half_edge_apply::Scratch;
+use crate::geom::orient3d;
+use crate::mesh::NONE;
+
+
+
+
+/// Most candidates that have a rank.
+const RANKED: usize = 14;
+
+/// Candidates are ranked until what is left has less weight than this.
+const LEFT: f64 = 1.0 / 256.0;
+
+/// Stands for a remover that has no rank.
+const FURTHER: u32 = NONE - 1;
+
+/// A candidate for the removal of a tetrahedron, or none of them, or one of those without a rank.
+#[derive(Clone, Copy, Debug)]
+struct Choice {
+    weight: f64,
+    remover: u32,
+    corner: u8,
+}
+
+/// Scratch space: what may remove each tetrahedron of a star.
+#[derive(Clone, Debug, Default)]
+pub(super) struct StarCode {
+    /// By falling weight, tetrahedron by tetrahedron.
+    choices: Vec<Choice>,
+    ends: Vec<u32>,
+    /// The merged lists that the ranked candidates were taken from go on here.
+    rests: Vec<[u32; 4]>,
+    /// What is to be told, by rising certainty: a key, tetrahedron and face.
+    order: Vec<(u64, u8, u8)>,
+    /// The corner of each tetrahedron that is the near vertex of its remover.
+    near: Vec<u8>,
+    /// Where the vertex lies that its remover inserts.
+    aims: Vec<[i32; 3]>,
+    hashes: Vec<u64>,
+}
+
+/// Tells, or is told, what cannot be predicted.
+trait Teller {
+    /// Which of the choices it is; for one without rank also which one.
+    fn choose(&mut self, tet: usize, choices: &[Choice]) -> Option<usize>;
+    /// Of the candidates without a rank, 0 for none.
+    fn further(&mut self, tet: usize, index_of: &mut dyn FnMut(u32) -> Option<u32>) -> Option<u32>;
+    /// Whether a face goes with the tetrahedron.
+    fn is_inner(&mut self, tet: usize, face: usize, guess: bool) -> bool;
+}
+
+/// Reads a code.
+struct Reader<'a> {
+    symbols: &'a [u8],
+    bits: &'a [u8],
+    at: usize,
+}
+
+impl Reader<'_> {
+    fn symbol(&mut self) -> u8 {
+        let Some((&first, rest)) = self.symbols.split_first() else { return 0 };
+        self.symbols = rest;
+        first
+    }
+}
+
+impl Teller for Reader<'_> {
+    fn choose(&mut self, _: usize, choices: &[Choice]) -> Option<usize> {
+        Some(usize::from(self.symbol())).filter(|&rank| rank < choices.len())
+    }
+
+    fn further(&mut self, _: usize, _: &mut dyn FnMut(u32) -> Option<u32>) -> Option<u32> {
+        let mut index = 0;
+        for shift in (0..30).step_by(3) {
+            let symbol = self.symbol();
+            index |= u32::from(symbol & 7) << shift;
+            if symbol < 8 {
+                return Some(index);
+            }
+        }
+        None
+    }
+
+    fn is_inner(&mut self, _: usize, _: usize, guess: bool) -> bool {
+        let byte = self.bits.get(self.at / 8).copied().unwrap_or(0);
+        let wrong = byte >> (self.at % 8) & 1 == 1;
+        self.at += 1;
+        guess ^ wrong
+    }
+}
+
+/// Writes a code.
+struct Writer<'a> {
+    /// The remover of each tetrahedron, and its inner faces.
+    truth: &'a [(u32, u8)],
+    symbols: Vec<u8>,
+    bits: Vec<bool>,
+}
+
+impl Teller for Writer<'_> {
+    fn choose(&mut self, tet: usize, choices: &[Choice]) -> Option<usize> {
+        let remover = self.truth[tet].0;
+        let rank = choices.iter().position(|choice| choice.remover == remover);
+        let rank = rank.or_else(|| choices.iter().position(|choice| choice.remover == FURTHER))?;
+        self.symbols.push(rank as u8);
+        Some(rank)
+    }
+
+    fn further(&mut self, tet: usize, index_of: &mut dyn FnMut(u32) -> Option<u32>) -> Option<u32> {
+        let index = index_of(self.truth[tet].0)?;
+        let mut rest = index;
+        loop {
+            let (low, more) = ((rest & 7) as u8, rest > 7);
+            self.symbols.push(low | u8::from(more) << 3);
+            rest >>= 3;
+            if !more {
+                return Some(index);
+            }
+        }
+    }
+
+    fn is_inner(&mut self, tet: usize, face: usize, guess: bool) -> bool {
+        let inner = self.truth[tet].1 >> face & 1 == 1;
+        self.bits.push(inner != guess);
+        inner
+    }
+}
+
+impl HalfEdgeMt {
+    /// Finds what removes the tetrahedra of the star that update `u` makes. None if the code does not fit the star.
+    pub(super) fn find_removers(
+        &self,
+        mesh: &CurrentMesh,
+        u: UpdateId,
+        position: [i32; 3],
+        scratch: &mut Scratch,
+    ) -> Option<()> {
+        let star = self.update(u)?.star;
+        let (symbols, bits) = match star.split_first() {
+            Some((&count, rest)) => rest.split_at_checked(usize::from(count))?,
+            None => (star, star),
+        };
+        self.tell(mesh, u, position, scratch, &mut Reader { symbols, bits, at: 0 })
+    }
+
+    /// The code of a star, given the remover and the inner faces of each of its tetrahedra. None if it has none.
+    pub(super) fn code_star(
+        &self,
+        mesh: &CurrentMesh,
+        u: UpdateId,
+        position: [i32; 3],
+        scratch: &mut Scratch,
+        truth: &[(u32, u8)],
+    ) -> Option<Vec<u8>> {
+        let mut writer = Writer { truth, symbols: Vec::new(), bits: Vec::new() };
+        self.tell(mesh, u, position, scratch, &mut writer)?;
+        let Writer { mut symbols, bits, .. } = writer;
+        symbols.truncate(symbols.iter().rposition(|&s| s != 0).map_or(0, |last| last + 1));
+        let used = bits.iter().rposition(|&bit| bit).map_or(0, |last| last + 1);
+        if symbols.is_empty() && used == 0 {
+            return Some(Vec::new());
+        }
+        let mut code = vec![u8::try_from(symbols.len()).ok()?];
+        code.extend(symbols);
+        for eight in bits[..used].chunks(8) {
+            code.push((0..).zip(eight).fold(0, |byte, (i, &bit)| byte | u8::from(bit) << i));
+        }
+        Some(code)
+    }
+
+    fn tell(
+        &self,
+        mesh: &CurrentMesh,
+        u: UpdateId,
+        position: [i32; 3],
+        scratch: &mut Scratch,
+        teller: &mut impl Teller,
+    ) -> Option<()> {
+        let Scratch { star, star_len, link, link_len, code, sorted, hashes, .. } = scratch;
+        let (star, link) = (&mut star[..*star_len], &link[..*link_len]);
+        let vertex = self.vertex(u);
+        let later = |v| {
+            let children = self.children_of(v);
+            &children[children.partition_point(|child| child.update <= u.0)..]
+        };
+        let lists: Vec<&[ForestChild]> =
+            link.iter().map(|&slot| later(mesh.vertex(slot))).chain([later(vertex)]).collect();
+        if lists.iter().all(|list| list.is_empty()) {
+            star.iter_mut().for_each(|new| (new.remover, new.inner) = (NONE, 0));
+            return Some(());
+        }
+        let around = Around {
+            positions: link.iter().map(|&slot| mesh.positions[slot as usize]).chain([position]).collect(),
+            hashes,
+            lists,
+        };
+        code.hashes.clear();
+        code.hashes.resize(star.len(), 0);
+        sorted.iter().for_each(|&(hash, i)| code.hashes[i as usize % MOST] = hash);
+        code.find_removers(&around, star, teller)?;
+        code.find_inner(&around, star, teller);
+        Some(())
+    }
+}
+
+/// What surrounds a new vertex, by index into its link; the vertex itself is the last.
+struct Around<'a> {
+    positions: Vec<[i32; 3]>,
+    hashes: &'a [u64],
+    /// The forest children that come later.
+    lists: Vec<&'a [ForestChild]>,
+}
+
+impl Around<'_> {
+    #[inline]
+    fn index(&self, corner: u8) -> usize {
+        if corner == NEW { self.positions.len() - 1 } else { usize::from(corner) }
+    }
+
+    #[inline]
+    fn corners(&self, new: &NewTet) -> [[i32; 3]; 4] {
+        new.corners.map(|corner| self.positions[self.index(corner)])
+    }
+}
+
+/// Spreads a label over the bits of a word (the constants are those of SplitMix64).
+#[inline]
+pub(super) fn spread(label: u32) -> u64 {
+    let x = u64::from(label).wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    let x = (x ^ x >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    let x = (x ^ x >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
+    x ^ x >> 31
+}
+
+/// Certainties are told apart to this many levels.
+const CERTAINTIES: f64 = 4095.0;
+
+/// The place of something in the order of rising certainty, ties broken by a hash.
+fn key(certainty: f64, hash: u64) -> u64 {
+    let level = (certainty.clamp(0.0, 1.0) * CERTAINTIES) as u64;
+    level << 52 | hash >> 12
+}
+
+impl StarCode {
+    fn find_removers(
+        &mut self,
+        around: &Around<'_>,
+        star: &mut [NewTet],
+        teller: &mut impl Teller,
+    ) -> Option<()> {
+        self.choices.clear();
+        self.ends.clear();
+        self.rests.clear();
+        self.order.clear();
+        for (i, new) in star.iter().enumerate() {
+            let first = self.choices.len();
+            self.rank(around, new);
+            let hash = self.hashes[i];
+            self.ends.push(self.choices.len() as u32);
+            // What can only be one thing is not told.
+            if self.choices.len() - first > 1 {
+                self.order.push((key(self.choices[first].weight, hash), i as u8, 0));
+            }
+        }
+        self.near.clear();
+        self.near.resize(star.len(), 0);
+        self.aims.clear();
+        self.aims.resize(star.len(), [0; 3]);
+        star.iter_mut().for_each(|new| (new.remover, new.inner) = (NONE, 0));
+        self.order.sort_unstable();
+        for at in 0..self.order.len() {
+            let i = usize::from(self.order[at].1);
+            let first = i.checked_sub(1).map_or(0, |before| self.ends[before] as usize);
+            let choices = &self.choices[first..self.ends[i] as usize];
+            let mut choice = choices[teller.choose(i, choices)?];
+            if choice.remover == FURTHER {
+                choice = self.further(around, &star[i], i, teller)?;
+            }
+            if choice.remover == NONE {
+                continue;
+            }
+            let corner = usize::from(choice.corner) & 3;
+            star[i].remover = choice.remover;
+            self.near[i] = choice.corner;
+            let x = around.index(star[i].corners[corner]);
+            let list = around.lists[x];
+            let found = list.binary_search_by_key(&choice.remover, |child| child.update).ok()?;
+            let offset = list[found].offset;
+            self.aims[i] = [0, 1, 2].map(|k| around.positions[x][k].saturating_add(offset[k]));
+        }
+        Some(())
+    }
+
+    /// Appends the choices for a tetrahedron by falling weight.
+    fn rank(&mut self, around: &Around<'_>, new: &NewTet) {
+        let corners = around.corners(new);
+        let sum = [0, 1, 2].map(|k| corners.iter().map(|p| i64::from(p[k])).sum::<i64>());
+        let lists = new.corners.map(|corner| around.lists[around.index(corner)]);
+        let first = self.choices.len();
+        let mut next = [0_u32; 4];
+        let mut left = 1.0;
+        let mut more = true;
+        while self.choices.len() - first < RANKED && left >= LEFT {
+            let Some((corner, child)) = pop_least(&lists, &mut next) else {
+                more = false;
+                break;
+            };
+            let share = share(&corners, sum, corner, child.offset);
+            self.choices.push(Choice {
+                weight: left * share,
+                remover: child.update,
+                corner: corner as u8,
+            });
+            left *= 1.0 - share;
+        }
+        more &= (0..4).any(|k| (next[k] as usize) < lists[k].len());
+        let remover = if more { FURTHER } else { NONE };
+        self.choices.push(Choice { weight: left, remover, corner: 0 });
+        self.rests.push(next);
+        // Stable, and short.
+        self.choices[first..].sort_by(|a, b| b.weight.total_cmp(&a.weight));
+    }
+
+    /// The candidate without a rank that is told by its number, or none.
+    #[cold]
+    fn further(
+        &self,
+        around: &Around<'_>,
+        new: &NewTet,
+        i: usize,
+        teller: &mut impl Teller,
+    ) -> Option<Choice> {
+        let lists = new.corners.map(|corner| around.lists[around.index(corner)]);
+        let mut index_of = |remover: u32| {
+            if remover == NONE {
+                return Some(0);
+            }
+            let mut next = self.rests[i];
+            (1..).map_while(|index| pop_least(&lists, &mut next).map(|found| (index, found.1.update)))
+                .find(|found| found.1 == remover)
+                .map(|found| found.0)
+        };
+        let index = teller.further(i, &mut index_of)?;
+        let mut choice = Choice { weight: 0.0, remover: NONE, corner: 0 };
+        let mut next = self.rests[i];
+        for _ in 0..index {
+            let (corner, child) = pop_least(&lists, &mut next)?;
+            choice = Choice { weight: 0.0, remover: child.update, corner: corner as u8 };
+        }
+        Some(choice)
+    }
+
+    fn find_inner(&mut self, around: &Around<'_>, star: &mut [NewTet], teller: &mut impl Teller) {
+        self.order.clear();
+        for i in 0..star.len() {
+            let new = star[i];
+            if new.remover == NONE {
+                continue;
+            }
+            let corners = around.corners(&new);
+            let near = usize::from(self.near[i]) & 3;
+            for face in (0..4).filter(|&face| face != near) {
+                let behind = new.across[face];
+                if face != usize::from(new.own) && behind != NO_ENTRY {
+                    let other = star[usize::from(behind) % MOST].remover;
+                    if other == new.remover {
+                        star[i].inner |= 1 << face;
+                        continue;
+                    }
+                    if other > new.remover {
+                        continue;
+                    }
+                }
+                let mut with = corners;
+                with[face] = self.aims[i];
+                if !on_lattice(with[face]) || orient3d(with[0], with[1], with[2], with[3]) <= 0 {
+                    star[i].inner |= 1 << face;
+                    continue;
+                }
+                let sine = elevation(&corners, near, face, self.aims[i]);
+                let face_hash = around.hashes[around.index(new.corners[face])].rotate_left(17);
+                let key = key((sine - STEEP).abs(), self.hashes[i].wrapping_add(face_hash));
+                let guess = u8::from(sine < STEEP);
+                self.order.push((key, i as u8, face as u8 | guess << 7));
+            }
+        }
+        self.order.sort_unstable();
+        for &(_, i, face) in &self.order {
+            let (i, face, guess) = (usize::from(i), usize::from(face & 3), face >> 7 == 1);
+            if teller.is_inner(i, face, guess) {
+                star[i].inner |= 1 << face;
+            }
+        }
+    }
+}
+
+/// Whether predicates can be asked about a point.
+fn on_lattice(p: [i32; 3]) -> bool {
+    p.iter().all(|&x| (0..=1 << crate::geom::WIDE_BITS).contains(&x))
+}
+
+/// The next update of four ascending lists, merged, and which list it is of.
+#[inline]
+fn pop_least(lists: &[&[ForestChild]; 4], next: &mut [u32; 4]) -> Option<(usize, ForestChild)> {
+    let mut least: Option<(usize, ForestChild)> = None;
+    for k in 0..4 {
+        if let Some(&child) = lists[k].get(next[k] as usize)
+            && least.is_none_or(|(_, other)| child.update < other.update)
+        {
+            least = Some((k, child));
+        }
+    }
+    let (k, _) = least?;
+    next[k] += 1;
+    least
+}
+
+/// How likely a child of corner `corner`, at an offset, removes a tetrahedron that no earlier candidate has removed.
+#[inline]
+fn share(corners: &[[i32; 3]; 4], sum: [i64; 3], corner: usize, offset: [i32; 3]) -> f64 {
+    let at = corners[corner];
+    let centre = [0, 1, 2].map(|k| (sum[k] - 4 * i64::from(at[k])) as f64);
+    let to = offset.map(f64::from);
+    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let lengths = (dot(centre, centre) * dot(to, to)).sqrt();
+    let cosine = dot(centre, to) / lengths.max(1e-300);
+    let ratio = ((1.0 - cosine) / (1.0 + cosine).max(1e-9)).min(1e9);
+    1.0 / (1.0 + ratio * ratio)
+}
+
+/// Faces over which the new vertex lies at a larger sine than this are guessed to stay.
+const STEEP: f64 = 0.35;
+
+/// The sine of the angle at which a point lies over a face, seen from corner `near` of it.
+fn elevation(corners: &[[i32; 3]; 4], near: usize, face: usize, point: [i32; 3]) -> f64 {
+    let from = corners[near];
+    let apart = |p: [i32; 3]| [0, 1, 2].map(|k| f64::from(p[k]) - f64::from(from[k]));
+    let mut others = (0..4).filter(|&k| k != near && k != face);
+    let (Some(i), Some(j)) = (others.next(), others.next()) else { return 0.0 };
+    let (a, b) = (apart(corners[i]), apart(corners[j]));
+    let normal = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let to = apart(point);
+    let lengths = (dot(normal, normal) * dot(to, to)).sqrt();
+    dot(normal, to).abs() / lengths.max(1e-300)
+}
+
+/// What removes the stars of updates that have been applied, so that it need not be predicted again.
+#[derive(Clone, Debug)]
+pub(super) struct KnownStars {
+    /// Where each begins, and one more.
+    starts: Sparse<u32>,
+    /// For each: how many removers, these, and for each tetrahedron in canonical order four bits for the remover, 15 for none,
+    /// and four for the inner faces.
+    bytes: Vec<u8>,
+    /// Bytes of those that were forgotten.
+    waste: usize,
+}
+
+/// Removers that a known star can have.
+const FEW: usize = 15;
+
+impl Default for KnownStars {
+    fn default() -> Self {
+        Self { starts: Sparse::new(0), bytes: Vec::new(), waste: 0 }
+    }
+}
+
+impl KnownStars {
+    /// Bytes in memory.
+    pub fn bytes(&self) -> u64 {
+        (self.starts.bytes() + size_of_val(&self.bytes[..])) as u64
+    }
+
+    /// Enters what is known of the star of `u`, which is in canonical order; false if nothing is.
+    #[inline]
+    pub fn recall(&self, u: u32, scratch: &mut Scratch) -> bool {
+        let Some(record) = self.starts.get(u).checked_sub(1).and_then(|at| self.bytes.get(at as usize..)) else {
+            return false;
+        };
+        let Some((&count, rest)) = record.split_first() else { return false };
+        let Some((removers, marks)) = rest.split_at_checked(4 * usize::from(count)) else { return false };
+        let Some(marks) = marks.get(..scratch.sorted.len()) else { return false };
+        let mut known = [NONE; FEW + 1];
+        for (known, bytes) in known.iter_mut().zip(removers.chunks_exact(4)) {
+            *known = u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
+        }
+        known[FEW] = NONE;
+        for (&mark, &(_, i)) in marks.iter().zip(&scratch.sorted) {
+            let new = &mut scratch.star[i as usize % MOST];
+            (new.remover, new.inner) = (known[usize::from(mark & 15)], mark >> 4);
+        }
+        true
+    }
+
+    /// Takes note of the star of `u`, which is in canonical order.
+    pub fn keep(&mut self, u: u32, scratch: &Scratch) {
+        let mut known: Vec<u32> = Vec::with_capacity(FEW);
+        let mut marks = [0; MOST];
+        for (mark, &(_, i)) in marks.iter_mut().zip(&scratch.sorted) {
+            let NewTet { remover, inner, .. } = scratch.star[i as usize % MOST];
+            let at = if remover == NONE {
+                FEW
+            } else {
+                known.iter().position(|&r| r == remover).unwrap_or_else(|| {
+                    known.push(remover);
+                    known.len() - 1
+                })
+            };
+            if known.len() > FEW {
+                return;
+            }
+            *mark = at as u8 | inner << 4;
+        }
+        let Ok(start) = u32::try_from(self.bytes.len() + 1) else { return };
+        self.starts.set(u, start);
+        self.bytes.push(known.len() as u8);
+        known.iter().for_each(|remover| self.bytes.extend(remover.to_le_bytes()));
+        self.bytes.extend_from_slice(&marks[..scratch.sorted.len()]);
+    }
+
+    /// Forgets the stars of updates that go.
+    pub fn forget(&mut self, updates: std::ops::Range<u32>) {
+        self.waste += updates.clone().filter(|&u| self.starts.get(u) > 0).count() * USUAL;
+        self.starts.forget(updates);
+        if 2 * self.waste > self.bytes.len() {
+            *self = Self::default();
+        }
+    }
+}
+
+/// Bytes of a known star, as a rule.
+const USUAL: usize = 40;
