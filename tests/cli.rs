@@ -445,6 +445,20 @@ fn insertion_refuses_what_it_would_fill_up() {
 }
 
 #[test]
+fn an_mt_is_built_for_a_purpose() {
+    let folder = Folder::new("purpose");
+    let [input, mt] = ["b.vti", "b.mt"].map(|name| folder.path(name));
+    good(&["generate", "bucky", "--size", "7", "-o", &input]);
+    for criterion in ["half-edge", "delaunay"] {
+        for purpose in ["uniform", "regions"] {
+            let options = ["--kind", "vertex", "--criterion", criterion, "--for", purpose, "--quiet"];
+            good(&[&["build", &input, "-o", &mt], &options[..]].concat());
+            assert!(good(&["verify", &mt, "--against", &input]).contains("every promise is kept"));
+        }
+    }
+}
+
+#[test]
 fn kinds_methods_and_criteria_that_do_not_go_together_are_refused() {
     for (options, words) in [
         (
@@ -459,6 +473,9 @@ fn kinds_methods_and_criteria_that_do_not_go_together_are_refused() {
         (&["--kind", "face"], &["face", "edge, vertex, explicit"]),
         (&["--method", "guess"], &["guess", "collapse, insert, decimate"]),
         (&["--criterion", "none"], &["none", "delaunay, half-edge"]),
+        (&["--kind", "vertex", "--for", "all"], &["all", "uniform, regions"]),
+        (&["--kind", "edge", "--for", "regions"], &["--for", "--method decimate"]),
+        (&["--kind", "vertex", "--method", "insert", "--for", "regions"], &["--for", "--method decimate"]),
     ] {
         let arguments = [&["build", "a.vtu", "-o", "b.mt"], options].concat();
         bad(2, &arguments, words);

@@ -1,5 +1,6 @@
 //! What to simplify next: candidates in the order of error level, depth plus star size, and length.
 
+use super::Purpose;
 use crate::mt::ErrorCode;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -16,16 +17,29 @@ pub(super) struct Levels {
 }
 
 impl Levels {
-    /// Half a power of two each.
+    /// Two for each power of two: each is about √2 wide.
     pub const HALVES: Self = Self { bits: 10 };
-    /// A quarter of a power of two each.
+    /// Four for each power of two: each is about 2^¼ wide.
     pub const QUARTERS: Self = Self { bits: 9 };
+
+    /// What serves the purpose of an MT that is built by removing vertices.
+    pub fn of_purpose(purpose: Purpose) -> Self {
+        match purpose {
+            Purpose::Uniform => Self::QUARTERS,
+            Purpose::Regions => Self::HALVES,
+        }
+    }
 
     /// The level of an error. Stored errors are logarithmic, so their codes are; no logarithm is taken, since the
     /// libraries of different platforms round it differently.
     pub fn of(self, error: f64) -> u16 {
         let code = ErrorCode::at_least(error).max(ErrorCode::at_least(FINEST));
         code.0 >> self.bits
+    }
+
+    /// The level of the largest errors.
+    pub fn last(self) -> u16 {
+        ErrorCode::MAX.0 >> self.bits
     }
 
     /// The largest error of a level; of the last one, any.
@@ -56,6 +70,11 @@ impl Key {
 
     pub fn level(self) -> u16 {
         (self.cost >> 48) as u16
+    }
+
+    /// What orders candidates within a level.
+    pub fn second(self) -> u32 {
+        (self.cost >> 32) as u32 & 0xffff
     }
 
     /// Level, depth and star size: what has to be right before the candidate is carried out.

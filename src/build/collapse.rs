@@ -247,7 +247,7 @@ impl<'a> Builder<'a> {
 
     fn try_collapse(&mut self, key: Key) {
         let Key { a, b, .. } = key;
-        match self.plan.make(&mut self.mesh, &mut self.marks, &self.data.positions, &self.frozen, a, b) {
+        match self.plan.make(&self.mesh, &mut self.marks, &self.data.positions, &self.frozen, a, b) {
             Ok(()) => {}
             Err(Refusal::Blocked) => {
                 self.blocked.push((a, b, self.edge_version(a, b)));

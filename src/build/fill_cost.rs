@@ -27,8 +27,6 @@ pub(super) struct Past {
     pub makers: Vec<u32>,
     /// The errors of each removal, field by field.
     pub errors: Vec<f64>,
-    /// Length of the longest chain of removals that ends with each.
-    pub heights: Vec<u32>,
 }
 
 /// What a removal costs whatever fills its hole.
@@ -40,8 +38,6 @@ pub(super) struct Legacy {
     pub depends: bool,
     /// The least error of this removal in each field.
     pub errors: Vec<f64>,
-    /// One more than the longest chain of removals that it depends on.
-    pub height: u32,
 }
 
 /// One tetrahedron of a filling.
@@ -76,22 +72,22 @@ impl Past {
     /// What the hole's tetrahedra leave to the removal of its vertex.
     pub fn legacy(&self, hole: &Hole, reference: &Reference<'_>) -> Legacy {
         let fields = reference.quantized.fields.len();
-        let (mut inherited, mut height) = (vec![0.0_f64; fields], 0);
+        let mut inherited = vec![0.0_f64; fields];
+        let mut depends = false;
         for s in &hole.star {
             let maker = self.makers[s.tet as usize];
             if maker != NONE {
                 let errors = &self.errors[maker as usize * fields..][..fields];
                 inherited.iter_mut().zip(errors).for_each(|(error, made)| *error = error.max(*made));
-                height = height.max(self.heights[maker as usize]);
+                depends = true;
             }
         }
-        let depends = height > 0;
         let mut errors = inherited.clone();
         if depends {
             let overshoot = |f: usize| reference.quantized.overshoot(hole.a, &hole.link, f);
             errors.iter_mut().enumerate().for_each(|(f, error)| *error += overshoot(f));
         }
-        Legacy { inherited, depends, errors, height: height + 1 }
+        Legacy { inherited, depends, errors }
     }
 }
 

@@ -4,6 +4,7 @@ use super::hole::Filling;
 use super::hole::Hole;
 use super::plan::VertexMarks;
 use super::work_mesh::StarTet;
+use super::work_mesh::TetMarks;
 use super::work_mesh::WorkMesh;
 use crate::mesh::NONE;
 
@@ -75,16 +76,25 @@ fn lay_border(hole: &Hole, b: u32, filling: &mut Filling) -> bool {
     true
 }
 
+/// Scratch space of [`keeps_topology`].
+pub(super) struct Nearby {
+    marks: VertexMarks,
+    seen: TetMarks,
+    star: Vec<StarTet>,
+}
+
+impl Nearby {
+    /// Of a mesh of so many vertices.
+    pub fn new(vertices: usize) -> Self {
+        Self { marks: VertexMarks::new(vertices), seen: TetMarks::default(), star: Vec::new() }
+    }
+}
+
 /// The link condition, with the boundary closed by a cone from a vertex ω outside.
 /// (Dey, Edelsbrunner, Guha, Nekhayev: *Topology preserving edge contraction*, 1999.)
-pub(super) fn keeps_topology(
-    hole: &Hole,
-    mesh: &mut WorkMesh,
-    marks: &mut VertexMarks,
-    star: &mut Vec<StarTet>,
-    b: u32,
-) -> bool {
-    if !mesh.star(b, LARGEST_STAR, star) {
+pub(super) fn keeps_topology(hole: &Hole, mesh: &WorkMesh, scratch: &mut Nearby, b: u32) -> bool {
+    let Nearby { marks, seen, star } = scratch;
+    if !mesh.star(b, LARGEST_STAR, seen, star) {
         return false;
     }
     mark(hole, marks, b);

@@ -2,6 +2,7 @@
 
 use super::plan::Refusal;
 use super::work_mesh::StarTet;
+use super::work_mesh::TetMarks;
 use super::work_mesh::WorkMesh;
 use crate::geom::NARROW_BITS;
 use crate::geom::orient3d;
@@ -32,6 +33,7 @@ pub(super) struct Hole {
     sides: Vec<([i32; 3], [i64; 3])>,
     /// Whether orientations fit `i64`.
     narrow: bool,
+    seen: TetMarks,
 }
 
 /// Tetrahedra that fill a hole.
@@ -46,9 +48,9 @@ pub(super) struct Filling {
 
 impl Hole {
     /// Looks at what the removal of `a` would leave.
-    pub fn open(&mut self, mesh: &mut WorkMesh, positions: &[[i32; 3]], a: u32) -> Result<(), Refusal> {
+    pub fn open(&mut self, mesh: &WorkMesh, positions: &[[i32; 3]], a: u32) -> Result<(), Refusal> {
         self.a = a;
-        if !mesh.star(a, MAX_HOLE, &mut self.star) {
+        if !mesh.star(a, MAX_HOLE, &mut self.seen, &mut self.star) {
             return Err(Refusal::Blocked);
         }
         self.faces.clear();

@@ -24,6 +24,33 @@ pub enum Criterion {
     HalfEdge,
 }
 
+/// What an MT is built for, where that makes a difference: with [`Method::Decimate`].
+///
+/// Vertices go in levels of error, and within a level in rounds of removals that do not depend on each other. Wide levels
+/// leave more freedom to remove first what depends on little. Then less has to be refined beside a region for the region's
+/// sake; but vertices go that should have stayed a little longer, so that meshes of one error everywhere are larger.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Purpose {
+    /// Meshes of one error everywhere: levels are 2^¼ wide.
+    #[default]
+    Uniform,
+    /// Regions at full detail: levels are √2 wide.
+    Regions,
+}
+
+impl Purpose {
+    /// All purposes.
+    pub const ALL: [Self; 2] = [Self::Uniform, Self::Regions];
+
+    /// The purpose in one word, as options have it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Uniform => "uniform",
+            Self::Regions => "regions",
+        }
+    }
+}
+
 impl Method {
     /// All methods.
     pub const ALL: [Self; 3] = [Self::Collapse, Self::Insert, Self::Decimate];

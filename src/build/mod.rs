@@ -39,6 +39,9 @@ mod place;
 mod plan;
 mod precision;
 mod quantize;
+mod reach;
+mod removal;
+mod rounds;
 mod sequence;
 mod skin;
 mod vertex;
@@ -48,6 +51,7 @@ pub use collapse::edge_mt;
 pub use delaunay::delaunay;
 pub use method::Criterion;
 pub use method::Method;
+pub use method::Purpose;
 
 use crate::mesh::MeshError;
 use crate::mesh::TetMesh;
@@ -73,6 +77,8 @@ pub struct BuildConfig {
     pub method: Method,
     /// By what criterion vertices are removed or inserted; [`Method::Collapse`] has its own.
     pub criterion: Criterion,
+    /// What it is built for; [`Method::Decimate`] makes use of this.
+    pub purpose: Purpose,
     /// Names of the fields to keep, in this order; a vector's name stands for its components. Of a time series all steps
     /// are kept. The first field of the mesh if empty.
     pub fields: Vec<String>,
@@ -108,6 +114,7 @@ impl Default for BuildConfig {
             kind: MtKind::Edge,
             method: Method::Collapse,
             criterion: Criterion::HalfEdge,
+            purpose: Purpose::default(),
             fields: Vec::new(),
             all_fields: false,
             position_bits: None,

@@ -1,6 +1,7 @@
 //! May this edge be collapsed? What comes of it? The tests that need no field: topology and orientation.
 
 use super::work_mesh::StarTet;
+use super::work_mesh::TetMarks;
 use super::work_mesh::WorkMesh;
 use crate::geom::orient3d;
 use crate::mesh::NONE;
@@ -37,6 +38,7 @@ pub(super) struct Plan {
     star_a: Vec<StarTet>,
     star_b: Vec<StarTet>,
     edges: Vec<(u32, u32)>,
+    seen: TetMarks,
 }
 
 /// Marks on vertices around the edge that is looked at.
@@ -89,7 +91,7 @@ impl Plan {
     /// Plans the collapse of edge `ab`.
     pub fn make(
         &mut self,
-        mesh: &mut WorkMesh,
+        mesh: &WorkMesh,
         marks: &mut VertexMarks,
         positions: &[[i32; 3]],
         frozen: &[bool],
@@ -104,7 +106,8 @@ impl Plan {
             return Err(Refusal::Never);
         }
         (self.a, self.b) = (a, b);
-        if !mesh.star(a, LARGEST_STAR, &mut self.star_a) || !mesh.star(b, LARGEST_STAR, &mut self.star_b) {
+        let Self { star_a, star_b, seen, .. } = self;
+        if !mesh.star(a, LARGEST_STAR, seen, star_a) || !mesh.star(b, LARGEST_STAR, seen, star_b) {
             return Err(Refusal::Blocked);
         }
         self.part(mesh)?;

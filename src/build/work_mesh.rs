@@ -13,8 +13,37 @@ pub(super) struct WorkMesh {
     pub incident: Vec<u32>,
     /// Numbers of dead tetrahedra that [`WorkMesh::fresh`] may give away.
     unused: Vec<u32>,
+}
+
+/// Marks on tetrahedra. They are apart from the mesh, so that searches need not change it.
+#[derive(Default)]
+pub(super) struct TetMarks {
     marks: Vec<u32>,
     epoch: u32,
+}
+
+impl TetMarks {
+    /// Takes all marks away, in a mesh of so many tetrahedra.
+    fn start(&mut self, tets: usize) {
+        self.epoch = self.epoch.wrapping_add(1);
+        if self.epoch == 0 {
+            self.marks.fill(0);
+            self.epoch = 1;
+        }
+        if self.marks.len() < tets {
+            self.marks.resize(tets, 0);
+        }
+    }
+
+    #[inline]
+    fn has(&self, t: u32) -> bool {
+        self.marks[t as usize] == self.epoch
+    }
+
+    #[inline]
+    fn add(&mut self, t: u32) {
+        self.marks[t as usize] = self.epoch;
+    }
 }
 
 /// A tetrahedron of a star, and which of its corners is the centre.
@@ -30,8 +59,7 @@ impl WorkMesh {
         for (t, tet) in tets.iter().enumerate() {
             tet.iter().for_each(|&v| incident[v as usize] = t as u32);
         }
-        let marks = vec![0; tets.len()];
-        Self { tets, neighbors, incident, unused: Vec::new(), marks, epoch: 0 }
+        Self { tets, neighbors, incident, unused: Vec::new() }
     }
 
     /// Whether the vertex is in the mesh.
@@ -45,24 +73,20 @@ impl WorkMesh {
     }
 
     /// The tetrahedra around `v` that hang together through faces, unless there are more than `most`.
-    pub fn star(&mut self, v: u32, most: usize, star: &mut Vec<StarTet>) -> bool {
-        self.epoch = self.epoch.wrapping_add(1);
-        if self.epoch == 0 {
-            self.marks.fill(0);
-            self.epoch = 1;
-        }
+    pub fn star(&self, v: u32, most: usize, marks: &mut TetMarks, star: &mut Vec<StarTet>) -> bool {
+        marks.start(self.tets.len());
         star.clear();
-        self.reach(self.incident[v as usize], v, star);
+        self.reach(self.incident[v as usize], v, marks, star);
         let mut next = 0;
         while next < star.len() {
             let StarTet { tet, corner } = star[next];
             next += 1;
             for (i, n) in self.neighbors[tet as usize].into_iter().enumerate() {
-                if i != corner as usize && n != NONE && self.marks[n as usize] != self.epoch {
+                if i != corner as usize && n != NONE && !marks.has(n) {
                     if star.len() == most {
                         return false;
                     }
-                    self.reach(n, v, star);
+                    self.reach(n, v, marks, star);
                 }
             }
         }
@@ -70,8 +94,8 @@ impl WorkMesh {
     }
 
     #[inline]
-    fn reach(&mut self, t: u32, v: u32, star: &mut Vec<StarTet>) {
-        self.marks[t as usize] = self.epoch;
+    fn reach(&self, t: u32, v: u32, marks: &mut TetMarks, star: &mut Vec<StarTet>) {
+        marks.add(t);
         let tet = self.tets[t as usize];
         let corner =
             usize::from(tet[1] == v) | (usize::from(tet[2] == v) << 1) | (usize::from(tet[3] == v) * 3);
@@ -101,7 +125,6 @@ impl WorkMesh {
         self.unused.pop().unwrap_or_else(|| {
             self.tets.push([NONE; 4]);
             self.neighbors.push([NONE; 4]);
-            self.marks.push(0);
             (self.tets.len() - 1) as u32
         })
     }

@@ -19,6 +19,7 @@ use tetralod::build::BuildSummary;
 use tetralod::build::Criterion;
 use tetralod::build::FieldPrecision;
 use tetralod::build::Method;
+use tetralod::build::Purpose;
 use tetralod::format::EncodeOptions;
 use tetralod::format::encode_to;
 use tetralod::io::CellData;
@@ -48,6 +49,10 @@ pub struct Arguments {
     /// decimate].
     #[arg(long, value_name = "CRITERION", value_parser = criterion)]
     criterion: Option<Criterion>,
+    /// What it is for, with decimate: uniform, the fewest tetrahedra at one error everywhere, or regions, which then take
+    /// less around them with them [default: uniform].
+    #[arg(long = "for", value_name = "PURPOSE", value_parser = purpose)]
+    purpose: Option<Purpose>,
     /// A field to keep (repeatable, in this order), or a vector with all its components; the first field if not given.
     #[arg(long = "field", value_name = "NAME")]
     fields: Vec<String>,
@@ -159,6 +164,10 @@ fn criterion(text: &str) -> Result<Criterion> {
     named(text, &Criterion::ALL.map(|criterion| (criterion.name(), criterion)))
 }
 
+fn purpose(text: &str) -> Result<Purpose> {
+    named(text, &Purpose::ALL.map(|purpose| (purpose.name(), purpose)))
+}
+
 /// What has this name.
 fn named<T: Copy>(text: &str, all: &[(&str, T)]) -> Result<T> {
     let found = all.iter().find(|(name, _)| *name == text).map(|&(_, value)| value);
@@ -250,6 +259,7 @@ fn config(arguments: &Arguments) -> BuildConfig {
         kind,
         method,
         criterion: arguments.criterion.unwrap_or(Criterion::usual(method)),
+        purpose: arguments.purpose.unwrap_or(default.purpose),
         fields: arguments.fields.clone(),
         all_fields: arguments.all_fields,
         position_bits: arguments.position_bits,
@@ -266,6 +276,9 @@ fn config(arguments: &Arguments) -> BuildConfig {
     }
     if method == Method::Collapse && arguments.criterion.is_some() {
         super::refuse_usage("--criterion goes with --method insert or decimate, not with collapse");
+    }
+    if method != Method::Decimate && arguments.purpose.is_some() {
+        super::refuse_usage("--for goes with --method decimate");
     }
     config
 }

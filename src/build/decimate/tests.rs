@@ -2,10 +2,18 @@
 
 use super::Criterion;
 use super::Decimated;
+use super::Decimator;
+use super::Levels;
+use super::State;
+use super::WorkMesh;
 use super::decimate;
-use super::largest;
+use super::quantize;
 use crate::build::BuildConfig;
 use crate::build::BuildError;
+use crate::build::Purpose;
+use crate::build::cost::largest;
+use crate::build::gift_wrap::GiftWrap;
+use crate::build::reach::Reach;
 use crate::build::sequence::Insertion;
 use crate::geom::in_conflict;
 use crate::geom::nearest_on_triangle;
@@ -26,6 +34,13 @@ use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 
 const CRITERIA: [Criterion; 2] = [Criterion::HalfEdge, Criterion::Delaunay];
+
+/// Every criterion, and every purpose.
+const WAYS: [(Criterion, Purpose); 3] = [
+    (Criterion::HalfEdge, Purpose::Uniform),
+    (Criterion::HalfEdge, Purpose::Regions),
+    (Criterion::Delaunay, Purpose::Uniform),
+];
 
 fn hilly([x, y, z]: [f64; 3]) -> f64 {
     let hill = |a: f64, b: f64, c: f64| (-((x - a).powi(2) + (y - b).powi(2) + (z - c).powi(2)) * 9.0).exp();
@@ -83,8 +98,12 @@ fn domains() -> Vec<(&'static str, TetMesh)> {
 }
 
 fn built(mesh: &TetMesh, criterion: Criterion) -> Decimated {
+    built_for(mesh, criterion, Purpose::default())
+}
+
+fn built_for(mesh: &TetMesh, criterion: Criterion, purpose: Purpose) -> Decimated {
     let fields = mesh.fields.iter().map(|field| field.name.clone()).collect();
-    let config = BuildConfig { fields, ..BuildConfig::default() };
+    let config = BuildConfig { fields, purpose, ..BuildConfig::default() };
     decimate(mesh, &config, criterion, &mut |_| ControlFlow::Continue(())).expect("a valid mesh")
 }
 
@@ -156,13 +175,17 @@ fn shape(points: usize, tets: &[[u32; 4]]) -> (usize, i64, i64, Vec<bool>) {
 #[test]
 fn every_step_of_a_replay_is_a_sound_mesh() {
     for (name, mesh) in domains() {
-        for criterion in CRITERIA {
-            let result = built(&mesh, criterion);
+        for (criterion, purpose) in WAYS {
+            let result = built_for(&mesh, criterion, purpose);
             let points = mesh.positions.len();
             let expected = shape(points, &mesh.tets);
             let mut replay = Replay::new(&result.sequence.base);
             let mut present: BTreeSet<u32> = result.sequence.base.iter().flatten().copied().collect();
-            assert_eq!(shape(points, &replay.tets()), expected, "{name} {criterion:?}: the base mesh");
+            assert_eq!(
+                shape(points, &replay.tets()),
+                expected,
+                "{name} {criterion:?} {purpose:?}: the base mesh"
+            );
             for step in &result.sequence.steps {
                 assert!(present.insert(step.vertex), "a vertex comes once");
                 replay.insert(&result, step);
@@ -172,10 +195,14 @@ fn every_step_of_a_replay_is_a_sound_mesh() {
                 assert!(link.len() <= MAX_LINK + 1 && inserted.len() <= 60 && removed.len() <= 128);
                 let volumes = [removed, inserted].map(|tets| six_volumes(&result, tets));
                 assert!(step.step > 0.0 || volumes[0] == volumes[1], "the boundary stays");
-                assert_eq!(shape(points, &replay.tets()), expected, "{name} {criterion:?}");
+                assert_eq!(shape(points, &replay.tets()), expected, "{name} {criterion:?} {purpose:?}");
             }
             let all: BTreeSet<[u32; 4]> = mesh.tets.iter().copied().map(sorted).collect();
-            assert_eq!(replay.0.keys().copied().collect::<BTreeSet<_>>(), all, "{name} {criterion:?}");
+            assert_eq!(
+                replay.0.keys().copied().collect::<BTreeSet<_>>(),
+                all,
+                "{name} {criterion:?} {purpose:?}"
+            );
             assert!(replay.0.values().all(|tet| six_volumes(&result, &[*tet]) > 0));
         }
     }
@@ -184,8 +211,8 @@ fn every_step_of_a_replay_is_a_sound_mesh() {
 #[test]
 fn errors_follow_the_dependencies() {
     for (name, mesh) in domains() {
-        for criterion in CRITERIA {
-            let result = built(&mesh, criterion);
+        for (criterion, purpose) in WAYS {
+            let result = built_for(&mesh, criterion, purpose);
             let sequence = &result.sequence;
             // Which insertion made each tetrahedron.
             let mut makers: BTreeMap<[u32; 4], usize> = BTreeMap::new();
@@ -193,7 +220,10 @@ fn errors_follow_the_dependencies() {
                 for &tet in &sequence.tets[step.removed.clone()] {
                     if let Some(&parent) = makers.get(&sorted(tet)) {
                         let least = largest(&step.errors) + sequence.steps[parent].step;
-                        assert!(largest(&sequence.steps[parent].errors) >= least, "{name} {criterion:?}");
+                        assert!(
+                            largest(&sequence.steps[parent].errors) >= least,
+                            "{name} {criterion:?} {purpose:?}"
+                        );
                     }
                 }
                 let error = ErrorCode::at_least(largest(&step.errors));
@@ -271,8 +301,8 @@ fn boundary_vertices(mesh: &TetMesh) -> BTreeSet<u32> {
 #[test]
 fn every_reference_vertex_is_within_the_error() {
     for (name, mesh) in domains() {
-        for criterion in CRITERIA {
-            let result = built(&mesh, criterion);
+        for (criterion, purpose) in WAYS {
+            let result = built_for(&mesh, criterion, purpose);
             let rim = boundary_vertices(&mesh);
             for bound in [0.003, 0.02, 0.06, 0.15, 0.4] {
                 // Errors are monotone, so that these insertions do not need the others.
@@ -290,11 +320,14 @@ fn every_reference_vertex_is_within_the_error() {
                 for &point in &rim {
                     let distance = distance(&result, &border, point);
                     let most = bound * result.displacement_per_error + 1e-9;
-                    assert!(distance <= most, "{name} {criterion:?}: boundary point {point} at {bound}");
+                    assert!(
+                        distance <= most,
+                        "{name} {criterion:?} {purpose:?}: boundary point {point} at {bound}"
+                    );
                 }
                 for point in 0..mesh.positions.len() {
                     let good = is_within(&result, &tets, &border, point, allowed);
-                    assert!(good, "{name} {criterion:?}: point {point} at {bound}");
+                    assert!(good, "{name} {criterion:?} {purpose:?}: point {point} at {bound}");
                 }
             }
         }
@@ -355,8 +388,11 @@ fn vertices_at_which_parts_touch_stay() {
 #[test]
 fn the_same_input_gives_the_same_sequence() {
     let mesh = bent(blocks([5; 3], |_| true));
-    for criterion in CRITERIA {
-        assert_eq!(built(&mesh, criterion).sequence, built(&mesh, criterion).sequence);
+    for (criterion, purpose) in WAYS {
+        assert_eq!(
+            built_for(&mesh, criterion, purpose).sequence,
+            built_for(&mesh, criterion, purpose).sequence
+        );
     }
 }
 
@@ -402,5 +438,54 @@ fn the_finest_lattice_will_do() {
         let mut replay = Replay::new(&result.sequence.base);
         result.sequence.steps.iter().for_each(|step| replay.insert(&result, step));
         assert_eq!(replay.0.len(), mesh.tets.len());
+    }
+}
+
+/// What takes place in one round does not depend on anything else that does, and the reaches of the candidates hold all
+/// that their removals would depend on, and no more.
+#[test]
+fn the_removals_of_a_round_are_independent() {
+    for (name, mesh) in domains() {
+        for (criterion, purpose) in WAYS {
+            let quantized = quantize::quantize(&mesh, &BuildConfig::default()).expect("a valid mesh");
+            let topology = topology(mesh.positions.len(), &mesh.tets).expect("a conforming mesh");
+            let work = WorkMesh::new(mesh.tets.clone(), topology.neighbors, mesh.positions.len());
+            let levels = Levels::of_purpose(purpose);
+            let state = State::new(work, &quantized, 1.0, topology.non_manifold, levels);
+            let wrap = (criterion == Criterion::Delaunay).then(|| GiftWrap::new(&quantized.positions));
+            let mut decimator = Decimator::new(state, wrap);
+            // The removal that made each tetrahedron, and the boxes of the removals.
+            let mut makers: BTreeMap<[u32; 4], usize> = BTreeMap::new();
+            let mut boxes: Vec<Reach> = Vec::new();
+            let mut largest_round = 0;
+            loop {
+                let start = boxes.len();
+                decimator.round(&mut |_| ControlFlow::Continue(())).expect("not stopped");
+                let sequence = &decimator.sequence;
+                for (i, step) in sequence.steps.iter().enumerate().skip(start) {
+                    let mut reach = Reach::default();
+                    for &tet in &sequence.tets[step.inserted.clone()] {
+                        tet.iter().for_each(|&v| reach.add(quantized.positions[v as usize]));
+                        if let Some(&maker) = makers.get(&sorted(tet)) {
+                            assert!(
+                                maker < start,
+                                "{name} {criterion:?} {purpose:?}: {i} depends on {maker}"
+                            );
+                            reach.join(&boxes[maker]);
+                        }
+                    }
+                    let told = decimator.state.reaches[step.vertex as usize];
+                    assert_eq!(told, reach, "{name} {criterion:?} {purpose:?}: removal {i}");
+                    boxes.push(reach);
+                    let filling = &sequence.tets[step.removed.clone()];
+                    filling.iter().for_each(|&tet| _ = makers.insert(sorted(tet), i));
+                }
+                largest_round = largest_round.max(boxes.len() - start);
+                if !decimator.rounds.end(boxes.len() - start, mesh.positions.len() - boxes.len()) {
+                    break;
+                }
+            }
+            assert!(largest_round > 1 || boxes.len() < 10, "{name} {criterion:?}: rounds of one removal");
+        }
     }
 }

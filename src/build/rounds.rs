@@ -1,0 +1,89 @@
+//! What to look at next: vertices in levels of error, and in each level in rounds.
+//!
+//! In a round no removal may touch what another one of the same round has made. That keeps chains of updates that depend
+//! on each other short, and all that a region needs near to it. All candidates of a round are looked at before any of
+//! them is carried out; as none changes the star of another one, what was found still holds when its turn comes. What comes
+//! too near to a removal waits for the next round. A round that removes little ends its level, and what waits is looked at
+//! again in the next level.
+
+use std::mem;
+
+/// A round that removes less than this part of the mesh's vertices, one in so many, ends its level.
+const LITTLE: usize = 20;
+
+/// A vertex of a later level, and what was found when it was looked at.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Later {
+    pub vertex: u32,
+    /// The best of the neighbours that it could be moved to.
+    pub end: u32,
+    /// Its neighbourhood was in this version.
+    pub version: u32,
+}
+
+/// The vertices that are to be looked at.
+pub(super) struct Rounds {
+    level: u16,
+    last_level: u16,
+    /// Those of the next round, each once.
+    waiting: Vec<u32>,
+    waits: Vec<bool>,
+    /// Those of later levels. If their neighbourhood has changed since, they are waiting, too.
+    later: Vec<Vec<Later>>,
+}
+
+impl Rounds {
+    /// Nothing yet, at the first of these levels, of a mesh of so many vertices.
+    pub fn new(first_level: u16, last_level: u16, vertices: usize) -> Self {
+        let later = vec![Vec::new(); usize::from(last_level) + 1];
+        Self { level: first_level, last_level, waiting: Vec::new(), waits: vec![false; vertices], later }
+    }
+
+    /// The level that is worked on.
+    pub fn level(&self) -> u16 {
+        self.level
+    }
+
+    /// Lets a vertex wait for the next round: it was not looked at yet, or its neighbourhood has changed.
+    pub fn wait(&mut self, vertex: u32) {
+        if !mem::replace(&mut self.waits[vertex as usize], true) {
+            self.waiting.push(vertex);
+        }
+    }
+
+    /// Whether a vertex waits: in the midst of a round, whether the round has changed its star.
+    pub fn waits(&self, vertex: u32) -> bool {
+        self.waits[vertex as usize]
+    }
+
+    /// Puts a vertex off to a later level.
+    pub fn put_off(&mut self, level: u16, later: Later) {
+        self.later[usize::from(level)].push(later);
+    }
+
+    /// Starts a round: what waits, and what was put off to this level.
+    pub fn start(&mut self) -> (Vec<u32>, Vec<Later>) {
+        let waiting = mem::take(&mut self.waiting);
+        waiting.iter().for_each(|&v| self.waits[v as usize] = false);
+        (waiting, mem::take(&mut self.later[usize::from(self.level)]))
+    }
+
+    /// Ends a round that has removed so many vertices of a mesh that has so many left. False if there is nothing to do
+    /// any more.
+    pub fn end(&mut self, removed: usize, left: usize) -> bool {
+        let goes_on = !self.waiting.is_empty();
+        if goes_on && (removed * LITTLE >= left + removed || self.level == self.last_level) {
+            return true;
+        }
+        let above = usize::from(self.level) + 1;
+        let next = if goes_on {
+            Some(above)
+        } else {
+            (above..self.later.len()).find(|&l| !self.later[l].is_empty())
+        };
+        if let Some(level) = next {
+            self.level = level as u16;
+        }
+        next.is_some()
+    }
+}
