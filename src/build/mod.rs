@@ -47,6 +47,7 @@ mod skin;
 mod vertex;
 mod work_mesh;
 
+use order::Updates;
 pub use collapse::edge_mt;
 pub use delaunay::delaunay;
 pub use method::Criterion;
@@ -376,15 +377,56 @@ pub fn build(
         }
     };
     // Conversions keep the numbers of the vertices.
-    let mt = match mt {
+    let (mt, vertices, exact) = match mt {
         Mt::Explicit(explicit) if config.kind == MtKind::HalfEdge => {
-            let bits = config.block_bits.clamp(4, 16);
-            HalfEdgeMt::from_explicit(&explicit, bits).map_err(BuildError::Convert)?.into()
+            let (mt, vertices) = half_edge_mt(&explicit, &vertices, config.block_bits.clamp(4, 16))?;
+            let exact = choice::exact_values(mesh, config, &vertices)?;
+            (mt.into(), vertices, exact)
         }
+        mt => (mt, vertices, exact),
+    };
+    let mt = match mt {
         mt if mt.info().kind == config.kind => mt,
         mt => mt.convert(config.kind).map_err(BuildError::Convert)?,
     };
     Ok(BuildResult { mt, summary, vertices, exact })
+}
+
+/// The half-edge MT of an explicit one, its updates in blocks by depth and place, and its vertex for each point, given those
+/// of the explicit one.
+fn half_edge_mt(
+    explicit: &ExplicitMt,
+    vertices: &[VertexId],
+    block_bits: u32,
+) -> Result<(HalfEdgeMt, Vec<VertexId>), BuildError> {
+    let near = HalfEdgeMt::near_vertices(explicit).map_err(BuildError::Convert)?;
+    let (mut starts, mut parents) = (vec![0], Vec::new());
+    let all = || (0..explicit.updates()).map(UpdateId);
+    for u in all() {
+        parents.extend_from_slice(explicit.parents(u));
+        starts.push(parents.len() as u32);
+    }
+    let sites: Vec<[i32; 3]> = all().map(|u| explicit.position(VertexId(explicit.created(u).start))).collect();
+    let base = explicit.base_mesh().positions.len() as u32;
+    let updates = Updates {
+        base,
+        vertices: &near,
+        starts: &starts,
+        parents: &parents,
+        sites: &sites,
+        bits: explicit.info().lattice.bits,
+        created: 1,
+    };
+    let order = updates.order_by_depth(block_bits);
+    let explicit = explicit.reordered(&order).map_err(BuildError::Internal)?;
+    let mut new_numbers = vec![0; order.len()];
+    (0..).zip(&order).for_each(|(new, &old)| new_numbers[old as usize] = new);
+    let renamed = |v: &VertexId| match v.0.checked_sub(base) {
+        Some(update) => VertexId(base + new_numbers[update as usize]),
+        None => *v,
+    };
+    let mt = HalfEdgeMt::from_explicit(&explicit, block_bits).map_err(BuildError::Convert)?;
+    Ok((mt, vertices.iter().map(renamed).collect()))
 }
 
 /// Adds what is to be told of an MT that is spelled out.

@@ -19,6 +19,8 @@ pub(super) struct Updates<'a> {
     /// Where each takes place, on a lattice of `bits` bits.
     pub sites: &'a [[i32; 3]],
     pub bits: u32,
+    /// Vertices that an update creates.
+    pub created: u32,
 }
 
 /// Models of so many updates or fewer are always fetched as a whole; nothing is gained by putting what is near together.
@@ -26,6 +28,9 @@ const SMALL: usize = 1 << 17;
 
 /// A band ends where this many times as many updates have come as before it.
 const BAND_GROWTH: usize = 4;
+
+/// A band of depth has about so many blocks.
+const BAND_BLOCKS: usize = 24;
 
 /// Updates in a cell of a band.
 const CELL: usize = 512;
@@ -40,8 +45,54 @@ impl Updates<'_> {
         let count = self.vertices.len();
         let mut order: Vec<u32> = (0..count as u32).collect();
         if count > SMALL {
-            order = self.by_place();
+            order = self.by_place(&self.error_bands());
         }
+        self.sort_blocks(&mut order, block_bits);
+        order
+    }
+
+    /// The updates of a half-edge MT in the new order: by bands of depth in the partial order, in these place by place.
+    pub fn order_by_depth(&self, block_bits: u32) -> Vec<u32> {
+        let count = self.vertices.len();
+        let mut depths = vec![0_u32; count];
+        for u in 0..count as u32 {
+            depths[u as usize] = self.parents(u).iter().map(|&p| depths[p as usize] + 1).max().unwrap_or(0);
+        }
+        let deepest = depths.iter().max().map_or(0, |&depth| depth as usize + 1);
+        let width = deepest.div_ceil((count / (BAND_BLOCKS << block_bits)).max(1)).max(1);
+        let mut ranked: Vec<u32> = (0..count as u32).collect();
+        ranked.sort_by_key(|&u| depths[u as usize] as usize / width);
+        let mut ends: Vec<usize> = Vec::new();
+        for at in 1..=count {
+            let band = |at: usize| depths[ranked[at] as usize] as usize / width;
+            if at == count || band(at) != band(at - 1) {
+                ends.push(at);
+            }
+        }
+        // The same updates, numbered as they are ranked.
+        let mut ranks = vec![0_u32; count];
+        (0..).zip(&ranked).for_each(|(rank, &u)| ranks[u as usize] = rank);
+        let (mut starts, mut parents) = (vec![0], Vec::new());
+        for &u in &ranked {
+            parents.extend(self.parents(u).iter().map(|&p| ranks[p as usize]));
+            starts.push(parents.len() as u32);
+        }
+        let vertex = |&u: &u32| match self.vertices[u as usize].checked_sub(self.base) {
+            Some(creator) => self.base + ranks[creator as usize],
+            None => self.vertices[u as usize],
+        };
+        let vertices: Vec<u32> = ranked.iter().map(vertex).collect();
+        let sites: Vec<[i32; 3]> = ranked.iter().map(|&u| self.sites[u as usize]).collect();
+        let updates =
+            Updates { vertices: &vertices, starts: &starts, parents: &parents, sites: &sites, ..*self };
+        let mut order = updates.by_place(&ends);
+        updates.sort_blocks(&mut order, block_bits);
+        order.into_iter().map(|rank| ranked[rank as usize]).collect()
+    }
+
+    /// Sorts the updates of each block.
+    fn sort_blocks(&self, order: &mut [u32], block_bits: u32) {
+        let count = self.vertices.len();
         let mut new_numbers = vec![u32::MAX; count];
         let mut depths = vec![0_u32; count];
         let mut first = 0;
@@ -55,7 +106,6 @@ impl Updates<'_> {
             self.sort(block, first, &depths, &mut new_numbers);
             first += block.len() as u32;
         }
-        order
     }
 
     /// Sorts a block by depth and new vertex number, and numbers its updates from `first` on.
@@ -80,13 +130,26 @@ impl Updates<'_> {
     fn vertex(&self, u: u32, new_numbers: &[u32]) -> u32 {
         let vertex = self.vertices[u as usize];
         match vertex.checked_sub(self.base) {
-            Some(created) => self.base + 2 * new_numbers[created as usize / 2] + created % 2,
+            Some(created) => {
+                let [creator, place] = [created / self.created, created % self.created];
+                self.base + self.created * new_numbers[creator as usize] + place
+            }
             None => vertex,
         }
     }
 
-    /// Bands of falling error, in each cell by cell what can come, again and again until all has.
-    fn by_place(&self) -> Vec<u32> {
+    /// Where the bands of falling error end.
+    fn error_bands(&self) -> Vec<usize> {
+        let mut ends = vec![self.vertices.len()];
+        while let Some(&end) = ends.last().filter(|&&end| end > SMALL / BAND_GROWTH) {
+            ends.push(end / BAND_GROWTH);
+        }
+        ends.reverse();
+        ends
+    }
+
+    /// Bands that end there, in each cell by cell what can come, again and again until all has.
+    fn by_place(&self, ends: &[usize]) -> Vec<u32> {
         let count = self.vertices.len();
         let mut children = vec![0_u32; count + 1];
         self.parents.iter().for_each(|&p| children[p as usize + 1] += 1);
@@ -105,12 +168,8 @@ impl Updates<'_> {
         let children =
             |u: u32| &all_children[child_starts[u as usize] as usize..child_starts[u as usize + 1] as usize];
         let mut order = Vec::with_capacity(count);
-        let mut ends = vec![count];
-        while let Some(&end) = ends.last().filter(|&&end| end > SMALL / BAND_GROWTH) {
-            ends.push(end / BAND_GROWTH);
-        }
         let mut start = 0;
-        for &end in ends.iter().rev() {
+        for &end in ends {
             let mut band: Vec<u32> = (start as u32..end as u32).collect();
             band.sort_by_cached_key(|&u| (curve(self.sites[u as usize], self.bits), u));
             let cells = band.len().div_ceil(CELL).max(1);

@@ -8,6 +8,7 @@ use crate::geom::WIDE_BITS;
 use crate::geom::orient3d;
 use crate::mesh::Grid;
 use crate::mesh::TetMesh;
+use crate::mt::MtKind;
 
 /// The fewest position bits that are tried unless the caller says otherwise.
 const FEWEST_BITS: u32 = 16;
@@ -32,6 +33,10 @@ pub(super) fn place(mesh: &TetMesh, config: &BuildConfig) -> Result<Placed, Buil
         }
         (Some(bits), None) => with_bits(mesh, bits),
         (None, Some(tolerance)) => within(mesh, tolerance),
+        // Half-edge updates make no new positions: the points of a grid need no finer lattice than the grid.
+        (None, None) if config.kind == MtKind::HalfEdge && grid_bits(mesh).is_some() => {
+            Ok(on(mesh, grid_bits(mesh).unwrap_or(FEWEST_BITS)))
+        }
         (None, None) => by_cells(mesh),
     }
 }
@@ -141,9 +146,19 @@ fn lattice(mesh: &TetMesh, bits: u32) -> Lattice {
 
 /// A lattice that holds every point of the grid exactly, with as many steps to a cell as a power of two can be.
 fn grid_lattice(grid: &Grid, bits: u32) -> Option<Lattice> {
-    let cells = grid.dims.iter().map(|n| n.saturating_sub(1)).max().filter(|&n| n > 0)?;
-    let needed = u32::BITS - (cells - 1).leading_zeros();
-    let spare = bits.checked_sub(needed)?;
+    let spare = bits.checked_sub(cell_bits(grid)?)?;
     let step = grid.spacing.map(|s| s / f64::from(1_u32 << spare));
     Some(Lattice { origin: grid.origin, step, bits })
+}
+
+/// The fewest bits of a lattice that holds every point of the grid exactly.
+fn cell_bits(grid: &Grid) -> Option<u32> {
+    let cells = grid.dims.iter().map(|n| n.saturating_sub(1)).max().filter(|&n| n > 0)?;
+    Some(u32::BITS - (cells - 1).leading_zeros())
+}
+
+/// The same for a mesh on a grid, if its cells are positive there.
+fn grid_bits(mesh: &TetMesh) -> Option<u32> {
+    let bits = cell_bits(&mesh.grid?)?.max(1);
+    fits(mesh, &on(mesh, bits)).then_some(bits)
 }

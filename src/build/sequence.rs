@@ -48,16 +48,18 @@ pub(super) struct Insertion {
 }
 
 impl Sequence {
-    /// The MT of these insertions, and its vertex for each reference point. They come in the order of falling error, as far as equal errors leave it open in
+    /// The MT of these insertions, with errors that take few bits in a file if they are `coarse`, and its vertex for each
+    /// reference point. They come in the order of falling error, as far as equal errors leave it open in
     /// the order of the sequence: errors are made monotone along the DAG first, so this extends the partial order.
     pub fn explicit_mt(
         &self,
         mut info: MtInfo,
         quantized: &Quantized,
+        coarse: bool,
         progress: OnProgress<'_>,
     ) -> Result<(ExplicitMt, Vec<VertexId>), BuildError> {
         let arcs = self.arcs(quantized.positions.len())?;
-        let errors = self.monotone_errors(quantized, &arcs, &quantize::floors(&info));
+        let errors = self.monotone_errors(quantized, &arcs, &quantize::floors(&info), coarse);
         let mut order: Vec<u32> = (0..self.steps.len() as u32).collect();
         let fields = info.fields.len();
         let errors_of = |i: u32| &errors[i as usize * fields..][..fields];
@@ -136,11 +138,19 @@ impl Sequence {
 
     /// Errors by insertion and field that are at least those of all insertions that depend on each, by so much more that selection by isovalue
     /// and by box is monotone: see [`Quantized::overshoot`], and `step_of_boundary` in the builders' costs.
-    fn monotone_errors(&self, quantized: &Quantized, arcs: &Arcs, floors: &[f64]) -> Vec<ErrorCode> {
+    fn monotone_errors(
+        &self,
+        quantized: &Quantized,
+        arcs: &Arcs,
+        floors: &[f64],
+        coarse: bool,
+    ) -> Vec<ErrorCode> {
+        // Rounded before others are derived from it, an error keeps its distance to these.
+        let round = |code: ErrorCode| if coarse { code.coarse() } else { code };
         // Never zero: error 0 is to mean the reference mesh, with every update applied.
         let fields = quantized.fields.len();
         let own = |(at, error): (usize, &f64)| {
-            ErrorCode::at_least(error.max(floors[at % fields])).max(ErrorCode(1))
+            round(ErrorCode::at_least(error.max(floors[at % fields])).max(ErrorCode(1)))
         };
         let all = self.steps.iter().flat_map(|step| &step.errors).enumerate();
         let mut errors: Vec<ErrorCode> = all.map(own).collect();
@@ -159,7 +169,7 @@ impl Sequence {
             parents.dedup();
             for p in parents.iter().map(|&p| p as usize) {
                 for (own, above) in (i * fields..(i + 1) * fields).zip(p * fields..) {
-                    let least = ErrorCode::at_least(errors[own].error() + more[above]);
+                    let least = round(ErrorCode::at_least(errors[own].error() + more[above]));
                     errors[above] = errors[above].max(least);
                 }
             }

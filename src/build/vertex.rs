@@ -30,7 +30,8 @@ pub(super) fn decimated_mt(
     progress: OnProgress<'_>,
 ) -> Result<(ExplicitMt, Vec<VertexId>), BuildError> {
     let built = decimate::decimate(mesh, config, criterion, progress)?;
-    spell_out(&built.sequence, &built.quantized, built.displacement_per_error, progress)
+    let coarse = config.kind == MtKind::HalfEdge;
+    spell_out(&built.sequence, &built.quantized, built.displacement_per_error, coarse, progress)
 }
 
 /// Builds a vertex-based MT of the points of `mesh` by inserting them into a coarse mesh of their convex hull, the one
@@ -54,13 +55,14 @@ pub(super) fn inserted_mt(
     let quantized = quantize::quantize(mesh, config)?;
     let displacement_per_error = config.displacement * Bounds::of(&mesh.positions).diagonal();
     let sequence = insert::insert(&quantized, &mesh.tets, progress)?;
-    spell_out(&sequence, &quantized, displacement_per_error, progress)
+    spell_out(&sequence, &quantized, displacement_per_error, false, progress)
 }
 
 fn spell_out(
     sequence: &Sequence,
     quantized: &Quantized,
     displacement_per_error: f64,
+    coarse: bool,
     progress: OnProgress<'_>,
 ) -> Result<(ExplicitMt, Vec<VertexId>), BuildError> {
     let grown: usize = sequence.steps.iter().map(|step| step.inserted.len()).sum();
@@ -75,5 +77,5 @@ fn spell_out(
         displacement_per_error,
         quantization: quantized.quantization,
     };
-    sequence.explicit_mt(info, quantized, progress)
+    sequence.explicit_mt(info, quantized, coarse, progress)
 }

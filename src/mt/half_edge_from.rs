@@ -39,7 +39,7 @@ impl HalfEdgeMt {
     pub fn from_explicit(explicit: &ExplicitMt, page_bits: u32) -> Result<Self, ConvertError> {
         let updates = explicit.updates();
         let base = explicit.base_mesh().positions.len() as u32;
-        let near: Vec<u32> = (0..updates).map(|u| near_vertex(explicit, UpdateId(u))).collect::<Result<_, _>>()?;
+        let near = Self::near_vertices(explicit)?;
         let mut children: Vec<Vec<ForestChild>> = vec![Vec::new(); explicit.vertices() as usize];
         for (u, &v) in (0..).zip(&near) {
             let [from, to] = [VertexId(v), VertexId(base + u)].map(|v| explicit.position(v));
@@ -61,6 +61,14 @@ impl HalfEdgeMt {
             mt.add(explicit, &inner, &mut mesh, &mut scratch, u, children)?;
         }
         Ok(mt)
+    }
+
+    /// The near vertex of each update of an explicit MT.
+    ///
+    /// # Errors
+    /// If an update is no inverse half-edge collapse.
+    pub(crate) fn near_vertices(explicit: &ExplicitMt) -> Result<Vec<u32>, ConvertError> {
+        (0..explicit.updates()).map(|u| near_vertex(explicit, UpdateId(u))).collect()
     }
 
     /// Adds an update and applies it.

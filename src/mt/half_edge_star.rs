@@ -31,10 +31,10 @@ use crate::mesh::NONE;
 
 
 /// Most candidates that have a rank.
-const RANKED: usize = 14;
+const RANKED: usize = 8;
 
 /// Candidates are ranked until what is left has less weight than this.
-const LEFT: f64 = 1.0 / 256.0;
+const LEFT: f64 = 1.0 / 64.0;
 
 /// Stands for a remover that has no rank.
 const FURTHER: u32 = NONE - 1;
@@ -236,7 +236,13 @@ struct Around<'a> {
     lists: Vec<&'a [ForestChild]>,
 }
 
-impl Around<'_> {
+impl<'a> Around<'a> {
+    #[inline]
+    fn lists_of(&self, new: &NewTet) -> [&'a [ForestChild]; 4] {
+        let [a, b, c, d] = new.corners;
+        [self.index(a), self.index(b), self.index(c), self.index(d)].map(|x| self.lists[x])
+    }
+
     #[inline]
     fn index(&self, corner: u8) -> usize {
         if corner == NEW { self.positions.len() - 1 } else { usize::from(corner) }
@@ -244,7 +250,13 @@ impl Around<'_> {
 
     #[inline]
     fn corners(&self, new: &NewTet) -> [[i32; 3]; 4] {
-        new.corners.map(|corner| self.positions[self.index(corner)])
+        let [a, b, c, d] = new.corners;
+        [
+            self.positions[self.index(a)],
+            self.positions[self.index(b)],
+            self.positions[self.index(c)],
+            self.positions[self.index(d)],
+        ]
     }
 }
 
@@ -318,10 +330,16 @@ impl StarCode {
 
     /// Appends the choices for a tetrahedron by falling weight.
     fn rank(&mut self, around: &Around<'_>, new: &NewTet) {
-        let corners = around.corners(new);
-        let sum = [0, 1, 2].map(|k| corners.iter().map(|p| i64::from(p[k])).sum::<i64>());
-        let lists = new.corners.map(|corner| around.lists[around.index(corner)]);
+        let lists = around.lists_of(new);
         let first = self.choices.len();
+        if lists.iter().all(|list| list.is_empty()) {
+            self.choices.push(Choice { weight: 1.0, remover: NONE, corner: 0 });
+            self.rests.push([0; 4]);
+            return;
+        }
+        let corners = around.corners(new);
+        let [p, q, r, s] = corners;
+        let sum = [0, 1, 2].map(|k| i64::from(p[k]) + i64::from(q[k]) + i64::from(r[k]) + i64::from(s[k]));
         let mut next = [0_u32; 4];
         let mut left = 1.0;
         let mut more = true;
@@ -355,7 +373,7 @@ impl StarCode {
         i: usize,
         teller: &mut impl Teller,
     ) -> Option<Choice> {
-        let lists = new.corners.map(|corner| around.lists[around.index(corner)]);
+        let lists = around.lists_of(new);
         let mut index_of = |remover: u32| {
             if remover == NONE {
                 return Some(0);
