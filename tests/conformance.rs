@@ -12,6 +12,7 @@ use conformance_support::HALF_EDGE;
 use conformance_support::How;
 use conformance_support::INSERTED;
 use conformance_support::Input;
+use conformance_support::PAGED;
 use conformance_support::SPELLED_EDGE;
 use conformance_support::SPELLED_VERTEX;
 use conformance_support::Subject;
@@ -92,6 +93,7 @@ conformance! {
     vertex_by_delaunay_removal: DELAUNAY,
     vertex_by_delaunay_insertion: INSERTED,
     explicit_of_vertex: SPELLED_VERTEX,
+    half_edge_in_pages: PAGED,
 }
 
 fn domain(how: How) -> BoxedStrategy<Domain> {
@@ -442,7 +444,7 @@ fn within_errors(subject: &Subject, sets: usize, random: &mut Random) {
 /// are given up. The suite above would be worth little if such updates did not occur in it.
 #[test]
 fn insertions_that_move_the_boundary_occur_and_are_undone_exactly() {
-    for (how, least) in [(HALF_EDGE, 30), (DELAUNAY, 5)] {
+    for (how, least) in [(HALF_EDGE, 30), (PAGED, 30), (DELAUNAY, 5)] {
         let mut moving = 0;
         for subject in subjects(how).filter(|subject| !subject.input.flat) {
             let mut walk = Walk::new(&subject, subject.mt.clone());

@@ -128,7 +128,7 @@ fn the_examples_are_written_and_read_as_ever() {
 fn files_of_the_first_version_are_told_apart() {
     let found = decode(&bytes_of(include_str!("golden/v1-edge.hex")));
     let error = found.expect_err("version 1 is no longer read");
-    assert_eq!(error, FormatError::UnsupportedVersion { found: [1, 0], supported: [2, 0] });
+    assert_eq!(error, FormatError::UnsupportedVersion { found: [1, 0], supported: [3, 0] });
     let text = error.to_string();
     assert!(text.contains("1.0") && text.contains("build the file again"), "{text}");
 }

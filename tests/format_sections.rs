@@ -72,9 +72,10 @@ fn versions_and_flags() {
     assert!(with(header([2, 0], 0, total)).is_ok());
     assert!(with(header([2, 0], 0, 0)).is_ok(), "a writer need not know the size");
     assert!(with(header([2, 9], 0, total)).is_ok(), "a later minor version");
+    assert!(with(header([3, 0], 0, total)).is_ok(), "version 3 has all of version 2");
     assert!(with(header([2, 0], 1 << 16, total)).is_ok(), "a hint");
-    for found in [[0, 9], [1, 0], [1, 9], [3, 0]] {
-        let other = FormatError::UnsupportedVersion { found, supported: [2, 0] };
+    for found in [[0, 9], [1, 0], [1, 9], [4, 0]] {
+        let other = FormatError::UnsupportedVersion { found, supported: [3, 0] };
         assert_eq!(with(header(found, 0, total)), Err(other));
     }
     let critical = with(header([2, 0], 1 << 15, total));
@@ -104,7 +105,7 @@ fn other_files_are_called_so_at_once() {
 fn every_error_says_what_to_do() {
     let errors = [
         FormatError::NotMt,
-        FormatError::UnsupportedVersion { found: [3, 0], supported: [2, 0] },
+        FormatError::UnsupportedVersion { found: [4, 0], supported: [3, 0] },
         FormatError::UnsupportedFeature { offset: 12, what: "a flag" },
         FormatError::Corrupt { offset: 99, what: "a number" },
         FormatError::Truncated { offset: 99 },

@@ -118,7 +118,12 @@ async function retry() {
 }
 
 /** What the updates of each kind of MT are. */
-const KINDS = { edge: "vertex splits", vertex: "vertex insertions", explicit: "spelled out" };
+const KINDS = {
+  "half-edge": "half-edge insertions",
+  edge: "vertex splits",
+  vertex: "vertex insertions",
+  explicit: "spelled out",
+};
 
 /** The base mesh is there: fit the settings to it. */
 function arrive(info) {

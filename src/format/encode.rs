@@ -10,6 +10,8 @@ use super::header::HEAD_BYTES;
 use super::header::HEADER_BYTES;
 use super::header::Head;
 use super::header::Kind;
+use super::header::VERSION;
+use super::header::VERSION_WITHOUT_HALF_EDGE;
 use super::header::header;
 use super::payload;
 use super::payload::State;
@@ -22,6 +24,7 @@ use super::survey::Survey;
 use super::write;
 use crate::mt::BaseMeshError;
 use crate::mt::Exact;
+use crate::mt::MtKind;
 use crate::mt::MtRef;
 use crate::mt::UpdateError;
 use crate::mt::VertexId;
@@ -151,7 +154,9 @@ pub fn encode_to<'a>(
     payload::write_end(&mut end, totals);
     let end = Section::new(Kind::ENDF, end)?;
     let mut put = |bytes: &[u8]| writer.write_all(bytes).map_err(EncodeError::Write);
-    put(&header(total))?;
+    let version =
+        if mt.info().kind == MtKind::HalfEdge { VERSION } else { VERSION_WITHOUT_HALF_EDGE };
+    put(&header(total, version))?;
     for section in sections.iter().chain([&end]) {
         put(&section.head.to_bytes())?;
         put(&section.payload)?;

@@ -4,10 +4,12 @@ use super::FormatError;
 
 /// First bytes of every MT file. The high bit, CR LF and Ctrl-Z show transfers that meddle with text.
 pub const MAGIC: [u8; 8] = *b"\x89TLOD\r\n\x1a";
-/// Major and minor version of the files that this module writes.
+/// Major and minor version of the newest files that this module writes.
 pub const VERSION: [u16; 2] = [3, 0];
-/// The oldest major version that is read: files of version 2 are those of version 3 without half-edge MTs.
-const OLDEST: u16 = 2;
+/// What files without half-edge MTs are written as: version 3 has these besides.
+pub const VERSION_WITHOUT_HALF_EDGE: [u16; 2] = [2, 0];
+/// The oldest major version that is read.
+const OLDEST: u16 = VERSION_WITHOUT_HALF_EDGE[0];
 /// Bytes of the file header.
 pub const HEADER_BYTES: usize = 32;
 /// Bytes of a section's head.
@@ -17,12 +19,12 @@ pub const END_BYTES: usize = HEAD_BYTES + 12;
 /// Flags that a reader must know.
 const CRITICAL_FLAGS: u32 = 0xFFFF;
 
-/// The header of a file that is `total` bytes long.
-pub fn header(total: u64) -> [u8; HEADER_BYTES] {
+/// The header of a file of a version that is `total` bytes long.
+pub fn header(total: u64, version: [u16; 2]) -> [u8; HEADER_BYTES] {
     let mut bytes = [0; HEADER_BYTES];
     bytes[..8].copy_from_slice(&MAGIC);
-    bytes[8..10].copy_from_slice(&VERSION[0].to_le_bytes());
-    bytes[10..12].copy_from_slice(&VERSION[1].to_le_bytes());
+    bytes[8..10].copy_from_slice(&version[0].to_le_bytes());
+    bytes[10..12].copy_from_slice(&version[1].to_le_bytes());
     bytes[16..24].copy_from_slice(&total.to_le_bytes());
     let crc = crc32fast::hash(&bytes[..28]);
     bytes[28..].copy_from_slice(&crc.to_le_bytes());

@@ -93,16 +93,16 @@ pub struct HalfEdgeMt {
     zeros: Vec<ErrorCode>,
 }
 
-/// Two MTs are equal if they have the same updates.
+/// Two MTs are equal if they have the same updates, whatever their pages.
 impl PartialEq for HalfEdgeMt {
     fn eq(&self, other: &Self) -> bool {
+        let same = |u: u32| self.update(UpdateId(u)) == other.update(UpdateId(u));
         self.info == other.info
             && self.base == other.base
             && self.base_marks == other.base_marks
             && self.base_children == other.base_children
-            && self.pages == other.pages
-            && self.page_bits == other.page_bits
-            && self.to_come == other.to_come
+            && self.updates == other.updates
+            && (0..self.updates).all(same)
     }
 }
 

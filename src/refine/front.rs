@@ -368,7 +368,11 @@ impl Front {
         }
         mt.conceal(&mut self.mesh, updates.clone());
         self.leaves.forget(updates.clone());
-        self.pending.retain(|asked| !updates.contains(&asked.update.0));
+        let (gone, kept) = std::mem::take(&mut self.pending)
+            .into_iter()
+            .partition(|asked: &Asked| updates.contains(&asked.update.0));
+        self.pending = kept;
+        self.awaiting.extend(Vec::into_iter(gone).map(|asked| (asked.update.0, asked.tet)));
         self.begin_again();
         true
     }

@@ -72,7 +72,7 @@ export interface BlockProgress {
 /** What is known of a volume as soon as it is open. */
 export interface MtInfo {
   /** The kind of Multi-Tessellation: what its updates are. */
-  kind: "edge" | "vertex" | "explicit";
+  kind: "half-edge" | "edge" | "vertex" | "explicit";
   fields: FieldInfo[];
   /** A box that holds every mesh of the volume, and may be larger: `[x0, y0, z0, x1, y1, z1]` in model units. */
   bounds: number[];

@@ -27,6 +27,7 @@ use tetralod::mt::CurrentMesh;
 use tetralod::mt::EdgeMt;
 use tetralod::mt::ExplicitMt;
 use tetralod::mt::ExplicitUpdate;
+use tetralod::mt::HalfEdgeMt;
 use tetralod::mt::Mt;
 use tetralod::mt::MtKind;
 use tetralod::mt::MultiTessellation;
@@ -47,6 +48,7 @@ pub const SPELLED_EDGE: How = How { kind: MtKind::Explicit, ..EDGE };
 pub const HALF_EDGE: How = How { kind: MtKind::Vertex, method: Method::Decimate, ..EDGE };
 pub const DELAUNAY: How = How { criterion: Criterion::Delaunay, ..HALF_EDGE };
 pub const INSERTED: How = How { method: Method::Insert, ..DELAUNAY };
+pub const PAGED: How = How { kind: MtKind::HalfEdge, ..HALF_EDGE };
 pub const SPELLED_VERTEX: How = How { kind: MtKind::Explicit, ..HALF_EDGE };
 
 impl How {
@@ -258,6 +260,12 @@ pub fn empty(mt: &Mt) -> Mt {
                 .expect("the same base mesh")
                 .into()
         }
+        Mt::HalfEdge(mt) => {
+            let vertices = (0..base.positions.len() as u32).map(VertexId);
+            let children: Vec<_> = vertices.map(|v| mt.children_of(v).to_vec()).collect();
+            let marks = mt.base_marks().to_vec();
+            HalfEdgeMt::new(info, base, marks, &children, mt.page_bits()).expect("the same base mesh").into()
+        }
         Mt::Explicit(_) => ExplicitMt::new(info, base).into(),
         _ => unreachable!("there are no others"),
     }
@@ -269,6 +277,7 @@ pub fn grow(part: &mut Mt, whole: &Mt) {
     let pushed = match (part, whole) {
         (Mt::Edge(part), Mt::Edge(whole)) => part.push(&whole.split(u)),
         (Mt::Vertex(part), Mt::Vertex(whole)) => part.push(&whole.node(u), whole.errors_of(u)),
+        (Mt::HalfEdge(part), Mt::HalfEdge(whole)) => part.push(&whole.update(u).expect("an update")),
         (Mt::Explicit(part), Mt::Explicit(whole)) => {
             let created = whole.created(u).map(VertexId);
             let positions: Vec<[i32; 3]> = created.clone().map(|v| whole.position(v)).collect();

@@ -38,11 +38,11 @@ pub struct Arguments {
     /// The MT file to write.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// The kind of MT: edge, vertex or explicit [default: edge].
+    /// The kind of MT: half-edge (the best for regions), edge, vertex or explicit [default: edge].
     #[arg(long, value_name = "KIND", value_parser = kind)]
     kind: Option<MtKind>,
     /// How it is built: collapse (edges, for kind edge), insert or decimate (vertices, for kind vertex); any for kind
-    /// explicit [default: collapse, decimate for kind vertex].
+    /// explicit [default: collapse, decimate for kinds vertex and half-edge].
     #[arg(long, value_name = "METHOD", value_parser = method)]
     method: Option<Method>,
     /// By what criterion vertices go or come: delaunay, or half-edge with decimate alone [default: half-edge with

@@ -22,7 +22,7 @@ pub struct Arguments {
     /// The MT file to write.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// The kind of MT that it becomes: edge, vertex or explicit.
+    /// The kind of MT that it becomes: half-edge, edge, vertex or explicit.
     #[arg(long, value_name = "KIND", value_parser = build::kind)]
     kind: MtKind,
     /// No summary.
