@@ -92,8 +92,7 @@ impl Paged {
         let criterion = LodCriterion::new(self.mt.info(), request);
         let outcome = front.satisfy(&self.mt, &criterion, Budget::default()).expect("a sound MT");
         let wanted = self.subject.closure(self.asked(&criterion, &self.available()));
-        let found: Vec<bool> =
-            (0..self.whole.info().updates).map(|u| front.contains(UpdateId(u))).collect();
+        let found: Vec<bool> = (0..self.whole.info().updates).map(|u| front.contains(UpdateId(u))).collect();
         assert_eq!(found, wanted, "{request:?}");
         front.mesh().check().expect("a valid mesh");
         let lacks = self.asked(&criterion, &vec![true; found.len()]).iter().any(|&u| !found[u as usize]);
@@ -178,8 +177,9 @@ fn demanded_pages_are_enough_and_all_in_use() {
         let bounds = (0..paged.pages()).flat_map(|page| {
             let updates = paged.whole.page_updates(page);
             let whole = &paged.whole;
-            (0..fields)
-                .map(move |f| updates.clone().map(|u| whole.errors_of(UpdateId(u))[f]).max().expect("an update"))
+            (0..fields).map(move |f| {
+                updates.clone().map(|u| whole.errors_of(UpdateId(u))[f]).max().expect("an update")
+            })
         });
         let bounds = bounds.collect();
         paged.mt.set_page_bounds(bounds);
@@ -207,7 +207,11 @@ fn demanded_pages_are_enough_and_all_in_use() {
             let here: BTreeSet<u32> = (0..paged.pages()).filter(|&page| paged.mt.has_page(page)).collect();
             assert!(in_use.is_subset(&here));
             front
-                .satisfy(&paged.mt, &LodCriterion::new(paged.mt.info(), &Request::within(f64::INFINITY)), Budget::default())
+                .satisfy(
+                    &paged.mt,
+                    &LodCriterion::new(paged.mt.info(), &Request::within(f64::INFINITY)),
+                    Budget::default(),
+                )
                 .expect("a sound MT");
             for page in here {
                 assert!(front.leave(&paged.mt, page), "nothing is applied");
@@ -237,7 +241,10 @@ fn what_cannot_come_or_go_changes_nothing() {
     let early = [ForestChild { update: 0, offset: [0; 3] }];
     let mut wrong = records.clone();
     wrong[2].children = &early;
-    assert!(matches!(paged.mt.insert_page(1, &wrong), Err(PageError::Update(_))), "a child before its parent");
+    assert!(
+        matches!(paged.mt.insert_page(1, &wrong), Err(PageError::Update(_))),
+        "a child before its parent"
+    );
     let far = [ForestChild { update: whole.info().updates - 1, offset: [i32::MIN; 3] }];
     wrong[2].children = &far;
     assert!(matches!(paged.mt.insert_page(1, &wrong), Err(PageError::Update(_))), "off the lattice");

@@ -122,7 +122,10 @@ impl BuildConfig {
                  explicit",
             ),
             (MtKind::HalfEdge, Method::Collapse | Method::Insert) => refuse(
-                ["kind half-edge", if self.method == Method::Insert { "method insert" } else { "method collapse" }],
+                [
+                    "kind half-edge",
+                    if self.method == Method::Insert { "method insert" } else { "method collapse" },
+                ],
                 "MTs of kind half-edge are built by method decimate with criterion half-edge",
             ),
             (MtKind::HalfEdge, Method::Decimate) if self.criterion != Criterion::HalfEdge => refuse(

@@ -47,12 +47,12 @@ mod skin;
 mod vertex;
 mod work_mesh;
 
-use order::Updates;
 pub use collapse::edge_mt;
 pub use delaunay::delaunay;
 pub use method::Criterion;
 pub use method::Method;
 pub use method::Purpose;
+use order::Updates;
 
 use crate::mesh::MeshError;
 use crate::mesh::TetMesh;
@@ -406,7 +406,8 @@ fn half_edge_mt(
         parents.extend_from_slice(explicit.parents(u));
         starts.push(parents.len() as u32);
     }
-    let sites: Vec<[i32; 3]> = all().map(|u| explicit.position(VertexId(explicit.created(u).start))).collect();
+    let sites: Vec<[i32; 3]> =
+        all().map(|u| explicit.position(VertexId(explicit.created(u).start))).collect();
     let base = explicit.base_mesh().positions.len() as u32;
     let updates = Updates {
         base,

@@ -592,7 +592,8 @@ impl Decoder {
                 let (mut mt, state) = base.start(info, bits)?;
                 if let (Mt::HalfEdge(mt), Some(index)) = (&mut mt, &self.head.index) {
                     let wanted = &self.head.wanted;
-                    let of_block = |block: &BlockInfo| wanted.iter().map(|&f| block.errors[f]).collect::<Vec<_>>();
+                    let of_block =
+                        |block: &BlockInfo| wanted.iter().map(|&f| block.errors[f]).collect::<Vec<_>>();
                     mt.set_page_bounds(index.blocks.iter().flat_map(of_block).collect());
                 }
                 (self.mt, self.state) = (Some(mt), state);

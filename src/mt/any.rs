@@ -180,6 +180,11 @@ impl MultiTessellation for Mt {
     }
 
     #[inline]
+    fn refine_marked(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
+        each!(self, mt => mt.refine_marked(mesh, u))
+    }
+
+    #[inline]
     fn start_at(&self, mesh: &mut CurrentMesh, t: u32) {
         each!(self, mt => mt.start_at(mesh, t));
     }

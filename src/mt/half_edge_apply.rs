@@ -97,6 +97,15 @@ impl Default for Scratch {
     }
 }
 
+/// How far to go to name an update that has to come first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Search {
+    /// Around the near vertex.
+    Nearby,
+    /// Through all updates before, which takes as long as applying them.
+    Everywhere,
+}
+
 /// A tetrahedron at a vertex, and which of its corners that is.
 type AtVertex = (u32, usize);
 
@@ -106,6 +115,7 @@ impl HalfEdgeMt {
         &self,
         mesh: &mut CurrentMesh,
         u: UpdateId,
+        search: Search,
         scratch: &mut Scratch,
     ) -> Result<Applied, UpdateError> {
         let update = u.0;
@@ -123,7 +133,7 @@ impl HalfEdgeMt {
         }
         let first = match mesh.tagged(update) {
             Some(t) => t,
-            None => match self.find_tagged(mesh, u, slot)? {
+            None => match self.find_tagged(mesh, u, slot, search)? {
                 Ok(t) => t,
                 Err(blocking) => return Ok(Applied::Blocked(blocking)),
             },
@@ -173,6 +183,7 @@ impl HalfEdgeMt {
         mesh: &mut CurrentMesh,
         u: UpdateId,
         slot: u32,
+        search: Search,
     ) -> Result<Result<u32, UpdateId>, UpdateError> {
         let star = mesh.all_around(slot);
         if let Some(&(t, _)) = star.iter().find(|&&(t, _)| mesh.tag(t) == u.0) {
@@ -181,15 +192,31 @@ impl HalfEdgeMt {
         let torn = UpdateError::Cavity { update: u.0 };
         let near = self.near(u).ok_or(torn.clone())?;
         let child = self.children_of(near).iter().find(|child| child.update == u.0).ok_or(torn.clone())?;
-        // T_u will hold the direction in which the new vertex lies: what does so now has to go first. At the boundary none
-        // may hold it; then the one that is the least off.
+        // T_u will hold the direction in which the new vertex lies, if the domain does: what does so now has to go first.
         let before = |&&(t, _): &&AtVertex| mesh.tag(t) < u.0;
-        let off = |&&(t, at): &&AtVertex| (mesh.off_by(t, at, child.offset), mesh.tag(t));
-        let found = star.iter().filter(before).min_by(|a, b| {
-            let (a, b) = (off(a), off(b));
-            a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))
-        });
-        Ok(Err(UpdateId(mesh.tag(found.ok_or(torn)?.0))))
+        let mut holding = star.iter().filter(|&&(t, at)| mesh.holds(t, at, child.offset));
+        if let Some(&(t, _)) = holding.find(before) {
+            return Ok(Err(UpdateId(mesh.tag(t))));
+        }
+        match search {
+            Search::Nearby => Err(UpdateError::Missing { update: u.0 }),
+            Search::Everywhere => self.find_parent(mesh, u).map(Err),
+        }
+    }
+
+    /// A parent of `u` that is not in the mesh, found by applying all updates before `u` to another one.
+    fn find_parent(&self, mesh: &CurrentMesh, u: UpdateId) -> Result<UpdateId, UpdateError> {
+        let torn = UpdateError::Cavity { update: u.0 };
+        let mut other = self.start().map_err(|_| torn.clone())?;
+        let mut scratch = Box::<Scratch>::default();
+        for before in (0..u.0).map(UpdateId) {
+            self.insert(&mut other, before, Search::Nearby, &mut scratch)?;
+            other.clear_touched();
+        }
+        self.collect_removed(&mut other, u, Search::Nearby, &mut scratch)?;
+        let removed = &scratch.removed[..scratch.removed_len];
+        let mut parents = removed.iter().filter_map(|&t| self.creator(&other, t));
+        parents.find(|&p| mesh.slot(self.vertex(p)).is_none()).ok_or(torn)
     }
 
     /// Finds the star that the insertion makes, whose T_u has been collected.
@@ -208,7 +235,8 @@ impl HalfEdgeMt {
                 *corner = scratch.number(mesh, v)?;
             }
             let at = corner_of(&tet, slot);
-            let mut new = NewTet { corners, own: at as u8, beyond: around[at], source: t, ..NewTet::default() };
+            let mut new =
+                NewTet { corners, own: at as u8, beyond: around[at], source: t, ..NewTet::default() };
             new.corners[at] = NEW;
             new.across = [NO_ENTRY; 4];
             for face in (0..4).filter(|&face| face != at) {
@@ -259,9 +287,10 @@ impl HalfEdgeMt {
         &self,
         mesh: &mut CurrentMesh,
         u: UpdateId,
+        search: Search,
         scratch: &mut Scratch,
     ) -> Result<Result<[i32; 3], UpdateId>, UpdateError> {
-        if let Applied::Blocked(before) = self.collect_removed(mesh, u, scratch)? {
+        if let Applied::Blocked(before) = self.collect_removed(mesh, u, search, scratch)? {
             return Ok(Err(before));
         }
         self.find_star(mesh, scratch).ok_or(UpdateError::Cavity { update: u.0 })?;
@@ -279,9 +308,10 @@ impl HalfEdgeMt {
         &self,
         mesh: &mut CurrentMesh,
         u: UpdateId,
+        search: Search,
         scratch: &mut Scratch,
     ) -> Result<Applied, UpdateError> {
-        let position = match self.prepare(mesh, u, scratch)? {
+        let position = match self.prepare(mesh, u, search, scratch)? {
             Ok(position) => position,
             Err(before) => return Ok(Applied::Blocked(before)),
         };
@@ -580,25 +610,17 @@ impl CurrentMesh {
         star
     }
 
-    /// How far a direction from corner `at` of tetrahedron `t` leaves it: 0 if it does not, else the largest sine of an angle with
-    /// a face.
-    fn off_by(&self, t: u32, at: usize, direction: [i32; 3]) -> f64 {
+    /// Whether a direction from corner `at` of tetrahedron `t` leads into it, or along a face.
+    fn holds(&self, t: u32, at: usize, direction: [i32; 3]) -> bool {
         let corners = self.tets[t as usize].map(|v| self.positions[v as usize]);
-        let apart = |k: usize| [0, 1, 2].map(|i| f64::from(corners[k][i]) - f64::from(corners[at][i]));
-        let [d0, d1, d2] = direction.map(f64::from);
-        let length = |v: [f64; 3]| (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
-        let mut worst = 0.0_f64;
-        for face in (0..4).filter(|&face| face != at) {
-            let mut others = (0..4).filter(|&k| k != at && k != face);
-            let (Some(i), Some(j)) = (others.next(), others.next()) else { continue };
-            let (a, b, inside) = (apart(i), apart(j), apart(face));
-            let normal = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-            let dot = |v: [f64; 3]| normal[0] * v[0] + normal[1] * v[1] + normal[2] * v[2];
-            let side = if dot(inside) < 0.0 { -1.0 } else { 1.0 };
-            let sine = side * dot([d0, d1, d2]) / (length(normal) * length([d0, d1, d2])).max(1e-300);
-            worst = worst.max(-sine);
-        }
-        worst
+        let point = [0, 1, 2].map(|k| corners[at][k].saturating_add(direction[k]));
+        let largest = 1 << crate::geom::WIDE_BITS;
+        let inside = |face: usize| {
+            let mut with = corners;
+            with[face] = point;
+            orient3d(with[0], with[1], with[2], with[3]) >= 0
+        };
+        point.iter().all(|x| (0..=largest).contains(x)) && (0..4).all(|face| face == at || inside(face))
     }
 }
 
@@ -694,7 +716,14 @@ impl MultiTessellation for HalfEdgeMt {
 
     fn refine(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
         let mut scratch = mesh.take_scratch();
-        let applied = self.insert(mesh, u, &mut scratch);
+        let applied = self.insert(mesh, u, Search::Everywhere, &mut scratch);
+        mesh.put_back_scratch(scratch);
+        applied
+    }
+
+    fn refine_marked(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
+        let mut scratch = mesh.take_scratch();
+        let applied = self.insert(mesh, u, Search::Nearby, &mut scratch);
         mesh.put_back_scratch(scratch);
         applied
     }
@@ -752,7 +781,7 @@ impl MultiTessellation for HalfEdgeMt {
         found: &mut Vec<u32>,
     ) -> Result<(), UpdateError> {
         let mut scratch = mesh.take_scratch();
-        let collected = self.collect_removed(mesh, u, &mut scratch);
+        let collected = self.collect_removed(mesh, u, Search::Everywhere, &mut scratch);
         if collected == Ok(Applied::Done) {
             found.extend_from_slice(&scratch.removed[..scratch.removed_len]);
         }

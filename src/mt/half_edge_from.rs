@@ -17,6 +17,7 @@ use super::half_edge::HalfEdgeMt;
 use super::half_edge::HalfEdgeUpdate;
 use super::half_edge_apply::NEW;
 use super::half_edge_apply::Scratch;
+use super::half_edge_apply::Search;
 use super::replay::canonical;
 use crate::mesh::NONE;
 
@@ -84,9 +85,11 @@ impl HalfEdgeMt {
         let fields = self.info().fields.len();
         let zeros = vec![0; fields];
         let id = UpdateId(u);
-        let record = HalfEdgeUpdate { children, level_residuals: &zeros, star: &[], errors: explicit.errors(id) };
+        let record =
+            HalfEdgeUpdate { children, level_residuals: &zeros, star: &[], errors: explicit.errors(id) };
         self.push(&record).map_err(damaged)?;
-        let position = self.prepare(mesh, id, scratch).map_err(damaged)?.map_err(|_| refused(u))?;
+        let position =
+            self.prepare(mesh, id, Search::Nearby, scratch).map_err(damaged)?.map_err(|_| refused(u))?;
         let vertex = self.vertex(id);
         let levels = explicit.levels(vertex);
         let residuals: Vec<i32> = levels.iter().zip(&scratch.levels).map(|(a, b)| a - b).collect();

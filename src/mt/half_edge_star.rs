@@ -27,9 +27,6 @@ use super::half_edge_apply::Scratch;
 use crate::geom::orient3d;
 use crate::mesh::NONE;
 
-
-
-
 /// Most candidates that have a rank.
 const RANKED: usize = 8;
 
@@ -62,6 +59,8 @@ pub(super) struct StarCode {
     /// Where the vertex lies that its remover inserts.
     aims: Vec<[i32; 3]>,
     hashes: Vec<u64>,
+    /// Of which tetrahedra the remover is known by now.
+    told: Vec<bool>,
 }
 
 /// Tells, or is told, what cannot be predicted.
@@ -288,6 +287,7 @@ impl StarCode {
         self.choices.clear();
         self.ends.clear();
         self.rests.clear();
+        self.told.clear();
         self.order.clear();
         for (i, new) in star.iter().enumerate() {
             let first = self.choices.len();
@@ -295,7 +295,8 @@ impl StarCode {
             let hash = self.hashes[i];
             self.ends.push(self.choices.len() as u32);
             // What can only be one thing is not told.
-            if self.choices.len() - first > 1 {
+            self.told.push(self.choices.len() - first == 1);
+            if !self.told[i] {
                 self.order.push((key(self.choices[first].weight, hash), i as u8, 0));
             }
         }
@@ -308,8 +309,10 @@ impl StarCode {
         for at in 0..self.order.len() {
             let i = usize::from(self.order[at].1);
             let first = i.checked_sub(1).map_or(0, |before| self.ends[before] as usize);
-            let choices = &self.choices[first..self.ends[i] as usize];
+            let choices = &mut self.choices[first..self.ends[i] as usize];
+            weigh_by_neighbors(choices, star, i, &self.told);
             let mut choice = choices[teller.choose(i, choices)?];
+            self.told[i] = true;
             if choice.remover == FURTHER {
                 choice = self.further(around, &star[i], i, teller)?;
             }
@@ -349,11 +352,7 @@ impl StarCode {
                 break;
             };
             let share = share(&corners, sum, corner, child.offset);
-            self.choices.push(Choice {
-                weight: left * share,
-                remover: child.update,
-                corner: corner as u8,
-            });
+            self.choices.push(Choice { weight: left * share, remover: child.update, corner: corner as u8 });
             left *= 1.0 - share;
         }
         more &= (0..4).any(|k| (next[k] as usize) < lists[k].len());
@@ -379,7 +378,8 @@ impl StarCode {
                 return Some(0);
             }
             let mut next = self.rests[i];
-            (1..).map_while(|index| pop_least(&lists, &mut next).map(|found| (index, found.1.update)))
+            (1..)
+                .map_while(|index| pop_least(&lists, &mut next).map(|found| (index, found.1.update)))
                 .find(|found| found.1 == remover)
                 .map(|found| found.0)
         };
@@ -435,6 +435,28 @@ impl StarCode {
             }
         }
     }
+}
+
+/// How much more likely a candidate is that removes a neighbour, and how much less one that leaves it.
+const AGREEMENT: f64 = 6.0;
+
+/// Weighs the choices for tetrahedron `i` anew by what is known of its neighbours in the star: T_u hangs together.
+fn weigh_by_neighbors(choices: &mut [Choice], star: &[NewTet], i: usize, told: &[bool]) {
+    for choice in choices.iter_mut().filter(|choice| choice.remover < FURTHER) {
+        for (face, &n) in star[i].across.iter().enumerate() {
+            let n = usize::from(n);
+            if face == usize::from(choice.corner) || !told.get(n).is_some_and(|&told| told) {
+                continue;
+            }
+            // What is removed later than the candidate, or never, was left by it.
+            if star[n].remover == choice.remover {
+                choice.weight *= AGREEMENT;
+            } else if star[n].remover > choice.remover {
+                choice.weight /= AGREEMENT;
+            }
+        }
+    }
+    choices.sort_by(|a, b| b.weight.total_cmp(&a.weight));
 }
 
 /// Whether predicates can be asked about a point.
@@ -518,7 +540,8 @@ impl KnownStars {
     /// Enters what is known of the star of `u`, which is in canonical order; false if nothing is.
     #[inline]
     pub fn recall(&self, u: u32, scratch: &mut Scratch) -> bool {
-        let Some(record) = self.starts.get(u).checked_sub(1).and_then(|at| self.bytes.get(at as usize..)) else {
+        let Some(record) = self.starts.get(u).checked_sub(1).and_then(|at| self.bytes.get(at as usize..))
+        else {
             return false;
         };
         let Some((&count, rest)) = record.split_first() else { return false };

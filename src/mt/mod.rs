@@ -337,6 +337,15 @@ pub trait MultiTessellation {
     /// If the MT is damaged; the mesh is unchanged then.
     fn refine(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError>;
 
+    /// [`MultiTessellation::refine`] for an update that removes a tetrahedron of the mesh, or whose ancestors are all applied
+    /// as far as they are here: no other is looked for at length.
+    ///
+    /// # Errors
+    /// As that, and [`UpdateError::Missing`] if what has to come first cannot be named.
+    fn refine_marked(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
+        self.refine(mesh, u)
+    }
+
     /// Applies `u−` to a mesh that contains `u`, or names a child that has to go first.
     ///
     /// # Errors

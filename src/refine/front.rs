@@ -551,7 +551,8 @@ impl Front {
         let mut next = Some(u).filter(|&u| self.contains(u) != applied);
         let mut waiting = Vec::new();
         while let Some(u) = next {
-            let turned = if applied { mt.refine(&mut self.mesh, u) } else { mt.coarsen(&mut self.mesh, u) };
+            let turned =
+                if applied { mt.refine_marked(&mut self.mesh, u) } else { mt.coarsen(&mut self.mesh, u) };
             // What depends on an update that is not here is as if it were not here itself.
             let is_cut_off = match &turned {
                 Ok(Applied::Blocked(other)) => applied && *other < u && !mt.has(*other),
@@ -817,7 +818,7 @@ impl Front {
         let mut stack = vec![u];
         let mut forced = Vec::new();
         while let Some(&top) = stack.last() {
-            match mt.refine(&mut self.mesh, top)? {
+            match mt.refine_marked(&mut self.mesh, top)? {
                 Applied::Done => {
                     self.note(top, true);
                     outcome.refined += 1;
@@ -959,7 +960,9 @@ impl Front {
             let missing = incomplete && (update.is_none() || unlimited);
             let (error, errors) = match (update, mt.awaited_errors(&self.mesh, t)) {
                 (Some(u), _) => (mt.error(u), mt.errors(u)),
-                (None, Some(errors)) => (errors.iter().copied().fold(ErrorCode::ZERO, ErrorCode::max), errors),
+                (None, Some(errors)) => {
+                    (errors.iter().copied().fold(ErrorCode::ZERO, ErrorCode::max), errors)
+                }
                 (None, None) => (mt.to_come(), &to_come[..]),
             };
             // The last number there can be: nothing is added to what is wanted.

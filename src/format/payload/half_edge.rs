@@ -280,9 +280,10 @@ fn put_star(out: &mut impl Put, star: &[u8]) {
     for (place, &symbol) in (0..).zip(symbols) {
         out.symbol(SYMBOL, place_context(u32::from(count), place), u32::from(symbol));
     }
-    let used = bits.iter().rposition(|&byte| byte != 0).map_or(0, |last| {
-        8 * last as u32 + u8::BITS - bits[last].leading_zeros()
-    });
+    let used = bits
+        .iter()
+        .rposition(|&byte| byte != 0)
+        .map_or(0, |last| 8 * last as u32 + u8::BITS - bits[last].leading_zeros());
     out.number(BITS, 0, used);
     for place in 0..used.saturating_sub(1) {
         let bit = bits[place as usize / 8] >> (place % 8) & 1;
@@ -360,7 +361,8 @@ pub fn put_field(out: &mut impl Put, mt: &HalfEdgeMt, first: u32, end: u32, fiel
     let all = (first..end).map(UpdateId);
     edge::put_changes(out, [ERROR, LEVEL], all, |u| {
         // Whoever writes an MT has all of its updates.
-        mt.update(u).map_or((ErrorCode::ZERO, 0), |update| (update.errors[field], update.level_residuals[field]))
+        mt.update(u)
+            .map_or((ErrorCode::ZERO, 0), |update| (update.errors[field], update.level_residuals[field]))
     });
 }
 
