@@ -28,7 +28,13 @@ pub enum Criterion {
 ///
 /// Vertices go in levels of error, and within a level in rounds of removals that do not depend on each other. Wide levels
 /// leave more freedom to remove first what depends on little. Then less has to be refined beside a region for the region's
-/// sake; but vertices go that should have stayed a little longer, so that meshes of one error everywhere are larger.
+/// sake; but vertices go that should have stayed a little longer, so that meshes of one error everywhere are larger. For the
+/// generated bucky at 33³ points, by half-edges:
+///
+/// | | an octant at error 0, tetrahedra of all | a box of 1/64 of the volume, updates of all | 0.1 / 1 / 5 % everywhere, tetrahedra |
+/// |---|--:|--:|--:|
+/// | uniform | 42.1 % | 24.1 % | 97 120 / 49 770 / 18 712 |
+/// | regions | 40.2 % | 21.5 % | 99 259 / 51 996 / 18 928 |
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Purpose {
     /// Meshes of one error everywhere: levels are 2^¼ wide.
