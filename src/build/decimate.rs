@@ -273,7 +273,9 @@ impl<'a> Decimator<'a> {
         for i in 0..self.ends.len() {
             let b = self.ends[i].1;
             let positions = &self.reference.quantized.positions;
-            if !contract(&self.hole, positions, b, &mut self.now.filling) {
+            if !contract(&self.hole, positions, b, &mut self.now.filling)
+                || self.hole.tilts_flat(&self.now.filling, positions)
+            {
                 continue;
             }
             if !self.reference.skin.at(b).is_empty() {
@@ -299,6 +301,9 @@ impl<'a> Decimator<'a> {
     fn wrap(&mut self, key: Key, legacy: &Legacy) -> Option<Key> {
         let Self { hole, best, buckets, reference, gift_wrap, .. } = self;
         if !gift_wrap.as_mut()?.fill(hole, &reference.quantized.positions, &mut best.filling) {
+            return None;
+        }
+        if hole.tilts_flat(&best.filling, &reference.quantized.positions) {
             return None;
         }
         // A removal must make the mesh smaller: a finer mesh is then a larger one, which budgets rely on.
