@@ -176,6 +176,28 @@ impl<S: Source> Client<S> {
         Ok(self.asked.is_empty() && !self.ask())
     }
 
+    /// Fetches the exact values that the file keeps, if it does and they are not here: see [`Session::exact_values`]. They take as
+    /// many bytes whatever the mesh is.
+    ///
+    /// # Errors
+    /// If the bytes do not come or are damaged.
+    pub fn fetch_exact(&mut self) -> Result<(), ClientError> {
+        let Some(range) = self.session.exact_range() else { return Ok(()) };
+        self.source.want(&[Wanted { range: range.clone(), priority: 0.0 }]);
+        let bytes = loop {
+            match self.source.next(PATIENCE).map_err(ClientError::Stream)? {
+                Some((arrived, bytes)) if arrived == range => break bytes,
+                // Something that was wanted before.
+                Some(other) => self.take(other)?,
+                None => {}
+            }
+        };
+        self.fetched += bytes.len() as u64;
+        let taken = self.session.take_exact(&bytes).map_err(ClientError::Format);
+        self.ask();
+        taken
+    }
+
     /// Tells the source what is wanted now; whether there is anything.
     fn ask(&mut self) -> bool {
         let wanted = self.session.wanted();

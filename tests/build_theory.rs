@@ -135,7 +135,8 @@ fn a_linear_field_in_a_box_needs_next_to_nothing() {
     let (front, _) = refined(&result.mt, &uniform(0.001));
     assert!(front.mesh().tet_count() < 100, "{} tetrahedra", front.mesh().tet_count());
     assert_eq!(volume(&front), volume(&refined(&result.mt, &uniform(0.0)).0));
-    assert!(result.summary.base_vertices < 20, "{:?}", result.summary);
+    // Corners stay, and creases and sides between them cannot be collapsed onto them: 8, 12, 6 and one inside.
+    assert!(result.summary.base_vertices <= 27, "{:?}", result.summary);
 }
 
 #[test]

@@ -45,7 +45,7 @@ use tetralod::mt::VertexSplit;
 
 fn options(block_bits: u32) -> EncodeOptions {
     let metadata = [("tool".to_owned(), "hand".to_owned()), ("a".to_owned(), String::new())];
-    EncodeOptions { block_bits, exact: Vec::new(), metadata: metadata.into() }
+    EncodeOptions { block_bits, metadata: metadata.into(), ..EncodeOptions::default() }
 }
 
 /// Reads a file both ways, block by block.
@@ -469,7 +469,8 @@ fn the_example_is_written_and_read_as_specified() {
     };
     mt.push(&split).expect("the example is an MT");
     let metadata = [("tool".to_owned(), "hand".to_owned())].into();
-    let bytes = encode(&mt, &EncodeOptions { block_bits: 4, exact: Vec::new(), metadata }).expect("an MT");
+    let bytes =
+        encode(&mt, &EncodeOptions { block_bits: 4, metadata, ..EncodeOptions::default() }).expect("an MT");
     let hex = |bytes: &[u8]| bytes.iter().map(|b| format!("{b:02X} ")).collect::<String>();
     assert_eq!(hex(&bytes), hex(&example()));
     compare(&example());

@@ -274,7 +274,7 @@ impl<'a> Builder<'a> {
         let code = errors.iter().copied().fold(ErrorCode::ZERO, ErrorCode::max);
         let v = self.data.positions.len() as u32;
         let Self { plan, mesh, data, evaluator, .. } = self;
-        self.history.push(Collapse::new(plan, mesh, code));
+        self.history.push(Collapse::new(plan, mesh, code, evaluator.steps));
         data.positions.push(plan.position);
         data.levels.extend_from_slice(&evaluator.levels);
         data.errors.extend(errors.iter().map(|code| code.error()));

@@ -172,6 +172,8 @@ pub(super) struct Evaluator {
     /// The triangle of the reference boundary near the new vertex.
     pub foot: u32,
     pub height: u32,
+    /// How far the boundary at each end is outside of the new one, as an error; 0 if no updates depend on this one.
+    pub steps: [f64; 2],
 }
 
 /// Raises the errors of all fields to at least this.
@@ -202,6 +204,7 @@ impl Evaluator {
         reference: &Reference<'_>,
         limit: f64,
     ) -> f64 {
+        self.steps = [0.0; 2];
         self.halve_levels(plan, data, reference);
         let newest = self.inherit(plan, mesh, data);
         self.cells.clear();
@@ -215,7 +218,9 @@ impl Evaluator {
         let foot = self.find_foot(plan, data, reference);
         raise(&mut self.errors, foot);
         if newest && largest(&self.errors) <= limit {
-            let step = reference.error_of(self.step_of_boundary(plan, data, reference));
+            let steps = self.steps_of_boundary(plan, data, reference);
+            self.steps = steps.map(|distance| reference.error_of(distance));
+            let step = self.steps[0].max(self.steps[1]);
             let Self { errors, inherited, .. } = self;
             errors.iter_mut().zip(inherited).for_each(|(error, own)| *error = error.max(*own + step));
         }
@@ -242,7 +247,26 @@ impl Evaluator {
         for end in [plan.a, plan.b].into_iter().filter(|&end| end < reference.points) {
             error = error.max(self.place(end, 0, plan, data, reference));
         }
-        error
+        error.max(self.look_beside_corners(data, plan, reference))
+    }
+
+    /// The error at reference vertices that are corners of the new tetrahedra, where the lattice has moved them: beside the corner
+    /// the field has another value.
+    fn look_beside_corners(&mut self, data: &VertexData, plan: &Plan, reference: &Reference<'_>) -> f64 {
+        let mut largest = 0.0_f64;
+        for cell in 0..self.cells.len() {
+            for v in self.cells[cell].others {
+                if v >= reference.points || !reference.quantized.is_moved(v) {
+                    continue;
+                }
+                let relative = reference.quantized.places[v as usize] - as_vec(plan.position);
+                let lambda = self.cells[cell].barycentric * relative;
+                if lambda.min_element().min(1.0 - lambda.element_sum()) >= -SLACK {
+                    largest = largest.max(self.deviate(v, cell, clamped(lambda), data, reference));
+                }
+            }
+        }
+        largest
     }
 
     /// Moves the points to the buckets where [`Evaluator::evaluate`] found them to belong.
@@ -307,29 +331,43 @@ impl Evaluator {
         }
     }
 
-    /// How far the ends are from the new boundary.
-    fn step_of_boundary(&mut self, plan: &Plan, data: &VertexData, reference: &Reference<'_>) -> f64 {
+    /// How far what there is at each end is outside of the new boundary: so much nearer to a region may a tetrahedron be that the
+    /// split creates than all that it removes.
+    fn steps_of_boundary(&mut self, plan: &Plan, data: &VertexData, reference: &Reference<'_>) -> [f64; 2] {
+        let mut steps = [0.0_f64; 2];
         if !plan.on_boundary || self.flat {
-            return 0.0;
+            return steps;
         }
-        let at = |v: u32| reference.scaled(data.positions[v as usize]);
-        let mut largest = 0.0_f64;
-        for end in [plan.a, plan.b] {
-            largest = largest.max(self.nearest(at(end), self.at_centre, plan, data, reference).2);
+        let at = |v: u32| as_vec(data.positions[v as usize]);
+        for (step, end) in steps.iter_mut().zip([plan.a, plan.b]) {
+            *step = self.outside(at(end), plan, data, reference);
         }
         // Between the ends and the link the new boundary may be further away than at either.
         // The two triangles of an edge have it in opposite directions; one is enough.
         for i in 0..self.old_border.len() {
             let [x, y, z] = self.old_border[i];
             for [x, y] in [[x, y], [y, z], [z, x]] {
-                let at_end = [plan.a, plan.b].iter().any(|&end| end == x || end == y);
-                if x < y && at_end {
-                    let middle = (at(x) + at(y)) * 0.5;
-                    largest = largest.max(self.nearest(middle, self.at_centre, plan, data, reference).2);
+                let at_end = [plan.a, plan.b].map(|end| end == x || end == y);
+                if x < y && at_end.contains(&true) {
+                    let distance = self.outside((at(x) + at(y)) * 0.5, plan, data, reference);
+                    for (step, _) in steps.iter_mut().zip(at_end).filter(|(_, at_end)| *at_end) {
+                        *step = step.max(distance);
+                    }
                 }
             }
         }
-        largest
+        steps
+    }
+
+    /// How far a place, in steps of the lattice, is from the new boundary; 0 if a tetrahedron of the new star holds it.
+    fn outside(&mut self, place: DVec3, plan: &Plan, data: &VertexData, reference: &Reference<'_>) -> f64 {
+        let relative = place - as_vec(plan.position);
+        let (.., depth) = locate(self.cells.len(), 0, |i| self.cells[i].barycentric * relative);
+        if depth >= -SLACK {
+            return 0.0;
+        }
+        let step = DVec3::from_array(reference.quantized.lattice.step);
+        self.nearest(place * step, self.at_centre, plan, data, reference).2
     }
 
     /// Finds the part of the reference boundary that the new vertex is near to. Returns the error that the distance
@@ -366,7 +404,7 @@ impl Evaluator {
         let tets = plan.stay.iter().map(|(s, _)| s.tet).chain(plan.fan.iter().map(|&(tet, ..)| tet));
         let ends = [plan.a, plan.b].into_iter().filter(|&end| end < reference.points);
         for point in tets.flat_map(|tet| buckets.border.iter(tet)).chain(ends) {
-            let p = reference.scaled(reference.quantized.positions[point as usize]);
+            let p = reference.place(point);
             let (cell, _, distance) = self.nearest(p, usize::MAX, plan, data, reference);
             self.border_moves.push((point, cell));
             largest = largest.max(distance);
@@ -424,13 +462,12 @@ impl Evaluator {
         data: &VertexData,
         reference: &Reference<'_>,
     ) -> f64 {
-        let position = as_vec(reference.quantized.positions[point as usize]);
-        let relative = position - as_vec(plan.position);
+        let relative = reference.quantized.places[point as usize] - as_vec(plan.position);
         let (mut cell, mut lambda, depth) =
             locate(self.cells.len(), hint, |i| self.cells[i].barycentric * relative);
         let mut displaced = 0.0;
         if depth < -SLACK && !self.border.is_empty() {
-            let p = reference.scaled(reference.quantized.positions[point as usize]);
+            let p = reference.place(point);
             let (found, q, distance) = self.nearest(p, usize::MAX, plan, data, reference);
             let step = DVec3::from_array(reference.quantized.lattice.step);
             let to_q = (q - reference.scaled(plan.position)) / step;
@@ -500,6 +537,11 @@ impl Reference<'_> {
     /// What a displacement counts as.
     pub fn error_of(&self, distance: f64) -> f64 {
         if distance > 0.0 { distance / self.displacement_per_error } else { 0.0 }
+    }
+
+    /// Where a reference vertex is in the input, in model units from the lattice's origin.
+    pub fn place(&self, point: u32) -> DVec3 {
+        self.quantized.places[point as usize] * DVec3::from_array(self.quantized.lattice.step)
     }
 
     /// A lattice point in model units, from the lattice's origin.

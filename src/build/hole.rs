@@ -1,5 +1,6 @@
 //! The hole that a vertex leaves when it is removed, what fills it, and how a filling is put into the mesh.
 
+use super::flat;
 use super::plan::Refusal;
 use super::work_mesh::StarTet;
 use super::work_mesh::TetMarks;
@@ -29,6 +30,8 @@ pub(super) struct Hole {
     /// The planes of those triangles, if there are no more than two.
     planes: Vec<[[i32; 3]; 3]>,
     many_planes: bool,
+    /// Whether the boundary must stay where it is: see [`flat::planes`].
+    stays: bool,
     /// For each of `faces` a corner and the normal.
     sides: Vec<([i32; 3], [i64; 3])>,
     /// Whether orientations fit `i64`.
@@ -119,6 +122,7 @@ impl Hole {
         self.planes.clear();
         self.many_planes = false;
         let at = |v: u32| positions[v as usize];
+        self.stays = flat::planes(self.border.iter().map(|&[x, y]| [self.a, x, y].map(at))).is_some();
         for &[x, y] in &self.border {
             let [p, q, r] = [self.a, x, y].map(at);
             if !self.planes.iter().any(|&[a, b, c]| orient3d(a, b, c, q) == 0 && orient3d(a, b, c, r) == 0) {
@@ -139,6 +143,11 @@ impl Hole {
     /// Whether three points lie in a plane of the boundary at the vertex. Meaningful where [`Hole::is_flat`].
     pub fn in_plane(&self, triangle: [[i32; 3]; 3]) -> bool {
         self.planes.iter().any(|&[a, b, c]| triangle.iter().all(|&p| orient3d(a, b, c, p) == 0))
+    }
+
+    /// Whether a filling moves the boundary although it must stay.
+    pub fn tilts_flat(&self, filling: &Filling, positions: &[[i32; 3]]) -> bool {
+        self.stays && !self.keeps_boundary(filling, positions)
     }
 
     /// Whether the boundary stays where it is. In two planes it can only be filled in one way.

@@ -380,7 +380,10 @@ impl<'a> Greedy<'a> {
 
     #[inline]
     fn field_error_at(&self, p: u32, cell: usize, v: u32, f: usize) -> f64 {
-        let arm = difference(self.mesh.position(p), self.mesh.position(v)).map(|x| x as f64);
+        let apex = self.mesh.position(v);
+        // The field as it is in the input's own place.
+        let place = self.quantized.places[p as usize].to_array();
+        let arm = [0, 1, 2].map(|i| place[i] - f64::from(apex[i]));
         let fields = self.weights.len();
         let slope = self.slopes[cell * fields + f];
         let value = f64::from(self.quantized.levels[v as usize * fields + f])

@@ -12,9 +12,9 @@
 //!   grow along the partial order towards the base mesh.
 //! - **Topology** never changes: the link condition is checked inside and on the boundary, and vertices at which the
 //!   input is not a manifold stay where they are.
-//! - **Geometry**: every tetrahedron is positive on the lattice, exactly. Flat parts of the boundary stay flat and
-//!   straight creases straight (to half a lattice step where they are oblique to the axes); a boundary that moves
-//!   is counted into the error.
+//! - **Geometry**: every tetrahedron is positive on the lattice, exactly. Parts of the boundary that are flat on the lattice stay
+//!   flat, and the creases and corners where such parts meet at 60° or more stay straight and where they are; where
+//!   the boundary moves, that is counted into the error.
 //! - **Determinism**: the same input gives the same MT on every platform.
 //!
 //! Not promised: distant parts of a curved boundary may come to overlap where they were nearer to each other than
@@ -28,6 +28,7 @@ mod cost;
 mod decimate;
 mod delaunay;
 mod fill_cost;
+mod flat;
 mod gift_wrap;
 mod half_edge;
 mod history;

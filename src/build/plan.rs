@@ -1,9 +1,11 @@
 //! May this edge be collapsed? What comes of it? The tests that need no field: topology and orientation.
 
+use super::flat;
 use super::work_mesh::StarTet;
 use super::work_mesh::TetMarks;
 use super::work_mesh::WorkMesh;
 use crate::geom::orient3d;
+use crate::mesh::FACES;
 use crate::mesh::NONE;
 use crate::mt::MAX_LINK;
 use crate::mt::MAX_STAR;
@@ -114,7 +116,25 @@ impl Plan {
         self.mark_links(mesh, marks)?;
         self.check_link_condition(mesh, marks)?;
         self.place(positions);
-        self.check_orientation(mesh, positions)
+        self.check_orientation(mesh, positions)?;
+        if self.on_boundary { self.check_flat(mesh, positions) } else { Ok(()) }
+    }
+
+    /// Where the boundary at an end must stay, the new vertex has to be in its planes: see [`flat::planes`].
+    fn check_flat(&self, mesh: &WorkMesh, positions: &[[i32; 3]]) -> Result<(), Refusal> {
+        for star in [&self.star_a, &self.star_b] {
+            let triangles = star.iter().flat_map(|s| {
+                let (corners, around) = (mesh.tets[s.tet as usize], mesh.neighbors[s.tet as usize]);
+                let faces = (0..4).filter(move |&k| k != s.corner as usize && around[k] == NONE);
+                faces.map(move |k| FACES[k].map(|l| positions[corners[l] as usize]))
+            });
+            if let Some(planes) = flat::planes(triangles)
+                && !planes.iter().all(|plane| flat::is_in(plane, self.position))
+            {
+                return Err(Refusal::Blocked);
+            }
+        }
+        Ok(())
     }
 
     /// Parts the two stars into what stays and the fan between them.

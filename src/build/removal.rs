@@ -176,7 +176,8 @@ impl Look {
     /// Fills the hole by moving its vertex to `b`, if that may be.
     fn contract(&mut self, state: &State<'_>, b: u32) -> bool {
         let Self { hole, now, nearby, .. } = self;
-        if !contract(hole, &state.reference.quantized.positions, b, &mut now.filling) {
+        let positions = &state.reference.quantized.positions;
+        if !contract(hole, positions, b, &mut now.filling) || hole.tilts_flat(&now.filling, positions) {
             return false;
         }
         // Inside, positive tetrahedra are all it takes.
@@ -190,7 +191,10 @@ impl Look {
     /// Fills the hole by the Delaunay criterion; the filling becomes `best`.
     fn wrap(&mut self, state: &State<'_>, level: u16) -> Option<Key> {
         let Self { hole, legacy, best, gift_wrap, .. } = self;
-        if !gift_wrap.as_mut()?.fill(hole, &state.reference.quantized.positions, &mut best.filling) {
+        let positions = &state.reference.quantized.positions;
+        if !gift_wrap.as_mut()?.fill(hole, positions, &mut best.filling)
+            || hole.tilts_flat(&best.filling, positions)
+        {
             return None;
         }
         // A removal must make the mesh smaller: a finer mesh is then a larger one, which budgets rely on.

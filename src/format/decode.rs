@@ -289,6 +289,53 @@ impl Decoder {
         self.head.index_end.checked_add(index.shared)
     }
 
+    /// The bytes of the file behind the blocks, where exact values are; none if there are none, or that is not known yet.
+    pub fn exact_range(&self) -> Option<Range<u64>> {
+        let index = self.head.index.as_ref()?;
+        let blocks = index.blocks.iter().try_fold(0_u64, |sum, block| sum.checked_add(block.len()))?;
+        let start = self.head_end()?.checked_add(blocks)?;
+        let end = self.total?.checked_sub(END_BYTES as u64)?;
+        (start < end).then_some(start..end)
+    }
+
+    /// Takes in the bytes of [`Decoder::exact_range`] where blocks come by themselves; once is enough.
+    ///
+    /// # Errors
+    /// When the bytes are damaged, or all that comes in front of the blocks is not there yet; nothing has changed then.
+    pub fn take_exact(&mut self, bytes: &[u8]) -> Result<(), FormatError> {
+        let Some(range) = self.exact_range().filter(|_| self.takes_blocks()) else {
+            return Err(self.corrupt("there are no exact values, or not yet"));
+        };
+        let before = std::mem::take(&mut self.exact);
+        let taken = self.read_exact_sections(bytes, range.start);
+        if taken.is_err() {
+            self.exact = before;
+        }
+        taken
+    }
+
+    fn read_exact_sections(&mut self, bytes: &[u8], start: u64) -> Result<(), FormatError> {
+        let mut rest = bytes;
+        while !rest.is_empty() {
+            let offset = start + (bytes.len() - rest.len()) as u64;
+            let corrupt = |what| FormatError::Corrupt { offset, what };
+            let short = || corrupt("the bytes behind the blocks do not end with a section");
+            let (head, behind) = rest.split_first_chunk::<HEAD_BYTES>().ok_or_else(short)?;
+            let head = Head::parse(head);
+            let (payload, behind) = behind.split_at_checked(head.length as usize).ok_or_else(short)?;
+            if Head::new(head.kind, payload).crc != head.crc {
+                return Err(corrupt("the checksum of a section does not match"));
+            }
+            match head.kind {
+                Kind::EXACT => self.open_exact(Reader::new(payload, offset + HEAD_BYTES as u64))?,
+                kind if kind.is_skippable() && !kind.is_known() => {}
+                _ => return Err(corrupt("a section is out of place")),
+            }
+            rest = behind;
+        }
+        Ok(())
+    }
+
     /// Whether all is there that comes in front of the blocks, and these may come in any order.
     pub fn takes_blocks(&self) -> bool {
         matches!(self.mt, Some(Mt::Edge(_) | Mt::HalfEdge(_))) && self.head.base_fields == self.head.fields()

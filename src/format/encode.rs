@@ -37,6 +37,9 @@ use std::io;
 pub struct EncodeOptions {
     /// log2 of the updates of a block, 4 to 16: the least that a client can fetch of the file by itself.
     pub block_bits: u32,
+    /// Refuse an MT whose errors do not fall along its partial order by as much as requests for values rely on, too; errors that
+    /// grow are always refused. What the builders make passes.
+    pub check_margins: bool,
     /// Exact values of fields at the vertices of the reference mesh.
     pub exact: Vec<Exact>,
     /// Free keys and values, kept as they are. What is here makes the bytes: leave out dates and paths.
@@ -45,7 +48,7 @@ pub struct EncodeOptions {
 
 impl Default for EncodeOptions {
     fn default() -> Self {
-        Self { block_bits: BLOCK_BITS, exact: Vec::new(), metadata: BTreeMap::new() }
+        Self { block_bits: BLOCK_BITS, check_margins: false, exact: Vec::new(), metadata: BTreeMap::new() }
     }
 }
 
@@ -70,6 +73,16 @@ pub enum EncodeError {
     },
     /// An update of the MT cannot be applied.
     Update(UpdateError),
+    /// The error of an update is not as far below that of one it depends on as selection relies on: what a request gives would
+    /// depend on what was asked for before.
+    Order {
+        /// The update.
+        update: u32,
+        /// The one that it depends on.
+        parent: u32,
+        /// The field.
+        field: usize,
+    },
     /// Exact values are given for a field or a vertex that the reference mesh does not have.
     Exact {
         /// The field.
@@ -95,6 +108,11 @@ impl fmt::Display for EncodeError {
             ),
             Self::Blocks { bits } => write!(f, "a block cannot hold 2^{bits} updates; choose 4 to 16"),
             Self::Update(error) => write!(f, "the MT is damaged: {error}"),
+            Self::Order { update, parent, field } => write!(
+                f,
+                "the errors of the MT do not fall along its partial order: in field {field} that of update {update} is too \
+                 large for update {parent}, which it depends on; build the MT again"
+            ),
             Self::Exact { field } => {
                 write!(f, "the exact values of field {field} are not those of the reference mesh")
             }
@@ -136,7 +154,7 @@ pub fn encode_to<'a>(
 ) -> Result<u64, EncodeError> {
     let mt = mt.into();
     check(mt, options)?;
-    let Survey { blocks, coded, reference } = Survey::of(mt, options.block_bits)?;
+    let Survey { blocks, coded, reference } = Survey::of(mt, options)?;
     let mt = coded.as_ref().map_or(mt, MtRef::from);
     let mut index = Index { block_bits: options.block_bits, shared: 0, blocks };
     index.round(mt.info());

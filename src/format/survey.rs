@@ -1,12 +1,15 @@
 //! A run through an MT from the base to the reference mesh, for what its file tells of each block.
 
 use super::EncodeError;
+use super::EncodeOptions;
 use super::payload::index::BlockInfo;
 use crate::mt::Applied;
 use crate::mt::CurrentMesh;
 use crate::mt::EdgeMt;
 use crate::mt::HalfEdgeMt;
 use crate::mt::Mt;
+use crate::mt::Excess;
+use crate::mt::Margins;
 use crate::mt::MtRef;
 use crate::mt::MultiTessellation;
 use crate::mt::UpdateError;
@@ -24,32 +27,32 @@ pub struct Survey {
 }
 
 impl Survey {
-    pub fn of(mt: MtRef<'_>, block_bits: u32) -> Result<Self, EncodeError> {
+    pub fn of(mt: MtRef<'_>, options: &EncodeOptions) -> Result<Self, EncodeError> {
         match mt {
-            MtRef::Edge(mt) => survey_edge(mt, block_bits),
-            MtRef::Vertex(mt) => run(mt, block_bits, &mut |_, _| Ok(())),
-            MtRef::HalfEdge(mt) => survey_half_edge(mt, block_bits),
-            MtRef::Explicit(mt) => run(mt, block_bits, &mut |_, _| Ok(())),
+            MtRef::Edge(mt) => survey_edge(mt, options),
+            MtRef::Vertex(mt) => run(mt, options, &mut |_, _| Ok(())),
+            MtRef::HalfEdge(mt) => survey_half_edge(mt, options),
+            MtRef::Explicit(mt) => run(mt, options, &mut |_, _| Ok(())),
         }
     }
 }
 
-fn survey_edge(mt: &EdgeMt, block_bits: u32) -> Result<Survey, EncodeError> {
+fn survey_edge(mt: &EdgeMt, options: &EncodeOptions) -> Result<Survey, EncodeError> {
     if mt.is_coded() {
-        return run(mt, block_bits, &mut |_, _| Ok(()));
+        return run(mt, options, &mut |_, _| Ok(()));
     }
-    let mut coded = EdgeMt::coded(mt.info().clone(), mt.base().clone(), block_bits);
+    let mut coded = EdgeMt::coded(mt.info().clone(), mt.base().clone(), options.block_bits);
     let mut residuals = Vec::new();
-    let survey =
-        run(mt, block_bits, &mut |mesh, u| coded.push(&mt.told(mesh, u, &mut residuals)?).map(drop))?;
+    let survey = run(mt, options, &mut |mesh, u| coded.push(&mt.told(mesh, u, &mut residuals)?).map(drop))?;
     Ok(Survey { coded: Some(coded.into()), ..survey })
 }
 
 /// Blocks are pages, and do not tell on which others they depend: each can be used without.
-fn survey_half_edge(mt: &HalfEdgeMt, block_bits: u32) -> Result<Survey, EncodeError> {
-    let coded = (mt.page_bits() != block_bits).then(|| mt.in_pages(block_bits));
+fn survey_half_edge(mt: &HalfEdgeMt, options: &EncodeOptions) -> Result<Survey, EncodeError> {
+    let bits = options.block_bits;
+    let coded = (mt.page_bits() != bits).then(|| mt.in_pages(bits));
     let coded = coded.transpose().map_err(EncodeError::Update)?.map(Mt::from);
-    let mut survey = run(mt, block_bits, &mut |_, _| Ok(()))?;
+    let mut survey = run(mt, options, &mut |_, _| Ok(()))?;
     survey.blocks.iter_mut().for_each(|block| block.parents.clear());
     Ok(Survey { coded, ..survey })
 }
@@ -57,15 +60,19 @@ fn survey_half_edge(mt: &HalfEdgeMt, block_bits: u32) -> Result<Survey, EncodeEr
 /// Called before each update with the mesh that has all of its parents.
 type Before<'a> = &'a mut dyn FnMut(&mut CurrentMesh, UpdateId) -> Result<(), UpdateError>;
 
-fn run(mt: &impl MultiTessellation, block_bits: u32, before: Before<'_>) -> Result<Survey, EncodeError> {
+fn run(
+    mt: &impl MultiTessellation,
+    options: &EncodeOptions,
+    before: Before<'_>,
+) -> Result<Survey, EncodeError> {
     let mut mesh = mt.start().map_err(EncodeError::Base)?;
     mt.announce(&mut mesh, 0);
+    let mut margins = Margins::new(mt.info());
     let mut blocks = Vec::new();
     let mut first = 0;
     while first < mt.updates() {
-        let end = mt.updates().min(first + (1 << block_bits));
-        let block = survey_block(mt, &mut mesh, first..end, block_bits, before);
-        blocks.push(block.map_err(EncodeError::Update)?);
+        let end = mt.updates().min(first + (1 << options.block_bits));
+        blocks.push(survey_block(mt, &mut mesh, first..end, options, &mut margins, before)?);
         first = end;
     }
     mesh.compact();
@@ -80,9 +87,10 @@ fn survey_block(
     mt: &impl MultiTessellation,
     mesh: &mut CurrentMesh,
     updates: std::ops::Range<u32>,
-    block_bits: u32,
+    options: &EncodeOptions,
+    margins: &mut Margins,
     before: Before<'_>,
-) -> Result<BlockInfo, UpdateError> {
+) -> Result<BlockInfo, EncodeError> {
     let fields = mt.info().fields.len();
     let mut block = BlockInfo {
         bounds: [[i32::MAX; 3], [i32::MIN; 3]],
@@ -90,25 +98,31 @@ fn survey_block(
         ranges: vec![[i32::MAX, i32::MIN]; fields],
         ..BlockInfo::default()
     };
-    let own = updates.start >> block_bits;
+    let own = updates.start >> options.block_bits;
     let mut parents = BTreeSet::new();
     let mut tets = Vec::new();
     for u in updates.map(UpdateId) {
-        before(mesh, u)?;
+        before(mesh, u).map_err(EncodeError::Update)?;
         for (f, error) in block.errors.iter_mut().enumerate() {
             *error = (*error).max(mt.error_of_field(u, f));
         }
         tets.clear();
-        mt.find_removed(mesh, u, &mut tets)?;
-        parents.extend(tets.iter().filter_map(|&t| mt.creator(mesh, t)).map(|p| p.0 >> block_bits));
+        mt.find_removed(mesh, u, &mut tets).map_err(EncodeError::Update)?;
+        if let Some(excess) = margins.check(mt, mesh, u, &tets) {
+            let Excess { parent, field, larger, .. } = excess;
+            if larger || options.check_margins {
+                return Err(EncodeError::Order { update: u.0, parent: parent.0, field });
+            }
+        }
+        parents.extend(tets.iter().filter_map(|&t| mt.creator(mesh, t)).map(|p| p.0 >> options.block_bits));
         widen(&mut block, mesh, &tets);
-        match mt.refine(mesh, u)? {
+        match mt.refine(mesh, u).map_err(EncodeError::Update)? {
             Applied::Done => {}
-            Applied::Blocked(_) => return Err(UpdateError::Error { update: u.0 }),
+            Applied::Blocked(_) => return Err(EncodeError::Update(UpdateError::Error { update: u.0 })),
         }
         mesh.clear_touched();
         tets.clear();
-        mt.find_inserted(mesh, u, &mut tets)?;
+        mt.find_inserted(mesh, u, &mut tets).map_err(EncodeError::Update)?;
         widen(&mut block, mesh, &tets);
     }
     parents.remove(&own);

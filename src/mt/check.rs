@@ -5,10 +5,14 @@ use super::ExplicitMt;
 use super::MultiTessellation;
 #[cfg(feature = "build")]
 use super::ReplayError;
+#[cfg(feature = "build")]
+use super::UpdateError;
 use super::UpdateId;
 use super::VertexId;
 #[cfg(feature = "build")]
-use super::replay::replay;
+use super::margins::Margins;
+#[cfg(feature = "build")]
+use super::split::Applied;
 use super::taken::Faces;
 use super::taken::faces;
 use crate::geom::orient3d;
@@ -26,6 +30,12 @@ pub enum MtFault {
     },
     /// An update has a larger error than one that it depends on.
     Error {
+        /// The update.
+        update: UpdateId,
+    },
+    /// An update has an error that is not as much below that of one it depends on as its values are beyond those which that one
+    /// replaces: what a request for values gives would depend on what was asked for before.
+    Margin {
         /// The update.
         update: UpdateId,
     },
@@ -54,6 +64,9 @@ impl fmt::Display for MtFault {
         match self {
             Self::Order { update } => write!(f, "update {} contradicts the order of the MT", update.0),
             Self::Error { update } => write!(f, "update {} has a larger error than a parent", update.0),
+            Self::Margin { update } => {
+                write!(f, "update {} has an error too near to that of a parent", update.0)
+            }
             Self::Tetrahedron { update } => {
                 write!(f, "{} has a tetrahedron that is not positive", place(update))
             }
@@ -67,22 +80,31 @@ impl fmt::Display for MtFault {
 
 impl std::error::Error for MtFault {}
 
-/// Checks that the errors of an MT do not grow along the partial order, by applying all its updates. Returns the first
-/// update with a larger error than a parent, if there is one.
+/// Checks that the errors of an MT fall along the partial order by as much as requests for values rely on, by applying all its
+/// updates. Returns the first update with a larger error than a parent, or one too near to it, if there is one.
 ///
 /// # Errors
 /// If an update cannot be applied.
 #[cfg(feature = "build")]
 pub fn check_errors(mt: &impl MultiTessellation) -> Result<Option<MtFault>, ReplayError> {
-    let mut fault = None;
-    replay(mt, |step| {
-        let own = mt.errors(step.update);
-        let exceeds = |parent: &UpdateId| own.iter().zip(mt.errors(*parent)).any(|(own, above)| own > above);
-        if fault.is_none() && step.parents.iter().any(exceeds) {
-            fault = Some(MtFault::Error { update: step.update });
+    let mut mesh = mt.start()?;
+    mt.announce(&mut mesh, 0);
+    let mut margins = Margins::new(mt.info());
+    let mut tets = Vec::new();
+    for update in (0..mt.updates()).map(UpdateId) {
+        tets.clear();
+        mt.find_removed(&mut mesh, update, &mut tets)?;
+        if let Some(excess) = margins.check(mt, &mesh, update, &tets) {
+            let fault = if excess.larger { MtFault::Error { update } } else { MtFault::Margin { update } };
+            return Ok(Some(fault));
         }
-    })?;
-    Ok(fault)
+        if let Applied::Blocked(_) = mt.refine(&mut mesh, update)? {
+            // All updates with smaller numbers are applied, and only those can be in the way.
+            return Err(UpdateError::Error { update: update.0 }.into());
+        }
+        mesh.clear_touched();
+    }
+    Ok(None)
 }
 
 impl ExplicitMt {

@@ -21,6 +21,7 @@ mod half_edge_apply;
 mod half_edge_from;
 mod half_edge_star;
 mod insertion;
+mod margins;
 mod predict;
 mod replay;
 mod ring;
@@ -51,6 +52,7 @@ pub use half_edge::BaseMark;
 pub use half_edge::ForestChild;
 pub use half_edge::HalfEdgeMt;
 pub use half_edge::HalfEdgeUpdate;
+pub(crate) use margins::{Excess, Margins};
 pub use replay::ReplayError;
 #[cfg(feature = "build")]
 pub(crate) use replay::canonical;
@@ -131,8 +133,9 @@ pub struct FieldInfo {
     pub vector: Option<VectorPart>,
     /// The time that the values are of, if it is known.
     pub time: Option<f64>,
-    /// The largest difference between a reference vertex's value on the lattice and the input's, in field units, rounded
-    /// up; 0 if all are exact.
+    /// The largest difference between the input's value at a reference vertex and that of the reference mesh where the input has the
+    /// vertex, in field units, rounded up: what the lattice of the values rounds off and, where the lattice of the positions moves
+    /// vertices, what the field changes on the way. 0 if all are exact.
     pub quantization: f64,
 }
 

@@ -14,6 +14,7 @@ use crate::format::FormatError;
 use crate::format::Limits;
 use crate::mt::CurrentMesh;
 use crate::mt::ErrorCode;
+use crate::mt::Exact;
 use crate::mt::MeshChanges;
 use crate::mt::Mt;
 use crate::mt::MtInfo;
@@ -338,7 +339,7 @@ impl Session {
 
     /// One of the fields at the vertices of the current mesh in double precision: exact at vertices of the reference mesh if
     /// the file keeps exact values, else the values of the levels; empty if there is no such field. Exact values come last in
-    /// a file, and only where it is read as a whole.
+    /// a file: a session in parts has them after [`Session::take_exact`].
     pub fn exact_values(&self, field: usize) -> Vec<f64> {
         let (Some(mesh), Some(info)) = (self.mesh(), self.info().and_then(|info| info.fields.get(field)))
         else {
@@ -351,6 +352,40 @@ impl Session {
             exact.unwrap_or(of_level)
         };
         (0..mesh.positions().len() as u32).map(value).collect()
+    }
+
+    /// The bytes of the file that hold its exact values, for [`Session::take_exact`]; none if there are none, or they are here.
+    pub fn exact_range(&self) -> Option<Range<u64>> {
+        let fields = self.info()?.fields.len();
+        let here = (0..fields).any(|field| self.decoder.exact(field).is_some());
+        self.decoder.exact_range().filter(|_| !here && self.decoder.takes_blocks())
+    }
+
+    /// Takes in the bytes of [`Session::exact_range`], in sessions in parts.
+    ///
+    /// # Errors
+    /// As [`Decoder::take_exact`].
+    pub fn take_exact(&mut self, bytes: &[u8]) -> Result<(), FormatError> {
+        self.decoder.take_exact(bytes)
+    }
+
+    /// The exact values of all vertices of the reference mesh that the file keeps, as tables to [write](crate::format::encode).
+    /// Changes the current mesh to the reference mesh if there are any.
+    ///
+    /// # Errors
+    /// As [`Session::refine`].
+    pub fn exact_tables(&mut self) -> Result<Vec<Exact>, SessionError> {
+        let count = self.info().ok_or(SessionError::NotReady)?.fields.len();
+        let fields: Vec<usize> = (0..count).filter(|&f| self.decoder.exact(f).is_some()).collect();
+        if !fields.is_empty() {
+            self.refine(&Request::within(0.0))?;
+        }
+        let Some(mesh) = self.mesh() else { return Err(SessionError::NotReady) };
+        let table = |field: usize| {
+            let values = self.exact_values(field).into_iter().zip(0..);
+            Exact::new(field, values.map(|(value, slot)| (mesh.vertex(slot), value)).collect())
+        };
+        Ok(fields.into_iter().map(table).collect())
     }
 
     /// The field that is shown.

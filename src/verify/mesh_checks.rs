@@ -1,7 +1,6 @@
 //! Is this a valid conforming mesh? Asked of plain arrays, with nothing but sorting and exact orientation.
 
 use crate::geom::orient3d;
-use crate::mesh::EDGES;
 use crate::mesh::FACES;
 use crate::mesh::NONE;
 use crate::mt::CurrentMesh;
@@ -30,12 +29,16 @@ pub struct Shape {
 
 impl Shape {
     pub fn of(reference: &PlainReference<'_>) -> Result<Self, String> {
-        Ok(Self { euler: euler(reference.positions.len(), reference.tets, &sorted_faces(reference.tets)?) })
+        let around = Around::new(reference.positions.len(), reference.tets)?;
+        let mut faces = Vec::new();
+        let mut count = Counts::default();
+        (0..reference.positions.len() as u32).for_each(|v| count.add(&around.at(v, &mut faces), &faces));
+        Ok(Self { euler: count.euler(reference.positions.len(), reference.tets.len()) })
     }
 }
 
-/// A face by its sorted vertices, the side its tetrahedron is on, and where it is: `4 · tet + face`.
-type Face = ([u32; 3], bool, u32);
+/// A face at its least vertex: the two others, ascending, the side its tetrahedron is on, and where it is: `4 · tet + face`.
+type Face = ([u32; 2], bool, u32);
 
 impl<'a> PlainMesh<'a> {
     /// The mesh, which must be packed.
@@ -47,10 +50,15 @@ impl<'a> PlainMesh<'a> {
     pub fn check(&self, reference: &Shape) -> Result<(), String> {
         self.check_vertices()?;
         self.check_orientation()?;
-        let faces = sorted_faces(self.tets)?;
-        let boundary = self.check_faces(&faces)?;
+        let around = Around::new(self.positions.len(), self.tets)?;
+        let (mut faces, mut boundary) = (Vec::new(), Vec::new());
+        let mut count = Counts::default();
+        for v in 0..self.positions.len() as u32 {
+            count.add(&around.at(v, &mut faces), &faces);
+            self.check_faces(v, &faces, &mut boundary)?;
+        }
         check_closed(&boundary)?;
-        let euler = euler(self.positions.len(), self.tets, &faces);
+        let euler = count.euler(self.positions.len(), self.tets.len());
         if euler != reference.euler {
             return Err(format!("the Euler number is {euler}, that of the input {}", reference.euler));
         }
@@ -86,13 +94,12 @@ impl<'a> PlainMesh<'a> {
         }
     }
 
-    /// Compares adjacency with what the faces say. Returns the boundary.
-    fn check_faces(&self, faces: &[Face]) -> Result<Vec<[u32; 3]>, String> {
+    /// Compares adjacency with what the sorted faces with least vertex `v` say. Appends those of the boundary.
+    fn check_faces(&self, v: u32, faces: &[Face], boundary: &mut Vec<[u32; 3]>) -> Result<(), String> {
         let across = |at: u32| self.neighbors[at as usize / 4][at as usize % 4];
-        let mut boundary = Vec::new();
         for group in faces.chunk_by(|a, b| a.0 == b.0) {
             match group {
-                &[(face, _, at)] if across(at) == NONE => boundary.push(face),
+                &[([b, c], _, at)] if across(at) == NONE => boundary.push([v, b, c]),
                 &[(.., at)] => return Err(format!("tetrahedron {} has a neighbour too many", at / 4)),
                 &[(_, side, a), (_, other_side, b)] => {
                     if side == other_side {
@@ -108,7 +115,7 @@ impl<'a> PlainMesh<'a> {
                 [] => {}
             }
         }
-        Ok(boundary)
+        Ok(())
     }
 
     /// The triangles of the boundary, each with its tetrahedron.
@@ -119,22 +126,75 @@ impl<'a> PlainMesh<'a> {
     }
 }
 
-fn sorted_faces(tets: &[[u32; 4]]) -> Result<Vec<Face>, String> {
-    if tets.len() > crate::mesh::MAX_TETS {
-        return Err("too many tetrahedra to check".into());
-    }
-    let mut faces: Vec<Face> = Vec::with_capacity(4 * tets.len());
-    for (t, tet) in tets.iter().enumerate() {
-        for (i, corners) in FACES.iter().enumerate() {
-            let [a, b, c] = corners.map(|j| tet[j]);
-            let odd = (a > b) ^ (b > c) ^ (a > c);
-            let mut face = [a, b, c];
-            face.sort_unstable();
-            faces.push((face, odd, (4 * t + i) as u32));
+/// The tetrahedra around each vertex: what is looked at vertex by vertex needs no list of all faces or edges.
+struct Around<'a> {
+    tets: &'a [[u32; 4]],
+    /// Where those of each vertex start in `items`.
+    starts: Vec<usize>,
+    items: Vec<u32>,
+}
+
+impl<'a> Around<'a> {
+    fn new(vertices: usize, tets: &'a [[u32; 4]]) -> Result<Self, String> {
+        if tets.len() > crate::mesh::MAX_TETS {
+            return Err("too many tetrahedra to check".into());
         }
+        let mut starts = vec![0_usize; vertices + 1];
+        for &v in tets.iter().flatten() {
+            *starts.get_mut(v as usize + 1).ok_or(format!("there is no vertex {v}"))? += 1;
+        }
+        (1..starts.len()).for_each(|i| starts[i] += starts[i - 1]);
+        let mut next = starts.clone();
+        let mut items = vec![0; 4 * tets.len()];
+        for (t, tet) in (0..).zip(tets) {
+            for &v in tet {
+                items[next[v as usize]] = t;
+                next[v as usize] += 1;
+            }
+        }
+        Ok(Self { tets, starts, items })
     }
-    faces.sort_unstable();
-    Ok(faces)
+
+    /// Gives the vertices that have larger numbers and share an edge with `v`, and sorted the faces of which it is the least vertex.
+    fn at(&self, v: u32, faces: &mut Vec<Face>) -> Vec<u32> {
+        faces.clear();
+        let mut larger = Vec::new();
+        for &t in &self.items[self.starts[v as usize]..self.starts[v as usize + 1]] {
+            let tet = self.tets[t as usize];
+            larger.extend(tet.iter().filter(|&&w| w > v));
+            for (i, corners) in FACES.iter().enumerate() {
+                let [a, b, c] = corners.map(|j| tet[j]);
+                let odd = (a > b) ^ (b > c) ^ (a > c);
+                let mut face = [a, b, c];
+                face.sort_unstable();
+                if face[0] == v {
+                    faces.push(([face[1], face[2]], odd, 4 * t + i as u32));
+                }
+            }
+        }
+        larger.sort_unstable();
+        larger.dedup();
+        faces.sort_unstable();
+        larger
+    }
+}
+
+/// Edges and faces of a mesh, each once.
+#[derive(Default)]
+struct Counts {
+    edges: i64,
+    faces: i64,
+}
+
+impl Counts {
+    fn add(&mut self, larger: &[u32], faces: &[Face]) {
+        self.edges += larger.len() as i64;
+        self.faces += faces.chunk_by(|a, b| a.0 == b.0).count() as i64;
+    }
+
+    fn euler(&self, vertices: usize, tets: usize) -> i64 {
+        vertices as i64 - self.edges + self.faces - tets as i64
+    }
 }
 
 fn check_closed(boundary: &[[u32; 3]]) -> Result<(), String> {
@@ -144,15 +204,4 @@ fn check_closed(boundary: &[[u32; 3]]) -> Result<(), String> {
         Some(group) => Err(format!("the boundary is open at the edge {:?}", group[0])),
         None => Ok(()),
     }
-}
-
-fn euler(vertices: usize, tets: &[[u32; 4]], faces: &[Face]) -> i64 {
-    let mut edges: Vec<(u32, u32)> = Vec::with_capacity(6 * tets.len());
-    for tet in tets {
-        edges.extend(EDGES.map(|[i, j]| (tet[i].min(tet[j]), tet[i].max(tet[j]))));
-    }
-    edges.sort_unstable();
-    edges.dedup();
-    let faces = faces.chunk_by(|a, b| a.0 == b.0).count();
-    vertices as i64 - edges.len() as i64 + faces as i64 - tets.len() as i64
 }

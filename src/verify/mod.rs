@@ -7,10 +7,12 @@
 //! What is promised and checked, for regions, values, views, transfer functions, their unions, and budgets:
 //! - **Full circle**: error 0 gives the reference mesh, tetrahedron for tetrahedron, on the lattice; error ∞ the base.
 //!   Where the MT was built from points, the mesh that it gives at error 0 has those points and no others.
-//! - **Order**: the error of an update is at least that of every update that depends on it.
+//! - **Order**: the error of an update is at least that of every update that depends on it, and by as much larger as requests for
+//!   values rely on.
 //! - **Valid meshes**: positive tetrahedra, faces shared by at most two, complete and symmetric adjacency, a closed
 //!   boundary, the reference mesh's Euler number, no vertex without a tetrahedron.
-//! - **Error**: within the bound of each need, or half a level where that is more, at every reference vertex in its part.
+//! - **Error**: within the bound of each need, or what the lattices round off ([`MtInfo::floor`](crate::mt::MtInfo::floor)) where
+//!   that is more, at every reference vertex in its part, where the input has it.
 //!   Where the boundary has moved, a place on it that is near enough counts: a displacement `d` is an error
 //!   of `d / displacement_per_error`. In a view, the error is compared with the one that fills the pixels at that vertex; with a
 //!   transfer function, the colour of the interpolated value with that of the vertex.
@@ -20,9 +22,12 @@
 //! - **Answers**: `satisfied` and the bounds are true, budgets are kept, a larger budget never has a larger excess, and the
 //!   same request gives the same mesh whatever was asked for before and in whatever steps it is answered; asking for it
 //!   again changes nothing.
+//! - **History**: a hundred more requests for values all over the range and for boxes, in random order, each from the base mesh and
+//!   from others.
 //! - **Steps**: between them the mesh is valid and within the budget.
 
 mod deviation;
+mod history;
 mod mesh_checks;
 mod parts;
 mod points;
@@ -81,7 +86,55 @@ pub fn run<M: MultiTessellation>(
     reference: Reference,
     on_progress: &mut dyn FnMut(u32, u32),
 ) -> VerifyReport {
-    with(mt, input, reference, &|input| queries::of(mt, input), on_progress)
+    let plan = |input: &TetMesh| Plan {
+        queries: queries::of(mt, input),
+        histories: history::requests(mt.info(), input),
+        vertices: usize::MAX,
+    };
+    with(mt, input, reference, &plan, on_progress)
+}
+
+/// How much of a verification is done where all of it would take too long.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sample {
+    /// Requests of each sort, at most: those whose answers are looked at, and those of which only the way there is varied.
+    pub requests: usize,
+    /// About so many reference vertices, spread over the mesh, at which errors are measured.
+    pub vertices: usize,
+}
+
+impl Default for Sample {
+    fn default() -> Self {
+        Self { requests: 12, vertices: 20_000 }
+    }
+}
+
+impl Sample {
+    /// Some of the queries, from all over the list.
+    fn of(&self, queries: Vec<Query>) -> Vec<Query> {
+        let count = queries.len();
+        let taken = self.requests.min(count);
+        // The i-th one of those that are taken is number i * count / taken.
+        let is_taken = |i: usize| (i * taken) % count < taken;
+        queries.into_iter().enumerate().filter(|(i, _)| is_taken(*i)).map(|(_, query)| query).collect()
+    }
+}
+
+/// [`run`] on a sample of the requests and of the reference vertices: for very large meshes. What is checked of a mesh without
+/// requests, and that the meshes which come out are valid, is checked as there.
+pub fn run_sample<M: MultiTessellation>(
+    mt: &M,
+    input: &TetMesh,
+    reference: Reference,
+    sample: Sample,
+    on_progress: &mut dyn FnMut(u32, u32),
+) -> VerifyReport {
+    let plan = |input: &TetMesh| Plan {
+        queries: sample.of(queries::of(mt, input)),
+        histories: sample.of(history::requests(mt.info(), input)),
+        vertices: sample.vertices,
+    };
+    with(mt, input, reference, &plan, on_progress)
 }
 
 /// [`run`] with requests of the caller's own.
@@ -93,18 +146,33 @@ pub fn run_requests<M: MultiTessellation>(
     on_progress: &mut dyn FnMut(u32, u32),
 ) -> VerifyReport {
     let named = |(i, request): (usize, &Request)| Query::new(&format!("request {i}"), request.clone());
-    with(mt, input, reference, &|_| requests.iter().enumerate().map(named).collect(), on_progress)
+    let plan = |_: &TetMesh| Plan {
+        queries: requests.iter().enumerate().map(named).collect(),
+        histories: Vec::new(),
+        vertices: usize::MAX,
+    };
+    with(mt, input, reference, &plan, on_progress)
+}
+
+/// What is tried with an MT.
+struct Plan {
+    /// Requests whose answers are looked at from all sides.
+    queries: Vec<Query>,
+    /// Requests of which only the way there is varied.
+    histories: Vec<Query>,
+    /// About how many reference vertices are looked at.
+    vertices: usize,
 }
 
 fn with<M: MultiTessellation>(
     mt: &M,
     input: &TetMesh,
     reference: Reference,
-    queries: &dyn Fn(&TetMesh) -> Vec<Query>,
+    plan: &dyn Fn(&TetMesh) -> Plan,
     on_progress: &mut dyn FnMut(u32, u32),
 ) -> VerifyReport {
     let mut report = VerifyReport::default();
-    let mut check = |input: &TetMesh| verify(mt, input, &queries(input), on_progress, &mut report);
+    let mut check = |input: &TetMesh| verify(mt, input, &plan(input), on_progress, &mut report);
     let verified = match reference {
         Reference::Mesh => check(input),
         Reference::Points => points::triangulated(mt, input).and_then(|mesh| check(&mesh)),
@@ -120,15 +188,15 @@ fn with<M: MultiTessellation>(
 fn verify<M: MultiTessellation>(
     mt: &M,
     input: &TetMesh,
-    queries: &[Query],
+    Plan { queries, histories, vertices }: &Plan,
     on_progress: &mut dyn FnMut(u32, u32),
     report: &mut VerifyReport,
 ) -> Result<(), String> {
-    let deviation = Deviation::new(mt.info(), input)?;
+    let deviation = Deviation::new(mt.info(), input, *vertices)?;
     let base = fresh(mt)?;
     let reference = check_full_circle(mt, &deviation, report)?;
     check_order(mt, report);
-    let steps = 2 * queries.len() as u32;
+    let steps = (2 * queries.len() + histories.len()) as u32;
     let mut hashes = Vec::with_capacity(queries.len());
     let mut excesses = Vec::with_capacity(queries.len());
     for (i, query) in (0..).zip(queries) {
@@ -142,7 +210,9 @@ fn verify<M: MultiTessellation>(
     }
     check_monotone(queries, &excesses, report);
     let walk = Walk { mt, base: &base, shape: &reference, steps: Steps(1) };
-    walk.run(queries, &hashes, on_progress, report)
+    let first = queries.len() as u32;
+    walk.run(queries, &hashes, &mut |i| on_progress(first + i, steps), report)?;
+    history::check(mt, &base, histories, &mut |i| on_progress(2 * first + i, steps), report)
 }
 
 /// Of two requests that differ in their budgets alone, the one that allows more must not be answered worse.
@@ -241,14 +311,14 @@ impl<M: MultiTessellation> Walk<'_, M> {
         mut self,
         queries: &[Query],
         hashes: &[u64],
-        on_progress: &mut dyn FnMut(u32, u32),
+        on_progress: &mut dyn FnMut(u32),
         report: &mut VerifyReport,
     ) -> Result<(), String> {
         let count = queries.len();
         let stride = (count / 3..).find(|&s| s > 0 && coprime(s, count)).unwrap_or(1);
         let mut front = self.base.clone();
         for step in 0..count {
-            on_progress((count + step) as u32, 2 * count as u32);
+            on_progress(step as u32);
             let i = step * stride % count;
             let query = &queries[i];
             self.answer(&mut front, query, report)?;

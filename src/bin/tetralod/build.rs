@@ -207,7 +207,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     drop(mesh);
     let told = metadata(&config).into_iter().map(|(k, v)| (k.to_owned(), v.to_owned()));
     let metadata = told.chain(arguments.metadata.iter().cloned()).collect();
-    let options = EncodeOptions { block_bits: config.block_bits, exact, metadata };
+    let options = EncodeOptions { block_bits: config.block_bits, check_margins: true, exact, metadata };
     let file_bytes = files::write_file(&arguments.output, |out| Ok(encode_to(&mt, &options, out)?))?;
     let report = report(&config, &summary, file_bytes, start.elapsed().as_secs_f64(), repaired);
     match arguments {

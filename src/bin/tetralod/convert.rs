@@ -49,12 +49,14 @@ struct Report {
 
 pub fn run(arguments: &Arguments) -> Result<()> {
     let start = Instant::now();
-    let opened = files::open_mt(&arguments.file)?;
+    let mut opened = files::open_mt(&arguments.file)?;
     let from = opened.info()?.kind;
     let converted = opened.mt()?.convert(arguments.kind);
     let mt = converted.with_context(|| arguments.file.display().to_string())?;
+    // Conversions keep the numbers of the vertices.
+    let exact = opened.session.exact_tables()?;
     let metadata = opened.session.metadata().iter().cloned().collect();
-    let options = EncodeOptions { metadata, ..EncodeOptions::default() };
+    let options = EncodeOptions { check_margins: true, exact, metadata, ..EncodeOptions::default() };
     let file_bytes = files::write_file(&arguments.output, |out| Ok(encode_to(&mt, &options, out)?))?;
     let info = mt.info();
     let report = Report {

@@ -54,7 +54,7 @@ struct Report<'a> {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let answer = arguments.query.answer(&arguments.file)?;
+    let answer = arguments.query.answer_exactly(&arguments.file)?;
     let opened = &answer.opened;
     let measured = arguments.measure.as_deref().map(|input| measure(input, &answer)).transpose()?;
     let mesh = opened.session.mesh().context("there is no mesh")?;

@@ -186,6 +186,15 @@ impl Query {
 
     /// Opens an MT file and refines its mesh to what is asked for; the session shows the field that is asked for.
     pub fn answer(&self, file: &Path) -> Result<Answer> {
+        self.answer_from(file, false)
+    }
+
+    /// [`Query::answer`] with the exact values that the file keeps.
+    pub fn answer_exactly(&self, file: &Path) -> Result<Answer> {
+        self.answer_from(file, true)
+    }
+
+    fn answer_from(&self, file: &Path, exact: bool) -> Result<Answer> {
         if let Err(wrong) = self.group() {
             super::refuse_usage(&wrong.to_string());
         }
@@ -198,6 +207,9 @@ impl Query {
         let request = Request { needs, budget: self.budget() };
         client.aim(&request).with_context(name)?;
         while !client.fetch(PATIENCE).with_context(name)? {}
+        if exact {
+            client.fetch_exact().with_context(name)?;
+        }
         let mut opened = Opened::of(client);
         let start = Instant::now();
         let deadline = self.max_ms.map(|ms| Duration::from_secs_f64(ms / 1000.0));

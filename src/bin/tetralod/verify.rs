@@ -8,7 +8,11 @@ use indicatif::ProgressStyle;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use tetralod::mesh::TetMesh;
+use tetralod::mt::Mt;
+use tetralod::mt::MultiTessellation;
 use tetralod::verify;
+use tetralod::verify::Sample;
 use tetralod::verify::VerifyReport;
 
 /// Checks every promise of an MT file against the mesh that it was built from; exit code 1 if one is broken.
@@ -19,6 +23,9 @@ pub struct Arguments {
     /// The mesh, or the points, that it was built from (repeatable: time steps).
     #[arg(long, value_name = "INPUT", required = true)]
     against: Vec<PathBuf>,
+    /// Only a sample: fewer requests, and errors measured at about 20 000 vertices. For very large meshes.
+    #[arg(long)]
+    quick: bool,
     /// Print a JSON object.
     #[arg(long)]
     json: bool,
@@ -29,32 +36,65 @@ struct Report<'a> {
     valid: bool,
     queries: u32,
     worst_error_ratio: f64,
+    /// Whether only a sample was checked.
+    quick: bool,
+    /// About what it took.
+    memory_bytes: u64,
     failures: &'a [String],
+}
+
+/// Percent between two lines that tell how far it is.
+const TOLD_EVERY: u64 = 10;
+/// Bytes for each tetrahedron and vertex of the reference mesh beside the MT and the input: two current meshes, the tetrahedra
+/// around each vertex, and what requests are answered with.
+const TET_BYTES: u64 = 140;
+const VERTEX_BYTES: u64 = 240;
+
+/// About the most memory that a verification takes.
+fn memory(mt: &Mt, input: &TetMesh) -> u64 {
+    let [vertices, tets] = [input.positions.len() as u64, u64::from(mt.info().tetrahedra)];
+    let fields = (input.fields.len() + 3) as u64;
+    mt.bytes() + (16 + TET_BYTES) * tets + (VERTEX_BYTES + 8 * fields) * vertices
 }
 
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let opened = files::open_mt(&arguments.file)?;
     let reference = opened.reference();
     let input = files::read_reference(&arguments.against, &opened)?;
-    // Drawn on stderr, and only on a terminal.
+    let about = memory(opened.mt()?, &input);
+    if !arguments.json {
+        eprintln!("takes about {} of memory", output::bytes(about));
+    }
+    // Drawn on stderr, and only on a terminal; elsewhere lines tell how far it is.
     let bar = ProgressBar::new(1);
     bar.set_style(ProgressStyle::with_template("{wide_bar} {percent:>3} %  about {eta} left")?);
-    let report = verify::run(opened.mt()?, &input, reference, &mut |done, total| {
+    let mut told = 0;
+    let mut on_progress = |done: u32, total: u32| {
         bar.set_length(u64::from(total.max(1)));
         bar.set_position(u64::from(done));
-    });
+        let percent = 100 * u64::from(done) / u64::from(total.max(1));
+        if bar.is_hidden() && !arguments.json && percent >= told + TOLD_EVERY {
+            told = percent;
+            eprintln!("{percent} % ({done} of {total} steps)");
+        }
+    };
+    let report = if arguments.quick {
+        verify::run_sample(opened.mt()?, &input, reference, Sample::default(), &mut on_progress)
+    } else {
+        verify::run(opened.mt()?, &input, reference, &mut on_progress)
+    };
     bar.finish_and_clear();
     if arguments.json {
-        print_json(&report)?
+        print_json(&report, arguments.quick, about)?
     } else {
         print(&report)?
     }
     Ok(if report.valid { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-fn print_json(report: &VerifyReport) -> Result<()> {
+fn print_json(report: &VerifyReport, quick: bool, memory_bytes: u64) -> Result<()> {
     let VerifyReport { valid, queries, worst_error_ratio, ref failures, .. } = *report;
-    output::json(&Report { valid, queries, worst_error_ratio, failures })
+    output::json(&Report { valid, queries, worst_error_ratio, quick, memory_bytes, failures })
 }
 
 fn print(report: &VerifyReport) -> Result<()> {
