@@ -152,7 +152,7 @@ pub fn encode_to<'a>(
     payload::write_end(&mut end, totals);
     let end = Section::new(Kind::ENDF, end)?;
     let mut put = |bytes: &[u8]| writer.write_all(bytes).map_err(EncodeError::Write);
-    put(&header(total))?;
+    put(&header(total, mt.has_tet_errors()))?;
     for section in sections.iter().chain([&end]) {
         put(&section.head.to_bytes())?;
         put(&section.payload)?;

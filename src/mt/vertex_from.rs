@@ -41,11 +41,16 @@ impl VertexMt {
         let mut compact =
             Self::new(info, base, base_removers, most_children.min(MAX_INSERTED as u32), mt.always_grows)
                 .map_err(damaged)?;
+        if let Some(quarterings) = mt.quarterings() {
+            let base = quarterings[..mt.base().len()].to_vec();
+            compact = compact.with_tet_errors(base).map_err(damaged)?;
+        }
         let mut boundary: HashSet<[u32; 3]> = boundary_faces(mt);
         let mut writer = Writer { mt, children: &children, glue: Box::default() };
         for u in (0..updates).map(UpdateId) {
             let node = writer.node(&compact, u, &mut boundary)?;
             compact.push(&node, mt.errors(u)).map_err(damaged)?;
+            compact.set_own_fall(u, mt.own_fall_of(u));
         }
         Ok(compact)
     }
@@ -108,7 +113,7 @@ impl Writer<'_> {
             bits.push(level as u64, field.bits);
         }
         self.write_links(&mut bits, compact, u);
-        self.write_shape(&mut bits, u, &canonical)?;
+        self.write_shape(&mut bits, compact, u, &canonical)?;
         Ok(NodeBits(bits))
     }
 
@@ -197,16 +202,19 @@ impl Writer<'_> {
     fn write_shape(
         &mut self,
         bits: &mut Bits,
+        compact: &VertexMt,
         u: UpdateId,
         canonical: &Canonical,
     ) -> Result<(), ConvertError> {
         let on_boundary = write_given_up(bits, canonical)
             .ok_or(ConvertError::Update { update: u.0, why: "it has too many faces on the boundary" })?;
         let children = &self.children[u.0 as usize];
+        let own = compact.quartering_bits(children.len() as u32);
         for (_, t) in &canonical.walls {
             let remover = self.mt.remover(*t);
             let child = remover.map_or(0, |c| 1 + children.partition_point(|&x| x < c.0));
             bits.push(child as u64, width_of(children.len() as u32));
+            bits.push(u64::from(self.mt.quarterings_of(*t)), own);
         }
         let torn = ConvertError::Update { update: u.0, why: "it does not fill the hole that it leaves" };
         write_removed(&mut self.glue, bits, canonical, on_boundary).ok_or(torn)
