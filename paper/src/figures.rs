@@ -125,9 +125,9 @@ pub struct AtZero {
 /// Asks all MTs of a data set for both.
 pub fn at_zero(data: &DataSet) -> Result<Vec<AtZero>> {
     let of = |model: &Model| -> Result<AtZero> {
-        // Updates of no error have the least one that is stored, or what rounding leaves.
+        // Updates of no error have the least one that is stored, or what rounding leaves; builders may round it up.
         let least = ErrorCode(1).error().max(model.mt.info().floor(0));
-        let [reference, exact] = [0.0, ErrorCode::at_least(least).error()].map(Request::within);
+        let [reference, exact] = [0.0, ErrorCode::at_least(least).coarse().error()].map(Request::within);
         let [reference, exact] = [tetrahedra(&model.mt, &reference)?, tetrahedra(&model.mt, &exact)?];
         Ok(AtZero { recipe: model.recipe, reference, exact })
     };

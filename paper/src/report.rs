@@ -100,7 +100,10 @@ wide as they need to be, not 4 bytes each, which more than pays for shapes. *{ha
 mean star of the reference mesh has {star}; insertion does not choose by size, decimation does ({half_inserted} for \
 half-edges).
 - *{bits} bits a node* for shapes of the inserted MT, the paper's 69: our T_u are larger ({removed} tetrahedra, the \
-paper's 12), and our code also tells which tetrahedra of the star belong to which child. Half-edge decimation, with \
+paper's 12), and our code also tells which tetrahedra of the star belong to which child, so that every tetrahedron of a mesh \
+knows what removes it; the paper's code has a seed and finds T_u by it. How T_u fills its polyhedron we tell face by face, by the \
+place of the fourth vertex in the order in which spheres through the face reach them, where that takes fewer bits than its number. \
+Where T_u is Delaunay this place is 0. Half-edge decimation, with \
 {half_removed}, takes {half_bits}.
 - *Edge-based: {edge_inserted} tetrahedra in u+*, the paper's 27. With six tetrahedra a cell, an inner vertex has 24 around \
 it, and the very first collapse of an inner edge joins two such stars: more than 40 tetrahedra. The paper does not say \
@@ -284,8 +287,8 @@ decimation these are {half_for_others} of {half_needed}, since decimation choose
 
 {table}
 Errors of less than a level of the field count as none here. So the paper's order, vertex before edge, holds for the decimated \
-vertex-based MTs; whether it holds for an inserted one depends on how errors are assigned: the rows with errors of the \
-tetrahedra's own are of the same updates. The single numbers that the \
+vertex-based MTs; for an inserted one it depends on how errors are assigned. With errors of the tetrahedra's own the same updates come near to \
+the edge-based MT; at large errors two bits are too few to tell them well. The single numbers that the \
 paper does print for its inserted MT (at 0.1 %) are near to ours.
 ",
         worse = count(insert.worse),

@@ -28,6 +28,8 @@ use super::glue::Face;
 use super::glue::Glue;
 use super::glue::turned;
 use super::ring::rank;
+use super::sphere_rank::Spheres;
+use super::sphere_rank::Told;
 use super::tet_errors::Packed;
 use super::tet_errors::QUARTERING_BITS;
 use super::tet_errors::TetErrors;
@@ -624,7 +626,7 @@ impl VertexMt {
         }
         cavity.order_link(mesh);
         self.sort(cavity);
-        self.build_removed(u, cavity).ok_or(torn.clone())?;
+        self.build_removed(mesh, u, cavity).ok_or(torn.clone())?;
         cavity.fingerprint_built(mesh);
         if cavity.fingerprint.0 != mesh.labels[slot as usize].split {
             return Err(torn);
@@ -655,7 +657,7 @@ impl VertexMt {
 
     /// Builds T_u from walls in canonical order.
     #[inline]
-    fn build_removed(&self, u: UpdateId, cavity: &mut Cavity) -> Option<()> {
+    fn build_removed(&self, mesh: &CurrentMesh, u: UpdateId, cavity: &mut Cavity) -> Option<()> {
         let shape = self.shape(u);
         let mut faces: [Face; MAX_INSERTED] = [[0; 3]; MAX_INSERTED];
         for (face, wall) in faces.iter_mut().zip(&cavity.walls[..cavity.walls_len]) {
@@ -665,6 +667,12 @@ impl VertexMt {
         let at = shape.remover(cavity.walls_len as u64);
         let mut code = Code::new(at, vertices, shape.boundary);
         let apex = code.apex_of_all(&self.nodes);
+        if apex.is_none() {
+            code.read_told(&self.nodes, || {
+                let link = &cavity.link[..cavity.link_len];
+                Spheres::of(link.iter().map(|&v| mesh.positions[v as usize]))
+            });
+        }
         let close = |face: Face, of_link: bool| match apex {
             Some(apex) if !of_link || face.contains(&apex) => Some(Close::Leave),
             Some(apex) => Some(Close::With(apex)),
@@ -723,11 +731,14 @@ pub(super) struct Code {
     /// Vertices of Π_u.
     vertices: u32,
     boundary: bool,
+    told: Told,
+    /// Where places in their order are told.
+    spheres: Option<Spheres>,
 }
 
 impl Code {
     pub fn new(at: u64, vertices: u32, boundary: bool) -> Self {
-        Self { at, vertices, boundary }
+        Self { at, vertices, boundary, told: Told::Vertex, spheres: None }
     }
 
     fn read(&mut self, nodes: &super::bits::Bits, width: u32) -> u32 {
@@ -743,10 +754,25 @@ impl Code {
         fan.then(|| self.read(nodes, width_of(self.vertices.saturating_sub(1))) as u8)
     }
 
+    /// Reads how faces are told; `spheres` are made only if that takes them.
+    #[inline]
+    fn read_told(&mut self, nodes: &super::bits::Bits, spheres: impl FnOnce() -> Spheres) {
+        self.told = Told::ALL[self.read(nodes, 2) as usize % Told::ALL.len()];
+        self.spheres = (self.told != Told::Vertex).then(spheres);
+    }
+
     /// How to close a face. Its own vertices are left out of the count; at the boundary of the domain, one more choice
     /// for a face inside Π_u is that nothing lies behind it.
     #[inline]
     fn close(&mut self, nodes: &super::bits::Bits, face: Face, of_link: bool) -> Option<Close> {
+        if let Some(spheres) = &self.spheres {
+            let at = &mut self.at;
+            let place = self.told.read(&mut || {
+                *at += 1;
+                nodes.get(*at - 1, 1) == 1
+            });
+            return spheres.vertex(face, place).map(Close::With);
+        }
         let choices = choices(self.vertices, self.boundary, of_link)?;
         let chosen = self.read(nodes, width_of(choices - 1));
         if chosen + 3 == self.vertices && self.boundary && !of_link {

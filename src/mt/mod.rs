@@ -22,6 +22,7 @@ mod replay;
 mod ring;
 mod sparse;
 mod spelled;
+mod sphere_rank;
 mod split;
 mod stats;
 mod taken;

@@ -15,7 +15,9 @@
 //!    then what hangs together around any tetrahedron that `u` removes, and complete when its size is the stored one.
 //!    No seed is stored: the last tetrahedron that `u` was found to remove is in T_u when all parents of `u` are applied.
 //! 2. *Build T_u inside Π_u.* The faces of Π_u, and those that come up on the way, are closed one after the other in
-//!    canonical order; the code names the fourth vertex of the tetrahedron behind each, among those of Π_u. When all of
+//!    canonical order; the code names the fourth vertex of the tetrahedron behind each, among those of Π_u: by
+//!    its number there, or by its place in the order in which spheres through the face reach them, in whichever way takes the
+//!    fewest bits. When all of
 //!    T_u meets in one vertex, as after a half-edge collapse, the code is that vertex.
 //!
 //! Where tetrahedra have errors of their own, the node that creates one tells with what removes it how often the errors of

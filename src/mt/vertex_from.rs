@@ -17,6 +17,8 @@ use super::glue::Face;
 use super::glue::Glue;
 use super::glue::turned;
 use super::insertion::choices;
+use super::sphere_rank::Spheres;
+use super::sphere_rank::Told;
 use super::vertex::COUNT_BITS;
 use super::vertex::MAX_AROUND;
 use super::vertex::MAX_INSERTED;
@@ -217,7 +219,8 @@ impl Writer<'_> {
             bits.push(u64::from(self.mt.quarterings_of(*t)), own);
         }
         let torn = ConvertError::Update { update: u.0, why: "it does not fill the hole that it leaves" };
-        write_removed(&mut self.glue, bits, canonical, on_boundary).ok_or(torn)
+        let spheres = Spheres::of(canonical.link.iter().map(|&v| self.mt.position(VertexId(v))));
+        write_removed(&mut self.glue, bits, canonical, on_boundary, &spheres).ok_or(torn)
     }
 }
 
@@ -243,6 +246,7 @@ pub(super) fn write_removed(
     bits: &mut Bits,
     canonical: &Canonical,
     on_boundary: bool,
+    spheres: &Spheres,
 ) -> Option<()> {
     let faces: Vec<Face> = canonical.walls.iter().map(|(face, _)| *face).collect();
     let vertices = canonical.link.len() as u32;
@@ -263,6 +267,7 @@ pub(super) fn write_removed(
     let mut behind: Vec<(Face, u8)> = canonical.removed.iter().flat_map(sides).collect();
     behind.sort_unstable();
     let behind = |face: &Face| behind.binary_search_by_key(face, |entry| entry.0).ok().map(|at| behind[at].1);
+    let (mut plain, mut places) = (Vec::new(), Vec::new());
     let written = glue.build(&faces, !on_boundary, |face, of_link| {
         let apex = behind(&face);
         let choices = choices(vertices, on_boundary, of_link)?;
@@ -274,10 +279,12 @@ pub(super) fn write_removed(
             None if on_boundary && !of_link => (Close::Leave, vertices - 3),
             None => return None,
         };
-        bits.push(u64::from(chosen), width_of(choices - 1));
+        plain.push((chosen, width_of(choices - 1)));
+        places.push(apex.and_then(|x| spheres.place(face, x)));
         Some(close)
     });
     written?;
+    write_closed(bits, &plain, &places);
     // What was built must be T_u, whatever the way.
     let all = |tets: &[[u8; 4]]| {
         let mut all: Vec<[u8; 4]> = tets.to_vec();
@@ -286,6 +293,29 @@ pub(super) fn write_removed(
         all
     };
     (all(&glue.tets[..glue.len]) == all(&canonical.removed)).then_some(())
+}
+
+/// Appends how faces are closed, in that way which takes the fewest bits: the number of a vertex and its width for each, or its
+/// place in the order of spheres, where all have one.
+fn write_closed(bits: &mut Bits, plain: &[(u32, u32)], places: &[Option<u32>]) {
+    let places: Option<Vec<u32>> = places.iter().copied().collect();
+    let size = |told: &Told| match (told, &places) {
+        (Told::Vertex, _) => plain.iter().map(|(_, width)| width).sum(),
+        (told, Some(places)) => places.iter().map(|&place| told.code(place).1).sum(),
+        (_, None) => u32::MAX,
+    };
+    let told = Told::ALL.into_iter().min_by_key(size).unwrap_or(Told::Vertex);
+    bits.push(Told::ALL.iter().position(|&other| other == told).unwrap_or(0) as u64, 2);
+    match (told, &places) {
+        (Told::Vertex, _) | (_, None) => {
+            plain.iter().for_each(|&(chosen, width)| bits.push(u64::from(chosen), width));
+        }
+        (told, Some(places)) => {
+            for (code, width) in places.iter().map(|&place| told.code(place)) {
+                bits.push(code, width);
+            }
+        }
+    }
 }
 
 /// Whether the tetrahedra are those that `x` makes with the faces, which are turned and in canonical order, that do not have

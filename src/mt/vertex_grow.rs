@@ -12,12 +12,14 @@ use super::MultiTessellation;
 use super::NodeBits;
 use super::UpdateError;
 use super::UpdateId;
+use super::VertexId;
 use super::VertexMt;
 use super::bits::Bits;
 use super::bits::width_of;
 use super::current::FIRST_ANONYMOUS_TAG;
 use super::glue::Glue;
 use super::glue::turned;
+use super::sphere_rank::Spheres;
 use super::vertex::MAX_AROUND;
 use super::vertex::MAX_INSERTED;
 use super::vertex::MAX_REMOVED;
@@ -163,7 +165,9 @@ impl VertexMt {
             bits.push(level as u64, field.bits);
         }
         let on_boundary = write_given_up(&mut bits, &canonical).ok_or(torn.clone())?;
-        write_removed(glue, &mut bits, &canonical, on_boundary).ok_or(torn.clone())?;
+        let slots = canonical.link.iter().filter_map(|&v| mesh.slot(VertexId(v)));
+        let spheres = Spheres::of(slots.map(|slot| mesh.positions[slot as usize]));
+        write_removed(glue, &mut bits, &canonical, on_boundary, &spheres).ok_or(torn.clone())?;
         self.add_node(&bits, new.errors)?;
         self.set_own_fall(UpdateId(update), new.own_fall);
         self.note_parents(update, &creators, quarterings, canonical.walls.len());
