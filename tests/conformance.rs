@@ -143,7 +143,7 @@ impl<'a> Walk<'a> {
         let feasible = subject.explicit.is_feasible(set, id);
         let before = mesh.hash();
         if undo {
-            let looked = mt.look_at_removed(mesh, id, &mut |_, _| false).expect("a valid MT");
+            let looked = mt.look_at_removed(mesh, id, &mut |_, _, _| false).expect("a valid MT");
             assert_eq!(looked == Applied::Done, feasible);
             assert!(mt.may_coarsen(mesh, id) || !feasible);
         } else {

@@ -76,9 +76,13 @@ fn in_order(tets: impl Iterator<Item = Tet>) -> Vec<Tet> {
 }
 
 fn without_orders(change: Change) -> Change {
-    let Change { removed, inserted, .. } = change;
+    let Change { removed, inserted, own, .. } = change;
+    let own = own.map(|(fall, quarters)| {
+        let pairs = removed.iter().map(|tet| sorted(*tet)).zip(quarters);
+        (fall, pairs.collect::<BTreeMap<Tet, u32>>().into_values().collect())
+    });
     let [removed, inserted] = [removed, inserted].map(|tets| in_order(tets.into_iter()));
-    Change { removed, inserted, ..change }
+    Change { removed, inserted, own, ..change }
 }
 
 fn change_of(mt: &ExplicitMt, k: UpdateId) -> Change {
@@ -90,6 +94,11 @@ fn change_of(mt: &ExplicitMt, k: UpdateId) -> Change {
         levels: created().map(|v| mt.levels(v).to_vec()).collect(),
         removed: in_order(mt.removed(k).iter().map(|&t| tet(t))),
         inserted: in_order(mt.inserted(k).map(tet)),
+        own: mt.has_tet_errors().then(|| {
+            let pairs = mt.removed(k).iter().map(|&t| (sorted(tet(t)), u32::from(mt.quarterings_of(t))));
+            let quarters = pairs.collect::<BTreeMap<Tet, u32>>().into_values().collect();
+            (u32::from(mt.own_fall_of(k)), quarters)
+        }),
     }
 }
 
@@ -298,6 +307,7 @@ fn golden_files_are_read_as_ever() {
             levels: vec![vec![15]],
             removed: vec![[0, 1, 2, 3]],
             inserted: vec![[0, 1, 2, 5], [0, 1, 3, 5], [0, 2, 3, 5], [1, 2, 3, 5]],
+            own: None,
         };
         assert_eq!(changes, [expected]);
     }
@@ -360,5 +370,23 @@ fn compare_exact(file: &File, changes: &[Change], expected: &[Exact]) {
             let value = ours.value(field.origin + field.step * level, correction);
             assert_eq!(Some(value.to_bits()), theirs.get(VertexId(vertex)).map(f64::to_bits));
         }
+    }
+}
+
+#[test]
+fn errors_of_tetrahedra_are_read_alike() {
+    let mesh = generate::bucky(7).expect("a size that is allowed");
+    for kind in [MtKind::Vertex, MtKind::Explicit] {
+        let (method, criterion) = (Method::Insert, Criterion::Delaunay);
+        let config = BuildConfig { kind, method, criterion, tet_errors: true, ..BuildConfig::default() };
+        let built = tetralod::build::build(&mesh, &config, &mut |_| ControlFlow::Continue(()));
+        let options = EncodeOptions { block_bits: 5, ..EncodeOptions::default() };
+        let bytes = encode(&built.expect("a good mesh").mt, &options).expect("a complete MT");
+        let (file, changes) = compare(&bytes);
+        assert!(file.tet_errors);
+        let own: Vec<&(u32, Vec<u32>)> = changes.iter().filter_map(|change| change.own.as_ref()).collect();
+        assert_eq!(own.len(), changes.len());
+        let quarters: BTreeSet<u32> = own.iter().flat_map(|(_, quarters)| quarters).copied().collect();
+        assert!(quarters.len() == 4 && own.iter().any(|(fall, _)| *fall > 0));
     }
 }

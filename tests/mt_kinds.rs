@@ -70,7 +70,7 @@ impl<M: MultiTessellation> Walk<M> {
     /// What criteria are shown of the tetrahedra that `u+` removed, in any order.
     fn look(&mut self, u: UpdateId, field: usize) -> Option<Vec<Seen>> {
         let mut seen = Vec::new();
-        let mut look = |corners: &[[i32; 3]; 4], levels: &dyn Fn(usize) -> [i32; 4]| {
+        let mut look = |corners: &[[i32; 3]; 4], levels: &dyn Fn(usize) -> [i32; 4], _: u8| {
             let levels = levels(field);
             let mut both = [0, 1, 2, 3].map(|i| (corners[i], levels[i]));
             both.sort_unstable();

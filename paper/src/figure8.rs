@@ -141,6 +141,7 @@ fn style(recipe: Recipe) -> Style {
     let (colour, marker, line) = match recipe {
         Recipe::Edge => ("#d55e00", Marker::Square, "7 5"),
         Recipe::Insert => ("#0072b2", Marker::Disc, ""),
+        Recipe::InsertOwn => ("#56b4e9", Marker::Disc, "2 3"),
         Recipe::Delaunay => ("#009e73", Marker::Disc, ""),
         Recipe::HalfEdge => ("#a0507d", Marker::Disc, ""),
     };

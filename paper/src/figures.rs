@@ -3,6 +3,7 @@
 use anyhow::Context;
 use anyhow::Result;
 use tetralod::geom::Bounds;
+use tetralod::mt::ErrorCode;
 use tetralod::mt::Mt;
 use tetralod::mt::MultiTessellation;
 use tetralod::refine::Need;
@@ -14,7 +15,9 @@ use crate::markdown::Table;
 use crate::markdown::count;
 use crate::markdown::percent;
 use crate::model::DataSet;
+use crate::model::Model;
 use crate::model::Recipe;
+use crate::published;
 use crate::published::Caption;
 use crate::query::Shown;
 use crate::query::tetrahedra;
@@ -64,25 +67,26 @@ fn in_the_middle(domain: &Bounds, side: f64) -> Bounds {
 /// What boxes cost with one MT.
 pub struct Boxed {
     pub recipe: Recipe,
-    /// Tetrahedra of the mesh that is fine everywhere, in the octant, in the middle; by [`BOX_ERRORS`].
-    pub tets: Vec<[u64; 3]>,
+    /// Tetrahedra of the mesh that is fine everywhere, in the octant, in the boxes in the middle; by [`BOX_ERRORS`].
+    pub tets: Vec<[u64; 2 + MIDDLE.len()]>,
 }
 
 /// At which errors boxes are asked for.
 const BOX_ERRORS: [f64; 2] = [0.0, 0.01];
-/// The sides of the box in the middle, as a part of the domain's.
-const MIDDLE: f64 = 1.0 / 16.0;
+/// The domain's sides as multiples of those of the boxes in the middle.
+const MIDDLE: [u32; 4] = [2, 4, 8, 16];
 
 /// Asks all MTs of a data set for boxes.
 pub fn boxes(data: &DataSet) -> Result<Vec<Boxed>> {
     let domain = Bounds::of(&data.reference.positions);
-    let regions = [None, Some(octant(&domain)), Some(in_the_middle(&domain, MIDDLE))];
+    let middle = MIDDLE.map(|times| Some(in_the_middle(&domain, 1.0 / f64::from(times))));
+    let regions = [None, Some(octant(&domain))].into_iter().chain(middle);
     let mut all = Vec::new();
     for model in &data.models {
         let mut tets = Vec::new();
         for error in BOX_ERRORS {
-            let mut sizes = [0; 3];
-            for (size, roi) in sizes.iter_mut().zip(regions) {
+            let mut sizes = [0; 2 + MIDDLE.len()];
+            for (size, roi) in sizes.iter_mut().zip(regions.clone()) {
                 *size =
                     tetrahedra(&model.mt, &Need::within(error).limited(roi.map(Region::Box), 0, &[]).into())?;
             }
@@ -97,24 +101,57 @@ pub fn boxes(data: &DataSet) -> Result<Vec<Boxed>> {
 pub fn box_table(all: &[Boxed]) -> String {
     let mut heads = vec!["MT".to_owned()];
     for error in BOX_ERRORS.map(percent) {
-        heads.extend(["everywhere", "octant", "middle"].map(|place| format!("{place}, {error}")));
+        heads.extend(["everywhere", "octant"].map(|place| format!("{place}, {error}")));
+        heads.extend(MIDDLE.map(|times| format!("1/{times} wide, {error}")));
     }
     let mut table = Table::new(&heads.iter().map(String::as_str).collect::<Vec<_>>(), 1);
     for Boxed { recipe, tets } in all {
-        let cells = tets.iter().flat_map(|&[whole, octant, middle]| {
-            let part = |tets: u64| format!("{} ({:.2})", count(tets), tets as f64 / whole.max(1) as f64);
-            [count(whole), part(octant), part(middle)]
+        let cells = tets.iter().flat_map(|&[whole, ref parts @ ..]| {
+            let part = |&tets: &u64| format!("{} ({:.2})", count(tets), tets as f64 / whole.max(1) as f64);
+            std::iter::once(count(whole)).chain(parts.iter().map(part)).collect::<Vec<_>>()
         });
         table.row(&std::iter::once(recipe.name().to_owned()).chain(cells).collect::<Vec<_>>());
     }
     table.finish()
 }
 
-/// The multiple of a hundredth at which the isosurface has most nearly so many facets.
+/// What error 0 takes with one MT: the reference mesh, or a mesh that is exact at its vertices.
+pub struct AtZero {
+    pub recipe: Recipe,
+    pub reference: u64,
+    pub exact: u64,
+}
+
+/// Asks all MTs of a data set for both.
+pub fn at_zero(data: &DataSet) -> Result<Vec<AtZero>> {
+    let of = |model: &Model| -> Result<AtZero> {
+        // Updates of no error have the least one that is stored, or what rounding leaves; builders may round it up.
+        let least = ErrorCode(1).error().max(model.mt.info().floor(0));
+        let [reference, exact] = [0.0, ErrorCode::at_least(least).coarse().error()].map(Request::within);
+        let [reference, exact] = [tetrahedra(&model.mt, &reference)?, tetrahedra(&model.mt, &exact)?];
+        Ok(AtZero { recipe: model.recipe, reference, exact })
+    };
+    data.models.iter().map(of).collect()
+}
+
+/// That as a table.
+pub fn zero_table(all: &[AtZero]) -> String {
+    let mut table = Table::new(&["MT", "reference mesh", "exact at vertices", "÷"], 1);
+    let theirs = [published::TETRAHEDRA, published::FIGURE_7.uniform_tets];
+    let ours = all.iter().map(|zero| (zero.recipe.name(), [zero.reference, zero.exact]));
+    for (name, [reference, exact]) in std::iter::once(("*paper: edge*", theirs)).chain(ours) {
+        let ratio = format!("{:.2}", exact as f64 / reference.max(1) as f64);
+        table.row(&[name.to_owned(), count(reference), count(exact), ratio]);
+    }
+    table.finish()
+}
+
+/// The multiple of a hundredth, or for a wide range the integer, at which the isosurface has most nearly so many facets.
 fn isovalue_with(mt: &Mt, shown: &Shown, facets: u64) -> Result<f64> {
     let field = mt.info().fields.first().context("an MT has a field")?;
-    let hundredth = |x: f64| (x * 100.0).floor() as i64;
-    let values = (hundredth(field.min) + 1..=hundredth(field.max)).map(|i| i as f64 / 100.0);
+    let per_unit = if field.range() > 10.0 { 1.0 } else { 100.0 };
+    let whole = |x: f64| (x * per_unit).floor() as i64;
+    let values = (whole(field.min) + 1..=whole(field.max)).map(|i| i as f64 / per_unit);
     values.min_by_key(|&v| shown.facets(v).abs_diff(facets)).context("a field with values")
 }
 

@@ -28,6 +28,7 @@ use std::process::ExitCode;
 use tetralod::mesh::TetMesh;
 
 use crate::figure8::Curves;
+use crate::figures::AtZero;
 use crate::figures::Boxed;
 use crate::figures::Pair;
 use crate::greedy::Needs;
@@ -51,6 +52,35 @@ pub struct Findings {
     pub needs: Vec<Needs>,
     pub own: Vec<Own>,
     pub boxes: Vec<Boxed>,
+    pub at_zero: Vec<AtZero>,
+    pub scan: Option<Scan>,
+}
+
+/// Figures 6 to 8 of a volume that was measured, not computed.
+pub struct Scan {
+    pub name: &'static str,
+    pub figure_6: Pair,
+    pub figure_7: Pair,
+    pub uniform: Curves,
+    pub variable: Curves,
+    pub boxes: Vec<Boxed>,
+    pub at_zero: Vec<AtZero>,
+}
+
+impl Scan {
+    fn of(name: &'static str, data: &DataSet) -> Result<Self> {
+        let inserted = &data.model(Recipe::Insert).mt;
+        let figure_6 = figures::around_isovalue(inserted, 0.001, published::FIGURE_6.uniform_facets)?;
+        Ok(Self {
+            name,
+            figure_7: figures::in_an_octant(&data.model(Recipe::Edge).mt, figure_6.isovalue)?,
+            uniform: figure8::curves(data, None)?,
+            variable: figure8::curves(data, Some(figure_6.isovalue))?,
+            boxes: figures::boxes(data)?,
+            at_zero: figures::at_zero(data)?,
+            figure_6,
+        })
+    }
 }
 
 fn main() -> ExitCode {
@@ -75,7 +105,11 @@ fn run() -> Result<()> {
 
 /// Does all experiments on a grid, and those of Table 1 on the data sets in a folder, too.
 fn findings(name: &str, mesh: &TetMesh, data: Option<&Path>) -> Result<Findings> {
-    let bucky = DataSet::by_insertion(name, mesh, &[Recipe::Edge, Recipe::Delaunay, Recipe::HalfEdge])?;
+    let bucky = DataSet::by_insertion(
+        name,
+        mesh,
+        &[Recipe::InsertOwn, Recipe::Edge, Recipe::Delaunay, Recipe::HalfEdge],
+    )?;
     let mut rows = table1::rows(&bucky)?;
     let figure_6 =
         figures::around_isovalue(&bucky.model(Recipe::Insert).mt, 0.001, published::FIGURE_6.uniform_facets)?;
@@ -85,14 +119,18 @@ fn findings(name: &str, mesh: &TetMesh, data: Option<&Path>) -> Result<Findings>
     let variable = figure8::curves(&bucky, Some(figure_6.isovalue))?;
     let needs = greedy::needs(&bucky)?;
     let own = own::own(&bucky)?;
+    let at_zero = figures::at_zero(&bucky)?;
     drop(bucky);
-    let missing = others(data, &mut rows)?;
-    Ok(Findings { rows, missing, figure_6, figure_7, uniform, variable, needs, own, boxes })
+    let (missing, scan) = others(data, &mut rows)?;
+    let findings =
+        Findings { rows, missing, figure_6, figure_7, uniform, variable, needs, own, boxes, at_zero, scan };
+    Ok(findings)
 }
 
-/// Adds the rows of the data sets that have to be there already, one in memory at a time; gives those that are not.
-fn others(folder: Option<&Path>, rows: &mut Vec<Row>) -> Result<Vec<&'static str>> {
-    let mut missing = Vec::new();
+/// Adds the rows of the data sets that have to be there already, one in memory at a time; gives those that are not, and the
+/// figures of the one that is on a grid.
+fn others(folder: Option<&Path>, rows: &mut Vec<Row>) -> Result<(Vec<&'static str>, Option<Scan>)> {
+    let (mut missing, mut scan) = (Vec::new(), None);
     for name in ["bucky.vti", "bluntfin_clean.vtu", "combustor.vtu"] {
         let Some(path) = folder.map(|folder| folder.join(name)).filter(|path| path.is_file()) else {
             missing.push(name);
@@ -100,13 +138,16 @@ fn others(folder: Option<&Path>, rows: &mut Vec<Row>) -> Result<Vec<&'static str
         };
         let mesh = model::load(&path)?;
         let data = if mesh.grid.is_some() {
-            DataSet::by_insertion(name, &mesh, &[Recipe::Edge])?
+            DataSet::by_insertion(name, &mesh, &[Recipe::InsertOwn, Recipe::Edge, Recipe::HalfEdge])?
         } else {
             DataSet::of_mesh(name, mesh, &[Recipe::Edge, Recipe::HalfEdge])?
         };
         rows.extend(table1::rows(&data)?);
+        if data.reference.grid.is_some() {
+            scan = Some(Scan::of(name, &data)?);
+        }
     }
-    Ok(missing)
+    Ok((missing, scan))
 }
 
 /// Writes the page, its plots and, where it can be done, its pictures.

@@ -28,6 +28,8 @@ pub enum Recipe {
     Edge,
     /// Greedy insertion from a box of six tetrahedra: the paper's way for its vertex-based MT.
     Insert,
+    /// The same with errors of the tetrahedra's own.
+    InsertOwn,
     /// Vertices removed, cheapest first, and the hole filled by Delaunay tetrahedra.
     Delaunay,
     /// Vertices removed by moving them onto a neighbour.
@@ -35,13 +37,14 @@ pub enum Recipe {
 }
 
 impl Recipe {
-    pub const ALL: [Self; 4] = [Self::Edge, Self::Insert, Self::Delaunay, Self::HalfEdge];
+    pub const ALL: [Self; 5] = [Self::Edge, Self::Insert, Self::InsertOwn, Self::Delaunay, Self::HalfEdge];
 
     /// Kind of MT and how it is made, in a few words.
     pub fn name(self) -> &'static str {
         match self {
             Self::Edge => "edge, collapse",
             Self::Insert => "vertex, insertion",
+            Self::InsertOwn => "vertex, insertion, own errors",
             Self::Delaunay => "vertex, decimation (Delaunay)",
             Self::HalfEdge => "vertex, decimation (half-edge)",
         }
@@ -50,11 +53,12 @@ impl Recipe {
     fn config(self) -> BuildConfig {
         let (kind, method, criterion) = match self {
             Self::Edge => (MtKind::Edge, Method::Collapse, Criterion::HalfEdge),
-            Self::Insert => (MtKind::Vertex, Method::Insert, Criterion::Delaunay),
+            Self::Insert | Self::InsertOwn => (MtKind::Vertex, Method::Insert, Criterion::Delaunay),
             Self::Delaunay => (MtKind::Vertex, Method::Decimate, Criterion::Delaunay),
             Self::HalfEdge => (MtKind::Vertex, Method::Decimate, Criterion::HalfEdge),
         };
-        BuildConfig { kind, method, criterion, ..BuildConfig::default() }
+        let tet_errors = self == Self::InsertOwn;
+        BuildConfig { kind, method, criterion, tet_errors, ..BuildConfig::default() }
     }
 }
 
@@ -87,7 +91,8 @@ impl DataSet {
         let reference = finest(&inserted.mt, points.grid)?;
         let mut models = vec![inserted];
         for &recipe in others {
-            models.push(Model::build(recipe, &reference)?);
+            let mesh = if recipe == Recipe::InsertOwn { points } else { &reference };
+            models.push(Model::build(recipe, mesh)?);
         }
         Ok(Self { name: name.to_owned(), reference, models })
     }

@@ -37,7 +37,7 @@ pub fn own(data: &DataSet) -> Result<Vec<Own>> {
         let Mt::Explicit(mt) = model.mt.convert(MtKind::Explicit)? else { bail!("not an explicit MT") };
         Ok(of(model.recipe, &mt, &data.reference))
     };
-    data.models.iter().map(of).collect()
+    data.models.iter().filter(|model| model.recipe != Recipe::InsertOwn).map(of).collect()
 }
 
 fn of(recipe: Recipe, mt: &ExplicitMt, reference: &TetMesh) -> Own {

@@ -1,6 +1,7 @@
 //! The page: every number of ours in it is computed, so its words follow the numbers wherever these may change.
 
 use crate::Findings;
+use crate::Scan;
 use crate::figure8::Curves;
 use crate::figures;
 use crate::figures::Pair;
@@ -15,8 +16,9 @@ use crate::published;
 use crate::table1;
 
 pub fn page(all: &Findings) -> String {
-    [INTRODUCTION.to_owned(), table_1(all), figure_6(all), figure_7(all), figure_8(all), beyond(all)]
-        .join("\n")
+    let parts =
+        [INTRODUCTION.to_owned(), table_1(all), figure_6(all), figure_7(all), figure_8(all), beyond(all)];
+    parts.into_iter().chain(all.scan.as_ref().map(scan)).collect::<Vec<_>>().join("\n")
 }
 
 const INTRODUCTION: &str = "\
@@ -43,6 +45,12 @@ paper's section 2.2 has them, its section 6 does not). `.vtu` files have a mesh,
 field's range. An update's error is at least that of every update that depends on it, so a request's mesh keeps its \
 error *by construction*, whatever else is applied; where an update's values overshoot those around it, that is added, \
 so that requests by isovalue miss nothing. The paper does not say how it assigns errors to updates.
+- **The tetrahedron's own error.** The MT *vertex, insertion, own errors* (`--tet-errors`) has the same updates as *vertex, \
+insertion*. It keeps two bits for each tetrahedron and eight for each update besides, which say how far the tetrahedron's own \
+error is below that of the update that removes it. A request then compares the tetrahedron's, and takes the least set of updates \
+that it leads to from the base mesh: what violates forces the update that removes it, with its parents. The guarantee is the same, \
+since it is the tetrahedra of the mesh that have to be within the error.
+- **Limits.** The paper allows 32 vertices around a new vertex, we 64 in vertex-based MTs: insertion is not free in its choice of stars.
 - **Lattices.** Positions and fields are integers of 16 bits or more, not floats of 32.
 ";
 
@@ -92,7 +100,10 @@ wide as they need to be, not 4 bytes each, which more than pays for shapes. *{ha
 mean star of the reference mesh has {star}; insertion does not choose by size, decimation does ({half_inserted} for \
 half-edges).
 - *{bits} bits a node* for shapes of the inserted MT, the paper's 69: our T_u are larger ({removed} tetrahedra, the \
-paper's 12), and our code also tells which tetrahedra of the star belong to which child. Half-edge decimation, with \
+paper's 12), and our code also tells which tetrahedra of the star belong to which child, so that every tetrahedron of a mesh \
+knows what removes it; the paper's code has a seed and finds T_u by it. How T_u fills its polyhedron we tell face by face, by the \
+place of the fourth vertex in the order in which spheres through the face reach them, where that takes fewer bits than its number. \
+Where T_u is Delaunay this place is 0. Half-edge decimation, with \
 {half_removed}, takes {half_bits}.
 - *Edge-based: {edge_inserted} tetrahedra in u+*, the paper's 27. With six tetrahedra a cell, an inner vertex has 24 around \
 it, and the very first collapse of an inner edge joins two such stars: more than 40 tetrahedra. The paper does not say \
@@ -164,10 +175,12 @@ the eye, {roi}.
 Two things differ:
 
 - *At error 0 the paper's uniform mesh has {paper_tets} tetrahedra, not all {paper_all}.* The updates that are left out \
-have no error. Here error 0 means the reference mesh, every update applied; Figure 8 shows how few tetrahedra do for \
-0.1 %.
+have no error. Here error 0 means the reference mesh, every update applied. Beside it, a mesh that is exact at all \
+reference vertices, up to the rounding to lattices:
+
+{zero}
 - *Boxes cost more here:* the octant needs {ratio:.2} of the uniform mesh, the paper's box {paper:.2} of its own. \
-Other boxes and other MTs, with the middle box a sixteenth of the domain wide:
+Other boxes and other MTs, among them boxes in the middle of the domain, as wide as this part of it:
 
 {}
 In brackets, the part of the mesh that is fine everywhere. The octant holds an eighth of the reference mesh; what comes \
@@ -178,6 +191,7 @@ chains suffer less. This is a shortfall, not a difference of data.
         pair.table(&published::FIGURE_7),
         pictures(pair, 7, "behind a plane through the middle of the box"),
         figures::box_table(&all.boxes),
+        zero = figures::zero_table(&all.at_zero),
         paper_tets = count(published::FIGURE_7.uniform_tets),
         paper_all = count(published::TETRAHEDRA),
     )
@@ -240,7 +254,8 @@ edge-based one. Here, compared with the edge-based MT of the same reference mesh
 
 - decimation by half-edge collapse needs {half};
 - decimation by the Delaunay criterion needs {delaunay};
-- insertion needs {insert}.
+- insertion needs {insert};
+- insertion with errors of the tetrahedra's own needs {own}.
 
 The literature has half-edge collapses at {literature} than full-edge ones, without midpoints; our edge collapses put \
 the new vertex at the midpoint, as the paper's do.
@@ -249,6 +264,7 @@ the new vertex at the midpoint, as the paper's do.
         half = both(Recipe::HalfEdge),
         delaunay = both(Recipe::Delaunay),
         insert = both(Recipe::Insert),
+        own = both(Recipe::InsertOwn),
         literature = fewer(published::HALF_EDGE_SAVED),
         why = why(&all.own),
     )
@@ -271,7 +287,8 @@ decimation these are {half_for_others} of {half_needed}, since decimation choose
 
 {table}
 Errors of less than a level of the field count as none here. So the paper's order, vertex before edge, holds for the decimated \
-vertex-based MTs; whether it holds for an inserted one depends on how errors are assigned. The single numbers that the \
+vertex-based MTs; for an inserted one it depends on how errors are assigned. With errors of the tetrahedra's own the same updates come near to \
+the edge-based MT; at large errors two bits are too few to tell them well. The single numbers that the \
 paper does print for its inserted MT (at 0.1 %) are near to ours.
 ",
         worse = count(insert.worse),
@@ -300,5 +317,40 @@ A greedy mesh is good at the moment at which it stops; the MT by insertion has t
 that a request may lead to, and pays as told above. Decimated MTs pay little for being MTs.
 ",
         greedy::table(&all.needs)
+    )
+}
+
+/// Figures 6 to 8 of a volume that was measured.
+fn scan(scan: &Scan) -> String {
+    format!(
+        "\
+## Figures 6 to 8 on `{name}`
+
+The same on a measured volume, in 8 bits.
+
+Figure 6, with isovalue {isovalue}, and Figure 7, in the octant:
+
+{figure_6}
+{figure_7}
+What error 0 takes:
+
+{zero}
+Boxes, the octant and those in the middle:
+
+{boxes}
+Figure 8, uniform:
+
+{uniform}
+Figure 8, by field value:
+
+{variable}",
+        name = scan.name,
+        isovalue = scan.figure_6.isovalue,
+        figure_6 = scan.figure_6.table(&published::FIGURE_6),
+        figure_7 = scan.figure_7.table(&published::FIGURE_7),
+        zero = figures::zero_table(&scan.at_zero),
+        boxes = figures::box_table(&scan.boxes),
+        uniform = scan.uniform.table(),
+        variable = scan.variable.table(),
     )
 }

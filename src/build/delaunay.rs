@@ -172,6 +172,22 @@ impl Triangulation {
         self.tets[t as usize]
     }
 
+    /// The tetrahedra in whose closure a point lies, given one of them.
+    pub fn all_around(&self, v: u32, at: u32) -> Vec<u32> {
+        let p = self.points[v as usize];
+        let mut found = vec![at];
+        let mut next = 0;
+        while let Some(&t) = found.get(next) {
+            next += 1;
+            for (i, &n) in self.neighbors[t as usize].iter().enumerate() {
+                if !self.is_ghost(n) && !found.contains(&n) && self.side(t, i, p) == 0 {
+                    found.push(n);
+                }
+            }
+        }
+        found
+    }
+
     /// A bound of the slots in use.
     pub fn slots(&self) -> usize {
         self.tets.len()

@@ -31,7 +31,7 @@ const FINEST: f64 = 2e-4;
 const PROGRESS_STEPS: usize = 1024;
 
 /// Inserts all points of `quantized` into a triangulation of the corners of their hull. `tets` is the reference mesh,
-/// or nothing where there are only points.
+/// or nothing where there are only points. With `tet_errors` the errors of every tetrahedron by itself are recorded, too.
 ///
 /// # Errors
 /// If the points span no volume or two are equal, if the reference mesh does not fill its convex hull, if more
@@ -39,6 +39,7 @@ const PROGRESS_STEPS: usize = 1024;
 pub(super) fn insert(
     quantized: &Quantized,
     tets: &[[u32; 4]],
+    tet_errors: bool,
     progress: OnProgress<'_>,
 ) -> Result<Sequence, BuildError> {
     refuse_duplicates(&quantized.positions)?;
@@ -54,6 +55,7 @@ pub(super) fn insert(
         }
     }
     let mut greedy = Greedy::new(mesh, base, quantized);
+    greedy.closed = tet_errors.then(|| Closed::new(quantized));
     greedy.distribute(&corners);
     greedy.insert_all(quantized.positions.len() - corners.len(), progress)?;
     Ok(greedy.sequence)
@@ -120,6 +122,76 @@ impl Cell {
     }
 }
 
+/// The points in every tetrahedron, those on its boundary included, and its errors there: what it can promise by itself, in
+/// whatever mesh it is. Buckets do not do for that: a point on a face is in that of one side.
+struct Closed {
+    fields: usize,
+    /// By slot.
+    points: Vec<Vec<u32>>,
+    errors: Vec<f64>,
+    /// The last insertion that has moved each point.
+    seen: Vec<u32>,
+    insertions: u32,
+    /// The points that have to move.
+    taken: Vec<u32>,
+    /// Where they go.
+    moves: Vec<(u32, u32)>,
+}
+
+impl Closed {
+    fn new(quantized: &Quantized) -> Self {
+        Self {
+            fields: quantized.fields.len(),
+            points: Vec::new(),
+            errors: Vec::new(),
+            seen: vec![0; quantized.positions.len()],
+            insertions: 0,
+            taken: Vec::new(),
+            moves: Vec::new(),
+        }
+    }
+
+    fn add(&mut self, slot: u32, p: u32) {
+        if slot as usize >= self.points.len() {
+            self.points.resize(slot as usize + 1, Vec::new());
+        }
+        self.points[slot as usize].push(p);
+    }
+
+    fn points(&self, slot: u32) -> &[u32] {
+        self.points.get(slot as usize).map_or(&[], Vec::as_slice)
+    }
+
+    /// Takes the points of these slots, each once, but for `v`.
+    fn take_points(&mut self, slots: impl Iterator<Item = u32>, v: u32) {
+        self.insertions += 1;
+        self.seen[v as usize] = self.insertions;
+        self.taken.clear();
+        for slot in slots {
+            let Some(points) = self.points.get_mut(slot as usize) else { continue };
+            for p in std::mem::take(points) {
+                if std::mem::replace(&mut self.seen[p as usize], self.insertions) != self.insertions {
+                    self.taken.push(p);
+                }
+            }
+        }
+    }
+
+    /// The errors of the tetrahedron in a slot, field by field.
+    fn errors(&self, slot: u32) -> impl Iterator<Item = f64> + Clone + '_ {
+        let at = slot as usize * self.fields;
+        (at..at + self.fields).map(|at| self.errors.get(at).copied().unwrap_or(0.0))
+    }
+
+    fn set_errors(&mut self, slot: u32, errors: &[f64]) {
+        let at = slot as usize * self.fields;
+        if self.errors.len() < at + self.fields {
+            self.errors.resize(at + self.fields, 0.0);
+        }
+        self.errors[at..at + self.fields].copy_from_slice(errors);
+    }
+}
+
 struct Greedy<'a> {
     mesh: Triangulation,
     quantized: &'a Quantized,
@@ -139,6 +211,8 @@ struct Greedy<'a> {
     moves: Vec<(u32, u32)>,
     /// The fields' slopes, in levels a step: of each cell all fields.
     slopes: Vec<[f64; 3]>,
+    /// What the errors of tetrahedra by themselves take, where they are wanted.
+    closed: Option<Closed>,
     sequence: Sequence,
 }
 
@@ -158,6 +232,7 @@ impl<'a> Greedy<'a> {
             cells: Vec::new(),
             moves: Vec::new(),
             slopes: Vec::new(),
+            closed: None,
             sequence: Sequence { base, ..Sequence::default() },
             mesh,
         }
@@ -168,18 +243,26 @@ impl<'a> Greedy<'a> {
         let Some(mut at) = self.mesh.finite_slots().next() else { return };
         for v in (0..self.next.len() as u32).filter(|v| corners.binary_search(v).is_err()) {
             at = self.mesh.locate(v, at);
+            if let Some(closed) = &mut self.closed {
+                self.mesh.all_around(v, at).into_iter().for_each(|t| closed.add(t, v));
+            }
             self.next[v as usize] = std::mem::replace(&mut self.buckets[at as usize].first, v);
         }
         let slots: Vec<u32> = self.mesh.finite_slots().collect();
         for slot in slots {
-            if self.buckets[slot as usize].first == NONE {
+            let of_its_own = self.closed.as_ref().is_some_and(|closed| !closed.points(slot).is_empty());
+            if self.buckets[slot as usize].first == NONE && !of_its_own {
                 continue;
             }
             let tet = self.mesh.tet(slot);
             self.cells.clear();
             self.slopes.clear();
             self.add_cell(tet, [NONE; 3]);
+            self.weigh_closed(0, slot, tet[3]);
             let first = self.buckets[slot as usize].first;
+            if first == NONE {
+                continue;
+            }
             self.cells[0].first = first;
             let mut p = first;
             while p != NONE {
@@ -228,6 +311,7 @@ impl<'a> Greedy<'a> {
             self.buckets.resize(self.mesh.slots(), NO_BUCKET);
         }
         self.record(v);
+        self.move_closed(v);
         for i in 0..self.mesh.removed().len() {
             self.empty(self.mesh.removed()[i].1);
         }
@@ -281,6 +365,12 @@ impl<'a> Greedy<'a> {
             };
             errors.iter_mut().zip(own).for_each(|(error, own)| *error = error.max(*own));
             self.sequence.tets.push(tet);
+            if let Some(closed) = &self.closed {
+                let own = closed.errors(slot);
+                // Points on its faces may be in the buckets of others.
+                errors.iter_mut().zip(own.clone()).for_each(|(error, own)| *error = error.max(own));
+                self.sequence.own_errors.extend(own);
+            }
         }
         let middle = self.sequence.tets.len();
         let inserted = self.cells.iter().filter(|cell| !cell.is_ghost());
@@ -288,6 +378,62 @@ impl<'a> Greedy<'a> {
         let end = self.sequence.tets.len();
         let (removed, inserted) = (start..middle, middle..end);
         self.sequence.steps.push(Insertion { vertex: v, removed, inserted, errors, step: 0.0 });
+    }
+
+    /// Moves the points in the closures of what was removed to those of the new star, which is carried out.
+    fn move_closed(&mut self, v: u32) {
+        let Some(mut closed) = self.closed.take() else { return };
+        closed.take_points(self.mesh.removed().iter().map(|&(_, slot)| slot), v);
+        let mut cell = self.cells.iter().position(|cell| !cell.is_ghost()).unwrap_or(0);
+        let mut around = Vec::new();
+        for &p in &closed.taken {
+            cell = self.find_cell(p, v, cell);
+            self.cells_around(p, v, cell, &mut around);
+            closed.moves.extend(around.iter().map(|&cell| (p, cell as u32)));
+        }
+        for (p, cell) in std::mem::take(&mut closed.moves) {
+            closed.add(self.mesh.star()[cell as usize], p);
+        }
+        self.closed = Some(closed);
+        for cell in 0..self.cells.len() {
+            if !self.cells[cell].is_ghost() {
+                self.weigh_closed(cell, self.mesh.star()[cell], v);
+            }
+        }
+    }
+
+    /// The cells of the star of `v` in whose closure point `p` lies, given one of them. All of them hold the line from `v` to the
+    /// point, so they hang together through the sides that do.
+    fn cells_around(&self, p: u32, v: u32, cell: usize, found: &mut Vec<usize>) {
+        let arm = difference(self.mesh.position(p), self.mesh.position(v));
+        found.clear();
+        found.push(cell);
+        let mut next = 0;
+        while let Some(&at) = found.get(next) {
+            next += 1;
+            for (normal, other) in self.cells[at].sides {
+                let is_on = (0..3).map(|i| i128::from(normal[i]) * i128::from(arm[i])).sum::<i128>() == 0;
+                let other = other as usize;
+                let is_cell = self.cells.get(other).is_some_and(|cell| !cell.is_ghost());
+                if is_on && is_cell && !found.contains(&other) {
+                    found.push(other);
+                }
+            }
+        }
+    }
+
+    /// Works out the errors of a cell by itself, whose tetrahedron is in a slot.
+    fn weigh_closed(&mut self, cell: usize, slot: u32, apex: u32) {
+        let Some(mut closed) = self.closed.take() else { return };
+        let fields = self.weights.len();
+        let mut errors = vec![0.0_f64; fields];
+        for &p in closed.points(slot) {
+            for (f, error) in errors.iter_mut().enumerate() {
+                *error = error.max(self.field_error_at(p, cell, apex, f));
+            }
+        }
+        closed.set_errors(slot, &errors);
+        self.closed = Some(closed);
     }
 
     fn lay_out_star(&mut self, v: u32) {
@@ -484,7 +630,7 @@ mod tests {
     fn inserted_on(mesh: &TetMesh, bits: Option<u32>) -> Result<(Quantized, Sequence), BuildError> {
         let config = BuildConfig { fields: names(mesh), position_bits: bits, ..BuildConfig::default() };
         let quantized = quantize(mesh, &config)?;
-        let sequence = insert(&quantized, &mesh.tets, &mut |_| ControlFlow::Continue(()))?;
+        let sequence = insert(&quantized, &mesh.tets, true, &mut |_| ControlFlow::Continue(()))?;
         Ok((quantized, sequence))
     }
 
@@ -699,7 +845,7 @@ mod tests {
         let stopped = {
             let mesh = bumps(4);
             let quantized = quantize(&mesh, &BuildConfig::default()).unwrap();
-            insert(&quantized, &mesh.tets, &mut |_| ControlFlow::Break(()))
+            insert(&quantized, &mesh.tets, false, &mut |_| ControlFlow::Break(()))
         };
         assert_eq!(stopped, Err(BuildError::Stopped));
     }

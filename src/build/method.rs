@@ -143,6 +143,14 @@ impl BuildConfig {
                 ["method insert", "criterion half-edge"],
                 "method insert has criterion delaunay; criterion half-edge goes with method decimate",
             ),
+            (_, Method::Collapse | Method::Decimate) if self.tet_errors => refuse(
+                [
+                    "tet errors",
+                    if self.method == Method::Collapse { "method collapse" } else { "method decimate" },
+                ],
+                "errors of tetrahedra by themselves go with method insert; by the other methods they hardly differ from those \
+                 of updates",
+            ),
             _ => Ok(()),
         }
     }

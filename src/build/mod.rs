@@ -105,6 +105,10 @@ pub struct BuildConfig {
     /// of the domain's diagonal; not negative. With 0.2, an error of 1 % allows the boundary to move by 0.2 % of the
     /// diagonal.
     pub displacement: f64,
+    /// Whether tetrahedra have errors of their own, two bits each (see
+    /// [`quarterings`](MultiTessellation::quarterings)): requests take fewer tetrahedra then, but each is answered from the
+    /// base mesh. With [`Method::Insert`] only.
+    pub tet_errors: bool,
     /// log2 of the updates that files are going to have in a block, 4 to 16: within a block of an edge-based MT updates are
     /// numbered so that they take few bits. Encode with the same.
     pub block_bits: u32,
@@ -126,6 +130,7 @@ impl Default for BuildConfig {
             lossless: Vec::new(),
             all_lossless: false,
             displacement: 0.2,
+            tet_errors: false,
             block_bits: 11,
         }
     }

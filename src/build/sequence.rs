@@ -11,8 +11,10 @@ use crate::mesh::NONE;
 use crate::mt::ErrorCode;
 use crate::mt::ExplicitMt;
 use crate::mt::ExplicitUpdate;
+use crate::mt::MAX_QUARTERINGS;
 use crate::mt::MtInfo;
 use crate::mt::UpdateError;
+use crate::mt::UpdateId;
 use crate::mt::VertexId;
 use crate::mt::canonical;
 use std::cmp::Reverse;
@@ -28,6 +30,9 @@ pub(super) struct Sequence {
     pub tets: Vec<[u32; 4]>,
     /// The insertions.
     pub steps: Vec<Insertion>,
+    /// For each entry of `tets` that is removed the errors of its own, field by field, in the order in which they are removed;
+    /// nothing where tetrahedra are to have none.
+    pub own_errors: Vec<f64>,
 }
 
 /// One vertex insertion.
@@ -102,7 +107,48 @@ impl Sequence {
                 ids[at] = first + place as u32;
             }
         }
+        if let Some((falls, quarterings)) = self.tet_errors(&mt, &order, &arcs, [&base_ids, &ids]) {
+            mt.set_tet_errors(falls, quarterings).map_err(BuildError::Internal)?;
+        }
         Ok((mt, number.into_iter().map(VertexId).collect()))
+    }
+
+    /// How far the errors of each insertion can be lowered for all that it removes, and then quartered for each tetrahedron
+    /// of the MT that is removed, and still bound those of its own. None where tetrahedra are to have none.
+    fn tet_errors(
+        &self,
+        mt: &ExplicitMt,
+        order: &[u32],
+        arcs: &Arcs,
+        [base_ids, ids]: [&[u32]; 2],
+    ) -> Option<(Vec<u8>, Vec<u8>)> {
+        let fields = mt.fields();
+        let least: Vec<ErrorCode> = (0..fields).map(|f| mt.info().least_own_error(f)).collect();
+        let mut update_of = vec![0; order.len()];
+        order.iter().zip(0..).for_each(|(&i, u)| update_of[i as usize] = u);
+        let mut rest = &self.own_errors[..];
+        let (mut falls, mut quarterings) = (vec![0; order.len()], vec![0; mt.tets().len()]);
+        for (step, &u) in self.steps.iter().zip(&update_of) {
+            let errors = mt.errors(UpdateId(u));
+            let (own, after) =
+                rest.split_at_checked(step.removed.len() * fields).filter(|_| !rest.is_empty())?;
+            rest = after;
+            let own: Vec<ErrorCode> = own.iter().map(|&error| ErrorCode::at_least(error)).collect();
+            let told = own.iter().enumerate().filter(|&(at, own)| *own > least[at % fields]);
+            let fall = told.map(|(at, &own)| errors[at % fields].fall_to(own)).min().unwrap_or(u8::MAX);
+            falls[u as usize] = fall;
+            for (source, own) in arcs.source[step.removed.clone()].iter().zip(own.chunks(fields)) {
+                let bounds = |times: &u8| {
+                    let fields = errors.iter().zip(own).zip(&least);
+                    fields
+                        .into_iter()
+                        .all(|((error, own), least)| error.lowered(fall, *times).max(*least) >= *own)
+                };
+                let most = (0..=MAX_QUARTERINGS).rev().find(bounds).unwrap_or(0);
+                quarterings[source.number(base_ids, ids) as usize] = most;
+            }
+        }
+        Some((falls, quarterings))
     }
 
     /// Where each removed tetrahedron comes from. Insertions are never undone, and all that one inserts is around its

@@ -54,7 +54,7 @@ pub(super) fn inserted_mt(
     }
     let quantized = quantize::quantize(mesh, config)?;
     let displacement_per_error = config.displacement * Bounds::of(&mesh.positions).diagonal();
-    let sequence = insert::insert(&quantized, &mesh.tets, progress)?;
+    let sequence = insert::insert(&quantized, &mesh.tets, config.tet_errors, progress)?;
     spell_out(&sequence, &quantized, displacement_per_error, false, progress)
 }
 

@@ -120,6 +120,8 @@ struct FileHead {
     base: Option<BaseParts>,
     /// How many fields' levels of the base mesh have been seen.
     base_fields: usize,
+    /// Whether updates tell errors of the tetrahedra that they remove.
+    tet_errors: bool,
 }
 
 impl FileHead {
@@ -476,7 +478,9 @@ impl Decoder {
             return Err(FormatError::NotMt);
         }
         if let Some(header) = whole {
-            self.total = parse_header(&header)?;
+            let start = parse_header(&header)?;
+            self.total = start.total;
+            self.head.tet_errors = start.tet_errors;
             self.stage = Stage::Head;
         }
         Ok(())
@@ -572,7 +576,12 @@ impl Decoder {
         if self.head.info.is_some() {
             return Err(content.corrupt("a section is out of place"));
         }
+        let offset = self.bytes;
         let (info, metadata) = payload::read_info(content)?;
+        if self.head.tet_errors && info.kind.is_paged() {
+            let what = "errors of tetrahedra in an MT that comes in pages";
+            return Err(FormatError::UnsupportedFeature { offset, what });
+        }
         let names = &self.options.fields;
         if let Some(name) = names.iter().find(|name| !info.fields.iter().any(|field| field.name == **name)) {
             let known = info.fields.iter().map(|field| field.name.clone()).collect();
@@ -636,7 +645,7 @@ impl Decoder {
         if self.head.base.as_ref().is_some_and(|base| base.fields() == self.head.wanted.len()) {
             let bits = self.head.index.as_ref().map_or(0, |index| index.block_bits);
             if let (Some(base), Some(info)) = (self.head.base.take(), self.head.wanted_info()) {
-                let (mut mt, state) = base.start(info, bits)?;
+                let (mut mt, state) = base.start(info, bits, self.head.tet_errors)?;
                 if let (Mt::HalfEdge(mt), Some(index)) = (&mut mt, &self.head.index) {
                     let wanted = &self.head.wanted;
                     let of_block =

@@ -173,7 +173,7 @@ pub fn encode_to<'a>(
     let end = Section::new(Kind::ENDF, end)?;
     let mut put = |bytes: &[u8]| writer.write_all(bytes).map_err(EncodeError::Write);
     let version = if mt.info().kind == MtKind::HalfEdge { VERSION } else { VERSION_WITHOUT_HALF_EDGE };
-    put(&header(total, version))?;
+    put(&header(total, version, mt.has_tet_errors()))?;
     for section in sections.iter().chain([&end]) {
         put(&section.head.to_bytes())?;
         put(&section.payload)?;

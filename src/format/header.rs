@@ -18,13 +18,25 @@ pub const HEAD_BYTES: usize = 12;
 pub const END_BYTES: usize = HEAD_BYTES + 12;
 /// Flags that a reader must know.
 const CRITICAL_FLAGS: u32 = 0xFFFF;
+/// Of these: updates tell errors of the tetrahedra that they remove.
+const TET_ERRORS: u32 = 1;
+
+/// What a header tells.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Start {
+    /// Bytes of the whole file, if the writer knew.
+    pub total: Option<u64>,
+    /// Whether updates tell errors of the tetrahedra that they remove.
+    pub tet_errors: bool,
+}
 
 /// The header of a file of a version that is `total` bytes long.
-pub fn header(total: u64, version: [u16; 2]) -> [u8; HEADER_BYTES] {
+pub fn header(total: u64, version: [u16; 2], tet_errors: bool) -> [u8; HEADER_BYTES] {
     let mut bytes = [0; HEADER_BYTES];
     bytes[..8].copy_from_slice(&MAGIC);
     bytes[8..10].copy_from_slice(&version[0].to_le_bytes());
     bytes[10..12].copy_from_slice(&version[1].to_le_bytes());
+    bytes[12..16].copy_from_slice(&(if tet_errors { TET_ERRORS } else { 0 }).to_le_bytes());
     bytes[16..24].copy_from_slice(&total.to_le_bytes());
     let crc = crc32fast::hash(&bytes[..28]);
     bytes[28..].copy_from_slice(&crc.to_le_bytes());
@@ -36,8 +48,8 @@ pub fn may_be_mt(bytes: &[u8]) -> bool {
     bytes.iter().zip(&MAGIC).all(|(a, b)| a == b)
 }
 
-/// Reads a header: the bytes of the whole file, if the writer knew.
-pub fn parse_header(bytes: &[u8; HEADER_BYTES]) -> Result<Option<u64>, FormatError> {
+/// Reads a header.
+pub fn parse_header(bytes: &[u8; HEADER_BYTES]) -> Result<Start, FormatError> {
     if !may_be_mt(bytes) {
         return Err(FormatError::NotMt);
     }
@@ -50,14 +62,15 @@ pub fn parse_header(bytes: &[u8; HEADER_BYTES]) -> Result<Option<u64>, FormatErr
     if !(OLDEST..=VERSION[0]).contains(&found[0]) {
         return Err(FormatError::UnsupportedVersion { found, supported: VERSION });
     }
-    if u32_at(12) & CRITICAL_FLAGS != 0 {
+    let flags = u32_at(12);
+    if flags & CRITICAL_FLAGS & !TET_ERRORS != 0 {
         return Err(FormatError::UnsupportedFeature {
             offset: 12,
             what: "a flag that this reader does not know",
         });
     }
     let total = u64::from(u32_at(16)) | u64::from(u32_at(20)) << 32;
-    Ok((total != 0).then_some(total))
+    Ok(Start { total: (total != 0).then_some(total), tet_errors: flags & TET_ERRORS != 0 })
 }
 
 /// The first four bytes as a number. The callers have them.

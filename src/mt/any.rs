@@ -161,6 +161,19 @@ impl MultiTessellation for Mt {
         each!(self, mt => MultiTessellation::errors(mt, u))
     }
 
+    fn has_tet_errors(&self) -> bool {
+        each!(self, mt => mt.has_tet_errors())
+    }
+
+    fn own_fall(&self, u: UpdateId) -> u8 {
+        each!(self, mt => MultiTessellation::own_fall(mt, u))
+    }
+
+    #[inline]
+    fn quarterings(&self, mesh: &CurrentMesh, t: u32) -> u8 {
+        each!(self, mt => MultiTessellation::quarterings(mt, mesh, t))
+    }
+
     fn to_come(&self) -> ErrorCode {
         each!(self, mt => mt.to_come())
     }
@@ -331,6 +344,15 @@ impl MtRef<'_> {
             Self::Vertex(mt) => mt.updates(),
             Self::HalfEdge(mt) => mt.updates(),
             Self::Explicit(mt) => mt.updates(),
+        }
+    }
+
+    /// Whether tetrahedra have errors of their own.
+    pub fn has_tet_errors(&self) -> bool {
+        match self {
+            Self::Edge(_) | Self::HalfEdge(_) => false,
+            Self::Vertex(mt) => mt.has_tet_errors(),
+            Self::Explicit(mt) => mt.has_tet_errors(),
         }
     }
 

@@ -24,6 +24,7 @@ use super::ring::RING_CAPACITY;
 use super::ring::Ring;
 use super::ring::TURN;
 use super::taken::Taken;
+use super::tet_errors::TetErrors;
 use crate::mesh::FACES;
 use crate::mesh::NONE;
 use std::ops::Range;
@@ -60,6 +61,8 @@ pub struct CurrentMesh {
     whole_stars: bool,
     /// For each tag a tetrahedron that has it, [`NONE`] if none does: the last that got it.
     place_of: Vec<u32>,
+    /// What is known of the errors of tetrahedra, for MTs that tell it.
+    pub(super) tet_errors: Option<Box<TetErrors>>,
     /// What is taken, for kinds of MT whose updates are spelled out.
     pub(super) taken: Option<Box<Taken>>,
     free_vertices: Vec<u32>,
@@ -153,6 +156,7 @@ impl CurrentMesh {
             inner: Vec::new(),
             whole_stars: false,
             place_of: Vec::new(),
+            tet_errors: None,
             taken: None,
             free_vertices: Vec::new(),
             free_tets: Vec::new(),
@@ -308,6 +312,23 @@ impl CurrentMesh {
                 *place = to;
             }
         }
+        if let Some(errors) = &mut self.tet_errors {
+            errors.set(to, errors.get(from));
+        }
+    }
+
+    /// How often the errors of the update that removes tetrahedron `t` can be quartered to bound its own, as far as is known.
+    #[inline]
+    pub(crate) fn quarterings(&self, t: u32) -> u8 {
+        self.tet_errors.as_ref().map_or(0, |errors| errors.get(t))
+    }
+
+    /// Sets that, where it is kept.
+    #[inline]
+    pub(crate) fn set_quarterings(&mut self, t: u32, quarterings: u8) {
+        if let Some(errors) = &mut self.tet_errors {
+            errors.set(t, quarterings);
+        }
     }
 
     /// Number of tetrahedra.
@@ -340,12 +361,13 @@ impl CurrentMesh {
             + size_of_val(&self.proven[..])
             + size_of_val(&self.pinched[..])
             + self.taken.as_ref().map_or(0, |taken| taken.bytes());
+        let errors = self.tet_errors.as_ref().map_or(0, |errors| errors.bytes());
         let changes =
             size_of_val(&self.changed_vertices.blocks[..]) + size_of_val(&self.changed_tets.blocks[..]);
         let scratch = self.ring.as_ref().map_or(0, |ring| size_of_val(&**ring))
             + self.cavity.as_ref().map_or(0, |cavity| size_of_val(&**cavity))
             + self.scratch.as_ref().map_or(0, |scratch| size_of_val(&**scratch));
-        (vertices + tets + of_the_mt + changes + scratch) as u64 + self.stars.bytes()
+        (vertices + tets + of_the_mt + changes + scratch) as u64 + self.stars.bytes() + errors
     }
 
     /// Number of tetrahedron slots, holes included; see [`CurrentMesh::tet`].
@@ -407,6 +429,9 @@ impl CurrentMesh {
             }
         }
         self.rename_all(&moves);
+        if let Some(errors) = &mut self.tet_errors {
+            errors.truncate(self.tets.len());
+        }
         self.changed_tets.truncate(self.tets.len());
         self.changed_vertices.truncate(self.labels.len());
     }

@@ -8,6 +8,10 @@ use std::fmt;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ErrorCode(pub u16);
 
+/// Errors that are twice as large have a code larger by this.
+const CODES_AN_OCTAVE: u16 = 1 << 11;
+/// A 32nd of that.
+const CODES_A_FALL: u16 = CODES_AN_OCTAVE / 32;
 /// Bits of an `f32` below the eleven of the mantissa that a code keeps.
 const DROPPED: u32 = 12;
 /// What the kept bits of 2^-25 are. The code of 2^-24 is then 2^11, and the code 0 stays free for zero.
@@ -47,6 +51,20 @@ impl ErrorCode {
     /// others, so that an error takes few bits in a file.
     pub fn coarse(self) -> Self {
         Self(self.0.checked_next_multiple_of(1 << 8).unwrap_or(u16::MAX))
+    }
+
+    /// The code that is lower by `fall` 32nds of a factor of 2 and then by a factor of 4 so many times, but not that of no
+    /// error at all unless this is.
+    #[must_use]
+    pub fn lowered(self, fall: u8, quarterings: u8) -> Self {
+        let octaves = u16::from(quarterings).saturating_mul(2 * CODES_AN_OCTAVE);
+        let below = octaves.saturating_add(u16::from(fall) * CODES_A_FALL);
+        Self(self.0.saturating_sub(below).max(self.0.min(1)))
+    }
+
+    /// The largest fall to a code that is not below another.
+    pub fn fall_to(self, other: Self) -> u8 {
+        u8::try_from(self.0.saturating_sub(other.0) / CODES_A_FALL).unwrap_or(u8::MAX)
     }
 
     /// The error this code stands for.

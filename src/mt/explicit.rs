@@ -19,6 +19,7 @@ use super::errors::Errors;
 use super::replay::ReplayError;
 use super::replay::canonical;
 use super::replay::replay;
+use super::tet_errors::MAX_QUARTERINGS;
 use crate::geom::orient3d;
 use crate::mesh::NONE;
 use std::collections::HashMap;
@@ -85,6 +86,10 @@ pub struct ExplicitMt {
     /// The update that removes each tetrahedron; [`NONE`] if there is none so far. Children follow from it.
     remover: Vec<u32>,
     errors: Errors,
+    /// The [quarterings](super::MultiTessellation::quarterings) of each tetrahedron, if they have errors of their own.
+    quarterings: Option<Vec<u8>>,
+    /// The [fall](super::MultiTessellation::own_fall) of each update, then.
+    own_falls: Vec<u8>,
     to_come: ErrorCode,
     /// Whether every update so far inserts more tetrahedra than it removes.
     pub(super) always_grows: bool,
@@ -132,6 +137,8 @@ impl ExplicitMt {
             parents: Rows::new(),
             remover: vec![NONE; base_tets],
             errors,
+            quarterings: None,
+            own_falls: Vec::new(),
             to_come: ErrorCode::MAX,
             always_grows: true,
             base,
@@ -194,9 +201,53 @@ impl ExplicitMt {
         self.tets.extend(new.inserted.iter().map(|&tet| canonical(tet)));
         self.tets[first..].sort_unstable();
         self.remover.resize(self.tets.len(), NONE);
+        if let Some(quarterings) = &mut self.quarterings {
+            quarterings.resize(self.tets.len(), 0);
+            self.own_falls.push(0);
+        }
         self.inserted.push(self.tets.len() as u32);
         self.always_grows &= new.inserted.len() > new.removed.len();
         Ok(UpdateId(update))
+    }
+
+    /// Gives each update a [fall](super::MultiTessellation::own_fall), and each tetrahedron
+    /// [quarterings](super::MultiTessellation::quarterings). Those of what is pushed later are 0.
+    ///
+    /// # Errors
+    /// If there is not a number for each update, and one of at most [`MAX_QUARTERINGS`] for each tetrahedron.
+    pub fn set_tet_errors(&mut self, falls: Vec<u8>, quarterings: Vec<u8>) -> Result<(), UpdateError> {
+        let sound = quarterings.len() == self.tets.len() && falls.len() == self.updates() as usize;
+        if !sound || !quarterings.iter().all(|&own| own <= MAX_QUARTERINGS) {
+            return Err(UpdateError::Error { update: 0 });
+        }
+        (self.quarterings, self.own_falls) = (Some(quarterings), falls);
+        Ok(())
+    }
+
+    /// Sets the fall of update `u`, where tetrahedra have errors of their own.
+    pub(crate) fn set_own_fall(&mut self, u: UpdateId, fall: u8) {
+        self.own_falls.get_mut(u.0 as usize).into_iter().for_each(|own| *own = fall);
+    }
+
+    /// The fall of update `u`.
+    pub fn own_fall_of(&self, u: UpdateId) -> u8 {
+        self.own_falls.get(u.0 as usize).copied().unwrap_or(0)
+    }
+
+    /// Sets the quarterings of tetrahedron `t`, where there are any.
+    pub(crate) fn set_quarterings_of(&mut self, t: u32, quarterings: u8) {
+        let own = self.quarterings.as_mut().and_then(|all| all.get_mut(t as usize));
+        own.into_iter().for_each(|own| *own = quarterings);
+    }
+
+    /// The quarterings of all tetrahedra; none if they have no errors of their own.
+    pub fn quarterings(&self) -> Option<&[u8]> {
+        self.quarterings.as_deref()
+    }
+
+    /// The quarterings of tetrahedron `t`.
+    pub fn quarterings_of(&self, t: u32) -> u8 {
+        self.quarterings.as_ref().and_then(|all| all.get(t as usize)).copied().unwrap_or(0)
     }
 
     /// Spells out an MT of any kind by applying all its updates.
@@ -207,6 +258,8 @@ impl ExplicitMt {
         let mut explicit = Self::new(mt.info().clone(), mt.base().clone());
         // The tetrahedra of the current mesh, by their vertices.
         let mut live: HashMap<[u32; 4], u32> = explicit.tets.iter().copied().zip(0..).collect();
+        let mut quarterings = mt.has_tet_errors().then(|| vec![0; explicit.tets.len()]);
+        let falls = |explicit: &Self| (0..explicit.updates()).map(|u| mt.own_fall(UpdateId(u))).collect();
         let mut failed = Ok(UpdateId(0));
         replay(mt, |step| {
             let old = explicit.positions.len() as u32;
@@ -217,6 +270,10 @@ impl ExplicitMt {
                 levels.extend_from_slice(step.mesh.levels(slot));
             }
             let removed: Vec<u32> = step.removed.iter().filter_map(|tet| live.remove(tet)).collect();
+            if let Some(all) = &mut quarterings {
+                all.resize(explicit.tets.len(), 0);
+                removed.iter().zip(step.quarterings).for_each(|(&t, &own)| all[t as usize] = own);
+            }
             let first = explicit.tets.len();
             let pushed = explicit.push(&ExplicitUpdate {
                 positions: &positions,
@@ -231,6 +288,11 @@ impl ExplicitMt {
             live.extend((first..explicit.tets.len()).map(|t| (explicit.tets[t], t as u32)));
         })?;
         failed?;
+        if let Some(mut all) = quarterings {
+            all.resize(explicit.tets.len(), 0);
+            let falls = falls(&explicit);
+            explicit.set_tet_errors(falls, all).map_err(ReplayError::Update)?;
+        }
         Ok(explicit)
     }
 
@@ -444,7 +506,9 @@ impl ExplicitMt {
             + size_of_val(&self.inserted[..])
             + self.removed.bytes()
             + self.parents.bytes()
-            + self.errors.bytes();
+            + self.errors.bytes()
+            + self.quarterings.as_ref().map_or(0, Vec::len)
+            + self.own_falls.len();
         (base + vertices + tets + nodes) as u64
     }
 }

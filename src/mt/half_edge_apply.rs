@@ -749,7 +749,7 @@ impl MultiTessellation for HalfEdgeMt {
             for tet in tets.filter(|tet| !tet.contains(&near)) {
                 let tet = tet.map(|v| if v == slot { near } else { v });
                 let levels = |field: usize| tet.map(|v| mesh.levels(v)[field]);
-                if look(&tet.map(|v| mesh.positions[v as usize]), &levels) {
+                if look(&tet.map(|v| mesh.positions[v as usize]), &levels, 0) {
                     break;
                 }
             }

@@ -28,6 +28,11 @@ use super::glue::Face;
 use super::glue::Glue;
 use super::glue::turned;
 use super::ring::rank;
+use super::sphere_rank::Spheres;
+use super::sphere_rank::Told;
+use super::tet_errors::Packed;
+use super::tet_errors::QUARTERING_BITS;
+use super::tet_errors::TetErrors;
 use super::vertex::COUNT_BITS;
 use super::vertex::MAX_AROUND;
 use super::vertex::MAX_INSERTED;
@@ -81,6 +86,8 @@ pub(super) struct Cavity {
     across: [[u32; 4]; MAX_INSERTED],
     /// The tags of the new tetrahedra.
     tags: [u32; MAX_INSERTED],
+    /// Their quarterings, where these are kept.
+    quarterings: [u8; MAX_INSERTED],
     /// Of T_u.
     fingerprint: Fingerprint,
 }
@@ -126,6 +133,7 @@ impl Default for Cavity {
             places: [0; GATHERED],
             across: [[NONE; 4]; MAX_INSERTED],
             tags: [NONE; MAX_INSERTED],
+            quarterings: [0; MAX_INSERTED],
             fingerprint: Fingerprint::default(),
         }
     }
@@ -265,9 +273,24 @@ struct Shape {
     /// Where the bits are that tell which boundary faces of T_u are given up, and how many.
     given_up: u64,
     given_up_len: u32,
-    /// Where the removers of the star are, and how wide.
+    /// Where the removers of the star are, and how wide; each has the quarterings of its tetrahedron behind it.
     removers: u64,
     remover_width: u32,
+    quartering_bits: u32,
+}
+
+impl Shape {
+    /// Where the remover at a place of the star is.
+    #[inline]
+    fn remover(&self, place: u64) -> u64 {
+        self.removers + place * u64::from(self.remover_width + self.quartering_bits)
+    }
+
+    /// Where the quarterings there are.
+    #[inline]
+    fn quarterings(&self, place: u64) -> u64 {
+        self.remover(place) + u64::from(self.remover_width)
+    }
 }
 
 impl VertexMt {
@@ -298,7 +321,14 @@ impl VertexMt {
             given_up_len,
             removers: at + u64::from(given_up_len),
             remover_width: width_of(children),
+            quartering_bits: self.quartering_bits(children),
         }
+    }
+
+    /// Bits of the quarterings of each tetrahedron that an update with so many children creates.
+    #[inline]
+    pub(super) fn quartering_bits(&self, children: u32) -> u32 {
+        if self.base_quarterings.is_some() && children > 0 { QUARTERING_BITS } else { 0 }
     }
 
     /// Collects T_u. Tells a parent that has to be applied first, if T_u is not complete.
@@ -414,6 +444,7 @@ impl VertexMt {
         let walls = cavity.walls_len;
         if shape.children == 0 && self.growing.is_none() {
             cavity.tags[..walls].fill(NONE);
+            cavity.quarterings[..walls].fill(0);
             return Ok(());
         }
         cavity.order_link(mesh);
@@ -421,6 +452,9 @@ impl VertexMt {
         if let Some(growing) = &self.growing {
             for (tag, &place) in cavity.tags[..walls].iter_mut().zip(&cavity.places) {
                 *tag = growing.remover(u.0, place as usize).unwrap_or(FIRST_ANONYMOUS_TAG | place as u32);
+            }
+            for (own, &place) in cavity.quarterings[..walls].iter_mut().zip(&cavity.places) {
+                *own = growing.quarterings(u.0, place as usize);
             }
             return Ok(());
         }
@@ -434,12 +468,58 @@ impl VertexMt {
             };
         }
         for (tag, &place) in cavity.tags[..walls].iter_mut().zip(&cavity.places) {
-            let at = shape.removers + place as u64 * u64::from(shape.remover_width);
-            let child = self.nodes.get(at, shape.remover_width) as usize;
+            let child = self.nodes.get(shape.remover(place as u64), shape.remover_width) as usize;
             let child = *children.get(child).ok_or(UpdateError::Cavity { update: u.0 })?;
             *tag = if child == FIRST_ANONYMOUS_TAG { child | place as u32 } else { child };
         }
+        for (own, &place) in cavity.quarterings[..walls].iter_mut().zip(&cavity.places) {
+            *own = self.nodes.get(shape.quarterings(place as u64), shape.quartering_bits) as u8;
+        }
         Ok(())
+    }
+
+    /// The quarterings of the tetrahedron at a place of the star that update `u` makes.
+    fn quarterings_at(&self, u: UpdateId, place: u32) -> u8 {
+        if let Some(growing) = &self.growing {
+            return growing.quarterings(u.0, place as usize);
+        }
+        let shape = self.shape(u);
+        self.nodes.get(shape.quarterings(u64::from(place)), shape.quartering_bits) as u8
+    }
+
+    /// Keeps the quarterings of T_u with the vertex that takes its place.
+    fn keep_quarterings(&self, mesh: &mut CurrentMesh, u: UpdateId, cavity: &Cavity) {
+        if mesh.tet_errors.is_none() {
+            return;
+        }
+        let by_labels = |&t: &u32| {
+            let mut tet = mesh.tets[t as usize].map(|v| mesh.labels[v as usize].vertex);
+            tet.sort_unstable();
+            (tet, mesh.quarterings(t))
+        };
+        let mut all: Vec<([u32; 4], u8)> = cavity.tets[..cavity.tets_len].iter().map(by_labels).collect();
+        all.sort_unstable();
+        let mut packed = Packed::default();
+        all.iter().enumerate().for_each(|(place, (_, own))| packed.set(place, *own));
+        if let Some(errors) = &mut mesh.tet_errors {
+            errors.set_replaced(self.vertex(u).0, packed);
+        }
+    }
+
+    /// The quarterings of the tetrahedra of T_u that were built; none if they are not kept.
+    fn kept_quarterings(&self, mesh: &CurrentMesh, u: UpdateId, glue: &Glue) -> Option<[u8; GATHERED]> {
+        let packed = mesh.tet_errors.as_ref()?.replaced(self.vertex(u).0);
+        // Numbers are in the order of labels.
+        let sorted = |(i, tet): (usize, &[u8; 4])| {
+            let mut tet = *tet;
+            tet.sort_unstable();
+            (tet, i)
+        };
+        let mut all: Vec<([u8; 4], usize)> = glue.tets[..glue.len].iter().enumerate().map(sorted).collect();
+        all.sort_unstable();
+        let mut kept = [0; GATHERED];
+        all.iter().enumerate().for_each(|(place, (_, i))| kept[*i] = packed.get(place));
+        Some(kept)
     }
 
     /// The update that removes the tetrahedron at a place of the star that update `u` makes, if it is here.
@@ -448,8 +528,7 @@ impl VertexMt {
             return growing.remover(u.0, place as usize);
         }
         let shape = self.shape(u);
-        let at = shape.removers + u64::from(place * shape.remover_width);
-        let child = self.nodes.get(at, shape.remover_width) as u32;
+        let child = self.nodes.get(shape.remover(u64::from(place)), shape.remover_width) as u32;
         self.child(u, child).filter(|_| child > 0).map(|child| child.0)
     }
 
@@ -477,6 +556,7 @@ impl VertexMt {
         position: [i32; 3],
         cavity: &mut Cavity,
     ) {
+        self.keep_quarterings(mesh, u, cavity);
         let slot = mesh.new_vertex();
         let labels = Labels { vertex: self.vertex(u).0, split: cavity.fingerprint.0 };
         mesh.put_vertex(slot, labels, position);
@@ -501,6 +581,7 @@ impl VertexMt {
                 mesh.mark_tet(wall.beyond);
             }
             mesh.set_tag(t, cavity.tags[i]);
+            mesh.set_quarterings(t, cavity.quarterings[i]);
             mesh.mark_tet(t);
             [a, b, c].iter().for_each(|&v| mesh.incident[v as usize] = t);
         }
@@ -545,7 +626,7 @@ impl VertexMt {
         }
         cavity.order_link(mesh);
         self.sort(cavity);
-        self.build_removed(u, cavity).ok_or(torn.clone())?;
+        self.build_removed(mesh, u, cavity).ok_or(torn.clone())?;
         cavity.fingerprint_built(mesh);
         if cavity.fingerprint.0 != mesh.labels[slot as usize].split {
             return Err(torn);
@@ -576,16 +657,22 @@ impl VertexMt {
 
     /// Builds T_u from walls in canonical order.
     #[inline]
-    fn build_removed(&self, u: UpdateId, cavity: &mut Cavity) -> Option<()> {
+    fn build_removed(&self, mesh: &CurrentMesh, u: UpdateId, cavity: &mut Cavity) -> Option<()> {
         let shape = self.shape(u);
         let mut faces: [Face; MAX_INSERTED] = [[0; 3]; MAX_INSERTED];
         for (face, wall) in faces.iter_mut().zip(&cavity.walls[..cavity.walls_len]) {
             *face = wall.corners;
         }
         let vertices = cavity.link_len as u32;
-        let at = shape.removers + cavity.walls_len as u64 * u64::from(shape.remover_width);
+        let at = shape.remover(cavity.walls_len as u64);
         let mut code = Code::new(at, vertices, shape.boundary);
         let apex = code.apex_of_all(&self.nodes);
+        if apex.is_none() {
+            code.read_told(&self.nodes, || {
+                let link = &cavity.link[..cavity.link_len];
+                Spheres::of(link.iter().map(|&v| mesh.positions[v as usize]))
+            });
+        }
         let close = |face: Face, of_link: bool| match apex {
             Some(apex) if !of_link || face.contains(&apex) => Some(Close::Leave),
             Some(apex) => Some(Close::With(apex)),
@@ -597,6 +684,7 @@ impl VertexMt {
 
     fn perform_removal(&self, mesh: &mut CurrentMesh, u: UpdateId, cavity: &mut Cavity) {
         let Cavity { glue, star, walls, link, .. } = cavity;
+        let kept = self.kept_quarterings(mesh, u, glue);
         let (old, new) = (star.len, glue.len);
         let mut slots = [NONE; GATHERED];
         let reused = old.min(new);
@@ -628,6 +716,9 @@ impl VertexMt {
                 };
             }
             mesh.set_tag(t, u.0);
+            if let Some(kept) = &kept {
+                mesh.set_quarterings(t, kept[i]);
+            }
             mesh.mark_tet(t);
             tet.iter().for_each(|&v| mesh.incident[v as usize] = t);
         }
@@ -640,11 +731,14 @@ pub(super) struct Code {
     /// Vertices of Π_u.
     vertices: u32,
     boundary: bool,
+    told: Told,
+    /// Where places in their order are told.
+    spheres: Option<Spheres>,
 }
 
 impl Code {
     pub fn new(at: u64, vertices: u32, boundary: bool) -> Self {
-        Self { at, vertices, boundary }
+        Self { at, vertices, boundary, told: Told::Vertex, spheres: None }
     }
 
     fn read(&mut self, nodes: &super::bits::Bits, width: u32) -> u32 {
@@ -660,10 +754,25 @@ impl Code {
         fan.then(|| self.read(nodes, width_of(self.vertices.saturating_sub(1))) as u8)
     }
 
+    /// Reads how faces are told; `spheres` are made only if that takes them.
+    #[inline]
+    fn read_told(&mut self, nodes: &super::bits::Bits, spheres: impl FnOnce() -> Spheres) {
+        self.told = Told::ALL[self.read(nodes, 2) as usize % Told::ALL.len()];
+        self.spheres = (self.told != Told::Vertex).then(spheres);
+    }
+
     /// How to close a face. Its own vertices are left out of the count; at the boundary of the domain, one more choice
     /// for a face inside Π_u is that nothing lies behind it.
     #[inline]
     fn close(&mut self, nodes: &super::bits::Bits, face: Face, of_link: bool) -> Option<Close> {
+        if let Some(spheres) = &self.spheres {
+            let at = &mut self.at;
+            let place = self.told.read(&mut || {
+                *at += 1;
+                nodes.get(*at - 1, 1) == 1
+            });
+            return spheres.vertex(face, place).map(Close::With);
+        }
         let choices = choices(self.vertices, self.boundary, of_link)?;
         let chosen = self.read(nodes, width_of(choices - 1));
         if chosen + 3 == self.vertices && self.boundary && !of_link {
@@ -709,6 +818,7 @@ impl MultiTessellation for VertexMt {
                 .zip(self.base_removers())
                 .map(|(t, &u)| if anonymous && u == NONE { FIRST_ANONYMOUS_TAG | t } else { u }),
         );
+        mesh.tet_errors = self.base_quarterings.clone().map(|base| Box::new(TetErrors::new(base)));
         Ok(mesh)
     }
 
@@ -724,6 +834,19 @@ impl MultiTessellation for VertexMt {
     #[inline]
     fn errors(&self, u: UpdateId) -> &[ErrorCode] {
         self.errors_of(u)
+    }
+
+    fn has_tet_errors(&self) -> bool {
+        self.base_quarterings.is_some()
+    }
+
+    fn own_fall(&self, u: UpdateId) -> u8 {
+        self.own_falls.get(u.0 as usize).copied().unwrap_or(0)
+    }
+
+    #[inline]
+    fn quarterings(&self, mesh: &CurrentMesh, t: u32) -> u8 {
+        mesh.quarterings(t)
     }
 
     fn to_come(&self) -> ErrorCode {
@@ -773,10 +896,12 @@ impl MultiTessellation for VertexMt {
         let mut cavity = mesh.take_cavity();
         let rebuilt = self.rebuild(mesh, u, &mut cavity);
         if rebuilt == Ok(Applied::Done) {
-            for tet in &cavity.glue.tets[..cavity.glue.len] {
+            let kept = self.kept_quarterings(mesh, u, &cavity.glue);
+            for (i, tet) in cavity.glue.tets[..cavity.glue.len].iter().enumerate() {
                 let tet = tet.map(|x| cavity.link[x as usize % MAX_AROUND]);
                 let levels = |field: usize| tet.map(|v| mesh.levels(v)[field]);
-                if look(&tet.map(|v| mesh.positions[v as usize]), &levels) {
+                let own = kept.map_or(0, |kept| kept[i]);
+                if look(&tet.map(|v| mesh.positions[v as usize]), &levels, own) {
                     break;
                 }
             }
@@ -803,12 +928,17 @@ impl MultiTessellation for VertexMt {
                 continue;
             }
             let place = tag & !FIRST_ANONYMOUS_TAG;
-            let remover = match self.creator(mesh, t) {
+            let creator = self.creator(mesh, t);
+            let remover = match creator {
                 Some(u) => self.remover_at(u, place),
                 None => self.base_removers().get(place as usize).copied().filter(|&u| u != NONE),
             };
             if let Some(u) = remover {
                 mesh.set_tag(t, u);
+                if let Some(base) = &self.base_quarterings {
+                    let of_base = || base.get(place as usize).copied().unwrap_or(0);
+                    mesh.set_quarterings(t, creator.map_or_else(of_base, |u| self.quarterings_at(u, place)));
+                }
                 mesh.touch(&[t]);
             }
         }

@@ -27,9 +27,11 @@ mod replay;
 mod ring;
 mod sparse;
 mod spelled;
+mod sphere_rank;
 mod split;
 mod stats;
 mod taken;
+mod tet_errors;
 mod vertex;
 mod vertex_from;
 mod vertex_grow;
@@ -59,6 +61,7 @@ pub(crate) use replay::canonical;
 pub(crate) use sparse::Sparse;
 pub use split::Applied;
 pub use stats::{MtStats, stats};
+pub use tet_errors::MAX_QUARTERINGS;
 pub use vertex::{MAX_AROUND, MAX_INSERTED, MAX_REMOVED, NodeBits, VertexMt};
 pub(crate) use vertex_grow::Insertion;
 
@@ -222,8 +225,17 @@ impl MtInfo {
     }
 }
 
-/// Sees a tetrahedron: positions at its corners and, by field, levels there, on the lattices. True ends the show.
-pub type LookAtTet<'a> = &'a mut dyn FnMut(&[[i32; 3]; 4], &dyn Fn(usize) -> [i32; 4]) -> bool;
+impl MtInfo {
+    /// Errors of tetrahedra by themselves are told down to this: what rounding alone can amount to, of the values
+    /// at corners and of those that are compared with.
+    pub fn least_own_error(&self, field: usize) -> ErrorCode {
+        ErrorCode::at_least(2.0 * self.floor(field))
+    }
+}
+
+/// Sees a tetrahedron: positions at its corners and, by field, levels there, on the lattices; and its
+/// [quarterings](MultiTessellation::quarterings). True ends the show.
+pub type LookAtTet<'a> = &'a mut dyn FnMut(&[[i32; 3]; 4], &dyn Fn(usize) -> [i32; 4], u8) -> bool;
 
 /// What selective refinement needs of a Multi-Tessellation of any kind [§2.3].
 pub trait MultiTessellation {
@@ -271,6 +283,34 @@ pub trait MultiTessellation {
     #[inline]
     fn error_of_field(&self, u: UpdateId, field: usize) -> ErrorCode {
         self.errors(u).get(field).copied().unwrap_or(ErrorCode::ZERO)
+    }
+
+    /// Whether tetrahedra have errors of their own, which may be smaller than those of the updates that remove them and do
+    /// not fall along the partial order: see [`MultiTessellation::quarterings`].
+    fn has_tet_errors(&self) -> bool {
+        false
+    }
+
+    /// By how much the errors of update `u` are larger than those that the tetrahedra it removes have by themselves, because of
+    /// the updates that depend on it: in 32nds of a factor of 2. 0 where nothing is known.
+    fn own_fall(&self, _u: UpdateId) -> u8 {
+        0
+    }
+
+    /// How often the errors of the update that removes tetrahedron `t` of the current mesh can be quartered, after
+    /// [`own_fall`](MultiTessellation::own_fall), and still bound those of the tetrahedron, at most [`MAX_QUARTERINGS`]; 0 where
+    /// nothing is known. See [`ErrorCode::lowered`].
+    #[inline]
+    fn quarterings(&self, _mesh: &CurrentMesh, _t: u32) -> u8 {
+        0
+    }
+
+    /// What bounds the error in a field of a tetrahedron by itself, given the update that removes it and the tetrahedron's
+    /// quarterings.
+    fn own_error(&self, u: UpdateId, field: usize, quarterings: u8) -> ErrorCode {
+        let error = self.error_of_field(u, field);
+        let own = error.lowered(self.own_fall(u), quarterings);
+        if own == error { error } else { own.max(error.min(self.info().least_own_error(field))) }
     }
 
     /// No update that is not here (yet) has a larger error; [`ErrorCode::ZERO`] if all are.

@@ -49,6 +49,8 @@ pub(super) struct Step<'a> {
     /// The updates that created what this one removes, ascending.
     pub parents: &'a [UpdateId],
     pub removed: &'a [[u32; 4]],
+    /// The quarterings of each of them.
+    pub quarterings: &'a [u8],
     pub inserted: &'a [[u32; 4]],
 }
 
@@ -66,6 +68,7 @@ pub(super) fn replay(
         mt.find_removed(&mut mesh, update, &mut found)?;
         removed.clear();
         removed.extend(found.iter().map(|&t| named(&mesh, t)));
+        let quarterings: Vec<u8> = found.iter().map(|&t| mt.quarterings(&mesh, t)).collect();
         parents.clear();
         parents.extend(found.iter().filter_map(|&t| mt.creator(&mesh, t)));
         parents.sort_unstable();
@@ -79,7 +82,14 @@ pub(super) fn replay(
         mt.find_inserted(&mut mesh, update, &mut found)?;
         inserted.clear();
         inserted.extend(found.iter().map(|&t| named(&mesh, t)));
-        see(&Step { update, mesh: &mesh, parents: &parents, removed: &removed, inserted: &inserted });
+        see(&Step {
+            update,
+            mesh: &mesh,
+            parents: &parents,
+            removed: &removed,
+            quarterings: &quarterings,
+            inserted: &inserted,
+        });
     }
     Ok(mesh)
 }

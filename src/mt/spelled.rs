@@ -233,6 +233,18 @@ impl MultiTessellation for ExplicitMt {
         ExplicitMt::errors(self, u)
     }
 
+    fn has_tet_errors(&self) -> bool {
+        self.quarterings().is_some()
+    }
+
+    fn own_fall(&self, u: UpdateId) -> u8 {
+        self.own_fall_of(u)
+    }
+
+    fn quarterings(&self, mesh: &CurrentMesh, t: u32) -> u8 {
+        self.quarterings_of(mesh.tag(t))
+    }
+
     fn to_come(&self) -> ErrorCode {
         self.to_come()
     }
@@ -282,7 +294,7 @@ impl MultiTessellation for ExplicitMt {
         for &t in self.removed(u) {
             let tet = self.tets()[t as usize].map(VertexId);
             let levels = |field: usize| tet.map(|v| self.levels(v)[field]);
-            if look(&tet.map(|v| self.position(v)), &levels) {
+            if look(&tet.map(|v| self.position(v)), &levels, self.quarterings_of(t)) {
                 break;
             }
         }

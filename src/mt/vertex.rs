@@ -15,8 +15,13 @@
 //!    then what hangs together around any tetrahedron that `u` removes, and complete when its size is the stored one.
 //!    No seed is stored: the last tetrahedron that `u` was found to remove is in T_u when all parents of `u` are applied.
 //! 2. *Build T_u inside Π_u.* The faces of Π_u, and those that come up on the way, are closed one after the other in
-//!    canonical order; the code names the fourth vertex of the tetrahedron behind each, among those of Π_u. When all of
+//!    canonical order; the code names the fourth vertex of the tetrahedron behind each, among those of Π_u: by
+//!    its number there, or by its place in the order in which spheres through the face reach them, in whichever way takes the
+//!    fewest bits. When all of
 //!    T_u meets in one vertex, as after a half-edge collapse, the code is that vertex.
+//!
+//! Where tetrahedra have errors of their own, the node that creates one tells with what removes it how often the errors of
+//! that update can be quartered to bound those of the tetrahedron.
 //!
 //! The canonical order of the star is that of the sorted vertex numbers of the faces opposite the new vertex. It is the
 //! same in every consistent set, since the star at the moment of insertion is.
@@ -30,6 +35,7 @@ use super::VertexId;
 use super::bits::Bits;
 use super::bits::width_of;
 use super::errors::Errors;
+use super::tet_errors::MAX_QUARTERINGS;
 use super::vertex_grow::Growing;
 use crate::mesh::NONE;
 
@@ -70,6 +76,11 @@ pub struct VertexMt {
     pub(super) info: MtInfo,
     pub(super) base: BaseMesh,
     pub(super) base_removers: Vec<u32>,
+    /// The [quarterings](super::MultiTessellation::quarterings) of each base tetrahedron, if tetrahedra have errors of
+    /// their own: then nodes tell those of the tetrahedra that they create.
+    pub(super) base_quarterings: Option<Vec<u8>>,
+    /// The [fall](super::MultiTessellation::own_fall) of each update, then.
+    pub(super) own_falls: Vec<u8>,
     /// Whether every insertion inserts more tetrahedra than it removes.
     pub(super) always_grows: bool,
     pub(super) widths: Widths,
@@ -131,6 +142,8 @@ impl VertexMt {
             info,
             base,
             base_removers,
+            base_quarterings: None,
+            own_falls: Vec::new(),
             always_grows,
             widths,
             nodes: Bits::default(),
@@ -141,6 +154,32 @@ impl VertexMt {
             shape_bits: 0,
             growing: None,
         })
+    }
+
+    /// The same MT, still without updates, with errors of tetrahedra: those of the base mesh are here, the nodes that are
+    /// pushed tell the others. See [`quarterings`](super::MultiTessellation::quarterings).
+    ///
+    /// # Errors
+    /// If there is not one number of at most [`MAX_QUARTERINGS`](super::MAX_QUARTERINGS) for each base tetrahedron, or there
+    /// are updates.
+    pub fn with_tet_errors(mut self, base: Vec<u8>) -> Result<Self, UpdateError> {
+        let sound = base.len() == self.base.tets.len() && base.iter().all(|&q| q <= MAX_QUARTERINGS);
+        if !sound || self.updates() > 0 {
+            return Err(UpdateError::Error { update: 0 });
+        }
+        self.base_quarterings = Some(base);
+        Ok(self)
+    }
+
+    /// Sets the fall of an update, where tetrahedra have errors of their own: see
+    /// [`own_fall`](super::MultiTessellation::own_fall).
+    pub fn set_own_fall(&mut self, u: UpdateId, fall: u8) {
+        self.own_falls.get_mut(u.0 as usize).into_iter().for_each(|own| *own = fall);
+    }
+
+    /// The quarterings of the base tetrahedra; none if tetrahedra have no errors of their own.
+    pub fn base_quarterings(&self) -> Option<&[u8]> {
+        self.base_quarterings.as_deref()
     }
 
     /// Adds the next update.
@@ -190,6 +229,9 @@ impl VertexMt {
             return Err(UpdateError::Error { update });
         }
         self.starts.push(offset);
+        if self.base_quarterings.is_some() {
+            self.own_falls.push(0);
+        }
         self.nodes.extend(bits);
         self.nodes.pad(UNIT);
         Ok(())
@@ -249,7 +291,9 @@ impl VertexMt {
         let base = size_of_val(&self.base.positions[..])
             + size_of_val(&self.base.values[..])
             + size_of_val(&self.base.tets[..])
-            + size_of_val(&self.base_removers[..]);
+            + size_of_val(&self.base_removers[..])
+            + self.base_quarterings.as_ref().map_or(0, Vec::len)
+            + self.own_falls.len();
         let nodes = self.nodes.bytes() + size_of_val(&self.groups[..]) + size_of_val(&self.starts[..]);
         let growing = self.growing.as_ref().map_or(0, |growing| growing.bytes());
         (base + nodes + growing + self.errors.bytes()) as u64

@@ -17,6 +17,8 @@ use super::glue::Face;
 use super::glue::Glue;
 use super::glue::turned;
 use super::insertion::choices;
+use super::sphere_rank::Spheres;
+use super::sphere_rank::Told;
 use super::vertex::COUNT_BITS;
 use super::vertex::MAX_AROUND;
 use super::vertex::MAX_INSERTED;
@@ -41,11 +43,16 @@ impl VertexMt {
         let mut compact =
             Self::new(info, base, base_removers, most_children.min(MAX_INSERTED as u32), mt.always_grows)
                 .map_err(damaged)?;
+        if let Some(quarterings) = mt.quarterings() {
+            let base = quarterings[..mt.base().len()].to_vec();
+            compact = compact.with_tet_errors(base).map_err(damaged)?;
+        }
         let mut boundary: HashSet<[u32; 3]> = boundary_faces(mt);
         let mut writer = Writer { mt, children: &children, glue: Box::default() };
         for u in (0..updates).map(UpdateId) {
             let node = writer.node(&compact, u, &mut boundary)?;
             compact.push(&node, mt.errors(u)).map_err(damaged)?;
+            compact.set_own_fall(u, mt.own_fall_of(u));
         }
         Ok(compact)
     }
@@ -108,7 +115,7 @@ impl Writer<'_> {
             bits.push(level as u64, field.bits);
         }
         self.write_links(&mut bits, compact, u);
-        self.write_shape(&mut bits, u, &canonical)?;
+        self.write_shape(&mut bits, compact, u, &canonical)?;
         Ok(NodeBits(bits))
     }
 
@@ -197,19 +204,23 @@ impl Writer<'_> {
     fn write_shape(
         &mut self,
         bits: &mut Bits,
+        compact: &VertexMt,
         u: UpdateId,
         canonical: &Canonical,
     ) -> Result<(), ConvertError> {
         let on_boundary = write_given_up(bits, canonical)
             .ok_or(ConvertError::Update { update: u.0, why: "it has too many faces on the boundary" })?;
         let children = &self.children[u.0 as usize];
+        let own = compact.quartering_bits(children.len() as u32);
         for (_, t) in &canonical.walls {
             let remover = self.mt.remover(*t);
             let child = remover.map_or(0, |c| 1 + children.partition_point(|&x| x < c.0));
             bits.push(child as u64, width_of(children.len() as u32));
+            bits.push(u64::from(self.mt.quarterings_of(*t)), own);
         }
         let torn = ConvertError::Update { update: u.0, why: "it does not fill the hole that it leaves" };
-        write_removed(&mut self.glue, bits, canonical, on_boundary).ok_or(torn)
+        let spheres = Spheres::of(canonical.link.iter().map(|&v| self.mt.position(VertexId(v))));
+        write_removed(&mut self.glue, bits, canonical, on_boundary, &spheres).ok_or(torn)
     }
 }
 
@@ -235,6 +246,7 @@ pub(super) fn write_removed(
     bits: &mut Bits,
     canonical: &Canonical,
     on_boundary: bool,
+    spheres: &Spheres,
 ) -> Option<()> {
     let faces: Vec<Face> = canonical.walls.iter().map(|(face, _)| *face).collect();
     let vertices = canonical.link.len() as u32;
@@ -255,6 +267,7 @@ pub(super) fn write_removed(
     let mut behind: Vec<(Face, u8)> = canonical.removed.iter().flat_map(sides).collect();
     behind.sort_unstable();
     let behind = |face: &Face| behind.binary_search_by_key(face, |entry| entry.0).ok().map(|at| behind[at].1);
+    let (mut plain, mut places) = (Vec::new(), Vec::new());
     let written = glue.build(&faces, !on_boundary, |face, of_link| {
         let apex = behind(&face);
         let choices = choices(vertices, on_boundary, of_link)?;
@@ -266,10 +279,12 @@ pub(super) fn write_removed(
             None if on_boundary && !of_link => (Close::Leave, vertices - 3),
             None => return None,
         };
-        bits.push(u64::from(chosen), width_of(choices - 1));
+        plain.push((chosen, width_of(choices - 1)));
+        places.push(apex.and_then(|x| spheres.place(face, x)));
         Some(close)
     });
     written?;
+    write_closed(bits, &plain, &places);
     // What was built must be T_u, whatever the way.
     let all = |tets: &[[u8; 4]]| {
         let mut all: Vec<[u8; 4]> = tets.to_vec();
@@ -278,6 +293,29 @@ pub(super) fn write_removed(
         all
     };
     (all(&glue.tets[..glue.len]) == all(&canonical.removed)).then_some(())
+}
+
+/// Appends how faces are closed, in that way which takes the fewest bits: the number of a vertex and its width for each, or its
+/// place in the order of spheres, where all have one.
+fn write_closed(bits: &mut Bits, plain: &[(u32, u32)], places: &[Option<u32>]) {
+    let places: Option<Vec<u32>> = places.iter().copied().collect();
+    let size = |told: &Told| match (told, &places) {
+        (Told::Vertex, _) => plain.iter().map(|(_, width)| width).sum(),
+        (told, Some(places)) => places.iter().map(|&place| told.code(place).1).sum(),
+        (_, None) => u32::MAX,
+    };
+    let told = Told::ALL.into_iter().min_by_key(size).unwrap_or(Told::Vertex);
+    bits.push(Told::ALL.iter().position(|&other| other == told).unwrap_or(0) as u64, 2);
+    match (told, &places) {
+        (Told::Vertex, _) | (_, None) => {
+            plain.iter().for_each(|&(chosen, width)| bits.push(u64::from(chosen), width));
+        }
+        (told, Some(places)) => {
+            for (code, width) in places.iter().map(|&place| told.code(place)) {
+                bits.push(code, width);
+            }
+        }
+    }
 }
 
 /// Whether the tetrahedra are those that `x` makes with the faces, which are turned and in canonical order, that do not have

@@ -12,12 +12,14 @@ use super::MultiTessellation;
 use super::NodeBits;
 use super::UpdateError;
 use super::UpdateId;
+use super::VertexId;
 use super::VertexMt;
 use super::bits::Bits;
 use super::bits::width_of;
 use super::current::FIRST_ANONYMOUS_TAG;
 use super::glue::Glue;
 use super::glue::turned;
+use super::sphere_rank::Spheres;
 use super::vertex::MAX_AROUND;
 use super::vertex::MAX_INSERTED;
 use super::vertex::MAX_REMOVED;
@@ -39,6 +41,8 @@ pub(super) struct Growing {
     removers_end: Vec<u64>,
     /// For each tetrahedron of a star, in canonical order, which child removes it, counted from 1; 0 while none does.
     removers: Vec<u8>,
+    /// For each of these tetrahedra its quarterings; nothing if tetrahedra have no errors of their own.
+    quarterings: Vec<u8>,
     /// Bits that each node was padded with.
     padding: Vec<u8>,
 }
@@ -67,6 +71,11 @@ impl Growing {
         self.children(u).get(usize::from(child).checked_sub(1)?).copied()
     }
 
+    /// The quarterings of the tetrahedron at a place of a star, as far as its remover is here.
+    pub fn quarterings(&self, u: u32, place: usize) -> u8 {
+        self.quarterings.get(self.removers_start(u) + place).copied().unwrap_or(0)
+    }
+
     pub fn bytes(&self) -> usize {
         // There are as many parents as children.
         2 * size_of_val(&self.parents[..])
@@ -74,6 +83,7 @@ impl Growing {
             + size_of_val(&self.children[..])
             + size_of_val(&self.removers_end[..])
             + self.removers.len()
+            + self.quarterings.len()
             + self.padding.len()
     }
 
@@ -100,6 +110,10 @@ pub(crate) struct Insertion<'a> {
     /// Slot and face of those of their faces on the boundary that are given up.
     pub given_up: &'a [[u32; 2]],
     pub errors: &'a [ErrorCode],
+    /// The quarterings of each removed tetrahedron; not looked at where tetrahedra have no errors of their own.
+    pub quarterings: &'a [u8],
+    /// The fall of the update, then.
+    pub own_fall: u8,
 }
 
 impl VertexMt {
@@ -107,10 +121,18 @@ impl VertexMt {
     ///
     /// # Errors
     /// If the base mesh has too many tetrahedra.
-    pub(crate) fn growing(info: MtInfo, base: BaseMesh, always_grows: bool) -> Result<Self, UpdateError> {
-        let removers = vec![NONE; base.tets.len()];
+    pub(crate) fn growing(
+        info: MtInfo,
+        base: BaseMesh,
+        always_grows: bool,
+        tet_errors: bool,
+    ) -> Result<Self, UpdateError> {
+        let tets = base.tets.len();
         let complete = info.updates == 0;
-        let mut mt = Self::new(info, base, removers, 0, always_grows)?;
+        let mut mt = Self::new(info, base, vec![NONE; tets], 0, always_grows)?;
+        if tet_errors {
+            mt = mt.with_tet_errors(vec![0; tets])?;
+        }
         mt.growing = (!complete).then(Box::default);
         Ok(mt)
     }
@@ -135,6 +157,7 @@ impl VertexMt {
             return Err(UpdateError::OffLattice { update });
         }
         let creators = self.take_away(mesh, new).ok_or(torn.clone())?;
+        let quarterings = if self.base_quarterings.is_some() { new.quarterings } else { &[] };
         let canonical = canonical(mesh, update, new).ok_or(torn.clone())?;
         let mut bits = Bits::default();
         new.position.iter().for_each(|&x| bits.push(x as u64, self.widths.position));
@@ -142,9 +165,12 @@ impl VertexMt {
             bits.push(level as u64, field.bits);
         }
         let on_boundary = write_given_up(&mut bits, &canonical).ok_or(torn.clone())?;
-        write_removed(glue, &mut bits, &canonical, on_boundary).ok_or(torn.clone())?;
+        let slots = canonical.link.iter().filter_map(|&v| mesh.slot(VertexId(v)));
+        let spheres = Spheres::of(slots.map(|slot| mesh.positions[slot as usize]));
+        write_removed(glue, &mut bits, &canonical, on_boundary, &spheres).ok_or(torn.clone())?;
         self.add_node(&bits, new.errors)?;
-        self.note_parents(update, &creators, canonical.walls.len());
+        self.set_own_fall(UpdateId(update), new.own_fall);
+        self.note_parents(update, &creators, quarterings, canonical.walls.len());
         match self.refine(mesh, UpdateId(update))? {
             Applied::Done => {}
             Applied::Blocked(_) => return Err(torn),
@@ -159,6 +185,10 @@ impl VertexMt {
     /// base mesh. None if one of them was removed before.
     fn take_away(&self, mesh: &mut CurrentMesh, new: &Insertion<'_>) -> Option<Vec<(Option<u32>, u32)>> {
         let update = self.updates();
+        for (&t, &own) in new.removed.iter().zip(new.quarterings) {
+            mesh.tet(t)?;
+            mesh.set_quarterings(t, own);
+        }
         let take = |&t: &u32| {
             mesh.tet(t)?;
             let tag = mesh.tag(t);
@@ -174,12 +204,16 @@ impl VertexMt {
 
     /// Lists update `u` with its parents, given what it removes; and makes room for what will remove the `inserted`
     /// tetrahedra of its star.
-    fn note_parents(&mut self, u: u32, creators: &[(Option<u32>, u32)], inserted: usize) {
+    fn note_parents(&mut self, u: u32, creators: &[(Option<u32>, u32)], quarterings: &[u8], inserted: usize) {
         let Some(growing) = &mut self.growing else { return };
         let first = growing.parents.len();
-        for &(creator, place) in creators {
+        let own = quarterings.iter().copied().chain(std::iter::repeat(0));
+        for (&(creator, place), own) in creators.iter().zip(own) {
             let Some(parent) = creator else {
                 self.base_removers[place as usize] = u;
+                if let Some(base) = &mut self.base_quarterings {
+                    base[place as usize] = own;
+                }
                 continue;
             };
             let children = &mut growing.children[parent as usize];
@@ -190,12 +224,18 @@ impl VertexMt {
             let child = children.len() as u8;
             let at = growing.removers_start(parent) + place as usize;
             growing.removers[at] = child;
+            if let Some(quarterings) = growing.quarterings.get_mut(at) {
+                *quarterings = own;
+            }
         }
         growing.parents[first..].sort_unstable();
         growing.parents_end.push(growing.parents.len() as u32);
         growing.children.push(Vec::new());
         growing.removers.resize(growing.removers.len() + inserted, 0);
         growing.removers_end.push(growing.removers.len() as u64);
+        if self.base_quarterings.is_some() {
+            growing.quarterings.resize(growing.removers.len(), 0);
+        }
     }
 
     /// Adds the bits of a node without links and removers.
@@ -215,10 +255,12 @@ impl VertexMt {
         let most_children = growing.children.iter().map(Vec::len).max().unwrap_or(0) as u32;
         let (base, removers) = (std::mem::take(&mut self.base), std::mem::take(&mut self.base_removers));
         let mut packed = Self::new(self.info.clone(), base, removers, most_children, self.always_grows)?;
+        packed.base_quarterings = self.base_quarterings.take();
         for u in 0..self.updates() {
             let node = self.packed_node(&growing, &packed, u);
             packed.push(&node, self.errors_of(UpdateId(u)))?;
         }
+        packed.own_falls = std::mem::take(&mut self.own_falls);
         *self = packed;
         Ok(())
     }
@@ -241,8 +283,12 @@ impl VertexMt {
         }
         let code = self.code_start(vertex_end);
         bits.copy(&self.nodes, vertex_end, code);
-        let width = width_of(children.len() as u32);
-        growing.removers(u).iter().for_each(|&child| bits.push(u64::from(child), width));
+        let count = children.len() as u32;
+        let (width, own) = (width_of(count), packed.quartering_bits(count));
+        for (place, &child) in growing.removers(u).iter().enumerate() {
+            bits.push(u64::from(child), width);
+            bits.push(u64::from(growing.quarterings(u, place)), own);
+        }
         bits.copy(&self.nodes, code, end);
         NodeBits(bits)
     }

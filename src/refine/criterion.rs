@@ -23,7 +23,7 @@ pub struct TetLook<'a> {
     pub corners: &'a [[i32; 3]; 4],
     /// Levels of a field at its corners.
     pub levels: &'a dyn Fn(usize) -> [i32; 4],
-    /// The error of the update that removes it: the largest one of all fields.
+    /// Its error, the largest one of all fields: that of the update that removes it, or what the MT knows of its own.
     pub error: ErrorCode,
     /// The same for each field.
     pub errors: &'a [ErrorCode],
@@ -32,7 +32,7 @@ pub struct TetLook<'a> {
 }
 
 impl TetLook<'_> {
-    /// The error of the update that removes it in one field, or the largest one of all.
+    /// Its error in one field, or the largest one of all.
     #[inline]
     pub fn error_of(&self, field: Option<usize>) -> ErrorCode {
         field.and_then(|f| self.errors.get(f)).copied().unwrap_or(self.error)

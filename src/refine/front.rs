@@ -15,9 +15,11 @@ use crate::mt::Applied;
 use crate::mt::BaseMeshError;
 use crate::mt::CurrentMesh;
 use crate::mt::ErrorCode;
+use crate::mt::MAX_QUARTERINGS;
 use crate::mt::MultiTessellation;
 use crate::mt::UpdateError;
 use crate::mt::UpdateId;
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -94,15 +96,45 @@ struct Open<'a> {
     t: u32,
     tet: [u32; 4],
     update: UpdateId,
-    error: ErrorCode,
-    errors: &'a [ErrorCode],
+    errors: TetErrors<'a>,
     corners: [[i32; 3]; 4],
 }
 
 impl Open<'_> {
     fn look<'a>(&'a self, levels: &'a dyn Fn(usize) -> [i32; 4]) -> TetLook<'a> {
-        let Self { corners, error, errors, update, .. } = self;
-        TetLook { corners, levels, error: *error, errors, update: *update }
+        let Self { corners, errors, update, .. } = self;
+        TetLook { corners, levels, error: errors.largest, errors: &errors.by_field, update: *update }
+    }
+}
+
+/// The errors of a tetrahedron.
+pub(super) struct TetErrors<'a> {
+    pub largest: ErrorCode,
+    pub by_field: Cow<'a, [ErrorCode]>,
+}
+
+impl<'a> TetErrors<'a> {
+    /// Those of a tetrahedron that update `u` removes, given its quarterings.
+    #[inline]
+    pub fn new(mt: &'a impl MultiTessellation, u: UpdateId, quarterings: u8) -> Self {
+        let (largest, errors, fall) = (mt.error(u), mt.errors(u), mt.own_fall(u));
+        if quarterings == 0 && fall == 0 {
+            return Self { largest, by_field: Cow::Borrowed(errors) };
+        }
+        let own: Vec<ErrorCode> = (0..errors.len()).map(|f| mt.own_error(u, f, quarterings)).collect();
+        Self { largest: own.iter().copied().fold(ErrorCode::ZERO, ErrorCode::max), by_field: Cow::Owned(own) }
+    }
+
+    /// Those of tetrahedron `t` of the mesh, which update `u` removes.
+    #[inline]
+    pub fn of(mt: &'a impl MultiTessellation, mesh: &CurrentMesh, t: u32, u: UpdateId) -> Self {
+        Self::new(mt, u, mt.quarterings(mesh, t))
+    }
+
+    /// Those of a tetrahedron of which only this is known.
+    pub fn bounded_by(errors: &'a [ErrorCode]) -> Self {
+        let largest = errors.iter().copied().fold(ErrorCode::ZERO, ErrorCode::max);
+        Self { largest, by_field: Cow::Borrowed(errors) }
     }
 }
 
@@ -279,7 +311,9 @@ impl Front {
         match before {
             Some(goal) if distance == 0.0 && goal.budget == budget => self.goal = Some(goal),
             before => {
-                self.move_watch(distance, &*criterion, before.as_ref().map(|goal| &*goal.criterion));
+                let keeps = criterion.is_monotone() && !mt.has_tet_errors();
+                let known = before.as_ref().filter(|_| keeps).map(|goal| &*goal.criterion);
+                self.move_watch(distance, &*criterion, known);
                 self.ranked.clear();
                 let outcome = Outcome::default();
                 self.goal = Some(Goal { criterion, budget, reached: false, outcome });
@@ -288,14 +322,15 @@ impl Front {
         self.learn(mt);
     }
 
-    /// The criterion has moved: verdicts whose slack is used up are void.
+    /// The criterion has moved: verdicts whose slack is used up are void; all of them, if they were not for one from which
+    /// the way leads on.
     fn move_watch(&mut self, distance: f64, criterion: &dyn Criterion, before: Option<&dyn Criterion>) {
         // Those judged for the last goal only.
         for asked in std::mem::take(&mut self.pending) {
             self.tets.open(asked.tet);
         }
         match before {
-            Some(before) if self.watched && criterion.is_monotone() && distance.is_finite() => {
+            Some(before) if self.watched && distance.is_finite() => {
                 for dial in 0..DIALS as u8 {
                     let moved =
                         if dial == ANY { distance } else { criterion.turned(before, dial).min(distance) };
@@ -439,11 +474,13 @@ impl Front {
         let Goal { criterion, budget, outcome, .. } = goal;
         // Where updates may make the mesh smaller, several thresholds fit a budget with larger ones between them: only
         // from the base mesh is the first one found for sure.
-        let restarts = !criterion.is_monotone() || !budget.is_unlimited() && !mt.always_grows();
+        let is_monotone = criterion.is_monotone() && !mt.has_tet_errors();
+        let restarts = !is_monotone || !budget.is_unlimited() && !mt.always_grows();
         if restarts && !self.watched && !self.ranked.is_running() {
             self.coarsen_all(mt, outcome)?;
         }
-        let uniform = criterion.uniform().filter(|_| budget.is_unlimited());
+        // Errors of updates say what is wanted as long as tetrahedra have none of their own.
+        let uniform = criterion.uniform().filter(|_| budget.is_unlimited() && !mt.has_tet_errors());
         let done = match uniform {
             Some(tolerances) => {
                 self.forget_watch();
@@ -708,8 +745,8 @@ impl Front {
                 continue;
             };
             let corners = tet.map(|v| self.mesh.positions[v as usize]);
-            let (error, errors) = (mt.error(update), mt.errors(update));
-            fetched.push(Open { t, tet, update, error, errors, corners });
+            let errors = TetErrors::of(mt, &self.mesh, t, update);
+            fetched.push(Open { t, tet, update, errors, corners });
         }
         outcome.judged += fetched.len() as u64;
     }
@@ -796,10 +833,14 @@ impl Front {
         u: UpdateId,
         ranked: bool,
     ) -> Result<Option<Verdict>, UpdateError> {
-        let (error, errors) = (mt.error(u), mt.errors(u));
+        // With every number of quarterings.
+        let all_errors = [0, 1, 2, MAX_QUARTERINGS]
+            .map(|own| if own == 0 || mt.has_tet_errors() { Some(TetErrors::new(mt, u, own)) } else { None });
         let mut all = Verdict::NEVER;
-        let mut look = |corners: &[[i32; 3]; 4], levels: &dyn Fn(usize) -> [i32; 4]| {
-            let look = TetLook { corners, levels, error, errors, update: u };
+        let mut look = |corners: &[[i32; 3]; 4], levels: &dyn Fn(usize) -> [i32; 4], own: u8| {
+            let of_own = all_errors.get(usize::from(own)).and_then(Option::as_ref).or(all_errors[0].as_ref());
+            let Some(TetErrors { largest, by_field }) = of_own else { return false };
+            let look = TetLook { corners, levels, error: *largest, errors: by_field, update: u };
             let one = if ranked { criterion.rank(&look) } else { criterion.judge(&look) };
             all = all.or(one);
             !ranked && one.asks() && one.slack > LONG
@@ -821,6 +862,7 @@ impl Front {
             match mt.refine_marked(&mut self.mesh, top)? {
                 Applied::Done => {
                     self.note(top, true);
+                    self.ranked.note_applied(top);
                     outcome.refined += 1;
                     stack.pop();
                     outcome.forced += u64::from(!stack.is_empty());
@@ -928,11 +970,11 @@ impl Front {
         let mut demand = |absent: UpdateId, t: u32| {
             let Some(tet) = self.mesh.tet(t) else { return };
             let update = mt.remover(&self.mesh, t);
-            let errors = update.map(|u| mt.errors(u)).or_else(|| mt.awaited_errors(&self.mesh, t));
+            let known = update.map(|u| TetErrors::of(mt, &self.mesh, t, u));
+            let errors = known.or_else(|| mt.awaited_errors(&self.mesh, t).map(TetErrors::bounded_by));
             let Some(errors) = errors else { return };
-            let error = errors.iter().copied().fold(ErrorCode::ZERO, ErrorCode::max);
             let verdict =
-                see(&self.mesh, &tet, error, errors, update.unwrap_or(absent), |look| criterion.rank(look));
+                see(&self.mesh, &tet, &errors, update.unwrap_or(absent), |look| criterion.rank(look));
             if verdict.asks() {
                 let largest = pages.entry(page_of(absent)).or_insert(0.0_f64);
                 *largest = largest.max(verdict.excess);
@@ -958,18 +1000,17 @@ impl Front {
         for (t, tet) in (0..).zip(self.mesh.tets()) {
             let update = mt.remover(&self.mesh, t);
             let missing = incomplete && (update.is_none() || unlimited);
-            let (error, errors) = match (update, mt.awaited_errors(&self.mesh, t)) {
-                (Some(u), _) => (mt.error(u), mt.errors(u)),
-                (None, Some(errors)) => {
-                    (errors.iter().copied().fold(ErrorCode::ZERO, ErrorCode::max), errors)
-                }
-                (None, None) => (mt.to_come(), &to_come[..]),
+            let errors = match (update, mt.awaited_errors(&self.mesh, t)) {
+                (Some(u), _) => TetErrors::of(mt, &self.mesh, t, u),
+                (None, Some(errors)) => TetErrors::bounded_by(errors),
+                (None, None) => TetErrors { largest: mt.to_come(), by_field: Cow::Borrowed(&to_come) },
             };
             // The last number there can be: nothing is added to what is wanted.
             let update = update.unwrap_or(UpdateId(mt.info().updates));
-            let verdict = see(&self.mesh, tet, error, errors, update, |look| criterion.rank(look));
+            let verdict = see(&self.mesh, tet, &errors, update, |look| criterion.rank(look));
             if verdict.asks() {
-                let error = field.and_then(|field| errors.get(field)).copied().unwrap_or(error);
+                let TetErrors { largest, by_field } = &errors;
+                let error = field.and_then(|field| by_field.get(field)).copied().unwrap_or(*largest);
                 all.error = all.error.max(error);
                 all.excess = all.excess.max(verdict.excess);
                 all.missing |= missing;
@@ -1001,12 +1042,12 @@ pub(super) fn creators_of_touched<'a>(
 pub(super) fn see(
     mesh: &CurrentMesh,
     tet: &[u32; 4],
-    error: ErrorCode,
-    errors: &[ErrorCode],
+    errors: &TetErrors<'_>,
     update: UpdateId,
     judge: impl FnOnce(&TetLook<'_>) -> Verdict,
 ) -> Verdict {
     let corners = tet.map(|v| mesh.positions[v as usize]);
     let levels = |field: usize| tet.map(|v| mesh.levels(v)[field]);
-    judge(&TetLook { corners: &corners, levels: &levels, error, errors, update })
+    let TetErrors { largest: error, ref by_field } = *errors;
+    judge(&TetLook { corners: &corners, levels: &levels, error, errors: by_field, update })
 }

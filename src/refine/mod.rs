@@ -13,6 +13,13 @@
 //! A region and values together ([`Part::Both`]) are not monotone: updates whose tetrahedra violate may depend on none that
 //! does, and would keep themselves once they are applied. Such a request is answered from the base mesh each time it changes.
 //!
+//! Where tetrahedra have errors of their own ([`quarterings`](crate::mt::MultiTessellation::quarterings)), they are judged by
+//! these, and no request is monotone: a tetrahedron may have a larger error than those it was made from. The result is the least
+//! set of updates that holds the parents of each of its members, and the update that removes any tetrahedron which violates the
+//! request and is of the base mesh or created by a member. It is unique. But from a finer mesh it cannot be told, by undoing
+//! updates: two updates may each be there only because of a tetrahedron that the other one makes or needs. So it is found from
+//! the base mesh whenever the request changes, at a cost that grows with the mesh. Updates that arrive only add to it.
+//!
 //! **Budgets.** Each violation has an excess, its error as a multiple of what is wanted there. With a budget the mesh is
 //! that of all updates above a threshold of excess, ties by their number; both run against the partial order, never with
 //! it. The threshold is the smallest one that fits: no mesh within the budget has a smaller largest excess.

@@ -4,6 +4,10 @@
 //! stops when the two meet: when what was forced last is what has to go. The mesh is then that of all updates above a
 //! threshold of urgency, the smallest threshold that fits. No set within the budget has a smaller largest excess, since each
 //! set with that excess contains this one; so no exchange can improve it.
+//!
+//! Where tetrahedra have errors of their own, what is forced may lead to violations that are more urgent. They belong to the
+//! threshold that has been reached: all that was applied since then goes when the budget is exceeded. Again the mesh is that
+//! of the smallest threshold that fits.
 
 use super::Budget;
 use super::Criterion;
@@ -11,6 +15,7 @@ use super::Front;
 use super::GoOn;
 use super::Outcome;
 use super::front::Forced;
+use super::front::TetErrors;
 use super::front::creators_of_touched;
 use super::front::see;
 use crate::mt::MultiTessellation;
@@ -37,6 +42,10 @@ pub(super) struct Ranked {
     coarsenable: BinaryHeap<Reverse<Rank>>,
     /// Tetrahedra that packing the mesh has moved since the queues were looked at.
     moved: Vec<u32>,
+    /// The least rank of what was forced.
+    threshold: Option<Rank>,
+    /// What has been applied since that was reached; kept where tetrahedra have errors of their own.
+    since: Vec<UpdateId>,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -61,6 +70,23 @@ impl Ranked {
         self.refinable.clear();
         self.coarsenable.clear();
         self.moved.clear();
+        self.threshold = None;
+        self.since.clear();
+    }
+
+    /// Something of this rank is about to be forced.
+    fn reach(&mut self, rank: Rank) {
+        if self.threshold.is_none_or(|threshold| rank < threshold) {
+            self.threshold = Some(rank);
+            self.since.clear();
+        }
+    }
+
+    /// An update has been applied.
+    pub fn note_applied(&mut self, u: UpdateId) {
+        if self.threshold.is_some() {
+            self.since.push(u);
+        }
     }
 
     /// Tetrahedra have moved to these slots.
@@ -81,7 +107,7 @@ impl Ranked {
 
     pub fn bytes(&self) -> u64 {
         let refinable = self.refinable.len() * size_of::<(Rank, u32)>();
-        (refinable + self.coarsenable.len() * size_of::<Rank>()) as u64
+        (refinable + self.coarsenable.len() * size_of::<Rank>() + size_of_val(&self.since[..])) as u64
     }
 }
 
@@ -102,9 +128,13 @@ impl Front {
         for t in std::mem::take(&mut self.ranked.moved) {
             self.push_violation(mt, criterion, t, outcome);
         }
-        while let Some(((_, Reverse(u)), t)) = self.ranked.refinable.pop() {
+        while let Some((rank, t)) = self.ranked.refinable.pop() {
+            let (_, Reverse(u)) = rank;
             if self.contains(u) || self.mesh.tet(t).is_none() || mt.remover(&self.mesh, t) != Some(u) {
                 continue;
+            }
+            if mt.has_tet_errors() {
+                self.ranked.reach(rank);
             }
             mt.start_at(&mut self.mesh, t);
             if let Forced::Awaits(absent, forced) = self.force(mt, u, outcome)? {
@@ -117,10 +147,17 @@ impl Front {
                 }
                 continue;
             }
-            // A tetrahedron asked for it, so it is queued. What it forced is blocked by it, and comes back when it goes.
-            self.is_idle(mt, criterion, u, outcome)?;
+            if !mt.has_tet_errors() {
+                // A tetrahedron asked for it, so it is queued. What it forced is blocked by it, and comes back when it goes.
+                self.is_idle(mt, criterion, u, outcome)?;
+            }
             self.push_touched(mt, criterion, outcome);
-            if self.trim(mt, criterion, budget, Some(u), outcome)? {
+            let limited = if mt.has_tet_errors() {
+                self.undo_threshold(mt, budget, outcome)?
+            } else {
+                self.trim(mt, criterion, budget, Some(u), outcome)?
+            };
+            if limited {
                 self.ranked.clear();
                 self.ranked.state = State::Limited;
                 return Ok(true);
@@ -186,7 +223,8 @@ impl Front {
         let Some(tet) = self.mesh.tet(t) else { return };
         let Some(u) = mt.remover(&self.mesh, t) else { return };
         outcome.judged += 1;
-        let verdict = see(&self.mesh, &tet, mt.error(u), mt.errors(u), u, |look| criterion.rank(look));
+        let errors = TetErrors::of(mt, &self.mesh, t, u);
+        let verdict = see(&self.mesh, &tet, &errors, u, |look| criterion.rank(look));
         if verdict.asks() {
             self.ranked.refinable.push((rank(verdict.excess, u), t));
         }
@@ -202,6 +240,24 @@ impl Front {
             self.push_violation(mt, criterion, self.mesh.touched()[i], outcome);
         }
         self.mesh.clear_touched();
+    }
+
+    /// Undoes all that was applied since the threshold was reached, if the budget is exceeded; tells whether it is.
+    fn undo_threshold(
+        &mut self,
+        mt: &impl MultiTessellation,
+        budget: Budget,
+        outcome: &mut Outcome,
+    ) -> Result<bool, UpdateError> {
+        if budget.holds(self.mesh.vertex_count(), self.mesh.tet_count()) {
+            return Ok(false);
+        }
+        // The last one has no child that is applied.
+        while let Some(u) = self.ranked.since.pop() {
+            self.coarsen(mt, u, outcome)?;
+        }
+        self.mesh.clear_touched();
+        Ok(true)
     }
 
     /// Undoes the least urgent updates until the budget is kept. Tells whether `last` was among them.

@@ -38,6 +38,7 @@ mod triangles;
 use crate::mesh::TetMesh;
 use crate::mt::ErrorCode;
 use crate::mt::MultiTessellation;
+use crate::mt::UpdateId;
 use crate::mt::check_errors;
 use crate::refine::Criterion;
 use crate::refine::Front;
@@ -425,7 +426,7 @@ impl<M: MultiTessellation> Case<'_, M> {
         }
     }
 
-    /// The error of each tetrahedron: that of the update which removes it.
+    /// The error of each tetrahedron: that of the update which removes it, or its own where that is known.
     fn errors(&self, mesh: &PlainMesh<'_>) -> TetErrors {
         let fields = self.mt.info().fields.len();
         let mut errors = TetErrors { stride: fields + 1, of: Vec::new() };
@@ -433,12 +434,19 @@ impl<M: MultiTessellation> Case<'_, M> {
             match self.mt.remover(mesh.mesh, t) {
                 None => errors.of.resize(errors.of.len() + fields + 1, 0.0),
                 Some(u) => {
-                    errors.of.push(self.mt.error(u).error());
-                    errors.of.extend(self.mt.errors(u).iter().map(|error| error.error()));
+                    let own = self.own_errors(mesh, t, u);
+                    errors.of.push(own.iter().max().copied().unwrap_or_default().error());
+                    errors.of.extend(own.iter().map(|error| error.error()));
                 }
             }
         }
         errors
+    }
+
+    /// The errors of tetrahedron `t`, which update `u` removes, field by field.
+    fn own_errors(&self, mesh: &PlainMesh<'_>, t: u32, u: UpdateId) -> Vec<ErrorCode> {
+        let own = self.mt.quarterings(mesh.mesh, t);
+        (0..self.mt.info().fields.len()).map(|field| self.mt.own_error(u, field, own)).collect()
     }
 
     /// The largest error and the largest excess of all tetrahedra that violate a request; 0 and 1 if none does.
@@ -449,8 +457,9 @@ impl<M: MultiTessellation> Case<'_, M> {
             let Some(update) = self.mt.remover(mesh.mesh, t) else { continue };
             let corners = tet.map(|v| mesh.positions[v as usize]);
             let levels = |field: usize| tet.map(|v| mesh.mesh.levels(v)[field]);
-            let (error, errors) = (self.mt.error(update), self.mt.errors(update));
-            let look = TetLook { corners: &corners, levels: &levels, error, errors, update };
+            let errors = self.own_errors(mesh, t, update);
+            let error = errors.iter().max().copied().unwrap_or_default();
+            let look = TetLook { corners: &corners, levels: &levels, error, errors: &errors, update };
             let verdict = criterion.rank(&look);
             if verdict.asks() {
                 let error = look.error_of(criterion.field());

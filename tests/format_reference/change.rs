@@ -16,6 +16,9 @@ pub struct Change {
     pub levels: Vec<Vec<i32>>,
     pub removed: Vec<Tet>,
     pub inserted: Vec<Tet>,
+    /// In files with flag 0: how far errors fall for all that is removed, and how often they are quartered for each of
+    /// these.
+    pub own: Option<(u32, Vec<u32>)>,
 }
 
 /// Reads the errors of an update, given those of the one before.

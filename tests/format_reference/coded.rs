@@ -75,6 +75,9 @@ pub const LEVEL: Row = numbers(253, 128, 1);
 pub const BASE_LEVEL: Row = numbers(381, 1, 2);
 pub const VALUE_GAP: Row = numbers(382, 1, 1);
 pub const VALUE_BITS: Row = symbols(383, 2, 65);
+/// In files with flag 0.
+pub const QUARTERS: Row = symbols(385, 8, 4);
+pub const OWN_FALL: Row = symbols(393, 1, 256);
 
 /// In the place of those from `GAP` to `LEVEL`, in files of kind 1 and 2.
 pub const FALL: Row = numbers(29, 1, 2);
@@ -93,7 +96,8 @@ pub const LEVEL_DIFFERENCE: Row = numbers(213, 1, 1);
 pub const REMOVED: Row = numbers(214, 2, 2);
 pub const CORNER: Row = numbers(216, 4, 4);
 
-const BOTH: [Row; 8] = [BEHIND, SEED, LENGTH, STEP, RANK, BASE_LEVEL, VALUE_GAP, VALUE_BITS];
+const BOTH: [Row; 10] =
+    [BEHIND, SEED, LENGTH, STEP, RANK, BASE_LEVEL, VALUE_GAP, VALUE_BITS, QUARTERS, OWN_FALL];
 const OF_SPLITS: [Row; 10] = [GAP, RUN, CHILDREN, RISE, EDGE, OFFSET, LAST_WRONG, WRONG, ERROR, LEVEL];
 const OF_OTHERS: [Row; 15] = [
     FALL,
@@ -119,7 +123,7 @@ pub type Table = Vec<(u32, u32)>;
 /// Reads the tables of all contexts of a file of a kind.
 pub fn tables(mut bytes: Bytes<'_>, kind: u8) -> Vec<Table> {
     let count = bytes.varint();
-    assert!(count <= VALUE_BITS.first + VALUE_BITS.contexts);
+    assert!(count <= OWN_FALL.first + OWN_FALL.contexts);
     let mut bits = Bits::new(bytes.0);
     let rows = BOTH.iter().chain(if kind == 0 { OF_SPLITS.iter() } else { OF_OTHERS.iter() });
     let tables = (0..count).map(|context| {

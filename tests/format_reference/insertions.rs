@@ -16,6 +16,8 @@ use super::coded::FAR;
 use super::coded::GIVEN_UP;
 use super::coded::GROW;
 use super::coded::INSERTION_LEVEL;
+use super::coded::OWN_FALL;
+use super::coded::QUARTERS;
 use super::coded::SEED_PLACE;
 use super::coded::SHORT;
 use super::coded::len;
@@ -49,6 +51,7 @@ pub struct Mesh<'a> {
     pub levels: Vec<Vec<i32>>,
     pub tets: Vec<Tet>,
     errors: Vec<u16>,
+    tet_errors: bool,
 }
 
 /// Which tetrahedra are removed, while that is found out.
@@ -68,6 +71,7 @@ impl<'a> Mesh<'a> {
             levels: vertices.map(|v| file.base_levels.iter().map(|levels| levels[v]).collect()).collect(),
             tets: file.base.tets.clone(),
             errors: vec![65_535; file.info.fields.len()],
+            tet_errors: file.tet_errors,
         }
     }
 
@@ -82,6 +86,7 @@ impl<'a> Mesh<'a> {
         self.grow(coded, near, fan, &mut grown);
         let given_up = self.given_up(coded, &grown);
         let levels = self.levels(coded, &grown);
+        let own = self.tet_errors.then(|| self.own_errors(coded, &grown));
         let removed: Vec<Tet> = grown.taken.iter().map(|&t| self.tets[t]).collect();
         let inserted = self.inserted(&grown, &given_up);
         self.positions.push(v);
@@ -94,7 +99,18 @@ impl<'a> Mesh<'a> {
         let around: BTreeSet<u32> = inserted.iter().flatten().copied().collect();
         assert!(removed.iter().flatten().all(|v| around.contains(v)), "a vertex is swallowed");
         assert!(removed.len() <= 127 && inserted.len() <= 124 && around.len() <= 1 + 64);
-        Change { errors, positions: vec![v], levels: vec![levels], removed, inserted }
+        Change { errors, positions: vec![v], levels: vec![levels], removed, inserted, own }
+    }
+
+    fn own_errors(&self, coded: &mut Coded<'_>, grown: &Grown) -> (u32, Vec<u32>) {
+        let fall = coded.symbol(OWN_FALL, 0);
+        let mut before = 0;
+        let quarters = grown.taken.iter().map(|&t| {
+            let is_within = self.volumes(t, grown.v).iter().all(|volume| *volume >= 0);
+            before = coded.symbol(QUARTERS, 2 * before + u32::from(is_within));
+            before
+        });
+        (fall, quarters.collect())
     }
 
     fn corners(&self, tet: Tet) -> [Point; 4] {

@@ -32,6 +32,8 @@ use wire::Section;
 /// A file, decoded as far as that needs no mesh.
 pub struct File {
     pub info: Info,
+    /// Flag 0: updates tell errors of the tetrahedra that they remove.
+    pub tet_errors: bool,
     pub index: Index,
     tables: Vec<Table>,
     pub base: Growth,
@@ -105,7 +107,9 @@ pub fn open(file: &[u8]) -> (File, Parts<'_>) {
     assert!(exact.windows(2).all(|pair| pair[0].field < pair[1].field));
     check_end(end, front, &info);
     let splits = HashMap::new();
-    (File { info, index, tables, base, start, base_levels, splits, exact, blocks }, parts_of)
+    let tet_errors = file[12] & 1 == 1;
+    assert!(!tet_errors || info.kind != 0);
+    (File { info, tet_errors, index, tables, base, start, base_levels, splits, exact, blocks }, parts_of)
 }
 
 /// Reads a whole file of kind 0. Blocks are read in an order that `choose` makes of those that can be read next, given only

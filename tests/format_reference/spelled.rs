@@ -10,6 +10,8 @@ use super::coded::COUNT;
 use super::coded::Coded;
 use super::coded::DIFFERENCE;
 use super::coded::LEVEL_DIFFERENCE;
+use super::coded::OWN_FALL;
+use super::coded::QUARTERS;
 use super::coded::REMOVED;
 use super::coded::SPELLED_FALL;
 use super::growth::volume;
@@ -22,6 +24,7 @@ pub struct Spelled<'a> {
     pub positions: Vec<Point>,
     pub tets: Vec<Tet>,
     pub is_removed: Vec<bool>,
+    tet_errors: bool,
 }
 
 /// What goes on from one update of a block to the next.
@@ -38,6 +41,7 @@ impl<'a> Spelled<'a> {
             positions: file.base.positions.clone(),
             tets: file.base.tets.clone(),
             is_removed: vec![false; file.base.tets.len()],
+            tet_errors: file.tet_errors,
         }
     }
 
@@ -75,6 +79,14 @@ impl<'a> Spelled<'a> {
             assert!(!self.is_removed[t], "removed twice");
             self.is_removed[t] = true;
             change.removed.push(self.tets[t]);
+        }
+        if self.tet_errors {
+            let (fall, mut before) = (coded.symbol(OWN_FALL, 0), 0);
+            let mut next = || {
+                before = coded.symbol(QUARTERS, 2 * before);
+                before
+            };
+            change.own = Some((fall, (0..removed).map(|_| next()).collect()));
         }
         let known: BTreeSet<u32> = change.removed.iter().flatten().copied().collect();
         let places: Vec<u32> = known.into_iter().chain(first..self.positions.len() as u32).collect();

@@ -53,6 +53,10 @@ pub struct Arguments {
     /// less around them with them [default: uniform].
     #[arg(long = "for", value_name = "PURPOSE", value_parser = purpose)]
     purpose: Option<Purpose>,
+    /// Keep for each tetrahedron how far its own error is below that of the update that removes it: requests take fewer
+    /// tetrahedra, but every one is answered from the base mesh. With --method insert only.
+    #[arg(long)]
+    tet_errors: bool,
     /// A field to keep (repeatable, in this order), or a vector with all its components; the first field if not given.
     #[arg(long = "field", value_name = "NAME")]
     fields: Vec<String>,
@@ -268,6 +272,7 @@ fn config(arguments: &Arguments) -> BuildConfig {
         precision_of: precision.iter().filter_map(of_one).collect(),
         lossless: arguments.lossless.iter().filter(|name| !name.is_empty()).cloned().collect(),
         all_lossless: arguments.lossless.iter().any(String::is_empty),
+        tet_errors: arguments.tet_errors,
         block_bits: arguments.block_updates.unwrap_or(default.block_bits),
         ..default
     };

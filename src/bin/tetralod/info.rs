@@ -38,6 +38,8 @@ struct Report {
     base_vertices: u32,
     base_tetrahedra: u32,
     updates: u32,
+    /// Whether tetrahedra have errors of their own.
+    tet_errors: bool,
     file_bytes: u64,
     bytes_per_vertex: f64,
     blocks: Blocks,
@@ -138,6 +140,7 @@ fn report(opened: &Opened) -> Result<Report> {
         base_vertices: mt.base().positions.len() as u32,
         base_tetrahedra: base_tetrahedra as u32,
         updates: info.updates,
+        tet_errors: mt.has_tet_errors(),
         file_bytes: opened.bytes,
         bytes_per_vertex: opened.bytes as f64 / f64::from(info.vertices.max(1)),
         blocks: blocks(opened)?,
@@ -183,7 +186,7 @@ fn breakdown(opened: &Opened) -> Result<Vec<FilePart>> {
     let known: f64 = parts.iter().map(|(_, bytes)| bytes).sum();
     parts.push(("heads and ends of sections", opened.bytes as f64 - known));
     // Few files keep any.
-    parts.retain(|(name, bytes)| *bytes != 0.0 || *name != "exact values");
+    parts.retain(|(name, bytes)| *bytes != 0.0 || !["exact values", "errors of tetrahedra"].contains(name));
     let vertices = f64::from(opened.info()?.vertices.max(1));
     let part =
         |(name, bytes): (&'static str, f64)| FilePart { name, bytes, bytes_per_vertex: bytes / vertices };
@@ -250,6 +253,7 @@ fn print(report: &Report) -> Result<()> {
             "",
             format!("{:.2} tetrahedra, {:.2} arcs per update", report.tets_per_update, report.arcs_per_node),
         ),
+        ("errors", if report.tet_errors { "of tetrahedra, 2 bits each" } else { "of updates" }.to_owned()),
         ("file size", output::bytes(report.file_bytes)),
         ("bytes per vertex", format!("{:.2}", report.bytes_per_vertex)),
         (

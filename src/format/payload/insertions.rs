@@ -5,6 +5,8 @@
 //! the new vertex lies in. Who is parent of whom, what the node of the update says of its star, and how what it
 //! removes is built again follow from that.
 
+use super::OWN_FALL;
+use super::QUARTERINGS;
 use super::base;
 use super::check_bytes;
 use super::largest;
@@ -112,6 +114,8 @@ pub struct State {
     /// What is removed.
     removed: Vec<u32>,
     given_up: Vec<[u32; 2]>,
+    /// Of what is removed, where it is told.
+    quarterings: Vec<u8>,
     /// By tetrahedron and by vertex: `epoch` if it is in the star or the link, one more if it is removed, two more if it is
     /// not.
     tet_marks: Vec<u32>,
@@ -146,8 +150,13 @@ pub fn read_head(source: &mut Source<'_>) -> Result<Head, FormatError> {
 }
 
 /// An MT without updates, and what to read its updates with.
-pub fn start(info: MtInfo, base: BaseMesh, head: Head) -> Result<(VertexMt, State), FormatError> {
-    let mt = VertexMt::growing(info, base, head.always_grows)?;
+pub fn start(
+    info: MtInfo,
+    base: BaseMesh,
+    head: Head,
+    tet_errors: bool,
+) -> Result<(VertexMt, State), FormatError> {
+    let mt = VertexMt::growing(info, base, head.always_grows, tet_errors)?;
     let state = State::new(&mt, head.grain)?;
     Ok((mt, state))
 }
@@ -223,6 +232,15 @@ fn put_update(out: &mut impl Put, mt: &VertexMt, u: UpdateId, state: &mut State)
         Ok::<_, UpdateError>(is_given_up)
     })?;
     put_levels(out, mt, u, state, position);
+    if mt.has_tet_errors() {
+        out.symbol(OWN_FALL, 0, u32::from(mt.own_fall(u)));
+        let mut context = 0;
+        for &t in &state.removed {
+            let own = mt.quarterings(&state.mesh, t);
+            out.symbol(QUARTERINGS, state.holds(t, position) + context, u32::from(own));
+            context = 2 * u32::from(own);
+        }
+    }
     match mt.refine(&mut state.mesh, u)? {
         Applied::Done => state.settle(u.0),
         Applied::Blocked(_) => return Err(torn),
@@ -365,8 +383,20 @@ fn read_update(source: &mut Source<'_>, mt: &mut VertexMt, state: &mut State) ->
     })?;
     state.list_given_up(position, &mut |_| Ok::<_, FormatError>(source.symbol(GIVEN_UP, 0)? == 1))?;
     let levels = read_levels(source, mt.info(), state, position)?;
-    let State { mesh, glue, removed, given_up, errors, .. } = state;
-    let insertion = Insertion { position, levels: &levels, removed, given_up, errors };
+    let mut own_fall = 0;
+    if mt.has_tet_errors() {
+        own_fall = source.symbol(OWN_FALL, 0)? as u8;
+        state.quarterings.clear();
+        let mut context = 0;
+        for i in 0..state.removed.len() {
+            let own = source.symbol(QUARTERINGS, state.holds(state.removed[i], position) + context)?;
+            state.quarterings.push(own as u8);
+            context = 2 * own;
+        }
+    }
+    let State { mesh, glue, removed, given_up, errors, quarterings, .. } = state;
+    let levels = &levels;
+    let insertion = Insertion { position, levels, removed, given_up, errors, quarterings, own_fall };
     let update = mt.insert_into(mesh, glue, &insertion)?;
     state.settle(update.0);
     Ok(())
@@ -470,6 +500,7 @@ impl State {
             link: Vec::new(),
             removed: Vec::new(),
             given_up: Vec::new(),
+            quarterings: Vec::new(),
             tet_marks: Vec::new(),
             vertex_marks: Vec::new(),
             epoch: 0,
@@ -561,6 +592,12 @@ impl State {
     /// Whether the point lies on the inner side of face `k` of a tetrahedron, not in its plane.
     fn sees(&self, tet: [u32; 4], k: usize, position: [i32; 3]) -> bool {
         self.inward(tet, k, position) > 0.0
+    }
+
+    /// 1 if the point lies in a tetrahedron, its boundary included; else 0.
+    fn holds(&self, t: u32, position: [i32; 3]) -> u32 {
+        let tet = self.mesh.tets()[t as usize];
+        u32::from((0..4).all(|k| self.inward(tet, k, position) >= 0.0))
     }
 
     fn sorted(&self, t: u32) -> [u32; 4] {
@@ -844,7 +881,7 @@ pub(super) mod tests {
     fn decoded(coded: &Coded, info: &MtInfo, base: &BaseMesh, size: u32) -> Result<VertexMt, FormatError> {
         let mut source = Source::new(Reader::new(&coded.head, 0), &coded.models)?;
         let known = read_head(&mut source)?;
-        let (mut mt, mut state) = start(info.clone(), base.clone(), known)?;
+        let (mut mt, mut state) = start(info.clone(), base.clone(), known, false)?;
         source.end()?;
         for block in &coded.blocks {
             let mut source = Source::new(Reader::new(block, 0), &coded.models)?;
@@ -873,7 +910,7 @@ pub(super) mod tests {
         let whole = delaunay(120);
         let Coded { models, head, blocks } = coded(&whole, 10)?;
         let known = read_head(&mut Source::new(Reader::new(&head, 0), &models)?)?;
-        let (mut mt, mut state) = start(whole.info().clone(), whole.base().clone(), known)?;
+        let (mut mt, mut state) = start(whole.info().clone(), whole.base().clone(), known, false)?;
         // One mesh follows; at every stage another one is taken back to the base, and there again.
         let mut mesh = mt.start()?;
         let mut reference = whole.start()?;

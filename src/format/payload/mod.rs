@@ -30,6 +30,7 @@ use crate::mt::ExplicitMt;
 use crate::mt::FieldInfo;
 use crate::mt::HalfEdgeMt;
 use crate::mt::HalfEdgeUpdate;
+use crate::mt::MAX_QUARTERINGS;
 use crate::mt::Mt;
 use crate::mt::MtInfo;
 use crate::mt::MtKind;
@@ -215,12 +216,25 @@ pub fn parts(kind: MtKind) -> Vec<(&'static str, Family)> {
         MtKind::HalfEdge => &half_edge::PARTS,
         MtKind::Explicit => &spelled::PARTS,
     };
-    let last = [("base mesh", BASE_LEVEL), ("exact values", exact::GAP), ("exact values", exact::LENGTH)];
+    let last = [
+        ("base mesh", BASE_LEVEL),
+        ("exact values", exact::GAP),
+        ("exact values", exact::LENGTH),
+        ("errors of tetrahedra", QUARTERINGS),
+        ("errors of tetrahedra", OWN_FALL),
+    ];
     base.chain(own.iter().copied()).chain(last).collect()
 }
 
 /// Differences between the levels of base vertices.
 const BASE_LEVEL: Family = edge::LEVEL.numbers_after(1, 2);
+
+/// By how many 32nds of a factor of 2 the errors of an update are larger than those of what it removes.
+const OWN_FALL: Family = QUARTERINGS.after(1, 256);
+
+/// How often what is left of the errors of an update can be quartered to bound those of a tetrahedron that it removes; by that of the one
+/// before it in the update, and whether the new vertex lies in it.
+const QUARTERINGS: Family = exact::LENGTH.after(8, MAX_QUARTERINGS as u32 + 1);
 
 /// Puts what is coded of the base mesh.
 pub fn put_base(out: &mut impl Put, mt: MtRef<'_>) {
@@ -317,7 +331,12 @@ impl BaseParts {
     }
 
     /// The MT without updates, when all levels are there.
-    pub fn start(self, info: MtInfo, block_bits: u32) -> Result<(Mt, Option<State>), FormatError> {
+    pub fn start(
+        self,
+        info: MtInfo,
+        block_bits: u32,
+        tet_errors: bool,
+    ) -> Result<(Mt, Option<State>), FormatError> {
         let Self { mut base, insertions, half_edge, levels } = self;
         let vertices = base.positions.len();
         base.values = (0..vertices).flat_map(|v| levels.iter().map(move |levels| levels[v])).collect();
@@ -325,14 +344,20 @@ impl BaseParts {
         Ok(match info.kind {
             MtKind::Edge => (EdgeMt::coded(info, base, block_bits).into(), None),
             MtKind::Vertex => {
-                let (mt, state) = insertions::start(info, base, insertions)?;
+                let (mt, state) = insertions::start(info, base, insertions, tet_errors)?;
                 (mt.into(), Some(state))
             }
             MtKind::HalfEdge => {
                 let half_edge::BaseHead { marks, children } = half_edge;
                 (HalfEdgeMt::new(info, base, marks, &children, block_bits)?.into(), None)
             }
-            MtKind::Explicit => (ExplicitMt::new(info, base).into(), None),
+            MtKind::Explicit => {
+                let mut mt = ExplicitMt::new(info, base);
+                if tet_errors {
+                    mt.set_tet_errors(Vec::new(), vec![0; mt.tets().len()])?;
+                }
+                (mt.into(), None)
+            }
         })
     }
 }

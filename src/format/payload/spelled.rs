@@ -1,5 +1,7 @@
 //! Updates that are spelled out, coded: numbers with a context for each kind of number.
 
+use super::OWN_FALL;
+use super::QUARTERINGS;
 use super::check_bytes;
 use super::insertions;
 use super::largest;
@@ -90,6 +92,15 @@ pub fn put(out: &mut impl Put, mt: &ExplicitMt, first: u32, end: u32) {
             }
         }
         put_removed(out, mt, u);
+        if mt.quarterings().is_some() {
+            out.symbol(OWN_FALL, 0, u32::from(mt.own_fall_of(u)));
+            let mut context = 0;
+            for &t in mt.removed(u).iter().rev() {
+                let own = u32::from(mt.quarterings_of(t));
+                out.symbol(QUARTERINGS, context, own);
+                context = 2 * own;
+            }
+        }
         put_inserted(out, mt, u);
     }
 }
@@ -129,6 +140,9 @@ struct Parts {
     removed: Vec<u32>,
     inserted: Vec<[u32; 4]>,
     errors: Vec<ErrorCode>,
+    /// Of what is removed, where it is told.
+    quarterings: Vec<u8>,
+    own_fall: u8,
     /// The last vertex of the update before.
     position: [i32; 3],
     level: Vec<i32>,
@@ -147,13 +161,17 @@ pub fn read(
         removed: Vec::new(),
         inserted: Vec::new(),
         errors: vec![ErrorCode::MAX; mt.fields()],
+        quarterings: Vec::new(),
+        own_fall: 0,
         position: [0; 3],
         level: vec![0; mt.fields()],
     };
     for _ in 0..count {
         parts.read(source, mt, limits)?;
-        let Parts { positions, levels, removed, inserted, errors, .. } = &parts;
-        mt.push(&ExplicitUpdate { positions, levels, removed, inserted, errors })?;
+        let Parts { positions, levels, removed, inserted, errors, quarterings, .. } = &parts;
+        let update = mt.push(&ExplicitUpdate { positions, levels, removed, inserted, errors })?;
+        mt.set_own_fall(update, parts.own_fall);
+        removed.iter().zip(quarterings).for_each(|(&t, &own)| mt.set_quarterings_of(t, own));
     }
     mt.set_to_come(largest(&parts.errors));
     Ok(())
@@ -177,6 +195,9 @@ impl Parts {
         let removed = source.number(COUNT, 1)?;
         fits(created, removed, 0)?;
         self.read_removed(source, removed, mt.tets().len() as u32)?;
+        if mt.quarterings().is_some() {
+            self.read_quarterings(source, removed)?;
+        }
         let first = mt.vertices();
         let Some(end) = first.checked_add(created) else {
             return Err(source.corrupt("there are more vertices than 32 bits can number"));
@@ -211,6 +232,18 @@ impl Parts {
             let t = above.checked_sub(1).and_then(|newest| newest.checked_sub(distance));
             above = t.ok_or_else(|| source.corrupt("an update removes a tetrahedron that is not there"))?;
             self.removed.push(above);
+        }
+        Ok(())
+    }
+
+    fn read_quarterings(&mut self, source: &mut Source<'_>, count: u32) -> Result<(), FormatError> {
+        self.own_fall = source.symbol(OWN_FALL, 0)? as u8;
+        self.quarterings.clear();
+        let mut context = 0;
+        for _ in 0..count {
+            let own = source.symbol(QUARTERINGS, context)?;
+            self.quarterings.push(own as u8);
+            context = 2 * own;
         }
         Ok(())
     }
