@@ -1,7 +1,7 @@
 //! The Multi-Tessellation itself [§2]: what it is made of and what every kind of it can do.
 //!
-//! [`EdgeMt`] is the compact structure that files hold and programs use; [`ExplicitMt`] spells the same MT out, as the
-//! oracle of tests. Both are immutable once they are complete. What changes is the [`CurrentMesh`], to which updates
+//! [`EdgeMt`], [`VertexMt`] and [`HalfEdgeMt`] are the compact structures that files hold and programs use; [`ExplicitMt`]
+//! spells the same MTs out, as the oracle of tests. Both are immutable once they are complete. What changes is the [`CurrentMesh`], to which updates
 //! are applied through the trait [`MultiTessellation`].
 
 mod any;
