@@ -84,7 +84,7 @@ impl<'a> Deviation<'a> {
         let per_error = info.displacement_per_error;
         let moved = if per_error > 0.0 { info.quantization / per_error } else { 0.0 };
         let stride = points.div_ceil(vertices.max(1)).max(1);
-        boundary_vertices.retain(|&v| v as usize % stride == 0);
+        boundary_vertices.retain(|&v| (v as usize).is_multiple_of(stride));
         let slack = 1e-9 * crate::geom::Bounds::of(&input.positions).diagonal();
         let cells = Cells::new(&positions);
         Ok(Self {
