@@ -246,7 +246,8 @@ fn any_order(how: How) {
 /// of them is tried.
 fn every_consistent_set(how: How) {
     let (mut sets, mut whole) = (0, 0);
-    for (cells, seed) in [([2, 1, 1], 0), ([2, 2, 1], 1), ([2, 2, 2], 2), ([9, 1, 1], 3), ([5, 5, 4], 4)] {
+    let cells = [[2, 1, 1], [2, 2, 1], [2, 2, 2], [9, 1, 1], [5, 5, 4], [4, 3, 3], [6, 4, 2], [3, 3, 5]];
+    for (cells, seed) in cells.into_iter().zip(0..) {
         let waves: fn([f64; 3]) -> f64 = |p| (5.0 * p[0] + 3.0 * p[1]).sin() + p[2] * p[1];
         let mesh = build_support::blocks(cells, &[waves, build_support::hilly], |_| true);
         let input = Input { name: "a few cells", mesh, position_bits: None, flat: true, convex: true };

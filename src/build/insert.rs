@@ -526,10 +526,7 @@ impl<'a> Greedy<'a> {
 
     #[inline]
     fn field_error_at(&self, p: u32, cell: usize, v: u32, f: usize) -> f64 {
-        let apex = self.mesh.position(v);
-        // The field as it is in the input's own place.
-        let place = self.quantized.places[p as usize].to_array();
-        let arm = [0, 1, 2].map(|i| place[i] - f64::from(apex[i]));
+        let arm = difference(self.mesh.position(p), self.mesh.position(v)).map(|x| x as f64);
         let fields = self.weights.len();
         let slope = self.slopes[cell * fields + f];
         let value = f64::from(self.quantized.levels[v as usize * fields + f])
@@ -689,17 +686,10 @@ mod tests {
             if parts.iter().any(|&part| part < 0) {
                 continue;
             }
-            // The point is in the tetrahedron as the lattice has it; the field counts where the input has it.
-            let [a, b, c, d] = tet.map(|v| glam::DVec3::from_array(at(v).map(f64::from)));
-            let arms = glam::DMat3::from_cols(b - a, c - a, d - a);
             let total = parts.iter().sum::<i128>() as f64;
-            let moved = quantized.places[p as usize] - glam::DVec3::from_array(at(p).map(f64::from));
-            let change = arms.inverse() * moved;
-            let change = [-change.element_sum(), change.x, change.y, change.z];
-            let weights = [0, 1, 2, 3].map(|k| parts[k] as f64 / total + change[k]);
             for (f, field) in quantized.fields.iter().enumerate() {
                 let level = |v: u32| f64::from(quantized.levels[v as usize * fields + f]);
-                let value: f64 = (0..4).map(|k| weights[k] * level(tet[k])).sum();
+                let value: f64 = (0..4).map(|k| parts[k] as f64 / total * level(tet[k])).sum();
                 let error =
                     (value - quantized.exact[p as usize * fields + f]).abs() * field.step / field.range();
                 all = all.max(error);
