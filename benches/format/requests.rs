@@ -30,11 +30,14 @@ pub fn run(sets: &[Set]) -> Result<()> {
     let mut boxes = Vec::new();
     for set in sets {
         eprintln!("{}", set.name);
-        let file = sets::file(&set.mesh, MtKind::Edge)?;
-        if set.mesh.tets.len() > LARGE {
-            pictures.push(picture(set, &file)?);
+        for kind in [MtKind::Edge, MtKind::HalfEdge] {
+            let file = sets::file(&set.mesh, kind)?;
+            let name = format!("{}, {}", set.name, kind.name());
+            if set.mesh.tets.len() > LARGE {
+                pictures.push(picture(set, &name, &file)?);
+            }
+            boxes.extend(corners(set, &name, &file)?);
         }
-        boxes.extend(corners(set, &file)?);
     }
     println!(
         "| set | file KB | prefix: guaranteed % | prefix: measured % | error % | Hausdorff % | ranges: guaranteed % | error % | Hausdorff % |"
@@ -99,7 +102,7 @@ fn percent_of(part: u64, file: &[u8]) -> f64 {
     100.0 * part as f64 / file.len() as f64
 }
 
-fn picture(set: &Set, file: &[u8]) -> Result<String> {
+fn picture(set: &Set, name: &str, file: &[u8]) -> Result<String> {
     let mut whole = Session::new();
     whole.feed(file)?;
     whole.refine(&Request::within(0.0))?;
@@ -114,7 +117,7 @@ fn picture(set: &Set, file: &[u8]) -> Result<String> {
     let (guaranteed, measured, found) = in_order(file, &request, &reference, &least)?;
     Ok(format!(
         "| {} | {} | {guaranteed:.1} | {measured:.0} | {:.2} | {:.2} | {ranges:.1} | {:.2} | {:.2} |",
-        set.name,
+        name,
         file.len() / 1000,
         found.field,
         found.distance,
@@ -161,19 +164,20 @@ fn in_order(
 }
 
 /// Boxes of a quarter of each side.
-fn corners(set: &Set, file: &[u8]) -> Result<Vec<String>> {
+fn corners(set: &Set, set_name: &str, file: &[u8]) -> Result<Vec<String>> {
     let whole = Bounds::of(&set.mesh.positions);
     let at = |part: f64| [0, 1, 2].map(|i| whole.min[i] + part * (whole.max[i] - whole.min[i]));
     let mut rows = Vec::new();
-    for (name, part) in [("low", 0.1), ("middle", 0.375), ("high", 0.65)] {
+    let boxes =
+        [("low", 0.1, 0.0), ("middle", 0.375, 0.0), ("high", 0.65, 0.0), ("middle, 1 %", 0.375, 0.01)];
+    for (name, part, error) in boxes {
         let region = Bounds { min: at(part), max: at(part + 0.25) };
         let mut client = open(file)?;
-        let stats = client.refine(&Need::within(0.0).inside(region).into())?;
+        let stats = client.refine(&Need::within(error).inside(region).into())?;
         let updates = client.session().info().map_or(1, |info| info.updates.max(1));
         let progress = client.session().block_progress();
         rows.push(format!(
-            "| {} | {name} | {:.1} | {:.1} | {} | {} |",
-            set.name,
+            "| {set_name} | {name} | {:.1} | {:.1} | {} | {} |",
             percent_of(client.fetched(), file),
             100.0 * f64::from(stats.applied) / f64::from(updates),
             progress.needed,

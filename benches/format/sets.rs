@@ -78,13 +78,15 @@ fn read(path: &Path) -> Option<Set> {
 
 /// The MT of a mesh.
 pub fn mt(mesh: &TetMesh, kind: MtKind) -> Result<Mt> {
-    let config = BuildConfig { kind, method: Method::usual(kind), ..BuildConfig::default() };
+    let block_bits = kind.usual_block_bits();
+    let config = BuildConfig { kind, method: Method::usual(kind), block_bits, ..BuildConfig::default() };
     Ok(build(mesh, &config, &mut |_| ControlFlow::Continue(()))?.mt)
 }
 
 /// The MT file of a mesh.
 pub fn file(mesh: &TetMesh, kind: MtKind) -> Result<Vec<u8>> {
-    Ok(encode(&mt(mesh, kind)?, &EncodeOptions::default())?)
+    let options = EncodeOptions { block_bits: kind.usual_block_bits(), ..EncodeOptions::default() };
+    Ok(encode(&mt(mesh, kind)?, &options)?)
 }
 
 /// Writes the MT file of a generated volume.

@@ -30,6 +30,7 @@ struct Found {
     edge: usize,
     /// Not measured where it would take long.
     vertex: Option<usize>,
+    half_edge: usize,
     index_share: f64,
     /// Million updates decoded per second.
     speed: f64,
@@ -39,14 +40,14 @@ struct Found {
 pub fn run(sets: &[Set]) -> Result<()> {
     let found = sets.iter().map(measure).collect::<Result<Vec<_>>>()?;
     println!(
-        "| set | vertices | tets | bits | raw | as given | xz | xz, shuffled | MT, edge | MT, vertex | index % | decode |"
+        "| set | vertices | tets | bits | raw | as given | xz | xz, shuffled | MT, edge | MT, vertex | MT, half-edge | index % | decode |"
     );
-    println!("|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|");
+    println!("|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|");
     for one in &found {
         let per = |bytes: usize| format!("{:.2}", bytes as f64 / one.vertices as f64);
         let maybe = |bytes: Option<usize>| bytes.map_or("–".to_owned(), per);
         println!(
-            "| {} | {} | {} | {} | {} | {} | {} | {} | **{}** | {} | {:.2} | {:.2} |",
+            "| {} | {} | {} | {} | {} | {} | {} | {} | **{}** | {} | {} | {:.2} | {:.2} |",
             one.name,
             one.vertices,
             one.tets,
@@ -57,6 +58,7 @@ pub fn run(sets: &[Set]) -> Result<()> {
             maybe(one.shuffled),
             per(one.edge),
             maybe(one.vertex),
+            per(one.half_edge),
             100.0 * one.index_share,
             one.speed
         );
@@ -87,6 +89,7 @@ fn measure(set: &Set) -> Result<Found> {
     let edge = sets::file(mesh, MtKind::Edge)?;
     let is_small = mesh.positions.len() <= LARGE;
     let vertex = is_small.then(|| sets::file(mesh, MtKind::Vertex)).transpose()?;
+    let half_edge = sets::file(mesh, MtKind::HalfEdge)?;
     let (decoder, speed) = decode(&edge)?;
     let index = decoder.index().ok_or("no index")?;
     let index_bytes = decoder.head_end().unwrap_or(0).saturating_sub(index.shared);
@@ -108,6 +111,7 @@ fn measure(set: &Set) -> Result<Found> {
         shuffled: xz(&shuffled(mesh)),
         edge: edge.len(),
         vertex: vertex.map(|file| file.len()),
+        half_edge: half_edge.len(),
         index_share: index_bytes as f64 / edge.len() as f64,
         speed,
         parts,

@@ -562,29 +562,48 @@ impl Scratch {
     /// Predicts the levels of a vertex at `position` from those around it: means by inverse squared distance, in whole
     /// numbers, so that the order of the link does not matter.
     pub fn predict_levels(&mut self, mesh: &CurrentMesh, position: [i32; 3]) {
-        let squared = |v: u32| {
-            let p = mesh.positions[v as usize];
-            (0..3).map(|k| i128::from(p[k]) - i128::from(position[k])).map(|d| d * d).sum::<i128>()
-        };
         let link = &self.link[..self.link_len];
-        let largest = link.iter().map(|&v| squared(v)).max().unwrap_or(1).max(1);
-        let mut total = 0_i128;
+        let largest = link.iter().map(|&v| squared(mesh, v, position)).max().unwrap_or(1).max(1);
         self.levels.clear();
         self.levels.resize(mesh.fields, 0);
-        let mut sums = [0_i128; 8];
-        let few = mesh.fields <= sums.len();
-        let mut many = if few { Vec::new() } else { vec![0_i128; mesh.fields] };
-        let sums = if few { &mut sums[..mesh.fields] } else { &mut many[..] };
-        for &v in link {
-            let weight = (largest << WEIGHT_BITS) / squared(v).max(1);
-            total += weight;
-            for (sum, &level) in sums.iter_mut().zip(mesh.levels(v)) {
-                *sum += weight * i128::from(level);
+        for (field, level) in self.levels.iter_mut().enumerate() {
+            let (mut total, mut sum) = (0_u128, 0_u128);
+            for &v in link {
+                let weight = weight(largest, squared(mesh, v, position));
+                total += weight;
+                // Levels are not negative.
+                sum += weight * u128::from(mesh.levels(v)[field].unsigned_abs());
             }
+            *level = mean(sum, total.max(1)) as i32;
         }
-        for (level, sum) in self.levels.iter_mut().zip(sums) {
-            *level = ((2 * *sum + total) / (2 * total.max(1))) as i32;
-        }
+    }
+}
+
+/// The squared distance of a vertex from a position.
+#[inline]
+fn squared(mesh: &CurrentMesh, v: u32, position: [i32; 3]) -> u64 {
+    let p = mesh.positions[v as usize];
+    // Less than 2^62 each: positions are on lattices of at most 30 bits.
+    (0..3).map(|k| u64::from(p[k].abs_diff(position[k]))).fold(0, |sum, d| sum.saturating_add(d * d))
+}
+
+#[inline]
+fn weight(largest: u64, squared: u64) -> u128 {
+    let squared = squared.max(1);
+    // Short numbers divide many times as fast.
+    if largest < 1 << (64 - WEIGHT_BITS) {
+        u128::from((largest << WEIGHT_BITS) / squared)
+    } else {
+        (u128::from(largest) << WEIGHT_BITS) / u128::from(squared)
+    }
+}
+
+/// The quotient, rounded.
+#[inline]
+fn mean(sum: u128, total: u128) -> u128 {
+    match (u64::try_from(2 * sum + total), u64::try_from(2 * total)) {
+        (Ok(sum), Ok(total)) => u128::from(sum / total),
+        _ => (2 * sum + total) / (2 * total),
     }
 }
 

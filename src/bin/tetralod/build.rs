@@ -88,7 +88,8 @@ pub struct Arguments {
     /// Keep the exact values of all fields or (repeatable) of one.
     #[arg(long, value_name = "NAME", num_args = 0..=1, require_equals = true, default_missing_value = "")]
     lossless: Vec<String>,
-    /// Updates in a block, the least that can be fetched of the file by itself: a power of two, 16 to 65536 [default: 2048].
+    /// Updates in a block, the least that can be fetched of the file by itself: a power of two, 16 to 65536 [default: 2048, 512 for kind
+    /// half-edge].
     #[arg(long, value_name = "N", value_parser = block_bits)]
     block_updates: Option<u32>,
     /// No progress bar and no summary.
@@ -273,7 +274,7 @@ fn config(arguments: &Arguments) -> BuildConfig {
         lossless: arguments.lossless.iter().filter(|name| !name.is_empty()).cloned().collect(),
         all_lossless: arguments.lossless.iter().any(String::is_empty),
         tet_errors: arguments.tet_errors,
-        block_bits: arguments.block_updates.unwrap_or(default.block_bits),
+        block_bits: arguments.block_updates.unwrap_or(kind.usual_block_bits()),
         ..default
     };
     if let Err(error) = config.check() {
