@@ -125,7 +125,7 @@ impl Named {
     }
 
     /// Makes a block the one that was named last.
-    fn to_front(&mut self, at: usize) {
+    fn name_again(&mut self, at: usize) {
         self.blocks[..=at].rotate_right(1);
     }
 }
@@ -152,7 +152,7 @@ fn put_children(out: &mut impl Put, named: &mut Named, children: &[ForestChild],
             Some(at) => {
                 let gap = i64::from(child.update) - i64::from(named.blocks[at].1) - 1;
                 out.number(GAP, 0, zigzag(gap));
-                named.to_front(at);
+                named.name_again(at);
             }
             None => {
                 out.number(NEW_BLOCK, 0, zigzag(i64::from(block) - i64::from(named.newest)));
@@ -214,7 +214,7 @@ fn read_children(
         } else {
             let gap = unzigzag(source.number(GAP, 0)?);
             let &(_, last) = named.blocks.get(at - 1).ok_or_else(|| wrong(source))?;
-            named.to_front(at - 1);
+            named.name_again(at - 1);
             u32::try_from(i64::from(last) + 1 + gap).map_err(|_| wrong(source))?
         };
         named.blocks[0].1 = update;
