@@ -192,6 +192,8 @@ fn outcome(bytes: &[u8]) -> String {
         Err(EncodeError::Update(error)) => format!("refused by the mesh: {}", name(&error)),
         // What only the neighbours tell of a base mesh.
         Err(EncodeError::Base(error)) => format!("refused by the mesh: {}", name(&error)),
+        // Readers do not compare errors with those of other updates; writers do.
+        Err(error @ EncodeError::Order { .. }) => format!("refused by the writer: {}", name(&error)),
         Err(error) => panic!("what was read cannot be written: {error:?}"),
     }
 }

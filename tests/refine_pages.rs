@@ -190,8 +190,9 @@ fn explore(subject: &Subject, bits: u32, random: &mut Random) {
     check(&paged, &mut front, &Request::within(0.0));
     let empty = (paged.mt.bytes(), front.mesh().bytes());
     assert_eq!((paged.mt.present(), paged.mt.updates()), (0, 0));
-    assert!(empty.0 < full.0 / 4 && empty.1 < full.1, "{empty:?} of {full:?}");
     let start = EdgeMt::with_page_bits(paged.mt.info().clone(), paged.mt.base().clone(), bits);
+    // Nothing is left of the pages.
+    assert!(empty.0 == start.bytes() && empty.0 < full.0 && empty.1 < full.1, "{empty:?} of {full:?}");
     assert_eq!(paged.mt, start);
     assert_eq!(paged.bits, bits);
 }

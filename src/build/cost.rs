@@ -247,26 +247,7 @@ impl Evaluator {
         for end in [plan.a, plan.b].into_iter().filter(|&end| end < reference.points) {
             error = error.max(self.place(end, 0, plan, data, reference));
         }
-        error.max(self.look_beside_corners(data, plan, reference))
-    }
-
-    /// The error at reference vertices that are corners of the new tetrahedra, where the lattice has moved them: beside the corner
-    /// the field has another value.
-    fn look_beside_corners(&mut self, data: &VertexData, plan: &Plan, reference: &Reference<'_>) -> f64 {
-        let mut largest = 0.0_f64;
-        for cell in 0..self.cells.len() {
-            for v in self.cells[cell].others {
-                if v >= reference.points || !reference.quantized.is_moved(v) {
-                    continue;
-                }
-                let relative = reference.quantized.places[v as usize] - as_vec(plan.position);
-                let lambda = self.cells[cell].barycentric * relative;
-                if lambda.min_element().min(1.0 - lambda.element_sum()) >= -SLACK {
-                    largest = largest.max(self.deviate(v, cell, clamped(lambda), data, reference));
-                }
-            }
-        }
-        largest
+        error
     }
 
     /// Moves the points to the buckets where [`Evaluator::evaluate`] found them to belong.
@@ -404,7 +385,7 @@ impl Evaluator {
         let tets = plan.stay.iter().map(|(s, _)| s.tet).chain(plan.fan.iter().map(|&(tet, ..)| tet));
         let ends = [plan.a, plan.b].into_iter().filter(|&end| end < reference.points);
         for point in tets.flat_map(|tet| buckets.border.iter(tet)).chain(ends) {
-            let p = reference.place(point);
+            let p = reference.scaled(reference.quantized.positions[point as usize]);
             let (cell, _, distance) = self.nearest(p, usize::MAX, plan, data, reference);
             self.border_moves.push((point, cell));
             largest = largest.max(distance);
@@ -462,12 +443,12 @@ impl Evaluator {
         data: &VertexData,
         reference: &Reference<'_>,
     ) -> f64 {
-        let relative = reference.quantized.places[point as usize] - as_vec(plan.position);
+        let relative = as_vec(reference.quantized.positions[point as usize]) - as_vec(plan.position);
         let (mut cell, mut lambda, depth) =
             locate(self.cells.len(), hint, |i| self.cells[i].barycentric * relative);
         let mut displaced = 0.0;
         if depth < -SLACK && !self.border.is_empty() {
-            let p = reference.place(point);
+            let p = reference.scaled(reference.quantized.positions[point as usize]);
             let (found, q, distance) = self.nearest(p, usize::MAX, plan, data, reference);
             let step = DVec3::from_array(reference.quantized.lattice.step);
             let to_q = (q - reference.scaled(plan.position)) / step;
@@ -537,11 +518,6 @@ impl Reference<'_> {
     /// What a displacement counts as.
     pub fn error_of(&self, distance: f64) -> f64 {
         if distance > 0.0 { distance / self.displacement_per_error } else { 0.0 }
-    }
-
-    /// Where a reference vertex is in the input, in model units from the lattice's origin.
-    pub fn place(&self, point: u32) -> DVec3 {
-        self.quantized.places[point as usize] * DVec3::from_array(self.quantized.lattice.step)
     }
 
     /// A lattice point in model units, from the lattice's origin.

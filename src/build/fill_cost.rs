@@ -16,7 +16,6 @@ use super::cost::nearest_face;
 use super::cost::raise;
 use super::hole::Filling;
 use super::hole::Hole;
-use super::quantize::Quantized;
 use crate::mesh::NONE;
 use glam::DMat3;
 use glam::DVec3;
@@ -146,23 +145,7 @@ impl FillCost {
                 }
             }
         }
-        error.max(self.look_beside_corners(filling, reference.quantized))
-    }
-
-    /// The error at the corners of the filling, where the lattice has moved them: beside the corner the field has another value.
-    fn look_beside_corners(&mut self, filling: &Filling, quantized: &Quantized) -> f64 {
-        let mut largest = 0.0_f64;
-        for (tet, Cell { barycentric, origin }) in filling.tets.iter().zip(&self.cells) {
-            for &v in tet.iter().filter(|&&v| quantized.is_moved(v)) {
-                let lambda = *barycentric * (quantized.places[v as usize] - *origin);
-                if lambda.min_element().min(1.0 - lambda.element_sum()) >= -SLACK {
-                    let corners = |f: usize| tet.map(|w| quantized.level(w, f));
-                    let error = quantized.deviation(v, clamped(lambda), corners, &mut self.errors);
-                    largest = largest.max(error);
-                }
-            }
-        }
-        largest
+        error
     }
 
     /// Moves the points to the buckets where [`FillCost::evaluate`] found them to belong. `slots` are the numbers of the
@@ -212,7 +195,7 @@ impl FillCost {
         let mut largest = 0.0_f64;
         let own = hole.on_boundary().then_some(hole.a);
         for point in hole.star.iter().flat_map(|s| buckets.border.iter(s.tet)).chain(own) {
-            let p = reference.place(point);
+            let p = reference.scaled(reference.quantized.positions[point as usize]);
             let (cell, _, distance) = self.nearest(p, usize::MAX, filling, reference);
             self.border_moves.push((point, cell));
             largest = largest.max(distance);
@@ -244,14 +227,14 @@ impl FillCost {
         filling: &Filling,
         reference: &Reference<'_>,
     ) -> (f64, usize) {
-        let position = reference.quantized.places[point as usize];
+        let position = as_vec(reference.quantized.positions[point as usize]);
         let (mut cell, mut lambda, depth) = locate(self.cells.len(), hint, |i| {
             let Cell { barycentric, origin } = self.cells[i];
             barycentric * (position - origin)
         });
         let mut displaced = 0.0;
         if depth < -SLACK && !filling.border.is_empty() {
-            let p = reference.place(point);
+            let p = reference.scaled(reference.quantized.positions[point as usize]);
             let (found, q, distance) = self.nearest(p, usize::MAX, filling, reference);
             cell = found as usize;
             let Cell { barycentric, origin } = self.cells[cell];

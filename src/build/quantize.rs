@@ -3,7 +3,6 @@
 use super::BuildConfig;
 use super::BuildError;
 use super::choice;
-use super::cost::clamped;
 use super::place;
 use super::place::Placed;
 use super::precision;
@@ -13,7 +12,6 @@ use crate::mesh::Field;
 use crate::mesh::TetMesh;
 use crate::mt::FieldInfo;
 use crate::mt::MtInfo;
-use glam::DMat3;
 use glam::DVec3;
 
 /// The reference mesh on its lattices.
@@ -25,72 +23,11 @@ pub(super) struct Quantized {
     pub levels: Vec<i32>,
     /// The input's values in units of levels, not rounded; errors are measured against these.
     pub exact: Vec<f64>,
-    /// The input's points in steps of the lattice, not rounded; errors are measured there.
-    pub places: Vec<DVec3>,
     /// How far the lattice moves a point at most: see [`MtInfo::quantization`](crate::mt::MtInfo::quantization).
     pub quantization: f64,
 }
 
 impl Quantized {
-    fn on(
-        mesh: &TetMesh,
-        Placed { lattice, positions }: Placed,
-        fields: Vec<FieldInfo>,
-        levels: Vec<i32>,
-        exact: Vec<f64>,
-    ) -> Self {
-        let (origin, step) = (DVec3::from(lattice.origin), DVec3::from(lattice.step));
-        let place = |(p, q): (&[f64; 3], &[i32; 3])| {
-            let (place, rounded) = ((DVec3::from(*p) - origin) / step, DVec3::from_array(q.map(f64::from)));
-            if place.distance(rounded) < ON_LATTICE { rounded } else { place }
-        };
-        let places = mesh.positions.iter().zip(&positions).map(place).collect();
-        let quantization = place::largest_move(mesh, &lattice, &positions);
-        Self { lattice, fields, positions, levels, exact, places, quantization }
-    }
-
-    /// Whether the lattice has moved a point.
-    pub fn is_moved(&self, point: u32) -> bool {
-        let rounded = DVec3::from_array(self.positions[point as usize].map(f64::from));
-        self.places[point as usize] != rounded
-    }
-
-    /// By how much the reference mesh, on the lattices, differs from the input's values at the input's points, as a fraction of the
-    /// range of each field, if the lattice of the positions has moved them.
-    fn losses(&self, tets: &[[u32; 4]]) -> Vec<f64> {
-        let mut nearest: Vec<(f64, u32)> = vec![(f64::NEG_INFINITY, 0); self.positions.len()];
-        let inverse = |tet: &[u32; 4]| {
-            let [a, b, c, d] = tet.map(|v| DVec3::from_array(self.positions[v as usize].map(f64::from)));
-            (a, DMat3::from_cols(b - a, c - a, d - a).inverse())
-        };
-        for (t, tet) in (0..).zip(tets) {
-            let moved = tet.map(|v| self.is_moved(v));
-            if !moved.contains(&true) {
-                continue;
-            }
-            let (origin, inverse) = inverse(tet);
-            for (&v, _) in tet.iter().zip(moved).filter(|(_, moved)| *moved) {
-                let lambda = inverse * (self.places[v as usize] - origin);
-                let depth = lambda.min_element().min(1.0 - lambda.element_sum());
-                let best = &mut nearest[v as usize];
-                if depth > best.0 {
-                    *best = (depth, t);
-                }
-            }
-        }
-        let mut losses = vec![0.0; self.fields.len()];
-        for (v, &(depth, t)) in (0..).zip(&nearest) {
-            if depth > f64::NEG_INFINITY {
-                let tet = tets[t as usize];
-                let (origin, inverse) = inverse(&tet);
-                // On the boundary the lattice may have put it outside: its nearest place counts.
-                let lambda = clamped(inverse * (self.places[v as usize] - origin));
-                self.deviation(v, lambda, |f| tet.map(|w| self.level(w, f)), &mut losses);
-            }
-        }
-        losses
-    }
-
     /// The level of field `f` at point `v`.
     pub fn level(&self, v: u32, f: usize) -> i32 {
         self.levels[v as usize * self.fields.len() + f]
@@ -162,45 +99,15 @@ pub(super) fn quantize(mesh: &TetMesh, config: &BuildConfig) -> Result<Quantized
     }
     let chosen = choice::fields(mesh, config)?;
     check_finite(mesh, &chosen)?;
-    let mut placed = place::place(mesh, config)?;
+    let Placed { lattice, positions } = place::place(mesh, config)?;
     let fields = precision::field_lattices(&chosen, config)?;
     let per_point = |i: usize| chosen.iter().zip(&fields).map(move |(field, info)| (field.values[i], info));
     let points = 0..mesh.positions.len();
     let levels = points.clone().flat_map(|i| per_point(i).map(|(value, info)| info.nearest(value))).collect();
     let exact = points.flat_map(|i| per_point(i).map(|(x, info)| (x - info.origin) / info.step)).collect();
-    let mut quantized = Quantized::on(mesh, placed, fields, levels, exact);
-    let mut losses = quantized.losses(&mesh.tets);
-    // Where cells are thin for what varies across them, a finer lattice is what keeps the reference mesh near the input.
-    let is_free = config.position_bits.is_none() && config.position_tolerance.is_none();
-    let is_large = |losses: &[f64], fields: &[FieldInfo]| {
-        let own = fields.iter().map(|field| field.quantization / field.range());
-        losses.iter().zip(own).any(|(&loss, own)| loss > own + LARGEST_LOSS)
-    };
-    while is_free && is_large(&losses, &quantized.fields) {
-        let bits = quantized.lattice.bits + FINER_BITS;
-        let finer = BuildConfig { position_bits: Some(bits), ..config.clone() };
-        if bits > WIDE_BITS {
-            break;
-        }
-        let Ok(finer) = place::place(mesh, &finer) else { break };
-        placed = finer;
-        let Quantized { fields, levels, exact, .. } = quantized;
-        quantized = Quantized::on(mesh, placed, fields, levels, exact);
-        losses = quantized.losses(&mesh.tets);
-    }
-    for (field, loss) in quantized.fields.iter_mut().zip(losses) {
-        field.quantization = field.quantization.max(loss * field.range());
-    }
-    Ok(quantized)
+    let quantization = place::largest_move(mesh, &lattice, &positions);
+    Ok(Quantized { lattice, fields, positions, levels, exact, quantization })
 }
-
-/// Without other wishes the lattice of the positions is fine enough that the reference mesh has, where the input's points are, the
-/// input's values up to this fraction of the range, besides what the lattices of the fields round off.
-const LARGEST_LOSS: f64 = 0.001;
-/// Bits by which it becomes finer at a time.
-const FINER_BITS: u32 = 2;
-/// Points are taken to be on the lattice if they are nearer than this, in its steps.
-const ON_LATTICE: f64 = 1e-7;
 
 /// The error that is left at full resolution, of whichever field has the largest.
 pub(super) fn floors(info: &MtInfo) -> Vec<f64> {

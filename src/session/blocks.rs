@@ -46,7 +46,7 @@ pub struct BlockProgress {
 }
 
 /// How many bytes are asked for at first: as a rule more than stands in front of the blocks of a small file.
-const FIRST_BYTES: u64 = 1 << 14;
+const FIRST_BYTES: u64 = 1 << 16;
 
 /// How many bytes are asked for at a time where the file has to be read from end to end.
 const LATER_BYTES: u64 = 1 << 20;

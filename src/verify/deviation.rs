@@ -13,7 +13,6 @@ use crate::mesh::TetMesh;
 use crate::mt::MtInfo;
 use crate::refine::Need;
 use crate::refine::Part;
-use glam::DMat3;
 use glam::DVec3;
 use std::ops::RangeInclusive;
 
@@ -22,8 +21,6 @@ pub struct Deviation<'a> {
     info: &'a MtInfo,
     input: &'a TetMesh,
     positions: Vec<[i32; 3]>,
-    /// The input's own positions, in steps of the lattice.
-    places: Vec<DVec3>,
     levels: Vec<i32>,
     /// The input's values as fractions of each field's range: `values[vertex * fields + f]`.
     values: Vec<f64>,
@@ -32,8 +29,6 @@ pub struct Deviation<'a> {
     boundary_vertices: Vec<u32>,
     /// Every so many vertices are looked at.
     stride: usize,
-    /// How far the lattice moves a vertex at most, as an error.
-    moved: f64,
     /// Rounding errors of distances.
     slack: f64,
 }
@@ -67,8 +62,6 @@ impl<'a> Deviation<'a> {
         }
         let positions: Vec<[i32; 3]> = input.positions.iter().map(|p| info.lattice.nearest(*p)).collect();
         let each = || (0..points).flat_map(|v| fields.iter().zip(&info.fields).map(move |(f, i)| (f[v], i)));
-        let (origin, step) = (DVec3::from(info.lattice.origin), DVec3::from(info.lattice.step));
-        let places = input.positions.iter().map(|p| (DVec3::from(*p) - origin) / step).collect();
         let levels = each().map(|(value, field)| field.nearest(value)).collect();
         let values = each().map(|(value, field)| value / field.range()).collect();
         let neighbors = crate::mesh::neighbors(&input.tets).map_err(|error| format!("the input: {error}"))?;
@@ -81,26 +74,11 @@ impl<'a> Deviation<'a> {
         let mut boundary_vertices: Vec<u32> = faces.into_iter().flatten().collect();
         boundary_vertices.sort_unstable();
         boundary_vertices.dedup();
-        let per_error = info.displacement_per_error;
-        let moved = if per_error > 0.0 { info.quantization / per_error } else { 0.0 };
         let stride = points.div_ceil(vertices.max(1)).max(1);
         boundary_vertices.retain(|&v| (v as usize).is_multiple_of(stride));
         let slack = 1e-9 * crate::geom::Bounds::of(&input.positions).diagonal();
         let cells = Cells::new(&positions);
-        Ok(Self {
-            info,
-            input,
-            positions,
-            places,
-            levels,
-            values,
-            cells,
-            boundary,
-            boundary_vertices,
-            stride,
-            moved,
-            slack,
-        })
+        Ok(Self { info, input, positions, levels, values, cells, boundary, boundary_vertices, stride, slack })
     }
 
     /// The input on the lattice.
@@ -183,8 +161,7 @@ impl Look<'_> {
                 if !self.asks.iter().any(asked) {
                     return;
                 }
-                let (position, place) = (self.of.positions[point as usize], self.of.places[point as usize]);
-                let Some(weights) = weights_at(corners, position, place) else { return };
+                let Some(weights) = barycentric(corners, self.of.positions[point as usize]) else { return };
                 let place = Place { tet: t, weights, displaced: 0.0 };
                 for (ask, least) in self.asks.iter().zip(least).filter(|(ask, _)| asked(ask)) {
                     *least = least.min(self.ratio(ask, point, &place));
@@ -225,7 +202,7 @@ impl Look<'_> {
         let known = &self.of.values[point as usize * fields.len()..][..fields.len()];
         let named = ask.values().map(|values| values.field).or(ask.need.measured_field());
         let error = self.errors.of(place.tet, named);
-        let near = place.displaced <= error.max(self.of.moved);
+        let near = place.displaced <= error;
         if let Some(values) = ask.values() {
             let (info, value) = (&fields[values.field], known[values.field] * fields[values.field].range());
             if near && is_aside(info, values, self.mesh, tet, error, value) {
@@ -249,7 +226,7 @@ impl Look<'_> {
 
     /// The least part of what is allowed with which some place of the boundary stands for a reference vertex.
     fn ratio_at_border(&self, ask: &Ask<'_>, point: u32) -> f64 {
-        let p = DVec3::from(self.of.input.positions[point as usize]);
+        let p = DVec3::from(self.of.info.lattice.point(self.of.positions[point as usize]));
         let per_error = self.of.info.displacement_per_error;
         let allowed = ask.allowed[point as usize];
         // Tetrahedra that values pass by, or whose colour does not matter, may have any error.
@@ -260,7 +237,6 @@ impl Look<'_> {
             Part::Everywhere | Part::Region(_) => allowed,
         };
         let mut least = f64::INFINITY;
-        let reach = reach.max(self.of.moved);
         self.border.triangles.within(p, reach * per_error + self.of.slack, |i, q, distance| {
             let (t, face) = self.border.faces[i as usize];
             let tet = self.mesh.tets[t as usize];
@@ -290,7 +266,7 @@ impl Look<'_> {
     fn at_reference_boundary(&self, found: &mut Measured) {
         let mut failures = Failures::default();
         for &v in &self.of.boundary_vertices {
-            let p = self.of.input.positions[v as usize];
+            let p = self.of.info.lattice.point(self.of.positions[v as usize]);
             self.compare_distance(p, &self.border.triangles, "of the input's boundary", &mut failures, found);
         }
         failures.end("vertices of the input's boundary", found);
@@ -309,9 +285,7 @@ impl Look<'_> {
         if bound == f64::INFINITY {
             return;
         }
-        // What the lattice moves a vertex by is no error of the extracted mesh.
-        let floor = self.of.info.quantization;
-        let allowed = (bound * self.of.info.displacement_per_error).max(floor) + self.of.slack;
+        let allowed = bound * self.of.info.displacement_per_error + self.of.slack;
         let distance = other.distance(DVec3::from(p));
         if bound > 0.0 {
             found.worst_ratio = found.worst_ratio.max(distance / allowed);
@@ -381,24 +355,6 @@ fn barycentric([a, b, c, d]: [[i32; 3]; 4], p: [i32; 3]) -> Option<[f64; 4]> {
     parts.iter().all(|&part| part >= 0).then(|| parts.map(|part| part as f64 / whole))
 }
 
-/// The barycentric coordinates of a reference vertex at its place in the input; none if it is outside the tetrahedron. Decided
-/// exactly where that is where the lattice has it.
-fn weights_at(corners: [[i32; 3]; 4], position: [i32; 3], place: DVec3) -> Option<[f64; 4]> {
-    let at = |q: [i32; 3]| DVec3::from_array(q.map(f64::from));
-    if place.distance(at(position)) < ON_LATTICE {
-        return barycentric(corners, position);
-    }
-    let [a, b, c, d] = corners.map(at);
-    let lambda = DMat3::from_cols(b - a, c - a, d - a).inverse() * (place - a);
-    let weights = [1.0 - lambda.element_sum(), lambda.x, lambda.y, lambda.z];
-    weights.iter().all(|&weight| weight >= -SIDE_SLACK).then_some(weights)
-}
-
-/// Points are taken to be on the lattice if they are nearer than this, in its steps.
-const ON_LATTICE: f64 = 1e-7;
-/// Barycentric coordinates this far below zero are rounding errors of a point on a face.
-const SIDE_SLACK: f64 = 1e-9;
-
 /// Lattice points sorted into the cells of a regular grid.
 struct Cells {
     points: Vec<(u32, [i32; 3])>,
@@ -448,8 +404,7 @@ impl Cells {
         let low = [0, 1, 2].map(|i| corners.iter().map(|q| q[i]).fold(i32::MAX, i32::min));
         let high = [0, 1, 2].map(|i| corners.iter().map(|q| q[i]).fold(i32::MIN, i32::max));
         let range = |axis: usize| -> RangeInclusive<usize> {
-            // Points may be half a step beside their place on the lattice.
-            self.along(axis, low[axis].saturating_sub(1))..=self.along(axis, high[axis].saturating_add(1))
+            self.along(axis, low[axis])..=self.along(axis, high[axis])
         };
         let [xs, ys, zs] = [range(0), range(1), range(2)];
         for z in zs {
@@ -457,7 +412,7 @@ impl Cells {
                 let row = (z * self.cells[1] + y) * self.cells[0];
                 let cells = self.starts[row + xs.start()] as usize..self.starts[row + xs.end() + 1] as usize;
                 for &(point, p) in &self.points[cells] {
-                    if (0..3).all(|i| low[i] <= p[i].saturating_add(1) && p[i] <= high[i].saturating_add(1)) {
+                    if (0..3).all(|i| low[i] <= p[i] && p[i] <= high[i]) {
                         visit(point);
                     }
                 }

@@ -8,6 +8,8 @@ use indicatif::ProgressStyle;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::time::Duration;
+use std::time::Instant;
 use tetralod::mesh::TetMesh;
 use tetralod::mt::Mt;
 use tetralod::mt::MultiTessellation;
@@ -43,6 +45,8 @@ struct Report<'a> {
     failures: &'a [String],
 }
 
+/// What is over sooner tells nothing on the way.
+const LONG: Duration = Duration::from_secs(10);
 /// Percent between two lines that tell how far it is.
 const TOLD_EVERY: u64 = 10;
 /// Bytes for each tetrahedron and vertex of the reference mesh beside the MT and the input: two current meshes, the tetrahedra
@@ -62,10 +66,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let reference = opened.reference();
     let input = files::read_reference(&arguments.against, &opened)?;
     let about = memory(opened.mt()?, &input);
-    if !arguments.json {
-        eprintln!("takes about {} of memory", output::bytes(about));
-    }
-    // Drawn on stderr, and only on a terminal; elsewhere lines tell how far it is.
+    // Drawn on stderr, and only on a terminal; elsewhere lines tell how far it is, of what takes long.
+    let start = Instant::now();
     let bar = ProgressBar::new(1);
     bar.set_style(ProgressStyle::with_template("{wide_bar} {percent:>3} %  about {eta} left")?);
     let mut told = 0;
@@ -73,9 +75,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         bar.set_length(u64::from(total.max(1)));
         bar.set_position(u64::from(done));
         let percent = 100 * u64::from(done) / u64::from(total.max(1));
-        if bar.is_hidden() && !arguments.json && percent >= told + TOLD_EVERY {
+        if bar.is_hidden() && !arguments.json && percent >= told + TOLD_EVERY && start.elapsed() >= LONG {
             told = percent;
-            eprintln!("{percent} % ({done} of {total} steps)");
+            eprintln!("{percent} % ({done} of {total} steps), about {} of memory", output::bytes(about));
         }
     };
     let report = if arguments.quick {
@@ -87,7 +89,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     if arguments.json {
         print_json(&report, arguments.quick, about)?
     } else {
-        print(&report)?
+        print(&report, about)?
     }
     Ok(if report.valid { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
@@ -97,12 +99,13 @@ fn print_json(report: &VerifyReport, quick: bool, memory_bytes: u64) -> Result<(
     output::json(&Report { valid, queries, worst_error_ratio, quick, memory_bytes, failures })
 }
 
-fn print(report: &VerifyReport) -> Result<()> {
+fn print(report: &VerifyReport, memory_bytes: u64) -> Result<()> {
     let verdict = if report.valid { "every promise is kept" } else { "promises are broken" };
     let mut rows = vec![
         ("verdict", verdict.to_owned()),
         ("requests", output::count(report.queries)),
         ("worst error", format!("{} of what is promised", output::percent(report.worst_error_ratio))),
+        ("memory", format!("about {}", output::bytes(memory_bytes))),
     ];
     rows.extend(report.failures.iter().map(|failure| ("broken", failure.clone())));
     output::table(&rows)
