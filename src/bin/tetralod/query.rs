@@ -17,6 +17,7 @@ use std::path::Path;
 use std::path::PathBuf;
 use std::time::Duration;
 use std::time::Instant;
+use tetralod::client::Step;
 use tetralod::geom::Bounds;
 use tetralod::mt::MtInfo;
 use tetralod::refine::Budget;
@@ -210,14 +211,30 @@ impl Query {
         if exact {
             client.fetch_exact().with_context(name)?;
         }
-        let mut opened = Opened::of(client);
         let start = Instant::now();
         let deadline = self.max_ms.map(|ms| Duration::from_secs_f64(ms / 1000.0));
         let mut go_on = |done: &Outcome| {
             self.max_updates.is_none_or(|most| done.refined + done.coarsened < most)
                 && deadline.is_none_or(|deadline| start.elapsed() < deadline)
         };
-        let stats = opened.session.step(&mut go_on).with_context(name)?;
+        // What blocks of a half-edge MT it takes, the mesh shows on the way.
+        let mut before = RefineStats::default();
+        while client.session().mt().is_some_and(|mt| !mt.needs_parents()) {
+            let Step { stats, complete } = client.step(PATIENCE, &mut go_on).with_context(name)?;
+            before.refined += stats.refined;
+            before.coarsened += stats.coarsened;
+            before.forced += stats.forced;
+            before.judged += stats.judged;
+            if complete || !stats.done {
+                break;
+            }
+        }
+        let mut opened = Opened::of(client);
+        let mut stats = opened.session.step(&mut go_on).with_context(name)?;
+        stats.refined += before.refined;
+        stats.coarsened += before.coarsened;
+        stats.forced += before.forced;
+        stats.judged += before.judged;
         let seconds = start.elapsed().as_secs_f64();
         opened.session.set_field(field).with_context(name)?;
         let summary = summary(&opened, field, &stats, &wanted)?;
