@@ -182,6 +182,7 @@ impl Replay<'_> {
     /// The error from which on a field has its largest ones: one in [`LARGE`].
     fn largest_from(&self, field: usize) -> ErrorCode {
         let fields = self.errors.len() / self.history.len().max(1);
+        // Errors stand collapse by collapse; those of this field begin at its own place in the first one.
         let mut errors: Vec<ErrorCode> =
             self.errors.iter().skip(field).step_by(fields.max(1)).copied().collect();
         errors.sort_unstable();

@@ -462,6 +462,7 @@ fn the_removals_of_a_round_are_independent() {
                 let start = boxes.len();
                 decimator.round(&mut |_| ControlFlow::Continue(())).expect("not stopped");
                 let sequence = &decimator.sequence;
+                // Those before `start` are of earlier rounds, and have been looked at.
                 for (i, step) in sequence.steps.iter().enumerate().skip(start) {
                     let mut reach = Reach::default();
                     for &tet in &sequence.tets[step.inserted.clone()] {
