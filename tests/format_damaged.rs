@@ -7,6 +7,7 @@ use format_support::assemble;
 use format_support::bytes_in_blocks;
 use format_support::bytes_of;
 use format_support::decode;
+use format_support::half_edge;
 use format_support::inserted;
 use format_support::insertions;
 use format_support::is_prefix;
@@ -214,7 +215,7 @@ fn name(error: &impl std::fmt::Debug) -> String {
 #[test]
 fn any_bit_behind_good_checksums_is_refused_or_read_faithfully() {
     let mut seen = BTreeSet::new();
-    for mt in [sample(1, 20), insertions(2, 1, 20).into(), inserted(2, 1, 20)] {
+    for mt in [sample(1, 20), insertions(2, 1, 20).into(), inserted(2, 1, 20), half_edge(2, 1, 20)] {
         let good = sections(&bytes_in_blocks(&mt, 4));
         for section in 0..good.len() {
             for bit in 0..8 * good[section].1.len() {

@@ -163,9 +163,9 @@ impl FileHead {
     }
 
     /// The largest error that an update can have which is not in the MT.
-    fn largest_of_others(&self, has_page: impl Fn(u32) -> bool) -> ErrorCode {
+    fn largest_of_others(&self, mt: &Mt) -> ErrorCode {
         let Some(index) = &self.index else { return ErrorCode::MAX };
-        let absent = (0..).zip(&index.blocks).filter(|(page, _)| !has_page(*page));
+        let absent = (0..).zip(&index.blocks).filter(|(page, _)| !mt.has_page(*page));
         let errors = absent.flat_map(|(_, block)| self.wanted.iter().map(|&field| block.errors[field]));
         errors.max().unwrap_or(ErrorCode::ZERO)
     }
@@ -340,7 +340,7 @@ impl Decoder {
 
     /// Whether all is there that comes in front of the blocks, and these may come in any order.
     pub fn takes_blocks(&self) -> bool {
-        matches!(self.mt, Some(Mt::Edge(_) | Mt::HalfEdge(_))) && self.head.base_fields == self.head.fields()
+        self.mt.as_ref().is_some_and(Mt::is_paged) && self.head.base_fields == self.head.fields()
     }
 
     /// The block of which a range of [`Decoder::block_ranges`] begins at this byte of the file.
@@ -408,19 +408,10 @@ impl Decoder {
     /// # Errors
     /// If the block is not there, or another one depends on it.
     pub fn drop_block(&mut self, block: u32) -> Result<(), PageError> {
-        match &mut self.mt {
-            Some(Mt::Edge(mt)) => {
-                mt.remove_page(block)?;
-                mt.set_to_come(self.head.largest_of_others(|page| mt.has_page(page)));
-                Ok(())
-            }
-            Some(Mt::HalfEdge(mt)) => {
-                mt.remove_page(block)?;
-                mt.set_to_come(self.head.largest_of_others(|page| mt.has_page(page)));
-                Ok(())
-            }
-            _ => Err(PageError::Absent { page: block }),
-        }
+        let Some(mt) = &mut self.mt else { return Err(PageError::Absent { page: block }) };
+        mt.remove_page(block)?;
+        mt.set_to_come(self.head.largest_of_others(mt));
+        Ok(())
     }
 
     /// The file's free keys and values, in ascending order of the keys; empty before that section is there.
@@ -708,12 +699,9 @@ impl Decoder {
         let OpenBlock { block, shared, fields, .. } = open;
         let fields: Vec<FieldPart> = fields.into_iter().flatten().collect();
         let Some(mt) = &mut self.mt else { return Ok(()) };
+        shared.check_memory(mt, &self.options.limits)?;
         shared.insert(mt, block, &fields)?;
-        match mt {
-            Mt::Edge(mt) => mt.set_to_come(self.head.largest_of_others(|page| mt.has_page(page))),
-            Mt::HalfEdge(mt) => mt.set_to_come(self.head.largest_of_others(|page| mt.has_page(page))),
-            _ => {}
-        }
+        mt.set_to_come(self.head.largest_of_others(mt));
         Ok(())
     }
 

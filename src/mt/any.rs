@@ -11,6 +11,7 @@ use super::HalfEdgeMt;
 use super::LookAtTet;
 use super::MtInfo;
 use super::MultiTessellation;
+use super::PageError;
 use super::UpdateError;
 use super::UpdateId;
 use super::VertexMt;
@@ -77,7 +78,19 @@ impl Mt {
 impl Mt {
     /// Whether pages of updates can come and go one by one.
     pub fn is_paged(&self) -> bool {
-        matches!(self, Self::Edge(_) | Self::HalfEdge(_))
+        self.info().kind.is_paged()
+    }
+
+    /// Takes a page away: see [`EdgeMt::remove_page`] and [`HalfEdgeMt::remove_page`].
+    ///
+    /// # Errors
+    /// As these; for kinds without pages, that it is not here.
+    pub fn remove_page(&mut self, page: u32) -> Result<(), PageError> {
+        match self {
+            Self::Edge(mt) => mt.remove_page(page),
+            Self::HalfEdge(mt) => mt.remove_page(page),
+            _ => Err(PageError::Absent { page }),
+        }
     }
 
     /// Whether a page is here. False for kinds without pages.

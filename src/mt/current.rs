@@ -60,7 +60,7 @@ pub struct CurrentMesh {
     /// Whether every vertex that is not of the base mesh has a star whose tetrahedra hang together through faces.
     whole_stars: bool,
     /// For each tag a tetrahedron that has it, [`NONE`] if none does: the last that got it.
-    place_of: Vec<u32>,
+    place_of: Sparse<u32>,
     /// What is known of the errors of tetrahedra, for MTs that tell it.
     pub(super) tet_errors: Option<Box<TetErrors>>,
     /// What is taken, for kinds of MT whose updates are spelled out.
@@ -155,7 +155,7 @@ impl CurrentMesh {
             tags: Vec::new(),
             inner: Vec::new(),
             whole_stars: false,
-            place_of: Vec::new(),
+            place_of: Sparse::new(NONE),
             tet_errors: None,
             taken: None,
             free_vertices: Vec::new(),
@@ -282,21 +282,18 @@ impl CurrentMesh {
     #[inline]
     pub(crate) fn set_tag(&mut self, t: u32, tag: u32) {
         let old = std::mem::replace(&mut self.tags[t as usize], tag);
-        if let Some(place) = self.place_of.get_mut(old as usize).filter(|place| **place == t) {
-            *place = NONE;
+        if self.place_of.get(old) == t {
+            self.place_of.set(old, NONE);
         }
         if tag < FIRST_ANONYMOUS_TAG {
-            if tag as usize >= self.place_of.len() {
-                self.place_of.resize(tag as usize + 1, NONE);
-            }
-            self.place_of[tag as usize] = t;
+            self.place_of.set(tag, t);
         }
     }
 
     /// The tetrahedron that got a tag last, as long as it is in the mesh and has it.
     #[inline]
     pub(crate) fn tagged(&self, tag: u32) -> Option<u32> {
-        self.place_of.get(tag as usize).copied().filter(|&t| t != NONE)
+        Some(self.place_of.get(tag)).filter(|&t| t != NONE)
     }
 
     /// Takes the tag of `from` over to `to`, a free slot.
@@ -308,8 +305,8 @@ impl CurrentMesh {
             if self.whole_stars {
                 self.inner[to as usize] = self.inner[from as usize];
             }
-            if let Some(place) = self.place_of.get_mut(tag as usize).filter(|place| **place == from) {
-                *place = to;
+            if self.place_of.get(tag) == from {
+                self.place_of.set(tag, to);
             }
         }
         if let Some(errors) = &mut self.tet_errors {
@@ -357,7 +354,7 @@ impl CurrentMesh {
             + size_of_val(&self.free_tets[..])
             + size_of_val(&self.touched[..]);
         let of_the_mt = self.slot_of.bytes()
-            + size_of_val(&self.place_of[..])
+            + self.place_of.bytes()
             + size_of_val(&self.proven[..])
             + size_of_val(&self.pinched[..])
             + self.taken.as_ref().map_or(0, |taken| taken.bytes());
@@ -909,8 +906,8 @@ impl CurrentMesh {
     #[inline]
     pub(super) fn place_tag(&mut self, t: u32) {
         let tag = self.tags[t as usize];
-        if let Some(place) = self.place_of.get_mut(tag as usize) {
-            *place = t;
+        if tag < FIRST_ANONYMOUS_TAG {
+            self.place_of.set(tag, t);
         }
     }
 

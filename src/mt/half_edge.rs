@@ -213,7 +213,7 @@ impl HalfEdgeMt {
         for (v, row) in (0..).zip(children) {
             mt.check_children(0, None, row)?;
             mt.base_children.push(row);
-            row.iter().for_each(|child| mt.near.set(child.update, v));
+            mt.note_children(v, row)?;
         }
         Ok(mt)
     }
@@ -251,7 +251,7 @@ impl HalfEdgeMt {
     /// Adds the next update, behind all that are here.
     ///
     /// # Errors
-    /// Children must come later and be on the lattice, and each field has a level and an error. What needs the mesh is checked
+    /// Children must come later, be on the lattice and of no other vertex, and each field has a level and an error. What needs the mesh is checked
     /// when the update is applied; that errors do not grow along the partial order is the caller's to see to.
     pub fn push(&mut self, new: &HalfEdgeUpdate<'_>) -> Result<UpdateId, UpdateError> {
         let update = self.updates;
@@ -259,6 +259,7 @@ impl HalfEdgeMt {
             return Err(UpdateError::Error { update });
         }
         self.check(update, new)?;
+        self.note_children(self.vertex(UpdateId(update)).0, new.children)?;
         if update as usize >> self.page_bits == self.pages.len() {
             self.pages.push(Some(Page::new(self.info.fields.len())));
         }
@@ -266,7 +267,6 @@ impl HalfEdgeMt {
         if let Some(Some(page)) = self.pages.last_mut() {
             page.push(new);
         }
-        self.note_children(update, new.children);
         self.updates += 1;
         self.present += 1;
         Ok(UpdateId(update))
@@ -287,9 +287,17 @@ impl HalfEdgeMt {
         Ok(mt)
     }
 
-    fn note_children(&mut self, update: u32, children: &[ForestChild]) {
-        let vertex = self.base.positions.len() as u32 + update;
+    /// Notes the near vertex of these updates, none of which has another one. As before if one has.
+    fn note_children(&mut self, vertex: u32, children: &[ForestChild]) -> Result<(), UpdateError> {
+        if let Some(child) = children.iter().find(|child| self.near.get(child.update) != NONE) {
+            return Err(UpdateError::Vertex { update: child.update, vertex });
+        }
         children.iter().for_each(|child| self.near.set(child.update, vertex));
+        Ok(())
+    }
+
+    fn forget_children(&mut self, children: &[ForestChild]) {
+        children.iter().for_each(|child| self.near.set(child.update, NONE));
     }
 
     /// Replaces the star code of the last update.
@@ -307,8 +315,8 @@ impl HalfEdgeMt {
     /// Adds all updates of a page. Pages on which it depends need not be here.
     ///
     /// # Errors
-    /// If the page is not a whole one of this MT, is here already, or has an update that [`Self::push`] would refuse. The
-    /// MT is as it was then.
+    /// If the page is not a whole one of this MT, is here already, or has an update that [`Self::push`] would refuse; if two
+    /// vertices have the same update as a child. The MT is as it was then.
     pub fn insert_page(&mut self, page: u32, updates: &[HalfEdgeUpdate<'_>]) -> Result<(), PageError> {
         let range = self.page_updates(page);
         if range.is_empty() {
@@ -325,8 +333,11 @@ impl HalfEdgeMt {
             self.check(update, record)?;
             new.push(record);
         }
-        for (update, record) in range.clone().zip(updates) {
-            self.note_children(update, record.children);
+        for (k, (update, record)) in range.clone().zip(updates).enumerate() {
+            if let Err(error) = self.note_children(self.vertex(UpdateId(update)).0, record.children) {
+                updates[..k].iter().for_each(|noted| self.forget_children(noted.children));
+                return Err(error.into());
+            }
         }
         if page as usize >= self.pages.len() {
             self.pages.resize_with(page as usize + 1, || None);
@@ -345,7 +356,7 @@ impl HalfEdgeMt {
     pub fn remove_page(&mut self, page: u32) -> Result<(), PageError> {
         let gone = self.pages.get_mut(page as usize).and_then(Option::take);
         let Some(gone) = gone else { return Err(PageError::Absent { page }) };
-        gone.children.items.iter().for_each(|child| self.near.set(child.update, NONE));
+        self.forget_children(&gone.children.items);
         self.present -= gone.len();
         while self.pages.last().is_some_and(Option::is_none) {
             self.pages.pop();

@@ -286,7 +286,8 @@ impl Front {
     pub fn queue_bytes(&self) -> u64 {
         let own =
             size_of_val(&self.applied[..]) + size_of_val(&self.pending[..]) + size_of_val(&self.chunks[..]);
-        own as u64 + self.tets.bytes() + self.leaves.bytes() + self.ranked.bytes()
+        let awaiting = self.awaiting.len() * size_of::<(u32, u32)>();
+        (own + awaiting) as u64 + self.tets.bytes() + self.leaves.bytes() + self.ranked.bytes()
     }
 
     /// Moves to the smallest consistent set that satisfies `criterion`; with a budget, to the one of the smallest excess that

@@ -155,9 +155,20 @@ pub fn inserted(tets: u32, fields: usize, updates: usize) -> Mt {
     mt.expect("insertions")
 }
 
+/// The same as a half-edge MT: a vertex in a single tetrahedron collapses onto any of its corners.
+pub fn half_edge(tets: u32, fields: usize, updates: usize) -> Mt {
+    let mt = Mt::from(insertions(tets, fields, updates)).convert(MtKind::HalfEdge);
+    mt.expect("insertions that collapse onto a corner")
+}
+
 /// An MT of each kind.
-pub fn samples(fields: usize, updates: usize) -> [Mt; 3] {
-    [sample(fields, updates), spelled(fields, updates), inserted(2, fields, updates)]
+pub fn samples(fields: usize, updates: usize) -> [Mt; 4] {
+    [
+        sample(fields, updates),
+        spelled(fields, updates),
+        inserted(2, fields, updates),
+        half_edge(2, fields, updates),
+    ]
 }
 
 /// Small blocks, so that small MTs have many.
@@ -249,6 +260,10 @@ pub fn is_prefix(part: &Mt, whole: &Mt) -> bool {
         (Mt::Edge(part), Mt::Edge(whole)) => {
             (0..part.updates()).all(|k| part.split(UpdateId(k)) == whole.split(UpdateId(k)))
         }
+        (Mt::HalfEdge(part), Mt::HalfEdge(whole)) => {
+            part.base_marks() == whole.base_marks()
+                && (0..part.updates()).map(UpdateId).all(|u| part.update(u) == whole.update(u))
+        }
         (Mt::Vertex(part), Mt::Vertex(whole)) => {
             // Nodes are made when all updates are there; until then what they tell is kept beside them.
             let same = |u| {
@@ -331,5 +346,6 @@ pub fn assemble(sections: &[([u8; 4], Vec<u8>)], updates: u32) -> Vec<u8> {
     end.extend((framed.len() as u32).to_le_bytes());
     end.extend(crc32(&[&crcs]).to_le_bytes());
     let body = [framed.concat(), section(b"ENDF", &end)].concat();
-    [header([2, 0], 0, 32 + body.len() as u64), body].concat()
+    let version = if sections.iter().any(|(kind, _)| kind == b"HALF") { [3, 0] } else { [2, 0] };
+    [header(version, 0, 32 + body.len() as u64), body].concat()
 }

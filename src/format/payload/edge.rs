@@ -57,22 +57,15 @@ pub const PARTS: [(&str, Family); 10] = [
 const WRONG_ROWS: u32 = 12;
 const WRONG_COLUMNS: u32 = 11;
 
+/// Which of the ranges that end with these numbers a number is in; what is larger is in one more.
+pub fn range_of(number: u32, ends: &[u32]) -> u32 {
+    ends.partition_point(|&end| end < number) as u32
+}
+
 /// The context for place `place` in front of the last wrong one, `last`.
 fn wrong_context(last: u32, place: u32) -> u32 {
-    let row = match last {
-        0..=8 => last.saturating_sub(1),
-        9..=12 => 8,
-        13..=16 => 9,
-        17..=24 => 10,
-        _ => 11,
-    };
-    let column = match place {
-        0..=7 => place,
-        8..=11 => 8,
-        12..=15 => 9,
-        _ => 10,
-    };
-    row * WRONG_COLUMNS + column
+    let row = range_of(last, &[1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 24]);
+    row * WRONG_COLUMNS + range_of(place, &[0, 1, 2, 3, 4, 5, 6, 7, 11, 15])
 }
 
 /// Bytes that an update takes in memory.

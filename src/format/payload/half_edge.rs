@@ -77,30 +77,19 @@ const COLUMNS: u32 = 8;
 
 /// The context for place `place` of `count`.
 fn place_context(count: u32, place: u32) -> u32 {
-    let row = match count {
-        0..=1 => 0,
-        2 => 1,
-        3..=4 => 2,
-        5..=6 => 3,
-        7..=9 => 4,
-        10..=13 => 5,
-        14..=19 => 6,
-        _ => 7,
-    };
-    let column = match place {
-        0..=2 => place,
-        3..=4 => 3,
-        5..=7 => 4,
-        8..=11 => 5,
-        12..=16 => 6,
-        _ => 7,
-    };
-    row * COLUMNS + column
+    let row = edge::range_of(count, &[1, 2, 4, 6, 9, 13, 19]);
+    row * COLUMNS + edge::range_of(place, &[0, 1, 2, 4, 7, 11, 16])
 }
 
-/// Bytes that an update takes in memory, at least.
+/// Bytes that an update takes in memory besides its children and its star code: where these begin, where its near vertex
+/// is noted, levels and errors.
+fn own_bytes(fields: u64) -> u64 {
+    8 + 4 + 6 * fields
+}
+
+/// Bytes that an update takes in memory, at least. Every update is the child of one vertex.
 pub fn least_update_bytes(fields: u64) -> u64 {
-    8 + 6 * fields
+    own_bytes(fields) + size_of::<ForestChild>() as u64
 }
 
 /// Every update inserts one vertex.
@@ -333,6 +322,15 @@ pub fn put(out: &mut impl Put, mt: &HalfEdgeMt, first: u32, end: u32) {
 pub struct Insertions {
     pub children: Vec<Vec<ForestChild>>,
     pub stars: Vec<Vec<u8>>,
+}
+
+impl Insertions {
+    /// Bytes that they take in memory, in an MT of so many fields.
+    pub fn bytes(&self, fields: u64) -> u64 {
+        let children: usize = self.children.iter().map(|row| size_of_val(&row[..])).sum();
+        let stars: usize = self.stars.iter().map(Vec::len).sum();
+        (children + stars) as u64 + self.stars.len() as u64 * own_bytes(fields)
+    }
 }
 
 /// Reads updates that are a block.

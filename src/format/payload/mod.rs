@@ -35,6 +35,7 @@ use crate::mt::Mt;
 use crate::mt::MtInfo;
 use crate::mt::MtKind;
 use crate::mt::MtRef;
+use crate::mt::MultiTessellation;
 use crate::mt::PageError;
 use crate::mt::UpdateError;
 use crate::mt::VertexId;
@@ -456,6 +457,17 @@ impl Shared {
         match self {
             Self::Splits(_) => edge::read_changes(source, [edge::ERROR, edge::LEVEL], count),
             Self::Insertions(_) => half_edge::read_field(source, count),
+        }
+    }
+
+    /// Whether an MT fits the limits with these updates in it. Those of an edge MT take the same each, and fit already.
+    pub fn check_memory(&self, mt: &Mt, limits: &Limits) -> Result<(), FormatError> {
+        match self {
+            Self::Splits(_) => Ok(()),
+            Self::Insertions(insertions) => {
+                let fields = mt.info().fields.len() as u64;
+                check_bytes(MultiTessellation::bytes(mt) + insertions.bytes(fields), limits)
+            }
         }
     }
 
