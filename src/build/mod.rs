@@ -22,6 +22,7 @@
 
 mod agenda;
 mod base;
+mod block_order;
 mod choice;
 mod collapse;
 mod cost;
@@ -53,11 +54,11 @@ pub use delaunay::delaunay;
 pub use method::Criterion;
 pub use method::Method;
 pub use method::Purpose;
-use order::Updates;
 
 use crate::mesh::MeshError;
 use crate::mesh::TetMesh;
 use crate::mt::ConvertError;
+use crate::mt::ErrorCode;
 use crate::mt::Exact;
 use crate::mt::ExplicitMt;
 use crate::mt::HalfEdgeMt;
@@ -398,7 +399,7 @@ pub fn build(
     Ok(BuildResult { mt, summary, vertices, exact })
 }
 
-/// The half-edge MT of an explicit one, its updates in blocks by depth and place, and its vertex for each point, given those
+/// The half-edge MT of an explicit one, its updates in blocks by what they reach, and its vertex for each point, given those
 /// of the explicit one.
 fn half_edge_mt(
     explicit: &ExplicitMt,
@@ -412,19 +413,18 @@ fn half_edge_mt(
         parents.extend_from_slice(explicit.parents(u));
         starts.push(parents.len() as u32);
     }
-    let sites: Vec<[i32; 3]> =
-        all().map(|u| explicit.position(VertexId(explicit.created(u).start))).collect();
+    let boxes: Vec<[[i32; 3]; 2]> = all().map(|u| bounds_of_inserted(explicit, u)).collect();
+    let errors: Vec<ErrorCode> = all().map(|u| explicit.error(u)).collect();
     let base = explicit.base_mesh().positions.len() as u32;
-    let updates = Updates {
+    let updates = block_order::Updates {
         base,
-        vertices: &near,
+        near: &near,
         starts: &starts,
         parents: &parents,
-        sites: &sites,
-        bits: explicit.info().lattice.bits,
-        created: 1,
+        boxes: &boxes,
+        errors: &errors,
     };
-    let order = updates.order_by_depth(block_bits);
+    let order = updates.order(block_bits);
     let explicit = explicit.reordered(&order).map_err(BuildError::Internal)?;
     let mut new_numbers = vec![0; order.len()];
     (0..).zip(&order).for_each(|(new, &old)| new_numbers[old as usize] = new);
@@ -434,6 +434,18 @@ fn half_edge_mt(
     };
     let mt = HalfEdgeMt::from_explicit(&explicit, block_bits).map_err(BuildError::Convert)?;
     Ok((mt, vertices.iter().map(renamed).collect()))
+}
+
+/// The box around the tetrahedra that an update inserts.
+fn bounds_of_inserted(explicit: &ExplicitMt, u: UpdateId) -> [[i32; 3]; 2] {
+    let tets = explicit.inserted(u);
+    let corners = explicit.tets()[tets.start as usize..tets.end as usize].as_flattened();
+    corners
+        .iter()
+        .map(|&v| explicit.position(VertexId(v)))
+        .fold([[i32::MAX; 3], [i32::MIN; 3]], |[low, high], p| {
+            [[0, 1, 2].map(|k| low[k].min(p[k])), [0, 1, 2].map(|k| high[k].max(p[k]))]
+        })
 }
 
 /// Adds what is to be told of an MT that is spelled out.

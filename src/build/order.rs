@@ -29,9 +29,6 @@ const SMALL: usize = 1 << 17;
 /// A band ends where this many times as many updates have come as before it.
 const BAND_GROWTH: usize = 4;
 
-/// A band of depth has about so many blocks.
-const BAND_BLOCKS: usize = 24;
-
 /// Updates in a cell of a band.
 const CELL: usize = 512;
 
@@ -49,45 +46,6 @@ impl Updates<'_> {
         }
         self.sort_blocks(&mut order, block_bits);
         order
-    }
-
-    /// The updates of a half-edge MT in the new order: by bands of depth in the partial order, in these place by place.
-    pub fn order_by_depth(&self, block_bits: u32) -> Vec<u32> {
-        let count = self.vertices.len();
-        let mut depths = vec![0_u32; count];
-        for u in 0..count as u32 {
-            depths[u as usize] = self.parents(u).iter().map(|&p| depths[p as usize] + 1).max().unwrap_or(0);
-        }
-        let deepest = depths.iter().max().map_or(0, |&depth| depth as usize + 1);
-        let width = deepest.div_ceil((count / (BAND_BLOCKS << block_bits)).max(1)).max(1);
-        let mut ranked: Vec<u32> = (0..count as u32).collect();
-        ranked.sort_by_key(|&u| depths[u as usize] as usize / width);
-        let mut ends: Vec<usize> = Vec::new();
-        for at in 1..=count {
-            let band = |at: usize| depths[ranked[at] as usize] as usize / width;
-            if at == count || band(at) != band(at - 1) {
-                ends.push(at);
-            }
-        }
-        // The same updates, numbered as they are ranked.
-        let mut ranks = vec![0_u32; count];
-        (0..).zip(&ranked).for_each(|(rank, &u)| ranks[u as usize] = rank);
-        let (mut starts, mut parents) = (vec![0], Vec::new());
-        for &u in &ranked {
-            parents.extend(self.parents(u).iter().map(|&p| ranks[p as usize]));
-            starts.push(parents.len() as u32);
-        }
-        let vertex = |&u: &u32| match self.vertices[u as usize].checked_sub(self.base) {
-            Some(creator) => self.base + ranks[creator as usize],
-            None => self.vertices[u as usize],
-        };
-        let vertices: Vec<u32> = ranked.iter().map(vertex).collect();
-        let sites: Vec<[i32; 3]> = ranked.iter().map(|&u| self.sites[u as usize]).collect();
-        let updates =
-            Updates { vertices: &vertices, starts: &starts, parents: &parents, sites: &sites, ..*self };
-        let mut order = updates.by_place(&ends);
-        updates.sort_blocks(&mut order, block_bits);
-        order.into_iter().map(|rank| ranked[rank as usize]).collect()
     }
 
     /// Sorts the updates of each block.
