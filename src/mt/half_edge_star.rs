@@ -20,7 +20,6 @@ use super::UpdateId;
 use super::half_edge::ForestChild;
 use super::half_edge::HalfEdgeMt;
 use super::half_edge_apply::MOST;
-use super::half_edge_apply::NEW;
 use super::half_edge_apply::NO_ENTRY;
 use super::half_edge_apply::NewTet;
 use super::half_edge_apply::Scratch;
@@ -36,22 +35,54 @@ const LEFT: f64 = 1.0 / 64.0;
 /// Stands for a remover that has no rank.
 const FURTHER: u32 = NONE - 1;
 
-/// A candidate for the removal of a tetrahedron, or none of them, or one of those without a rank.
+/// An update that may remove tetrahedra of a star.
 #[derive(Clone, Copy, Debug)]
+struct Candidate {
+    child: ForestChild,
+    /// Its near vertex.
+    near: u8,
+}
+
+/// A candidate for the removal of a tetrahedron, or none of them, or one of those without a rank.
+#[derive(Clone, Copy, Debug, Default)]
 struct Choice {
     weight: f64,
+    /// The weight before neighbours were looked at.
+    first_weight: f64,
     remover: u32,
+    /// Which of the candidates it is.
+    candidate: u16,
+    /// The corner of the tetrahedron that is its near vertex.
     corner: u8,
+}
+
+/// The choices for a tetrahedron, in the order of the candidates; what is left comes last.
+#[derive(Clone, Debug, Default)]
+struct Choices {
+    all: [Choice; RANKED + 1],
+    len: usize,
+    /// The weight that none of them has.
+    left: f64,
+    /// Whether there are candidates that are none of them.
+    more: bool,
 }
 
 /// Scratch space: what may remove each tetrahedron of a star.
 #[derive(Clone, Debug, Default)]
 pub(super) struct StarCode {
-    /// By falling weight, tetrahedron by tetrahedron.
-    choices: Vec<Choice>,
-    ends: Vec<u32>,
-    /// The merged lists that the ranked candidates were taken from go on here.
-    rests: Vec<[u32; 4]>,
+    /// Those that can have a rank, ascending by update.
+    candidates: Vec<Candidate>,
+    /// Tetrahedra and which of their corners it is, vertex by vertex.
+    corners: Vec<(u8, u8)>,
+    /// Where those of each vertex begin.
+    starts: Vec<u32>,
+    choices: Vec<Choices>,
+    /// The sum of the corners of each tetrahedron.
+    sums: Vec<[i64; 3]>,
+    /// The corners of each tetrahedron.
+    tets: Vec<[[i32; 3]; 4]>,
+    /// The vertices of the link, and then the new one.
+    positions: Vec<[i32; 3]>,
     /// What is to be told, by rising certainty: a key, tetrahedron and face.
     order: Vec<(u64, u8, u8)>,
     /// The corner of each tetrahedron that is the near vertex of its remover.
@@ -65,10 +96,12 @@ pub(super) struct StarCode {
 
 /// Tells, or is told, what cannot be predicted.
 trait Teller {
-    /// Which of the choices it is; for one without rank also which one.
-    fn choose(&mut self, tet: usize, choices: &[Choice]) -> Option<usize>;
+    /// Which of the choices it is.
+    fn choose(&mut self, tet: usize, choices: &mut [Choice]) -> Option<Choice>;
     /// Of the candidates without a rank, 0 for none.
     fn further(&mut self, tet: usize, index_of: &mut dyn FnMut(u32) -> Option<u32>) -> Option<u32>;
+    /// How many faces more may not be as guessed.
+    fn bits_left(&self) -> usize;
     /// Whether a face goes with the tetrahedron.
     fn is_inner(&mut self, tet: usize, face: usize, guess: bool) -> bool;
 }
@@ -89,8 +122,17 @@ impl Reader<'_> {
 }
 
 impl Teller for Reader<'_> {
-    fn choose(&mut self, _: usize, choices: &[Choice]) -> Option<usize> {
-        Some(usize::from(self.symbol())).filter(|&rank| rank < choices.len())
+    fn choose(&mut self, _: usize, choices: &mut [Choice]) -> Option<Choice> {
+        let rank = usize::from(self.symbol());
+        if rank == 0 {
+            // The first of those that come first.
+            return choices
+                .iter()
+                .copied()
+                .reduce(|best, choice| if comes_before(&choice, &best).is_lt() { choice } else { best });
+        }
+        choices.sort_by(comes_before);
+        choices.get(rank).copied()
     }
 
     fn further(&mut self, _: usize, _: &mut dyn FnMut(u32) -> Option<u32>) -> Option<u32> {
@@ -103,6 +145,10 @@ impl Teller for Reader<'_> {
             }
         }
         None
+    }
+
+    fn bits_left(&self) -> usize {
+        (8 * self.bits.len()).saturating_sub(self.at)
     }
 
     fn is_inner(&mut self, _: usize, _: usize, guess: bool) -> bool {
@@ -122,12 +168,13 @@ struct Writer<'a> {
 }
 
 impl Teller for Writer<'_> {
-    fn choose(&mut self, tet: usize, choices: &[Choice]) -> Option<usize> {
+    fn choose(&mut self, tet: usize, choices: &mut [Choice]) -> Option<Choice> {
+        choices.sort_by(comes_before);
         let remover = self.truth[tet].0;
         let rank = choices.iter().position(|choice| choice.remover == remover);
         let rank = rank.or_else(|| choices.iter().position(|choice| choice.remover == FURTHER))?;
         self.symbols.push(rank as u8);
-        Some(rank)
+        choices.get(rank).copied()
     }
 
     fn further(&mut self, tet: usize, index_of: &mut dyn FnMut(u32) -> Option<u32>) -> Option<u32> {
@@ -141,6 +188,10 @@ impl Teller for Writer<'_> {
                 return Some(index);
             }
         }
+    }
+
+    fn bits_left(&self) -> usize {
+        usize::MAX
     }
 
     fn is_inner(&mut self, tet: usize, face: usize, guess: bool) -> bool {
@@ -209,15 +260,14 @@ impl HalfEdgeMt {
         };
         let lists: Vec<&[ForestChild]> =
             link.iter().map(|&slot| later(mesh.vertex(slot))).chain([later(vertex)]).collect();
+        star.iter_mut().for_each(|new| (new.remover, new.inner) = (NONE, 0));
         if lists.iter().all(|list| list.is_empty()) {
-            star.iter_mut().for_each(|new| (new.remover, new.inner) = (NONE, 0));
             return Some(());
         }
-        let around = Around {
-            positions: link.iter().map(|&slot| mesh.positions[slot as usize]).chain([position]).collect(),
-            hashes,
-            lists,
-        };
+        let around = Around { hashes, lists };
+        code.positions.clear();
+        code.positions.extend(link.iter().map(|&slot| mesh.positions[slot as usize]));
+        code.positions.push(position);
         code.hashes.clear();
         code.hashes.resize(star.len(), 0);
         sorted.iter().for_each(|&(hash, i)| code.hashes[i as usize % MOST] = hash);
@@ -229,33 +279,18 @@ impl HalfEdgeMt {
 
 /// What surrounds a new vertex, by index into its link; the vertex itself is the last.
 struct Around<'a> {
-    positions: Vec<[i32; 3]>,
     hashes: &'a [u64],
     /// The forest children that come later.
     lists: Vec<&'a [ForestChild]>,
 }
 
 impl<'a> Around<'a> {
-    #[inline]
+    fn list(&self, corner: u8) -> &'a [ForestChild] {
+        self.lists[usize::from(corner).min(self.lists.len() - 1)]
+    }
+
     fn lists_of(&self, new: &NewTet) -> [&'a [ForestChild]; 4] {
-        let [a, b, c, d] = new.corners;
-        [self.index(a), self.index(b), self.index(c), self.index(d)].map(|x| self.lists[x])
-    }
-
-    #[inline]
-    fn index(&self, corner: u8) -> usize {
-        if corner == NEW { self.positions.len() - 1 } else { usize::from(corner) }
-    }
-
-    #[inline]
-    fn corners(&self, new: &NewTet) -> [[i32; 3]; 4] {
-        let [a, b, c, d] = new.corners;
-        [
-            self.positions[self.index(a)],
-            self.positions[self.index(b)],
-            self.positions[self.index(c)],
-            self.positions[self.index(d)],
-        ]
+        new.corners.map(|corner| self.list(corner))
     }
 }
 
@@ -277,6 +312,11 @@ fn key(certainty: f64, hash: u64) -> u64 {
     level << 52 | hash >> 12
 }
 
+/// Choices by falling weight, equal ones by the weights that they had first, and then as they came.
+fn comes_before(a: &Choice, b: &Choice) -> std::cmp::Ordering {
+    b.weight.total_cmp(&a.weight).then(b.first_weight.total_cmp(&a.first_weight))
+}
+
 impl StarCode {
     fn find_removers(
         &mut self,
@@ -284,86 +324,132 @@ impl StarCode {
         star: &mut [NewTet],
         teller: &mut impl Teller,
     ) -> Option<()> {
-        self.choices.clear();
-        self.ends.clear();
-        self.rests.clear();
+        self.list_corners(star);
+        self.list_candidates(around);
+        self.rank(around, star);
         self.told.clear();
         self.order.clear();
-        for (i, new) in star.iter().enumerate() {
-            let first = self.choices.len();
-            self.rank(around, new);
-            let hash = self.hashes[i];
-            self.ends.push(self.choices.len() as u32);
+        for (i, choices) in self.choices[..star.len()].iter().enumerate() {
             // What can only be one thing is not told.
-            self.told.push(self.choices.len() - first == 1);
-            if !self.told[i] {
-                self.order.push((key(self.choices[first].weight, hash), i as u8, 0));
+            self.told.push(choices.len == 1);
+            if choices.len > 1 {
+                let largest =
+                    choices.all[..choices.len].iter().fold(0.0, |w: f64, choice| w.max(choice.weight));
+                self.order.push((key(largest, self.hashes[i]), i as u8, 0));
             }
         }
         self.near.clear();
         self.near.resize(star.len(), 0);
         self.aims.clear();
         self.aims.resize(star.len(), [0; 3]);
-        star.iter_mut().for_each(|new| (new.remover, new.inner) = (NONE, 0));
         self.order.sort_unstable();
         for at in 0..self.order.len() {
             let i = usize::from(self.order[at].1);
-            let first = i.checked_sub(1).map_or(0, |before| self.ends[before] as usize);
-            let choices = &mut self.choices[first..self.ends[i] as usize];
+            let choices = &mut self.choices[i];
+            let choices = &mut choices.all[..choices.len];
             weigh_by_neighbors(choices, star, i, &self.told);
-            let mut choice = choices[teller.choose(i, choices)?];
+            let choice = teller.choose(i, choices)?;
             self.told[i] = true;
-            if choice.remover == FURTHER {
-                choice = self.further(around, &star[i], i, teller)?;
-            }
-            if choice.remover == NONE {
-                continue;
-            }
-            let corner = usize::from(choice.corner) & 3;
-            star[i].remover = choice.remover;
-            self.near[i] = choice.corner;
-            let x = around.index(star[i].corners[corner]);
-            let list = around.lists[x];
-            let found = list.binary_search_by_key(&choice.remover, |child| child.update).ok()?;
-            let offset = list[found].offset;
-            self.aims[i] = [0, 1, 2].map(|k| around.positions[x][k].saturating_add(offset[k]));
+            let (corner, child) = match choice.remover {
+                NONE => continue,
+                FURTHER => match self.further(around, &star[i], i, teller)? {
+                    Some(found) => found,
+                    None => continue,
+                },
+                _ => (choice.corner, self.candidates.get(usize::from(choice.candidate))?.child),
+            };
+            star[i].remover = child.update;
+            self.near[i] = corner;
+            let from = self.tets[i][usize::from(corner) & 3];
+            self.aims[i] = [0, 1, 2].map(|k| from[k].saturating_add(child.offset[k]));
         }
         Some(())
     }
 
-    /// Appends the choices for a tetrahedron by falling weight.
-    fn rank(&mut self, around: &Around<'_>, new: &NewTet) {
-        let lists = around.lists_of(new);
-        let first = self.choices.len();
-        if lists.iter().all(|list| list.is_empty()) {
-            self.choices.push(Choice { weight: 1.0, remover: NONE, corner: 0 });
-            self.rests.push([0; 4]);
-            return;
+    /// Lists the candidates. A tetrahedron ranks no more of any vertex.
+    fn list_candidates(&mut self, around: &Around<'_>) {
+        self.candidates.clear();
+        for (near, list) in (0..).zip(&around.lists) {
+            self.candidates.extend(list.iter().take(RANKED).map(|&child| Candidate { child, near }));
         }
-        let corners = around.corners(new);
-        let [p, q, r, s] = corners;
-        let sum = [0, 1, 2].map(|k| i64::from(p[k]) + i64::from(q[k]) + i64::from(r[k]) + i64::from(s[k]));
-        let mut next = [0_u32; 4];
-        let mut left = 1.0;
-        let mut more = true;
-        while self.choices.len() - first < RANKED && left >= LEFT {
-            let Some((corner, child)) = pop_least(&lists, &mut next) else {
-                more = false;
-                break;
-            };
-            let share = share(&corners, sum, corner, child.offset);
-            self.choices.push(Choice { weight: left * share, remover: child.update, corner: corner as u8 });
-            left *= 1.0 - share;
-        }
-        more &= (0..4).any(|k| (next[k] as usize) < lists[k].len());
-        let remover = if more { FURTHER } else { NONE };
-        self.choices.push(Choice { weight: left, remover, corner: 0 });
-        self.rests.push(next);
-        // Stable, and short.
-        self.choices[first..].sort_by(|a, b| b.weight.total_cmp(&a.weight));
+        self.candidates.sort_unstable_by_key(|candidate| candidate.child.update);
     }
 
-    /// The candidate without a rank that is told by its number, or none.
+    /// Lists the corners of the star, by tetrahedron and by vertex.
+    fn list_corners(&mut self, star: &[NewTet]) {
+        let newest = self.positions.len() - 1;
+        let vertices = |new: &NewTet| new.corners.map(|corner| usize::from(corner).min(newest));
+        self.tets.clear();
+        self.sums.clear();
+        self.starts.clear();
+        self.starts.resize(newest + 2, 0);
+        for new in star {
+            let vertices = vertices(new);
+            vertices.iter().for_each(|&x| self.starts[x] += 1);
+            let [p, q, r, s] = vertices.map(|x| self.positions[x]);
+            self.tets.push([p, q, r, s]);
+            let sum = |k: usize| i64::from(p[k]) + i64::from(q[k]) + i64::from(r[k]) + i64::from(s[k]);
+            self.sums.push([0, 1, 2].map(sum));
+        }
+        let mut end = 0;
+        for start in &mut self.starts {
+            end += *start;
+            *start = end;
+        }
+        self.corners.clear();
+        self.corners.resize(4 * star.len(), (0, 0));
+        for (i, new) in star.iter().enumerate().rev() {
+            for (corner, x) in vertices(new).into_iter().enumerate() {
+                self.starts[x] -= 1;
+                self.corners[self.starts[x] as usize] = (i as u8, corner as u8);
+            }
+        }
+    }
+
+    /// The tetrahedra that a candidate may remove, each with the corner that is its near vertex.
+    #[inline]
+    fn reached(&self, candidate: &Candidate) -> std::ops::Range<usize> {
+        let x = usize::from(candidate.near);
+        self.starts[x] as usize..self.starts[x + 1] as usize
+    }
+
+    /// Finds the choices for each tetrahedron.
+    fn rank(&mut self, around: &Around<'_>, star: &[NewTet]) {
+        if self.choices.len() < star.len() {
+            self.choices.resize_with(star.len(), Choices::default);
+        }
+        for choices in &mut self.choices[..star.len()] {
+            (choices.len, choices.left, choices.more) = (0, 1.0, false);
+        }
+        for (number, candidate) in (0..).zip(&self.candidates) {
+            let at = self.positions[usize::from(candidate.near)];
+            let direction = Direction::new(candidate.child.offset);
+            for &(i, corner) in &self.corners[self.reached(candidate)] {
+                let choices = &mut self.choices[usize::from(i)];
+                if choices.len >= RANKED || choices.left < LEFT {
+                    choices.more = true;
+                    continue;
+                }
+                let share = direction.share(self.sums[usize::from(i)], at);
+                let weight = choices.left * share;
+                let remover = candidate.child.update;
+                choices.all[choices.len] =
+                    Choice { weight, first_weight: weight, remover, candidate: number, corner };
+                choices.len += 1;
+                choices.left *= 1.0 - share;
+            }
+        }
+        for (new, choices) in star.iter().zip(&mut self.choices) {
+            let more = choices.more || new.corners.iter().any(|&x| around.list(x).len() > RANKED);
+            let remover = if more { FURTHER } else { NONE };
+            let weight = choices.left;
+            choices.all[choices.len % (RANKED + 1)] =
+                Choice { weight, first_weight: weight, remover, ..Choice::default() };
+            choices.len += 1;
+        }
+    }
+
+    /// The candidate without a rank that is told by its number, and the corner that is its near vertex; or that there is none.
     #[cold]
     fn further(
         &self,
@@ -371,26 +457,29 @@ impl StarCode {
         new: &NewTet,
         i: usize,
         teller: &mut impl Teller,
-    ) -> Option<Choice> {
+    ) -> Option<Option<(u8, ForestChild)>> {
         let lists = around.lists_of(new);
+        let mut rest = [0; 4];
+        // All choices but the last have a rank.
+        for _ in 1..self.choices[i].len {
+            pop_least(&lists, &mut rest)?;
+        }
         let mut index_of = |remover: u32| {
             if remover == NONE {
                 return Some(0);
             }
-            let mut next = self.rests[i];
+            let mut next = rest;
             (1..)
                 .map_while(|index| pop_least(&lists, &mut next).map(|found| (index, found.1.update)))
                 .find(|found| found.1 == remover)
                 .map(|found| found.0)
         };
         let index = teller.further(i, &mut index_of)?;
-        let mut choice = Choice { weight: 0.0, remover: NONE, corner: 0 };
-        let mut next = self.rests[i];
+        let mut found = None;
         for _ in 0..index {
-            let (corner, child) = pop_least(&lists, &mut next)?;
-            choice = Choice { weight: 0.0, remover: child.update, corner: corner as u8 };
+            found = Some(pop_least(&lists, &mut rest)?);
         }
-        Some(choice)
+        Some(found)
     }
 
     fn find_inner(&mut self, around: &Around<'_>, star: &mut [NewTet], teller: &mut impl Teller) {
@@ -400,7 +489,7 @@ impl StarCode {
             if new.remover == NONE {
                 continue;
             }
-            let corners = around.corners(&new);
+            let corners = self.tets[i];
             let near = usize::from(self.near[i]) & 3;
             for face in (0..4).filter(|&face| face != near) {
                 let behind = new.across[face];
@@ -421,16 +510,23 @@ impl StarCode {
                     continue;
                 }
                 let sine = elevation(&corners, near, face, self.aims[i]);
-                let face_hash = around.hashes[around.index(new.corners[face])].rotate_left(17);
+                let face_hash = around.hashes[usize::from(new.corners[face]).min(around.hashes.len() - 1)]
+                    .rotate_left(17);
                 let key = key((sine - STEEP).abs(), self.hashes[i].wrapping_add(face_hash));
                 let guess = u8::from(sine < STEEP);
                 self.order.push((key, i as u8, face as u8 | guess << 7));
             }
         }
-        self.order.sort_unstable();
-        for &(_, i, face) in &self.order {
+        // Those that are not told are as guessed.
+        let told = teller.bits_left().min(self.order.len());
+        if told > 0 && told < self.order.len() {
+            self.order.select_nth_unstable(told);
+        }
+        self.order[..told].sort_unstable();
+        for (at, &(_, i, face)) in self.order.iter().enumerate() {
             let (i, face, guess) = (usize::from(i), usize::from(face & 3), face >> 7 == 1);
-            if teller.is_inner(i, face, guess) {
+            let is_inner = if at < told { teller.is_inner(i, face, guess) } else { guess };
+            if is_inner {
                 star[i].inner |= 1 << face;
             }
         }
@@ -442,21 +538,24 @@ const AGREEMENT: f64 = 6.0;
 
 /// Weighs the choices for tetrahedron `i` anew by what is known of its neighbours in the star: T_u hangs together.
 fn weigh_by_neighbors(choices: &mut [Choice], star: &[NewTet], i: usize, told: &[bool]) {
-    for choice in choices.iter_mut().filter(|choice| choice.remover < FURTHER) {
-        for (face, &n) in star[i].across.iter().enumerate() {
-            let n = usize::from(n);
-            if face == usize::from(choice.corner) || !told.get(n).is_some_and(|&told| told) {
+    for (face, &n) in star[i].across.iter().enumerate() {
+        let n = usize::from(n);
+        if !told.get(n).is_some_and(|&told| told) {
+            continue;
+        }
+        let other = star[n].remover;
+        for choice in choices.iter_mut() {
+            if choice.remover >= FURTHER || face == usize::from(choice.corner) {
                 continue;
             }
             // What is removed later than the candidate, or never, was left by it.
-            if star[n].remover == choice.remover {
+            if other == choice.remover {
                 choice.weight *= AGREEMENT;
-            } else if star[n].remover > choice.remover {
+            } else if other > choice.remover {
                 choice.weight /= AGREEMENT;
             }
         }
     }
-    choices.sort_by(|a, b| b.weight.total_cmp(&a.weight));
 }
 
 /// Whether predicates can be asked about a point.
@@ -465,32 +564,46 @@ fn on_lattice(p: [i32; 3]) -> bool {
 }
 
 /// The next update of four ascending lists, merged, and which list it is of.
-#[inline]
-fn pop_least(lists: &[&[ForestChild]; 4], next: &mut [u32; 4]) -> Option<(usize, ForestChild)> {
-    let mut least: Option<(usize, ForestChild)> = None;
-    for k in 0..4 {
-        if let Some(&child) = lists[k].get(next[k] as usize)
+fn pop_least(lists: &[&[ForestChild]; 4], next: &mut [u32; 4]) -> Option<(u8, ForestChild)> {
+    let mut least: Option<(u8, ForestChild)> = None;
+    for (k, list) in (0..).zip(lists) {
+        if let Some(&child) = list.get(next[usize::from(k)] as usize)
             && least.is_none_or(|(_, other)| child.update < other.update)
         {
             least = Some((k, child));
         }
     }
-    let (k, _) = least?;
-    next[k] += 1;
+    next[usize::from(least?.0)] += 1;
     least
 }
 
-/// How likely a child of corner `corner`, at an offset, removes a tetrahedron that no earlier candidate has removed.
+/// From the near vertex of a candidate to the vertex that it inserts.
+struct Direction {
+    to: [f64; 3],
+    squared: f64,
+}
+
+impl Direction {
+    fn new(offset: [i32; 3]) -> Self {
+        let to = offset.map(f64::from);
+        Self { to, squared: dot(to, to) }
+    }
+
+    /// How likely the candidate removes a tetrahedron that no earlier one has removed, given the sum of its corners and the near
+    /// vertex.
+    #[inline]
+    fn share(&self, sum: [i64; 3], at: [i32; 3]) -> f64 {
+        let centre = [0, 1, 2].map(|k| (sum[k] - 4 * i64::from(at[k])) as f64);
+        let lengths = (dot(centre, centre) * self.squared).sqrt();
+        let cosine = dot(centre, self.to) / lengths.max(1e-300);
+        let ratio = ((1.0 - cosine) / (1.0 + cosine).max(1e-9)).min(1e9);
+        1.0 / (1.0 + ratio * ratio)
+    }
+}
+
 #[inline]
-fn share(corners: &[[i32; 3]; 4], sum: [i64; 3], corner: usize, offset: [i32; 3]) -> f64 {
-    let at = corners[corner];
-    let centre = [0, 1, 2].map(|k| (sum[k] - 4 * i64::from(at[k])) as f64);
-    let to = offset.map(f64::from);
-    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    let lengths = (dot(centre, centre) * dot(to, to)).sqrt();
-    let cosine = dot(centre, to) / lengths.max(1e-300);
-    let ratio = ((1.0 - cosine) / (1.0 + cosine).max(1e-9)).min(1e9);
-    1.0 / (1.0 + ratio * ratio)
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// Faces over which the new vertex lies at a larger sine than this are guessed to stay.
@@ -504,7 +617,6 @@ fn elevation(corners: &[[i32; 3]; 4], near: usize, face: usize, point: [i32; 3])
     let (Some(i), Some(j)) = (others.next(), others.next()) else { return 0.0 };
     let (a, b) = (apart(corners[i]), apart(corners[j]));
     let normal = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let to = apart(point);
     let lengths = (dot(normal, normal) * dot(to, to)).sqrt();
     dot(normal, to).abs() / lengths.max(1e-300)
@@ -515,8 +627,8 @@ fn elevation(corners: &[[i32; 3]; 4], near: usize, face: usize, point: [i32; 3])
 pub(super) struct KnownStars {
     /// Where each begins, and one more.
     starts: Sparse<u32>,
-    /// For each: how many removers, these, and for each tetrahedron in canonical order four bits for the remover, 15 for none,
-    /// and four for the inner faces.
+    /// For each: how many removers; for each tetrahedron in canonical order four bits for the remover, 15 for none, and four for
+    /// the inner faces; and the removers.
     bytes: Vec<u8>,
     /// Bytes of those that were forgotten.
     waste: usize,
@@ -545,8 +657,8 @@ impl KnownStars {
             return false;
         };
         let Some((&count, rest)) = record.split_first() else { return false };
-        let Some((removers, marks)) = rest.split_at_checked(4 * usize::from(count)) else { return false };
-        let Some(marks) = marks.get(..scratch.sorted.len()) else { return false };
+        let Some((marks, removers)) = rest.split_at_checked(scratch.sorted.len()) else { return false };
+        let Some(removers) = removers.get(..4 * usize::from(count)) else { return false };
         let mut known = [NONE; FEW + 1];
         for (known, bytes) in known.iter_mut().zip(removers.chunks_exact(4)) {
             *known = u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
@@ -561,28 +673,29 @@ impl KnownStars {
 
     /// Takes note of the star of `u`, which is in canonical order.
     pub fn keep(&mut self, u: u32, scratch: &Scratch) {
-        let mut known: Vec<u32> = Vec::with_capacity(FEW);
-        let mut marks = [0; MOST];
-        for (mark, &(_, i)) in marks.iter_mut().zip(&scratch.sorted) {
+        let first = self.bytes.len();
+        let Ok(start) = u32::try_from(first + 1) else { return };
+        let (mut known, mut count) = ([NONE; FEW], 0);
+        self.bytes.push(0);
+        for &(_, i) in &scratch.sorted {
             let NewTet { remover, inner, .. } = scratch.star[i as usize % MOST];
-            let at = if remover == NONE {
-                FEW
-            } else {
-                known.iter().position(|&r| r == remover).unwrap_or_else(|| {
-                    known.push(remover);
-                    known.len() - 1
-                })
+            let at = match remover {
+                NONE => FEW,
+                _ => known[..count].iter().position(|&other| other == remover).unwrap_or(count),
             };
-            if known.len() > FEW {
-                return;
+            if remover != NONE && at == count {
+                let Some(next) = known.get_mut(count) else {
+                    self.bytes.truncate(first);
+                    return;
+                };
+                *next = remover;
+                count += 1;
             }
-            *mark = at as u8 | inner << 4;
+            self.bytes.push(at as u8 | inner << 4);
         }
-        let Ok(start) = u32::try_from(self.bytes.len() + 1) else { return };
+        self.bytes[first] = count as u8;
+        known[..count].iter().for_each(|remover| self.bytes.extend(remover.to_le_bytes()));
         self.starts.set(u, start);
-        self.bytes.push(known.len() as u8);
-        known.iter().for_each(|remover| self.bytes.extend(remover.to_le_bytes()));
-        self.bytes.extend_from_slice(&marks[..scratch.sorted.len()]);
     }
 
     /// Forgets the stars of updates that go.
