@@ -28,8 +28,10 @@ pub(super) struct Updates<'a> {
 /// Requests are for boxes of this part of the whole, along each axis.
 const BOX: f64 = 0.1;
 
-/// How often requests are for everything down to error zero: this part of how often they are for one of the errors between
-/// the least and the largest.
+/// Errors that are asked for lie between these, as often in any range of the same ratio.
+const ASKED_ERRORS: [f64; 2] = [1.0 / 8192.0, 0.25];
+
+/// Error zero is asked for this many times as often as all of these.
 const DOWN_TO_ZERO: f64 = 0.1;
 
 /// Of many blocks, no fewer than one in so many are parted from the rest.
@@ -139,8 +141,8 @@ struct Parts<'a> {
     sorted: [Vec<u32>; KEYS],
     /// The sides of a box that is asked for.
     asked: [f64; 3],
-    /// The errors that are asked for begin here.
-    least_error: f64,
+    /// The least and the largest error that is asked for. Codes are on a logarithmic scale.
+    asked_errors: [ErrorCode; 2],
 }
 
 impl<'a> Parts<'a> {
@@ -162,16 +164,16 @@ impl<'a> Parts<'a> {
         let mut whole = Hull::EMPTY;
         reach.iter().zip(errors).for_each(|(reach, &error)| whole.add(reach, error));
         let sides = [0, 1, 2].map(|k| f64::from(whole.high[k]) - f64::from(whole.low[k]));
-        let [least, largest] = [errors.iter().min(), errors.iter().max()]
-            .map(|code| f64::from(code.copied().unwrap_or(ErrorCode::ZERO).0));
-        let least_error = least - DOWN_TO_ZERO * (largest - least) - 1.0;
-        Self { reach, errors, size, sorted, asked: sides.map(|side| BOX * side + 1.0), least_error }
+        let asked = sides.map(|side| BOX * side + 1.0);
+        Self { reach, errors, size, sorted, asked, asked_errors: ASKED_ERRORS.map(ErrorCode::at_least) }
     }
 
     /// How often a block of the updates in `hull` is read.
     fn weight(&self, hull: &Hull) -> f64 {
         let sides = [0, 1, 2].map(|k| f64::from(hull.high[k]) - f64::from(hull.low[k]) + self.asked[k]);
-        sides[0] * sides[1] * sides[2] * (f64::from(hull.error.0) - self.least_error)
+        let [least, largest] = self.asked_errors;
+        let of_errors = f64::from(hull.error.clamp(least, largest).0 - least.0);
+        sides[0] * sides[1] * sides[2] * (of_errors + DOWN_TO_ZERO * f64::from(largest.0 - least.0))
     }
 
     /// All updates in blocks of `size`.
