@@ -20,6 +20,7 @@ use tetralod::geom::orient3d;
 use tetralod::mesh::TetMesh;
 use tetralod::mt::EdgeMt;
 use tetralod::mt::ExplicitMt;
+use tetralod::mt::MtKind;
 use tetralod::mt::MultiTessellation;
 use tetralod::mt::UpdateId;
 use tetralod::mt::check_errors;
@@ -205,14 +206,14 @@ fn what_cannot_be_built_is_refused() {
 fn a_build_can_be_stopped_at_any_time() {
     let mesh = cube(12, &[hilly]);
     let mut calls = 0;
-    let finished = edge_mt(&mesh, &BuildConfig::default(), &mut |_| {
+    let finished = edge_mt(&mesh, &BuildConfig::of(MtKind::Edge), &mut |_| {
         calls += 1;
         ControlFlow::Continue(())
     });
     assert!(finished.is_ok() && calls > 2, "{calls} calls");
     for stop in [1, calls / 2, calls] {
         let mut left = stop;
-        let stopped = edge_mt(&mesh, &BuildConfig::default(), &mut |_| {
+        let stopped = edge_mt(&mesh, &BuildConfig::of(MtKind::Edge), &mut |_| {
             left -= 1;
             if left == 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });

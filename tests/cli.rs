@@ -322,11 +322,20 @@ fn kinds_are_built_and_converted() {
     let [input, edge, spelled, other, out] =
         ["b.vti", "e.mt", "x.mt", "o.mt", "o.vtu"].map(|name| folder.path(name));
     good(&["generate", "bucky", "--size", "9", "-o", &input]);
-    let built = json(&["build", &input, "-o", &edge, "--json"]);
-    assert_eq!(
-        (&built["kind"], &built["method"], built.get("criterion")),
-        (&"edge".into(), &"collapse".into(), None)
-    );
+    // What is not named goes with what is.
+    for (options, kind, method, criterion) in [
+        (&[][..], "edge", "collapse", None),
+        (&["--method", "decimate"], "half-edge", "decimate", Some("half-edge")),
+        (&["--tet-errors"], "vertex", "insert", Some("delaunay")),
+        (&["--for", "regions"], "half-edge", "decimate", Some("half-edge")),
+        (&["--method", "insert"], "vertex", "insert", Some("delaunay")),
+        (&["--criterion", "delaunay"], "vertex", "decimate", Some("delaunay")),
+        (&["--method", "collapse"], "edge", "collapse", None),
+    ] {
+        let built = json(&[&["build", &input, "-o", &edge, "--json"], options].concat());
+        let told = ["kind", "method", "criterion"].map(|key| built.get(key).and_then(Value::as_str));
+        assert_eq!(told, [Some(kind), Some(method), criterion], "{options:?}");
+    }
     let named = ["build", &input, "--kind", "edge", "--method", "collapse", "-o", &other, "--quiet"];
     assert!(good(&named).is_empty());
     let bytes = |path: &str| fs::read(path).expect("it is there");
@@ -462,13 +471,13 @@ fn an_mt_is_built_for_a_purpose() {
 fn kinds_methods_and_criteria_that_do_not_go_together_are_refused() {
     for (options, words) in [
         (
-            &["--method", "insert"][..],
+            &["--kind", "edge", "--method", "insert"][..],
             &["kind edge", "method insert", "collapse", "kinds vertex and explicit"][..],
         ),
         (&["--kind", "edge", "--method", "decimate"], &["kind edge", "method decimate", "collapse"]),
         (&["--kind", "vertex", "--method", "collapse"], &["kind vertex", "insert and decimate"]),
         (&["--kind", "vertex", "--method", "insert", "--criterion", "half-edge"], &["delaunay", "decimate"]),
-        (&["--criterion", "delaunay"], &["--method insert or decimate"]),
+        (&["--method", "collapse", "--criterion", "delaunay"], &["--method insert or decimate"]),
         (&["--kind", "explicit", "--criterion", "half-edge"], &["--method insert or decimate"]),
         (&["--kind", "face"], &["face", "edge, vertex, explicit"]),
         (&["--method", "guess"], &["guess", "collapse, insert, decimate"]),

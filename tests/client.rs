@@ -41,7 +41,7 @@ fn file(kind: MtKind) -> Vec<u8> {
     // More than a client reads at first.
     let mesh = generate::bucky(25).expect("a size that is allowed");
     let method = tetralod::build::Method::usual(kind);
-    let config = BuildConfig { kind, method, block_bits: BLOCK_BITS, ..BuildConfig::default() };
+    let config = BuildConfig { kind, method, block_bits: BLOCK_BITS, ..BuildConfig::of(MtKind::Edge) };
     let mt = build(&mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a valid mesh").mt;
     encode(&mt, &EncodeOptions { block_bits: BLOCK_BITS, ..EncodeOptions::default() }).expect("a sound MT")
 }

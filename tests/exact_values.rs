@@ -24,7 +24,7 @@ use tetralod::stream::FileSource;
 
 /// A file of an edge-based MT with exact values, in small blocks, and the MT's vertex for each point.
 fn file(mesh: &TetMesh) -> (Vec<u8>, Vec<VertexId>) {
-    let config = BuildConfig { all_lossless: true, block_bits: 4, ..BuildConfig::default() };
+    let config = BuildConfig { all_lossless: true, block_bits: 4, ..BuildConfig::of(MtKind::Edge) };
     let built = build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on");
     let BuildResult { mt, vertices, exact, .. } = built;
     let options = EncodeOptions { block_bits: 4, exact, ..EncodeOptions::default() };
@@ -80,7 +80,8 @@ fn a_client_has_exact_values_when_it_has_fetched_them() {
 #[test]
 fn a_file_without_exact_values_has_no_range_of_them() {
     let mesh = cube(5, &[hilly]);
-    let built = build(&mesh, &BuildConfig::default(), &mut |_| ControlFlow::Continue(())).expect("a mesh");
+    let built =
+        build(&mesh, &BuildConfig::of(MtKind::Edge), &mut |_| ControlFlow::Continue(())).expect("a mesh");
     let bytes = encode(&built.mt, &EncodeOptions::default()).expect("a sound MT");
     let mut client = open(&bytes);
     client.refine(&Request::within(0.0)).expect("a sound file");

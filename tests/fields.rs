@@ -89,7 +89,7 @@ fn exact_values_come_back_at_every_point_of_every_kind() {
             criterion,
             all_fields: true,
             all_lossless: true,
-            ..BuildConfig::default()
+            ..BuildConfig::of(MtKind::Edge)
         };
         let BuildResult { mt, vertices, exact, .. } = made(&mesh, &config);
         let what = format!("{kind:?} {method:?} {criterion:?}");
@@ -136,9 +136,9 @@ fn exact_values_come_back_at_every_point_of_every_kind() {
 fn only_what_is_asked_for_is_exact_and_nan_is_refused() {
     let mut mesh = cube(3, &[hilly, linear]);
     let lossless = vec!["f1".to_owned()];
-    let config = BuildConfig { all_fields: true, lossless, ..BuildConfig::default() };
+    let config = BuildConfig { all_fields: true, lossless, ..BuildConfig::of(MtKind::Edge) };
     assert_eq!(made(&mesh, &config).exact.iter().map(|table| table.field).collect::<Vec<_>>(), [1]);
-    let unknown = BuildConfig { lossless: vec!["f1".to_owned()], ..BuildConfig::default() };
+    let unknown = BuildConfig { lossless: vec!["f1".to_owned()], ..BuildConfig::of(MtKind::Edge) };
     assert!(matches!(try_build(&mesh, &unknown), Err(BuildError::UnknownField { .. })));
     mesh.fields[1].values[5] = f64::NAN;
     assert!(matches!(try_build(&mesh, &config), Err(BuildError::NotFinite { point: 5 })));
@@ -149,8 +149,13 @@ fn what_lattices_round_off_is_measured_and_a_floor_of_every_error() {
     for (kind, method, criterion) in WAYS.into_iter().filter(|way| way.1.keeps_the_mesh()) {
         for precision in [FieldPrecision::Bits(4), FieldPrecision::Bits(20)] {
             let mesh = bent(4);
-            let config =
-                BuildConfig { kind, method, criterion, field_precision: precision, ..BuildConfig::default() };
+            let config = BuildConfig {
+                kind,
+                method,
+                criterion,
+                field_precision: precision,
+                ..BuildConfig::of(MtKind::Edge)
+            };
             let BuildResult { mt, vertices, .. } = made(&mesh, &config);
             let (info, full) = (mt.info(), reference(&mt));
             let (mut moved, mut lost) = (0.0_f64, 0.0_f64);
@@ -182,7 +187,7 @@ fn integers_are_exact_by_themselves() {
     };
     mesh.fields = vec![integer("narrow", 1.0), integer("wide", 200_000.0), integer("too wide", 1e9)];
     let precision_of = vec![];
-    let config = BuildConfig { all_fields: true, precision_of, ..BuildConfig::default() };
+    let config = BuildConfig { all_fields: true, precision_of, ..BuildConfig::of(MtKind::Edge) };
     let mt = made(&mesh, &config).mt;
     let told: Vec<_> = mt.info().fields.iter().map(|f| (f.step, f.bits, f.quantization == 0.0)).collect();
     assert_eq!(told[0], (1.0, 6, true));
@@ -202,7 +207,7 @@ fn tolerances_are_kept_with_the_fewest_bits() {
         let wanted = |position_tolerance| BuildConfig {
             position_tolerance: Some(position_tolerance),
             field_precision: FieldPrecision::Fraction(tolerance),
-            ..BuildConfig::default()
+            ..BuildConfig::of(MtKind::Edge)
         };
         let mt = made(&mesh, &wanted(tolerance)).mt;
         let info = mt.info();
@@ -211,7 +216,7 @@ fn tolerances_are_kept_with_the_fewest_bits() {
         let fewer = BuildConfig {
             position_bits: Some(info.lattice.bits - 1),
             field_precision: FieldPrecision::Bits(field.bits - 1),
-            ..BuildConfig::default()
+            ..BuildConfig::of(MtKind::Edge)
         };
         match try_build(&mesh, &fewer) {
             Ok(coarser) => {
@@ -222,25 +227,26 @@ fn tolerances_are_kept_with_the_fewest_bits() {
             Err(error) => assert!(matches!(error, BuildError::TooThin { enough: Some(_), .. }), "{error}"),
         }
     }
-    let units = BuildConfig { field_precision: FieldPrecision::Units(1e-12), ..BuildConfig::default() };
+    let units =
+        BuildConfig { field_precision: FieldPrecision::Units(1e-12), ..BuildConfig::of(MtKind::Edge) };
     assert!(matches!(try_build(&mesh, &units), Err(BuildError::Tolerance { field: Some(_), .. })));
-    let positions = BuildConfig { position_tolerance: Some(0.0), ..BuildConfig::default() };
+    let positions = BuildConfig { position_tolerance: Some(0.0), ..BuildConfig::of(MtKind::Edge) };
     assert!(matches!(try_build(&mesh, &positions), Err(BuildError::Tolerance { field: None, .. })));
-    let nan = BuildConfig { position_tolerance: Some(f64::NAN), ..BuildConfig::default() };
+    let nan = BuildConfig { position_tolerance: Some(f64::NAN), ..BuildConfig::of(MtKind::Edge) };
     assert!(matches!(try_build(&mesh, &nan), Err(BuildError::Option { .. })));
 }
 
 #[test]
 fn too_few_bits_are_refused_with_those_that_do() {
     let mesh = bent(6);
-    let with = |bits| BuildConfig { position_bits: Some(bits), ..BuildConfig::default() };
+    let with = |bits| BuildConfig { position_bits: Some(bits), ..BuildConfig::of(MtKind::Edge) };
     let Err(BuildError::TooThin { bits: 2, enough: Some(enough), .. }) = try_build(&mesh, &with(2)) else {
         panic!("two bits must not do");
     };
     made(&mesh, &with(enough));
     assert!(matches!(try_build(&mesh, &with(enough - 1)), Err(BuildError::TooThin { .. })));
     // A tolerance that so few bits would keep gets the bits that the cells need.
-    let loose = BuildConfig { position_tolerance: Some(1e3), ..BuildConfig::default() };
+    let loose = BuildConfig { position_tolerance: Some(1e3), ..BuildConfig::of(MtKind::Edge) };
     assert!(made(&mesh, &loose).mt.info().lattice.bits >= enough.min(3));
 }
 
@@ -265,7 +271,7 @@ fn a_vector_brings_its_components_and_a_field_its_time_steps() {
     };
     let named = |fields: &[&str]| BuildConfig {
         fields: fields.iter().map(|&name| name.to_owned()).collect(),
-        ..BuildConfig::default()
+        ..BuildConfig::of(MtKind::Edge)
     };
     assert_eq!(names(named(&[])), ["f0"]);
     assert_eq!(names(named(&["p", "U"])), ["p", "p", "f0", "f1"]);
@@ -284,7 +290,7 @@ fn a_vector_brings_its_components_and_a_field_its_time_steps() {
 fn fields_at_cells_are_refused_with_the_remedy_and_built_once_they_are_at_points() {
     let mut mesh = cube(3, &[hilly]);
     mesh.cell_fields = vec![Field::new("rho", (0..mesh.tets.len()).map(|i| i as f64).collect())];
-    let config = BuildConfig { fields: vec!["rho".into()], ..BuildConfig::default() };
+    let config = BuildConfig { fields: vec!["rho".into()], ..BuildConfig::of(MtKind::Edge) };
     let error = try_build(&mesh, &config).expect_err("a field at cells");
     assert!(error.to_string().contains("--cell-to-point"), "{error}");
     mesh.cells_to_points();
@@ -292,5 +298,5 @@ fn fields_at_cells_are_refused_with_the_remedy_and_built_once_they_are_at_points
     assert_eq!(mt.info().fields[0].name, "rho");
     assert!(0.0 <= mt.info().fields[0].min && mt.info().fields[0].max <= mesh.tets.len() as f64 - 1.0);
     let bare = TetMesh { fields: Vec::new(), cell_fields: vec![Field::new("rho", Vec::new())], ..mesh };
-    assert!(matches!(try_build(&bare, &BuildConfig::default()), Err(BuildError::CellField { .. })));
+    assert!(matches!(try_build(&bare, &BuildConfig::of(MtKind::Edge)), Err(BuildError::CellField { .. })));
 }

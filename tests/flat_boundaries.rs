@@ -25,7 +25,7 @@ use tetralod::refine::Request;
 
 fn made(mesh: &TetMesh, kind: MtKind, criterion: Criterion) -> Mt {
     let method = if kind == MtKind::Edge { Method::Collapse } else { Method::Decimate };
-    let config = BuildConfig { kind, method, criterion, ..BuildConfig::default() };
+    let config = BuildConfig { kind, method, criterion, ..BuildConfig::of(MtKind::Edge) };
     build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt
 }
 

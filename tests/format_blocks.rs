@@ -116,8 +116,8 @@ fn header_and_index_are_small() {
     use tetralod::build::BuildConfig;
     use tetralod::build::build;
     let mesh = tetralod::generate::bucky(33).expect("a size that is allowed");
-    let built =
-        build(&mesh, &BuildConfig::default(), &mut |_| ControlFlow::Continue(())).expect("a good mesh");
+    let built = build(&mesh, &BuildConfig::of(MtKind::Edge), &mut |_| ControlFlow::Continue(()))
+        .expect("a good mesh");
     let bytes =
         encode(&built.mt, &EncodeOptions { block_bits: 11, ..EncodeOptions::default() }).expect("complete");
     let sections = sections(&bytes);

@@ -239,18 +239,18 @@ fn built_mts_are_read_alike() {
     let coarse = BuildConfig {
         position_bits: Some(6),
         field_precision: FieldPrecision::Bits(5),
-        ..BuildConfig::default()
+        ..BuildConfig::of(MtKind::Edge)
     };
     let fine = BuildConfig {
         position_bits: Some(27),
         field_precision: FieldPrecision::Bits(24),
-        ..BuildConfig::default()
+        ..BuildConfig::of(MtKind::Edge)
     };
-    for (bits, config) in [(5, BuildConfig::default()), (4, coarse), (16, fine)] {
+    for (bits, config) in [(5, BuildConfig::of(MtKind::Edge)), (4, coarse), (16, fine)] {
         compare(&encode(&built(&bucky, config), &options(bits)).expect("an MT"));
     }
     let flow = generate::sphere_flow(4).expect("a small size");
-    let config = BuildConfig { all_fields: true, ..BuildConfig::default() };
+    let config = BuildConfig { all_fields: true, ..BuildConfig::of(MtKind::Edge) };
     let mut mt = built(&flow, config);
     compare(&encode(&mt, &options(4)).expect("an MT"));
     mt = told_more(&mt);
@@ -273,7 +273,7 @@ fn guesses_at_whole_numbers_are_rounded_alike() {
             all_fields: true,
             position_bits: Some(position_bits),
             field_precision: FieldPrecision::Bits(field_bits),
-            ..BuildConfig::default()
+            ..BuildConfig::of(MtKind::Edge)
         };
         compare(&encode(&built(&mesh, config), &options(5)).expect("an MT"));
     }
@@ -284,7 +284,7 @@ fn exact_values_are_read_alike() {
     let mut flow = generate::sphere_flow(4).expect("a small size");
     // One field of single precision, one of double.
     flow.fields[0].values.iter_mut().for_each(|x| *x = f64::from(*x as f32));
-    let config = BuildConfig { all_fields: true, all_lossless: true, ..BuildConfig::default() };
+    let config = BuildConfig { all_fields: true, all_lossless: true, ..BuildConfig::of(MtKind::Edge) };
     let built = edge_mt(&flow, &config, &mut |_| ControlFlow::Continue(())).expect("a valid mesh");
     assert_eq!(built.exact.len(), 2);
     let options = EncodeOptions { exact: built.exact.clone(), ..options(5) };
@@ -489,7 +489,7 @@ fn example() -> Vec<u8> {
 /// A reader that does not find what is wrong proves nothing.
 #[test]
 fn a_changed_formula_would_be_noticed() {
-    let mt = built(&generate::bucky(7).expect("a small size"), BuildConfig::default());
+    let mt = built(&generate::bucky(7).expect("a small size"), BuildConfig::of(MtKind::Edge));
     let mut file = reader::read(&encode(&mt, &options(6)).expect("an MT"), |ready| ready[0]);
     let right = refined(&file, |ready| ready[0]);
     let wrong_levels = file.splits.values().filter(|split| split.residuals != [0]).count();

@@ -190,7 +190,7 @@ fn precise(position_bits: u32, field_bits: u32) -> BuildConfig {
         all_fields: true,
         position_bits: Some(position_bits),
         field_precision: FieldPrecision::Bits(field_bits),
-        ..BuildConfig::default()
+        ..BuildConfig::of(MtKind::Edge)
     }
 }
 
@@ -199,7 +199,8 @@ fn built_mts_are_read_alike() {
     let bucky = generate::bucky(6).expect("a small size");
     let mut symbols = BTreeSet::new();
     for how in METHODS {
-        for (bits, config) in [(5, BuildConfig::default()), (4, precise(6, 5)), (16, precise(30, 24))] {
+        for (bits, config) in [(5, BuildConfig::of(MtKind::Edge)), (4, precise(6, 5)), (16, precise(30, 24))]
+        {
             let (file, _) = compare(&bytes_in_blocks(&built(&bucky, how, config), bits));
             symbols.extend(file.symbols());
         }
@@ -382,7 +383,8 @@ fn errors_of_tetrahedra_are_read_alike() {
     let mesh = generate::bucky(7).expect("a size that is allowed");
     for kind in [MtKind::Vertex, MtKind::Explicit] {
         let (method, criterion) = (Method::Insert, Criterion::Delaunay);
-        let config = BuildConfig { kind, method, criterion, tet_errors: true, ..BuildConfig::default() };
+        let config =
+            BuildConfig { kind, method, criterion, tet_errors: true, ..BuildConfig::of(MtKind::Edge) };
         let built = tetralod::build::build(&mesh, &config, &mut |_| ControlFlow::Continue(()));
         let options = EncodeOptions { block_bits: 5, ..EncodeOptions::default() };
         let bytes = encode(&built.expect("a good mesh").mt, &options).expect("a complete MT");

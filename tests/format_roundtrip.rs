@@ -151,7 +151,7 @@ fn what_could_not_be_read_back_is_not_written() {
 #[test]
 fn offsets_come_back_on_lattices_of_all_widths() {
     for bits in [8, 12, 16, 17, 18, 19, 20, 24, WIDE_BITS] {
-        let config = BuildConfig { position_bits: Some(bits), ..BuildConfig::default() };
+        let config = BuildConfig { position_bits: Some(bits), ..BuildConfig::of(MtKind::Edge) };
         let mesh = generate::bucky(6).expect("a small size");
         let built = build(&mesh, &config, &mut |_| ControlFlow::Continue(())).expect("an MT");
         let mt = built.mt;

@@ -45,7 +45,7 @@ fn made(mesh: &TetMesh, kind: MtKind) -> Mt {
         MtKind::Edge => (Method::Collapse, Criterion::HalfEdge),
         _ => (Method::Decimate, Criterion::HalfEdge),
     };
-    let config = BuildConfig { kind, method, criterion, ..BuildConfig::default() };
+    let config = BuildConfig { kind, method, criterion, ..BuildConfig::of(MtKind::Edge) };
     build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt
 }
 

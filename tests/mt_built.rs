@@ -16,6 +16,7 @@ use tetralod::mesh::Field;
 use tetralod::mesh::TetMesh;
 use tetralod::mt::Applied;
 use tetralod::mt::ExplicitMt;
+use tetralod::mt::MtKind;
 use tetralod::mt::MultiTessellation;
 use tetralod::mt::UpdateId;
 use tetralod::mt::stats;
@@ -35,8 +36,8 @@ fn built_mts_refine_and_coarsen_as_their_explicit_twins() {
     for (seed, domain) in (0..).zip(domains) {
         let mut random = Random(seed);
         let input = mesh(domain, &mut random);
-        let built =
-            edge_mt(&input, &BuildConfig::default(), &mut |_| ControlFlow::Continue(())).expect("a build");
+        let built = edge_mt(&input, &BuildConfig::of(MtKind::Edge), &mut |_| ControlFlow::Continue(()))
+            .expect("a build");
         let mt = built.mt;
         let explicit = ExplicitMt::of(&mt).expect("a valid MT");
         assert_eq!(explicit.check(), Ok(()), "{domain:?}");

@@ -88,7 +88,7 @@ fn what_is_promised_of_a_field_holds_for_every_builder() {
     ] {
         let criterion = if method == Method::Insert { Criterion::Delaunay } else { Criterion::HalfEdge };
         let fields = names.clone();
-        let config = BuildConfig { kind, method, criterion, fields, ..BuildConfig::default() };
+        let config = BuildConfig { kind, method, criterion, fields, ..BuildConfig::of(MtKind::Edge) };
         let mt = build(&input, &config, &mut |_| ControlFlow::Continue(())).expect("a good mesh").mt;
         let reference = match method {
             Method::Insert => verify::Reference::Points,

@@ -13,6 +13,7 @@ use tetralod::format::encode;
 use tetralod::generate;
 use tetralod::geom::Bounds;
 use tetralod::mt::CurrentMesh;
+use tetralod::mt::MtKind;
 use tetralod::refine::Need;
 
 use tetralod::refine::Request;
@@ -22,8 +23,9 @@ const BLOCK_BITS: u32 = 6;
 
 fn file() -> Vec<u8> {
     let mesh = generate::bucky(15).expect("a size that is allowed");
-    let mt =
-        edge_mt(&mesh, &BuildConfig::default(), &mut |_| ControlFlow::Continue(())).expect("a valid mesh").mt;
+    let mt = edge_mt(&mesh, &BuildConfig::of(MtKind::Edge), &mut |_| ControlFlow::Continue(()))
+        .expect("a valid mesh")
+        .mt;
     encode(&mt, &EncodeOptions { block_bits: BLOCK_BITS, ..EncodeOptions::default() }).expect("a sound MT")
 }
 

@@ -49,7 +49,7 @@ fn config(mesh: &TetMesh, kind: MtKind, tet_errors: bool) -> BuildConfig {
         criterion: BuiltBy::Delaunay,
         fields: mesh.fields.iter().map(|field| field.name.clone()).collect(),
         tet_errors,
-        ..BuildConfig::default()
+        ..BuildConfig::of(MtKind::Edge)
     }
 }
 
@@ -417,7 +417,7 @@ fn every_promise_is_kept() {
 fn other_methods_refuse() {
     let input = cube(3, &[hilly]);
     for (kind, method) in [(MtKind::Vertex, Method::Decimate), (MtKind::Edge, Method::Collapse)] {
-        let config = BuildConfig { kind, method, tet_errors: true, ..BuildConfig::default() };
+        let config = BuildConfig { kind, method, tet_errors: true, ..BuildConfig::of(MtKind::Edge) };
         let error = build(&input, &config, &mut |_| ControlFlow::Continue(())).unwrap_err();
         assert!(error.to_string().contains("method insert"), "{error}");
     }

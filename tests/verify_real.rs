@@ -48,7 +48,7 @@ fn check(name: &str, mesh: &TetMesh, most: u32) {
         if method == Method::Insert && mesh.grid.is_none() {
             continue;
         }
-        let config = BuildConfig { kind: MtKind::Vertex, method, criterion, ..BuildConfig::default() };
+        let config = BuildConfig { kind: MtKind::Vertex, method, criterion, ..BuildConfig::of(MtKind::Edge) };
         let mt = build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt;
         let reference = if method.keeps_the_mesh() { Reference::Mesh } else { Reference::Points };
         keeps_promises(&format!("{name}, {} {}", method.name(), criterion.name()), &mt, mesh, reference);

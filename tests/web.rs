@@ -23,7 +23,11 @@ const MT: &[u8] = include_bytes!(concat!(env!("TETRALOD_FIXTURE"), "/small.mt"))
 const HASHES: &str = include_str!(concat!(env!("TETRALOD_FIXTURE"), "/hashes.json"));
 
 /// MTs of the other kinds, each with its hashes.
-const OTHERS: [(&[u8], &str); 2] = [
+const OTHERS: [(&[u8], &str); 3] = [
+    (
+        include_bytes!(concat!(env!("TETRALOD_FIXTURE"), "/small-half-edge.mt")),
+        include_str!(concat!(env!("TETRALOD_FIXTURE"), "/hashes-half-edge.json")),
+    ),
     (
         include_bytes!(concat!(env!("TETRALOD_FIXTURE"), "/small-vertex.mt")),
         include_str!(concat!(env!("TETRALOD_FIXTURE"), "/hashes-vertex.json")),

@@ -5,7 +5,6 @@ use std::fs;
 use std::ops::ControlFlow;
 use std::path::Path;
 use tetralod::build::BuildConfig;
-use tetralod::build::Method;
 use tetralod::build::build;
 use tetralod::format::EncodeOptions;
 use tetralod::format::encode;
@@ -79,7 +78,7 @@ fn read(path: &Path) -> Option<Set> {
 /// The MT of a mesh.
 pub fn mt(mesh: &TetMesh, kind: MtKind) -> Result<Mt> {
     let block_bits = kind.usual_block_bits();
-    let config = BuildConfig { kind, method: Method::usual(kind), block_bits, ..BuildConfig::default() };
+    let config = BuildConfig { block_bits, ..BuildConfig::of(kind) };
     Ok(build(mesh, &config, &mut |_| ControlFlow::Continue(()))?.mt)
 }
 

@@ -5,7 +5,6 @@ use std::fs;
 use std::ops::ControlFlow;
 use std::path::Path;
 use tetralod::build::BuildConfig;
-use tetralod::build::Method;
 use tetralod::build::build;
 use tetralod::format::EncodeOptions;
 use tetralod::format::encode;
@@ -49,14 +48,16 @@ fn mts() -> Result<Vec<(String, Vec<u8>)>, Box<dyn Error>> {
     };
     for (model, size) in [("bucky", 4), ("bucky", 6), ("sphere-flow", 5)] {
         let mesh = by_name(model, size)?;
-        let all = BuildConfig { all_fields: true, ..BuildConfig::default() };
+        let all = BuildConfig { all_fields: true, ..BuildConfig::of(MtKind::Edge) };
         let edge = build(&mesh, &all, &mut |_| ControlFlow::Continue(()))?.mt;
         put(&format!("edge-{model}-{size}"), &edge, 4)?;
         put(&format!("edge-{model}-{size}"), &edge, 8)?;
         put(&format!("explicit-{model}-{size}"), &edge.convert(MtKind::Explicit)?, 4)?;
-        let vertex = BuildConfig { kind: MtKind::Vertex, method: Method::usual(MtKind::Vertex), ..all };
-        if let Ok(built) = build(&mesh, &vertex, &mut |_| ControlFlow::Continue(())) {
-            put(&format!("vertex-{model}-{size}"), &built.mt, 5)?;
+        for kind in [MtKind::Vertex, MtKind::HalfEdge] {
+            let config = BuildConfig { all_fields: true, ..BuildConfig::of(kind) };
+            if let Ok(built) = build(&mesh, &config, &mut |_| ControlFlow::Continue(())) {
+                put(&format!("{}-{model}-{size}", kind.name()), &built.mt, 5)?;
+            }
         }
     }
     Ok(files)

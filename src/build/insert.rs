@@ -617,6 +617,7 @@ mod tests {
     use crate::mesh::TetMesh;
     use crate::mesh::kuhn_tets;
     use crate::mesh::neighbors;
+    use crate::mt::MtKind;
     use std::collections::BTreeSet;
     use std::ops::ControlFlow;
 
@@ -625,7 +626,8 @@ mod tests {
     }
 
     fn inserted_on(mesh: &TetMesh, bits: Option<u32>) -> Result<(Quantized, Sequence), BuildError> {
-        let config = BuildConfig { fields: names(mesh), position_bits: bits, ..BuildConfig::default() };
+        let config =
+            BuildConfig { fields: names(mesh), position_bits: bits, ..BuildConfig::of(MtKind::Edge) };
         let quantized = quantize(mesh, &config)?;
         let sequence = insert(&quantized, &mesh.tets, true, &mut |_| ControlFlow::Continue(()))?;
         Ok((quantized, sequence))
@@ -841,7 +843,7 @@ mod tests {
         assert_eq!(error(&twice), Some(BuildError::SamePlace { points: [21, 64] }));
         let stopped = {
             let mesh = bumps(4);
-            let quantized = quantize(&mesh, &BuildConfig::default()).unwrap();
+            let quantized = quantize(&mesh, &BuildConfig::of(MtKind::Edge)).unwrap();
             insert(&quantized, &mesh.tets, false, &mut |_| ControlFlow::Break(()))
         };
         assert_eq!(stopped, Err(BuildError::Stopped));

@@ -116,11 +116,20 @@ pub struct BuildConfig {
 }
 
 impl Default for BuildConfig {
+    /// The usual configuration for the usual kind, [`MtKind::Edge`].
     fn default() -> Self {
+        Self::of(MtKind::Edge)
+    }
+}
+
+impl BuildConfig {
+    /// The usual configuration for a kind of MT.
+    pub fn of(kind: MtKind) -> Self {
+        let method = Method::usual(kind);
         Self {
-            kind: MtKind::Edge,
-            method: Method::Collapse,
-            criterion: Criterion::HalfEdge,
+            kind,
+            method,
+            criterion: Criterion::usual(method),
             purpose: Purpose::default(),
             fields: Vec::new(),
             all_fields: false,
@@ -132,7 +141,7 @@ impl Default for BuildConfig {
             all_lossless: false,
             displacement: 0.2,
             tet_errors: false,
-            block_bits: 11,
+            block_bits: kind.usual_block_bits(),
         }
     }
 }

@@ -11,6 +11,7 @@ use tetralod::mesh::TetMesh;
 use tetralod::mesh::repair;
 use tetralod::mt::EdgeMt;
 use tetralod::mt::ErrorCode;
+use tetralod::mt::MtKind;
 use tetralod::mt::UpdateId;
 use tetralod::mt::VertexSplit;
 
@@ -69,7 +70,7 @@ pub fn bent(n: u32) -> TetMesh {
 /// Builds with all fields.
 pub fn built(mesh: &TetMesh) -> BuildResult<EdgeMt> {
     let fields = mesh.fields.iter().map(|field| field.name.clone()).collect();
-    let config = BuildConfig { fields, ..BuildConfig::default() };
+    let config = BuildConfig { fields, ..BuildConfig::of(MtKind::Edge) };
     edge_mt(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a valid mesh")
 }
 

@@ -60,7 +60,8 @@ impl How {
     pub fn build(self, mesh: &TetMesh, position_bits: Option<u32>) -> Mt {
         let How { kind, method, criterion } = self;
         let fields = mesh.fields.iter().map(|field| field.name.clone()).collect();
-        let config = BuildConfig { kind, method, criterion, fields, position_bits, ..BuildConfig::default() };
+        let config =
+            BuildConfig { kind, method, criterion, fields, position_bits, ..BuildConfig::of(MtKind::Edge) };
         build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt
     }
 }

@@ -151,6 +151,7 @@ test("every volume of the demo can be shown, of whatever kind it is", async () =
   const seen = {};
   for (const [name, kind, title] of [
     ["sphere-flow", "edge", "Flow past a sphere"],
+    ["sphere-flow-half-edge", "half-edge", "Flow past a sphere, in blocks for regions"],
     ["sphere-flow-vertex", "vertex", "Flow past a sphere, by vertex insertion"],
     ["bucky-explicit", "explicit", "Small bucky ball, explicit"],
   ]) {
@@ -167,9 +168,11 @@ test("every volume of the demo can be shown, of whatever kind it is", async () =
     assert.deepEqual(page.complaints, []);
     await page.close();
   }
-  // Built from the same mesh, both kinds have the same reference mesh: up to the lattice, one picture.
-  assert.equal(seen["sphere-flow"].tetrahedra, seen["sphere-flow-vertex"].tetrahedra);
-  assert.ok(differing(seen["sphere-flow"].picture, seen["sphere-flow-vertex"].picture) < 0.02);
+  // Built from the same mesh, all kinds have the same reference mesh: up to the lattice, one picture.
+  for (const other of ["sphere-flow-half-edge", "sphere-flow-vertex"]) {
+    assert.equal(seen["sphere-flow"].tetrahedra, seen[other].tetrahedra);
+    assert.ok(differing(seen["sphere-flow"].picture, seen[other].picture) < 0.02, other);
+  }
 });
 
 test("a browser without WebGPU gets a message, not a blank page", async () => {

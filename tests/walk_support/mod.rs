@@ -45,7 +45,7 @@ impl Walk {
     pub fn new(mesh: &TetMesh, (kind, method): (MtKind, Method)) -> Self {
         let fields = mesh.fields.iter().map(|field| field.name.clone()).collect();
         let criterion = if method == Method::Insert { Criterion::Delaunay } else { Criterion::HalfEdge };
-        let config = BuildConfig { kind, method, criterion, fields, ..BuildConfig::default() };
+        let config = BuildConfig { kind, method, criterion, fields, ..BuildConfig::of(MtKind::Edge) };
         let mt = build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt;
         let mut mesh = mt.start().expect("a valid base mesh");
         mt.announce(&mut mesh, 0);

@@ -38,7 +38,7 @@ pub struct Arguments {
     /// The MT file to write.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// The kind of MT: half-edge (the best for regions), edge, vertex or explicit [default: edge].
+    /// The kind of MT: half-edge (the best for regions), edge, vertex or explicit [default: what goes with the other options, else edge].
     #[arg(long, value_name = "KIND", value_parser = kind)]
     kind: Option<MtKind>,
     /// How it is built: collapse (edges, for kind edge), insert or decimate (vertices, for kind vertex); any for kind
@@ -246,11 +246,24 @@ fn read(arguments: &Arguments, config: &BuildConfig) -> Result<(TetMesh, RepairR
     Ok((mesh, repaired))
 }
 
+/// The kind of MT that goes with the other options.
+fn usual_kind(arguments: &Arguments) -> MtKind {
+    match (arguments.method, arguments.criterion) {
+        (Some(Method::Collapse), _) => MtKind::Edge,
+        (Some(Method::Insert), _) | (_, Some(Criterion::Delaunay)) => MtKind::Vertex,
+        (Some(Method::Decimate), _) | (_, Some(Criterion::HalfEdge)) => MtKind::HalfEdge,
+        (None, None) if arguments.purpose.is_some() => MtKind::HalfEdge,
+        (None, None) if arguments.tet_errors => MtKind::Vertex,
+        (None, None) => BuildConfig::default().kind,
+    }
+}
+
 /// How to build. Ends the program if the options contradict each other.
 fn config(arguments: &Arguments) -> BuildConfig {
-    let default = BuildConfig::default();
-    let kind = arguments.kind.unwrap_or(default.kind);
-    let method = arguments.method.unwrap_or(Method::usual(kind));
+    let kind = arguments.kind.unwrap_or_else(|| usual_kind(arguments));
+    let default = BuildConfig::of(kind);
+    let method =
+        arguments.method.unwrap_or(if arguments.tet_errors { Method::Insert } else { default.method });
     let precision: Vec<&Precision> = arguments.field_bits.iter().chain(&arguments.field_tolerance).collect();
     let for_all: Vec<FieldPrecision> =
         precision.iter().filter(|p| p.name.is_none()).map(|p| p.precision).collect();
@@ -274,7 +287,7 @@ fn config(arguments: &Arguments) -> BuildConfig {
         lossless: arguments.lossless.iter().filter(|name| !name.is_empty()).cloned().collect(),
         all_lossless: arguments.lossless.iter().any(String::is_empty),
         tet_errors: arguments.tet_errors,
-        block_bits: arguments.block_updates.unwrap_or(kind.usual_block_bits()),
+        block_bits: arguments.block_updates.unwrap_or(default.block_bits),
         ..default
     };
     if let Err(error) = config.check() {

@@ -27,6 +27,7 @@ use crate::mesh::repair;
 use crate::mesh::topology;
 use crate::mt::ErrorCode;
 use crate::mt::MAX_LINK;
+use crate::mt::MtKind;
 use glam::DMat3;
 use glam::DVec3;
 use std::collections::BTreeMap;
@@ -103,7 +104,7 @@ fn built(mesh: &TetMesh, criterion: Criterion) -> Decimated {
 
 fn built_for(mesh: &TetMesh, criterion: Criterion, purpose: Purpose) -> Decimated {
     let fields = mesh.fields.iter().map(|field| field.name.clone()).collect();
-    let config = BuildConfig { fields, purpose, ..BuildConfig::default() };
+    let config = BuildConfig { fields, purpose, ..BuildConfig::of(MtKind::Edge) };
     decimate(mesh, &config, criterion, &mut |_| ControlFlow::Continue(())).expect("a valid mesh")
 }
 
@@ -400,7 +401,8 @@ fn the_same_input_gives_the_same_sequence() {
 fn the_work_can_be_stopped() {
     let mesh = blocks([12; 3], |_| true);
     for criterion in CRITERIA {
-        let stopped = decimate(&mesh, &BuildConfig::default(), criterion, &mut |_| ControlFlow::Break(()));
+        let stopped =
+            decimate(&mesh, &BuildConfig::of(MtKind::Edge), criterion, &mut |_| ControlFlow::Break(()));
         assert_eq!(stopped.err(), Some(BuildError::Stopped));
     }
 }
@@ -409,7 +411,7 @@ fn the_work_can_be_stopped() {
 #[test]
 fn a_boundary_that_may_not_move_costs_all() {
     let mesh = bent(blocks([4; 3], |_| true));
-    let config = BuildConfig { displacement: 0.0, ..BuildConfig::default() };
+    let config = BuildConfig { displacement: 0.0, ..BuildConfig::of(MtKind::Edge) };
     let result = decimate(&mesh, &config, Criterion::HalfEdge, &mut |_| ControlFlow::Continue(()))
         .expect("a valid mesh");
     let mut replay = Replay::new(&result.sequence.base);
@@ -430,7 +432,7 @@ fn a_boundary_that_may_not_move_costs_all() {
 #[test]
 fn the_finest_lattice_will_do() {
     let mesh = bent(blocks([3; 3], |_| true));
-    let config = BuildConfig { position_bits: Some(30), ..BuildConfig::default() };
+    let config = BuildConfig { position_bits: Some(30), ..BuildConfig::of(MtKind::Edge) };
     for criterion in CRITERIA {
         let result = decimate(&mesh, &config, criterion, &mut |_| ControlFlow::Continue(()));
         let result = result.expect("a valid mesh");
@@ -447,7 +449,7 @@ fn the_finest_lattice_will_do() {
 fn the_removals_of_a_round_are_independent() {
     for (name, mesh) in domains() {
         for (criterion, purpose) in WAYS {
-            let quantized = quantize::quantize(&mesh, &BuildConfig::default()).expect("a valid mesh");
+            let quantized = quantize::quantize(&mesh, &BuildConfig::of(MtKind::Edge)).expect("a valid mesh");
             let topology = topology(mesh.positions.len(), &mesh.tets).expect("a conforming mesh");
             let work = WorkMesh::new(mesh.tets.clone(), topology.neighbors, mesh.positions.len());
             let levels = Levels::of_purpose(purpose);
