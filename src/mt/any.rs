@@ -111,6 +111,15 @@ impl Mt {
         }
     }
 
+    /// Bytes of a page, or what it most likely takes if it is not here.
+    pub fn bytes_of_page(&self, page: u32) -> u64 {
+        let known = match self {
+            Self::HalfEdge(mt) => mt.bytes_of_page(page),
+            _ => None,
+        };
+        known.unwrap_or_else(|| self.page_updates(page).len() as u64 * self.update_bytes())
+    }
+
     /// Bytes that an update of a page takes in memory, or most likely does.
     pub fn update_bytes(&self) -> u64 {
         match self {

@@ -456,6 +456,11 @@ impl HalfEdgeMt {
         self.pages.iter().flatten().map(|page| page.bytes() as u64).sum()
     }
 
+    /// Bytes of a page that is here.
+    pub fn bytes_of_page(&self, page: u32) -> Option<u64> {
+        self.pages.get(page as usize)?.as_ref().map(|page| page.bytes() as u64)
+    }
+
     /// Bytes of everything that the MT holds, base mesh and errors included.
     pub fn bytes(&self) -> u64 {
         let base = size_of_val(&self.base.positions[..])

@@ -991,6 +991,31 @@ impl Front {
         pages
     }
 
+    /// The pages that are here and hold what removes a tetrahedron which might violate the criterion, as far as `bounds` of the
+    /// page tell: without them it would be unknown whether the mesh is what was asked for.
+    pub fn telling_pages(
+        &self,
+        mt: &impl MultiTessellation,
+        criterion: &dyn Criterion,
+        page_of: impl Fn(UpdateId) -> u32,
+        bounds: impl Fn(u32) -> Vec<ErrorCode>,
+    ) -> BTreeSet<u32> {
+        let mut pages = BTreeSet::new();
+        for (t, tet) in (0..).zip(self.mesh.tets()) {
+            let Some(u) = mt.remover(&self.mesh, t) else { continue };
+            let page = page_of(u);
+            if pages.contains(&page) {
+                continue;
+            }
+            let bounds = bounds(page);
+            let errors = TetErrors::bounded_by(&bounds);
+            if see(&self.mesh, tet, &errors, u, |look| criterion.judge(look)).asks() {
+                pages.insert(page);
+            }
+        }
+        pages
+    }
+
     fn violations(&self, mt: &impl MultiTessellation, criterion: &dyn Criterion) -> Violations {
         // Where no budget is in the way, what violates the criterion waits for something.
         let unlimited = self.ranked.has_room();

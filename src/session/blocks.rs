@@ -18,6 +18,7 @@ use crate::refine::Criterion;
 use crate::refine::Front;
 use crate::refine::TetLook;
 use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -183,8 +184,15 @@ impl Session {
             if let Some(blocks) = &mut self.blocks {
                 blocks.waiting.insert(block, whole);
             }
-            block += 1;
             self.insert_waiting()?;
+            // What nobody has asked for does not wait for room.
+            if let Some(blocks) = &mut self.blocks
+                && blocks.criterion.is_none()
+                && blocks.waiting.remove(&block).is_some()
+            {
+                return Ok(());
+            }
+            block += 1;
         }
     }
 
@@ -211,10 +219,8 @@ impl Session {
 
     /// Whether a block can come without anything going.
     fn has_room_for(&self, block: u32) -> bool {
-        let (Some(blocks), Some(index)) = (&self.blocks, self.decoder.index()) else { return false };
-        let Some(mt) = self.decoder.mt() else { return false };
-        let new = page_bytes(mt, index.updates(block, mt.info().updates).len());
-        mt.page_bytes() + new <= blocks.room
+        let (Some(blocks), Some(mt)) = (&self.blocks, self.decoder.mt()) else { return false };
+        mt.page_bytes() + mt.bytes_of_page(block) <= blocks.room
     }
 
     /// A block that waits for no other one.
@@ -233,11 +239,13 @@ impl Session {
         let paged = self.decoder.mt().filter(|mt| mt.is_paged());
         let (Some(blocks), Some(mt)) = (&self.blocks, paged) else { return BlockProgress::default() };
         let count = self.decoder.index().map_or(0, |index| index.blocks.len() as u32);
+        // What needs no others waits for room alone.
+        let without_room = if mt.needs_parents() { 0 } else { blocks.waiting.len() as u32 };
         BlockProgress {
             blocks: count,
             here: (0..count).filter(|&block| mt.has_page(block)).count() as u32,
             needed: blocks.needed,
-            left_out: blocks.left_out,
+            left_out: blocks.left_out + without_room,
             bytes: blocks.bytes_beside() + mt.page_bytes(),
         }
     }
@@ -269,13 +277,13 @@ impl Session {
         let mut taken = match &self.front {
             Some(front) if !mt.needs_parents() => (0..index.blocks.len() as u32)
                 .filter(|&block| mt.has_page(block) && is_in_use(front, index, mt, block))
-                .map(|block| page_bytes(mt, index.updates(block, mt.info().updates).len()))
+                .map(|block| mt.bytes_of_page(block))
                 .sum(),
             _ => 0,
         };
         let room = blocks.room;
         plan.retain(|&(_, block)| {
-            taken += page_bytes(mt, index.updates(block, mt.info().updates).len());
+            taken += mt.bytes_of_page(block);
             taken <= room
         });
         blocks.left_out = blocks.needed - plan.len() as u32;
@@ -311,12 +319,25 @@ impl Session {
         for &(_, block) in &blocks.plan {
             planned[block as usize] = true;
             if !mt.has_page(block) {
-                coming += page_bytes(mt, index.updates(block, mt.info().updates).len());
+                coming += mt.bytes_of_page(block);
             }
         }
         let mut excess = (mt.page_bytes() + coming).saturating_sub(blocks.room);
+        if excess == 0 {
+            return;
+        }
+        // Pages that come without their parents are asked for one by one; what they have shown must not be forgotten.
+        let telling = match (&self.front, &blocks.criterion) {
+            (Some(front), Some(criterion)) if !mt.needs_parents() => {
+                let fields = self.decoder.wanted_fields();
+                let bounds =
+                    |page: u32| fields.iter().map(|&f| index.blocks[page as usize].errors[f]).collect();
+                front.telling_pages(mt, &**criterion, |u| u.0 >> index.block_bits, bounds)
+            }
+            _ => BTreeSet::new(),
+        };
         let mut order: Vec<(u32, u32)> = (0..index.blocks.len() as u32)
-            .filter(|&block| mt.has_page(block) && !planned[block as usize])
+            .filter(|&block| mt.has_page(block) && !planned[block as usize] && !telling.contains(&block))
             .map(|block| (blocks.last_needed.get(block as usize).copied().unwrap_or(0), block))
             .collect();
         // Of the same age, children before parents.
@@ -334,11 +355,10 @@ impl Session {
                 if excess == 0 || held[block as usize] > 0 || leaving.contains(&block) {
                     continue;
                 }
-                let updates = index.updates(block, mt.info().updates);
                 if self.front.as_ref().is_some_and(|front| is_in_use(front, index, mt, block)) {
                     continue;
                 }
-                excess = excess.saturating_sub(page_bytes(mt, updates.len()));
+                excess = excess.saturating_sub(mt.bytes_of_page(block));
                 index.blocks[block as usize].parents.iter().for_each(|&parent| held[parent as usize] -= 1);
                 leaving.push(block);
                 is_moving = true;
@@ -363,11 +383,6 @@ impl Blocks {
         let all = self.pieces.values().chain(self.waiting.values());
         all.map(|bytes| bytes.len() as u64).sum()
     }
-}
-
-/// Bytes that so many updates take in memory.
-fn page_bytes(mt: &Mt, updates: usize) -> u64 {
-    updates as u64 * mt.update_bytes()
 }
 
 /// Whether an update of a block is applied.
