@@ -67,6 +67,19 @@ export function coreMethods(emit) {
     } while (!step.stats.done);
     return step;
   };
+  /** Resolves when all is here that the mesh needs. In half-edge MTs what has come shows what else that is. */
+  const settled = async () => {
+    const showsMore = session.info().kind === "half-edge";
+    let here;
+    do {
+      await parts.settled();
+      here = session.blocks().here;
+      if (!showsMore || goal === 0) return;
+      // News stays news for those who follow the mesh.
+      session.step(Infinity, Infinity);
+      parts.follow();
+    } while (parts.isWaiting || session.blocks().here !== here);
+  };
   /** The mesh as it is now, or what has changed in it, after a step. */
   const result = ({ stats, more }, deltas) => ({ ...(deltas ? session.delta() : session.mesh()), stats, more });
   return {
@@ -108,7 +121,7 @@ export function coreMethods(emit) {
     },
     aim: async (options) => aim(await received(options)),
     step: (milliseconds, updates, deltas) => result(advance(milliseconds, updates), deltas),
-    settled: () => parts.settled(),
+    settled,
     arrived: () => parts.arrived(),
     retry: () => parts.retry(),
     /** Ends the fetching; the mesh stays usable. */

@@ -519,10 +519,9 @@ impl StarCode {
         }
         // Those that are not told are as guessed.
         let told = teller.bits_left().min(self.order.len());
-        if told > 0 && told < self.order.len() {
-            self.order.select_nth_unstable(told);
+        if told > 0 {
+            self.order.sort_unstable();
         }
-        self.order[..told].sort_unstable();
         for (at, &(_, i, face)) in self.order.iter().enumerate() {
             let (i, face, guess) = (usize::from(i), usize::from(face & 3), face >> 7 == 1);
             let is_inner = if at < told { teller.is_inner(i, face, guess) } else { guess };

@@ -992,25 +992,26 @@ impl Front {
     }
 
     /// The pages that are here and hold what removes a tetrahedron which might violate the criterion, as far as `bounds` of the
-    /// page tell: without them it would be unknown whether the mesh is what was asked for.
+    /// page tell: without them it would be unknown whether the mesh is what was asked for. Some are named several times.
     pub fn telling_pages(
         &self,
         mt: &impl MultiTessellation,
         criterion: &dyn Criterion,
         page_of: impl Fn(UpdateId) -> u32,
         bounds: impl Fn(u32) -> Vec<ErrorCode>,
-    ) -> BTreeSet<u32> {
-        let mut pages = BTreeSet::new();
+    ) -> Vec<u32> {
+        let mut pages = Vec::new();
         for (t, tet) in (0..).zip(self.mesh.tets()) {
             let Some(u) = mt.remover(&self.mesh, t) else { continue };
             let page = page_of(u);
-            if pages.contains(&page) {
+            // Tetrahedra side by side are often removed by updates of a page.
+            if pages.last() == Some(&page) {
                 continue;
             }
             let bounds = bounds(page);
             let errors = TetErrors::bounded_by(&bounds);
             if see(&self.mesh, tet, &errors, u, |look| criterion.judge(look)).asks() {
-                pages.insert(page);
+                pages.push(page);
             }
         }
         pages

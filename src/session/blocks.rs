@@ -18,7 +18,6 @@ use crate::refine::Criterion;
 use crate::refine::Front;
 use crate::refine::TetLook;
 use std::collections::BTreeMap;
-use std::collections::BTreeSet;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -327,17 +326,14 @@ impl Session {
             return;
         }
         // Pages that come without their parents are asked for one by one; what they have shown must not be forgotten.
-        let telling = match (&self.front, &blocks.criterion) {
-            (Some(front), Some(criterion)) if !mt.needs_parents() => {
-                let fields = self.decoder.wanted_fields();
-                let bounds =
-                    |page: u32| fields.iter().map(|&f| index.blocks[page as usize].errors[f]).collect();
-                front.telling_pages(mt, &**criterion, |u| u.0 >> index.block_bits, bounds)
-            }
-            _ => BTreeSet::new(),
-        };
+        if let (Some(front), Some(criterion), false) = (&self.front, &blocks.criterion, mt.needs_parents()) {
+            let fields = self.decoder.wanted_fields();
+            let bounds = |page: u32| fields.iter().map(|&f| index.blocks[page as usize].errors[f]).collect();
+            let telling = front.telling_pages(mt, &**criterion, |u| u.0 >> index.block_bits, bounds);
+            telling.into_iter().for_each(|block| planned[block as usize] = true);
+        }
         let mut order: Vec<(u32, u32)> = (0..index.blocks.len() as u32)
-            .filter(|&block| mt.has_page(block) && !planned[block as usize] && !telling.contains(&block))
+            .filter(|&block| mt.has_page(block) && !planned[block as usize])
             .map(|block| (blocks.last_needed.get(block as usize).copied().unwrap_or(0), block))
             .collect();
         // Of the same age, children before parents.

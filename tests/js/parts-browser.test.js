@@ -7,7 +7,7 @@ import { launch } from "./browser.js";
 
 const folder = process.env.TETRALOD_FIXTURE;
 assert.ok(folder, "TETRALOD_FIXTURE is not set: run `cargo xtask test e2e`");
-const bytes = await readFile(`${folder}/blocks.mt`);
+const bytes = await readFile(`${folder}/blocks-half-edge.mt`);
 const TYPES = { html: "text/html", js: "text/javascript", css: "text/css", wasm: "application/wasm" };
 const PATIENCE = 60_000;
 

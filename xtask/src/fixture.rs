@@ -48,14 +48,16 @@ pub fn make() -> Result<()> {
     make_blocks(&tetralod, folder)
 }
 
-/// Makes `blocks.mt`, a file of hundreds of blocks, and `fields.mt`, one of two fields.
+/// Makes `blocks-edge.mt` and `blocks-half-edge.mt`, files of hundreds of blocks, and `fields.mt`, one of two fields.
 fn make_blocks(tetralod: &Path, folder: &Path) -> Result<()> {
-    for (name, data, size, extension) in
-        [("blocks", "bucky", "33", "vti"), ("fields", "sphere-flow", "14", "vtu")]
-    {
+    for (name, kind, data, size, extension) in [
+        ("blocks-edge", "edge", "bucky", "33", "vti"),
+        ("blocks-half-edge", "half-edge", "bucky", "33", "vti"),
+        ("fields", "edge", "sphere-flow", "14", "vtu"),
+    ] {
         let [mesh, mt] = [extension, "mt"].map(|extension| folder.join(format!("{name}.{extension}")));
         shell::run(shell::command(tetralod, ["generate", data, "--size", size, "-o"]).arg(&mesh))?;
-        let build = ["build", "--quiet", "--all-fields", "--block-updates", "64", "-o"];
+        let build = ["build", "--quiet", "--kind", kind, "--all-fields", "--block-updates", "64", "-o"];
         shell::run(shell::command(tetralod, build).arg(mt).arg(mesh))?;
     }
     Ok(())
