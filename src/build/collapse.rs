@@ -139,7 +139,7 @@ impl<'a> Builder<'a> {
         };
         Self {
             gradients: quantized.gradients(&mesh.tets),
-            buckets: Buckets::new(mesh.tets.len(), points),
+            buckets: Buckets::new(mesh.tets.len(), quantized),
             marks: VertexMarks::new(points),
             versions: vec![0; points],
             mesh,

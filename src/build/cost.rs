@@ -3,7 +3,8 @@
 //! Each reference vertex that is not a vertex of the mesh lives in the bucket of one tetrahedron: the one that
 //! contains it or, where the boundary has moved, the one with the nearest boundary triangle. A collapse takes it from
 //! a tetrahedron that it removes to one that it creates. So for every consistent set S, some tetrahedron of Σ_S had
-//! the vertex in its bucket, and the error recorded then bounds what Σ_S has there.
+//! the vertex in its bucket, and the error recorded then bounds what Σ_S has there. A created tetrahedron is also compared with
+//! those that it contains but that are in other buckets ([`super::strays`]).
 //!
 //! The boundary is kept track of in both directions. A created vertex is compared with the reference boundary itself:
 //! its distance from the mesh before says nothing, as step after step along chords would fill any hollow. And each
@@ -12,6 +13,7 @@
 use super::plan::Plan;
 use super::quantize::Quantized;
 use super::skin::Skin;
+use super::strays::Strays;
 use super::work_mesh::WorkMesh;
 use crate::geom::nearest_on_triangle;
 use crate::geom::orient3d;
@@ -38,21 +40,29 @@ pub(super) struct Buckets {
     pub inside: Lists,
     /// Those of the boundary that its boundary faces stand for.
     pub border: Lists,
+    /// Those that are not where their buckets are.
+    pub strays: Strays,
 }
 
 impl Buckets {
-    pub fn new(tets: usize, points: usize) -> Self {
-        Self { inside: Lists::new(tets, points), border: Lists::new(tets, points) }
+    /// Of a mesh with so many tetrahedra.
+    pub fn new(tets: usize, quantized: &Quantized) -> Self {
+        let places: Vec<DVec3> = quantized.positions.iter().map(|&q| as_vec(q)).collect();
+        let points = places.len();
+        Self {
+            inside: Lists::new(tets, points),
+            border: Lists::new(tets, points),
+            strays: Strays::new(tets, places),
+        }
     }
 
     /// Empties the buckets of a tetrahedron, which may be a new one.
     pub fn clear(&mut self, t: u32) {
         for lists in [&mut self.inside, &mut self.border] {
-            if lists.first.len() <= t as usize {
-                lists.first.resize(t as usize + 1, NONE);
-            }
+            lists.reserve(t);
             lists.take(t);
         }
+        self.strays.clear(t);
     }
 }
 
@@ -63,8 +73,15 @@ pub(super) struct Lists {
 }
 
 impl Lists {
-    fn new(tets: usize, points: usize) -> Self {
+    pub fn new(tets: usize, points: usize) -> Self {
         Self { first: vec![NONE; tets], next: vec![NONE; points] }
+    }
+
+    /// Makes room for the list of a tetrahedron.
+    pub fn reserve(&mut self, t: u32) {
+        if self.first.len() <= t as usize {
+            self.first.resize(t as usize + 1, NONE);
+        }
     }
 
     pub fn take(&mut self, t: u32) {
@@ -160,8 +177,10 @@ pub(super) struct Evaluator {
     faces: Vec<Face>,
     flat: bool,
     old_border: Vec<[u32; 3]>,
-    /// Where each point goes: point and cell.
-    moves: Vec<(u32, u32)>,
+    /// Where each point goes: point, cell, and whether it is outside.
+    moves: Vec<(u32, u32, bool)>,
+    /// Points of other buckets that are inside: point and cell.
+    visits: Vec<(u32, u32)>,
     border_moves: Vec<(u32, u32)>,
     /// The levels of the new vertex.
     pub levels: Vec<i32>,
@@ -247,7 +266,42 @@ impl Evaluator {
         for end in [plan.a, plan.b].into_iter().filter(|&end| end < reference.points) {
             error = error.max(self.place(end, 0, plan, data, reference));
         }
+        error.max(self.meet_strays(plan, data, buckets, reference))
+    }
+
+    /// The error at points of other buckets that the new star contains.
+    fn meet_strays(
+        &mut self,
+        plan: &Plan,
+        data: &VertexData,
+        buckets: &Buckets,
+        reference: &Reference<'_>,
+    ) -> f64 {
+        self.visits.clear();
+        let mut error = 0.0_f64;
+        for tet in removed(plan) {
+            for point in buckets.strays.of(tet) {
+                error = error.max(self.visit(point, plan, data, reference));
+            }
+        }
+        if plan.on_boundary && !self.flat {
+            let places = plan.link.iter().map(|&v| data.positions[v as usize]);
+            let [low, high] = bounds(places.chain([plan.position]));
+            for point in buckets.strays.between(low, high) {
+                error = error.max(self.visit(point, plan, data, reference));
+            }
+        }
         error
+    }
+
+    fn visit(&mut self, point: u32, plan: &Plan, data: &VertexData, reference: &Reference<'_>) -> f64 {
+        let relative = as_vec(reference.quantized.positions[point as usize]) - as_vec(plan.position);
+        let (cell, lambda, depth) = locate(self.cells.len(), 0, |i| self.cells[i].barycentric * relative);
+        if depth < -SLACK {
+            return 0.0;
+        }
+        self.visits.push((point, cell as u32));
+        self.deviate(point, cell, clamped(lambda), data, reference)
     }
 
     /// Moves the points to the buckets where [`Evaluator::evaluate`] found them to belong.
@@ -263,7 +317,13 @@ impl Evaluator {
         }
         plan.stay.iter().for_each(|(s, _)| buckets.inside.take(s.tet));
         plan.fan.iter().for_each(|&(tet, ..)| buckets.inside.take(tet));
-        self.moves.iter().for_each(|&(point, cell)| buckets.inside.put(self.cells[cell as usize].tet, point));
+        removed(plan).for_each(|tet| buckets.strays.clear(tet));
+        for &(point, cell, outside) in &self.moves {
+            buckets.inside.put(self.cells[cell as usize].tet, point);
+            buckets.strays.set_outside(point, outside);
+        }
+        let visits = self.visits.iter();
+        visits.for_each(|&(point, cell)| buckets.strays.invite(self.cells[cell as usize].tet, point));
         if plan.on_boundary {
             plan.stay.iter().for_each(|(s, _)| buckets.border.take(s.tet));
             plan.fan.iter().for_each(|&(tet, ..)| buckets.border.take(tet));
@@ -447,7 +507,8 @@ impl Evaluator {
         let (mut cell, mut lambda, depth) =
             locate(self.cells.len(), hint, |i| self.cells[i].barycentric * relative);
         let mut displaced = 0.0;
-        if depth < -SLACK && !self.border.is_empty() {
+        let outside = depth < -SLACK && !self.border.is_empty();
+        if outside {
             let p = reference.scaled(reference.quantized.positions[point as usize]);
             let (found, q, distance) = self.nearest(p, usize::MAX, plan, data, reference);
             let step = DVec3::from_array(reference.quantized.lattice.step);
@@ -455,7 +516,7 @@ impl Evaluator {
             (cell, lambda, displaced) =
                 (found as usize, self.cells[found as usize].barycentric * to_q, distance);
         }
-        self.moves.push((point, cell as u32));
+        self.moves.push((point, cell as u32, outside));
         let lambda = clamped(lambda);
         let displaced = reference.error_of(displaced);
         raise(&mut self.errors, displaced);
@@ -524,6 +585,17 @@ impl Reference<'_> {
     pub fn scaled(&self, q: [i32; 3]) -> DVec3 {
         as_vec(q) * DVec3::from_array(self.quantized.lattice.step)
     }
+}
+
+/// The tetrahedra that a collapse removes.
+fn removed(plan: &Plan) -> impl Iterator<Item = u32> {
+    plan.stay.iter().map(|(s, _)| s.tet).chain(plan.fan.iter().map(|&(tet, ..)| tet))
+}
+
+/// The corners of the box around lattice points.
+pub(super) fn bounds(places: impl Iterator<Item = [i32; 3]>) -> [DVec3; 2] {
+    let all = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+    places.map(as_vec).fold(all, |[low, high], p| [low.min(p), high.max(p)])
 }
 
 pub(super) fn as_vec(q: [i32; 3]) -> DVec3 {

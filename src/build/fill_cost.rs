@@ -9,6 +9,7 @@ use super::cost::Face;
 use super::cost::Reference;
 use super::cost::SLACK;
 use super::cost::as_vec;
+use super::cost::bounds;
 use super::cost::clamped;
 use super::cost::largest;
 use super::cost::locate;
@@ -55,8 +56,10 @@ pub(super) struct FillCost {
     /// The border of the filling in model units, made when it is first needed.
     faces: Vec<Face>,
     flat: bool,
-    /// Where each point goes: point and cell.
-    moves: Vec<(u32, u32)>,
+    /// Where each point goes: point, cell, and whether it is outside.
+    moves: Vec<(u32, u32, bool)>,
+    /// Points of other buckets that are inside: point and cell.
+    visits: Vec<(u32, u32)>,
     border_moves: Vec<(u32, u32)>,
     /// How far the boundary moves, as an error.
     pub step: f64,
@@ -145,7 +148,39 @@ impl FillCost {
                 }
             }
         }
+        error.max(self.meet_strays(hole, filling, buckets, reference))
+    }
+
+    /// The error at points of other buckets that the filling contains.
+    fn meet_strays(
+        &mut self,
+        hole: &Hole,
+        filling: &Filling,
+        buckets: &Buckets,
+        reference: &Reference<'_>,
+    ) -> f64 {
+        self.visits.clear();
+        let mut error = 0.0_f64;
+        for point in hole.star.iter().flat_map(|s| buckets.strays.of(s.tet)) {
+            error = error.max(self.visit(point, filling, reference));
+        }
+        if !self.flat {
+            let places = hole.link.iter().map(|&v| reference.quantized.positions[v as usize]);
+            let [low, high] = bounds(places);
+            for point in buckets.strays.between(low, high) {
+                error = error.max(self.visit(point, filling, reference));
+            }
+        }
         error
+    }
+
+    fn visit(&mut self, point: u32, filling: &Filling, reference: &Reference<'_>) -> f64 {
+        let (cell, lambda, depth) = self.locate(point, 0, reference);
+        if depth < -SLACK {
+            return 0.0;
+        }
+        self.visits.push((point, cell as u32));
+        self.deviate(point, cell, lambda, filling, reference)
     }
 
     /// Moves the points to the buckets where [`FillCost::evaluate`] found them to belong. `slots` are the numbers of the
@@ -165,7 +200,12 @@ impl FillCost {
         }
         let tets = hole.star.iter().map(|s| s.tet).chain(slots.iter().copied());
         tets.for_each(|t| buckets.clear(t));
-        self.moves.iter().for_each(|&(point, cell)| buckets.inside.put(slots[cell as usize], point));
+        for &(point, cell, outside) in &self.moves {
+            buckets.inside.put(slots[cell as usize], point);
+            buckets.strays.set_outside(point, outside);
+        }
+        let visits = self.visits.iter();
+        visits.for_each(|&(point, cell)| buckets.strays.invite(slots[cell as usize], point));
         self.border_moves.iter().for_each(|&(point, cell)| buckets.border.put(slots[cell as usize], point));
     }
 
@@ -227,13 +267,10 @@ impl FillCost {
         filling: &Filling,
         reference: &Reference<'_>,
     ) -> (f64, usize) {
-        let position = as_vec(reference.quantized.positions[point as usize]);
-        let (mut cell, mut lambda, depth) = locate(self.cells.len(), hint, |i| {
-            let Cell { barycentric, origin } = self.cells[i];
-            barycentric * (position - origin)
-        });
+        let (mut cell, mut lambda, depth) = self.locate(point, hint, reference);
         let mut displaced = 0.0;
-        if depth < -SLACK && !filling.border.is_empty() {
+        let outside = depth < -SLACK && !filling.border.is_empty();
+        if outside {
             let p = reference.scaled(reference.quantized.positions[point as usize]);
             let (found, q, distance) = self.nearest(p, usize::MAX, filling, reference);
             cell = found as usize;
@@ -241,13 +278,31 @@ impl FillCost {
             lambda = barycentric * (q / DVec3::from_array(reference.quantized.lattice.step) - origin);
             displaced = distance;
         }
-        self.moves.push((point, cell as u32));
-        let quantized = reference.quantized;
+        self.moves.push((point, cell as u32, outside));
         let displaced = reference.error_of(displaced);
         raise(&mut self.errors, displaced);
-        let corners = |f: usize| filling.tets[cell].map(|v| quantized.level(v, f));
-        let error = quantized.deviation(point, clamped(lambda), corners, &mut self.errors);
-        (error.max(displaced), cell)
+        (self.deviate(point, cell, lambda, filling, reference).max(displaced), cell)
+    }
+
+    /// The cell that contains a point, or is nearest to it: see [`locate`].
+    fn locate(&self, point: u32, hint: usize, reference: &Reference<'_>) -> (usize, DVec3, f64) {
+        let position = as_vec(reference.quantized.positions[point as usize]);
+        locate(self.cells.len(), hint, |i| {
+            let Cell { barycentric, origin } = self.cells[i];
+            barycentric * (position - origin)
+        })
+    }
+
+    fn deviate(
+        &mut self,
+        point: u32,
+        cell: usize,
+        lambda: DVec3,
+        filling: &Filling,
+        reference: &Reference<'_>,
+    ) -> f64 {
+        let corners = |f: usize| filling.tets[cell].map(|v| reference.quantized.level(v, f));
+        reference.quantized.deviation(point, clamped(lambda), corners, &mut self.errors)
     }
 }
 

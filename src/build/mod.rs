@@ -46,6 +46,7 @@ mod removal;
 mod rounds;
 mod sequence;
 mod skin;
+mod strays;
 mod vertex;
 mod work_mesh;
 

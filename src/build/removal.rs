@@ -64,7 +64,7 @@ impl<'a> State<'a> {
             gradients: quantized.gradients(&mesh.tets),
             reference: Reference { quantized, points: points as u32, skin, displacement_per_error },
             frozen,
-            buckets: Buckets::new(mesh.tets.len(), points),
+            buckets: Buckets::new(mesh.tets.len(), quantized),
             past: Past::new(mesh.tets.len()),
             versions: vec![0; points],
             degrees,
