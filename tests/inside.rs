@@ -1,5 +1,5 @@
 //! Promise: reference vertices inside an extracted mesh are within its bound there, also where the boundary has moved away from
-//! them and back again.
+//! them and back again: where the input has them, not only where the lattice has put them.
 
 mod build_support;
 
@@ -75,14 +75,12 @@ fn refined(mt: &Mt, error: f64) -> (Front, f64) {
 /// How much the field differs, as a fraction of its range, at each vertex of the input that is inside the mesh.
 fn errors_inside(info: &MtInfo, mesh: &CurrentMesh, input: &TetMesh) -> Vec<f64> {
     let mut least = vec![f64::INFINITY; input.positions.len()];
-    let places: Vec<[f64; 3]> =
-        input.positions.iter().map(|p| info.lattice.point(info.lattice.nearest(*p))).collect();
     for tet in mesh.tets() {
         let [a, b, c, d] = tet.map(|v| info.lattice.point(mesh.positions()[v as usize]));
         let low = [0, 1, 2].map(|i| a[i].min(b[i]).min(c[i]).min(d[i]));
         let high = [0, 1, 2].map(|i| a[i].max(b[i]).max(c[i]).max(d[i]));
         let whole = volume(a, b, c, d);
-        for (i, &p) in places.iter().enumerate() {
+        for (i, &p) in input.positions.iter().enumerate() {
             if (0..3).any(|k| p[k] < low[k] || p[k] > high[k]) {
                 continue;
             }

@@ -56,7 +56,7 @@ pub fn edge_mt(
     mesh::check(mesh).map_err(BuildError::Mesh)?;
     let Topology { neighbors, non_manifold: frozen, .. } =
         mesh::topology(mesh.positions.len(), &mesh.tets).map_err(BuildError::Mesh)?;
-    let quantized = quantize::quantize(mesh, config)?;
+    let quantized = quantize::quantize_cells(mesh, config)?;
     let diagonal = Bounds::of(&mesh.positions).diagonal();
     let info = MtInfo {
         kind: MtKind::Edge,

@@ -47,13 +47,14 @@ pub(super) struct Buckets {
 impl Buckets {
     /// Of a mesh with so many tetrahedra.
     pub fn new(tets: usize, quantized: &Quantized) -> Self {
-        let places: Vec<DVec3> = quantized.positions.iter().map(|&q| as_vec(q)).collect();
-        let points = places.len();
-        Self {
-            inside: Lists::new(tets, points),
-            border: Lists::new(tets, points),
-            strays: Strays::new(tets, places),
+        let points = quantized.places.len();
+        let mut inside = Lists::new(tets, points);
+        let mut strays = Strays::new(tets, quantized.places.clone());
+        for home in &quantized.homes {
+            inside.put(home.tet, home.point);
+            strays.set_outside(home.point, home.outside);
         }
+        Self { inside, border: Lists::new(tets, points), strays }
     }
 
     /// Empties the buckets of a tetrahedron, which may be a new one.
@@ -263,7 +264,9 @@ impl Evaluator {
                 }
             }
         }
-        for end in [plan.a, plan.b].into_iter().filter(|&end| end < reference.points) {
+        // Those that the lattice has moved are in a bucket already.
+        let is_new = |end: &u32| *end < reference.points && !reference.quantized.is_moved(*end);
+        for end in [plan.a, plan.b].into_iter().filter(is_new) {
             error = error.max(self.place(end, 0, plan, data, reference));
         }
         error.max(self.meet_strays(plan, data, buckets, reference))
@@ -285,8 +288,9 @@ impl Evaluator {
             }
         }
         if plan.on_boundary && !self.flat {
-            let places = plan.link.iter().map(|&v| data.positions[v as usize]);
-            let [low, high] = bounds(places.chain([plan.position]));
+            // What is new inside is between the old boundary and the new one.
+            let rim = self.old_border.iter().flatten().map(|&v| data.positions[v as usize]);
+            let [low, high] = bounds(rim.chain([plan.position]));
             for point in buckets.strays.between(low, high) {
                 error = error.max(self.visit(point, plan, data, reference));
             }
@@ -295,7 +299,7 @@ impl Evaluator {
     }
 
     fn visit(&mut self, point: u32, plan: &Plan, data: &VertexData, reference: &Reference<'_>) -> f64 {
-        let relative = as_vec(reference.quantized.positions[point as usize]) - as_vec(plan.position);
+        let relative = reference.quantized.places[point as usize] - as_vec(plan.position);
         let (cell, lambda, depth) = locate(self.cells.len(), 0, |i| self.cells[i].barycentric * relative);
         if depth < -SLACK {
             return 0.0;
@@ -503,18 +507,18 @@ impl Evaluator {
         data: &VertexData,
         reference: &Reference<'_>,
     ) -> f64 {
-        let relative = as_vec(reference.quantized.positions[point as usize]) - as_vec(plan.position);
+        let relative = reference.quantized.places[point as usize] - as_vec(plan.position);
         let (mut cell, mut lambda, depth) =
             locate(self.cells.len(), hint, |i| self.cells[i].barycentric * relative);
         let mut displaced = 0.0;
         let outside = depth < -SLACK && !self.border.is_empty();
         if outside {
-            let p = reference.scaled(reference.quantized.positions[point as usize]);
+            let (p, moved) = reference.place(point);
             let (found, q, distance) = self.nearest(p, usize::MAX, plan, data, reference);
             let step = DVec3::from_array(reference.quantized.lattice.step);
             let to_q = (q - reference.scaled(plan.position)) / step;
             (cell, lambda, displaced) =
-                (found as usize, self.cells[found as usize].barycentric * to_q, distance);
+                (found as usize, self.cells[found as usize].barycentric * to_q, distance - moved);
         }
         self.moves.push((point, cell as u32, outside));
         let lambda = clamped(lambda);
@@ -579,6 +583,13 @@ impl Reference<'_> {
     /// What a displacement counts as.
     pub fn error_of(&self, distance: f64) -> f64 {
         if distance > 0.0 { distance / self.displacement_per_error } else { 0.0 }
+    }
+
+    /// Where a reference vertex is in the input, in model units from the lattice's origin, and how far the lattice has moved it: what
+    /// that alone puts outside is no displacement.
+    pub fn place(&self, point: u32) -> (DVec3, f64) {
+        let p = self.quantized.places[point as usize] * DVec3::from_array(self.quantized.lattice.step);
+        (p, p.distance(self.scaled(self.quantized.positions[point as usize])))
     }
 
     /// A lattice point in model units, from the lattice's origin.

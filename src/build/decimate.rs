@@ -64,7 +64,7 @@ pub(super) fn decimate(
     mesh::check(mesh).map_err(BuildError::Mesh)?;
     let Topology { neighbors, non_manifold, .. } =
         mesh::topology(mesh.positions.len(), &mesh.tets).map_err(BuildError::Mesh)?;
-    let quantized = quantize::quantize(mesh, config)?;
+    let quantized = quantize::quantize_cells(mesh, config)?;
     let gift_wrap = match criterion {
         Criterion::HalfEdge => None,
         Criterion::Delaunay => Some(GiftWrap::new(&quantized.positions)),

@@ -114,7 +114,7 @@ impl FillCost {
         self.cells
             .extend(filling.tets.iter().map(|tet| Cell::new(tet.map(|v| as_vec(positions[v as usize])))));
         self.errors.clone_from(&legacy.errors);
-        self.place(hole.a, 0, filling, reference);
+        self.look_at_centre(hole.a, filling, reference);
         if largest(&self.errors) > limit {
             return largest(&self.errors);
         }
@@ -151,6 +151,19 @@ impl FillCost {
         error.max(self.meet_strays(hole, filling, buckets, reference))
     }
 
+    /// Looks at the vertex that is removed before all else: as a rule the error is largest there. If the lattice has moved it, it is in a
+    /// bucket already.
+    fn look_at_centre(&mut self, a: u32, filling: &Filling, reference: &Reference<'_>) {
+        if !reference.quantized.is_moved(a) {
+            self.place(a, 0, filling, reference);
+            return;
+        }
+        let (cell, lambda, depth) = self.locate(a, 0, reference);
+        if depth >= -SLACK {
+            self.deviate(a, cell, lambda, filling, reference);
+        }
+    }
+
     /// The error at points of other buckets that the filling contains.
     fn meet_strays(
         &mut self,
@@ -165,8 +178,9 @@ impl FillCost {
             error = error.max(self.visit(point, filling, reference));
         }
         if !self.flat {
-            let places = hole.link.iter().map(|&v| reference.quantized.positions[v as usize]);
-            let [low, high] = bounds(places);
+            // What is new inside is between the old boundary and the new one.
+            let rim = hole.border.iter().flatten().chain([&hole.a]);
+            let [low, high] = bounds(rim.map(|&v| reference.quantized.positions[v as usize]));
             for point in buckets.strays.between(low, high) {
                 error = error.max(self.visit(point, filling, reference));
             }
@@ -271,12 +285,12 @@ impl FillCost {
         let mut displaced = 0.0;
         let outside = depth < -SLACK && !filling.border.is_empty();
         if outside {
-            let p = reference.scaled(reference.quantized.positions[point as usize]);
+            let (p, moved) = reference.place(point);
             let (found, q, distance) = self.nearest(p, usize::MAX, filling, reference);
             cell = found as usize;
             let Cell { barycentric, origin } = self.cells[cell];
             lambda = barycentric * (q / DVec3::from_array(reference.quantized.lattice.step) - origin);
-            displaced = distance;
+            displaced = distance - moved;
         }
         self.moves.push((point, cell as u32, outside));
         let displaced = reference.error_of(displaced);
@@ -286,7 +300,7 @@ impl FillCost {
 
     /// The cell that contains a point, or is nearest to it: see [`locate`].
     fn locate(&self, point: u32, hint: usize, reference: &Reference<'_>) -> (usize, DVec3, f64) {
-        let position = as_vec(reference.quantized.positions[point as usize]);
+        let position = reference.quantized.places[point as usize];
         locate(self.cells.len(), hint, |i| {
             let Cell { barycentric, origin } = self.cells[i];
             barycentric * (position - origin)

@@ -22,6 +22,7 @@
 
 mod agenda;
 mod base;
+mod beside;
 mod block_order;
 mod choice;
 mod collapse;
