@@ -17,6 +17,7 @@ use super::strays::Strays;
 use super::work_mesh::WorkMesh;
 use crate::geom::nearest_on_triangle;
 use crate::geom::orient3d;
+use crate::mesh::EDGES;
 use crate::mesh::FACES;
 use crate::mesh::NONE;
 use glam::DMat3;
@@ -104,7 +105,9 @@ pub(super) struct Reference<'a> {
     pub quantized: &'a Quantized,
     pub points: u32,
     pub skin: Skin,
-    /// Model units of displacement that count as an error of 1.
+    /// Model units of displacement of the boundary that count as an error of 1, at each vertex of the reference mesh.
+    allowances: Vec<f64>,
+    /// The most of them.
     pub displacement_per_error: f64,
 }
 
@@ -239,7 +242,7 @@ impl Evaluator {
         raise(&mut self.errors, foot);
         if newest && largest(&self.errors) <= limit {
             let steps = self.steps_of_boundary(plan, data, reference);
-            self.steps = steps.map(|distance| reference.error_of(distance));
+            self.steps = steps.map(|distance| reference.least_error_of(distance));
             let step = self.steps[0].max(self.steps[1]);
             let Self { errors, inherited, .. } = self;
             errors.iter_mut().zip(inherited).for_each(|(error, own)| *error = error.max(*own + step));
@@ -433,10 +436,10 @@ impl Evaluator {
         if less < distance {
             self.foot = other;
         }
-        reference.error_of(less.min(distance))
+        reference.error_from(self.foot, less.min(distance))
     }
 
-    /// Finds where the reference vertices of the boundary go. Returns the error that the largest distance stands for.
+    /// Finds where the reference vertices of the boundary go. Returns the largest error that their distances stand for.
     fn place_on_border(
         &mut self,
         plan: &Plan,
@@ -452,9 +455,9 @@ impl Evaluator {
             let p = reference.scaled(reference.quantized.positions[point as usize]);
             let (cell, _, distance) = self.nearest(p, usize::MAX, plan, data, reference);
             self.border_moves.push((point, cell));
-            largest = largest.max(distance);
+            largest = largest.max(reference.error_at(point, distance));
         }
-        reference.error_of(largest)
+        largest
     }
 
     /// The boundary triangles of the star, before and after.
@@ -522,7 +525,7 @@ impl Evaluator {
         }
         self.moves.push((point, cell as u32, outside));
         let lambda = clamped(lambda);
-        let displaced = reference.error_of(displaced);
+        let displaced = reference.error_at(point, displaced);
         raise(&mut self.errors, displaced);
         self.deviate(point, cell, lambda, data, reference).max(displaced)
     }
@@ -579,9 +582,55 @@ impl Cell {
     }
 }
 
-impl Reference<'_> {
-    /// What a displacement counts as.
-    pub fn error_of(&self, distance: f64) -> f64 {
+impl<'a> Reference<'a> {
+    /// A displacement by `edges` times the shortest edge at a vertex counts as an error of 1 there, but at most one of
+    /// `displacement_per_error`.
+    pub fn new(quantized: &'a Quantized, mesh: &WorkMesh, displacement_per_error: f64, edges: f64) -> Self {
+        let step = DVec3::from_array(quantized.lattice.step);
+        let places: Vec<DVec3> = quantized.positions.iter().map(|&q| as_vec(q) * step).collect();
+        let mut shortest = vec![f64::INFINITY; places.len()];
+        for tet in &mesh.tets {
+            for [a, b] in EDGES.map(|edge| edge.map(|i| tet[i] as usize)) {
+                let squared = places[a].distance_squared(places[b]);
+                shortest[a] = shortest[a].min(squared);
+                shortest[b] = shortest[b].min(squared);
+            }
+        }
+        // With no displacement allowed any movement is an infinite error.
+        let allowance = |squared: f64| {
+            let own = if edges > 0.0 { edges * squared.sqrt() } else { 0.0 };
+            own.min(displacement_per_error)
+        };
+        Self {
+            quantized,
+            points: places.len() as u32,
+            skin: Skin::new(&mesh.tets, &mesh.neighbors, &places),
+            allowances: shortest.into_iter().map(allowance).collect(),
+            displacement_per_error,
+        }
+    }
+
+    /// What a displacement at a reference vertex counts as.
+    pub fn error_at(&self, point: u32, distance: f64) -> f64 {
+        if distance > 0.0 { distance / self.allowances[point as usize] } else { 0.0 }
+    }
+
+    /// What a displacement from a triangle of the reference boundary counts as.
+    pub fn error_from(&self, triangle: u32, distance: f64) -> f64 {
+        if distance > 0.0 { distance / self.allowance_from(triangle) } else { 0.0 }
+    }
+
+    /// The displacement from a triangle of the reference boundary that counts as an error of 1.
+    pub fn allowance_from(&self, triangle: u32) -> f64 {
+        self.skin
+            .corners(triangle)
+            .map(|point| self.allowances[point as usize])
+            .into_iter()
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// What a displacement counts as at least, wherever it is.
+    pub fn least_error_of(&self, distance: f64) -> f64 {
         if distance > 0.0 { distance / self.displacement_per_error } else { 0.0 }
     }
 

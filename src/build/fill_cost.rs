@@ -120,7 +120,7 @@ impl FillCost {
         }
         self.flat = !hole.on_boundary() || hole.keeps_boundary(filling, positions);
         if !self.flat {
-            self.step = reference.error_of(self.step_of_boundary(hole, filling, reference));
+            self.step = reference.least_error_of(self.step_of_boundary(hole, filling, reference));
             if legacy.depends {
                 let Self { errors, step, .. } = self;
                 let inherited = errors.iter_mut().zip(&legacy.inherited);
@@ -237,7 +237,7 @@ impl FillCost {
         largest
     }
 
-    /// Finds where the reference vertices of the boundary go. Returns the error that the largest distance stands for.
+    /// Finds where the reference vertices of the boundary go. Returns the largest error that their distances stand for.
     fn place_on_border(
         &mut self,
         hole: &Hole,
@@ -252,9 +252,9 @@ impl FillCost {
             let p = reference.scaled(reference.quantized.positions[point as usize]);
             let (cell, _, distance) = self.nearest(p, usize::MAX, filling, reference);
             self.border_moves.push((point, cell));
-            largest = largest.max(distance);
+            largest = largest.max(reference.error_at(point, distance));
         }
-        reference.error_of(largest)
+        largest
     }
 
     /// The nearest of the first `count` boundary triangles of the filling: its cell, the nearest point, and the distance.
@@ -293,7 +293,7 @@ impl FillCost {
             displaced = distance - moved;
         }
         self.moves.push((point, cell as u32, outside));
-        let displaced = reference.error_of(displaced);
+        let displaced = reference.error_at(point, displaced);
         raise(&mut self.errors, displaced);
         (self.deviate(point, cell, lambda, filling, reference).max(displaced), cell)
     }
@@ -330,13 +330,15 @@ fn chords(filling: &Filling, reference: &Reference<'_>) -> f64 {
             let mut least = f64::INFINITY;
             for v in triangle {
                 if let Some(&from) = reference.skin.at(v).first().filter(|_| least > largest) {
-                    least = least.min(reference.skin.walk(p, from, largest).1);
+                    let (foot, distance) =
+                        reference.skin.walk(p, from, largest * reference.allowance_from(from));
+                    least = least.min(reference.error_from(foot, distance));
                 }
             }
             largest = largest.max(least);
         }
     }
-    reference.error_of(largest)
+    largest
 }
 
 impl Cell {
