@@ -207,7 +207,8 @@ pub struct MtInfo {
     pub tetrahedra: u32,
     /// Updates of the complete MT.
     pub updates: u32,
-    /// The displacement of the boundary, in model units, that counts as an error of 1. A mesh within error `e` comes
+    /// The displacement of the boundary, in model units, that counts as an error of 1 (where cells are small, less may count as
+    /// one). A mesh within error `e` comes
     /// within `e · displacement_per_error` of every reference vertex, and no vertex of its boundary is further than
     /// that from the boundary of the reference mesh.
     pub displacement_per_error: f64,
