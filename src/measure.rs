@@ -1,7 +1,7 @@
 //! How far a mesh is from the one that it stands for, measured at every reference vertex.
 //!
-//! A reference vertex is compared with the linear interpolant of the tetrahedron that contains it on the lattice
-//! (decided exactly) or, where the boundary has moved, with that of the nearest boundary triangle.
+//! A reference vertex is compared, where the input has it, with the linear interpolant of the tetrahedron that contains it
+//! (decided exactly if the lattice has not moved it) or, where the boundary has moved, with that of the nearest boundary triangle.
 //!
 //! An MT promises that each reference vertex has *some* place in the mesh, no farther than the boundary may have
 //! moved, where the field is as near as promised. Where the boundary has moved this need not be the nearest place,
@@ -16,6 +16,7 @@ use crate::mesh::NONE;
 use crate::mt::CurrentMesh;
 use crate::mt::FieldInfo;
 use crate::mt::MtInfo;
+use glam::DMat3;
 use glam::DVec3;
 use std::ops::RangeInclusive;
 
@@ -52,8 +53,9 @@ pub struct Promise {
 
 impl Promise {
     /// What a mesh with a relative error of `bound` promises. Half a step of the lattices is added: that is what the
-    /// reference itself was rounded by.
+    /// reference itself was rounded by; and no bound is below what is left at full resolution ([`MtInfo::floor`]).
     pub fn of(info: &MtInfo, field: usize, bound: f64) -> Self {
+        let bound = bound.max(info.floor(field));
         let (field, step) = (&info.fields[field], DVec3::from(info.lattice.step));
         Self {
             field: bound * field.range() + 0.5 * field.step * ROUNDING,
@@ -64,6 +66,10 @@ impl Promise {
 
 /// Allowance for the rounding errors of the measurement itself.
 const ROUNDING: f64 = 1.000_01;
+/// Points are taken to be on the lattice if they are nearer than this, in its steps.
+const ON_LATTICE: f64 = 1e-7;
+/// Barycentric coordinates this far below zero are rounding errors of a point on a face.
+const SIDE_SLACK: f64 = 1e-10;
 
 /// What was measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -87,6 +93,7 @@ pub fn deviation(info: &MtInfo, mesh: &CurrentMesh, reference: &Reference<'_>, p
         .filter(|(p, _)| wanted(p))
         .map(|(p, value)| Point {
             at: info.lattice.nearest(*p),
+            place: DVec3::from(*p),
             value: *value,
             inside: false,
             excused: false,
@@ -111,6 +118,8 @@ pub fn deviation(info: &MtInfo, mesh: &CurrentMesh, reference: &Reference<'_>, p
 /// A reference vertex on the lattice.
 struct Point {
     at: [i32; 3],
+    /// Where it is in the input, in model units.
+    place: DVec3,
     value: f64,
     /// Whether some tetrahedron contains it.
     inside: bool,
@@ -157,8 +166,10 @@ impl Measure<'_> {
         let spans = self.spans(values);
         let low = [0, 1, 2].map(|i| corners.iter().map(|q| q[i]).fold(i32::MAX, i32::min));
         let high = [0, 1, 2].map(|i| corners.iter().map(|q| q[i]).fold(i32::MIN, i32::max));
+        // A point may be half a step beside its place on the lattice.
+        let (low, high) = (low.map(|x| x.saturating_sub(1)), high.map(|x| x.saturating_add(1)));
         raster.for_each_between(low, high, |point| {
-            let Some(weights) = barycentric(corners, point.at) else { return };
+            let Some(weights) = self.weights_at(corners, point) else { return };
             point.inside = true;
             if spans {
                 let value: f64 = weights.iter().zip(values).map(|(w, v)| w * v).sum();
@@ -168,6 +179,20 @@ impl Measure<'_> {
                 }
             }
         });
+    }
+
+    /// The barycentric coordinates of a point where the input has it; none if it is outside the tetrahedron.
+    fn weights_at(&self, corners: [[i32; 3]; 4], point: &Point) -> Option<[f64; 4]> {
+        let (origin, step) = (DVec3::from(self.info.lattice.origin), DVec3::from(self.info.lattice.step));
+        let at = |q: [i32; 3]| DVec3::from_array(q.map(f64::from));
+        let place = (point.place - origin) / step;
+        if place.distance(at(point.at)) < ON_LATTICE {
+            return barycentric(corners, point.at);
+        }
+        let [a, b, c, d] = corners.map(at);
+        let lambda = DMat3::from_cols(b - a, c - a, d - a).inverse() * (place - a);
+        let weights = [1.0 - lambda.element_sum(), lambda.x, lambda.y, lambda.z];
+        weights.iter().all(|&weight| weight >= -SIDE_SLACK).then_some(weights)
     }
 
     /// Whether what is promised has been found at a point.
@@ -210,7 +235,7 @@ impl Measure<'_> {
             if !open(point) {
                 return;
             }
-            let p = DVec3::from(self.info.lattice.point(point.at));
+            let p = point.place;
             let q = nearest_on_triangle(p, triangle.corners);
             if p.distance(q) <= reach {
                 self.compare(point, triangle, p, q);
@@ -220,7 +245,7 @@ impl Measure<'_> {
 
     /// Compares a point with the nearest place on the boundary.
     fn look_nearest(&self, point: &mut Point, triangles: &[Triangle]) {
-        let p = DVec3::from(self.info.lattice.point(point.at));
+        let p = point.place;
         let mut nearest: Option<(f64, DVec3, &Triangle)> = None;
         for triangle in triangles {
             let bound = p.distance_squared(p.clamp(triangle.low, triangle.high));

@@ -105,6 +105,8 @@ fn boxes_isovalues_and_budgets_select() {
     let tets = |more: &[&str]| {
         let result = json(&[&["extract", &mt, "-o", &out, "--json", "--measure", &input], more].concat());
         assert!(number(&result, "measured_error") <= number(&result, "error_bound") + 1e-4, "{result}");
+        assert!(number(&result, "field_bound") >= number(&result, "error_bound"), "{result}");
+        assert!(number(&result, "boundary_bound") >= 0.0, "{result}");
         number(&result, "tetrahedra")
     };
     let whole = tets(&[]);

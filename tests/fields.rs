@@ -167,9 +167,13 @@ fn what_lattices_round_off_is_measured_and_a_floor_of_every_error() {
                 lost = lost.max((value - mesh.fields[0].values[point]).abs());
             }
             assert!(moved > 0.0 && lost > 0.0);
-            for (told, found) in [(info.quantization, moved), (info.fields[0].quantization, lost)] {
-                assert!(found <= told && told <= found * (1.0 + 1e-9), "{told} for {found}");
-            }
+            let (told, at_most) = (info.quantization, moved * (1.0 + 1e-9));
+            assert!(moved <= told && told <= at_most, "{told} for {moved}");
+            // Beside the vertices, where the input has them, a little more may be lost: far less than the lattice moves them by, as a
+            // part of a cell.
+            let (told, at_most) =
+                (info.fields[0].quantization, lost * (1.0 + 1e-9) + 1e-3 * info.fields[0].range());
+            assert!(lost <= told && told <= at_most, "{told} for {lost}");
             let floor = info.floor(0);
             assert!(floor >= lost / info.fields[0].range() && floor >= moved / info.displacement_per_error);
             assert!((0..mt.updates()).all(|u| mt.error(UpdateId(u)).error() >= floor), "{kind:?} {method:?}");
@@ -212,7 +216,7 @@ fn tolerances_are_kept_with_the_fewest_bits() {
         let mt = made(&mesh, &wanted(tolerance)).mt;
         let info = mt.info();
         let field = &info.fields[0];
-        assert!(info.quantization <= tolerance && field.quantization <= tolerance * field.range());
+        assert!(info.quantization <= tolerance && 0.5 * field.step <= tolerance * field.range());
         let fewer = BuildConfig {
             position_bits: Some(info.lattice.bits - 1),
             field_precision: FieldPrecision::Bits(field.bits - 1),

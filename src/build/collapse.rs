@@ -21,8 +21,6 @@ use super::plan::Plan;
 use super::plan::Refusal;
 use super::plan::VertexMarks;
 use super::quantize;
-use super::quantize::Quantized;
-use super::skin::Skin;
 use super::work_mesh::WorkMesh;
 use crate::geom::Bounds;
 use crate::mesh;
@@ -56,7 +54,7 @@ pub fn edge_mt(
     mesh::check(mesh).map_err(BuildError::Mesh)?;
     let Topology { neighbors, non_manifold: frozen, .. } =
         mesh::topology(mesh.positions.len(), &mesh.tets).map_err(BuildError::Mesh)?;
-    let quantized = quantize::quantize(mesh, config)?;
+    let quantized = quantize::quantize_cells(mesh, config)?;
     let diagonal = Bounds::of(&mesh.positions).diagonal();
     let info = MtInfo {
         kind: MtKind::Edge,
@@ -69,7 +67,8 @@ pub fn edge_mt(
         quantization: quantized.quantization,
     };
     let work = WorkMesh::new(mesh.tets.clone(), neighbors, mesh.positions.len());
-    let mut builder = Builder::new(work, &quantized, &info, frozen);
+    let reference = Reference::new(&quantized, &work, info.displacement_per_error, config.displacement_edges);
+    let mut builder = Builder::new(work, reference, &info, frozen);
     builder.collapse_all(progress)?;
     let Builder { mesh: base, data, history, .. } = builder;
     let depth = data.height.iter().copied().max().unwrap_or(0);
@@ -114,15 +113,12 @@ struct Builder<'a> {
 }
 
 impl<'a> Builder<'a> {
-    fn new(mesh: WorkMesh, quantized: &'a Quantized, info: &MtInfo, frozen: Vec<bool>) -> Self {
+    fn new(mesh: WorkMesh, reference: Reference<'a>, info: &MtInfo, frozen: Vec<bool>) -> Self {
+        let quantized = reference.quantized;
         let points = quantized.positions.len();
         let mut degrees = vec![0; points];
         mesh.tets.iter().flatten().for_each(|&v| degrees[v as usize] += 1);
-        let step = glam::DVec3::from_array(quantized.lattice.step);
-        let scaled = |q: &[i32; 3]| glam::DVec3::from_array(q.map(f64::from)) * step;
-        let places: Vec<glam::DVec3> = quantized.positions.iter().map(scaled).collect();
-        let skin = Skin::new(&mesh.tets, &mesh.neighbors, &places);
-        let foot = |v: u32| skin.at(v).first().copied().unwrap_or(crate::mesh::NONE);
+        let foot = |v: u32| reference.skin.at(v).first().copied().unwrap_or(crate::mesh::NONE);
         let data = VertexData {
             positions: quantized.positions.clone(),
             levels: quantized.levels.clone(),
@@ -130,16 +126,9 @@ impl<'a> Builder<'a> {
             height: vec![0; points],
             foot: (0..points as u32).map(foot).collect(),
         };
-        let reference = Reference {
-            quantized,
-            points: points as u32,
-            skin,
-            // With no displacement allowed any movement is an infinite error.
-            displacement_per_error: info.displacement_per_error,
-        };
         Self {
             gradients: quantized.gradients(&mesh.tets),
-            buckets: Buckets::new(mesh.tets.len(), points),
+            buckets: Buckets::new(mesh.tets.len(), quantized),
             marks: VertexMarks::new(points),
             versions: vec![0; points],
             mesh,

@@ -3,7 +3,8 @@
 //! Each reference vertex that is not a vertex of the mesh lives in the bucket of one tetrahedron: the one that
 //! contains it or, where the boundary has moved, the one with the nearest boundary triangle. A collapse takes it from
 //! a tetrahedron that it removes to one that it creates. So for every consistent set S, some tetrahedron of Σ_S had
-//! the vertex in its bucket, and the error recorded then bounds what Σ_S has there.
+//! the vertex in its bucket, and the error recorded then bounds what Σ_S has there. A created tetrahedron is also compared with
+//! those that it contains but that are in other buckets ([`super::strays`]).
 //!
 //! The boundary is kept track of in both directions. A created vertex is compared with the reference boundary itself:
 //! its distance from the mesh before says nothing, as step after step along chords would fill any hollow. And each
@@ -12,9 +13,11 @@
 use super::plan::Plan;
 use super::quantize::Quantized;
 use super::skin::Skin;
+use super::strays::Strays;
 use super::work_mesh::WorkMesh;
 use crate::geom::nearest_on_triangle;
 use crate::geom::orient3d;
+use crate::mesh::EDGES;
 use crate::mesh::FACES;
 use crate::mesh::NONE;
 use glam::DMat3;
@@ -38,21 +41,30 @@ pub(super) struct Buckets {
     pub inside: Lists,
     /// Those of the boundary that its boundary faces stand for.
     pub border: Lists,
+    /// Those that are not where their buckets are.
+    pub strays: Strays,
 }
 
 impl Buckets {
-    pub fn new(tets: usize, points: usize) -> Self {
-        Self { inside: Lists::new(tets, points), border: Lists::new(tets, points) }
+    /// Of a mesh with so many tetrahedra.
+    pub fn new(tets: usize, quantized: &Quantized) -> Self {
+        let points = quantized.places.len();
+        let mut inside = Lists::new(tets, points);
+        let mut strays = Strays::new(tets, quantized.places.clone());
+        for home in &quantized.homes {
+            inside.put(home.tet, home.point);
+            strays.set_outside(home.point, home.outside);
+        }
+        Self { inside, border: Lists::new(tets, points), strays }
     }
 
     /// Empties the buckets of a tetrahedron, which may be a new one.
     pub fn clear(&mut self, t: u32) {
         for lists in [&mut self.inside, &mut self.border] {
-            if lists.first.len() <= t as usize {
-                lists.first.resize(t as usize + 1, NONE);
-            }
+            lists.reserve(t);
             lists.take(t);
         }
+        self.strays.clear(t);
     }
 }
 
@@ -63,8 +75,15 @@ pub(super) struct Lists {
 }
 
 impl Lists {
-    fn new(tets: usize, points: usize) -> Self {
+    pub fn new(tets: usize, points: usize) -> Self {
         Self { first: vec![NONE; tets], next: vec![NONE; points] }
+    }
+
+    /// Makes room for the list of a tetrahedron.
+    pub fn reserve(&mut self, t: u32) {
+        if self.first.len() <= t as usize {
+            self.first.resize(t as usize + 1, NONE);
+        }
     }
 
     pub fn take(&mut self, t: u32) {
@@ -86,7 +105,9 @@ pub(super) struct Reference<'a> {
     pub quantized: &'a Quantized,
     pub points: u32,
     pub skin: Skin,
-    /// Model units of displacement that count as an error of 1.
+    /// Model units of displacement of the boundary that count as an error of 1, at each vertex of the reference mesh.
+    allowances: Vec<f64>,
+    /// The most of them.
     pub displacement_per_error: f64,
 }
 
@@ -160,8 +181,10 @@ pub(super) struct Evaluator {
     faces: Vec<Face>,
     flat: bool,
     old_border: Vec<[u32; 3]>,
-    /// Where each point goes: point and cell.
-    moves: Vec<(u32, u32)>,
+    /// Where each point goes: point, cell, and whether it is outside.
+    moves: Vec<(u32, u32, bool)>,
+    /// Points of other buckets that are inside: point and cell.
+    visits: Vec<(u32, u32)>,
     border_moves: Vec<(u32, u32)>,
     /// The levels of the new vertex.
     pub levels: Vec<i32>,
@@ -219,7 +242,7 @@ impl Evaluator {
         raise(&mut self.errors, foot);
         if newest && largest(&self.errors) <= limit {
             let steps = self.steps_of_boundary(plan, data, reference);
-            self.steps = steps.map(|distance| reference.error_of(distance));
+            self.steps = steps.map(|distance| reference.least_error_of(distance));
             let step = self.steps[0].max(self.steps[1]);
             let Self { errors, inherited, .. } = self;
             errors.iter_mut().zip(inherited).for_each(|(error, own)| *error = error.max(*own + step));
@@ -244,10 +267,48 @@ impl Evaluator {
                 }
             }
         }
-        for end in [plan.a, plan.b].into_iter().filter(|&end| end < reference.points) {
+        // Those that the lattice has moved are in a bucket already.
+        let is_new = |end: &u32| *end < reference.points && !reference.quantized.is_moved(*end);
+        for end in [plan.a, plan.b].into_iter().filter(is_new) {
             error = error.max(self.place(end, 0, plan, data, reference));
         }
+        error.max(self.meet_strays(plan, data, buckets, reference))
+    }
+
+    /// The error at points of other buckets that the new star contains.
+    fn meet_strays(
+        &mut self,
+        plan: &Plan,
+        data: &VertexData,
+        buckets: &Buckets,
+        reference: &Reference<'_>,
+    ) -> f64 {
+        self.visits.clear();
+        let mut error = 0.0_f64;
+        for tet in removed(plan) {
+            for point in buckets.strays.of(tet) {
+                error = error.max(self.visit(point, plan, data, reference));
+            }
+        }
+        if plan.on_boundary && !self.flat {
+            // What is new inside is between the old boundary and the new one.
+            let rim = self.old_border.iter().flatten().map(|&v| data.positions[v as usize]);
+            let [low, high] = bounds(rim.chain([plan.position]));
+            for point in buckets.strays.between(low, high) {
+                error = error.max(self.visit(point, plan, data, reference));
+            }
+        }
         error
+    }
+
+    fn visit(&mut self, point: u32, plan: &Plan, data: &VertexData, reference: &Reference<'_>) -> f64 {
+        let relative = reference.quantized.places[point as usize] - as_vec(plan.position);
+        let (cell, lambda, depth) = locate(self.cells.len(), 0, |i| self.cells[i].barycentric * relative);
+        if depth < -SLACK {
+            return 0.0;
+        }
+        self.visits.push((point, cell as u32));
+        self.deviate(point, cell, clamped(lambda), data, reference)
     }
 
     /// Moves the points to the buckets where [`Evaluator::evaluate`] found them to belong.
@@ -263,7 +324,13 @@ impl Evaluator {
         }
         plan.stay.iter().for_each(|(s, _)| buckets.inside.take(s.tet));
         plan.fan.iter().for_each(|&(tet, ..)| buckets.inside.take(tet));
-        self.moves.iter().for_each(|&(point, cell)| buckets.inside.put(self.cells[cell as usize].tet, point));
+        removed(plan).for_each(|tet| buckets.strays.clear(tet));
+        for &(point, cell, outside) in &self.moves {
+            buckets.inside.put(self.cells[cell as usize].tet, point);
+            buckets.strays.set_outside(point, outside);
+        }
+        let visits = self.visits.iter();
+        visits.for_each(|&(point, cell)| buckets.strays.invite(self.cells[cell as usize].tet, point));
         if plan.on_boundary {
             plan.stay.iter().for_each(|(s, _)| buckets.border.take(s.tet));
             plan.fan.iter().for_each(|&(tet, ..)| buckets.border.take(tet));
@@ -369,10 +436,10 @@ impl Evaluator {
         if less < distance {
             self.foot = other;
         }
-        reference.error_of(less.min(distance))
+        reference.error_from(self.foot, less.min(distance))
     }
 
-    /// Finds where the reference vertices of the boundary go. Returns the error that the largest distance stands for.
+    /// Finds where the reference vertices of the boundary go. Returns the largest error that their distances stand for.
     fn place_on_border(
         &mut self,
         plan: &Plan,
@@ -388,9 +455,9 @@ impl Evaluator {
             let p = reference.scaled(reference.quantized.positions[point as usize]);
             let (cell, _, distance) = self.nearest(p, usize::MAX, plan, data, reference);
             self.border_moves.push((point, cell));
-            largest = largest.max(distance);
+            largest = largest.max(reference.error_at(point, distance));
         }
-        reference.error_of(largest)
+        largest
     }
 
     /// The boundary triangles of the star, before and after.
@@ -443,21 +510,22 @@ impl Evaluator {
         data: &VertexData,
         reference: &Reference<'_>,
     ) -> f64 {
-        let relative = as_vec(reference.quantized.positions[point as usize]) - as_vec(plan.position);
+        let relative = reference.quantized.places[point as usize] - as_vec(plan.position);
         let (mut cell, mut lambda, depth) =
             locate(self.cells.len(), hint, |i| self.cells[i].barycentric * relative);
         let mut displaced = 0.0;
-        if depth < -SLACK && !self.border.is_empty() {
-            let p = reference.scaled(reference.quantized.positions[point as usize]);
+        let outside = depth < -SLACK && !self.border.is_empty();
+        if outside {
+            let (p, moved) = reference.place(point);
             let (found, q, distance) = self.nearest(p, usize::MAX, plan, data, reference);
             let step = DVec3::from_array(reference.quantized.lattice.step);
             let to_q = (q - reference.scaled(plan.position)) / step;
             (cell, lambda, displaced) =
-                (found as usize, self.cells[found as usize].barycentric * to_q, distance);
+                (found as usize, self.cells[found as usize].barycentric * to_q, distance - moved);
         }
-        self.moves.push((point, cell as u32));
+        self.moves.push((point, cell as u32, outside));
         let lambda = clamped(lambda);
-        let displaced = reference.error_of(displaced);
+        let displaced = reference.error_at(point, displaced);
         raise(&mut self.errors, displaced);
         self.deviate(point, cell, lambda, data, reference).max(displaced)
     }
@@ -514,16 +582,80 @@ impl Cell {
     }
 }
 
-impl Reference<'_> {
-    /// What a displacement counts as.
-    pub fn error_of(&self, distance: f64) -> f64 {
+impl<'a> Reference<'a> {
+    /// A displacement by `edges` times the shortest edge at a vertex counts as an error of 1 there, but at most one of
+    /// `displacement_per_error`.
+    pub fn new(quantized: &'a Quantized, mesh: &WorkMesh, displacement_per_error: f64, edges: f64) -> Self {
+        let step = DVec3::from_array(quantized.lattice.step);
+        let places: Vec<DVec3> = quantized.positions.iter().map(|&q| as_vec(q) * step).collect();
+        let mut shortest = vec![f64::INFINITY; places.len()];
+        for tet in &mesh.tets {
+            for [a, b] in EDGES.map(|edge| edge.map(|i| tet[i] as usize)) {
+                let squared = places[a].distance_squared(places[b]);
+                shortest[a] = shortest[a].min(squared);
+                shortest[b] = shortest[b].min(squared);
+            }
+        }
+        // With no displacement allowed any movement is an infinite error.
+        let allowance = |squared: f64| {
+            let own = if edges > 0.0 { edges * squared.sqrt() } else { 0.0 };
+            own.min(displacement_per_error)
+        };
+        Self {
+            quantized,
+            points: places.len() as u32,
+            skin: Skin::new(&mesh.tets, &mesh.neighbors, &places),
+            allowances: shortest.into_iter().map(allowance).collect(),
+            displacement_per_error,
+        }
+    }
+
+    /// What a displacement at a reference vertex counts as.
+    pub fn error_at(&self, point: u32, distance: f64) -> f64 {
+        if distance > 0.0 { distance / self.allowances[point as usize] } else { 0.0 }
+    }
+
+    /// What a displacement from a triangle of the reference boundary counts as.
+    pub fn error_from(&self, triangle: u32, distance: f64) -> f64 {
+        if distance > 0.0 { distance / self.allowance_from(triangle) } else { 0.0 }
+    }
+
+    /// The displacement from a triangle of the reference boundary that counts as an error of 1.
+    pub fn allowance_from(&self, triangle: u32) -> f64 {
+        self.skin
+            .corners(triangle)
+            .map(|point| self.allowances[point as usize])
+            .into_iter()
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// What a displacement counts as at least, wherever it is.
+    pub fn least_error_of(&self, distance: f64) -> f64 {
         if distance > 0.0 { distance / self.displacement_per_error } else { 0.0 }
+    }
+
+    /// Where a reference vertex is in the input, in model units from the lattice's origin, and how far the lattice has moved it: what
+    /// that alone puts outside is no displacement.
+    pub fn place(&self, point: u32) -> (DVec3, f64) {
+        let p = self.quantized.places[point as usize] * DVec3::from_array(self.quantized.lattice.step);
+        (p, p.distance(self.scaled(self.quantized.positions[point as usize])))
     }
 
     /// A lattice point in model units, from the lattice's origin.
     pub fn scaled(&self, q: [i32; 3]) -> DVec3 {
         as_vec(q) * DVec3::from_array(self.quantized.lattice.step)
     }
+}
+
+/// The tetrahedra that a collapse removes.
+fn removed(plan: &Plan) -> impl Iterator<Item = u32> {
+    plan.stay.iter().map(|(s, _)| s.tet).chain(plan.fan.iter().map(|&(tet, ..)| tet))
+}
+
+/// The corners of the box around lattice points.
+pub(super) fn bounds(places: impl Iterator<Item = [i32; 3]>) -> [DVec3; 2] {
+    let all = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+    places.map(as_vec).fold(all, |[low, high], p| [low.min(p), high.max(p)])
 }
 
 pub(super) fn as_vec(q: [i32; 3]) -> DVec3 {

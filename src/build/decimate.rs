@@ -7,6 +7,7 @@ use super::Criterion;
 use super::OnProgress;
 use super::agenda::Key;
 use super::agenda::Levels;
+use super::cost::Reference;
 use super::gift_wrap::GiftWrap;
 use super::quantize;
 use super::quantize::Quantized;
@@ -64,7 +65,7 @@ pub(super) fn decimate(
     mesh::check(mesh).map_err(BuildError::Mesh)?;
     let Topology { neighbors, non_manifold, .. } =
         mesh::topology(mesh.positions.len(), &mesh.tets).map_err(BuildError::Mesh)?;
-    let quantized = quantize::quantize(mesh, config)?;
+    let quantized = quantize::quantize_cells(mesh, config)?;
     let gift_wrap = match criterion {
         Criterion::HalfEdge => None,
         Criterion::Delaunay => Some(GiftWrap::new(&quantized.positions)),
@@ -72,7 +73,8 @@ pub(super) fn decimate(
     let displacement_per_error = config.displacement * Bounds::of(&mesh.positions).diagonal();
     let work = WorkMesh::new(mesh.tets.clone(), neighbors, mesh.positions.len());
     let levels = Levels::of_purpose(config.purpose);
-    let state = State::new(work, &quantized, displacement_per_error, non_manifold, levels);
+    let reference = Reference::new(&quantized, &work, displacement_per_error, config.displacement_edges);
+    let state = State::new(work, reference, non_manifold, levels);
     let mut decimator = Decimator::new(state, gift_wrap);
     decimator.remove_all(progress)?;
     let Decimator { state, mut sequence, .. } = decimator;

@@ -9,6 +9,7 @@ use super::cost::Face;
 use super::cost::Reference;
 use super::cost::SLACK;
 use super::cost::as_vec;
+use super::cost::bounds;
 use super::cost::clamped;
 use super::cost::largest;
 use super::cost::locate;
@@ -55,8 +56,10 @@ pub(super) struct FillCost {
     /// The border of the filling in model units, made when it is first needed.
     faces: Vec<Face>,
     flat: bool,
-    /// Where each point goes: point and cell.
-    moves: Vec<(u32, u32)>,
+    /// Where each point goes: point, cell, and whether it is outside.
+    moves: Vec<(u32, u32, bool)>,
+    /// Points of other buckets that are inside: point and cell.
+    visits: Vec<(u32, u32)>,
     border_moves: Vec<(u32, u32)>,
     /// How far the boundary moves, as an error.
     pub step: f64,
@@ -111,13 +114,13 @@ impl FillCost {
         self.cells
             .extend(filling.tets.iter().map(|tet| Cell::new(tet.map(|v| as_vec(positions[v as usize])))));
         self.errors.clone_from(&legacy.errors);
-        self.place(hole.a, 0, filling, reference);
+        self.look_at_centre(hole.a, filling, reference);
         if largest(&self.errors) > limit {
             return largest(&self.errors);
         }
         self.flat = !hole.on_boundary() || hole.keeps_boundary(filling, positions);
         if !self.flat {
-            self.step = reference.error_of(self.step_of_boundary(hole, filling, reference));
+            self.step = reference.least_error_of(self.step_of_boundary(hole, filling, reference));
             if legacy.depends {
                 let Self { errors, step, .. } = self;
                 let inherited = errors.iter_mut().zip(&legacy.inherited);
@@ -145,7 +148,53 @@ impl FillCost {
                 }
             }
         }
+        error.max(self.meet_strays(hole, filling, buckets, reference))
+    }
+
+    /// Looks at the vertex that is removed before all else: as a rule the error is largest there. If the lattice has moved it, it is in a
+    /// bucket already.
+    fn look_at_centre(&mut self, a: u32, filling: &Filling, reference: &Reference<'_>) {
+        if !reference.quantized.is_moved(a) {
+            self.place(a, 0, filling, reference);
+            return;
+        }
+        let (cell, lambda, depth) = self.locate(a, 0, reference);
+        if depth >= -SLACK {
+            self.deviate(a, cell, lambda, filling, reference);
+        }
+    }
+
+    /// The error at points of other buckets that the filling contains.
+    fn meet_strays(
+        &mut self,
+        hole: &Hole,
+        filling: &Filling,
+        buckets: &Buckets,
+        reference: &Reference<'_>,
+    ) -> f64 {
+        self.visits.clear();
+        let mut error = 0.0_f64;
+        for point in hole.star.iter().flat_map(|s| buckets.strays.of(s.tet)) {
+            error = error.max(self.visit(point, filling, reference));
+        }
+        if !self.flat {
+            // What is new inside is between the old boundary and the new one.
+            let rim = hole.border.iter().flatten().chain([&hole.a]);
+            let [low, high] = bounds(rim.map(|&v| reference.quantized.positions[v as usize]));
+            for point in buckets.strays.between(low, high) {
+                error = error.max(self.visit(point, filling, reference));
+            }
+        }
         error
+    }
+
+    fn visit(&mut self, point: u32, filling: &Filling, reference: &Reference<'_>) -> f64 {
+        let (cell, lambda, depth) = self.locate(point, 0, reference);
+        if depth < -SLACK {
+            return 0.0;
+        }
+        self.visits.push((point, cell as u32));
+        self.deviate(point, cell, lambda, filling, reference)
     }
 
     /// Moves the points to the buckets where [`FillCost::evaluate`] found them to belong. `slots` are the numbers of the
@@ -165,7 +214,12 @@ impl FillCost {
         }
         let tets = hole.star.iter().map(|s| s.tet).chain(slots.iter().copied());
         tets.for_each(|t| buckets.clear(t));
-        self.moves.iter().for_each(|&(point, cell)| buckets.inside.put(slots[cell as usize], point));
+        for &(point, cell, outside) in &self.moves {
+            buckets.inside.put(slots[cell as usize], point);
+            buckets.strays.set_outside(point, outside);
+        }
+        let visits = self.visits.iter();
+        visits.for_each(|&(point, cell)| buckets.strays.invite(slots[cell as usize], point));
         self.border_moves.iter().for_each(|&(point, cell)| buckets.border.put(slots[cell as usize], point));
     }
 
@@ -183,7 +237,7 @@ impl FillCost {
         largest
     }
 
-    /// Finds where the reference vertices of the boundary go. Returns the error that the largest distance stands for.
+    /// Finds where the reference vertices of the boundary go. Returns the largest error that their distances stand for.
     fn place_on_border(
         &mut self,
         hole: &Hole,
@@ -198,9 +252,9 @@ impl FillCost {
             let p = reference.scaled(reference.quantized.positions[point as usize]);
             let (cell, _, distance) = self.nearest(p, usize::MAX, filling, reference);
             self.border_moves.push((point, cell));
-            largest = largest.max(distance);
+            largest = largest.max(reference.error_at(point, distance));
         }
-        reference.error_of(largest)
+        largest
     }
 
     /// The nearest of the first `count` boundary triangles of the filling: its cell, the nearest point, and the distance.
@@ -227,27 +281,42 @@ impl FillCost {
         filling: &Filling,
         reference: &Reference<'_>,
     ) -> (f64, usize) {
-        let position = as_vec(reference.quantized.positions[point as usize]);
-        let (mut cell, mut lambda, depth) = locate(self.cells.len(), hint, |i| {
-            let Cell { barycentric, origin } = self.cells[i];
-            barycentric * (position - origin)
-        });
+        let (mut cell, mut lambda, depth) = self.locate(point, hint, reference);
         let mut displaced = 0.0;
-        if depth < -SLACK && !filling.border.is_empty() {
-            let p = reference.scaled(reference.quantized.positions[point as usize]);
+        let outside = depth < -SLACK && !filling.border.is_empty();
+        if outside {
+            let (p, moved) = reference.place(point);
             let (found, q, distance) = self.nearest(p, usize::MAX, filling, reference);
             cell = found as usize;
             let Cell { barycentric, origin } = self.cells[cell];
             lambda = barycentric * (q / DVec3::from_array(reference.quantized.lattice.step) - origin);
-            displaced = distance;
+            displaced = distance - moved;
         }
-        self.moves.push((point, cell as u32));
-        let quantized = reference.quantized;
-        let displaced = reference.error_of(displaced);
+        self.moves.push((point, cell as u32, outside));
+        let displaced = reference.error_at(point, displaced);
         raise(&mut self.errors, displaced);
-        let corners = |f: usize| filling.tets[cell].map(|v| quantized.level(v, f));
-        let error = quantized.deviation(point, clamped(lambda), corners, &mut self.errors);
-        (error.max(displaced), cell)
+        (self.deviate(point, cell, lambda, filling, reference).max(displaced), cell)
+    }
+
+    /// The cell that contains a point, or is nearest to it: see [`locate`].
+    fn locate(&self, point: u32, hint: usize, reference: &Reference<'_>) -> (usize, DVec3, f64) {
+        let position = reference.quantized.places[point as usize];
+        locate(self.cells.len(), hint, |i| {
+            let Cell { barycentric, origin } = self.cells[i];
+            barycentric * (position - origin)
+        })
+    }
+
+    fn deviate(
+        &mut self,
+        point: u32,
+        cell: usize,
+        lambda: DVec3,
+        filling: &Filling,
+        reference: &Reference<'_>,
+    ) -> f64 {
+        let corners = |f: usize| filling.tets[cell].map(|v| reference.quantized.level(v, f));
+        reference.quantized.deviation(point, clamped(lambda), corners, &mut self.errors)
     }
 }
 
@@ -261,13 +330,15 @@ fn chords(filling: &Filling, reference: &Reference<'_>) -> f64 {
             let mut least = f64::INFINITY;
             for v in triangle {
                 if let Some(&from) = reference.skin.at(v).first().filter(|_| least > largest) {
-                    least = least.min(reference.skin.walk(p, from, largest).1);
+                    let (foot, distance) =
+                        reference.skin.walk(p, from, largest * reference.allowance_from(from));
+                    least = least.min(reference.error_from(foot, distance));
                 }
             }
             largest = largest.max(least);
         }
     }
-    reference.error_of(largest)
+    largest
 }
 
 impl Cell {

@@ -8,8 +8,8 @@
 //! evaluation*, 2000): a cheap prediction orders the candidates, the exact error decides.
 //!
 //! What is promised:
-//! - **Errors** bound the deviation from the input's field at every reference vertex, for all consistent sets, and
-//!   grow along the partial order towards the base mesh.
+//! - **Errors** bound the deviation from the input's field at every reference vertex, where the input has it, for all consistent
+//!   sets, and grow along the partial order towards the base mesh. (By insertion: where the lattice has put it.)
 //! - **Topology** never changes: the link condition is checked inside and on the boundary, and vertices at which the
 //!   input is not a manifold stay where they are.
 //! - **Geometry**: every tetrahedron is positive on the lattice, exactly. Parts of the boundary that are flat on the lattice stay
@@ -22,6 +22,7 @@
 
 mod agenda;
 mod base;
+mod beside;
 mod block_order;
 mod choice;
 mod collapse;
@@ -46,6 +47,7 @@ mod removal;
 mod rounds;
 mod sequence;
 mod skin;
+mod strays;
 mod vertex;
 mod work_mesh;
 
@@ -106,6 +108,9 @@ pub struct BuildConfig {
     /// of the domain's diagonal; not negative. With 0.2, an error of 1 % allows the boundary to move by 0.2 % of the
     /// diagonal.
     pub displacement: f64,
+    /// The same in lengths of the shortest edge of the reference mesh at each place, where that is less; infinite where cells do not
+    /// matter. With 10, an error of 1 % allows the boundary to move by a tenth of such an edge.
+    pub displacement_edges: f64,
     /// Whether tetrahedra have errors of their own, two bits each (see
     /// [`quarterings`](MultiTessellation::quarterings)): requests take fewer tetrahedra then, but each is answered from the
     /// base mesh. With [`Method::Insert`] only.
@@ -140,6 +145,7 @@ impl BuildConfig {
             lossless: Vec::new(),
             all_lossless: false,
             displacement: 0.2,
+            displacement_edges: 10.0,
             tet_errors: false,
             block_bits: kind.usual_block_bits(),
         }

@@ -2,7 +2,11 @@
 
 use super::BuildConfig;
 use super::BuildError;
+use super::beside;
+use super::beside::Home;
 use super::choice;
+use super::cost::as_vec;
+use super::cost::clamped;
 use super::place;
 use super::place::Placed;
 use super::precision;
@@ -23,11 +27,53 @@ pub(super) struct Quantized {
     pub levels: Vec<i32>,
     /// The input's values in units of levels, not rounded; errors are measured against these.
     pub exact: Vec<f64>,
+    /// The input's points in steps of the lattice, not rounded; the field is compared there.
+    pub places: Vec<DVec3>,
+    /// Where those are that the lattice has moved; nothing where there are no cells.
+    pub homes: Vec<Home>,
     /// How far the lattice moves a point at most: see [`MtInfo::quantization`](crate::mt::MtInfo::quantization).
     pub quantization: f64,
 }
 
 impl Quantized {
+    fn new(
+        mesh: &TetMesh,
+        Placed { lattice, positions }: Placed,
+        fields: Vec<FieldInfo>,
+        levels: Vec<i32>,
+        exact: Vec<f64>,
+    ) -> Self {
+        let (origin, step) = (DVec3::from(lattice.origin), DVec3::from(lattice.step));
+        let place = |(p, &q): (&[f64; 3], &[i32; 3])| {
+            let (place, rounded) = ((DVec3::from(*p) - origin) / step, as_vec(q));
+            if place.distance(rounded) < ON_LATTICE { rounded } else { place }
+        };
+        let places = mesh.positions.iter().zip(&positions).map(place).collect();
+        let quantization = place::largest_move(mesh, &lattice, &positions);
+        Self { lattice, fields, positions, levels, exact, places, homes: Vec::new(), quantization }
+    }
+
+    /// Where the lattice has put a point, in its steps.
+    pub fn rounded(&self, point: u32) -> DVec3 {
+        as_vec(self.positions[point as usize])
+    }
+
+    /// Whether the lattice has moved a point.
+    pub fn is_moved(&self, point: u32) -> bool {
+        self.places[point as usize] != self.rounded(point)
+    }
+
+    /// By how much the reference mesh, on the lattices, differs from the input's values at the input's points, as a fraction of the
+    /// range of each field, where the lattice of the positions has moved them.
+    fn losses(&self, tets: &[[u32; 4]]) -> Vec<f64> {
+        let mut losses = vec![0.0; self.fields.len()];
+        for home in &self.homes {
+            let tet = tets[home.tet as usize];
+            self.deviation(home.point, clamped(home.lambda), |f| tet.map(|v| self.level(v, f)), &mut losses);
+        }
+        losses
+    }
+
     /// The level of field `f` at point `v`.
     pub fn level(&self, v: u32, f: usize) -> i32 {
         self.levels[v as usize * self.fields.len() + f]
@@ -99,15 +145,51 @@ pub(super) fn quantize(mesh: &TetMesh, config: &BuildConfig) -> Result<Quantized
     }
     let chosen = choice::fields(mesh, config)?;
     check_finite(mesh, &chosen)?;
-    let Placed { lattice, positions } = place::place(mesh, config)?;
+    let placed = place::place(mesh, config)?;
     let fields = precision::field_lattices(&chosen, config)?;
     let per_point = |i: usize| chosen.iter().zip(&fields).map(move |(field, info)| (field.values[i], info));
     let points = 0..mesh.positions.len();
     let levels = points.clone().flat_map(|i| per_point(i).map(|(value, info)| info.nearest(value))).collect();
     let exact = points.flat_map(|i| per_point(i).map(|(x, info)| (x - info.origin) / info.step)).collect();
-    let quantization = place::largest_move(mesh, &lattice, &positions);
-    Ok(Quantized { lattice, fields, positions, levels, exact, quantization })
+    Ok(Quantized::new(mesh, placed, fields, levels, exact))
 }
+
+/// The same for a mesh whose cells are kept: errors are then measured at the input's own points.
+pub(super) fn quantize_cells(mesh: &TetMesh, config: &BuildConfig) -> Result<Quantized, BuildError> {
+    let mut quantized = quantize(mesh, config)?;
+    quantized.homes = beside::homes(&mesh.tets, &quantized).map_err(BuildError::Mesh)?;
+    let mut losses = quantized.losses(&mesh.tets);
+    // Where cells are thin for what varies across them, a finer lattice is what keeps the reference mesh near the input.
+    let is_free = config.position_bits.is_none() && config.position_tolerance.is_none();
+    let is_large = |losses: &[f64], fields: &[FieldInfo]| {
+        let own = fields.iter().map(|field| field.quantization / field.range());
+        losses.iter().zip(own).any(|(&loss, own)| loss > own + LARGEST_LOSS)
+    };
+    while is_free && is_large(&losses, &quantized.fields) {
+        let bits = quantized.lattice.bits + FINER_BITS;
+        if bits > WIDE_BITS {
+            break;
+        }
+        let finer = BuildConfig { position_bits: Some(bits), ..config.clone() };
+        let Ok(placed) = place::place(mesh, &finer) else { break };
+        let Quantized { fields, levels, exact, .. } = quantized;
+        quantized = Quantized::new(mesh, placed, fields, levels, exact);
+        quantized.homes = beside::homes(&mesh.tets, &quantized).map_err(BuildError::Mesh)?;
+        losses = quantized.losses(&mesh.tets);
+    }
+    for (field, loss) in quantized.fields.iter_mut().zip(losses) {
+        field.quantization = field.quantization.max(loss * field.range());
+    }
+    Ok(quantized)
+}
+
+/// Without other wishes the lattice of the positions is fine enough that the reference mesh has, where the input's points are, the
+/// input's values up to this fraction of the range, besides what the lattices of the fields round off.
+const LARGEST_LOSS: f64 = 0.001;
+/// Bits by which it becomes finer at a time.
+const FINER_BITS: u32 = 2;
+/// Points are taken to be on the lattice if they are nearer than this, in its steps.
+const ON_LATTICE: f64 = 1e-7;
 
 /// The error that is left at full resolution, of whichever field has the largest.
 pub(super) fn floors(info: &MtInfo) -> Vec<f64> {

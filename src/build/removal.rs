@@ -21,7 +21,6 @@ use super::quantize::Quantized;
 use super::reach;
 use super::reach::Reach;
 use super::reach::Ruler;
-use super::skin::Skin;
 use super::work_mesh::WorkMesh;
 use crate::mesh::NONE;
 use glam::DVec3;
@@ -46,25 +45,16 @@ pub(super) struct State<'a> {
 }
 
 impl<'a> State<'a> {
-    pub fn new(
-        mesh: WorkMesh,
-        quantized: &'a Quantized,
-        displacement_per_error: f64,
-        frozen: Vec<bool>,
-        levels: Levels,
-    ) -> Self {
+    pub fn new(mesh: WorkMesh, reference: Reference<'a>, frozen: Vec<bool>, levels: Levels) -> Self {
+        let quantized = reference.quantized;
         let points = quantized.positions.len();
-        let step = DVec3::from_array(quantized.lattice.step);
-        let scaled = |q: &[i32; 3]| DVec3::from_array(q.map(f64::from)) * step;
-        let places: Vec<DVec3> = quantized.positions.iter().map(scaled).collect();
-        let skin = Skin::new(&mesh.tets, &mesh.neighbors, &places);
         let mut degrees = vec![0; points];
         mesh.tets.iter().flatten().for_each(|&v| degrees[v as usize] += 1);
         Self {
             gradients: quantized.gradients(&mesh.tets),
-            reference: Reference { quantized, points: points as u32, skin, displacement_per_error },
+            reference,
             frozen,
-            buckets: Buckets::new(mesh.tets.len(), points),
+            buckets: Buckets::new(mesh.tets.len(), quantized),
             past: Past::new(mesh.tets.len()),
             versions: vec![0; points],
             degrees,

@@ -38,6 +38,11 @@ impl Skin {
         &self.around[self.starts[v as usize] as usize..self.starts[v as usize + 1] as usize]
     }
 
+    /// The corners of a triangle.
+    pub fn corners(&self, triangle: u32) -> [u32; 3] {
+        self.corners[triangle as usize]
+    }
+
     /// Walks from a triangle to ever nearer ones, until one is as near as `enough`. Returns the last one and
     /// its distance from `p`: an upper bound of how far `p` is from the boundary.
     pub fn walk(&self, p: DVec3, from: u32, enough: f64) -> (u32, f64) {

@@ -207,7 +207,8 @@ pub struct MtInfo {
     pub tetrahedra: u32,
     /// Updates of the complete MT.
     pub updates: u32,
-    /// The displacement of the boundary, in model units, that counts as an error of 1. A mesh within error `e` comes
+    /// The displacement of the boundary, in model units, that counts as an error of 1 (where cells are small, less may count as
+    /// one). A mesh within error `e` comes
     /// within `e · displacement_per_error` of every reference vertex, and no vertex of its boundary is further than
     /// that from the boundary of the reference mesh.
     pub displacement_per_error: f64,
@@ -231,6 +232,17 @@ impl MtInfo {
 }
 
 impl MtInfo {
+    /// The largest error of a field, in its units, at the reference vertices inside a mesh within `error`, where the input has them.
+    pub fn field_bound(&self, field: usize, error: f64) -> f64 {
+        error.max(self.floor(field)) * self.fields[field].range()
+    }
+
+    /// How far the boundary of a mesh within `error` is from that of the input at most, in model units, compared at the vertices of
+    /// both.
+    pub fn boundary_bound(&self, error: f64) -> f64 {
+        error * self.displacement_per_error + self.quantization
+    }
+
     /// Errors of tetrahedra by themselves are told down to this: what rounding alone can amount to, of the values
     /// at corners and of those that are compared with.
     pub fn least_own_error(&self, field: usize) -> ErrorCode {

@@ -13,6 +13,7 @@ use crate::mesh::TetMesh;
 use crate::mt::MtInfo;
 use crate::refine::Need;
 use crate::refine::Part;
+use glam::DMat3;
 use glam::DVec3;
 use std::ops::RangeInclusive;
 
@@ -21,6 +22,8 @@ pub struct Deviation<'a> {
     info: &'a MtInfo,
     input: &'a TetMesh,
     positions: Vec<[i32; 3]>,
+    /// The input's own positions, in steps of the lattice.
+    places: Vec<DVec3>,
     levels: Vec<i32>,
     /// The input's values as fractions of each field's range: `values[vertex * fields + f]`.
     values: Vec<f64>,
@@ -62,6 +65,8 @@ impl<'a> Deviation<'a> {
         }
         let positions: Vec<[i32; 3]> = input.positions.iter().map(|p| info.lattice.nearest(*p)).collect();
         let each = || (0..points).flat_map(|v| fields.iter().zip(&info.fields).map(move |(f, i)| (f[v], i)));
+        let (origin, step) = (DVec3::from(info.lattice.origin), DVec3::from(info.lattice.step));
+        let places = input.positions.iter().map(|p| (DVec3::from(*p) - origin) / step).collect();
         let levels = each().map(|(value, field)| field.nearest(value)).collect();
         let values = each().map(|(value, field)| value / field.range()).collect();
         let neighbors = crate::mesh::neighbors(&input.tets).map_err(|error| format!("the input: {error}"))?;
@@ -78,7 +83,19 @@ impl<'a> Deviation<'a> {
         boundary_vertices.retain(|&v| (v as usize).is_multiple_of(stride));
         let slack = 1e-9 * crate::geom::Bounds::of(&input.positions).diagonal();
         let cells = Cells::new(&positions);
-        Ok(Self { info, input, positions, levels, values, cells, boundary, boundary_vertices, stride, slack })
+        Ok(Self {
+            info,
+            input,
+            positions,
+            places,
+            levels,
+            values,
+            cells,
+            boundary,
+            boundary_vertices,
+            stride,
+            slack,
+        })
     }
 
     /// The input on the lattice.
@@ -161,7 +178,8 @@ impl Look<'_> {
                 if !self.asks.iter().any(asked) {
                     return;
                 }
-                let Some(weights) = barycentric(corners, self.of.positions[point as usize]) else { return };
+                let (position, place) = (self.of.positions[point as usize], self.of.places[point as usize]);
+                let Some(weights) = weights_at(corners, position, place) else { return };
                 let place = Place { tet: t, weights, displaced: 0.0 };
                 for (ask, least) in self.asks.iter().zip(least).filter(|(ask, _)| asked(ask)) {
                     *least = least.min(self.ratio(ask, point, &place));
@@ -172,8 +190,8 @@ impl Look<'_> {
             let mut failures = Failures::default();
             for point in (0..points).filter(|&point| ask.allowed[point] < f64::INFINITY) {
                 let inside = least[point * self.asks.len() + k];
-                let ratio =
-                    if inside > 1.0 { inside.min(self.ratio_at_border(ask, point as u32)) } else { inside };
+                // Inside there is one place that stands for it; only what the boundary has left outside has a choice.
+                let ratio = if inside.is_finite() { inside } else { self.ratio_at_border(ask, point as u32) };
                 found.worst_ratio = found.worst_ratio.max(ratio);
                 if ratio > 1.0 {
                     failures.add(|| self.describe(ask, point, inside, ratio));
@@ -226,7 +244,7 @@ impl Look<'_> {
 
     /// The least part of what is allowed with which some place of the boundary stands for a reference vertex.
     fn ratio_at_border(&self, ask: &Ask<'_>, point: u32) -> f64 {
-        let p = DVec3::from(self.of.info.lattice.point(self.of.positions[point as usize]));
+        let p = DVec3::from(self.of.input.positions[point as usize]);
         let per_error = self.of.info.displacement_per_error;
         let allowed = ask.allowed[point as usize];
         // Tetrahedra that values pass by, or whose colour does not matter, may have any error.
@@ -237,10 +255,13 @@ impl Look<'_> {
             Part::Everywhere | Part::Region(_) => allowed,
         };
         let mut least = f64::INFINITY;
-        self.border.triangles.within(p, reach * per_error + self.of.slack, |i, q, distance| {
+        // What the lattice has moved the vertex by is no displacement.
+        let moved = p.distance(DVec3::from(self.of.info.lattice.point(self.of.positions[point as usize])));
+        let slack = moved + self.of.slack;
+        self.border.triangles.within(p, reach * per_error + slack, |i, q, distance| {
             let (t, face) = self.border.faces[i as usize];
             let tet = self.mesh.tets[t as usize];
-            let away = (distance - self.of.slack).max(0.0);
+            let away = (distance - slack).max(0.0);
             let displaced = if away > 0.0 { away / per_error } else { 0.0 };
             let own = weights_on(q, self.border.triangles.corners[i as usize]);
             let weights = tet.map(|v| face.iter().zip(own).find(|(w, _)| **w == v).map_or(0.0, |(_, x)| x));
@@ -355,6 +376,24 @@ fn barycentric([a, b, c, d]: [[i32; 3]; 4], p: [i32; 3]) -> Option<[f64; 4]> {
     parts.iter().all(|&part| part >= 0).then(|| parts.map(|part| part as f64 / whole))
 }
 
+/// The barycentric coordinates of a reference vertex at its place in the input; none if it is outside the tetrahedron. Decided
+/// exactly where that is where the lattice has it.
+fn weights_at(corners: [[i32; 3]; 4], position: [i32; 3], place: DVec3) -> Option<[f64; 4]> {
+    let at = |q: [i32; 3]| DVec3::from_array(q.map(f64::from));
+    if place.distance(at(position)) < ON_LATTICE {
+        return barycentric(corners, position);
+    }
+    let [a, b, c, d] = corners.map(at);
+    let lambda = DMat3::from_cols(b - a, c - a, d - a).inverse() * (place - a);
+    let weights = [1.0 - lambda.element_sum(), lambda.x, lambda.y, lambda.z];
+    weights.iter().all(|&weight| weight >= -SIDE_SLACK).then_some(weights)
+}
+
+/// Points are taken to be on the lattice if they are nearer than this, in its steps.
+const ON_LATTICE: f64 = 1e-7;
+/// Barycentric coordinates this far below zero are rounding errors of a point on a face. Builders allow for more.
+const SIDE_SLACK: f64 = 1e-10;
+
 /// Lattice points sorted into the cells of a regular grid.
 struct Cells {
     points: Vec<(u32, [i32; 3])>,
@@ -404,7 +443,8 @@ impl Cells {
         let low = [0, 1, 2].map(|i| corners.iter().map(|q| q[i]).fold(i32::MAX, i32::min));
         let high = [0, 1, 2].map(|i| corners.iter().map(|q| q[i]).fold(i32::MIN, i32::max));
         let range = |axis: usize| -> RangeInclusive<usize> {
-            self.along(axis, low[axis])..=self.along(axis, high[axis])
+            // Points may be half a step beside their place on the lattice.
+            self.along(axis, low[axis].saturating_sub(1))..=self.along(axis, high[axis].saturating_add(1))
         };
         let [xs, ys, zs] = [range(0), range(1), range(2)];
         for z in zs {
@@ -412,7 +452,7 @@ impl Cells {
                 let row = (z * self.cells[1] + y) * self.cells[0];
                 let cells = self.starts[row + xs.start()] as usize..self.starts[row + xs.end() + 1] as usize;
                 for &(point, p) in &self.points[cells] {
-                    if (0..3).all(|i| low[i] <= p[i] && p[i] <= high[i]) {
+                    if (0..3).all(|i| low[i] <= p[i].saturating_add(1) && p[i] <= high[i].saturating_add(1)) {
                         visit(point);
                     }
                 }

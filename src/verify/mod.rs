@@ -13,7 +13,7 @@
 //!   boundary, the reference mesh's Euler number, no vertex without a tetrahedron.
 //! - **Error**: within the bound of each need, or what the lattices round off ([`MtInfo::floor`](crate::mt::MtInfo::floor)) where
 //!   that is more, at every reference vertex in its part, where the input has it.
-//!   Where the boundary has moved, a place on it that is near enough counts: a displacement `d` is an error
+//!   Of those that the boundary has left outside, a place on it that is near enough counts: a displacement `d` is an error
 //!   of `d / displacement_per_error`. In a view, the error is compared with the one that fills the pixels at that vertex; with a
 //!   transfer function, the colour of the interpolated value with that of the vertex.
 //! - **Boundary**: no vertex of the extracted boundary is further from the reference boundary than the bound allows.

@@ -31,8 +31,9 @@ const COLOUR_SLACK: f64 = 1e-6;
 
 impl<'a> Ask<'a> {
     pub fn new(info: &MtInfo, input: &TetMesh, need: &'a Need, bound: f64) -> Self {
-        let half_level = info.fields.iter().map(|f| 0.5 * f.step / f.range()).fold(0.0, f64::max);
-        let of_field = |error: f64| error.max(half_level) + VALUE_SLACK;
+        let floor = |f: usize| info.floor(f).max(0.5 * info.fields[f].step / info.fields[f].range());
+        let floor = (0..info.fields.len()).map(floor).fold(0.0, f64::max);
+        let of_field = |error: f64| error.max(floor) + VALUE_SLACK;
         let allowed = |p: &[f64; 3]| match &need.part {
             Part::Everywhere | Part::Values(_) => of_field(bound),
             Part::Region(region) | Part::Both(region, _) if region.contains(*p) => of_field(bound),
@@ -106,10 +107,10 @@ fn pixels(view: &View, p: [f64; 3]) -> f64 {
 }
 
 /// By how much the picture changes along a ray through the whole model if a value is shown instead of another one: the channel
-/// that changes most, colours weighted by opacity. Half a level's difference is none.
+/// that changes most, colours weighted by opacity. What the lattices round off is none.
 pub fn change(info: &FieldInfo, transfer: &Transfer, wanted: f64, shown: f64) -> f64 {
-    let half_level = 0.5 * info.step;
-    let shown = shown + (wanted - shown).clamp(-half_level, half_level);
+    let rounding = info.quantization.max(0.5 * info.step);
+    let shown = shown + (wanted - shown).clamp(-rounding, rounding);
     let [a, b] = [colour(transfer, wanted), colour(transfer, shown)];
     let largest = (0..4).map(|c| (a[c] - b[c]).abs()).fold(0.0, f64::max);
     largest / transfer.unit_length

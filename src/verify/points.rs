@@ -39,7 +39,9 @@ pub fn triangulated(mt: &impl MultiTessellation, input: &TetMesh) -> Result<TetM
         return Err(format!("full refinement: the volume times six is {ours}, that of the input {theirs}"));
     }
     let tets = mesh.tets.iter().map(|tet| tet.map(|v| point[v as usize])).collect();
-    Ok(TetMesh { tets, ..input.clone() })
+    // Insertion measures errors on the lattice.
+    let positions = places.iter().map(|&q| info.lattice.point(q)).collect();
+    Ok(TetMesh { positions, tets, ..input.clone() })
 }
 
 /// The vertices in the order of their positions, then of their levels.

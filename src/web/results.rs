@@ -102,6 +102,10 @@ export interface CoreStats {
    */
   errorBound: number;
   relativeErrorBound: number;
+  /** The same at the vertices of the input inside the mesh, in field units: `errorBound`, or what rounding leaves. */
+  fieldBound: number;
+  /** How far the boundary of the mesh is from that of the input at most, in model units. */
+  boundaryBound: number;
   /**
    * The error that is guaranteed for each need: in field units, in pixels for views, of colour and opacity for transfer
    * functions. In the order of the request, `outside` of a view behind it. Empty until `done`.
@@ -259,6 +263,8 @@ pub fn stats(stats: &RefineStats, info: &MtInfo, asked: &Asked) -> JsStats {
         ("judged", (stats.judged as f64).into()),
         ("errorBound", (stats.error_bound * field.range()).into()),
         ("relativeErrorBound", stats.error_bound.into()),
+        ("fieldBound", info.field_bound(asked.field, stats.error_bound).into()),
+        ("boundaryBound", info.boundary_bound(stats.error_bound).into()),
         ("bounds", list(&bounds)),
         ("excess", stats.excess.into()),
         ("satisfied", stats.satisfied.into()),

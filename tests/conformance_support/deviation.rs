@@ -1,7 +1,6 @@
 //! The largest error of a mesh at the reference vertices, by comparing each with everything.
 
 use super::border;
-use crate::support::domains::volume6;
 use tetralod::mesh::TetMesh;
 use tetralod::mt::CurrentMesh;
 use tetralod::mt::Mt;
@@ -9,16 +8,17 @@ use tetralod::mt::MultiTessellation;
 
 type Point = [f64; 3];
 
-/// Asserts that the field at every vertex of the reference mesh is within `epsilon` (or half a level, where that is
-/// more): in a tetrahedron around it, or at a place of the boundary so near that its distance is worth no more.
+/// Asserts that the field at every vertex of the reference mesh, where the input has it, is within `epsilon` (or what the
+/// lattices round off, where that is more): in a tetrahedron around it, or at a place of the boundary so near that its
+/// distance is worth no more.
 pub fn assert_within(reference: &TetMesh, mt: &Mt, mesh: &CurrentMesh, epsilon: f64) {
     let info = mt.info();
-    let half_level = info.fields.iter().map(|f| 0.5 * f.step / f.range()).fold(0.0, f64::max);
-    let allowed = epsilon.max(half_level) + 1e-9;
+    let rounding = (0..info.fields.len()).map(|f| info.floor(f)).fold(0.0, f64::max);
+    let allowed = epsilon.max(rounding) + 1e-9;
     let tets: Vec<[u32; 4]> = (0..mesh.tet_slots() as u32).filter_map(|t| mesh.tet(t)).collect();
     let border = border(&tets);
     for (i, p) in reference.positions.iter().enumerate() {
-        let at = info.lattice.nearest(*p);
+        let at = [0, 1, 2].map(|k| (p[k] - info.lattice.origin[k]) / info.lattice.step[k]);
         // The largest difference of any field, interpolated from these slots.
         let difference = |slots: &[u32], weights: &[f64]| {
             let fields = info.fields.iter().zip(&reference.fields).enumerate();
@@ -35,10 +35,9 @@ pub fn assert_within(reference: &TetMesh, mt: &Mt, mesh: &CurrentMesh, epsilon: 
         });
         let mut least = inside.fold(f64::INFINITY, f64::min);
         if least > allowed {
-            let at = info.lattice.point(at);
             for face in &border {
                 let corners = face.map(|v| info.lattice.point(mesh.positions()[v as usize]));
-                let (distance, weights) = nearest(at, corners);
+                let (distance, weights) = nearest(*p, corners);
                 let displaced = if distance > 1e-9 { distance / info.displacement_per_error } else { 0.0 };
                 least = least.min(difference(face, &weights).max(displaced));
             }
@@ -47,11 +46,17 @@ pub fn assert_within(reference: &TetMesh, mt: &Mt, mesh: &CurrentMesh, epsilon: 
     }
 }
 
-/// Barycentric coordinates; none outside.
-fn barycentric([a, b, c, d]: [[i32; 3]; 4], p: [i32; 3]) -> Option<[f64; 4]> {
-    let parts = [[p, b, c, d], [a, p, c, d], [a, b, p, d], [a, b, c, p]].map(volume6);
-    let whole = volume6([a, b, c, d]) as f64;
-    parts.iter().all(|&part| part >= 0).then(|| parts.map(|part| part as f64 / whole))
+/// Barycentric coordinates of a point in steps of the lattice; none outside.
+fn barycentric(corners: [[i32; 3]; 4], p: Point) -> Option<[f64; 4]> {
+    let [a, b, c, d] = corners.map(|corner| corner.map(f64::from));
+    let volume6 = |[a, b, c, d]: [Point; 4]| {
+        let (u, v, w) = (minus(b, a), minus(c, a), minus(d, a));
+        let cross = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+        dot(cross, w)
+    };
+    let whole = volume6([a, b, c, d]);
+    let parts = [[p, b, c, d], [a, p, c, d], [a, b, p, d], [a, b, c, p]].map(|tet| volume6(tet) / whole);
+    parts.iter().all(|&part| part >= -1e-9).then_some(parts)
 }
 
 fn minus(a: Point, b: Point) -> Point {

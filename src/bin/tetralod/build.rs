@@ -88,6 +88,13 @@ pub struct Arguments {
     /// Keep the exact values of all fields or (repeatable) of one.
     #[arg(long, value_name = "NAME", num_args = 0..=1, require_equals = true, default_missing_value = "")]
     lossless: Vec<String>,
+    /// The displacement of the boundary that counts as an error of 100 %, in % of the domain's diagonal [default: 20%].
+    #[arg(long, value_name = "X%", value_parser = share)]
+    displacement: Option<f64>,
+    /// The same in lengths of the shortest edge of the input at each place, where that is less; inf where cells do not matter
+    /// [default: 10].
+    #[arg(long, value_name = "N", value_parser = lengths)]
+    displacement_edges: Option<f64>,
     /// Updates in a block, the least that can be fetched of the file by itself: a power of two, 16 to 65536 [default: 2048, 512 for kind
     /// half-edge].
     #[arg(long, value_name = "N", value_parser = block_bits)]
@@ -132,6 +139,18 @@ fn tolerance(text: &str) -> Result<Precision> {
     let number = number.trim().parse().ok().filter(|x: &f64| *x >= 0.0 && x.is_finite());
     let number = number.context("it must be a number, or a percentage as 1%, or NAME= and that")?;
     Ok(Precision { name, precision: unit(number) })
+}
+
+/// A part of the diagonal.
+fn share(text: &str) -> Result<f64> {
+    let percent = text.trim().strip_suffix('%').and_then(|number| number.trim().parse().ok());
+    let percent = percent.filter(|x: &f64| *x >= 0.0 && x.is_finite());
+    Ok(percent.context("it must be a percentage of the diagonal, as 20%")? / 100.0)
+}
+
+/// How many edges.
+fn lengths(text: &str) -> Result<f64> {
+    text.trim().parse().ok().filter(|x: &f64| *x >= 0.0).context("it must be a number of at least 0, or inf")
 }
 
 /// log2 of the updates of a block.
@@ -286,6 +305,8 @@ fn config(arguments: &Arguments) -> BuildConfig {
         precision_of: precision.iter().filter_map(of_one).collect(),
         lossless: arguments.lossless.iter().filter(|name| !name.is_empty()).cloned().collect(),
         all_lossless: arguments.lossless.iter().any(String::is_empty),
+        displacement: arguments.displacement.unwrap_or(default.displacement),
+        displacement_edges: arguments.displacement_edges.unwrap_or(default.displacement_edges),
         tet_errors: arguments.tet_errors,
         block_bits: arguments.block_updates.unwrap_or(default.block_bits),
         ..default

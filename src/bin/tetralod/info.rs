@@ -52,6 +52,8 @@ struct Report {
     position_bits: u32,
     /// How far the lattice moves a vertex at most, in model units.
     position_quantization: f64,
+    /// The displacement of the boundary, in model units, that counts as an error of 1; of less in small cells.
+    displacement_per_error: f64,
     depth: u32,
     arcs_per_node: f64,
     tets_per_update: f64,
@@ -155,6 +157,7 @@ fn report(opened: &Opened) -> Result<Report> {
         bounds: [x0, y0, z0, x1, y1, z1],
         position_bits: info.lattice.bits,
         position_quantization: info.quantization,
+        displacement_per_error: info.displacement_per_error,
         depth: stats.depth,
         arcs_per_node: stats.arcs_per_update(),
         tets_per_update: stats.inserted_per_update(),

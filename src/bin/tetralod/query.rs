@@ -265,6 +265,10 @@ pub struct Summary {
     pub error_bound: Option<f64>,
     /// As a fraction of the field's range.
     pub relative_error_bound: Option<f64>,
+    /// Of the field at the vertices of the input inside the mesh, in its units: the error bound, or what rounding leaves.
+    pub field_bound: Option<f64>,
+    /// How far the boundary is from that of the input, in model units.
+    pub boundary_bound: Option<f64>,
     /// How often the error exceeds what was asked for, at most.
     pub excess: Option<f64>,
     pub satisfied: bool,
@@ -291,7 +295,7 @@ pub struct NeedReport {
     pub bound: Option<f64>,
 }
 
-fn summary(opened: &Opened, field: usize, stats: &RefineStats, wanted: &[Wanted]) -> Result<Summary> {
+fn summary(opened: &Opened, number: usize, stats: &RefineStats, wanted: &[Wanted]) -> Result<Summary> {
     let known = |value: f64| (stats.done && value.is_finite()).then_some(value);
     let report = |(i, wanted): (usize, &Wanted)| NeedReport {
         need: wanted.name.clone(),
@@ -299,7 +303,8 @@ fn summary(opened: &Opened, field: usize, stats: &RefineStats, wanted: &[Wanted]
         asked: wanted.need.error,
         bound: stats.bounds.get(i).copied().and_then(known),
     };
-    let field = &opened.info()?.fields[field];
+    let info = opened.info()?;
+    let field = &info.fields[number];
     Ok(Summary {
         field: field.name.clone(),
         vertices: stats.vertices,
@@ -307,6 +312,8 @@ fn summary(opened: &Opened, field: usize, stats: &RefineStats, wanted: &[Wanted]
         updates_applied: stats.applied,
         error_bound: known(stats.error_bound * field.range()),
         relative_error_bound: known(stats.error_bound),
+        field_bound: known(info.field_bound(number, stats.error_bound)),
+        boundary_bound: known(info.boundary_bound(stats.error_bound)),
         excess: known(stats.excess),
         satisfied: stats.satisfied,
         done: stats.done,
@@ -336,6 +343,9 @@ impl Summary {
             ("updates applied", output::count(self.updates_applied)),
             ("error bound", bound),
         ];
+        if let Some(bound) = self.boundary_bound {
+            rows.push(("boundary within", output::number(bound)));
+        }
         // One need of the field says no more than the bound.
         if self.needs.len() > 1 || self.needs.iter().any(|need| need.unit != needs::RELATIVE) {
             rows.extend(self.needs.iter().map(|need| ("need", need.sentence())));

@@ -4,6 +4,7 @@ use super::Criterion;
 use super::Decimated;
 use super::Decimator;
 use super::Levels;
+use super::Reference;
 use super::State;
 use super::WorkMesh;
 use super::decimate;
@@ -18,6 +19,7 @@ use crate::build::sequence::Insertion;
 use crate::geom::in_conflict;
 use crate::geom::nearest_on_triangle;
 use crate::geom::orient3d;
+use crate::mesh::EDGES;
 use crate::mesh::FACES;
 use crate::mesh::Field;
 use crate::mesh::Grid;
@@ -290,6 +292,17 @@ fn distance(result: &Decimated, border: &[(usize, [u32; 3])], point: u32) -> f64
     border.iter().map(to).fold(f64::INFINITY, f64::min)
 }
 
+/// The boundary triangles of some tetrahedra of a mesh, and whose they are.
+fn border_of(mesh: &TetMesh, tets: &[[u32; 4]]) -> Vec<(usize, [u32; 3])> {
+    let around = topology(mesh.positions.len(), tets).expect("a conforming mesh").neighbors;
+    let mut border = Vec::new();
+    for (t, tet) in tets.iter().enumerate() {
+        let faces = (0..4).filter(|&k| around[t][k] == NONE);
+        border.extend(faces.map(|k| (t, FACES[k].map(|l| tet[l]))));
+    }
+    border
+}
+
 fn boundary_vertices(mesh: &TetMesh) -> BTreeSet<u32> {
     let around = topology(mesh.positions.len(), &mesh.tets).expect("a conforming mesh").neighbors;
     let faces = |(tet, around): (&[u32; 4], &[u32; 4])| {
@@ -311,12 +324,7 @@ fn every_reference_vertex_is_within_the_error() {
                 let wanted = result.sequence.steps.iter().filter(|step| largest(&step.errors) > bound);
                 wanted.for_each(|step| replay.insert(&result, step));
                 let tets = replay.tets();
-                let around = topology(mesh.positions.len(), &tets).expect("a conforming mesh").neighbors;
-                let mut border = Vec::new();
-                for (t, tet) in tets.iter().enumerate() {
-                    let faces = (0..4).filter(|&k| around[t][k] == NONE);
-                    border.extend(faces.map(|k| (t, FACES[k].map(|l| tet[l]))));
-                }
+                let border = border_of(&mesh, &tets);
                 let allowed = bound * (1.0 + 1e-6) + 1e-5;
                 for &point in &rim {
                     let distance = distance(&result, &border, point);
@@ -330,6 +338,45 @@ fn every_reference_vertex_is_within_the_error() {
                     let good = is_within(&result, &tets, &border, point, allowed);
                     assert!(good, "{name} {criterion:?} {purpose:?}: point {point} at {bound}");
                 }
+            }
+        }
+    }
+}
+
+/// Where edges are short the boundary moves by less.
+#[test]
+fn the_boundary_moves_by_a_part_of_the_edges_there() {
+    let mut mesh = bent(blocks([8, 4, 4], |_| true));
+    for p in &mut mesh.positions {
+        // One end is much finer than the other.
+        *p = p.map(|x| x * 1.5_f64.powf(2.0 * p[0]));
+    }
+    let most = 1.0;
+    for (criterion, purpose) in WAYS {
+        let fields = vec![mesh.fields[0].name.clone()];
+        let config = BuildConfig { fields, purpose, displacement_edges: most, ..BuildConfig::default() };
+        let result =
+            decimate(&mesh, &config, criterion, &mut |_| ControlFlow::Continue(())).expect("a valid mesh");
+        let step = DVec3::from_array(result.quantized.lattice.step);
+        let at = |v: u32| result.quantized.rounded(v) * step;
+        let mut shortest = vec![f64::INFINITY; mesh.positions.len()];
+        for tet in &mesh.tets {
+            for [a, b] in EDGES.map(|edge| edge.map(|i| tet[i])) {
+                let length = at(a).distance(at(b));
+                [a, b].iter().for_each(|&v| shortest[v as usize] = shortest[v as usize].min(length));
+            }
+        }
+        let rim = boundary_vertices(&mesh);
+        for bound in [0.05, 0.2, 0.5] {
+            let mut replay = Replay::new(&result.sequence.base);
+            let wanted = result.sequence.steps.iter().filter(|step| largest(&step.errors) > bound);
+            wanted.for_each(|step| replay.insert(&result, step));
+            let tets = replay.tets();
+            let border = border_of(&mesh, &tets);
+            for &point in &rim {
+                let allowed = bound * (most * shortest[point as usize]).min(result.displacement_per_error);
+                let found = distance(&result, &border, point);
+                assert!(found <= allowed + 1e-9, "{criterion:?} {purpose:?} {bound}: {point} by {found}");
             }
         }
     }
@@ -453,7 +500,8 @@ fn the_removals_of_a_round_are_independent() {
             let topology = topology(mesh.positions.len(), &mesh.tets).expect("a conforming mesh");
             let work = WorkMesh::new(mesh.tets.clone(), topology.neighbors, mesh.positions.len());
             let levels = Levels::of_purpose(purpose);
-            let state = State::new(work, &quantized, 1.0, topology.non_manifold, levels);
+            let reference = Reference::new(&quantized, &work, 1.0, f64::INFINITY);
+            let state = State::new(work, reference, topology.non_manifold, levels);
             let wrap = (criterion == Criterion::Delaunay).then(|| GiftWrap::new(&quantized.positions));
             let mut decimator = Decimator::new(state, wrap);
             // The removal that made each tetrahedron, and the boxes of the removals.
