@@ -249,11 +249,14 @@ impl Session {
         }
     }
 
-    /// The request is another one: works out what it needs.
+    /// The request is another one: works out what it needs. Where the mesh shows that, it has to move first: what a mesh that was made
+    /// for another request asks for may not be needed.
     pub(super) fn plan_for(&mut self, criterion: Arc<dyn Criterion>) {
         if let Some(blocks) = &mut self.blocks {
             blocks.criterion = Some(criterion);
-            self.plan();
+            if self.decoder.mt().is_none_or(Mt::needs_parents) {
+                self.plan();
+            }
         }
     }
 
