@@ -67,14 +67,13 @@ export function coreMethods(emit) {
     } while (!step.stats.done);
     return step;
   };
-  /** Resolves when all is here that the mesh needs. In half-edge MTs what has come shows what else that is. */
+  /** Resolves when all is here that the mesh needs. What has come may show what else that is. */
   const settled = async () => {
-    const showsMore = session.info().kind === "half-edge";
     let here;
     do {
       await parts.settled();
       here = session.blocks().here;
-      if (!showsMore || goal === 0) return;
+      if (goal === 0) return;
       // News stays news for those who follow the mesh.
       session.step(Infinity, Infinity);
       parts.follow();

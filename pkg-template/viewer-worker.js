@@ -105,8 +105,15 @@ const methods = {
     return { progress: mine.progress, info: { ...viewer.info(), bounds: Array.from(viewer.bounds()) } };
   },
 
-  /** Resolves when all has come that the mesh needs. */
-  settled: () => parts?.settled(),
+  /** Resolves when all has come that the mesh needs. What has come may show what else that is. */
+  async settled() {
+    const mine = parts;
+    await mine?.settled();
+    while (mine && mine === parts && !broken && (following !== undefined || viewer.moving)) {
+      await drawn();
+      await mine.settled();
+    }
+  },
 
   retry: () => parts?.retry(),
 

@@ -67,8 +67,8 @@ impl Promise {
 /// Allowance for the rounding errors of the measurement itself.
 const ROUNDING: f64 = 1.000_01;
 /// Points are taken to be on the lattice if they are nearer than this, in its steps.
-const ON_LATTICE: f64 = 1e-7;
-/// Barycentric coordinates this far below zero are rounding errors of a point on a face.
+pub(crate) const ON_LATTICE: f64 = 1e-7;
+/// Barycentric coordinates this far below zero are rounding errors of a point on a face. Builders allow for more.
 const SIDE_SLACK: f64 = 1e-10;
 
 /// What was measured.
@@ -169,7 +169,9 @@ impl Measure<'_> {
         // A point may be half a step beside its place on the lattice.
         let (low, high) = (low.map(|x| x.saturating_sub(1)), high.map(|x| x.saturating_add(1)));
         raster.for_each_between(low, high, |point| {
-            let Some(weights) = self.weights_at(corners, point) else { return };
+            let place =
+                (point.place - DVec3::from(self.info.lattice.origin)) / DVec3::from(self.info.lattice.step);
+            let Some(weights) = weights_at(corners, point.at, place) else { return };
             point.inside = true;
             if spans {
                 let value: f64 = weights.iter().zip(values).map(|(w, v)| w * v).sum();
@@ -179,20 +181,6 @@ impl Measure<'_> {
                 }
             }
         });
-    }
-
-    /// The barycentric coordinates of a point where the input has it; none if it is outside the tetrahedron.
-    fn weights_at(&self, corners: [[i32; 3]; 4], point: &Point) -> Option<[f64; 4]> {
-        let (origin, step) = (DVec3::from(self.info.lattice.origin), DVec3::from(self.info.lattice.step));
-        let at = |q: [i32; 3]| DVec3::from_array(q.map(f64::from));
-        let place = (point.place - origin) / step;
-        if place.distance(at(point.at)) < ON_LATTICE {
-            return barycentric(corners, point.at);
-        }
-        let [a, b, c, d] = corners.map(at);
-        let lambda = DMat3::from_cols(b - a, c - a, d - a).inverse() * (place - a);
-        let weights = [1.0 - lambda.element_sum(), lambda.x, lambda.y, lambda.z];
-        weights.iter().all(|&weight| weight >= -SIDE_SLACK).then_some(weights)
     }
 
     /// Whether what is promised has been found at a point.
@@ -308,6 +296,19 @@ impl Triangle {
         let w = (b - a).cross(q - a).dot(normal) / area;
         self.values[0] * (1.0 - v - w) + self.values[1] * v + self.values[2] * w
     }
+}
+
+/// The barycentric coordinates of a point that is at `place`, in steps of the lattice, which has it at `position`; none if it is
+/// outside the tetrahedron. Decided exactly where the lattice has not moved it.
+pub(crate) fn weights_at(corners: [[i32; 3]; 4], position: [i32; 3], place: DVec3) -> Option<[f64; 4]> {
+    let at = |q: [i32; 3]| DVec3::from_array(q.map(f64::from));
+    if place.distance(at(position)) < ON_LATTICE {
+        return barycentric(corners, position);
+    }
+    let [a, b, c, d] = corners.map(at);
+    let lambda = DMat3::from_cols(b - a, c - a, d - a).inverse() * (place - a);
+    let weights = [1.0 - lambda.element_sum(), lambda.x, lambda.y, lambda.z];
+    weights.iter().all(|&weight| weight >= -SIDE_SLACK).then_some(weights)
 }
 
 /// The barycentric coordinates of `p`; none if it is outside the tetrahedron.

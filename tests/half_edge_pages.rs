@@ -95,6 +95,11 @@ impl Paged {
         let found: Vec<bool> = (0..self.whole.info().updates).map(|u| front.contains(UpdateId(u))).collect();
         assert_eq!(found, wanted, "{request:?}");
         front.mesh().check().expect("a valid mesh");
+        let held: Option<u64> = (0..self.pages())
+            .filter(|&page| self.mt.has_page(page))
+            .map(|page| self.mt.bytes_of_page(page))
+            .sum();
+        assert_eq!(held, Some(self.mt.page_bytes()));
         let lacks = self.asked(&criterion, &vec![true; found.len()]).iter().any(|&u| !found[u as usize]);
         assert!(outcome.missing || !lacks, "{request:?}");
         // What is demanded is not here, and what is lacking is found by what is demanded again and again.

@@ -1,11 +1,14 @@
 //! Promise: errors are bounded where the input has its vertices, not only where the lattice has put them, also where cells are so thin
 //! that the one is far from the other.
 
+mod bound_support;
 mod build_support;
 #[allow(dead_code, reason = "other tests use the rest")]
 #[path = "support/random.rs"]
 mod random;
 
+use bound_support::errors_inside;
+use bound_support::refined;
 use build_support::blocks;
 use random::Random;
 use std::ops::ControlFlow;
@@ -20,9 +23,6 @@ use tetralod::mt::Mt;
 use tetralod::mt::MtInfo;
 use tetralod::mt::MtKind;
 use tetralod::mt::MultiTessellation;
-use tetralod::refine::Front;
-use tetralod::refine::LodCriterion;
-use tetralod::refine::Request;
 use tetralod::verify;
 use tetralod::verify::Reference;
 
@@ -54,41 +54,9 @@ fn made(mesh: &TetMesh, kind: MtKind, position_bits: Option<u32>) -> Mt {
     build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt
 }
 
-fn refined(mt: &Mt, error: f64) -> (Front, f64) {
-    let mut front = Front::new(mt).expect("a valid base mesh");
-    let request = Request::within(error);
-    let criterion = LodCriterion::new(mt.info(), &request);
-    let outcome = front.satisfy(mt, &criterion, request.budget).expect("a valid MT");
-    (front, outcome.error.error())
-}
-
-/// The largest error, as a fraction of the range, at the vertices of the input that are inside the mesh.
+/// The largest error at the vertices of the input that are inside the mesh.
 fn largest_error(info: &MtInfo, mesh: &CurrentMesh, input: &TetMesh) -> f64 {
-    let mut largest = 0.0_f64;
-    for (p, value) in input.positions.iter().zip(&input.fields[0].values) {
-        let mut least = f64::INFINITY;
-        for tet in mesh.tets() {
-            let corners = tet.map(|v| info.lattice.point(mesh.positions()[v as usize]));
-            let side = |a: [f64; 3], b: [f64; 3], c: [f64; 3], d: [f64; 3]| {
-                let [u, v, w] = [b, c, d].map(|q| [q[0] - a[0], q[1] - a[1], q[2] - a[2]]);
-                u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0])
-                    + u[2] * (v[0] * w[1] - v[1] * w[0])
-            };
-            let [a, b, c, d] = corners;
-            let whole = side(a, b, c, d);
-            let weights = [side(*p, b, c, d), side(a, *p, c, d), side(a, b, *p, d), side(a, b, c, *p)]
-                .map(|x| x / whole);
-            if weights.iter().all(|&w| w >= -1e-9) {
-                let shown: f64 =
-                    tet.iter().zip(weights).map(|(&v, w)| w * info.fields[0].value(mesh.levels(v)[0])).sum();
-                least = least.min((shown - value).abs() / info.fields[0].range());
-            }
-        }
-        if least.is_finite() {
-            largest = largest.max(least);
-        }
-    }
-    largest
+    errors_inside(info, mesh, input).into_iter().fold(0.0, f64::max)
 }
 
 #[test]

@@ -219,6 +219,7 @@ impl<'a> Parts<'a> {
                 behind[block] = self.weight(&hull) * (list.len() - block * self.size) as f64;
             }
             hull = Hull::EMPTY;
+            // In front of the first block there is nothing to cut off.
             for (cut, behind) in behind.iter().enumerate().skip(1) {
                 add(&mut hull, cut - 1);
                 let sum = self.weight(&hull) * (cut * self.size) as f64 + behind;

@@ -285,18 +285,10 @@ impl Evaluator {
     ) -> f64 {
         self.visits.clear();
         let mut error = 0.0_f64;
-        for tet in removed(plan) {
-            for point in buckets.strays.of(tet) {
-                error = error.max(self.visit(point, plan, data, reference));
-            }
-        }
-        if plan.on_boundary && !self.flat {
-            // What is new inside is between the old boundary and the new one.
-            let rim = self.old_border.iter().flatten().map(|&v| data.positions[v as usize]);
-            let [low, high] = bounds(rim.chain([plan.position]));
-            for point in buckets.strays.between(low, high) {
-                error = error.max(self.visit(point, plan, data, reference));
-            }
+        let rim = self.old_border.iter().flatten().map(|&v| data.positions[v as usize]);
+        let changed = (plan.on_boundary && !self.flat).then(|| bounds(rim.chain([plan.position])));
+        for point in buckets.strays.met(removed(plan), changed) {
+            error = error.max(self.visit(point, plan, data, reference));
         }
         error
     }
@@ -352,8 +344,7 @@ impl Evaluator {
         let (fields, mut height) = (self.levels.len(), 0);
         self.inherited.clear();
         self.inherited.resize(fields, 0.0);
-        let stay = plan.stay.iter().map(|(s, _)| s.tet);
-        for tet in stay.chain(plan.fan.iter().map(|&(tet, ..)| tet)) {
+        for tet in removed(plan) {
             let newest = mesh.tets[tet as usize].into_iter().fold(0, u32::max) as usize;
             let errors = &data.errors[newest * fields..][..fields];
             self.inherited.iter_mut().zip(errors).for_each(|(error, made)| *error = error.max(*made));
@@ -449,9 +440,8 @@ impl Evaluator {
     ) -> f64 {
         self.border_moves.clear();
         let mut largest = 0.0_f64;
-        let tets = plan.stay.iter().map(|(s, _)| s.tet).chain(plan.fan.iter().map(|&(tet, ..)| tet));
         let ends = [plan.a, plan.b].into_iter().filter(|&end| end < reference.points);
-        for point in tets.flat_map(|tet| buckets.border.iter(tet)).chain(ends) {
+        for point in removed(plan).flat_map(|tet| buckets.border.iter(tet)).chain(ends) {
             let p = reference.scaled(reference.quantized.positions[point as usize]);
             let (cell, _, distance) = self.nearest(p, usize::MAX, plan, data, reference);
             self.border_moves.push((point, cell));

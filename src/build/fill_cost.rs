@@ -174,16 +174,10 @@ impl FillCost {
     ) -> f64 {
         self.visits.clear();
         let mut error = 0.0_f64;
-        for point in hole.star.iter().flat_map(|s| buckets.strays.of(s.tet)) {
+        let rim = hole.border.iter().flatten().chain([&hole.a]);
+        let changed = (!self.flat).then(|| bounds(rim.map(|&v| reference.quantized.positions[v as usize])));
+        for point in buckets.strays.met(hole.star.iter().map(|s| s.tet), changed) {
             error = error.max(self.visit(point, filling, reference));
-        }
-        if !self.flat {
-            // What is new inside is between the old boundary and the new one.
-            let rim = hole.border.iter().flatten().chain([&hole.a]);
-            let [low, high] = bounds(rim.map(|&v| reference.quantized.positions[v as usize]));
-            for point in buckets.strays.between(low, high) {
-                error = error.max(self.visit(point, filling, reference));
-            }
         }
         error
     }

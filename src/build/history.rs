@@ -77,7 +77,6 @@ pub(super) fn edge_mt(
         parents: &found.parents,
         sites: &found.sites,
         bits,
-        created: 2,
     };
     let order: Vec<u32> =
         updates.order(block_bits.clamp(4, 16)).into_iter().map(|u| falling[u as usize]).collect();

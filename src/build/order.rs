@@ -19,9 +19,10 @@ pub(super) struct Updates<'a> {
     /// Where each takes place, on a lattice of `bits` bits.
     pub sites: &'a [[i32; 3]],
     pub bits: u32,
-    /// Vertices that an update creates.
-    pub created: u32,
 }
+
+/// Vertices that a split creates.
+const CREATED: u32 = 2;
 
 /// Models of so many updates or fewer are always fetched as a whole; nothing is gained by putting what is near together.
 const SMALL: usize = 1 << 17;
@@ -89,8 +90,8 @@ impl Updates<'_> {
         let vertex = self.vertices[u as usize];
         match vertex.checked_sub(self.base) {
             Some(created) => {
-                let [creator, place] = [created / self.created, created % self.created];
-                self.base + self.created * new_numbers[creator as usize] + place
+                let [creator, place] = [created / CREATED, created % CREATED];
+                self.base + CREATED * new_numbers[creator as usize] + place
             }
             None => vertex,
         }

@@ -12,6 +12,7 @@ use super::place::Placed;
 use super::precision;
 use crate::geom::Lattice;
 use crate::geom::WIDE_BITS;
+use crate::measure::ON_LATTICE;
 use crate::mesh::Field;
 use crate::mesh::TetMesh;
 use crate::mt::FieldInfo;
@@ -188,8 +189,6 @@ pub(super) fn quantize_cells(mesh: &TetMesh, config: &BuildConfig) -> Result<Qua
 const LARGEST_LOSS: f64 = 0.001;
 /// Bits by which it becomes finer at a time.
 const FINER_BITS: u32 = 2;
-/// Points are taken to be on the lattice if they are nearer than this, in its steps.
-const ON_LATTICE: f64 = 1e-7;
 
 /// The error that is left at full resolution, of whichever field has the largest.
 pub(super) fn floors(info: &MtInfo) -> Vec<f64> {

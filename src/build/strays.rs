@@ -49,13 +49,20 @@ impl Strays {
         }
     }
 
-    /// The guests of a tetrahedron.
-    pub fn of(&self, t: u32) -> impl Iterator<Item = u32> {
-        self.guests.iter(t)
+    /// The vertices that what replaces these tetrahedra may come to contain although they are in other buckets: the guests, and
+    /// where the boundary changes inside of a box, those in the box that no tetrahedron contains. What is new inside is between the
+    /// old boundary and the new one.
+    pub fn met(
+        &self,
+        tets: impl Iterator<Item = u32>,
+        changed: Option<[DVec3; 2]>,
+    ) -> impl Iterator<Item = u32> {
+        let guests = tets.flat_map(|t| self.guests.iter(t));
+        guests.chain(changed.into_iter().flat_map(|[low, high]| self.between(low, high)))
     }
 
     /// The vertices between two corners of a box that no tetrahedron contains.
-    pub fn between(&self, low: DVec3, high: DVec3) -> impl Iterator<Item = u32> {
+    fn between(&self, low: DVec3, high: DVec3) -> impl Iterator<Item = u32> {
         let [from, to] = [low, high].map(|p| self.grid.cell(p));
         let rows = (from[0]..=to[0]).flat_map(move |x| (from[1]..=to[1]).map(move |y| self.grid.row(x, y)));
         let cells = rows.flat_map(move |row| row + from[2]..=row + to[2]);
@@ -133,11 +140,16 @@ mod tests {
         strays.invite(0, 4);
         strays.invite(5, 30);
         assert_eq!(found(&strays), [2, 3, 5, 6, 7]);
-        assert_eq!((strays.of(0).count(), strays.of(1).collect::<Vec<u32>>()), (0, vec![4]));
+        let guests = |strays: &Strays, t: u32| strays.met([t].into_iter(), None).collect::<Vec<u32>>();
+        assert_eq!((guests(&strays, 0), guests(&strays, 1)), (vec![], vec![4]));
+        let whole = [DVec3::ZERO, DVec3::splat(9.0)];
+        let mut met: Vec<u32> = strays.met([0, 1].into_iter(), Some(whole)).collect();
+        met.sort_unstable();
+        assert_eq!(met, [0, 1, 2, 3, 4, 5, 6, 7], "guests and those outside, each once");
         strays.set_outside(6, false);
         strays.clear(1);
         strays.clear(7);
         assert_eq!(found(&strays), [2, 3, 4, 5, 7]);
-        assert_eq!((strays.of(1).count(), strays.of(7).count()), (0, 0));
+        assert_eq!((guests(&strays, 1), guests(&strays, 7)), (vec![], vec![]));
     }
 }

@@ -86,6 +86,8 @@ pub struct HalfEdgeMt {
     /// The end of the last page that is here.
     updates: u32,
     present: u32,
+    /// Bytes of the pages that are here.
+    page_bytes: u64,
     to_come: ErrorCode,
     /// Page by page and field by field, what bounds the errors of a page that is not here.
     bounds: Vec<ErrorCode>,
@@ -204,6 +206,7 @@ impl HalfEdgeMt {
             near: Sparse::new(NONE),
             updates: 0,
             present: 0,
+            page_bytes: 0,
             to_come: ErrorCode::MAX,
             bounds: Vec::new(),
             zeros: Vec::new(),
@@ -251,8 +254,8 @@ impl HalfEdgeMt {
     /// Adds the next update, behind all that are here.
     ///
     /// # Errors
-    /// Children must come later, be on the lattice and of no other vertex, and each field has a level and an error. What needs the mesh is checked
-    /// when the update is applied; that errors do not grow along the partial order is the caller's to see to.
+    /// Children must come later, be on the lattice and of no other vertex, and each field has a level and an error. What needs
+    /// the mesh is checked when the update is applied; that errors do not grow along the partial order is the caller's to see to.
     pub fn push(&mut self, new: &HalfEdgeUpdate<'_>) -> Result<UpdateId, UpdateError> {
         let update = self.updates;
         if update >= self.info.updates {
@@ -261,12 +264,14 @@ impl HalfEdgeMt {
         self.check(update, new)?;
         self.note_children(self.vertex(UpdateId(update)).0, new.children)?;
         if update as usize >> self.page_bits == self.pages.len() {
-            self.pages.push(Some(Page::new(self.info.fields.len())));
+            let page = Page::new(self.info.fields.len());
+            self.page_bytes += page.bytes() as u64;
+            self.pages.push(Some(page));
         }
         // The last page is here, and has an error for each field.
-        if let Some(Some(page)) = self.pages.last_mut() {
+        self.change_last(|page| {
             page.push(new);
-        }
+        });
         self.updates += 1;
         self.present += 1;
         Ok(UpdateId(update))
@@ -302,14 +307,22 @@ impl HalfEdgeMt {
 
     /// Replaces the star code of the last update.
     pub(super) fn set_last_star(&mut self, star: &[u8], level_residuals: &[i32]) {
+        self.change_last(|page| {
+            let first = page.stars.starts[page.stars.len() - 1] as usize;
+            page.stars.items.truncate(first);
+            page.stars.items.extend_from_slice(star);
+            page.stars.starts.pop();
+            page.stars.starts.push(page.stars.items.len() as u32);
+            let kept = page.level_residuals.len() - level_residuals.len();
+            page.level_residuals[kept..].copy_from_slice(level_residuals);
+        });
+    }
+
+    fn change_last(&mut self, change: impl FnOnce(&mut Page)) {
         let Some(Some(page)) = self.pages.last_mut() else { return };
-        let first = page.stars.starts[page.stars.len() - 1] as usize;
-        page.stars.items.truncate(first);
-        page.stars.items.extend_from_slice(star);
-        page.stars.starts.pop();
-        page.stars.starts.push(page.stars.items.len() as u32);
-        let kept = page.level_residuals.len() - level_residuals.len();
-        page.level_residuals[kept..].copy_from_slice(level_residuals);
+        self.page_bytes -= page.bytes() as u64;
+        change(page);
+        self.page_bytes += page.bytes() as u64;
     }
 
     /// Adds all updates of a page. Pages on which it depends need not be here.
@@ -342,6 +355,7 @@ impl HalfEdgeMt {
         if page as usize >= self.pages.len() {
             self.pages.resize_with(page as usize + 1, || None);
         }
+        self.page_bytes += new.bytes() as u64;
         self.pages[page as usize] = Some(new);
         self.present += range.len() as u32;
         self.updates = self.updates.max(range.end);
@@ -357,6 +371,7 @@ impl HalfEdgeMt {
         let gone = self.pages.get_mut(page as usize).and_then(Option::take);
         let Some(gone) = gone else { return Err(PageError::Absent { page }) };
         self.forget_children(&gone.children.items);
+        self.page_bytes -= gone.bytes() as u64;
         self.present -= gone.len();
         while self.pages.last().is_some_and(Option::is_none) {
             self.pages.pop();
@@ -453,7 +468,7 @@ impl HalfEdgeMt {
 
     /// Bytes of the updates that are here.
     pub fn page_bytes(&self) -> u64 {
-        self.pages.iter().flatten().map(|page| page.bytes() as u64).sum()
+        self.page_bytes
     }
 
     /// Bytes of a page that is here.

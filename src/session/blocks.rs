@@ -331,7 +331,7 @@ impl Session {
         // Pages that come without their parents are asked for one by one; what they have shown must not be forgotten.
         if let (Some(front), Some(criterion), false) = (&self.front, &blocks.criterion, mt.needs_parents()) {
             let fields = self.decoder.wanted_fields();
-            let bounds = |page: u32| fields.iter().map(|&f| index.blocks[page as usize].errors[f]).collect();
+            let bounds = |page: u32| errors_of(index, fields, page);
             let telling = front.telling_pages(mt, &**criterion, |u| u.0 >> index.block_bits, bounds);
             telling.into_iter().for_each(|block| planned[block as usize] = true);
         }
@@ -389,6 +389,12 @@ fn is_in_use(front: &Front, index: &Index, mt: &Mt, block: u32) -> bool {
     index.updates(block, mt.info().updates).any(|u| front.contains(UpdateId(u)))
 }
 
+/// The largest errors of the updates of a block, in these fields.
+fn errors_of(index: &Index, fields: &[usize], block: u32) -> Vec<ErrorCode> {
+    let errors = &index.blocks[block as usize].errors;
+    fields.iter().map(|&f| errors[f]).collect()
+}
+
 /// What a block promises for each of its bytes, given how often the error that it lowers exceeds what is wanted.
 fn priority(excess: f64, errors: &[ErrorCode], bytes: u64) -> f64 {
     // Infinite where any error is too much: then the largest errors come first.
@@ -403,7 +409,7 @@ fn plan_by_index(mt: &Mt, criterion: &dyn Criterion, index: &Index, fields: &[us
     let mut priorities: Vec<f64> = vec![0.0; count];
     for at in (0..count).rev() {
         let info = &index.blocks[at];
-        let errors: Vec<ErrorCode> = fields.iter().map(|&f| info.errors[f]).collect();
+        let errors = errors_of(index, fields, at as u32);
         let ranges: Vec<[i32; 2]> = fields.iter().map(|&f| info.ranges[f]).collect();
         let first = index.updates(at as u32, mt.info().updates).start;
         let excess = excess(criterion, info.bounds, &errors, &ranges, first);
@@ -427,10 +433,6 @@ fn plan_by_mesh(
     index: &Index,
     fields: &[usize],
 ) -> Vec<(f64, u32)> {
-    let errors_of = |block: u32| -> Vec<ErrorCode> {
-        let errors = &index.blocks[block as usize].errors;
-        fields.iter().map(|&f| errors[f]).collect()
-    };
     if let Some(tolerances) = criterion.uniform() {
         let asks = |errors: &[ErrorCode]| {
             tolerances.iter().any(|tolerance| match tolerance.field {
@@ -438,7 +440,7 @@ fn plan_by_mesh(
                 None => errors.iter().any(|&error| error > tolerance.error),
             })
         };
-        let blocks = (0..index.blocks.len() as u32).map(|block| (block, errors_of(block)));
+        let blocks = (0..index.blocks.len() as u32).map(|block| (block, errors_of(index, fields, block)));
         let needed = blocks.filter(|(_, errors)| asks(errors));
         return needed
             .map(|(block, errors)| {
@@ -450,7 +452,7 @@ fn plan_by_mesh(
     let known = demanded.into_iter().filter(|(block, _)| (*block as usize) < index.blocks.len());
     known
         .map(|(block, excess)| {
-            (priority(excess, &errors_of(block), index.blocks[block as usize].len()), block)
+            (priority(excess, &errors_of(index, fields, block), index.blocks[block as usize].len()), block)
         })
         .collect()
 }

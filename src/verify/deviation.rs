@@ -6,14 +6,13 @@ use super::parts::Ask;
 use super::parts::change;
 use super::parts::is_aside;
 use super::triangles::Triangles;
-use crate::geom::orient3d;
+use crate::measure::weights_at;
 use crate::mesh::FACES;
 use crate::mesh::NONE;
 use crate::mesh::TetMesh;
 use crate::mt::MtInfo;
 use crate::refine::Need;
 use crate::refine::Part;
-use glam::DMat3;
 use glam::DVec3;
 use std::ops::RangeInclusive;
 
@@ -368,31 +367,6 @@ fn weights_on(q: DVec3, [a, b, c]: [DVec3; 3]) -> [f64; 3] {
     let w = (b - a).cross(q - a).dot(normal) / area;
     [1.0 - v - w, v, w]
 }
-
-/// The barycentric coordinates of `p`; none if it is outside the tetrahedron. Which one is decided exactly.
-fn barycentric([a, b, c, d]: [[i32; 3]; 4], p: [i32; 3]) -> Option<[f64; 4]> {
-    let parts = [orient3d(p, b, c, d), orient3d(a, p, c, d), orient3d(a, b, p, d), orient3d(a, b, c, p)];
-    let whole = orient3d(a, b, c, d) as f64;
-    parts.iter().all(|&part| part >= 0).then(|| parts.map(|part| part as f64 / whole))
-}
-
-/// The barycentric coordinates of a reference vertex at its place in the input; none if it is outside the tetrahedron. Decided
-/// exactly where that is where the lattice has it.
-fn weights_at(corners: [[i32; 3]; 4], position: [i32; 3], place: DVec3) -> Option<[f64; 4]> {
-    let at = |q: [i32; 3]| DVec3::from_array(q.map(f64::from));
-    if place.distance(at(position)) < ON_LATTICE {
-        return barycentric(corners, position);
-    }
-    let [a, b, c, d] = corners.map(at);
-    let lambda = DMat3::from_cols(b - a, c - a, d - a).inverse() * (place - a);
-    let weights = [1.0 - lambda.element_sum(), lambda.x, lambda.y, lambda.z];
-    weights.iter().all(|&weight| weight >= -SIDE_SLACK).then_some(weights)
-}
-
-/// Points are taken to be on the lattice if they are nearer than this, in its steps.
-const ON_LATTICE: f64 = 1e-7;
-/// Barycentric coordinates this far below zero are rounding errors of a point on a face. Builders allow for more.
-const SIDE_SLACK: f64 = 1e-10;
 
 /// Lattice points sorted into the cells of a regular grid.
 struct Cells {

@@ -309,7 +309,6 @@ fn config(arguments: &Arguments) -> BuildConfig {
         displacement_edges: arguments.displacement_edges.unwrap_or(default.displacement_edges),
         tet_errors: arguments.tet_errors,
         block_bits: arguments.block_updates.unwrap_or(default.block_bits),
-        ..default
     };
     if let Err(error) = config.check() {
         super::refuse_usage(&error.to_string());
