@@ -28,7 +28,7 @@ fn from_data_to_a_checked_mesh() {
         let built = json(&["build", &input, "-o", &mt, "--json"]);
 
         let info = json(&["info", &mt, "--json"]);
-        assert_eq!(info["kind"], "edge");
+        assert_eq!(info["kind"], "half-edge");
         let same =
             ["vertices", "tetrahedra", "base_vertices", "base_tetrahedra", "updates", "file_bytes", "depth"];
         for key in same {
@@ -328,7 +328,7 @@ fn kinds_are_built_and_converted() {
     good(&["generate", "bucky", "--size", "9", "-o", &input]);
     // What is not named goes with what is.
     for (options, kind, method, criterion) in [
-        (&[][..], "edge", "collapse", None),
+        (&[][..], "half-edge", "decimate", Some("half-edge")),
         (&["--method", "decimate"], "half-edge", "decimate", Some("half-edge")),
         (&["--tet-errors"], "vertex", "insert", Some("delaunay")),
         (&["--for", "regions"], "half-edge", "decimate", Some("half-edge")),

@@ -25,8 +25,8 @@ const HASHES: &str = include_str!(concat!(env!("TETRALOD_FIXTURE"), "/hashes.jso
 /// MTs of the other kinds, each with its hashes.
 const OTHERS: [(&[u8], &str); 3] = [
     (
-        include_bytes!(concat!(env!("TETRALOD_FIXTURE"), "/small-half-edge.mt")),
-        include_str!(concat!(env!("TETRALOD_FIXTURE"), "/hashes-half-edge.json")),
+        include_bytes!(concat!(env!("TETRALOD_FIXTURE"), "/small-edge.mt")),
+        include_str!(concat!(env!("TETRALOD_FIXTURE"), "/hashes-edge.json")),
     ),
     (
         include_bytes!(concat!(env!("TETRALOD_FIXTURE"), "/small-vertex.mt")),

@@ -121,9 +121,9 @@ pub struct BuildConfig {
 }
 
 impl Default for BuildConfig {
-    /// The usual configuration for the usual kind, [`MtKind::Edge`].
+    /// The usual configuration for the usual kind, [`MtKind::HalfEdge`].
     fn default() -> Self {
-        Self::of(MtKind::Edge)
+        Self::of(MtKind::HalfEdge)
     }
 }
 

@@ -13,9 +13,10 @@ const FOLDER: &str = "target/bench";
 const ROUNDS: usize = 5;
 
 /// The kinds of MT that are compared: a name and how they are built.
-const KINDS: [(&str, &[&str]); 3] = [
-    ("edge", &[]),
-    ("half-edge", &["--kind", "vertex"]),
+const KINDS: [(&str, &[&str]); 4] = [
+    ("edge", &["--kind", "edge"]),
+    ("half-edge", &["--kind", "half-edge"]),
+    ("vertex", &["--kind", "vertex"]),
     ("delaunay", &["--kind", "vertex", "--criterion", "delaunay"]),
 ];
 

@@ -23,15 +23,9 @@ struct Volume {
 
 /// One of each kind of MT: the page opens all alike.
 const VOLUMES: [Volume; 5] = [
-    Volume { name: "bucky", data: "bucky", extension: "vti", size: "65", kind: "edge" },
-    Volume { name: "sphere-flow", data: "sphere-flow", extension: "vtu", size: "24", kind: "edge" },
-    Volume {
-        name: "sphere-flow-half-edge",
-        data: "sphere-flow",
-        extension: "vtu",
-        size: "24",
-        kind: "half-edge",
-    },
+    Volume { name: "bucky", data: "bucky", extension: "vti", size: "65", kind: "half-edge" },
+    Volume { name: "sphere-flow", data: "sphere-flow", extension: "vtu", size: "24", kind: "half-edge" },
+    Volume { name: "sphere-flow-edge", data: "sphere-flow", extension: "vtu", size: "24", kind: "edge" },
     Volume { name: "sphere-flow-vertex", data: "sphere-flow", extension: "vtu", size: "24", kind: "vertex" },
     Volume { name: "bucky-explicit", data: "bucky", extension: "vti", size: "17", kind: "explicit" },
 ];

@@ -27,7 +27,7 @@ fn requests() -> Vec<Value> {
 
 /// The files beside `small.mt`, of the other kinds, and how they are built.
 const OTHERS: [(&str, &[&str]); 3] = [
-    ("half-edge", &["--kind", "half-edge"]),
+    ("edge", &["--kind", "edge"]),
     ("vertex", &["--kind", "vertex"]),
     ("explicit", &["--kind", "explicit"]),
 ];
