@@ -21,7 +21,7 @@ fn main() -> Result<()> {
         ["table", inputs @ ..] => table::run(&sets::all(inputs)?),
         ["requests", inputs @ ..] => requests::run(&sets::all(inputs)?),
         ["walk", file] => walk::run(file.as_ref()),
-        ["make", size, file] => sets::make(size.parse()?, file.as_ref()),
+        ["make", size, kind, file] => sets::make(size.parse()?, kind, file.as_ref()),
         // `cargo test --all-targets` runs it without any.
         [] => Ok(()),
         other => Err(format!("no such benchmark: {other:?}").into()),

@@ -5,6 +5,7 @@ use std::fs;
 use std::ops::ControlFlow;
 use std::path::Path;
 use tetralod::build::BuildConfig;
+use tetralod::build::Purpose;
 use tetralod::build::build;
 use tetralod::format::EncodeOptions;
 use tetralod::format::encode;
@@ -14,7 +15,6 @@ use tetralod::io::CellData;
 use tetralod::io::ReadOptions;
 use tetralod::mesh::TetMesh;
 use tetralod::mesh::repair;
-use tetralod::mt::Mt;
 use tetralod::mt::MtKind;
 
 pub struct Set {
@@ -75,21 +75,16 @@ fn read(path: &Path) -> Option<Set> {
     }
 }
 
-/// The MT of a mesh.
-pub fn mt(mesh: &TetMesh, kind: MtKind) -> Result<Mt> {
-    let block_bits = kind.usual_block_bits();
-    let config = BuildConfig { block_bits, ..BuildConfig::of(kind) };
-    Ok(build(mesh, &config, &mut |_| ControlFlow::Continue(()))?.mt)
-}
-
 /// The MT file of a mesh.
-pub fn file(mesh: &TetMesh, kind: MtKind) -> Result<Vec<u8>> {
-    let options = EncodeOptions { block_bits: kind.usual_block_bits(), ..EncodeOptions::default() };
-    Ok(encode(&mt(mesh, kind)?, &options)?)
+pub fn file(mesh: &TetMesh, kind: MtKind, purpose: Purpose) -> Result<Vec<u8>> {
+    let config = BuildConfig { purpose, ..BuildConfig::of(kind) };
+    let mt = build(mesh, &config, &mut |_| ControlFlow::Continue(()))?.mt;
+    Ok(encode(&mt, &EncodeOptions { block_bits: config.block_bits, ..EncodeOptions::default() })?)
 }
 
 /// Writes the MT file of a generated volume.
-pub fn make(size: u32, file: &Path) -> Result<()> {
-    fs::write(file, self::file(&generate::bucky(size)?, MtKind::Edge)?)?;
+pub fn make(size: u32, kind: &str, file: &Path) -> Result<()> {
+    let kind = MtKind::ALL.into_iter().find(|known| known.name() == kind).ok_or("no such kind")?;
+    fs::write(file, self::file(&generate::bucky(size)?, kind, Purpose::default())?)?;
     Ok(())
 }

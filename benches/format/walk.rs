@@ -10,8 +10,9 @@ use std::time::Duration;
 use std::time::Instant;
 use tetralod::client::Client;
 use tetralod::client::ClientOptions;
+use tetralod::format::Decoder;
 use tetralod::geom::Bounds;
-use tetralod::mt::EdgeMt;
+use tetralod::mt::MultiTessellation;
 use tetralod::refine::Need;
 use tetralod::refine::Request;
 use tetralod::refine::View;
@@ -57,11 +58,12 @@ pub fn run(path: &Path) -> Result<()> {
         let source = Counted { file: FileSource::new(File::open(path)?)?, ranges: Rc::clone(&ranges) };
         Ok(Client::open(source, ClientOptions { room, ..ClientOptions::default() })?)
     };
-    let first = open(0)?;
-    let info = first.session().info().ok_or("no MT")?.clone();
-    drop(first);
-    ranges.set(0);
-    let all = EdgeMt::update_bytes(&info) * u64::from(info.updates);
+    let mut decoder = Decoder::default();
+    decoder.feed(&fs::read(path)?)?;
+    decoder.finish()?;
+    let mt = decoder.into_mt().ok_or("no MT")?;
+    let (info, all) = (mt.info().clone(), mt.page_bytes());
+    drop(mt);
     let room = all / TIMES;
     let start = Instant::now();
     let mut client = open(room)?;

@@ -26,11 +26,8 @@ fn requests() -> Vec<Value> {
 }
 
 /// The files beside `small.mt`, of the other kinds, and how they are built.
-const OTHERS: [(&str, &[&str]); 3] = [
-    ("edge", &["--kind", "edge"]),
-    ("vertex", &["--kind", "vertex"]),
-    ("explicit", &["--kind", "explicit"]),
-];
+const OTHERS: [(&str, &[&str]); 3] =
+    [("edge", &["--kind", "edge"]), ("vertex", &["--kind", "vertex"]), ("explicit", &["--kind", "explicit"])];
 
 /// Makes `small.mt` and `hashes.json`, a list of `{ options, hash }`; and the same for the other kinds of MT, with the
 /// kind in the names.
