@@ -103,7 +103,7 @@ impl MtKind {
 
     /// log2 of the updates that blocks of files have unless somebody says otherwise: fewer where each can be fetched by itself.
     pub fn usual_block_bits(self) -> u32 {
-        if self == Self::HalfEdge { 9 } else { 11 }
+        if self == Self::HalfEdge { 8 } else { 11 }
     }
 
     /// The kind in one word: `half-edge`, `edge`, `vertex` or `explicit`.

@@ -95,7 +95,7 @@ pub struct Arguments {
     /// [default: 10].
     #[arg(long, value_name = "N", value_parser = lengths)]
     displacement_edges: Option<f64>,
-    /// Updates in a block, the least that can be fetched of the file by itself: a power of two, 16 to 65536 [default: 2048, 512 for kind
+    /// Updates in a block, the least that can be fetched of the file by itself: a power of two, 16 to 65536 [default: 2048, 256 for kind
     /// half-edge].
     #[arg(long, value_name = "N", value_parser = block_bits)]
     block_updates: Option<u32>,
