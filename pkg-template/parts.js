@@ -152,7 +152,7 @@ export class Parts {
     const { ready = false, complete = false, updates = 0 } = this.#progress ?? {};
     const total = this.#ranges.total ?? this.#progress?.total;
     const blocks = this.#session.blocks();
-    // Only edge-based MTs have blocks.
+    // Half-edge and edge-based MTs come in blocks.
     return { ready, complete, bytes: this.#bytes, total, updates, blocks: blocks.all > 0 ? blocks : undefined };
   }
 

@@ -1,6 +1,8 @@
 //! From a tetrahedral mesh to a Multi-Tessellation, offline.
 //!
-//! [`build`] makes an MT of any kind by any method that goes with it; [`edge_mt`] is the one behind edge-based MTs: it
+//! [`build`] makes an MT of any kind by any method that goes with it: see [`Method`]. The usual one, [`Method::Decimate`],
+//! collapses vertices onto neighbours in rounds of removals that do not depend on each other; the removals in reverse are the
+//! updates of a half-edge MT. [`edge_mt`] is behind edge-based MTs: it
 //! collapses edges to their midpoints, cheapest first, until nothing can be collapsed any more; the
 //! collapses in reverse are the updates of an edge-based MT [§2.1]. The cost of a collapse is the largest error it
 //! leads to, evaluated exactly at every reference vertex that its star covers. The model is the greedy scheme of

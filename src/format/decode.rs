@@ -67,8 +67,8 @@ enum Stage {
 pub struct DecodeOptions {
     /// What it may take.
     pub limits: Limits,
-    /// The fields that are wanted, by name; all if none is named. Files of edge-based MTs have every field in sections of
-    /// its own, and those of others need not be fetched; the other kinds come with all fields.
+    /// The fields that are wanted, by name; all if none is named. Files of half-edge and edge-based MTs have every field in
+    /// sections of its own, and those of others need not be fetched; the other kinds come with all fields.
     pub fields: Vec<String>,
     /// Whether blocks are going to come by [`Decoder::take_block`], so that not all of them need to fit the limits at
     /// once.
@@ -80,7 +80,7 @@ pub struct DecodeOptions {
 /// Only the section in flight is kept as bytes. Every section's checksum is verified before its content is used.
 /// After an error the MT stays usable as far as it came, and all further bytes give the same error.
 ///
-/// The blocks of an edge-based MT may also come in another order, each as a whole: see [`Decoder::take_block`].
+/// The blocks of a half-edge or edge-based MT may also come in another order, each as a whole: see [`Decoder::take_block`].
 #[derive(Debug)]
 pub struct Decoder {
     options: DecodeOptions,
@@ -356,8 +356,8 @@ impl Decoder {
         self.block_ranges(block).iter().any(|range| range.start == start).then_some(block)
     }
 
-    /// Takes in a whole block of an edge-based MT: the bytes of [`Decoder::block_ranges`], one after the other. The blocks on
-    /// which it depends must be there. Afterwards no more bytes can be fed in the order of the file.
+    /// Takes in a whole block of a half-edge or edge-based MT: the bytes of [`Decoder::block_ranges`], one after the other. In
+    /// edge-based MTs the blocks on which it depends must be there. Afterwards no more bytes can be fed in the order of the file.
     ///
     /// # Errors
     /// When the bytes are damaged, or the block cannot be taken now; nothing has changed then.

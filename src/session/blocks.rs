@@ -74,8 +74,8 @@ pub(super) struct Blocks {
 }
 
 impl Session {
-    /// A session for a file that comes in parts, whose blocks may take so many bytes in memory. Files of MTs that are not
-    /// edge-based are wanted as a whole.
+    /// A session for a file that comes in parts, whose blocks may take so many bytes in memory. Files of kinds that do not come
+    /// in blocks (see [`MtKind::is_paged`](crate::mt::MtKind::is_paged)) are wanted as a whole.
     pub fn in_parts(options: DecodeOptions, room: u64) -> Self {
         let decoder = Decoder::new(DecodeOptions { in_parts: true, ..options });
         let blocks = Blocks {
