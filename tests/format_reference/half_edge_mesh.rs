@@ -154,7 +154,8 @@ fn star(removed: &[Marked], w: u32, v: u32) -> Vec<Tet> {
         removed.iter().map(|marked| marked.tet.map(|x| if x == w { v } else { x })).collect();
     let mut rim = Vec::new();
     for Marked { tet, mark } in removed {
-        assert!(tet.contains(&w), "{tet:?} lacks the near vertex");
+        let near = tet.iter().position(|&x| x == w).expect("the near vertex");
+        assert!(!mark.inner[near], "the face opposite the near vertex is inner");
         for corner in (0..4).filter(|&corner| tet[corner] != w && !mark.inner[corner]) {
             let mut added = *tet;
             added[corner] = v;

@@ -8,6 +8,7 @@ use super::reader::half_edge::Record;
 use super::reader::half_edge_mesh::Mesh;
 use super::*;
 use tetralod::build::Purpose;
+use tetralod::mt::Applied;
 
 fn built(mesh: &TetMesh, config: BuildConfig) -> Mt {
     let config = BuildConfig { all_fields: true, ..config };
@@ -32,6 +33,20 @@ fn shaken(mut mesh: TetMesh, random: &mut Random, most: f64) -> TetMesh {
         *p = p.map(|x| x + most * f64::from(random.between(-1000, 1000)) / 1000.0);
     }
     TetMesh { grid: None, ..mesh }
+}
+
+/// A grid on a lattice of steps of 1 to 2^30, whose products are beyond what doubles hold: choices that are as good as each other but
+/// for what is rounded. A tetrahedron apart from it reaches to the far corner of the lattice.
+fn wide_grid(cells: u32) -> TetMesh {
+    let mut mesh = cube(cells, &[hilly]);
+    let scale = f64::from(cells) * f64::from(850_000_021 / cells);
+    let far = mesh.positions.len() as u32;
+    mesh.positions.iter_mut().for_each(|p| *p = p.map(|x| (x * scale).round()));
+    let ends = [[0, 0, 0], [-3, 0, 0], [0, -3, 0], [0, 0, -3]];
+    mesh.positions.extend(ends.map(|p| p.map(|x| f64::from(x + (1 << 30)))));
+    mesh.fields[0].values.extend([0.5; 4]);
+    mesh.tets.push([far, far + 2, far + 1, far + 3]);
+    tetralod::mesh::repair(TetMesh { grid: None, ..mesh }).expect("a grid and a tetrahedron").0
 }
 
 #[test]
@@ -70,6 +85,44 @@ fn built_mts_are_read_alike() {
     }
     assert!(symbols.range((102, 0)..(166, 0)).any(|symbol| symbol.1 > 8));
     assert!(symbols.range((33, 0)..(34, 0)).any(|symbol| symbol.1 % 2 == 1));
+}
+
+#[test]
+fn products_beyond_doubles_are_rounded_alike() {
+    for cells in [4, 6] {
+        let mt = built(&wide_grid(cells), with_bits(Purpose::Uniform, 30, 12));
+        assert_eq!(mt.info().lattice.step, [1.0; 3]);
+        compare(&bytes_in_blocks(&mt, 5));
+    }
+}
+
+/// No corner changes its place: that is seen in a current mesh only.
+#[test]
+fn corners_come_in_the_same_order() {
+    let mesh = shaken(cube(5, &[hilly, linear]), &mut Random(2), 0.03);
+    let bytes = bytes_in_blocks(&built(&mesh, with_bits(Purpose::Uniform, 14, 10)), 4);
+    let mt = decode(&bytes).expect("a good file");
+    let mut current = mt.start().expect("a base mesh");
+    let (file, parts) = reader::open(&bytes);
+    let mut mesh = Mesh::new(&file);
+    for block in 0..parts.len() as u32 {
+        mesh.add_block(half_edge::block(&file, block, &parts[block as usize]));
+        for k in file.index.updates(block, &file.info) {
+            mesh.apply(k);
+            assert_eq!(mt.refine(&mut current, UpdateId(k)), Ok(Applied::Done));
+            let found = (0..current.tet_slots() as u32).filter_map(|t| current.tet(t));
+            let found: BTreeSet<Tet> = found.map(|tet| tet.map(|v| current.vertex(v).0)).collect();
+            let ours: BTreeSet<Tet> = mesh.tets.iter().map(|marked| marked.tet).collect();
+            assert_eq!(ours, found, "update {k}");
+        }
+    }
+    for (&v, vertex) in &mesh.vertices {
+        let slot = current.slot(VertexId(v)).expect("a vertex of the mesh");
+        assert_eq!(
+            (vertex.position, &vertex.levels[..]),
+            (current.positions()[slot as usize], current.levels(slot))
+        );
+    }
 }
 
 #[test]
