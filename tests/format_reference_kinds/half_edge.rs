@@ -35,13 +35,13 @@ fn shaken(mut mesh: TetMesh, random: &mut Random, most: f64) -> TetMesh {
     TetMesh { grid: None, ..mesh }
 }
 
-/// A grid on a lattice of steps of 1 to 2^30, whose products are beyond what doubles hold: choices that are as good as each other but
-/// for what is rounded. A tetrahedron apart from it reaches to the far corner of the lattice.
-fn wide_grid(cells: u32) -> TetMesh {
-    let mut mesh = cube(cells, &[hilly]);
-    let scale = f64::from(cells) * f64::from(850_000_021 / cells);
+/// A grid of cells of a size in steps of a lattice of 30 bits, beyond what products in doubles hold: many choices are as good as
+/// each other but for what is rounded. A tetrahedron apart from it reaches to the far corner of the lattice.
+fn wide_grid(cells: u32, size: [u32; 3], field: fn([f64; 3]) -> f64) -> TetMesh {
+    let mut mesh = cube(cells, &[field]);
     let far = mesh.positions.len() as u32;
-    mesh.positions.iter_mut().for_each(|p| *p = p.map(|x| (x * scale).round()));
+    let scale = size.map(|size| f64::from(cells * size));
+    mesh.positions.iter_mut().for_each(|p| *p = [0, 1, 2].map(|k| (p[k] * scale[k]).round()));
     let ends = [[0, 0, 0], [-3, 0, 0], [0, -3, 0], [0, 0, -3]];
     mesh.positions.extend(ends.map(|p| p.map(|x| f64::from(x + (1 << 30)))));
     mesh.fields[0].values.extend([0.5; 4]);
@@ -89,10 +89,15 @@ fn built_mts_are_read_alike() {
 
 #[test]
 fn products_beyond_doubles_are_rounded_alike() {
-    for cells in [4, 6] {
-        let mt = built(&wide_grid(cells), with_bits(Purpose::Uniform, 30, 12));
-        assert_eq!(mt.info().lattice.step, [1.0; 3]);
-        compare(&bytes_in_blocks(&mt, 5));
+    // Where another order of sums or products, or of neighbours, would show.
+    let small = 47_166_671;
+    let grids = [(5, [140_000_005; 3]), (7, [107_142_861; 3]), (6, [small, 2 * small, 3 * small])];
+    for (cells, size) in grids {
+        for field in [hilly, linear] {
+            let mt = built(&wide_grid(cells, size, field), with_bits(Purpose::Uniform, 30, 12));
+            assert_eq!(mt.info().lattice.step, [1.0; 3]);
+            compare(&bytes_in_blocks(&mt, 5));
+        }
     }
 }
 
