@@ -1,4 +1,4 @@
-//! What an update of a file of kind 1 or 2 does, and what reading these has in common.
+//! What an update of a file of kind 1, 2 or 3 does, and what reading these has in common.
 
 use super::coded::Coded;
 use super::coded::Row;

@@ -96,7 +96,22 @@ pub const LEVEL_DIFFERENCE: Row = numbers(213, 1, 1);
 pub const REMOVED: Row = numbers(214, 2, 2);
 pub const CORNER: Row = numbers(216, 4, 4);
 
-const BOTH: [Row; 10] =
+/// In their place in files of kind 3.
+pub const REMOVER: Row = numbers(29, 1, 1);
+pub const BASE_INNER: Row = symbols(30, 1, 16);
+pub const FOREST_CHILDREN: Row = numbers(31, 1, 2);
+pub const NAMED: Row = numbers(32, 1, 2);
+pub const NEW_BLOCK: Row = numbers(33, 1, 1);
+pub const CHILD_GAP: Row = numbers(34, 1, 2);
+pub const CHILD_OFFSET: Row = numbers(35, 66, 2);
+pub const STAR_SYMBOLS: Row = symbols(101, 1, 256);
+pub const STAR_SYMBOL: Row = symbols(102, 64, 16);
+pub const STAR_BITS: Row = numbers(166, 1, 4);
+pub const STAR_BIT: Row = symbols(167, 64, 2);
+pub const HALF_EDGE_ERROR: Row = symbols(231, 16, 256);
+pub const HALF_EDGE_LEVEL: Row = numbers(247, 128, 1);
+
+const OF_ALL: [Row; 10] =
     [BEHIND, SEED, LENGTH, STEP, RANK, BASE_LEVEL, VALUE_GAP, VALUE_BITS, QUARTERS, OWN_FALL];
 const OF_SPLITS: [Row; 10] = [GAP, RUN, CHILDREN, RISE, EDGE, OFFSET, LAST_WRONG, WRONG, ERROR, LEVEL];
 const OF_OTHERS: [Row; 15] = [
@@ -117,6 +132,22 @@ const OF_OTHERS: [Row; 15] = [
     CORNER,
 ];
 
+const OF_HALF_EDGES: [Row; 13] = [
+    REMOVER,
+    BASE_INNER,
+    FOREST_CHILDREN,
+    NAMED,
+    NEW_BLOCK,
+    CHILD_GAP,
+    CHILD_OFFSET,
+    STAR_SYMBOLS,
+    STAR_SYMBOL,
+    STAR_BITS,
+    STAR_BIT,
+    HALF_EDGE_ERROR,
+    HALF_EDGE_LEVEL,
+];
+
 /// Symbols with their shares.
 pub type Table = Vec<(u32, u32)>;
 
@@ -125,7 +156,12 @@ pub fn tables(mut bytes: Bytes<'_>, kind: u8) -> Vec<Table> {
     let count = bytes.varint();
     assert!(count <= OWN_FALL.first + OWN_FALL.contexts);
     let mut bits = Bits::new(bytes.0);
-    let rows = BOTH.iter().chain(if kind == 0 { OF_SPLITS.iter() } else { OF_OTHERS.iter() });
+    let of_kind = match kind {
+        0 => OF_SPLITS.iter(),
+        3 => OF_HALF_EDGES.iter(),
+        _ => OF_OTHERS.iter(),
+    };
+    let rows = OF_ALL.iter().chain(of_kind);
     let tables = (0..count).map(|context| {
         let row = rows.clone().find(|row| (row.first..row.first + row.contexts).contains(&context));
         table(&mut bits, row.map_or(0, |row| row.letters))

@@ -6,6 +6,9 @@ pub mod change;
 mod coded;
 pub mod exact;
 pub mod growth;
+pub mod half_edge;
+mod half_edge_guess;
+pub mod half_edge_mesh;
 pub mod insertions;
 pub mod plain;
 pub mod spelled;
@@ -15,9 +18,12 @@ pub mod wire;
 use change::Change;
 use coded::BASE_LEVEL;
 use coded::Coded;
+use coded::ERROR;
+use coded::LEVEL;
 use coded::Table;
 use exact::Exact;
 use growth::Growth;
+use half_edge::Forest;
 use insertions::Start;
 use spelled::Spelled;
 use splits::Split;
@@ -39,6 +45,8 @@ pub struct File {
     pub base: Growth,
     /// In files of kind 1.
     pub start: Option<Start>,
+    /// In files of kind 3.
+    pub forest: Option<Forest>,
     /// By field, then by vertex.
     pub base_levels: Vec<Vec<i32>>,
     pub splits: HashMap<u32, Split>,
@@ -61,6 +69,7 @@ pub fn open(file: &[u8]) -> (File, Parts<'_>) {
         section
     };
     let info = wire::info(next(b"INFO").payload);
+    assert!(info.kind != 3 || file[8] == 3, "a kind of version 3");
     let section = next(b"INDX");
     let (index, index_end) = (wire::index(section.payload, &info), section.range[1]);
     let tables = coded::tables(next(b"MODL").payload, info.kind);
@@ -70,6 +79,7 @@ pub fn open(file: &[u8]) -> (File, Parts<'_>) {
     let mut coded = Coded::new(payload, &tables);
     let base = growth::read(&mut coded, vertices as usize, tets as usize);
     let start = (info.kind == 1).then(|| insertions::start(&mut coded));
+    let forest = (info.kind == 3).then(|| half_edge::forest(&mut coded, &info, index.block_bits, &base));
     coded.end();
     let mut base_levels = Vec::new();
     for field in 0..info.fields.len() {
@@ -86,7 +96,7 @@ pub fn open(file: &[u8]) -> (File, Parts<'_>) {
     }
     let mut parts_of = Parts::new();
     let (mut at, mut blocks) = (index_end + index.between, Vec::new());
-    let kind = [b"UPDT", b"INSV", b"EXPL"][usize::from(info.kind)];
+    let kind = [b"UPDT", b"INSV", b"EXPL", b"HALF"][usize::from(info.kind)];
     for (block, entry) in (0..).zip(&index.blocks) {
         let (start, mut parts) = (at as usize, Vec::new());
         for (part, length) in (0..).zip(&entry.lengths) {
@@ -108,8 +118,11 @@ pub fn open(file: &[u8]) -> (File, Parts<'_>) {
     check_end(end, front, &info);
     let splits = HashMap::new();
     let tet_errors = file[12] & 1 == 1;
-    assert!(!tet_errors || info.kind != 0);
-    (File { info, tet_errors, index, tables, base, start, base_levels, splits, exact, blocks }, parts_of)
+    assert!(!tet_errors || [1, 2].contains(&info.kind));
+    (
+        File { info, tet_errors, index, tables, base, start, forest, base_levels, splits, exact, blocks },
+        parts_of,
+    )
 }
 
 /// Reads a whole file of kind 0. Blocks are read in an order that `choose` makes of those that can be read next, given only
@@ -136,9 +149,17 @@ pub fn read(file: &[u8], mut choose: impl FnMut(&[u32]) -> u32) -> File {
     file
 }
 
-/// Reads the blocks of a file of kind 1 or 2: the updates in order.
+/// Reads the blocks of a file of kind 1, 2 or 3: the updates in order.
 pub fn changes(file: &File, parts: &Parts<'_>) -> Vec<Change> {
     let mut changes = Vec::new();
+    if file.info.kind == 3 {
+        let mut mesh = half_edge_mesh::Mesh::new(file);
+        for block in 0..parts.len() as u32 {
+            mesh.add_block(half_edge::block(file, block, &parts[block as usize]));
+            changes.extend(file.index.updates(block, &file.info).map(|k| mesh.apply(k)));
+        }
+        return changes;
+    }
     let mut each = |read: &mut dyn FnMut(&mut Coded<'_>, usize) -> Vec<Change>| {
         for (block, parts) in (0..).zip(parts) {
             let mut coded = Coded::new(parts[0], &file.tables);
@@ -194,9 +215,11 @@ impl File {
         let mut splits =
             splits::shared(&mut coded, self.base.positions.len() as u32, updates.clone(), &known);
         coded.end();
+        let rows = [ERROR, LEVEL];
         for part in &parts[1..] {
             let mut coded = Coded::new(*part, &self.tables);
-            for (split, (error, residual)) in splits.iter_mut().zip(splits::field(&mut coded, updates.len()))
+            for (split, (error, residual)) in
+                splits.iter_mut().zip(splits::field(&mut coded, updates.len(), rows))
             {
                 split.errors.push(error);
                 split.residuals.push(residual);

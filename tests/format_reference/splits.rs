@@ -3,13 +3,12 @@
 use super::coded::CHILDREN;
 use super::coded::Coded;
 use super::coded::EDGE;
-use super::coded::ERROR;
 use super::coded::GAP;
 use super::coded::LAST_WRONG;
-use super::coded::LEVEL;
 use super::coded::OFFSET;
 use super::coded::RISE;
 use super::coded::RUN;
+use super::coded::Row;
 use super::coded::WRONG;
 use super::coded::len;
 use std::collections::HashMap;
@@ -122,17 +121,17 @@ fn mask(coded: &mut Coded<'_>) -> u64 {
     mask
 }
 
-/// Reads the errors and the residuals of one field.
-pub fn field(coded: &mut Coded<'_>, count: usize) -> Vec<(u16, i32)> {
+/// Reads the errors and the residuals of one field, given the contexts of both.
+pub fn field(coded: &mut Coded<'_>, count: usize, [error, level]: [Row; 2]) -> Vec<(u16, i32)> {
     let largest = coded.bits(8);
     let fine = coded.bits(1) == 1;
     let mut before = 0;
     let mut part = Vec::new();
     for _ in 0..count {
-        before = coded.symbol(ERROR, before);
-        let upper = largest - before;
+        before = coded.symbol(error, before);
+        let upper = largest.checked_sub(before).expect("an error");
         let lower = if fine { coded.bits(8) } else { 0 };
-        let residual = coded.signed(LEVEL, upper >> 1);
+        let residual = coded.signed(level, upper >> 1);
         part.push(((256 * upper + lower) as u16, residual));
     }
     part

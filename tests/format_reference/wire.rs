@@ -90,7 +90,7 @@ pub struct Section<'a> {
 pub fn sections(file: &[u8]) -> Vec<Section<'_>> {
     let mut header = Bytes(&file[..32]);
     assert_eq!(header.take(8), [0x89, 0x54, 0x4C, 0x4F, 0x44, 0x0D, 0x0A, 0x1A]);
-    assert_eq!(header.u16(), 2, "the major version");
+    assert!([2, 3].contains(&header.u16()), "the major version");
     let _minor = header.u16();
     assert!(header.u32() & 0xFFFF <= 1, "critical flags");
     let total = header.u64();
@@ -157,7 +157,7 @@ pub fn info(mut bytes: Bytes<'_>) -> Info {
         metadata: Vec::new(),
         rounding: 0.0,
     };
-    assert!(info.kind <= 2 && info.updates <= 1 << 30 && (1..=30).contains(&info.bits));
+    assert!(info.kind <= 3 && info.updates <= 1 << 30 && (1..=30).contains(&info.bits));
     for _ in 0..bytes.u8() {
         let field = Field {
             name: bytes.string(),
@@ -244,7 +244,7 @@ pub fn index(mut bytes: Bytes<'_>, info: &Info) -> Index {
 }
 
 fn block_entry(bytes: &mut Bytes<'_>, info: &Info, block: u32) -> BlockEntry {
-    let parts = if info.kind == 0 { 1 + info.fields.len() } else { 1 };
+    let parts = if [0, 3].contains(&info.kind) { 1 + info.fields.len() } else { 1 };
     let lengths = (0..parts).map(|_| bytes.varint()).collect();
     let span = |bytes: &mut Bytes<'_>, bits: u32| {
         let (low, more) = (u64::from(bytes.varint()), u64::from(bytes.varint()));
@@ -263,6 +263,7 @@ fn block_entry(bytes: &mut Bytes<'_>, info: &Info, block: u32) -> BlockEntry {
         before = before - 1 - bytes.varint();
         parents.push(before);
     }
+    assert!(info.kind != 3 || parents.is_empty());
     parents.reverse();
     BlockEntry { lengths, bounds, fields, parents }
 }
