@@ -1,4 +1,4 @@
-//! Promise: version 2 of the format does not change. What these small MTs are written as, byte for byte, is kept in
+//! Promise: versions 2 and 3 of the format do not change. What these small MTs are written as, byte for byte, is kept in
 //! `tests/golden`, and is read back; files of other versions are told apart.
 
 mod format_support;
@@ -7,6 +7,7 @@ mod support;
 use format_support::assert_same;
 use format_support::decode;
 use format_support::field;
+use format_support::header;
 use std::fmt::Write;
 use tetralod::format::EncodeOptions;
 use tetralod::format::FormatError;
@@ -83,6 +84,11 @@ fn vertex_example() -> Mt {
     explicit_example().convert(MtKind::Vertex).expect("an insertion")
 }
 
+/// The same update in a half-edge MT: its vertex collapses onto one of the tetrahedron's.
+fn half_edge_example() -> Mt {
+    explicit_example().convert(MtKind::HalfEdge).expect("a half-edge insertion")
+}
+
 fn options() -> EncodeOptions {
     let metadata = [("tool".to_owned(), "hand".to_owned())].into();
     EncodeOptions { metadata, ..EncodeOptions::default() }
@@ -110,6 +116,7 @@ fn the_examples_are_written_and_read_as_ever() {
         (edge_example(), include_str!("golden/v2-edge.hex")),
         (explicit_example(), include_str!("golden/v2-explicit.hex")),
         (vertex_example(), include_str!("golden/v2-vertex.hex")),
+        (half_edge_example(), include_str!("golden/v3-half-edge.hex")),
     ];
     let mut changes = String::new();
     for (mt, golden) in examples {
@@ -122,6 +129,15 @@ fn the_examples_are_written_and_read_as_ever() {
         }
     }
     assert!(changes.is_empty(), "these are written as other bytes now:\n{changes}");
+}
+
+#[test]
+fn a_half_edge_mt_in_a_file_of_version_2_is_refused() {
+    let mut bytes = bytes_of(include_str!("golden/v3-half-edge.hex"));
+    let total = bytes.len() as u64;
+    bytes[..32].copy_from_slice(&header([2, 0], 0, total));
+    let what = "the version of the file does not go with the kind of MT in it";
+    assert_eq!(decode(&bytes).expect_err("an older version"), FormatError::Corrupt { offset: 8, what });
 }
 
 #[test]

@@ -310,7 +310,11 @@ fn bytes_of(text: &str) -> Vec<u8> {
 
 #[test]
 fn golden_files_are_read_as_ever() {
-    for text in [include_str!("golden/v2-vertex.hex"), include_str!("golden/v2-explicit.hex")] {
+    for text in [
+        include_str!("golden/v2-vertex.hex"),
+        include_str!("golden/v2-explicit.hex"),
+        include_str!("golden/v3-half-edge.hex"),
+    ] {
         let (_, changes) = compare(&bytes_of(text));
         let expected = Change {
             errors: vec![300],

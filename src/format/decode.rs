@@ -11,8 +11,11 @@ use super::header::HEAD_BYTES;
 use super::header::HEADER_BYTES;
 use super::header::Head;
 use super::header::Kind;
+use super::header::Start;
+use super::header::VERSION_AT;
 use super::header::may_be_mt;
 use super::header::parse_header;
+use super::header::version_for;
 use super::payload;
 use super::payload::BaseParts;
 use super::payload::Metadata;
@@ -120,8 +123,7 @@ struct FileHead {
     base: Option<BaseParts>,
     /// How many fields' levels of the base mesh have been seen.
     base_fields: usize,
-    /// Whether updates tell errors of the tetrahedra that they remove.
-    tet_errors: bool,
+    start: Start,
 }
 
 impl FileHead {
@@ -471,7 +473,7 @@ impl Decoder {
         if let Some(header) = whole {
             let start = parse_header(&header)?;
             self.total = start.total;
-            self.head.tet_errors = start.tet_errors;
+            self.head.start = start;
             self.stage = Stage::Head;
         }
         Ok(())
@@ -569,7 +571,11 @@ impl Decoder {
         }
         let offset = self.bytes;
         let (info, metadata) = payload::read_info(content)?;
-        if self.head.tet_errors && info.kind.is_paged() {
+        if self.head.start.version[0] < version_for(info.kind)[0] {
+            let what = "the version of the file does not go with the kind of MT in it";
+            return Err(FormatError::Corrupt { offset: VERSION_AT, what });
+        }
+        if self.head.start.tet_errors && info.kind.is_paged() {
             let what = "errors of tetrahedra in an MT that comes in pages";
             return Err(FormatError::UnsupportedFeature { offset, what });
         }
@@ -636,7 +642,7 @@ impl Decoder {
         if self.head.base.as_ref().is_some_and(|base| base.fields() == self.head.wanted.len()) {
             let bits = self.head.index.as_ref().map_or(0, |index| index.block_bits);
             if let (Some(base), Some(info)) = (self.head.base.take(), self.head.wanted_info()) {
-                let (mut mt, state) = base.start(info, bits, self.head.tet_errors)?;
+                let (mut mt, state) = base.start(info, bits, self.head.start.tet_errors)?;
                 if let (Mt::HalfEdge(mt), Some(index)) = (&mut mt, &self.head.index) {
                     let wanted = &self.head.wanted;
                     let of_block =

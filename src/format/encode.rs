@@ -10,9 +10,8 @@ use super::header::HEAD_BYTES;
 use super::header::HEADER_BYTES;
 use super::header::Head;
 use super::header::Kind;
-use super::header::VERSION;
-use super::header::VERSION_WITHOUT_HALF_EDGE;
 use super::header::header;
+use super::header::version_for;
 use super::payload;
 use super::payload::State;
 use super::payload::Totals;
@@ -172,8 +171,7 @@ pub fn encode_to<'a>(
     payload::write_end(&mut end, totals);
     let end = Section::new(Kind::ENDF, end)?;
     let mut put = |bytes: &[u8]| writer.write_all(bytes).map_err(EncodeError::Write);
-    let version = if mt.info().kind == MtKind::HalfEdge { VERSION } else { VERSION_WITHOUT_HALF_EDGE };
-    put(&header(total, version, mt.has_tet_errors()))?;
+    put(&header(total, version_for(mt.info().kind), mt.has_tet_errors()))?;
     for section in sections.iter().chain([&end]) {
         put(&section.head.to_bytes())?;
         put(&section.payload)?;

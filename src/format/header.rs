@@ -1,13 +1,16 @@
 //! The fixed parts of a file: its header and the heads of its sections.
 
 use super::FormatError;
+use crate::mt::MtKind;
 
 /// First bytes of every MT file. The high bit, CR LF and Ctrl-Z show transfers that meddle with text.
 pub const MAGIC: [u8; 8] = *b"\x89TLOD\r\n\x1a";
+/// Where in the file the version stands.
+pub const VERSION_AT: u64 = 8;
 /// Major and minor version of the newest files that this module writes.
 pub const VERSION: [u16; 2] = [3, 0];
 /// What files without half-edge MTs are written as: version 3 has these besides.
-pub const VERSION_WITHOUT_HALF_EDGE: [u16; 2] = [2, 0];
+const VERSION_WITHOUT_HALF_EDGE: [u16; 2] = [2, 0];
 /// The oldest major version that is read.
 const OLDEST: u16 = VERSION_WITHOUT_HALF_EDGE[0];
 /// Bytes of the file header.
@@ -24,10 +27,17 @@ const TET_ERRORS: u32 = 1;
 /// What a header tells.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Start {
+    /// Major and minor.
+    pub version: [u16; 2],
     /// Bytes of the whole file, if the writer knew.
     pub total: Option<u64>,
     /// Whether updates tell errors of the tetrahedra that they remove.
     pub tet_errors: bool,
+}
+
+/// The version of files that hold an MT of this kind.
+pub fn version_for(kind: MtKind) -> [u16; 2] {
+    if kind == MtKind::HalfEdge { VERSION } else { VERSION_WITHOUT_HALF_EDGE }
 }
 
 /// The header of a file of a version that is `total` bytes long.
@@ -70,7 +80,7 @@ pub fn parse_header(bytes: &[u8; HEADER_BYTES]) -> Result<Start, FormatError> {
         });
     }
     let total = u64::from(u32_at(16)) | u64::from(u32_at(20)) << 32;
-    Ok(Start { total: (total != 0).then_some(total), tet_errors: flags & TET_ERRORS != 0 })
+    Ok(Start { version: found, total: (total != 0).then_some(total), tet_errors: flags & TET_ERRORS != 0 })
 }
 
 /// The first four bytes as a number. The callers have them.

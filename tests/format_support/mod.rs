@@ -346,6 +346,7 @@ pub fn assemble(sections: &[([u8; 4], Vec<u8>)], updates: u32) -> Vec<u8> {
     end.extend((framed.len() as u32).to_le_bytes());
     end.extend(crc32(&[&crcs]).to_le_bytes());
     let body = [framed.concat(), section(b"ENDF", &end)].concat();
-    let version = if sections.iter().any(|(kind, _)| kind == b"HALF") { [3, 0] } else { [2, 0] };
+    let of_half_edges = sections.iter().any(|(kind, payload)| kind == b"INFO" && payload.first() == Some(&3));
+    let version = if of_half_edges { [3, 0] } else { [2, 0] };
     [header(version, 0, 32 + body.len() as u64), body].concat()
 }

@@ -5,6 +5,7 @@ use crate::format::read::Reader;
 use crate::format::write;
 use crate::mt::ErrorCode;
 use crate::mt::MtInfo;
+use crate::mt::MtKind;
 use std::ops::Range;
 
 /// Most blocks that a block may depend on directly, so that an index is not larger than its file.
@@ -168,6 +169,9 @@ fn read_block(
         block.ranges.push(span(reader, field.bits)?);
     }
     let count = reader.varint()?;
+    if info.kind == MtKind::HalfEdge && count > 0 {
+        return Err(reader.corrupt("a block of a half-edge MT names blocks that it depends on"));
+    }
     if count > at.min(MAX_PARENTS) {
         return Err(reader.corrupt("a block depends on more blocks than come before it"));
     }
