@@ -23,7 +23,6 @@ use super::survey::Survey;
 use super::write;
 use crate::mt::BaseMeshError;
 use crate::mt::Exact;
-use crate::mt::MtKind;
 use crate::mt::MtRef;
 use crate::mt::UpdateError;
 use crate::mt::VertexId;
