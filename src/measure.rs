@@ -10,13 +10,12 @@
 
 use crate::geom::Bounds;
 use crate::geom::nearest_on_triangle;
-use crate::geom::orient3d;
+use crate::geom::weights_at;
 use crate::mesh::FACES;
 use crate::mesh::NONE;
 use crate::mt::CurrentMesh;
 use crate::mt::FieldInfo;
 use crate::mt::MtInfo;
-use glam::DMat3;
 use glam::DVec3;
 use std::ops::RangeInclusive;
 
@@ -66,10 +65,6 @@ impl Promise {
 
 /// Allowance for the rounding errors of the measurement itself.
 const ROUNDING: f64 = 1.000_01;
-/// Points are taken to be on the lattice if they are nearer than this, in its steps.
-pub(crate) const ON_LATTICE: f64 = 1e-7;
-/// Barycentric coordinates this far below zero are rounding errors of a point on a face. Builders allow for more.
-const SIDE_SLACK: f64 = 1e-10;
 
 /// What was measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -296,27 +291,6 @@ impl Triangle {
         let w = (b - a).cross(q - a).dot(normal) / area;
         self.values[0] * (1.0 - v - w) + self.values[1] * v + self.values[2] * w
     }
-}
-
-/// The barycentric coordinates of a point that is at `place`, in steps of the lattice, which has it at `position`; none if it is
-/// outside the tetrahedron. Decided exactly where the lattice has not moved it.
-pub(crate) fn weights_at(corners: [[i32; 3]; 4], position: [i32; 3], place: DVec3) -> Option<[f64; 4]> {
-    let at = |q: [i32; 3]| DVec3::from_array(q.map(f64::from));
-    if place.distance(at(position)) < ON_LATTICE {
-        return barycentric(corners, position);
-    }
-    let [a, b, c, d] = corners.map(at);
-    let lambda = DMat3::from_cols(b - a, c - a, d - a).inverse() * (place - a);
-    let weights = [1.0 - lambda.element_sum(), lambda.x, lambda.y, lambda.z];
-    weights.iter().all(|&weight| weight >= -SIDE_SLACK).then_some(weights)
-}
-
-/// The barycentric coordinates of `p`; none if it is outside the tetrahedron.
-fn barycentric([a, b, c, d]: [[i32; 3]; 4], p: [i32; 3]) -> Option<[f64; 4]> {
-    let parts = [orient3d(p, b, c, d), orient3d(a, p, c, d), orient3d(a, b, p, d), orient3d(a, b, c, p)];
-    let whole: i128 = parts.iter().sum();
-    let inside = whole > 0 && parts.iter().all(|&part| part >= 0);
-    inside.then(|| parts.map(|part| part as f64 / whole as f64))
 }
 
 /// Points sorted into the boxes of a regular raster.

@@ -6,6 +6,8 @@ mod lattice;
 mod predicates;
 mod tet_box;
 mod triangle;
+#[cfg(feature = "build")]
+mod weights;
 
 pub use bounds::Bounds;
 pub use camera::{Camera, Ray};
@@ -13,3 +15,5 @@ pub use lattice::Lattice;
 pub use predicates::{NARROW_BITS, WIDE_BITS, in_conflict, insphere, orient3d};
 pub use tet_box::{LatticeBox, tet_meets_box};
 pub use triangle::nearest_on_triangle;
+#[cfg(feature = "build")]
+pub(crate) use weights::{ON_LATTICE, weights_at};

@@ -6,7 +6,7 @@ use super::parts::Ask;
 use super::parts::change;
 use super::parts::is_aside;
 use super::triangles::Triangles;
-use crate::measure::weights_at;
+use crate::geom::weights_at;
 use crate::mesh::FACES;
 use crate::mesh::NONE;
 use crate::mesh::TetMesh;
