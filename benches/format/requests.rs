@@ -130,13 +130,13 @@ fn picture(set: &Set, name: &str, file: &[u8]) -> Result<String> {
     assert!(stats.satisfied && client.session().hash() == whole.hash(), "the same mesh by ranges");
     let ranges = percent_of(client.fetched(), file);
     let exact = reference.compare(client.session())?;
-    let (guaranteed, measured, found) = in_order(file, &request, &reference, &least)?;
+    let (guaranteed, measured) = in_order(file, &request, &reference, &least)?;
+    let measured = measured.map_or("– | – | –".to_owned(), |(share, found)| {
+        format!("{share:.0} | {:.2} | {:.2}", found.field, found.distance)
+    });
     Ok(format!(
-        "| {} | {} | {guaranteed:.1} | {measured:.0} | {:.2} | {:.2} | {ranges:.1} | {:.2} | {:.2} |",
-        name,
+        "| {name} | {} | {guaranteed:.1} | {measured} | {ranges:.1} | {:.2} | {:.2} |",
         file.len() / 1000,
-        found.field,
-        found.distance,
         exact.field,
         exact.distance
     ))
@@ -149,7 +149,7 @@ fn in_order(
     request: &Request,
     reference: &Reference,
     least: &RefineStats,
-) -> Result<(f64, f64, Accuracy)> {
+) -> Result<(f64, Option<(f64, Accuracy)>)> {
     let mut session = Session::new();
     let mut measured = None;
     let mut guaranteed = None;
@@ -172,11 +172,11 @@ fn in_order(
                 measured = Some((share, found));
             }
         }
-        if let (Some(guaranteed), Some((measured, found))) = (guaranteed, measured) {
-            return Ok((guaranteed, measured, found));
+        if let (Some(guaranteed), Some(_)) = (guaranteed, measured) {
+            return Ok((guaranteed, measured));
         }
     }
-    Ok((guaranteed.unwrap_or(f64::NAN), f64::NAN, Accuracy { field: f64::NAN, distance: f64::NAN }))
+    Ok((guaranteed.ok_or("the whole file does not give the mesh of the request")?, measured))
 }
 
 /// Boxes that meet the model: a name, where they begin and how long they are along each side, and the error inside.

@@ -50,7 +50,7 @@ const BOXES: &str = "\
 Boxes of a quarter of each side, a 64th of the box around the model, with error 0, and in the middle with 1 % of the range; and one of
 a twentieth of each side in the lowest corner, in generated volumes a place where nothing varies. The share of the updates that are
 applied is what the partial order makes necessary: no way to cut the file into blocks can do with less. *rounds*: how often
-something is asked for and waited for, the front of the file included. The goals are a fifth of the file for the middle of 97³ at error
+something is asked for and waited for, beyond the first 64 KiB. The goals are a fifth of the file for the middle of 97³ at error
 0, 5 % with 1 %, and 2 % for the corner.
 
 ";
