@@ -22,7 +22,9 @@ use super::current::corner_of;
 use super::half_edge::HalfEdgeMt;
 use super::half_edge_star::StarCode;
 use super::half_edge_star::spread;
+use crate::geom::NARROW_BITS;
 use crate::geom::orient3d;
+use crate::mesh::FACES;
 use crate::mesh::NONE;
 use std::ops::Range;
 
@@ -71,10 +73,12 @@ pub(super) struct Scratch {
     ends: Vec<(u8, u8, u8)>,
     pub levels: Vec<i32>,
     gathered: Star,
-    /// The star in canonical order: a hash of the labels of each tetrahedron, and its place.
-    pub sorted: Vec<(u64, u8)>,
     /// A hash of the label of each vertex of the link; then that of the new vertex.
     pub hashes: Vec<u64>,
+    /// For each tetrahedron of the star, the sum of those of its corners.
+    pub tet_hashes: Vec<u64>,
+    /// The star in canonical order: hashes whose lowest bits are replaced by the place in the star.
+    pub sorted: Vec<u64>,
     pub code: StarCode,
 }
 
@@ -90,8 +94,9 @@ impl Default for Scratch {
             ends: Vec::new(),
             levels: Vec::new(),
             gathered: Star::default(),
-            sorted: Vec::new(),
             hashes: Vec::new(),
+            tet_hashes: Vec::new(),
+            sorted: Vec::new(),
             code: StarCode::default(),
         }
     }
@@ -315,7 +320,8 @@ impl HalfEdgeMt {
             Ok(position) => position,
             Err(before) => return Ok(Applied::Blocked(before)),
         };
-        scratch.sort_star(mesh, self.vertex(u).0);
+        scratch.hash_star(mesh, self.vertex(u).0);
+        scratch.sort_star();
         if !mesh.stars.recall(u.0, scratch) {
             self.find_removers(mesh, u, position, scratch).ok_or(UpdateError::Mask { update: u.0 })?;
             mesh.stars.keep(u.0, scratch);
@@ -533,29 +539,51 @@ impl Scratch {
         (met == gaps).then_some(())
     }
 
-    /// Puts the star into canonical order.
-    pub fn sort_star(&mut self, mesh: &CurrentMesh, vertex: u32) {
+    /// Hashes the labels of the star.
+    pub fn hash_star(&mut self, mesh: &CurrentMesh, vertex: u32) {
         self.hashes.clear();
         self.hashes.extend(self.link[..self.link_len].iter().map(|&slot| spread(mesh.vertex(slot).0)));
         self.hashes.push(spread(vertex));
-        self.sorted.clear();
-        for (new, i) in self.star[..self.star_len].iter().zip(0..) {
-            let sum = new.corners.iter().fold(0, |sum: u64, &corner| {
-                sum.wrapping_add(self.hashes[if corner == NEW { self.link_len } else { corner as usize }])
-            });
-            self.sorted.push((sum, i));
+        let last = self.link_len;
+        self.tet_hashes.clear();
+        for new in &self.star[..self.star_len] {
+            let sum = new
+                .corners
+                .iter()
+                .fold(0, |sum: u64, &corner| sum.wrapping_add(self.hashes[usize::from(corner).min(last)]));
+            self.tet_hashes.push(sum);
         }
+    }
+
+    /// Puts the star, which has been hashed, into canonical order.
+    fn sort_star(&mut self) {
+        const PLACE: u64 = MOST as u64 - 1;
+        self.sorted.clear();
+        self.sorted.extend((0..).zip(&self.tet_hashes).map(|(i, hash)| hash & !PLACE | i));
         self.sorted.sort_unstable();
     }
 
     /// Whether all tetrahedra of the star are positive with the new vertex at `position`.
     fn is_positive(&self, mesh: &CurrentMesh, position: [i32; 3]) -> bool {
+        let (mut from, mut largest) = ([[0_i64; 3]; MOST], 0);
+        for (from, &v) in from.iter_mut().zip(&self.link[..self.link_len]) {
+            let p = mesh.positions[v as usize];
+            for k in 0..3 {
+                from[k] = i64::from(p[k]) - i64::from(position[k]);
+                largest |= from[k].unsigned_abs();
+            }
+        }
+        let narrow = largest <= 1 << NARROW_BITS;
         self.star[..self.star_len].iter().all(|new| {
-            let [a, b, c, d] = new.corners.map(|x| match x {
-                NEW => position,
-                x => mesh.positions[self.link[x as usize % MOST] as usize],
-            });
-            orient3d(a, b, c, d) > 0
+            let [i, j, k] = FACES[new.own as usize & 3].map(|corner| new.corners[corner] as usize % MOST);
+            if narrow {
+                let [u, v, w] = [from[i], from[j], from[k]];
+                // Components up to 2^20 make minors up to 2^41 and a sum of three products up to 3 · 2^61 < 2^63.
+                let first = (u[1] * v[2] - u[2] * v[1]) * w[0];
+                return first + (u[2] * v[0] - u[0] * v[2]) * w[1] + (u[0] * v[1] - u[1] * v[0]) * w[2] > 0;
+            }
+            let at = |x: usize| mesh.positions[self.link[x] as usize];
+            orient3d(position, at(i), at(j), at(k)) > 0
         })
     }
 

@@ -110,7 +110,7 @@ impl HalfEdgeMt {
             let t = range.start + at as u32;
             truth.push((explicit.remover(t).map_or(NONE, |c| c.0), inner.of(t, tet)));
         }
-        scratch.sort_star(mesh, vertex.0);
+        scratch.hash_star(mesh, vertex.0);
         let star = self.code_star(mesh, id, position, scratch, &truth).ok_or(refused(u))?;
         self.set_last_star(&star, &residuals);
         match self.refine(mesh, id).map_err(damaged)? {

@@ -35,14 +35,6 @@ const LEFT: f64 = 1.0 / 64.0;
 /// Stands for a remover that has no rank.
 const FURTHER: u32 = NONE - 1;
 
-/// An update that may remove tetrahedra of a star.
-#[derive(Clone, Copy, Debug)]
-struct Candidate {
-    child: ForestChild,
-    /// Its near vertex.
-    near: u8,
-}
-
 /// A candidate for the removal of a tetrahedron, or none of them, or one of those without a rank.
 #[derive(Clone, Copy, Debug, Default)]
 struct Choice {
@@ -50,8 +42,8 @@ struct Choice {
     /// The weight before neighbours were looked at.
     first_weight: f64,
     remover: u32,
-    /// Which of the candidates it is.
-    candidate: u16,
+    /// Its place among the forest children of its near vertex that come later.
+    place: u32,
     /// The corner of the tetrahedron that is its near vertex.
     corner: u8,
 }
@@ -61,35 +53,20 @@ struct Choice {
 struct Choices {
     all: [Choice; RANKED + 1],
     len: usize,
-    /// The weight that none of them has.
-    left: f64,
-    /// Whether there are candidates that are none of them.
-    more: bool,
 }
 
 /// Scratch space: what may remove each tetrahedron of a star.
 #[derive(Clone, Debug, Default)]
 pub(super) struct StarCode {
-    /// Those that can have a rank, ascending by update.
-    candidates: Vec<Candidate>,
-    /// Tetrahedra and which of their corners it is, vertex by vertex.
-    corners: Vec<(u8, u8)>,
-    /// Where those of each vertex begin.
-    starts: Vec<u32>,
     choices: Vec<Choices>,
-    /// The sum of the corners of each tetrahedron.
-    sums: Vec<[i64; 3]>,
-    /// The corners of each tetrahedron.
-    tets: Vec<[[i32; 3]; 4]>,
     /// The vertices of the link, and then the new one.
     positions: Vec<[i32; 3]>,
     /// What is to be told, by rising certainty: a key, tetrahedron and face.
     order: Vec<(u64, u8, u8)>,
     /// The corner of each tetrahedron that is the near vertex of its remover.
     near: Vec<u8>,
-    /// Where the vertex lies that its remover inserts.
-    aims: Vec<[i32; 3]>,
-    hashes: Vec<u64>,
+    /// From that corner to the vertex that its remover inserts.
+    offsets: Vec<[i32; 3]>,
     /// Of which tetrahedra the remover is known by now.
     told: Vec<bool>,
 }
@@ -251,35 +228,46 @@ impl HalfEdgeMt {
         scratch: &mut Scratch,
         teller: &mut impl Teller,
     ) -> Option<()> {
-        let Scratch { star, star_len, link, link_len, code, sorted, hashes, .. } = scratch;
+        let Scratch { star, star_len, link, link_len, code, hashes, tet_hashes, .. } = scratch;
         let (star, link) = (&mut star[..*star_len], &link[..*link_len]);
         let vertex = self.vertex(u);
-        let later = |v| {
-            let children = self.children_of(v);
-            &children[children.partition_point(|child| child.update <= u.0)..]
-        };
-        let lists: Vec<&[ForestChild]> =
-            link.iter().map(|&slot| later(mesh.vertex(slot))).chain([later(vertex)]).collect();
+        let lists: Vec<&[ForestChild]> = link
+            .iter()
+            .map(|&slot| mesh.vertex(slot))
+            .chain([vertex])
+            .map(|v| later(self.children_of(v), u))
+            .collect();
         star.iter_mut().for_each(|new| (new.remover, new.inner) = (NONE, 0));
         if lists.iter().all(|list| list.is_empty()) {
             return Some(());
         }
-        let around = Around { hashes, lists };
+        let around = Around { hashes, tet_hashes, lists };
         code.positions.clear();
         code.positions.extend(link.iter().map(|&slot| mesh.positions[slot as usize]));
         code.positions.push(position);
-        code.hashes.clear();
-        code.hashes.resize(star.len(), 0);
-        sorted.iter().for_each(|&(hash, i)| code.hashes[i as usize % MOST] = hash);
         code.find_removers(&around, star, teller)?;
         code.find_inner(&around, star, teller);
         Some(())
     }
 }
 
+/// Those of the children that come after `u`.
+#[inline]
+fn later(children: &[ForestChild], u: UpdateId) -> &[ForestChild] {
+    match (children.first(), children.last()) {
+        (Some(first), _) if first.update > u.0 => children,
+        (_, Some(last)) if last.update > u.0 => {
+            &children[children.partition_point(|child| child.update <= u.0)..]
+        }
+        _ => &[],
+    }
+}
+
 /// What surrounds a new vertex, by index into its link; the vertex itself is the last.
 struct Around<'a> {
     hashes: &'a [u64],
+    /// The hashes of the tetrahedra.
+    tet_hashes: &'a [u64],
     /// The forest children that come later.
     lists: Vec<&'a [ForestChild]>,
 }
@@ -290,7 +278,8 @@ impl<'a> Around<'a> {
     }
 
     fn lists_of(&self, new: &NewTet) -> [&'a [ForestChild]; 4] {
-        new.corners.map(|corner| self.list(corner))
+        let [a, b, c, d] = new.corners;
+        [self.list(a), self.list(b), self.list(c), self.list(d)]
     }
 }
 
@@ -324,8 +313,6 @@ impl StarCode {
         star: &mut [NewTet],
         teller: &mut impl Teller,
     ) -> Option<()> {
-        self.list_corners(star);
-        self.list_candidates(around);
         self.rank(around, star);
         self.told.clear();
         self.order.clear();
@@ -335,19 +322,19 @@ impl StarCode {
             if choices.len > 1 {
                 let largest =
                     choices.all[..choices.len].iter().fold(0.0, |w: f64, choice| w.max(choice.weight));
-                self.order.push((key(largest, self.hashes[i]), i as u8, 0));
+                self.order.push((key(largest, around.tet_hashes[i]), i as u8, 0));
             }
         }
         self.near.clear();
         self.near.resize(star.len(), 0);
-        self.aims.clear();
-        self.aims.resize(star.len(), [0; 3]);
+        self.offsets.clear();
+        self.offsets.resize(star.len(), [0; 3]);
         self.order.sort_unstable();
         for at in 0..self.order.len() {
             let i = usize::from(self.order[at].1);
             let choices = &mut self.choices[i];
             let choices = &mut choices.all[..choices.len];
-            weigh_by_neighbors(choices, star, i, &self.told);
+            weigh_by_neighbors(choices, &star[i], star, &self.told);
             let choice = teller.choose(i, choices)?;
             self.told[i] = true;
             let (corner, child) = match choice.remover {
@@ -356,61 +343,25 @@ impl StarCode {
                     Some(found) => found,
                     None => continue,
                 },
-                _ => (choice.corner, self.candidates.get(usize::from(choice.candidate))?.child),
+                _ => {
+                    let list = around.list(star[i].corners[usize::from(choice.corner) & 3]);
+                    (choice.corner, *list.get(choice.place as usize)?)
+                }
             };
             star[i].remover = child.update;
             self.near[i] = corner;
-            let from = self.tets[i][usize::from(corner) & 3];
-            self.aims[i] = [0, 1, 2].map(|k| from[k].saturating_add(child.offset[k]));
+            self.offsets[i] = child.offset;
         }
         Some(())
     }
 
-    /// Lists the candidates. A tetrahedron ranks no more of any vertex.
-    fn list_candidates(&mut self, around: &Around<'_>) {
-        self.candidates.clear();
-        for (near, list) in (0..).zip(&around.lists) {
-            self.candidates.extend(list.iter().take(RANKED).map(|&child| Candidate { child, near }));
-        }
-        self.candidates.sort_unstable_by_key(|candidate| candidate.child.update);
-    }
-
-    /// Lists the corners of the star, by tetrahedron and by vertex.
-    fn list_corners(&mut self, star: &[NewTet]) {
-        let newest = self.positions.len() - 1;
-        let vertices = |new: &NewTet| new.corners.map(|corner| usize::from(corner).min(newest));
-        self.tets.clear();
-        self.sums.clear();
-        self.starts.clear();
-        self.starts.resize(newest + 2, 0);
-        for new in star {
-            let vertices = vertices(new);
-            vertices.iter().for_each(|&x| self.starts[x] += 1);
-            let [p, q, r, s] = vertices.map(|x| self.positions[x]);
-            self.tets.push([p, q, r, s]);
-            let sum = |k: usize| i64::from(p[k]) + i64::from(q[k]) + i64::from(r[k]) + i64::from(s[k]);
-            self.sums.push([0, 1, 2].map(sum));
-        }
-        let mut end = 0;
-        for start in &mut self.starts {
-            end += *start;
-            *start = end;
-        }
-        self.corners.clear();
-        self.corners.resize(4 * star.len(), (0, 0));
-        for (i, new) in star.iter().enumerate().rev() {
-            for (corner, x) in vertices(new).into_iter().enumerate() {
-                self.starts[x] -= 1;
-                self.corners[self.starts[x] as usize] = (i as u8, corner as u8);
-            }
-        }
-    }
-
-    /// The tetrahedra that a candidate may remove, each with the corner that is its near vertex.
+    /// The corners of a tetrahedron.
     #[inline]
-    fn reached(&self, candidate: &Candidate) -> std::ops::Range<usize> {
-        let x = usize::from(candidate.near);
-        self.starts[x] as usize..self.starts[x + 1] as usize
+    fn corners(&self, new: &NewTet) -> [[i32; 3]; 4] {
+        let newest = self.positions.len() - 1;
+        let [a, b, c, d] = new.corners;
+        let at = |corner: u8| self.positions[usize::from(corner).min(newest)];
+        [at(a), at(b), at(c), at(d)]
     }
 
     /// Finds the choices for each tetrahedron.
@@ -418,34 +369,9 @@ impl StarCode {
         if self.choices.len() < star.len() {
             self.choices.resize_with(star.len(), Choices::default);
         }
-        for choices in &mut self.choices[..star.len()] {
-            (choices.len, choices.left, choices.more) = (0, 1.0, false);
-        }
-        for (number, candidate) in (0..).zip(&self.candidates) {
-            let at = self.positions[usize::from(candidate.near)];
-            let direction = Direction::new(candidate.child.offset);
-            for &(i, corner) in &self.corners[self.reached(candidate)] {
-                let choices = &mut self.choices[usize::from(i)];
-                if choices.len >= RANKED || choices.left < LEFT {
-                    choices.more = true;
-                    continue;
-                }
-                let share = direction.share(self.sums[usize::from(i)], at);
-                let weight = choices.left * share;
-                let remover = candidate.child.update;
-                choices.all[choices.len] =
-                    Choice { weight, first_weight: weight, remover, candidate: number, corner };
-                choices.len += 1;
-                choices.left *= 1.0 - share;
-            }
-        }
-        for (new, choices) in star.iter().zip(&mut self.choices) {
-            let more = choices.more || new.corners.iter().any(|&x| around.list(x).len() > RANKED);
-            let remover = if more { FURTHER } else { NONE };
-            let weight = choices.left;
-            choices.all[choices.len % (RANKED + 1)] =
-                Choice { weight, first_weight: weight, remover, ..Choice::default() };
-            choices.len += 1;
+        for (i, new) in star.iter().enumerate() {
+            let corners = self.corners(new);
+            rank_tet(&mut self.choices[i], &around.lists_of(new), &corners);
         }
     }
 
@@ -484,13 +410,15 @@ impl StarCode {
 
     fn find_inner(&mut self, around: &Around<'_>, star: &mut [NewTet], teller: &mut impl Teller) {
         self.order.clear();
+        // Those that are not told are as guessed.
+        let bits = teller.bits_left();
         for i in 0..star.len() {
             let new = star[i];
             if new.remover == NONE {
                 continue;
             }
-            let corners = self.tets[i];
             let near = usize::from(self.near[i]) & 3;
+            let view = View::new(&self.corners(&new), near, self.offsets[i]);
             for face in (0..4).filter(|&face| face != near) {
                 let behind = new.across[face];
                 if face != usize::from(new.own) && behind != NO_ENTRY {
@@ -503,50 +431,73 @@ impl StarCode {
                         continue;
                     }
                 }
-                let mut with = corners;
-                with[face] = self.aims[i];
-                if !on_lattice(with[face]) || orient3d(with[0], with[1], with[2], with[3]) <= 0 {
+                let Some(sine) = view.elevation(face) else {
                     star[i].inner |= 1 << face;
                     continue;
+                };
+                let guess = u8::from(sine < STEEP);
+                if bits == 0 {
+                    star[i].inner |= guess << face;
+                    continue;
                 }
-                let sine = elevation(&corners, near, face, self.aims[i]);
                 let face_hash = around.hashes[usize::from(new.corners[face]).min(around.hashes.len() - 1)]
                     .rotate_left(17);
-                let key = key((sine - STEEP).abs(), self.hashes[i].wrapping_add(face_hash));
-                let guess = u8::from(sine < STEEP);
+                let key = key((sine - STEEP).abs(), around.tet_hashes[i].wrapping_add(face_hash));
                 self.order.push((key, i as u8, face as u8 | guess << 7));
             }
         }
-        // Those that are not told are as guessed.
-        let told = teller.bits_left().min(self.order.len());
+        let told = bits.min(self.order.len());
         if told > 0 {
             self.order.sort_unstable();
         }
         for (at, &(_, i, face)) in self.order.iter().enumerate() {
             let (i, face, guess) = (usize::from(i), usize::from(face & 3), face >> 7 == 1);
             let is_inner = if at < told { teller.is_inner(i, face, guess) } else { guess };
-            if is_inner {
-                star[i].inner |= 1 << face;
-            }
+            star[i].inner |= u8::from(is_inner) << face;
         }
     }
+}
+
+/// Finds the choices for a tetrahedron, given the forest children of its corners.
+#[inline]
+fn rank_tet(choices: &mut Choices, lists: &[&[ForestChild]; 4], corners: &[[i32; 3]; 4]) {
+    let count: usize = lists.iter().map(|list| list.len()).sum();
+    let [p, q, r, s] = corners;
+    let sum = |k: usize| i64::from(p[k]) + i64::from(q[k]) + i64::from(r[k]) + i64::from(s[k]);
+    let sums = [sum(0), sum(1), sum(2)];
+    let mut next = [0; 4];
+    let (mut len, mut left) = (0, 1.0);
+    while len < count.min(RANKED) && left >= LEFT {
+        let Some((corner, child)) = pop_least(lists, &mut next) else { break };
+        let share = share(child.offset, sums, corners[usize::from(corner) & 3]);
+        let (weight, place) = (left * share, next[usize::from(corner) & 3] - 1);
+        choices.all[len] = Choice { weight, first_weight: weight, remover: child.update, place, corner };
+        len += 1;
+        left *= 1.0 - share;
+    }
+    let remover = if count > len { FURTHER } else { NONE };
+    choices.all[len] = Choice { weight: left, first_weight: left, remover, ..Choice::default() };
+    choices.len = len + 1;
 }
 
 /// How much more likely a candidate is that removes a neighbour, and how much less one that leaves it.
 const AGREEMENT: f64 = 6.0;
 
-/// Weighs the choices for tetrahedron `i` anew by what is known of its neighbours in the star: T_u hangs together.
-fn weigh_by_neighbors(choices: &mut [Choice], star: &[NewTet], i: usize, told: &[bool]) {
-    for (face, &n) in star[i].across.iter().enumerate() {
-        let n = usize::from(n);
-        if !told.get(n).is_some_and(|&told| told) {
-            continue;
+/// Weighs the choices for a tetrahedron anew by what is known of its neighbours in the star: T_u hangs together.
+#[inline]
+fn weigh_by_neighbors(choices: &mut [Choice], new: &NewTet, star: &[NewTet], told: &[bool]) {
+    let (mut known, mut count) = ([(0, NONE); 4], 0);
+    for (face, &n) in (0..).zip(&new.across) {
+        if told.get(usize::from(n)).is_some_and(|&told| told) {
+            known[count] = (face, star[usize::from(n)].remover);
+            count += 1;
         }
-        let other = star[n].remover;
-        for choice in choices.iter_mut() {
-            if choice.remover >= FURTHER || face == usize::from(choice.corner) {
-                continue;
-            }
+    }
+    if count == 0 {
+        return;
+    }
+    for choice in choices.iter_mut().filter(|choice| choice.remover < FURTHER) {
+        for &(_, other) in known[..count].iter().filter(|&&(face, _)| face != choice.corner) {
             // What is removed later than the candidate, or never, was left by it.
             if other == choice.remover {
                 choice.weight *= AGREEMENT;
@@ -563,41 +514,32 @@ fn on_lattice(p: [i32; 3]) -> bool {
 }
 
 /// The next update of four ascending lists, merged, and which list it is of.
+#[inline]
 fn pop_least(lists: &[&[ForestChild]; 4], next: &mut [u32; 4]) -> Option<(u8, ForestChild)> {
-    let mut least: Option<(u8, ForestChild)> = None;
+    let mut least: Option<(u8, &ForestChild)> = None;
     for (k, list) in (0..).zip(lists) {
-        if let Some(&child) = list.get(next[usize::from(k)] as usize)
+        if let Some(child) = list.get(next[usize::from(k)] as usize)
             && least.is_none_or(|(_, other)| child.update < other.update)
         {
             least = Some((k, child));
         }
     }
-    next[usize::from(least?.0)] += 1;
-    least
+    let (k, &child) = least?;
+    next[usize::from(k)] += 1;
+    Some((k, child))
 }
 
-/// From the near vertex of a candidate to the vertex that it inserts.
-struct Direction {
-    to: [f64; 3],
-    squared: f64,
-}
-
-impl Direction {
-    fn new(offset: [i32; 3]) -> Self {
-        let to = offset.map(f64::from);
-        Self { to, squared: dot(to, to) }
-    }
-
-    /// How likely the candidate removes a tetrahedron that no earlier one has removed, given the sum of its corners and the near
-    /// vertex.
-    #[inline]
-    fn share(&self, sum: [i64; 3], at: [i32; 3]) -> f64 {
-        let centre = [0, 1, 2].map(|k| (sum[k] - 4 * i64::from(at[k])) as f64);
-        let lengths = (dot(centre, centre) * self.squared).sqrt();
-        let cosine = dot(centre, self.to) / lengths.max(1e-300);
-        let ratio = ((1.0 - cosine) / (1.0 + cosine).max(1e-9)).min(1e9);
-        1.0 / (1.0 + ratio * ratio)
-    }
+/// How likely a candidate removes a tetrahedron that no earlier one has removed, given its offset, the sum of the corners, and
+/// its near vertex.
+#[inline]
+fn share(offset: [i32; 3], sum: [i64; 3], at: [i32; 3]) -> f64 {
+    let to = [f64::from(offset[0]), f64::from(offset[1]), f64::from(offset[2])];
+    let apart = |k: usize| (sum[k] - 4 * i64::from(at[k])) as f64;
+    let centre = [apart(0), apart(1), apart(2)];
+    let lengths = (dot(centre, centre) * dot(to, to)).sqrt();
+    let cosine = dot(centre, to) / lengths.max(1e-300);
+    let ratio = ((1.0 - cosine) / (1.0 + cosine).max(1e-9)).min(1e9);
+    1.0 / (1.0 + ratio * ratio)
 }
 
 #[inline]
@@ -608,18 +550,69 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 /// Faces over which the new vertex lies at a larger sine than this are guessed to stay.
 const STEEP: f64 = 0.35;
 
-/// The sine of the angle at which a point lies over a face, seen from corner `near` of it.
-fn elevation(corners: &[[i32; 3]; 4], near: usize, face: usize, point: [i32; 3]) -> f64 {
-    let from = corners[near];
-    let apart = |p: [i32; 3]| [0, 1, 2].map(|k| f64::from(p[k]) - f64::from(from[k]));
-    let mut others = (0..4).filter(|&k| k != near && k != face);
-    let (Some(i), Some(j)) = (others.next(), others.next()) else { return 0.0 };
-    let (a, b) = (apart(corners[i]), apart(corners[j]));
-    let normal = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-    let to = apart(point);
-    let lengths = (dot(normal, normal) * dot(to, to)).sqrt();
-    dot(normal, to).abs() / lengths.max(1e-300)
+/// A new vertex, seen from the near vertex of a tetrahedron.
+struct View {
+    corners: [[i32; 3]; 4],
+    near: usize,
+    /// Where the new vertex lies; none if it lies off every lattice.
+    point: Option<[i32; 3]>,
+    /// From the near vertex to the new one.
+    to: [f64; 3],
+    /// From the near vertex to each corner.
+    apart: [[f64; 3]; 4],
+    /// Whether determinants of these are exact.
+    exact: bool,
 }
+
+impl View {
+    #[inline]
+    fn new(corners: &[[i32; 3]; 4], near: usize, offset: [i32; 3]) -> Self {
+        let from = corners[near];
+        let add = |k: usize| from[k].saturating_add(offset[k]);
+        let point = Some([add(0), add(1), add(2)]).filter(|&point| on_lattice(point));
+        let mut apart = [[0.0; 3]; 4];
+        let mut largest = offset.iter().fold(0, |m, x| m | x.unsigned_abs());
+        for (apart, corner) in apart.iter_mut().zip(corners) {
+            for k in 0..3 {
+                let d = corner[k] - from[k];
+                largest |= d.unsigned_abs();
+                apart[k] = f64::from(d);
+            }
+        }
+        let to = [f64::from(offset[0]), f64::from(offset[1]), f64::from(offset[2])];
+        // Components below 2^16 make minors below 2^33 and sums of three products below 2^51.
+        Self { corners: *corners, near, point, to, apart, exact: largest < 1 << 16 }
+    }
+
+    /// The sine of the angle at which the new vertex lies over a face at the near vertex; none if it does not lie over it, or
+    /// off every lattice.
+    #[inline]
+    fn elevation(&self, face: usize) -> Option<f64> {
+        let point = self.point?;
+        let [i, j] = OTHERS[self.near & 3][face & 3];
+        let (a, b) = (self.apart[i], self.apart[j]);
+        let normal = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+        let height = dot(normal, self.to);
+        let is_over = if self.exact {
+            height > 0.0
+        } else {
+            let mut with = self.corners;
+            with[face] = point;
+            orient3d(with[0], with[1], with[2], with[3]) > 0
+        };
+        let lengths = (dot(normal, normal) * dot(self.to, self.to)).sqrt();
+        is_over.then(|| height.abs() / lengths.max(1e-300))
+    }
+}
+
+/// For a near corner and a face, the two other corners, in the order in which the normal of the face points into the
+/// tetrahedron.
+const OTHERS: [[[usize; 2]; 4]; 4] = [
+    [[0, 0], [2, 3], [3, 1], [1, 2]],
+    [[3, 2], [0, 0], [0, 3], [2, 0]],
+    [[1, 3], [3, 0], [0, 0], [0, 1]],
+    [[2, 1], [0, 2], [1, 0], [0, 0]],
+];
 
 /// What removes the stars of updates that have been applied, so that it need not be predicted again.
 #[derive(Clone, Debug)]
@@ -656,15 +649,16 @@ impl KnownStars {
             return false;
         };
         let Some((&count, rest)) = record.split_first() else { return false };
-        let Some((marks, removers)) = rest.split_at_checked(scratch.sorted.len()) else { return false };
+        let Some((marks, removers)) = rest.split_at_checked(scratch.star_len) else { return false };
         let Some(removers) = removers.get(..4 * usize::from(count)) else { return false };
         let mut known = [NONE; FEW + 1];
         for (known, bytes) in known.iter_mut().zip(removers.chunks_exact(4)) {
             *known = u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
         }
         known[FEW] = NONE;
-        for (&mark, &(_, i)) in marks.iter().zip(&scratch.sorted) {
-            let new = &mut scratch.star[i as usize % MOST];
+        let Scratch { star, sorted, .. } = scratch;
+        for (&mark, &place) in marks.iter().zip(&*sorted) {
+            let new = &mut star[place as usize % MOST];
             (new.remover, new.inner) = (known[usize::from(mark & 15)], mark >> 4);
         }
         true
@@ -676,8 +670,8 @@ impl KnownStars {
         let Ok(start) = u32::try_from(first + 1) else { return };
         let (mut known, mut count) = ([NONE; FEW], 0);
         self.bytes.push(0);
-        for &(_, i) in &scratch.sorted {
-            let NewTet { remover, inner, .. } = scratch.star[i as usize % MOST];
+        for &place in &scratch.sorted {
+            let NewTet { remover, inner, .. } = scratch.star[place as usize % MOST];
             let at = match remover {
                 NONE => FEW,
                 _ => known[..count].iter().position(|&other| other == remover).unwrap_or(count),
