@@ -61,10 +61,11 @@ impl fmt::Display for ClientError {
 
 impl std::error::Error for ClientError {
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        // Each is printed as it is, so what stands behind it comes next.
         match self {
-            Self::Stream(error) => Some(error),
-            Self::Format(error) => Some(error),
-            Self::Session(error) => Some(error),
+            Self::Stream(error) => error.source(),
+            Self::Format(error) => error.source(),
+            Self::Session(error) => error.source(),
         }
     }
 }

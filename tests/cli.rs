@@ -377,10 +377,14 @@ fn kinds_are_built_and_converted() {
     let before = folder.names();
     bad(
         1,
-        &["convert", &edge, "--kind", "vertex", "-o", &out],
+        &["convert", &edge, "--kind", "vertex", "-o", &folder.path("none.mt")],
         &[&edge, "kind edge", "--kind vertex", "build"],
     );
-    bad(1, &["convert", &input, "--kind", "edge", "-o", &out], &[&input, "not an MT file"]);
+    bad(
+        1,
+        &["convert", &input, "--kind", "edge", "-o", &folder.path("none.mt")],
+        &[&input, "not an MT file"],
+    );
     assert_eq!(folder.names(), before);
 }
 
@@ -567,6 +571,148 @@ fn a_broken_promise_is_told_by_the_exit_code() {
 }
 
 #[test]
+fn inputs_are_never_replaced() {
+    let folder = Folder::new("replaced");
+    let [input, mt, table] = ["in.vti", "m.mt", "points.csv"].map(|name| folder.path(name));
+    good(&["generate", "bucky", "--size", "7", "-o", &input]);
+    good(&["build", &input, "-o", &mt, "--quiet"]);
+    fs::write(&table, "0.5,0.5,0.5\n").expect("a file");
+    fs::create_dir(folder.path("sub")).expect("a folder");
+    let roundabout = folder.path("sub/../m.mt");
+    let [mesh, linked] = ["mesh.vtu", "linked.mt"].map(|name| folder.path(name));
+    good(&["extract", &mt, "-o", &mesh]);
+    #[cfg(unix)]
+    std::os::unix::fs::symlink(&mt, &linked).expect("a link");
+    let read = || [&input, &mt, &table, &mesh].map(|path| fs::read(path).expect("it is there"));
+    let before = read();
+    let renamed = folder.path("m.vtu");
+    fs::copy(&mt, &renamed).expect("a copy");
+    for arguments in [
+        &["convert", &mt, "-o", &mt, "--kind", "explicit"][..],
+        &["convert", &mt, "-o", &roundabout, "--kind", "explicit"],
+        &["convert", &roundabout, "-o", &mt, "--kind", "explicit"],
+        #[cfg(unix)]
+        &["convert", &mt, "-o", &linked, "--kind", "explicit"],
+        &["extract", &mt, "-o", &mesh, "--measure", &mesh],
+        &["extract", &renamed, "-o", &renamed],
+        &["probe", &mt, "--points", &table, "-o", &table],
+        &["stats", &mt, "--reference", &table, "-o", &table],
+    ] {
+        bad(1, arguments, &["is an input, too", "another file"]);
+    }
+    assert_eq!(read(), before);
+}
+
+#[test]
+fn outputs_have_names_and_places() {
+    let folder = Folder::new("places");
+    let [input, mt, none, other] = ["in.vti", "m.mt", "none/m.mt", "sub"].map(|name| folder.path(name));
+    good(&["generate", "bucky", "--size", "7", "-o", &input]);
+    good(&["build", &input, "-o", &mt, "--quiet"]);
+    fs::create_dir(&other).expect("a folder");
+    let [vtu, stl] = ["m.vtu", "m.stl"].map(|name| folder.path(name));
+    for (arguments, words) in [
+        (&["build", &input, "-o", &none][..], &["no folder", "none"][..]),
+        (&["build", &input, "-o", &other], &["is a folder"]),
+        (&["build", &input, "-o", &input], &[".mt", "in.vti"]),
+        (&["build", &input, "-o", &vtu], &["extract", ".mt"]),
+        (&["convert", &mt, "-o", &stl, "--kind", "explicit"], &["surface", ".mt"]),
+        (&["extract", &mt, "-o", &stl], &["surface", ".vtu"]),
+        (&["extract", &mt, "-o", "-"], &["/dev/stdout"]),
+        (&["surface", &mt, "-o", &folder.path("none/a.stl")], &["no folder"]),
+    ] {
+        bad(1, arguments, words);
+    }
+    assert_eq!(folder.names(), ["in.vti", "m.mt", "sub"]);
+}
+
+#[test]
+fn mistakes_are_told_once_and_by_their_name() {
+    let folder = Folder::new("mistakes");
+    let [input, mt, empty, out] = ["in.vti", "m.mt", "empty.mt", "out.vtu"].map(|name| folder.path(name));
+    good(&["generate", "bucky", "--size", "7", "-o", &input]);
+    good(&["build", &input, "-o", &mt, "--quiet"]);
+    fs::write(&empty, "").expect("a file");
+    for (arguments, words) in [
+        (&["extract", &empty, "-o", &out][..], &["is empty"][..]),
+        (&["info", &empty], &["is empty"]),
+        (&["info", "ftp://host/a.mt"], &["ftp", "http"]),
+        (&["build", "https://host/a.vtu", "-o", &mt], &["https", "fetch"]),
+    ] {
+        bad(1, arguments, words);
+        let error = text(&run(arguments).stderr).to_owned();
+        assert!(words.iter().all(|word| error.matches(word).count() <= 2), "said twice: {error}");
+        assert!(!error.contains("can be used"), "nothing has arrived: {error}");
+    }
+    for (arguments, words) in [
+        (&["extract", &mt, "-o", &out, "--need", ""][..], &["says nothing"][..]),
+        (&["extract", &mt, "-o", &out, "--need", " ; "], &["says nothing"]),
+        (&["extract", &mt, "-o", &out, "--budget", "-5"], &["'-5'", "whole number"]),
+        (&["extract", &mt, "-o", &out, "--max-bytes", "-5"], &["-5"]),
+        (&["build", &input, "-o", &mt, "--method", "collapse", "--for", "regions"], &["--for", "build"]),
+    ] {
+        bad(2, arguments, words);
+        assert!(!text(&run(arguments).stderr).contains("-- -5"), "that tip does not help");
+    }
+    // The server's error, with what is behind it, once.
+    let output = run(&["extract", "http://127.0.0.1:1/a.mt", "-o", &out]);
+    assert_eq!(text(&output.stderr).matches("cannot be reached").count(), 1, "{}", text(&output.stderr));
+}
+
+#[test]
+fn requests_that_meet_nothing_get_a_warning() {
+    let folder = Folder::new("nothing");
+    let [input, mt, out] = ["in.vti", "m.mt", "out.vtu"].map(|name| folder.path(name));
+    good(&["generate", "bucky", "--size", "9", "-o", &input]);
+    good(&["build", &input, "-o", &mt, "--quiet"]);
+    let warnings = |more: &[&str]| {
+        let output = run(&[&["extract", &mt, "-o", &out], more].concat());
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        text(&output.stderr).matches("warning: ").count()
+    };
+    let far = "90,90,90,91,91,91";
+    for (more, expected) in [
+        (&["--iso", "99"][..], 1),
+        (&["--iso", "99", "--iso", "0.1"], 0),
+        (&["--range", "-9,-8"], 1),
+        (&["--box", far], 1),
+        (&["--box", far, "--sphere", "90,0,0,1"], 2),
+        (&["--half-space", "1,0,0,-90"], 1),
+        (&["--half-space", "-1,0,0,90"], 0),
+        (&["--slab", "0,0,2,180,1"], 1),
+        (&["--slab", "0,0,2,0,1"], 0),
+        (&["--obox", "90,0,0,1,0,0,0,1,0,0,0,1"], 1),
+        (&["--obox", "0,0,0,1,0,0,0,1,0,0,0,1"], 0),
+        (&["--convex", "1,0,0,90,0,1,0,-90"], 1),
+        (&["--convex", "1,0,0,90,0,1,0,90"], 0),
+        (&["--need", "iso=99; error=1%", "--outside", "5%"], 1),
+        (&["--error", "1%"], 0),
+    ] {
+        assert_eq!(warnings(more), expected, "{more:?}");
+    }
+}
+
+#[test]
+fn measuring_against_another_mesh_fails() {
+    let folder = Folder::new("another");
+    let [input, other, mt, out] = ["in.vti", "other.vtu", "m.mt", "out.vtu"].map(|name| folder.path(name));
+    good(&["generate", "bucky", "--size", "9", "-o", &input]);
+    let mut mesh = tetralod::io::read(Path::new(&input)).expect("a mesh");
+    mesh.fields[0].values.iter_mut().for_each(|value| *value = 1.0 - *value);
+    let mut file = fs::File::create(&other).expect("a file");
+    tetralod::io::write_vtu(&mesh, &mut file).expect("it is written");
+    drop(file);
+    good(&["build", &input, "-o", &mt, "--quiet"]);
+    for error in ["0", "1%", "20%"] {
+        good(&["extract", &mt, "-o", &out, "--error", error, "--measure", &input]);
+        let output = run(&["extract", &mt, "-o", &out, "--error", error, "--measure", &other]);
+        assert_eq!(output.status.code(), Some(1));
+        let told = text(&output.stderr);
+        assert!(told.contains("is not what the MT was built from"), "{told}");
+    }
+}
+
+#[test]
 fn wrong_usage_is_told_apart() {
     for arguments in [
         &["extract", "a.mt"][..],
@@ -617,8 +763,10 @@ fn an_interrupt_leaves_what_was_there() {
     let input = folder.path("b.vti");
     good(&["generate", "bucky", "--size", "48", "-o", &input]);
     let start = Instant::now();
-    let code = interrupt(&["build", &input, "-o", &out], || start.elapsed() > Duration::from_millis(700));
+    let mt = folder.path("b.mt");
+    fs::write(&mt, "old").expect("a file");
+    let code = interrupt(&["build", &input, "-o", &mt], || start.elapsed() > Duration::from_millis(700));
     assert_eq!(code, Some(130));
-    assert_eq!(folder.names(), ["b.vti", "big.vtu"]);
-    assert_eq!(fs::read(Path::new(&out)).expect("it is there"), b"old");
+    assert_eq!(folder.names(), ["b.mt", "b.vti", "big.vtu"]);
+    assert_eq!(fs::read(Path::new(&mt)).expect("it is there"), b"old");
 }

@@ -82,6 +82,7 @@ impl fmt::Display for FormatError {
             Self::Corrupt { offset, what } => {
                 write!(f, "the MT file is damaged at byte {offset}: {what}; {AGAIN}")
             }
+            Self::Truncated { offset: 0 } => write!(f, "the file is empty; {AGAIN}"),
             Self::Truncated { offset } => write!(
                 f,
                 "the MT file ends too early, after {offset} bytes; what has arrived can be used, for the rest {AGAIN}"

@@ -222,6 +222,8 @@ struct Report {
 pub fn run(arguments: &Arguments) -> Result<()> {
     let start = Instant::now();
     let config = config(arguments);
+    files::check_ending(&arguments.output, "mt")?;
+    files::check_output(&arguments.output, &arguments.inputs)?;
     let (mesh, repaired) = read(arguments, &config)?;
     let repaired = repaired.to_string();
     if !repaired.is_empty() && !arguments.quiet {

@@ -49,6 +49,8 @@ struct Report {
 
 pub fn run(arguments: &Arguments) -> Result<()> {
     let start = Instant::now();
+    files::check_ending(&arguments.output, "mt")?;
+    files::check_output(&arguments.output, [&arguments.file])?;
     let mut opened = files::open_mt(&arguments.file)?;
     let from = opened.info()?.kind;
     let converted = opened.mt()?.convert(arguments.kind);

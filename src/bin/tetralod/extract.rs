@@ -8,6 +8,7 @@ use super::query::Query;
 use super::query::Summary;
 use anyhow::Context;
 use anyhow::Result;
+use anyhow::bail;
 use serde::Serialize;
 use std::path::Path;
 use std::path::PathBuf;
@@ -54,19 +55,46 @@ struct Report<'a> {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
+    files::check_ending(&arguments.output, "vtu")?;
+    let inputs = arguments.measure.iter().chain([&arguments.file]).chain(arguments.query.files());
+    files::check_output(&arguments.output, inputs)?;
     let answer = arguments.query.answer_exactly(&arguments.file)?;
     let opened = &answer.opened;
-    let measured = arguments.measure.as_deref().map(|input| measure(input, &answer)).transpose()?;
+    let measured = arguments.measure.as_deref().map(|input| measure(input, &answer)).transpose()?.flatten();
     let mesh = opened.session.mesh().context("there is no mesh")?;
     let mesh = reference_units(&opened.session, opened.info()?, mesh);
     files::write_file(&arguments.output, |out| Ok(tetralod::io::write_vtu(&mesh, out)?))?;
     let report = Report {
         mesh: &answer.summary,
-        measured_error: measured.flatten(),
+        measured_error: measured.as_ref().map(|measured| measured.error),
         seconds: answer.seconds,
         hash: format!("{:016x}", opened.session.hash()),
     };
-    if arguments.json { output::json(&report) } else { print(arguments, &report) }
+    if arguments.json {
+        output::json(&report)?
+    } else {
+        print(arguments, &report)?
+    }
+    if let (Some(Measured { error, beyond: Some(bound) }), Some(input)) = (measured, &arguments.measure) {
+        bail!(
+            "the measured error, {}, is above the bound, {}: {} is not what the MT was built from, or the MT is damaged; \
+             `tetralod verify` looks at all of it",
+            output::number(error),
+            output::number(bound),
+            input.display()
+        );
+    }
+    Ok(())
+}
+
+/// Bounds and errors are computed in doubles.
+const ROUNDING: f64 = 1e-9;
+
+/// What was measured, in units of the field.
+struct Measured {
+    error: f64,
+    /// The bound that it is above, if it is.
+    beyond: Option<f64>,
 }
 
 /// The current mesh in the units of the model and of all its fields.
@@ -85,7 +113,7 @@ fn reference_units(session: &Session, info: &MtInfo, mesh: &CurrentMesh) -> TetM
 
 /// The largest difference from the field of the input at its vertices, in the parts that needs of that field select; none
 /// if there are no such needs.
-fn measure(input: &Path, answer: &Answer) -> Result<Option<f64>> {
+fn measure(input: &Path, answer: &Answer) -> Result<Option<Measured>> {
     let opened = &answer.opened;
     let reference = files::read_reference(&[input.to_owned()], opened)?;
     let info = opened.info()?;
@@ -95,7 +123,7 @@ fn measure(input: &Path, answer: &Answer) -> Result<Option<f64>> {
         format!("{}: there is no field '{name}'; give the mesh that the MT was built from", input.display())
     })?;
     let mesh = opened.session.mesh().context("there is no mesh")?;
-    let mut largest = None;
+    let mut largest: Option<Measured> = None;
     for (i, wanted) in answer.wanted.iter().enumerate() {
         let (region, ranges) = match &wanted.need.part {
             refine::Part::Everywhere => (None, Vec::new()),
@@ -114,7 +142,12 @@ fn measure(input: &Path, answer: &Answer) -> Result<Option<f64>> {
         let promise = bound.map(|bound| Promise::of(info, answer.field, *bound));
         let part = Part { ranges, promise, ..Part::default() };
         let found = deviation(info, mesh, &reference, &part).field;
-        largest = Some(largest.map_or(found, |largest: f64| largest.max(found)));
+        let bound = bound.map(|bound| info.field_bound(answer.field, *bound)).filter(|_| answer.stats.done);
+        let beyond = bound.filter(|bound| found > bound * (1.0 + ROUNDING));
+        largest = Some(match largest {
+            None => Measured { error: found, beyond },
+            Some(largest) => Measured { error: largest.error.max(found), beyond: largest.beyond.or(beyond) },
+        });
     }
     Ok(largest)
 }

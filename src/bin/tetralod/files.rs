@@ -5,6 +5,7 @@ use super::input;
 use super::input::Wanted as WantedFields;
 use anyhow::Context;
 use anyhow::Result;
+use anyhow::bail;
 use std::fs;
 use std::fs::File;
 use std::io::BufWriter;
@@ -65,6 +66,53 @@ pub fn remove_partial_output_on_interrupt() -> Result<()> {
         std::process::exit(INTERRUPTED);
     };
     ctrlc::set_handler(interrupted).context("the handler for Ctrl-C could not be set")
+}
+
+/// Refuses an output that is one of the inputs, or that has no place, before any work is done for it.
+pub fn check_output<'a>(path: &Path, inputs: impl IntoIterator<Item = &'a PathBuf>) -> Result<()> {
+    let name = path.display();
+    if path == Path::new("-") {
+        bail!("'-' is no name for a file; give one after -o, or /dev/stdout");
+    }
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
+        bail!("{name} cannot be written: there is no folder '{}'; make it first", folder.display());
+    }
+    let Ok(found) = fs::metadata(path) else { return Ok(()) };
+    if found.is_dir() {
+        bail!("{name} is a folder; give a file in it after -o");
+    }
+    let Ok(place) = fs::canonicalize(path) else { return Ok(()) };
+    let is_it = |input: &&PathBuf| fs::canonicalize(input).is_ok_and(|input| input == place);
+    // Pipes and devices are not replaced.
+    if let Some(input) = inputs.into_iter().find(is_it).filter(|_| found.is_file()) {
+        bail!(
+            "{name} is an input, too ({}), and would be replaced; give another file after -o",
+            input.display()
+        );
+    }
+    Ok(())
+}
+
+/// What output files are called, and which command writes them.
+const ENDINGS: [(&[&str], &str); 4] = [
+    (&["mt"], "`tetralod build` writes .mt"),
+    (&["vtu"], "`tetralod extract` writes .vtu"),
+    (
+        &["vtp", "stl", "ply", "obj", "csv"],
+        "`tetralod surface`, `isosurface`, `slice`, `probe` and `streamlines` write .vtp, .stl, .ply, .obj and .csv",
+    ),
+    (&["vti", "vtk", "pvd", "raw", "json"], "this command does not write that format"),
+];
+
+/// Refuses a name that says of what format the file is, if that is another one than `format`.
+pub fn check_ending(path: &Path, format: &str) -> Result<()> {
+    let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let other = ENDINGS.iter().find(|(endings, _)| endings.contains(&ending.as_str()) && ending != format);
+    match other {
+        Some((_, who)) => bail!("{}: this command writes .{format}; {who}", path.display()),
+        None => Ok(()),
+    }
 }
 
 /// Writes the file at `path` with `write`; on any failure what was there before stays.
@@ -165,6 +213,11 @@ impl Bytes {
         if let Some(url) = url(path) {
             return Self::of_server(url);
         }
+        if let Some(scheme) = scheme(path) {
+            bail!(
+                "files cannot be read by {scheme}; give an address that begins with http:// or https://, or a file"
+            );
+        }
         if fs::metadata(path)?.is_file() {
             return Ok(Self(Box::new(FileSource::new(File::open(path)?)?)));
         }
@@ -186,6 +239,14 @@ impl Bytes {
 /// The address, if a path is one.
 fn url(path: &Path) -> Option<&str> {
     path.to_str().filter(|text| ["http://", "https://"].iter().any(|scheme| text.starts_with(scheme)))
+}
+
+/// What stands in front of `://`, if a path looks like an address and is no file.
+pub fn scheme(path: &Path) -> Option<&str> {
+    let (scheme, _) = path.to_str()?.split_once("://")?;
+    let is_scheme =
+        !scheme.is_empty() && scheme.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c));
+    Some(scheme).filter(|_| is_scheme && !path.exists())
 }
 
 /// Opens an MT file of which only what is needed is read.

@@ -28,6 +28,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if !["vtu", "vti"].contains(&ending.as_str()) {
         bail!("{}: the name must end in .vtu or .vti", path.display());
     }
+    files::check_output(path, [])?;
     let mesh = generate::by_name(&arguments.name, arguments.size)?;
     files::write_file(path, |out| match ending.as_str() {
         "vti" => Ok(io::write_vti(&mesh, out)?),

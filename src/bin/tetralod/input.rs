@@ -1,5 +1,6 @@
 //! Meshes from files: time steps put together, mended, fields at cells turned into fields at points.
 
+use super::files;
 use anyhow::Context;
 use anyhow::Result;
 use anyhow::bail;
@@ -31,6 +32,9 @@ pub struct Wanted<'a> {
 pub fn read(paths: &[PathBuf], wanted: &Wanted<'_>) -> Result<(TetMesh, RepairReport)> {
     let mut steps = Vec::new();
     for path in paths {
+        if let Some(scheme) = files::scheme(path) {
+            bail!("{}: meshes are not read by {scheme}; fetch the file first", path.display());
+        }
         // Read errors name the file themselves.
         steps.extend(io::steps(path)?);
     }

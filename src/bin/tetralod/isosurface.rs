@@ -48,6 +48,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if isovalues.is_empty() {
         super::refuse_usage("isosurface needs a value: give --iso V, in units of the field");
     }
+    arguments.output.check(arguments.query.files().chain([&arguments.file]))?;
     let mut answer = arguments.query.answer(&arguments.file)?;
     let start = Instant::now();
     let surface = answer.opened.session.isosurfaces(isovalues)?;

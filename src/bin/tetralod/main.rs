@@ -105,5 +105,11 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
 
 /// Ends the program as wrong usage, with a word about what to do instead.
 fn refuse_usage(what: &str) -> ! {
-    Arguments::command().error(ErrorKind::ArgumentConflict, what).exit()
+    let mut command = Arguments::command();
+    command.build();
+    let name = std::env::args().nth(1).unwrap_or_default();
+    match command.find_subcommand_mut(&name) {
+        Some(subcommand) => subcommand.error(ErrorKind::ArgumentConflict, what).exit(),
+        None => command.error(ErrorKind::ArgumentConflict, what).exit(),
+    }
 }

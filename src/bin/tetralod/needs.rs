@@ -14,14 +14,17 @@ use std::fs;
 use std::path::Path;
 use std::path::PathBuf;
 use std::str::FromStr;
+use tetralod::geom::Bounds;
 use tetralod::mt::MtInfo;
 use tetralod::refine::MAX_PLANES;
 use tetralod::refine::Need;
 use tetralod::refine::Part;
+use tetralod::refine::RefineStats;
 use tetralod::refine::Region;
 use tetralod::refine::Transfer;
 use tetralod::refine::Values;
 use tetralod::refine::View;
+use tetralod::session::Session;
 
 /// An error in units of a field, or as a fraction of its range.
 #[derive(Clone, Copy, Debug)]
@@ -107,6 +110,9 @@ impl FromStr for Group {
     /// Reads `key=value; key=value; ...`.
     fn from_str(text: &str) -> Result<Self, String> {
         let mut group = Self::default();
+        if text.split(';').all(|part| part.trim().is_empty()) {
+            return Err("it says nothing; give key=value, as in 'error=1%'".to_owned());
+        }
         for part in text.split(';').map(str::trim).filter(|part| !part.is_empty()) {
             let (key, value) =
                 part.split_once('=').ok_or_else(|| format!("'{part}' is not of the form key=value"))?;
@@ -152,6 +158,15 @@ impl Group {
             }
         }
         Ok(())
+    }
+
+    /// The files that it names.
+    pub fn files(&self) -> impl Iterator<Item = &PathBuf> {
+        let cameras = self.cameras.iter().filter_map(|camera| match camera {
+            Camera::File(path) => Some(path),
+            Camera::Given(_) => None,
+        });
+        cameras.chain(&self.transfers)
     }
 
     /// Whether it says nothing about where the mesh is needed.
@@ -231,6 +246,64 @@ impl Group {
         } else {
             self.regions.iter().for_each(|region| add(Some(region)));
         }
+    }
+}
+
+/// A word about a need that can meet nothing: values that the field does not have, or a region outside of the domain.
+pub fn warning(session: &Session, stats: &RefineStats, wanted: &Wanted) -> Option<String> {
+    let (info, mesh) = (session.info()?, session.mesh()?);
+    let (region, values) = match &wanted.need.part {
+        Part::Region(region) => (Some(region), None),
+        Part::Values(values) => (None, Some(values)),
+        Part::Both(region, values) => (Some(region), Some(values)),
+        _ => (None, None),
+    };
+    let number = output::number;
+    if let Some(values) = values {
+        let field = &info.fields[values.field];
+        let misses = |[low, high]: &[f64; 2]| *high < field.min || *low > field.max;
+        if values.ranges.iter().all(misses) {
+            let [min, max] = [number(field.min), number(field.max)];
+            return Some(format!("{}: the field has values from {min} to {max} alone", wanted.name));
+        }
+    }
+    let corners: Vec<[f64; 3]> = mesh.positions().iter().map(|&q| info.lattice.point(q)).collect();
+    let domain = Bounds::of(&corners);
+    // The boundary of the input may be as far from that of a coarse mesh.
+    let near = info.boundary_bound(stats.error_bound);
+    region.filter(|region| is_apart(region, &domain, near)).map(|_| {
+        let list = |p: [f64; 3]| p.map(number).join(",");
+        format!("{}: the mesh lies in the box {},{} alone", wanted.name, list(domain.min), list(domain.max))
+    })
+}
+
+/// Whether a plane parts a region from the domain by more than `near`.
+fn is_apart(region: &Region, domain: &Bounds, near: f64) -> bool {
+    let centre = [0, 1, 2].map(|k| 0.5 * (domain.min[k] + domain.max[k]));
+    let half = [0, 1, 2].map(|k| 0.5 * (domain.max[k] - domain.min[k]) + near);
+    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    // From where to where the domain reaches along a direction.
+    let reach = |n: [f64; 3]| {
+        let (middle, wide) = (dot(n, centre), dot(n.map(f64::abs), half));
+        [middle - wide, middle + wide]
+    };
+    let below = |n: [f64; 3], offset: f64| reach(n)[0] > offset;
+    match region {
+        Region::Box(b) => (0..3).any(|k| b.min[k] > centre[k] + half[k] || b.max[k] < centre[k] - half[k]),
+        Region::OrientedBox { centre: c, halves } => halves.iter().any(|&n| {
+            let [low, high] = reach(n);
+            high < dot(n, *c) - dot(n, n) || low > dot(n, *c) + dot(n, n)
+        }),
+        Region::Sphere { centre: c, radius } => {
+            let apart = [0, 1, 2].map(|k| ((c[k] - centre[k]).abs() - half[k]).max(0.0));
+            dot(apart, apart) > radius * radius
+        }
+        Region::HalfSpace { normal, offset } => below(*normal, *offset),
+        Region::Slab { normal, offset, thickness } => {
+            let ([low, high], wide) = (reach(*normal), 0.5 * thickness * dot(*normal, *normal).sqrt());
+            high < offset - wide || low > offset + wide
+        }
+        Region::Convex(planes) => planes.iter().any(|&[x, y, z, d]| below([x, y, z], d)),
     }
 }
 
@@ -385,6 +458,16 @@ pub fn parse_share(text: &str) -> Result<f64, String> {
     let (number, percent) = percentage(text)?;
     let share = if percent { number / 100.0 } else { number };
     if share >= 0.0 { Ok(share) } else { Err(format!("'{text}' is negative")) }
+}
+
+/// A whole number that is not negative.
+pub fn parse_count(text: &str) -> Result<u32, String> {
+    text.trim().parse().map_err(|_| format!("'{text}' is not a whole number from 0 to {}", u32::MAX))
+}
+
+/// The same, larger.
+pub fn parse_long_count(text: &str) -> Result<u64, String> {
+    text.trim().parse().map_err(|_| format!("'{text}' is not a whole number from 0 to {}", u64::MAX))
 }
 
 /// A number of bytes; K, M and G stand for powers of 1024.

@@ -50,6 +50,11 @@ impl FromStr for Target {
 }
 
 impl Target {
+    /// Refuses a target that is one of the inputs, or that has no place.
+    pub fn check<'a>(&self, inputs: impl IntoIterator<Item = &'a PathBuf>) -> Result<()> {
+        files::check_output(&self.path, inputs)
+    }
+
     /// Writes a surface; a table gets its points.
     pub fn write(&self, data: &PolyData) -> Result<()> {
         match self.format {

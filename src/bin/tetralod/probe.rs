@@ -108,6 +108,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if arguments.samples.is_some() && arguments.what.line.is_none() {
         super::refuse_usage("--samples are points of a line: give --line, too");
     }
+    if let Some(target) = &arguments.output {
+        let inputs = arguments.what.list.iter().chain(arguments.query.files()).chain([&arguments.file]);
+        target.check(inputs)?;
+    }
     let mut answer = arguments.query.answer(&arguments.file)?;
     let start = Instant::now();
     let fields = answer.all_values()?;

@@ -94,7 +94,7 @@ pub struct Query {
     #[arg(long, value_name = "w,h", value_parser = needs::parse_viewport, requires = "matrix", help_heading = WHAT)]
     viewport: Option<[f64; 2]>,
     /// Largest error on the screen in pixels, for --view and --matrix [default: what the file says, or 1]
-    #[arg(long, value_name = "P", value_parser = needs::parse_size, help_heading = WHAT)]
+    #[arg(long, value_name = "P", value_parser = needs::parse_size, allow_hyphen_values = true, help_heading = WHAT)]
     pixels: Option<f64>,
     /// What a transfer function makes visible, within --colour-error: a file with its points (repeatable).
     #[arg(long = "transfer", value_name = "FILE.json", help_heading = WHAT)]
@@ -111,23 +111,28 @@ pub struct Query {
     #[arg(long = "need", value_name = "K=V;…", allow_hyphen_values = true, help_heading = WHAT)]
     needs: Vec<Group>,
     /// At most so many tetrahedra; the best mesh that fits, but never less than the base mesh.
-    #[arg(long, value_name = "N", help_heading = LIMITS)]
+    #[arg(long, value_name = "N", value_parser = needs::parse_count, allow_hyphen_values = true, help_heading = LIMITS)]
     budget: Option<u32>,
     /// At most so many vertices.
-    #[arg(long, value_name = "N", help_heading = LIMITS)]
+    #[arg(long, value_name = "N", value_parser = needs::parse_count, allow_hyphen_values = true, help_heading = LIMITS)]
     max_vertices: Option<u32>,
     /// At most so many bytes, 32 a tetrahedron and 16 a vertex; K, M and G are KiB, MiB and GiB.
-    #[arg(long, value_name = "N[K|M|G]", value_parser = needs::parse_bytes, help_heading = LIMITS)]
+    #[arg(long, value_name = "N[K|M|G]", value_parser = needs::parse_bytes, allow_hyphen_values = true, help_heading = LIMITS)]
     max_bytes: Option<u64>,
     /// Stop refining after so many milliseconds: a valid mesh, but an unfinished one, and not the same each time.
-    #[arg(long, value_name = "MS", value_parser = needs::parse_size, help_heading = LIMITS)]
+    #[arg(long, value_name = "MS", value_parser = needs::parse_size, allow_hyphen_values = true, help_heading = LIMITS)]
     max_ms: Option<f64>,
     /// Stop after so many updates: a valid mesh, but an unfinished one.
-    #[arg(long, value_name = "N", help_heading = LIMITS)]
+    #[arg(long, value_name = "N", value_parser = needs::parse_long_count, allow_hyphen_values = true, help_heading = LIMITS)]
     max_updates: Option<u64>,
 }
 
 impl Query {
+    /// The files that it names.
+    pub fn files(&self) -> impl Iterator<Item = &PathBuf> {
+        self.views.iter().chain(&self.transfers).chain(self.needs.iter().flat_map(Group::files))
+    }
+
     /// The values that the mesh is refined around, if they are said by `--iso`.
     pub fn isovalues(&self) -> &[f64] {
         &self.isovalues
@@ -237,6 +242,8 @@ impl Query {
         stats.judged += before.judged;
         let seconds = start.elapsed().as_secs_f64();
         opened.session.set_field(field).with_context(name)?;
+        let warnings = wanted.iter().filter_map(|wanted| needs::warning(&opened.session, &stats, wanted));
+        warnings.for_each(|warning| eprintln!("warning: {warning}"));
         let summary = summary(&opened, field, &stats, &wanted)?;
         Ok(Answer { opened, field, wanted, stats, seconds, summary })
     }

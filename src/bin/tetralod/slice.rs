@@ -68,6 +68,7 @@ struct Report {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
+    arguments.output.check(arguments.query.files().chain([&arguments.file]))?;
     let mut answer = arguments.query.answer(&arguments.file)?;
     let (names, fields) = (answer.field_names()?, answer.all_values()?);
     let mesh = answer.opened.session.view();

@@ -121,6 +121,11 @@ impl Sums {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
+    if let Some(path) = &arguments.output {
+        files::check_ending(path, "csv")?;
+        let inputs = arguments.reference.iter().chain(arguments.query.files()).chain([&arguments.file]);
+        files::check_output(path, inputs)?;
+    }
     let answer = arguments.query.answer(&arguments.file)?;
     let field = &answer.opened.info()?.fields[answer.field];
     // A constant field is a range, too.

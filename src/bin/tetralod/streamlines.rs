@@ -157,6 +157,7 @@ impl Lines {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
+    arguments.output.check(arguments.query.files().chain([&arguments.file]))?;
     let mut answer = arguments.query.answer(&arguments.file)?;
     let info = answer.opened.info()?;
     let components =
