@@ -27,6 +27,8 @@ async function load() {
 /** The methods that wait for bytes, beside which others are answered. */
 export const WAITING = ["openParts", "reach", "settled", "arrived"];
 
+export const REPLACED = "another mesh was asked for before all had come that this one needs";
+
 /** What adds up over the steps of a refinement. */
 const SUMS = ["refined", "coarsened", "forced", "judged", "milliseconds"];
 
@@ -99,9 +101,11 @@ export function coreMethods(emit) {
     feed: (bytes) => session.feed(bytes),
     finish: () => session.finish(),
     info: () => session.info(),
-    async refine(options, deltas) {
+    /** Without `partial`, nothing is handed out as long as data is missing that a stream will bring. */
+    async refine(options, deltas, partial) {
       aim(await received(options));
-      return result(advanceAll(), deltas);
+      const step = advanceAll();
+      return partial || !step.stats.missing ? result(step, deltas) : { more: true };
     },
     /** The same when all has come that it needs. */
     async reach(options, deltas) {
@@ -116,7 +120,7 @@ export function coreMethods(emit) {
         for (const name of SUMS) step.stats[name] += before[name];
       }
       if (mine === goal) return result(step, deltas);
-      throw new TetralodError("replaced", "another mesh was asked for before all had come that this one needs");
+      throw new TetralodError("replaced", REPLACED);
     },
     aim: async (options) => aim(await received(options)),
     step: (milliseconds, updates, deltas) => result(advance(milliseconds, updates), deltas),

@@ -1,3 +1,4 @@
+/// <reference lib="esnext.disposable" />
 /**
  * Very large tetrahedral volumes in a web page: an MT file is streamed, and selective refinement makes from it the
  * mesh that is needed now.
@@ -6,8 +7,8 @@
  * import { MultiTessellation } from "tetralod";
  *
  * const mt = await MultiTessellation.open("combustor.mt", { onProgress: (p) => console.log(p.bytes, "of", p.total) });
- * const coarse = await mt.refine({ error: "5%" });           // as far as what has arrived allows
- * const sharp = await mt.refine({ error: "0.1%", isovalues: [0.7], maxTets: 500_000 }, { complete: true });
+ * const coarse = await mt.refine({ error: "5%" }, { partial: true });  // as far as what has arrived allows
+ * const sharp = await mt.refine({ error: "0.1%", isovalues: [0.7], maxTets: 500_000 });
  * const surface = await mt.isosurface(0.7);
  * mt.free();
  * ```
@@ -192,7 +193,7 @@ export class MultiTessellation {
    *
    * Of a file that is fetched in parts: another promise each time it is read, that resolves when all is here that the
    * request needs that was made last; before the first one that is at once. Waiting for it does not change the mesh:
-   * call `refine` afterwards, or use its `complete`.
+   * call `refine` afterwards, which waits by itself.
    *
    * Rejects with what ended the download; what had arrived stays usable.
    */
@@ -207,9 +208,9 @@ export class MultiTessellation {
 
   /**
    * Changes the current mesh to the one that is asked for and gives a copy of it. The cost is that of the difference
-   * from the last one. It does at once what the data that is here allows; `stats.missing` tells whether more is on its way.
-   * With `complete` it resolves when all has arrived that the request needs, and rejects with `replaced` if another mesh is
-   * asked for before that, or with what ended the download.
+   * from the last one. It resolves when all has arrived that the request needs, and rejects with `replaced` if another mesh is
+   * asked for before that, or with what ended the download. With `partial` it does at once what the data that is here
+   * allows; `stats.missing` tells whether more is on its way.
    *
    * @example
    * await mt.refine({ error: "1%" });                                  // within 1 % of the field's range everywhere
@@ -231,8 +232,8 @@ export class MultiTessellation {
    *
    * With `deltas` only what has changed since a mesh was last handed out is sent, for {@link applyChanges}.
    */
-  refine(options?: RefineOptions, how?: { deltas?: false; complete?: boolean }): Promise<RefineResult>;
-  refine(options: RefineOptions | undefined, how: { deltas: true; complete?: boolean }): Promise<RefineDelta>;
+  refine(options?: RefineOptions, how?: { deltas?: false; partial?: boolean }): Promise<RefineResult>;
+  refine(options: RefineOptions | undefined, how: { deltas: true; partial?: boolean }): Promise<RefineDelta>;
 
   /**
    * The same in steps, each of which gives a mesh that is valid and within the budget. The loop ends when the mesh is the

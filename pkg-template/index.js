@@ -3,7 +3,7 @@
  */
 
 import { applyChanges, emptyMesh } from "./changes.js";
-import { Local } from "./core.js";
+import { Local, REPLACED } from "./core.js";
 import { TetralodError } from "./errors.js";
 import { openOptions, sendable } from "./options.js";
 import { Remote, nodeEndpoint, webEndpoint } from "./rpc.js";
@@ -72,14 +72,22 @@ export class MultiTessellation {
   }
 
   async refine(options = {}, how = {}) {
-    checkNames(how, ["deltas", "complete"]);
-    const { deltas = false, complete = false } = how;
+    checkNames(how, ["deltas", "partial"]);
+    const { deltas = false, partial = false } = how;
     const sent = sendable(options, this.#inWorker);
-    this.#goal++;
-    if (complete && this.#complete) await this.#complete;
-    const method = complete && !this.#complete ? "reach" : "refine";
-    const { more, ...result } = await this.#wait(method, [sent, Boolean(deltas)], method === "reach");
-    return result;
+    const goal = ++this.#goal;
+    const ask = async (method, ...more) => {
+      const args = [sent, Boolean(deltas), ...more];
+      const { more: _, ...result } = await this.#wait(method, args, method === "reach");
+      return result;
+    };
+    if (!partial && !this.#complete) return ask("reach");
+    const early = await ask("refine", Boolean(partial));
+    if (early.stats) return early;
+    // Data of the stream is missing, and nothing was handed out.
+    await this.#complete;
+    if (goal !== this.#goal) throw new TetralodError("replaced", REPLACED);
+    return ask("refine", true);
   }
 
   async *refineSteps(options = {}, how = {}) {

@@ -28,10 +28,11 @@ const PIECE = 1 << 20;
 export async function openSource(source, signal, { headers, credentials } = {}) {
   signal?.throwIfAborted();
   const url = urlOf(source);
+  if (url !== undefined && nodeModule("node:fs") && isPath(url)) throw new TetralodError("bad-source", `${url}: ${NO_PATH}`);
   if (url?.startsWith("file:") && nodeModule("node:fs")) return openFile(url);
   if (url !== undefined) return openResponse(await request(source, url, { signal, headers, credentials }), url);
   if (isInstance(source, "Response")) return openResponse(source, source.url || "response");
-  if (isInstance(source, "Blob")) return open("blob", source.size, source.stream());
+  if (isInstance(source, "Blob")) return open(source.name || "blob", source.size, source.stream());
   const bytes = bytesOf(source);
   if (bytes) return { name: "bytes", total: bytes.byteLength, chunks: pieces(bytes) };
   return open("stream", undefined, source);
@@ -121,6 +122,11 @@ function open(name, total, source) {
 }
 
 const KINDS = "give a URL, Request, Response, Blob, ArrayBuffer, Uint8Array, ReadableStream or async iterable of Uint8Array";
+
+const NO_PATH = 'a path is no URL; in Node, give pathToFileURL(path) of "node:url"';
+
+/** Whether a text is no URL, or begins with the letter of a drive. */
+const isPath = (text) => !URL.canParse(text) || /^[a-z]:[\\/]/i.test(text);
 
 function iteratorOf(source) {
   if (typeof source?.getReader === "function") return readerIterator(source);

@@ -18,6 +18,10 @@ const NO_WEBGPU =
 const NO_ADAPTER =
   "the browser gives no GPU adapter; allow hardware acceleration in its settings, or update the graphics driver";
 
+const NO_PAGE = 'a viewer draws on a canvas of a page; elsewhere, use MultiTessellation of "tetralod"';
+const USED_CANVAS =
+  "`canvas` has been used by another viewer, or has a context of its own; give each viewer a new canvas element";
+
 export class Viewer extends EventTarget {
   #remote;
   #canvas;
@@ -45,6 +49,7 @@ export class Viewer extends EventTarget {
   /** Takes the canvas over, for good, and starts the worker. */
   static async create(canvas, { signal } = {}) {
     signal?.throwIfAborted();
+    if (typeof HTMLCanvasElement === "undefined") throw new TetralodError("no-webgpu", NO_PAGE);
     if (!(canvas instanceof HTMLCanvasElement)) {
       throw new TetralodError("bad-option", "`canvas` must be a canvas element");
     }
@@ -70,7 +75,7 @@ export class Viewer extends EventTarget {
   }
 
   async #start() {
-    const offscreen = this.#canvas.transferControlToOffscreen();
+    const offscreen = handOver(this.#canvas);
     const [width, height] = pixels(this.#canvas.getBoundingClientRect());
     const created = await this.#remote.call("create", [offscreen, width, height, devicePixelRatio], [offscreen]);
     this.#adapter = created.adapter;
@@ -226,8 +231,8 @@ export class Viewer extends EventTarget {
   }
 
   /** Cuts away what lies beyond a plane, `{ normal, offset }`; `null` cuts nothing. */
-  setClip(clip) {
-    return this.#change({ clip: clip ?? null });
+  async setClip(clip) {
+    return this.#change({ clip: clip ? plane(clip) : null });
   }
 
   /** Shows a box with handles; `null` hides it. It is a picture only: pass `box` to `refine` to use it. */
@@ -288,6 +293,24 @@ export class Viewer extends EventTarget {
 function naming(name, error) {
   const named = !(error instanceof TetralodError) || error.code === "freed" || error.message.startsWith(`${name}:`);
   return named ? error : new TetralodError(error.code, `${name}: ${error.message}`, { cause: error });
+}
+
+/** A canvas can be handed to a worker once. */
+function handOver(canvas) {
+  try {
+    return canvas.transferControlToOffscreen();
+  } catch (error) {
+    throw new TetralodError("bad-option", USED_CANVAS, { cause: error });
+  }
+}
+
+/** A plane, as a worker takes it. */
+function plane({ normal, offset }) {
+  const numbers = [...Array.from(normal ?? []), offset];
+  if (numbers.length !== 4 || !numbers.every(Number.isFinite) || numbers.slice(0, 3).every((x) => x === 0)) {
+    throw new TetralodError("bad-option", "option `clip`: must have a `normal` of three numbers, not all 0, and an `offset`");
+  }
+  return { normal: numbers.slice(0, 3), offset };
 }
 
 function pixels({ width, height }) {

@@ -75,8 +75,7 @@
 //! - Every mesh that comes out is a valid conforming mesh: positive tetrahedra, faces shared by at most two, complete
 //!   adjacency.
 //! - [`RefineStats::error_bound`](refine::RefineStats::error_bound) bounds the error at every vertex of the reference
-//!   mesh in the selected part, up to the rounding of the reference itself, which [`MtInfo::floor`](mt::MtInfo::floor)
-//!   tells.
+//!   mesh in the selected part. What the lattices round off ([`MtInfo::floor`](mt::MtInfo::floor)) is part of it.
 //! - The same file and request give the same mesh on every platform, whatever was asked for before; the same input
 //!   gives the same file.
 //! - No bytes cause a panic, an endless loop or an MT beyond [`Limits`](format::Limits): decoders return typed errors,

@@ -27,9 +27,9 @@ const INTRODUCTION: &str = "\
 *Written by `cargo xtask paper`: change the command, not this page.*
 
 The paper is E. Danovaro, L. De Floriani, P. Magillo, E. Puppo, *Data Structures for 3D Multi-Tessellations: an \
-Overview* (2003); what follows is its section 6. Its numbers are set in *italics*. Everything else is computed by the \
-command, from the library as it is, and is the same on every run and machine (but for the pictures, which depend on \
-the GPU).
+Overview* (2003); what follows is its section 6. Its numbers are set in *italics*. Rows marked *elsewhere* are \
+constants: what other programs were measured to need. Everything else is computed by the command, from the library as it is, \
+and is the same on every run and machine (but for the pictures, which depend on the GPU).
 
 What differs from the paper before anything is built:
 

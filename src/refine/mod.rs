@@ -3,7 +3,7 @@
 //! A [`Request`] says how accurate the mesh must be, and where: the union of some [`Need`]s. A tetrahedron of the current
 //! mesh *violates* it when the update that removes it has a larger error than asked for and the tetrahedron meets the
 //! selected part. That update is then forced, its parents first, until no tetrahedron violates. The set of updates this
-//! leads to is the smallest consistent set that satisfies the request; it does not depend on the order of work or on the
+//! leads to is the smallest consistent set that satisfies the request, by the errors that updates have here; it does not depend on the order of work or on the
 //! mesh that one starts from, because criteria are *monotone*: when a tetrahedron violates, so does one of those that the
 //! update which created it removed. (Errors grow towards the base, the selected part is widened by the error, and the
 //! builder adds to the error of an update by how much its new values overshoot the range of those it replaces. What is
@@ -71,8 +71,8 @@ pub struct RefineStats {
     /// Tetrahedra and updates whose place in the request was looked at on the way.
     pub judged: u64,
     /// The error that is guaranteed in the selected part, as a fraction of the field's range, at every vertex of the
-    /// reference mesh there. The rounding to the lattices, half a step, is not in it. With several needs, the largest one of
-    /// those that measure the field.
+    /// reference mesh there. What the lattices round off is part of it: see [`MtInfo::floor`](crate::mt::MtInfo::floor). With
+    /// several needs, the largest one of those that measure the field.
     pub error_bound: f64,
     /// How often the error exceeds what was asked for, at most; not above 1 if the request is satisfied.
     pub excess: f64,

@@ -271,9 +271,8 @@ test("the package runs in a worker of the page, without a viewer", async () => {
   const seen = await page.evaluate(async () => {
     const { MultiTessellation, applyChanges } = await import("tetralod");
     const mt = await MultiTessellation.open("data/bucky.mt");
-    const all = { complete: true };
-    const { stats, tets } = await mt.refine({ error: "5%", maxTets: 20_000 }, all);
-    const [one, two] = [await mt.hash(), (await mt.refine({ error: "0%" }, all), await mt.refine({ error: "5%", maxTets: 20_000 }, all), await mt.hash())];
+    const { stats, tets } = await mt.refine({ error: "5%", maxTets: 20_000 });
+    const [one, two] = [await mt.hash(), (await mt.refine({ error: "0%" }), await mt.refine({ error: "5%", maxTets: 20_000 }), await mt.hash())];
     // Deltas over a walk of a box, in steps and whole.
     const at = (place) => place.map((x, i) => mt.info.bounds[i] + x * (mt.info.bounds[i + 3] - mt.info.bounds[i]));
     const mesh = await mt.refine({ error: "100%" });
@@ -290,13 +289,22 @@ test("the package runs in a worker of the page, without a viewer", async () => {
         followed &&= full[name].length === mesh[name].length && full[name].every((x, i) => x === mesh[name][i]);
       }
     }
+    // What a viewer cannot do is said, and by whom it is to be mended.
+    const { Viewer } = await import("tetralod/viewer");
+    const canvas = document.createElement("canvas");
+    const viewer = await Viewer.create(canvas);
+    const flat = await viewer.setClip({ normal: [0, 0, 0], offset: 1 }).catch(({ message }) => message);
+    viewer.free();
+    const used = await Viewer.create(canvas).catch(({ message }) => message);
     const abort = new AbortController();
     abort.abort();
     const aborted = await MultiTessellation.open("data/bucky.mt", { signal: abort.signal }).catch((error) => error.name);
     mt.free();
-    return { tetrahedra: stats.tetrahedra, length: tets.length, same: one === two, followed, aborted };
+    return { tetrahedra: stats.tetrahedra, length: tets.length, same: one === two, followed, aborted, flat, used };
   });
   assert.ok(seen.tetrahedra > 0 && seen.tetrahedra <= 20_000);
+  assert.match(seen.flat, /`clip`/);
+  assert.match(seen.used, /new canvas/);
   assert.equal(seen.length, 4 * seen.tetrahedra);
   assert.ok(seen.same, "the same request gives the same mesh from wherever one starts");
   assert.ok(seen.followed, "deltas add up to the mesh");

@@ -6,6 +6,7 @@ import { createServer } from "node:http";
 import { after, before, describe, test } from "node:test";
 import { pathToFileURL } from "node:url";
 import { MultiTessellation, TetralodError } from "../../pkg/index.js";
+import { Viewer } from "../../pkg/viewer.js";
 
 const folder = process.env.TETRALOD_FIXTURE;
 assert.ok(folder, "TETRALOD_FIXTURE is not set: run `cargo xtask test js`");
@@ -274,14 +275,18 @@ for (const worker of [true, false]) {
       }
       const mt = await open(slow());
       assert.equal(mt.progress.complete, false);
-      const early = await mt.refine({ error: 0 });
+      const early = await mt.refine({ error: 0 }, { partial: true });
       assert.ok(early.stats.tetrahedra > 0 && early.stats.tetrahedra < mt.info.tetrahedra);
       assert.equal(early.stats.satisfied, false);
+      // What has come is enough for this one.
+      assert.equal((await mt.refine({ error: "100%" })).stats.satisfied, true);
+      const waiting = mt.refine({ error: 0 });
+      const replaced = rejects(waiting, "replaced");
+      const late = mt.refine({ error: "0.01%" }).then(() => mt.refine({ error: 0 }));
       release();
-      await mt.complete;
-      const late = await mt.refine({ error: 0 });
-      assert.equal(late.stats.tetrahedra, mt.info.tetrahedra);
-      assert.equal(late.stats.satisfied, true);
+      await replaced;
+      assert.equal((await late).stats.tetrahedra, mt.info.tetrahedra);
+      assert.equal((await late).stats.satisfied, true);
       mt.free();
     });
 
@@ -292,7 +297,12 @@ for (const worker of [true, false]) {
       await rejects(open(`${base}/page`), "not-mt", /\/page: /);
       await rejects(open(bytes.slice(0, 10)), "truncated");
       await rejects(open(new Uint8Array()), "truncated");
+      await rejects(Viewer.create({}), "no-webgpu", /MultiTessellation/);
       await rejects(open(7), "bad-source", /URL, Request/);
+      await rejects(open("models/none.mt"), "bad-source", /none\.mt: .*pathToFileURL/);
+      await rejects(open("C:\\models\\none.mt"), "bad-source", /pathToFileURL/);
+      const named = new File(["no mesh at all"], "dropped.mt");
+      await rejects(open(named), "not-mt", /^dropped\.mt: /);
       await rejects(open(null), "bad-source");
       await rejects(open((async function* () { yield "text"; })()), "bad-source", /string/);
       const used = await fetch(`${base}/good`);
@@ -304,12 +314,13 @@ for (const worker of [true, false]) {
     test("a file that breaks off stays usable as far as it came", async () => {
       const mt = await open(`${base}/breaks`);
       await rejects(mt.complete, "network", /\/breaks/);
-      assert.ok((await mt.refine({ error: 0 })).stats.tetrahedra > 0);
+      assert.ok((await mt.refine({ error: 0 }, { partial: true })).stats.tetrahedra > 0);
       mt.free();
 
       const cut = await open(bytes.slice(0, bytes.length - 5));
       await rejects(cut.complete, "truncated");
-      assert.ok((await cut.refine({ error: 0 })).stats.tetrahedra > 0);
+      assert.ok((await cut.refine({ error: 0 }, { partial: true })).stats.tetrahedra > 0);
+      await rejects(cut.refine({ error: 0 }), "truncated");
       cut.free();
     });
 
@@ -344,7 +355,7 @@ for (const worker of [true, false]) {
       await until(() => held.size === 1, "only the stream is left of the requests");
       abort.abort();
       await assert.rejects(mt.complete, { name: "AbortError" });
-      assert.ok((await mt.refine({ error: 0 })).stats.tetrahedra > 0, "what arrived stays usable");
+      assert.ok((await mt.refine({ error: 0 }, { partial: true })).stats.tetrahedra > 0, "what arrived stays usable");
       mt.free();
       await until(() => held.size === 0, "the connection is closed");
 
@@ -356,7 +367,7 @@ for (const worker of [true, false]) {
 
     test("free ends the download, and all later calls say so", async () => {
       const mt = await open(`${base}/holds`);
-      const underWay = mt.refine({ error: 0 });
+      const underWay = mt.refine({ error: 0 }, { partial: true });
       mt.free();
       mt.free();
       if (worker) await rejects(underWay, "freed");

@@ -1,9 +1,14 @@
 // Files on servers that are fetched in parts: the meshes are those of the whole file, at fewer bytes, whatever the server
 // does; or there is an error that says what to do about it, and the mesh stays valid.
 import assert from "node:assert/strict";
-import { readFile } from "node:fs/promises";
+import { execFile } from "node:child_process";
+import { mkdir, mkdtemp, readFile, rm, symlink, writeFile } from "node:fs/promises";
 import { createServer } from "node:http";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
 import { after, before, beforeEach, describe, test } from "node:test";
+import { fileURLToPath } from "node:url";
+import { promisify } from "node:util";
 import { MultiTessellation, TetralodError } from "../../pkg/index.js";
 
 const folder = process.env.TETRALOD_FIXTURE;
@@ -125,14 +130,14 @@ for (const [kind, worker] of Object.keys(blocks).flatMap((kind) => [[kind, true]
       assert.ok(mt.progress.blocks.all > 200, `${mt.progress.blocks.all} blocks`);
       assert.ok(sent < bytes.length / 3, "the base mesh and the index come first");
       assert.equal(mt.progress.total, bytes.length);
-      const first = await mt.refine(REQUESTS[0], { complete: true });
+      const first = await mt.refine(REQUESTS[0]);
       checkMesh(first);
       assert.deepEqual([first.stats.satisfied, first.stats.missing, first.stats.done], [true, false, true]);
       assert.equal(first.more, undefined);
       assert.equal(await mt.hash(), hashes[0]);
       assert.ok(sent < bytes.length / 2, `${sent} of ${bytes.length}`);
       for (const [i, request] of REQUESTS.entries()) {
-        await mt.refine(request, { complete: true });
+        await mt.refine(request);
         assert.equal(await mt.hash(), hashes[i], `request ${i}`);
       }
       assert.ok(sent < 0.8 * bytes.length, `${sent} of ${bytes.length}`);
@@ -141,7 +146,7 @@ for (const [kind, worker] of Object.keys(blocks).flatMap((kind) => [[kind, true]
       assert.ok(seen.every((progress, i) => i === 0 || progress.bytes >= seen[i - 1].bytes));
       await mt.complete;
       const before = sent;
-      await mt.refine(REQUESTS[0], { complete: true });
+      await mt.refine(REQUESTS[0]);
       assert.equal(sent, before, "what is here is not fetched again");
       mt.free();
     });
@@ -154,11 +159,10 @@ for (const [kind, worker] of Object.keys(blocks).flatMap((kind) => [[kind, true]
         await gate;
         good(range, response);
       };
-      const early = await mt.refine(REQUESTS[0]);
+      const early = await mt.refine(REQUESTS[0], { partial: true });
       checkMesh(early);
       assert.deepEqual([early.stats.satisfied, early.stats.missing], [false, true]);
       release();
-      await mt.complete;
       const late = await mt.refine(REQUESTS[0]);
       assert.deepEqual([late.stats.satisfied, late.stats.missing], [true, false]);
       assert.equal(await mt.hash(), hashes[0]);
@@ -189,11 +193,11 @@ for (const [kind, worker] of Object.keys(blocks).flatMap((kind) => [[kind, true]
         held.push(range);
         response.on("close", () => closed++);
       };
-      const replaced = mt.refine(REQUESTS[0], { complete: true });
+      const replaced = mt.refine(REQUESTS[0]);
       replaced.catch(() => {});
       await until(() => held.length > 0, "something is asked for");
       answer = good;
-      const second = mt.refine(REQUESTS[2], { complete: true });
+      const second = mt.refine(REQUESTS[2]);
       await rejects(replaced, "replaced");
       checkMesh(await second);
       assert.equal(await mt.hash(), hashes[2]);
@@ -205,7 +209,7 @@ for (const [kind, worker] of Object.keys(blocks).flatMap((kind) => [[kind, true]
       const mt = await open({ memory: 300_000 });
       for (const round of [0, 1]) {
         for (const [i, request] of REQUESTS.entries()) {
-          const mesh = await mt.refine(request, { complete: true });
+          const mesh = await mt.refine(request);
           checkMesh(mesh);
           assert.equal(mesh.stats.missing, false);
           const { leftOut, needed } = mt.progress.blocks;
@@ -230,7 +234,7 @@ for (const [kind, worker] of Object.keys(blocks).flatMap((kind) => [[kind, true]
       // Three of four answers are none.
       const mt = await open({ retries: 12 });
       for (const [i, request] of REQUESTS.entries()) {
-        checkMesh(await mt.refine(request, { complete: true }));
+        checkMesh(await mt.refine(request));
         assert.equal(await mt.hash(), hashes[i]);
       }
       mt.free();
@@ -239,29 +243,29 @@ for (const [kind, worker] of Object.keys(blocks).flatMap((kind) => [[kind, true]
     test("a server that fails for good is reported, and gone on with when it is back", async () => {
       const mt = await open();
       answer = (_, response) => response.writeHead(500).end();
-      await rejects(mt.refine(REQUESTS[0], { complete: true }), "network", /model\.mt: .*500/);
+      await rejects(mt.refine(REQUESTS[0]), "network", /model\.mt: .*500/);
       await rejects(mt.complete, "network");
-      const meanwhile = await mt.refine(REQUESTS[0]);
+      const meanwhile = await mt.refine(REQUESTS[0], { partial: true });
       checkMesh(meanwhile);
       assert.equal(meanwhile.stats.satisfied, false);
       const steps = mt.refineSteps(REQUESTS[0]);
       await rejects((async () => { for await (const step of steps) checkMesh(step); })(), "network");
       answer = good;
       await mt.retry();
-      await mt.refine(REQUESTS[0], { complete: true });
+      await mt.refine(REQUESTS[0]);
       assert.equal(await mt.hash(), hashes[0]);
       mt.free();
     });
 
     test("a file that changes is noticed: the mesh stays, and nothing of both is mixed", async () => {
       const mt = await open();
-      await mt.refine(REQUESTS[0], { complete: true });
+      await mt.refine(REQUESTS[0]);
       answer = (range, response) => {
         head(range, response, '"two"');
         response.end(bytes.slice(range.start, range.end).reverse());
       };
-      await rejects(mt.refine(REQUESTS[2], { complete: true }), "changed", /replaced/);
-      checkMesh(await mt.refine(REQUESTS[0]));
+      await rejects(mt.refine(REQUESTS[2]), "changed", /replaced/);
+      checkMesh(await mt.refine(REQUESTS[0], { partial: true }));
       assert.equal(await mt.hash(), hashes[0]);
       await rejects(mt.retry(), "changed");
       mt.free();
@@ -273,11 +277,11 @@ for (const [kind, worker] of Object.keys(blocks).flatMap((kind) => [[kind, true]
         head(range, response);
         response.end(bytes.slice(range.start, range.end).map((byte) => byte ^ 1));
       };
-      await rejects(mt.refine(REQUESTS[0], { complete: true }), "corrupt", /model\.mt: /);
-      checkMesh(await mt.refine(REQUESTS[0]));
+      await rejects(mt.refine(REQUESTS[0]), "corrupt", /model\.mt: /);
+      checkMesh(await mt.refine(REQUESTS[0], { partial: true }));
       answer = good;
       await mt.retry();
-      checkMesh(await mt.refine(REQUESTS[0], { complete: true }));
+      checkMesh(await mt.refine(REQUESTS[0]));
       assert.equal(await mt.hash(), hashes[0]);
       mt.free();
     });
@@ -293,7 +297,7 @@ for (const [kind, worker] of Object.keys(blocks).flatMap((kind) => [[kind, true]
 
       asked = [];
       const streamed = await open({ whole: true, headers: { "x-key": "open" } });
-      const mesh = await streamed.refine(REQUESTS[0], { complete: true });
+      const mesh = await streamed.refine(REQUESTS[0]);
       checkMesh(mesh);
       assert.equal(await streamed.hash(), hashes[0]);
       assert.deepEqual(asked.map(({ start }) => start), [undefined]);
@@ -306,7 +310,7 @@ for (const [kind, worker] of Object.keys(blocks).flatMap((kind) => [[kind, true]
         asked = [];
         const headers = source instanceof URL ? { "x-key": "open" } : undefined;
         const mt = await MultiTessellation.open(source, { worker, headers });
-        await mt.refine(REQUESTS[0], { complete: true });
+        await mt.refine(REQUESTS[0]);
         assert.equal(await mt.hash(), hashes[0]);
         assert.ok(asked.every(({ headers, start }) => headers["x-key"] === "open" && start !== undefined));
         mt.free();
@@ -318,7 +322,7 @@ for (const [kind, worker] of Object.keys(blocks).flatMap((kind) => [[kind, true]
       assert.ok(floor >= 0 && floor < 0.01);
       assert.deepEqual([unit, time, vector], ["", undefined, undefined]);
       const mt = await open({ fields: [name] });
-      const { stats } = await mt.refine({ ...REQUESTS[0], field: 0 }, { complete: true });
+      const { stats } = await mt.refine({ ...REQUESTS[0], field: 0 });
       assert.ok(stats.errorBound >= floor, "no bound is below what storing rounds off");
       await mt.setField(0);
       await rejects(mt.setField(1), "bad-option", /0 to 0/);
@@ -337,14 +341,14 @@ for (const [kind, worker] of Object.keys(blocks).flatMap((kind) => [[kind, true]
         assert.deepEqual(mt.info.fields.map(({ name }) => name), names);
         for (const [number, { name, min, max, floor }] of mt.info.fields.entries()) {
           assert.ok(floor > 0 && floor < 1e-3 * (max - min));
-          const { stats } = await mt.refine({ error: "4%", field: number }, { complete: true });
+          const { stats } = await mt.refine({ error: "4%", field: number });
           assert.ok(stats.satisfied && stats.relativeErrorBound <= 0.04);
           const byNumber = await mt.hash();
-          await mt.refine({ error: "4%", field: name }, { complete: true });
+          await mt.refine({ error: "4%", field: name });
           assert.equal(await mt.hash(), byNumber);
         }
         const { floor } = mt.info.fields.at(-1);
-        const exact = await mt.refine({ error: 0, field: "speed" }, { complete: true });
+        const exact = await mt.refine({ error: 0, field: "speed" });
         assert.equal(exact.stats.tetrahedra, mt.info.tetrahedra);
         assert.ok(exact.stats.errorBound >= floor && exact.stats.bounds[0] >= floor, "what storing rounds off counts");
         fetched[names.length] = sent - before;
@@ -358,11 +362,11 @@ for (const [kind, worker] of Object.keys(blocks).flatMap((kind) => [[kind, true]
       const abort = new AbortController();
       const mt = await open({ signal: abort.signal });
       answer = () => {};
-      const never = mt.refine(REQUESTS[0], { complete: true });
+      const never = mt.refine(REQUESTS[0]);
       abort.abort();
       await assert.rejects(never, { name: "AbortError" });
       await assert.rejects(mt.complete, { name: "AbortError" });
-      checkMesh(await mt.refine(REQUESTS[0]));
+      checkMesh(await mt.refine(REQUESTS[0], { partial: true }));
       mt.free();
       await rejects(mt.refine(REQUESTS[0]), "freed");
     });
@@ -389,17 +393,17 @@ test("damage is not kept in the cache", async () => {
       head(range, response);
       response.end(bytes.slice(range.start, range.end).map((byte) => byte ^ 1));
     };
-    await rejects(mt.refine(REQUESTS[2], { complete: true }), "corrupt");
+    await rejects(mt.refine(REQUESTS[2]), "corrupt");
     answer = good;
     await mt.retry();
-    await mt.refine(REQUESTS[2], { complete: true });
+    await mt.refine(REQUESTS[2]);
     assert.equal(await mt.hash(), hashes[2]);
     mt.free();
     const before = sent;
     const other = await open();
     // The cache opens beside.
     await new Promise((resolve) => setTimeout(resolve, 50));
-    await other.refine(REQUESTS[2], { complete: true });
+    await other.refine(REQUESTS[2]);
     assert.equal(await other.hash(), hashes[2]);
     assert.ok(sent - before < 0.5 * before, "most comes from the cache");
     other.free();
@@ -415,3 +419,25 @@ async function until(condition, what) {
   }
   assert.fail(`waited in vain until ${what}`);
 }
+
+test("the example of the README does what its text says, from a server with ranges", async () => {
+  bytes = blocks["half-edge"];
+  const readme = await readFile(new URL("../../README.md", import.meta.url), "utf8");
+  const [, example] = /```js\n(import \{ MultiTessellation \}[^]*?)```/.exec(readme);
+  assert.ok(example.includes('"bucky.mt", import.meta.url'));
+  const project = await mkdtemp(join(tmpdir(), "tetralod-readme-"));
+  try {
+    await mkdir(join(project, "node_modules"));
+    await symlink(fileURLToPath(new URL("../../pkg", import.meta.url)), join(project, "node_modules/tetralod"));
+    await writeFile(join(project, "example.mjs"), example.replace("import.meta.url", JSON.stringify(base)));
+    const { stdout, stderr } = await promisify(execFile)("node", ["example.mjs"], { cwd: project });
+    assert.equal(stderr, "");
+    const [early, sharp, surface] = stdout.trim().split("\n").map((line) => line.split(" "));
+    assert.ok(Number(early[0]) > 0 && ["true", "false"].includes(early[1]));
+    assert.ok(Number(sharp[0]) > 0 && Number(sharp[1]) <= 0.01 && sharp[2] === "true", "what is asked for is there without more ado");
+    assert.ok(Number(surface[0]) > 0 && surface[1] === "triangles");
+    assert.ok(sent < bytes.length, "not all of the file is fetched");
+  } finally {
+    await rm(project, { recursive: true });
+  }
+});

@@ -25,7 +25,6 @@ let chunks = 0;
 const options: OpenOptions = { onProgress: (progress) => void (chunks += progress.bytes > 0 ? 1 : 0) };
 const source: Source = new URL(`file://${fixture}/small.mt`);
 const mt: MultiTessellation = await MultiTessellation.open(source, options);
-await mt.complete;
 
 const info: MtInfo = mt.info;
 const request: RefineOptions = { error: "1%", maxTets: 10_000, box: new Float64Array([-1, -1, -1, 99, 99, 99]) };
@@ -48,7 +47,6 @@ const whole: RefineResult = await mt.refine(seen);
 const followed = copy.tets.length === whole.tets.length && copy.tets.every((vertex, i) => vertex === whole.tets[i]);
 
 const local = await MultiTessellation.open(source, { worker: false });
-await local.complete;
 const where: Where = ({ errors }) => errors.map((error) => error / 0.1);
 const asked = await local.refine({ where }, { deltas: true });
 const told: Mesh = applyChanges(emptyMesh(), asked);
