@@ -648,7 +648,11 @@ impl Front {
                 if self.contains(asked.update) {
                     continue;
                 }
-                mt.start_at(&mut self.mesh, asked.tet);
+                // Between two steps holes are filled, and what was asked by then has moved.
+                let is_there = self.mesh.tet(asked.tet).is_some();
+                if is_there && mt.remover(&self.mesh, asked.tet) == Some(asked.update) {
+                    mt.start_at(&mut self.mesh, asked.tet);
+                }
                 match self.force(mt, asked.update, outcome)? {
                     // It is a leaf now; those that it forced are none.
                     Forced::Applied => {
