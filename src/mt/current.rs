@@ -290,6 +290,13 @@ impl CurrentMesh {
         }
     }
 
+    /// Gives tetrahedron `t` a tag that is not looked for, although it is below [`FIRST_ANONYMOUS_TAG`], in the place of one that is
+    /// not.
+    #[inline]
+    pub(super) fn take_tag(&mut self, t: u32, tag: u32) {
+        self.tags[t as usize] = tag;
+    }
+
     /// The tetrahedron that got a tag last, as long as it is in the mesh and has it.
     #[inline]
     pub(crate) fn tagged(&self, tag: u32) -> Option<u32> {

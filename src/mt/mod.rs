@@ -49,7 +49,6 @@ pub use error::{ErrorCode, UpdateError};
 pub use exact::Exact;
 pub use exact::ExactValues;
 pub use explicit::{ExplicitMt, ExplicitUpdate};
-pub(crate) use glue::Glue;
 pub use half_edge::BaseMark;
 pub use half_edge::ForestChild;
 pub use half_edge::HalfEdgeMt;
