@@ -91,7 +91,7 @@ pub(super) fn turned([a, b, c]: Face) -> Face {
 
 /// The sorted vertices of a turned face as one number.
 #[inline]
-pub(super) fn key([a, b, c]: Face) -> u32 {
+fn key([a, b, c]: Face) -> u32 {
     u32::from(a) << 12 | u32::from(b.min(c)) << 6 | u32::from(b.max(c))
 }
 

@@ -38,6 +38,7 @@ use super::vertex::COUNT_BITS;
 use super::vertex::MAX_AROUND;
 use super::vertex::MAX_INSERTED;
 use super::vertex::VertexMt;
+use super::vertex_from::Hole;
 use super::vertex_from::write_given_up;
 use super::vertex_from::write_removed;
 use super::vertex_grow::Insertion;
@@ -52,6 +53,9 @@ const GIVEN_UP: u32 = 0xFF;
 
 /// Room for the new slots, and for [`GIVEN_UP`].
 const SLOTS: usize = 256;
+
+/// To look around a vertex for what an update removes takes as much as to look at so many tetrahedra.
+const SITE_COST: usize = 32;
 
 /// A face of Π_u with what lies beyond.
 #[derive(Clone, Copy, Debug, Default)]
@@ -153,6 +157,20 @@ impl Default for Cavity {
 }
 
 impl Cavity {
+    /// Takes `removed`, which all have the tag, and lists their faces that none of them lies behind.
+    fn list_bare(&mut self, mesh: &mut CurrentMesh, removed: &[u32], tag: u32) {
+        mesh.next_epoch();
+        (self.tets_len, self.bare_len) = (removed.len(), 0);
+        self.tets[..removed.len()].copy_from_slice(removed);
+        for &t in removed {
+            for (face, n) in (0..).zip(mesh.neighbors[t as usize]) {
+                // Written anyway, and counted if it belongs there.
+                self.bare[self.bare_len % BARE] = [t, face, n];
+                self.bare_len += usize::from(n == NONE || mesh.tag(n) != tag);
+            }
+        }
+    }
+
     /// Puts a face of tetrahedron `tet` on the list of walls. None if there are too many, or too many vertices.
     #[inline]
     fn add_wall(
@@ -326,7 +344,7 @@ impl Cavity {
             Spheres::of(positions[..self.link_len].iter().copied())
         };
         let (vertices, faces) = (self.link_len as u32, &faces[..self.walls_len]);
-        write_removed(&mut self.glue, &mut self.bits, vertices, faces, removed, on_boundary, spheres)
+        write_removed(&mut self.glue, &mut self.bits, Hole { vertices, faces, removed, on_boundary }, spheres)
     }
 
     /// Whether all tetrahedra of the new star are positive, exactly.
@@ -569,6 +587,65 @@ impl VertexMt {
         self.child(u, child).filter(|_| child > 0).map(|child| child.0)
     }
 
+    /// Reveals updates to the tetrahedra around the vertices that these come with. False if others may be left to be told, or to look at
+    /// all would be quicker.
+    fn reveal_around(&self, mesh: &mut CurrentMesh, updates: &Range<u32>) -> bool {
+        let Some(growing) = &self.growing else { return false };
+        let of_base = self.base.tets.iter().zip(&self.base_removers).filter(|(_, u)| updates.contains(u));
+        let mut sites: Vec<u32> = of_base.map(|(tet, _)| tet[0]).collect();
+        let mut missing = sites.len();
+        let mut parents: Vec<u32> = updates.clone().flat_map(|u| growing.parents(u)).copied().collect();
+        parents.sort_unstable();
+        parents.dedup();
+        for p in parents {
+            let VertexId(v) = self.vertex(UpdateId(p));
+            if mesh.slot(VertexId(v)).is_some() {
+                sites.push(v);
+                missing += growing.count_removed(p, updates);
+            }
+        }
+        if SITE_COST * sites.len() > mesh.tet_slots() {
+            return false;
+        }
+        sites.sort_unstable();
+        sites.dedup();
+        let mut star = Vec::new();
+        for slot in sites.into_iter().filter_map(|v| mesh.slot(VertexId(v))).collect::<Vec<u32>>() {
+            star.clear();
+            mesh.list_star(slot, &mut star);
+            let found = star.iter().filter(|&&t| self.reveal_at(mesh, t, updates)).count();
+            missing = missing.saturating_sub(found);
+        }
+        // Else the tetrahedra around a vertex do not all hang together, or the mesh knows of some updates already.
+        missing == 0
+    }
+
+    /// Lets the mesh know which update removes a tetrahedron, if it is here; touches it if it is one of `updates`. Tells whether that is
+    /// news.
+    fn reveal_at(&self, mesh: &mut CurrentMesh, t: u32, updates: &Range<u32>) -> bool {
+        let tag = mesh.tag(t);
+        if tag == NONE || tag < FIRST_ANONYMOUS_TAG {
+            if updates.contains(&tag) {
+                mesh.touch(&[t]);
+            }
+            return false;
+        }
+        let place = tag & !FIRST_ANONYMOUS_TAG;
+        let creator = self.creator(mesh, t);
+        let remover = match creator {
+            Some(u) => self.remover_at(u, place),
+            None => self.base_removers().get(place as usize).copied().filter(|&u| u != NONE),
+        };
+        let Some(u) = remover else { return false };
+        mesh.set_tag(t, u);
+        if let Some(base) = &self.base_quarterings {
+            let of_base = || base.get(place as usize).copied().unwrap_or(0);
+            mesh.set_quarterings(t, creator.map_or_else(of_base, |u| self.quarterings_at(u, place)));
+        }
+        mesh.touch(&[t]);
+        updates.contains(&u)
+    }
+
     /// Adds the insertion of a vertex as the next update and applies it; nothing is added if it cannot be applied.
     pub(super) fn insert_next(
         &mut self,
@@ -600,14 +677,12 @@ impl VertexMt {
     fn open(&self, mesh: &mut CurrentMesh, new: &Insertion<'_>, cavity: &mut Cavity) -> Option<bool> {
         self.take_away(mesh, new, &mut cavity.removed_tags)?;
         let update = self.updates();
-        let Cavity { tets, bare, .. } = cavity;
-        let (found, bare_len) = mesh.gather_tagged(*new.removed.last()?, update, tets, bare)?;
-        if found != new.removed.len() || mesh.slot(self.vertex(UpdateId(update))).is_some() {
+        if mesh.slot(self.vertex(UpdateId(update))).is_some() {
             return None;
         }
-        (cavity.tets_len, cavity.bare_len) = (found, bare_len);
+        cavity.list_bare(mesh, new.removed, update);
         let on_boundary = !new.given_up.is_empty();
-        let outer = cavity.bare[..bare_len].iter().filter(|[.., beyond]| on_boundary && *beyond == NONE);
+        let outer = cavity.bare[..cavity.bare_len].iter().filter(|[.., beyond]| on_boundary && *beyond == NONE);
         let outer = on_boundary.then(|| outer.count());
         let mut given_up = Vec::new();
         let mut is_given_up = |_: usize, face: [u32; 2]| {
@@ -621,7 +696,7 @@ impl VertexMt {
         for (&level, field) in new.levels.iter().zip(&self.info.fields) {
             bits.push(level as u64, field.bits);
         }
-        write_given_up(bits, found, &given_up)?;
+        write_given_up(bits, new.removed.len(), &given_up)?;
         Some(on_boundary)
     }
 
@@ -1009,31 +1084,12 @@ impl MultiTessellation for VertexMt {
     }
 
     fn reveal(&self, mesh: &mut CurrentMesh, updates: Range<u32>) {
+        let updates = updates.start..updates.end.min(self.updates());
         if updates.is_empty() {
             return;
         }
-        for t in 0..mesh.tet_slots() as u32 {
-            let tag = mesh.tag(t);
-            if tag == NONE || tag < FIRST_ANONYMOUS_TAG {
-                if updates.contains(&tag) {
-                    mesh.touch(&[t]);
-                }
-                continue;
-            }
-            let place = tag & !FIRST_ANONYMOUS_TAG;
-            let creator = self.creator(mesh, t);
-            let remover = match creator {
-                Some(u) => self.remover_at(u, place),
-                None => self.base_removers().get(place as usize).copied().filter(|&u| u != NONE),
-            };
-            if let Some(u) = remover {
-                mesh.set_tag(t, u);
-                if let Some(base) = &self.base_quarterings {
-                    let of_base = || base.get(place as usize).copied().unwrap_or(0);
-                    mesh.set_quarterings(t, creator.map_or_else(of_base, |u| self.quarterings_at(u, place)));
-                }
-                mesh.touch(&[t]);
-            }
+        if !self.reveal_around(mesh, &updates) {
+            (0..mesh.tet_slots() as u32).for_each(|t| _ = self.reveal_at(mesh, t, &updates));
         }
     }
 

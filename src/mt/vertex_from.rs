@@ -15,7 +15,6 @@ use super::bits::width_of;
 use super::glue::Close;
 use super::glue::Face;
 use super::glue::Glue;
-use super::glue::key;
 use super::glue::turned;
 use super::insertion::choices;
 use super::sphere_rank::Spheres;
@@ -225,8 +224,11 @@ impl Writer<'_> {
         let Canonical { link, walls, removed, .. } = canonical;
         let spheres = || Spheres::of(link.iter().map(|&v| self.mt.position(VertexId(v))));
         let faces: Vec<Face> = walls.iter().map(|(face, _)| *face).collect();
-        let vertices = link.len() as u32;
-        write_removed(&mut self.glue, bits, vertices, &faces, removed, on_boundary, spheres).ok_or(torn)
+        if !are_faces_of(&faces, removed) {
+            return Err(torn);
+        }
+        let hole = Hole { vertices: link.len() as u32, faces: &faces, removed, on_boundary };
+        write_removed(&mut self.glue, bits, hole, spheres).ok_or(torn)
     }
 }
 
@@ -245,21 +247,29 @@ pub(super) fn write_given_up(bits: &mut Bits, removed: usize, given_up: &[bool])
     Some(())
 }
 
-/// Appends how T_u, `removed`, fills Π_u, which has these faces, turned and in canonical order.
+/// Π_u and T_u in canonical numbers.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Hole<'a> {
+    pub vertices: u32,
+    /// The faces of Π_u, turned and in canonical order.
+    pub faces: &'a [Face],
+    pub removed: &'a [[u8; 4]],
+    /// Whether faces on the boundary are given up.
+    pub on_boundary: bool,
+}
+
+/// Appends how T_u fills Π_u, all faces of which are such of T_u.
 pub(super) fn write_removed(
     glue: &mut Glue,
     bits: &mut Bits,
-    vertices: u32,
-    faces: &[Face],
-    removed: &[[u8; 4]],
-    on_boundary: bool,
+    Hole { vertices, faces, removed, on_boundary }: Hole<'_>,
     spheres: impl FnOnce() -> Spheres,
 ) -> Option<()> {
     let corners = |tet: &[u8; 4]| tet.iter().fold(0, |set, &x| set | 1_u64 << (x % 64));
     let shared = removed.iter().fold(u64::MAX, |set, tet| set & corners(tet));
-    // All of T_u meets in a vertex, and all faces of Π_u without that vertex have one of its tetrahedra behind them.
+    // All of T_u meets in a vertex, and stands on the faces of Π_u without that vertex: each of these has one of it behind it.
     let in_all = (shared != 0).then(|| shared.trailing_zeros() as u8);
-    let fan = in_all.filter(|&x| is_fan(faces, removed, x));
+    let fan = in_all.filter(|x| faces.iter().filter(|face| !face.contains(x)).count() == removed.len());
     bits.push(u64::from(fan.is_some()), 1);
     if let Some(apex) = fan {
         bits.push(u64::from(apex), width_of(vertices - 1));
@@ -327,15 +337,11 @@ fn write_closed(bits: &mut Bits, plain: &[(u32, u32)], places: &[Option<u32>]) {
     }
 }
 
-/// Whether the tetrahedra, which all have `x`, are those that it makes with the faces that do not have it. The faces are turned and in
-/// canonical order.
-fn is_fan(faces: &[Face], tets: &[[u8; 4]], x: u8) -> bool {
-    let without = faces.iter().filter(|face| !face.contains(&x));
-    let stands_on_one = |tet: &[u8; 4]| {
-        let own = tet.iter().position(|&corner| corner == x).map(|i| turned(FACES[i].map(|k| tet[k])));
-        own.is_some_and(|own| faces.binary_search_by_key(&key(own), |&face| key(face)).is_ok_and(|at| faces[at] == own))
-    };
-    without.count() == tets.len() && tets.iter().all(stands_on_one)
+/// Whether all faces are such of the tetrahedra, from the same side.
+fn are_faces_of(faces: &[Face], tets: &[[u8; 4]]) -> bool {
+    let sides = |tet: &[u8; 4]| FACES.map(|face| turned(face.map(|k| tet[k])));
+    let sides: HashSet<Face> = tets.iter().flat_map(sides).collect();
+    faces.iter().all(|face| sides.contains(face))
 }
 
 /// Whether one can go from each tetrahedron to each other one through faces.

@@ -18,6 +18,7 @@ use super::current::FIRST_ANONYMOUS_TAG;
 use super::current::GATHERED;
 use super::vertex::MAX_REMOVED;
 use crate::mesh::NONE;
+use std::ops::Range;
 
 /// What is kept beside the nodes.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -59,6 +60,13 @@ impl Growing {
     pub fn remover(&self, u: u32, place: usize) -> Option<u32> {
         let child = *self.removers(u).get(place)?;
         self.children(u).get(usize::from(child).checked_sub(1)?).copied()
+    }
+
+    /// How many tetrahedra of a star updates of a range remove.
+    pub fn count_removed(&self, u: u32, updates: &Range<u32>) -> usize {
+        let children = self.children(u);
+        let remover = |&child: &u8| children.get(usize::from(child).checked_sub(1)?);
+        self.removers(u).iter().filter_map(remover).filter(|u| updates.contains(u)).count()
     }
 
     /// The quarterings of the tetrahedron at a place of a star, as far as its remover is here.

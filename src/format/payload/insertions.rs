@@ -34,6 +34,7 @@ use crate::mt::MultiTessellation;
 use crate::mt::UpdateError;
 use crate::mt::UpdateId;
 use crate::mt::VertexMt;
+use crate::mt::corner_of;
 
 /// By how many codes an error is below the one before.
 const ERROR: Family = base::LAST.numbers_after(1, 2);
@@ -111,8 +112,12 @@ pub struct State {
     narrow: bool,
     /// The tetrahedra around the near vertex.
     star: Vec<u32>,
-    /// The other vertices of these.
-    link: Vec<u32>,
+    /// The other vertices of each, by index into the link, in the order of the face that they make, outward.
+    corners: Vec<[u32; 3]>,
+    /// These vertices as seen from the near one.
+    link: Vec<[i64; 3]>,
+    /// Their cross products with the new vertex, seen from there as well.
+    turned: Vec<[i64; 3]>,
     /// What is removed.
     removed: Vec<u32>,
     views: Vec<View>,
@@ -121,10 +126,11 @@ pub struct State {
     cone: Vec<u32>,
     /// Of what is removed, where it is told.
     quarterings: Vec<u8>,
-    /// By tetrahedron and by vertex: `epoch` if it is in the star or the link, one more if it is removed, two more if it is
+    /// By tetrahedron: `epoch` if it is in the star, one more if it is removed, two more if it is
     /// not, three more if it cannot be.
     tet_marks: Vec<u32>,
-    vertex_marks: Vec<u32>,
+    /// By vertex: `epoch << 32 | index` if it is in the link.
+    vertex_marks: Vec<u64>,
     epoch: u32,
 }
 
@@ -272,12 +278,11 @@ fn one_of(count: u32) -> (u32, u32) {
 
 /// Along an axis, what is expected of a new vertex near `near`: the usual difference, the context, and what the difference
 /// is told from.
-fn usual(state: &State, near: u32, axis: usize) -> (u32, u32, i32) {
-    let positions = state.mesh.positions();
-    let (origin, grain) = (i64::from(positions[near as usize][axis]), i64::from(state.grain[axis]));
+fn usual(state: &State, axis: usize) -> (u32, u32, i32) {
+    let grain = i64::from(state.grain[axis]);
     let (mut sum, mut size, mut level) = (0, 0, 1);
-    for &v in &state.link {
-        let difference = i64::from(positions[v as usize][axis]) - origin;
+    for seen in &state.link {
+        let difference = seen[axis];
         sum += difference;
         size += difference.abs();
         level += u32::from(difference == 0);
@@ -295,7 +300,7 @@ fn bits_of(x: u32) -> u32 {
 
 fn put_position(out: &mut impl Put, state: &State, near: u32, position: [i32; 3]) {
     for (axis, x) in position.into_iter().enumerate() {
-        let (size, context, from) = usual(state, near, axis);
+        let (size, context, from) = usual(state, axis);
         let offset = x.wrapping_sub(state.mesh.positions()[near as usize][axis]);
         let residual = (offset / state.grain[axis]).wrapping_sub(from);
         let length = residual.unsigned_abs();
@@ -423,7 +428,7 @@ fn read_position(
 ) -> Result<[i32; 3], FormatError> {
     let mut position = state.mesh.positions()[near as usize];
     for (axis, x) in position.iter_mut().enumerate() {
-        let (size, context, from) = usual(state, near, axis);
+        let (size, context, from) = usual(state, axis);
         let symbol = source.symbol(OFFSET, context)?;
         let mut residual = 0;
         if symbol > 0 {
@@ -519,7 +524,9 @@ impl State {
             errors: vec![ErrorCode::MAX; mt.info().fields.len()],
             narrow: mt.info().lattice.bits <= NARROW_BITS,
             star: Vec::new(),
+            corners: Vec::new(),
             link: Vec::new(),
+            turned: Vec::new(),
             removed: Vec::new(),
             views: Vec::new(),
             cone: Vec::new(),
@@ -548,25 +555,31 @@ impl State {
     fn gather(&mut self, near: u32) -> bool {
         self.next_epoch();
         self.star.clear();
+        self.corners.clear();
         self.link.clear();
         let Some(&first) = self.mesh.incident.get(near as usize).filter(|&&t| t != NONE) else {
             return false;
         };
-        self.vertex_marks[near as usize] = self.epoch;
+        let [x, y, z] = self.mesh.positions()[near as usize];
+        let mark = u64::from(self.epoch) << 32;
         self.tet_marks[first as usize] = self.epoch;
         self.star.push(first);
         let mut next = 0;
         while let Some(&t) = self.star.get(next) {
             next += 1;
-            let tet = self.mesh.tets()[t as usize];
-            for (v, n) in tet.into_iter().zip(self.mesh.neighbors()[t as usize]) {
-                if std::mem::replace(&mut self.vertex_marks[v as usize], self.epoch) != self.epoch {
-                    self.link.push(v);
+            let (tet, around) = (self.mesh.tets()[t as usize], self.mesh.neighbors()[t as usize]);
+            let face = FACES[corner_of(&tet, near)];
+            self.corners.push(face.map(|k| {
+                let own = &mut self.vertex_marks[tet[k] as usize];
+                if *own < mark {
+                    *own = mark | self.link.len() as u64;
+                    let position = self.mesh.positions()[tet[k] as usize];
+                    self.link.push([position[0] - x, position[1] - y, position[2] - z].map(i64::from));
                 }
-                if v != near
-                    && n != NONE
-                    && std::mem::replace(&mut self.tet_marks[n as usize], self.epoch) != self.epoch
-                {
+                *own as u32
+            }));
+            for n in face.map(|k| around[k]) {
+                if n != NONE && std::mem::replace(&mut self.tet_marks[n as usize], self.epoch) != self.epoch {
                     self.star.push(n);
                 }
             }
@@ -634,13 +647,40 @@ impl State {
     fn find_cone(&mut self, near: u32, position: [i32; 3]) {
         let mut cone = std::mem::take(&mut self.cone);
         cone.clear();
-        cone.extend(self.star.iter().copied().filter(|&t| {
-            let tet = self.mesh.tets()[t as usize];
-            let inward = self.inward(tet, position);
-            (0..4).all(|k| inward[k] >= 0.0 || tet[k] == near)
-        }));
+        if self.narrow {
+            self.turn_link(near, position);
+            let ahead = self.star.iter().zip(&self.corners).filter(|(_, corners)| self.is_ahead(**corners));
+            cone.extend(ahead.map(|(&t, _)| t));
+        } else {
+            cone.extend(self.star.iter().copied().filter(|&t| {
+                let tet = self.mesh.tets()[t as usize];
+                let inward = self.inward(tet, position);
+                (0..4).all(|k| inward[k] >= 0.0 || tet[k] == near)
+            }));
+        }
         cone.sort_unstable_by_key(|&t| self.sorted(t));
         self.cone = cone;
+    }
+
+    /// Finds the cross product of each vertex of the link with the new one.
+    fn turn_link(&mut self, near: u32, position: [i32; 3]) {
+        let origin = self.mesh.positions()[near as usize];
+        let v = [0, 1, 2].map(|k| i64::from(position[k] - origin[k]));
+        self.turned.clear();
+        self.turned.extend(self.link.iter().map(|u| {
+            [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
+        }));
+    }
+
+    /// Whether the new vertex is in the direction of a tetrahedron of the star.
+    #[inline]
+    fn is_ahead(&self, [a, b, c]: [u32; 3]) -> bool {
+        // Components up to 2^20 make cross products up to 2^41, and a sum of three products up to 3 · 2^61 < 2^63.
+        let is_inside = |i: u32, j: u32| {
+            let (u, v) = (self.link[i as usize], self.turned[j as usize]);
+            u[0] * v[0] + u[1] * v[1] + u[2] * v[2] >= 0
+        };
+        is_inside(a, b) && is_inside(b, c) && is_inside(c, a)
     }
 
     fn sort_star(&mut self) {
