@@ -682,7 +682,8 @@ impl VertexMt {
         }
         cavity.list_bare(mesh, new.removed, update);
         let on_boundary = !new.given_up.is_empty();
-        let outer = cavity.bare[..cavity.bare_len].iter().filter(|[.., beyond]| on_boundary && *beyond == NONE);
+        let outer =
+            cavity.bare[..cavity.bare_len].iter().filter(|[.., beyond]| on_boundary && *beyond == NONE);
         let outer = on_boundary.then(|| outer.count());
         let mut given_up = Vec::new();
         let mut is_given_up = |_: usize, face: [u32; 2]| {

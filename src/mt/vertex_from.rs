@@ -277,8 +277,11 @@ pub(super) fn write_removed(
         return Some(());
     }
     // By the face that it stands on: the vertex of the tetrahedron opposite it.
-    let sides = |tet: &[u8; 4]| [0, 1, 2, 3].map(|i| u32::from(tet[i]) | oriented(FACES[i].map(|k| tet[k])) << 6);
-    let mut behind: Vec<u32> = removed.iter().flat_map(sides).collect();
+    let sides =
+        |tet: &[u8; 4]| [0, 1, 2, 3].map(|i| u32::from(tet[i]) | oriented(FACES[i].map(|k| tet[k])) << 6);
+    let mut behind = [u32::MAX; 4 * MAX_REMOVED];
+    let behind = &mut behind[..4 * removed.len().min(MAX_REMOVED)];
+    behind.iter_mut().zip(removed.iter().flat_map(sides)).for_each(|(entry, side)| *entry = side);
     behind.sort_unstable();
     let behind = |face: Face| {
         let key = oriented(face) << 6;

@@ -20,6 +20,9 @@ use super::vertex::MAX_REMOVED;
 use crate::mesh::NONE;
 use std::ops::Range;
 
+/// Children that a list has room for at first.
+const USUAL_CHILDREN: usize = 8;
+
 /// What is kept beside the nodes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Growing {
@@ -210,6 +213,8 @@ impl VertexMt {
             };
             let children = &mut growing.children[parent as usize];
             if children.last() != Some(&u) {
+                // Most have a few more than a new list has room for.
+                children.reserve(USUAL_CHILDREN * usize::from(children.is_empty()));
                 children.push(u);
                 growing.parents.push(parent);
             }
@@ -278,9 +283,17 @@ impl VertexMt {
         bits.copy(&self.nodes, vertex_end, code);
         let count = children.len() as u32;
         let (width, own) = (width_of(count), packed.quartering_bits(count));
-        for (place, &child) in growing.removers(u).iter().enumerate().filter(|_| count > 0) {
-            let quarterings = u64::from(growing.quarterings(u, place));
-            bits.push(u64::from(child) | quarterings << width, width + own);
+        // Several at a time: together they have at most 45 bits.
+        let mut place = 0;
+        for removers in growing.removers(u).chunks(5).filter(|_| count > 0) {
+            let (mut several, mut taken) = (0, 0);
+            for &child in removers {
+                let quarterings = u64::from(growing.quarterings(u, place));
+                several |= (u64::from(child) | quarterings << width) << taken;
+                taken += width + own;
+                place += 1;
+            }
+            bits.push(several, taken);
         }
         bits.copy(&self.nodes, code, end);
     }

@@ -121,6 +121,8 @@ pub struct State {
     /// What is removed.
     removed: Vec<u32>,
     views: Vec<View>,
+    /// Whether some of it is on the boundary.
+    on_boundary: bool,
     given_up: Vec<[u32; 2]>,
     /// Tetrahedra of the star, in the direction of the new vertex.
     cone: Vec<u32>,
@@ -529,6 +531,7 @@ impl State {
             turned: Vec::new(),
             removed: Vec::new(),
             views: Vec::new(),
+            on_boundary: false,
             cone: Vec::new(),
             given_up: Vec::new(),
             quarterings: Vec::new(),
@@ -667,9 +670,11 @@ impl State {
         let origin = self.mesh.positions()[near as usize];
         let v = [0, 1, 2].map(|k| i64::from(position[k] - origin[k]));
         self.turned.clear();
-        self.turned.extend(self.link.iter().map(|u| {
-            [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
-        }));
+        self.turned.extend(
+            self.link
+                .iter()
+                .map(|u| [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]),
+        );
     }
 
     /// Whether the new vertex is in the direction of a tetrahedron of the star.
@@ -703,6 +708,7 @@ impl State {
         self.removed.clear();
         self.removed.push(seed);
         self.tet_marks[seed as usize] = yes;
+        self.on_boundary = false;
         self.views.clear();
         self.views.push(self.view(seed, position));
         let mut next = 0;
@@ -712,6 +718,7 @@ impl State {
             let around = self.mesh.neighbors()[t as usize];
             for k in by_vertex(self.mesh.tets()[t as usize]) {
                 let n = around[k];
+                self.on_boundary |= n == NONE;
                 let mark = self.tet_marks.get(n as usize).copied().unwrap_or(no);
                 if (yes..=never).contains(&mark) {
                     continue;
@@ -758,14 +765,16 @@ impl State {
     /// Half the context of whether a tetrahedron is removed: 0 to 53.
     #[inline]
     fn grow_context(&self, t: u32, view: View) -> u32 {
-        let [yes, no] = [self.epoch + 1, self.epoch + 2];
-        let marks =
-            self.mesh.neighbors()[t as usize].map(|n| self.tet_marks.get(n as usize).copied().unwrap_or(0));
-        let marked = |mark: u32| marks.iter().map(|&own| u32::from(own == mark)).sum::<u32>();
+        let (mut removed, mut kept) = (0, 0);
+        for n in self.mesh.neighbors()[t as usize] {
+            let mark = self.tet_marks.get(n as usize).copied().unwrap_or(0);
+            removed += u32::from(mark == self.epoch + 1);
+            kept |= u32::from(mark == self.epoch + 2);
+        }
         let hidden = 4 - view.seen.count_ones();
-        let known = marked(yes).clamp(1, 3) - 1;
+        let known = removed.clamp(1, 3) - 1;
         let shape = (view.sphere + 1) as u32 * 3 + known;
-        (shape * 3 + hidden.clamp(1, 3) - 1) * 2 + marked(no).min(1)
+        (shape * 3 + hidden.clamp(1, 3) - 1) * 2 + kept
     }
 
     /// Finds the faces on the boundary that are given up: those that the new vertex does not see, and such as `decide` says, given
@@ -776,6 +785,9 @@ impl State {
         decide: &mut dyn FnMut(usize) -> Result<bool, E>,
     ) -> Result<(), E> {
         self.given_up.clear();
+        if !self.on_boundary {
+            return Ok(());
+        }
         let mut bare: Vec<([u32; 3], [u32; 2])> = Vec::new();
         for &t in &self.removed {
             let tet = self.mesh.tets()[t as usize];
