@@ -149,7 +149,8 @@ impl VertexMt {
         new: &Insertion<'_>,
     ) -> Result<UpdateId, UpdateError> {
         let update = self.updates();
-        if self.growing.is_none() || update >= self.info.updates || new.removed.len() > MAX_REMOVED {
+        let fits = (1..=MAX_REMOVED).contains(&new.removed.len());
+        if self.growing.is_none() || update >= self.info.updates || !fits {
             return Err(UpdateError::Cavity { update });
         }
         if !self.info.holds(new.position, new.levels) {

@@ -1024,6 +1024,53 @@ pub(super) mod tests {
         Ok(())
     }
 
+    /// What removes each tetrahedron of a mesh, as far as is known.
+    fn removers(mt: &VertexMt, mesh: &CurrentMesh) -> Vec<([u32; 4], Option<u32>)> {
+        let tets = (0..mesh.tet_slots() as u32).filter_map(|t| Some((t, mesh.tet(t)?)));
+        let mut removers: Vec<_> = tets
+            .map(|(t, tet)| {
+                let mut labels = tet.map(|slot| mesh.vertex(slot).0);
+                labels.sort_unstable();
+                (labels, mt.remover(mesh, t).map(|u| u.0))
+            })
+            .collect();
+        removers.sort_unstable();
+        removers
+    }
+
+    #[test]
+    fn updates_that_come_one_by_one_are_revealed_wherever_they_lie() -> Result<(), FormatError> {
+        let whole = delaunay(240);
+        let Coded { models, head, blocks } = coded(&whole, 1)?;
+        let known = read_head(&mut Source::new(Reader::new(&head, 0), &models)?)?;
+        let (mut mt, mut state) = start(whole.info().clone(), whole.base().clone(), known, false)?;
+        let mut mesh = mt.start()?;
+        let mut applied = Vec::new();
+        for (u, block) in (0..).zip(&blocks) {
+            let mut source = Source::new(Reader::new(block, 0), &models)?;
+            read(&mut source, &mut mt, 1, &mut state, &Limits::default())?;
+            mesh.clear_touched();
+            mt.announce(&mut mesh, u);
+            let is_news = |&t: &u32| mt.remover(&mesh, t) == Some(UpdateId(u));
+            let news = (0..mesh.tet_slots() as u32).filter(|t| mesh.tet(*t).is_some()).filter(is_news);
+            assert!(news.into_iter().all(|t| mesh.touched().contains(&t)));
+            if u % 8 == 7 {
+                // A mesh that knew of all from the start.
+                let mut other = mt.start()?;
+                for &u in &applied {
+                    assert_eq!(mt.refine(&mut other, u)?, Applied::Done);
+                }
+                assert_eq!(removers(&mt, &mesh), removers(&mt, &other));
+            }
+            // Some are left out later on, and all that depends on them.
+            if (u < 150 || u % 9 > 0) && mt.refine(&mut mesh, UpdateId(u))? == Applied::Done {
+                applied.push(UpdateId(u));
+            }
+        }
+        assert!((151..230).contains(&applied.len()));
+        Ok(())
+    }
+
     #[test]
     fn damage_makes_errors_or_other_mts() -> Result<(), FormatError> {
         let mt = delaunay(40);
