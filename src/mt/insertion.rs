@@ -55,7 +55,7 @@ const GIVEN_UP: u32 = 0xFF;
 const SLOTS: usize = 256;
 
 /// To look around a vertex for what an update removes takes as much as to look at so many tetrahedra.
-const SITE_COST: usize = 32;
+const SITE_COST: usize = 128;
 
 /// A face of Π_u with what lies beyond.
 #[derive(Clone, Copy, Debug, Default)]
