@@ -43,13 +43,13 @@ fn det_i128(u: [i64; 3], v: [i64; 3], w: [i64; 3]) -> i128 {
         + i128::from(u[0] * v[1] - u[1] * v[0]) * i128::from(w[2])
 }
 
-/// Differences of coordinates up to this many bits let [`insphere`] work in `i64` alone.
-const SHORT_BITS: u32 = 11;
+/// Squared distances up to this many bits let [`insphere`] work in `i64` alone.
+const SHORT_SQUARE_BITS: u32 = 24;
 
 /// Where `e` lies with respect to the sphere through the corners of the positive tetrahedron `(a, b, c, d)`: 1 inside,
 /// −1 outside, 0 on it, exactly. For a negative tetrahedron the signs are swapped.
 ///
-/// Coordinates must lie in `0 ..= 2^WIDE_BITS`. Near points are cheap: up to 11 bits apart all is done in `i64`, up to
+/// Coordinates must lie in `0 ..= 2^WIDE_BITS`. Near points are cheap: less than 2^12 apart all is done in `i64`, up to
 /// 20 bits in `i64` but for the last sum; beyond, a floating-point filter (Shewchuk 1997) decides most cases.
 ///
 /// ```
@@ -63,18 +63,34 @@ const SHORT_BITS: u32 = 11;
 pub fn insphere(a: [i32; 3], b: [i32; 3], c: [i32; 3], d: [i32; 3], e: [i32; 3]) -> i32 {
     let rows = [a, b, c, d].map(|p| [0, 1, 2].map(|i| i64::from(p[i]) - i64::from(e[i])));
     let largest = rows.iter().flatten().fold(0, |m, x| m | x.unsigned_abs());
-    if largest <= 1 << SHORT_BITS {
-        // Four products of a minor up to 6 · 2^33 and a square up to 3 · 2^22 stay below 2^62.
-        let minors = minors_i64(rows);
-        let sum = (0..4).map(|i| minors[i] * square(rows[i])).sum::<i64>();
-        sum.signum() as i32
-    } else if largest <= 1 << NARROW_BITS {
-        // Minors up to 6 · 2^60 stay below 2^63; they are multiplied into two words.
-        let minors = minors_i64(rows);
-        let sum = (0..4).map(|i| i128::from(minors[i]) * i128::from(square(rows[i]))).sum::<i128>();
-        sum.signum() as i32
+    if largest <= 1 << NARROW_BITS {
+        sphere_side(rows, minors_i64(rows))
     } else {
         insphere_far(rows, largest)
+    }
+}
+
+/// How the origin lies to a tetrahedron with these corners, none of whose coordinates is beyond ±2^[`NARROW_BITS`]: six times the
+/// volume between it and each face, and [`insphere`]. The volumes are positive on the inner sides of the faces if the
+/// tetrahedron is.
+#[inline]
+pub(crate) fn views_of_origin(corners: [[i64; 3]; 4]) -> ([i64; 4], i32) {
+    let inward = minors_i64(corners);
+    (inward, sphere_side(corners, inward))
+}
+
+/// [`insphere`] by differences of at most [`NARROW_BITS`] bits and their cofactors.
+#[inline]
+fn sphere_side(rows: [[i64; 3]; 4], minors: [i64; 4]) -> i32 {
+    let squares = rows.map(square);
+    if squares.iter().fold(0, |bits, square| bits | square) < 1 << SHORT_SQUARE_BITS {
+        // Vectors shorter than 2^12 have minors up to 2^36 (Hadamard): the four products stay below 2^62.
+        let sum = (0..4).map(|i| minors[i] * squares[i]).sum::<i64>();
+        sum.signum() as i32
+    } else {
+        // Minors up to 6 · 2^60 stay below 2^63; they are multiplied into two words.
+        let sum = (0..4).map(|i| i128::from(minors[i]) * i128::from(squares[i])).sum::<i128>();
+        sum.signum() as i32
     }
 }
 
@@ -259,7 +275,7 @@ mod tests {
     #[test]
     fn insphere_equals_its_plain_twin_on_every_lattice() {
         let mut state = 1;
-        for bits in [1, 3, SHORT_BITS, SHORT_BITS + 1, NARROW_BITS, NARROW_BITS + 1, 25, WIDE_BITS] {
+        for bits in [1, 3, 11, 12, 13, NARROW_BITS, NARROW_BITS + 1, 25, WIDE_BITS] {
             for _ in 0..3000 {
                 let [a, b, c, d, e] = [(); 5].map(|()| [(); 3].map(|()| number(&mut state, bits)));
                 assert_eq!(

@@ -13,6 +13,11 @@ impl Bits {
         self.len
     }
 
+    pub fn clear(&mut self) {
+        self.words.clear();
+        self.len = 0;
+    }
+
     pub fn bytes(&self) -> usize {
         size_of_val(&self.words[..])
     }

@@ -290,6 +290,13 @@ impl CurrentMesh {
         }
     }
 
+    /// Gives tetrahedron `t` a tag that is not looked for, although it is below [`FIRST_ANONYMOUS_TAG`], in the place of one that is
+    /// not.
+    #[inline]
+    pub(super) fn take_tag(&mut self, t: u32, tag: u32) {
+        self.tags[t as usize] = tag;
+    }
+
     /// The tetrahedron that got a tag last, as long as it is in the mesh and has it.
     #[inline]
     pub(crate) fn tagged(&self, tag: u32) -> Option<u32> {
@@ -993,18 +1000,25 @@ impl CurrentMesh {
 
     /// Touches the tetrahedra around the vertex in `slot`, however many, as far as they hang together through faces.
     pub(super) fn touch_star(&mut self, slot: u32) {
+        let mut touched = std::mem::take(&mut self.touched);
+        self.list_star(slot, &mut touched);
+        self.touched = touched;
+    }
+
+    /// Lists the tetrahedra around the vertex in `slot`, however many, as far as they hang together through faces.
+    pub(super) fn list_star(&mut self, slot: u32, star: &mut Vec<u32>) {
         self.next_epoch();
         let first = self.incident[slot as usize];
         self.marks[first as usize] = self.epoch << MARK_BITS;
-        let mut next = self.touched.len();
-        self.touched.push(first);
-        while let Some(&t) = self.touched.get(next) {
+        let mut next = star.len();
+        star.push(first);
+        while let Some(&t) = star.get(next) {
             next += 1;
             let (corner, around) = (corner_of(&self.tets[t as usize], slot), self.neighbors[t as usize]);
             for (i, n) in around.into_iter().enumerate() {
                 if i != corner && n != NONE && self.marks[n as usize] >> MARK_BITS != self.epoch {
                     self.marks[n as usize] = self.epoch << MARK_BITS;
-                    self.touched.push(n);
+                    star.push(n);
                 }
             }
         }
@@ -1107,7 +1121,7 @@ impl CurrentMesh {
 
 /// Where a value is in an array that holds it once, without a branch.
 #[inline(always)]
-pub(super) fn corner_of(array: &[u32; 4], value: u32) -> usize {
+pub(crate) fn corner_of(array: &[u32; 4], value: u32) -> usize {
     usize::from(array[1] == value)
         | usize::from(array[2] == value) << 1
         | (usize::from(array[3] == value) * 3)

@@ -14,6 +14,7 @@ use super::MultiTessellation;
 use super::UpdateError;
 use super::UpdateId;
 use super::VertexId;
+use super::bits::Bits;
 use super::bits::width_of;
 use super::current::BARE;
 use super::current::FIRST_ANONYMOUS_TAG;
@@ -37,6 +38,10 @@ use super::vertex::COUNT_BITS;
 use super::vertex::MAX_AROUND;
 use super::vertex::MAX_INSERTED;
 use super::vertex::VertexMt;
+use super::vertex_from::Hole;
+use super::vertex_from::write_given_up;
+use super::vertex_from::write_removed;
+use super::vertex_grow::Insertion;
 use crate::geom::NARROW_BITS;
 use crate::geom::orient3d;
 use crate::mesh::FACES;
@@ -48,6 +53,9 @@ const GIVEN_UP: u32 = 0xFF;
 
 /// Room for the new slots, and for [`GIVEN_UP`].
 const SLOTS: usize = 256;
+
+/// To look around a vertex for what an update removes takes as much as to look at so many tetrahedra.
+const SITE_COST: usize = 128;
 
 /// A face of Π_u with what lies beyond.
 #[derive(Clone, Copy, Debug, Default)]
@@ -67,6 +75,8 @@ pub(super) struct Cavity {
     /// The slots of T_u.
     tets: [u32; GATHERED],
     tets_len: usize,
+    /// Their corners by index into the link.
+    corners: [[u8; 4]; GATHERED],
     /// Faces of T_u that none of its tetrahedra lies behind: tetrahedron, face, what lies behind.
     bare: Box<[[u32; 3]; BARE]>,
     bare_len: usize,
@@ -90,6 +100,10 @@ pub(super) struct Cavity {
     quarterings: [u8; MAX_INSERTED],
     /// Of T_u.
     fingerprint: Fingerprint,
+    /// The node of an update that is added.
+    bits: Bits,
+    /// The tags that the tetrahedra which it removes had.
+    removed_tags: [u32; GATHERED],
 }
 
 /// A hash of the tetrahedra that an insertion removed, which stays with the vertex. What the removal of the vertex puts
@@ -121,6 +135,7 @@ impl Default for Cavity {
             star: Star::default(),
             tets: [0; GATHERED],
             tets_len: 0,
+            corners: [[0; 4]; GATHERED],
             bare: Box::new([[0; 3]; BARE]),
             bare_len: 0,
             walls: [Wall::default(); MAX_INSERTED],
@@ -135,11 +150,27 @@ impl Default for Cavity {
             tags: [NONE; MAX_INSERTED],
             quarterings: [0; MAX_INSERTED],
             fingerprint: Fingerprint::default(),
+            bits: Bits::default(),
+            removed_tags: [NONE; GATHERED],
         }
     }
 }
 
 impl Cavity {
+    /// Takes `removed`, which all have the tag, and lists their faces that none of them lies behind.
+    fn list_bare(&mut self, mesh: &mut CurrentMesh, removed: &[u32], tag: u32) {
+        mesh.next_epoch();
+        (self.tets_len, self.bare_len) = (removed.len(), 0);
+        self.tets[..removed.len()].copy_from_slice(removed);
+        for &t in removed {
+            for (face, n) in (0..).zip(mesh.neighbors[t as usize]) {
+                // Written anyway, and counted if it belongs there.
+                self.bare[self.bare_len % BARE] = [t, face, n];
+                self.bare_len += usize::from(n == NONE || mesh.tag(n) != tag);
+            }
+        }
+    }
+
     /// Puts a face of tetrahedron `tet` on the list of walls. None if there are too many, or too many vertices.
     #[inline]
     fn add_wall(
@@ -176,6 +207,64 @@ impl Cavity {
             let of_corners = tet.iter().map(|&x| prints[x as usize % MAX_AROUND]);
             self.fingerprint.add(of_corners.fold(0, u32::wrapping_add));
         }
+    }
+
+    /// Finds the faces of Π_u around the tetrahedra that were gathered, and joins the new tetrahedra behind them. `given_up` is the
+    /// number of faces on the boundary where some of these are given up; which are, `is_given_up` tells by their places and by
+    /// tetrahedron and face.
+    fn find_walls(
+        &mut self,
+        mesh: &mut CurrentMesh,
+        given_up: Option<usize>,
+        is_given_up: &mut dyn FnMut(usize, [u32; 2]) -> bool,
+    ) -> Option<()> {
+        (self.walls_len, self.link_len) = (0, 0);
+        let mut outer: Vec<([u32; 3], [u32; 2])> = Vec::new();
+        let mut fits = true;
+        for i in 0..self.bare_len {
+            let [t, face, beyond] = self.bare[i];
+            let tet = mesh.tets[t as usize];
+            if beyond == NONE && given_up.is_some() {
+                let mut sorted = FACES[face as usize & 3].map(|k| mesh.labels[tet[k] as usize].vertex);
+                sorted.sort_unstable();
+                // Kept in order as they come: they are few.
+                let at = outer.partition_point(|other| *other < (sorted, [t, face]));
+                outer.insert(at, (sorted, [t, face]));
+                continue;
+            }
+            let side = if beyond == NONE { Some(0) } else { mesh.side_towards(beyond, t) };
+            fits &= side.is_some();
+            self.add_wall(mesh, &tet, face as usize, beyond, side.unwrap_or(0))?;
+        }
+        let mut bare = Vec::new();
+        if given_up.is_some_and(|count| count != outer.len()) {
+            return None;
+        }
+        for (place, (_, [t, face])) in outer.into_iter().enumerate() {
+            let tet = mesh.tets[t as usize];
+            if is_given_up(place, [t, face]) {
+                bare.push(FACES[face as usize & 3].map(|k| tet[k]));
+            } else {
+                self.add_wall(mesh, &tet, face as usize, NONE, 0)?;
+            }
+        }
+        let mut rim = Vec::new();
+        for [a, b, c] in bare {
+            let number = |v: u32| mesh.vertex_number(v);
+            rim.push([number(a)?, number(b)?, number(c)?]);
+        }
+        if !fits {
+            return None;
+        }
+        let prints = self.prints(mesh);
+        self.fingerprint = Fingerprint::default();
+        for (corners, &t) in self.corners.iter_mut().zip(&self.tets[..self.tets_len]) {
+            // No vertex may be left without a tetrahedron.
+            *corners = mesh.corner_numbers(&mesh.tets[t as usize])?;
+            let prints = corners.map(|x| prints[usize::from(x) % MAX_AROUND]);
+            self.fingerprint.add(prints.into_iter().fold(0, u32::wrapping_add));
+        }
+        self.join_walls(&rim)
     }
 
     /// Orders the link by the labels of its vertices.
@@ -235,6 +324,27 @@ impl Cavity {
             *across = [NONE, b & 0xFFFF, c & 0xFFFF, d & 0xFFFF];
         }
         (!twice && !open).then_some(())
+    }
+
+    /// Appends to the node of an update that is added how T_u fills Π_u, once link and walls are ordered.
+    fn write_shape(&mut self, mesh: &CurrentMesh, on_boundary: bool) -> Option<()> {
+        let order = &self.order;
+        let canonical = |x: u8| order[usize::from(x) % MAX_AROUND] as u8;
+        let mut faces: [Face; MAX_INSERTED] = [[0; 3]; MAX_INSERTED];
+        for (wall, &place) in self.walls[..self.walls_len].iter().zip(&self.places) {
+            faces[place as usize % MAX_INSERTED] = turned(wall.corners.map(canonical));
+        }
+        let removed = &mut self.corners[..self.tets_len];
+        removed.iter_mut().for_each(|tet| *tet = tet.map(canonical));
+        let spheres = || {
+            let mut positions = [[0; 3]; MAX_AROUND];
+            for (&v, &place) in self.link[..self.link_len].iter().zip(order) {
+                positions[place as usize % MAX_AROUND] = mesh.positions[v as usize];
+            }
+            Spheres::of(positions[..self.link_len].iter().copied())
+        };
+        let (vertices, faces) = (self.link_len as u32, &faces[..self.walls_len]);
+        write_removed(&mut self.glue, &mut self.bits, Hole { vertices, faces, removed, on_boundary }, spheres)
     }
 
     /// Whether all tetrahedra of the new star are positive, exactly.
@@ -365,7 +475,9 @@ impl VertexMt {
         if mesh.slot(self.vertex(u)).is_some() {
             return Err(torn);
         }
-        self.find_walls(mesh, &shape, cavity).ok_or(torn.clone())?;
+        let count = shape.boundary.then_some(shape.given_up_len as usize);
+        let mut is_given_up = |place: usize, _| self.nodes.get(shape.given_up + place as u64, 1) == 1;
+        cavity.find_walls(mesh, count, &mut is_given_up).ok_or(torn.clone())?;
         let position = self.position(u);
         if !cavity.is_star_positive(mesh, position, self.info.lattice.bits <= NARROW_BITS) {
             return Err(UpdateError::Inverted { update: u.0 });
@@ -373,63 +485,6 @@ impl VertexMt {
         self.find_tags(mesh, u, &shape, cavity)?;
         self.perform_insertion(mesh, u, position, cavity);
         Ok(Applied::Done)
-    }
-
-    /// Finds the faces of Π_u and joins the new tetrahedra behind them.
-    #[inline]
-    fn find_walls(&self, mesh: &mut CurrentMesh, shape: &Shape, cavity: &mut Cavity) -> Option<()> {
-        (cavity.walls_len, cavity.link_len) = (0, 0);
-        let mut outer: Vec<([u32; 3], [u32; 3])> = Vec::new();
-        let mut fits = true;
-        for i in 0..cavity.bare_len {
-            let [t, face, beyond] = cavity.bare[i];
-            let tet = mesh.tets[t as usize];
-            if beyond == NONE && shape.boundary {
-                let slots = FACES[face as usize & 3].map(|k| tet[k]);
-                let mut sorted = slots.map(|v| mesh.labels[v as usize].vertex);
-                sorted.sort_unstable();
-                // Kept in order as they come: they are few.
-                let at = outer.partition_point(|other| *other < (sorted, slots));
-                outer.insert(at, (sorted, slots));
-                continue;
-            }
-            let side = if beyond == NONE { Some(0) } else { mesh.side_towards(beyond, t) };
-            fits &= side.is_some();
-            cavity.add_wall(mesh, &tet, face as usize, beyond, side.unwrap_or(0))?;
-        }
-        let mut rim = Vec::new();
-        if shape.boundary {
-            if outer.len() != shape.given_up_len as usize {
-                return None;
-            }
-            let mut given_up = Vec::new();
-            for (i, (_, slots)) in (0..).zip(outer) {
-                if self.nodes.get(shape.given_up + i, 1) == 1 {
-                    given_up.push(slots);
-                } else {
-                    let [a, b, c] = slots;
-                    // As face 0 of a tetrahedron, whose first corner does not matter.
-                    cavity.add_wall(mesh, &[NONE, a, b, c], 0, NONE, 0)?;
-                }
-            }
-            for slots in given_up {
-                let number = |v: u32| mesh.vertex_number(v);
-                rim.push([number(slots[0])?, number(slots[1])?, number(slots[2])?]);
-            }
-        }
-        if !fits {
-            return None;
-        }
-        let prints = cavity.prints(mesh);
-        cavity.fingerprint = Fingerprint::default();
-        for &t in &cavity.tets[..cavity.tets_len] {
-            let tet = mesh.tets[t as usize];
-            // No vertex may be left without a tetrahedron.
-            let numbers = mesh.corner_numbers(&tet)?;
-            let prints = numbers.map(|x| prints[usize::from(x) % MAX_AROUND]);
-            cavity.fingerprint.add(prints.into_iter().fold(0, u32::wrapping_add));
-        }
-        cavity.join_walls(&rim)
     }
 
     /// Finds which update removes each tetrahedron of the new star.
@@ -530,6 +585,120 @@ impl VertexMt {
         let shape = self.shape(u);
         let child = self.nodes.get(shape.remover(u64::from(place)), shape.remover_width) as u32;
         self.child(u, child).filter(|_| child > 0).map(|child| child.0)
+    }
+
+    /// Reveals updates to the tetrahedra around the vertices that these come with. False if others may be left to be told, or to look at
+    /// all would be quicker.
+    fn reveal_around(&self, mesh: &mut CurrentMesh, updates: &Range<u32>) -> bool {
+        let Some(growing) = &self.growing else { return false };
+        let of_base = self.base.tets.iter().zip(&self.base_removers).filter(|(_, u)| updates.contains(u));
+        let mut sites: Vec<u32> = of_base.map(|(tet, _)| tet[0]).collect();
+        let mut missing = sites.len();
+        let mut parents: Vec<u32> = updates.clone().flat_map(|u| growing.parents(u)).copied().collect();
+        parents.sort_unstable();
+        parents.dedup();
+        for p in parents {
+            let VertexId(v) = self.vertex(UpdateId(p));
+            if mesh.slot(VertexId(v)).is_some() {
+                sites.push(v);
+                missing += growing.count_removed(p, updates);
+            }
+        }
+        if SITE_COST * sites.len() > mesh.tet_slots() {
+            return false;
+        }
+        sites.sort_unstable();
+        sites.dedup();
+        let mut star = Vec::new();
+        for slot in sites.into_iter().filter_map(|v| mesh.slot(VertexId(v))).collect::<Vec<u32>>() {
+            star.clear();
+            mesh.list_star(slot, &mut star);
+            let found = star.iter().filter(|&&t| self.reveal_at(mesh, t, updates)).count();
+            missing = missing.saturating_sub(found);
+        }
+        // Else the tetrahedra around a vertex do not all hang together, or the mesh knows of some updates already.
+        missing == 0
+    }
+
+    /// Lets the mesh know which update removes a tetrahedron, if it is here; touches it if it is one of `updates`. Tells whether that is
+    /// news.
+    fn reveal_at(&self, mesh: &mut CurrentMesh, t: u32, updates: &Range<u32>) -> bool {
+        let tag = mesh.tag(t);
+        if tag == NONE || tag < FIRST_ANONYMOUS_TAG {
+            if updates.contains(&tag) {
+                mesh.touch(&[t]);
+            }
+            return false;
+        }
+        let place = tag & !FIRST_ANONYMOUS_TAG;
+        let creator = self.creator(mesh, t);
+        let remover = match creator {
+            Some(u) => self.remover_at(u, place),
+            None => self.base_removers().get(place as usize).copied().filter(|&u| u != NONE),
+        };
+        let Some(u) = remover else { return false };
+        mesh.set_tag(t, u);
+        if let Some(base) = &self.base_quarterings {
+            let of_base = || base.get(place as usize).copied().unwrap_or(0);
+            mesh.set_quarterings(t, creator.map_or_else(of_base, |u| self.quarterings_at(u, place)));
+        }
+        mesh.touch(&[t]);
+        updates.contains(&u)
+    }
+
+    /// Adds the insertion of a vertex as the next update and applies it; nothing is added if it cannot be applied.
+    pub(super) fn insert_next(
+        &mut self,
+        mesh: &mut CurrentMesh,
+        new: &Insertion<'_>,
+        cavity: &mut Cavity,
+    ) -> Result<(), UpdateError> {
+        let u = UpdateId(self.updates());
+        let torn = UpdateError::Cavity { update: u.0 };
+        let on_boundary = self.open(mesh, new, cavity).ok_or(torn.clone())?;
+        if !cavity.is_star_positive(mesh, new.position, self.info.lattice.bits <= NARROW_BITS) {
+            return Err(UpdateError::Inverted { update: u.0 });
+        }
+        cavity.order_link(mesh);
+        cavity.order_walls();
+        cavity.write_shape(mesh, on_boundary).ok_or(torn)?;
+        self.add_node(&cavity.bits, new.errors)?;
+        self.note_parents(mesh, new, &cavity.removed_tags, cavity.walls_len);
+        for (tag, &place) in cavity.tags[..cavity.walls_len].iter_mut().zip(&cavity.places) {
+            *tag = FIRST_ANONYMOUS_TAG | place as u32;
+        }
+        cavity.quarterings[..cavity.walls_len].fill(0);
+        self.perform_insertion(mesh, u, new.position, cavity);
+        Ok(())
+    }
+
+    /// Finds the faces of Π_u for an update that is added, and writes all in front of the code of T_u. Tells whether faces on the boundary are
+    /// given up. None if it is not a hole that a vertex could be inserted into.
+    fn open(&self, mesh: &mut CurrentMesh, new: &Insertion<'_>, cavity: &mut Cavity) -> Option<bool> {
+        self.take_away(mesh, new, &mut cavity.removed_tags)?;
+        let update = self.updates();
+        if mesh.slot(self.vertex(UpdateId(update))).is_some() {
+            return None;
+        }
+        cavity.list_bare(mesh, new.removed, update);
+        let on_boundary = !new.given_up.is_empty();
+        let outer =
+            cavity.bare[..cavity.bare_len].iter().filter(|[.., beyond]| on_boundary && *beyond == NONE);
+        let outer = on_boundary.then(|| outer.count());
+        let mut given_up = Vec::new();
+        let mut is_given_up = |_: usize, face: [u32; 2]| {
+            given_up.push(new.given_up.contains(&face));
+            given_up.last() == Some(&true)
+        };
+        cavity.find_walls(mesh, outer, &mut is_given_up)?;
+        let bits = &mut cavity.bits;
+        bits.clear();
+        new.position.iter().for_each(|&x| bits.push(x as u64, self.widths.position));
+        for (&level, field) in new.levels.iter().zip(&self.info.fields) {
+            bits.push(level as u64, field.bits);
+        }
+        write_given_up(bits, new.removed.len(), &given_up)?;
+        Some(on_boundary)
     }
 
     /// Which faces of T_u on the boundary are given up, in the order of their sorted vertices; empty if none is.
@@ -916,31 +1085,12 @@ impl MultiTessellation for VertexMt {
     }
 
     fn reveal(&self, mesh: &mut CurrentMesh, updates: Range<u32>) {
+        let updates = updates.start..updates.end.min(self.updates());
         if updates.is_empty() {
             return;
         }
-        for t in 0..mesh.tet_slots() as u32 {
-            let tag = mesh.tag(t);
-            if tag == NONE || tag < FIRST_ANONYMOUS_TAG {
-                if updates.contains(&tag) {
-                    mesh.touch(&[t]);
-                }
-                continue;
-            }
-            let place = tag & !FIRST_ANONYMOUS_TAG;
-            let creator = self.creator(mesh, t);
-            let remover = match creator {
-                Some(u) => self.remover_at(u, place),
-                None => self.base_removers().get(place as usize).copied().filter(|&u| u != NONE),
-            };
-            if let Some(u) = remover {
-                mesh.set_tag(t, u);
-                if let Some(base) = &self.base_quarterings {
-                    let of_base = || base.get(place as usize).copied().unwrap_or(0);
-                    mesh.set_quarterings(t, creator.map_or_else(of_base, |u| self.quarterings_at(u, place)));
-                }
-                mesh.touch(&[t]);
-            }
+        if !self.reveal_around(mesh, &updates) {
+            (0..mesh.tet_slots() as u32).for_each(|t| _ = self.reveal_at(mesh, t, &updates));
         }
     }
 

@@ -8,12 +8,14 @@ const PART: usize = 1 << PART_BITS;
 #[derive(Clone, Debug)]
 pub(crate) struct Sparse<T> {
     parts: Vec<Option<Box<[T; PART]>>>,
+    /// How many are there.
+    held: usize,
     none: T,
 }
 
 impl<T: Copy + PartialEq> Sparse<T> {
     pub fn new(none: T) -> Self {
-        Self { parts: Vec::new(), none }
+        Self { parts: Vec::new(), held: 0, none }
     }
 
     #[inline]
@@ -44,6 +46,7 @@ impl<T: Copy + PartialEq> Sparse<T> {
         let mut part = Box::new([self.none; PART]);
         part[i as usize % PART] = value;
         self.parts[at] = Some(part);
+        self.held += 1;
     }
 
     /// Forgets the entries of a range, and what memory that leaves without any.
@@ -60,17 +63,18 @@ impl<T: Copy + PartialEq> Sparse<T> {
             entries[place(range.start)..place(range.end)].fill(self.none);
             if entries.iter().all(|entry| *entry == self.none) {
                 *part = None;
+                self.held -= 1;
             }
         }
     }
 
     pub fn clear(&mut self) {
         self.parts.clear();
+        self.held = 0;
     }
 
     pub fn bytes(&self) -> usize {
-        let held = self.parts.iter().flatten().count() * size_of::<[T; PART]>();
-        held + size_of_val(&self.parts[..])
+        self.held * size_of::<[T; PART]>() + size_of_val(&self.parts[..])
     }
 }
 

@@ -8,10 +8,14 @@
 use super::glue::Face;
 use super::vertex::MAX_AROUND;
 
+/// Vertices whose distances are found together.
+const GROUP: usize = 4;
+
 /// The vertices of Π_u, seen from the first.
 #[derive(Clone, Debug)]
 pub(super) struct Spheres {
-    points: [[f64; 3]; MAX_AROUND],
+    /// Along each axis.
+    points: [[f64; MAX_AROUND]; 3],
     len: usize,
 }
 
@@ -30,32 +34,38 @@ fn dot(u: [f64; 3], v: [f64; 3]) -> f64 {
 impl Spheres {
     /// Given the vertices in canonical order.
     pub fn of(positions: impl Iterator<Item = [i32; 3]>) -> Self {
-        let mut spheres = Self { points: [[0.0; 3]; MAX_AROUND], len: 0 };
+        let mut spheres = Self { points: [[0.0; MAX_AROUND]; 3], len: 0 };
         let mut first = None;
-        for (point, position) in spheres.points.iter_mut().zip(positions) {
+        for (i, position) in positions.take(MAX_AROUND).enumerate() {
             let first = *first.get_or_insert(position);
-            *point = [0, 1, 2].map(|k| f64::from(position[k]) - f64::from(first[k]));
-            spheres.len += 1;
+            for (k, points) in spheres.points.iter_mut().enumerate() {
+                points[i] = f64::from(position[k]) - f64::from(first[k]);
+            }
+            spheres.len = i + 1;
         }
         spheres
     }
 
     /// How far the centre of the sphere through a face and each vertex lies behind the face, in a unit of the face's own;
-    /// infinity for vertices that are not behind it.
+    /// infinity for vertices that are not behind it. What comes behind the last vertex means nothing.
+    #[inline]
     fn distances(&self, [a, b, c]: Face) -> [f64; MAX_AROUND] {
-        let [a, b, c] = [a, b, c].map(|x| self.points[usize::from(x) % MAX_AROUND]);
+        let [xs, ys, zs] = &self.points;
+        let [a, b, c] = [a, b, c].map(|x| usize::from(x) % MAX_AROUND).map(|x| [xs[x], ys[x], zs[x]]);
         let (u, v) = (difference(b, a), difference(c, a));
         let n = cross(u, v);
         let (across_v, across_u) = (cross(v, n), cross(n, u));
         let (uu, vv, nn) = (dot(u, u), dot(v, v), dot(n, n));
         let centre = [0, 1, 2].map(|k| uu * across_v[k] + vv * across_u[k]);
         let mut distances = [f64::INFINITY; MAX_AROUND];
-        for (distance, &point) in distances.iter_mut().zip(&self.points[..self.len]) {
-            let w = difference(point, a);
+        // Whole groups, and a choice for each vertex, not a branch.
+        let len = self.len.next_multiple_of(GROUP).min(MAX_AROUND);
+        let points = xs[..len].iter().zip(&ys[..len]).zip(&zs[..len]);
+        for (distance, ((&x, &y), &z)) in distances[..len].iter_mut().zip(points) {
+            let w = difference([x, y, z], a);
             let behind = -dot(w, n);
-            if behind > 0.0 {
-                *distance = (dot(w, w) * nn - dot(w, centre)) / behind;
-            }
+            let own = (dot(w, w) * nn - dot(w, centre)) / behind;
+            *distance = if behind > 0.0 { own } else { f64::INFINITY };
         }
         distances
     }
@@ -64,9 +74,10 @@ impl Spheres {
     pub fn place(&self, face: Face, x: u8) -> Option<u32> {
         let distances = self.distances(face);
         let own = distances[usize::from(x) % MAX_AROUND];
-        let is_before =
-            |&(y, distance): &(usize, &f64)| *distance < own || *distance == own && y < usize::from(x);
-        (own < f64::INFINITY).then(|| distances.iter().enumerate().filter(is_before).count() as u32)
+        let is_before = |(y, &distance): (usize, &f64)| {
+            u32::from((distance < own) | (distance == own) & (y < usize::from(x)))
+        };
+        (own < f64::INFINITY).then(|| distances[..self.len].iter().enumerate().map(is_before).sum())
     }
 
     /// The vertex at a place of that order.
@@ -76,7 +87,7 @@ impl Spheres {
         for _ in 0..=place {
             // The first one of several.
             let (at, least) =
-                distances.iter().enumerate().fold((0, f64::INFINITY), |best, (at, &distance)| {
+                distances[..self.len].iter().enumerate().fold((0, f64::INFINITY), |best, (at, &distance)| {
                     if distance < best.1 { (at, distance) } else { best }
                 });
             if least == f64::INFINITY {

@@ -208,7 +208,9 @@ impl Writer<'_> {
         u: UpdateId,
         canonical: &Canonical,
     ) -> Result<(), ConvertError> {
-        let on_boundary = write_given_up(bits, canonical)
+        let given_up: Vec<bool> = canonical.bare.iter().map(|(_, given_up)| *given_up).collect();
+        let on_boundary = !given_up.is_empty();
+        write_given_up(bits, canonical.removed.len(), &given_up)
             .ok_or(ConvertError::Update { update: u.0, why: "it has too many faces on the boundary" })?;
         let children = &self.children[u.0 as usize];
         let own = compact.quartering_bits(children.len() as u32);
@@ -219,57 +221,77 @@ impl Writer<'_> {
             bits.push(u64::from(self.mt.quarterings_of(*t)), own);
         }
         let torn = ConvertError::Update { update: u.0, why: "it does not fill the hole that it leaves" };
-        let spheres = Spheres::of(canonical.link.iter().map(|&v| self.mt.position(VertexId(v))));
-        write_removed(&mut self.glue, bits, canonical, on_boundary, &spheres).ok_or(torn)
+        let Canonical { link, walls, removed, .. } = canonical;
+        let spheres = || Spheres::of(link.iter().map(|&v| self.mt.position(VertexId(v))));
+        let faces: Vec<Face> = walls.iter().map(|(face, _)| *face).collect();
+        if !are_faces_of(&faces, removed) {
+            return Err(torn);
+        }
+        let hole = Hole { vertices: link.len() as u32, faces: &faces, removed, on_boundary };
+        write_removed(&mut self.glue, bits, hole, spheres).ok_or(torn)
     }
 }
 
-/// Appends how many tetrahedra are removed, and which of their faces on the boundary are given up. Tells whether there are
-/// any; none if there are too many.
-pub(super) fn write_given_up(bits: &mut Bits, canonical: &Canonical) -> Option<bool> {
-    bits.push(canonical.removed.len() as u64, COUNT_BITS);
-    let on_boundary = !canonical.bare.is_empty();
-    bits.push(u64::from(on_boundary), 1);
-    if on_boundary {
-        if canonical.bare.len() >= 1 << COUNT_BITS {
+/// Appends how many tetrahedra are removed, and which of their faces on the boundary are given up, if any is. None if there are too
+/// many.
+pub(super) fn write_given_up(bits: &mut Bits, removed: usize, given_up: &[bool]) -> Option<()> {
+    bits.push(removed as u64, COUNT_BITS);
+    bits.push(u64::from(!given_up.is_empty()), 1);
+    if !given_up.is_empty() {
+        if given_up.len() >= 1 << COUNT_BITS {
             return None;
         }
-        bits.push(canonical.bare.len() as u64, COUNT_BITS);
-        canonical.bare.iter().for_each(|(_, given_up)| bits.push(u64::from(*given_up), 1));
+        bits.push(given_up.len() as u64, COUNT_BITS);
+        given_up.iter().for_each(|&given_up| bits.push(u64::from(given_up), 1));
     }
-    Some(on_boundary)
+    Some(())
 }
 
-/// Appends how T_u fills Π_u.
+/// Π_u and T_u in canonical numbers.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Hole<'a> {
+    pub vertices: u32,
+    /// The faces of Π_u, turned and in canonical order.
+    pub faces: &'a [Face],
+    pub removed: &'a [[u8; 4]],
+    /// Whether faces on the boundary are given up.
+    pub on_boundary: bool,
+}
+
+/// Appends how T_u fills Π_u, all faces of which are such of T_u.
 pub(super) fn write_removed(
     glue: &mut Glue,
     bits: &mut Bits,
-    canonical: &Canonical,
-    on_boundary: bool,
-    spheres: &Spheres,
+    Hole { vertices, faces, removed, on_boundary }: Hole<'_>,
+    spheres: impl FnOnce() -> Spheres,
 ) -> Option<()> {
-    let faces: Vec<Face> = canonical.walls.iter().map(|(face, _)| *face).collect();
-    let vertices = canonical.link.len() as u32;
-    let shared = |x: &u8| canonical.removed.iter().all(|tet| tet.contains(x));
-    let in_all = (0..vertices as u8).find(shared);
-    // All of T_u meets in a vertex, and all faces of Π_u without that vertex have one of its tetrahedra behind them.
-    let fan = in_all.filter(|&x| is_fan(&faces, &canonical.removed, x));
+    let corners = |tet: &[u8; 4]| tet.iter().fold(0, |set, &x| set | 1_u64 << (x % 64));
+    let shared = removed.iter().fold(u64::MAX, |set, tet| set & corners(tet));
+    // All of T_u meets in a vertex, and stands on the faces of Π_u without that vertex: each of these has one of it behind it.
+    let in_all = (shared != 0).then(|| shared.trailing_zeros() as u8);
+    let fan = in_all.filter(|x| faces.iter().filter(|face| !face.contains(x)).count() == removed.len());
     bits.push(u64::from(fan.is_some()), 1);
     if let Some(apex) = fan {
         bits.push(u64::from(apex), width_of(vertices - 1));
-    }
-    if fan.is_some() {
         // These are the tetrahedra, whatever the way.
         return Some(());
     }
     // By the face that it stands on: the vertex of the tetrahedron opposite it.
-    let sides = |tet: &[u8; 4]| [0, 1, 2, 3].map(|i| (turned(FACES[i].map(|k| tet[k])), tet[i]));
-    let mut behind: Vec<(Face, u8)> = canonical.removed.iter().flat_map(sides).collect();
+    let sides =
+        |tet: &[u8; 4]| [0, 1, 2, 3].map(|i| u32::from(tet[i]) | oriented(FACES[i].map(|k| tet[k])) << 6);
+    let mut behind = [u32::MAX; 4 * MAX_REMOVED];
+    let behind = &mut behind[..4 * removed.len().min(MAX_REMOVED)];
+    behind.iter_mut().zip(removed.iter().flat_map(sides)).for_each(|(entry, side)| *entry = side);
     behind.sort_unstable();
-    let behind = |face: &Face| behind.binary_search_by_key(face, |entry| entry.0).ok().map(|at| behind[at].1);
-    let (mut plain, mut places) = (Vec::new(), Vec::new());
-    let written = glue.build(&faces, !on_boundary, |face, of_link| {
-        let apex = behind(&face);
+    let behind = |face: Face| {
+        let key = oriented(face) << 6;
+        let found = behind.get(behind.partition_point(|&entry| entry < key));
+        found.filter(|&&entry| entry >> 6 == key >> 6).map(|&entry| (entry & 63) as u8)
+    };
+    let spheres = spheres();
+    let (mut plain, mut places) = (Vec::with_capacity(removed.len()), Vec::with_capacity(removed.len()));
+    let written = glue.build(faces, !on_boundary, |face, of_link| {
+        let apex = behind(face);
         let choices = choices(vertices, on_boundary, of_link)?;
         let (close, chosen) = match apex {
             Some(x) => {
@@ -285,14 +307,14 @@ pub(super) fn write_removed(
     });
     written?;
     write_closed(bits, &plain, &places);
-    // What was built must be T_u, whatever the way.
-    let all = |tets: &[[u8; 4]]| {
-        let mut all: Vec<[u8; 4]> = tets.to_vec();
-        all.iter_mut().for_each(|tet| tet.sort_unstable());
-        all.sort_unstable();
-        all
-    };
-    (all(&glue.tets[..glue.len]) == all(&canonical.removed)).then_some(())
+    // Each tetrahedron that was built is one of T_u, and no two are the same; these must be all.
+    (glue.len == removed.len()).then_some(())
+}
+
+/// A face as one number: its turned vertices, by six bits each.
+fn oriented(face: [u8; 3]) -> u32 {
+    let [a, b, c] = turned(face).map(u32::from);
+    a << 12 | b << 6 | c
 }
 
 /// Appends how faces are closed, in that way which takes the fewest bits: the number of a vertex and its width for each, or its
@@ -318,19 +340,11 @@ fn write_closed(bits: &mut Bits, plain: &[(u32, u32)], places: &[Option<u32>]) {
     }
 }
 
-/// Whether the tetrahedra are those that `x` makes with the faces, which are turned and in canonical order, that do not have
-/// it.
-fn is_fan(faces: &[Face], tets: &[[u8; 4]], x: u8) -> bool {
-    let key = |face: &Face| {
-        let [a, b, c] = *face;
-        [a, b.min(c), b.max(c)]
-    };
-    let stands_on_one = |tet: &[u8; 4]| {
-        let Some(i) = tet.iter().position(|&corner| corner == x) else { return false };
-        let own = turned(FACES[i].map(|k| tet[k]));
-        faces.binary_search_by_key(&key(&own), key).is_ok_and(|at| faces[at] == own)
-    };
-    faces.iter().filter(|face| !face.contains(&x)).count() == tets.len() && tets.iter().all(stands_on_one)
+/// Whether all faces are such of the tetrahedra, from the same side.
+fn are_faces_of(faces: &[Face], tets: &[[u8; 4]]) -> bool {
+    let sides = |tet: &[u8; 4]| FACES.map(|face| turned(face.map(|k| tet[k])));
+    let sides: HashSet<Face> = tets.iter().flat_map(sides).collect();
+    faces.iter().all(|face| sides.contains(face))
 }
 
 /// Whether one can go from each tetrahedron to each other one through faces.

@@ -3,7 +3,6 @@
 //! Nodes name their children, which come later. So until all updates are here, parents, children and removers are kept
 //! beside the nodes; then they move into them.
 
-use super::Applied;
 use super::BaseMesh;
 use super::CurrentMesh;
 use super::ErrorCode;
@@ -12,22 +11,17 @@ use super::MultiTessellation;
 use super::NodeBits;
 use super::UpdateError;
 use super::UpdateId;
-use super::VertexId;
 use super::VertexMt;
 use super::bits::Bits;
 use super::bits::width_of;
 use super::current::FIRST_ANONYMOUS_TAG;
-use super::glue::Glue;
-use super::glue::turned;
-use super::sphere_rank::Spheres;
-use super::vertex::MAX_AROUND;
-use super::vertex::MAX_INSERTED;
+use super::current::GATHERED;
 use super::vertex::MAX_REMOVED;
-use super::vertex_from::Canonical;
-use super::vertex_from::write_given_up;
-use super::vertex_from::write_removed;
-use crate::mesh::FACES;
 use crate::mesh::NONE;
+use std::ops::Range;
+
+/// Children that a list has room for at first.
+const USUAL_CHILDREN: usize = 8;
 
 /// What is kept beside the nodes.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -69,6 +63,13 @@ impl Growing {
     pub fn remover(&self, u: u32, place: usize) -> Option<u32> {
         let child = *self.removers(u).get(place)?;
         self.children(u).get(usize::from(child).checked_sub(1)?).copied()
+    }
+
+    /// How many tetrahedra of a star updates of a range remove.
+    pub fn count_removed(&self, u: u32, updates: &Range<u32>) -> usize {
+        let children = self.children(u);
+        let remover = |&child: &u8| children.get(usize::from(child).checked_sub(1)?);
+        self.removers(u).iter().filter_map(remover).filter(|u| updates.contains(u)).count()
     }
 
     /// The quarterings of the tetrahedron at a place of a star, as far as its remover is here.
@@ -145,84 +146,81 @@ impl VertexMt {
     pub(crate) fn insert_into(
         &mut self,
         mesh: &mut CurrentMesh,
-        glue: &mut Glue,
         new: &Insertion<'_>,
     ) -> Result<UpdateId, UpdateError> {
         let update = self.updates();
-        let torn = UpdateError::Cavity { update };
-        if self.growing.is_none() || update >= self.info.updates || new.removed.len() > MAX_REMOVED {
-            return Err(torn);
+        let fits = (1..=MAX_REMOVED).contains(&new.removed.len());
+        if self.growing.is_none() || update >= self.info.updates || !fits {
+            return Err(UpdateError::Cavity { update });
         }
         if !self.info.holds(new.position, new.levels) {
             return Err(UpdateError::OffLattice { update });
         }
-        let creators = self.take_away(mesh, new).ok_or(torn.clone())?;
-        let quarterings = if self.base_quarterings.is_some() { new.quarterings } else { &[] };
-        let canonical = canonical(mesh, update, new).ok_or(torn.clone())?;
-        let mut bits = Bits::default();
-        new.position.iter().for_each(|&x| bits.push(x as u64, self.widths.position));
-        for (&level, field) in new.levels.iter().zip(&self.info.fields) {
-            bits.push(level as u64, field.bits);
-        }
-        let on_boundary = write_given_up(&mut bits, &canonical).ok_or(torn.clone())?;
-        let slots = canonical.link.iter().filter_map(|&v| mesh.slot(VertexId(v)));
-        let spheres = Spheres::of(slots.map(|slot| mesh.positions[slot as usize]));
-        write_removed(glue, &mut bits, &canonical, on_boundary, &spheres).ok_or(torn.clone())?;
-        self.add_node(&bits, new.errors)?;
+        let mut cavity = mesh.take_cavity();
+        let inserted = self.insert_next(mesh, new, &mut cavity);
+        mesh.put_back_cavity(cavity);
+        inserted?;
         self.set_own_fall(UpdateId(update), new.own_fall);
-        self.note_parents(update, &creators, quarterings, canonical.walls.len());
-        match self.refine(mesh, UpdateId(update))? {
-            Applied::Done => {}
-            Applied::Blocked(_) => return Err(torn),
-        }
         if self.updates() == self.info.updates {
             self.pack()?;
         }
         Ok(UpdateId(update))
     }
 
-    /// Marks the removed tetrahedra as such. Tells for each which update created it, and its place among what that one created, or in the
-    /// base mesh. None if one of them was removed before.
-    fn take_away(&self, mesh: &mut CurrentMesh, new: &Insertion<'_>) -> Option<Vec<(Option<u32>, u32)>> {
+    /// Marks the removed tetrahedra as such, and tells the tags that they had. None if one of them was removed before.
+    pub(super) fn take_away(
+        &self,
+        mesh: &mut CurrentMesh,
+        new: &Insertion<'_>,
+        tags: &mut [u32; GATHERED],
+    ) -> Option<()> {
         let update = self.updates();
         for (&t, &own) in new.removed.iter().zip(new.quarterings) {
             mesh.tet(t)?;
             mesh.set_quarterings(t, own);
         }
-        let take = |&t: &u32| {
+        for (old, &t) in tags.iter_mut().zip(new.removed) {
             mesh.tet(t)?;
-            let tag = mesh.tag(t);
-            if tag < FIRST_ANONYMOUS_TAG || tag == NONE {
+            *old = mesh.tag(t);
+            if *old < FIRST_ANONYMOUS_TAG || *old == NONE {
                 return None;
             }
-            let creator = self.creator(mesh, t).map(|u| u.0);
-            mesh.set_tag(t, update);
-            Some((creator, tag & !FIRST_ANONYMOUS_TAG))
-        };
-        new.removed.iter().map(take).collect()
+            mesh.take_tag(t, update);
+        }
+        Some(())
     }
 
-    /// Lists update `u` with its parents, given what it removes; and makes room for what will remove the `inserted`
-    /// tetrahedra of its star.
-    fn note_parents(&mut self, u: u32, creators: &[(Option<u32>, u32)], quarterings: &[u8], inserted: usize) {
-        let Some(growing) = &mut self.growing else { return };
+    /// Lists the update that was added last with its parents, given the tags of what it removes; and makes room for what will
+    /// remove the `inserted` tetrahedra of its star.
+    pub(super) fn note_parents(
+        &mut self,
+        mesh: &CurrentMesh,
+        new: &Insertion<'_>,
+        tags: &[u32],
+        inserted: usize,
+    ) {
+        let Some(mut growing) = self.growing.take() else { return };
+        let u = self.updates() - 1;
         let first = growing.parents.len();
-        let own = quarterings.iter().copied().chain(std::iter::repeat(0));
-        for (&(creator, place), own) in creators.iter().zip(own) {
-            let Some(parent) = creator else {
-                self.base_removers[place as usize] = u;
+        let own = new.quarterings.iter().copied().chain(std::iter::repeat(0));
+        for ((&t, tag), own) in new.removed.iter().zip(tags).zip(own) {
+            let place = (tag & !FIRST_ANONYMOUS_TAG) as usize;
+            let Some(UpdateId(parent)) = self.creator(mesh, t) else {
+                self.base_removers[place] = u;
                 if let Some(base) = &mut self.base_quarterings {
-                    base[place as usize] = own;
+                    base[place] = own;
                 }
                 continue;
             };
             let children = &mut growing.children[parent as usize];
             if children.last() != Some(&u) {
+                // Most have a few more than a new list has room for.
+                children.reserve(USUAL_CHILDREN * usize::from(children.is_empty()));
                 children.push(u);
                 growing.parents.push(parent);
             }
             let child = children.len() as u8;
-            let at = growing.removers_start(parent) + place as usize;
+            let at = growing.removers_start(parent) + place;
             growing.removers[at] = child;
             if let Some(quarterings) = growing.quarterings.get_mut(at) {
                 *quarterings = own;
@@ -236,10 +234,11 @@ impl VertexMt {
         if self.base_quarterings.is_some() {
             growing.quarterings.resize(growing.removers.len(), 0);
         }
+        self.growing = Some(growing);
     }
 
     /// Adds the bits of a node without links and removers.
-    fn add_node(&mut self, bits: &Bits, errors: &[ErrorCode]) -> Result<(), UpdateError> {
+    pub(super) fn add_node(&mut self, bits: &Bits, errors: &[ErrorCode]) -> Result<(), UpdateError> {
         let before = self.nodes.len();
         self.store(bits, errors)?;
         let padding = self.nodes.len() - before - bits.len();
@@ -256,8 +255,9 @@ impl VertexMt {
         let (base, removers) = (std::mem::take(&mut self.base), std::mem::take(&mut self.base_removers));
         let mut packed = Self::new(self.info.clone(), base, removers, most_children, self.always_grows)?;
         packed.base_quarterings = self.base_quarterings.take();
+        let mut node = NodeBits::default();
         for u in 0..self.updates() {
-            let node = self.packed_node(&growing, &packed, u);
+            self.write_packed(&growing, &packed, u, &mut node.0);
             packed.push(&node, self.errors_of(UpdateId(u)))?;
         }
         packed.own_falls = std::mem::take(&mut self.own_falls);
@@ -265,8 +265,8 @@ impl VertexMt {
         Ok(())
     }
 
-    fn packed_node(&self, growing: &Growing, packed: &Self, u: u32) -> NodeBits {
-        let mut bits = Bits::default();
+    fn write_packed(&self, growing: &Growing, packed: &Self, u: u32, bits: &mut Bits) {
+        bits.clear();
         let start = self.node_start(u);
         let end = self.node_end(u) - u64::from(growing.padding[u as usize]);
         let vertex_end = start + u64::from(self.widths.vertex);
@@ -278,62 +278,24 @@ impl VertexMt {
             growing.next_in_loop(child, at + 1)
         });
         for [node, link] in std::iter::once(growing.next_in_loop(u, 0)).chain(of_children) {
-            bits.push(u64::from(node), widths.node);
-            bits.push(u64::from(link), widths.link);
+            bits.push(u64::from(node) | u64::from(link) << widths.node, widths.node + widths.link);
         }
         let code = self.code_start(vertex_end);
         bits.copy(&self.nodes, vertex_end, code);
         let count = children.len() as u32;
         let (width, own) = (width_of(count), packed.quartering_bits(count));
-        for (place, &child) in growing.removers(u).iter().enumerate() {
-            bits.push(u64::from(child), width);
-            bits.push(u64::from(growing.quarterings(u, place)), own);
+        // Several at a time: together they have at most 45 bits.
+        let mut place = 0;
+        for removers in growing.removers(u).chunks(5).filter(|_| count > 0) {
+            let (mut several, mut taken) = (0, 0);
+            for &child in removers {
+                let quarterings = u64::from(growing.quarterings(u, place));
+                several |= (u64::from(child) | quarterings << width) << taken;
+                taken += width + own;
+                place += 1;
+            }
+            bits.push(several, taken);
         }
         bits.copy(&self.nodes, code, end);
-        NodeBits(bits)
     }
-}
-
-/// The insertion in canonical numbers; the removed tetrahedra have the tag `update`. None if it is too large.
-fn canonical(mesh: &CurrentMesh, update: u32, new: &Insertion<'_>) -> Option<Canonical> {
-    let label = |slot: u32| mesh.vertex(slot).0;
-    let mut walls: Vec<([u32; 3], [u32; 3])> = Vec::with_capacity(2 * new.removed.len() + 2);
-    let mut bare = Vec::new();
-    for &t in new.removed {
-        let tet = mesh.tets()[t as usize];
-        for (k, n) in (0..).zip(mesh.neighbors()[t as usize]) {
-            if n != NONE && mesh.tag(n) == update {
-                continue;
-            }
-            let face = FACES[k as usize].map(|k| label(tet[k]));
-            let mut sorted = face;
-            sorted.sort_unstable();
-            let given_up = n == NONE && new.given_up.contains(&[t, k]);
-            if n == NONE {
-                bare.push((sorted, given_up));
-            }
-            if !given_up {
-                walls.push((sorted, face));
-            }
-        }
-    }
-    bare.sort_unstable();
-    if new.given_up.is_empty() {
-        bare.clear();
-    }
-    walls.sort_unstable();
-    let mut link: Vec<u32> = walls.iter().flat_map(|(face, _)| *face).collect();
-    link.sort_unstable();
-    link.dedup();
-    if walls.len() > MAX_INSERTED || link.len() > MAX_AROUND {
-        return None;
-    }
-    let number = |v: u32| link.binary_search(&v).ok().map(|place| place as u8);
-    let mut removed = Vec::with_capacity(new.removed.len());
-    for &t in new.removed {
-        let [a, b, c, d] = mesh.tets()[t as usize].map(label);
-        removed.push([number(a)?, number(b)?, number(c)?, number(d)?]);
-    }
-    let walls = walls.iter().map(|(_, face)| (turned(face.map(|v| number(v).unwrap_or(0))), NONE)).collect();
-    Some(Canonical { link, walls, removed, bare })
 }

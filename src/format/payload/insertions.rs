@@ -18,6 +18,7 @@ use crate::format::coder::Source;
 use crate::geom::NARROW_BITS;
 use crate::geom::insphere;
 use crate::geom::orient3d;
+use crate::geom::views_of_origin;
 use crate::mesh::FACES;
 use crate::mesh::NONE;
 use crate::mt::Applied;
@@ -25,7 +26,6 @@ use crate::mt::BaseMesh;
 use crate::mt::BaseMeshError;
 use crate::mt::CurrentMesh;
 use crate::mt::ErrorCode;
-use crate::mt::Glue;
 use crate::mt::Insertion;
 use crate::mt::MAX_FIELD_BITS;
 use crate::mt::MAX_REMOVED;
@@ -34,6 +34,7 @@ use crate::mt::MultiTessellation;
 use crate::mt::UpdateError;
 use crate::mt::UpdateId;
 use crate::mt::VertexMt;
+use crate::mt::corner_of;
 
 /// By how many codes an error is below the one before.
 const ERROR: Family = base::LAST.numbers_after(1, 2);
@@ -72,6 +73,9 @@ pub const PARTS: [(&str, Family); 9] = [
 /// The last [`SEED`]: none of them, its place is told.
 const ELSEWHERE: u32 = 8;
 
+/// After so many updates their memory is looked at.
+const MEASURED: u32 = 16;
+
 /// Most tetrahedra around a near vertex.
 const MOST_AROUND: usize = 4096;
 
@@ -106,20 +110,29 @@ pub struct State {
     errors: Vec<ErrorCode>,
     /// Whether orientations fit 64 bits.
     narrow: bool,
-    glue: Box<Glue>,
     /// The tetrahedra around the near vertex.
     star: Vec<u32>,
-    /// The other vertices of these.
-    link: Vec<u32>,
+    /// The other vertices of each, by index into the link, in the order of the face that they make, outward.
+    corners: Vec<[u32; 3]>,
+    /// These vertices as seen from the near one.
+    link: Vec<[i64; 3]>,
+    /// Their cross products with the new vertex, seen from there as well.
+    turned: Vec<[i64; 3]>,
     /// What is removed.
     removed: Vec<u32>,
+    views: Vec<View>,
+    /// Whether some of it is on the boundary.
+    on_boundary: bool,
     given_up: Vec<[u32; 2]>,
+    /// Tetrahedra of the star, in the direction of the new vertex.
+    cone: Vec<u32>,
     /// Of what is removed, where it is told.
     quarterings: Vec<u8>,
-    /// By tetrahedron and by vertex: `epoch` if it is in the star or the link, one more if it is removed, two more if it is
-    /// not.
+    /// By tetrahedron: `epoch` if it is in the star, one more if it is removed, two more if it is
+    /// not, three more if it cannot be.
     tet_marks: Vec<u32>,
-    vertex_marks: Vec<u32>,
+    /// By vertex: `epoch << 32 | index` if it is in the link.
+    vertex_marks: Vec<u64>,
     epoch: u32,
 }
 
@@ -203,11 +216,11 @@ fn put_update(out: &mut impl Put, mt: &VertexMt, u: UpdateId, state: &mut State)
     out.symbol(FAN, 0, u32::from(fan));
     put_one_of(out, near, state.mesh.positions().len() as u32);
     put_position(out, state, near, position);
-    let cone = state.cone(near, position);
-    let seed = match cone.iter().take(ELSEWHERE as usize).position(|t| removed.contains(t)) {
+    state.find_cone(near, position);
+    let seed = match state.cone.iter().take(ELSEWHERE as usize).position(|t| removed.contains(t)) {
         Some(at) => {
             out.symbol(SEED, 0, at as u32);
-            cone[at]
+            state.cone[at]
         }
         None => {
             out.symbol(SEED, 0, ELSEWHERE);
@@ -267,12 +280,11 @@ fn one_of(count: u32) -> (u32, u32) {
 
 /// Along an axis, what is expected of a new vertex near `near`: the usual difference, the context, and what the difference
 /// is told from.
-fn usual(state: &State, near: u32, axis: usize) -> (u32, u32, i32) {
-    let positions = state.mesh.positions();
-    let (origin, grain) = (i64::from(positions[near as usize][axis]), i64::from(state.grain[axis]));
+fn usual(state: &State, axis: usize) -> (u32, u32, i32) {
+    let grain = i64::from(state.grain[axis]);
     let (mut sum, mut size, mut level) = (0, 0, 1);
-    for &v in &state.link {
-        let difference = i64::from(positions[v as usize][axis]) - origin;
+    for seen in &state.link {
+        let difference = seen[axis];
         sum += difference;
         size += difference.abs();
         level += u32::from(difference == 0);
@@ -290,7 +302,7 @@ fn bits_of(x: u32) -> u32 {
 
 fn put_position(out: &mut impl Put, state: &State, near: u32, position: [i32; 3]) {
     for (axis, x) in position.into_iter().enumerate() {
-        let (size, context, from) = usual(state, near, axis);
+        let (size, context, from) = usual(state, axis);
         let offset = x.wrapping_sub(state.mesh.positions()[near as usize][axis]);
         let residual = (offset / state.grain[axis]).wrapping_sub(from);
         let length = residual.unsigned_abs();
@@ -347,9 +359,11 @@ pub fn read(
     state: &mut State,
     limits: &Limits,
 ) -> Result<(), FormatError> {
-    for _ in 0..count {
+    for k in 1..=count {
         read_update(source, mt, state)?;
-        check_bytes(mt.bytes() + state.mesh.bytes(), limits)?;
+        if k.is_multiple_of(MEASURED) || k == count {
+            check_bytes(mt.bytes() + state.mesh.bytes(), limits)?;
+        }
     }
     mt.set_to_come(largest(&state.errors));
     Ok(())
@@ -367,14 +381,14 @@ fn read_update(source: &mut Source<'_>, mt: &mut VertexMt, state: &mut State) ->
         return Err(source.corrupt("a vertex is inserted next to one with too many tetrahedra"));
     }
     let position = read_position(source, mt.info(), state, near)?;
-    let cone = state.cone(near, position);
+    state.find_cone(near, position);
     let seed = match source.symbol(SEED, 0)? {
         ELSEWHERE => {
             state.sort_star();
             let at = read_one_of(source, state.star.len() as u32)?;
             state.star.get(at as usize).copied()
         }
-        at => cone.get(at as usize).copied(),
+        at => state.cone.get(at as usize).copied(),
     };
     let nothing = "an update removes a tetrahedron that is not there";
     let seed = seed.ok_or_else(|| source.corrupt(nothing))?;
@@ -394,10 +408,10 @@ fn read_update(source: &mut Source<'_>, mt: &mut VertexMt, state: &mut State) ->
             context = 2 * own;
         }
     }
-    let State { mesh, glue, removed, given_up, errors, quarterings, .. } = state;
+    let State { mesh, removed, given_up, errors, quarterings, .. } = state;
     let levels = &levels;
     let insertion = Insertion { position, levels, removed, given_up, errors, quarterings, own_fall };
-    let update = mt.insert_into(mesh, glue, &insertion)?;
+    let update = mt.insert_into(mesh, &insertion)?;
     state.settle(update.0);
     Ok(())
 }
@@ -416,7 +430,7 @@ fn read_position(
 ) -> Result<[i32; 3], FormatError> {
     let mut position = state.mesh.positions()[near as usize];
     for (axis, x) in position.iter_mut().enumerate() {
-        let (size, context, from) = usual(state, near, axis);
+        let (size, context, from) = usual(state, axis);
         let symbol = source.symbol(OFFSET, context)?;
         let mut residual = 0;
         if symbol > 0 {
@@ -463,10 +477,10 @@ fn read_levels(
 }
 
 /// How a point and a tetrahedron lie to each other.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 struct View {
-    /// Whether the point is on the inner side of each face.
-    seen: [bool; 4],
+    /// Bit `k` tells that the point is on the inner side of face `k`.
+    seen: u8,
     /// Where the point is with respect to the sphere: 1 inside, -1 outside, 0 on it.
     sphere: i32,
 }
@@ -478,6 +492,22 @@ struct Home {
     weights: [f64; 4],
     /// Whether the vertex lies outside.
     outside: bool,
+}
+
+/// One bit for each.
+#[inline]
+fn signs(all: [bool; 4]) -> u8 {
+    (0..).zip(all).fold(0, |bits, (k, is_set)| bits | u8::from(is_set) << k)
+}
+
+/// The corners of a tetrahedron in the order of their vertices.
+#[inline]
+fn by_vertex(tet: [u32; 4]) -> [usize; 4] {
+    let mut keys = [0, 1, 2, 3].map(|k| u64::from(tet[k]) << 2 | k as u64);
+    for [i, j] in [[0, 1], [2, 3], [0, 2], [1, 3], [1, 2]] {
+        (keys[i], keys[j]) = (keys[i].min(keys[j]), keys[i].max(keys[j]));
+    }
+    keys.map(|key| (key & 3) as usize)
 }
 
 impl State {
@@ -495,10 +525,14 @@ impl State {
             grain,
             errors: vec![ErrorCode::MAX; mt.info().fields.len()],
             narrow: mt.info().lattice.bits <= NARROW_BITS,
-            glue: Box::default(),
             star: Vec::new(),
+            corners: Vec::new(),
             link: Vec::new(),
+            turned: Vec::new(),
             removed: Vec::new(),
+            views: Vec::new(),
+            on_boundary: false,
+            cone: Vec::new(),
             given_up: Vec::new(),
             quarterings: Vec::new(),
             tet_marks: Vec::new(),
@@ -508,13 +542,13 @@ impl State {
     }
 
     fn next_epoch(&mut self) {
-        if self.epoch > u32::MAX - 6 {
+        if self.epoch > u32::MAX - 8 {
             self.tet_marks.fill(0);
             self.vertex_marks.fill(0);
             self.epoch = 0;
         }
-        // Three marks are in use.
-        self.epoch += 3;
+        // Four marks are in use.
+        self.epoch += 4;
         self.tet_marks.resize(self.mesh.tet_slots(), 0);
         self.vertex_marks.resize(self.mesh.positions().len(), 0);
     }
@@ -524,25 +558,31 @@ impl State {
     fn gather(&mut self, near: u32) -> bool {
         self.next_epoch();
         self.star.clear();
+        self.corners.clear();
         self.link.clear();
         let Some(&first) = self.mesh.incident.get(near as usize).filter(|&&t| t != NONE) else {
             return false;
         };
-        self.vertex_marks[near as usize] = self.epoch;
+        let [x, y, z] = self.mesh.positions()[near as usize];
+        let mark = u64::from(self.epoch) << 32;
         self.tet_marks[first as usize] = self.epoch;
         self.star.push(first);
         let mut next = 0;
         while let Some(&t) = self.star.get(next) {
             next += 1;
-            let tet = self.mesh.tets()[t as usize];
-            for (v, n) in tet.into_iter().zip(self.mesh.neighbors()[t as usize]) {
-                if std::mem::replace(&mut self.vertex_marks[v as usize], self.epoch) != self.epoch {
-                    self.link.push(v);
+            let (tet, around) = (self.mesh.tets()[t as usize], self.mesh.neighbors()[t as usize]);
+            let face = FACES[corner_of(&tet, near)];
+            self.corners.push(face.map(|k| {
+                let own = &mut self.vertex_marks[tet[k] as usize];
+                if *own < mark {
+                    *own = mark | self.link.len() as u64;
+                    let position = self.mesh.positions()[tet[k] as usize];
+                    self.link.push([position[0] - x, position[1] - y, position[2] - z].map(i64::from));
                 }
-                if v != near
-                    && n != NONE
-                    && std::mem::replace(&mut self.tet_marks[n as usize], self.epoch) != self.epoch
-                {
+                *own as u32
+            }));
+            for n in face.map(|k| around[k]) {
+                if n != NONE && std::mem::replace(&mut self.tet_marks[n as usize], self.epoch) != self.epoch {
                     self.star.push(n);
                 }
             }
@@ -574,30 +614,30 @@ impl State {
         })
     }
 
-    /// Six times the volume between a point and face `k` of a tetrahedron, rounded; its sign, positive on the side of the tetrahedron,
-    /// is exact.
-    fn inward(&self, tet: [u32; 4], k: usize, position: [i32; 3]) -> f64 {
-        let [a, b, c] = FACES[k].map(|i| self.mesh.positions()[tet[i] as usize]);
-        if !self.narrow {
-            return -orient3d(a, b, c, position) as f64;
+    /// Six times the volume between a point and each face of a tetrahedron, rounded; the signs, positive on the inner sides, are
+    /// exact.
+    fn inward(&self, tet: [u32; 4], position: [i32; 3]) -> [f64; 4] {
+        if self.narrow {
+            return views_of_origin(self.seen_from(tet, position)).0.map(|volume| volume as f64);
         }
-        // Components up to 2^20 make minors up to 2^41 and a sum of three products up to 3 · 2^61 < 2^63.
-        let [u, v, w] = [a, b, c].map(|p| [0, 1, 2].map(|i| i64::from(p[i] - position[i])));
-        let volume = (u[1] * v[2] - u[2] * v[1]) * w[0]
-            + (u[2] * v[0] - u[0] * v[2]) * w[1]
-            + (u[0] * v[1] - u[1] * v[0]) * w[2];
-        volume as f64
+        FACES.map(|face| {
+            let [a, b, c] = face.map(|i| self.mesh.positions()[tet[i] as usize]);
+            -orient3d(a, b, c, position) as f64
+        })
     }
 
-    /// Whether the point lies on the inner side of face `k` of a tetrahedron, not in its plane.
-    fn sees(&self, tet: [u32; 4], k: usize, position: [i32; 3]) -> bool {
-        self.inward(tet, k, position) > 0.0
+    /// The corners of a tetrahedron as seen from a point.
+    #[inline]
+    fn seen_from(&self, tet: [u32; 4], position: [i32; 3]) -> [[i64; 3]; 4] {
+        tet.map(|v| {
+            let [x, y, z] = self.mesh.positions()[v as usize];
+            [x - position[0], y - position[1], z - position[2]].map(i64::from)
+        })
     }
 
     /// 1 if the point lies in a tetrahedron, its boundary included; else 0.
     fn holds(&self, t: u32, position: [i32; 3]) -> u32 {
-        let tet = self.mesh.tets()[t as usize];
-        u32::from((0..4).all(|k| self.inward(tet, k, position) >= 0.0))
+        u32::from(self.inward(self.mesh.tets()[t as usize], position).iter().all(|&volume| volume >= 0.0))
     }
 
     fn sorted(&self, t: u32) -> [u32; 4] {
@@ -606,15 +646,46 @@ impl State {
         tet
     }
 
-    /// The tetrahedra around the near vertex that `position` is in the direction of, by their sorted vertices.
-    fn cone(&self, near: u32, position: [i32; 3]) -> Vec<u32> {
-        let is_towards = |&t: &u32| {
-            let tet = self.mesh.tets()[t as usize];
-            (0..4).filter(|&k| tet[k] != near).all(|k| self.inward(tet, k, position) >= 0.0)
-        };
-        let mut cone: Vec<u32> = self.star.iter().copied().filter(is_towards).collect();
+    /// Finds the tetrahedra around the near vertex that `position` is in the direction of, by their sorted vertices.
+    fn find_cone(&mut self, near: u32, position: [i32; 3]) {
+        let mut cone = std::mem::take(&mut self.cone);
+        cone.clear();
+        if self.narrow {
+            self.turn_link(near, position);
+            let ahead = self.star.iter().zip(&self.corners).filter(|(_, corners)| self.is_ahead(**corners));
+            cone.extend(ahead.map(|(&t, _)| t));
+        } else {
+            cone.extend(self.star.iter().copied().filter(|&t| {
+                let tet = self.mesh.tets()[t as usize];
+                let inward = self.inward(tet, position);
+                (0..4).all(|k| inward[k] >= 0.0 || tet[k] == near)
+            }));
+        }
         cone.sort_unstable_by_key(|&t| self.sorted(t));
-        cone
+        self.cone = cone;
+    }
+
+    /// Finds the cross product of each vertex of the link with the new one.
+    fn turn_link(&mut self, near: u32, position: [i32; 3]) {
+        let origin = self.mesh.positions()[near as usize];
+        let v = [0, 1, 2].map(|k| i64::from(position[k] - origin[k]));
+        self.turned.clear();
+        self.turned.extend(
+            self.link
+                .iter()
+                .map(|u| [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]),
+        );
+    }
+
+    /// Whether the new vertex is in the direction of a tetrahedron of the star.
+    #[inline]
+    fn is_ahead(&self, [a, b, c]: [u32; 3]) -> bool {
+        // Components up to 2^20 make cross products up to 2^41, and a sum of three products up to 3 · 2^61 < 2^63.
+        let is_inside = |i: u32, j: u32| {
+            let (u, v) = (self.link[i as usize], self.turned[j as usize]);
+            u[0] * v[0] + u[1] * v[1] + u[2] * v[2] >= 0
+        };
+        is_inside(a, b) && is_inside(b, c) && is_inside(c, a)
     }
 
     fn sort_star(&mut self) {
@@ -633,67 +704,77 @@ impl State {
         position: [i32; 3],
         decide: &mut dyn FnMut(u32, u32) -> Result<bool, E>,
     ) -> Result<(), E> {
-        let [yes, no] = [self.epoch + 1, self.epoch + 2];
+        let [yes, no, never] = [1, 2, 3].map(|more| self.epoch + more);
         self.removed.clear();
         self.removed.push(seed);
         self.tet_marks[seed as usize] = yes;
-        let mut views = Vec::with_capacity(32);
-        views.push(self.view(seed, position));
+        self.on_boundary = false;
+        self.views.clear();
+        self.views.push(self.view(seed, position));
         let mut next = 0;
         while let Some(&t) = self.removed.get(next).filter(|_| self.removed.len() <= MAX_REMOVED) {
-            let view = views[next];
+            let view = self.views[next];
             next += 1;
-            let tet = self.mesh.tets()[t as usize];
-            let mut order = [0, 1, 2, 3];
-            order.sort_unstable_by_key(|&k| tet[k]);
-            for k in order {
-                let n = self.mesh.neighbors()[t as usize][k];
+            let around = self.mesh.neighbors()[t as usize];
+            for k in by_vertex(self.mesh.tets()[t as usize]) {
+                let n = around[k];
+                self.on_boundary |= n == NONE;
                 let mark = self.tet_marks.get(n as usize).copied().unwrap_or(no);
-                if mark == yes || mark == no || !self.may_have(n, fan, position) {
+                if (yes..=never).contains(&mark) {
                     continue;
                 }
-                let beyond = self.view(n, position);
+                let Some(beyond) = self.view_if(n, fan, position) else {
+                    self.tet_marks[n as usize] = never;
+                    continue;
+                };
                 let context = 2 * self.grow_context(n, beyond) + u32::from(view.sphere > 0);
-                let is_removed = !view.seen[k] || decide(n, context)?;
+                let is_removed = view.seen >> k & 1 == 0 || decide(n, context)?;
                 self.tet_marks[n as usize] = if is_removed { yes } else { no };
                 if is_removed {
                     self.removed.push(n);
-                    views.push(beyond);
+                    self.views.push(beyond);
                 }
             }
         }
         Ok(())
     }
 
-    /// Whether a tetrahedron has the vertex that all have, if there is one; the face opposite it must be seen then, unless it
-    /// is on the boundary.
-    fn may_have(&self, t: u32, fan: Option<u32>, position: [i32; 3]) -> bool {
-        let Some(fan) = fan else { return true };
-        let tet = self.mesh.tets()[t as usize];
-        let Some(k) = tet.iter().position(|&v| v == fan) else { return false };
-        self.mesh.neighbors()[t as usize][k] == NONE || self.sees(tet, k, position)
+    /// The view of a tetrahedron that may be removed: it has the vertex that all have, if there is one; the face opposite it must be
+    /// seen then, unless it is on the boundary.
+    #[inline]
+    fn view_if(&self, t: u32, fan: Option<u32>, position: [i32; 3]) -> Option<View> {
+        let Some(fan) = fan else { return Some(self.view(t, position)) };
+        let corner = self.mesh.tets()[t as usize].iter().position(|&v| v == fan)?;
+        let view = self.view(t, position);
+        let is_open = self.mesh.neighbors()[t as usize][corner] == NONE || view.seen >> corner & 1 == 1;
+        is_open.then_some(view)
     }
 
+    #[inline]
     fn view(&self, t: u32, position: [i32; 3]) -> View {
         let tet = self.mesh.tets()[t as usize];
-        let [a, b, c, d] = tet.map(|v| self.mesh.positions()[v as usize]);
-        View {
-            seen: [0, 1, 2, 3].map(|k| self.sees(tet, k, position)),
-            sphere: insphere(a, b, c, d, position),
+        if self.narrow {
+            let (inward, sphere) = views_of_origin(self.seen_from(tet, position));
+            return View { seen: signs(inward.map(|volume| volume > 0)), sphere };
         }
+        let [a, b, c, d] = tet.map(|v| self.mesh.positions()[v as usize]);
+        let seen = signs(self.inward(tet, position).map(|volume| volume > 0.0));
+        View { seen, sphere: insphere(a, b, c, d, position) }
     }
 
     /// Half the context of whether a tetrahedron is removed: 0 to 53.
+    #[inline]
     fn grow_context(&self, t: u32, view: View) -> u32 {
-        let [yes, no] = [self.epoch + 1, self.epoch + 2];
-        let around = self.mesh.neighbors()[t as usize];
-        let marked = |mark: u32| {
-            around.iter().filter(|&&n| self.tet_marks.get(n as usize) == Some(&mark)).count() as u32
-        };
-        let hidden = view.seen.iter().filter(|seen| !**seen).count() as u32;
-        let known = marked(yes).clamp(1, 3) - 1;
+        let (mut removed, mut kept) = (0, 0);
+        for n in self.mesh.neighbors()[t as usize] {
+            let mark = self.tet_marks.get(n as usize).copied().unwrap_or(0);
+            removed += u32::from(mark == self.epoch + 1);
+            kept |= u32::from(mark == self.epoch + 2);
+        }
+        let hidden = 4 - view.seen.count_ones();
+        let known = removed.clamp(1, 3) - 1;
         let shape = (view.sphere + 1) as u32 * 3 + known;
-        (shape * 3 + hidden.clamp(1, 3) - 1) * 2 + marked(no).min(1)
+        (shape * 3 + hidden.clamp(1, 3) - 1) * 2 + kept
     }
 
     /// Finds the faces on the boundary that are given up: those that the new vertex does not see, and such as `decide` says, given
@@ -704,6 +785,9 @@ impl State {
         decide: &mut dyn FnMut(usize) -> Result<bool, E>,
     ) -> Result<(), E> {
         self.given_up.clear();
+        if !self.on_boundary {
+            return Ok(());
+        }
         let mut bare: Vec<([u32; 3], [u32; 2])> = Vec::new();
         for &t in &self.removed {
             let tet = self.mesh.tets()[t as usize];
@@ -717,8 +801,7 @@ impl State {
         }
         bare.sort_unstable();
         for (place, (_, [t, k])) in bare.into_iter().enumerate() {
-            let tet = self.mesh.tets()[t as usize];
-            if !self.sees(tet, k as usize, position) || decide(place)? {
+            if self.view(t, position).seen >> k & 1 == 0 || decide(place)? {
                 self.given_up.push([t, k]);
             }
         }
@@ -731,7 +814,7 @@ impl State {
         let mut most = f64::NEG_INFINITY;
         for &t in &self.removed {
             let tet = self.mesh.tets()[t as usize];
-            let weights = [0, 1, 2, 3].map(|k| self.inward(tet, k, position));
+            let weights = self.inward(tet, position);
             let whole: f64 = weights.iter().sum();
             let weights = weights.map(|weight| weight / whole);
             let least = weights.iter().fold(f64::INFINITY, |least, &weight| least.min(weight));
@@ -938,6 +1021,53 @@ pub(super) mod tests {
             assert_eq!(other.hash(), mt.start()?.hash());
         }
         assert!(mt == whole);
+        Ok(())
+    }
+
+    /// What removes each tetrahedron of a mesh, as far as is known.
+    fn removers(mt: &VertexMt, mesh: &CurrentMesh) -> Vec<([u32; 4], Option<u32>)> {
+        let tets = (0..mesh.tet_slots() as u32).filter_map(|t| Some((t, mesh.tet(t)?)));
+        let mut removers: Vec<_> = tets
+            .map(|(t, tet)| {
+                let mut labels = tet.map(|slot| mesh.vertex(slot).0);
+                labels.sort_unstable();
+                (labels, mt.remover(mesh, t).map(|u| u.0))
+            })
+            .collect();
+        removers.sort_unstable();
+        removers
+    }
+
+    #[test]
+    fn updates_that_come_one_by_one_are_revealed_wherever_they_lie() -> Result<(), FormatError> {
+        let whole = delaunay(240);
+        let Coded { models, head, blocks } = coded(&whole, 1)?;
+        let known = read_head(&mut Source::new(Reader::new(&head, 0), &models)?)?;
+        let (mut mt, mut state) = start(whole.info().clone(), whole.base().clone(), known, false)?;
+        let mut mesh = mt.start()?;
+        let mut applied = Vec::new();
+        for (u, block) in (0..).zip(&blocks) {
+            let mut source = Source::new(Reader::new(block, 0), &models)?;
+            read(&mut source, &mut mt, 1, &mut state, &Limits::default())?;
+            mesh.clear_touched();
+            mt.announce(&mut mesh, u);
+            let is_news = |&t: &u32| mt.remover(&mesh, t) == Some(UpdateId(u));
+            let news = (0..mesh.tet_slots() as u32).filter(|t| mesh.tet(*t).is_some()).filter(is_news);
+            assert!(news.into_iter().all(|t| mesh.touched().contains(&t)));
+            if u % 8 == 7 {
+                // A mesh that knew of all from the start.
+                let mut other = mt.start()?;
+                for &u in &applied {
+                    assert_eq!(mt.refine(&mut other, u)?, Applied::Done);
+                }
+                assert_eq!(removers(&mt, &mesh), removers(&mt, &other));
+            }
+            // Some are left out later on, and all that depends on them.
+            if (u < 150 || u % 9 > 0) && mt.refine(&mut mesh, UpdateId(u))? == Applied::Done {
+                applied.push(UpdateId(u));
+            }
+        }
+        assert!((151..230).contains(&applied.len()));
         Ok(())
     }
 
