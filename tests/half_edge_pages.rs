@@ -7,6 +7,9 @@ mod build_support;
 mod conformance_support;
 mod support;
 
+use build_support::blocks;
+use build_support::hilly;
+use conformance_support::Input;
 use conformance_support::PAGED;
 use conformance_support::Subject;
 use conformance_support::inputs;
@@ -27,8 +30,10 @@ use tetralod::refine::Criterion;
 use tetralod::refine::Front;
 use tetralod::refine::LodCriterion;
 use tetralod::refine::Need;
+use tetralod::refine::Part;
 use tetralod::refine::Request;
 use tetralod::refine::TetLook;
+use tetralod::refine::Values;
 
 struct Paged {
     subject: Subject,
@@ -262,4 +267,55 @@ fn what_cannot_come_or_go_changes_nothing() {
     assert!(matches!(refused, Err(tetralod::mt::UpdateError::Missing { update: 0 })), "{refused:?}");
     paged.mt.remove_page(1).expect("it is here");
     assert_eq!(paged.mt, empty);
+}
+
+/// Steps fill the holes of the mesh, also while updates are waiting that were asked for before.
+#[test]
+fn small_steps_end_where_a_large_one_does() {
+    let mut random = Random(19);
+    // Holes in it keep the base mesh large.
+    let porous = |c: [u32; 3]| c.iter().any(|x| x % 2 == 0);
+    let mesh = blocks([9, 9, 5], &[hilly], porous);
+    let large = Input { name: "a porous block", mesh, position_bits: None, flat: true, convex: false };
+    for input in inputs().into_iter().chain([large]) {
+        let subject = Subject::new(PAGED, input).expect("decimation takes every mesh");
+        let mt = &subject.mt;
+        let mut front = Front::new(mt).expect("a valid base mesh");
+        for _ in 0..60 {
+            let mut request = request(&subject, &mut random);
+            if let (Part::Region(region), 0) = (&request.needs[0].part, random.below(4)) {
+                // A region and values together are answered from the base mesh.
+                let field = random.below(mt.info().fields.len());
+                let info = &mt.info().fields[field];
+                let value = info.min + random.below(1000) as f64 / 1000.0 * info.range();
+                let values = Values { field, ranges: vec![[value, info.max]] };
+                request.needs[0].part = Part::Both(region.clone(), values);
+            }
+            let criterion = Arc::new(LodCriterion::new(mt.info(), &request));
+            let tets = mt.info().tetrahedra;
+            // Room for all, for all but little, or for a part.
+            let budget = match random.below(6) {
+                0 => Budget::default(),
+                1..5 => Budget { tets: Some(2 * tets), ..Budget::default() },
+                _ => Budget { tets: Some(random.below(tets as usize) as u32), ..Budget::default() },
+            };
+            front.aim(mt, criterion.clone(), budget);
+            let most = 1 + random.below(12) as u64;
+            // Some are given up on the way.
+            let mut left = if random.below(3) == 0 { random.below(8) } else { usize::MAX };
+            while left > 0 {
+                let outcome = front.step(mt, &mut |done| done.refined + done.coarsened < most);
+                front.mesh().check().expect("a valid mesh");
+                if outcome.expect("a sound MT").done {
+                    break;
+                }
+                left -= 1;
+            }
+            if left > 0 {
+                let mut alone = Front::new(mt).expect("a valid base mesh");
+                alone.satisfy(mt, &*criterion, budget).expect("a sound MT");
+                assert_eq!(front.mesh().hash(), alone.mesh().hash(), "{request:?} {budget:?}");
+            }
+        }
+    }
 }

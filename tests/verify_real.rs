@@ -39,19 +39,24 @@ fn check(name: &str, mesh: &TetMesh, most: u32) {
     keeps_promises(&format!("{name}, edge"), &built.mt, mesh, Reference::Mesh);
     let base = built.summary.base_vertices;
     assert!(base <= most, "{name}: {base} vertices in the base mesh");
-    for (method, criterion) in [
-        (Method::Decimate, Criterion::HalfEdge),
-        (Method::Decimate, Criterion::Delaunay),
-        (Method::Insert, Criterion::Delaunay),
+    for (kind, method, criterion) in [
+        (MtKind::HalfEdge, Method::Decimate, Criterion::HalfEdge),
+        (MtKind::Vertex, Method::Decimate, Criterion::Delaunay),
+        (MtKind::Vertex, Method::Insert, Criterion::Delaunay),
     ] {
         // Insertion fills the convex hull; of these meshes, only the grids do.
         if method == Method::Insert && mesh.grid.is_none() {
             continue;
         }
-        let config = BuildConfig { kind: MtKind::Vertex, method, criterion, ..BuildConfig::of(MtKind::Edge) };
+        let config = BuildConfig { method, criterion, ..BuildConfig::of(kind) };
         let mt = build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt;
         let reference = if method.keeps_the_mesh() { Reference::Mesh } else { Reference::Points };
-        keeps_promises(&format!("{name}, {} {}", method.name(), criterion.name()), &mt, mesh, reference);
+        keeps_promises(
+            &format!("{name}, {} {} {}", kind.name(), method.name(), criterion.name()),
+            &mt,
+            mesh,
+            reference,
+        );
     }
 }
 
