@@ -504,8 +504,9 @@ impl Evaluator {
         let (mut cell, mut lambda, depth) =
             locate(self.cells.len(), hint, |i| self.cells[i].barycentric * relative);
         let mut displaced = 0.0;
-        let outside = depth < -SLACK && !self.border.is_empty();
-        if outside {
+        // The point stays outside of the mesh where no boundary is near, too: it was not in the star from the start.
+        let outside = depth < -SLACK;
+        if outside && !self.border.is_empty() {
             let (p, moved) = reference.place(point);
             let (found, q, distance) = self.nearest(p, usize::MAX, plan, data, reference);
             let step = DVec3::from_array(reference.quantized.lattice.step);

@@ -277,8 +277,9 @@ impl FillCost {
     ) -> (f64, usize) {
         let (mut cell, mut lambda, depth) = self.locate(point, hint, reference);
         let mut displaced = 0.0;
-        let outside = depth < -SLACK && !filling.border.is_empty();
-        if outside {
+        // The point stays outside of the mesh where no boundary is near, too: it was not in the star from the start.
+        let outside = depth < -SLACK;
+        if outside && !filling.border.is_empty() {
             let (p, moved) = reference.place(point);
             let (found, q, distance) = self.nearest(p, usize::MAX, filling, reference);
             cell = found as usize;

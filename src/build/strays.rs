@@ -90,6 +90,12 @@ impl Strays {
         }
     }
 
+    /// Whether a vertex is known to be outside of the tetrahedron in whose bucket it is.
+    #[cfg(test)]
+    pub fn is_outside(&self, point: u32) -> bool {
+        self.outside[point as usize]
+    }
+
     /// Makes a vertex that is outside of its own tetrahedron a guest of another one, unless it is one already.
     pub fn invite(&mut self, t: u32, point: u32) {
         if self.outside[point as usize] && !std::mem::replace(&mut self.visits[point as usize], true) {

@@ -12,6 +12,7 @@ use super::quantize;
 use crate::build::BuildConfig;
 use crate::build::BuildError;
 use crate::build::Purpose;
+use crate::build::beside::Home;
 use crate::build::cost::largest;
 use crate::build::gift_wrap::GiftWrap;
 use crate::build::reach::Reach;
@@ -539,4 +540,36 @@ fn the_removals_of_a_round_are_independent() {
             assert!(largest_round > 1 || boxes.len() < 10, "{name} {criterion:?}: rounds of one removal");
         }
     }
+}
+
+/// A vertex of the input that is not inside of the tetrahedron in whose bucket it is, is known to be outside, also where that has
+/// no face on the boundary: another tetrahedron may come to contain it.
+#[test]
+fn vertices_outside_of_their_tetrahedra_are_known() {
+    let mesh = blocks([8; 3], |_| true);
+    let mut quantized = quantize::quantize(&mesh, &BuildConfig::of(MtKind::Edge)).expect("a valid mesh");
+    // The corner of the cube is beside it, and in the bucket of a tetrahedron in its middle.
+    let middle = (0..).zip(&mesh.tets).find(|(_, tet)| tet.contains(&(4 * 81 + 4 * 9 + 4)));
+    let (tet, _) = middle.expect("the vertex in the middle has tetrahedra");
+    quantized.places[0] -= DVec3::splat(0.4);
+    quantized.homes = vec![Home { point: 0, tet, lambda: DVec3::ZERO, outside: true }];
+    let topology = topology(mesh.positions.len(), &mesh.tets).expect("a conforming mesh");
+    let work = WorkMesh::new(mesh.tets.clone(), topology.neighbors, mesh.positions.len());
+    let reference = Reference::new(&quantized, &work, 1.0, f64::INFINITY);
+    let state = State::new(work, reference, topology.non_manifold, Levels::of_purpose(Purpose::Uniform));
+    let mut decimator = Decimator::new(state, None);
+    let mut buckets_of_it = BTreeSet::new();
+    loop {
+        let before = decimator.sequence.steps.len();
+        decimator.round(&mut |_| ControlFlow::Continue(())).expect("not stopped");
+        let State { mesh: now, buckets, .. } = &decimator.state;
+        let own = (0..now.tets.len() as u32).find(|&t| buckets.inside.iter(t).any(|point| point == 0));
+        buckets_of_it.insert(own.expect("it is in a bucket"));
+        assert!(buckets.strays.is_outside(0), "after {before} removals");
+        let after = decimator.sequence.steps.len();
+        if !decimator.rounds.end(after - before, mesh.positions.len() - after) {
+            break;
+        }
+    }
+    assert!(buckets_of_it.len() > 2, "it has come from bucket to bucket");
 }
