@@ -25,6 +25,8 @@ export class MultiTessellation {
   #onProgress;
   #stop = new AbortController();
   #inWorker;
+  /** Why nothing can be called any more. */
+  #closed;
   /** Counts the meshes that were asked for: each one replaces those before it. */
   #goal = 0;
 
@@ -171,12 +173,15 @@ export class MultiTessellation {
   }
 
   #close(reason) {
+    this.#closed ??= reason;
     this.#stop.abort(reason);
     this.#core.close(reason);
   }
 
   /** A call that may wait for bytes: the end of the download ends the wait. */
   #wait(method, args = [], waits = true) {
+    // A signal may have ended the download before, which is not why this call fails.
+    if (this.#closed) return Promise.reject(this.#closed);
     const called = this.#core.call(method, args);
     return waits ? abortable(called, this.#stop.signal) : called;
   }
