@@ -6,6 +6,7 @@ mod cli_support;
 
 use cli_support::Folder;
 use cli_support::bad;
+use cli_support::bucky;
 use cli_support::command;
 use cli_support::good;
 use cli_support::json;
@@ -102,8 +103,7 @@ fn from_data_to_a_checked_mesh() {
 fn boxes_isovalues_and_budgets_select() {
     let folder = Folder::new("select");
     let [input, mt, out] = ["b.vti", "b.mt", "out.vtu"].map(|name| folder.path(name));
-    good(&["generate", "bucky", "--size", "13", "-o", &input]);
-    good(&["build", &input, "-o", &mt, "--quiet"]);
+    bucky(13, &input, &mt);
     let tets = |more: &[&str]| {
         let result = json(&[&["extract", &mt, "-o", &out, "--json", "--measure", &input], more].concat());
         assert!(number(&result, "measured_error") <= number(&result, "error_bound") + 1e-4, "{result}");
@@ -139,8 +139,7 @@ fn every_part_can_be_asked_for_in_two_ways() {
     let folder = Folder::new("parts");
     let [input, mt, out, view, colours] =
         ["b.vti", "b.mt", "out.vtu", "view.json", "colours.json"].map(|name| folder.path(name));
-    good(&["generate", "bucky", "--size", "11", "-o", &input]);
-    good(&["build", &input, "-o", &mt, "--quiet"]);
+    bucky(11, &input, &mt);
     fs::write(&view, camera([0.5, 0.5, -0.2], [800, 600], 20.0).to_string()).expect("a file");
     let points = serde_json::json!([[0.2, 0, 0, 0, 0], [0.6, 1, 0.5, 0, 0.8]]);
     let transfer =
@@ -194,8 +193,7 @@ fn every_part_can_be_asked_for_in_two_ways() {
 fn several_needs_are_all_met() {
     let folder = Folder::new("union");
     let [input, mt, out, view] = ["b.vti", "b.mt", "out.vtu", "view.json"].map(|name| folder.path(name));
-    good(&["generate", "bucky", "--size", "13", "-o", &input]);
-    good(&["build", &input, "-o", &mt, "--quiet"]);
+    bucky(13, &input, &mt);
     let extract = |more: &[&str]| {
         let result = json(&[&["extract", &mt, "-o", &out, "--json", "--measure", &input], more].concat());
         assert!(number(&result, "measured_error") <= number(&result, "error_bound") + 1e-4, "{result}");
@@ -224,8 +222,7 @@ fn budgets_and_steps_stop_with_a_valid_mesh() {
     let folder = Folder::new("budgets");
     let [input, mt, out, again, view] =
         ["b.vti", "b.mt", "out.vtu", "again.mt", "view.json"].map(|name| folder.path(name));
-    good(&["generate", "bucky", "--size", "13", "-o", &input]);
-    good(&["build", &input, "-o", &mt, "--quiet"]);
+    bucky(13, &input, &mt);
     let extract = |more: &[&str]| json(&[&["extract", &mt, "-o", &out, "--json"], more].concat());
     let mut bound = f64::INFINITY;
     for most in ["800", "1200", "1600"] {
@@ -263,8 +260,7 @@ fn nonsense_in_a_query_is_refused() {
     let folder = Folder::new("nonsense");
     let [input, mt, out, view, text] =
         ["b.vti", "b.mt", "out.vtu", "view.json", "text"].map(|name| folder.path(name));
-    good(&["generate", "bucky", "--size", "7", "-o", &input]);
-    good(&["build", &input, "-o", &mt, "--quiet"]);
+    bucky(7, &input, &mt);
     fs::write(&view, "{\"matrix\": [1, 2], \"viewport\": [1, 1]}").expect("a file");
     fs::write(&text, "{\"points\": [[0, 0, 0, 0, 2]]}").expect("a file");
     for (options, words) in [
@@ -506,8 +502,7 @@ fn failures_name_the_file_and_leave_nothing() {
     let folder = Folder::new("failures");
     let [input, mt, none, text, cut, damaged, out] =
         ["b.vti", "b.mt", "none", "text", "cut.mt", "damaged.mt", "out"].map(|name| folder.path(name));
-    good(&["generate", "bucky", "--size", "7", "-o", &input]);
-    good(&["build", &input, "-o", &mt, "--quiet"]);
+    bucky(7, &input, &mt);
     fs::write(&text, "<!DOCTYPE html>\n<title>404</title>").expect("a file");
     let mut bytes = fs::read(&mt).expect("it is there");
     fs::write(&cut, &bytes[..bytes.len() * 2 / 3]).expect("a file");
@@ -574,8 +569,7 @@ fn a_broken_promise_is_told_by_the_exit_code() {
 fn inputs_are_never_replaced() {
     let folder = Folder::new("replaced");
     let [input, mt, table] = ["in.vti", "m.mt", "points.csv"].map(|name| folder.path(name));
-    good(&["generate", "bucky", "--size", "7", "-o", &input]);
-    good(&["build", &input, "-o", &mt, "--quiet"]);
+    bucky(7, &input, &mt);
     fs::write(&table, "0.5,0.5,0.5\n").expect("a file");
     fs::create_dir(folder.path("sub")).expect("a folder");
     let roundabout = folder.path("sub/../m.mt");
@@ -607,8 +601,7 @@ fn inputs_are_never_replaced() {
 fn outputs_have_names_and_places() {
     let folder = Folder::new("places");
     let [input, mt, none, other] = ["in.vti", "m.mt", "none/m.mt", "sub"].map(|name| folder.path(name));
-    good(&["generate", "bucky", "--size", "7", "-o", &input]);
-    good(&["build", &input, "-o", &mt, "--quiet"]);
+    bucky(7, &input, &mt);
     fs::create_dir(&other).expect("a folder");
     let [vtu, stl] = ["m.vtu", "m.stl"].map(|name| folder.path(name));
     for (arguments, words) in [
@@ -630,20 +623,16 @@ fn outputs_have_names_and_places() {
 fn mistakes_are_told_once_and_by_their_name() {
     let folder = Folder::new("mistakes");
     let [input, mt, empty, out] = ["in.vti", "m.mt", "empty.mt", "out.vtu"].map(|name| folder.path(name));
-    good(&["generate", "bucky", "--size", "7", "-o", &input]);
-    good(&["build", &input, "-o", &mt, "--quiet"]);
+    bucky(7, &input, &mt);
     fs::write(&empty, "").expect("a file");
-    for (arguments, words) in [
-        (&["extract", &empty, "-o", &out][..], &["is empty"][..]),
-        (&["info", &empty], &["is empty"]),
-        (&["info", "ftp://host/a.mt"], &["ftp", "http"]),
-        (&["build", "https://host/a.vtu", "-o", &mt], &["https", "fetch"]),
-    ] {
-        bad(1, arguments, words);
+    for arguments in [&["extract", &empty, "-o", &out][..], &["info", &empty]] {
+        bad(1, arguments, &[]);
         let error = text(&run(arguments).stderr).to_owned();
-        assert!(words.iter().all(|word| error.matches(word).count() <= 2), "said twice: {error}");
+        assert_eq!(error.matches("is empty").count(), 1, "{error}");
         assert!(!error.contains("can be used"), "nothing has arrived: {error}");
     }
+    bad(1, &["info", "ftp://host/a.mt"], &["ftp", "http"]);
+    bad(1, &["build", "https://host/a.vtu", "-o", &mt], &["https", "fetch"]);
     for (arguments, words) in [
         (&["extract", &mt, "-o", &out, "--need", ""][..], &["says nothing"][..]),
         (&["extract", &mt, "-o", &out, "--need", " ; "], &["says nothing"]),
@@ -663,8 +652,7 @@ fn mistakes_are_told_once_and_by_their_name() {
 fn requests_that_meet_nothing_get_a_warning() {
     let folder = Folder::new("nothing");
     let [input, mt, out] = ["in.vti", "m.mt", "out.vtu"].map(|name| folder.path(name));
-    good(&["generate", "bucky", "--size", "9", "-o", &input]);
-    good(&["build", &input, "-o", &mt, "--quiet"]);
+    bucky(9, &input, &mt);
     let warnings = |more: &[&str]| {
         let output = run(&[&["extract", &mt, "-o", &out], more].concat());
         assert!(output.status.success(), "{}", text(&output.stderr));

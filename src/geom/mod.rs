@@ -12,8 +12,8 @@ mod weights;
 pub use bounds::Bounds;
 pub use camera::{Camera, Ray};
 pub use lattice::Lattice;
-pub(crate) use predicates::views_of_origin;
 pub use predicates::{NARROW_BITS, WIDE_BITS, in_conflict, insphere, orient3d};
+pub(crate) use predicates::{det_i64, views_of_origin};
 pub use tet_box::{LatticeBox, tet_meets_box};
 pub use triangle::nearest_on_triangle;
 #[cfg(feature = "build")]

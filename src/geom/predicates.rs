@@ -20,16 +20,13 @@ pub const WIDE_BITS: u32 = 30;
 pub fn orient3d(a: [i32; 3], b: [i32; 3], c: [i32; 3], d: [i32; 3]) -> i128 {
     let [u, v, w] = [b, c, d].map(|p| [0, 1, 2].map(|i| i64::from(p[i]) - i64::from(a[i])));
     let largest = [u, v, w].iter().flatten().fold(0, |m, x| m | x.unsigned_abs());
-    if largest <= 1 << NARROW_BITS {
-        // Components up to 2^20 make minors up to 2^41 and a sum of three products up to 3 · 2^61 < 2^63.
-        i128::from(det_i64(u, v, w))
-    } else {
-        det_i128(u, v, w)
-    }
+    if largest <= 1 << NARROW_BITS { i128::from(det_i64(u, v, w)) } else { det_i128(u, v, w) }
 }
 
+/// The determinant of three vectors: their components must be at most 2^[`NARROW_BITS`], which makes minors up to 2^41 and
+/// a sum of three products up to 3 · 2^61 < 2^63.
 #[inline]
-fn det_i64(u: [i64; 3], v: [i64; 3], w: [i64; 3]) -> i64 {
+pub(crate) fn det_i64(u: [i64; 3], v: [i64; 3], w: [i64; 3]) -> i64 {
     (u[1] * v[2] - u[2] * v[1]) * w[0]
         + (u[2] * v[0] - u[0] * v[2]) * w[1]
         + (u[0] * v[1] - u[1] * v[0]) * w[2]

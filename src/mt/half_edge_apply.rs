@@ -23,6 +23,7 @@ use super::half_edge::HalfEdgeMt;
 use super::half_edge_star::StarCode;
 use super::half_edge_star::spread;
 use crate::geom::NARROW_BITS;
+use crate::geom::det_i64;
 use crate::geom::orient3d;
 use crate::mesh::FACES;
 use crate::mesh::NONE;
@@ -577,10 +578,7 @@ impl Scratch {
         self.star[..self.star_len].iter().all(|new| {
             let [i, j, k] = FACES[new.own as usize & 3].map(|corner| new.corners[corner] as usize % MOST);
             if narrow {
-                let [u, v, w] = [from[i], from[j], from[k]];
-                // Components up to 2^20 make minors up to 2^41 and a sum of three products up to 3 · 2^61 < 2^63.
-                let first = (u[1] * v[2] - u[2] * v[1]) * w[0];
-                return first + (u[2] * v[0] - u[0] * v[2]) * w[1] + (u[0] * v[1] - u[1] * v[0]) * w[2] > 0;
+                return det_i64(from[i], from[j], from[k]) > 0;
             }
             let at = |x: usize| mesh.positions[self.link[x] as usize];
             orient3d(position, at(i), at(j), at(k)) > 0

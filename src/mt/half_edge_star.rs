@@ -23,6 +23,7 @@ use super::half_edge_apply::MOST;
 use super::half_edge_apply::NO_ENTRY;
 use super::half_edge_apply::NewTet;
 use super::half_edge_apply::Scratch;
+use super::ring::TURN;
 use crate::geom::orient3d;
 use crate::mesh::NONE;
 
@@ -589,7 +590,8 @@ impl View {
     #[inline]
     fn elevation(&self, face: usize) -> Option<f64> {
         let point = self.point?;
-        let [i, j] = OTHERS[self.near & 3][face & 3];
+        // In this order the normal of the face points into the tetrahedron.
+        let [_, _, i, j] = TURN[(4 * self.near + face) % 16].map(|corner| corner as usize & 3);
         let (a, b) = (self.apart[i], self.apart[j]);
         let normal = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
         let height = dot(normal, self.to);
@@ -604,15 +606,6 @@ impl View {
         is_over.then(|| height.abs() / lengths.max(1e-300))
     }
 }
-
-/// For a near corner and a face, the two other corners, in the order in which the normal of the face points into the
-/// tetrahedron.
-const OTHERS: [[[usize; 2]; 4]; 4] = [
-    [[0, 0], [2, 3], [3, 1], [1, 2]],
-    [[3, 2], [0, 0], [0, 3], [2, 0]],
-    [[1, 3], [3, 0], [0, 0], [0, 1]],
-    [[2, 1], [0, 2], [1, 0], [0, 0]],
-];
 
 /// What removes the stars of updates that have been applied, so that it need not be predicted again.
 #[derive(Clone, Debug)]

@@ -43,6 +43,7 @@ use super::vertex_from::write_given_up;
 use super::vertex_from::write_removed;
 use super::vertex_grow::Insertion;
 use crate::geom::NARROW_BITS;
+use crate::geom::det_i64;
 use crate::geom::orient3d;
 use crate::mesh::FACES;
 use crate::mesh::NONE;
@@ -366,10 +367,7 @@ impl Cavity {
         }
         self.walls[..self.walls_len].iter().all(|wall| {
             let [u, v, w] = wall.corners.map(|x| relative[x as usize % MAX_AROUND]);
-            (u[1] * v[2] - u[2] * v[1]) * w[0]
-                + (u[2] * v[0] - u[0] * v[2]) * w[1]
-                + (u[0] * v[1] - u[1] * v[0]) * w[2]
-                > 0
+            det_i64(u, v, w) > 0
         })
     }
 }

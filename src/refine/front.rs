@@ -281,6 +281,11 @@ impl Front {
         self.applied.get(u.0 as usize / 64).is_some_and(|w| w >> (u.0 % 64) & 1 == 1)
     }
 
+    /// Whether tetrahedron `t` is (still) in the mesh and update `u` removes it.
+    pub(super) fn is_removed_by(&self, mt: &impl MultiTessellation, t: u32, u: UpdateId) -> bool {
+        self.mesh.tet(t).is_some() && mt.remover(&self.mesh, t) == Some(u)
+    }
+
     /// Heap bytes of the queues that say what has to be judged again, and of the set of applied updates: entries that are there,
     /// not what is reserved for more. The mesh itself has [`CurrentMesh::bytes`].
     pub fn queue_bytes(&self) -> u64 {
@@ -649,8 +654,7 @@ impl Front {
                     continue;
                 }
                 // Between two steps holes are filled, and what was asked by then has moved.
-                let is_there = self.mesh.tet(asked.tet).is_some();
-                if is_there && mt.remover(&self.mesh, asked.tet) == Some(asked.update) {
+                if self.is_removed_by(mt, asked.tet, asked.update) {
                     mt.start_at(&mut self.mesh, asked.tet);
                 }
                 match self.force(mt, asked.update, outcome)? {

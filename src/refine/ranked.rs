@@ -130,7 +130,7 @@ impl Front {
         }
         while let Some((rank, t)) = self.ranked.refinable.pop() {
             let (_, Reverse(u)) = rank;
-            if self.contains(u) || self.mesh.tet(t).is_none() || mt.remover(&self.mesh, t) != Some(u) {
+            if self.contains(u) || !self.is_removed_by(mt, t, u) {
                 continue;
             }
             if mt.has_tet_errors() {

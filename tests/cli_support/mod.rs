@@ -60,6 +60,12 @@ pub fn good(arguments: &[&str]) -> String {
     text(&output.stdout).to_owned()
 }
 
+/// Writes the data set `bucky` with `size` points along an edge, and its MT.
+pub fn bucky(size: u32, input: &str, mt: &str) {
+    good(&["generate", "bucky", "--size", &size.to_string(), "-o", input]);
+    good(&["build", input, "-o", mt, "--quiet"]);
+}
+
 /// Runs what must succeed with one JSON object on stdout.
 pub fn json(arguments: &[&str]) -> Value {
     let value: Value = serde_json::from_str(&good(arguments)).expect("one JSON value on stdout");

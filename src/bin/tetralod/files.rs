@@ -94,6 +94,11 @@ pub fn check_output<'a>(path: &Path, inputs: impl IntoIterator<Item = &'a PathBu
     Ok(())
 }
 
+/// The ending of a file's name in lower case, without the dot.
+pub fn ending(path: &Path) -> String {
+    path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
+}
+
 /// What output files are called, and which command writes them.
 const ENDINGS: [(&[&str], &str); 4] = [
     (&["mt"], "`tetralod build` writes .mt"),
@@ -107,7 +112,7 @@ const ENDINGS: [(&[&str], &str); 4] = [
 
 /// Refuses a name that says of what format the file is, if that is another one than `format`.
 pub fn check_ending(path: &Path, format: &str) -> Result<()> {
-    let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let ending = ending(path);
     let other = ENDINGS.iter().find(|(endings, _)| endings.contains(&ending.as_str()) && ending != format);
     match other {
         Some((_, who)) => bail!("{}: this command writes .{format}; {who}", path.display()),

@@ -24,7 +24,7 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments) -> Result<()> {
     let path = &arguments.output;
-    let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let ending = files::ending(path);
     if !["vtu", "vti"].contains(&ending.as_str()) {
         bail!("{}: the name must end in .vtu or .vti", path.display());
     }

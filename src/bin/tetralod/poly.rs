@@ -36,7 +36,7 @@ impl FromStr for Target {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let path = PathBuf::from(text);
-        let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+        let ending = files::ending(&path);
         let format = match ending.as_str() {
             "vtp" => Format::Vtp,
             "stl" => Format::Stl,

@@ -961,11 +961,18 @@ pub(super) mod tests {
         Ok(Coded { models, head, blocks })
     }
 
+    impl Coded {
+        /// An MT into which no block has come.
+        fn start(&self, info: &MtInfo, base: &BaseMesh) -> Result<(VertexMt, State), FormatError> {
+            let mut source = Source::new(Reader::new(&self.head, 0), &self.models)?;
+            let known = read_head(&mut source)?;
+            source.end()?;
+            start(info.clone(), base.clone(), known, false)
+        }
+    }
+
     fn decoded(coded: &Coded, info: &MtInfo, base: &BaseMesh, size: u32) -> Result<VertexMt, FormatError> {
-        let mut source = Source::new(Reader::new(&coded.head, 0), &coded.models)?;
-        let known = read_head(&mut source)?;
-        let (mut mt, mut state) = start(info.clone(), base.clone(), known, false)?;
-        source.end()?;
+        let (mut mt, mut state) = coded.start(info, base)?;
         for block in &coded.blocks {
             let mut source = Source::new(Reader::new(block, 0), &coded.models)?;
             let count = size.min(info.updates - mt.updates());
@@ -991,14 +998,13 @@ pub(super) mod tests {
     #[test]
     fn what_has_come_is_an_mt() -> Result<(), FormatError> {
         let whole = delaunay(120);
-        let Coded { models, head, blocks } = coded(&whole, 10)?;
-        let known = read_head(&mut Source::new(Reader::new(&head, 0), &models)?)?;
-        let (mut mt, mut state) = start(whole.info().clone(), whole.base().clone(), known, false)?;
+        let coded = coded(&whole, 10)?;
+        let (mut mt, mut state) = coded.start(whole.info(), whole.base())?;
         // One mesh follows; at every stage another one is taken back to the base, and there again.
         let mut mesh = mt.start()?;
         let mut reference = whole.start()?;
-        for block in &blocks {
-            let mut source = Source::new(Reader::new(block, 0), &models)?;
+        for block in &coded.blocks {
+            let mut source = Source::new(Reader::new(block, 0), &coded.models)?;
             let known = mt.updates();
             read(&mut source, &mut mt, 10, &mut state, &Limits::default())?;
             mt.announce(&mut mesh, known);
@@ -1041,13 +1047,12 @@ pub(super) mod tests {
     #[test]
     fn updates_that_come_one_by_one_are_revealed_wherever_they_lie() -> Result<(), FormatError> {
         let whole = delaunay(240);
-        let Coded { models, head, blocks } = coded(&whole, 1)?;
-        let known = read_head(&mut Source::new(Reader::new(&head, 0), &models)?)?;
-        let (mut mt, mut state) = start(whole.info().clone(), whole.base().clone(), known, false)?;
+        let coded = coded(&whole, 1)?;
+        let (mut mt, mut state) = coded.start(whole.info(), whole.base())?;
         let mut mesh = mt.start()?;
         let mut applied = Vec::new();
-        for (u, block) in (0..).zip(&blocks) {
-            let mut source = Source::new(Reader::new(block, 0), &models)?;
+        for (u, block) in (0..).zip(&coded.blocks) {
+            let mut source = Source::new(Reader::new(block, 0), &coded.models)?;
             read(&mut source, &mut mt, 1, &mut state, &Limits::default())?;
             mesh.clear_touched();
             mt.announce(&mut mesh, u);
