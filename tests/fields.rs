@@ -9,13 +9,13 @@ use build_support::cube;
 use build_support::hilly;
 use build_support::linear;
 use std::ops::ControlFlow;
-use tetralod::build::BuildConfig;
-use tetralod::build::BuildError;
-use tetralod::build::BuildResult;
-use tetralod::build::Criterion;
-use tetralod::build::FieldPrecision;
-use tetralod::build::Method;
-use tetralod::build::build;
+use tetralod::builder::BuildConfig;
+use tetralod::builder::BuildError;
+use tetralod::builder::BuildResult;
+use tetralod::builder::Criterion;
+use tetralod::builder::FieldPrecision;
+use tetralod::builder::Method;
+use tetralod::builder::build;
 use tetralod::format::EncodeOptions;
 use tetralod::format::encode;
 use tetralod::mesh::Field;
@@ -54,7 +54,7 @@ fn made(mesh: &TetMesh, config: &BuildConfig) -> BuildResult {
 /// All updates applied.
 fn reference(mt: &Mt) -> CurrentMesh {
     let mut mesh = mt.start().expect("a valid base mesh");
-    mt.announce(&mut mesh, 0);
+    mt.updates_arrived(&mut mesh, 0);
     for u in (0..mt.updates()).map(UpdateId) {
         mt.refine(&mut mesh, u).expect("an update of this MT");
     }

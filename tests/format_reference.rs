@@ -17,9 +17,9 @@ use support::builder::build;
 use support::domains::Domain;
 use support::domains::PlainMesh;
 use support::random::Random;
-use tetralod::build::BuildConfig;
-use tetralod::build::FieldPrecision;
-use tetralod::build::edge_mt;
+use tetralod::builder::BuildConfig;
+use tetralod::builder::FieldPrecision;
+use tetralod::builder::edge_mt;
 use tetralod::format::Decoder;
 use tetralod::format::EncodeOptions;
 use tetralod::format::Index;
@@ -65,7 +65,7 @@ fn compare(bytes: &[u8]) {
         let mt = edge_of(&decoder);
         let updates = file.index.updates(block, &file.info);
         assert_eq!(mt.updates(), updates.end);
-        mt.announce(&mut current, updates.start);
+        mt.updates_arrived(&mut current, updates.start);
         let mut parents = BTreeSet::new();
         for k in updates {
             compare_split(&file, mt, k);

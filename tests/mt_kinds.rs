@@ -13,6 +13,7 @@ use support::random::Random;
 use support::strategies::config;
 use support::strategies::plan;
 use tetralod::mt::Applied;
+use tetralod::mt::ApplyUpdates;
 use tetralod::mt::ConvertError;
 use tetralod::mt::CurrentMesh;
 use tetralod::mt::EdgeMt;
@@ -40,10 +41,10 @@ struct Walk<M> {
     mesh: CurrentMesh,
 }
 
-impl<M: MultiTessellation> Walk<M> {
+impl<M: ApplyUpdates> Walk<M> {
     fn new(mt: M) -> Self {
         let mut mesh = mt.start().expect("a valid base mesh");
-        mt.announce(&mut mesh, 0);
+        mt.updates_arrived(&mut mesh, 0);
         Self { mt, mesh }
     }
 

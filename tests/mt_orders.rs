@@ -208,7 +208,7 @@ proptest! {
             if random.once_in(3) {
                 continue;
             }
-            mt.announce(&mut mesh, known);
+            mt.updates_arrived(&mut mesh, known);
             known = mt.updates();
             set.resize(known as usize, false);
             for _ in 0..random.below(8) {
@@ -227,7 +227,7 @@ proptest! {
                 mesh.compact();
             }
         }
-        mt.announce(&mut mesh, known);
+        mt.updates_arrived(&mut mesh, known);
         set.resize(built.splits.len(), false);
         assert_same(&mesh, &built, &built.oracle.extract(&set));
         prop_assert_eq!(&mt, &built.edge_mt());

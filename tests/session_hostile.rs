@@ -10,7 +10,7 @@ use proptest::prelude::*;
 use session_support::requests;
 use std::ops::ControlFlow;
 use std::sync::LazyLock;
-use tetralod::build::{BuildConfig, build};
+use tetralod::builder::{BuildConfig, build};
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::generate::by_name;
 use tetralod::mt::{MtKind, MultiTessellation};

@@ -5,8 +5,8 @@ mod support;
 
 use std::ops::ControlFlow;
 use support::random::Random;
-use tetralod::build::BuildConfig;
-use tetralod::build::build;
+use tetralod::builder::BuildConfig;
+use tetralod::builder::build;
 use tetralod::format::DecodeOptions;
 use tetralod::format::EncodeOptions;
 use tetralod::format::encode;

@@ -2,9 +2,9 @@
 #![allow(dead_code, reason = "every test binary uses a part of it")]
 
 use std::ops::ControlFlow;
-use tetralod::build::BuildConfig;
-use tetralod::build::BuildResult;
-use tetralod::build::edge_mt;
+use tetralod::builder::BuildConfig;
+use tetralod::builder::BuildResult;
+use tetralod::builder::edge_mt;
 use tetralod::mesh::Field;
 use tetralod::mesh::Grid;
 use tetralod::mesh::TetMesh;

@@ -11,7 +11,7 @@ use tetralod::mt::MultiTessellation;
 /// The base mesh, told of all updates.
 pub fn fresh_mesh(mt: &EdgeMt) -> CurrentMesh {
     let mut mesh = CurrentMesh::new(mt.info(), mt.base()).expect("a valid base mesh");
-    mt.announce(&mut mesh, 0);
+    mt.updates_arrived(&mut mesh, 0);
     mesh
 }
 
