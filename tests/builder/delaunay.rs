@@ -1,5 +1,6 @@
 //! Promise: the triangulation of any points is exact, fills their hull, and is the same in whatever order they come.
 
+use crate::support::random::Random;
 use std::collections::BTreeSet;
 use tetralod::build::BuildError;
 use tetralod::build::delaunay;
@@ -13,26 +14,11 @@ use tetralod::mesh::neighbors;
 
 type Point = [i32; 3];
 
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, n: u32) -> u32 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (((self.0 >> 32) * u64::from(n)) >> 32) as u32
-    }
-
-    fn shuffle<T>(&mut self, items: &mut [T]) {
-        for i in (1..items.len()).rev() {
-            items.swap(i, self.below(i as u32 + 1) as usize);
-        }
-    }
-}
-
 fn scattered(count: usize, size: u32, seed: u64) -> Vec<Point> {
-    let mut random = Random(seed);
+    let mut random = Random::new(seed);
     let mut points = BTreeSet::new();
     while points.len() < count {
-        points.insert([(); 3].map(|()| random.below(size) as i32));
+        points.insert([(); 3].map(|()| random.below(size as usize) as i32));
     }
     let mut points: Vec<Point> = points.into_iter().collect();
     random.shuffle(&mut points);
@@ -133,7 +119,7 @@ fn the_order_of_the_points_does_not_matter() {
     for mut points in [grid([5, 6, 4], 1), sphere(9), sheets(), scattered(300, 9, 3), scattered(300, 1000, 4)]
     {
         let wanted = as_set(&points, &delaunay(&points).unwrap());
-        let mut random = Random(points.len() as u64);
+        let mut random = Random::new(points.len() as u64);
         for _ in 0..10 {
             random.shuffle(&mut points);
             assert_eq!(as_set(&points, &delaunay(&points).unwrap()), wanted);

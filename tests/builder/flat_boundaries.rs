@@ -39,7 +39,7 @@ fn tilted(mesh: &CurrentMesh, sides: &[Vec<i32>; 3]) -> usize {
 }
 
 fn noise(mesh: &mut TetMesh, seed: u64) {
-    let mut random = Random(seed);
+    let mut random = Random::new(seed);
     mesh.fields[0].values.iter_mut().for_each(|x| *x = random.below(1000) as f64);
 }
 

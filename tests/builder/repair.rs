@@ -1,5 +1,6 @@
 //! Repair on random soups of tetrahedra: what it accepts is valid and fills what it filled before.
 
+use crate::support::strategies::config;
 use proptest::prelude::*;
 use tetralod::mesh::Field;
 use tetralod::mesh::Grid;
@@ -62,7 +63,7 @@ fn dirty_grid() -> impl Strategy<Value = (TetMesh, usize, usize)> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(20_000))]
+    #![proptest_config(config(20_000, 41))]
 
     #[test]
     fn what_is_accepted_is_valid_and_as_full_as_before(mesh in soup()) {
@@ -84,6 +85,8 @@ proptest! {
 }
 
 proptest! {
+    #![proptest_config(config(256, 43))]
+
     #[test]
     fn a_dirty_grid_is_mended((mesh, turned, slivers) in dirty_grid()) {
         let (mended, report) = repair(mesh).unwrap();

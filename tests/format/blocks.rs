@@ -123,7 +123,7 @@ fn blocks_in_any_order_make_the_mt_of_the_stream() {
     let mut whole = Decoder::default();
     whole.feed(&bytes).expect("a good file");
     for seed in 0..40 {
-        let mut random = Random(seed);
+        let mut random = Random::new(seed);
         let mut decoder = opened(&bytes, &[]);
         let mut here = BTreeSet::new();
         while here.len() < 19 {

@@ -43,7 +43,7 @@ fn options(block_bits: u32) -> EncodeOptions {
 
 /// Reads a file both ways, block by block.
 fn compare(bytes: &[u8]) {
-    let mut random = Random(7);
+    let mut random = Random::new(7);
     let file = reader::read(bytes, |ready| ready[random.below(ready.len())]);
     let mut decoder = Decoder::default();
     let front = file.blocks.first().map_or(bytes.len(), |range| range.start);
@@ -195,7 +195,7 @@ fn random_mts_are_read_alike() {
 /// Any order that keeps what the page says of dependence leads to the same mesh.
 #[test]
 fn updates_in_another_order_make_the_same_mesh() {
-    let mut random = Random(5);
+    let mut random = Random::new(5);
     let built = build(Plan { domain: Domain::Cube(3), seed: 9, fields: 2, updates: 1000 });
     let bytes = encode(&built.edge_mt(), &options(4)).expect("an MT");
     let file = reader::read(&bytes, |ready| ready[0]);
@@ -321,7 +321,7 @@ fn told_more(mt: &EdgeMt) -> EdgeMt {
 
 #[test]
 fn base_meshes_are_read_alike() {
-    let mut random = Random(3);
+    let mut random = Random::new(3);
     let mut meshes: Vec<PlainMesh> =
         [Domain::Cube(1), Domain::Cube(5), Domain::Ell(2), Domain::TwoComponents(2), Domain::Ring]
             .map(|domain| domain.mesh(&mut random))
@@ -409,7 +409,7 @@ fn grown(mesh: &PlainMesh) -> PlainMesh {
 
 /// An MT without updates.
 fn base_only(mesh: &PlainMesh) -> EdgeMt {
-    let mut random = Random(11);
+    let mut random = Random::new(11);
     let info = MtInfo {
         kind: MtKind::Edge,
         lattice: Lattice { origin: [0.0; 3], step: [1.0; 3], bits: 11 },

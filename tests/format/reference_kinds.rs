@@ -222,7 +222,7 @@ fn built_mts_are_read_alike() {
 /// Cubes of which parts are missing: what is left meets in faces, edges and vertices.
 #[test]
 fn parts_that_meet_in_edges_and_vertices_are_read_alike() {
-    let mut random = Random(3);
+    let mut random = Random::new(3);
     let mut updates = 0;
     for domain in [Domain::Cube(4), Domain::Cube(5), Domain::Ell(3), Domain::TwoComponents(3)] {
         for share in [3, 6, 20] {
@@ -273,7 +273,7 @@ fn linear_fields(mesh: &mut TetMesh) {
 /// Planes on which the field is the same, in which vertices are anywhere: volumes are beyond what doubles hold.
 #[test]
 fn volumes_of_many_bits_are_rounded_alike() {
-    let mut random = Random(17);
+    let mut random = Random::new(17);
     for size in [5, 6, 7, 9] {
         let mut mesh = generate::bucky(size).expect("a small size");
         linear_fields(&mut mesh);

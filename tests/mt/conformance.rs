@@ -219,7 +219,7 @@ fn any_order(how: How) {
     let (mut done, mut blocked) = (0, 0);
     for (seed, subject) in (0..).zip(subjects(how)) {
         assert_eq!(subject.explicit.check(), Ok(()), "{}", subject.input.name);
-        let mut random = Random(seed);
+        let mut random = Random::new(seed);
         let mut walk = Walk::new(&subject, subject.mt.clone());
         walk.wander(400, &mut random);
         walk.go_back(&mut random);
@@ -241,7 +241,7 @@ fn every_consistent_set(how: How) {
         let updates = subject.explicit.updates();
         let first = updates - updates.min(10);
         whole += u32::from(first == 0);
-        sets += visit_all(&subject, first, &mut Random(seed));
+        sets += visit_all(&subject, first, &mut Random::new(seed));
     }
     assert!(sets > 150 && whole > 0, "{sets} sets of {whole} whole MTs");
 }
@@ -309,7 +309,7 @@ fn random_request(subject: &Subject, random: &mut Random) -> Request {
 
 fn requests(how: How) {
     for (seed, subject) in (50..).zip(subjects(how)) {
-        let mut random = Random(seed);
+        let mut random = Random::new(seed);
         let mut front = Front::new(&subject.mt).expect("a valid base mesh");
         let mut spelled = Front::new(&subject.explicit).expect("a valid base mesh");
         let base = front.mesh().hash();
@@ -339,7 +339,7 @@ fn requests(how: How) {
 
 fn arrivals(how: How) {
     for (seed, subject) in (90..).zip(subjects(how)) {
-        let mut random = Random(seed);
+        let mut random = Random::new(seed);
         let mut walk = Walk::new(&subject, empty(&subject.mt));
         let mut front = Front::new(&walk.mt).expect("a valid base mesh");
         let whole = subject.mt.updates();
@@ -387,7 +387,7 @@ fn converted(how: How, mt: &Mt) -> Option<Mt> {
 }
 
 fn errors(how: How) {
-    let mut random = Random(3);
+    let mut random = Random::new(3);
     for subject in subjects(how) {
         within_errors(&subject, 12, &mut random);
     }

@@ -157,7 +157,7 @@ fn explore(mut paged: Paged, random: &mut Random) {
 
 #[test]
 fn pages_come_and_go_in_any_order() {
-    let mut random = Random(17);
+    let mut random = Random::new(17);
     for (i, input) in inputs().into_iter().enumerate() {
         let subject = Subject::new(PAGED, input).expect("decimation takes every mesh");
         explore(Paged::new(subject, 2 + i as u32 % 3), &mut random);
@@ -168,7 +168,7 @@ fn pages_come_and_go_in_any_order() {
 /// request is in.
 #[test]
 fn demanded_pages_are_enough_and_all_in_use() {
-    let mut random = Random(18);
+    let mut random = Random::new(18);
     for input in inputs() {
         let subject = Subject::new(PAGED, input).expect("decimation takes every mesh");
         let mut paged = Paged::new(subject, 2);
@@ -263,7 +263,7 @@ fn what_cannot_come_or_go_changes_nothing() {
 /// Steps fill the holes of the mesh, also while updates are waiting that were asked for before.
 #[test]
 fn small_steps_end_where_a_large_one_does() {
-    let mut random = Random(19);
+    let mut random = Random::new(19);
     // Holes in it keep the base mesh large.
     let porous = |c: [u32; 3]| c.iter().any(|x| x % 2 == 0);
     let mesh = blocks([9, 9, 5], &[hilly], porous);

@@ -29,7 +29,7 @@ use tetralod::refine::Request;
 /// As many values as a scan has, with noise that no neighbour shares.
 fn noisy(cells: [u32; 3], noise: f64, seed: u64) -> TetMesh {
     let mut mesh = blocks(cells, &[|p| p[0] * (1.0 - p[0]) + p[1] * p[2]], |_| true);
-    let mut random = Random(seed);
+    let mut random = Random::new(seed);
     mesh.fields[0].values.iter_mut().for_each(|x| *x += noise * random.below(1000) as f64 / 1000.0);
     mesh
 }
@@ -76,7 +76,7 @@ fn values_are_monotone(mt: &ExplicitMt) -> Result<(), String> {
 
 /// Answers requests for values all over the range, in random order, each from the base mesh and from what the one before left.
 fn remembers_nothing(name: &str, mt: &impl MultiTessellation, seed: u64) {
-    let mut random = Random(seed);
+    let mut random = Random::new(seed);
     let info = mt.info().fields[0].clone();
     let base = Front::new(mt).expect("a valid base mesh");
     let mut walk = base.clone();
@@ -120,7 +120,7 @@ fn noisy_scans_with_holes() {
     for seed in 0..4 {
         let bits = 4;
         let mut mt = EdgeMt::with_page_bits(whole.info().clone(), whole.base().clone(), bits);
-        let mut random = Random(seed);
+        let mut random = Random::new(seed);
         let mut pages: Vec<u32> = (0..whole.updates().div_ceil(1 << bits)).collect();
         random.shuffle(&mut pages);
         pages.truncate(pages.len() * 3 / 4);

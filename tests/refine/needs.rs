@@ -2,8 +2,8 @@
 //! request, within a budget or without, is answered with the smallest consistent set that satisfies it.
 
 use crate::subjects::{SUBJECTS, Subject, applied};
+use crate::support::strategies::config;
 use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
 use std::sync::Arc;
 use tetralod::geom::Bounds;
 use tetralod::geom::Camera;
@@ -139,18 +139,13 @@ fn request(subject: &Subject, wishes: &[Wish]) -> Request {
     Request { needs: wishes.iter().map(|wish| wish.need(subject)).collect(), budget: Budget::default() }
 }
 
-fn config(cases: u32) -> ProptestConfig {
-    let rng_seed = RngSeed::Fixed(4);
-    ProptestConfig { cases, failure_persistence: None, rng_seed, ..ProptestConfig::default() }
-}
-
 /// Excesses of all tetrahedra that `front` has.
 fn largest_excess(subject: &Subject, front: &Front, criterion: &LodCriterion) -> f64 {
     front.largest_violation(&subject.mt, criterion).1
 }
 
 proptest! {
-    #![proptest_config(config(250))]
+    #![proptest_config(config(250, 4))]
 
     /// A walk of requests that jump or move a little, each answered in random steps.
     #[test]
@@ -280,7 +275,7 @@ fn tetrahedron(subject: &Subject, numbers: &[f64]) -> [[i32; 3]; 4] {
 }
 
 proptest! {
-    #![proptest_config(config(6000))]
+    #![proptest_config(config(6000, 4))]
 
     /// As long as the criterion has moved by less than a verdict's slack, the verdict stands.
     #[test]

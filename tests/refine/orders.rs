@@ -45,7 +45,7 @@ fn places(mesh: &tetralod::mt::CurrentMesh) -> BTreeSet<[[i32; 3]; 4]> {
 
 #[test]
 fn the_order_of_the_updates_does_not_show_in_any_mesh() {
-    let mut random = Random(5);
+    let mut random = Random::new(5);
     for subject in SUBJECTS.iter() {
         let order = random_order(&subject.explicit, |n| random.below(n));
         let other = reordered(subject, &order);
@@ -76,7 +76,7 @@ fn with_errors(mt: &EdgeMt, error: &mut dyn FnMut(UpdateId) -> ErrorCode) -> Edg
 
 #[test]
 fn refinement_ends_whatever_the_errors_are() {
-    let mut random = Random(6);
+    let mut random = Random::new(6);
     for subject in SUBJECTS.iter() {
         let mt = with_errors(&subject.mt, &mut |_| ErrorCode(random.below(40_000) as u16));
         let hostile = Subject::of(subject.input.clone(), mt);

@@ -190,7 +190,7 @@ fn explore(subject: &Subject, bits: u32, random: &mut Random) {
 
 #[test]
 fn pages_come_and_go_in_any_order() {
-    let mut random = Random(9);
+    let mut random = Random::new(9);
     for (i, subject) in SUBJECTS.iter().enumerate() {
         explore(subject, 2 + i as u32 % 3, &mut random);
     }
@@ -198,7 +198,7 @@ fn pages_come_and_go_in_any_order() {
 
 #[test]
 fn pages_of_updates_in_another_order_come_and_go() {
-    let mut random = Random(10);
+    let mut random = Random::new(10);
     for subject in SUBJECTS.iter() {
         let order = random_order(&subject.explicit, |n| random.below(n));
         explore(&reordered(subject, &order), 3, &mut random);

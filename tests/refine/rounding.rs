@@ -23,7 +23,7 @@ use tetralod::verify::Reference;
 fn layers(thinnest: f64) -> TetMesh {
     let mut mesh = blocks([7, 6, 8], &[|_| 0.0], |_| true);
     mesh.grid = None;
-    let mut random = Random(7);
+    let mut random = Random::new(7);
     for (p, value) in mesh.positions.iter_mut().zip(&mut mesh.fields[0].values) {
         let mut moved = |x: f64, by: f64| {
             let inside = x > 0.0 && x < 1.0;

@@ -141,7 +141,7 @@ impl Subject {
 
 /// Points that look random, two fields, and no tetrahedra.
 fn scattered() -> TetMesh {
-    let mut random = Random(11);
+    let mut random = Random::new(11);
     let mut places = BTreeSet::new();
     while places.len() < 700 {
         places.insert([0; 3].map(|_| (random.bits() % 60) as u32));
@@ -247,7 +247,7 @@ fn a_request_gives_the_least_set_whatever_was_asked_for_before() {
         let updates = subject.explicit.updates();
         let mut vertex = Front::new(&subject.vertex).unwrap();
         let mut spelled = Front::new(&subject.explicit).unwrap();
-        let mut random = Random(3);
+        let mut random = Random::new(3);
         let mut sizes = BTreeSet::new();
         for step in 0..150 {
             let request = &requests[random.bits() as usize % requests.len()];
@@ -311,7 +311,7 @@ fn errors_come_back_with_the_tetrahedra() {
         let (mt, explicit) = (&subject.vertex, &subject.explicit);
         let mut meshes = (mt.start().unwrap(), explicit.start().unwrap());
         let updates = u64::from(mt.updates());
-        let mut random = Random(5);
+        let mut random = Random::new(5);
         let mut set = vec![false; updates as usize];
         for step in 0..6000 {
             // Coarse updates first, so that many can be applied.

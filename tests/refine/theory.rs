@@ -3,8 +3,8 @@
 
 use crate::subjects::{SUBJECTS, Subject, applied, sorted, tets};
 use crate::support::meshes::prefix;
+use crate::support::strategies::config;
 use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
 use std::collections::BTreeSet;
 use tetralod::geom::Bounds;
 use tetralod::measure::Part;
@@ -61,13 +61,8 @@ fn wish(budget: bool) -> impl Strategy<Value = Wish> {
     })
 }
 
-fn config(cases: u32) -> ProptestConfig {
-    let rng_seed = RngSeed::Fixed(99);
-    ProptestConfig { cases, failure_persistence: None, rng_seed, ..ProptestConfig::default() }
-}
-
 proptest! {
-    #![proptest_config(config(600))]
+    #![proptest_config(config(600, 99))]
 
     /// One front is asked for one thing after the other: each answer is the closure, and what the oracle extracts.
     #[test]
@@ -126,7 +121,7 @@ proptest! {
 }
 
 proptest! {
-    #![proptest_config(config(100))]
+    #![proptest_config(config(100, 99))]
 
     /// While updates arrive, what is there is a valid MT: the closure in it, true bounds, and no claim to be done
     /// where data is missing.

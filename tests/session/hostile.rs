@@ -2,6 +2,7 @@
 
 use crate::support::files::{assemble, sections};
 use crate::support::requests::requests;
+use crate::support::strategies::config;
 use proptest::prelude::*;
 use std::ops::ControlFlow;
 use std::sync::LazyLock;
@@ -50,7 +51,7 @@ fn the_files_themselves_are_sound() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(400))]
+    #![proptest_config(config(400, 47))]
 
     #[test]
     fn changes_behind_good_checksums(

@@ -3,6 +3,7 @@
 use crate::support::files::sections;
 use crate::support::meshes::{bent, built, cube, hilly, linear};
 use crate::support::requests::requests;
+use crate::support::strategies::config;
 use proptest::prelude::*;
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::mesh::TetMesh;
@@ -73,7 +74,7 @@ fn streamed(files: &[Vec<u8>; 2], piece: usize, order: &[prop::sample::Index]) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 6, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(config(6, 53))]
 
     #[test]
     fn meshes_are_the_same_at_every_moment(

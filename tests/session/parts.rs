@@ -93,7 +93,7 @@ fn the_mesh_is_that_of_the_whole_file() {
 
 fn has_the_mesh_of_the_whole_file(kind: MtKind) {
     let file = file(kind);
-    let random = &mut Random(7);
+    let random = &mut Random::new(7);
     let mut whole = Session::new();
     whole.feed(&file).expect("a sound file");
     for _ in 0..3 {
@@ -119,7 +119,7 @@ fn memory_stays_within_the_room() {
 
 fn stays_within_the_room(kind: MtKind) {
     let file = file(kind);
-    let random = &mut Random(8);
+    let random = &mut Random::new(8);
     let mut whole = Session::new();
     whole.feed(&file).expect("a sound file");
     let all = whole.mt().map_or(0, tetralod::mt::MultiTessellation::bytes);

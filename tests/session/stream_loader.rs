@@ -2,6 +2,7 @@
 //! while it holds it, keeps to its number of requests, and never waits for ever.
 
 use crate::support::random::Random;
+use crate::support::strategies::config;
 use proptest::prelude::*;
 use std::ops::Range;
 use tetralod::stream::Action;
@@ -289,7 +290,7 @@ const FAULTS: [Fault; 12] = [
 ];
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 400, ..ProptestConfig::default() })]
+    #![proptest_config(config(400, 59))]
 
     #[test]
     fn everything_wanted_comes_when_the_server_recovers(
@@ -586,7 +587,7 @@ fn many_small_ranges_take_few_requests_in_any_order_of_importance() {
     let options = LoaderOptions { gap: 0, max_request_bytes: 1 << 14, ..LoaderOptions::default() };
     for shuffled in [false, true] {
         let mut loader = Loader::new(options);
-        let mut random = Random(7);
+        let mut random = Random::new(7);
         let mut list: Vec<_> = (0..count)
             .map(|k| wanted(k * size..(k + 1) * size, if shuffled { random.below(1000) as f32 } else { 0.0 }))
             .collect();

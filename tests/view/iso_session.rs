@@ -89,7 +89,7 @@ fn the_surface_follows_every_kind_of_mt_from_request_to_request() {
             let bytes = encode(&how.build(&mesh, None), &EncodeOptions::default()).expect("a complete MT");
             let mut session = Session::new();
             session.feed(&bytes).expect("a good file");
-            let mut random = Random(7);
+            let mut random = Random::new(7);
             let mut wish = Wish::default();
             let mut values = vec![0.3];
             for step in 0..60 {

@@ -159,7 +159,7 @@ fn blocks(entries: &mut Vec<u32>, len: usize) -> Vec<Range<u32>> {
 
 /// Follows a mesh for many steps.
 fn wander(scene: Scene, seed: u64, kind: NormalKind, change_values: bool) {
-    let mut random = Random(seed);
+    let mut random = Random::new(seed);
     let mut walk = Walk::new(scene);
     let mut surface = IsoSurface::new();
     surface.set_normal_kind(kind);

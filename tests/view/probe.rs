@@ -3,6 +3,7 @@
 
 use crate::scenes::Scene;
 use crate::support::meshes::{bent, blocks, cube, hilly, linear};
+use crate::support::random::Random;
 use crate::walk::{KINDS, Walk};
 use std::f64::consts::PI;
 use tetralod::mesh::TetMesh;
@@ -34,24 +35,14 @@ fn in_pocket([x, y, z]: [f64; 3]) -> bool {
     inner(x) && inner(y) && 2.0 / 6.0 < z
 }
 
-struct Random(u64);
+/// In the cube from -0.1 to 1.1.
+fn random_point(random: &mut Random) -> [f64; 3] {
+    [(); 3].map(|()| 1.2 * random.fraction() - 0.1)
+}
 
-impl Random {
-    /// Uniform between 0 and 1.
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// In the cube from -0.1 to 1.1.
-    fn point(&mut self) -> [f64; 3] {
-        [(); 3].map(|()| 1.2 * self.next() - 0.1)
-    }
-
-    /// A point of a grid, on which many tetrahedra meet.
-    fn corner(&mut self, cells: f64) -> [f64; 3] {
-        self.point().map(|x| (x * 2.0 * cells).round() / (2.0 * cells))
-    }
+/// A point of a grid, on which many tetrahedra meet.
+fn random_corner(random: &mut Random, cells: f64) -> [f64; 3] {
+    random_point(random).map(|x| (x * 2.0 * cells).round() / (2.0 * cells))
 }
 
 /// The place of a point by asking all tetrahedra in turn, inexactly.
@@ -67,13 +58,13 @@ fn holds(mesh: &MeshView<'_>, place: &Place, p: [f64; 3]) -> bool {
 
 #[test]
 fn points_are_found_inside_and_not_outside() {
-    let mut random = Random(1);
+    let mut random = Random::new(1);
     for (scene, has_pocket) in [(scene(&cube(6, &[linear])), false), (pocket(), true)] {
         let view = scene.view();
         let (mut walking, mut boxed) = (Probe::new(view), Probe::new(view));
         boxed.make_grid();
         for i in 0..4000 {
-            let p = if i % 2 == 0 { random.point() } else { random.corner(6.0) };
+            let p = if i % 2 == 0 { random_point(&mut random) } else { random_corner(&mut random, 6.0) };
             let near_face =
                 p.iter().any(|x| [0.0, 2.0, 4.0, 6.0].iter().any(|face| (x - face / 6.0).abs() < 1e-6));
             let inside = p.iter().all(|x| (0.0..=1.0).contains(x)) && !(has_pocket && in_pocket(p));
@@ -106,7 +97,7 @@ fn points_are_found_in_every_current_mesh() {
         for _ in 0..4 {
             walk.change(150, true);
             let points: Vec<[f64; 3]> =
-                (0..200).map(|_| [(); 3].map(|()| walk.random(1001) as f64 / 1000.0)).collect();
+                (0..200).map(|_| [(); 3].map(|()| walk.random.below(1001) as f64 / 1000.0)).collect();
             let view = walk.view();
             let mut probe = Probe::new(view);
             for p in points {
@@ -177,16 +168,16 @@ fn check_line(probe: &mut Probe<'_>, spans: &[Span], from: [f64; 3], to: [f64; 3
 
 #[test]
 fn lines_pass_through_every_tetrahedron_on_their_way() {
-    let mut random = Random(2);
+    let mut random = Random::new(2);
     for scene in [scene(&cube(6, &[linear])), pocket(), scene(&bent(5))] {
         let mut scanning = Probe::new(scene.view());
         let mut boxed = Probe::new(scene.view());
         boxed.make_grid();
         for i in 0..60 {
             let [from, to] = [(); 2].map(|()| match i % 3 {
-                0 => random.point(),
-                1 => random.point().map(|x| 4.0 * x - 1.5),
-                _ => random.corner(6.0),
+                0 => random_point(&mut random),
+                1 => random_point(&mut random).map(|x| 4.0 * x - 1.5),
+                _ => random_corner(&mut random, 6.0),
             });
             let without = Probe::new(scene.view()).line(from, to);
             let spans = boxed.line(from, to);

@@ -3,6 +3,7 @@
 use crate::scenes::Scene;
 use crate::support::meshes::linear as linear_field;
 use crate::support::meshes::{bent, built, cube, hilly};
+use crate::support::random::Random;
 use crate::support::requests::requests;
 use crate::walk::{KINDS, Walk, changed};
 use std::collections::BTreeMap;
@@ -217,7 +218,7 @@ fn follow(walk: &mut Walk, plane: &Plane) {
     let mut largest = 0;
     for round in 0..60 {
         let refine = round / 10 % 2 == 0;
-        let count = [1, 2, 3, 5, 20, walk.updates()][walk.random(6)];
+        let count = [1, 2, 3, 5, 20, walk.updates()][walk.random.below(6)];
         let changes = if round == 30 { walk.refine_all() } else { walk.change(count, refine) };
         slice.update(&walk.view(), &changes.vertices, &changes.tets);
         let fresh = cut(&walk.view(), plane);
@@ -245,15 +246,14 @@ fn a_slice_follows_a_session_from_request_to_request() {
     session.feed(&encode(&whole.mt, &EncodeOptions::default()).expect("a complete MT")).expect("a good file");
     let plane = plane([0.3, -0.4, 1.0], 0.45);
     let mut slice = cut(&session.view(), &plane);
-    let (requests, mut state) = (requests(), 3_usize);
+    let (requests, mut random) = (requests(), Random::new(3));
     let mut sizes = BTreeSet::new();
     for _ in 0..60 {
-        state = state.wrapping_mul(1_103_515_245).wrapping_add(12_345);
         let before = session.view();
         let (positions, values) = (before.positions.to_vec(), before.field.to_vec());
         let (tets, neighbors) = (before.tets.to_vec(), before.neighbors.to_vec());
-        session.set_field(state >> 20 & 1).expect("there are two");
-        session.refine(&requests[(state >> 16) % requests.len()]).expect("a good request");
+        session.set_field(random.below(2)).expect("there are two");
+        session.refine(&requests[random.below(requests.len())]).expect("a good request");
         let now = session.view();
         let points = [changed(&positions, now.positions), changed(&values, now.field)].concat();
         let cells = [changed(&tets, now.tets), changed(&neighbors, now.neighbors)].concat();

@@ -1,5 +1,6 @@
 //! A current mesh that changes at random, as slices with the ranges that have changed.
 
+use crate::support::random::Random;
 use std::ops::ControlFlow;
 use std::ops::Range;
 use tetralod::build::BuildConfig;
@@ -37,7 +38,7 @@ pub struct Walk {
     applied: Vec<bool>,
     positions: Vec<[f32; 3]>,
     values: Vec<f32>,
-    state: u64,
+    pub random: Random,
 }
 
 impl Walk {
@@ -49,7 +50,8 @@ impl Walk {
         let mut mesh = mt.start().expect("a valid base mesh");
         mt.announce(&mut mesh, 0);
         let applied = vec![false; mt.updates() as usize];
-        let mut walk = Self { mt, mesh, applied, positions: Vec::new(), values: Vec::new(), state: 5 };
+        let mut walk =
+            Self { mt, mesh, applied, positions: Vec::new(), values: Vec::new(), random: Random::new(5) };
         walk.take_changes();
         walk
     }
@@ -58,16 +60,10 @@ impl Walk {
         self.mt.updates() as usize
     }
 
-    pub fn random(&mut self, below: usize) -> usize {
-        self.state =
-            self.state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.state >> 33) as usize % below
-    }
-
     /// Tries `count` updates chosen at random, all in the same direction; tells where the slices have changed.
     pub fn change(&mut self, count: usize, refine: bool) -> MeshChanges {
         for _ in 0..count {
-            let u = self.random(self.updates()) as u32;
+            let u = self.random.below(self.updates()) as u32;
             self.try_update(u, refine);
         }
         self.mesh.compact();

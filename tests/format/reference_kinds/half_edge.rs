@@ -60,7 +60,7 @@ fn random_insertions_are_read_alike() {
 #[test]
 fn built_mts_are_read_alike() {
     let grid = cube(6, &[hilly, linear]);
-    let meshes = [shaken(grid.clone(), &mut Random(5), 0.03), grid];
+    let meshes = [shaken(grid.clone(), &mut Random::new(5), 0.03), grid];
     let mut symbols = BTreeSet::new();
     for purpose in [Purpose::Uniform, Purpose::Regions] {
         for (position_bits, field_bits, block_bits) in [(6, 5, 4), (16, 12, 5), (30, 24, 4)] {
@@ -103,7 +103,7 @@ fn products_beyond_doubles_are_rounded_alike() {
 /// No corner changes its place: that is seen in a current mesh only.
 #[test]
 fn corners_come_in_the_same_order() {
-    let mesh = shaken(cube(5, &[hilly, linear]), &mut Random(2), 0.03);
+    let mesh = shaken(cube(5, &[hilly, linear]), &mut Random::new(2), 0.03);
     let bytes = bytes_in_blocks(&built(&mesh, with_bits(Purpose::Uniform, 14, 10)), 4);
     let mt = decode(&bytes).expect("a good file");
     let mut current = mt.start().expect("a base mesh");
@@ -143,7 +143,7 @@ fn meshes_that_are_not_convex_are_read_alike() {
 /// Cubes of which parts are missing: what is left meets in faces, edges and vertices.
 #[test]
 fn parts_that_meet_in_edges_and_vertices_are_read_alike() {
-    let mut random = Random(3);
+    let mut random = Random::new(3);
     let mut updates = 0;
     for share in [3, 6, 20] {
         let cells = [5, 4, 4];
@@ -171,11 +171,11 @@ fn closure(mt: &ExplicitMt, of: &[u32]) -> BTreeSet<u32> {
 /// inserts, and which can be applied.
 #[test]
 fn blocks_are_read_and_used_by_themselves() {
-    let mesh = shaken(cube(7, &[hilly, linear]), &mut Random(9), 0.02);
+    let mesh = shaken(cube(7, &[hilly, linear]), &mut Random::new(9), 0.02);
     let bytes = bytes_in_blocks(&built(&mesh, with_bits(Purpose::Regions, 14, 10)), 4);
     let mt = spelled_out(&decode(&bytes).expect("a good file"));
     let (file, parts) = reader::open(&bytes);
-    let mut random = Random(21);
+    let mut random = Random::new(21);
     let mut fewest = usize::MAX;
     for _ in 0..12 {
         let wanted = closure(&mt, &[random.below(mt.updates() as usize) as u32]);
@@ -222,7 +222,7 @@ fn first_with(records: &mut [Record], is_such: fn(&Record) -> bool) -> &mut Reco
 /// A reader that does not find what is wrong proves nothing.
 #[test]
 fn a_changed_formula_would_be_noticed() {
-    let mesh = shaken(cube(6, &[hilly]), &mut Random(1), 0.03);
+    let mesh = shaken(cube(6, &[hilly]), &mut Random::new(1), 0.03);
     let bytes = bytes_in_blocks(&built(&mesh, with_bits(Purpose::Uniform, 12, 10)), 4);
     let read = |alter: Alter| {
         let (mut file, parts) = reader::open(&bytes);
