@@ -2,8 +2,8 @@
 //! any order, it is Σ_S as the DAG tells it, and it is within the error that S promises.
 
 use crate::support::conformance::{
-    DELAUNAY, EDGE, HALF_EDGE, How, INSERTED, Input, PAGED, SPELLED_EDGE, SPELLED_VERTEX, Subject, deviation,
-    empty, grow, inputs, random_input,
+    Corners, DELAUNAY, EDGE, HALF_EDGE, How, INSERTED, Input, PAGED, SPELLED_EDGE, SPELLED_VERTEX, Subject,
+    deviation, empty, grow, in_order, inputs, random_input,
 };
 use crate::support::domains::Domain;
 use crate::support::meshes::{blocks, hilly};
@@ -11,13 +11,16 @@ use crate::support::random::Random;
 use crate::support::strategies::config;
 use proptest::prelude::*;
 use std::collections::HashMap;
+use std::collections::HashSet;
 use tetralod::geom::Bounds;
 use tetralod::mt::Applied;
 use tetralod::mt::CurrentMesh;
 use tetralod::mt::ErrorCode;
 use tetralod::mt::Mt;
+use tetralod::mt::MtKind;
 use tetralod::mt::MultiTessellation;
 use tetralod::mt::UpdateId;
+use tetralod::mt::stats;
 use tetralod::refine::Budget;
 use tetralod::refine::Front;
 use tetralod::refine::LodCriterion;
@@ -110,6 +113,8 @@ struct Walk<'a> {
     set: Vec<bool>,
     done: usize,
     blocked: usize,
+    /// How many random steps there are from one comparison to the next.
+    compare_every: usize,
 }
 
 impl<'a> Walk<'a> {
@@ -117,7 +122,7 @@ impl<'a> Walk<'a> {
         let mut mesh = mt.start().expect("a valid base mesh");
         mt.announce(&mut mesh, 0);
         let set = vec![false; subject.explicit.updates() as usize];
-        Self { subject, mt, mesh, set, done: 0, blocked: 0 }
+        Self { subject, mt, mesh, set, done: 0, blocked: 0, compare_every: 1 }
     }
 
     /// Tries to put `u` in or to take it out; that works when the set stays consistent. Who is said to be in the way
@@ -129,8 +134,14 @@ impl<'a> Walk<'a> {
         let feasible = subject.explicit.is_feasible(set, id);
         let before = mesh.hash();
         if undo {
-            let looked = mt.look_at_removed(mesh, id, &mut |_, _, _| false).expect("a valid MT");
-            assert_eq!(looked == Applied::Done, feasible);
+            let (mut seen, fields): (Vec<Corners>, _) = (Vec::new(), mt.info().fields.len());
+            let looked = mt.look_at_removed(mesh, id, &mut |corners, levels, _| {
+                let levels: Vec<[i32; 4]> = (0..fields).map(levels).collect();
+                seen.push([0, 1, 2, 3].map(|i| (corners[i], levels.iter().map(|field| field[i]).collect())));
+                false
+            });
+            assert_eq!(looked.expect("a valid MT") == Applied::Done, feasible);
+            assert!(!feasible || in_order(seen) == subject.removed_by(id), "what {u} removes is shown");
             assert!(mt.may_coarsen(mesh, id) || !feasible);
         } else {
             assert!(!mt.may_coarsen(mesh, id));
@@ -177,7 +188,7 @@ impl<'a> Walk<'a> {
     /// Random steps, more of them one way for a while, then more of them the other way.
     fn wander(&mut self, steps: usize, random: &mut Random) {
         let mut refining = true;
-        for _ in 0..steps {
+        for step in 1..=steps {
             let known = self.mt.updates();
             if random.once_in(60) || known == 0 {
                 refining = !refining;
@@ -196,9 +207,22 @@ impl<'a> Walk<'a> {
             }
             if random.once_in(15) {
                 self.mesh.compact();
+                assert!(self.mesh.tets().iter().flatten().all(|&v| v != u32::MAX), "nothing is left out");
             }
-            self.assert_same();
+            if step % self.compare_every == 0 {
+                self.assert_same();
+            }
         }
+    }
+
+    /// The same set reached straight down has the same hash.
+    fn assert_hash_of_the_set(&self) {
+        let mut straight = Walk::new(self.subject, self.mt.clone());
+        for u in (0..self.mt.updates()).filter(|&u| self.set[u as usize]) {
+            assert_eq!(straight.toggle(u), Applied::Done);
+        }
+        straight.assert_same();
+        assert_eq!(straight.mesh.hash(), self.mesh.hash());
     }
 
     /// Back to the base mesh, in any order that works.
@@ -277,6 +301,8 @@ fn visit_all(subject: &Subject, first: u32, random: &mut Random) -> usize {
         subject.explicit.is_consistent(&(0..updates).map(is_in).collect::<Vec<_>>())
     });
     assert_eq!(seen.len(), consistent.count(), "all of them are reached, and no other");
+    let different: HashSet<u64> = seen.values().copied().collect();
+    assert_eq!(different.len(), seen.len(), "two sets have the same hash");
     seen.len()
 }
 
@@ -339,30 +365,32 @@ fn requests(how: How) {
 
 fn arrivals(how: How) {
     for (seed, subject) in (90..).zip(subjects(how)) {
-        let mut random = Random::new(seed);
-        let mut walk = Walk::new(&subject, empty(&subject.mt));
-        let mut front = Front::new(&walk.mt).expect("a valid base mesh");
-        let whole = subject.mt.updates();
-        while walk.mt.updates() < whole {
-            let known = walk.mt.updates();
-            let most = if random.once_in(4) { 60 } else { 9 };
-            (0..random.below(most).min((whole - known) as usize))
-                .for_each(|_| grow(&mut walk.mt, &subject.mt));
-            walk.mt.announce(&mut walk.mesh, known);
-            walk.assert_same();
-            walk.wander(12, &mut random);
-            let request = random_request(&subject, &mut random);
-            satisfy(&mut front, &walk.mt, &request);
-            let set: Vec<bool> =
-                (0..whole).map(|u| u < walk.mt.updates() && front.contains(UpdateId(u))).collect();
-            subject.assert_is(&walk.mt, front.mesh(), &set);
-        }
-        assert_eq!(walk.mt, subject.mt);
-        let outcome = satisfy(&mut front, &walk.mt, &Request::within(0.0));
-        assert!(outcome.satisfied);
-        subject.assert_is(&subject.mt, front.mesh(), &vec![true; whole as usize]);
-        walk.go_back(&mut random);
+        arrive(&subject, 1, &mut Random::new(seed));
     }
+}
+
+fn arrive(subject: &Subject, compare_every: usize, random: &mut Random) {
+    let mut walk = Walk { compare_every, ..Walk::new(subject, empty(&subject.mt)) };
+    let mut front = Front::new(&walk.mt).expect("a valid base mesh");
+    let whole = subject.mt.updates();
+    while walk.mt.updates() < whole {
+        let known = walk.mt.updates();
+        let most = if random.once_in(4) { 60 } else { 9 };
+        (0..random.below(most).min((whole - known) as usize)).for_each(|_| grow(&mut walk.mt, &subject.mt));
+        walk.mt.announce(&mut walk.mesh, known);
+        walk.assert_same();
+        walk.wander(12, random);
+        let request = random_request(subject, random);
+        satisfy(&mut front, &walk.mt, &request);
+        let set: Vec<bool> =
+            (0..whole).map(|u| u < walk.mt.updates() && front.contains(UpdateId(u))).collect();
+        subject.assert_is(&walk.mt, front.mesh(), &set);
+    }
+    assert_eq!(walk.mt, subject.mt);
+    let outcome = satisfy(&mut front, &walk.mt, &Request::within(0.0));
+    assert!(outcome.satisfied);
+    subject.assert_is(&subject.mt, front.mesh(), &vec![true; whole as usize]);
+    walk.go_back(random);
 }
 
 fn random_mt(how: How, domain: Domain, seed: u64, fields: usize) {
@@ -372,6 +400,7 @@ fn random_mt(how: How, domain: Domain, seed: u64, fields: usize) {
     assert_eq!(subject.explicit.check(), Ok(()));
     let mut walk = Walk::new(&subject, subject.mt.clone());
     walk.wander(150, &mut random);
+    walk.assert_hash_of_the_set();
     walk.go_back(&mut random);
     if let Some(mt) = converted(how, &subject.mt) {
         assert_eq!(mt, subject.mt);
@@ -381,7 +410,15 @@ fn random_mt(how: How, domain: Domain, seed: u64, fields: usize) {
 
 /// The same MT by way of the explicit one, if it is not that already.
 fn converted(how: How, mt: &Mt) -> Option<Mt> {
-    let spelled = mt.convert(tetralod::mt::MtKind::Explicit).expect("any MT can be spelled out");
+    let spelled = mt.convert(MtKind::Explicit).expect("any MT can be spelled out");
+    assert_eq!(spelled.info().kind, MtKind::Explicit);
+    assert_eq!(spelled.convert(MtKind::Explicit).as_ref(), Ok(&spelled));
+    let [of_mt, of_spelled] = [mt, &spelled].map(|mt| stats(mt).expect("a valid MT"));
+    assert_eq!(of_mt.explicit_bytes, of_spelled.explicit_bytes);
+    assert_eq!(
+        (of_mt.arcs, of_mt.depth, of_mt.bounds),
+        (of_spelled.arcs, of_spelled.depth, of_spelled.bounds)
+    );
     let back = spelled.convert(how.kind).expect("it was one");
     (back != spelled).then_some(back)
 }
@@ -452,9 +489,146 @@ fn insertions_that_move_the_boundary_occur_and_are_undone_exactly() {
 fn the_compact_mt_is_the_one_that_the_builder_spelled_out() {
     for how in [HALF_EDGE, DELAUNAY, INSERTED] {
         for subject in subjects(how) {
-            let spelled = How { kind: tetralod::mt::MtKind::Explicit, ..how };
+            let spelled = How { kind: MtKind::Explicit, ..how };
             let built = spelled.build(&subject.input.mesh, subject.input.position_bits);
             assert_eq!(Mt::from(subject.explicit), built, "{how:?}: {}", subject.input.name);
         }
+    }
+}
+
+/// Of a domain each, larger than what is compared after every step.
+#[test]
+fn larger_mts_in_waves() {
+    let domains =
+        [Domain::Cube(7), Domain::Ell(3), Domain::Ring, Domain::TwoComponents(3), Domain::SingleTet];
+    for how in [EDGE, HALF_EDGE, PAGED] {
+        let mut updates = 0;
+        for (seed, domain) in (0..).zip(domains) {
+            let mut random = Random::new(seed);
+            let subject = Subject::new(how, random_input(domain, 1, &mut random)).expect("any domain");
+            assert_eq!(subject.explicit.check(), Ok(()), "{domain:?}");
+            assert_eq!(stats(&subject.mt).map(|found| found.explicit_bytes), Ok(subject.explicit.bytes()));
+            updates += subject.mt.updates();
+            let mut walk = Walk { compare_every: 500, ..Walk::new(&subject, subject.mt.clone()) };
+            walk.wander(6000, &mut random);
+            walk.assert_same();
+        }
+        assert!(updates > 500, "{how:?}: the builder made {updates} updates only");
+    }
+}
+
+/// MTs that no builder of the library has made, of random splits; `explicit` compares what they are made of. As they are, and spelled
+/// out.
+mod random_splits {
+    use super::*;
+    use crate::support::builder::{Plan, build};
+    use crate::support::strategies::plan;
+    use tetralod::mesh::TetMesh;
+
+    fn subjects(plan: Plan) -> [Subject; 2] {
+        let edge = Mt::from(build(plan).edge_mt());
+        let spelled = edge.convert(MtKind::Explicit).expect("any MT can be spelled out");
+        [edge, spelled].map(|mt| {
+            let mesh = TetMesh::default();
+            let name = "random splits";
+            Subject::of(Input { name, mesh, position_bits: None, flat: false, convex: false }, mt)
+        })
+    }
+
+    proptest! {
+        #![proptest_config(config(60, 1))]
+
+        /// All updates in their order make the reference mesh, undone from the last one on the base mesh.
+        #[test]
+        fn straight_down_and_up_again(plan in plan(6, 2, 0..200)) {
+            for subject in subjects(plan) {
+                let mut walk = Walk::new(&subject, subject.mt.clone());
+                let start = walk.mesh.hash();
+                walk.assert_same();
+                for u in 0..subject.mt.updates() {
+                    prop_assert_eq!(walk.toggle(u), Applied::Done);
+                    walk.assert_same();
+                }
+                prop_assert_eq!(walk.mesh.tet_count(), subject.mt.info().tetrahedra as usize);
+                prop_assert_eq!(walk.mesh.vertex_count(), subject.mt.info().vertices as usize);
+                for u in (0..subject.mt.updates()).rev() {
+                    prop_assert_eq!(walk.toggle(u), Applied::Done);
+                    walk.assert_same();
+                }
+                prop_assert_eq!(walk.mesh.hash(), start);
+                walk.mesh.compact();
+                walk.assert_same();
+            }
+        }
+
+        /// The hash depends on the set alone, and tells sets apart.
+        #[test]
+        fn small_meshes_at_random(plan in plan(6, 2, 0..14), steps in 0_usize..600, seed in any::<u64>()) {
+            for subject in subjects(plan) {
+                let mut walk = Walk::new(&subject, subject.mt.clone());
+                let mut random = Random(seed);
+                let mut hashes = HashMap::from([(walk.set.clone(), walk.mesh.hash())]);
+                for _ in 0..if walk.set.is_empty() { 0 } else { steps } {
+                    walk.toggle(random.below(walk.set.len()) as u32);
+                    if random.once_in(7) {
+                        walk.mesh.compact();
+                    }
+                    walk.assert_same();
+                    let hash = walk.mesh.hash();
+                    prop_assert_eq!(*hashes.entry(walk.set.clone()).or_insert(hash), hash);
+                }
+                let different: HashSet<u64> = hashes.values().copied().collect();
+                prop_assert_eq!(different.len(), hashes.len(), "two sets have the same hash");
+            }
+        }
+    }
+
+    proptest! {
+        #![proptest_config(config(24, 2))]
+
+        #[test]
+        fn large_meshes_in_waves(plan in plan(6, 2, 100..1000), seed in any::<u64>()) {
+            for subject in subjects(plan) {
+                let mut walk = Walk { compare_every: 80, ..Walk::new(&subject, subject.mt.clone()) };
+                walk.wander(4000, &mut Random(seed));
+                walk.assert_hash_of_the_set();
+            }
+        }
+
+        #[test]
+        fn they_may_arrive_at_any_time(plan in plan(6, 2, 0..300), seed in any::<u64>()) {
+            for subject in subjects(plan) {
+                arrive(&subject, 12, &mut Random(seed));
+            }
+        }
+
+        /// Turned into the other kind and back, an MT is what it was.
+        #[test]
+        fn both_kinds_hold_the_same(plan in plan(5, 2, 0..300)) {
+            let [edge, spelled] = subjects(plan).map(|subject| subject.mt);
+            let back = converted(EDGE, &edge).expect("it is of another kind");
+            prop_assert_eq!(&back, &edge);
+            prop_assert_eq!(converted(EDGE, &spelled), Some(edge));
+        }
+    }
+
+    #[test]
+    fn every_consistent_set_of_tiny_mts() {
+        let domains =
+            [Domain::Cube(1), Domain::Cube(2), Domain::Ell(1), Domain::Ring, Domain::TwoComponents(1)];
+        let mut dependent = 0;
+        for seed in 0..24 {
+            let plan = Plan {
+                domain: domains[seed as usize % 5],
+                seed: crate::support::random::seed(seed),
+                fields: 1,
+                updates: 9,
+            };
+            for subject in subjects(plan) {
+                dependent += subject.ancestors.iter().filter(|above| !above.is_empty()).count();
+                visit_all(&subject, 0, &mut Random(seed));
+            }
+        }
+        assert!(dependent > 100, "the tiny MTs have hardly any dependencies: {dependent}");
     }
 }

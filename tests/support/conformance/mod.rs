@@ -12,6 +12,7 @@ use std::collections::BTreeSet;
 use std::collections::HashMap;
 use std::ops::ControlFlow;
 use tetralod::build::BuildConfig;
+use tetralod::build::BuildResult;
 use tetralod::build::Criterion;
 use tetralod::build::Method;
 use tetralod::build::build;
@@ -28,6 +29,7 @@ use tetralod::mt::MultiTessellation;
 use tetralod::mt::UpdateId;
 use tetralod::mt::VertexId;
 use tetralod::mt::VertexMt;
+use tetralod::mt::stats;
 
 /// A kind of MT and how it is built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,11 +54,15 @@ impl How {
     }
 
     pub fn build(self, mesh: &TetMesh, position_bits: Option<u32>) -> Mt {
+        self.build_result(mesh, position_bits).mt
+    }
+
+    fn build_result(self, mesh: &TetMesh, position_bits: Option<u32>) -> BuildResult<Mt> {
         let How { kind, method, criterion } = self;
         let fields = mesh.fields.iter().map(|field| field.name.clone()).collect();
         let config =
             BuildConfig { kind, method, criterion, fields, position_bits, ..BuildConfig::of(MtKind::Edge) };
-        build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt
+        build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on")
     }
 }
 
@@ -127,7 +133,13 @@ impl Subject {
     /// None if the builder does not take such an input.
     pub fn new(how: How, input: Input) -> Option<Self> {
         how.takes(&input).then(|| {
-            let mt = how.build(&input.mesh, input.position_bits);
+            let BuildResult { mt, summary, .. } = how.build_result(&input.mesh, input.position_bits);
+            let found = stats(&mt).expect("a valid MT");
+            assert_eq!(found.depth, summary.depth, "{}", input.name);
+            if how.method.keeps_the_mesh() {
+                let size = [found.vertices as usize, found.tetrahedra as usize];
+                assert_eq!(size, [input.mesh.positions.len(), input.mesh.tets.len()], "{}", input.name);
+            }
             Self::of(input, mt)
         })
     }
@@ -147,6 +159,13 @@ impl Subject {
         subject.volume = subject.volume_of(subject.explicit.extract(&all).expect("a consistent set"));
         subject.assert_volumes();
         subject
+    }
+
+    /// Positions and levels at the corners of the tetrahedra that `u+` removes, in ascending order.
+    pub fn removed_by(&self, u: UpdateId) -> Vec<Corners> {
+        let corner = |v| (self.explicit.position(v), self.explicit.levels(v).to_vec());
+        let removed = self.explicit.removed(u).iter();
+        in_order(removed.map(|&t| self.explicit.tets()[t as usize].map(|v| corner(VertexId(v)))).collect())
     }
 
     /// Asserts that the mesh is Σ_S, of an MT of which only the updates before `known` have arrived.
@@ -227,6 +246,16 @@ impl Subject {
         let after: BTreeSet<_> = self.explicit.inserted(u).flat_map(|t| faces_of(tet(t))).collect();
         border(&removed).into_iter().filter(|face| !after.contains(face)).collect()
     }
+}
+
+/// Positions and levels at the corners of a tetrahedron.
+pub type Corners = [([i32; 3], Vec<i32>); 4];
+
+/// The same tetrahedra, whatever order they and their corners come in.
+pub fn in_order(mut tets: Vec<Corners>) -> Vec<Corners> {
+    tets.iter_mut().for_each(|tet| tet.sort_unstable());
+    tets.sort_unstable();
+    tets
 }
 
 /// The faces of a tetrahedron, by their sorted vertices.

@@ -1,11 +1,7 @@
-//! Promise: it makes no difference to the mesh which structure an MT is held in. The explicit MT, applied to a current
-//! mesh of its own, gives the mesh of the compact one after every update, and turns back into it.
+//! Explicit updates that do not fit are refused and change nothing; what is no split does not become one.
 
-use crate::support::builder::{Built, Plan, build};
+use crate::support::builder::{Plan, build};
 use crate::support::domains::{Domain, volume6};
-use crate::support::random::Random;
-use crate::support::strategies::{config, plan};
-use proptest::prelude::*;
 use tetralod::mt::Applied;
 use tetralod::mt::ConvertError;
 use tetralod::mt::CurrentMesh;
@@ -19,14 +15,6 @@ use tetralod::mt::MultiTessellation;
 use tetralod::mt::UpdateError;
 use tetralod::mt::UpdateId;
 use tetralod::mt::VertexId;
-use tetralod::mt::stats;
-
-fn explicit(built: &Built) -> ExplicitMt {
-    ExplicitMt::of(&built.edge_mt()).expect("a valid MT")
-}
-
-/// Positions and levels at the corners of a tetrahedron.
-type Seen = ([[i32; 3]; 4], [i32; 4]);
 
 /// One MT and its current mesh.
 struct Walk<M> {
@@ -59,89 +47,6 @@ impl<M: MultiTessellation> Walk<M> {
             .collect();
         tets.sort_unstable();
         tets
-    }
-
-    /// What criteria are shown of the tetrahedra that `u+` removed, in any order.
-    fn look(&mut self, u: UpdateId, field: usize) -> Option<Vec<Seen>> {
-        let mut seen = Vec::new();
-        let mut look = |corners: &[[i32; 3]; 4], levels: &dyn Fn(usize) -> [i32; 4], _: u8| {
-            let levels = levels(field);
-            let mut both = [0, 1, 2, 3].map(|i| (corners[i], levels[i]));
-            both.sort_unstable();
-            seen.push((both.map(|(p, _)| p), both.map(|(_, q)| q)));
-            false
-        };
-        let looked = self.mt.look_at_removed(&mut self.mesh, u, &mut look);
-        seen.sort_unstable();
-        (looked.expect("a valid MT") == Applied::Done).then_some(seen)
-    }
-}
-
-proptest! {
-    #![proptest_config(config(48, 11))]
-
-    /// Random updates forwards and backwards: both structures allow the same ones and make the same mesh.
-    #[test]
-    fn both_structures_make_the_same_meshes(plan in plan(5, 2, 1..300), seed in any::<u64>()) {
-        let built = build(plan);
-        prop_assume!(!built.splits.is_empty());
-        let (mut edge, mut spelled) = (Walk::new(built.edge_mt()), Walk::new(explicit(&built)));
-        let mut random = Random(seed);
-        let mut set = vec![false; built.splits.len()];
-        let mut refining = true;
-        for step in 0..1500 {
-            if random.once_in(150) {
-                refining = !refining;
-            }
-            let at = random.below(set.len());
-            let u = UpdateId(at as u32);
-            if set[at] == refining && !random.once_in(8) {
-                continue;
-            }
-            let field = random.below(built.info.fields.len());
-            if set[at] {
-                prop_assert_eq!(edge.look(u, field), spelled.look(u, field));
-            }
-            let done = edge.step(u, set[at]);
-            prop_assert_eq!(spelled.step(u, set[at]), done);
-            set[at] ^= done;
-            prop_assert!(!spelled.mt.may_coarsen(&spelled.mesh, u) || set[at]);
-            if random.once_in(40) {
-                edge.mesh.compact();
-                spelled.mesh.compact();
-            }
-            prop_assert_eq!(edge.mesh.hash(), spelled.mesh.hash());
-            if step % 50 == 0 {
-                prop_assert_eq!(edge.tets(), spelled.tets());
-                prop_assert_eq!(spelled.mesh.check(), Ok(()));
-            }
-        }
-        prop_assert_eq!(edge.tets(), spelled.tets());
-    }
-
-    /// Spelled out and turned back, an edge-based MT is what it was.
-    #[test]
-    fn an_edge_mt_comes_back_from_the_explicit_one(plan in plan(5, 2, 0..300)) {
-        let edge = Mt::from(build(plan).edge_mt());
-        let spelled = edge.convert(MtKind::Explicit).expect("a valid MT");
-        prop_assert_eq!(spelled.info().kind, MtKind::Explicit);
-        prop_assert_eq!(spelled.convert(MtKind::Edge), Ok(edge.clone()));
-        prop_assert_eq!(spelled.convert(MtKind::Explicit), Ok(spelled.clone()));
-        let (of_edge, of_spelled) = (stats(&edge).expect("valid"), stats(&spelled).expect("valid"));
-        prop_assert_eq!(of_edge.explicit_bytes, of_spelled.explicit_bytes);
-        prop_assert_eq!((of_edge.arcs, of_edge.depth), (of_spelled.arcs, of_spelled.depth));
-        prop_assert_eq!(of_edge.bounds, of_spelled.bounds);
-    }
-
-    /// What the structure really holds is within the paper's estimate [§3], by all vertices and tetrahedra of the MT;
-    /// the base mesh, which is small, is held twice.
-    #[test]
-    fn explicit_bytes_are_within_the_estimate(plan in plan(5, 2, 0..300)) {
-        let mt = explicit(&build(Plan { fields: 1, ..plan }));
-        let base = mt.base_mesh();
-        let twice = 16 * (base.positions.len() + base.tets.len());
-        let estimate = 24 * mt.vertices() as usize + 28 * mt.tets().len();
-        prop_assert!(mt.held_bytes() as usize <= estimate + twice + 12);
     }
 }
 
