@@ -1,11 +1,11 @@
 //! How much of a file requests need: the first useful picture, and a box at full resolution.
 
 use super::Result;
-use super::guarantee_support::Interpolant;
-use super::guarantee_support::Mesh;
-use super::guarantee_support::Surface;
 use super::sets;
 use super::sets::Set;
+use super::surfaces::Interpolant;
+use super::surfaces::Mesh;
+use super::surfaces::Surface;
 use std::io::Cursor;
 use std::time::Duration;
 use tetralod::builder::Purpose;
