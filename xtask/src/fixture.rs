@@ -71,7 +71,7 @@ fn make_one(tetralod: &Path, grid: &Path, mt: &Path, hashes: &Path, arguments: &
 
 /// The native command, optimised, built if necessary.
 pub fn tetralod() -> Result<PathBuf> {
-    shell::run(&mut shell::cargo(["build", "--release", "--package", "tetralod", "--bin", "tetralod"]))?;
+    shell::run(&mut shell::cargo(["build", "--release", "--package", "tetralod-cli"]))?;
     Ok(shell::root().join("target/release").join(format!("tetralod{}", std::env::consts::EXE_SUFFIX)))
 }
 

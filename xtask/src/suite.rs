@@ -64,7 +64,7 @@ fn fmt() -> Result<()> {
 }
 
 /// The feature sets that are shipped, and the core alone, which must not need any of them.
-const LIBRARIES: [&str; 5] = ["", "build", "gpu", "http", "cli,gpu"];
+const LIBRARIES: [&str; 5] = ["", "build", "gpu", "http", "build,http,gpu"];
 
 /// What goes into the package.
 const WEB_LIBRARIES: [&str; 2] = ["web", "web,gpu"];
@@ -93,14 +93,12 @@ fn lint_library(features: &str, target: &[&str]) -> Result<()> {
 
 fn doc() -> Result<()> {
     let mut command =
-        shell::cargo(["doc", "--package", "tetralod", "--lib", "--no-deps", "--features", "gpu,web"]);
+        shell::cargo(["doc", "--package", "tetralod", "--lib", "--no-deps", "--features", "http,gpu,web"]);
     shell::run(command.env("RUSTDOCFLAGS", "-D warnings"))
 }
 
 fn native() -> Result<()> {
     shell::run(&mut shell::cargo(["test", "--workspace"]))?;
-    let servers = ["test", "--package", "tetralod", "--features", "http", "--lib", "--test", "stream_*"];
-    shell::run(&mut shell::cargo(servers))?;
     // The renderer against its twin on the CPU. Its output is shown: where there is no Vulkan adapter, not even Mesa's
     // lavapipe in software (package `mesa-vulkan-drivers`), the tests say that they were skipped.
     let args = [
