@@ -1,12 +1,11 @@
 //! Promise: the commands in README.md work as they stand there, in that order, and answer with the lines shown there.
 //!
 //! Values are not compared: they change with the builder, and times with the machine. What is shown is brought up to
-//! date by `TETRALOD_UPDATE_README=1 cargo test --release --test readme`.
-#![cfg(feature = "cli")]
+//! date by `TETRALOD_UPDATE_README=1 cargo test --release --package tetralod-cli readme`.
 
+use crate::support::{self, text};
 use std::fs;
 use std::path::Path;
-use std::process::Command;
 
 const START: &str = "```console";
 const PROMPT: &str = "$ tetralod ";
@@ -44,15 +43,15 @@ fn without_values(readme: &str) -> String {
 }
 
 fn run(command: &str, folder: &Path) -> String {
-    let mut program = Command::new(env!("CARGO_BIN_EXE_tetralod"));
-    let output = program.args(command.split(' ')).current_dir(folder).output().expect("the command starts");
-    assert!(output.status.success(), "{command}: {}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).expect("UTF-8")
+    let mut program = support::command(&command.split(' ').collect::<Vec<_>>());
+    let output = program.current_dir(folder).output().expect("the command starts");
+    assert!(output.status.success(), "{command}: {}", text(&output.stderr));
+    text(&output.stdout).to_owned()
 }
 
 #[test]
 fn every_command_works_and_answers_as_shown() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../README.md");
     let readme = fs::read_to_string(&path).expect("README.md");
     for command in ["generate", "build", "convert", "info", "extract", "verify", "bench"] {
         let example = format!("\n{PROMPT}{command} ");
