@@ -1,7 +1,7 @@
 // The demo page in a real browser, with WebGPU, on the demo's data. The pictures that it makes are kept in
 // `target/e2e/` to be looked at.
 import assert from "node:assert/strict";
-import { mkdir, writeFile } from "node:fs/promises";
+import { mkdir, readFile, writeFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
 import { fileURLToPath } from "node:url";
 import { address, launch } from "./browser.js";
@@ -48,10 +48,14 @@ async function setSlider(page, id, value) {
   return demo(page, "stats");
 }
 
-/** A picture of the canvas, kept under `name`; how many colours it has and a hash of it. */
+/** A picture of the canvas, kept under `name`, studied. */
 async function picture(page, name) {
   await settle(page);
-  const png = await page.locator("#canvas").screenshot({ path: fileURLToPath(new URL(`${name}.png`, pictures)) });
+  return study(page, await page.locator("#canvas").screenshot({ path: fileURLToPath(new URL(`${name}.png`, pictures)) }));
+}
+
+/** How many colours a picture has, how much of it is its most frequent one, and some of its pixels. */
+function study(page, png) {
   return page.evaluate(async (base64) => {
     const bytes = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
     const image = await createImageBitmap(new Blob([bytes], { type: "image/png" }));
@@ -131,6 +135,27 @@ test("the page streams a volume, draws it, and its settings change mesh and pict
   await page.locator("#n-blocks").scrollIntoViewIfNeeded();
   await page.screenshot({ path: fileURLToPath(new URL("page-numbers.png", pictures)) });
   assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("the page of the README draws the volume", async () => {
+  const readme = await readFile(new URL("../../README.md", import.meta.url), "utf8");
+  const [, html] = /```html\n([^]*?)```/.exec(readme);
+  const page = await browser.newPage({ viewport: { width: 500, height: 500 } });
+  const complaints = [];
+  page.on("pageerror", (error) => complaints.push(String(error)));
+  // The package and the volume are on the server; the page lies beside them.
+  await page.route("**/readme.html", (route) => route.fulfill({ contentType: "text/html", body: html }));
+  await page.route("**/bucky.mt", (route) => route.continue({ url: `${address()}data/bucky.mt` }));
+  await page.goto(`${address()}readme.html`);
+  const canvas = page.locator("canvas");
+  let seen;
+  for (const deadline = Date.now() + PATIENCE; Date.now() < deadline; await page.waitForTimeout(500)) {
+    seen = await study(page, await canvas.screenshot({ path: fileURLToPath(new URL("readme.png", pictures)) }));
+    if (seen.colours > 50) break;
+  }
+  assertDrawn(seen);
+  assert.deepEqual(complaints, []);
   await page.close();
 });
 
