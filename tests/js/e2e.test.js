@@ -140,28 +140,43 @@ test("the page streams a volume, draws it, and its settings change mesh and pict
   await page.close();
 });
 
-test("the page of the README draws the volume", async () => {
-  const readme = await readFile(new URL("../../README.md", import.meta.url), "utf8");
-  const [, html] = /```html\n([^]*?)```/.exec(readme);
-  const page = await browser.newPage({ viewport: { width: 500, height: 500 } });
-  const complaints = [];
-  page.on("pageerror", (error) => complaints.push(String(error)));
-  // The package and the volume are on the server; the page lies beside them.
-  await page.route("**/readme.html", (route) => route.fulfill({ contentType: "text/html", body: html }));
-  await page.route("**/bucky.mt", (route) => route.continue({ url: `${address()}data/bucky.mt` }));
-  await page.goto(`${address()}readme.html`);
-  // Until it shows the volume, and the same for a while.
-  let seen;
-  for (let [before, still] = [[], 0]; still < 3; before = seen.pixels) {
-    await page.waitForTimeout(500);
-    seen = await study(page, await page.locator("canvas").screenshot({ path: fileURLToPath(new URL("readme.png", pictures)) }));
-    still = seen.covered > 0.1 && String(seen.pixels) === String(before) ? still + 1 : 0;
-  }
-  assertDrawn(seen);
-  assert.ok(seen.covered > 0.1, `${(100 * seen.covered).toFixed(1)} % of the picture shows the volume`);
-  assert.deepEqual(complaints, []);
-  await page.close();
-});
+/** The block of a page in the repository that begins like this. */
+async function block(page, start) {
+  const text = await readFile(new URL(`../../${page}`, import.meta.url), "utf8");
+  return text.slice(text.indexOf(start) + start.indexOf("\n") + 1).split("```")[0];
+}
+
+/** A page that draws, around the example of the package's README. */
+const around = (code) => `<!doctype html>
+<canvas style="width: 100%; height: 90vh"></canvas>
+<script type="importmap">{ "imports": { "tetralod/viewer": "./pkg/viewer.js" } }</script>
+<script type="module">${code}</script>`;
+
+for (const [name, html] of [
+  ["README", await block("README.md", "```html\n<!doctype html>")],
+  ["package's README", around(await block("pkg-template/README.md", "```js\nimport { Viewer }"))],
+]) {
+  test(`the page of the ${name} draws the volume`, async () => {
+    const page = await browser.newPage({ viewport: { width: 500, height: 500 } });
+    const complaints = [];
+    page.on("pageerror", (error) => complaints.push(String(error)));
+    // The package and the volume are on the server; the page lies beside them.
+    await page.route("**/readme.html", (route) => route.fulfill({ contentType: "text/html", body: html }));
+    await page.route(/(bucky|combustor)\.mt$/, (route) => route.continue({ url: `${address()}data/bucky.mt` }));
+    await page.goto(`${address()}readme.html`);
+    // Until it shows the volume, and the same for a while.
+    let seen;
+    for (let [before, still] = [[], 0]; still < 3; before = seen.pixels) {
+      await page.waitForTimeout(500);
+      const path = fileURLToPath(new URL(`${name.replaceAll(/\W/g, "-")}.png`, pictures));
+      seen = await study(page, await page.locator("canvas").screenshot({ path }));
+      still = seen.covered > 0.1 && String(seen.pixels) === String(before) ? still + 1 : 0;
+    }
+    assertDrawn(seen);
+    assert.deepEqual(complaints, []);
+    await page.close();
+  });
+}
 
 test("the first picture is there before the file is", async () => {
   const page = await open("data/bucky.mt?throttle=100000");
