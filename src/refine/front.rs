@@ -10,7 +10,7 @@ use super::Verdict;
 use super::ranked::Ranked;
 use super::sweep::Window;
 use super::sweep::window_size;
-use super::watch::Waiting;
+use super::timing_wheel::TimingWheels;
 use crate::mt::Applied;
 use crate::mt::BaseMeshError;
 use crate::mt::CurrentMesh;
@@ -44,10 +44,10 @@ pub struct Front {
     /// Whether `tets` and `leaves` account for the whole mesh.
     watched: bool,
     /// Tetrahedra that do not violate the criterion, by when they may.
-    pub(super) tets: Waiting,
+    pub(super) tets: TimingWheels,
     /// Applied updates without applied children, by when nothing may ask for them any more; others that have got children
     /// since among them.
-    pub(super) leaves: Waiting,
+    pub(super) leaves: TimingWheels,
     /// Updates that tetrahedra ask for, the first one last, each with the tetrahedron and for how long that asks.
     pending: Vec<Asked>,
     /// Updates that are not here but that something waits for, each with a tetrahedron: the update removes it, or what removes
@@ -252,8 +252,8 @@ impl Front {
             chunks: Vec::new(),
             goal: None,
             watched: false,
-            tets: Waiting::default(),
-            leaves: Waiting::default(),
+            tets: TimingWheels::default(),
+            leaves: TimingWheels::default(),
             pending: Vec::new(),
             awaiting: BTreeSet::new(),
             ranked: Ranked::default(),

@@ -37,13 +37,13 @@ mod camera;
 mod criterion;
 mod custom;
 mod front;
-mod game;
 mod palette;
 mod ranked;
 mod request;
 mod shape;
 mod sweep;
-mod watch;
+mod tet_minimax;
+mod timing_wheel;
 
 pub use criterion::{ANY, Criterion, DIALS, LodCriterion, TetLook, Tolerance, Verdict};
 pub use custom::Custom;

@@ -7,7 +7,7 @@ use super::NO_NORMAL;
 use super::crossings::Crossing;
 use super::cut;
 use super::cut::WANTED;
-use super::known::Known;
+use super::mesh_snapshot::MeshSnapshot;
 use crate::mesh::NONE;
 use crate::view::MeshView;
 
@@ -66,13 +66,13 @@ impl Gradients {
         unit([0, 1, 2].map(|i| -(g[i] + t * (h[i] - g[i])))).unwrap_or(NO_NORMAL)
     }
 
-    /// Makes the gradients at `points` known, as far as they are not. With what is `known` of the mesh, few points
+    /// Makes the gradients at `points` known, as far as they are not. With a `snapshot` of the mesh, few points
     /// cost no pass over it. `sides` is scratch space.
     pub fn sum(
         &mut self,
         mesh: &MeshView<'_>,
         points: impl Iterator<Item = u32>,
-        known: Option<&mut Known>,
+        snapshot: Option<&mut MeshSnapshot>,
         sides: &mut Vec<u8>,
     ) {
         let start = self.points.len();
@@ -89,12 +89,12 @@ impl Gradients {
             return;
         }
         let mut found = Vec::new();
-        match known {
-            Some(known) if new < mesh.tets.len() / FEW => {
+        match snapshot {
+            Some(snapshot) if new < mesh.tets.len() / FEW => {
                 let mut lost = Vec::new();
                 for slot in start..self.points.len() {
                     let point = self.points[slot];
-                    if known.star(mesh, point, &mut found) {
+                    if snapshot.star(mesh, point, &mut found) {
                         self.means[slot] = sum_of(mesh, &mut found);
                     } else {
                         lost.push(point);

@@ -21,8 +21,8 @@ mod changes;
 mod crossings;
 mod cut;
 mod gradients;
-mod known;
 mod links;
+mod mesh_snapshot;
 mod update;
 
 use crate::mesh::NONE;
@@ -34,8 +34,8 @@ use gradients::Gradients;
 use gradients::cross;
 use gradients::sub;
 use gradients::unit;
-use known::Known;
 use links::Links;
+use mesh_snapshot::MeshSnapshot;
 
 /// What the normals of a surface are made of.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -79,7 +79,7 @@ pub struct IsoSurface {
     state: State,
     /// How many tetrahedra the mesh had that came last.
     tets: usize,
-    known: Option<Box<Known>>,
+    snapshot: Option<Box<MeshSnapshot>>,
     /// There from the first edit after an extraction on.
     links: Option<Box<Links>>,
     changed_vertices: Marks,
@@ -130,7 +130,7 @@ impl IsoSurface {
     /// # Panics
     /// If the mesh names a point that it does not have.
     pub fn extract_all(&mut self, mesh: &MeshView<'_>, values: &[f64]) {
-        self.known = None;
+        self.snapshot = None;
         self.rebuild(mesh, distinct(values));
     }
 
@@ -157,7 +157,7 @@ impl IsoSurface {
         self.indices.clear();
         self.owners.clear();
         self.crossings.clear();
-        if self.known.is_none() || self.kind == NormalKind::Smooth {
+        if self.snapshot.is_none() || self.kind == NormalKind::Smooth {
             self.gradients.clear(points);
         }
         for which in 0..self.isovalues.len() {
@@ -173,8 +173,8 @@ impl IsoSurface {
     /// Finds the tetrahedra that are cut at `value`.
     fn find_cut(&mut self, mesh: &MeshView<'_>, value: f32) {
         self.cut.clear();
-        if let Some(known) = self.known.as_ref().filter(|known| !known.is_passed_widely(value)) {
-            for block in known.blocks_at(value) {
+        if let Some(snapshot) = self.snapshot.as_ref().filter(|snapshot| !snapshot.is_passed_widely(value)) {
+            for block in snapshot.blocks_at(value) {
                 let first = block * cut::BLOCK;
                 let tets = &mesh.tets[first..mesh.tets.len().min(first + cut::BLOCK)];
                 cut::find_cut_in_block(tets, first as u32, (mesh.field, value), &mut self.cut);
@@ -206,7 +206,7 @@ impl IsoSurface {
         let by_gradient = self.kind == NormalKind::Gradient;
         if by_gradient {
             let ends = crossings.list.iter().flat_map(|crossing| crossing.ends);
-            gradients.sum(mesh, ends, self.known.as_deref_mut(), &mut self.sides);
+            gradients.sum(mesh, ends, self.snapshot.as_deref_mut(), &mut self.sides);
         }
         let count = crossings.list.len();
         positions.reserve(count);

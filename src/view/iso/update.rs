@@ -12,10 +12,10 @@ use super::UP;
 use super::cut;
 use super::distinct;
 use super::gradients::unit;
-use super::known::Bits;
-use super::known::Dirty;
-use super::known::Known;
 use super::links::Links;
+use super::mesh_snapshot::Bits;
+use super::mesh_snapshot::Dirty;
+use super::mesh_snapshot::MeshSnapshot;
 use crate::mesh::NONE;
 use crate::view::MeshView;
 use std::ops::Range;
@@ -75,13 +75,13 @@ impl IsoSurface {
         let old_tets = self.tets;
         let new_tets = mesh.tets.len();
         let is_similar = old_tets.abs_diff(new_tets) <= new_tets / SIMILAR;
-        let Some(mut known) = self.known.take().filter(|_| is_similar) else {
+        let Some(mut snapshot) = self.snapshot.take().filter(|_| is_similar) else {
             self.rebuild(mesh, isovalues);
-            self.known = (was != State::New && is_similar).then(|| Box::new(Known::new(mesh)));
+            self.snapshot = (was != State::New && is_similar).then(|| Box::new(MeshSnapshot::new(mesh)));
             return;
         };
-        let dirty = known.catch_up(mesh, changed_vertices, changed_tets);
-        self.known = Some(known);
+        let dirty = snapshot.catch_up(mesh, changed_vertices, changed_tets);
+        self.snapshot = Some(snapshot);
         if same && dirty.tets.len() <= new_tets / LITTLE {
             self.state = now;
             self.tets = new_tets;
@@ -198,7 +198,7 @@ impl IsoSurface {
             self.renew_gradients(mesh, dirty, links, &mut renew);
             let list = &self.crossings.list;
             let ends = renew.vertices.iter().flat_map(|v| list[*v as usize].ends);
-            self.gradients.sum(mesh, ends, self.known.as_deref_mut(), &mut self.sides);
+            self.gradients.sum(mesh, ends, self.snapshot.as_deref_mut(), &mut self.sides);
         }
         for &v in &renew.vertices {
             let mut normal = NO_NORMAL;
@@ -220,7 +220,7 @@ impl IsoSurface {
     /// Sets gradients anew that are not what they were, and adds the vertices that use them.
     fn renew_gradients(&mut self, mesh: &MeshView<'_>, dirty: &Dirty, links: &Links, renew: &mut Edit) {
         self.gradients.resize(mesh.positions.len());
-        let Some(known) = &mut self.known else { return };
+        let Some(snapshot) = &mut self.snapshot else { return };
         let list = &self.crossings.list;
         let mut star = Vec::new();
         let mut lost = Bits::default();
@@ -229,7 +229,7 @@ impl IsoSurface {
             if !self.gradients.has(point) {
                 continue;
             }
-            if !known.star(mesh, point, &mut star) {
+            if !snapshot.star(mesh, point, &mut star) {
                 self.gradients.forget(point);
                 lost.insert(point);
                 any_lost = true;

@@ -12,7 +12,7 @@ use std::ops::Range;
 /// Per 64 tetrahedra the smallest and the largest value; per tetrahedron and per point a copy; per point a
 /// tetrahedron and how many there are. 16.3 bytes a tetrahedron and 24 bytes a point.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Known {
+pub(super) struct MeshSnapshot {
     tets: Vec<[u32; 4]>,
     /// Position and value, as bits.
     points: Vec<[u32; 4]>,
@@ -70,9 +70,9 @@ impl Bits {
     }
 }
 
-impl Known {
+impl MeshSnapshot {
     pub fn new(mesh: &MeshView<'_>) -> Self {
-        let mut known = Self {
+        let mut snapshot = Self {
             tets: mesh.tets.to_vec(),
             points: (0..mesh.positions.len()).map(|p| bits(mesh, p)).collect(),
             stars: vec![Star { tet: NONE, count: 0 }; mesh.positions.len()],
@@ -80,9 +80,9 @@ impl Known {
             seen: Bits::default(),
         };
         for (t, tet) in (0..).zip(mesh.tets) {
-            known.add(t, *tet);
+            snapshot.add(t, *tet);
         }
-        known
+        snapshot
     }
 
     fn add(&mut self, t: u32, tet: [u32; 4]) {
