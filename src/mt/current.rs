@@ -25,8 +25,7 @@ use super::ring::Ring;
 use super::ring::TURN;
 use super::taken::Taken;
 use super::tet_errors::TetErrors;
-use crate::mesh::FACES;
-use crate::mesh::NONE;
+use crate::mesh::{BitSet, ChangedBlocks, FACES, NONE};
 use std::ops::Range;
 
 /// The labels of the vertex in a slot.
@@ -77,13 +76,13 @@ pub struct CurrentMesh {
     scratch: Option<Box<Scratch>>,
     /// For half-edge MTs.
     pub(super) stars: KnownStars,
-    changed_vertices: Changes,
-    changed_tets: Changes,
+    changed_vertices: ChangedBlocks,
+    changed_tets: ChangedBlocks,
     /// The tetrahedra of the stars that updates changed since the list was last cleared, and where others were moved;
     /// free slots among them.
     touched: Vec<u32>,
     /// Updates that have been applied before and so need not be checked again: their stars are always the same.
-    proven: Vec<u64>,
+    proven: BitSet,
     /// Base vertices whose star is not connected through faces: they cannot be split.
     pinched: Vec<u32>,
 }
@@ -167,10 +166,10 @@ impl CurrentMesh {
             cavity: None,
             scratch: None,
             stars: KnownStars::default(),
-            changed_vertices: Changes::all(vertices),
-            changed_tets: Changes::all(base.tets.len()),
+            changed_vertices: ChangedBlocks::all(vertices),
+            changed_tets: ChangedBlocks::all(base.tets.len()),
             touched: Vec::new(),
-            proven: Vec::new(),
+            proven: BitSet::default(),
             pinched: Vec::new(),
         };
         mesh.find_pinched();
@@ -208,25 +207,18 @@ impl CurrentMesh {
     /// Whether update `u` has been applied before.
     #[inline]
     pub(crate) fn is_proven(&self, u: u32) -> bool {
-        self.proven.get(u as usize / 64).is_some_and(|w| w >> (u % 64) & 1 == 1)
+        self.proven.has(u)
     }
 
     #[inline]
     pub(crate) fn set_proven(&mut self, u: u32) {
-        let word = u as usize / 64;
-        if word >= self.proven.len() {
-            self.proven.resize(word + 1, 0);
-        }
-        self.proven[word] |= 1 << (u % 64);
+        self.proven.insert(u);
     }
 
     /// Updates from this one on are to be checked again: what was not known of when they were applied may have to come
     /// before them.
     pub(crate) fn forget_proven(&mut self, from: u32) {
-        self.proven.truncate((from as usize).div_ceil(64));
-        if let Some(word) = self.proven.get_mut(from as usize / 64) {
-            *word &= (1 << (from % 64)) - 1;
-        }
+        self.proven.truncate(from);
     }
 
     /// Forgets memory of vertices that are not in the mesh.
@@ -362,12 +354,11 @@ impl CurrentMesh {
             + size_of_val(&self.touched[..]);
         let of_the_mt = self.slot_of.bytes()
             + self.place_of.bytes()
-            + size_of_val(&self.proven[..])
+            + size_of_val(self.proven.words())
             + size_of_val(&self.pinched[..])
             + self.taken.as_ref().map_or(0, |taken| taken.bytes());
         let errors = self.tet_errors.as_ref().map_or(0, |errors| errors.bytes());
-        let changes =
-            size_of_val(&self.changed_vertices.blocks[..]) + size_of_val(&self.changed_tets.blocks[..]);
+        let changes = self.changed_vertices.bytes() + self.changed_tets.bytes();
         let scratch = self.ring.as_ref().map_or(0, |ring| size_of_val(&**ring))
             + self.cavity.as_ref().map_or(0, |cavity| size_of_val(&**cavity))
             + self.scratch.as_ref().map_or(0, |scratch| size_of_val(&**scratch));
@@ -1182,63 +1173,6 @@ pub struct MeshChanges {
     pub vertices: Vec<Range<u32>>,
     /// Changed ranges of tetrahedron slots.
     pub tets: Vec<Range<u32>>,
-}
-
-/// Changed entries of an array, by blocks.
-#[derive(Clone, Debug, Default)]
-struct Changes {
-    blocks: Vec<u64>,
-}
-
-/// log2 of the entries in a block: 1 KiB of tetrahedra.
-const BLOCK_BITS: u32 = 6;
-
-impl Changes {
-    fn all(len: usize) -> Self {
-        let mut changes = Self::default();
-        (0..len.next_multiple_of(1 << BLOCK_BITS))
-            .step_by(1 << BLOCK_BITS)
-            .for_each(|i| changes.mark(i as u32));
-        changes
-    }
-
-    #[inline]
-    fn mark(&mut self, entry: u32) {
-        let block = entry >> BLOCK_BITS;
-        let (word, bit) = ((block / 64) as usize, 1 << (block % 64));
-        match self.blocks.get_mut(word) {
-            Some(word) => *word |= bit,
-            None => self.grow(word, bit),
-        }
-    }
-
-    #[cold]
-    fn grow(&mut self, word: usize, bit: u64) {
-        self.blocks.resize(word + 1, 0);
-        self.blocks[word] = bit;
-    }
-
-    fn truncate(&mut self, len: usize) {
-        self.blocks.truncate(len.div_ceil(64 << BLOCK_BITS));
-    }
-
-    fn take(&mut self, len: usize) -> Vec<Range<u32>> {
-        let mut ranges: Vec<Range<u32>> = Vec::new();
-        for (i, word) in self.blocks.iter_mut().enumerate() {
-            let mut bits = std::mem::take(word);
-            while bits != 0 {
-                let block = i as u32 * 64 + bits.trailing_zeros();
-                bits &= bits - 1;
-                let (start, end) = (block << BLOCK_BITS, ((block + 1) << BLOCK_BITS).min(len as u32));
-                match ranges.last_mut() {
-                    _ if start >= end => {}
-                    Some(last) if last.end == start => last.end = end,
-                    _ => ranges.push(start..end),
-                }
-            }
-        }
-        ranges
-    }
 }
 
 #[cfg(test)]

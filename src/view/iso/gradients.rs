@@ -4,12 +4,10 @@
 //! depends on the mesh alone to the last bit.
 
 use super::NO_NORMAL;
-use super::crossings::Crossing;
-use super::cut;
-use super::cut::WANTED;
-use super::mesh_snapshot::MeshSnapshot;
 use crate::mesh::NONE;
 use crate::view::MeshView;
+use crate::view::marching::{Crossing, select};
+use crate::view::mesh_snapshot::MeshSnapshot;
 
 /// Gradients of some of the points.
 #[derive(Clone, Debug, Default)]
@@ -67,13 +65,13 @@ impl Gradients {
     }
 
     /// Makes the gradients at `points` known, as far as they are not. With a `snapshot` of the mesh, few points
-    /// cost no pass over it. `sides` is scratch space.
+    /// cost no pass over it. `wanted` is scratch space.
     pub fn sum(
         &mut self,
         mesh: &MeshView<'_>,
         points: impl Iterator<Item = u32>,
         snapshot: Option<&mut MeshSnapshot>,
-        sides: &mut Vec<u8>,
+        wanted: &mut Vec<u8>,
     ) {
         let start = self.points.len();
         for point in points {
@@ -101,12 +99,12 @@ impl Gradients {
                     }
                 }
                 if !lost.is_empty() {
-                    self.pass(mesh, &lost, sides, &mut found);
+                    self.pass(mesh, &lost, wanted, &mut found);
                 }
             }
             _ => {
                 let points = std::mem::take(&mut self.points);
-                self.pass(mesh, &points[start..], sides, &mut found);
+                self.pass(mesh, &points[start..], wanted, &mut found);
                 self.points = points;
             }
         }
@@ -121,16 +119,16 @@ impl Gradients {
     }
 
     /// Sums the gradients at `points` in one pass over the mesh.
-    fn pass(&mut self, mesh: &MeshView<'_>, points: &[u32], sides: &mut Vec<u8>, found: &mut Vec<u32>) {
-        sides.clear();
-        sides.resize(mesh.positions.len(), 0);
-        points.iter().for_each(|point| sides[*point as usize] = WANTED);
+    fn pass(&mut self, mesh: &MeshView<'_>, points: &[u32], wanted: &mut Vec<u8>, found: &mut Vec<u32>) {
+        wanted.clear();
+        wanted.resize(mesh.positions.len(), 0);
+        points.iter().for_each(|point| wanted[*point as usize] = 1);
         found.clear();
-        cut::find_wanted(mesh.tets, sides, found);
+        select(mesh.tets, 0, found, |tet| tet.iter().fold(0, |all, p| all | wanted[*p as usize]) != 0);
         for t in found {
             let term = weighted(mesh, *t);
             for point in mesh.tets[*t as usize] {
-                if sides[point as usize] != 0 {
+                if wanted[point as usize] != 0 {
                     let sum = &mut self.means[self.slots[point as usize] as usize];
                     *sum = add(*sum, term);
                 }
