@@ -26,7 +26,8 @@ use super::mesh_snapshot::MeshSnapshot;
 use super::{MeshView, SurfaceChanges};
 use crate::mesh::BLOCK;
 use block_ranges::BlockRanges;
-use gradients::{Gradients, cross, sub, unit};
+use glam::DVec3;
+use gradients::{Gradients, unit};
 
 /// What the normals of a surface are made of.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -200,12 +201,10 @@ impl IsoSurface {
         if !self.normals.contains(&NO_NORMAL) {
             return;
         }
-        let mut sums = vec![[0.0; 3]; self.normals.len()];
+        let mut sums = vec![DVec3::ZERO; self.normals.len()];
         for triangle in &self.indices {
             let area = self.area(*triangle);
-            for v in triangle {
-                (0..3).for_each(|i| sums[*v as usize][i] += area[i]);
-            }
+            triangle.iter().for_each(|v| sums[*v as usize] += area);
         }
         for (normal, sum) in self.normals.iter_mut().zip(sums).filter(|(normal, _)| **normal == NO_NORMAL) {
             *normal = unit(sum).unwrap_or(UP);
@@ -213,9 +212,9 @@ impl IsoSurface {
     }
 
     /// Twice the area of a triangle, along its normal.
-    fn area(&self, triangle: [u32; 3]) -> [f64; 3] {
-        let [a, b, c] = triangle.map(|v| self.positions[v as usize].map(f64::from));
-        cross(sub(b, a), sub(c, a))
+    fn area(&self, triangle: [u32; 3]) -> DVec3 {
+        let [a, b, c] = triangle.map(|v| DVec3::from(self.positions[v as usize].map(f64::from)));
+        (b - a).cross(c - a)
     }
 }
 

@@ -12,6 +12,7 @@ use crate::mesh::BitSet;
 use crate::view::MeshView;
 use crate::view::marching::{Crossing, Vertices};
 use crate::view::mesh_snapshot::{Dirty, MeshSnapshot};
+use glam::DVec3;
 use std::ops::Range;
 
 /// A mesh of a size that differs by more than this part is another mesh.
@@ -171,11 +172,8 @@ impl IsoSurface {
 
     /// The mean direction of the triangles at a vertex, summed in the order of an extraction.
     fn fan_normal(&self, v: u32) -> [f32; 3] {
-        let mut sum = [0.0; 3];
-        for triangle in self.pieces.ordered_fan(v) {
-            let area = self.area(self.indices[triangle as usize]);
-            (0..3).for_each(|i| sum[i] += area[i]);
-        }
+        let fan = self.pieces.ordered_fan(v).into_iter();
+        let sum = fan.fold(DVec3::ZERO, |sum, triangle| sum + self.area(self.indices[triangle as usize]));
         unit(sum).unwrap_or(UP)
     }
 }
