@@ -1,8 +1,8 @@
 //! The way to a request without a tight budget: what violates it is refined, what nothing asks for is undone.
 
-use super::front::{Asked, Front, GoOn};
+use super::front::{Asked, Front, GoOn, Task};
 use super::look::{Open, TetErrors};
-use super::{Budget, Criterion, Outcome, TetLook, Verdict};
+use super::{TetLook, Verdict};
 use crate::mt::{Applied, CurrentMesh, MAX_QUARTERINGS, MultiTessellation, UpdateError, UpdateId};
 
 /// What came of the wish to apply an update with all that it depends on.
@@ -34,31 +34,28 @@ impl Front {
     /// budget. Then what is left is asked for, and the mesh only grows to what it is in the end.
     pub(super) fn converge(
         &mut self,
-        mt: &impl MultiTessellation,
-        criterion: &dyn Criterion,
-        budget: Budget,
-        outcome: &mut Outcome,
+        task: &mut Task<'_, impl MultiTessellation>,
         go_on: GoOn<'_>,
     ) -> Result<Way, UpdateError> {
-        self.watch_all(mt);
-        if !budget.is_unlimited() {
+        self.watch_all(task.mt);
+        if !task.budget.is_unlimited() {
             while let Some(u) = self.leaves.next().map(UpdateId) {
-                self.coarsen_unless_needed(mt, criterion, u, outcome)?;
+                self.coarsen_unless_needed(task, u)?;
             }
-            if !budget.holds(self.mesh.vertex_count(), self.mesh.tet_count()) {
+            if !task.budget.holds(self.mesh.vertex_count(), self.mesh.tet_count()) {
                 return Ok(Way::Full);
             }
         }
         loop {
-            while let Some(asked) = self.next_asked(mt, criterion, outcome) {
+            while let Some(asked) = self.next_asked(task) {
                 if self.contains(asked.update) {
                     continue;
                 }
                 // Between two steps holes are filled, and what was asked by then has moved.
-                if self.is_removed_by(mt, asked.tet, asked.update) {
-                    mt.start_at(&mut self.mesh, asked.tet);
+                if self.is_removed_by(task.mt, asked.tet, asked.update) {
+                    task.mt.start_at(&mut self.mesh, asked.tet);
                 }
-                match self.force(mt, asked.update, outcome)? {
+                match self.force(task, asked.update)? {
                     // It is a leaf now; those that it forced are none.
                     Forced::Applied => {
                         self.leaves.defer(asked.update.0, asked.verdict.slack, asked.verdict.dial);
@@ -70,15 +67,15 @@ impl Front {
                     }
                 }
                 self.open_touched();
-                if !budget.holds(self.mesh.vertex_count(), self.mesh.tet_count()) {
+                if !task.budget.holds(self.mesh.vertex_count(), self.mesh.tet_count()) {
                     return Ok(Way::Full);
                 }
-                if !go_on(outcome) {
+                if !go_on(task.outcome) {
                     return Ok(Way::Paused);
                 }
             }
             let Some(u) = self.leaves.next().map(UpdateId) else { return Ok(Way::Done) };
-            if self.coarsen_unless_needed(mt, criterion, u, outcome)? && !go_on(outcome) {
+            if self.coarsen_unless_needed(task, u)? && !go_on(task.outcome) {
                 return Ok(Way::Paused);
             }
         }
@@ -103,18 +100,13 @@ impl Front {
 
     /// The next update that a tetrahedron asks for. All open tetrahedra are judged before the first one is forced, so that
     /// those which several updates change are judged once.
-    fn next_asked(
-        &mut self,
-        mt: &impl MultiTessellation,
-        criterion: &dyn Criterion,
-        outcome: &mut Outcome,
-    ) -> Option<Asked> {
+    fn next_asked(&mut self, task: &mut Task<'_, impl MultiTessellation>) -> Option<Asked> {
         if self.pending.is_empty() && !self.tets.is_settled() {
-            if criterion.is_batched() {
-                self.judge_batch(mt, criterion, outcome);
+            if task.criterion.is_batched() {
+                self.judge_batch(task);
             } else {
                 self.tets.sort();
-                self.judge_open(mt, criterion, outcome);
+                self.judge_open(task);
             }
             // Parents have smaller numbers: in this order few updates are forced by others that wait too.
             self.pending.sort_unstable_by_key(|asked| std::cmp::Reverse(asked.update));
@@ -124,13 +116,13 @@ impl Front {
 
     /// Judges all open tetrahedra, some at a time: what they need is fetched from all over the memory for all of them before
     /// the first is judged.
-    fn judge_open(&mut self, mt: &impl MultiTessellation, criterion: &dyn Criterion, outcome: &mut Outcome) {
+    fn judge_open(&mut self, task: &mut Task<'_, impl MultiTessellation>) {
         let mut fetched = Vec::with_capacity(AT_ONCE);
         while !self.tets.is_settled() {
-            self.fetch_open(mt, AT_ONCE, &mut fetched, outcome);
+            self.fetch_open(task, AT_ONCE, &mut fetched);
             for open in &fetched {
                 let levels = |field: usize| open.tet.map(|v| self.mesh.levels(v)[field]);
-                let verdict = criterion.judge(&open.look(&levels));
+                let verdict = task.criterion.judge(&open.look(&levels));
                 self.take_verdict(open.t, open.update, verdict);
             }
         }
@@ -139,26 +131,25 @@ impl Front {
     /// Takes at most so many open tetrahedra to be judged, in place of those in `fetched`.
     fn fetch_open<'a>(
         &mut self,
-        mt: &'a impl MultiTessellation,
+        task: &mut Task<'a, impl MultiTessellation>,
         most: usize,
         fetched: &mut Vec<Open<'a>>,
-        outcome: &mut Outcome,
     ) {
         fetched.clear();
         while fetched.len() < most {
             let Some(t) = self.tets.next() else { break };
             let Some(tet) = self.mesh.tet(t) else { continue };
             // If its update is not here, it is judged when that arrives.
-            let Some(update) = mt.remover(&self.mesh, t) else {
-                let awaited = mt.awaited(&self.mesh, t);
+            let Some(update) = task.mt.remover(&self.mesh, t) else {
+                let awaited = task.mt.awaited(&self.mesh, t);
                 self.awaiting.extend(awaited.map(|u| (u.0, t)));
                 continue;
             };
             let corners = tet.map(|v| self.mesh.positions[v as usize]);
-            let errors = TetErrors::of(mt, &self.mesh, t, update);
+            let errors = TetErrors::of(task.mt, &self.mesh, t, update);
             fetched.push(Open { t, tet, update, errors, corners });
         }
-        outcome.judged += fetched.len() as u64;
+        task.outcome.judged += fetched.len() as u64;
     }
 
     fn take_verdict(&mut self, tet: u32, update: UpdateId, verdict: Verdict) {
@@ -170,15 +161,15 @@ impl Front {
     }
 
     /// Judges all open tetrahedra at once.
-    fn judge_batch(&mut self, mt: &impl MultiTessellation, criterion: &dyn Criterion, outcome: &mut Outcome) {
+    fn judge_batch(&mut self, task: &mut Task<'_, impl MultiTessellation>) {
         let mut fetched = Vec::new();
-        self.fetch_open(mt, usize::MAX, &mut fetched, outcome);
+        self.fetch_open(task, usize::MAX, &mut fetched);
         let mesh = &self.mesh;
         let levels: Vec<_> =
             fetched.iter().map(|open| move |f: usize| open.tet.map(|v| mesh.levels(v)[f])).collect();
         let looks: Vec<TetLook<'_>> =
             fetched.iter().zip(&levels).map(|(open, levels)| open.look(levels)).collect();
-        let verdicts = criterion.judge_all(&looks);
+        let verdicts = task.criterion.judge_all(&looks);
         for (open, verdict) in fetched.iter().zip(verdicts) {
             self.take_verdict(open.t, open.update, verdict);
         }
@@ -187,16 +178,14 @@ impl Front {
     /// Undoes an update that nothing asks for and none depends on; tells whether it did.
     fn coarsen_unless_needed(
         &mut self,
-        mt: &impl MultiTessellation,
-        criterion: &dyn Criterion,
+        task: &mut Task<'_, impl MultiTessellation>,
         u: UpdateId,
-        outcome: &mut Outcome,
     ) -> Result<bool, UpdateError> {
-        if !self.contains(u) || !mt.may_coarsen(&self.mesh, u) {
+        if !self.contains(u) || !task.mt.may_coarsen(&self.mesh, u) {
             return Ok(false);
         }
-        outcome.judged += 1;
-        match self.need(mt, criterion, u, false)? {
+        task.outcome.judged += 1;
+        match self.need(task, u, false)? {
             // It is looked at again when the child that is in the way is undone.
             None => Ok(false),
             Some(verdict) if verdict.asks() => {
@@ -204,8 +193,8 @@ impl Front {
                 Ok(false)
             }
             Some(verdict) => {
-                self.coarsen(mt, u, outcome)?;
-                self.open_parents(mt);
+                self.coarsen(task, u)?;
+                self.open_parents(task.mt);
                 // What has come back has just been judged.
                 for i in 0..self.mesh.touched().len() {
                     let t = self.mesh.touched()[i];
@@ -238,48 +227,47 @@ impl Front {
     /// sake if one of them asks for it. None if a child is in the way.
     pub(super) fn need(
         &mut self,
-        mt: &impl MultiTessellation,
-        criterion: &dyn Criterion,
+        task: &Task<'_, impl MultiTessellation>,
         u: UpdateId,
         ranked: bool,
     ) -> Result<Option<Verdict>, UpdateError> {
         // With every number of quarterings.
-        let all_errors = [0, 1, 2, MAX_QUARTERINGS]
-            .map(|own| if own == 0 || mt.has_tet_errors() { Some(TetErrors::new(mt, u, own)) } else { None });
+        let all_errors = [0, 1, 2, MAX_QUARTERINGS].map(|own| {
+            if own == 0 || task.mt.has_tet_errors() { Some(TetErrors::new(task.mt, u, own)) } else { None }
+        });
         let mut all = Verdict::NEVER;
         let mut look = |corners: &[[i32; 3]; 4], levels: &dyn Fn(usize) -> [i32; 4], own: u8| {
             let of_own = all_errors.get(usize::from(own)).and_then(Option::as_ref).or(all_errors[0].as_ref());
             let Some(TetErrors { largest, by_field }) = of_own else { return false };
             let look = TetLook { corners, levels, error: *largest, errors: by_field, update: u };
-            let one = if ranked { criterion.rank(&look) } else { criterion.judge(&look) };
+            let one = if ranked { task.criterion.rank(&look) } else { task.criterion.judge(&look) };
             all = all.or(one);
             !ranked && one.asks() && one.slack > LONG
         };
-        let looked = mt.look_at_removed(&mut self.mesh, u, &mut look)?;
+        let looked = task.mt.look_at_removed(&mut self.mesh, u, &mut look)?;
         Ok((looked == Applied::Done).then_some(all))
     }
 
     /// Applies `u` and all that it depends on, unless something of that is not here.
     pub(super) fn force(
         &mut self,
-        mt: &impl MultiTessellation,
+        task: &mut Task<'_, impl MultiTessellation>,
         u: UpdateId,
-        outcome: &mut Outcome,
     ) -> Result<Forced, UpdateError> {
         let mut stack = vec![u];
         let mut forced = Vec::new();
         while let Some(&top) = stack.last() {
-            match mt.refine_marked(&mut self.mesh, top)? {
+            match task.mt.refine_marked(&mut self.mesh, top)? {
                 Applied::Done => {
                     self.note(top, true);
                     self.ranked.note_applied(top);
-                    outcome.refined += 1;
+                    task.outcome.refined += 1;
                     stack.pop();
-                    outcome.forced += u64::from(!stack.is_empty());
+                    task.outcome.forced += u64::from(!stack.is_empty());
                     forced.push(top);
                 }
                 // Numbers fall from child to parent, so this ends.
-                Applied::Blocked(parent) if parent < top && mt.has(parent) => stack.push(parent),
+                Applied::Blocked(parent) if parent < top && task.mt.has(parent) => stack.push(parent),
                 Applied::Blocked(parent) if parent < top => return Ok(Forced::Awaits(parent, forced)),
                 Applied::Blocked(_) => return Err(UpdateError::Error { update: top.0 }),
             }
@@ -291,15 +279,14 @@ impl Front {
     #[inline]
     pub(super) fn coarsen(
         &mut self,
-        mt: &impl MultiTessellation,
+        task: &mut Task<'_, impl MultiTessellation>,
         u: UpdateId,
-        outcome: &mut Outcome,
     ) -> Result<(), UpdateError> {
-        match mt.coarsen(&mut self.mesh, u)? {
+        match task.mt.coarsen(&mut self.mesh, u)? {
             Applied::Done => self.note(u, false),
             Applied::Blocked(_) => return Err(UpdateError::Error { update: u.0 }),
         }
-        outcome.coarsened += 1;
+        task.outcome.coarsened += 1;
         Ok(())
     }
 }

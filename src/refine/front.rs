@@ -58,6 +58,14 @@ pub(super) struct Asked {
     pub verdict: Verdict,
 }
 
+/// A goal on the way to it.
+pub(super) struct Task<'a, M> {
+    pub mt: &'a M,
+    pub criterion: &'a dyn Criterion,
+    pub budget: Budget,
+    pub outcome: &'a mut Outcome,
+}
+
 /// What has been done on the way to a goal, and how good the mesh is.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Outcome {
@@ -264,20 +272,21 @@ impl Front {
         }
         // Errors of updates say what is wanted as long as tetrahedra have none of their own.
         let uniform = criterion.uniform().filter(|_| budget.is_unlimited() && !mt.has_tet_errors());
+        let mut task = Task { mt, criterion: &**criterion, budget: *budget, outcome };
         let done = match uniform {
             Some(tolerances) => {
                 self.forget_watch();
-                self.satisfy_uniform(mt, Wanted::new(&tolerances), outcome, go_on)?
+                self.satisfy_uniform(mt, Wanted::new(&tolerances), task.outcome, go_on)?
             }
             // Most budgets are there for safety: while they leave room, nothing needs to be compared.
             None if budget.is_unlimited() || !restarts && self.ranked.has_room() => {
-                match self.converge(mt, &**criterion, *budget, outcome, go_on)? {
+                match self.converge(&mut task, go_on)? {
                     Way::Done => true,
                     Way::Paused => false,
-                    Way::Full => self.ranked_converge(mt, &**criterion, *budget, outcome, go_on)?,
+                    Way::Full => self.ranked_converge(&mut task, go_on)?,
                 }
             }
-            None => self.ranked_converge(mt, &**criterion, *budget, outcome, go_on)?,
+            None => self.ranked_converge(&mut task, go_on)?,
         };
         goal.reached = done;
         Ok(())
