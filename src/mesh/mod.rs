@@ -12,7 +12,10 @@ mod repair;
 mod series;
 mod tet_mesh;
 
+#[cfg(feature = "build")]
+pub(crate) use adjacency::stars;
 pub use adjacency::{MAX_TETS, Topology, neighbors, topology};
+pub(crate) use adjacency::{boundary_faces, match_faces, sorted_faces};
 pub(crate) use bit_set::BitSet;
 pub(crate) use changed_blocks::{BLOCK, ChangedBlocks};
 pub use check::check;

@@ -25,7 +25,7 @@ use super::ring::Ring;
 use super::ring::TURN;
 use super::taken::Taken;
 use super::tet_errors::TetErrors;
-use crate::mesh::{BitSet, ChangedBlocks, FACES, NONE};
+use crate::mesh::{BitSet, ChangedBlocks, FACES, NONE, match_faces, sorted_faces};
 use std::ops::Range;
 
 /// The labels of the vertex in a slot.
@@ -1120,7 +1120,7 @@ pub(crate) fn corner_of(array: &[u32; 4], value: u32) -> usize {
 
 /// A finaliser that spreads every input bit over the word (the constants are those of SplitMix64).
 #[inline]
-fn mix(x: u64) -> u64 {
+pub(crate) fn mix(x: u64) -> u64 {
     let x = x.wrapping_add(0x9E37_79B9_7F4A_7C15);
     let x = (x ^ x >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     let x = (x ^ x >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
@@ -1128,42 +1128,12 @@ fn mix(x: u64) -> u64 {
 }
 
 /// Finds the neighbour across every face. Each face may be shared by two tetrahedra that lie on its two sides.
-pub(crate) fn face_neighbors(tets: &[[u32; 4]]) -> Result<Vec<[u32; 4]>, BaseMeshError> {
-    let mut faces: Vec<([u32; 3], bool, u32)> = Vec::with_capacity(tets.len() * 4);
-    for (t, tet) in tets.iter().enumerate() {
-        for (i, face) in FACES.iter().enumerate() {
-            let (sorted, even) = sort3(face.map(|j| tet[j]));
-            faces.push((sorted, even, (t * 4 + i) as u32));
-        }
-    }
-    faces.sort_unstable();
-    let mut neighbors = vec![[NONE; 4]; tets.len()];
-    let mut rest = faces.as_slice();
-    while let [(face, even, at), tail @ ..] = rest {
-        rest = tail;
-        let Some((_, other_even, other)) = tail.first().filter(|(f, ..)| f == face) else { continue };
-        let crowded = tail.get(1).is_some_and(|(f, ..)| f == face);
-        if crowded || even == other_even {
-            return Err(BaseMeshError::Face(at / 4));
-        }
-        neighbors[*at as usize / 4][*at as usize % 4] = other / 4;
-        neighbors[*other as usize / 4][*other as usize % 4] = at / 4;
-        rest = &tail[1..];
-    }
-    Ok(neighbors)
-}
-
-/// Sorts three numbers and tells whether the permutation was even.
-#[inline]
-fn sort3(mut v: [u32; 3]) -> ([u32; 3], bool) {
-    let mut even = true;
-    for (i, j) in [(0, 1), (1, 2), (0, 1)] {
-        if v[i] > v[j] {
-            v.swap(i, j);
-            even = !even;
-        }
-    }
-    (v, even)
+fn face_neighbors(tets: &[[u32; 4]]) -> Result<Vec<[u32; 4]>, BaseMeshError> {
+    let faces = sorted_faces(tets).map_err(|_| BaseMeshError::Info("it has too many tetrahedra"))?;
+    match_faces(tets, &faces, |group, folded| {
+        let first = group.iter().find(|face| face.is_odd(tets)).unwrap_or(&group[0]);
+        if folded || group.len() > 2 { Err(BaseMeshError::Face(first.tet())) } else { Ok(()) }
+    })
 }
 
 /// What [`CurrentMesh::take_changes`] tells.

@@ -44,6 +44,8 @@ pub use check::check_errors;
 pub use collapse::{EdgeMt, MAX_EDGE, MAX_LINK, MAX_STAR, VertexSplit};
 pub use convert::ConvertError;
 pub(crate) use current::corner_of;
+#[cfg(feature = "build")]
+pub(crate) use current::mix;
 pub use current::{CurrentMesh, MeshChanges};
 pub use error::PageError;
 pub use error::{ErrorCode, UpdateError};
