@@ -1,4 +1,4 @@
-//! What each fuzz target does with its input. The tests of regressions do the same: see `tests/format_regressions.rs`.
+//! What each fuzz target does with its input. The tests of regressions do the same: see `tests/format/regressions.rs`.
 //!
 //! Nothing here may panic but for a bug: errors are answers, too. Where an input begins with a script, its bytes say what to
 //! do when; the file follows.

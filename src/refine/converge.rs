@@ -3,7 +3,7 @@
 use super::front::{Asked, Front, GoOn, Task};
 use super::look::{Open, TetErrors};
 use super::{TetLook, Verdict};
-use crate::mt::{Applied, CurrentMesh, MAX_QUARTERINGS, MultiTessellation, UpdateError, UpdateId};
+use crate::mt::{Applied, ApplyUpdates, CurrentMesh, MAX_QUARTERINGS, UpdateError, UpdateId};
 
 /// What came of the wish to apply an update with all that it depends on.
 pub(super) enum Forced {
@@ -34,7 +34,7 @@ impl Front {
     /// budget. Then what is left is asked for, and the mesh only grows to what it is in the end.
     pub(super) fn converge(
         &mut self,
-        task: &mut Task<'_, impl MultiTessellation>,
+        task: &mut Task<'_, impl ApplyUpdates>,
         go_on: GoOn<'_>,
     ) -> Result<Way, UpdateError> {
         self.watch_all(task.mt);
@@ -82,7 +82,7 @@ impl Front {
     }
 
     /// Makes sure that everything is either judged or going to be.
-    fn watch_all(&mut self, mt: &impl MultiTessellation) {
+    fn watch_all(&mut self, mt: &impl ApplyUpdates) {
         if self.watched {
             return;
         }
@@ -100,7 +100,7 @@ impl Front {
 
     /// The next update that a tetrahedron asks for. All open tetrahedra are judged before the first one is forced, so that
     /// those which several updates change are judged once.
-    fn next_asked(&mut self, task: &mut Task<'_, impl MultiTessellation>) -> Option<Asked> {
+    fn next_asked(&mut self, task: &mut Task<'_, impl ApplyUpdates>) -> Option<Asked> {
         if self.pending.is_empty() && !self.tets.is_settled() {
             if task.criterion.is_batched() {
                 self.judge_batch(task);
@@ -116,7 +116,7 @@ impl Front {
 
     /// Judges all open tetrahedra, some at a time: what they need is fetched from all over the memory for all of them before
     /// the first is judged.
-    fn judge_open(&mut self, task: &mut Task<'_, impl MultiTessellation>) {
+    fn judge_open(&mut self, task: &mut Task<'_, impl ApplyUpdates>) {
         let mut fetched = Vec::with_capacity(AT_ONCE);
         while !self.tets.is_settled() {
             self.fetch_open(task, AT_ONCE, &mut fetched);
@@ -131,7 +131,7 @@ impl Front {
     /// Takes at most so many open tetrahedra to be judged, in place of those in `fetched`.
     fn fetch_open<'a>(
         &mut self,
-        task: &mut Task<'a, impl MultiTessellation>,
+        task: &mut Task<'a, impl ApplyUpdates>,
         most: usize,
         fetched: &mut Vec<Open<'a>>,
     ) {
@@ -161,7 +161,7 @@ impl Front {
     }
 
     /// Judges all open tetrahedra at once.
-    fn judge_batch(&mut self, task: &mut Task<'_, impl MultiTessellation>) {
+    fn judge_batch(&mut self, task: &mut Task<'_, impl ApplyUpdates>) {
         let mut fetched = Vec::new();
         self.fetch_open(task, usize::MAX, &mut fetched);
         let mesh = &self.mesh;
@@ -178,7 +178,7 @@ impl Front {
     /// Undoes an update that nothing asks for and none depends on; tells whether it did.
     fn coarsen_unless_needed(
         &mut self,
-        task: &mut Task<'_, impl MultiTessellation>,
+        task: &mut Task<'_, impl ApplyUpdates>,
         u: UpdateId,
     ) -> Result<bool, UpdateError> {
         if !self.contains(u) || !task.mt.may_coarsen(&self.mesh, u) {
@@ -209,7 +209,7 @@ impl Front {
     }
 
     /// The updates that created the tetrahedra which have come back may have no children any more.
-    fn open_parents(&mut self, mt: &impl MultiTessellation) {
+    fn open_parents(&mut self, mt: &impl ApplyUpdates) {
         let Self { mesh, leaves, .. } = self;
         creators_of_touched(mesh, mt).for_each(|parent| leaves.open(parent.0));
     }
@@ -227,7 +227,7 @@ impl Front {
     /// sake if one of them asks for it. None if a child is in the way.
     pub(super) fn need(
         &mut self,
-        task: &Task<'_, impl MultiTessellation>,
+        task: &Task<'_, impl ApplyUpdates>,
         u: UpdateId,
         ranked: bool,
     ) -> Result<Option<Verdict>, UpdateError> {
@@ -251,7 +251,7 @@ impl Front {
     /// Applies `u` and all that it depends on, unless something of that is not here.
     pub(super) fn force(
         &mut self,
-        task: &mut Task<'_, impl MultiTessellation>,
+        task: &mut Task<'_, impl ApplyUpdates>,
         u: UpdateId,
     ) -> Result<Forced, UpdateError> {
         let mut stack = vec![u];
@@ -279,7 +279,7 @@ impl Front {
     #[inline]
     pub(super) fn coarsen(
         &mut self,
-        task: &mut Task<'_, impl MultiTessellation>,
+        task: &mut Task<'_, impl ApplyUpdates>,
         u: UpdateId,
     ) -> Result<(), UpdateError> {
         match task.mt.coarsen(&mut self.mesh, u)? {
@@ -294,7 +294,7 @@ impl Front {
 /// The updates that created the tetrahedra just changed, as often as they did.
 pub(super) fn creators_of_touched<'a>(
     mesh: &'a CurrentMesh,
-    mt: &'a impl MultiTessellation,
+    mt: &'a impl ApplyUpdates,
 ) -> impl Iterator<Item = UpdateId> + 'a {
     let live = mesh.touched().iter().filter(|&&t| mesh.tet(t).is_some());
     live.filter_map(|&t| mt.creator(mesh, t))

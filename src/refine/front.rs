@@ -6,7 +6,7 @@ use super::timing_wheel::TimingWheels;
 use super::uniform::Wanted;
 use super::{ANY, Budget, Criterion, DIALS, Verdict};
 use crate::mesh::BitSet;
-use crate::mt::{BaseMeshError, CurrentMesh, ErrorCode, MultiTessellation, UpdateError, UpdateId};
+use crate::mt::{ApplyUpdates, BaseMeshError, CurrentMesh, ErrorCode, UpdateError, UpdateId};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -101,7 +101,7 @@ impl Front {
     ///
     /// # Errors
     /// If the base mesh is not a valid mesh, or does not fit its description.
-    pub fn new(mt: &impl MultiTessellation) -> Result<Self, BaseMeshError> {
+    pub fn new(mt: &impl ApplyUpdates) -> Result<Self, BaseMeshError> {
         Ok(Self {
             mesh: mt.start()?,
             applied: BitSet::default(),
@@ -140,7 +140,7 @@ impl Front {
     }
 
     /// Whether tetrahedron `t` is (still) in the mesh and update `u` removes it.
-    pub(super) fn is_removed_by(&self, mt: &impl MultiTessellation, t: u32, u: UpdateId) -> bool {
+    pub(super) fn is_removed_by(&self, mt: &impl ApplyUpdates, t: u32, u: UpdateId) -> bool {
         self.mesh.tet(t).is_some() && mt.remover(&self.mesh, t) == Some(u)
     }
 
@@ -161,7 +161,7 @@ impl Front {
     /// If the MT turns out to be damaged. The mesh is then valid still, but no answer to the request.
     pub fn satisfy(
         &mut self,
-        mt: &impl MultiTessellation,
+        mt: &impl ApplyUpdates,
         criterion: &(impl Criterion + Clone),
         budget: Budget,
     ) -> Result<Outcome, UpdateError> {
@@ -170,7 +170,7 @@ impl Front {
     }
 
     /// Tells what is wanted from now on. Nothing moves before [`Front::step`].
-    pub fn aim(&mut self, mt: &impl MultiTessellation, criterion: Arc<dyn Criterion>, budget: Budget) {
+    pub fn aim(&mut self, mt: &impl ApplyUpdates, criterion: Arc<dyn Criterion>, budget: Budget) {
         let before = self.goal.take();
         let distance = before.as_ref().map_or(f64::INFINITY, |goal| criterion.distance(&*goal.criterion));
         match before {
@@ -223,7 +223,7 @@ impl Front {
     ///
     /// # Errors
     /// As [`Front::satisfy`].
-    pub fn step(&mut self, mt: &impl MultiTessellation, go_on: GoOn<'_>) -> Result<Outcome, UpdateError> {
+    pub fn step(&mut self, mt: &impl ApplyUpdates, go_on: GoOn<'_>) -> Result<Outcome, UpdateError> {
         self.learn(mt);
         let Some(mut goal) = self.goal.take() else { return Ok(Outcome::default()) };
         // What was done for an earlier call does not count again.
@@ -256,12 +256,7 @@ impl Front {
     }
 
     /// Whether the goal is reached is noted in it.
-    fn go(
-        &mut self,
-        mt: &impl MultiTessellation,
-        goal: &mut Goal,
-        go_on: GoOn<'_>,
-    ) -> Result<(), UpdateError> {
+    fn go(&mut self, mt: &impl ApplyUpdates, goal: &mut Goal, go_on: GoOn<'_>) -> Result<(), UpdateError> {
         let Goal { criterion, budget, outcome, .. } = goal;
         // Where updates may make the mesh smaller, several thresholds fit a budget with larger ones between them: only
         // from the base mesh is the first one found for sure.

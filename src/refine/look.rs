@@ -1,7 +1,7 @@
 //! Tetrahedra of the mesh as criteria see them.
 
 use super::{TetLook, Verdict};
-use crate::mt::{CurrentMesh, ErrorCode, MultiTessellation, UpdateId};
+use crate::mt::{ApplyUpdates, CurrentMesh, ErrorCode, UpdateId};
 use std::borrow::Cow;
 
 /// A tetrahedron that is to be judged, with what that takes.
@@ -29,7 +29,7 @@ pub(super) struct TetErrors<'a> {
 impl<'a> TetErrors<'a> {
     /// Those of a tetrahedron that update `u` removes, given its quarterings.
     #[inline]
-    pub fn new(mt: &'a impl MultiTessellation, u: UpdateId, quarterings: u8) -> Self {
+    pub fn new(mt: &'a impl ApplyUpdates, u: UpdateId, quarterings: u8) -> Self {
         let (largest, errors, fall) = (mt.error(u), mt.errors(u), mt.own_fall(u));
         if quarterings == 0 && fall == 0 {
             return Self { largest, by_field: Cow::Borrowed(errors) };
@@ -40,7 +40,7 @@ impl<'a> TetErrors<'a> {
 
     /// Those of tetrahedron `t` of the mesh, which update `u` removes.
     #[inline]
-    pub fn of(mt: &'a impl MultiTessellation, mesh: &CurrentMesh, t: u32, u: UpdateId) -> Self {
+    pub fn of(mt: &'a impl ApplyUpdates, mesh: &CurrentMesh, t: u32, u: UpdateId) -> Self {
         Self::new(mt, u, mt.quarterings(mesh, t))
     }
 

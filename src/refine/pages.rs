@@ -3,13 +3,13 @@
 use super::Criterion;
 use super::front::{Asked, CHUNK_WORDS, Front};
 use super::look::{TetErrors, see};
-use crate::mt::{ErrorCode, MultiTessellation, UpdateId};
+use crate::mt::{ApplyUpdates, ErrorCode, UpdateId};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
 impl Front {
     /// Takes note of updates that have arrived.
-    pub(super) fn learn(&mut self, mt: &impl MultiTessellation) {
+    pub(super) fn learn(&mut self, mt: &impl ApplyUpdates) {
         if mt.updates() <= self.known && !self.applied.words().is_empty() {
             return;
         }
@@ -22,13 +22,13 @@ impl Front {
     }
 
     /// Tells the mesh of updates that have arrived. What they remove is judged again, and nothing else.
-    fn take_in(&mut self, mt: &impl MultiTessellation, updates: Range<u32>) {
+    fn take_in(&mut self, mt: &impl ApplyUpdates, updates: Range<u32>) {
         self.sum_up(mt, updates.clone());
         while let Some(&(u, t)) = self.awaiting.range((updates.start, 0)..(updates.end, 0)).next() {
             self.awaiting.remove(&(u, t));
             self.tets.open(t);
         }
-        mt.reveal(&mut self.mesh, updates);
+        mt.page_inserted(&mut self.mesh, updates);
         self.open_touched();
         self.begin_again();
     }
@@ -44,7 +44,7 @@ impl Front {
     /// Takes note that a page of updates has come to the MT, with all on which it depends. Updates that are not here are no
     /// updates: a mesh is what was asked for as far as those that are here go. Needs not be told of updates that came by
     /// `push`, behind all others.
-    pub fn arrived(&mut self, mt: &impl MultiTessellation, page: u32) {
+    pub fn arrived(&mut self, mt: &impl ApplyUpdates, page: u32) {
         let (updates, known) = (mt.page_updates(page), self.known);
         self.learn(mt);
         if updates.start < known {
@@ -55,12 +55,12 @@ impl Front {
 
     /// Gets ready for a page of updates to be taken from the MT, which has to follow at once. False if that must not be, since
     /// one of them is applied.
-    pub fn leave(&mut self, mt: &impl MultiTessellation, page: u32) -> bool {
+    pub fn leave(&mut self, mt: &impl ApplyUpdates, page: u32) -> bool {
         let updates = mt.page_updates(page);
         if updates.clone().any(|u| self.contains(UpdateId(u))) {
             return false;
         }
-        mt.conceal(&mut self.mesh, updates.clone());
+        mt.page_evicted(&mut self.mesh, updates.clone());
         self.leaves.forget(updates.clone());
         let (gone, kept) = std::mem::take(&mut self.pending)
             .into_iter()
@@ -72,7 +72,7 @@ impl Front {
     }
 
     /// Takes note of the errors of updates that have arrived.
-    fn sum_up(&mut self, mt: &impl MultiTessellation, updates: Range<u32>) {
+    fn sum_up(&mut self, mt: &impl ApplyUpdates, updates: Range<u32>) {
         for u in updates {
             let chunk = u as usize / (64 * CHUNK_WORDS);
             if chunk >= self.chunks.len() {
@@ -88,7 +88,7 @@ impl Front {
     /// more may be demanded when these have come. Ascending.
     pub fn demanded_pages(
         &self,
-        mt: &impl MultiTessellation,
+        mt: &impl ApplyUpdates,
         criterion: &dyn Criterion,
         page_of: impl Fn(UpdateId) -> u32,
     ) -> BTreeMap<u32, f64> {
@@ -120,7 +120,7 @@ impl Front {
     /// page tell: without them it would be unknown whether the mesh is what was asked for. Some are named several times.
     pub fn telling_pages(
         &self,
-        mt: &impl MultiTessellation,
+        mt: &impl ApplyUpdates,
         criterion: &dyn Criterion,
         page_of: impl Fn(UpdateId) -> u32,
         bounds: impl Fn(u32) -> Vec<ErrorCode>,

@@ -3,7 +3,7 @@
 use super::front::{CHUNK_WORDS, Front, Goal};
 use super::look::{TetErrors, see};
 use super::{Criterion, Outcome};
-use crate::mt::{ErrorCode, MultiTessellation, UpdateId};
+use crate::mt::{ApplyUpdates, ErrorCode, UpdateId};
 use std::borrow::Cow;
 
 /// What violates a criterion.
@@ -18,7 +18,7 @@ struct Violations {
 
 impl Front {
     /// Works out how good the mesh is, which is packed.
-    pub(super) fn report(&self, mt: &impl MultiTessellation, goal: &mut Goal) {
+    pub(super) fn report(&self, mt: &impl ApplyUpdates, goal: &mut Goal) {
         let complete = mt.present() >= mt.info().updates;
         let satisfied = goal.budget.is_unlimited() || self.ranked.has_room();
         let criterion = &*goal.criterion;
@@ -34,12 +34,7 @@ impl Front {
 
     /// No update that is not applied, here or not, has a larger error in this field, or in all of them if it is none. What
     /// is at least `enough` is as good as any.
-    pub fn largest_left(
-        &self,
-        mt: &impl MultiTessellation,
-        field: Option<usize>,
-        enough: ErrorCode,
-    ) -> ErrorCode {
+    pub fn largest_left(&self, mt: &impl ApplyUpdates, field: Option<usize>, enough: ErrorCode) -> ErrorCode {
         let error = |u: UpdateId| field.map_or_else(|| mt.error(u), |field| mt.error_of_field(u, field));
         let mut found = mt.to_come();
         for (chunk, words) in self.applied.words().chunks(CHUNK_WORDS).enumerate() {
@@ -60,16 +55,12 @@ impl Front {
 
     /// The largest error that can be left where something is wanted, and the largest excess of all tetrahedra that violate the
     /// criterion; 1 if none does. Takes time in proportion to the mesh.
-    pub fn largest_violation(
-        &self,
-        mt: &impl MultiTessellation,
-        criterion: &dyn Criterion,
-    ) -> (ErrorCode, f64) {
+    pub fn largest_violation(&self, mt: &impl ApplyUpdates, criterion: &dyn Criterion) -> (ErrorCode, f64) {
         let Violations { error, excess, .. } = self.violations(mt, criterion);
         (error, excess)
     }
 
-    fn violations(&self, mt: &impl MultiTessellation, criterion: &dyn Criterion) -> Violations {
+    fn violations(&self, mt: &impl ApplyUpdates, criterion: &dyn Criterion) -> Violations {
         // Where no budget is in the way, what violates the criterion waits for something.
         let unlimited = self.ranked.has_room();
         let field = criterion.field();
@@ -101,7 +92,7 @@ impl Front {
     }
 
     /// The error that is left where nothing violates the criterion.
-    fn within(&self, mt: &impl MultiTessellation, criterion: &dyn Criterion) -> ErrorCode {
+    fn within(&self, mt: &impl ApplyUpdates, criterion: &dyn Criterion) -> ErrorCode {
         let tolerance = criterion.tolerance();
         self.largest_left(mt, criterion.field(), tolerance).min(tolerance)
     }

@@ -12,7 +12,7 @@
 use super::converge::{Forced, creators_of_touched};
 use super::front::{Front, GoOn, Task};
 use super::look::{TetErrors, see};
-use crate::mt::{MultiTessellation, UpdateError, UpdateId};
+use crate::mt::{ApplyUpdates, UpdateError, UpdateId};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
@@ -107,7 +107,7 @@ impl Front {
     /// Moves to the mesh of the smallest excess that fits the budget. True when it is there.
     pub(super) fn ranked_converge(
         &mut self,
-        task: &mut Task<'_, impl MultiTessellation>,
+        task: &mut Task<'_, impl ApplyUpdates>,
         go_on: GoOn<'_>,
     ) -> Result<bool, UpdateError> {
         if !self.ranked.is_running() {
@@ -158,7 +158,7 @@ impl Front {
     }
 
     /// Fills both queues with what there is, and undoes what nothing asks for on the way.
-    fn fill_queues(&mut self, task: &mut Task<'_, impl MultiTessellation>) -> Result<(), UpdateError> {
+    fn fill_queues(&mut self, task: &mut Task<'_, impl ApplyUpdates>) -> Result<(), UpdateError> {
         self.forget_watch();
         self.ranked.clear();
         self.ranked.state = State::Running;
@@ -179,11 +179,7 @@ impl Front {
 
     /// Queues an update for coarsening if something asks for it. True if nothing does, neither the request nor a child: then it
     /// is idle and can be undone.
-    fn is_idle(
-        &mut self,
-        task: &mut Task<'_, impl MultiTessellation>,
-        u: UpdateId,
-    ) -> Result<bool, UpdateError> {
+    fn is_idle(&mut self, task: &mut Task<'_, impl ApplyUpdates>, u: UpdateId) -> Result<bool, UpdateError> {
         task.outcome.judged += 1;
         let Some(verdict) = self.need(task, u, true)? else { return Ok(false) };
         if verdict.asks() {
@@ -192,7 +188,7 @@ impl Front {
         Ok(!verdict.asks())
     }
 
-    fn push_violation(&mut self, task: &mut Task<'_, impl MultiTessellation>, t: u32) {
+    fn push_violation(&mut self, task: &mut Task<'_, impl ApplyUpdates>, t: u32) {
         let Some(tet) = self.mesh.tet(t) else { return };
         let Some(u) = task.mt.remover(&self.mesh, t) else { return };
         task.outcome.judged += 1;
@@ -203,7 +199,7 @@ impl Front {
         }
     }
 
-    fn push_touched(&mut self, task: &mut Task<'_, impl MultiTessellation>) {
+    fn push_touched(&mut self, task: &mut Task<'_, impl ApplyUpdates>) {
         for i in 0..self.mesh.touched().len() {
             self.push_violation(task, self.mesh.touched()[i]);
         }
@@ -211,7 +207,7 @@ impl Front {
     }
 
     /// Undoes all that was applied since the threshold was reached, if the budget is exceeded; tells whether it is.
-    fn undo_threshold(&mut self, task: &mut Task<'_, impl MultiTessellation>) -> Result<bool, UpdateError> {
+    fn undo_threshold(&mut self, task: &mut Task<'_, impl ApplyUpdates>) -> Result<bool, UpdateError> {
         if task.budget.holds(self.mesh.vertex_count(), self.mesh.tet_count()) {
             return Ok(false);
         }
@@ -226,7 +222,7 @@ impl Front {
     /// Undoes the least urgent updates until the budget is kept. Tells whether `last` was among them.
     fn trim(
         &mut self,
-        task: &mut Task<'_, impl MultiTessellation>,
+        task: &mut Task<'_, impl ApplyUpdates>,
         last: Option<UpdateId>,
     ) -> Result<bool, UpdateError> {
         let mut reached = false;
@@ -243,7 +239,7 @@ impl Front {
     }
 
     /// Undoes `u` and whatever was there only for its sake.
-    fn undo(&mut self, task: &mut Task<'_, impl MultiTessellation>, u: UpdateId) -> Result<(), UpdateError> {
+    fn undo(&mut self, task: &mut Task<'_, impl ApplyUpdates>, u: UpdateId) -> Result<(), UpdateError> {
         let mut idle = vec![u];
         while let Some(u) = idle.pop() {
             if !self.contains(u) {
@@ -262,7 +258,7 @@ impl Front {
     }
 
     /// The updates that created the tetrahedra just changed.
-    fn parents_of_touched(&self, mt: &impl MultiTessellation) -> Vec<UpdateId> {
+    fn parents_of_touched(&self, mt: &impl ApplyUpdates) -> Vec<UpdateId> {
         let mut parents: Vec<u32> = creators_of_touched(&self.mesh, mt).map(|u| u.0).collect();
         parents.sort_unstable();
         parents.dedup();

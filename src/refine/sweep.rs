@@ -5,8 +5,8 @@
 //! needs in the caches. New slots then lie side by side, too.
 
 use crate::geom::morton;
+use crate::mt::ApplyUpdates;
 use crate::mt::CurrentMesh;
-use crate::mt::MultiTessellation;
 use crate::mt::UpdateId;
 
 /// log2 of the cells along each axis by which updates are sorted.
@@ -30,7 +30,7 @@ pub(super) struct Window {
 
 impl Window {
     /// Sorts the updates by their places; those of a cell stay in the order they are in.
-    pub fn sort(&mut self, mt: &impl MultiTessellation, mesh: &CurrentMesh) {
+    pub fn sort(&mut self, mt: &impl ApplyUpdates, mesh: &CurrentMesh) {
         let shift = mt.info().lattice.bits.saturating_sub(CELL_BITS);
         self.starts.clear();
         self.starts.resize(CELLS, 0);

@@ -4,7 +4,7 @@ use super::front::{CHUNK_WORDS, Front, GoOn};
 use super::sweep::{Window, window_size};
 use super::{Outcome, Tolerance};
 use crate::mesh::BitSet;
-use crate::mt::{Applied, ErrorCode, MultiTessellation, UpdateError, UpdateId};
+use crate::mt::{Applied, ApplyUpdates, ErrorCode, UpdateError, UpdateId};
 
 /// The updates that are asked for everywhere, by their errors alone.
 #[derive(Clone, Copy)]
@@ -25,12 +25,12 @@ impl<'a> Wanted<'a> {
     }
 
     #[inline]
-    fn has(&self, mt: &impl MultiTessellation, u: UpdateId) -> bool {
+    fn has(&self, mt: &impl ApplyUpdates, u: UpdateId) -> bool {
         let error = mt.error(u);
         error > self.sure || error > self.least && self.has_of_field(mt, u)
     }
 
-    fn has_of_field(&self, mt: &impl MultiTessellation, u: UpdateId) -> bool {
+    fn has_of_field(&self, mt: &impl ApplyUpdates, u: UpdateId) -> bool {
         self.tolerances.iter().any(|t| t.field.is_some_and(|field| mt.error_of_field(u, field) > t.error))
     }
 }
@@ -43,7 +43,7 @@ struct Staying<'a> {
 }
 
 impl Staying<'_> {
-    fn has(&self, mt: &impl MultiTessellation, u: UpdateId) -> bool {
+    fn has(&self, mt: &impl ApplyUpdates, u: UpdateId) -> bool {
         self.others.has(u.0) || self.wanted.has(mt, u)
     }
 
@@ -59,7 +59,7 @@ impl Front {
     /// Back to the base mesh.
     pub(super) fn coarsen_all(
         &mut self,
-        mt: &impl MultiTessellation,
+        mt: &impl ApplyUpdates,
         outcome: &mut Outcome,
     ) -> Result<(), UpdateError> {
         self.forget_watch();
@@ -70,7 +70,7 @@ impl Front {
     /// mesh; they are monotone along the partial order, so no update is in the way of what is undone.
     pub(super) fn satisfy_uniform(
         &mut self,
-        mt: &impl MultiTessellation,
+        mt: &impl ApplyUpdates,
         wanted: Wanted<'_>,
         outcome: &mut Outcome,
         go_on: GoOn<'_>,
@@ -82,7 +82,7 @@ impl Front {
     /// one is done before it. False if it was told to stop.
     fn sweep(
         &mut self,
-        mt: &impl MultiTessellation,
+        mt: &impl ApplyUpdates,
         wanted: Wanted<'_>,
         applied: bool,
         outcome: &mut Outcome,
@@ -114,7 +114,7 @@ impl Front {
     /// Appends the updates of a word that a sweep has to apply, by rising number, or to undo, by falling number.
     fn push_unlike(
         &self,
-        mt: &impl MultiTessellation,
+        mt: &impl ApplyUpdates,
         wanted: Wanted<'_>,
         word: usize,
         applied: bool,
@@ -140,7 +140,7 @@ impl Front {
     /// which happens where errors grow along the partial order.
     fn turn(
         &mut self,
-        mt: &impl MultiTessellation,
+        mt: &impl ApplyUpdates,
         u: UpdateId,
         applied: bool,
         staying: &mut Staying<'_>,
