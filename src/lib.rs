@@ -10,7 +10,7 @@
 #![cfg_attr(feature = "build", doc = "```")]
 #![cfg_attr(not(feature = "build"), doc = "```ignore")]
 //! use std::ops::ControlFlow;
-//! use tetralod::build::{BuildConfig, build};
+//! use tetralod::builder::{BuildConfig, build};
 //! use tetralod::format::{EncodeOptions, encode};
 //! use tetralod::refine::Request;
 //! use tetralod::session::Session;
@@ -54,7 +54,7 @@
 //!
 //! | feature | adds | for |
 //! |---|---|---|
-//! | `build` | modules `io`, `generate`, `build`, `measure`, `verify` | making MTs, natively or in wasm |
+//! | `build` | modules `io`, `generate`, `builder`, `measure`, `verify` | making MTs, natively or in wasm |
 //! | `cli` (default) | `build` and the command `tetralod` | the command line |
 //! | `serve` (default) | its subcommand `serve` | files for pages on your own machine |
 //! | `http` (default) | `stream::HttpSource` | MT files on servers, in native programs and on the command line |
@@ -107,7 +107,7 @@
 
 pub mod bench;
 #[cfg(feature = "build")]
-pub mod build;
+pub mod builder;
 pub mod client;
 pub mod format;
 #[cfg(feature = "build")]

@@ -8,7 +8,7 @@ use super::surfaces::Mesh;
 use super::surfaces::Surface;
 use std::io::Cursor;
 use std::time::Duration;
-use tetralod::build::Purpose;
+use tetralod::builder::Purpose;
 use tetralod::client::Client;
 use tetralod::client::ClientOptions;
 use tetralod::geom::Bounds;

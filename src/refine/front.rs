@@ -12,11 +12,11 @@ use super::sweep::Window;
 use super::sweep::window_size;
 use super::watch::Waiting;
 use crate::mt::Applied;
+use crate::mt::ApplyUpdates;
 use crate::mt::BaseMeshError;
 use crate::mt::CurrentMesh;
 use crate::mt::ErrorCode;
 use crate::mt::MAX_QUARTERINGS;
-use crate::mt::MultiTessellation;
 use crate::mt::UpdateError;
 use crate::mt::UpdateId;
 use std::borrow::Cow;
@@ -116,7 +116,7 @@ pub(super) struct TetErrors<'a> {
 impl<'a> TetErrors<'a> {
     /// Those of a tetrahedron that update `u` removes, given its quarterings.
     #[inline]
-    pub fn new(mt: &'a impl MultiTessellation, u: UpdateId, quarterings: u8) -> Self {
+    pub fn new(mt: &'a impl ApplyUpdates, u: UpdateId, quarterings: u8) -> Self {
         let (largest, errors, fall) = (mt.error(u), mt.errors(u), mt.own_fall(u));
         if quarterings == 0 && fall == 0 {
             return Self { largest, by_field: Cow::Borrowed(errors) };
@@ -127,7 +127,7 @@ impl<'a> TetErrors<'a> {
 
     /// Those of tetrahedron `t` of the mesh, which update `u` removes.
     #[inline]
-    pub fn of(mt: &'a impl MultiTessellation, mesh: &CurrentMesh, t: u32, u: UpdateId) -> Self {
+    pub fn of(mt: &'a impl ApplyUpdates, mesh: &CurrentMesh, t: u32, u: UpdateId) -> Self {
         Self::new(mt, u, mt.quarterings(mesh, t))
     }
 
@@ -201,18 +201,18 @@ impl<'a> Wanted<'a> {
     }
 
     #[inline]
-    fn has(&self, mt: &impl MultiTessellation, u: UpdateId) -> bool {
+    fn has(&self, mt: &impl ApplyUpdates, u: UpdateId) -> bool {
         let error = mt.error(u);
         error > self.sure || error > self.least && self.has_of_field(mt, u)
     }
 
-    fn has_of_field(&self, mt: &impl MultiTessellation, u: UpdateId) -> bool {
+    fn has_of_field(&self, mt: &impl ApplyUpdates, u: UpdateId) -> bool {
         self.tolerances.iter().any(|t| t.field.is_some_and(|field| mt.error_of_field(u, field) > t.error))
     }
 }
 
 impl Staying<'_> {
-    fn has(&self, mt: &impl MultiTessellation, u: UpdateId) -> bool {
+    fn has(&self, mt: &impl ApplyUpdates, u: UpdateId) -> bool {
         let found = self.others.get(u.0 as usize / 64).is_some_and(|word| word >> (u.0 % 64) & 1 == 1);
         found || self.wanted.has(mt, u)
     }
@@ -243,7 +243,7 @@ impl Front {
     ///
     /// # Errors
     /// If the base mesh is not a valid mesh, or does not fit its description.
-    pub fn new(mt: &impl MultiTessellation) -> Result<Self, BaseMeshError> {
+    pub fn new(mt: &impl ApplyUpdates) -> Result<Self, BaseMeshError> {
         Ok(Self {
             mesh: mt.start()?,
             applied: Vec::new(),
@@ -282,7 +282,7 @@ impl Front {
     }
 
     /// Whether tetrahedron `t` is (still) in the mesh and update `u` removes it.
-    pub(super) fn is_removed_by(&self, mt: &impl MultiTessellation, t: u32, u: UpdateId) -> bool {
+    pub(super) fn is_removed_by(&self, mt: &impl ApplyUpdates, t: u32, u: UpdateId) -> bool {
         self.mesh.tet(t).is_some() && mt.remover(&self.mesh, t) == Some(u)
     }
 
@@ -302,7 +302,7 @@ impl Front {
     /// If the MT turns out to be damaged. The mesh is then valid still, but no answer to the request.
     pub fn satisfy(
         &mut self,
-        mt: &impl MultiTessellation,
+        mt: &impl ApplyUpdates,
         criterion: &(impl Criterion + Clone),
         budget: Budget,
     ) -> Result<Outcome, UpdateError> {
@@ -311,7 +311,7 @@ impl Front {
     }
 
     /// Tells what is wanted from now on. Nothing moves before [`Front::step`].
-    pub fn aim(&mut self, mt: &impl MultiTessellation, criterion: Arc<dyn Criterion>, budget: Budget) {
+    pub fn aim(&mut self, mt: &impl ApplyUpdates, criterion: Arc<dyn Criterion>, budget: Budget) {
         let before = self.goal.take();
         let distance = before.as_ref().map_or(f64::INFINITY, |goal| criterion.distance(&*goal.criterion));
         match before {
@@ -357,7 +357,7 @@ impl Front {
     }
 
     /// Takes note of updates that have arrived.
-    fn learn(&mut self, mt: &impl MultiTessellation) {
+    fn learn(&mut self, mt: &impl ApplyUpdates) {
         if mt.updates() <= self.known && !self.applied.is_empty() {
             return;
         }
@@ -369,13 +369,13 @@ impl Front {
     }
 
     /// Tells the mesh of updates that have arrived. What they remove is judged again, and nothing else.
-    fn take_in(&mut self, mt: &impl MultiTessellation, updates: Range<u32>) {
+    fn take_in(&mut self, mt: &impl ApplyUpdates, updates: Range<u32>) {
         self.sum_up(mt, updates.clone());
         while let Some(&(u, t)) = self.awaiting.range((updates.start, 0)..(updates.end, 0)).next() {
             self.awaiting.remove(&(u, t));
             self.tets.open(t);
         }
-        mt.reveal(&mut self.mesh, updates);
+        mt.page_inserted(&mut self.mesh, updates);
         self.open_touched();
         self.begin_again();
     }
@@ -391,7 +391,7 @@ impl Front {
     /// Takes note that a page of updates has come to the MT, with all on which it depends. Updates that are not here are no
     /// updates: a mesh is what was asked for as far as those that are here go. Needs not be told of updates that came by
     /// `push`, behind all others.
-    pub fn arrived(&mut self, mt: &impl MultiTessellation, page: u32) {
+    pub fn arrived(&mut self, mt: &impl ApplyUpdates, page: u32) {
         let (updates, known) = (mt.page_updates(page), self.known);
         self.learn(mt);
         if updates.start < known {
@@ -402,12 +402,12 @@ impl Front {
 
     /// Gets ready for a page of updates to be taken from the MT, which has to follow at once. False if that must not be, since
     /// one of them is applied.
-    pub fn leave(&mut self, mt: &impl MultiTessellation, page: u32) -> bool {
+    pub fn leave(&mut self, mt: &impl ApplyUpdates, page: u32) -> bool {
         let updates = mt.page_updates(page);
         if updates.clone().any(|u| self.contains(UpdateId(u))) {
             return false;
         }
-        mt.conceal(&mut self.mesh, updates.clone());
+        mt.page_evicted(&mut self.mesh, updates.clone());
         self.leaves.forget(updates.clone());
         let (gone, kept) = std::mem::take(&mut self.pending)
             .into_iter()
@@ -419,7 +419,7 @@ impl Front {
     }
 
     /// Takes note of the errors of updates that have arrived.
-    fn sum_up(&mut self, mt: &impl MultiTessellation, updates: Range<u32>) {
+    fn sum_up(&mut self, mt: &impl ApplyUpdates, updates: Range<u32>) {
         for u in updates {
             let chunk = u as usize / (64 * CHUNK_WORDS);
             if chunk >= self.chunks.len() {
@@ -438,7 +438,7 @@ impl Front {
     ///
     /// # Errors
     /// As [`Front::satisfy`].
-    pub fn step(&mut self, mt: &impl MultiTessellation, go_on: GoOn<'_>) -> Result<Outcome, UpdateError> {
+    pub fn step(&mut self, mt: &impl ApplyUpdates, go_on: GoOn<'_>) -> Result<Outcome, UpdateError> {
         self.learn(mt);
         let Some(mut goal) = self.goal.take() else { return Ok(Outcome::default()) };
         // What was done for an earlier call does not count again.
@@ -471,12 +471,7 @@ impl Front {
     }
 
     /// Whether the goal is reached is noted in it.
-    fn go(
-        &mut self,
-        mt: &impl MultiTessellation,
-        goal: &mut Goal,
-        go_on: GoOn<'_>,
-    ) -> Result<(), UpdateError> {
+    fn go(&mut self, mt: &impl ApplyUpdates, goal: &mut Goal, go_on: GoOn<'_>) -> Result<(), UpdateError> {
         let Goal { criterion, budget, outcome, .. } = goal;
         // Where updates may make the mesh smaller, several thresholds fit a budget with larger ones between them: only
         // from the base mesh is the first one found for sure.
@@ -507,7 +502,7 @@ impl Front {
     }
 
     /// Back to the base mesh.
-    fn coarsen_all(&mut self, mt: &impl MultiTessellation, outcome: &mut Outcome) -> Result<(), UpdateError> {
+    fn coarsen_all(&mut self, mt: &impl ApplyUpdates, outcome: &mut Outcome) -> Result<(), UpdateError> {
         self.forget_watch();
         self.sweep(mt, Wanted::new(&[]), false, outcome, &mut |_| true).map(drop)
     }
@@ -516,7 +511,7 @@ impl Front {
     /// mesh; they are monotone along the partial order, so no update is in the way of what is undone.
     fn satisfy_uniform(
         &mut self,
-        mt: &impl MultiTessellation,
+        mt: &impl ApplyUpdates,
         wanted: Wanted<'_>,
         outcome: &mut Outcome,
         go_on: GoOn<'_>,
@@ -528,7 +523,7 @@ impl Front {
     /// one is done before it. False if it was told to stop.
     fn sweep(
         &mut self,
-        mt: &impl MultiTessellation,
+        mt: &impl ApplyUpdates,
         wanted: Wanted<'_>,
         applied: bool,
         outcome: &mut Outcome,
@@ -560,7 +555,7 @@ impl Front {
     /// Appends the updates of a word that a sweep has to apply, by rising number, or to undo, by falling number.
     fn push_unlike(
         &self,
-        mt: &impl MultiTessellation,
+        mt: &impl ApplyUpdates,
         wanted: Wanted<'_>,
         word: usize,
         applied: bool,
@@ -585,7 +580,7 @@ impl Front {
     /// which happens where errors grow along the partial order.
     fn turn(
         &mut self,
-        mt: &impl MultiTessellation,
+        mt: &impl ApplyUpdates,
         u: UpdateId,
         applied: bool,
         staying: &mut Staying<'_>,
@@ -633,7 +628,7 @@ impl Front {
     /// budget. Then what is left is asked for, and the mesh only grows to what it is in the end.
     fn converge(
         &mut self,
-        mt: &impl MultiTessellation,
+        mt: &impl ApplyUpdates,
         criterion: &dyn Criterion,
         budget: Budget,
         outcome: &mut Outcome,
@@ -684,7 +679,7 @@ impl Front {
     }
 
     /// Makes sure that everything is either judged or going to be.
-    fn watch_all(&mut self, mt: &impl MultiTessellation) {
+    fn watch_all(&mut self, mt: &impl ApplyUpdates) {
         if self.watched {
             return;
         }
@@ -704,7 +699,7 @@ impl Front {
     /// those which several updates change are judged once.
     fn next_asked(
         &mut self,
-        mt: &impl MultiTessellation,
+        mt: &impl ApplyUpdates,
         criterion: &dyn Criterion,
         outcome: &mut Outcome,
     ) -> Option<Asked> {
@@ -723,7 +718,7 @@ impl Front {
 
     /// Judges all open tetrahedra, some at a time: what they need is fetched from all over the memory for all of them before
     /// the first is judged.
-    fn judge_open(&mut self, mt: &impl MultiTessellation, criterion: &dyn Criterion, outcome: &mut Outcome) {
+    fn judge_open(&mut self, mt: &impl ApplyUpdates, criterion: &dyn Criterion, outcome: &mut Outcome) {
         let mut fetched = Vec::with_capacity(AT_ONCE);
         while !self.tets.is_settled() {
             self.fetch_open(mt, AT_ONCE, &mut fetched, outcome);
@@ -738,7 +733,7 @@ impl Front {
     /// Takes at most so many open tetrahedra to be judged, in place of those in `fetched`.
     fn fetch_open<'a>(
         &mut self,
-        mt: &'a impl MultiTessellation,
+        mt: &'a impl ApplyUpdates,
         most: usize,
         fetched: &mut Vec<Open<'a>>,
         outcome: &mut Outcome,
@@ -769,7 +764,7 @@ impl Front {
     }
 
     /// Judges all open tetrahedra at once.
-    fn judge_batch(&mut self, mt: &impl MultiTessellation, criterion: &dyn Criterion, outcome: &mut Outcome) {
+    fn judge_batch(&mut self, mt: &impl ApplyUpdates, criterion: &dyn Criterion, outcome: &mut Outcome) {
         let mut fetched = Vec::new();
         self.fetch_open(mt, usize::MAX, &mut fetched, outcome);
         let mesh = &self.mesh;
@@ -786,7 +781,7 @@ impl Front {
     /// Undoes an update that nothing asks for and none depends on; tells whether it did.
     fn coarsen_unless_needed(
         &mut self,
-        mt: &impl MultiTessellation,
+        mt: &impl ApplyUpdates,
         criterion: &dyn Criterion,
         u: UpdateId,
         outcome: &mut Outcome,
@@ -819,7 +814,7 @@ impl Front {
     }
 
     /// The updates that created the tetrahedra which have come back may have no children any more.
-    fn open_parents(&mut self, mt: &impl MultiTessellation) {
+    fn open_parents(&mut self, mt: &impl ApplyUpdates) {
         let Self { mesh, leaves, .. } = self;
         creators_of_touched(mesh, mt).for_each(|parent| leaves.open(parent.0));
     }
@@ -837,7 +832,7 @@ impl Front {
     /// sake if one of them asks for it. None if a child is in the way.
     pub(super) fn need(
         &mut self,
-        mt: &impl MultiTessellation,
+        mt: &impl ApplyUpdates,
         criterion: &dyn Criterion,
         u: UpdateId,
         ranked: bool,
@@ -861,7 +856,7 @@ impl Front {
     /// Applies `u` and all that it depends on, unless something of that is not here.
     pub(super) fn force(
         &mut self,
-        mt: &impl MultiTessellation,
+        mt: &impl ApplyUpdates,
         u: UpdateId,
         outcome: &mut Outcome,
     ) -> Result<Forced, UpdateError> {
@@ -890,7 +885,7 @@ impl Front {
     #[inline]
     pub(super) fn coarsen(
         &mut self,
-        mt: &impl MultiTessellation,
+        mt: &impl ApplyUpdates,
         u: UpdateId,
         outcome: &mut Outcome,
     ) -> Result<(), UpdateError> {
@@ -915,7 +910,7 @@ impl Front {
     }
 
     /// Works out how good the mesh is, which is packed.
-    fn report(&self, mt: &impl MultiTessellation, goal: &mut Goal) {
+    fn report(&self, mt: &impl ApplyUpdates, goal: &mut Goal) {
         let complete = mt.present() >= mt.info().updates;
         let satisfied = goal.budget.is_unlimited() || self.ranked.has_room();
         let criterion = &*goal.criterion;
@@ -931,12 +926,7 @@ impl Front {
 
     /// No update that is not applied, here or not, has a larger error in this field, or in all of them if it is none. What
     /// is at least `enough` is as good as any.
-    pub fn largest_left(
-        &self,
-        mt: &impl MultiTessellation,
-        field: Option<usize>,
-        enough: ErrorCode,
-    ) -> ErrorCode {
+    pub fn largest_left(&self, mt: &impl ApplyUpdates, field: Option<usize>, enough: ErrorCode) -> ErrorCode {
         let error = |u: UpdateId| field.map_or_else(|| mt.error(u), |field| mt.error_of_field(u, field));
         let mut found = mt.to_come();
         for (chunk, words) in self.applied.chunks(CHUNK_WORDS).enumerate() {
@@ -957,11 +947,7 @@ impl Front {
 
     /// The largest error that can be left where something is wanted, and the largest excess of all tetrahedra that violate the
     /// criterion; 1 if none does. Takes time in proportion to the mesh.
-    pub fn largest_violation(
-        &self,
-        mt: &impl MultiTessellation,
-        criterion: &dyn Criterion,
-    ) -> (ErrorCode, f64) {
+    pub fn largest_violation(&self, mt: &impl ApplyUpdates, criterion: &dyn Criterion) -> (ErrorCode, f64) {
         let Violations { error, excess, .. } = self.violations(mt, criterion);
         (error, excess)
     }
@@ -971,7 +957,7 @@ impl Front {
     /// more may be demanded when these have come. Ascending.
     pub fn demanded_pages(
         &self,
-        mt: &impl MultiTessellation,
+        mt: &impl ApplyUpdates,
         criterion: &dyn Criterion,
         page_of: impl Fn(UpdateId) -> u32,
     ) -> BTreeMap<u32, f64> {
@@ -1003,7 +989,7 @@ impl Front {
     /// page tell: without them it would be unknown whether the mesh is what was asked for. Some are named several times.
     pub fn telling_pages(
         &self,
-        mt: &impl MultiTessellation,
+        mt: &impl ApplyUpdates,
         criterion: &dyn Criterion,
         page_of: impl Fn(UpdateId) -> u32,
         bounds: impl Fn(u32) -> Vec<ErrorCode>,
@@ -1025,7 +1011,7 @@ impl Front {
         pages
     }
 
-    fn violations(&self, mt: &impl MultiTessellation, criterion: &dyn Criterion) -> Violations {
+    fn violations(&self, mt: &impl ApplyUpdates, criterion: &dyn Criterion) -> Violations {
         // Where no budget is in the way, what violates the criterion waits for something.
         let unlimited = self.ranked.has_room();
         let field = criterion.field();
@@ -1057,7 +1043,7 @@ impl Front {
     }
 
     /// The error that is left where nothing violates the criterion.
-    fn within(&self, mt: &impl MultiTessellation, criterion: &dyn Criterion) -> ErrorCode {
+    fn within(&self, mt: &impl ApplyUpdates, criterion: &dyn Criterion) -> ErrorCode {
         let tolerance = criterion.tolerance();
         self.largest_left(mt, criterion.field(), tolerance).min(tolerance)
     }
@@ -1066,7 +1052,7 @@ impl Front {
 /// The updates that created the tetrahedra just changed, as often as they did.
 pub(super) fn creators_of_touched<'a>(
     mesh: &'a CurrentMesh,
-    mt: &'a impl MultiTessellation,
+    mt: &'a impl ApplyUpdates,
 ) -> impl Iterator<Item = UpdateId> + 'a {
     let live = mesh.touched().iter().filter(|&&t| mesh.tet(t).is_some());
     live.filter_map(|&t| mt.creator(mesh, t))

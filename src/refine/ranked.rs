@@ -18,7 +18,7 @@ use super::front::Forced;
 use super::front::TetErrors;
 use super::front::creators_of_touched;
 use super::front::see;
-use crate::mt::MultiTessellation;
+use crate::mt::ApplyUpdates;
 use crate::mt::UpdateError;
 use crate::mt::UpdateId;
 use std::cmp::Reverse;
@@ -115,7 +115,7 @@ impl Front {
     /// Moves to the mesh of the smallest excess that fits the budget. True when it is there.
     pub(super) fn ranked_converge(
         &mut self,
-        mt: &impl MultiTessellation,
+        mt: &impl ApplyUpdates,
         criterion: &dyn Criterion,
         budget: Budget,
         outcome: &mut Outcome,
@@ -174,7 +174,7 @@ impl Front {
     /// Fills both queues with what there is, and undoes what nothing asks for on the way.
     fn fill_queues(
         &mut self,
-        mt: &impl MultiTessellation,
+        mt: &impl ApplyUpdates,
         criterion: &dyn Criterion,
         outcome: &mut Outcome,
     ) -> Result<(), UpdateError> {
@@ -200,7 +200,7 @@ impl Front {
     /// is idle and can be undone.
     fn is_idle(
         &mut self,
-        mt: &impl MultiTessellation,
+        mt: &impl ApplyUpdates,
         criterion: &dyn Criterion,
         u: UpdateId,
         outcome: &mut Outcome,
@@ -215,7 +215,7 @@ impl Front {
 
     fn push_violation(
         &mut self,
-        mt: &impl MultiTessellation,
+        mt: &impl ApplyUpdates,
         criterion: &dyn Criterion,
         t: u32,
         outcome: &mut Outcome,
@@ -230,12 +230,7 @@ impl Front {
         }
     }
 
-    fn push_touched(
-        &mut self,
-        mt: &impl MultiTessellation,
-        criterion: &dyn Criterion,
-        outcome: &mut Outcome,
-    ) {
+    fn push_touched(&mut self, mt: &impl ApplyUpdates, criterion: &dyn Criterion, outcome: &mut Outcome) {
         for i in 0..self.mesh.touched().len() {
             self.push_violation(mt, criterion, self.mesh.touched()[i], outcome);
         }
@@ -245,7 +240,7 @@ impl Front {
     /// Undoes all that was applied since the threshold was reached, if the budget is exceeded; tells whether it is.
     fn undo_threshold(
         &mut self,
-        mt: &impl MultiTessellation,
+        mt: &impl ApplyUpdates,
         budget: Budget,
         outcome: &mut Outcome,
     ) -> Result<bool, UpdateError> {
@@ -263,7 +258,7 @@ impl Front {
     /// Undoes the least urgent updates until the budget is kept. Tells whether `last` was among them.
     fn trim(
         &mut self,
-        mt: &impl MultiTessellation,
+        mt: &impl ApplyUpdates,
         criterion: &dyn Criterion,
         budget: Budget,
         last: Option<UpdateId>,
@@ -285,7 +280,7 @@ impl Front {
     /// Undoes `u` and whatever was there only for its sake.
     fn undo(
         &mut self,
-        mt: &impl MultiTessellation,
+        mt: &impl ApplyUpdates,
         criterion: &dyn Criterion,
         u: UpdateId,
         outcome: &mut Outcome,
@@ -308,7 +303,7 @@ impl Front {
     }
 
     /// The updates that created the tetrahedra just changed.
-    fn parents_of_touched(&self, mt: &impl MultiTessellation) -> Vec<UpdateId> {
+    fn parents_of_touched(&self, mt: &impl ApplyUpdates) -> Vec<UpdateId> {
         let mut parents: Vec<u32> = creators_of_touched(&self.mesh, mt).map(|u| u.0).collect();
         parents.sort_unstable();
         parents.dedup();

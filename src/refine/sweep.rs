@@ -4,8 +4,8 @@
 //! follow falling error, which jumps all over the model; a whole window of them, sorted by place, finds most of what it
 //! needs in the caches. New slots then lie side by side, too.
 
+use crate::mt::ApplyUpdates;
 use crate::mt::CurrentMesh;
-use crate::mt::MultiTessellation;
 use crate::mt::UpdateId;
 
 /// log2 of the cells along each axis by which updates are sorted.
@@ -29,7 +29,7 @@ pub(super) struct Window {
 
 impl Window {
     /// Sorts the updates by their places; those of a cell stay in the order they are in.
-    pub fn sort(&mut self, mt: &impl MultiTessellation, mesh: &CurrentMesh) {
+    pub fn sort(&mut self, mt: &impl ApplyUpdates, mesh: &CurrentMesh) {
         let shift = mt.info().lattice.bits.saturating_sub(CELL_BITS);
         self.starts.clear();
         self.starts.resize(CELLS, 0);

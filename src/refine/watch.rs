@@ -7,7 +7,7 @@
 //! priorities in ROAM (Duchaineau et al. 1997) and timing wheels (Varghese and Lauck 1987) are the ideas behind this.
 
 use super::DIALS;
-use crate::mt::Sparse;
+use crate::mt::PagedArray;
 use std::ops::Range;
 
 /// Slacks from 2^-24 to 2^4 are told apart.
@@ -29,7 +29,7 @@ const NOWHERE: u16 = u16::MAX;
 #[derive(Clone, Debug)]
 pub(super) struct Waiting {
     /// The slot of each thing, or [`OPEN`] or [`NOWHERE`].
-    place: Sparse<u16>,
+    place: PagedArray<u16>,
     /// What waits in each slot of each wheel, with entries that have moved on since.
     slots: Vec<Vec<u32>>,
     /// What is to be judged now; here, too, entries may have moved on.
@@ -40,7 +40,7 @@ pub(super) struct Waiting {
 
 impl Default for Waiting {
     fn default() -> Self {
-        Self { place: Sparse::new(NOWHERE), slots: Vec::new(), open: Vec::new(), now: [0.0; DIALS] }
+        Self { place: PagedArray::new(NOWHERE), slots: Vec::new(), open: Vec::new(), now: [0.0; DIALS] }
     }
 }
 

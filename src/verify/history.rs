@@ -6,8 +6,8 @@ use super::note;
 use super::satisfy;
 use crate::geom::Bounds;
 use crate::mesh::TetMesh;
+use crate::mt::ApplyUpdates;
 use crate::mt::MtInfo;
-use crate::mt::MultiTessellation;
 use crate::refine::Front;
 use crate::refine::Need;
 use crate::refine::Request;
@@ -81,7 +81,7 @@ pub fn requests(info: &MtInfo, input: &TetMesh) -> Vec<Query> {
 
 /// Answers each request from the base mesh, and again from the mesh that the one before left, or from the reference mesh.
 pub fn check(
-    mt: &impl MultiTessellation,
+    mt: &impl ApplyUpdates,
     base: &Front,
     queries: &[Query],
     on_progress: &mut dyn FnMut(u32),

@@ -36,8 +36,8 @@ mod same;
 mod triangles;
 
 use crate::mesh::TetMesh;
+use crate::mt::ApplyUpdates;
 use crate::mt::ErrorCode;
-use crate::mt::MultiTessellation;
 use crate::mt::UpdateId;
 use crate::mt::check_errors;
 use crate::refine::Criterion;
@@ -81,7 +81,7 @@ pub enum Reference {
 
 /// Checks `mt` against `input`, what it was built from (repaired if need be: [`crate::mesh::repair`]), with requests of every
 /// kind. `on_progress` is told how many of how many steps are done.
-pub fn run<M: MultiTessellation>(
+pub fn run<M: ApplyUpdates>(
     mt: &M,
     input: &TetMesh,
     reference: Reference,
@@ -123,7 +123,7 @@ impl Sample {
 
 /// [`run`] on a sample of the requests and of the reference vertices: for very large meshes. What is checked of a mesh without
 /// requests, and that the meshes which come out are valid, is checked as there.
-pub fn run_sample<M: MultiTessellation>(
+pub fn run_sample<M: ApplyUpdates>(
     mt: &M,
     input: &TetMesh,
     reference: Reference,
@@ -139,7 +139,7 @@ pub fn run_sample<M: MultiTessellation>(
 }
 
 /// [`run`] with requests of the caller's own.
-pub fn run_requests<M: MultiTessellation>(
+pub fn run_requests<M: ApplyUpdates>(
     mt: &M,
     input: &TetMesh,
     reference: Reference,
@@ -165,7 +165,7 @@ struct Plan {
     vertices: usize,
 }
 
-fn with<M: MultiTessellation>(
+fn with<M: ApplyUpdates>(
     mt: &M,
     input: &TetMesh,
     reference: Reference,
@@ -186,7 +186,7 @@ fn with<M: MultiTessellation>(
 }
 
 /// Failures that leave nothing more to check are returned, the others noted.
-fn verify<M: MultiTessellation>(
+fn verify<M: ApplyUpdates>(
     mt: &M,
     input: &TetMesh,
     Plan { queries, histories, vertices }: &Plan,
@@ -232,11 +232,11 @@ fn check_monotone(queries: &[Query], excesses: &[f64], report: &mut VerifyReport
     }
 }
 
-fn fresh(mt: &impl MultiTessellation) -> Result<Front, String> {
+fn fresh(mt: &impl ApplyUpdates) -> Result<Front, String> {
     Front::new(mt).map_err(|error| format!("the base mesh: {error}"))
 }
 
-fn satisfy(mt: &impl MultiTessellation, front: &mut Front, query: &Query) -> Result<Outcome, String> {
+fn satisfy(mt: &impl ApplyUpdates, front: &mut Front, query: &Query) -> Result<Outcome, String> {
     let outcome = front.satisfy(mt, &query.criterion(mt.info()), query.request.budget);
     outcome.map_err(|error| format!("{query}: the MT is damaged: {error}"))
 }
@@ -249,7 +249,7 @@ fn note(report: &mut VerifyReport, place: &dyn std::fmt::Display, failure: &str)
 
 /// Refines the base mesh to the reference mesh and coarsens it again. Returns what is to hold of every mesh.
 fn check_full_circle(
-    mt: &impl MultiTessellation,
+    mt: &impl ApplyUpdates,
     deviation: &Deviation<'_>,
     report: &mut VerifyReport,
 ) -> Result<mesh_checks::Shape, String> {
@@ -274,7 +274,7 @@ fn check_full_circle(
 }
 
 /// Refinement relies on errors that do not grow from an update to those that depend on it.
-fn check_order(mt: &impl MultiTessellation, report: &mut VerifyReport) {
+fn check_order(mt: &impl ApplyUpdates, report: &mut VerifyReport) {
     let place = &"errors along the partial order";
     match check_errors(mt) {
         Ok(None) => {}
@@ -307,7 +307,7 @@ impl Steps {
 /// Steps that a request is answered in, at most.
 const MOST_STEPS: u32 = 5;
 
-impl<M: MultiTessellation> Walk<'_, M> {
+impl<M: ApplyUpdates> Walk<'_, M> {
     fn run(
         mut self,
         queries: &[Query],
@@ -386,7 +386,7 @@ struct Case<'a, M> {
 /// Errors that are smaller than this, in whatever unit, are judged as this: ratios to 0 mean nothing.
 const LEAST: f64 = 1.0 / (1_u64 << 20) as f64;
 
-impl<M: MultiTessellation> Case<'_, M> {
+impl<M: ApplyUpdates> Case<'_, M> {
     fn check(
         &self,
         base: &Front,

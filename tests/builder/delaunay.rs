@@ -2,8 +2,8 @@
 
 use crate::support::random::Random;
 use std::collections::BTreeSet;
-use tetralod::build::BuildError;
-use tetralod::build::delaunay;
+use tetralod::builder::BuildError;
+use tetralod::builder::delaunay;
 use tetralod::geom::WIDE_BITS;
 use tetralod::geom::in_conflict;
 use tetralod::geom::orient3d;

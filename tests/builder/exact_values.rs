@@ -3,9 +3,9 @@
 use crate::support::meshes::{cube, hilly};
 use std::io::Cursor;
 use std::ops::ControlFlow;
-use tetralod::build::BuildConfig;
-use tetralod::build::BuildResult;
-use tetralod::build::build;
+use tetralod::builder::BuildConfig;
+use tetralod::builder::BuildResult;
+use tetralod::builder::build;
 use tetralod::client::Client;
 use tetralod::client::ClientError;
 use tetralod::client::ClientOptions;

@@ -3,13 +3,13 @@
 
 use crate::support::meshes::{bent, cube, hilly, linear};
 use std::ops::ControlFlow;
-use tetralod::build::BuildConfig;
-use tetralod::build::BuildError;
-use tetralod::build::BuildResult;
-use tetralod::build::Criterion;
-use tetralod::build::FieldPrecision;
-use tetralod::build::Method;
-use tetralod::build::build;
+use tetralod::builder::BuildConfig;
+use tetralod::builder::BuildError;
+use tetralod::builder::BuildResult;
+use tetralod::builder::Criterion;
+use tetralod::builder::FieldPrecision;
+use tetralod::builder::Method;
+use tetralod::builder::build;
 use tetralod::format::EncodeOptions;
 use tetralod::format::encode;
 use tetralod::mesh::Field;
@@ -48,7 +48,7 @@ fn made(mesh: &TetMesh, config: &BuildConfig) -> BuildResult {
 /// All updates applied.
 fn reference(mt: &Mt) -> CurrentMesh {
     let mut mesh = mt.start().expect("a valid base mesh");
-    mt.announce(&mut mesh, 0);
+    mt.updates_arrived(&mut mesh, 0);
     for u in (0..mt.updates()).map(UpdateId) {
         mt.refine(&mut mesh, u).expect("an update of this MT");
     }

@@ -3,10 +3,10 @@
 use crate::support::meshes::blocks;
 use crate::support::random::Random;
 use std::ops::ControlFlow;
-use tetralod::build::BuildConfig;
-use tetralod::build::Criterion;
-use tetralod::build::Method;
-use tetralod::build::build;
+use tetralod::builder::BuildConfig;
+use tetralod::builder::Criterion;
+use tetralod::builder::Method;
+use tetralod::builder::build;
 use tetralod::mesh::FACES;
 use tetralod::mesh::NONE;
 use tetralod::mesh::TetMesh;

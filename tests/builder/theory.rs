@@ -2,10 +2,10 @@
 
 use crate::support::meshes::{bent, blocks, built, cube, hilly, linear};
 use std::ops::ControlFlow;
-use tetralod::build::BuildConfig;
-use tetralod::build::BuildError;
-use tetralod::build::FieldPrecision;
-use tetralod::build::edge_mt;
+use tetralod::builder::BuildConfig;
+use tetralod::builder::BuildError;
+use tetralod::builder::FieldPrecision;
+use tetralod::builder::edge_mt;
 use tetralod::format::EncodeOptions;
 use tetralod::format::encode;
 use tetralod::generate;

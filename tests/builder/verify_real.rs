@@ -5,14 +5,15 @@
 use crate::support::meshes::built;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
-use tetralod::build::BuildConfig;
-use tetralod::build::Criterion;
-use tetralod::build::Method;
-use tetralod::build::build;
+use tetralod::builder::BuildConfig;
+use tetralod::builder::Criterion;
+use tetralod::builder::Method;
+use tetralod::builder::build;
 use tetralod::io;
 use tetralod::mesh::Grid;
 use tetralod::mesh::TetMesh;
 use tetralod::mesh::repair;
+use tetralod::mt::ApplyUpdates;
 use tetralod::mt::MtKind;
 use tetralod::mt::MultiTessellation;
 use tetralod::verify;
@@ -58,7 +59,7 @@ fn check(name: &str, mesh: &TetMesh, most: u32) {
     }
 }
 
-fn keeps_promises(name: &str, mt: &impl MultiTessellation, mesh: &TetMesh, reference: Reference) {
+fn keeps_promises(name: &str, mt: &impl ApplyUpdates, mesh: &TetMesh, reference: Reference) {
     let report = verify::run(mt, mesh, reference, &mut |_, _| {});
     assert!(report.valid && report.queries > 40, "{name}: {:#?}", report.failures);
     assert!(report.worst_error_ratio <= 1.0, "{name}: {}", report.worst_error_ratio);

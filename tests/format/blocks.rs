@@ -51,7 +51,7 @@ fn the_index_tells_the_truth() {
         assert_eq!(index.blocks.len(), 19);
         let mt = decoder.mt().expect("a base mesh");
         let mut mesh = mt.start().expect("a valid base mesh");
-        mt.announce(&mut mesh, 0);
+        mt.updates_arrived(&mut mesh, 0);
         for u in (0..mt.updates()).map(UpdateId) {
             let block = u.0 >> 4;
             let info = &index.blocks[block as usize];
@@ -103,8 +103,8 @@ fn the_index_tells_where_blocks_are() {
 #[test]
 fn header_and_index_are_small() {
     use std::ops::ControlFlow;
-    use tetralod::build::BuildConfig;
-    use tetralod::build::build;
+    use tetralod::builder::BuildConfig;
+    use tetralod::builder::build;
     let mesh = tetralod::generate::bucky(33).expect("a size that is allowed");
     let built = build(&mesh, &BuildConfig::of(MtKind::Edge), &mut |_| ControlFlow::Continue(()))
         .expect("a good mesh");
@@ -218,7 +218,7 @@ fn a_damaged_block_changes_nothing() {
 /// Levels and errors of all vertices by field, and where they are.
 fn told(mt: &Mt, fields: &[usize]) -> Vec<([i32; 3], Vec<i32>)> {
     let mut mesh = mt.start().expect("a valid base mesh");
-    mt.announce(&mut mesh, 0);
+    mt.updates_arrived(&mut mesh, 0);
     for u in (0..mt.updates()).map(UpdateId) {
         assert_eq!(mt.refine(&mut mesh, u), Ok(Applied::Done));
     }

@@ -10,9 +10,9 @@ use std::collections::BTreeMap;
 use std::collections::BTreeSet;
 use std::collections::HashMap;
 use std::ops::ControlFlow;
-use tetralod::build::BuildConfig;
-use tetralod::build::FieldPrecision;
-use tetralod::build::edge_mt;
+use tetralod::builder::BuildConfig;
+use tetralod::builder::FieldPrecision;
+use tetralod::builder::edge_mt;
 use tetralod::format::Decoder;
 use tetralod::format::EncodeOptions;
 use tetralod::format::Index;
@@ -58,7 +58,7 @@ fn compare(bytes: &[u8]) {
         let mt = edge_of(&decoder);
         let updates = file.index.updates(block, &file.info);
         assert_eq!(mt.updates(), updates.end);
-        mt.announce(&mut current, updates.start);
+        mt.updates_arrived(&mut current, updates.start);
         let mut parents = BTreeSet::new();
         for k in updates {
             compare_split(&file, mt, k);

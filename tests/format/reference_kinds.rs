@@ -14,10 +14,10 @@ use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::panic::AssertUnwindSafe;
 use std::panic::catch_unwind;
-use tetralod::build::BuildConfig;
-use tetralod::build::Criterion;
-use tetralod::build::FieldPrecision;
-use tetralod::build::Method;
+use tetralod::builder::BuildConfig;
+use tetralod::builder::Criterion;
+use tetralod::builder::FieldPrecision;
+use tetralod::builder::Method;
 use tetralod::format::EncodeOptions;
 use tetralod::format::encode;
 use tetralod::generate;
@@ -176,7 +176,7 @@ const METHODS: [(Method, Criterion); 3] = [
 
 fn built(mesh: &TetMesh, (method, criterion): (Method, Criterion), config: BuildConfig) -> Mt {
     let config = BuildConfig { kind: MtKind::Vertex, method, criterion, ..config };
-    tetralod::build::build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a valid mesh").mt
+    tetralod::builder::build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a valid mesh").mt
 }
 
 fn precise(position_bits: u32, field_bits: u32) -> BuildConfig {
@@ -346,7 +346,7 @@ fn exact_values_are_read_alike() {
     let flow = generate::sphere_flow(6).expect("a small size");
     for (kind, method) in [(MtKind::Vertex, Method::Decimate), (MtKind::Edge, Method::Collapse)] {
         let config = BuildConfig { kind, method, all_lossless: true, ..precise(12, 9) };
-        let built = tetralod::build::build(&flow, &config, &mut |_| ControlFlow::Continue(()));
+        let built = tetralod::builder::build(&flow, &config, &mut |_| ControlFlow::Continue(()));
         let built = built.expect("a valid mesh");
         let spelled = built.mt.convert(MtKind::Explicit).expect("a valid MT");
         for mt in [spelled, built.mt].iter().filter(|mt| mt.info().kind != MtKind::Edge) {
@@ -383,7 +383,7 @@ fn errors_of_tetrahedra_are_read_alike() {
         let (method, criterion) = (Method::Insert, Criterion::Delaunay);
         let config =
             BuildConfig { kind, method, criterion, tet_errors: true, ..BuildConfig::of(MtKind::Edge) };
-        let built = tetralod::build::build(&mesh, &config, &mut |_| ControlFlow::Continue(()));
+        let built = tetralod::builder::build(&mesh, &config, &mut |_| ControlFlow::Continue(()));
         let options = EncodeOptions { block_bits: 5, ..EncodeOptions::default() };
         let bytes = encode(&built.expect("a good mesh").mt, &options).expect("a complete MT");
         let (file, changes) = compare(&bytes);

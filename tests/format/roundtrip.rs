@@ -7,8 +7,8 @@ use crate::support::files::{
 use crate::support::strategies::{config, plan};
 use proptest::prelude::*;
 use std::ops::ControlFlow;
-use tetralod::build::BuildConfig;
-use tetralod::build::build;
+use tetralod::builder::BuildConfig;
+use tetralod::builder::build;
 use tetralod::format::BLOCK_BITS;
 use tetralod::format::Decoder;
 use tetralod::format::EncodeError;
@@ -168,7 +168,7 @@ fn offsets_are_not_counted_from_edges_that_are_not_there() {
     // How many edges there are only the mesh can tell.
     let far = copy(told(), 1, 127).expect("seven bits");
     let mut mesh = far.start().expect("a base mesh");
-    far.announce(&mut mesh, 0);
+    far.updates_arrived(&mut mesh, 0);
     let tets = mesh.tets().to_vec();
     assert_eq!(far.refine(&mut mesh, UpdateId(0)), Err(UpdateError::Edge { update: 0 }));
     assert_eq!(mesh.tets(), tets, "the mesh is as it was");

@@ -18,7 +18,7 @@ use tetralod::mt::UpdateId;
 /// Few updates between the copies, many blocks of entries: nothing is told by accident.
 fn changes_tell_everything(mt: &Mt, random: &mut Random) {
     let mut mesh = mt.start().expect("a valid base mesh");
-    mt.announce(&mut mesh, 0);
+    mt.updates_arrived(&mut mesh, 0);
     let mut set = vec![false; mt.updates() as usize];
     let mut copy = snapshot_of_nothing(&snapshot(&mesh));
     let (n, fields) = (set.len(), mt.info().fields.len());

@@ -18,6 +18,7 @@ use tetralod::mt::CurrentMesh;
 use tetralod::mt::ErrorCode;
 use tetralod::mt::Mt;
 use tetralod::mt::MtKind;
+use tetralod::mt::ApplyUpdates;
 use tetralod::mt::MultiTessellation;
 use tetralod::mt::UpdateId;
 use tetralod::mt::stats;
@@ -120,7 +121,7 @@ struct Walk<'a> {
 impl<'a> Walk<'a> {
     fn new(subject: &'a Subject, mt: Mt) -> Self {
         let mut mesh = mt.start().expect("a valid base mesh");
-        mt.announce(&mut mesh, 0);
+        mt.updates_arrived(&mut mesh, 0);
         let set = vec![false; subject.explicit.updates() as usize];
         Self { subject, mt, mesh, set, done: 0, blocked: 0, compare_every: 1 }
     }
@@ -306,7 +307,7 @@ fn visit_all(subject: &Subject, first: u32, random: &mut Random) -> usize {
     seen.len()
 }
 
-fn satisfy(front: &mut Front, mt: &impl MultiTessellation, request: &Request) -> Outcome {
+fn satisfy(front: &mut Front, mt: &impl ApplyUpdates, request: &Request) -> Outcome {
     let criterion = LodCriterion::new(mt.info(), request);
     front.satisfy(mt, &criterion, request.budget).expect("a valid MT")
 }
@@ -377,7 +378,7 @@ fn arrive(subject: &Subject, compare_every: usize, random: &mut Random) {
         let known = walk.mt.updates();
         let most = if random.once_in(4) { 60 } else { 9 };
         (0..random.below(most).min((whole - known) as usize)).for_each(|_| grow(&mut walk.mt, &subject.mt));
-        walk.mt.announce(&mut walk.mesh, known);
+        walk.mt.updates_arrived(&mut walk.mesh, known);
         walk.assert_same();
         walk.wander(12, random);
         let request = random_request(subject, random);

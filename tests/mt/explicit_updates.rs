@@ -3,6 +3,7 @@
 use crate::support::builder::{Plan, build};
 use crate::support::domains::{Domain, volume6};
 use tetralod::mt::Applied;
+use tetralod::mt::ApplyUpdates;
 use tetralod::mt::ConvertError;
 use tetralod::mt::CurrentMesh;
 use tetralod::mt::EdgeMt;
@@ -22,10 +23,10 @@ struct Walk<M> {
     mesh: CurrentMesh,
 }
 
-impl<M: MultiTessellation> Walk<M> {
+impl<M: ApplyUpdates> Walk<M> {
     fn new(mt: M) -> Self {
         let mut mesh = mt.start().expect("a valid base mesh");
-        mt.announce(&mut mesh, 0);
+        mt.updates_arrived(&mut mesh, 0);
         Self { mt, mesh }
     }
 

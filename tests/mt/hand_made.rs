@@ -88,7 +88,7 @@ impl Cone {
             errors: &[error],
         })?;
         let mut mesh = CurrentMesh::new(mt.info(), mt.base()).expect("a valid base mesh");
-        mt.announce(&mut mesh, 0);
+        mt.updates_arrived(&mut mesh, 0);
         let (before, hash) = (snapshot(&mesh), mesh.hash());
         let result = mt.refine(&mut mesh, UpdateId(0));
         assert_eq!(mesh.check(), Ok(()));
@@ -255,8 +255,8 @@ fn a_mesh_that_was_not_told_of_an_update_refuses_it() {
     let mut mesh = CurrentMesh::new(mt.info(), mt.base()).expect("a valid base mesh");
     mt.push(&built.splits[0].as_update()).expect("a valid update");
     let before = snapshot(&mesh);
-    assert_eq!(mt.refine(&mut mesh, UpdateId(0)), Err(UpdateError::Unannounced { update: 0 }));
+    assert_eq!(mt.refine(&mut mesh, UpdateId(0)), Err(UpdateError::UnknownToMesh { update: 0 }));
     assert_eq!(snapshot(&mesh), before);
-    mt.announce(&mut mesh, 0);
+    mt.updates_arrived(&mut mesh, 0);
     assert_eq!(mt.refine(&mut mesh, UpdateId(0)), Ok(Applied::Done));
 }

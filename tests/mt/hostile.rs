@@ -30,7 +30,7 @@ struct Driver<'a> {
 impl<'a> Driver<'a> {
     fn new(mt: &'a EdgeMt) -> Result<Self, BaseMeshError> {
         let mut mesh = CurrentMesh::new(mt.info(), mt.base())?;
-        mt.announce(&mut mesh, 0);
+        mt.updates_arrived(&mut mesh, 0);
         assert_eq!(mesh.check(), Ok(()));
         Ok(Self { mt, mesh, set: vec![false; mt.updates() as usize], done: 0, errors: Vec::new() })
     }

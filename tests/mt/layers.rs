@@ -14,7 +14,7 @@ const LAYERS: [(&str, &[&str]); 17] = [
     ("mt", &["geom", "mesh"]),
     ("generate", &["geom", "mesh"]),
     ("io", &["geom", "mesh"]),
-    ("build", &["geom", "mesh", "mt"]),
+    ("builder", &["geom", "mesh", "mt"]),
     ("format", &["geom", "mesh", "mt"]),
     ("refine", &["geom", "mesh", "mt"]),
     ("measure", &["geom", "mesh", "mt"]),
@@ -29,7 +29,7 @@ const LAYERS: [(&str, &[&str]); 17] = [
         "web",
         &[
             "geom", "mesh", "mt", "format", "refine", "view", "session", "stream", "bench", "gpu", "io",
-            "build",
+            "builder",
         ],
     ),
 ];

@@ -4,10 +4,10 @@
 use crate::subjects::{SUBJECTS, applied};
 use crate::support::meshes::{cube, hilly};
 use std::ops::ControlFlow;
-use tetralod::build::BuildConfig;
-use tetralod::build::Criterion;
-use tetralod::build::Method;
-use tetralod::build::build;
+use tetralod::builder::BuildConfig;
+use tetralod::builder::Criterion;
+use tetralod::builder::Method;
+use tetralod::builder::build;
 use tetralod::geom::Bounds;
 use tetralod::mt::EdgeMt;
 use tetralod::mt::MtKind;

@@ -4,10 +4,10 @@
 use crate::support::meshes::{blocks, tampered};
 use crate::support::random::Random;
 use std::ops::ControlFlow;
-use tetralod::build::BuildConfig;
-use tetralod::build::Criterion;
-use tetralod::build::Method;
-use tetralod::build::build;
+use tetralod::builder::BuildConfig;
+use tetralod::builder::Criterion;
+use tetralod::builder::Method;
+use tetralod::builder::build;
 use tetralod::format::EncodeError;
 use tetralod::format::EncodeOptions;
 use tetralod::format::encode;
@@ -17,6 +17,7 @@ use tetralod::mt::ErrorCode;
 use tetralod::mt::ExplicitMt;
 use tetralod::mt::Mt;
 use tetralod::mt::MtKind;
+use tetralod::mt::ApplyUpdates;
 use tetralod::mt::MultiTessellation;
 use tetralod::mt::UpdateId;
 use tetralod::mt::VertexId;
@@ -75,7 +76,7 @@ fn values_are_monotone(mt: &ExplicitMt) -> Result<(), String> {
 }
 
 /// Answers requests for values all over the range, in random order, each from the base mesh and from what the one before left.
-fn remembers_nothing(name: &str, mt: &impl MultiTessellation, seed: u64) {
+fn remembers_nothing(name: &str, mt: &impl ApplyUpdates, seed: u64) {
     let mut random = Random::new(seed);
     let info = mt.info().fields[0].clone();
     let base = Front::new(mt).expect("a valid base mesh");

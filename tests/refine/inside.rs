@@ -4,10 +4,10 @@
 use crate::at_vertices::{errors_inside, refined};
 use crate::support::meshes::blocks;
 use std::ops::ControlFlow;
-use tetralod::build::BuildConfig;
-use tetralod::build::Criterion;
-use tetralod::build::Method;
-use tetralod::build::build;
+use tetralod::builder::BuildConfig;
+use tetralod::builder::Criterion;
+use tetralod::builder::Method;
+use tetralod::builder::build;
 use tetralod::mesh::TetMesh;
 use tetralod::mt::Mt;
 use tetralod::mt::MtKind;

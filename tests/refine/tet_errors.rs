@@ -7,11 +7,11 @@ use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::LazyLock;
-use tetralod::build::BuildConfig;
-use tetralod::build::BuildResult;
-use tetralod::build::Criterion as BuiltBy;
-use tetralod::build::Method;
-use tetralod::build::build;
+use tetralod::builder::BuildConfig;
+use tetralod::builder::BuildResult;
+use tetralod::builder::Criterion as BuiltBy;
+use tetralod::builder::Method;
+use tetralod::builder::build;
 use tetralod::format::Decoder;
 use tetralod::format::EncodeOptions;
 use tetralod::format::encode;
@@ -24,6 +24,7 @@ use tetralod::mt::ErrorCode;
 use tetralod::mt::ExplicitMt;
 use tetralod::mt::Mt;
 use tetralod::mt::MtKind;
+use tetralod::mt::ApplyUpdates;
 use tetralod::mt::MultiTessellation;
 use tetralod::mt::UpdateId;
 use tetralod::mt::VertexId;
@@ -166,7 +167,7 @@ fn applied(front: &Front, updates: u32) -> Vec<bool> {
 }
 
 /// A mesh by its tetrahedra, each with its errors.
-fn seen(mt: &impl MultiTessellation, mesh: &CurrentMesh) -> BTreeSet<([u32; 4], Option<u32>, u8)> {
+fn seen(mt: &impl ApplyUpdates, mesh: &CurrentMesh) -> BTreeSet<([u32; 4], Option<u32>, u8)> {
     let tets = (0..).zip(mesh.tets()).map(|(t, tet)| {
         let mut tet = tet.map(|slot| mesh.vertex(slot).0);
         tet.sort_unstable();

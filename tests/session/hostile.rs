@@ -6,7 +6,7 @@ use crate::support::strategies::config;
 use proptest::prelude::*;
 use std::ops::ControlFlow;
 use std::sync::LazyLock;
-use tetralod::build::{BuildConfig, build};
+use tetralod::builder::{BuildConfig, build};
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::generate::by_name;
 use tetralod::mt::{MtKind, MultiTessellation};

@@ -3,8 +3,8 @@
 
 use crate::support::random::Random;
 use std::ops::ControlFlow;
-use tetralod::build::BuildConfig;
-use tetralod::build::build;
+use tetralod::builder::BuildConfig;
+use tetralod::builder::build;
 use tetralod::format::DecodeOptions;
 use tetralod::format::EncodeOptions;
 use tetralod::format::encode;

@@ -13,6 +13,7 @@ use tetralod::format::encode;
 use tetralod::geom::Lattice;
 use tetralod::mesh::VectorPart;
 use tetralod::mt::Applied;
+use tetralod::mt::ApplyUpdates;
 use tetralod::mt::BaseMesh;
 use tetralod::mt::CurrentMesh;
 use tetralod::mt::EdgeMt;
@@ -221,9 +222,9 @@ fn seen(mesh: &CurrentMesh, found: &[u32]) -> Vec<Seen> {
 }
 
 /// Applies all updates in order, and shows for each what it removed and inserted.
-fn replayed(mt: &impl MultiTessellation, mut each: impl FnMut(UpdateId, [Vec<Seen>; 2])) -> CurrentMesh {
+fn replayed(mt: &impl ApplyUpdates, mut each: impl FnMut(UpdateId, [Vec<Seen>; 2])) -> CurrentMesh {
     let mut mesh = mt.start().expect("a valid base mesh");
-    mt.announce(&mut mesh, 0);
+    mt.updates_arrived(&mut mesh, 0);
     for u in (0..mt.updates()).map(UpdateId) {
         let (mut removed, mut found) = (Vec::new(), Vec::new());
         mt.find_removed(&mut mesh, u, &mut removed).expect("a valid MT");
@@ -236,7 +237,7 @@ fn replayed(mt: &impl MultiTessellation, mut each: impl FnMut(UpdateId, [Vec<See
 }
 
 /// Asserts that two MTs have the same description, base mesh and errors, and that every update does the same in both.
-pub fn assert_same(a: &impl MultiTessellation, b: &impl MultiTessellation) {
+pub fn assert_same(a: &impl ApplyUpdates, b: &impl ApplyUpdates) {
     assert_eq!((a.info(), a.base(), a.updates()), (b.info(), b.base(), b.updates()));
     let mut steps = Vec::new();
     let mesh = replayed(a, |u, step| steps.push((a.errors(u).to_vec(), step)));

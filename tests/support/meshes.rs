@@ -1,9 +1,9 @@
 //! Meshes made by code, small enough to be built and verified in a test.
 
 use std::ops::ControlFlow;
-use tetralod::build::BuildConfig;
-use tetralod::build::BuildResult;
-use tetralod::build::edge_mt;
+use tetralod::builder::BuildConfig;
+use tetralod::builder::BuildResult;
+use tetralod::builder::edge_mt;
 use tetralod::mesh::Field;
 use tetralod::mesh::Grid;
 use tetralod::mesh::TetMesh;

@@ -3,10 +3,10 @@
 use crate::support::random::Random;
 use std::ops::ControlFlow;
 use std::ops::Range;
-use tetralod::build::BuildConfig;
-use tetralod::build::Criterion;
-use tetralod::build::Method;
-use tetralod::build::build;
+use tetralod::builder::BuildConfig;
+use tetralod::builder::Criterion;
+use tetralod::builder::Method;
+use tetralod::builder::build;
 use tetralod::mesh::TetMesh;
 use tetralod::mt::Applied;
 use tetralod::mt::CurrentMesh;
@@ -48,7 +48,7 @@ impl Walk {
         let config = BuildConfig { kind, method, criterion, fields, ..BuildConfig::of(MtKind::Edge) };
         let mt = build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt;
         let mut mesh = mt.start().expect("a valid base mesh");
-        mt.announce(&mut mesh, 0);
+        mt.updates_arrived(&mut mesh, 0);
         let applied = vec![false; mt.updates() as usize];
         let mut walk =
             Self { mt, mesh, applied, positions: Vec::new(), values: Vec::new(), random: Random::new(5) };

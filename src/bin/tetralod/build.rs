@@ -12,14 +12,14 @@ use serde::Serialize;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::Instant;
-use tetralod::build::BuildConfig;
-use tetralod::build::BuildProgress;
-use tetralod::build::BuildResult;
-use tetralod::build::BuildSummary;
-use tetralod::build::Criterion;
-use tetralod::build::FieldPrecision;
-use tetralod::build::Method;
-use tetralod::build::Purpose;
+use tetralod::builder::BuildConfig;
+use tetralod::builder::BuildProgress;
+use tetralod::builder::BuildResult;
+use tetralod::builder::BuildSummary;
+use tetralod::builder::Criterion;
+use tetralod::builder::FieldPrecision;
+use tetralod::builder::Method;
+use tetralod::builder::Purpose;
 use tetralod::format::EncodeOptions;
 use tetralod::format::encode_to;
 use tetralod::io::CellData;
@@ -336,7 +336,7 @@ fn build(arguments: &Arguments, config: &BuildConfig, mesh: &TetMesh) -> Result<
     let style = "{msg:<12} {wide_bar} {percent:>3} %  {pos}/{len}  {elapsed_precise}  about {eta} left";
     bar.set_style(ProgressStyle::with_template(style).context("the style of the progress bar")?);
     let mut stage = "";
-    let result = tetralod::build::build(mesh, config, &mut |progress: BuildProgress| {
+    let result = tetralod::builder::build(mesh, config, &mut |progress: BuildProgress| {
         bar.set_length(progress.total.max(1));
         if progress.stage != stage {
             stage = progress.stage;
