@@ -2,7 +2,11 @@
 
 import { TetralodError } from "./errors.js";
 
-/** The arrays of a mesh, and how many numbers a vertex or a tetrahedron has in each. */
+/**
+ * The arrays of a mesh, and how many numbers a vertex or a tetrahedron has in each.
+ *
+ * @type {["positions" | "field" | "tets" | "neighbors", "vertices" | "tets", number][]}
+ */
 const ARRAYS = [
   ["positions", "vertices", 3],
   ["field", "vertices", 1],

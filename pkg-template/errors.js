@@ -16,7 +16,10 @@ export class TetralodError extends Error {
 
 /** What `postMessage` can carry of an error. */
 export function flattenError(error) {
-  if (error instanceof Error) return { name: error.name, message: error.message, code: error.code };
+  if (error instanceof Error) {
+    const { name, message, code } = /** @type {Error & { code?: string }} */ (error);
+    return { name, message, code };
+  }
   return { name: "Error", message: String(error), code: undefined };
 }
 

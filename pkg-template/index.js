@@ -260,7 +260,7 @@ function numbers(name, list) {
   if (!isList || !Array.prototype.every.call(list, (number) => typeof number === "number")) {
     throw new TetralodError("bad-option", `option \`${name}\`: must be a list of numbers`);
   }
-  return Float64Array.from(list);
+  return Float64Array.from(/** @type {ArrayLike<number>} */ (list));
 }
 
 function checkNumber(name, number) {

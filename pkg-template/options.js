@@ -73,7 +73,7 @@ function plain(value, depth = DEPTH) {
   if (typeof value !== "object" || value === null) return value;
   if (depth === 0) return null;
   const inner = (member) => plain(member, depth - 1);
-  if (ArrayBuffer.isView(value)) return Array.from(value);
+  if (ArrayBuffer.isView(value)) return Array.from(/** @type {any} */ (value));
   if (Array.isArray(value)) return value.map(inner);
   const { x, y, z, min, max, elements } = value;
   if (x !== undefined && y !== undefined && z !== undefined) return [x, y, z];

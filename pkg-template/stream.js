@@ -179,6 +179,8 @@ function bytesOf(value) {
 /**
  * What `Ranges` needs to fetch `source` in parts, if that is a file on a server: its address, and what goes along.
  *
+ * @param {import("./index.js").Source} source
+ * @param {{ headers?: HeadersInit, credentials?: RequestCredentials }} [along] goes along with a request
  * @returns {{ url: string, headers?: [string, string][], credentials?: RequestCredentials } | undefined}
  */
 export function rangesOf(source, { headers, credentials } = {}) {
@@ -207,7 +209,14 @@ function urlOf(source) {
   return isInstance(source, "Request") ? source.url : undefined;
 }
 
-/** `instanceof` for classes that a runtime may lack. */
+/**
+ * `instanceof` for classes that a runtime may lack.
+ *
+ * @template {"Request" | "Response" | "Blob"} Name
+ * @param {any} value
+ * @param {Name} name
+ * @returns {value is { Request: Request, Response: Response, Blob: Blob & { name?: string } }[Name]}
+ */
 function isInstance(value, name) {
   return typeof globalThis[name] === "function" && value instanceof globalThis[name];
 }

@@ -135,12 +135,19 @@ const methods = {
     return goal;
   },
 
-  /** Applies what has been set since the last call, in one go. */
+  /**
+   * Applies what has been set since the last call, in one go.
+   *
+   * @param {{ size?: [number, number, number], orbit?: [number, number], pan?: [number, number], [setting: string]: any }} settings
+   */
   update({ mode, isovalue, clip, roi, orbit, zoom, pan, home, size }) {
     if (size) viewer.resize(...size);
     if (mode !== undefined) viewer.setMode(mode);
     if (isovalue !== undefined) viewer.setIsovalue(isovalue);
-    if (clip !== undefined) viewer.setClip(...(clip ? [...clip.normal, clip.offset] : [0, 0, 0, 0]));
+    if (clip !== undefined) {
+      const [x, y, z] = clip?.normal ?? [0, 0, 0];
+      viewer.setClip(x, y, z, clip?.offset ?? 0);
+    }
     if (roi !== undefined) viewer.setRoi(roi ? Float64Array.from(roi) : undefined);
     if (home) viewer.home();
     if (orbit) viewer.orbit(...orbit);
@@ -214,7 +221,7 @@ function step(budget) {
   const start = performance.now();
   try {
     const here = parts && viewer.blocks().here;
-    const stats = viewer.step(budget);
+    const stats = /** @type {any} */ (viewer.step(budget));
     const end = performance.now();
     parts?.follow();
     // Where there was no room for blocks, there may be now. A view that follows the camera may want others.

@@ -46,7 +46,12 @@ export class Viewer extends EventTarget {
     if (!adapter) throw new TetralodError("no-webgpu", NO_ADAPTER);
   }
 
-  /** Takes the canvas over, for good, and starts the worker. */
+  /**
+   * Takes the canvas over, for good, and starts the worker.
+   *
+   * @param {HTMLCanvasElement} canvas
+   * @param {{ signal?: AbortSignal }} [options]
+   */
   static async create(canvas, { signal } = {}) {
     signal?.throwIfAborted();
     if (typeof HTMLCanvasElement === "undefined") throw new TetralodError("no-webgpu", NO_PAGE);
@@ -135,6 +140,9 @@ export class Viewer extends EventTarget {
   /**
    * Streams a volume in, in place of the one before. Resolves when its base mesh has been drawn; `finished` of the
    * result when all of it is there.
+   *
+   * @param {any} source
+   * @param {{ signal?: AbortSignal, [how: string]: any }} [options]
    */
   async open(source, { signal, ...how } = {}) {
     const fetching = openOptions(how, ["signal"]);

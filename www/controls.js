@@ -25,6 +25,7 @@ export function attachControls(canvas, viewer, { onHome, onBox }) {
   let press = 0;
   let hovering = false;
 
+  /** @type {(event: MouseEvent) => [number, number]} From -1 to 1 in both directions. */
   const point = (event) => {
     const { left, top, width, height } = canvas.getBoundingClientRect();
     return [((event.clientX - left) / width) * 2 - 1, 1 - ((event.clientY - top) / height) * 2];
@@ -92,7 +93,7 @@ export function attachControls(canvas, viewer, { onHome, onBox }) {
 
   for (const name of ["pointerup", "pointercancel"]) {
     canvas.addEventListener(name, (event) => {
-      pointers.delete(event.pointerId);
+      pointers.delete(/** @type {PointerEvent} */ (event).pointerId);
       press++;
       handle = -1;
       canvas.classList.remove("turning");

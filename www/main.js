@@ -7,7 +7,10 @@
 
 import { attachControls } from "./controls.js";
 
+/** @type {(id: string) => any} What an element can do is up to the page. */
 const $ = (id) => document.getElementById(id);
+/** @type {(selector: string) => Iterable<any>} */
+const all = (selector) => document.querySelectorAll(selector);
 const canvas = $("canvas");
 
 const demo = (window.tetralodDemo = {
@@ -195,8 +198,9 @@ function say(title, error) {
 
 /* Settings */
 
-const mode = () => document.querySelector("[name=mode]:checked").value;
-const aim = () => document.querySelector("[name=aim]:checked").value;
+const checked = (name) => /** @type {HTMLInputElement} */ (document.querySelector(`[name=${name}]:checked`)).value;
+const mode = () => /** @type {"iso" | "cutaway"} */ (checked("mode"));
+const aim = () => checked("aim");
 
 /** Places of the error's slider: what is good enough where a view asks for more is coarser. */
 const errorPlaces = { field: 50, view: 78 };
@@ -230,6 +234,7 @@ function refine() {
   text("error-text", percent === 0 ? "0: the reference mesh" : percentage(percent), "error");
   text("budget-text", budget() === undefined ? "no limit" : `${count(budget())} tetrahedra`, "budget");
   text("pixels-text", pixels(errorPixels()), "pixels");
+  /** @type {import("tetralod/viewer").ViewerRefineOptions} */
   const options = { error: `${percent}%`, field: demo.info.fields.indexOf(field), maxTets: budget(), ...part() };
   if ($("focus").checked) options.isovalues = [isovalue()];
   if (aim() === "view") options.needs = [{ view: { pixels: errorPixels() } }];
@@ -248,18 +253,18 @@ function applyIsovalue() {
 }
 
 function applyMode() {
-  for (const row of document.querySelectorAll("[data-mode]")) row.hidden = row.dataset.mode !== mode();
+  for (const row of all("[data-mode]")) row.hidden = row.dataset.mode !== mode();
   $("legend-mark").hidden = mode() !== "iso";
   viewer.setMode(mode());
 }
 
-/** The plane of the cut. */
+/** The plane of the cut. @returns {{ normal: [number, number, number], offset: number }} */
 function plane() {
   const axis = Number($("axis").value);
   const [low, high] = [demo.info.bounds[axis], demo.info.bounds[axis + 3]];
   const sign = $("flip").checked ? -1 : 1;
-  const normal = [0, 1, 2].map((i) => (i === axis ? sign : 0));
-  return { normal, offset: sign * (low + ((high - low) * $("cut").value) / 1000) };
+  const along = (other) => (other === axis ? sign : 0);
+  return { normal: [along(0), along(1), along(2)], offset: sign * (low + ((high - low) * $("cut").value) / 1000) };
 }
 
 function applyCut() {
@@ -298,7 +303,7 @@ function applyRoi() {
 
 function applyAim() {
   const view = aim() === "view";
-  for (const row of document.querySelectorAll("[data-aim]")) row.hidden = !view;
+  for (const row of all("[data-aim]")) row.hidden = !view;
   $("error-label").textContent = view ? "Error elsewhere" : "Error";
   $("error").value = errorPlaces[aim()];
   refine();
@@ -412,10 +417,11 @@ function showInList(from) {
 
 /* Numbers */
 
+/** @param {import("tetralod/viewer").ViewerProgress} progress */
 function showProgress({ bytes, total, complete, blocks }) {
   demo.receivedBytes = bytes;
   demo.blocks = blocks;
-  document.querySelectorAll(".of-blocks").forEach((part) => (part.hidden = !blocks));
+  for (const part of all(".of-blocks")) part.hidden = !blocks;
   if (blocks) return showBlocks(blocks, bytes);
   const known = total ?? demo.totalBytes;
   demo.totalBytes ??= total;
@@ -479,10 +485,12 @@ function achieved({ relativeErrorBound, bounds }) {
   return `The best mesh of so many tetrahedra: within ${percentage(relativeErrorBound * 100)}${seen}`;
 }
 
+let waiting;
+
 /** Tells screen readers, once the numbers have come to rest. */
 function announce(words) {
-  clearTimeout(announce.timer);
-  announce.timer = setTimeout(() => ($("status").textContent = words), 800);
+  clearTimeout(waiting);
+  waiting = setTimeout(() => ($("status").textContent = words), 800);
 }
 
 /** Shows what a slider stands for, also to those who do not see it. */

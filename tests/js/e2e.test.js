@@ -1,7 +1,7 @@
 // The demo page in a real browser, with WebGPU, on the demo's data. The pictures that it makes are kept in
 // `target/e2e/` to be looked at.
 import assert from "node:assert/strict";
-import { mkdir, readFile, writeFile } from "node:fs/promises";
+import { mkdir, readFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
 import { fileURLToPath } from "node:url";
 import { address, launch } from "./browser.js";
@@ -19,7 +19,7 @@ before(async () => {
 after(() => browser?.close());
 
 /** A fresh page with `volume` opened; anything that it complains about is kept. */
-async function open(volume, prepare = async () => {}) {
+async function open(volume, prepare = async (_page) => {}) {
   const page = await browser.newPage({ viewport: { width: 1100, height: 760 } });
   page.complaints = [];
   page.on("pageerror", (error) => page.complaints.push(String(error)));
@@ -232,7 +232,10 @@ test("a browser without WebGPU gets a message, not a blank page", async () => {
 });
 
 test("a file that is not there, or is no MT, is named", async () => {
-  for (const [file, words] of [["data/none.mt", /none\.mt.*404/], ["style.css", /style\.css.*not an MT file/i]]) {
+  for (const [file, words] of /** @type {[string, RegExp][]} */ ([
+    ["data/none.mt", /none\.mt.*404/],
+    ["style.css", /style\.css.*not an MT file/i],
+  ])) {
     const page = await open(file);
     await reach(page, "failed");
     assert.match(await page.locator("#message").innerText(), words);
@@ -316,7 +319,10 @@ test("the package runs in a worker of the page, without a viewer", async () => {
     const { MultiTessellation, applyChanges } = await import("tetralod");
     const mt = await MultiTessellation.open("data/bucky.mt");
     const { stats, tets } = await mt.refine({ error: "5%", maxTets: 20_000 });
-    const [one, two] = [await mt.hash(), (await mt.refine({ error: "0%" }), await mt.refine({ error: "5%", maxTets: 20_000 }), await mt.hash())];
+    const one = await mt.hash();
+    await mt.refine({ error: "0%" });
+    await mt.refine({ error: "5%", maxTets: 20_000 });
+    const two = await mt.hash();
     // Deltas over a walk of a box, in steps and whole.
     const at = (place) => place.map((x, i) => mt.info.bounds[i] + x * (mt.info.bounds[i + 3] - mt.info.bounds[i]));
     const mesh = await mt.refine({ error: "100%" });
@@ -324,8 +330,8 @@ test("the package runs in a worker of the page, without a viewer", async () => {
     for (let i = 0; i < 12; i++) {
       const [lower, upper] = [[0.1 + 0.05 * i, 0.2, 0.2], [0.3 + 0.05 * i, 0.5, 0.5]];
       const options = { error: "0.5%", box: [...at(lower), ...at(upper)] };
-      const how = { deltas: true, updates: 200 + 500 * i };
-      for await (const step of mt.refineSteps(options, how)) applyChanges(mesh, step);
+      const updates = 200 + 500 * i;
+      for await (const step of mt.refineSteps(options, { deltas: true, updates })) applyChanges(mesh, step);
       if (i % 3 > 0) continue;
       const full = await mt.refine(options);
       mesh.changes = full.changes;

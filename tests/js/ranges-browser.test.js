@@ -18,8 +18,8 @@ const servers = [];
 async function listen(answer) {
   const server = createServer(answer);
   servers.push(server);
-  await new Promise((resolve) => server.listen(0, "127.0.0.1", resolve));
-  return `http://127.0.0.1:${server.address().port}`;
+  await new Promise((resolve) => server.listen(0, "127.0.0.1", () => resolve(undefined)));
+  return `http://127.0.0.1:${/** @type {import("node:net").AddressInfo} */ (server.address()).port}`;
 }
 
 async function servePage({ url }, response) {
@@ -85,9 +85,10 @@ function fetchIn(path, ranges, options = {}) {
   return page.evaluate(run, { url: base + path, ranges, options });
 }
 
+/** @type {[number, number][]} */
 const RANGES = [[1000, 50_000], [100_000, 160_000], [199_000, SIZE + 9]];
-const sum = ([start, end]) => file.slice(start, end).reduce((total, byte) => total + byte, 0);
-const expected = Object.fromEntries([[0, 100], ...RANGES].map((range) => [range[0], sum(range)]));
+const sum = (start, end) => file.slice(start, end).reduce((total, byte) => total + byte, 0);
+const expected = Object.fromEntries([[0, 100], ...RANGES].map(([start, end]) => [start, sum(start, end)]));
 
 test("ranges of another origin need no preflight, and no header but the one that allows reading", async () => {
   const hidden = await fetchIn("/open", RANGES.slice(0, 2));
@@ -104,8 +105,8 @@ test("what the browser forbids is told from a server that is away", async () => 
   assert.ok(asked.length <= 2, JSON.stringify(asked));
   const url = base;
   const away = createServer();
-  await new Promise((resolve) => away.listen(0, "127.0.0.1", resolve));
-  base = `http://127.0.0.1:${away.address().port}`;
+  await new Promise((resolve) => away.listen(0, "127.0.0.1", () => resolve(undefined)));
+  base = `http://127.0.0.1:${/** @type {import("node:net").AddressInfo} */ (away.address()).port}`;
   await new Promise((resolve) => away.close(resolve));
   const nobody = await fetchIn("/x", RANGES);
   base = url;

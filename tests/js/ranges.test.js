@@ -30,8 +30,8 @@ before(async () => {
     asked.push({ ...range, path, headers: request.headers });
     answer({ ...range, path }, response);
   });
-  await new Promise((resolve) => server.listen(0, "127.0.0.1", resolve));
-  base = `http://127.0.0.1:${server.address().port}/file.mt`;
+  await new Promise((resolve) => server.listen(0, "127.0.0.1", () => resolve(undefined)));
+  base = `http://127.0.0.1:${/** @type {import("node:net").AddressInfo} */ (server.address()).port}/file.mt`;
 });
 
 after(() => {
@@ -81,7 +81,7 @@ async function works(most, handler, options) {
 async function fails(most, code, message, handler, options) {
   answer = handler;
   asked = [];
-  await assert.rejects(fetchAll(WANTED, options, `${base}?${++round}`), (error) => {
+  await assert.rejects(fetchAll(WANTED, options, `${base}?${++round}`), (/** @type {any} */ error) => {
     assert.equal(error.name, "TetralodError", error.stack);
     assert.equal(error.code, code, error.message);
     assert.match(error.message, message);
@@ -196,7 +196,7 @@ test("a file that changes is noticed, and can be read anew", async () => {
           if (start === 0) answer = good;
           if (start === 0) return ranges.want([100_000, 100_010, 0]);
           ranges.close();
-          resolve();
+          resolve(undefined);
         },
         onError: (error) => {
           errors.push(error.code);
@@ -224,8 +224,8 @@ test("redirects are followed once, and again when they expire", async () => {
 
 test("no server is reported", async () => {
   const other = createServer();
-  await new Promise((resolve) => other.listen(0, "127.0.0.1", resolve));
-  const url = `http://127.0.0.1:${other.address().port}/x`;
+  await new Promise((resolve) => other.listen(0, "127.0.0.1", () => resolve(undefined)));
+  const url = `http://127.0.0.1:${/** @type {import("node:net").AddressInfo} */ (other.address()).port}/x`;
   await new Promise((resolve) => other.close(resolve));
   await assert.rejects(fetchAll(WANTED, {}, url), { code: "network", message: /ECONNREFUSED/ });
 });
@@ -252,7 +252,7 @@ test("what is wanted no longer is cancelled, and nothing comes after the end", a
 test("what was fetched once is kept for the next time", async () => {
   // Node has no Cache Storage: as much of one as is needed.
   const stores = new Map();
-  globalThis.caches = {
+  globalThis.caches = /** @type {any} */ ({
     async open(name) {
       if (!stores.has(name)) stores.set(name, new Map());
       const store = stores.get(name);
@@ -263,7 +263,7 @@ test("what was fetched once is kept for the next time", async () => {
         delete: async (url) => store.delete(url),
       };
     },
-  };
+  });
   try {
     let tag = '"one"';
     answer = (range, response) => response.writeHead(206, headers(range, { etag: tag })).end(file.slice(range.start, range.end));
@@ -279,7 +279,7 @@ test("what was fetched once is kept for the next time", async () => {
         const onRange = (start, end, bytes) => {
           got.set(start, bytes);
           if (start === 0 && got.size === 1) setTimeout(() => second.want(WANTED.slice(1).flatMap(([a, b]) => [a, b, 0])), 20);
-          if (got.size === WANTED.length) resolve();
+          if (got.size === WANTED.length) resolve(undefined);
         };
         second = new Ranges(RangeLoader, base, { onRange, onError: reject }, { cache: "mt" });
         second.want([0, 1000, 0]);

@@ -12,7 +12,7 @@ const KINDS = ["small", "small-edge", "small-vertex", "small-explicit"];
 
 const refuses = (promise, name, message = /./) =>
   assert.rejects(promise, (error) => {
-    assert.ok(error instanceof TetralodError, `${error?.stack}`);
+    assert.ok(error instanceof TetralodError, String(error));
     assert.equal(error.code, "bad-option", error.message);
     assert.ok(error.message.includes(`\`${name}\``), `${error.message} names \`${name}\``);
     assert.match(error.message, message);
@@ -24,7 +24,11 @@ const camera = (distance) => [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 1, -0.5, -0.5, di
 
 const VIEW = { matrix: camera(1), viewport: [800, 800], pixels: 2 };
 
-/** What can be asked for, each with what it may be called. */
+/**
+ * What can be asked for, each with what it may be called.
+ *
+ * @type {Record<string, import("../../pkg/index.js").RefineOptions>}
+ */
 const REQUESTS = {
   "two needs": { error: "5%", needs: [{ error: "1%", sphere: { center: [0.2, 0.2, 0.2], radius: 0.2 } }] },
   "an oriented box": { orientedBox: { center: [0.5, 0.5, 0.5], halfAxes: [[0.1, 0.1, 0], [-0.1, 0.1, 0], [0, 0, 0.2]] } },
@@ -153,12 +157,12 @@ for (const worker of [true, false]) {
         [{ error: "%" }, "error"],
         [{ error: "1" }, "error"],
       ]) {
-        await refuses(mt.refine(options), name);
+        await refuses(mt.refine(/** @type {any} */ (options)), name);
       }
-      await refuses(mt.refine({}, { delta: true }), "delta");
-      await refuses(mt.refineSteps({}, { budgetMs: "long" }).next(), "budgetMs");
+      await refuses(mt.refine({}, /** @type {any} */ ({ delta: true })), "delta");
+      await refuses(mt.refineSteps({}, /** @type {any} */ ({ budgetMs: "long" })).next(), "budgetMs");
       await refuses(mt.refineSteps({}, { updates: 0 }).next(), "updates");
-      await refuses(mt.refineSteps({ eror: 1 }).next(), "eror");
+      await refuses(mt.refineSteps(/** @type {any} */ ({ eror: 1 })).next(), "eror");
       assert.ok((await mt.refine({ error: undefined, needs: undefined, where: undefined })).stats.satisfied);
       mt.free();
     });
@@ -190,7 +194,8 @@ for (const worker of [true, false]) {
     test("a later request ends the steps of an earlier one, and so do a signal and leaving the loop", async () => {
       const mt = await open();
       const steps = mt.refineSteps({ error: 0 }, { updates: 50 });
-      assert.equal((await steps.next()).value.stats.done, false);
+      const first = /** @type {import("../../pkg/index.js").RefineResult} */ ((await steps.next()).value);
+      assert.equal(first.stats.done, false);
       const { stats } = await mt.refine({ error: "5%" });
       const wanted = await mt.hash();
       assert.equal((await steps.next()).done, true);
@@ -220,6 +225,7 @@ for (const worker of [true, false]) {
         let whole = 0;
         for (let i = 0; i < 12; i++) {
           const options = walk[(i * i + 3 * i) % walk.length];
+          /** @type {import("../../pkg/index.js").RefineOptions} */
           const near = { error: "1%", sphere: { center: [0.3 + i / 200, 0.5, 0.5], radius: 0.15 } };
           for (const asked of [options, near]) {
             const delta = await mt.refine(asked, { deltas: true });
@@ -336,7 +342,7 @@ describe("a function in the caller's thread", () => {
     const mt = await open();
     await refuses(mt.refine({ where: () => { throw new Error("my mistake"); } }), "where", /my mistake/);
     await refuses(mt.refine({ where: () => [1] }), "where", /one number for each/);
-    await refuses(mt.refine({ where: () => 7 }), "where", /one number for each/);
+    await refuses(mt.refine({ where: /** @type {any} */ (() => 7) }), "where", /one number for each/);
     assert.ok((await mt.refine({ where: ({ count }) => new Array(count).fill(NaN) })).stats.satisfied);
     await mt.refine({ error: 0 });
     assert.equal((await mt.refine({ error: 0 })).stats.tetrahedra, mt.info.tetrahedra);

@@ -69,8 +69,13 @@ pub fn find(program: &str) -> Option<PathBuf> {
 }
 
 /// Everything native but this program, whose dependencies it was compiled with already, with every feature.
-pub const ALL: [&str; 5] =
-    ["--workspace", "--exclude", "xtask", "--features", "tetralod/vulkan,tetralod/web,paper/pictures"];
+pub const ALL: [&str; 5] = [
+    "--workspace",
+    "--exclude",
+    "xtask",
+    "--features",
+    "tetralod/http,tetralod/vulkan,tetralod/web,paper/pictures",
+];
 
 /// The native command as it was compiled for the tests, optimised and with every assertion.
 pub fn tested_command() -> Result<PathBuf> {

@@ -26,7 +26,7 @@ const STEPS: [Step; 10] = [
     Step { name: "native", what: "unit, integration and documentation tests", run: native },
     Step { name: "package", what: "the npm package and its size", run: npm_package },
     Step { name: "wasm", what: "the core and a WebGPU adapter in headless Chromium", run: wasm },
-    Step { name: "js", what: "the package in Node", run: js },
+    Step { name: "js", what: "lints and types of all JavaScript, and the package in Node", run: js },
     Step { name: "consumer", what: "installing and type-checking the packed package", run: consumer },
     Step { name: "e2e", what: "the demo page in headless Chromium", run: e2e },
 ];
@@ -160,6 +160,8 @@ fn fixture_env(command: &mut Command) -> &mut Command {
 
 fn js() -> Result<()> {
     with_package()?;
+    shell::run(&mut node_tool("@biomejs/biome/bin/biome", &["lint", "--error-on-warnings"]))?;
+    shell::run(&mut node_tool("typescript/bin/tsc", &["--project", "tests/js"]))?;
     shell::run(&mut node_test("latest.test.js"))?;
     shell::run(&mut node_test("ranges.test.js"))?;
     with_fixture(|| {
@@ -175,6 +177,12 @@ fn with_package() -> Result<()> {
         return shell::install_node_tools();
     }
     package::build(&[])
+}
+
+fn node_tool(path: &str, args: &[&str]) -> Command {
+    let mut command = shell::command("node", [format!("tests/js/node_modules/{path}")]);
+    command.args(args);
+    command
 }
 
 fn node_test(file: &str) -> Command {
@@ -205,8 +213,7 @@ fn consumer() -> Result<()> {
     ensure!(archive.is_file(), "npm pack said `{}` but wrote no such file", packed.trim());
     let install = ["install", "--no-save", "--offline", "--loglevel=error"];
     shell::run(shell::npm(install).arg(&archive).current_dir(&project))?;
-    let tsc = shell::root().join("tests/js/node_modules/typescript/bin/tsc");
-    shell::run(shell::command("node", [tsc]).arg("--project").arg(&project))?;
+    shell::run(node_tool("typescript/bin/tsc", &["--project"]).arg(&project))?;
     with_fixture(|| shell::run(fixture_env(shell::command("node", ["dist/main.js"]).current_dir(&project))))
 }
 
