@@ -99,7 +99,7 @@
 //! | *uniform*, *variable* mesh | one error everywhere; an error that depends on the place or the field |
 //! | *ROI*, *region of interest* | the part of the model that a request selects |
 //! | *budget* `b` | the largest size that the extracted mesh may have |
-//! | *star*, *link* of a vertex | the tetrahedra around it; their faces opposite the vertex |
+//! | *star*, *link* of a vertex | the tetrahedra around it; their faces opposite the vertex, with the edges and vertices of these |
 //! | *star-shaped polyhedron*, *cavity* `Π_u` | the space that a vertex insertion fills with the star of the new vertex; the tetrahedra that it removes are `T_u` |
 //! | *edge collapse*, *vertex split* | an edge becomes one vertex; the reverse |
 //! | *half-edge collapse* | an edge collapse that moves one vertex onto the other, which stays where it is |

@@ -30,23 +30,6 @@ const LINKED: [&str; 10] = [
     "docs/input.md",
     "docs/promises.md",
 ];
-const COMMANDS: [&str; 14] = [
-    "generate",
-    "build",
-    "convert",
-    "info",
-    "extract",
-    "isosurface",
-    "slice",
-    "surface",
-    "probe",
-    "streamlines",
-    "stats",
-    "verify",
-    "bench",
-    "serve",
-];
-
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
@@ -136,11 +119,20 @@ fn check_page(page: &str) {
 #[test]
 fn every_command_works_and_answers_as_shown() {
     let shown: String = PAGES.map(text).concat();
-    for command in COMMANDS.into_iter().filter(|command| *command != "serve") {
+    // `serve` ends with Ctrl-C alone.
+    for command in commands().iter().filter(|command| *command != "serve") {
         let example = format!("\n{PROMPT}{command} ");
         assert!(shown.contains(&example), "no page shows `tetralod {command}`");
     }
     PAGES.iter().for_each(|page| check_page(page));
+}
+
+/// The names of the commands, as the program tells them.
+fn commands() -> Vec<String> {
+    let help = run("--help", root());
+    let (_, listed) = help.split_once("Commands:\n").expect("commands");
+    let names = listed.lines().map_while(|line| line.split_whitespace().next());
+    names.filter(|name| *name != "help").map(str::to_owned).collect()
 }
 
 /// What looks like a long option in `text`.
@@ -160,7 +152,7 @@ fn options(text: &str) -> BTreeSet<String> {
 #[test]
 fn the_manual_names_every_option_and_no_other() {
     let mut known = BTreeSet::new();
-    for command in COMMANDS {
+    for command in commands() {
         let help = run(&format!("{command} --help"), root());
         let lines = help.lines().map(str::trim).filter(|line| line.starts_with('-'));
         let heads = lines.map(|line| line.split("  ").next().unwrap_or_default());
