@@ -54,13 +54,13 @@
 //!
 //! | feature | adds | for |
 //! |---|---|---|
-//! | `build` | modules `io`, `generate`, `builder`, `measure`, `verify` | making MTs, natively or in wasm |
-//! | `cli` (default) | `build` and the command `tetralod` | the command line |
-//! | `serve` (default) | its subcommand `serve` | files for pages on your own machine |
-//! | `http` (default) | `stream::HttpSource` | MT files on servers, in native programs and on the command line |
+//! | `build` (default) | modules `io`, `generate`, `builder`, `measure`, `verify` | making MTs, natively or in wasm |
+//! | `http` | `stream::HttpSource` | MT files on servers, in native programs |
 //! | `gpu` | module `gpu`: the renderer on wgpu, with WebGPU as its only backend | pages; add a backend of wgpu for native use |
 //! | `vulkan` | `gpu` with wgpu's Vulkan backend | testing the renderer without a browser |
 //! | `web` | module `web`: the JavaScript API, with `gpu` also the viewer | `wasm32-unknown-unknown` |
+//!
+//! The command `tetralod` is a crate of its own, `tetralod-cli`.
 //!
 //! # Modules
 //!

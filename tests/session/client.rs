@@ -1,14 +1,6 @@
 //! Promise: a client fetches what a request needs and no more, and its mesh is that of a session with the whole file.
 
-#![cfg(feature = "build")]
-
-#[cfg(all(feature = "serve", feature = "http"))]
-mod cli_support;
-#[path = "support/random.rs"]
-#[allow(dead_code, reason = "other tests use the rest of it")]
-mod random;
-
-use random::Random;
+use crate::support::random::Random;
 use std::cell::Cell;
 use std::io::Cursor;
 use std::ops::ControlFlow;
@@ -215,98 +207,4 @@ fn a_request_that_makes_no_sense_changes_nothing() {
     let hash = client.session().hash();
     assert!(matches!(client.refine(&Request::within(-1.0)), Err(ClientError::Session(_))));
     assert_eq!(client.session().hash(), hash);
-}
-
-/// Over a server: the command's own, with the bytes counted by what its answers carry.
-#[cfg(all(feature = "serve", feature = "http"))]
-mod over_a_server {
-    use super::BLOCK_BITS;
-    use super::file;
-    use crate::cli_support::Folder;
-    use crate::cli_support::command;
-    use crate::cli_support::good;
-    use crate::cli_support::json;
-    use std::fs;
-    use std::io::BufRead;
-    use std::io::BufReader;
-    use std::process::Child;
-    use std::process::Stdio;
-    use tetralod::client::Client;
-    use tetralod::client::ClientOptions;
-    use tetralod::mt::MtKind;
-    use tetralod::refine::Request;
-    use tetralod::session::Session;
-    use tetralod::stream::HttpOptions;
-    use tetralod::stream::HttpSource;
-    use tetralod::stream::LoaderOptions;
-
-    /// A server that ends with the test.
-    struct Server {
-        child: Child,
-        url: String,
-    }
-
-    impl Server {
-        fn of(path: &str) -> Self {
-            let mut child = command(&["serve", "--port", "0", path])
-                .stdout(Stdio::piped())
-                .stderr(Stdio::null())
-                .spawn()
-                .expect("it starts");
-            let mut line = String::new();
-            BufReader::new(child.stdout.take().expect("a pipe")).read_line(&mut line).expect("a line");
-            Self { child, url: line.trim().to_owned() }
-        }
-    }
-
-    impl Drop for Server {
-        fn drop(&mut self) {
-            let _ = self.child.kill();
-            let _ = self.child.wait();
-        }
-    }
-
-    #[test]
-    fn clients_read_what_they_need() {
-        let (folder, bytes) = (Folder::new("client-serve"), file(MtKind::Edge));
-        let path = folder.path("served.mt");
-        fs::write(&path, &bytes).expect("a file");
-        let server = Server::of(&path);
-        // Small gaps, for the file is small.
-        let loader = LoaderOptions { gap: 64, ..LoaderOptions::default() };
-        let source = HttpSource::new(&server.url, HttpOptions { loader, ..HttpOptions::default() });
-        let mut client = Client::open(source, ClientOptions::default()).expect("a sound file");
-        let mut whole = Session::new();
-        whole.feed(&bytes).expect("a sound file");
-        for request in [Request::within(0.1), Request::within(0.03), Request::within(0.0)] {
-            client.refine(&request).expect("a sound file");
-            whole.refine(&request).expect("a sound file");
-            assert_eq!(client.session().hash(), whole.hash(), "{request:?}, blocks of 2^{BLOCK_BITS}");
-        }
-        assert_eq!(client.total(), Some(bytes.len() as u64));
-    }
-
-    #[test]
-    fn commands_take_addresses_and_read_what_they_need() {
-        let folder = Folder::new("client-command");
-        let [grid, mt, out] = ["b.vti", "b.mt", "out.vtu"].map(|name| folder.path(name));
-        good(&["generate", "bucky", "--size", "25", "-o", &grid]);
-        good(&["build", &grid, "-o", &mt, "--quiet", "--block-updates", "64"]);
-        let server = Server::of(&mt);
-        let extract = |file: &str| json(&["extract", file, "--error", "10%", "-o", &out, "--json"]);
-        let (here, there) = (extract(&mt), extract(&server.url));
-        for key in ["hash", "file_bytes", "relative_error_bound"] {
-            assert_eq!(here[key], there[key], "{key}");
-        }
-        assert_eq!(here["file_bytes"].as_u64(), fs::metadata(&mt).ok().map(|found| found.len()));
-        for report in [&here, &there] {
-            assert!(report["bytes_read"].as_u64() < report["file_bytes"].as_u64(), "{report}");
-        }
-        let (here, there) = (json(&["info", &mt, "--json"]), json(&["info", &server.url, "--json"]));
-        assert_eq!(here, there);
-        assert_eq!(here["blocks"]["updates_per_block"], 64);
-        let parts = here["breakdown"].as_array().expect("a list").iter();
-        let sum: f64 = parts.map(|part| part["bytes"].as_f64().expect("a number")).sum();
-        assert!((sum - here["file_bytes"].as_f64().expect("a number")).abs() < 1.0, "all bytes are told");
-    }
 }

@@ -28,9 +28,7 @@ use tetralod::mt::MtInfo;
 use tetralod::session::Session;
 use tetralod::stream::Arrived;
 use tetralod::stream::FileSource;
-#[cfg(feature = "http")]
 use tetralod::stream::HttpOptions;
-#[cfg(feature = "http")]
 use tetralod::stream::HttpSource;
 use tetralod::stream::Source;
 use tetralod::stream::StreamError;
@@ -216,7 +214,7 @@ impl Bytes {
     /// Of a path, or of an address that begins with `http://` or `https://`.
     fn of(path: &Path) -> Result<Self> {
         if let Some(url) = url(path) {
-            return Self::of_server(url);
+            return Ok(Self(Box::new(HttpSource::new(url, HttpOptions::default()))));
         }
         if let Some(scheme) = scheme(path) {
             bail!(
@@ -228,16 +226,6 @@ impl Bytes {
         }
         // Pipes cannot be sought in.
         Ok(Self(Box::new(FileSource::new(Cursor::new(fs::read(path)?))?)))
-    }
-
-    #[cfg(feature = "http")]
-    fn of_server(url: &str) -> Result<Self> {
-        Ok(Self(Box::new(HttpSource::new(url, HttpOptions::default()))))
-    }
-
-    #[cfg(not(feature = "http"))]
-    fn of_server(_: &str) -> Result<Self> {
-        anyhow::bail!("this `tetralod` reads no files on servers; build it with the feature `http`")
     }
 }
 

@@ -1,14 +1,6 @@
 //! Promise: the commands that look into a mesh write what they say, in every format, with the error that is guaranteed.
-#![cfg(feature = "cli")]
 
-mod cli_support;
-
-use cli_support::Folder;
-use cli_support::bad;
-use cli_support::good;
-use cli_support::json;
-use cli_support::number;
-use cli_support::table;
+use crate::support::{Folder, bad, good, json, number, table};
 use std::fs;
 use tetralod::mesh::Field;
 use tetralod::mesh::Grid;

@@ -1,15 +1,6 @@
 //! Promises of the command for several fields, time steps, fields at cells, units and precision.
-#![cfg(feature = "cli")]
 
-mod cli_support;
-
-use cli_support::Folder;
-use cli_support::bad;
-use cli_support::good;
-use cli_support::json;
-use cli_support::number;
-use cli_support::run;
-use cli_support::text;
+use crate::support::{Folder, bad, good, json, number, run, text};
 use std::fs;
 use std::fs::File;
 use tetralod::io;

@@ -1,18 +1,7 @@
 //! Promise: the command does what its help says, from data to a checked mesh, and fails with a word about which file
 //! and why, leaving nothing half done.
-#![cfg(feature = "cli")]
 
-mod cli_support;
-
-use cli_support::Folder;
-use cli_support::bad;
-use cli_support::bucky;
-use cli_support::command;
-use cli_support::good;
-use cli_support::json;
-use cli_support::number;
-use cli_support::run;
-use cli_support::text;
+use crate::support::{Folder, bad, bucky, command, good, json, number, run, text};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;

@@ -1,12 +1,10 @@
 //! Runs the command `tetralod` in a folder of its own.
-#![allow(dead_code, reason = "every test binary uses a part of it")]
 
 use serde_json::Value;
 use std::fs;
+use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
-use std::process::Command;
-use std::process::Output;
-use std::process::Stdio;
+use std::process::{Child, Command, Output, Stdio};
 
 /// A folder of one test, gone when the test is done.
 pub struct Folder(PathBuf);
@@ -43,6 +41,38 @@ pub fn command(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_tetralod"));
     command.args(arguments).stdin(Stdio::null());
     command
+}
+
+/// `tetralod serve` on a free port; ends with the test.
+pub struct Server {
+    pub child: Child,
+    /// What it printed: the address of the folder or of the one file.
+    pub url: String,
+}
+
+impl Server {
+    pub fn start(arguments: &[&str]) -> Self {
+        let mut all = vec!["serve", "--port", "0"];
+        all.extend(arguments);
+        let mut child =
+            command(&all).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().expect("it starts");
+        let mut line = String::new();
+        BufReader::new(child.stdout.take().expect("a pipe")).read_line(&mut line).expect("a line");
+        Self { child, url: line.trim().to_owned() }
+    }
+
+    /// Host and port, and the path that follows.
+    pub fn address(&self) -> (&str, &str) {
+        let rest = self.url.strip_prefix("http://").expect("it prints its address");
+        rest.split_at(rest.find('/').expect("with a path"))
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
 }
 
 pub fn run(arguments: &[&str]) -> Output {

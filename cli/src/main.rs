@@ -17,7 +17,6 @@ mod output;
 mod poly;
 mod probe;
 mod query;
-#[cfg(feature = "serve")]
 mod serve;
 mod slice;
 mod stats;
@@ -54,14 +53,12 @@ enum Command {
     Stats(Box<stats::Arguments>),
     Verify(verify::Arguments),
     Bench(bench::Arguments),
-    #[cfg(feature = "serve")]
     Serve(serve::Arguments),
 }
 
 impl Command {
     /// Whether it has a handler of its own for Ctrl-C; there can be only one.
     fn ends_by_itself(&self) -> bool {
-        #[cfg(feature = "serve")]
         if let Self::Serve(_) = self {
             return true;
         }
@@ -97,7 +94,6 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Probe(arguments) => probe::run(&arguments)?,
         Command::Streamlines(arguments) => streamlines::run(&arguments)?,
         Command::Stats(arguments) => stats::run(&arguments)?,
-        #[cfg(feature = "serve")]
         Command::Serve(arguments) => serve::run(&arguments)?,
     }
     Ok(ExitCode::SUCCESS)
