@@ -192,6 +192,40 @@ fn links_lead_somewhere() {
     }
 }
 
+/// All files of the repository but those that are made, relative to its root.
+fn files() -> Vec<String> {
+    let (mut folders, mut found) = (vec![PathBuf::new()], Vec::new());
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(root().join(&folder)).expect("a folder") {
+            let entry = entry.expect("an entry");
+            let path = folder.join(entry.file_name());
+            let made = ["target", "node_modules", "pkg", ".git"].iter().any(|name| path.ends_with(name));
+            if entry.path().is_dir() && !made {
+                folders.push(path);
+            } else if !made {
+                found.push(format!("/{}", path.to_string_lossy()));
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn the_files_that_are_named_to_developers_exist() {
+    let files = files();
+    for page in ["ARCHITECTURE.md", "CONTRIBUTING.md"] {
+        let shown = content(page);
+        let named = shown.split('`').skip(1).step_by(2).filter(|name| {
+            let ending = name.rsplit_once('.').map(|(_, ending)| ending);
+            ending.is_some_and(|ending| ["rs", "js", "ts", "wgsl", "md"].contains(&ending))
+                && !name.contains("NAME")
+        });
+        let missing: Vec<&str> =
+            named.filter(|name| !files.iter().any(|file| file.ends_with(&format!("/{name}")))).collect();
+        assert!(missing.is_empty(), "{page} names files that are not there: {missing:?}");
+    }
+}
+
 #[test]
 fn what_the_readme_links_to_is_in_the_package() {
     let listed = Command::new(env!("CARGO"))
