@@ -117,7 +117,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         },
         bytes_per_tet: bytes_per_tet(&found.coherent),
     };
-    if arguments.json { output::json(&report) } else { print(&report) }
+    output::result(arguments.json, &report, &rows(&report))
 }
 
 /// The most of the three: where the mesh is small beside the MT, so are what it knows of the MT's vertices and updates.
@@ -129,11 +129,9 @@ fn run_delaunay(arguments: &Arguments) -> Result<()> {
     let grid: Vec<[i32; 3]> =
         (0..GRID.pow(3)).map(|i| [i % GRID, i / GRID % GRID, i / (GRID * GRID)]).collect();
     let report = Delaunay { grid: triangulate(&grid)?, random: triangulate(&random_points(RANDOM))? };
-    if arguments.json {
-        return output::json(&report);
-    }
     let rate = |tets: &Tets| format!("{} tetrahedra per second", output::count(tets.tets_per_second as u64));
-    output::table(&[("grid", rate(&report.grid)), ("random points", rate(&report.random))])
+    let rows = [("grid", rate(&report.grid)), ("random points", rate(&report.random))];
+    output::result(arguments.json, &report, &rows)
 }
 
 /// The fastest of several runs, as of all benchmarks.
@@ -161,7 +159,7 @@ fn random_points(count: usize) -> Vec<[i32; 3]> {
     points
 }
 
-fn print(report: &Report) -> Result<()> {
+fn rows(report: &Report) -> [(&'static str, String); 10] {
     let walk = |walk: &Walk| {
         let Walk { median_ms, p95_ms, cold_ms, updates, .. } = walk;
         format!(
@@ -170,7 +168,7 @@ fn print(report: &Report) -> Result<()> {
     };
     let rate =
         |per_second: f64, what: &str| format!("{} {what} per second", output::count(per_second as u64));
-    output::table(&[
+    [
         ("decode", rate(report.decode.updates_per_second, "updates")),
         ("refine", rate(report.refine.updates_per_second, "updates")),
         ("", rate(report.refine.tets_per_second, "tetrahedra")),
@@ -181,5 +179,5 @@ fn print(report: &Report) -> Result<()> {
         ("turning camera", walk(&report.coherent.view)),
         ("memory", format!("{:.0} bytes a tetrahedron of the mesh", report.bytes_per_tet)),
         ("", format!("the fastest of {} runs on one thread", report.runs)),
-    ])
+    ]
 }

@@ -1,9 +1,8 @@
 //! `tetralod build`: a mesh to an MT file.
 
 use super::files;
-use super::input;
-use super::input::Wanted;
-use super::output;
+use super::input::{self, FieldSelection};
+use super::output::{self, Verbosity};
 use anyhow::Context;
 use anyhow::Result;
 use indicatif::ProgressBar;
@@ -99,12 +98,8 @@ pub struct Arguments {
     /// half-edge].
     #[arg(long, value_name = "N", value_parser = block_bits)]
     block_updates: Option<u32>,
-    /// No progress bar and no summary.
-    #[arg(short, long)]
-    quiet: bool,
-    /// Print the summary as a JSON object.
-    #[arg(long, conflicts_with = "quiet")]
-    json: bool,
+    #[command(flatten)]
+    verbosity: Verbosity,
 }
 
 /// The metadata keys under which a file tells how it was built.
@@ -226,7 +221,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     files::check_output(&arguments.output, &arguments.inputs)?;
     let (mesh, repaired) = read(arguments, &config)?;
     let repaired = repaired.to_string();
-    if !repaired.is_empty() && !arguments.quiet {
+    if !repaired.is_empty() && !arguments.verbosity.quiet {
         eprintln!("{}: {repaired}", arguments.inputs[0].display());
     }
     let BuildResult { mt, summary, exact, .. } = build(arguments, &config, &mesh)?;
@@ -236,17 +231,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let options = EncodeOptions { block_bits: config.block_bits, check_margins: true, exact, metadata };
     let file_bytes = files::write_file(&arguments.output, |out| Ok(encode_to(&mt, &options, out)?))?;
     let report = report(&config, &summary, file_bytes, start.elapsed().as_secs_f64(), repaired);
-    match arguments {
-        Arguments { json: true, .. } => output::json(&report),
-        Arguments { quiet: true, .. } => Ok(()),
-        _ => print(arguments, &report),
-    }
+    arguments.verbosity.print(&report, &rows(arguments, &report))
 }
 
 /// Reads what is wanted of the input.
 fn read(arguments: &Arguments, config: &BuildConfig) -> Result<(TetMesh, RepairReport)> {
     let cells = if arguments.cell_to_point { CellData::Values } else { CellData::Names };
-    let wanted = Wanted { names: &config.fields, all: config.all_fields, cells };
+    let wanted = FieldSelection { names: &config.fields, all: config.all_fields, cells };
     let (mut mesh, repaired) = input::read(&arguments.inputs, &wanted)?;
     if config.method.keeps_the_mesh() {
         input::expect_cells(&mesh, &arguments.inputs[0])?;
@@ -332,7 +323,7 @@ fn metadata(config: &BuildConfig) -> Vec<(&'static str, &'static str)> {
 
 fn build(arguments: &Arguments, config: &BuildConfig, mesh: &TetMesh) -> Result<BuildResult> {
     // Drawn on stderr, and only on a terminal.
-    let bar = if arguments.quiet { ProgressBar::hidden() } else { ProgressBar::new(0) };
+    let bar = if arguments.verbosity.quiet { ProgressBar::hidden() } else { ProgressBar::new(0) };
     let style = "{msg:<12} {wide_bar} {percent:>3} %  {pos}/{len}  {elapsed_precise}  about {eta} left";
     bar.set_style(ProgressStyle::with_template(style).context("the style of the progress bar")?);
     let mut stage = "";
@@ -376,15 +367,12 @@ fn report(
     }
 }
 
-fn print(arguments: &Arguments, report: &Report) -> Result<()> {
+fn rows(arguments: &Arguments, report: &Report) -> Vec<(&'static str, String)> {
     let removed = f64::from(report.tetrahedra.saturating_sub(report.base_tetrahedra));
-    let mesh = |vertices: u32, tets: u32| {
-        format!("{} vertices, {} tetrahedra", output::count(vertices), output::count(tets))
-    };
-    output::table(&[
+    vec![
         ("file", arguments.output.display().to_string()),
-        ("reference mesh", mesh(report.vertices, report.tetrahedra)),
-        ("base mesh", mesh(report.base_vertices, report.base_tetrahedra)),
+        ("reference mesh", output::mesh(report.vertices, report.tetrahedra)),
+        ("base mesh", output::mesh(report.base_vertices, report.base_tetrahedra)),
         (
             "updates",
             format!("{}, at most {} deep", output::count(report.updates), output::count(report.depth)),
@@ -400,5 +388,5 @@ fn print(arguments: &Arguments, report: &Report) -> Result<()> {
                 removed / report.seconds
             ),
         ),
-    ])
+    ]
 }

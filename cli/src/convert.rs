@@ -2,7 +2,7 @@
 
 use super::build;
 use super::files;
-use super::output;
+use super::output::{self, Verbosity};
 use anyhow::Context;
 use anyhow::Result;
 use serde::Serialize;
@@ -25,12 +25,8 @@ pub struct Arguments {
     /// The kind of MT that it becomes: half-edge, edge, vertex or explicit.
     #[arg(long, value_name = "KIND", value_parser = build::kind)]
     kind: MtKind,
-    /// No summary.
-    #[arg(short, long)]
-    quiet: bool,
-    /// Print the summary as a JSON object.
-    #[arg(long, conflicts_with = "quiet")]
-    json: bool,
+    #[command(flatten)]
+    verbosity: Verbosity,
 }
 
 /// The summary as programs get it.
@@ -72,29 +68,15 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         memory_bytes: mt.bytes(),
         seconds: start.elapsed().as_secs_f64(),
     };
-    match arguments {
-        Arguments { json: true, .. } => output::json(&report),
-        Arguments { quiet: true, .. } => Ok(()),
-        _ => print(arguments, &report),
-    }
-}
-
-fn print(arguments: &Arguments, report: &Report) -> Result<()> {
-    output::table(&[
+    let rows = [
         ("file", arguments.output.display().to_string()),
         ("kind", format!("{}, was {}", report.kind, report.from)),
-        (
-            "reference mesh",
-            format!(
-                "{} vertices, {} tetrahedra",
-                output::count(report.vertices),
-                output::count(report.tetrahedra)
-            ),
-        ),
+        ("reference mesh", output::mesh(report.vertices, report.tetrahedra)),
         ("updates", output::count(report.updates)),
         ("file size", output::bytes(report.file_bytes)),
         ("bytes per vertex", format!("{:.2}", report.bytes_per_vertex)),
         ("in memory", output::bytes(report.memory_bytes)),
         ("time", format!("{:.2} s", report.seconds)),
-    ])
+    ];
+    arguments.verbosity.print(&report, &rows)
 }

@@ -1,26 +1,13 @@
 //! `tetralod extract`: the mesh that a request needs, out of an MT file.
 
-use super::files;
-use super::output;
-use super::query::Answer;
-use super::query::EXAMPLES;
-use super::query::Query;
-use super::query::Summary;
-use anyhow::Context;
-use anyhow::Result;
-use anyhow::bail;
+use super::query::{Answer, EXAMPLES, Query};
+use super::{files, output};
+use anyhow::{Context, Result, bail};
 use serde::Serialize;
-use std::path::Path;
-use std::path::PathBuf;
-use tetralod::measure::Part;
-use tetralod::measure::Promise;
-use tetralod::measure::Reference;
-use tetralod::measure::deviation;
-use tetralod::mesh::Field;
-use tetralod::mesh::TetMesh;
-use tetralod::mt::CurrentMesh;
-use tetralod::mt::FieldInfo;
-use tetralod::mt::MtInfo;
+use std::path::{Path, PathBuf};
+use tetralod::measure::{Part, Promise, Reference, deviation};
+use tetralod::mesh::{Field, TetMesh};
+use tetralod::mt::{CurrentMesh, FieldInfo, MtInfo};
 use tetralod::refine;
 use tetralod::session::Session;
 
@@ -28,8 +15,6 @@ use tetralod::session::Session;
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Arguments {
-    /// The MT file, or its http(s) address.
-    file: PathBuf,
     #[command(flatten)]
     query: Query,
     /// The mesh to write: .vtu.
@@ -38,43 +23,34 @@ pub struct Arguments {
     /// Compare with the mesh that the MT was built from, where regions and values (or nothing) say that the field matters.
     #[arg(long, value_name = "INPUT")]
     measure: Option<PathBuf>,
-    /// Print the result as a JSON object.
-    #[arg(long)]
-    json: bool,
 }
 
 /// The result as programs get it. Errors are in units of the field, relative ones as fractions of its range.
 #[derive(Serialize)]
-struct Report<'a> {
-    #[serde(flatten)]
-    mesh: &'a Summary,
+struct Report {
     #[serde(skip_serializing_if = "Option::is_none")]
     measured_error: Option<f64>,
-    seconds: f64,
     hash: String,
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
     files::check_ending(&arguments.output, "vtu")?;
-    let inputs = arguments.measure.iter().chain([&arguments.file]).chain(arguments.query.files());
+    let inputs = arguments.measure.iter().chain(arguments.query.files());
     files::check_output(&arguments.output, inputs)?;
-    let answer = arguments.query.answer_exactly(&arguments.file)?;
+    let answer = arguments.query.answer_exactly()?;
     let opened = &answer.opened;
     let measured = arguments.measure.as_deref().map(|input| measure(input, &answer)).transpose()?.flatten();
     let mesh = opened.session.mesh().context("there is no mesh")?;
     let mesh = reference_units(&opened.session, opened.info()?, mesh);
     files::write_file(&arguments.output, |out| Ok(tetralod::io::write_vtu(&mesh, out)?))?;
     let report = Report {
-        mesh: &answer.summary,
         measured_error: measured.as_ref().map(|measured| measured.error),
-        seconds: answer.seconds,
         hash: format!("{:016x}", opened.session.hash()),
     };
-    if arguments.json {
-        output::json(&report)?
-    } else {
-        print(arguments, &report)?
-    }
+    let mut after = vec![("hash", report.hash.clone())];
+    after.extend(report.measured_error.map(|error| ("measured error", output::number(error))));
+    let rows = [vec![("file", arguments.output.display().to_string())], after];
+    arguments.query.print_around(&report, rows, (&answer.summary, answer.seconds))?;
     if let (Some(Measured { error, beyond: Some(bound) }), Some(input)) = (measured, &arguments.measure) {
         bail!(
             "the measured error, {}, is above the bound, {}: {} is not what the MT was built from, or the MT is damaged; \
@@ -124,8 +100,8 @@ fn measure(input: &Path, answer: &Answer) -> Result<Option<Measured>> {
     })?;
     let mesh = opened.session.mesh().context("there is no mesh")?;
     let mut largest: Option<Measured> = None;
-    for (i, wanted) in answer.wanted.iter().enumerate() {
-        let (region, ranges) = match &wanted.need.part {
+    for (i, named) in answer.needs.iter().enumerate() {
+        let (region, ranges) = match &named.need.part {
             refine::Part::Everywhere => (None, Vec::new()),
             refine::Part::Region(region) => (Some(region), Vec::new()),
             refine::Part::Values(values) if values.field == answer.field => (None, values.ranges.clone()),
@@ -150,15 +126,4 @@ fn measure(input: &Path, answer: &Answer) -> Result<Option<Measured>> {
         });
     }
     Ok(largest)
-}
-
-fn print(arguments: &Arguments, report: &Report<'_>) -> Result<()> {
-    let mut rows = vec![("file", arguments.output.display().to_string())];
-    rows.extend(report.mesh.rows());
-    if let Some(error) = report.measured_error {
-        rows.push(("measured error", output::number(error)));
-    }
-    rows.push(("time", format!("{:.3} s", report.seconds)));
-    rows.push(("hash", report.hash.clone()));
-    output::table(&rows)
 }

@@ -1,8 +1,7 @@
 //! Files in and out: MT files are read as far as they are needed, from disk or from a server; outputs appear whole or not at all.
 
 use super::build::METHOD;
-use super::input;
-use super::input::Wanted as WantedFields;
+use super::input::{self, FieldSelection};
 use anyhow::Context;
 use anyhow::Result;
 use anyhow::bail;
@@ -39,7 +38,7 @@ use tetralod::verify::Reference;
 const CHUNK: u64 = 1 << 20;
 
 /// How long is waited for a server at a time.
-const PATIENCE: Duration = Duration::from_secs(1);
+pub const PATIENCE: Duration = Duration::from_secs(1);
 
 /// Exit code after Ctrl-C, as shells have it.
 pub const INTERRUPTED: i32 = 130;
@@ -276,7 +275,7 @@ fn read_mt(mut source: Bytes) -> Result<Session> {
 
 /// Reads a mesh and mends what can be mended.
 pub fn read_mesh(path: &Path) -> Result<(TetMesh, RepairReport)> {
-    let wanted = WantedFields { names: &[], all: true, cells: CellData::LeaveOut };
+    let wanted = FieldSelection { names: &[], all: true, cells: CellData::LeaveOut };
     let (mesh, report) = input::read(&[path.to_owned()], &wanted)?;
     input::expect_cells(&mesh, path)?;
     Ok((mesh, report))
@@ -285,7 +284,8 @@ pub fn read_mesh(path: &Path) -> Result<(TetMesh, RepairReport)> {
 /// Reads what the MT was built from: time steps of a mesh or, where no more is needed, of points.
 pub fn read_reference(paths: &[PathBuf], opened: &Opened) -> Result<TetMesh> {
     let names: Vec<String> = opened.info()?.fields.iter().map(|field| field.name.clone()).collect();
-    let (mesh, _) = input::read(paths, &WantedFields { names: &names, all: false, cells: CellData::Values })?;
+    let (mesh, _) =
+        input::read(paths, &FieldSelection { names: &names, all: false, cells: CellData::Values })?;
     if let (Reference::Mesh, Some(path)) = (opened.reference(), paths.first()) {
         input::expect_cells(&mesh, path)?;
     }

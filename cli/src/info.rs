@@ -121,7 +121,7 @@ struct Memory {
 pub fn run(arguments: &Arguments) -> Result<()> {
     let opened = files::open_mt(&arguments.file)?;
     let report = report(&opened).with_context(|| arguments.file.display().to_string())?;
-    if arguments.json { output::json(&report) } else { print(&report) }
+    output::result(arguments.json, &report, &rows(&report))
 }
 
 fn report(opened: &Opened) -> Result<Report> {
@@ -238,16 +238,13 @@ fn part_row(part: &FilePart, file_bytes: u64) -> String {
     format!("{}: {:.2} per vertex ({share})", part.name, part.bytes_per_vertex)
 }
 
-fn print(report: &Report) -> Result<()> {
-    let mesh = |vertices: u32, tets: u32| {
-        format!("{} vertices, {} tetrahedra", output::count(vertices), output::count(tets))
-    };
+fn rows(report: &Report) -> Vec<(&str, String)> {
     let [x0, y0, z0, x1, y1, z1] = report.bounds.map(output::number);
     let memory = &report.memory;
     let mut rows = vec![
         ("kind", report.updates_are.to_owned()),
-        ("reference mesh", mesh(report.vertices, report.tetrahedra)),
-        ("base mesh", mesh(report.base_vertices, report.base_tetrahedra)),
+        ("reference mesh", output::mesh(report.vertices, report.tetrahedra)),
+        ("base mesh", output::mesh(report.base_vertices, report.base_tetrahedra)),
         (
             "updates",
             format!("{}, at most {} deep", output::count(report.updates), output::count(report.depth)),
@@ -290,5 +287,5 @@ fn print(report: &Report) -> Result<()> {
     for (key, value) in &report.metadata {
         rows.push((key, value.clone()));
     }
-    output::table(&rows)
+    rows
 }

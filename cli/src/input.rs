@@ -15,8 +15,8 @@ use tetralod::mesh::RepairReport;
 use tetralod::mesh::TetMesh;
 use tetralod::mesh::repair;
 
-/// What is wanted of the files.
-pub struct Wanted<'a> {
+/// Which fields of the files are read.
+pub struct FieldSelection<'a> {
     /// Names of fields, a vector's for its components; the first field if there are none and not all are wanted.
     pub names: &'a [String],
     /// All fields.
@@ -29,7 +29,7 @@ pub struct Wanted<'a> {
 /// without any cell are as they are.
 ///
 /// The first step is kept with all that is wanted, of later ones nothing but their fields.
-pub fn read(paths: &[PathBuf], wanted: &Wanted<'_>) -> Result<(TetMesh, RepairReport)> {
+pub fn read(paths: &[PathBuf], wanted: &FieldSelection<'_>) -> Result<(TetMesh, RepairReport)> {
     let mut steps = Vec::new();
     for path in paths {
         if let Some(scheme) = files::scheme(path) {
@@ -58,7 +58,7 @@ pub fn read(paths: &[PathBuf], wanted: &Wanted<'_>) -> Result<(TetMesh, RepairRe
 
 /// Leaves the fields that are wanted; returns their names. None if one is missing: that is for the builder to refuse, who
 /// names those that are there.
-fn reduce(mesh: &mut TetMesh, wanted: &Wanted<'_>) -> Option<Vec<String>> {
+fn reduce(mesh: &mut TetMesh, wanted: &FieldSelection<'_>) -> Option<Vec<String>> {
     let any = |test: &dyn Fn(&Field) -> bool| mesh.fields.iter().chain(&mesh.cell_fields).any(test);
     if !wanted.names.iter().all(|name| any(&|field| field.answers_to(name))) {
         return None;

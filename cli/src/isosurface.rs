@@ -1,13 +1,9 @@
 //! `tetralod isosurface`: surfaces on which a field has a value.
 
-use super::output;
-use super::poly::Amount;
-use super::poly::Target;
+use super::poly::{Amount, Target};
 use super::query::Query;
-use super::query::Summary;
 use anyhow::Result;
 use serde::Serialize;
-use std::path::PathBuf;
 use std::time::Instant;
 use tetralod::io::PolyData;
 use tetralod::view::is_closed;
@@ -18,16 +14,11 @@ use tetralod::view::is_closed;
 #[derive(clap::Args)]
 #[command(after_help = "Example: tetralod isosurface engine.mt --iso 0.3 --iso 0.6 --error 1% -o engine.vtp")]
 pub struct Arguments {
-    /// The MT file, or its http(s) address.
-    file: PathBuf,
     #[command(flatten)]
     query: Query,
     /// The surface to write: .vtp, .stl, .ply, .obj, or .csv for its points.
     #[arg(short, long, value_name = "FILE")]
     output: Target,
-    /// Print the result as a JSON object.
-    #[arg(long)]
-    json: bool,
 }
 
 /// The result as programs get it.
@@ -38,9 +29,6 @@ struct Report {
     surface: Amount,
     /// Whether the surfaces have no border.
     closed: bool,
-    #[serde(flatten)]
-    mesh: Summary,
-    seconds: f64,
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
@@ -48,8 +36,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if isovalues.is_empty() {
         super::refuse_usage("isosurface needs a value: give --iso V, in units of the field");
     }
-    arguments.output.check(arguments.query.files().chain([&arguments.file]))?;
-    let mut answer = arguments.query.answer(&arguments.file)?;
+    arguments.output.check(arguments.query.files())?;
+    let mut answer = arguments.query.answer()?;
     let start = Instant::now();
     let surface = answer.opened.session.isosurfaces(isovalues)?;
     let seconds = start.elapsed().as_secs_f64();
@@ -65,16 +53,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         isovalues: isovalues.to_vec(),
         surface: Amount::of(&data),
         closed: is_closed(&data.triangles),
-        mesh: answer.summary,
-        seconds,
     };
-    if arguments.json { output::json(&report) } else { print(arguments, &report) }
-}
-
-fn print(arguments: &Arguments, report: &Report) -> Result<()> {
     let mut rows = report.surface.rows(&arguments.output);
     rows.push(("border", if report.closed { "none" } else { "where the mesh ends" }.to_owned()));
-    rows.extend(report.mesh.rows());
-    rows.push(("time", format!("{:.3} s", report.seconds)));
-    output::table(&rows)
+    arguments.query.print(&report, rows, (&answer.summary, seconds))
 }

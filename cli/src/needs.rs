@@ -1,29 +1,18 @@
 //! Needs as they are written on the command line and in files, and what they mean for an MT.
 
-use super::files;
-use super::output;
-use super::query::parse_bounds;
-use super::query::parse_list;
-use super::query::parse_number;
-use super::query::parse_numbers;
-use anyhow::Context;
-use anyhow::Result;
+use super::query::{parse_bounds, parse_list, parse_number, parse_numbers};
+use super::{files, output};
+use anyhow::{Context, Result};
+use clap::error::ErrorKind;
+use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use std::fs;
-use std::path::Path;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use tetralod::geom::Bounds;
 use tetralod::mt::MtInfo;
-use tetralod::refine::MAX_PLANES;
-use tetralod::refine::Need;
-use tetralod::refine::Part;
-use tetralod::refine::RefineStats;
-use tetralod::refine::Region;
-use tetralod::refine::Transfer;
-use tetralod::refine::Values;
-use tetralod::refine::View;
+use tetralod::refine::{MAX_PLANES, Need, Part, RefineStats, Region, Transfer, Values, View};
 use tetralod::session::Session;
 
 /// An error in units of a field, or as a fraction of its range.
@@ -63,29 +52,160 @@ fn percentage(text: &str) -> Result<(f64, bool), String> {
     }
 }
 
-/// A camera, and where it is described.
-#[derive(Clone, Debug)]
-pub enum Camera {
-    File(PathBuf),
-    Given(View),
+/// One entry of a need: the option `--NAME VALUE` of a command, and `NAME=VALUE` in `--need`.
+struct Key {
+    name: &'static str,
+    /// What the value looks like.
+    value: &'static str,
+    help: &'static str,
+    times: Times,
+}
+
+/// How often an entry may be given.
+#[derive(PartialEq)]
+enum Times {
+    Once,
+    Many,
+    /// Once, and only together with the entry of this name.
+    With(&'static str),
+}
+
+/// Regions limit values and the other way round; [`Group::set`] reads the values.
+const KEYS: [Key; 16] = [
+    Key {
+        name: "error",
+        value: "E|E%",
+        help: "Largest error, in units of the field, or with % of its range; 0 is the reference mesh [default: 0]",
+        times: Times::Once,
+    },
+    Key {
+        name: "box",
+        value: "x0,y0,z0,x1,y1,z1",
+        help: "Only inside this box, in model units; the mesh is as coarse as possible elsewhere. Regions are repeatable: \
+               their union is taken",
+        times: Times::Many,
+    },
+    Key {
+        name: "obox",
+        value: "cx,cy,cz,ax,…,bx,…,cx,…",
+        help: "Only inside this oriented box: its centre, and three orthogonal vectors from the centre to the middles of \
+               faces",
+        times: Times::Many,
+    },
+    Key {
+        name: "sphere",
+        value: "x,y,z,r",
+        help: "Only inside this sphere: centre and radius",
+        times: Times::Many,
+    },
+    Key { name: "half-space", value: "nx,ny,nz,d", help: "Only where n · p <= d", times: Times::Many },
+    Key {
+        name: "slab",
+        value: "nx,ny,nz,d,t",
+        help: "Only within a distance of t / 2 from the plane n · p = d",
+        times: Times::Many,
+    },
+    Key {
+        name: "convex",
+        value: "nx,ny,nz,d,nx,…",
+        help: "Only where n · p <= d for all of these planes, at most 16",
+        times: Times::Many,
+    },
+    Key {
+        name: "iso",
+        value: "V",
+        help: "Only around the isosurface at this value, in units of the field (repeatable)",
+        times: Times::Many,
+    },
+    Key {
+        name: "range",
+        value: "a,b",
+        help: "Only where the field has a value from a to b, in units of the field (repeatable)",
+        times: Times::Many,
+    },
+    Key {
+        name: "field",
+        value: "NAME",
+        help: "The field of all these values and errors [default: the first field]",
+        times: Times::Once,
+    },
+    Key {
+        name: "view",
+        value: "FILE.json",
+        help: "What a camera sees, within --pixels: a file with its matrix and viewport (repeatable)",
+        times: Times::Many,
+    },
+    Key {
+        name: "matrix",
+        value: "m0,…,m15",
+        help: "A camera without a file: the matrix from model space to clip space, column by column",
+        times: Times::With("viewport"),
+    },
+    Key {
+        name: "viewport",
+        value: "w,h",
+        help: "Width and height of the picture in pixels, for --matrix",
+        times: Times::With("matrix"),
+    },
+    Key {
+        name: "pixels",
+        value: "P",
+        help: "Largest error on the screen in pixels, for --view and --matrix [default: that in the file, or 1]",
+        times: Times::Once,
+    },
+    Key {
+        name: "transfer",
+        value: "FILE.json",
+        help: "What a transfer function makes visible, within --colour-error: a file with its points (repeatable)",
+        times: Times::Many,
+    },
+    Key {
+        name: "colour-error",
+        value: "C|C%",
+        help: "Largest change of colour or opacity, 0 to 1 or with %, for --transfer [default: that in the file, or 1%]",
+        times: Times::Once,
+    },
+];
+
+/// Heading in the help of the options that say what is needed.
+pub const WHAT: &str = "What mesh";
+
+impl Key {
+    /// The option of this name. Its value is checked here and read by [`Group::set`].
+    fn option(&'static self) -> Arg {
+        let check = |text: &str| Group::default().set(self.name, text).map(|()| text.to_owned());
+        let option = Arg::new(self.name).long(self.name).value_name(self.value).help(self.help);
+        // Numbers may be negative, names of files and fields do not begin with a hyphen.
+        let is_name = ["FILE.json", "NAME"].contains(&self.value);
+        let option = option.value_parser(check).allow_hyphen_values(!is_name).help_heading(WHAT);
+        match self.times {
+            Times::Once => option,
+            Times::Many => option.action(ArgAction::Append),
+            Times::With(other) => option.requires(other),
+        }
+    }
 }
 
 /// Needs of one error: inside each of the regions where the field has one of the values, what each camera sees, and what
 /// each transfer function shows. Without any of these, everywhere.
 #[derive(Clone, Debug, Default)]
 pub struct Group {
-    pub error: Option<Tolerance>,
-    pub regions: Vec<Region>,
-    pub ranges: Vec<[f64; 2]>,
-    pub field: Option<String>,
-    pub cameras: Vec<Camera>,
-    pub pixels: Option<f64>,
-    pub transfers: Vec<PathBuf>,
-    pub colour_error: Option<f64>,
+    error: Option<Tolerance>,
+    regions: Vec<Region>,
+    isovalues: Vec<f64>,
+    /// Of values; isovalues are among them.
+    ranges: Vec<[f64; 2]>,
+    field: Option<String>,
+    views: Vec<PathBuf>,
+    matrix: Option<[f64; 16]>,
+    viewport: Option<[f64; 2]>,
+    pixels: Option<f64>,
+    transfers: Vec<PathBuf>,
+    colour_error: Option<f64>,
 }
 
-/// A need and what it is called.
-pub struct Wanted {
+/// A need and how messages call it.
+pub struct NamedNeed {
     pub name: String,
     pub need: Need,
 }
@@ -101,6 +221,33 @@ pub fn unit(need: &Need) -> &'static str {
         Part::View(_) => PIXELS,
         Part::Transfer(_) => COLOUR,
         _ => RELATIVE,
+    }
+}
+
+impl Args for Group {
+    fn augment_args(command: Command) -> Command {
+        command.args(KEYS.iter().map(Key::option))
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Self::augment_args(command)
+    }
+}
+
+impl FromArgMatches for Group {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        let mut group = Self::default();
+        group.update_from_arg_matches(matches)?;
+        Ok(group)
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        for Key { name, .. } in &KEYS {
+            for value in matches.get_many::<String>(name).into_iter().flatten() {
+                self.set(name, value).map_err(|wrong| clap::Error::raw(ErrorKind::InvalidValue, wrong))?;
+            }
+        }
+        Ok(())
     }
 }
 
@@ -135,47 +282,54 @@ fn once<T>(place: &mut Option<T>, value: T) -> Result<(), String> {
 impl Group {
     fn set(&mut self, key: &str, value: &str) -> Result<(), String> {
         match key {
-            "box" => self.regions.push(parse_box(value)?),
+            "error" => once(&mut self.error, value.parse()?)?,
+            "box" => self.regions.push(parse_bounds(value).map(Region::Box)?),
             "obox" => self.regions.push(parse_oriented_box(value)?),
             "sphere" => self.regions.push(parse_sphere(value)?),
             "half-space" => self.regions.push(parse_half_space(value)?),
             "slab" => self.regions.push(parse_slab(value)?),
             "convex" => self.regions.push(parse_convex(value)?),
-            "iso" => self.ranges.push(parse_number(value).map(|v| [v, v])?),
-            "range" => self.ranges.push(parse_range(value)?),
-            "view" => self.cameras.push(Camera::File(value.into())),
-            "transfer" => self.transfers.push(value.into()),
-            "field" => once(&mut self.field, value.to_owned())?,
-            "error" => once(&mut self.error, value.parse()?)?,
-            "pixels" => once(&mut self.pixels, parse_size(value)?)?,
-            "colour-error" => once(&mut self.colour_error, parse_share(value)?)?,
-            _ => {
-                return Err(
-                    "is no key; there are box, obox, sphere, half-space, slab, convex, iso, range, field, \
-                            error, view, pixels, transfer and colour-error"
-                        .to_owned(),
-                );
+            "iso" => {
+                let value = parse_number(value)?;
+                self.isovalues.push(value);
+                self.ranges.push([value, value]);
             }
+            "range" => self.ranges.push(parse_range(value)?),
+            "field" => once(&mut self.field, value.to_owned())?,
+            "view" => self.views.push(value.into()),
+            "matrix" => once(&mut self.matrix, parse_numbers(value, "a matrix")?)?,
+            "viewport" => once(&mut self.viewport, parse_viewport(value)?)?,
+            "pixels" => once(&mut self.pixels, parse_size(value)?)?,
+            "transfer" => self.transfers.push(value.into()),
+            "colour-error" => once(&mut self.colour_error, parse_share(value)?)?,
+            _ => return Err(format!("is no key; there are {}", KEYS.map(|key| key.name).join(", "))),
         }
         Ok(())
     }
 
     /// The files that it names.
     pub fn files(&self) -> impl Iterator<Item = &PathBuf> {
-        let cameras = self.cameras.iter().filter_map(|camera| match camera {
-            Camera::File(path) => Some(path),
-            Camera::Given(_) => None,
-        });
-        cameras.chain(&self.transfers)
+        self.views.iter().chain(&self.transfers)
+    }
+
+    /// The values given as isovalues.
+    pub fn isovalues(&self) -> &[f64] {
+        &self.isovalues
+    }
+
+    /// The field's name, if there is one.
+    pub fn field(&self) -> Option<&str> {
+        self.field.as_deref()
+    }
+
+    /// Whether it says neither where the mesh is needed nor how accurate it is to be.
+    pub fn is_empty(&self) -> bool {
+        self.is_bare() && self.error.is_none()
     }
 
     /// Whether it says nothing about where the mesh is needed.
-    pub fn is_bare(&self) -> bool {
-        !self.is_limited() && self.cameras.is_empty() && self.transfers.is_empty()
-    }
-
-    pub fn has_error(&self) -> bool {
-        self.error.is_some()
+    fn is_bare(&self) -> bool {
+        !self.is_limited() && !self.has_camera() && self.transfers.is_empty()
     }
 
     /// Whether there are regions or values.
@@ -183,9 +337,15 @@ impl Group {
         !self.regions.is_empty() || !self.ranges.is_empty()
     }
 
-    /// Errors that nothing goes with are mistakes.
+    fn has_camera(&self) -> bool {
+        !self.views.is_empty() || self.matrix.is_some()
+    }
+
+    /// Refuses errors of which nothing is there that has them.
     pub fn check(&self) -> Result<(), String> {
-        let wrong = if self.pixels.is_some() && self.cameras.is_empty() {
+        let wrong = if self.matrix.is_some() != self.viewport.is_some() {
+            "a camera has both a matrix and a viewport"
+        } else if self.pixels.is_some() && !self.has_camera() {
             "pixels are the error of a view; there is none"
         } else if self.colour_error.is_some() && self.transfers.is_empty() {
             "colour-error is the error of a transfer function; there is none"
@@ -199,33 +359,38 @@ impl Group {
     }
 
     /// Adds the needs; `field` is the field's name if the group has none.
-    pub fn add_to(&self, info: &MtInfo, field: Option<&str>, wanted: &mut Vec<Wanted>) -> Result<()> {
-        let field = files::field_index(info, self.field.as_deref().or(field))?;
+    pub fn add_to(&self, info: &MtInfo, field: Option<&str>, needs: &mut Vec<NamedNeed>) -> Result<()> {
+        let field = files::field_index(info, self.field().or(field))?;
         if self.is_bare() || self.is_limited() {
-            self.add_limited(info, field, wanted);
+            self.add_limited(info, field, needs);
         }
-        for camera in &self.cameras {
-            let (view, pixels, name) = read_camera(camera)?;
-            let need = Need::seen(view, self.pixels.or(pixels).unwrap_or(1.0));
-            wanted.push(Wanted { name, need });
+        for path in &self.views {
+            let ViewFile { matrix, viewport, pixels } = read_json(path)?;
+            let need = Need::seen(View { matrix, viewport }, self.pixels.or(pixels).unwrap_or(1.0));
+            needs.push(NamedNeed { name: format!("view {}", path.display()), need });
+        }
+        if let (Some(matrix), Some(viewport)) = (self.matrix, self.viewport) {
+            let need = Need::seen(View { matrix, viewport }, self.pixels.unwrap_or(1.0));
+            needs.push(NamedNeed { name: "view".to_owned(), need });
         }
         for path in &self.transfers {
-            let file: TransferFile = read_json(path)?;
-            let name = file.field.as_deref();
-            let field = if name.is_some() { files::field_index(info, name)? } else { field };
-            let error = self.colour_error.or(file.error).unwrap_or(0.01);
-            let colour = |[value, r, g, b, opacity]: [f64; 5]| (value, [r, g, b, opacity]);
-            let points = file.points.into_iter().map(colour).collect();
-            let transfer = Transfer { field, points, unit_length: file.unit_length };
-            wanted.push(Wanted {
-                name: format!("transfer {}", path.display()),
-                need: Need::shown(transfer, error),
-            });
+            needs.push(self.transfer(path, info, field)?);
         }
         Ok(())
     }
 
-    fn add_limited(&self, info: &MtInfo, field: usize, wanted: &mut Vec<Wanted>) {
+    fn transfer(&self, path: &Path, info: &MtInfo, field: usize) -> Result<NamedNeed> {
+        let file: TransferFile = read_json(path)?;
+        let name = file.field.as_deref();
+        let field = if name.is_some() { files::field_index(info, name)? } else { field };
+        let error = self.colour_error.or(file.error).unwrap_or(0.01);
+        let colour = |[value, r, g, b, opacity]: [f64; 5]| (value, [r, g, b, opacity]);
+        let points = file.points.into_iter().map(colour).collect();
+        let transfer = Transfer { field, points, unit_length: file.unit_length };
+        Ok(NamedNeed { name: format!("transfer {}", path.display()), need: Need::shown(transfer, error) })
+    }
+
+    fn add_limited(&self, info: &MtInfo, field: usize, needs: &mut Vec<NamedNeed>) {
         let error = self.error.map_or(0.0, |error| error.relative(info.fields[field].range()));
         let values = (!self.ranges.is_empty()).then(|| Values { field, ranges: self.ranges.clone() });
         let of_values = values.as_ref().map(|values| describe_values(info, values));
@@ -239,7 +404,7 @@ impl Group {
                 (Some(region), ..) => (Part::Region(region.clone()), describe_region(region)),
                 (None, ..) => (Part::Everywhere, "everywhere".to_owned()),
             };
-            wanted.push(Wanted { name, need: Need { error, field: None, part } });
+            needs.push(NamedNeed { name, need: Need { error, field: None, part } });
         };
         if self.regions.is_empty() {
             add(None);
@@ -250,9 +415,9 @@ impl Group {
 }
 
 /// A word about a need that can meet nothing: values that the field does not have, or a region outside of the domain.
-pub fn warning(session: &Session, stats: &RefineStats, wanted: &Wanted) -> Option<String> {
+pub fn warning(session: &Session, stats: &RefineStats, named: &NamedNeed) -> Option<String> {
     let (info, mesh) = (session.info()?, session.mesh()?);
-    let (region, values) = match &wanted.need.part {
+    let (region, values) = match &named.need.part {
         Part::Region(region) => (Some(region), None),
         Part::Values(values) => (None, Some(values)),
         Part::Both(region, values) => (Some(region), Some(values)),
@@ -264,7 +429,7 @@ pub fn warning(session: &Session, stats: &RefineStats, wanted: &Wanted) -> Optio
         let misses = |[low, high]: &[f64; 2]| *high < field.min || *low > field.max;
         if values.ranges.iter().all(misses) {
             let [min, max] = [number(field.min), number(field.max)];
-            return Some(format!("{}: the field has values from {min} to {max} alone", wanted.name));
+            return Some(format!("{}: the field has values from {min} to {max} alone", named.name));
         }
     }
     let corners: Vec<[f64; 3]> = mesh.positions().iter().map(|&q| info.lattice.point(q)).collect();
@@ -273,7 +438,7 @@ pub fn warning(session: &Session, stats: &RefineStats, wanted: &Wanted) -> Optio
     let near = info.boundary_bound(stats.error_bound);
     region.filter(|region| is_apart(region, &domain, near)).map(|_| {
         let list = |p: [f64; 3]| p.map(number).join(",");
-        format!("{}: the mesh lies in the box {},{} alone", wanted.name, list(domain.min), list(domain.max))
+        format!("{}: the mesh lies in the box {},{} alone", named.name, list(domain.min), list(domain.max))
     })
 }
 
@@ -363,27 +528,12 @@ fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T> {
     serde_json::from_str(&text).with_context(name)
 }
 
-/// The camera, the error if its file has one, and its name.
-fn read_camera(camera: &Camera) -> Result<(View, Option<f64>, String)> {
-    match camera {
-        Camera::Given(view) => Ok((*view, None, "view".to_owned())),
-        Camera::File(path) => {
-            let ViewFile { matrix, viewport, pixels } = read_json(path)?;
-            Ok((View { matrix, viewport }, pixels, format!("view {}", path.display())))
-        }
-    }
-}
-
-pub fn parse_box(text: &str) -> Result<Region, String> {
-    parse_bounds(text).map(Region::Box)
-}
-
 /// Refuses a direction of no length.
 fn direction(v: [f64; 3], what: &str) -> Result<[f64; 3], String> {
     if v == [0.0; 3] { Err(format!("{what} is not 0,0,0")) } else { Ok(v) }
 }
 
-pub fn parse_oriented_box(text: &str) -> Result<Region, String> {
+fn parse_oriented_box(text: &str) -> Result<Region, String> {
     let numbers: [f64; 12] = parse_numbers(text, "an oriented box")?;
     let vector = |i: usize| [numbers[3 * i], numbers[3 * i + 1], numbers[3 * i + 2]];
     let halves = [vector(1), vector(2), vector(3)];
@@ -398,7 +548,7 @@ pub fn parse_oriented_box(text: &str) -> Result<Region, String> {
     Ok(Region::OrientedBox { centre: vector(0), halves })
 }
 
-pub fn parse_sphere(text: &str) -> Result<Region, String> {
+fn parse_sphere(text: &str) -> Result<Region, String> {
     let [x, y, z, radius] = parse_numbers(text, "a sphere")?;
     if radius < 0.0 {
         return Err("a radius is not negative".to_owned());
@@ -406,12 +556,12 @@ pub fn parse_sphere(text: &str) -> Result<Region, String> {
     Ok(Region::Sphere { centre: [x, y, z], radius })
 }
 
-pub fn parse_half_space(text: &str) -> Result<Region, String> {
+fn parse_half_space(text: &str) -> Result<Region, String> {
     let [x, y, z, offset] = parse_numbers(text, "a half-space")?;
     Ok(Region::HalfSpace { normal: direction([x, y, z], "a normal")?, offset })
 }
 
-pub fn parse_slab(text: &str) -> Result<Region, String> {
+fn parse_slab(text: &str) -> Result<Region, String> {
     let [x, y, z, offset, thickness] = parse_numbers(text, "a slab")?;
     if thickness < 0.0 {
         return Err("a thickness is not negative".to_owned());
@@ -419,7 +569,7 @@ pub fn parse_slab(text: &str) -> Result<Region, String> {
     Ok(Region::Slab { normal: direction([x, y, z], "a normal")?, offset, thickness })
 }
 
-pub fn parse_convex(text: &str) -> Result<Region, String> {
+fn parse_convex(text: &str) -> Result<Region, String> {
     let numbers = parse_list(text)?;
     let (planes, rest) = numbers.as_chunks::<4>();
     if !rest.is_empty() || planes.len() > MAX_PLANES {
@@ -429,16 +579,12 @@ pub fn parse_convex(text: &str) -> Result<Region, String> {
     Ok(Region::Convex(planes.to_vec()))
 }
 
-pub fn parse_range(text: &str) -> Result<[f64; 2], String> {
+fn parse_range(text: &str) -> Result<[f64; 2], String> {
     let [low, high] = parse_numbers(text, "a range")?;
     if low > high { Err("a range has its smaller value first".to_owned()) } else { Ok([low, high]) }
 }
 
-pub fn parse_matrix(text: &str) -> Result<[f64; 16], String> {
-    parse_numbers(text, "a matrix")
-}
-
-pub fn parse_viewport(text: &str) -> Result<[f64; 2], String> {
+fn parse_viewport(text: &str) -> Result<[f64; 2], String> {
     let size: [f64; 2] = parse_numbers(text, "a viewport")?;
     if size.iter().all(|&x| x > 0.0) {
         Ok(size)
@@ -454,20 +600,10 @@ pub fn parse_size(text: &str) -> Result<f64, String> {
 }
 
 /// A part of 1, or a percentage.
-pub fn parse_share(text: &str) -> Result<f64, String> {
+fn parse_share(text: &str) -> Result<f64, String> {
     let (number, percent) = percentage(text)?;
     let share = if percent { number / 100.0 } else { number };
     if share >= 0.0 { Ok(share) } else { Err(format!("'{text}' is negative")) }
-}
-
-/// A whole number that is not negative.
-pub fn parse_count(text: &str) -> Result<u32, String> {
-    text.trim().parse().map_err(|_| format!("'{text}' is not a whole number from 0 to {}", u32::MAX))
-}
-
-/// The same, larger.
-pub fn parse_long_count(text: &str) -> Result<u64, String> {
-    text.trim().parse().map_err(|_| format!("'{text}' is not a whole number from 0 to {}", u64::MAX))
 }
 
 /// A number of bytes; K, M and G stand for powers of 1024.
@@ -512,6 +648,8 @@ mod tests {
             ("box=1,2", "6 numbers"),
             ("error=1;error=2", "twice"),
             ("pixels=1", "there is none"),
+            ("matrix=1,2", "16 numbers"),
+            ("viewport=4,3", "both a matrix and a viewport"),
             ("colour-error=1%;iso=1", "there is none"),
             ("view=a.json;error=1", "outside"),
             ("slab=0,0,0,1,1", "0,0,0"),

@@ -6,6 +6,29 @@ use serde::Serialize;
 use std::io;
 use std::io::Write;
 
+/// How much a command that writes a file says about it.
+#[derive(clap::Args)]
+pub struct Verbosity {
+    /// No progress bar and no summary.
+    #[arg(short, long)]
+    pub quiet: bool,
+    /// Print the summary as a JSON object.
+    #[arg(long, conflicts_with = "quiet")]
+    json: bool,
+}
+
+impl Verbosity {
+    /// Prints the summary, if it is wanted.
+    pub fn print(&self, report: &impl Serialize, rows: &[(&str, String)]) -> Result<()> {
+        if self.quiet { Ok(()) } else { result(self.json, report, rows) }
+    }
+}
+
+/// Prints a result: `report` as one JSON object, or `rows` for people.
+pub fn result<N: AsRef<str>>(as_json: bool, report: &impl Serialize, rows: &[(N, String)]) -> Result<()> {
+    if as_json { json(report) } else { table(rows) }
+}
+
 /// Prints `value` as one JSON object.
 pub fn json(value: &impl Serialize) -> Result<()> {
     let text = serde_json::to_string_pretty(value).context("the result could not be put into JSON")?;
@@ -13,9 +36,10 @@ pub fn json(value: &impl Serialize) -> Result<()> {
 }
 
 /// Prints lines of `name  value`, the values below one another.
-pub fn table(rows: &[(&str, String)]) -> Result<()> {
-    let width = rows.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
-    let lines: Vec<String> = rows.iter().map(|(name, value)| format!("{name:<width$}  {value}")).collect();
+fn table<N: AsRef<str>>(rows: &[(N, String)]) -> Result<()> {
+    let width = rows.iter().map(|(name, _)| name.as_ref().len()).max().unwrap_or(0);
+    let line = |(name, value): &(N, String)| format!("{:<width$}  {value}", name.as_ref());
+    let lines: Vec<String> = rows.iter().map(line).collect();
     print(&lines.join("\n"))
 }
 
@@ -39,6 +63,11 @@ pub fn count(number: impl Into<u64>) -> String {
         text.push(digit);
     }
     text
+}
+
+/// The size of a mesh, for people.
+pub fn mesh(vertices: u32, tetrahedra: u32) -> String {
+    format!("{} vertices, {} tetrahedra", count(vertices), count(tetrahedra))
 }
 
 /// A size in bytes, for people.

@@ -2,22 +2,14 @@
 
 use super::output;
 use super::poly::Target;
-use super::query::Answer;
-use super::query::Query;
-use super::query::Summary;
-use super::query::parse_numbers;
-use anyhow::Context;
-use anyhow::Result;
+use super::query::{Query, parse_numbers};
+use anyhow::{Context, Result};
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::path::Path;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 use tetralod::io::PolyData;
-use tetralod::view::MeshView;
-use tetralod::view::Place;
-use tetralod::view::Probe;
-use tetralod::view::Span;
+use tetralod::view::{MeshView, Place, Probe, Span};
 
 /// Tells what all fields are at points or along a line.
 ///
@@ -27,8 +19,6 @@ use tetralod::view::Span;
                         tetralod probe engine.mt --line 0,0,0,1,1,1 -o profile.csv\n          \
                         tetralod probe engine.mt --points sensors.csv -o values.csv")]
 pub struct Arguments {
-    /// The MT file, or its http(s) address.
-    file: PathBuf,
     #[command(flatten)]
     what: What,
     /// Instead of the exact profile of --line, so many points at equal distances.
@@ -39,9 +29,6 @@ pub struct Arguments {
     /// The values to write: .csv, or .vtp, .ply, .obj for the points and lines with their values.
     #[arg(short, long, value_name = "FILE")]
     output: Option<Target>,
-    /// Print the result as a JSON object.
-    #[arg(long)]
-    json: bool,
 }
 
 /// Where to look.
@@ -82,9 +69,6 @@ struct Report {
     /// The fields at each --point; null outside.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     values: Vec<Option<BTreeMap<String, f64>>>,
-    #[serde(flatten)]
-    mesh: Summary,
-    seconds: f64,
 }
 
 /// A point that was looked at.
@@ -109,10 +93,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         super::refuse_usage("--samples are points of a line: give --line, too");
     }
     if let Some(target) = &arguments.output {
-        let inputs = arguments.what.list.iter().chain(arguments.query.files()).chain([&arguments.file]);
+        let inputs = arguments.what.list.iter().chain(arguments.query.files());
         target.check(inputs)?;
     }
-    let mut answer = arguments.query.answer(&arguments.file)?;
+    let mut answer = arguments.query.answer()?;
     let start = Instant::now();
     let fields = answer.all_values()?;
     let names = answer.field_names()?;
@@ -125,8 +109,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if let Some(target) = &arguments.output {
         target.write_either(&poly_data(&found, &names, &columns), &table(&found, &names, &columns))?;
     }
-    let report = report(arguments, answer, &found, &names, &columns, seconds);
-    if arguments.json { output::json(&report) } else { print(arguments, &report) }
+    let report = report(arguments, &found, &names, &columns);
+    arguments.query.print(&report, rows(arguments, &report), (&answer.summary, seconds))
 }
 
 fn look(arguments: &Arguments, mesh: MeshView<'_>) -> Result<Samples> {
@@ -253,14 +237,7 @@ fn poly_data(found: &Samples, names: &[String], columns: &[Vec<Option<f64>>]) ->
     }
 }
 
-fn report(
-    arguments: &Arguments,
-    answer: Answer,
-    found: &Samples,
-    names: &[String],
-    columns: &[Vec<Option<f64>>],
-    seconds: f64,
-) -> Report {
+fn report(arguments: &Arguments, found: &Samples, names: &[String], columns: &[Vec<Option<f64>>]) -> Report {
     let all_at = |i: usize| {
         let values = names.iter().zip(columns).map(|(name, column)| Some((name.clone(), column[i]?)));
         values.collect::<Option<BTreeMap<_, _>>>()
@@ -271,12 +248,10 @@ fn report(
         length: found.length,
         length_inside: found.length_inside,
         values: (0..arguments.what.points.len()).map(all_at).collect(),
-        mesh: answer.summary,
-        seconds,
     }
 }
 
-fn print(arguments: &Arguments, report: &Report) -> Result<()> {
+fn rows(arguments: &Arguments, report: &Report) -> Vec<(String, String)> {
     let mut lines: Vec<(String, String)> = Vec::new();
     if let Some(target) = &arguments.output {
         lines.push(("file".to_owned(), target.path.display().to_string()));
@@ -295,9 +270,5 @@ fn print(arguments: &Arguments, report: &Report) -> Result<()> {
             None => lines.push((at, "outside".to_owned())),
         }
     }
-    lines.extend(report.mesh.rows().into_iter().map(|(name, value)| (name.to_owned(), value)));
-    lines.push(("time".to_owned(), format!("{:.3} s", report.seconds)));
-    let rows: Vec<(&str, String)> =
-        lines.iter().map(|(name, value)| (name.as_str(), value.clone())).collect();
-    output::table(&rows)
+    lines
 }

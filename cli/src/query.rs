@@ -2,31 +2,18 @@
 //!
 //! The plain options make needs of one error; each `--need` makes others, with an error of its own. The mesh suits all.
 
-use super::files;
-use super::files::Opened;
-use super::needs;
-use super::needs::Camera;
-use super::needs::Group;
-use super::needs::Tolerance;
-use super::needs::Wanted;
-use super::output;
-use anyhow::Context;
-use anyhow::Result;
+use super::files::{Bytes, Opened, PATIENCE};
+use super::needs::{Group, NamedNeed, Tolerance};
+use super::{files, needs, output};
+use anyhow::{Context, Result};
 use serde::Serialize;
-use std::path::Path;
 use std::path::PathBuf;
-use std::time::Duration;
-use std::time::Instant;
-use tetralod::client::Step;
+use std::str::FromStr;
+use std::time::{Duration, Instant};
+use tetralod::client::{Client, Step};
 use tetralod::geom::Bounds;
 use tetralod::mt::MtInfo;
-use tetralod::refine::Budget;
-use tetralod::refine::Need;
-use tetralod::refine::Outcome;
-use tetralod::refine::RefineStats;
-use tetralod::refine::Region;
-use tetralod::refine::Request;
-use tetralod::refine::View;
+use tetralod::refine::{Budget, Need, Outcome, RefineStats, Request};
 
 /// What the options look like in use.
 pub const EXAMPLES: &str = "\
@@ -44,209 +31,172 @@ camera.json:  {\"matrix\": [16 numbers: clip from model space, column by column]
 colours.json: {\"points\": [[value, red, green, blue, opacity], ...], \"unit_length\": 0.1, \"field\": \"name\"}; colours and
               opacities 0 to 1, the opacity that of a way of unit_length times the model's diagonal";
 
-/// How long is waited for a server at a time.
-const PATIENCE: Duration = Duration::from_secs(1);
-
-/// Headings of the help.
-const WHAT: &str = "What mesh";
+/// Heading in the help of the options that limit the mesh and the work.
 const LIMITS: &str = "How large, how long";
 
-/// The mesh to work on: as coarse as these options allow.
+/// What every command that works on a mesh takes: the MT, the needs that the mesh meets, its limits, and how results are
+/// printed. The mesh is the coarsest one that meets all needs.
 #[derive(clap::Args)]
 pub struct Query {
-    /// Largest error, in units of the field, or with % of its range; 0 is the reference mesh [default: 0]
-    #[arg(long, value_name = "E|E%", allow_hyphen_values = true, help_heading = WHAT)]
-    error: Option<Tolerance>,
-    /// Only inside this box, in model units; everywhere else as coarse as possible (regions are repeatable: their union).
-    #[arg(long = "box", value_name = "x0,y0,z0,x1,y1,z1", value_parser = needs::parse_box, allow_hyphen_values = true, help_heading = WHAT)]
-    boxes: Vec<Region>,
-    /// Only inside this oriented box: its centre, and three vectors at right angles from there to the middles of faces.
-    #[arg(long = "obox", value_name = "cx,cy,cz,ax,…,bx,…,cx,…", value_parser = needs::parse_oriented_box, allow_hyphen_values = true, help_heading = WHAT)]
-    oriented_boxes: Vec<Region>,
-    /// Only inside this ball: centre and radius.
-    #[arg(long = "sphere", value_name = "x,y,z,r", value_parser = needs::parse_sphere, allow_hyphen_values = true, help_heading = WHAT)]
-    spheres: Vec<Region>,
-    /// Only where n · p <= d.
-    #[arg(long = "half-space", value_name = "nx,ny,nz,d", value_parser = needs::parse_half_space, allow_hyphen_values = true, help_heading = WHAT)]
-    half_spaces: Vec<Region>,
-    /// Only within t / 2 of the plane n · p = d.
-    #[arg(long = "slab", value_name = "nx,ny,nz,d,t", value_parser = needs::parse_slab, allow_hyphen_values = true, help_heading = WHAT)]
-    slabs: Vec<Region>,
-    /// Only where n · p <= d for all of these planes, at most 16.
-    #[arg(long = "convex", value_name = "nx,ny,nz,d,nx,…", value_parser = needs::parse_convex, allow_hyphen_values = true, help_heading = WHAT)]
-    convexes: Vec<Region>,
-    /// Only where the field passes this value, in units of the field (repeatable).
-    #[arg(long = "iso", value_name = "V", value_parser = parse_number, allow_hyphen_values = true, help_heading = WHAT)]
-    isovalues: Vec<f64>,
-    /// Only where the field has a value from a to b, in units of the field (repeatable).
-    #[arg(long = "range", value_name = "a,b", value_parser = needs::parse_range, allow_hyphen_values = true, help_heading = WHAT)]
-    ranges: Vec<[f64; 2]>,
-    /// The field that all values are of; the first one if not given.
-    #[arg(long, value_name = "NAME", help_heading = WHAT)]
-    field: Option<String>,
-    /// What a camera sees, within --pixels: a file with its matrix and viewport (repeatable).
-    #[arg(long = "view", value_name = "FILE.json", help_heading = WHAT)]
-    views: Vec<PathBuf>,
-    /// The same without a file: 16 numbers, column by column, from model space to clip space.
-    #[arg(long, value_name = "m0,…,m15", value_parser = needs::parse_matrix, allow_hyphen_values = true, requires = "viewport", help_heading = WHAT)]
-    matrix: Option<[f64; 16]>,
-    /// Width and height of the picture in pixels, for --matrix.
-    #[arg(long, value_name = "w,h", value_parser = needs::parse_viewport, requires = "matrix", help_heading = WHAT)]
-    viewport: Option<[f64; 2]>,
-    /// Largest error on the screen in pixels, for --view and --matrix [default: what the file says, or 1]
-    #[arg(long, value_name = "P", value_parser = needs::parse_size, allow_hyphen_values = true, help_heading = WHAT)]
-    pixels: Option<f64>,
-    /// What a transfer function makes visible, within --colour-error: a file with its points (repeatable).
-    #[arg(long = "transfer", value_name = "FILE.json", help_heading = WHAT)]
-    transfers: Vec<PathBuf>,
-    /// Largest change of colour or opacity, 0 to 1 or with %, for --transfer [default: what the file says, or 1%]
-    #[arg(long, value_name = "C|C%", value_parser = needs::parse_share, help_heading = WHAT)]
-    colour_error: Option<f64>,
-    /// Besides, everywhere within this error, in units of the field, or with % of its range.
-    #[arg(long, value_name = "E|E%", allow_hyphen_values = true, help_heading = WHAT)]
+    /// The MT file, or its http(s) address.
+    pub file: PathBuf,
+    #[command(flatten)]
+    group: Group,
+    /// In addition, everywhere within this error, in units of the field, or with % of its range.
+    #[arg(long, value_name = "E|E%", allow_hyphen_values = true, help_heading = needs::WHAT)]
     outside: Option<Tolerance>,
-    /// Another need beside those of the options above, with its own error: 'key=value; key=value; …', the keys being box,
-    /// obox, sphere, half-space, slab, convex, iso, range, field, error, view, pixels, transfer and colour-error
-    /// (repeatable: the mesh suits all needs).
-    #[arg(long = "need", value_name = "K=V;…", allow_hyphen_values = true, help_heading = WHAT)]
+    /// Another need with its own error: 'key=value; key=value; …'. The keys are the names of the options above
+    /// (repeatable: the mesh meets all needs).
+    #[arg(long = "need", value_name = "K=V;…", allow_hyphen_values = true, help_heading = needs::WHAT)]
     needs: Vec<Group>,
-    /// At most so many tetrahedra; the best mesh that fits, but never less than the base mesh.
-    #[arg(long, value_name = "N", value_parser = needs::parse_count, allow_hyphen_values = true, help_heading = LIMITS)]
+    /// At most this many tetrahedra: the best mesh that fits, but never less than the base mesh.
+    #[arg(long, value_name = "N", value_parser = parse_count::<u32>, allow_hyphen_values = true, help_heading = LIMITS)]
     budget: Option<u32>,
-    /// At most so many vertices.
-    #[arg(long, value_name = "N", value_parser = needs::parse_count, allow_hyphen_values = true, help_heading = LIMITS)]
+    /// At most this many vertices.
+    #[arg(long, value_name = "N", value_parser = parse_count::<u32>, allow_hyphen_values = true, help_heading = LIMITS)]
     max_vertices: Option<u32>,
-    /// At most so many bytes, 32 a tetrahedron and 16 a vertex; K, M and G are KiB, MiB and GiB.
+    /// At most this many bytes, 32 a tetrahedron and 16 a vertex; K, M and G are KiB, MiB and GiB.
     #[arg(long, value_name = "N[K|M|G]", value_parser = needs::parse_bytes, allow_hyphen_values = true, help_heading = LIMITS)]
     max_bytes: Option<u64>,
-    /// Stop refining after so many milliseconds: a valid mesh, but an unfinished one, and not the same each time.
+    /// Stop refining after this many milliseconds: the mesh is valid but unfinished, and not the same each time.
     #[arg(long, value_name = "MS", value_parser = needs::parse_size, allow_hyphen_values = true, help_heading = LIMITS)]
     max_ms: Option<f64>,
-    /// Stop after so many updates: a valid mesh, but an unfinished one.
-    #[arg(long, value_name = "N", value_parser = needs::parse_long_count, allow_hyphen_values = true, help_heading = LIMITS)]
+    /// Stop refining after this many updates: the mesh is valid but unfinished.
+    #[arg(long, value_name = "N", value_parser = parse_count::<u64>, allow_hyphen_values = true, help_heading = LIMITS)]
     max_updates: Option<u64>,
+    /// Print the result as a JSON object.
+    #[arg(long)]
+    json: bool,
 }
 
 impl Query {
-    /// The files that it names.
+    /// The files that it reads.
     pub fn files(&self) -> impl Iterator<Item = &PathBuf> {
-        self.views.iter().chain(&self.transfers).chain(self.needs.iter().flat_map(Group::files))
+        let named = self.group.files().chain(self.needs.iter().flat_map(Group::files));
+        named.chain([&self.file])
     }
 
-    /// The values that the mesh is refined around, if they are said by `--iso`.
+    /// The values of the isosurfaces that the mesh is refined around by `--iso`.
     pub fn isovalues(&self) -> &[f64] {
-        &self.isovalues
+        self.group.isovalues()
     }
 
-    /// What the options beside `--need` and `--outside` say.
-    fn group(&self) -> Result<Group> {
-        let regions = [
-            &self.boxes,
-            &self.oriented_boxes,
-            &self.spheres,
-            &self.half_spaces,
-            &self.slabs,
-            &self.convexes,
-        ];
-        let isovalues = self.isovalues.iter().map(|&v| [v, v]);
-        let mut cameras: Vec<Camera> = self.views.iter().cloned().map(Camera::File).collect();
-        if let (Some(matrix), Some(viewport)) = (self.matrix, self.viewport) {
-            cameras.push(Camera::Given(View { matrix, viewport }));
+    fn named_needs(&self, info: &MtInfo) -> Result<Vec<NamedNeed>> {
+        let mut needs = Vec::new();
+        // Without any other need, the mesh is the reference mesh everywhere.
+        if !self.group.is_empty() || self.needs.is_empty() && self.outside.is_none() {
+            self.group.add_to(info, None, &mut needs)?;
         }
-        let group = Group {
-            error: self.error,
-            regions: regions.into_iter().flatten().cloned().collect(),
-            ranges: isovalues.chain(self.ranges.iter().copied()).collect(),
-            field: self.field.clone(),
-            cameras,
-            pixels: self.pixels,
-            transfers: self.transfers.clone(),
-            colour_error: self.colour_error,
-        };
-        group.check().map_err(anyhow::Error::msg)?;
-        Ok(group)
-    }
-
-    fn wanted(&self, info: &MtInfo) -> Result<Vec<Wanted>> {
-        let group = self.group()?;
-        let mut wanted = Vec::new();
-        // Needs said otherwise do without the reference mesh everywhere.
-        let says_all = self.needs.is_empty() && self.outside.is_none();
-        if !group.is_bare() || group.has_error() || says_all {
-            group.add_to(info, None, &mut wanted)?;
-        }
-        for need in &self.needs {
-            need.add_to(info, self.field.as_deref(), &mut wanted)?;
+        for group in &self.needs {
+            group.add_to(info, self.group.field(), &mut needs)?;
         }
         if let Some(error) = self.outside {
-            let field = files::field_index(info, self.field.as_deref())?;
+            let field = files::field_index(info, self.group.field())?;
             let need = Need::within(error.relative(info.fields[field].range()));
-            wanted.push(Wanted { name: "everywhere".to_owned(), need });
+            needs.push(NamedNeed { name: "everywhere".to_owned(), need });
         }
-        Ok(wanted)
+        Ok(needs)
     }
 
-    fn budget(&self) -> Budget {
-        Budget { tets: self.budget, vertices: self.max_vertices, bytes: self.max_bytes }
-    }
-
-    /// Opens an MT file and refines its mesh to what is asked for; the session shows the field that is asked for.
-    pub fn answer(&self, file: &Path) -> Result<Answer> {
-        self.answer_from(file, false)
+    /// Opens the MT and refines its mesh to what is asked for; the session shows the field that is asked for.
+    pub fn answer(&self) -> Result<Answer> {
+        self.answer_with(|_| Ok(()))
     }
 
     /// [`Query::answer`] with the exact values that the file keeps.
-    pub fn answer_exactly(&self, file: &Path) -> Result<Answer> {
-        self.answer_from(file, true)
+    pub fn answer_exactly(&self) -> Result<Answer> {
+        self.answer_with(|client| Ok(client.fetch_exact()?))
     }
 
-    fn answer_from(&self, file: &Path, exact: bool) -> Result<Answer> {
-        if let Err(wrong) = self.group() {
-            super::refuse_usage(&wrong.to_string());
+    fn answer_with(&self, fetch_more: impl FnOnce(&mut Client<Bytes>) -> Result<()>) -> Result<Answer> {
+        if let Err(wrong) = self.group.check() {
+            super::refuse_usage(&wrong);
         }
-        let name = || file.display().to_string();
-        let mut client = files::open_parts(file).with_context(name)?;
-        let info = client.session().info().context("the MT has no description").with_context(name)?;
-        let wanted = self.wanted(info).with_context(name)?;
-        let field = files::field_index(info, self.field.as_deref()).with_context(name)?;
-        let needs = wanted.iter().map(|wanted| wanted.need.clone()).collect();
-        let request = Request { needs, budget: self.budget() };
-        client.aim(&request).with_context(name)?;
-        while !client.fetch(PATIENCE).with_context(name)? {}
-        if exact {
-            client.fetch_exact().with_context(name)?;
-        }
+        self.refined(fetch_more).with_context(|| self.file.display().to_string())
+    }
+
+    fn refined(&self, fetch_more: impl FnOnce(&mut Client<Bytes>) -> Result<()>) -> Result<Answer> {
+        let mut client = files::open_parts(&self.file)?;
+        let info = client.session().info().context("the MT has no description")?;
+        let needs = self.named_needs(info)?;
+        let field = files::field_index(info, self.group.field())?;
+        let budget = Budget { tets: self.budget, vertices: self.max_vertices, bytes: self.max_bytes };
+        client.aim(&Request { needs: needs.iter().map(|named| named.need.clone()).collect(), budget })?;
+        while !client.fetch(PATIENCE)? {}
+        fetch_more(&mut client)?;
+        let start = Instant::now();
+        let (mut opened, stats) = self.refine(client)?;
+        let seconds = start.elapsed().as_secs_f64();
+        opened.session.set_field(field)?;
+        let warnings = needs.iter().filter_map(|named| needs::warning(&opened.session, &stats, named));
+        warnings.for_each(|warning| eprintln!("warning: {warning}"));
+        let summary = summary(&opened, field, &stats, &needs)?;
+        Ok(Answer { opened, field, needs, stats, seconds, summary })
+    }
+
+    /// Refines until the request is met or a limit of time or updates is reached.
+    fn refine(&self, mut client: Client<Bytes>) -> Result<(Opened, RefineStats)> {
         let start = Instant::now();
         let deadline = self.max_ms.map(|ms| Duration::from_secs_f64(ms / 1000.0));
         let mut go_on = |done: &Outcome| {
             self.max_updates.is_none_or(|most| done.refined + done.coarsened < most)
                 && deadline.is_none_or(|deadline| start.elapsed() < deadline)
         };
-        // What blocks of a half-edge MT it takes, the mesh shows on the way.
+        // Which blocks of a half-edge MT are needed shows only while the mesh is refined.
         let mut before = RefineStats::default();
         while client.session().mt().is_some_and(|mt| !mt.needs_parents()) {
-            let Step { stats, complete } = client.step(PATIENCE, &mut go_on).with_context(name)?;
-            before.refined += stats.refined;
-            before.coarsened += stats.coarsened;
-            before.forced += stats.forced;
-            before.judged += stats.judged;
+            let Step { stats, complete } = client.step(PATIENCE, &mut go_on)?;
+            add_work(&mut before, &stats);
             if complete || !stats.done {
                 break;
             }
         }
         let mut opened = Opened::of(client);
-        let mut stats = opened.session.step(&mut go_on).with_context(name)?;
-        stats.refined += before.refined;
-        stats.coarsened += before.coarsened;
-        stats.forced += before.forced;
-        stats.judged += before.judged;
-        let seconds = start.elapsed().as_secs_f64();
-        opened.session.set_field(field).with_context(name)?;
-        let warnings = wanted.iter().filter_map(|wanted| needs::warning(&opened.session, &stats, wanted));
-        warnings.for_each(|warning| eprintln!("warning: {warning}"));
-        let summary = summary(&opened, field, &stats, &wanted)?;
-        Ok(Answer { opened, field, wanted, stats, seconds, summary })
+        let mut stats = opened.session.step(&mut go_on)?;
+        add_work(&mut stats, &before);
+        Ok((opened, stats))
     }
+
+    /// Prints a result: `found` and the summary of the mesh as one JSON object, or `rows` and those of the summary.
+    pub fn print<N: Into<String>>(
+        &self,
+        found: &impl Serialize,
+        rows: Vec<(N, String)>,
+        mesh: (&Summary, f64),
+    ) -> Result<()> {
+        self.print_around(found, [rows, Vec::new()], mesh)
+    }
+
+    /// [`Query::print`] with rows before and after those of the summary.
+    pub fn print_around<N: Into<String>>(
+        &self,
+        found: &impl Serialize,
+        [before, after]: [Vec<(N, String)>; 2],
+        (mesh, seconds): (&Summary, f64),
+    ) -> Result<()> {
+        let named = |rows: Vec<(N, String)>| rows.into_iter().map(|(name, value)| (name.into(), value));
+        let time = ("time", format!("{seconds:.3} s"));
+        let of_mesh = mesh.rows().into_iter().chain([time]).map(|(name, value)| (name.to_owned(), value));
+        let rows: Vec<(String, String)> = named(before).chain(of_mesh).chain(named(after)).collect();
+        output::result(self.json, &Report { found, mesh, seconds }, &rows)
+    }
+}
+
+/// A result as programs get it.
+#[derive(Serialize)]
+struct Report<'a, T> {
+    #[serde(flatten)]
+    found: &'a T,
+    #[serde(flatten)]
+    mesh: &'a Summary,
+    seconds: f64,
+}
+
+fn add_work(total: &mut RefineStats, step: &RefineStats) {
+    total.refined += step.refined;
+    total.coarsened += step.coarsened;
+    total.forced += step.forced;
+    total.judged += step.judged;
 }
 
 /// A mesh that answers a query.
@@ -254,7 +204,7 @@ pub struct Answer {
     pub opened: Opened,
     /// Which field was asked for.
     pub field: usize,
-    pub wanted: Vec<Wanted>,
+    pub needs: Vec<NamedNeed>,
     pub stats: RefineStats,
     /// What refinement took.
     pub seconds: f64,
@@ -302,12 +252,12 @@ pub struct NeedReport {
     pub bound: Option<f64>,
 }
 
-fn summary(opened: &Opened, number: usize, stats: &RefineStats, wanted: &[Wanted]) -> Result<Summary> {
+fn summary(opened: &Opened, number: usize, stats: &RefineStats, needs: &[NamedNeed]) -> Result<Summary> {
     let known = |value: f64| (stats.done && value.is_finite()).then_some(value);
-    let report = |(i, wanted): (usize, &Wanted)| NeedReport {
-        need: wanted.name.clone(),
-        unit: needs::unit(&wanted.need),
-        asked: wanted.need.error,
+    let report = |(i, named): (usize, &NamedNeed)| NeedReport {
+        need: named.name.clone(),
+        unit: needs::unit(&named.need),
+        asked: named.need.error,
         bound: stats.bounds.get(i).copied().and_then(known),
     };
     let info = opened.info()?;
@@ -324,7 +274,7 @@ fn summary(opened: &Opened, number: usize, stats: &RefineStats, wanted: &[Wanted
         excess: known(stats.excess),
         satisfied: stats.satisfied,
         done: stats.done,
-        needs: wanted.iter().enumerate().map(report).collect(),
+        needs: needs.iter().enumerate().map(report).collect(),
         refined: stats.refined,
         coarsened: stats.coarsened,
         forced: stats.forced,
@@ -389,6 +339,11 @@ impl Answer {
     pub fn all_values(&self) -> Result<Vec<Vec<f32>>> {
         Ok((0..self.opened.info()?.fields.len()).map(|field| self.opened.session.values(field)).collect())
     }
+}
+
+/// A whole number that is not negative.
+fn parse_count<T: FromStr>(text: &str) -> Result<T, String> {
+    text.trim().parse().map_err(|_| format!("'{text}' is not a whole number of at least 0, or too large"))
 }
 
 /// A finite number.

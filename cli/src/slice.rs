@@ -1,19 +1,13 @@
 //! `tetralod slice`: the mesh in a plane.
 
 use super::output;
-use super::poly::Amount;
-use super::poly::Target;
-use super::query::Query;
-use super::query::Summary;
-use super::query::parse_number;
-use super::query::parse_numbers;
+use super::poly::{Amount, Target};
+use super::query::{Query, parse_number, parse_numbers};
 use anyhow::Result;
 use serde::Serialize;
-use std::path::PathBuf;
 use std::time::Instant;
 use tetralod::io::PolyData;
-use tetralod::view::Plane;
-use tetralod::view::Slice;
+use tetralod::view::{Plane, Slice};
 
 /// Writes the section of the mesh with a plane, with all fields interpolated in it.
 #[derive(clap::Args)]
@@ -22,8 +16,6 @@ use tetralod::view::Slice;
                         tetralod slice engine.mt --plane 1,1,0,12.5 --edges -o slice.obj"
 )]
 pub struct Arguments {
-    /// The MT file, or its http(s) address.
-    file: PathBuf,
     /// The plane: x=D, y=D or z=D, or the points p with n · p = D; in model units.
     #[arg(long, value_name = "nx,ny,nz,D", value_parser = parse_plane, allow_hyphen_values = true)]
     plane: Plane,
@@ -35,9 +27,6 @@ pub struct Arguments {
     /// The surface to write: .vtp, .stl (without edges), .ply, .obj, or .csv for its points.
     #[arg(short, long, value_name = "FILE")]
     output: Target,
-    /// Print the result as a JSON object.
-    #[arg(long)]
-    json: bool,
 }
 
 fn parse_plane(text: &str) -> Result<Plane, String> {
@@ -62,14 +51,11 @@ struct Report {
     surface: Amount,
     #[serde(skip_serializing_if = "Option::is_none")]
     edges: Option<usize>,
-    #[serde(flatten)]
-    mesh: Summary,
-    seconds: f64,
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
-    arguments.output.check(arguments.query.files().chain([&arguments.file]))?;
-    let mut answer = arguments.query.answer(&arguments.file)?;
+    arguments.output.check(arguments.query.files())?;
+    let mut answer = arguments.query.answer()?;
     let (names, fields) = (answer.field_names()?, answer.all_values()?);
     let mesh = answer.opened.session.view();
     let start = Instant::now();
@@ -90,16 +76,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     };
     arguments.output.write(&data)?;
     let edges = arguments.edges.then_some(edges.len());
-    let report = Report { surface: Amount::of(&data), edges, mesh: answer.summary, seconds };
-    if arguments.json { output::json(&report) } else { print(arguments, &report) }
-}
-
-fn print(arguments: &Arguments, report: &Report) -> Result<()> {
+    let report = Report { surface: Amount::of(&data), edges };
     let mut rows = report.surface.rows(&arguments.output);
-    if let Some(edges) = report.edges {
+    if let Some(edges) = edges {
         rows.push(("cell edges", output::count(edges as u64)));
     }
-    rows.extend(report.mesh.rows());
-    rows.push(("time", format!("{:.3} s", report.seconds)));
-    output::table(&rows)
+    arguments.query.print(&report, rows, (&answer.summary, seconds))
 }

@@ -1,29 +1,19 @@
 //! `tetralod stats`: integral, mean and histogram of a field over the mesh.
 
-use super::files;
-use super::output;
 use super::poly::write_table;
-use super::query::Answer;
-use super::query::Query;
-use super::query::Summary;
-use super::query::parse_numbers;
-use anyhow::Context;
-use anyhow::Result;
-use anyhow::bail;
+use super::query::{Answer, Query, parse_numbers};
+use super::{files, output};
+use anyhow::{Context, Result, bail};
 use serde::Serialize;
-use std::path::Path;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
-use tetralod::view::FieldStats;
-use tetralod::view::Histogram;
+use tetralod::view::{FieldStats, Histogram};
 
 /// Tells the integral, the mean and the histogram of a field, exact for the field that is linear in every tetrahedron.
 #[derive(clap::Args)]
 #[command(after_help = "Examples: tetralod stats engine.mt --error 1% --bins 20\n          \
                         tetralod stats engine.mt --error 1% --reference engine.vtu -o histogram.csv")]
 pub struct Arguments {
-    /// The MT file, or its http(s) address.
-    file: PathBuf,
     /// Number of bins of the histogram.
     #[arg(long, value_name = "N", default_value = "10", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     bins: u32,
@@ -38,9 +28,6 @@ pub struct Arguments {
     /// The histogram to write: .csv.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Print the result as a JSON object.
-    #[arg(long)]
-    json: bool,
 }
 
 fn parse_range(text: &str) -> Result<[f64; 2], String> {
@@ -56,9 +43,6 @@ struct Report {
     #[serde(skip_serializing_if = "Option::is_none")]
     reference: Option<Compared>,
     histogram: Bins,
-    #[serde(flatten)]
-    mesh: Summary,
-    seconds: f64,
 }
 
 #[derive(Serialize)]
@@ -123,10 +107,10 @@ impl Sums {
 pub fn run(arguments: &Arguments) -> Result<()> {
     if let Some(path) = &arguments.output {
         files::check_ending(path, "csv")?;
-        let inputs = arguments.reference.iter().chain(arguments.query.files()).chain([&arguments.file]);
+        let inputs = arguments.reference.iter().chain(arguments.query.files());
         files::check_output(path, inputs)?;
     }
-    let answer = arguments.query.answer(&arguments.file)?;
+    let answer = arguments.query.answer()?;
     let field = &answer.opened.info()?.fields[answer.field];
     // A constant field is a range, too.
     let whole =
@@ -153,9 +137,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         ];
         write_table(path, &table)?;
     }
-    let found = sums.numbers();
-    let report = Report { found, reference, histogram: bins, mesh: answer.summary, seconds };
-    if arguments.json { output::json(&report) } else { print(arguments, &report) }
+    let report = Report { found: sums.numbers(), reference, histogram: bins };
+    arguments.query.print(&report, rows(arguments, &report), (&answer.summary, seconds))
 }
 
 /// Sums over the current mesh on its lattices, which double precision holds exactly.
@@ -193,7 +176,7 @@ fn compare(path: &Path, answer: &Answer, sums: &Sums, mut reference: Sums) -> Re
     })
 }
 
-fn print(arguments: &Arguments, report: &Report) -> Result<()> {
+fn rows(arguments: &Arguments, report: &Report) -> Vec<(&'static str, String)> {
     let numbers = &report.found;
     let mut rows = vec![
         ("volume", output::number(numbers.volume)),
@@ -229,7 +212,5 @@ fn print(arguments: &Arguments, report: &Report) -> Result<()> {
     if let Some(path) = &arguments.output {
         rows.push(("file", path.display().to_string()));
     }
-    rows.extend(report.mesh.rows());
-    rows.push(("time", format!("{:.3} s", report.seconds)));
-    output::table(&rows)
+    rows
 }

@@ -3,22 +3,14 @@
 use super::output;
 use super::poly::Target;
 use super::probe::parse_point;
-use super::query::Query;
-use super::query::Summary;
-use super::query::parse_number;
-use super::query::parse_numbers;
-use anyhow::Context;
-use anyhow::Result;
+use super::query::{Query, parse_number, parse_numbers};
+use anyhow::{Context, Result};
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 use std::time::Instant;
 use tetralod::io::PolyData;
 use tetralod::mt::FieldInfo;
-use tetralod::view::StreamPoint;
-use tetralod::view::Streamline;
-use tetralod::view::TraceOptions;
-use tetralod::view::Tracer;
+use tetralod::view::{StreamPoint, Streamline, TraceOptions, Tracer};
 
 /// Writes the streamlines of a vector field that start at seeds.
 ///
@@ -28,8 +20,6 @@ use tetralod::view::Tracer;
     after_help = "Example: tetralod streamlines flow.mt --vector velocity --seeds 0,0,0,0,0,1,20 -o lines.vtp"
 )]
 pub struct Arguments {
-    /// The MT file, or its http(s) address.
-    file: PathBuf,
     /// The vector field: the name that its components begin with, or the three names of the components.
     #[arg(long, value_name = "NAME|X,Y,Z")]
     vector: String,
@@ -52,9 +42,6 @@ pub struct Arguments {
     /// The lines to write: .vtp, .ply, .obj, or .csv for their points.
     #[arg(short, long, value_name = "FILE")]
     output: Target,
-    /// Print the result as a JSON object.
-    #[arg(long)]
-    json: bool,
 }
 
 #[derive(clap::Args)]
@@ -123,9 +110,6 @@ struct Report {
     /// How many ends there are of each kind.
     ends: BTreeMap<&'static str, usize>,
     vector: Vec<String>,
-    #[serde(flatten)]
-    mesh: Summary,
-    seconds: f64,
 }
 
 /// All lines, one behind the other.
@@ -157,11 +141,11 @@ impl Lines {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
-    arguments.output.check(arguments.query.files().chain([&arguments.file]))?;
-    let mut answer = arguments.query.answer(&arguments.file)?;
+    arguments.output.check(arguments.query.files())?;
+    let mut answer = arguments.query.answer()?;
     let info = answer.opened.info()?;
-    let components =
-        components(&info.fields, &arguments.vector).with_context(|| arguments.file.display().to_string())?;
+    let components = components(&info.fields, &arguments.vector)
+        .with_context(|| arguments.query.file.display().to_string())?;
     let names = answer.field_names()?;
     let start = Instant::now();
     let fields = answer.all_values()?;
@@ -196,10 +180,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         points: lines.points.len(),
         ends: lines.ends,
         vector: components.map(|f| names[f].clone()).to_vec(),
-        mesh: answer.summary,
-        seconds,
     };
-    if arguments.json { output::json(&report) } else { print(arguments, &report) }
+    arguments.query.print(&report, rows(arguments, &report), (&answer.summary, seconds))
 }
 
 /// The fields that are the components of a vector.
@@ -262,17 +244,14 @@ fn poly_data(lines: &Lines, columns: &[(String, Vec<f64>)]) -> PolyData {
     }
 }
 
-fn print(arguments: &Arguments, report: &Report) -> Result<()> {
+fn rows(arguments: &Arguments, report: &Report) -> Vec<(&'static str, String)> {
     let ends: Vec<String> = report.ends.iter().map(|(name, count)| format!("{count} {name}")).collect();
-    let mut rows = vec![
+    vec![
         ("file", arguments.output.path.display().to_string()),
         ("vector", report.vector.join(", ")),
         ("seeds", format!("{}, {} outside", report.seeds, report.outside)),
         ("lines", output::count(report.lines as u64)),
         ("points", output::count(report.points as u64)),
         ("ends", ends.join(", ")),
-    ];
-    rows.extend(report.mesh.rows());
-    rows.push(("time", format!("{:.3} s", report.seconds)));
-    output::table(&rows)
+    ]
 }

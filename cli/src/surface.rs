@@ -1,13 +1,9 @@
 //! `tetralod surface`: the boundary of the mesh.
 
-use super::output;
-use super::poly::Amount;
-use super::poly::Target;
+use super::poly::{Amount, Target};
 use super::query::Query;
-use super::query::Summary;
 use anyhow::Result;
 use serde::Serialize;
-use std::path::PathBuf;
 use std::time::Instant;
 use tetralod::io::PolyData;
 use tetralod::view::BoundarySurface;
@@ -17,16 +13,11 @@ use tetralod::view::BoundarySurface;
 #[derive(clap::Args)]
 #[command(after_help = "Example: tetralod surface engine.mt --error 5% -o engine.stl")]
 pub struct Arguments {
-    /// The MT file, or its http(s) address.
-    file: PathBuf,
     #[command(flatten)]
     query: Query,
     /// The surface to write: .vtp, .stl, .ply, .obj, or .csv for its points.
     #[arg(short, long, value_name = "FILE")]
     output: Target,
-    /// Print the result as a JSON object.
-    #[arg(long)]
-    json: bool,
 }
 
 /// The result as programs get it.
@@ -35,14 +26,11 @@ struct Report {
     #[serde(flatten)]
     surface: Amount,
     closed: bool,
-    #[serde(flatten)]
-    mesh: Summary,
-    seconds: f64,
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
-    arguments.output.check(arguments.query.files().chain([&arguments.file]))?;
-    let mut answer = arguments.query.answer(&arguments.file)?;
+    arguments.output.check(arguments.query.files())?;
+    let mut answer = arguments.query.answer()?;
     let (names, fields) = (answer.field_names()?, answer.all_values()?);
     let start = Instant::now();
     let mut surface = BoundarySurface::new();
@@ -54,14 +42,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let data =
         PolyData { positions: surface.positions, fields, triangles: surface.indices, ..PolyData::default() };
     arguments.output.write(&data)?;
-    let report = Report { surface: Amount::of(&data), closed, mesh: answer.summary, seconds };
-    if arguments.json { output::json(&report) } else { print(arguments, &report) }
-}
-
-fn print(arguments: &Arguments, report: &Report) -> Result<()> {
+    let report = Report { surface: Amount::of(&data), closed };
     let mut rows = report.surface.rows(&arguments.output);
-    rows.push(("closed", if report.closed { "yes" } else { "no" }.to_owned()));
-    rows.extend(report.mesh.rows());
-    rows.push(("time", format!("{:.3} s", report.seconds)));
-    output::table(&rows)
+    rows.push(("closed", if closed { "yes" } else { "no" }.to_owned()));
+    arguments.query.print(&report, rows, (&answer.summary, seconds))
 }

@@ -86,27 +86,21 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         verify::run(opened.mt()?, &input, reference, &mut on_progress)
     };
     bar.finish_and_clear();
-    if arguments.json {
-        print_json(&report, arguments.quick, about)?
-    } else {
-        print(&report, about)?
-    }
+    print(arguments, &report, about)?;
     Ok(if report.valid { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-fn print_json(report: &VerifyReport, quick: bool, memory_bytes: u64) -> Result<()> {
+fn print(arguments: &Arguments, report: &VerifyReport, memory_bytes: u64) -> Result<()> {
+    let &Arguments { quick, json, .. } = arguments;
     let VerifyReport { valid, queries, worst_error_ratio, ref failures, .. } = *report;
-    output::json(&Report { valid, queries, worst_error_ratio, quick, memory_bytes, failures })
-}
-
-fn print(report: &VerifyReport, memory_bytes: u64) -> Result<()> {
-    let verdict = if report.valid { "every promise is kept" } else { "promises are broken" };
+    let verdict = if valid { "every promise is kept" } else { "promises are broken" };
     let mut rows = vec![
         ("verdict", verdict.to_owned()),
-        ("requests", output::count(report.queries)),
-        ("worst error", format!("{} of what is promised", output::percent(report.worst_error_ratio))),
+        ("requests", output::count(queries)),
+        ("worst error", format!("{} of what is promised", output::percent(worst_error_ratio))),
         ("memory", format!("about {}", output::bytes(memory_bytes))),
     ];
-    rows.extend(report.failures.iter().map(|failure| ("broken", failure.clone())));
-    output::table(&rows)
+    rows.extend(failures.iter().map(|failure| ("broken", failure.clone())));
+    let report = Report { valid, queries, worst_error_ratio, quick, memory_bytes, failures };
+    output::result(json, &report, &rows)
 }

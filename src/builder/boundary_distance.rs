@@ -1,41 +1,30 @@
 //! The boundary of the reference mesh, and how far a point is from it.
 
-use crate::geom::nearest_on_triangle;
-use crate::mesh::FACES;
-use crate::mesh::NONE;
+use crate::geom::{Groups, nearest_on_triangle};
+use crate::mesh::boundary_faces;
 use glam::DVec3;
 
 /// The boundary triangles of the reference mesh, in model units.
 pub(super) struct Skin {
     triangles: Vec<[DVec3; 3]>,
     corners: Vec<[u32; 3]>,
-    /// Where the triangles at each vertex start in `around`.
-    starts: Vec<u32>,
-    around: Vec<u32>,
+    /// The triangles at each vertex.
+    around: Groups,
 }
 
 impl Skin {
     pub fn new(tets: &[[u32; 4]], neighbors: &[[u32; 4]], positions: &[DVec3]) -> Self {
-        let mut corners: Vec<[u32; 3]> = Vec::new();
-        for (tet, around) in tets.iter().zip(neighbors) {
-            corners.extend((0..4).filter(|&i| around[i] == NONE).map(|i| FACES[i].map(|j| tet[j])));
-        }
+        let corners: Vec<[u32; 3]> = boundary_faces(tets, neighbors).map(|(_, face)| face).collect();
         let triangles = corners.iter().map(|face| face.map(|v| positions[v as usize])).collect();
-        let mut starts = vec![0_u32; positions.len() + 1];
-        corners.iter().flatten().for_each(|&v| starts[v as usize + 1] += 1);
-        (1..starts.len()).for_each(|i| starts[i] += starts[i - 1]);
-        let mut next = starts.clone();
-        let mut around = vec![0; 3 * corners.len()];
-        for (t, &v) in corners.iter().enumerate().flat_map(|(t, face)| face.iter().map(move |v| (t, v))) {
-            around[next[v as usize] as usize] = t as u32;
-            next[v as usize] += 1;
-        }
-        Self { triangles, corners, starts, around }
+        let around = Groups::new(positions.len(), |add| {
+            (0..).zip(&corners).for_each(|(t, face)| face.iter().for_each(|v| add(*v as usize, t)));
+        });
+        Self { triangles, corners, around }
     }
 
     /// The triangles at a vertex of the reference mesh.
     pub fn at(&self, v: u32) -> &[u32] {
-        &self.around[self.starts[v as usize] as usize..self.starts[v as usize + 1] as usize]
+        self.around.of(v as usize)
     }
 
     /// The corners of a triangle.

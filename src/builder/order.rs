@@ -5,6 +5,7 @@
 //! a block come first the updates that depend on none of the block, then those that depend on these alone, and so on, the
 //! vertices that they split ascending: that is told in few bits.
 
+use crate::geom::morton;
 use std::collections::BTreeMap;
 
 /// What the order depends on. Updates are numbered by falling error, which extends the partial order.
@@ -162,11 +163,7 @@ impl Updates<'_> {
     }
 }
 
-/// Where a position lies on a curve through the lattice that seldom leaps far (Morton 1966).
+/// Where a position lies on a curve through the lattice that seldom leaps far.
 fn curve(position: [i32; 3], bits: u32) -> u64 {
-    let shift = bits.saturating_sub(20);
-    let spread =
-        |x: i32| (0..21).fold(0_u64, |sum, bit| sum | u64::from((x >> shift) as u32 >> bit & 1) << (3 * bit));
-    let [x, y, z] = position.map(spread);
-    x | y << 1 | z << 2
+    morton(position.map(|x| (x >> bits.saturating_sub(20)) as u32))
 }

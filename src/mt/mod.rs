@@ -36,8 +36,9 @@ pub use half_edge::store::HalfEdgeMt;
 pub use half_edge::store::HalfEdgeUpdate;
 pub(crate) use margins::{Excess, Margins};
 pub use mesh::base::{BaseMesh, BaseMeshError, MAX_FIELD_BITS, MAX_UPDATES};
-pub use mesh::change_log::MeshChanges;
-pub use mesh::current::CurrentMesh;
+#[cfg(feature = "build")]
+pub(crate) use mesh::current::mix;
+pub use mesh::current::{CurrentMesh, MeshChanges};
 pub(crate) use mesh::paged_array::PagedArray;
 pub(crate) use mesh::tet::corner_of;
 pub use replay::ReplayError;

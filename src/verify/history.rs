@@ -22,10 +22,10 @@ const FULL: u32 = 3;
 const ERRORS: [f64; 5] = [0.01, 0.0, 0.003, 0.03, 0.001];
 
 /// Numbers that look random; the same on every run (Xorshift, Marsaglia 2003).
-struct Numbers(u64);
+pub struct Numbers(pub u64);
 
 impl Numbers {
-    fn next(&mut self) -> u64 {
+    pub fn next(&mut self) -> u64 {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 7;
         self.0 ^= self.0 << 17;

@@ -33,7 +33,6 @@ mod parts;
 mod points;
 mod queries;
 mod same;
-mod triangles;
 
 use crate::mesh::TetMesh;
 use crate::mt::ApplyUpdates;
@@ -50,6 +49,7 @@ use crate::refine::Request;
 use crate::refine::TetLook;
 use deviation::Deviation;
 use deviation::TetErrors;
+use history::Numbers;
 use mesh_checks::PlainMesh;
 use queries::Query;
 use std::sync::Arc;
@@ -210,7 +210,7 @@ fn verify<M: ApplyUpdates>(
         report.queries += 1;
     }
     check_monotone(queries, &excesses, report);
-    let walk = Walk { mt, base: &base, shape: &reference, steps: Steps(1) };
+    let walk = Walk { mt, base: &base, shape: &reference, numbers: Numbers(1) };
     let first = queries.len() as u32;
     walk.run(queries, &hashes, &mut |i| on_progress(first + i, steps), report)?;
     history::check(mt, &base, histories, &mut |i| on_progress(2 * first + i, steps), report)
@@ -288,20 +288,8 @@ struct Walk<'a, M> {
     mt: &'a M,
     base: &'a Front,
     shape: &'a mesh_checks::Shape,
-    steps: Steps,
-}
-
-/// Lengths of steps, from one update to all of them; the same on every run.
-struct Steps(u64);
-
-impl Steps {
-    fn next(&mut self) -> u64 {
-        // Xorshift (Marsaglia 2003).
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        1 << (self.0 % 16)
-    }
+    /// For the lengths of steps, from one update to many of them.
+    numbers: Numbers,
 }
 
 /// Steps that a request is answered in, at most.
@@ -339,7 +327,7 @@ impl<M: ApplyUpdates> Walk<'_, M> {
     fn answer(&mut self, front: &mut Front, query: &Query, report: &mut VerifyReport) -> Result<(), String> {
         front.aim(self.mt, Arc::new(query.criterion(self.mt.info())), query.request.budget);
         for step in 1..=MOST_STEPS {
-            let most = if step < MOST_STEPS { self.steps.next() } else { u64::MAX };
+            let most = if step < MOST_STEPS { 1 << (self.numbers.next() % 16) } else { u64::MAX };
             let outcome = front
                 .step(self.mt, &mut |done| done.refined + done.coarsened < most)
                 .map_err(|error| format!("{query}: the MT is damaged: {error}"))?;

@@ -9,10 +9,9 @@
 //! mesh depends on the set of applied updates alone, not on their order or on the platform.
 
 use super::base::{BaseMesh, BaseMeshError};
-use super::change_log::{Changes, MeshChanges};
 use super::paged_array::PagedArray;
 use super::tet::face_neighbors;
-use crate::mesh::{FACES, NONE};
+use crate::mesh::{BitSet, ChangedBlocks, FACES, NONE};
 use crate::mt::{MtInfo, VertexId};
 use std::any::Any;
 use std::fmt::Debug;
@@ -31,6 +30,15 @@ impl Clone for Box<dyn KindState> {
     fn clone(&self) -> Self {
         (**self).copy()
     }
+}
+
+/// What [`CurrentMesh::take_changes`] tells.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct MeshChanges {
+    /// Changed ranges of vertex slots.
+    pub vertices: Vec<Range<u32>>,
+    /// Changed ranges of tetrahedron slots.
+    pub tets: Vec<Range<u32>>,
 }
 
 /// The labels of the vertex in a slot.
@@ -82,13 +90,13 @@ pub struct CurrentMesh {
     pub(in crate::mt) epoch: u32,
     /// What the kind of the MT keeps with its meshes.
     kind_state: Option<Box<dyn KindState>>,
-    changed_vertices: Changes,
-    changed_tets: Changes,
+    changed_vertices: ChangedBlocks,
+    changed_tets: ChangedBlocks,
     /// The tetrahedra of the stars that updates changed since the list was last cleared, and where others were moved;
     /// free slots among them.
     pub(in crate::mt) touched: Vec<u32>,
     /// Updates that have been applied before and so need not be checked again: their stars are always the same.
-    proven: Vec<u64>,
+    proven: BitSet,
     /// Base vertices whose star is not connected through faces: they cannot be split.
     pinched: Vec<u32>,
 }
@@ -133,10 +141,10 @@ impl CurrentMesh {
             vertex_marks: vec![0; vertices],
             epoch: 0,
             kind_state: None,
-            changed_vertices: Changes::all(vertices),
-            changed_tets: Changes::all(base.tets.len()),
+            changed_vertices: ChangedBlocks::all(vertices),
+            changed_tets: ChangedBlocks::all(base.tets.len()),
             touched: Vec::new(),
-            proven: Vec::new(),
+            proven: BitSet::default(),
             pinched: Vec::new(),
         };
         mesh.find_pinched();
@@ -174,25 +182,18 @@ impl CurrentMesh {
     /// Whether update `u` has been applied before.
     #[inline]
     pub(crate) fn is_proven(&self, u: u32) -> bool {
-        self.proven.get(u as usize / 64).is_some_and(|w| w >> (u % 64) & 1 == 1)
+        self.proven.has(u)
     }
 
     #[inline]
     pub(crate) fn set_proven(&mut self, u: u32) {
-        let word = u as usize / 64;
-        if word >= self.proven.len() {
-            self.proven.resize(word + 1, 0);
-        }
-        self.proven[word] |= 1 << (u % 64);
+        self.proven.insert(u);
     }
 
     /// Updates from this one on are to be checked again: what was not known of when they were applied may have to come
     /// before them.
     pub(crate) fn forget_proven(&mut self, from: u32) {
-        self.proven.truncate((from as usize).div_ceil(64));
-        if let Some(word) = self.proven.get_mut(from as usize / 64) {
-            *word &= (1 << (from % 64)) - 1;
-        }
+        self.proven.truncate(from);
     }
 
     /// Forgets memory of vertices that are not in the mesh.
@@ -227,7 +228,7 @@ impl CurrentMesh {
             + size_of_val(&self.touched[..]);
         let of_the_mt = self.slot_of.bytes()
             + self.place_of.bytes()
-            + size_of_val(&self.proven[..])
+            + size_of_val(self.proven.words())
             + size_of_val(&self.pinched[..]);
         let changes = self.changed_vertices.bytes() + self.changed_tets.bytes();
         let of_the_kind = self.kind_state.as_ref().map_or(0, |state| state.bytes());
@@ -611,7 +612,7 @@ impl CurrentMesh {
 
 /// A finaliser that spreads every input bit over the word (the constants are those of SplitMix64).
 #[inline]
-fn mix(x: u64) -> u64 {
+pub(crate) fn mix(x: u64) -> u64 {
     let x = x.wrapping_add(0x9E37_79B9_7F4A_7C15);
     let x = (x ^ x >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     let x = (x ^ x >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);

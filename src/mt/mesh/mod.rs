@@ -1,7 +1,6 @@
 //! The current mesh and what it is made of. Knows no kind of MT.
 
 pub(super) mod base;
-pub(super) mod change_log;
 pub(super) mod current;
 pub(super) mod paged_array;
 pub(super) mod stars;

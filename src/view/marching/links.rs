@@ -67,9 +67,8 @@ impl Links {
     /// The triangles of a tetrahedron.
     pub fn triangles(&self, t: u32) -> impl Iterator<Item = u32> {
         let some = |triangle: u32| (triangle != NONE).then_some(triangle);
-        std::iter::successors(some(self.heads[t as usize]), move |triangle| {
-            some(self.next[*triangle as usize])
-        })
+        let head = self.heads.get(t as usize).copied().and_then(some);
+        std::iter::successors(head, move |triangle| some(self.next[*triangle as usize]))
     }
 
     /// Empties the list of triangles of a tetrahedron.

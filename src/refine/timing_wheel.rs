@@ -20,14 +20,14 @@ const FINE: i32 = 3;
 const SLOTS: usize = 4 << FINE;
 /// Slots of a dial.
 const DIAL: usize = WHEELS as usize * SLOTS;
-/// To be judged: in [`Waiting::open`].
+/// To be judged: in [`TimingWheels::open`].
 const OPEN: u16 = u16::MAX - 1;
 /// Not waiting for anything.
 const NOWHERE: u16 = u16::MAX;
 
 /// Things, known by number, that wait to be judged again.
 #[derive(Clone, Debug)]
-pub(super) struct Waiting {
+pub(super) struct TimingWheels {
     /// The slot of each thing, or [`OPEN`] or [`NOWHERE`].
     place: PagedArray<u16>,
     /// What waits in each slot of each wheel, with entries that have moved on since.
@@ -38,13 +38,13 @@ pub(super) struct Waiting {
     now: [f64; DIALS],
 }
 
-impl Default for Waiting {
+impl Default for TimingWheels {
     fn default() -> Self {
         Self { place: PagedArray::new(NOWHERE), slots: Vec::new(), open: Vec::new(), now: [0.0; DIALS] }
     }
 }
 
-impl Waiting {
+impl TimingWheels {
     /// Has thing `id` judged.
     #[inline]
     pub fn open(&mut self, id: u32) {
@@ -177,7 +177,7 @@ mod tests {
     #[test]
     fn nothing_is_looked_at_too_late_and_little_too_often() {
         let slacks: Vec<f64> = (0..2000).map(|i| f64::from(i * i) * 1e-6).collect();
-        let mut waiting = Waiting::default();
+        let mut waiting = TimingWheels::default();
         let mut since = vec![0.0; slacks.len()];
         let mut looks = vec![0; slacks.len()];
         slacks.iter().enumerate().for_each(|(id, &slack)| waiting.defer(id as u32, slack, 2));
@@ -206,7 +206,7 @@ mod tests {
 
     #[test]
     fn what_can_never_change_is_never_looked_at() {
-        let mut waiting = Waiting::default();
+        let mut waiting = TimingWheels::default();
         waiting.defer(3, f64::INFINITY, 0);
         waiting.defer(5, f64::NAN, 0);
         waiting.advance(1e-9, 1);

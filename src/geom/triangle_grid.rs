@@ -1,23 +1,21 @@
-//! Triangles of a boundary, found by place.
+//! Triangles, found by place.
 
-use crate::geom::nearest_on_triangle;
+use super::{Groups, nearest_on_triangle};
 use glam::DVec3;
 
 /// Triangles sorted into the cells of a regular grid.
-pub struct Triangles {
+pub(crate) struct TriangleGrid {
     pub corners: Vec<[DVec3; 3]>,
     low: DVec3,
     side: f64,
     cells: [usize; 3],
-    /// Where the triangles of each cell start in `items`.
-    starts: Vec<u32>,
-    items: Vec<u32>,
+    in_cell: Groups,
 }
 
 /// Most cells along an axis.
 const MAX_CELLS: f64 = 128.0;
 
-impl Triangles {
+impl TriangleGrid {
     pub fn new(corners: Vec<[DVec3; 3]>) -> Self {
         let mut low = DVec3::INFINITY;
         let mut high = DVec3::NEG_INFINITY;
@@ -27,21 +25,13 @@ impl Triangles {
         let wanted = (corners.len() as f64 / 6.0).sqrt().clamp(1.0, MAX_CELLS);
         let side = (extent.max_element() / wanted).max(f64::MIN_POSITIVE);
         let cells = extent.to_array().map(|e| (e / side).clamp(0.0, MAX_CELLS) as usize + 1);
-        let mut grid = Self { corners, low, side, cells, starts: Vec::new(), items: Vec::new() };
-        grid.sort();
+        let mut grid = Self { corners, low, side, cells, in_cell: Groups::default() };
+        grid.in_cell = Groups::new(cells.iter().product(), |add| {
+            for (i, [a, b, c]) in (0..).zip(&grid.corners) {
+                grid.cells_between(a.min(*b).min(*c), a.max(*b).max(*c), |cell| add(cell, i));
+            }
+        });
         grid
-    }
-
-    fn sort(&mut self) {
-        let mut places: Vec<(u32, u32)> = Vec::new();
-        for (i, [a, b, c]) in (0..).zip(&self.corners) {
-            self.cells_between(a.min(*b).min(*c), a.max(*b).max(*c), |cell| places.push((cell as u32, i)));
-        }
-        places.sort_unstable();
-        self.starts = vec![0; self.cells.iter().product::<usize>() + 1];
-        places.iter().for_each(|&(cell, _)| self.starts[cell as usize + 1] += 1);
-        (1..self.starts.len()).for_each(|i| self.starts[i] += self.starts[i - 1]);
-        self.items = places.into_iter().map(|(_, i)| i).collect();
     }
 
     fn cells_between(&self, low: DVec3, high: DVec3, mut visit: impl FnMut(usize)) {
@@ -64,7 +54,7 @@ impl Triangles {
         }
         let reach = DVec3::splat(radius);
         self.cells_between(p - reach, p + reach, |cell| {
-            for &i in &self.items[self.starts[cell] as usize..self.starts[cell + 1] as usize] {
+            for &i in self.in_cell.of(cell) {
                 let q = nearest_on_triangle(p, self.corners[i as usize]);
                 let distance = p.distance(q);
                 if distance <= radius {
@@ -74,15 +64,23 @@ impl Triangles {
         });
     }
 
-    /// The distance of `p` from the nearest triangle; infinite if there is none.
-    pub fn distance(&self, p: DVec3) -> f64 {
+    /// The nearest of the triangles, of several the first, and its point nearest to `p`; none if there are no triangles.
+    pub fn nearest(&self, p: DVec3) -> Option<(u32, DVec3)> {
+        if self.corners.is_empty() {
+            return None;
+        }
         let whole = self.side * (self.cells.iter().sum::<usize>() as f64 + 1.0) + p.distance(self.low);
         let mut radius = self.side / 4.0;
         loop {
-            let mut nearest = f64::INFINITY;
-            self.within(p, radius, |_, _, distance| nearest = nearest.min(distance));
-            if nearest.is_finite() || radius > whole {
-                return nearest;
+            let mut nearest: Option<(f64, u32, DVec3)> = None;
+            self.within(p, radius, |i, q, _| {
+                let square = p.distance_squared(q);
+                if nearest.is_none_or(|(least, first, _)| square < least || square == least && i < first) {
+                    nearest = Some((square, i, q));
+                }
+            });
+            if nearest.is_some() || radius > whole {
+                return nearest.map(|(_, i, q)| (i, q));
             }
             radius *= 2.0;
         }

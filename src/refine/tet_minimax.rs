@@ -53,7 +53,7 @@ impl Rows {
         (if high <= threshold { high } else { self.solve(low, high) }, None)
     }
 
-    /// The value of the matrix game in which one player names a function and the other a point of the tetrahedron, by the
+    /// The value of the zero-sum game in which one player names a function and the other a point of the tetrahedron, by the
     /// simplex method (Dantzig 1951). The result is what the greatest function is at a point that was found, so never
     /// too small.
     #[inline(never)]

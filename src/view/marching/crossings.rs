@@ -1,13 +1,14 @@
 //! The vertices of a surface: which edge of the mesh each one lies on, and which vertex an edge has.
 
+use super::polygon::Ends;
 use crate::mesh::NONE;
 
 /// Where the surface crosses an edge: its ends, or twice the same point if the surface goes through that point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Crossing {
+pub(in crate::view) struct Crossing {
     /// The end that is inside, and the other one.
-    pub ends: [u32; 2],
-    /// Which of the isovalues is met.
+    pub ends: Ends,
+    /// Which of several surfaces this is on.
     pub which: u32,
 }
 
@@ -15,7 +16,7 @@ pub(super) struct Crossing {
 ///
 /// The table is an open one with linear probing, at most half full. Nothing ever goes through it in its order.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Crossings {
+pub(in crate::view) struct Crossings {
     /// One per vertex of the surface.
     pub list: Vec<Crossing>,
     /// Vertices, `NONE` in a free place; as many places as a power of two, or none.
@@ -28,22 +29,35 @@ pub(super) struct Crossings {
 const SMALLEST: usize = 64;
 
 impl Crossing {
-    /// How far the crossing is from the inside end to the outside end, 0 to 1.
-    pub fn fraction(&self, field: &[f32], value: f32) -> f64 {
+    /// How far the crossing is from the inside end to the outside end, 0 to 1, where the function that is cut is `at` its ends
+    /// and `value` in the surface.
+    #[inline]
+    pub fn fraction(&self, value: f64, at: impl Fn(u32) -> f64) -> f64 {
         if self.ends[0] == self.ends[1] {
             return 0.0;
         }
-        let [low, high] = self.ends.map(|end| f64::from(field[end as usize]));
-        let t = (f64::from(value) - low) / (high - low);
+        let [low, high] = self.ends.map(at);
+        let t = (value - low) / (high - low);
         // Only infinite values make it NaN.
         if t.is_nan() { 0.0 } else { t.clamp(0.0, 1.0) }
     }
 
-    /// The place of the crossing: where the linear field along the edge has the value.
+    /// The place of the crossing, the fraction `t` along its edge.
+    #[inline]
     pub fn place(&self, positions: &[[f32; 3]], t: f64) -> [f32; 3] {
-        let [p, q] = self.ends.map(|end| positions[end as usize].map(f64::from));
-        [0, 1, 2].map(|i| (p[i] + t * (q[i] - p[i])) as f32)
+        let [p, q] = self.ends.map(|end| positions[end as usize]);
+        [0, 1, 2].map(|i| between(p[i], q[i], t))
     }
+
+    /// The value there of a field with one number a point.
+    pub fn value(&self, field: &[f32], t: f64) -> f32 {
+        let [a, b] = self.ends.map(|end| field[end as usize]);
+        between(a, b, t)
+    }
+}
+
+fn between(a: f32, b: f32, t: f64) -> f32 {
+    (f64::from(a) + t * (f64::from(b) - f64::from(a))) as f32
 }
 
 impl Crossings {
@@ -72,7 +86,7 @@ impl Crossings {
 
     /// The vertex of this crossing: an earlier one, or a new one at the end.
     #[inline]
-    pub fn vertex(&mut self, ends: [u32; 2], which: u32) -> u32 {
+    pub fn vertex(&mut self, ends: Ends, which: u32) -> u32 {
         let crossing = Crossing { ends, which };
         let mask = self.table.len().wrapping_sub(1);
         let mut at = self.start(crossing);

@@ -1,40 +1,35 @@
-//! Which entries of an array have changed, by blocks, so that copies elsewhere can be kept up to date at the cost of the
-//! change.
+//! Which entries of an array have changed since somebody last asked.
 
 use std::ops::Range;
 
-/// What [`CurrentMesh::take_changes`](crate::mt::CurrentMesh::take_changes) tells.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct MeshChanges {
-    /// Changed ranges of vertex slots.
-    pub vertices: Vec<Range<u32>>,
-    /// Changed ranges of tetrahedron slots.
-    pub tets: Vec<Range<u32>>,
-}
-
 /// Changed entries of an array, by blocks.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Changes {
-    blocks: Vec<u64>,
+pub(crate) struct ChangedBlocks {
+    words: Vec<u64>,
 }
 
-/// log2 of the entries in a block: 1 KiB of tetrahedra.
+/// log2 of [`BLOCK`]: 1 KiB of tetrahedra.
 const BLOCK_BITS: u32 = 6;
+/// Entries of a block.
+pub(crate) const BLOCK: usize = 1 << BLOCK_BITS;
 
-impl Changes {
+impl ChangedBlocks {
+    /// All entries of an array of this length, and no others.
     pub fn all(len: usize) -> Self {
-        let mut changes = Self::default();
-        (0..len.next_multiple_of(1 << BLOCK_BITS))
-            .step_by(1 << BLOCK_BITS)
-            .for_each(|i| changes.mark(i as u32));
-        changes
+        let mut changed = Self::default();
+        (0..len).step_by(BLOCK).for_each(|entry| changed.mark(entry as u32));
+        changed
+    }
+
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.words[..])
     }
 
     #[inline]
     pub fn mark(&mut self, entry: u32) {
         let block = entry >> BLOCK_BITS;
         let (word, bit) = ((block / 64) as usize, 1 << (block % 64));
-        match self.blocks.get_mut(word) {
+        match self.words.get_mut(word) {
             Some(word) => *word |= bit,
             None => self.grow(word, bit),
         }
@@ -42,21 +37,19 @@ impl Changes {
 
     #[cold]
     fn grow(&mut self, word: usize, bit: u64) {
-        self.blocks.resize(word + 1, 0);
-        self.blocks[word] = bit;
+        self.words.resize(word + 1, 0);
+        self.words[word] = bit;
     }
 
-    pub fn bytes(&self) -> usize {
-        size_of_val(&self.blocks[..])
-    }
-
+    /// The array has become shorter.
     pub fn truncate(&mut self, len: usize) {
-        self.blocks.truncate(len.div_ceil(64 << BLOCK_BITS));
+        self.words.truncate(len.div_ceil(64 * BLOCK));
     }
 
+    /// The ranges of blocks that have changed, as far as there are `len` entries, and forgets them.
     pub fn take(&mut self, len: usize) -> Vec<Range<u32>> {
         let mut ranges: Vec<Range<u32>> = Vec::new();
-        for (i, word) in self.blocks.iter_mut().enumerate() {
+        for (i, word) in self.words.iter_mut().enumerate() {
             let mut bits = std::mem::take(word);
             while bits != 0 {
                 let block = i as u32 * 64 + bits.trailing_zeros();

@@ -1,25 +1,24 @@
-//! What a surface knows of the mesh it was extracted from, so that it can follow the changes.
+//! What a surface keeps of the mesh that it was cut out of, so that it can follow the changes.
 //!
 //! A mesh tells its changes by blocks. A copy of points and tetrahedra tells which entries of these blocks really
 //! changed. Stars are walked through faces; the number of tetrahedra at each point tells when the domain is
 //! pinched there, so that a walk does not reach them all.
 
-use super::cut::BLOCK;
-use crate::mesh::NONE;
-use crate::view::MeshView;
+use super::MeshView;
+use crate::mesh::{BitSet, NONE};
 use std::ops::Range;
 
-/// Per 64 tetrahedra the smallest and the largest value; per tetrahedron and per point a copy; per point a
-/// tetrahedron and how many there are. 16.3 bytes a tetrahedron and 24 bytes a point.
+/// A copy of every tetrahedron and every point; per point a tetrahedron and how many there are. 16 bytes a tetrahedron and 24
+/// bytes a point.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Known {
+pub(super) struct MeshSnapshot {
     tets: Vec<[u32; 4]>,
     /// Position and value, as bits.
     points: Vec<[u32; 4]>,
     stars: Vec<Star>,
-    ranges: Vec<[f32; 2]>,
-    /// Of tetrahedra; empty between two calls.
-    seen: Bits,
+    /// Scratch: tetrahedra of a star, and dirty ones; empty between two calls.
+    seen: BitSet,
+    in_dirty: BitSet,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -33,75 +32,45 @@ struct Star {
 const MANY: usize = 32;
 
 /// What has really changed.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub(super) struct Dirty {
-    /// Tetrahedra that have other points, or a point with another position or value, ascending.
+    /// Tetrahedra that have other points, or a point with another position or value; each once.
     pub tets: Vec<u32>,
-    /// Points of these tetrahedra, and of those that were there before; some may be gone.
-    pub points: Vec<u32>,
+    /// Points that have changed or lost a tetrahedron; some may be gone, and some come several times.
+    points: Vec<u32>,
 }
 
-/// A set of small numbers.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Bits(Vec<u64>);
-
-impl Bits {
-    /// Puts `i` in; false if it was there.
-    #[inline]
-    pub fn insert(&mut self, i: u32) -> bool {
-        let word = i as usize / 64;
-        if word >= self.0.len() {
-            self.0.resize(word + 1, 0);
-        }
-        let (word, bit) = (&mut self.0[word], 1 << (i % 64));
-        let new = *word & bit == 0;
-        *word |= bit;
-        new
-    }
-
-    #[inline]
-    pub fn has(&self, i: u32) -> bool {
-        self.0.get(i as usize / 64).is_some_and(|word| word >> (i % 64) & 1 == 1)
-    }
-
-    /// Takes out all of `list`, which must hold at least what is in.
-    pub fn clear(&mut self, list: &[u32]) {
-        list.iter().for_each(|i| self.0[*i as usize / 64] = 0);
+impl Dirty {
+    /// Points of the tetrahedra, and of those that were there before, each once; some may be gone.
+    pub fn points(&self, mesh: &MeshView<'_>) -> Vec<u32> {
+        let mut seen = BitSet::default();
+        let now = self.tets.iter().flat_map(|t| mesh.tets[*t as usize]);
+        self.points.iter().copied().chain(now).filter(|point| *point != NONE && seen.insert(*point)).collect()
     }
 }
 
-impl Known {
+impl MeshSnapshot {
     pub fn new(mesh: &MeshView<'_>) -> Self {
-        let mut known = Self {
+        let mut snapshot = Self {
             tets: mesh.tets.to_vec(),
             points: (0..mesh.positions.len()).map(|p| bits(mesh, p)).collect(),
             stars: vec![Star { tet: NONE, count: 0 }; mesh.positions.len()],
-            ranges: mesh.tets.chunks(BLOCK).map(|block| range(block, mesh.field)).collect(),
-            seen: Bits::default(),
+            seen: BitSet::default(),
+            in_dirty: BitSet::default(),
         };
         for (t, tet) in (0..).zip(mesh.tets) {
-            known.add(t, *tet);
+            snapshot.add(t, *tet);
         }
-        known
+        snapshot
     }
 
     fn add(&mut self, t: u32, tet: [u32; 4]) {
-        for point in tet {
+        // A free slot has no points.
+        for point in tet.into_iter().filter(|point| *point != NONE) {
             let star = &mut self.stars[point as usize];
             star.tet = t;
             star.count += 1;
         }
-    }
-
-    /// The blocks in which a tetrahedron can have points on both sides of `value`.
-    pub fn blocks_at(&self, value: f32) -> impl Iterator<Item = usize> {
-        let spans = move |range: &[f32; 2]| range[0] < value && range[1] >= value;
-        self.ranges.iter().enumerate().filter(move |(_, range)| spans(range)).map(|(block, _)| block)
-    }
-
-    /// Whether so many blocks are passed by `value` that looking for them is not worth while.
-    pub fn is_passed_widely(&self, value: f32) -> bool {
-        2 * self.blocks_at(value).count() > self.ranges.len()
     }
 
     /// Follows the mesh, of which only entries in these ranges and at the ends of the arrays may have changed.
@@ -117,13 +86,6 @@ impl Known {
         self.compare_tets(mesh, changed_tets, &mut dirty);
         self.compare_points(mesh, changed_vertices, &mut dirty);
         self.stars.truncate(points);
-        dirty.tets.sort_unstable();
-        for t in &dirty.tets {
-            dirty.points.extend(mesh.tets[*t as usize]);
-        }
-        let mut seen = Bits::default();
-        dirty.points.retain(|point| seen.insert(*point));
-        self.find_ranges(mesh, &dirty.tets);
         dirty
     }
 
@@ -170,16 +132,15 @@ impl Known {
         }
         // Then one pass costs less than all the walks.
         let many = moved.len() > new / MANY;
-        let mut in_dirty = Bits::default();
         for t in &dirty.tets {
-            in_dirty.insert(*t);
+            self.in_dirty.insert(*t);
         }
         let mut star = Vec::new();
-        let mut lost = Bits::default();
+        let mut lost = BitSet::default();
         let mut any_lost = false;
         for p in &moved {
             if !many && self.star(mesh, *p, &mut star) {
-                dirty.tets.extend(star.iter().filter(|t| in_dirty.insert(**t)));
+                dirty.tets.extend(star.iter().filter(|t| self.in_dirty.insert(**t)));
             } else {
                 any_lost = true;
                 lost.insert(*p);
@@ -187,28 +148,13 @@ impl Known {
         }
         if any_lost {
             for (t, tet) in (0..).zip(mesh.tets) {
-                if tet.iter().any(|p| lost.has(*p)) && in_dirty.insert(t) {
+                if tet.iter().any(|p| lost.has(*p)) && self.in_dirty.insert(t) {
                     dirty.tets.push(t);
                 }
             }
         }
+        self.in_dirty.clear_listed(&dirty.tets);
         dirty.points.extend(moved);
-    }
-
-    /// Finds the values of the blocks of these tetrahedra, which are in ascending order.
-    fn find_ranges(&mut self, mesh: &MeshView<'_>, tets: &[u32]) {
-        self.ranges.resize(mesh.tets.len().div_ceil(BLOCK), [0.0; 2]);
-        let mut last = usize::MAX;
-        let short = mesh.tets.len() / BLOCK;
-        for block in
-            tets.iter().map(|t| *t as usize / BLOCK).chain((short < self.ranges.len()).then_some(short))
-        {
-            if block != last {
-                last = block;
-                let end = mesh.tets.len().min((block + 1) * BLOCK);
-                self.ranges[block] = range(&mesh.tets[block * BLOCK..end], mesh.field);
-            }
-        }
     }
 
     /// Finds the tetrahedra around a point; false if they do not hang together through faces, so that some are
@@ -232,13 +178,13 @@ impl Known {
                 }
             }
         }
-        self.seen.clear(found);
+        self.seen.clear_listed(found);
         found.len() == count as usize
     }
 }
 
 /// The entries in ranges, and those that are new at the end.
-fn entries(ranges: &[Range<u32>], old: usize, new: usize) -> impl Iterator<Item = u32> {
+pub(super) fn entries(ranges: &[Range<u32>], old: usize, new: usize) -> impl Iterator<Item = u32> {
     let common = old.min(new) as u32;
     let ranges = ranges.iter().flat_map(move |range| range.start.min(common)..range.end.min(common));
     ranges.chain(common..new as u32)
@@ -247,18 +193,4 @@ fn entries(ranges: &[Range<u32>], old: usize, new: usize) -> impl Iterator<Item 
 fn bits(mesh: &MeshView<'_>, point: usize) -> [u32; 4] {
     let [x, y, z] = mesh.positions[point].map(f32::to_bits);
     [x, y, z, mesh.field[point].to_bits()]
-}
-
-/// The smallest and the largest value at the points of some tetrahedra. What is not a number is not smaller than
-/// any isovalue, as if it were large.
-fn range(tets: &[[u32; 4]], field: &[f32]) -> [f32; 2] {
-    let mut range = [f32::INFINITY, f32::NEG_INFINITY];
-    for point in tets.iter().flatten() {
-        let value = field[*point as usize];
-        let [low, high] = &mut range;
-        *low = if value < *low { value } else { *low };
-        let value = if value.is_nan() { f32::INFINITY } else { value };
-        *high = if value > *high { value } else { *high };
-    }
-    range
 }
