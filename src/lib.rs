@@ -16,7 +16,7 @@
 //! use tetralod::session::Session;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! // A mesh: here made by formula; `tetralod::io::read` takes one from a file. Files are rarely flawless.
+//! // A mesh: generated here; `tetralod::io::read` reads one from a file. Meshes in files often need repair.
 //! let mesh = tetralod::generate::bucky(17)?;
 //! let (mesh, repaired) = tetralod::mesh::repair(mesh)?;
 //! assert!(repaired.is_empty());
@@ -25,7 +25,7 @@
 //! let built = build(&mesh, &BuildConfig::default(), &mut |_| ControlFlow::Continue(()))?;
 //! let bytes = encode(&built.mt, &EncodeOptions::default())?;
 //!
-//! // Wherever it is wanted: bytes go in, in pieces of any size, and the first meshes come out before the last byte.
+//! // Where it is used: bytes go in, in pieces of any size, and meshes come out before the last byte has arrived.
 //! let mut session = Session::new();
 //! let (first, rest) = bytes.split_at(bytes.len() / 2);
 //! session.feed(first)?;
@@ -50,7 +50,7 @@
 //! # Features
 //!
 //! The core (decoder, refinement, isosurfaces on the CPU) is always there and needs no I/O, no GPU and no JavaScript:
-//! `default-features = false` is enough for a program that shows MT files. The features open its edges:
+//! `default-features = false` is enough for a program that shows MT files. Features add the rest:
 //!
 //! | feature | adds | for |
 //! |---|---|---|
