@@ -11,6 +11,7 @@ use tetralod::io;
 use tetralod::mt::Mt;
 use tetralod::mt::MtInfo;
 use tetralod::mt::MultiTessellation;
+use tetralod::mt::UpdatePages;
 use tetralod::refine::Front;
 use tetralod::refine::LodCriterion;
 use tetralod::refine::Need;

@@ -15,7 +15,6 @@ use tetralod::mesh::TetMesh;
 use tetralod::mesh::repair;
 use tetralod::mt::ApplyUpdates;
 use tetralod::mt::MtKind;
-use tetralod::mt::MultiTessellation;
 use tetralod::verify;
 use tetralod::verify::Reference;
 

@@ -10,12 +10,14 @@ use tetralod::format::EncodeOptions;
 use tetralod::format::FormatError;
 use tetralod::format::encode;
 use tetralod::mt::Applied;
+use tetralod::mt::ApplyUpdates;
 use tetralod::mt::CurrentMesh;
 use tetralod::mt::Mt;
 use tetralod::mt::MtKind;
 use tetralod::mt::MultiTessellation;
 use tetralod::mt::PageError;
 use tetralod::mt::UpdateId;
+use tetralod::mt::UpdatePages;
 
 /// A decoder of blocks: it has what comes before the first one.
 fn opened(bytes: &[u8], fields: &[&str]) -> Decoder {

@@ -16,6 +16,7 @@ use tetralod::format::encode;
 use tetralod::mt::BaseMeshError;
 use tetralod::mt::Mt;
 use tetralod::mt::MultiTessellation;
+use tetralod::mt::UpdatePages;
 
 #[test]
 fn every_flipped_bit_is_detected_and_what_came_before_is_intact() {

@@ -23,6 +23,7 @@ use tetralod::mesh::Field;
 use tetralod::mesh::TetMesh;
 use tetralod::mesh::VectorPart;
 use tetralod::mt::Applied;
+use tetralod::mt::ApplyUpdates;
 use tetralod::mt::BaseMesh;
 use tetralod::mt::CurrentMesh;
 use tetralod::mt::EdgeMt;
@@ -31,8 +32,8 @@ use tetralod::mt::FieldInfo;
 use tetralod::mt::Mt;
 use tetralod::mt::MtInfo;
 use tetralod::mt::MtKind;
-use tetralod::mt::MultiTessellation;
 use tetralod::mt::UpdateId;
+use tetralod::mt::UpdatePages;
 use tetralod::mt::VertexId;
 use tetralod::mt::VertexSplit;
 

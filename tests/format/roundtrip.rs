@@ -17,6 +17,7 @@ use tetralod::format::encode;
 use tetralod::format::encode_to;
 use tetralod::generate;
 use tetralod::geom::WIDE_BITS;
+use tetralod::mt::ApplyUpdates;
 use tetralod::mt::EdgeMt;
 use tetralod::mt::ExplicitMt;
 use tetralod::mt::Mt;
@@ -25,6 +26,7 @@ use tetralod::mt::MtKind;
 use tetralod::mt::MultiTessellation;
 use tetralod::mt::UpdateError;
 use tetralod::mt::UpdateId;
+use tetralod::mt::UpdatePages;
 use tetralod::mt::VertexSplit;
 
 /// The file of an MT gives an MT of the same updates, and that the same file.

@@ -5,7 +5,7 @@ use tetralod::format::Decoder;
 use tetralod::format::FormatError;
 use tetralod::format::Progress;
 use tetralod::mt::Mt;
-use tetralod::mt::MultiTessellation;
+use tetralod::mt::UpdatePages;
 
 /// What must hold when the first bytes of a file have arrived.
 fn check_prefix(decoder: &Decoder, progress: Progress, length: usize) {

@@ -11,9 +11,11 @@ use crate::support::strategies::{config, plan};
 use proptest::prelude::*;
 use std::ops::Range;
 use tetralod::mt::Applied;
+use tetralod::mt::ApplyUpdates;
 use tetralod::mt::Mt;
 use tetralod::mt::MultiTessellation;
 use tetralod::mt::UpdateId;
+use tetralod::mt::UpdatePages;
 
 /// Few updates between the copies, many blocks of entries: nothing is told by accident.
 fn changes_tell_everything(mt: &Mt, random: &mut Random) {

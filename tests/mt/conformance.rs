@@ -21,6 +21,7 @@ use tetralod::mt::Mt;
 use tetralod::mt::MtKind;
 use tetralod::mt::MultiTessellation;
 use tetralod::mt::UpdateId;
+use tetralod::mt::UpdatePages;
 use tetralod::mt::stats;
 use tetralod::refine::Budget;
 use tetralod::refine::Front;

@@ -8,6 +8,7 @@ use crate::support::random::Random;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use tetralod::geom::Bounds;
+use tetralod::mt::ApplyUpdates;
 use tetralod::mt::ForestChild;
 use tetralod::mt::HalfEdgeMt;
 use tetralod::mt::HalfEdgeUpdate;

@@ -5,6 +5,7 @@ use crate::support::compare::{live_tets, snapshot};
 use crate::support::domains::{Domain, volume6};
 use tetralod::geom::Lattice;
 use tetralod::mt::Applied;
+use tetralod::mt::ApplyUpdates;
 use tetralod::mt::BaseMesh;
 use tetralod::mt::CurrentMesh;
 use tetralod::mt::EdgeMt;
@@ -12,9 +13,9 @@ use tetralod::mt::ErrorCode;
 use tetralod::mt::FieldInfo;
 use tetralod::mt::MtInfo;
 use tetralod::mt::MtKind;
-use tetralod::mt::MultiTessellation;
 use tetralod::mt::UpdateError;
 use tetralod::mt::UpdateId;
+use tetralod::mt::UpdatePages;
 use tetralod::mt::VertexId;
 use tetralod::mt::VertexSplit;
 

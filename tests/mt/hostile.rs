@@ -7,15 +7,16 @@ use crate::support::random::Random;
 use crate::support::strategies::config;
 use proptest::prelude::*;
 use tetralod::mt::Applied;
+use tetralod::mt::ApplyUpdates;
 use tetralod::mt::BaseMesh;
 use tetralod::mt::BaseMeshError;
 use tetralod::mt::CurrentMesh;
 use tetralod::mt::EdgeMt;
 use tetralod::mt::ExplicitMt;
 use tetralod::mt::MtFault;
-use tetralod::mt::MultiTessellation;
 use tetralod::mt::UpdateError;
 use tetralod::mt::UpdateId;
+use tetralod::mt::UpdatePages;
 use tetralod::mt::stats;
 
 /// Forces updates in and out as a refinement engine does, and checks what must hold after every call.

@@ -41,7 +41,7 @@ const EDGES: [(&str, &[&str]); 7] = [
     ("wasm_bindgen", &["web"]),
     ("js_sys", &["web"]),
     ("web_sys", &["web"]),
-    ("std::fs", &["bin", "io", "stream"]),
+    ("std::fs", &["io", "stream"]),
     ("ureq", &["stream"]),
 ];
 
@@ -105,9 +105,7 @@ fn violations(module: &str, code: &str) -> Vec<String> {
 fn modules_import_only_what_is_below_them() {
     let sources = sources();
     let mut wrong = Vec::new();
-    for Source { module, path, code } in
-        sources.iter().filter(|s| !matches!(s.module.as_str(), "lib" | "bin"))
-    {
+    for Source { module, path, code } in sources.iter().filter(|s| s.module != "lib") {
         wrong.extend(violations(module, code).into_iter().map(|what| format!("{}: {what}", path.display())));
     }
     assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
@@ -116,15 +114,6 @@ fn modules_import_only_what_is_below_them() {
             sources.iter().any(|s| s.module == module),
             "`{module}` has no sources: has it been renamed?"
         );
-    }
-}
-
-#[test]
-fn the_command_knows_neither_renderer_nor_javascript() {
-    for Source { path, code, .. } in sources().iter().filter(|s| s.module == "bin") {
-        for name in ["tetralod::gpu", "tetralod::web"] {
-            assert!(!code.contains(name), "{}: {name}", path.display());
-        }
     }
 }
 

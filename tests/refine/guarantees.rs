@@ -15,6 +15,7 @@ use tetralod::geom::Bounds;
 use tetralod::io;
 use tetralod::mesh::TetMesh;
 use tetralod::mesh::repair;
+use tetralod::mt::ApplyUpdates;
 use tetralod::mt::ExplicitMt;
 use tetralod::mt::Mt;
 use tetralod::mt::MultiTessellation;

@@ -6,6 +6,7 @@ use crate::subjects::{SUBJECTS, Subject, applied};
 use crate::support::random::Random;
 use std::collections::BTreeSet;
 use tetralod::geom::Bounds;
+use tetralod::mt::ApplyUpdates;
 use tetralod::mt::EdgeMt;
 use tetralod::mt::ErrorCode;
 use tetralod::mt::MultiTessellation;

@@ -2,6 +2,7 @@
 
 mod bench;
 mod changes;
+mod client;
 mod hostile;
 mod kinds;
 mod parts;

@@ -9,12 +9,14 @@ use tetralod::builder::Method;
 use tetralod::builder::build;
 use tetralod::mesh::TetMesh;
 use tetralod::mt::Applied;
+use tetralod::mt::ApplyUpdates;
 use tetralod::mt::CurrentMesh;
 use tetralod::mt::MeshChanges;
 use tetralod::mt::Mt;
 use tetralod::mt::MtKind;
 use tetralod::mt::MultiTessellation;
 use tetralod::mt::UpdateId;
+use tetralod::mt::UpdatePages;
 use tetralod::view::MeshView;
 
 /// The blocks of 64 entries in which two states of an array differ, as ranges of the new one.

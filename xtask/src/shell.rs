@@ -80,7 +80,7 @@ pub fn tested_command() -> Result<PathBuf> {
 
 /// The native command as users get it.
 pub fn released_command() -> Result<PathBuf> {
-    run(&mut cargo(["build", "--release", "--package", "tetralod", "--bin", "tetralod"]))?;
+    run(&mut cargo(["build", "--release", "--package", "tetralod-cli"]))?;
     Ok(built_in("release"))
 }
 

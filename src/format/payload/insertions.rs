@@ -861,7 +861,7 @@ pub(super) mod tests {
     use crate::mt::ExplicitMt;
     use crate::mt::ExplicitUpdate;
     use crate::mt::FieldInfo;
-    use crate::mt::MtKind;
+    use crate::mt::{MtKind, UpdatePages};
 
     /// A cube of 6 bits with two fields.
     fn info() -> MtInfo {

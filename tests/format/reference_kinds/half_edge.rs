@@ -8,6 +8,7 @@ use crate::support::files;
 use crate::support::meshes::{blocks, cube, hilly, linear};
 use tetralod::builder::Purpose;
 use tetralod::mt::Applied;
+use tetralod::mt::ApplyUpdates;
 
 fn built(mesh: &TetMesh, config: BuildConfig) -> Mt {
     let config = BuildConfig { all_fields: true, ..config };

@@ -18,6 +18,7 @@ use tetralod::builder::Method;
 use tetralod::builder::build;
 use tetralod::mesh::Field;
 use tetralod::mesh::TetMesh;
+use tetralod::mt::ApplyUpdates;
 use tetralod::mt::CurrentMesh;
 use tetralod::mt::EdgeMt;
 use tetralod::mt::ExplicitMt;
