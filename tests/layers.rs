@@ -35,12 +35,13 @@ const LAYERS: [(&str, &[&str]); 17] = [
 ];
 
 /// Libraries of the edges, and the modules that they may appear in.
-const EDGES: [(&str, &[&str]); 7] = [
+const EDGES: [(&str, &[&str]); 8] = [
     ("wgpu", &["gpu", "web"]),
     ("bytemuck", &["gpu"]),
     ("wasm_bindgen", &["web"]),
     ("js_sys", &["web"]),
     ("web_sys", &["web"]),
+    ("serde_wasm_bindgen", &["web"]),
     ("std::fs", &["bin", "io", "stream"]),
     ("ureq", &["stream"]),
 ];

@@ -8,6 +8,7 @@ mod error;
 mod loader;
 mod options;
 mod parts;
+mod reader;
 mod results;
 mod session;
 mod tools;

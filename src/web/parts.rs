@@ -1,17 +1,8 @@
 //! Sessions for files of which only those blocks come that are needed: what both classes do with them.
 
-use super::results;
 use crate::format::DecodeOptions;
 use crate::session::Session;
 use crate::session::WantedBytes;
-use wasm_bindgen::prelude::wasm_bindgen;
-
-#[wasm_bindgen]
-extern "C" {
-    /// How the blocks stand.
-    #[wasm_bindgen(typescript_type = "BlockProgress")]
-    pub type JsBlocks;
-}
 
 /// A session for the fields of these names, or for all if none is named; with `room`, for a file that comes in parts, whose
 /// blocks may take so many bytes.
@@ -33,16 +24,4 @@ pub fn wanted(session: &Session) -> Vec<f64> {
     let wanted = session.wanted();
     let triple = |part: &WantedBytes| [part.range.start as f64, part.range.end as f64, part.priority];
     wanted.iter().flat_map(triple).collect()
-}
-
-/// How the blocks stand, for JavaScript.
-pub fn blocks(session: &Session) -> JsBlocks {
-    let progress = session.block_progress();
-    results::object(&[
-        ("all", progress.blocks.into()),
-        ("here", progress.here.into()),
-        ("needed", progress.needed.into()),
-        ("leftOut", progress.left_out.into()),
-        ("bytes", (progress.bytes as f64).into()),
-    ])
 }

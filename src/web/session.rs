@@ -6,9 +6,9 @@ use super::options;
 use super::options::Asked;
 use super::options::RefineOptions;
 use super::parts;
-use super::parts::JsBlocks;
 use super::results;
 use super::results::Changes;
+use super::results::JsBlocks;
 use super::results::JsDelta;
 use super::results::JsInfo;
 use super::results::JsIsoSurface;
@@ -54,7 +54,7 @@ impl CoreSession {
 
     /// How the blocks stand.
     pub fn blocks(&self) -> JsBlocks {
-        parts::blocks(&self.session)
+        results::blocks(&self.session.block_progress())
     }
 
     /// Takes the next bytes of the file, however they were cut.

@@ -11,8 +11,8 @@ use super::options;
 use super::options::Asked;
 use super::options::RefineOptions;
 use super::parts;
-use super::parts::JsBlocks;
 use super::results;
+use super::results::JsBlocks;
 use super::results::JsInfo;
 use super::results::JsProgress;
 use super::results::JsStats;
@@ -159,7 +159,7 @@ impl Viewer {
 
     /// How the blocks stand.
     pub fn blocks(&self) -> JsBlocks {
-        parts::blocks(&self.session)
+        results::blocks(&self.session.block_progress())
     }
 
     /// The file has ended: refuses one that was cut short.

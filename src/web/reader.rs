@@ -1,0 +1,208 @@
+//! Reads an object of JavaScript as a type of ours.
+//!
+//! `serde-wasm-bindgen` reads the values. It skips names that a struct does not have, and its errors do not say where in an
+//! object a value stands; [`Reader`] refuses such names, and its errors name the option by its whole path.
+
+use super::error::WebError;
+use js_sys::{Array, Object, Reflect};
+use serde::de::value::StringDeserializer;
+use serde::de::{
+    DeserializeOwned, DeserializeSeed, Deserializer, IntoDeserializer, MapAccess, SeqAccess, Visitor,
+};
+use serde::forward_to_deserialize_any;
+use std::fmt;
+use wasm_bindgen::{JsCast, JsValue};
+
+/// Reads `value`, which is the option `name`.
+pub fn read<T: DeserializeOwned>(value: &JsValue, name: &str) -> Result<T, WebError> {
+    T::deserialize(Reader::new(value.clone())).map_err(|error| error.inside(name).into())
+}
+
+/// An array, typed array or anything like one, as an array.
+pub fn list(value: &JsValue) -> Option<Array> {
+    let has_length = || Reflect::get(value, &"length".into()).is_ok_and(|length| length.as_f64().is_some());
+    (value.is_object() && has_length()).then(|| Array::from(value))
+}
+
+/// What cannot be read, and why.
+#[derive(Debug, Default)]
+pub struct ReadError {
+    /// The option, from the value on that was read; empty for that value itself.
+    path: String,
+    problem: String,
+}
+
+impl ReadError {
+    fn new(problem: impl Into<String>) -> Self {
+        Self { path: String::new(), problem: problem.into() }
+    }
+
+    /// The same error as the one of whoever reads `name`.
+    fn inside(mut self, name: &str) -> Self {
+        let between = if self.path.is_empty() || self.path.starts_with('[') { "" } else { "." };
+        self.path = format!("{name}{between}{}", self.path);
+        self
+    }
+}
+
+impl From<ReadError> for WebError {
+    fn from(error: ReadError) -> Self {
+        let path = if error.path.is_empty() { "options" } else { &error.path };
+        Self::bad_option(path, &error.problem)
+    }
+}
+
+impl fmt::Display for ReadError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.path, self.problem)
+    }
+}
+
+impl std::error::Error for ReadError {}
+
+impl serde::de::Error for ReadError {
+    fn custom<T: fmt::Display>(problem: T) -> Self {
+        Self::new(problem.to_string())
+    }
+
+    fn missing_field(name: &'static str) -> Self {
+        Self::new("is missing").inside(name)
+    }
+
+    fn unknown_field(name: &str, known: &'static [&'static str]) -> Self {
+        Self::new(format!("there is none of this name, only {}", known.join(", "))).inside(name)
+    }
+}
+
+impl From<serde_wasm_bindgen::Error> for ReadError {
+    fn from(error: serde_wasm_bindgen::Error) -> Self {
+        let message = Reflect::get(&error.into(), &"message".into());
+        Self::new(message.ok().and_then(|text| text.as_string()).unwrap_or_default())
+    }
+}
+
+/// A value, and which of its members are read.
+pub struct Reader {
+    value: JsValue,
+    /// These names are somebody else's, if not ours alone.
+    names: &'static [&'static str],
+    is_ours: bool,
+}
+
+impl Reader {
+    fn new(value: JsValue) -> Self {
+        Self { value, names: &[], is_ours: false }
+    }
+
+    /// Reads an object whose members `names` are read by the second type, and all others by the first.
+    pub fn read_both<A: DeserializeOwned, B: DeserializeOwned>(
+        value: &JsValue,
+        names: &'static [&'static str],
+    ) -> Result<(A, B), ReadError> {
+        let reader = |is_ours| Self { value: value.clone(), names, is_ours };
+        let first = A::deserialize(reader(false))?;
+        Ok((first, B::deserialize(reader(true))?))
+    }
+}
+
+impl<'de> Deserializer<'de> for Reader {
+    type Error = ReadError;
+
+    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, ReadError> {
+        Ok(serde_wasm_bindgen::Deserializer::from(self.value).deserialize_any(visitor)?)
+    }
+
+    fn deserialize_f64<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, ReadError> {
+        visitor.visit_f64(self.value.as_f64().ok_or_else(|| ReadError::new("must be a number"))?)
+    }
+
+    /// Members that are `undefined` are not there, and `null` is a value.
+    fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, ReadError> {
+        visitor.visit_some(self)
+    }
+
+    fn deserialize_seq<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, ReadError> {
+        let array = list(&self.value).ok_or_else(|| ReadError::new("must be an array"))?;
+        visitor.visit_seq(Items { array, next: 0 })
+    }
+
+    fn deserialize_struct<V: Visitor<'de>>(
+        self,
+        _name: &'static str,
+        _fields: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, ReadError> {
+        // Objects of other pages are instances of other classes.
+        if !self.value.is_object() || Array::is_array(&self.value) {
+            return Err(ReadError::new("must be an object"));
+        }
+        let left = Object::keys(self.value.unchecked_ref::<Object>())
+            .iter()
+            .filter_map(|name| name.as_string())
+            .collect();
+        visitor.visit_map(Members { reader: self, left, current: None })
+    }
+
+    fn deserialize_ignored_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, ReadError> {
+        visitor.visit_unit()
+    }
+
+    forward_to_deserialize_any! {
+        bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 char str string bytes byte_buf unit unit_struct newtype_struct
+        tuple tuple_struct map enum identifier
+    }
+}
+
+/// The members of an object.
+struct Members {
+    reader: Reader,
+    /// The names that are still to come.
+    left: Vec<String>,
+    current: Option<(String, JsValue)>,
+}
+
+impl<'de> MapAccess<'de> for Members {
+    type Error = ReadError;
+
+    fn next_key_seed<K: DeserializeSeed<'de>>(&mut self, seed: K) -> Result<Option<K::Value>, ReadError> {
+        let Reader { value: object, names, is_ours } = &self.reader;
+        while let Some(name) = self.left.pop() {
+            let value = Reflect::get(object, &name.as_str().into()).unwrap_or(JsValue::UNDEFINED);
+            if value.is_undefined() || names.contains(&name.as_str()) != *is_ours {
+                continue;
+            }
+            self.current = Some((name.clone(), value));
+            let key: StringDeserializer<ReadError> = name.into_deserializer();
+            return seed.deserialize(key).map(Some).map_err(|mut error| {
+                names.iter().for_each(|name| error.problem += &format!(", {name}"));
+                error
+            });
+        }
+        Ok(None)
+    }
+
+    fn next_value_seed<V: DeserializeSeed<'de>>(&mut self, seed: V) -> Result<V::Value, ReadError> {
+        let (name, value) = self.current.take().unwrap_or_default();
+        seed.deserialize(Reader::new(value)).map_err(|error| error.inside(&name))
+    }
+}
+
+/// The items of an array.
+struct Items {
+    array: Array,
+    next: u32,
+}
+
+impl<'de> SeqAccess<'de> for Items {
+    type Error = ReadError;
+
+    fn next_element_seed<T: DeserializeSeed<'de>>(&mut self, seed: T) -> Result<Option<T::Value>, ReadError> {
+        let at = self.next;
+        if at == self.array.length() {
+            return Ok(None);
+        }
+        self.next += 1;
+        let item = seed.deserialize(Reader::new(self.array.get(at)));
+        item.map(Some).map_err(|error| error.inside(&format!("[{at}]")))
+    }
+}
