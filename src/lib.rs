@@ -122,6 +122,7 @@ pub mod measure;
 pub mod mesh;
 pub mod mt;
 pub mod refine;
+pub mod remote;
 pub mod session;
 pub mod stream;
 #[cfg(feature = "build")]

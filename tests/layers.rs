@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Each module with what it may import besides itself.
-const LAYERS: [(&str, &[&str]); 17] = [
+const LAYERS: [(&str, &[&str]); 18] = [
     ("geom", &[]),
     ("mesh", &["geom"]),
     ("mt", &["geom", "mesh"]),
@@ -22,14 +22,15 @@ const LAYERS: [(&str, &[&str]); 17] = [
     ("view", &["geom", "mesh"]),
     ("stream", &[]),
     ("session", &["geom", "mesh", "mt", "format", "refine", "view"]),
-    ("client", &["format", "refine", "session", "stream"]),
+    ("remote", &["format", "refine", "session", "stream"]),
+    ("client", &["format", "refine", "remote", "session", "stream"]),
     ("bench", &["geom", "format", "mt", "refine", "session"]),
     ("gpu", &["geom", "mesh", "view"]),
     (
         "web",
         &[
-            "geom", "mesh", "mt", "format", "refine", "view", "session", "stream", "bench", "gpu", "io",
-            "build",
+            "geom", "mesh", "mt", "format", "refine", "view", "session", "stream", "remote", "bench", "gpu",
+            "io", "build",
         ],
     ),
 ];

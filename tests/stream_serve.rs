@@ -228,14 +228,14 @@ fn the_project_s_own_client_gets_along_with_it() {
     use std::time::Duration;
     use tetralod::stream::HttpOptions;
     use tetralod::stream::HttpSource;
-    use tetralod::stream::Source;
+    use tetralod::stream::RangeSource;
     use tetralod::stream::StreamError;
-    use tetralod::stream::Wanted;
+    use tetralod::stream::WantedRange;
 
     let (folder, www) = folder("serve-client");
     let server = Server::start(&[&www]);
     let mut source = HttpSource::new(&format!("http://{}/digits.mt", server.address), HttpOptions::default());
-    let wanted = |range| [Wanted { range, priority: 0.0 }];
+    let wanted = |range| [WantedRange { range, priority: 0.0 }];
     source.want(&wanted(2..5));
     assert_eq!(source.next(Duration::from_secs(20)), Ok(Some((2..5, b"234".to_vec()))));
     assert_eq!((source.total(), source.serves_ranges()), (Some(10), Some(true)));

@@ -170,10 +170,6 @@ impl<'de> Visitor<'de> for OfValue {
         f.write_str("a number, a text or a list of numbers")
     }
 
-    fn visit_i64<E>(self, number: i64) -> Result<Value, E> {
-        Ok(Value::Number(number as f64))
-    }
-
     fn visit_f64<E>(self, number: f64) -> Result<Value, E> {
         Ok(Value::Number(number))
     }

@@ -1,13 +1,15 @@
-//! Reads an object of JavaScript as a type of ours.
+//! Reads a value of JavaScript as a type that serde describes.
 //!
-//! `serde-wasm-bindgen` reads the values. It skips names that a struct does not have, and its errors do not say where in an
-//! object a value stands; [`Reader`] refuses such names, and its errors name the option by its whole path.
+//! `serde-wasm-bindgen`, which makes the [results](super::results), skips names that a struct does not have, does not say where in
+//! an object a value stands, and links the formatting of floats for its messages. [`Reader`] refuses such names, and its errors
+//! name the option by its whole path.
 
 use super::error::WebError;
 use js_sys::{Array, Object, Reflect};
 use serde::de::value::StringDeserializer;
 use serde::de::{
-    DeserializeOwned, DeserializeSeed, Deserializer, IntoDeserializer, MapAccess, SeqAccess, Visitor,
+    DeserializeOwned, DeserializeSeed, Deserializer, Expected, IntoDeserializer, MapAccess, SeqAccess,
+    Unexpected, Visitor,
 };
 use serde::forward_to_deserialize_any;
 use std::fmt;
@@ -65,19 +67,25 @@ impl serde::de::Error for ReadError {
         Self::new(problem.to_string())
     }
 
+    /// What was given instead is not told: formatting it would be larger than all of this.
+    fn invalid_type(_: Unexpected<'_>, expected: &dyn Expected) -> Self {
+        Self::new(format!("must be {expected}"))
+    }
+
+    fn invalid_value(found: Unexpected<'_>, expected: &dyn Expected) -> Self {
+        Self::invalid_type(found, expected)
+    }
+
+    fn invalid_length(_: usize, expected: &dyn Expected) -> Self {
+        Self::invalid_type(Unexpected::Seq, expected)
+    }
+
     fn missing_field(name: &'static str) -> Self {
         Self::new("is missing").inside(name)
     }
 
     fn unknown_field(name: &str, known: &'static [&'static str]) -> Self {
         Self::new(format!("there is none of this name, only {}", known.join(", "))).inside(name)
-    }
-}
-
-impl From<serde_wasm_bindgen::Error> for ReadError {
-    fn from(error: serde_wasm_bindgen::Error) -> Self {
-        let message = Reflect::get(&error.into(), &"message".into());
-        Self::new(message.ok().and_then(|text| text.as_string()).unwrap_or_default())
     }
 }
 
@@ -109,7 +117,16 @@ impl<'de> Deserializer<'de> for Reader {
     type Error = ReadError;
 
     fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, ReadError> {
-        Ok(serde_wasm_bindgen::Deserializer::from(self.value).deserialize_any(visitor)?)
+        if let Some(number) = self.value.as_f64() {
+            return visitor.visit_f64(number);
+        }
+        if let Some(text) = self.value.as_string() {
+            return visitor.visit_string(text);
+        }
+        if list(&self.value).is_some() {
+            return self.deserialize_seq(visitor);
+        }
+        Err(serde::de::Error::invalid_type(Unexpected::Unit, &visitor))
     }
 
     fn deserialize_f64<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, ReadError> {

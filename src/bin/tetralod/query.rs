@@ -13,6 +13,7 @@ use super::output;
 use anyhow::Context;
 use anyhow::Result;
 use serde::Serialize;
+use std::cell::Cell;
 use std::path::Path;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -218,28 +219,25 @@ impl Query {
         }
         let start = Instant::now();
         let deadline = self.max_ms.map(|ms| Duration::from_secs_f64(ms / 1000.0));
+        let stopped = Cell::new(false);
         let mut go_on = |done: &Outcome| {
-            self.max_updates.is_none_or(|most| done.refined + done.coarsened < most)
-                && deadline.is_none_or(|deadline| start.elapsed() < deadline)
+            let goes_on = self.max_updates.is_none_or(|most| done.refined + done.coarsened < most)
+                && deadline.is_none_or(|deadline| start.elapsed() < deadline);
+            stopped.set(!goes_on);
+            goes_on
         };
         // What blocks of a half-edge MT it takes, the mesh shows on the way.
         let mut before = RefineStats::default();
         while client.session().mt().is_some_and(|mt| !mt.needs_parents()) {
             let Step { stats, complete } = client.step(PATIENCE, &mut go_on).with_context(name)?;
-            before.refined += stats.refined;
-            before.coarsened += stats.coarsened;
-            before.forced += stats.forced;
-            before.judged += stats.judged;
-            if complete || !stats.done {
+            before.add_work(&stats);
+            if complete || stopped.get() {
                 break;
             }
         }
         let mut opened = Opened::of(client);
         let mut stats = opened.session.step(&mut go_on).with_context(name)?;
-        stats.refined += before.refined;
-        stats.coarsened += before.coarsened;
-        stats.forced += before.forced;
-        stats.judged += before.judged;
+        stats.add_work(&before);
         let seconds = start.elapsed().as_secs_f64();
         opened.session.set_field(field).with_context(name)?;
         let warnings = wanted.iter().filter_map(|wanted| needs::warning(&opened.session, &stats, wanted));
