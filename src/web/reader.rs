@@ -35,11 +35,13 @@ pub struct ReadError {
 }
 
 impl ReadError {
-    fn new(problem: impl Into<String>) -> Self {
-        Self { path: String::new(), problem: problem.into() }
+    #[inline(never)]
+    fn new(problem: &str) -> Self {
+        Self { path: String::new(), problem: problem.to_owned() }
     }
 
     /// The same error as the one of whoever reads `name`.
+    #[inline(never)]
     fn inside(mut self, name: &str) -> Self {
         let between = if self.path.is_empty() || self.path.starts_with('[') { "" } else { "." };
         self.path = format!("{name}{between}{}", self.path);
@@ -64,12 +66,12 @@ impl std::error::Error for ReadError {}
 
 impl serde::de::Error for ReadError {
     fn custom<T: fmt::Display>(problem: T) -> Self {
-        Self::new(problem.to_string())
+        Self::new(&problem.to_string())
     }
 
     /// What was given instead is not told: formatting it would be larger than all of this.
     fn invalid_type(_: Unexpected<'_>, expected: &dyn Expected) -> Self {
-        Self::new(format!("must be {expected}"))
+        Self::new(&format!("must be {expected}"))
     }
 
     fn invalid_value(found: Unexpected<'_>, expected: &dyn Expected) -> Self {
@@ -85,7 +87,7 @@ impl serde::de::Error for ReadError {
     }
 
     fn unknown_field(name: &str, known: &'static [&'static str]) -> Self {
-        Self::new(format!("there is none of this name, only {}", known.join(", "))).inside(name)
+        Self::new(&format!("there is none of this name, only {}", known.join(", "))).inside(name)
     }
 }
 
@@ -100,6 +102,33 @@ pub struct Reader {
 impl Reader {
     fn new(value: JsValue) -> Self {
         Self { value, names: &[], is_ours: false }
+    }
+
+    // What is no generic code stays out of it: the same for each type would be a large part of the wasm.
+
+    #[inline(never)]
+    fn number(&self) -> Result<f64, ReadError> {
+        self.value.as_f64().ok_or_else(|| ReadError::new("must be a number"))
+    }
+
+    #[inline(never)]
+    fn items(&self) -> Result<Items, ReadError> {
+        let array = list(&self.value).ok_or_else(|| ReadError::new("must be an array"))?;
+        Ok(Items { array, next: 0 })
+    }
+
+    #[inline(never)]
+    fn members(self) -> Result<Members, ReadError> {
+        // Objects of other pages are instances of other classes.
+        if !self.value.is_object() || Array::is_array(&self.value) {
+            return Err(ReadError::new("must be an object"));
+        }
+        let names = Object::keys(self.value.unchecked_ref::<Object>());
+        Ok(Members {
+            left: names.iter().filter_map(|name| name.as_string()).collect(),
+            reader: self,
+            current: None,
+        })
     }
 
     /// Reads an object whose members `names` are read by the second type, and all others by the first.
@@ -130,7 +159,7 @@ impl<'de> Deserializer<'de> for Reader {
     }
 
     fn deserialize_f64<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, ReadError> {
-        visitor.visit_f64(self.value.as_f64().ok_or_else(|| ReadError::new("must be a number"))?)
+        visitor.visit_f64(self.number()?)
     }
 
     /// Members that are `undefined` are not there, and `null` is a value.
@@ -139,8 +168,7 @@ impl<'de> Deserializer<'de> for Reader {
     }
 
     fn deserialize_seq<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, ReadError> {
-        let array = list(&self.value).ok_or_else(|| ReadError::new("must be an array"))?;
-        visitor.visit_seq(Items { array, next: 0 })
+        visitor.visit_seq(self.items()?)
     }
 
     fn deserialize_struct<V: Visitor<'de>>(
@@ -149,15 +177,7 @@ impl<'de> Deserializer<'de> for Reader {
         _fields: &'static [&'static str],
         visitor: V,
     ) -> Result<V::Value, ReadError> {
-        // Objects of other pages are instances of other classes.
-        if !self.value.is_object() || Array::is_array(&self.value) {
-            return Err(ReadError::new("must be an object"));
-        }
-        let left = Object::keys(self.value.unchecked_ref::<Object>())
-            .iter()
-            .filter_map(|name| name.as_string())
-            .collect();
-        visitor.visit_map(Members { reader: self, left, current: None })
+        visitor.visit_map(self.members()?)
     }
 
     fn deserialize_ignored_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, ReadError> {
@@ -178,29 +198,46 @@ struct Members {
     current: Option<(String, JsValue)>,
 }
 
+impl Members {
+    #[inline(never)]
+    fn next_name(&mut self) -> Option<String> {
+        let Reader { value: object, names, is_ours } = &self.reader;
+        while let Some(name) = self.left.pop() {
+            let value = Reflect::get(object, &name.as_str().into()).unwrap_or(JsValue::UNDEFINED);
+            if !value.is_undefined() && names.contains(&name.as_str()) == *is_ours {
+                self.current = Some((name.clone(), value));
+                return Some(name);
+            }
+        }
+        None
+    }
+
+    /// An error that lists names lists those of the other type, too.
+    #[inline(never)]
+    fn refuse_name(&self, mut error: ReadError) -> ReadError {
+        self.reader.names.iter().for_each(|name| error.problem += &format!(", {name}"));
+        error
+    }
+
+    #[inline(never)]
+    fn value(&mut self) -> (String, Reader) {
+        let (name, value) = self.current.take().unwrap_or_default();
+        (name, Reader::new(value))
+    }
+}
+
 impl<'de> MapAccess<'de> for Members {
     type Error = ReadError;
 
     fn next_key_seed<K: DeserializeSeed<'de>>(&mut self, seed: K) -> Result<Option<K::Value>, ReadError> {
-        let Reader { value: object, names, is_ours } = &self.reader;
-        while let Some(name) = self.left.pop() {
-            let value = Reflect::get(object, &name.as_str().into()).unwrap_or(JsValue::UNDEFINED);
-            if value.is_undefined() || names.contains(&name.as_str()) != *is_ours {
-                continue;
-            }
-            self.current = Some((name.clone(), value));
-            let key: StringDeserializer<ReadError> = name.into_deserializer();
-            return seed.deserialize(key).map(Some).map_err(|mut error| {
-                names.iter().for_each(|name| error.problem += &format!(", {name}"));
-                error
-            });
-        }
-        Ok(None)
+        let Some(name) = self.next_name() else { return Ok(None) };
+        let key: StringDeserializer<ReadError> = name.into_deserializer();
+        seed.deserialize(key).map(Some).map_err(|error| self.refuse_name(error))
     }
 
     fn next_value_seed<V: DeserializeSeed<'de>>(&mut self, seed: V) -> Result<V::Value, ReadError> {
-        let (name, value) = self.current.take().unwrap_or_default();
-        seed.deserialize(Reader::new(value)).map_err(|error| error.inside(&name))
+        let (name, reader) = self.value();
+        seed.deserialize(reader).map_err(|error| error.inside(&name))
     }
 }
 
