@@ -4,10 +4,10 @@ use anyhow::Context;
 use anyhow::Result;
 use std::ops::ControlFlow;
 use std::path::Path;
-use tetralod::build;
-use tetralod::build::BuildConfig;
-use tetralod::build::Criterion;
-use tetralod::build::Method;
+use tetralod::builder;
+use tetralod::builder::BuildConfig;
+use tetralod::builder::Criterion;
+use tetralod::builder::Method;
 use tetralod::mesh::Field;
 use tetralod::mesh::Grid;
 use tetralod::mesh::TetMesh;
@@ -71,7 +71,7 @@ pub struct Model {
 impl Model {
     pub fn build(recipe: Recipe, mesh: &TetMesh) -> Result<Self> {
         eprintln!("  {} ...", recipe.name());
-        let built = build::build(mesh, &recipe.config(), &mut |_| ControlFlow::Continue(()));
+        let built = builder::build(mesh, &recipe.config(), &mut |_| ControlFlow::Continue(()));
         Ok(Self { recipe, mt: built.with_context(|| recipe.name())?.mt })
     }
 }

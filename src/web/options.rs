@@ -48,9 +48,9 @@ struct NeedOptions {
     oriented_box: Option<OrientedBoxOptions>,
     half_space: Option<PlaneOptions>,
     slab: Option<SlabOptions>,
-    planes: Option<Rows<4>>,
+    planes: Option<Numbers>,
     isovalues: Option<Numbers>,
-    ranges: Option<Rows<2>>,
+    ranges: Option<Numbers>,
     view: Option<ViewOptions>,
     transfer: Option<TransferOptions>,
 }
@@ -58,28 +58,28 @@ struct NeedOptions {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct SphereOptions {
-    center: Fixed<3>,
+    center: Numbers,
     radius: f64,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "camelCase")]
 struct OrientedBoxOptions {
-    center: Fixed<3>,
-    half_axes: Fixed<9>,
+    center: Numbers,
+    half_axes: Numbers,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct PlaneOptions {
-    normal: Fixed<3>,
+    normal: Numbers,
     offset: f64,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct SlabOptions {
-    normal: Fixed<3>,
+    normal: Numbers,
     offset: f64,
     thickness: Option<f64>,
 }
@@ -87,8 +87,8 @@ struct SlabOptions {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ViewOptions {
-    matrix: Option<Fixed<16>>,
-    viewport: Option<Fixed<2>>,
+    matrix: Option<Numbers>,
+    viewport: Option<Numbers>,
     pixels: f64,
     outside: Option<Value>,
 }
@@ -96,7 +96,7 @@ struct ViewOptions {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "camelCase")]
 struct TransferOptions {
-    points: Rows<5>,
+    points: Numbers,
     unit_length: Option<f64>,
 }
 
@@ -111,33 +111,6 @@ enum Value {
 #[derive(Deserialize)]
 #[serde(try_from = "Vec<Value>")]
 struct Numbers(Vec<f64>);
-
-/// Numbers of which there must be a certain count.
-#[derive(Deserialize)]
-#[serde(try_from = "Numbers")]
-struct Fixed<const N: usize>([f64; N]);
-
-/// Rows of `N` numbers.
-#[derive(Deserialize)]
-#[serde(try_from = "Numbers")]
-struct Rows<const N: usize>(Vec<[f64; N]>);
-
-impl<const N: usize> TryFrom<Numbers> for Fixed<N> {
-    type Error = String;
-
-    fn try_from(Numbers(numbers): Numbers) -> Result<Self, String> {
-        <[f64; N]>::try_from(numbers).map(Self).map_err(|_| format!("must be {N} numbers"))
-    }
-}
-
-impl<const N: usize> TryFrom<Numbers> for Rows<N> {
-    type Error = String;
-
-    fn try_from(Numbers(numbers): Numbers) -> Result<Self, String> {
-        let (rows, rest) = numbers.as_chunks::<N>();
-        if rest.is_empty() { Ok(Self(rows.to_vec())) } else { Err(format!("must be rows of {N} numbers")) }
-    }
-}
 
 impl TryFrom<Vec<Value>> for Numbers {
     type Error = &'static str;
@@ -214,10 +187,10 @@ pub fn asked(options: &JsValue, info: &MtInfo, own: Option<&View>) -> Result<Ask
     parser.asked.field = parser.field(&need, &at)?.unwrap_or(0);
     // A field alone is no need: it says which one is shown.
     if all.needs.is_none() && all.r#where.is_none() || need.names().next().is_some() {
-        parser.need(need, &at)?;
+        parser.need(&need, &at)?;
     }
     for (i, need) in all.needs.into_iter().flatten().enumerate() {
-        parser.need(need, &Place(format!("needs[{i}].")))?;
+        parser.need(&need, &Place(format!("needs[{i}].")))?;
     }
     if all.r#where.is_some() {
         parser.function(options)?;
@@ -287,6 +260,26 @@ impl Place {
         WebError::bad_option(&format!("{}{name}", self.0), problem)
     }
 
+    /// The same for the options of the option `name`.
+    fn inside(&self, name: &str) -> Self {
+        Self(format!("{}{name}.", self.0))
+    }
+
+    /// Numbers of which there must be a certain count.
+    fn fixed<const N: usize>(&self, name: &str, numbers: &Numbers) -> Result<[f64; N], WebError> {
+        let fixed = <[f64; N]>::try_from(&numbers.0[..]);
+        fixed.map_err(|_| self.refuse(name, &format!("must be {N} numbers")))
+    }
+
+    /// Rows of `N` numbers; none if the option is not there.
+    fn rows<const N: usize>(&self, name: &str, numbers: Option<&Numbers>) -> Result<Vec<[f64; N]>, WebError> {
+        let (rows, rest) = numbers.map_or(&[][..], |Numbers(numbers)| numbers).as_chunks::<N>();
+        if rest.is_empty() {
+            return Ok(rows.to_vec());
+        }
+        Err(self.refuse(name, &format!("must be rows of {N} numbers")))
+    }
+
     /// An error as a part of `range`.
     fn error(&self, name: &str, error: Option<&Value>, range: f64) -> Result<Option<f64>, WebError> {
         let relative = match error {
@@ -349,35 +342,39 @@ impl NeedOptions {
     }
 
     /// The regions that are given, by their names.
-    fn regions(&mut self, at: &Place) -> Result<Vec<(&'static str, Region)>, WebError> {
+    fn regions(&self, at: &Place) -> Result<Vec<(&'static str, Region)>, WebError> {
         let mut regions = Vec::new();
         if let Some(Numbers(numbers)) = &self.r#box {
             regions
                 .push(("box", Region::Box(corners(numbers).map_err(|problem| at.refuse("box", problem))?)));
         }
         if let Some(SphereOptions { center, radius }) = &self.sphere {
-            regions.push(("sphere", Region::Sphere { centre: center.0, radius: *radius }));
+            let centre = at.inside("sphere").fixed("center", center)?;
+            regions.push(("sphere", Region::Sphere { centre, radius: *radius }));
         }
         if let Some(OrientedBoxOptions { center, half_axes }) = &self.oriented_box {
-            let [a, b, c, d, e, f, g, h, i] = half_axes.0;
-            let halves = [[a, b, c], [d, e, f], [g, h, i]];
-            regions.push(("orientedBox", Region::OrientedBox { centre: center.0, halves }));
+            let at = at.inside("orientedBox");
+            let [a, b, c, d, e, f, g, h, i] = at.fixed("halfAxes", half_axes)?;
+            let (centre, halves) = (at.fixed("center", center)?, [[a, b, c], [d, e, f], [g, h, i]]);
+            regions.push(("orientedBox", Region::OrientedBox { centre, halves }));
         }
         if let Some(PlaneOptions { normal, offset }) = &self.half_space {
-            regions.push(("halfSpace", Region::HalfSpace { normal: normal.0, offset: *offset }));
+            let normal = at.inside("halfSpace").fixed("normal", normal)?;
+            regions.push(("halfSpace", Region::HalfSpace { normal, offset: *offset }));
         }
         if let Some(SlabOptions { normal, offset, thickness }) = &self.slab {
+            let normal = at.inside("slab").fixed("normal", normal)?;
             let thickness = thickness.unwrap_or(0.0);
-            regions.push(("slab", Region::Slab { normal: normal.0, offset: *offset, thickness }));
+            regions.push(("slab", Region::Slab { normal, offset: *offset, thickness }));
         }
-        if let Some(Rows(planes)) = self.planes.take() {
-            regions.push(("planes", Region::Convex(planes)));
+        if self.planes.is_some() {
+            regions.push(("planes", Region::Convex(at.rows("planes", self.planes.as_ref())?)));
         }
         Ok(regions)
     }
 
     /// The region that the need is limited to.
-    fn region(&mut self, at: &Place) -> Result<Option<(&'static str, Region)>, WebError> {
+    fn region(&self, at: &Place) -> Result<Option<(&'static str, Region)>, WebError> {
         let mut regions = self.regions(at)?;
         if let [(name, _), (other, _), ..] = &regions[..] {
             let problem =
@@ -388,16 +385,16 @@ impl NeedOptions {
     }
 
     /// Isovalues and ranges of values.
-    fn ranges(&mut self, at: &Place) -> Result<Vec<[f64; 2]>, WebError> {
-        let mut ranges = self.ranges.take().map_or_else(Vec::new, |Rows(ranges)| ranges);
+    fn ranges(&self, at: &Place) -> Result<Vec<[f64; 2]>, WebError> {
+        let mut ranges: Vec<[f64; 2]> = at.rows("ranges", self.ranges.as_ref())?;
         if !ranges.iter().all(|[low, high]| low <= high) {
             return Err(at.refuse("ranges", "each must be two numbers, the smaller one first"));
         }
-        let isovalues = self.isovalues.take().map_or_else(Vec::new, |Numbers(values)| values);
+        let isovalues = self.isovalues.as_ref().map_or(&[][..], |Numbers(values)| values);
         if !isovalues.iter().all(|value| value.is_finite()) {
             return Err(at.refuse("isovalues", "must be finite numbers"));
         }
-        ranges.extend(isovalues.into_iter().map(|value| [value, value]));
+        ranges.extend(isovalues.iter().map(|&value| [value, value]));
         Ok(ranges)
     }
 }
@@ -433,17 +430,18 @@ impl Parser<'_> {
     }
 
     /// The need that `options` describe.
-    fn need(&mut self, mut options: NeedOptions, at: &Place) -> Result<(), WebError> {
-        let field = self.field(&options, at)?.unwrap_or(self.asked.field);
+    fn need(&mut self, options: &NeedOptions, at: &Place) -> Result<(), WebError> {
+        let field = self.field(options, at)?.unwrap_or(self.asked.field);
         if options.view.is_some() {
             options.stands_alone("view", &[], at)?;
         } else if options.transfer.is_some() {
             options.stands_alone("transfer", &["error"], at)?;
         }
-        if let Some(view) = options.view {
-            return self.view(view, field, &Place(format!("{}view.", at.0)));
+        if let Some(view) = &options.view {
+            return self.view(view, field, &at.inside("view"));
         }
-        if let Some(TransferOptions { points: Rows(points), unit_length }) = options.transfer {
+        if let Some(TransferOptions { points, unit_length }) = &options.transfer {
+            let points = at.inside("transfer").rows("points", Some(points))?;
             let error = at.error("error", options.error.as_ref(), 1.0)?.unwrap_or(0.0);
             let points = points.into_iter().map(|[value, r, g, b, a]| (value, [r, g, b, a])).collect();
             let part = Part::Transfer(Transfer { field, points, unit_length: unit_length.unwrap_or(1.0) });
@@ -464,9 +462,11 @@ impl Parser<'_> {
         self.push(at, name, need, unit)
     }
 
-    fn view(&mut self, view: ViewOptions, field: usize, at: &Place) -> Result<(), WebError> {
-        let camera = match (view.matrix, view.viewport, self.own) {
-            (Some(matrix), Some(viewport), _) => View { matrix: matrix.0, viewport: viewport.0 },
+    fn view(&mut self, view: &ViewOptions, field: usize, at: &Place) -> Result<(), WebError> {
+        let camera = match (&view.matrix, &view.viewport, self.own) {
+            (Some(matrix), Some(viewport), _) => {
+                View { matrix: at.fixed("matrix", matrix)?, viewport: at.fixed("viewport", viewport)? }
+            }
             (None, None, Some(own)) => {
                 self.asked.follows.push(self.asked.request.needs.len());
                 *own

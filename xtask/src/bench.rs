@@ -6,7 +6,7 @@ use anyhow::{Context, Result, bail};
 use serde_json::Value;
 
 use crate::serve::Mount;
-use crate::{bench_build, bench_format, browser, demo, fixture, package, serve, shell};
+use crate::{bench_build, bench_format, browser, demo, package, serve, shell};
 
 /// Measures `FILE.mt`, or the demo's volume; with `--browser` also in Chromium. With `--build`, the builders instead, with `--format` the files.
 pub fn run(args: &[String]) -> Result<()> {
@@ -37,7 +37,7 @@ pub fn run(args: &[String]) -> Result<()> {
 type Rates = Vec<(String, f64)>;
 
 fn native(file: &Path) -> Result<Rates> {
-    let tetralod = fixture::tetralod()?;
+    let tetralod = shell::released_command()?;
     rates(&shell::output(shell::command(tetralod, ["bench"]).arg(file).arg("--json"))?)
 }
 

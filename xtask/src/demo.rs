@@ -7,7 +7,7 @@ use std::thread;
 use anyhow::{Context, Result, bail};
 
 use crate::serve::Mount;
-use crate::{fixture, package, serve, shell};
+use crate::{package, serve, shell};
 
 /// Where the page looks for its volumes.
 const DATA: &str = "www/data";
@@ -45,31 +45,30 @@ pub fn run(args: &[String]) -> Result<()> {
         }
     }
     package::build(&[])?;
-    make_data()?;
+    make_data(&shell::released_command()?)?;
     if serve { serve_page(port) } else { Ok(()) }
 }
 
 /// The largest of the demo's volumes, made if necessary: also what the benchmark measures.
 pub fn bench_volume() -> Result<PathBuf> {
-    make_data()?;
+    make_data(&shell::released_command()?)?;
     Ok(Path::new(DATA).join("bucky.mt"))
 }
 
-/// Makes the MT files that are missing or older than the program that builds them.
-pub fn make_data() -> Result<()> {
-    let tetralod = fixture::tetralod()?;
+/// Makes the MT files that are missing or older than the command that builds them.
+pub fn make_data(tetralod: &Path) -> Result<()> {
     fs::create_dir_all(DATA)?;
     for Volume { name, data, extension, size, kind } in VOLUMES {
         let mt = Path::new(DATA).join(format!("{name}.mt"));
-        if is_newer(&mt, &tetralod) {
+        if is_newer(&mt, tetralod) {
             continue;
         }
         println!("making {}", mt.display());
         let input = Path::new("target").join(format!("{name}.{extension}"));
-        shell::run(shell::command(&tetralod, ["generate", data, "--size", size, "-o"]).arg(&input))?;
+        shell::run(shell::command(tetralod, ["generate", data, "--size", size, "-o"]).arg(&input))?;
         // Built beside and moved, so that an interrupted build is not taken for a finished one.
         let part = Path::new("target").join(format!("{name}.mt"));
-        shell::run(shell::command(&tetralod, ["build", "--kind", kind]).arg(&input).arg("-o").arg(&part))?;
+        shell::run(shell::command(tetralod, ["build", "--kind", kind]).arg(&input).arg("-o").arg(&part))?;
         fs::rename(&part, &mt)?;
     }
     Ok(())

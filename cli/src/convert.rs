@@ -1,0 +1,82 @@
+//! `tetralod convert`: an MT file to one of another kind.
+
+use super::build;
+use super::files;
+use super::output::{self, Verbosity};
+use anyhow::Context;
+use anyhow::Result;
+use serde::Serialize;
+use std::path::PathBuf;
+use std::time::Instant;
+use tetralod::format::EncodeOptions;
+use tetralod::format::encode_to;
+use tetralod::mt::MtKind;
+use tetralod::mt::MultiTessellation;
+
+/// Writes the same updates as an MT of another kind: any kind becomes explicit, and an explicit MT becomes again what
+/// it was made of.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// The MT file, or its http(s) address.
+    file: PathBuf,
+    /// The MT file to write.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// The kind of MT that it becomes: half-edge, edge, vertex or explicit.
+    #[arg(long, value_name = "KIND", value_parser = build::kind)]
+    kind: MtKind,
+    #[command(flatten)]
+    verbosity: Verbosity,
+}
+
+/// The summary as programs get it.
+#[derive(Serialize)]
+struct Report {
+    kind: &'static str,
+    from: &'static str,
+    vertices: u32,
+    tetrahedra: u32,
+    updates: u32,
+    file_bytes: u64,
+    bytes_per_vertex: f64,
+    memory_bytes: u64,
+    seconds: f64,
+}
+
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let start = Instant::now();
+    files::check_ending(&arguments.output, "mt")?;
+    files::check_output(&arguments.output, [&arguments.file])?;
+    let mut opened = files::open_mt(&arguments.file)?;
+    let from = opened.info()?.kind;
+    let converted = opened.mt()?.convert(arguments.kind);
+    let mt = converted.with_context(|| arguments.file.display().to_string())?;
+    // Conversions keep the numbers of the vertices.
+    let exact = opened.session.exact_tables()?;
+    let metadata = opened.session.metadata().iter().cloned().collect();
+    let options = EncodeOptions { check_margins: true, exact, metadata, ..EncodeOptions::default() };
+    let file_bytes = files::write_file(&arguments.output, |out| Ok(encode_to(&mt, &options, out)?))?;
+    let info = mt.info();
+    let report = Report {
+        kind: info.kind.name(),
+        from: from.name(),
+        vertices: info.vertices,
+        tetrahedra: info.tetrahedra,
+        updates: info.updates,
+        file_bytes,
+        bytes_per_vertex: file_bytes as f64 / f64::from(info.vertices.max(1)),
+        memory_bytes: mt.bytes(),
+        seconds: start.elapsed().as_secs_f64(),
+    };
+    let rows = [
+        ("file", arguments.output.display().to_string()),
+        ("kind", format!("{}, was {}", report.kind, report.from)),
+        ("reference mesh", output::mesh(report.vertices, report.tetrahedra)),
+        ("updates", output::count(report.updates)),
+        ("file size", output::bytes(report.file_bytes)),
+        ("bytes per vertex", format!("{:.2}", report.bytes_per_vertex)),
+        ("in memory", output::bytes(report.memory_bytes)),
+        ("time", format!("{:.2} s", report.seconds)),
+    ];
+    arguments.verbosity.print(&report, &rows)
+}

@@ -1,0 +1,301 @@
+//! Files in and out: MT files are read as far as they are needed, from disk or from a server; outputs appear whole or not at all.
+
+use super::build::METHOD;
+use super::input::{self, FieldSelection};
+use anyhow::Context;
+use anyhow::Result;
+use anyhow::bail;
+use std::fs;
+use std::fs::File;
+use std::io::BufWriter;
+use std::io::Cursor;
+use std::io::Write;
+use std::path::Path;
+use std::path::PathBuf;
+use std::sync::Mutex;
+use std::sync::MutexGuard;
+use std::sync::PoisonError;
+use std::time::Duration;
+use tetralod::builder::Method;
+use tetralod::client::Client;
+use tetralod::client::ClientOptions;
+use tetralod::io::CellData;
+use tetralod::mesh::RepairReport;
+use tetralod::mesh::TetMesh;
+use tetralod::mt::Mt;
+use tetralod::mt::MtInfo;
+use tetralod::session::Session;
+use tetralod::stream::Arrived;
+use tetralod::stream::FileSource;
+use tetralod::stream::HttpOptions;
+use tetralod::stream::HttpSource;
+use tetralod::stream::RangeSource;
+use tetralod::stream::StreamError;
+use tetralod::stream::WantedRange;
+use tetralod::verify::Reference;
+
+/// Bytes that are read at a time.
+const CHUNK: u64 = 1 << 20;
+
+/// How long is waited for a server at a time.
+pub const PATIENCE: Duration = Duration::from_secs(1);
+
+/// Exit code after Ctrl-C, as shells have it.
+pub const INTERRUPTED: i32 = 130;
+
+/// The unfinished output, if there is one. Whoever holds the lock decides what becomes of it.
+static PARTIAL: Mutex<Option<PathBuf>> = Mutex::new(None);
+
+fn partial() -> MutexGuard<'static, Option<PathBuf>> {
+    // A path is whole even if a thread panicked while it held the lock.
+    PARTIAL.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Makes Ctrl-C (and SIGTERM) end the program without leaving a partial file.
+pub fn remove_partial_output_on_interrupt() -> Result<()> {
+    let interrupted = || {
+        // Reassembly to the end: no file can be created or put in place any more.
+        let partial = partial();
+        if let Some(path) = &*partial {
+            let _ = fs::remove_file(path);
+        }
+        eprintln!("\ninterrupted");
+        std::process::exit(INTERRUPTED);
+    };
+    ctrlc::set_handler(interrupted).context("the handler for Ctrl-C could not be set")
+}
+
+/// Refuses an output that is one of the inputs, or that has no place, before any work is done for it.
+pub fn check_output<'a>(path: &Path, inputs: impl IntoIterator<Item = &'a PathBuf>) -> Result<()> {
+    let name = path.display();
+    if path == Path::new("-") {
+        bail!("'-' is no name for a file; give one after -o, or /dev/stdout");
+    }
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
+        bail!("{name} cannot be written: there is no folder '{}'; make it first", folder.display());
+    }
+    let Ok(found) = fs::metadata(path) else { return Ok(()) };
+    if found.is_dir() {
+        bail!("{name} is a folder; give a file in it after -o");
+    }
+    let Ok(place) = fs::canonicalize(path) else { return Ok(()) };
+    let is_it = |input: &&PathBuf| fs::canonicalize(input).is_ok_and(|input| input == place);
+    // Pipes and devices are not replaced.
+    if let Some(input) = inputs.into_iter().find(is_it).filter(|_| found.is_file()) {
+        bail!(
+            "{name} is an input, too ({}), and would be replaced; give another file after -o",
+            input.display()
+        );
+    }
+    Ok(())
+}
+
+/// The ending of a file's name in lower case, without the dot.
+pub fn ending(path: &Path) -> String {
+    path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
+}
+
+/// What output files are called, and which command writes them.
+const ENDINGS: [(&[&str], &str); 4] = [
+    (&["mt"], "`tetralod build` writes .mt"),
+    (&["vtu"], "`tetralod extract` writes .vtu"),
+    (
+        &["vtp", "stl", "ply", "obj", "csv"],
+        "`tetralod surface`, `isosurface`, `slice`, `probe` and `streamlines` write .vtp, .stl, .ply, .obj and .csv",
+    ),
+    (&["vti", "vtk", "pvd", "raw", "json"], "this command does not write that format"),
+];
+
+/// Refuses a name that says of what format the file is, if that is another one than `format`.
+pub fn check_ending(path: &Path, format: &str) -> Result<()> {
+    let ending = ending(path);
+    let other = ENDINGS.iter().find(|(endings, _)| endings.contains(&ending.as_str()) && ending != format);
+    match other {
+        Some((_, who)) => bail!("{}: this command writes .{format}; {who}", path.display()),
+        None => Ok(()),
+    }
+}
+
+/// Writes the file at `path` with `write`; on any failure what was there before stays.
+pub fn write_file<T>(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> Result<T>) -> Result<T> {
+    let failed = || format!("{} could not be written", path.display());
+    // Pipes and devices cannot be replaced by a file.
+    if fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
+        let mut out = BufWriter::new(File::create(path).with_context(failed)?);
+        return write(&mut out).and_then(|done| Ok(out.flush().map(|()| done)?)).with_context(failed);
+    }
+    let partial_path = partial_path(path).with_context(failed)?;
+    let file = {
+        let mut partial = partial();
+        let file = File::create(&partial_path).with_context(failed)?;
+        *partial = Some(partial_path.clone());
+        file
+    };
+    let mut out = BufWriter::new(file);
+    let written = write(&mut out).and_then(|done| {
+        out.flush()?;
+        Ok(done)
+    });
+    drop(out);
+    let mut partial = partial();
+    *partial = None;
+    let placed = written.and_then(|done| {
+        fs::rename(&partial_path, path)?;
+        Ok(done)
+    });
+    if placed.is_err() {
+        let _ = fs::remove_file(&partial_path);
+    }
+    placed.with_context(failed)
+}
+
+/// Where the output grows: beside its place, so that it can be moved there at once.
+fn partial_path(path: &Path) -> Result<PathBuf> {
+    let name = path.file_name().context("this is no name for a file; give one after -o")?;
+    let mut partial = std::ffi::OsString::from(".");
+    partial.push(name);
+    partial.push(format!(".{}.partial", std::process::id()));
+    Ok(path.with_file_name(partial))
+}
+
+/// An MT file: all of it, or what was needed.
+pub struct Opened {
+    pub session: Session,
+    /// Of the file.
+    pub bytes: u64,
+    /// Those that were read.
+    pub read: u64,
+}
+
+impl Opened {
+    /// What a client has.
+    pub fn of(client: Client<Bytes>) -> Self {
+        let read = client.fetched();
+        Self { bytes: client.total().unwrap_or(read), read, session: client.into_session() }
+    }
+
+    pub fn mt(&self) -> Result<&Mt> {
+        self.session.mt().context("the MT has no base mesh")
+    }
+
+    pub fn info(&self) -> Result<&MtInfo> {
+        self.session.info().context("the MT has no description")
+    }
+
+    /// What its reference mesh has in common with the input, by what the builder wrote into the file.
+    pub fn reference(&self) -> Reference {
+        let mut metadata = self.session.metadata().iter();
+        let method = metadata.find(|(key, _)| key == METHOD).map(|(_, value)| value.as_str());
+        let found = Method::ALL.into_iter().find(|m| Some(m.name()) == method);
+        if found.is_none_or(Method::keeps_the_mesh) { Reference::Mesh } else { Reference::Points }
+    }
+}
+
+/// Bytes of a file here or on a server.
+pub struct Bytes(Box<dyn RangeSource>);
+
+impl RangeSource for Bytes {
+    fn want(&mut self, wanted: &[WantedRange]) {
+        self.0.want(wanted);
+    }
+
+    fn next(&mut self, patience: Duration) -> Result<Option<Arrived>, StreamError> {
+        self.0.next(patience)
+    }
+
+    fn total(&self) -> Option<u64> {
+        self.0.total()
+    }
+}
+
+impl Bytes {
+    /// Of a path, or of an address that begins with `http://` or `https://`.
+    fn of(path: &Path) -> Result<Self> {
+        if let Some(url) = url(path) {
+            return Ok(Self(Box::new(HttpSource::new(url, HttpOptions::default()))));
+        }
+        if let Some(scheme) = scheme(path) {
+            bail!(
+                "files cannot be read by {scheme}; give an address that begins with http:// or https://, or a file"
+            );
+        }
+        if fs::metadata(path)?.is_file() {
+            return Ok(Self(Box::new(FileSource::new(File::open(path)?)?)));
+        }
+        // Pipes cannot be sought in.
+        Ok(Self(Box::new(FileSource::new(Cursor::new(fs::read(path)?))?)))
+    }
+}
+
+/// The address, if a path is one.
+fn url(path: &Path) -> Option<&str> {
+    path.to_str().filter(|text| ["http://", "https://"].iter().any(|scheme| text.starts_with(scheme)))
+}
+
+/// What stands in front of `://`, if a path looks like an address and is no file.
+pub fn scheme(path: &Path) -> Option<&str> {
+    let (scheme, _) = path.to_str()?.split_once("://")?;
+    let is_scheme =
+        !scheme.is_empty() && scheme.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c));
+    Some(scheme).filter(|_| is_scheme && !path.exists())
+}
+
+/// Opens an MT file of which only what is needed is read.
+pub fn open_parts(path: &Path) -> Result<Client<Bytes>> {
+    Ok(Client::open(Bytes::of(path)?, ClientOptions::default())?)
+}
+
+/// Opens an MT file and reads all of it.
+pub fn open_mt(path: &Path) -> Result<Opened> {
+    let session = Bytes::of(path).and_then(read_mt).with_context(|| path.display().to_string())?;
+    let bytes = session.progress().bytes;
+    Ok(Opened { session, bytes, read: bytes })
+}
+
+fn read_mt(mut source: Bytes) -> Result<Session> {
+    let mut session = Session::new();
+    let mut at = 0;
+    loop {
+        let range = at..at + CHUNK;
+        source.want(&[WantedRange { range: range.clone(), priority: 0.0 }]);
+        let bytes = loop {
+            if let Some((_, bytes)) = source.next(PATIENCE)? {
+                break bytes;
+            }
+        };
+        session.feed(&bytes)?;
+        at += bytes.len() as u64;
+        if at < range.end {
+            session.finish()?;
+            return Ok(session);
+        }
+    }
+}
+
+/// Reads a mesh and mends what can be mended.
+pub fn read_mesh(path: &Path) -> Result<(TetMesh, RepairReport)> {
+    let wanted = FieldSelection { names: &[], all: true, cells: CellData::LeaveOut };
+    let (mesh, report) = input::read(&[path.to_owned()], &wanted)?;
+    input::expect_cells(&mesh, path)?;
+    Ok((mesh, report))
+}
+
+/// Reads what the MT was built from: time steps of a mesh or, where no more is needed, of points.
+pub fn read_reference(paths: &[PathBuf], opened: &Opened) -> Result<TetMesh> {
+    let names: Vec<String> = opened.info()?.fields.iter().map(|field| field.name.clone()).collect();
+    let (mesh, _) =
+        input::read(paths, &FieldSelection { names: &names, all: false, cells: CellData::Values })?;
+    if let (Reference::Mesh, Some(path)) = (opened.reference(), paths.first()) {
+        input::expect_cells(&mesh, path)?;
+    }
+    Ok(mesh)
+}
+
+/// The number of the field called `name`; the first field without a name.
+pub fn field_index(info: &MtInfo, name: Option<&str>) -> Result<usize> {
+    let Some(name) = name else { return Ok(0) };
+    let known = || info.fields.iter().map(|field| field.name.as_str()).collect::<Vec<_>>().join(", ");
+    let found = info.fields.iter().position(|field| field.name == name);
+    found.with_context(|| format!("there is no field '{name}'; the MT has: {}", known()))
+}

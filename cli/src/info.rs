@@ -1,0 +1,291 @@
+//! `tetralod info`: what is in an MT file.
+
+use super::files;
+use super::files::Opened;
+use super::output;
+use anyhow::Context;
+use anyhow::Result;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use tetralod::format;
+use tetralod::format::BlockInfo;
+use tetralod::mesh::VectorPart;
+use tetralod::mt::FieldInfo;
+use tetralod::mt::MtKind;
+use tetralod::mt::MultiTessellation;
+use tetralod::mt::stats;
+
+/// Tells what is in an MT file.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// The MT file, or its http(s) address.
+    file: PathBuf,
+    /// Print a JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+/// The description as programs get it.
+#[derive(Serialize)]
+struct Report {
+    kind: &'static str,
+    /// The kind, for people.
+    #[serde(skip)]
+    updates_are: &'static str,
+    vertices: u32,
+    tetrahedra: u32,
+    base_vertices: u32,
+    base_tetrahedra: u32,
+    updates: u32,
+    /// Whether tetrahedra have errors of their own.
+    tet_errors: bool,
+    file_bytes: u64,
+    bytes_per_vertex: f64,
+    blocks: Blocks,
+    /// What the bytes of the file tell, as far as that is coded in common, and all others.
+    breakdown: Vec<FilePart>,
+    memory: Memory,
+    fields: Vec<Field>,
+    /// Of the reference mesh: x0, y0, z0, x1, y1, z1.
+    bounds: [f64; 6],
+    position_bits: u32,
+    /// How far the lattice moves a vertex at most, in model units.
+    position_quantization: f64,
+    /// The displacement of the boundary, in model units, that counts as an error of 1; of less in small cells.
+    displacement_per_error: f64,
+    depth: u32,
+    arcs_per_node: f64,
+    tets_per_update: f64,
+    metadata: BTreeMap<String, String>,
+}
+
+#[derive(Serialize)]
+struct Field {
+    name: String,
+    #[serde(skip_serializing_if = "String::is_empty")]
+    unit: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    vector: Option<Vector>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    time: Option<f64>,
+    min: f64,
+    max: f64,
+    bits: u32,
+    /// How far the lattice rounds a value at most, in field units.
+    quantization: f64,
+    /// The error that is left at full resolution, as a fraction of the range.
+    floor: f64,
+}
+
+/// Which part of a vector a field is; its length if no component is told.
+#[derive(Serialize)]
+struct Vector {
+    name: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    component: Option<u8>,
+}
+
+/// What can be fetched of the file by itself.
+#[derive(Serialize)]
+struct Blocks {
+    count: usize,
+    updates_per_block: u32,
+    /// From the start of the file to the end of the index.
+    index_bytes: u64,
+    /// From the start of the file to its first block.
+    head_bytes: u64,
+    largest_bytes: u64,
+    parents_per_block: f64,
+}
+
+/// Some of the bytes of the file.
+#[derive(Serialize)]
+struct FilePart {
+    name: &'static str,
+    bytes: f64,
+    bytes_per_vertex: f64,
+}
+
+#[derive(Serialize)]
+struct Memory {
+    /// The compact structure of this MT.
+    compact_bytes: u64,
+    /// The same MT as an explicit structure.
+    explicit_bytes: u64,
+    /// The reference mesh alone, without and with adjacency.
+    indexed_bytes: u64,
+    adjacency_bytes: u64,
+}
+
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let opened = files::open_mt(&arguments.file)?;
+    let report = report(&opened).with_context(|| arguments.file.display().to_string())?;
+    output::result(arguments.json, &report, &rows(&report))
+}
+
+fn report(opened: &Opened) -> Result<Report> {
+    let (mt, info) = (opened.mt()?, opened.info()?);
+    let base_tetrahedra = mt.base().tets.len();
+    let stats = stats(mt)?;
+    let field = |(number, field): (usize, &FieldInfo)| {
+        let FieldInfo { name, unit, vector, time, min, max, bits, quantization, .. } = field.clone();
+        let vector = vector.map(|VectorPart { name, component }| Vector { name, component });
+        Field { name, unit, vector, time, min, max, bits, quantization, floor: info.floor(number) }
+    };
+    let [[x0, y0, z0], [x1, y1, z1]] = stats.bounds.map(|corner| info.lattice.point(corner));
+    Ok(Report {
+        kind: info.kind.name(),
+        updates_are: words(info.kind),
+        vertices: info.vertices,
+        tetrahedra: info.tetrahedra,
+        base_vertices: mt.base().positions.len() as u32,
+        base_tetrahedra: base_tetrahedra as u32,
+        updates: info.updates,
+        tet_errors: mt.has_tet_errors(),
+        file_bytes: opened.bytes,
+        bytes_per_vertex: opened.bytes as f64 / f64::from(info.vertices.max(1)),
+        blocks: blocks(opened)?,
+        breakdown: breakdown(opened)?,
+        memory: Memory {
+            compact_bytes: stats.compact_bytes,
+            explicit_bytes: stats.explicit_bytes,
+            indexed_bytes: stats.indexed_bytes,
+            adjacency_bytes: stats.adjacency_bytes,
+        },
+        fields: info.fields.iter().enumerate().map(field).collect(),
+        bounds: [x0, y0, z0, x1, y1, z1],
+        position_bits: info.lattice.bits,
+        position_quantization: info.quantization,
+        displacement_per_error: info.displacement_per_error,
+        depth: stats.depth,
+        arcs_per_node: stats.arcs_per_update(),
+        tets_per_update: stats.inserted_per_update(),
+        metadata: opened.session.metadata().iter().cloned().collect(),
+    })
+}
+
+fn blocks(opened: &Opened) -> Result<Blocks> {
+    let decoder = opened.session.decoder();
+    let index = decoder.index().context("the file has no index")?;
+    let head_bytes = decoder.head_end().unwrap_or(0);
+    let parents: usize = index.blocks.iter().map(|block| block.parents.len()).sum();
+    Ok(Blocks {
+        count: index.blocks.len(),
+        updates_per_block: 1 << index.block_bits,
+        index_bytes: head_bytes.saturating_sub(index.shared),
+        head_bytes,
+        largest_bytes: index.blocks.iter().map(BlockInfo::len).max().unwrap_or(0),
+        parents_per_block: parents as f64 / index.blocks.len().max(1) as f64,
+    })
+}
+
+fn breakdown(opened: &Opened) -> Result<Vec<FilePart>> {
+    let decoder = opened.session.decoder();
+    let index = decoder.index().context("the file has no index")?;
+    let index_bytes = decoder.head_end().unwrap_or(0).saturating_sub(index.shared);
+    let mut parts = format::breakdown(opened.mt()?.into(), index.block_bits)?;
+    parts.push(("header, description and index", index_bytes as f64));
+    let known: f64 = parts.iter().map(|(_, bytes)| bytes).sum();
+    parts.push(("heads and ends of sections", opened.bytes as f64 - known));
+    // Few files keep any.
+    parts.retain(|(name, bytes)| *bytes != 0.0 || !["exact values", "errors of tetrahedra"].contains(name));
+    let vertices = f64::from(opened.info()?.vertices.max(1));
+    let part =
+        |(name, bytes): (&'static str, f64)| FilePart { name, bytes, bytes_per_vertex: bytes / vertices };
+    Ok(parts.into_iter().map(part).collect())
+}
+
+/// What the updates of an MT do.
+fn words(kind: MtKind) -> &'static str {
+    match kind {
+        MtKind::Edge => "edge collapse",
+        MtKind::Vertex => "vertex insertion",
+        MtKind::HalfEdge => "half-edge insertion",
+        MtKind::Explicit => "explicit",
+    }
+}
+
+fn rounded(by: f64) -> String {
+    if by == 0.0 { "exact".to_owned() } else { format!("rounded by at most {}", output::number(by)) }
+}
+
+/// A field for people, all its time steps in one row.
+fn field_row(steps: &[Field]) -> String {
+    let Field { name, unit, vector, time, min, max, bits, .. } = &steps[0];
+    let part = match vector {
+        Some(Vector { name, component: Some(component) }) => format!(" (component {component} of {name})"),
+        Some(Vector { name, component: None }) => format!(" (length of {name})"),
+        None => String::new(),
+    };
+    let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+    let [min, max] = [*min, *max].map(output::number);
+    let worst = rounded(steps.iter().map(|step| step.quantization).fold(0.0, f64::max));
+    let last = steps.last().and_then(|step| step.time);
+    let time = match (*time, last) {
+        (Some(first), Some(last)) if steps.len() > 1 => {
+            let [first, last] = [first, last].map(output::number);
+            format!("; {} times from {first} to {last}", steps.len())
+        }
+        (Some(time), _) => format!("; time {}", output::number(time)),
+        _ => String::new(),
+    };
+    format!("{name}{part}: {min} to {max}{unit}, {bits} bits, {worst}{time}")
+}
+
+fn part_row(part: &FilePart, file_bytes: u64) -> String {
+    let share = output::percent(part.bytes / file_bytes.max(1) as f64);
+    format!("{}: {:.2} per vertex ({share})", part.name, part.bytes_per_vertex)
+}
+
+fn rows(report: &Report) -> Vec<(&str, String)> {
+    let [x0, y0, z0, x1, y1, z1] = report.bounds.map(output::number);
+    let memory = &report.memory;
+    let mut rows = vec![
+        ("kind", report.updates_are.to_owned()),
+        ("reference mesh", output::mesh(report.vertices, report.tetrahedra)),
+        ("base mesh", output::mesh(report.base_vertices, report.base_tetrahedra)),
+        (
+            "updates",
+            format!("{}, at most {} deep", output::count(report.updates), output::count(report.depth)),
+        ),
+        (
+            "",
+            format!("{:.2} tetrahedra, {:.2} arcs per update", report.tets_per_update, report.arcs_per_node),
+        ),
+        ("errors", if report.tet_errors { "of tetrahedra, 2 bits each" } else { "of updates" }.to_owned()),
+        ("file size", output::bytes(report.file_bytes)),
+        ("bytes per vertex", format!("{:.2}", report.bytes_per_vertex)),
+        (
+            "blocks",
+            format!(
+                "{} of {} updates, up to {} each",
+                report.blocks.count,
+                report.blocks.updates_per_block,
+                output::bytes(report.blocks.largest_bytes)
+            ),
+        ),
+        (
+            "in front of them",
+            format!(
+                "{}; to the end of the index {} ({} of the file)",
+                output::bytes(report.blocks.head_bytes),
+                output::bytes(report.blocks.index_bytes),
+                output::percent(report.blocks.index_bytes as f64 / report.file_bytes.max(1) as f64)
+            ),
+        ),
+        ("in memory", output::bytes(memory.compact_bytes)),
+        ("  explicit", output::bytes(memory.explicit_bytes)),
+        ("reference alone", output::bytes(memory.indexed_bytes)),
+        ("  with adjacency", output::bytes(memory.adjacency_bytes)),
+        ("bounds", format!("({x0}, {y0}, {z0}) to ({x1}, {y1}, {z1})")),
+        ("position bits", format!("{}, {}", report.position_bits, rounded(report.position_quantization))),
+    ];
+    let steps = |a: &Field, b: &Field| a.name == b.name;
+    rows.extend(report.fields.chunk_by(steps).map(|steps| ("field", field_row(steps))));
+    rows.extend(report.breakdown.iter().map(|part| ("bytes of", part_row(part, report.file_bytes))));
+    for (key, value) in &report.metadata {
+        rows.push((key, value.clone()));
+    }
+    rows
+}

@@ -1,0 +1,111 @@
+//! The command `tetralod`: builds MT files, looks into them, takes meshes out of them, checks and times them.
+//!
+//! One file a subcommand, each with its arguments and a `run`. Exit codes: 0 done, 1 failed (or a check failed),
+//! 2 wrong usage, 130 interrupted. Results go to stdout, everything else to stderr.
+
+mod bench;
+mod build;
+mod convert;
+mod extract;
+mod files;
+mod generate;
+mod info;
+mod input;
+mod isosurface;
+mod needs;
+mod output;
+mod poly;
+mod probe;
+mod query;
+mod serve;
+mod slice;
+mod stats;
+mod streamlines;
+mod surface;
+mod verify;
+
+use clap::CommandFactory;
+use clap::Parser;
+use clap::Subcommand;
+use clap::error::ErrorKind;
+use std::process::ExitCode;
+
+/// Very large tetrahedral volumes for web pages: builds, inspects and checks MT files.
+#[derive(Parser)]
+#[command(name = "tetralod", version, arg_required_else_help = true)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Generate(generate::Arguments),
+    Build(Box<build::Arguments>),
+    Convert(convert::Arguments),
+    Info(info::Arguments),
+    Extract(Box<extract::Arguments>),
+    Isosurface(Box<isosurface::Arguments>),
+    Slice(Box<slice::Arguments>),
+    Surface(Box<surface::Arguments>),
+    Probe(Box<probe::Arguments>),
+    Streamlines(Box<streamlines::Arguments>),
+    Stats(Box<stats::Arguments>),
+    Verify(verify::Arguments),
+    Bench(bench::Arguments),
+    Serve(serve::Arguments),
+}
+
+impl Command {
+    /// Whether it has a handler of its own for Ctrl-C; there can be only one.
+    fn ends_by_itself(&self) -> bool {
+        if let Self::Serve(_) = self {
+            return true;
+        }
+        false
+    }
+}
+
+fn main() -> ExitCode {
+    match run(Arguments::parse().command) {
+        Ok(code) => code,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(command: Command) -> anyhow::Result<ExitCode> {
+    if !command.ends_by_itself() {
+        files::remove_partial_output_on_interrupt()?;
+    }
+    match command {
+        Command::Generate(arguments) => generate::run(&arguments)?,
+        Command::Build(arguments) => build::run(&arguments)?,
+        Command::Convert(arguments) => convert::run(&arguments)?,
+        Command::Info(arguments) => info::run(&arguments)?,
+        Command::Verify(arguments) => return verify::run(&arguments),
+        Command::Bench(arguments) => bench::run(&arguments)?,
+        Command::Extract(arguments) => extract::run(&arguments)?,
+        Command::Isosurface(arguments) => isosurface::run(&arguments)?,
+        Command::Slice(arguments) => slice::run(&arguments)?,
+        Command::Surface(arguments) => surface::run(&arguments)?,
+        Command::Probe(arguments) => probe::run(&arguments)?,
+        Command::Streamlines(arguments) => streamlines::run(&arguments)?,
+        Command::Stats(arguments) => stats::run(&arguments)?,
+        Command::Serve(arguments) => serve::run(&arguments)?,
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Ends the program as wrong usage, with a word about what to do instead.
+fn refuse_usage(what: &str) -> ! {
+    let mut command = Arguments::command();
+    command.build();
+    let name = std::env::args().nth(1).unwrap_or_default();
+    match command.find_subcommand_mut(&name) {
+        Some(subcommand) => subcommand.error(ErrorKind::ArgumentConflict, what).exit(),
+        None => command.error(ErrorKind::ArgumentConflict, what).exit(),
+    }
+}

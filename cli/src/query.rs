@@ -1,0 +1,371 @@
+//! What mesh a command works on: the options that say so, and the mesh itself.
+//!
+//! The plain options make needs of one error; each `--need` makes others, with an error of its own. The mesh suits all.
+
+use super::files::{Bytes, Opened, PATIENCE};
+use super::needs::{Group, NamedNeed, Tolerance};
+use super::{files, needs, output};
+use anyhow::{Context, Result};
+use serde::Serialize;
+use std::cell::Cell;
+use std::path::PathBuf;
+use std::str::FromStr;
+use std::time::{Duration, Instant};
+use tetralod::client::{Client, Step};
+use tetralod::geom::Bounds;
+use tetralod::mt::MtInfo;
+use tetralod::refine::{Budget, Need, Outcome, RefineStats, Request};
+
+/// What the options look like in use.
+pub const EXAMPLES: &str = "\
+Examples (everything in model units and units of the field, errors also in % of the field's range):
+  --error 1%                                        within 1 % of the range everywhere
+  --box 0,0,0,1,1,1 --error 0.1% --outside 5%       fine in a box, coarse around it
+  --sphere 5,5,5,2 --iso 0.5 --error 1%             an isosurface inside a ball
+  --need 'box=0,0,0,1,1,1; error=0' --need 'iso=0.5; iso=0.8; error=1%'
+                                                    a box at full detail and, everywhere, two isosurfaces
+  --view camera.json --pixels 2 --outside 10%       what a camera sees, and roughly the rest
+  --transfer colours.json --max-bytes 50M           the best picture that 50 MiB can give
+Regions and values limit each other; everything else is a union. Without any option the mesh is the reference mesh.
+
+camera.json:  {\"matrix\": [16 numbers: clip from model space, column by column], \"viewport\": [1920, 1080], \"pixels\": 1}
+colours.json: {\"points\": [[value, red, green, blue, opacity], ...], \"unit_length\": 0.1, \"field\": \"name\"}; colours and
+              opacities 0 to 1, the opacity that of a way of unit_length times the model's diagonal";
+
+/// Heading in the help of the options that limit the mesh and the work.
+const LIMITS: &str = "How large, how long";
+
+/// What every command that works on a mesh takes: the MT, the needs that the mesh meets, its limits, and how results are
+/// printed. The mesh is the coarsest one that meets all needs.
+#[derive(clap::Args)]
+pub struct Query {
+    /// The MT file, or its http(s) address.
+    pub file: PathBuf,
+    #[command(flatten)]
+    group: Group,
+    /// In addition, everywhere within this error, in units of the field, or with % of its range.
+    #[arg(long, value_name = "E|E%", allow_hyphen_values = true, help_heading = needs::WHAT)]
+    outside: Option<Tolerance>,
+    /// Another need with its own error: 'key=value; key=value; …'. The keys are the names of the options above
+    /// (repeatable: the mesh meets all needs).
+    #[arg(long = "need", value_name = "K=V;…", allow_hyphen_values = true, help_heading = needs::WHAT)]
+    needs: Vec<Group>,
+    /// At most this many tetrahedra: the best mesh that fits, but never less than the base mesh.
+    #[arg(long, value_name = "N", value_parser = parse_count::<u32>, allow_hyphen_values = true, help_heading = LIMITS)]
+    budget: Option<u32>,
+    /// At most this many vertices.
+    #[arg(long, value_name = "N", value_parser = parse_count::<u32>, allow_hyphen_values = true, help_heading = LIMITS)]
+    max_vertices: Option<u32>,
+    /// At most this many bytes, 32 a tetrahedron and 16 a vertex; K, M and G are KiB, MiB and GiB.
+    #[arg(long, value_name = "N[K|M|G]", value_parser = needs::parse_bytes, allow_hyphen_values = true, help_heading = LIMITS)]
+    max_bytes: Option<u64>,
+    /// Stop refining after this many milliseconds: the mesh is valid but unfinished, and not the same each time.
+    #[arg(long, value_name = "MS", value_parser = needs::parse_size, allow_hyphen_values = true, help_heading = LIMITS)]
+    max_ms: Option<f64>,
+    /// Stop refining after this many updates: the mesh is valid but unfinished.
+    #[arg(long, value_name = "N", value_parser = parse_count::<u64>, allow_hyphen_values = true, help_heading = LIMITS)]
+    max_updates: Option<u64>,
+    /// Print the result as a JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Query {
+    /// The files that it reads.
+    pub fn files(&self) -> impl Iterator<Item = &PathBuf> {
+        let named = self.group.files().chain(self.needs.iter().flat_map(Group::files));
+        named.chain([&self.file])
+    }
+
+    /// The values of the isosurfaces that the mesh is refined around by `--iso`.
+    pub fn isovalues(&self) -> &[f64] {
+        self.group.isovalues()
+    }
+
+    fn named_needs(&self, info: &MtInfo) -> Result<Vec<NamedNeed>> {
+        let mut needs = Vec::new();
+        // Without any other need, the mesh is the reference mesh everywhere.
+        if !self.group.is_empty() || self.needs.is_empty() && self.outside.is_none() {
+            self.group.add_to(info, None, &mut needs)?;
+        }
+        for group in &self.needs {
+            group.add_to(info, self.group.field(), &mut needs)?;
+        }
+        if let Some(error) = self.outside {
+            let field = files::field_index(info, self.group.field())?;
+            let need = Need::within(error.relative(info.fields[field].range()));
+            needs.push(NamedNeed { name: "everywhere".to_owned(), need });
+        }
+        Ok(needs)
+    }
+
+    /// Opens the MT and refines its mesh to what is asked for; the session shows the field that is asked for.
+    pub fn answer(&self) -> Result<Answer> {
+        self.answer_with(|_| Ok(()))
+    }
+
+    /// [`Query::answer`] with the exact values that the file keeps.
+    pub fn answer_exactly(&self) -> Result<Answer> {
+        self.answer_with(|client| Ok(client.fetch_exact()?))
+    }
+
+    fn answer_with(&self, fetch_more: impl FnOnce(&mut Client<Bytes>) -> Result<()>) -> Result<Answer> {
+        if let Err(wrong) = self.group.check() {
+            super::refuse_usage(&wrong);
+        }
+        self.refined(fetch_more).with_context(|| self.file.display().to_string())
+    }
+
+    fn refined(&self, fetch_more: impl FnOnce(&mut Client<Bytes>) -> Result<()>) -> Result<Answer> {
+        let mut client = files::open_parts(&self.file)?;
+        let info = client.session().info().context("the MT has no description")?;
+        let needs = self.named_needs(info)?;
+        let field = files::field_index(info, self.group.field())?;
+        let budget = Budget { tets: self.budget, vertices: self.max_vertices, bytes: self.max_bytes };
+        client.aim(&Request { needs: needs.iter().map(|named| named.need.clone()).collect(), budget })?;
+        while !client.fetch(PATIENCE)? {}
+        fetch_more(&mut client)?;
+        let start = Instant::now();
+        let (mut opened, stats) = self.refine(client)?;
+        let seconds = start.elapsed().as_secs_f64();
+        opened.session.set_field(field)?;
+        let warnings = needs.iter().filter_map(|named| needs::warning(&opened.session, &stats, named));
+        warnings.for_each(|warning| eprintln!("warning: {warning}"));
+        let summary = summary(&opened, field, &stats, &needs)?;
+        Ok(Answer { opened, field, needs, stats, seconds, summary })
+    }
+
+    /// Refines until the request is met or a limit of time or updates is reached.
+    fn refine(&self, mut client: Client<Bytes>) -> Result<(Opened, RefineStats)> {
+        let start = Instant::now();
+        let deadline = self.max_ms.map(|ms| Duration::from_secs_f64(ms / 1000.0));
+        let stopped = Cell::new(false);
+        let mut go_on = |done: &Outcome| {
+            let goes_on = self.max_updates.is_none_or(|most| done.refined + done.coarsened < most)
+                && deadline.is_none_or(|deadline| start.elapsed() < deadline);
+            stopped.set(!goes_on);
+            goes_on
+        };
+        // Which blocks of a half-edge MT are needed shows only while the mesh is refined.
+        let mut before = RefineStats::default();
+        while client.session().mt().is_some_and(|mt| !mt.needs_parents()) {
+            let Step { stats, complete } = client.step(PATIENCE, &mut go_on)?;
+            before.add_work(&stats);
+            if complete || stopped.get() {
+                break;
+            }
+        }
+        let mut opened = Opened::of(client);
+        let mut stats = opened.session.step(&mut go_on)?;
+        stats.add_work(&before);
+        Ok((opened, stats))
+    }
+
+    /// Prints a result: `found` and the summary of the mesh as one JSON object, or `rows` and those of the summary.
+    pub fn print<N: Into<String>>(
+        &self,
+        found: &impl Serialize,
+        rows: Vec<(N, String)>,
+        mesh: (&Summary, f64),
+    ) -> Result<()> {
+        self.print_around(found, [rows, Vec::new()], mesh)
+    }
+
+    /// [`Query::print`] with rows before and after those of the summary.
+    pub fn print_around<N: Into<String>>(
+        &self,
+        found: &impl Serialize,
+        [before, after]: [Vec<(N, String)>; 2],
+        (mesh, seconds): (&Summary, f64),
+    ) -> Result<()> {
+        let named = |rows: Vec<(N, String)>| rows.into_iter().map(|(name, value)| (name.into(), value));
+        let time = ("time", format!("{seconds:.3} s"));
+        let of_mesh = mesh.rows().into_iter().chain([time]).map(|(name, value)| (name.to_owned(), value));
+        let rows: Vec<(String, String)> = named(before).chain(of_mesh).chain(named(after)).collect();
+        output::result(self.json, &Report { found, mesh, seconds }, &rows)
+    }
+}
+
+/// A result as programs get it.
+#[derive(Serialize)]
+struct Report<'a, T> {
+    #[serde(flatten)]
+    found: &'a T,
+    #[serde(flatten)]
+    mesh: &'a Summary,
+    seconds: f64,
+}
+
+/// A mesh that answers a query.
+pub struct Answer {
+    pub opened: Opened,
+    /// Which field was asked for.
+    pub field: usize,
+    pub needs: Vec<NamedNeed>,
+    pub stats: RefineStats,
+    /// What refinement took.
+    pub seconds: f64,
+    pub summary: Summary,
+}
+
+/// The mesh that a result is from, and the error that is guaranteed, as programs get them.
+#[derive(Serialize)]
+pub struct Summary {
+    pub field: String,
+    pub vertices: u32,
+    pub tetrahedra: u32,
+    pub updates_applied: u32,
+    /// In units of the field; none as long as it is not known.
+    pub error_bound: Option<f64>,
+    /// As a fraction of the field's range.
+    pub relative_error_bound: Option<f64>,
+    /// Of the field at the vertices of the input inside the mesh, in its units: the error bound, or what rounding leaves.
+    pub field_bound: Option<f64>,
+    /// How far the boundary is from that of the input, in model units.
+    pub boundary_bound: Option<f64>,
+    /// How often the error exceeds what was asked for, at most.
+    pub excess: Option<f64>,
+    pub satisfied: bool,
+    /// False if a limit of time or updates came first.
+    pub done: bool,
+    pub needs: Vec<NeedReport>,
+    pub refined: u64,
+    pub coarsened: u64,
+    pub forced: u64,
+    pub judged: u64,
+    /// Bytes of the file that were read: where blocks of it are not needed, not all.
+    pub bytes_read: u64,
+    pub file_bytes: u64,
+}
+
+/// What was asked for in one need, and what is guaranteed.
+#[derive(Serialize)]
+pub struct NeedReport {
+    /// In words.
+    pub need: String,
+    /// Of both errors: `relative` to the range of the field, `pixels` or `colour`.
+    pub unit: &'static str,
+    pub asked: f64,
+    pub bound: Option<f64>,
+}
+
+fn summary(opened: &Opened, number: usize, stats: &RefineStats, needs: &[NamedNeed]) -> Result<Summary> {
+    let known = |value: f64| (stats.done && value.is_finite()).then_some(value);
+    let report = |(i, named): (usize, &NamedNeed)| NeedReport {
+        need: named.name.clone(),
+        unit: needs::unit(&named.need),
+        asked: named.need.error,
+        bound: stats.bounds.get(i).copied().and_then(known),
+    };
+    let info = opened.info()?;
+    let field = &info.fields[number];
+    Ok(Summary {
+        field: field.name.clone(),
+        vertices: stats.vertices,
+        tetrahedra: stats.tetrahedra,
+        updates_applied: stats.applied,
+        error_bound: known(stats.error_bound * field.range()),
+        relative_error_bound: known(stats.error_bound),
+        field_bound: known(info.field_bound(number, stats.error_bound)),
+        boundary_bound: known(info.boundary_bound(stats.error_bound)),
+        excess: known(stats.excess),
+        satisfied: stats.satisfied,
+        done: stats.done,
+        needs: needs.iter().enumerate().map(report).collect(),
+        refined: stats.refined,
+        coarsened: stats.coarsened,
+        forced: stats.forced,
+        judged: stats.judged,
+        bytes_read: opened.read,
+        file_bytes: opened.bytes,
+    })
+}
+
+impl Summary {
+    /// The same for people.
+    pub fn rows(&self) -> Vec<(&'static str, String)> {
+        let bound = match (self.error_bound, self.relative_error_bound) {
+            (Some(bound), Some(relative)) => {
+                format!("{} ({} of the range)", output::number(bound), output::percent(relative))
+            }
+            _ => "not known yet".to_owned(),
+        };
+        let mut rows = vec![
+            ("field", self.field.clone()),
+            ("vertices", output::count(self.vertices)),
+            ("tetrahedra", output::count(self.tetrahedra)),
+            ("updates applied", output::count(self.updates_applied)),
+            ("error bound", bound),
+        ];
+        if let Some(bound) = self.boundary_bound {
+            rows.push(("boundary within", output::number(bound)));
+        }
+        // One need of the field says no more than the bound.
+        if self.needs.len() > 1 || self.needs.iter().any(|need| need.unit != needs::RELATIVE) {
+            rows.extend(self.needs.iter().map(|need| ("need", need.sentence())));
+        }
+        let [read, all] = [self.bytes_read, self.file_bytes].map(output::bytes);
+        rows.push(("read", format!("{read} of {all}")));
+        if !self.done {
+            rows.push(("", "stopped before it was done".to_owned()));
+        } else if !self.satisfied {
+            rows.push(("", "the budget did not allow the error that was asked for".to_owned()));
+        }
+        rows
+    }
+}
+
+impl NeedReport {
+    fn sentence(&self) -> String {
+        let say = |error: f64| match self.unit {
+            needs::PIXELS => format!("{} pixels", output::number(error)),
+            _ => output::percent(error),
+        };
+        let bound = self.bound.map_or("not known yet".to_owned(), say);
+        format!("{}: {bound}, {} wanted", self.need, say(self.asked))
+    }
+}
+
+impl Answer {
+    /// The names of all fields, in the order of the MT.
+    pub fn field_names(&self) -> Result<Vec<String>> {
+        Ok(self.opened.info()?.fields.iter().map(|field| field.name.clone()).collect())
+    }
+
+    /// All fields at the vertices of the mesh, in the order of the MT.
+    pub fn all_values(&self) -> Result<Vec<Vec<f32>>> {
+        Ok((0..self.opened.info()?.fields.len()).map(|field| self.opened.session.values(field)).collect())
+    }
+}
+
+/// A whole number that is not negative.
+fn parse_count<T: FromStr>(text: &str) -> Result<T, String> {
+    text.trim().parse().map_err(|_| format!("'{text}' is not a whole number of at least 0, or too large"))
+}
+
+/// A finite number.
+pub fn parse_number(text: &str) -> Result<f64, String> {
+    let number: f64 = text.trim().parse().map_err(|_| format!("'{text}' is not a number"))?;
+    if number.is_finite() { Ok(number) } else { Err(format!("'{text}' is not finite")) }
+}
+
+/// Finite numbers between commas.
+pub fn parse_list(text: &str) -> Result<Vec<f64>, String> {
+    text.split(',').map(parse_number).collect()
+}
+
+/// `N` finite numbers between commas; `what` has so many.
+pub fn parse_numbers<const N: usize>(text: &str, what: &str) -> Result<[f64; N], String> {
+    let numbers = parse_list(text)?;
+    let found = numbers.len();
+    numbers.try_into().map_err(|_| format!("{what} has {N} numbers, not {found}"))
+}
+
+/// A box by its smaller and its larger corner.
+pub fn parse_bounds(text: &str) -> Result<Bounds, String> {
+    let [x0, y0, z0, x1, y1, z1] = parse_numbers(text, "a box")?;
+    if x0 > x1 || y0 > y1 || z0 > z1 {
+        return Err("a box has its smaller corner first".to_owned());
+    }
+    Ok(Bounds { min: [x0, y0, z0], max: [x1, y1, z1] })
+}

@@ -1,0 +1,85 @@
+//! `tetralod slice`: the mesh in a plane.
+
+use super::output;
+use super::poly::{Amount, Target};
+use super::query::{Query, parse_number, parse_numbers};
+use anyhow::Result;
+use serde::Serialize;
+use std::time::Instant;
+use tetralod::io::PolyData;
+use tetralod::view::{Plane, Slice};
+
+/// Writes the section of the mesh with a plane, with all fields interpolated in it.
+#[derive(clap::Args)]
+#[command(
+    after_help = "Examples: tetralod slice engine.mt --plane z=0.5 --error 1% -o slice.vtp\n          \
+                        tetralod slice engine.mt --plane 1,1,0,12.5 --edges -o slice.obj"
+)]
+pub struct Arguments {
+    /// The plane: x=D, y=D or z=D, or the points p with n · p = D; in model units.
+    #[arg(long, value_name = "nx,ny,nz,D", value_parser = parse_plane, allow_hyphen_values = true)]
+    plane: Plane,
+    /// Also write the edges of the mesh's cells in the plane, as lines.
+    #[arg(long)]
+    edges: bool,
+    #[command(flatten)]
+    query: Query,
+    /// The surface to write: .vtp, .stl (without edges), .ply, .obj, or .csv for its points.
+    #[arg(short, long, value_name = "FILE")]
+    output: Target,
+}
+
+fn parse_plane(text: &str) -> Result<Plane, String> {
+    if let Some((axis, offset)) = text.split_once('=') {
+        let axis = ["x", "y", "z"].iter().position(|name| *name == axis.trim());
+        let axis = axis.ok_or_else(|| format!("'{text}' is not x=, y= or z= and a number"))?;
+        let mut normal = [0.0; 3];
+        normal[axis] = 1.0;
+        return Ok(Plane { normal, offset: parse_number(offset)? });
+    }
+    let [x, y, z, offset] = parse_numbers(text, "a plane")?;
+    if [x, y, z] == [0.0; 3] {
+        return Err("the normal of a plane is not 0,0,0".to_owned());
+    }
+    Ok(Plane { normal: [x, y, z], offset })
+}
+
+/// The result as programs get it.
+#[derive(Serialize)]
+struct Report {
+    #[serde(flatten)]
+    surface: Amount,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    edges: Option<usize>,
+}
+
+pub fn run(arguments: &Arguments) -> Result<()> {
+    arguments.output.check(arguments.query.files())?;
+    let mut answer = arguments.query.answer()?;
+    let (names, fields) = (answer.field_names()?, answer.all_values()?);
+    let mesh = answer.opened.session.view();
+    let start = Instant::now();
+    let mut slice = Slice::new();
+    slice.extract(&mesh, &arguments.plane);
+    let mut edges = Vec::new();
+    if arguments.edges {
+        slice.cell_edges(&mut edges);
+    }
+    let seconds = start.elapsed().as_secs_f64();
+    let values = fields.iter().map(|field| slice.interpolate(&mesh, field));
+    let data = PolyData {
+        positions: slice.positions().to_vec(),
+        normals: Vec::new(),
+        fields: names.into_iter().zip(values).collect(),
+        triangles: slice.indices().to_vec(),
+        lines: edges.iter().map(|edge| edge.to_vec()).collect(),
+    };
+    arguments.output.write(&data)?;
+    let edges = arguments.edges.then_some(edges.len());
+    let report = Report { surface: Amount::of(&data), edges };
+    let mut rows = report.surface.rows(&arguments.output);
+    if let Some(edges) = edges {
+        rows.push(("cell edges", output::count(edges as u64)));
+    }
+    arguments.query.print(&report, rows, (&answer.summary, seconds))
+}

@@ -1,0 +1,216 @@
+//! `tetralod stats`: integral, mean and histogram of a field over the mesh.
+
+use super::poly::write_table;
+use super::query::{Answer, Query, parse_numbers};
+use super::{files, output};
+use anyhow::{Context, Result, bail};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+use tetralod::view::{FieldStats, Histogram};
+
+/// Tells the integral, the mean and the histogram of a field, exact for the field that is linear in every tetrahedron.
+#[derive(clap::Args)]
+#[command(after_help = "Examples: tetralod stats engine.mt --error 1% --bins 20\n          \
+                        tetralod stats engine.mt --error 1% --reference engine.vtu -o histogram.csv")]
+pub struct Arguments {
+    /// Number of bins of the histogram.
+    #[arg(long, value_name = "N", default_value = "10", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    bins: u32,
+    /// Where the first bin starts and the last one ends, in units of the field; the field's range if not given.
+    #[arg(long = "bin-range", value_name = "low,high", value_parser = parse_range, allow_hyphen_values = true)]
+    bin_range: Option<[f64; 2]>,
+    /// Compare with this mesh: the one that the MT was built from.
+    #[arg(long, value_name = "INPUT")]
+    reference: Option<PathBuf>,
+    #[command(flatten)]
+    query: Query,
+    /// The histogram to write: .csv.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+fn parse_range(text: &str) -> Result<[f64; 2], String> {
+    let [low, high] = parse_numbers(text, "a range")?;
+    if low < high { Ok([low, high]) } else { Err("a range has its smaller end first".to_owned()) }
+}
+
+/// The result as programs get it: volumes in cubic model units, values in units of the field.
+#[derive(Serialize)]
+struct Report {
+    #[serde(flatten)]
+    found: Numbers,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reference: Option<Compared>,
+    histogram: Bins,
+}
+
+#[derive(Serialize)]
+struct Numbers {
+    volume: f64,
+    integral: f64,
+    mean: f64,
+    standard_deviation: f64,
+    min: f64,
+    max: f64,
+}
+
+/// The reference, and how far the mesh is from it.
+#[derive(Serialize)]
+struct Compared {
+    #[serde(flatten)]
+    found: Numbers,
+    volume_error: f64,
+    integral_error: f64,
+    mean_error: f64,
+    /// The fraction of the volume that would have to change its bin.
+    histogram_error: f64,
+}
+
+#[derive(Serialize)]
+struct Bins {
+    edges: Vec<f64>,
+    volumes: Vec<f64>,
+    below: f64,
+    above: f64,
+}
+
+/// What is summed up in one pass.
+struct Sums {
+    stats: FieldStats,
+    histogram: Histogram,
+}
+
+impl Sums {
+    fn new(bins: u32, [low, high]: [f64; 2]) -> Self {
+        Self { stats: FieldStats::default(), histogram: Histogram::new(low, high, bins as usize) }
+    }
+
+    fn add(&mut self, corners: [[f64; 3]; 4], values: [f64; 4]) {
+        self.stats.add(corners, values);
+        self.histogram.add(corners, values);
+    }
+
+    fn numbers(&self) -> Numbers {
+        let [min, max] = self.stats.range();
+        Numbers {
+            volume: self.stats.volume(),
+            integral: self.stats.integral(),
+            mean: self.stats.mean(),
+            standard_deviation: self.stats.deviation(),
+            min,
+            max,
+        }
+    }
+}
+
+pub fn run(arguments: &Arguments) -> Result<()> {
+    if let Some(path) = &arguments.output {
+        files::check_ending(path, "csv")?;
+        let inputs = arguments.reference.iter().chain(arguments.query.files());
+        files::check_output(path, inputs)?;
+    }
+    let answer = arguments.query.answer()?;
+    let field = &answer.opened.info()?.fields[answer.field];
+    // A constant field is a range, too.
+    let whole =
+        if field.min < field.max { [field.min, field.max] } else { [field.min - 0.5, field.min + 0.5] };
+    let range = arguments.bin_range.unwrap_or(whole);
+    let start = Instant::now();
+    let sums = of_mesh(&answer, Sums::new(arguments.bins, range))?;
+    let seconds = start.elapsed().as_secs_f64();
+    let compare = |path: &Path| compare(path, &answer, &sums, Sums::new(arguments.bins, range));
+    let reference = arguments.reference.as_deref().map(compare).transpose()?;
+    let [below, above] = sums.histogram.outside();
+    let bins = Bins {
+        edges: (0..=arguments.bins as usize).map(|b| sums.histogram.edge(b)).collect(),
+        volumes: sums.histogram.volumes(),
+        below,
+        above,
+    };
+    if let Some(path) = &arguments.output {
+        let upto = bins.edges.len() - 1;
+        let table = [
+            ("low".to_owned(), bins.edges[..upto].to_vec()),
+            ("high".to_owned(), bins.edges[1..].to_vec()),
+            ("volume".to_owned(), bins.volumes.clone()),
+        ];
+        write_table(path, &table)?;
+    }
+    let report = Report { found: sums.numbers(), reference, histogram: bins };
+    arguments.query.print(&report, rows(arguments, &report), (&answer.summary, seconds))
+}
+
+/// Sums over the current mesh on its lattices, which double precision holds exactly.
+fn of_mesh(answer: &Answer, mut sums: Sums) -> Result<Sums> {
+    let info = answer.opened.info()?;
+    let mesh = answer.opened.session.mesh().context("there is no mesh")?;
+    let point = |v: u32| info.lattice.point(mesh.positions()[v as usize]);
+    let value = |v: u32| info.fields[answer.field].value(mesh.levels(v)[answer.field]);
+    mesh.tets().iter().for_each(|tet| sums.add(tet.map(point), tet.map(value)));
+    Ok(sums)
+}
+
+fn compare(path: &Path, answer: &Answer, sums: &Sums, mut reference: Sums) -> Result<Compared> {
+    let (mesh, _) = files::read_mesh(path)?;
+    let name = &answer.summary.field;
+    let Some(field) = mesh.fields.iter().find(|field| field.name == *name) else {
+        bail!("{}: there is no field '{name}'; give the mesh that the MT was built from", path.display());
+    };
+    for tet in &mesh.tets {
+        reference.add(tet.map(|v| mesh.positions[v as usize]), tet.map(|v| field.values[v as usize]));
+    }
+    let [ours, theirs] = [sums, &reference].map(|sums| {
+        let [below, above] = sums.histogram.outside();
+        let volume = sums.stats.volume();
+        let shares = sums.histogram.volumes().into_iter().chain([below, above]);
+        shares.map(|share| share / volume).collect::<Vec<f64>>()
+    });
+    let found = reference.numbers();
+    Ok(Compared {
+        volume_error: sums.stats.volume() - found.volume,
+        integral_error: sums.stats.integral() - found.integral,
+        mean_error: sums.stats.mean() - found.mean,
+        histogram_error: 0.5 * ours.iter().zip(&theirs).map(|(a, b)| (a - b).abs()).sum::<f64>(),
+        found,
+    })
+}
+
+fn rows(arguments: &Arguments, report: &Report) -> Vec<(&'static str, String)> {
+    let numbers = &report.found;
+    let mut rows = vec![
+        ("volume", output::number(numbers.volume)),
+        ("integral", output::number(numbers.integral)),
+        ("mean", output::number(numbers.mean)),
+        ("deviation", output::number(numbers.standard_deviation)),
+        ("range", format!("{} to {}", output::number(numbers.min), output::number(numbers.max))),
+    ];
+    if let Some(reference) = &report.reference {
+        rows.push(("reference", format!("integral {}", output::number(reference.found.integral))));
+        rows.push(("  volume", format!("off by {}", output::number(reference.volume_error))));
+        rows.push(("  integral", format!("off by {}", output::number(reference.integral_error))));
+        rows.push(("  mean", format!("off by {}", output::number(reference.mean_error))));
+        rows.push((
+            "  histogram",
+            format!("off by {} of the volume", output::percent(reference.histogram_error)),
+        ));
+    }
+    let Bins { edges, volumes, below, above } = &report.histogram;
+    let share = |volume: f64| output::percent(volume / numbers.volume);
+    // Not what rounding has put beside the ends.
+    let counts = |volume: f64| volume > 1e-9 * numbers.volume;
+    if counts(*below) {
+        rows.push(("below", share(*below)));
+    }
+    for (ends, volume) in edges.windows(2).zip(volumes).take(100) {
+        let ends = format!("{} to {}", output::number(ends[0]), output::number(ends[1]));
+        rows.push(("bin", format!("{ends}: {}", share(*volume))));
+    }
+    if counts(*above) {
+        rows.push(("above", share(*above)));
+    }
+    if let Some(path) = &arguments.output {
+        rows.push(("file", path.display().to_string()));
+    }
+    rows
+}

@@ -1,0 +1,49 @@
+//! `tetralod surface`: the boundary of the mesh.
+
+use super::poly::{Amount, Target};
+use super::query::Query;
+use anyhow::Result;
+use serde::Serialize;
+use std::time::Instant;
+use tetralod::io::PolyData;
+use tetralod::view::BoundarySurface;
+
+/// Writes the boundary of the mesh: the faces of tetrahedra behind which there is nothing, facing outwards, with all
+/// fields.
+#[derive(clap::Args)]
+#[command(after_help = "Example: tetralod surface engine.mt --error 5% -o engine.stl")]
+pub struct Arguments {
+    #[command(flatten)]
+    query: Query,
+    /// The surface to write: .vtp, .stl, .ply, .obj, or .csv for its points.
+    #[arg(short, long, value_name = "FILE")]
+    output: Target,
+}
+
+/// The result as programs get it.
+#[derive(Serialize)]
+struct Report {
+    #[serde(flatten)]
+    surface: Amount,
+    closed: bool,
+}
+
+pub fn run(arguments: &Arguments) -> Result<()> {
+    arguments.output.check(arguments.query.files())?;
+    let mut answer = arguments.query.answer()?;
+    let (names, fields) = (answer.field_names()?, answer.all_values()?);
+    let start = Instant::now();
+    let mut surface = BoundarySurface::new();
+    surface.extract(&answer.opened.session.view());
+    let seconds = start.elapsed().as_secs_f64();
+    let closed = surface.is_closed();
+    let values = |field: &Vec<f32>| surface.points.iter().map(|p| field[*p as usize]).collect();
+    let fields = names.into_iter().zip(fields.iter().map(values)).collect();
+    let data =
+        PolyData { positions: surface.positions, fields, triangles: surface.indices, ..PolyData::default() };
+    arguments.output.write(&data)?;
+    let report = Report { surface: Amount::of(&data), closed };
+    let mut rows = report.surface.rows(&arguments.output);
+    rows.push(("closed", if closed { "yes" } else { "no" }.to_owned()));
+    arguments.query.print(&report, rows, (&answer.summary, seconds))
+}

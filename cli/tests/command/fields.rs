@@ -1,0 +1,195 @@
+//! Promises of the command for several fields, time steps, fields at cells, units and precision.
+
+use crate::support::{Folder, bad, good, json, number, run, text};
+use std::fs;
+use std::fs::File;
+use tetralod::io;
+use tetralod::mesh::Field;
+use tetralod::mesh::Grid;
+use tetralod::mesh::TetMesh;
+use tetralod::mesh::VectorPart;
+
+/// Cubes with a scalar and a vector that depend on the time.
+fn step(time: Option<f64>, factor: f64) -> TetMesh {
+    let grid = Grid { dims: [5, 4, 4], origin: [0.0; 3], spacing: [0.25, 0.5, 0.5] };
+    let mut mesh = TetMesh { grid: None, ..TetMesh::from_grid(grid, Vec::new()) };
+    let at = |value: fn([f64; 3]) -> f64| -> Vec<f64> {
+        mesh.positions.iter().map(|p| factor * value(*p)).collect()
+    };
+    let vector = |component| Some(VectorPart { name: "U".into(), component: Some(component) });
+    let fields = vec![
+        Field { unit: "Pa".into(), ..Field::new("p", at(|[x, y, z]| x * x + y * z)) },
+        Field { vector: vector(0), ..Field::new("U_x", at(|[x, _, z]| x * z)) },
+        Field { vector: vector(1), ..Field::new("U_y", at(|[_, y, _]| y)) },
+        Field { vector: vector(2), ..Field::new("U_z", at(|[x, y, z]| x + y * z)) },
+    ];
+    mesh.fields = fields.into_iter().map(|field| Field { time, ..field }).collect();
+    mesh
+}
+
+fn write(path: &str, mesh: &TetMesh) {
+    io::write_vtu(mesh, &mut File::create(path).expect("a new file")).expect("a mesh that can be written");
+}
+
+fn names(info: &serde_json::Value) -> Vec<&str> {
+    let fields = info["fields"].as_array().expect("a list");
+    fields.iter().map(|field| field["name"].as_str().expect("a name")).collect()
+}
+
+#[test]
+fn several_fields_with_units_times_and_metadata() {
+    let folder = Folder::new("several-fields");
+    let [input, mt, out] = ["a.vtu", "a.mt", "b.vtu"].map(|name| folder.path(name));
+    write(&input, &step(Some(0.75), 1.0));
+    let built = ["build", &input, "-o", &mt, "--quiet"];
+    good(&[&built[..], &["--field", "p", "--field", "U", "--unit", "U=m/s", "--meta", "case=a=b"]].concat());
+    let info = json(&["info", &mt, "--json"]);
+    assert_eq!(names(&info), ["p", "U_x", "U_y", "U_z"]);
+    let field = |i: usize| &info["fields"][i];
+    assert_eq!((&field(0)["unit"], &field(2)["unit"]), (&"Pa".into(), &"m/s".into()));
+    assert_eq!((&field(3)["vector"]["name"], &field(3)["vector"]["component"]), (&"U".into(), &2.into()));
+    assert!((0..4).all(|i| field(i)["time"] == 0.75 && number(field(i), "floor") > 0.0));
+    assert_eq!(info["metadata"]["case"], "a=b");
+    let shown = good(&["info", &mt]);
+    assert!(shown.contains("U_z (component 2 of U)") && shown.contains("m/s") && shown.contains("time 0.75"));
+    // All of it is in what is written, and read back from there.
+    json(&["extract", &mt, "-o", &out, "--json"]);
+    let read = io::read(out.as_ref()).expect("a mesh");
+    assert_eq!(read.fields.iter().map(|f| f.name.as_str()).collect::<Vec<_>>()[..4], names(&info)[..]);
+    assert_eq!((read.fields[0].unit.as_str(), read.fields[3].unit.as_str()), ("Pa", "m/s"));
+    assert!(read.fields.iter().all(|field| field.time == Some(0.75)));
+    assert_eq!(json(&["verify", &mt, "--against", &input, "--json"])["valid"], true);
+    // A vector's length only by its own name.
+    good(&[&built[..], &["--all-fields"]].concat());
+    assert_eq!(names(&json(&["info", &mt, "--json"])), ["p", "U_x", "U_y", "U_z"]);
+    good(&[&built[..], &["--field", "U_magnitude", "--field", "p"]].concat());
+    assert_eq!(names(&json(&["info", &mt, "--json"])), ["U_magnitude", "p"]);
+    bad(1, &[&built[..], &["--field", "q"]].concat(), &["'q'", "U_x"]);
+    bad(1, &[&built[..], &["--unit", "q=m"]].concat(), &["'q'"]);
+    bad(2, &[&built[..], &["--meta", "method=x"]].concat(), &["method"]);
+    // A conversion keeps it all.
+    let [again, explicit] = ["c.mt", "d.mt"].map(|name| folder.path(name));
+    good(&["build", &input, "-o", &again, "--quiet", "--field", "U", "--meta", "case=1"]);
+    good(&["convert", &again, "-o", &explicit, "--kind", "explicit", "--quiet"]);
+    let [a, b] = [&again, &explicit].map(|path| json(&["info", path, "--json"]));
+    assert_eq!((&a["fields"], &a["metadata"]), (&b["fields"], &b["metadata"]));
+}
+
+#[test]
+fn time_steps_share_one_mesh() {
+    let folder = Folder::new("time-steps");
+    let [first, second, mt, list] = ["a.vtu", "b.vtu", "s.mt", "s.pvd"].map(|name| folder.path(name));
+    write(&first, &step(None, 1.0));
+    write(&second, &step(None, -2.0));
+    let times = |path: &str| -> Vec<(String, f64)> {
+        let info = json(&["info", path, "--json"]);
+        let fields = info["fields"].as_array().expect("a list").iter();
+        fields.map(|f| (f["name"].as_str().expect("a name").to_owned(), number(f, "time"))).collect()
+    };
+    let fields = ["--field", "U_y", "--field", "p", "--quiet"];
+    good(&[&["build", &first, &second, "-o", &mt], &fields[..]].concat());
+    let pairs = |a: f64, b: f64| [("U_y", a), ("U_y", b), ("p", a), ("p", b)].map(|(n, t)| (n.to_owned(), t));
+    assert_eq!(times(&mt), pairs(0.0, 1.0));
+    let both = ["--against", &first, "--against", &second];
+    assert_eq!(json(&[&["verify", &mt, "--json"], &both[..]].concat())["valid"], true);
+    let without = run(&["verify", &mt, "--against", &second]);
+    assert!(!without.status.success() && text(&without.stdout).contains("U_y"));
+    fs::write(
+        &list,
+        "<VTKFile type=\"Collection\"><Collection><DataSet timestep=\"3.5\" file=\"b.vtu\"/>\
+         <DataSet timestep=\"-1\" file=\"a.vtu\"/></Collection></VTKFile>",
+    )
+    .expect("a new file");
+    good(&[&["build", &list, "-o", &mt], &fields[..]].concat());
+    assert_eq!(times(&mt), pairs(-1.0, 3.5));
+    assert_eq!(json(&["verify", &mt, "--against", &list, "--json"])["valid"], true);
+    assert!(good(&["info", &mt]).contains("2 times from -1 to 3.5"));
+    // Only one mesh, only different times, only fields that all steps have.
+    let [other, fewer] = ["c.vtu", "d.vtu"].map(|name| folder.path(name));
+    let mut moved = step(None, 1.0);
+    moved.positions[7][0] += 0.01;
+    write(&other, &moved);
+    bad(1, &["build", &first, &other, "-o", &mt], &["c.vtu", "point 7"]);
+    let mut without = step(None, 1.0);
+    without.fields.remove(0);
+    write(&fewer, &without);
+    bad(1, &["build", &first, &fewer, "-o", &mt], &["d.vtu", "\"p\""]);
+    good(&["build", &first, &fewer, "-o", &mt, "--quiet", "--field", "U"]);
+    write(&first, &step(Some(1.0), 1.0));
+    bad(1, &["build", &first, &second, "-o", &mt], &["b.vtu", "time"]);
+    write(&second, &step(Some(1.0), 2.0));
+    bad(1, &["build", &first, &second, "-o", &mt], &["b.vtu", "time step at 1"]);
+}
+
+/// A mesh of two tetrahedra with a field at its cells.
+const TWO_CELLS: &str = "# vtk DataFile Version 3.0\ntitle\nASCII\nDATASET UNSTRUCTURED_GRID\n\
+    FIELD FieldData 1\nTimeValue 1 1 double\n12.5\nPOINTS 5 double\n0 0 0 1 0 0 0 1 0 0 0 1 0 0 -3\n\
+    CELLS 2 10\n4 0 1 2 3\n4 0 2 1 4\nCELL_TYPES 2\n10 10\n\
+    CELL_DATA 2\nSCALARS rho double 1\nLOOKUP_TABLE default\n8 4\n";
+
+#[test]
+fn fields_at_cells_become_fields_at_points() {
+    let folder = Folder::new("cell-fields");
+    let [input, mt, out] = ["a.vtk", "a.mt", "b.vtu"].map(|name| folder.path(name));
+    fs::write(&input, TWO_CELLS).expect("a new file");
+    bad(1, &["build", &input, "-o", &mt], &["rho", "--cell-to-point"]);
+    bad(1, &["build", &input, "-o", &mt, "--field", "rho"], &["rho", "--cell-to-point"]);
+    good(&["build", &input, "-o", &mt, "--quiet", "--cell-to-point", "--all-fields", "--field-bits", "24"]);
+    let info = json(&["info", &mt, "--json"]);
+    assert_eq!((names(&info), &info["fields"][0]["time"]), (vec!["rho"], &12.5.into()));
+    json(&["extract", &mt, "-o", &out, "--json"]);
+    let mut values = io::read(out.as_ref()).expect("a mesh").fields[0].values.clone();
+    values.sort_by(f64::total_cmp);
+    for (value, expected) in values.iter().zip([4.0, 5.0, 5.0, 5.0, 8.0]) {
+        assert!((value - expected).abs() < 1e-6, "{values:?}");
+    }
+    assert_eq!(json(&["verify", &mt, "--against", &input, "--json"])["valid"], true);
+}
+
+#[test]
+fn precision_is_asked_for_and_told() {
+    let folder = Folder::new("precision");
+    let [input, mt] = ["a.vtu", "a.mt"].map(|name| folder.path(name));
+    let mut mesh = step(None, 1.0);
+    mesh.positions.iter_mut().for_each(|p| p[0] += 0.01 * (p[1] * 7.0).sin());
+    write(&input, &mesh);
+    let info = |more: &[&str]| {
+        good(&[&["build", &input, "-o", &mt, "--quiet", "--all-fields"], more].concat());
+        json(&["info", &mt, "--json"])
+    };
+    let told = info(&["--field-bits", "8", "--field-bits", "U=10", "--field-tolerance", "p=1%"]);
+    let bits: Vec<f64> = (0..4).map(|i| number(&told["fields"][i], "bits")).collect();
+    assert!(bits[0] < 8.0 && bits[1..] == [10.0; 3], "{bits:?}");
+    let p = &told["fields"][0];
+    assert!(number(p, "quantization") <= 0.01 * (number(p, "max") - number(p, "min")));
+    let told = info(&["--position-tolerance", "0.001", "--field-tolerance", "0.002"]);
+    assert!(number(&told, "position_quantization") <= 0.001 && number(&told, "position_bits") < 12.0);
+    // What the lattice of the positions makes of the fields is told with what their own one does.
+    let loss = |told: &serde_json::Value, i: usize| number(&told["fields"][i], "quantization");
+    let fine = info(&["--position-bits", "28", "--field-tolerance", "0.002"]);
+    assert!((0..4).all(|i| loss(&fine, i) <= 0.002), "{fine}");
+    assert!((0..4).all(|i| loss(&told, i) >= loss(&fine, i)), "{told}");
+    info(&["--lossless"]);
+    info(&["--lossless=U"]);
+    let with = |more: &[&str]| -> Vec<String> {
+        let start = ["build", &input, "-o", &mt];
+        start.iter().chain(more).map(|&word| word.to_owned()).collect()
+    };
+    for (code, more, word) in [
+        (2, &["--position-bits", "9", "--position-tolerance", "1"][..], "cannot be used with"),
+        (2, &["--field-bits", "8", "--field-tolerance", "1%"], "give one of them"),
+        (2, &["--field-bits", "25"], "1 to 24"),
+        (2, &["--field-tolerance", "-1"], "-1"),
+        (2, &["--field-tolerance", "x%"], "percentage"),
+        (1, &["--position-bits", "1"], "position bits"),
+        (1, &["--field-tolerance", "1e-15"], "--lossless"),
+        (1, &["--lossless=q"], "'q'"),
+        (1, &["--field-bits", "q=8"], "'q'"),
+    ] {
+        let arguments = with(more);
+        let output = run(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
+        let error = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(code), "{more:?}: {error}");
+        assert!(error.contains(word), "{more:?}: {error}");
+    }
+}

@@ -1,0 +1,201 @@
+//! Promise: `tetralod serve` answers as readers of byte ranges need it, shows nothing but what it was told to, and ends
+//! when it is asked to.
+
+use crate::support::{Folder, Server, bad};
+use std::fs;
+use std::io::{Read, Write};
+use std::net::TcpStream;
+use std::time::Duration;
+use tetralod::stream::{HttpOptions, HttpSource, RangeSource, StreamError, WantedRange};
+
+const DIGITS: &str = "0123456789";
+
+fn ask(server: &Server, method: &str, path: &str, headers: &[(&str, &str)]) -> Answer {
+    let mut stream = TcpStream::connect(server.address().0).expect("it listens");
+    let headers: String = headers.iter().map(|(name, value)| format!("{name}: {value}\r\n")).collect();
+    write!(stream, "{method} {path} HTTP/1.1\r\nHost: x\r\n{headers}Connection: close\r\n\r\n").unwrap();
+    let mut text = String::new();
+    stream.read_to_string(&mut text).expect("an answer");
+    let (head, body) = text.split_once("\r\n\r\n").expect("a head");
+    Answer { status: head[9..12].parse().expect("a status"), head: head.to_owned(), body: body.to_owned() }
+}
+
+fn get(server: &Server, path: &str, headers: &[(&str, &str)]) -> Answer {
+    ask(server, "GET", path, headers)
+}
+
+struct Answer {
+    status: u16,
+    head: String,
+    body: String,
+}
+
+impl Answer {
+    fn header(&self, name: &str) -> Option<&str> {
+        let lines = self.head.lines().filter_map(|line| line.split_once(": "));
+        lines.filter(|(found, _)| found.eq_ignore_ascii_case(name)).map(|(_, value)| value).next()
+    }
+}
+
+/// A folder with `www/digits.mt`, `www/index.html`, and `secret` outside of `www`.
+fn folder(name: &str) -> (Folder, String) {
+    let folder = Folder::new(name);
+    let www = folder.path("www");
+    fs::create_dir_all(&www).expect("a folder");
+    fs::write(folder.path("www/digits.mt"), DIGITS).expect("a file");
+    fs::write(folder.path("www/index.html"), "<p>").expect("a file");
+    fs::write(folder.path("secret"), "secret").expect("a file");
+    (folder, www)
+}
+
+#[test]
+fn whole_files_carry_what_readers_and_caches_need() {
+    let (_folder, www) = folder("serve-whole");
+    let server = Server::start(&[&www]);
+    assert_eq!(server.address().1, "/");
+    let answer = get(&server, "/digits.mt", &[("Origin", "https://example.org")]);
+    assert_eq!((answer.status, answer.body.as_str()), (200, DIGITS));
+    for (name, value) in [
+        ("content-type", "application/octet-stream"),
+        ("content-length", "10"),
+        ("accept-ranges", "bytes"),
+        ("cache-control", "no-cache"),
+        ("access-control-allow-origin", "*"),
+        ("x-content-type-options", "nosniff"),
+    ] {
+        assert_eq!(answer.header(name), Some(value), "{name}");
+    }
+    assert!(answer.header("etag").is_some_and(|tag| tag.starts_with('"')), "{}", answer.head);
+    assert!(answer.header("last-modified").is_some());
+    let exposed = answer.header("access-control-expose-headers").expect("headers are exposed");
+    for name in ["content-range", "etag", "accept-ranges", "content-length"] {
+        assert!(exposed.contains(name), "{name} in {exposed}");
+    }
+    let head = ask(&server, "HEAD", "/digits.mt", &[]);
+    assert_eq!((head.status, head.header("content-length"), head.body.as_str()), (200, Some("10"), ""));
+    assert!(get(&server, "/", &[]).header("content-type").is_some_and(|kind| kind.starts_with("text/html")));
+    assert_eq!(ask(&server, "POST", "/digits.mt", &[]).status, 405);
+}
+
+#[test]
+fn ranges_are_answered_exactly() {
+    let (_folder, www) = folder("serve-ranges");
+    let server = Server::start(&[&www]);
+    for (range, content_range, body) in [
+        ("bytes=2-4", "bytes 2-4/10", "234"),
+        ("bytes=7-", "bytes 7-9/10", "789"),
+        ("bytes=-3", "bytes 7-9/10", "789"),
+        ("bytes=8-99", "bytes 8-9/10", "89"),
+    ] {
+        let answer = get(&server, "/digits.mt", &[("Range", range)]);
+        assert_eq!((answer.status, answer.body.as_str()), (206, body), "{range}");
+        assert_eq!(answer.header("content-range"), Some(content_range), "{range}");
+    }
+    let beyond = get(&server, "/digits.mt", &[("Range", "bytes=10-")]);
+    assert_eq!((beyond.status, beyond.header("content-range")), (416, Some("bytes */10")));
+    // Several ranges at once are not given; a whole file may always be.
+    assert_eq!(get(&server, "/digits.mt", &[("Range", "bytes=0-1,3-4")]).body, DIGITS);
+}
+
+#[test]
+fn a_file_that_was_replaced_is_noticed() {
+    let (folder, www) = folder("serve-tags");
+    let server = Server::start(&[&www]);
+    let first = get(&server, "/digits.mt", &[]);
+    let (tag, date) = (first.header("etag").unwrap(), first.header("last-modified").unwrap());
+    let part = |held: (&str, &str)| get(&server, "/digits.mt", &[("Range", "bytes=2-4"), held]);
+    assert_eq!(part(("If-Range", tag)).body, "234");
+    assert_eq!(part(("If-Range", date)).body, "234");
+    assert_eq!(part(("If-Match", tag)).body, "234");
+    assert_eq!(get(&server, "/digits.mt", &[("If-None-Match", tag)]).status, 304);
+    assert_eq!(get(&server, "/digits.mt", &[("If-Modified-Since", date)]).status, 304);
+    fs::write(folder.path("www/digits.mt"), "abcdefghijk").expect("a file");
+    let whole = part(("If-Range", tag));
+    assert_eq!((whole.status, whole.body.as_str()), (200, "abcdefghijk"));
+    assert_eq!(part(("If-Match", tag)).status, 412);
+    let fresh = get(&server, "/digits.mt", &[("If-None-Match", tag)]);
+    assert_eq!(fresh.status, 200);
+    assert_ne!(fresh.header("etag"), Some(tag));
+}
+
+#[test]
+fn nothing_else_is_shown() {
+    let (folder, www) = folder("serve-outside");
+    let server = Server::start(&[&www]);
+    for path in
+        ["/../secret", "/%2e%2e/secret", "/..%2fsecret", "/x/../../secret", "/..%5csecret", "/%00", "/none"]
+    {
+        let answer = get(&server, path, &[]);
+        assert!(matches!(answer.status, 400 | 404), "{path}: {}", answer.status);
+        assert!(!answer.body.contains("secret"), "{path}");
+        assert_eq!(answer.header("cache-control").unwrap_or("no-store"), "no-store", "{path}");
+    }
+    fs::write(folder.path("www/a b{c}.mt"), "one").expect("a file");
+    let one = Server::start(&[&folder.path("www/a b{c}.mt")]);
+    assert_eq!(one.address().1, "/a%20b%7Bc%7D.mt");
+    assert_eq!(get(&one, one.address().1, &[("Range", "bytes=0-1")]).body, "on");
+    for path in ["/", "/digits.mt", "/../secret"] {
+        assert_eq!(get(&one, path, &[]).status, 404, "{path}");
+    }
+}
+
+#[test]
+fn other_origins_and_caches_are_told_what_was_chosen() {
+    let (_folder, www) = folder("serve-cors");
+    let page = ("Origin", "https://example.org");
+    let server = Server::start(&[&www, "--cors", "https://example.org", "--cache", "60"]);
+    let answer = get(&server, "/digits.mt", &[page, ("Range", "bytes=0-0")]);
+    assert_eq!(answer.header("access-control-allow-origin"), Some("https://example.org"));
+    assert_eq!(answer.header("cache-control"), Some("public, max-age=60"));
+    let asked = [page, ("Access-Control-Request-Method", "GET"), ("Access-Control-Request-Headers", "range")];
+    let preflight = ask(&server, "OPTIONS", "/digits.mt", &asked);
+    assert_eq!(preflight.status, 200);
+    assert!(preflight.header("access-control-allow-headers").is_some_and(|names| names.contains("range")));
+    let server = Server::start(&[&www, "--cors", "none"]);
+    assert_eq!(get(&server, "/digits.mt", &[page]).header("access-control-allow-origin"), None);
+}
+
+#[test]
+fn what_cannot_be_served_is_refused_with_a_reason() {
+    let (folder, www) = folder("serve-refused");
+    bad(1, &["serve", &folder.path("none")], &["none"]);
+    bad(1, &["serve", "--port", "0", "--cors", "example.org", &www], &["--cors", "https://"]);
+    let server = Server::start(&[&www]);
+    let port = server.address().0.rsplit_once(':').unwrap().1;
+    bad(1, &["serve", "--port", port, &www], &[port, "--port"]);
+}
+
+#[test]
+#[cfg(unix)]
+fn it_ends_well_when_it_is_asked_to() {
+    let (_folder, www) = folder("serve-end");
+    for signal in ["-INT", "-TERM"] {
+        let mut server = Server::start(&[&www]);
+        // A connection that nobody uses does not keep it.
+        let _idle = TcpStream::connect(server.address().0).expect("it listens");
+        assert_eq!(get(&server, "/digits.mt", &[]).status, 200);
+        let id = server.child.id().to_string();
+        let sent = std::process::Command::new("kill").args([signal, &id]).status().expect("kill runs");
+        assert!(sent.success());
+        assert!(server.child.wait().expect("it ends").success(), "{signal}");
+        assert!(TcpStream::connect(server.address().0).is_err());
+    }
+}
+
+#[test]
+fn the_project_s_own_client_gets_along_with_it() {
+    let (folder, www) = folder("serve-client");
+    let server = Server::start(&[&www]);
+    let mut source = HttpSource::new(&format!("{}digits.mt", server.url), HttpOptions::default());
+    let wanted = |range| [WantedRange { range, priority: 0.0 }];
+    source.want(&wanted(2..5));
+    assert_eq!(source.next(Duration::from_secs(20)), Ok(Some((2..5, b"234".to_vec()))));
+    assert_eq!((source.total(), source.serves_ranges()), (Some(10), Some(true)));
+    fs::write(folder.path("www/digits.mt"), "abcdefghijk").expect("a file");
+    source.want(&wanted(2..5));
+    assert_eq!(source.next(Duration::from_secs(20)), Err(StreamError::Changed));
+    source.retry();
+    assert_eq!(source.next(Duration::from_secs(20)), Ok(Some((2..5, b"cde".to_vec()))));
+    source.want(&wanted(5..50));
+    assert_eq!(source.next(Duration::from_secs(20)), Ok(Some((5..50, b"fghijk".to_vec()))));
+}

@@ -1,0 +1,266 @@
+//! Promise: the commands that look into a mesh write what they say, in every format, with the error that is guaranteed.
+
+use crate::support::{Folder, bad, good, json, number, table};
+use std::fs;
+use tetralod::mesh::Field;
+use tetralod::mesh::Grid;
+use tetralod::mesh::TetMesh;
+
+/// Makes an MT of a box from (0, 0, 0) to (2, 1, 1) with a linear field `ramp`, a field `hill`, and the velocity of a
+/// rotation around the axis through (1, 0.5, 0) along z.
+fn box_mt(folder: &Folder) -> String {
+    let grid = Grid { dims: [17, 9, 9], origin: [0.0; 3], spacing: [0.125; 3] };
+    let mut mesh = TetMesh::from_grid(grid, Vec::new());
+    let mut field = |name: &str, f: fn([f64; 3]) -> f64| {
+        let values = mesh.positions.iter().map(|p| f(*p)).collect();
+        mesh.fields.push(Field::new(name, values));
+    };
+    field("ramp", |[x, y, z]| x + 2.0 * y - z);
+    field("hill", |[x, y, z]| 1.0 / (0.1 + (x - 1.0).powi(2) + (y - 0.5).powi(2) + (z - 0.5).powi(2)));
+    field("v_x", |[_, y, _]| 0.5 - y);
+    field("v_y", |[x, _, _]| x - 1.0);
+    field("v_z", |_| 0.0);
+    let [input, mt] = ["box.vti", "box.mt"].map(|name| folder.path(name));
+    tetralod::io::write_vti(&mesh, &mut fs::File::create(&input).expect("a file")).expect("it is written");
+    let fields = ["ramp", "hill", "v_x", "v_y", "v_z"].map(|name| ["--field", name]).concat();
+    good(&[&["build", &input, "-o", &mt, "--quiet"], &fields[..]].concat());
+    mt
+}
+
+fn near(a: f64, b: f64) -> bool {
+    (a - b).abs() < 1e-3 * b.abs().max(1.0)
+}
+
+#[test]
+fn surfaces_come_in_every_format() {
+    let folder = Folder::new("formats");
+    let mt = box_mt(&folder);
+    let commands = [
+        &["isosurface", &mt, "--iso", "4", "--field", "hill", "--error", "1%"][..],
+        &["slice", &mt, "--plane", "z=0.4"],
+        &["surface", &mt, "--error", "5%"],
+    ];
+    for command in commands {
+        let mut reports = Vec::new();
+        for ending in ["vtp", "stl", "ply", "obj", "csv"] {
+            let out = folder.path(&format!("out.{ending}"));
+            let mut report = json(&[command, &["-o", &out, "--json"]].concat());
+            report["seconds"] = 0.into();
+            reports.push(report);
+            let bytes = fs::read(&out).expect("it is there");
+            let report = &reports[0];
+            let (points, triangles) =
+                (number(report, "points") as usize, number(report, "triangles") as usize);
+            assert!(points > 10 && triangles > 10, "{report}");
+            let lines = |start: &str| {
+                String::from_utf8_lossy(&bytes).lines().filter(|line| line.starts_with(start)).count()
+            };
+            match ending {
+                "vtp" => assert!(bytes.starts_with(b"<?xml")),
+                "stl" => assert_eq!(bytes.len(), 84 + 50 * triangles),
+                "ply" => assert!(bytes.starts_with(b"ply\nformat binary_little_endian 1.0\n")),
+                "obj" => assert_eq!((lines("v "), lines("f ")), (points, triangles)),
+                _ => assert_eq!(table(&out).1.len(), points),
+            }
+            assert!(number(report, "error_bound") >= 0.0 && report["satisfied"] == true);
+        }
+        assert!(reports.iter().all(|report| *report == reports[0]));
+        let text = good(&[command, &["-o", &folder.path("out.vtp")]].concat());
+        assert!(text.contains("error bound") && text.contains("triangles"));
+    }
+}
+
+#[test]
+fn a_slice_is_the_section_of_the_box() {
+    let folder = Folder::new("slice");
+    let mt = box_mt(&folder);
+    let out = folder.path("slice.csv");
+    let planes = [
+        ("z=0.4", 2.0),
+        ("x=1", 1.0),
+        ("0,0,3,0", 2.0),
+        ("0,-1,0,-1", 2.0),
+        ("1,1,0,1.5", 2.0_f64.sqrt()),
+        ("z=-1", 0.0),
+    ];
+    for (plane, area) in planes {
+        let report = json(&["slice", &mt, "--plane", plane, "--field", "ramp", "-o", &out, "--json"]);
+        assert!(near(number(&report, "area"), area), "{plane}: {report}");
+        let (names, rows) = table(&out);
+        assert_eq!(names, ["x", "y", "z", "ramp", "hill", "v_x", "v_y", "v_z"]);
+        for row in rows {
+            assert!((row[0] + 2.0 * row[1] - row[2] - row[3]).abs() < 1e-3, "{row:?}");
+            assert!((0.5 - row[1] - row[5]).abs() < 1e-3 && (row[0] - 1.0 - row[6]).abs() < 1e-3, "{row:?}");
+        }
+    }
+    let obj = folder.path("slice.obj");
+    let report = json(&["slice", &mt, "--plane", "z=0.4", "--edges", "-o", &obj, "--json"]);
+    let lines = fs::read_to_string(&obj).expect("text").lines().filter(|line| line.starts_with("l ")).count();
+    assert!(lines as f64 == number(&report, "edges") && lines > 100);
+}
+
+#[test]
+fn isosurfaces_have_their_values_and_the_boundary_its_area() {
+    let folder = Folder::new("iso");
+    let mt = box_mt(&folder);
+    let out = folder.path("iso.csv");
+    let iso =
+        |more: &[&str]| json(&[&["isosurface", &mt, "--field", "hill", "-o", &out, "--json"], more].concat());
+    let [one, other] = ["4", "6"].map(|value| iso(&["--iso", value]));
+    let both = iso(&["--iso", "4", "--iso", "6"]);
+    assert_eq!(one["closed"], true);
+    for key in ["points", "triangles", "area"] {
+        assert!(
+            (number(&one, key) + number(&other, key) - number(&both, key)).abs() < 1e-6 * number(&both, key)
+        );
+    }
+    let (names, rows) = table(&out);
+    assert_eq!(names, ["x", "y", "z", "nx", "ny", "nz", "hill"]);
+    let ring = |row: &Vec<f64>| [row[0] - 1.0, row[1] - 0.5, row[2] - 0.5].iter().map(|x| x * x).sum::<f64>();
+    for row in &rows {
+        assert!((ring(row) - (1.0 / row[6] - 0.1)).abs() < 0.02, "{row:?}");
+    }
+    let ramp = json(&["isosurface", &mt, "--iso", "1.5", "--field", "ramp", "-o", &out, "--json"]);
+    assert_eq!(ramp["closed"], false);
+    let surface = json(&["surface", &mt, "--error", "3%", "-o", &out, "--json"]);
+    assert!(near(number(&surface, "area"), 10.0) && surface["closed"] == true, "{surface}");
+    assert_eq!(table(&out).0, ["x", "y", "z", "ramp", "hill", "v_x", "v_y", "v_z"]);
+}
+
+#[test]
+fn what_cannot_be_done_is_refused_with_a_reason() {
+    let folder = Folder::new("refuse");
+    let mt = box_mt(&folder);
+    let out = folder.path("out.vtp");
+    let before = folder.names();
+    bad(2, &["isosurface", &mt, "-o", &out], &["--iso"]);
+    bad(2, &["surface", &mt, "-o", &folder.path("out.xyz")], &[".vtp", ".csv"]);
+    bad(2, &["slice", &mt, "-o", &out], &["--plane"]);
+    for plane in ["w=1", "1,2,3", "0,0,0,1", "x=", "1,2,nan,4"] {
+        bad(2, &["slice", &mt, "--plane", plane, "-o", &out], &["--plane"]);
+    }
+    bad(1, &["surface", &mt, "--field", "none", "-o", &out], &["none", "ramp", "hill"]);
+    bad(1, &["surface", &folder.path("box.vti"), "-o", &out], &["box.vti", "not an MT file"]);
+    bad(1, &["slice", &mt, "--plane", "z=0.5", "--edges", "-o", &folder.path("o.stl")], &["o.stl", ".vtp"]);
+    assert_eq!(folder.names(), before);
+}
+
+#[test]
+fn points_have_their_values() {
+    let folder = Folder::new("points");
+    let mt = box_mt(&folder);
+    let points = ["--point", "0.3,0.4,0.5", "--point", "3,0,0", "--point", "2,1,1"];
+    let report = json(&[&["probe", &mt, "--json"], &points[..]].concat());
+    assert_eq!((number(&report, "points"), number(&report, "outside")), (3.0, 1.0));
+    let values = report["values"].as_array().expect("one each");
+    assert!(near(number(&values[0], "ramp"), 0.6) && near(number(&values[2], "ramp"), 3.0), "{report}");
+    assert!(values[1].is_null() && number(&values[0], "hill") > 0.0);
+    assert!(good(&[&["probe", &mt], &points[..]].concat()).contains("ramp at 0.3,0.4,0.5"));
+
+    let [input, out, lines] = ["in.csv", "out.csv", "out.vtp"].map(|name| folder.path(name));
+    fs::write(&input, "x,y,z,name\n0.25,0.5,0.75,a\n-1,0,0,b\n 1 , 1 , 1 ,c\n").expect("a file");
+    let report = json(&["probe", &mt, "--points", &input, "-o", &out, "--json"]);
+    assert_eq!((number(&report, "points"), number(&report, "outside")), (3.0, 1.0));
+    let (names, rows) = table(&out);
+    assert_eq!(names, ["x", "y", "z", "tetrahedron", "ramp", "hill", "v_x", "v_y", "v_z"]);
+    assert!(near(rows[0][4], 0.5) && rows[1][4].is_nan() && near(rows[2][4], 2.0), "{rows:?}");
+    // The points of a mesh are all inside it.
+    let report = json(&["probe", &mt, "--points", &folder.path("box.vti"), "-o", &lines, "--json"]);
+    assert_eq!((number(&report, "points"), number(&report, "outside")), (17.0 * 81.0, 0.0));
+    fs::write(&input, "x,y,z\n1,2\n").expect("a file");
+    bad(1, &["probe", &mt, "--points", &input], &["in.csv", "line 2", "3 numbers"]);
+    bad(2, &["probe", &mt], &["--point"]);
+    bad(2, &["probe", &mt, "--point", "1,2,3", "--line", "0,0,0,1,1,1"], &["--point", "--line"]);
+    bad(2, &["probe", &mt, "--point", "1,2,3", "--samples", "3"], &["--line"]);
+}
+
+#[test]
+fn lines_have_their_profile() {
+    let folder = Folder::new("lines");
+    let mt = box_mt(&folder);
+    let [out, lines] = ["out.csv", "out.obj"].map(|name| folder.path(name));
+    let line = ["probe", &mt, "--error", "2%", "--line", "-1,0.3,0.2,3,0.5,0.7", "--json", "-o"];
+    let report = json(&[&line[..], &[&out]].concat());
+    let whole = number(&report, "length");
+    assert!(
+        near(whole, (16.0_f64 + 0.04 + 0.25).sqrt()) && near(number(&report, "length_inside"), 0.5 * whole)
+    );
+    let (names, rows) = table(&out);
+    assert_eq!(names[..5], ["distance", "x", "y", "z", "tetrahedron"]);
+    assert!(rows.len() % 2 == 0 && rows.is_sorted_by(|a, b| a[0] <= b[0]));
+    let error = number(&report, "relative_error_bound") * 4.0 + 1e-3;
+    assert!(rows.iter().all(|row| (row[1] + 2.0 * row[2] - row[3] - row[5]).abs() <= error), "{rows:?}");
+    json(&[&line[..], &[&lines]].concat());
+    assert!(fs::read_to_string(&lines).expect("text").lines().any(|line| line.starts_with("l ")));
+
+    let report = json(&[&line[..], &[&out, "--samples", "41"]].concat());
+    let (_, rows) = table(&out);
+    assert_eq!((rows.len(), number(&report, "points")), (41, 41.0));
+    let inside = rows.iter().filter(|row| !row[5].is_nan()).count() as f64;
+    assert!((19.0..=21.0).contains(&inside) && inside + number(&report, "outside") == 41.0);
+}
+
+#[test]
+fn streamlines_follow_the_field() {
+    let folder = Folder::new("stream");
+    let mt = box_mt(&folder);
+    let [out, lines] = ["out.csv", "out.vtp"].map(|name| folder.path(name));
+    let seeds = ["streamlines", &mt, "--seeds", "1.1,0.5,0.3,1.4,0.5,0.3,4", "--seed", "5,5,5", "--vector"];
+    let report = json(&[&seeds[..], &["v", "--length", "2", "-o", &out, "--json"]].concat());
+    assert_eq!(["seeds", "outside", "lines"].map(|key| number(&report, key)), [5.0, 1.0, 4.0]);
+    assert_eq!(report["ends"]["length"], 8, "both ways: {report}");
+    let (names, rows) = table(&out);
+    assert_eq!(names[..6], ["line", "time", "x", "y", "z", "speed"]);
+    assert_eq!(rows.len() as f64, number(&report, "points"));
+    for row in &rows {
+        let radius = ((row[2] - 1.0).powi(2) + (row[3] - 0.5).powi(2)).sqrt();
+        assert!(
+            (radius - (1.1 + 0.1 * row[0] - 1.0)).abs() < 1e-3 && (row[5] - radius).abs() < 1e-3,
+            "{row:?}"
+        );
+    }
+    let forward = ["v_x,v_y,v_z", "--direction", "forward", "--length", "2", "-o", &lines, "--json"];
+    let report = json(&[&seeds[..], &forward[..]].concat());
+    assert_eq!(report["ends"]["length"], 4);
+    assert!(good(&[&seeds[..], &["v", "-o", &lines]].concat()).contains("seeds"));
+    let before = folder.names();
+    bad(1, &[&seeds[..], &["w", "-o", &lines]].concat(), &["'w'", "v_x"]);
+    bad(1, &[&seeds[..], &["v", "-o", &folder.path("x.stl")]].concat(), &["x.stl", "triangles"]);
+    bad(2, &["streamlines", &mt, "--vector", "v", "-o", &lines], &["--seed"]);
+    assert_eq!(folder.names(), before);
+}
+
+#[test]
+fn statistics_are_those_of_the_box() {
+    let folder = Folder::new("stats");
+    let mt = box_mt(&folder);
+    let [input, out] = ["box.vti", "out.csv"].map(|name| folder.path(name));
+    let report = json(&["stats", &mt, "--reference", &input, "-o", &out, "--json"]);
+    // x + 2 y - z over the box: mean 1 + 1 - 1/2, variance (4 + 4 + 1) / 12.
+    for (key, expected) in
+        [("volume", 2.0), ("integral", 3.0), ("mean", 1.5), ("standard_deviation", 0.75_f64.sqrt())]
+    {
+        assert!(near(number(&report, key), expected), "{key}: {report}");
+        assert!(near(number(&report["reference"], key), expected), "{key}: {report}");
+    }
+    for key in ["volume_error", "integral_error", "mean_error", "histogram_error"] {
+        assert!(number(&report["reference"], key).abs() < 1e-3, "{key}: {report}");
+    }
+    let (names, rows) = table(&out);
+    assert_eq!((names.len(), rows.len()), (3, 10));
+    assert!((rows.iter().map(|row| row[2]).sum::<f64>() - 2.0).abs() < 1e-9);
+
+    let narrow = ["stats", &mt, "--field", "hill", "--bins", "4", "--bin-range", "2,5", "--json"];
+    let report = json(&narrow);
+    let bins = &report["histogram"];
+    let volumes: f64 =
+        bins["volumes"].as_array().expect("four").iter().filter_map(serde_json::Value::as_f64).sum();
+    assert!(number(bins, "below") > 0.0 && number(bins, "above") > 0.0);
+    assert!((volumes + number(bins, "below") + number(bins, "above") - 2.0).abs() < 1e-9);
+    assert!(good(&["stats", &mt, "--reference", &input]).contains("histogram"));
+    // The coarse mesh is off by something, and says by how much.
+    let coarse = json(&["stats", &mt, "--field", "hill", "--error", "30%", "--reference", &input, "--json"]);
+    assert!(number(&coarse["reference"], "integral_error") != 0.0);
+    bad(2, &["stats", &mt, "--bin-range", "5,2"], &["--bin-range"]);
+    bad(2, &["stats", &mt, "--bins", "0"], &["--bins"]);
+}
