@@ -48,15 +48,10 @@ export function coreMethods(emit) {
   const advance = (milliseconds, updates) => {
     const start = performance.now();
     parts?.look();
-    const here = parts && session.blocks().here;
     const stats = session.step(milliseconds, updates);
     stats.milliseconds = performance.now() - start;
-    if (!parts) return { stats, more: !stats.done };
-    // Where there was no room for blocks, there may be now.
-    const { here: now } = session.blocks();
-    parts.follow();
-    if (now !== here || parts.hasNews) stats.done = false;
-    return { stats, more: !stats.done || parts.isWaiting };
+    parts?.follow();
+    return { stats, more: !stats.done || Boolean(parts?.hasMore) };
   };
   /** Goes on with all that is here. */
   const advanceAll = () => {
@@ -71,15 +66,14 @@ export function coreMethods(emit) {
   };
   /** Resolves when all is here that the mesh needs. What has come may show what else that is. */
   const settled = async () => {
-    let here;
+    let done;
     do {
       await parts.settled();
-      here = session.blocks().here;
       if (goal === 0) return;
       // News stays news for those who follow the mesh.
-      session.step(Infinity, Infinity);
+      ({ done } = session.step(Infinity, Infinity));
       parts.follow();
-    } while (parts.isWaiting || session.blocks().here !== here);
+    } while (!done || parts.isWaiting);
   };
   /** The mesh as it is now, or what has changed in it, after a step. */
   const result = ({ stats, more }, deltas) => ({ ...(deltas ? session.delta() : session.mesh()), stats, more });
@@ -91,8 +85,8 @@ export function coreMethods(emit) {
     /** Opens a file in parts; resolves to nothing where the server gives no ranges, and otherwise when the base mesh is there. */
     async openParts(url, { fields, memory, ...options }) {
       await loadCore();
-      session = new CoreSession(fields, memory);
-      parts = new Parts(RangeLoader, session, url, options, (progress) => emit("progress", progress));
+      const make = (loader) => (session = CoreSession.inParts(fields, memory, loader));
+      parts = new Parts(RangeLoader, make, url, options, (progress) => emit("progress", progress));
       if (await parts.begin()) return { info: session.info(), progress: parts.progress };
       session.free();
       [session, parts] = [undefined, undefined];

@@ -1,6 +1,7 @@
 /**
- * A file on a server of which only those blocks come that are needed: a session in wasm says which bytes it wants, `Ranges`
- * fetches them. Runs where the session is, so that no bytes cross between threads.
+ * A file on a server of which only those blocks come that are needed: the session in wasm takes what the loader has and tells it
+ * what is wanted; this moves bytes with `Ranges`, and keeps the promises of those who wait. Runs where the session is, so that no
+ * bytes cross between threads.
  */
 
 import { TetralodError, reviveError } from "./errors.js";
@@ -10,8 +11,9 @@ import { Ranges } from "./ranges.js";
 /** What a session in parts has: `CoreSession` and `Viewer` of the wasm modules.
  *
  * @typedef {object} PartsSession
- * @property {() => Float64Array} wanted
- * @property {(start: number, bytes: Uint8Array) => import("./index.js").Progress} take
+ * @property {() => boolean} supply
+ * @property {boolean} isWaiting
+ * @property {() => import("./index.js").Progress} progress
  * @property {() => import("./index.js").BlockProgress} blocks
  */
 
@@ -28,35 +30,31 @@ export class Parts {
   #failure;
   #closed = false;
   #due = false;
-  /** Bytes taken in, and how often that was. */
-  #bytes = 0;
-  #count = 0;
-  #seen = 0;
-  /** The first bytes of the file: more than what stands in front of the blocks, where files are small. */
-  #first;
-  #progress;
+  /** Whether anything has come since `look`. */
+  #hasNews = false;
 
   /**
    * @param {typeof import("./tetralod_core.js").RangeLoader} RangeLoader of the session's wasm module
-   * @param {PartsSession} session
+   * @param {(loader: object) => PartsSession} makeSession makes the session that the loader serves
    * @param {string} url
    * @param {import("./ranges.js").RangesOptions} options
    * @param {(progress: object) => void} onChange hears of everything that comes
    * @param {(error: Error) => void} [onError] hears of what ends the fetching until `retry`
    */
-  constructor(RangeLoader, session, url, options, onChange, onError = () => {}) {
-    this.#session = session;
+  constructor(RangeLoader, makeSession, url, options, onChange, onError = () => {}) {
     this.#url = url;
     this.#onChange = onChange;
     const sink = {
+      // Without ranges each look at the file would be one at all of it.
       onServer: (servesRanges) => servesRanges || this.#turnAway(),
-      onRange: (start, end, bytes) => this.#take(start, bytes),
+      onComplete: () => this.#supply() && this.#soon(),
       onError: (error) => {
         this.#fail(error);
         onError(error);
       },
     };
     this.#ranges = new Ranges(RangeLoader, url, sink, options);
+    this.#session = makeSession(this.#ranges.loader);
   }
 
   /**
@@ -71,55 +69,29 @@ export class Parts {
   /** Asks for what the session wants now, and for nothing else any more. */
   follow() {
     if (this.#closed || this.#failure) return;
-    let wanted = this.#session.wanted();
-    // What has come already with the first bytes is taken from there, and may make the session want other things.
-    while (this.#takeFirst(wanted)) {
-      if (this.#failure) return;
-      this.#onChange(this.progress);
-      wanted = this.#session.wanted();
-    }
-    this.#ranges.want(wanted);
-    if (wanted.length > 0) return;
+    this.#supply();
+    this.#ranges.go();
+    if (this.#failure || this.isWaiting) return;
     for (const { resolve } of this.#settled.splice(0)) resolve();
     this.#wake();
   }
 
-  /** Takes what `wanted` has of the first bytes; whether there was any. */
-  #takeFirst(wanted) {
-    if (!this.#first) return false;
-    let any = false;
-    for (let at = 0; at < wanted.length && !this.#failure; at += 3) {
-      const [start, end] = [wanted[at], wanted[at + 1]];
-      if (end > this.#first.length) continue;
-      this.#give(start, this.#first.subarray(start, end));
-      any = true;
-    }
-    return any;
-  }
-
-  /** Without ranges each look at the file would be one at all of it. */
   #turnAway() {
     this.close();
     this.#begun.resolve(false);
   }
 
-  #take(start, bytes) {
-    if (this.#closed || this.#failure) return;
-    if (start === 0) this.#first = bytes;
-    this.#bytes += bytes.length;
-    this.#give(start, bytes);
-    if (!this.#failure) this.#soon();
-  }
-
-  #give(start, bytes) {
+  /** Hands the session what has come; whether it could take it. */
+  #supply() {
+    if (this.#closed || this.#failure) return false;
     try {
-      this.#progress = this.#session.take(start, bytes);
-      this.#count++;
+      this.#hasNews = this.#session.supply() || this.#hasNews;
+      return true;
     } catch (error) {
       const known = reviveError(error);
       this.#ranges.forget();
-      this.#ranges.want([]);
       this.#fail(new TetralodError(known.code, `${this.#url}: ${known.message}`, { cause: error }));
+      return false;
     }
   }
 
@@ -131,8 +103,9 @@ export class Parts {
       this.#due = false;
       if (this.#closed || this.#failure) return;
       this.follow();
-      this.#onChange(this.progress);
-      if (this.#progress?.ready) this.#begun.resolve(true);
+      const { progress } = this;
+      this.#onChange(progress);
+      if (progress.ready) this.#begun.resolve(true);
       this.#wake();
     });
   }
@@ -149,21 +122,19 @@ export class Parts {
 
   /** What is known of the file as a whole. */
   get progress() {
-    const { ready = false, complete = false, updates = 0 } = this.#progress ?? {};
-    const total = this.#ranges.total ?? this.#progress?.total;
     const blocks = this.#session.blocks();
     // Half-edge and edge-based MTs come in blocks.
-    return { ready, complete, bytes: this.#bytes, total, updates, blocks: blocks.all > 0 ? blocks : undefined };
+    return { ...this.#session.progress(), blocks: blocks.all > 0 ? blocks : undefined };
   }
 
   /** Whether there is more to come. */
   get isWaiting() {
-    return this.#session.wanted().length > 0;
+    return this.#session.isWaiting;
   }
 
-  /** Whether anything has come since `look`. */
-  get hasNews() {
-    return this.#count !== this.#seen;
+  /** Whether there is more to come, or something has come since `look`. */
+  get hasMore() {
+    return this.isWaiting || this.#hasNews;
   }
 
   /** Resolves when all that is wanted has come, rejects when it cannot. */
@@ -173,12 +144,12 @@ export class Parts {
 
   /** Resolves when anything has come since `look`, or another mesh is wanted. */
   arrived() {
-    return this.#wait(this.#arrived, this.#failure || !this.hasNews);
+    return this.#wait(this.#arrived, this.#failure || !this.#hasNews);
   }
 
   /** The mesh is made of what is here now. */
   look() {
-    this.#seen = this.#count;
+    this.#hasNews = false;
   }
 
   /** Another mesh is wanted: those who wait for the one before look again. */

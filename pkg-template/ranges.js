@@ -1,6 +1,6 @@
 /**
- * Byte ranges of a file on a server: the loader in wasm decides what to fetch, this does it. Nothing here knows what the
- * bytes mean.
+ * Byte ranges of a file on a server: the loader in wasm decides what to fetch, cancel or read from the cache, and when; this does
+ * it, and hands over what comes. Nothing here knows what is wanted, or what the bytes mean.
  */
 
 import { TetralodError, reviveError } from "./errors.js";
@@ -38,14 +38,13 @@ const LATE = 100;
 
 /**
  * @typedef {object} RangesSink
- * @property {(start: number, end: number, bytes: Uint8Array) => void} onRange takes a range that was wanted: once, with
- *   fewer bytes where it reaches beyond the end of the file. May call `want`.
+ * @property {() => void} onComplete the loader has ranges that are complete: they are to be taken
  * @property {(servesRanges: boolean) => void} [onServer] hears once, before any range, whether the server gives ranges. May
  *   call `close`.
  * @property {(error: TetralodError) => void} onError nothing comes any more, until `retry` is called
  */
 
-/** What is wanted of one file, and its requests. */
+/** The requests of one file. */
 export class Ranges {
   #loader;
   #url;
@@ -60,9 +59,8 @@ export class Ranges {
   #clock = 0;
   #seen = performance.now();
   #due = Infinity;
-  #kept;
-  /** What has not come yet. */
-  #wanted = [];
+  /** @type {Cached | undefined} */
+  #cached;
   #failed = false;
   #closed = false;
   #knowsServer = false;
@@ -82,34 +80,27 @@ export class Ranges {
     this.#sink = sink;
   }
 
-  /**
-   * Says which ranges are wanted from now on, all of them; each comes out once.
-   *
-   * @param {ArrayLike<number>} triples start, end and priority of each; higher priorities come first
-   */
-  want(triples) {
-    if (this.#closed) return;
-    const wanted = [];
-    for (let at = 0; at + 2 < triples.length; at += 3) wanted.push(Array.prototype.slice.call(triples, at, at + 3));
-    this.#wanted = wanted;
-    this.#ask();
+  /** Decides what is done here; knows what is wanted. */
+  get loader() {
+    return this.#loader;
   }
 
   /** Tries again after an error. */
   retry() {
     if (this.#closed) return;
     this.#loader.retry();
-    this.#kept = undefined;
+    this.#cached = undefined;
     this.#forgets = false;
     this.#failed = false;
-    this.#ask();
+    this.go();
   }
 
   /** What came is damaged: the cache may hold it, and is not used until `retry`. */
   forget() {
-    this.#kept?.clear();
-    this.#kept = undefined;
+    this.#cached?.clear();
+    this.#cached = undefined;
     this.#forgets = true;
+    this.#loader.forgetCached();
   }
 
   /** The size of the file, once it is known. */
@@ -138,29 +129,6 @@ export class Ranges {
     this.#loader.free();
   }
 
-  /** Takes from the cache what is kept there, and asks for the rest. */
-  #ask() {
-    const kept = (range) => this.#kept?.has(range) ?? false;
-    this.#loader.want(Float64Array.from(this.#wanted.filter((range) => !kept(range)).flat()));
-    for (const range of this.#wanted.filter(kept)) this.#takeKept(range);
-    this.#go();
-  }
-
-  async #takeKept(range) {
-    const bytes = await this.#kept.get(range);
-    if (this.#closed) return;
-    // Damaged, or removed by somebody else: then it is fetched like others.
-    if (!bytes) this.#ask();
-    else if (this.#noMore(range)) this.#sink.onRange(range[0], range[1], bytes);
-  }
-
-  /** Takes `range` off the list; whether it was on it. */
-  #noMore([start, end]) {
-    const before = this.#wanted.length;
-    this.#wanted = this.#wanted.filter(([a, b]) => a !== start || b !== end);
-    return this.#wanted.length < before;
-  }
-
   #now() {
     const now = performance.now();
     const passed = now - this.#seen;
@@ -170,19 +138,18 @@ export class Ranges {
     return this.#clock;
   }
 
-  /** Hands out what is complete, and does what the loader says. */
-  #go() {
+  /** Tells of what is complete, and does what the loader says: to be called when something else is wanted. */
+  go() {
     if (this.#closed) return;
     this.#learn();
     if (this.#closed) return;
-    for (let range; (range = this.#loader.take()); ) {
-      const { start, end, bytes } = range;
-      const kept = this.#kept;
-      // A copy at once: whoever takes the range may move it to another thread.
-      const copy = kept && bytes.slice();
-      if (this.#noMore([start, end])) this.#sink.onRange(start, end, bytes);
+    if (this.#loader.hasComplete()) {
+      const cached = this.#cached;
+      const copies = cached?.isOpen ? this.#loader.uncached() : [];
+      this.#sink.onComplete();
       if (this.#closed) return;
-      if (kept === this.#kept) kept?.put([start, end], copy);
+      // What is damaged has made the cache forgotten.
+      if (cached === this.#cached) for (const range of copies) this.#keep(range);
     }
     try {
       this.#obey();
@@ -202,16 +169,35 @@ export class Ranges {
       const { id, start, end, until } = action;
       if (until !== undefined) {
         this.#due = Math.max(until - this.#clock, 1);
-        this.#timer = setTimeout(() => this.#go(), this.#due);
+        this.#timer = setTimeout(() => this.go(), this.#due);
         return;
       }
-      if (start !== undefined) {
-        this.#fetch(id, start, end);
-      } else {
+      if (start === undefined) {
         this.#open.get(id)?.abort();
         this.#open.delete(id);
+      } else if (id === undefined) {
+        this.#read(start, end);
+      } else {
+        this.#fetch(id, start, end);
       }
     }
+  }
+
+  async #keep({ start, end, bytes }) {
+    const cached = this.#cached;
+    if ((await cached.put(start, end, bytes)) && !this.#closed && cached === this.#cached) {
+      this.#loader.addCached(Float64Array.of(start, end));
+    }
+  }
+
+  /** A range from the cache, if it is still there and sound. */
+  async #read(start, end) {
+    const cached = this.#cached;
+    const bytes = await cached?.get(start, end);
+    if (this.#closed || cached !== this.#cached) return;
+    if (bytes) this.#loader.put(start, end, bytes);
+    else this.#loader.lost(start, end);
+    this.go();
   }
 
   /** What the first answer tells: whether there are ranges, and of which version of the file, which opens the cache. */
@@ -222,11 +208,15 @@ export class Ranges {
       if (this.#closed) return;
     }
     const { cache } = this.#options;
-    if (this.#kept || this.#forgets || !cache || !globalThis.caches) return;
+    if (this.#cached || this.#forgets || !cache || !globalThis.caches) return;
     const version = this.#loader.version();
     if (version === undefined) return;
-    this.#kept = new Kept(cache, this.#url, version);
-    this.#kept.opened.then(() => this.#closed || this.#ask());
+    const cached = (this.#cached = new Cached(this.#url, version));
+    cached.open(cache).then((found) => {
+      if (this.#closed || cached !== this.#cached) return;
+      this.#loader.addCached(Float64Array.from(found));
+      this.go();
+    });
   }
 
   /** One request from beginning to end. */
@@ -237,7 +227,7 @@ export class Ranges {
     const tell = (what) => {
       if (this.#closed || this.#open.get(id) !== controller) return false;
       what(this.#now());
-      this.#go();
+      this.go();
       return !this.#closed && this.#open.get(id) === controller;
     };
     const asked = this.#ledTo;
@@ -298,58 +288,54 @@ export class Ranges {
 }
 
 /** Ranges of one version of one file in Cache Storage. Nothing depends on it: whatever fails is as if it were empty. */
-class Kept {
+class Cached {
   #cache;
   #base;
   /** Addresses of what is kept. */
   #keys = new Set();
-  #reading = new Map();
-  /** Resolves when it is known what is kept. */
-  opened;
 
-  constructor(name, url, version) {
+  constructor(url, version) {
     this.#base = new URL(url);
     this.#base.hash = "";
     this.#base.searchParams.set("tetralod-version", version);
-    this.opened = this.#look(name).catch(() => {});
   }
 
-  /** Finds what is kept; ranges of other versions are of no more use. */
-  async #look(name) {
-    const cache = await caches.open(name);
-    this.#cache = cache;
-    const { origin, pathname, searchParams } = this.#base;
-    for (const { url } of await cache.keys()) {
-      const found = new URL(url);
-      const version = found.searchParams.get("tetralod-version");
-      if (!version || found.origin !== origin || found.pathname !== pathname) continue;
-      if (version === searchParams.get("tetralod-version")) this.#keys.add(url);
-      else await cache.delete(url);
+  get isOpen() {
+    return this.#cache !== undefined;
+  }
+
+  /** Finds what is kept: start and end of each range. Those of other versions are of no more use. */
+  async open(name) {
+    const found = [];
+    try {
+      const cache = await caches.open(name);
+      const { origin, pathname, searchParams } = this.#base;
+      for (const { url } of await cache.keys()) {
+        const key = new URL(url);
+        const version = key.searchParams.get("tetralod-version");
+        if (!version || key.origin !== origin || key.pathname !== pathname) continue;
+        if (version !== searchParams.get("tetralod-version")) {
+          await cache.delete(url);
+          continue;
+        }
+        this.#keys.add(url);
+        found.push(...key.searchParams.get("tetralod-range").split("-").map(Number));
+      }
+      this.#cache = cache;
+    } catch {
+      // As if it were empty.
     }
+    return found;
   }
 
-  #key([start, end]) {
+  #key(start, end) {
     const key = new URL(this.#base);
     key.searchParams.set("tetralod-range", `${start}-${end}`);
     return key.href;
   }
 
-  has(range) {
-    return this.#keys.size > 0 && this.#keys.has(this.#key(range));
-  }
-
-  /** The bytes of `range`; asked for again meanwhile, it is read once. */
-  get(range) {
-    const key = this.#key(range);
-    let reading = this.#reading.get(key);
-    if (!reading) {
-      reading = this.#read(key).finally(() => this.#reading.delete(key));
-      this.#reading.set(key, reading);
-    }
-    return reading;
-  }
-
-  async #read(key) {
+  async get(start, end) {
+    const key = this.#key(start, end);
     try {
       const response = await this.#cache.match(key);
       const bytes = response && new Uint8Array(await response.arrayBuffer());
@@ -361,15 +347,21 @@ class Kept {
     return undefined;
   }
 
+  /** Whether the range is kept now. */
+  async put(start, end, bytes) {
+    const key = this.#key(start, end);
+    const response = new Response(bytes, { headers: { "content-length": String(bytes.length) } });
+    try {
+      await this.#cache.put(key, response);
+    } catch {
+      return false;
+    }
+    this.#keys.add(key);
+    return true;
+  }
+
   clear() {
     for (const key of this.#keys) this.#cache.delete(key).catch(() => {});
     this.#keys.clear();
-  }
-
-  put(range, bytes) {
-    if (!this.#cache) return;
-    const key = this.#key(range);
-    const response = new Response(bytes, { headers: { "content-length": String(bytes.length) } });
-    this.#cache.put(key, response).then(() => this.#keys.add(key)).catch(() => {});
   }
 }

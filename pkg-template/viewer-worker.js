@@ -15,8 +15,6 @@ import { serve, webEndpoint } from "./rpc.js";
 const FOLLOW = 120;
 /** A step is as long as the last picture took, but not shorter or longer than this (in ms). */
 const STEP = [6, 30];
-/** How much of a file is asked for first. */
-const FIRST_BYTES = 1 << 16;
 /** Hidden pages have no frames: their meshes follow in steps this far apart (in ms). */
 const HIDDEN = 200;
 
@@ -57,7 +55,8 @@ const methods = {
 
   clear(fields) {
     methods.halt();
-    clear(fields);
+    viewer.clear(fields);
+    forget();
   },
 
   /** Takes a chunk; the answer to the one that brings the base mesh waits until the first picture is out. */
@@ -81,18 +80,27 @@ const methods = {
    */
   async openParts(url, { fields, memory, ...options }) {
     methods.halt();
-    let begun = false;
-    const session = {
-      wanted: () => (begun ? viewer.wanted() : Float64Array.of(0, FIRST_BYTES, 1)),
-      take(start, bytes) {
-        if (!begun) clear(fields, memory);
-        begun = true;
-        return viewer.take(start, bytes);
-      },
-      blocks: () => viewer.blocks(),
+    const make = (loader) => {
+      viewer.openParts(fields, memory, loader);
+      return {
+        /** The first bytes make place for this volume. */
+        supply() {
+          const before = viewer.isOpening;
+          try {
+            return viewer.supply();
+          } finally {
+            if (before && !viewer.isOpening) forget();
+          }
+        },
+        get isWaiting() {
+          return viewer.isWaiting;
+        },
+        progress: () => viewer.progress(),
+        blocks: () => viewer.blocks(),
+      };
     };
-    const onError = (error) => ready && begun && emit("error", flattenError(error));
-    const mine = (parts = new Parts(RangeLoader, session, url, options, partsCame, onError));
+    const onError = (error) => ready && !viewer.isOpening && emit("error", flattenError(error));
+    const mine = (parts = new Parts(RangeLoader, make, url, options, partsCame, onError));
     const served = await mine.begin();
     if (mine !== parts) throw new TetralodError("replaced", "another volume was opened");
     if (!served) {
@@ -184,9 +192,8 @@ function followParts() {
   invalidate();
 }
 
-/** Makes place for another volume. */
-function clear(fields, memory) {
-  viewer.clear(fields, memory);
+/** Another volume has taken the place of the one before. */
+function forget() {
   request = {};
   aimed = false;
   bytes = 0;
@@ -220,12 +227,10 @@ function follow() {
 function step(budget) {
   const start = performance.now();
   try {
-    const here = parts && viewer.blocks().here;
     const stats = /** @type {any} */ (viewer.step(budget));
     const end = performance.now();
+    // A view that follows the camera may want other blocks.
     parts?.follow();
-    // Where there was no room for blocks, there may be now. A view that follows the camera may want others.
-    if (parts && stats.done && viewer.blocks().here !== here) viewer.aimAgain();
     stats.milliseconds = end - start;
     for (const name of Object.keys(total)) total[name] += stats[name];
     if (stats.done) lastRefine = { end, took: total.milliseconds };

@@ -162,6 +162,7 @@ pub mod measure;
 pub mod mesh;
 pub mod mt;
 pub mod refine;
+pub mod remote;
 pub mod session;
 pub mod stream;
 #[cfg(feature = "build")]

@@ -52,7 +52,7 @@ fn code(error: impl Into<JsValue>) -> String {
 
 /// A session that has got `bytes` in pieces of `piece`.
 fn fed(bytes: &[u8], piece: usize) -> CoreSession {
-    let mut session = CoreSession::new(Vec::new(), None);
+    let mut session = CoreSession::new(Vec::new());
     for bytes in bytes.chunks(piece) {
         session.feed(bytes).expect("the fixture is a good file");
     }
@@ -164,7 +164,7 @@ fn a_function_tells_where_the_mesh_is_wanted() {
 
 #[wasm_bindgen_test]
 fn broken_files_and_requests_are_refused_with_a_code() {
-    let mut early = CoreSession::new(Vec::new(), None);
+    let mut early = CoreSession::new(Vec::new());
     assert_eq!(code(early.mesh().err().expect("refused")), "not-ready");
     assert_eq!(code(early.feed(b"<!doctype html><title>404</title>").err().expect("refused")), "not-mt");
 
@@ -174,7 +174,7 @@ fn broken_files_and_requests_are_refused_with_a_code() {
 
     let mut broken = MT.to_vec();
     broken[half] ^= 0x10;
-    let mut session = CoreSession::new(Vec::new(), None);
+    let mut session = CoreSession::new(Vec::new());
     assert_eq!(code(session.feed(&broken).err().expect("refused")), "corrupt");
 
     let mut session = fed(MT, MT.len());

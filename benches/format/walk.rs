@@ -1,4 +1,4 @@
-//! A walk through a model ten times as large as the room for it.
+//! A walk through a model ten times as large as the memory for it.
 
 use super::Result;
 use std::cell::Cell;
@@ -19,14 +19,14 @@ use tetralod::refine::View;
 use tetralod::session::Session;
 use tetralod::stream::Arrived;
 use tetralod::stream::FileSource;
-use tetralod::stream::Source;
+use tetralod::stream::RangeSource;
 use tetralod::stream::StreamError;
-use tetralod::stream::Wanted;
+use tetralod::stream::WantedRange;
 
 /// Requests of a walk.
 const STOPS: u32 = 60;
 
-/// How many times as large as the room the MT is.
+/// How many times as large as the memory the MT is.
 const TIMES: u64 = 10;
 
 /// Counts what a file is asked for.
@@ -35,8 +35,8 @@ struct Counted {
     ranges: Rc<Cell<u64>>,
 }
 
-impl Source for Counted {
-    fn want(&mut self, wanted: &[Wanted]) {
+impl RangeSource for Counted {
+    fn want(&mut self, wanted: &[WantedRange]) {
         self.file.want(wanted);
     }
 
@@ -54,9 +54,9 @@ impl Source for Counted {
 pub fn run(path: &Path) -> Result<()> {
     let file_bytes = fs::metadata(path)?.len();
     let ranges = Rc::new(Cell::new(0));
-    let open = |room: u64| -> Result<Client<Counted>> {
+    let open = |memory: u64| -> Result<Client<Counted>> {
         let source = Counted { file: FileSource::new(File::open(path)?)?, ranges: Rc::clone(&ranges) };
-        Ok(Client::open(source, ClientOptions { room, ..ClientOptions::default() })?)
+        Ok(Client::open(source, ClientOptions { memory, ..ClientOptions::default() })?)
     };
     let mut decoder = Decoder::default();
     decoder.feed(&fs::read(path)?)?;
@@ -64,9 +64,9 @@ pub fn run(path: &Path) -> Result<()> {
     let mt = decoder.into_mt().ok_or("no MT")?;
     let (info, all) = (mt.info().clone(), mt.page_bytes());
     drop(mt);
-    let room = all / TIMES;
+    let memory = all / TIMES;
     let start = Instant::now();
-    let mut client = open(room)?;
+    let mut client = open(memory)?;
     let (mut most, mut most_beside, mut left_out, mut satisfied, mut largest) = (0, 0, 0, 0, 0);
     for stop in 0..STOPS {
         client.aim(&request(client.session(), stop)?)?;
@@ -91,14 +91,14 @@ pub fn run(path: &Path) -> Result<()> {
     println!("| tetrahedra of the reference mesh | {} |", info.tetrahedra);
     println!("| file | {} |", mega(file_bytes));
     println!("| all updates in memory | {} |", mega(all));
-    println!("| room | {} |", mega(room));
+    println!("| memory | {} |", mega(memory));
     println!("| most that blocks took | {} |", mega(most));
     println!("| most that the current mesh took beside them | {} |", mega(most_beside));
     println!("| tetrahedra of the largest mesh | {largest} |");
     println!("| largest memory of the process | {} |", peak().map_or("not known".to_owned(), mega));
     println!("| requests of the walk | {STOPS} |");
     println!("| … met in full | {satisfied} |");
-    println!("| … of which blocks were left out for lack of room | {left_out} |");
+    println!("| … of which blocks were left out for lack of memory | {left_out} |");
     println!("| ranges read | {} |", ranges.get());
     println!(
         "| bytes read | {} ({:.1} times the file) |",

@@ -29,9 +29,9 @@ use tetralod::stream::Arrived;
 use tetralod::stream::FileSource;
 use tetralod::stream::HttpOptions;
 use tetralod::stream::HttpSource;
-use tetralod::stream::Source;
+use tetralod::stream::RangeSource;
 use tetralod::stream::StreamError;
-use tetralod::stream::Wanted;
+use tetralod::stream::WantedRange;
 use tetralod::verify::Reference;
 
 /// Bytes that are read at a time.
@@ -54,7 +54,7 @@ fn partial() -> MutexGuard<'static, Option<PathBuf>> {
 /// Makes Ctrl-C (and SIGTERM) end the program without leaving a partial file.
 pub fn remove_partial_output_on_interrupt() -> Result<()> {
     let interrupted = || {
-        // Held to the end: no file can be created or put in place any more.
+        // Reassembly to the end: no file can be created or put in place any more.
         let partial = partial();
         if let Some(path) = &*partial {
             let _ = fs::remove_file(path);
@@ -193,10 +193,10 @@ impl Opened {
 }
 
 /// Bytes of a file here or on a server.
-pub struct Bytes(Box<dyn Source>);
+pub struct Bytes(Box<dyn RangeSource>);
 
-impl Source for Bytes {
-    fn want(&mut self, wanted: &[Wanted]) {
+impl RangeSource for Bytes {
+    fn want(&mut self, wanted: &[WantedRange]) {
         self.0.want(wanted);
     }
 
@@ -258,7 +258,7 @@ fn read_mt(mut source: Bytes) -> Result<Session> {
     let mut at = 0;
     loop {
         let range = at..at + CHUNK;
-        source.want(&[Wanted { range: range.clone(), priority: 0.0 }]);
+        source.want(&[WantedRange { range: range.clone(), priority: 0.0 }]);
         let bytes = loop {
             if let Some((_, bytes)) = source.next(PATIENCE)? {
                 break bytes;

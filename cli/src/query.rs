@@ -7,6 +7,7 @@ use super::needs::{Group, NamedNeed, Tolerance};
 use super::{files, needs, output};
 use anyhow::{Context, Result};
 use serde::Serialize;
+use std::cell::Cell;
 use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::{Duration, Instant};
@@ -138,22 +139,25 @@ impl Query {
     fn refine(&self, mut client: Client<Bytes>) -> Result<(Opened, RefineStats)> {
         let start = Instant::now();
         let deadline = self.max_ms.map(|ms| Duration::from_secs_f64(ms / 1000.0));
+        let stopped = Cell::new(false);
         let mut go_on = |done: &Outcome| {
-            self.max_updates.is_none_or(|most| done.refined + done.coarsened < most)
-                && deadline.is_none_or(|deadline| start.elapsed() < deadline)
+            let goes_on = self.max_updates.is_none_or(|most| done.refined + done.coarsened < most)
+                && deadline.is_none_or(|deadline| start.elapsed() < deadline);
+            stopped.set(!goes_on);
+            goes_on
         };
         // Which blocks of a half-edge MT are needed shows only while the mesh is refined.
         let mut before = RefineStats::default();
         while client.session().mt().is_some_and(|mt| !mt.needs_parents()) {
             let Step { stats, complete } = client.step(PATIENCE, &mut go_on)?;
-            add_work(&mut before, &stats);
-            if complete || !stats.done {
+            before.add_work(&stats);
+            if complete || stopped.get() {
                 break;
             }
         }
         let mut opened = Opened::of(client);
         let mut stats = opened.session.step(&mut go_on)?;
-        add_work(&mut stats, &before);
+        stats.add_work(&before);
         Ok((opened, stats))
     }
 
@@ -190,13 +194,6 @@ struct Report<'a, T> {
     #[serde(flatten)]
     mesh: &'a Summary,
     seconds: f64,
-}
-
-fn add_work(total: &mut RefineStats, step: &RefineStats) {
-    total.refined += step.refined;
-    total.coarsened += step.coarsened;
-    total.forced += step.forced;
-    total.judged += step.judged;
 }
 
 /// A mesh that answers a query.

@@ -90,3 +90,13 @@ pub struct RefineStats {
     /// Whether there is nothing more to do, as far as budget and data allow. Otherwise the bounds are not known yet.
     pub done: bool,
 }
+
+impl RefineStats {
+    /// Adds what was done in the steps before this one.
+    pub fn add_work(&mut self, before: &Self) {
+        self.refined += before.refined;
+        self.coarsened += before.coarsened;
+        self.forced += before.forced;
+        self.judged += before.judged;
+    }
+}

@@ -2,7 +2,7 @@
 //!
 //! [`Session::in_parts`] starts such a session. It opens nothing: [`Session::wanted`] says which bytes of the file it wants
 //! next, most important first, and [`Session::take`] takes them, in whatever order they come. Blocks that the request does
-//! not need any more go when the room that the session may take is short.
+//! not need any more go when the memory that they may take is short.
 
 use super::Session;
 use crate::format::DecodeOptions;
@@ -39,7 +39,7 @@ pub struct BlockProgress {
     pub here: u32,
     /// Blocks that the request needs, as far as the index tells.
     pub needed: u32,
-    /// Blocks of those that are not to be fetched because there is no room for them.
+    /// Blocks of those that are not to be fetched because there is no memory for them.
     pub left_out: u32,
     /// Bytes in memory of the blocks that are here, and of what waits to be put together.
     pub bytes: u64,
@@ -55,14 +55,14 @@ const LATER_BYTES: u64 = 1 << 20;
 #[derive(Debug)]
 pub(super) struct Blocks {
     /// Bytes that blocks may take in memory.
-    room: u64,
+    memory: u64,
     /// How far the file has been read in order.
     fed: u64,
     /// What has come of blocks that are not complete, by where it begins.
     pieces: BTreeMap<u64, Vec<u8>>,
     /// Complete blocks that wait for others.
     waiting: BTreeMap<u32, Vec<u8>>,
-    /// What is to be here, most important first, as far as there is room.
+    /// What is to be here, most important first, as far as there is memory for it.
     plan: Vec<(f64, u32)>,
     needed: u32,
     left_out: u32,
@@ -76,10 +76,10 @@ pub(super) struct Blocks {
 impl Session {
     /// A session for a file that comes in parts, whose blocks may take so many bytes in memory. Files of kinds that do not come
     /// in blocks (see [`MtKind::is_paged`](crate::mt::MtKind::is_paged)) are wanted as a whole.
-    pub fn in_parts(options: DecodeOptions, room: u64) -> Self {
+    pub fn in_parts(options: DecodeOptions, memory: u64) -> Self {
         let decoder = Decoder::new(DecodeOptions { in_parts: true, ..options });
         let blocks = Blocks {
-            room,
+            memory,
             fed: 0,
             pieces: BTreeMap::new(),
             waiting: BTreeMap::new(),
@@ -124,6 +124,12 @@ impl Session {
             Some(end) => Some(end),
             None => Some(blocks.fed + FIRST_BYTES),
         }
+    }
+
+    /// Whether more is to come of the file, if all goes well: anything that the request needs, or the rest of a file that comes
+    /// from front to back.
+    pub fn is_waiting(&self) -> bool {
+        if self.blocks.is_some() { !self.wanted().is_empty() } else { !self.progress().complete }
     }
 
     /// Takes in bytes that were [wanted](Session::wanted): exactly one of the ranges, or less of it at the end of the file.
@@ -184,7 +190,7 @@ impl Session {
                 blocks.waiting.insert(block, whole);
             }
             self.insert_waiting()?;
-            // What nobody has asked for does not wait for room.
+            // What nobody has asked for does not wait for memory.
             if let Some(blocks) = &mut self.blocks
                 && blocks.criterion.is_none()
                 && blocks.waiting.remove(&block).is_some()
@@ -199,10 +205,10 @@ impl Session {
     fn insert_waiting(&mut self) -> Result<(), FormatError> {
         let mut next = self.next_complete();
         while let Some(block) = next {
-            if !self.has_room_for(block) {
-                self.make_room();
+            if !self.has_memory_for(block) {
+                self.make_place();
             }
-            if !self.has_room_for(block) {
+            if !self.has_memory_for(block) {
                 // When the mesh has followed the request, more can go.
                 break;
             }
@@ -217,9 +223,9 @@ impl Session {
     }
 
     /// Whether a block can come without anything going.
-    fn has_room_for(&self, block: u32) -> bool {
+    fn has_memory_for(&self, block: u32) -> bool {
         let (Some(blocks), Some(mt)) = (&self.blocks, self.decoder.mt()) else { return false };
-        mt.page_bytes() + mt.bytes_of_page(block) <= blocks.room
+        mt.page_bytes() + mt.bytes_of_page(block) <= blocks.memory
     }
 
     /// A block that waits for no other one.
@@ -238,13 +244,13 @@ impl Session {
         let paged = self.decoder.mt().filter(|mt| mt.is_paged());
         let (Some(blocks), Some(mt)) = (&self.blocks, paged) else { return BlockProgress::default() };
         let count = self.decoder.index().map_or(0, |index| index.blocks.len() as u32);
-        // What needs no others waits for room alone.
-        let without_room = if mt.needs_parents() { 0 } else { blocks.waiting.len() as u32 };
+        // What needs no others waits for memory alone.
+        let without_memory = if mt.needs_parents() { 0 } else { blocks.waiting.len() as u32 };
         BlockProgress {
             blocks: count,
             here: (0..count).filter(|&block| mt.has_page(block)).count() as u32,
             needed: blocks.needed,
-            left_out: blocks.left_out + without_room,
+            left_out: blocks.left_out + without_memory,
             bytes: blocks.bytes_beside() + mt.page_bytes(),
         }
     }
@@ -283,10 +289,10 @@ impl Session {
                 .sum(),
             _ => 0,
         };
-        let room = blocks.room;
+        let memory = blocks.memory;
         plan.retain(|&(_, block)| {
             taken += mt.bytes_of_page(block);
-            taken <= room
+            taken <= memory
         });
         blocks.left_out = blocks.needed - plan.len() as u32;
         blocks.plan = plan;
@@ -303,15 +309,15 @@ impl Session {
                 // The mesh shows now what else it needs.
                 self.plan();
             }
-            self.make_room();
+            self.make_place();
             self.insert_waiting()?;
         }
         Ok(())
     }
 
     /// Lets blocks go that the request does not need, those first that have not been needed for longest, until what is here
-    /// and what is wanted fit the room. Those of which an update is applied stay, and what these depend on.
-    fn make_room(&mut self) {
+    /// and what is wanted fit the memory. Those of which an update is applied stay, and what these depend on.
+    fn make_place(&mut self) {
         let (Some(blocks), Some(mt), Some(index)) = (&self.blocks, self.decoder.mt(), self.decoder.index())
         else {
             return;
@@ -324,7 +330,7 @@ impl Session {
                 coming += mt.bytes_of_page(block);
             }
         }
-        let mut excess = (mt.page_bytes() + coming).saturating_sub(blocks.room);
+        let mut excess = (mt.page_bytes() + coming).saturating_sub(blocks.memory);
         if excess == 0 {
             return;
         }

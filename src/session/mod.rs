@@ -219,17 +219,20 @@ impl Session {
     }
 
     /// Goes on towards the mesh that [`Session::aim`] was told, until it is there or `go_on` says no, which is asked after
-    /// every update. The mesh is valid then and within the budget, whether it is done or not.
+    /// every update. The mesh is valid then and within the budget, whether it is done or not. It is not done where blocks came or
+    /// went with this step, for there may be more to do with the others. Data is missing only if it is to come.
     ///
     /// # Errors
     /// If nothing has arrived yet, or the MT turns out to be damaged.
     pub fn step(&mut self, go_on: GoOn<'_>) -> Result<RefineStats, SessionError> {
+        let before = self.block_progress();
         let (Some(front), Some(mt)) = (&mut self.front, self.decoder.mt()) else {
             return Err(SessionError::NotReady);
         };
         let outcome =
             front.step(mt, go_on).map_err(|error| SessionError::Format(FormatError::Update(error)))?;
         self.after_step().map_err(SessionError::Format)?;
+        let done = outcome.done && self.block_progress() == before;
         let (Some(front), Some(mt)) = (&self.front, self.decoder.mt()) else {
             return Err(SessionError::NotReady);
         };
@@ -246,8 +249,8 @@ impl Session {
             excess: outcome.excess,
             bounds,
             satisfied: outcome.satisfied,
-            missing: outcome.missing,
-            done: outcome.done,
+            missing: outcome.missing && self.is_waiting(),
+            done,
         })
     }
 

@@ -1,6 +1,5 @@
 //! The loader over HTTP, for native programs: a thread for each request, and a channel.
 
-use super::answer::Head;
 use super::cache::Cache;
 use super::cache::CacheFolder;
 use super::error::StreamError;
@@ -9,9 +8,10 @@ use super::loader::Failure;
 use super::loader::Loader;
 use super::loader::LoaderOptions;
 use super::loader::Traffic;
-use super::loader::Wanted;
+use super::loader::WantedRange;
+use super::response::ResponseHead;
 use super::source::Arrived;
-use super::source::Source;
+use super::source::RangeSource;
 use std::collections::VecDeque;
 use std::io::Read;
 use std::ops::Range;
@@ -49,7 +49,7 @@ pub struct HttpOptions {
 
 /// Ranges of a file on a server.
 ///
-/// Time passes for it only while [`next`](Source::next) waits: a program that computes for a while must not find its
+/// Time passes for it only while [`next`](RangeSource::next) waits: a program that computes for a while must not find its
 /// requests timed out when it comes back.
 #[derive(Debug)]
 pub struct HttpSource {
@@ -74,22 +74,22 @@ struct Event(u32, What);
 
 #[derive(Debug)]
 enum What {
-    Head(Box<OwnedHead>),
+    Head(Box<OwnedResponseHead>),
     Data(Vec<u8>),
     End,
     Failed(Failure),
 }
 
-/// What a [`Head`] borrows, where it was asked for, and where redirects led to.
+/// What a [`ResponseHead`] borrows, where it was asked for, and where redirects led to.
 #[derive(Debug)]
-struct OwnedHead {
+struct OwnedResponseHead {
     asked: String,
     led_to: String,
     status: u16,
     fields: [Option<String>; 7],
 }
 
-/// In the order of `OwnedHead::fields`.
+/// In the order of `OwnedResponseHead::fields`.
 const FIELDS: [header::HeaderName; 7] = [
     header::CONTENT_RANGE,
     header::CONTENT_LENGTH,
@@ -100,7 +100,7 @@ const FIELDS: [header::HeaderName; 7] = [
     header::RETRY_AFTER,
 ];
 
-impl OwnedHead {
+impl OwnedResponseHead {
     /// Packed answers are unpacked on the way, and their head says neither that nor the length any more.
     fn of(asked: &str, response: &Response<Body>) -> Self {
         let field = |name| Some(response.headers().get(name)?.to_str().ok()?.to_owned());
@@ -108,11 +108,11 @@ impl OwnedHead {
         Self { asked, led_to, status: response.status().as_u16(), fields: FIELDS.map(field) }
     }
 
-    fn head(&self) -> Head<'_> {
+    fn head(&self) -> ResponseHead<'_> {
         let [range, length, encoding, kind, etag, modified, retry] =
             self.fields.each_ref().map(Option::as_deref);
         let number = |text: Option<&str>| text?.trim().parse().ok();
-        Head {
+        ResponseHead {
             status: self.status,
             content_range: range,
             content_length: number(length),
@@ -177,6 +177,8 @@ impl HttpSource {
                     *open != id
                 }),
                 Action::Fetch { id, range, if_match } => self.fetch(id, range, if_match),
+                // Only those are told what a cache has who read it later: `want` has read it already.
+                Action::Read { range } => self.loader.lost(&range),
             }
         }
     }
@@ -211,7 +213,7 @@ impl HttpSource {
         }
     }
 
-    fn take_head(&mut self, id: u32, head: &OwnedHead) {
+    fn take_head(&mut self, id: u32, head: &OwnedResponseHead) {
         if matches!(head.status, 401 | 403 | 404 | 410) && head.asked != self.given {
             // Addresses that redirects lead to may be good for a while only.
             if self.led_to == head.asked {
@@ -268,8 +270,8 @@ impl HttpSource {
     }
 }
 
-impl Source for HttpSource {
-    fn want(&mut self, wanted: &[Wanted]) {
+impl RangeSource for HttpSource {
+    fn want(&mut self, wanted: &[WantedRange]) {
         let Some(cache) = &mut self.cache else { return self.loader.want(wanted) };
         let mut missing = Vec::new();
         for wanted in wanted {
@@ -349,7 +351,7 @@ impl Client {
                 return;
             }
         };
-        if !tell(What::Head(Box::new(OwnedHead::of(url, &response)))) {
+        if !tell(What::Head(Box::new(OwnedResponseHead::of(url, &response)))) {
             return;
         }
         let mut body = response.into_body().into_reader();

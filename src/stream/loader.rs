@@ -1,11 +1,11 @@
 //! Decides which bytes to ask for next, and takes what comes.
 
-use super::answer::Answer;
-use super::answer::Head;
-use super::answer::UNKNOWN;
 use super::error::StreamError;
-use super::held::Held;
 use super::range_set::RangeSet;
+use super::reassembly::Reassembly;
+use super::response::ResponseContent;
+use super::response::ResponseHead;
+use super::response::UNKNOWN;
 use std::collections::VecDeque;
 use std::ops::Range;
 
@@ -48,7 +48,7 @@ impl Default for LoaderOptions {
 
 /// Bytes that are wanted, and how much.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Wanted {
+pub struct WantedRange {
     /// Which bytes. What lies beyond the end of the file comes out shorter.
     pub range: Range<u64>,
     /// Higher comes first.
@@ -66,6 +66,11 @@ pub enum Action {
         range: Range<u64>,
         /// For `If-Match`, where sending that costs nothing (in a page it costs a preflight); answers are checked anyway.
         if_match: Option<String>,
+    },
+    /// Read these bytes, which a cache has, and [put](Loader::put) them, or say that they are [lost](Loader::lost).
+    Read {
+        /// The bytes.
+        range: Range<u64>,
     },
     /// Drop this request; nothing needs to be told of it any more.
     Cancel {
@@ -114,12 +119,15 @@ pub struct Traffic {
 pub struct Loader {
     options: LoaderOptions,
     /// What has not come out yet.
-    wanted: Vec<Wanted>,
+    wanted: Vec<WantedRange>,
     /// Bytes of `wanted` that are not held.
     needed: RangeSet,
     /// Bytes of `wanted` that are.
-    held: Held,
+    reassembly: Reassembly,
     ready: VecDeque<(Range<u64>, Vec<u8>)>,
+    /// Ranges that a cache has, in order, and those of them that are being read.
+    cached: Vec<Range<u64>>,
+    reading: Vec<Range<u64>>,
     requests: Vec<Request>,
     pauses: Vec<Pause>,
     cancelled: Vec<u32>,
@@ -178,7 +186,7 @@ impl Version {
     }
 
     /// Takes over what `head` tells; an error if that is of another version.
-    fn learn(&mut self, head: &Head) -> Result<(), StreamError> {
+    fn learn(&mut self, head: &ResponseHead) -> Result<(), StreamError> {
         agree(&mut self.total, head.total())?;
         let tag = head.strong_etag();
         let same = tag.is_some() && tag == self.etag.as_deref();
@@ -208,14 +216,14 @@ impl Loader {
     /// Says which ranges are wanted from now on, all of them: what is missing in `wanted` is not wanted any more.
     ///
     /// A range comes out once. One that has come out is fetched again if it is still in the list: leave it out.
-    pub fn want(&mut self, wanted: &[Wanted]) {
+    pub fn want(&mut self, wanted: &[WantedRange]) {
         self.wanted = wanted.to_vec();
         let ready = &self.ready;
         self.wanted.retain(|wanted| ready.iter().all(|(range, _)| *range != wanted.range));
         let all = self.all_wanted();
-        self.held.keep(&all);
+        self.reassembly.keep(&all);
         self.needed = all;
-        for range in self.held.ranges() {
+        for range in self.reassembly.ranges() {
             self.needed.remove(&range);
         }
         self.deliver(&(0..UNKNOWN));
@@ -231,6 +239,10 @@ impl Loader {
         if self.error.is_some() {
             return None;
         }
+        if let Some(range) = self.readable() {
+            self.reading.push(range.clone());
+            return Some(Action::Read { range });
+        }
         if let Some((range, strikes)) = self.choose(now_ms) {
             return Some(self.fetch(range, strikes, now_ms));
         }
@@ -240,7 +252,7 @@ impl Loader {
     }
 
     /// The head of an answer has come.
-    pub fn head(&mut self, id: u32, now_ms: u64, head: &Head) {
+    pub fn head(&mut self, id: u32, now_ms: u64, head: &ResponseHead) {
         let Some(at) = self.position(id) else { return };
         let request = &mut self.requests[at];
         request.deadline = now_ms.saturating_add(self.options.timeout_ms);
@@ -248,13 +260,13 @@ impl Loader {
         let judged = head.judge(&request.asked);
         let judged = judged.and_then(|answer| self.file.learn(head).map(|()| answer));
         match judged {
-            Ok(Answer::Part(part)) => {
+            Ok(ResponseContent::Part(part)) => {
                 self.requests[at].body = part;
                 self.ranges = Some(true);
                 self.end_at(self.file.end());
             }
-            Ok(Answer::Whole(end)) => self.take_whole(at, end),
-            Ok(Answer::Beyond(end)) => {
+            Ok(ResponseContent::Whole(end)) => self.take_whole(at, end),
+            Ok(ResponseContent::Beyond(end)) => {
                 self.requests.swap_remove(at);
                 // Its body, if any, says nothing.
                 self.cancelled.push(id);
@@ -326,9 +338,53 @@ impl Loader {
         self.stumble(request, error, now_ms, 0);
     }
 
+    /// Says of more ranges that a cache has them: those that are wanted are read from there.
+    pub fn add_cached(&mut self, ranges: &[Range<u64>]) {
+        self.cached.extend_from_slice(ranges);
+        self.cached.sort_unstable_by_key(|range| (range.start, range.end));
+        self.cached.dedup();
+    }
+
+    /// There is no cache any more.
+    pub fn forget_cached(&mut self) {
+        self.cached.clear();
+        self.reading.clear();
+    }
+
+    /// Takes a range that a cache had, with its bytes; passed over if nobody waits for it any more.
+    pub fn put(&mut self, range: &Range<u64>, bytes: &[u8]) {
+        self.reading.retain(|reading| reading != range);
+        let there = range.start..range.end.min(range.start.saturating_add(bytes.len() as u64));
+        self.store(&there, bytes);
+        self.deliver(range);
+    }
+
+    /// The cache does not have a range any more.
+    pub fn lost(&mut self, range: &Range<u64>) {
+        self.reading.retain(|reading| reading != range);
+        self.cached.retain(|cached| cached != range);
+    }
+
+    /// The ranges that are complete and nobody has taken, those that came out of a cache left out.
+    pub fn uncached(&self) -> impl Iterator<Item = (&Range<u64>, &[u8])> {
+        let new = self.ready.iter().filter(|(range, _)| !self.is_cached(range));
+        new.map(|(range, bytes)| (range, &bytes[..]))
+    }
+
+    /// Whether [`Loader::take`] has something to give.
+    pub fn has_complete(&self) -> bool {
+        !self.ready.is_empty()
+    }
+
     /// A range that is complete: as it was wanted, with its bytes, fewer where it reaches beyond the end of the file.
     pub fn take(&mut self) -> Option<(Range<u64>, Vec<u8>)> {
         self.ready.pop_front()
+    }
+
+    /// Nothing is wanted any more, and what is complete neither.
+    pub fn drop_all(&mut self) {
+        self.want(&[]);
+        self.ready.clear();
     }
 
     /// Why nothing comes any more. What was complete before can still be taken.
@@ -336,11 +392,12 @@ impl Loader {
         self.error.as_ref()
     }
 
-    /// Tries again after an error, from the beginning if the file had changed.
+    /// Tries again after an error, from the beginning if the file had changed; what a cache has is not known any more.
     pub fn retry(&mut self) {
+        self.forget_cached();
         if self.error.take() == Some(StreamError::Changed) {
             self.file = Version::default();
-            self.held = Held::default();
+            self.reassembly = Reassembly::default();
             self.needed = self.all_wanted();
         }
     }
@@ -372,7 +429,20 @@ impl Loader {
 
     /// Bytes that wait for the rest of their range, and complete ones that nobody has taken.
     pub fn held_bytes(&self) -> u64 {
-        self.held.len() + self.ready.iter().map(|(_, bytes)| bytes.len() as u64).sum::<u64>()
+        self.reassembly.len() + self.ready.iter().map(|(_, bytes)| bytes.len() as u64).sum::<u64>()
+    }
+
+    fn is_cached(&self, range: &Range<u64>) -> bool {
+        self.cached.binary_search_by_key(&(range.start, range.end), |range| (range.start, range.end)).is_ok()
+    }
+
+    /// A range that is wanted, that a cache has, and that is not being read.
+    fn readable(&self) -> Option<Range<u64>> {
+        if self.cached.is_empty() {
+            return None;
+        }
+        let ranges = self.wanted.iter().map(|wanted| &wanted.range);
+        ranges.filter(|range| self.is_cached(range)).find(|range| !self.reading.contains(range)).cloned()
     }
 
     fn position(&self, id: u32) -> Option<usize> {
@@ -388,7 +458,7 @@ impl Loader {
         let (mut rest, mut used) = (chunk.clone(), 0);
         while let Some(part) = self.needed.first_in(&rest) {
             let place = |at: u64| (at - chunk.start) as usize;
-            self.held.put(part.start, &bytes[place(part.start)..place(part.end)]);
+            self.reassembly.put(part.start, &bytes[place(part.start)..place(part.end)]);
             self.needed.remove(&part);
             used += part.end - part.start;
             rest.start = part.end;
@@ -398,7 +468,7 @@ impl Loader {
 
     /// Hands out what is complete now that the bytes of `touched` are there or known not to exist.
     fn deliver(&mut self, touched: &Range<u64>) {
-        let Self { wanted, needed, held, ready, file, .. } = self;
+        let Self { wanted, needed, reassembly, ready, file, .. } = self;
         let mut done = Vec::new();
         wanted.retain(|wanted| {
             let range = file.clip(&wanted.range);
@@ -410,7 +480,7 @@ impl Loader {
             }
             // The same range may have been wanted twice.
             if ready.iter().all(|(ready, _)| *ready != wanted.range) {
-                ready.push_back((wanted.range.clone(), held.get(&range)));
+                ready.push_back((wanted.range.clone(), reassembly.get(&range)));
             }
             done.push(range);
             false
@@ -427,11 +497,11 @@ impl Loader {
         for wanted in &self.wanted {
             gone.remove(&wanted.range);
         }
-        let mut keep = RangeSet::of(self.held.ranges().collect());
+        let mut keep = RangeSet::of(self.reassembly.ranges().collect());
         for range in gone.iter() {
             keep.remove(range);
         }
-        self.held.keep(&keep);
+        self.reassembly.keep(&keep);
     }
 
     /// There are no bytes from `end` on.
@@ -536,10 +606,12 @@ impl Loader {
         }
     }
 
-    /// What is on its way or will be tried again.
+    /// What is on its way, will be tried again, or is being read from a cache.
     fn under_way(&self) -> impl Iterator<Item = Range<u64>> {
         let requests = self.requests.iter().map(|request| request.body.clone());
-        requests.chain(self.pauses.iter().map(|pause| pause.range.clone()))
+        requests
+            .chain(self.pauses.iter().map(|pause| pause.range.clone()))
+            .chain(self.reading.iter().cloned())
     }
 
     /// The range from `start` over what is free, and over gaps that are small and not held or on their way.
@@ -559,7 +631,7 @@ impl Loader {
     }
 
     fn is_busy(&self, gap: &Range<u64>) -> bool {
-        let mut busy = self.held.ranges().chain(self.under_way());
+        let mut busy = self.reassembly.ranges().chain(self.under_way());
         busy.any(|range| range.start < gap.end && gap.start < range.end)
     }
 

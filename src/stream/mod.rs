@@ -1,21 +1,20 @@
 //! Byte ranges of a file that is somewhere else: what is wanted now, how much, and how to come by it.
 //!
-//! [`Loader`] decides and a driver does. [`Source`] is what native programs see of both: [`FileSource`] over a file,
+//! [`Loader`] decides and a driver does. [`RangeSource`] is what native programs see of both: [`FileSource`] over a file,
 //! `HttpSource` (feature `http`) over a server. In pages `ranges.js` of the package drives the same loader. Nothing
 //! here knows what the bytes mean.
 
-mod answer;
 #[cfg(feature = "http")]
 mod cache;
 mod error;
-mod held;
 #[cfg(feature = "http")]
 mod http;
 mod loader;
 mod range_set;
+mod reassembly;
+mod response;
 mod source;
 
-pub use answer::Head;
 #[cfg(feature = "http")]
 pub use cache::CacheFolder;
 pub use error::StreamError;
@@ -28,7 +27,8 @@ pub use loader::Failure;
 pub use loader::Loader;
 pub use loader::LoaderOptions;
 pub use loader::Traffic;
-pub use loader::Wanted;
+pub use loader::WantedRange;
+pub use response::ResponseHead;
 pub use source::Arrived;
 pub use source::FileSource;
-pub use source::Source;
+pub use source::RangeSource;

@@ -1,7 +1,7 @@
 //! Where bytes come from, for native programs: one interface for files and servers.
 
 use super::error::StreamError;
-use super::loader::Wanted;
+use super::loader::WantedRange;
 use std::io::Read;
 use std::io::Seek;
 use std::io::SeekFrom;
@@ -12,9 +12,9 @@ use std::time::Duration;
 pub type Arrived = (Range<u64>, Vec<u8>);
 
 /// Something that ranges of bytes can be had from.
-pub trait Source {
+pub trait RangeSource {
     /// Says which ranges are wanted from now on, all of them; each comes out once.
-    fn want(&mut self, wanted: &[Wanted]);
+    fn want(&mut self, wanted: &[WantedRange]);
 
     /// The next range that is complete: waits up to `patience` for it. `None` if there is none by then, or none wanted.
     fn next(&mut self, patience: Duration) -> Result<Option<Arrived>, StreamError>;
@@ -29,7 +29,7 @@ pub struct FileSource<R> {
     reader: R,
     total: u64,
     /// The most important last.
-    wanted: Vec<Wanted>,
+    wanted: Vec<WantedRange>,
 }
 
 impl<R: Read + Seek> FileSource<R> {
@@ -54,8 +54,8 @@ fn unreadable(error: std::io::Error) -> StreamError {
     StreamError::Unreadable(error.to_string())
 }
 
-impl<R: Read + Seek> Source for FileSource<R> {
-    fn want(&mut self, wanted: &[Wanted]) {
+impl<R: Read + Seek> RangeSource for FileSource<R> {
+    fn want(&mut self, wanted: &[WantedRange]) {
         self.wanted = wanted.to_vec();
         self.wanted.sort_by(|a, b| a.priority.total_cmp(&b.priority).then(b.range.start.cmp(&a.range.start)));
     }
@@ -80,7 +80,7 @@ mod tests {
     #[test]
     fn ranges_of_a_file_come_in_the_order_of_their_importance() {
         let mut source = FileSource::new(Cursor::new(b"0123456789".to_vec())).expect("it can be read");
-        let wanted = |range, priority| Wanted { range, priority };
+        let wanted = |range, priority| WantedRange { range, priority };
         source.want(&[
             wanted(7..99, 0.0),
             wanted(2..4, 1.0),

@@ -1,7 +1,7 @@
 //! The benchmark of the command line, for the browser: `cargo xtask bench --browser` sets both side by side.
 
-use super::aim::now;
 use super::error::WebError;
+use super::file::now;
 use super::results;
 use super::results::JsBench;
 use crate::bench;

@@ -63,7 +63,7 @@ impl Callback {
             let words = Reflect::get(&thrown, &"message".into()).ok().and_then(|words| words.as_string());
             format!("it threw: {}", words.or_else(|| thrown.as_string()).unwrap_or_default())
         })?;
-        let numbers = super::options::list(&answer).map(|list| list.to_vec()).unwrap_or_default();
+        let numbers = super::reader::list(&answer).map(|list| list.to_vec()).unwrap_or_default();
         if numbers.len() != tets.len() {
             return Err("it must return an array of one number for each tetrahedron of the batch".to_owned());
         }

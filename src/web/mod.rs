@@ -1,13 +1,13 @@
 //! The JavaScript API: a thin façade over [`session`](crate::session) for wasm-bindgen. The package's JavaScript
 //! (`pkg-template/`) wraps it with streams, workers and promises; nothing here waits or does I/O.
 
-mod aim;
 mod bench;
 mod callback;
 mod error;
+mod file;
 mod loader;
 mod options;
-mod parts;
+mod reader;
 mod results;
 mod session;
 mod tools;

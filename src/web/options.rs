@@ -2,132 +2,20 @@
 
 use super::callback::Callback;
 use super::error::WebError;
+use super::reader::{Reader, read};
 use crate::geom::Bounds;
 use crate::mt::MtInfo;
-use crate::refine::Budget;
-use crate::refine::Criterion;
-use crate::refine::Need;
-use crate::refine::Part;
-use crate::refine::Region;
-use crate::refine::Request;
-use crate::refine::RequestError;
-use crate::refine::Transfer;
-use crate::refine::View;
-use js_sys::Array;
-use js_sys::Function;
-use js_sys::Object;
-use js_sys::Reflect;
+use crate::refine::{Budget, Criterion, Need, Part, Region, Request, RequestError, Transfer, View};
+use js_sys::{Function, Reflect};
+use serde::de::{IgnoredAny, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer};
+use std::fmt;
 use std::sync::Arc;
-use wasm_bindgen::JsCast;
-use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
+use wasm_bindgen::{JsCast, JsValue};
 
 #[wasm_bindgen(typescript_custom_section)]
-const TYPES: &str = r#"
-/** A point or a direction: three numbers, or an object such as the `Vector3` of three.js. */
-export type Vector = ArrayLike<number> | { readonly x: number; readonly y: number; readonly z: number };
-
-/** A number in the field's own units, or a string such as `"1%"` relative to the field's range. */
-export type FieldError = number | string;
-
-/** What a camera sees. */
-export interface ViewOptions {
-  /**
-   * From the space of the model to clip space, 16 numbers column by column. In three.js
-   * `new Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse)`, or its `elements`.
-   */
-  matrix: ArrayLike<number> | { readonly elements: ArrayLike<number> };
-  /** Width and height of the picture in pixels. */
-  viewport: ArrayLike<number>;
-  /** The largest error that may be seen, in pixels: the displacement that the field's error counts as. */
-  pixels: number;
-  /** The error that is good enough everywhere, seen or not. Default: what is not seen is left as coarse as it can be. */
-  outside?: FieldError;
-}
-
-/** The colour and opacity of each value of a field, linear between its points and constant beyond. */
-export interface TransferOptions {
-  /** `[value, red, green, blue, opacity]` of each point: values in field units, ascending, the others from 0 to 1. */
-  points: ArrayLike<ArrayLike<number>> | ArrayLike<number>;
-  /** The way through the model, in parts of its diagonal, along which the opacities are what they say. Default 1. */
-  unitLength?: number;
-}
-
-/**
- * A part of the volume and the error that the mesh may have there. A need is one of three: the field within `error`, in
- * one region or around values or both; what a camera sees, within `view.pixels`; or what a transfer function shows,
- * within `error`.
- */
-export interface Need {
-  /**
-   * The largest error that the mesh may have where it counts. Default 0: the reference mesh. With `transfer`: of colour
-   * and opacity, 0 to 1 or a percentage, along a ray through the whole model.
-   */
-  error?: FieldError;
-  /** The field that the need speaks of: its name, or its number in `info.fields`. Default: the field of the request. */
-  field?: string | number;
-  /** Only tetrahedra that meet this box count: `[x0, y0, z0, x1, y1, z1]`, or the `Box3` of three.js. */
-  box?: ArrayLike<number> | { readonly min: Vector; readonly max: Vector };
-  /** Only what meets this ball counts. */
-  sphere?: { readonly center: Vector; readonly radius: number };
-  /** Only what meets this box counts: its center, and from there the ways to the middles of three faces. */
-  orientedBox?: { readonly center: Vector; readonly halfAxes: ArrayLike<number> | readonly [Vector, Vector, Vector] };
-  /** Only what meets the half-space of all p with `normal · p <= offset` counts. */
-  halfSpace?: { readonly normal: Vector; readonly offset: number };
-  /** Only what is close to a plane counts: all p with `|normal · p - offset| <= thickness / 2 · |normal|`. */
-  slab?: { readonly normal: Vector; readonly offset: number; readonly thickness?: number };
-  /** Only what lies behind all of these planes, `[nx, ny, nz, d]`, counts: all p with `n · p <= d`. At most 16. */
-  planes?: ArrayLike<ArrayLike<number>> | ArrayLike<number>;
-  /** Only tetrahedra whose values may span one of these values, in field units, count. */
-  isovalues?: ArrayLike<number>;
-  /** Only tetrahedra whose values may meet one of these ranges, `[low, high]` in field units, count. */
-  ranges?: ArrayLike<ArrayLike<number>> | ArrayLike<number>;
-  /** What a camera sees. */
-  view?: ViewOptions;
-  /** What a transfer function shows. */
-  transfer?: TransferOptions;
-}
-
-/** Many tetrahedra at once, for a function that says where the mesh is too coarse. */
-export interface TetBatch {
-  /** Number of tetrahedra. */
-  count: number;
-  /** Twelve coordinates a tetrahedron. */
-  positions: Float32Array;
-  /** Four values a tetrahedron, in field units. */
-  values: Float32Array;
-  /** The error of each tetrahedron, in field units: what is removed with it differs from the reference by so much. */
-  errors: Float32Array;
-}
-
-/** How often the error of each tetrahedron exceeds what is wanted there: above 1 it is refined. */
-export type Where = (batch: TetBatch) => ArrayLike<number>;
-
-/**
- * Which mesh is wanted: the coarsest one that meets every need. The options of a {@link Need} describe the first one.
- * Every option may be left out, and names that are not listed here are refused.
- */
-export interface RefineOptions extends Need {
-  /**
-   * The field that errors and values speak of and that the mesh carries: its name (the first time step of that name), or
-   * its number in `info.fields`. Default: the first.
-   */
-  field?: string | number;
-  /** More needs. If they are given and nothing else is, they are the only ones. */
-  needs?: readonly Need[];
-  /**
-   * A need of your own, answered from the base mesh with every request. A function where the MT runs in the caller's
-   * thread (`worker: false`); otherwise the URL of a module whose default export is the function.
-   */
-  where?: Where | string | URL;
-  /** The mesh may have at most so many tetrahedra; the error is then as small as that allows. Default: no limit. */
-  maxTets?: number;
-  /** At most so many vertices. Default: no limit. */
-  maxVertices?: number;
-  /** At most so many bytes of arrays: 32 a tetrahedron and 16 a vertex. Default: no limit. */
-  maxBytes?: number;
-}
-"#;
+const TYPES: &str = include_str!("options.d.ts");
 
 #[wasm_bindgen]
 extern "C" {
@@ -136,23 +24,141 @@ extern "C" {
     pub type RefineOptions;
 }
 
-const REGIONS: [&str; 6] = ["box", "sphere", "orientedBox", "halfSpace", "slab", "planes"];
-const NEED: [&str; 12] = [
-    "error",
-    "field",
-    "box",
-    "sphere",
-    "orientedBox",
-    "halfSpace",
-    "slab",
-    "planes",
-    "isovalues",
-    "ranges",
-    "view",
-    "transfer",
-];
-/// What only a whole request has.
+/// Options of a whole request, not of a need: the names of [`RequestOptions`].
 const REQUEST: [&str; 5] = ["needs", "where", "maxTets", "maxVertices", "maxBytes"];
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "camelCase")]
+struct RequestOptions {
+    needs: Option<Vec<NeedOptions>>,
+    /// A function, which is no value that serde knows.
+    r#where: Option<IgnoredAny>,
+    max_tets: Option<f64>,
+    max_vertices: Option<f64>,
+    max_bytes: Option<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "camelCase")]
+struct NeedOptions {
+    error: Option<Value>,
+    field: Option<Value>,
+    r#box: Option<Numbers>,
+    sphere: Option<SphereOptions>,
+    oriented_box: Option<OrientedBoxOptions>,
+    half_space: Option<PlaneOptions>,
+    slab: Option<SlabOptions>,
+    planes: Option<Numbers>,
+    isovalues: Option<Numbers>,
+    ranges: Option<Numbers>,
+    view: Option<ViewOptions>,
+    transfer: Option<TransferOptions>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SphereOptions {
+    center: Numbers,
+    radius: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "camelCase")]
+struct OrientedBoxOptions {
+    center: Numbers,
+    half_axes: Numbers,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PlaneOptions {
+    normal: Numbers,
+    offset: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SlabOptions {
+    normal: Numbers,
+    offset: f64,
+    thickness: Option<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ViewOptions {
+    matrix: Option<Numbers>,
+    viewport: Option<Numbers>,
+    pixels: f64,
+    outside: Option<Value>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "camelCase")]
+struct TransferOptions {
+    points: Numbers,
+    unit_length: Option<f64>,
+}
+
+/// What is not an object of options: an error, a field, or one of many numbers.
+enum Value {
+    Number(f64),
+    Text(String),
+    List(Vec<f64>),
+}
+
+/// Numbers, in lists of lists or not.
+#[derive(Deserialize)]
+#[serde(try_from = "Vec<Value>")]
+struct Numbers(Vec<f64>);
+
+impl TryFrom<Vec<Value>> for Numbers {
+    type Error = &'static str;
+
+    fn try_from(values: Vec<Value>) -> Result<Self, &'static str> {
+        let mut numbers = Vec::new();
+        for value in values {
+            match value {
+                Value::Number(number) => numbers.push(number),
+                Value::List(mut list) => numbers.append(&mut list),
+                Value::Text(_) => return Err("must be numbers"),
+            }
+        }
+        Ok(Self(numbers))
+    }
+}
+
+impl<'de> Deserialize<'de> for Value {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(OfValue)
+    }
+}
+
+struct OfValue;
+
+impl<'de> Visitor<'de> for OfValue {
+    type Value = Value;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a number, a text or a list of numbers")
+    }
+
+    fn visit_f64<E>(self, number: f64) -> Result<Value, E> {
+        Ok(Value::Number(number))
+    }
+
+    fn visit_str<E>(self, text: &str) -> Result<Value, E> {
+        Ok(Value::Text(text.to_owned()))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<Value, A::Error> {
+        let mut numbers = Vec::new();
+        while let Some(number) = items.next_element()? {
+            numbers.push(number);
+        }
+        Ok(Value::List(numbers))
+    }
+}
 
 /// What was asked for.
 #[derive(Clone, Debug, Default)]
@@ -176,55 +182,49 @@ pub fn asked(options: &JsValue, info: &MtInfo, own: Option<&View>) -> Result<Ask
         parser.asked.units.push(info.fields[0].range());
         return Ok(parser.asked);
     }
-    let options = Options::new(options, "options", String::new())?;
-    options.knows(&[&NEED[..], &REQUEST[..]].concat())?;
-    parser.asked.field = options.field(info)?.unwrap_or(0);
-    let needs = options.get("needs").map(|needs| options.list("needs", &needs)).transpose()?;
-    let others = needs.is_some() || options.has("where");
+    let (need, all): (NeedOptions, RequestOptions) = Reader::read_both(options, &REQUEST)?;
+    let at = Place(String::new());
+    parser.asked.field = parser.field(&need, &at)?.unwrap_or(0);
     // A field alone is no need: it says which one is shown.
-    if !others || NEED.iter().any(|name| *name != "field" && options.has(name)) {
-        parser.need(&options)?;
+    if all.needs.is_none() && all.r#where.is_none() || need.names().next().is_some() {
+        parser.need(&need, &at)?;
     }
-    for (i, need) in needs.iter().flat_map(Array::iter).enumerate() {
-        let need = Options::new(&need, &format!("needs[{i}]"), format!("needs[{i}]."))?;
-        need.knows(&NEED)?;
-        parser.need(&need)?;
+    for (i, need) in all.needs.into_iter().flatten().enumerate() {
+        parser.need(&need, &Place(format!("needs[{i}].")))?;
     }
-    parser.function(&options)?;
-    parser.asked.request.budget = budget(&options)?;
+    if all.r#where.is_some() {
+        parser.function(options)?;
+    }
+    // Casts saturate: more than an integer can count, infinity included, is no limit.
+    parser.asked.request.budget = Budget {
+        tets: at_least_one("maxTets", all.max_tets)?.map(|most| most as u32),
+        vertices: at_least_one("maxVertices", all.max_vertices)?.map(|most| most as u32),
+        bytes: at_least_one("maxBytes", all.max_bytes)?.map(|most| most as u64),
+    };
     Ok(parser.asked)
 }
 
 /// The index of a field that is named, or given by that index.
 pub fn field_index(info: &MtInfo, field: &JsValue) -> Result<usize, WebError> {
-    known_field(info, field).map_err(|problem| WebError::bad_option("field", &problem))
+    known_field(info, &read(field, "field")?).map_err(|problem| WebError::bad_option("field", &problem))
 }
 
-fn known_field(info: &MtInfo, field: &JsValue) -> Result<usize, String> {
-    if let Some(name) = field.as_string() {
-        return named_field(info, &name);
+fn known_field(info: &MtInfo, field: &Value) -> Result<usize, String> {
+    match field {
+        Value::Text(name) => info.fields.iter().position(|field| field.name == *name).ok_or_else(|| {
+            let known: Vec<&str> = info.fields.iter().map(|field| field.name.as_str()).collect();
+            format!("there is no field `{name}`, only {}", known.join(", "))
+        }),
+        Value::Number(number) => {
+            let index = *number as usize;
+            // Casts saturate, and what is no number becomes 0.
+            let is_known = index as f64 == *number && index < info.fields.len();
+            is_known
+                .then_some(index)
+                .ok_or_else(|| format!("there are fields 0 to {}", info.fields.len() - 1))
+        }
+        Value::List(_) => Err("must be a text or a number".to_owned()),
     }
-    let number = field.as_f64().ok_or("must be a text or a number")?;
-    let index = number as usize;
-    // Casts saturate, and what is no number becomes 0.
-    if index as f64 == number && index < info.fields.len() {
-        Ok(index)
-    } else {
-        Err(format!("there are fields 0 to {}", info.fields.len() - 1))
-    }
-}
-
-fn named_field(info: &MtInfo, name: &str) -> Result<usize, String> {
-    info.fields.iter().position(|field| field.name == name).ok_or_else(|| {
-        let known: Vec<&str> = info.fields.iter().map(|field| field.name.as_str()).collect();
-        format!("there is no field `{name}`, only {}", known.join(", "))
-    })
-}
-
-/// An array, typed array or anything like one, as an array.
-pub fn list(value: &JsValue) -> Option<Array> {
-    let has_length = || Reflect::get(value, &"length".into()).is_ok_and(|length| length.as_f64().is_some());
-    (value.is_object() && has_length()).then(|| Array::from(value))
 }
 
 /// The box of `[x0, y0, z0, x1, y1, z1]`.
@@ -243,6 +243,162 @@ fn corners(numbers: &[f64]) -> Result<Bounds, &'static str> {
     Ok(Bounds { min: [x0, y0, z0], max: [x1, y1, z1] })
 }
 
+fn at_least_one(name: &str, number: Option<f64>) -> Result<Option<f64>, WebError> {
+    match number {
+        Some(number) if number.is_nan() || number < 1.0 => {
+            Err(WebError::bad_option(name, "must be a number of at least 1"))
+        }
+        _ => Ok(number),
+    }
+}
+
+/// What stands in front of the names of a need's options.
+struct Place(String);
+
+impl Place {
+    fn refuse(&self, name: &str, problem: &str) -> WebError {
+        WebError::bad_option(&format!("{}{name}", self.0), problem)
+    }
+
+    /// The same for the options of the option `name`.
+    fn inside(&self, name: &str) -> Self {
+        Self(format!("{}{name}.", self.0))
+    }
+
+    /// Numbers of which there must be a certain count.
+    fn fixed<const N: usize>(&self, name: &str, numbers: &Numbers) -> Result<[f64; N], WebError> {
+        let fixed = <[f64; N]>::try_from(&numbers.0[..]);
+        fixed.map_err(|_| self.refuse(name, &format!("must be {N} numbers")))
+    }
+
+    /// Rows of `N` numbers; none if the option is not there.
+    fn rows<const N: usize>(&self, name: &str, numbers: Option<&Numbers>) -> Result<Vec<[f64; N]>, WebError> {
+        let (rows, rest) = numbers.map_or(&[][..], |Numbers(numbers)| numbers).as_chunks::<N>();
+        if rest.is_empty() {
+            return Ok(rows.to_vec());
+        }
+        Err(self.refuse(name, &format!("must be rows of {N} numbers")))
+    }
+
+    /// An error as a part of `range`.
+    fn error(&self, name: &str, error: Option<&Value>, range: f64) -> Result<Option<f64>, WebError> {
+        let relative = match error {
+            None => return Ok(None),
+            Some(Value::Text(text)) => percentage(text).map_err(|problem| self.refuse(name, &problem))?,
+            Some(Value::Number(number)) => number / range,
+            Some(Value::List(_)) => return Err(self.refuse(name, "must be a number or a percentage")),
+        };
+        if relative.is_finite() && relative >= 0.0 {
+            return Ok(Some(relative));
+        }
+        Err(self.refuse(name, "must be a finite number that is not negative"))
+    }
+}
+
+impl NeedOptions {
+    /// The names of the options that are given and limit the need, `field` aside.
+    fn names(&self) -> impl Iterator<Item = &'static str> {
+        let Self {
+            error,
+            field: _,
+            r#box,
+            sphere,
+            oriented_box,
+            half_space,
+            slab,
+            planes,
+            isovalues,
+            ranges,
+            view,
+            transfer,
+        } = self;
+        let given = [
+            ("box", r#box.is_some()),
+            ("sphere", sphere.is_some()),
+            ("orientedBox", oriented_box.is_some()),
+            ("halfSpace", half_space.is_some()),
+            ("slab", slab.is_some()),
+            ("planes", planes.is_some()),
+            ("isovalues", isovalues.is_some()),
+            ("ranges", ranges.is_some()),
+            ("error", error.is_some()),
+            ("transfer", transfer.is_some()),
+            ("view", view.is_some()),
+        ];
+        given.into_iter().filter_map(|(name, is_given)| is_given.then_some(name))
+    }
+
+    /// The option `kind` makes the need one of its own kind: of the others it has but these.
+    fn stands_alone(&self, kind: &str, besides: &[&str], at: &Place) -> Result<(), WebError> {
+        match self.names().find(|name| *name != kind && !besides.contains(name)) {
+            Some(other) => {
+                let problem = format!(
+                    "has no place beside `{kind}`; put it in another one of `needs`, all of which are met"
+                );
+                Err(at.refuse(other, &problem))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// The regions that are given, by their names.
+    fn regions(&self, at: &Place) -> Result<Vec<(&'static str, Region)>, WebError> {
+        let mut regions = Vec::new();
+        if let Some(Numbers(numbers)) = &self.r#box {
+            regions
+                .push(("box", Region::Box(corners(numbers).map_err(|problem| at.refuse("box", problem))?)));
+        }
+        if let Some(SphereOptions { center, radius }) = &self.sphere {
+            let centre = at.inside("sphere").fixed("center", center)?;
+            regions.push(("sphere", Region::Sphere { centre, radius: *radius }));
+        }
+        if let Some(OrientedBoxOptions { center, half_axes }) = &self.oriented_box {
+            let at = at.inside("orientedBox");
+            let [a, b, c, d, e, f, g, h, i] = at.fixed("halfAxes", half_axes)?;
+            let (centre, halves) = (at.fixed("center", center)?, [[a, b, c], [d, e, f], [g, h, i]]);
+            regions.push(("orientedBox", Region::OrientedBox { centre, halves }));
+        }
+        if let Some(PlaneOptions { normal, offset }) = &self.half_space {
+            let normal = at.inside("halfSpace").fixed("normal", normal)?;
+            regions.push(("halfSpace", Region::HalfSpace { normal, offset: *offset }));
+        }
+        if let Some(SlabOptions { normal, offset, thickness }) = &self.slab {
+            let normal = at.inside("slab").fixed("normal", normal)?;
+            let thickness = thickness.unwrap_or(0.0);
+            regions.push(("slab", Region::Slab { normal, offset: *offset, thickness }));
+        }
+        if self.planes.is_some() {
+            regions.push(("planes", Region::Convex(at.rows("planes", self.planes.as_ref())?)));
+        }
+        Ok(regions)
+    }
+
+    /// The region that the need is limited to.
+    fn region(&self, at: &Place) -> Result<Option<(&'static str, Region)>, WebError> {
+        let mut regions = self.regions(at)?;
+        if let [(name, _), (other, _), ..] = &regions[..] {
+            let problem =
+                format!("cannot stand beside `{name}`; one need has one region, `needs` takes several");
+            return Err(at.refuse(other, &problem));
+        }
+        Ok(regions.pop())
+    }
+
+    /// Isovalues and ranges of values.
+    fn ranges(&self, at: &Place) -> Result<Vec<[f64; 2]>, WebError> {
+        let mut ranges: Vec<[f64; 2]> = at.rows("ranges", self.ranges.as_ref())?;
+        if !ranges.iter().all(|[low, high]| low <= high) {
+            return Err(at.refuse("ranges", "each must be two numbers, the smaller one first"));
+        }
+        let isovalues = self.isovalues.as_ref().map_or(&[][..], |Numbers(values)| values);
+        if !isovalues.iter().all(|value| value.is_finite()) {
+            return Err(at.refuse("isovalues", "must be finite numbers"));
+        }
+        ranges.extend(isovalues.iter().map(|&value| [value, value]));
+        Ok(ranges)
+    }
+}
+
 /// Needs as they are found.
 struct Parser<'a> {
     info: &'a MtInfo,
@@ -251,16 +407,21 @@ struct Parser<'a> {
 }
 
 impl Parser<'_> {
-    /// Adds a need, which the option `name` of `options` makes what it is.
-    fn push(&mut self, options: &Options, name: &str, need: Need, unit: f64) -> Result<(), WebError> {
+    /// Adds a need, which the option `name` makes what it is.
+    fn push(&mut self, at: &Place, name: &str, need: Need, unit: f64) -> Result<(), WebError> {
         let alone = Request::from(need);
         alone.check(self.info).map_err(|error| match error {
-            RequestError::Need { problem, .. } => options.refuse(name, problem),
-            _ => options.refuse(name, &error.to_string()),
+            RequestError::Need { problem, .. } => at.refuse(name, problem),
+            _ => at.refuse(name, &error.to_string()),
         })?;
         self.asked.request.needs.extend(alone.needs);
         self.asked.units.push(unit);
         Ok(())
+    }
+
+    fn field(&self, need: &NeedOptions, at: &Place) -> Result<Option<usize>, WebError> {
+        let index = need.field.as_ref().map(|field| known_field(self.info, field)).transpose();
+        index.map_err(|problem| at.refuse("field", &problem))
     }
 
     /// `need` of one field, where there are others.
@@ -269,274 +430,70 @@ impl Parser<'_> {
     }
 
     /// The need that `options` describe.
-    fn need(&mut self, options: &Options) -> Result<(), WebError> {
-        let field = options.field(self.info)?.unwrap_or(self.asked.field);
-        if let Some(view) = options.object("view")? {
-            options.stands_alone("view", &["error", "transfer"])?;
-            return self.view(&view, field);
+    fn need(&mut self, options: &NeedOptions, at: &Place) -> Result<(), WebError> {
+        let field = self.field(options, at)?.unwrap_or(self.asked.field);
+        if options.view.is_some() {
+            options.stands_alone("view", &[], at)?;
+        } else if options.transfer.is_some() {
+            options.stands_alone("transfer", &["error"], at)?;
         }
-        if let Some(transfer) = options.object("transfer")? {
-            options.stands_alone("transfer", &[])?;
-            let error = options.error("error", 1.0)?.unwrap_or(0.0);
-            let part = Part::Transfer(transfer.transfer(field)?);
-            return self.push(options, "transfer", Need { error, field: None, part }, 1.0);
+        if let Some(view) = &options.view {
+            return self.view(view, field, &at.inside("view"));
         }
-        let info = &self.info.fields[field];
-        let mut need =
-            self.of_field(Need::within(options.error("error", info.range())?.unwrap_or(0.0)), field);
+        if let Some(TransferOptions { points, unit_length }) = &options.transfer {
+            let points = at.inside("transfer").rows("points", Some(points))?;
+            let error = at.error("error", options.error.as_ref(), 1.0)?.unwrap_or(0.0);
+            let points = points.into_iter().map(|[value, r, g, b, a]| (value, [r, g, b, a])).collect();
+            let part = Part::Transfer(Transfer { field, points, unit_length: unit_length.unwrap_or(1.0) });
+            return self.push(at, "transfer", Need { error, field: None, part }, 1.0);
+        }
+        let unit = self.info.fields[field].range();
+        let error = at.error("error", options.error.as_ref(), unit)?.unwrap_or(0.0);
+        let mut need = self.of_field(Need::within(error), field);
         let mut name = "error";
-        if let Some((kind, region)) = options.region()? {
+        if let Some((kind, region)) = options.region(at)? {
             name = kind;
             need = need.inside(region);
         }
-        let ranges = options.ranges()?;
+        let ranges = options.ranges(at)?;
         if !ranges.is_empty() {
             need = need.between(field, ranges);
         }
-        let unit = info.range();
-        self.push(options, name, need, unit)
+        self.push(at, name, need, unit)
     }
 
-    fn view(&mut self, view: &Options, field: usize) -> Result<(), WebError> {
-        view.knows(&["matrix", "viewport", "pixels", "outside"])?;
-        let camera = match self.own {
-            Some(own) if !view.has("matrix") && !view.has("viewport") => {
+    fn view(&mut self, view: &ViewOptions, field: usize, at: &Place) -> Result<(), WebError> {
+        let camera = match (&view.matrix, &view.viewport, self.own) {
+            (Some(matrix), Some(viewport), _) => {
+                View { matrix: at.fixed("matrix", matrix)?, viewport: at.fixed("viewport", viewport)? }
+            }
+            (None, None, Some(own)) => {
                 self.asked.follows.push(self.asked.request.needs.len());
                 *own
             }
-            _ => View { matrix: view.fixed("matrix")?, viewport: view.fixed("viewport")? },
+            (None, _, _) => return Err(at.refuse("matrix", "is missing")),
+            (_, None, _) => return Err(at.refuse("viewport", "is missing")),
         };
-        let pixels = view.required("pixels")?;
+        let pixels = view.pixels;
         if !(pixels.is_finite() && pixels >= 0.0) {
-            return Err(view.refuse("pixels", "must be a finite number that is not negative"));
+            return Err(at.refuse("pixels", "must be a finite number that is not negative"));
         }
-        self.push(view, "matrix", self.of_field(Need::seen(camera, pixels), field), 1.0)?;
+        self.push(at, "matrix", self.of_field(Need::seen(camera, pixels), field), 1.0)?;
         let range = self.info.fields[field].range();
-        match view.error("outside", range)? {
-            Some(error) => self.push(view, "outside", self.of_field(Need::within(error), field), range),
+        match at.error("outside", view.outside.as_ref(), range)? {
+            Some(error) => self.push(at, "outside", self.of_field(Need::within(error), field), range),
             None => Ok(()),
         }
     }
 
-    fn function(&mut self, options: &Options) -> Result<(), WebError> {
-        let Some(function) = options.get("where") else { return Ok(()) };
-        let function: Function = function.dyn_into().map_err(|_| {
-            options.refuse("where", "must be a function, or the URL of a module that has one")
+    fn function(&mut self, options: &JsValue) -> Result<(), WebError> {
+        let function =
+            Reflect::get(options, &"where".into()).ok().and_then(|where_| where_.dyn_into::<Function>().ok());
+        let function = function.ok_or_else(|| {
+            WebError::bad_option("where", "must be a function, or the URL of a module that has one")
         })?;
         self.asked.custom.push(Arc::new(Callback::new(function, self.info, self.asked.field)));
         Ok(())
-    }
-}
-
-fn budget(options: &Options) -> Result<Budget, WebError> {
-    let most = |name: &str| {
-        let Some(number) = options.number(name)? else { return Ok(None) };
-        if number >= 1.0 {
-            Ok(Some(number))
-        } else {
-            Err(options.refuse(name, "must be a number of at least 1"))
-        }
-    };
-    // Casts saturate: more than an integer can count, infinity included, is no limit.
-    Ok(Budget {
-        tets: most("maxTets")?.map(|most| most as u32),
-        vertices: most("maxVertices")?.map(|most| most as u32),
-        bytes: most("maxBytes")?.map(|most| most as u64),
-    })
-}
-
-/// An object with options.
-struct Options {
-    object: Object,
-    /// What stands before the name of an option of it.
-    path: String,
-}
-
-impl Options {
-    /// `value`, which is the option `name`, as an object.
-    fn new(value: &JsValue, name: &str, path: String) -> Result<Self, WebError> {
-        // Objects of other pages are instances of other classes.
-        if !value.is_object() || Array::is_array(value) {
-            return Err(WebError::bad_option(name, "must be an object"));
-        }
-        Ok(Self { object: value.clone().unchecked_into(), path })
-    }
-
-    fn refuse(&self, name: &str, problem: &str) -> WebError {
-        WebError::bad_option(&format!("{}{name}", self.path), problem)
-    }
-
-    /// Refuses names that are not among these.
-    fn knows(&self, names: &[&str]) -> Result<(), WebError> {
-        for name in Object::keys(&self.object).iter().filter_map(|name| name.as_string()) {
-            if !names.contains(&name.as_str()) && self.has(&name) {
-                let problem = format!("there is none of this name, only {}", names.join(", "));
-                return Err(self.refuse(&name, &problem));
-            }
-        }
-        Ok(())
-    }
-
-    /// What is undefined is not there.
-    fn get(&self, name: &str) -> Option<JsValue> {
-        let value = Reflect::get(&self.object, &name.into()).unwrap_or(JsValue::UNDEFINED);
-        (!value.is_undefined()).then_some(value)
-    }
-
-    fn has(&self, name: &str) -> bool {
-        self.get(name).is_some()
-    }
-
-    /// The option `name` makes the need one of its own kind.
-    fn stands_alone(&self, name: &str, besides: &[&str]) -> Result<(), WebError> {
-        let others = REGIONS.iter().chain(&["isovalues", "ranges"]).chain(besides);
-        match others.into_iter().find(|other| self.has(other)) {
-            Some(other) => Err(self.refuse(
-                other,
-                &format!(
-                    "has no place beside `{name}`; put it in another one of `needs`, all of which are met"
-                ),
-            )),
-            None => Ok(()),
-        }
-    }
-
-    fn object(&self, name: &str) -> Result<Option<Self>, WebError> {
-        let (path, inner) = (format!("{}{name}", self.path), format!("{}{name}.", self.path));
-        self.get(name).map(|value| Self::new(&value, &path, inner)).transpose()
-    }
-
-    fn list(&self, name: &str, value: &JsValue) -> Result<Array, WebError> {
-        list(value).ok_or_else(|| self.refuse(name, "must be an array"))
-    }
-
-    fn number(&self, name: &str) -> Result<Option<f64>, WebError> {
-        let Some(value) = self.get(name) else { return Ok(None) };
-        value.as_f64().map(Some).ok_or_else(|| self.refuse(name, "must be a number"))
-    }
-
-    fn required(&self, name: &str) -> Result<f64, WebError> {
-        self.number(name)?.ok_or_else(|| self.refuse(name, "is missing"))
-    }
-
-    /// Numbers, in lists of lists or not.
-    fn numbers(&self, name: &str) -> Result<Option<Vec<f64>>, WebError> {
-        let Some(value) = self.get(name) else { return Ok(None) };
-        let mut numbers = Vec::new();
-        for item in self.list(name, &value)?.iter() {
-            match list(&item) {
-                Some(inner) => numbers.extend(inner.iter().map(|number| number.as_f64())),
-                None => numbers.push(item.as_f64()),
-            }
-        }
-        let numbers: Option<Vec<f64>> = numbers.into_iter().collect();
-        numbers.map(Some).ok_or_else(|| self.refuse(name, "must be numbers"))
-    }
-
-    /// Numbers of which there must be a certain count.
-    fn fixed<const N: usize>(&self, name: &str) -> Result<[f64; N], WebError> {
-        let numbers = self.numbers(name)?.ok_or_else(|| self.refuse(name, "is missing"))?;
-        <[f64; N]>::try_from(numbers).map_err(|_| self.refuse(name, &format!("must be {N} numbers")))
-    }
-
-    /// Rows of `N` numbers; none if the option is not there.
-    fn rows<const N: usize>(&self, name: &str) -> Result<Vec<[f64; N]>, WebError> {
-        let numbers = self.numbers(name)?.unwrap_or_default();
-        let (rows, rest) = numbers.as_chunks::<N>();
-        if rest.is_empty() {
-            Ok(rows.to_vec())
-        } else {
-            Err(self.refuse(name, &format!("must be rows of {N} numbers")))
-        }
-    }
-
-    fn field(&self, info: &MtInfo) -> Result<Option<usize>, WebError> {
-        let Some(value) = self.get("field") else { return Ok(None) };
-        known_field(info, &value).map(Some).map_err(|problem| self.refuse("field", &problem))
-    }
-
-    /// An error as a part of `range`.
-    fn error(&self, name: &str, range: f64) -> Result<Option<f64>, WebError> {
-        let Some(value) = self.get(name) else { return Ok(None) };
-        let relative = match value.as_string() {
-            Some(text) => percentage(&text).map_err(|problem| self.refuse(name, &problem))?,
-            None => self.required(name)? / range,
-        };
-        if relative.is_finite() && relative >= 0.0 {
-            return Ok(Some(relative));
-        }
-        Err(self.refuse(name, "must be a finite number that is not negative"))
-    }
-
-    /// The region that the need is limited to.
-    fn region(&self) -> Result<Option<(&'static str, Region)>, WebError> {
-        let mut given = REGIONS.iter().copied().filter(|name| self.has(name));
-        let Some(name) = given.next() else { return Ok(None) };
-        if let Some(other) = given.next() {
-            let problem =
-                format!("cannot stand beside `{name}`; one need has one region, `needs` takes several");
-            return Err(self.refuse(other, &problem));
-        }
-        let region = match name {
-            "box" => {
-                let numbers = self.numbers(name)?.unwrap_or_default();
-                Region::Box(corners(&numbers).map_err(|problem| self.refuse(name, problem))?)
-            }
-            "planes" => Region::Convex(self.rows(name)?),
-            _ => {
-                let Some(object) = self.object(name)? else { return Ok(None) };
-                object.shape(name)?
-            }
-        };
-        Ok(Some((name, region)))
-    }
-
-    /// The region of kind `name` that this object describes.
-    fn shape(&self, name: &str) -> Result<Region, WebError> {
-        let region = match name {
-            "sphere" => {
-                self.knows(&["center", "radius"])?;
-                Region::Sphere { centre: self.fixed("center")?, radius: self.required("radius")? }
-            }
-            "orientedBox" => {
-                self.knows(&["center", "halfAxes"])?;
-                let [a, b, c, d, e, f, g, h, i] = self.fixed("halfAxes")?;
-                let halves = [[a, b, c], [d, e, f], [g, h, i]];
-                Region::OrientedBox { centre: self.fixed("center")?, halves }
-            }
-            "halfSpace" => {
-                self.knows(&["normal", "offset"])?;
-                Region::HalfSpace { normal: self.fixed("normal")?, offset: self.required("offset")? }
-            }
-            _ => {
-                self.knows(&["normal", "offset", "thickness"])?;
-                let thickness = self.number("thickness")?.unwrap_or(0.0);
-                let (normal, offset) = (self.fixed("normal")?, self.required("offset")?);
-                Region::Slab { normal, offset, thickness }
-            }
-        };
-        Ok(region)
-    }
-
-    /// Isovalues and ranges of values.
-    fn ranges(&self) -> Result<Vec<[f64; 2]>, WebError> {
-        let mut ranges: Vec<[f64; 2]> = self.rows("ranges")?;
-        if !ranges.iter().all(|[low, high]| low <= high) {
-            return Err(self.refuse("ranges", "each must be two numbers, the smaller one first"));
-        }
-        let isovalues = self.numbers("isovalues")?.unwrap_or_default();
-        if !isovalues.iter().all(|value| value.is_finite()) {
-            return Err(self.refuse("isovalues", "must be finite numbers"));
-        }
-        ranges.extend(isovalues.into_iter().map(|value| [value, value]));
-        Ok(ranges)
-    }
-
-    fn transfer(&self, field: usize) -> Result<Transfer, WebError> {
-        self.knows(&["points", "unitLength"])?;
-        let points = self.rows("points")?;
-        let points = points.into_iter().map(|[value, r, g, b, a]| (value, [r, g, b, a])).collect();
-        Ok(Transfer { field, points, unit_length: self.number("unitLength")?.unwrap_or(1.0) })
     }
 }
 

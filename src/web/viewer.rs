@@ -5,32 +5,16 @@
 //! ([`Viewer::step`]), so that the camera never waits for it. Screen points are given in normalised coordinates, as in
 //! [`Camera`](crate::geom::Camera).
 
-use super::aim;
 use super::error::WebError;
-use super::options;
-use super::options::Asked;
-use super::options::RefineOptions;
-use super::parts;
-use super::parts::JsBlocks;
-use super::results;
-use super::results::JsInfo;
-use super::results::JsProgress;
-use super::results::JsStats;
-use crate::geom::Bounds;
-use crate::geom::Camera;
-use crate::gpu::BoxLines;
-use crate::gpu::Look;
-use crate::gpu::Renderer;
-use crate::gpu::Show;
-use crate::mt::MtInfo;
-use crate::refine::Part;
-use crate::refine::View;
-use crate::session::Progress;
-use crate::session::Session;
-use crate::view::ClipPlane;
-use crate::view::Cutaway;
-use crate::view::gizmo;
-use crate::view::gizmo::BoxFace;
+use super::file::File;
+use super::loader::RangeLoader;
+use super::options::{self, RefineOptions};
+use super::results::{self, JsBlocks, JsInfo, JsProgress, JsStats};
+use crate::geom::{Bounds, Camera};
+use crate::gpu::{BoxLines, Look, Renderer, Show};
+use crate::refine::{Part, View};
+use crate::view::gizmo::{self, BoxFace};
+use crate::view::{ClipPlane, Cutaway};
 use glam::DVec2;
 use wasm_bindgen::prelude::wasm_bindgen;
 
@@ -43,14 +27,13 @@ const ROI_COLOUR: [f32; 4] = [0.36, 0.86, 1.0, 1.0];
 /// An MT and its picture on a canvas.
 #[wasm_bindgen]
 pub struct Viewer {
-    session: Session,
-    /// Whether the file comes in parts.
-    in_parts: bool,
+    file: File,
+    /// What takes the place of `file` when its first bytes are here.
+    next: Option<File>,
     renderer: Renderer,
     look: Look,
     camera: Camera,
     show: Show,
-    asked: Asked,
     /// What the camera saw when the needs that follow it were last told.
     seen: View,
     /// Whether the mesh is not yet the one that was asked for.
@@ -94,12 +77,11 @@ impl Viewer {
         let renderer = Renderer::on_surface(target, [width, height]).await?;
         let camera = Camera::home(&Bounds::EMPTY, renderer.aspect());
         Ok(Self {
-            session: Session::default(),
-            in_parts: false,
+            file: File::default(),
+            next: None,
             look: Look { pixel_ratio: ratio, ..Look::default() },
             camera,
             show: Show::default(),
-            asked: Asked::default(),
             seen: View { matrix: [0.0; 16], viewport: [1.0; 2] },
             moving: false,
             isovalue: None,
@@ -124,13 +106,32 @@ impl Viewer {
         self.look.colormap.table::<16>().concat()
     }
 
-    /// Forgets the volume, for another one; what the user has set about the view goes with it. The arguments are those of
-    /// `CoreSession`.
-    pub fn clear(&mut self, fields: Vec<String>, room: Option<f64>) -> Result<(), WebError> {
-        self.session = parts::session(fields, room);
-        self.in_parts = room.is_some();
+    /// Forgets the volume, for another one, that is fed from front to back; what the user has set about the view goes with it.
+    pub fn clear(&mut self, fields: Vec<String>) -> Result<(), WebError> {
+        self.show_file(File::whole(fields))
+    }
+
+    /// Another volume, that `loader` brings in parts: it takes the place of the one that is shown when its first bytes are here.
+    #[wasm_bindgen(js_name = openParts)]
+    pub fn open_parts(&mut self, fields: Vec<String>, memory: f64, loader: &RangeLoader) {
+        self.next = Some(File::in_parts(fields, memory, loader));
+    }
+
+    /// Whether such a volume has not taken its place yet.
+    #[wasm_bindgen(getter, js_name = isOpening)]
+    pub fn is_opening(&self) -> bool {
+        self.next.is_some()
+    }
+
+    /// The file that is being opened, or the one that is shown.
+    fn coming(&self) -> &File {
+        self.next.as_ref().unwrap_or(&self.file)
+    }
+
+    fn show_file(&mut self, file: File) -> Result<(), WebError> {
+        (self.file, self.next) = (file, None);
         (self.bounds, self.roi, self.isovalue) = (None, None, None);
-        (self.asked, self.moving) = (Asked::default(), false);
+        self.moving = false;
         self.clip = ClipPlane::NOTHING;
         self.cutaway = Cutaway::new();
         (self.surface_triangles, self.surface_fits) = (0, false);
@@ -142,35 +143,53 @@ impl Viewer {
 
     /// Takes the next bytes of the file, however they were cut.
     pub fn feed(&mut self, bytes: &[u8]) -> Result<JsProgress, WebError> {
-        let progress = self.session.feed(bytes)?;
-        Ok(self.arrived(&progress))
+        self.file.session_mut().feed(bytes)?;
+        self.arrive();
+        Ok(self.progress())
     }
 
-    /// Start, end and priority of each range of bytes that is wanted of a file that comes in parts.
-    pub fn wanted(&self) -> Vec<f64> {
-        parts::wanted(&self.session)
+    /// Takes what the loader has complete, and tells it what is wanted then; whether there was anything.
+    pub fn supply(&mut self) -> Result<bool, WebError> {
+        let Some(mut next) = self.next.take() else {
+            let any = self.file.supply()?;
+            self.arrive();
+            return Ok(any);
+        };
+        let supplied = next.supply();
+        if matches!(supplied, Ok(false)) {
+            self.next = Some(next);
+            return supplied;
+        }
+        self.show_file(next)?;
+        self.arrive();
+        supplied
     }
 
-    /// Takes one of these ranges, or less of it at the end of the file.
-    pub fn take(&mut self, start: f64, bytes: &[u8]) -> Result<JsProgress, WebError> {
-        let progress = self.session.take(start as u64, bytes)?;
-        Ok(self.arrived(&progress))
+    /// Whether more is to come of a file in parts, if all goes well.
+    #[wasm_bindgen(getter, js_name = isWaiting)]
+    pub fn is_waiting(&self) -> bool {
+        self.coming().is_waiting()
+    }
+
+    /// How much of the file has come.
+    pub fn progress(&self) -> JsProgress {
+        self.coming().progress()
     }
 
     /// How the blocks stand.
     pub fn blocks(&self) -> JsBlocks {
-        parts::blocks(&self.session)
+        self.coming().blocks()
     }
 
     /// The file has ended: refuses one that was cut short.
     pub fn finish(&mut self) -> Result<JsProgress, WebError> {
-        self.session.finish()?;
-        Ok(results::progress(&self.session.progress()))
+        self.file.session_mut().finish()?;
+        Ok(self.progress())
     }
 
     /// What is known of the MT; `undefined` until the base mesh is there.
     pub fn info(&self) -> Option<JsInfo> {
-        self.session.info().map(results::info)
+        self.file.session().info().map(results::info)
     }
 
     /// The box around the mesh: `[x0, y0, z0, x1, y1, z1]`; empty until the base mesh is there.
@@ -180,12 +199,12 @@ impl Viewer {
 
     /// Tells which mesh is wanted from now on, for `step` to make it. Views without a matrix follow the camera.
     pub fn aim(&mut self, options: &RefineOptions) -> Result<(), WebError> {
-        let seen = self.view();
-        let asked = aim::aim(&mut self.session, options, Some(&seen))?;
-        if asked.field != self.asked.field {
+        let (seen, before) = (self.view(), self.file.asked.field);
+        self.file.aim(options, Some(&seen))?;
+        if self.file.asked.field != before {
             self.stale = Stale { boxes: self.stale.boxes, ..Stale::MESH };
         }
-        (self.asked, self.seen, self.moving) = (asked, seen, true);
+        (self.seen, self.moving) = (seen, true);
         self.set_range();
         Ok(())
     }
@@ -193,13 +212,13 @@ impl Viewer {
     /// More of the file has come, and with it perhaps what was asked for.
     #[wasm_bindgen(js_name = aimAgain)]
     pub fn aim_again(&mut self) {
-        self.moving = self.session.info().is_some();
+        self.moving = self.file.session().info().is_some();
     }
 
     /// Whether `step` has something to do.
     #[wasm_bindgen(getter)]
     pub fn moving(&self) -> bool {
-        self.moving || !self.asked.follows.is_empty() && self.view() != self.seen
+        self.moving || !self.file.asked.follows.is_empty() && self.view() != self.seen
     }
 
     /// Goes on towards the mesh that is wanted for about so many milliseconds.
@@ -207,18 +226,17 @@ impl Viewer {
         // What fails would fail again: it is not tried before something else is asked for.
         self.moving = false;
         self.follow_camera()?;
-        let mut stats = aim::step(&mut self.session, milliseconds, f64::INFINITY)?;
-        stats.missing &= parts::is_coming(&self.session, self.in_parts);
+        let stats = self.file.step(milliseconds, f64::INFINITY)?;
         self.moving = !stats.done;
         if stats.refined + stats.coarsened > 0 {
             self.stale = Stale { boxes: self.stale.boxes, ..Stale::MESH };
         }
-        Ok(results::stats(&stats, self.known()?, &self.asked))
+        self.file.stats(&stats)
     }
 
     /// A hash of the current mesh, the same wherever the same request was made.
     pub fn hash(&self) -> String {
-        format!("{:016x}", self.session.hash())
+        self.file.hash()
     }
 
     /// Chooses what is drawn: `"iso"` or `"cutaway"`.
@@ -362,10 +380,10 @@ impl Viewer {
                 let [low, high] = self.look.range;
                 let middle = f64::midpoint(f64::from(low), f64::from(high));
                 let value = self.isovalue.unwrap_or(middle);
-                self.session.isosurface(value)?;
-                let changes = self.session.take_surface_changes();
+                self.file.session_mut().isosurface(value)?;
+                let changes = self.file.session_mut().take_surface_changes();
                 // Asked for again, it is as it was.
-                let surface = self.session.isosurface(value)?;
+                let surface = self.file.session_mut().isosurface(value)?;
                 self.surface_triangles = surface.indices.len();
                 // What did not fit was written in part, and is written as a whole when it fits again.
                 if std::mem::replace(&mut self.surface_fits, false) {
@@ -377,7 +395,7 @@ impl Viewer {
                 self.stale.surface = false;
             }
             Show::Cutaway if self.stale.cutaway => {
-                self.cutaway.cut(&self.session.view(), &self.clip);
+                self.cutaway.cut(&self.file.session_mut().view(), &self.clip);
                 self.renderer.set_cutaway(&self.cutaway)?;
                 self.stale.cutaway = false;
             }
@@ -395,27 +413,22 @@ impl Viewer {
     /// Tells the needs that follow the camera where it is.
     fn follow_camera(&mut self) -> Result<(), WebError> {
         let seen = self.view();
-        if self.asked.follows.is_empty() || seen == self.seen {
+        if self.file.asked.follows.is_empty() || seen == self.seen {
             return Ok(());
         }
         self.seen = seen;
-        for &need in &self.asked.follows {
-            self.asked.request.needs[need].part = Part::View(seen);
+        for need in self.file.asked.follows.clone() {
+            self.file.asked.request.needs[need].part = Part::View(seen);
         }
-        Ok(self.session.aim_with(&self.asked.request, &self.asked.custom)?)
+        self.file.aim_again()
     }
 
-    /// Bytes have come.
-    fn arrived(&mut self, progress: &Progress) -> JsProgress {
-        if progress.ready && self.bounds.is_none() {
-            self.arrive();
-        }
-        results::progress(progress)
-    }
-
-    /// The base mesh is there: look at it.
+    /// Bytes have come: when the base mesh is there, look at it.
     fn arrive(&mut self) {
-        let positions = self.session.view().positions;
+        if self.bounds.is_some() || self.file.session().info().is_none() {
+            return;
+        }
+        let positions = self.file.session_mut().view().positions;
         let bounds = positions.iter().fold(Bounds::EMPTY, |b, p| b.with(p.map(f64::from)));
         self.bounds = Some(bounds);
         self.set_range();
@@ -424,7 +437,9 @@ impl Viewer {
     }
 
     fn set_range(&mut self) {
-        if let Some(field) = self.session.info().and_then(|info| info.fields.get(self.asked.field)) {
+        if let Some(field) =
+            self.file.session().info().and_then(|info| info.fields.get(self.file.asked.field))
+        {
             self.look.range = [field.min as f32, field.max as f32];
         }
     }
@@ -434,10 +449,6 @@ impl Viewer {
             self.bounds.map(|bounds| BoxLines { bounds, colour: DOMAIN_COLOUR, width: 1.0, handles: false });
         let roi = self.roi.map(|bounds| BoxLines { bounds, colour: ROI_COLOUR, width: 2.0, handles: true });
         domain.into_iter().chain(roi).collect()
-    }
-
-    fn known(&self) -> Result<&MtInfo, WebError> {
-        self.session.info().ok_or_else(WebError::not_ready)
     }
 }
 

@@ -70,11 +70,18 @@ function fetchIn(path, ranges, options = {}) {
         const onRange = (start, end, bytes) => {
           sums[start] = bytes.reduce((sum, byte) => sum + byte, 0);
           // Later, so that the cache has been opened.
-          if (start === 0) setTimeout(() => source.want(ranges.flatMap(([a, b]) => [a, b, 0])), 200);
+          if (start === 0) setTimeout(() => want(ranges.flatMap(([a, b]) => [a, b, 0])), 200);
           if (Object.keys(sums).length > ranges.length) setTimeout(resolve, 200);
         };
-        const source = new Ranges(core.RangeLoader, url, { onRange, onError: reject }, { retries: 1, backoffMs: 10, ...options });
-        source.want([0, 100, 0]);
+        const onComplete = () => {
+          for (let range; (range = source.loader.take()); ) onRange(range.start, range.end, range.bytes);
+        };
+        const want = (triples) => {
+          source.loader.want(Float64Array.from(triples));
+          source.go();
+        };
+        const source = new Ranges(core.RangeLoader, url, { onComplete, onError: reject }, { retries: 1, backoffMs: 10, ...options });
+        want([0, 100, 0]);
         total = () => source.total;
       });
       return { sums, total: total() };

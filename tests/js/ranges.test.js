@@ -50,6 +50,23 @@ function good(range, response) {
   response.writeHead(206, headers(range)).end(file.slice(range.start, range.end));
 }
 
+/** `Ranges` that hand each range that is complete to `onRange`. */
+function open(url, { onRange, onError }, options) {
+  const onComplete = () => {
+    for (let range; (range = ranges.loader.take()); ) {
+      if (onRange(range.start, range.end, range.bytes) === "closed") return;
+    }
+  };
+  const ranges = new Ranges(RangeLoader, url, { onComplete, onError }, options);
+  return ranges;
+}
+
+/** What a session does: asks for these ranges from now on. */
+function want(ranges, triples) {
+  ranges.loader.want(Float64Array.from(triples));
+  ranges.go();
+}
+
 /** Fetches ranges; gives them as `[start, end, bytes]` when all are there. */
 function fetchAll(wanted, options = {}, url = base) {
   const got = [];
@@ -60,8 +77,8 @@ function fetchAll(wanted, options = {}, url = base) {
       if (got.length === wanted.length) resolve({ got, ranges });
     };
     const quick = { retries: 3, backoffMs: 10, timeoutMs: 400, maxRequestBytes: 30_000, gap: 500 };
-    ranges = new Ranges(RangeLoader, url, { onRange, onError: reject }, { ...quick, ...options });
-    ranges.want(wanted.flatMap(([start, end]) => [start, end, -start]));
+    ranges = open(url, { onRange, onError: reject }, { ...quick, ...options });
+    want(ranges, wanted.flatMap(([start, end]) => [start, end, -start]));
   });
   return all.finally(() => options.open || ranges.close());
 }
@@ -187,16 +204,16 @@ test("a file that changes is noticed, and can be read anew", async () => {
   const first = await fetchAll([[0, 10]], { open: true });
   answer = changed;
   await new Promise((resolve, reject) => {
-    const ranges = new Ranges(
-      RangeLoader,
+    const ranges = open(
       base,
       {
         onRange: (start, end, bytes) => {
           assert.deepEqual(bytes, file.slice(start, end));
           if (start === 0) answer = good;
-          if (start === 0) return ranges.want([100_000, 100_010, 0]);
+          if (start === 0) return queueMicrotask(() => want(ranges, [100_000, 100_010, 0]));
           ranges.close();
           resolve(undefined);
+          return "closed";
         },
         onError: (error) => {
           errors.push(error.code);
@@ -206,7 +223,7 @@ test("a file that changes is noticed, and can be read anew", async () => {
       },
       { maxRequestBytes: 100 },
     );
-    ranges.want([0, 10, 0]);
+    want(ranges, [0, 10, 0]);
   });
   assert.deepEqual(errors, ["changed"]);
   first.ranges.close();
@@ -238,14 +255,14 @@ test("what is wanted no longer is cancelled, and nothing comes after the end", a
   };
   asked = [];
   const { ranges } = await fetchAll([[0, 10]], { open: true });
-  ranges.want([100_000, 100_100, 1]);
+  want(ranges, [100_000, 100_100, 1]);
   while (asked.length < 2) await new Promise((resolve) => setTimeout(resolve, 5));
-  ranges.want([]);
+  want(ranges, []);
   while (closed < 1) await new Promise((resolve) => setTimeout(resolve, 5));
   assert.deepEqual([ranges.total, ranges.servesRanges, ranges.traffic.requests], [SIZE, true, 2]);
-  ranges.want([100_000, 100_100, 1]);
+  want(ranges, [100_000, 100_100, 1]);
   ranges.close();
-  ranges.want([0, 1, 0]);
+  ranges.go();
   assert.equal(ranges.total, undefined);
 });
 
@@ -278,11 +295,11 @@ test("what was fetched once is kept for the next time", async () => {
       await new Promise((resolve, reject) => {
         const onRange = (start, end, bytes) => {
           got.set(start, bytes);
-          if (start === 0 && got.size === 1) setTimeout(() => second.want(WANTED.slice(1).flatMap(([a, b]) => [a, b, 0])), 20);
+          if (start === 0 && got.size === 1) setTimeout(() => want(second, WANTED.slice(1).flatMap(([a, b]) => [a, b, 0])), 20);
           if (got.size === WANTED.length) resolve(undefined);
         };
-        second = new Ranges(RangeLoader, base, { onRange, onError: reject }, { cache: "mt" });
-        second.want([0, 1000, 0]);
+        second = open(base, { onRange, onError: reject }, { cache: "mt" });
+        want(second, [0, 1000, 0]);
       });
       second.close();
       for (const [start, end] of WANTED) assert.deepEqual(got.get(start), file.slice(start, end));

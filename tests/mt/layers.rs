@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Each module with what it may import besides itself.
-const LAYERS: [(&str, &[&str]); 17] = [
+const LAYERS: [(&str, &[&str]); 18] = [
     ("geom", &[]),
     ("mesh", &["geom"]),
     ("mt", &["geom", "mesh"]),
@@ -22,25 +22,27 @@ const LAYERS: [(&str, &[&str]); 17] = [
     ("view", &["geom", "mesh"]),
     ("stream", &[]),
     ("session", &["geom", "mesh", "mt", "format", "refine", "view"]),
-    ("client", &["format", "refine", "session", "stream"]),
+    ("remote", &["format", "refine", "session", "stream"]),
+    ("client", &["format", "refine", "remote", "session", "stream"]),
     ("bench", &["geom", "format", "mt", "refine", "session"]),
     ("gpu", &["geom", "mesh", "view"]),
     (
         "web",
         &[
-            "geom", "mesh", "mt", "format", "refine", "view", "session", "stream", "bench", "gpu", "io",
-            "builder",
+            "geom", "mesh", "mt", "format", "refine", "view", "session", "stream", "remote", "bench", "gpu",
+            "io", "builder",
         ],
     ),
 ];
 
 /// Libraries of the edges, and the modules that they may appear in.
-const EDGES: [(&str, &[&str]); 7] = [
+const EDGES: [(&str, &[&str]); 8] = [
     ("wgpu", &["gpu", "web"]),
     ("bytemuck", &["gpu"]),
     ("wasm_bindgen", &["web"]),
     ("js_sys", &["web"]),
     ("web_sys", &["web"]),
+    ("serde_wasm_bindgen", &["web"]),
     ("std::fs", &["io", "stream"]),
     ("ureq", &["stream"]),
 ];

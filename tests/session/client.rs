@@ -11,6 +11,7 @@ use tetralod::builder::build;
 use tetralod::client::Client;
 use tetralod::client::ClientError;
 use tetralod::client::ClientOptions;
+use tetralod::format::DecodeOptions;
 use tetralod::format::EncodeOptions;
 use tetralod::format::FormatError;
 use tetralod::format::encode;
@@ -20,12 +21,17 @@ use tetralod::mt::MtKind;
 use tetralod::mt::MultiTessellation;
 use tetralod::refine::Need;
 use tetralod::refine::Request;
+use tetralod::remote::Remote;
 use tetralod::session::Session;
+use tetralod::stream::Action;
 use tetralod::stream::Arrived;
 use tetralod::stream::FileSource;
-use tetralod::stream::Source;
+use tetralod::stream::Loader;
+use tetralod::stream::LoaderOptions;
+use tetralod::stream::RangeSource;
+use tetralod::stream::ResponseHead;
 use tetralod::stream::StreamError;
-use tetralod::stream::Wanted;
+use tetralod::stream::WantedRange;
 
 const BLOCK_BITS: u32 = 6;
 
@@ -52,8 +58,8 @@ impl Counted {
     }
 }
 
-impl Source for Counted {
-    fn want(&mut self, wanted: &[Wanted]) {
+impl RangeSource for Counted {
+    fn want(&mut self, wanted: &[WantedRange]) {
         self.file.want(wanted);
     }
 
@@ -154,19 +160,20 @@ fn steps_give_valid_meshes_on_the_way() {
 }
 
 #[test]
-fn memory_stays_within_the_room() {
+fn blocks_stay_within_the_memory() {
     let file = file(MtKind::Edge);
     let mut whole = Session::new();
     whole.feed(&file).expect("a sound file");
-    let room = whole.mt().map_or(0, MultiTessellation::bytes) / 4;
+    let memory = whole.mt().map_or(0, MultiTessellation::bytes) / 4;
     let (source, _) = Counted::new(&file);
-    let mut client = Client::open(source, ClientOptions { room, ..ClientOptions::default() }).expect("sound");
+    let mut client =
+        Client::open(source, ClientOptions { memory, ..ClientOptions::default() }).expect("sound");
     let mut complete = 0;
     for request in requests() {
         client.refine(&request).expect("a sound file");
         client.session().mesh().expect("it is ready").check().expect("a valid mesh");
         let progress = client.session().block_progress();
-        assert!(progress.bytes <= room, "{progress:?}");
+        assert!(progress.bytes <= memory, "{progress:?}");
         if progress.left_out == 0 {
             whole.refine(&request).expect("a sound file");
             assert_eq!(client.session().hash(), whole.hash(), "what fits is as good as the whole file");
@@ -207,4 +214,67 @@ fn a_request_that_makes_no_sense_changes_nothing() {
     let hash = client.session().hash();
     assert!(matches!(client.refine(&Request::within(-1.0)), Err(ClientError::Session(_))));
     assert_eq!(client.session().hash(), hash);
+}
+
+/// Answers all that `loader` asks for with bytes of `file`, in pieces, until `remote` waits for nothing more.
+fn serve(remote: &mut Remote, loader: &mut Loader, file: &[u8]) -> Result<(), FormatError> {
+    let total = file.len() as u64;
+    loop {
+        remote.supply(loader)?;
+        let (id, range) = match loader.next(0) {
+            Some(Action::Fetch { id, range, .. }) => (id, range),
+            Some(Action::Cancel { .. }) => continue,
+            None => return Ok(()),
+            other => panic!("{other:?}"),
+        };
+        if range.start >= total {
+            loader.head(id, 0, &ResponseHead { status: 416, ..ResponseHead::default() });
+            continue;
+        }
+        let end = range.end.min(total);
+        let content_range = format!("bytes {}-{}/{total}", range.start, end - 1);
+        let head =
+            ResponseHead { status: 206, content_range: Some(&content_range), ..ResponseHead::default() };
+        loader.head(id, 0, &head);
+        for piece in file[range.start as usize..end as usize].chunks(1000) {
+            loader.data(id, 0, piece);
+        }
+    }
+}
+
+#[test]
+fn without_io_it_is_the_same_machine() {
+    let file = file(MtKind::HalfEdge);
+    let mut loader = Loader::new(LoaderOptions { gap: 64, ..LoaderOptions::default() });
+    let mut remote = Remote::in_parts(DecodeOptions::default(), u64::MAX);
+    serve(&mut remote, &mut loader, &file).expect("a sound file");
+    assert!(remote.session().mesh().is_some() && !remote.session().is_waiting());
+    let mut whole = Session::new();
+    whole.feed(&file).expect("a sound file");
+    for request in requests() {
+        remote.aim(&request, &[]).expect("a sensible request");
+        let mut step = remote.step(&mut |_| true).expect("a sound file");
+        while !step.complete {
+            assert!(!step.stats.done || remote.session().is_waiting(), "there is a reason to go on");
+            serve(&mut remote, &mut loader, &file).expect("a sound file");
+            step = remote.step(&mut |_| true).expect("a sound file");
+        }
+        let expected = whole.refine(&request).expect("a sound file");
+        assert_eq!(remote.session().hash(), whole.hash(), "{request:?}");
+        assert_eq!((step.stats.satisfied, step.stats.missing), (expected.satisfied, false));
+    }
+    assert_eq!(loader.total(), Some(file.len() as u64));
+    assert!(remote.fetched() <= loader.traffic().received);
+    // A file that was cut: told, and not asked for again and again.
+    for end in [10, file.len() / 3] {
+        let (mut loader, mut remote) =
+            (Loader::default(), Remote::in_parts(DecodeOptions::default(), u64::MAX));
+        let opened = serve(&mut remote, &mut loader, &file[..end]);
+        let found = opened.and_then(|()| {
+            remote.aim(&Request::within(0.0), &[]).expect("a sensible request");
+            remote.step(&mut |_| true).expect("a sound beginning");
+            serve(&mut remote, &mut loader, &file[..end])
+        });
+        assert!(matches!(found, Err(FormatError::Truncated { .. })), "{end}: {found:?}");
+    }
 }

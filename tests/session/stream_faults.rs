@@ -22,9 +22,9 @@ use tetralod::stream::CacheFolder;
 use tetralod::stream::HttpOptions;
 use tetralod::stream::HttpSource;
 use tetralod::stream::LoaderOptions;
-use tetralod::stream::Source;
+use tetralod::stream::RangeSource;
 use tetralod::stream::StreamError;
-use tetralod::stream::Wanted;
+use tetralod::stream::WantedRange;
 
 const SIZE: u64 = 200_000;
 
@@ -181,7 +181,7 @@ fn fetch_with(url: &str, options: HttpOptions, ranges: &[Range<u64>]) -> Result<
 fn fetch_from(source: &mut HttpSource, ranges: &[Range<u64>]) -> Result<(), StreamError> {
     let mut left = ranges.to_vec();
     let list: Vec<_> =
-        left.iter().map(|r| Wanted { range: r.clone(), priority: -(r.start as f32) }).collect();
+        left.iter().map(|r| WantedRange { range: r.clone(), priority: -(r.start as f32) }).collect();
     source.want(&list);
     let start = Instant::now();
     while !left.is_empty() {
@@ -450,7 +450,7 @@ fn no_server_is_reported() {
 fn what_is_wanted_no_longer_is_not_waited_for() {
     let server = Server::start(|asked| if asked.range.start == 100_000 { vec![Hang] } else { good(asked) });
     let mut source = fetch_with(&server.url, options(), from_ref(&(0..10))).expect("it works");
-    source.want(&[Wanted { range: 100_000..100_100, priority: 1.0 }]);
+    source.want(&[WantedRange { range: 100_000..100_100, priority: 1.0 }]);
     assert_eq!(source.next(Duration::from_millis(50)), Ok(None));
     fetch_from(&mut source, from_ref(&(5000..6000))).expect("it works");
     let start = Instant::now();

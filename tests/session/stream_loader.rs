@@ -7,11 +7,11 @@ use proptest::prelude::*;
 use std::ops::Range;
 use tetralod::stream::Action;
 use tetralod::stream::Failure;
-use tetralod::stream::Head;
 use tetralod::stream::Loader;
 use tetralod::stream::LoaderOptions;
+use tetralod::stream::ResponseHead;
 use tetralod::stream::StreamError;
-use tetralod::stream::Wanted;
+use tetralod::stream::WantedRange;
 
 const SIZE: u64 = 3000;
 
@@ -23,8 +23,8 @@ fn bytes(range: Range<u64>) -> Vec<u8> {
     (range.start.min(SIZE)..range.end.min(SIZE)).map(byte).collect()
 }
 
-fn wanted(range: Range<u64>, priority: f32) -> Wanted {
-    Wanted { range, priority }
+fn wanted(range: Range<u64>, priority: f32) -> WantedRange {
+    WantedRange { range, priority }
 }
 
 fn small() -> LoaderOptions {
@@ -90,7 +90,7 @@ impl World {
 
     fn want_something(&mut self) {
         let count = self.random.below(12);
-        let mut list: Vec<Wanted> = (0..count)
+        let mut list: Vec<WantedRange> = (0..count)
             .map(|_| {
                 let start = self.random.below(SIZE as usize + 50) as u64;
                 let length = self.random.below([1, 30, 400, 4000][self.random.clone().below(4)]) as u64;
@@ -101,6 +101,8 @@ impl World {
         list.extend(self.pending.iter().filter(|_| !self.random.once_in(3)).map(|r| wanted(r.clone(), 1.0)));
         self.loader.want(&list);
         self.pending = list.into_iter().map(|wanted| wanted.range).collect();
+        let cached: Vec<_> = self.pending.clone().into_iter().filter(|_| self.random.once_in(5)).collect();
+        self.loader.add_cached(&cached);
         self.take();
         self.forget();
     }
@@ -132,9 +134,21 @@ impl World {
                 }
                 Some(Action::Cancel { id }) => self.open.retain(|open| open.id != id),
                 Some(Action::Fetch { id, range, .. }) => self.accept(id, range, faults),
+                Some(Action::Read { range }) => self.read(&range),
             }
         }
         panic!("the loader has always something to do");
+    }
+
+    /// A cache has a range, or has lost it.
+    fn read(&mut self, range: &Range<u64>) {
+        assert!(self.pending.contains(range), "{range:?} was not wanted");
+        if self.random.once_in(3) {
+            self.loader.lost(range);
+        } else {
+            self.loader.put(range, &bytes(range.clone()));
+            self.take();
+        }
     }
 
     fn accept(&mut self, id: u32, asked: Range<u64>, faults: &[Fault]) {
@@ -198,7 +212,8 @@ impl World {
         let open = &mut self.open[at];
         let (id, now, asked) = (open.id, self.now, open.asked.clone());
         let part = |range: &Range<u64>| format!("bytes {}-{}/{SIZE}", range.start, range.end - 1);
-        let tagged = Head { etag: Some("\"one\""), last_modified: Some("then"), ..Head::default() };
+        let tagged =
+            ResponseHead { etag: Some("\"one\""), last_modified: Some("then"), ..ResponseHead::default() };
         let mut range = asked.start..asked.end.min(SIZE);
         match open.fault {
             Fault::Silent => return true,
@@ -207,19 +222,19 @@ impl World {
                 return false;
             }
             Fault::Status(status) => {
-                self.loader.head(id, now, &Head { status, ..Head::default() });
+                self.loader.head(id, now, &ResponseHead { status, ..ResponseHead::default() });
                 return false;
             }
             Fault::Whole | Fault::WholeOfUnknownLength => {
                 let content_length = (open.fault == Fault::Whole).then_some(SIZE);
                 (open.body, open.stop) = (Some(0..SIZE), SIZE);
-                self.loader.head(id, now, &Head { status: 200, content_length, ..tagged });
+                self.loader.head(id, now, &ResponseHead { status: 200, content_length, ..tagged });
                 self.take();
                 return true;
             }
             _ if range.start >= SIZE => {
                 let content_range = format!("bytes */{SIZE}");
-                let head = Head { status: 416, content_range: Some(&content_range), ..tagged };
+                let head = ResponseHead { status: 416, content_range: Some(&content_range), ..tagged };
                 self.loader.head(id, now, &head);
                 self.take();
                 return false;
@@ -236,7 +251,7 @@ impl World {
             };
         open.body = Some(range.clone());
         let content_range = part(&range);
-        let head = Head {
+        let head = ResponseHead {
             status: 206,
             content_range: Some(&content_range),
             content_length: Some(range.end - range.start),
@@ -369,7 +384,7 @@ fn fetches(loader: &mut Loader, now: u64) -> Vec<(u32, Range<u64>)> {
     actions(loader, now).into_iter().map(fetch).collect()
 }
 
-const GOOD: Head = Head {
+const GOOD: ResponseHead = ResponseHead {
     status: 206,
     content_range: None,
     content_length: None,
@@ -387,7 +402,7 @@ fn open(options: LoaderOptions) -> Loader {
     loader.want(&[wanted(0..10, 0.0), wanted(500..510, -1.0)]);
     let first = fetches(&mut loader, 0);
     assert_eq!(first, [(1, 0..10)], "one request, until it is known what the server does");
-    loader.head(1, 0, &Head { content_range: Some("bytes 0-9/3000"), ..GOOD });
+    loader.head(1, 0, &ResponseHead { content_range: Some("bytes 0-9/3000"), ..GOOD });
     loader.data(1, 0, &bytes(0..10));
     loader.want(&[]);
     assert_eq!(loader.take(), Some((0..10, bytes(0..10))));
@@ -417,7 +432,7 @@ fn what_nobody_wants_any_more_is_cancelled_and_the_rest_is_not() {
     assert_eq!(fetches(&mut loader, 0).len(), 2);
     loader.want(&[wanted(150..160, 1.0)]);
     assert_eq!(actions(&mut loader, 1), [Action::Cancel { id: 3 }]);
-    loader.head(2, 1, &Head { content_range: Some("bytes 100-199/3000"), ..GOOD });
+    loader.head(2, 1, &ResponseHead { content_range: Some("bytes 100-199/3000"), ..GOOD });
     loader.data(2, 1, &bytes(100..170));
     assert_eq!(loader.take(), Some((150..160, bytes(150..160))));
     assert_eq!(actions(&mut loader, 1), [Action::Cancel { id: 2 }]);
@@ -429,7 +444,7 @@ fn a_cut_connection_is_taken_up_where_it_ended() {
     let mut loader = open(small());
     loader.want(&[wanted(100..300, 0.0)]);
     assert_eq!(fetches(&mut loader, 0), [(2, 100..300)]);
-    loader.head(2, 0, &Head { content_range: Some("bytes 100-299/3000"), ..GOOD });
+    loader.head(2, 0, &ResponseHead { content_range: Some("bytes 100-299/3000"), ..GOOD });
     loader.data(2, 0, &bytes(100..180));
     loader.failed(2, 0, Failure::Network("cut".to_owned()));
     let tagged = Some("\"one\"".to_owned());
@@ -455,6 +470,7 @@ fn tries_get_rarer_and_end() {
                 }
                 Some(Action::Fetch { id, .. }) => loader.failed(id, now, failure.clone()),
                 Some(Action::Cancel { .. }) => {}
+                Some(Action::Read { .. }) => panic!("there is no cache"),
             }
         }
         assert_eq!(waits.len(), 4);
@@ -470,11 +486,44 @@ fn tries_get_rarer_and_end() {
 }
 
 #[test]
+fn what_a_cache_has_is_read_from_there_and_not_fetched() {
+    let mut loader = Loader::new(LoaderOptions { gap: 0, ..LoaderOptions::default() });
+    loader.want(&[wanted(0..10, 0.0)]);
+    assert_eq!(fetches(&mut loader, 0), [(1, 0..10)]);
+    loader.head(
+        1,
+        0,
+        &ResponseHead { content_range: Some("bytes 0-9/3000"), content_length: Some(10), ..GOOD },
+    );
+    loader.data(1, 0, &bytes(0..10));
+    assert_eq!(loader.uncached().count(), 1);
+    assert!(loader.has_complete());
+    assert_eq!(loader.take(), Some((0..10, bytes(0..10))));
+    loader.add_cached(&[2990..3010, 20..30, 100..200]);
+    loader.want(&[wanted(20..30, 1.0), wanted(30..40, 0.0), wanted(2990..3010, 0.0), wanted(100..200, 0.0)]);
+    let told = actions(&mut loader, 0);
+    let reads = told.iter().filter(|action| matches!(action, Action::Read { .. })).count();
+    assert_eq!(reads, 3, "{told:?}");
+    let fetched: Vec<_> = told
+        .iter()
+        .filter_map(|a| if let Action::Fetch { range, .. } = a { Some(range.clone()) } else { None })
+        .collect();
+    assert_eq!(fetched, [30..40]);
+    loader.put(&(20..30), &bytes(20..30));
+    loader.put(&(2990..3010), &bytes(2990..3000));
+    assert_eq!(loader.uncached().count(), 0, "what a cache has is not kept again");
+    assert_eq!(loader.take(), Some((20..30, bytes(20..30))));
+    assert_eq!(loader.take(), Some((2990..3010, bytes(2990..3000))));
+    loader.lost(&(100..200));
+    assert_eq!(fetches(&mut loader, 0), [(3, 100..200)], "what it has lost is fetched");
+}
+
+#[test]
 fn a_server_is_not_asked_before_it_wants_to_be() {
     let mut loader = Loader::new(LoaderOptions::default());
     loader.want(&[wanted(0..10, 0.0)]);
     assert_eq!(fetches(&mut loader, 0).len(), 1);
-    loader.head(1, 0, &Head { status: 503, retry_after_seconds: Some(7), ..Head::default() });
+    loader.head(1, 0, &ResponseHead { status: 503, retry_after_seconds: Some(7), ..ResponseHead::default() });
     assert_eq!(actions(&mut loader, 0), [Action::Cancel { id: 1 }]);
     // A new list changes nothing about that.
     loader.want(&[wanted(20..30, 0.0)]);
@@ -487,7 +536,7 @@ fn a_server_without_ranges_is_read_from_the_start_by_one_request() {
     let mut loader = Loader::new(small());
     loader.want(&[wanted(100..120, 0.0), wanted(2000..2010, 0.0)]);
     assert_eq!(fetches(&mut loader, 0).len(), 1);
-    loader.head(1, 0, &Head { status: 200, content_length: Some(SIZE), ..GOOD });
+    loader.head(1, 0, &ResponseHead { status: 200, content_length: Some(SIZE), ..GOOD });
     assert_eq!(loader.serves_ranges(), Some(false));
     assert_eq!(fetches(&mut loader, 0), []);
     loader.data(1, 0, &bytes(0..1500));
@@ -505,11 +554,11 @@ fn a_server_without_ranges_is_read_from_the_start_by_one_request() {
 #[test]
 fn another_version_of_the_file_is_never_mixed_in() {
     let other = [
-        Head { etag: Some("\"two\""), ..GOOD },
-        Head { content_range: Some("bytes 100-199/3001"), ..GOOD },
-        Head { status: 412, ..GOOD },
-        Head { status: 200, content_length: Some(5), ..GOOD },
-        Head { status: 200, etag: Some("\"two\""), ..GOOD },
+        ResponseHead { etag: Some("\"two\""), ..GOOD },
+        ResponseHead { content_range: Some("bytes 100-199/3001"), ..GOOD },
+        ResponseHead { status: 412, ..GOOD },
+        ResponseHead { status: 200, content_length: Some(5), ..GOOD },
+        ResponseHead { status: 200, etag: Some("\"two\""), ..GOOD },
     ];
     for head in other {
         let mut loader = open(small());
@@ -531,10 +580,10 @@ fn the_end_of_the_file_is_found_without_being_told() {
     loader.want(&[wanted(2900..u64::MAX, 1.0), wanted(5000..5001, 0.0)]);
     assert_eq!(fetches(&mut loader, 0), [(1, 2900..3200)]);
     // Pages may not see how much of the file that is.
-    loader.head(1, 0, &Head { content_length: Some(100), ..GOOD });
+    loader.head(1, 0, &ResponseHead { content_length: Some(100), ..GOOD });
     loader.data(1, 0, &bytes(2900..3000));
     assert_eq!(fetches(&mut loader, 0)[0], (2, 3000..3300));
-    loader.head(2, 0, &Head { status: 416, ..GOOD });
+    loader.head(2, 0, &ResponseHead { status: 416, ..GOOD });
     assert_eq!(loader.take(), Some((2900..u64::MAX, bytes(2900..3000))));
     assert_eq!(loader.take(), Some((5000..5001, Vec::new())));
     assert!(loader.is_idle());
@@ -542,13 +591,13 @@ fn the_end_of_the_file_is_found_without_being_told() {
 
 #[test]
 fn what_cannot_be_mended_by_trying_is_reported_at_once_and_says_what_to_do() {
-    let page = Head { status: 200, content_type: Some("text/html"), ..Head::default() };
-    let packed = Head { content_encoding: Some("br"), decoded: true, ..GOOD };
+    let page = ResponseHead { status: 200, content_type: Some("text/html"), ..ResponseHead::default() };
+    let packed = ResponseHead { content_encoding: Some("br"), decoded: true, ..GOOD };
     let cases = [
         (page, "404"),
         (packed, "compression"),
-        (Head { status: 404, ..GOOD }, "address"),
-        (Head { status: 403, ..GOOD }, "allow"),
+        (ResponseHead { status: 404, ..GOOD }, "address"),
+        (ResponseHead { status: 403, ..GOOD }, "allow"),
     ];
     for (head, advice) in cases {
         let mut loader = Loader::new(small());
@@ -568,7 +617,7 @@ fn events_of_requests_that_are_over_change_nothing() {
     loader.want(&[wanted(100..110, 0.0)]);
     assert_eq!(fetches(&mut loader, 0).len(), 1);
     for id in [0, 1, 7] {
-        loader.head(id, 0, &Head { status: 404, ..Head::default() });
+        loader.head(id, 0, &ResponseHead { status: 404, ..ResponseHead::default() });
         loader.data(id, 0, &[1, 2, 3]);
         loader.end(id, 0);
         loader.failed(id, 0, Failure::Blocked);
@@ -601,7 +650,7 @@ fn many_small_ranges_take_few_requests_in_any_order_of_importance() {
             }
             let (id, range) = open.remove(0);
             let whole = format!("bytes {}-{}/{}", range.start, range.end - 1, count * size);
-            loader.head(id, 0, &Head { content_range: Some(&whole), ..GOOD });
+            loader.head(id, 0, &ResponseHead { content_range: Some(&whole), ..GOOD });
             loader.data(id, 0, &vec![0; (range.end - range.start) as usize]);
             came +=
                 std::iter::from_fn(|| loader.take()).map(|(range, _)| range.end - range.start).sum::<u64>();

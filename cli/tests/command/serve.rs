@@ -6,7 +6,7 @@ use std::fs;
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::time::Duration;
-use tetralod::stream::{HttpOptions, HttpSource, Source, StreamError, Wanted};
+use tetralod::stream::{HttpOptions, HttpSource, RangeSource, StreamError, WantedRange};
 
 const DIGITS: &str = "0123456789";
 
@@ -187,7 +187,7 @@ fn the_project_s_own_client_gets_along_with_it() {
     let (folder, www) = folder("serve-client");
     let server = Server::start(&[&www]);
     let mut source = HttpSource::new(&format!("{}digits.mt", server.url), HttpOptions::default());
-    let wanted = |range| [Wanted { range, priority: 0.0 }];
+    let wanted = |range| [WantedRange { range, priority: 0.0 }];
     source.want(&wanted(2..5));
     assert_eq!(source.next(Duration::from_secs(20)), Ok(Some((2..5, b"234".to_vec()))));
     assert_eq!((source.total(), source.serves_ranges()), (Some(10), Some(true)));

@@ -15,6 +15,7 @@ import {
   type Source,
   type Where,
 } from "tetralod";
+import { checkOptions } from "./options.js";
 
 declare const process: { env: Record<string, string | undefined>; exitCode: number };
 
@@ -58,8 +59,11 @@ const failed: ErrorCode | undefined = await mt.refine({ error: -1 }).then(
 );
 mt.free();
 
+const examples = await checkOptions(source);
+
 const good =
   chunks > 0 &&
+  examples === 39 &&
   positions.length === 3 * mesh.stats.vertices &&
   mesh.tets.length === 4 * mesh.stats.tetrahedra &&
   surface.indices.length % 3 === 0 &&

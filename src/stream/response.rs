@@ -1,11 +1,11 @@
-//! What the head of an answer says, judged against what was asked.
+//! What the head of a response says, judged against what was asked.
 
 use super::error::StreamError;
 use std::ops::Range;
 
-/// The head of an HTTP answer: what of it matters here.
+/// The head of an HTTP response: what of it matters here.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Head<'a> {
+pub struct ResponseHead<'a> {
     /// The status, after redirects.
     pub status: u16,
     /// `Content-Range`; pages see it only where the server exposes it.
@@ -26,9 +26,9 @@ pub struct Head<'a> {
     pub retry_after_seconds: Option<u64>,
 }
 
-/// What an answer brings.
+/// What a response brings.
 #[derive(Debug, PartialEq, Eq)]
-pub enum Answer {
+pub enum ResponseContent {
     /// These bytes of the file.
     Part(Range<u64>),
     /// The file from its start, to its end if that is known.
@@ -40,9 +40,9 @@ pub enum Answer {
 /// The end of what is not known to end.
 pub const UNKNOWN: u64 = u64::MAX;
 
-impl Head<'_> {
+impl ResponseHead<'_> {
     /// What this head promises as the answer to `asked`.
-    pub fn judge(&self, asked: &Range<u64>) -> Result<Answer, StreamError> {
+    pub fn judge(&self, asked: &Range<u64>) -> Result<ResponseContent, StreamError> {
         match self.status {
             200 | 206 => {}
             412 => return Err(StreamError::Changed),
@@ -58,12 +58,12 @@ impl Head<'_> {
         match self.encoding() {
             Some(encoding) if !self.decoded => Err(StreamError::Encoded(short(encoding))),
             // The length is that of the packed bytes.
-            Some(_) => Ok(Answer::Whole(UNKNOWN)),
-            None => Ok(Answer::Whole(self.content_length.unwrap_or(UNKNOWN))),
+            Some(_) => Ok(ResponseContent::Whole(UNKNOWN)),
+            None => Ok(ResponseContent::Whole(self.content_length.unwrap_or(UNKNOWN))),
         }
     }
 
-    fn part(&self, asked: &Range<u64>) -> Result<Answer, StreamError> {
+    fn part(&self, asked: &Range<u64>) -> Result<ResponseContent, StreamError> {
         if let Some(encoding) = self.encoding() {
             return Err(StreamError::Encoded(short(encoding)));
         }
@@ -81,18 +81,18 @@ impl Head<'_> {
         let length = part.end.saturating_sub(part.start);
         let fits = part.start == asked.start && part.end <= asked.end;
         if fits && length > 0 && self.content_length.is_none_or(|given| given == length) {
-            return Ok(Answer::Part(part));
+            return Ok(ResponseContent::Part(part));
         }
         let found = self.content_range.map_or_else(|| "a body of another length".to_owned(), short);
         Err(StreamError::WrongRange(found))
     }
 
-    fn beyond(&self, asked: &Range<u64>) -> Result<Answer, StreamError> {
+    fn beyond(&self, asked: &Range<u64>) -> Result<ResponseContent, StreamError> {
         match self.total() {
             Some(total) if total > asked.start => {
                 Err(StreamError::WrongRange("416 for bytes that there are".to_owned()))
             }
-            total => Ok(Answer::Beyond(total.unwrap_or(asked.start))),
+            total => Ok(ResponseContent::Beyond(total.unwrap_or(asked.start))),
         }
     }
 
@@ -168,11 +168,16 @@ mod tests {
     #[test]
     fn a_part_must_be_the_one_that_was_asked_for() {
         let judge = |range: &'static str, length| {
-            Head { status: 206, content_range: Some(range), content_length: length, ..Head::default() }
-                .judge(&(10..20))
+            ResponseHead {
+                status: 206,
+                content_range: Some(range),
+                content_length: length,
+                ..ResponseHead::default()
+            }
+            .judge(&(10..20))
         };
-        assert_eq!(judge("bytes 10-19/99", Some(10)), Ok(Answer::Part(10..20)));
-        assert_eq!(judge("bytes 10-14/15", None), Ok(Answer::Part(10..15)));
+        assert_eq!(judge("bytes 10-19/99", Some(10)), Ok(ResponseContent::Part(10..20)));
+        assert_eq!(judge("bytes 10-14/15", None), Ok(ResponseContent::Part(10..15)));
         for wrong in ["bytes 0-9/99", "bytes 11-19/99", "bytes 10-20/99", "bytes */99", "nonsense"] {
             assert!(matches!(judge(wrong, None), Err(StreamError::WrongRange(_))), "{wrong}");
         }
@@ -181,19 +186,26 @@ mod tests {
 
     #[test]
     fn pages_packed_ranges_and_refusals_are_no_bytes() {
-        let head = |status| Head { status, ..Head::default() };
-        let page = Head { content_type: Some("Text/HTML; charset=utf-8"), ..head(200) };
+        let head = |status| ResponseHead { status, ..ResponseHead::default() };
+        let page = ResponseHead { content_type: Some("Text/HTML; charset=utf-8"), ..head(200) };
         assert_eq!(page.judge(&(0..9)), Err(StreamError::WebPage));
-        let packed =
-            Head { content_encoding: Some("gzip"), content_length: Some(5), decoded: true, ..head(206) };
+        let packed = ResponseHead {
+            content_encoding: Some("gzip"),
+            content_length: Some(5),
+            decoded: true,
+            ..head(206)
+        };
         assert_eq!(packed.judge(&(0..9)), Err(StreamError::Encoded("gzip".to_owned())));
-        assert_eq!(Head { status: 200, ..packed }.judge(&(0..9)), Ok(Answer::Whole(UNKNOWN)));
-        assert_eq!(Head { status: 200, ..packed }.total(), None);
+        assert_eq!(
+            ResponseHead { status: 200, ..packed }.judge(&(0..9)),
+            Ok(ResponseContent::Whole(UNKNOWN))
+        );
+        assert_eq!(ResponseHead { status: 200, ..packed }.total(), None);
         assert_eq!(head(404).judge(&(0..9)), Err(StreamError::Status(404)));
         assert_eq!(head(412).judge(&(0..9)), Err(StreamError::Changed));
-        assert_eq!(head(416).judge(&(7..9)), Ok(Answer::Beyond(7)));
-        let lying = Head { content_range: Some("bytes */20"), ..head(416) };
+        assert_eq!(head(416).judge(&(7..9)), Ok(ResponseContent::Beyond(7)));
+        let lying = ResponseHead { content_range: Some("bytes */20"), ..head(416) };
         assert!(matches!(lying.judge(&(7..9)), Err(StreamError::WrongRange(_))));
-        assert_eq!(lying.judge(&(30..31)), Ok(Answer::Beyond(20)));
+        assert_eq!(lying.judge(&(30..31)), Ok(ResponseContent::Beyond(20)));
     }
 }

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 /// Runs of bytes of a file, in order and apart. They grow with what arrives, never with what somebody announces.
 #[derive(Debug, Default)]
-pub struct Held {
+pub struct Reassembly {
     runs: Vec<Run>,
 }
 
@@ -27,7 +27,7 @@ impl Run {
     }
 }
 
-impl Held {
+impl Reassembly {
     /// Takes bytes that are not held yet.
     pub fn put(&mut self, start: u64, bytes: &[u8]) {
         let at = self.runs.partition_point(|run| run.start < start);
