@@ -2,12 +2,11 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::thread;
 
 use anyhow::{Context, Result, bail};
 
-use crate::serve::Mount;
-use crate::{fixture, package, serve, shell};
+use crate::serve::Server;
+use crate::{fixture, package, shell};
 
 /// Where the page looks for its volumes.
 const DATA: &str = "www/data";
@@ -81,15 +80,13 @@ fn is_newer(file: &Path, than: &Path) -> bool {
 }
 
 /// Serves the page as a web site would: the package at `pkg/`, everything else from `www/`.
-pub fn start_server(port: u16) -> Result<String> {
-    serve::start(vec![Mount::new("/pkg/", package::PKG)?, Mount::new("/", "www")?], port)
+pub fn start_server(port: u16) -> Result<Server> {
+    Server::start("www", &[("/pkg", package::PKG)], port)
 }
 
 fn serve_page(port: u16) -> Result<()> {
     // Somebody else on the port is no reason to fail: any other will do.
-    let address = start_server(port).or_else(|_| start_server(0))?;
-    println!("\nThe demo is at {address}   (Ctrl-C ends it)");
-    loop {
-        thread::park();
-    }
+    let server = start_server(port).or_else(|_| start_server(0))?;
+    println!("\nThe demo is at {}   (Ctrl-C ends it)", server.address);
+    server.wait()
 }
