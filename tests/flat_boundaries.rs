@@ -9,6 +9,7 @@ use build_support::blocks;
 use random::Random;
 use std::ops::ControlFlow;
 use tetralod::build::BuildConfig;
+use tetralod::build::Construction;
 use tetralod::build::Criterion;
 use tetralod::build::Method;
 use tetralod::build::build;
@@ -25,7 +26,8 @@ use tetralod::refine::Request;
 
 fn made(mesh: &TetMesh, kind: MtKind, criterion: Criterion) -> Mt {
     let method = if kind == MtKind::Edge { Method::Collapse } else { Method::Decimate };
-    let config = BuildConfig { kind, method, criterion, ..BuildConfig::of(MtKind::Edge) };
+    let construction = Construction::new(kind, method, criterion).expect("they go together");
+    let config = BuildConfig { construction, ..BuildConfig::of(MtKind::Edge) };
     build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt
 }
 

@@ -11,6 +11,7 @@ use build_support::tampered;
 use random::Random;
 use std::ops::ControlFlow;
 use tetralod::build::BuildConfig;
+use tetralod::build::Construction;
 use tetralod::build::Criterion;
 use tetralod::build::Method;
 use tetralod::build::build;
@@ -45,7 +46,8 @@ fn made(mesh: &TetMesh, kind: MtKind) -> Mt {
         MtKind::Edge => (Method::Collapse, Criterion::HalfEdge),
         _ => (Method::Decimate, Criterion::HalfEdge),
     };
-    let config = BuildConfig { kind, method, criterion, ..BuildConfig::of(MtKind::Edge) };
+    let construction = Construction::new(kind, method, criterion).expect("they go together");
+    let config = BuildConfig { construction, ..BuildConfig::of(MtKind::Edge) };
     build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt
 }
 

@@ -9,6 +9,7 @@ use bound_support::refined;
 use build_support::blocks;
 use std::ops::ControlFlow;
 use tetralod::build::BuildConfig;
+use tetralod::build::Construction;
 use tetralod::build::Criterion;
 use tetralod::build::Method;
 use tetralod::build::build;
@@ -58,7 +59,8 @@ fn rough() -> TetMesh {
 }
 
 fn made(mesh: &TetMesh, (kind, method, criterion): (MtKind, Method, Criterion)) -> Mt {
-    let config = BuildConfig { kind, method, criterion, ..BuildConfig::default() };
+    let construction = Construction::new(kind, method, criterion).expect("they go together");
+    let config = BuildConfig { construction, ..BuildConfig::default() };
     build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt
 }
 

@@ -10,6 +10,7 @@ use refine_support::SUBJECTS;
 use refine_support::applied;
 use std::ops::ControlFlow;
 use tetralod::build::BuildConfig;
+use tetralod::build::Construction;
 use tetralod::build::Criterion;
 use tetralod::build::Method;
 use tetralod::build::build;
@@ -88,7 +89,8 @@ fn what_is_promised_of_a_field_holds_for_every_builder() {
     ] {
         let criterion = if method == Method::Insert { Criterion::Delaunay } else { Criterion::HalfEdge };
         let fields = names.clone();
-        let config = BuildConfig { kind, method, criterion, fields, ..BuildConfig::of(MtKind::Edge) };
+        let construction = Construction::new(kind, method, criterion).expect("they go together");
+        let config = BuildConfig { construction, fields, ..BuildConfig::of(MtKind::Edge) };
         let mt = build(&input, &config, &mut |_| ControlFlow::Continue(())).expect("a good mesh").mt;
         let reference = match method {
             Method::Insert => verify::Reference::Points,

@@ -13,6 +13,7 @@ use build_support::blocks;
 use random::Random;
 use std::ops::ControlFlow;
 use tetralod::build::BuildConfig;
+use tetralod::build::Construction;
 use tetralod::build::Criterion;
 use tetralod::build::Method;
 use tetralod::build::build;
@@ -50,7 +51,8 @@ fn made(mesh: &TetMesh, kind: MtKind, position_bits: Option<u32>) -> Mt {
         MtKind::Edge => (Method::Collapse, Criterion::HalfEdge),
         _ => (Method::Decimate, Criterion::HalfEdge),
     };
-    let config = BuildConfig { kind, method, criterion, position_bits, ..BuildConfig::default() };
+    let construction = Construction::new(kind, method, criterion).expect("they go together");
+    let config = BuildConfig { construction, position_bits, ..BuildConfig::default() };
     build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt
 }
 

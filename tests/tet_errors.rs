@@ -14,6 +14,7 @@ use std::sync::LazyLock;
 use support::random::Random;
 use tetralod::build::BuildConfig;
 use tetralod::build::BuildResult;
+use tetralod::build::Construction;
 use tetralod::build::Criterion as BuiltBy;
 use tetralod::build::Method;
 use tetralod::build::build;
@@ -43,12 +44,10 @@ use tetralod::verify;
 use tetralod::verify::Reference;
 
 fn config(mesh: &TetMesh, kind: MtKind, tet_errors: bool) -> BuildConfig {
+    let plain = Construction::new(kind, Method::Insert, BuiltBy::Delaunay).expect("they go together");
     BuildConfig {
-        kind,
-        method: Method::Insert,
-        criterion: BuiltBy::Delaunay,
+        construction: if tet_errors { plain.with_tet_errors().expect("they go together") } else { plain },
         fields: mesh.fields.iter().map(|field| field.name.clone()).collect(),
-        tet_errors,
         ..BuildConfig::of(MtKind::Edge)
     }
 }
@@ -415,10 +414,9 @@ fn every_promise_is_kept() {
 
 #[test]
 fn other_methods_refuse() {
-    let input = cube(3, &[hilly]);
     for (kind, method) in [(MtKind::Vertex, Method::Decimate), (MtKind::Edge, Method::Collapse)] {
-        let config = BuildConfig { kind, method, tet_errors: true, ..BuildConfig::of(MtKind::Edge) };
-        let error = build(&input, &config, &mut |_| ControlFlow::Continue(())).unwrap_err();
+        let plain = Construction::new(kind, method, BuiltBy::HalfEdge).expect("they go together");
+        let error = plain.with_tet_errors().unwrap_err();
         assert!(error.to_string().contains("method insert"), "{error}");
     }
 }

@@ -8,6 +8,7 @@ use build_support::built;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use tetralod::build::BuildConfig;
+use tetralod::build::Construction;
 use tetralod::build::Criterion;
 use tetralod::build::Method;
 use tetralod::build::build;
@@ -48,7 +49,8 @@ fn check(name: &str, mesh: &TetMesh, most: u32) {
         if method == Method::Insert && mesh.grid.is_none() {
             continue;
         }
-        let config = BuildConfig { method, criterion, ..BuildConfig::of(kind) };
+        let construction = Construction::new(kind, method, criterion).expect("they go together");
+        let config = BuildConfig { construction, ..BuildConfig::of(kind) };
         let mt = build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt;
         let reference = if method.keeps_the_mesh() { Reference::Mesh } else { Reference::Points };
         keeps_promises(

@@ -18,6 +18,7 @@ use std::collections::BTreeSet;
 use std::collections::HashMap;
 use std::ops::ControlFlow;
 use tetralod::build::BuildConfig;
+use tetralod::build::Construction;
 use tetralod::build::Criterion;
 use tetralod::build::Method;
 use tetralod::build::build;
@@ -60,8 +61,8 @@ impl How {
     pub fn build(self, mesh: &TetMesh, position_bits: Option<u32>) -> Mt {
         let How { kind, method, criterion } = self;
         let fields = mesh.fields.iter().map(|field| field.name.clone()).collect();
-        let config =
-            BuildConfig { kind, method, criterion, fields, position_bits, ..BuildConfig::of(MtKind::Edge) };
+        let construction = Construction::new(kind, method, criterion).expect("they go together");
+        let config = BuildConfig { construction, fields, position_bits, ..BuildConfig::of(MtKind::Edge) };
         build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt
     }
 }

@@ -7,7 +7,7 @@ use super::reader::half_edge;
 use super::reader::half_edge::Record;
 use super::reader::half_edge_mesh::Mesh;
 use super::*;
-use tetralod::build::Purpose;
+use tetralod::build::{Construction, Purpose};
 use tetralod::mt::Applied;
 
 fn built(mesh: &TetMesh, config: BuildConfig) -> Mt {
@@ -19,7 +19,7 @@ fn built(mesh: &TetMesh, config: BuildConfig) -> Mt {
 /// With lattices of so many bits.
 fn with_bits(purpose: Purpose, position_bits: u32, field_bits: u32) -> BuildConfig {
     BuildConfig {
-        purpose,
+        construction: Construction::HalfEdge { purpose },
         position_bits: Some(position_bits),
         field_precision: FieldPrecision::Bits(field_bits),
         ..BuildConfig::of(MtKind::HalfEdge)
