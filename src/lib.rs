@@ -10,7 +10,7 @@
 #![cfg_attr(feature = "build", doc = "```")]
 #![cfg_attr(not(feature = "build"), doc = "```ignore")]
 //! use std::ops::ControlFlow;
-//! use tetralod::build::{BuildConfig, build};
+//! use tetralod::builder::{BuildConfig, build};
 //! use tetralod::format::{EncodeOptions, encode};
 //! use tetralod::refine::Request;
 //! use tetralod::session::Session;
@@ -54,7 +54,7 @@
 //!
 //! | feature | adds | for |
 //! |---|---|---|
-//! | `build` (default) | modules `io`, `generate`, `build`, `measure`, `verify` | making MTs, natively or in wasm |
+//! | `build` (default) | modules `io`, `generate`, `builder`, `measure`, `verify` | making MTs, natively or in wasm |
 //! | `http` | `stream::HttpSource` | MT files on servers, in native programs |
 //! | `gpu` | module `gpu`: the renderer on wgpu, with WebGPU as its only backend | pages; add a backend of wgpu for native use |
 //! | `vulkan` | `gpu` with wgpu's Vulkan backend | testing the renderer without a browser |
@@ -83,19 +83,59 @@
 //!
 //! # Glossary
 //!
+//! Terms of the paper first:
+//!
 //! | term | meaning |
 //! |---|---|
-//! | *lattice* | integer coordinates for positions, and integer *levels* for fields, on which all meshes of an MT live |
-//! | *reference mesh* | the input mesh on the lattice: all updates applied |
+//! | *Multi-Tessellation*, *MT* | a base mesh, and updates of it with a partial order [§2] |
 //! | *base mesh* | the coarsest mesh: no update applied |
-//! | *update*, *node* `u` | one local change: `refine` is `u+`, `coarsen` is `u−` |
-//! | *parents*, *children* | `u` depends on its parents: `u+` removes a tetrahedron that a parent's `p+` created |
-//! | *consistent set* `S` | a set of updates that holds every parent of its members |
-//! | *current mesh* `Σ_S` | the base mesh with the updates of `S` applied |
-//! | *star* of a vertex | the tetrahedra around it; its *link* is their opposite faces |
-//! | *error* | largest deviation from the input's fields at the vertices of the reference mesh, as a fraction of each field's range; where the boundary has moved, its displacement counts as an error, too ([`MtInfo::displacement_per_error`](mt::MtInfo::displacement_per_error)) |
-//! | *ROI* | region of interest: the box that a request selects |
-//! | *budget* `b` | largest number of tetrahedra that the extracted mesh may have |
+//! | *reference mesh* | the finest mesh: all updates applied. It is the input mesh with positions and values rounded to lattices |
+//! | *update*, *node* `u` | one local change: `u+` (`refine`) removes some tetrahedra and inserts others that fill the same space, `u−` (`coarsen`) undoes that |
+//! | *parents*, *children*, *arc* | `u` depends on its parents: `u+` removes a tetrahedron that a parent's `p+` inserted; then `u` is a child of `p`, and there is an arc from `p` to `u` |
+//! | *partial order*, *depth* | the order that the arcs make: parents before children; the length of its longest chain |
+//! | *consistent set* `S` | a set of updates that contains every parent of its members |
+//! | *current mesh* `Σ_S`, *extracted mesh* | the base mesh with the updates of `S` applied |
+//! | *selective refinement* | finds the smallest consistent set whose mesh meets a request [§2.3], with the errors that updates have here |
+//! | *uniform*, *variable* mesh | one error everywhere; an error that depends on the place or the field |
+//! | *ROI*, *region of interest* | the part of the model that a request selects |
+//! | *budget* `b` | the largest size that the extracted mesh may have |
+//! | *star*, *link* of a vertex | the tetrahedra around it; their faces opposite the vertex |
+//! | *star-shaped polyhedron*, *cavity* `Π_u` | the space that a vertex insertion fills with the star of the new vertex; the tetrahedra that it removes are `T_u` |
+//! | *edge collapse*, *vertex split* | an edge becomes one vertex; the reverse |
+//! | *half-edge collapse* | an edge collapse that moves one vertex onto the other, which stays where it is |
+//! | *vertex removal*, *vertex insertion* | a vertex goes, and its star is filled without it; the reverse |
+//! | *explicit structure* | all tetrahedra, updates and arcs stored one by one [§3] |
+//!
+//! Terms of this crate:
+//!
+//! | term | meaning |
+//! |---|---|
+//! | *kind* of an MT | [`edge`](mt::EdgeMt): vertex splits, undone by edge collapses to midpoints [§4]; [`vertex`](mt::VertexMt): vertex insertions [§5]; [`half-edge`](mt::HalfEdgeMt): vertex insertions, undone by half-edge collapses, whose blocks can be used by themselves; [`explicit`](mt::ExplicitMt): updates of any kind in the explicit structure |
+//! | *method*, *criterion* | how an MT is built: by collapses, decimation or insertion; which vertex goes where or comes next |
+//! | *store* | what holds the updates of an MT of one kind in memory |
+//! | *remover*, *creator* of a tetrahedron | the update whose `u+` removes it; the one whose `u+` inserted it |
+//! | *lattice*, *bits* | the integer coordinates of positions, or values of a field, and their number of binary digits; all meshes of an MT are on them |
+//! | *level* | the value of a field at a vertex as an integer on its lattice |
+//! | *quantization* | the largest loss by rounding to a lattice, measured when an MT is built; part of every bound |
+//! | *error* of a tetrahedron, of an update | the largest deviation from the input's field at the vertices of the reference mesh in the tetrahedron, as a fraction of the field's range; an upper bound of that for all tetrahedra that `u+` removes, and of the errors of all updates that depend on `u` |
+//! | *error code* | an error as an integer of 16 bits, rounded up ([`ErrorCode`](mt::ErrorCode)) |
+//! | *own error*, *quarterings* | of a tetrahedron by itself, where an MT keeps it: at most the error of its remover, as a number of quarterings of that |
+//! | *displacement* | how far the boundary has moved; it counts as an error ([`MtInfo::displacement_per_error`](mt::MtInfo::displacement_per_error)) |
+//! | *bound* | what is guaranteed of a mesh: of its error ([`error_bound`](refine::RefineStats::error_bound)), of the field at inner vertices ([`field_bound`](mt::MtInfo::field_bound)), of the boundary ([`boundary_bound`](mt::MtInfo::boundary_bound)) |
+//! | *request*, *need* | what the current mesh is to be: a union of needs, each a part of the model with an error, and a budget |
+//! | *region* | a convex part of space in a need: a box, ball, half-space, slab, or intersection of half-spaces |
+//! | *LOD criterion* | decides whether a tetrahedron *violates* a request ([`Criterion`](refine::Criterion)) |
+//! | *front* | selective refinement in progress: the current mesh and what is left to do for a request ([`Front`](refine::Front)) |
+//! | *forced* update | applied only because an update that a request needs depends on it |
+//! | *satisfied*, *missing* | the mesh meets its request; it does not because data has not arrived |
+//! | *section*, *head* | a part of a file with a kind, a length and a checksum, which are its head |
+//! | *block*, *index* | consecutive updates in a file, the smallest part that is fetched; the section that says where each block is and what it contains |
+//! | *page* | the updates of a block in memory: they are inserted and evicted together |
+//! | *prefix* | the first bytes of a file; with the base mesh in it, it is an MT by itself |
+//! | *residual* | a number in a file minus its prediction, which the reader makes, too |
+//! | *offset*, *mask* | of a vertex split: the difference between the two new vertices; which tetrahedra of the star go to which of them |
+//! | *exact values* | the input's values before rounding, at the end of a file |
+//! | *session*, *client* | decoder, MT and current mesh in one ([`Session`](session::Session)); a session that fetches blocks ([`Client`](client::Client)) |
 //!
 //! # Conventions
 //!
@@ -107,7 +147,7 @@
 
 pub mod bench;
 #[cfg(feature = "build")]
-pub mod build;
+pub mod builder;
 pub mod client;
 pub mod format;
 #[cfg(feature = "build")]
@@ -130,7 +170,17 @@ pub mod view;
 #[cfg(feature = "web")]
 pub mod web;
 
-/// The Rust code of README.md, as a test.
+/// The Rust code of README.md and of the pages in `docs/`, as tests.
 #[cfg(all(doctest, feature = "build"))]
-#[doc = include_str!("../README.md")]
-struct Readme;
+mod pages {
+    #[doc = include_str!("../README.md")]
+    struct Readme;
+    #[doc = include_str!("../docs/command.md")]
+    struct CommandLine;
+    #[doc = include_str!("../docs/hosting.md")]
+    struct Hosting;
+    #[doc = include_str!("../docs/input.md")]
+    struct Input;
+    #[doc = include_str!("../docs/promises.md")]
+    struct Promises;
+}

@@ -8,16 +8,10 @@
 //! nor one in a tetrahedron that happens to contain the vertex. So when [`Part::promise`] is given, places on the
 //! boundary within its distance count as well, and the one that fits best is taken.
 
-use crate::geom::Bounds;
-use crate::geom::nearest_on_triangle;
-use crate::geom::weights_at;
-use crate::mesh::FACES;
-use crate::mesh::NONE;
-use crate::mt::CurrentMesh;
-use crate::mt::FieldInfo;
-use crate::mt::MtInfo;
+use crate::geom::{Bounds, PointGrid, TriangleGrid, weights_at, weights_on_triangle};
+use crate::mesh::boundary_faces;
+use crate::mt::{CurrentMesh, FieldInfo, MtInfo};
 use glam::DVec3;
-use std::ops::RangeInclusive;
 
 /// The vertices and one field of the mesh that an MT was built from.
 #[derive(Clone, Copy, Debug)]
@@ -80,29 +74,17 @@ pub struct Deviation {
 /// Measures how far `mesh` is from `reference` in the part that is asked for.
 pub fn deviation(info: &MtInfo, mesh: &CurrentMesh, reference: &Reference<'_>, part: &Part) -> Deviation {
     let measure = Measure { info, field: &info.fields[reference.field], mesh, reference, part };
-    let wanted = |p: &[f64; 3]| part.roi.is_none_or(|roi| roi.contains(*p));
-    let points: Vec<Point> = reference
-        .positions
-        .iter()
-        .zip(reference.values)
-        .filter(|(p, _)| wanted(p))
-        .map(|(p, value)| Point {
-            at: info.lattice.nearest(*p),
-            place: DVec3::from(*p),
-            value: *value,
-            inside: false,
-            excused: false,
-            least: None,
-        })
-        .collect();
-    let mut raster = Raster::new(points, info.lattice.step);
+    let wanted = |(p, _): &(&[f64; 3], &f64)| part.roi.is_none_or(|roi| roi.contains(**p));
+    let pairs = reference.positions.iter().zip(reference.values).filter(wanted);
+    let mut points: Vec<Point> = pairs.map(|(p, value)| Point::new(*p, *value)).collect();
+    let grid = PointGrid::new(points.iter().map(|p| info.lattice.nearest(p.place.to_array())).collect());
     for tet in mesh.tets() {
-        measure.look_inside(*tet, &mut raster);
+        measure.look_inside(*tet, &grid, &mut points);
     }
-    measure.look_beside(&mut raster);
+    measure.look_beside(&mut points);
     let mut largest = Deviation::default();
     let counts = |point: &&Point| !point.excused || measure.is_kept(point);
-    for (field, distance) in raster.points.iter().filter(counts).filter_map(|point| point.least) {
+    for (field, distance) in points.iter().filter(counts).filter_map(|point| point.least) {
         largest.field = largest.field.max(field);
         largest.distance = largest.distance.max(distance);
         largest.vertices += 1;
@@ -110,9 +92,8 @@ pub fn deviation(info: &MtInfo, mesh: &CurrentMesh, reference: &Reference<'_>, p
     largest
 }
 
-/// A reference vertex on the lattice.
+/// A reference vertex.
 struct Point {
-    at: [i32; 3],
     /// Where it is in the input, in model units.
     place: DVec3,
     value: f64,
@@ -124,6 +105,20 @@ struct Point {
     least: Option<(f64, f64)>,
 }
 
+impl Point {
+    fn new(place: [f64; 3], value: f64) -> Self {
+        Self { place: DVec3::from(place), value, inside: false, excused: false, least: None }
+    }
+
+    /// Takes note of a deviation, at this distance, if it is the least one.
+    fn compare(&mut self, value: f64, distance: f64) {
+        let deviation = (value - self.value).abs();
+        if self.least.is_none_or(|(least, _)| deviation < least) {
+            self.least = Some((deviation, distance));
+        }
+    }
+}
+
 struct Measure<'a> {
     info: &'a MtInfo,
     field: &'a FieldInfo,
@@ -132,14 +127,11 @@ struct Measure<'a> {
     part: &'a Part,
 }
 
-/// A boundary triangle: its corners in model units and their values.
-struct Triangle {
-    corners: [DVec3; 3],
-    values: [f64; 3],
-    low: DVec3,
-    high: DVec3,
-    /// Whether the field has a wanted value in its tetrahedron.
-    spans: bool,
+/// The boundary of the mesh.
+struct Boundary {
+    triangles: TriangleGrid,
+    /// Of each triangle, the values at its corners, and whether the field has a wanted value in its tetrahedron.
+    values: Vec<([f64; 3], bool)>,
 }
 
 impl Measure<'_> {
@@ -155,25 +147,18 @@ impl Measure<'_> {
         ranges.is_empty() || ranges.iter().any(|&[from, to]| low <= to && from <= high)
     }
 
-    fn look_inside(&self, tet: [u32; 4], raster: &mut Raster) {
+    fn look_inside(&self, tet: [u32; 4], grid: &PointGrid, points: &mut [Point]) {
         let corners = tet.map(|slot| self.mesh.positions()[slot as usize]);
         let values = self.values(tet);
         let spans = self.spans(values);
-        let low = [0, 1, 2].map(|i| corners.iter().map(|q| q[i]).fold(i32::MAX, i32::min));
-        let high = [0, 1, 2].map(|i| corners.iter().map(|q| q[i]).fold(i32::MIN, i32::max));
-        // A point may be half a step beside its place on the lattice.
-        let (low, high) = (low.map(|x| x.saturating_sub(1)), high.map(|x| x.saturating_add(1)));
-        raster.for_each_between(low, high, |point| {
-            let place =
-                (point.place - DVec3::from(self.info.lattice.origin)) / DVec3::from(self.info.lattice.step);
-            let Some(weights) = weights_at(corners, point.at, place) else { return };
+        let [origin, step] = [self.info.lattice.origin, self.info.lattice.step].map(DVec3::from);
+        grid.near_tet(&corners, |i| {
+            let point = &mut points[i as usize];
+            let place = (point.place - origin) / step;
+            let Some(weights) = weights_at(corners, grid.points()[i as usize], place) else { return };
             point.inside = true;
             if spans {
-                let value: f64 = weights.iter().zip(values).map(|(w, v)| w * v).sum();
-                let deviation = (value - point.value).abs();
-                if point.least.is_none_or(|(least, _)| deviation < least) {
-                    point.least = Some((deviation, 0.0));
-                }
+                point.compare(weights.iter().zip(values).map(|(w, v)| w * v).sum(), 0.0);
             }
         });
     }
@@ -185,181 +170,58 @@ impl Measure<'_> {
 
     /// Compares points with places on the boundary: those that no tetrahedron contains, and those for which the
     /// promise has not been found to be kept.
-    fn look_beside(&self, raster: &mut Raster) {
+    fn look_beside(&self, points: &mut [Point]) {
         let open = |point: &Point| match self.part.promise {
             None => !point.inside,
             Some(_) => (!point.inside || point.least.is_some()) && !self.is_kept(point),
         };
-        if !raster.points.iter().any(open) {
+        if !points.iter().any(open) {
             return;
         }
-        let triangles = self.boundary();
-        if let Some(promise) = self.part.promise {
-            triangles.iter().for_each(|triangle| self.look_around(triangle, promise.distance, raster, open));
-        }
-        for point in raster.points.iter_mut().filter(|point| !point.inside && point.least.is_none()) {
-            self.look_nearest(point, &triangles);
-        }
-    }
-
-    /// Compares a triangle with the points that are no farther from it than `reach`.
-    fn look_around(
-        &self,
-        triangle: &Triangle,
-        reach: f64,
-        raster: &mut Raster,
-        open: impl Fn(&Point) -> bool,
-    ) {
-        let corner = |corner: DVec3| self.info.lattice.nearest(corner.to_array());
-        // One step more for the rounding to the lattice.
-        let low = corner(triangle.low - reach).map(|x| x - 1);
-        let high = corner(triangle.high + reach).map(|x| x + 1);
-        raster.for_each_between(low, high, |point| {
-            if !open(point) {
-                return;
-            }
-            let p = point.place;
-            let q = nearest_on_triangle(p, triangle.corners);
-            if p.distance(q) <= reach {
-                self.compare(point, triangle, p, q);
-            }
-        });
-    }
-
-    /// Compares a point with the nearest place on the boundary.
-    fn look_nearest(&self, point: &mut Point, triangles: &[Triangle]) {
-        let p = point.place;
-        let mut nearest: Option<(f64, DVec3, &Triangle)> = None;
-        for triangle in triangles {
-            let bound = p.distance_squared(p.clamp(triangle.low, triangle.high));
-            if nearest.is_some_and(|(distance, ..)| bound >= distance) {
-                continue;
-            }
-            let q = nearest_on_triangle(p, triangle.corners);
-            let distance = p.distance_squared(q);
-            if nearest.is_none_or(|(least, ..)| distance < least) {
-                nearest = Some((distance, q, triangle));
-            }
-        }
-        if let Some((_, q, triangle)) = nearest {
-            self.compare(point, triangle, p, q);
-        }
-    }
-
-    /// Compares the point at `p` with the place `q` of a triangle.
-    fn compare(&self, point: &mut Point, triangle: &Triangle, p: DVec3, q: DVec3) {
-        if !triangle.spans {
-            point.excused = true;
-            return;
-        }
-        let deviation = (triangle.value(q) - point.value).abs();
-        if point.least.is_none_or(|(least, _)| deviation < least) {
-            point.least = Some((deviation, p.distance(q)));
-        }
-    }
-
-    fn boundary(&self) -> Vec<Triangle> {
-        let mut triangles = Vec::new();
-        for (tet, around) in self.mesh.tets().iter().zip(self.mesh.neighbors()) {
-            for face in (0..4).filter(|&face| around[face] == NONE) {
-                let slots = FACES[face].map(|i| tet[i]);
-                let corners = slots
-                    .map(|slot| DVec3::from(self.info.lattice.point(self.mesh.positions()[slot as usize])));
-                triangles.push(Triangle {
-                    corners,
-                    values: self.values(slots),
-                    low: corners[0].min(corners[1]).min(corners[2]),
-                    high: corners[0].max(corners[1]).max(corners[2]),
-                    spans: self.spans(self.values(*tet)),
-                });
-            }
-        }
-        triangles
-    }
-}
-
-impl Triangle {
-    /// The interpolated value at a point of the triangle.
-    fn value(&self, q: DVec3) -> f64 {
-        let [a, b, c] = self.corners;
-        let normal = (b - a).cross(c - a);
-        let area = normal.length_squared();
-        if area <= 0.0 {
-            return self.values[0];
-        }
-        let v = (q - a).cross(c - a).dot(normal) / area;
-        let w = (b - a).cross(q - a).dot(normal) / area;
-        self.values[0] * (1.0 - v - w) + self.values[1] * v + self.values[2] * w
-    }
-}
-
-/// Points sorted into the boxes of a regular raster.
-struct Raster {
-    points: Vec<Point>,
-    /// Where the points of each box start.
-    starts: Vec<u32>,
-    low: [i32; 3],
-    high: [i32; 3],
-    boxes: [usize; 3],
-}
-
-/// Points in a box, on average, if they were spread evenly.
-const CROWD: f64 = 2.0;
-/// Most boxes along an axis.
-const MAX_BOXES: f64 = 256.0;
-
-impl Raster {
-    fn new(mut points: Vec<Point>, step: [f64; 3]) -> Self {
-        let low = [0, 1, 2].map(|i| points.iter().map(|p| p.at[i]).min().unwrap_or(0));
-        let high = [0, 1, 2].map(|i| points.iter().map(|p| p.at[i]).max().unwrap_or(0));
-        let extent = [0, 1, 2].map(|i| f64::from(high[i] - low[i] + 1) * step[i]);
-        let side = (extent[0] * extent[1] * extent[2] * CROWD / points.len().max(1) as f64).cbrt();
-        let boxes = extent.map(|e| (e / side).clamp(1.0, MAX_BOXES) as usize);
-        let mut raster = Self { points: Vec::new(), starts: Vec::new(), low, high, boxes };
-        points.sort_by_cached_key(|point| raster.index(point.at));
-        raster.starts = vec![0; boxes.iter().product::<usize>() + 1];
-        for point in &points {
-            let index = raster.index(point.at);
-            raster.starts[index + 1] += 1;
-        }
-        (1..raster.starts.len()).for_each(|i| raster.starts[i] += raster.starts[i - 1]);
-        raster.points = points;
-        raster
-    }
-
-    /// Which box a coordinate between `low` and `high` falls into along an axis.
-    fn along(&self, axis: usize, x: i32) -> usize {
-        let size = u64::from(self.high[axis].abs_diff(self.low[axis])) + 1;
-        (u64::from(x.abs_diff(self.low[axis])) * self.boxes[axis] as u64 / size) as usize
-    }
-
-    fn index(&self, at: [i32; 3]) -> usize {
-        let [x, y, z] = [0, 1, 2].map(|axis| self.along(axis, at[axis]));
-        (z * self.boxes[1] + y) * self.boxes[0] + x
-    }
-
-    /// Calls `look` with the points between two corners.
-    fn for_each_between(&mut self, low: [i32; 3], high: [i32; 3], mut look: impl FnMut(&mut Point)) {
-        let (low, high) =
-            ([0, 1, 2].map(|i| low[i].max(self.low[i])), [0, 1, 2].map(|i| high[i].min(self.high[i])));
-        if self.points.is_empty() || (0..3).any(|i| low[i] > high[i]) {
-            return;
-        }
-        let range = |axis: usize| -> RangeInclusive<usize> {
-            self.along(axis, low[axis])..=self.along(axis, high[axis])
-        };
-        let [xs, ys, zs] = [range(0), range(1), range(2)];
-        for z in zs {
-            for y in ys.clone() {
-                let row = (z * self.boxes[1] + y) * self.boxes[0];
-                let first = self.starts[row + xs.start()] as usize;
-                let end = self.starts[row + xs.end() + 1] as usize;
-                for point in &mut self.points[first..end] {
-                    if (0..3).all(|i| low[i] <= point.at[i] && point.at[i] <= high[i]) {
-                        look(point);
+        let boundary = self.boundary();
+        let mut near = Vec::new();
+        for point in points {
+            if let Some(promise) = self.part.promise.filter(|_| open(point)) {
+                near.clear();
+                boundary.triangles.within(point.place, promise.distance, |i, q, _| near.push((i, q)));
+                // In the order of the triangles, each once.
+                near.sort_unstable_by_key(|(i, _)| *i);
+                near.dedup_by_key(|(i, _)| *i);
+                for (i, q) in near.drain(..) {
+                    if open(point) {
+                        boundary.compare(point, i, q);
                     }
                 }
             }
+            if !point.inside && point.least.is_none() {
+                let nearest = boundary.triangles.nearest(point.place);
+                nearest.into_iter().for_each(|(i, q)| boundary.compare(point, i, q));
+            }
         }
+    }
+
+    fn boundary(&self) -> Boundary {
+        let at = |slot: u32| DVec3::from(self.info.lattice.point(self.mesh.positions()[slot as usize]));
+        let tets = self.mesh.tets();
+        let faces = boundary_faces(tets, self.mesh.neighbors());
+        let triangle = |(t, face): (u32, [u32; 3])| {
+            (face.map(at), (self.values(face), self.spans(self.values(tets[t as usize]))))
+        };
+        let (corners, values) = faces.map(triangle).unzip();
+        Boundary { triangles: TriangleGrid::new(corners), values }
+    }
+}
+
+impl Boundary {
+    /// Compares a point with the place `q` of a triangle.
+    fn compare(&self, point: &mut Point, triangle: u32, q: DVec3) {
+        let (values, spans) = self.values[triangle as usize];
+        if !spans {
+            point.excused = true;
+            return;
+        }
+        let weights = weights_on_triangle(q, self.triangles.corners[triangle as usize]);
+        let [a, b, c] = [0, 1, 2].map(|i| values[i] * weights[i]);
+        point.compare(a + b + c, point.place.distance(q));
     }
 }

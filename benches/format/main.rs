@@ -1,8 +1,9 @@
 //! What MT files cost: bytes beside other forms of the same meshes, what requests need of them by ranges, and a model larger
 //! than the memory for it. Prints Markdown; `cargo xtask bench --format` puts it together as docs/benchmarks.md.
 
-#[path = "../../tests/guarantee_support/mod.rs"]
-mod guarantee_support;
+#[allow(dead_code, reason = "the tests use the rest")]
+#[path = "../../tests/support/surfaces.rs"]
+mod surfaces;
 
 mod requests;
 mod sets;

@@ -1,14 +1,14 @@
 //! How much of a file requests need: the first useful picture, and a box at full resolution.
 
 use super::Result;
-use super::guarantee_support::Interpolant;
-use super::guarantee_support::Mesh;
-use super::guarantee_support::Surface;
 use super::sets;
 use super::sets::Set;
+use super::surfaces::Interpolant;
+use super::surfaces::Mesh;
+use super::surfaces::Surface;
 use std::io::Cursor;
 use std::time::Duration;
-use tetralod::build::Purpose;
+use tetralod::builder::Purpose;
 use tetralod::client::Client;
 use tetralod::client::ClientOptions;
 use tetralod::geom::Bounds;

@@ -8,7 +8,7 @@ use std::io::Write;
 use std::process::Command;
 use std::process::Stdio;
 use std::time::Instant;
-use tetralod::build::Purpose;
+use tetralod::builder::Purpose;
 use tetralod::format::Decoder;
 use tetralod::format::breakdown;
 use tetralod::mesh::TetMesh;

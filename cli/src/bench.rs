@@ -140,7 +140,7 @@ fn triangulate(points: &[[i32; 3]]) -> Result<Tets> {
     let begin = Instant::now();
     while begin.elapsed().as_secs_f64() < TIME {
         let start = Instant::now();
-        let tets = tetralod::build::delaunay(points)?;
+        let tets = tetralod::builder::delaunay(points)?;
         fastest = fastest.max(tets.len() as f64 / start.elapsed().as_secs_f64());
     }
     Ok(Tets { tets_per_second: fastest })

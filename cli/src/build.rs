@@ -9,7 +9,7 @@ use serde::Serialize;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::Instant;
-use tetralod::build::{
+use tetralod::builder::{
     BuildConfig, BuildError, BuildProgress, BuildResult, BuildSummary, Construction, Criterion,
     FieldPrecision, Method, Purpose,
 };
@@ -323,7 +323,7 @@ fn build(arguments: &Arguments, config: &BuildConfig, mesh: &TetMesh) -> Result<
     let style = "{msg:<12} {wide_bar} {percent:>3} %  {pos}/{len}  {elapsed_precise}  about {eta} left";
     bar.set_style(ProgressStyle::with_template(style).context("the style of the progress bar")?);
     let mut stage = "";
-    let result = tetralod::build::build(mesh, config, &mut |progress: BuildProgress| {
+    let result = tetralod::builder::build(mesh, config, &mut |progress: BuildProgress| {
         bar.set_length(progress.total.max(1));
         if progress.stage != stage {
             stage = progress.stage;

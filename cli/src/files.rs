@@ -16,7 +16,7 @@ use std::sync::Mutex;
 use std::sync::MutexGuard;
 use std::sync::PoisonError;
 use std::time::Duration;
-use tetralod::build::Method;
+use tetralod::builder::Method;
 use tetralod::client::Client;
 use tetralod::client::ClientOptions;
 use tetralod::io::CellData;

@@ -1,4 +1,4 @@
-//! What each fuzz target does with its input. The tests of regressions do the same: see `tests/format_regressions.rs`.
+//! What each fuzz target does with its input. The tests of regressions do the same: see `tests/format/regressions.rs`.
 //!
 //! Nothing here may panic but for a bug: errors are answers, too. Where an input begins with a script, its bytes say what to
 //! do when; the file follows.
@@ -11,6 +11,7 @@ use tetralod::io;
 use tetralod::mt::Mt;
 use tetralod::mt::MtInfo;
 use tetralod::mt::MultiTessellation;
+use tetralod::mt::UpdatePages;
 use tetralod::refine::Front;
 use tetralod::refine::LodCriterion;
 use tetralod::refine::Need;

@@ -4,8 +4,8 @@ use anyhow::Context;
 use anyhow::Result;
 use std::ops::ControlFlow;
 use std::path::Path;
-use tetralod::build;
-use tetralod::build::{BuildConfig, Construction, Criterion, Purpose, VertexMethod};
+use tetralod::builder;
+use tetralod::builder::{BuildConfig, Construction, Criterion, Purpose, VertexMethod};
 use tetralod::mesh::Field;
 use tetralod::mesh::Grid;
 use tetralod::mesh::TetMesh;
@@ -69,7 +69,7 @@ pub struct Model {
 impl Model {
     pub fn build(recipe: Recipe, mesh: &TetMesh) -> Result<Self> {
         eprintln!("  {} ...", recipe.name());
-        let built = build::build(mesh, &recipe.config(), &mut |_| ControlFlow::Continue(()));
+        let built = builder::build(mesh, &recipe.config(), &mut |_| ControlFlow::Continue(()));
         Ok(Self { recipe, mt: built.with_context(|| recipe.name())?.mt })
     }
 }

@@ -30,6 +30,7 @@ use crate::mt::MtInfo;
 use crate::mt::MtRef;
 use crate::mt::MultiTessellation;
 use crate::mt::PageError;
+use crate::mt::UpdatePages;
 use std::ops::Range;
 
 /// Most bytes that are kept allocated between sections.

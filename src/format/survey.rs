@@ -4,6 +4,7 @@ use super::EncodeError;
 use super::EncodeOptions;
 use super::payload::index::BlockInfo;
 use crate::mt::Applied;
+use crate::mt::ApplyUpdates;
 use crate::mt::CurrentMesh;
 use crate::mt::EdgeMt;
 use crate::mt::Excess;
@@ -11,7 +12,6 @@ use crate::mt::HalfEdgeMt;
 use crate::mt::Margins;
 use crate::mt::Mt;
 use crate::mt::MtRef;
-use crate::mt::MultiTessellation;
 use crate::mt::UpdateError;
 use crate::mt::UpdateId;
 use std::collections::BTreeSet;
@@ -60,13 +60,9 @@ fn survey_half_edge(mt: &HalfEdgeMt, options: &EncodeOptions) -> Result<Survey, 
 /// Called before each update with the mesh that has all of its parents.
 type Before<'a> = &'a mut dyn FnMut(&mut CurrentMesh, UpdateId) -> Result<(), UpdateError>;
 
-fn run(
-    mt: &impl MultiTessellation,
-    options: &EncodeOptions,
-    before: Before<'_>,
-) -> Result<Survey, EncodeError> {
+fn run(mt: &impl ApplyUpdates, options: &EncodeOptions, before: Before<'_>) -> Result<Survey, EncodeError> {
     let mut mesh = mt.start().map_err(EncodeError::Base)?;
-    mt.announce(&mut mesh, 0);
+    mt.updates_arrived(&mut mesh, 0);
     let mut margins = Margins::new(mt.info());
     let mut blocks = Vec::new();
     let mut first = 0;
@@ -84,7 +80,7 @@ fn run(
 }
 
 fn survey_block(
-    mt: &impl MultiTessellation,
+    mt: &impl ApplyUpdates,
     mesh: &mut CurrentMesh,
     updates: std::ops::Range<u32>,
     options: &EncodeOptions,

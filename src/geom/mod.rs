@@ -2,19 +2,33 @@
 
 mod bounds;
 mod camera;
+mod groups;
 mod lattice;
+mod morton;
+#[cfg(feature = "build")]
+mod point_grid;
 mod predicates;
 mod tet_box;
 mod triangle;
+#[cfg(feature = "build")]
+mod triangle_grid;
 #[cfg(feature = "build")]
 mod weights;
 
 pub use bounds::Bounds;
 pub use camera::{Camera, Ray};
+pub(crate) use groups::Groups;
 pub use lattice::Lattice;
+pub(crate) use morton::morton;
+#[cfg(feature = "build")]
+pub(crate) use point_grid::PointGrid;
 pub use predicates::{NARROW_BITS, WIDE_BITS, in_conflict, insphere, orient3d};
 pub(crate) use predicates::{det_i64, views_of_origin};
 pub use tet_box::{LatticeBox, tet_meets_box};
 pub use triangle::nearest_on_triangle;
+#[cfg(feature = "build")]
+pub(crate) use triangle::weights_on_triangle;
+#[cfg(feature = "build")]
+pub(crate) use triangle_grid::TriangleGrid;
 #[cfg(feature = "build")]
 pub(crate) use weights::{ON_LATTICE, weights_at};

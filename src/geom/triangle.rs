@@ -7,17 +7,13 @@ use glam::DVec3;
 /// By the regions of the triangle's plane in which the projection of `p` can fall; see Ericson, *Real-Time Collision
 /// Detection* (2005), section 5.1.5.
 pub fn nearest_on_triangle(p: DVec3, [a, b, c]: [DVec3; 3]) -> DVec3 {
-    let (ab, ac) = (b - a, c - a);
-    let normal = ab.cross(ac);
-    let area = normal.length_squared();
-    if area > 0.0 {
-        // Barycentric coordinates of the projection; inside, that is the nearest point.
-        let ap = p - a;
-        let v = ap.cross(ac).dot(normal) / area;
-        let w = ab.cross(ap).dot(normal) / area;
-        if v >= 0.0 && w >= 0.0 && v + w <= 1.0 {
-            return a + ab * v + ac * w;
-        }
+    // Inside, the projection is the nearest point.
+    if let Some([v, w]) = weights_of_projection(p, [a, b, c])
+        && v >= 0.0
+        && w >= 0.0
+        && v + w <= 1.0
+    {
+        return a + (b - a) * v + (c - a) * w;
     }
     let sides = [[a, b], [b, c], [c, a]].map(|side| nearest_on_segment(p, side));
     let mut nearest = sides[0];
@@ -27,6 +23,20 @@ pub fn nearest_on_triangle(p: DVec3, [a, b, c]: [DVec3; 3]) -> DVec3 {
         }
     }
     nearest
+}
+
+/// The barycentric coordinates of a point on a triangle; those of the first corner if the triangle has no area.
+#[cfg(feature = "build")]
+pub(crate) fn weights_on_triangle(q: DVec3, corners: [DVec3; 3]) -> [f64; 3] {
+    weights_of_projection(q, corners).map_or([1.0, 0.0, 0.0], |[v, w]| [1.0 - v - w, v, w])
+}
+
+/// The weights of `b` and `c` at the projection of `p` into the plane of a triangle; none if that has no area.
+fn weights_of_projection(p: DVec3, [a, b, c]: [DVec3; 3]) -> Option<[f64; 2]> {
+    let (ab, ac, ap) = (b - a, c - a, p - a);
+    let normal = ab.cross(ac);
+    let area = normal.length_squared();
+    (area > 0.0).then(|| [ap.cross(ac).dot(normal) / area, ab.cross(ap).dot(normal) / area])
 }
 
 fn nearest_on_segment(p: DVec3, [a, b]: [DVec3; 2]) -> DVec3 {

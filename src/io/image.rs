@@ -1,16 +1,10 @@
 //! Regular grids: VTK XML image data (`.vti`), and the grid's checks that all grid formats share.
 
-use crate::io::CellData;
-use crate::io::ReadOptions;
-use crate::io::error::At;
-use crate::io::error::ReadError;
-use crate::io::error::ReadReason;
-use crate::io::vtu;
+use crate::io::error::{At, ReadError, ReadReason};
+use crate::io::vtu::PieceReader;
 use crate::io::xml::Document;
-use crate::io::xml::Piece;
-use crate::mesh::Field;
-use crate::mesh::Grid;
-use crate::mesh::TetMesh;
+use crate::io::{CellData, ReadOptions};
+use crate::mesh::{Field, Grid, TetMesh};
 
 /// Most points of a grid: 512³. Its tetrahedra take some 13 GB.
 pub const MAX_GRID_POINTS: u64 = 1 << 27;
@@ -60,10 +54,11 @@ pub(super) fn read(document: &Document<'_>, options: &ReadOptions) -> Result<Tet
     let whole_place = || "<ImageData>".to_owned();
     let (grid, whole) = read_grid(document).at(whole_place)?;
     let (mut parts, mut cubes) = (Vec::new(), Vec::new());
-    for (i, piece) in document.pieces.iter().enumerate() {
-        parts.push(read_part(document, piece, whole, i, options)?);
+    let reader = |(number, piece)| PieceReader { document, piece, number, options };
+    for piece in document.pieces.iter().enumerate().map(reader) {
+        parts.push(read_part(&piece, whole)?);
         if options.cells == CellData::Values {
-            cubes.extend(read_cubes(document, piece, whole, i, options)?);
+            cubes.extend(read_cubes(&piece, whole)?);
         }
     }
     let fields = assemble(parts, whole).at(whole_place)?;
@@ -71,7 +66,7 @@ pub(super) fn read(document: &Document<'_>, options: &ReadOptions) -> Result<Tet
         _ if cubes.iter().any(|part| !part.fields.is_empty()) => {
             assemble(cubes, cubes_of(whole)).at(whole_place)?
         }
-        Some(piece) if options.cells == CellData::Names => vtu::name_fields(piece, "CellData", options)?,
+        Some(piece) if options.cells == CellData::Names => reader((0, piece)).field_names()?,
         _ => Vec::new(),
     };
     grid_mesh(grid, fields, cubes).at(whole_place)
@@ -84,19 +79,12 @@ fn cubes_of(mut extent: Extent) -> Extent {
 }
 
 /// The fields at the cubes of a piece; none if it is flat.
-fn read_cubes(
-    document: &Document<'_>,
-    piece: &Piece<'_>,
-    whole: Extent,
-    i: usize,
-    options: &ReadOptions,
-) -> Result<Option<Part>, ReadError> {
-    let place = || format!("piece {i}");
-    let extent = cubes_of(piece.attributes.numbers("Extent").at(place)?.unwrap_or(whole));
+fn read_cubes(reader: &PieceReader<'_, '_>, whole: Extent) -> Result<Option<Part>, ReadError> {
+    let extent = reader.piece.attributes.numbers("Extent").at(|| reader.place())?;
+    let extent = cubes_of(extent.unwrap_or(whole));
     let Ok(dims) = dims_in(extent, cubes_of(whole)) else { return Ok(None) };
     let cubes = dims.iter().product::<u64>() as usize;
-    let fields = vtu::read_fields(document, piece, "CellData", cubes, options).map_err(vtu::at_cell)?;
-    Ok(Some(Part { extent, fields }))
+    Ok(Some(Part { extent, fields: reader.cell_fields(cubes)? }))
 }
 
 /// A piece of a grid: where it is and its fields.
@@ -105,19 +93,13 @@ struct Part {
     fields: Vec<Field>,
 }
 
-fn read_part(
-    document: &Document<'_>,
-    piece: &Piece<'_>,
-    whole: Extent,
-    i: usize,
-    options: &ReadOptions,
-) -> Result<Part, ReadError> {
-    let place = || format!("piece {i}");
-    let extent = piece.attributes.numbers("Extent").at(place)?.unwrap_or(whole);
+fn read_part(reader: &PieceReader<'_, '_>, whole: Extent) -> Result<Part, ReadError> {
+    let place = || reader.place();
+    let extent = reader.piece.attributes.numbers("Extent").at(place)?.unwrap_or(whole);
     // No overflow: the piece is inside the grid, whose points were counted.
     let points = dims_in(extent, whole).at(place)?.iter().product::<u64>() as usize;
-    let fields = vtu::read_fields(document, piece, "PointData", points, options)?;
-    if fields.is_empty() && options.cells != CellData::Values {
+    let fields = reader.fields("PointData", points)?;
+    if fields.is_empty() && reader.options.cells != CellData::Values {
         return Err(ReadReason::Missing("an array in <PointData>".into())).at(place);
     }
     Ok(Part { extent, fields })

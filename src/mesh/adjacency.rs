@@ -1,5 +1,6 @@
 //! Who meets whom: tetrahedra across faces, and the shape of the stars of vertices.
 
+use crate::geom::Groups;
 use crate::mesh::FACES;
 use crate::mesh::MeshError;
 use crate::mesh::NONE;
@@ -26,6 +27,11 @@ impl HalfFace {
     pub fn face(self) -> usize {
         (self.code & 3) as usize
     }
+
+    /// Whether sorting its vertices turns it around.
+    pub fn is_odd(self, tets: &[[u32; 4]]) -> bool {
+        is_odd(face_of(tets[self.tet() as usize], self.face()))
+    }
 }
 
 /// The vertices of face `i` of `tet`, in the outward order of [`FACES`].
@@ -34,7 +40,7 @@ pub(crate) fn face_of(tet: [u32; 4], i: usize) -> [u32; 3] {
 }
 
 /// Whether sorting three different numbers takes an odd number of swaps.
-pub(crate) fn is_odd([a, b, c]: [u32; 3]) -> bool {
+fn is_odd([a, b, c]: [u32; 3]) -> bool {
     (a > b) ^ (a > c) ^ (b > c)
 }
 
@@ -91,18 +97,36 @@ pub(crate) fn face_groups(sorted: &[HalfFace]) -> impl Iterator<Item = &[HalfFac
 /// # Errors
 /// If three or more tetrahedra share a face, or there are more than [`MAX_TETS`].
 pub fn neighbors(tets: &[[u32; 4]]) -> Result<Vec<[u32; 4]>, MeshError> {
-    let mut result = vec![[NONE; 4]; tets.len()];
-    for group in face_groups(&sorted_faces(tets)?) {
-        match group {
-            [_] => {}
-            [a, b] => {
-                result[a.tet() as usize][a.face()] = b.tet();
-                result[b.tet() as usize][b.face()] = a.tet();
-            }
-            _ => return Err(crowded(group)),
-        }
+    let fits = |group: &[HalfFace], _| if group.len() > 2 { Err(crowded(group)) } else { Ok(()) };
+    match_faces(tets, &sorted_faces(tets)?, fits)
+}
+
+/// The neighbours by their [sorted faces](sorted_faces). `fits` may refuse a face of several tetrahedra; it is told whether the
+/// first two of them lie on the same side.
+pub(crate) fn match_faces<E>(
+    tets: &[[u32; 4]],
+    sorted: &[HalfFace],
+    fits: impl Fn(&[HalfFace], bool) -> Result<(), E>,
+) -> Result<Vec<[u32; 4]>, E> {
+    let mut neighbors = vec![[NONE; 4]; tets.len()];
+    for group in face_groups(sorted) {
+        let [a, b, ..] = group else { continue };
+        fits(group, a.is_odd(tets) == b.is_odd(tets))?;
+        neighbors[a.tet() as usize][a.face()] = b.tet();
+        neighbors[b.tet() as usize][b.face()] = a.tet();
     }
-    Ok(result)
+    Ok(neighbors)
+}
+
+/// The faces without neighbour, each with its tetrahedron, counter-clockwise when seen from outside. Free slots have none.
+pub(crate) fn boundary_faces<'a>(
+    tets: &'a [[u32; 4]],
+    neighbors: &'a [[u32; 4]],
+) -> impl Iterator<Item = (u32, [u32; 3])> + 'a {
+    let live = (0..).zip(tets.iter().zip(neighbors)).filter(|(_, (tet, _))| tet[0] != NONE);
+    live.flat_map(|(t, (tet, around))| {
+        (0..4).filter(|&i| around[i] == NONE).map(move |i| (t, face_of(*tet, i)))
+    })
 }
 
 /// The error for a face with three or more tetrahedra.
@@ -139,7 +163,7 @@ pub fn topology(points: usize, tets: &[[u32; 4]]) -> Result<Topology, MeshError>
     super::check::check_indices(points, tets)?;
     let neighbors = neighbors(tets)?;
     let boundary_faces = neighbors.iter().flatten().filter(|&&n| n == NONE).count();
-    let stars = Stars::new(points, tets);
+    let stars = stars(points, tets);
     let mut scratch = LinkScratch::default();
     let non_manifold = (0..points)
         .map(|v| {
@@ -150,44 +174,20 @@ pub fn topology(points: usize, tets: &[[u32; 4]]) -> Result<Topology, MeshError>
     Ok(Topology { components: components(&neighbors), boundary_faces, non_manifold, neighbors })
 }
 
-/// The tetrahedra around each vertex, in increasing order.
-struct Stars {
-    starts: Vec<u32>,
-    tets: Vec<u32>,
-}
-
-impl Stars {
-    fn new(points: usize, tets: &[[u32; 4]]) -> Self {
-        let mut starts = vec![0_u32; points + 1];
-        for &v in tets.iter().flatten() {
-            starts[v as usize + 1] += 1;
-        }
-        for i in 1..starts.len() {
-            starts[i] += starts[i - 1];
-        }
-        let mut next = starts.clone();
-        let mut list = vec![0; 4 * tets.len()];
-        for (t, tet) in (0_u32..).zip(tets) {
-            for &v in tet {
-                list[next[v as usize] as usize] = t;
-                next[v as usize] += 1;
-            }
-        }
-        Self { starts, tets: list }
-    }
-
-    fn of(&self, v: usize) -> &[u32] {
-        &self.tets[self.starts[v] as usize..self.starts[v + 1] as usize]
-    }
+/// The tetrahedra around each of so many vertices, in increasing order.
+pub(crate) fn stars(points: usize, tets: &[[u32; 4]]) -> Groups {
+    Groups::new(points, |add| {
+        (0..).zip(tets).for_each(|(t, tet)| tet.iter().for_each(|v| add(*v as usize, t)));
+    })
 }
 
 /// Reused buffers for the links of vertices.
 #[derive(Default)]
 struct LinkScratch {
     /// Groups of star tetrahedra that hang together by faces at the vertex.
-    tets: Groups,
+    tets: DisjointSets,
     /// Groups of corners of link triangles: one group a link vertex unless the surface is pinched there.
-    corners: Groups,
+    corners: DisjointSets,
     /// The link's vertices.
     vertices: Vec<u32>,
 }
@@ -239,12 +239,12 @@ impl LinkScratch {
 
 /// Disjoint groups of small numbers.
 #[derive(Default)]
-struct Groups {
+struct DisjointSets {
     parents: Vec<u32>,
     count: usize,
 }
 
-impl Groups {
+impl DisjointSets {
     fn reset(&mut self, len: usize) {
         self.parents.clear();
         self.parents.extend(0..len as u32);
@@ -269,7 +269,7 @@ impl Groups {
 }
 
 fn components(neighbors: &[[u32; 4]]) -> usize {
-    let mut groups = Groups::default();
+    let mut groups = DisjointSets::default();
     groups.reset(neighbors.len());
     for (t, sides) in neighbors.iter().enumerate() {
         for &n in sides.iter().filter(|&&n| n != NONE) {

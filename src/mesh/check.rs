@@ -3,13 +3,8 @@
 use robust::Coord;
 use robust::Coord3D;
 
-use crate::mesh::MeshError;
-use crate::mesh::TetMesh;
-use crate::mesh::adjacency::crowded;
-use crate::mesh::adjacency::face_groups;
-use crate::mesh::adjacency::face_of;
-use crate::mesh::adjacency::is_odd;
-use crate::mesh::adjacency::sorted_faces;
+use crate::mesh::adjacency::{HalfFace, crowded, face_of, match_faces, sorted_faces};
+use crate::mesh::{MeshError, TetMesh};
 
 /// Checks that `mesh` is valid: fields and indices fit, every tetrahedron is positive (decided exactly), and
 /// every face has at most two tetrahedra, which lie on opposite sides of it.
@@ -28,19 +23,12 @@ pub fn check(mesh: &TetMesh) -> Result<(), MeshError> {
             _ => return Err(MeshError::Inverted { tet: t }),
         }
     }
-    for group in face_groups(&sorted_faces(&mesh.tets)?) {
-        match group {
-            [_] => {}
-            [a, b] => {
-                let odd = [a, b].map(|f| is_odd(face_of(mesh.tets[f.tet() as usize], f.face())));
-                if odd[0] == odd[1] {
-                    return Err(MeshError::Folded { tets: [a.tet(), b.tet()] });
-                }
-            }
-            _ => return Err(crowded(group)),
-        }
-    }
-    Ok(())
+    let fits = |group: &[HalfFace], folded: bool| match group {
+        [a, b] if folded => Err(MeshError::Folded { tets: [a.tet(), b.tet()] }),
+        [_, _] => Ok(()),
+        _ => Err(crowded(group)),
+    };
+    match_faces(&mesh.tets, &sorted_faces(&mesh.tets)?, fits).map(drop)
 }
 
 /// Checks what holds before geometry is looked at: lengths, finite coordinates, indices in range.

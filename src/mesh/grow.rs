@@ -7,6 +7,7 @@ use super::NONE;
 #[cfg(any(feature = "build", test))]
 use super::neighbors;
 use crate::geom::orient3d;
+use glam::DVec3;
 
 /// Most faces around a vertex that are looked at.
 const MOST_AROUND: usize = 256;
@@ -220,11 +221,11 @@ impl Growth {
 /// The angle from face `(u, v, w)` out to a face at the edge `uv` with third vertex `p`: 0 to 4, of which 1 is a right angle and 2 is
 /// straight.
 fn angle([u, v, w]: [[i32; 3]; 3], p: [i32; 3]) -> f64 {
-    let [v, w, p] = [v, w, p].map(|x| [0, 1, 2].map(|k| f64::from(x[k]) - f64::from(u[k])));
-    let n = cross(v, w);
+    let [v, w, p] = [v, w, p].map(|x| at(x) - at(u));
+    let n = v.cross(w);
     // In the face, away from the edge.
-    let m = cross(n, v);
-    let (s, h) = (dot(m, p), dot(n, p) * dot(v, v).sqrt());
+    let m = n.cross(v);
+    let (s, h) = (m.dot(p), n.dot(p) * v.length());
     let size = s.abs() + h.abs();
     let turn = if size > 0.0 { s / size } else { 1.0 };
     if h >= 0.0 { 1.0 - turn } else { 3.0 + turn }
@@ -232,21 +233,16 @@ fn angle([u, v, w]: [[i32; 3]; 3], p: [i32; 3]) -> f64 {
 
 /// How far in front of a face the centre of the sphere through it and `p` lies.
 fn reach([a, b, c]: [[i32; 3]; 3], p: [i32; 3]) -> f64 {
-    let [b, c, p] = [b, c, p].map(|x| [0, 1, 2].map(|k| f64::from(x[k]) - f64::from(a[k])));
-    let n = cross(b, c);
-    let (bb, cc, nn) = (dot(b, b), dot(c, c), dot(n, n));
+    let [b, c, p] = [b, c, p].map(|x| at(x) - at(a));
+    let n = b.cross(c);
+    let (bb, cc, nn) = (b.length_squared(), c.length_squared(), n.length_squared());
     // From `a` to the centre of the circle through the face.
-    let (u, v) = (cross(c, n), cross(n, b));
-    let o = [0, 1, 2].map(|k| (bb * u[k] + cc * v[k]) / (2.0 * nn));
-    (dot(p, p) - 2.0 * dot(p, o)) / dot(n, p)
+    let o = (bb * c.cross(n) + cc * n.cross(b)) / (2.0 * nn);
+    (p.length_squared() - 2.0 * p.dot(o)) / n.dot(p)
 }
 
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+fn at(q: [i32; 3]) -> DVec3 {
+    DVec3::from(q.map(f64::from))
 }
 
 /// The order in which a mesh grows.

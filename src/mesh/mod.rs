@@ -1,7 +1,9 @@
 //! The vocabulary of tetrahedral meshes: plain arrays, adjacency, validity.
 
 mod adjacency;
+mod bit_set;
 mod cell_data;
+mod changed_blocks;
 mod check;
 mod error;
 mod grow;
@@ -10,7 +12,12 @@ mod repair;
 mod series;
 mod tet_mesh;
 
+#[cfg(feature = "build")]
+pub(crate) use adjacency::stars;
 pub use adjacency::{MAX_TETS, Topology, neighbors, topology};
+pub(crate) use adjacency::{boundary_faces, match_faces, sorted_faces};
+pub(crate) use bit_set::BitSet;
+pub(crate) use changed_blocks::{BLOCK, ChangedBlocks};
 pub use check::check;
 pub use error::MeshError;
 #[cfg(any(feature = "build", test))]

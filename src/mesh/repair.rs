@@ -18,18 +18,9 @@
 
 use std::fmt;
 
-use crate::mesh::FACES;
-use crate::mesh::MeshError;
-use crate::mesh::NONE;
-use crate::mesh::TetMesh;
-use crate::mesh::adjacency::HalfFace;
-use crate::mesh::adjacency::crowded;
-use crate::mesh::adjacency::face_groups;
-use crate::mesh::adjacency::face_of;
-use crate::mesh::adjacency::is_odd;
-use crate::mesh::adjacency::sorted_faces;
-use crate::mesh::check::Sides;
-use crate::mesh::check::check_arrays;
+use crate::mesh::adjacency::{HalfFace, crowded, face_groups, match_faces, sorted_faces};
+use crate::mesh::check::{Sides, check_arrays};
+use crate::mesh::{FACES, MeshError, NONE, TetMesh};
 
 /// What [`repair`] did; displays as one line, empty when there was nothing to do.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -209,24 +200,14 @@ impl Work {
 
     /// Rule 4; returns the neighbours.
     fn conforming_faces(&self, flat: &[bool]) -> Result<Vec<[u32; 4]>, MeshError> {
-        let tets = &self.mesh.tets;
-        let mut neighbors = vec![[NONE; 4]; tets.len()];
-        for group in face_groups(&sorted_faces(tets)?) {
-            match group {
-                [_] => {}
-                [a, b] => {
-                    let (s, t) = (a.tet() as usize, b.tet() as usize);
-                    let odd = [a, b].map(|f| is_odd(face_of(tets[f.tet() as usize], f.face())));
-                    if odd[0] == odd[1] && !flat[s] && !flat[t] {
-                        return Err(MeshError::Folded { tets: [self.cells[s], self.cells[t]] });
-                    }
-                    neighbors[s][a.face()] = b.tet();
-                    neighbors[t][b.face()] = a.tet();
-                }
-                _ => return Err(self.with_cells(crowded(group))),
+        let fits = |group: &[HalfFace], folded: bool| match group {
+            [a, b] if folded && !flat[a.tet() as usize] && !flat[b.tet() as usize] => {
+                Err(MeshError::Folded { tets: [a, b].map(|face| self.cells[face.tet() as usize]) })
             }
-        }
-        Ok(neighbors)
+            [_, _] => Ok(()),
+            _ => Err(self.with_cells(crowded(group))),
+        };
+        match_faces(&self.mesh.tets, &sorted_faces(&self.mesh.tets)?, fits)
     }
 
     /// `error` with the input's numbers.

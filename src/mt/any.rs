@@ -15,6 +15,8 @@ use super::PageError;
 use super::UpdateError;
 use super::UpdateId;
 use super::VertexMt;
+use crate::mt::ApplyUpdates;
+use crate::mt::UpdatePages;
 use std::ops::Range;
 
 /// An MT of any kind.
@@ -147,26 +149,8 @@ impl MultiTessellation for Mt {
         each!(self, mt => mt.updates())
     }
 
-    #[inline]
-    fn has(&self, u: UpdateId) -> bool {
-        each!(self, mt => mt.has(u))
-    }
-
-    fn present(&self) -> u32 {
-        each!(self, mt => mt.present())
-    }
-
-    fn page_updates(&self, page: u32) -> Range<u32> {
-        each!(self, mt => mt.page_updates(page))
-    }
-
     fn bytes(&self) -> u64 {
         each!(self, mt => MultiTessellation::bytes(mt))
-    }
-
-    #[inline(never)]
-    fn start(&self) -> Result<CurrentMesh, BaseMeshError> {
-        each!(self, mt => mt.start())
     }
 
     fn always_grows(&self) -> bool {
@@ -191,18 +175,23 @@ impl MultiTessellation for Mt {
         each!(self, mt => MultiTessellation::own_fall(mt, u))
     }
 
-    #[inline]
-    fn quarterings(&self, mesh: &CurrentMesh, t: u32) -> u8 {
-        each!(self, mt => MultiTessellation::quarterings(mt, mesh, t))
-    }
-
     fn to_come(&self) -> ErrorCode {
         each!(self, mt => mt.to_come())
     }
+}
 
+impl UpdatePages for Mt {
     #[inline]
-    fn remover(&self, mesh: &CurrentMesh, t: u32) -> Option<UpdateId> {
-        each!(self, mt => MultiTessellation::remover(mt, mesh, t))
+    fn has(&self, u: UpdateId) -> bool {
+        each!(self, mt => mt.has(u))
+    }
+
+    fn present(&self) -> u32 {
+        each!(self, mt => mt.present())
+    }
+
+    fn page_updates(&self, page: u32) -> Range<u32> {
+        each!(self, mt => mt.page_updates(page))
     }
 
     #[inline]
@@ -212,6 +201,32 @@ impl MultiTessellation for Mt {
 
     fn awaited_errors(&self, mesh: &CurrentMesh, t: u32) -> Option<&[ErrorCode]> {
         each!(self, mt => mt.awaited_errors(mesh, t))
+    }
+
+    #[inline(never)]
+    fn page_inserted(&self, mesh: &mut CurrentMesh, updates: Range<u32>) {
+        each!(self, mt => mt.page_inserted(mesh, updates));
+    }
+
+    fn page_evicted(&self, mesh: &mut CurrentMesh, updates: Range<u32>) {
+        each!(self, mt => mt.page_evicted(mesh, updates));
+    }
+}
+
+impl ApplyUpdates for Mt {
+    #[inline(never)]
+    fn start(&self) -> Result<CurrentMesh, BaseMeshError> {
+        each!(self, mt => mt.start())
+    }
+
+    #[inline]
+    fn quarterings(&self, mesh: &CurrentMesh, t: u32) -> u8 {
+        each!(self, mt => ApplyUpdates::quarterings(mt, mesh, t))
+    }
+
+    #[inline]
+    fn remover(&self, mesh: &CurrentMesh, t: u32) -> Option<UpdateId> {
+        each!(self, mt => ApplyUpdates::remover(mt, mesh, t))
     }
 
     #[inline]
@@ -226,7 +241,7 @@ impl MultiTessellation for Mt {
 
     #[inline]
     fn creator(&self, mesh: &CurrentMesh, t: u32) -> Option<UpdateId> {
-        each!(self, mt => MultiTessellation::creator(mt, mesh, t))
+        each!(self, mt => ApplyUpdates::creator(mt, mesh, t))
     }
 
     #[inline]
@@ -257,15 +272,6 @@ impl MultiTessellation for Mt {
     #[inline(never)]
     fn site(&self, mesh: &CurrentMesh, u: UpdateId) -> [i32; 3] {
         each!(self, mt => mt.site(mesh, u))
-    }
-
-    #[inline(never)]
-    fn reveal(&self, mesh: &mut CurrentMesh, updates: Range<u32>) {
-        each!(self, mt => mt.reveal(mesh, updates));
-    }
-
-    fn conceal(&self, mesh: &mut CurrentMesh, updates: Range<u32>) {
-        each!(self, mt => mt.conceal(mesh, updates));
     }
 
     #[inline(never)]

@@ -13,7 +13,7 @@ use super::UpdateId;
 use super::VertexId;
 use super::VertexMt;
 use super::VertexSplit;
-use super::replay::canonical;
+use crate::mt::replay::canonical;
 use std::fmt;
 
 /// Why an MT cannot be one of another kind.
@@ -119,7 +119,7 @@ fn not_a_split(error: ReplayError) -> ConvertError {
         | E::Inverted { update }
         | E::Star { update }
         | E::Missing { update }
-        | E::Unannounced { update }
+        | E::UnknownToMesh { update }
         | E::Error { update } => update,
     };
     ConvertError::Update { update, why: NOT_A_SPLIT }

@@ -115,8 +115,8 @@ pub enum UpdateError {
         update: u32,
     },
     /// The update arrived, but the mesh that it is applied to was not told: see
-    /// [`MultiTessellation::announce`](super::MultiTessellation::announce).
-    Unannounced {
+    /// [`MultiTessellation::updates_arrived`](super::MultiTessellation::updates_arrived).
+    UnknownToMesh {
         /// The update.
         update: u32,
     },
@@ -152,7 +152,9 @@ impl fmt::Display for UpdateError {
                 "update {update} meets a star of more than 64 tetrahedra or 32 vertices, or in parts"
             ),
             Self::Missing { update } => write!(f, "update {update} is not here"),
-            Self::Unannounced { update } => write!(f, "update {update} was not announced to the mesh"),
+            Self::UnknownToMesh { update } => {
+                write!(f, "the mesh has not been told that update {update} has arrived")
+            }
             Self::Error { update } => {
                 write!(f, "update {update} does not come after those it depends on, or lacks errors")
             }

@@ -1,9 +1,9 @@
 //! Do errors fall along the partial order, by as much as requests for values rely on?
 
+use super::ApplyUpdates;
 use super::CurrentMesh;
 use super::ErrorCode;
 use super::MtInfo;
-use super::MultiTessellation;
 use super::UpdateId;
 
 /// Follows the updates of an MT in their order, each before it is applied.
@@ -55,7 +55,7 @@ impl Margins {
     /// every field how many levels what they created is beyond the range of what they removed.
     pub fn next(
         &mut self,
-        mt: &impl MultiTessellation,
+        mt: &impl ApplyUpdates,
         mesh: &CurrentMesh,
         tets: &[u32],
         parents: &mut Vec<UpdateId>,
@@ -98,7 +98,7 @@ impl Margins {
     /// [`Margins::next`], and what is wrong with the errors of the update, `u`: one that is larger than a parent's first.
     pub fn check(
         &mut self,
-        mt: &impl MultiTessellation,
+        mt: &impl ApplyUpdates,
         mesh: &CurrentMesh,
         u: UpdateId,
         tets: &[u32],

@@ -2,68 +2,52 @@
 //!
 //! [`EdgeMt`], [`VertexMt`] and [`HalfEdgeMt`] are the compact structures that files hold and programs use; [`ExplicitMt`]
 //! spells the same MTs out, as the oracle of tests. Both are immutable once they are complete. What changes is the [`CurrentMesh`], to which updates
-//! are applied through the trait [`MultiTessellation`].
+//! are applied through the trait [`ApplyUpdates`].
 
 mod any;
-mod base;
-mod bits;
-mod check;
-mod collapse;
 mod convert;
-mod current;
+mod edge;
 mod error;
-mod errors;
 mod exact;
 mod explicit;
-mod glue;
 mod half_edge;
-mod half_edge_apply;
-mod half_edge_from;
-mod half_edge_star;
-mod insertion;
 mod margins;
-mod predict;
+mod mesh;
+mod ranks;
 mod replay;
-mod ring;
-mod sparse;
-mod spelled;
-mod sphere_rank;
-mod split;
 mod stats;
-mod taken;
-mod tet_errors;
+mod update_errors;
 mod vertex;
-mod vertex_from;
-mod vertex_grow;
 
 pub use any::{Mt, MtRef};
-pub use base::{BaseMesh, BaseMeshError, MAX_FIELD_BITS, MAX_UPDATES};
-pub use check::MtFault;
-#[cfg(feature = "build")]
-pub use check::check_errors;
-pub use collapse::{EdgeMt, MAX_EDGE, MAX_LINK, MAX_STAR, VertexSplit};
 pub use convert::ConvertError;
-pub(crate) use current::corner_of;
-pub use current::{CurrentMesh, MeshChanges};
+pub use edge::store::{EdgeMt, MAX_EDGE, MAX_LINK, MAX_STAR, VertexSplit};
 pub use error::PageError;
 pub use error::{ErrorCode, UpdateError};
 pub use exact::Exact;
 pub use exact::ExactValues;
-pub use explicit::{ExplicitMt, ExplicitUpdate};
-pub use half_edge::BaseMark;
-pub use half_edge::ForestChild;
-pub use half_edge::HalfEdgeMt;
-pub use half_edge::HalfEdgeUpdate;
+pub use explicit::check::MtFault;
+#[cfg(feature = "build")]
+pub use explicit::check::check_errors;
+pub use explicit::store::{ExplicitMt, ExplicitUpdate};
+pub use half_edge::store::BaseMark;
+pub use half_edge::store::ForestChild;
+pub use half_edge::store::HalfEdgeMt;
+pub use half_edge::store::HalfEdgeUpdate;
 pub(crate) use margins::{Excess, Margins};
+pub use mesh::base::{BaseMesh, BaseMeshError, MAX_FIELD_BITS, MAX_UPDATES};
+#[cfg(feature = "build")]
+pub(crate) use mesh::current::mix;
+pub use mesh::current::{CurrentMesh, MeshChanges};
+pub(crate) use mesh::paged_array::PagedArray;
+pub(crate) use mesh::tet::corner_of;
 pub use replay::ReplayError;
 #[cfg(feature = "build")]
 pub(crate) use replay::canonical;
-pub(crate) use sparse::Sparse;
-pub use split::Applied;
 pub use stats::{MtStats, stats};
-pub use tet_errors::MAX_QUARTERINGS;
-pub use vertex::{MAX_AROUND, MAX_INSERTED, MAX_REMOVED, NodeBits, VertexMt};
-pub(crate) use vertex_grow::Insertion;
+pub use vertex::store::{MAX_AROUND, MAX_INSERTED, MAX_REMOVED, NodeBits, VertexMt};
+pub(crate) use vertex::streaming::Insertion;
+pub use vertex::tet_errors::MAX_QUARTERINGS;
 
 use crate::geom::Lattice;
 use crate::mesh::Field;
@@ -250,11 +234,20 @@ impl MtInfo {
     }
 }
 
+/// What came of the wish to apply an update.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Applied {
+    /// The update is applied.
+    Done,
+    /// Nothing changed: this other update has to be applied (`u+`), or undone (`u−`), first.
+    Blocked(UpdateId),
+}
+
 /// Sees a tetrahedron: positions at its corners and, by field, levels there, on the lattices; and its
 /// [quarterings](MultiTessellation::quarterings). True ends the show.
 pub type LookAtTet<'a> = &'a mut dyn FnMut(&[[i32; 3]; 4], &dyn Fn(usize) -> [i32; 4], u8) -> bool;
 
-/// What selective refinement needs of a Multi-Tessellation of any kind [§2.3].
+/// A Multi-Tessellation of any kind, to be read: what is known of it as a whole, and of each of its updates [§2].
 pub trait MultiTessellation {
     /// What is known of the MT as a whole.
     fn info(&self) -> &MtInfo;
@@ -265,24 +258,6 @@ pub trait MultiTessellation {
     /// Number of updates so far; they are `UpdateId(0) .. UpdateId(updates)`, parents before children. Where updates come
     /// in pages, some of these may not be here: see [`MultiTessellation::has`].
     fn updates(&self) -> u32;
-
-    /// Whether update `u` is here.
-    #[inline]
-    fn has(&self, u: UpdateId) -> bool {
-        u.0 < self.updates()
-    }
-
-    /// How many updates are here.
-    fn present(&self) -> u32 {
-        self.updates()
-    }
-
-    /// The updates of page `page`: those that come and go together.
-    fn page_updates(&self, page: u32) -> Range<u32> {
-        let first = u64::from(page) << PAGE_BITS;
-        let end = u64::from(self.info().updates);
-        first.min(end) as u32..(first + (1 << PAGE_BITS)).min(end) as u32
-    }
 
     /// Whether every update inserts more tetrahedra than it removes: a larger consistent set then has a larger mesh.
     fn always_grows(&self) -> bool;
@@ -314,14 +289,6 @@ pub trait MultiTessellation {
         0
     }
 
-    /// How often the errors of the update that removes tetrahedron `t` of the current mesh can be quartered, after
-    /// [`own_fall`](MultiTessellation::own_fall), and still bound those of the tetrahedron, at most [`MAX_QUARTERINGS`]; 0 where
-    /// nothing is known. See [`ErrorCode::lowered`].
-    #[inline]
-    fn quarterings(&self, _mesh: &CurrentMesh, _t: u32) -> u8 {
-        0
-    }
-
     /// What bounds the error in a field of a tetrahedron by itself, given the update that removes it and the tetrahedron's
     /// quarterings.
     fn own_error(&self, u: UpdateId, field: usize, quarterings: u8) -> ErrorCode {
@@ -335,6 +302,62 @@ pub trait MultiTessellation {
 
     /// Bytes of everything that the MT holds, base mesh and errors included.
     fn bytes(&self) -> u64;
+}
+
+/// A Multi-Tessellation whose updates arrive and leave in pages; where none do, all are here as soon as they are known.
+pub trait UpdatePages: MultiTessellation {
+    /// Whether update `u` is here.
+    #[inline]
+    fn has(&self, u: UpdateId) -> bool {
+        u.0 < self.updates()
+    }
+
+    /// How many updates are here.
+    fn present(&self) -> u32 {
+        self.updates()
+    }
+
+    /// The updates of page `page`: those that come and go together.
+    fn page_updates(&self, page: u32) -> Range<u32> {
+        let first = u64::from(page) << PAGE_BITS;
+        let end = u64::from(self.info().updates);
+        first.min(end) as u32..(first + (1 << PAGE_BITS)).min(end) as u32
+    }
+
+    /// The update that removes tetrahedron `t` of the current mesh where that is known although the update is not here.
+    fn awaited(&self, _: &CurrentMesh, _: u32) -> Option<UpdateId> {
+        None
+    }
+
+    /// What bounds the errors of the update that removes tetrahedron `t`, field by field, where that update is not here; zeros
+    /// if it is known that there is none. None where nothing is known.
+    fn awaited_errors(&self, _: &CurrentMesh, _: u32) -> Option<&[ErrorCode]> {
+        None
+    }
+
+    /// Tells the mesh of updates that have arrived since it last knew of `known` of them.
+    fn updates_arrived(&self, mesh: &mut CurrentMesh, known: u32) {
+        self.page_inserted(mesh, known..self.updates());
+    }
+
+    /// Tells the mesh that these updates have arrived, as far as they are here. The tetrahedra that they remove are among
+    /// the touched ones then.
+    fn page_inserted(&self, mesh: &mut CurrentMesh, updates: Range<u32>);
+
+    /// Tells the mesh that these updates, none of which is applied, will not be here any more.
+    fn page_evicted(&self, _: &mut CurrentMesh, _: Range<u32>) {}
+}
+
+/// What selective refinement needs of a Multi-Tessellation of any kind [§2.3]: its updates are applied to a
+/// [`CurrentMesh`] and undone, and each tetrahedron of that names the updates that create and remove it.
+pub trait ApplyUpdates: UpdatePages {
+    /// How often the errors of the update that removes tetrahedron `t` of the current mesh can be quartered, after
+    /// [`own_fall`](MultiTessellation::own_fall), and still bound those of the tetrahedron, at most [`MAX_QUARTERINGS`]; 0 where
+    /// nothing is known. See [`ErrorCode::lowered`].
+    #[inline]
+    fn quarterings(&self, _mesh: &CurrentMesh, _t: u32) -> u8 {
+        0
+    }
 
     /// The base mesh as a current mesh that updates of this MT can be applied to.
     ///
@@ -347,17 +370,6 @@ pub trait MultiTessellation {
     /// The update that removes tetrahedron `t` of the current mesh; none if that belongs to the reference mesh (as far
     /// as it is known).
     fn remover(&self, mesh: &CurrentMesh, t: u32) -> Option<UpdateId>;
-
-    /// The update that removes tetrahedron `t` of the current mesh where that is known although the update is not here.
-    fn awaited(&self, _: &CurrentMesh, _: u32) -> Option<UpdateId> {
-        None
-    }
-
-    /// What bounds the errors of the update that removes tetrahedron `t`, field by field, where that update is not here; zeros
-    /// if it is known that there is none. None where nothing is known.
-    fn awaited_errors(&self, _: &CurrentMesh, _: u32) -> Option<&[ErrorCode]> {
-        None
-    }
 
     /// Says that the update which removes tetrahedron `t` is going to be applied, if it can be.
     fn start_at(&self, _: &mut CurrentMesh, _: u32) {}
@@ -427,16 +439,4 @@ pub trait MultiTessellation {
     /// Where in the model update `u` takes place, as well as the mesh can tell: what lies side by side is quicker done one
     /// after the other. Any answer will do.
     fn site(&self, mesh: &CurrentMesh, u: UpdateId) -> [i32; 3];
-
-    /// Tells the mesh of updates that have arrived since it last knew of `known` of them.
-    fn announce(&self, mesh: &mut CurrentMesh, known: u32) {
-        self.reveal(mesh, known..self.updates());
-    }
-
-    /// Tells the mesh that these updates have arrived, as far as they are here. The tetrahedra that they remove are among
-    /// the touched ones then.
-    fn reveal(&self, mesh: &mut CurrentMesh, updates: Range<u32>);
-
-    /// Tells the mesh that these updates, none of which is applied, will not be here any more.
-    fn conceal(&self, _: &mut CurrentMesh, _: Range<u32>) {}
 }

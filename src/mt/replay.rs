@@ -1,9 +1,9 @@
 //! All updates of an MT, coarse to fine, each with the tetrahedra that it removes and inserts.
 
 use super::Applied;
+use super::ApplyUpdates;
 use super::BaseMeshError;
 use super::CurrentMesh;
-use super::MultiTessellation;
 use super::UpdateError;
 use super::UpdateId;
 use std::fmt;
@@ -56,11 +56,11 @@ pub(super) struct Step<'a> {
 
 /// Applies all updates in their order and shows each to `see`. Returns the reference mesh.
 pub(super) fn replay(
-    mt: &impl MultiTessellation,
+    mt: &impl ApplyUpdates,
     mut see: impl FnMut(&Step<'_>),
 ) -> Result<CurrentMesh, ReplayError> {
     let mut mesh = mt.start()?;
-    mt.announce(&mut mesh, 0);
+    mt.updates_arrived(&mut mesh, 0);
     let (mut found, mut parents) = (Vec::new(), Vec::new());
     let (mut removed, mut inserted) = (Vec::new(), Vec::new());
     for update in (0..mt.updates()).map(UpdateId) {

@@ -1,10 +1,10 @@
 //! What an MT is like and what it costs to store, in the paper's terms [§6, Table 1].
 
+use super::ApplyUpdates;
 use super::CurrentMesh;
-use super::MultiTessellation;
-use super::explicit::Counts;
-use super::replay::ReplayError;
-use super::replay::replay;
+use crate::mt::explicit::store::Counts;
+use crate::mt::replay::ReplayError;
+use crate::mt::replay::replay;
 
 /// Numbers about an MT. The storage of the alternatives is by the paper's way of counting: 4 bytes for a
 /// coordinate, a field value or an index, 1 for a counter.
@@ -71,7 +71,7 @@ impl MtStats {
 ///
 /// # Errors
 /// If an update cannot be applied.
-pub fn stats(mt: &impl MultiTessellation) -> Result<MtStats, ReplayError> {
+pub fn stats(mt: &impl ApplyUpdates) -> Result<MtStats, ReplayError> {
     let (base, fields) = (mt.base(), mt.info().fields.len() as u64);
     let mut counts = Counts {
         fields,

@@ -6,8 +6,8 @@ use super::criterion::Frame;
 use super::criterion::TetLook;
 use super::criterion::Verdict;
 use super::criterion::dial_of;
-use super::game::Rows;
 use super::shape::Plane;
+use super::tet_minimax::Rows;
 use glam::DMat4;
 use glam::DVec2;
 use glam::DVec3;
@@ -73,51 +73,59 @@ impl Camera {
             return Verdict::NEVER;
         }
         let margin = frame.margin(tet);
-        let seen = |threshold: f64, limit: Option<(&Plane, f64)>| {
-            let mut rows = Rows::new();
-            for plane in &self.sides {
-                rows.push(plane.distances(corners));
+        let limit = match &self.depth {
+            // Another scale is far away, but the same one will never ask.
+            Depth::Parallel { pixels: scale } if length * scale / pixels <= 1.0 => return Verdict::NEVER,
+            Depth::Parallel { .. } => None,
+            Depth::Perspective { plane, pixels: scale } => {
+                Some((plane, (length * scale / pixels).min(2.0 * self.deepest(frame))))
             }
-            if let Some((plane, limit)) = limit {
-                rows.push(plane.distances(corners).map(|depth| depth - limit));
-            }
-            rows.least_by(threshold)
         };
+        let (outside, side) = self.outside(corners, margin, limit);
+        let slack = (outside - margin).abs() / away(corners, frame);
+        let verdict = |excess: f64, dial: u8| Verdict { excess, slack, dial };
         match &self.depth {
             Depth::Parallel { pixels: scale } => {
-                let excess = length * scale / pixels;
-                if excess <= 1.0 {
-                    // Another scale is far away, but the same one will never ask.
-                    return Verdict::NEVER;
-                }
-                let (outside, side) = seen(margin, None);
-                let slack = (outside - margin).abs() / away(corners, frame);
-                Verdict { excess: if outside <= margin { excess } else { 0.0 }, slack, dial: dial_of(side) }
+                verdict(if outside <= margin { length * scale / pixels } else { 0.0 }, dial_of(side))
             }
+            Depth::Perspective { .. } if outside > margin => verdict(0.0, dial_of(side)),
+            Depth::Perspective { .. } if !ranked => verdict(2.0, ANY),
             Depth::Perspective { plane, pixels: scale } => {
-                let deepest = self.deepest(frame);
-                let limit = (length * scale / pixels).min(2.0 * deepest);
-                let (outside, side) = seen(margin, Some((plane, limit)));
-                let slack = (outside - margin).abs() / away(corners, frame);
-                if outside > margin {
-                    return Verdict { excess: 0.0, slack, dial: dial_of(side) };
-                }
-                if !ranked {
-                    return Verdict { excess: 2.0, slack, dial: ANY };
-                }
-                // The nearest depth on a fixed scale: the same for all tetrahedra, so that a larger error at the same place is
-                // never the less urgent.
-                let at = |step: usize| deepest * power(step);
-                let (mut near, mut far) = (0, STEPS);
-                while near + 1 < far {
-                    let middle = usize::midpoint(near, far);
-                    let is_seen = seen(margin, Some((plane, at(middle)))).0 <= margin;
-                    *(if is_seen { &mut near } else { &mut far }) = middle;
-                }
-                let excess = length * scale / (pixels.max(f64::MIN_POSITIVE) * at(near)) / STEP;
-                Verdict { excess: excess.clamp(1.0 + f64::EPSILON, f64::MAX), slack, dial: ANY }
+                let depth = self.nearest_depth(corners, margin, plane, frame);
+                let excess = length * scale / (pixels.max(f64::MIN_POSITIVE) * depth) / STEP;
+                verdict(excess.clamp(1.0 + f64::EPSILON, f64::MAX), ANY)
             }
         }
+    }
+
+    /// How far a tetrahedron is outside of the picture, or beyond a depth, as far as that decides whether it is by more than
+    /// `threshold`; and if one function alone decides that it is, which.
+    fn outside(
+        &self,
+        corners: &[DVec3; 4],
+        threshold: f64,
+        limit: Option<(&Plane, f64)>,
+    ) -> (f64, Option<usize>) {
+        let mut rows = Rows::new();
+        self.sides.iter().for_each(|plane| rows.push(plane.distances(corners)));
+        if let Some((plane, limit)) = limit {
+            rows.push(plane.distances(corners).map(|depth| depth - limit));
+        }
+        rows.least_by(threshold)
+    }
+
+    /// The nearest depth at which a tetrahedron is seen, on a fixed scale: the same for all tetrahedra, so that a larger error
+    /// at the same place is never the less urgent.
+    fn nearest_depth(&self, corners: &[DVec3; 4], margin: f64, plane: &Plane, frame: &Frame) -> f64 {
+        let deepest = self.deepest(frame);
+        let at = |step: usize| deepest * power(step);
+        let (mut near, mut far) = (0, STEPS);
+        while near + 1 < far {
+            let middle = usize::midpoint(near, far);
+            let is_seen = self.outside(corners, margin, Some((plane, at(middle)))).0 <= margin;
+            *(if is_seen { &mut near } else { &mut far }) = middle;
+        }
+        at(near)
     }
 
     /// No point of the domain is further away, and the camera need not be inside.

@@ -34,16 +34,21 @@
 //! **Steps.** [`Front::step`] stops whenever it is told to, with a valid mesh, and goes on from there.
 
 mod camera;
+mod converge;
 mod criterion;
 mod custom;
 mod front;
-mod game;
+mod look;
+mod pages;
 mod palette;
+mod quality;
 mod ranked;
 mod request;
 mod shape;
 mod sweep;
-mod watch;
+mod tet_minimax;
+mod timing_wheel;
+mod uniform;
 
 pub use criterion::{ANY, Criterion, DIALS, LodCriterion, TetLook, Tolerance, Verdict};
 pub use custom::Custom;

@@ -9,18 +9,10 @@
 //! threshold that has been reached: all that was applied since then goes when the budget is exceeded. Again the mesh is that
 //! of the smallest threshold that fits.
 
-use super::Budget;
-use super::Criterion;
-use super::Front;
-use super::GoOn;
-use super::Outcome;
-use super::front::Forced;
-use super::front::TetErrors;
-use super::front::creators_of_touched;
-use super::front::see;
-use crate::mt::MultiTessellation;
-use crate::mt::UpdateError;
-use crate::mt::UpdateId;
+use super::converge::{Forced, creators_of_touched};
+use super::front::{Front, GoOn, Task};
+use super::look::{TetErrors, see};
+use crate::mt::{ApplyUpdates, UpdateError, UpdateId};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
@@ -115,54 +107,48 @@ impl Front {
     /// Moves to the mesh of the smallest excess that fits the budget. True when it is there.
     pub(super) fn ranked_converge(
         &mut self,
-        mt: &impl MultiTessellation,
-        criterion: &dyn Criterion,
-        budget: Budget,
-        outcome: &mut Outcome,
+        task: &mut Task<'_, impl ApplyUpdates>,
         go_on: GoOn<'_>,
     ) -> Result<bool, UpdateError> {
         if !self.ranked.is_running() {
-            self.fill_queues(mt, criterion, outcome)?;
-            self.trim(mt, criterion, budget, None, outcome)?;
+            self.fill_queues(task)?;
+            self.trim(task, None)?;
         }
         for t in std::mem::take(&mut self.ranked.moved) {
-            self.push_violation(mt, criterion, t, outcome);
+            self.push_violation(task, t);
         }
         while let Some((rank, t)) = self.ranked.refinable.pop() {
             let (_, Reverse(u)) = rank;
-            if self.contains(u) || !self.is_removed_by(mt, t, u) {
+            if self.contains(u) || !self.is_removed_by(task.mt, t, u) {
                 continue;
             }
-            if mt.has_tet_errors() {
+            if task.mt.has_tet_errors() {
                 self.ranked.reach(rank);
             }
-            mt.start_at(&mut self.mesh, t);
-            if let Forced::Awaits(absent, forced) = self.force(mt, u, outcome)? {
+            task.mt.start_at(&mut self.mesh, t);
+            if let Forced::Awaits(absent, forced) = self.force(task, u)? {
                 self.awaiting.insert((absent.0, t));
-                self.push_touched(mt, criterion, outcome);
+                self.push_touched(task);
                 for u in forced.into_iter().rev() {
-                    if self.contains(u) && self.is_idle(mt, criterion, u, outcome)? {
-                        self.undo(mt, criterion, u, outcome)?;
+                    if self.contains(u) && self.is_idle(task, u)? {
+                        self.undo(task, u)?;
                     }
                 }
                 continue;
             }
-            if !mt.has_tet_errors() {
+            if !task.mt.has_tet_errors() {
                 // A tetrahedron asked for it, so it is queued. What it forced is blocked by it, and comes back when it goes.
-                self.is_idle(mt, criterion, u, outcome)?;
+                self.is_idle(task, u)?;
             }
-            self.push_touched(mt, criterion, outcome);
-            let limited = if mt.has_tet_errors() {
-                self.undo_threshold(mt, budget, outcome)?
-            } else {
-                self.trim(mt, criterion, budget, Some(u), outcome)?
-            };
+            self.push_touched(task);
+            let limited =
+                if task.mt.has_tet_errors() { self.undo_threshold(task)? } else { self.trim(task, Some(u))? };
             if limited {
                 self.ranked.clear();
                 self.ranked.state = State::Limited;
                 return Ok(true);
             }
-            if !go_on(outcome) {
+            if !go_on(task.outcome) {
                 return Ok(false);
             }
         }
@@ -172,89 +158,62 @@ impl Front {
     }
 
     /// Fills both queues with what there is, and undoes what nothing asks for on the way.
-    fn fill_queues(
-        &mut self,
-        mt: &impl MultiTessellation,
-        criterion: &dyn Criterion,
-        outcome: &mut Outcome,
-    ) -> Result<(), UpdateError> {
+    fn fill_queues(&mut self, task: &mut Task<'_, impl ApplyUpdates>) -> Result<(), UpdateError> {
         self.forget_watch();
         self.ranked.clear();
         self.ranked.state = State::Running;
         // Children have larger numbers, so one pass downwards sees each after all that depend on it.
-        for u in (0..mt.updates()).rev().map(UpdateId) {
-            if self.contains(u) && mt.may_coarsen(&self.mesh, u) {
-                if self.is_idle(mt, criterion, u, outcome)? {
-                    self.coarsen(mt, u, outcome)?;
+        for u in (0..task.mt.updates()).rev().map(UpdateId) {
+            if self.contains(u) && task.mt.may_coarsen(&self.mesh, u) {
+                if self.is_idle(task, u)? {
+                    self.coarsen(task, u)?;
                 }
                 self.mesh.clear_touched();
             }
         }
         for t in 0..self.mesh.tet_slots() as u32 {
-            self.push_violation(mt, criterion, t, outcome);
+            self.push_violation(task, t);
         }
         Ok(())
     }
 
     /// Queues an update for coarsening if something asks for it. True if nothing does, neither the request nor a child: then it
     /// is idle and can be undone.
-    fn is_idle(
-        &mut self,
-        mt: &impl MultiTessellation,
-        criterion: &dyn Criterion,
-        u: UpdateId,
-        outcome: &mut Outcome,
-    ) -> Result<bool, UpdateError> {
-        outcome.judged += 1;
-        let Some(verdict) = self.need(mt, criterion, u, true)? else { return Ok(false) };
+    fn is_idle(&mut self, task: &mut Task<'_, impl ApplyUpdates>, u: UpdateId) -> Result<bool, UpdateError> {
+        task.outcome.judged += 1;
+        let Some(verdict) = self.need(task, u, true)? else { return Ok(false) };
         if verdict.asks() {
             self.ranked.coarsenable.push(Reverse(rank(verdict.excess, u)));
         }
         Ok(!verdict.asks())
     }
 
-    fn push_violation(
-        &mut self,
-        mt: &impl MultiTessellation,
-        criterion: &dyn Criterion,
-        t: u32,
-        outcome: &mut Outcome,
-    ) {
+    fn push_violation(&mut self, task: &mut Task<'_, impl ApplyUpdates>, t: u32) {
         let Some(tet) = self.mesh.tet(t) else { return };
-        let Some(u) = mt.remover(&self.mesh, t) else { return };
-        outcome.judged += 1;
-        let errors = TetErrors::of(mt, &self.mesh, t, u);
-        let verdict = see(&self.mesh, &tet, &errors, u, |look| criterion.rank(look));
+        let Some(u) = task.mt.remover(&self.mesh, t) else { return };
+        task.outcome.judged += 1;
+        let errors = TetErrors::of(task.mt, &self.mesh, t, u);
+        let verdict = see(&self.mesh, &tet, &errors, u, |look| task.criterion.rank(look));
         if verdict.asks() {
             self.ranked.refinable.push((rank(verdict.excess, u), t));
         }
     }
 
-    fn push_touched(
-        &mut self,
-        mt: &impl MultiTessellation,
-        criterion: &dyn Criterion,
-        outcome: &mut Outcome,
-    ) {
+    fn push_touched(&mut self, task: &mut Task<'_, impl ApplyUpdates>) {
         for i in 0..self.mesh.touched().len() {
-            self.push_violation(mt, criterion, self.mesh.touched()[i], outcome);
+            self.push_violation(task, self.mesh.touched()[i]);
         }
         self.mesh.clear_touched();
     }
 
     /// Undoes all that was applied since the threshold was reached, if the budget is exceeded; tells whether it is.
-    fn undo_threshold(
-        &mut self,
-        mt: &impl MultiTessellation,
-        budget: Budget,
-        outcome: &mut Outcome,
-    ) -> Result<bool, UpdateError> {
-        if budget.holds(self.mesh.vertex_count(), self.mesh.tet_count()) {
+    fn undo_threshold(&mut self, task: &mut Task<'_, impl ApplyUpdates>) -> Result<bool, UpdateError> {
+        if task.budget.holds(self.mesh.vertex_count(), self.mesh.tet_count()) {
             return Ok(false);
         }
         // The last one has no child that is applied.
         while let Some(u) = self.ranked.since.pop() {
-            self.coarsen(mt, u, outcome)?;
+            self.coarsen(task, u)?;
         }
         self.mesh.clear_touched();
         Ok(true)
@@ -263,43 +222,34 @@ impl Front {
     /// Undoes the least urgent updates until the budget is kept. Tells whether `last` was among them.
     fn trim(
         &mut self,
-        mt: &impl MultiTessellation,
-        criterion: &dyn Criterion,
-        budget: Budget,
+        task: &mut Task<'_, impl ApplyUpdates>,
         last: Option<UpdateId>,
-        outcome: &mut Outcome,
     ) -> Result<bool, UpdateError> {
         let mut reached = false;
-        while !budget.holds(self.mesh.vertex_count(), self.mesh.tet_count()) {
+        while !task.budget.holds(self.mesh.vertex_count(), self.mesh.tet_count()) {
             let Some(Reverse((_, Reverse(u)))) = self.ranked.coarsenable.pop() else { break };
-            if !self.contains(u) || self.need(mt, criterion, u, false)?.is_none() {
+            if !self.contains(u) || self.need(task, u, false)?.is_none() {
                 // With a child it comes back when that goes.
                 continue;
             }
-            self.undo(mt, criterion, u, outcome)?;
+            self.undo(task, u)?;
             reached |= last == Some(u);
         }
         Ok(reached)
     }
 
     /// Undoes `u` and whatever was there only for its sake.
-    fn undo(
-        &mut self,
-        mt: &impl MultiTessellation,
-        criterion: &dyn Criterion,
-        u: UpdateId,
-        outcome: &mut Outcome,
-    ) -> Result<(), UpdateError> {
+    fn undo(&mut self, task: &mut Task<'_, impl ApplyUpdates>, u: UpdateId) -> Result<(), UpdateError> {
         let mut idle = vec![u];
         while let Some(u) = idle.pop() {
             if !self.contains(u) {
                 continue;
             }
-            self.coarsen(mt, u, outcome)?;
-            let parents = self.parents_of_touched(mt);
-            self.push_touched(mt, criterion, outcome);
+            self.coarsen(task, u)?;
+            let parents = self.parents_of_touched(task.mt);
+            self.push_touched(task);
             for parent in parents {
-                if self.is_idle(mt, criterion, parent, outcome)? {
+                if self.is_idle(task, parent)? {
                     idle.push(parent);
                 }
             }
@@ -308,7 +258,7 @@ impl Front {
     }
 
     /// The updates that created the tetrahedra just changed.
-    fn parents_of_touched(&self, mt: &impl MultiTessellation) -> Vec<UpdateId> {
+    fn parents_of_touched(&self, mt: &impl ApplyUpdates) -> Vec<UpdateId> {
         let mut parents: Vec<u32> = creators_of_touched(&self.mesh, mt).map(|u| u.0).collect();
         parents.sort_unstable();
         parents.dedup();

@@ -2,7 +2,7 @@
 
 use super::MAX_PLANES;
 use super::Region;
-use super::game::Rows;
+use super::tet_minimax::Rows;
 use crate::geom::nearest_on_triangle;
 use crate::mesh::FACES;
 use glam::DVec3;

@@ -4,8 +4,9 @@
 //! follow falling error, which jumps all over the model; a whole window of them, sorted by place, finds most of what it
 //! needs in the caches. New slots then lie side by side, too.
 
+use crate::geom::morton;
+use crate::mt::ApplyUpdates;
 use crate::mt::CurrentMesh;
-use crate::mt::MultiTessellation;
 use crate::mt::UpdateId;
 
 /// log2 of the cells along each axis by which updates are sorted.
@@ -29,7 +30,7 @@ pub(super) struct Window {
 
 impl Window {
     /// Sorts the updates by their places; those of a cell stay in the order they are in.
-    pub fn sort(&mut self, mt: &impl MultiTessellation, mesh: &CurrentMesh) {
+    pub fn sort(&mut self, mt: &impl ApplyUpdates, mesh: &CurrentMesh) {
         let shift = mt.info().lattice.bits.saturating_sub(CELL_BITS);
         self.starts.clear();
         self.starts.resize(CELLS, 0);
@@ -52,17 +53,10 @@ impl Window {
     }
 }
 
-/// The cell of a position, along a curve through all cells that seldom leaps far (Morton 1966).
+/// The cell of a position, along a curve through all cells that seldom leaps far.
 fn cell(position: [i32; 3], shift: u32) -> u16 {
     let largest = (1 << CELL_BITS) - 1;
-    let [x, y, z] = position.map(|x| spread((x >> shift).clamp(0, largest) as u32));
-    (x | y << 1 | z << 2) as u16
-}
-
-/// Puts two zeros before each of [`CELL_BITS`] bits.
-fn spread(x: u32) -> u32 {
-    let x = (x | x << 4) & 0o303;
-    (x | x << 2) & 0o1111
+    morton(position.map(|x| (x >> shift).clamp(0, largest) as u32)) as u16
 }
 
 #[cfg(test)]

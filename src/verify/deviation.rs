@@ -1,33 +1,24 @@
 //! How far is an extracted mesh from the input, at every reference vertex and all over the boundary?
 
-use super::mesh_checks::PlainMesh;
-use super::mesh_checks::PlainReference;
-use super::parts::Ask;
-use super::parts::change;
-use super::parts::is_aside;
-use super::triangles::Triangles;
-use crate::geom::weights_at;
-use crate::mesh::FACES;
-use crate::mesh::NONE;
-use crate::mesh::TetMesh;
+use super::mesh_checks::{PlainMesh, PlainReference};
+use super::parts::{Ask, change, is_aside};
+use crate::geom::{PointGrid, TriangleGrid, weights_at, weights_on_triangle};
+use crate::mesh::{TetMesh, boundary_faces};
 use crate::mt::MtInfo;
-use crate::refine::Need;
-use crate::refine::Part;
+use crate::refine::{Need, Part};
 use glam::DVec3;
-use std::ops::RangeInclusive;
 
 /// The input, prepared for being compared with.
 pub struct Deviation<'a> {
     info: &'a MtInfo,
     input: &'a TetMesh,
-    positions: Vec<[i32; 3]>,
+    points: PointGrid,
     /// The input's own positions, in steps of the lattice.
     places: Vec<DVec3>,
     levels: Vec<i32>,
     /// The input's values as fractions of each field's range: `values[vertex * fields + f]`.
     values: Vec<f64>,
-    cells: Cells,
-    boundary: Triangles,
+    boundary: TriangleGrid,
     boundary_vertices: Vec<u32>,
     /// Every so many vertices are looked at.
     stride: usize,
@@ -70,26 +61,21 @@ impl<'a> Deviation<'a> {
         let values = each().map(|(value, field)| value / field.range()).collect();
         let neighbors = crate::mesh::neighbors(&input.tets).map_err(|error| format!("the input: {error}"))?;
         let at = |v: u32| DVec3::from(info.lattice.point(positions[v as usize]));
-        let mut faces = Vec::new();
-        for (tet, around) in input.tets.iter().zip(&neighbors) {
-            faces.extend((0..4).filter(|&i| around[i] == NONE).map(|i| FACES[i].map(|j| tet[j])));
-        }
-        let boundary = Triangles::new(faces.iter().map(|face| face.map(at)).collect());
+        let faces: Vec<_> = boundary_faces(&input.tets, &neighbors).map(|(_, face)| face).collect();
+        let boundary = TriangleGrid::new(faces.iter().map(|face| face.map(at)).collect());
         let mut boundary_vertices: Vec<u32> = faces.into_iter().flatten().collect();
         boundary_vertices.sort_unstable();
         boundary_vertices.dedup();
         let stride = points.div_ceil(vertices.max(1)).max(1);
         boundary_vertices.retain(|&v| (v as usize).is_multiple_of(stride));
         let slack = 1e-9 * crate::geom::Bounds::of(&input.positions).diagonal();
-        let cells = Cells::new(&positions);
         Ok(Self {
             info,
             input,
-            positions,
+            points: PointGrid::new(positions),
             places,
             levels,
             values,
-            cells,
             boundary,
             boundary_vertices,
             stride,
@@ -99,7 +85,7 @@ impl<'a> Deviation<'a> {
 
     /// The input on the lattice.
     pub fn reference(&self) -> PlainReference<'_> {
-        PlainReference { positions: &self.positions, levels: &self.levels, tets: &self.input.tets }
+        PlainReference { positions: self.points.points(), levels: &self.levels, tets: &self.input.tets }
     }
 
     /// What each of the needs asks of the reference vertices; `bounds` are what is guaranteed.
@@ -166,18 +152,19 @@ struct Place {
 impl Look<'_> {
     /// The error at every reference vertex that is wanted.
     fn at_vertices(&self, found: &mut Measured) {
-        let points = self.of.positions.len();
+        let points = self.of.points.points().len();
         // For each need and vertex, the least part of what is allowed.
         let mut least = vec![f64::INFINITY; points * self.asks.len()];
         for (t, tet) in (0..).zip(self.mesh.tets) {
             let corners = tet.map(|v| self.mesh.positions[v as usize]);
-            self.of.cells.between(&corners, |point| {
+            self.of.points.near_tet(&corners, |point| {
                 let least = &mut least[point as usize * self.asks.len()..][..self.asks.len()];
                 let asked = |ask: &Ask<'_>| ask.allowed[point as usize] < f64::INFINITY;
                 if !self.asks.iter().any(asked) {
                     return;
                 }
-                let (position, place) = (self.of.positions[point as usize], self.of.places[point as usize]);
+                let (position, place) =
+                    (self.of.points.points()[point as usize], self.of.places[point as usize]);
                 let Some(weights) = weights_at(corners, position, place) else { return };
                 let place = Place { tet: t, weights, displaced: 0.0 };
                 for (ask, least) in self.asks.iter().zip(least).filter(|(ask, _)| asked(ask)) {
@@ -255,14 +242,15 @@ impl Look<'_> {
         };
         let mut least = f64::INFINITY;
         // What the lattice has moved the vertex by is no displacement.
-        let moved = p.distance(DVec3::from(self.of.info.lattice.point(self.of.positions[point as usize])));
+        let moved =
+            p.distance(DVec3::from(self.of.info.lattice.point(self.of.points.points()[point as usize])));
         let slack = moved + self.of.slack;
         self.border.triangles.within(p, reach * per_error + slack, |i, q, distance| {
             let (t, face) = self.border.faces[i as usize];
             let tet = self.mesh.tets[t as usize];
             let away = (distance - slack).max(0.0);
             let displaced = if away > 0.0 { away / per_error } else { 0.0 };
-            let own = weights_on(q, self.border.triangles.corners[i as usize]);
+            let own = weights_on_triangle(q, self.border.triangles.corners[i as usize]);
             let weights = tet.map(|v| face.iter().zip(own).find(|(w, _)| **w == v).map_or(0.0, |(_, x)| x));
             least = least.min(self.ratio(ask, point, &Place { tet: t, weights, displaced }));
         });
@@ -286,7 +274,7 @@ impl Look<'_> {
     fn at_reference_boundary(&self, found: &mut Measured) {
         let mut failures = Failures::default();
         for &v in &self.of.boundary_vertices {
-            let p = self.of.info.lattice.point(self.of.positions[v as usize]);
+            let p = self.of.info.lattice.point(self.of.points.points()[v as usize]);
             self.compare_distance(p, &self.border.triangles, "of the input's boundary", &mut failures, found);
         }
         failures.end("vertices of the input's boundary", found);
@@ -295,7 +283,7 @@ impl Look<'_> {
     fn compare_distance(
         &self,
         p: [f64; 3],
-        other: &Triangles,
+        other: &TriangleGrid,
         what: &str,
         failures: &mut Failures,
         found: &mut Measured,
@@ -306,13 +294,18 @@ impl Look<'_> {
             return;
         }
         let allowed = bound * self.of.info.displacement_per_error + self.of.slack;
-        let distance = other.distance(DVec3::from(p));
+        let p = DVec3::from(p);
+        let distance = other.nearest(p).map_or(f64::INFINITY, |(_, q)| p.distance(q));
         if bound > 0.0 {
             found.worst_ratio = found.worst_ratio.max(distance / allowed);
         }
         if distance > allowed {
-            failures
-                .add(|| format!("vertex {what} at {p:?} is {distance} from the other, more than {allowed}"));
+            failures.add(|| {
+                format!(
+                    "vertex {what} at {:?} is {distance} from the other, more than {allowed}",
+                    p.to_array()
+                )
+            });
         }
     }
 }
@@ -342,7 +335,7 @@ impl Failures {
 
 /// The boundary of an extracted mesh.
 struct Border {
-    triangles: Triangles,
+    triangles: TriangleGrid,
     /// The tetrahedron behind each triangle, and the triangle's vertices.
     faces: Vec<(u32, [u32; 3])>,
 }
@@ -351,86 +344,7 @@ impl Border {
     fn of(mesh: &PlainMesh<'_>, info: &MtInfo) -> Self {
         let faces: Vec<(u32, [u32; 3])> = mesh.boundary().collect();
         let at = |v: u32| DVec3::from(info.lattice.point(mesh.positions[v as usize]));
-        let triangles = Triangles::new(faces.iter().map(|(_, face)| face.map(at)).collect());
+        let triangles = TriangleGrid::new(faces.iter().map(|(_, face)| face.map(at)).collect());
         Self { triangles, faces }
-    }
-}
-
-/// The barycentric coordinates of a point on a triangle.
-fn weights_on(q: DVec3, [a, b, c]: [DVec3; 3]) -> [f64; 3] {
-    let normal = (b - a).cross(c - a);
-    let area = normal.length_squared();
-    if area <= 0.0 {
-        return [1.0, 0.0, 0.0];
-    }
-    let v = (q - a).cross(c - a).dot(normal) / area;
-    let w = (b - a).cross(q - a).dot(normal) / area;
-    [1.0 - v - w, v, w]
-}
-
-/// Lattice points sorted into the cells of a regular grid.
-struct Cells {
-    points: Vec<(u32, [i32; 3])>,
-    starts: Vec<u32>,
-    low: [i32; 3],
-    side: [i64; 3],
-    cells: [usize; 3],
-}
-
-/// Points in a cell, on average, if they were spread evenly.
-const CROWD: f64 = 3.0;
-const MAX_CELLS: f64 = 128.0;
-
-impl Cells {
-    fn new(positions: &[[i32; 3]]) -> Self {
-        let low = [0, 1, 2].map(|i| positions.iter().map(|p| p[i]).min().unwrap_or(0));
-        let extent =
-            [0, 1, 2].map(|i| positions.iter().map(|p| i64::from(p[i] - low[i])).max().unwrap_or(0) + 1);
-        let volume: f64 = extent.iter().map(|&e| e as f64).product();
-        let edge = (volume * CROWD / positions.len().max(1) as f64).cbrt();
-        let side =
-            extent.map(|e| ((e as f64 / (e as f64 / edge).clamp(1.0, MAX_CELLS)).ceil() as i64).max(1));
-        let cells = [0, 1, 2].map(|i| (extent[i] / side[i]) as usize + 1);
-        let mut sorted = Self { points: Vec::new(), starts: Vec::new(), low, side, cells };
-        let mut places: Vec<(usize, u32)> =
-            positions.iter().zip(0..).map(|(p, i)| (sorted.index(*p), i)).collect();
-        places.sort_unstable();
-        sorted.starts = vec![0; cells.iter().product::<usize>() + 1];
-        places.iter().for_each(|&(cell, _)| sorted.starts[cell + 1] += 1);
-        (1..sorted.starts.len()).for_each(|i| sorted.starts[i] += sorted.starts[i - 1]);
-        sorted.points = places.into_iter().map(|(_, i)| (i, positions[i as usize])).collect();
-        sorted
-    }
-
-    fn along(&self, axis: usize, x: i32) -> usize {
-        let offset = i64::from(x) - i64::from(self.low[axis]);
-        (offset.max(0) / self.side[axis]).min(self.cells[axis] as i64 - 1) as usize
-    }
-
-    fn index(&self, p: [i32; 3]) -> usize {
-        let [x, y, z] = [0, 1, 2].map(|axis| self.along(axis, p[axis]));
-        (z * self.cells[1] + y) * self.cells[0] + x
-    }
-
-    /// Calls `visit` with all points in the bounds of a tetrahedron.
-    fn between(&self, corners: &[[i32; 3]; 4], mut visit: impl FnMut(u32)) {
-        let low = [0, 1, 2].map(|i| corners.iter().map(|q| q[i]).fold(i32::MAX, i32::min));
-        let high = [0, 1, 2].map(|i| corners.iter().map(|q| q[i]).fold(i32::MIN, i32::max));
-        let range = |axis: usize| -> RangeInclusive<usize> {
-            // Points may be half a step beside their place on the lattice.
-            self.along(axis, low[axis].saturating_sub(1))..=self.along(axis, high[axis].saturating_add(1))
-        };
-        let [xs, ys, zs] = [range(0), range(1), range(2)];
-        for z in zs {
-            for y in ys.clone() {
-                let row = (z * self.cells[1] + y) * self.cells[0];
-                let cells = self.starts[row + xs.start()] as usize..self.starts[row + xs.end() + 1] as usize;
-                for &(point, p) in &self.points[cells] {
-                    if (0..3).all(|i| low[i] <= p[i].saturating_add(1) && p[i] <= high[i].saturating_add(1)) {
-                        visit(point);
-                    }
-                }
-            }
-        }
     }
 }

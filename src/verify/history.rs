@@ -6,8 +6,8 @@ use super::note;
 use super::satisfy;
 use crate::geom::Bounds;
 use crate::mesh::TetMesh;
+use crate::mt::ApplyUpdates;
 use crate::mt::MtInfo;
-use crate::mt::MultiTessellation;
 use crate::refine::Front;
 use crate::refine::Need;
 use crate::refine::Request;
@@ -22,10 +22,10 @@ const FULL: u32 = 3;
 const ERRORS: [f64; 5] = [0.01, 0.0, 0.003, 0.03, 0.001];
 
 /// Numbers that look random; the same on every run (Xorshift, Marsaglia 2003).
-struct Numbers(u64);
+pub struct Numbers(pub u64);
 
 impl Numbers {
-    fn next(&mut self) -> u64 {
+    pub fn next(&mut self) -> u64 {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 7;
         self.0 ^= self.0 << 17;
@@ -81,7 +81,7 @@ pub fn requests(info: &MtInfo, input: &TetMesh) -> Vec<Query> {
 
 /// Answers each request from the base mesh, and again from the mesh that the one before left, or from the reference mesh.
 pub fn check(
-    mt: &impl MultiTessellation,
+    mt: &impl ApplyUpdates,
     base: &Front,
     queries: &[Query],
     on_progress: &mut dyn FnMut(u32),

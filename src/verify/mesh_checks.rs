@@ -1,8 +1,7 @@
 //! Is this a valid conforming mesh? Asked of plain arrays, with nothing but sorting and exact orientation.
 
-use crate::geom::orient3d;
-use crate::mesh::FACES;
-use crate::mesh::NONE;
+use crate::geom::{Groups, orient3d};
+use crate::mesh::{FACES, NONE, boundary_faces, stars};
 use crate::mt::CurrentMesh;
 
 /// An extracted mesh as plain arrays.
@@ -120,18 +119,14 @@ impl<'a> PlainMesh<'a> {
 
     /// The triangles of the boundary, each with its tetrahedron.
     pub fn boundary(&self) -> impl Iterator<Item = (u32, [u32; 3])> {
-        self.tets.iter().zip(self.neighbors).zip(0..).flat_map(|((tet, around), t)| {
-            (0..4).filter(|&i| around[i] == NONE).map(move |i| (t, FACES[i].map(|j| tet[j])))
-        })
+        boundary_faces(self.tets, self.neighbors)
     }
 }
 
 /// The tetrahedra around each vertex: what is looked at vertex by vertex needs no list of all faces or edges.
 struct Around<'a> {
     tets: &'a [[u32; 4]],
-    /// Where those of each vertex start in `items`.
-    starts: Vec<usize>,
-    items: Vec<u32>,
+    stars: Groups,
 }
 
 impl<'a> Around<'a> {
@@ -139,27 +134,17 @@ impl<'a> Around<'a> {
         if tets.len() > crate::mesh::MAX_TETS {
             return Err("too many tetrahedra to check".into());
         }
-        let mut starts = vec![0_usize; vertices + 1];
-        for &v in tets.iter().flatten() {
-            *starts.get_mut(v as usize + 1).ok_or(format!("there is no vertex {v}"))? += 1;
+        if let Some(v) = tets.iter().flatten().find(|v| **v as usize >= vertices) {
+            return Err(format!("there is no vertex {v}"));
         }
-        (1..starts.len()).for_each(|i| starts[i] += starts[i - 1]);
-        let mut next = starts.clone();
-        let mut items = vec![0; 4 * tets.len()];
-        for (t, tet) in (0..).zip(tets) {
-            for &v in tet {
-                items[next[v as usize]] = t;
-                next[v as usize] += 1;
-            }
-        }
-        Ok(Self { tets, starts, items })
+        Ok(Self { tets, stars: stars(vertices, tets) })
     }
 
     /// Gives the vertices that have larger numbers and share an edge with `v`, and sorted the faces of which it is the least vertex.
     fn at(&self, v: u32, faces: &mut Vec<Face>) -> Vec<u32> {
         faces.clear();
         let mut larger = Vec::new();
-        for &t in &self.items[self.starts[v as usize]..self.starts[v as usize + 1]] {
+        for &t in self.stars.of(v as usize) {
             let tet = self.tets[t as usize];
             larger.extend(tet.iter().filter(|&&w| w > v));
             for (i, corners) in FACES.iter().enumerate() {

@@ -33,11 +33,10 @@ mod parts;
 mod points;
 mod queries;
 mod same;
-mod triangles;
 
 use crate::mesh::TetMesh;
+use crate::mt::ApplyUpdates;
 use crate::mt::ErrorCode;
-use crate::mt::MultiTessellation;
 use crate::mt::UpdateId;
 use crate::mt::check_errors;
 use crate::refine::Criterion;
@@ -50,6 +49,7 @@ use crate::refine::Request;
 use crate::refine::TetLook;
 use deviation::Deviation;
 use deviation::TetErrors;
+use history::Numbers;
 use mesh_checks::PlainMesh;
 use queries::Query;
 use std::sync::Arc;
@@ -81,7 +81,7 @@ pub enum Reference {
 
 /// Checks `mt` against `input`, what it was built from (repaired if need be: [`crate::mesh::repair`]), with requests of every
 /// kind. `on_progress` is told how many of how many steps are done.
-pub fn run<M: MultiTessellation>(
+pub fn run<M: ApplyUpdates>(
     mt: &M,
     input: &TetMesh,
     reference: Reference,
@@ -123,7 +123,7 @@ impl Sample {
 
 /// [`run`] on a sample of the requests and of the reference vertices: for very large meshes. What is checked of a mesh without
 /// requests, and that the meshes which come out are valid, is checked as there.
-pub fn run_sample<M: MultiTessellation>(
+pub fn run_sample<M: ApplyUpdates>(
     mt: &M,
     input: &TetMesh,
     reference: Reference,
@@ -139,7 +139,7 @@ pub fn run_sample<M: MultiTessellation>(
 }
 
 /// [`run`] with requests of the caller's own.
-pub fn run_requests<M: MultiTessellation>(
+pub fn run_requests<M: ApplyUpdates>(
     mt: &M,
     input: &TetMesh,
     reference: Reference,
@@ -165,7 +165,7 @@ struct Plan {
     vertices: usize,
 }
 
-fn with<M: MultiTessellation>(
+fn with<M: ApplyUpdates>(
     mt: &M,
     input: &TetMesh,
     reference: Reference,
@@ -186,7 +186,7 @@ fn with<M: MultiTessellation>(
 }
 
 /// Failures that leave nothing more to check are returned, the others noted.
-fn verify<M: MultiTessellation>(
+fn verify<M: ApplyUpdates>(
     mt: &M,
     input: &TetMesh,
     Plan { queries, histories, vertices }: &Plan,
@@ -210,7 +210,7 @@ fn verify<M: MultiTessellation>(
         report.queries += 1;
     }
     check_monotone(queries, &excesses, report);
-    let walk = Walk { mt, base: &base, shape: &reference, steps: Steps(1) };
+    let walk = Walk { mt, base: &base, shape: &reference, numbers: Numbers(1) };
     let first = queries.len() as u32;
     walk.run(queries, &hashes, &mut |i| on_progress(first + i, steps), report)?;
     history::check(mt, &base, histories, &mut |i| on_progress(2 * first + i, steps), report)
@@ -232,11 +232,11 @@ fn check_monotone(queries: &[Query], excesses: &[f64], report: &mut VerifyReport
     }
 }
 
-fn fresh(mt: &impl MultiTessellation) -> Result<Front, String> {
+fn fresh(mt: &impl ApplyUpdates) -> Result<Front, String> {
     Front::new(mt).map_err(|error| format!("the base mesh: {error}"))
 }
 
-fn satisfy(mt: &impl MultiTessellation, front: &mut Front, query: &Query) -> Result<Outcome, String> {
+fn satisfy(mt: &impl ApplyUpdates, front: &mut Front, query: &Query) -> Result<Outcome, String> {
     let outcome = front.satisfy(mt, &query.criterion(mt.info()), query.request.budget);
     outcome.map_err(|error| format!("{query}: the MT is damaged: {error}"))
 }
@@ -249,7 +249,7 @@ fn note(report: &mut VerifyReport, place: &dyn std::fmt::Display, failure: &str)
 
 /// Refines the base mesh to the reference mesh and coarsens it again. Returns what is to hold of every mesh.
 fn check_full_circle(
-    mt: &impl MultiTessellation,
+    mt: &impl ApplyUpdates,
     deviation: &Deviation<'_>,
     report: &mut VerifyReport,
 ) -> Result<mesh_checks::Shape, String> {
@@ -274,7 +274,7 @@ fn check_full_circle(
 }
 
 /// Refinement relies on errors that do not grow from an update to those that depend on it.
-fn check_order(mt: &impl MultiTessellation, report: &mut VerifyReport) {
+fn check_order(mt: &impl ApplyUpdates, report: &mut VerifyReport) {
     let place = &"errors along the partial order";
     match check_errors(mt) {
         Ok(None) => {}
@@ -288,26 +288,14 @@ struct Walk<'a, M> {
     mt: &'a M,
     base: &'a Front,
     shape: &'a mesh_checks::Shape,
-    steps: Steps,
-}
-
-/// Lengths of steps, from one update to all of them; the same on every run.
-struct Steps(u64);
-
-impl Steps {
-    fn next(&mut self) -> u64 {
-        // Xorshift (Marsaglia 2003).
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        1 << (self.0 % 16)
-    }
+    /// For the lengths of steps, from one update to many of them.
+    numbers: Numbers,
 }
 
 /// Steps that a request is answered in, at most.
 const MOST_STEPS: u32 = 5;
 
-impl<M: MultiTessellation> Walk<'_, M> {
+impl<M: ApplyUpdates> Walk<'_, M> {
     fn run(
         mut self,
         queries: &[Query],
@@ -339,7 +327,7 @@ impl<M: MultiTessellation> Walk<'_, M> {
     fn answer(&mut self, front: &mut Front, query: &Query, report: &mut VerifyReport) -> Result<(), String> {
         front.aim(self.mt, Arc::new(query.criterion(self.mt.info())), query.request.budget);
         for step in 1..=MOST_STEPS {
-            let most = if step < MOST_STEPS { self.steps.next() } else { u64::MAX };
+            let most = if step < MOST_STEPS { 1 << (self.numbers.next() % 16) } else { u64::MAX };
             let outcome = front
                 .step(self.mt, &mut |done| done.refined + done.coarsened < most)
                 .map_err(|error| format!("{query}: the MT is damaged: {error}"))?;
@@ -386,7 +374,7 @@ struct Case<'a, M> {
 /// Errors that are smaller than this, in whatever unit, are judged as this: ratios to 0 mean nothing.
 const LEAST: f64 = 1.0 / (1_u64 << 20) as f64;
 
-impl<M: MultiTessellation> Case<'_, M> {
+impl<M: ApplyUpdates> Case<'_, M> {
     fn check(
         &self,
         base: &Front,

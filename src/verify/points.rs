@@ -6,12 +6,12 @@ use super::mesh_checks::PlainMesh;
 use super::same::volume;
 use super::satisfy;
 use crate::mesh::TetMesh;
-use crate::mt::MultiTessellation;
+use crate::mt::ApplyUpdates;
 use crate::refine::Request;
 
 /// The points and fields of `input` with the tetrahedra of the mesh at error 0, which must have just these points.
 /// If the input has tetrahedra, the two must have the same volume.
-pub fn triangulated(mt: &impl MultiTessellation, input: &TetMesh) -> Result<TetMesh, String> {
+pub fn triangulated(mt: &impl ApplyUpdates, input: &TetMesh) -> Result<TetMesh, String> {
     let mut front = fresh(mt)?;
     satisfy(mt, &mut front, &Query::new("full refinement", Request::within(0.0)))?;
     let mesh = PlainMesh::of(front.mesh());

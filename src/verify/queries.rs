@@ -2,9 +2,9 @@
 
 use crate::geom::Bounds;
 use crate::mesh::TetMesh;
+use crate::mt::ApplyUpdates;
 use crate::mt::FieldInfo;
 use crate::mt::MtInfo;
-use crate::mt::MultiTessellation;
 use crate::refine::Budget;
 use crate::refine::LodCriterion;
 use crate::refine::Need;
@@ -40,7 +40,7 @@ impl Query {
 const ERRORS: [f64; 5] = [0.0, 0.001, 0.01, 0.05, 0.2];
 
 /// All requests for an MT of `input`.
-pub fn of(mt: &impl MultiTessellation, input: &TetMesh) -> Vec<Query> {
+pub fn of(mt: &impl ApplyUpdates, input: &TetMesh) -> Vec<Query> {
     let mut queries = Queries {
         all: Vec::new(),
         boxes: boxes(input),

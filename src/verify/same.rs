@@ -3,6 +3,7 @@
 use super::mesh_checks::PlainMesh;
 use super::mesh_checks::PlainReference;
 use crate::geom::orient3d;
+use crate::mt::mix;
 
 /// How often neighbourhoods are compared: vertices at one place with equal values are told apart by what is around.
 const ROUNDS: usize = 4;
@@ -83,12 +84,4 @@ impl<'a> Vertices<'a> {
         }
         self.known.iter_mut().zip(around).for_each(|(known, around)| *known = mix(*known ^ mix(around)));
     }
-}
-
-/// Spreads every bit over the word (SplitMix64).
-fn mix(x: u64) -> u64 {
-    let x = x.wrapping_add(0x9E37_79B9_7F4A_7C15);
-    let x = (x ^ x >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    let x = (x ^ x >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
-    x ^ x >> 31
 }

@@ -1,7 +1,6 @@
 //! The boundary of a mesh as a surface of its own.
 
-use crate::mesh::FACES;
-use crate::mesh::NONE;
+use crate::mesh::{NONE, boundary_faces};
 use crate::view::MeshView;
 use glam::DVec3;
 
@@ -37,14 +36,9 @@ impl BoundarySurface {
         self.indices.clear();
         self.points.clear();
         self.vertex_of.resize(mesh.positions.len(), NONE);
-        for (tet, around) in mesh.tets.iter().zip(mesh.neighbors) {
-            // A free slot has neither corners nor neighbours.
-            for face in
-                FACES.iter().zip(around).filter(|(_, n)| **n == NONE && tet[0] != NONE).map(|(face, _)| face)
-            {
-                let triangle = face.map(|i| self.vertex(tet[i]));
-                self.indices.push(triangle);
-            }
+        for (_, face) in boundary_faces(mesh.tets, mesh.neighbors) {
+            let triangle = face.map(|point| self.vertex(point));
+            self.indices.push(triangle);
         }
         self.positions.clear();
         self.positions.extend(self.points.iter().map(|p| mesh.positions[*p as usize]));

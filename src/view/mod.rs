@@ -1,12 +1,12 @@
 //! What is to be seen, computed on the CPU from slices. Knows no MT.
 
 mod boundary;
-mod cases;
 mod colormap;
 mod cutaway;
 pub mod gizmo;
 mod iso;
-mod patches;
+mod marching;
+mod mesh_snapshot;
 mod probe;
 mod slice;
 mod stats;

@@ -7,6 +7,7 @@
 //! What holds: a point of the domain, its boundary included, is found, and one outside is not; of several tetrahedra
 //! that meet at a point the one with the smallest number is taken.
 
+use crate::geom::Groups;
 use crate::mesh::FACES;
 use crate::mesh::NONE;
 use crate::view::MeshView;
@@ -370,9 +371,7 @@ struct Grid {
     /// Boxes per model unit.
     scale: [f64; 3],
     dims: [usize; 3],
-    /// Where the tetrahedra of each box start in `tets`.
-    starts: Vec<u32>,
-    tets: Vec<u32>,
+    tets: Groups,
 }
 
 impl Grid {
@@ -407,7 +406,7 @@ impl Grid {
                 max[i] = max[i].max(p[i]);
             });
         }
-        Self { min, max, scale: [0.0; 3], dims: [1; 3], starts: Vec::new(), tets: Vec::new() }
+        Self { min, max, scale: [0.0; 3], dims: [1; 3], tets: Groups::default() }
     }
 
     /// About so many boxes, about as long as wide. Found by doubling the number along the axis where boxes are longest.
@@ -447,21 +446,11 @@ impl Grid {
     }
 
     fn fill(&mut self, mesh: &MeshView<'_>) {
-        let tets = || (0..).zip(mesh.tets).filter(|(_, tet)| tet[0] != NONE);
-        let mut starts = vec![0_u32; self.dims.iter().product::<usize>() + 1];
-        for (_, tet) in tets() {
-            self.each_box(self.range(mesh, tet), |b| starts[b + 1] += 1);
-        }
-        (1..starts.len()).for_each(|b| starts[b] += starts[b - 1]);
-        let mut next = starts.clone();
-        let mut entries = vec![0_u32; starts.last().map_or(0, |end| *end as usize)];
-        for (t, tet) in tets() {
-            self.each_box(self.range(mesh, tet), |b| {
-                entries[next[b] as usize] = t;
-                next[b] += 1;
-            });
-        }
-        (self.starts, self.tets) = (starts, entries);
+        self.tets = Groups::new(self.dims.iter().product(), |add| {
+            for (t, tet) in (0..).zip(mesh.tets).filter(|(_, tet)| tet[0] != NONE) {
+                self.each_box(self.range(mesh, tet), |b| add(b, t));
+            }
+        });
     }
 
     fn each_box(&self, range: [[usize; 2]; 3], mut see: impl FnMut(usize)) {
@@ -473,17 +462,13 @@ impl Grid {
         }
     }
 
-    fn in_box(&self, b: usize) -> &[u32] {
-        &self.tets[self.starts[b] as usize..self.starts[b + 1] as usize]
-    }
-
     /// The tetrahedra that a point may be in, in ascending order.
     fn at(&self, p: [f64; 3]) -> &[u32] {
         if !(0..3).all(|i| self.min[i] <= p[i] && p[i] <= self.max[i]) {
             return &[];
         }
         let [i, j, k] = [0, 1, 2].map(|axis| self.place(p[axis], axis));
-        self.in_box((k * self.dims[1] + j) * self.dims[0] + i)
+        self.tets.of((k * self.dims[1] + j) * self.dims[0] + i)
     }
 
     /// The tetrahedra that a segment may meet, in ascending order.
@@ -516,7 +501,7 @@ impl Grid {
                     [self.place(x[0] - slack, i), self.place(x[1] + slack, i)]
                 }
             });
-            self.each_box(range, |b| found.extend_from_slice(self.in_box(b)));
+            self.each_box(range, |b| found.extend_from_slice(self.tets.of(b)));
         }
         found.sort_unstable();
         found.dedup();

@@ -9,15 +9,10 @@
 //!   side of a triangle has its opposite.
 //! - After [`Slice::update`] the triangles are those that [`Slice::extract`] would give, in another order.
 
-use crate::mesh::NONE;
-use crate::view::MeshView;
-use crate::view::SurfaceChanges;
-use crate::view::patches::Crossing;
-use crate::view::patches::Patches;
-use crate::view::patches::Polygon;
-use crate::view::patches::Watch;
-use crate::view::patches::side;
-use crate::view::patches::within;
+use super::marching::{Crossing, Pieces, Polygon, select};
+use super::mesh_snapshot::{MeshSnapshot, entries};
+use super::{MeshView, SurfaceChanges};
+use crate::mesh::{FACES, NONE};
 use std::ops::Range;
 
 /// The plane of all points `p` with `normal · p = offset`, in model units.
@@ -40,6 +35,16 @@ impl Plane {
         let [x, y, z] = [0, 1, 2].map(|i| self.normal[i] * f64::from(p[i]));
         x + y + z - self.offset
     }
+
+    fn height_at(&self, mesh: &MeshView<'_>, point: u32) -> f64 {
+        self.height(mesh.positions[point as usize])
+    }
+
+    /// The position of a vertex and the field's value there.
+    fn vertex(&self, mesh: &MeshView<'_>, crossing: &Crossing) -> ([f32; 3], f32) {
+        let t = crossing.fraction(0.0, |p| self.height_at(mesh, p));
+        (crossing.place(mesh.positions, t), crossing.value(mesh.field, t))
+    }
 }
 
 /// The section of a mesh with a plane.
@@ -48,11 +53,14 @@ pub struct Slice {
     plane: Option<Plane>,
     positions: Vec<[f32; 3]>,
     values: Vec<f32>,
+    indices: Vec<[u32; 3]>,
+    pieces: Pieces,
     /// Of each point of the mesh, the side of the plane that it is on.
     sides: Vec<u8>,
-    patches: Patches,
+    /// Scratch: tetrahedra that may be cut.
+    cut: Vec<u32>,
     /// Once the mesh has changed: what it was.
-    watch: Option<Watch>,
+    snapshot: Option<MeshSnapshot>,
 }
 
 impl Slice {
@@ -61,7 +69,7 @@ impl Slice {
         Self::default()
     }
 
-    /// Vertices in model units. After updates there may be some that no triangle names.
+    /// Vertices in model units.
     pub fn positions(&self) -> &[[f32; 3]] {
         &self.positions
     }
@@ -76,23 +84,20 @@ impl Slice {
     /// # Panics
     /// If there are fewer points or numbers than in the mesh that was sliced.
     pub fn interpolate(&self, mesh: &MeshView<'_>, field: &[f32]) -> Vec<f32> {
-        let mut values = vec![0.0; self.positions.len()];
-        if let Some(plane) = &self.plane {
-            self.patches.each_vertex(|v, crossing| {
-                values[v] = value(field, crossing, fraction(plane, mesh, crossing));
-            });
-        }
-        values
+        let Some(plane) = &self.plane else { return Vec::new() };
+        let list = self.pieces.crossings.list.iter();
+        list.map(|crossing| crossing.value(field, crossing.fraction(0.0, |p| plane.height_at(mesh, p))))
+            .collect()
     }
 
     /// Triangles, counter-clockwise when seen from where the normal points to.
     pub fn indices(&self) -> &[[u32; 3]] {
-        &self.patches.triangles
+        &self.indices
     }
 
     /// Which sides of each triangle lie in faces of the mesh: bit `k` is for the side from corner `k` to the next.
-    pub fn cell_sides(&self) -> &[u8] {
-        &self.patches.sides
+    pub fn cell_sides(&self) -> Vec<u8> {
+        self.pieces.polygon_sides()
     }
 
     /// Replaces `lines` by the sections of the mesh's faces, each once, in ascending order.
@@ -114,105 +119,152 @@ impl Slice {
     /// If the mesh names a point that it does not have.
     pub fn extract(&mut self, mesh: &MeshView<'_>, plane: &Plane) {
         self.plane = Some(*plane);
-        self.watch = None;
-        self.cut(mesh, plane);
+        self.snapshot = None;
+        self.rebuild(mesh, plane);
     }
 
     /// Brings the section with the same plane up to date, given in which ranges points (or their values) and
     /// tetrahedra (or their neighbours) have changed since; does nothing before the first [`Slice::extract`].
     ///
-    /// The first time after [`Slice::extract`], and where most of the mesh has changed, this costs a pass over the
-    /// mesh; else what changed. Wider ranges than needed cost a little more and change nothing else.
+    /// The first time after [`Slice::extract`] this costs a pass over the mesh; else what changed. Wider ranges than needed cost a little more and change nothing else.
     ///
     /// # Panics
     /// If the mesh names a point or a neighbour that it does not have.
     pub fn update(&mut self, mesh: &MeshView<'_>, points: &[Range<u32>], tets: &[Range<u32>]) {
         let Some(plane) = self.plane else { return };
-        let most = is_most(points, mesh.positions.len()) || is_most(tets, mesh.tets.len());
-        match &mut self.watch {
-            Some(watch) if !most => {
-                self.sides.resize(mesh.positions.len(), side::NOWHERE);
-                for p in within(points, mesh.positions.len()) {
-                    self.sides[p as usize] = side::of(plane.height(mesh.positions[p as usize]));
+        let Some(snapshot) = &mut self.snapshot else {
+            self.snapshot = Some(MeshSnapshot::new(mesh));
+            return self.rebuild(mesh, &plane);
+        };
+        let (count, before) = (mesh.tets.len(), self.sides.len());
+        self.sides.resize(mesh.positions.len(), side::NOWHERE);
+        for p in entries(points, before, mesh.positions.len()) {
+            self.sides[p as usize] = side::of(plane.height_at(mesh, p));
+        }
+        let Self { pieces, indices, positions, values, sides, .. } = self;
+        pieces.follow(indices);
+        let mut dirty = snapshot.catch_up(mesh, points, tets).tets;
+        dirty.retain(|t| pieces.has_piece(*t) || may_pass(sides, &mesh.tets[*t as usize]));
+        // A face in the plane comes from another tetrahedron when what was across it has changed.
+        dirty.extend(entries(tets, count, count).filter(|&t| {
+            let may_have_floor = pieces.has_piece(t) || mesh.neighbors[t as usize].contains(&NONE);
+            may_have_floor && sides_of(sides, mesh, t).is_some_and(is_above)
+        }));
+        dirty.sort_unstable();
+        dirty.dedup();
+        let piece = |t, _| sides_of(sides, mesh, t).map_or(Polygon::default(), |of| polygon(mesh, t, of));
+        let edited = pieces.recut(indices, count, &dirty, 1, piece).list;
+        let old = positions.len();
+        positions.resize(pieces.crossings.list.len(), [0.0; 3]);
+        values.resize(pieces.crossings.list.len(), 0.0);
+        for &v in &edited {
+            if pieces.is_used(v) {
+                let now = plane.vertex(mesh, &pieces.crossings.list[v as usize]);
+                let at = v as usize;
+                let before =
+                    (std::mem::replace(&mut positions[at], now.0), std::mem::replace(&mut values[at], now.1));
+                if at >= old || bits(before) != bits(now) {
+                    pieces.mark_vertex(v);
                 }
-                let (sides, patches) = (&self.sides, &mut self.patches);
-                watch.look(mesh, points, tets, |t| patches.has_piece(t) || may_pass(sides, mesh, t));
-                // All pieces go before the first comes, so that no old vertex is taken for a new one.
-                patches.remove(&watch.dirty, mesh.tets.len());
-                patches.resize(mesh.positions.len(), mesh.tets.len());
-                watch.dirty.iter().for_each(|t| add(patches, sides, mesh, *t));
-                patches.repack();
-                self.place(mesh, &plane);
-            }
-            watch => {
-                watch.get_or_insert_default().reset(mesh);
-                self.cut(mesh, &plane);
             }
         }
+        pieces.drop_unused(indices, edited, |v| {
+            positions.swap_remove(v);
+            values.swap_remove(v);
+        });
     }
 
-    fn cut(&mut self, mesh: &MeshView<'_>, plane: &Plane) {
-        self.patches.clear(mesh.positions.len(), mesh.tets.len());
-        self.positions.clear();
-        self.values.clear();
-        self.sides.clear();
-        self.sides.extend(mesh.positions.iter().map(|p| side::of(plane.height(*p))));
-        for t in 0..mesh.tets.len() as u32 {
-            add(&mut self.patches, &self.sides, mesh, t);
+    fn rebuild(&mut self, mesh: &MeshView<'_>, plane: &Plane) {
+        let Self { pieces, indices, positions, values, sides, cut, .. } = self;
+        pieces.clear(mesh.tets.len());
+        indices.clear();
+        sides.clear();
+        sides.extend(mesh.positions.iter().map(|p| side::of(plane.height(*p))));
+        cut.clear();
+        select(mesh.tets, 0, cut, |tet| may_pass(sides, tet));
+        for &t in &*cut {
+            let sides = mesh.tets[t as usize].map(|p| sides[p as usize]);
+            pieces.push(indices, t, 0, &polygon(mesh, t, sides));
         }
-        self.place(mesh, plane);
+        (*positions, *values) =
+            pieces.crossings.list.iter().map(|crossing| plane.vertex(mesh, crossing)).unzip();
+        pieces.mark_all();
     }
 
     /// Which parts of the arrays have changed since this was last asked.
     pub fn take_changes(&mut self) -> SurfaceChanges {
-        let [vertices, triangles] = self.patches.take_changes();
-        SurfaceChanges { vertices, triangles }
-    }
-
-    /// Sets the positions and values of new vertices.
-    fn place(&mut self, mesh: &MeshView<'_>, plane: &Plane) {
-        self.positions.resize(self.patches.vertex_count(), [0.0; 3]);
-        self.values.resize(self.patches.vertex_count(), 0.0);
-        let Self { positions, values, patches, .. } = self;
-        patches.place_fresh(|v, crossing| {
-            let [p, q] = crossing.map(|point| mesh.positions[point as usize]);
-            let t = fraction(plane, mesh, crossing);
-            positions[v] = [0, 1, 2].map(|i| between(p[i], q[i], t));
-            values[v] = value(mesh.field, crossing, t);
-        });
+        self.pieces.take_changes()
     }
 }
 
-/// How far a crossing is from the end below to the end above, 0 to 1.
-fn fraction(plane: &Plane, mesh: &MeshView<'_>, crossing: Crossing) -> f64 {
-    let [low, high] = crossing.map(|point| plane.height(mesh.positions[point as usize]));
-    if crossing[0] == crossing[1] { 0.0 } else { low / (low - high) }
+fn bits(([x, y, z], value): ([f32; 3], f32)) -> [u32; 4] {
+    [x, y, z, value].map(f32::to_bits)
 }
 
-fn value(field: &[f32], [a, b]: Crossing, t: f64) -> f32 {
-    between(field[a as usize], field[b as usize], t)
-}
+/// On which side of a plane a point is: bits, so that those of a tetrahedron can be put together.
+mod side {
+    /// Below: inside.
+    pub const INSIDE: u8 = 1;
+    /// In the plane itself.
+    pub const TOUCHED: u8 = 2;
+    /// Above: outside.
+    pub const OUTSIDE: u8 = 4;
+    /// Neither: a point that is no number is in no piece.
+    pub const NOWHERE: u8 = 8;
 
-fn between(x: f32, y: f32, t: f64) -> f32 {
-    (f64::from(x) + t * (f64::from(y) - f64::from(x))) as f32
-}
-
-/// Whether ranges are more than half of so many entries.
-fn is_most(ranges: &[Range<u32>], len: usize) -> bool {
-    ranges.iter().fold(0_usize, |sum, range| sum.saturating_add(range.len())) > len / 2
+    /// The side of a point at this height above the plane.
+    #[inline]
+    pub fn of(height: f64) -> u8 {
+        if height < 0.0 {
+            INSIDE
+        } else if height > 0.0 {
+            OUTSIDE
+        } else if height == 0.0 {
+            TOUCHED
+        } else {
+            NOWHERE
+        }
+    }
 }
 
 /// Whether a tetrahedron may have a piece. A free slot has no corners.
-fn may_pass(sides: &[u8], mesh: &MeshView<'_>, t: u32) -> bool {
-    let tet = mesh.tets[t as usize];
-    tet[0] != NONE && side::may_pass(tet.iter().fold(0, |all, p| all | sides[*p as usize]))
+#[inline]
+fn may_pass(sides: &[u8], tet: &[u32; 4]) -> bool {
+    use side::{INSIDE, OUTSIDE, TOUCHED};
+    if tet[0] == NONE {
+        return false;
+    }
+    let all = tet.iter().fold(0, |all, p| all | sides[*p as usize]);
+    // Nothing inside leaves faces at the bottom of the domain.
+    all & TOUCHED != 0 && all & OUTSIDE != 0 || all & INSIDE != 0 && all & (TOUCHED | OUTSIDE) != 0
 }
 
-/// Adds the piece of a tetrahedron, if it has one.
-fn add(patches: &mut Patches, sides: &[u8], mesh: &MeshView<'_>, t: u32) {
-    if may_pass(sides, mesh, t) {
-        let (tet, around) = (mesh.tets[t as usize], mesh.neighbors[t as usize]);
-        let polygon = Polygon::of(tet, tet.map(|p| sides[p as usize]), around);
-        patches.add(t, &polygon.reversed());
+/// The sides of the corners of a tetrahedron; none of a free slot.
+fn sides_of(sides: &[u8], mesh: &MeshView<'_>, t: u32) -> Option<[u8; 4]> {
+    let tet = mesh.tets[t as usize];
+    (tet[0] != NONE).then(|| tet.map(|p| sides[p as usize]))
+}
+
+/// Whether a tetrahedron has a face in the plane and lies above it.
+fn is_above(sides: [u8; 4]) -> bool {
+    sides.contains(&side::OUTSIDE) && sides.iter().filter(|side| **side == side::TOUCHED).count() == 3
+}
+
+/// The piece in a tetrahedron whose corners have these sides. A face that lies in the plane belongs to the tetrahedron below
+/// it or, at the bottom of the domain, to the one above.
+#[inline]
+fn polygon(mesh: &MeshView<'_>, t: u32, sides: [u8; 4]) -> Polygon {
+    let tet = mesh.tets[t as usize];
+    let on = |side: u8| (0..4).fold(0, |bits, i| bits | usize::from(sides[i] == side) << i);
+    if sides.contains(&side::NOWHERE) {
+        return Polygon::default();
     }
+    let top = sides.iter().position(|side| *side == side::OUTSIDE);
+    let bottom = top.filter(|top| is_above(sides) && mesh.neighbors[t as usize][*top] == NONE);
+    let polygon = match bottom {
+        Some(top) => Polygon::of_face(FACES[top].map(|i| tet[i])),
+        None => Polygon::of(tet, on(side::INSIDE), on(side::TOUCHED)),
+    };
+    // Seen from above.
+    polygon.reversed()
 }

@@ -1,7 +1,7 @@
 // The demo page in a real browser, with WebGPU, on the demo's data. The pictures that it makes are kept in
 // `target/e2e/` to be looked at.
 import assert from "node:assert/strict";
-import { mkdir, writeFile } from "node:fs/promises";
+import { mkdir, readFile, writeFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
 import { fileURLToPath } from "node:url";
 import { address, launch } from "./browser.js";
@@ -48,10 +48,14 @@ async function setSlider(page, id, value) {
   return demo(page, "stats");
 }
 
-/** A picture of the canvas, kept under `name`; how many colours it has and a hash of it. */
+/** A picture of the canvas, kept under `name`, studied. */
 async function picture(page, name) {
   await settle(page);
-  const png = await page.locator("#canvas").screenshot({ path: fileURLToPath(new URL(`${name}.png`, pictures)) });
+  return study(page, await page.locator("#canvas").screenshot({ path: fileURLToPath(new URL(`${name}.png`, pictures)) }));
+}
+
+/** How many colours a picture has, how much of it is its most frequent one, how much is not background, and some pixels. */
+function study(page, png) {
   return page.evaluate(async (base64) => {
     const bytes = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
     const image = await createImageBitmap(new Blob([bytes], { type: "image/png" }));
@@ -61,7 +65,9 @@ async function picture(page, name) {
     const counts = new Map();
     for (const pixel of pixels) counts.set(pixel, (counts.get(pixel) ?? 0) + 1);
     const background = Math.max(...counts.values()) / pixels.length;
-    return { colours: counts.size, background, pixels: Array.from(pixels.filter((_, i) => i % 97 === 0)) };
+    // The background has one colour in each row.
+    const covered = pixels.filter((pixel, i) => pixel !== pixels[i - (i % image.width)]).length / pixels.length;
+    return { colours: counts.size, background, covered, pixels: Array.from(pixels.filter((_, i) => i % 97 === 0)) };
   }, png.toString("base64"));
 }
 
@@ -133,6 +139,44 @@ test("the page streams a volume, draws it, and its settings change mesh and pict
   assert.deepEqual(page.complaints, []);
   await page.close();
 });
+
+/** The block of a page in the repository that begins like this. */
+async function block(page, start) {
+  const text = await readFile(new URL(`../../${page}`, import.meta.url), "utf8");
+  return text.slice(text.indexOf(start) + start.indexOf("\n") + 1).split("```")[0];
+}
+
+/** A page that draws, around the example of the package's README. */
+const around = (code) => `<!doctype html>
+<canvas style="width: 100%; height: 90vh"></canvas>
+<script type="importmap">{ "imports": { "tetralod/viewer": "./pkg/viewer.js" } }</script>
+<script type="module">${code}</script>`;
+
+for (const [name, html] of [
+  ["README", await block("README.md", "```html\n<!doctype html>")],
+  ["package's README", around(await block("pkg-template/README.md", "```js\nimport { Viewer }"))],
+]) {
+  test(`the page of the ${name} draws the volume`, async () => {
+    const page = await browser.newPage({ viewport: { width: 500, height: 500 } });
+    const complaints = [];
+    page.on("pageerror", (error) => complaints.push(String(error)));
+    // The package and the volume are on the server; the page lies beside them.
+    await page.route("**/readme.html", (route) => route.fulfill({ contentType: "text/html", body: html }));
+    await page.route(/(bucky|combustor)\.mt$/, (route) => route.continue({ url: `${address()}data/bucky.mt` }));
+    await page.goto(`${address()}readme.html`);
+    // Until it shows the volume, and the same for a while.
+    let seen;
+    for (let [before, still] = [[], 0]; still < 3; before = seen.pixels) {
+      await page.waitForTimeout(500);
+      const path = fileURLToPath(new URL(`${name.replaceAll(/\W/g, "-")}.png`, pictures));
+      seen = await study(page, await page.locator("canvas").screenshot({ path }));
+      still = seen.covered > 0.1 && String(seen.pixels) === String(before) ? still + 1 : 0;
+    }
+    assertDrawn(seen);
+    assert.deepEqual(complaints, []);
+    await page.close();
+  });
+}
 
 test("the first picture is there before the file is", async () => {
   const page = await open("data/bucky.mt?throttle=100000");

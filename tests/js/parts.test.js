@@ -420,24 +420,62 @@ async function until(condition, what) {
   assert.fail(`waited in vain until ${what}`);
 }
 
-test("the example of the README does what its text says, from a server with ranges", async () => {
-  bytes = blocks["half-edge"];
-  const readme = await readFile(new URL("../../README.md", import.meta.url), "utf8");
-  const [, example] = /```js\n(import \{ MultiTessellation \}[^]*?)```/.exec(readme);
-  assert.ok(example.includes('"bucky.mt", import.meta.url'));
+/** The first block of JavaScript of a page that begins like this. */
+async function example(page, start) {
+  const blocks = (await readFile(new URL(`../../${page}`, import.meta.url), "utf8")).split("```js\n").slice(1);
+  const found = blocks.map((block) => block.split("```")[0]).find((block) => block.startsWith(start));
+  assert.ok(found, `${page} has an example that begins with ${start}`);
+  return found;
+}
+
+/** What a module prints, line by line and word by word, that imports the package as a project of its own does. */
+async function printed(code) {
   const project = await mkdtemp(join(tmpdir(), "tetralod-readme-"));
   try {
     await mkdir(join(project, "node_modules"));
     await symlink(fileURLToPath(new URL("../../pkg", import.meta.url)), join(project, "node_modules/tetralod"));
-    await writeFile(join(project, "example.mjs"), example.replace("import.meta.url", JSON.stringify(base)));
+    await writeFile(join(project, "example.mjs"), code.replace("import.meta.url", JSON.stringify(base)));
     const { stdout, stderr } = await promisify(execFile)("node", ["example.mjs"], { cwd: project });
     assert.equal(stderr, "");
-    const [early, sharp, surface] = stdout.trim().split("\n").map((line) => line.split(" "));
-    assert.ok(Number(early[0]) > 0 && ["true", "false"].includes(early[1]));
-    assert.ok(Number(sharp[0]) > 0 && Number(sharp[1]) <= 0.01 && sharp[2] === "true", "what is asked for is there without more ado");
-    assert.ok(Number(surface[0]) > 0 && surface[1] === "triangles");
-    assert.ok(sent < bytes.length, "not all of the file is fetched");
+    return stdout.trim().split("\n").map((line) => line.split(" "));
   } finally {
     await rm(project, { recursive: true });
   }
+}
+
+test("the example of the README does what its text says, from a server with ranges", async () => {
+  bytes = blocks["half-edge"];
+  const code = await example("README.md", "import { MultiTessellation }");
+  assert.ok(code.includes('"bucky.mt", import.meta.url'));
+  const [early, sharp, surface] = await printed(code);
+  assert.ok(Number(early[0]) > 0 && ["true", "false"].includes(early[1]));
+  assert.ok(Number(sharp[0]) > 0 && Number(sharp[1]) <= 0.01 && sharp[2] === "true", "what is asked for is there without more ado");
+  assert.ok(Number(surface[0]) > 0 && surface[1] === "triangles");
+  assert.ok(sent < bytes.length, "not all of the file is fetched");
+});
+
+test("the first example of the package's README does what its text says", async () => {
+  bytes = blocks["half-edge"];
+  const code = await example("pkg-template/README.md", "import { MultiTessellation }");
+  const lines = await printed(`${code}
+    console.log(coarse.stats.tetrahedra < sharp.stats.tetrahedra, sharp.stats.satisfied, surface.indices.length > 0);`);
+  assert.deepEqual(lines.pop(), ["true", "true", "true"]);
+  assert.ok(lines.length > 0 && lines.every(([received, , total]) => Number(received) <= bytes.length && Number(total) === bytes.length));
+});
+
+test("the example of the package's README for three.js takes what that library has", async () => {
+  bytes = blocks["half-edge"];
+  const code = await example("pkg-template/README.md", "// three.js");
+  const [[steps, done, most]] = await printed(`
+    import { MultiTessellation, applyChanges } from "tetralod";
+    const mt = await MultiTessellation.open(new URL("model.mt", import.meta.url));
+    const matrix4 = { elements: [2, 0, 0, 0, 0, 2, 0, 0, 0, 0, -1, -1, -1, -1, 2, 3], clone: () => matrix4, multiply: () => matrix4 };
+    const camera = { projectionMatrix: matrix4, matrixWorldInverse: matrix4 };
+    const [canvas, probe] = [{ width: 640, height: 480 }, { position: { x: 0.5, y: 0.5, z: 0.5 } }];
+    let steps = 0;
+    const upload = (mesh, changes) => (steps += mesh.tets.length > 0 && changes !== undefined);
+    ${code.replace("const mesh =", "let last;\n    const mesh =").replace("upload(", "last = step.stats;\n  upload(")}
+    console.log(steps, last.done, last.tetrahedra);
+    mt.free();`);
+  assert.ok(Number(steps) > 0 && done === "true" && Number(most) > 0);
 });

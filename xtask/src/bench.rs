@@ -6,7 +6,7 @@ use anyhow::{Context, Result, bail};
 use serde_json::Value;
 
 use crate::serve::Server;
-use crate::{bench_build, bench_format, browser, demo, fixture, package, shell};
+use crate::{bench_build, bench_format, browser, demo, package, shell};
 
 /// Measures `FILE.mt`, or the demo's volume; with `--browser` also in Chromium. With `--build`, the builders instead, with `--format` the files.
 pub fn run(args: &[String]) -> Result<()> {
@@ -37,7 +37,7 @@ pub fn run(args: &[String]) -> Result<()> {
 type Rates = Vec<(String, f64)>;
 
 fn native(file: &Path) -> Result<Rates> {
-    let tetralod = fixture::tetralod()?;
+    let tetralod = shell::released_command()?;
     rates(&shell::output(shell::command(tetralod, ["bench"]).arg(file).arg("--json"))?)
 }
 
@@ -49,7 +49,7 @@ fn browser(file: &Path) -> Result<Rates> {
     std::fs::create_dir_all(data)?;
     std::fs::copy(file, data.join("volume.mt")).with_context(|| file.display().to_string())?;
     let mounts = [("/pkg", package::PKG), ("/data", "target/bench")];
-    let server = Server::start("tests/js/bench", &mounts, 0)?;
+    let server = Server::start(&shell::released_command()?, "tests/js/bench", &mounts, 0)?;
     let mut command = shell::command("node", ["tests/js/bench/run.js"]);
     command.env("TETRALOD_PAGE", &server.address).env("CHROMIUM", browser.chromium);
     rates(&shell::output(&mut command)?)

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use serde_json::Value;
 
-use crate::{fixture, shell};
+use crate::shell;
 
 const FOLDER: &str = "target/bench";
 
@@ -22,7 +22,7 @@ const KINDS: [(&str, &[&str]); 4] = [
 
 /// Measures all; `large` adds a grid of 97³ points.
 pub fn run(large: bool) -> Result<()> {
-    let tetralod = fixture::tetralod()?;
+    let tetralod = shell::released_command()?;
     std::fs::create_dir_all(FOLDER)?;
     triangulation(&tetralod)?;
     insertion(&tetralod, if large { &[33, 65, 97] } else { &[33, 65] })?;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 
 use crate::serve::Server;
-use crate::{fixture, package, shell};
+use crate::{package, shell};
 
 /// Where the page looks for its volumes.
 const DATA: &str = "www/data";
@@ -44,31 +44,31 @@ pub fn run(args: &[String]) -> Result<()> {
         }
     }
     package::build(&[])?;
-    make_data()?;
-    if serve { serve_page(port) } else { Ok(()) }
+    let tetralod = shell::released_command()?;
+    make_data(&tetralod)?;
+    if serve { serve_page(&tetralod, port) } else { Ok(()) }
 }
 
 /// The largest of the demo's volumes, made if necessary: also what the benchmark measures.
 pub fn bench_volume() -> Result<PathBuf> {
-    make_data()?;
+    make_data(&shell::released_command()?)?;
     Ok(Path::new(DATA).join("bucky.mt"))
 }
 
-/// Makes the MT files that are missing or older than the program that builds them.
-pub fn make_data() -> Result<()> {
-    let tetralod = fixture::tetralod()?;
+/// Makes the MT files that are missing or older than the command that builds them.
+pub fn make_data(tetralod: &Path) -> Result<()> {
     fs::create_dir_all(DATA)?;
     for Volume { name, data, extension, size, kind } in VOLUMES {
         let mt = Path::new(DATA).join(format!("{name}.mt"));
-        if is_newer(&mt, &tetralod) {
+        if is_newer(&mt, tetralod) {
             continue;
         }
         println!("making {}", mt.display());
         let input = Path::new("target").join(format!("{name}.{extension}"));
-        shell::run(shell::command(&tetralod, ["generate", data, "--size", size, "-o"]).arg(&input))?;
+        shell::run(shell::command(tetralod, ["generate", data, "--size", size, "-o"]).arg(&input))?;
         // Built beside and moved, so that an interrupted build is not taken for a finished one.
         let part = Path::new("target").join(format!("{name}.mt"));
-        shell::run(shell::command(&tetralod, ["build", "--kind", kind]).arg(&input).arg("-o").arg(&part))?;
+        shell::run(shell::command(tetralod, ["build", "--kind", kind]).arg(&input).arg("-o").arg(&part))?;
         fs::rename(&part, &mt)?;
     }
     Ok(())
@@ -80,13 +80,13 @@ fn is_newer(file: &Path, than: &Path) -> bool {
 }
 
 /// Serves the page as a web site would: the package at `pkg/`, everything else from `www/`.
-pub fn start_server(port: u16) -> Result<Server> {
-    Server::start("www", &[("/pkg", package::PKG)], port)
+pub fn start_server(tetralod: &Path, port: u16) -> Result<Server> {
+    Server::start(tetralod, "www", &[("/pkg", package::PKG)], port)
 }
 
-fn serve_page(port: u16) -> Result<()> {
+fn serve_page(tetralod: &Path, port: u16) -> Result<()> {
     // Somebody else on the port is no reason to fail: any other will do.
-    let server = start_server(port).or_else(|_| start_server(0))?;
+    let server = start_server(tetralod, port).or_else(|_| start_server(tetralod, 0))?;
     println!("\nThe demo is at {}   (Ctrl-C ends it)", server.address);
     server.wait()
 }

@@ -2,7 +2,7 @@
 //! tests in Node and in the browser must get the same ones.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::{Context, Result};
 use serde_json::{Value, json};
@@ -31,18 +31,17 @@ const OTHERS: [(&str, &[&str]); 3] =
 
 /// Makes `small.mt` and `hashes.json`, a list of `{ options, hash }`; and the same for the other kinds of MT, with the
 /// kind in the names.
-pub fn make() -> Result<()> {
+pub fn make(tetralod: &Path) -> Result<()> {
     let folder = Path::new(FOLDER);
     fs::create_dir_all(folder)?;
-    let tetralod = tetralod()?;
     let (grid, mt) = (folder.join("small.vti"), folder.join("small.mt"));
-    shell::run(shell::command(&tetralod, ["generate", "bucky", "--size", "17", "-o"]).arg(&grid))?;
-    make_one(&tetralod, &grid, &mt, &folder.join("hashes.json"), &[])?;
+    shell::run(shell::command(tetralod, ["generate", "bucky", "--size", "17", "-o"]).arg(&grid))?;
+    make_one(tetralod, &grid, &mt, &folder.join("hashes.json"), &[])?;
     for (kind, arguments) in OTHERS {
         let [mt, hashes] = [format!("small-{kind}.mt"), format!("hashes-{kind}.json")];
-        make_one(&tetralod, &grid, &folder.join(mt), &folder.join(hashes), arguments)?;
+        make_one(tetralod, &grid, &folder.join(mt), &folder.join(hashes), arguments)?;
     }
-    make_blocks(&tetralod, folder)
+    make_blocks(tetralod, folder)
 }
 
 /// Makes `blocks-edge.mt` and `blocks-half-edge.mt`, files of hundreds of blocks, and `fields.mt`, one of two fields.
@@ -67,12 +66,6 @@ fn make_one(tetralod: &Path, grid: &Path, mt: &Path, hashes: &Path, arguments: &
         requests().into_iter().map(|options| expectation(tetralod, mt, options)).collect();
     fs::write(hashes, serde_json::to_string_pretty(&expected?)?)?;
     Ok(())
-}
-
-/// The native command, optimised, built if necessary.
-pub fn tetralod() -> Result<PathBuf> {
-    shell::run(&mut shell::cargo(["build", "--release", "--package", "tetralod-cli"]))?;
-    Ok(shell::root().join("target/release").join(format!("tetralod{}", std::env::consts::EXE_SUFFIX)))
 }
 
 fn expectation(tetralod: &Path, mt: &Path, options: Value) -> Result<Value> {

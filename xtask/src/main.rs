@@ -10,6 +10,7 @@ mod demo;
 mod fixture;
 mod package;
 mod paper;
+mod random;
 mod serve;
 mod shell;
 mod suite;
@@ -24,6 +25,9 @@ usage: cargo xtask COMMAND
   build                          build the npm package into pkg/
   demo [--port N] [--no-serve]   build everything, make the demo's data, serve the page on localhost
   test [STEP...]                 every check, or the named steps; `test --list` names them
+  test --quick                   formatting, lints of the native code, and native tests without the long ones: no
+                                 other feature sets, no documentation, nothing of JavaScript, wasm and browsers
+  random [MINUTES]               the tests with random inputs for 30 minutes, each time with another TETRALOD_SEED
   bench [FILE.mt] [--browser]    measure decoding, refinement and isosurfaces; natively, or also in the browser
   bench --build [--large]        measure triangulation, insertion and the kinds of MT side by side
   bench --format                 measure MT files and what requests need of them; writes docs/benchmarks.md
@@ -54,6 +58,7 @@ fn run() -> Result<()> {
         "test" => suite::run(rest),
         "bench" => bench::run(rest),
         "paper" => paper::run(rest),
+        "random" => random::run(rest),
         other => bail!("there is no command `{other}`\n{USAGE}"),
     }
 }

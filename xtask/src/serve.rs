@@ -1,11 +1,12 @@
 //! The server of pages on localhost: `tetralod serve`, in a process of its own.
 
 use std::io::{BufRead, BufReader};
+use std::path::Path;
 use std::process::{Child, Stdio};
 
 use anyhow::{Context, Result, ensure};
 
-use crate::{fixture, shell};
+use crate::shell;
 
 /// A server that ends when this is dropped.
 pub struct Server {
@@ -15,9 +16,9 @@ pub struct Server {
 }
 
 impl Server {
-    /// Serves `folder`, and other folders below the addresses of `mounts`; port 0 takes any free one.
-    pub fn start(folder: &str, mounts: &[(&str, &str)], port: u16) -> Result<Self> {
-        let mut command = shell::command(fixture::tetralod()?, ["serve", folder, "--port"]);
+    /// Serves `folder`, and other folders below the addresses of `mounts`, with this command; port 0 takes any free one.
+    pub fn start(tetralod: &Path, folder: &str, mounts: &[(&str, &str)], port: u16) -> Result<Self> {
+        let mut command = shell::command(tetralod, ["serve", folder, "--port"]);
         command.arg(port.to_string());
         command.args(mounts.iter().flat_map(|(at, folder)| ["--mount".to_owned(), format!("{at}={folder}")]));
         let mut child = command.stdout(Stdio::piped()).spawn().context("cannot start `tetralod serve`")?;

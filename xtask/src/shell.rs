@@ -68,6 +68,26 @@ pub fn find(program: &str) -> Option<PathBuf> {
     std::env::split_paths(&path).map(|folder| folder.join(program)).find(|file| file.is_file())
 }
 
+/// Everything native but this program, whose dependencies it was compiled with already, with every feature.
+pub const ALL: [&str; 5] =
+    ["--workspace", "--exclude", "xtask", "--features", "tetralod/vulkan,tetralod/web,paper/pictures"];
+
+/// The native command as it was compiled for the tests, optimised and with every assertion.
+pub fn tested_command() -> Result<PathBuf> {
+    run(cargo(["build", "--bin", "tetralod"]).args(ALL))?;
+    Ok(built_in("debug"))
+}
+
+/// The native command as users get it.
+pub fn released_command() -> Result<PathBuf> {
+    run(&mut cargo(["build", "--release", "--package", "tetralod-cli"]))?;
+    Ok(built_in("release"))
+}
+
+fn built_in(profile: &str) -> PathBuf {
+    root().join("target").join(profile).join(format!("tetralod{}", std::env::consts::EXE_SUFFIX))
+}
+
 /// Adds the wasm target to the pinned toolchain where it is missing.
 pub fn add_wasm_target() -> Result<()> {
     let sysroot = output(&mut command("rustc", ["--print", "sysroot"]))?;

@@ -1,5 +1,8 @@
 //! `cargo xtask test`: every check there is, in order of cost. Each step prints a header and its time; the first that
 //! fails ends the run, and none is left out because something is missing on the machine.
+//!
+//! A feature set of its own compiles the crate and what it needs again. So lints, documentation, tests and the command that
+//! makes the tests' data share one ([`shell::ALL`]); further ones are only linted, and only where a mistake would not show in it.
 
 use std::path::Path;
 use std::process::Command;
@@ -15,9 +18,10 @@ struct Step {
     run: fn() -> Result<()>,
 }
 
-const STEPS: [Step; 9] = [
+const STEPS: [Step; 10] = [
     Step { name: "fmt", what: "formatting", run: fmt },
-    Step { name: "clippy", what: "lints, native and for the browser", run: clippy },
+    Step { name: "clippy", what: "lints of everything native", run: clippy },
+    Step { name: "features", what: "lints of the feature sets that are shipped", run: features },
     Step { name: "doc", what: "documentation without broken links", run: doc },
     Step { name: "native", what: "unit, integration and documentation tests", run: native },
     Step { name: "package", what: "the npm package and its size", run: npm_package },
@@ -27,20 +31,35 @@ const STEPS: [Step; 9] = [
     Step { name: "e2e", what: "the demo page in headless Chromium", run: e2e },
 ];
 
-/// Runs the steps named in `args`, or all.
+/// What `--quick` runs.
+const QUICK: [Step; 3] = [
+    Step { name: "fmt", what: "formatting", run: fmt },
+    Step { name: "clippy", what: "lints of everything native", run: clippy },
+    Step {
+        name: "quick",
+        what: "unit tests, and integration tests that take no more than seconds",
+        run: quick,
+    },
+];
+
+/// Runs the steps named in `args`, or all, or with `--quick` those few that find most mistakes.
 pub fn run(args: &[String]) -> Result<()> {
-    if args.iter().any(|arg| arg == "--list") {
-        for step in &STEPS {
-            println!("{:<10} {}", step.name, step.what);
-        }
+    if args == ["--list"] {
+        STEPS.iter().for_each(|step| println!("{:<10} {}", step.name, step.what));
         return Ok(());
+    }
+    if args == ["--quick"] {
+        return run_all(QUICK.iter());
     }
     if let Some(unknown) = args.iter().find(|name| STEPS.iter().all(|step| step.name != name.as_str())) {
         anyhow::bail!("there is no step `{unknown}`; `cargo xtask test --list` names them");
     }
-    let chosen = STEPS.iter().filter(|step| args.is_empty() || args.iter().any(|name| name == step.name));
+    run_all(STEPS.iter().filter(|step| args.is_empty() || args.iter().any(|name| name == step.name)))
+}
+
+fn run_all<'a>(steps: impl Iterator<Item = &'a Step>) -> Result<()> {
     let mut times = Vec::new();
-    for step in chosen {
+    for step in steps {
         println!("\n=== {}: {}", step.name, step.what);
         let start = Instant::now();
         (step.run)().with_context(|| format!("step `{}` failed", step.name))?;
@@ -63,25 +82,21 @@ fn fmt() -> Result<()> {
     shell::run(&mut shell::cargo(["fmt", "--all", "--", "--check"]))
 }
 
-/// The feature sets that are shipped, and the core alone, which must not need any of them.
-const LIBRARIES: [&str; 5] = ["", "build", "gpu", "http", "build,http,gpu"];
-
-/// What goes into the package.
-const WEB_LIBRARIES: [&str; 2] = ["web", "web,gpu"];
-
 fn clippy() -> Result<()> {
-    shell::run(&mut shell::cargo(["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]))?;
-    let pictures = ["clippy", "--package", "paper", "--features", "pictures", "--", "-D", "warnings"];
-    shell::run(&mut shell::cargo(pictures))?;
-    for features in LIBRARIES {
-        lint_library(features, &[])?;
-    }
+    let mut command = shell::cargo(["clippy", "--all-targets"]);
+    shell::run(command.args(shell::ALL).args(["--", "-D", "warnings"]))?;
+    shell::run(&mut shell::cargo(["clippy", "--package", "xtask", "--all-targets", "--", "-D", "warnings"]))
+}
+
+/// The core alone, which must not need any feature; with the builders, as `paper` has it; and what goes into the package,
+/// the second with its tests in the browser.
+fn features() -> Result<()> {
+    lint_library("", &[])?;
+    lint_library("build", &[])?;
     shell::add_wasm_target()?;
-    for features in WEB_LIBRARIES {
-        lint_library(features, &["--target", shell::WASM])?;
-    }
+    lint_library("web", &["--target", shell::WASM])?;
     with_fixture(|| {
-        let args = ["clippy", "--package", "tetralod", "--test", "web*", "--target", shell::WASM];
+        let args = ["clippy", "--package", "tetralod", "--lib", "--test", "web", "--target", shell::WASM];
         shell::run(fixture_env(shell::cargo(args).args(WEB_FEATURES).args(["--", "-D", "warnings"])))
     })
 }
@@ -92,27 +107,30 @@ fn lint_library(features: &str, target: &[&str]) -> Result<()> {
 }
 
 fn doc() -> Result<()> {
-    let mut command =
-        shell::cargo(["doc", "--package", "tetralod", "--lib", "--no-deps", "--features", "http,gpu,web"]);
-    shell::run(command.env("RUSTDOCFLAGS", "-D warnings"))
+    let mut command = shell::cargo(["doc", "--lib", "--no-deps"]);
+    shell::run(command.args(shell::ALL).env("RUSTDOCFLAGS", "-D warnings"))
 }
 
+/// All that needs no browser. Where there is no Vulkan adapter, not even Mesa's lavapipe in software (package
+/// `mesa-vulkan-drivers`), the tests that compare the renderer with its twin on the CPU say that they were skipped: their output
+/// is shown.
 fn native() -> Result<()> {
-    shell::run(&mut shell::cargo(["test", "--workspace"]))?;
-    // The renderer against its twin on the CPU. Its output is shown: where there is no Vulkan adapter, not even Mesa's
-    // lavapipe in software (package `mesa-vulkan-drivers`), the tests say that they were skipped.
-    let args = [
-        "test",
-        "--package",
-        "tetralod",
-        "--features",
-        "vulkan",
-        "--test",
-        "shaders",
-        "--test",
-        "gpu_matches_cpu",
-    ];
-    shell::run(shell::cargo(args).args(["--", "--nocapture"]))
+    shell::run(shell::cargo(["test"]).args(shell::ALL).args(["--", "--skip", "gpu_matches_cpu"]))?;
+    shell::run(shell::cargo(["test", "--test", "view"]).args(shell::ALL).args([
+        "gpu_",
+        "--",
+        "--nocapture",
+    ]))?;
+    shell::run(&mut shell::cargo(["test", "--package", "xtask"]))
+}
+
+/// Tests of more than about ten seconds, by the names of their modules: `--quick` leaves them out.
+const LONG: [&str; 0] = [];
+
+fn quick() -> Result<()> {
+    let mut command = shell::cargo(["test", "--lib", "--bins", "--tests"]);
+    command.args(shell::ALL).arg("--");
+    shell::run(command.args(LONG.iter().flat_map(|name| ["--skip", name])))
 }
 
 fn npm_package() -> Result<()> {
@@ -125,13 +143,13 @@ fn wasm() -> Result<()> {
     let browser = browser::require()?;
     shell::add_wasm_target()?;
     with_fixture(|| {
-        let mut command = browser::wasm_tests(&browser, &["--package", "tetralod", "--test", "web*"])?;
+        let mut command = browser::wasm_tests(&browser, &["--package", "tetralod", "--test", "web"])?;
         shell::run(fixture_env(command.args(WEB_FEATURES)))
     })
 }
 
 fn with_fixture(then: impl FnOnce() -> Result<()>) -> Result<()> {
-    fixture::make().context("making the small MT that the tests use")?;
+    fixture::make(&shell::tested_command()?).context("making the small MT that the tests use")?;
     then()
 }
 
@@ -195,8 +213,9 @@ fn consumer() -> Result<()> {
 fn e2e() -> Result<()> {
     let browser = browser::require()?;
     with_package()?;
-    demo::make_data()?;
-    let server = demo::start_server(0)?;
+    let tetralod = shell::tested_command()?;
+    demo::make_data(&tetralod)?;
+    let server = demo::start_server(&tetralod, 0)?;
     shell::run(node_test("ranges-browser.test.js").env("CHROMIUM", &browser.chromium))?;
     with_fixture(|| {
         let mut command = node_test("parts-browser.test.js");

@@ -1,19 +1,63 @@
-//! Promise: the commands in README.md work as they stand there, in that order, and answer with the lines shown there.
+//! Promise: the commands in README.md and in the pages of `docs/` work as they stand there, in that order, and answer
+//! with the lines shown there; the manual names every option; links lead somewhere.
 //!
 //! Values are not compared: they change with the builder, and times with the machine. What is shown is brought up to
 //! date by `TETRALOD_UPDATE_README=1 cargo test --release --package tetralod-cli readme`.
 
-use crate::support::{self, text};
+use std::collections::BTreeSet;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
 
 const START: &str = "```console";
 const PROMPT: &str = "$ tetralod ";
 
-/// `readme` with what `run` answers to the commands in its blocks of kind `console` in place of what is shown.
-fn answered(readme: &str, mut run: impl FnMut(&str) -> String) -> String {
+/// The pages with commands. Each is run in a folder of its own.
+const PAGES: [&str; 3] = ["README.md", "docs/command.md", "docs/input.md"];
+/// The pages that are the manual of the command.
+const MANUAL: [&str; 4] = ["docs/command.md", "docs/hosting.md", "docs/input.md", "docs/promises.md"];
+/// The pages whose links are followed.
+const LINKED: [&str; 10] = [
+    "ARCHITECTURE.md",
+    "CHANGELOG.md",
+    "CONTRIBUTING.md",
+    "README.md",
+    "docs/benchmarks.md",
+    "docs/command.md",
+    "docs/format.md",
+    "docs/hosting.md",
+    "docs/input.md",
+    "docs/promises.md",
+];
+const COMMANDS: [&str; 14] = [
+    "generate",
+    "build",
+    "convert",
+    "info",
+    "extract",
+    "isosurface",
+    "slice",
+    "surface",
+    "probe",
+    "streamlines",
+    "stats",
+    "verify",
+    "bench",
+    "serve",
+];
+
+fn root() -> &'static Path {
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
+}
+
+fn text(page: &str) -> String {
+    fs::read_to_string(root().join(page)).unwrap_or_else(|error| panic!("{page}: {error}"))
+}
+
+/// `page` with what `run` answers to the commands in its blocks of kind `console` in place of what is shown.
+fn answered(page: &str, mut run: impl FnMut(&str) -> String) -> String {
     let (mut fresh, mut inside) = (String::new(), false);
-    for line in readme.lines() {
+    for line in page.lines() {
         if line.starts_with("```") {
             inside = line == START;
         }
@@ -26,11 +70,11 @@ fn answered(readme: &str, mut run: impl FnMut(&str) -> String) -> String {
     fresh
 }
 
-/// `readme` with only the first column of the answers shown in it.
-fn without_values(readme: &str) -> String {
+/// `page` with only the first column of the answers shown in it.
+fn without_values(page: &str) -> String {
     let mut answer = false;
     let mut names = String::new();
-    for line in readme.lines() {
+    for line in page.lines() {
         answer = line.starts_with(PROMPT) || answer && !line.starts_with("```");
         match line.split_once("  ") {
             // The rest of the row before.
@@ -42,32 +86,154 @@ fn without_values(readme: &str) -> String {
     names
 }
 
+/// The arguments of a command line, which may be in single quotes.
+fn arguments(command: &str) -> Vec<&str> {
+    let quoted = command.split('\'').enumerate();
+    let parts =
+        quoted.map(|(i, part)| if i % 2 == 0 { part.split_whitespace().collect() } else { vec![part] });
+    parts.flatten().collect()
+}
+
+fn tetralod(command: &str, folder: &Path) -> Output {
+    let mut program = Command::new(env!("CARGO_BIN_EXE_tetralod"));
+    program.args(arguments(command)).current_dir(folder).output().expect("the command starts")
+}
+
 fn run(command: &str, folder: &Path) -> String {
-    let mut program = support::command(&command.split(' ').collect::<Vec<_>>());
-    let output = program.current_dir(folder).output().expect("the command starts");
-    assert!(output.status.success(), "{command}: {}", text(&output.stderr));
-    text(&output.stdout).to_owned()
+    let output = tetralod(command, folder);
+    assert!(output.status.success(), "{command}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).expect("UTF-8")
+}
+
+/// Writes the files that `page` shows, in blocks such as "```json camera.json".
+fn write_files(page: &str, folder: &Path) {
+    for block in page.split("\n```json ").skip(1) {
+        let (name, rest) = block.split_once('\n').expect("a block has lines");
+        let (content, _) = rest.split_once("\n```").expect("a block ends");
+        fs::write(folder.join(name), content).expect("a file in the temporary folder");
+    }
+}
+
+fn check_page(page: &str) {
+    let shown = text(page);
+    let name = page.replace('/', "-");
+    let folder = std::env::temp_dir().join(format!("tetralod-{name}-{}", std::process::id()));
+    fs::create_dir_all(&folder).expect("a temporary folder");
+    write_files(&shown, &folder);
+    let update = std::env::var_os("TETRALOD_UPDATE_README").is_some();
+    // Smaller data will do for the names.
+    let size = if update { "--size 33" } else { "--size 9" };
+    let fresh = answered(&shown, |command| run(&command.replace("--size 33", size), &folder));
+    fs::remove_dir_all(&folder).expect("the folder goes");
+    if update {
+        fs::write(root().join(page), fresh).expect("the page can be written");
+    } else {
+        assert_eq!(without_values(&shown), without_values(&fresh), "{page}");
+    }
 }
 
 #[test]
 fn every_command_works_and_answers_as_shown() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../README.md");
-    let readme = fs::read_to_string(&path).expect("README.md");
-    for command in ["generate", "build", "convert", "info", "extract", "verify", "bench"] {
+    let shown: String = PAGES.map(text).concat();
+    for command in COMMANDS.into_iter().filter(|command| *command != "serve") {
         let example = format!("\n{PROMPT}{command} ");
-        assert!(readme.contains(&example), "README.md shows no `tetralod {command}`");
+        assert!(shown.contains(&example), "no page shows `tetralod {command}`");
     }
-    let folder = std::env::temp_dir().join(format!("tetralod-readme-{}", std::process::id()));
-    fs::create_dir_all(&folder).expect("a temporary folder");
-    let update = std::env::var_os("TETRALOD_UPDATE_README").is_some();
-    // Smaller data will do for the names.
-    let size = if update { "--size 33" } else { "--size 9" };
-    let fresh = answered(&readme, |command| run(&command.replace("--size 33", size), &folder));
-    fs::remove_dir_all(&folder).expect("the folder goes");
-    if update {
-        fs::write(&path, fresh).expect("README.md can be written");
-    } else {
-        assert_eq!(without_values(&readme), without_values(&fresh));
+    PAGES.iter().for_each(|page| check_page(page));
+}
+
+/// What looks like a long option in `text`.
+fn options(text: &str) -> BTreeSet<String> {
+    let mut found = BTreeSet::new();
+    for (at, _) in text.match_indices("--") {
+        let starts = text[..at].ends_with([' ', '`', '\n', '(', '\'']);
+        let name: String =
+            text[at + 2..].chars().take_while(|c| c.is_ascii_lowercase() || *c == '-').collect();
+        if starts && !name.is_empty() && !name.starts_with('-') {
+            found.insert(name);
+        }
+    }
+    found
+}
+
+#[test]
+fn the_manual_names_every_option_and_no_other() {
+    let mut known = BTreeSet::new();
+    for command in COMMANDS {
+        let help = run(&format!("{command} --help"), root());
+        let lines = help.lines().map(str::trim).filter(|line| line.starts_with('-'));
+        let heads = lines.map(|line| line.split("  ").next().unwrap_or_default());
+        known.extend(heads.flat_map(|head| options(&format!(" {head}"))));
+    }
+    let mut named: BTreeSet<String> = MANUAL.iter().flat_map(|page| options(&text(page))).collect();
+    // Every command writes its result to `-o`.
+    named.insert("output".to_owned());
+    assert_eq!(named, known);
+}
+
+/// The anchors of a page: its headings as GitHub names them.
+fn anchors(page: &str) -> BTreeSet<String> {
+    let headings =
+        page.lines().filter(|line| line.starts_with('#')).map(|line| line.trim_start_matches('#').trim());
+    let kept = |c: &char| c.is_alphanumeric() || [' ', '-', '_'].contains(c);
+    headings
+        .map(|heading| heading.to_lowercase().chars().filter(kept).collect::<String>().replace(' ', "-"))
+        .collect()
+}
+
+/// The targets of the links and pictures of a page, but those on the web.
+fn links(page: &str) -> Vec<&str> {
+    let targets = page.split("](").skip(1).filter_map(|rest| rest.split_once(')'));
+    targets.map(|(target, _)| target).filter(|target| !target.contains("://")).collect()
+}
+
+#[test]
+fn links_lead_somewhere() {
+    for page in LINKED {
+        let content = text(page);
+        for link in links(&content) {
+            let (file, anchor) =
+                link.split_once('#').map_or((link, None), |(file, anchor)| (file, Some(anchor)));
+            let folder = root().join(page).parent().expect("a page is in a folder").to_owned();
+            let path: PathBuf = if file.is_empty() { root().join(page) } else { folder.join(file) };
+            assert!(path.exists(), "{page} links to {link}");
+            let there =
+                anchor.is_none_or(|anchor| anchors(&fs::read_to_string(&path).unwrap()).contains(anchor));
+            assert!(there, "{page} links to {link}: there is no such heading");
+        }
+    }
+}
+
+#[test]
+fn what_the_readme_links_to_is_in_the_package() {
+    let listed = Command::new(env!("CARGO"))
+        .args(["package", "--list", "--allow-dirty", "--offline", "--package", "tetralod"])
+        .current_dir(root())
+        .output()
+        .expect("cargo starts");
+    assert!(listed.status.success(), "{}", String::from_utf8_lossy(&listed.stderr));
+    let listed = String::from_utf8(listed.stdout).expect("UTF-8");
+    for link in links(&text("README.md")) {
+        assert!(listed.lines().any(|file| file == link), "{link} is excluded in Cargo.toml");
+    }
+}
+
+/// The cells of the row of docs/benchmarks.md that begins with `start`.
+fn benchmark(benchmarks: &str, start: &str) -> Vec<String> {
+    let row = benchmarks.lines().find(|line| line.starts_with(&format!("| {start} |"))).expect(start);
+    row.trim_matches('|').split('|').map(|cell| cell.trim().to_owned()).collect()
+}
+
+#[test]
+fn the_numbers_of_the_readme_are_measured() {
+    let (readme, benchmarks) = (text("README.md"), text("docs/benchmarks.md"));
+    let surface = benchmark(&benchmarks, "bucky 97³, generated, half-edge");
+    let kilobytes: f64 = surface[1].parse().expect("kilobytes");
+    let part = benchmark(&benchmarks, "bucky 97³, generated, half-edge | middle, 1 %");
+    for number in
+        [format!("{:.1} MB", kilobytes / 1000.0), format!("{} %", surface[6]), format!("{} %", part[2])]
+    {
+        assert!(readme.contains(&format!("**{number}**")), "README.md does not say {number}");
     }
 }
 
@@ -81,4 +247,8 @@ fn only_answers_are_replaced() {
     assert_eq!(fresh, expected);
     let block = "a  b\n```console\n$ tetralod yes\nold  1\n    2\n```\nc  d\n";
     assert_eq!(without_values(block), "a  b\n```console\n$ tetralod yes\nold\n```\nc  d\n");
+    assert_eq!(
+        arguments("build a.vti --need 'box=1; error=0' -o b"),
+        ["build", "a.vti", "--need", "box=1; error=0", "-o", "b"]
+    );
 }

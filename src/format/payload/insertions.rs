@@ -22,6 +22,7 @@ use crate::geom::views_of_origin;
 use crate::mesh::FACES;
 use crate::mesh::NONE;
 use crate::mt::Applied;
+use crate::mt::ApplyUpdates;
 use crate::mt::BaseMesh;
 use crate::mt::BaseMeshError;
 use crate::mt::CurrentMesh;
@@ -860,7 +861,7 @@ pub(super) mod tests {
     use crate::mt::ExplicitMt;
     use crate::mt::ExplicitUpdate;
     use crate::mt::FieldInfo;
-    use crate::mt::MtKind;
+    use crate::mt::{MtKind, UpdatePages};
 
     /// A cube of 6 bits with two fields.
     fn info() -> MtInfo {
@@ -1007,7 +1008,7 @@ pub(super) mod tests {
             let mut source = Source::new(Reader::new(block, 0), &coded.models)?;
             let known = mt.updates();
             read(&mut source, &mut mt, 10, &mut state, &Limits::default())?;
-            mt.announce(&mut mesh, known);
+            mt.updates_arrived(&mut mesh, known);
             let mut other = mt.start()?;
             for u in (0..mt.updates()).map(UpdateId) {
                 let parents: Vec<UpdateId> = mt.parents(u).collect();
@@ -1055,7 +1056,7 @@ pub(super) mod tests {
             let mut source = Source::new(Reader::new(block, 0), &coded.models)?;
             read(&mut source, &mut mt, 1, &mut state, &Limits::default())?;
             mesh.clear_touched();
-            mt.announce(&mut mesh, u);
+            mt.updates_arrived(&mut mesh, u);
             let is_news = |&t: &u32| mt.remover(&mesh, t) == Some(UpdateId(u));
             let news = (0..mesh.tet_slots() as u32).filter(|t| mesh.tet(*t).is_some()).filter(is_news);
             assert!(news.into_iter().all(|t| mesh.touched().contains(&t)));

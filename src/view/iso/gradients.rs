@@ -4,12 +4,11 @@
 //! depends on the mesh alone to the last bit.
 
 use super::NO_NORMAL;
-use super::crossings::Crossing;
-use super::cut;
-use super::cut::WANTED;
-use super::known::Known;
 use crate::mesh::NONE;
 use crate::view::MeshView;
+use crate::view::marching::{Crossing, select};
+use crate::view::mesh_snapshot::MeshSnapshot;
+use glam::DVec3;
 
 /// Gradients of some of the points.
 #[derive(Clone, Debug, Default)]
@@ -63,17 +62,17 @@ impl Gradients {
     #[inline]
     pub fn normal(&self, crossing: &Crossing, t: f64) -> [f32; 3] {
         let [g, h] = crossing.ends.map(|end| self.means[self.slots[end as usize] as usize]);
-        unit([0, 1, 2].map(|i| -(g[i] + t * (h[i] - g[i])))).unwrap_or(NO_NORMAL)
+        unit(DVec3::from([0, 1, 2].map(|i| -(g[i] + t * (h[i] - g[i]))))).unwrap_or(NO_NORMAL)
     }
 
-    /// Makes the gradients at `points` known, as far as they are not. With what is `known` of the mesh, few points
-    /// cost no pass over it. `sides` is scratch space.
+    /// Makes the gradients at `points` known, as far as they are not. With a `snapshot` of the mesh, few points
+    /// cost no pass over it. `wanted` is scratch space.
     pub fn sum(
         &mut self,
         mesh: &MeshView<'_>,
         points: impl Iterator<Item = u32>,
-        known: Option<&mut Known>,
-        sides: &mut Vec<u8>,
+        snapshot: Option<&mut MeshSnapshot>,
+        wanted: &mut Vec<u8>,
     ) {
         let start = self.points.len();
         for point in points {
@@ -89,24 +88,24 @@ impl Gradients {
             return;
         }
         let mut found = Vec::new();
-        match known {
-            Some(known) if new < mesh.tets.len() / FEW => {
+        match snapshot {
+            Some(snapshot) if new < mesh.tets.len() / FEW => {
                 let mut lost = Vec::new();
                 for slot in start..self.points.len() {
                     let point = self.points[slot];
-                    if known.star(mesh, point, &mut found) {
+                    if snapshot.star(mesh, point, &mut found) {
                         self.means[slot] = sum_of(mesh, &mut found);
                     } else {
                         lost.push(point);
                     }
                 }
                 if !lost.is_empty() {
-                    self.pass(mesh, &lost, sides, &mut found);
+                    self.pass(mesh, &lost, wanted, &mut found);
                 }
             }
             _ => {
                 let points = std::mem::take(&mut self.points);
-                self.pass(mesh, &points[start..], sides, &mut found);
+                self.pass(mesh, &points[start..], wanted, &mut found);
                 self.points = points;
             }
         }
@@ -121,16 +120,16 @@ impl Gradients {
     }
 
     /// Sums the gradients at `points` in one pass over the mesh.
-    fn pass(&mut self, mesh: &MeshView<'_>, points: &[u32], sides: &mut Vec<u8>, found: &mut Vec<u32>) {
-        sides.clear();
-        sides.resize(mesh.positions.len(), 0);
-        points.iter().for_each(|point| sides[*point as usize] = WANTED);
+    fn pass(&mut self, mesh: &MeshView<'_>, points: &[u32], wanted: &mut Vec<u8>, found: &mut Vec<u32>) {
+        wanted.clear();
+        wanted.resize(mesh.positions.len(), 0);
+        points.iter().for_each(|point| wanted[*point as usize] = 1);
         found.clear();
-        cut::find_wanted(mesh.tets, sides, found);
+        select(mesh.tets, 0, found, |tet| tet.iter().fold(0, |all, p| all | wanted[*p as usize]) != 0);
         for t in found {
             let term = weighted(mesh, *t);
             for point in mesh.tets[*t as usize] {
-                if sides[point as usize] != 0 {
+                if wanted[point as usize] != 0 {
                     let sum = &mut self.means[self.slots[point as usize] as usize];
                     *sum = add(*sum, term);
                 }
@@ -158,45 +157,30 @@ fn add(a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
 /// Six times volume · gradient, and six times the volume, of one tetrahedron.
 fn weighted(mesh: &MeshView<'_>, t: u32) -> [f64; 4] {
     let tet = mesh.tets[t as usize];
-    let [a, b, c, d] = tet.map(|p| mesh.positions[p as usize].map(f64::from));
+    let [a, b, c, d] = tet.map(|p| DVec3::from(mesh.positions[p as usize].map(f64::from)));
     let [fa, fb, fc, fd] = tet.map(|p| f64::from(mesh.field[p as usize]));
-    let (u, v, w) = (sub(b, a), sub(c, a), sub(d, a));
+    let (u, v, w) = (b - a, c - a, d - a);
     let (p, q, r) = (fb - fa, fc - fa, fd - fa);
     // p v x w + q w x u + r u x v, with two products instead of three.
-    let uv = cross(u, v);
-    let rest = cross([0, 1, 2].map(|i| p * v[i] - q * u[i]), w);
-    let g = |i: usize| rest[i] + r * uv[i];
-    [g(0), g(1), g(2), dot(w, uv)]
-}
-
-pub(super) fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    let uv = u.cross(v);
+    let rest = (p * v - q * u).cross(w);
+    (rest + r * uv).extend(w.dot(uv)).to_array()
 }
 
 /// `v` at length 1; `None` if it has no direction.
 #[inline]
-pub(super) fn unit(v: [f64; 3]) -> Option<[f32; 3]> {
-    let square = dot(v, v);
+pub(super) fn unit(v: DVec3) -> Option<[f32; 3]> {
+    let square = v.length_squared();
     if square > 1e-200 && square < 1e200 {
-        let scale = 1.0 / square.sqrt();
-        return Some(v.map(|x| (x * scale) as f32));
+        return Some((v * (1.0 / square.sqrt())).as_vec3().to_array());
     }
     unit_of_extreme(v)
 }
 
 /// The same for a vector whose square may leave the range of `f64`: it is divided by its largest component first.
 #[cold]
-fn unit_of_extreme(v: [f64; 3]) -> Option<[f32; 3]> {
-    let largest = v.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-    let v = v.map(|x| x / largest);
-    let length = dot(v, v).sqrt();
-    (length.is_finite() && length > 0.0).then(|| v.map(|x| (x / length) as f32))
+fn unit_of_extreme(v: DVec3) -> Option<[f32; 3]> {
+    let v = v / v.to_array().iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+    let length = v.length();
+    (length.is_finite() && length > 0.0).then(|| (v / length).as_vec3().to_array())
 }

@@ -17,25 +17,17 @@
 //! [`IsoSurface::extract_all`] makes of the same mesh: the same triangles with the same positions and normals, to the
 //! last bit. Only their order, and that of the vertices, depends on the updates before.
 
-mod changes;
-mod crossings;
-mod cut;
+mod block_ranges;
 mod gradients;
-mod known;
-mod links;
 mod update;
 
-use crate::mesh::NONE;
-use crate::view::MeshView;
-use crate::view::SurfaceChanges;
-use changes::Marks;
-use crossings::Crossings;
-use gradients::Gradients;
-use gradients::cross;
-use gradients::sub;
-use gradients::unit;
-use known::Known;
-use links::Links;
+use super::marching::{Crossing, Pieces, Polygon, select};
+use super::mesh_snapshot::MeshSnapshot;
+use super::{MeshView, SurfaceChanges};
+use crate::mesh::BLOCK;
+use block_ranges::BlockRanges;
+use glam::DVec3;
+use gradients::{Gradients, unit};
 
 /// What the normals of a surface are made of.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -66,24 +58,24 @@ pub struct IsoSurface {
     pub values: Vec<f32>,
     /// Triangles, counter-clockwise when seen from lower values.
     pub indices: Vec<[u32; 3]>,
-    /// Per triangle twice the number of its tetrahedron, and 1 more if it is the second one there at its isovalue.
-    owners: Vec<u32>,
     kind: NormalKind,
     isovalues: Vec<f32>,
-    crossings: Crossings,
+    pieces: Pieces,
     gradients: Gradients,
     /// Scratch: a byte per point.
     sides: Vec<u8>,
     /// Scratch: tetrahedra that are cut.
     cut: Vec<u32>,
     state: State,
-    /// How many tetrahedra the mesh had that came last.
-    tets: usize,
-    known: Option<Box<Known>>,
-    /// There from the first edit after an extraction on.
-    links: Option<Box<Links>>,
-    changed_vertices: Marks,
-    changed_triangles: Marks,
+    /// Once the surface follows a mesh: what that was.
+    followed: Option<Box<Followed>>,
+}
+
+/// A mesh that a surface follows.
+#[derive(Clone, Debug)]
+struct Followed {
+    snapshot: MeshSnapshot,
+    ranges: BlockRanges,
 }
 
 /// What the arrays show.
@@ -130,91 +122,74 @@ impl IsoSurface {
     /// # Panics
     /// If the mesh names a point that it does not have.
     pub fn extract_all(&mut self, mesh: &MeshView<'_>, values: &[f64]) {
-        self.known = None;
+        self.followed = None;
         self.rebuild(mesh, distinct(values));
     }
 
     /// The ranges of vertices and of triangles that were written since the last call, in ascending order, for copies
     /// elsewhere. Anything beyond the ends of the arrays is gone.
     pub fn take_changes(&mut self) -> SurfaceChanges {
-        SurfaceChanges {
-            vertices: self.changed_vertices.take(self.positions.len()),
-            triangles: self.changed_triangles.take(self.indices.len()),
-        }
+        self.pieces.take_changes()
     }
 
     /// Extracts everything anew, with the help of what is known of the mesh.
     fn rebuild(&mut self, mesh: &MeshView<'_>, isovalues: Vec<f32>) {
-        assert!(mesh.tets.len() < 1 << 31, "too many tetrahedra");
         let points = mesh.positions.len();
         self.isovalues = isovalues;
         self.state = State::Of(points, mesh.tets.len());
-        self.tets = mesh.tets.len();
-        self.links = None;
         self.positions.clear();
         self.normals.clear();
         self.values.clear();
         self.indices.clear();
-        self.owners.clear();
-        self.crossings.clear();
-        if self.known.is_none() || self.kind == NormalKind::Smooth {
+        self.pieces.clear(mesh.tets.len());
+        if self.followed.is_none() || self.kind == NormalKind::Smooth {
             self.gradients.clear(points);
         }
         for which in 0..self.isovalues.len() {
-            self.find_cut(mesh, self.isovalues[which]);
-            self.march(mesh, which);
+            let value = self.isovalues[which];
+            self.find_cut(mesh, value);
+            for &t in &self.cut {
+                self.pieces.push(&mut self.indices, t, which as u32, &polygon(mesh, t, value));
+            }
         }
         self.place(mesh);
         self.mend_normals();
-        self.changed_vertices.mark_all(self.positions.len());
-        self.changed_triangles.mark_all(self.indices.len());
+        self.pieces.mark_all();
     }
 
     /// Finds the tetrahedra that are cut at `value`.
     fn find_cut(&mut self, mesh: &MeshView<'_>, value: f32) {
-        self.cut.clear();
-        if let Some(known) = self.known.as_ref().filter(|known| !known.is_passed_widely(value)) {
-            for block in known.blocks_at(value) {
-                let first = block * cut::BLOCK;
-                let tets = &mesh.tets[first..mesh.tets.len().min(first + cut::BLOCK)];
-                cut::find_cut_in_block(tets, first as u32, (mesh.field, value), &mut self.cut);
+        let Self { cut, sides, followed, .. } = self;
+        cut.clear();
+        let ranges = followed.as_ref().map(|followed| &followed.ranges);
+        if let Some(ranges) = ranges.filter(|ranges| !ranges.is_passed_widely(value)) {
+            for first in ranges.blocks_at(value).map(|block| block * BLOCK) {
+                let tets = &mesh.tets[first..mesh.tets.len().min(first + BLOCK)];
+                select(tets, first, cut, |tet| is_cut(tet.map(|p| u8::from(mesh.field[p as usize] < value))));
             }
         } else {
-            cut::set_sides(&mut self.sides, mesh.field, value);
-            cut::find_cut(mesh.tets, &self.sides, &mut self.cut);
-        }
-    }
-
-    /// Finds the triangles, and the crossings that are their vertices.
-    fn march(&mut self, mesh: &MeshView<'_>, which: usize) {
-        let at = (which as u32, self.isovalues[which]);
-        for t in &self.cut {
-            let tet = mesh.tets[*t as usize];
-            let triangles = cut::triangles(&mut self.crossings, tet, mesh.field, at);
-            for (rank, triangle) in (0..).zip(triangles) {
-                if triangle[0] != NONE {
-                    self.indices.push(triangle);
-                    self.owners.push(t << 1 | rank);
-                }
-            }
+            sides.clear();
+            sides.extend(mesh.field.iter().map(|v| u8::from(*v < value)));
+            select(mesh.tets, 0, cut, |tet| is_cut(tet.map(|p| sides[p as usize])));
         }
     }
 
     /// Sets all that belongs to the vertices, but for the normals that [`Self::mend_normals`] gives.
     fn place(&mut self, mesh: &MeshView<'_>) {
-        let Self { positions, normals, values, isovalues, crossings, gradients, .. } = self;
+        let Self { positions, normals, values, isovalues, pieces, gradients, .. } = self;
+        let list = &pieces.crossings.list;
         let by_gradient = self.kind == NormalKind::Gradient;
         if by_gradient {
-            let ends = crossings.list.iter().flat_map(|crossing| crossing.ends);
-            gradients.sum(mesh, ends, self.known.as_deref_mut(), &mut self.sides);
+            let ends = list.iter().flat_map(|crossing| crossing.ends);
+            let snapshot = self.followed.as_mut().map(|followed| &mut followed.snapshot);
+            gradients.sum(mesh, ends, snapshot, &mut self.sides);
         }
-        let count = crossings.list.len();
-        positions.reserve(count);
-        normals.reserve(count);
-        values.reserve(count);
-        for crossing in &crossings.list {
+        positions.reserve(list.len());
+        normals.reserve(list.len());
+        values.reserve(list.len());
+        for crossing in list {
             let value = isovalues[crossing.which as usize];
-            let t = crossing.fraction(mesh.field, value);
+            let t = fraction(crossing, mesh, value);
             values.push(value);
             positions.push(crossing.place(mesh.positions, t));
             normals.push(if by_gradient { gradients.normal(crossing, t) } else { NO_NORMAL });
@@ -226,12 +201,10 @@ impl IsoSurface {
         if !self.normals.contains(&NO_NORMAL) {
             return;
         }
-        let mut sums = vec![[0.0; 3]; self.normals.len()];
+        let mut sums = vec![DVec3::ZERO; self.normals.len()];
         for triangle in &self.indices {
             let area = self.area(*triangle);
-            for v in triangle {
-                (0..3).for_each(|i| sums[*v as usize][i] += area[i]);
-            }
+            triangle.iter().for_each(|v| sums[*v as usize] += area);
         }
         for (normal, sum) in self.normals.iter_mut().zip(sums).filter(|(normal, _)| **normal == NO_NORMAL) {
             *normal = unit(sum).unwrap_or(UP);
@@ -239,10 +212,31 @@ impl IsoSurface {
     }
 
     /// Twice the area of a triangle, along its normal.
-    fn area(&self, triangle: [u32; 3]) -> [f64; 3] {
-        let [a, b, c] = triangle.map(|v| self.positions[v as usize].map(f64::from));
-        cross(sub(b, a), sub(c, a))
+    fn area(&self, triangle: [u32; 3]) -> DVec3 {
+        let [a, b, c] = triangle.map(|v| DVec3::from(self.positions[v as usize].map(f64::from)));
+        (b - a).cross(c - a)
     }
+}
+
+/// The piece of the surface at `value` in a tetrahedron.
+#[inline]
+fn polygon(mesh: &MeshView<'_>, t: u32, value: f32) -> Polygon {
+    let tet = mesh.tets[t as usize];
+    let values = tet.map(|p| mesh.field[p as usize]);
+    let bits = |holds: [bool; 4]| (0..4).fold(0, |bits, i| bits | usize::from(holds[i]) << i);
+    Polygon::of(tet, bits(values.map(|v| v < value)), bits(values.map(|v| v == value)))
+}
+
+/// Whether a tetrahedron has points on both sides, given 1 for each that is inside.
+#[inline(always)]
+fn is_cut(inside: [u8; 4]) -> bool {
+    inside.iter().sum::<u8>().wrapping_sub(1) < 3
+}
+
+/// How far a crossing is from its inside end to its outside end.
+#[inline]
+fn fraction(crossing: &Crossing, mesh: &MeshView<'_>, value: f32) -> f64 {
+    crossing.fraction(f64::from(value), |end| f64::from(mesh.field[end as usize]))
 }
 
 /// In place of a normal that cannot be told.

@@ -4,48 +4,21 @@
 //! extraction is a plain one; when the mesh then changes a little, or not at all, a copy of the mesh is made beside
 //! the second one; from then on tetrahedra that have changed are cut anew, and nothing else is.
 
-use super::IsoSurface;
-use super::NO_NORMAL;
-use super::NormalKind;
-use super::State;
-use super::UP;
-use super::cut;
-use super::distinct;
 use super::gradients::unit;
-use super::known::Bits;
-use super::known::Dirty;
-use super::known::Known;
-use super::links::Links;
-use crate::mesh::NONE;
+use super::{
+    BlockRanges, Followed, IsoSurface, NO_NORMAL, NormalKind, State, UP, distinct, fraction, polygon,
+};
+use crate::mesh::BitSet;
 use crate::view::MeshView;
+use crate::view::marching::{Crossing, Vertices};
+use crate::view::mesh_snapshot::{Dirty, MeshSnapshot};
+use glam::DVec3;
 use std::ops::Range;
 
 /// A mesh of a size that differs by more than this part is another mesh.
 const SIMILAR: usize = 4;
 /// When more than this part of the tetrahedra has changed, a new extraction costs less.
 const LITTLE: usize = 8;
-
-/// What happens to a surface in one update.
-#[derive(Debug, Default)]
-struct Edit {
-    /// Triangles that are gone.
-    holes: Vec<u32>,
-    /// Triangles that are new, and their owners.
-    new: Vec<([u32; 3], u32)>,
-    /// Vertices that were found at a cut tetrahedron or have lost a triangle.
-    vertices: Vec<u32>,
-    in_vertices: Bits,
-}
-
-impl Edit {
-    fn add_vertices(&mut self, triangle: [u32; 3]) {
-        for v in triangle {
-            if self.in_vertices.insert(v) {
-                self.vertices.push(v);
-            }
-        }
-    }
-}
 
 impl IsoSurface {
     /// Changes this surface into those of `mesh` at `values`, when the mesh differs from that of the last extraction
@@ -72,176 +45,117 @@ impl IsoSurface {
         if same && was == now && changed_vertices.is_empty() && changed_tets.is_empty() {
             return;
         }
-        let old_tets = self.tets;
         let new_tets = mesh.tets.len();
-        let is_similar = old_tets.abs_diff(new_tets) <= new_tets / SIMILAR;
-        let Some(mut known) = self.known.take().filter(|_| is_similar) else {
+        let is_similar = self.pieces.tets().abs_diff(new_tets) <= new_tets / SIMILAR;
+        let Some(mut followed) = self.followed.take().filter(|_| is_similar) else {
             self.rebuild(mesh, isovalues);
-            self.known = (was != State::New && is_similar).then(|| Box::new(Known::new(mesh)));
+            let follow =
+                || Box::new(Followed { snapshot: MeshSnapshot::new(mesh), ranges: BlockRanges::new(mesh) });
+            self.followed = (was != State::New && is_similar).then(follow);
             return;
         };
-        let dirty = known.catch_up(mesh, changed_vertices, changed_tets);
-        self.known = Some(known);
+        let mut dirty = followed.snapshot.catch_up(mesh, changed_vertices, changed_tets);
+        dirty.tets.sort_unstable();
+        followed.ranges.update(mesh, &dirty.tets);
+        self.followed = Some(followed);
         if same && dirty.tets.len() <= new_tets / LITTLE {
             self.state = now;
-            self.tets = new_tets;
-            self.splice(mesh, old_tets, &dirty);
+            self.splice(mesh, &dirty);
         } else {
-            dirty.points.iter().for_each(|point| self.gradients.forget(*point));
+            dirty.points(mesh).iter().for_each(|point| self.gradients.forget(*point));
             self.gradients.resize(mesh.positions.len());
             self.rebuild(mesh, isovalues);
         }
     }
 
     /// Cuts the dirty tetrahedra anew.
-    fn splice(&mut self, mesh: &MeshView<'_>, old_tets: usize, dirty: &Dirty) {
-        let mut links = self.links.take().unwrap_or_else(|| {
-            Box::new(Links::new(old_tets, self.positions.len(), &self.indices, &self.owners))
+    fn splice(&mut self, mesh: &MeshView<'_>, dirty: &Dirty) {
+        let Self { pieces, indices, isovalues, .. } = self;
+        let piece = |t, which| polygon(mesh, t, isovalues[which as usize]);
+        let edited = pieces.recut(indices, mesh.tets.len(), &dirty.tets, isovalues.len() as u32, piece);
+        self.place_again(mesh, &edited);
+        self.renew_normals(mesh, dirty, &edited);
+        let Self { pieces, indices, positions, normals, values, .. } = self;
+        pieces.drop_unused(indices, edited.list, |v| {
+            positions.swap_remove(v);
+            normals.swap_remove(v);
+            values.swap_remove(v);
         });
-        let mut edit = Edit::default();
-        self.recut(mesh, dirty, &mut links, &mut edit);
-        self.set_triangles(&mut links, &mut edit);
-        self.place_again(mesh, &links, &edit);
-        self.renew_normals(mesh, dirty, &links, &edit);
-        self.drop_unused(&mut links, edit);
-        self.links = Some(links);
-    }
-
-    /// Finds out which triangles go and which come.
-    fn recut(&mut self, mesh: &MeshView<'_>, dirty: &Dirty, links: &mut Links, edit: &mut Edit) {
-        let mut old = Vec::new();
-        for t in mesh.tets.len()..links.tet_count() {
-            links.take(t as u32, &mut old);
-            self.take_out(&old, links, edit);
-        }
-        links.resize(mesh.tets.len());
-        for &t in &dirty.tets {
-            links.take(t, &mut old);
-            for at in (0..).zip(self.isovalues.iter().copied()) {
-                let triangles = cut::triangles(&mut self.crossings, mesh.tets[t as usize], mesh.field, at);
-                for (rank, triangle) in (0..).zip(triangles).filter(|(_, triangle)| triangle[0] != NONE) {
-                    let owner = t << 1 | rank;
-                    edit.add_vertices(triangle);
-                    let same = |old: &u32| {
-                        (self.indices[*old as usize], self.owners[*old as usize]) == (triangle, owner)
-                    };
-                    match old.iter().position(same) {
-                        Some(at) => links.put_back(old.swap_remove(at) as usize, owner),
-                        None => edit.new.push((triangle, owner)),
-                    }
-                }
-            }
-            self.take_out(&old, links, edit);
-        }
-    }
-
-    /// Takes triangles from their vertices.
-    fn take_out(&self, triangles: &[u32], links: &mut Links, edit: &mut Edit) {
-        for &triangle in triangles {
-            let vertices = self.indices[triangle as usize];
-            links.unlink(triangle, vertices);
-            edit.add_vertices(vertices);
-            edit.holes.push(triangle);
-        }
-    }
-
-    /// Writes the new triangles into the holes first, and fills what holes are left with the last triangles.
-    fn set_triangles(&mut self, links: &mut Links, edit: &mut Edit) {
-        links.make_room(self.crossings.list.len());
-        edit.holes.sort_unstable();
-        let filled = edit.holes.len().min(edit.new.len());
-        for (i, (triangle, owner)) in edit.new.drain(..).enumerate() {
-            let slot = edit.holes.get(i).map_or(self.indices.len(), |hole| *hole as usize);
-            if slot == self.indices.len() {
-                self.indices.push(triangle);
-                self.owners.push(owner);
-            } else {
-                (self.indices[slot], self.owners[slot]) = (triangle, owner);
-            }
-            links.put(slot, &self.indices, owner);
-            self.changed_triangles.mark(slot as u32);
-        }
-        for hole in edit.holes.drain(filled..).rev() {
-            let last = self.indices.len() - 1;
-            links.swap_remove(hole, self.indices[last], self.owners[last]);
-            self.indices.swap_remove(hole as usize);
-            self.owners.swap_remove(hole as usize);
-            self.changed_triangles.mark(hole);
-        }
     }
 
     /// Sets the positions of vertices that are new or whose ends may have moved.
-    fn place_again(&mut self, mesh: &MeshView<'_>, links: &Links, edit: &Edit) {
-        let old = self.positions.len();
-        let new = &self.crossings.list[old..];
-        self.values.extend(new.iter().map(|crossing| self.isovalues[crossing.which as usize]));
-        self.positions.resize(self.crossings.list.len(), [0.0; 3]);
-        self.normals.resize(self.crossings.list.len(), [0.0; 3]);
-        for &v in edit.vertices.iter().filter(|v| links.is_used(**v)) {
-            let crossing = &self.crossings.list[v as usize];
-            let t = crossing.fraction(mesh.field, self.values[v as usize]);
-            let place = crossing.place(mesh.positions, t);
-            let before = std::mem::replace(&mut self.positions[v as usize], place);
+    fn place_again(&mut self, mesh: &MeshView<'_>, edited: &Vertices) {
+        let Self { pieces, positions, normals, values, isovalues, .. } = self;
+        let old = positions.len();
+        let list = &pieces.crossings.list;
+        values.extend(list[old..].iter().map(|crossing| isovalues[crossing.which as usize]));
+        positions.resize(list.len(), [0.0; 3]);
+        normals.resize(list.len(), [0.0; 3]);
+        for &v in &edited.list {
+            if !pieces.is_used(v) {
+                continue;
+            }
+            let crossing = &pieces.crossings.list[v as usize];
+            let place = crossing.place(mesh.positions, fraction(crossing, mesh, values[v as usize]));
+            let before = std::mem::replace(&mut positions[v as usize], place);
             if v as usize >= old || before.map(f32::to_bits) != place.map(f32::to_bits) {
-                self.changed_vertices.mark(v);
+                pieces.mark_vertex(v);
             }
         }
     }
 
     /// Sets the normals where a gradient or a triangle has changed.
-    fn renew_normals(&mut self, mesh: &MeshView<'_>, dirty: &Dirty, links: &Links, edit: &Edit) {
-        let mut renew = Edit::default();
-        for v in edit.vertices.iter().filter(|v| links.is_used(**v)) {
-            links.fan(*v).for_each(|triangle| renew.add_vertices(self.indices[triangle as usize]));
+    fn renew_normals(&mut self, mesh: &MeshView<'_>, dirty: &Dirty, edited: &Vertices) {
+        let mut renew = Vertices::default();
+        for triangle in edited.list.iter().flat_map(|v| self.pieces.fan(*v)) {
+            renew.add(self.indices[triangle as usize]);
         }
         if self.kind == NormalKind::Gradient {
-            self.renew_gradients(mesh, dirty, links, &mut renew);
-            let list = &self.crossings.list;
-            let ends = renew.vertices.iter().flat_map(|v| list[*v as usize].ends);
-            self.gradients.sum(mesh, ends, self.known.as_deref_mut(), &mut self.sides);
+            self.renew_gradients(mesh, dirty, &mut renew);
+            let list = &self.pieces.crossings.list;
+            let ends = renew.list.iter().flat_map(|v| list[*v as usize].ends);
+            let snapshot = self.followed.as_mut().map(|followed| &mut followed.snapshot);
+            self.gradients.sum(mesh, ends, snapshot, &mut self.sides);
         }
-        for &v in &renew.vertices {
+        for &v in &renew.list {
             let mut normal = NO_NORMAL;
             if self.kind == NormalKind::Gradient {
-                let crossing = &self.crossings.list[v as usize];
-                let t = crossing.fraction(mesh.field, self.values[v as usize]);
-                normal = self.gradients.normal(crossing, t);
+                let crossing = &self.pieces.crossings.list[v as usize];
+                normal = self.gradients.normal(crossing, fraction(crossing, mesh, self.values[v as usize]));
             }
             if normal == NO_NORMAL {
-                normal = self.fan_normal(links, v);
+                normal = self.fan_normal(v);
             }
             let before = std::mem::replace(&mut self.normals[v as usize], normal);
             if before.map(f32::to_bits) != normal.map(f32::to_bits) {
-                self.changed_vertices.mark(v);
+                self.pieces.mark_vertex(v);
             }
         }
     }
 
     /// Sets gradients anew that are not what they were, and adds the vertices that use them.
-    fn renew_gradients(&mut self, mesh: &MeshView<'_>, dirty: &Dirty, links: &Links, renew: &mut Edit) {
+    fn renew_gradients(&mut self, mesh: &MeshView<'_>, dirty: &Dirty, renew: &mut Vertices) {
         self.gradients.resize(mesh.positions.len());
-        let Some(known) = &mut self.known else { return };
-        let list = &self.crossings.list;
+        let Some(followed) = &mut self.followed else { return };
+        let list = &self.pieces.crossings.list;
         let mut star = Vec::new();
-        let mut lost = Bits::default();
+        let mut lost = BitSet::default();
         let mut any_lost = false;
-        for &point in &dirty.points {
+        for point in dirty.points(mesh) {
             if !self.gradients.has(point) {
                 continue;
             }
-            if !known.star(mesh, point, &mut star) {
+            if !followed.snapshot.star(mesh, point, &mut star) {
                 self.gradients.forget(point);
-                lost.insert(point);
                 any_lost = true;
+                lost.insert(point);
                 continue;
             }
-            let mut is_used = false;
-            for v in star.iter().flat_map(|t| links.triangles(*t)).flat_map(|t| self.indices[t as usize]) {
-                if list[v as usize].ends.contains(&point) {
-                    is_used = true;
-                    renew.add_vertices([v; 3]);
-                }
-            }
+            let corners = star.iter().flat_map(|t| self.pieces.triangles_in(*t));
+            let corners = corners.flat_map(|triangle| self.indices[triangle as usize]);
+            let mut users = corners.filter(|v| list[*v as usize].ends.contains(&point)).peekable();
+            let is_used = users.peek().is_some();
+            renew.add(users);
             if is_used {
                 self.gradients.set(mesh, point, &mut star);
             } else {
@@ -249,38 +163,17 @@ impl IsoSurface {
             }
         }
         if any_lost {
-            for (v, crossing) in (0..).zip(list) {
-                if links.is_used(v) && crossing.ends.iter().any(|end| lost.has(*end)) {
-                    renew.add_vertices([v; 3]);
-                }
-            }
+            let crossings = (0..).zip(list);
+            let lost = |crossing: &Crossing| crossing.ends.iter().any(|end| lost.has(*end));
+            let users = crossings.filter(|(v, crossing)| lost(crossing) && self.pieces.is_used(*v));
+            renew.add(users.map(|(v, _)| v));
         }
     }
 
     /// The mean direction of the triangles at a vertex, summed in the order of an extraction.
-    fn fan_normal(&self, links: &Links, v: u32) -> [f32; 3] {
-        let mut fan: Vec<_> =
-            links.fan(v).map(|triangle| (self.owners[triangle as usize], triangle)).collect();
-        fan.sort_unstable();
-        let mut sum = [0.0; 3];
-        for (_, triangle) in fan {
-            let area = self.area(self.indices[triangle as usize]);
-            (0..3).for_each(|i| sum[i] += area[i]);
-        }
+    fn fan_normal(&self, v: u32) -> [f32; 3] {
+        let fan = self.pieces.ordered_fan(v).into_iter();
+        let sum = fan.fold(DVec3::ZERO, |sum, triangle| sum + self.area(self.indices[triangle as usize]));
         unit(sum).unwrap_or(UP)
-    }
-
-    /// Takes out the vertices that no triangle uses any more.
-    fn drop_unused(&mut self, links: &mut Links, mut edit: Edit) {
-        edit.vertices.retain(|v| !links.is_used(*v));
-        edit.vertices.sort_unstable();
-        for v in edit.vertices.into_iter().rev() {
-            self.crossings.swap_remove(v);
-            self.positions.swap_remove(v as usize);
-            self.normals.swap_remove(v as usize);
-            self.values.swap_remove(v as usize);
-            links.rename_last(v, &mut self.indices, |triangle| self.changed_triangles.mark(triangle));
-            self.changed_vertices.mark(v);
-        }
     }
 }

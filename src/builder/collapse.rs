@@ -1,0 +1,300 @@
+//! The driver: pick an edge, test it, collapse it, record it.
+
+use super::BuildConfig;
+use super::BuildError;
+use super::BuildProgress;
+use super::BuildResult;
+use super::BuildSummary;
+use super::OnProgress;
+use super::candidate_queue::Agenda;
+use super::candidate_queue::Key;
+use super::candidate_queue::Levels;
+use super::collapse_check::Plan;
+use super::collapse_check::Refusal;
+use super::collapse_check::VertexMarks;
+use super::cost::Buckets;
+use super::cost::Evaluator;
+use super::cost::Reference;
+use super::cost::VertexData;
+use super::cost::largest;
+use super::field_selection;
+use super::history;
+use super::history::Collapse;
+use super::quantize;
+use super::work_mesh::WorkMesh;
+use crate::geom::Bounds;
+use crate::mesh;
+use crate::mesh::EDGES;
+use crate::mesh::TetMesh;
+use crate::mesh::Topology;
+use crate::mt::EdgeMt;
+use crate::mt::ErrorCode;
+use crate::mt::MAX_UPDATES;
+use crate::mt::MtInfo;
+use crate::mt::MtKind;
+
+/// Builds an edge-based MT of `mesh`, which must be valid: see [`crate::mesh::repair`].
+///
+/// Works on one thread and calls `progress` now and then.
+///
+/// # Errors
+/// If the mesh is not valid, has none of the wanted fields, or does not fit the lattice; if an option is out of its
+/// range; if `progress` breaks the work off.
+pub fn edge_mt(
+    mesh: &TetMesh,
+    config: &BuildConfig,
+    progress: OnProgress<'_>,
+) -> Result<BuildResult<EdgeMt>, BuildError> {
+    if mesh.positions.len() > MAX_UPDATES as usize {
+        return Err(BuildError::TooLarge);
+    }
+    if mesh.tets.is_empty() {
+        return Err(BuildError::Empty);
+    }
+    mesh::check(mesh).map_err(BuildError::Mesh)?;
+    let Topology { neighbors, non_manifold: frozen, .. } =
+        mesh::topology(mesh.positions.len(), &mesh.tets).map_err(BuildError::Mesh)?;
+    let quantized = quantize::quantize_cells(mesh, config)?;
+    let diagonal = Bounds::of(&mesh.positions).diagonal();
+    let info = MtInfo {
+        kind: MtKind::Edge,
+        lattice: quantized.lattice,
+        fields: quantized.fields.clone(),
+        vertices: mesh.positions.len() as u32,
+        tetrahedra: mesh.tets.len() as u32,
+        updates: 0,
+        displacement_per_error: config.displacement * diagonal,
+        quantization: quantized.quantization,
+    };
+    let work = WorkMesh::new(mesh.tets.clone(), neighbors, mesh.positions.len());
+    let reference = Reference::new(&quantized, &work, info.displacement_per_error, config.displacement_edges);
+    let mut builder = Builder::new(work, reference, &info, frozen);
+    builder.collapse_all(progress)?;
+    let Builder { mesh: base, data, history, .. } = builder;
+    let depth = data.height.iter().copied().max().unwrap_or(0);
+    let (mt, vertices) = history::edge_mt(info, &base, &data, &history, config.block_bits, progress)?;
+    let summary = BuildSummary {
+        vertices: mt.info().vertices,
+        tetrahedra: mt.info().tetrahedra,
+        base_vertices: mt.base().positions.len() as u32,
+        base_tetrahedra: mt.base().tets.len() as u32,
+        updates: mt.updates(),
+        position_bits: mt.info().lattice.bits,
+        depth,
+    };
+    let exact = field_selection::exact_values(mesh, config, &vertices)?;
+    Ok(BuildResult { mt, summary, vertices, exact })
+}
+
+/// How errors are grouped.
+const LEVELS: Levels = Levels::HALVES;
+
+struct Builder<'a> {
+    mesh: WorkMesh,
+    data: VertexData,
+    /// Average gradient of each field at each vertex, in levels per lattice step.
+    gradients: Vec<glam::DVec3>,
+    reference: Reference<'a>,
+    frozen: Vec<bool>,
+    buckets: Buckets,
+    marks: VertexMarks,
+    /// Counts the changes around each vertex.
+    versions: Vec<u32>,
+    agenda: Agenda,
+    /// Edges that could not be collapsed, with the sum of their ends' versions then.
+    blocked: Vec<(u32, u32, u32)>,
+    plan: Plan,
+    evaluator: Evaluator,
+    history: Vec<Collapse>,
+    /// Tetrahedra around each vertex.
+    degrees: Vec<u32>,
+    /// What the lattices round off, as an error.
+    floors: Vec<f64>,
+}
+
+impl<'a> Builder<'a> {
+    fn new(mesh: WorkMesh, reference: Reference<'a>, info: &MtInfo, frozen: Vec<bool>) -> Self {
+        let quantized = reference.quantized;
+        let points = quantized.positions.len();
+        let mut degrees = vec![0; points];
+        mesh.tets.iter().flatten().for_each(|&v| degrees[v as usize] += 1);
+        let foot = |v: u32| reference.skin.at(v).first().copied().unwrap_or(crate::mesh::NONE);
+        let data = VertexData {
+            positions: quantized.positions.clone(),
+            levels: quantized.levels.clone(),
+            errors: vec![0.0; points * quantized.fields.len()],
+            height: vec![0; points],
+            foot: (0..points as u32).map(foot).collect(),
+        };
+        Self {
+            gradients: quantized.gradients(&mesh.tets),
+            buckets: Buckets::new(mesh.tets.len(), quantized),
+            marks: VertexMarks::new(points),
+            versions: vec![0; points],
+            mesh,
+            data,
+            reference,
+            frozen,
+            agenda: Agenda::default(),
+            blocked: Vec::new(),
+            plan: Plan::default(),
+            evaluator: Evaluator::default(),
+            history: Vec::new(),
+            degrees,
+            floors: quantize::floors(info),
+        }
+    }
+
+    fn collapse_all(&mut self, progress: OnProgress<'_>) -> Result<(), BuildError> {
+        self.push_all_edges();
+        let mut steps = 0_u64;
+        loop {
+            steps += 1;
+            if steps.is_multiple_of(1024) {
+                let done = self.history.len() as u64;
+                let total = u64::from(self.reference.points);
+                if progress(BuildProgress { stage: "collapse", done, total }).is_break() {
+                    return Err(BuildError::Stopped);
+                }
+            }
+            let Some(key) = self.agenda.pop() else {
+                if self.next_level() {
+                    continue;
+                }
+                return Ok(());
+            };
+            self.try_collapse(key);
+        }
+    }
+
+    fn push_all_edges(&mut self) {
+        let mut edges: Vec<(u32, u32)> = Vec::with_capacity(self.mesh.tets.len() * 6);
+        for tet in &self.mesh.tets {
+            edges.extend(EDGES.map(|[i, j]| (tet[i].min(tet[j]), tet[i].max(tet[j]))));
+        }
+        edges.sort_unstable();
+        edges.dedup();
+        for (a, b) in edges {
+            self.agenda.push(self.predicted_key(a, b));
+        }
+    }
+
+    /// Goes on to the next level that has candidates; what was in the way at the lower ones may be gone, so that is
+    /// looked at again. False if nothing is left to do.
+    fn next_level(&mut self) -> bool {
+        let more = self.agenda.next_level();
+        self.retry_blocked() || more
+    }
+
+    /// Puts those blocked edges back whose neighbourhood has changed. Tells whether there were any.
+    fn retry_blocked(&mut self) -> bool {
+        let mut still = std::mem::take(&mut self.blocked);
+        let before = still.len();
+        still.retain(|&(a, b, versions)| {
+            if !self.mesh.has(a) || !self.mesh.has(b) {
+                return false;
+            }
+            if self.edge_version(a, b) == versions {
+                return true;
+            }
+            let key = self.predicted_key(a, b).no_earlier_than(self.agenda.level());
+            self.agenda.push(key);
+            false
+        });
+        self.blocked = still;
+        self.blocked.len() < before
+    }
+
+    fn edge_version(&self, a: u32, b: u32) -> u32 {
+        self.versions[a as usize].wrapping_add(self.versions[b as usize])
+    }
+
+    fn key(&self, error: f64, height: u32, star: u32, a: u32, b: u32) -> Key {
+        let (p, q) = (self.data.positions[a as usize], self.data.positions[b as usize]);
+        let length: f32 = (0..3).map(|i| (i64::from(p[i]) - i64::from(q[i])) as f32).map(|d| d * d).sum();
+        Key::new(LEVELS.of(error), height + star, length, a, b)
+    }
+
+    /// A key from what the ends know: second differences of the fields, errors and depths so far.
+    fn predicted_key(&self, a: u32, b: u32) -> Key {
+        let fields = &self.reference.quantized.fields;
+        let (i, j) = (a as usize, b as usize);
+        let [p, q] = [i, j].map(|v| glam::DVec3::from_array(self.data.positions[v].map(f64::from)));
+        let errors = |v: usize| largest(&self.data.errors[v * fields.len()..][..fields.len()]);
+        let mut error = errors(i).max(errors(j));
+        for (f, field) in fields.iter().enumerate() {
+            let [u, v] = [i, j].map(|v| v * fields.len() + f);
+            let rise = f64::from(self.data.levels[v] - self.data.levels[u]);
+            let bend =
+                [u, v].map(|w| (rise - self.gradients[w].dot(q - p)).abs()).into_iter().fold(0.0, f64::max);
+            error = error.max(0.5 * bend * field.step / field.range());
+        }
+        // About six tetrahedra lie around an edge; they are in both stars and go.
+        let star = (self.degrees[i] + self.degrees[j]).saturating_sub(12);
+        self.key(error, self.data.height[i].max(self.data.height[j]) + 1, star, a, b)
+    }
+
+    fn try_collapse(&mut self, key: Key) {
+        let Key { a, b, .. } = key;
+        match self.plan.make(&self.mesh, &mut self.marks, &self.data.positions, &self.frozen, a, b) {
+            Ok(()) => {}
+            Err(Refusal::Blocked) => {
+                self.blocked.push((a, b, self.edge_version(a, b)));
+                return;
+            }
+            Err(Refusal::Gone | Refusal::Never) => return,
+        }
+        let Self { plan, mesh, data, buckets, reference, evaluator, .. } = self;
+        let limit = LEVELS.largest(key.level());
+        let error = evaluator.evaluate(plan, mesh, data, buckets, reference, limit);
+        let exact = self.key(error, self.evaluator.height, self.plan.stay.len() as u32, a, b);
+        if exact.urgency() > key.urgency() {
+            self.agenda.push(exact);
+            return;
+        }
+        self.perform();
+    }
+
+    fn perform(&mut self) {
+        // Never zero: error 0 is to mean the reference mesh, with every update applied.
+        let stored = |error: &f64, floor: &f64| ErrorCode::at_least(error.max(*floor)).max(ErrorCode(1));
+        let errors = self.evaluator.errors.iter().zip(&self.floors);
+        let errors: Vec<ErrorCode> = errors.map(|(error, floor)| stored(error, floor)).collect();
+        let code = errors.iter().copied().fold(ErrorCode::ZERO, ErrorCode::max);
+        let v = self.data.positions.len() as u32;
+        let Self { plan, mesh, data, evaluator, .. } = self;
+        self.history.push(Collapse::new(plan, mesh, code, evaluator.steps));
+        data.positions.push(plan.position);
+        data.levels.extend_from_slice(&evaluator.levels);
+        data.errors.extend(errors.iter().map(|code| code.error()));
+        data.height.push(evaluator.height);
+        data.foot.push(evaluator.foot);
+        evaluator.settle(plan, data, &mut self.buckets, &self.reference);
+        for f in 0..evaluator.levels.len() {
+            let fields = evaluator.levels.len();
+            let [g, h] = [plan.a, plan.b].map(|w| self.gradients[w as usize * fields + f]);
+            self.gradients.push((g + h) * 0.5);
+        }
+        self.degrees.push(plan.stay.len() as u32);
+        for &(tet, i, j) in &plan.fan {
+            mesh.tets[tet as usize].iter().for_each(|&v| self.degrees[v as usize] -= 1);
+            mesh.close(tet, i as usize, j as usize);
+        }
+        let mut first = crate::mesh::NONE;
+        for (s, _) in &plan.stay {
+            mesh.tets[s.tet as usize][s.corner as usize] = v;
+            first = s.tet;
+        }
+        mesh.incident.push(first);
+        mesh.incident[plan.a as usize] = crate::mesh::NONE;
+        mesh.incident[plan.b as usize] = crate::mesh::NONE;
+        self.marks.push();
+        self.versions.push(0);
+        for i in 0..self.plan.link.len() {
+            let x = self.plan.link[i];
+            self.versions[x as usize] = self.versions[x as usize].wrapping_add(1);
+            let key = self.predicted_key(x, v);
+            self.agenda.push(key);
+        }
+    }
+}

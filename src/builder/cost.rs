@@ -1,0 +1,661 @@
+//! The exact error of a collapse: what the field and the boundary lose, at every reference vertex concerned.
+//!
+//! Each reference vertex that is not a vertex of the mesh lives in the bucket of one tetrahedron: the one that
+//! contains it or, where the boundary has moved, the one with the nearest boundary triangle. A collapse takes it from
+//! a tetrahedron that it removes to one that it creates. So for every consistent set S, some tetrahedron of Σ_S had
+//! the vertex in its bucket, and the error recorded then bounds what Σ_S has there. A created tetrahedron is also compared with
+//! those that it contains but that are in other buckets ([`super::strays`]).
+//!
+//! The boundary is kept track of in both directions. A created vertex is compared with the reference boundary itself:
+//! its distance from the mesh before says nothing, as step after step along chords would fill any hollow. And each
+//! reference vertex of the boundary has a second bucket, of the boundary triangle that is nearest to it.
+
+use super::boundary_distance::Skin;
+use super::collapse_check::Plan;
+use super::quantize::Quantized;
+use super::strays::Strays;
+use super::work_mesh::WorkMesh;
+use crate::geom::nearest_on_triangle;
+use crate::geom::orient3d;
+use crate::mesh::EDGES;
+use crate::mesh::FACES;
+use crate::mesh::NONE;
+use glam::DMat3;
+use glam::DVec3;
+
+/// What is known of each vertex, input and created.
+pub(super) struct VertexData {
+    pub positions: Vec<[i32; 3]>,
+    pub levels: Vec<i32>,
+    /// `errors[vertex * fields + f]`: those of the update whose collapse made the vertex; 0 for reference vertices.
+    pub errors: Vec<f64>,
+    /// Length of the longest chain of collapses that led to the vertex.
+    pub height: Vec<u32>,
+    /// The triangle of the reference boundary that a boundary vertex is near to; [`NONE`] inside.
+    pub foot: Vec<u32>,
+}
+
+/// The reference vertices that belong to each tetrahedron.
+pub(super) struct Buckets {
+    /// Those that it stands for.
+    pub inside: Lists,
+    /// Those of the boundary that its boundary faces stand for.
+    pub border: Lists,
+    /// Those that are not where their buckets are.
+    pub strays: Strays,
+}
+
+impl Buckets {
+    /// Of a mesh with so many tetrahedra.
+    pub fn new(tets: usize, quantized: &Quantized) -> Self {
+        let points = quantized.places.len();
+        let mut inside = Lists::new(tets, points);
+        let mut strays = Strays::new(tets, quantized.places.clone());
+        for home in &quantized.homes {
+            inside.put(home.tet, home.point);
+            strays.set_outside(home.point, home.outside);
+        }
+        Self { inside, border: Lists::new(tets, points), strays }
+    }
+
+    /// Empties the buckets of a tetrahedron, which may be a new one.
+    pub fn clear(&mut self, t: u32) {
+        for lists in [&mut self.inside, &mut self.border] {
+            lists.reserve(t);
+            lists.take(t);
+        }
+        self.strays.clear(t);
+    }
+}
+
+/// Disjoint lists of points, one for each tetrahedron.
+pub(super) struct Lists {
+    first: Vec<u32>,
+    next: Vec<u32>,
+}
+
+impl Lists {
+    pub fn new(tets: usize, points: usize) -> Self {
+        Self { first: vec![NONE; tets], next: vec![NONE; points] }
+    }
+
+    /// Makes room for the list of a tetrahedron.
+    pub fn reserve(&mut self, t: u32) {
+        if self.first.len() <= t as usize {
+            self.first.resize(t as usize + 1, NONE);
+        }
+    }
+
+    pub fn take(&mut self, t: u32) {
+        self.first[t as usize] = NONE;
+    }
+
+    pub fn put(&mut self, t: u32, point: u32) {
+        self.next[point as usize] = std::mem::replace(&mut self.first[t as usize], point);
+    }
+
+    pub fn iter(&self, t: u32) -> impl Iterator<Item = u32> {
+        let step = |p: u32| (p != NONE).then_some(p);
+        std::iter::successors(step(self.first[t as usize]), move |&p| step(self.next[p as usize]))
+    }
+}
+
+/// The reference mesh and the units of its errors.
+pub(super) struct Reference<'a> {
+    pub quantized: &'a Quantized,
+    pub points: u32,
+    pub skin: Skin,
+    /// Model units of displacement of the boundary that count as an error of 1, at each vertex of the reference mesh.
+    allowances: Vec<f64>,
+    /// The most of them.
+    pub displacement_per_error: f64,
+}
+
+/// One tetrahedron of the star after the collapse.
+struct Cell {
+    /// `(λ_x, λ_y, λ_z)` of a point are this times its position relative to the centre.
+    barycentric: DMat3,
+    others: [u32; 3],
+    tet: u32,
+}
+
+/// A boundary triangle in model units.
+pub(super) struct Face {
+    corners: [DVec3; 3],
+    normal: DVec3,
+    /// The normal's length, squared.
+    area: f64,
+}
+
+impl Face {
+    pub fn new(corners: [DVec3; 3]) -> Self {
+        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+        Self { corners, normal, area: normal.length_squared() }
+    }
+}
+
+/// The number of the face nearest to `p`, the nearest point there, and its distance.
+pub(super) fn nearest_face(p: DVec3, faces: &[Face]) -> (usize, DVec3, f64) {
+    let (mut least, mut found, mut nearest) = (f64::INFINITY, 0, p);
+    for (i, face) in faces.iter().enumerate() {
+        // No point of a triangle is nearer than its plane.
+        let height = (p - face.corners[0]).dot(face.normal);
+        if height * height > least * face.area {
+            continue;
+        }
+        let q = nearest_on_triangle(p, face.corners);
+        let distance = p.distance_squared(q);
+        if distance < least {
+            (least, found, nearest) = (distance, i, q);
+        }
+    }
+    (found, nearest, least.sqrt())
+}
+
+/// Which of so many tetrahedra a point lies in, or is least outside of: its barycentric coordinates there but for the
+/// first one, which `barycentric` gives, and how deep inside it lies. The one called `hint` is looked at first.
+pub(super) fn locate(cells: usize, hint: usize, barycentric: impl Fn(usize) -> DVec3) -> (usize, DVec3, f64) {
+    let (mut cell, mut lambda, mut depth) = (hint, DVec3::ZERO, f64::NEG_INFINITY);
+    let order = std::iter::once(hint).chain((0..cells).filter(|&i| i != hint));
+    for i in order {
+        let l = barycentric(i);
+        let inside = l.min_element().min(1.0 - l.element_sum());
+        if inside > depth {
+            (cell, lambda, depth) = (i, l, inside);
+        }
+        if inside >= 0.0 {
+            break;
+        }
+    }
+    (cell, lambda, depth)
+}
+
+/// Evaluates collapses; holds scratch space.
+#[derive(Default)]
+pub(super) struct Evaluator {
+    cells: Vec<Cell>,
+    /// Boundary triangles of the star: the cell and its corners, [`NONE`] for the centre. Those at the centre first.
+    border: Vec<(u32, [u32; 3])>,
+    at_centre: usize,
+    /// The same triangles in model units with their normals, made when they are first needed.
+    faces: Vec<Face>,
+    flat: bool,
+    old_border: Vec<[u32; 3]>,
+    /// Where each point goes: point, cell, and whether it is outside.
+    moves: Vec<(u32, u32, bool)>,
+    /// Points of other buckets that are inside: point and cell.
+    visits: Vec<(u32, u32)>,
+    border_moves: Vec<(u32, u32)>,
+    /// The levels of the new vertex.
+    pub levels: Vec<i32>,
+    /// The error of each field.
+    pub errors: Vec<f64>,
+    /// The largest error of each field among the updates that this one will be a parent of.
+    inherited: Vec<f64>,
+    /// The triangle of the reference boundary near the new vertex.
+    pub foot: u32,
+    pub height: u32,
+    /// How far the boundary at each end is outside of the new one, as an error; 0 if no updates depend on this one.
+    pub steps: [f64; 2],
+}
+
+/// Raises the errors of all fields to at least this.
+pub(super) fn raise(errors: &mut [f64], least: f64) {
+    errors.iter_mut().for_each(|error| *error = error.max(least));
+}
+
+/// The largest error of all fields.
+pub(super) fn largest(errors: &[f64]) -> f64 {
+    errors.iter().copied().fold(0.0, f64::max)
+}
+
+/// Errors below this are far below the smallest that is stored.
+const NO_DISTANCE: f64 = 1e-8;
+
+/// Barycentric coordinates this far below zero are rounding errors of a point on a face.
+pub(super) const SLACK: f64 = 1e-9;
+
+impl Evaluator {
+    /// The error of the planned collapse, the largest one of all fields; any value above `limit` may be returned early once it is exceeded, then
+    /// as a lower bound.
+    pub fn evaluate(
+        &mut self,
+        plan: &Plan,
+        mesh: &WorkMesh,
+        data: &VertexData,
+        buckets: &Buckets,
+        reference: &Reference<'_>,
+        limit: f64,
+    ) -> f64 {
+        self.steps = [0.0; 2];
+        self.halve_levels(plan, data, reference);
+        let newest = self.inherit(plan, mesh, data);
+        self.cells.clear();
+        self.cells
+            .extend(plan.stay.iter().map(|&(s, _)| Cell::new(s.tet, s.corner as usize, plan, mesh, data)));
+        self.collect_border(plan, mesh);
+        self.flat = self.is_flat(plan, data);
+        if newest {
+            self.add_overshoot(plan, data, reference);
+        }
+        let foot = self.find_foot(plan, data, reference);
+        raise(&mut self.errors, foot);
+        if newest && largest(&self.errors) <= limit {
+            let steps = self.steps_of_boundary(plan, data, reference);
+            self.steps = steps.map(|distance| reference.least_error_of(distance));
+            let step = self.steps[0].max(self.steps[1]);
+            let Self { errors, inherited, .. } = self;
+            errors.iter_mut().zip(inherited).for_each(|(error, own)| *error = error.max(*own + step));
+        }
+        if plan.on_boundary && !self.flat && largest(&self.errors) <= limit {
+            // Where it is flat, no point of the boundary gets further away than it is.
+            let border = self.place_on_border(plan, data, buckets, reference);
+            raise(&mut self.errors, border);
+        }
+        let mut error = largest(&self.errors);
+        if error > limit {
+            return error;
+        }
+        self.moves.clear();
+        let stars = plan.stay.iter().enumerate().map(|(i, (s, _))| (s.tet, i));
+        let fans = plan.fan.iter().map(|&(tet, ..)| (tet, 0));
+        for (tet, cell) in stars.chain(fans) {
+            for point in buckets.inside.iter(tet) {
+                error = error.max(self.place(point, cell, plan, data, reference));
+                if error > limit {
+                    return error;
+                }
+            }
+        }
+        // Those that the lattice has moved are in a bucket already.
+        let is_new = |end: &u32| *end < reference.points && !reference.quantized.is_moved(*end);
+        for end in [plan.a, plan.b].into_iter().filter(is_new) {
+            error = error.max(self.place(end, 0, plan, data, reference));
+        }
+        error.max(self.meet_strays(plan, data, buckets, reference))
+    }
+
+    /// The error at points of other buckets that the new star contains.
+    fn meet_strays(
+        &mut self,
+        plan: &Plan,
+        data: &VertexData,
+        buckets: &Buckets,
+        reference: &Reference<'_>,
+    ) -> f64 {
+        self.visits.clear();
+        let mut error = 0.0_f64;
+        let rim = self.old_border.iter().flatten().map(|&v| data.positions[v as usize]);
+        let changed = (plan.on_boundary && !self.flat).then(|| bounds(rim.chain([plan.position])));
+        for point in buckets.strays.met(removed(plan), changed) {
+            error = error.max(self.visit(point, plan, data, reference));
+        }
+        error
+    }
+
+    fn visit(&mut self, point: u32, plan: &Plan, data: &VertexData, reference: &Reference<'_>) -> f64 {
+        let relative = reference.quantized.places[point as usize] - as_vec(plan.position);
+        let (cell, lambda, depth) = locate(self.cells.len(), 0, |i| self.cells[i].barycentric * relative);
+        if depth < -SLACK {
+            return 0.0;
+        }
+        self.visits.push((point, cell as u32));
+        self.deviate(point, cell, clamped(lambda), data, reference)
+    }
+
+    /// Moves the points to the buckets where [`Evaluator::evaluate`] found them to belong.
+    pub fn settle(
+        &mut self,
+        plan: &Plan,
+        data: &VertexData,
+        buckets: &mut Buckets,
+        reference: &Reference<'_>,
+    ) {
+        if plan.on_boundary && self.flat {
+            self.place_on_border(plan, data, buckets, reference);
+        }
+        plan.stay.iter().for_each(|(s, _)| buckets.inside.take(s.tet));
+        plan.fan.iter().for_each(|&(tet, ..)| buckets.inside.take(tet));
+        removed(plan).for_each(|tet| buckets.strays.clear(tet));
+        for &(point, cell, outside) in &self.moves {
+            buckets.inside.put(self.cells[cell as usize].tet, point);
+            buckets.strays.set_outside(point, outside);
+        }
+        let visits = self.visits.iter();
+        visits.for_each(|&(point, cell)| buckets.strays.invite(self.cells[cell as usize].tet, point));
+        if plan.on_boundary {
+            plan.stay.iter().for_each(|(s, _)| buckets.border.take(s.tet));
+            plan.fan.iter().for_each(|&(tet, ..)| buckets.border.take(tet));
+            let moves = self.border_moves.iter();
+            moves.for_each(|&(point, cell)| buckets.border.put(self.cells[cell as usize].tet, point));
+        }
+    }
+
+    fn halve_levels(&mut self, plan: &Plan, data: &VertexData, reference: &Reference<'_>) {
+        let fields = reference.quantized.fields.len();
+        let [a, b] = [plan.a, plan.b].map(|v| &data.levels[v as usize * fields..][..fields]);
+        self.levels.clear();
+        self.levels.extend(a.iter().zip(b).map(|(a, b)| b + ((a - b) >> 1)));
+    }
+
+    /// Starts with the errors of the updates that this one will be a parent of; tells whether there are any.
+    /// A tetrahedron was made by the collapse that made its newest vertex.
+    fn inherit(&mut self, plan: &Plan, mesh: &WorkMesh, data: &VertexData) -> bool {
+        let (fields, mut height) = (self.levels.len(), 0);
+        self.inherited.clear();
+        self.inherited.resize(fields, 0.0);
+        for tet in removed(plan) {
+            let newest = mesh.tets[tet as usize].into_iter().fold(0, u32::max) as usize;
+            let errors = &data.errors[newest * fields..][..fields];
+            self.inherited.iter_mut().zip(errors).for_each(|(error, made)| *error = error.max(*made));
+            height = height.max(data.height[newest]);
+        }
+        self.height = height + 1;
+        self.errors.clone_from(&self.inherited);
+        height > 0
+    }
+
+    /// Adds how much the ends exceed the range of values around the new vertex, as a fraction of the field's range: this
+    /// makes the selection by isovalue monotone.
+    fn add_overshoot(&mut self, plan: &Plan, data: &VertexData, reference: &Reference<'_>) {
+        let fields = &reference.quantized.fields;
+        let level = |v: u32, f: usize| data.levels[v as usize * fields.len() + f];
+        for (f, field) in fields.iter().enumerate() {
+            let own = self.levels[f];
+            let (low, high) =
+                plan.link.iter().map(|&v| level(v, f)).fold((own, own), |(l, h), x| (l.min(x), h.max(x)));
+            let (a, b) = (level(plan.a, f), level(plan.b, f));
+            let beyond = (a.max(b) - high).max(low - a.min(b)).max(0);
+            self.errors[f] += f64::from(beyond) * field.step / field.range() * (1.0 + 1e-9);
+        }
+    }
+
+    /// How far what there is at each end is outside of the new boundary: so much nearer to a region may a tetrahedron be that the
+    /// split creates than all that it removes.
+    fn steps_of_boundary(&mut self, plan: &Plan, data: &VertexData, reference: &Reference<'_>) -> [f64; 2] {
+        let mut steps = [0.0_f64; 2];
+        if !plan.on_boundary || self.flat {
+            return steps;
+        }
+        let at = |v: u32| as_vec(data.positions[v as usize]);
+        for (step, end) in steps.iter_mut().zip([plan.a, plan.b]) {
+            *step = self.outside(at(end), plan, data, reference);
+        }
+        // Between the ends and the link the new boundary may be further away than at either.
+        // The two triangles of an edge have it in opposite directions; one is enough.
+        for i in 0..self.old_border.len() {
+            let [x, y, z] = self.old_border[i];
+            for [x, y] in [[x, y], [y, z], [z, x]] {
+                let at_end = [plan.a, plan.b].map(|end| end == x || end == y);
+                if x < y && at_end.contains(&true) {
+                    let distance = self.outside((at(x) + at(y)) * 0.5, plan, data, reference);
+                    for (step, _) in steps.iter_mut().zip(at_end).filter(|(_, at_end)| *at_end) {
+                        *step = step.max(distance);
+                    }
+                }
+            }
+        }
+        steps
+    }
+
+    /// How far a place, in steps of the lattice, is from the new boundary; 0 if a tetrahedron of the new star holds it.
+    fn outside(&mut self, place: DVec3, plan: &Plan, data: &VertexData, reference: &Reference<'_>) -> f64 {
+        let relative = place - as_vec(plan.position);
+        let (.., depth) = locate(self.cells.len(), 0, |i| self.cells[i].barycentric * relative);
+        if depth >= -SLACK {
+            return 0.0;
+        }
+        let step = DVec3::from_array(reference.quantized.lattice.step);
+        self.nearest(place * step, self.at_centre, plan, data, reference).2
+    }
+
+    /// Finds the part of the reference boundary that the new vertex is near to. Returns the error that the distance
+    /// stands for.
+    fn find_foot(&mut self, plan: &Plan, data: &VertexData, reference: &Reference<'_>) -> f64 {
+        self.foot = NONE;
+        if !plan.on_boundary {
+            return 0.0;
+        }
+        let centre = reference.scaled(plan.position);
+        let enough = NO_DISTANCE * reference.displacement_per_error;
+        let (foot, distance) = reference.skin.walk(centre, data.foot[plan.a as usize], enough);
+        self.foot = foot;
+        if distance <= enough {
+            return 0.0;
+        }
+        let (other, less) = reference.skin.walk(centre, data.foot[plan.b as usize], enough);
+        if less < distance {
+            self.foot = other;
+        }
+        reference.error_from(self.foot, less.min(distance))
+    }
+
+    /// Finds where the reference vertices of the boundary go. Returns the largest error that their distances stand for.
+    fn place_on_border(
+        &mut self,
+        plan: &Plan,
+        data: &VertexData,
+        buckets: &Buckets,
+        reference: &Reference<'_>,
+    ) -> f64 {
+        self.border_moves.clear();
+        let mut largest = 0.0_f64;
+        let ends = [plan.a, plan.b].into_iter().filter(|&end| end < reference.points);
+        for point in removed(plan).flat_map(|tet| buckets.border.iter(tet)).chain(ends) {
+            let p = reference.scaled(reference.quantized.positions[point as usize]);
+            let (cell, _, distance) = self.nearest(p, usize::MAX, plan, data, reference);
+            self.border_moves.push((point, cell));
+            largest = largest.max(reference.error_at(point, distance));
+        }
+        largest
+    }
+
+    /// The boundary triangles of the star, before and after.
+    fn collect_border(&mut self, plan: &Plan, mesh: &WorkMesh) {
+        self.border.clear();
+        self.faces.clear();
+        self.old_border.clear();
+        self.at_centre = 0;
+        if plan.on_boundary {
+            self.collect_border_at_centre(plan, mesh);
+            self.at_centre = self.border.len();
+        }
+        for (i, &(s, _)) in plan.stay.iter().enumerate() {
+            if mesh.neighbors[s.tet as usize][s.corner as usize] == NONE {
+                self.border.push((i as u32, self.cells[i].others));
+            }
+        }
+    }
+
+    fn collect_border_at_centre(&mut self, plan: &Plan, mesh: &WorkMesh) {
+        for &(tet, ..) in &plan.fan {
+            let (corners, around) = (mesh.tets[tet as usize], mesh.neighbors[tet as usize]);
+            let faces = (0..4).filter(|&k| around[k] == NONE);
+            self.old_border.extend(faces.map(|k| FACES[k].map(|l| corners[l])));
+        }
+        for (i, &(s, _)) in plan.stay.iter().enumerate() {
+            let (corners, around) = (mesh.tets[s.tet as usize], mesh.neighbors[s.tet as usize]);
+            let centre = s.corner as usize;
+            for k in (0..4).filter(|&k| k != centre && around[k] == NONE) {
+                self.old_border.push(FACES[k].map(|l| corners[l]));
+                self.border.push((i as u32, FACES[k].map(|l| if l == centre { NONE } else { corners[l] })));
+            }
+        }
+    }
+
+    /// Whether the boundary stays where it is: around both ends it is flat, and in the same plane.
+    fn is_flat(&self, plan: &Plan, data: &VertexData) -> bool {
+        let at = |v: u32| data.positions[v as usize];
+        let Some(plane) = self.old_border.first().map(|t| t.map(at)) else { return false };
+        let in_plane = |p: [i32; 3]| orient3d(plane[0], plane[1], plane[2], p) == 0;
+        in_plane(plan.position) && self.old_border.iter().flatten().all(|&v| in_plane(at(v)))
+    }
+
+    /// Finds the cell for a point, looking at `hint` first, and the error there.
+    fn place(
+        &mut self,
+        point: u32,
+        hint: usize,
+        plan: &Plan,
+        data: &VertexData,
+        reference: &Reference<'_>,
+    ) -> f64 {
+        let relative = reference.quantized.places[point as usize] - as_vec(plan.position);
+        let (mut cell, mut lambda, depth) =
+            locate(self.cells.len(), hint, |i| self.cells[i].barycentric * relative);
+        let mut displaced = 0.0;
+        // The point stays outside of the mesh where no boundary is near, too: it was not in the star from the start.
+        let outside = depth < -SLACK;
+        if outside && !self.border.is_empty() {
+            let (p, moved) = reference.place(point);
+            let (found, q, distance) = self.nearest(p, usize::MAX, plan, data, reference);
+            let step = DVec3::from_array(reference.quantized.lattice.step);
+            let to_q = (q - reference.scaled(plan.position)) / step;
+            (cell, lambda, displaced) =
+                (found as usize, self.cells[found as usize].barycentric * to_q, distance - moved);
+        }
+        self.moves.push((point, cell as u32, outside));
+        let lambda = clamped(lambda);
+        let displaced = reference.error_at(point, displaced);
+        raise(&mut self.errors, displaced);
+        self.deviate(point, cell, lambda, data, reference).max(displaced)
+    }
+
+    /// The nearest of the first `count` boundary triangles after the collapse: its cell, the nearest point, and the
+    /// distance.
+    fn nearest(
+        &mut self,
+        p: DVec3,
+        count: usize,
+        plan: &Plan,
+        data: &VertexData,
+        reference: &Reference<'_>,
+    ) -> (u32, DVec3, f64) {
+        if self.faces.is_empty() {
+            self.lay_out_faces(plan, data, reference);
+        }
+        let (face, q, distance) = nearest_face(p, &self.faces[..count.min(self.faces.len())]);
+        (self.border.get(face).map_or(0, |&(cell, _)| cell), q, distance)
+    }
+
+    fn lay_out_faces(&mut self, plan: &Plan, data: &VertexData, reference: &Reference<'_>) {
+        let at =
+            |v: u32| reference.scaled(if v == NONE { plan.position } else { data.positions[v as usize] });
+        self.faces.extend(self.border.iter().map(|&(_, triangle)| Face::new(triangle.map(at))));
+    }
+
+    fn deviate(
+        &mut self,
+        point: u32,
+        cell: usize,
+        lambda: DVec3,
+        data: &VertexData,
+        reference: &Reference<'_>,
+    ) -> f64 {
+        let fields = reference.quantized.fields.len();
+        let Self { cells, levels, errors, .. } = self;
+        let corners = |f: usize| {
+            let [x, y, z] = cells[cell].others.map(|v| data.levels[v as usize * fields + f]);
+            [levels[f], x, y, z]
+        };
+        reference.quantized.deviation(point, lambda, corners, errors)
+    }
+}
+
+impl Cell {
+    fn new(tet: u32, centre: usize, plan: &Plan, mesh: &WorkMesh, data: &VertexData) -> Self {
+        let corners = mesh.tets[tet as usize];
+        let [i, j, k] = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]][centre];
+        let others = [corners[i], corners[j], corners[k]];
+        let [x, y, z] = others.map(|v| as_vec(data.positions[v as usize]) - as_vec(plan.position));
+        // The orientation was found positive, so the matrix is regular.
+        Self { barycentric: DMat3::from_cols(x, y, z).inverse(), others, tet }
+    }
+}
+
+impl<'a> Reference<'a> {
+    /// A displacement by `edges` times the shortest edge at a vertex counts as an error of 1 there, but at most one of
+    /// `displacement_per_error`.
+    pub fn new(quantized: &'a Quantized, mesh: &WorkMesh, displacement_per_error: f64, edges: f64) -> Self {
+        let step = DVec3::from_array(quantized.lattice.step);
+        let places: Vec<DVec3> = quantized.positions.iter().map(|&q| as_vec(q) * step).collect();
+        let mut shortest = vec![f64::INFINITY; places.len()];
+        for tet in &mesh.tets {
+            for [a, b] in EDGES.map(|edge| edge.map(|i| tet[i] as usize)) {
+                let squared = places[a].distance_squared(places[b]);
+                shortest[a] = shortest[a].min(squared);
+                shortest[b] = shortest[b].min(squared);
+            }
+        }
+        // With no displacement allowed any movement is an infinite error.
+        let allowance = |squared: f64| {
+            let own = if edges > 0.0 { edges * squared.sqrt() } else { 0.0 };
+            own.min(displacement_per_error)
+        };
+        Self {
+            quantized,
+            points: places.len() as u32,
+            skin: Skin::new(&mesh.tets, &mesh.neighbors, &places),
+            allowances: shortest.into_iter().map(allowance).collect(),
+            displacement_per_error,
+        }
+    }
+
+    /// What a displacement at a reference vertex counts as.
+    pub fn error_at(&self, point: u32, distance: f64) -> f64 {
+        if distance > 0.0 { distance / self.allowances[point as usize] } else { 0.0 }
+    }
+
+    /// What a displacement from a triangle of the reference boundary counts as.
+    pub fn error_from(&self, triangle: u32, distance: f64) -> f64 {
+        if distance > 0.0 { distance / self.allowance_from(triangle) } else { 0.0 }
+    }
+
+    /// The displacement from a triangle of the reference boundary that counts as an error of 1.
+    pub fn allowance_from(&self, triangle: u32) -> f64 {
+        self.skin
+            .corners(triangle)
+            .map(|point| self.allowances[point as usize])
+            .into_iter()
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// What a displacement counts as at least, wherever it is.
+    pub fn least_error_of(&self, distance: f64) -> f64 {
+        if distance > 0.0 { distance / self.displacement_per_error } else { 0.0 }
+    }
+
+    /// Where a reference vertex is in the input, in model units from the lattice's origin, and how far the lattice has moved it: what
+    /// that alone puts outside is no displacement.
+    pub fn place(&self, point: u32) -> (DVec3, f64) {
+        let p = self.quantized.places[point as usize] * DVec3::from_array(self.quantized.lattice.step);
+        (p, p.distance(self.scaled(self.quantized.positions[point as usize])))
+    }
+
+    /// A lattice point in model units, from the lattice's origin.
+    pub fn scaled(&self, q: [i32; 3]) -> DVec3 {
+        as_vec(q) * DVec3::from_array(self.quantized.lattice.step)
+    }
+}
+
+/// The tetrahedra that a collapse removes.
+fn removed(plan: &Plan) -> impl Iterator<Item = u32> {
+    plan.stay.iter().map(|(s, _)| s.tet).chain(plan.fan.iter().map(|&(tet, ..)| tet))
+}
+
+/// The corners of the box around lattice points.
+pub(super) fn bounds(places: impl Iterator<Item = [i32; 3]>) -> [DVec3; 2] {
+    let all = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+    places.map(as_vec).fold(all, |[low, high], p| [low.min(p), high.max(p)])
+}
+
+pub(super) fn as_vec(q: [i32; 3]) -> DVec3 {
+    DVec3::from_array(q.map(f64::from))
+}
+
+/// Barycentric coordinates of a point just outside, moved inside.
+pub(super) fn clamped(lambda: DVec3) -> DVec3 {
+    let inside = lambda.max(DVec3::ZERO);
+    let sum = inside.element_sum();
+    if sum > 1.0 { inside / sum } else { inside }
+}

@@ -1,0 +1,255 @@
+//! Vertex-based MTs from fine to coarse: pick a vertex, remove it, record it [§2.2, §5].
+
+use super::BuildConfig;
+use super::BuildError;
+use super::BuildProgress;
+use super::Criterion;
+use super::OnProgress;
+use super::Purpose;
+use super::candidate_queue::Key;
+use super::candidate_queue::Levels;
+use super::cost::Reference;
+use super::gift_wrap::GiftWrap;
+use super::quantize;
+use super::quantize::Quantized;
+use super::removal::Look;
+use super::removal::State;
+use super::rounds::Later;
+use super::rounds::Rounds;
+use super::sequence::Insertion;
+use super::sequence::Sequence;
+use super::work_mesh::WorkMesh;
+use crate::geom::Bounds;
+use crate::mesh;
+use crate::mesh::NONE;
+use crate::mesh::TetMesh;
+use crate::mesh::Topology;
+use crate::mt::ErrorCode;
+use crate::mt::MAX_UPDATES;
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+/// The candidates of a round are looked at in so many batches.
+const BATCHES: usize = 64;
+
+/// Batches are at least so large.
+const SMALLEST_BATCH: usize = 64;
+
+/// An edge that is contracted has about so many tetrahedra around it, at most.
+const LARGEST_FAN: u32 = 10;
+
+/// What [`decimate`] hands over.
+pub(super) struct Decimated {
+    pub sequence: Sequence,
+    pub quantized: Quantized,
+    /// Model units of displacement that count as an error of 1.
+    pub displacement_per_error: f64,
+}
+
+/// Removes vertices of `mesh`, cheapest first, until no more can be removed. `mesh` must be valid: see
+/// [`crate::mesh::repair`].
+///
+/// # Errors
+/// As [`super::edge_mt`].
+pub(super) fn decimate(
+    mesh: &TetMesh,
+    config: &BuildConfig,
+    (criterion, purpose): (Criterion, Purpose),
+    progress: OnProgress<'_>,
+) -> Result<Decimated, BuildError> {
+    if mesh.positions.len() > MAX_UPDATES as usize {
+        return Err(BuildError::TooLarge);
+    }
+    if mesh.tets.is_empty() {
+        return Err(BuildError::Empty);
+    }
+    mesh::check(mesh).map_err(BuildError::Mesh)?;
+    let Topology { neighbors, non_manifold, .. } =
+        mesh::topology(mesh.positions.len(), &mesh.tets).map_err(BuildError::Mesh)?;
+    let quantized = quantize::quantize_cells(mesh, config)?;
+    let gift_wrap = match criterion {
+        Criterion::HalfEdge => None,
+        Criterion::Delaunay => Some(GiftWrap::new(&quantized.positions)),
+    };
+    let displacement_per_error = config.displacement * Bounds::of(&mesh.positions).diagonal();
+    let work = WorkMesh::new(mesh.tets.clone(), neighbors, mesh.positions.len());
+    let levels = Levels::of_purpose(purpose);
+    let reference = Reference::new(&quantized, &work, displacement_per_error, config.displacement_edges);
+    let state = State::new(work, reference, non_manifold, levels);
+    let mut decimator = Decimator::new(state, gift_wrap);
+    decimator.remove_all(progress)?;
+    let Decimator { state, mut sequence, .. } = decimator;
+    sequence.base = state.mesh.tets.iter().copied().filter(|tet| tet[0] != NONE).collect();
+    turn_round(&mut sequence);
+    Ok(Decimated { sequence, quantized, displacement_per_error })
+}
+
+/// Makes insertions, coarse to fine, of removals in the order in which they were made.
+fn turn_round(sequence: &mut Sequence) {
+    let all = sequence.tets.len();
+    sequence.tets.reverse();
+    sequence.steps.reverse();
+    for step in &mut sequence.steps {
+        for range in [&mut step.removed, &mut step.inserted] {
+            *range = all - range.end..all - range.start;
+        }
+    }
+}
+
+struct Decimator<'a> {
+    state: State<'a>,
+    rounds: Rounds,
+    look: Look,
+    slots: Vec<u32>,
+    /// The removals so far: each with the star in `inserted` and the filling in `removed`.
+    sequence: Sequence,
+}
+
+/// A candidate of a round.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Prospect {
+    /// What [`Key::second`] is going to be, or less.
+    guess: u32,
+    vertex: u32,
+    /// The best end to move it to; [`NONE`] if that is not known.
+    end: u32,
+}
+
+impl<'a> Decimator<'a> {
+    fn new(state: State<'a>, gift_wrap: Option<GiftWrap>) -> Self {
+        let points = state.versions.len();
+        let mut rounds = Rounds::new(state.levels.of(0.0), state.levels.last(), points);
+        let free = (0..points as u32).filter(|&v| state.mesh.has(v) && !state.frozen[v as usize]);
+        free.for_each(|v| rounds.wait(v));
+        let look = Look::new(gift_wrap, points);
+        Self { state, rounds, look, slots: Vec::new(), sequence: Sequence::default() }
+    }
+
+    fn remove_all(&mut self, progress: OnProgress<'_>) -> Result<(), BuildError> {
+        let vertices = (0..self.state.reference.points).filter(|&v| self.state.mesh.has(v)).count();
+        loop {
+            let before = self.sequence.steps.len();
+            self.round(progress)?;
+            let after = self.sequence.steps.len();
+            if !self.rounds.end(after - before, vertices - after) {
+                return Ok(());
+            }
+        }
+    }
+
+    /// Looks at the candidates of a round in batches, so that those that have come too near to a removal until then need not
+    /// be looked at, and removes what can be removed, in the order of the keys.
+    fn round(&mut self, progress: OnProgress<'_>) -> Result<(), BuildError> {
+        let candidates = self.candidates();
+        let size = (candidates.len() / BATCHES).max(SMALLEST_BATCH);
+        let mut ready = BinaryHeap::new();
+        for batch in candidates.chunks(size) {
+            let done = self.sequence.steps.len() as u64;
+            let total = u64::from(self.state.reference.points);
+            if progress(BuildProgress { stage: "remove", done, total }).is_break() {
+                return Err(BuildError::Stopped);
+            }
+            self.remove_before(batch[0].guess, &mut ready);
+            batch.iter().for_each(|prospect| self.look_at(*prospect, &mut ready));
+        }
+        self.remove_before(u32::MAX, &mut ready);
+        Ok(())
+    }
+
+    /// The candidates of the next round, in about the order of their keys.
+    fn candidates(&mut self) -> Vec<Prospect> {
+        let (waiting, later) = self.rounds.start();
+        let state = &self.state;
+        let unchanged =
+            later.into_iter().filter(|later| state.versions[later.vertex as usize] == later.version);
+        let known = unchanged.map(|later| (later.vertex, later.end));
+        let prospect = |(vertex, end): (u32, u32)| {
+            let tets = state.degrees[vertex as usize].saturating_sub(LARGEST_FAN);
+            Prospect { guess: state.second(vertex, tets), vertex, end }
+        };
+        let all = known.chain(waiting.into_iter().map(|v| (v, NONE)));
+        let mut all: Vec<Prospect> = all.map(prospect).collect();
+        all.sort_unstable();
+        all
+    }
+
+    /// Looks at a candidate, and puts it where it belongs. What cannot be removed is left alone until its neighbourhood
+    /// changes.
+    fn look_at(&mut self, Prospect { vertex, end, .. }: Prospect, ready: &mut BinaryHeap<Reverse<Key>>) {
+        if self.rounds.waits(vertex) {
+            return;
+        }
+        let level = self.rounds.level();
+        match self.look.at(&self.state, vertex, end, level) {
+            Some(key) if key.level() <= level => ready.push(Reverse(key.no_earlier_than(level))),
+            Some(key) => {
+                let version = self.state.versions[vertex as usize];
+                self.rounds.put_off(key.level(), Later { vertex, end: key.b, version });
+            }
+            None => {}
+        }
+    }
+
+    /// Removes the vertices that are due before those with this guess, unless the round has changed their stars.
+    fn remove_before(&mut self, guess: u32, ready: &mut BinaryHeap<Reverse<Key>>) {
+        while ready.peek().is_some_and(|Reverse(key)| key.second() < guess) {
+            let Some(Reverse(key)) = ready.pop() else { return };
+            if self.rounds.waits(key.a) {
+                continue;
+            }
+            // The star is what it was, and so is the error. What is behind the other end of the edge may have changed, and
+            // topology depends on that.
+            let level = self.rounds.level();
+            match self.look.at(&self.state, key.a, key.b, level) {
+                Some(found) if found.level() <= level => self.remove(),
+                _ => self.rounds.wait(key.a),
+            }
+        }
+    }
+
+    /// Removes the vertex that was looked at last.
+    fn remove(&mut self) {
+        let Self { state, look, slots, sequence, .. } = self;
+        let Look { hole, best, .. } = look;
+        let State { mesh, past, degrees, .. } = state;
+        // Never zero: error 0 is to mean the reference mesh, with every vertex in.
+        let stored = |error: &f64| ErrorCode::at_least(*error).max(ErrorCode(1)).error();
+        let errors: Vec<f64> = best.cost.errors.iter().map(stored).collect();
+        let start = sequence.tets.len();
+        sequence.tets.extend(hole.star.iter().map(|s| mesh.tets[s.tet as usize]));
+        let middle = sequence.tets.len();
+        sequence.tets.extend_from_slice(&best.filling.tets);
+        let end = sequence.tets.len();
+        let step = best.cost.step;
+        let removal = sequence.steps.len() as u32;
+        sequence.steps.push(Insertion {
+            vertex: hole.a,
+            removed: middle..end,
+            inserted: start..middle,
+            errors: errors.clone(),
+            step,
+        });
+        hole.replace(mesh, &best.filling, slots);
+        past.errors.extend(errors);
+        past.makers.resize(mesh.tets.len(), NONE);
+        slots.iter().for_each(|&t| past.makers[t as usize] = removal);
+        best.cost.settle(hole, &best.filling, &mut state.buckets, &state.reference, slots);
+        let stars = &sequence.tets[start..middle];
+        stars.iter().flatten().for_each(|&v| degrees[v as usize] -= 1);
+        best.filling.tets.iter().flatten().for_each(|&v| degrees[v as usize] += 1);
+        // The neighbours have other stars now, and may have become cheaper.
+        let reach = self.state.reaches[self.look.hole.a as usize];
+        for i in 0..self.look.hole.link.len() {
+            let v = self.look.hole.link[i];
+            self.state.versions[v as usize] = self.state.versions[v as usize].wrapping_add(1);
+            // What was in the star of v, and is not any more, lies within the reach of this removal.
+            self.state.reaches[v as usize].join(&reach);
+            if !self.state.frozen[v as usize] {
+                self.rounds.wait(v);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

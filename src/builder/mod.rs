@@ -1,0 +1,476 @@
+//! From a tetrahedral mesh to a Multi-Tessellation, offline.
+//!
+//! [`build`] makes an MT of any kind by any method that goes with it: see [`Method`]. The usual one, [`Method::Decimate`],
+//! collapses vertices onto neighbours in rounds of removals that do not depend on each other; the removals in reverse are the
+//! updates of a half-edge MT. [`edge_mt`] is behind edge-based MTs: it
+//! collapses edges to their midpoints, cheapest first, until nothing can be collapsed any more; the
+//! collapses in reverse are the updates of an edge-based MT [§2.1]. The cost of a collapse is the largest error it
+//! leads to, evaluated exactly at every reference vertex that its star covers. The model is the greedy scheme of
+//! Cignoni, Costanza, Montani, Rocchini, Scopigno (*Simplification of tetrahedral meshes with accurate error
+//! evaluation*, 2000): a cheap prediction orders the candidates, the exact error decides.
+//!
+//! What is promised:
+//! - **Errors** bound the deviation from the input's field at every reference vertex, where the input has it, for all consistent
+//!   sets, and grow along the partial order towards the base mesh. (By insertion: where the lattice has put it.)
+//! - **Topology** never changes: the link condition is checked inside and on the boundary, and vertices at which the
+//!   input is not a manifold stay where they are.
+//! - **Geometry**: every tetrahedron is positive on the lattice, exactly. Parts of the boundary that are flat on the lattice stay
+//!   flat, and the creases and corners where such parts meet at 60° or more stay straight and where they are; where
+//!   the boundary moves, that is counted into the error.
+//! - **Determinism**: the same input gives the same MT on every platform.
+//!
+//! Not promised: distant parts of a curved boundary may come to overlap where they were nearer to each other than
+//! the error allows the boundary to move.
+
+mod base;
+mod beside;
+mod block_order;
+mod boundary_distance;
+mod candidate_queue;
+mod collapse;
+mod collapse_check;
+mod cost;
+mod decimate;
+mod delaunay;
+mod field_lattice;
+mod field_selection;
+mod fill_cost;
+mod flat;
+mod gift_wrap;
+mod half_edge;
+mod history;
+mod hole;
+mod insert;
+mod method;
+mod order;
+mod position_lattice;
+mod quantize;
+mod reach;
+mod removal;
+mod rounds;
+mod sequence;
+mod strays;
+mod vertex;
+mod work_mesh;
+
+pub use collapse::edge_mt;
+pub use delaunay::delaunay;
+pub use method::{Construction, Criterion, Method, Purpose, VertexMethod};
+
+use crate::mesh::MeshError;
+use crate::mesh::TetMesh;
+use crate::mt::ConvertError;
+use crate::mt::ErrorCode;
+use crate::mt::Exact;
+use crate::mt::ExplicitMt;
+use crate::mt::HalfEdgeMt;
+use crate::mt::Mt;
+use crate::mt::MtKind;
+use crate::mt::MultiTessellation;
+use crate::mt::UpdateError;
+use crate::mt::UpdateId;
+use crate::mt::VertexId;
+use std::fmt;
+use std::ops::ControlFlow;
+
+/// How to build.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BuildConfig {
+    /// The kind of MT and how it is built.
+    pub construction: Construction,
+    /// Names of the fields to keep, in this order; a vector's name stands for its components. Of a time series all steps
+    /// are kept. The first field of the mesh if empty.
+    pub fields: Vec<String>,
+    /// Keep all fields but the lengths of vectors, which follow from their components; those that are named come first.
+    pub all_fields: bool,
+    /// Bits of the position lattice, 1 to 30. If neither these nor a tolerance are given: 16 where that keeps every cell
+    /// positive, else as few as do, and two more to spare. No side of the domain is longer than 2^bits steps.
+    pub position_bits: Option<u32>,
+    /// How far the lattice may move a point, in model units: as few bits are taken as keep within it, and every cell
+    /// positive.
+    pub position_tolerance: Option<f64>,
+    /// How finely fields are kept. Fields of integers whose range fits 24 bits are exact unless they are named in
+    /// [`BuildConfig::precision_of`].
+    pub field_precision: FieldPrecision,
+    /// How finely fields, or vectors, of these names are kept.
+    pub precision_of: Vec<(String, FieldPrecision)>,
+    /// Names of fields, or vectors, of which the exact values are kept as well.
+    pub lossless: Vec<String>,
+    /// Keep the exact values of all fields.
+    pub all_lossless: bool,
+    /// The displacement of the boundary that counts as much as an error of the field's whole range, as a fraction
+    /// of the domain's diagonal; not negative. With 0.2, an error of 1 % allows the boundary to move by 0.2 % of the
+    /// diagonal.
+    pub displacement: f64,
+    /// The same in lengths of the shortest edge of the reference mesh at each place, where that is less; infinite where cells do not
+    /// matter. With 10, an error of 1 % allows the boundary to move by a tenth of such an edge.
+    pub displacement_edges: f64,
+    /// log2 of the updates that files are going to have in a block, 4 to 16: within a block of an edge-based MT updates are
+    /// numbered so that they take few bits. Encode with the same.
+    pub block_bits: u32,
+}
+
+impl Default for BuildConfig {
+    /// The usual configuration for the usual kind, [`MtKind::HalfEdge`].
+    fn default() -> Self {
+        Self::of(MtKind::HalfEdge)
+    }
+}
+
+impl BuildConfig {
+    /// The usual configuration for a kind of MT.
+    pub fn of(kind: MtKind) -> Self {
+        Self {
+            construction: Construction::usual(kind),
+            fields: Vec::new(),
+            all_fields: false,
+            position_bits: None,
+            position_tolerance: None,
+            field_precision: FieldPrecision::Bits(16),
+            precision_of: Vec::new(),
+            lossless: Vec::new(),
+            all_lossless: false,
+            displacement: 0.2,
+            displacement_edges: 10.0,
+            block_bits: kind.usual_block_bits(),
+        }
+    }
+}
+
+/// How finely the values of a field are kept; what is lost remains as an error at full resolution.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FieldPrecision {
+    /// By a lattice of so many bits, 1 to 24.
+    Bits(u32),
+    /// By as few bits as keep each value within so many units of the field.
+    Units(f64),
+    /// By as few bits as keep each value within this fraction of the field's range.
+    Fraction(f64),
+}
+
+/// How far the work has come; sent now and then, so that a caller can show it and stop it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BuildProgress {
+    /// What is being done.
+    pub stage: &'static str,
+    /// How much of it is done.
+    pub done: u64,
+    /// All there is to do, as far as is known.
+    pub total: u64,
+}
+
+/// Receives progress; [`ControlFlow::Break`] stops the work.
+pub type OnProgress<'a> = &'a mut dyn FnMut(BuildProgress) -> ControlFlow<()>;
+
+/// An MT and how it came about.
+#[derive(Clone, Debug)]
+pub struct BuildResult<M = Mt> {
+    /// The MT, complete and applied once from base to reference mesh.
+    pub mt: M,
+    /// Counts.
+    pub summary: BuildSummary,
+    /// The MT's vertex for each point of the mesh.
+    pub vertices: Vec<VertexId>,
+    /// The exact values of the fields that are wanted without loss, in the order of the MT's fields.
+    pub exact: Vec<Exact>,
+}
+
+/// What came of a build.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct BuildSummary {
+    /// Vertices of the reference mesh.
+    pub vertices: u32,
+    /// Tetrahedra of the reference mesh.
+    pub tetrahedra: u32,
+    /// Vertices of the base mesh.
+    pub base_vertices: u32,
+    /// Tetrahedra of the base mesh.
+    pub base_tetrahedra: u32,
+    /// Updates of the MT.
+    pub updates: u32,
+    /// Bits of the position lattice.
+    pub position_bits: u32,
+    /// Length of the longest chain of updates, each of which depends on the one before.
+    pub depth: u32,
+}
+
+/// Why no MT was built.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum BuildError {
+    /// Kind, method and criterion do not go together.
+    Combination {
+        /// The two that do not.
+        which: [String; 2],
+        /// What goes with what.
+        instead: &'static str,
+    },
+    /// The MT could not be converted to the kind that was asked for.
+    Convert(ConvertError),
+    /// The mesh has no tetrahedra.
+    Empty,
+    /// The mesh has no point field.
+    NoField,
+    /// A wanted field is not there.
+    UnknownField {
+        /// The name asked for.
+        name: String,
+        /// The names that are there.
+        known: Vec<String>,
+    },
+    /// A wanted field is one at cells.
+    CellField {
+        /// Its name.
+        name: String,
+    },
+    /// More fields than an MT can have.
+    TooManyFields {
+        /// How many are wanted.
+        fields: usize,
+    },
+    /// The values of a field are too far apart to subtract them.
+    WideRange {
+        /// The field.
+        field: String,
+    },
+    /// The finest lattice moves positions, or values, further than it may.
+    Tolerance {
+        /// The field; none if positions are meant.
+        field: Option<String>,
+        /// How far it moves them.
+        reached: f64,
+    },
+    /// An option is out of its range.
+    Option {
+        /// Its name.
+        name: &'static str,
+        /// What it may be.
+        expected: &'static str,
+    },
+    /// The mesh is not one to build on; repair it first.
+    Mesh(MeshError),
+    /// A coordinate or a field value is not finite.
+    NotFinite {
+        /// The point.
+        point: u32,
+    },
+    /// A tetrahedron is too thin for the lattice.
+    TooThin {
+        /// The cell.
+        cell: u32,
+        /// The bits that were asked for, or tried last.
+        bits: u32,
+        /// The fewest bits that keep all cells positive, if it is not one of those.
+        enough: Option<u32>,
+    },
+    /// Fewer than four points, or all of them in one plane.
+    Flat,
+    /// Two points are in the same place.
+    SamePlace {
+        /// The points.
+        points: [u32; 2],
+    },
+    /// More tetrahedra meet at a point than an MT can describe.
+    Crowded {
+        /// The point.
+        point: u32,
+    },
+    /// The mesh is not convex: insertion fills the convex hull of the points.
+    NotConvex,
+    /// More vertices than an MT can number.
+    TooLarge,
+    /// The caller stopped the work.
+    Stopped,
+    /// The finished MT failed its own check: a bug in the builder, not in the input.
+    Internal(UpdateError),
+}
+
+impl fmt::Display for BuildError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Combination { which: [one, other], instead } => {
+                write!(f, "{one} does not go with {other}: {instead}")
+            }
+            Self::Convert(error) => write!(f, "{error}"),
+            Self::Empty => {
+                write!(f, "the mesh has no tetrahedra; only insertion builds an MT of points alone")
+            }
+            Self::NoField => {
+                write!(f, "the mesh has no point field: an MT needs at least one scalar at its points")
+            }
+            Self::UnknownField { name, known } => {
+                write!(f, "there is no point field '{name}'; the mesh has: {}", known.join(", "))
+            }
+            Self::Option { name, expected } => write!(f, "option {name} must be {expected}"),
+            Self::Mesh(error) => write!(f, "{error}"),
+            Self::NotFinite { point } => {
+                write!(f, "point {point} has a coordinate or a value that is not finite")
+            }
+            Self::CellField { name } => write!(
+                f,
+                "'{name}' is a field at cells, but an MT has fields at points; turn it into one at points first"
+            ),
+            Self::TooManyFields { fields } => {
+                write!(f, "{fields} fields and time steps are too many (at most 255); name those to keep")
+            }
+            Self::WideRange { field } => {
+                write!(f, "the values of field '{field}' are too far apart; scale them down")
+            }
+            Self::Tolerance { field: Some(field), reached } => write!(
+                f,
+                "24 bits keep the values of field '{field}' within {reached:e}, no closer; allow a \
+                 larger tolerance, or keep its exact values"
+            ),
+            Self::Tolerance { field: None, reached } => write!(
+                f,
+                "30 bits keep the positions within {reached:e}, no closer; allow a larger tolerance"
+            ),
+            Self::TooThin { cell, bits, enough: Some(enough) } => write!(
+                f,
+                "cell {cell} is too thin for a lattice of {bits} bits: it turns flat or inside out; use {enough} \
+                 position bits"
+            ),
+            Self::TooThin { cell, bits, enough: None } => write!(
+                f,
+                "cell {cell} is too thin for a lattice of {bits} bits: it turns flat or inside out, and no lattice of at \
+                 most 30 bits keeps all cells; remove the cell"
+            ),
+            Self::Flat => {
+                write!(f, "the points do not span a volume: there must be four that are not in one plane")
+            }
+            Self::SamePlace { points: [a, b] } => write!(
+                f,
+                "points {a} and {b} are in the same place on the lattice: remove one, or use more position bits \
+                 (at most 30)"
+            ),
+            Self::Crowded { point } => {
+                write!(f, "too many tetrahedra meet around point {point} for insertion; build by decimation")
+            }
+            Self::NotConvex => write!(
+                f,
+                "the mesh does not fill its convex hull, which insertion would do; build by decimation"
+            ),
+            Self::TooLarge => write!(f, "the mesh has more than 2^30 points; split it into parts"),
+            Self::Stopped => write!(f, "stopped"),
+            Self::Internal(error) => write!(f, "the built MT is not sound ({error}); please report this"),
+        }
+    }
+}
+
+impl std::error::Error for BuildError {}
+
+/// Builds an MT of `mesh`, which must be valid: see [`crate::mesh::repair`].
+///
+/// Works on one thread and calls `progress` now and then.
+///
+/// # Errors
+/// If the mesh is not valid, has none of the wanted fields, or does not fit the
+/// lattice; if `progress` breaks the work off.
+pub fn build(
+    mesh: &TetMesh,
+    config: &BuildConfig,
+    progress: OnProgress<'_>,
+) -> Result<BuildResult, BuildError> {
+    let kind = config.construction.kind();
+    let BuildResult { mt, summary, vertices, exact } = match config.construction {
+        Construction::Edge | Construction::ExplicitEdge => {
+            let BuildResult { mt, summary, vertices, exact } = edge_mt(mesh, config, progress)?;
+            BuildResult { mt: Mt::from(mt), summary, vertices, exact }
+        }
+        Construction::HalfEdge { purpose } => {
+            let how = (Criterion::HalfEdge, purpose);
+            summed_up(mesh, config, vertex::decimated_mt(mesh, config, how, progress)?)?
+        }
+        Construction::Vertex(method) | Construction::ExplicitVertex(method) => {
+            summed_up(mesh, config, vertex::mt_by(method, mesh, config, progress)?)?
+        }
+    };
+    // Conversions keep the numbers of the vertices.
+    let (mt, vertices, exact) = match mt {
+        Mt::Explicit(explicit) if kind == MtKind::HalfEdge => {
+            let (mt, vertices) = half_edge_mt(&explicit, &vertices, config.block_bits.clamp(4, 16))?;
+            let exact = field_selection::exact_values(mesh, config, &vertices)?;
+            (mt.into(), vertices, exact)
+        }
+        mt => (mt, vertices, exact),
+    };
+    let mt = match mt {
+        mt if mt.info().kind == kind => mt,
+        mt => mt.convert(kind).map_err(BuildError::Convert)?,
+    };
+    Ok(BuildResult { mt, summary, vertices, exact })
+}
+
+/// The half-edge MT of an explicit one, its updates in blocks by what they reach, and its vertex for each point, given those
+/// of the explicit one.
+fn half_edge_mt(
+    explicit: &ExplicitMt,
+    vertices: &[VertexId],
+    block_bits: u32,
+) -> Result<(HalfEdgeMt, Vec<VertexId>), BuildError> {
+    let near = HalfEdgeMt::near_vertices(explicit).map_err(BuildError::Convert)?;
+    let (mut starts, mut parents) = (vec![0], Vec::new());
+    let all = || (0..explicit.updates()).map(UpdateId);
+    for u in all() {
+        parents.extend_from_slice(explicit.parents(u));
+        starts.push(parents.len() as u32);
+    }
+    let boxes: Vec<[[i32; 3]; 2]> = all().map(|u| bounds_of_inserted(explicit, u)).collect();
+    let errors: Vec<ErrorCode> = all().map(|u| explicit.error(u)).collect();
+    let base = explicit.base_mesh().positions.len() as u32;
+    let updates = block_order::Updates {
+        base,
+        near: &near,
+        starts: &starts,
+        parents: &parents,
+        boxes: &boxes,
+        errors: &errors,
+    };
+    let order = updates.order(block_bits);
+    let explicit = explicit.reordered(&order).map_err(BuildError::Internal)?;
+    let mut new_numbers = vec![0; order.len()];
+    (0..).zip(&order).for_each(|(new, &old)| new_numbers[old as usize] = new);
+    let renamed = |v: &VertexId| match v.0.checked_sub(base) {
+        Some(update) => VertexId(base + new_numbers[update as usize]),
+        None => *v,
+    };
+    let mt = HalfEdgeMt::from_explicit(&explicit, block_bits).map_err(BuildError::Convert)?;
+    Ok((mt, vertices.iter().map(renamed).collect()))
+}
+
+/// The box around the tetrahedra that an update inserts.
+fn bounds_of_inserted(explicit: &ExplicitMt, u: UpdateId) -> [[i32; 3]; 2] {
+    let tets = explicit.inserted(u);
+    let corners = explicit.tets()[tets.start as usize..tets.end as usize].as_flattened();
+    corners
+        .iter()
+        .map(|&v| explicit.position(VertexId(v)))
+        .fold([[i32::MAX; 3], [i32::MIN; 3]], |[low, high], p| {
+            [[0, 1, 2].map(|k| low[k].min(p[k])), [0, 1, 2].map(|k| high[k].max(p[k]))]
+        })
+}
+
+/// Adds what is to be told of an MT that is spelled out.
+fn summed_up(
+    mesh: &TetMesh,
+    config: &BuildConfig,
+    (mt, vertices): (ExplicitMt, Vec<VertexId>),
+) -> Result<BuildResult, BuildError> {
+    let mut depths: Vec<u32> = Vec::new();
+    for u in (0..mt.updates()).map(UpdateId) {
+        let above = mt.parents(u).iter().map(|&p| depths[p as usize]).max();
+        depths.push(above.unwrap_or(0) + 1);
+    }
+    let info = mt.info();
+    let summary = BuildSummary {
+        vertices: info.vertices,
+        tetrahedra: info.tetrahedra,
+        base_vertices: mt.base_mesh().positions.len() as u32,
+        base_tetrahedra: mt.base_mesh().tets.len() as u32,
+        updates: mt.updates(),
+        position_bits: info.lattice.bits,
+        depth: depths.into_iter().max().unwrap_or(0),
+    };
+    let exact = field_selection::exact_values(mesh, config, &vertices)?;
+    Ok(BuildResult { mt: mt.into(), summary, vertices, exact })
+}

@@ -1,0 +1,207 @@
+//! The input on integer lattices: positions and field levels.
+
+use super::BuildConfig;
+use super::BuildError;
+use super::beside;
+use super::beside::Home;
+use super::cost::as_vec;
+use super::cost::clamped;
+use super::field_lattice;
+use super::field_selection;
+use super::position_lattice;
+use super::position_lattice::Placed;
+use crate::geom::Lattice;
+use crate::geom::ON_LATTICE;
+use crate::geom::WIDE_BITS;
+use crate::mesh::Field;
+use crate::mesh::TetMesh;
+use crate::mt::FieldInfo;
+use crate::mt::MtInfo;
+use glam::DVec3;
+
+/// The reference mesh on its lattices.
+pub(super) struct Quantized {
+    pub lattice: Lattice,
+    pub fields: Vec<FieldInfo>,
+    pub positions: Vec<[i32; 3]>,
+    /// `levels[point * fields + f]`.
+    pub levels: Vec<i32>,
+    /// The input's values in units of levels, not rounded; errors are measured against these.
+    pub exact: Vec<f64>,
+    /// The input's points in steps of the lattice, not rounded; the field is compared there.
+    pub places: Vec<DVec3>,
+    /// Where those are that the lattice has moved; nothing where there are no cells.
+    pub homes: Vec<Home>,
+    /// How far the lattice moves a point at most: see [`MtInfo::quantization`](crate::mt::MtInfo::quantization).
+    pub quantization: f64,
+}
+
+impl Quantized {
+    fn new(
+        mesh: &TetMesh,
+        Placed { lattice, positions }: Placed,
+        fields: Vec<FieldInfo>,
+        levels: Vec<i32>,
+        exact: Vec<f64>,
+    ) -> Self {
+        let (origin, step) = (DVec3::from(lattice.origin), DVec3::from(lattice.step));
+        let place = |(p, &q): (&[f64; 3], &[i32; 3])| {
+            let (place, rounded) = ((DVec3::from(*p) - origin) / step, as_vec(q));
+            if place.distance(rounded) < ON_LATTICE { rounded } else { place }
+        };
+        let places = mesh.positions.iter().zip(&positions).map(place).collect();
+        let quantization = position_lattice::largest_move(mesh, &lattice, &positions);
+        Self { lattice, fields, positions, levels, exact, places, homes: Vec::new(), quantization }
+    }
+
+    /// Where the lattice has put a point, in its steps.
+    pub fn rounded(&self, point: u32) -> DVec3 {
+        as_vec(self.positions[point as usize])
+    }
+
+    /// Whether the lattice has moved a point.
+    pub fn is_moved(&self, point: u32) -> bool {
+        self.places[point as usize] != self.rounded(point)
+    }
+
+    /// By how much the reference mesh, on the lattices, differs from the input's values at the input's points, as a fraction of the
+    /// range of each field, where the lattice of the positions has moved them.
+    fn losses(&self, tets: &[[u32; 4]]) -> Vec<f64> {
+        let mut losses = vec![0.0; self.fields.len()];
+        for home in &self.homes {
+            let tet = tets[home.tet as usize];
+            self.deviation(home.point, clamped(home.lambda), |f| tet.map(|v| self.level(v, f)), &mut losses);
+        }
+        losses
+    }
+
+    /// The level of field `f` at point `v`.
+    pub fn level(&self, v: u32, f: usize) -> i32 {
+        self.levels[v as usize * self.fields.len() + f]
+    }
+
+    /// How far the value of field `f` at `v` exceeds the range of those at the points around it, as a fraction of the
+    /// field's range. Added to inherited errors it makes the selection by isovalue monotone.
+    pub fn overshoot<'a>(&self, v: u32, around: impl IntoIterator<Item = &'a u32>, f: usize) -> f64 {
+        let field = &self.fields[f];
+        let levels = around.into_iter().map(|&w| self.level(w, f));
+        let (low, high) = levels.fold((i32::MAX, i32::MIN), |(low, high), x| (low.min(x), high.max(x)));
+        let own = self.level(v, f);
+        let beyond = (own - high).max(low - own).max(0);
+        f64::from(beyond) * field.step / field.range() * (1.0 + 1e-9)
+    }
+
+    /// Raises the error of each field to the deviation, as a fraction of its range, of the value that is interpolated at a
+    /// point from the true one; returns the largest of these deviations. `lambda` has the point's barycentric coordinates
+    /// but for the first one, `corners` gives the levels of a field.
+    pub fn deviation(
+        &self,
+        point: u32,
+        lambda: DVec3,
+        corners: impl Fn(usize) -> [i32; 4],
+        errors: &mut [f64],
+    ) -> f64 {
+        let own = 1.0 - lambda.element_sum();
+        let mut largest = 0.0_f64;
+        for (f, field) in self.fields.iter().enumerate() {
+            let [w, x, y, z] = corners(f).map(f64::from);
+            let value = own * w + lambda.x * x + lambda.y * y + lambda.z * z;
+            let exact = self.exact[point as usize * self.fields.len() + f];
+            let error = (value - exact).abs() * field.step / field.range();
+            errors[f] = errors[f].max(error);
+            largest = largest.max(error);
+        }
+        largest
+    }
+
+    /// The average gradient of each field at each point, in levels per lattice step: averages of the tetrahedra's
+    /// gradients, weighted by volume.
+    pub fn gradients(&self, tets: &[[u32; 4]]) -> Vec<DVec3> {
+        let (vertices, fields) = (self.positions.len(), self.fields.len());
+        let mut sums = vec![DVec3::ZERO; vertices * fields];
+        let mut volumes = vec![0.0; vertices];
+        for tet in tets {
+            let [a, b, c, d] = tet.map(|v| DVec3::from_array(self.positions[v as usize].map(f64::from)));
+            let (u, v, w) = (b - a, c - a, d - a);
+            let volume = u.cross(v).dot(w);
+            for f in 0..fields {
+                let [l0, l1, l2, l3] = tet.map(|v| f64::from(self.levels[v as usize * fields + f]));
+                // Six times the volume times the gradient; the volume cancels in the weighted average.
+                let weighted = v.cross(w) * (l1 - l0) + w.cross(u) * (l2 - l0) + u.cross(v) * (l3 - l0);
+                tet.iter().for_each(|&v| sums[v as usize * fields + f] += weighted);
+            }
+            tet.iter().for_each(|&v| volumes[v as usize] += volume);
+        }
+        sums.iter()
+            .enumerate()
+            .map(|(i, sum)| *sum / f64::max(volumes[i / fields], f64::MIN_POSITIVE))
+            .collect()
+    }
+}
+
+/// Puts the points on a lattice that keeps the cells positive or, where there are none, the points apart.
+pub(super) fn quantize(mesh: &TetMesh, config: &BuildConfig) -> Result<Quantized, BuildError> {
+    if config.position_bits.is_some_and(|bits| !(1..=WIDE_BITS).contains(&bits)) {
+        return Err(BuildError::Option { name: "position-bits", expected: "1 to 30" });
+    }
+    let chosen = field_selection::fields(mesh, config)?;
+    check_finite(mesh, &chosen)?;
+    let placed = position_lattice::place(mesh, config)?;
+    let fields = field_lattice::field_lattices(&chosen, config)?;
+    let per_point = |i: usize| chosen.iter().zip(&fields).map(move |(field, info)| (field.values[i], info));
+    let points = 0..mesh.positions.len();
+    let levels = points.clone().flat_map(|i| per_point(i).map(|(value, info)| info.nearest(value))).collect();
+    let exact = points.flat_map(|i| per_point(i).map(|(x, info)| (x - info.origin) / info.step)).collect();
+    Ok(Quantized::new(mesh, placed, fields, levels, exact))
+}
+
+/// The same for a mesh whose cells are kept: errors are then measured at the input's own points.
+pub(super) fn quantize_cells(mesh: &TetMesh, config: &BuildConfig) -> Result<Quantized, BuildError> {
+    let mut quantized = quantize(mesh, config)?;
+    quantized.homes = beside::homes(&mesh.tets, &quantized).map_err(BuildError::Mesh)?;
+    let mut losses = quantized.losses(&mesh.tets);
+    // Where cells are thin for what varies across them, a finer lattice is what keeps the reference mesh near the input.
+    let is_free = config.position_bits.is_none() && config.position_tolerance.is_none();
+    let is_large = |losses: &[f64], fields: &[FieldInfo]| {
+        let own = fields.iter().map(|field| field.quantization / field.range());
+        losses.iter().zip(own).any(|(&loss, own)| loss > own + LARGEST_LOSS)
+    };
+    while is_free && is_large(&losses, &quantized.fields) {
+        let bits = quantized.lattice.bits + FINER_BITS;
+        if bits > WIDE_BITS {
+            break;
+        }
+        let finer = BuildConfig { position_bits: Some(bits), ..config.clone() };
+        let Ok(placed) = position_lattice::place(mesh, &finer) else { break };
+        let Quantized { fields, levels, exact, .. } = quantized;
+        quantized = Quantized::new(mesh, placed, fields, levels, exact);
+        quantized.homes = beside::homes(&mesh.tets, &quantized).map_err(BuildError::Mesh)?;
+        losses = quantized.losses(&mesh.tets);
+    }
+    for (field, loss) in quantized.fields.iter_mut().zip(losses) {
+        field.quantization = field.quantization.max(loss * field.range());
+    }
+    Ok(quantized)
+}
+
+/// Without other wishes the lattice of the positions is fine enough that the reference mesh has, where the input's points are, the
+/// input's values up to this fraction of the range, besides what the lattices of the fields round off.
+const LARGEST_LOSS: f64 = 0.001;
+/// Bits by which it becomes finer at a time.
+const FINER_BITS: u32 = 2;
+
+/// The error that is left at full resolution, of whichever field has the largest.
+pub(super) fn floors(info: &MtInfo) -> Vec<f64> {
+    (0..info.fields.len()).map(|f| info.floor(f)).collect()
+}
+
+fn check_finite(mesh: &TetMesh, fields: &[&Field]) -> Result<(), BuildError> {
+    let sound = |i: usize| {
+        mesh.positions[i].iter().all(|x| x.is_finite())
+            && fields.iter().all(|field| field.values.get(i).is_some_and(|x| x.is_finite()))
+    };
+    match (0..mesh.positions.len()).find(|&i| !sound(i)) {
+        Some(point) => Err(BuildError::NotFinite { point: point as u32 }),
+        None => Ok(()),
+    }
+}

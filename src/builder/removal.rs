@@ -1,0 +1,216 @@
+//! Looking at the removal of a vertex: what would fill its hole, and at what error.
+//!
+//! All that is read is in [`State`], which no look changes, and all that is written in [`Look`]: so many candidates can be
+//! looked at side by side, each thread having its own [`Look`].
+
+use super::candidate_queue::Key;
+use super::candidate_queue::Levels;
+use super::cost::Buckets;
+use super::cost::Reference;
+use super::cost::largest;
+use super::fill_cost::FillCost;
+use super::fill_cost::Legacy;
+use super::fill_cost::Past;
+use super::gift_wrap::GiftWrap;
+use super::half_edge::Nearby;
+use super::half_edge::contract;
+use super::half_edge::keeps_topology;
+use super::hole::Filling;
+use super::hole::Hole;
+use super::quantize::Quantized;
+use super::reach;
+use super::reach::Reach;
+use super::reach::Ruler;
+use super::work_mesh::WorkMesh;
+use crate::mesh::NONE;
+use glam::DVec3;
+
+/// All that it takes to look at a candidate, and that does not change while one looks.
+pub(super) struct State<'a> {
+    pub mesh: WorkMesh,
+    /// Average gradient of each field at each vertex, in levels per lattice step.
+    pub gradients: Vec<DVec3>,
+    pub reference: Reference<'a>,
+    pub frozen: Vec<bool>,
+    pub buckets: Buckets,
+    pub past: Past,
+    /// Counts the changes around each vertex.
+    pub versions: Vec<u32>,
+    /// Tetrahedra around each vertex.
+    pub degrees: Vec<u32>,
+    /// Where the removal of each vertex, and all those that it would depend on, take place.
+    pub reaches: Vec<Reach>,
+    pub ruler: Ruler,
+    pub levels: Levels,
+}
+
+impl<'a> State<'a> {
+    pub fn new(mesh: WorkMesh, reference: Reference<'a>, frozen: Vec<bool>, levels: Levels) -> Self {
+        let quantized = reference.quantized;
+        let points = quantized.positions.len();
+        let mut degrees = vec![0; points];
+        mesh.tets.iter().flatten().for_each(|&v| degrees[v as usize] += 1);
+        Self {
+            gradients: quantized.gradients(&mesh.tets),
+            reference,
+            frozen,
+            buckets: Buckets::new(mesh.tets.len(), quantized),
+            past: Past::new(mesh.tets.len()),
+            versions: vec![0; points],
+            degrees,
+            reaches: reach::of_stars(&mesh.tets, &quantized.positions),
+            ruler: Ruler::new(quantized),
+            levels,
+            mesh,
+        }
+    }
+
+    /// What orders removals of one level, by [`Key::second`]: what reaches less far comes first, and then what leaves fewer
+    /// tetrahedra. Eight of these count as much as an eighth of a power of two of reach.
+    pub fn second(&self, a: u32, tets: u32) -> u32 {
+        8 * self.ruler.size(&self.reaches[a as usize]) + tets
+    }
+}
+
+/// A look at one candidate: its hole, and the best filling. Reused from candidate to candidate.
+pub(super) struct Look {
+    /// None where holes are filled by contracting edges.
+    gift_wrap: Option<GiftWrap>,
+    pub hole: Hole,
+    legacy: Legacy,
+    nearby: Nearby,
+    /// Link vertices by what is predicted of contracting the edge to them.
+    ends: Vec<(f64, u32)>,
+    /// The filling that is looked at, and the best one so far.
+    now: Candidate,
+    pub best: Candidate,
+}
+
+/// A filling and its cost.
+#[derive(Default)]
+pub(super) struct Candidate {
+    pub filling: Filling,
+    pub cost: FillCost,
+    error: f64,
+}
+
+impl Look {
+    pub fn new(gift_wrap: Option<GiftWrap>, points: usize) -> Self {
+        Self {
+            gift_wrap,
+            hole: Hole::default(),
+            legacy: Legacy::default(),
+            nearby: Nearby::new(points),
+            ends: Vec::new(),
+            now: Candidate::default(),
+            best: Candidate::default(),
+        }
+    }
+
+    /// Looks at the removal of `a`, by moving it to `end` unless that is [`NONE`]. Returns its key; none if it cannot be
+    /// removed. If the key's level is above `level`, it is a lower bound; else `best` is the filling to be made.
+    pub fn at(&mut self, state: &State<'_>, a: u32, end: u32, level: u16) -> Option<Key> {
+        self.hole.open(&state.mesh, &state.reference.quantized.positions, a).ok()?;
+        if self.hole.star.len() < state.degrees[a as usize] as usize {
+            // What is around it touches itself elsewhere, which only an input that overlaps itself leads to.
+            return None;
+        }
+        self.legacy = state.past.legacy(&self.hole, &state.reference);
+        let least = state.levels.of(largest(&self.legacy.errors));
+        if least > level {
+            return Some(Key::new(least, 0, 0.0, a, NONE));
+        }
+        if self.gift_wrap.is_none() { self.find_end(state, end, level) } else { self.wrap(state, level) }
+    }
+
+    /// The key of a filling of the hole.
+    fn key(&self, state: &State<'_>, candidate: &Candidate, b: u32) -> Key {
+        let length = if b == NONE { 0.0 } else { squared_length(state, self.hole.a, b) };
+        let second = state.second(self.hole.a, candidate.filling.tets.len() as u32);
+        Key::new(state.levels.of(candidate.error), second, length, self.hole.a, b)
+    }
+
+    /// Finds the best edge to contract: the one to `known` unless that is [`NONE`]. Its filling becomes `best`.
+    fn find_end(&mut self, state: &State<'_>, known: u32, level: u16) -> Option<Key> {
+        self.ends.clear();
+        if known != NONE {
+            self.ends.push((0.0, known));
+        } else {
+            let ends = self
+                .hole
+                .link
+                .iter()
+                .map(|&b| (predicted(&state.reference, &state.gradients, self.hole.a, b), b));
+            self.ends.extend(ends);
+            self.ends.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+        }
+        let mut found: Option<Key> = None;
+        for i in 0..self.ends.len() {
+            let b = self.ends[i].1;
+            if !self.contract(state, b) {
+                continue;
+            }
+            let limit = state.levels.largest(found.map_or(level, |found| found.level().min(level)));
+            let Self { hole, legacy, now, .. } = self;
+            now.error =
+                now.cost.evaluate(hole, &now.filling, legacy, &state.buckets, &state.reference, limit);
+            let key = self.key(state, &self.now, b);
+            if found.is_none_or(|found| key < found) {
+                found = Some(key);
+                std::mem::swap(&mut self.now, &mut self.best);
+            }
+        }
+        found
+    }
+
+    /// Fills the hole by moving its vertex to `b`, if that may be.
+    fn contract(&mut self, state: &State<'_>, b: u32) -> bool {
+        let Self { hole, now, nearby, .. } = self;
+        let positions = &state.reference.quantized.positions;
+        if !contract(hole, positions, b, &mut now.filling) || hole.tilts_flat(&now.filling, positions) {
+            return false;
+        }
+        // Inside, positive tetrahedra are all it takes.
+        if state.reference.skin.at(b).is_empty() {
+            return true;
+        }
+        let stays = hole.on_boundary() && state.frozen[b as usize];
+        !stays && keeps_topology(hole, &state.mesh, nearby, b)
+    }
+
+    /// Fills the hole by the Delaunay criterion; the filling becomes `best`.
+    fn wrap(&mut self, state: &State<'_>, level: u16) -> Option<Key> {
+        let Self { hole, legacy, best, gift_wrap, .. } = self;
+        let positions = &state.reference.quantized.positions;
+        if !gift_wrap.as_mut()?.fill(hole, positions, &mut best.filling)
+            || hole.tilts_flat(&best.filling, positions)
+        {
+            return None;
+        }
+        // A removal must make the mesh smaller: a finer mesh is then a larger one, which budgets rely on.
+        if best.filling.tets.len() >= hole.star.len() {
+            return None;
+        }
+        let limit = state.levels.largest(level);
+        best.error = best.cost.evaluate(hole, &best.filling, legacy, &state.buckets, &state.reference, limit);
+        Some(self.key(state, &self.best, NONE))
+    }
+}
+
+fn squared_length(state: &State<'_>, a: u32, b: u32) -> f32 {
+    let [p, q] = [a, b].map(|v| state.reference.quantized.positions[v as usize]);
+    (0..3).map(|i| (i64::from(p[i]) - i64::from(q[i])) as f32).map(|d| d * d).sum()
+}
+
+/// The second difference of the fields along an edge that is to be contracted to `b`, as an error.
+fn predicted(reference: &Reference<'_>, gradients: &[DVec3], a: u32, b: u32) -> f64 {
+    let Quantized { positions, levels, fields, .. } = reference.quantized;
+    let [p, q] = [a, b].map(|v| DVec3::from_array(positions[v as usize].map(f64::from)));
+    let mut largest = 0.0_f64;
+    for (f, field) in fields.iter().enumerate() {
+        let [u, v] = [a, b].map(|v| v as usize * fields.len() + f);
+        let rise = f64::from(levels[v] - levels[u]);
+        largest = largest.max((rise - gradients[u].dot(q - p)).abs() * field.step / field.range());
+    }
+    largest
+}

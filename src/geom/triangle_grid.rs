@@ -1,0 +1,88 @@
+//! Triangles, found by place.
+
+use super::{Groups, nearest_on_triangle};
+use glam::DVec3;
+
+/// Triangles sorted into the cells of a regular grid.
+pub(crate) struct TriangleGrid {
+    pub corners: Vec<[DVec3; 3]>,
+    low: DVec3,
+    side: f64,
+    cells: [usize; 3],
+    in_cell: Groups,
+}
+
+/// Most cells along an axis.
+const MAX_CELLS: f64 = 128.0;
+
+impl TriangleGrid {
+    pub fn new(corners: Vec<[DVec3; 3]>) -> Self {
+        let mut low = DVec3::INFINITY;
+        let mut high = DVec3::NEG_INFINITY;
+        corners.iter().flatten().for_each(|p| (low, high) = (low.min(*p), high.max(*p)));
+        let extent = (high - low).max(DVec3::ZERO);
+        // About as many cells along an axis as there are triangles along it.
+        let wanted = (corners.len() as f64 / 6.0).sqrt().clamp(1.0, MAX_CELLS);
+        let side = (extent.max_element() / wanted).max(f64::MIN_POSITIVE);
+        let cells = extent.to_array().map(|e| (e / side).clamp(0.0, MAX_CELLS) as usize + 1);
+        let mut grid = Self { corners, low, side, cells, in_cell: Groups::default() };
+        grid.in_cell = Groups::new(cells.iter().product(), |add| {
+            for (i, [a, b, c]) in (0..).zip(&grid.corners) {
+                grid.cells_between(a.min(*b).min(*c), a.max(*b).max(*c), |cell| add(cell, i));
+            }
+        });
+        grid
+    }
+
+    fn cells_between(&self, low: DVec3, high: DVec3, mut visit: impl FnMut(usize)) {
+        let along = |x: f64, axis: usize| {
+            ((x - self.low[axis]) / self.side).clamp(0.0, (self.cells[axis] - 1) as f64) as usize
+        };
+        let range = |axis: usize| along(low[axis], axis)..=along(high[axis], axis);
+        for z in range(2) {
+            for y in range(1) {
+                range(0).for_each(|x| visit((z * self.cells[1] + y) * self.cells[0] + x));
+            }
+        }
+    }
+
+    /// Calls `visit` with each triangle that comes within `radius` of `p`, its nearest point and the distance; with
+    /// some of them more than once.
+    pub fn within(&self, p: DVec3, radius: f64, mut visit: impl FnMut(u32, DVec3, f64)) {
+        if self.corners.is_empty() {
+            return;
+        }
+        let reach = DVec3::splat(radius);
+        self.cells_between(p - reach, p + reach, |cell| {
+            for &i in self.in_cell.of(cell) {
+                let q = nearest_on_triangle(p, self.corners[i as usize]);
+                let distance = p.distance(q);
+                if distance <= radius {
+                    visit(i, q, distance);
+                }
+            }
+        });
+    }
+
+    /// The nearest of the triangles, of several the first, and its point nearest to `p`; none if there are no triangles.
+    pub fn nearest(&self, p: DVec3) -> Option<(u32, DVec3)> {
+        if self.corners.is_empty() {
+            return None;
+        }
+        let whole = self.side * (self.cells.iter().sum::<usize>() as f64 + 1.0) + p.distance(self.low);
+        let mut radius = self.side / 4.0;
+        loop {
+            let mut nearest: Option<(f64, u32, DVec3)> = None;
+            self.within(p, radius, |i, q, _| {
+                let square = p.distance_squared(q);
+                if nearest.is_none_or(|(least, first, _)| square < least || square == least && i < first) {
+                    nearest = Some((square, i, q));
+                }
+            });
+            if nearest.is_some() || radius > whole {
+                return nearest.map(|(_, i, q)| (i, q));
+            }
+            radius *= 2.0;
+        }
+    }
+}

@@ -1,0 +1,882 @@
+//! Insertion and removal of vertices of a [`HalfEdgeMt`] on the current mesh.
+//!
+//! In the current mesh the tag of a tetrahedron is the update that removes it, and its inner faces are those that go with
+//! it. Insertion keeps the slots of T_u, removal those of the star without the near vertex.
+
+use super::star_code::spread;
+use super::star_code::{KnownStars, StarCode};
+use super::store::HalfEdgeMt;
+use crate::geom::NARROW_BITS;
+use crate::geom::det_i64;
+use crate::geom::orient3d;
+use crate::mesh::FACES;
+use crate::mesh::NONE;
+use crate::mt::Applied;
+use crate::mt::ApplyUpdates;
+use crate::mt::BaseMesh;
+use crate::mt::BaseMeshError;
+use crate::mt::CurrentMesh;
+use crate::mt::ErrorCode;
+use crate::mt::LookAtTet;
+use crate::mt::MtInfo;
+use crate::mt::MultiTessellation;
+use crate::mt::UpdateError;
+use crate::mt::UpdateId;
+use crate::mt::UpdatePages;
+use crate::mt::VertexId;
+use crate::mt::mesh::KindState;
+use crate::mt::mesh::current::{KindWord, Labels};
+use crate::mt::mesh::stars::GATHERED;
+use crate::mt::mesh::stars::Gather;
+use crate::mt::mesh::stars::Star;
+use crate::mt::mesh::tet::corner_of;
+use std::ops::Range;
+
+/// Most tetrahedra of a star, and most vertices of its link.
+pub(in crate::mt) const MOST: usize = GATHERED;
+
+/// Stands for the new vertex among the corners of a [`NewTet`].
+pub(in crate::mt) const NEW: u8 = 0xFF;
+
+/// No tetrahedron of the new star.
+pub(in crate::mt) const NO_ENTRY: u8 = 0xFF;
+
+/// A tetrahedron of the star that an insertion makes.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in crate::mt) struct NewTet {
+    /// Its corners by index into the link, [`NEW`] for the new vertex; positive.
+    pub corners: [u8; 4],
+    /// Across each face that has the new vertex, the tetrahedron of the star, [`NO_ENTRY`] at the boundary.
+    pub across: [u8; 4],
+    /// Which corner is the new vertex.
+    pub own: u8,
+    /// What lies across the face opposite the new vertex.
+    pub beyond: u32,
+    /// The slot of T_u that it takes, or along whose face it fills the gap.
+    pub source: u32,
+    /// The update that removes it.
+    pub remover: u32,
+    /// Which faces go with it.
+    pub inner: u8,
+}
+
+/// Scratch space for insertions and removals.
+#[derive(Clone, Debug)]
+pub(in crate::mt) struct Scratch {
+    /// T_u.
+    removed: [u32; MOST],
+    removed_len: usize,
+    /// The star: first what takes the slots of T_u in its order, then what fills the gaps.
+    pub star: [NewTet; MOST],
+    pub star_len: usize,
+    /// Slots of the vertices of Π_u; the near vertex is the first.
+    pub link: [u32; MOST],
+    pub link_len: usize,
+    /// Around the edge from the near to the new vertex: a link vertex, a gap, and the corner of that opposite the face
+    /// which has the vertex.
+    ends: Vec<(u8, u8, u8)>,
+    pub levels: Vec<i32>,
+    gathered: Star,
+    /// A hash of the label of each vertex of the link; then that of the new vertex.
+    pub hashes: Vec<u64>,
+    /// For each tetrahedron of the star, the sum of those of its corners.
+    pub tet_hashes: Vec<u64>,
+    /// The star in canonical order: hashes whose lowest bits are replaced by the place in the star.
+    pub sorted: Vec<u64>,
+    pub code: StarCode,
+    known: KnownStars,
+}
+
+impl KindState for Scratch {
+    fn bytes(&self) -> u64 {
+        size_of_val(self) as u64 + self.known.bytes()
+    }
+
+    fn copy(&self) -> Box<dyn KindState> {
+        Box::new(self.clone())
+    }
+}
+
+fn take_scratch(mesh: &mut CurrentMesh) -> Box<Scratch> {
+    mesh.take_kind_state().unwrap_or_default()
+}
+
+impl Default for Scratch {
+    fn default() -> Self {
+        Self {
+            removed: [0; MOST],
+            removed_len: 0,
+            star: [NewTet::default(); MOST],
+            star_len: 0,
+            link: [0; MOST],
+            link_len: 0,
+            ends: Vec::new(),
+            levels: Vec::new(),
+            gathered: Star::default(),
+            hashes: Vec::new(),
+            tet_hashes: Vec::new(),
+            sorted: Vec::new(),
+            code: StarCode::default(),
+            known: KnownStars::default(),
+        }
+    }
+}
+
+/// How far to go to name an update that has to come first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::mt) enum Search {
+    /// Around the near vertex.
+    Nearby,
+    /// Through all updates before, which takes as long as applying them.
+    Everywhere,
+}
+
+/// A tetrahedron at a vertex, and which of its corners that is.
+type AtVertex = (u32, usize);
+
+impl HalfEdgeMt {
+    /// Collects T_u, or tells what has to be applied first.
+    fn collect_removed(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        search: Search,
+        scratch: &mut Scratch,
+    ) -> Result<Applied, UpdateError> {
+        let update = u.0;
+        let torn = UpdateError::Cavity { update };
+        if !self.has(u) {
+            return Err(UpdateError::Missing { update });
+        }
+        let near = self.near(u).ok_or(UpdateError::Missing { update })?;
+        let Some(slot) = mesh.slot(near) else {
+            let before = self.inserted_by(near).ok_or(torn)?;
+            return Ok(Applied::Blocked(before));
+        };
+        if mesh.slot(self.vertex(u)).is_some() {
+            return Err(torn);
+        }
+        let first = match mesh.tagged(update) {
+            Some(t) => t,
+            None => match self.find_tagged(mesh, u, slot, search)? {
+                Ok(t) => t,
+                Err(blocking) => return Ok(Applied::Blocked(blocking)),
+            },
+        };
+        mesh.next_epoch();
+        mesh.number_tet(first, 0);
+        scratch.removed[0] = first;
+        let (mut next, mut len) = (0, 1);
+        while next < len {
+            let t = scratch.removed[next];
+            let (tet, around, inner) = (mesh.tets[t as usize], mesh.neighbors[t as usize], mesh.tet_byte(t));
+            let at = corner_of(&tet, slot);
+            if tet[at] != slot {
+                return Err(torn);
+            }
+            for (face, &n) in around.iter().enumerate() {
+                if face == at || inner >> face & 1 == 0 || n == NONE {
+                    continue;
+                }
+                let tag = mesh.tag(n);
+                if tag != update {
+                    if tag >= update {
+                        return Err(torn);
+                    }
+                    mesh.place_tag(n);
+                    return Ok(Applied::Blocked(UpdateId(tag)));
+                }
+                if len == MOST {
+                    return Err(torn);
+                }
+                if mesh.number_tet(n, len as u32).is_none() {
+                    scratch.removed[len] = n;
+                    len += 1;
+                }
+            }
+            next += 1;
+        }
+        scratch.removed_len = len;
+        scratch.link[0] = slot;
+        Ok(Applied::Done)
+    }
+
+    /// A tetrahedron of T_u, if one is in the mesh; else what has to be applied before one can be.
+    #[cold]
+    fn find_tagged(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        slot: u32,
+        search: Search,
+    ) -> Result<Result<u32, UpdateId>, UpdateError> {
+        let star = mesh.all_around(slot);
+        if let Some(&(t, _)) = star.iter().find(|&&(t, _)| mesh.tag(t) == u.0) {
+            return Ok(Ok(t));
+        }
+        let torn = UpdateError::Cavity { update: u.0 };
+        let near = self.near(u).ok_or(torn.clone())?;
+        let child = self.children_of(near).iter().find(|child| child.update == u.0).ok_or(torn.clone())?;
+        // T_u will hold the direction in which the new vertex lies, if the domain does: what does so now has to go first.
+        let before = |&&(t, _): &&AtVertex| mesh.tag(t) < u.0;
+        let mut holding = star.iter().filter(|&&(t, at)| mesh.holds(t, at, child.offset));
+        if let Some(&(t, _)) = holding.find(before) {
+            return Ok(Err(UpdateId(mesh.tag(t))));
+        }
+        match search {
+            Search::Nearby => Err(UpdateError::Missing { update: u.0 }),
+            Search::Everywhere => self.find_parent(mesh, u).map(Err),
+        }
+    }
+
+    /// A parent of `u` that is not in the mesh, found by applying all updates before `u` to another one.
+    fn find_parent(&self, mesh: &CurrentMesh, u: UpdateId) -> Result<UpdateId, UpdateError> {
+        let torn = UpdateError::Cavity { update: u.0 };
+        let mut other = self.start().map_err(|_| torn.clone())?;
+        let mut scratch = Box::<Scratch>::default();
+        for before in (0..u.0).map(UpdateId) {
+            self.insert(&mut other, before, Search::Nearby, &mut scratch)?;
+            other.clear_touched();
+        }
+        self.collect_removed(&mut other, u, Search::Nearby, &mut scratch)?;
+        let removed = &scratch.removed[..scratch.removed_len];
+        let mut parents = removed.iter().filter_map(|&t| self.creator(&other, t));
+        parents.find(|&p| mesh.slot(self.vertex(p)).is_none()).ok_or(torn)
+    }
+
+    /// Finds the star that the insertion makes, whose T_u has been collected.
+    fn find_star(&self, mesh: &mut CurrentMesh, scratch: &mut Scratch) -> Option<()> {
+        let slot = scratch.link[0];
+        mesh.number_slot(slot, 0);
+        scratch.link_len = 1;
+        scratch.ends.clear();
+        let moved = scratch.removed_len;
+        scratch.star_len = moved;
+        for i in 0..moved {
+            let t = scratch.removed[i];
+            let (tet, around, inner) = (mesh.tets[t as usize], mesh.neighbors[t as usize], mesh.tet_byte(t));
+            let mut corners = [0; 4];
+            for (corner, &v) in corners.iter_mut().zip(&tet) {
+                *corner = scratch.number(mesh, v)?;
+            }
+            let at = corner_of(&tet, slot);
+            let mut new =
+                NewTet { corners, own: at as u8, beyond: around[at], source: t, ..NewTet::default() };
+            new.corners[at] = NEW;
+            new.across = [NO_ENTRY; 4];
+            for face in (0..4).filter(|&face| face != at) {
+                let n = around[face];
+                let behind = if n == NONE { None } else { mesh.tet_number(n) };
+                if inner >> face & 1 == 1 {
+                    if n != NONE {
+                        new.across[face] = behind? as u8;
+                    }
+                    continue;
+                }
+                // A face that stays must not have tetrahedra of T_u on both sides.
+                if behind.is_some() {
+                    return None;
+                }
+                new.across[face] = scratch.add_gap(i as u8, &corners, [at, face], n, t)?;
+            }
+            scratch.star[i] = new;
+        }
+        scratch.close_ring()
+    }
+
+    /// Positions and levels of the new vertex.
+    fn place_vertex(
+        &self,
+        mesh: &CurrentMesh,
+        u: UpdateId,
+        scratch: &mut Scratch,
+    ) -> Result<[i32; 3], UpdateError> {
+        let off = UpdateError::OffLattice { update: u.0 };
+        let near = mesh.vertex(scratch.link[0]);
+        let children = self.children_of(near);
+        let at = children.binary_search_by_key(&u.0, |child| child.update).map_err(|_| off.clone())?;
+        let centre = mesh.positions[scratch.link[0] as usize];
+        let offset = children[at].offset;
+        let position = [0, 1, 2].map(|k| centre[k].saturating_add(offset[k]));
+        let residuals = self.update(u).ok_or(UpdateError::Missing { update: u.0 })?.level_residuals;
+        scratch.predict_levels(mesh, position);
+        for (level, residual) in scratch.levels.iter_mut().zip(residuals) {
+            *level = level.saturating_add(*residual);
+        }
+        if self.info().holds(position, &scratch.levels) { Ok(position) } else { Err(off) }
+    }
+
+    /// Gets ready to insert the vertex of `u`: star, position and levels are in the scratch space then, but not yet what
+    /// removes the star.
+    pub(in crate::mt) fn prepare(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        search: Search,
+        scratch: &mut Scratch,
+    ) -> Result<Result<[i32; 3], UpdateId>, UpdateError> {
+        if let Applied::Blocked(before) = self.collect_removed(mesh, u, search, scratch)? {
+            return Ok(Err(before));
+        }
+        self.find_star(mesh, scratch).ok_or(UpdateError::Cavity { update: u.0 })?;
+        let position = self.place_vertex(mesh, u, scratch)?;
+        if !mesh.is_proven(u.0) {
+            if !scratch.is_positive(mesh, position) {
+                return Err(UpdateError::Inverted { update: u.0 });
+            }
+            mesh.set_proven(u.0);
+        }
+        Ok(Ok(position))
+    }
+
+    fn insert(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        search: Search,
+        scratch: &mut Scratch,
+    ) -> Result<Applied, UpdateError> {
+        let position = match self.prepare(mesh, u, search, scratch)? {
+            Ok(position) => position,
+            Err(before) => return Ok(Applied::Blocked(before)),
+        };
+        scratch.hash_star(mesh, self.vertex(u).0);
+        scratch.sort_star();
+        let mut known = std::mem::take(&mut scratch.known);
+        let found = if known.recall(u.0, scratch) {
+            Some(())
+        } else {
+            self.find_removers(mesh, u, position, scratch).inspect(|()| known.keep(u.0, scratch))
+        };
+        scratch.known = known;
+        found.ok_or(UpdateError::Mask { update: u.0 })?;
+        self.perform_insertion(mesh, u, position, scratch);
+        Ok(Applied::Done)
+    }
+
+    pub(in crate::mt) fn perform_insertion(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        position: [i32; 3],
+        scratch: &mut Scratch,
+    ) {
+        let slot = mesh.new_vertex();
+        mesh.put_vertex(slot, Labels { vertex: self.vertex(u).0, kind_word: KindWord::NONE }, position);
+        let first = slot as usize * mesh.fields;
+        mesh.levels[first..first + scratch.levels.len()].copy_from_slice(&scratch.levels);
+        let (moved, all) = (scratch.removed_len, scratch.star_len);
+        let mut slots = [NONE; MOST];
+        slots[..moved].copy_from_slice(&scratch.removed[..moved]);
+        mesh.new_tets(&mut slots[moved..all]);
+        let near = scratch.link[0];
+        let slot_of = |entry: u8| if entry == NO_ENTRY { NONE } else { slots[entry as usize % MOST] };
+        for (i, new) in scratch.star[..all].iter().enumerate() {
+            let t = slots[i];
+            let own = new.own as usize & 3;
+            let tet = new.corners.map(|x| if x == NEW { slot } else { scratch.link[x as usize % MOST] });
+            let mut around = new.across.map(slot_of);
+            around[own] = new.beyond;
+            mesh.tets[t as usize] = tet;
+            mesh.neighbors[t as usize] = around;
+            if i >= moved {
+                if new.beyond != NONE {
+                    mesh.relink(new.beyond, new.source, t);
+                }
+                tet.iter().for_each(|&v| mesh.incident[v as usize] = t);
+            }
+            mesh.set_tag(t, new.remover);
+            mesh.set_tet_byte(t, new.inner);
+            mesh.mark_tet(t);
+        }
+        mesh.incident[slot as usize] = slots[0];
+        mesh.incident[near as usize] = slots[moved];
+        mesh.touch(&slots[..all]);
+    }
+
+    /// Collects the star of the vertex that `u` inserted. Tells its slot and that of the near vertex, or a child of `u` that
+    /// has to go first.
+    fn collect_inserted(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        star: &mut Star,
+    ) -> Result<Result<[u32; 2], UpdateId>, UpdateError> {
+        let vertex = self.vertex(u).0;
+        let absent = UpdateError::Vertex { update: u.0, vertex };
+        let slot = mesh.slot(VertexId(vertex)).ok_or(absent.clone())?;
+        let younger = |labels: &[Labels], tet: &[u32; 4]| {
+            tet.iter().map(|&v| labels[v as usize].vertex).find(|&v| v > vertex)
+        };
+        match mesh.gather_star(slot, star, younger) {
+            Ok(()) => {}
+            Err(Gather::TooLarge) => return Err(UpdateError::Star { update: u.0 }),
+            Err(Gather::Stopped(v)) => return Ok(Err(self.inserted_by(VertexId(v)).ok_or(absent)?)),
+        }
+        let near = self.near(u).and_then(|near| mesh.slot(near)).ok_or(absent)?;
+        Ok(Ok([slot, near]))
+    }
+
+    fn remove(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        scratch: &mut Scratch,
+    ) -> Result<Applied, UpdateError> {
+        let star = &mut scratch.gathered;
+        let [slot, near] = match self.collect_inserted(mesh, u, star)? {
+            Ok(slots) => slots,
+            Err(child) => return Ok(Applied::Blocked(child)),
+        };
+        let (mut gone, mut gone_len) = ([NONE; MOST], 0);
+        for (&t, &at) in star.tets[..star.len].iter().zip(&star.corner) {
+            let (mut tet, mut around) = (mesh.tets[t as usize], mesh.neighbors[t as usize]);
+            if tet.contains(&near) {
+                gone[gone_len] = t;
+                gone_len += 1;
+                continue;
+            }
+            let at = at as usize & 3;
+            tet[at] = near;
+            let mut inner = 0;
+            for face in (0..4).filter(|&face| face != at) {
+                let n = around[face];
+                // A tetrahedron at the edge to the near vertex fills a gap; what lies beyond it is the neighbour again.
+                let gap = if n == NONE { None } else { Some(mesh.tets[n as usize]) };
+                match gap.filter(|gap| gap.contains(&near) && gap.contains(&slot)) {
+                    Some(gap) => {
+                        let beyond = mesh.neighbors[n as usize][corner_of(&gap, slot)];
+                        around[face] = beyond;
+                        if beyond != NONE {
+                            mesh.relink(beyond, n, t);
+                        }
+                    }
+                    None => inner |= 1 << face,
+                }
+            }
+            mesh.tets[t as usize] = tet;
+            mesh.neighbors[t as usize] = around;
+            mesh.set_tag(t, u.0);
+            mesh.set_tet_byte(t, inner);
+            mesh.mark_tet(t);
+            tet.iter().for_each(|&v| mesh.incident[v as usize] = t);
+        }
+        mesh.touch(&star.tets[..star.len]);
+        gone[..gone_len].iter().for_each(|&t| mesh.free_tet(t));
+        mesh.remove_vertex(slot);
+        Ok(Applied::Done)
+    }
+}
+
+impl Scratch {
+    /// The index of a vertex in the link, where it is put if it is new.
+    #[inline]
+    fn number(&mut self, mesh: &mut CurrentMesh, v: u32) -> Option<u8> {
+        let next = self.link_len;
+        if let Some(known) = mesh.number_slot(v, next as u32) {
+            return Some(known as u8);
+        }
+        // One less than all numbers, so that a mark never overflows.
+        *self.link.get_mut(next).filter(|_| next + 1 < MOST)? = v;
+        self.link_len += 1;
+        Some(next as u8)
+    }
+
+    /// Adds the tetrahedron that fills the gap behind a face of tetrahedron `t` of T_u, whose corner `at` is the near vertex.
+    #[inline]
+    fn add_gap(
+        &mut self,
+        of: u8,
+        corners: &[u8; 4],
+        [at, face]: [usize; 2],
+        beyond: u32,
+        t: u32,
+    ) -> Option<u8> {
+        let place = self.star_len;
+        if place == MOST {
+            return None;
+        }
+        let mut new = NewTet { corners: *corners, own: face as u8, beyond, source: t, ..NewTet::default() };
+        new.corners[face] = NEW;
+        new.across = [NO_ENTRY; 4];
+        new.across[at] = of;
+        for corner in (0..4).filter(|&k| k != at && k != face) {
+            // The face opposite this corner has the other one.
+            let other = 6 - at - face - corner;
+            self.ends.push((corners[other], place as u8, corner as u8));
+        }
+        self.star[place] = new;
+        self.star_len += 1;
+        Some(place as u8)
+    }
+
+    /// Joins the tetrahedra around the edge from the near to the new vertex. They must close up, or run from boundary to
+    /// boundary, in one piece.
+    fn close_ring(&mut self) -> Option<()> {
+        let gaps = self.ends.len() / 2;
+        if gaps == 0 {
+            return None;
+        }
+        self.ends.sort_unstable();
+        let (mut open, mut i) = (0, 0);
+        while i < self.ends.len() {
+            let (v, gap, corner) = self.ends[i];
+            let next = self.ends.get(i + 1).filter(|next| next.0 == v);
+            let Some(&(_, other, side)) = next else {
+                open += 1;
+                i += 1;
+                continue;
+            };
+            if self.ends.get(i + 2).is_some_and(|third| third.0 == v) {
+                return None;
+            }
+            self.star[gap as usize % MOST].across[corner as usize & 3] = other;
+            self.star[other as usize % MOST].across[side as usize & 3] = gap;
+            i += 2;
+        }
+        if open != 0 && open != 2 {
+            return None;
+        }
+        // From one end, or from anywhere, all must be met.
+        let first = self.ends[0].1;
+        let (mut met, mut from, mut at) = (1, NO_ENTRY, first);
+        if open == 2 {
+            let lone = |i: usize| {
+                let v = self.ends[i].0;
+                let same = |j: Option<usize>| j.and_then(|j| self.ends.get(j)).is_some_and(|e| e.0 == v);
+                !same(i.checked_sub(1)) && !same(Some(i + 1))
+            };
+            at = self.ends[(0..self.ends.len()).find(|&i| lone(i))?].1;
+        }
+        let start = at;
+        loop {
+            let NewTet { corners, across, own, .. } = self.star[at as usize % MOST];
+            let next = (0..4).filter(|&k| k != own as usize && corners[k] != 0).map(|k| across[k]);
+            let Some(next) = next.filter(|&n| n != NO_ENTRY && n != from).min() else { break };
+            if next == start {
+                break;
+            }
+            (from, at) = (at, next);
+            met += 1;
+            if met > gaps {
+                return None;
+            }
+        }
+        (met == gaps).then_some(())
+    }
+
+    /// Hashes the labels of the star.
+    pub fn hash_star(&mut self, mesh: &CurrentMesh, vertex: u32) {
+        self.hashes.clear();
+        self.hashes.extend(self.link[..self.link_len].iter().map(|&slot| spread(mesh.vertex(slot).0)));
+        self.hashes.push(spread(vertex));
+        let last = self.link_len;
+        self.tet_hashes.clear();
+        for new in &self.star[..self.star_len] {
+            let sum = new
+                .corners
+                .iter()
+                .fold(0, |sum: u64, &corner| sum.wrapping_add(self.hashes[usize::from(corner).min(last)]));
+            self.tet_hashes.push(sum);
+        }
+    }
+
+    /// Puts the star, which has been hashed, into canonical order.
+    fn sort_star(&mut self) {
+        const PLACE: u64 = MOST as u64 - 1;
+        self.sorted.clear();
+        self.sorted.extend((0..).zip(&self.tet_hashes).map(|(i, hash)| hash & !PLACE | i));
+        self.sorted.sort_unstable();
+    }
+
+    /// Whether all tetrahedra of the star are positive with the new vertex at `position`.
+    fn is_positive(&self, mesh: &CurrentMesh, position: [i32; 3]) -> bool {
+        let (mut from, mut largest) = ([[0_i64; 3]; MOST], 0);
+        for (from, &v) in from.iter_mut().zip(&self.link[..self.link_len]) {
+            let p = mesh.positions[v as usize];
+            for k in 0..3 {
+                from[k] = i64::from(p[k]) - i64::from(position[k]);
+                largest |= from[k].unsigned_abs();
+            }
+        }
+        let narrow = largest <= 1 << NARROW_BITS;
+        self.star[..self.star_len].iter().all(|new| {
+            let [i, j, k] = FACES[new.own as usize & 3].map(|corner| new.corners[corner] as usize % MOST);
+            if narrow {
+                return det_i64(from[i], from[j], from[k]) > 0;
+            }
+            let at = |x: usize| mesh.positions[self.link[x] as usize];
+            orient3d(position, at(i), at(j), at(k)) > 0
+        })
+    }
+
+    /// Predicts the levels of a vertex at `position` from those around it: means by inverse squared distance, in whole
+    /// numbers, so that the order of the link does not matter.
+    pub fn predict_levels(&mut self, mesh: &CurrentMesh, position: [i32; 3]) {
+        let link = &self.link[..self.link_len];
+        let largest = link.iter().map(|&v| squared(mesh, v, position)).max().unwrap_or(1).max(1);
+        self.levels.clear();
+        self.levels.resize(mesh.fields, 0);
+        for (field, level) in self.levels.iter_mut().enumerate() {
+            let (mut total, mut sum) = (0_u128, 0_u128);
+            for &v in link {
+                let weight = weight(largest, squared(mesh, v, position));
+                total += weight;
+                // Levels are not negative.
+                sum += weight * u128::from(mesh.levels(v)[field].unsigned_abs());
+            }
+            *level = mean(sum, total.max(1)) as i32;
+        }
+    }
+}
+
+/// The squared distance of a vertex from a position.
+#[inline]
+fn squared(mesh: &CurrentMesh, v: u32, position: [i32; 3]) -> u64 {
+    let p = mesh.positions[v as usize];
+    // Less than 2^62 each: positions are on lattices of at most 30 bits.
+    (0..3).map(|k| u64::from(p[k].abs_diff(position[k]))).fold(0, |sum, d| sum.saturating_add(d * d))
+}
+
+#[inline]
+fn weight(largest: u64, squared: u64) -> u128 {
+    let squared = squared.max(1);
+    // Short numbers divide many times as fast.
+    if largest < 1 << (64 - WEIGHT_BITS) {
+        u128::from((largest << WEIGHT_BITS) / squared)
+    } else {
+        (u128::from(largest) << WEIGHT_BITS) / u128::from(squared)
+    }
+}
+
+/// The quotient, rounded.
+#[inline]
+fn mean(sum: u128, total: u128) -> u128 {
+    match (u64::try_from(2 * sum + total), u64::try_from(2 * total)) {
+        (Ok(sum), Ok(total)) => u128::from(sum / total),
+        _ => (2 * sum + total) / (2 * total),
+    }
+}
+
+/// Weights of the vertices around a new one have at least so many bits.
+const WEIGHT_BITS: u32 = 8;
+
+impl CurrentMesh {
+    /// All tetrahedra around the vertex in `slot`, however many, each with the corner that it is.
+    fn all_around(&mut self, slot: u32) -> Vec<AtVertex> {
+        self.next_epoch();
+        let first = self.incident[slot as usize];
+        let mut star = vec![(first, corner_of(&self.tets[first as usize], slot))];
+        self.number_tet(first, 0);
+        let mut next = 0;
+        while let Some(&(t, at)) = star.get(next) {
+            next += 1;
+            for (face, n) in self.neighbors[t as usize].into_iter().enumerate() {
+                if face != at && n != NONE && self.number_tet(n, 0).is_none() {
+                    star.push((n, corner_of(&self.tets[n as usize], slot)));
+                }
+            }
+        }
+        star
+    }
+
+    /// Whether a direction from corner `at` of tetrahedron `t` leads into it, or along a face.
+    fn holds(&self, t: u32, at: usize, direction: [i32; 3]) -> bool {
+        let corners = self.tets[t as usize].map(|v| self.positions[v as usize]);
+        let point = [0, 1, 2].map(|k| corners[at][k].saturating_add(direction[k]));
+        let largest = 1 << crate::geom::WIDE_BITS;
+        let inside = |face: usize| {
+            let mut with = corners;
+            with[face] = point;
+            orient3d(with[0], with[1], with[2], with[3]) >= 0
+        };
+        point.iter().all(|x| (0..=largest).contains(x)) && (0..4).all(|face| face == at || inside(face))
+    }
+}
+
+impl MultiTessellation for HalfEdgeMt {
+    fn info(&self) -> &MtInfo {
+        self.info()
+    }
+
+    fn base(&self) -> &BaseMesh {
+        self.base()
+    }
+
+    fn updates(&self) -> u32 {
+        self.updates()
+    }
+
+    fn bytes(&self) -> u64 {
+        self.bytes()
+    }
+
+    /// Each fills at least one gap.
+    fn always_grows(&self) -> bool {
+        true
+    }
+
+    #[inline]
+    fn error(&self, u: UpdateId) -> ErrorCode {
+        self.error_of(u)
+    }
+
+    #[inline]
+    fn errors(&self, u: UpdateId) -> &[ErrorCode] {
+        self.errors_of(u)
+    }
+
+    fn to_come(&self) -> ErrorCode {
+        self.to_come()
+    }
+}
+
+impl UpdatePages for HalfEdgeMt {
+    #[inline]
+    fn has(&self, u: UpdateId) -> bool {
+        self.has(u)
+    }
+
+    fn present(&self) -> u32 {
+        self.present()
+    }
+
+    fn page_updates(&self, page: u32) -> Range<u32> {
+        self.page_updates(page)
+    }
+
+    #[inline]
+    fn awaited(&self, mesh: &CurrentMesh, t: u32) -> Option<UpdateId> {
+        Some(UpdateId(mesh.tag(t))).filter(|&u| u.0 != NONE && !self.has(u))
+    }
+
+    fn awaited_errors(&self, mesh: &CurrentMesh, t: u32) -> Option<&[ErrorCode]> {
+        match mesh.tag(t) {
+            NONE => Some(self.no_errors()),
+            u if self.has(UpdateId(u)) => None,
+            u => Some(self.bounds_of(UpdateId(u))),
+        }
+    }
+
+    /// Tetrahedra know what removes them from the moment they are created: whoever waits for an update asks
+    /// [`MultiTessellation::awaited`].
+    fn page_inserted(&self, _: &mut CurrentMesh, _: Range<u32>) {}
+
+    fn page_evicted(&self, mesh: &mut CurrentMesh, updates: Range<u32>) {
+        let vertices = updates.start..updates.end;
+        let base = self.vertex(UpdateId(0)).0;
+        mesh.forget_vertices(vertices.start + base..vertices.end + base);
+        if let Some(mut scratch) = mesh.take_kind_state::<Scratch>() {
+            scratch.known.forget(updates);
+            mesh.put_back_kind_state(scratch);
+        }
+    }
+}
+
+impl ApplyUpdates for HalfEdgeMt {
+    fn start(&self) -> Result<CurrentMesh, BaseMeshError> {
+        let mut mesh = CurrentMesh::new(self.info(), self.base())?;
+        mesh.tag_all(self.base_marks().iter().map(|mark| mark.remover));
+        mesh.keep_tet_bytes(self.base_marks().iter().map(|mark| mark.inner).collect());
+        mesh.whole_stars = true;
+        Ok(mesh)
+    }
+
+    #[inline]
+    fn remover(&self, mesh: &CurrentMesh, t: u32) -> Option<UpdateId> {
+        Some(UpdateId(mesh.tag(t))).filter(|&u| self.has(u))
+    }
+
+    #[inline]
+    fn start_at(&self, mesh: &mut CurrentMesh, t: u32) {
+        mesh.place_tag(t);
+    }
+
+    #[inline]
+    fn creator(&self, mesh: &CurrentMesh, t: u32) -> Option<UpdateId> {
+        let newest = mesh.tets[t as usize].iter().map(|&v| mesh.labels[v as usize].vertex).max();
+        self.inserted_by(VertexId(newest?))
+    }
+
+    #[inline]
+    fn may_coarsen(&self, mesh: &CurrentMesh, u: UpdateId) -> bool {
+        let incident = mesh.slot(self.vertex(u)).map(|slot| mesh.incident[slot as usize]);
+        incident.is_some_and(|t| self.creator(mesh, t) == Some(u))
+    }
+
+    fn refine(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
+        let mut scratch = take_scratch(mesh);
+        let applied = self.insert(mesh, u, Search::Everywhere, &mut scratch);
+        mesh.put_back_kind_state(scratch);
+        applied
+    }
+
+    fn refine_marked(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
+        let mut scratch = take_scratch(mesh);
+        let applied = self.insert(mesh, u, Search::Nearby, &mut scratch);
+        mesh.put_back_kind_state(scratch);
+        applied
+    }
+
+    fn coarsen(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
+        let mut scratch = take_scratch(mesh);
+        let applied = self.remove(mesh, u, &mut scratch);
+        mesh.put_back_kind_state(scratch);
+        applied
+    }
+
+    fn look_at_removed(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        look: LookAtTet<'_>,
+    ) -> Result<Applied, UpdateError> {
+        let mut scratch = take_scratch(mesh);
+        let star = &mut scratch.gathered;
+        let found = self.collect_inserted(mesh, u, star);
+        if let Ok(Ok([slot, near])) = found {
+            let tets = star.tets[..star.len].iter().map(|&t| mesh.tets[t as usize]);
+            for tet in tets.filter(|tet| !tet.contains(&near)) {
+                let tet = tet.map(|v| if v == slot { near } else { v });
+                let levels = |field: usize| tet.map(|v| mesh.levels(v)[field]);
+                if look(&tet.map(|v| mesh.positions[v as usize]), &levels, 0) {
+                    break;
+                }
+            }
+        }
+        mesh.put_back_kind_state(scratch);
+        Ok(found?.map_or_else(Applied::Blocked, |_| Applied::Done))
+    }
+
+    /// All alike, so that numbers decide: to find out that an insertion has to wait costs as much as most of it.
+    fn site(&self, _: &CurrentMesh, _: UpdateId) -> [i32; 3] {
+        [0; 3]
+    }
+
+    fn find_removed(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        found: &mut Vec<u32>,
+    ) -> Result<(), UpdateError> {
+        let mut scratch = take_scratch(mesh);
+        let collected = self.collect_removed(mesh, u, Search::Everywhere, &mut scratch);
+        if collected == Ok(Applied::Done) {
+            found.extend_from_slice(&scratch.removed[..scratch.removed_len]);
+        }
+        mesh.put_back_kind_state(scratch);
+        match collected? {
+            Applied::Done => Ok(()),
+            Applied::Blocked(_) => Err(UpdateError::Error { update: u.0 }),
+        }
+    }
+
+    fn find_inserted(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        found: &mut Vec<u32>,
+    ) -> Result<(), UpdateError> {
+        mesh.find_star(u, self.vertex(u), found)
+    }
+}

@@ -1,0 +1,6 @@
+//! Half-edge Multi-Tessellations: vertex insertions that half-edge collapses undo, with the removers of tetrahedra coded, so that any page can be used without the others.
+
+pub(super) mod apply;
+pub(super) mod from_explicit;
+pub(super) mod star_code;
+pub(super) mod store;

@@ -1,0 +1,135 @@
+//! The base mesh, and what must hold of it before anything is applied to it.
+
+use crate::geom::WIDE_BITS;
+use crate::geom::orient3d;
+use crate::mt::MtInfo;
+use std::fmt;
+
+/// The coarsest mesh of an MT, on the lattices.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BaseMesh {
+    /// Integer positions; vertex `i` is [`VertexId`](crate::mt::VertexId)`(i)`.
+    pub positions: Vec<[i32; 3]>,
+    /// Field levels: `values[i * fields + f]` is field `f` at vertex `i`.
+    pub values: Vec<i32>,
+    /// Positive tetrahedra.
+    pub tets: Vec<[u32; 4]>,
+}
+
+/// Why a base mesh, or the description that comes with it, cannot be used.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum BaseMeshError {
+    /// The description of the MT contradicts itself or leaves the limits of the lattices.
+    Info(&'static str),
+    /// The vertex is off its lattice.
+    Vertex(u32),
+    /// The tetrahedron names a vertex that is not there, or is flat or inside out.
+    Tetrahedron(u32),
+    /// More than two tetrahedra share a face of this one, or two lie on the same side of it.
+    Face(u32),
+}
+
+impl fmt::Display for BaseMeshError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Info(what) => write!(f, "the description of the MT is not usable: {what}"),
+            Self::Vertex(v) => write!(f, "vertex {v} of the base mesh is off the lattice"),
+            Self::Tetrahedron(t) => write!(f, "tetrahedron {t} of the base mesh is not positive"),
+            Self::Face(t) => write!(f, "a face of tetrahedron {t} of the base mesh is shared by too many"),
+        }
+    }
+}
+
+impl std::error::Error for BaseMeshError {}
+
+impl BaseMesh {
+    /// Checks everything that refinement relies on: sizes, lattices, orientation. Adjacency is checked where it is
+    /// built, by [`CurrentMesh::new`](crate::mt::CurrentMesh::new).
+    ///
+    /// # Errors
+    /// The first thing that is wrong.
+    pub fn check(&self, info: &MtInfo) -> Result<(), BaseMeshError> {
+        info.check()?;
+        if self.values.len() != self.positions.len() * info.fields.len() {
+            return Err(BaseMeshError::Info("field levels and vertices differ in number"));
+        }
+        for (i, (position, levels)) in
+            self.positions.iter().zip(self.values.chunks(info.fields.len())).enumerate()
+        {
+            if !info.holds(*position, levels) {
+                return Err(BaseMeshError::Vertex(i as u32));
+            }
+        }
+        for (t, tet) in self.tets.iter().enumerate() {
+            let corners = tet.map(|v| self.positions.get(v as usize).copied());
+            let [Some(a), Some(b), Some(c), Some(d)] = corners else {
+                return Err(BaseMeshError::Tetrahedron(t as u32));
+            };
+            if orient3d(a, b, c, d) <= 0 {
+                return Err(BaseMeshError::Tetrahedron(t as u32));
+            }
+        }
+        Ok(())
+    }
+}
+
+impl MtInfo {
+    /// Checks that lattices and fields are usable: finite, not too fine, and in numbers that a file can hold.
+    ///
+    /// # Errors
+    /// The first thing that is not.
+    pub fn check(&self) -> Result<(), BaseMeshError> {
+        let lattice = &self.lattice;
+        let finite = |x: &f64| x.is_finite();
+        if lattice.bits == 0 || lattice.bits > WIDE_BITS {
+            return Err(BaseMeshError::Info("position bits must be 1 to 30"));
+        }
+        if !lattice.origin.iter().all(finite) || !lattice.step.iter().all(|s| s.is_finite() && *s > 0.0) {
+            return Err(BaseMeshError::Info("the lattice must be finite, its steps positive"));
+        }
+        if self.fields.is_empty() || self.fields.len() > usize::from(u8::MAX) {
+            return Err(BaseMeshError::Info("an MT has 1 to 255 fields"));
+        }
+        for field in &self.fields {
+            let numbers = [field.min, field.max, field.origin, field.step];
+            if !numbers.iter().all(finite) || field.step <= 0.0 || field.min > field.max {
+                return Err(BaseMeshError::Info("field ranges must be finite, their steps positive"));
+            }
+            if !field.quantization.is_finite()
+                || field.quantization < 0.0
+                || !field.time.is_none_or(f64::is_finite)
+            {
+                return Err(BaseMeshError::Info(
+                    "times must be finite, and what lattices round off not negative",
+                ));
+            }
+            if field.bits == 0 || field.bits > MAX_FIELD_BITS {
+                return Err(BaseMeshError::Info("field bits must be 1 to 24"));
+            }
+        }
+        if !self.quantization.is_finite() || self.quantization < 0.0 {
+            return Err(BaseMeshError::Info("what the lattice rounds off must be finite and not negative"));
+        }
+        if !self.displacement_per_error.is_finite() || self.displacement_per_error < 0.0 {
+            return Err(BaseMeshError::Info("the displacement per error must be finite and not negative"));
+        }
+        if self.updates > MAX_UPDATES {
+            return Err(BaseMeshError::Info("an MT has at most 2^30 updates"));
+        }
+        Ok(())
+    }
+
+    /// Whether a vertex with this position and these field levels is on the lattices.
+    #[inline]
+    pub fn holds(&self, position: [i32; 3], levels: &[i32]) -> bool {
+        position.iter().all(|&x| 0 <= x && x <= 1 << self.lattice.bits)
+            && levels.iter().zip(&self.fields).all(|(&q, field)| 0 <= q && q < 1 << field.bits)
+    }
+}
+
+/// Finest field lattice.
+pub const MAX_FIELD_BITS: u32 = 24;
+
+/// Most updates that an MT can have: vertex numbers stay below 2^32.
+pub const MAX_UPDATES: u32 = 1 << 30;

@@ -1,0 +1,12 @@
+//! The current mesh and what it is made of. Knows no kind of MT.
+
+pub(super) mod base;
+pub(super) mod current;
+pub(super) mod paged_array;
+pub(super) mod stars;
+mod tags;
+pub(super) mod tet;
+
+pub(super) use current::{CurrentMesh, KindState};
+pub(super) use stars::Gather;
+pub(super) use tags::FIRST_ANONYMOUS_TAG;

@@ -1,0 +1,1146 @@
+//! Vertex insertion and removal on the current mesh [§5]: the updates of the compact vertex-based MT.
+//!
+//! In the current mesh, the tag of a tetrahedron is the update that removes it. While that update has not arrived, the
+//! tag tells which child of the tetrahedron's creator it will be.
+
+use super::bit_string::Bits;
+use super::bit_string::width_of;
+use super::cavity_fill::Across;
+use super::cavity_fill::Close;
+use super::cavity_fill::Face;
+use super::cavity_fill::Glue;
+use super::cavity_fill::turned;
+use super::from_explicit::Hole;
+use super::from_explicit::write_given_up;
+use super::from_explicit::write_removed;
+use super::sphere_order::Spheres;
+use super::sphere_order::Told;
+use super::store::COUNT_BITS;
+use super::store::MAX_AROUND;
+use super::store::MAX_INSERTED;
+use super::store::VertexMt;
+use super::streaming::Insertion;
+use super::tet_errors::Packed;
+use super::tet_errors::QUARTERING_BITS;
+use crate::geom::NARROW_BITS;
+use crate::geom::det_i64;
+use crate::geom::orient3d;
+use crate::mesh::FACES;
+use crate::mesh::NONE;
+use crate::mt::Applied;
+use crate::mt::ApplyUpdates;
+use crate::mt::BaseMesh;
+use crate::mt::BaseMeshError;
+use crate::mt::CurrentMesh;
+use crate::mt::ErrorCode;
+use crate::mt::LookAtTet;
+use crate::mt::MtInfo;
+use crate::mt::MultiTessellation;
+use crate::mt::PagedArray;
+use crate::mt::UpdateError;
+use crate::mt::UpdateId;
+use crate::mt::UpdatePages;
+use crate::mt::VertexId;
+use crate::mt::mesh::FIRST_ANONYMOUS_TAG;
+use crate::mt::mesh::KindState;
+use crate::mt::mesh::current::{KindWord, Labels};
+use crate::mt::mesh::stars::BARE;
+use crate::mt::mesh::stars::GATHERED;
+use crate::mt::mesh::stars::Gather;
+use crate::mt::mesh::stars::LINK_CAPACITY;
+use crate::mt::mesh::stars::Star;
+use crate::mt::ranks::rank;
+use std::ops::Range;
+
+/// "This edge is on the rim: the face behind it is given up."
+const GIVEN_UP: u32 = 0xFF;
+
+/// Room for the new slots, and for [`GIVEN_UP`].
+const SLOTS: usize = 256;
+
+/// To look around a vertex for what an update removes takes as much as to look at so many tetrahedra.
+const SITE_COST: usize = 128;
+
+/// A face of Π_u with what lies beyond.
+#[derive(Clone, Copy, Debug, Default)]
+struct Wall {
+    /// Its vertices by index into the link, in an order that makes a tetrahedron `(v, corners)` positive.
+    corners: [u8; 3],
+    beyond: u32,
+    /// Which neighbour of the one beyond lies on this side.
+    side: u8,
+}
+
+/// Scratch space for insertions and removals.
+#[derive(Clone, Debug)]
+pub(in crate::mt) struct Cavity {
+    glue: Glue,
+    star: Star,
+    /// The slots of T_u.
+    tets: [u32; GATHERED],
+    tets_len: usize,
+    /// Their corners by index into the link.
+    corners: [[u8; 4]; GATHERED],
+    /// Faces of T_u that none of its tetrahedra lies behind: tetrahedron, face, what lies behind.
+    bare: Box<[[u32; 3]; BARE]>,
+    bare_len: usize,
+    walls: [Wall; MAX_INSERTED],
+    walls_len: usize,
+    /// Slots of the vertices of Π_u.
+    link: [u32; LINK_CAPACITY],
+    link_len: usize,
+    /// The place of each vertex of the link in the order of their labels.
+    order: [i32; MAX_AROUND],
+    /// For a directed edge between two of them the new tetrahedron that has it: `epoch << 16 | tetrahedron`.
+    edges: Box<[u32; MAX_AROUND * MAX_AROUND]>,
+    epoch: u32,
+    /// The place of each wall in canonical order.
+    places: [i32; GATHERED],
+    /// Across the faces of each new tetrahedron.
+    across: [[u32; 4]; MAX_INSERTED],
+    /// The tags of the new tetrahedra.
+    tags: [u32; MAX_INSERTED],
+    /// Their quarterings, where these are kept.
+    quarterings: [u8; MAX_INSERTED],
+    /// Of T_u.
+    fingerprint: Fingerprint,
+    /// The node of an update that is added.
+    bits: Bits,
+    /// The tags that the tetrahedra which it removes had.
+    removed_tags: [u32; GATHERED],
+    /// The quarterings of the tetrahedra that vertices have replaced, by label, where quarterings are kept.
+    replaced: Option<PagedArray<Packed>>,
+}
+
+impl KindState for Cavity {
+    fn bytes(&self) -> u64 {
+        (size_of_val(self) + self.replaced.as_ref().map_or(0, PagedArray::bytes)) as u64
+    }
+
+    fn copy(&self) -> Box<dyn KindState> {
+        Box::new(self.clone())
+    }
+}
+
+pub(super) fn take_cavity(mesh: &mut CurrentMesh) -> Box<Cavity> {
+    mesh.take_kind_state().unwrap_or_default()
+}
+
+/// A hash of the tetrahedra that an insertion removed, which the mesh keeps with the vertex (its [`KindWord`]). What the removal of the vertex puts
+/// back must have the same one. So a mesh is always one that insertions alone lead to; a code that names other
+/// tetrahedra than those which were there could make ones that the rest of the mesh, if it overlaps, has already.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Fingerprint(u32);
+
+impl Fingerprint {
+    /// What a vertex contributes, by its label.
+    #[inline]
+    fn of_vertex(label: u32) -> u32 {
+        let x = label.wrapping_mul(0x9E37_79B1);
+        (x ^ x >> 15).wrapping_mul(0x85EB_CA77)
+    }
+
+    /// Takes in a tetrahedron, given the sum of what its vertices contribute.
+    #[inline]
+    fn add(&mut self, sum: u32) {
+        let x = (sum ^ sum >> 16).wrapping_mul(0xC2B2_AE3D);
+        self.0 = self.0.wrapping_add(x ^ x >> 13);
+    }
+}
+
+impl Default for Cavity {
+    fn default() -> Self {
+        Self {
+            glue: Glue::default(),
+            star: Star::default(),
+            tets: [0; GATHERED],
+            tets_len: 0,
+            corners: [[0; 4]; GATHERED],
+            bare: Box::new([[0; 3]; BARE]),
+            bare_len: 0,
+            walls: [Wall::default(); MAX_INSERTED],
+            walls_len: 0,
+            link: [0; LINK_CAPACITY],
+            link_len: 0,
+            order: [0; MAX_AROUND],
+            edges: Box::new([0; MAX_AROUND * MAX_AROUND]),
+            epoch: 0,
+            places: [0; GATHERED],
+            across: [[NONE; 4]; MAX_INSERTED],
+            tags: [NONE; MAX_INSERTED],
+            quarterings: [0; MAX_INSERTED],
+            fingerprint: Fingerprint::default(),
+            bits: Bits::default(),
+            removed_tags: [NONE; GATHERED],
+            replaced: None,
+        }
+    }
+}
+
+impl Cavity {
+    /// Takes `removed`, which all have the tag, and lists their faces that none of them lies behind.
+    fn list_bare(&mut self, mesh: &mut CurrentMesh, removed: &[u32], tag: u32) {
+        mesh.next_epoch();
+        (self.tets_len, self.bare_len) = (removed.len(), 0);
+        self.tets[..removed.len()].copy_from_slice(removed);
+        for &t in removed {
+            for (face, n) in (0..).zip(mesh.neighbors[t as usize]) {
+                // Written anyway, and counted if it belongs there.
+                self.bare[self.bare_len % BARE] = [t, face, n];
+                self.bare_len += usize::from(n == NONE || mesh.tag(n) != tag);
+            }
+        }
+    }
+
+    /// Puts a face of tetrahedron `tet` on the list of walls. None if there are too many, or too many vertices.
+    #[inline]
+    fn add_wall(
+        &mut self,
+        mesh: &mut CurrentMesh,
+        tet: &[u32; 4],
+        face: usize,
+        beyond: u32,
+        side: u8,
+    ) -> Option<()> {
+        let corners =
+            FACES[face & 3].map(|k| mesh.number_vertex(tet[k & 3], &mut self.link, &mut self.link_len));
+        *self.walls.get_mut(self.walls_len)? = Wall { corners, beyond, side };
+        self.walls_len += 1;
+        (self.link_len <= MAX_AROUND).then_some(())
+    }
+
+    /// What each vertex of the link contributes to a fingerprint.
+    #[inline]
+    fn prints(&self, mesh: &CurrentMesh) -> [u32; MAX_AROUND] {
+        let mut prints = [0; MAX_AROUND];
+        for (print, &v) in prints.iter_mut().zip(&self.link[..self.link_len]) {
+            *print = Fingerprint::of_vertex(mesh.labels[v as usize].vertex);
+        }
+        prints
+    }
+
+    /// Finds the fingerprint of the tetrahedra that were built.
+    #[inline]
+    fn fingerprint_built(&mut self, mesh: &CurrentMesh) {
+        let prints = self.prints(mesh);
+        self.fingerprint = Fingerprint::default();
+        for tet in &self.glue.tets[..self.glue.len] {
+            let of_corners = tet.iter().map(|&x| prints[x as usize % MAX_AROUND]);
+            self.fingerprint.add(of_corners.fold(0, u32::wrapping_add));
+        }
+    }
+
+    /// Finds the faces of Π_u around the tetrahedra that were gathered, and joins the new tetrahedra behind them. `given_up` is the
+    /// number of faces on the boundary where some of these are given up; which are, `is_given_up` tells by their places and by
+    /// tetrahedron and face.
+    fn find_walls(
+        &mut self,
+        mesh: &mut CurrentMesh,
+        given_up: Option<usize>,
+        is_given_up: &mut dyn FnMut(usize, [u32; 2]) -> bool,
+    ) -> Option<()> {
+        (self.walls_len, self.link_len) = (0, 0);
+        let mut outer: Vec<([u32; 3], [u32; 2])> = Vec::new();
+        let mut fits = true;
+        for i in 0..self.bare_len {
+            let [t, face, beyond] = self.bare[i];
+            let tet = mesh.tets[t as usize];
+            if beyond == NONE && given_up.is_some() {
+                let mut sorted = FACES[face as usize & 3].map(|k| mesh.labels[tet[k] as usize].vertex);
+                sorted.sort_unstable();
+                // Kept in order as they come: they are few.
+                let at = outer.partition_point(|other| *other < (sorted, [t, face]));
+                outer.insert(at, (sorted, [t, face]));
+                continue;
+            }
+            let side = if beyond == NONE { Some(0) } else { mesh.side_towards(beyond, t) };
+            fits &= side.is_some();
+            self.add_wall(mesh, &tet, face as usize, beyond, side.unwrap_or(0))?;
+        }
+        let mut bare = Vec::new();
+        if given_up.is_some_and(|count| count != outer.len()) {
+            return None;
+        }
+        for (place, (_, [t, face])) in outer.into_iter().enumerate() {
+            let tet = mesh.tets[t as usize];
+            if is_given_up(place, [t, face]) {
+                bare.push(FACES[face as usize & 3].map(|k| tet[k]));
+            } else {
+                self.add_wall(mesh, &tet, face as usize, NONE, 0)?;
+            }
+        }
+        let mut rim = Vec::new();
+        for [a, b, c] in bare {
+            let number = |v: u32| mesh.vertex_number(v);
+            rim.push([number(a)?, number(b)?, number(c)?]);
+        }
+        if !fits {
+            return None;
+        }
+        let prints = self.prints(mesh);
+        self.fingerprint = Fingerprint::default();
+        for (corners, &t) in self.corners.iter_mut().zip(&self.tets[..self.tets_len]) {
+            // No vertex may be left without a tetrahedron.
+            *corners = mesh.corner_numbers(&mesh.tets[t as usize])?;
+            let prints = corners.map(|x| prints[usize::from(x) % MAX_AROUND]);
+            self.fingerprint.add(prints.into_iter().fold(0, u32::wrapping_add));
+        }
+        self.join_walls(&rim)
+    }
+
+    /// Orders the link by the labels of its vertices.
+    #[inline]
+    fn order_link(&mut self, mesh: &CurrentMesh) {
+        let mut labels = [i32::MAX; MAX_AROUND];
+        for (label, &v) in labels.iter_mut().zip(&self.link[..self.link_len]) {
+            // Signed numbers compare in one instruction; the shift keeps the order.
+            *label = (mesh.labels[v as usize].vertex ^ 1 << 31) as i32;
+        }
+        rank(&labels, self.link_len, &mut self.order);
+    }
+
+    /// Finds the place of each wall in canonical order: ascending by the sorted labels of its vertices.
+    #[inline]
+    fn order_walls(&mut self) {
+        let mut keys = [i32::MAX; GATHERED];
+        for (key, wall) in keys.iter_mut().zip(&self.walls[..self.walls_len]) {
+            let [a, b, c] = wall.corners.map(|x| self.order[x as usize % MAX_AROUND]);
+            let (low, high) = (a.min(b), a.max(b));
+            let (least, most) = (low.min(c), high.max(c));
+            *key = least << 12 | low.max(c.min(high)) << 6 | most;
+        }
+        rank(&keys, self.walls_len, &mut self.places);
+    }
+
+    /// Finds what lies across the faces of the new tetrahedra that meet at the new vertex. `rim` are the faces that are
+    /// given up. None if walls and rim do not close.
+    #[inline]
+    fn join_walls(&mut self, rim: &[[u8; 3]]) -> Option<()> {
+        self.epoch += 1;
+        if self.epoch == 1 << 16 {
+            self.edges.fill(0);
+            self.epoch = 1;
+        }
+        // Epochs grow, so what is of this one is not less than its start.
+        let epoch = self.epoch << 16;
+        let edges = &mut *self.edges;
+        let place = |a: u8, b: u8| (usize::from(a) << 6 | usize::from(b)) % (MAX_AROUND * MAX_AROUND);
+        let mut twice = false;
+        for &[a, b, c] in rim {
+            for (from, to) in [(b, c), (c, a), (a, b)] {
+                twice |= std::mem::replace(&mut edges[place(from, to)], epoch | GIVEN_UP) >= epoch;
+            }
+        }
+        for (i, wall) in (0_u32..).zip(&self.walls[..self.walls_len]) {
+            let [a, b, c] = wall.corners;
+            for (from, to) in [(b, c), (c, a), (a, b)] {
+                twice |= std::mem::replace(&mut edges[place(from, to)], epoch | i) >= epoch;
+            }
+        }
+        let mut open = false;
+        for (across, wall) in self.across.iter_mut().zip(&self.walls[..self.walls_len]) {
+            let [a, b, c] = wall.corners;
+            let [b, c, d] = [(c, b), (a, c), (b, a)].map(|(from, to)| edges[place(from, to)]);
+            open |= b.min(c).min(d) < epoch;
+            *across = [NONE, b & 0xFFFF, c & 0xFFFF, d & 0xFFFF];
+        }
+        (!twice && !open).then_some(())
+    }
+
+    /// Appends to the node of an update that is added how T_u fills Π_u, once link and walls are ordered.
+    fn write_shape(&mut self, mesh: &CurrentMesh, on_boundary: bool) -> Option<()> {
+        let order = &self.order;
+        let canonical = |x: u8| order[usize::from(x) % MAX_AROUND] as u8;
+        let mut faces: [Face; MAX_INSERTED] = [[0; 3]; MAX_INSERTED];
+        for (wall, &place) in self.walls[..self.walls_len].iter().zip(&self.places) {
+            faces[place as usize % MAX_INSERTED] = turned(wall.corners.map(canonical));
+        }
+        let removed = &mut self.corners[..self.tets_len];
+        removed.iter_mut().for_each(|tet| *tet = tet.map(canonical));
+        let spheres = || {
+            let mut positions = [[0; 3]; MAX_AROUND];
+            for (&v, &place) in self.link[..self.link_len].iter().zip(order) {
+                positions[place as usize % MAX_AROUND] = mesh.positions[v as usize];
+            }
+            Spheres::of(positions[..self.link_len].iter().copied())
+        };
+        let (vertices, faces) = (self.link_len as u32, &faces[..self.walls_len]);
+        write_removed(&mut self.glue, &mut self.bits, Hole { vertices, faces, removed, on_boundary }, spheres)
+    }
+
+    /// Whether all tetrahedra of the new star are positive, exactly.
+    #[inline]
+    fn is_star_positive(&self, mesh: &CurrentMesh, centre: [i32; 3], narrow: bool) -> bool {
+        let link = &self.link[..self.link_len];
+        if !narrow {
+            let at = |x: u8| mesh.positions[link[x as usize] as usize];
+            let positive = |wall: &Wall| {
+                let [a, b, c] = wall.corners.map(at);
+                orient3d(centre, a, b, c) > 0
+            };
+            return self.walls[..self.walls_len].iter().all(positive);
+        }
+        let mut relative = [[0_i64; 3]; MAX_AROUND];
+        for (relative, &v) in relative.iter_mut().zip(link) {
+            let position = mesh.positions[v as usize];
+            *relative = [0, 1, 2].map(|k| i64::from(position[k] - centre[k]));
+        }
+        self.walls[..self.walls_len].iter().all(|wall| {
+            let [u, v, w] = wall.corners.map(|x| relative[x as usize % MAX_AROUND]);
+            det_i64(u, v, w) > 0
+        })
+    }
+}
+
+/// Where the parts of a node's shape are.
+#[derive(Clone, Copy, Debug)]
+struct Shape {
+    children: u32,
+    removed: usize,
+    boundary: bool,
+    /// Where the bits are that tell which boundary faces of T_u are given up, and how many.
+    given_up: u64,
+    given_up_len: u32,
+    /// Where the removers of the star are, and how wide; each has the quarterings of its tetrahedron behind it.
+    removers: u64,
+    remover_width: u32,
+    quartering_bits: u32,
+}
+
+impl Shape {
+    /// Where the remover at a place of the star is.
+    #[inline]
+    fn remover(&self, place: u64) -> u64 {
+        self.removers + place * u64::from(self.remover_width + self.quartering_bits)
+    }
+
+    /// Where the quarterings there are.
+    #[inline]
+    fn quarterings(&self, place: u64) -> u64 {
+        self.remover(place) + u64::from(self.remover_width)
+    }
+}
+
+impl VertexMt {
+    #[inline]
+    fn shape(&self, u: UpdateId) -> Shape {
+        let start = self.node_start(u.0);
+        // While the MT grows, links and removers are elsewhere.
+        let (at, children) = match &self.growing {
+            Some(_) => (start + u64::from(self.widths.vertex), 0),
+            None => {
+                let children = self.children(u);
+                (self.links_end(start, children), children)
+            }
+        };
+        let removed = self.nodes.get(at, COUNT_BITS) as usize;
+        let boundary = self.nodes.get(at + u64::from(COUNT_BITS), 1) == 1;
+        let mut at = at + u64::from(COUNT_BITS) + 1;
+        let mut given_up_len = 0;
+        if boundary {
+            given_up_len = self.nodes.get(at, COUNT_BITS) as u32;
+            at += u64::from(COUNT_BITS);
+        }
+        Shape {
+            children,
+            removed,
+            boundary,
+            given_up: at,
+            given_up_len,
+            removers: at + u64::from(given_up_len),
+            remover_width: width_of(children),
+            quartering_bits: self.quartering_bits(children),
+        }
+    }
+
+    /// Bits of the quarterings of each tetrahedron that an update with so many children creates.
+    #[inline]
+    pub(in crate::mt) fn quartering_bits(&self, children: u32) -> u32 {
+        if self.base_quarterings.is_some() && children > 0 { QUARTERING_BITS } else { 0 }
+    }
+
+    /// Collects T_u. Tells a parent that has to be applied first, if T_u is not complete.
+    #[inline]
+    fn gather_removed(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        removed: usize,
+        cavity: &mut Cavity,
+    ) -> Result<Applied, UpdateError> {
+        let Cavity { tets, bare, .. } = cavity;
+        let gathered = mesh.tagged(u.0).and_then(|first| mesh.gather_tagged(first, u.0, tets, bare));
+        let (found, bare_len) = gathered.unwrap_or((0, 0));
+        if found != removed {
+            let missing = self.parents(u).find(|&p| mesh.slot(self.vertex(p)).is_none());
+            return missing.map(Applied::Blocked).ok_or(UpdateError::Cavity { update: u.0 });
+        }
+        (cavity.tets_len, cavity.bare_len) = (removed, bare_len);
+        Ok(Applied::Done)
+    }
+
+    fn insert(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        cavity: &mut Cavity,
+    ) -> Result<Applied, UpdateError> {
+        let torn = UpdateError::Cavity { update: u.0 };
+        let shape = self.shape(u);
+        if let blocked @ Applied::Blocked(_) = self.gather_removed(mesh, u, shape.removed, cavity)? {
+            return Ok(blocked);
+        }
+        if mesh.slot(self.vertex(u)).is_some() {
+            return Err(torn);
+        }
+        let count = shape.boundary.then_some(shape.given_up_len as usize);
+        let mut is_given_up = |place: usize, _| self.nodes.get(shape.given_up + place as u64, 1) == 1;
+        cavity.find_walls(mesh, count, &mut is_given_up).ok_or(torn.clone())?;
+        let position = self.position(u);
+        if !cavity.is_star_positive(mesh, position, self.info.lattice.bits <= NARROW_BITS) {
+            return Err(UpdateError::Inverted { update: u.0 });
+        }
+        self.find_tags(mesh, u, &shape, cavity)?;
+        self.perform_insertion(mesh, u, position, cavity);
+        Ok(Applied::Done)
+    }
+
+    /// Finds which update removes each tetrahedron of the new star.
+    #[inline]
+    fn find_tags(
+        &self,
+        mesh: &CurrentMesh,
+        u: UpdateId,
+        shape: &Shape,
+        cavity: &mut Cavity,
+    ) -> Result<(), UpdateError> {
+        let walls = cavity.walls_len;
+        if shape.children == 0 && self.growing.is_none() {
+            cavity.tags[..walls].fill(NONE);
+            cavity.quarterings[..walls].fill(0);
+            return Ok(());
+        }
+        cavity.order_link(mesh);
+        cavity.order_walls();
+        if let Some(growing) = &self.growing {
+            for (tag, &place) in cavity.tags[..walls].iter_mut().zip(&cavity.places) {
+                *tag = growing.remover(u.0, place as usize).unwrap_or(FIRST_ANONYMOUS_TAG | place as u32);
+            }
+            for (own, &place) in cavity.quarterings[..walls].iter_mut().zip(&cavity.places) {
+                *own = growing.quarterings(u.0, place as usize);
+            }
+            return Ok(());
+        }
+        let complete = self.updates() == self.info.updates;
+        let mut children = [NONE; MAX_INSERTED + 1];
+        for i in 1..=shape.children.min(MAX_INSERTED as u32) {
+            children[i as usize] = match self.child(u, i) {
+                Some(child) => child.0,
+                None if complete => return Err(UpdateError::Cavity { update: u.0 }),
+                None => FIRST_ANONYMOUS_TAG,
+            };
+        }
+        for (tag, &place) in cavity.tags[..walls].iter_mut().zip(&cavity.places) {
+            let child = self.nodes.get(shape.remover(place as u64), shape.remover_width) as usize;
+            let child = *children.get(child).ok_or(UpdateError::Cavity { update: u.0 })?;
+            *tag = if child == FIRST_ANONYMOUS_TAG { child | place as u32 } else { child };
+        }
+        for (own, &place) in cavity.quarterings[..walls].iter_mut().zip(&cavity.places) {
+            *own = self.nodes.get(shape.quarterings(place as u64), shape.quartering_bits) as u8;
+        }
+        Ok(())
+    }
+
+    /// The quarterings of the tetrahedron at a place of the star that update `u` makes.
+    fn quarterings_at(&self, u: UpdateId, place: u32) -> u8 {
+        if let Some(growing) = &self.growing {
+            return growing.quarterings(u.0, place as usize);
+        }
+        let shape = self.shape(u);
+        self.nodes.get(shape.quarterings(u64::from(place)), shape.quartering_bits) as u8
+    }
+
+    /// Keeps the quarterings of T_u with the vertex that takes its place.
+    fn keep_quarterings(&self, mesh: &CurrentMesh, u: UpdateId, cavity: &mut Cavity) {
+        let Some(replaced) = &mut cavity.replaced else { return };
+        let by_labels = |&t: &u32| {
+            let mut tet = mesh.tets[t as usize].map(|v| mesh.labels[v as usize].vertex);
+            tet.sort_unstable();
+            (tet, mesh.tet_byte(t))
+        };
+        let mut all: Vec<([u32; 4], u8)> = cavity.tets[..cavity.tets_len].iter().map(by_labels).collect();
+        all.sort_unstable();
+        let mut packed = Packed::default();
+        all.iter().enumerate().for_each(|(place, (_, own))| packed.set(place, *own));
+        replaced.set(self.vertex(u).0, packed);
+    }
+
+    /// The quarterings of the tetrahedra of T_u that were built; none if they are not kept.
+    fn kept_quarterings(&self, u: UpdateId, cavity: &Cavity) -> Option<[u8; GATHERED]> {
+        let Cavity { glue, replaced, .. } = cavity;
+        let packed = replaced.as_ref()?.get(self.vertex(u).0);
+        // Numbers are in the order of labels.
+        let sorted = |(i, tet): (usize, &[u8; 4])| {
+            let mut tet = *tet;
+            tet.sort_unstable();
+            (tet, i)
+        };
+        let mut all: Vec<([u8; 4], usize)> = glue.tets[..glue.len].iter().enumerate().map(sorted).collect();
+        all.sort_unstable();
+        let mut kept = [0; GATHERED];
+        all.iter().enumerate().for_each(|(place, (_, i))| kept[*i] = packed.get(place));
+        Some(kept)
+    }
+
+    /// The update that removes the tetrahedron at a place of the star that update `u` makes, if it is here.
+    fn remover_at(&self, u: UpdateId, place: u32) -> Option<u32> {
+        if let Some(growing) = &self.growing {
+            return growing.remover(u.0, place as usize);
+        }
+        let shape = self.shape(u);
+        let child = self.nodes.get(shape.remover(u64::from(place)), shape.remover_width) as u32;
+        self.child(u, child).filter(|_| child > 0).map(|child| child.0)
+    }
+
+    /// Reveals updates to the tetrahedra around the vertices that these come with. False if others may be left to be told, or to look at
+    /// all would be quicker.
+    fn mark_arrived_around(&self, mesh: &mut CurrentMesh, updates: &Range<u32>) -> bool {
+        let Some(growing) = &self.growing else { return false };
+        let of_base = self.base.tets.iter().zip(&self.base_removers).filter(|(_, u)| updates.contains(u));
+        let mut sites: Vec<u32> = of_base.map(|(tet, _)| tet[0]).collect();
+        let mut missing = sites.len();
+        let mut parents: Vec<u32> = updates.clone().flat_map(|u| growing.parents(u)).copied().collect();
+        parents.sort_unstable();
+        parents.dedup();
+        for p in parents {
+            let VertexId(v) = self.vertex(UpdateId(p));
+            if mesh.slot(VertexId(v)).is_some() {
+                sites.push(v);
+                missing += growing.count_removed(p, updates);
+            }
+        }
+        if SITE_COST * sites.len() > mesh.tet_slots() {
+            return false;
+        }
+        sites.sort_unstable();
+        sites.dedup();
+        let mut star = Vec::new();
+        for slot in sites.into_iter().filter_map(|v| mesh.slot(VertexId(v))).collect::<Vec<u32>>() {
+            star.clear();
+            mesh.list_star(slot, &mut star);
+            let found = star.iter().filter(|&&t| self.mark_arrived_at(mesh, t, updates)).count();
+            missing = missing.saturating_sub(found);
+        }
+        // Else the tetrahedra around a vertex do not all hang together, or the mesh knows of some updates already.
+        missing == 0
+    }
+
+    /// Lets the mesh know which update removes a tetrahedron, if it is here; touches it if it is one of `updates`. Tells whether that is
+    /// news.
+    fn mark_arrived_at(&self, mesh: &mut CurrentMesh, t: u32, updates: &Range<u32>) -> bool {
+        let tag = mesh.tag(t);
+        if tag == NONE || tag < FIRST_ANONYMOUS_TAG {
+            if updates.contains(&tag) {
+                mesh.touch(&[t]);
+            }
+            return false;
+        }
+        let place = tag & !FIRST_ANONYMOUS_TAG;
+        let creator = self.creator(mesh, t);
+        let remover = match creator {
+            Some(u) => self.remover_at(u, place),
+            None => self.base_removers().get(place as usize).copied().filter(|&u| u != NONE),
+        };
+        let Some(u) = remover else { return false };
+        mesh.set_tag(t, u);
+        if let Some(base) = &self.base_quarterings {
+            let of_base = || base.get(place as usize).copied().unwrap_or(0);
+            mesh.set_tet_byte(t, creator.map_or_else(of_base, |u| self.quarterings_at(u, place)));
+        }
+        mesh.touch(&[t]);
+        updates.contains(&u)
+    }
+
+    /// Adds the insertion of a vertex as the next update and applies it; nothing is added if it cannot be applied.
+    pub(in crate::mt) fn insert_next(
+        &mut self,
+        mesh: &mut CurrentMesh,
+        new: &Insertion<'_>,
+        cavity: &mut Cavity,
+    ) -> Result<(), UpdateError> {
+        let u = UpdateId(self.updates());
+        let torn = UpdateError::Cavity { update: u.0 };
+        let on_boundary = self.open(mesh, new, cavity).ok_or(torn.clone())?;
+        if !cavity.is_star_positive(mesh, new.position, self.info.lattice.bits <= NARROW_BITS) {
+            return Err(UpdateError::Inverted { update: u.0 });
+        }
+        cavity.order_link(mesh);
+        cavity.order_walls();
+        cavity.write_shape(mesh, on_boundary).ok_or(torn)?;
+        self.add_node(&cavity.bits, new.errors)?;
+        self.note_parents(mesh, new, &cavity.removed_tags, cavity.walls_len);
+        for (tag, &place) in cavity.tags[..cavity.walls_len].iter_mut().zip(&cavity.places) {
+            *tag = FIRST_ANONYMOUS_TAG | place as u32;
+        }
+        cavity.quarterings[..cavity.walls_len].fill(0);
+        self.perform_insertion(mesh, u, new.position, cavity);
+        Ok(())
+    }
+
+    /// Finds the faces of Π_u for an update that is added, and writes all in front of the code of T_u. Tells whether faces on the boundary are
+    /// given up. None if it is not a hole that a vertex could be inserted into.
+    fn open(&self, mesh: &mut CurrentMesh, new: &Insertion<'_>, cavity: &mut Cavity) -> Option<bool> {
+        self.take_away(mesh, new, &mut cavity.removed_tags)?;
+        let update = self.updates();
+        if mesh.slot(self.vertex(UpdateId(update))).is_some() {
+            return None;
+        }
+        cavity.list_bare(mesh, new.removed, update);
+        let on_boundary = !new.given_up.is_empty();
+        let outer =
+            cavity.bare[..cavity.bare_len].iter().filter(|[.., beyond]| on_boundary && *beyond == NONE);
+        let outer = on_boundary.then(|| outer.count());
+        let mut given_up = Vec::new();
+        let mut is_given_up = |_: usize, face: [u32; 2]| {
+            given_up.push(new.given_up.contains(&face));
+            given_up.last() == Some(&true)
+        };
+        cavity.find_walls(mesh, outer, &mut is_given_up)?;
+        let bits = &mut cavity.bits;
+        bits.clear();
+        new.position.iter().for_each(|&x| bits.push(x as u64, self.widths.position));
+        for (&level, field) in new.levels.iter().zip(&self.info.fields) {
+            bits.push(level as u64, field.bits);
+        }
+        write_given_up(bits, new.removed.len(), &given_up)?;
+        Some(on_boundary)
+    }
+
+    /// Which faces of T_u on the boundary are given up, in the order of their sorted vertices; empty if none is.
+    pub(crate) fn given_up(&self, u: UpdateId) -> Vec<bool> {
+        let shape = self.shape(u);
+        let count = if shape.boundary { u64::from(shape.given_up_len) } else { 0 };
+        (0..count).map(|i| self.nodes.get(shape.given_up + i, 1) == 1).collect()
+    }
+
+    /// Where the code of T_u starts in a node without removers, given where its shape does.
+    pub(in crate::mt) fn code_start(&self, shape_start: u64) -> u64 {
+        let at = shape_start + u64::from(COUNT_BITS) + 1;
+        if self.nodes.get(at - 1, 1) == 0 {
+            return at;
+        }
+        at + u64::from(COUNT_BITS) + self.nodes.get(at, COUNT_BITS)
+    }
+
+    #[inline]
+    fn perform_insertion(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        position: [i32; 3],
+        cavity: &mut Cavity,
+    ) {
+        self.keep_quarterings(mesh, u, cavity);
+        let slot = mesh.new_vertex();
+        let labels = Labels { vertex: self.vertex(u).0, kind_word: KindWord(cavity.fingerprint.0) };
+        mesh.put_vertex(slot, labels, position);
+        let first = slot as usize * mesh.fields;
+        for (f, level) in self.levels(u).enumerate() {
+            mesh.levels[first + f] = level;
+        }
+        let (old, new) = (cavity.tets_len, cavity.walls_len);
+        let mut slots = [NONE; SLOTS];
+        let reused = old.min(new);
+        slots[..reused].copy_from_slice(&cavity.tets[..reused]);
+        mesh.new_tets(&mut slots[reused..new]);
+        for (i, wall) in cavity.walls[..new].iter().enumerate() {
+            let t = slots[i];
+            let [a, b, c] = wall.corners.map(|x| cavity.link[x as usize % MAX_AROUND]);
+            mesh.tets[t as usize] = [slot, a, b, c];
+            let [_, b_side, c_side, d_side] = cavity.across[i].map(|j| slots[j as usize % SLOTS]);
+            let around = [wall.beyond, b_side, c_side, d_side];
+            mesh.neighbors[t as usize] = around;
+            if wall.beyond != NONE {
+                mesh.neighbors[wall.beyond as usize][wall.side as usize & 3] = t;
+                mesh.mark_tet(wall.beyond);
+            }
+            mesh.set_tag(t, cavity.tags[i]);
+            mesh.set_tet_byte(t, cavity.quarterings[i]);
+            mesh.mark_tet(t);
+            [a, b, c].iter().for_each(|&v| mesh.incident[v as usize] = t);
+        }
+        mesh.incident[slot as usize] = slots[0];
+        for &t in &cavity.tets[reused..old] {
+            mesh.free_tet(t);
+        }
+        mesh.touch(&cavity.tets[..old]);
+        mesh.touch(&slots[reused..new]);
+    }
+
+    /// Collects the star of the vertex that `u` inserted and builds T_u from it, in numbers; the mesh stays as it is. Tells
+    /// a child of `u` that has to go first, if there is one.
+    fn rebuild(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        cavity: &mut Cavity,
+    ) -> Result<Applied, UpdateError> {
+        let vertex = self.vertex(u);
+        let torn = UpdateError::Cavity { update: u.0 };
+        let absent = UpdateError::Vertex { update: u.0, vertex: vertex.0 };
+        let slot = mesh.slot(vertex).ok_or(absent.clone())?;
+        let younger = |labels: &[Labels], tet: &[u32; 4]| {
+            tet.iter().map(|&v| labels[v as usize].vertex).find(|&v| v > vertex.0)
+        };
+        match mesh.gather_star(slot, &mut cavity.star, younger) {
+            Ok(()) => {}
+            Err(Gather::TooLarge) => return Err(UpdateError::Star { update: u.0 }),
+            Err(Gather::Stopped(v)) => {
+                return self.inserted_by(VertexId(v)).map(Applied::Blocked).ok_or(absent);
+            }
+        }
+        (cavity.walls_len, cavity.link_len) = (0, 0);
+        for i in 0..cavity.star.len {
+            let (t, corner) = (cavity.star.tets[i], cavity.star.corner[i] as usize);
+            let beyond = mesh.neighbors[t as usize][corner];
+            let side = if beyond == NONE { Some(0) } else { mesh.side_towards(beyond, t) };
+            let tet = mesh.tets[t as usize];
+            let added = side.and_then(|side| cavity.add_wall(mesh, &tet, corner, beyond, side));
+            added.ok_or(torn.clone())?;
+        }
+        cavity.order_link(mesh);
+        self.sort(cavity);
+        self.build_removed(mesh, u, cavity).ok_or(torn.clone())?;
+        cavity.fingerprint_built(mesh);
+        if KindWord(cavity.fingerprint.0) != mesh.labels[slot as usize].kind_word {
+            return Err(torn);
+        }
+        // Other tetrahedra may have the same fingerprint by intent; none may be inside out.
+        let at = |x: u8| mesh.positions[cavity.link[x as usize % MAX_AROUND] as usize];
+        let positive = cavity.glue.tets[..cavity.glue.len].iter().all(|tet| {
+            let [a, b, c, d] = tet.map(at);
+            orient3d(a, b, c, d) > 0
+        });
+        if positive { Ok(Applied::Done) } else { Err(UpdateError::Inverted { update: u.0 }) }
+    }
+
+    /// Puts link and walls into canonical order.
+    #[inline]
+    fn sort(&self, cavity: &mut Cavity) {
+        cavity.order_walls();
+        let walls = cavity.walls;
+        for (wall, &place) in walls[..cavity.walls_len].iter().zip(&cavity.places) {
+            let corners = turned(wall.corners.map(|x| cavity.order[x as usize % MAX_AROUND] as u8));
+            cavity.walls[place as usize % MAX_INSERTED] = Wall { corners, ..*wall };
+        }
+        let link = cavity.link;
+        for (&v, &place) in link[..cavity.link_len].iter().zip(&cavity.order) {
+            cavity.link[place as usize % MAX_AROUND] = v;
+        }
+    }
+
+    /// Builds T_u from walls in canonical order.
+    #[inline]
+    fn build_removed(&self, mesh: &CurrentMesh, u: UpdateId, cavity: &mut Cavity) -> Option<()> {
+        let shape = self.shape(u);
+        let mut faces: [Face; MAX_INSERTED] = [[0; 3]; MAX_INSERTED];
+        for (face, wall) in faces.iter_mut().zip(&cavity.walls[..cavity.walls_len]) {
+            *face = wall.corners;
+        }
+        let vertices = cavity.link_len as u32;
+        let at = shape.remover(cavity.walls_len as u64);
+        let mut code = Code::new(at, vertices, shape.boundary);
+        let apex = code.apex_of_all(&self.nodes);
+        if apex.is_none() {
+            code.read_told(&self.nodes, || {
+                let link = &cavity.link[..cavity.link_len];
+                Spheres::of(link.iter().map(|&v| mesh.positions[v as usize]))
+            });
+        }
+        let close = |face: Face, of_link: bool| match apex {
+            Some(apex) if !of_link || face.contains(&apex) => Some(Close::Leave),
+            Some(apex) => Some(Close::With(apex)),
+            None => code.close(&self.nodes, face, of_link),
+        };
+        cavity.glue.build(&faces[..cavity.walls_len], !shape.boundary, close)?;
+        (cavity.glue.len == shape.removed).then_some(())
+    }
+
+    fn perform_removal(&self, mesh: &mut CurrentMesh, u: UpdateId, cavity: &mut Cavity) {
+        let kept = self.kept_quarterings(u, cavity);
+        let Cavity { glue, star, walls, link, .. } = cavity;
+        let (old, new) = (star.len, glue.len);
+        let mut slots = [NONE; GATHERED];
+        let reused = old.min(new);
+        slots[..reused].copy_from_slice(&star.tets[..reused]);
+        mesh.touch(&star.tets[..old]);
+        // Free what is left first: the vertex goes with it.
+        star.tets[reused..old].iter().for_each(|&t| mesh.free_tet(t));
+        slots[reused..new].iter_mut().for_each(|t| *t = mesh.new_tet());
+        mesh.touch(&slots[reused..new]);
+        if let Some(slot) = mesh.slot(self.vertex(u)) {
+            mesh.remove_vertex(slot);
+        }
+        for i in 0..new {
+            let t = slots[i];
+            let tet = glue.tets[i].map(|x| link[x as usize % MAX_AROUND]);
+            mesh.tets[t as usize] = tet;
+            for (side, across) in glue.across[i].iter().enumerate() {
+                mesh.neighbors[t as usize][side] = match *across {
+                    Across::Nothing => NONE,
+                    Across::Inside(j) => slots[j as usize],
+                    Across::Outside(place) => {
+                        let wall = walls[place as usize % MAX_INSERTED];
+                        if wall.beyond != NONE {
+                            mesh.neighbors[wall.beyond as usize][wall.side as usize & 3] = t;
+                            mesh.mark_tet(wall.beyond);
+                        }
+                        wall.beyond
+                    }
+                };
+            }
+            mesh.set_tag(t, u.0);
+            if let Some(kept) = &kept {
+                mesh.set_tet_byte(t, kept[i]);
+            }
+            mesh.mark_tet(t);
+            tet.iter().for_each(|&v| mesh.incident[v as usize] = t);
+        }
+    }
+}
+
+/// Reads how the faces inside Π_u are closed.
+pub(in crate::mt) struct Code {
+    at: u64,
+    /// Vertices of Π_u.
+    vertices: u32,
+    boundary: bool,
+    told: Told,
+    /// Where places in their order are told.
+    spheres: Option<Spheres>,
+}
+
+impl Code {
+    pub fn new(at: u64, vertices: u32, boundary: bool) -> Self {
+        Self { at, vertices, boundary, told: Told::Vertex, spheres: None }
+    }
+
+    fn read(&mut self, nodes: &Bits, width: u32) -> u32 {
+        let value = nodes.get(self.at, width) as u32;
+        self.at += u64::from(width);
+        value
+    }
+
+    /// The vertex that all of T_u has, if the code says that there is one.
+    #[inline]
+    fn apex_of_all(&mut self, nodes: &Bits) -> Option<u8> {
+        let fan = self.read(nodes, 1) == 1;
+        fan.then(|| self.read(nodes, width_of(self.vertices.saturating_sub(1))) as u8)
+    }
+
+    /// Reads how faces are told; `spheres` are made only if that takes them.
+    #[inline]
+    fn read_told(&mut self, nodes: &Bits, spheres: impl FnOnce() -> Spheres) {
+        self.told = Told::ALL[self.read(nodes, 2) as usize % Told::ALL.len()];
+        self.spheres = (self.told != Told::Vertex).then(spheres);
+    }
+
+    /// How to close a face. Its own vertices are left out of the count; at the boundary of the domain, one more choice
+    /// for a face inside Π_u is that nothing lies behind it.
+    #[inline]
+    fn close(&mut self, nodes: &Bits, face: Face, of_link: bool) -> Option<Close> {
+        if let Some(spheres) = &self.spheres {
+            let at = &mut self.at;
+            let place = self.told.read(&mut || {
+                *at += 1;
+                nodes.get(*at - 1, 1) == 1
+            });
+            return spheres.vertex(face, place).map(Close::With);
+        }
+        let choices = choices(self.vertices, self.boundary, of_link)?;
+        let chosen = self.read(nodes, width_of(choices - 1));
+        if chosen + 3 == self.vertices && self.boundary && !of_link {
+            return Some(Close::Leave);
+        }
+        // The least vertex comes first.
+        let [a, b, c] = face;
+        let mut x = chosen as u8;
+        [a, b.min(c), b.max(c)].iter().for_each(|&own| x += u8::from(x >= own));
+        (u32::from(x) < self.vertices).then_some(Close::With(x))
+    }
+}
+
+/// How many ways there are to close a face.
+#[inline]
+pub(in crate::mt) fn choices(vertices: u32, boundary: bool, of_link: bool) -> Option<u32> {
+    let choices = vertices.checked_sub(3)? + u32::from(boundary && !of_link);
+    (choices > 0).then_some(choices)
+}
+
+impl MultiTessellation for VertexMt {
+    fn info(&self) -> &MtInfo {
+        self.info()
+    }
+
+    fn base(&self) -> &BaseMesh {
+        self.base()
+    }
+
+    fn updates(&self) -> u32 {
+        self.updates()
+    }
+
+    fn bytes(&self) -> u64 {
+        self.bytes()
+    }
+
+    fn always_grows(&self) -> bool {
+        self.always_grows
+    }
+
+    #[inline]
+    fn error(&self, u: UpdateId) -> ErrorCode {
+        self.error_of(u)
+    }
+
+    #[inline]
+    fn errors(&self, u: UpdateId) -> &[ErrorCode] {
+        self.errors_of(u)
+    }
+
+    fn has_tet_errors(&self) -> bool {
+        self.base_quarterings.is_some()
+    }
+
+    fn own_fall(&self, u: UpdateId) -> u8 {
+        self.own_falls.get(u.0 as usize).copied().unwrap_or(0)
+    }
+
+    fn to_come(&self) -> ErrorCode {
+        self.to_come()
+    }
+}
+
+impl UpdatePages for VertexMt {
+    fn page_inserted(&self, mesh: &mut CurrentMesh, updates: Range<u32>) {
+        let updates = updates.start..updates.end.min(self.updates());
+        if updates.is_empty() {
+            return;
+        }
+        if !self.mark_arrived_around(mesh, &updates) {
+            (0..mesh.tet_slots() as u32).for_each(|t| _ = self.mark_arrived_at(mesh, t, &updates));
+        }
+    }
+}
+
+impl ApplyUpdates for VertexMt {
+    fn start(&self) -> Result<CurrentMesh, BaseMeshError> {
+        let mut mesh = CurrentMesh::new(self.info(), self.base())?;
+        let anonymous = self.growing.is_some();
+        mesh.tag_all(
+            (0..)
+                .zip(self.base_removers())
+                .map(|(t, &u)| if anonymous && u == NONE { FIRST_ANONYMOUS_TAG | t } else { u }),
+        );
+        if let Some(quarterings) = &self.base_quarterings {
+            mesh.keep_tet_bytes(quarterings.clone());
+            let replaced = Some(PagedArray::new(Packed::default()));
+            mesh.put_back_kind_state(Box::new(Cavity { replaced, ..Cavity::default() }));
+        }
+        Ok(mesh)
+    }
+
+    #[inline]
+    fn quarterings(&self, mesh: &CurrentMesh, t: u32) -> u8 {
+        mesh.tet_byte(t)
+    }
+
+    #[inline]
+    fn remover(&self, mesh: &CurrentMesh, t: u32) -> Option<UpdateId> {
+        Some(mesh.tag(t)).filter(|&u| u < self.updates()).map(UpdateId)
+    }
+
+    #[inline]
+    fn creator(&self, mesh: &CurrentMesh, t: u32) -> Option<UpdateId> {
+        let newest = mesh.tets[t as usize].iter().map(|&v| mesh.labels[v as usize].vertex).max();
+        self.inserted_by(VertexId(newest?))
+    }
+
+    #[inline]
+    fn may_coarsen(&self, mesh: &CurrentMesh, u: UpdateId) -> bool {
+        let incident = mesh.slot(self.vertex(u)).map(|slot| mesh.incident[slot as usize]);
+        incident.is_some_and(|t| self.creator(mesh, t) == Some(u))
+    }
+
+    fn refine(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
+        let mut cavity = take_cavity(mesh);
+        let applied = self.insert(mesh, u, &mut cavity);
+        mesh.put_back_kind_state(cavity);
+        applied
+    }
+
+    fn coarsen(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
+        let mut cavity = take_cavity(mesh);
+        let rebuilt = self.rebuild(mesh, u, &mut cavity);
+        if rebuilt == Ok(Applied::Done) {
+            self.perform_removal(mesh, u, &mut cavity);
+        }
+        mesh.put_back_kind_state(cavity);
+        rebuilt
+    }
+
+    fn look_at_removed(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        look: LookAtTet<'_>,
+    ) -> Result<Applied, UpdateError> {
+        let mut cavity = take_cavity(mesh);
+        let rebuilt = self.rebuild(mesh, u, &mut cavity);
+        if rebuilt == Ok(Applied::Done) {
+            let kept = self.kept_quarterings(u, &cavity);
+            for (i, tet) in cavity.glue.tets[..cavity.glue.len].iter().enumerate() {
+                let tet = tet.map(|x| cavity.link[x as usize % MAX_AROUND]);
+                let levels = |field: usize| tet.map(|v| mesh.levels(v)[field]);
+                let own = kept.map_or(0, |kept| kept[i]);
+                if look(&tet.map(|v| mesh.positions[v as usize]), &levels, own) {
+                    break;
+                }
+            }
+        }
+        mesh.put_back_kind_state(cavity);
+        rebuilt
+    }
+
+    /// All alike, so that numbers decide: to find out that an insertion has to wait costs as much as most of it.
+    fn site(&self, _: &CurrentMesh, _: UpdateId) -> [i32; 3] {
+        [0; 3]
+    }
+
+    fn find_removed(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        found: &mut Vec<u32>,
+    ) -> Result<(), UpdateError> {
+        let mut cavity = take_cavity(mesh);
+        let gathered = self.gather_removed(mesh, u, self.shape(u).removed, &mut cavity);
+        if gathered == Ok(Applied::Done) {
+            found.extend_from_slice(&cavity.tets[..cavity.tets_len]);
+        }
+        mesh.put_back_kind_state(cavity);
+        match gathered? {
+            Applied::Done => Ok(()),
+            Applied::Blocked(_) => Err(UpdateError::Error { update: u.0 }),
+        }
+    }
+
+    fn find_inserted(
+        &self,
+        mesh: &mut CurrentMesh,
+        u: UpdateId,
+        found: &mut Vec<u32>,
+    ) -> Result<(), UpdateError> {
+        mesh.find_star(u, self.vertex(u), found)
+    }
+}

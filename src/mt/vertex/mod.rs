@@ -1,0 +1,10 @@
+//! Vertex-based Multi-Tessellations [§2.2, §5]: updates are vertex insertions, their inverses vertex removals.
+
+pub(super) mod apply;
+pub(super) mod bit_string;
+pub(super) mod cavity_fill;
+pub(super) mod from_explicit;
+pub(super) mod sphere_order;
+pub(super) mod store;
+pub(super) mod streaming;
+pub(super) mod tet_errors;

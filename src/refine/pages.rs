@@ -1,0 +1,144 @@
+//! Updates that arrive and leave, one after the other or page by page, and what pages the front waits for.
+
+use super::Criterion;
+use super::front::{Asked, CHUNK_WORDS, Front};
+use super::look::{TetErrors, see};
+use crate::mt::{ApplyUpdates, ErrorCode, UpdateId};
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+impl Front {
+    /// Takes note of updates that have arrived.
+    pub(super) fn learn(&mut self, mt: &impl ApplyUpdates) {
+        if mt.updates() <= self.known && !self.applied.words().is_empty() {
+            return;
+        }
+        let arrived = self.known..mt.updates();
+        self.known = arrived.end;
+        self.applied.resize(self.known);
+        self.chunks
+            .resize(self.applied.words().len().div_ceil(CHUNK_WORDS), [ErrorCode::MAX, ErrorCode::ZERO]);
+        self.take_in(mt, arrived);
+    }
+
+    /// Tells the mesh of updates that have arrived. What they remove is judged again, and nothing else.
+    fn take_in(&mut self, mt: &impl ApplyUpdates, updates: Range<u32>) {
+        self.sum_up(mt, updates.clone());
+        while let Some(&(u, t)) = self.awaiting.range((updates.start, 0)..(updates.end, 0)).next() {
+            self.awaiting.remove(&(u, t));
+            self.tets.open(t);
+        }
+        mt.page_inserted(&mut self.mesh, updates);
+        self.open_touched();
+        self.begin_again();
+    }
+
+    /// The goal is another one with what is here now.
+    fn begin_again(&mut self) {
+        self.ranked.clear();
+        if let Some(goal) = &mut self.goal {
+            goal.reached = false;
+        }
+    }
+
+    /// Takes note that a page of updates has come to the MT, with all on which it depends. Updates that are not here are no
+    /// updates: a mesh is what was asked for as far as those that are here go. Needs not be told of updates that came by
+    /// `push`, behind all others.
+    pub fn arrived(&mut self, mt: &impl ApplyUpdates, page: u32) {
+        let (updates, known) = (mt.page_updates(page), self.known);
+        self.learn(mt);
+        if updates.start < known {
+            self.mesh.forget_proven(updates.start);
+            self.take_in(mt, updates);
+        }
+    }
+
+    /// Gets ready for a page of updates to be taken from the MT, which has to follow at once. False if that must not be, since
+    /// one of them is applied.
+    pub fn leave(&mut self, mt: &impl ApplyUpdates, page: u32) -> bool {
+        let updates = mt.page_updates(page);
+        if updates.clone().any(|u| self.contains(UpdateId(u))) {
+            return false;
+        }
+        mt.page_evicted(&mut self.mesh, updates.clone());
+        self.leaves.forget(updates.clone());
+        let (gone, kept) = std::mem::take(&mut self.pending)
+            .into_iter()
+            .partition(|asked: &Asked| updates.contains(&asked.update.0));
+        self.pending = kept;
+        self.awaiting.extend(Vec::into_iter(gone).map(|asked| (asked.update.0, asked.tet)));
+        self.begin_again();
+        true
+    }
+
+    /// Takes note of the errors of updates that have arrived.
+    fn sum_up(&mut self, mt: &impl ApplyUpdates, updates: Range<u32>) {
+        for u in updates {
+            let chunk = u as usize / (64 * CHUNK_WORDS);
+            if chunk >= self.chunks.len() {
+                self.chunks.resize(chunk + 1, [ErrorCode::MAX, ErrorCode::ZERO]);
+            }
+            let (error, [least, largest]) = (mt.error(UpdateId(u)), self.chunks[chunk]);
+            self.chunks[chunk] = [least.min(error), largest.max(error)];
+        }
+    }
+
+    /// The pages that are not here but hold what removes a tetrahedron that violates the criterion, as far as what is known of
+    /// the page tells, or what such an update depends on; each with the largest excess. Only what the mesh shows at once:
+    /// more may be demanded when these have come. Ascending.
+    pub fn demanded_pages(
+        &self,
+        mt: &impl ApplyUpdates,
+        criterion: &dyn Criterion,
+        page_of: impl Fn(UpdateId) -> u32,
+    ) -> BTreeMap<u32, f64> {
+        let mut pages = BTreeMap::new();
+        let mut demand = |absent: UpdateId, t: u32| {
+            let Some(tet) = self.mesh.tet(t) else { return };
+            let update = mt.remover(&self.mesh, t);
+            let known = update.map(|u| TetErrors::of(mt, &self.mesh, t, u));
+            let errors = known.or_else(|| mt.awaited_errors(&self.mesh, t).map(TetErrors::bounded_by));
+            let Some(errors) = errors else { return };
+            let verdict =
+                see(&self.mesh, &tet, &errors, update.unwrap_or(absent), |look| criterion.rank(look));
+            if verdict.asks() {
+                let largest = pages.entry(page_of(absent)).or_insert(0.0_f64);
+                *largest = largest.max(verdict.excess);
+            }
+        };
+        if self.watched {
+            self.awaiting.iter().for_each(|&(u, t)| demand(UpdateId(u), t));
+        } else {
+            let slots = 0..self.mesh.tet_slots() as u32;
+            slots.filter_map(|t| mt.awaited(&self.mesh, t).map(|u| (u, t))).for_each(|(u, t)| demand(u, t));
+            self.awaiting.iter().for_each(|&(u, t)| demand(UpdateId(u), t));
+        }
+        pages
+    }
+
+    /// The pages that are here and hold what removes a tetrahedron which might violate the criterion, as far as `bounds` of the
+    /// page tell: without them it would be unknown whether the mesh is what was asked for. Some are named several times.
+    pub fn telling_pages(
+        &self,
+        mt: &impl ApplyUpdates,
+        criterion: &dyn Criterion,
+        page_of: impl Fn(UpdateId) -> u32,
+        bounds: impl Fn(u32) -> Vec<ErrorCode>,
+    ) -> Vec<u32> {
+        let mut pages = Vec::new();
+        for (t, tet) in (0..).zip(self.mesh.tets()) {
+            let Some(u) = mt.remover(&self.mesh, t) else { continue };
+            let page = page_of(u);
+            // Tetrahedra side by side are often removed by updates of a page.
+            if pages.last() == Some(&page) {
+                continue;
+            }
+            let bounds = bounds(page);
+            let errors = TetErrors::bounded_by(&bounds);
+            if see(&self.mesh, tet, &errors, u, |look| criterion.judge(look)).asks() {
+                pages.push(page);
+            }
+        }
+        pages
+    }
+}

@@ -1,0 +1,186 @@
+//! Requests that errors alone decide: which updates they want needs no look at the mesh.
+
+use super::front::{CHUNK_WORDS, Front, GoOn};
+use super::sweep::{Window, window_size};
+use super::{Outcome, Tolerance};
+use crate::mesh::BitSet;
+use crate::mt::{Applied, ApplyUpdates, ErrorCode, UpdateError, UpdateId};
+
+/// The updates that are asked for everywhere, by their errors alone.
+#[derive(Clone, Copy)]
+pub(super) struct Wanted<'a> {
+    tolerances: &'a [Tolerance],
+    /// What all of them have a larger error than.
+    least: ErrorCode,
+    /// What has a larger error than this is wanted for sure.
+    sure: ErrorCode,
+}
+
+impl<'a> Wanted<'a> {
+    pub fn new(tolerances: &'a [Tolerance]) -> Self {
+        let least = tolerances.iter().map(|t| t.error).min();
+        // One field may have a small error where another has a large one.
+        let sure = tolerances.iter().filter(|t| t.field.is_none()).map(|t| t.error).min();
+        Self { tolerances, least: least.unwrap_or(ErrorCode::MAX), sure: sure.unwrap_or(ErrorCode::MAX) }
+    }
+
+    #[inline]
+    fn has(&self, mt: &impl ApplyUpdates, u: UpdateId) -> bool {
+        let error = mt.error(u);
+        error > self.sure || error > self.least && self.has_of_field(mt, u)
+    }
+
+    fn has_of_field(&self, mt: &impl ApplyUpdates, u: UpdateId) -> bool {
+        self.tolerances.iter().any(|t| t.field.is_some_and(|field| mt.error_of_field(u, field) > t.error))
+    }
+}
+
+/// The updates that a sweep which undoes others leaves applied.
+struct Staying<'a> {
+    wanted: Wanted<'a>,
+    /// Those on which such updates depend, as far as they were found; none where errors are monotone.
+    others: BitSet,
+}
+
+impl Staying<'_> {
+    fn has(&self, mt: &impl ApplyUpdates, u: UpdateId) -> bool {
+        self.others.has(u.0) || self.wanted.has(mt, u)
+    }
+
+    #[cold]
+    fn add(&mut self, updates: &[UpdateId]) {
+        for u in updates {
+            self.others.insert(u.0);
+        }
+    }
+}
+
+impl Front {
+    /// Back to the base mesh.
+    pub(super) fn coarsen_all(
+        &mut self,
+        mt: &impl ApplyUpdates,
+        outcome: &mut Outcome,
+    ) -> Result<(), UpdateError> {
+        self.forget_watch();
+        self.sweep(mt, Wanted::new(&[]), false, outcome, &mut |_| true).map(drop)
+    }
+
+    /// Undoes all updates within the tolerances and applies the others. Which these are, errors tell without a look at the
+    /// mesh; they are monotone along the partial order, so no update is in the way of what is undone.
+    pub(super) fn satisfy_uniform(
+        &mut self,
+        mt: &impl ApplyUpdates,
+        wanted: Wanted<'_>,
+        outcome: &mut Outcome,
+        go_on: GoOn<'_>,
+    ) -> Result<bool, UpdateError> {
+        Ok(self.sweep(mt, wanted, false, outcome, go_on)? && self.sweep(mt, wanted, true, outcome, go_on)?)
+    }
+
+    /// Applies all updates that are wanted, or undoes all others: windows by number, in each by place. What is in the way of
+    /// one is done before it. False if it was told to stop.
+    fn sweep(
+        &mut self,
+        mt: &impl ApplyUpdates,
+        wanted: Wanted<'_>,
+        applied: bool,
+        outcome: &mut Outcome,
+        go_on: GoOn<'_>,
+    ) -> Result<bool, UpdateError> {
+        let mut window = Window::default();
+        let mut staying = Staying { wanted, others: BitSet::default() };
+        let words = self.applied.words().len();
+        let mut done = 0;
+        while done < words {
+            window.updates.clear();
+            let size = window_size(self.applied_count);
+            while done < words && window.updates.len() < size {
+                let word = if applied { done } else { words - 1 - done };
+                self.push_unlike(mt, wanted, word, applied, &mut window.updates);
+                done += 1;
+            }
+            window.sort(mt, &self.mesh);
+            for &u in &window.updates {
+                self.turn(mt, u, applied, &mut staying, outcome)?;
+                if !go_on(outcome) {
+                    return Ok(false);
+                }
+            }
+        }
+        Ok(true)
+    }
+
+    /// Appends the updates of a word that a sweep has to apply, by rising number, or to undo, by falling number.
+    fn push_unlike(
+        &self,
+        mt: &impl ApplyUpdates,
+        wanted: Wanted<'_>,
+        word: usize,
+        applied: bool,
+        updates: &mut Vec<UpdateId>,
+    ) {
+        let [least, largest] = self.chunks[word / CHUNK_WORDS];
+        let bits = self.applied.words()[word];
+        let mut rest = if applied { !bits } else { bits };
+        if rest == 0 || (if applied { largest <= wanted.least } else { least > wanted.sure }) {
+            return;
+        }
+        while rest != 0 {
+            let bit = if applied { rest.trailing_zeros() } else { 63 - rest.leading_zeros() };
+            rest &= !(1 << bit);
+            let u = UpdateId(64 * word as u32 + bit);
+            if u.0 < self.known && wanted.has(mt, u) == applied {
+                updates.push(u);
+            }
+        }
+    }
+
+    /// Applies or undoes `u` and before it what is in the way. What has to stay for the sake of another update does so,
+    /// which happens where errors grow along the partial order.
+    fn turn(
+        &mut self,
+        mt: &impl ApplyUpdates,
+        u: UpdateId,
+        applied: bool,
+        staying: &mut Staying<'_>,
+        outcome: &mut Outcome,
+    ) -> Result<(), UpdateError> {
+        let mut next = Some(u).filter(|&u| self.contains(u) != applied);
+        let mut waiting = Vec::new();
+        while let Some(u) = next {
+            let turned =
+                if applied { mt.refine_marked(&mut self.mesh, u) } else { mt.coarsen(&mut self.mesh, u) };
+            // What depends on an update that is not here is as if it were not here itself.
+            let is_cut_off = match &turned {
+                Ok(Applied::Blocked(other)) => applied && *other < u && !mt.has(*other),
+                Err(UpdateError::Missing { .. }) => applied && mt.present() < mt.info().updates,
+                _ => false,
+            };
+            if is_cut_off {
+                return Ok(());
+            }
+            next = match turned? {
+                Applied::Done => {
+                    self.note(u, applied);
+                    *(if applied { &mut outcome.refined } else { &mut outcome.coarsened }) += 1;
+                    self.mesh.clear_touched();
+                    waiting.pop()
+                }
+                // Numbers fall from child to parent, so this ends.
+                Applied::Blocked(other)
+                    if other != u && (other < u) == applied && self.contains(other) != applied =>
+                {
+                    waiting.push(u);
+                    if !applied && staying.has(mt, other) {
+                        staying.add(&waiting);
+                        return Ok(());
+                    }
+                    Some(other)
+                }
+                Applied::Blocked(_) => return Err(UpdateError::Error { update: u.0 }),
+            };
+        }
+        Ok(())
+    }
+}

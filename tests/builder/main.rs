@@ -1,0 +1,13 @@
+//! Promises of what is built from meshes, and of what checks and measures it.
+
+mod delaunay;
+mod exact_values;
+mod fields;
+mod flat_boundaries;
+mod measure;
+mod repair;
+#[path = "../support/mod.rs"]
+mod support;
+mod theory;
+mod verify_real;
+mod verify_tampered;

@@ -1,0 +1,141 @@
+//! Promise: MTs of real meshes keep every promise, and what cannot be used is refused with a reason.
+//!
+//! Needs the environment variable TETRALOD_DATA: a folder with the data sets.
+
+use crate::support::meshes::built;
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use tetralod::builder::BuildConfig;
+use tetralod::builder::Construction;
+use tetralod::builder::Criterion;
+use tetralod::builder::Method;
+use tetralod::builder::build;
+use tetralod::io;
+use tetralod::mesh::Grid;
+use tetralod::mesh::TetMesh;
+use tetralod::mesh::repair;
+use tetralod::mt::ApplyUpdates;
+use tetralod::mt::MtKind;
+use tetralod::verify;
+use tetralod::verify::Reference;
+
+fn data() -> Option<PathBuf> {
+    let data = std::env::var_os("TETRALOD_DATA").map(PathBuf::from);
+    if data.is_none() {
+        println!("skipped: TETRALOD_DATA is not set");
+    }
+    data
+}
+
+fn load(name: &str) -> Option<TetMesh> {
+    let mesh = io::read(&data()?.join(name)).expect("a file that can be read");
+    Some(repair(mesh).expect("a mesh that can be repaired").0)
+}
+
+/// Builds and verifies MTs of all kinds; the base mesh of the edge-based one must have at most so many vertices.
+fn check(name: &str, mesh: &TetMesh, most: u32) {
+    let built = built(mesh);
+    keeps_promises(&format!("{name}, edge"), &built.mt, mesh, Reference::Mesh);
+    let base = built.summary.base_vertices;
+    assert!(base <= most, "{name}: {base} vertices in the base mesh");
+    for (kind, method, criterion) in [
+        (MtKind::HalfEdge, Method::Decimate, Criterion::HalfEdge),
+        (MtKind::Vertex, Method::Decimate, Criterion::Delaunay),
+        (MtKind::Vertex, Method::Insert, Criterion::Delaunay),
+    ] {
+        // Insertion fills the convex hull; of these meshes, only the grids do.
+        if method == Method::Insert && mesh.grid.is_none() {
+            continue;
+        }
+        let construction = Construction::new(kind, method, criterion).expect("they go together");
+        let config = BuildConfig { construction, ..BuildConfig::of(kind) };
+        let mt = build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt;
+        let reference = if method.keeps_the_mesh() { Reference::Mesh } else { Reference::Points };
+        keeps_promises(
+            &format!("{name}, {} {} {}", kind.name(), method.name(), criterion.name()),
+            &mt,
+            mesh,
+            reference,
+        );
+    }
+}
+
+fn keeps_promises(name: &str, mt: &impl ApplyUpdates, mesh: &TetMesh, reference: Reference) {
+    let report = verify::run(mt, mesh, reference, &mut |_, _| {});
+    assert!(report.valid && report.queries > 40, "{name}: {:#?}", report.failures);
+    assert!(report.worst_error_ratio <= 1.0, "{name}: {}", report.worst_error_ratio);
+}
+
+fn file(name: &str, most: u32) {
+    if let Some(mesh) = load(name) {
+        check(name, &mesh, most);
+    }
+}
+
+#[test]
+fn bluntfin() {
+    file("bluntfin_clean.vtu", 2000);
+}
+
+#[test]
+fn combustor() {
+    file("combustor.vtu", 2000);
+}
+
+#[test]
+fn fea_bracket() {
+    file("fea_bracket.vtu", 3000);
+}
+
+#[test]
+fn bucky() {
+    file("bucky.vti", 1000);
+}
+
+/// Every second sample of the middle, so that the test does not take minutes.
+#[test]
+fn part_of_cthead() {
+    let Some(mesh) = load("cthead.vti") else { return };
+    let Some(Grid { dims: [nx, ny, _], origin, spacing }) = mesh.grid else {
+        panic!("a regular grid");
+    };
+    let dims = [26, 26, 30];
+    let first = [6, 6, 16];
+    let mut fields = mesh.fields.clone();
+    for (field, whole) in fields.iter_mut().zip(&mesh.fields) {
+        field.values.clear();
+        for z in 0..dims[2] {
+            for y in 0..dims[1] {
+                let at = |x: u32| {
+                    let [x, y, z] = [first[0] + 2 * x, first[1] + 2 * y, first[2] + 2 * z];
+                    whole.values[(x + nx * (y + ny * z)) as usize]
+                };
+                field.values.extend((0..dims[0]).map(at));
+            }
+        }
+    }
+    let part = TetMesh::from_grid(Grid { dims, origin, spacing: spacing.map(|s| 2.0 * s) }, fields);
+    check("cthead", &part, 1000);
+}
+
+#[test]
+fn meshes_with_something_wrong_or_unusual() {
+    for name in
+        ["post_slit", "angular_sector", "ossicles", "raptor_8418", "manifold_check0", "manifold_check1"]
+    {
+        file(&format!("robust/{name}.vtu"), 1500);
+    }
+    let Some(data) = data() else { return };
+    for (name, reason) in [("can_crushed", "folded"), ("manifold_check2", "shared by")] {
+        let mesh = io::read(&data.join(format!("robust/{name}.vtu"))).expect("a file that can be read");
+        let refusal = repair(mesh).expect_err("not a mesh").to_string();
+        assert!(refusal.contains(reason), "{name}: {refusal}");
+    }
+}
+
+#[test]
+fn meshes_of_many_kinds() {
+    for name in ["disk_out_ref", "cylinder_flow", "piezo_micro", "hand", "piece"] {
+        file(&format!("{name}.vtu"), 1000);
+    }
+}

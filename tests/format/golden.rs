@@ -1,0 +1,144 @@
+//! Promise: versions 2 and 3 of the format do not change. What these small MTs are written as, byte for byte, is kept in
+//! `tests/golden`, and is read back; files of other versions are told apart.
+
+use crate::support::files::{assert_same, decode, field, header};
+use std::fmt::Write;
+use tetralod::format::EncodeOptions;
+use tetralod::format::FormatError;
+use tetralod::format::encode;
+use tetralod::geom::Lattice;
+use tetralod::mt::BaseMesh;
+use tetralod::mt::EdgeMt;
+use tetralod::mt::ErrorCode;
+use tetralod::mt::ExplicitMt;
+use tetralod::mt::ExplicitUpdate;
+use tetralod::mt::Mt;
+use tetralod::mt::MtInfo;
+use tetralod::mt::MtKind;
+use tetralod::mt::MultiTessellation;
+use tetralod::mt::VertexId;
+use tetralod::mt::VertexSplit;
+
+/// Two tetrahedra on one face, with one field of 8 bits; there are going to be `updates` updates.
+fn start(kind: MtKind, [vertices, tetrahedra, updates]: [u32; 3]) -> (MtInfo, BaseMesh) {
+    let info = MtInfo {
+        kind,
+        lattice: Lattice { origin: [0.0; 3], step: [0.5; 3], bits: 5 },
+        fields: vec![field("p", 8)],
+        vertices,
+        tetrahedra,
+        updates,
+        displacement_per_error: 2.0,
+        quantization: 0.0,
+    };
+    let base = BaseMesh {
+        positions: vec![[0, 8, 8], [16, 8, 8], [8, 8, 20], [8, 0, 8], [8, 20, 8]],
+        values: vec![10, 20, 30, 200, 40],
+        tets: vec![[0, 1, 2, 3], [1, 0, 2, 4]],
+    };
+    (info, base)
+}
+
+/// Splits of a vertex on the edge that both tetrahedra have, and of one of its halves.
+fn edge_example() -> Mt {
+    let (info, base) = start(MtKind::Edge, [7, 4, 2]);
+    let mut mt = EdgeMt::new(info, base);
+    let splits = [(0, [0, -3, -1], -3, 0b10, 300), (5, [0, 1, 0], 2, 0b01, 299)];
+    for (vertex, offset, level, mask, error) in splits {
+        let split = VertexSplit {
+            vertex: VertexId(vertex),
+            offset,
+            edge: 0,
+            field_offsets: &[level],
+            mask,
+            errors: &[ErrorCode(error)],
+        };
+        mt.push(&split).expect("the example is an MT");
+    }
+    mt.into()
+}
+
+/// The only update puts a vertex into the first tetrahedron.
+fn explicit_example() -> Mt {
+    let (info, base) = start(MtKind::Explicit, [6, 5, 1]);
+    let mut mt = ExplicitMt::new(info, base);
+    let update = ExplicitUpdate {
+        positions: &[[8, 6, 11]],
+        levels: &[15],
+        removed: &[0],
+        inserted: &[[5, 1, 2, 3], [0, 5, 2, 3], [0, 1, 5, 3], [0, 1, 2, 5]],
+        errors: &[ErrorCode(300)],
+    };
+    mt.push(&update).expect("the example is an MT");
+    mt.into()
+}
+
+/// The same update in a vertex-based MT.
+fn vertex_example() -> Mt {
+    explicit_example().convert(MtKind::Vertex).expect("an insertion")
+}
+
+/// The same update in a half-edge MT: its vertex collapses onto one of the tetrahedron's.
+fn half_edge_example() -> Mt {
+    explicit_example().convert(MtKind::HalfEdge).expect("a half-edge insertion")
+}
+
+fn options() -> EncodeOptions {
+    let metadata = [("tool".to_owned(), "hand".to_owned())].into();
+    EncodeOptions { metadata, ..EncodeOptions::default() }
+}
+
+/// Bytes from pairs of hexadecimal digits; what follows two slashes is a remark.
+fn bytes_of(text: &str) -> Vec<u8> {
+    let digits = text.lines().flat_map(|line| line.split("//").next().unwrap_or("").split_whitespace());
+    digits.map(|d| u8::from_str_radix(d, 16).expect("two hexadecimal digits")).collect()
+}
+
+/// The inverse, 32 bytes a line.
+fn text_of(bytes: &[u8]) -> String {
+    let mut text = String::new();
+    for line in bytes.chunks(32) {
+        let digits: Vec<String> = line.iter().map(|byte| format!("{byte:02X}")).collect();
+        writeln!(text, "{}", digits.join(" ")).expect("a string takes everything");
+    }
+    text
+}
+
+#[test]
+fn the_examples_are_written_and_read_as_ever() {
+    let examples = [
+        (edge_example(), include_str!("../golden/v2-edge.hex")),
+        (explicit_example(), include_str!("../golden/v2-explicit.hex")),
+        (vertex_example(), include_str!("../golden/v2-vertex.hex")),
+        (half_edge_example(), include_str!("../golden/v3-half-edge.hex")),
+    ];
+    let mut changes = String::new();
+    for (mt, golden) in examples {
+        let golden = bytes_of(golden);
+        let found = encode(&mt, &options()).expect("the example is complete");
+        if found == golden {
+            assert_same(&decode(&golden).expect("a good file"), &mt);
+        } else {
+            write!(changes, "{}:\n{}\n", mt.info().kind.name(), text_of(&found)).expect("a string");
+        }
+    }
+    assert!(changes.is_empty(), "these are written as other bytes now:\n{changes}");
+}
+
+#[test]
+fn a_half_edge_mt_in_a_file_of_version_2_is_refused() {
+    let mut bytes = bytes_of(include_str!("../golden/v3-half-edge.hex"));
+    let total = bytes.len() as u64;
+    bytes[..32].copy_from_slice(&header([2, 0], 0, total));
+    let what = "the version of the file does not go with the kind of MT in it";
+    assert_eq!(decode(&bytes).expect_err("an older version"), FormatError::Corrupt { offset: 8, what });
+}
+
+#[test]
+fn files_of_the_first_version_are_told_apart() {
+    let found = decode(&bytes_of(include_str!("../golden/v1-edge.hex")));
+    let error = found.expect_err("version 1 is no longer read");
+    assert_eq!(error, FormatError::UnsupportedVersion { found: [1, 0], supported: [3, 0] });
+    let text = error.to_string();
+    assert!(text.contains("1.0") && text.contains("build the file again"), "{text}");
+}

@@ -1,0 +1,16 @@
+//! Promises of MT files: read back, split, cut off, damaged, and as the specification says.
+
+mod blocks;
+mod damaged;
+mod golden;
+#[allow(dead_code, reason = "each test uses a part of it")]
+mod reader;
+mod reference;
+mod reference_kinds;
+mod regressions;
+mod roundtrip;
+mod sections;
+mod split;
+#[path = "../support/mod.rs"]
+mod support;
+mod truncated;

@@ -1,0 +1,177 @@
+//! Promise: what is decoded is what was encoded, and the same MT gives the same bytes.
+
+use crate::support::files::{
+    assert_same, bytes_in_blocks, bytes_of, coded, decode, inserted, options, planned, sample, samples,
+    spelled,
+};
+use crate::support::strategies::{config, plan};
+use proptest::prelude::*;
+use std::ops::ControlFlow;
+use tetralod::builder::BuildConfig;
+use tetralod::builder::build;
+use tetralod::format::BLOCK_BITS;
+use tetralod::format::Decoder;
+use tetralod::format::EncodeError;
+use tetralod::format::EncodeOptions;
+use tetralod::format::encode;
+use tetralod::format::encode_to;
+use tetralod::generate;
+use tetralod::geom::WIDE_BITS;
+use tetralod::mt::ApplyUpdates;
+use tetralod::mt::EdgeMt;
+use tetralod::mt::ExplicitMt;
+use tetralod::mt::Mt;
+use tetralod::mt::MtInfo;
+use tetralod::mt::MtKind;
+use tetralod::mt::MultiTessellation;
+use tetralod::mt::UpdateError;
+use tetralod::mt::UpdateId;
+use tetralod::mt::UpdatePages;
+use tetralod::mt::VertexSplit;
+
+/// The file of an MT gives an MT of the same updates, and that the same file.
+fn comes_back(mt: &Mt, block_bits: u32) {
+    let bytes = bytes_in_blocks(mt, block_bits);
+    let found = decode(&bytes).expect("a good file");
+    assert_same(mt, &found);
+    assert!(bytes_in_blocks(mt, block_bits) == bytes, "other bytes for the same MT");
+    assert!(bytes_in_blocks(&found, block_bits) == bytes, "other bytes for what was read");
+    if !matches!(mt, Mt::Edge(_)) {
+        assert!(found == *mt, "these kinds come back as they were");
+    }
+}
+
+proptest! {
+    #![proptest_config(config(48, 23))]
+
+    #[test]
+    fn any_mt_comes_back(plan in plan(4, 2, 0..80), block_bits in 4..8_u32) {
+        let mt = Mt::from(planned(plan));
+        comes_back(&mt, block_bits);
+        comes_back(&mt.convert(MtKind::Explicit).expect("a valid MT"), block_bits);
+    }
+
+    #[test]
+    fn any_insertions_come_back(tets in 1..4_u32, fields in 1..=3_usize, updates in 0..200_usize) {
+        comes_back(&inserted(tets, fields, updates), 4);
+    }
+}
+
+#[test]
+fn blocks_of_all_sizes_come_back() {
+    for updates in [0, 1, 15, 16, 17, 48, 255, 256, 257] {
+        for mt in samples(2, updates) {
+            [4, 8, 16].iter().for_each(|&bits| comes_back(&mt, bits));
+        }
+    }
+}
+
+#[test]
+fn splits_come_back_from_a_file_as_they_were() {
+    let mt = sample(3, 600);
+    let spelled = coded(&mt).convert(MtKind::Explicit).expect("a valid MT");
+    assert!(spelled.convert(MtKind::Edge) == Ok(mt));
+}
+
+#[test]
+fn description_metadata_and_size_come_back() {
+    samples(3, 600).iter().for_each(all_comes_back);
+}
+
+fn all_comes_back(mt: &Mt) {
+    let bytes = bytes_of(mt);
+    let mut decoder = Decoder::default();
+    let progress = decoder.feed(&bytes).expect("a good file");
+    assert_eq!(decoder.info(), Some(mt.info()));
+    assert_eq!(decoder.mt().map(|mt| mt.info()), Some(mt.info()));
+    assert_eq!(decoder.wanted_fields(), [0, 1, 2]);
+    assert!(decoder.metadata().iter().cloned().eq(options().metadata));
+    assert!(progress.ready && progress.complete);
+    assert_eq!((progress.bytes, progress.updates), (bytes.len() as u64, 600));
+    assert_eq!(progress.total, Some(bytes.len() as u64));
+}
+
+#[test]
+fn a_writer_gets_the_same_bytes() {
+    for mt in samples(1, 600) {
+        let mut written = Vec::new();
+        let size = encode_to(&mt, &options(), &mut written).expect("a vector takes everything");
+        assert_eq!(size, written.len() as u64);
+        assert_eq!(written, bytes_of(&mt));
+    }
+}
+
+#[test]
+fn what_could_not_be_read_back_is_not_written() {
+    let plain = EncodeOptions::default();
+    let Mt::Edge(whole) = sample(1, 5) else { panic!("edge-based") };
+    let part = EdgeMt::new(whole.info().clone(), whole.base().clone());
+    let incomplete = encode(&part, &plain);
+    assert!(matches!(incomplete, Err(EncodeError::Incomplete { updates: 0, expected: 5 })));
+
+    let mut miscounted = whole.info().clone();
+    miscounted.updates = 0;
+    let miscounted = EdgeMt::new(miscounted, whole.base().clone());
+    assert!(matches!(encode(&miscounted, &plain), Err(EncodeError::Base(_))));
+
+    let spelled = spelled(1, 5);
+    let other = MtInfo { updates: 0, ..spelled.info().clone() };
+    let other = ExplicitMt::new(other, MultiTessellation::base(&spelled).clone());
+    assert!(matches!(encode(&other, &plain), Err(EncodeError::Base(_))));
+
+    let metadata = [("key".to_owned(), "x".repeat(70_000))].into();
+    let wordy = EncodeOptions { metadata, ..plain.clone() };
+    assert!(matches!(encode(&whole, &wordy), Err(EncodeError::TooLong { .. })));
+
+    for block_bits in [0, 3, 17, 32, u32::MAX] {
+        let odd = EncodeOptions { block_bits, ..plain.clone() };
+        assert!(matches!(encode(&whole, &odd), Err(EncodeError::Blocks { bits }) if bits == block_bits));
+    }
+    assert!((4..=16).contains(&BLOCK_BITS));
+
+    // Updates that no mesh takes: all goes to one side, and more than there is.
+    let mut damaged = EdgeMt::new(whole.info().clone(), whole.base().clone());
+    for u in (0..whole.updates()).map(UpdateId) {
+        let split = whole.split(u);
+        damaged.push(&VertexSplit { mask: u64::MAX, ..split }).expect("only a mesh can tell");
+    }
+    let refused = encode(&damaged, &plain);
+    assert!(matches!(refused, Err(EncodeError::Update(_))), "{refused:?}");
+}
+
+#[test]
+fn offsets_come_back_on_lattices_of_all_widths() {
+    for bits in [8, 12, 16, 17, 18, 19, 20, 24, WIDE_BITS] {
+        let config = BuildConfig { position_bits: Some(bits), ..BuildConfig::of(MtKind::Edge) };
+        let mesh = generate::bucky(6).expect("a small size");
+        let built = build(&mesh, &config, &mut |_| ControlFlow::Continue(())).expect("an MT");
+        let mt = built.mt;
+        comes_back(&mt, 5);
+        let Mt::Edge(coded) = coded(&mt) else { panic!("edge-based") };
+        let edges = (0..coded.updates()).filter(|&u| coded.split(UpdateId(u)).edge != 0).count();
+        assert!(0 < edges && edges < coded.updates() as usize, "{edges} offsets are told by edges");
+    }
+}
+
+#[test]
+fn offsets_are_not_counted_from_edges_that_are_not_there() {
+    let Mt::Edge(mt) = sample(1, 40) else { panic!("edge-based") };
+    let copy = |mut to: EdgeMt, count: u32, edge: u8| {
+        for u in (0..count - 1).map(UpdateId) {
+            to.push(&mt.split(u)).expect("an update of the MT");
+        }
+        let last = mt.split(UpdateId(count - 1));
+        to.push(&VertexSplit { edge, ..last }).map(|_| to)
+    };
+    let empty = || EdgeMt::new(mt.info().clone(), mt.base().clone());
+    let told = || EdgeMt::coded(mt.info().clone(), mt.base().clone(), 5);
+    assert_eq!(copy(empty(), 3, 1), Err(UpdateError::Edge { update: 2 }));
+    assert_eq!(copy(told(), 3, 128), Err(UpdateError::Edge { update: 2 }));
+    // How many edges there are only the mesh can tell.
+    let far = copy(told(), 1, 127).expect("seven bits");
+    let mut mesh = far.start().expect("a base mesh");
+    far.updates_arrived(&mut mesh, 0);
+    let tets = mesh.tets().to_vec();
+    assert_eq!(far.refine(&mut mesh, UpdateId(0)), Err(UpdateError::Edge { update: 0 }));
+    assert_eq!(mesh.tets(), tets, "the mesh is as it was");
+}

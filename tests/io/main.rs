@@ -1,0 +1,9 @@
+//! Promises of the exchange formats.
+
+mod damaged;
+mod encodings;
+mod fields;
+#[allow(dead_code, reason = "each test uses a part of it")]
+mod files;
+mod real;
+mod surfaces;

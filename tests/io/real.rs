@@ -1,0 +1,185 @@
+//! Real files: every encoding of one mesh, damaged originals, dirty meshes.
+
+use std::path::Path;
+
+use crate::files::real_data;
+use tetralod::io;
+use tetralod::io::ReadError;
+use tetralod::mesh;
+use tetralod::mesh::MeshError;
+use tetralod::mesh::TetMesh;
+
+fn read(folder: &Path, name: &str) -> TetMesh {
+    io::read(&folder.join(name)).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn refused(folder: &Path, name: &str) -> ReadError {
+    match io::read(&folder.join(name)) {
+        Ok(_) => panic!("{name} was read"),
+        Err(error) => error,
+    }
+}
+
+#[test]
+fn every_encoding_of_one_mesh() {
+    let Some(folder) = real_data() else { return };
+    let exact = read(&folder, "encodings/appended_raw.vtu");
+    assert_eq!((exact.positions.len(), exact.tets.len(), exact.fields.len()), (465, 1522, 1));
+    let mut files = 0;
+    for entry in std::fs::read_dir(folder.join("encodings")).unwrap() {
+        let path = entry.unwrap().path();
+        let mesh = io::read(&path).unwrap_or_else(|e| panic!("{e}"));
+        files += 1;
+        if path.file_name().unwrap() != "legacy42_ascii.vtk" {
+            // The ASCII VTU has all digits.
+            assert_eq!(mesh, exact, "{}", path.display());
+            continue;
+        }
+        assert_eq!(mesh.tets, exact.tets);
+        let (a, b) = (mesh.positions.as_flattened(), exact.positions.as_flattened());
+        let values = a.iter().chain(&mesh.fields[0].values).zip(b.iter().chain(&exact.fields[0].values));
+        for (printed, exact) in values {
+            assert!((printed - exact).abs() <= 5.1e-11 * exact.abs(), "{printed} {exact}");
+        }
+    }
+    assert_eq!(files, 14);
+    let native = read(&folder, "native/CylinderLinear.vtk");
+    assert_eq!((&native.positions, &native.tets, native.fields.len()), (&exact.positions, &exact.tets, 5));
+    assert_eq!(native.fields[4], exact.fields[0]);
+}
+
+#[test]
+fn grids_in_all_their_formats() {
+    let Some(folder) = real_data() else { return };
+    for name in ["bucky", "nucleon", "hydrogen", "neghip", "ironprot", "cthead"] {
+        let image = read(&folder, &format!("{name}.vti"));
+        assert_eq!(image, read(&folder, &format!("{name}.json")), "{name}");
+        let dims = image.grid.unwrap().dims;
+        let cells: u32 = dims.iter().map(|d| d - 1).product();
+        assert_eq!(image.tets.len() as u32, 6 * cells);
+    }
+    assert_eq!(read(&folder, "native/hydrogen.vti"), read(&folder, "hydrogen.vti"));
+    let legacy = read(&folder, "native/ironProt.vtk");
+    let image = read(&folder, "ironprot.vti");
+    assert_eq!((&legacy.fields[0].values, &legacy.tets), (&image.fields[0].values, &image.tets));
+}
+
+#[test]
+fn files_that_must_be_refused() {
+    let Some(folder) = real_data() else { return };
+    for (name, reason) in [
+        ("native/Armadillo_Tetra_4406_for_test_broken.vtu", "expected 4407, found 4406"),
+        ("native/liver_for_test_broken.vtk", "is not known"),
+        (
+            "native/uGridEx.vtk",
+            "12 cells: 1 vertex, 2 lines, 2 triangles, 1 triangle strip, 1 polygon, 1 quad, 2 tetrahedra, 2 hexahedra",
+        ),
+        ("native/QuadraticTetra.vtu", "96 cells: 96 quadratic tetrahedra"),
+        ("native/manifoldCheck1.vtu", "4 cells: 4 hexahedra"),
+        ("native/manifoldCheck2.vtu", "4 cells: 4 hexahedra"),
+        ("native/6_tetra_bad.msh", "not a format that is known"),
+        ("native/piece.bin.v41.msh", "not a format that is known"),
+        ("native/unit_ball.mesh", "not a format that is known"),
+    ] {
+        let error = refused(&folder, name).to_string();
+        assert!(error.contains(reason), "{error}");
+    }
+}
+
+/// What repair makes of a file: points, tetrahedra, components, boundary faces, and its report.
+type Expected = (&'static str, usize, usize, usize, usize, &'static str);
+
+const GOOD: &[Expected] = &[
+    ("armadillo.vtu", 13230, 54985, 1, 17296, ""),
+    ("bluntfin_clean.vtu", 40921, 187318, 1, 13438, ""),
+    (
+        "bluntfin.vtu",
+        40921,
+        187318,
+        1,
+        13438,
+        "repaired: merged 39 coincident points, dropped 77 collapsed tetrahedra",
+    ),
+    ("combustor.vtu", 47025, 215040, 1, 15616, ""),
+    ("fea_bracket.vtu", 39423, 206208, 1, 19538, ""),
+    ("disk_out_ref.vtu", 8499, 44832, 1, 3976, ""),
+    ("cylinder_flow.vtu", 2814, 12176, 1, 2904, ""),
+    ("piezo_micro.vtu", 8918, 42744, 1, 7584, ""),
+    ("hand.vtu", 7234, 29998, 1, 9556, ""),
+    ("piece.vtu", 3915, 13179, 1, 6668, ""),
+    ("robust/angular_sector.vtu", 10141, 46080, 7, 8880, ""),
+    ("robust/post_slit.vtu", 2288, 8750, 1, 1980, ""),
+    ("robust/ossicles.vtu", 1733, 5058, 1, 3412, ""),
+    ("robust/raptor_8418.vtu", 2993, 8418, 1, 5750, "repaired: dropped 3 unused points"),
+    ("robust/manifold_check0.vtu", 29, 24, 4, 48, ""),
+    ("robust/manifold_check1.vtu", 24, 24, 3, 44, ""),
+    ("native/tetraMesh.vtk", 55, 160, 1, 80, "repaired: turned 80 inverted tetrahedra"),
+    ("native/post.vtk", 2288, 8750, 1, 1980, ""),
+    ("native/a_grid.vtk", 1317, 4802, 1, 2000, ""),
+    ("native/cylinder.vtk", 354, 1348, 1, 440, ""),
+    ("native/cut-cylinder.vtk", 1147, 3279, 2, 2286, ""),
+    ("native/Tetrahedron.vtu", 35, 96, 1, 48, ""),
+    ("native/Armadillo_Tetra_4406.vtu", 1446, 4406, 1, 2532, ""),
+    (
+        "native/bracket_appended_compressed.vtu",
+        39423,
+        206208,
+        1,
+        19538,
+        "repaired: turned 206208 inverted tetrahedra, dropped 10577 unused points",
+    ),
+];
+
+#[test]
+fn good_and_mendable_meshes() {
+    let Some(folder) = real_data() else { return };
+    for &(name, points, tets, components, boundary, summary) in GOOD {
+        let (mesh, report) = mesh::repair(read(&folder, name)).unwrap_or_else(|e| panic!("{name}: {e}"));
+        assert_eq!(report.to_string(), summary, "{name}");
+        assert_eq!((mesh.positions.len(), mesh.tets.len()), (points, tets), "{name}");
+        mesh::check(&mesh).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let topology = mesh::topology(points, &mesh.tets).unwrap();
+        assert_eq!((topology.components, topology.boundary_faces), (components, boundary), "{name}");
+    }
+}
+
+#[test]
+fn non_manifold_vertices_are_found() {
+    let Some(folder) = real_data() else { return };
+    for (name, count) in [
+        ("robust/manifold_check0.vtu", 3),
+        ("robust/manifold_check1.vtu", 4),
+        ("native/Armadillo_Tetra_4406.vtu", 1),
+        ("robust/angular_sector.vtu", 0),
+        ("robust/post_slit.vtu", 0),
+    ] {
+        let mesh = read(&folder, name);
+        let topology = mesh::topology(mesh.positions.len(), &mesh.tets).unwrap();
+        assert_eq!(topology.non_manifold_count(), count, "{name}");
+    }
+}
+
+#[test]
+fn bluntfin_is_mended_into_its_clean_twin() {
+    let Some(folder) = real_data() else { return };
+    let (mended, _) = mesh::repair(read(&folder, "bluntfin.vtu")).unwrap();
+    assert_eq!(mended, read(&folder, "bluntfin_clean.vtu"));
+}
+
+#[test]
+fn meshes_that_cannot_be_mended_name_their_cells() {
+    let Some(folder) = real_data() else { return };
+    let error = |name: &str| mesh::repair(read(&folder, name)).unwrap_err();
+    assert_eq!(
+        error("robust/manifold_check2.vtu"),
+        MeshError::CrowdedFace { face: [2, 3, 11], tets: vec![2, 10, 16] }
+    );
+    let MeshError::Folded { tets } = error("robust/can_crushed.vtu") else { panic!("not seen as folded") };
+    // One of the two is inverted in the file, the other is not.
+    let mesh = read(&folder, "robust/can_crushed.vtu");
+    let positive = tets.map(|t| {
+        let one = TetMesh { tets: vec![mesh.tets[t as usize]], ..mesh.clone() };
+        mesh::check(&one).is_ok()
+    });
+    assert_ne!(positive[0], positive[1], "cells {tets:?}");
+}

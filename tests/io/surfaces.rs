@@ -1,0 +1,174 @@
+//! Promise: surfaces, lines and points are written as their formats have it.
+
+use flate2::read::ZlibDecoder;
+use std::io::ErrorKind;
+use std::io::Read;
+use tetralod::io::PolyData;
+use tetralod::io::write_csv;
+use tetralod::io::write_obj;
+use tetralod::io::write_ply;
+use tetralod::io::write_stl;
+use tetralod::io::write_vtp;
+
+/// Two triangles of a square, or a zigzag through its corners.
+fn square(lines: bool) -> PolyData {
+    let data = PolyData {
+        positions: vec![[0.0, 0.0, 0.5], [2.0, 0.0, 0.5], [2.0, 2.0, 0.5], [0.0, 2.0, 0.5]],
+        normals: vec![[0.0, 0.0, 1.0]; 4],
+        fields: vec![("a <b>".to_owned(), vec![1.0, 2.0, 3.0, 4.0]), ("x".to_owned(), vec![-0.5; 4])],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        lines: Vec::new(),
+    };
+    if lines {
+        PolyData { triangles: Vec::new(), lines: vec![vec![0, 2, 1], vec![3, 1]], ..data }
+    } else {
+        data
+    }
+}
+
+fn floats(bytes: &[u8]) -> Vec<f32> {
+    bytes.as_chunks::<4>().0.iter().map(|c| f32::from_le_bytes(*c)).collect()
+}
+
+#[test]
+fn stl_holds_triangles_with_normals() {
+    let mut out = Vec::new();
+    write_stl(&square(false), &mut out).expect("written");
+    assert!(!out.starts_with(b"solid"));
+    assert_eq!(out[80..84], 2_u32.to_le_bytes());
+    let first = &out[84..134];
+    assert_eq!(floats(&first[..48]), [0.0, 0.0, 1.0, 0.0, 0.0, 0.5, 2.0, 0.0, 0.5, 2.0, 2.0, 0.5]);
+    assert_eq!((&first[48..], out.len()), (&[0, 0][..], 84 + 100));
+    let refused = write_stl(&square(true), &mut Vec::new()).expect_err("lines");
+    assert_eq!(refused.kind(), ErrorKind::InvalidInput);
+    write_stl(&PolyData::default(), &mut Vec::new()).expect("an empty surface is one");
+}
+
+#[test]
+fn ply_holds_points_with_properties() {
+    for lines in [false, true] {
+        let mut out = Vec::new();
+        write_ply(&square(lines), &mut out).expect("written");
+        let end = b"end_header\n";
+        let at = out.windows(end.len()).position(|w| w == end).expect("a header") + end.len();
+        let header = String::from_utf8_lossy(&out[..at]).into_owned();
+        assert!(header.contains("element vertex 4\n"));
+        let properties: Vec<&str> =
+            header.lines().filter_map(|line| line.strip_prefix("property float ")).collect();
+        assert_eq!(properties, ["x", "y", "z", "nx", "ny", "nz", "a__b_", "x_1"]);
+        let body = &out[at..];
+        assert_eq!(floats(&body[32..64]), [2.0, 0.0, 0.5, 0.0, 0.0, 1.0, 2.0, -0.5]);
+        let cells = &body[4 * 32..];
+        let ints = |bytes: &[u8]| {
+            bytes.as_chunks::<4>().0.iter().map(|c| u32::from_le_bytes(*c)).collect::<Vec<_>>()
+        };
+        if lines {
+            assert!(header.contains("element edge 3\n"));
+            assert_eq!(ints(cells), [0, 2, 2, 1, 3, 1]);
+        } else {
+            assert!(header.contains("element face 2\n"));
+            assert_eq!((cells.len(), cells[0], ints(&cells[1..13])), (26, 3, vec![0, 1, 2]));
+        }
+    }
+}
+
+#[test]
+fn obj_counts_from_one() {
+    let written = |data: &PolyData| {
+        let mut out = Vec::new();
+        write_obj(data, &mut out).expect("written");
+        String::from_utf8(out).expect("text")
+    };
+    let text = written(&square(false));
+    assert!(text.starts_with("v 0 0 0.5\nv 2 0 0.5\n") && text.contains("\nvn 0 0 1\n"));
+    assert!(text.ends_with("f 1//1 2//2 3//3\nf 1//1 3//3 4//4\n"));
+    assert!(written(&square(true)).ends_with("l 1 3 2\nl 4 2\n"));
+    let points = PolyData { triangles: Vec::new(), normals: Vec::new(), ..square(false) };
+    assert!(written(&points).ends_with("p 3\np 4\n"));
+}
+
+/// The numbers of the appended array at `offset`.
+fn array(file: &[u8], offset: usize) -> Vec<u8> {
+    let mark = b"encoding=\"raw\">\n   _";
+    let start =
+        file.windows(mark.len()).position(|w| w == mark).expect("appended data") + mark.len() + offset;
+    let word = |i: usize| {
+        let bytes = file[start + 8 * i..start + 8 * i + 8].try_into().expect("eight bytes");
+        u64::from_le_bytes(bytes) as usize
+    };
+    let mut at = start + 8 * (3 + word(0));
+    let mut plain = Vec::new();
+    for block in 0..word(0) {
+        ZlibDecoder::new(&file[at..at + word(3 + block)]).read_to_end(&mut plain).expect("zlib");
+        at += word(3 + block);
+    }
+    plain
+}
+
+#[test]
+fn vtp_holds_all_there_is() {
+    for (lines, what) in [(false, "NumberOfPolys=\"2\""), (true, "NumberOfLines=\"2\"")] {
+        let mut out = Vec::new();
+        write_vtp(&square(lines), &mut out).expect("written");
+        let text = String::from_utf8_lossy(&out).into_owned();
+        assert!(
+            text.contains("type=\"PolyData\"")
+                && text.contains("NumberOfPoints=\"4\"")
+                && text.contains(what)
+        );
+        assert!(text.contains("Scalars=\"a &#60;b&#62;\"") && text.contains("Normals=\"Normals\""));
+        let offset = |after: &str, name: &str| {
+            let rest = &text[text.find(after).expect("the element")..];
+            let rest = &rest[rest.find(&format!("Name=\"{name}\"")).expect("the array")..];
+            let rest = &rest[rest.find("offset=\"").expect("an offset") + 8..];
+            rest[..rest.find('"').expect("its end")].parse::<usize>().expect("a number")
+        };
+        assert_eq!(
+            floats(&array(&out, offset("<Points>", "Points"))),
+            square(lines).positions.as_flattened()
+        );
+        assert_eq!(floats(&array(&out, offset("<PointData", "x"))), [-0.5; 4]);
+        let ints = |offset| {
+            let bytes = array(&out, offset);
+            bytes.as_chunks::<8>().0.iter().map(|c| i64::from_le_bytes(*c)).collect::<Vec<_>>()
+        };
+        let element = if lines { "<Lines>" } else { "<Polys>" };
+        let (connectivity, ends) =
+            if lines { (vec![0, 2, 1, 3, 1], vec![3, 5]) } else { (vec![0, 1, 2, 0, 2, 3], vec![3, 6]) };
+        assert_eq!(ints(offset(element, "connectivity")), connectivity);
+        assert_eq!(ints(offset(element, "offsets")), ends);
+    }
+}
+
+#[test]
+fn tables_read_back_exactly() {
+    let third = 1.0 / 3.0;
+    let columns = [("a".to_owned(), vec![1.0, third]), ("b, \"c\"".to_owned(), vec![f64::NAN, -1e-300])];
+    let mut out = Vec::new();
+    write_csv(&columns, &mut out).expect("written");
+    let text = String::from_utf8(out).expect("text");
+    assert_eq!(text, format!("a,\"b, \"\"c\"\"\"\n1.0,\n{third},-1e-300\n"));
+}
+
+#[test]
+fn arrays_that_do_not_fit_are_refused() {
+    let spoilt: [fn(&mut PolyData); 4] = [
+        |data| data.normals.truncate(1),
+        |data| data.fields[1].1.push(0.0),
+        |data| data.triangles[1][2] = 4,
+        |data| data.lines.push(vec![0, 9]),
+    ];
+    for spoil in spoilt {
+        let mut data = square(false);
+        spoil(&mut data);
+        let out = &mut Vec::new();
+        for result in
+            [write_vtp(&data, out), write_stl(&data, out), write_ply(&data, out), write_obj(&data, out)]
+        {
+            assert_eq!(result.expect_err("it does not fit").kind(), ErrorKind::InvalidInput);
+        }
+        assert!(out.is_empty());
+    }
+    let columns = [("a".to_owned(), vec![1.0]), ("b".to_owned(), Vec::new())];
+    assert!(write_csv(&columns, &mut Vec::new()).is_err());
+}

@@ -1,0 +1,164 @@
+//! Promise: what a request gives does not depend on what was asked for before, on noisy data, in any order, and with updates that are
+//! not here; and MTs whose errors would not allow that are not written.
+
+use crate::support::meshes::{blocks, tampered};
+use crate::support::random::Random;
+use std::ops::ControlFlow;
+use tetralod::builder::BuildConfig;
+use tetralod::builder::Construction;
+use tetralod::builder::Criterion;
+use tetralod::builder::Method;
+use tetralod::builder::build;
+use tetralod::format::EncodeError;
+use tetralod::format::EncodeOptions;
+use tetralod::format::encode;
+use tetralod::mesh::TetMesh;
+use tetralod::mt::ApplyUpdates;
+use tetralod::mt::EdgeMt;
+use tetralod::mt::ErrorCode;
+use tetralod::mt::ExplicitMt;
+use tetralod::mt::Mt;
+use tetralod::mt::MtKind;
+use tetralod::mt::MultiTessellation;
+use tetralod::mt::UpdateId;
+use tetralod::mt::VertexId;
+use tetralod::mt::check_errors;
+use tetralod::refine::Front;
+use tetralod::refine::LodCriterion;
+use tetralod::refine::Need;
+use tetralod::refine::Request;
+
+/// As many values as a scan has, with noise that no neighbour shares.
+fn noisy(cells: [u32; 3], noise: f64, seed: u64) -> TetMesh {
+    let mut mesh = blocks(cells, &[|p| p[0] * (1.0 - p[0]) + p[1] * p[2]], |_| true);
+    let mut random = Random::new(seed);
+    mesh.fields[0].values.iter_mut().for_each(|x| *x += noise * random.below(1000) as f64 / 1000.0);
+    mesh
+}
+
+fn made(mesh: &TetMesh, kind: MtKind) -> Mt {
+    let (method, criterion) = match kind {
+        MtKind::Edge => (Method::Collapse, Criterion::HalfEdge),
+        _ => (Method::Decimate, Criterion::HalfEdge),
+    };
+    let construction = Construction::new(kind, method, criterion).expect("they go together");
+    let config = BuildConfig { construction, ..BuildConfig::of(MtKind::Edge) };
+    build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt
+}
+
+fn edge(mesh: &TetMesh) -> EdgeMt {
+    let Mt::Edge(mt) = made(mesh, MtKind::Edge) else { panic!("edge-based") };
+    mt
+}
+
+/// Checks, on the MT spelled out, what makes requests for values monotone: where an update removes a tetrahedron that another one
+/// created, no value is nearer to it, for its error, than to all that the other one removed, for that one's.
+fn values_are_monotone(mt: &ExplicitMt) -> Result<(), String> {
+    for (field, info) in mt.info().fields.iter().enumerate() {
+        let reach = |u: UpdateId| mt.error_of_field(u, field).error() * info.range() / info.step;
+        let levels = |t: u32| mt.tets()[t as usize].map(|v| f64::from(mt.levels(VertexId(v))[field]));
+        let low = |t: u32| levels(t).into_iter().fold(f64::INFINITY, f64::min);
+        let high = |t: u32| levels(t).into_iter().fold(f64::NEG_INFINITY, f64::max);
+        for t in 0..mt.tets().len() as u32 {
+            let (Some(above), Some(own)) = (ExplicitMt::creator(mt, t), ExplicitMt::remover(mt, t)) else {
+                continue;
+            };
+            if mt.error_of_field(above, field) == ErrorCode::MAX {
+                continue;
+            }
+            let removed = || mt.removed(above).iter().copied();
+            let least = removed().map(low).fold(f64::INFINITY, f64::min) - reach(above);
+            let most = removed().map(high).fold(f64::NEG_INFINITY, f64::max) + reach(above);
+            if low(t) - reach(own) < least - 1e-6 || high(t) + reach(own) > most + 1e-6 {
+                return Err(format!("update {} below {}", own.0, above.0));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Answers requests for values all over the range, in random order, each from the base mesh and from what the one before left.
+fn remembers_nothing(name: &str, mt: &impl ApplyUpdates, seed: u64) {
+    let mut random = Random::new(seed);
+    let info = mt.info().fields[0].clone();
+    let base = Front::new(mt).expect("a valid base mesh");
+    let mut walk = base.clone();
+    for i in 0..120 {
+        let value = info.min + info.range() * random.below(1001) as f64 / 1000.0;
+        let error = [0.0, 0.001, 0.01, 0.03, 0.1][random.below(5)];
+        let need = if i % 4 == 3 { Need::within(0.0) } else { Need::within(error).around(0, &[value]) };
+        let request = Request::from(need);
+        let criterion = LodCriterion::new(mt.info(), &request);
+        let mut fresh = base.clone();
+        for front in [&mut fresh, &mut walk] {
+            front.satisfy(mt, &criterion, request.budget).expect("a valid MT");
+        }
+        let sizes = [&fresh, &walk].map(|front| front.mesh().tet_count());
+        assert_eq!(fresh.mesh().hash(), walk.mesh().hash(), "{name}: {value} within {error}: {sizes:?}");
+    }
+}
+
+#[test]
+fn noisy_scans_of_both_kinds() {
+    for (noise, seed) in [(0.02, 1), (0.3, 2), (5.0, 3)] {
+        let mesh = noisy([9, 8, 7], noise, seed);
+        for kind in [MtKind::Edge, MtKind::Vertex] {
+            let mt = made(&mesh, kind);
+            let name = format!("{}, noise {noise}", kind.name());
+            assert_eq!(check_errors(&mt), Ok(None), "{name}");
+            let explicit = ExplicitMt::of(&mt).expect("a valid MT");
+            assert_eq!(values_are_monotone(&explicit), Ok(()), "{name}");
+            remembers_nothing(&name, &mt, seed);
+            let strict = EncodeOptions { check_margins: true, ..EncodeOptions::default() };
+            encode(&mt, &strict).expect("an MT to write");
+        }
+    }
+}
+
+/// Pages come in random order as far as what they depend on is here; others are never here.
+#[test]
+fn noisy_scans_with_holes() {
+    let whole = edge(&noisy([9, 8, 7], 0.3, 4));
+    let explicit = ExplicitMt::of(&whole).expect("a valid MT");
+    for seed in 0..4 {
+        let bits = 4;
+        let mut mt = EdgeMt::with_page_bits(whole.info().clone(), whole.base().clone(), bits);
+        let mut random = Random::new(seed);
+        let mut pages: Vec<u32> = (0..whole.updates().div_ceil(1 << bits)).collect();
+        random.shuffle(&mut pages);
+        pages.truncate(pages.len() * 3 / 4);
+        pages.sort_unstable();
+        for page in pages {
+            let updates = mt.page_updates(page);
+            let needs = |u: u32| explicit.parents(UpdateId(u)).iter().map(|p| p >> bits);
+            if updates.clone().flat_map(needs).all(|p| p == page || mt.has_page(p)) {
+                let splits: Vec<_> = updates.map(|u| whole.split(UpdateId(u))).collect();
+                mt.insert_page(page, &splits).expect("what it depends on is here");
+            }
+        }
+        assert!(mt.present() < whole.updates());
+        remembers_nothing(&format!("holes {seed}"), &mt, seed);
+    }
+}
+
+#[test]
+fn errors_that_do_not_fall_are_not_written() {
+    let mt = edge(&noisy([6, 6, 6], 0.3, 5));
+    let explicit = ExplicitMt::of(&mt).expect("a valid MT");
+    let plain = EncodeOptions::default();
+    assert!(encode(&mt, &plain).is_ok());
+    let leaf = (0..mt.updates()).rev().find(|&u| !explicit.parents(UpdateId(u)).is_empty());
+    let leaf = leaf.expect("an update that depends on another");
+    // Larger than that of a parent.
+    let swollen = tampered(&mt, |u, parts| parts.error = if u == leaf { 50_000 } else { parts.error });
+    let refused = encode(&swollen, &plain);
+    assert!(matches!(refused, Err(EncodeError::Order { update, .. }) if update == leaf), "{refused:?}");
+    // Equal all over, although values go beyond those that they replace.
+    let equal = tampered(&mt, |_, parts| parts.error = 30_000);
+    let spelled = ExplicitMt::of(&equal).expect("a valid MT");
+    assert!(values_are_monotone(&spelled).is_err());
+    let strict = EncodeOptions { check_margins: true, ..plain.clone() };
+    for refused in [encode(&equal, &strict), encode(&spelled, &strict)] {
+        assert!(matches!(refused, Err(EncodeError::Order { .. })), "{refused:?}");
+    }
+}

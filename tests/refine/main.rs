@@ -1,0 +1,18 @@
+//! Promises of selective refinement: what a request gives, and how large its error is.
+
+mod at_vertices;
+mod fields;
+mod guarantees;
+mod histories;
+mod inside;
+mod needs;
+mod orders;
+mod pages;
+mod random_orders;
+mod rounding;
+#[allow(dead_code, reason = "each test uses a part of it")]
+mod subjects;
+#[path = "../support/mod.rs"]
+mod support;
+mod tet_errors;
+mod theory;

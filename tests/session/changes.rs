@@ -1,0 +1,93 @@
+//! Promise: who copies only what a session says has changed has the current mesh, whatever was done in between.
+
+use crate::support::meshes::{built, cube, hilly, linear};
+use crate::support::requests::requests;
+use std::ops::Range;
+use tetralod::format::{EncodeOptions, encode};
+use tetralod::mt::{Mt, MtKind};
+use tetralod::session::Session;
+
+/// A copy of the mesh, kept up by change lists.
+#[derive(Default)]
+struct Copy {
+    positions: Vec<[f32; 3]>,
+    field: Vec<f32>,
+    tets: Vec<[u32; 4]>,
+    neighbors: Vec<[u32; 4]>,
+}
+
+/// Brings `to` to the length of `from`, and copies the ranges.
+fn copy<T: Clone + Default>(to: &mut Vec<T>, from: &[T], ranges: &[Range<u32>]) {
+    to.resize(from.len(), T::default());
+    for range in ranges {
+        let range = range.start as usize..range.end as usize;
+        to[range.clone()].clone_from_slice(&from[range]);
+    }
+}
+
+impl Copy {
+    /// How many tetrahedra were copied.
+    fn catch_up(&mut self, session: &mut Session) -> usize {
+        let changes = session.take_changes();
+        for ranges in [&changes.vertices, &changes.tets] {
+            assert!(ranges.iter().all(|range| range.start < range.end));
+            assert!(ranges.windows(2).all(|pair| pair[0].end < pair[1].start), "ascending and apart");
+        }
+        let view = session.view();
+        copy(&mut self.positions, view.positions, &changes.vertices);
+        copy(&mut self.field, view.field, &changes.vertices);
+        copy(&mut self.tets, view.tets, &changes.tets);
+        copy(&mut self.neighbors, view.neighbors, &changes.tets);
+        assert_eq!(self.positions, view.positions);
+        assert_eq!(self.field, view.field);
+        assert_eq!(self.tets, view.tets);
+        assert_eq!(self.neighbors, view.neighbors);
+        changes.tets.iter().map(Range::len).sum()
+    }
+}
+
+fn opened(mt: &Mt) -> Session {
+    let mut session = Session::new();
+    session.feed(&encode(mt, &EncodeOptions::default()).expect("a complete MT")).expect("a good file");
+    session
+}
+
+#[test]
+fn copies_follow_a_walk_of_requests_and_steps() {
+    let edge = Mt::from(built(&cube(6, &[hilly, linear])).mt);
+    let spelled = edge.convert(MtKind::Explicit).expect("any MT can be spelled out");
+    for mt in [edge, spelled] {
+        let mut session = opened(&mt);
+        let mut copy = Copy::default();
+        for i in 0_usize..60 {
+            let request = &requests()[i * i % 7];
+            session.aim(request).expect("a good request");
+            // Some steps are handed out, some are not, and some requests are replaced on the way.
+            for step in 1..12 {
+                let mut updates = i + 3 * step;
+                let stats = session.step(&mut |_| {
+                    updates -= 1;
+                    updates > 0
+                });
+                if i % 3 == 0 {
+                    copy.catch_up(&mut session);
+                }
+                if stats.expect("a good MT").done {
+                    break;
+                }
+            }
+            if i % 4 == 1 {
+                // Looks at the mesh too, and must not take the changes away.
+                session.isosurface(0.3).expect("it is open");
+            }
+            if i % 7 == 2 {
+                session.set_field(i % 2).expect("there are two");
+            }
+            if i % 5 < 3 {
+                copy.catch_up(&mut session);
+            }
+        }
+        assert!(copy.catch_up(&mut session) <= copy.tets.len());
+        assert_eq!(copy.catch_up(&mut session), 0, "nothing has changed since");
+    }
+}

@@ -1,0 +1,211 @@
+//! Promise: a client fetches what a request needs and no more, and its mesh is that of a session with the whole file.
+
+use crate::support::random::Random;
+use std::cell::Cell;
+use std::io::Cursor;
+use std::ops::ControlFlow;
+use std::rc::Rc;
+use std::time::Duration;
+use tetralod::builder::BuildConfig;
+use tetralod::builder::Construction;
+use tetralod::builder::build;
+use tetralod::client::Client;
+use tetralod::client::ClientError;
+use tetralod::client::ClientOptions;
+use tetralod::format::EncodeOptions;
+use tetralod::format::FormatError;
+use tetralod::format::encode;
+use tetralod::generate;
+use tetralod::geom::Bounds;
+use tetralod::mt::MtKind;
+use tetralod::mt::MultiTessellation;
+use tetralod::refine::Need;
+use tetralod::refine::Request;
+use tetralod::session::Session;
+use tetralod::stream::Arrived;
+use tetralod::stream::FileSource;
+use tetralod::stream::Source;
+use tetralod::stream::StreamError;
+use tetralod::stream::Wanted;
+
+const BLOCK_BITS: u32 = 6;
+
+fn file(kind: MtKind) -> Vec<u8> {
+    // More than a client reads at first.
+    let mesh = generate::bucky(25).expect("a size that is allowed");
+    let construction = Construction::usual(kind);
+    let config = BuildConfig { construction, block_bits: BLOCK_BITS, ..BuildConfig::of(MtKind::Edge) };
+    let mt = build(&mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a valid mesh").mt;
+    encode(&mt, &EncodeOptions { block_bits: BLOCK_BITS, ..EncodeOptions::default() }).expect("a sound MT")
+}
+
+/// Counts the bytes that a file gives.
+struct Counted {
+    file: FileSource<Cursor<Vec<u8>>>,
+    given: Rc<Cell<u64>>,
+}
+
+impl Counted {
+    fn new(file: &[u8]) -> (Self, Rc<Cell<u64>>) {
+        let given = Rc::new(Cell::new(0));
+        let file = FileSource::new(Cursor::new(file.to_vec())).expect("it can be read");
+        (Self { file, given: Rc::clone(&given) }, given)
+    }
+}
+
+impl Source for Counted {
+    fn want(&mut self, wanted: &[Wanted]) {
+        self.file.want(wanted);
+    }
+
+    fn next(&mut self, patience: Duration) -> Result<Option<Arrived>, StreamError> {
+        let arrived = self.file.next(patience)?;
+        self.given.set(self.given.get() + arrived.as_ref().map_or(0, |(_, bytes)| bytes.len() as u64));
+        Ok(arrived)
+    }
+
+    fn total(&self) -> Option<u64> {
+        self.file.total()
+    }
+}
+
+fn requests() -> Vec<Request> {
+    let mut random = Random(3);
+    let mut requests = vec![Request::within(0.05)];
+    for _ in 0..6 {
+        let min = [0, 1, 2].map(|_| random.below(70) as f64 / 100.0);
+        let corner = Bounds { min, max: min.map(|x| x + 0.25) };
+        requests.push(Need::within(0.01).inside(corner).into());
+        let value = 0.1 + random.below(80) as f64 / 100.0;
+        requests.push(Need::within(0.005).around(0, &[value]).into());
+    }
+    requests.push(Request::within(0.0));
+    requests
+}
+
+#[test]
+fn meshes_and_bounds_are_those_of_the_whole_file() {
+    for kind in MtKind::ALL {
+        let file = file(kind);
+        let mut whole = Session::new();
+        whole.feed(&file).expect("a sound file");
+        let (source, given) = Counted::new(&file);
+        let mut client = Client::open(source, ClientOptions::default()).expect("a sound file");
+        let first = given.get();
+        assert!(kind != MtKind::Edge || first < file.len() as u64, "the base mesh is not the whole file");
+        for request in requests() {
+            let stats = client.refine(&request).expect("a sound file");
+            let expected = whole.refine(&request).expect("a sound file");
+            assert_eq!(client.session().hash(), whole.hash(), "{kind:?}: {request:?}");
+            assert_eq!(stats.satisfied, expected.satisfied);
+            assert!(!stats.missing, "all that it needs is here");
+            client.session().mesh().expect("it is ready").check().expect("a valid mesh");
+            // What has not come may have any error that its block may have.
+            assert!(stats.error_bound >= expected.error_bound, "{kind:?}: {request:?}");
+        }
+        assert_eq!(client.fetched(), given.get());
+        // But for the block of which the first request brought a part.
+        let index = client.session().decoder().index().expect("it is ready");
+        let largest = index.blocks.iter().map(tetralod::format::BlockInfo::len).max().unwrap_or(0);
+        assert!(given.get() <= file.len() as u64 + largest, "nothing is fetched twice: {}", given.get());
+    }
+}
+
+#[test]
+fn a_small_request_needs_a_part_of_the_file() {
+    let file = file(MtKind::Edge);
+    let (source, given) = Counted::new(&file);
+    let mut client = Client::open(source, ClientOptions::default()).expect("a sound file");
+    let stats = client.refine(&Request::within(0.1)).expect("a sound file");
+    assert!(stats.satisfied && stats.applied > 0);
+    // Not half of it, for a client reads some 64 KiB at first.
+    assert!(given.get() < file.len() as u64, "{} of {}", given.get(), file.len());
+    assert_eq!(client.total(), Some(file.len() as u64));
+    // Once more costs nothing.
+    let before = given.get();
+    client.refine(&Request::within(0.1)).expect("a sound file");
+    assert_eq!(given.get(), before);
+}
+
+#[test]
+fn steps_give_valid_meshes_on_the_way() {
+    let file = file(MtKind::Edge);
+    let (source, _) = Counted::new(&file);
+    let mut client = Client::open(source, ClientOptions::default()).expect("a sound file");
+    client.aim(&Request::within(0.0)).expect("a sensible request");
+    let mut steps = 0;
+    loop {
+        let mut left = 200;
+        let step = client.step(Duration::ZERO, &mut |_| {
+            left -= 1;
+            left > 0
+        });
+        client.session().mesh().expect("it is ready").check().expect("a valid mesh");
+        steps += 1;
+        if step.expect("a sound file").complete {
+            break;
+        }
+        assert!(steps < 1000, "it comes to an end");
+    }
+    let mut whole = Session::new();
+    whole.feed(&file).expect("a sound file");
+    whole.refine(&Request::within(0.0)).expect("a sound file");
+    assert_eq!(client.session().hash(), whole.hash());
+    assert!(steps > 3);
+}
+
+#[test]
+fn memory_stays_within_the_room() {
+    let file = file(MtKind::Edge);
+    let mut whole = Session::new();
+    whole.feed(&file).expect("a sound file");
+    let room = whole.mt().map_or(0, MultiTessellation::bytes) / 4;
+    let (source, _) = Counted::new(&file);
+    let mut client = Client::open(source, ClientOptions { room, ..ClientOptions::default() }).expect("sound");
+    let mut complete = 0;
+    for request in requests() {
+        client.refine(&request).expect("a sound file");
+        client.session().mesh().expect("it is ready").check().expect("a valid mesh");
+        let progress = client.session().block_progress();
+        assert!(progress.bytes <= room, "{progress:?}");
+        if progress.left_out == 0 {
+            whole.refine(&request).expect("a sound file");
+            assert_eq!(client.session().hash(), whole.hash(), "what fits is as good as the whole file");
+            complete += 1;
+        }
+    }
+    let last = client.session().block_progress();
+    assert!(complete > 0 && last.left_out > 0, "both happen: {complete}, {last:?}");
+}
+
+#[test]
+fn files_that_are_cut_or_damaged_are_told() {
+    for kind in [MtKind::Edge, MtKind::Vertex] {
+        let file = file(kind);
+        let all = |bytes: &[u8]| {
+            let (source, _) = Counted::new(bytes);
+            let mut client = Client::open(source, ClientOptions::default())?;
+            client.refine(&Request::within(0.0)).map(drop)
+        };
+        assert_eq!(all(&file), Ok(()));
+        for end in [0, 10, file.len() / 3, file.len() - 500] {
+            let found = all(&file[..end]);
+            let cut = matches!(found, Err(ClientError::Format(FormatError::Truncated { offset })) if offset <= end as u64);
+            assert!(cut, "{kind:?} {end}: {found:?}");
+        }
+        let mut damaged = file.clone();
+        damaged[file.len() / 2] ^= 1;
+        assert!(matches!(all(&damaged), Err(ClientError::Format(FormatError::Corrupt { .. }))), "{kind:?}");
+    }
+}
+
+#[test]
+fn a_request_that_makes_no_sense_changes_nothing() {
+    let file = file(MtKind::Edge);
+    let (source, _) = Counted::new(&file);
+    let mut client = Client::open(source, ClientOptions::default()).expect("a sound file");
+    client.refine(&Request::within(0.01)).expect("a sound file");
+    let hash = client.session().hash();
+    assert!(matches!(client.refine(&Request::within(-1.0)), Err(ClientError::Session(_))));
+    assert_eq!(client.session().hash(), hash);
+}

@@ -1,0 +1,14 @@
+//! Promises of sessions and of the ranges that they are fetched by.
+
+mod bench;
+mod changes;
+mod client;
+mod hostile;
+mod kinds;
+mod parts;
+mod states;
+#[cfg(feature = "http")]
+mod stream_faults;
+mod stream_loader;
+#[path = "../support/mod.rs"]
+mod support;

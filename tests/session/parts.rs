@@ -1,0 +1,147 @@
+//! Sessions that keep only the blocks that their request needs: the mesh is that of a session with the whole file, memory
+//! stays within the room, and bytes may come in any order.
+
+use crate::support::random::Random;
+use std::ops::ControlFlow;
+use tetralod::builder::BuildConfig;
+use tetralod::builder::build;
+use tetralod::format::DecodeOptions;
+use tetralod::format::EncodeOptions;
+use tetralod::format::encode;
+use tetralod::generate;
+use tetralod::geom::Bounds;
+use tetralod::mt::CurrentMesh;
+use tetralod::mt::MtKind;
+use tetralod::refine::Need;
+use tetralod::refine::Request;
+use tetralod::session::Session;
+
+const BLOCK_BITS: u32 = 6;
+
+/// The kinds whose blocks come one by one.
+const KINDS: [MtKind; 2] = [MtKind::Edge, MtKind::HalfEdge];
+
+fn file(kind: MtKind) -> Vec<u8> {
+    let mesh = generate::bucky(15).expect("a size that is allowed");
+    let config = BuildConfig { block_bits: BLOCK_BITS, ..BuildConfig::of(kind) };
+    let mt = build(&mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a valid mesh").mt;
+    encode(&mt, &EncodeOptions { block_bits: BLOCK_BITS, ..EncodeOptions::default() }).expect("a sound MT")
+}
+
+/// A server: counts the bytes it gives.
+struct Server<'a> {
+    file: &'a [u8],
+    given: u64,
+}
+
+impl Server<'_> {
+    fn get(&mut self, range: std::ops::Range<u64>) -> Vec<u8> {
+        let end = range.end.min(self.file.len() as u64);
+        self.given += end - range.start;
+        self.file[range.start as usize..end as usize].to_vec()
+    }
+}
+
+fn check(mesh: &CurrentMesh) {
+    mesh.check().expect("a valid mesh");
+}
+
+/// Fetches until nothing is wanted, in random order, refining in between. Whether the mesh is what was asked for.
+fn settle(session: &mut Session, server: &mut Server<'_>, random: &mut Random, room: u64) -> bool {
+    for _ in 0..10_000 {
+        let mut wanted = session.wanted();
+        if wanted.is_empty() && session.mesh().is_some() {
+            // The mesh may show now what else it needs.
+            let before = session.block_progress();
+            session.step(&mut |_| true).expect("a sound file");
+            wanted = session.wanted();
+            if wanted.is_empty() && session.block_progress() != before {
+                continue;
+            }
+        }
+        let Some(chosen) = wanted.get(random.below(wanted.len().max(1))) else { break };
+        let bytes = server.get(chosen.range.clone());
+        session.take(chosen.range.start, &bytes).expect("a sound file");
+        assert!(session.block_progress().bytes <= room + 40_000, "what waits is compressed");
+        if random.once_in(3) && session.mesh().is_some() {
+            session.step(&mut |_| true).expect("a sound file");
+            check(session.mesh().expect("it is ready"));
+        }
+    }
+    let stats = session.step(&mut |_| true).expect("a sound file");
+    check(session.mesh().expect("it is ready"));
+    stats.satisfied
+}
+
+fn requests(random: &mut Random) -> Request {
+    let at = |random: &mut Random| [0, 1, 2].map(|_| random.below(75) as f64 / 100.0);
+    let error = [0.0, 0.002, 0.01, 0.05, 0.1, 0.2, 0.4][random.below(7)];
+    match random.below(3) {
+        0 => Request::within(error),
+        1 => {
+            let min = at(random);
+            Request::from(Need::within(error).inside(Bounds { min, max: min.map(|x| x + 0.25) }))
+        }
+        _ => Request::from(Need::within(error).around(0, &[0.1 + random.below(80) as f64 / 100.0])),
+    }
+}
+
+#[test]
+fn the_mesh_is_that_of_the_whole_file() {
+    KINDS.into_iter().for_each(has_the_mesh_of_the_whole_file);
+}
+
+fn has_the_mesh_of_the_whole_file(kind: MtKind) {
+    let file = file(kind);
+    let random = &mut Random::new(7);
+    let mut whole = Session::new();
+    whole.feed(&file).expect("a sound file");
+    for _ in 0..3 {
+        let mut server = Server { file: &file, given: 0 };
+        let mut session = Session::in_parts(DecodeOptions::default(), u64::MAX);
+        settle(&mut session, &mut server, random, u64::MAX / 2);
+        for _ in 0..12 {
+            let request = requests(random);
+            session.aim(&request).expect("a sensible request");
+            assert!(settle(&mut session, &mut server, random, u64::MAX / 2));
+            whole.refine(&request).expect("a sensible request");
+            assert_eq!(session.hash(), whole.hash(), "{request:?}");
+            assert!(session.wanted().is_empty());
+        }
+        assert!(server.given <= file.len() as u64, "nothing is fetched twice while there is room");
+    }
+}
+
+#[test]
+fn memory_stays_within_the_room() {
+    KINDS.into_iter().for_each(stays_within_the_room);
+}
+
+fn stays_within_the_room(kind: MtKind) {
+    let file = file(kind);
+    let random = &mut Random::new(8);
+    let mut whole = Session::new();
+    whole.feed(&file).expect("a sound file");
+    let all = whole.mt().map_or(0, tetralod::mt::MultiTessellation::bytes);
+    let room = all / 3;
+    let mut server = Server { file: &file, given: 0 };
+    let mut session = Session::in_parts(DecodeOptions::default(), room);
+    settle(&mut session, &mut server, random, room);
+    let (mut complete, mut left_out) = (0, 0);
+    for _ in 0..40 {
+        let request = requests(random);
+        session.aim(&request).expect("a sensible request");
+        let satisfied = settle(&mut session, &mut server, random, room);
+        let progress = session.block_progress();
+        assert!(progress.bytes <= room + 40_000);
+        if progress.left_out == 0 {
+            whole.refine(&request).expect("a sensible request");
+            assert_eq!(session.hash(), whole.hash(), "what fits is as good as the whole file");
+            assert!(satisfied, "{kind:?}, {request:?}");
+            complete += 1;
+        } else {
+            left_out += 1;
+        }
+    }
+    assert!(complete > 3 && left_out > 3, "both happen: {complete}, {left_out}");
+}

@@ -1,0 +1,351 @@
+//! MTs for the tests of the file format, made by code, and files taken apart and put together as the specification says.
+
+use crate::support::builder::{Plan, build};
+use crate::support::domains::Domain;
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+use tetralod::format::DecodeOptions;
+use tetralod::format::Decoder;
+use tetralod::format::EncodeOptions;
+use tetralod::format::FormatError;
+use tetralod::format::Limits;
+use tetralod::format::encode;
+use tetralod::geom::Lattice;
+use tetralod::mesh::VectorPart;
+use tetralod::mt::Applied;
+use tetralod::mt::ApplyUpdates;
+use tetralod::mt::BaseMesh;
+use tetralod::mt::CurrentMesh;
+use tetralod::mt::EdgeMt;
+use tetralod::mt::ErrorCode;
+use tetralod::mt::ExplicitMt;
+use tetralod::mt::ExplicitUpdate;
+use tetralod::mt::FieldInfo;
+use tetralod::mt::Mt;
+use tetralod::mt::MtInfo;
+use tetralod::mt::MtKind;
+use tetralod::mt::MtRef;
+use tetralod::mt::MultiTessellation;
+use tetralod::mt::UpdateId;
+use tetralod::mt::VertexId;
+use tetralod::mt::VertexSplit;
+
+pub fn field(name: &str, bits: u32) -> FieldInfo {
+    let largest = f64::from((1_u32 << bits) - 1);
+    FieldInfo {
+        name: name.to_owned(),
+        min: -1.0,
+        max: largest / 2.0 - 1.0,
+        origin: -1.0,
+        step: 0.5,
+        bits,
+        ..FieldInfo::default()
+    }
+}
+
+/// A field that tells all there is, or a part of it, or no more than it must.
+fn told_more(number: usize, bits: u32) -> FieldInfo {
+    let field = field(["pressure", "Dichte ρ", "", "w"][number % 4], bits);
+    let vector = |component| Some(VectorPart { name: "U".into(), component });
+    match number {
+        0 => field,
+        1 => FieldInfo { unit: "m/s".into(), vector: vector(Some(1)), ..field },
+        2 => FieldInfo { time: Some(-2.5), vector: vector(None), quantization: 0.25, ..field },
+        _ => FieldInfo { time: Some(0.0), ..field },
+    }
+}
+
+/// A random edge-based MT as [`build`] makes it, whose fields tell more and have errors of their own.
+pub fn planned(plan: Plan) -> EdgeMt {
+    let built = build(plan);
+    let mut info = built.info;
+    info.lattice = Lattice { origin: [-1.5, 0.0, 2.0], step: [0.25, 0.5, 1.0], ..info.lattice };
+    info.fields = (0..plan.fields).map(|f| told_more(f, info.fields[f].bits)).collect();
+    info.displacement_per_error = 0.125;
+    info.quantization = if plan.fields == 2 { 0.0 } else { 0.0625 };
+    let mut mt = EdgeMt::new(info, built.base);
+    for split in &built.splits {
+        let below = |f: usize| ErrorCode(split.error.saturating_sub(300 * f as u16));
+        let errors: Vec<ErrorCode> = (0..plan.fields).map(below).collect();
+        let split = VertexSplit { errors: &errors, ..split.as_update() };
+        mt.push(&split).expect("the builder makes valid updates");
+    }
+    mt
+}
+
+/// An edge-based MT of exactly so many random updates. Made once a process.
+pub fn sample(fields: usize, updates: usize) -> Mt {
+    static MADE: Mutex<BTreeMap<[usize; 2], EdgeMt>> = Mutex::new(BTreeMap::new());
+    let mut made = MADE.lock().unwrap_or_else(|broken| broken.into_inner());
+    let mt = made.entry([fields, updates]).or_insert_with(|| {
+        let cells = (2..).find(|n| n * n * n > updates).unwrap_or(2);
+        planned(Plan { domain: Domain::Cube(cells), seed: updates as u64, fields, updates })
+    });
+    assert_eq!(mt.updates() as usize, updates, "the cube is large enough");
+    mt.clone().into()
+}
+
+/// The same as an explicit MT.
+pub fn spelled(fields: usize, updates: usize) -> Mt {
+    sample(fields, updates).convert(MtKind::Explicit).expect("a valid MT")
+}
+
+/// Pseudo-random numbers.
+fn numbers() -> impl FnMut() -> u64 {
+    let mut state = 0x9E37_79B9_7F4A_7C15_u64;
+    move || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        state
+    }
+}
+
+/// An explicit MT of `tets` separate tetrahedra, each of whose updates puts a vertex into one.
+pub fn insertions(tets: u32, fields: usize, updates: usize) -> ExplicitMt {
+    let mut next = numbers();
+    let n = updates as u32;
+    let info = MtInfo {
+        kind: MtKind::Explicit,
+        lattice: Lattice { origin: [-1.5, 0.0, 2.0], step: [0.25, 0.5, 1.0], bits: 28 },
+        fields: (0..fields).map(|f| field(["p", "q", "r"][f % 3], 12)).collect(),
+        vertices: 4 * tets + n,
+        tetrahedra: tets + 3 * n,
+        updates: n,
+        displacement_per_error: 0.125,
+        quantization: 0.0,
+    };
+    let corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]].map(|c: [i32; 3]| c.map(|x| x << 24));
+    let base = BaseMesh {
+        positions: (0..tets)
+            .flat_map(|t| corners.map(|[x, y, z]| [x + (1 << 25) * t as i32, y, z]))
+            .collect(),
+        values: vec![7; 4 * tets as usize * fields],
+        tets: (0..tets).map(|t| [0, 1, 2, 3].map(|i| 4 * t + i)).collect(),
+    };
+    let mut made = ExplicitMt::new(info, base);
+    let mut live: Vec<u32> = (0..tets).collect();
+    for k in 0..updates {
+        // Old ones first: they are the large ones.
+        let removed = [live.remove(0)];
+        let tet = made.tets()[removed[0] as usize];
+        let corners = tet.map(|v| made.position(VertexId(v)));
+        let middle = [0, 1, 2].map(|i| corners.iter().map(|c| c[i] / 4).sum::<i32>());
+        let [a, b, c, d] = tet;
+        let v = made.vertices();
+        let levels: Vec<i32> = (0..fields).map(|_| (next() % 4096) as i32).collect();
+        let first = made.tets().len() as u32;
+        let update = ExplicitUpdate {
+            positions: &[middle],
+            levels: &levels,
+            removed: &removed,
+            inserted: &[[v, b, c, d], [a, v, c, d], [a, b, v, d], [a, b, c, v]],
+            errors: &vec![ErrorCode(60_000 - (k * 50_000 / updates) as u16); fields],
+        };
+        made.push(&update).expect("made to fit");
+        live.extend(first..made.tets().len() as u32);
+    }
+    made
+}
+
+/// The same as a vertex-based MT.
+pub fn inserted(tets: u32, fields: usize, updates: usize) -> Mt {
+    let mt = Mt::from(insertions(tets, fields, updates)).convert(MtKind::Vertex);
+    mt.expect("insertions")
+}
+
+/// The same as a half-edge MT: a vertex in a single tetrahedron collapses onto any of its corners.
+pub fn half_edge(tets: u32, fields: usize, updates: usize) -> Mt {
+    let mt = Mt::from(insertions(tets, fields, updates)).convert(MtKind::HalfEdge);
+    mt.expect("insertions that collapse onto a corner")
+}
+
+/// An MT of each kind.
+pub fn samples(fields: usize, updates: usize) -> [Mt; 4] {
+    [
+        sample(fields, updates),
+        spelled(fields, updates),
+        inserted(2, fields, updates),
+        half_edge(2, fields, updates),
+    ]
+}
+
+/// Small blocks, so that small MTs have many.
+pub fn options() -> EncodeOptions {
+    let pairs = [("tool", "a test"), ("ключ", "значение"), ("empty", "")];
+    let metadata = pairs.map(|(k, v)| (k.to_owned(), v.to_owned())).into();
+    EncodeOptions { block_bits: 8, metadata, ..EncodeOptions::default() }
+}
+
+pub fn bytes_of<'a>(mt: impl Into<MtRef<'a>>) -> Vec<u8> {
+    encode(mt, &options()).expect("the MT is complete")
+}
+
+/// The same with blocks of `2^block_bits` updates.
+pub fn bytes_in_blocks<'a>(mt: impl Into<MtRef<'a>>, block_bits: u32) -> Vec<u8> {
+    encode(mt, &EncodeOptions { block_bits, ..options() }).expect("the MT is complete")
+}
+
+/// A decoder with limits.
+pub fn within(limits: Limits) -> Decoder {
+    Decoder::new(DecodeOptions { limits, ..DecodeOptions::default() })
+}
+
+/// Decodes a whole file in one piece.
+pub fn decode(bytes: &[u8]) -> Result<Mt, FormatError> {
+    let mut decoder = Decoder::default();
+    decoder.feed(bytes)?;
+    decoder.finish()?;
+    Ok(decoder.into_mt().expect("a complete file has a base mesh"))
+}
+
+/// An MT in the form that its file has.
+pub fn coded(mt: &Mt) -> Mt {
+    decode(&bytes_of(mt)).expect("a good file")
+}
+
+/// Positions and levels at the corners of a tetrahedron, with the numbers of its vertices.
+type Seen = [(VertexId, [i32; 3], Vec<i32>); 4];
+
+fn seen(mesh: &CurrentMesh, found: &[u32]) -> Vec<Seen> {
+    let corner = |v: u32| (mesh.vertex(v), mesh.positions()[v as usize], mesh.levels(v).to_vec());
+    let mut tets: Vec<Seen> = found
+        .iter()
+        .map(|&t| {
+            let mut tet = mesh.tet(t).expect("it was found").map(corner);
+            tet.sort();
+            tet
+        })
+        .collect();
+    tets.sort();
+    tets
+}
+
+/// Applies all updates in order, and shows for each what it removed and inserted.
+fn replayed(mt: &impl ApplyUpdates, mut each: impl FnMut(UpdateId, [Vec<Seen>; 2])) -> CurrentMesh {
+    let mut mesh = mt.start().expect("a valid base mesh");
+    mt.updates_arrived(&mut mesh, 0);
+    for u in (0..mt.updates()).map(UpdateId) {
+        let (mut removed, mut found) = (Vec::new(), Vec::new());
+        mt.find_removed(&mut mesh, u, &mut removed).expect("a valid MT");
+        let removed = seen(&mesh, &removed);
+        assert_eq!(mt.refine(&mut mesh, u), Ok(Applied::Done), "{u:?}");
+        mt.find_inserted(&mut mesh, u, &mut found).expect("a valid MT");
+        each(u, [removed, seen(&mesh, &found)]);
+    }
+    mesh
+}
+
+/// Asserts that two MTs have the same description, base mesh and errors, and that every update does the same in both.
+pub fn assert_same(a: &impl ApplyUpdates, b: &impl ApplyUpdates) {
+    assert_eq!((a.info(), a.base(), a.updates()), (b.info(), b.base(), b.updates()));
+    let mut steps = Vec::new();
+    let mesh = replayed(a, |u, step| steps.push((a.errors(u).to_vec(), step)));
+    let mut expected = steps.into_iter();
+    let other = replayed(b, |u, step| {
+        assert!(expected.next() == Some((b.errors(u).to_vec(), step)), "{u:?} does something else");
+    });
+    assert_eq!(mesh.check(), Ok(()));
+    let live = |mesh: &CurrentMesh| {
+        let slots: Vec<u32> = (0..mesh.tet_slots() as u32).filter(|&t| mesh.tet(t).is_some()).collect();
+        seen(mesh, &slots)
+    };
+    assert!(live(&mesh) == live(&other), "the reference meshes differ");
+}
+
+/// Whether `part` is `whole` cut off behind some update.
+pub fn is_prefix(part: &Mt, whole: &Mt) -> bool {
+    let same_updates = match (part, whole) {
+        (Mt::Edge(part), Mt::Edge(whole)) => {
+            (0..part.updates()).all(|k| part.split(UpdateId(k)) == whole.split(UpdateId(k)))
+        }
+        (Mt::HalfEdge(part), Mt::HalfEdge(whole)) => {
+            part.base_marks() == whole.base_marks()
+                && (0..part.updates()).map(UpdateId).all(|u| part.update(u) == whole.update(u))
+        }
+        (Mt::Vertex(part), Mt::Vertex(whole)) => {
+            // Nodes are made when all updates are there; until then what they tell is kept beside them.
+            let same = |u| {
+                part.position(u) == whole.position(u)
+                    && part.levels(u).eq(whole.levels(u))
+                    && part.parents(u).eq(whole.parents(u))
+                    && part.errors_of(u) == whole.errors_of(u)
+            };
+            (0..part.updates()).map(UpdateId).all(same)
+        }
+        (Mt::Explicit(part), Mt::Explicit(whole)) => {
+            let same = |u| {
+                part.created(u) == whole.created(u)
+                    && part.inserted(u) == whole.inserted(u)
+                    && part.removed(u) == whole.removed(u)
+                    && part.error(u) == whole.error(u)
+            };
+            let vertex = |v| part.position(v) == whole.position(v) && part.levels(v) == whole.levels(v);
+            whole.tets().starts_with(part.tets())
+                && (0..part.vertices()).map(VertexId).all(vertex)
+                && (0..part.updates()).map(UpdateId).all(same)
+        }
+        _ => false,
+    };
+    part.info() == whole.info()
+        && MultiTessellation::base(part) == MultiTessellation::base(whole)
+        && part.updates() <= whole.updates()
+        && same_updates
+}
+
+/// CRC-32 bit by bit, so that the checksums are checked against their definition.
+pub fn crc32(parts: &[&[u8]]) -> u32 {
+    let mut crc = u32::MAX;
+    for byte in parts.iter().copied().flatten() {
+        crc ^= u32::from(*byte);
+        for _ in 0..8 {
+            crc = if crc & 1 == 1 { crc >> 1 ^ 0xEDB8_8320 } else { crc >> 1 };
+        }
+    }
+    !crc
+}
+
+/// A section as the specification says.
+pub fn section(kind: &[u8; 4], payload: &[u8]) -> Vec<u8> {
+    let length = (payload.len() as u32).to_le_bytes();
+    let crc = crc32(&[kind, &length, payload]).to_le_bytes();
+    [kind.as_slice(), &length, &crc, payload].concat()
+}
+
+/// A header as the specification says.
+pub fn header(version: [u16; 2], flags: u32, total: u64) -> Vec<u8> {
+    let mut bytes = b"\x89TLOD\r\n\x1a".to_vec();
+    version.iter().for_each(|v| bytes.extend(v.to_le_bytes()));
+    bytes.extend(flags.to_le_bytes());
+    bytes.extend(total.to_le_bytes());
+    bytes.extend([0; 4]);
+    let crc = crc32(&[&bytes]).to_le_bytes();
+    bytes.extend(crc);
+    bytes
+}
+
+/// Kinds and payloads of the sections of a file, without `ENDF`.
+pub fn sections(bytes: &[u8]) -> Vec<([u8; 4], Vec<u8>)> {
+    let mut rest = &bytes[32..];
+    let mut sections = Vec::new();
+    while let Some((head, tail)) = rest.split_first_chunk::<12>() {
+        let length = u32::from_le_bytes([head[4], head[5], head[6], head[7]]) as usize;
+        sections.push(([head[0], head[1], head[2], head[3]], tail[..length].to_vec()));
+        rest = &tail[length..];
+    }
+    assert_eq!(sections.pop().expect("every file has an end").0, *b"ENDF");
+    sections
+}
+
+/// A well-framed file of the given sections, with a header and totals that fit.
+pub fn assemble(sections: &[([u8; 4], Vec<u8>)], updates: u32) -> Vec<u8> {
+    let framed: Vec<Vec<u8>> = sections.iter().map(|(kind, payload)| section(kind, payload)).collect();
+    let crcs: Vec<u8> = framed.iter().flat_map(|s| s[8..12].to_vec()).collect();
+    let mut end = updates.to_le_bytes().to_vec();
+    end.extend((framed.len() as u32).to_le_bytes());
+    end.extend(crc32(&[&crcs]).to_le_bytes());
+    let body = [framed.concat(), section(b"ENDF", &end)].concat();
+    let of_half_edges = sections.iter().any(|(kind, payload)| kind == b"INFO" && payload.first() == Some(&3));
+    let version = if of_half_edges { [3, 0] } else { [2, 0] };
+    [header(version, 0, 32 + body.len() as u64), body].concat()
+}
