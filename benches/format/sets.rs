@@ -77,7 +77,9 @@ fn read(path: &Path) -> Option<Set> {
 
 /// The MT file of a mesh.
 pub fn file(mesh: &TetMesh, kind: MtKind, purpose: Purpose) -> Result<Vec<u8>> {
-    let config = BuildConfig { purpose, ..BuildConfig::of(kind) };
+    let mut config = BuildConfig::of(kind);
+    // Other methods know no purpose.
+    config.construction = config.construction.with_purpose(purpose).unwrap_or(config.construction);
     let mt = build(mesh, &config, &mut |_| ControlFlow::Continue(()))?.mt;
     Ok(encode(&mt, &EncodeOptions { block_bits: config.block_bits, ..EncodeOptions::default() })?)
 }

@@ -3,28 +3,19 @@
 use super::files;
 use super::input::{self, FieldSelection};
 use super::output::{self, Verbosity};
-use anyhow::Context;
-use anyhow::Result;
-use indicatif::ProgressBar;
-use indicatif::ProgressStyle;
+use anyhow::{Context, Result, anyhow};
+use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::Instant;
-use tetralod::builder::BuildConfig;
-use tetralod::builder::BuildProgress;
-use tetralod::builder::BuildResult;
-use tetralod::builder::BuildSummary;
-use tetralod::builder::Criterion;
-use tetralod::builder::FieldPrecision;
-use tetralod::builder::Method;
-use tetralod::builder::Purpose;
-use tetralod::format::EncodeOptions;
-use tetralod::format::encode_to;
+use tetralod::builder::{
+    BuildConfig, BuildError, BuildProgress, BuildResult, BuildSummary, Construction, Criterion,
+    FieldPrecision, Method, Purpose,
+};
+use tetralod::format::{EncodeOptions, encode_to};
 use tetralod::io::CellData;
-use tetralod::mesh::Field;
-use tetralod::mesh::RepairReport;
-use tetralod::mesh::TetMesh;
+use tetralod::mesh::{Field, RepairReport, TetMesh};
 use tetralod::mt::MtKind;
 
 /// Turns a tetrahedral mesh or a regular grid into an MT file.
@@ -239,7 +230,7 @@ fn read(arguments: &Arguments, config: &BuildConfig) -> Result<(TetMesh, RepairR
     let cells = if arguments.cell_to_point { CellData::Values } else { CellData::Names };
     let wanted = FieldSelection { names: &config.fields, all: config.all_fields, cells };
     let (mut mesh, repaired) = input::read(&arguments.inputs, &wanted)?;
-    if config.method.keeps_the_mesh() {
+    if config.construction.method().keeps_the_mesh() {
         input::expect_cells(&mesh, &arguments.inputs[0])?;
     }
     for (name, unit) in &arguments.units {
@@ -266,7 +257,7 @@ fn usual_kind(arguments: &Arguments) -> MtKind {
         (Some(Method::Decimate), _) | (_, Some(Criterion::HalfEdge)) => MtKind::HalfEdge,
         (None, None) if arguments.purpose.is_some() => MtKind::HalfEdge,
         (None, None) if arguments.tet_errors => MtKind::Vertex,
-        (None, None) => BuildConfig::default().kind,
+        (None, None) => BuildConfig::default().construction.kind(),
     }
 }
 
@@ -274,8 +265,6 @@ fn usual_kind(arguments: &Arguments) -> MtKind {
 fn config(arguments: &Arguments) -> BuildConfig {
     let kind = arguments.kind.unwrap_or_else(|| usual_kind(arguments));
     let default = BuildConfig::of(kind);
-    let method =
-        arguments.method.unwrap_or(if arguments.tet_errors { Method::Insert } else { default.method });
     let precision: Vec<&Precision> = arguments.field_bits.iter().chain(&arguments.field_tolerance).collect();
     let for_all: Vec<FieldPrecision> =
         precision.iter().filter(|p| p.name.is_none()).map(|p| p.precision).collect();
@@ -285,11 +274,8 @@ fn config(arguments: &Arguments) -> BuildConfig {
         );
     }
     let of_one = |p: &&Precision| p.name.clone().map(|name| (name, p.precision));
-    let config = BuildConfig {
-        kind,
-        method,
-        criterion: arguments.criterion.unwrap_or(Criterion::usual(method)),
-        purpose: arguments.purpose.unwrap_or(default.purpose),
+    BuildConfig {
+        construction: construction(arguments, kind).unwrap_or_else(|wrong| super::refuse_usage(&wrong)),
         fields: arguments.fields.clone(),
         all_fields: arguments.all_fields,
         position_bits: arguments.position_bits,
@@ -300,25 +286,35 @@ fn config(arguments: &Arguments) -> BuildConfig {
         all_lossless: arguments.lossless.iter().any(String::is_empty),
         displacement: arguments.displacement.unwrap_or(default.displacement),
         displacement_edges: arguments.displacement_edges.unwrap_or(default.displacement_edges),
-        tet_errors: arguments.tet_errors,
         block_bits: arguments.block_updates.unwrap_or(default.block_bits),
-    };
-    if let Err(error) = config.check() {
-        super::refuse_usage(&error.to_string());
+    }
+}
+
+/// How an MT of this kind is built, or why the options contradict each other.
+fn construction(arguments: &Arguments, kind: MtKind) -> Result<Construction, String> {
+    let usual = Construction::usual(kind).method();
+    let method = arguments.method.unwrap_or(if arguments.tet_errors { Method::Insert } else { usual });
+    let criterion = arguments.criterion.unwrap_or(Criterion::usual(method));
+    let refused = |error: BuildError| error.to_string();
+    let mut construction = Construction::new(kind, method, criterion).map_err(refused)?;
+    if arguments.tet_errors {
+        construction = construction.with_tet_errors().map_err(refused)?;
     }
     if method == Method::Collapse && arguments.criterion.is_some() {
-        super::refuse_usage("--criterion goes with --method insert or decimate, not with collapse");
+        return Err("--criterion goes with --method insert or decimate, not with collapse".to_owned());
     }
-    if method != Method::Decimate && arguments.purpose.is_some() {
-        super::refuse_usage("--for goes with --method decimate");
+    match arguments.purpose {
+        Some(purpose) => {
+            construction.with_purpose(purpose).map_err(|_| "--for goes with --method decimate".to_owned())
+        }
+        None => Ok(construction),
     }
-    config
 }
 
 /// What the file tells of how it was built.
 fn metadata(config: &BuildConfig) -> Vec<(&'static str, &'static str)> {
-    let criterion = (config.method != Method::Collapse).then_some((CRITERION, config.criterion.name()));
-    criterion.into_iter().chain([(METHOD, config.method.name())]).collect()
+    let criterion = config.construction.criterion().map(|criterion| (CRITERION, criterion.name()));
+    criterion.into_iter().chain([(METHOD, config.construction.method().name())]).collect()
 }
 
 fn build(arguments: &Arguments, config: &BuildConfig, mesh: &TetMesh) -> Result<BuildResult> {
@@ -339,7 +335,24 @@ fn build(arguments: &Arguments, config: &BuildConfig, mesh: &TetMesh) -> Result<
         ControlFlow::Continue(())
     });
     bar.finish_and_clear();
-    result.with_context(|| arguments.inputs[0].display().to_string())
+    let failed = |error: BuildError| match option_for(&error) {
+        Some(option) => anyhow!("{error} ({option})"),
+        None => error.into(),
+    };
+    result.map_err(failed).with_context(|| arguments.inputs[0].display().to_string())
+}
+
+/// The option that does what the error advises.
+fn option_for(error: &BuildError) -> Option<&'static str> {
+    Some(match error {
+        BuildError::Empty => "--method insert",
+        BuildError::CellField { .. } => "--cell-to-point",
+        BuildError::Tolerance { field: Some(_), .. } => "--field-tolerance, --lossless",
+        BuildError::Tolerance { field: None, .. } => "--position-tolerance",
+        BuildError::TooThin { enough: Some(_), .. } | BuildError::SamePlace { .. } => "--position-bits",
+        BuildError::Crowded { .. } | BuildError::NotConvex => "--method decimate",
+        _ => return None,
+    })
 }
 
 fn report(
@@ -350,9 +363,9 @@ fn report(
     repaired: String,
 ) -> Report {
     Report {
-        kind: config.kind.name(),
-        method: config.method.name(),
-        criterion: (config.method != Method::Collapse).then_some(config.criterion.name()),
+        kind: config.construction.kind().name(),
+        method: config.construction.method().name(),
+        criterion: config.construction.criterion().map(Criterion::name),
         vertices: summary.vertices,
         tetrahedra: summary.tetrahedra,
         base_vertices: summary.base_vertices,

@@ -3,15 +3,13 @@
 use super::build;
 use super::files;
 use super::output::{self, Verbosity};
-use anyhow::Context;
-use anyhow::Result;
+use anyhow::{Context, Result, anyhow};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
 use tetralod::format::EncodeOptions;
 use tetralod::format::encode_to;
-use tetralod::mt::MtKind;
-use tetralod::mt::MultiTessellation;
+use tetralod::mt::{ConvertError, MtKind, MultiTessellation};
 
 /// Writes the same updates as an MT of another kind: any kind becomes explicit, and an explicit MT becomes again what
 /// it was made of.
@@ -50,7 +48,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let mut opened = files::open_mt(&arguments.file)?;
     let from = opened.info()?.kind;
     let converted = opened.mt()?.convert(arguments.kind);
-    let mt = converted.with_context(|| arguments.file.display().to_string())?;
+    let hint = |error| match error {
+        ConvertError::Kinds { to, .. } => anyhow!("{error}, with `tetralod build --kind {}`", to.name()),
+        _ => error.into(),
+    };
+    let mt = converted.map_err(hint).with_context(|| arguments.file.display().to_string())?;
     // Conversions keep the numbers of the vertices.
     let exact = opened.session.exact_tables()?;
     let metadata = opened.session.metadata().iter().cloned().collect();

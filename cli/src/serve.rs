@@ -4,31 +4,24 @@
 //! Range, CORS with the headers that scripts have to see, and entity tags. Any good host does the same; this one is for
 //! the own machine and for data that does not leave the house.
 
-use anyhow::Context;
-use anyhow::Result;
-use anyhow::bail;
+use anyhow::{Context, Result, bail};
 use axum::Router;
+use axum::body::{Body, Bytes};
 use axum::extract::Request;
-use axum::http::HeaderMap;
-use axum::http::HeaderName;
-use axum::http::HeaderValue;
-use axum::http::Method;
-use axum::http::StatusCode;
-use axum::http::header;
-use axum::middleware;
-use axum::middleware::Next;
+use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header};
+use axum::middleware::{self, Next};
 use axum::response::Response;
+use futures_util::StreamExt;
+use futures_util::stream::unfold;
+use percent_encoding::percent_decode_str;
 use std::io::Write;
 use std::net::SocketAddr;
-use std::path::Path;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tokio::net::TcpListener;
 use tokio::sync::watch;
-use tower_http::cors::AllowOrigin;
-use tower_http::cors::CorsLayer;
-use tower_http::services::ServeDir;
-use tower_http::services::ServeFile;
+use tower_http::cors::{AllowOrigin, CorsLayer};
+use tower_http::services::{ServeDir, ServeFile};
 
 /// How long downloads under way may take to end after Ctrl-C.
 const GRACE: Duration = Duration::from_secs(5);
@@ -50,7 +43,7 @@ const ACCEPTED: [HeaderName; 4] = [header::IF_MATCH, header::IF_NONE_MATCH, head
 /// Serves MT files to pages and programs: byte ranges, entity tags, CORS.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// The folder to serve, or the one file.
+    /// The folder to serve, or the one file. Links that lead out of a folder are not followed.
     #[arg(default_value = ".", value_name = "DIR|FILE")]
     path: PathBuf,
     /// The port to listen on; 0 takes any that is free.
@@ -65,10 +58,22 @@ pub struct Arguments {
     /// The origin whose pages may read the files, * for any, none for those of this server alone.
     #[arg(long, value_name = "ORIGIN", default_value = "*")]
     cors: String,
+    /// Serve another folder below an address (repeatable): --mount /pkg=node_modules/tetralod.
+    #[arg(long = "mount", value_name = "/NAME=DIR", value_parser = parse_mount)]
+    mounts: Vec<(String, PathBuf)>,
+}
+
+fn parse_mount(text: &str) -> Result<(String, PathBuf), String> {
+    let parts = text.split_once('=').filter(|(at, _)| {
+        let name = at.strip_prefix('/').unwrap_or_default();
+        !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || "-._/".contains(c))
+    });
+    let (at, folder) = parts.ok_or("it must be an address and a folder, as in /pkg=node_modules/tetralod")?;
+    Ok((at.trim_end_matches('/').to_owned(), folder.into()))
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let (router, path) = files(&arguments.path)?;
+    let (router, path) = router(arguments)?;
     let router = with_headers(router, arguments)?;
     let stop = stop_on_interrupt()?;
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
@@ -86,12 +91,46 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 }
 
 /// What answers, and the path at which it does.
-fn files(path: &Path) -> Result<(Router, String)> {
+fn router(arguments: &Arguments) -> Result<(Router, String)> {
+    let path = &arguments.path;
     let found = std::fs::metadata(path).with_context(|| path.display().to_string())?;
-    if found.is_dir() {
-        let folder = ServeDir::new(path).ignore_multi_range_requests(true);
-        return Ok((Router::new().fallback_service(folder), "/".to_owned()));
+    let (mut router, at) = if found.is_dir() { (folder("", path)?, "/".to_owned()) } else { file(path)? };
+    for (at, path) in &arguments.mounts {
+        let files = folder(at, path).with_context(|| format!("--mount {at}"))?;
+        router = router.nest_service(at, files);
     }
+    Ok((router, at))
+}
+
+/// The files in the folder at `path`, below the address `at`.
+fn folder(at: &str, path: &Path) -> Result<Router> {
+    let root = path.canonicalize().with_context(|| path.display().to_string())?;
+    let files = ServeDir::new(&root).redirect_path_prefix(at);
+    let guard = middleware::from_fn(move |request: Request, next: Next| {
+        let file =
+            root.join(&*percent_decode_str(request.uri().path().trim_start_matches('/')).decode_utf8_lossy());
+        let root = root.clone();
+        async move {
+            if leads_out(&root, file).await {
+                with_status(StatusCode::NOT_FOUND)
+            } else {
+                next.run(request).await
+            }
+        }
+    });
+    Ok(Router::new().fallback_service(files).layer(guard))
+}
+
+/// Whether a file that is there lies outside of the folder `root`: a link may lead there.
+async fn leads_out(root: &Path, file: PathBuf) -> bool {
+    let index = file.join("index.html");
+    let outside =
+        async |path: PathBuf| tokio::fs::canonicalize(path).await.is_ok_and(|found| !found.starts_with(root));
+    outside(file).await || outside(index).await
+}
+
+/// The one file at `path`, and its address.
+fn file(path: &Path) -> Result<(Router, String)> {
     let name = path.file_name().and_then(|name| name.to_str());
     let Some(name) = name else { bail!("{}: a name in UTF-8 is needed for the address", path.display()) };
     let at = format!("/{}", encoded(name));
@@ -128,7 +167,7 @@ fn with_headers(router: Router, arguments: &Arguments) -> Result<Router> {
         seconds => HeaderValue::try_from(format!("public, max-age={seconds}"))?,
     };
     let shared = arguments.cors != "none";
-    let router = router.layer(middleware::from_fn(if_range));
+    let router = router.layer(middleware::from_fn(ranges)).layer(middleware::from_fn(throttle));
     let router = router.layer(middleware::from_fn(move |request: Request, next: Next| {
         let caching = caching.clone();
         async move {
@@ -170,17 +209,74 @@ fn cors(origin: &str) -> Result<CorsLayer> {
         .max_age(Duration::from_secs(3600)))
 }
 
-/// Answers a range with the whole file when that is no longer the one which the reader has a part of.
-async fn if_range(request: Request, next: Next) -> Response {
-    let Some(held) = request.headers().get(header::IF_RANGE).cloned() else { return next.run(request).await };
-    let mut whole = Request::new(axum::body::Body::empty());
-    *whole.method_mut() = request.method().clone();
-    *whole.uri_mut() = request.uri().clone();
-    let response = next.clone().run(request).await;
-    if response.status() != StatusCode::PARTIAL_CONTENT || still_holds(&held, response.headers()) {
+/// Answers ranges as RFC 9110 has it where the server of files does not: with the whole file where the range is none or is
+/// of a file that the reader has an older version of, and where the end is longer than the file, with all of it.
+async fn ranges(mut request: Request, next: Next) -> Response {
+    let headers = request.headers_mut();
+    let range = headers.remove(header::RANGE).filter(is_one_range);
+    let held = headers.remove(header::IF_RANGE);
+    let Some(range) = range else { return next.run(request).await };
+    let (parts, _) = request.into_parts();
+    let with_range = |range: Option<HeaderValue>| {
+        let mut parts = parts.clone();
+        parts.headers.extend(range.map(|range| (header::RANGE, range)));
+        Request::from_parts(parts, Body::empty())
+    };
+    let mut response = next.clone().run(with_range(Some(range.clone()))).await;
+    if response.status() == StatusCode::RANGE_NOT_SATISFIABLE && is_end(&range) {
+        response = next.clone().run(with_range(Some(HeaderValue::from_static("bytes=0-")))).await;
+    }
+    let holds = held.is_none_or(|held| still_holds(&held, response.headers()));
+    if holds || response.status() != StatusCode::PARTIAL_CONTENT {
         return response;
     }
-    next.run(whole).await
+    next.run(with_range(None)).await
+}
+
+/// Whether a range is some bytes at the end of a file, however long that is.
+fn is_end(range: &HeaderValue) -> bool {
+    let length = range.to_str().ok().and_then(|text| text.strip_prefix("bytes=-")?.parse::<u64>().ok());
+    length.is_some_and(|length| length > 0)
+}
+
+/// Whether a header asks for one range of bytes; RFC 9110, section 14.2, lets a server ignore all others.
+fn is_one_range(value: &HeaderValue) -> bool {
+    let range = value.to_str().ok().and_then(|text| text.strip_prefix("bytes=")?.split_once('-'));
+    let Some((first, last)) = range else { return false };
+    match (first.parse::<u64>(), last.parse::<u64>()) {
+        (Ok(first), Ok(last)) => first <= last,
+        (Ok(_), Err(_)) => last.is_empty(),
+        (Err(_), Ok(_)) => first.is_empty(),
+        (Err(_), Err(_)) => false,
+    }
+}
+
+/// Sends a body as slowly as `?throttle=BYTES_PER_SECOND` says, so that a page can be seen while its data arrives.
+async fn throttle(request: Request, next: Next) -> Response {
+    let mut entries = request.uri().query().unwrap_or_default().split('&');
+    let rate = entries.find_map(|entry| entry.strip_prefix("throttle=")?.parse().ok());
+    let response = next.run(request).await;
+    match rate.filter(|rate: &u32| *rate > 0) {
+        Some(rate) => response.map(|body| slowed(body, rate)),
+        None => response,
+    }
+}
+
+/// Hands on `rate` bytes a second, in twenty portions.
+fn slowed(body: Body, rate: u32) -> Body {
+    let portion = rate.div_ceil(20) as usize;
+    let portions = unfold((body.into_data_stream(), Bytes::new()), move |(mut rest, mut bytes)| async move {
+        if bytes.is_empty() {
+            match rest.next().await? {
+                Ok(more) => bytes = more,
+                Err(error) => return Some((Err(error), (rest, bytes))),
+            }
+        }
+        let next = bytes.split_to(portion.min(bytes.len()));
+        tokio::time::sleep(Duration::from_secs_f64(next.len() as f64 / f64::from(rate))).await;
+        Some((Ok(next), (rest, bytes)))
+    });
+    Body::from_stream(portions)
 }
 
 /// Whether `held`, an entity tag or a date, names the file of this answer; weak tags do not name bytes.

@@ -5,9 +5,7 @@ use anyhow::Result;
 use std::ops::ControlFlow;
 use std::path::Path;
 use tetralod::builder;
-use tetralod::builder::BuildConfig;
-use tetralod::builder::Criterion;
-use tetralod::builder::Method;
+use tetralod::builder::{BuildConfig, Construction, Criterion, Purpose, VertexMethod};
 use tetralod::mesh::Field;
 use tetralod::mesh::Grid;
 use tetralod::mesh::TetMesh;
@@ -15,7 +13,6 @@ use tetralod::mesh::repair;
 use tetralod::mt::CurrentMesh;
 use tetralod::mt::Mt;
 use tetralod::mt::MtInfo;
-use tetralod::mt::MtKind;
 use tetralod::mt::MultiTessellation;
 use tetralod::refine::Request;
 
@@ -51,14 +48,15 @@ impl Recipe {
     }
 
     fn config(self) -> BuildConfig {
-        let (kind, method, criterion) = match self {
-            Self::Edge => (MtKind::Edge, Method::Collapse, Criterion::HalfEdge),
-            Self::Insert | Self::InsertOwn => (MtKind::Vertex, Method::Insert, Criterion::Delaunay),
-            Self::Delaunay => (MtKind::Vertex, Method::Decimate, Criterion::Delaunay),
-            Self::HalfEdge => (MtKind::Vertex, Method::Decimate, Criterion::HalfEdge),
+        let decimated = |criterion| VertexMethod::Decimate { criterion, purpose: Purpose::Uniform };
+        let construction = match self {
+            Self::Edge => Construction::Edge,
+            Self::Insert => Construction::Vertex(VertexMethod::Insert { tet_errors: false }),
+            Self::InsertOwn => Construction::Vertex(VertexMethod::Insert { tet_errors: true }),
+            Self::Delaunay => Construction::Vertex(decimated(Criterion::Delaunay)),
+            Self::HalfEdge => Construction::Vertex(decimated(Criterion::HalfEdge)),
         };
-        let tet_errors = self == Self::InsertOwn;
-        BuildConfig { kind, method, criterion, tet_errors, ..BuildConfig::default() }
+        BuildConfig { construction, ..BuildConfig::default() }
     }
 }
 

@@ -5,6 +5,7 @@ use super::BuildError;
 use super::BuildProgress;
 use super::Criterion;
 use super::OnProgress;
+use super::Purpose;
 use super::candidate_queue::Key;
 use super::candidate_queue::Levels;
 use super::cost::Reference;
@@ -53,7 +54,7 @@ pub(super) struct Decimated {
 pub(super) fn decimate(
     mesh: &TetMesh,
     config: &BuildConfig,
-    criterion: Criterion,
+    (criterion, purpose): (Criterion, Purpose),
     progress: OnProgress<'_>,
 ) -> Result<Decimated, BuildError> {
     if mesh.positions.len() > MAX_UPDATES as usize {
@@ -72,7 +73,7 @@ pub(super) fn decimate(
     };
     let displacement_per_error = config.displacement * Bounds::of(&mesh.positions).diagonal();
     let work = WorkMesh::new(mesh.tets.clone(), neighbors, mesh.positions.len());
-    let levels = Levels::of_purpose(config.purpose);
+    let levels = Levels::of_purpose(purpose);
     let reference = Reference::new(&quantized, &work, displacement_per_error, config.displacement_edges);
     let state = State::new(work, reference, non_manifold, levels);
     let mut decimator = Decimator::new(state, gift_wrap);

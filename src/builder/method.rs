@@ -1,6 +1,5 @@
 //! How an MT is built, and which kinds come out.
 
-use super::BuildConfig;
 use super::BuildError;
 use crate::mt::MtKind;
 
@@ -70,12 +69,8 @@ impl Method {
         }
     }
 
-    /// What is used for a kind of MT if nothing else is asked for.
-    pub fn usual(kind: MtKind) -> Self {
-        match kind {
-            MtKind::Edge | MtKind::Explicit => Self::Collapse,
-            MtKind::Vertex | MtKind::HalfEdge => Self::Decimate,
-        }
+    fn described(self) -> String {
+        format!("method {}", self.name())
     }
 
     /// Whether the reference mesh is the input, tetrahedron for tetrahedron, and not only a mesh of its points.
@@ -105,53 +100,177 @@ impl Criterion {
     }
 }
 
-impl BuildConfig {
-    /// Whether kind, method and criterion go together: collapses make edge-based MTs, insertion and decimation
-    /// vertex-based ones, and all make explicit ones; insertion is always by the Delaunay criterion.
+/// The kind of MT and how it is built: exactly what goes together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Construction {
+    /// An edge-based MT, by [`Method::Collapse`].
+    Edge,
+    /// A half-edge MT, by [`Method::Decimate`] with [`Criterion::HalfEdge`].
+    HalfEdge {
+        /// What it is built for.
+        purpose: Purpose,
+    },
+    /// A vertex-based MT.
+    Vertex(VertexMethod),
+    /// An explicit MT of the updates of an edge-based one.
+    ExplicitEdge,
+    /// An explicit MT of the updates of a vertex-based one.
+    ExplicitVertex(VertexMethod),
+}
+
+/// How the updates of a vertex-based MT are built.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum VertexMethod {
+    /// [`Method::Insert`], always by [`Criterion::Delaunay`].
+    Insert {
+        /// Whether tetrahedra have errors of their own, two bits each (see
+        /// [`quarterings`](crate::mt::MultiTessellation::quarterings)): requests take fewer tetrahedra then, but each is
+        /// answered from the base mesh.
+        tet_errors: bool,
+    },
+    /// [`Method::Decimate`].
+    Decimate {
+        /// How a vertex is removed.
+        criterion: Criterion,
+        /// What the MT is built for.
+        purpose: Purpose,
+    },
+}
+
+impl Construction {
+    /// The usual construction of a kind of MT.
+    pub fn usual(kind: MtKind) -> Self {
+        let purpose = Purpose::default();
+        match kind {
+            MtKind::Edge => Self::Edge,
+            MtKind::HalfEdge => Self::HalfEdge { purpose },
+            MtKind::Vertex => {
+                Self::Vertex(VertexMethod::Decimate { criterion: Criterion::HalfEdge, purpose })
+            }
+            MtKind::Explicit => Self::ExplicitEdge,
+        }
+    }
+
+    /// An MT of this kind by this method and criterion; [`Method::Collapse`] has its own criterion.
     ///
     /// # Errors
     /// [`BuildError::Combination`], with what does go together.
-    pub fn check(&self) -> Result<(), BuildError> {
-        let refuse = |which, instead| Err(BuildError::Combination { which, instead });
-        match (self.kind, self.method) {
-            (MtKind::Edge, Method::Insert | Method::Decimate) => refuse(
-                [
-                    "kind edge",
-                    if self.method == Method::Insert { "method insert" } else { "method decimate" },
-                ],
-                "MTs of kind edge are built by method collapse; methods insert and decimate build kinds vertex and \
-                 explicit",
-            ),
-            (MtKind::Vertex, Method::Collapse) => refuse(
-                ["kind vertex", "method collapse"],
-                "MTs of kind vertex are built by methods insert and decimate; method collapse builds kinds edge and \
-                 explicit",
-            ),
-            (MtKind::HalfEdge, Method::Collapse | Method::Insert) => refuse(
-                [
-                    "kind half-edge",
-                    if self.method == Method::Insert { "method insert" } else { "method collapse" },
-                ],
-                "MTs of kind half-edge are built by method decimate with criterion half-edge",
-            ),
-            (MtKind::HalfEdge, Method::Decimate) if self.criterion != Criterion::HalfEdge => refuse(
-                ["kind half-edge", "criterion delaunay"],
-                "MTs of kind half-edge are built with criterion half-edge; criterion delaunay builds kinds vertex and \
-                 explicit",
-            ),
-            (_, Method::Insert) if self.criterion != Criterion::Delaunay => refuse(
-                ["method insert", "criterion half-edge"],
-                "method insert has criterion delaunay; criterion half-edge goes with method decimate",
-            ),
-            (_, Method::Collapse | Method::Decimate) if self.tet_errors => refuse(
-                [
-                    "tet errors",
-                    if self.method == Method::Collapse { "method collapse" } else { "method decimate" },
-                ],
-                "errors of tetrahedra by themselves go with method insert; by the other methods they hardly differ from those \
-                 of updates",
-            ),
-            _ => Ok(()),
+    pub fn new(kind: MtKind, method: Method, criterion: Criterion) -> Result<Self, BuildError> {
+        let purpose = Purpose::default();
+        let by_vertices = match (method, criterion) {
+            (Method::Decimate, criterion) => Some(VertexMethod::Decimate { criterion, purpose }),
+            (Method::Insert, Criterion::Delaunay) => Some(VertexMethod::Insert { tet_errors: false }),
+            _ => None,
+        };
+        match (kind, method, by_vertices) {
+            (MtKind::Edge, Method::Collapse, _) => Ok(Self::Edge),
+            (MtKind::Explicit, Method::Collapse, _) => Ok(Self::ExplicitEdge),
+            (MtKind::HalfEdge, Method::Decimate, _) if criterion == Criterion::HalfEdge => {
+                Ok(Self::HalfEdge { purpose })
+            }
+            (MtKind::Vertex, _, Some(method)) => Ok(Self::Vertex(method)),
+            (MtKind::Explicit, _, Some(method)) => Ok(Self::ExplicitVertex(method)),
+            _ => Err(contradiction(kind, method, criterion)),
         }
     }
+
+    /// The same for a purpose.
+    ///
+    /// # Errors
+    /// [`BuildError::Combination`] if the method is not [`Method::Decimate`].
+    pub fn with_purpose(self, purpose: Purpose) -> Result<Self, BuildError> {
+        match self {
+            Self::HalfEdge { .. } => Ok(Self::HalfEdge { purpose }),
+            Self::Vertex(VertexMethod::Decimate { criterion, .. }) => {
+                Ok(Self::Vertex(VertexMethod::Decimate { criterion, purpose }))
+            }
+            Self::ExplicitVertex(VertexMethod::Decimate { criterion, .. }) => {
+                Ok(Self::ExplicitVertex(VertexMethod::Decimate { criterion, purpose }))
+            }
+            _ => Err(BuildError::Combination {
+                which: ["a purpose".to_owned(), self.method().described()],
+                instead: "only method decimate builds for a purpose",
+            }),
+        }
+    }
+
+    /// The same with errors that tetrahedra have of their own.
+    ///
+    /// # Errors
+    /// [`BuildError::Combination`] if the method is not [`Method::Insert`].
+    pub fn with_tet_errors(self) -> Result<Self, BuildError> {
+        let method = VertexMethod::Insert { tet_errors: true };
+        match self {
+            Self::Vertex(VertexMethod::Insert { .. }) => Ok(Self::Vertex(method)),
+            Self::ExplicitVertex(VertexMethod::Insert { .. }) => Ok(Self::ExplicitVertex(method)),
+            _ => Err(BuildError::Combination {
+                which: ["tet errors".to_owned(), self.method().described()],
+                instead: "errors of tetrahedra by themselves go with method insert; by the other methods they hardly \
+                          differ from those of updates",
+            }),
+        }
+    }
+
+    /// The kind of MT.
+    pub fn kind(self) -> MtKind {
+        match self {
+            Self::Edge => MtKind::Edge,
+            Self::HalfEdge { .. } => MtKind::HalfEdge,
+            Self::Vertex(_) => MtKind::Vertex,
+            Self::ExplicitEdge | Self::ExplicitVertex(_) => MtKind::Explicit,
+        }
+    }
+
+    /// How it is built.
+    pub fn method(self) -> Method {
+        match self {
+            Self::Edge | Self::ExplicitEdge => Method::Collapse,
+            Self::HalfEdge { .. } => Method::Decimate,
+            Self::Vertex(method) | Self::ExplicitVertex(method) => match method {
+                VertexMethod::Insert { .. } => Method::Insert,
+                VertexMethod::Decimate { .. } => Method::Decimate,
+            },
+        }
+    }
+
+    /// By what criterion vertices are removed or inserted; none for [`Method::Collapse`].
+    pub fn criterion(self) -> Option<Criterion> {
+        match self {
+            Self::Edge | Self::ExplicitEdge => None,
+            Self::HalfEdge { .. } => Some(Criterion::HalfEdge),
+            Self::Vertex(method) | Self::ExplicitVertex(method) => Some(match method {
+                VertexMethod::Insert { .. } => Criterion::Delaunay,
+                VertexMethod::Decimate { criterion, .. } => criterion,
+            }),
+        }
+    }
+}
+
+/// Why kind, method and criterion do not go together.
+fn contradiction(kind: MtKind, method: Method, criterion: Criterion) -> BuildError {
+    let of_kind = format!("kind {}", kind.name());
+    let by_criterion = format!("criterion {}", criterion.name());
+    let (which, instead) = match (kind, method) {
+        (MtKind::Edge, _) => (
+            [of_kind, method.described()],
+            "MTs of kind edge are built by method collapse; methods insert and decimate build kinds vertex and explicit",
+        ),
+        (MtKind::Vertex, Method::Collapse) => (
+            [of_kind, method.described()],
+            "MTs of kind vertex are built by methods insert and decimate; method collapse builds kinds edge and explicit",
+        ),
+        (MtKind::HalfEdge, Method::Collapse | Method::Insert) => (
+            [of_kind, method.described()],
+            "MTs of kind half-edge are built by method decimate with criterion half-edge",
+        ),
+        (MtKind::HalfEdge, Method::Decimate) => (
+            [of_kind, by_criterion],
+            "MTs of kind half-edge are built with criterion half-edge; criterion delaunay builds kinds vertex and explicit",
+        ),
+        (MtKind::Vertex | MtKind::Explicit, _) => (
+            [method.described(), by_criterion],
+            "method insert has criterion delaunay; criterion half-edge goes with method decimate",
+        ),
+    };
+    BuildError::Combination { which, instead }
 }

@@ -55,9 +55,7 @@ mod work_mesh;
 
 pub use collapse::edge_mt;
 pub use delaunay::delaunay;
-pub use method::Criterion;
-pub use method::Method;
-pub use method::Purpose;
+pub use method::{Construction, Criterion, Method, Purpose, VertexMethod};
 
 use crate::mesh::MeshError;
 use crate::mesh::TetMesh;
@@ -78,14 +76,8 @@ use std::ops::ControlFlow;
 /// How to build.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BuildConfig {
-    /// The kind of MT.
-    pub kind: MtKind,
-    /// How it is built; not every method makes every kind: see [`BuildConfig::check`].
-    pub method: Method,
-    /// By what criterion vertices are removed or inserted; [`Method::Collapse`] has its own.
-    pub criterion: Criterion,
-    /// What it is built for; [`Method::Decimate`] makes use of this.
-    pub purpose: Purpose,
+    /// The kind of MT and how it is built.
+    pub construction: Construction,
     /// Names of the fields to keep, in this order; a vector's name stands for its components. Of a time series all steps
     /// are kept. The first field of the mesh if empty.
     pub fields: Vec<String>,
@@ -113,10 +105,6 @@ pub struct BuildConfig {
     /// The same in lengths of the shortest edge of the reference mesh at each place, where that is less; infinite where cells do not
     /// matter. With 10, an error of 1 % allows the boundary to move by a tenth of such an edge.
     pub displacement_edges: f64,
-    /// Whether tetrahedra have errors of their own, two bits each (see
-    /// [`quarterings`](MultiTessellation::quarterings)): requests take fewer tetrahedra then, but each is answered from the
-    /// base mesh. With [`Method::Insert`] only.
-    pub tet_errors: bool,
     /// log2 of the updates that files are going to have in a block, 4 to 16: within a block of an edge-based MT updates are
     /// numbered so that they take few bits. Encode with the same.
     pub block_bits: u32,
@@ -132,12 +120,8 @@ impl Default for BuildConfig {
 impl BuildConfig {
     /// The usual configuration for a kind of MT.
     pub fn of(kind: MtKind) -> Self {
-        let method = Method::usual(kind);
         Self {
-            kind,
-            method,
-            criterion: Criterion::usual(method),
-            purpose: Purpose::default(),
+            construction: Construction::usual(kind),
             fields: Vec::new(),
             all_fields: false,
             position_bits: None,
@@ -148,7 +132,6 @@ impl BuildConfig {
             all_lossless: false,
             displacement: 0.2,
             displacement_edges: 10.0,
-            tet_errors: false,
             block_bits: kind.usual_block_bits(),
         }
     }
@@ -218,7 +201,7 @@ pub enum BuildError {
     /// Kind, method and criterion do not go together.
     Combination {
         /// The two that do not.
-        which: [&'static str; 2],
+        which: [String; 2],
         /// What goes with what.
         instead: &'static str,
     },
@@ -310,7 +293,7 @@ impl fmt::Display for BuildError {
             }
             Self::Convert(error) => write!(f, "{error}"),
             Self::Empty => {
-                write!(f, "the mesh has no tetrahedra; --method insert builds from points alone")
+                write!(f, "the mesh has no tetrahedra; only insertion builds an MT of points alone")
             }
             Self::NoField => {
                 write!(f, "the mesh has no point field: an MT needs at least one scalar at its points")
@@ -325,7 +308,7 @@ impl fmt::Display for BuildError {
             }
             Self::CellField { name } => write!(
                 f,
-                "'{name}' is a field at cells, but an MT has fields at points: --cell-to-point turns those at cells into such"
+                "'{name}' is a field at cells, but an MT has fields at points; turn it into one at points first"
             ),
             Self::TooManyFields { fields } => {
                 write!(f, "{fields} fields and time steps are too many (at most 255); name those to keep")
@@ -335,12 +318,12 @@ impl fmt::Display for BuildError {
             }
             Self::Tolerance { field: Some(field), reached } => write!(
                 f,
-                "24 bits keep the values of field '{field}' within {reached:e}, no closer; use a larger \
-                 --field-tolerance, or --lossless"
+                "24 bits keep the values of field '{field}' within {reached:e}, no closer; allow a \
+                 larger tolerance, or keep its exact values"
             ),
             Self::Tolerance { field: None, reached } => write!(
                 f,
-                "30 bits keep the positions within {reached:e}, no closer; use a larger --position-tolerance"
+                "30 bits keep the positions within {reached:e}, no closer; allow a larger tolerance"
             ),
             Self::TooThin { cell, bits, enough: Some(enough) } => write!(
                 f,
@@ -360,13 +343,12 @@ impl fmt::Display for BuildError {
                 "points {a} and {b} are in the same place on the lattice: remove one, or use more position bits \
                  (at most 30)"
             ),
-            Self::Crowded { point } => write!(
-                f,
-                "too many tetrahedra meet around point {point} for a vertex-based MT; use --method decimate"
-            ),
+            Self::Crowded { point } => {
+                write!(f, "too many tetrahedra meet around point {point} for insertion; build by decimation")
+            }
             Self::NotConvex => write!(
                 f,
-                "the mesh does not fill its convex hull, which insertion would do; use --method decimate"
+                "the mesh does not fill its convex hull, which insertion would do; build by decimation"
             ),
             Self::TooLarge => write!(f, "the mesh has more than 2^30 points; split it into parts"),
             Self::Stopped => write!(f, "stopped"),
@@ -382,27 +364,30 @@ impl std::error::Error for BuildError {}
 /// Works on one thread and calls `progress` now and then.
 ///
 /// # Errors
-/// If the configuration contradicts itself, the mesh is not valid, has none of the wanted fields, or does not fit the
+/// If the mesh is not valid, has none of the wanted fields, or does not fit the
 /// lattice; if `progress` breaks the work off.
 pub fn build(
     mesh: &TetMesh,
     config: &BuildConfig,
     progress: OnProgress<'_>,
 ) -> Result<BuildResult, BuildError> {
-    config.check()?;
-    let BuildResult { mt, summary, vertices, exact } = match config.method {
-        Method::Collapse => {
+    let kind = config.construction.kind();
+    let BuildResult { mt, summary, vertices, exact } = match config.construction {
+        Construction::Edge | Construction::ExplicitEdge => {
             let BuildResult { mt, summary, vertices, exact } = edge_mt(mesh, config, progress)?;
             BuildResult { mt: Mt::from(mt), summary, vertices, exact }
         }
-        Method::Insert => summed_up(mesh, config, vertex::inserted_mt(mesh, config, progress)?)?,
-        Method::Decimate => {
-            summed_up(mesh, config, vertex::decimated_mt(mesh, config, config.criterion, progress)?)?
+        Construction::HalfEdge { purpose } => {
+            let how = (Criterion::HalfEdge, purpose);
+            summed_up(mesh, config, vertex::decimated_mt(mesh, config, how, progress)?)?
+        }
+        Construction::Vertex(method) | Construction::ExplicitVertex(method) => {
+            summed_up(mesh, config, vertex::mt_by(method, mesh, config, progress)?)?
         }
     };
     // Conversions keep the numbers of the vertices.
     let (mt, vertices, exact) = match mt {
-        Mt::Explicit(explicit) if config.kind == MtKind::HalfEdge => {
+        Mt::Explicit(explicit) if kind == MtKind::HalfEdge => {
             let (mt, vertices) = half_edge_mt(&explicit, &vertices, config.block_bits.clamp(4, 16))?;
             let exact = field_selection::exact_values(mesh, config, &vertices)?;
             (mt.into(), vertices, exact)
@@ -410,8 +395,8 @@ pub fn build(
         mt => (mt, vertices, exact),
     };
     let mt = match mt {
-        mt if mt.info().kind == config.kind => mt,
-        mt => mt.convert(config.kind).map_err(BuildError::Convert)?,
+        mt if mt.info().kind == kind => mt,
+        mt => mt.convert(kind).map_err(BuildError::Convert)?,
     };
     Ok(BuildResult { mt, summary, vertices, exact })
 }

@@ -34,7 +34,7 @@ pub(super) fn place(mesh: &TetMesh, config: &BuildConfig) -> Result<Placed, Buil
         (Some(bits), None) => with_bits(mesh, bits),
         (None, Some(tolerance)) => within(mesh, tolerance),
         // Half-edge updates make no new positions: the points of a grid need no finer lattice than the grid.
-        (None, None) if config.kind == MtKind::HalfEdge && grid_bits(mesh).is_some() => {
+        (None, None) if config.construction.kind() == MtKind::HalfEdge && grid_bits(mesh).is_some() => {
             Ok(on(mesh, grid_bits(mesh).unwrap_or(FEWEST_BITS)))
         }
         (None, None) => by_cells(mesh),

@@ -4,6 +4,8 @@ use super::BuildConfig;
 use super::BuildError;
 use super::Criterion;
 use super::OnProgress;
+use super::Purpose;
+use super::VertexMethod;
 use super::decimate;
 use super::insert;
 use super::quantize;
@@ -18,6 +20,24 @@ use crate::mt::MtInfo;
 use crate::mt::MtKind;
 use crate::mt::VertexId;
 
+/// Builds a vertex-based MT of `mesh` by this method, and spells it out.
+///
+/// # Errors
+/// As [`decimated_mt`] and [`inserted_mt`].
+pub(super) fn mt_by(
+    method: VertexMethod,
+    mesh: &TetMesh,
+    config: &BuildConfig,
+    progress: OnProgress<'_>,
+) -> Result<(ExplicitMt, Vec<VertexId>), BuildError> {
+    match method {
+        VertexMethod::Insert { tet_errors } => inserted_mt(mesh, config, tet_errors, progress),
+        VertexMethod::Decimate { criterion, purpose } => {
+            decimated_mt(mesh, config, (criterion, purpose), progress)
+        }
+    }
+}
+
 /// Builds a vertex-based MT of `mesh` by removing vertices, cheapest first, and spells it out: see
 /// [`VertexMt::from_explicit`](crate::mt::VertexMt::from_explicit).
 ///
@@ -26,11 +46,11 @@ use crate::mt::VertexId;
 pub(super) fn decimated_mt(
     mesh: &TetMesh,
     config: &BuildConfig,
-    criterion: Criterion,
+    how: (Criterion, Purpose),
     progress: OnProgress<'_>,
 ) -> Result<(ExplicitMt, Vec<VertexId>), BuildError> {
-    let built = decimate::decimate(mesh, config, criterion, progress)?;
-    let coarse = config.kind == MtKind::HalfEdge;
+    let built = decimate::decimate(mesh, config, how, progress)?;
+    let coarse = config.construction.kind() == MtKind::HalfEdge;
     spell_out(&built.sequence, &built.quantized, built.displacement_per_error, coarse, progress)
 }
 
@@ -44,6 +64,7 @@ pub(super) fn decimated_mt(
 pub(super) fn inserted_mt(
     mesh: &TetMesh,
     config: &BuildConfig,
+    tet_errors: bool,
     progress: OnProgress<'_>,
 ) -> Result<(ExplicitMt, Vec<VertexId>), BuildError> {
     if mesh.positions.len() > MAX_UPDATES as usize {
@@ -54,7 +75,7 @@ pub(super) fn inserted_mt(
     }
     let quantized = quantize::quantize(mesh, config)?;
     let displacement_per_error = config.displacement * Bounds::of(&mesh.positions).diagonal();
-    let sequence = insert::insert(&quantized, &mesh.tets, config.tet_errors, progress)?;
+    let sequence = insert::insert(&quantized, &mesh.tets, tet_errors, progress)?;
     spell_out(&sequence, &quantized, displacement_per_error, false, progress)
 }
 

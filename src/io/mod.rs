@@ -147,7 +147,7 @@ fn read_xml(bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadError> {
         "ImageData" => image::read(&document, options)?,
         "Collection" => {
             let what = "a list of time steps as one mesh".into();
-            let remedy = "give a file that it lists, or use `tetralod build`, which takes all of them".into();
+            let remedy = "give one of the files that it lists".into();
             return Err(ReadReason::Unsupported { what, remedy }).at(String::new);
         }
         other => {

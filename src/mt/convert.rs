@@ -43,10 +43,8 @@ impl fmt::Display for ConvertError {
         match self {
             Self::Kinds { from, to } => write!(
                 f,
-                "an MT of kind {} has other updates than one of kind {}: build it again from the mesh, with \
-                 `--kind {}`",
+                "an MT of kind {} has other updates than one of kind {}: build it again from the mesh",
                 from.name(),
-                to.name(),
                 to.name()
             ),
             Self::Update { update, why } => write!(f, "update {update} does not fit the other kind: {why}"),

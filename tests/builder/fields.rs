@@ -6,6 +6,7 @@ use std::ops::ControlFlow;
 use tetralod::builder::BuildConfig;
 use tetralod::builder::BuildError;
 use tetralod::builder::BuildResult;
+use tetralod::builder::Construction;
 use tetralod::builder::Criterion;
 use tetralod::builder::FieldPrecision;
 use tetralod::builder::Method;
@@ -80,9 +81,7 @@ fn exact_values_come_back_at_every_point_of_every_kind() {
     mesh.fields.push(Field::new("single", odd_values(points, true)));
     for (kind, method, criterion) in WAYS {
         let config = BuildConfig {
-            kind,
-            method,
-            criterion,
+            construction: Construction::new(kind, method, criterion).expect("they go together"),
             all_fields: true,
             all_lossless: true,
             ..BuildConfig::of(MtKind::Edge)
@@ -146,9 +145,7 @@ fn what_lattices_round_off_is_measured_and_a_floor_of_every_error() {
         for precision in [FieldPrecision::Bits(4), FieldPrecision::Bits(20)] {
             let mesh = bent(4);
             let config = BuildConfig {
-                kind,
-                method,
-                criterion,
+                construction: Construction::new(kind, method, criterion).expect("they go together"),
                 field_precision: precision,
                 ..BuildConfig::of(MtKind::Edge)
             };

@@ -4,6 +4,7 @@ use crate::support::meshes::blocks;
 use crate::support::random::Random;
 use std::ops::ControlFlow;
 use tetralod::builder::BuildConfig;
+use tetralod::builder::Construction;
 use tetralod::builder::Criterion;
 use tetralod::builder::Method;
 use tetralod::builder::build;
@@ -20,7 +21,8 @@ use tetralod::refine::Request;
 
 fn made(mesh: &TetMesh, kind: MtKind, criterion: Criterion) -> Mt {
     let method = if kind == MtKind::Edge { Method::Collapse } else { Method::Decimate };
-    let config = BuildConfig { kind, method, criterion, ..BuildConfig::of(MtKind::Edge) };
+    let construction = Construction::new(kind, method, criterion).expect("they go together");
+    let config = BuildConfig { construction, ..BuildConfig::of(MtKind::Edge) };
     build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt
 }
 

@@ -6,6 +6,7 @@ use crate::support::meshes::built;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use tetralod::builder::BuildConfig;
+use tetralod::builder::Construction;
 use tetralod::builder::Criterion;
 use tetralod::builder::Method;
 use tetralod::builder::build;
@@ -46,7 +47,8 @@ fn check(name: &str, mesh: &TetMesh, most: u32) {
         if method == Method::Insert && mesh.grid.is_none() {
             continue;
         }
-        let config = BuildConfig { method, criterion, ..BuildConfig::of(kind) };
+        let construction = Construction::new(kind, method, criterion).expect("they go together");
+        let config = BuildConfig { construction, ..BuildConfig::of(kind) };
         let mt = build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt;
         let reference = if method.keeps_the_mesh() { Reference::Mesh } else { Reference::Points };
         keeps_promises(

@@ -15,6 +15,7 @@ use std::ops::ControlFlow;
 use std::panic::AssertUnwindSafe;
 use std::panic::catch_unwind;
 use tetralod::builder::BuildConfig;
+use tetralod::builder::Construction;
 use tetralod::builder::Criterion;
 use tetralod::builder::FieldPrecision;
 use tetralod::builder::Method;
@@ -175,7 +176,8 @@ const METHODS: [(Method, Criterion); 3] = [
 ];
 
 fn built(mesh: &TetMesh, (method, criterion): (Method, Criterion), config: BuildConfig) -> Mt {
-    let config = BuildConfig { kind: MtKind::Vertex, method, criterion, ..config };
+    let construction = Construction::new(MtKind::Vertex, method, criterion).expect("they go together");
+    let config = BuildConfig { construction, ..config };
     tetralod::builder::build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a valid mesh").mt
 }
 
@@ -345,7 +347,8 @@ fn a_changed_formula_would_be_noticed() {
 fn exact_values_are_read_alike() {
     let flow = generate::sphere_flow(6).expect("a small size");
     for (kind, method) in [(MtKind::Vertex, Method::Decimate), (MtKind::Edge, Method::Collapse)] {
-        let config = BuildConfig { kind, method, all_lossless: true, ..precise(12, 9) };
+        let construction = Construction::new(kind, method, Criterion::HalfEdge).expect("they go together");
+        let config = BuildConfig { construction, all_lossless: true, ..precise(12, 9) };
         let built = tetralod::builder::build(&flow, &config, &mut |_| ControlFlow::Continue(()));
         let built = built.expect("a valid mesh");
         let spelled = built.mt.convert(MtKind::Explicit).expect("a valid MT");
@@ -380,9 +383,10 @@ fn compare_exact(file: &File, changes: &[Change], expected: &[Exact]) {
 fn errors_of_tetrahedra_are_read_alike() {
     let mesh = generate::bucky(7).expect("a size that is allowed");
     for kind in [MtKind::Vertex, MtKind::Explicit] {
-        let (method, criterion) = (Method::Insert, Criterion::Delaunay);
-        let config =
-            BuildConfig { kind, method, criterion, tet_errors: true, ..BuildConfig::of(MtKind::Edge) };
+        let construction = Construction::new(kind, Method::Insert, Criterion::Delaunay)
+            .and_then(Construction::with_tet_errors)
+            .expect("they go together");
+        let config = BuildConfig { construction, ..BuildConfig::of(MtKind::Edge) };
         let built = tetralod::builder::build(&mesh, &config, &mut |_| ControlFlow::Continue(()));
         let options = EncodeOptions { block_bits: 5, ..EncodeOptions::default() };
         let bytes = encode(&built.expect("a good mesh").mt, &options).expect("a complete MT");

@@ -5,6 +5,7 @@ use crate::subjects::{SUBJECTS, applied};
 use crate::support::meshes::{cube, hilly};
 use std::ops::ControlFlow;
 use tetralod::builder::BuildConfig;
+use tetralod::builder::Construction;
 use tetralod::builder::Criterion;
 use tetralod::builder::Method;
 use tetralod::builder::build;
@@ -83,7 +84,8 @@ fn what_is_promised_of_a_field_holds_for_every_builder() {
     ] {
         let criterion = if method == Method::Insert { Criterion::Delaunay } else { Criterion::HalfEdge };
         let fields = names.clone();
-        let config = BuildConfig { kind, method, criterion, fields, ..BuildConfig::of(MtKind::Edge) };
+        let construction = Construction::new(kind, method, criterion).expect("they go together");
+        let config = BuildConfig { construction, fields, ..BuildConfig::of(MtKind::Edge) };
         let mt = build(&input, &config, &mut |_| ControlFlow::Continue(())).expect("a good mesh").mt;
         let reference = match method {
             Method::Insert => verify::Reference::Points,

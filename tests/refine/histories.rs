@@ -5,6 +5,7 @@ use crate::support::meshes::{blocks, tampered};
 use crate::support::random::Random;
 use std::ops::ControlFlow;
 use tetralod::builder::BuildConfig;
+use tetralod::builder::Construction;
 use tetralod::builder::Criterion;
 use tetralod::builder::Method;
 use tetralod::builder::build;
@@ -40,7 +41,8 @@ fn made(mesh: &TetMesh, kind: MtKind) -> Mt {
         MtKind::Edge => (Method::Collapse, Criterion::HalfEdge),
         _ => (Method::Decimate, Criterion::HalfEdge),
     };
-    let config = BuildConfig { kind, method, criterion, ..BuildConfig::of(MtKind::Edge) };
+    let construction = Construction::new(kind, method, criterion).expect("they go together");
+    let config = BuildConfig { construction, ..BuildConfig::of(MtKind::Edge) };
     build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt
 }
 

@@ -5,6 +5,7 @@ use crate::at_vertices::{errors_inside, refined};
 use crate::support::meshes::blocks;
 use std::ops::ControlFlow;
 use tetralod::builder::BuildConfig;
+use tetralod::builder::Construction;
 use tetralod::builder::Criterion;
 use tetralod::builder::Method;
 use tetralod::builder::build;
@@ -54,7 +55,8 @@ fn rough() -> TetMesh {
 }
 
 fn made(mesh: &TetMesh, (kind, method, criterion): (MtKind, Method, Criterion)) -> Mt {
-    let config = BuildConfig { kind, method, criterion, ..BuildConfig::default() };
+    let construction = Construction::new(kind, method, criterion).expect("they go together");
+    let config = BuildConfig { construction, ..BuildConfig::default() };
     build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt
 }
 

@@ -6,6 +6,7 @@ use crate::support::meshes::blocks;
 use crate::support::random::Random;
 use std::ops::ControlFlow;
 use tetralod::builder::BuildConfig;
+use tetralod::builder::Construction;
 use tetralod::builder::Criterion;
 use tetralod::builder::Method;
 use tetralod::builder::build;
@@ -43,7 +44,8 @@ fn made(mesh: &TetMesh, kind: MtKind, position_bits: Option<u32>) -> Mt {
         MtKind::Edge => (Method::Collapse, Criterion::HalfEdge),
         _ => (Method::Decimate, Criterion::HalfEdge),
     };
-    let config = BuildConfig { kind, method, criterion, position_bits, ..BuildConfig::default() };
+    let construction = Construction::new(kind, method, criterion).expect("they go together");
+    let config = BuildConfig { construction, position_bits, ..BuildConfig::default() };
     build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt
 }
 

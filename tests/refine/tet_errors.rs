@@ -9,6 +9,7 @@ use std::sync::Arc;
 use std::sync::LazyLock;
 use tetralod::builder::BuildConfig;
 use tetralod::builder::BuildResult;
+use tetralod::builder::Construction;
 use tetralod::builder::Criterion as BuiltBy;
 use tetralod::builder::Method;
 use tetralod::builder::build;
@@ -39,12 +40,10 @@ use tetralod::verify;
 use tetralod::verify::Reference;
 
 fn config(mesh: &TetMesh, kind: MtKind, tet_errors: bool) -> BuildConfig {
+    let plain = Construction::new(kind, Method::Insert, BuiltBy::Delaunay).expect("they go together");
     BuildConfig {
-        kind,
-        method: Method::Insert,
-        criterion: BuiltBy::Delaunay,
+        construction: if tet_errors { plain.with_tet_errors().expect("they go together") } else { plain },
         fields: mesh.fields.iter().map(|field| field.name.clone()).collect(),
-        tet_errors,
         ..BuildConfig::of(MtKind::Edge)
     }
 }
@@ -411,10 +410,9 @@ fn every_promise_is_kept() {
 
 #[test]
 fn other_methods_refuse() {
-    let input = cube(3, &[hilly]);
     for (kind, method) in [(MtKind::Vertex, Method::Decimate), (MtKind::Edge, Method::Collapse)] {
-        let config = BuildConfig { kind, method, tet_errors: true, ..BuildConfig::of(MtKind::Edge) };
-        let error = build(&input, &config, &mut |_| ControlFlow::Continue(())).unwrap_err();
+        let plain = Construction::new(kind, method, BuiltBy::HalfEdge).expect("they go together");
+        let error = plain.with_tet_errors().unwrap_err();
         assert!(error.to_string().contains("method insert"), "{error}");
     }
 }

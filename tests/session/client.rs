@@ -7,6 +7,7 @@ use std::ops::ControlFlow;
 use std::rc::Rc;
 use std::time::Duration;
 use tetralod::builder::BuildConfig;
+use tetralod::builder::Construction;
 use tetralod::builder::build;
 use tetralod::client::Client;
 use tetralod::client::ClientError;
@@ -38,8 +39,8 @@ const BLOCK_BITS: u32 = 6;
 fn file(kind: MtKind) -> Vec<u8> {
     // More than a client reads at first.
     let mesh = generate::bucky(25).expect("a size that is allowed");
-    let method = tetralod::builder::Method::usual(kind);
-    let config = BuildConfig { kind, method, block_bits: BLOCK_BITS, ..BuildConfig::of(MtKind::Edge) };
+    let construction = Construction::usual(kind);
+    let config = BuildConfig { construction, block_bits: BLOCK_BITS, ..BuildConfig::of(MtKind::Edge) };
     let mt = build(&mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a valid mesh").mt;
     encode(&mt, &EncodeOptions { block_bits: BLOCK_BITS, ..EncodeOptions::default() }).expect("a sound MT")
 }

@@ -4,6 +4,7 @@ use crate::support::random::Random;
 use std::ops::ControlFlow;
 use std::ops::Range;
 use tetralod::builder::BuildConfig;
+use tetralod::builder::Construction;
 use tetralod::builder::Criterion;
 use tetralod::builder::Method;
 use tetralod::builder::build;
@@ -47,7 +48,8 @@ impl Walk {
     pub fn new(mesh: &TetMesh, (kind, method): (MtKind, Method)) -> Self {
         let fields = mesh.fields.iter().map(|field| field.name.clone()).collect();
         let criterion = if method == Method::Insert { Criterion::Delaunay } else { Criterion::HalfEdge };
-        let config = BuildConfig { kind, method, criterion, fields, ..BuildConfig::of(MtKind::Edge) };
+        let construction = Construction::new(kind, method, criterion).expect("they go together");
+        let config = BuildConfig { construction, fields, ..BuildConfig::of(MtKind::Edge) };
         let mt = build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt;
         let mut mesh = mt.start().expect("a valid base mesh");
         mt.updates_arrived(&mut mesh, 0);

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use serde_json::Value;
 
-use crate::serve::Mount;
-use crate::{bench_build, bench_format, browser, demo, package, serve, shell};
+use crate::serve::Server;
+use crate::{bench_build, bench_format, browser, demo, package, shell};
 
 /// Measures `FILE.mt`, or the demo's volume; with `--browser` also in Chromium. With `--build`, the builders instead, with `--format` the files.
 pub fn run(args: &[String]) -> Result<()> {
@@ -48,11 +48,10 @@ fn browser(file: &Path) -> Result<Rates> {
     let data = Path::new("target/bench");
     std::fs::create_dir_all(data)?;
     std::fs::copy(file, data.join("volume.mt")).with_context(|| file.display().to_string())?;
-    let mounts = [("/pkg/", package::PKG), ("/data/", "target/bench"), ("/", "tests/js/bench")];
-    let mounts =
-        mounts.iter().map(|(prefix, folder)| Mount::new(prefix, folder)).collect::<Result<Vec<_>>>()?;
+    let mounts = [("/pkg", package::PKG), ("/data", "target/bench")];
+    let server = Server::start(&shell::released_command()?, "tests/js/bench", &mounts, 0)?;
     let mut command = shell::command("node", ["tests/js/bench/run.js"]);
-    command.env("TETRALOD_PAGE", serve::start(mounts, 0)?).env("CHROMIUM", browser.chromium);
+    command.env("TETRALOD_PAGE", &server.address).env("CHROMIUM", browser.chromium);
     rates(&shell::output(&mut command)?)
 }
 

@@ -2,12 +2,11 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::thread;
 
 use anyhow::{Context, Result, bail};
 
-use crate::serve::Mount;
-use crate::{package, serve, shell};
+use crate::serve::Server;
+use crate::{package, shell};
 
 /// Where the page looks for its volumes.
 const DATA: &str = "www/data";
@@ -45,8 +44,9 @@ pub fn run(args: &[String]) -> Result<()> {
         }
     }
     package::build(&[])?;
-    make_data(&shell::released_command()?)?;
-    if serve { serve_page(port) } else { Ok(()) }
+    let tetralod = shell::released_command()?;
+    make_data(&tetralod)?;
+    if serve { serve_page(&tetralod, port) } else { Ok(()) }
 }
 
 /// The largest of the demo's volumes, made if necessary: also what the benchmark measures.
@@ -80,15 +80,13 @@ fn is_newer(file: &Path, than: &Path) -> bool {
 }
 
 /// Serves the page as a web site would: the package at `pkg/`, everything else from `www/`.
-pub fn start_server(port: u16) -> Result<String> {
-    serve::start(vec![Mount::new("/pkg/", package::PKG)?, Mount::new("/", "www")?], port)
+pub fn start_server(tetralod: &Path, port: u16) -> Result<Server> {
+    Server::start(tetralod, "www", &[("/pkg", package::PKG)], port)
 }
 
-fn serve_page(port: u16) -> Result<()> {
+fn serve_page(tetralod: &Path, port: u16) -> Result<()> {
     // Somebody else on the port is no reason to fail: any other will do.
-    let address = start_server(port).or_else(|_| start_server(0))?;
-    println!("\nThe demo is at {address}   (Ctrl-C ends it)");
-    loop {
-        thread::park();
-    }
+    let server = start_server(tetralod, port).or_else(|_| start_server(tetralod, 0))?;
+    println!("\nThe demo is at {}   (Ctrl-C ends it)", server.address);
+    server.wait()
 }

@@ -220,13 +220,14 @@ fn consumer() -> Result<()> {
 fn e2e() -> Result<()> {
     let browser = browser::require()?;
     with_package()?;
-    demo::make_data(&shell::tested_command()?)?;
-    let address = demo::start_server(0)?;
+    let tetralod = shell::tested_command()?;
+    demo::make_data(&tetralod)?;
+    let server = demo::start_server(&tetralod, 0)?;
     shell::run(node_test("ranges-browser.test.js").env("CHROMIUM", &browser.chromium))?;
     with_fixture(|| {
         let mut command = node_test("parts-browser.test.js");
         shell::run(fixture_env(command.env("CHROMIUM", &browser.chromium)))
     })?;
     let mut command = node_test("e2e.test.js");
-    shell::run(command.env("TETRALOD_PAGE", address).env("CHROMIUM", browser.chromium))
+    shell::run(command.env("TETRALOD_PAGE", &server.address).env("CHROMIUM", browser.chromium))
 }

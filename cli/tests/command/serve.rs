@@ -5,7 +5,7 @@ use crate::support::{Folder, Server, bad};
 use std::fs;
 use std::io::{Read, Write};
 use std::net::TcpStream;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tetralod::stream::{HttpOptions, HttpSource, RangeSource, StreamError, WantedRange};
 
 const DIGITS: &str = "0123456789";
@@ -86,15 +86,22 @@ fn ranges_are_answered_exactly() {
         ("bytes=7-", "bytes 7-9/10", "789"),
         ("bytes=-3", "bytes 7-9/10", "789"),
         ("bytes=8-99", "bytes 8-9/10", "89"),
+        ("bytes=-99", "bytes 0-9/10", DIGITS),
     ] {
         let answer = get(&server, "/digits.mt", &[("Range", range)]);
         assert_eq!((answer.status, answer.body.as_str()), (206, body), "{range}");
         assert_eq!(answer.header("content-range"), Some(content_range), "{range}");
     }
-    let beyond = get(&server, "/digits.mt", &[("Range", "bytes=10-")]);
-    assert_eq!((beyond.status, beyond.header("content-range")), (416, Some("bytes */10")));
-    // Several ranges at once are not given; a whole file may always be.
-    assert_eq!(get(&server, "/digits.mt", &[("Range", "bytes=0-1,3-4")]).body, DIGITS);
+    for beyond in ["bytes=10-", "bytes=-0"] {
+        let answer = get(&server, "/digits.mt", &[("Range", beyond)]);
+        assert_eq!((answer.status, answer.header("content-range")), (416, Some("bytes */10")), "{beyond}");
+        assert_eq!(answer.body, "", "{beyond}");
+    }
+    // Several ranges at once, and what is no range, get the whole file.
+    for ignored in ["bytes=4-2", "bytes=0-1,3-4", "lines=1-2", "bytes=a-b", "bytes=-"] {
+        let answer = get(&server, "/digits.mt", &[("Range", ignored)]);
+        assert_eq!((answer.status, answer.body.as_str()), (200, DIGITS), "{ignored}");
+    }
 }
 
 #[test]
@@ -121,10 +128,28 @@ fn a_file_that_was_replaced_is_noticed() {
 #[test]
 fn nothing_else_is_shown() {
     let (folder, www) = folder("serve-outside");
-    let server = Server::start(&[&www]);
-    for path in
-        ["/../secret", "/%2e%2e/secret", "/..%2fsecret", "/x/../../secret", "/..%5csecret", "/%00", "/none"]
+    // Links that lead outside are not followed.
+    #[cfg(unix)]
     {
+        fs::create_dir_all(folder.path("www/linked")).expect("a folder");
+        for link in ["www/link", "www/linked/index.html"] {
+            std::os::unix::fs::symlink(folder.path("secret"), folder.path(link)).expect("a link");
+        }
+    }
+    let server = Server::start(&[&www]);
+    for path in [
+        "/../secret",
+        "/%2e%2e/secret",
+        "/..%2fsecret",
+        "/x/../../secret",
+        "/..%5csecret",
+        "/%00",
+        "/%zz",
+        "/none",
+        "/link",
+        "/linked/",
+        "/linked/index.html",
+    ] {
         let answer = get(&server, path, &[]);
         assert!(matches!(answer.status, 400 | 404), "{path}: {}", answer.status);
         assert!(!answer.body.contains("secret"), "{path}");
@@ -156,9 +181,59 @@ fn other_origins_and_caches_are_told_what_was_chosen() {
 }
 
 #[test]
+fn pages_and_their_modules_have_the_types_that_browsers_ask_for() {
+    let (folder, www) = folder("serve-types");
+    let package = folder.path("package");
+    fs::create_dir_all(folder.path("package/sub")).expect("a folder");
+    fs::write(folder.path("package/index.js"), "1").expect("a file");
+    fs::write(folder.path("package/sub/index.html"), "<b>").expect("a file");
+    fs::write(folder.path("www/a b.wasm"), "\0asm").expect("a file");
+    let server = Server::start(&[&www, "--mount", &format!("/pkg={package}")]);
+    for (path, kind, body) in [
+        ("/", "text/html", "<p>"),
+        ("/index.html", "text/html", "<p>"),
+        ("/a%20b.wasm", "application/wasm", "\0asm"),
+        ("/pkg/index.js", "text/javascript", "1"),
+        ("/pkg/sub/", "text/html", "<b>"),
+    ] {
+        let answer = get(&server, path, &[]);
+        assert_eq!((answer.status, answer.body.as_str()), (200, body), "{path}");
+        assert!(answer.header("content-type").is_some_and(|found| found.starts_with(kind)), "{path}");
+    }
+    assert_eq!(get(&server, "/pkg/sub", &[]).header("location"), Some("/pkg/sub/"));
+    for path in ["/pkg/../secret", "/pkg/%2e%2e/secret", "/pkg/none", "/index.js"] {
+        assert_eq!(get(&server, path, &[]).status, 404, "{path}");
+    }
+}
+
+#[test]
+fn connections_that_wait_do_not_keep_others_waiting() {
+    let (_folder, www) = folder("serve-idle");
+    let server = Server::start(&[&www]);
+    let connect = |_| TcpStream::connect(server.address().0).expect("it listens");
+    let idle: Vec<TcpStream> = (0..40).map(connect).collect();
+    assert_eq!(get(&server, "/digits.mt", &[]).body, DIGITS);
+    drop(idle);
+}
+
+#[test]
+fn a_throttled_file_takes_its_time() {
+    let (_folder, www) = folder("serve-throttle");
+    let server = Server::start(&[&www]);
+    let start = Instant::now();
+    let answer = get(&server, "/digits.mt?throttle=50", &[]);
+    assert_eq!((answer.body.as_str(), answer.header("content-length")), (DIGITS, Some("10")));
+    assert!(start.elapsed() >= Duration::from_millis(180), "{:?}", start.elapsed());
+}
+
+#[test]
 fn what_cannot_be_served_is_refused_with_a_reason() {
     let (folder, www) = folder("serve-refused");
     bad(1, &["serve", &folder.path("none")], &["none"]);
+    bad(1, &["serve", "--mount", "/pkg=nowhere", &www], &["--mount /pkg", "nowhere"]);
+    for mount in ["pkg=nowhere", "/=nowhere", "/pkg", "/{x}=nowhere"] {
+        bad(2, &["serve", "--mount", mount, &www], &["--mount", "node_modules"]);
+    }
     bad(1, &["serve", "--port", "0", "--cors", "example.org", &www], &["--cors", "https://"]);
     let server = Server::start(&[&www]);
     let port = server.address().0.rsplit_once(':').unwrap().1;

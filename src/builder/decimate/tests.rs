@@ -107,8 +107,8 @@ fn built(mesh: &TetMesh, criterion: Criterion) -> Decimated {
 
 fn built_for(mesh: &TetMesh, criterion: Criterion, purpose: Purpose) -> Decimated {
     let fields = mesh.fields.iter().map(|field| field.name.clone()).collect();
-    let config = BuildConfig { fields, purpose, ..BuildConfig::of(MtKind::Edge) };
-    decimate(mesh, &config, criterion, &mut |_| ControlFlow::Continue(())).expect("a valid mesh")
+    let config = BuildConfig { fields, ..BuildConfig::of(MtKind::Edge) };
+    decimate(mesh, &config, (criterion, purpose), &mut |_| ControlFlow::Continue(())).expect("a valid mesh")
 }
 
 fn sorted(mut tet: [u32; 4]) -> [u32; 4] {
@@ -353,11 +353,10 @@ fn the_boundary_moves_by_a_part_of_the_edges_there() {
         *p = p.map(|x| x * 1.5_f64.powf(2.0 * p[0]));
     }
     let most = 1.0;
-    for (criterion, purpose) in WAYS {
+    for how in WAYS {
         let fields = vec![mesh.fields[0].name.clone()];
-        let config = BuildConfig { fields, purpose, displacement_edges: most, ..BuildConfig::default() };
-        let result =
-            decimate(&mesh, &config, criterion, &mut |_| ControlFlow::Continue(())).expect("a valid mesh");
+        let config = BuildConfig { fields, displacement_edges: most, ..BuildConfig::default() };
+        let result = decimate(&mesh, &config, how, &mut |_| ControlFlow::Continue(())).expect("a valid mesh");
         let step = DVec3::from_array(result.quantized.lattice.step);
         let at = |v: u32| result.quantized.rounded(v) * step;
         let mut shortest = vec![f64::INFINITY; mesh.positions.len()];
@@ -377,7 +376,7 @@ fn the_boundary_moves_by_a_part_of_the_edges_there() {
             for &point in &rim {
                 let allowed = bound * (most * shortest[point as usize]).min(result.displacement_per_error);
                 let found = distance(&result, &border, point);
-                assert!(found <= allowed + 1e-9, "{criterion:?} {purpose:?} {bound}: {point} by {found}");
+                assert!(found <= allowed + 1e-9, "{how:?} {bound}: {point} by {found}");
             }
         }
     }
@@ -450,7 +449,9 @@ fn the_work_can_be_stopped() {
     let mesh = blocks([12; 3], |_| true);
     for criterion in CRITERIA {
         let stopped =
-            decimate(&mesh, &BuildConfig::of(MtKind::Edge), criterion, &mut |_| ControlFlow::Break(()));
+            decimate(&mesh, &BuildConfig::of(MtKind::Edge), (criterion, Purpose::Uniform), &mut |_| {
+                ControlFlow::Break(())
+            });
         assert_eq!(stopped.err(), Some(BuildError::Stopped));
     }
 }
@@ -460,8 +461,9 @@ fn the_work_can_be_stopped() {
 fn a_boundary_that_may_not_move_costs_all() {
     let mesh = bent(blocks([4; 3], |_| true));
     let config = BuildConfig { displacement: 0.0, ..BuildConfig::of(MtKind::Edge) };
-    let result = decimate(&mesh, &config, Criterion::HalfEdge, &mut |_| ControlFlow::Continue(()))
-        .expect("a valid mesh");
+    let result =
+        decimate(&mesh, &config, (Criterion::HalfEdge, Purpose::Uniform), &mut |_| ControlFlow::Continue(()))
+            .expect("a valid mesh");
     let mut replay = Replay::new(&result.sequence.base);
     let moves = |step: &&Insertion| step.step > 0.0;
     assert!(
@@ -482,7 +484,8 @@ fn the_finest_lattice_will_do() {
     let mesh = bent(blocks([3; 3], |_| true));
     let config = BuildConfig { position_bits: Some(30), ..BuildConfig::of(MtKind::Edge) };
     for criterion in CRITERIA {
-        let result = decimate(&mesh, &config, criterion, &mut |_| ControlFlow::Continue(()));
+        let result =
+            decimate(&mesh, &config, (criterion, Purpose::Uniform), &mut |_| ControlFlow::Continue(()));
         let result = result.expect("a valid mesh");
         assert!(!result.sequence.steps.is_empty(), "{criterion:?}");
         let mut replay = Replay::new(&result.sequence.base);

@@ -6,7 +6,7 @@ use crate::reader::half_edge::Record;
 use crate::reader::half_edge_mesh::Mesh;
 use crate::support::files;
 use crate::support::meshes::{blocks, cube, hilly, linear};
-use tetralod::builder::Purpose;
+use tetralod::builder::{Construction, Purpose};
 use tetralod::mt::Applied;
 use tetralod::mt::ApplyUpdates;
 
@@ -19,7 +19,7 @@ fn built(mesh: &TetMesh, config: BuildConfig) -> Mt {
 /// With lattices of so many bits.
 fn with_bits(purpose: Purpose, position_bits: u32, field_bits: u32) -> BuildConfig {
     BuildConfig {
-        purpose,
+        construction: Construction::HalfEdge { purpose },
         position_bits: Some(position_bits),
         field_precision: FieldPrecision::Bits(field_bits),
         ..BuildConfig::of(MtKind::HalfEdge)

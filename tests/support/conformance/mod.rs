@@ -13,6 +13,7 @@ use std::collections::HashMap;
 use std::ops::ControlFlow;
 use tetralod::builder::BuildConfig;
 use tetralod::builder::BuildResult;
+use tetralod::builder::Construction;
 use tetralod::builder::Criterion;
 use tetralod::builder::Method;
 use tetralod::builder::build;
@@ -61,8 +62,8 @@ impl How {
     fn build_result(self, mesh: &TetMesh, position_bits: Option<u32>) -> BuildResult<Mt> {
         let How { kind, method, criterion } = self;
         let fields = mesh.fields.iter().map(|field| field.name.clone()).collect();
-        let config =
-            BuildConfig { kind, method, criterion, fields, position_bits, ..BuildConfig::of(MtKind::Edge) };
+        let construction = Construction::new(kind, method, criterion).expect("they go together");
+        let config = BuildConfig { construction, fields, position_bits, ..BuildConfig::of(MtKind::Edge) };
         build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on")
     }
 }
