@@ -16,7 +16,7 @@
 //! use tetralod::session::Session;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! // A mesh: here made by formula; `tetralod::io::read` takes one from a file. Files are rarely flawless.
+//! // A mesh: generated here; `tetralod::io::read` reads one from a file. Meshes in files often need repair.
 //! let mesh = tetralod::generate::bucky(17)?;
 //! let (mesh, repaired) = tetralod::mesh::repair(mesh)?;
 //! assert!(repaired.is_empty());
@@ -25,7 +25,7 @@
 //! let built = build(&mesh, &BuildConfig::default(), &mut |_| ControlFlow::Continue(()))?;
 //! let bytes = encode(&built.mt, &EncodeOptions::default())?;
 //!
-//! // Wherever it is wanted: bytes go in, in pieces of any size, and the first meshes come out before the last byte.
+//! // Where it is used: bytes go in, in pieces of any size, and meshes come out before the last byte has arrived.
 //! let mut session = Session::new();
 //! let (first, rest) = bytes.split_at(bytes.len() / 2);
 //! session.feed(first)?;
@@ -50,7 +50,7 @@
 //! # Features
 //!
 //! The core (decoder, refinement, isosurfaces on the CPU) is always there and needs no I/O, no GPU and no JavaScript:
-//! `default-features = false` is enough for a program that shows MT files. The features open its edges:
+//! `default-features = false` is enough for a program that shows MT files. Features add the rest:
 //!
 //! | feature | adds | for |
 //! |---|---|---|
@@ -99,7 +99,7 @@
 //! | *uniform*, *variable* mesh | one error everywhere; an error that depends on the place or the field |
 //! | *ROI*, *region of interest* | the part of the model that a request selects |
 //! | *budget* `b` | the largest size that the extracted mesh may have |
-//! | *star*, *link* of a vertex | the tetrahedra around it; their faces opposite the vertex |
+//! | *star*, *link* of a vertex | the tetrahedra around it; their faces opposite the vertex, with the edges and vertices of these |
 //! | *star-shaped polyhedron*, *cavity* `Π_u` | the space that a vertex insertion fills with the star of the new vertex; the tetrahedra that it removes are `T_u` |
 //! | *edge collapse*, *vertex split* | an edge becomes one vertex; the reverse |
 //! | *half-edge collapse* | an edge collapse that moves one vertex onto the other, which stays where it is |

@@ -233,7 +233,7 @@ impl Front {
             let moved = self.go(mt, &mut goal, go_on);
             self.pack();
             if let Err(error) = moved {
-                // Where this leaves the front nobody knows: the next goal starts from a look at everything.
+                // The state is unspecified after an error: the next goal judges everything again.
                 self.forget_watch();
                 self.ranked.clear();
                 return Err(error);

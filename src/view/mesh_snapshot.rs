@@ -8,7 +8,7 @@ use super::MeshView;
 use crate::mesh::{BitSet, NONE};
 use std::ops::Range;
 
-/// A copy of every tetrahedron and every point; per point a tetrahedron and how many there are. 16 bytes a tetrahedron and 24
+/// A copy of every tetrahedron and every point; per point a tetrahedron and how many there are. 16.3 bytes a tetrahedron and 24
 /// bytes a point.
 #[derive(Clone, Debug, Default)]
 pub(super) struct MeshSnapshot {

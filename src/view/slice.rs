@@ -126,7 +126,8 @@ impl Slice {
     /// Brings the section with the same plane up to date, given in which ranges points (or their values) and
     /// tetrahedra (or their neighbours) have changed since; does nothing before the first [`Slice::extract`].
     ///
-    /// The first time after [`Slice::extract`] this costs a pass over the mesh; else what changed. Wider ranges than needed cost a little more and change nothing else.
+    /// The first time after [`Slice::extract`] this costs a pass over the mesh; else what changed. Wider ranges than needed cost
+    /// a little more and change nothing else.
     ///
     /// # Panics
     /// If the mesh names a point or a neighbour that it does not have.
@@ -136,38 +137,38 @@ impl Slice {
             self.snapshot = Some(MeshSnapshot::new(mesh));
             return self.rebuild(mesh, &plane);
         };
-        let (count, before) = (mesh.tets.len(), self.sides.len());
+        let before = self.sides.len();
         self.sides.resize(mesh.positions.len(), side::NOWHERE);
         for p in entries(points, before, mesh.positions.len()) {
             self.sides[p as usize] = side::of(plane.height_at(mesh, p));
         }
-        let Self { pieces, indices, positions, values, sides, .. } = self;
+        let Self { pieces, indices, sides, .. } = self;
         pieces.follow(indices);
         let mut dirty = snapshot.catch_up(mesh, points, tets).tets;
         dirty.retain(|t| pieces.has_piece(*t) || may_pass(sides, &mesh.tets[*t as usize]));
         // A face in the plane comes from another tetrahedron when what was across it has changed.
-        dirty.extend(entries(tets, count, count).filter(|&t| {
+        dirty.extend(entries(tets, mesh.tets.len(), mesh.tets.len()).filter(|&t| {
             let may_have_floor = pieces.has_piece(t) || mesh.neighbors[t as usize].contains(&NONE);
             may_have_floor && sides_of(sides, mesh, t).is_some_and(is_above)
         }));
         dirty.sort_unstable();
         dirty.dedup();
+        self.splice(mesh, &plane, &dirty);
+    }
+
+    /// Cuts the dirty tetrahedra anew.
+    fn splice(&mut self, mesh: &MeshView<'_>, plane: &Plane, dirty: &[u32]) {
+        let Self { pieces, indices, positions, values, sides, .. } = self;
         let piece = |t, _| sides_of(sides, mesh, t).map_or(Polygon::default(), |of| polygon(mesh, t, of));
-        let edited = pieces.recut(indices, count, &dirty, 1, piece).list;
+        let edited = pieces.recut(indices, mesh.tets.len(), dirty, 1, piece).list;
         let old = positions.len();
         positions.resize(pieces.crossings.list.len(), [0.0; 3]);
         values.resize(pieces.crossings.list.len(), 0.0);
-        for &v in &edited {
-            if pieces.is_used(v) {
-                let now = plane.vertex(mesh, &pieces.crossings.list[v as usize]);
-                let at = v as usize;
-                let before =
-                    (std::mem::replace(&mut positions[at], now.0), std::mem::replace(&mut values[at], now.1));
-                if at >= old || bits(before) != bits(now) {
-                    pieces.mark_vertex(v);
-                }
-            }
-        }
+        pieces.place_again(&edited, old, |v, crossing| {
+            let before = bits(positions[v], values[v]);
+            (positions[v], values[v]) = plane.vertex(mesh, crossing);
+            before != bits(positions[v], values[v])
+        });
         pieces.drop_unused(indices, edited, |v| {
             positions.swap_remove(v);
             values.swap_remove(v);
@@ -197,7 +198,7 @@ impl Slice {
     }
 }
 
-fn bits(([x, y, z], value): ([f32; 3], f32)) -> [u32; 4] {
+fn bits([x, y, z]: [f32; 3], value: f32) -> [u32; 4] {
     [x, y, z, value].map(f32::to_bits)
 }
 

@@ -124,12 +124,14 @@ fn native() -> Result<()> {
     shell::run(&mut shell::cargo(["test", "--package", "xtask"]))
 }
 
-/// Words in the names of the longest tests, five to seventeen seconds each: `--quick` leaves them out.
-const LONG: [&str; 4] = [
+/// Words in the names of the longest tests, of five to seventeen seconds each: `--quick` leaves them out.
+const LONG: [&str; 6] = [
     "reference_kinds::built_mts_are_read_alike",
     "behind_good_checksums_is_refused_or_read_faithfully",
     "header_and_index_are_small",
     "every_flipped_bit_is_detected",
+    "vertices_inside_are_within_the_bound",
+    "tet_errors::",
 ];
 
 fn quick() -> Result<()> {

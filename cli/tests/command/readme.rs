@@ -4,10 +4,11 @@
 //! Values are not compared: they change with the builder, and times with the machine. What is shown is brought up to
 //! date by `TETRALOD_UPDATE_README=1 cargo test --release --package tetralod-cli readme`.
 
+use crate::support::{self, Folder, text};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Command;
 
 const START: &str = "```console";
 const PROMPT: &str = "$ tetralod ";
@@ -29,28 +30,12 @@ const LINKED: [&str; 10] = [
     "docs/input.md",
     "docs/promises.md",
 ];
-const COMMANDS: [&str; 14] = [
-    "generate",
-    "build",
-    "convert",
-    "info",
-    "extract",
-    "isosurface",
-    "slice",
-    "surface",
-    "probe",
-    "streamlines",
-    "stats",
-    "verify",
-    "bench",
-    "serve",
-];
-
-fn root() -> &'static Path {
-    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
+/// The root of the repository.
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-fn text(page: &str) -> String {
+fn content(page: &str) -> String {
     fs::read_to_string(root().join(page)).unwrap_or_else(|error| panic!("{page}: {error}"))
 }
 
@@ -94,37 +79,31 @@ fn arguments(command: &str) -> Vec<&str> {
     parts.flatten().collect()
 }
 
-fn tetralod(command: &str, folder: &Path) -> Output {
-    let mut program = Command::new(env!("CARGO_BIN_EXE_tetralod"));
-    program.args(arguments(command)).current_dir(folder).output().expect("the command starts")
-}
-
 fn run(command: &str, folder: &Path) -> String {
-    let output = tetralod(command, folder);
-    assert!(output.status.success(), "{command}: {}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).expect("UTF-8")
+    let mut program = support::command(&arguments(command));
+    let output = program.current_dir(folder).output().expect("the command starts");
+    assert!(output.status.success(), "{command}: {}", text(&output.stderr));
+    text(&output.stdout).to_owned()
 }
 
 /// Writes the files that `page` shows, in blocks such as "```json camera.json".
 fn write_files(page: &str, folder: &Path) {
     for block in page.split("\n```json ").skip(1) {
         let (name, rest) = block.split_once('\n').expect("a block has lines");
-        let (content, _) = rest.split_once("\n```").expect("a block ends");
-        fs::write(folder.join(name), content).expect("a file in the temporary folder");
+        let (shown, _) = rest.split_once("\n```").expect("a block ends");
+        fs::write(folder.join(name), shown).expect("a file in the temporary folder");
     }
 }
 
 fn check_page(page: &str) {
-    let shown = text(page);
-    let name = page.replace('/', "-");
-    let folder = std::env::temp_dir().join(format!("tetralod-{name}-{}", std::process::id()));
-    fs::create_dir_all(&folder).expect("a temporary folder");
-    write_files(&shown, &folder);
+    let shown = content(page);
+    let folder = Folder::new(&page.replace('/', "-"));
+    let path = PathBuf::from(folder.path(""));
+    write_files(&shown, &path);
     let update = std::env::var_os("TETRALOD_UPDATE_README").is_some();
     // Smaller data will do for the names.
     let size = if update { "--size 33" } else { "--size 9" };
-    let fresh = answered(&shown, |command| run(&command.replace("--size 33", size), &folder));
-    fs::remove_dir_all(&folder).expect("the folder goes");
+    let fresh = answered(&shown, |command| run(&command.replace("--size 33", size), &path));
     if update {
         fs::write(root().join(page), fresh).expect("the page can be written");
     } else {
@@ -134,12 +113,21 @@ fn check_page(page: &str) {
 
 #[test]
 fn every_command_works_and_answers_as_shown() {
-    let shown: String = PAGES.map(text).concat();
-    for command in COMMANDS.into_iter().filter(|command| *command != "serve") {
+    let shown: String = PAGES.map(content).concat();
+    // `serve` ends with Ctrl-C alone.
+    for command in commands().iter().filter(|command| *command != "serve") {
         let example = format!("\n{PROMPT}{command} ");
         assert!(shown.contains(&example), "no page shows `tetralod {command}`");
     }
     PAGES.iter().for_each(|page| check_page(page));
+}
+
+/// The names of the commands, as the program tells them.
+fn commands() -> Vec<String> {
+    let help = run("--help", &root());
+    let (_, listed) = help.split_once("Commands:\n").expect("commands");
+    let names = listed.lines().map_while(|line| line.split_whitespace().next());
+    names.filter(|name| *name != "help").map(str::to_owned).collect()
 }
 
 /// What looks like a long option in `text`.
@@ -159,13 +147,13 @@ fn options(text: &str) -> BTreeSet<String> {
 #[test]
 fn the_manual_names_every_option_and_no_other() {
     let mut known = BTreeSet::new();
-    for command in COMMANDS {
-        let help = run(&format!("{command} --help"), root());
+    for command in commands() {
+        let help = run(&format!("{command} --help"), &root());
         let lines = help.lines().map(str::trim).filter(|line| line.starts_with('-'));
         let heads = lines.map(|line| line.split("  ").next().unwrap_or_default());
         known.extend(heads.flat_map(|head| options(&format!(" {head}"))));
     }
-    let mut named: BTreeSet<String> = MANUAL.iter().flat_map(|page| options(&text(page))).collect();
+    let mut named: BTreeSet<String> = MANUAL.iter().flat_map(|page| options(&content(page))).collect();
     // Every command writes its result to `-o`.
     named.insert("output".to_owned());
     assert_eq!(named, known);
@@ -190,8 +178,8 @@ fn links(page: &str) -> Vec<&str> {
 #[test]
 fn links_lead_somewhere() {
     for page in LINKED {
-        let content = text(page);
-        for link in links(&content) {
+        let shown = content(page);
+        for link in links(&shown) {
             let (file, anchor) =
                 link.split_once('#').map_or((link, None), |(file, anchor)| (file, Some(anchor)));
             let folder = root().join(page).parent().expect("a page is in a folder").to_owned();
@@ -204,6 +192,40 @@ fn links_lead_somewhere() {
     }
 }
 
+/// All files of the repository but those that are made, relative to its root.
+fn files() -> Vec<String> {
+    let (mut folders, mut found) = (vec![PathBuf::new()], Vec::new());
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(root().join(&folder)).expect("a folder") {
+            let entry = entry.expect("an entry");
+            let path = folder.join(entry.file_name());
+            let made = ["target", "node_modules", "pkg", ".git"].iter().any(|name| path.ends_with(name));
+            if entry.path().is_dir() && !made {
+                folders.push(path);
+            } else if !made {
+                found.push(format!("/{}", path.to_string_lossy()));
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn the_files_that_are_named_to_developers_exist() {
+    let files = files();
+    for page in ["ARCHITECTURE.md", "CONTRIBUTING.md"] {
+        let shown = content(page);
+        let named = shown.split('`').skip(1).step_by(2).filter(|name| {
+            let ending = name.rsplit_once('.').map(|(_, ending)| ending);
+            ending.is_some_and(|ending| ["rs", "js", "ts", "wgsl", "md"].contains(&ending))
+                && !name.contains("NAME")
+        });
+        let missing: Vec<&str> =
+            named.filter(|name| !files.iter().any(|file| file.ends_with(&format!("/{name}")))).collect();
+        assert!(missing.is_empty(), "{page} names files that are not there: {missing:?}");
+    }
+}
+
 #[test]
 fn what_the_readme_links_to_is_in_the_package() {
     let listed = Command::new(env!("CARGO"))
@@ -211,9 +233,9 @@ fn what_the_readme_links_to_is_in_the_package() {
         .current_dir(root())
         .output()
         .expect("cargo starts");
-    assert!(listed.status.success(), "{}", String::from_utf8_lossy(&listed.stderr));
-    let listed = String::from_utf8(listed.stdout).expect("UTF-8");
-    for link in links(&text("README.md")) {
+    assert!(listed.status.success(), "{}", text(&listed.stderr));
+    let listed = text(&listed.stdout);
+    for link in links(&content("README.md")) {
         assert!(listed.lines().any(|file| file == link), "{link} is excluded in Cargo.toml");
     }
 }
@@ -226,7 +248,7 @@ fn benchmark(benchmarks: &str, start: &str) -> Vec<String> {
 
 #[test]
 fn the_numbers_of_the_readme_are_measured() {
-    let (readme, benchmarks) = (text("README.md"), text("docs/benchmarks.md"));
+    let (readme, benchmarks) = (content("README.md"), content("docs/benchmarks.md"));
     let surface = benchmark(&benchmarks, "bucky 97³, generated, half-edge");
     let kilobytes: f64 = surface[1].parse().expect("kilobytes");
     let part = benchmark(&benchmarks, "bucky 97³, generated, half-edge | middle, 1 %");

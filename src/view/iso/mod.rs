@@ -46,7 +46,7 @@ pub enum NormalKind {
 /// two.
 ///
 /// Takes at most 56 bytes a vertex and 16 a triangle, 5 a point of the mesh, 36 for every point next to the surface and 4
-/// for every tetrahedron that is cut. Once [`IsoSurface::update`] follows a mesh, 20.3 bytes a tetrahedron, 24 a point, 4
+/// for every tetrahedron that is cut. Once [`IsoSurface::update`] follows a mesh, 20.4 bytes a tetrahedron, 24 a point, 4
 /// a vertex and 16 a triangle more.
 #[derive(Clone, Debug, Default)]
 pub struct IsoSurface {

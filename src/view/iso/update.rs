@@ -91,17 +91,11 @@ impl IsoSurface {
         values.extend(list[old..].iter().map(|crossing| isovalues[crossing.which as usize]));
         positions.resize(list.len(), [0.0; 3]);
         normals.resize(list.len(), [0.0; 3]);
-        for &v in &edited.list {
-            if !pieces.is_used(v) {
-                continue;
-            }
-            let crossing = &pieces.crossings.list[v as usize];
-            let place = crossing.place(mesh.positions, fraction(crossing, mesh, values[v as usize]));
-            let before = std::mem::replace(&mut positions[v as usize], place);
-            if v as usize >= old || before.map(f32::to_bits) != place.map(f32::to_bits) {
-                pieces.mark_vertex(v);
-            }
-        }
+        pieces.place_again(&edited.list, old, |v, crossing| {
+            let place = crossing.place(mesh.positions, fraction(crossing, mesh, values[v]));
+            let before = std::mem::replace(&mut positions[v], place);
+            before.map(f32::to_bits) != place.map(f32::to_bits)
+        });
     }
 
     /// Sets the normals where a gradient or a triangle has changed.

@@ -210,6 +210,21 @@ impl Pieces {
         }
     }
 
+    /// Has `set` place those of the vertices that are used; it tells whether that changes them. Those from number `old` on are
+    /// new.
+    pub fn place_again(
+        &mut self,
+        vertices: &[u32],
+        old: usize,
+        mut set: impl FnMut(usize, &Crossing) -> bool,
+    ) {
+        for &v in vertices {
+            if self.is_used(v) && (set(v as usize, &self.crossings.list[v as usize]) || v as usize >= old) {
+                self.changed_vertices.mark(v);
+            }
+        }
+    }
+
     /// Whether a tetrahedron has triangles in a surface that was [cut anew](Self::recut).
     pub fn has_piece(&self, t: u32) -> bool {
         self.triangles_in(t).next().is_some()
