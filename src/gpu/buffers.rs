@@ -116,7 +116,7 @@ mod tests {
         assert_eq!(uploads(&[], 20, 10), []);
         assert_eq!(uploads(&[0..64, 128..192, 5000..5064], 9000, 9000), [0..192, 5000..5064]);
         // Beyond the old end all is new; beyond the new one there is nothing.
-        assert_eq!(uploads(&[64..128], 3000, 4000), [64..128, 3000..4000]);
+        assert_eq!(uploads(std::slice::from_ref(&(64..128)), 3000, 4000), [64..128, 3000..4000]);
         assert_eq!(uploads(&[64..128, 3900..3964], 3000, 4000), [64..128, 3000..4000]);
         assert_eq!(uploads(&[64..128, 256..320], 300, 100).first(), Some(&(64..100)));
     }

@@ -25,8 +25,8 @@ usage: cargo xtask COMMAND
   build                          build the npm package into pkg/
   demo [--port N] [--no-serve]   build everything, make the demo's data, serve the page on localhost
   test [STEP...]                 every check, or the named steps; `test --list` names them
-  test --quick                   formatting, lints of the native code, and native tests without the long ones: no
-                                 other feature sets, no documentation, nothing of JavaScript, wasm and browsers
+  test --quick                   formatting, lints and native tests; not: other feature sets, documentation, the longest
+                                 tests, real data, JavaScript, wasm, browsers
   random [MINUTES]               the tests with random inputs for 30 minutes, each time with another TETRALOD_SEED
   bench [FILE.mt] [--browser]    measure decoding, refinement and isosurfaces; natively, or also in the browser
   bench --build [--large]        measure triangulation, insertion and the kinds of MT side by side
