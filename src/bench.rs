@@ -5,13 +5,10 @@ mod coherent;
 
 pub use coherent::{Coherent, Walks};
 
-use crate::format::Decoder;
-use crate::format::FormatError;
-use crate::mt::Mt;
-use crate::mt::MultiTessellation;
+use crate::format::{Decoder, FormatError};
+use crate::mt::{Mt, MultiTessellation};
 use crate::refine::Request;
-use crate::session::Session;
-use crate::session::SessionError;
+use crate::session::{Session, SessionError};
 
 /// What a benchmark found. Rates are those of the fastest of several runs: the others only tell what else the
 /// machine was doing.

@@ -3,9 +3,7 @@
 use std::f64::consts::FRAC_PI_4;
 use std::fmt;
 
-use crate::mesh::Field;
-use crate::mesh::Grid;
-use crate::mesh::TetMesh;
+use crate::mesh::{Field, Grid, TetMesh};
 
 /// The names that [`by_name`] knows.
 pub const NAMES: [&str; 2] = ["bucky", "sphere-flow"];
@@ -241,8 +239,7 @@ impl CubeSurface {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::check;
-    use crate::mesh::topology;
+    use crate::mesh::{check, topology};
 
     fn volume(mesh: &TetMesh) -> f64 {
         let volumes = mesh.tets.iter().map(|tet| {

@@ -3,19 +3,11 @@
 //! `cargo xtask test wasm` makes the fixture and runs this; TETRALOD_FIXTURE is its folder.
 #![cfg(all(target_arch = "wasm32", feature = "web"))]
 
-use js_sys::Array;
-use js_sys::Float32Array;
-use js_sys::Function;
-use js_sys::JSON;
-use js_sys::Promise;
-use js_sys::Reflect;
-use js_sys::Uint32Array;
+use js_sys::{Array, Float32Array, Function, JSON, Promise, Reflect, Uint32Array};
 use tetralod::web::CoreSession;
-use wasm_bindgen::JsCast;
-use wasm_bindgen::JsValue;
+use wasm_bindgen::{JsCast, JsValue};
 use wasm_bindgen_futures::JsFuture;
-use wasm_bindgen_test::wasm_bindgen_test;
-use wasm_bindgen_test::wasm_bindgen_test_configure;
+use wasm_bindgen_test::{wasm_bindgen_test, wasm_bindgen_test_configure};
 
 wasm_bindgen_test_configure!(run_in_browser);
 
@@ -226,11 +218,8 @@ async fn call(object: &JsValue, method: &str) -> JsValue {
 #[cfg(feature = "gpu")]
 #[wasm_bindgen_test]
 async fn the_renderer_draws_the_isosurface() {
-    use tetralod::geom::Bounds;
-    use tetralod::geom::Camera;
-    use tetralod::gpu::Look;
-    use tetralod::gpu::Renderer;
-    use tetralod::gpu::Show;
+    use tetralod::geom::{Bounds, Camera};
+    use tetralod::gpu::{Look, Renderer, Show};
     use tetralod::refine::Request;
     use tetralod::session::Session;
 
@@ -255,13 +244,9 @@ async fn the_renderer_draws_the_isosurface() {
 #[cfg(feature = "gpu")]
 #[wasm_bindgen_test]
 async fn a_surface_is_kept_up_by_what_has_changed() {
-    use tetralod::geom::Bounds;
-    use tetralod::geom::Camera;
-    use tetralod::gpu::Look;
-    use tetralod::gpu::Renderer;
-    use tetralod::gpu::Show;
-    use tetralod::refine::Need;
-    use tetralod::refine::Request;
+    use tetralod::geom::{Bounds, Camera};
+    use tetralod::gpu::{Look, Renderer, Show};
+    use tetralod::refine::{Need, Request};
     use tetralod::session::Session;
 
     const SIZE: [u32; 2] = [96, 96];

@@ -1,21 +1,15 @@
 //! How much of a file requests need: the first useful picture, and a box at full resolution.
 
-use super::Result;
-use super::sets;
 use super::sets::Set;
-use super::surfaces::Interpolant;
-use super::surfaces::Mesh;
-use super::surfaces::Surface;
+use super::surfaces::{Interpolant, Mesh, Surface};
+use super::{Result, sets};
 use std::io::Cursor;
 use std::time::Duration;
 use tetralod::builder::Purpose;
-use tetralod::client::Client;
-use tetralod::client::ClientOptions;
+use tetralod::client::{Client, ClientOptions};
 use tetralod::geom::Bounds;
 use tetralod::mt::MtKind;
-use tetralod::refine::Need;
-use tetralod::refine::RefineStats;
-use tetralod::refine::Request;
+use tetralod::refine::{Need, RefineStats, Request};
 use tetralod::session::Session;
 use tetralod::stream::FileSource;
 

@@ -4,18 +4,12 @@ use super::Result;
 use std::fs;
 use std::ops::ControlFlow;
 use std::path::Path;
-use tetralod::builder::BuildConfig;
-use tetralod::builder::Purpose;
-use tetralod::builder::build;
-use tetralod::format::EncodeOptions;
-use tetralod::format::encode;
-use tetralod::generate;
-use tetralod::io;
-use tetralod::io::CellData;
-use tetralod::io::ReadOptions;
-use tetralod::mesh::TetMesh;
-use tetralod::mesh::repair;
+use tetralod::builder::{BuildConfig, Purpose, build};
+use tetralod::format::{EncodeOptions, encode};
+use tetralod::io::{CellData, ReadOptions};
+use tetralod::mesh::{TetMesh, repair};
 use tetralod::mt::MtKind;
+use tetralod::{generate, io};
 
 pub struct Set {
     pub name: String,

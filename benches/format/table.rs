@@ -1,19 +1,14 @@
 //! Bytes of MT files, beside those of other forms of the same mesh, and how fast they are decoded.
 
-use super::Result;
-use super::sets;
 use super::sets::Set;
-use std::io::Read;
-use std::io::Write;
-use std::process::Command;
-use std::process::Stdio;
+use super::{Result, sets};
+use std::io::{Read, Write};
+use std::process::{Command, Stdio};
 use std::time::Instant;
 use tetralod::builder::Purpose;
-use tetralod::format::Decoder;
-use tetralod::format::breakdown;
+use tetralod::format::{Decoder, breakdown};
 use tetralod::mesh::TetMesh;
-use tetralod::mt::MtKind;
-use tetralod::mt::MultiTessellation;
+use tetralod::mt::{MtKind, MultiTessellation};
 
 /// Most points of a set of which a vertex-based MT is built, too.
 const LARGE: usize = 100_000;

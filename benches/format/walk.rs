@@ -6,22 +6,14 @@ use std::fs;
 use std::fs::File;
 use std::path::Path;
 use std::rc::Rc;
-use std::time::Duration;
-use std::time::Instant;
-use tetralod::client::Client;
-use tetralod::client::ClientOptions;
+use std::time::{Duration, Instant};
+use tetralod::client::{Client, ClientOptions};
 use tetralod::format::Decoder;
 use tetralod::geom::Bounds;
 use tetralod::mt::MultiTessellation;
-use tetralod::refine::Need;
-use tetralod::refine::Request;
-use tetralod::refine::View;
+use tetralod::refine::{Need, Request, View};
 use tetralod::session::Session;
-use tetralod::stream::Arrived;
-use tetralod::stream::FileSource;
-use tetralod::stream::RangeSource;
-use tetralod::stream::StreamError;
-use tetralod::stream::WantedRange;
+use tetralod::stream::{Arrived, FileSource, RangeSource, StreamError, WantedRange};
 
 /// Requests of a walk.
 const STOPS: u32 = 60;

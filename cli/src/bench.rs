@@ -1,8 +1,7 @@
 //! `tetralod bench`: how fast this machine is with an MT file, or at Delaunay triangulation.
 
 use super::output;
-use anyhow::Context;
-use anyhow::Result;
+use anyhow::{Context, Result};
 use serde::Serialize;
 use std::fs;
 use std::path::PathBuf;

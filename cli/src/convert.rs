@@ -1,14 +1,12 @@
 //! `tetralod convert`: an MT file to one of another kind.
 
-use super::build;
-use super::files;
 use super::output::{self, Verbosity};
+use super::{build, files};
 use anyhow::{Context, Result, anyhow};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
-use tetralod::format::EncodeOptions;
-use tetralod::format::encode_to;
+use tetralod::format::{EncodeOptions, encode_to};
 use tetralod::mt::{ConvertError, MtKind, MultiTessellation};
 
 /// Writes the same updates as an MT of another kind: any kind becomes explicit, and an explicit MT becomes again what

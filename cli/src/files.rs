@@ -2,36 +2,20 @@
 
 use super::build::METHOD;
 use super::input::{self, FieldSelection};
-use anyhow::Context;
-use anyhow::Result;
-use anyhow::bail;
+use anyhow::{Context, Result, bail};
 use std::fs;
 use std::fs::File;
-use std::io::BufWriter;
-use std::io::Cursor;
-use std::io::Write;
-use std::path::Path;
-use std::path::PathBuf;
-use std::sync::Mutex;
-use std::sync::MutexGuard;
-use std::sync::PoisonError;
+use std::io::{BufWriter, Cursor, Write};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tetralod::builder::Method;
-use tetralod::client::Client;
-use tetralod::client::ClientOptions;
+use tetralod::client::{Client, ClientOptions};
 use tetralod::io::CellData;
-use tetralod::mesh::RepairReport;
-use tetralod::mesh::TetMesh;
-use tetralod::mt::Mt;
-use tetralod::mt::MtInfo;
+use tetralod::mesh::{RepairReport, TetMesh};
+use tetralod::mt::{Mt, MtInfo};
 use tetralod::session::Session;
-use tetralod::stream::Arrived;
-use tetralod::stream::FileSource;
-use tetralod::stream::HttpOptions;
-use tetralod::stream::HttpSource;
-use tetralod::stream::RangeSource;
-use tetralod::stream::StreamError;
-use tetralod::stream::WantedRange;
+use tetralod::stream::{Arrived, FileSource, HttpOptions, HttpSource, RangeSource, StreamError, WantedRange};
 use tetralod::verify::Reference;
 
 /// Bytes that are read at a time.

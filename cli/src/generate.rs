@@ -1,12 +1,10 @@
 //! `tetralod generate`: data for trying things out, made by code.
 
 use super::files;
-use anyhow::Result;
-use anyhow::bail;
+use anyhow::{Result, bail};
 use clap::builder::PossibleValuesParser;
 use std::path::PathBuf;
-use tetralod::generate;
-use tetralod::io;
+use tetralod::{generate, io};
 
 /// Makes a data set to try things out with.
 #[derive(clap::Args)]

@@ -1,20 +1,15 @@
 //! `tetralod info`: what is in an MT file.
 
-use super::files;
 use super::files::Opened;
-use super::output;
-use anyhow::Context;
-use anyhow::Result;
+use super::{files, output};
+use anyhow::{Context, Result};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use tetralod::format;
 use tetralod::format::BlockInfo;
 use tetralod::mesh::VectorPart;
-use tetralod::mt::FieldInfo;
-use tetralod::mt::MtKind;
-use tetralod::mt::MultiTessellation;
-use tetralod::mt::stats;
+use tetralod::mt::{FieldInfo, MtKind, MultiTessellation, stats};
 
 /// Tells what is in an MT file.
 #[derive(clap::Args)]

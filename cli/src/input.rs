@@ -1,19 +1,11 @@
 //! Meshes from files: time steps put together, mended, fields at cells turned into fields at points.
 
 use super::files;
-use anyhow::Context;
-use anyhow::Result;
-use anyhow::bail;
-use std::path::Path;
-use std::path::PathBuf;
+use anyhow::{Context, Result, bail};
+use std::path::{Path, PathBuf};
 use tetralod::io;
-use tetralod::io::CellData;
-use tetralod::io::ReadOptions;
-use tetralod::io::Step;
-use tetralod::mesh::Field;
-use tetralod::mesh::RepairReport;
-use tetralod::mesh::TetMesh;
-use tetralod::mesh::repair;
+use tetralod::io::{CellData, ReadOptions, Step};
+use tetralod::mesh::{Field, RepairReport, TetMesh, repair};
 
 /// Which fields of the files are read.
 pub struct FieldSelection<'a> {

@@ -24,10 +24,8 @@ mod streamlines;
 mod surface;
 mod verify;
 
-use clap::CommandFactory;
-use clap::Parser;
-use clap::Subcommand;
 use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser, Subcommand};
 use std::process::ExitCode;
 
 /// Very large tetrahedral volumes for web pages: builds, inspects and checks MT files.

@@ -1,7 +1,6 @@
 //! What goes to stdout: one JSON object for programs, lines for people.
 
-use anyhow::Context;
-use anyhow::Result;
+use anyhow::{Context, Result};
 use serde::Serialize;
 use std::io;
 use std::io::Write;

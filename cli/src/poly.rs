@@ -1,18 +1,11 @@
 //! Where surfaces, lines and points go: a file whose ending says of what format it is.
 
-use super::files;
-use super::output;
+use super::{files, output};
 use anyhow::Result;
 use serde::Serialize;
-use std::path::Path;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
-use tetralod::io::PolyData;
-use tetralod::io::write_csv;
-use tetralod::io::write_obj;
-use tetralod::io::write_ply;
-use tetralod::io::write_stl;
-use tetralod::io::write_vtp;
+use tetralod::io::{PolyData, write_csv, write_obj, write_ply, write_stl, write_vtp};
 use tetralod::view::area;
 
 /// A file to write, of a format that is known.

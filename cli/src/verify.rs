@@ -1,21 +1,16 @@
 //! `tetralod verify`: does an MT file keep its promises?
 
-use super::files;
-use super::output;
+use super::{files, output};
 use anyhow::Result;
-use indicatif::ProgressBar;
-use indicatif::ProgressStyle;
+use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::time::Duration;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use tetralod::mesh::TetMesh;
-use tetralod::mt::Mt;
-use tetralod::mt::MultiTessellation;
+use tetralod::mt::{Mt, MultiTessellation};
 use tetralod::verify;
-use tetralod::verify::Sample;
-use tetralod::verify::VerifyReport;
+use tetralod::verify::{Sample, VerifyReport};
 
 /// Checks every promise of an MT file against the mesh that it was built from; exit code 1 if one is broken.
 #[derive(clap::Args)]

@@ -3,19 +3,11 @@
 //! Nothing here may panic but for a bug: errors are answers, too. Where an input begins with a script, its bytes say what to
 //! do when; the file follows.
 
-use tetralod::format::DecodeOptions;
-use tetralod::format::Decoder;
-use tetralod::format::Limits;
+use tetralod::format::{DecodeOptions, Decoder, Limits};
 use tetralod::geom::Bounds;
 use tetralod::io;
-use tetralod::mt::Mt;
-use tetralod::mt::MtInfo;
-use tetralod::mt::MultiTessellation;
-use tetralod::mt::UpdatePages;
-use tetralod::refine::Front;
-use tetralod::refine::LodCriterion;
-use tetralod::refine::Need;
-use tetralod::refine::Request;
+use tetralod::mt::{Mt, MtInfo, MultiTessellation, UpdatePages};
+use tetralod::refine::{Front, LodCriterion, Need, Request};
 use tetralod::session::Session;
 
 /// Bytes of a script.

@@ -4,17 +4,9 @@ use anyhow::Result;
 use tetralod::mt::MultiTessellation;
 use tetralod::refine::Need;
 
-use crate::chart::Chart;
-use crate::chart::Marker;
-use crate::chart::Series;
-use crate::chart::Style;
-use crate::markdown::Table;
-use crate::markdown::count;
-use crate::markdown::fewer;
-use crate::markdown::percent;
-use crate::model::DataSet;
-use crate::model::Model;
-use crate::model::Recipe;
+use crate::chart::{Chart, Marker, Series, Style};
+use crate::markdown::{Table, count, fewer, percent};
+use crate::model::{DataSet, Model, Recipe};
 use crate::published;
 use crate::published::FIGURE_8_ERRORS;
 

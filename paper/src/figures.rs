@@ -1,26 +1,16 @@
 //! Figures 6 and 7: the same isosurface out of a uniform mesh and out of one of variable resolution.
 
-use anyhow::Context;
-use anyhow::Result;
+use anyhow::{Context, Result};
 use tetralod::geom::Bounds;
-use tetralod::mt::ErrorCode;
-use tetralod::mt::Mt;
-use tetralod::mt::MultiTessellation;
-use tetralod::refine::Need;
-use tetralod::refine::Region;
-use tetralod::refine::Request;
+use tetralod::mt::{ErrorCode, Mt, MultiTessellation};
+use tetralod::refine::{Need, Region, Request};
 use tetralod::view::IsoSurface;
 
-use crate::markdown::Table;
-use crate::markdown::count;
-use crate::markdown::percent;
-use crate::model::DataSet;
-use crate::model::Model;
-use crate::model::Recipe;
+use crate::markdown::{Table, count, percent};
+use crate::model::{DataSet, Model, Recipe};
 use crate::published;
 use crate::published::Caption;
-use crate::query::Shown;
-use crate::query::tetrahedra;
+use crate::query::{Shown, tetrahedra};
 
 /// Two meshes of one MT that show one isosurface.
 pub struct Pair {

@@ -3,13 +3,9 @@
 use anyhow::Result;
 use tetralod::refine::Request;
 
-use crate::markdown::Table;
-use crate::markdown::count;
-use crate::markdown::percent;
-use crate::model::DataSet;
-use crate::model::Recipe;
-use crate::published;
-use crate::query;
+use crate::markdown::{Table, count, percent};
+use crate::model::{DataSet, Recipe};
+use crate::{published, query};
 
 /// What one MT needs.
 pub struct Needs {

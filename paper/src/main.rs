@@ -18,22 +18,16 @@ mod query;
 mod report;
 mod table1;
 
-use anyhow::Context;
-use anyhow::Result;
-use anyhow::bail;
+use anyhow::{Context, Result, bail};
 use std::fs;
-use std::path::Path;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use tetralod::mesh::TetMesh;
 
 use crate::figure8::Curves;
-use crate::figures::AtZero;
-use crate::figures::Boxed;
-use crate::figures::Pair;
+use crate::figures::{AtZero, Boxed, Pair};
 use crate::greedy::Needs;
-use crate::model::DataSet;
-use crate::model::Recipe;
+use crate::model::{DataSet, Recipe};
 use crate::own::Own;
 use crate::table1::Row;
 

@@ -1,19 +1,12 @@
 //! The data sets and their MTs, built as the paper built its own.
 
-use anyhow::Context;
-use anyhow::Result;
+use anyhow::{Context, Result};
 use std::ops::ControlFlow;
 use std::path::Path;
 use tetralod::builder;
 use tetralod::builder::{BuildConfig, Construction, Criterion, Purpose, VertexMethod};
-use tetralod::mesh::Field;
-use tetralod::mesh::Grid;
-use tetralod::mesh::TetMesh;
-use tetralod::mesh::repair;
-use tetralod::mt::CurrentMesh;
-use tetralod::mt::Mt;
-use tetralod::mt::MtInfo;
-use tetralod::mt::MultiTessellation;
+use tetralod::mesh::{Field, Grid, TetMesh, repair};
+use tetralod::mt::{CurrentMesh, Mt, MtInfo, MultiTessellation};
 use tetralod::refine::Request;
 
 use crate::query;

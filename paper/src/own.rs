@@ -1,21 +1,12 @@
 //! Why a promise costs what it costs: the error that each tetrahedron of an MT has by itself, beside the error below
 //! which its update is needed because of those that depend on it.
 
-use anyhow::Result;
-use anyhow::bail;
+use anyhow::{Result, bail};
 use tetralod::mesh::TetMesh;
-use tetralod::mt::ErrorCode;
-use tetralod::mt::ExplicitMt;
-use tetralod::mt::Mt;
-use tetralod::mt::MtKind;
-use tetralod::mt::UpdateId;
-use tetralod::mt::VertexId;
+use tetralod::mt::{ErrorCode, ExplicitMt, Mt, MtKind, UpdateId, VertexId};
 
-use crate::markdown::Table;
-use crate::markdown::count;
-use crate::markdown::percent;
-use crate::model::DataSet;
-use crate::model::Recipe;
+use crate::markdown::{Table, count, percent};
+use crate::model::{DataSet, Recipe};
 
 /// The errors at which the updates that a request applies are looked at.
 pub const AT: [f64; 2] = [0.01, 0.05];

@@ -1,24 +1,15 @@
 //! Pictures of meshes, drawn by the crate's renderer on whatever Vulkan there is: Mesa's lavapipe will do.
 
-use anyhow::Context;
-use anyhow::Result;
+use anyhow::{Context, Result};
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
 use std::pin::pin;
 use std::task;
-use std::task::Poll;
-use std::task::Waker;
-use tetralod::geom::Bounds;
-use tetralod::geom::Camera;
-use tetralod::gpu::BoxLines;
-use tetralod::gpu::GpuError;
-use tetralod::gpu::Look;
-use tetralod::gpu::Renderer;
-use tetralod::gpu::Show;
-use tetralod::view::ClipPlane;
-use tetralod::view::Cutaway;
-use tetralod::view::IsoSurface;
+use std::task::{Poll, Waker};
+use tetralod::geom::{Bounds, Camera};
+use tetralod::gpu::{BoxLines, GpuError, Look, Renderer, Show};
+use tetralod::view::{ClipPlane, Cutaway, IsoSurface};
 
 use crate::figures::Pair;
 use crate::query::Shown;

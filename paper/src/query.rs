@@ -1,19 +1,11 @@
 //! Meshes out of an MT, and what is counted on them.
 
-use anyhow::Context;
-use anyhow::Result;
-use anyhow::ensure;
-use tetralod::measure::Part;
-use tetralod::measure::Reference;
-use tetralod::measure::deviation;
+use anyhow::{Context, Result, ensure};
+use tetralod::measure::{Part, Reference, deviation};
 use tetralod::mesh::TetMesh;
-use tetralod::mt::Mt;
-use tetralod::mt::MultiTessellation;
-use tetralod::refine::Front;
-use tetralod::refine::LodCriterion;
-use tetralod::refine::Request;
-use tetralod::view::IsoSurface;
-use tetralod::view::MeshView;
+use tetralod::mt::{Mt, MultiTessellation};
+use tetralod::refine::{Front, LodCriterion, Request};
+use tetralod::view::{IsoSurface, MeshView};
 
 /// The coarsest mesh of `mt` that satisfies `request`.
 pub fn front(mt: &Mt, request: &Request) -> Result<Front> {

@@ -1,19 +1,11 @@
 //! The page: every number of ours in it is computed, so its words follow the numbers wherever these may change.
 
-use crate::Findings;
-use crate::Scan;
 use crate::figure8::Curves;
-use crate::figures;
 use crate::figures::Pair;
-use crate::greedy;
-use crate::markdown::count;
-use crate::markdown::fewer;
-use crate::markdown::percent;
+use crate::markdown::{count, fewer, percent};
 use crate::model::Recipe;
-use crate::own;
 use crate::own::Own;
-use crate::published;
-use crate::table1;
+use crate::{Findings, Scan, figures, greedy, own, published, table1};
 
 pub fn page(all: &Findings) -> String {
     let parts =

@@ -1,16 +1,11 @@
 //! Table 1: what the structures cost.
 
 use anyhow::Result;
-use tetralod::format::EncodeOptions;
-use tetralod::format::encode;
-use tetralod::mt::Mt;
-use tetralod::mt::MtStats;
-use tetralod::mt::stats;
+use tetralod::format::{EncodeOptions, encode};
+use tetralod::mt::{Mt, MtStats, stats};
 
-use crate::markdown::Table;
-use crate::markdown::count;
-use crate::model::DataSet;
-use crate::model::Recipe;
+use crate::markdown::{Table, count};
+use crate::model::{DataSet, Recipe};
 use crate::published;
 use crate::published::PublishedMt;
 

@@ -3,11 +3,8 @@
 use super::timed;
 use crate::geom::Bounds;
 use crate::mt::MtInfo;
-use crate::refine::Need;
-use crate::refine::Request;
-use crate::refine::View;
-use crate::session::Session;
-use crate::session::SessionError;
+use crate::refine::{Need, Request, View};
+use crate::session::{Session, SessionError};
 
 /// What a walk of requests cost.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -5,10 +5,8 @@
 
 use super::cost::SLACK;
 use super::quantize::Quantized;
-use crate::mesh::MeshError;
-use crate::mesh::NONE;
-use glam::DMat3;
-use glam::DVec3;
+use crate::mesh::{MeshError, NONE};
+use glam::{DMat3, DVec3};
 
 /// A point of the input, and the cell on the lattice that it lies in or is least outside of.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,37 +1,18 @@
 //! The driver: pick an edge, test it, collapse it, record it.
 
-use super::BuildConfig;
-use super::BuildError;
-use super::BuildProgress;
-use super::BuildResult;
-use super::BuildSummary;
-use super::OnProgress;
-use super::candidate_queue::Agenda;
-use super::candidate_queue::Key;
-use super::candidate_queue::Levels;
-use super::collapse_check::Plan;
-use super::collapse_check::Refusal;
-use super::collapse_check::VertexMarks;
-use super::cost::Buckets;
-use super::cost::Evaluator;
-use super::cost::Reference;
-use super::cost::VertexData;
-use super::cost::largest;
-use super::field_selection;
-use super::history;
+use super::candidate_queue::{Agenda, Key, Levels};
+use super::collapse_check::{Plan, Refusal, VertexMarks};
+use super::cost::{Buckets, Evaluator, Reference, VertexData, largest};
 use super::history::Collapse;
-use super::quantize;
 use super::work_mesh::WorkMesh;
+use super::{
+    BuildConfig, BuildError, BuildProgress, BuildResult, BuildSummary, OnProgress, field_selection, history,
+    quantize,
+};
 use crate::geom::Bounds;
 use crate::mesh;
-use crate::mesh::EDGES;
-use crate::mesh::TetMesh;
-use crate::mesh::Topology;
-use crate::mt::EdgeMt;
-use crate::mt::ErrorCode;
-use crate::mt::MAX_UPDATES;
-use crate::mt::MtInfo;
-use crate::mt::MtKind;
+use crate::mesh::{EDGES, TetMesh, Topology};
+use crate::mt::{EdgeMt, ErrorCode, MAX_UPDATES, MtInfo, MtKind};
 
 /// Builds an edge-based MT of `mesh`, which must be valid: see [`crate::mesh::repair`].
 ///

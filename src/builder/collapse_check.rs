@@ -1,14 +1,10 @@
 //! May this edge be collapsed? What comes of it? The tests that need no field: topology and orientation.
 
 use super::flat;
-use super::work_mesh::StarTet;
-use super::work_mesh::TetMarks;
-use super::work_mesh::WorkMesh;
+use super::work_mesh::{StarTet, TetMarks, WorkMesh};
 use crate::geom::orient3d;
-use crate::mesh::FACES;
-use crate::mesh::NONE;
-use crate::mt::MAX_LINK;
-use crate::mt::MAX_STAR;
+use crate::mesh::{FACES, NONE};
+use crate::mt::{MAX_LINK, MAX_STAR};
 
 /// Why an edge cannot be collapsed now.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

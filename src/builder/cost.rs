@@ -15,13 +15,9 @@ use super::collapse_check::Plan;
 use super::quantize::Quantized;
 use super::strays::Strays;
 use super::work_mesh::WorkMesh;
-use crate::geom::nearest_on_triangle;
-use crate::geom::orient3d;
-use crate::mesh::EDGES;
-use crate::mesh::FACES;
-use crate::mesh::NONE;
-use glam::DMat3;
-use glam::DVec3;
+use crate::geom::{nearest_on_triangle, orient3d};
+use crate::mesh::{EDGES, FACES, NONE};
+use glam::{DMat3, DVec3};
 
 /// What is known of each vertex, input and created.
 pub(super) struct VertexData {

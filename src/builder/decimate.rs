@@ -1,31 +1,18 @@
 //! Vertex-based MTs from fine to coarse: pick a vertex, remove it, record it [§2.2, §5].
 
-use super::BuildConfig;
-use super::BuildError;
-use super::BuildProgress;
-use super::Criterion;
-use super::OnProgress;
-use super::Purpose;
-use super::candidate_queue::Key;
-use super::candidate_queue::Levels;
+use super::candidate_queue::{Key, Levels};
 use super::cost::Reference;
 use super::gift_wrap::GiftWrap;
-use super::quantize;
 use super::quantize::Quantized;
-use super::removal::Look;
-use super::removal::State;
-use super::rounds::Later;
-use super::rounds::Rounds;
-use super::sequence::Insertion;
-use super::sequence::Sequence;
+use super::removal::{Look, State};
+use super::rounds::{Later, Rounds};
+use super::sequence::{Insertion, Sequence};
 use super::work_mesh::WorkMesh;
+use super::{BuildConfig, BuildError, BuildProgress, Criterion, OnProgress, Purpose, quantize};
 use crate::geom::Bounds;
 use crate::mesh;
-use crate::mesh::NONE;
-use crate::mesh::TetMesh;
-use crate::mesh::Topology;
-use crate::mt::ErrorCode;
-use crate::mt::MAX_UPDATES;
+use crate::mesh::{NONE, TetMesh, Topology};
+use crate::mt::{ErrorCode, MAX_UPDATES};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 

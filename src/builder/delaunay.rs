@@ -10,10 +10,8 @@
 //! the mesh is no longer Delaunay there, and from then on every zone is checked to be star-shaped, and cut if not.
 
 use super::BuildError;
-use crate::geom::in_conflict;
-use crate::geom::orient3d;
-use crate::mesh::FACES;
-use crate::mesh::NONE;
+use crate::geom::{in_conflict, orient3d};
+use crate::mesh::{FACES, NONE};
 
 /// The most that one insertion may remove and insert.
 #[derive(Clone, Copy, Debug)]

@@ -1,11 +1,8 @@
 //! The lattices of the fields: as coarse as what is asked for allows.
 
-use super::BuildConfig;
-use super::BuildError;
-use super::FieldPrecision;
+use super::{BuildConfig, BuildError, FieldPrecision};
 use crate::mesh::Field;
-use crate::mt::FieldInfo;
-use crate::mt::MAX_FIELD_BITS;
+use crate::mt::{FieldInfo, MAX_FIELD_BITS};
 
 /// Largest integer up to which `f64` holds all.
 const MAX_EXACT_INTEGER: f64 = 9_007_199_254_740_992.0;

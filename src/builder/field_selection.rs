@@ -1,11 +1,8 @@
 //! Which fields of a mesh are kept, and which of them bit for bit.
 
-use super::BuildConfig;
-use super::BuildError;
-use crate::mesh::Field;
-use crate::mesh::TetMesh;
-use crate::mt::Exact;
-use crate::mt::VertexId;
+use super::{BuildConfig, BuildError};
+use crate::mesh::{Field, TetMesh};
+use crate::mt::{Exact, VertexId};
 
 /// Most fields of an MT.
 const MAX_FIELDS: usize = 255;

@@ -4,22 +4,12 @@
 //! Buckets are those of [`super::cost`]. A removal takes points from tetrahedra that it removes to tetrahedra that it
 //! makes; all other tetrahedra keep theirs, and their errors.
 
-use super::cost::Buckets;
-use super::cost::Face;
-use super::cost::Reference;
-use super::cost::SLACK;
-use super::cost::as_vec;
-use super::cost::bounds;
-use super::cost::clamped;
-use super::cost::largest;
-use super::cost::locate;
-use super::cost::nearest_face;
-use super::cost::raise;
-use super::hole::Filling;
-use super::hole::Hole;
+use super::cost::{
+    Buckets, Face, Reference, SLACK, as_vec, bounds, clamped, largest, locate, nearest_face, raise,
+};
+use super::hole::{Filling, Hole};
 use crate::mesh::NONE;
-use glam::DMat3;
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 /// What is known of the removals so far.
 #[derive(Default)]

@@ -2,13 +2,9 @@
 
 use super::cost::as_vec;
 use super::delaunay::shifted;
-use super::hole::Filling;
-use super::hole::Hole;
-use super::hole::sorted;
-use crate::geom::in_conflict;
-use crate::geom::orient3d;
-use crate::mesh::FACES;
-use crate::mesh::NONE;
+use super::hole::{Filling, Hole, sorted};
+use crate::geom::{in_conflict, orient3d};
+use crate::mesh::{FACES, NONE};
 use glam::DVec3;
 
 /// The most tetrahedra that fill a hole.

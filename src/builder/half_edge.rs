@@ -1,11 +1,8 @@
 //! Filling a hole by contracting an edge: all that was at its one end moves to the other, which stays where it is.
 
 use super::collapse_check::VertexMarks;
-use super::hole::Filling;
-use super::hole::Hole;
-use super::work_mesh::StarTet;
-use super::work_mesh::TetMarks;
-use super::work_mesh::WorkMesh;
+use super::hole::{Filling, Hole};
+use super::work_mesh::{StarTet, TetMarks, WorkMesh};
 use crate::mesh::NONE;
 
 const NEAR_A: u32 = 1;

@@ -1,27 +1,16 @@
 //! From recorded collapses to the updates of an MT.
 
-use super::BuildError;
-use super::BuildProgress;
-use super::OnProgress;
-use super::base::Numbered;
-use super::base::number_base;
+use super::base::{Numbered, number_base};
 use super::collapse_check::Plan;
 use super::cost::VertexData;
 use super::order::Updates;
 use super::work_mesh::WorkMesh;
+use super::{BuildError, BuildProgress, OnProgress};
 use crate::mesh::NONE;
-use crate::mt::Applied;
-use crate::mt::ApplyUpdates;
-use crate::mt::CurrentMesh;
-use crate::mt::EdgeMt;
-use crate::mt::ErrorCode;
-use crate::mt::Margins;
-use crate::mt::MtInfo;
-use crate::mt::UpdateError;
-use crate::mt::UpdateId;
-use crate::mt::UpdatePages;
-use crate::mt::VertexId;
-use crate::mt::VertexSplit;
+use crate::mt::{
+    Applied, ApplyUpdates, CurrentMesh, EdgeMt, ErrorCode, Margins, MtInfo, UpdateError, UpdateId,
+    UpdatePages, VertexId, VertexSplit,
+};
 use std::cmp::Reverse;
 
 /// One collapse in the builder's own numbers: the `i`-th one makes vertex `points + i`.

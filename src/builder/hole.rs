@@ -2,13 +2,9 @@
 
 use super::collapse_check::Refusal;
 use super::flat;
-use super::work_mesh::StarTet;
-use super::work_mesh::TetMarks;
-use super::work_mesh::WorkMesh;
-use crate::geom::NARROW_BITS;
-use crate::geom::orient3d;
-use crate::mesh::FACES;
-use crate::mesh::NONE;
+use super::work_mesh::{StarTet, TetMarks, WorkMesh};
+use crate::geom::{NARROW_BITS, orient3d};
+use crate::mesh::{FACES, NONE};
 use crate::mt::MAX_LINK;
 
 /// The most tetrahedra around a vertex that is removed: what a sphere of [`MAX_LINK`] vertices has.

@@ -9,17 +9,11 @@
 //! have an error of at least those of all that depend on it, and some make worse tetrahedra than those that they remove,
 //! which only later ones mend. So a selective request can promise its error, and pays for it.
 
-use super::BuildError;
-use super::BuildProgress;
-use super::OnProgress;
-use super::delaunay::MT_LIMITS;
-use super::delaunay::Triangulation;
-use super::delaunay::extreme_points;
+use super::delaunay::{MT_LIMITS, Triangulation, extreme_points};
 use super::quantize::Quantized;
-use super::sequence::Insertion;
-use super::sequence::Sequence;
-use crate::geom::NARROW_BITS;
-use crate::geom::orient3d;
+use super::sequence::{Insertion, Sequence};
+use super::{BuildError, BuildProgress, OnProgress};
+use crate::geom::{NARROW_BITS, orient3d};
 use crate::mesh::NONE;
 use std::collections::BinaryHeap;
 
@@ -606,17 +600,11 @@ fn float_dot(u: [i64; 3], v: [i64; 3]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::super::BuildConfig;
-    use super::super::delaunay::Limits;
-    use super::super::delaunay::delaunay;
+    use super::super::delaunay::{Limits, delaunay};
     use super::super::quantize::quantize;
     use super::*;
-    use crate::geom::WIDE_BITS;
-    use crate::geom::in_conflict;
-    use crate::mesh::Field;
-    use crate::mesh::Grid;
-    use crate::mesh::TetMesh;
-    use crate::mesh::kuhn_tets;
-    use crate::mesh::neighbors;
+    use crate::geom::{WIDE_BITS, in_conflict};
+    use crate::mesh::{Field, Grid, TetMesh, kuhn_tets, neighbors};
     use crate::mt::MtKind;
     use std::collections::BTreeSet;
     use std::ops::ControlFlow;

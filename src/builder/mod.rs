@@ -57,19 +57,11 @@ pub use collapse::edge_mt;
 pub use delaunay::delaunay;
 pub use method::{Construction, Criterion, Method, Purpose, VertexMethod};
 
-use crate::mesh::MeshError;
-use crate::mesh::TetMesh;
-use crate::mt::ConvertError;
-use crate::mt::ErrorCode;
-use crate::mt::Exact;
-use crate::mt::ExplicitMt;
-use crate::mt::HalfEdgeMt;
-use crate::mt::Mt;
-use crate::mt::MtKind;
-use crate::mt::MultiTessellation;
-use crate::mt::UpdateError;
-use crate::mt::UpdateId;
-use crate::mt::VertexId;
+use crate::mesh::{MeshError, TetMesh};
+use crate::mt::{
+    ConvertError, ErrorCode, Exact, ExplicitMt, HalfEdgeMt, Mt, MtKind, MultiTessellation, UpdateError,
+    UpdateId, VertexId,
+};
 use std::fmt;
 use std::ops::ControlFlow;
 

@@ -1,13 +1,8 @@
 //! The lattice of the positions: as coarse as what is asked for and the cells allow.
 
-use super::BuildConfig;
-use super::BuildError;
-use crate::geom::Bounds;
-use crate::geom::Lattice;
-use crate::geom::WIDE_BITS;
-use crate::geom::orient3d;
-use crate::mesh::Grid;
-use crate::mesh::TetMesh;
+use super::{BuildConfig, BuildError};
+use crate::geom::{Bounds, Lattice, WIDE_BITS, orient3d};
+use crate::mesh::{Grid, TetMesh};
 use crate::mt::MtKind;
 
 /// The fewest position bits that are tried unless the caller says otherwise.

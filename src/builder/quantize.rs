@@ -1,22 +1,12 @@
 //! The input on integer lattices: positions and field levels.
 
-use super::BuildConfig;
-use super::BuildError;
-use super::beside;
 use super::beside::Home;
-use super::cost::as_vec;
-use super::cost::clamped;
-use super::field_lattice;
-use super::field_selection;
-use super::position_lattice;
+use super::cost::{as_vec, clamped};
 use super::position_lattice::Placed;
-use crate::geom::Lattice;
-use crate::geom::ON_LATTICE;
-use crate::geom::WIDE_BITS;
-use crate::mesh::Field;
-use crate::mesh::TetMesh;
-use crate::mt::FieldInfo;
-use crate::mt::MtInfo;
+use super::{BuildConfig, BuildError, beside, field_lattice, field_selection, position_lattice};
+use crate::geom::{Lattice, ON_LATTICE, WIDE_BITS};
+use crate::mesh::{Field, TetMesh};
+use crate::mt::{FieldInfo, MtInfo};
 use glam::DVec3;
 
 /// The reference mesh on its lattices.

@@ -3,24 +3,15 @@
 //! All that is read is in [`State`], which no look changes, and all that is written in [`Look`]: so many candidates can be
 //! looked at side by side, each thread having its own [`Look`].
 
-use super::candidate_queue::Key;
-use super::candidate_queue::Levels;
-use super::cost::Buckets;
-use super::cost::Reference;
-use super::cost::largest;
-use super::fill_cost::FillCost;
-use super::fill_cost::Legacy;
-use super::fill_cost::Past;
+use super::candidate_queue::{Key, Levels};
+use super::cost::{Buckets, Reference, largest};
+use super::fill_cost::{FillCost, Legacy, Past};
 use super::gift_wrap::GiftWrap;
-use super::half_edge::Nearby;
-use super::half_edge::contract;
-use super::half_edge::keeps_topology;
-use super::hole::Filling;
-use super::hole::Hole;
+use super::half_edge::{Nearby, contract, keeps_topology};
+use super::hole::{Filling, Hole};
 use super::quantize::Quantized;
 use super::reach;
-use super::reach::Reach;
-use super::reach::Ruler;
+use super::reach::{Reach, Ruler};
 use super::work_mesh::WorkMesh;
 use crate::mesh::NONE;
 use glam::DVec3;

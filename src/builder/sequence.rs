@@ -1,22 +1,13 @@
 //! What the builders of vertex-based MTs hand over: vertex insertions, coarse to fine.
 
-use super::BuildError;
-use super::BuildProgress;
-use super::OnProgress;
-use super::base::Numbered;
-use super::base::number_base;
-use super::quantize;
+use super::base::{Numbered, number_base};
 use super::quantize::Quantized;
+use super::{BuildError, BuildProgress, OnProgress, quantize};
 use crate::mesh::NONE;
-use crate::mt::ErrorCode;
-use crate::mt::ExplicitMt;
-use crate::mt::ExplicitUpdate;
-use crate::mt::MAX_QUARTERINGS;
-use crate::mt::MtInfo;
-use crate::mt::UpdateError;
-use crate::mt::UpdateId;
-use crate::mt::VertexId;
-use crate::mt::canonical;
+use crate::mt::{
+    ErrorCode, ExplicitMt, ExplicitUpdate, MAX_QUARTERINGS, MtInfo, UpdateError, UpdateId, VertexId,
+    canonical,
+};
 use std::cmp::Reverse;
 use std::ops::Range;
 

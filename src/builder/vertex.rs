@@ -1,24 +1,14 @@
 //! Vertex-based MTs, by whichever builder.
 
-use super::BuildConfig;
-use super::BuildError;
-use super::Criterion;
-use super::OnProgress;
-use super::Purpose;
-use super::VertexMethod;
-use super::decimate;
-use super::insert;
-use super::quantize;
 use super::quantize::Quantized;
 use super::sequence::Sequence;
+use super::{
+    BuildConfig, BuildError, Criterion, OnProgress, Purpose, VertexMethod, decimate, insert, quantize,
+};
 use crate::geom::Bounds;
 use crate::mesh;
 use crate::mesh::TetMesh;
-use crate::mt::ExplicitMt;
-use crate::mt::MAX_UPDATES;
-use crate::mt::MtInfo;
-use crate::mt::MtKind;
-use crate::mt::VertexId;
+use crate::mt::{ExplicitMt, MAX_UPDATES, MtInfo, MtKind, VertexId};
 
 /// Builds a vertex-based MT of `mesh` by this method, and spells it out.
 ///

@@ -7,16 +7,11 @@
 //!
 //! What is written is described once, to a [`Put`]: at first to [`Counts`], which makes the tables, then to a [`Writer`].
 
-use super::FormatError;
 use super::read::Reader;
-use super::write;
-use constriction::stream::Code;
-use constriction::stream::Decode;
-use constriction::stream::Encode;
-use constriction::stream::model::DecoderModel;
-use constriction::stream::model::EncoderModel;
-use constriction::stream::model::EntropyModel;
+use super::{FormatError, write};
+use constriction::stream::model::{DecoderModel, EncoderModel, EntropyModel};
 use constriction::stream::stack::SmallAnsCoder;
+use constriction::stream::{Code, Decode, Encode};
 use std::num::NonZeroU16;
 
 /// Bits of a probability.

@@ -1,36 +1,15 @@
 //! Bytes of any split to a growing MT.
 
-use super::BlockInfo;
-use super::FormatError;
-use super::Index;
-use super::Limits;
-use super::coder::Models;
-use super::coder::Source;
-use super::header::END_BYTES;
-use super::header::HEAD_BYTES;
-use super::header::HEADER_BYTES;
-use super::header::Head;
-use super::header::Kind;
-use super::header::Start;
-use super::header::VERSION_AT;
-use super::header::may_be_mt;
-use super::header::parse_header;
-use super::header::version_for;
-use super::payload;
-use super::payload::BaseParts;
-use super::payload::Metadata;
-use super::payload::Shared;
-use super::payload::State;
+use super::coder::{Models, Source};
+use super::header::{
+    END_BYTES, HEAD_BYTES, HEADER_BYTES, Head, Kind, Start, VERSION_AT, may_be_mt, parse_header, version_for,
+};
 use super::payload::edge::FieldPart;
 use super::payload::exact::Corrections;
+use super::payload::{BaseParts, Metadata, Shared, State};
 use super::read::Reader;
-use crate::mt::ErrorCode;
-use crate::mt::Mt;
-use crate::mt::MtInfo;
-use crate::mt::MtRef;
-use crate::mt::MultiTessellation;
-use crate::mt::PageError;
-use crate::mt::UpdatePages;
+use super::{BlockInfo, FormatError, Index, Limits, payload};
+use crate::mt::{ErrorCode, Mt, MtInfo, MtRef, MultiTessellation, PageError, UpdatePages};
 use std::ops::Range;
 
 /// Most bytes that are kept allocated between sections.

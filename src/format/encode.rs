@@ -1,34 +1,15 @@
 //! An MT to bytes: the same MT and options give the same bytes everywhere.
 
-use super::coder::Counts;
-use super::coder::Measure;
-use super::coder::Models;
-use super::coder::Put;
-use super::coder::Writer;
-use super::header::END_BYTES;
-use super::header::HEAD_BYTES;
-use super::header::HEADER_BYTES;
-use super::header::Head;
-use super::header::Kind;
-use super::header::header;
-use super::header::version_for;
-use super::payload;
-use super::payload::State;
-use super::payload::Totals;
+use super::coder::{Counts, Measure, Models, Put, Writer};
+use super::header::{END_BYTES, HEAD_BYTES, HEADER_BYTES, Head, Kind, header, version_for};
 use super::payload::exact::Corrections;
-use super::payload::index::Index;
-use super::payload::index::MAX_BLOCK_BITS;
-use super::payload::index::MIN_BLOCK_BITS;
+use super::payload::index::{Index, MAX_BLOCK_BITS, MIN_BLOCK_BITS};
+use super::payload::{State, Totals};
 use super::survey::Survey;
-use super::write;
-use crate::mt::BaseMeshError;
-use crate::mt::Exact;
-use crate::mt::MtRef;
-use crate::mt::UpdateError;
-use crate::mt::VertexId;
+use super::{payload, write};
+use crate::mt::{BaseMeshError, Exact, MtRef, UpdateError, VertexId};
 use std::collections::BTreeMap;
-use std::fmt;
-use std::io;
+use std::{fmt, io};
 
 /// What goes into a file besides the MT.
 #[derive(Clone, Debug, PartialEq)]

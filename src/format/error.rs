@@ -1,8 +1,6 @@
 //! What can be wrong with an MT file, each with where and what to do.
 
-use crate::mt::BaseMeshError;
-use crate::mt::PageError;
-use crate::mt::UpdateError;
+use crate::mt::{BaseMeshError, PageError, UpdateError};
 use std::fmt;
 
 /// Why a stream of bytes is not, or not all of, a usable MT file.

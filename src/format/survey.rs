@@ -1,19 +1,10 @@
 //! A run through an MT from the base to the reference mesh, for what its file tells of each block.
 
-use super::EncodeError;
-use super::EncodeOptions;
 use super::payload::index::BlockInfo;
-use crate::mt::Applied;
-use crate::mt::ApplyUpdates;
-use crate::mt::CurrentMesh;
-use crate::mt::EdgeMt;
-use crate::mt::Excess;
-use crate::mt::HalfEdgeMt;
-use crate::mt::Margins;
-use crate::mt::Mt;
-use crate::mt::MtRef;
-use crate::mt::UpdateError;
-use crate::mt::UpdateId;
+use super::{EncodeError, EncodeOptions};
+use crate::mt::{
+    Applied, ApplyUpdates, CurrentMesh, EdgeMt, Excess, HalfEdgeMt, Margins, Mt, MtRef, UpdateError, UpdateId,
+};
 use std::collections::BTreeSet;
 
 /// What a run through an MT has found.

@@ -223,8 +223,7 @@ mod tests {
     /// The slow, plain twin of [`insphere`]: the expansion by minors of Shewchuk's matrix, in integers of any size.
     #[cfg(not(target_arch = "wasm32"))]
     fn plain_insphere(corners: [[i32; 3]; 4], e: [i32; 3]) -> i32 {
-        use num_bigint::BigInt;
-        use num_bigint::Sign;
+        use num_bigint::{BigInt, Sign};
         let rows: Vec<Vec<BigInt>> = corners
             .iter()
             .map(|p| {

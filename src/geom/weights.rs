@@ -1,8 +1,7 @@
 //! Barycentric coordinates in a tetrahedron on the lattice.
 
 use super::orient3d;
-use glam::DMat3;
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 /// Points are taken to be on the lattice if they are nearer than this, in its steps.
 pub(crate) const ON_LATTICE: f64 = 1e-7;

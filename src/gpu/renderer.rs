@@ -8,8 +8,7 @@ use crate::gpu::target::{Picture, Target};
 use crate::gpu::types::Frame;
 use crate::gpu::wire::WirePass;
 use crate::gpu::{BoxLines, Context, GpuError, Look};
-use crate::view::Cutaway;
-use crate::view::IsoSurface;
+use crate::view::{Cutaway, IsoSurface};
 use std::ops::Range;
 
 /// Which view of the mesh is drawn.

@@ -4,8 +4,7 @@
 //! named `name_x` and so on, and `name_magnitude`, the length of the vector.
 
 use crate::io::error::ReadReason;
-use crate::mesh::Field;
-use crate::mesh::VectorPart;
+use crate::mesh::{Field, VectorPart};
 
 /// Most fields of a mesh.
 const MAX_FIELDS: usize = 1024;

@@ -4,18 +4,11 @@
 //! Binary numbers are big-endian and start right after the line that announces them. Version 5 lists cells as
 //! offsets and connectivity, older ones as counts followed by indices.
 
-use crate::io::CellData;
-use crate::io::ReadOptions;
-use crate::io::cells;
-use crate::io::error::At;
-use crate::io::error::ReadError;
-use crate::io::error::ReadReason;
+use crate::io::error::{At, ReadError, ReadReason};
 use crate::io::fields::Collector;
-use crate::io::image;
 use crate::io::number::NumberType;
-use crate::io::points_from;
-use crate::mesh::Field;
-use crate::mesh::TetMesh;
+use crate::io::{CellData, ReadOptions, cells, image, points_from};
+use crate::mesh::{Field, TetMesh};
 
 /// How every legacy file starts.
 pub(super) const MAGIC: &[u8] = b"# vtk DataFile Version ";

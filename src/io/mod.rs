@@ -36,8 +36,7 @@ mod xz;
 
 pub use error::{ReadError, ReadReason};
 pub use image::MAX_GRID_POINTS;
-pub use pvd::Step;
-pub use pvd::steps;
+pub use pvd::{Step, steps};
 pub use surface::{PolyData, write_csv, write_obj, write_ply, write_stl, write_vtp};
 pub use write::{write_vti, write_vtu};
 

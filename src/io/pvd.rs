@@ -1,19 +1,13 @@
 //! Lists of time steps: ParaView's collections (`.pvd`).
 
-use std::path::Component;
-use std::path::Path;
-use std::path::PathBuf;
+use std::path::{Component, Path, PathBuf};
 
 use quick_xml::Reader;
 use quick_xml::events::Event;
 
-use crate::io::error::At;
-use crate::io::error::ReadError;
-use crate::io::error::ReadReason;
-use crate::io::in_file;
-use crate::io::load;
-use crate::io::lower_extension;
+use crate::io::error::{At, ReadError, ReadReason};
 use crate::io::xml::Attributes;
+use crate::io::{in_file, load, lower_extension};
 
 /// A file that holds one time step.
 #[derive(Clone, Debug, PartialEq)]

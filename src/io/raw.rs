@@ -10,9 +10,7 @@ use serde_json::Value;
 use crate::io::error::ReadReason;
 use crate::io::image;
 use crate::io::number::NumberType;
-use crate::mesh::Field;
-use crate::mesh::Grid;
-use crate::mesh::TetMesh;
+use crate::mesh::{Field, Grid, TetMesh};
 
 /// What a sidecar says.
 pub(super) struct Sidecar {

@@ -8,8 +8,7 @@ use flate2::Compression;
 use flate2::write::ZlibEncoder;
 
 use crate::io::fields;
-use crate::mesh::Field;
-use crate::mesh::TetMesh;
+use crate::mesh::{Field, TetMesh};
 
 /// Bytes of a block before compression, as VTK has it.
 const BLOCK: usize = 32768;

@@ -2,19 +2,13 @@
 
 use std::borrow::Cow;
 
-use quick_xml::Reader;
-use quick_xml::XmlVersion;
-use quick_xml::events::BytesStart;
-use quick_xml::events::Event;
+use quick_xml::events::{BytesStart, Event};
+use quick_xml::{Reader, XmlVersion};
 
-use crate::io::error::At;
-use crate::io::error::ReadError;
-use crate::io::error::ReadReason;
+use crate::io::error::{At, ReadError, ReadReason};
 use crate::io::number::NumberType;
 use crate::io::payload;
-use crate::io::payload::Compressor;
-use crate::io::payload::Framing;
-use crate::io::payload::Source;
+use crate::io::payload::{Compressor, Framing, Source};
 
 /// Deepest nesting of elements; VTK's files need eight.
 const MAX_DEPTH: usize = 32;

@@ -1,9 +1,7 @@
 //! Who meets whom: tetrahedra across faces, and the shape of the stars of vertices.
 
 use crate::geom::Groups;
-use crate::mesh::FACES;
-use crate::mesh::MeshError;
-use crate::mesh::NONE;
+use crate::mesh::{FACES, MeshError, NONE};
 
 /// Most tetrahedra in a mesh: its faces, four a tetrahedron, are counted in 32 bits.
 pub const MAX_TETS: usize = (1 << 30) - 1;

@@ -1,7 +1,6 @@
 //! Fields at cells as fields at points.
 
-use crate::mesh::Field;
-use crate::mesh::TetMesh;
+use crate::mesh::{Field, TetMesh};
 
 impl TetMesh {
     /// Turns the fields at cells that have values into fields at points: the mean of the cells around a point, weighted

@@ -1,7 +1,6 @@
 //! Is this a valid conforming mesh? And the exact side tests on `f64` that the answer needs.
 
-use robust::Coord;
-use robust::Coord3D;
+use robust::{Coord, Coord3D};
 
 use crate::mesh::adjacency::{HalfFace, crowded, face_of, match_faces, sorted_faces};
 use crate::mesh::{MeshError, TetMesh};

@@ -1,8 +1,6 @@
 //! Regular grids as tetrahedral meshes: every cube becomes six tetrahedra around its main diagonal.
 
-use crate::mesh::Field;
-use crate::mesh::Grid;
-use crate::mesh::TetMesh;
+use crate::mesh::{Field, Grid, TetMesh};
 
 /// The six ways from corner (0,0,0) of a cube to (1,1,1) along three edges, each a positive tetrahedron.
 ///

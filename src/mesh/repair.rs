@@ -293,9 +293,7 @@ fn may_go(sides: [i32; 4], shared: [bool; 4]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::Field;
-    use crate::mesh::check;
-    use crate::mesh::kuhn_tets;
+    use crate::mesh::{Field, check, kuhn_tets};
 
     fn mesh(positions: &[[f64; 3]], tets: &[[u32; 4]]) -> TetMesh {
         let values = (0..positions.len()).map(|i| i as f64).collect();

@@ -2,8 +2,7 @@
 
 use std::fmt;
 
-use crate::mesh::NONE;
-use crate::mesh::TetMesh;
+use crate::mesh::{NONE, TetMesh};
 
 /// Why two meshes are not time steps over one mesh. Cells and points are numbered as in the input, from 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -116,8 +115,7 @@ impl TetMesh {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::Field;
-    use crate::mesh::Grid;
+    use crate::mesh::{Field, Grid};
 
     fn step(time: f64) -> TetMesh {
         let grid = Grid { dims: [2, 2, 2], origin: [0.0; 3], spacing: [1.0; 3] };

@@ -1,22 +1,10 @@
 //! An MT of any kind: what files hold and sessions use, without the caller knowing which.
 
-use super::Applied;
-use super::BaseMesh;
-use super::BaseMeshError;
-use super::CurrentMesh;
-use super::EdgeMt;
-use super::ErrorCode;
-use super::ExplicitMt;
-use super::HalfEdgeMt;
-use super::LookAtTet;
-use super::MtInfo;
-use super::MultiTessellation;
-use super::PageError;
-use super::UpdateError;
-use super::UpdateId;
-use super::VertexMt;
-use crate::mt::ApplyUpdates;
-use crate::mt::UpdatePages;
+use super::{
+    Applied, BaseMesh, BaseMeshError, CurrentMesh, EdgeMt, ErrorCode, ExplicitMt, HalfEdgeMt, LookAtTet,
+    MtInfo, MultiTessellation, PageError, UpdateError, UpdateId, VertexMt,
+};
+use crate::mt::{ApplyUpdates, UpdatePages};
 use std::ops::Range;
 
 /// An MT of any kind.

@@ -1,18 +1,9 @@
 //! From one kind of MT to another that can hold the same updates.
 
-use super::EdgeMt;
-use super::ExplicitMt;
-use super::HalfEdgeMt;
-use super::MAX_STAR;
-use super::Mt;
-use super::MtKind;
-use super::MultiTessellation;
-use super::ReplayError;
-use super::UpdateError;
-use super::UpdateId;
-use super::VertexId;
-use super::VertexMt;
-use super::VertexSplit;
+use super::{
+    EdgeMt, ExplicitMt, HalfEdgeMt, MAX_STAR, Mt, MtKind, MultiTessellation, ReplayError, UpdateError,
+    UpdateId, VertexId, VertexMt, VertexSplit,
+};
 use crate::mt::replay::canonical;
 use std::fmt;
 

@@ -1,10 +1,6 @@
 //! Do errors fall along the partial order, by as much as requests for values rely on?
 
-use super::ApplyUpdates;
-use super::CurrentMesh;
-use super::ErrorCode;
-use super::MtInfo;
-use super::UpdateId;
+use super::{ApplyUpdates, CurrentMesh, ErrorCode, MtInfo, UpdateId};
 
 /// Follows the updates of an MT in their order, each before it is applied.
 ///

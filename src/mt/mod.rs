@@ -22,18 +22,13 @@ mod vertex;
 pub use any::{Mt, MtRef};
 pub use convert::ConvertError;
 pub use edge::store::{EdgeMt, MAX_EDGE, MAX_LINK, MAX_STAR, VertexSplit};
-pub use error::PageError;
-pub use error::{ErrorCode, UpdateError};
-pub use exact::Exact;
-pub use exact::ExactValues;
+pub use error::{ErrorCode, PageError, UpdateError};
+pub use exact::{Exact, ExactValues};
 pub use explicit::check::MtFault;
 #[cfg(feature = "build")]
 pub use explicit::check::check_errors;
 pub use explicit::store::{ExplicitMt, ExplicitUpdate};
-pub use half_edge::store::BaseMark;
-pub use half_edge::store::ForestChild;
-pub use half_edge::store::HalfEdgeMt;
-pub use half_edge::store::HalfEdgeUpdate;
+pub use half_edge::store::{BaseMark, ForestChild, HalfEdgeMt, HalfEdgeUpdate};
 pub(crate) use margins::{Excess, Margins};
 pub use mesh::base::{BaseMesh, BaseMeshError, MAX_FIELD_BITS, MAX_UPDATES};
 #[cfg(feature = "build")]
@@ -50,8 +45,7 @@ pub(crate) use vertex::streaming::Insertion;
 pub use vertex::tet_errors::MAX_QUARTERINGS;
 
 use crate::geom::Lattice;
-use crate::mesh::Field;
-use crate::mesh::VectorPart;
+use crate::mesh::{Field, VectorPart};
 use std::ops::Range;
 
 /// Index of an update (a node of the MT) in coarse-to-fine order: parents come before their children.

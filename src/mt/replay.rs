@@ -1,11 +1,6 @@
 //! All updates of an MT, coarse to fine, each with the tetrahedra that it removes and inserts.
 
-use super::Applied;
-use super::ApplyUpdates;
-use super::BaseMeshError;
-use super::CurrentMesh;
-use super::UpdateError;
-use super::UpdateId;
+use super::{Applied, ApplyUpdates, BaseMeshError, CurrentMesh, UpdateError, UpdateId};
 use std::fmt;
 
 /// Why the updates of an MT cannot all be applied. Only a damaged or hostile MT leads here.

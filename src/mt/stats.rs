@@ -1,10 +1,8 @@
 //! What an MT is like and what it costs to store, in the paper's terms [§6, Table 1].
 
-use super::ApplyUpdates;
-use super::CurrentMesh;
+use super::{ApplyUpdates, CurrentMesh};
 use crate::mt::explicit::store::Counts;
-use crate::mt::replay::ReplayError;
-use crate::mt::replay::replay;
+use crate::mt::replay::{ReplayError, replay};
 
 /// Numbers about an MT. The storage of the alternatives is by the paper's way of counting: 4 bytes for a
 /// coordinate, a field value or an index, 1 for a counter.

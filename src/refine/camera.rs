@@ -1,17 +1,10 @@
 //! What a camera sees: its pyramid of vision, and how large an error looks.
 
 use super::View;
-use super::criterion::ANY;
-use super::criterion::Frame;
-use super::criterion::TetLook;
-use super::criterion::Verdict;
-use super::criterion::dial_of;
+use super::criterion::{ANY, Frame, TetLook, Verdict, dial_of};
 use super::shape::Plane;
 use super::tet_minimax::Rows;
-use glam::DMat4;
-use glam::DVec2;
-use glam::DVec3;
-use glam::DVec4;
+use glam::{DMat4, DVec2, DVec3, DVec4};
 
 /// A camera in model units, seen from the middle of the domain.
 #[derive(Clone, Debug, PartialEq)]

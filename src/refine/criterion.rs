@@ -1,16 +1,11 @@
 //! Is this tetrahedron fine enough? Functions of a tetrahedron and the error that its removal has.
 
-use super::Need;
-use super::Part;
-use super::Request;
-use super::Values;
 use super::camera::Camera;
 use super::palette::Palette;
 use super::shape::Shape;
+use super::{Need, Part, Request, Values};
 use crate::geom::Lattice;
-use crate::mt::ErrorCode;
-use crate::mt::MtInfo;
-use crate::mt::UpdateId;
+use crate::mt::{ErrorCode, MtInfo, UpdateId};
 use glam::DVec3;
 use std::any::Any;
 use std::fmt;

@@ -1,9 +1,6 @@
 //! Criteria of the caller's own.
 
-use super::ANY;
-use super::Criterion;
-use super::TetLook;
-use super::Verdict;
+use super::{ANY, Criterion, TetLook, Verdict};
 use std::fmt;
 
 /// A criterion that a closure tells: how often the error of a tetrahedron exceeds what is wanted there (see

@@ -1,8 +1,7 @@
 //! Convex regions as functions: how far a tetrahedron is outside, or how deep inside.
 
-use super::MAX_PLANES;
-use super::Region;
 use super::tet_minimax::Rows;
+use super::{MAX_PLANES, Region};
 use crate::geom::nearest_on_triangle;
 use crate::mesh::FACES;
 use glam::DVec3;

@@ -5,9 +5,7 @@
 //! needs in the caches. New slots then lie side by side, too.
 
 use crate::geom::morton;
-use crate::mt::ApplyUpdates;
-use crate::mt::CurrentMesh;
-use crate::mt::UpdateId;
+use crate::mt::{ApplyUpdates, CurrentMesh, UpdateId};
 
 /// log2 of the cells along each axis by which updates are sorted.
 const CELL_BITS: u32 = 4;

@@ -5,18 +5,9 @@
 //! not need any more go when the memory that they may take is short.
 
 use super::Session;
-use crate::format::DecodeOptions;
-use crate::format::Decoder;
-use crate::format::FormatError;
-use crate::format::Index;
-use crate::format::Progress;
-use crate::mt::ErrorCode;
-use crate::mt::Mt;
-use crate::mt::MultiTessellation;
-use crate::mt::UpdateId;
-use crate::refine::Criterion;
-use crate::refine::Front;
-use crate::refine::TetLook;
+use crate::format::{DecodeOptions, Decoder, FormatError, Index, Progress};
+use crate::mt::{ErrorCode, Mt, MultiTessellation, UpdateId};
+use crate::refine::{Criterion, Front, TetLook};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;

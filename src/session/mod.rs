@@ -8,32 +8,12 @@ mod blocks;
 
 pub use blocks::{BlockProgress, WantedBytes};
 
-use crate::format::DecodeOptions;
-use crate::format::Decoder;
-use crate::format::FormatError;
-use crate::format::Limits;
-use crate::mt::CurrentMesh;
-use crate::mt::ErrorCode;
-use crate::mt::Exact;
-use crate::mt::MeshChanges;
-use crate::mt::Mt;
-use crate::mt::MtInfo;
-use crate::mt::MultiTessellation;
-use crate::refine::Criterion;
-use crate::refine::Front;
-use crate::refine::LodCriterion;
-use crate::refine::Need;
-use crate::refine::Outcome;
-use crate::refine::Part;
-use crate::refine::RefineStats;
-use crate::refine::Request;
-use crate::refine::RequestError;
-use crate::view::IsoSurface;
-use crate::view::MeshView;
-use crate::view::NormalKind;
-use crate::view::Plane;
-use crate::view::Slice;
-use crate::view::SurfaceChanges;
+use crate::format::{DecodeOptions, Decoder, FormatError, Limits};
+use crate::mt::{CurrentMesh, ErrorCode, Exact, MeshChanges, Mt, MtInfo, MultiTessellation};
+use crate::refine::{
+    Criterion, Front, LodCriterion, Need, Outcome, Part, RefineStats, Request, RequestError,
+};
+use crate::view::{IsoSurface, MeshView, NormalKind, Plane, Slice, SurfaceChanges};
 use blocks::Blocks;
 use std::fmt;
 use std::ops::Range;

@@ -1,34 +1,20 @@
 //! The loader over HTTP, for native programs: a thread for each request, and a channel.
 
-use super::cache::Cache;
-use super::cache::CacheFolder;
+use super::cache::{Cache, CacheFolder};
 use super::error::StreamError;
-use super::loader::Action;
-use super::loader::Failure;
-use super::loader::Loader;
-use super::loader::LoaderOptions;
-use super::loader::Traffic;
-use super::loader::WantedRange;
+use super::loader::{Action, Failure, Loader, LoaderOptions, Traffic, WantedRange};
 use super::response::ResponseHead;
-use super::source::Arrived;
-use super::source::RangeSource;
+use super::source::{Arrived, RangeSource};
 use std::collections::VecDeque;
 use std::io::Read;
 use std::ops::Range;
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
-use std::sync::atomic::Ordering;
-use std::sync::mpsc;
-use std::sync::mpsc::Receiver;
-use std::sync::mpsc::SyncSender;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender};
+use std::sync::{Arc, mpsc};
 use std::thread;
-use std::time::Duration;
-use std::time::Instant;
-use ureq::Agent;
-use ureq::Body;
-use ureq::ResponseExt;
-use ureq::http::Response;
-use ureq::http::header;
+use std::time::{Duration, Instant};
+use ureq::http::{Response, header};
+use ureq::{Agent, Body, ResponseExt};
 
 /// Bytes that are read at a time.
 const CHUNK: usize = 64 << 10;

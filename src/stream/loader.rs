@@ -3,9 +3,7 @@
 use super::error::StreamError;
 use super::range_set::RangeSet;
 use super::reassembly::Reassembly;
-use super::response::ResponseContent;
-use super::response::ResponseHead;
-use super::response::UNKNOWN;
+use super::response::{ResponseContent, ResponseHead, UNKNOWN};
 use std::collections::VecDeque;
 use std::ops::Range;
 

@@ -22,13 +22,6 @@ pub use error::StreamError;
 pub use http::HttpOptions;
 #[cfg(feature = "http")]
 pub use http::HttpSource;
-pub use loader::Action;
-pub use loader::Failure;
-pub use loader::Loader;
-pub use loader::LoaderOptions;
-pub use loader::Traffic;
-pub use loader::WantedRange;
+pub use loader::{Action, Failure, Loader, LoaderOptions, Traffic, WantedRange};
 pub use response::ResponseHead;
-pub use source::Arrived;
-pub use source::FileSource;
-pub use source::RangeSource;
+pub use source::{Arrived, FileSource, RangeSource};

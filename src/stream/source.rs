@@ -2,9 +2,7 @@
 
 use super::error::StreamError;
 use super::loader::WantedRange;
-use std::io::Read;
-use std::io::Seek;
-use std::io::SeekFrom;
+use std::io::{Read, Seek, SeekFrom};
 use std::ops::Range;
 use std::time::Duration;
 

@@ -1,16 +1,10 @@
 //! Is the answer to a request the same whatever was asked for before? Tried with many requests, compared by their meshes alone.
 
-use super::Query;
-use super::VerifyReport;
-use super::note;
-use super::satisfy;
+use super::{Query, VerifyReport, note, satisfy};
 use crate::geom::Bounds;
 use crate::mesh::TetMesh;
-use crate::mt::ApplyUpdates;
-use crate::mt::MtInfo;
-use crate::refine::Front;
-use crate::refine::Need;
-use crate::refine::Request;
+use crate::mt::{ApplyUpdates, MtInfo};
+use crate::refine::{Front, Need, Request};
 
 /// Requests for values, of all fields together, and for boxes.
 const VALUES: usize = 60;

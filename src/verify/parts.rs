@@ -2,16 +2,9 @@
 
 use super::mesh_checks::PlainMesh;
 use crate::mesh::TetMesh;
-use crate::mt::FieldInfo;
-use crate::mt::MtInfo;
-use crate::refine::Need;
-use crate::refine::Part;
-use crate::refine::Transfer;
-use crate::refine::Values;
-use crate::refine::View;
-use glam::DVec2;
-use glam::DVec3;
-use glam::DVec4;
+use crate::mt::{FieldInfo, MtInfo};
+use crate::refine::{Need, Part, Transfer, Values, View};
+use glam::{DVec2, DVec3, DVec4};
 
 /// A need, what is guaranteed, and what that means at each reference vertex.
 pub struct Ask<'a> {

@@ -1,10 +1,8 @@
 //! The mesh that an MT makes of points, as if it had been the input.
 
-use super::Query;
-use super::fresh;
 use super::mesh_checks::PlainMesh;
 use super::same::volume;
-use super::satisfy;
+use super::{Query, fresh, satisfy};
 use crate::mesh::TetMesh;
 use crate::mt::ApplyUpdates;
 use crate::refine::Request;

@@ -2,16 +2,8 @@
 
 use crate::geom::Bounds;
 use crate::mesh::TetMesh;
-use crate::mt::ApplyUpdates;
-use crate::mt::FieldInfo;
-use crate::mt::MtInfo;
-use crate::refine::Budget;
-use crate::refine::LodCriterion;
-use crate::refine::Need;
-use crate::refine::Region;
-use crate::refine::Request;
-use crate::refine::Transfer;
-use crate::refine::View;
+use crate::mt::{ApplyUpdates, FieldInfo, MtInfo};
+use crate::refine::{Budget, LodCriterion, Need, Region, Request, Transfer, View};
 use glam::DVec3;
 use std::fmt;
 

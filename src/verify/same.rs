@@ -1,7 +1,6 @@
 //! Is the fully refined mesh the input, tetrahedron for tetrahedron?
 
-use super::mesh_checks::PlainMesh;
-use super::mesh_checks::PlainReference;
+use super::mesh_checks::{PlainMesh, PlainReference};
 use crate::geom::orient3d;
 use crate::mt::mix;
 

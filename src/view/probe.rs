@@ -8,8 +8,7 @@
 //! that meet at a point the one with the smallest number is taken.
 
 use crate::geom::Groups;
-use crate::mesh::FACES;
-use crate::mesh::NONE;
+use crate::mesh::{FACES, NONE};
 use crate::view::MeshView;
 use robust::Coord3D;
 use std::collections::BTreeSet;

@@ -4,9 +4,7 @@
 //! tetrahedron's shortest edge, halved until the error is small enough. Nothing but the basic operations and square
 //! roots, so a line is the same on every platform.
 
-use crate::view::MeshView;
-use crate::view::Place;
-use crate::view::Probe;
+use crate::view::{MeshView, Place, Probe};
 
 /// Halvings of a step before the boundary counts as reached: to a millionth of a step.
 const HALVINGS: u32 = 20;

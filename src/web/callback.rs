@@ -2,16 +2,9 @@
 
 use super::error::WebError;
 use crate::geom::Lattice;
-use crate::mt::FieldInfo;
-use crate::mt::MtInfo;
-use crate::refine::ANY;
-use crate::refine::Criterion;
-use crate::refine::TetLook;
-use crate::refine::Verdict;
-use js_sys::Float32Array;
-use js_sys::Function;
-use js_sys::Object;
-use js_sys::Reflect;
+use crate::mt::{FieldInfo, MtInfo};
+use crate::refine::{ANY, Criterion, TetLook, Verdict};
+use js_sys::{Float32Array, Function, Object, Reflect};
 use std::cell::RefCell;
 use std::fmt;
 use wasm_bindgen::JsValue;

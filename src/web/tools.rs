@@ -2,27 +2,14 @@
 
 use super::error::WebError;
 use super::options::field_index;
-use super::results::JsIsoSurface;
-use super::results::iso_surface;
+use super::results::{JsIsoSurface, iso_surface};
 use super::session::CoreSession;
-use crate::view::BoundarySurface;
-use crate::view::FieldStats;
-use crate::view::Histogram;
-use crate::view::NormalKind;
-use crate::view::Plane;
-use crate::view::Probe;
-use crate::view::Streamline;
-use crate::view::TraceOptions;
-use crate::view::Tracer;
-use js_sys::Array;
-use js_sys::Float32Array;
-use js_sys::Float64Array;
-use js_sys::Object;
-use js_sys::Reflect;
-use js_sys::Uint32Array;
-use wasm_bindgen::JsCast;
-use wasm_bindgen::JsValue;
+use crate::view::{
+    BoundarySurface, FieldStats, Histogram, NormalKind, Plane, Probe, Streamline, TraceOptions, Tracer,
+};
+use js_sys::{Array, Float32Array, Float64Array, Object, Reflect, Uint32Array};
 use wasm_bindgen::prelude::wasm_bindgen;
+use wasm_bindgen::{JsCast, JsValue};
 
 #[wasm_bindgen(typescript_custom_section)]
 const TYPES: &str = include_str!("tools.d.ts");

@@ -2,15 +2,9 @@
 
 use crate::support::random::Random;
 use std::collections::BTreeSet;
-use tetralod::builder::BuildError;
-use tetralod::builder::delaunay;
-use tetralod::geom::WIDE_BITS;
-use tetralod::geom::in_conflict;
-use tetralod::geom::orient3d;
-use tetralod::mesh::FACES;
-use tetralod::mesh::NONE;
-use tetralod::mesh::kuhn_tets;
-use tetralod::mesh::neighbors;
+use tetralod::builder::{BuildError, delaunay};
+use tetralod::geom::{WIDE_BITS, in_conflict, orient3d};
+use tetralod::mesh::{FACES, NONE, kuhn_tets, neighbors};
 
 type Point = [i32; 3];
 

@@ -3,28 +3,14 @@
 
 use crate::support::meshes::{bent, cube, hilly, linear};
 use std::ops::ControlFlow;
-use tetralod::builder::BuildConfig;
-use tetralod::builder::BuildError;
-use tetralod::builder::BuildResult;
-use tetralod::builder::Construction;
-use tetralod::builder::Criterion;
-use tetralod::builder::FieldPrecision;
-use tetralod::builder::Method;
-use tetralod::builder::build;
-use tetralod::format::EncodeOptions;
-use tetralod::format::encode;
-use tetralod::mesh::Field;
-use tetralod::mesh::TetMesh;
-use tetralod::mesh::VectorPart;
-use tetralod::mt::ApplyUpdates;
-use tetralod::mt::CurrentMesh;
-use tetralod::mt::ExactValues;
-use tetralod::mt::Mt;
-use tetralod::mt::MtKind;
-use tetralod::mt::MultiTessellation;
-use tetralod::mt::UpdateId;
-use tetralod::mt::UpdatePages;
-use tetralod::mt::VertexId;
+use tetralod::builder::{
+    BuildConfig, BuildError, BuildResult, Construction, Criterion, FieldPrecision, Method, build,
+};
+use tetralod::format::{EncodeOptions, encode};
+use tetralod::mesh::{Field, TetMesh, VectorPart};
+use tetralod::mt::{
+    ApplyUpdates, CurrentMesh, ExactValues, Mt, MtKind, MultiTessellation, UpdateId, UpdatePages, VertexId,
+};
 use tetralod::refine::Request;
 use tetralod::session::Session;
 

@@ -3,21 +3,10 @@
 use crate::support::meshes::blocks;
 use crate::support::random::Random;
 use std::ops::ControlFlow;
-use tetralod::builder::BuildConfig;
-use tetralod::builder::Construction;
-use tetralod::builder::Criterion;
-use tetralod::builder::Method;
-use tetralod::builder::build;
-use tetralod::mesh::FACES;
-use tetralod::mesh::NONE;
-use tetralod::mesh::TetMesh;
-use tetralod::mt::CurrentMesh;
-use tetralod::mt::Mt;
-use tetralod::mt::MtKind;
-use tetralod::mt::MultiTessellation;
-use tetralod::refine::Front;
-use tetralod::refine::LodCriterion;
-use tetralod::refine::Request;
+use tetralod::builder::{BuildConfig, Construction, Criterion, Method, build};
+use tetralod::mesh::{FACES, NONE, TetMesh};
+use tetralod::mt::{CurrentMesh, Mt, MtKind, MultiTessellation};
+use tetralod::refine::{Front, LodCriterion, Request};
 
 fn made(mesh: &TetMesh, kind: MtKind, criterion: Criterion) -> Mt {
     let method = if kind == MtKind::Edge { Method::Collapse } else { Method::Decimate };

@@ -2,12 +2,7 @@
 
 use crate::support::strategies::config;
 use proptest::prelude::*;
-use tetralod::mesh::Field;
-use tetralod::mesh::Grid;
-use tetralod::mesh::TetMesh;
-use tetralod::mesh::check;
-use tetralod::mesh::repair;
-use tetralod::mesh::topology;
+use tetralod::mesh::{Field, Grid, TetMesh, check, repair, topology};
 
 /// Six times the volume; exact for the small integer coordinates used here.
 fn six_volume(mesh: &TetMesh, tet: [u32; 4]) -> f64 {

@@ -2,27 +2,14 @@
 
 use crate::support::meshes::{bent, blocks, built, cube, hilly, linear};
 use std::ops::ControlFlow;
-use tetralod::builder::BuildConfig;
-use tetralod::builder::BuildError;
-use tetralod::builder::FieldPrecision;
-use tetralod::builder::edge_mt;
-use tetralod::format::EncodeOptions;
-use tetralod::format::encode;
-use tetralod::generate;
+use tetralod::builder::{BuildConfig, BuildError, FieldPrecision, edge_mt};
+use tetralod::format::{EncodeOptions, encode};
 use tetralod::geom::orient3d;
 use tetralod::mesh::TetMesh;
-use tetralod::mt::EdgeMt;
-use tetralod::mt::ExplicitMt;
-use tetralod::mt::MtKind;
-use tetralod::mt::MultiTessellation;
-use tetralod::mt::UpdateId;
-use tetralod::mt::check_errors;
-use tetralod::refine::Front;
-use tetralod::refine::LodCriterion;
-use tetralod::refine::Outcome;
-use tetralod::refine::Request;
-use tetralod::verify;
+use tetralod::mt::{EdgeMt, ExplicitMt, MtKind, MultiTessellation, UpdateId, check_errors};
+use tetralod::refine::{Front, LodCriterion, Outcome, Request};
 use tetralod::verify::Reference;
+use tetralod::{generate, verify};
 
 fn refined(mt: &EdgeMt, request: &Request) -> (Front, Outcome) {
     let mut front = Front::new(mt).expect("a valid base mesh");

@@ -5,19 +5,11 @@
 use crate::support::meshes::built;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
-use tetralod::builder::BuildConfig;
-use tetralod::builder::Construction;
-use tetralod::builder::Criterion;
-use tetralod::builder::Method;
-use tetralod::builder::build;
-use tetralod::io;
-use tetralod::mesh::Grid;
-use tetralod::mesh::TetMesh;
-use tetralod::mesh::repair;
-use tetralod::mt::ApplyUpdates;
-use tetralod::mt::MtKind;
-use tetralod::verify;
+use tetralod::builder::{BuildConfig, Construction, Criterion, Method, build};
+use tetralod::mesh::{Grid, TetMesh, repair};
+use tetralod::mt::{ApplyUpdates, MtKind};
 use tetralod::verify::Reference;
+use tetralod::{io, verify};
 
 fn data() -> Option<PathBuf> {
     let data = std::env::var_os("TETRALOD_DATA").map(PathBuf::from);

@@ -2,19 +2,10 @@
 
 use crate::support::meshes::{bent, built, cube, hilly, linear, tampered};
 use tetralod::mesh::TetMesh;
-use tetralod::mt::BaseMesh;
-use tetralod::mt::EdgeMt;
-use tetralod::mt::MtInfo;
-use tetralod::mt::UpdateId;
-use tetralod::refine::Need;
-use tetralod::refine::Region;
-use tetralod::refine::Request;
-use tetralod::refine::Transfer;
-use tetralod::refine::View;
+use tetralod::mt::{BaseMesh, EdgeMt, MtInfo, UpdateId};
+use tetralod::refine::{Need, Region, Request, Transfer, View};
 use tetralod::verify;
-use tetralod::verify::MAX_FAILURES;
-use tetralod::verify::Reference;
-use tetralod::verify::VerifyReport;
+use tetralod::verify::{MAX_FAILURES, Reference, VerifyReport};
 
 fn verified(mt: &EdgeMt, input: &TetMesh) -> VerifyReport {
     let mut last = None;

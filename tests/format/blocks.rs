@@ -4,20 +4,10 @@
 use crate::support::files::{bytes_in_blocks, coded, inserted, options, sample, samples, sections, spelled};
 use crate::support::random::Random;
 use std::collections::BTreeSet;
-use tetralod::format::DecodeOptions;
-use tetralod::format::Decoder;
-use tetralod::format::EncodeOptions;
-use tetralod::format::FormatError;
-use tetralod::format::encode;
-use tetralod::mt::Applied;
-use tetralod::mt::ApplyUpdates;
-use tetralod::mt::CurrentMesh;
-use tetralod::mt::Mt;
-use tetralod::mt::MtKind;
-use tetralod::mt::MultiTessellation;
-use tetralod::mt::PageError;
-use tetralod::mt::UpdateId;
-use tetralod::mt::UpdatePages;
+use tetralod::format::{DecodeOptions, Decoder, EncodeOptions, FormatError, encode};
+use tetralod::mt::{
+    Applied, ApplyUpdates, CurrentMesh, Mt, MtKind, MultiTessellation, PageError, UpdateId, UpdatePages,
+};
 
 /// A decoder of blocks: it has what comes before the first one.
 fn opened(bytes: &[u8], fields: &[&str]) -> Decoder {
@@ -105,8 +95,7 @@ fn the_index_tells_where_blocks_are() {
 #[test]
 fn header_and_index_are_small() {
     use std::ops::ControlFlow;
-    use tetralod::builder::BuildConfig;
-    use tetralod::builder::build;
+    use tetralod::builder::{BuildConfig, build};
     let mesh = tetralod::generate::bucky(33).expect("a size that is allowed");
     let built = build(&mesh, &BuildConfig::of(MtKind::Edge), &mut |_| ControlFlow::Continue(()))
         .expect("a good mesh");

@@ -7,16 +7,8 @@ use crate::support::files::{
 use crate::support::strategies::config;
 use proptest::prelude::*;
 use std::collections::BTreeSet;
-use tetralod::format::Decoder;
-use tetralod::format::EncodeError;
-use tetralod::format::EncodeOptions;
-use tetralod::format::FormatError;
-use tetralod::format::Limits;
-use tetralod::format::encode;
-use tetralod::mt::BaseMeshError;
-use tetralod::mt::Mt;
-use tetralod::mt::MultiTessellation;
-use tetralod::mt::UpdatePages;
+use tetralod::format::{Decoder, EncodeError, EncodeOptions, FormatError, Limits, encode};
+use tetralod::mt::{BaseMeshError, Mt, MultiTessellation, UpdatePages};
 
 #[test]
 fn every_flipped_bit_is_detected_and_what_came_before_is_intact() {

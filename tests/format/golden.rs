@@ -3,21 +3,12 @@
 
 use crate::support::files::{assert_same, decode, field, header};
 use std::fmt::Write;
-use tetralod::format::EncodeOptions;
-use tetralod::format::FormatError;
-use tetralod::format::encode;
+use tetralod::format::{EncodeOptions, FormatError, encode};
 use tetralod::geom::Lattice;
-use tetralod::mt::BaseMesh;
-use tetralod::mt::EdgeMt;
-use tetralod::mt::ErrorCode;
-use tetralod::mt::ExplicitMt;
-use tetralod::mt::ExplicitUpdate;
-use tetralod::mt::Mt;
-use tetralod::mt::MtInfo;
-use tetralod::mt::MtKind;
-use tetralod::mt::MultiTessellation;
-use tetralod::mt::VertexId;
-use tetralod::mt::VertexSplit;
+use tetralod::mt::{
+    BaseMesh, EdgeMt, ErrorCode, ExplicitMt, ExplicitUpdate, Mt, MtInfo, MtKind, MultiTessellation, VertexId,
+    VertexSplit,
+};
 
 /// Two tetrahedra on one face, with one field of 8 bits; there are going to be `updates` updates.
 fn start(kind: MtKind, [vertices, tetrahedra, updates]: [u32; 3]) -> (MtInfo, BaseMesh) {

@@ -6,36 +6,17 @@ use crate::reader::{self, File, plain};
 use crate::support::builder::{Plan, build};
 use crate::support::domains::{Domain, PlainMesh};
 use crate::support::random::Random;
-use std::collections::BTreeMap;
-use std::collections::BTreeSet;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::ops::ControlFlow;
-use tetralod::builder::BuildConfig;
-use tetralod::builder::FieldPrecision;
-use tetralod::builder::edge_mt;
-use tetralod::format::Decoder;
-use tetralod::format::EncodeOptions;
-use tetralod::format::Index;
-use tetralod::format::encode;
+use tetralod::builder::{BuildConfig, FieldPrecision, edge_mt};
+use tetralod::format::{Decoder, EncodeOptions, Index, encode};
 use tetralod::generate;
 use tetralod::geom::Lattice;
-use tetralod::mesh::Field;
-use tetralod::mesh::TetMesh;
-use tetralod::mesh::VectorPart;
-use tetralod::mt::Applied;
-use tetralod::mt::ApplyUpdates;
-use tetralod::mt::BaseMesh;
-use tetralod::mt::CurrentMesh;
-use tetralod::mt::EdgeMt;
-use tetralod::mt::ErrorCode;
-use tetralod::mt::FieldInfo;
-use tetralod::mt::Mt;
-use tetralod::mt::MtInfo;
-use tetralod::mt::MtKind;
-use tetralod::mt::UpdateId;
-use tetralod::mt::UpdatePages;
-use tetralod::mt::VertexId;
-use tetralod::mt::VertexSplit;
+use tetralod::mesh::{Field, TetMesh, VectorPart};
+use tetralod::mt::{
+    Applied, ApplyUpdates, BaseMesh, CurrentMesh, EdgeMt, ErrorCode, FieldInfo, Mt, MtInfo, MtKind, UpdateId,
+    UpdatePages, VertexId, VertexSplit,
+};
 
 fn options(block_bits: u32) -> EncodeOptions {
     let metadata = [("tool".to_owned(), "hand".to_owned()), ("a".to_owned(), String::new())];

@@ -9,28 +9,14 @@ use crate::support::builder::Plan;
 use crate::support::domains::Domain;
 use crate::support::files::{bytes_in_blocks, decode, inserted, options, planned, spelled};
 use crate::support::random::Random;
-use std::collections::BTreeMap;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
-use std::panic::AssertUnwindSafe;
-use std::panic::catch_unwind;
-use tetralod::builder::BuildConfig;
-use tetralod::builder::Construction;
-use tetralod::builder::Criterion;
-use tetralod::builder::FieldPrecision;
-use tetralod::builder::Method;
-use tetralod::format::EncodeOptions;
-use tetralod::format::encode;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use tetralod::builder::{BuildConfig, Construction, Criterion, FieldPrecision, Method};
+use tetralod::format::{EncodeOptions, encode};
 use tetralod::generate;
-use tetralod::mesh::Field;
-use tetralod::mesh::TetMesh;
-use tetralod::mt::Exact;
-use tetralod::mt::ExplicitMt;
-use tetralod::mt::Mt;
-use tetralod::mt::MtKind;
-use tetralod::mt::MultiTessellation;
-use tetralod::mt::UpdateId;
-use tetralod::mt::VertexId;
+use tetralod::mesh::{Field, TetMesh};
+use tetralod::mt::{Exact, ExplicitMt, Mt, MtKind, MultiTessellation, UpdateId, VertexId};
 
 /// Reads a file both ways; gives what was read.
 fn compare(bytes: &[u8]) -> (File, Vec<Change>) {

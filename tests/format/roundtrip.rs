@@ -7,27 +7,14 @@ use crate::support::files::{
 use crate::support::strategies::{config, plan};
 use proptest::prelude::*;
 use std::ops::ControlFlow;
-use tetralod::builder::BuildConfig;
-use tetralod::builder::build;
-use tetralod::format::BLOCK_BITS;
-use tetralod::format::Decoder;
-use tetralod::format::EncodeError;
-use tetralod::format::EncodeOptions;
-use tetralod::format::encode;
-use tetralod::format::encode_to;
+use tetralod::builder::{BuildConfig, build};
+use tetralod::format::{BLOCK_BITS, Decoder, EncodeError, EncodeOptions, encode, encode_to};
 use tetralod::generate;
 use tetralod::geom::WIDE_BITS;
-use tetralod::mt::ApplyUpdates;
-use tetralod::mt::EdgeMt;
-use tetralod::mt::ExplicitMt;
-use tetralod::mt::Mt;
-use tetralod::mt::MtInfo;
-use tetralod::mt::MtKind;
-use tetralod::mt::MultiTessellation;
-use tetralod::mt::UpdateError;
-use tetralod::mt::UpdateId;
-use tetralod::mt::UpdatePages;
-use tetralod::mt::VertexSplit;
+use tetralod::mt::{
+    ApplyUpdates, EdgeMt, ExplicitMt, Mt, MtInfo, MtKind, MultiTessellation, UpdateError, UpdateId,
+    UpdatePages, VertexSplit,
+};
 
 /// The file of an MT gives an MT of the same updates, and that the same file.
 fn comes_back(mt: &Mt, block_bits: u32) {

@@ -2,12 +2,8 @@
 //! other versions are refused, and what is not an MT file is called so at its first byte.
 
 use crate::support::files::{assemble, bytes_of, coded, decode, header, sample, section, sections, within};
-use tetralod::format::Decoder;
-use tetralod::format::FormatError;
-use tetralod::format::Limits;
-use tetralod::mt::BaseMeshError;
-use tetralod::mt::PageError;
-use tetralod::mt::UpdateError;
+use tetralod::format::{Decoder, FormatError, Limits};
+use tetralod::mt::{BaseMeshError, PageError, UpdateError};
 
 #[test]
 fn unknown_skippable_sections_are_skipped_anywhere() {

@@ -3,8 +3,7 @@
 use crate::support::files::{bytes_of, decode, samples};
 use crate::support::strategies::config;
 use proptest::prelude::*;
-use tetralod::format::Decoder;
-use tetralod::format::FormatError;
+use tetralod::format::{Decoder, FormatError};
 use tetralod::mt::Mt;
 
 /// Feeds pieces that end at `cuts`.

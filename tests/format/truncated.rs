@@ -1,11 +1,8 @@
 //! Promise: every prefix of a file is usable as far as it goes, and is told apart from the whole and from damage.
 
 use crate::support::files::{bytes_in_blocks, decode, is_prefix, samples};
-use tetralod::format::Decoder;
-use tetralod::format::FormatError;
-use tetralod::format::Progress;
-use tetralod::mt::Mt;
-use tetralod::mt::UpdatePages;
+use tetralod::format::{Decoder, FormatError, Progress};
+use tetralod::mt::{Mt, UpdatePages};
 
 /// What must hold when the first bytes of a file have arrived.
 fn check_prefix(decoder: &Decoder, progress: Progress, length: usize) {

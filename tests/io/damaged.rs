@@ -1,12 +1,9 @@
 //! Files that are cut short, flipped or lie about their sizes: a typed error or the same mesh, never a panic.
 
 use crate::files::*;
-use tetralod::io;
-use tetralod::io::CellData;
-use tetralod::io::ReadOptions;
-use tetralod::io::ReadReason;
-use tetralod::mesh;
+use tetralod::io::{CellData, ReadOptions, ReadReason};
 use tetralod::mesh::TetMesh;
+use tetralod::{io, mesh};
 
 /// A few small files, one of each kind, and what they hold.
 fn files() -> Vec<(String, Vec<u8>, TetMesh)> {

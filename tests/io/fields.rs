@@ -1,8 +1,7 @@
 //! Promises of what readers tell of fields: units, times, vectors, fields at cells, and that no more is kept than is wanted.
 
 use tetralod::io;
-use tetralod::io::CellData;
-use tetralod::io::ReadOptions;
+use tetralod::io::{CellData, ReadOptions};
 use tetralod::mesh::TetMesh;
 
 fn read(name: &str, file: &str, options: &ReadOptions) -> TetMesh {

@@ -5,10 +5,7 @@ use std::path::PathBuf;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use tetralod::mesh::Field;
-use tetralod::mesh::Grid;
-use tetralod::mesh::TetMesh;
-use tetralod::mesh::VectorPart;
+use tetralod::mesh::{Field, Grid, TetMesh, VectorPart};
 
 /// The folder of real data sets, if this run has one; says so if not.
 pub fn real_data() -> Option<PathBuf> {

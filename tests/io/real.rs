@@ -3,11 +3,9 @@
 use std::path::Path;
 
 use crate::files::real_data;
-use tetralod::io;
 use tetralod::io::ReadError;
-use tetralod::mesh;
-use tetralod::mesh::MeshError;
-use tetralod::mesh::TetMesh;
+use tetralod::mesh::{MeshError, TetMesh};
+use tetralod::{io, mesh};
 
 fn read(folder: &Path, name: &str) -> TetMesh {
     io::read(&folder.join(name)).unwrap_or_else(|e| panic!("{e}"))

@@ -1,14 +1,8 @@
 //! Promise: surfaces, lines and points are written as their formats have it.
 
 use flate2::read::ZlibDecoder;
-use std::io::ErrorKind;
-use std::io::Read;
-use tetralod::io::PolyData;
-use tetralod::io::write_csv;
-use tetralod::io::write_obj;
-use tetralod::io::write_ply;
-use tetralod::io::write_stl;
-use tetralod::io::write_vtp;
+use std::io::{ErrorKind, Read};
+use tetralod::io::{PolyData, write_csv, write_obj, write_ply, write_stl, write_vtp};
 
 /// Two triangles of a square, or a zigzag through its corners.
 fn square(lines: bool) -> PolyData {

@@ -10,12 +10,7 @@ use crate::support::random::Random;
 use crate::support::strategies::{config, plan};
 use proptest::prelude::*;
 use std::ops::Range;
-use tetralod::mt::Applied;
-use tetralod::mt::ApplyUpdates;
-use tetralod::mt::Mt;
-use tetralod::mt::MultiTessellation;
-use tetralod::mt::UpdateId;
-use tetralod::mt::UpdatePages;
+use tetralod::mt::{Applied, ApplyUpdates, Mt, MultiTessellation, UpdateId, UpdatePages};
 
 /// Few updates between the copies, many blocks of entries: nothing is told by accident.
 fn changes_tell_everything(mt: &Mt, random: &mut Random) {

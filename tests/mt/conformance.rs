@@ -10,26 +10,13 @@ use crate::support::meshes::{blocks, hilly};
 use crate::support::random::Random;
 use crate::support::strategies::config;
 use proptest::prelude::*;
-use std::collections::HashMap;
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use tetralod::geom::Bounds;
-use tetralod::mt::Applied;
-use tetralod::mt::ApplyUpdates;
-use tetralod::mt::CurrentMesh;
-use tetralod::mt::ErrorCode;
-use tetralod::mt::Mt;
-use tetralod::mt::MtKind;
-use tetralod::mt::MultiTessellation;
-use tetralod::mt::UpdateId;
-use tetralod::mt::UpdatePages;
-use tetralod::mt::stats;
-use tetralod::refine::Budget;
-use tetralod::refine::Front;
-use tetralod::refine::LodCriterion;
-use tetralod::refine::Need;
-use tetralod::refine::Outcome;
-use tetralod::refine::Region;
-use tetralod::refine::Request;
+use tetralod::mt::{
+    Applied, ApplyUpdates, CurrentMesh, ErrorCode, Mt, MtKind, MultiTessellation, UpdateId, UpdatePages,
+    stats,
+};
+use tetralod::refine::{Budget, Front, LodCriterion, Need, Outcome, Region, Request};
 
 macro_rules! conformance {
     ($($name:ident: $how:expr,)*) => {$(

@@ -7,10 +7,7 @@ use crate::support::random::Random;
 use crate::support::strategies::{config, plan};
 use proptest::prelude::*;
 use std::collections::BTreeSet;
-use tetralod::mt::ExplicitMt;
-use tetralod::mt::UpdateId;
-use tetralod::mt::VertexId;
-use tetralod::mt::stats;
+use tetralod::mt::{ExplicitMt, UpdateId, VertexId, stats};
 
 fn explicit(built: &Built) -> ExplicitMt {
     ExplicitMt::of(&built.edge_mt()).expect("a valid MT")

@@ -2,20 +2,10 @@
 
 use crate::support::builder::{Plan, build};
 use crate::support::domains::{Domain, volume6};
-use tetralod::mt::Applied;
-use tetralod::mt::ApplyUpdates;
-use tetralod::mt::ConvertError;
-use tetralod::mt::CurrentMesh;
-use tetralod::mt::EdgeMt;
-use tetralod::mt::ErrorCode;
-use tetralod::mt::ExplicitMt;
-use tetralod::mt::ExplicitUpdate;
-use tetralod::mt::Mt;
-use tetralod::mt::MtKind;
-use tetralod::mt::MultiTessellation;
-use tetralod::mt::UpdateError;
-use tetralod::mt::UpdateId;
-use tetralod::mt::VertexId;
+use tetralod::mt::{
+    Applied, ApplyUpdates, ConvertError, CurrentMesh, EdgeMt, ErrorCode, ExplicitMt, ExplicitUpdate, Mt,
+    MtKind, MultiTessellation, UpdateError, UpdateId, VertexId,
+};
 
 /// One MT and its current mesh.
 struct Walk<M> {

@@ -8,24 +8,11 @@ use crate::support::random::Random;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use tetralod::geom::Bounds;
-use tetralod::mt::ApplyUpdates;
-use tetralod::mt::ForestChild;
-use tetralod::mt::HalfEdgeMt;
-use tetralod::mt::HalfEdgeUpdate;
-use tetralod::mt::Mt;
-use tetralod::mt::MultiTessellation;
-use tetralod::mt::PageError;
-use tetralod::mt::UpdateId;
-use tetralod::mt::VertexId;
-use tetralod::refine::Budget;
-use tetralod::refine::Criterion;
-use tetralod::refine::Front;
-use tetralod::refine::LodCriterion;
-use tetralod::refine::Need;
-use tetralod::refine::Part;
-use tetralod::refine::Request;
-use tetralod::refine::TetLook;
-use tetralod::refine::Values;
+use tetralod::mt::{
+    ApplyUpdates, ForestChild, HalfEdgeMt, HalfEdgeUpdate, Mt, MultiTessellation, PageError, UpdateId,
+    VertexId,
+};
+use tetralod::refine::{Budget, Criterion, Front, LodCriterion, Need, Part, Request, TetLook, Values};
 
 struct Paged {
     subject: Subject,

@@ -4,20 +4,10 @@ use crate::support::builder::{Plan, build};
 use crate::support::compare::{live_tets, snapshot};
 use crate::support::domains::{Domain, volume6};
 use tetralod::geom::Lattice;
-use tetralod::mt::Applied;
-use tetralod::mt::ApplyUpdates;
-use tetralod::mt::BaseMesh;
-use tetralod::mt::CurrentMesh;
-use tetralod::mt::EdgeMt;
-use tetralod::mt::ErrorCode;
-use tetralod::mt::FieldInfo;
-use tetralod::mt::MtInfo;
-use tetralod::mt::MtKind;
-use tetralod::mt::UpdateError;
-use tetralod::mt::UpdateId;
-use tetralod::mt::UpdatePages;
-use tetralod::mt::VertexId;
-use tetralod::mt::VertexSplit;
+use tetralod::mt::{
+    Applied, ApplyUpdates, BaseMesh, CurrentMesh, EdgeMt, ErrorCode, FieldInfo, MtInfo, MtKind, UpdateError,
+    UpdateId, UpdatePages, VertexId, VertexSplit,
+};
 
 const CENTRE: [i32; 3] = [512; 3];
 

@@ -6,18 +6,10 @@ use crate::support::domains::Domain;
 use crate::support::random::Random;
 use crate::support::strategies::config;
 use proptest::prelude::*;
-use tetralod::mt::Applied;
-use tetralod::mt::ApplyUpdates;
-use tetralod::mt::BaseMesh;
-use tetralod::mt::BaseMeshError;
-use tetralod::mt::CurrentMesh;
-use tetralod::mt::EdgeMt;
-use tetralod::mt::ExplicitMt;
-use tetralod::mt::MtFault;
-use tetralod::mt::UpdateError;
-use tetralod::mt::UpdateId;
-use tetralod::mt::UpdatePages;
-use tetralod::mt::stats;
+use tetralod::mt::{
+    Applied, ApplyUpdates, BaseMesh, BaseMeshError, CurrentMesh, EdgeMt, ExplicitMt, MtFault, UpdateError,
+    UpdateId, UpdatePages, stats,
+};
 
 /// Forces updates in and out as a refinement engine does, and checks what must hold after every call.
 struct Driver<'a> {

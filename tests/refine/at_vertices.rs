@@ -1,13 +1,8 @@
 //! What an extracted mesh shows at the vertices of the input, found by plain search.
 
 use tetralod::mesh::TetMesh;
-use tetralod::mt::CurrentMesh;
-use tetralod::mt::Mt;
-use tetralod::mt::MtInfo;
-use tetralod::mt::MultiTessellation;
-use tetralod::refine::Front;
-use tetralod::refine::LodCriterion;
-use tetralod::refine::Request;
+use tetralod::mt::{CurrentMesh, Mt, MtInfo, MultiTessellation};
+use tetralod::refine::{Front, LodCriterion, Request};
 
 /// The mesh within an error, and the bound that it keeps.
 pub fn refined(mt: &Mt, error: f64) -> (Front, f64) {

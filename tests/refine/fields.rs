@@ -4,20 +4,10 @@
 use crate::subjects::{SUBJECTS, applied};
 use crate::support::meshes::{cube, hilly};
 use std::ops::ControlFlow;
-use tetralod::builder::BuildConfig;
-use tetralod::builder::Construction;
-use tetralod::builder::Criterion;
-use tetralod::builder::Method;
-use tetralod::builder::build;
+use tetralod::builder::{BuildConfig, Construction, Criterion, Method, build};
 use tetralod::geom::Bounds;
-use tetralod::mt::EdgeMt;
-use tetralod::mt::MtKind;
-use tetralod::mt::MultiTessellation;
-use tetralod::mt::UpdateId;
-use tetralod::refine::LodCriterion;
-use tetralod::refine::Need;
-use tetralod::refine::Request;
-use tetralod::refine::RequestError;
+use tetralod::mt::{EdgeMt, MtKind, MultiTessellation, UpdateId};
+use tetralod::refine::{LodCriterion, Need, Request, RequestError};
 use tetralod::verify;
 
 #[test]

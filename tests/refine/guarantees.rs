@@ -10,29 +10,14 @@ use crate::support::conformance::{
 use crate::support::surfaces::{Interpolant, Mesh, Surface};
 use glam::DVec3;
 use std::path::PathBuf;
-use tetralod::generate;
 use tetralod::geom::Bounds;
-use tetralod::io;
-use tetralod::mesh::TetMesh;
-use tetralod::mesh::repair;
-use tetralod::mt::ApplyUpdates;
-use tetralod::mt::ExplicitMt;
-use tetralod::mt::Mt;
-use tetralod::mt::MultiTessellation;
-use tetralod::mt::UpdateId;
-use tetralod::mt::VertexId;
-use tetralod::refine::Budget;
-use tetralod::refine::Criterion;
-use tetralod::refine::Front;
-use tetralod::refine::LodCriterion;
-use tetralod::refine::Need;
-use tetralod::refine::Region;
-use tetralod::refine::Request;
-use tetralod::refine::TetLook;
-use tetralod::refine::Transfer;
-use tetralod::refine::View;
-use tetralod::verify;
+use tetralod::mesh::{TetMesh, repair};
+use tetralod::mt::{ApplyUpdates, ExplicitMt, Mt, MultiTessellation, UpdateId, VertexId};
+use tetralod::refine::{
+    Budget, Criterion, Front, LodCriterion, Need, Region, Request, TetLook, Transfer, View,
+};
 use tetralod::verify::Reference;
+use tetralod::{generate, io, verify};
 
 const KINDS: [(&str, How); 4] =
     [("edge", EDGE), ("half-edge", HALF_EDGE), ("Delaunay", DELAUNAY), ("insertion", INSERTED)];

@@ -4,29 +4,14 @@
 use crate::support::meshes::{blocks, tampered};
 use crate::support::random::Random;
 use std::ops::ControlFlow;
-use tetralod::builder::BuildConfig;
-use tetralod::builder::Construction;
-use tetralod::builder::Criterion;
-use tetralod::builder::Method;
-use tetralod::builder::build;
-use tetralod::format::EncodeError;
-use tetralod::format::EncodeOptions;
-use tetralod::format::encode;
+use tetralod::builder::{BuildConfig, Construction, Criterion, Method, build};
+use tetralod::format::{EncodeError, EncodeOptions, encode};
 use tetralod::mesh::TetMesh;
-use tetralod::mt::ApplyUpdates;
-use tetralod::mt::EdgeMt;
-use tetralod::mt::ErrorCode;
-use tetralod::mt::ExplicitMt;
-use tetralod::mt::Mt;
-use tetralod::mt::MtKind;
-use tetralod::mt::MultiTessellation;
-use tetralod::mt::UpdateId;
-use tetralod::mt::VertexId;
-use tetralod::mt::check_errors;
-use tetralod::refine::Front;
-use tetralod::refine::LodCriterion;
-use tetralod::refine::Need;
-use tetralod::refine::Request;
+use tetralod::mt::{
+    ApplyUpdates, EdgeMt, ErrorCode, ExplicitMt, Mt, MtKind, MultiTessellation, UpdateId, VertexId,
+    check_errors,
+};
+use tetralod::refine::{Front, LodCriterion, Need, Request};
 
 /// As many values as a scan has, with noise that no neighbour shares.
 fn noisy(cells: [u32; 3], noise: f64, seed: u64) -> TetMesh {

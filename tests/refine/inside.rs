@@ -4,15 +4,9 @@
 use crate::at_vertices::{errors_inside, refined};
 use crate::support::meshes::blocks;
 use std::ops::ControlFlow;
-use tetralod::builder::BuildConfig;
-use tetralod::builder::Construction;
-use tetralod::builder::Criterion;
-use tetralod::builder::Method;
-use tetralod::builder::build;
+use tetralod::builder::{BuildConfig, Construction, Criterion, Method, build};
 use tetralod::mesh::TetMesh;
-use tetralod::mt::Mt;
-use tetralod::mt::MtKind;
-use tetralod::mt::MultiTessellation;
+use tetralod::mt::{Mt, MtKind, MultiTessellation};
 
 /// The kinds and builders that move a boundary.
 const WAYS: [(MtKind, Method, Criterion); 4] = [

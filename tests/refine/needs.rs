@@ -5,23 +5,12 @@ use crate::subjects::{SUBJECTS, Subject, applied};
 use crate::support::strategies::config;
 use proptest::prelude::*;
 use std::sync::Arc;
-use tetralod::geom::Bounds;
-use tetralod::geom::Camera;
-use tetralod::mt::ErrorCode;
-use tetralod::mt::UpdateId;
-use tetralod::refine::ANY;
-use tetralod::refine::Budget;
-use tetralod::refine::Criterion;
-use tetralod::refine::Custom;
-use tetralod::refine::Front;
-use tetralod::refine::LodCriterion;
-use tetralod::refine::Need;
-use tetralod::refine::Region;
-use tetralod::refine::Request;
-use tetralod::refine::TetLook;
-use tetralod::refine::Transfer;
-use tetralod::refine::Verdict;
-use tetralod::refine::View;
+use tetralod::geom::{Bounds, Camera};
+use tetralod::mt::{ErrorCode, UpdateId};
+use tetralod::refine::{
+    ANY, Budget, Criterion, Custom, Front, LodCriterion, Need, Region, Request, TetLook, Transfer, Verdict,
+    View,
+};
 
 /// A need by numbers from 0 to 1, so that it can be moved a little.
 #[derive(Clone, Debug)]

@@ -6,14 +6,8 @@ use crate::subjects::{SUBJECTS, Subject, applied, tets};
 use crate::support::random::Random;
 use std::collections::BTreeSet;
 use tetralod::geom::Bounds;
-use tetralod::mt::EdgeMt;
-use tetralod::mt::ErrorCode;
-use tetralod::mt::MultiTessellation;
-use tetralod::mt::UpdateId;
-use tetralod::mt::VertexSplit;
-use tetralod::refine::LodCriterion;
-use tetralod::refine::Need;
-use tetralod::refine::Request;
+use tetralod::mt::{EdgeMt, ErrorCode, MultiTessellation, UpdateId, VertexSplit};
+use tetralod::refine::{LodCriterion, Need, Request};
 
 fn requests(subject: &Subject, random: &mut Random) -> Vec<Request> {
     let bounds = Bounds::of(&subject.input.positions);

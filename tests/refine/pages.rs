@@ -6,22 +6,11 @@ use crate::subjects::{SUBJECTS, Subject, applied};
 use crate::support::random::Random;
 use std::collections::BTreeSet;
 use tetralod::geom::Bounds;
-use tetralod::mt::ApplyUpdates;
-use tetralod::mt::EdgeMt;
-use tetralod::mt::ErrorCode;
-use tetralod::mt::MultiTessellation;
-use tetralod::mt::PageError;
-use tetralod::mt::UpdateError;
-use tetralod::mt::UpdateId;
-use tetralod::mt::VertexId;
-use tetralod::mt::VertexSplit;
-use tetralod::refine::Budget;
-use tetralod::refine::Criterion;
-use tetralod::refine::Front;
-use tetralod::refine::LodCriterion;
-use tetralod::refine::Need;
-use tetralod::refine::Request;
-use tetralod::refine::TetLook;
+use tetralod::mt::{
+    ApplyUpdates, EdgeMt, ErrorCode, MultiTessellation, PageError, UpdateError, UpdateId, VertexId,
+    VertexSplit,
+};
+use tetralod::refine::{Budget, Criterion, Front, LodCriterion, Need, Request, TetLook};
 
 /// A subject in pages, with what each depends on.
 struct Paged<'a> {

@@ -1,11 +1,7 @@
 //! The same MT with its updates in another order.
 
 use crate::subjects::{Subject, sorted};
-use tetralod::mt::EdgeMt;
-use tetralod::mt::ExplicitMt;
-use tetralod::mt::ExplicitUpdate;
-use tetralod::mt::UpdateId;
-use tetralod::mt::VertexId;
+use tetralod::mt::{EdgeMt, ExplicitMt, ExplicitUpdate, UpdateId, VertexId};
 
 /// A random order of the updates in which parents come first.
 pub fn random_order(explicit: &ExplicitMt, mut below: impl FnMut(usize) -> usize) -> Vec<UpdateId> {

@@ -5,20 +5,11 @@ use crate::at_vertices::{errors_inside, refined};
 use crate::support::meshes::blocks;
 use crate::support::random::Random;
 use std::ops::ControlFlow;
-use tetralod::builder::BuildConfig;
-use tetralod::builder::Construction;
-use tetralod::builder::Criterion;
-use tetralod::builder::Method;
-use tetralod::builder::build;
-use tetralod::measure;
+use tetralod::builder::{BuildConfig, Construction, Criterion, Method, build};
 use tetralod::mesh::TetMesh;
-use tetralod::mt::CurrentMesh;
-use tetralod::mt::Mt;
-use tetralod::mt::MtInfo;
-use tetralod::mt::MtKind;
-use tetralod::mt::MultiTessellation;
-use tetralod::verify;
+use tetralod::mt::{CurrentMesh, Mt, MtInfo, MtKind, MultiTessellation};
 use tetralod::verify::Reference;
+use tetralod::{measure, verify};
 
 /// A box with ever thinner layers towards its bottom, across which the field rises steeply; no vertex inside is on a lattice.
 fn layers(thinnest: f64) -> TetMesh {

@@ -4,17 +4,8 @@ use crate::support::meshes::{bent, blocks, built, cube, hilly, linear};
 use std::collections::BTreeSet;
 use std::sync::LazyLock;
 use tetralod::mesh::TetMesh;
-use tetralod::mt::CurrentMesh;
-use tetralod::mt::EdgeMt;
-use tetralod::mt::ExplicitMt;
-use tetralod::mt::UpdateId;
-use tetralod::mt::VertexId;
-use tetralod::refine::Criterion;
-use tetralod::refine::Front;
-use tetralod::refine::LodCriterion;
-use tetralod::refine::Outcome;
-use tetralod::refine::Request;
-use tetralod::refine::TetLook;
+use tetralod::mt::{CurrentMesh, EdgeMt, ExplicitMt, UpdateId, VertexId};
+use tetralod::refine::{Criterion, Front, LodCriterion, Outcome, Request, TetLook};
 
 /// An MT, its input and its oracle.
 pub struct Subject {

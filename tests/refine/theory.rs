@@ -7,16 +7,9 @@ use crate::support::strategies::config;
 use proptest::prelude::*;
 use std::collections::BTreeSet;
 use tetralod::geom::Bounds;
-use tetralod::measure::Part;
-use tetralod::measure::Reference;
-use tetralod::measure::deviation;
+use tetralod::measure::{Part, Reference, deviation};
 use tetralod::mt::ErrorCode;
-use tetralod::refine::Budget;
-use tetralod::refine::Front;
-use tetralod::refine::LodCriterion;
-use tetralod::refine::Need;
-use tetralod::refine::Region;
-use tetralod::refine::Request;
+use tetralod::refine::{Budget, Front, LodCriterion, Need, Region, Request};
 
 /// A request in fractions of the subject's bounds and ranges.
 #[derive(Clone, Debug)]

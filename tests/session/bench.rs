@@ -2,8 +2,7 @@
 
 use crate::support::meshes::{built, cube, hilly};
 use tetralod::bench;
-use tetralod::format::EncodeOptions;
-use tetralod::format::encode;
+use tetralod::format::{EncodeOptions, encode};
 use tetralod::session::SessionError;
 
 /// A clock that says a millisecond has passed whenever it is asked.

@@ -6,33 +6,18 @@ use std::io::Cursor;
 use std::ops::ControlFlow;
 use std::rc::Rc;
 use std::time::Duration;
-use tetralod::builder::BuildConfig;
-use tetralod::builder::Construction;
-use tetralod::builder::build;
-use tetralod::client::Client;
-use tetralod::client::ClientError;
-use tetralod::client::ClientOptions;
-use tetralod::format::DecodeOptions;
-use tetralod::format::EncodeOptions;
-use tetralod::format::FormatError;
-use tetralod::format::encode;
+use tetralod::builder::{BuildConfig, Construction, build};
+use tetralod::client::{Client, ClientError, ClientOptions};
+use tetralod::format::{DecodeOptions, EncodeOptions, FormatError, encode};
 use tetralod::generate;
 use tetralod::geom::Bounds;
-use tetralod::mt::MtKind;
-use tetralod::mt::MultiTessellation;
-use tetralod::refine::Need;
-use tetralod::refine::Request;
+use tetralod::mt::{MtKind, MultiTessellation};
+use tetralod::refine::{Need, Request};
 use tetralod::remote::Remote;
 use tetralod::session::Session;
-use tetralod::stream::Action;
-use tetralod::stream::Arrived;
-use tetralod::stream::FileSource;
-use tetralod::stream::Loader;
-use tetralod::stream::LoaderOptions;
-use tetralod::stream::RangeSource;
-use tetralod::stream::ResponseHead;
-use tetralod::stream::StreamError;
-use tetralod::stream::WantedRange;
+use tetralod::stream::{
+    Action, Arrived, FileSource, Loader, LoaderOptions, RangeSource, ResponseHead, StreamError, WantedRange,
+};
 
 const BLOCK_BITS: u32 = 6;
 

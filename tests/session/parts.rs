@@ -3,17 +3,12 @@
 
 use crate::support::random::Random;
 use std::ops::ControlFlow;
-use tetralod::builder::BuildConfig;
-use tetralod::builder::build;
-use tetralod::format::DecodeOptions;
-use tetralod::format::EncodeOptions;
-use tetralod::format::encode;
+use tetralod::builder::{BuildConfig, build};
+use tetralod::format::{DecodeOptions, EncodeOptions, encode};
 use tetralod::generate;
 use tetralod::geom::Bounds;
-use tetralod::mt::CurrentMesh;
-use tetralod::mt::MtKind;
-use tetralod::refine::Need;
-use tetralod::refine::Request;
+use tetralod::mt::{CurrentMesh, MtKind};
+use tetralod::refine::{Need, Request};
 use tetralod::session::Session;
 
 const BLOCK_BITS: u32 = 6;

@@ -4,9 +4,7 @@ use crate::support::files::{assemble, sections};
 use tetralod::format::{EncodeOptions, FormatError, encode};
 use tetralod::geom::{Bounds, Lattice};
 use tetralod::mt::{BaseMesh, EdgeMt, ErrorCode, FieldInfo, MtInfo, MtKind, VertexId, VertexSplit};
-use tetralod::refine::Need;
-use tetralod::refine::Request;
-use tetralod::refine::RequestError;
+use tetralod::refine::{Need, Request, RequestError};
 use tetralod::session::{Session, SessionError};
 
 fn field(name: &str) -> FieldInfo {

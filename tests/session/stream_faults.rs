@@ -1,30 +1,18 @@
 //! Promise: over real connections to a server that misbehaves, the right bytes come or an error that says what to do
 //! about it, after a bounded number of requests, and nothing hangs.
 
-use std::io::BufRead;
-use std::io::BufReader;
-use std::io::Read;
-use std::io::Write;
-use std::net::Shutdown;
-use std::net::TcpListener;
-use std::net::TcpStream;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::{Shutdown, TcpListener, TcpStream};
 use std::ops::Range;
 use std::path::PathBuf;
 use std::slice::from_ref;
-use std::sync::Arc;
-use std::sync::Mutex;
-use std::sync::atomic::AtomicUsize;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
 use std::thread;
-use std::time::Duration;
-use std::time::Instant;
-use tetralod::stream::CacheFolder;
-use tetralod::stream::HttpOptions;
-use tetralod::stream::HttpSource;
-use tetralod::stream::LoaderOptions;
-use tetralod::stream::RangeSource;
-use tetralod::stream::StreamError;
-use tetralod::stream::WantedRange;
+use std::time::{Duration, Instant};
+use tetralod::stream::{
+    CacheFolder, HttpOptions, HttpSource, LoaderOptions, RangeSource, StreamError, WantedRange,
+};
 
 const SIZE: u64 = 200_000;
 
@@ -55,9 +43,7 @@ enum Step {
     Hang,
 }
 
-use Step::Hang;
-use Step::Send;
-use Step::Sleep;
+use Step::{Hang, Send, Sleep};
 
 type Answers = dyn Fn(&Asked) -> Vec<Step> + std::marker::Send + Sync;
 

@@ -1,22 +1,11 @@
 //! A slow, plain builder of random MTs: collapses random edges of a small mesh to their floor midpoints.
 
-use super::domains::Domain;
-use super::domains::POSITION_BITS;
-use super::domains::volume6;
-use super::oracle::Node;
-use super::oracle::Oracle;
+use super::domains::{Domain, POSITION_BITS, volume6};
+use super::oracle::{Node, Oracle};
 use super::random::Random;
-use std::collections::BTreeMap;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use tetralod::geom::Lattice;
-use tetralod::mt::BaseMesh;
-use tetralod::mt::EdgeMt;
-use tetralod::mt::ErrorCode;
-use tetralod::mt::FieldInfo;
-use tetralod::mt::MtInfo;
-use tetralod::mt::MtKind;
-use tetralod::mt::VertexId;
-use tetralod::mt::VertexSplit;
+use tetralod::mt::{BaseMesh, EdgeMt, ErrorCode, FieldInfo, MtInfo, MtKind, VertexId, VertexSplit};
 
 /// A vertex split that owns its parts.
 #[derive(Clone, Debug)]

@@ -4,31 +4,13 @@ use crate::support::builder::{Plan, build};
 use crate::support::domains::Domain;
 use std::collections::BTreeMap;
 use std::sync::Mutex;
-use tetralod::format::DecodeOptions;
-use tetralod::format::Decoder;
-use tetralod::format::EncodeOptions;
-use tetralod::format::FormatError;
-use tetralod::format::Limits;
-use tetralod::format::encode;
+use tetralod::format::{DecodeOptions, Decoder, EncodeOptions, FormatError, Limits, encode};
 use tetralod::geom::Lattice;
 use tetralod::mesh::VectorPart;
-use tetralod::mt::Applied;
-use tetralod::mt::ApplyUpdates;
-use tetralod::mt::BaseMesh;
-use tetralod::mt::CurrentMesh;
-use tetralod::mt::EdgeMt;
-use tetralod::mt::ErrorCode;
-use tetralod::mt::ExplicitMt;
-use tetralod::mt::ExplicitUpdate;
-use tetralod::mt::FieldInfo;
-use tetralod::mt::Mt;
-use tetralod::mt::MtInfo;
-use tetralod::mt::MtKind;
-use tetralod::mt::MtRef;
-use tetralod::mt::MultiTessellation;
-use tetralod::mt::UpdateId;
-use tetralod::mt::VertexId;
-use tetralod::mt::VertexSplit;
+use tetralod::mt::{
+    Applied, ApplyUpdates, BaseMesh, CurrentMesh, EdgeMt, ErrorCode, ExplicitMt, ExplicitUpdate, FieldInfo,
+    Mt, MtInfo, MtKind, MtRef, MultiTessellation, UpdateId, VertexId, VertexSplit,
+};
 
 pub fn field(name: &str, bits: u32) -> FieldInfo {
     let largest = f64::from((1_u32 << bits) - 1);

@@ -1,18 +1,9 @@
 //! Meshes made by code, small enough to be built and verified in a test.
 
 use std::ops::ControlFlow;
-use tetralod::builder::BuildConfig;
-use tetralod::builder::BuildResult;
-use tetralod::builder::edge_mt;
-use tetralod::mesh::Field;
-use tetralod::mesh::Grid;
-use tetralod::mesh::TetMesh;
-use tetralod::mesh::repair;
-use tetralod::mt::EdgeMt;
-use tetralod::mt::ErrorCode;
-use tetralod::mt::MtKind;
-use tetralod::mt::UpdateId;
-use tetralod::mt::VertexSplit;
+use tetralod::builder::{BuildConfig, BuildResult, edge_mt};
+use tetralod::mesh::{Field, Grid, TetMesh, repair};
+use tetralod::mt::{EdgeMt, ErrorCode, MtKind, UpdateId, VertexSplit};
 
 /// A field with hills, edges and a plateau.
 pub fn hilly([x, y, z]: [f64; 3]) -> f64 {

@@ -2,8 +2,7 @@
 
 use super::domains::volume6;
 use super::random::Random;
-use std::collections::BTreeMap;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// What an update does, in numbers of MT vertices; tetrahedra are positive.
 #[derive(Clone, Debug)]

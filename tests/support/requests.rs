@@ -1,8 +1,7 @@
 //! What sessions are asked for in tests.
 
 use tetralod::geom::Bounds;
-use tetralod::refine::Need;
-use tetralod::refine::Request;
+use tetralod::refine::{Need, Request};
 
 /// Requests that go up and down, with and without a part and a budget.
 pub fn requests() -> [Request; 7] {

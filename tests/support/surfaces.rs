@@ -3,8 +3,7 @@
 use glam::DVec3;
 use std::collections::BTreeMap;
 use tetralod::geom::nearest_on_triangle;
-use tetralod::mt::CurrentMesh;
-use tetralod::mt::MtInfo;
+use tetralod::mt::{CurrentMesh, MtInfo};
 
 /// A mesh in model units with its first field.
 pub struct Mesh {

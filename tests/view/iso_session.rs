@@ -5,16 +5,11 @@ use crate::support::conformance::{DELAUNAY, EDGE, HALF_EDGE, INSERTED, SPELLED_E
 use crate::support::meshes::{bent, cube, hilly, linear};
 use crate::support::random::Random;
 use std::collections::BTreeMap;
-use tetralod::format::EncodeOptions;
-use tetralod::format::encode;
+use tetralod::format::{EncodeOptions, encode};
 use tetralod::geom::Bounds;
-use tetralod::refine::Budget;
-use tetralod::refine::Need;
-use tetralod::refine::Region;
-use tetralod::refine::Request;
+use tetralod::refine::{Budget, Need, Region, Request};
 use tetralod::session::Session;
-use tetralod::view::IsoSurface;
-use tetralod::view::NormalKind;
+use tetralod::view::{IsoSurface, NormalKind};
 
 type Corner = [u32; 6];
 

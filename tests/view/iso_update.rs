@@ -5,10 +5,7 @@ use crate::scenes::{Scene, distance_to_centre};
 use crate::support::random::Random;
 use std::ops::Range;
 use tetralod::mesh::NONE;
-use tetralod::view::IsoSurface;
-use tetralod::view::MeshView;
-use tetralod::view::NormalKind;
-use tetralod::view::SurfaceChanges;
+use tetralod::view::{IsoSurface, MeshView, NormalKind, SurfaceChanges};
 
 /// A vertex of a surface, as bits: value, position, normal.
 type Vertex = [u32; 7];

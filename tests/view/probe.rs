@@ -7,15 +7,7 @@ use crate::support::random::Random;
 use crate::walk::{KINDS, Walk};
 use std::f64::consts::PI;
 use tetralod::mesh::TetMesh;
-use tetralod::view::FieldStats;
-use tetralod::view::Histogram;
-use tetralod::view::MeshView;
-use tetralod::view::Place;
-use tetralod::view::Probe;
-use tetralod::view::Span;
-use tetralod::view::StreamEnd;
-use tetralod::view::TraceOptions;
-use tetralod::view::Tracer;
+use tetralod::view::{FieldStats, Histogram, MeshView, Place, Probe, Span, StreamEnd, TraceOptions, Tracer};
 
 fn scene(mesh: &TetMesh) -> Scene {
     let positions = mesh.positions.iter().map(|p| p.map(|x| x as f32)).collect();

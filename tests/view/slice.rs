@@ -1,22 +1,14 @@
 //! Promise: a slice is the section of the mesh with the plane, whole and once, from scratch as after any change.
 
 use crate::scenes::Scene;
-use crate::support::meshes::linear as linear_field;
-use crate::support::meshes::{bent, built, cube, hilly};
+use crate::support::meshes::{bent, built, cube, hilly, linear as linear_field};
 use crate::support::random::Random;
 use crate::support::requests::requests;
 use crate::walk::{KINDS, Walk, changed};
-use std::collections::BTreeMap;
-use std::collections::BTreeSet;
-use tetralod::format::EncodeOptions;
-use tetralod::format::encode;
+use std::collections::{BTreeMap, BTreeSet};
+use tetralod::format::{EncodeOptions, encode};
 use tetralod::session::Session;
-use tetralod::view::BoundarySurface;
-use tetralod::view::MeshView;
-use tetralod::view::Plane;
-use tetralod::view::Slice;
-use tetralod::view::area;
-use tetralod::view::is_closed;
+use tetralod::view::{BoundarySurface, MeshView, Plane, Slice, area, is_closed};
 
 fn linear([x, y, z]: [f32; 3]) -> f32 {
     x + 2.0 * y - 3.0 * z

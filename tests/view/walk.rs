@@ -1,23 +1,12 @@
 //! A current mesh that changes at random, as slices with the ranges that have changed.
 
 use crate::support::random::Random;
-use std::ops::ControlFlow;
-use std::ops::Range;
-use tetralod::builder::BuildConfig;
-use tetralod::builder::Construction;
-use tetralod::builder::Criterion;
-use tetralod::builder::Method;
-use tetralod::builder::build;
+use std::ops::{ControlFlow, Range};
+use tetralod::builder::{BuildConfig, Construction, Criterion, Method, build};
 use tetralod::mesh::TetMesh;
-use tetralod::mt::Applied;
-use tetralod::mt::ApplyUpdates;
-use tetralod::mt::CurrentMesh;
-use tetralod::mt::MeshChanges;
-use tetralod::mt::Mt;
-use tetralod::mt::MtKind;
-use tetralod::mt::MultiTessellation;
-use tetralod::mt::UpdateId;
-use tetralod::mt::UpdatePages;
+use tetralod::mt::{
+    Applied, ApplyUpdates, CurrentMesh, MeshChanges, Mt, MtKind, MultiTessellation, UpdateId, UpdatePages,
+};
 use tetralod::view::MeshView;
 
 /// The blocks of 64 entries in which two states of an array differ, as ranges of the new one.

@@ -4,10 +4,7 @@ use crate::support::{Folder, bad, good, json, number, run, text};
 use std::fs;
 use std::fs::File;
 use tetralod::io;
-use tetralod::mesh::Field;
-use tetralod::mesh::Grid;
-use tetralod::mesh::TetMesh;
-use tetralod::mesh::VectorPart;
+use tetralod::mesh::{Field, Grid, TetMesh, VectorPart};
 
 /// Cubes with a scalar and a vector that depend on the time.
 fn step(time: Option<f64>, factor: f64) -> TetMesh {

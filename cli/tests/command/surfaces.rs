@@ -2,9 +2,7 @@
 
 use crate::support::{Folder, bad, good, json, number, table};
 use std::fs;
-use tetralod::mesh::Field;
-use tetralod::mesh::Grid;
-use tetralod::mesh::TetMesh;
+use tetralod::mesh::{Field, Grid, TetMesh};
 
 /// Makes an MT of a box from (0, 0, 0) to (2, 1, 1) with a linear field `ramp`, a field `hill`, and the velocity of a
 /// rotation around the axis through (1, 0.5, 0) along z.

@@ -1,40 +1,17 @@
 //! Promises: what is removed can be inserted again, step by step, in sound meshes; errors bound the deviation.
 
-use super::Criterion;
-use super::Decimated;
-use super::Decimator;
-use super::Levels;
-use super::Reference;
-use super::State;
-use super::WorkMesh;
-use super::decimate;
-use super::quantize;
-use crate::builder::BuildConfig;
-use crate::builder::BuildError;
-use crate::builder::Purpose;
+use super::{Criterion, Decimated, Decimator, Levels, Reference, State, WorkMesh, decimate, quantize};
 use crate::builder::beside::Home;
 use crate::builder::cost::largest;
 use crate::builder::gift_wrap::GiftWrap;
 use crate::builder::reach::Reach;
 use crate::builder::sequence::Insertion;
-use crate::geom::in_conflict;
-use crate::geom::nearest_on_triangle;
-use crate::geom::orient3d;
-use crate::mesh::EDGES;
-use crate::mesh::FACES;
-use crate::mesh::Field;
-use crate::mesh::Grid;
-use crate::mesh::NONE;
-use crate::mesh::TetMesh;
-use crate::mesh::repair;
-use crate::mesh::topology;
-use crate::mt::ErrorCode;
-use crate::mt::MAX_LINK;
-use crate::mt::MtKind;
-use glam::DMat3;
-use glam::DVec3;
-use std::collections::BTreeMap;
-use std::collections::BTreeSet;
+use crate::builder::{BuildConfig, BuildError, Purpose};
+use crate::geom::{in_conflict, nearest_on_triangle, orient3d};
+use crate::mesh::{EDGES, FACES, Field, Grid, NONE, TetMesh, repair, topology};
+use crate::mt::{ErrorCode, MAX_LINK, MtKind};
+use glam::{DMat3, DVec3};
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 
 const CRITERIA: [Criterion; 2] = [Criterion::HalfEdge, Criterion::Delaunay];

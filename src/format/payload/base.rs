@@ -5,12 +5,9 @@
 //! order comes back as it was, too, but takes far more bits.
 
 use crate::format::FormatError;
-use crate::format::coder::Family;
-use crate::format::coder::Put;
-use crate::format::coder::Source;
+use crate::format::coder::{Family, Put, Source};
 use crate::geom::WIDE_BITS;
-use crate::mesh::Gate;
-use crate::mesh::Growth;
+use crate::mesh::{Gate, Growth};
 use crate::mt::BaseMesh;
 
 /// What lies behind a face.
@@ -292,13 +289,9 @@ fn add_vertex(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::format::coder::Counts;
-    use crate::format::coder::Models;
-    use crate::format::coder::Writer;
+    use crate::format::coder::{Counts, Models, Writer};
     use crate::format::read::Reader;
-    use crate::mesh::NONE;
-    use crate::mesh::growth_order;
-    use crate::mesh::kuhn_tets;
+    use crate::mesh::{NONE, growth_order, kuhn_tets};
 
     fn coded(base: &BaseMesh) -> (Models, Vec<u8>) {
         let mut counts = Counts::default();

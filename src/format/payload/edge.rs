@@ -6,17 +6,8 @@
 
 use super::base;
 use crate::format::FormatError;
-use crate::format::coder::Family;
-use crate::format::coder::Put;
-use crate::format::coder::Source;
-use crate::mt::BaseMeshError;
-use crate::mt::EdgeMt;
-use crate::mt::ErrorCode;
-use crate::mt::MAX_EDGE;
-use crate::mt::MtInfo;
-use crate::mt::PageError;
-use crate::mt::UpdateId;
-use crate::mt::VertexId;
+use crate::format::coder::{Family, Put, Source};
+use crate::mt::{BaseMeshError, EdgeMt, ErrorCode, MAX_EDGE, MtInfo, PageError, UpdateId, VertexId};
 use std::collections::BTreeMap;
 
 /// Distances from the vertex of one root to that of the next.

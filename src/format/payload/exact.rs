@@ -2,12 +2,8 @@
 
 use super::BASE_LEVEL;
 use crate::format::FormatError;
-use crate::format::coder::Family;
-use crate::format::coder::Put;
-use crate::format::coder::Source;
-use crate::mt::Exact;
-use crate::mt::ExactValues;
-use crate::mt::VertexId;
+use crate::format::coder::{Family, Put, Source};
+use crate::mt::{Exact, ExactValues, VertexId};
 
 /// Distances between the numbers of vertices that have values.
 pub const GAP: Family = BASE_LEVEL.numbers_after(1, 1);

@@ -4,22 +4,12 @@
 //! updates whose near vertex is its own. What removes the tetrahedra of its star is told as residuals: see
 //! `mt/half_edge_star.rs`.
 
-use super::base;
-use super::edge;
 use super::edge::FieldPart;
-use crate::format::FormatError;
-use crate::format::Limits;
-use crate::format::coder::Family;
-use crate::format::coder::Put;
-use crate::format::coder::Source;
+use super::{base, edge};
+use crate::format::coder::{Family, Put, Source};
+use crate::format::{FormatError, Limits};
 use crate::mesh::NONE;
-use crate::mt::BaseMark;
-use crate::mt::BaseMeshError;
-use crate::mt::ErrorCode;
-use crate::mt::ForestChild;
-use crate::mt::HalfEdgeMt;
-use crate::mt::MtInfo;
-use crate::mt::UpdateId;
+use crate::mt::{BaseMark, BaseMeshError, ErrorCode, ForestChild, HalfEdgeMt, MtInfo, UpdateId};
 use std::ops::Range;
 
 /// One more than the update that removes a base tetrahedron.

@@ -1,11 +1,8 @@
 //! `INDX`: what is in each block and where, so that a client can fetch just the blocks that it needs.
 
-use crate::format::FormatError;
 use crate::format::read::Reader;
-use crate::format::write;
-use crate::mt::ErrorCode;
-use crate::mt::MtInfo;
-use crate::mt::MtKind;
+use crate::format::{FormatError, write};
+use crate::mt::{ErrorCode, MtInfo, MtKind};
 use std::ops::Range;
 
 /// Most blocks that a block may depend on directly, so that an index is not larger than its file.

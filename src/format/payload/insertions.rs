@@ -5,37 +5,15 @@
 //! the new vertex lies in. Who is parent of whom, what the node of the update says of its star, and how what it
 //! removes is built again follow from that.
 
-use super::OWN_FALL;
-use super::QUARTERINGS;
-use super::base;
-use super::check_bytes;
-use super::largest;
-use crate::format::FormatError;
-use crate::format::Limits;
-use crate::format::coder::Family;
-use crate::format::coder::Put;
-use crate::format::coder::Source;
-use crate::geom::NARROW_BITS;
-use crate::geom::insphere;
-use crate::geom::orient3d;
-use crate::geom::views_of_origin;
-use crate::mesh::FACES;
-use crate::mesh::NONE;
-use crate::mt::Applied;
-use crate::mt::ApplyUpdates;
-use crate::mt::BaseMesh;
-use crate::mt::BaseMeshError;
-use crate::mt::CurrentMesh;
-use crate::mt::ErrorCode;
-use crate::mt::Insertion;
-use crate::mt::MAX_FIELD_BITS;
-use crate::mt::MAX_REMOVED;
-use crate::mt::MtInfo;
-use crate::mt::MultiTessellation;
-use crate::mt::UpdateError;
-use crate::mt::UpdateId;
-use crate::mt::VertexMt;
-use crate::mt::corner_of;
+use super::{OWN_FALL, QUARTERINGS, base, check_bytes, largest};
+use crate::format::coder::{Family, Put, Source};
+use crate::format::{FormatError, Limits};
+use crate::geom::{NARROW_BITS, insphere, orient3d, views_of_origin};
+use crate::mesh::{FACES, NONE};
+use crate::mt::{
+    Applied, ApplyUpdates, BaseMesh, BaseMeshError, CurrentMesh, ErrorCode, Insertion, MAX_FIELD_BITS,
+    MAX_REMOVED, MtInfo, MultiTessellation, UpdateError, UpdateId, VertexMt, corner_of,
+};
 
 /// By how many codes an error is below the one before.
 const ERROR: Family = base::LAST.numbers_after(1, 2);
@@ -851,17 +829,11 @@ impl State {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::format::coder::Counts;
-    use crate::format::coder::Models;
-    use crate::format::coder::Writer;
+    use crate::format::coder::{Counts, Models, Writer};
     use crate::format::read::Reader;
-    use crate::geom::Lattice;
-    use crate::geom::in_conflict;
+    use crate::geom::{Lattice, in_conflict};
     use crate::mesh::kuhn_tets;
-    use crate::mt::ExplicitMt;
-    use crate::mt::ExplicitUpdate;
-    use crate::mt::FieldInfo;
-    use crate::mt::{MtKind, UpdatePages};
+    use crate::mt::{ExplicitMt, ExplicitUpdate, FieldInfo, MtKind, UpdatePages};
 
     /// A cube of 6 bits with two fields.
     fn info() -> MtInfo {

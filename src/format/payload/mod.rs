@@ -9,39 +9,18 @@ pub mod index;
 mod insertions;
 mod spelled;
 
-use super::EncodeError;
-use super::FormatError;
-use super::Limits;
-use super::coder::Family;
-use super::coder::Models;
-use super::coder::Put;
-use super::coder::Source;
+use super::coder::{Family, Models, Put, Source};
 use super::header::Kind;
-use super::read::MAX_STRING;
-use super::read::Reader;
-use super::write;
+use super::read::{MAX_STRING, Reader};
+use super::{EncodeError, FormatError, Limits, write};
 use crate::geom::Lattice;
 use crate::mesh::VectorPart;
-use crate::mt::BaseMesh;
-use crate::mt::BaseMeshError;
-use crate::mt::EdgeMt;
-use crate::mt::ErrorCode;
-use crate::mt::ExplicitMt;
-use crate::mt::FieldInfo;
-use crate::mt::HalfEdgeMt;
-use crate::mt::HalfEdgeUpdate;
-use crate::mt::MAX_QUARTERINGS;
-use crate::mt::Mt;
-use crate::mt::MtInfo;
-use crate::mt::MtKind;
-use crate::mt::MtRef;
-use crate::mt::MultiTessellation;
-use crate::mt::PageError;
-use crate::mt::UpdateError;
-use crate::mt::VertexId;
-use crate::mt::VertexSplit;
-use edge::FieldPart;
-use edge::Splits;
+use crate::mt::{
+    BaseMesh, BaseMeshError, EdgeMt, ErrorCode, ExplicitMt, FieldInfo, HalfEdgeMt, HalfEdgeUpdate,
+    MAX_QUARTERINGS, Mt, MtInfo, MtKind, MtRef, MultiTessellation, PageError, UpdateError, VertexId,
+    VertexSplit,
+};
+use edge::{FieldPart, Splits};
 pub use insertions::State;
 use std::collections::BTreeMap;
 use std::ops::Range;

@@ -1,21 +1,9 @@
 //! Updates that are spelled out, coded: numbers with a context for each kind of number.
 
-use super::OWN_FALL;
-use super::QUARTERINGS;
-use super::check_bytes;
-use super::insertions;
-use super::largest;
-use crate::format::FormatError;
-use crate::format::Limits;
-use crate::format::coder::Family;
-use crate::format::coder::Put;
-use crate::format::coder::Source;
-use crate::mt::BaseMeshError;
-use crate::mt::ErrorCode;
-use crate::mt::ExplicitMt;
-use crate::mt::ExplicitUpdate;
-use crate::mt::UpdateId;
-use crate::mt::VertexId;
+use super::{OWN_FALL, QUARTERINGS, check_bytes, insertions, largest};
+use crate::format::coder::{Family, Put, Source};
+use crate::format::{FormatError, Limits};
+use crate::mt::{BaseMeshError, ErrorCode, ExplicitMt, ExplicitUpdate, UpdateId, VertexId};
 use std::ops::Range;
 
 /// By how many codes an error is below the one before.
@@ -277,12 +265,9 @@ impl Parts {
 mod tests {
     use super::super::insertions::tests::delaunay;
     use super::*;
-    use crate::format::coder::Counts;
-    use crate::format::coder::Models;
-    use crate::format::coder::Writer;
+    use crate::format::coder::{Counts, Models, Writer};
     use crate::format::read::Reader;
-    use crate::mt::MtInfo;
-    use crate::mt::MtKind;
+    use crate::mt::{MtInfo, MtKind};
 
     fn sample() -> ExplicitMt {
         let mt = ExplicitMt::of(&delaunay(80)).unwrap();

@@ -5,8 +5,7 @@ use std::io::Write;
 
 use glam::DVec3;
 
-use crate::io::surface::PolyData;
-use crate::io::surface::unfit;
+use crate::io::surface::{PolyData, unfit};
 
 /// The first bytes of a file, which say nothing; they must not be `solid`.
 const HEADER: &[u8; 80] = &{

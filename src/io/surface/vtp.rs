@@ -4,10 +4,7 @@ use std::io;
 use std::io::Write;
 
 use crate::io::surface::PolyData;
-use crate::io::write::Appended;
-use crate::io::write::array;
-use crate::io::write::escaped;
-use crate::io::write::write_file;
+use crate::io::write::{Appended, array, escaped, write_file};
 
 /// Writes VTK XML poly data (`.vtp`): triangles, lines or, where there are neither, the points as vertices.
 ///

@@ -13,34 +13,19 @@
 //! The word that the mesh keeps with a vertex ([`KindWord`]) is the update that splits it, none if nothing does (yet).
 
 use super::predict::Link;
-use super::star::FAN_CAPACITY;
-use super::star::HalfStar;
-use super::star::RING_CAPACITY;
-use super::star::{Ring, take_ring};
+use super::star::{FAN_CAPACITY, HalfStar, RING_CAPACITY, Ring, take_ring};
 use crate::mesh::NONE;
-use crate::mt::Applied;
-use crate::mt::ApplyUpdates;
-use crate::mt::BaseMesh;
-use crate::mt::CurrentMesh;
-use crate::mt::EdgeMt;
-use crate::mt::ErrorCode;
-use crate::mt::LookAtTet;
-use crate::mt::MAX_LINK;
 #[cfg(feature = "build")]
 use crate::mt::MAX_STAR;
-use crate::mt::MtInfo;
-use crate::mt::MultiTessellation;
-use crate::mt::UpdateError;
-use crate::mt::UpdateId;
-use crate::mt::UpdatePages;
-use crate::mt::VertexId;
-use crate::mt::VertexSplit;
 use crate::mt::mesh::current::{KindWord, Labels};
-use crate::mt::mesh::stars::GATHERED;
-use crate::mt::mesh::stars::Gather;
+#[cfg(feature = "build")]
 use crate::mt::mesh::stars::Star;
-use crate::mt::mesh::tet::TURN;
-use crate::mt::mesh::tet::corner_of;
+use crate::mt::mesh::stars::{GATHERED, Gather};
+use crate::mt::mesh::tet::{TURN, corner_of};
+use crate::mt::{
+    Applied, ApplyUpdates, BaseMesh, CurrentMesh, EdgeMt, ErrorCode, LookAtTet, MAX_LINK, MtInfo,
+    MultiTessellation, UpdateError, UpdateId, UpdatePages, VertexId, VertexSplit,
+};
 use std::ops::Range;
 
 impl EdgeMt {

@@ -10,14 +10,9 @@
 //! follows the majority of its neighbours that are decided. **Levels.** The field is taken to be linear: its gradient is
 //! that of least squares over the link, near vertices counting more.
 
-use super::star::Ring;
-use super::star::three;
-use crate::mt::CurrentMesh;
-use crate::mt::FieldInfo;
-use crate::mt::MAX_EDGE;
-use crate::mt::MAX_LINK;
-use crate::mt::MAX_STAR;
+use super::star::{Ring, three};
 use crate::mt::ranks::rank;
+use crate::mt::{CurrentMesh, FieldInfo, MAX_EDGE, MAX_LINK, MAX_STAR};
 
 /// The link of a vertex that is to be split, as far as guesses need it.
 pub(in crate::mt) struct Link {

@@ -437,7 +437,8 @@ impl CurrentMesh {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mt::mesh::stars::{EPOCHS, tests::wheel};
+    use crate::mt::mesh::stars::EPOCHS;
+    use crate::mt::mesh::stars::tests::wheel;
 
     #[test]
     fn marks_of_long_ago_are_forgotten_when_the_epochs_start_again() {

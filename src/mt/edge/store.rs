@@ -14,16 +14,8 @@
 //! the same everywhere.
 
 use crate::mesh::NONE;
-use crate::mt::BaseMesh;
-use crate::mt::ErrorCode;
-use crate::mt::MtInfo;
-use crate::mt::MtKind;
-use crate::mt::PAGE_BITS;
-use crate::mt::PageError;
-use crate::mt::UpdateError;
-use crate::mt::UpdateId;
-use crate::mt::VertexId;
 use crate::mt::update_errors::Errors;
+use crate::mt::{BaseMesh, ErrorCode, MtInfo, MtKind, PAGE_BITS, PageError, UpdateError, UpdateId, VertexId};
 use std::ops::Range;
 
 /// Largest number of tetrahedra around a vertex that an update splits.

@@ -4,24 +4,13 @@
 //!
 //! In the current mesh, the tag of a tetrahedron is its number in the MT.
 
-use super::face_occupancy::FaceOccupancy;
-use super::face_occupancy::faces;
+use super::face_occupancy::{FaceOccupancy, faces};
 use crate::mesh::NONE;
-use crate::mt::Applied;
-use crate::mt::ApplyUpdates;
-use crate::mt::BaseMesh;
-use crate::mt::BaseMeshError;
-use crate::mt::CurrentMesh;
-use crate::mt::ErrorCode;
-use crate::mt::ExplicitMt;
-use crate::mt::LookAtTet;
-use crate::mt::MtInfo;
-use crate::mt::MultiTessellation;
-use crate::mt::UpdateError;
-use crate::mt::UpdateId;
-use crate::mt::UpdatePages;
-use crate::mt::VertexId;
 use crate::mt::mesh::current::{KindWord, Labels};
+use crate::mt::{
+    Applied, ApplyUpdates, BaseMesh, BaseMeshError, CurrentMesh, ErrorCode, ExplicitMt, LookAtTet, MtInfo,
+    MultiTessellation, UpdateError, UpdateId, UpdatePages, VertexId,
+};
 use std::ops::Range;
 
 impl ExplicitMt {

@@ -1,21 +1,18 @@
 //! Checks an explicit MT: is it what the theory of Multi-Tessellations asks for [§2]?
 
-use super::face_occupancy::Faces;
-use super::face_occupancy::faces;
+use super::face_occupancy::{Faces, faces};
 use crate::geom::orient3d;
 #[cfg(feature = "build")]
 use crate::mt::Applied;
 #[cfg(feature = "build")]
 use crate::mt::ApplyUpdates;
-use crate::mt::ExplicitMt;
 #[cfg(feature = "build")]
 use crate::mt::ReplayError;
 #[cfg(feature = "build")]
 use crate::mt::UpdateError;
-use crate::mt::UpdateId;
-use crate::mt::VertexId;
 #[cfg(feature = "build")]
 use crate::mt::margins::Margins;
+use crate::mt::{ExplicitMt, UpdateId, VertexId};
 use std::collections::BTreeSet;
 use std::fmt;
 

@@ -3,9 +3,7 @@
 use crate::mesh::FACES;
 use crate::mt::mesh::KindState;
 use std::collections::HashMap;
-use std::hash::BuildHasher;
-use std::hash::Hasher;
-use std::hash::RandomState;
+use std::hash::{BuildHasher, Hasher, RandomState};
 
 /// The faces of a set of tetrahedra: how often each is used from either side.
 #[derive(Clone, Debug, Default)]

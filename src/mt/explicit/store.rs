@@ -9,19 +9,10 @@
 
 use crate::geom::orient3d;
 use crate::mesh::NONE;
-use crate::mt::ApplyUpdates;
-use crate::mt::BaseMesh;
-use crate::mt::ErrorCode;
-use crate::mt::MtInfo;
-use crate::mt::MtKind;
-use crate::mt::UpdateError;
-use crate::mt::UpdateId;
-use crate::mt::VertexId;
-use crate::mt::replay::ReplayError;
-use crate::mt::replay::canonical;
-use crate::mt::replay::replay;
+use crate::mt::replay::{ReplayError, canonical, replay};
 use crate::mt::update_errors::Errors;
 use crate::mt::vertex::tet_errors::MAX_QUARTERINGS;
+use crate::mt::{ApplyUpdates, BaseMesh, ErrorCode, MtInfo, MtKind, UpdateError, UpdateId, VertexId};
 use std::collections::HashMap;
 use std::ops::Range;
 
@@ -517,10 +508,7 @@ impl ExplicitMt {
 mod tests {
     use super::*;
     use crate::geom::Lattice;
-    use crate::mt::EdgeMt;
-    use crate::mt::FieldInfo;
-    use crate::mt::MtFault;
-    use crate::mt::VertexSplit;
+    use crate::mt::{EdgeMt, FieldInfo, MtFault, VertexSplit};
 
     /// An octahedron around a vertex that is split along z and whose upper half is split along x.
     fn twice_split() -> ExplicitMt {

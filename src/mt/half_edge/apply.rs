@@ -3,33 +3,18 @@
 //! In the current mesh the tag of a tetrahedron is the update that removes it, and its inner faces are those that go with
 //! it. Insertion keeps the slots of T_u, removal those of the star without the near vertex.
 
-use super::star_code::spread;
-use super::star_code::{KnownStars, StarCode};
+use super::star_code::{KnownStars, StarCode, spread};
 use super::store::HalfEdgeMt;
-use crate::geom::NARROW_BITS;
-use crate::geom::det_i64;
-use crate::geom::orient3d;
-use crate::mesh::FACES;
-use crate::mesh::NONE;
-use crate::mt::Applied;
-use crate::mt::ApplyUpdates;
-use crate::mt::BaseMesh;
-use crate::mt::BaseMeshError;
-use crate::mt::CurrentMesh;
-use crate::mt::ErrorCode;
-use crate::mt::LookAtTet;
-use crate::mt::MtInfo;
-use crate::mt::MultiTessellation;
-use crate::mt::UpdateError;
-use crate::mt::UpdateId;
-use crate::mt::UpdatePages;
-use crate::mt::VertexId;
+use crate::geom::{NARROW_BITS, det_i64, orient3d};
+use crate::mesh::{FACES, NONE};
 use crate::mt::mesh::KindState;
 use crate::mt::mesh::current::{KindWord, Labels};
-use crate::mt::mesh::stars::GATHERED;
-use crate::mt::mesh::stars::Gather;
-use crate::mt::mesh::stars::Star;
+use crate::mt::mesh::stars::{GATHERED, Gather, Star};
 use crate::mt::mesh::tet::corner_of;
+use crate::mt::{
+    Applied, ApplyUpdates, BaseMesh, BaseMeshError, CurrentMesh, ErrorCode, LookAtTet, MtInfo,
+    MultiTessellation, UpdateError, UpdateId, UpdatePages, VertexId,
+};
 use std::ops::Range;
 
 /// Most tetrahedra of a star, and most vertices of its link.

@@ -1,25 +1,13 @@
 //! From an explicit MT to the compact half-edge one, where every update inserts a vertex that collapses onto a neighbour.
 
-use super::apply::NEW;
-use super::apply::Scratch;
-use super::apply::Search;
-use super::store::BaseMark;
-use super::store::ForestChild;
-use super::store::HalfEdgeMt;
-use super::store::HalfEdgeUpdate;
+use super::apply::{NEW, Scratch, Search};
+use super::store::{BaseMark, ForestChild, HalfEdgeMt, HalfEdgeUpdate};
 use crate::mesh::NONE;
-use crate::mt::Applied;
-use crate::mt::ApplyUpdates;
-use crate::mt::ConvertError;
-use crate::mt::CurrentMesh;
-use crate::mt::ExplicitMt;
-use crate::mt::MtInfo;
-use crate::mt::MtKind;
-use crate::mt::ReplayError;
-use crate::mt::UpdateError;
-use crate::mt::UpdateId;
-use crate::mt::VertexId;
 use crate::mt::replay::canonical;
+use crate::mt::{
+    Applied, ApplyUpdates, ConvertError, CurrentMesh, ExplicitMt, MtInfo, MtKind, ReplayError, UpdateError,
+    UpdateId, VertexId,
+};
 
 const NOT_HALF_EDGE: &str = "it is not the inverse of a half-edge collapse";
 

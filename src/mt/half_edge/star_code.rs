@@ -14,18 +14,13 @@
 //! All of this is the same in every consistent set, for the star is: positions are integers, sums of floating-point
 //! numbers have a fixed order, and ties are broken by labels.
 
-use super::apply::MOST;
-use super::apply::NO_ENTRY;
-use super::apply::NewTet;
-use super::apply::Scratch;
-use super::store::ForestChild;
-use super::store::HalfEdgeMt;
+use super::apply::{MOST, NO_ENTRY, NewTet, Scratch};
+use super::store::{ForestChild, HalfEdgeMt};
 use crate::geom::orient3d;
 use crate::mesh::NONE;
-use crate::mt::CurrentMesh;
-use crate::mt::UpdateId;
 use crate::mt::mesh::paged_array::PagedArray;
 use crate::mt::mesh::tet::TURN;
+use crate::mt::{CurrentMesh, UpdateId};
 
 /// Most candidates that have a rank.
 const RANKED: usize = 8;

@@ -23,16 +23,9 @@
 //! consistent set.
 
 use crate::mesh::NONE;
-use crate::mt::BaseMesh;
-use crate::mt::ErrorCode;
-use crate::mt::MtInfo;
-use crate::mt::MtKind;
-use crate::mt::PageError;
-use crate::mt::UpdateError;
-use crate::mt::UpdateId;
-use crate::mt::VertexId;
 use crate::mt::mesh::paged_array::PagedArray;
 use crate::mt::update_errors::Errors;
+use crate::mt::{BaseMesh, ErrorCode, MtInfo, MtKind, PageError, UpdateError, UpdateId, VertexId};
 use std::ops::Range;
 
 /// An update whose near vertex is the one that this is stored with.

@@ -1,7 +1,6 @@
 //! The base mesh, and what must hold of it before anything is applied to it.
 
-use crate::geom::WIDE_BITS;
-use crate::geom::orient3d;
+use crate::geom::{WIDE_BITS, orient3d};
 use crate::mt::MtInfo;
 use std::fmt;
 

@@ -14,16 +14,23 @@ use super::tet::face_neighbors;
 use crate::mesh::{BitSet, ChangedBlocks, FACES, NONE};
 use crate::mt::{MtInfo, VertexId};
 use std::any::Any;
-use std::fmt::Debug;
+use std::fmt;
 use std::ops::Range;
 
 /// What a kind of MT keeps with a mesh that its updates are applied to: scratch space, and memory of what was done.
-pub(in crate::mt) trait KindState: Any + Debug + Send + Sync {
+pub(in crate::mt) trait KindState: Any + Send + Sync {
     /// Bytes of it.
     fn bytes(&self) -> u64;
 
     /// A copy, for a copy of the mesh.
     fn copy(&self) -> Box<dyn KindState>;
+}
+
+/// Without its content: whatever a trait object can do is compiled into every program.
+impl fmt::Debug for dyn KindState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("KindState")
+    }
 }
 
 impl Clone for Box<dyn KindState> {

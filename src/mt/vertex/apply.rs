@@ -3,53 +3,23 @@
 //! In the current mesh, the tag of a tetrahedron is the update that removes it. While that update has not arrived, the
 //! tag tells which child of the tetrahedron's creator it will be.
 
-use super::bit_string::Bits;
-use super::bit_string::width_of;
-use super::cavity_fill::Across;
-use super::cavity_fill::Close;
-use super::cavity_fill::Face;
-use super::cavity_fill::Glue;
-use super::cavity_fill::turned;
-use super::from_explicit::Hole;
-use super::from_explicit::write_given_up;
-use super::from_explicit::write_removed;
-use super::sphere_order::Spheres;
-use super::sphere_order::Told;
-use super::store::COUNT_BITS;
-use super::store::MAX_AROUND;
-use super::store::MAX_INSERTED;
-use super::store::VertexMt;
+use super::bit_string::{Bits, width_of};
+use super::cavity_fill::{Across, Close, Face, Glue, turned};
+use super::from_explicit::{Hole, write_given_up, write_removed};
+use super::sphere_order::{Spheres, Told};
+use super::store::{COUNT_BITS, MAX_AROUND, MAX_INSERTED, VertexMt};
 use super::streaming::Insertion;
-use super::tet_errors::Packed;
-use super::tet_errors::QUARTERING_BITS;
-use crate::geom::NARROW_BITS;
-use crate::geom::det_i64;
-use crate::geom::orient3d;
-use crate::mesh::FACES;
-use crate::mesh::NONE;
-use crate::mt::Applied;
-use crate::mt::ApplyUpdates;
-use crate::mt::BaseMesh;
-use crate::mt::BaseMeshError;
-use crate::mt::CurrentMesh;
-use crate::mt::ErrorCode;
-use crate::mt::LookAtTet;
-use crate::mt::MtInfo;
-use crate::mt::MultiTessellation;
-use crate::mt::PagedArray;
-use crate::mt::UpdateError;
-use crate::mt::UpdateId;
-use crate::mt::UpdatePages;
-use crate::mt::VertexId;
-use crate::mt::mesh::FIRST_ANONYMOUS_TAG;
-use crate::mt::mesh::KindState;
+use super::tet_errors::{Packed, QUARTERING_BITS};
+use crate::geom::{NARROW_BITS, det_i64, orient3d};
+use crate::mesh::{FACES, NONE};
 use crate::mt::mesh::current::{KindWord, Labels};
-use crate::mt::mesh::stars::BARE;
-use crate::mt::mesh::stars::GATHERED;
-use crate::mt::mesh::stars::Gather;
-use crate::mt::mesh::stars::LINK_CAPACITY;
-use crate::mt::mesh::stars::Star;
+use crate::mt::mesh::stars::{BARE, GATHERED, Gather, LINK_CAPACITY, Star};
+use crate::mt::mesh::{FIRST_ANONYMOUS_TAG, KindState};
 use crate::mt::ranks::rank;
+use crate::mt::{
+    Applied, ApplyUpdates, BaseMesh, BaseMeshError, CurrentMesh, ErrorCode, LookAtTet, MtInfo,
+    MultiTessellation, PagedArray, UpdateError, UpdateId, UpdatePages, VertexId,
+};
 use std::ops::Range;
 
 /// "This edge is on the rim: the face behind it is given up."

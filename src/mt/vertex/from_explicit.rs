@@ -1,32 +1,16 @@
 //! From an explicit MT to the compact vertex-based one, where every update is a vertex insertion.
 
 use super::apply::choices;
-use super::bit_string::Bits;
-use super::bit_string::width_of;
-use super::cavity_fill::Close;
-use super::cavity_fill::Face;
-use super::cavity_fill::Glue;
-use super::cavity_fill::turned;
-use super::sphere_order::Spheres;
-use super::sphere_order::Told;
-use super::store::COUNT_BITS;
-use super::store::MAX_AROUND;
-use super::store::MAX_INSERTED;
-use super::store::MAX_REMOVED;
-use crate::mesh::FACES;
-use crate::mesh::NONE;
-use crate::mt::ConvertError;
-use crate::mt::ExplicitMt;
-use crate::mt::MtInfo;
-use crate::mt::MtKind;
-use crate::mt::NodeBits;
-use crate::mt::ReplayError;
-use crate::mt::UpdateError;
-use crate::mt::UpdateId;
-use crate::mt::VertexId;
-use crate::mt::VertexMt;
-use std::collections::HashMap;
-use std::collections::HashSet;
+use super::bit_string::{Bits, width_of};
+use super::cavity_fill::{Close, Face, Glue, turned};
+use super::sphere_order::{Spheres, Told};
+use super::store::{COUNT_BITS, MAX_AROUND, MAX_INSERTED, MAX_REMOVED};
+use crate::mesh::{FACES, NONE};
+use crate::mt::{
+    ConvertError, ExplicitMt, MtInfo, MtKind, NodeBits, ReplayError, UpdateError, UpdateId, VertexId,
+    VertexMt,
+};
+use std::collections::{HashMap, HashSet};
 
 impl VertexMt {
     /// The compact form of an explicit MT whose updates are vertex insertions.

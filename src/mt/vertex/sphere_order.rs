@@ -156,8 +156,7 @@ impl Told {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geom::insphere;
-    use crate::geom::orient3d;
+    use crate::geom::{insphere, orient3d};
 
     #[test]
     fn the_first_vertex_has_no_other_in_its_sphere() {

@@ -26,18 +26,12 @@
 //! The canonical order of the star is that of the sorted vertex numbers of the faces opposite the new vertex. It is the
 //! same in every consistent set, since the star at the moment of insertion is.
 
-use super::bit_string::Bits;
-use super::bit_string::width_of;
+use super::bit_string::{Bits, width_of};
 use super::streaming::Growing;
 use super::tet_errors::MAX_QUARTERINGS;
 use crate::mesh::NONE;
-use crate::mt::BaseMesh;
-use crate::mt::ErrorCode;
-use crate::mt::MtInfo;
-use crate::mt::UpdateError;
-use crate::mt::UpdateId;
-use crate::mt::VertexId;
 use crate::mt::update_errors::Errors;
+use crate::mt::{BaseMesh, ErrorCode, MtInfo, UpdateError, UpdateId, VertexId};
 
 /// Most tetrahedra around a vertex when it is inserted.
 pub const MAX_INSERTED: usize = 124;

@@ -4,21 +4,14 @@
 //! beside the nodes; then they move into them.
 
 use super::apply::take_cavity;
-use super::bit_string::Bits;
-use super::bit_string::width_of;
+use super::bit_string::{Bits, width_of};
 use super::store::MAX_REMOVED;
 use crate::mesh::NONE;
-use crate::mt::ApplyUpdates;
-use crate::mt::BaseMesh;
-use crate::mt::CurrentMesh;
-use crate::mt::ErrorCode;
-use crate::mt::MtInfo;
-use crate::mt::NodeBits;
-use crate::mt::UpdateError;
-use crate::mt::UpdateId;
-use crate::mt::VertexMt;
 use crate::mt::mesh::FIRST_ANONYMOUS_TAG;
 use crate::mt::mesh::stars::GATHERED;
+use crate::mt::{
+    ApplyUpdates, BaseMesh, CurrentMesh, ErrorCode, MtInfo, NodeBits, UpdateError, UpdateId, VertexMt,
+};
 use std::ops::Range;
 
 /// Children that a list has room for at first.

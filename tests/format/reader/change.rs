@@ -1,7 +1,6 @@
 //! What an update of a file of kind 1, 2 or 3 does, and what reading these has in common.
 
-use super::coded::Coded;
-use super::coded::Row;
+use super::coded::{Coded, Row};
 
 pub type Point = [i32; 3];
 pub type Tet = [u32; 4];

@@ -1,8 +1,6 @@
 //! Exact values of a field.
 
-use super::coded::Coded;
-use super::coded::VALUE_BITS;
-use super::coded::VALUE_GAP;
+use super::coded::{Coded, VALUE_BITS, VALUE_GAP};
 use super::wire::Bytes;
 
 /// What is wrong with the values of a field's levels, by vertex.

@@ -1,12 +1,6 @@
 //! The base mesh, which grows over its faces.
 
-use super::coded::BEHIND;
-use super::coded::Coded;
-use super::coded::LENGTH;
-use super::coded::RANK;
-use super::coded::SEED;
-use super::coded::STEP;
-use super::coded::len;
+use super::coded::{BEHIND, Coded, LENGTH, RANK, SEED, STEP, len};
 
 type Point = [i32; 3];
 type Vector = [f64; 3];

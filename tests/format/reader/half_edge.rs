@@ -1,26 +1,13 @@
 //! Blocks of half-edge insertions, read by themselves: lists of children and codes of stars.
 
-use super::File;
 use super::change::Point;
-use super::coded::BASE_INNER;
-use super::coded::CHILD_GAP;
-use super::coded::CHILD_OFFSET;
-use super::coded::Coded;
-use super::coded::FOREST_CHILDREN;
-use super::coded::HALF_EDGE_ERROR;
-use super::coded::HALF_EDGE_LEVEL;
-use super::coded::NAMED;
-use super::coded::NEW_BLOCK;
-use super::coded::REMOVER;
-use super::coded::STAR_BIT;
-use super::coded::STAR_BITS;
-use super::coded::STAR_SYMBOL;
-use super::coded::STAR_SYMBOLS;
-use super::coded::len;
+use super::coded::{
+    BASE_INNER, CHILD_GAP, CHILD_OFFSET, Coded, FOREST_CHILDREN, HALF_EDGE_ERROR, HALF_EDGE_LEVEL, NAMED,
+    NEW_BLOCK, REMOVER, STAR_BIT, STAR_BITS, STAR_SYMBOL, STAR_SYMBOLS, len,
+};
 use super::growth::Growth;
-use super::splits;
-use super::wire::Bytes;
-use super::wire::Info;
+use super::wire::{Bytes, Info};
+use super::{File, splits};
 use std::ops::Range;
 
 /// A forest child of a vertex: an update, and where it inserts its vertex as seen from this one.

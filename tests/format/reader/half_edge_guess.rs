@@ -1,14 +1,10 @@
 //! What is told of the tetrahedra of a star: which update removes each, and which of its faces are inner. The choices that there
 //! are follow from positions; the code of the star tells them apart.
 
-use super::change::Point;
-use super::change::Tet;
+use super::change::{Point, Tet};
 use super::growth::volume;
-use super::half_edge::Child;
-use super::half_edge::Mark;
-use super::half_edge::Record;
-use super::half_edge_mesh::Vertex;
-use super::half_edge_mesh::behind;
+use super::half_edge::{Child, Mark, Record};
+use super::half_edge_mesh::{Vertex, behind};
 use std::collections::HashMap;
 
 type Vertices = HashMap<u32, Vertex>;

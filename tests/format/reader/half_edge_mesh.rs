@@ -1,16 +1,10 @@
 //! The mesh of a file of half-edge insertions. What an update removes is found by looking at all tetrahedra.
 
-use super::File;
-use super::change::Change;
-use super::change::Point;
-use super::change::Tet;
+use super::change::{Change, Point, Tet};
 use super::growth::volume;
-use super::half_edge::Child;
-use super::half_edge::Mark;
-use super::half_edge::Record;
-use super::half_edge_guess;
-use std::collections::BTreeSet;
-use std::collections::HashMap;
+use super::half_edge::{Child, Mark, Record};
+use super::{File, half_edge_guess};
+use std::collections::{BTreeSet, HashMap};
 
 /// A tetrahedron of the mesh.
 #[derive(Clone, Copy)]

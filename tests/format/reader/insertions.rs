@@ -1,30 +1,15 @@
 //! Blocks of vertex insertions: what an update is told by is the mesh that all before it have made. Everything in it is found
 //! by looking at all tetrahedra.
 
-use super::File;
-use super::change;
-use super::change::Change;
-use super::change::Point;
-use super::change::Tet;
-use super::change::face;
-use super::change::sorted;
-use super::coded::Coded;
-use super::coded::DISTANCE;
-use super::coded::FALL;
-use super::coded::FAN;
-use super::coded::FAR;
-use super::coded::GIVEN_UP;
-use super::coded::GROW;
-use super::coded::INSERTION_LEVEL;
-use super::coded::OWN_FALL;
-use super::coded::QUARTERS;
-use super::coded::SEED_PLACE;
-use super::coded::SHORT;
-use super::coded::len;
+use super::change::{Change, Point, Tet, face, sorted};
+use super::coded::{
+    Coded, DISTANCE, FALL, FAN, FAR, GIVEN_UP, GROW, INSERTION_LEVEL, OWN_FALL, QUARTERS, SEED_PLACE, SHORT,
+    len,
+};
 use super::growth::volume;
 use super::wire::Info;
-use num_bigint::BigInt;
-use num_bigint::Sign;
+use super::{File, change};
+use num_bigint::{BigInt, Sign};
 use std::collections::BTreeSet;
 
 /// What `BASE` tells besides the base mesh.

@@ -15,24 +15,16 @@ pub mod splits;
 pub mod wire;
 
 use change::Change;
-use coded::BASE_LEVEL;
-use coded::Coded;
-use coded::ERROR;
-use coded::LEVEL;
-use coded::Table;
+use coded::{BASE_LEVEL, Coded, ERROR, LEVEL, Table};
 use exact::Exact;
 use growth::Growth;
 use half_edge::Forest;
 use insertions::Start;
 use spelled::Spelled;
 use splits::Split;
-use std::collections::BTreeSet;
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
-use wire::Bytes;
-use wire::Index;
-use wire::Info;
-use wire::Section;
+use wire::{Bytes, Index, Info, Section};
 
 /// A file, decoded as far as that needs no mesh.
 pub struct File {

@@ -3,8 +3,7 @@
 use super::File;
 use super::growth::volume;
 use super::splits::Split;
-use std::collections::BTreeSet;
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 #[derive(Clone, Default)]
 pub struct Mesh {

@@ -1,21 +1,12 @@
 //! Blocks of updates that are spelled out.
 
-use super::File;
-use super::change;
-use super::change::Change;
-use super::change::Point;
-use super::change::Tet;
-use super::coded::CORNER;
-use super::coded::COUNT;
-use super::coded::Coded;
-use super::coded::DIFFERENCE;
-use super::coded::LEVEL_DIFFERENCE;
-use super::coded::OWN_FALL;
-use super::coded::QUARTERS;
-use super::coded::REMOVED;
-use super::coded::SPELLED_FALL;
+use super::change::{Change, Point, Tet};
+use super::coded::{
+    CORNER, COUNT, Coded, DIFFERENCE, LEVEL_DIFFERENCE, OWN_FALL, QUARTERS, REMOVED, SPELLED_FALL,
+};
 use super::growth::volume;
 use super::wire::Info;
+use super::{File, change};
 use std::collections::BTreeSet;
 
 /// All vertices and tetrahedra so far, by their numbers.

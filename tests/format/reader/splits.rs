@@ -1,16 +1,6 @@
 //! Blocks of vertex splits, decoded without a mesh.
 
-use super::coded::CHILDREN;
-use super::coded::Coded;
-use super::coded::EDGE;
-use super::coded::GAP;
-use super::coded::LAST_WRONG;
-use super::coded::OFFSET;
-use super::coded::RISE;
-use super::coded::RUN;
-use super::coded::Row;
-use super::coded::WRONG;
-use super::coded::len;
+use super::coded::{CHILDREN, Coded, EDGE, GAP, LAST_WRONG, OFFSET, RISE, RUN, Row, WRONG, len};
 use std::collections::HashMap;
 use std::ops::Range;
 

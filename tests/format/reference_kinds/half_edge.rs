@@ -7,8 +7,7 @@ use crate::reader::half_edge_mesh::Mesh;
 use crate::support::files;
 use crate::support::meshes::{blocks, cube, hilly, linear};
 use tetralod::builder::{Construction, Purpose};
-use tetralod::mt::Applied;
-use tetralod::mt::ApplyUpdates;
+use tetralod::mt::{Applied, ApplyUpdates};
 
 fn built(mesh: &TetMesh, config: BuildConfig) -> Mt {
     let config = BuildConfig { all_fields: true, ..config };

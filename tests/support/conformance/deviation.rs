@@ -2,9 +2,7 @@
 
 use super::border;
 use tetralod::mesh::TetMesh;
-use tetralod::mt::CurrentMesh;
-use tetralod::mt::Mt;
-use tetralod::mt::MultiTessellation;
+use tetralod::mt::{CurrentMesh, Mt, MultiTessellation};
 
 type Point = [f64; 3];
 

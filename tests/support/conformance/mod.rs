@@ -7,31 +7,14 @@ use crate::support::domains::{Domain, volume6};
 use crate::support::meshes::{bent, blocks, cube, hilly, linear};
 use crate::support::oracle::sorted;
 use crate::support::random::Random;
-use std::collections::BTreeMap;
-use std::collections::BTreeSet;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::ops::ControlFlow;
-use tetralod::builder::BuildConfig;
-use tetralod::builder::BuildResult;
-use tetralod::builder::Construction;
-use tetralod::builder::Criterion;
-use tetralod::builder::Method;
-use tetralod::builder::build;
-use tetralod::mesh::Field;
-use tetralod::mesh::TetMesh;
-use tetralod::mt::ApplyUpdates;
-use tetralod::mt::CurrentMesh;
-use tetralod::mt::EdgeMt;
-use tetralod::mt::ExplicitMt;
-use tetralod::mt::ExplicitUpdate;
-use tetralod::mt::HalfEdgeMt;
-use tetralod::mt::Mt;
-use tetralod::mt::MtKind;
-use tetralod::mt::MultiTessellation;
-use tetralod::mt::UpdateId;
-use tetralod::mt::VertexId;
-use tetralod::mt::VertexMt;
-use tetralod::mt::stats;
+use tetralod::builder::{BuildConfig, BuildResult, Construction, Criterion, Method, build};
+use tetralod::mesh::{Field, TetMesh};
+use tetralod::mt::{
+    ApplyUpdates, CurrentMesh, EdgeMt, ExplicitMt, ExplicitUpdate, HalfEdgeMt, Mt, MtKind, MultiTessellation,
+    UpdateId, VertexId, VertexMt, stats,
+};
 
 /// A kind of MT and how it is built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
