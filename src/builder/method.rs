@@ -124,7 +124,7 @@ pub enum VertexMethod {
     /// [`Method::Insert`], always by [`Criterion::Delaunay`].
     Insert {
         /// Whether tetrahedra have errors of their own, two bits each (see
-        /// [`quarterings`](crate::mt::MultiTessellation::quarterings)): requests take fewer tetrahedra then, but each is
+        /// [`quarterings`](crate::mt::ApplyUpdates::quarterings)): requests take fewer tetrahedra then, but each is
         /// answered from the base mesh.
         tet_errors: bool,
     },

@@ -115,7 +115,7 @@ pub enum UpdateError {
         update: u32,
     },
     /// The update arrived, but the mesh that it is applied to was not told: see
-    /// [`MultiTessellation::updates_arrived`](super::MultiTessellation::updates_arrived).
+    /// [`updates_arrived`](super::UpdatePages::updates_arrived).
     UnknownToMesh {
         /// The update.
         update: u32,

@@ -238,7 +238,7 @@ pub enum Applied {
 }
 
 /// Sees a tetrahedron: positions at its corners and, by field, levels there, on the lattices; and its
-/// [quarterings](MultiTessellation::quarterings). True ends the show.
+/// [quarterings](ApplyUpdates::quarterings). Return true to stop.
 pub type LookAtTet<'a> = &'a mut dyn FnMut(&[[i32; 3]; 4], &dyn Fn(usize) -> [i32; 4], u8) -> bool;
 
 /// A Multi-Tessellation of any kind, to be read: what is known of it as a whole, and of each of its updates [§2].
@@ -250,7 +250,7 @@ pub trait MultiTessellation {
     fn base(&self) -> &BaseMesh;
 
     /// Number of updates so far; they are `UpdateId(0) .. UpdateId(updates)`, parents before children. Where updates come
-    /// in pages, some of these may not be here: see [`MultiTessellation::has`].
+    /// in pages, some of these may not be here: see [`UpdatePages::has`].
     fn updates(&self) -> u32;
 
     /// Whether every update inserts more tetrahedra than it removes: a larger consistent set then has a larger mesh.
@@ -272,7 +272,7 @@ pub trait MultiTessellation {
     }
 
     /// Whether tetrahedra have errors of their own, which may be smaller than those of the updates that remove them and do
-    /// not fall along the partial order: see [`MultiTessellation::quarterings`].
+    /// not fall along the partial order: see [`ApplyUpdates::quarterings`].
     fn has_tet_errors(&self) -> bool {
         false
     }
@@ -403,7 +403,7 @@ pub trait ApplyUpdates: UpdatePages {
     /// If the MT is damaged; the mesh is unchanged then.
     fn refine(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError>;
 
-    /// [`MultiTessellation::refine`] for an update that removes a tetrahedron of the mesh, or whose ancestors are all applied
+    /// [`ApplyUpdates::refine`] for an update that removes a tetrahedron of the mesh, or whose ancestors are all applied
     /// as far as they are here: no other is looked for at length.
     ///
     /// # Errors

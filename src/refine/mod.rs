@@ -13,7 +13,7 @@
 //! A region and values together ([`Part::Both`]) are not monotone: updates whose tetrahedra violate may depend on none that
 //! does, and would keep themselves once they are applied. Such a request is answered from the base mesh each time it changes.
 //!
-//! Where tetrahedra have errors of their own ([`quarterings`](crate::mt::MultiTessellation::quarterings)), they are judged by
+//! Where tetrahedra have errors of their own ([`quarterings`](crate::mt::ApplyUpdates::quarterings)), they are judged by
 //! these, and no request is monotone: a tetrahedron may have a larger error than those it was made from. The result is the least
 //! set of updates that holds the parents of each of its members, and the update that removes any tetrahedron which violates the
 //! request and is of the base mesh or created by a member. It is unique. But from a finer mesh it cannot be told, by undoing

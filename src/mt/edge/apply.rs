@@ -33,7 +33,7 @@ impl EdgeMt {
     ///
     /// # Errors
     /// If the update does not fit the mesh, which only happens to a damaged MT, or if the mesh was not told of it by
-    /// [`MultiTessellation::updates_arrived`]; the mesh is unchanged then.
+    /// [`UpdatePages::updates_arrived`]; the mesh is unchanged then.
     pub(in crate::mt) fn apply_split(
         &self,
         mesh: &mut CurrentMesh,

@@ -77,7 +77,7 @@ pub struct ExplicitMt {
     /// The update that removes each tetrahedron; [`NONE`] if there is none so far. Children follow from it.
     remover: Vec<u32>,
     errors: Errors,
-    /// The [quarterings](crate::mt::MultiTessellation::quarterings) of each tetrahedron, if they have errors of their own.
+    /// The [quarterings](crate::mt::ApplyUpdates::quarterings) of each tetrahedron, if they have errors of their own.
     quarterings: Option<Vec<u8>>,
     /// The [fall](crate::mt::MultiTessellation::own_fall) of each update, then.
     own_falls: Vec<u8>,
@@ -202,7 +202,7 @@ impl ExplicitMt {
     }
 
     /// Gives each update a [fall](crate::mt::MultiTessellation::own_fall), and each tetrahedron
-    /// [quarterings](crate::mt::MultiTessellation::quarterings). Those of what is pushed later are 0.
+    /// [quarterings](crate::mt::ApplyUpdates::quarterings). Those of what is pushed later are 0.
     ///
     /// # Errors
     /// If there is not a number for each update, and one of at most [`MAX_QUARTERINGS`] for each tetrahedron.

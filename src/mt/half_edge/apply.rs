@@ -744,7 +744,7 @@ impl UpdatePages for HalfEdgeMt {
     }
 
     /// Tetrahedra know what removes them from the moment they are created: whoever waits for an update asks
-    /// [`MultiTessellation::awaited`].
+    /// [`UpdatePages::awaited`].
     fn page_inserted(&self, _: &mut CurrentMesh, _: Range<u32>) {}
 
     fn page_evicted(&self, mesh: &mut CurrentMesh, updates: Range<u32>) {

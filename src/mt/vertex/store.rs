@@ -70,7 +70,7 @@ pub struct VertexMt {
     pub(in crate::mt) info: MtInfo,
     pub(in crate::mt) base: BaseMesh,
     pub(in crate::mt) base_removers: Vec<u32>,
-    /// The [quarterings](crate::mt::MultiTessellation::quarterings) of each base tetrahedron, if tetrahedra have errors of
+    /// The [quarterings](crate::mt::ApplyUpdates::quarterings) of each base tetrahedron, if tetrahedra have errors of
     /// their own: then nodes tell those of the tetrahedra that they create.
     pub(in crate::mt) base_quarterings: Option<Vec<u8>>,
     /// The [fall](crate::mt::MultiTessellation::own_fall) of each update, then.
@@ -151,7 +151,7 @@ impl VertexMt {
     }
 
     /// The same MT, still without updates, with errors of tetrahedra: those of the base mesh are here, the nodes that are
-    /// pushed tell the others. See [`quarterings`](crate::mt::MultiTessellation::quarterings).
+    /// pushed tell the others. See [`quarterings`](crate::mt::ApplyUpdates::quarterings).
     ///
     /// # Errors
     /// If there is not one number of at most [`MAX_QUARTERINGS`](crate::mt::MAX_QUARTERINGS) for each base tetrahedron, or there
