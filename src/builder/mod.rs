@@ -300,7 +300,7 @@ impl fmt::Display for BuildError {
             }
             Self::CellField { name } => write!(
                 f,
-                "'{name}' is a field at cells, but an MT has fields at points; turn it into one at points first"
+                "'{name}' is a field at cells, but an MT has fields at points; turn it into one at points first, as by TetMesh::cells_to_points"
             ),
             Self::TooManyFields { fields } => {
                 write!(f, "{fields} fields and time steps are too many (at most 255); name those to keep")
