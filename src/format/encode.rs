@@ -1,11 +1,11 @@
 //! An MT to bytes: the same MT and options give the same bytes everywhere.
 
+use super::block_scan::BlockScan;
 use super::coder::{Counts, Measure, Models, Put, Writer};
 use super::header::{END_BYTES, HEAD_BYTES, HEADER_BYTES, Head, Kind, header, version_for};
 use super::payload::exact::Corrections;
 use super::payload::index::{Index, MAX_BLOCK_BITS, MIN_BLOCK_BITS};
 use super::payload::{State, Totals};
-use super::survey::Survey;
 use super::{payload, write};
 use crate::mt::{BaseMeshError, Exact, MtRef, UpdateError, VertexId};
 use std::collections::BTreeMap;
@@ -133,7 +133,7 @@ pub fn encode_to<'a>(
 ) -> Result<u64, EncodeError> {
     let mt = mt.into();
     check(mt, options)?;
-    let Survey { blocks, coded, reference } = Survey::of(mt, options)?;
+    let BlockScan { blocks, coded, reference } = BlockScan::of(mt, options)?;
     let mt = coded.as_ref().map_or(mt, MtRef::from);
     let mut index = Index { block_bits: options.block_bits, shared: 0, blocks };
     index.round(mt.info());

@@ -5,6 +5,7 @@
 //! ---
 #![doc = include_str!("../../docs/format.md")]
 
+mod block_scan;
 mod coder;
 mod decode;
 mod encode;
@@ -13,7 +14,6 @@ mod header;
 mod limits;
 mod payload;
 mod read;
-mod survey;
 mod write;
 
 pub use decode::{DecodeOptions, Decoder, Progress};

@@ -144,7 +144,7 @@ impl fmt::Display for UpdateError {
             }
             Self::Mask { update } => write!(f, "update {update} does not part the star of its vertex in two"),
             Self::Edge { update } => {
-                write!(f, "update {update} is told by an edge that is not in the link of its vertex")
+                write!(f, "update {update} names an edge that is not in the link of its vertex")
             }
             Self::Inverted { update } => write!(f, "update {update} turns a tetrahedron inside out"),
             Self::Star { update } => write!(

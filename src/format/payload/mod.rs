@@ -4,10 +4,10 @@
 mod base;
 pub mod edge;
 pub mod exact;
+mod explicit;
 pub mod half_edge;
 pub mod index;
-mod insertions;
-mod spelled;
+mod vertex;
 
 use super::coder::{Family, Models, Put, Source};
 use super::header::Kind;
@@ -21,9 +21,9 @@ use crate::mt::{
     VertexSplit,
 };
 use edge::{FieldPart, Splits};
-pub use insertions::State;
 use std::collections::BTreeMap;
 use std::ops::Range;
+pub use vertex::State;
 
 /// Key and value of each entry, in ascending order of the keys.
 pub type Metadata = Vec<(String, String)>;
@@ -192,9 +192,9 @@ pub fn parts(kind: MtKind) -> Vec<(&'static str, Family)> {
     let base = base::FAMILIES.into_iter().map(|family| ("base mesh", family));
     let own: &[(&str, Family)] = match kind {
         MtKind::Edge => &edge::PARTS,
-        MtKind::Vertex => &insertions::PARTS,
+        MtKind::Vertex => &vertex::PARTS,
         MtKind::HalfEdge => &half_edge::PARTS,
-        MtKind::Explicit => &spelled::PARTS,
+        MtKind::Explicit => &explicit::PARTS,
     };
     let last = [
         ("base mesh", BASE_LEVEL),
@@ -220,7 +220,7 @@ const QUARTERINGS: Family = exact::LENGTH.after(8, MAX_QUARTERINGS as u32 + 1);
 pub fn put_base(out: &mut impl Put, mt: MtRef<'_>) {
     base::put(out, mt.base());
     match mt {
-        MtRef::Vertex(mt) => insertions::put_head(out, mt),
+        MtRef::Vertex(mt) => vertex::put_head(out, mt),
         MtRef::HalfEdge(mt) => half_edge::put_head(out, mt),
         _ => {}
     }
@@ -247,7 +247,7 @@ pub fn write_base_head(out: &mut Vec<u8>, mt: MtRef<'_>) {
 pub struct BaseParts {
     base: BaseMesh,
     /// What files of vertex-based MTs tell besides.
-    insertions: insertions::Head,
+    vertex: vertex::Head,
     /// What files of half-edge MTs tell besides.
     half_edge: half_edge::BaseHead,
     levels: Vec<Vec<i32>>,
@@ -281,7 +281,7 @@ pub fn read_base(
     let mut source = Source::new(reader, models)?;
     let mut parts = BaseParts { base: base::read(&mut source, vertices, tets)?, ..BaseParts::default() };
     if info.kind == MtKind::Vertex {
-        parts.insertions = insertions::read_head(&mut source)?;
+        parts.vertex = vertex::read_head(&mut source)?;
     }
     if info.kind == MtKind::HalfEdge {
         let counts = [vertices, tets].map(|count| count as usize);
@@ -317,14 +317,14 @@ impl BaseParts {
         block_bits: u32,
         tet_errors: bool,
     ) -> Result<(Mt, Option<State>), FormatError> {
-        let Self { mut base, insertions, half_edge, levels } = self;
+        let Self { mut base, vertex, half_edge, levels } = self;
         let vertices = base.positions.len();
         base.values = (0..vertices).flat_map(|v| levels.iter().map(move |levels| levels[v])).collect();
         base.check(&info)?;
         Ok(match info.kind {
             MtKind::Edge => (EdgeMt::coded(info, base, block_bits).into(), None),
             MtKind::Vertex => {
-                let (mt, state) = insertions::start(info, base, insertions, tet_errors)?;
+                let (mt, state) = vertex::start(info, base, vertex, tet_errors)?;
                 (mt.into(), Some(state))
             }
             MtKind::HalfEdge => {
@@ -346,7 +346,7 @@ impl BaseParts {
 pub fn check_counts(info: &MtInfo, base_vertices: u64) -> Result<(), BaseMeshError> {
     match info.kind {
         MtKind::Edge => edge::check_counts(info, base_vertices),
-        MtKind::Vertex => insertions::check_counts(info, base_vertices),
+        MtKind::Vertex => vertex::check_counts(info, base_vertices),
         MtKind::HalfEdge => half_edge::check_counts(info, base_vertices),
         // How many vertices and tetrahedra there are, every update tells; they are compared at the end.
         MtKind::Explicit => Ok(()),
@@ -365,9 +365,9 @@ pub fn check_memory(
     let base = vertices * (16 + 4 * fields) + tets * 16;
     let each = match info.kind {
         MtKind::Edge => edge::update_bytes(fields),
-        MtKind::Vertex => insertions::least_update_bytes(info),
+        MtKind::Vertex => vertex::least_update_bytes(info),
         MtKind::HalfEdge => half_edge::least_update_bytes(fields),
-        MtKind::Explicit => spelled::least_update_bytes(),
+        MtKind::Explicit => explicit::least_update_bytes(),
     };
     check_bytes(base + u64::from(updates) * each, limits)
 }
@@ -497,9 +497,9 @@ pub fn put_updates(
     state: Option<&mut State>,
 ) -> Result<(), UpdateError> {
     match (mt, state) {
-        (MtRef::Vertex(mt), Some(state)) => insertions::put(out, mt, start, end, state),
+        (MtRef::Vertex(mt), Some(state)) => vertex::put(out, mt, start, end, state),
         (MtRef::Explicit(mt), _) => {
-            spelled::put(out, mt, start, end);
+            explicit::put(out, mt, start, end);
             Ok(())
         }
         _ => Ok(()),
@@ -520,8 +520,8 @@ pub fn read_updates(
     limits: &Limits,
 ) -> Result<(), FormatError> {
     match (mt, state) {
-        (Mt::Vertex(mt), Some(state)) => insertions::read(source, mt, count, state, limits),
-        (Mt::Explicit(mt), _) => spelled::read(source, mt, count, limits),
+        (Mt::Vertex(mt), Some(state)) => vertex::read(source, mt, count, state, limits),
+        (Mt::Explicit(mt), _) => explicit::read(source, mt, count, limits),
         _ => Ok(()),
     }
 }
@@ -530,7 +530,7 @@ pub fn read_updates(
 pub fn check_reference(mt: MtRef<'_>) -> Result<(), BaseMeshError> {
     match mt {
         MtRef::Edge(_) | MtRef::Vertex(_) | MtRef::HalfEdge(_) => Ok(()),
-        MtRef::Explicit(mt) => spelled::check_reference(mt),
+        MtRef::Explicit(mt) => explicit::check_reference(mt),
     }
 }
 

@@ -370,12 +370,12 @@ fn half(v: i32, d: i32, largest: i64) -> Option<[i32; 2]> {
 }
 
 impl EdgeMt {
-    /// Update `u` of an MT that is not coded as a file tells it, with `residuals` for what is wrong with the guesses of the field
-    /// offsets. The mesh must be about to apply `u`, with all parents there.
+    /// Update `u` of an MT that is not coded, in the form that files have: its mask and offsets as residuals against the
+    /// prediction from its star. `residuals` gets those of the field offsets. The mesh must contain all parents of `u`, but not `u`.
     ///
     /// # Errors
     /// If the update does not fit the mesh.
-    pub(crate) fn told<'a>(
+    pub(crate) fn to_residuals<'a>(
         &'a self,
         mesh: &mut CurrentMesh,
         u: UpdateId,
@@ -387,9 +387,9 @@ impl EdgeMt {
         let p = mesh.slot(split.vertex).ok_or(vertex)?;
         let mut ring = take_ring(mesh);
         let gathered = mesh.gather_ring(p, update, &mut ring).is_ok();
-        let told = if gathered && ring.link_len <= MAX_LINK && ring.find_sides(split.mask) {
+        let split = if gathered && ring.link_len <= MAX_LINK && ring.find_sides(split.mask) {
             let mut link = Link::new(&ring, mesh, mesh.positions[p as usize]);
-            let (offset, edge) = link.told_offset(&ring, split.offset, self.info().lattice.bits);
+            let (offset, edge) = link.residual_offset(&ring, split.offset, self.info().lattice.bits);
             link.aim(&ring, split.offset);
             link.guess_levels(&ring, mesh, p, split.offset, &self.info().fields, |field, guess| {
                 residuals.push(split.field_offsets[field] - guess);
@@ -400,7 +400,7 @@ impl EdgeMt {
             Err(UpdateError::Star { update })
         };
         mesh.put_back_kind_state(ring);
-        told
+        split
     }
 }
 

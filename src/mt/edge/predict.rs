@@ -1,8 +1,8 @@
-//! What the star of a vertex tells of the split of that vertex, so that files need not.
+//! Predicts the split of a vertex from its star: files store residuals against the prediction.
 //!
-//! The star is the same in every consistent set, so whoever applies the split can make the same guess as whoever wrote
-//! the file; only where the guess is wrong has to be stored. All of it is the basic arithmetic of doubles, in an order
-//! that vertex numbers fix, and so the same on every platform. `docs/format.md` gives it as formulas.
+//! The star is the same in every consistent set, so the reader makes the same prediction as the writer. The prediction uses
+//! the basic arithmetic of doubles, in an order that vertex numbers fix, and so is the same on every platform.
+//! `docs/format.md` gives it as formulas.
 //!
 //! **Offsets.** Edges of the link often have the length and the direction of the edge that comes, so files may tell which
 //! one, and by how much the offset differs from the step along it. **Sides.** A tetrahedron of the star goes rather to the
@@ -98,20 +98,20 @@ impl Link {
     }
 
     /// An offset as files tell it: what is to be added to the step along an edge, and the number of that; or the offset and 0.
-    pub fn told_offset(&self, ring: &Ring, offset: [i32; 3], bits: u32) -> ([i32; 3], u8) {
+    pub fn residual_offset(&self, ring: &Ring, offset: [i32; 3], bits: u32) -> ([i32; 3], u8) {
         let places = self.by_number(ring.link_len.min(MAX_LINK));
         // What is not counted from an edge has no sign in its first component.
-        let (mut told, mut least) = ((offset, 0), length(offset).saturating_sub(8 + EDGE_COSTS));
+        let (mut residual, mut least) = ((offset, 0), length(offset).saturating_sub(8 + EDGE_COSTS));
         // A link that closes up has 96 edges at most; others may have a few that cannot be named.
         for (number, ends) in (1..=MAX_EDGE).zip(self.edges(ring)) {
             let step = self.step_between(&places, ends);
             let rest = [0, 1, 2].map(|k| offset[k].saturating_sub(step[k]));
             let fits = rest.iter().all(|d| d.unsigned_abs() <= 1 << bits);
             if fits && length(rest) < least {
-                (told, least) = ((rest, number), length(rest));
+                (residual, least) = ((rest, number), length(rest));
             }
         }
-        told
+        residual
     }
 
     /// The order in which the sides of the star are told, the least certain first, and a bit for each tetrahedron that

@@ -57,17 +57,17 @@ pub(in crate::mt) struct StarCode {
     choices: Vec<Choices>,
     /// The vertices of the link, and then the new one.
     positions: Vec<[i32; 3]>,
-    /// What is to be told, by rising certainty: a key, tetrahedron and face.
+    /// What has to be stored, by rising certainty: a key, tetrahedron and face.
     order: Vec<(u64, u8, u8)>,
     /// The corner of each tetrahedron that is the near vertex of its remover.
     near: Vec<u8>,
     /// From that corner to the vertex that its remover inserts.
     offsets: Vec<[i32; 3]>,
     /// Of which tetrahedra the remover is known by now.
-    told: Vec<bool>,
+    decided: Vec<bool>,
 }
 
-/// Tells, or is told, what cannot be predicted.
+/// Writes or reads what cannot be predicted.
 trait Teller {
     /// Which of the choices it is.
     fn choose(&mut self, tet: usize, choices: &mut [Choice]) -> Option<Choice>;
@@ -288,7 +288,7 @@ pub(in crate::mt) fn spread(label: u32) -> u64 {
     x ^ x >> 31
 }
 
-/// Certainties are told apart to this many levels.
+/// Levels of certainty.
 const CERTAINTIES: f64 = 4095.0;
 
 /// The place of something in the order of rising certainty, ties broken by a hash.
@@ -310,11 +310,11 @@ impl StarCode {
         teller: &mut impl Teller,
     ) -> Option<()> {
         self.rank(around, star);
-        self.told.clear();
+        self.decided.clear();
         self.order.clear();
         for (i, choices) in self.choices[..star.len()].iter().enumerate() {
-            // What can only be one thing is not told.
-            self.told.push(choices.len == 1);
+            // What can only be one thing is not stored.
+            self.decided.push(choices.len == 1);
             if choices.len > 1 {
                 let largest =
                     choices.all[..choices.len].iter().fold(0.0, |w: f64, choice| w.max(choice.weight));
@@ -330,9 +330,9 @@ impl StarCode {
             let i = usize::from(self.order[at].1);
             let choices = &mut self.choices[i];
             let choices = &mut choices.all[..choices.len];
-            weigh_by_neighbors(choices, &star[i], star, &self.told);
+            weigh_by_neighbors(choices, &star[i], star, &self.decided);
             let choice = teller.choose(i, choices)?;
-            self.told[i] = true;
+            self.decided[i] = true;
             let (corner, child) = match choice.remover {
                 NONE => continue,
                 FURTHER => match self.further(around, &star[i], i, teller)? {
@@ -371,7 +371,7 @@ impl StarCode {
         }
     }
 
-    /// The candidate without a rank that is told by its number, and the corner that is its near vertex; or that there is none.
+    /// The candidate without a rank that is stored by its number, and the corner that is its near vertex; or that there is none.
     #[cold]
     fn further(
         &self,
@@ -406,7 +406,7 @@ impl StarCode {
 
     fn find_inner(&mut self, around: &Around<'_>, star: &mut [NewTet], teller: &mut impl Teller) {
         self.order.clear();
-        // Those that are not told are as guessed.
+        // Those that are not stored are as predicted.
         let bits = teller.bits_left();
         for i in 0..star.len() {
             let new = star[i];
@@ -442,13 +442,13 @@ impl StarCode {
                 self.order.push((key, i as u8, face as u8 | guess << 7));
             }
         }
-        let told = bits.min(self.order.len());
-        if told > 0 {
+        let stored = bits.min(self.order.len());
+        if stored > 0 {
             self.order.sort_unstable();
         }
         for (at, &(_, i, face)) in self.order.iter().enumerate() {
             let (i, face, guess) = (usize::from(i), usize::from(face & 3), face >> 7 == 1);
-            let is_inner = if at < told { teller.is_inner(i, face, guess) } else { guess };
+            let is_inner = if at < stored { teller.is_inner(i, face, guess) } else { guess };
             star[i].inner |= u8::from(is_inner) << face;
         }
     }
@@ -481,10 +481,10 @@ const AGREEMENT: f64 = 6.0;
 
 /// Weighs the choices for a tetrahedron anew by what is known of its neighbours in the star: T_u hangs together.
 #[inline]
-fn weigh_by_neighbors(choices: &mut [Choice], new: &NewTet, star: &[NewTet], told: &[bool]) {
+fn weigh_by_neighbors(choices: &mut [Choice], new: &NewTet, star: &[NewTet], decided: &[bool]) {
     let (mut known, mut count) = ([(0, NONE); 4], 0);
     for (face, &n) in (0..).zip(&new.across) {
-        if told.get(usize::from(n)).is_some_and(|&told| told) {
+        if decided.get(usize::from(n)).is_some_and(|&decided| decided) {
             known[count] = (face, star[usize::from(n)].remover);
             count += 1;
         }

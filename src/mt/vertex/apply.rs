@@ -6,7 +6,7 @@
 use super::bit_string::{Bits, width_of};
 use super::cavity_fill::{Across, Close, Face, Glue, turned};
 use super::from_explicit::{Hole, write_given_up, write_removed};
-use super::sphere_order::{Spheres, Told};
+use super::sphere_order::{ApexCode, Spheres};
 use super::store::{COUNT_BITS, MAX_AROUND, MAX_INSERTED, VertexMt};
 use super::streaming::Insertion;
 use super::tet_errors::{Packed, QUARTERING_BITS};
@@ -822,7 +822,7 @@ impl VertexMt {
         let mut code = Code::new(at, vertices, shape.boundary);
         let apex = code.apex_of_all(&self.nodes);
         if apex.is_none() {
-            code.read_told(&self.nodes, || {
+            code.read_apex_code(&self.nodes, || {
                 let link = &cavity.link[..cavity.link_len];
                 Spheres::of(link.iter().map(|&v| mesh.positions[v as usize]))
             });
@@ -885,14 +885,14 @@ pub(in crate::mt) struct Code {
     /// Vertices of Π_u.
     vertices: u32,
     boundary: bool,
-    told: Told,
-    /// Where places in their order are told.
+    apex_code: ApexCode,
+    /// Where the codes of places in their order are.
     spheres: Option<Spheres>,
 }
 
 impl Code {
     pub fn new(at: u64, vertices: u32, boundary: bool) -> Self {
-        Self { at, vertices, boundary, told: Told::Vertex, spheres: None }
+        Self { at, vertices, boundary, apex_code: ApexCode::Vertex, spheres: None }
     }
 
     fn read(&mut self, nodes: &Bits, width: u32) -> u32 {
@@ -908,11 +908,11 @@ impl Code {
         fan.then(|| self.read(nodes, width_of(self.vertices.saturating_sub(1))) as u8)
     }
 
-    /// Reads how faces are told; `spheres` are made only if that takes them.
+    /// Reads how the apexes of faces are coded; `spheres` are made only if that takes them.
     #[inline]
-    fn read_told(&mut self, nodes: &Bits, spheres: impl FnOnce() -> Spheres) {
-        self.told = Told::ALL[self.read(nodes, 2) as usize % Told::ALL.len()];
-        self.spheres = (self.told != Told::Vertex).then(spheres);
+    fn read_apex_code(&mut self, nodes: &Bits, spheres: impl FnOnce() -> Spheres) {
+        self.apex_code = ApexCode::ALL[self.read(nodes, 2) as usize % ApexCode::ALL.len()];
+        self.spheres = (self.apex_code != ApexCode::Vertex).then(spheres);
     }
 
     /// How to close a face. Its own vertices are left out of the count; at the boundary of the domain, one more choice
@@ -921,7 +921,7 @@ impl Code {
     fn close(&mut self, nodes: &Bits, face: Face, of_link: bool) -> Option<Close> {
         if let Some(spheres) = &self.spheres {
             let at = &mut self.at;
-            let place = self.told.read(&mut || {
+            let place = self.apex_code.read(&mut || {
                 *at += 1;
                 nodes.get(*at - 1, 1) == 1
             });

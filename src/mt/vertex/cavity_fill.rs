@@ -95,7 +95,7 @@ fn key([a, b, c]: Face) -> u32 {
 
 impl Glue {
     /// Builds tetrahedra behind `link`, the faces of Π_u in canonical order, turned. `close` says how to close each face;
-    /// it is told whether the face is one of Π_u. None if the faces do not fit together: every face of Π_u must be
+    /// it gets whether the face is one of Π_u. None if the faces do not fit together: every face of Π_u must be
     /// closed, and with `whole` every other face as well.
     #[inline]
     pub fn build(

@@ -3,7 +3,7 @@
 use super::apply::choices;
 use super::bit_string::{Bits, width_of};
 use super::cavity_fill::{Close, Face, Glue, turned};
-use super::sphere_order::{Spheres, Told};
+use super::sphere_order::{ApexCode, Spheres};
 use super::store::{COUNT_BITS, MAX_AROUND, MAX_INSERTED, MAX_REMOVED};
 use crate::mesh::{FACES, NONE};
 use crate::mt::{
@@ -305,19 +305,19 @@ fn oriented(face: [u8; 3]) -> u32 {
 /// place in the order of spheres, where all have one.
 fn write_closed(bits: &mut Bits, plain: &[(u32, u32)], places: &[Option<u32>]) {
     let places: Option<Vec<u32>> = places.iter().copied().collect();
-    let size = |told: &Told| match (told, &places) {
-        (Told::Vertex, _) => plain.iter().map(|(_, width)| width).sum(),
-        (told, Some(places)) => places.iter().map(|&place| told.code(place).1).sum(),
+    let size = |apex_code: &ApexCode| match (apex_code, &places) {
+        (ApexCode::Vertex, _) => plain.iter().map(|(_, width)| width).sum(),
+        (apex_code, Some(places)) => places.iter().map(|&place| apex_code.code(place).1).sum(),
         (_, None) => u32::MAX,
     };
-    let told = Told::ALL.into_iter().min_by_key(size).unwrap_or(Told::Vertex);
-    bits.push(Told::ALL.iter().position(|&other| other == told).unwrap_or(0) as u64, 2);
-    match (told, &places) {
-        (Told::Vertex, _) | (_, None) => {
+    let apex_code = ApexCode::ALL.into_iter().min_by_key(size).unwrap_or(ApexCode::Vertex);
+    bits.push(ApexCode::ALL.iter().position(|&other| other == apex_code).unwrap_or(0) as u64, 2);
+    match (apex_code, &places) {
+        (ApexCode::Vertex, _) | (_, None) => {
             plain.iter().for_each(|&(chosen, width)| bits.push(u64::from(chosen), width));
         }
-        (told, Some(places)) => {
-            for (code, width) in places.iter().map(|&place| told.code(place)) {
+        (apex_code, Some(places)) => {
+            for (code, width) in places.iter().map(|&place| apex_code.code(place)) {
                 bits.push(code, width);
             }
         }

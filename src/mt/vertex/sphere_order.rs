@@ -100,20 +100,20 @@ impl Spheres {
     }
 }
 
-/// How the places in that order are told, or that numbers of vertices are.
+/// How the apex of a face is coded: by its place in that order, or by the number of the vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::mt) enum Told {
+pub(in crate::mt) enum ApexCode {
     /// The vertex, in as many bits as that takes.
     Vertex,
     /// So many ones as the place says, and a zero.
     Unary,
     /// The same for half of it, and the last bit.
     Halves,
-    /// A zero for place 0; else a one, and the place less 1 in the way of [`Told::Halves`].
+    /// A zero for place 0; else a one, and the place less 1 in the way of [`ApexCode::Halves`].
     Later,
 }
 
-impl Told {
+impl ApexCode {
     /// All ways; a node tells the place here, in two bits.
     pub const ALL: [Self; 4] = [Self::Vertex, Self::Unary, Self::Halves, Self::Later];
 
@@ -185,16 +185,16 @@ mod tests {
     }
 
     #[test]
-    fn places_come_back_however_they_are_told() {
-        for told in [Told::Unary, Told::Halves, Told::Later] {
+    fn places_come_back_however_they_are_coded() {
+        for code in [ApexCode::Unary, ApexCode::Halves, ApexCode::Later] {
             for place in 0..60 {
-                let (bits, width) = told.code(place);
+                let (bits, width) = code.code(place);
                 let mut at = 0;
                 let mut bit = || {
                     at += 1;
                     bits >> (at - 1) & 1 == 1
                 };
-                assert_eq!(told.read(&mut bit), place);
+                assert_eq!(code.read(&mut bit), place);
                 assert_eq!(at, width);
             }
         }

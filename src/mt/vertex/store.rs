@@ -92,7 +92,7 @@ pub struct VertexMt {
     pub(in crate::mt) growing: Option<Box<Growing>>,
 }
 
-/// Nodes whose starts are told from a common one: with at most 255 fields a node takes less than 2^14 bits.
+/// Nodes whose starts are relative to a common one: with at most 255 fields a node takes less than 2^14 bits.
 const GROUP: usize = 16;
 /// Nodes start at multiples of so many bits.
 const UNIT: u64 = 4;

@@ -1,4 +1,4 @@
-//! A compact vertex-based MT that grows by what its updates remove, without being told of their children.
+//! A compact vertex-based MT that grows by what its updates remove, without knowledge of their children.
 //!
 //! Nodes name their children, which come later. So until all updates are here, parents, children and removers are kept
 //! beside the nodes; then they move into them.

@@ -1,7 +1,7 @@
 //! Errors that tetrahedra have by themselves, as parts of those of the updates that remove them.
 //!
 //! An MT may tell of each update how far its errors are above those of what it removes, and of each tetrahedron how often the errors of the update that removes it can be quartered and still bound
-//! its own; the second number is told from the errors that the first one leaves. In the current mesh every tetrahedron has this number. When a vertex is inserted, the numbers of what gives way
+//! its own; the second number is relative to the errors that the first one leaves. In the current mesh every tetrahedron has this number. When a vertex is inserted, the numbers of what gives way
 //! stay with the vertex, in the order of the sorted labels of these tetrahedra, which is the same in every consistent set; when
 //! the vertex is removed they come back.
 

@@ -1,13 +1,13 @@
-//! Updates that are spelled out, coded: numbers with a context for each kind of number.
+//! Updates of explicit MTs, coded: numbers with a context for each kind of number.
 
-use super::{OWN_FALL, QUARTERINGS, check_bytes, insertions, largest};
+use super::{OWN_FALL, QUARTERINGS, check_bytes, largest, vertex};
 use crate::format::coder::{Family, Put, Source};
 use crate::format::{FormatError, Limits};
 use crate::mt::{BaseMeshError, ErrorCode, ExplicitMt, ExplicitUpdate, UpdateId, VertexId};
 use std::ops::Range;
 
 /// By how many codes an error is below the one before.
-const ERROR: Family = insertions::LAST.numbers_after(1, 2);
+const ERROR: Family = vertex::LAST.numbers_after(1, 2);
 /// How many vertices are created; how many tetrahedra removed; how many inserted.
 const COUNT: Family = ERROR.numbers_after(3, 3);
 /// A coordinate less that of the vertex before, by axis.
@@ -263,7 +263,7 @@ impl Parts {
 
 #[cfg(test)]
 mod tests {
-    use super::super::insertions::tests::delaunay;
+    use super::super::vertex::tests::delaunay;
     use super::*;
     use crate::format::coder::{Counts, Models, Writer};
     use crate::format::read::Reader;

@@ -8,7 +8,7 @@ use crate::mt::{
 use std::collections::BTreeSet;
 
 /// What a run through an MT has found.
-pub struct Survey {
+pub struct BlockScan {
     /// The blocks of `2^block_bits` updates; their lengths are not known yet.
     pub blocks: Vec<BlockInfo>,
     /// The MT in the form that files have, if it was not in that form.
@@ -17,41 +17,46 @@ pub struct Survey {
     pub reference: Vec<(u32, Vec<i32>)>,
 }
 
-impl Survey {
+impl BlockScan {
     pub fn of(mt: MtRef<'_>, options: &EncodeOptions) -> Result<Self, EncodeError> {
         match mt {
-            MtRef::Edge(mt) => survey_edge(mt, options),
+            MtRef::Edge(mt) => scan_edge(mt, options),
             MtRef::Vertex(mt) => run(mt, options, &mut |_, _| Ok(())),
-            MtRef::HalfEdge(mt) => survey_half_edge(mt, options),
+            MtRef::HalfEdge(mt) => scan_half_edge(mt, options),
             MtRef::Explicit(mt) => run(mt, options, &mut |_, _| Ok(())),
         }
     }
 }
 
-fn survey_edge(mt: &EdgeMt, options: &EncodeOptions) -> Result<Survey, EncodeError> {
+fn scan_edge(mt: &EdgeMt, options: &EncodeOptions) -> Result<BlockScan, EncodeError> {
     if mt.is_coded() {
         return run(mt, options, &mut |_, _| Ok(()));
     }
     let mut coded = EdgeMt::coded(mt.info().clone(), mt.base().clone(), options.block_bits);
     let mut residuals = Vec::new();
-    let survey = run(mt, options, &mut |mesh, u| coded.push(&mt.told(mesh, u, &mut residuals)?).map(drop))?;
-    Ok(Survey { coded: Some(coded.into()), ..survey })
+    let scan =
+        run(mt, options, &mut |mesh, u| coded.push(&mt.to_residuals(mesh, u, &mut residuals)?).map(drop))?;
+    Ok(BlockScan { coded: Some(coded.into()), ..scan })
 }
 
 /// Blocks are pages, and do not tell on which others they depend: each can be used without.
-fn survey_half_edge(mt: &HalfEdgeMt, options: &EncodeOptions) -> Result<Survey, EncodeError> {
+fn scan_half_edge(mt: &HalfEdgeMt, options: &EncodeOptions) -> Result<BlockScan, EncodeError> {
     let bits = options.block_bits;
     let coded = (mt.page_bits() != bits).then(|| mt.in_pages(bits));
     let coded = coded.transpose().map_err(EncodeError::Update)?.map(Mt::from);
-    let mut survey = run(mt, options, &mut |_, _| Ok(()))?;
-    survey.blocks.iter_mut().for_each(|block| block.parents.clear());
-    Ok(Survey { coded, ..survey })
+    let mut scan = run(mt, options, &mut |_, _| Ok(()))?;
+    scan.blocks.iter_mut().for_each(|block| block.parents.clear());
+    Ok(BlockScan { coded, ..scan })
 }
 
 /// Called before each update with the mesh that has all of its parents.
 type Before<'a> = &'a mut dyn FnMut(&mut CurrentMesh, UpdateId) -> Result<(), UpdateError>;
 
-fn run(mt: &impl ApplyUpdates, options: &EncodeOptions, before: Before<'_>) -> Result<Survey, EncodeError> {
+fn run(
+    mt: &impl ApplyUpdates,
+    options: &EncodeOptions,
+    before: Before<'_>,
+) -> Result<BlockScan, EncodeError> {
     let mut mesh = mt.start().map_err(EncodeError::Base)?;
     mt.updates_arrived(&mut mesh, 0);
     let mut margins = Margins::new(mt.info());
@@ -59,7 +64,7 @@ fn run(mt: &impl ApplyUpdates, options: &EncodeOptions, before: Before<'_>) -> R
     let mut first = 0;
     while first < mt.updates() {
         let end = mt.updates().min(first + (1 << options.block_bits));
-        blocks.push(survey_block(mt, &mut mesh, first..end, options, &mut margins, before)?);
+        blocks.push(scan_block(mt, &mut mesh, first..end, options, &mut margins, before)?);
         first = end;
     }
     mesh.compact();
@@ -67,10 +72,10 @@ fn run(mt: &impl ApplyUpdates, options: &EncodeOptions, before: Before<'_>) -> R
     let mut reference: Vec<(u32, Vec<i32>)> =
         slots.map(|slot| (mesh.vertex(slot).0, mesh.levels(slot).to_vec())).collect();
     reference.sort_unstable();
-    Ok(Survey { blocks, coded: None, reference })
+    Ok(BlockScan { blocks, coded: None, reference })
 }
 
-fn survey_block(
+fn scan_block(
     mt: &impl ApplyUpdates,
     mesh: &mut CurrentMesh,
     updates: std::ops::Range<u32>,
