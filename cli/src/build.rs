@@ -28,7 +28,7 @@ pub struct Arguments {
     /// The MT file to write.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// The kind of MT: half-edge (the best for regions), edge, vertex or explicit [default: what goes with the other options, else edge].
+    /// The kind of MT: half-edge (the best for regions), edge, vertex or explicit [default: what goes with the other options, else half-edge].
     #[arg(long, value_name = "KIND", value_parser = kind)]
     kind: Option<MtKind>,
     /// How it is built: collapse (edges, for kind edge), insert or decimate (vertices, for kind vertex); any for kind
