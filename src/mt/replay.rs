@@ -1,38 +1,17 @@
 //! All updates of an MT, coarse to fine, each with the tetrahedra that it removes and inserts.
 
 use super::{Applied, ApplyUpdates, BaseMeshError, CurrentMesh, UpdateError, UpdateId};
-use std::fmt;
+use thiserror::Error;
 
 /// Why the updates of an MT cannot all be applied. Only a damaged or hostile MT leads here.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum ReplayError {
     /// The base mesh is not usable.
-    Base(BaseMeshError),
+    #[error(transparent)]
+    Base(#[from] BaseMeshError),
     /// An update does not fit the mesh that the updates before it make.
-    Update(UpdateError),
-}
-
-impl fmt::Display for ReplayError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Base(error) => error.fmt(f),
-            Self::Update(error) => error.fmt(f),
-        }
-    }
-}
-
-impl std::error::Error for ReplayError {}
-
-impl From<BaseMeshError> for ReplayError {
-    fn from(error: BaseMeshError) -> Self {
-        Self::Base(error)
-    }
-}
-
-impl From<UpdateError> for ReplayError {
-    fn from(error: UpdateError) -> Self {
-        Self::Update(error)
-    }
+    #[error(transparent)]
+    Update(#[from] UpdateError),
 }
 
 /// One update that has just been applied. Tetrahedra are in numbers of MT vertices, positive, and written the same

@@ -2,7 +2,7 @@
 
 use crate::geom::{WIDE_BITS, orient3d};
 use crate::mt::MtInfo;
-use std::fmt;
+use thiserror::Error;
 
 /// The coarsest mesh of an MT, on the lattices.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -16,31 +16,22 @@ pub struct BaseMesh {
 }
 
 /// Why a base mesh, or the description that comes with it, cannot be used.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum BaseMeshError {
     /// The description of the MT contradicts itself or leaves the limits of the lattices.
+    #[error("the description of the MT is not usable: {0}")]
     Info(&'static str),
     /// The vertex is off its lattice.
+    #[error("vertex {0} of the base mesh is off the lattice")]
     Vertex(u32),
     /// The tetrahedron names a vertex that is not there, or is flat or inside out.
+    #[error("tetrahedron {0} of the base mesh is not positive")]
     Tetrahedron(u32),
     /// More than two tetrahedra share a face of this one, or two lie on the same side of it.
+    #[error("a face of tetrahedron {0} of the base mesh is shared by too many")]
     Face(u32),
 }
-
-impl fmt::Display for BaseMeshError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Info(what) => write!(f, "the description of the MT is not usable: {what}"),
-            Self::Vertex(v) => write!(f, "vertex {v} of the base mesh is off the lattice"),
-            Self::Tetrahedron(t) => write!(f, "tetrahedron {t} of the base mesh is not positive"),
-            Self::Face(t) => write!(f, "a face of tetrahedron {t} of the base mesh is shared by too many"),
-        }
-    }
-}
-
-impl std::error::Error for BaseMeshError {}
 
 impl BaseMesh {
     /// Checks everything that refinement relies on: sizes, lattices, orientation. Adjacency is checked where it is
