@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use tetralod::client::{Client, ClientOptions};
 use tetralod::format::Decoder;
 use tetralod::geom::Bounds;
-use tetralod::mt::MultiTessellation;
+use tetralod::mt::{MultiTessellation, UpdatePages};
 use tetralod::refine::{Need, Request, View};
 use tetralod::session::Session;
 use tetralod::stream::{Arrived, FileSource, RangeSource, StreamError, WantedRange};

@@ -179,7 +179,7 @@ fn breakdown(opened: &Opened) -> Result<Vec<FilePart>> {
     let decoder = opened.session.decoder();
     let index = decoder.index().context("the file has no index")?;
     let index_bytes = decoder.head_end().unwrap_or(0).saturating_sub(index.shared);
-    let mut parts = format::breakdown(opened.mt()?.into(), index.block_bits)?;
+    let mut parts = format::breakdown(opened.mt()?, index.block_bits)?;
     parts.push(("header, description and index", index_bytes as f64));
     let known: f64 = parts.iter().map(|(_, bytes)| bytes).sum();
     parts.push(("heads and ends of sections", opened.bytes as f64 - known));

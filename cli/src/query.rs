@@ -13,7 +13,7 @@ use std::str::FromStr;
 use std::time::{Duration, Instant};
 use tetralod::client::{Client, Step};
 use tetralod::geom::Bounds;
-use tetralod::mt::MtInfo;
+use tetralod::mt::{MtInfo, UpdatePages};
 use tetralod::refine::{Budget, Need, Outcome, RefineStats, Request};
 
 /// What the options look like in use.

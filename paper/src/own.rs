@@ -3,7 +3,7 @@
 
 use anyhow::{Result, bail};
 use tetralod::mesh::TetMesh;
-use tetralod::mt::{ErrorCode, ExplicitMt, Mt, MtKind, UpdateId, VertexId};
+use tetralod::mt::{ErrorCode, ExplicitMt, Mt, MtKind, MultiTessellation, UpdateId, VertexId};
 
 use crate::markdown::{Table, count, percent};
 use crate::model::{DataSet, Recipe};

@@ -12,7 +12,7 @@ use super::{
 use crate::geom::Bounds;
 use crate::mesh;
 use crate::mesh::{EDGES, TetMesh, Topology};
-use crate::mt::{EdgeMt, ErrorCode, MAX_UPDATES, MtInfo, MtKind};
+use crate::mt::{EdgeMt, ErrorCode, MAX_UPDATES, MtInfo, MtKind, MultiTessellation};
 
 /// Builds an edge-based MT of `mesh`, which must be valid: see [`crate::mesh::repair`].
 ///

@@ -8,8 +8,8 @@ use super::work_mesh::WorkMesh;
 use super::{BuildError, BuildProgress, OnProgress};
 use crate::mesh::NONE;
 use crate::mt::{
-    Applied, ApplyUpdates, CurrentMesh, EdgeMt, ErrorCode, Margins, MtInfo, UpdateError, UpdateId,
-    UpdatePages, VertexId, VertexSplit,
+    Applied, ApplyUpdates, CurrentMesh, EdgeMt, ErrorCode, Margins, MtInfo, MultiTessellation, UpdateError,
+    UpdateId, UpdatePages, VertexId, VertexSplit,
 };
 use std::cmp::Reverse;
 

@@ -409,7 +409,7 @@ fn half_edge_mt(
     }
     let boxes: Vec<[[i32; 3]; 2]> = all().map(|u| bounds_of_inserted(explicit, u)).collect();
     let errors: Vec<ErrorCode> = all().map(|u| explicit.error(u)).collect();
-    let base = explicit.base_mesh().positions.len() as u32;
+    let base = explicit.base().positions.len() as u32;
     let updates = block_order::Updates {
         base,
         near: &near,
@@ -457,8 +457,8 @@ fn summed_up(
     let summary = BuildSummary {
         vertices: info.vertices,
         tetrahedra: info.tetrahedra,
-        base_vertices: mt.base_mesh().positions.len() as u32,
-        base_tetrahedra: mt.base_mesh().tets.len() as u32,
+        base_vertices: mt.base().positions.len() as u32,
+        base_tetrahedra: mt.base().tets.len() as u32,
         updates: mt.updates(),
         position_bits: info.lattice.bits,
         depth: depths.into_iter().max().unwrap_or(0),

@@ -5,8 +5,8 @@ use super::quantize::Quantized;
 use super::{BuildError, BuildProgress, OnProgress, quantize};
 use crate::mesh::NONE;
 use crate::mt::{
-    ErrorCode, ExplicitMt, ExplicitUpdate, MAX_QUARTERINGS, MtInfo, UpdateError, UpdateId, VertexId,
-    canonical,
+    ErrorCode, ExplicitMt, ExplicitUpdate, MAX_QUARTERINGS, MtInfo, MultiTessellation, UpdateError, UpdateId,
+    VertexId, canonical,
 };
 use std::cmp::Reverse;
 use std::ops::Range;
@@ -78,7 +78,7 @@ impl Sequence {
                 }
             }
             let Insertion { vertex, inserted, .. } = &self.steps[i as usize];
-            number[*vertex as usize] = (mt.base_mesh().positions.len() + done) as u32;
+            number[*vertex as usize] = (mt.base().positions.len() + done) as u32;
             let sources = &arcs.source[self.steps[i as usize].removed.clone()];
             let removed: Vec<u32> = sources.iter().map(|source| source.number(&base_ids, &ids)).collect();
             let name = |tet: [u32; 4]| canonical(tet.map(|v| number[v as usize]));

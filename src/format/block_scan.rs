@@ -3,7 +3,8 @@
 use super::payload::index::BlockInfo;
 use super::{EncodeError, EncodeOptions};
 use crate::mt::{
-    Applied, ApplyUpdates, CurrentMesh, EdgeMt, Excess, HalfEdgeMt, Margins, Mt, MtRef, UpdateError, UpdateId,
+    Applied, ApplyUpdates, CurrentMesh, EdgeMt, Excess, HalfEdgeMt, Margins, Mt, MultiTessellation,
+    UpdateError, UpdateId, UpdatePages,
 };
 use std::collections::BTreeSet;
 
@@ -18,12 +19,12 @@ pub struct BlockScan {
 }
 
 impl BlockScan {
-    pub fn of(mt: MtRef<'_>, options: &EncodeOptions) -> Result<Self, EncodeError> {
+    pub fn of(mt: &Mt, options: &EncodeOptions) -> Result<Self, EncodeError> {
         match mt {
-            MtRef::Edge(mt) => scan_edge(mt, options),
-            MtRef::Vertex(mt) => run(mt, options, &mut |_, _| Ok(())),
-            MtRef::HalfEdge(mt) => scan_half_edge(mt, options),
-            MtRef::Explicit(mt) => run(mt, options, &mut |_, _| Ok(())),
+            Mt::Edge(mt) => scan_edge(mt, options),
+            Mt::Vertex(mt) => run(mt, options, &mut |_, _| Ok(())),
+            Mt::HalfEdge(mt) => scan_half_edge(mt, options),
+            Mt::Explicit(mt) => run(mt, options, &mut |_, _| Ok(())),
         }
     }
 }

@@ -9,7 +9,7 @@ use super::payload::exact::Corrections;
 use super::payload::{BaseParts, Metadata, Shared, State};
 use super::read::Reader;
 use super::{BlockInfo, FormatError, Index, Limits, payload};
-use crate::mt::{ErrorCode, Mt, MtInfo, MtRef, MultiTessellation, PageError, UpdatePages};
+use crate::mt::{ErrorCode, Mt, MtInfo, MultiTessellation, PageError, UpdatePages};
 use std::ops::Range;
 
 /// Most bytes that are kept allocated between sections.
@@ -738,7 +738,7 @@ impl Decoder {
             return Err(self.corrupt("updates are missing"));
         }
         if let Some(mt) = &self.mt {
-            payload::check_reference(MtRef::from(mt))?;
+            payload::check_reference(mt)?;
         }
         if totals.sections != self.sections || totals.crc != self.chain.clone().finalize() {
             return Err(self.corrupt("sections are missing or repeated"));

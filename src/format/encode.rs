@@ -7,7 +7,7 @@ use super::payload::exact::Corrections;
 use super::payload::index::{Index, MAX_BLOCK_BITS, MIN_BLOCK_BITS};
 use super::payload::{State, Totals};
 use super::{payload, write};
-use crate::mt::{BaseMeshError, Exact, MtRef, UpdateError, VertexId};
+use crate::mt::{BaseMeshError, Exact, Mt, MultiTessellation, UpdateError, UpdatePages, VertexId};
 use std::collections::BTreeMap;
 use std::{fmt, io};
 
@@ -116,7 +116,7 @@ impl std::error::Error for EncodeError {
 ///
 /// # Errors
 /// If the MT is not complete, or could not be read back.
-pub fn encode<'a>(mt: impl Into<MtRef<'a>>, options: &EncodeOptions) -> Result<Vec<u8>, EncodeError> {
+pub fn encode(mt: &Mt, options: &EncodeOptions) -> Result<Vec<u8>, EncodeError> {
     let mut bytes = Vec::new();
     encode_to(mt, options, &mut bytes)?;
     Ok(bytes)
@@ -126,15 +126,10 @@ pub fn encode<'a>(mt: impl Into<MtRef<'a>>, options: &EncodeOptions) -> Result<V
 ///
 /// # Errors
 /// As [`encode`], and when `writer` fails.
-pub fn encode_to<'a>(
-    mt: impl Into<MtRef<'a>>,
-    options: &EncodeOptions,
-    writer: &mut dyn io::Write,
-) -> Result<u64, EncodeError> {
-    let mt = mt.into();
+pub fn encode_to(mt: &Mt, options: &EncodeOptions, writer: &mut dyn io::Write) -> Result<u64, EncodeError> {
     check(mt, options)?;
     let BlockScan { blocks, coded, reference } = BlockScan::of(mt, options)?;
-    let mt = coded.as_ref().map_or(mt, MtRef::from);
+    let mt = coded.as_ref().unwrap_or(mt);
     let mut index = Index { block_bits: options.block_bits, shared: 0, blocks };
     index.round(mt.info());
     let exact = corrections(mt, &options.exact, &reference)?;
@@ -161,7 +156,7 @@ pub fn encode_to<'a>(
 }
 
 /// What a decoder would refuse must not be written.
-fn check(mt: MtRef<'_>, options: &EncodeOptions) -> Result<(), EncodeError> {
+fn check(mt: &Mt, options: &EncodeOptions) -> Result<(), EncodeError> {
     if !(MIN_BLOCK_BITS..=MAX_BLOCK_BITS).contains(&options.block_bits) {
         return Err(EncodeError::Blocks { bits: options.block_bits });
     }
@@ -212,7 +207,7 @@ impl Section {
 
 /// All sections but the last. Lengths are entered into the index.
 fn sections(
-    mt: MtRef<'_>,
+    mt: &Mt,
     metadata: &BTreeMap<String, String>,
     index: &mut Index,
     exact: &[(u32, Corrections)],
@@ -265,7 +260,7 @@ fn sections(
 
 /// What is to be written of exact values: by field, ascending.
 fn corrections(
-    mt: MtRef<'_>,
+    mt: &Mt,
     exact: &[Exact],
     reference: &[(u32, Vec<i32>)],
 ) -> Result<Vec<(u32, Corrections)>, EncodeError> {
@@ -284,7 +279,7 @@ fn corrections(
 }
 
 /// Puts all that is coded of a file.
-fn put_all(out: &mut impl Put, mt: MtRef<'_>, block_bits: u32) -> Result<(), EncodeError> {
+fn put_all(out: &mut impl Put, mt: &Mt, block_bits: u32) -> Result<(), EncodeError> {
     payload::put_base(out, mt);
     let fields = mt.info().fields.len();
     (0..fields).for_each(|field| payload::put_base_field(out, mt, field));
@@ -308,7 +303,7 @@ fn put_all(out: &mut impl Put, mt: MtRef<'_>, block_bits: u32) -> Result<(), Enc
 ///
 /// # Errors
 /// If the MT is damaged.
-pub fn breakdown(mt: MtRef<'_>, block_bits: u32) -> Result<Vec<(&'static str, f64)>, EncodeError> {
+pub fn breakdown(mt: &Mt, block_bits: u32) -> Result<Vec<(&'static str, f64)>, EncodeError> {
     let mut counts = Counts::default();
     put_all(&mut counts, mt, block_bits)?;
     let models = Models::new(&counts);
@@ -330,7 +325,7 @@ pub fn breakdown(mt: MtRef<'_>, block_bits: u32) -> Result<Vec<(&'static str, f6
 
 /// Appends the sections of a block.
 fn put_block(
-    mt: MtRef<'_>,
+    mt: &Mt,
     block: u32,
     index: &Index,
     models: &Models,

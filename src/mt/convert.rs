@@ -79,7 +79,7 @@ impl EdgeMt {
     /// # Errors
     /// The first update that is not.
     pub fn from_explicit(explicit: &ExplicitMt) -> Result<Self, ConvertError> {
-        let mut mt = Self::new(explicit.info().clone(), explicit.base_mesh().clone());
+        let mut mt = Self::new(explicit.info().clone(), explicit.base().clone());
         for u in (0..explicit.updates()).map(UpdateId) {
             let refused = |why| ConvertError::Update { update: u.0, why };
             let split = as_split(explicit, &mt, u).map_err(refused)?;

@@ -4,6 +4,8 @@
 //! spells the same MTs out, as the oracle of tests. Both are immutable once they are complete. What changes is the [`CurrentMesh`], to which updates
 //! are applied through the trait [`ApplyUpdates`].
 
+#[macro_use]
+mod pages;
 mod any;
 mod convert;
 mod edge;
@@ -19,7 +21,7 @@ mod stats;
 mod update_errors;
 mod vertex;
 
-pub use any::{Mt, MtRef};
+pub use any::Mt;
 pub use convert::ConvertError;
 pub use edge::store::{EdgeMt, MAX_EDGE, MAX_LINK, MAX_STAR, VertexSplit};
 pub use error::{ErrorCode, PageError, UpdateError};
@@ -46,6 +48,7 @@ pub use vertex::tet_errors::MAX_QUARTERINGS;
 
 use crate::geom::Lattice;
 use crate::mesh::{Field, VectorPart};
+use enum_dispatch::enum_dispatch;
 use std::ops::Range;
 
 /// Index of an update (a node of the MT) in coarse-to-fine order: parents come before their children.
@@ -242,6 +245,7 @@ pub enum Applied {
 pub type LookAtTet<'a> = &'a mut dyn FnMut(&[[i32; 3]; 4], &dyn Fn(usize) -> [i32; 4], u8) -> bool;
 
 /// A Multi-Tessellation of any kind, to be read: what is known of it as a whole, and of each of its updates [§2].
+#[enum_dispatch]
 pub trait MultiTessellation {
     /// What is known of the MT as a whole.
     fn info(&self) -> &MtInfo;
@@ -299,6 +303,7 @@ pub trait MultiTessellation {
 }
 
 /// A Multi-Tessellation whose updates arrive and leave in pages; where none do, all are here as soon as they are known.
+#[enum_dispatch]
 pub trait UpdatePages: MultiTessellation {
     /// Whether update `u` is here.
     #[inline]
@@ -311,11 +316,55 @@ pub trait UpdatePages: MultiTessellation {
         self.updates()
     }
 
-    /// The updates of page `page`: those that come and go together.
+    /// log2 of the updates of a page.
+    fn page_bits(&self) -> u32 {
+        PAGE_BITS
+    }
+
+    /// The updates of page `page`, which come and go together; none if there is no such page.
     fn page_updates(&self, page: u32) -> Range<u32> {
-        let first = u64::from(page) << PAGE_BITS;
+        let first = u64::from(page) << self.page_bits();
         let end = u64::from(self.info().updates);
-        first.min(end) as u32..(first + (1 << PAGE_BITS)).min(end) as u32
+        first.min(end) as u32..(first + (1 << self.page_bits())).min(end) as u32
+    }
+
+    /// Declares that no update which is still to come has a larger error than this; until then, any may come. Without effect
+    /// once all are here.
+    fn set_to_come(&mut self, bound: ErrorCode);
+
+    /// Whether page `page` is here. False for kinds without pages.
+    fn has_page(&self, _page: u32) -> bool {
+        false
+    }
+
+    /// Takes the updates of a page away, none of which may be applied to a mesh that is still in use; that mesh must have
+    /// been told before, by [`Front::leave`](crate::refine::Front::leave). What needs the page must have gone before: see
+    /// [`UpdatePages::needs_parents`].
+    ///
+    /// # Errors
+    /// If the page is not here, as always for kinds without pages, or another page needs it. The MT is as it was then.
+    fn remove_page(&mut self, page: u32) -> Result<(), PageError> {
+        Err(PageError::Absent { page })
+    }
+
+    /// Whether a page can be used only when those on which it depends are here.
+    fn needs_parents(&self) -> bool {
+        true
+    }
+
+    /// Bytes of the pages that are here.
+    fn page_bytes(&self) -> u64 {
+        0
+    }
+
+    /// Bytes of a page, or what it most likely takes if it is not here.
+    fn bytes_of_page(&self, _page: u32) -> u64 {
+        0
+    }
+
+    /// Bytes that an update of a page takes in memory, or most likely does.
+    fn update_bytes(&self) -> u64 {
+        0
     }
 
     /// The update that removes tetrahedron `t` of the current mesh where that is known although the update is not here.
@@ -344,6 +393,7 @@ pub trait UpdatePages: MultiTessellation {
 
 /// What selective refinement needs of a Multi-Tessellation of any kind [§2.3]: its updates are applied to a
 /// [`CurrentMesh`] and undone, and each tetrahedron of that names the updates that create and remove it.
+#[enum_dispatch]
 pub trait ApplyUpdates: UpdatePages {
     /// How often the errors of the update that removes tetrahedron `t` of the current mesh can be quartered, after
     /// [`own_fall`](MultiTessellation::own_fall), and still bound those of the tetrahedron, at most [`MAX_QUARTERINGS`]; 0 where

@@ -48,6 +48,11 @@ impl Errors {
         &self.codes[k * self.stride..][usize::from(self.stride > 1)..self.stride]
     }
 
+    /// How many updates have errors here.
+    pub fn updates(&self) -> u32 {
+        (self.codes.len() / self.stride) as u32
+    }
+
     /// Turns the order round.
     #[cfg(test)]
     pub fn swap(&mut self) {

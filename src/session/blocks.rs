@@ -6,7 +6,7 @@
 
 use super::Session;
 use crate::format::{DecodeOptions, Decoder, FormatError, Index, Progress};
-use crate::mt::{ErrorCode, Mt, MultiTessellation, UpdateId};
+use crate::mt::{ErrorCode, Mt, MultiTessellation, UpdateId, UpdatePages};
 use crate::refine::{Criterion, Front, TetLook};
 use std::collections::BTreeMap;
 use std::ops::Range;

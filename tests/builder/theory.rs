@@ -90,7 +90,8 @@ fn the_same_input_gives_the_same_bytes() {
         let [first, second] = [built(&mesh), built(&mesh)];
         assert_eq!(first.mt, second.mt);
         assert_eq!(first.summary, second.summary);
-        let bytes = [first, second].map(|b| encode(&b.mt, &EncodeOptions::default()).expect("a whole MT"));
+        let bytes =
+            [first, second].map(|b| encode(&b.mt.into(), &EncodeOptions::default()).expect("a whole MT"));
         assert_eq!(bytes[0], bytes[1]);
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::support::meshes::{bent, built, cube, hilly, linear, tampered};
 use tetralod::mesh::TetMesh;
-use tetralod::mt::{BaseMesh, EdgeMt, MtInfo, UpdateId};
+use tetralod::mt::{BaseMesh, EdgeMt, MtInfo, MultiTessellation, UpdateId};
 use tetralod::refine::{Need, Region, Request, Transfer, View};
 use tetralod::verify;
 use tetralod::verify::{MAX_FAILURES, Reference, VerifyReport};

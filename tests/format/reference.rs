@@ -5,17 +5,18 @@ use crate::reader::growth::Growth;
 use crate::reader::{self, File, plain};
 use crate::support::builder::{Plan, build};
 use crate::support::domains::{Domain, PlainMesh};
+use crate::support::files::encoded;
 use crate::support::random::Random;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::ops::ControlFlow;
 use tetralod::builder::{BuildConfig, FieldPrecision, edge_mt};
-use tetralod::format::{Decoder, EncodeOptions, Index, encode};
+use tetralod::format::{Decoder, EncodeOptions, Index};
 use tetralod::generate;
 use tetralod::geom::Lattice;
 use tetralod::mesh::{Field, TetMesh, VectorPart};
 use tetralod::mt::{
-    Applied, ApplyUpdates, BaseMesh, CurrentMesh, EdgeMt, ErrorCode, FieldInfo, Mt, MtInfo, MtKind, UpdateId,
-    UpdatePages, VertexId, VertexSplit,
+    Applied, ApplyUpdates, BaseMesh, CurrentMesh, EdgeMt, ErrorCode, FieldInfo, Mt, MtInfo, MtKind,
+    MultiTessellation, UpdateId, UpdatePages, VertexId, VertexSplit,
 };
 
 fn options(block_bits: u32) -> EncodeOptions {
@@ -169,7 +170,7 @@ fn random_mts_are_read_alike() {
     for (seed, domain) in (0..).zip(Domain::SMALL) {
         for fields in 1..4 {
             let built = build(Plan { domain, seed: 31 * seed + fields as u64, fields, updates: 1000 });
-            compare(&encode(&built.edge_mt(), &options(4)).expect("an MT"));
+            compare(&encoded(&built.edge_mt(), &options(4)).expect("an MT"));
         }
     }
 }
@@ -179,7 +180,7 @@ fn random_mts_are_read_alike() {
 fn updates_in_another_order_make_the_same_mesh() {
     let mut random = Random::new(5);
     let built = build(Plan { domain: Domain::Cube(3), seed: 9, fields: 2, updates: 1000 });
-    let bytes = encode(&built.edge_mt(), &options(4)).expect("an MT");
+    let bytes = encoded(&built.edge_mt(), &options(4)).expect("an MT");
     let file = reader::read(&bytes, |ready| ready[0]);
     let in_order = refined(&file, |ready| ready[0]);
     for _ in 0..3 {
@@ -222,14 +223,14 @@ fn built_mts_are_read_alike() {
         ..BuildConfig::of(MtKind::Edge)
     };
     for (bits, config) in [(5, BuildConfig::of(MtKind::Edge)), (4, coarse), (16, fine)] {
-        compare(&encode(&built(&bucky, config), &options(bits)).expect("an MT"));
+        compare(&encoded(&built(&bucky, config), &options(bits)).expect("an MT"));
     }
     let flow = generate::sphere_flow(4).expect("a small size");
     let config = BuildConfig { all_fields: true, ..BuildConfig::of(MtKind::Edge) };
     let mut mt = built(&flow, config);
-    compare(&encode(&mt, &options(4)).expect("an MT"));
+    compare(&encoded(&mt, &options(4)).expect("an MT"));
     mt = told_more(&mt);
-    compare(&encode(&mt, &options(6)).expect("an MT"));
+    compare(&encoded(&mt, &options(6)).expect("an MT"));
 }
 
 /// Where a field is linear, guesses come out at whole numbers but for rounding: the order of operations decides.
@@ -250,7 +251,7 @@ fn guesses_at_whole_numbers_are_rounded_alike() {
             field_precision: FieldPrecision::Bits(field_bits),
             ..BuildConfig::of(MtKind::Edge)
         };
-        compare(&encode(&built(&mesh, config), &options(5)).expect("an MT"));
+        compare(&encoded(&built(&mesh, config), &options(5)).expect("an MT"));
     }
 }
 
@@ -263,7 +264,7 @@ fn exact_values_are_read_alike() {
     let built = edge_mt(&flow, &config, &mut |_| ControlFlow::Continue(())).expect("a valid mesh");
     assert_eq!(built.exact.len(), 2);
     let options = EncodeOptions { exact: built.exact.clone(), ..options(5) };
-    let bytes = encode(&built.mt, &options).expect("an MT");
+    let bytes = encoded(&built.mt, &options).expect("an MT");
     compare(&bytes);
     let file = reader::read(&bytes, |ready| ready[0]);
     let mesh = refined(&file, |ready| ready[0]);
@@ -295,7 +296,7 @@ fn told_more(mt: &EdgeMt) -> EdgeMt {
     let mut told = EdgeMt::new(info, mt.base().clone());
     for k in (0..mt.updates()).map(UpdateId) {
         let errors: Vec<ErrorCode> =
-            mt.errors_of(k).iter().map(|error| ErrorCode(error.0.saturating_add(77))).collect();
+            mt.errors(k).iter().map(|error| ErrorCode(error.0.saturating_add(77))).collect();
         told.push(&VertexSplit { errors: &errors, ..mt.split(k) }).expect("an update of the MT");
     }
     told
@@ -316,8 +317,8 @@ fn base_meshes_are_read_alike() {
     }
     meshes.push(wheel(300));
     for mesh in meshes {
-        compare(&encode(&base_only(&mesh), &options(4)).expect("an MT"));
-        compare(&encode(&base_only(&grown(&mesh)), &options(4)).expect("an MT"));
+        compare(&encoded(&base_only(&mesh), &options(4)).expect("an MT"));
+        compare(&encoded(&base_only(&grown(&mesh)), &options(4)).expect("an MT"));
     }
 }
 
@@ -445,7 +446,7 @@ fn the_example_is_written_and_read_as_specified() {
     mt.push(&split).expect("the example is an MT");
     let metadata = [("tool".to_owned(), "hand".to_owned())].into();
     let bytes =
-        encode(&mt, &EncodeOptions { block_bits: 4, metadata, ..EncodeOptions::default() }).expect("an MT");
+        encoded(&mt, &EncodeOptions { block_bits: 4, metadata, ..EncodeOptions::default() }).expect("an MT");
     let hex = |bytes: &[u8]| bytes.iter().map(|b| format!("{b:02X} ")).collect::<String>();
     assert_eq!(hex(&bytes), hex(&example()));
     compare(&example());
@@ -465,7 +466,7 @@ fn example() -> Vec<u8> {
 #[test]
 fn a_changed_formula_would_be_noticed() {
     let mt = built(&generate::bucky(7).expect("a small size"), BuildConfig::of(MtKind::Edge));
-    let mut file = reader::read(&encode(&mt, &options(6)).expect("an MT"), |ready| ready[0]);
+    let mut file = reader::read(&encoded(&mt, &options(6)).expect("an MT"), |ready| ready[0]);
     let right = refined(&file, |ready| ready[0]);
     let wrong_levels = file.splits.values().filter(|split| split.residuals != [0]).count();
     let wrong_sides = file.splits.values().filter(|split| split.mask != 0).count();

@@ -41,7 +41,7 @@ fn spelled_out(mt: &Mt) -> ExplicitMt {
 }
 
 fn compare_base(file: &File, mt: &ExplicitMt) {
-    let base = mt.base_mesh();
+    let base = mt.base();
     assert_eq!((&file.base.positions, &file.base.tets), (&base.positions, &base.tets));
     for (f, levels) in file.base_levels.iter().enumerate() {
         assert!(levels.iter().eq(base.values.iter().skip(f).step_by(file.info.fields.len())));
@@ -75,7 +75,7 @@ fn change_of(mt: &ExplicitMt, k: UpdateId) -> Change {
         own: mt.has_tet_errors().then(|| {
             let pairs = mt.removed(k).iter().map(|&t| (sorted(tet(t)), u32::from(mt.quarterings_of(t))));
             let quarters = pairs.collect::<BTreeMap<Tet, u32>>().into_values().collect();
-            (u32::from(mt.own_fall_of(k)), quarters)
+            (u32::from(mt.own_fall(k)), quarters)
         }),
     }
 }

@@ -1,14 +1,14 @@
 //! Promise: what is decoded is what was encoded, and the same MT gives the same bytes.
 
 use crate::support::files::{
-    assert_same, bytes_in_blocks, bytes_of, coded, decode, inserted, options, planned, sample, samples,
-    spelled,
+    assert_same, bytes_in_blocks, bytes_of, coded, decode, encoded, inserted, options, planned, sample,
+    samples, spelled,
 };
 use crate::support::strategies::{config, plan};
 use proptest::prelude::*;
 use std::ops::ControlFlow;
 use tetralod::builder::{BuildConfig, build};
-use tetralod::format::{BLOCK_BITS, Decoder, EncodeError, EncodeOptions, encode, encode_to};
+use tetralod::format::{BLOCK_BITS, Decoder, EncodeError, EncodeOptions, encode_to};
 use tetralod::generate;
 use tetralod::geom::WIDE_BITS;
 use tetralod::mt::{
@@ -93,26 +93,26 @@ fn what_could_not_be_read_back_is_not_written() {
     let plain = EncodeOptions::default();
     let Mt::Edge(whole) = sample(1, 5) else { panic!("edge-based") };
     let part = EdgeMt::new(whole.info().clone(), whole.base().clone());
-    let incomplete = encode(&part, &plain);
+    let incomplete = encoded(&part, &plain);
     assert!(matches!(incomplete, Err(EncodeError::Incomplete { updates: 0, expected: 5 })));
 
     let mut miscounted = whole.info().clone();
     miscounted.updates = 0;
     let miscounted = EdgeMt::new(miscounted, whole.base().clone());
-    assert!(matches!(encode(&miscounted, &plain), Err(EncodeError::Base(_))));
+    assert!(matches!(encoded(&miscounted, &plain), Err(EncodeError::Base(_))));
 
     let spelled = spelled(1, 5);
     let other = MtInfo { updates: 0, ..spelled.info().clone() };
     let other = ExplicitMt::new(other, MultiTessellation::base(&spelled).clone());
-    assert!(matches!(encode(&other, &plain), Err(EncodeError::Base(_))));
+    assert!(matches!(encoded(&other, &plain), Err(EncodeError::Base(_))));
 
     let metadata = [("key".to_owned(), "x".repeat(70_000))].into();
     let wordy = EncodeOptions { metadata, ..plain.clone() };
-    assert!(matches!(encode(&whole, &wordy), Err(EncodeError::TooLong { .. })));
+    assert!(matches!(encoded(&whole, &wordy), Err(EncodeError::TooLong { .. })));
 
     for block_bits in [0, 3, 17, 32, u32::MAX] {
         let odd = EncodeOptions { block_bits, ..plain.clone() };
-        assert!(matches!(encode(&whole, &odd), Err(EncodeError::Blocks { bits }) if bits == block_bits));
+        assert!(matches!(encoded(&whole, &odd), Err(EncodeError::Blocks { bits }) if bits == block_bits));
     }
     assert!((4..=16).contains(&BLOCK_BITS));
 
@@ -122,7 +122,7 @@ fn what_could_not_be_read_back_is_not_written() {
         let split = whole.split(u);
         damaged.push(&VertexSplit { mask: u64::MAX, ..split }).expect("only a mesh can tell");
     }
-    let refused = encode(&damaged, &plain);
+    let refused = encoded(&damaged, &plain);
     assert!(matches!(refused, Err(EncodeError::Update(_))), "{refused:?}");
 }
 

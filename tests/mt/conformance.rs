@@ -496,7 +496,10 @@ fn larger_mts_in_waves() {
             let mut random = Random::new(seed);
             let subject = Subject::new(how, random_input(domain, 1, &mut random)).expect("any domain");
             assert_eq!(subject.explicit.check(), Ok(()), "{domain:?}");
-            assert_eq!(stats(&subject.mt).map(|found| found.explicit_bytes), Ok(subject.explicit.bytes()));
+            assert_eq!(
+                stats(&subject.mt).map(|found| found.explicit_bytes),
+                Ok(subject.explicit.paper_bytes())
+            );
             updates += subject.mt.updates();
             let mut walk = Walk { compare_every: 500, ..Walk::new(&subject, subject.mt.clone()) };
             walk.wander(6000, &mut random);

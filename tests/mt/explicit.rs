@@ -7,7 +7,7 @@ use crate::support::random::Random;
 use crate::support::strategies::{config, plan};
 use proptest::prelude::*;
 use std::collections::BTreeSet;
-use tetralod::mt::{ExplicitMt, UpdateId, VertexId, stats};
+use tetralod::mt::{ExplicitMt, MultiTessellation, UpdateId, VertexId, stats};
 
 fn explicit(built: &Built) -> ExplicitMt {
     ExplicitMt::of(&built.edge_mt()).expect("a valid MT")
@@ -43,9 +43,9 @@ proptest! {
         let tets = explicit.tets();
         prop_assert!(tets.iter().all(|t| volume6(t.map(|v| oracle.positions[v as usize])) > 0));
         let slice = |range: std::ops::Range<u32>| &tets[range.start as usize..range.end as usize];
-        prop_assert_eq!(as_sets(slice(explicit.base())), oracle.base_set());
+        prop_assert_eq!(as_sets(slice(explicit.base_tets())), oracle.base_set());
         prop_assert_eq!(explicit.updates(), oracle.updates());
-        let mut end = explicit.base().end;
+        let mut end = explicit.base_tets().end;
         for u in 0..explicit.updates() {
             let (id, node) = (UpdateId(u), &oracle.nodes[u as usize]);
             prop_assert_eq!(explicit.inserted(id).start, end);
@@ -54,17 +54,17 @@ proptest! {
             prop_assert_eq!(as_sets(slice(explicit.inserted(id))), as_sets(&node.inserted));
             let removed = explicit.removed(id).iter().map(|&t| &tets[t as usize]);
             prop_assert_eq!(as_sets(removed), as_sets(&node.removed));
-            prop_assert!(explicit.removed(id).iter().all(|&t| explicit.remover(t) == Some(id)));
+            prop_assert!(explicit.removed(id).iter().all(|&t| explicit.removed_by(t) == Some(id)));
             let set = |row: &[u32]| row.iter().copied().collect::<BTreeSet<u32>>();
             prop_assert_eq!(&set(explicit.parents(id)), &oracle.parents[u as usize]);
             prop_assert_eq!(explicit.parents(id).len(), oracle.parents[u as usize].len());
             prop_assert_eq!(&set(&explicit.children(id)), &oracle.children[u as usize]);
             prop_assert_eq!(explicit.children(id).len(), oracle.children[u as usize].len());
             prop_assert_eq!(explicit.error(id).0, oracle.errors[u as usize]);
-            prop_assert!(explicit.inserted(id).all(|t| explicit.creator(t) == Some(id)));
+            prop_assert!(explicit.inserted(id).all(|t| explicit.inserted_by(t) == Some(id)));
         }
-        prop_assert!(explicit.base().all(|t| explicit.creator(t).is_none()));
-        let removed = (0..tets.len() as u32).filter(|&t| explicit.remover(t).is_some());
+        prop_assert!(explicit.base_tets().all(|t| explicit.inserted_by(t).is_none()));
+        let removed = (0..tets.len() as u32).filter(|&t| explicit.removed_by(t).is_some());
         prop_assert_eq!(removed.count(), oracle.remover.len());
         prop_assert_eq!(end as usize, tets.len());
     }
@@ -126,7 +126,7 @@ proptest! {
         let nodes = n * (1 + 1 + 1 + 1 + 4) + 4 * (2 * arcs + removed.iter().sum::<usize>());
         let explicit_bytes = oracle.positions.len() * vertex + 16 * tets + nodes;
         prop_assert_eq!(found.explicit_bytes, explicit_bytes as u64);
-        prop_assert_eq!(explicit(&built).bytes(), explicit_bytes as u64);
+        prop_assert_eq!(explicit(&built).paper_bytes(), explicit_bytes as u64);
         let (v, t) = (built.info.vertices as usize, built.info.tetrahedra as usize);
         prop_assert_eq!(found.indexed_bytes, (v * vertex + 16 * t) as u64);
         prop_assert_eq!(found.adjacency_bytes, (v * vertex + 32 * t) as u64);
@@ -145,10 +145,10 @@ proptest! {
     #[test]
     fn explicit_bytes_are_within_the_estimate(plan in plan(5, 2, 0..300)) {
         let mt = explicit(&build(Plan { fields: 1, ..plan }));
-        let base = mt.base_mesh();
+        let base = mt.base();
         let twice = 16 * (base.positions.len() + base.tets.len());
         let estimate = 24 * mt.vertices() as usize + 28 * mt.tets().len();
-        prop_assert!(mt.held_bytes() as usize <= estimate + twice + 12);
+        prop_assert!(mt.bytes() as usize <= estimate + twice + 12);
     }
 }
 

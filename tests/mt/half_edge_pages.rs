@@ -10,7 +10,7 @@ use std::sync::Arc;
 use tetralod::geom::Bounds;
 use tetralod::mt::{
     ApplyUpdates, ForestChild, HalfEdgeMt, HalfEdgeUpdate, Mt, MultiTessellation, PageError, UpdateId,
-    VertexId,
+    UpdatePages, VertexId,
 };
 use tetralod::refine::{Budget, Criterion, Front, LodCriterion, Need, Part, Request, TetLook, Values};
 
@@ -79,11 +79,11 @@ impl Paged {
         let found: Vec<bool> = (0..self.whole.info().updates).map(|u| front.contains(UpdateId(u))).collect();
         assert_eq!(found, wanted, "{request:?}");
         front.mesh().check().expect("a valid mesh");
-        let held: Option<u64> = (0..self.pages())
+        let held: u64 = (0..self.pages())
             .filter(|&page| self.mt.has_page(page))
             .map(|page| self.mt.bytes_of_page(page))
             .sum();
-        assert_eq!(held, Some(self.mt.page_bytes()));
+        assert_eq!(held, self.mt.page_bytes());
         let lacks = self.asked(&criterion, &vec![true; found.len()]).iter().any(|&u| !found[u as usize]);
         assert!(outcome.missing || !lacks, "{request:?}");
         // What is demanded is not here, and what is lacking is found by what is demanded again and again.
@@ -166,9 +166,8 @@ fn demanded_pages_are_enough_and_all_in_use() {
         let bounds = (0..paged.pages()).flat_map(|page| {
             let updates = paged.whole.page_updates(page);
             let whole = &paged.whole;
-            (0..fields).map(move |f| {
-                updates.clone().map(|u| whole.errors_of(UpdateId(u))[f]).max().expect("an update")
-            })
+            (0..fields)
+                .map(move |f| updates.clone().map(|u| whole.errors(UpdateId(u))[f]).max().expect("an update"))
         });
         let bounds = bounds.collect();
         paged.mt.set_page_bounds(bounds);

@@ -5,8 +5,8 @@ use crate::support::compare::{live_tets, snapshot};
 use crate::support::domains::{Domain, volume6};
 use tetralod::geom::Lattice;
 use tetralod::mt::{
-    Applied, ApplyUpdates, BaseMesh, CurrentMesh, EdgeMt, ErrorCode, FieldInfo, MtInfo, MtKind, UpdateError,
-    UpdateId, UpdatePages, VertexId, VertexSplit,
+    Applied, ApplyUpdates, BaseMesh, CurrentMesh, EdgeMt, ErrorCode, FieldInfo, MtInfo, MtKind,
+    MultiTessellation, UpdateError, UpdateId, UpdatePages, VertexId, VertexSplit,
 };
 
 const CENTRE: [i32; 3] = [512; 3];

@@ -7,8 +7,8 @@ use crate::support::random::Random;
 use crate::support::strategies::config;
 use proptest::prelude::*;
 use tetralod::mt::{
-    Applied, ApplyUpdates, BaseMesh, BaseMeshError, CurrentMesh, EdgeMt, ExplicitMt, MtFault, UpdateError,
-    UpdateId, UpdatePages, stats,
+    Applied, ApplyUpdates, BaseMesh, BaseMeshError, CurrentMesh, EdgeMt, ExplicitMt, MtFault,
+    MultiTessellation, UpdateError, UpdateId, UpdatePages, stats,
 };
 
 /// Forces updates in and out as a refinement engine does, and checks what must hold after every call.

@@ -16,7 +16,7 @@ fn the_largest_error_is_that_of_some_field() {
         let fields = subject.mt.info().fields.len();
         for u in (0..subject.mt.updates()).map(UpdateId) {
             let errors = MultiTessellation::errors(&subject.mt, u);
-            assert_eq!((errors.len(), errors.iter().max()), (fields, Some(&subject.mt.error_of(u))));
+            assert_eq!((errors.len(), errors.iter().max()), (fields, Some(&subject.mt.error(u))));
         }
         assert_eq!(subject.explicit.check(), Ok(()));
     }

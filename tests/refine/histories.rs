@@ -1,15 +1,16 @@
 //! Promise: what a request gives does not depend on what was asked for before, on noisy data, in any order, and with updates that are
 //! not here; and MTs whose errors would not allow that are not written.
 
+use crate::support::files::encoded;
 use crate::support::meshes::{blocks, tampered};
 use crate::support::random::Random;
 use std::ops::ControlFlow;
 use tetralod::builder::{BuildConfig, Construction, Criterion, Method, build};
-use tetralod::format::{EncodeError, EncodeOptions, encode};
+use tetralod::format::{EncodeError, EncodeOptions};
 use tetralod::mesh::TetMesh;
 use tetralod::mt::{
-    ApplyUpdates, EdgeMt, ErrorCode, ExplicitMt, Mt, MtKind, MultiTessellation, UpdateId, VertexId,
-    check_errors,
+    ApplyUpdates, EdgeMt, ErrorCode, ExplicitMt, Mt, MtKind, MultiTessellation, UpdateId, UpdatePages,
+    VertexId, check_errors,
 };
 use tetralod::refine::{Front, LodCriterion, Need, Request};
 
@@ -45,7 +46,7 @@ fn values_are_monotone(mt: &ExplicitMt) -> Result<(), String> {
         let low = |t: u32| levels(t).into_iter().fold(f64::INFINITY, f64::min);
         let high = |t: u32| levels(t).into_iter().fold(f64::NEG_INFINITY, f64::max);
         for t in 0..mt.tets().len() as u32 {
-            let (Some(above), Some(own)) = (ExplicitMt::creator(mt, t), ExplicitMt::remover(mt, t)) else {
+            let (Some(above), Some(own)) = (mt.inserted_by(t), mt.removed_by(t)) else {
                 continue;
             };
             if mt.error_of_field(above, field) == ErrorCode::MAX {
@@ -95,7 +96,7 @@ fn noisy_scans_of_both_kinds() {
             assert_eq!(values_are_monotone(&explicit), Ok(()), "{name}");
             remembers_nothing(&name, &mt, seed);
             let strict = EncodeOptions { check_margins: true, ..EncodeOptions::default() };
-            encode(&mt, &strict).expect("an MT to write");
+            encoded(&mt, &strict).expect("an MT to write");
         }
     }
 }
@@ -131,19 +132,19 @@ fn errors_that_do_not_fall_are_not_written() {
     let mt = edge(&noisy([6, 6, 6], 0.3, 5));
     let explicit = ExplicitMt::of(&mt).expect("a valid MT");
     let plain = EncodeOptions::default();
-    assert!(encode(&mt, &plain).is_ok());
+    assert!(encoded(&mt, &plain).is_ok());
     let leaf = (0..mt.updates()).rev().find(|&u| !explicit.parents(UpdateId(u)).is_empty());
     let leaf = leaf.expect("an update that depends on another");
     // Larger than that of a parent.
     let swollen = tampered(&mt, |u, parts| parts.error = if u == leaf { 50_000 } else { parts.error });
-    let refused = encode(&swollen, &plain);
+    let refused = encoded(&swollen, &plain);
     assert!(matches!(refused, Err(EncodeError::Order { update, .. }) if update == leaf), "{refused:?}");
     // Equal all over, although values go beyond those that they replace.
     let equal = tampered(&mt, |_, parts| parts.error = 30_000);
     let spelled = ExplicitMt::of(&equal).expect("a valid MT");
     assert!(values_are_monotone(&spelled).is_err());
     let strict = EncodeOptions { check_margins: true, ..plain.clone() };
-    for refused in [encode(&equal, &strict), encode(&spelled, &strict)] {
+    for refused in [encoded(&equal, &strict), encoded(&spelled, &strict)] {
         assert!(matches!(refused, Err(EncodeError::Order { .. })), "{refused:?}");
     }
 }

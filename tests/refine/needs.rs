@@ -6,7 +6,7 @@ use crate::support::strategies::config;
 use proptest::prelude::*;
 use std::sync::Arc;
 use tetralod::geom::{Bounds, Camera};
-use tetralod::mt::{ErrorCode, UpdateId};
+use tetralod::mt::{ErrorCode, MultiTessellation, UpdateId};
 use tetralod::refine::{
     ANY, Budget, Criterion, Custom, Front, LodCriterion, Need, Region, Request, TetLook, Transfer, Verdict,
     View,

@@ -7,8 +7,8 @@ use crate::support::random::Random;
 use std::collections::BTreeSet;
 use tetralod::geom::Bounds;
 use tetralod::mt::{
-    ApplyUpdates, EdgeMt, ErrorCode, MultiTessellation, PageError, UpdateError, UpdateId, VertexId,
-    VertexSplit,
+    ApplyUpdates, EdgeMt, ErrorCode, MultiTessellation, PageError, UpdateError, UpdateId, UpdatePages,
+    VertexId, VertexSplit,
 };
 use tetralod::refine::{Budget, Criterion, Front, LodCriterion, Need, Request, TetLook};
 

@@ -1,7 +1,7 @@
 //! The same MT with its updates in another order.
 
 use crate::subjects::{Subject, sorted};
-use tetralod::mt::{EdgeMt, ExplicitMt, ExplicitUpdate, UpdateId, VertexId};
+use tetralod::mt::{EdgeMt, ExplicitMt, ExplicitUpdate, MultiTessellation, UpdateId, VertexId};
 
 /// A random order of the updates in which parents come first.
 pub fn random_order(explicit: &ExplicitMt, mut below: impl FnMut(usize) -> usize) -> Vec<UpdateId> {
@@ -25,10 +25,10 @@ pub fn random_order(explicit: &ExplicitMt, mut below: impl FnMut(usize) -> usize
 /// The subject with its updates in `order`; the update that was `order[i]` is number `i`.
 pub fn reordered(subject: &Subject, order: &[UpdateId]) -> Subject {
     let old = &subject.explicit;
-    let base = old.base_mesh().positions.len() as u32;
+    let base = old.base().positions.len() as u32;
     let mut vertex: Vec<u32> = (0..old.vertices()).collect();
     let mut tet: Vec<u32> = (0..old.tets().len() as u32).collect();
-    let mut new = ExplicitMt::new(old.info().clone(), old.base_mesh().clone());
+    let mut new = ExplicitMt::new(old.info().clone(), old.base().clone());
     let mut next = base;
     for &u in order {
         let created: Vec<VertexId> = old.created(u).map(VertexId).collect();

@@ -4,7 +4,7 @@ use crate::support::meshes::{bent, blocks, built, cube, hilly, linear};
 use std::collections::BTreeSet;
 use std::sync::LazyLock;
 use tetralod::mesh::TetMesh;
-use tetralod::mt::{CurrentMesh, EdgeMt, ExplicitMt, UpdateId, VertexId};
+use tetralod::mt::{CurrentMesh, EdgeMt, ExplicitMt, MultiTessellation, UpdateId, VertexId};
 use tetralod::refine::{Criterion, Front, LodCriterion, Outcome, Request, TetLook};
 
 /// An MT, its input and its oracle.

@@ -51,7 +51,7 @@ impl Subject {
 
     /// The errors of tetrahedron `t`, which `u` removes: the largest and those by field.
     fn errors(&self, t: u32, u: UpdateId) -> (ErrorCode, Vec<ErrorCode>) {
-        let (fall, own) = (self.explicit.own_fall_of(u), self.explicit.quarterings_of(t));
+        let (fall, own) = (self.explicit.own_fall(u), self.explicit.quarterings_of(t));
         let errors: Vec<ErrorCode> = self.lowered(u, fall, own);
         (errors.iter().copied().max().expect("a field"), errors)
     }
@@ -67,7 +67,7 @@ impl Subject {
     }
 
     fn violates(&self, criterion: &impl Criterion, t: u32) -> Option<u32> {
-        let update = self.explicit.remover(t)?;
+        let update = self.explicit.removed_by(t)?;
         let (error, errors) = self.errors(t, update);
         let tet = self.explicit.tets()[t as usize].map(VertexId);
         let corners = tet.map(|v| self.explicit.position(v));
@@ -80,7 +80,7 @@ impl Subject {
     /// parents of all; of the first `here` updates. Nothing is ever taken out of it.
     fn closure(&self, criterion: &impl Criterion, here: u32) -> Vec<bool> {
         let mut set = vec![false; self.explicit.updates() as usize];
-        let mut tets: Vec<u32> = self.explicit.base().collect();
+        let mut tets: Vec<u32> = self.explicit.base_tets().collect();
         while let Some(t) = tets.pop() {
             let mut todo: Vec<u32> = self.violates(criterion, t).filter(|&u| u < here).into_iter().collect();
             while let Some(u) = todo.pop() {
@@ -185,7 +185,7 @@ fn own_errors_bound_every_tetrahedron() {
         let mt = &subject.explicit;
         let (mut smaller, mut all) = (0, 0);
         for t in 0..mt.tets().len() as u32 {
-            let Some(u) = mt.remover(t) else { continue };
+            let Some(u) = mt.removed_by(t) else { continue };
             let found = plain_errors(subject, mt.tets()[t as usize].map(VertexId));
             let (_, own) = subject.errors(t, u);
             for (found, own) in found.iter().zip(own) {
@@ -204,12 +204,12 @@ fn own_errors_are_as_small_as_two_bits_tell() {
     for subject in SUBJECTS.iter() {
         let mt = &subject.explicit;
         for t in (0..mt.tets().len() as u32).filter(|t| t % 5 == 0) {
-            let (Some(u), own) = (mt.remover(t), mt.quarterings_of(t)) else { continue };
+            let (Some(u), own) = (mt.removed_by(t), mt.quarterings_of(t)) else { continue };
             if own == tetralod::mt::MAX_QUARTERINGS {
                 continue;
             }
             let found = plain_errors(subject, mt.tets()[t as usize].map(VertexId));
-            let next = subject.lowered(u, mt.own_fall_of(u), own + 1);
+            let next = subject.lowered(u, mt.own_fall(u), own + 1);
             let fits =
                 found.iter().zip(next).all(|(found, next)| found * (1.0 + 1e-9) + 1e-12 <= next.error());
             assert!(!fits, "{}: tetrahedron {t} has {own}, {found:?}", subject.name);

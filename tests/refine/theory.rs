@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use std::collections::BTreeSet;
 use tetralod::geom::Bounds;
 use tetralod::measure::{Part, Reference, deviation};
-use tetralod::mt::ErrorCode;
+use tetralod::mt::{ErrorCode, MultiTessellation};
 use tetralod::refine::{Budget, Front, LodCriterion, Need, Region, Request};
 
 /// A request in fractions of the subject's bounds and ranges.

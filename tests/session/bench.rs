@@ -3,6 +3,7 @@
 use crate::support::meshes::{built, cube, hilly};
 use tetralod::bench;
 use tetralod::format::{EncodeOptions, encode};
+use tetralod::mt::MultiTessellation;
 use tetralod::session::SessionError;
 
 /// A clock that says a millisecond has passed whenever it is asked.
@@ -17,7 +18,7 @@ fn ticking() -> impl FnMut() -> f64 {
 #[test]
 fn rates_are_counts_over_seconds() {
     let mt = built(&cube(5, &[hilly])).mt;
-    let bytes = encode(&mt, &EncodeOptions::default()).expect("a whole MT");
+    let bytes = encode(&mt.clone().into(), &EncodeOptions::default()).expect("a whole MT");
     let report = bench::run(&bytes, &mut ticking(), 0.1).expect("a good file");
     assert_eq!((report.updates, report.applied), (mt.updates(), mt.updates()));
     assert_eq!(report.tetrahedra, mt.info().tetrahedra);
@@ -38,7 +39,7 @@ fn rates_are_counts_over_seconds() {
 
 #[test]
 fn parts_of_files_are_refused() {
-    let bytes = encode(&built(&cube(3, &[hilly])).mt, &EncodeOptions::default()).expect("a whole MT");
+    let bytes = encode(&built(&cube(3, &[hilly])).mt.into(), &EncodeOptions::default()).expect("a whole MT");
     for length in [0, 7, bytes.len() / 2, bytes.len() - 1] {
         let error = bench::run(&bytes[..length], &mut ticking(), 0.0).expect_err("a part of a file");
         assert!(matches!(error, SessionError::Format(_)), "{length}: {error}");

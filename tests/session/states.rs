@@ -3,7 +3,9 @@
 use crate::support::files::{assemble, sections};
 use tetralod::format::{EncodeOptions, FormatError, encode};
 use tetralod::geom::{Bounds, Lattice};
-use tetralod::mt::{BaseMesh, EdgeMt, ErrorCode, FieldInfo, MtInfo, MtKind, VertexId, VertexSplit};
+use tetralod::mt::{
+    BaseMesh, EdgeMt, ErrorCode, FieldInfo, MtInfo, MtKind, MultiTessellation, VertexId, VertexSplit,
+};
 use tetralod::refine::{Need, Request, RequestError};
 use tetralod::session::{Session, SessionError};
 
@@ -54,7 +56,7 @@ fn two_splits(last_mask: u64) -> EdgeMt {
 }
 
 fn bytes() -> Vec<u8> {
-    encode(&two_splits(0b10), &EncodeOptions::default()).expect("the MT is complete")
+    encode(&two_splits(0b10).into(), &EncodeOptions::default()).expect("the MT is complete")
 }
 
 fn opened() -> Session {
@@ -174,7 +176,10 @@ fn flipped(file: &[u8], kind: &[u8; 4], bit: usize) -> Option<Vec<u8>> {
 
 #[test]
 fn damage_that_only_shows_in_the_mesh_leaves_a_valid_mesh() {
-    assert!(encode(&two_splits(0b111), &EncodeOptions::default()).is_err(), "a mask that parts nothing");
+    assert!(
+        encode(&two_splits(0b111).into(), &EncodeOptions::default()).is_err(),
+        "a mask that parts nothing"
+    );
     let file = bytes();
     assert_eq!(flipped(&file, b"UPDT", 0).map(|bytes| bytes.len()), Some(file.len()));
     let mut found = 0;
@@ -201,7 +206,7 @@ fn a_base_mesh_that_is_no_mesh_is_refused_for_good() {
     let mut base = good.base().clone();
     base.tets.push([0, 1, 2, 3]);
     let info = MtInfo { vertices: 5, updates: 0, ..good.info().clone() };
-    let refused = encode(&EdgeMt::new(info, base), &EncodeOptions::default());
+    let refused = encode(&EdgeMt::new(info, base).into(), &EncodeOptions::default());
     assert!(refused.is_err(), "the same tetrahedron twice");
     let (file, mut found) = (bytes(), 0);
     for bit in 0.. {

@@ -4,12 +4,12 @@ use crate::support::builder::{Plan, build};
 use crate::support::domains::Domain;
 use std::collections::BTreeMap;
 use std::sync::Mutex;
-use tetralod::format::{DecodeOptions, Decoder, EncodeOptions, FormatError, Limits, encode};
+use tetralod::format::{DecodeOptions, Decoder, EncodeError, EncodeOptions, FormatError, Limits, encode};
 use tetralod::geom::Lattice;
 use tetralod::mesh::VectorPart;
 use tetralod::mt::{
     Applied, ApplyUpdates, BaseMesh, CurrentMesh, EdgeMt, ErrorCode, ExplicitMt, ExplicitUpdate, FieldInfo,
-    Mt, MtInfo, MtKind, MtRef, MultiTessellation, UpdateId, VertexId, VertexSplit,
+    Mt, MtInfo, MtKind, MultiTessellation, UpdateId, VertexId, VertexSplit,
 };
 
 pub fn field(name: &str, bits: u32) -> FieldInfo {
@@ -159,13 +159,18 @@ pub fn options() -> EncodeOptions {
     EncodeOptions { block_bits: 8, metadata, ..EncodeOptions::default() }
 }
 
-pub fn bytes_of<'a>(mt: impl Into<MtRef<'a>>) -> Vec<u8> {
-    encode(mt, &options()).expect("the MT is complete")
+/// [`encode`] for an MT of one kind, too.
+pub fn encoded(mt: &(impl Clone + Into<Mt>), options: &EncodeOptions) -> Result<Vec<u8>, EncodeError> {
+    encode(&mt.clone().into(), options)
+}
+
+pub fn bytes_of(mt: &(impl Clone + Into<Mt>)) -> Vec<u8> {
+    encoded(mt, &options()).expect("the MT is complete")
 }
 
 /// The same with blocks of `2^block_bits` updates.
-pub fn bytes_in_blocks<'a>(mt: impl Into<MtRef<'a>>, block_bits: u32) -> Vec<u8> {
-    encode(mt, &EncodeOptions { block_bits, ..options() }).expect("the MT is complete")
+pub fn bytes_in_blocks(mt: &(impl Clone + Into<Mt>), block_bits: u32) -> Vec<u8> {
+    encoded(mt, &EncodeOptions { block_bits, ..options() }).expect("the MT is complete")
 }
 
 /// A decoder with limits.
@@ -251,7 +256,7 @@ pub fn is_prefix(part: &Mt, whole: &Mt) -> bool {
                 part.position(u) == whole.position(u)
                     && part.levels(u).eq(whole.levels(u))
                     && part.parents(u).eq(whole.parents(u))
-                    && part.errors_of(u) == whole.errors_of(u)
+                    && part.errors(u) == whole.errors(u)
             };
             (0..part.updates()).map(UpdateId).all(same)
         }

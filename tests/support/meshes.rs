@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use tetralod::builder::{BuildConfig, BuildResult, edge_mt};
 use tetralod::mesh::{Field, Grid, TetMesh, repair};
-use tetralod::mt::{EdgeMt, ErrorCode, MtKind, UpdateId, VertexSplit};
+use tetralod::mt::{EdgeMt, ErrorCode, MtKind, MultiTessellation, UpdateId, VertexSplit};
 
 /// A field with hills, edges and a plateau.
 pub fn hilly([x, y, z]: [f64; 3]) -> f64 {

@@ -235,7 +235,9 @@ fn follow(walk: &mut Walk, plane: &Plane) {
 fn a_slice_follows_a_session_from_request_to_request() {
     let whole = built(&cube(11, &[hilly, linear_field]));
     let mut session = Session::new();
-    session.feed(&encode(&whole.mt, &EncodeOptions::default()).expect("a complete MT")).expect("a good file");
+    session
+        .feed(&encode(&whole.mt.into(), &EncodeOptions::default()).expect("a complete MT"))
+        .expect("a good file");
     let plane = plane([0.3, -0.4, 1.0], 0.45);
     let mut slice = cut(&session.view(), &plane);
     let (requests, mut random) = (requests(), Random::new(3));

@@ -7,7 +7,10 @@
 use super::base;
 use crate::format::FormatError;
 use crate::format::coder::{Family, Put, Source};
-use crate::mt::{BaseMeshError, EdgeMt, ErrorCode, MAX_EDGE, MtInfo, PageError, UpdateId, VertexId};
+use crate::mt::{
+    BaseMeshError, EdgeMt, ErrorCode, MAX_EDGE, MtInfo, MultiTessellation, PageError, UpdateId, UpdatePages,
+    VertexId,
+};
 use std::collections::BTreeMap;
 
 /// Distances from the vertex of one root to that of the next.
@@ -254,7 +257,7 @@ fn offset_above(mt: &EdgeMt, first: u32, vertex: VertexId) -> Result<Option<Offs
     if mt.has(creator) {
         return Ok(Some(told_offset(mt, creator)));
     }
-    let [page, other] = [first, creator.0].map(|u| mt.page_of_update(u));
+    let [page, other] = [first, creator.0].map(|u| u >> mt.page_bits());
     Err(FormatError::Page(PageError::Needs { page, other }))
 }
 

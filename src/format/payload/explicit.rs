@@ -3,7 +3,9 @@
 use super::{OWN_FALL, QUARTERINGS, check_bytes, largest, vertex};
 use crate::format::coder::{Family, Put, Source};
 use crate::format::{FormatError, Limits};
-use crate::mt::{BaseMeshError, ErrorCode, ExplicitMt, ExplicitUpdate, UpdateId, VertexId};
+use crate::mt::{
+    BaseMeshError, ErrorCode, ExplicitMt, ExplicitUpdate, MultiTessellation, UpdateId, UpdatePages, VertexId,
+};
 use std::ops::Range;
 
 /// By how many codes an error is below the one before.
@@ -81,7 +83,7 @@ pub fn put(out: &mut impl Put, mt: &ExplicitMt, first: u32, end: u32) {
         }
         put_removed(out, mt, u);
         if mt.quarterings().is_some() {
-            out.symbol(OWN_FALL, 0, u32::from(mt.own_fall_of(u)));
+            out.symbol(OWN_FALL, 0, u32::from(mt.own_fall(u)));
             let mut context = 0;
             for &t in mt.removed(u).iter().rev() {
                 let own = u32::from(mt.quarterings_of(t));
@@ -175,7 +177,7 @@ impl Parts {
         }
         let fits = |vertices: u32, removed: u32, inserted: u32| {
             let [vertices, removed, inserted] = [vertices, removed, inserted].map(|count| count as usize);
-            check_bytes(mt.held_bytes() + bytes_of(vertices, mt.fields(), removed, inserted), limits)
+            check_bytes(mt.bytes() + bytes_of(vertices, mt.fields(), removed, inserted), limits)
         };
         let created = source.number(COUNT, 0)?;
         fits(created, 0, 0)?;
@@ -296,7 +298,7 @@ mod tests {
         mt: &ExplicitMt,
         limits: Limits,
     ) -> Result<ExplicitMt, FormatError> {
-        let mut new = ExplicitMt::new(MtInfo::clone(mt.info()), mt.base_mesh().clone());
+        let mut new = ExplicitMt::new(MtInfo::clone(mt.info()), mt.base().clone());
         for block in blocks {
             let mut source = Source::new(Reader::new(block, 0), models)?;
             let count = 60.min(mt.updates() - new.updates());
@@ -319,7 +321,7 @@ mod tests {
             damaged[0][bit / 8] ^= 1 << (bit % 8);
             assert!(decoded(&models, &damaged, &mt, Limits::default()).as_ref() != Ok(&mt));
         }
-        let limits = Limits { memory_bytes: mt.held_bytes() / 2, ..Limits::default() };
+        let limits = Limits { memory_bytes: mt.bytes() / 2, ..Limits::default() };
         let refused = decoded(&models, &blocks, &mt, limits);
         assert!(matches!(refused, Err(FormatError::Limit { .. })));
     }

@@ -9,7 +9,10 @@ use super::{base, edge};
 use crate::format::coder::{Family, Put, Source};
 use crate::format::{FormatError, Limits};
 use crate::mesh::NONE;
-use crate::mt::{BaseMark, BaseMeshError, ErrorCode, ForestChild, HalfEdgeMt, MtInfo, UpdateId};
+use crate::mt::{
+    BaseMark, BaseMeshError, ErrorCode, ForestChild, HalfEdgeMt, MtInfo, MultiTessellation, UpdateId,
+    UpdatePages,
+};
 use std::ops::Range;
 
 /// One more than the update that removes a base tetrahedron.

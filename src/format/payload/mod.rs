@@ -17,7 +17,7 @@ use crate::geom::Lattice;
 use crate::mesh::VectorPart;
 use crate::mt::{
     BaseMesh, BaseMeshError, EdgeMt, ErrorCode, ExplicitMt, FieldInfo, HalfEdgeMt, HalfEdgeUpdate,
-    MAX_QUARTERINGS, Mt, MtInfo, MtKind, MtRef, MultiTessellation, PageError, UpdateError, VertexId,
+    MAX_QUARTERINGS, Mt, MtInfo, MtKind, MultiTessellation, PageError, UpdateError, UpdatePages, VertexId,
     VertexSplit,
 };
 use edge::{FieldPart, Splits};
@@ -217,17 +217,17 @@ const OWN_FALL: Family = QUARTERINGS.after(1, 256);
 const QUARTERINGS: Family = exact::LENGTH.after(8, MAX_QUARTERINGS as u32 + 1);
 
 /// Puts what is coded of the base mesh.
-pub fn put_base(out: &mut impl Put, mt: MtRef<'_>) {
+pub fn put_base(out: &mut impl Put, mt: &Mt) {
     base::put(out, mt.base());
     match mt {
-        MtRef::Vertex(mt) => vertex::put_head(out, mt),
-        MtRef::HalfEdge(mt) => half_edge::put_head(out, mt),
+        Mt::Vertex(mt) => vertex::put_head(out, mt),
+        Mt::HalfEdge(mt) => half_edge::put_head(out, mt),
         _ => {}
     }
 }
 
 /// Puts the levels of one field at the base vertices.
-pub fn put_base_field(out: &mut impl Put, mt: MtRef<'_>, field: usize) {
+pub fn put_base_field(out: &mut impl Put, mt: &Mt, field: usize) {
     let mut last = 0;
     // Levels stand vertex by vertex; those of this field begin at its own place in the first one.
     for &level in mt.base().values.iter().skip(field).step_by(mt.info().fields.len()) {
@@ -237,7 +237,7 @@ pub fn put_base_field(out: &mut impl Put, mt: MtRef<'_>, field: usize) {
 }
 
 /// Appends what stands in front of the coded part of a `BASE` section.
-pub fn write_base_head(out: &mut Vec<u8>, mt: MtRef<'_>) {
+pub fn write_base_head(out: &mut Vec<u8>, mt: &Mt) {
     write::varint(out, mt.base().positions.len() as u64);
     write::varint(out, mt.base().tets.len() as u64);
 }
@@ -390,19 +390,19 @@ pub fn section_of(kind: MtKind) -> Kind {
 }
 
 /// Puts the updates of a block of an MT that has sections for fields, without what they do to these.
-pub fn put_shared(out: &mut impl Put, mt: MtRef<'_>, Range { start, end }: Range<u32>) {
+pub fn put_shared(out: &mut impl Put, mt: &Mt, Range { start, end }: Range<u32>) {
     match mt {
-        MtRef::Edge(mt) => edge::put(out, mt, start, end),
-        MtRef::HalfEdge(mt) => half_edge::put(out, mt, start, end),
+        Mt::Edge(mt) => edge::put(out, mt, start, end),
+        Mt::HalfEdge(mt) => half_edge::put(out, mt, start, end),
         _ => {}
     }
 }
 
 /// Puts what the updates of such a block do to a field.
-pub fn put_field(out: &mut impl Put, mt: MtRef<'_>, Range { start, end }: Range<u32>, field: usize) {
+pub fn put_field(out: &mut impl Put, mt: &Mt, Range { start, end }: Range<u32>, field: usize) {
     match mt {
-        MtRef::Edge(mt) => edge::put_field(out, mt, start, end, field),
-        MtRef::HalfEdge(mt) => half_edge::put_field(out, mt, start, end, field),
+        Mt::Edge(mt) => edge::put_field(out, mt, start, end, field),
+        Mt::HalfEdge(mt) => half_edge::put_field(out, mt, start, end, field),
         _ => {}
     }
 }
@@ -492,13 +492,13 @@ impl Shared {
 /// Puts the updates of an MT that is not edge-based; `state` goes from one block to the next.
 pub fn put_updates(
     out: &mut impl Put,
-    mt: MtRef<'_>,
+    mt: &Mt,
     Range { start, end }: Range<u32>,
     state: Option<&mut State>,
 ) -> Result<(), UpdateError> {
     match (mt, state) {
-        (MtRef::Vertex(mt), Some(state)) => vertex::put(out, mt, start, end, state),
-        (MtRef::Explicit(mt), _) => {
+        (Mt::Vertex(mt), Some(state)) => vertex::put(out, mt, start, end, state),
+        (Mt::Explicit(mt), _) => {
             explicit::put(out, mt, start, end);
             Ok(())
         }
@@ -507,8 +507,8 @@ pub fn put_updates(
 }
 
 /// Where the updates of an MT begin to be put.
-pub fn start_state(mt: MtRef<'_>) -> Result<Option<State>, BaseMeshError> {
-    if let MtRef::Vertex(mt) = mt { State::of(mt).map(Some) } else { Ok(None) }
+pub fn start_state(mt: &Mt) -> Result<Option<State>, BaseMeshError> {
+    if let Mt::Vertex(mt) = mt { State::of(mt).map(Some) } else { Ok(None) }
 }
 
 /// Reads what [`put_updates`] puts.
@@ -527,10 +527,10 @@ pub fn read_updates(
 }
 
 /// Whether a complete MT has the reference mesh that its description tells, as far as that follows without a mesh.
-pub fn check_reference(mt: MtRef<'_>) -> Result<(), BaseMeshError> {
+pub fn check_reference(mt: &Mt) -> Result<(), BaseMeshError> {
     match mt {
-        MtRef::Edge(_) | MtRef::Vertex(_) | MtRef::HalfEdge(_) => Ok(()),
-        MtRef::Explicit(mt) => explicit::check_reference(mt),
+        Mt::Edge(_) | Mt::Vertex(_) | Mt::HalfEdge(_) => Ok(()),
+        Mt::Explicit(mt) => explicit::check_reference(mt),
     }
 }
 

@@ -12,7 +12,7 @@ use crate::geom::{NARROW_BITS, insphere, orient3d, views_of_origin};
 use crate::mesh::{FACES, NONE};
 use crate::mt::{
     Applied, ApplyUpdates, BaseMesh, BaseMeshError, CurrentMesh, ErrorCode, Insertion, MAX_FIELD_BITS,
-    MAX_REMOVED, MtInfo, MultiTessellation, UpdateError, UpdateId, VertexMt, corner_of,
+    MAX_REMOVED, MtInfo, MultiTessellation, UpdateError, UpdateId, UpdatePages, VertexMt, corner_of,
 };
 
 /// By how many codes an error is below the one before.
@@ -184,7 +184,7 @@ pub fn put(
 
 fn put_update(out: &mut impl Put, mt: &VertexMt, u: UpdateId, state: &mut State) -> Result<(), UpdateError> {
     let torn = UpdateError::Cavity { update: u.0 };
-    for (before, &error) in state.errors.iter_mut().zip(mt.errors_of(u)) {
+    for (before, &error) in state.errors.iter_mut().zip(mt.errors(u)) {
         out.number(ERROR, 0, u32::from(before.0.wrapping_sub(error.0)));
         *before = error;
     }

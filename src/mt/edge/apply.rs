@@ -22,9 +22,10 @@ use crate::mt::mesh::current::{KindWord, Labels};
 use crate::mt::mesh::stars::Star;
 use crate::mt::mesh::stars::{GATHERED, Gather};
 use crate::mt::mesh::tet::{TURN, corner_of};
+use crate::mt::pages::Page;
 use crate::mt::{
-    Applied, ApplyUpdates, BaseMesh, CurrentMesh, EdgeMt, ErrorCode, LookAtTet, MAX_LINK, MtInfo,
-    MultiTessellation, UpdateError, UpdateId, UpdatePages, VertexId, VertexSplit,
+    Applied, ApplyUpdates, CurrentMesh, EdgeMt, ErrorCode, LookAtTet, MAX_LINK, MultiTessellation, PageError,
+    UpdateError, UpdateId, UpdatePages, VertexId, VertexSplit,
 };
 use std::ops::Range;
 
@@ -442,55 +443,15 @@ impl CurrentMesh {
     }
 }
 
-impl MultiTessellation for EdgeMt {
-    fn info(&self) -> &MtInfo {
-        self.info()
-    }
-
-    fn base(&self) -> &BaseMesh {
-        self.base()
-    }
-
-    fn updates(&self) -> u32 {
-        self.updates()
-    }
-
-    fn bytes(&self) -> u64 {
-        self.bytes()
-    }
-
-    /// A split adds the tetrahedra of its fan.
-    fn always_grows(&self) -> bool {
-        true
-    }
-
-    #[inline]
-    fn error(&self, u: UpdateId) -> ErrorCode {
-        self.error_of(u)
-    }
-
-    #[inline]
-    fn errors(&self, u: UpdateId) -> &[ErrorCode] {
-        self.errors_of(u)
-    }
-
-    fn to_come(&self) -> ErrorCode {
-        self.to_come()
-    }
-}
-
 impl UpdatePages for EdgeMt {
-    #[inline]
-    fn has(&self, u: UpdateId) -> bool {
-        self.has(u)
+    in_pages!();
+
+    fn remove_page(&mut self, page: u32) -> Result<(), PageError> {
+        self.take_page(page)
     }
 
-    fn present(&self) -> u32 {
-        self.present()
-    }
-
-    fn page_updates(&self, page: u32) -> Range<u32> {
-        self.page_updates(page)
+    fn update_bytes(&self) -> u64 {
+        self.record.bytes(self.info())
     }
 
     fn page_inserted(&self, mesh: &mut CurrentMesh, updates: Range<u32>) {

@@ -14,9 +14,12 @@
 //! the same everywhere.
 
 use crate::mesh::NONE;
+use crate::mt::pages::{Page, Pages};
 use crate::mt::update_errors::Errors;
-use crate::mt::{BaseMesh, ErrorCode, MtInfo, MtKind, PAGE_BITS, PageError, UpdateError, UpdateId, VertexId};
-use std::ops::Range;
+use crate::mt::{
+    BaseMesh, ErrorCode, MtInfo, MtKind, MultiTessellation, PAGE_BITS, PageError, UpdateError, UpdateId,
+    VertexId,
+};
 
 /// Largest number of tetrahedra around a vertex that an update splits.
 pub const MAX_STAR: usize = 64;
@@ -65,21 +68,13 @@ pub struct EdgeMt {
     is_coded: bool,
     /// `s(v)` for the vertices of the base mesh, [`WHOLE`] while nothing splits them.
     base_splits: Vec<i32>,
-    /// The last one is here.
-    pages: Vec<Option<Page>>,
-    /// log2 of the updates of a page.
-    page_bits: u32,
-    record: Record,
-    /// The end of the last page that is here.
-    updates: u32,
-    /// How many updates are here.
-    present: u32,
-    to_come: ErrorCode,
+    pub(super) pages: Pages<EdgePage>,
+    pub(super) record: Record,
 }
 
 /// Updates that come and go together, each with all that belongs to it side by side.
 #[derive(Clone, Debug, PartialEq)]
-struct Page {
+pub(super) struct EdgePage {
     words: Vec<i32>,
     errors: Errors,
 }
@@ -87,7 +82,7 @@ struct Page {
 /// What the words of an update are: the vertex that it splits, `s(v')`, `s(v'')`, two for the mask, the offset, and one for
 /// the offset in each field.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Record {
+pub(super) struct Record {
     /// Words of the offset and the edge that it is counted from: 2 where they share them, 3 on fine lattices if there is no
     /// such edge, else 4.
     offset: usize,
@@ -105,9 +100,6 @@ const SPLITS: usize = 1;
 const MASK: usize = 3;
 const OFFSET: usize = 5;
 
-/// Pages have at most 2 to this power of updates.
-const MAX_PAGE_BITS: u32 = 16;
-
 impl Record {
     fn new(info: &MtInfo, is_coded: bool) -> Self {
         // Coded, seven bits are left for the edge.
@@ -119,7 +111,7 @@ impl Record {
     }
 
     /// Bytes of an update, its errors included.
-    fn bytes(self, info: &MtInfo) -> u64 {
+    pub fn bytes(self, info: &MtInfo) -> u64 {
         let fields = info.fields.len();
         let errors = if fields == 1 { 1 } else { fields + 1 };
         (self.len * size_of::<i32>() + errors * size_of::<ErrorCode>()) as u64
@@ -155,12 +147,22 @@ fn two(words: &[i32], at: usize) -> u64 {
     u64::from(words[at] as u32) | u64::from(words[at + 1] as u32) << 32
 }
 
-impl Page {
+impl EdgePage {
     /// Adds the next update, which has been checked.
     fn push(&mut self, record: Record, split: &VertexSplit<'_>) {
         let complete = self.errors.push(split.errors);
         assert!(complete, "each field has an error: that is checked");
         record.push(&mut self.words, split);
+    }
+}
+
+impl Page for EdgePage {
+    fn errors(&self) -> &Errors {
+        &self.errors
+    }
+
+    fn bytes(&self) -> usize {
+        size_of_val(&self.words[..]) + self.errors.bytes()
     }
 }
 
@@ -181,12 +183,8 @@ impl EdgeMt {
             base_splits: vec![WHOLE; base.positions.len()],
             base,
             is_coded,
-            pages: Vec::new(),
-            page_bits: bits.min(MAX_PAGE_BITS),
+            pages: Pages::new(info.updates, bits),
             record: Record::new(&info, is_coded),
-            updates: 0,
-            present: 0,
-            to_come: ErrorCode::MAX,
             info,
         }
     }
@@ -212,23 +210,15 @@ impl EdgeMt {
     /// mesh is checked when the update is applied; that errors do not grow along the partial order is the caller's to see
     /// to.
     pub fn push(&mut self, split: &VertexSplit<'_>) -> Result<UpdateId, UpdateError> {
-        let update = self.updates;
+        let update = self.updates();
         self.check(update, split)?;
         let vertex = split.vertex.0;
         match self.split_word(split.vertex) {
             Some(word) if *word == WHOLE => *word = update as i32,
             _ => return Err(UpdateError::Vertex { update, vertex }),
         }
-        if update as usize >> self.page_bits == self.pages.len() {
-            let page = self.new_page(update);
-            self.pages.push(Some(page));
-        }
-        // The last page is here.
-        if let Some(Some(page)) = self.pages.last_mut() {
-            page.push(self.record, split);
-        }
-        self.updates += 1;
-        self.present += 1;
+        let (record, fields) = (self.record, self.info.fields.len());
+        self.pages.push(|updates| new_page(record, fields, updates.len()), |page| page.push(record, split));
         Ok(UpdateId(update))
     }
 
@@ -254,15 +244,6 @@ impl EdgeMt {
         if split.errors.len() == self.info.fields.len() { Ok(()) } else { Err(UpdateError::Error { update }) }
     }
 
-    /// A page that begins with update `first`.
-    fn new_page(&self, first: u32) -> Page {
-        let most = self.info.updates.saturating_sub(first).min(1 << self.page_bits) as usize;
-        Page {
-            words: Vec::with_capacity(most * self.record.len),
-            errors: Errors::with_capacity(self.info.fields.len(), most),
-        }
-    }
-
     /// Adds all updates of a page, of any that is not here. The pages on which it depends must be here; those that follow
     /// from the vertices that it splits are looked for, others are the caller's to know.
     ///
@@ -270,33 +251,20 @@ impl EdgeMt {
     /// If the page is not a whole one of this MT, is here already, depends on a page that is not, or has an update that
     /// [`EdgeMt::push`] would refuse. The MT is as it was then.
     pub fn insert_page(&mut self, page: u32, splits: &[VertexSplit<'_>]) -> Result<(), PageError> {
-        let updates = self.page_updates(page);
-        if updates.is_empty() {
-            return Err(PageError::Beyond { page });
-        }
-        if self.pages.get(page as usize).is_some_and(Option::is_some) {
-            return Err(PageError::Present { page });
-        }
-        if splits.len() != updates.len() {
-            return Err(PageError::Length { page, expected: updates.len() as u32 });
-        }
-        let mut new = self.new_page(updates.start);
+        let updates = self.pages.check_new(page, splits.len())?;
+        let mut new = new_page(self.record, self.info.fields.len(), updates.len());
         for (update, split) in updates.clone().zip(splits) {
             self.check(update, split)?;
             self.check_vertex(page, update, split.vertex)?;
             new.push(self.record, split);
         }
-        if page as usize >= self.pages.len() {
-            self.pages.resize_with(page as usize + 1, || None);
-        }
-        self.pages[page as usize] = Some(new);
-        self.present += updates.len() as u32;
-        self.updates = self.updates.max(updates.end);
+        self.pages.insert(page, new);
         for (k, (update, split)) in updates.zip(splits).enumerate() {
             match self.split_word(split.vertex) {
                 Some(word) if *word == WHOLE => *word = update as i32,
                 _ => {
-                    self.drop_page(page, &splits[..k]);
+                    splits[..k].iter().for_each(|noted| self.unsplit(noted.vertex));
+                    self.pages.remove(page);
                     return Err(UpdateError::Vertex { update, vertex: split.vertex.0 }.into());
                 }
             }
@@ -307,11 +275,11 @@ impl EdgeMt {
     /// Whether the vertex that an update of a new page splits is, or is going to be, there before it.
     fn check_vertex(&self, page: u32, update: u32, vertex: VertexId) -> Result<(), PageError> {
         let Some(creator) = self.created_by(vertex) else { return Ok(()) };
-        let other = creator.0 >> self.page_bits;
+        let other = self.pages.page_of(creator.0);
         if creator.0 >= update {
             return Err(UpdateError::Vertex { update, vertex: vertex.0 }.into());
         }
-        if other == page || self.has(creator) { Ok(()) } else { Err(PageError::Needs { page, other }) }
+        if other == page || self.pages.has(creator) { Ok(()) } else { Err(PageError::Needs { page, other }) }
     }
 
     /// Takes the updates of a page away, none of which may be applied to a mesh that is still in use; that mesh must have
@@ -319,26 +287,19 @@ impl EdgeMt {
     ///
     /// # Errors
     /// If the page is not here, or another one that is splits a vertex of it. The MT is as it was then.
-    pub fn remove_page(&mut self, page: u32) -> Result<(), PageError> {
-        let Some(Some(leaving)) = self.pages.get(page as usize) else {
-            return Err(PageError::Absent { page });
-        };
+    pub(super) fn take_page(&mut self, page: u32) -> Result<(), PageError> {
+        let leaving = self.pages.get(page).ok_or(PageError::Absent { page })?;
         let splits = leaving.words.chunks(self.record.len).flat_map(|words| &words[SPLITS..MASK]);
-        let mut others = splits.filter(|split| **split != WHOLE).map(|split| *split as u32 >> self.page_bits);
+        let mut others =
+            splits.filter(|split| **split != WHOLE).map(|split| self.pages.page_of(*split as u32));
         if let Some(other) = others.find(|other| *other != page) {
             return Err(PageError::Needed { page, other });
         }
         let vertices = leaving.words.chunks(self.record.len).map(|words| VertexId(words[VERTEX] as u32));
         let vertices: Vec<VertexId> = vertices.collect();
         vertices.into_iter().for_each(|v| self.unsplit(v));
-        self.forget_page(page);
+        self.pages.remove(page);
         Ok(())
-    }
-
-    /// Takes a page away of which so many splits have been noted.
-    fn drop_page(&mut self, page: u32, noted: &[VertexSplit<'_>]) {
-        noted.iter().for_each(|split| self.unsplit(split.vertex));
-        self.forget_page(page);
     }
 
     fn unsplit(&mut self, vertex: VertexId) {
@@ -347,113 +308,11 @@ impl EdgeMt {
         }
     }
 
-    fn forget_page(&mut self, page: u32) {
-        if let Some(gone) = self.pages[page as usize].take() {
-            self.present -= (gone.words.len() / self.record.len) as u32;
-        }
-        while self.pages.last().is_some_and(Option::is_none) {
-            self.pages.pop();
-        }
-        self.updates = match self.pages.last() {
-            Some(Some(last)) => {
-                let before = (self.pages.len() - 1) << self.page_bits;
-                (before + last.words.len() / self.record.len) as u32
-            }
-            _ => 0,
-        };
-    }
-
-    /// Whether update `u` is here.
-    #[inline]
-    pub fn has(&self, u: UpdateId) -> bool {
-        !self.words(u).is_empty()
-    }
-
-    /// How many updates are here.
-    pub fn present(&self) -> u32 {
-        self.present
-    }
-
-    /// Whether the page is here.
-    pub fn has_page(&self, page: u32) -> bool {
-        self.pages.get(page as usize).is_some_and(Option::is_some)
-    }
-
-    /// The page that update `u` belongs to.
-    pub(crate) fn page_of_update(&self, u: u32) -> u32 {
-        u >> self.page_bits
-    }
-
-    /// The updates of page `page`; none if there is no such page.
-    pub fn page_updates(&self, page: u32) -> Range<u32> {
-        let first = u64::from(page) << self.page_bits;
-        let end = u64::from(self.info.updates);
-        first.min(end) as u32..(first + (1 << self.page_bits)).min(end) as u32
-    }
-
-    /// Tells that no update which is not here has a larger error than this; until then, any may have. Means nothing once
-    /// all are here.
-    pub fn set_to_come(&mut self, bound: ErrorCode) {
-        self.to_come = if self.present == self.info.updates { ErrorCode::MAX } else { bound };
-    }
-
-    /// No update that is not here has a larger error.
-    pub fn to_come(&self) -> ErrorCode {
-        if self.present >= self.info.updates { ErrorCode::ZERO } else { self.to_come }
-    }
-
-    /// Bytes of the updates that are here.
-    pub fn page_bytes(&self) -> u64 {
-        u64::from(self.present) * self.record.bytes(&self.info)
-    }
-
-    /// Bytes that an update of an MT takes in the form that files have.
-    pub fn update_bytes(info: &MtInfo) -> u64 {
-        Record::new(info, true).bytes(info)
-    }
-
-    /// What is known of the MT as a whole.
-    pub fn info(&self) -> &MtInfo {
-        &self.info
-    }
-
-    /// The base mesh.
-    pub fn base(&self) -> &BaseMesh {
-        &self.base
-    }
-
-    /// Number of updates so far, those between them that are not here included.
-    pub fn updates(&self) -> u32 {
-        self.updates
-    }
-
-    /// Bytes of everything that the MT holds, base mesh and errors included.
-    pub fn bytes(&self) -> u64 {
-        let base = size_of_val(&self.base.positions[..])
-            + size_of_val(&self.base.values[..])
-            + size_of_val(&self.base.tets[..]);
-        let order = size_of_val(&self.base_splits[..]) + size_of_val(&self.pages[..]);
-        let pages = self.pages.iter().flatten();
-        let nodes: usize = pages.map(|page| size_of_val(&page.words[..]) + page.errors.bytes()).sum();
-        (base + order + nodes) as u64
-    }
-
-    #[inline]
-    fn page_of(&self, u: u32) -> Option<&Page> {
-        self.pages.get((u >> self.page_bits) as usize)?.as_ref()
-    }
-
-    /// The place of an update in its page.
-    #[inline]
-    fn place(&self, u: u32) -> usize {
-        (u & ((1 << self.page_bits) - 1)) as usize
-    }
-
     /// The words of an update; none if it is not here.
     #[inline]
     fn words(&self, u: UpdateId) -> &[i32] {
-        let start = self.place(u.0) * self.record.len;
-        let words = self.page_of(u.0).and_then(|page| page.words.get(start..start + self.record.len));
+        let len = self.record.len;
+        let words = self.pages.find(u.0).and_then(|(page, at)| page.words.get(at * len..(at + 1) * len));
         words.unwrap_or_default()
     }
 
@@ -462,20 +321,8 @@ impl EdgeMt {
         let Some(i) = v.0.checked_sub(self.base_splits.len() as u32) else {
             return self.base_splits.get_mut(v.0 as usize);
         };
-        let at = self.place(i / 2) * self.record.len + SPLITS + i as usize % 2;
-        self.pages.get_mut(((i / 2) >> self.page_bits) as usize)?.as_mut()?.words.get_mut(at)
-    }
-
-    /// The error of update `u`, the largest one of all fields; [`ErrorCode::ZERO`] if it is not here.
-    #[inline]
-    pub fn error_of(&self, u: UpdateId) -> ErrorCode {
-        self.page_of(u.0).map_or(ErrorCode::ZERO, |page| page.errors.largest(self.place(u.0)))
-    }
-
-    /// The error of update `u` in each field; nothing if it is not here.
-    #[inline]
-    pub fn errors_of(&self, u: UpdateId) -> &[ErrorCode] {
-        self.page_of(u.0).map_or(&[], |page| page.errors.of(self.place(u.0)))
+        let (page, place) = self.pages.find_mut(i / 2)?;
+        page.words.get_mut(place * self.record.len + SPLITS + i as usize % 2)
     }
 
     /// What update `u` does.
@@ -492,7 +339,7 @@ impl EdgeMt {
             edge,
             field_offsets: &words[OFFSET + self.record.offset..],
             mask: two(words, MASK),
-            errors: self.errors_of(u),
+            errors: self.errors(u),
         }
     }
 
@@ -524,6 +371,50 @@ impl EdgeMt {
             Some(i) => self.words(UpdateId(i / 2)).get(SPLITS + i as usize % 2),
         };
         split.filter(|&&s| s != WHOLE).map(|&s| UpdateId(s as u32))
+    }
+}
+
+fn new_page(record: Record, fields: usize, updates: usize) -> EdgePage {
+    EdgePage {
+        words: Vec::with_capacity(updates * record.len),
+        errors: Errors::with_capacity(fields, updates),
+    }
+}
+
+impl MultiTessellation for EdgeMt {
+    fn info(&self) -> &MtInfo {
+        &self.info
+    }
+
+    fn base(&self) -> &BaseMesh {
+        &self.base
+    }
+
+    fn updates(&self) -> u32 {
+        self.pages.updates()
+    }
+
+    /// A split adds the tetrahedra of its fan.
+    fn always_grows(&self) -> bool {
+        true
+    }
+
+    #[inline]
+    fn error(&self, u: UpdateId) -> ErrorCode {
+        self.pages.error(u)
+    }
+
+    #[inline]
+    fn errors(&self, u: UpdateId) -> &[ErrorCode] {
+        self.pages.errors(u)
+    }
+
+    fn to_come(&self) -> ErrorCode {
+        self.pages.to_come()
+    }
+
+    fn bytes(&self) -> u64 {
+        self.base.bytes() + size_of_val(&self.base_splits[..]) as u64 + self.pages.all_bytes()
     }
 }
 

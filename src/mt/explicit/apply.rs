@@ -8,8 +8,8 @@ use super::face_occupancy::{FaceOccupancy, faces};
 use crate::mesh::NONE;
 use crate::mt::mesh::current::{KindWord, Labels};
 use crate::mt::{
-    Applied, ApplyUpdates, BaseMesh, BaseMeshError, CurrentMesh, ErrorCode, ExplicitMt, LookAtTet, MtInfo,
-    MultiTessellation, UpdateError, UpdateId, UpdatePages, VertexId,
+    Applied, ApplyUpdates, BaseMeshError, CurrentMesh, ErrorCode, ExplicitMt, LookAtTet, MultiTessellation,
+    UpdateError, UpdateId, UpdatePages, VertexId,
 };
 use std::ops::Range;
 
@@ -188,49 +188,11 @@ fn perform(
     mesh.touch(&slots);
 }
 
-impl MultiTessellation for ExplicitMt {
-    fn info(&self) -> &MtInfo {
-        self.info()
-    }
-
-    fn base(&self) -> &BaseMesh {
-        self.base_mesh()
-    }
-
-    fn updates(&self) -> u32 {
-        self.updates()
-    }
-
-    fn bytes(&self) -> u64 {
-        self.held_bytes()
-    }
-
-    fn always_grows(&self) -> bool {
-        self.always_grows
-    }
-
-    fn error(&self, u: UpdateId) -> ErrorCode {
-        ExplicitMt::error(self, u)
-    }
-
-    fn errors(&self, u: UpdateId) -> &[ErrorCode] {
-        ExplicitMt::errors(self, u)
-    }
-
-    fn has_tet_errors(&self) -> bool {
-        self.quarterings().is_some()
-    }
-
-    fn own_fall(&self, u: UpdateId) -> u8 {
-        self.own_fall_of(u)
-    }
-
-    fn to_come(&self) -> ErrorCode {
-        self.to_come()
-    }
-}
-
 impl UpdatePages for ExplicitMt {
+    fn set_to_come(&mut self, bound: ErrorCode) {
+        self.to_come = if self.updates() == self.info().updates { ErrorCode::MAX } else { bound };
+    }
+
     fn page_inserted(&self, mesh: &mut CurrentMesh, updates: Range<u32>) {
         for t in updates.flat_map(|u| self.removed(UpdateId(u))) {
             if let Some(slot) = mesh.tagged(*t) {
@@ -242,9 +204,9 @@ impl UpdatePages for ExplicitMt {
 
 impl ApplyUpdates for ExplicitMt {
     fn start(&self) -> Result<CurrentMesh, BaseMeshError> {
-        let mut mesh = CurrentMesh::new(self.info(), self.base_mesh())?;
-        mesh.tag_all(ExplicitMt::base(self));
-        mesh.put_back_kind_state(Box::new(FaceOccupancy::by(&self.base_mesh().tets)));
+        let mut mesh = CurrentMesh::new(self.info(), self.base())?;
+        mesh.tag_all(self.base_tets());
+        mesh.put_back_kind_state(Box::new(FaceOccupancy::by(&self.base().tets)));
         Ok(mesh)
     }
 
@@ -253,11 +215,11 @@ impl ApplyUpdates for ExplicitMt {
     }
 
     fn remover(&self, mesh: &CurrentMesh, t: u32) -> Option<UpdateId> {
-        ExplicitMt::remover(self, mesh.tag(t))
+        self.removed_by(mesh.tag(t))
     }
 
     fn creator(&self, mesh: &CurrentMesh, t: u32) -> Option<UpdateId> {
-        ExplicitMt::creator(self, mesh.tag(t))
+        self.inserted_by(mesh.tag(t))
     }
 
     fn may_coarsen(&self, mesh: &CurrentMesh, u: UpdateId) -> bool {
@@ -268,7 +230,7 @@ impl ApplyUpdates for ExplicitMt {
         let missing = self.removed(u).iter().find(|&&t| mesh.tagged(t).is_none());
         if let Some(&t) = missing {
             let damaged = UpdateError::Cavity { update: u.0 };
-            return Ok(Applied::Blocked(ExplicitMt::creator(self, t).ok_or(damaged)?));
+            return Ok(Applied::Blocked(self.inserted_by(t).ok_or(damaged)?));
         }
         let old = Self::slots(mesh, u.0, self.removed(u).iter().copied())?;
         let new: Vec<u32> = self.inserted(u).collect();
@@ -335,6 +297,6 @@ impl ExplicitMt {
         let missing = self.inserted(u).find(|&t| mesh.tagged(t).is_none());
         let Some(t) = missing else { return Ok(None) };
         // Without a child to remove it, it was never there.
-        ExplicitMt::remover(self, t).map(Some).ok_or(UpdateError::Cavity { update: u.0 })
+        self.removed_by(t).map(Some).ok_or(UpdateError::Cavity { update: u.0 })
     }
 }

@@ -12,7 +12,7 @@ use crate::mt::ReplayError;
 use crate::mt::UpdateError;
 #[cfg(feature = "build")]
 use crate::mt::margins::Margins;
-use crate::mt::{ExplicitMt, UpdateId, VertexId};
+use crate::mt::{ExplicitMt, MultiTessellation, UpdateId, VertexId};
 use std::collections::BTreeSet;
 use std::fmt;
 
@@ -114,7 +114,7 @@ impl ExplicitMt {
     /// The first fault, coarse to fine.
     pub fn check(&self) -> Result<(), MtFault> {
         let mut mesh = Faces::default();
-        self.add_all(self.base(), None, &mut mesh)?;
+        self.add_all(self.base_tets(), None, &mut mesh)?;
         for u in (0..self.updates()).map(UpdateId) {
             self.check_place(u)?;
             let bare_before = self.bare_faces(self.removed(u).iter().copied(), &mesh);
@@ -136,7 +136,7 @@ impl ExplicitMt {
         let in_order = parents().all(|p| p < u && self.children(p).contains(&u.0))
             && self.children(u).iter().all(|&c| c > u.0 && self.parents(UpdateId(c)).contains(&u.0))
             && self.removed(u).iter().all(|&t| {
-                self.remover(t) == Some(u) && self.creator(t).is_none_or(|p| parents().any(|q| q == p))
+                self.removed_by(t) == Some(u) && self.inserted_by(t).is_none_or(|p| parents().any(|q| q == p))
             });
         if !in_order {
             return Err(MtFault::Order { update: u });

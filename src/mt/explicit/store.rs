@@ -9,38 +9,15 @@
 
 use crate::geom::orient3d;
 use crate::mesh::NONE;
+use crate::mt::pages::Rows;
 use crate::mt::replay::{ReplayError, canonical, replay};
 use crate::mt::update_errors::Errors;
 use crate::mt::vertex::tet_errors::MAX_QUARTERINGS;
-use crate::mt::{ApplyUpdates, BaseMesh, ErrorCode, MtInfo, MtKind, UpdateError, UpdateId, VertexId};
+use crate::mt::{
+    ApplyUpdates, BaseMesh, ErrorCode, MtInfo, MtKind, MultiTessellation, UpdateError, UpdateId, VertexId,
+};
 use std::collections::HashMap;
 use std::ops::Range;
-
-/// Lists of numbers, one after the other in one array.
-#[derive(Clone, Debug, PartialEq, Eq)]
-struct Rows {
-    starts: Vec<u32>,
-    items: Vec<u32>,
-}
-
-impl Rows {
-    fn new() -> Self {
-        Self { starts: vec![0], items: Vec::new() }
-    }
-
-    fn push(&mut self, row: impl IntoIterator<Item = u32>) {
-        self.items.extend(row);
-        self.starts.push(self.items.len() as u32);
-    }
-
-    fn row(&self, i: usize) -> &[u32] {
-        &self.items[self.starts[i] as usize..self.starts[i + 1] as usize]
-    }
-
-    fn bytes(&self) -> usize {
-        size_of_val(&self.starts[..]) + size_of_val(&self.items[..])
-    }
-}
 
 /// An update with everything spelled out, on its way into an [`ExplicitMt`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,8 +49,8 @@ pub struct ExplicitMt {
     created: Vec<u32>,
     /// First inserted tetrahedron of each update, and the end of all.
     inserted: Vec<u32>,
-    removed: Rows,
-    parents: Rows,
+    removed: Rows<u32>,
+    parents: Rows<u32>,
     /// The update that removes each tetrahedron; [`NONE`] if there is none so far. Children follow from it.
     remover: Vec<u32>,
     errors: Errors,
@@ -81,7 +58,7 @@ pub struct ExplicitMt {
     quarterings: Option<Vec<u8>>,
     /// The [fall](crate::mt::MultiTessellation::own_fall) of each update, then.
     own_falls: Vec<u8>,
-    to_come: ErrorCode,
+    pub(super) to_come: ErrorCode,
     /// Whether every update so far inserts more tetrahedra than it removes.
     pub(in crate::mt) always_grows: bool,
 }
@@ -180,11 +157,12 @@ impl ExplicitMt {
         if !self.errors.push(new.errors) {
             return Err(UpdateError::Error { update });
         }
-        let mut parents: Vec<u32> = removed.iter().filter_map(|&t| self.creator(t)).map(|u| u.0).collect();
+        let mut parents: Vec<u32> =
+            removed.iter().filter_map(|&t| self.inserted_by(t)).map(|u| u.0).collect();
         parents.dedup();
         removed.iter().for_each(|&t| self.remover[t as usize] = update);
-        self.parents.push(parents);
-        self.removed.push(removed);
+        self.parents.push(&parents);
+        self.removed.push(&removed);
         self.positions.extend_from_slice(new.positions);
         self.created.push(self.positions.len() as u32);
         self.levels.extend_from_slice(new.levels);
@@ -218,11 +196,6 @@ impl ExplicitMt {
     /// Sets the fall of update `u`, where tetrahedra have errors of their own.
     pub(crate) fn set_own_fall(&mut self, u: UpdateId, fall: u8) {
         self.own_falls.get_mut(u.0 as usize).into_iter().for_each(|own| *own = fall);
-    }
-
-    /// The fall of update `u`.
-    pub fn own_fall_of(&self, u: UpdateId) -> u8 {
-        self.own_falls.get(u.0 as usize).copied().unwrap_or(0)
     }
 
     /// Sets the quarterings of tetrahedron `t`, where there are any.
@@ -321,32 +294,6 @@ impl ExplicitMt {
         Ok(mt)
     }
 
-    /// Tells that no update which is still to come has a larger error than this; until then, any may come. Means
-    /// nothing once all are here.
-    pub fn set_to_come(&mut self, bound: ErrorCode) {
-        self.to_come = if self.updates() == self.info.updates { ErrorCode::MAX } else { bound };
-    }
-
-    /// No update that is not here has a larger error.
-    pub fn to_come(&self) -> ErrorCode {
-        if self.updates() >= self.info.updates { ErrorCode::ZERO } else { self.to_come }
-    }
-
-    /// What is known of the MT as a whole.
-    pub fn info(&self) -> &MtInfo {
-        &self.info
-    }
-
-    /// The base mesh as it came; its tetrahedra are the first of [`Self::tets`], in the same order.
-    pub fn base_mesh(&self) -> &BaseMesh {
-        &self.base
-    }
-
-    /// Number of updates.
-    pub fn updates(&self) -> u32 {
-        self.inserted.len() as u32 - 1
-    }
-
     /// Number of vertices that appear in any mesh of the MT.
     pub fn vertices(&self) -> u32 {
         self.positions.len() as u32
@@ -373,7 +320,7 @@ impl ExplicitMt {
     }
 
     /// Which tetrahedra make up the base mesh.
-    pub fn base(&self) -> Range<u32> {
+    pub fn base_tets(&self) -> Range<u32> {
         0..self.base.tets.len() as u32
     }
 
@@ -411,7 +358,7 @@ impl ExplicitMt {
     /// The updates that remove what `u+` inserts, ascending.
     pub fn children(&self, u: UpdateId) -> Vec<u32> {
         let mut children: Vec<u32> =
-            self.inserted(u).filter_map(|t| self.remover(t)).map(|child| child.0).collect();
+            self.inserted(u).filter_map(|t| self.removed_by(t)).map(|child| child.0).collect();
         children.sort_unstable();
         children.dedup();
         children
@@ -419,22 +366,12 @@ impl ExplicitMt {
 
     /// The update that removes tetrahedron `t`; none if it belongs to the reference mesh (as far as it is known).
     #[inline]
-    pub fn remover(&self, t: u32) -> Option<UpdateId> {
+    pub fn removed_by(&self, t: u32) -> Option<UpdateId> {
         Some(self.remover[t as usize]).filter(|&u| u != NONE).map(UpdateId)
     }
 
-    /// The error of an update: the largest one of all fields.
-    pub fn error(&self, u: UpdateId) -> ErrorCode {
-        self.errors.largest(u.0 as usize)
-    }
-
-    /// The error of an update in each field.
-    pub fn errors(&self, u: UpdateId) -> &[ErrorCode] {
-        self.errors.of(u.0 as usize)
-    }
-
     /// The update that inserts tetrahedron `t`; none if it belongs to the base mesh.
-    pub fn creator(&self, t: u32) -> Option<UpdateId> {
+    pub fn inserted_by(&self, t: u32) -> Option<UpdateId> {
         let after = self.inserted.partition_point(|&first| first <= t) as u32;
         after.checked_sub(1).map(UpdateId)
     }
@@ -472,8 +409,8 @@ impl ExplicitMt {
             vertices: self.positions.len() as u64,
             tets: self.tets.len() as u64,
             updates: u64::from(self.updates()),
-            removed: self.removed.items.len() as u64,
-            arcs: self.parents.items.len() as u64,
+            removed: self.removed.items().len() as u64,
+            arcs: self.parents.items().len() as u64,
         }
     }
 
@@ -482,15 +419,50 @@ impl ExplicitMt {
     /// The paper estimates it as 24n + 28m, with n the vertices of the reference mesh and m all tetrahedra of the MT:
     /// that takes one arc for each tetrahedron, where there are fewer, and does not count the vertices outside the
     /// reference mesh, which edge-based MTs have.
-    pub fn bytes(&self) -> u64 {
+    pub fn paper_bytes(&self) -> u64 {
         self.counts().bytes()
     }
+}
 
-    /// Bytes of everything that the MT really holds, base mesh and errors included.
-    pub fn held_bytes(&self) -> u64 {
-        let base = size_of_val(&self.base.positions[..])
-            + size_of_val(&self.base.values[..])
-            + size_of_val(&self.base.tets[..]);
+impl MultiTessellation for ExplicitMt {
+    fn info(&self) -> &MtInfo {
+        &self.info
+    }
+
+    /// Its tetrahedra are the first of [`ExplicitMt::tets`], in the same order.
+    fn base(&self) -> &BaseMesh {
+        &self.base
+    }
+
+    fn updates(&self) -> u32 {
+        self.inserted.len() as u32 - 1
+    }
+
+    fn always_grows(&self) -> bool {
+        self.always_grows
+    }
+
+    fn error(&self, u: UpdateId) -> ErrorCode {
+        self.errors.largest(u.0 as usize)
+    }
+
+    fn errors(&self, u: UpdateId) -> &[ErrorCode] {
+        self.errors.of(u.0 as usize)
+    }
+
+    fn has_tet_errors(&self) -> bool {
+        self.quarterings.is_some()
+    }
+
+    fn own_fall(&self, u: UpdateId) -> u8 {
+        self.own_falls.get(u.0 as usize).copied().unwrap_or(0)
+    }
+
+    fn to_come(&self) -> ErrorCode {
+        if self.updates() >= self.info.updates { ErrorCode::ZERO } else { self.to_come }
+    }
+
+    fn bytes(&self) -> u64 {
         let vertices = size_of_val(&self.positions[..]) + size_of_val(&self.levels[..]);
         let tets = size_of_val(&self.tets[..]) + size_of_val(&self.remover[..]);
         let nodes = size_of_val(&self.created[..])
@@ -500,7 +472,7 @@ impl ExplicitMt {
             + self.errors.bytes()
             + self.quarterings.as_ref().map_or(0, Vec::len)
             + self.own_falls.len();
-        (base + vertices + tets + nodes) as u64
+        self.base.bytes() + (vertices + tets + nodes) as u64
     }
 }
 
@@ -567,7 +539,7 @@ mod tests {
         let mt = twice_split();
         assert_eq!(mt.check(), Ok(()));
         let (first, second) = (UpdateId(0), UpdateId(1));
-        assert_eq!((mt.base(), mt.inserted(first), mt.inserted(second)), (0..8, 8..20, 20..32));
+        assert_eq!((mt.base_tets(), mt.inserted(first), mt.inserted(second)), (0..8, 8..20, 20..32));
         assert_eq!(mt.removed(first), [0, 1, 2, 3, 4, 5, 6, 7]);
         assert_eq!(mt.removed(second).len(), 8);
         assert_eq!((mt.parents(second), mt.children(first)), (&[0][..], vec![1]));
@@ -582,7 +554,7 @@ mod tests {
         assert!(mt.is_feasible(&[false, false], first) && !mt.is_feasible(&[false, false], second));
         assert!(!mt.is_feasible(&[true, true], first) && mt.is_feasible(&[true, true], second));
         // 11 vertices, 32 tetrahedra, 2 updates with 16 removed tetrahedra and one arc.
-        assert_eq!(mt.bytes(), 11 * 16 + 32 * 16 + 2 * 8 + 16 * 4 + 8);
+        assert_eq!(mt.paper_bytes(), 11 * 16 + 32 * 16 + 2 * 8 + 16 * 4 + 8);
     }
 
     #[test]
@@ -596,7 +568,8 @@ mod tests {
         assert_eq!(fault(&|mt| mt.errors.swap()), Err(MtFault::Error { update: second }));
         let removes_nothing = |mt: &mut ExplicitMt| mt.remover.fill(NONE);
         assert_eq!(fault(&removes_nothing), Err(MtFault::Order { update: first }));
-        let no_parents = Rows { starts: vec![0; 3], items: vec![] };
+        let mut no_parents = Rows::new();
+        (0..2).for_each(|_| no_parents.push(&[]));
         // Its child does not know it.
         assert_eq!(fault(&|mt| mt.parents = no_parents.clone()), Err(MtFault::Order { update: first }));
         assert_eq!(fault(&|mt| mt.tets[3].swap(0, 1)), Err(MtFault::Tetrahedron { update: None }));
@@ -605,9 +578,11 @@ mod tests {
         assert_eq!(fault(&|mt| mt.tets[1] = mt.tets[0]), Err(MtFault::Face { update: None }));
         // A tetrahedron that stays where new ones go.
         let stays = |mt: &mut ExplicitMt| {
-            let last = mt.removed.items.pop().expect("a removed tetrahedron");
-            mt.removed.starts[2] -= 1;
-            mt.remover[last as usize] = NONE;
+            let removed = mt.removed.row(1).to_vec();
+            let (last, others) = removed.split_last().expect("a removed tetrahedron");
+            mt.removed.pop();
+            mt.removed.push(others);
+            mt.remover[*last as usize] = NONE;
         };
         assert_eq!(fault(&stays), Err(MtFault::Face { update: Some(second) }));
         // A new tetrahedron left out: a hole in the middle.

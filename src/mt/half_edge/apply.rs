@@ -11,9 +11,10 @@ use crate::mt::mesh::KindState;
 use crate::mt::mesh::current::{KindWord, Labels};
 use crate::mt::mesh::stars::{GATHERED, Gather, Star};
 use crate::mt::mesh::tet::corner_of;
+use crate::mt::pages::Page;
 use crate::mt::{
-    Applied, ApplyUpdates, BaseMesh, BaseMeshError, CurrentMesh, ErrorCode, LookAtTet, MtInfo,
-    MultiTessellation, UpdateError, UpdateId, UpdatePages, VertexId,
+    Applied, ApplyUpdates, BaseMeshError, CurrentMesh, ErrorCode, LookAtTet, MultiTessellation, PageError,
+    UpdateError, UpdateId, UpdatePages, VertexId,
 };
 use std::ops::Range;
 
@@ -679,55 +680,19 @@ impl CurrentMesh {
     }
 }
 
-impl MultiTessellation for HalfEdgeMt {
-    fn info(&self) -> &MtInfo {
-        self.info()
-    }
-
-    fn base(&self) -> &BaseMesh {
-        self.base()
-    }
-
-    fn updates(&self) -> u32 {
-        self.updates()
-    }
-
-    fn bytes(&self) -> u64 {
-        self.bytes()
-    }
-
-    /// Each fills at least one gap.
-    fn always_grows(&self) -> bool {
-        true
-    }
-
-    #[inline]
-    fn error(&self, u: UpdateId) -> ErrorCode {
-        self.error_of(u)
-    }
-
-    #[inline]
-    fn errors(&self, u: UpdateId) -> &[ErrorCode] {
-        self.errors_of(u)
-    }
-
-    fn to_come(&self) -> ErrorCode {
-        self.to_come()
-    }
-}
-
 impl UpdatePages for HalfEdgeMt {
-    #[inline]
-    fn has(&self, u: UpdateId) -> bool {
-        self.has(u)
+    in_pages!();
+
+    fn remove_page(&mut self, page: u32) -> Result<(), PageError> {
+        self.take_page(page)
     }
 
-    fn present(&self) -> u32 {
-        self.present()
+    fn update_bytes(&self) -> u64 {
+        40 + 6 * self.info().fields.len() as u64
     }
 
-    fn page_updates(&self, page: u32) -> Range<u32> {
-        self.page_updates(page)
+    fn needs_parents(&self) -> bool {
+        false
     }
 
     #[inline]

@@ -5,8 +5,8 @@ use super::store::{BaseMark, ForestChild, HalfEdgeMt, HalfEdgeUpdate};
 use crate::mesh::NONE;
 use crate::mt::replay::canonical;
 use crate::mt::{
-    Applied, ApplyUpdates, ConvertError, CurrentMesh, ExplicitMt, MtInfo, MtKind, ReplayError, UpdateError,
-    UpdateId, VertexId,
+    Applied, ApplyUpdates, ConvertError, CurrentMesh, ExplicitMt, MtInfo, MtKind, MultiTessellation,
+    ReplayError, UpdateError, UpdateId, VertexId,
 };
 
 const NOT_HALF_EDGE: &str = "it is not the inverse of a half-edge collapse";
@@ -27,7 +27,7 @@ impl HalfEdgeMt {
     /// If an update is none.
     pub fn from_explicit(explicit: &ExplicitMt, page_bits: u32) -> Result<Self, ConvertError> {
         let updates = explicit.updates();
-        let base = explicit.base_mesh().positions.len() as u32;
+        let base = explicit.base().positions.len() as u32;
         let near = Self::near_vertices(explicit)?;
         let mut children: Vec<Vec<ForestChild>> = vec![Vec::new(); explicit.vertices() as usize];
         for (u, &v) in (0..).zip(&near) {
@@ -35,15 +35,14 @@ impl HalfEdgeMt {
             children[v as usize].push(ForestChild { update: u, offset: [0, 1, 2].map(|k| to[k] - from[k]) });
         }
         let inner = inner_faces(explicit, &near);
-        let mark = |t: u32| BaseMark { remover: explicit.remover(t).map_or(NONE, |u| u.0), inner: 0 };
-        let mut marks: Vec<BaseMark> = explicit.base().map(mark).collect();
-        for (t, mark) in explicit.base().zip(&mut marks) {
-            mark.inner = inner.of(t, explicit.base_mesh().tets[t as usize]);
+        let mark = |t: u32| BaseMark { remover: explicit.removed_by(t).map_or(NONE, |u| u.0), inner: 0 };
+        let mut marks: Vec<BaseMark> = explicit.base_tets().map(mark).collect();
+        for (t, mark) in explicit.base_tets().zip(&mut marks) {
+            mark.inner = inner.of(t, explicit.base().tets[t as usize]);
         }
         let info = MtInfo { kind: MtKind::HalfEdge, updates, ..explicit.info().clone() };
         let (of_base, of_updates) = children.split_at(base as usize);
-        let mut mt =
-            Self::new(info, explicit.base_mesh().clone(), marks, of_base, page_bits).map_err(damaged)?;
+        let mut mt = Self::new(info, explicit.base().clone(), marks, of_base, page_bits).map_err(damaged)?;
         let mut mesh = mt.start().map_err(|error| ConvertError::Damaged(error.into()))?;
         let mut scratch = Box::<Scratch>::default();
         for (u, children) in (0..).zip(of_updates) {
@@ -96,7 +95,7 @@ impl HalfEdgeMt {
             let tet = new.corners.map(slot_of);
             let at = inserted.binary_search(&canonical(tet)).map_err(|_| refused(u))?;
             let t = range.start + at as u32;
-            truth.push((explicit.remover(t).map_or(NONE, |c| c.0), inner.of(t, tet)));
+            truth.push((explicit.removed_by(t).map_or(NONE, |c| c.0), inner.of(t, tet)));
         }
         scratch.hash_star(mesh, vertex.0);
         let star = self.code_star(mesh, id, position, scratch, &truth).ok_or(refused(u))?;

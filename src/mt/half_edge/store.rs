@@ -24,9 +24,11 @@
 
 use crate::mesh::NONE;
 use crate::mt::mesh::paged_array::PagedArray;
+use crate::mt::pages::{Page, Pages, Rows};
 use crate::mt::update_errors::Errors;
-use crate::mt::{BaseMesh, ErrorCode, MtInfo, MtKind, PageError, UpdateError, UpdateId, VertexId};
-use std::ops::Range;
+use crate::mt::{
+    BaseMesh, ErrorCode, MtInfo, MtKind, MultiTessellation, PageError, UpdateError, UpdateId, VertexId,
+};
 
 /// An update whose near vertex is the one that this is stored with.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -70,18 +72,9 @@ pub struct HalfEdgeMt {
     base: BaseMesh,
     base_marks: Vec<BaseMark>,
     base_children: Rows<ForestChild>,
-    /// The last one is here.
-    pages: Vec<Option<Page>>,
-    /// log2 of the updates of a page.
-    page_bits: u32,
+    pub(super) pages: Pages<HalfEdgePage>,
     /// The near vertex of each update, as far as the page that tells it is here.
     near: PagedArray<u32>,
-    /// The end of the last page that is here.
-    updates: u32,
-    present: u32,
-    /// Bytes of the pages that are here.
-    page_bytes: u64,
-    to_come: ErrorCode,
     /// Page by page and field by field, what bounds the errors of a page that is not here.
     bounds: Vec<ErrorCode>,
     /// One for each field.
@@ -96,52 +89,21 @@ impl PartialEq for HalfEdgeMt {
             && self.base == other.base
             && self.base_marks == other.base_marks
             && self.base_children == other.base_children
-            && self.updates == other.updates
-            && (0..self.updates).all(same)
-    }
-}
-
-/// Lists of different lengths, one after the other.
-#[derive(Clone, Debug, PartialEq)]
-struct Rows<T> {
-    starts: Vec<u32>,
-    items: Vec<T>,
-}
-
-impl<T: Copy> Rows<T> {
-    fn new() -> Self {
-        Self { starts: vec![0], items: Vec::new() }
-    }
-
-    fn push(&mut self, row: &[T]) {
-        self.items.extend_from_slice(row);
-        self.starts.push(self.items.len() as u32);
-    }
-
-    fn len(&self) -> usize {
-        self.starts.len() - 1
-    }
-
-    #[inline]
-    fn row(&self, i: usize) -> &[T] {
-        &self.items[self.starts[i] as usize..self.starts[i + 1] as usize]
-    }
-
-    fn bytes(&self) -> usize {
-        size_of_val(&self.starts[..]) + size_of_val(&self.items[..])
+            && self.updates() == other.updates()
+            && (0..self.updates()).all(same)
     }
 }
 
 /// Updates that come and go together.
 #[derive(Clone, Debug, PartialEq)]
-struct Page {
+pub(super) struct HalfEdgePage {
     children: Rows<ForestChild>,
     stars: Rows<u8>,
     level_residuals: Vec<i32>,
     errors: Errors,
 }
 
-impl Page {
+impl HalfEdgePage {
     fn new(fields: usize) -> Self {
         Self {
             children: Rows::new(),
@@ -151,15 +113,19 @@ impl Page {
         }
     }
 
-    fn len(&self) -> u32 {
-        self.children.len() as u32
-    }
-
-    fn push(&mut self, update: &HalfEdgeUpdate<'_>) -> bool {
+    /// Adds the next update, which has been checked.
+    fn push(&mut self, update: &HalfEdgeUpdate<'_>) {
         self.children.push(update.children);
         self.stars.push(update.star);
         self.level_residuals.extend_from_slice(update.level_residuals);
-        self.errors.push(update.errors)
+        let complete = self.errors.push(update.errors);
+        assert!(complete, "each field has an error: that is checked");
+    }
+}
+
+impl Page for HalfEdgePage {
+    fn errors(&self) -> &Errors {
+        &self.errors
     }
 
     fn bytes(&self) -> usize {
@@ -167,9 +133,6 @@ impl Page {
         self.children.bytes() + self.stars.bytes() + levels + self.errors.bytes()
     }
 }
-
-/// Pages have at most 2 to this power of updates.
-const MAX_PAGE_BITS: u32 = 16;
 
 impl HalfEdgeMt {
     /// An MT without updates, whose pages will have `2^page_bits` updates, at most 2^16. `base` must fit `info`: see
@@ -189,23 +152,17 @@ impl HalfEdgeMt {
         if !fits || !marks.iter().all(known) {
             return Err(UpdateError::Cavity { update: 0 });
         }
+        let fields = info.fields.len();
         let mut mt = Self {
+            pages: Pages::new(info.updates, page_bits),
             info: MtInfo { kind: MtKind::HalfEdge, ..info },
             base,
             base_marks: marks,
             base_children: Rows::new(),
-            pages: Vec::new(),
-            page_bits: page_bits.min(MAX_PAGE_BITS),
             near: PagedArray::new(NONE),
-            updates: 0,
-            present: 0,
-            page_bytes: 0,
-            to_come: ErrorCode::MAX,
-            bounds: Vec::new(),
-            zeros: Vec::new(),
+            bounds: vec![ErrorCode::MAX; fields],
+            zeros: vec![ErrorCode::ZERO; fields],
         };
-        mt.zeros = vec![ErrorCode::ZERO; mt.info.fields.len()];
-        mt.bounds = vec![ErrorCode::MAX; mt.info.fields.len()];
         for (v, row) in (0..).zip(children) {
             mt.check_children(0, None, row)?;
             mt.base_children.push(row);
@@ -250,23 +207,14 @@ impl HalfEdgeMt {
     /// Children must come later, be on the lattice and of no other vertex, and each field has a level and an error. What needs
     /// the mesh is checked when the update is applied; that errors do not grow along the partial order is the caller's to see to.
     pub fn push(&mut self, new: &HalfEdgeUpdate<'_>) -> Result<UpdateId, UpdateError> {
-        let update = self.updates;
+        let update = self.updates();
         if update >= self.info.updates {
             return Err(UpdateError::Error { update });
         }
         self.check(update, new)?;
         self.note_children(self.vertex(UpdateId(update)).0, new.children)?;
-        if update as usize >> self.page_bits == self.pages.len() {
-            let page = Page::new(self.info.fields.len());
-            self.page_bytes += page.bytes() as u64;
-            self.pages.push(Some(page));
-        }
-        // The last page is here, and has an error for each field.
-        self.change_last(|page| {
-            page.push(new);
-        });
-        self.updates += 1;
-        self.present += 1;
+        let fields = self.info.fields.len();
+        self.pages.push(|_| HalfEdgePage::new(fields), |page| page.push(new));
         Ok(UpdateId(update))
     }
 
@@ -279,7 +227,7 @@ impl HalfEdgeMt {
         let children: Vec<Vec<ForestChild>> = vertices.map(|v| self.children_of(v).to_vec()).collect();
         let (info, base) = (self.info.clone(), self.base.clone());
         let mut mt = Self::new(info, base, self.base_marks.clone(), &children, page_bits)?;
-        for update in 0..self.updates {
+        for update in 0..self.updates() {
             mt.push(&self.update(UpdateId(update)).ok_or(UpdateError::Missing { update })?)?;
         }
         Ok(mt)
@@ -300,22 +248,12 @@ impl HalfEdgeMt {
 
     /// Replaces the star code of the last update.
     pub(in crate::mt) fn set_last_star(&mut self, star: &[u8], level_residuals: &[i32]) {
-        self.change_last(|page| {
-            let first = page.stars.starts[page.stars.len() - 1] as usize;
-            page.stars.items.truncate(first);
-            page.stars.items.extend_from_slice(star);
-            page.stars.starts.pop();
-            page.stars.starts.push(page.stars.items.len() as u32);
+        self.pages.change_last(|page| {
+            page.stars.pop();
+            page.stars.push(star);
             let kept = page.level_residuals.len() - level_residuals.len();
             page.level_residuals[kept..].copy_from_slice(level_residuals);
         });
-    }
-
-    fn change_last(&mut self, change: impl FnOnce(&mut Page)) {
-        let Some(Some(page)) = self.pages.last_mut() else { return };
-        self.page_bytes -= page.bytes() as u64;
-        change(page);
-        self.page_bytes += page.bytes() as u64;
     }
 
     /// Adds all updates of a page. Pages on which it depends need not be here.
@@ -324,17 +262,8 @@ impl HalfEdgeMt {
     /// If the page is not a whole one of this MT, is here already, or has an update that [`Self::push`] would refuse; if two
     /// vertices have the same update as a child. The MT is as it was then.
     pub fn insert_page(&mut self, page: u32, updates: &[HalfEdgeUpdate<'_>]) -> Result<(), PageError> {
-        let range = self.page_updates(page);
-        if range.is_empty() {
-            return Err(PageError::Beyond { page });
-        }
-        if self.has_page(page) {
-            return Err(PageError::Present { page });
-        }
-        if updates.len() != range.len() {
-            return Err(PageError::Length { page, expected: range.len() as u32 });
-        }
-        let mut new = Page::new(self.info.fields.len());
+        let range = self.pages.check_new(page, updates.len())?;
+        let mut new = HalfEdgePage::new(self.info.fields.len());
         for (update, record) in range.clone().zip(updates) {
             self.check(update, record)?;
             new.push(record);
@@ -345,13 +274,7 @@ impl HalfEdgeMt {
                 return Err(error.into());
             }
         }
-        if page as usize >= self.pages.len() {
-            self.pages.resize_with(page as usize + 1, || None);
-        }
-        self.page_bytes += new.bytes() as u64;
-        self.pages[page as usize] = Some(new);
-        self.present += range.len() as u32;
-        self.updates = self.updates.max(range.end);
+        self.pages.insert(page, new);
         Ok(())
     }
 
@@ -360,64 +283,10 @@ impl HalfEdgeMt {
     ///
     /// # Errors
     /// If the page is not here.
-    pub fn remove_page(&mut self, page: u32) -> Result<(), PageError> {
-        let gone = self.pages.get_mut(page as usize).and_then(Option::take);
-        let Some(gone) = gone else { return Err(PageError::Absent { page }) };
-        self.forget_children(&gone.children.items);
-        self.page_bytes -= gone.bytes() as u64;
-        self.present -= gone.len();
-        while self.pages.last().is_some_and(Option::is_none) {
-            self.pages.pop();
-        }
-        self.updates = match self.pages.last() {
-            Some(Some(last)) => (((self.pages.len() - 1) << self.page_bits) as u32) + last.len(),
-            _ => 0,
-        };
+    pub(super) fn take_page(&mut self, page: u32) -> Result<(), PageError> {
+        let gone = self.pages.remove(page).ok_or(PageError::Absent { page })?;
+        self.forget_children(gone.children.items());
         Ok(())
-    }
-
-    /// Whether the page is here.
-    pub fn has_page(&self, page: u32) -> bool {
-        self.pages.get(page as usize).is_some_and(Option::is_some)
-    }
-
-    /// log2 of the updates of a page.
-    pub fn page_bits(&self) -> u32 {
-        self.page_bits
-    }
-
-    /// The updates of page `page`; none if there is no such page.
-    pub fn page_updates(&self, page: u32) -> Range<u32> {
-        let first = u64::from(page) << self.page_bits;
-        let end = u64::from(self.info.updates);
-        first.min(end) as u32..(first + (1 << self.page_bits)).min(end) as u32
-    }
-
-    /// Whether update `u` is here.
-    #[inline]
-    pub fn has(&self, u: UpdateId) -> bool {
-        u.0 < self.updates && self.page_of(u.0).is_some()
-    }
-
-    /// How many updates are here.
-    pub fn present(&self) -> u32 {
-        self.present
-    }
-
-    /// Number of updates so far, those between them that are not here included.
-    pub fn updates(&self) -> u32 {
-        self.updates
-    }
-
-    /// Tells that no update which is not here has a larger error than this; until then, any may have. Means nothing once
-    /// all are here.
-    pub fn set_to_come(&mut self, bound: ErrorCode) {
-        self.to_come = if self.present == self.info.updates { ErrorCode::MAX } else { bound };
-    }
-
-    /// No update that is not here has a larger error.
-    pub fn to_come(&self) -> ErrorCode {
-        if self.present >= self.info.updates { ErrorCode::ZERO } else { self.to_come }
     }
 
     /// Tells what bounds the errors of the updates of each page, page by page and field by field, for as long as a page is not
@@ -430,7 +299,7 @@ impl HalfEdgeMt {
     #[inline]
     pub(in crate::mt) fn bounds_of(&self, u: UpdateId) -> &[ErrorCode] {
         let fields = self.zeros.len();
-        let at = (u.0 >> self.page_bits) as usize * fields;
+        let at = self.pages.page_of(u.0) as usize * fields;
         // Nothing is known of a page without bounds: the first entries stand for all then.
         self.bounds.get(at..at + fields).or_else(|| self.bounds.get(..fields)).unwrap_or(&self.zeros)
     }
@@ -439,73 +308,14 @@ impl HalfEdgeMt {
         &self.zeros
     }
 
-    /// Bytes that an update takes in memory, as a rule.
-    pub fn usual_update_bytes(info: &MtInfo) -> u64 {
-        40 + 6 * info.fields.len() as u64
-    }
-
-    /// What is known of the MT as a whole.
-    pub fn info(&self) -> &MtInfo {
-        &self.info
-    }
-
-    /// The base mesh.
-    pub fn base(&self) -> &BaseMesh {
-        &self.base
-    }
-
     /// For each base tetrahedron, what removes it.
     pub fn base_marks(&self) -> &[BaseMark] {
         &self.base_marks
     }
 
-    /// Bytes of the updates that are here.
-    pub fn page_bytes(&self) -> u64 {
-        self.page_bytes
-    }
-
-    /// Bytes of a page that is here.
-    pub fn bytes_of_page(&self, page: u32) -> Option<u64> {
-        self.pages.get(page as usize)?.as_ref().map(|page| page.bytes() as u64)
-    }
-
-    /// Bytes of everything that the MT holds, base mesh and errors included.
-    pub fn bytes(&self) -> u64 {
-        let base = size_of_val(&self.base.positions[..])
-            + size_of_val(&self.base.values[..])
-            + size_of_val(&self.base.tets[..])
-            + size_of_val(&self.base_marks[..])
-            + self.base_children.bytes()
-            + size_of_val(&self.pages[..])
-            + self.near.bytes();
-        base as u64 + self.page_bytes()
-    }
-
-    #[inline]
-    fn page_of(&self, u: u32) -> Option<&Page> {
-        self.pages.get((u >> self.page_bits) as usize)?.as_ref()
-    }
-
-    #[inline]
-    fn place(&self, u: u32) -> usize {
-        (u & ((1 << self.page_bits) - 1)) as usize
-    }
-
-    /// The error of update `u`, the largest one of all fields; [`ErrorCode::ZERO`] if it is not here.
-    #[inline]
-    pub fn error_of(&self, u: UpdateId) -> ErrorCode {
-        self.page_of(u.0).map_or(ErrorCode::ZERO, |page| page.errors.largest(self.place(u.0)))
-    }
-
-    /// The error of update `u` in each field; nothing if it is not here.
-    #[inline]
-    pub fn errors_of(&self, u: UpdateId) -> &[ErrorCode] {
-        self.page_of(u.0).map_or(&[], |page| page.errors.of(self.place(u.0)))
-    }
-
     /// Update `u` as it is stored; none if it is not here.
     pub fn update(&self, u: UpdateId) -> Option<HalfEdgeUpdate<'_>> {
-        let (page, place, fields) = (self.page_of(u.0)?, self.place(u.0), self.info.fields.len());
+        let ((page, place), fields) = (self.pages.find(u.0)?, self.info.fields.len());
         Some(HalfEdgeUpdate {
             children: page.children.row(place),
             level_residuals: &page.level_residuals[place * fields..][..fields],
@@ -519,7 +329,7 @@ impl HalfEdgeMt {
     pub fn children_of(&self, v: VertexId) -> &[ForestChild] {
         match self.inserted_by(v) {
             None => self.base_children.row(v.0 as usize),
-            Some(u) => self.page_of(u.0).map_or(&[], |page| page.children.row(self.place(u.0))),
+            Some(u) => self.pages.find(u.0).map_or(&[], |(page, place)| page.children.row(place)),
         }
     }
 
@@ -539,5 +349,43 @@ impl HalfEdgeMt {
     #[inline]
     pub fn inserted_by(&self, v: VertexId) -> Option<UpdateId> {
         v.0.checked_sub(self.base.positions.len() as u32).map(UpdateId)
+    }
+}
+
+impl MultiTessellation for HalfEdgeMt {
+    fn info(&self) -> &MtInfo {
+        &self.info
+    }
+
+    fn base(&self) -> &BaseMesh {
+        &self.base
+    }
+
+    fn updates(&self) -> u32 {
+        self.pages.updates()
+    }
+
+    /// Each fills at least one gap.
+    fn always_grows(&self) -> bool {
+        true
+    }
+
+    #[inline]
+    fn error(&self, u: UpdateId) -> ErrorCode {
+        self.pages.error(u)
+    }
+
+    #[inline]
+    fn errors(&self, u: UpdateId) -> &[ErrorCode] {
+        self.pages.errors(u)
+    }
+
+    fn to_come(&self) -> ErrorCode {
+        self.pages.to_come()
+    }
+
+    fn bytes(&self) -> u64 {
+        let marks = size_of_val(&self.base_marks[..]) + self.base_children.bytes();
+        self.base.bytes() + (marks + self.near.bytes()) as u64 + self.pages.all_bytes()
     }
 }

@@ -34,6 +34,11 @@ pub enum BaseMeshError {
 }
 
 impl BaseMesh {
+    pub(in crate::mt) fn bytes(&self) -> u64 {
+        (size_of_val(&self.positions[..]) + size_of_val(&self.values[..]) + size_of_val(&self.tets[..]))
+            as u64
+    }
+
     /// Checks everything that refinement relies on: sizes, lattices, orientation. Adjacency is checked where it is
     /// built, by [`CurrentMesh::new`](crate::mt::CurrentMesh::new).
     ///

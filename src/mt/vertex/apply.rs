@@ -17,8 +17,8 @@ use crate::mt::mesh::stars::{BARE, GATHERED, Gather, LINK_CAPACITY, Star};
 use crate::mt::mesh::{FIRST_ANONYMOUS_TAG, KindState};
 use crate::mt::ranks::rank;
 use crate::mt::{
-    Applied, ApplyUpdates, BaseMesh, BaseMeshError, CurrentMesh, ErrorCode, LookAtTet, MtInfo,
-    MultiTessellation, PagedArray, UpdateError, UpdateId, UpdatePages, VertexId,
+    Applied, ApplyUpdates, BaseMeshError, CurrentMesh, ErrorCode, LookAtTet, MultiTessellation, PagedArray,
+    UpdateError, UpdateId, UpdatePages, VertexId,
 };
 use std::ops::Range;
 
@@ -947,51 +947,11 @@ pub(in crate::mt) fn choices(vertices: u32, boundary: bool, of_link: bool) -> Op
     (choices > 0).then_some(choices)
 }
 
-impl MultiTessellation for VertexMt {
-    fn info(&self) -> &MtInfo {
-        self.info()
-    }
-
-    fn base(&self) -> &BaseMesh {
-        self.base()
-    }
-
-    fn updates(&self) -> u32 {
-        self.updates()
-    }
-
-    fn bytes(&self) -> u64 {
-        self.bytes()
-    }
-
-    fn always_grows(&self) -> bool {
-        self.always_grows
-    }
-
-    #[inline]
-    fn error(&self, u: UpdateId) -> ErrorCode {
-        self.error_of(u)
-    }
-
-    #[inline]
-    fn errors(&self, u: UpdateId) -> &[ErrorCode] {
-        self.errors_of(u)
-    }
-
-    fn has_tet_errors(&self) -> bool {
-        self.base_quarterings.is_some()
-    }
-
-    fn own_fall(&self, u: UpdateId) -> u8 {
-        self.own_falls.get(u.0 as usize).copied().unwrap_or(0)
-    }
-
-    fn to_come(&self) -> ErrorCode {
-        self.to_come()
-    }
-}
-
 impl UpdatePages for VertexMt {
+    fn set_to_come(&mut self, bound: ErrorCode) {
+        self.to_come = if self.updates() == self.info().updates { ErrorCode::MAX } else { bound };
+    }
+
     fn page_inserted(&self, mesh: &mut CurrentMesh, updates: Range<u32>) {
         let updates = updates.start..updates.end.min(self.updates());
         if updates.is_empty() {

@@ -7,8 +7,8 @@ use super::sphere_order::{ApexCode, Spheres};
 use super::store::{COUNT_BITS, MAX_AROUND, MAX_INSERTED, MAX_REMOVED};
 use crate::mesh::{FACES, NONE};
 use crate::mt::{
-    ConvertError, ExplicitMt, MtInfo, MtKind, NodeBits, ReplayError, UpdateError, UpdateId, VertexId,
-    VertexMt,
+    ConvertError, ExplicitMt, MtInfo, MtKind, MultiTessellation, NodeBits, ReplayError, UpdateError,
+    UpdateId, VertexId, VertexMt,
 };
 use std::collections::{HashMap, HashSet};
 
@@ -22,13 +22,14 @@ impl VertexMt {
         let children: Vec<Vec<u32>> = (0..updates).map(|u| mt.children(UpdateId(u))).collect();
         let most_children = children.iter().map(Vec::len).max().unwrap_or(0) as u32;
         let info = MtInfo { kind: MtKind::Vertex, updates, ..mt.info().clone() };
-        let base_removers: Vec<u32> = mt.base().map(|t| mt.remover(t).map_or(NONE, |u| u.0)).collect();
-        let base = mt.base_mesh().clone();
+        let base_removers: Vec<u32> =
+            mt.base_tets().map(|t| mt.removed_by(t).map_or(NONE, |u| u.0)).collect();
+        let base = mt.base().clone();
         let mut compact =
             Self::new(info, base, base_removers, most_children.min(MAX_INSERTED as u32), mt.always_grows)
                 .map_err(damaged)?;
         if let Some(quarterings) = mt.quarterings() {
-            let base = quarterings[..mt.base().len()].to_vec();
+            let base = quarterings[..mt.base_tets().len()].to_vec();
             compact = compact.with_tet_errors(base).map_err(damaged)?;
         }
         let mut boundary: HashSet<[u32; 3]> = boundary_faces(mt);
@@ -36,7 +37,7 @@ impl VertexMt {
         for u in (0..updates).map(UpdateId) {
             let node = writer.node(&compact, u, &mut boundary)?;
             compact.push(&node, mt.errors(u)).map_err(damaged)?;
-            compact.set_own_fall(u, mt.own_fall_of(u));
+            compact.set_own_fall(u, mt.own_fall(u));
         }
         Ok(compact)
     }
@@ -49,7 +50,7 @@ fn damaged(error: UpdateError) -> ConvertError {
 /// The faces of the base mesh that only one tetrahedron has.
 fn boundary_faces(mt: &ExplicitMt) -> HashSet<[u32; 3]> {
     let mut faces = HashSet::new();
-    for t in mt.base() {
+    for t in mt.base_tets() {
         for face in FACES.map(|face| sorted(face.map(|k| mt.tets()[t as usize][k]))) {
             if !faces.remove(&face) {
                 faces.insert(face);
@@ -199,7 +200,7 @@ impl Writer<'_> {
         let children = &self.children[u.0 as usize];
         let own = compact.quartering_bits(children.len() as u32);
         for (_, t) in &canonical.walls {
-            let remover = self.mt.remover(*t);
+            let remover = self.mt.removed_by(*t);
             let child = remover.map_or(0, |c| 1 + children.partition_point(|&x| x < c.0));
             bits.push(child as u64, width_of(children.len() as u32));
             bits.push(u64::from(self.mt.quarterings_of(*t)), own);

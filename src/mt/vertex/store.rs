@@ -31,7 +31,7 @@ use super::streaming::Growing;
 use super::tet_errors::MAX_QUARTERINGS;
 use crate::mesh::NONE;
 use crate::mt::update_errors::Errors;
-use crate::mt::{BaseMesh, ErrorCode, MtInfo, UpdateError, UpdateId, VertexId};
+use crate::mt::{BaseMesh, ErrorCode, MtInfo, MultiTessellation, UpdateError, UpdateId, VertexId};
 
 /// Most tetrahedra around a vertex when it is inserted.
 pub const MAX_INSERTED: usize = 124;
@@ -85,7 +85,7 @@ pub struct VertexMt {
     /// Where each node starts in its group, in units.
     starts: Vec<u16>,
     errors: Errors,
-    to_come: ErrorCode,
+    pub(super) to_come: ErrorCode,
     /// Bits of all nodes, padding included, but for vertices and links.
     shape_bits: u64,
     /// While the nodes have neither links nor removers: what is instead of them.
@@ -244,27 +244,6 @@ impl VertexMt {
         NodeBits(bits)
     }
 
-    /// Tells that no update which is still to come has a larger error than this; until then, any may come. Means
-    /// nothing once all are here.
-    pub fn set_to_come(&mut self, bound: ErrorCode) {
-        self.to_come = if self.updates() == self.info.updates { ErrorCode::MAX } else { bound };
-    }
-
-    /// No update that is not here has a larger error.
-    pub fn to_come(&self) -> ErrorCode {
-        if self.updates() >= self.info.updates { ErrorCode::ZERO } else { self.to_come }
-    }
-
-    /// What is known of the MT as a whole.
-    pub fn info(&self) -> &MtInfo {
-        &self.info
-    }
-
-    /// The base mesh.
-    pub fn base(&self) -> &BaseMesh {
-        &self.base
-    }
-
     /// Which update removes each base tetrahedron; [`u32::MAX`] if none does.
     pub fn base_removers(&self) -> &[u32] {
         &self.base_removers
@@ -275,40 +254,10 @@ impl VertexMt {
         ((1 << self.widths.link) - 1).min(MAX_INSERTED as u32)
     }
 
-    /// Number of updates so far.
-    pub fn updates(&self) -> u32 {
-        self.starts.len() as u32
-    }
-
-    /// Bytes of everything that the MT holds, base mesh and errors included.
-    pub fn bytes(&self) -> u64 {
-        let base = size_of_val(&self.base.positions[..])
-            + size_of_val(&self.base.values[..])
-            + size_of_val(&self.base.tets[..])
-            + size_of_val(&self.base_removers[..])
-            + self.base_quarterings.as_ref().map_or(0, Vec::len)
-            + self.own_falls.len();
-        let nodes = self.nodes.bytes() + size_of_val(&self.groups[..]) + size_of_val(&self.starts[..]);
-        let growing = self.growing.as_ref().map_or(0, |growing| growing.bytes());
-        (base + nodes + growing + self.errors.bytes()) as u64
-    }
-
     /// Bits in all nodes that describe shapes: what a star is made of and removed by, T_u, and what fills up the last unit. The paper's tree of T_u
     /// and seed take 69 bits a node [§5].
     pub fn shape_bits(&self) -> u64 {
         self.shape_bits
-    }
-
-    /// The error of update `u`: the largest one of all fields.
-    #[inline]
-    pub fn error_of(&self, u: UpdateId) -> ErrorCode {
-        self.errors.largest(u.0 as usize)
-    }
-
-    /// The error of update `u` in each field.
-    #[inline]
-    pub fn errors_of(&self, u: UpdateId) -> &[ErrorCode] {
-        self.errors.of(u.0 as usize)
     }
 
     /// The vertex that update `u` inserts.
@@ -415,5 +364,54 @@ impl VertexMt {
     pub(in crate::mt) fn links_end(&self, start: u64, children: u32) -> u64 {
         let Widths { node, link, vertex, .. } = self.widths;
         start + u64::from(vertex + link) + u64::from(children + 1) * u64::from(node + link)
+    }
+}
+
+impl MultiTessellation for VertexMt {
+    fn info(&self) -> &MtInfo {
+        &self.info
+    }
+
+    fn base(&self) -> &BaseMesh {
+        &self.base
+    }
+
+    fn updates(&self) -> u32 {
+        self.starts.len() as u32
+    }
+
+    fn always_grows(&self) -> bool {
+        self.always_grows
+    }
+
+    #[inline]
+    fn error(&self, u: UpdateId) -> ErrorCode {
+        self.errors.largest(u.0 as usize)
+    }
+
+    #[inline]
+    fn errors(&self, u: UpdateId) -> &[ErrorCode] {
+        self.errors.of(u.0 as usize)
+    }
+
+    fn has_tet_errors(&self) -> bool {
+        self.base_quarterings.is_some()
+    }
+
+    fn own_fall(&self, u: UpdateId) -> u8 {
+        self.own_falls.get(u.0 as usize).copied().unwrap_or(0)
+    }
+
+    fn to_come(&self) -> ErrorCode {
+        if self.updates() >= self.info.updates { ErrorCode::ZERO } else { self.to_come }
+    }
+
+    fn bytes(&self) -> u64 {
+        let base = size_of_val(&self.base_removers[..])
+            + self.base_quarterings.as_ref().map_or(0, Vec::len)
+            + self.own_falls.len();
+        let nodes = self.nodes.bytes() + size_of_val(&self.groups[..]) + size_of_val(&self.starts[..]);
+        let growing = self.growing.as_ref().map_or(0, |growing| growing.bytes());
+        self.base.bytes() + (base + nodes + growing + self.errors.bytes()) as u64
     }
 }

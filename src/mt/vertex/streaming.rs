@@ -10,7 +10,8 @@ use crate::mesh::NONE;
 use crate::mt::mesh::FIRST_ANONYMOUS_TAG;
 use crate::mt::mesh::stars::GATHERED;
 use crate::mt::{
-    ApplyUpdates, BaseMesh, CurrentMesh, ErrorCode, MtInfo, NodeBits, UpdateError, UpdateId, VertexMt,
+    ApplyUpdates, BaseMesh, CurrentMesh, ErrorCode, MtInfo, MultiTessellation, NodeBits, UpdateError,
+    UpdateId, VertexMt,
 };
 use std::ops::Range;
 
@@ -252,7 +253,7 @@ impl VertexMt {
         let mut node = NodeBits::default();
         for u in 0..self.updates() {
             self.write_packed(&growing, &packed, u, &mut node.0);
-            packed.push(&node, self.errors_of(UpdateId(u)))?;
+            packed.push(&node, self.errors(UpdateId(u)))?;
         }
         packed.own_falls = std::mem::take(&mut self.own_falls);
         *self = packed;

@@ -13,7 +13,7 @@ use tetralod::builder::{BuildConfig, BuildResult, Construction, Criterion, Metho
 use tetralod::mesh::{Field, TetMesh};
 use tetralod::mt::{
     ApplyUpdates, CurrentMesh, EdgeMt, ExplicitMt, ExplicitUpdate, HalfEdgeMt, Mt, MtKind, MultiTessellation,
-    UpdateId, VertexId, VertexMt, stats,
+    UpdateId, UpdatePages, VertexId, VertexMt, stats,
 };
 
 /// A kind of MT and how it is built.
@@ -163,8 +163,8 @@ impl Subject {
         for (t, tet) in (0..mesh.tet_slots() as u32).filter_map(|t| Some((t, mesh.tet(t)?))) {
             let name = sorted(tet.map(|slot| mesh.vertex(slot).0));
             let number = self.numbers[&name];
-            assert_eq!(mt.creator(mesh, t), explicit.creator(number), "creator of {name:?}");
-            assert_eq!(mt.remover(mesh, t), explicit.remover(number).filter(known), "remover of {name:?}");
+            assert_eq!(mt.creator(mesh, t), explicit.inserted_by(number), "creator of {name:?}");
+            assert_eq!(mt.remover(mesh, t), explicit.removed_by(number).filter(known), "remover of {name:?}");
             volume += volume6(tet.map(|slot| mesh.positions()[slot as usize]));
             found.push(number);
         }
@@ -285,7 +285,7 @@ pub fn grow(part: &mut Mt, whole: &Mt) {
     let u = UpdateId(part.updates());
     let pushed = match (part, whole) {
         (Mt::Edge(part), Mt::Edge(whole)) => part.push(&whole.split(u)),
-        (Mt::Vertex(part), Mt::Vertex(whole)) => part.push(&whole.node(u), whole.errors_of(u)),
+        (Mt::Vertex(part), Mt::Vertex(whole)) => part.push(&whole.node(u), whole.errors(u)),
         (Mt::HalfEdge(part), Mt::HalfEdge(whole)) => part.push(&whole.update(u).expect("an update")),
         (Mt::Explicit(part), Mt::Explicit(whole)) => {
             let created = whole.created(u).map(VertexId);
