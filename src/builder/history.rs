@@ -8,8 +8,8 @@ use super::work_mesh::WorkMesh;
 use super::{BuildError, BuildProgress, OnProgress};
 use crate::mesh::NONE;
 use crate::mt::{
-    Applied, ApplyUpdates, CurrentMesh, EdgeMt, ErrorCode, Margins, MtInfo, MultiTessellation, UpdateError,
-    UpdateId, UpdatePages, VertexId, VertexSplit,
+    ApplyUpdates, CurrentMesh, EdgeMt, EdgeMtBuilder, ErrorCode, Margins, MtInfo, MultiTessellation,
+    UpdateError, UpdateId, VertexId, VertexSplit,
 };
 use std::cmp::Reverse;
 
@@ -111,7 +111,7 @@ impl Found {
 
     /// Takes note of an update that is about to be applied.
     fn note(&mut self, mt: &EdgeMt, mesh: &mut CurrentMesh, u: UpdateId) -> Result<(), UpdateError> {
-        let vertex = mt.split(u).vertex;
+        let vertex = mt.update(u).vertex;
         let mut star = Vec::new();
         mt.find_removed(mesh, u, &mut star)?;
         let (mut parents, mut beyond) = (Vec::new(), Vec::new());
@@ -208,9 +208,9 @@ impl Replay<'_> {
         let tets: Vec<[u32; 4]> = live.map(|t| self.base.tets[t as usize]).collect();
         let Numbered { mesh: base_mesh, mut number, .. } =
             number_base(&data.positions, &data.levels, fields, &tets);
-        let mut mesh = CurrentMesh::new(&info, &base_mesh)
+        let mut next = base_mesh.positions.len() as u32;
+        let mut builder = EdgeMtBuilder::new(info, base_mesh)
             .map_err(|_| BuildError::Internal(UpdateError::Vertex { update: 0, vertex: 0 }))?;
-        let mut mt = EdgeMt::new(info, base_mesh);
         // The builder's number of each vertex of the MT.
         let mut built: Vec<u32> = vec![0; number.len()];
         number
@@ -218,7 +218,6 @@ impl Replay<'_> {
             .enumerate()
             .filter(|(_, v)| **v != NONE)
             .for_each(|(i, &v)| built[v as usize] = i as u32);
-        let mut next = mt.base().positions.len() as u32;
         let mut field_offsets = vec![0; fields];
         for (done, &i) in order.iter().enumerate() {
             if done % 4096 == 0 {
@@ -244,31 +243,24 @@ impl Replay<'_> {
             for (f, offset) in field_offsets.iter_mut().enumerate() {
                 *offset = data.levels[a as usize * fields + f] - data.levels[b as usize * fields + f];
             }
-            let mask = mesh
+            let mask = builder
+                .mesh()
                 .reorder_mask(VertexId(vertex), sides, is_turned, |v| built[v.0 as usize])
                 .ok_or(BuildError::Internal(UpdateError::Mask { update: done as u32 }))?;
             let split = VertexSplit {
                 vertex: VertexId(vertex),
                 offset: self.difference([a, b]),
-                edge: 0,
                 field_offsets: &field_offsets,
                 mask,
                 errors: &self.errors[i as usize * fields..][..fields],
             };
-            let update = mt.push(&split).map_err(BuildError::Internal)?;
-            mt.updates_arrived(&mut mesh, update.0);
-            if let Some(found) = &mut found {
-                found.note(&mt, &mut mesh, update).map_err(BuildError::Internal)?;
-            }
-            match mt.refine(&mut mesh, update).map_err(BuildError::Internal)? {
-                // Nobody asks what was touched.
-                Applied::Done => mesh.clear_touched(),
-                Applied::Blocked(_) => {
-                    return Err(BuildError::Internal(UpdateError::Error { update: update.0 }));
-                }
-            }
+            let pushed = builder.push_seen(&split, |mt, mesh, u| match &mut found {
+                Some(found) => found.note(mt, mesh, u),
+                None => Ok(()),
+            });
+            pushed.map_err(BuildError::Internal)?;
         }
         number.truncate(points);
-        Ok((mt, number.into_iter().map(VertexId).collect()))
+        Ok((builder.finish(), number.into_iter().map(VertexId).collect()))
     }
 }

@@ -3,8 +3,7 @@
 use super::payload::index::BlockInfo;
 use super::{EncodeError, EncodeOptions};
 use crate::mt::{
-    Applied, ApplyUpdates, CurrentMesh, EdgeMt, Excess, HalfEdgeMt, Margins, Mt, MultiTessellation,
-    UpdateError, UpdateId, UpdatePages,
+    Applied, ApplyUpdates, CurrentMesh, Excess, Margins, Mt, UpdateError, UpdateId, UpdatePages,
 };
 use std::collections::BTreeSet;
 
@@ -12,52 +11,27 @@ use std::collections::BTreeSet;
 pub struct BlockScan {
     /// The blocks of `2^block_bits` updates; their lengths are not known yet.
     pub blocks: Vec<BlockInfo>,
-    /// The MT in the form that files have, if it was not in that form.
-    pub coded: Option<Mt>,
+    /// The MT with blocks for pages, if its pages were others.
+    pub in_blocks: Option<Mt>,
     /// For each vertex of the reference mesh, ascending, its number and its levels.
     pub reference: Vec<(u32, Vec<i32>)>,
 }
 
 impl BlockScan {
     pub fn of(mt: &Mt, options: &EncodeOptions) -> Result<Self, EncodeError> {
-        match mt {
-            Mt::Edge(mt) => scan_edge(mt, options),
-            Mt::Vertex(mt) => run(mt, options, &mut |_, _| Ok(())),
-            Mt::HalfEdge(mt) => scan_half_edge(mt, options),
-            Mt::Explicit(mt) => run(mt, options, &mut |_, _| Ok(())),
+        let bits = options.block_bits;
+        let is_other = mt.is_paged() && mt.page_bits() != bits;
+        let in_blocks = is_other.then(|| mt.in_pages(bits)).transpose().map_err(EncodeError::Update)?;
+        let mut scan = run(mt, options)?;
+        if !mt.needs_parents() {
+            // Each block can be used without the others.
+            scan.blocks.iter_mut().for_each(|block| block.parents.clear());
         }
+        Ok(Self { in_blocks, ..scan })
     }
 }
 
-fn scan_edge(mt: &EdgeMt, options: &EncodeOptions) -> Result<BlockScan, EncodeError> {
-    if mt.is_coded() {
-        return run(mt, options, &mut |_, _| Ok(()));
-    }
-    let mut coded = EdgeMt::coded(mt.info().clone(), mt.base().clone(), options.block_bits);
-    let mut residuals = Vec::new();
-    let scan =
-        run(mt, options, &mut |mesh, u| coded.push(&mt.to_residuals(mesh, u, &mut residuals)?).map(drop))?;
-    Ok(BlockScan { coded: Some(coded.into()), ..scan })
-}
-
-/// Blocks are pages, and do not tell on which others they depend: each can be used without.
-fn scan_half_edge(mt: &HalfEdgeMt, options: &EncodeOptions) -> Result<BlockScan, EncodeError> {
-    let bits = options.block_bits;
-    let coded = (mt.page_bits() != bits).then(|| mt.in_pages(bits));
-    let coded = coded.transpose().map_err(EncodeError::Update)?.map(Mt::from);
-    let mut scan = run(mt, options, &mut |_, _| Ok(()))?;
-    scan.blocks.iter_mut().for_each(|block| block.parents.clear());
-    Ok(BlockScan { coded, ..scan })
-}
-
-/// Called before each update with the mesh that has all of its parents.
-type Before<'a> = &'a mut dyn FnMut(&mut CurrentMesh, UpdateId) -> Result<(), UpdateError>;
-
-fn run(
-    mt: &impl ApplyUpdates,
-    options: &EncodeOptions,
-    before: Before<'_>,
-) -> Result<BlockScan, EncodeError> {
+fn run(mt: &impl ApplyUpdates, options: &EncodeOptions) -> Result<BlockScan, EncodeError> {
     let mut mesh = mt.start().map_err(EncodeError::Base)?;
     mt.updates_arrived(&mut mesh, 0);
     let mut margins = Margins::new(mt.info());
@@ -65,7 +39,7 @@ fn run(
     let mut first = 0;
     while first < mt.updates() {
         let end = mt.updates().min(first + (1 << options.block_bits));
-        blocks.push(scan_block(mt, &mut mesh, first..end, options, &mut margins, before)?);
+        blocks.push(scan_block(mt, &mut mesh, first..end, options, &mut margins)?);
         first = end;
     }
     mesh.compact();
@@ -73,7 +47,7 @@ fn run(
     let mut reference: Vec<(u32, Vec<i32>)> =
         slots.map(|slot| (mesh.vertex(slot).0, mesh.levels(slot).to_vec())).collect();
     reference.sort_unstable();
-    Ok(BlockScan { blocks, coded: None, reference })
+    Ok(BlockScan { blocks, in_blocks: None, reference })
 }
 
 fn scan_block(
@@ -82,7 +56,6 @@ fn scan_block(
     updates: std::ops::Range<u32>,
     options: &EncodeOptions,
     margins: &mut Margins,
-    before: Before<'_>,
 ) -> Result<BlockInfo, EncodeError> {
     let fields = mt.info().fields.len();
     let mut block = BlockInfo {
@@ -95,7 +68,6 @@ fn scan_block(
     let mut parents = BTreeSet::new();
     let mut tets = Vec::new();
     for u in updates.map(UpdateId) {
-        before(mesh, u).map_err(EncodeError::Update)?;
         for (f, error) in block.errors.iter_mut().enumerate() {
             *error = (*error).max(mt.error_of_field(u, f));
         }

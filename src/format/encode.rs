@@ -128,8 +128,8 @@ pub fn encode(mt: &Mt, options: &EncodeOptions) -> Result<Vec<u8>, EncodeError> 
 /// As [`encode`], and when `writer` fails.
 pub fn encode_to(mt: &Mt, options: &EncodeOptions, writer: &mut dyn io::Write) -> Result<u64, EncodeError> {
     check(mt, options)?;
-    let BlockScan { blocks, coded, reference } = BlockScan::of(mt, options)?;
-    let mt = coded.as_ref().unwrap_or(mt);
+    let BlockScan { blocks, in_blocks, reference } = BlockScan::of(mt, options)?;
+    let mt = in_blocks.as_ref().unwrap_or(mt);
     let mut index = Index { block_bits: options.block_bits, shared: 0, blocks };
     index.round(mt.info());
     let exact = corrections(mt, &options.exact, &reference)?;

@@ -1,8 +1,8 @@
 //! From one kind of MT to another that can hold the same updates.
 
 use super::{
-    EdgeMt, ExplicitMt, HalfEdgeMt, MAX_STAR, Mt, MtKind, MultiTessellation, ReplayError, UpdateError,
-    UpdateId, VertexId, VertexMt, VertexSplit,
+    EdgeMt, EdgeMtBuilder, ExplicitMt, HalfEdgeMt, MAX_STAR, Mt, MtKind, MultiTessellation, ReplayError,
+    UpdateError, UpdateId, VertexId, VertexMt, VertexSplit,
 };
 use crate::mt::replay::canonical;
 use std::fmt;
@@ -79,14 +79,16 @@ impl EdgeMt {
     /// # Errors
     /// The first update that is not.
     pub fn from_explicit(explicit: &ExplicitMt) -> Result<Self, ConvertError> {
-        let mut mt = Self::new(explicit.info().clone(), explicit.base().clone());
+        let (info, base) = (explicit.info().clone(), explicit.base().clone());
+        let mut builder = EdgeMtBuilder::new(info, base).map_err(ReplayError::from)?;
         for u in (0..explicit.updates()).map(UpdateId) {
             let refused = |why| ConvertError::Update { update: u.0, why };
-            let split = as_split(explicit, &mt, u).map_err(refused)?;
-            mt.push(&split.borrowed()).map_err(|_| refused("its vertex, offset or error is not allowed"))?;
+            let split = as_split(explicit, builder.mt(), u).map_err(refused)?;
+            builder.push(&split.borrowed()).map_err(|error| refused(why_refused(&error)))?;
         }
         // Masks tell which tetrahedra a split makes only together with the mesh.
-        let made = ExplicitMt::of(&mt).map_err(not_a_split)?;
+        let mt = builder.finish();
+        let made = ExplicitMt::of(&mt)?;
         let differs = |u: &UpdateId| !same(&made, explicit, *u);
         match (0..explicit.updates()).map(UpdateId).find(differs) {
             Some(u) => Err(ConvertError::Update { update: u.0, why: NOT_A_SPLIT }),
@@ -98,22 +100,11 @@ impl EdgeMt {
 const NOT_A_SPLIT: &str = "it is not the split of a vertex in two";
 
 /// Splits that cannot be applied are not those of the explicit MT.
-fn not_a_split(error: ReplayError) -> ConvertError {
-    use UpdateError as E;
-    let ReplayError::Update(fault) = &error else { return error.into() };
-    let update = match *fault {
-        E::Vertex { update, .. }
-        | E::OffLattice { update }
-        | E::Cavity { update }
-        | E::Mask { update }
-        | E::Edge { update }
-        | E::Inverted { update }
-        | E::Star { update }
-        | E::Missing { update }
-        | E::UnknownToMesh { update }
-        | E::Error { update } => update,
-    };
-    ConvertError::Update { update, why: NOT_A_SPLIT }
+fn why_refused(error: &UpdateError) -> &'static str {
+    match error {
+        UpdateError::Vertex { .. } | UpdateError::OffLattice { .. } => "its vertex or offset is not allowed",
+        _ => NOT_A_SPLIT,
+    }
 }
 
 /// Whether update `u` is the same in both, by the tetrahedra that it removes and inserts.
@@ -137,7 +128,7 @@ struct Split {
 impl Split {
     fn borrowed(&self) -> VertexSplit<'_> {
         let Self { vertex, offset, ref field_offsets, mask, ref errors } = *self;
-        VertexSplit { vertex, offset, edge: 0, field_offsets, mask, errors }
+        VertexSplit { vertex, offset, field_offsets, mask, errors }
     }
 }
 

@@ -23,7 +23,8 @@ mod vertex;
 
 pub use any::Mt;
 pub use convert::ConvertError;
-pub use edge::store::{EdgeMt, MAX_EDGE, MAX_LINK, MAX_STAR, VertexSplit};
+pub use edge::builder::EdgeMtBuilder;
+pub use edge::store::{EdgeMt, EdgeUpdate, MAX_EDGE, MAX_LINK, MAX_STAR, VertexSplit};
 pub use error::{ErrorCode, PageError, UpdateError};
 pub use exact::{Exact, ExactValues};
 pub use explicit::check::MtFault;

@@ -31,7 +31,7 @@ fn with_base(mt: &EdgeMt, change: impl FnOnce(&mut MtInfo, &mut BaseMesh)) -> Ed
     change(&mut info, &mut base);
     let mut other = EdgeMt::new(info, base);
     for u in 0..mt.updates() {
-        other.push(&mt.split(UpdateId(u))).expect("the same updates");
+        other.push(&mt.update(UpdateId(u))).expect("the same updates");
     }
     other
 }
@@ -43,11 +43,12 @@ fn errors_that_are_too_small_are_found() {
     let report = verified(&mt, &mesh);
     assert!(report.valid, "{:#?}", report.failures);
     // Codes are logarithms: 2048 less is half the error.
-    let halved = tampered(&mt, |_, parts| parts.error = parts.error.saturating_sub(2048).max(1));
+    let halved =
+        tampered(&mt, |_, update| update.errors[0].0 = update.errors[0].0.saturating_sub(2048).max(1));
     let report = verified(&halved, &mesh);
     assert!(report.worst_error_ratio > 1.5, "{}", report.worst_error_ratio);
     fails(&halved, &mesh, "reference vertex");
-    let equal = tampered(&mt, |_, parts| parts.error = 1);
+    let equal = tampered(&mt, |_, update| update.errors[0].0 = 1);
     fails(&equal, &mesh, "more than");
 }
 
@@ -56,7 +57,8 @@ fn errors_that_are_too_small_are_found() {
 fn errors_that_are_too_small_are_found_by_needs_of_any_kind() {
     let mesh = cube(9, &[hilly]);
     let mt = built(&mesh).mt;
-    let lowered = tampered(&mt, |_, parts| parts.error = parts.error.saturating_sub(4 * 2048).max(1));
+    let lowered =
+        tampered(&mt, |_, update| update.errors[0].0 = update.errors[0].0.saturating_sub(4 * 2048).max(1));
     let centre = [0.3, 0.4, 0.6];
     let ball = Region::Sphere { centre, radius: 0.3 };
     let halves = [[0.3, 0.3, 0.0], [-0.2, 0.2, 0.0], [0.0, 0.0, 0.3]];
@@ -105,11 +107,11 @@ fn errors_that_are_too_small_are_found_by_needs_of_any_kind() {
 fn a_single_error_that_is_too_small_is_found() {
     let mesh = cube(6, &[hilly]);
     let mt = built(&mesh).mt;
-    let first = mt.split(UpdateId(0)).errors[0].0;
+    let first = mt.update(UpdateId(0)).errors[0].0;
     // The last update of a third, lowered to the smallest error of all: it must go to the end to keep the order.
-    let lowered = tampered(&mt, |u, parts| {
+    let lowered = tampered(&mt, |u, update| {
         if u > mt.updates() / 3 {
-            parts.error = parts.error.min(first).saturating_sub(4096).max(1);
+            update.errors[0].0 = update.errors[0].0.min(first).saturating_sub(4096).max(1);
         }
     });
     assert!(!verified(&lowered, &mesh).valid);
@@ -120,7 +122,7 @@ fn zero_errors_hide_the_reference_mesh() {
     let mesh = cube(4, &[linear]);
     let mt = built(&mesh).mt;
     let half = mt.updates() / 2;
-    let hidden = tampered(&mt, |u, parts| parts.error *= u16::from(u < half));
+    let hidden = tampered(&mt, |u, update| update.errors[0].0 *= u16::from(u < half));
     fails(&hidden, &mesh, "full refinement");
 }
 
@@ -142,10 +144,10 @@ fn wrong_positions_and_levels_are_found() {
     let value = with_base(&mt, |_, base| *base.values.iter_mut().min().expect("a vertex") += 1);
     fails(&value, &mesh, "not those of the input");
     let last = mt.updates() - 1;
-    let level = tampered(&mt, |u, parts| parts.field_offsets[0] ^= i32::from(u == last));
+    let level = tampered(&mt, |u, update| update.level_residuals[0] ^= i32::from(u == last));
     fails(&level, &mesh, "not those of the input");
     // A vertex in the middle, moved by a lattice step.
-    let place = tampered(&mt, |u, parts| parts.offset[0] += 2 * i32::from(u == last));
+    let place = tampered(&mt, |u, update| update.offset_residual[0] += 2 * i32::from(u == last));
     assert!(!verified(&place, &mesh).valid);
 }
 
@@ -155,7 +157,7 @@ fn wrong_masks_are_found() {
     let mt = built(&mesh).mt;
     for u in (0..mt.updates()).step_by(7) {
         for bit in [0, 1, 5] {
-            let flipped = tampered(&mt, |k, parts| parts.mask ^= u64::from(k == u) << bit);
+            let flipped = tampered(&mt, |k, update| update.wrong_sides ^= u64::from(k == u) << bit);
             assert!(!verified(&flipped, &mesh).valid, "bit {bit} of update {u}");
         }
     }

@@ -6,8 +6,8 @@ use std::fmt::Write;
 use tetralod::format::{EncodeOptions, FormatError, encode};
 use tetralod::geom::Lattice;
 use tetralod::mt::{
-    BaseMesh, EdgeMt, ErrorCode, ExplicitMt, ExplicitUpdate, Mt, MtInfo, MtKind, MultiTessellation, VertexId,
-    VertexSplit,
+    BaseMesh, EdgeMtBuilder, ErrorCode, ExplicitMt, ExplicitUpdate, Mt, MtInfo, MtKind, MultiTessellation,
+    VertexId, VertexSplit,
 };
 
 /// Two tetrahedra on one face, with one field of 8 bits; there are going to be `updates` updates.
@@ -33,20 +33,14 @@ fn start(kind: MtKind, [vertices, tetrahedra, updates]: [u32; 3]) -> (MtInfo, Ba
 /// Splits of a vertex on the edge that both tetrahedra have, and of one of its halves.
 fn edge_example() -> Mt {
     let (info, base) = start(MtKind::Edge, [7, 4, 2]);
-    let mut mt = EdgeMt::new(info, base);
     let splits = [(0, [0, -3, -1], -3, 0b10, 300), (5, [0, 1, 0], 2, 0b01, 299)];
+    let mut builder = EdgeMtBuilder::new(info, base).expect("a valid base mesh");
     for (vertex, offset, level, mask, error) in splits {
-        let split = VertexSplit {
-            vertex: VertexId(vertex),
-            offset,
-            edge: 0,
-            field_offsets: &[level],
-            mask,
-            errors: &[ErrorCode(error)],
-        };
-        mt.push(&split).expect("the example is an MT");
+        let (vertex, errors) = (VertexId(vertex), &[ErrorCode(error)]);
+        let split = VertexSplit { vertex, offset, field_offsets: &[level], mask, errors };
+        builder.push(&split).expect("the example is an MT");
     }
-    mt.into()
+    builder.finish().into()
 }
 
 /// The only update puts a vertex into the first tetrahedron.

@@ -3,7 +3,7 @@
 
 use crate::reader::growth::Growth;
 use crate::reader::{self, File, plain};
-use crate::support::builder::{Plan, build};
+use crate::support::builder::{Plan, build, mt_of_splits};
 use crate::support::domains::{Domain, PlainMesh};
 use crate::support::files::encoded;
 use crate::support::random::Random;
@@ -15,8 +15,8 @@ use tetralod::generate;
 use tetralod::geom::Lattice;
 use tetralod::mesh::{Field, TetMesh, VectorPart};
 use tetralod::mt::{
-    Applied, ApplyUpdates, BaseMesh, CurrentMesh, EdgeMt, ErrorCode, FieldInfo, Mt, MtInfo, MtKind,
-    MultiTessellation, UpdateId, UpdatePages, VertexId, VertexSplit,
+    Applied, ApplyUpdates, BaseMesh, CurrentMesh, EdgeMt, EdgeUpdate, ErrorCode, FieldInfo, Mt, MtInfo,
+    MtKind, MultiTessellation, UpdateId, UpdatePages, VertexId, VertexSplit,
 };
 
 fn options(block_bits: u32) -> EncodeOptions {
@@ -130,9 +130,12 @@ fn compare_base(file: &File, mt: &EdgeMt) -> CurrentMesh {
 
 /// Compares what the file tells of an update.
 fn compare_split(file: &File, mt: &EdgeMt, k: u32) {
-    let (ours, theirs) = (&file.splits[&k], mt.split(UpdateId(k)));
-    assert_eq!((ours.vertex, ours.offset, ours.mask), (theirs.vertex.0, theirs.offset, theirs.mask));
-    assert_eq!(ours.residuals, theirs.field_offsets);
+    let (ours, theirs) = (&file.splits[&k], mt.update(UpdateId(k)));
+    assert_eq!(
+        (ours.vertex, ours.offset, ours.mask),
+        (theirs.vertex.0, theirs.offset_residual, theirs.wrong_sides)
+    );
+    assert_eq!(ours.residuals, theirs.level_residuals);
     assert!(ours.errors.iter().eq(theirs.errors.iter().map(|error| &error.0)));
 }
 
@@ -297,7 +300,7 @@ fn told_more(mt: &EdgeMt) -> EdgeMt {
     for k in (0..mt.updates()).map(UpdateId) {
         let errors: Vec<ErrorCode> =
             mt.errors(k).iter().map(|error| ErrorCode(error.0.saturating_add(77))).collect();
-        told.push(&VertexSplit { errors: &errors, ..mt.split(k) }).expect("an update of the MT");
+        told.push(&EdgeUpdate { errors: &errors, ..mt.update(k) }).expect("an update of the MT");
     }
     told
 }
@@ -434,16 +437,14 @@ fn the_example_is_written_and_read_as_specified() {
         values: vec![10, 20, 30, 200, 40],
         tets: vec![[0, 1, 2, 3], [0, 2, 1, 4]],
     };
-    let mut mt = EdgeMt::new(info, base);
     let split = VertexSplit {
         vertex: VertexId(0),
         offset: [0, 0, 2],
-        edge: 0,
         field_offsets: &[-3],
         mask: 0b10,
         errors: &[ErrorCode(300)],
     };
-    mt.push(&split).expect("the example is an MT");
+    let mt = mt_of_splits(&info, &base, [split]);
     let metadata = [("tool".to_owned(), "hand".to_owned())].into();
     let bytes =
         encoded(&mt, &EncodeOptions { block_bits: 4, metadata, ..EncodeOptions::default() }).expect("an MT");

@@ -12,8 +12,8 @@ use tetralod::format::{BLOCK_BITS, Decoder, EncodeError, EncodeOptions, encode_t
 use tetralod::generate;
 use tetralod::geom::WIDE_BITS;
 use tetralod::mt::{
-    ApplyUpdates, EdgeMt, ExplicitMt, Mt, MtInfo, MtKind, MultiTessellation, UpdateError, UpdateId,
-    UpdatePages, VertexSplit,
+    ApplyUpdates, EdgeMt, EdgeUpdate, ExplicitMt, Mt, MtInfo, MtKind, MultiTessellation, UpdateError,
+    UpdateId, UpdatePages,
 };
 
 /// The file of an MT gives an MT of the same updates, and that the same file.
@@ -119,8 +119,8 @@ fn what_could_not_be_read_back_is_not_written() {
     // Updates that no mesh takes: all goes to one side, and more than there is.
     let mut damaged = EdgeMt::new(whole.info().clone(), whole.base().clone());
     for u in (0..whole.updates()).map(UpdateId) {
-        let split = whole.split(u);
-        damaged.push(&VertexSplit { mask: u64::MAX, ..split }).expect("only a mesh can tell");
+        let update = EdgeUpdate { wrong_sides: u64::MAX, ..whole.update(u) };
+        damaged.push(&update).expect("only a mesh can tell");
     }
     let refused = encoded(&damaged, &plain);
     assert!(matches!(refused, Err(EncodeError::Update(_))), "{refused:?}");
@@ -135,7 +135,7 @@ fn offsets_come_back_on_lattices_of_all_widths() {
         let mt = built.mt;
         comes_back(&mt, 5);
         let Mt::Edge(coded) = coded(&mt) else { panic!("edge-based") };
-        let edges = (0..coded.updates()).filter(|&u| coded.split(UpdateId(u)).edge != 0).count();
+        let edges = (0..coded.updates()).filter(|&u| coded.update(UpdateId(u)).edge != 0).count();
         assert!(0 < edges && edges < coded.updates() as usize, "{edges} offsets are told by edges");
     }
 }
@@ -143,19 +143,17 @@ fn offsets_come_back_on_lattices_of_all_widths() {
 #[test]
 fn offsets_are_not_counted_from_edges_that_are_not_there() {
     let Mt::Edge(mt) = sample(1, 40) else { panic!("edge-based") };
-    let copy = |mut to: EdgeMt, count: u32, edge: u8| {
+    let copy = |count: u32, edge: u8| {
+        let mut to = EdgeMt::new(mt.info().clone(), mt.base().clone());
         for u in (0..count - 1).map(UpdateId) {
-            to.push(&mt.split(u)).expect("an update of the MT");
+            to.push(&mt.update(u)).expect("an update of the MT");
         }
-        let last = mt.split(UpdateId(count - 1));
-        to.push(&VertexSplit { edge, ..last }).map(|_| to)
+        let last = mt.update(UpdateId(count - 1));
+        to.push(&EdgeUpdate { edge, ..last }).map(|_| to)
     };
-    let empty = || EdgeMt::new(mt.info().clone(), mt.base().clone());
-    let told = || EdgeMt::coded(mt.info().clone(), mt.base().clone(), 5);
-    assert_eq!(copy(empty(), 3, 1), Err(UpdateError::Edge { update: 2 }));
-    assert_eq!(copy(told(), 3, 128), Err(UpdateError::Edge { update: 2 }));
+    assert_eq!(copy(3, 128), Err(UpdateError::Edge { update: 2 }));
     // How many edges there are only the mesh can tell.
-    let far = copy(told(), 1, 127).expect("seven bits");
+    let far = copy(1, 127).expect("seven bits");
     let mut mesh = far.start().expect("a base mesh");
     far.updates_arrived(&mut mesh, 0);
     let tets = mesh.tets().to_vec();

@@ -3,9 +3,10 @@
 use crate::support::builder::{Plan, build};
 use crate::support::compare::{live_tets, snapshot};
 use crate::support::domains::{Domain, volume6};
+use crate::support::meshes::prefix;
 use tetralod::geom::Lattice;
 use tetralod::mt::{
-    Applied, ApplyUpdates, BaseMesh, CurrentMesh, EdgeMt, ErrorCode, FieldInfo, MtInfo, MtKind,
+    Applied, ApplyUpdates, BaseMesh, CurrentMesh, EdgeMtBuilder, ErrorCode, FieldInfo, MtInfo, MtKind,
     MultiTessellation, UpdateError, UpdateId, UpdatePages, VertexId, VertexSplit,
 };
 
@@ -68,20 +69,18 @@ impl Cone {
         assert!(far.iter().all(|face| faces.contains(face)));
         let bits = faces.iter().enumerate().take(64);
         let mask = bits.fold(0, |mask, (i, face)| mask | u64::from(far.contains(face)) << i);
-        let mut mt = EdgeMt::new(self.info(), self.base());
-        let error = ErrorCode(1);
-        mt.push(&VertexSplit {
-            vertex: VertexId(0),
-            offset,
-            edge: 0,
-            field_offsets: &[5],
-            mask,
-            errors: &[error],
-        })?;
+        let mut builder = EdgeMtBuilder::new(self.info(), self.base()).expect("a valid base mesh");
+        let (vertex, errors) = (VertexId(0), &[ErrorCode(1)]);
+        let built = builder.push(&VertexSplit { vertex, offset, field_offsets: &[5], mask, errors });
+        let mt = builder.finish();
+        if mt.updates() == 0 {
+            return Err(built.expect_err("it is not there"));
+        }
         let mut mesh = CurrentMesh::new(mt.info(), mt.base()).expect("a valid base mesh");
         mt.updates_arrived(&mut mesh, 0);
         let (before, hash) = (snapshot(&mesh), mesh.hash());
         let result = mt.refine(&mut mesh, UpdateId(0));
+        assert_eq!(result.clone().err(), built.err());
         assert_eq!(mesh.check(), Ok(()));
         if let Err(error) = result {
             assert_eq!(snapshot(&mesh), before);
@@ -242,9 +241,8 @@ fn a_fan_may_touch_the_border() {
 #[test]
 fn a_mesh_that_was_not_told_of_an_update_refuses_it() {
     let built = build(Plan { domain: Domain::Cube(2), seed: 1, fields: 1, updates: 6 });
-    let mut mt = EdgeMt::new(built.info.clone(), built.base.clone());
+    let mt = prefix(&built.edge_mt(), 1);
     let mut mesh = CurrentMesh::new(mt.info(), mt.base()).expect("a valid base mesh");
-    mt.push(&built.splits[0].as_update()).expect("a valid update");
     let before = snapshot(&mesh);
     assert_eq!(mt.refine(&mut mesh, UpdateId(0)), Err(UpdateError::UnknownToMesh { update: 0 }));
     assert_eq!(snapshot(&mesh), before);

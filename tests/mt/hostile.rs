@@ -1,13 +1,13 @@
 //! Damaged and hostile MTs: every call ends, with a typed error or with a valid mesh, and an error changes nothing.
 
-use crate::support::builder::{Built, Plan, Split, build};
+use crate::support::builder::{Built, Plan, Stored, build};
 use crate::support::compare::snapshot;
 use crate::support::domains::Domain;
 use crate::support::random::Random;
 use crate::support::strategies::config;
 use proptest::prelude::*;
 use tetralod::mt::{
-    Applied, ApplyUpdates, BaseMesh, BaseMeshError, CurrentMesh, EdgeMt, ExplicitMt, MtFault,
+    Applied, ApplyUpdates, BaseMesh, BaseMeshError, CurrentMesh, EdgeMt, ErrorCode, ExplicitMt, MtFault,
     MultiTessellation, UpdateError, UpdateId, UpdatePages, stats,
 };
 
@@ -111,24 +111,24 @@ fn assert_replay_is_sound(mt: &EdgeMt) {
 }
 
 /// Changes a split in one of many ways.
-fn damage(split: &mut Split, vertices: usize, random: &mut Random) {
+fn damage(split: &mut Stored, vertices: usize, random: &mut Random) {
     match random.below(9) {
         0 => split.vertex = random.below(vertices + 3) as u32,
-        1 => split.mask = random.bits(),
-        2 => split.mask ^= 1 << random.below(64),
-        3 => split.mask ^= 1 << random.below(10),
-        4 => split.offset = [0; 3].map(|_| random.between(-1024, 1024)),
-        5 => split.offset[random.below(3)] ^= 1 << random.below(31),
-        6 => split.offset = [0; 3],
+        1 => split.wrong_sides = random.bits(),
+        2 => split.wrong_sides ^= 1 << random.below(64),
+        3 => split.wrong_sides ^= 1 << random.below(10),
+        4 => split.offset_residual = [0; 3].map(|_| random.between(-1024, 1024)),
+        5 => split.offset_residual[random.below(3)] ^= 1 << random.below(31),
+        6 => split.offset_residual = [0; 3],
         7 => {
-            let f = random.below(split.field_offsets.len());
-            split.field_offsets[f] = if random.once_in(2) { i32::MIN } else { random.between(-256, 256) };
+            let f = random.below(split.level_residuals.len());
+            split.level_residuals[f] = if random.once_in(2) { i32::MIN } else { random.between(-256, 256) };
         }
-        _ => split.error = random.bits() as u16,
+        _ => split.errors.fill(ErrorCode(random.bits() as u16)),
     }
 }
 
-fn push_all(built: &Built, splits: &[Split]) -> (EdgeMt, usize) {
+fn push_all(built: &Built, splits: &[Stored]) -> (EdgeMt, usize) {
     let mut mt = EdgeMt::new(built.info.clone(), built.base.clone());
     let mut refused = 0;
     for split in splits {
@@ -156,7 +156,7 @@ proptest! {
     fn damaged_updates(domain in domain(), seed in any::<u64>(), updates in 0_usize..40, steps in 0_usize..60) {
         let mut random = Random(seed);
         let built = build(Plan { domain, seed, fields: 2, updates });
-        let mut splits = built.splits.clone();
+        let mut splits = Stored::all(&built.edge_mt());
         for _ in 0..random.below(4) + 1 {
             if splits.is_empty() {
                 break;
@@ -184,12 +184,13 @@ proptest! {
         let mut vertices = built.base.positions.len();
         for _ in 0..updates {
             let bits = random.below(8);
-            splits.push(Split {
+            splits.push(Stored {
                 vertex: random.below(vertices) as u32,
-                offset: [0; 3].map(|_| random.between(-40, 40)),
-                field_offsets: vec![random.between(-20, 20)],
-                mask: random.bits() & ((1 << bits) - 1),
-                error: if random.once_in(20) { random.bits() as u16 } else { 0 },
+                edge: if random.once_in(4) { random.below(60) as u8 } else { 0 },
+                offset_residual: [0; 3].map(|_| random.between(-40, 40)),
+                level_residuals: vec![random.between(-20, 20)],
+                wrong_sides: random.bits() & ((1 << bits) - 1),
+                errors: vec![ErrorCode(if random.once_in(20) { random.bits() as u16 } else { 0 })],
             });
             vertices += 2;
         }
@@ -210,12 +211,13 @@ proptest! {
         let mut splits = Vec::new();
         let mut vertices = built.base.positions.len().max(1);
         for _ in 0..updates {
-            splits.push(Split {
+            splits.push(Stored {
                 vertex: random.below(vertices) as u32,
-                offset: [0; 3].map(|_| random.between(-30, 30)),
-                field_offsets: vec![0],
-                mask: random.bits() & ((1 << random.below(14)) - 1),
-                error: 0,
+                edge: if random.once_in(4) { random.below(60) as u8 } else { 0 },
+                offset_residual: [0; 3].map(|_| random.between(-30, 30)),
+                level_residuals: vec![0],
+                wrong_sides: random.bits() & ((1 << random.below(14)) - 1),
+                errors: vec![ErrorCode::ZERO],
             });
             vertices += 2;
         }
@@ -268,7 +270,7 @@ fn hostile_tests_reach_all_errors() {
     for seed in 0..400 {
         let mut random = Random(seed);
         let built = build(Plan { domain: Domain::Cube(2), seed: seed % 7, fields: 2, updates: 12 });
-        let mut splits = built.splits.clone();
+        let mut splits = Stored::all(&built.edge_mt());
         let k = random.below(splits.len());
         damage(&mut splits[k], built.oracle.positions.len(), &mut random);
         let mut mt = EdgeMt::new(built.info.clone(), built.base.clone());

@@ -118,7 +118,7 @@ fn noisy_scans_with_holes() {
             let updates = mt.page_updates(page);
             let needs = |u: u32| explicit.parents(UpdateId(u)).iter().map(|p| p >> bits);
             if updates.clone().flat_map(needs).all(|p| p == page || mt.has_page(p)) {
-                let splits: Vec<_> = updates.map(|u| whole.split(UpdateId(u))).collect();
+                let splits: Vec<_> = updates.map(|u| whole.update(UpdateId(u))).collect();
                 mt.insert_page(page, &splits).expect("what it depends on is here");
             }
         }
@@ -136,11 +136,12 @@ fn errors_that_do_not_fall_are_not_written() {
     let leaf = (0..mt.updates()).rev().find(|&u| !explicit.parents(UpdateId(u)).is_empty());
     let leaf = leaf.expect("an update that depends on another");
     // Larger than that of a parent.
-    let swollen = tampered(&mt, |u, parts| parts.error = if u == leaf { 50_000 } else { parts.error });
+    let swollen =
+        tampered(&mt, |u, update| update.errors[0].0 = if u == leaf { 50_000 } else { update.errors[0].0 });
     let refused = encoded(&swollen, &plain);
     assert!(matches!(refused, Err(EncodeError::Order { update, .. }) if update == leaf), "{refused:?}");
     // Equal all over, although values go beyond those that they replace.
-    let equal = tampered(&mt, |_, parts| parts.error = 30_000);
+    let equal = tampered(&mt, |_, update| update.errors[0].0 = 30_000);
     let spelled = ExplicitMt::of(&equal).expect("a valid MT");
     assert!(values_are_monotone(&spelled).is_err());
     let strict = EncodeOptions { check_margins: true, ..plain.clone() };

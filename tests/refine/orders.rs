@@ -6,7 +6,7 @@ use crate::subjects::{SUBJECTS, Subject, applied, tets};
 use crate::support::random::Random;
 use std::collections::BTreeSet;
 use tetralod::geom::Bounds;
-use tetralod::mt::{EdgeMt, ErrorCode, MultiTessellation, UpdateId, VertexSplit};
+use tetralod::mt::{EdgeMt, EdgeUpdate, ErrorCode, MultiTessellation, UpdateId};
 use tetralod::refine::{LodCriterion, Need, Request};
 
 fn requests(subject: &Subject, random: &mut Random) -> Vec<Request> {
@@ -63,7 +63,7 @@ fn with_errors(mt: &EdgeMt, error: &mut dyn FnMut(UpdateId) -> ErrorCode) -> Edg
     let mut other = EdgeMt::new(mt.info().clone(), mt.base().clone());
     for u in (0..mt.updates()).map(UpdateId) {
         let errors = vec![error(u); mt.info().fields.len()];
-        other.push(&VertexSplit { errors: &errors, ..mt.split(u) }).expect("errors are not looked at");
+        other.push(&EdgeUpdate { errors: &errors, ..mt.update(u) }).expect("errors are not looked at");
     }
     other
 }

@@ -7,8 +7,8 @@ use crate::support::random::Random;
 use std::collections::BTreeSet;
 use tetralod::geom::Bounds;
 use tetralod::mt::{
-    ApplyUpdates, EdgeMt, ErrorCode, MultiTessellation, PageError, UpdateError, UpdateId, UpdatePages,
-    VertexId, VertexSplit,
+    ApplyUpdates, EdgeMt, EdgeUpdate, ErrorCode, MultiTessellation, PageError, UpdateError, UpdateId,
+    UpdatePages, VertexId,
 };
 use tetralod::refine::{Budget, Criterion, Front, LodCriterion, Need, Request, TetLook};
 
@@ -34,9 +34,9 @@ impl<'a> Paged<'a> {
         Self { subject, bits, above, mt }
     }
 
-    fn splits(&self, page: u32) -> Vec<VertexSplit<'a>> {
+    fn splits(&self, page: u32) -> Vec<EdgeUpdate<'a>> {
         let updates = self.mt.page_updates(page);
-        updates.map(|u| self.subject.mt.split(UpdateId(u))).collect()
+        updates.map(|u| self.subject.mt.update(UpdateId(u))).collect()
     }
 
     fn has(&self, page: u32) -> bool {
@@ -211,7 +211,7 @@ fn what_cannot_come_or_go_changes_nothing() {
     let mut paged = Paged::new(subject, 4);
     let empty = paged.mt.clone();
     let split_elsewhere = |page: &u32| {
-        let by_vertex = |split: &VertexSplit<'_>| subject.mt.created_by(split.vertex).map(|u| u.0 >> 4);
+        let by_vertex = |split: &EdgeUpdate<'_>| subject.mt.created_by(split.vertex).map(|u| u.0 >> 4);
         paged.splits(*page).iter().filter_map(by_vertex).any(|other| other != *page)
     };
     let page = (0..paged.pages()).find(split_elsewhere).expect("not all splits are of base vertices");
@@ -232,7 +232,7 @@ fn what_cannot_come_or_go_changes_nothing() {
     let vertex = twice[9].vertex.0;
     assert_eq!(paged.mt.insert_page(0, &twice), Err(UpdateError::Vertex { update: 9, vertex }.into()));
     let mut off = paged.splits(0);
-    off[15].offset = [i32::MIN; 3];
+    off[15].offset_residual = [i32::MIN; 3];
     assert_eq!(paged.mt.insert_page(0, &off), Err(UpdateError::OffLattice { update: 15 }.into()));
     assert_eq!(paged.mt, empty);
 

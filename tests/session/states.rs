@@ -4,7 +4,8 @@ use crate::support::files::{assemble, sections};
 use tetralod::format::{EncodeOptions, FormatError, encode};
 use tetralod::geom::{Bounds, Lattice};
 use tetralod::mt::{
-    BaseMesh, EdgeMt, ErrorCode, FieldInfo, MtInfo, MtKind, MultiTessellation, VertexId, VertexSplit,
+    BaseMesh, EdgeMt, EdgeMtBuilder, ErrorCode, FieldInfo, MtInfo, MtKind, MultiTessellation, UpdateError,
+    VertexId, VertexSplit,
 };
 use tetralod::refine::{Need, Request, RequestError};
 use tetralod::session::{Session, SessionError};
@@ -23,7 +24,7 @@ fn field(name: &str) -> FieldInfo {
 
 /// Two tetrahedra above and below a triangle. The first update splits a corner of the triangle upwards and
 /// downwards, the second, which depends on it, another one.
-fn two_splits(last_mask: u64) -> EdgeMt {
+fn two_splits(last_mask: u64) -> Result<EdgeMt, UpdateError> {
     let info = MtInfo {
         kind: MtKind::Edge,
         lattice: Lattice { origin: [-1.0; 3], step: [0.5; 3], bits: 6 },
@@ -39,24 +40,17 @@ fn two_splits(last_mask: u64) -> EdgeMt {
         values: [10, 20, 30, 80, 90].into_iter().flat_map(|q| [q, 100 - q]).collect(),
         tets: vec![[0, 1, 2, 3], [0, 2, 1, 4]],
     };
-    let mut mt = EdgeMt::new(info, base);
+    let mut builder = EdgeMtBuilder::new(info, base).expect("a valid base mesh");
     for (vertex, mask, error) in [(0, 0b10, 3000), (1, last_mask, 2000)] {
-        let (vertex, error) = (VertexId(vertex), ErrorCode(error));
-        let split = VertexSplit {
-            vertex,
-            offset: [0, 0, 2],
-            edge: 0,
-            field_offsets: &[6, -6],
-            mask,
-            errors: &[error; 2],
-        };
-        mt.push(&split).expect("both updates fit");
+        let (vertex, errors) = (VertexId(vertex), &[ErrorCode(error); 2]);
+        builder.push(&VertexSplit { vertex, offset: [0, 0, 2], field_offsets: &[6, -6], mask, errors })?;
     }
-    mt
+    Ok(builder.finish())
 }
 
 fn bytes() -> Vec<u8> {
-    encode(&two_splits(0b10).into(), &EncodeOptions::default()).expect("the MT is complete")
+    let mt = two_splits(0b10).expect("both updates fit");
+    encode(&mt.into(), &EncodeOptions::default()).expect("the MT is complete")
 }
 
 fn opened() -> Session {
@@ -176,10 +170,7 @@ fn flipped(file: &[u8], kind: &[u8; 4], bit: usize) -> Option<Vec<u8>> {
 
 #[test]
 fn damage_that_only_shows_in_the_mesh_leaves_a_valid_mesh() {
-    assert!(
-        encode(&two_splits(0b111).into(), &EncodeOptions::default()).is_err(),
-        "a mask that parts nothing"
-    );
+    assert_eq!(two_splits(0b111), Err(UpdateError::Mask { update: 1 }), "a mask that parts nothing");
     let file = bytes();
     assert_eq!(flipped(&file, b"UPDT", 0).map(|bytes| bytes.len()), Some(file.len()));
     let mut found = 0;
@@ -202,7 +193,7 @@ fn damage_that_only_shows_in_the_mesh_leaves_a_valid_mesh() {
 
 #[test]
 fn a_base_mesh_that_is_no_mesh_is_refused_for_good() {
-    let good = two_splits(0b10);
+    let good = two_splits(0b10).expect("both updates fit");
     let mut base = good.base().clone();
     base.tets.push([0, 1, 2, 3]);
     let info = MtInfo { vertices: 5, updates: 0, ..good.info().clone() };

@@ -5,7 +5,10 @@ use super::oracle::{Node, Oracle};
 use super::random::Random;
 use std::collections::{BTreeMap, BTreeSet};
 use tetralod::geom::Lattice;
-use tetralod::mt::{BaseMesh, EdgeMt, ErrorCode, FieldInfo, MtInfo, MtKind, VertexId, VertexSplit};
+use tetralod::mt::{
+    BaseMesh, EdgeMt, EdgeMtBuilder, EdgeUpdate, ErrorCode, FieldInfo, MtInfo, MtKind, MultiTessellation,
+    UpdateId, VertexId, VertexSplit,
+};
 
 /// A vertex split that owns its parts.
 #[derive(Clone, Debug)]
@@ -18,15 +21,67 @@ pub struct Split {
 }
 
 impl Split {
-    pub fn as_update(&self) -> VertexSplit<'_> {
+    pub fn as_split(&self) -> VertexSplit<'_> {
         VertexSplit {
             vertex: VertexId(self.vertex),
             offset: self.offset,
-            edge: 0,
             field_offsets: &self.field_offsets,
             mask: self.mask,
             // A test may forget them.
             errors: vec![ErrorCode(self.error); self.field_offsets.len()].leak(),
+        }
+    }
+}
+
+/// The MT of valid splits, coarse to fine.
+pub fn mt_of_splits<'a>(
+    info: &MtInfo,
+    base: &BaseMesh,
+    splits: impl IntoIterator<Item = VertexSplit<'a>>,
+) -> EdgeMt {
+    let mut builder = EdgeMtBuilder::new(info.clone(), base.clone()).expect("a valid base mesh");
+    for split in splits {
+        builder.push(&split).expect("a valid split");
+    }
+    builder.finish()
+}
+
+/// A stored update that owns its parts, to be tampered with.
+#[derive(Clone, Debug)]
+pub struct Stored {
+    pub vertex: u32,
+    pub offset_residual: [i32; 3],
+    pub edge: u8,
+    pub level_residuals: Vec<i32>,
+    pub wrong_sides: u64,
+    pub errors: Vec<ErrorCode>,
+}
+
+impl Stored {
+    pub fn of(update: &EdgeUpdate<'_>) -> Self {
+        Self {
+            vertex: update.vertex.0,
+            offset_residual: update.offset_residual,
+            edge: update.edge,
+            level_residuals: update.level_residuals.to_vec(),
+            wrong_sides: update.wrong_sides,
+            errors: update.errors.to_vec(),
+        }
+    }
+
+    /// All updates of an MT.
+    pub fn all(mt: &EdgeMt) -> Vec<Self> {
+        (0..mt.updates()).map(|u| Self::of(&mt.update(UpdateId(u)))).collect()
+    }
+
+    pub fn as_update(&self) -> EdgeUpdate<'_> {
+        EdgeUpdate {
+            vertex: VertexId(self.vertex),
+            offset_residual: self.offset_residual,
+            edge: self.edge,
+            level_residuals: &self.level_residuals,
+            wrong_sides: self.wrong_sides,
+            errors: &self.errors,
         }
     }
 }
@@ -43,11 +98,7 @@ pub struct Built {
 impl Built {
     /// Everything pushed into a compact MT.
     pub fn edge_mt(&self) -> EdgeMt {
-        let mut mt = EdgeMt::new(self.info.clone(), self.base.clone());
-        for split in &self.splits {
-            mt.push(&split.as_update()).expect("the builder makes valid updates");
-        }
-        mt
+        mt_of_splits(&self.info, &self.base, self.splits.iter().map(Split::as_split))
     }
 }
 

@@ -1,6 +1,6 @@
 //! MTs for the tests of the file format, made by code, and files taken apart and put together as the specification says.
 
-use crate::support::builder::{Plan, build};
+use crate::support::builder::{Plan, build, mt_of_splits};
 use crate::support::domains::Domain;
 use std::collections::BTreeMap;
 use std::sync::Mutex;
@@ -45,14 +45,13 @@ pub fn planned(plan: Plan) -> EdgeMt {
     info.fields = (0..plan.fields).map(|f| told_more(f, info.fields[f].bits)).collect();
     info.displacement_per_error = 0.125;
     info.quantization = if plan.fields == 2 { 0.0 } else { 0.0625 };
-    let mut mt = EdgeMt::new(info, built.base);
-    for split in &built.splits {
+    let errors = built.splits.iter().map(|split| {
         let below = |f: usize| ErrorCode(split.error.saturating_sub(300 * f as u16));
-        let errors: Vec<ErrorCode> = (0..plan.fields).map(below).collect();
-        let split = VertexSplit { errors: &errors, ..split.as_update() };
-        mt.push(&split).expect("the builder makes valid updates");
-    }
-    mt
+        (0..plan.fields).map(below).collect::<Vec<_>>()
+    });
+    let errors: Vec<_> = errors.collect();
+    let splits = built.splits.iter().zip(&errors);
+    mt_of_splits(&info, &built.base, splits.map(|(split, errors)| VertexSplit { errors, ..split.as_split() }))
 }
 
 /// An edge-based MT of exactly so many random updates. Made once a process.
@@ -244,7 +243,7 @@ pub fn assert_same(a: &impl ApplyUpdates, b: &impl ApplyUpdates) {
 pub fn is_prefix(part: &Mt, whole: &Mt) -> bool {
     let same_updates = match (part, whole) {
         (Mt::Edge(part), Mt::Edge(whole)) => {
-            (0..part.updates()).all(|k| part.split(UpdateId(k)) == whole.split(UpdateId(k)))
+            (0..part.updates()).all(|k| part.update(UpdateId(k)) == whole.update(UpdateId(k)))
         }
         (Mt::HalfEdge(part), Mt::HalfEdge(whole)) => {
             part.base_marks() == whole.base_marks()

@@ -1,9 +1,10 @@
 //! Meshes made by code, small enough to be built and verified in a test.
 
+use super::builder::Stored;
 use std::ops::ControlFlow;
 use tetralod::builder::{BuildConfig, BuildResult, edge_mt};
 use tetralod::mesh::{Field, Grid, TetMesh, repair};
-use tetralod::mt::{EdgeMt, ErrorCode, MtKind, MultiTessellation, UpdateId, VertexSplit};
+use tetralod::mt::{EdgeMt, ErrorCode, MtKind, MultiTessellation, UpdateId};
 
 /// A field with hills, edges and a plateau.
 pub fn hilly([x, y, z]: [f64; 3]) -> f64 {
@@ -64,35 +65,16 @@ pub fn built(mesh: &TetMesh) -> BuildResult<EdgeMt> {
     edge_mt(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a valid mesh")
 }
 
-/// What an update is made of, to be tampered with.
-#[derive(Clone, Debug)]
-pub struct Parts {
-    pub offset: [i32; 3],
-    pub field_offsets: Vec<i32>,
-    pub mask: u64,
-    /// Of the first field; the others change along with it.
-    pub error: u16,
-}
-
-/// The same MT with other updates: `change` sees each and its number.
-pub fn tampered(mt: &EdgeMt, mut change: impl FnMut(u32, &mut Parts)) -> EdgeMt {
+/// The same MT with other updates: `change` sees each and its number. Errors of other fields change along with that of the first.
+pub fn tampered(mt: &EdgeMt, mut change: impl FnMut(u32, &mut Stored)) -> EdgeMt {
     let mut other = EdgeMt::new(mt.info().clone(), mt.base().clone());
-    for u in 0..mt.updates() {
-        let VertexSplit { vertex, offset, edge, field_offsets, mask, errors } = mt.split(UpdateId(u));
-        let mut parts = Parts { offset, field_offsets: field_offsets.to_vec(), mask, error: errors[0].0 };
-        change(u, &mut parts);
-        let shift = i32::from(parts.error) - i32::from(errors[0].0);
+    for (u, before) in (0..).zip(Stored::all(mt)) {
+        let mut update = before.clone();
+        change(u, &mut update);
+        let shift = i32::from(update.errors[0].0) - i32::from(before.errors[0].0);
         let shifted = |code: &ErrorCode| ErrorCode((i32::from(code.0) + shift).clamp(0, 65_535) as u16);
-        let errors: Vec<ErrorCode> = errors.iter().map(shifted).collect();
-        let split = VertexSplit {
-            vertex,
-            offset: parts.offset,
-            edge,
-            field_offsets: &parts.field_offsets,
-            mask: parts.mask,
-            errors: &errors,
-        };
-        other.push(&split).expect("the change keeps what can be seen without a mesh");
+        update.errors = before.errors.iter().map(shifted).collect();
+        other.push(&update.as_update()).expect("the change keeps what can be seen without a mesh");
     }
     other
 }
@@ -101,7 +83,7 @@ pub fn tampered(mt: &EdgeMt, mut change: impl FnMut(u32, &mut Parts)) -> EdgeMt 
 pub fn prefix(mt: &EdgeMt, updates: u32) -> EdgeMt {
     let mut part = EdgeMt::new(mt.info().clone(), mt.base().clone());
     (0..updates).for_each(|u| {
-        part.push(&mt.split(UpdateId(u))).expect("the same updates");
+        part.push(&mt.update(UpdateId(u))).expect("the same updates");
     });
     part
 }

@@ -1,7 +1,7 @@
 //! `UPDT` of an edge-based MT: a block of vertex splits, and `FLDU`: what they do to one field.
 //!
-//! Nothing here needs a mesh. Masks and field offsets are what is wrong with the guesses made when a split is applied, see
-//! [`EdgeMt::coded`]; vertices are told as a forest: a split is listed with the split in the same block that created its
+//! Nothing here needs a mesh. Offsets, sides and levels are residuals, see [`EdgeUpdate`](crate::mt::EdgeUpdate); vertices
+//! are coded as a forest: a split is listed with the split in the same block that created its
 //! vertex, or else among the roots.
 
 use super::base;
@@ -114,21 +114,21 @@ fn runs(mt: &EdgeMt, first: u32, vertices: &[u32]) -> Vec<u32> {
     runs
 }
 
-/// Puts the splits `first .. end` of a coded MT.
+/// Puts the splits `first .. end` of an MT.
 pub fn put(out: &mut impl Put, mt: &EdgeMt, first: u32, end: u32) {
-    let vertices: Vec<u32> = (first..end).map(|k| mt.split(UpdateId(k)).vertex.0).collect();
+    let vertices: Vec<u32> = (first..end).map(|k| mt.update(UpdateId(k)).vertex.0).collect();
     put_vertices(out, mt, first, &vertices);
     let leads = |k| {
-        let split = mt.split(UpdateId(k));
-        split.edge != 0 || split.offset.into_iter().find(|&d| d != 0).is_none_or(|d| d > 0)
+        let (offset, edge) = offset_of(mt, UpdateId(k));
+        edge != 0 || offset.into_iter().find(|&d| d != 0).is_none_or(|d| d > 0)
     };
     let all_lead = (first..end).all(leads);
     out.bits(u32::from(all_lead), 1);
     for k in first..end {
-        let split = mt.split(UpdateId(k));
-        let above = mt.created_by(split.vertex).map(|u| told_offset(mt, u));
-        put_offset(out, above, (split.offset, split.edge), all_lead);
-        put_mask(out, split.mask);
+        let update = mt.update(UpdateId(k));
+        let above = mt.created_by(update.vertex).map(|u| offset_of(mt, u));
+        put_offset(out, above, offset_of(mt, UpdateId(k)), all_lead);
+        put_mask(out, update.wrong_sides);
     }
 }
 
@@ -165,9 +165,9 @@ fn put_vertices(out: &mut impl Put, mt: &EdgeMt, first: u32, vertices: &[u32]) {
 /// An offset, and the edge of the link that it is counted from.
 pub type Offset = ([i32; 3], u8);
 
-fn told_offset(mt: &EdgeMt, u: UpdateId) -> Offset {
-    let split = mt.split(u);
-    (split.offset, split.edge)
+fn offset_of(mt: &EdgeMt, u: UpdateId) -> Offset {
+    let update = mt.update(u);
+    (update.offset_residual, update.edge)
 }
 
 /// The context of the edge of an offset, by that of the split above.
@@ -201,11 +201,11 @@ fn put_mask(out: &mut impl Put, mask: u64) {
     }
 }
 
-/// Puts what the splits `first .. end` of a coded MT do to a field.
+/// Puts what the splits `first .. end` of an MT do to a field.
 pub fn put_field(out: &mut impl Put, mt: &EdgeMt, first: u32, end: u32, field: usize) {
     put_changes(out, [ERROR, LEVEL], (first..end).map(UpdateId), |u| {
-        let split = mt.split(u);
-        (split.errors[field], split.field_offsets[field])
+        let update = mt.update(u);
+        (update.errors[field], update.level_residuals[field])
     });
 }
 
@@ -255,7 +255,7 @@ pub fn read(source: &mut Source<'_>, mt: &EdgeMt, first: u32, count: u32) -> Res
 fn offset_above(mt: &EdgeMt, first: u32, vertex: VertexId) -> Result<Option<Offset>, FormatError> {
     let Some(creator) = mt.created_by(vertex) else { return Ok(None) };
     if mt.has(creator) {
-        return Ok(Some(told_offset(mt, creator)));
+        return Ok(Some(offset_of(mt, creator)));
     }
     let [page, other] = [first, creator.0].map(|u| u >> mt.page_bits());
     Err(FormatError::Page(PageError::Needs { page, other }))

@@ -16,9 +16,9 @@ use super::{EncodeError, FormatError, Limits, write};
 use crate::geom::Lattice;
 use crate::mesh::VectorPart;
 use crate::mt::{
-    BaseMesh, BaseMeshError, EdgeMt, ErrorCode, ExplicitMt, FieldInfo, HalfEdgeMt, HalfEdgeUpdate,
-    MAX_QUARTERINGS, Mt, MtInfo, MtKind, MultiTessellation, PageError, UpdateError, UpdatePages, VertexId,
-    VertexSplit,
+    BaseMesh, BaseMeshError, EdgeMt, EdgeUpdate, ErrorCode, ExplicitMt, FieldInfo, HalfEdgeMt,
+    HalfEdgeUpdate, MAX_QUARTERINGS, Mt, MtInfo, MtKind, MultiTessellation, PageError, UpdateError,
+    UpdatePages, VertexId,
 };
 use edge::{FieldPart, Splits};
 use std::collections::BTreeMap;
@@ -322,7 +322,7 @@ impl BaseParts {
         base.values = (0..vertices).flat_map(|v| levels.iter().map(move |levels| levels[v])).collect();
         base.check(&info)?;
         Ok(match info.kind {
-            MtKind::Edge => (EdgeMt::coded(info, base, block_bits).into(), None),
+            MtKind::Edge => (EdgeMt::with_page_bits(info, base, block_bits).into(), None),
             MtKind::Vertex => {
                 let (mt, state) = vertex::start(info, base, vertex, tet_errors)?;
                 (mt.into(), Some(state))
@@ -461,13 +461,13 @@ impl Shared {
         let changes = (0..count).zip(residuals.chunks(stride).zip(errors.chunks(stride)));
         match (self, mt) {
             (Self::Splits(splits), Mt::Edge(mt)) => {
-                let all: Vec<VertexSplit<'_>> = changes
-                    .map(|(k, (field_offsets, errors))| VertexSplit {
+                let all: Vec<EdgeUpdate<'_>> = changes
+                    .map(|(k, (level_residuals, errors))| EdgeUpdate {
                         vertex: VertexId(splits.vertices[k]),
-                        offset: splits.offsets[k].0,
+                        offset_residual: splits.offsets[k].0,
                         edge: splits.offsets[k].1,
-                        field_offsets,
-                        mask: splits.masks[k],
+                        level_residuals,
+                        wrong_sides: splits.masks[k],
                         errors,
                     })
                     .collect();

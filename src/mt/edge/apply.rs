@@ -15,19 +15,21 @@
 use super::predict::Link;
 use super::star::{FAN_CAPACITY, HalfStar, RING_CAPACITY, Ring, take_ring};
 use crate::mesh::NONE;
-#[cfg(feature = "build")]
-use crate::mt::MAX_STAR;
 use crate::mt::mesh::current::{KindWord, Labels};
-#[cfg(feature = "build")]
-use crate::mt::mesh::stars::Star;
 use crate::mt::mesh::stars::{GATHERED, Gather};
 use crate::mt::mesh::tet::{TURN, corner_of};
 use crate::mt::pages::Page;
 use crate::mt::{
-    Applied, ApplyUpdates, CurrentMesh, EdgeMt, ErrorCode, LookAtTet, MAX_LINK, MultiTessellation, PageError,
-    UpdateError, UpdateId, UpdatePages, VertexId, VertexSplit,
+    Applied, ApplyUpdates, CurrentMesh, EdgeMt, EdgeUpdate, ErrorCode, LookAtTet, MAX_LINK,
+    MultiTessellation, PageError, UpdateError, UpdateId, UpdatePages, VertexId,
 };
 use std::ops::Range;
+
+/// How far apart the halves of a vertex are: as in [`VertexSplit`](crate::mt::VertexSplit).
+struct Offsets<'a> {
+    offset: [i32; 3],
+    field_offsets: &'a [i32],
+}
 
 impl EdgeMt {
     /// Applies update `u` (`u+`, a vertex split) to `mesh`, which must not contain it yet.
@@ -43,8 +45,8 @@ impl EdgeMt {
         if !self.has(u) {
             return Err(UpdateError::Missing { update: u.0 });
         }
-        let split = self.split(u);
-        let vertex = split.vertex;
+        let update = self.update(u);
+        let vertex = update.vertex;
         let Some(p) = mesh.slot(vertex) else {
             let error = UpdateError::Vertex { update: u.0, vertex: vertex.0 };
             return Ok(Applied::Blocked(self.created_by(vertex).ok_or(error)?));
@@ -56,8 +58,8 @@ impl EdgeMt {
         let mut ring = take_ring(mesh);
         let mut field_offsets = std::mem::take(&mut ring.field_offsets);
         field_offsets.clear();
-        field_offsets.extend_from_slice(split.field_offsets);
-        let applied = self.split_ring(mesh, u, &split, p, &mut ring, &mut field_offsets);
+        field_offsets.extend_from_slice(update.level_residuals);
+        let applied = self.split_ring(mesh, u, &update, p, &mut ring, &mut field_offsets);
         ring.field_offsets = field_offsets;
         mesh.put_back_kind_state(ring);
         applied
@@ -67,7 +69,7 @@ impl EdgeMt {
         &self,
         mesh: &mut CurrentMesh,
         u: UpdateId,
-        split: &VertexSplit<'_>,
+        stored: &EdgeUpdate<'_>,
         p: u32,
         ring: &mut Ring,
         field_offsets: &mut [i32],
@@ -81,25 +83,21 @@ impl EdgeMt {
         if ring.link_len > MAX_LINK || mesh.is_pinched(p) {
             return Err(UpdateError::Star { update });
         }
-        let mut offset = split.offset;
-        let parted = if self.is_coded() {
-            let mut link = Link::new(ring, mesh, mesh.positions[p as usize]);
-            if split.edge != 0 {
-                let step = link.step(ring, split.edge).ok_or(UpdateError::Edge { update })?;
-                offset = [0, 1, 2].map(|k| step[k].saturating_add(offset[k]));
-            }
-            link.aim(ring, offset);
-            link.guess_levels(ring, mesh, p, offset, &self.info().fields, |field, guess| {
-                field_offsets[field] = field_offsets[field].saturating_add(guess);
-            });
-            link.part(ring, split.mask)
-        } else {
-            ring.find_sides(split.mask)
-        };
+        let mut link = Link::new(ring, mesh, mesh.positions[p as usize]);
+        let mut offset = stored.offset_residual;
+        if stored.edge != 0 {
+            let step = link.step(ring, stored.edge).ok_or(UpdateError::Edge { update })?;
+            offset = [0, 1, 2].map(|k| step[k].saturating_add(offset[k]));
+        }
+        link.aim(ring, offset);
+        link.guess_levels(ring, mesh, p, offset, &self.info().fields, |field, guess| {
+            field_offsets[field] = field_offsets[field].saturating_add(guess);
+        });
+        let parted = link.part(ring, stored.wrong_sides);
         if !parted || !ring.find_fan() {
             return Err(UpdateError::Mask { update });
         }
-        let split = &VertexSplit { offset, field_offsets, ..*split };
+        let split = &Offsets { offset, field_offsets };
         let halves = self.halve(mesh, u, split, p)?;
         if !mesh.is_proven(update) {
             if !ring.is_positive(mesh, halves, self.info().lattice.bits) {
@@ -116,7 +114,7 @@ impl EdgeMt {
         &self,
         mesh: &CurrentMesh,
         u: UpdateId,
-        split: &VertexSplit<'_>,
+        split: &Offsets<'_>,
         p: u32,
     ) -> Result<[[i32; 3]; 2], UpdateError> {
         let off = UpdateError::OffLattice { update: u.0 };
@@ -138,7 +136,7 @@ impl EdgeMt {
         &self,
         mesh: &mut CurrentMesh,
         u: UpdateId,
-        split: &VertexSplit<'_>,
+        split: &Offsets<'_>,
         p: u32,
         ring: &Ring,
         halves: [[i32; 3]; 2],
@@ -186,7 +184,7 @@ impl EdgeMt {
         &self,
         mesh: &mut CurrentMesh,
         u: UpdateId,
-        split: &VertexSplit<'_>,
+        split: &Offsets<'_>,
         [p, q]: [u32; 2],
         halves: [[i32; 3]; 2],
     ) {
@@ -256,7 +254,7 @@ impl EdgeMt {
         let far_vertex = mesh.labels[q as usize].vertex;
         mesh.slot_of.set(far_vertex, NONE);
         mesh.free_vertex(q);
-        mesh.put_vertex(p, self.labels(self.split(u).vertex), position);
+        mesh.put_vertex(p, self.labels(self.update(u).vertex), position);
         Ok(Applied::Done)
     }
 
@@ -370,79 +368,6 @@ fn half(v: i32, d: i32, largest: i64) -> Option<[i32; 2]> {
     (holds(a) && holds(b)).then_some([a as i32, b as i32])
 }
 
-impl EdgeMt {
-    /// Update `u` of an MT that is not coded, in the form that files have: its mask and offsets as residuals against the
-    /// prediction from its star. `residuals` gets those of the field offsets. The mesh must contain all parents of `u`, but not `u`.
-    ///
-    /// # Errors
-    /// If the update does not fit the mesh.
-    pub(crate) fn to_residuals<'a>(
-        &'a self,
-        mesh: &mut CurrentMesh,
-        u: UpdateId,
-        residuals: &'a mut Vec<i32>,
-    ) -> Result<VertexSplit<'a>, UpdateError> {
-        residuals.clear();
-        let (split, update) = (self.split(u), u.0);
-        let vertex = UpdateError::Vertex { update, vertex: split.vertex.0 };
-        let p = mesh.slot(split.vertex).ok_or(vertex)?;
-        let mut ring = take_ring(mesh);
-        let gathered = mesh.gather_ring(p, update, &mut ring).is_ok();
-        let split = if gathered && ring.link_len <= MAX_LINK && ring.find_sides(split.mask) {
-            let mut link = Link::new(&ring, mesh, mesh.positions[p as usize]);
-            let (offset, edge) = link.residual_offset(&ring, split.offset, self.info().lattice.bits);
-            link.aim(&ring, split.offset);
-            link.guess_levels(&ring, mesh, p, split.offset, &self.info().fields, |field, guess| {
-                residuals.push(split.field_offsets[field] - guess);
-            });
-            let mask = link.wrong(&ring, ring.sides);
-            Ok(VertexSplit { offset, edge, mask, field_offsets: residuals, ..split })
-        } else {
-            Err(UpdateError::Star { update })
-        };
-        mesh.put_back_kind_state(ring);
-        split
-    }
-}
-
-#[cfg(feature = "build")]
-impl CurrentMesh {
-    /// Brings the mask of a split from the order of other vertex numbers, which `other` gives, to that of the MT's.
-    /// The two sides change places if they `turn`. None if the vertex is not in the mesh or its star is too large.
-    pub(crate) fn reorder_mask(
-        &mut self,
-        vertex: VertexId,
-        mask: u64,
-        turn: bool,
-        other: impl Fn(VertexId) -> u32,
-    ) -> Option<u64> {
-        let mut star = Star::default();
-        let slot = self.slot(vertex)?;
-        self.gather_star(slot, &mut star, |_, _| None::<()>).ok()?;
-        if star.len > MAX_STAR {
-            return None;
-        }
-        let face = |i: usize, number: &dyn Fn(VertexId) -> u32| {
-            let tet = self.tets[star.tets[i] as usize];
-            let rest = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]][star.corner[i] as usize];
-            let mut face = rest.map(|k: usize| number(self.vertex(tet[k])));
-            face.sort_unstable();
-            face
-        };
-        let order = |number: &dyn Fn(VertexId) -> u32| {
-            let mut order: Vec<([u32; 3], usize)> = (0..star.len).map(|i| (face(i, number), i)).collect();
-            order.sort_unstable();
-            order
-        };
-        let theirs = order(&other);
-        let turn = u64::from(turn);
-        let side = |rank: usize| (mask >> rank & 1) ^ turn;
-        let sides = theirs.iter().enumerate().fold(0_u64, |s, (rank, &(_, i))| s | side(rank) << i);
-        let ours = order(&|v: VertexId| v.0);
-        Some(ours.iter().enumerate().fold(0_u64, |m, (rank, &(_, i))| m | (sides >> i & 1) << rank))
-    }
-}
-
 impl UpdatePages for EdgeMt {
     in_pages!();
 
@@ -456,7 +381,7 @@ impl UpdatePages for EdgeMt {
 
     fn page_inserted(&self, mesh: &mut CurrentMesh, updates: Range<u32>) {
         for u in updates.map(UpdateId).filter(|u| self.has(*u)) {
-            if let Some(slot) = mesh.slot(self.split(u).vertex) {
+            if let Some(slot) = mesh.slot(self.update(u).vertex) {
                 mesh.labels[slot as usize].kind_word = KindWord(u.0);
                 mesh.touch_star(slot);
             }
@@ -465,7 +390,7 @@ impl UpdatePages for EdgeMt {
 
     fn page_evicted(&self, mesh: &mut CurrentMesh, updates: Range<u32>) {
         for u in updates.clone().map(UpdateId).filter(|u| self.has(*u)) {
-            if let Some(slot) = mesh.slot(self.split(u).vertex) {
+            if let Some(slot) = mesh.slot(self.update(u).vertex) {
                 mesh.labels[slot as usize].kind_word = KindWord::NONE;
             }
         }
@@ -497,7 +422,7 @@ impl ApplyUpdates for EdgeMt {
         if !self.has(u) {
             return Err(UpdateError::Missing { update: u.0 });
         }
-        mesh.find_star(u, self.split(u).vertex, found)
+        mesh.find_star(u, self.update(u).vertex, found)
     }
 
     fn find_inserted(
@@ -547,7 +472,7 @@ impl ApplyUpdates for EdgeMt {
         // One of the vertices that the one to be split comes from, or of those that come from what it becomes.
         let (mut above, mut below) = (Some(u), Some(u));
         while above.is_some() || below.is_some() {
-            let coarse = above.map(|u| self.split(u).vertex);
+            let coarse = above.map(|u| self.update(u).vertex);
             let fine = below.map(|u| self.created(u)[0]);
             if let Some(slot) = [coarse, fine].into_iter().flatten().find_map(|v| mesh.slot(v)) {
                 return mesh.positions[slot as usize];

@@ -10,8 +10,10 @@
 //! a tetrahedron is created in refinement by the largest `c` of its vertices and removed by the smallest `s`. The
 //! split of `v` is feasible iff every neighbour `w` has `s(w) > s(v)`; the collapse of update `k` is feasible iff
 //! `v'` and `v''` are in the mesh and every other neighbour `w` of either has `c(w) < k`. Then the star of `v` is
-//! the one of the moment it was created, in every consistent set: a mask over it in the order of its labels means
-//! the same everywhere.
+//! the one of the moment it was created, in every consistent set.
+//!
+//! Offsets, sides and levels are stored as residuals against a prediction from that star, as in files: see
+//! `mt/edge/predict.rs`. [`EdgeMtBuilder`](crate::mt::EdgeMtBuilder) makes them from plain vertex splits.
 
 use crate::mesh::NONE;
 use crate::mt::pages::{Page, Pages};
@@ -31,7 +33,7 @@ pub const MAX_LINK: usize = 32;
 /// close up have at most 96 edges.
 pub const MAX_EDGE: u8 = 127;
 
-/// One update of an edge-based MT: how a vertex becomes two.
+/// A vertex split: how a vertex becomes two.
 ///
 /// With `v` the position of the vertex, `D` the offset and `>>` a floor shift, the new vertices lie at
 /// `v'' = v − (D >> 1)` and `v' = v'' + D`; the inverse is `v = v'' + (D >> 1)`. Field levels go the same way.
@@ -41,9 +43,6 @@ pub struct VertexSplit<'a> {
     pub vertex: VertexId,
     /// `v' − v''` in lattice steps.
     pub offset: [i32; 3],
-    /// In the form that files have, which edge of the link `offset` is counted from, 1 to [`MAX_EDGE`]; 0 for none. See
-    /// [`EdgeMt::coded`].
-    pub edge: u8,
     /// `v' − v''` in levels, field by field.
     pub field_offsets: &'a [i32],
     /// Bit `i` is 0 where tetrahedron `i` of the star goes to `v'`, 1 where it goes to `v''`. The star is in
@@ -51,6 +50,26 @@ pub struct VertexSplit<'a> {
     pub mask: u64,
     /// Field by field, what bounds the error of every tetrahedron that the split removes, and of all updates that depend on
     /// this one.
+    pub errors: &'a [ErrorCode],
+}
+
+/// One update of an edge-based MT, as it is stored: a [`VertexSplit`] whose parts are residuals against the prediction from the
+/// star.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct EdgeUpdate<'a> {
+    /// The vertex that is split.
+    pub vertex: VertexId,
+    /// What is added to the step along an edge of the link to get the offset, in lattice steps.
+    pub offset_residual: [i32; 3],
+    /// That edge, 1 to [`MAX_EDGE`]; 0 for none: `offset_residual` is the offset. Edges are counted from the one whose ends
+    /// have the largest numbers, and taken in the direction in which the first coordinate that changes grows.
+    pub edge: u8,
+    /// What is added to the predicted offsets in levels, field by field.
+    pub level_residuals: &'a [i32],
+    /// Bit `i` is 1 where the predicted side of a tetrahedron is wrong: the `i`-th one, counted from the one whose side is the
+    /// least certain.
+    pub wrong_sides: u64,
+    /// As [`VertexSplit::errors`].
     pub errors: &'a [ErrorCode],
 }
 
@@ -64,8 +83,6 @@ pub struct VertexSplit<'a> {
 pub struct EdgeMt {
     info: MtInfo,
     base: BaseMesh,
-    /// Whether masks and field offsets are told as what is wrong with guesses: see [`EdgeMt::coded`].
-    is_coded: bool,
     /// `s(v)` for the vertices of the base mesh, [`WHOLE`] while nothing splits them.
     base_splits: Vec<i32>,
     pub(super) pages: Pages<EdgePage>,
@@ -83,11 +100,8 @@ pub(super) struct EdgePage {
 /// the offset in each field.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Record {
-    /// Words of the offset and the edge that it is counted from: 2 where they share them, 3 on fine lattices if there is no
-    /// such edge, else 4.
+    /// Words of the offset and the edge that it is counted from: 2 where they share them, 4 on fine lattices.
     offset: usize,
-    /// Bits of a component of the offset where components share words.
-    component: u32,
     /// Words of an update.
     len: usize,
 }
@@ -99,15 +113,14 @@ const VERTEX: usize = 0;
 const SPLITS: usize = 1;
 const MASK: usize = 3;
 const OFFSET: usize = 5;
+/// Bits of a component of an offset where components share words: seven bits are left for the edge.
+const COMPONENT_BITS: u32 = 19;
 
 impl Record {
-    fn new(info: &MtInfo, is_coded: bool) -> Self {
-        // Coded, seven bits are left for the edge.
-        let component = if is_coded { 19 } else { 21 };
-        let wide = if is_coded { 4 } else { 3 };
+    fn new(info: &MtInfo) -> Self {
         // An offset has at most 2^bits, included, and a sign.
-        let offset = if info.lattice.bits + 2 <= component { 2 } else { wide };
-        Self { offset, component, len: OFFSET + offset + info.fields.len() }
+        let offset = if info.lattice.bits + 2 <= COMPONENT_BITS { 2 } else { 4 };
+        Self { offset, len: OFFSET + offset + info.fields.len() }
     }
 
     /// Bytes of an update, its errors included.
@@ -117,27 +130,24 @@ impl Record {
         (self.len * size_of::<i32>() + errors * size_of::<ErrorCode>()) as u64
     }
 
-    fn push(self, words: &mut Vec<i32>, split: &VertexSplit<'_>) {
+    fn push(self, words: &mut Vec<i32>, update: &EdgeUpdate<'_>) {
         let halves = |word: u64| [word as i32, (word >> 32) as i32];
-        let (vertex, [low, high]) = (split.vertex.0 as i32, halves(split.mask));
+        let (vertex, [low, high]) = (update.vertex.0 as i32, halves(update.wrong_sides));
         words.extend_from_slice(&[vertex, WHOLE, WHOLE, low, high]);
-        let [x, y, z] = split.offset;
+        let [x, y, z] = update.offset_residual;
         match self.offset {
-            2 => words.extend_from_slice(&halves(pack(split.offset, split.edge, self.component))),
-            3 => words.extend_from_slice(&[x, y, z]),
-            _ => words.extend_from_slice(&[x, y, z, i32::from(split.edge)]),
+            2 => words.extend_from_slice(&halves(pack(update.offset_residual, update.edge))),
+            _ => words.extend_from_slice(&[x, y, z, i32::from(update.edge)]),
         }
-        words.extend_from_slice(split.field_offsets);
+        words.extend_from_slice(update.level_residuals);
     }
 
-    /// The offset and the edge that it is counted from.
+    /// The residual of the offset and the edge that it is counted from.
     #[inline]
     fn offset(self, words: &[i32]) -> ([i32; 3], u8) {
-        let three = || [0, 1, 2].map(|axis| words[OFFSET + axis]);
         match self.offset {
-            2 => unpack(two(words, OFFSET), self.component),
-            3 => (three(), 0),
-            _ => (three(), words[OFFSET + 3] as u8),
+            2 => unpack(two(words, OFFSET)),
+            _ => ([0, 1, 2].map(|axis| words[OFFSET + axis]), words[OFFSET + 3] as u8),
         }
     }
 }
@@ -149,10 +159,10 @@ fn two(words: &[i32], at: usize) -> u64 {
 
 impl EdgePage {
     /// Adds the next update, which has been checked.
-    fn push(&mut self, record: Record, split: &VertexSplit<'_>) {
-        let complete = self.errors.push(split.errors);
+    fn push(&mut self, record: Record, update: &EdgeUpdate<'_>) {
+        let complete = self.errors.push(update.errors);
         assert!(complete, "each field has an error: that is checked");
-        record.push(&mut self.words, split);
+        record.push(&mut self.words, update);
     }
 }
 
@@ -173,75 +183,69 @@ impl EdgeMt {
     }
 
     /// [`EdgeMt::new`] with pages of `2^bits` updates, of `2^16` at most.
-    pub fn with_page_bits(info: MtInfo, base: BaseMesh, bits: u32) -> Self {
-        Self::empty(info, base, bits, false)
-    }
-
-    fn empty(mut info: MtInfo, base: BaseMesh, bits: u32, is_coded: bool) -> Self {
+    pub fn with_page_bits(mut info: MtInfo, base: BaseMesh, bits: u32) -> Self {
         info.kind = MtKind::Edge;
         Self {
             base_splits: vec![WHOLE; base.positions.len()],
             base,
-            is_coded,
             pages: Pages::new(info.updates, bits),
-            record: Record::new(&info, is_coded),
+            record: Record::new(&info),
             info,
         }
     }
 
-    /// [`EdgeMt::with_page_bits`] in the form that files have: what splits do is told by the star that they meet when they are
-    /// applied. Offsets are what is to be added to the step along an edge of the link, if `edge` names one; those are
-    /// counted from the one whose ends have the largest numbers, and taken in the direction in which the first coordinate that
-    /// changes grows. Masks and field offsets are what is wrong with the guesses that the star allows: bit `i` of a mask says that
-    /// the guess for the `i`-th tetrahedron is wrong, counted from the one whose side is the least certain.
-    pub fn coded(info: MtInfo, base: BaseMesh, page_bits: u32) -> Self {
-        Self::empty(info, base, page_bits, true)
-    }
-
-    /// Whether this is the form that files have.
-    pub fn is_coded(&self) -> bool {
-        self.is_coded
+    /// The same MT, complete, in pages of another size.
+    ///
+    /// # Errors
+    /// If an update is not here.
+    pub fn in_pages(&self, page_bits: u32) -> Result<Self, UpdateError> {
+        let mut mt = Self::with_page_bits(self.info.clone(), self.base.clone(), page_bits);
+        for update in 0..self.updates() {
+            if !self.pages.has(UpdateId(update)) {
+                return Err(UpdateError::Missing { update });
+            }
+            mt.push(&self.update(UpdateId(update)))?;
+        }
+        Ok(mt)
     }
 
     /// Adds the next update, behind all that are here.
     ///
     /// # Errors
-    /// The split vertex must exist and be whole, offsets must fit the lattices, and each field has an error. What needs the
+    /// The split vertex must exist and be whole, residuals must fit the lattices, and each field has an error. What needs the
     /// mesh is checked when the update is applied; that errors do not grow along the partial order is the caller's to see
     /// to.
-    pub fn push(&mut self, split: &VertexSplit<'_>) -> Result<UpdateId, UpdateError> {
+    pub fn push(&mut self, new: &EdgeUpdate<'_>) -> Result<UpdateId, UpdateError> {
         let update = self.updates();
-        self.check(update, split)?;
-        let vertex = split.vertex.0;
-        match self.split_word(split.vertex) {
+        self.check(update, new)?;
+        let vertex = new.vertex.0;
+        match self.split_word(new.vertex) {
             Some(word) if *word == WHOLE => *word = update as i32,
             _ => return Err(UpdateError::Vertex { update, vertex }),
         }
         let (record, fields) = (self.record, self.info.fields.len());
-        self.pages.push(|updates| new_page(record, fields, updates.len()), |page| page.push(record, split));
+        self.pages.push(|updates| new_page(record, fields, updates.len()), |page| page.push(record, new));
         Ok(UpdateId(update))
     }
 
     /// What can be told of an update by itself.
-    fn check(&self, update: u32, split: &VertexSplit<'_>) -> Result<(), UpdateError> {
-        let fits = |offset: i32, bits: u32| offset.unsigned_abs() <= 1 << bits;
-        // A guess may be as wrong as two offsets differ.
-        let spare = u32::from(self.is_coded);
-        let on_lattice = split.offset.iter().all(|&d| fits(d, self.info.lattice.bits))
-            && split.field_offsets.len() == self.info.fields.len()
-            && split
-                .field_offsets
-                .iter()
-                .zip(&self.info.fields)
-                .all(|(&d, field)| fits(d, field.bits + spare));
+    fn check(&self, update: u32, new: &EdgeUpdate<'_>) -> Result<(), UpdateError> {
+        let fits = |residual: i32, bits: u32| residual.unsigned_abs() <= 1 << bits;
+        let fields = &self.info.fields;
+        // A prediction may be as wrong as two offsets differ.
+        let levels = new.level_residuals.iter().zip(fields);
+        let on_lattice = new.offset_residual.iter().all(|&d| fits(d, self.info.lattice.bits))
+            && new.level_residuals.len() == fields.len()
+            && levels.into_iter().all(|(&d, field)| fits(d, field.bits + 1));
         if !on_lattice {
-            return Err(UpdateError::OffLattice { update });
+            Err(UpdateError::OffLattice { update })
+        } else if new.edge > MAX_EDGE {
+            Err(UpdateError::Edge { update })
+        } else if new.errors.len() != fields.len() {
+            Err(UpdateError::Error { update })
+        } else {
+            Ok(())
         }
-        let most_edge = if self.is_coded { MAX_EDGE } else { 0 };
-        if split.edge > most_edge {
-            return Err(UpdateError::Edge { update });
-        }
-        if split.errors.len() == self.info.fields.len() { Ok(()) } else { Err(UpdateError::Error { update }) }
     }
 
     /// Adds all updates of a page, of any that is not here. The pages on which it depends must be here; those that follow
@@ -250,7 +254,7 @@ impl EdgeMt {
     /// # Errors
     /// If the page is not a whole one of this MT, is here already, depends on a page that is not, or has an update that
     /// [`EdgeMt::push`] would refuse. The MT is as it was then.
-    pub fn insert_page(&mut self, page: u32, splits: &[VertexSplit<'_>]) -> Result<(), PageError> {
+    pub fn insert_page(&mut self, page: u32, splits: &[EdgeUpdate<'_>]) -> Result<(), PageError> {
         let updates = self.pages.check_new(page, splits.len())?;
         let mut new = new_page(self.record, self.info.fields.len(), updates.len());
         for (update, split) in updates.clone().zip(splits) {
@@ -325,20 +329,20 @@ impl EdgeMt {
         page.words.get_mut(place * self.record.len + SPLITS + i as usize % 2)
     }
 
-    /// What update `u` does.
+    /// Update `u` as it is stored.
     ///
     /// # Panics
     /// If the MT has no update `u`, or not here.
     #[inline]
-    pub fn split(&self, u: UpdateId) -> VertexSplit<'_> {
+    pub fn update(&self, u: UpdateId) -> EdgeUpdate<'_> {
         let words = self.words(u);
-        let (offset, edge) = self.record.offset(words);
-        VertexSplit {
+        let (offset_residual, edge) = self.record.offset(words);
+        EdgeUpdate {
             vertex: VertexId(words[VERTEX] as u32),
-            offset,
+            offset_residual,
             edge,
-            field_offsets: &words[OFFSET + self.record.offset..],
-            mask: two(words, MASK),
+            level_residuals: &words[OFFSET + self.record.offset..],
+            wrong_sides: two(words, MASK),
             errors: self.errors(u),
         }
     }
@@ -418,21 +422,20 @@ impl MultiTessellation for EdgeMt {
     }
 }
 
-/// Three components of so many bits in one word, and the number of an edge above them.
-fn pack(offset: [i32; 3], edge: u8, bits: u32) -> u64 {
-    let mask = (1_u64 << bits) - 1;
-    let [x, y, z] = offset.map(|d| d as u64 & mask);
-    x | y << bits | z << (2 * bits) | u64::from(edge) << (3 * bits)
+/// Three components in one word, and the number of an edge above them.
+fn pack(offset: [i32; 3], edge: u8) -> u64 {
+    let [x, y, z] = offset.map(|d| d as u64 & ((1 << COMPONENT_BITS) - 1));
+    x | y << COMPONENT_BITS | z << (2 * COMPONENT_BITS) | u64::from(edge) << (3 * COMPONENT_BITS)
 }
 
 #[inline]
-fn unpack(word: u64, bits: u32) -> ([i32; 3], u8) {
+fn unpack(word: u64) -> ([i32; 3], u8) {
     // Shifted up to the top of the word and down again, each component brings its sign along.
     let offset = [2, 1, 0].map(|above| {
-        let top = word << (64 - 3 * bits + above * bits);
-        (top as i64 >> (64 - bits)) as i32
+        let top = word << (64 - 3 * COMPONENT_BITS + above * COMPONENT_BITS);
+        (top as i64 >> (64 - COMPONENT_BITS)) as i32
     });
-    (offset, (word >> (3 * bits)) as u8)
+    (offset, (word >> (3 * COMPONENT_BITS)) as u8)
 }
 
 #[cfg(test)]
@@ -441,13 +444,11 @@ mod tests {
 
     #[test]
     fn offsets_come_back_from_a_word() {
-        for (bits, most_edges) in [(21, 0), (19, 127)] {
-            for largest in [2, 1 << 8, 1_i32 << (bits - 2)] {
-                let values = [-largest, 1 - largest, -1, 0, 1, largest - 1, largest];
-                for (i, edge) in (0..343).zip((0..=most_edges).cycle()) {
-                    let offset = [values[i % 7], values[i / 7 % 7], values[i / 49]];
-                    assert_eq!(unpack(pack(offset, edge, bits), bits), (offset, edge));
-                }
+        for largest in [2, 1 << 8, 1_i32 << (COMPONENT_BITS - 2)] {
+            let values = [-largest, 1 - largest, -1, 0, 1, largest - 1, largest];
+            for (i, edge) in (0..343).zip((0..=MAX_EDGE).cycle()) {
+                let offset = [values[i % 7], values[i / 7 % 7], values[i / 49]];
+                assert_eq!(unpack(pack(offset, edge)), (offset, edge));
             }
         }
     }

@@ -480,7 +480,7 @@ impl MultiTessellation for ExplicitMt {
 mod tests {
     use super::*;
     use crate::geom::Lattice;
-    use crate::mt::{EdgeMt, FieldInfo, MtFault, VertexSplit};
+    use crate::mt::{EdgeMtBuilder, FieldInfo, MtFault, VertexSplit};
 
     /// An octahedron around a vertex that is split along z and whose upper half is split along x.
     fn twice_split() -> ExplicitMt {
@@ -510,28 +510,27 @@ mod tests {
         let mut tets: Vec<[u32; 4]> = ring.map(|[a, b]| [0, a, b, 5]).to_vec();
         tets.extend(ring.map(|[a, b]| [0, b, a, 6]));
         let values = (3..10).collect();
-        let mut mt = EdgeMt::new(info, BaseMesh { positions, values, tets });
+        let base = BaseMesh { positions, values, tets };
+        let mut builder = EdgeMtBuilder::new(info, base).expect("a valid base mesh");
         // In order, the faces are 1 2 5, 1 2 6, 1 4 5, 1 4 6, 2 3 5, 2 3 6, 3 4 5, 3 4 6.
         let along_z = VertexSplit {
             vertex: VertexId(0),
             offset: [0, 0, 16],
-            edge: 0,
             field_offsets: &[3],
             mask: 0b1010_1010,
             errors: &[ErrorCode(9)],
         };
-        mt.push(&along_z).expect("a valid split");
+        builder.push(&along_z).expect("a valid split");
         // The upper half is 7, the lower 8: 1 2 5, 1 2 8, 1 4 5, 1 4 8 go to the side of 1, the rest to that of 3.
         let along_x = VertexSplit {
             vertex: VertexId(7),
             offset: [16, 0, 0],
-            edge: 0,
             field_offsets: &[-3],
             mask: 0b1111_0000,
             errors: &[ErrorCode(5)],
         };
-        mt.push(&along_x).expect("a valid split");
-        ExplicitMt::of(&mt).expect("a valid MT")
+        builder.push(&along_x).expect("a valid split");
+        ExplicitMt::of(builder.mt()).expect("a valid MT")
     }
 
     #[test]

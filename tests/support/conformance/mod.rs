@@ -284,7 +284,7 @@ pub fn empty(mt: &Mt) -> Mt {
 pub fn grow(part: &mut Mt, whole: &Mt) {
     let u = UpdateId(part.updates());
     let pushed = match (part, whole) {
-        (Mt::Edge(part), Mt::Edge(whole)) => part.push(&whole.split(u)),
+        (Mt::Edge(part), Mt::Edge(whole)) => part.push(&whole.update(u)),
         (Mt::Vertex(part), Mt::Vertex(whole)) => part.push(&whole.node(u), whole.errors(u)),
         (Mt::HalfEdge(part), Mt::HalfEdge(whole)) => part.push(&whole.update(u).expect("an update")),
         (Mt::Explicit(part), Mt::Explicit(whole)) => {
