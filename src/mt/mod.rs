@@ -43,7 +43,8 @@ pub use replay::ReplayError;
 #[cfg(feature = "build")]
 pub(crate) use replay::canonical;
 pub use stats::{MtStats, stats};
-pub use vertex::store::{MAX_AROUND, MAX_INSERTED, MAX_REMOVED, NodeBits, VertexMt};
+pub use vertex::limits::{MAX_AROUND, MAX_INSERTED, MAX_REMOVED};
+pub use vertex::store::{NodeBits, VertexMt};
 pub(crate) use vertex::streaming::Insertion;
 pub use vertex::tet_errors::MAX_QUARTERINGS;
 

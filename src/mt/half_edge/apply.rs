@@ -3,13 +3,14 @@
 //! In the current mesh the tag of a tetrahedron is the update that removes it, and its inner faces are those that go with
 //! it. Insertion keeps the slots of T_u, removal those of the star without the near vertex.
 
-use super::star_code::{KnownStars, StarCode, spread};
+use super::scratch::{MOST, NEW, NO_ENTRY, NewTet, Scratch};
+use super::star_code::{KnownStars, StarCode};
 use super::store::HalfEdgeMt;
-use crate::geom::{NARROW_BITS, det_i64, orient3d};
-use crate::mesh::{FACES, NONE};
+use crate::geom::orient3d;
+use crate::mesh::NONE;
 use crate::mt::mesh::KindState;
 use crate::mt::mesh::current::{KindWord, Labels};
-use crate::mt::mesh::stars::{GATHERED, Gather, Star};
+use crate::mt::mesh::stars::{Gather, Star};
 use crate::mt::mesh::tet::corner_of;
 use crate::mt::pages::Page;
 use crate::mt::{
@@ -18,62 +19,15 @@ use crate::mt::{
 };
 use std::ops::Range;
 
-/// Most tetrahedra of a star, and most vertices of its link.
-pub(in crate::mt) const MOST: usize = GATHERED;
-
-/// Stands for the new vertex among the corners of a [`NewTet`].
-pub(in crate::mt) const NEW: u8 = 0xFF;
-
-/// No tetrahedron of the new star.
-pub(in crate::mt) const NO_ENTRY: u8 = 0xFF;
-
-/// A tetrahedron of the star that an insertion makes.
-#[derive(Clone, Copy, Debug, Default)]
-pub(in crate::mt) struct NewTet {
-    /// Its corners by index into the link, [`NEW`] for the new vertex; positive.
-    pub corners: [u8; 4],
-    /// Across each face that has the new vertex, the tetrahedron of the star, [`NO_ENTRY`] at the boundary.
-    pub across: [u8; 4],
-    /// Which corner is the new vertex.
-    pub own: u8,
-    /// What lies across the face opposite the new vertex.
-    pub beyond: u32,
-    /// The slot of T_u that it takes, or along whose face it fills the gap.
-    pub source: u32,
-    /// The update that removes it.
-    pub remover: u32,
-    /// Which faces go with it.
-    pub inner: u8,
-}
-
-/// Scratch space for insertions and removals.
-#[derive(Clone, Debug)]
-pub(in crate::mt) struct Scratch {
-    /// T_u.
-    removed: [u32; MOST],
-    removed_len: usize,
-    /// The star: first what takes the slots of T_u in its order, then what fills the gaps.
-    pub star: [NewTet; MOST],
-    pub star_len: usize,
-    /// Slots of the vertices of Π_u; the near vertex is the first.
-    pub link: [u32; MOST],
-    pub link_len: usize,
-    /// Around the edge from the near to the new vertex: a link vertex, a gap, and the corner of that opposite the face
-    /// which has the vertex.
-    ends: Vec<(u8, u8, u8)>,
-    pub levels: Vec<i32>,
-    gathered: Star,
-    /// A hash of the label of each vertex of the link; then that of the new vertex.
-    pub hashes: Vec<u64>,
-    /// For each tetrahedron of the star, the sum of those of its corners.
-    pub tet_hashes: Vec<u64>,
-    /// The star in canonical order: hashes whose lowest bits are replaced by the place in the star.
-    pub sorted: Vec<u64>,
-    pub code: StarCode,
+/// What the current mesh carries for a half-edge MT.
+#[derive(Clone, Debug, Default)]
+struct State {
+    scratch: Scratch,
+    code: StarCode,
     known: KnownStars,
 }
 
-impl KindState for Scratch {
+impl KindState for State {
     fn bytes(&self) -> u64 {
         size_of_val(self) as u64 + self.known.bytes()
     }
@@ -83,29 +37,8 @@ impl KindState for Scratch {
     }
 }
 
-fn take_scratch(mesh: &mut CurrentMesh) -> Box<Scratch> {
+fn take_state(mesh: &mut CurrentMesh) -> Box<State> {
     mesh.take_kind_state().unwrap_or_default()
-}
-
-impl Default for Scratch {
-    fn default() -> Self {
-        Self {
-            removed: [0; MOST],
-            removed_len: 0,
-            star: [NewTet::default(); MOST],
-            star_len: 0,
-            link: [0; MOST],
-            link_len: 0,
-            ends: Vec::new(),
-            levels: Vec::new(),
-            gathered: Star::default(),
-            hashes: Vec::new(),
-            tet_hashes: Vec::new(),
-            sorted: Vec::new(),
-            code: StarCode::default(),
-            known: KnownStars::default(),
-        }
-    }
 }
 
 /// How far to go to name an update that has to come first.
@@ -219,12 +152,13 @@ impl HalfEdgeMt {
     fn find_parent(&self, mesh: &CurrentMesh, u: UpdateId) -> Result<UpdateId, UpdateError> {
         let torn = UpdateError::Cavity { update: u.0 };
         let mut other = self.start().map_err(|_| torn.clone())?;
-        let mut scratch = Box::<Scratch>::default();
+        let mut state = Box::<State>::default();
         for before in (0..u.0).map(UpdateId) {
-            self.insert(&mut other, before, Search::Nearby, &mut scratch)?;
+            self.insert(&mut other, before, Search::Nearby, &mut state)?;
             other.clear_touched();
         }
-        self.collect_removed(&mut other, u, Search::Nearby, &mut scratch)?;
+        let scratch = &mut state.scratch;
+        self.collect_removed(&mut other, u, Search::Nearby, scratch)?;
         let removed = &scratch.removed[..scratch.removed_len];
         let mut parents = removed.iter().filter_map(|&t| self.creator(&other, t));
         parents.find(|&p| mesh.slot(self.vertex(p)).is_none()).ok_or(torn)
@@ -320,21 +254,20 @@ impl HalfEdgeMt {
         mesh: &mut CurrentMesh,
         u: UpdateId,
         search: Search,
-        scratch: &mut Scratch,
+        state: &mut State,
     ) -> Result<Applied, UpdateError> {
+        let State { scratch, code, known } = state;
         let position = match self.prepare(mesh, u, search, scratch)? {
             Ok(position) => position,
             Err(before) => return Ok(Applied::Blocked(before)),
         };
         scratch.hash_star(mesh, self.vertex(u).0);
         scratch.sort_star();
-        let mut known = std::mem::take(&mut scratch.known);
         let found = if known.recall(u.0, scratch) {
             Some(())
         } else {
-            self.find_removers(mesh, u, position, scratch).inspect(|()| known.keep(u.0, scratch))
+            self.find_removers(mesh, u, position, scratch, code).inspect(|()| known.keep(u.0, scratch))
         };
-        scratch.known = known;
         found.ok_or(UpdateError::Mask { update: u.0 })?;
         self.perform_insertion(mesh, u, position, scratch);
         Ok(Applied::Done)
@@ -454,199 +387,6 @@ impl HalfEdgeMt {
     }
 }
 
-impl Scratch {
-    /// The index of a vertex in the link, where it is put if it is new.
-    #[inline]
-    fn number(&mut self, mesh: &mut CurrentMesh, v: u32) -> Option<u8> {
-        let next = self.link_len;
-        if let Some(known) = mesh.number_slot(v, next as u32) {
-            return Some(known as u8);
-        }
-        // One less than all numbers, so that a mark never overflows.
-        *self.link.get_mut(next).filter(|_| next + 1 < MOST)? = v;
-        self.link_len += 1;
-        Some(next as u8)
-    }
-
-    /// Adds the tetrahedron that fills the gap behind a face of tetrahedron `t` of T_u, whose corner `at` is the near vertex.
-    #[inline]
-    fn add_gap(
-        &mut self,
-        of: u8,
-        corners: &[u8; 4],
-        [at, face]: [usize; 2],
-        beyond: u32,
-        t: u32,
-    ) -> Option<u8> {
-        let place = self.star_len;
-        if place == MOST {
-            return None;
-        }
-        let mut new = NewTet { corners: *corners, own: face as u8, beyond, source: t, ..NewTet::default() };
-        new.corners[face] = NEW;
-        new.across = [NO_ENTRY; 4];
-        new.across[at] = of;
-        for corner in (0..4).filter(|&k| k != at && k != face) {
-            // The face opposite this corner has the other one.
-            let other = 6 - at - face - corner;
-            self.ends.push((corners[other], place as u8, corner as u8));
-        }
-        self.star[place] = new;
-        self.star_len += 1;
-        Some(place as u8)
-    }
-
-    /// Joins the tetrahedra around the edge from the near to the new vertex. They must close up, or run from boundary to
-    /// boundary, in one piece.
-    fn close_ring(&mut self) -> Option<()> {
-        let gaps = self.ends.len() / 2;
-        if gaps == 0 {
-            return None;
-        }
-        self.ends.sort_unstable();
-        let (mut open, mut i) = (0, 0);
-        while i < self.ends.len() {
-            let (v, gap, corner) = self.ends[i];
-            let next = self.ends.get(i + 1).filter(|next| next.0 == v);
-            let Some(&(_, other, side)) = next else {
-                open += 1;
-                i += 1;
-                continue;
-            };
-            if self.ends.get(i + 2).is_some_and(|third| third.0 == v) {
-                return None;
-            }
-            self.star[gap as usize % MOST].across[corner as usize & 3] = other;
-            self.star[other as usize % MOST].across[side as usize & 3] = gap;
-            i += 2;
-        }
-        if open != 0 && open != 2 {
-            return None;
-        }
-        // From one end, or from anywhere, all must be met.
-        let first = self.ends[0].1;
-        let (mut met, mut from, mut at) = (1, NO_ENTRY, first);
-        if open == 2 {
-            let lone = |i: usize| {
-                let v = self.ends[i].0;
-                let same = |j: Option<usize>| j.and_then(|j| self.ends.get(j)).is_some_and(|e| e.0 == v);
-                !same(i.checked_sub(1)) && !same(Some(i + 1))
-            };
-            at = self.ends[(0..self.ends.len()).find(|&i| lone(i))?].1;
-        }
-        let start = at;
-        loop {
-            let NewTet { corners, across, own, .. } = self.star[at as usize % MOST];
-            let next = (0..4).filter(|&k| k != own as usize && corners[k] != 0).map(|k| across[k]);
-            let Some(next) = next.filter(|&n| n != NO_ENTRY && n != from).min() else { break };
-            if next == start {
-                break;
-            }
-            (from, at) = (at, next);
-            met += 1;
-            if met > gaps {
-                return None;
-            }
-        }
-        (met == gaps).then_some(())
-    }
-
-    /// Hashes the labels of the star.
-    pub fn hash_star(&mut self, mesh: &CurrentMesh, vertex: u32) {
-        self.hashes.clear();
-        self.hashes.extend(self.link[..self.link_len].iter().map(|&slot| spread(mesh.vertex(slot).0)));
-        self.hashes.push(spread(vertex));
-        let last = self.link_len;
-        self.tet_hashes.clear();
-        for new in &self.star[..self.star_len] {
-            let sum = new
-                .corners
-                .iter()
-                .fold(0, |sum: u64, &corner| sum.wrapping_add(self.hashes[usize::from(corner).min(last)]));
-            self.tet_hashes.push(sum);
-        }
-    }
-
-    /// Puts the star, which has been hashed, into canonical order.
-    fn sort_star(&mut self) {
-        const PLACE: u64 = MOST as u64 - 1;
-        self.sorted.clear();
-        self.sorted.extend((0..).zip(&self.tet_hashes).map(|(i, hash)| hash & !PLACE | i));
-        self.sorted.sort_unstable();
-    }
-
-    /// Whether all tetrahedra of the star are positive with the new vertex at `position`.
-    fn is_positive(&self, mesh: &CurrentMesh, position: [i32; 3]) -> bool {
-        let (mut from, mut largest) = ([[0_i64; 3]; MOST], 0);
-        for (from, &v) in from.iter_mut().zip(&self.link[..self.link_len]) {
-            let p = mesh.positions[v as usize];
-            for k in 0..3 {
-                from[k] = i64::from(p[k]) - i64::from(position[k]);
-                largest |= from[k].unsigned_abs();
-            }
-        }
-        let narrow = largest <= 1 << NARROW_BITS;
-        self.star[..self.star_len].iter().all(|new| {
-            let [i, j, k] = FACES[new.own as usize & 3].map(|corner| new.corners[corner] as usize % MOST);
-            if narrow {
-                return det_i64(from[i], from[j], from[k]) > 0;
-            }
-            let at = |x: usize| mesh.positions[self.link[x] as usize];
-            orient3d(position, at(i), at(j), at(k)) > 0
-        })
-    }
-
-    /// Predicts the levels of a vertex at `position` from those around it: means by inverse squared distance, in whole
-    /// numbers, so that the order of the link does not matter.
-    pub fn predict_levels(&mut self, mesh: &CurrentMesh, position: [i32; 3]) {
-        let link = &self.link[..self.link_len];
-        let largest = link.iter().map(|&v| squared(mesh, v, position)).max().unwrap_or(1).max(1);
-        self.levels.clear();
-        self.levels.resize(mesh.fields, 0);
-        for (field, level) in self.levels.iter_mut().enumerate() {
-            let (mut total, mut sum) = (0_u128, 0_u128);
-            for &v in link {
-                let weight = weight(largest, squared(mesh, v, position));
-                total += weight;
-                // Levels are not negative.
-                sum += weight * u128::from(mesh.levels(v)[field].unsigned_abs());
-            }
-            *level = mean(sum, total.max(1)) as i32;
-        }
-    }
-}
-
-/// The squared distance of a vertex from a position.
-#[inline]
-fn squared(mesh: &CurrentMesh, v: u32, position: [i32; 3]) -> u64 {
-    let p = mesh.positions[v as usize];
-    // Less than 2^62 each: positions are on lattices of at most 30 bits.
-    (0..3).map(|k| u64::from(p[k].abs_diff(position[k]))).fold(0, |sum, d| sum.saturating_add(d * d))
-}
-
-#[inline]
-fn weight(largest: u64, squared: u64) -> u128 {
-    let squared = squared.max(1);
-    // Short numbers divide many times as fast.
-    if largest < 1 << (64 - WEIGHT_BITS) {
-        u128::from((largest << WEIGHT_BITS) / squared)
-    } else {
-        (u128::from(largest) << WEIGHT_BITS) / u128::from(squared)
-    }
-}
-
-/// The quotient, rounded.
-#[inline]
-fn mean(sum: u128, total: u128) -> u128 {
-    match (u64::try_from(2 * sum + total), u64::try_from(2 * total)) {
-        (Ok(sum), Ok(total)) => u128::from(sum / total),
-        _ => (2 * sum + total) / (2 * total),
-    }
-}
-
-/// Weights of the vertices around a new one have at least so many bits.
-const WEIGHT_BITS: u32 = 8;
-
 impl CurrentMesh {
     /// All tetrahedra around the vertex in `slot`, however many, each with the corner that it is.
     fn all_around(&mut self, slot: u32) -> Vec<AtVertex> {
@@ -716,9 +456,9 @@ impl UpdatePages for HalfEdgeMt {
         let vertices = updates.start..updates.end;
         let base = self.vertex(UpdateId(0)).0;
         mesh.forget_vertices(vertices.start + base..vertices.end + base);
-        if let Some(mut scratch) = mesh.take_kind_state::<Scratch>() {
-            scratch.known.forget(updates);
-            mesh.put_back_kind_state(scratch);
+        if let Some(mut state) = mesh.take_kind_state::<State>() {
+            state.known.forget(updates);
+            mesh.put_back_kind_state(state);
         }
     }
 }
@@ -744,34 +484,32 @@ impl ApplyUpdates for HalfEdgeMt {
 
     #[inline]
     fn creator(&self, mesh: &CurrentMesh, t: u32) -> Option<UpdateId> {
-        let newest = mesh.tets[t as usize].iter().map(|&v| mesh.labels[v as usize].vertex).max();
-        self.inserted_by(VertexId(newest?))
+        self.inserted_by(mesh.newest_vertex(t))
     }
 
     #[inline]
     fn may_coarsen(&self, mesh: &CurrentMesh, u: UpdateId) -> bool {
-        let incident = mesh.slot(self.vertex(u)).map(|slot| mesh.incident[slot as usize]);
-        incident.is_some_and(|t| self.creator(mesh, t) == Some(u))
+        mesh.is_newest_nearby(self.vertex(u))
     }
 
     fn refine(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
-        let mut scratch = take_scratch(mesh);
-        let applied = self.insert(mesh, u, Search::Everywhere, &mut scratch);
-        mesh.put_back_kind_state(scratch);
+        let mut state = take_state(mesh);
+        let applied = self.insert(mesh, u, Search::Everywhere, &mut state);
+        mesh.put_back_kind_state(state);
         applied
     }
 
     fn refine_marked(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
-        let mut scratch = take_scratch(mesh);
-        let applied = self.insert(mesh, u, Search::Nearby, &mut scratch);
-        mesh.put_back_kind_state(scratch);
+        let mut state = take_state(mesh);
+        let applied = self.insert(mesh, u, Search::Nearby, &mut state);
+        mesh.put_back_kind_state(state);
         applied
     }
 
     fn coarsen(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {
-        let mut scratch = take_scratch(mesh);
-        let applied = self.remove(mesh, u, &mut scratch);
-        mesh.put_back_kind_state(scratch);
+        let mut state = take_state(mesh);
+        let applied = self.remove(mesh, u, &mut state.scratch);
+        mesh.put_back_kind_state(state);
         applied
     }
 
@@ -781,8 +519,8 @@ impl ApplyUpdates for HalfEdgeMt {
         u: UpdateId,
         look: LookAtTet<'_>,
     ) -> Result<Applied, UpdateError> {
-        let mut scratch = take_scratch(mesh);
-        let star = &mut scratch.gathered;
+        let mut state = take_state(mesh);
+        let star = &mut state.scratch.gathered;
         let found = self.collect_inserted(mesh, u, star);
         if let Ok(Ok([slot, near])) = found {
             let tets = star.tets[..star.len].iter().map(|&t| mesh.tets[t as usize]);
@@ -794,7 +532,7 @@ impl ApplyUpdates for HalfEdgeMt {
                 }
             }
         }
-        mesh.put_back_kind_state(scratch);
+        mesh.put_back_kind_state(state);
         Ok(found?.map_or_else(Applied::Blocked, |_| Applied::Done))
     }
 
@@ -809,12 +547,12 @@ impl ApplyUpdates for HalfEdgeMt {
         u: UpdateId,
         found: &mut Vec<u32>,
     ) -> Result<(), UpdateError> {
-        let mut scratch = take_scratch(mesh);
-        let collected = self.collect_removed(mesh, u, Search::Everywhere, &mut scratch);
+        let mut state = take_state(mesh);
+        let collected = self.collect_removed(mesh, u, Search::Everywhere, &mut state.scratch);
         if collected == Ok(Applied::Done) {
-            found.extend_from_slice(&scratch.removed[..scratch.removed_len]);
+            found.extend_from_slice(&state.scratch.removed[..state.scratch.removed_len]);
         }
-        mesh.put_back_kind_state(scratch);
+        mesh.put_back_kind_state(state);
         match collected? {
             Applied::Done => Ok(()),
             Applied::Blocked(_) => Err(UpdateError::Error { update: u.0 }),

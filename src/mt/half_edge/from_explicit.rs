@@ -1,6 +1,7 @@
 //! From an explicit MT to the compact half-edge one, where every update inserts a vertex that collapses onto a neighbour.
 
-use super::apply::{NEW, Scratch, Search};
+use super::apply::Search;
+use super::scratch::{NEW, Scratch};
 use super::store::{BaseMark, ForestChild, HalfEdgeMt, HalfEdgeUpdate};
 use crate::mesh::NONE;
 use crate::mt::replay::canonical;

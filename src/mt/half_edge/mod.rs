@@ -2,5 +2,6 @@
 
 pub(super) mod apply;
 pub(super) mod from_explicit;
+pub(super) mod scratch;
 pub(super) mod star_code;
 pub(super) mod store;

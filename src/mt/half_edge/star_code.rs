@@ -14,7 +14,7 @@
 //! All of this is the same in every consistent set, for the star is: positions are integers, sums of floating-point
 //! numbers have a fixed order, and ties are broken by labels.
 
-use super::apply::{MOST, NO_ENTRY, NewTet, Scratch};
+use super::scratch::{MOST, NO_ENTRY, NewTet, Scratch};
 use super::store::{ForestChild, HalfEdgeMt};
 use crate::geom::orient3d;
 use crate::mesh::NONE;
@@ -182,13 +182,14 @@ impl HalfEdgeMt {
         u: UpdateId,
         position: [i32; 3],
         scratch: &mut Scratch,
+        code: &mut StarCode,
     ) -> Option<()> {
         let star = self.update(u)?.star;
         let (symbols, bits) = match star.split_first() {
             Some((&count, rest)) => rest.split_at_checked(usize::from(count))?,
             None => (star, star),
         };
-        self.tell(mesh, u, position, scratch, &mut Reader { symbols, bits, at: 0 })
+        self.tell(mesh, u, position, (scratch, code), &mut Reader { symbols, bits, at: 0 })
     }
 
     /// The code of a star, given the remover and the inner faces of each of its tetrahedra. None if it has none.
@@ -201,7 +202,7 @@ impl HalfEdgeMt {
         truth: &[(u32, u8)],
     ) -> Option<Vec<u8>> {
         let mut writer = Writer { truth, symbols: Vec::new(), bits: Vec::new() };
-        self.tell(mesh, u, position, scratch, &mut writer)?;
+        self.tell(mesh, u, position, (scratch, &mut StarCode::default()), &mut writer)?;
         let Writer { mut symbols, bits, .. } = writer;
         symbols.truncate(symbols.iter().rposition(|&s| s != 0).map_or(0, |last| last + 1));
         let used = bits.iter().rposition(|&bit| bit).map_or(0, |last| last + 1);
@@ -221,10 +222,10 @@ impl HalfEdgeMt {
         mesh: &CurrentMesh,
         u: UpdateId,
         position: [i32; 3],
-        scratch: &mut Scratch,
+        (scratch, code): (&mut Scratch, &mut StarCode),
         teller: &mut impl Teller,
     ) -> Option<()> {
-        let Scratch { star, star_len, link, link_len, code, hashes, tet_hashes, .. } = scratch;
+        let Scratch { star, star_len, link, link_len, hashes, tet_hashes, .. } = scratch;
         let (star, link) = (&mut star[..*star_len], &link[..*link_len]);
         let vertex = self.vertex(u);
         let lists: Vec<&[ForestChild]> = link
@@ -277,15 +278,6 @@ impl<'a> Around<'a> {
         let [a, b, c, d] = new.corners;
         [self.list(a), self.list(b), self.list(c), self.list(d)]
     }
-}
-
-/// Spreads a label over the bits of a word (the constants are those of SplitMix64).
-#[inline]
-pub(in crate::mt) fn spread(label: u32) -> u64 {
-    let x = u64::from(label).wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    let x = (x ^ x >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    let x = (x ^ x >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
-    x ^ x >> 31
 }
 
 /// Levels of certainty.

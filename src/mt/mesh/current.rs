@@ -296,6 +296,19 @@ impl CurrentMesh {
         Some(self.slot_of.get(vertex.0)).filter(|&s| s != NONE)
     }
 
+    /// The newest vertex of tetrahedron `t`, which has the largest number.
+    #[inline]
+    pub(in crate::mt) fn newest_vertex(&self, t: u32) -> VertexId {
+        let [a, b, c, d] = self.tets[t as usize].map(|slot| self.labels[slot as usize].vertex);
+        VertexId(a.max(b).max(c.max(d)))
+    }
+
+    /// Whether `vertex` is in the mesh, and the newest one of some tetrahedron around it.
+    #[inline]
+    pub(in crate::mt) fn is_newest_nearby(&self, vertex: VertexId) -> bool {
+        self.slot(vertex).is_some_and(|slot| self.newest_vertex(self.incident[slot as usize]) == vertex)
+    }
+
     /// Moves the last entries into the holes that coarsening left, so that all arrays are packed.
     pub fn compact(&mut self) {
         while let Some(hole) = self.free_tets.pop() {

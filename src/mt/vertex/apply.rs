@@ -3,364 +3,28 @@
 //! In the current mesh, the tag of a tetrahedron is the update that removes it. While that update has not arrived, the
 //! tag tells which child of the tetrahedron's creator it will be.
 
-use super::bit_string::{Bits, width_of};
-use super::cavity_fill::{Across, Close, Face, Glue, turned};
-use super::from_explicit::{Hole, write_given_up, write_removed};
-use super::sphere_order::{ApexCode, Spheres};
-use super::store::{COUNT_BITS, MAX_AROUND, MAX_INSERTED, VertexMt};
+use super::bit_string::width_of;
+use super::cavity::{Cavity, SLOTS, Wall, take_cavity};
+use super::cavity_fill::{Across, Close, Face, turned};
+use super::limits::{COUNT_BITS, MAX_AROUND, MAX_INSERTED};
+use super::shape_code::{Code, write_given_up};
+use super::sphere_order::Spheres;
+use super::store::VertexMt;
 use super::streaming::Insertion;
 use super::tet_errors::{Packed, QUARTERING_BITS};
-use crate::geom::{NARROW_BITS, det_i64, orient3d};
-use crate::mesh::{FACES, NONE};
+use crate::geom::{NARROW_BITS, orient3d};
+use crate::mesh::NONE;
+use crate::mt::mesh::FIRST_ANONYMOUS_TAG;
 use crate::mt::mesh::current::{KindWord, Labels};
-use crate::mt::mesh::stars::{BARE, GATHERED, Gather, LINK_CAPACITY, Star};
-use crate::mt::mesh::{FIRST_ANONYMOUS_TAG, KindState};
-use crate::mt::ranks::rank;
+use crate::mt::mesh::stars::{GATHERED, Gather};
 use crate::mt::{
     Applied, ApplyUpdates, BaseMeshError, CurrentMesh, ErrorCode, LookAtTet, MultiTessellation, PagedArray,
     UpdateError, UpdateId, UpdatePages, VertexId,
 };
 use std::ops::Range;
 
-/// "This edge is on the rim: the face behind it is given up."
-const GIVEN_UP: u32 = 0xFF;
-
-/// Room for the new slots, and for [`GIVEN_UP`].
-const SLOTS: usize = 256;
-
 /// To look around a vertex for what an update removes takes as much as to look at so many tetrahedra.
 const SITE_COST: usize = 128;
-
-/// A face of Π_u with what lies beyond.
-#[derive(Clone, Copy, Debug, Default)]
-struct Wall {
-    /// Its vertices by index into the link, in an order that makes a tetrahedron `(v, corners)` positive.
-    corners: [u8; 3],
-    beyond: u32,
-    /// Which neighbour of the one beyond lies on this side.
-    side: u8,
-}
-
-/// Scratch space for insertions and removals.
-#[derive(Clone, Debug)]
-pub(in crate::mt) struct Cavity {
-    glue: Glue,
-    star: Star,
-    /// The slots of T_u.
-    tets: [u32; GATHERED],
-    tets_len: usize,
-    /// Their corners by index into the link.
-    corners: [[u8; 4]; GATHERED],
-    /// Faces of T_u that none of its tetrahedra lies behind: tetrahedron, face, what lies behind.
-    bare: Box<[[u32; 3]; BARE]>,
-    bare_len: usize,
-    walls: [Wall; MAX_INSERTED],
-    walls_len: usize,
-    /// Slots of the vertices of Π_u.
-    link: [u32; LINK_CAPACITY],
-    link_len: usize,
-    /// The place of each vertex of the link in the order of their labels.
-    order: [i32; MAX_AROUND],
-    /// For a directed edge between two of them the new tetrahedron that has it: `epoch << 16 | tetrahedron`.
-    edges: Box<[u32; MAX_AROUND * MAX_AROUND]>,
-    epoch: u32,
-    /// The place of each wall in canonical order.
-    places: [i32; GATHERED],
-    /// Across the faces of each new tetrahedron.
-    across: [[u32; 4]; MAX_INSERTED],
-    /// The tags of the new tetrahedra.
-    tags: [u32; MAX_INSERTED],
-    /// Their quarterings, where these are kept.
-    quarterings: [u8; MAX_INSERTED],
-    /// Of T_u.
-    fingerprint: Fingerprint,
-    /// The node of an update that is added.
-    bits: Bits,
-    /// The tags that the tetrahedra which it removes had.
-    removed_tags: [u32; GATHERED],
-    /// The quarterings of the tetrahedra that vertices have replaced, by label, where quarterings are kept.
-    replaced: Option<PagedArray<Packed>>,
-}
-
-impl KindState for Cavity {
-    fn bytes(&self) -> u64 {
-        (size_of_val(self) + self.replaced.as_ref().map_or(0, PagedArray::bytes)) as u64
-    }
-
-    fn copy(&self) -> Box<dyn KindState> {
-        Box::new(self.clone())
-    }
-}
-
-pub(super) fn take_cavity(mesh: &mut CurrentMesh) -> Box<Cavity> {
-    mesh.take_kind_state().unwrap_or_default()
-}
-
-/// A hash of the tetrahedra that an insertion removed, which the mesh keeps with the vertex (its [`KindWord`]). What the removal of the vertex puts
-/// back must have the same one. So a mesh is always one that insertions alone lead to; a code that names other
-/// tetrahedra than those which were there could make ones that the rest of the mesh, if it overlaps, has already.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Fingerprint(u32);
-
-impl Fingerprint {
-    /// What a vertex contributes, by its label.
-    #[inline]
-    fn of_vertex(label: u32) -> u32 {
-        let x = label.wrapping_mul(0x9E37_79B1);
-        (x ^ x >> 15).wrapping_mul(0x85EB_CA77)
-    }
-
-    /// Takes in a tetrahedron, given the sum of what its vertices contribute.
-    #[inline]
-    fn add(&mut self, sum: u32) {
-        let x = (sum ^ sum >> 16).wrapping_mul(0xC2B2_AE3D);
-        self.0 = self.0.wrapping_add(x ^ x >> 13);
-    }
-}
-
-impl Default for Cavity {
-    fn default() -> Self {
-        Self {
-            glue: Glue::default(),
-            star: Star::default(),
-            tets: [0; GATHERED],
-            tets_len: 0,
-            corners: [[0; 4]; GATHERED],
-            bare: Box::new([[0; 3]; BARE]),
-            bare_len: 0,
-            walls: [Wall::default(); MAX_INSERTED],
-            walls_len: 0,
-            link: [0; LINK_CAPACITY],
-            link_len: 0,
-            order: [0; MAX_AROUND],
-            edges: Box::new([0; MAX_AROUND * MAX_AROUND]),
-            epoch: 0,
-            places: [0; GATHERED],
-            across: [[NONE; 4]; MAX_INSERTED],
-            tags: [NONE; MAX_INSERTED],
-            quarterings: [0; MAX_INSERTED],
-            fingerprint: Fingerprint::default(),
-            bits: Bits::default(),
-            removed_tags: [NONE; GATHERED],
-            replaced: None,
-        }
-    }
-}
-
-impl Cavity {
-    /// Takes `removed`, which all have the tag, and lists their faces that none of them lies behind.
-    fn list_bare(&mut self, mesh: &mut CurrentMesh, removed: &[u32], tag: u32) {
-        mesh.next_epoch();
-        (self.tets_len, self.bare_len) = (removed.len(), 0);
-        self.tets[..removed.len()].copy_from_slice(removed);
-        for &t in removed {
-            for (face, n) in (0..).zip(mesh.neighbors[t as usize]) {
-                // Written anyway, and counted if it belongs there.
-                self.bare[self.bare_len % BARE] = [t, face, n];
-                self.bare_len += usize::from(n == NONE || mesh.tag(n) != tag);
-            }
-        }
-    }
-
-    /// Puts a face of tetrahedron `tet` on the list of walls. None if there are too many, or too many vertices.
-    #[inline]
-    fn add_wall(
-        &mut self,
-        mesh: &mut CurrentMesh,
-        tet: &[u32; 4],
-        face: usize,
-        beyond: u32,
-        side: u8,
-    ) -> Option<()> {
-        let corners =
-            FACES[face & 3].map(|k| mesh.number_vertex(tet[k & 3], &mut self.link, &mut self.link_len));
-        *self.walls.get_mut(self.walls_len)? = Wall { corners, beyond, side };
-        self.walls_len += 1;
-        (self.link_len <= MAX_AROUND).then_some(())
-    }
-
-    /// What each vertex of the link contributes to a fingerprint.
-    #[inline]
-    fn prints(&self, mesh: &CurrentMesh) -> [u32; MAX_AROUND] {
-        let mut prints = [0; MAX_AROUND];
-        for (print, &v) in prints.iter_mut().zip(&self.link[..self.link_len]) {
-            *print = Fingerprint::of_vertex(mesh.labels[v as usize].vertex);
-        }
-        prints
-    }
-
-    /// Finds the fingerprint of the tetrahedra that were built.
-    #[inline]
-    fn fingerprint_built(&mut self, mesh: &CurrentMesh) {
-        let prints = self.prints(mesh);
-        self.fingerprint = Fingerprint::default();
-        for tet in &self.glue.tets[..self.glue.len] {
-            let of_corners = tet.iter().map(|&x| prints[x as usize % MAX_AROUND]);
-            self.fingerprint.add(of_corners.fold(0, u32::wrapping_add));
-        }
-    }
-
-    /// Finds the faces of Π_u around the tetrahedra that were gathered, and joins the new tetrahedra behind them. `given_up` is the
-    /// number of faces on the boundary where some of these are given up; which are, `is_given_up` tells by their places and by
-    /// tetrahedron and face.
-    fn find_walls(
-        &mut self,
-        mesh: &mut CurrentMesh,
-        given_up: Option<usize>,
-        is_given_up: &mut dyn FnMut(usize, [u32; 2]) -> bool,
-    ) -> Option<()> {
-        (self.walls_len, self.link_len) = (0, 0);
-        let mut outer: Vec<([u32; 3], [u32; 2])> = Vec::new();
-        let mut fits = true;
-        for i in 0..self.bare_len {
-            let [t, face, beyond] = self.bare[i];
-            let tet = mesh.tets[t as usize];
-            if beyond == NONE && given_up.is_some() {
-                let mut sorted = FACES[face as usize & 3].map(|k| mesh.labels[tet[k] as usize].vertex);
-                sorted.sort_unstable();
-                // Kept in order as they come: they are few.
-                let at = outer.partition_point(|other| *other < (sorted, [t, face]));
-                outer.insert(at, (sorted, [t, face]));
-                continue;
-            }
-            let side = if beyond == NONE { Some(0) } else { mesh.side_towards(beyond, t) };
-            fits &= side.is_some();
-            self.add_wall(mesh, &tet, face as usize, beyond, side.unwrap_or(0))?;
-        }
-        let mut bare = Vec::new();
-        if given_up.is_some_and(|count| count != outer.len()) {
-            return None;
-        }
-        for (place, (_, [t, face])) in outer.into_iter().enumerate() {
-            let tet = mesh.tets[t as usize];
-            if is_given_up(place, [t, face]) {
-                bare.push(FACES[face as usize & 3].map(|k| tet[k]));
-            } else {
-                self.add_wall(mesh, &tet, face as usize, NONE, 0)?;
-            }
-        }
-        let mut rim = Vec::new();
-        for [a, b, c] in bare {
-            let number = |v: u32| mesh.vertex_number(v);
-            rim.push([number(a)?, number(b)?, number(c)?]);
-        }
-        if !fits {
-            return None;
-        }
-        let prints = self.prints(mesh);
-        self.fingerprint = Fingerprint::default();
-        for (corners, &t) in self.corners.iter_mut().zip(&self.tets[..self.tets_len]) {
-            // No vertex may be left without a tetrahedron.
-            *corners = mesh.corner_numbers(&mesh.tets[t as usize])?;
-            let prints = corners.map(|x| prints[usize::from(x) % MAX_AROUND]);
-            self.fingerprint.add(prints.into_iter().fold(0, u32::wrapping_add));
-        }
-        self.join_walls(&rim)
-    }
-
-    /// Orders the link by the labels of its vertices.
-    #[inline]
-    fn order_link(&mut self, mesh: &CurrentMesh) {
-        let mut labels = [i32::MAX; MAX_AROUND];
-        for (label, &v) in labels.iter_mut().zip(&self.link[..self.link_len]) {
-            // Signed numbers compare in one instruction; the shift keeps the order.
-            *label = (mesh.labels[v as usize].vertex ^ 1 << 31) as i32;
-        }
-        rank(&labels, self.link_len, &mut self.order);
-    }
-
-    /// Finds the place of each wall in canonical order: ascending by the sorted labels of its vertices.
-    #[inline]
-    fn order_walls(&mut self) {
-        let mut keys = [i32::MAX; GATHERED];
-        for (key, wall) in keys.iter_mut().zip(&self.walls[..self.walls_len]) {
-            let [a, b, c] = wall.corners.map(|x| self.order[x as usize % MAX_AROUND]);
-            let (low, high) = (a.min(b), a.max(b));
-            let (least, most) = (low.min(c), high.max(c));
-            *key = least << 12 | low.max(c.min(high)) << 6 | most;
-        }
-        rank(&keys, self.walls_len, &mut self.places);
-    }
-
-    /// Finds what lies across the faces of the new tetrahedra that meet at the new vertex. `rim` are the faces that are
-    /// given up. None if walls and rim do not close.
-    #[inline]
-    fn join_walls(&mut self, rim: &[[u8; 3]]) -> Option<()> {
-        self.epoch += 1;
-        if self.epoch == 1 << 16 {
-            self.edges.fill(0);
-            self.epoch = 1;
-        }
-        // Epochs grow, so what is of this one is not less than its start.
-        let epoch = self.epoch << 16;
-        let edges = &mut *self.edges;
-        let place = |a: u8, b: u8| (usize::from(a) << 6 | usize::from(b)) % (MAX_AROUND * MAX_AROUND);
-        let mut twice = false;
-        for &[a, b, c] in rim {
-            for (from, to) in [(b, c), (c, a), (a, b)] {
-                twice |= std::mem::replace(&mut edges[place(from, to)], epoch | GIVEN_UP) >= epoch;
-            }
-        }
-        for (i, wall) in (0_u32..).zip(&self.walls[..self.walls_len]) {
-            let [a, b, c] = wall.corners;
-            for (from, to) in [(b, c), (c, a), (a, b)] {
-                twice |= std::mem::replace(&mut edges[place(from, to)], epoch | i) >= epoch;
-            }
-        }
-        let mut open = false;
-        for (across, wall) in self.across.iter_mut().zip(&self.walls[..self.walls_len]) {
-            let [a, b, c] = wall.corners;
-            let [b, c, d] = [(c, b), (a, c), (b, a)].map(|(from, to)| edges[place(from, to)]);
-            open |= b.min(c).min(d) < epoch;
-            *across = [NONE, b & 0xFFFF, c & 0xFFFF, d & 0xFFFF];
-        }
-        (!twice && !open).then_some(())
-    }
-
-    /// Appends to the node of an update that is added how T_u fills Π_u, once link and walls are ordered.
-    fn write_shape(&mut self, mesh: &CurrentMesh, on_boundary: bool) -> Option<()> {
-        let order = &self.order;
-        let canonical = |x: u8| order[usize::from(x) % MAX_AROUND] as u8;
-        let mut faces: [Face; MAX_INSERTED] = [[0; 3]; MAX_INSERTED];
-        for (wall, &place) in self.walls[..self.walls_len].iter().zip(&self.places) {
-            faces[place as usize % MAX_INSERTED] = turned(wall.corners.map(canonical));
-        }
-        let removed = &mut self.corners[..self.tets_len];
-        removed.iter_mut().for_each(|tet| *tet = tet.map(canonical));
-        let spheres = || {
-            let mut positions = [[0; 3]; MAX_AROUND];
-            for (&v, &place) in self.link[..self.link_len].iter().zip(order) {
-                positions[place as usize % MAX_AROUND] = mesh.positions[v as usize];
-            }
-            Spheres::of(positions[..self.link_len].iter().copied())
-        };
-        let (vertices, faces) = (self.link_len as u32, &faces[..self.walls_len]);
-        write_removed(&mut self.glue, &mut self.bits, Hole { vertices, faces, removed, on_boundary }, spheres)
-    }
-
-    /// Whether all tetrahedra of the new star are positive, exactly.
-    #[inline]
-    fn is_star_positive(&self, mesh: &CurrentMesh, centre: [i32; 3], narrow: bool) -> bool {
-        let link = &self.link[..self.link_len];
-        if !narrow {
-            let at = |x: u8| mesh.positions[link[x as usize] as usize];
-            let positive = |wall: &Wall| {
-                let [a, b, c] = wall.corners.map(at);
-                orient3d(centre, a, b, c) > 0
-            };
-            return self.walls[..self.walls_len].iter().all(positive);
-        }
-        let mut relative = [[0_i64; 3]; MAX_AROUND];
-        for (relative, &v) in relative.iter_mut().zip(link) {
-            let position = mesh.positions[v as usize];
-            *relative = [0, 1, 2].map(|k| i64::from(position[k] - centre[k]));
-        }
-        self.walls[..self.walls_len].iter().all(|wall| {
-            let [u, v, w] = wall.corners.map(|x| relative[x as usize % MAX_AROUND]);
-            det_i64(u, v, w) > 0
-        })
-    }
-}
 
 /// Where the parts of a node's shape are.
 #[derive(Clone, Copy, Debug)]
@@ -632,7 +296,7 @@ impl VertexMt {
     }
 
     /// Adds the insertion of a vertex as the next update and applies it; nothing is added if it cannot be applied.
-    pub(in crate::mt) fn insert_next(
+    pub(super) fn insert_next(
         &mut self,
         mesh: &mut CurrentMesh,
         new: &Insertion<'_>,
@@ -879,74 +543,6 @@ impl VertexMt {
     }
 }
 
-/// Reads how the faces inside Π_u are closed.
-pub(in crate::mt) struct Code {
-    at: u64,
-    /// Vertices of Π_u.
-    vertices: u32,
-    boundary: bool,
-    apex_code: ApexCode,
-    /// Where the codes of places in their order are.
-    spheres: Option<Spheres>,
-}
-
-impl Code {
-    pub fn new(at: u64, vertices: u32, boundary: bool) -> Self {
-        Self { at, vertices, boundary, apex_code: ApexCode::Vertex, spheres: None }
-    }
-
-    fn read(&mut self, nodes: &Bits, width: u32) -> u32 {
-        let value = nodes.get(self.at, width) as u32;
-        self.at += u64::from(width);
-        value
-    }
-
-    /// The vertex that all of T_u has, if the code says that there is one.
-    #[inline]
-    fn apex_of_all(&mut self, nodes: &Bits) -> Option<u8> {
-        let fan = self.read(nodes, 1) == 1;
-        fan.then(|| self.read(nodes, width_of(self.vertices.saturating_sub(1))) as u8)
-    }
-
-    /// Reads how the apexes of faces are coded; `spheres` are made only if that takes them.
-    #[inline]
-    fn read_apex_code(&mut self, nodes: &Bits, spheres: impl FnOnce() -> Spheres) {
-        self.apex_code = ApexCode::ALL[self.read(nodes, 2) as usize % ApexCode::ALL.len()];
-        self.spheres = (self.apex_code != ApexCode::Vertex).then(spheres);
-    }
-
-    /// How to close a face. Its own vertices are left out of the count; at the boundary of the domain, one more choice
-    /// for a face inside Π_u is that nothing lies behind it.
-    #[inline]
-    fn close(&mut self, nodes: &Bits, face: Face, of_link: bool) -> Option<Close> {
-        if let Some(spheres) = &self.spheres {
-            let at = &mut self.at;
-            let place = self.apex_code.read(&mut || {
-                *at += 1;
-                nodes.get(*at - 1, 1) == 1
-            });
-            return spheres.vertex(face, place).map(Close::With);
-        }
-        let choices = choices(self.vertices, self.boundary, of_link)?;
-        let chosen = self.read(nodes, width_of(choices - 1));
-        if chosen + 3 == self.vertices && self.boundary && !of_link {
-            return Some(Close::Leave);
-        }
-        // The least vertex comes first.
-        let [a, b, c] = face;
-        let mut x = chosen as u8;
-        [a, b.min(c), b.max(c)].iter().for_each(|&own| x += u8::from(x >= own));
-        (u32::from(x) < self.vertices).then_some(Close::With(x))
-    }
-}
-
-/// How many ways there are to close a face.
-#[inline]
-pub(in crate::mt) fn choices(vertices: u32, boundary: bool, of_link: bool) -> Option<u32> {
-    let choices = vertices.checked_sub(3)? + u32::from(boundary && !of_link);
-    (choices > 0).then_some(choices)
-}
-
 impl UpdatePages for VertexMt {
     fn set_to_come(&mut self, bound: ErrorCode) {
         self.to_come = if self.updates() == self.info().updates { ErrorCode::MAX } else { bound };
@@ -992,14 +588,12 @@ impl ApplyUpdates for VertexMt {
 
     #[inline]
     fn creator(&self, mesh: &CurrentMesh, t: u32) -> Option<UpdateId> {
-        let newest = mesh.tets[t as usize].iter().map(|&v| mesh.labels[v as usize].vertex).max();
-        self.inserted_by(VertexId(newest?))
+        self.inserted_by(mesh.newest_vertex(t))
     }
 
     #[inline]
     fn may_coarsen(&self, mesh: &CurrentMesh, u: UpdateId) -> bool {
-        let incident = mesh.slot(self.vertex(u)).map(|slot| mesh.incident[slot as usize]);
-        incident.is_some_and(|t| self.creator(mesh, t) == Some(u))
+        mesh.is_newest_nearby(self.vertex(u))
     }
 
     fn refine(&self, mesh: &mut CurrentMesh, u: UpdateId) -> Result<Applied, UpdateError> {

@@ -5,7 +5,7 @@
 //! up. To close a face takes a tetrahedron behind it; whoever calls names its fourth vertex. Faces that another
 //! tetrahedron has closed meanwhile are passed over.
 
-use super::store::{MAX_AROUND, MAX_INSERTED, MAX_REMOVED};
+use super::limits::{MAX_AROUND, MAX_INSERTED, MAX_REMOVED};
 use crate::mesh::FACES;
 
 /// Three vertices; in an order for which a tetrahedron `(x, face)` behind the face is positive, the least one first.

@@ -2,8 +2,12 @@
 
 pub(super) mod apply;
 pub(super) mod bit_string;
+pub(super) mod cavity;
 pub(super) mod cavity_fill;
 pub(super) mod from_explicit;
+pub(super) mod growing;
+pub(super) mod limits;
+pub(super) mod shape_code;
 pub(super) mod sphere_order;
 pub(super) mod store;
 pub(super) mod streaming;

@@ -6,7 +6,7 @@
 //! writes a node and whoever reads it: rounding may change the order, but nowhere else than here.
 
 use super::cavity_fill::Face;
-use super::store::MAX_AROUND;
+use super::limits::MAX_AROUND;
 
 /// Vertices whose distances are found together.
 const GROUP: usize = 4;

@@ -27,23 +27,12 @@
 //! same in every consistent set, since the star at the moment of insertion is.
 
 use super::bit_string::{Bits, width_of};
-use super::streaming::Growing;
+use super::growing::Growing;
+use super::limits::{COUNT_BITS, MAX_INSERTED, MAX_REMOVED};
 use super::tet_errors::MAX_QUARTERINGS;
 use crate::mesh::NONE;
 use crate::mt::update_errors::Errors;
 use crate::mt::{BaseMesh, ErrorCode, MtInfo, MultiTessellation, UpdateError, UpdateId, VertexId};
-
-/// Most tetrahedra around a vertex when it is inserted.
-pub const MAX_INSERTED: usize = 124;
-
-/// Most vertices around a vertex when it is inserted.
-pub const MAX_AROUND: usize = 64;
-
-/// Most tetrahedra that an insertion removes.
-pub const MAX_REMOVED: usize = 127;
-
-/// Bits of a number of tetrahedra that an insertion removes.
-pub(in crate::mt) const COUNT_BITS: u32 = 7;
 
 /// A member of a loop, and which of its links goes on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

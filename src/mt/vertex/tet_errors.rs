@@ -5,7 +5,7 @@
 //! stay with the vertex, in the order of the sorted labels of these tetrahedra, which is the same in every consistent set; when
 //! the vertex is removed they come back.
 
-use super::store::MAX_REMOVED;
+use super::limits::MAX_REMOVED;
 
 /// The largest number: at most a 64th of the update's error.
 pub const MAX_QUARTERINGS: u8 = 3;

@@ -1,0 +1,280 @@
+//! Scratch space for insertions and removals: T_u and the star that an insertion makes.
+
+use crate::geom::{NARROW_BITS, det_i64, orient3d};
+use crate::mesh::FACES;
+use crate::mt::CurrentMesh;
+use crate::mt::mesh::stars::{GATHERED, Star};
+
+/// Most tetrahedra of a star, and most vertices of its link.
+pub(in crate::mt) const MOST: usize = GATHERED;
+
+/// Stands for the new vertex among the corners of a [`NewTet`].
+pub(in crate::mt) const NEW: u8 = 0xFF;
+
+/// No tetrahedron of the new star.
+pub(in crate::mt) const NO_ENTRY: u8 = 0xFF;
+
+/// A tetrahedron of the star that an insertion makes.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in crate::mt) struct NewTet {
+    /// Its corners by index into the link, [`NEW`] for the new vertex; positive.
+    pub corners: [u8; 4],
+    /// Across each face that has the new vertex, the tetrahedron of the star, [`NO_ENTRY`] at the boundary.
+    pub across: [u8; 4],
+    /// Which corner is the new vertex.
+    pub own: u8,
+    /// What lies across the face opposite the new vertex.
+    pub beyond: u32,
+    /// The slot of T_u that it takes, or along whose face it fills the gap.
+    pub source: u32,
+    /// The update that removes it.
+    pub remover: u32,
+    /// Which faces go with it.
+    pub inner: u8,
+}
+
+/// Scratch space for insertions and removals.
+#[derive(Clone, Debug)]
+pub(in crate::mt) struct Scratch {
+    /// T_u.
+    pub removed: [u32; MOST],
+    pub removed_len: usize,
+    /// The star: first what takes the slots of T_u in its order, then what fills the gaps.
+    pub star: [NewTet; MOST],
+    pub star_len: usize,
+    /// Slots of the vertices of Π_u; the near vertex is the first.
+    pub link: [u32; MOST],
+    pub link_len: usize,
+    /// Around the edge from the near to the new vertex: a link vertex, a gap, and the corner of that opposite the face
+    /// which has the vertex.
+    pub ends: Vec<(u8, u8, u8)>,
+    pub levels: Vec<i32>,
+    pub gathered: Star,
+    /// A hash of the label of each vertex of the link; then that of the new vertex.
+    pub hashes: Vec<u64>,
+    /// For each tetrahedron of the star, the sum of those of its corners.
+    pub tet_hashes: Vec<u64>,
+    /// The star in canonical order: hashes whose lowest bits are replaced by the place in the star.
+    pub sorted: Vec<u64>,
+}
+
+impl Default for Scratch {
+    fn default() -> Self {
+        Self {
+            removed: [0; MOST],
+            removed_len: 0,
+            star: [NewTet::default(); MOST],
+            star_len: 0,
+            link: [0; MOST],
+            link_len: 0,
+            ends: Vec::new(),
+            levels: Vec::new(),
+            gathered: Star::default(),
+            hashes: Vec::new(),
+            tet_hashes: Vec::new(),
+            sorted: Vec::new(),
+        }
+    }
+}
+
+impl Scratch {
+    /// The index of a vertex in the link, where it is put if it is new.
+    #[inline]
+    pub fn number(&mut self, mesh: &mut CurrentMesh, v: u32) -> Option<u8> {
+        let next = self.link_len;
+        if let Some(known) = mesh.number_slot(v, next as u32) {
+            return Some(known as u8);
+        }
+        // One less than all numbers, so that a mark never overflows.
+        *self.link.get_mut(next).filter(|_| next + 1 < MOST)? = v;
+        self.link_len += 1;
+        Some(next as u8)
+    }
+
+    /// Adds the tetrahedron that fills the gap behind a face of tetrahedron `t` of T_u, whose corner `at` is the near vertex.
+    #[inline]
+    pub fn add_gap(
+        &mut self,
+        of: u8,
+        corners: &[u8; 4],
+        [at, face]: [usize; 2],
+        beyond: u32,
+        t: u32,
+    ) -> Option<u8> {
+        let place = self.star_len;
+        if place == MOST {
+            return None;
+        }
+        let mut new = NewTet { corners: *corners, own: face as u8, beyond, source: t, ..NewTet::default() };
+        new.corners[face] = NEW;
+        new.across = [NO_ENTRY; 4];
+        new.across[at] = of;
+        for corner in (0..4).filter(|&k| k != at && k != face) {
+            // The face opposite this corner has the other one.
+            let other = 6 - at - face - corner;
+            self.ends.push((corners[other], place as u8, corner as u8));
+        }
+        self.star[place] = new;
+        self.star_len += 1;
+        Some(place as u8)
+    }
+
+    /// Joins the tetrahedra around the edge from the near to the new vertex. They must close up, or run from boundary to
+    /// boundary, in one piece.
+    pub fn close_ring(&mut self) -> Option<()> {
+        let gaps = self.ends.len() / 2;
+        if gaps == 0 {
+            return None;
+        }
+        self.ends.sort_unstable();
+        let (mut open, mut i) = (0, 0);
+        while i < self.ends.len() {
+            let (v, gap, corner) = self.ends[i];
+            let next = self.ends.get(i + 1).filter(|next| next.0 == v);
+            let Some(&(_, other, side)) = next else {
+                open += 1;
+                i += 1;
+                continue;
+            };
+            if self.ends.get(i + 2).is_some_and(|third| third.0 == v) {
+                return None;
+            }
+            self.star[gap as usize % MOST].across[corner as usize & 3] = other;
+            self.star[other as usize % MOST].across[side as usize & 3] = gap;
+            i += 2;
+        }
+        if open != 0 && open != 2 {
+            return None;
+        }
+        // From one end, or from anywhere, all must be met.
+        let first = self.ends[0].1;
+        let (mut met, mut from, mut at) = (1, NO_ENTRY, first);
+        if open == 2 {
+            let lone = |i: usize| {
+                let v = self.ends[i].0;
+                let same = |j: Option<usize>| j.and_then(|j| self.ends.get(j)).is_some_and(|e| e.0 == v);
+                !same(i.checked_sub(1)) && !same(Some(i + 1))
+            };
+            at = self.ends[(0..self.ends.len()).find(|&i| lone(i))?].1;
+        }
+        let start = at;
+        loop {
+            let NewTet { corners, across, own, .. } = self.star[at as usize % MOST];
+            let next = (0..4).filter(|&k| k != own as usize && corners[k] != 0).map(|k| across[k]);
+            let Some(next) = next.filter(|&n| n != NO_ENTRY && n != from).min() else { break };
+            if next == start {
+                break;
+            }
+            (from, at) = (at, next);
+            met += 1;
+            if met > gaps {
+                return None;
+            }
+        }
+        (met == gaps).then_some(())
+    }
+
+    /// Hashes the labels of the star.
+    pub fn hash_star(&mut self, mesh: &CurrentMesh, vertex: u32) {
+        self.hashes.clear();
+        self.hashes.extend(self.link[..self.link_len].iter().map(|&slot| spread(mesh.vertex(slot).0)));
+        self.hashes.push(spread(vertex));
+        let last = self.link_len;
+        self.tet_hashes.clear();
+        for new in &self.star[..self.star_len] {
+            let sum = new
+                .corners
+                .iter()
+                .fold(0, |sum: u64, &corner| sum.wrapping_add(self.hashes[usize::from(corner).min(last)]));
+            self.tet_hashes.push(sum);
+        }
+    }
+
+    /// Puts the star, which has been hashed, into canonical order.
+    pub fn sort_star(&mut self) {
+        const PLACE: u64 = MOST as u64 - 1;
+        self.sorted.clear();
+        self.sorted.extend((0..).zip(&self.tet_hashes).map(|(i, hash)| hash & !PLACE | i));
+        self.sorted.sort_unstable();
+    }
+
+    /// Whether all tetrahedra of the star are positive with the new vertex at `position`.
+    pub fn is_positive(&self, mesh: &CurrentMesh, position: [i32; 3]) -> bool {
+        let (mut from, mut largest) = ([[0_i64; 3]; MOST], 0);
+        for (from, &v) in from.iter_mut().zip(&self.link[..self.link_len]) {
+            let p = mesh.positions[v as usize];
+            for k in 0..3 {
+                from[k] = i64::from(p[k]) - i64::from(position[k]);
+                largest |= from[k].unsigned_abs();
+            }
+        }
+        let narrow = largest <= 1 << NARROW_BITS;
+        self.star[..self.star_len].iter().all(|new| {
+            let [i, j, k] = FACES[new.own as usize & 3].map(|corner| new.corners[corner] as usize % MOST);
+            if narrow {
+                return det_i64(from[i], from[j], from[k]) > 0;
+            }
+            let at = |x: usize| mesh.positions[self.link[x] as usize];
+            orient3d(position, at(i), at(j), at(k)) > 0
+        })
+    }
+
+    /// Predicts the levels of a vertex at `position` from those around it: means by inverse squared distance, in whole
+    /// numbers, so that the order of the link does not matter.
+    pub fn predict_levels(&mut self, mesh: &CurrentMesh, position: [i32; 3]) {
+        let link = &self.link[..self.link_len];
+        let largest = link.iter().map(|&v| squared(mesh, v, position)).max().unwrap_or(1).max(1);
+        self.levels.clear();
+        self.levels.resize(mesh.fields, 0);
+        for (field, level) in self.levels.iter_mut().enumerate() {
+            let (mut total, mut sum) = (0_u128, 0_u128);
+            for &v in link {
+                let weight = weight(largest, squared(mesh, v, position));
+                total += weight;
+                // Levels are not negative.
+                sum += weight * u128::from(mesh.levels(v)[field].unsigned_abs());
+            }
+            *level = mean(sum, total.max(1)) as i32;
+        }
+    }
+}
+
+/// The squared distance of a vertex from a position.
+#[inline]
+fn squared(mesh: &CurrentMesh, v: u32, position: [i32; 3]) -> u64 {
+    let p = mesh.positions[v as usize];
+    // Less than 2^62 each: positions are on lattices of at most 30 bits.
+    (0..3).map(|k| u64::from(p[k].abs_diff(position[k]))).fold(0, |sum, d| sum.saturating_add(d * d))
+}
+
+#[inline]
+fn weight(largest: u64, squared: u64) -> u128 {
+    let squared = squared.max(1);
+    // Short numbers divide many times as fast.
+    if largest < 1 << (64 - WEIGHT_BITS) {
+        u128::from((largest << WEIGHT_BITS) / squared)
+    } else {
+        (u128::from(largest) << WEIGHT_BITS) / u128::from(squared)
+    }
+}
+
+/// The quotient, rounded.
+#[inline]
+fn mean(sum: u128, total: u128) -> u128 {
+    match (u64::try_from(2 * sum + total), u64::try_from(2 * total)) {
+        (Ok(sum), Ok(total)) => u128::from(sum / total),
+        _ => (2 * sum + total) / (2 * total),
+    }
+}
+
+/// Weights of the vertices around a new one have at least so many bits.
+const WEIGHT_BITS: u32 = 8;
+
+/// Spreads a label over the bits of a word (the constants are those of SplitMix64).
+#[inline]
+pub(in crate::mt) fn spread(label: u32) -> u64 {
+    let x = u64::from(label).wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    let x = (x ^ x >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    let x = (x ^ x >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
+    x ^ x >> 31
+}
