@@ -8,8 +8,8 @@ use crate::refine::{GoOn, RefineStats, Request};
 use crate::remote::Remote;
 use crate::session::{Session, SessionError};
 use crate::stream::{RangeSource, StreamError, WantedRange};
-use std::fmt;
 use std::time::Duration;
+use thiserror::Error;
 
 pub use crate::remote::Step;
 
@@ -32,36 +32,18 @@ impl Default for ClientOptions {
 }
 
 /// Why a client cannot do what it was asked for. The current mesh is valid all the same.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum ClientError {
     /// The bytes do not come.
-    Stream(StreamError),
+    #[error(transparent)]
+    Stream(#[from] StreamError),
     /// The bytes are not those of a sound MT file.
-    Format(FormatError),
+    #[error(transparent)]
+    Format(#[from] FormatError),
     /// The request makes no sense for this MT, or the MT is damaged.
-    Session(SessionError),
-}
-
-impl fmt::Display for ClientError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Stream(error) => write!(f, "{error}"),
-            Self::Format(error) => write!(f, "{error}"),
-            Self::Session(error) => write!(f, "{error}"),
-        }
-    }
-}
-
-impl std::error::Error for ClientError {
-    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
-        // Each is printed as it is, so what stands behind it comes next.
-        match self {
-            Self::Stream(error) => error.source(),
-            Self::Format(error) => error.source(),
-            Self::Session(error) => error.source(),
-        }
-    }
+    #[error(transparent)]
+    Session(#[from] SessionError),
 }
 
 /// How long is waited for bytes at a time where nobody waits for a mesh.
@@ -88,7 +70,7 @@ impl<S: RangeSource> Client<S> {
         let mut client = Self { source, remote: Remote::in_parts(decode, memory) };
         while client.session().mesh().is_none() && !client.fetch(PATIENCE)? {}
         if client.session().mesh().is_none() {
-            client.session_mut().finish().map_err(ClientError::Format)?;
+            client.session_mut().finish()?;
         }
         Ok(client)
     }
@@ -117,7 +99,7 @@ impl<S: RangeSource> Client<S> {
     /// # Errors
     /// If the request makes no sense for this MT; what was wanted before is then wanted still.
     pub fn aim(&mut self, request: &Request) -> Result<(), ClientError> {
-        self.remote.aim(request, &[]).map_err(ClientError::Session)?;
+        self.remote.aim(request, &[])?;
         // What is on its way may not be wanted any more.
         self.ask();
         Ok(())
@@ -138,7 +120,7 @@ impl<S: RangeSource> Client<S> {
                 break;
             }
         }
-        self.remote.step(go_on).map_err(ClientError::Session)
+        Ok(self.remote.step(go_on)?)
     }
 
     /// Waits up to `patience` for more of what is wanted, and takes it in; tells whether all of it is here.
@@ -149,10 +131,10 @@ impl<S: RangeSource> Client<S> {
         if !self.remote.is_asking() && !self.ask() {
             return Ok(true);
         }
-        let Some((range, bytes)) = self.source.next(patience).map_err(ClientError::Stream)? else {
+        let Some((range, bytes)) = self.source.next(patience)? else {
             return Ok(false);
         };
-        self.remote.take(&range, &bytes).map_err(ClientError::Format)?;
+        self.remote.take(&range, &bytes)?;
         Ok(!self.remote.is_asking() && !self.ask())
     }
 
@@ -165,16 +147,16 @@ impl<S: RangeSource> Client<S> {
         let Some(range) = self.session().exact_range() else { return Ok(()) };
         self.source.want(&[WantedRange { range: range.clone(), priority: 0.0 }]);
         let bytes = loop {
-            match self.source.next(PATIENCE).map_err(ClientError::Stream)? {
+            match self.source.next(PATIENCE)? {
                 Some((arrived, bytes)) if arrived == range => break bytes,
                 // Something that was wanted before.
-                Some((other, bytes)) => self.remote.take(&other, &bytes).map_err(ClientError::Format)?,
+                Some((other, bytes)) => self.remote.take(&other, &bytes)?,
                 None => {}
             }
         };
-        let taken = self.remote.take_exact(&bytes).map_err(ClientError::Format);
+        let taken = self.remote.take_exact(&bytes);
         self.ask();
-        taken
+        Ok(taken?)
     }
 
     /// Tells the source what is wanted now; whether there is anything.

@@ -9,7 +9,8 @@ use super::payload::{State, Totals};
 use super::{payload, write};
 use crate::mt::{BaseMeshError, Exact, MtRef, UpdateError, VertexId};
 use std::collections::BTreeMap;
-use std::{fmt, io};
+use std::io;
+use thiserror::Error;
 
 /// What goes into a file besides the MT.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,10 +36,13 @@ impl Default for EncodeOptions {
 pub const BLOCK_BITS: u32 = 11;
 
 /// Why an MT cannot be written.
-#[derive(Debug)]
+#[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum EncodeError {
     /// Not all updates of the MT are there.
+    #[error(
+        "the MT has {updates} of the {expected} updates that its description contains; write it when it is complete"
+    )]
     Incomplete {
         /// Updates that are there.
         updates: u32,
@@ -46,14 +50,20 @@ pub enum EncodeError {
         expected: u32,
     },
     /// No block can have so many updates.
+    #[error("a block cannot hold 2^{bits} updates; choose 4 to 16")]
     Blocks {
         /// log2 of the updates asked for.
         bits: u32,
     },
     /// An update of the MT cannot be applied.
+    #[error("the MT is damaged: {0}")]
     Update(UpdateError),
     /// The error of an update is not as far below that of one it depends on as selection relies on: what a request gives would
     /// depend on what was asked for before.
+    #[error(
+        "the errors of the MT do not fall along its partial order: in field {field} that of update {update} is too \
+         large for update {parent}, which it depends on; build the MT again"
+    )]
     Order {
         /// The update.
         update: u32,
@@ -63,53 +73,23 @@ pub enum EncodeError {
         field: usize,
     },
     /// Exact values are given for a field or a vertex that the reference mesh does not have.
+    #[error("the exact values of field {field} are not those of the reference mesh")]
     Exact {
         /// The field.
         field: usize,
     },
     /// Something is longer than the file can say.
+    #[error("{what} is too long for an MT file; shorten it")]
     TooLong {
         /// What it is.
         what: &'static str,
     },
     /// The description or the base mesh could not be read back.
-    Base(BaseMeshError),
+    #[error("the MT cannot be written")]
+    Base(#[source] BaseMeshError),
     /// The writer failed.
-    Write(io::Error),
-}
-
-impl fmt::Display for EncodeError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Incomplete { updates, expected } => write!(
-                f,
-                "the MT has {updates} of the {expected} updates that its description tells; write it when it is complete"
-            ),
-            Self::Blocks { bits } => write!(f, "a block cannot hold 2^{bits} updates; choose 4 to 16"),
-            Self::Update(error) => write!(f, "the MT is damaged: {error}"),
-            Self::Order { update, parent, field } => write!(
-                f,
-                "the errors of the MT do not fall along its partial order: in field {field} that of update {update} is too \
-                 large for update {parent}, which it depends on; build the MT again"
-            ),
-            Self::Exact { field } => {
-                write!(f, "the exact values of field {field} are not those of the reference mesh")
-            }
-            Self::TooLong { what } => write!(f, "{what} is too long for an MT file; shorten it"),
-            Self::Base(_) => f.write_str("the MT cannot be written"),
-            Self::Write(_) => f.write_str("the MT file could not be written"),
-        }
-    }
-}
-
-impl std::error::Error for EncodeError {
-    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
-        match self {
-            Self::Base(error) => Some(error),
-            Self::Write(error) => Some(error),
-            _ => None,
-        }
-    }
+    #[error("the MT file could not be written")]
+    Write(#[source] io::Error),
 }
 
 /// The bytes of an MT file.

@@ -15,39 +15,30 @@ use crate::refine::{
 };
 use crate::view::{IsoSurface, MeshView, NormalKind, Plane, Slice, SurfaceChanges};
 use blocks::Blocks;
-use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
+use thiserror::Error;
 
 pub use crate::format::Progress;
 pub use crate::refine::GoOn;
 
 /// Why a session cannot do what it was asked for. The current mesh is valid all the same.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum SessionError {
     /// The base mesh has not arrived yet.
+    #[error("the base mesh has not arrived yet; feed more of the file first")]
     NotReady,
     /// The request makes no sense for this MT.
-    Request(RequestError),
+    #[error(transparent)]
+    Request(#[from] RequestError),
     /// The isovalue is not a finite number.
+    #[error("the isovalue must be a finite number")]
     Isovalue,
     /// The MT turned out to be damaged when an update was applied.
-    Format(FormatError),
+    #[error(transparent)]
+    Format(#[from] FormatError),
 }
-
-impl fmt::Display for SessionError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NotReady => f.write_str("the base mesh has not arrived yet; feed more of the file first"),
-            Self::Request(error) => write!(f, "{error}"),
-            Self::Isovalue => f.write_str("the isovalue must be a finite number"),
-            Self::Format(error) => write!(f, "{error}"),
-        }
-    }
-}
-
-impl std::error::Error for SessionError {}
 
 /// A decoder, its MT and the current mesh.
 #[derive(Debug, Default)]
@@ -188,7 +179,7 @@ impl Session {
         let (Some(front), Some(mt)) = (&mut self.front, self.decoder.mt()) else {
             return Err(SessionError::NotReady);
         };
-        request.check(mt.info()).map_err(SessionError::Request)?;
+        request.check(mt.info())?;
         let own = LodCriterion::new(mt.info(), request);
         let criterion = custom.iter().fold(own, |all, one| all.and(Arc::clone(one)));
         let criterion: Arc<dyn Criterion> = Arc::new(criterion);
@@ -209,9 +200,8 @@ impl Session {
         let (Some(front), Some(mt)) = (&mut self.front, self.decoder.mt()) else {
             return Err(SessionError::NotReady);
         };
-        let outcome =
-            front.step(mt, go_on).map_err(|error| SessionError::Format(FormatError::Update(error)))?;
-        self.after_step().map_err(SessionError::Format)?;
+        let outcome = front.step(mt, go_on).map_err(FormatError::from)?;
+        self.after_step()?;
         let done = outcome.done && self.block_progress() == before;
         let (Some(front), Some(mt)) = (&self.front, self.decoder.mt()) else {
             return Err(SessionError::NotReady);
