@@ -1,6 +1,6 @@
 //! `tetralod build`: a mesh to an MT file.
 
-use super::files;
+use super::files::{self, CRITERION, METHOD};
 use super::input::{self, FieldSelection};
 use super::output::{self, Verbosity};
 use anyhow::{Context, Result, anyhow};
@@ -92,10 +92,6 @@ pub struct Arguments {
     #[command(flatten)]
     verbosity: Verbosity,
 }
-
-/// The metadata keys under which a file tells how it was built.
-pub const METHOD: &str = "method";
-pub const CRITERION: &str = "criterion";
 
 /// Parses the name of a kind of MT.
 pub fn kind(text: &str) -> Result<MtKind> {

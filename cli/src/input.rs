@@ -1,11 +1,12 @@
 //! Meshes from files: time steps put together, mended, fields at cells turned into fields at points.
 
-use super::files;
+use super::files::{self, Opened};
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 use tetralod::io;
 use tetralod::io::{CellData, ReadOptions, Step};
 use tetralod::mesh::{Field, RepairReport, TetMesh, repair};
+use tetralod::verify::Reference;
 
 /// Which fields of the files are read.
 pub struct FieldSelection<'a> {
@@ -121,4 +122,22 @@ pub fn expect_cells(mesh: &TetMesh, path: &Path) -> Result<()> {
         return Err(tetralod::mesh::MeshError::Empty).with_context(|| path.display().to_string());
     }
     Ok(())
+}
+
+/// Reads a mesh and mends what can be mended.
+pub fn read_mesh(path: &Path) -> Result<(TetMesh, RepairReport)> {
+    let wanted = FieldSelection { names: &[], all: true, cells: CellData::LeaveOut };
+    let (mesh, report) = read(&[path.to_owned()], &wanted)?;
+    expect_cells(&mesh, path)?;
+    Ok((mesh, report))
+}
+
+/// Reads what the MT was built from: time steps of a mesh or, where no more is needed, of points.
+pub fn read_reference(paths: &[PathBuf], opened: &Opened) -> Result<TetMesh> {
+    let names: Vec<String> = opened.info()?.fields.iter().map(|field| field.name.clone()).collect();
+    let (mesh, _) = read(paths, &FieldSelection { names: &names, all: false, cells: CellData::Values })?;
+    if let (Reference::Mesh, Some(path)) = (opened.reference(), paths.first()) {
+        expect_cells(&mesh, path)?;
+    }
+    Ok(mesh)
 }

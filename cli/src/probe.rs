@@ -1,8 +1,9 @@
 //! `tetralod probe`: what the fields are at points and along a line.
 
 use super::output;
+use super::parse::parse_numbers;
 use super::poly::Target;
-use super::query::{Query, parse_numbers};
+use super::query::Query;
 use anyhow::{Context, Result};
 use serde::Serialize;
 use std::collections::BTreeMap;

@@ -1,9 +1,10 @@
 //! `tetralod streamlines`: the lines along which a vector field flows.
 
 use super::output;
+use super::parse::{parse_number, parse_numbers};
 use super::poly::Target;
 use super::probe::parse_point;
-use super::query::{Query, parse_number, parse_numbers};
+use super::query::Query;
 use anyhow::{Context, Result};
 use serde::Serialize;
 use std::collections::BTreeMap;

@@ -1,6 +1,6 @@
 //! `tetralod verify`: does an MT file keep its promises?
 
-use super::{files, output};
+use super::{files, input, output};
 use anyhow::Result;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -59,7 +59,7 @@ fn memory(mt: &Mt, input: &TetMesh) -> u64 {
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let opened = files::open_mt(&arguments.file)?;
     let reference = opened.reference();
-    let input = files::read_reference(&arguments.against, &opened)?;
+    let input = input::read_reference(&arguments.against, &opened)?;
     let about = memory(opened.mt()?, &input);
     // Drawn on stderr, and only on a terminal; elsewhere lines tell how far it is, of what takes long.
     let start = Instant::now();
