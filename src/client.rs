@@ -81,7 +81,7 @@ impl<S: RangeSource> Client<S> {
     /// # Errors
     /// If the request makes no sense for this MT, or bytes that it needs do not come or are damaged.
     pub fn refine(&mut self, request: &Request) -> Result<RefineStats, ClientError> {
-        self.aim(request)?;
+        self.request(request)?;
         let mut before = RefineStats::default();
         loop {
             while !self.fetch(PATIENCE)? {}
@@ -98,8 +98,8 @@ impl<S: RangeSource> Client<S> {
     ///
     /// # Errors
     /// If the request makes no sense for this MT; what was wanted before is then wanted still.
-    pub fn aim(&mut self, request: &Request) -> Result<(), ClientError> {
-        self.remote.aim(request, &[])?;
+    pub fn request(&mut self, request: &Request) -> Result<(), ClientError> {
+        self.remote.request(request, &[])?;
         // What is on its way may not be wanted any more.
         self.ask();
         Ok(())
@@ -171,7 +171,7 @@ impl<S: RangeSource> Client<S> {
         self.remote.session()
     }
 
-    /// The session. What is [aimed](Session::aim) at here, nobody fetches until the next request.
+    /// The session. What is [requested](Session::request) here, nobody fetches until the next request.
     pub fn session_mut(&mut self) -> &mut Session {
         self.remote.session_mut()
     }

@@ -55,7 +55,7 @@ impl Remote {
         &self.session
     }
 
-    /// The session. What is [aimed](Session::aim) at here is wanted from the next call of [`Remote::wanted`] on.
+    /// The session. What is [requested](Session::request) at here is wanted from the next call of [`Remote::wanted`] on.
     pub fn session_mut(&mut self) -> &mut Session {
         &mut self.session
     }
@@ -70,12 +70,12 @@ impl Remote {
         self.fetched
     }
 
-    /// Tells what mesh is wanted from now on, for [`Remote::step`] to make it: see [`Session::aim_with`].
+    /// Tells what mesh is wanted from now on, for [`Remote::step`] to make it: see [`Session::request_with`].
     ///
     /// # Errors
     /// If the request makes no sense for this MT; what was wanted before is then wanted still.
-    pub fn aim(&mut self, request: &Request, custom: &[Arc<dyn Criterion>]) -> Result<(), SessionError> {
-        self.session.aim_with(request, custom)
+    pub fn request(&mut self, request: &Request, custom: &[Arc<dyn Criterion>]) -> Result<(), SessionError> {
+        self.session.request_with(request, custom)
     }
 
     /// Goes on towards that mesh with what is here, until it is there or `go_on` says no.

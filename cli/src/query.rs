@@ -121,7 +121,7 @@ impl Query {
         let needs = self.named_needs(info)?;
         let field = files::field_index(info, self.group.field())?;
         let budget = Budget { tets: self.budget, vertices: self.max_vertices, bytes: self.max_bytes };
-        client.aim(&Request { needs: needs.iter().map(|named| named.need.clone()).collect(), budget })?;
+        client.request(&Request { needs: needs.iter().map(|named| named.need.clone()).collect(), budget })?;
         while !client.fetch(PATIENCE)? {}
         fetch_more(&mut client)?;
         let start = Instant::now();

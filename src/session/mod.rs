@@ -158,7 +158,7 @@ impl Session {
     /// # Errors
     /// If the request makes no sense for this MT, or the MT turns out to be damaged.
     pub fn refine(&mut self, request: &Request) -> Result<RefineStats, SessionError> {
-        self.aim(request)?;
+        self.request(request)?;
         self.step(&mut |_| true)
     }
 
@@ -166,16 +166,20 @@ impl Session {
     ///
     /// # Errors
     /// If the request makes no sense for this MT; what was wanted before is then wanted still.
-    pub fn aim(&mut self, request: &Request) -> Result<(), SessionError> {
-        self.aim_with(request, &[])
+    pub fn request(&mut self, request: &Request) -> Result<(), SessionError> {
+        self.request_with(request, &[])
     }
 
-    /// [`Session::aim`] with criteria of the caller's own beside the needs of `request`: see
+    /// [`Session::request`] with criteria of the caller's own beside the needs of `request`: see
     /// [`Custom`](crate::refine::Custom).
     ///
     /// # Errors
-    /// As [`Session::aim`].
-    pub fn aim_with(&mut self, request: &Request, custom: &[Arc<dyn Criterion>]) -> Result<(), SessionError> {
+    /// As [`Session::request`].
+    pub fn request_with(
+        &mut self,
+        request: &Request,
+        custom: &[Arc<dyn Criterion>],
+    ) -> Result<(), SessionError> {
         let (Some(front), Some(mt)) = (&mut self.front, self.decoder.mt()) else {
             return Err(SessionError::NotReady);
         };
@@ -189,7 +193,7 @@ impl Session {
         Ok(())
     }
 
-    /// Goes on towards the mesh that [`Session::aim`] was told, until it is there or `go_on` says no, which is asked after
+    /// Goes on towards the mesh that [`Session::request`] was told, until it is there or `go_on` says no, which is asked after
     /// every update. The mesh is valid then and within the budget, whether it is done or not. It is not done where blocks came or
     /// went with this step, for there may be more to do with the others. Data is missing only if it is to come.
     ///

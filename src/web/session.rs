@@ -74,13 +74,13 @@ impl CoreSession {
 
     /// Changes the current mesh to what `options` asks for, as far as the data has arrived.
     pub fn refine(&mut self, options: &RefineOptions) -> Result<JsStats, WebError> {
-        self.aim(options)?;
+        self.request(options)?;
         self.step(f64::INFINITY, f64::INFINITY)
     }
 
     /// Tells which mesh is wanted from now on, for `step` to make it.
-    pub fn aim(&mut self, options: &RefineOptions) -> Result<(), WebError> {
-        self.file.aim(options, None)
+    pub fn request(&mut self, options: &RefineOptions) -> Result<(), WebError> {
+        self.file.request(options, None)
     }
 
     /// Goes on towards that mesh for about so many milliseconds or so many updates, whichever comes first.

@@ -198,9 +198,9 @@ impl Viewer {
     }
 
     /// Tells which mesh is wanted from now on, for `step` to make it. Views without a matrix follow the camera.
-    pub fn aim(&mut self, options: &RefineOptions) -> Result<(), WebError> {
+    pub fn request(&mut self, options: &RefineOptions) -> Result<(), WebError> {
         let (seen, before) = (self.view(), self.file.asked.field);
-        self.file.aim(options, Some(&seen))?;
+        self.file.request(options, Some(&seen))?;
         if self.file.asked.field != before {
             self.stale = Stale { boxes: self.stale.boxes, ..Stale::MESH };
         }
@@ -210,8 +210,8 @@ impl Viewer {
     }
 
     /// More of the file has come, and with it perhaps what was asked for.
-    #[wasm_bindgen(js_name = aimAgain)]
-    pub fn aim_again(&mut self) {
+    #[wasm_bindgen(js_name = requestAgain)]
+    pub fn request_again(&mut self) {
         self.moving = self.file.session().info().is_some();
     }
 
@@ -420,7 +420,7 @@ impl Viewer {
         for need in self.file.asked.follows.clone() {
             self.file.asked.request.needs[need].part = Part::View(seen);
         }
-        self.file.aim_again()
+        self.file.request_again()
     }
 
     /// Bytes have come: when the base mesh is there, look at it.
