@@ -2,7 +2,7 @@
 
 use super::block_scan::BlockScan;
 use super::coder::{Counts, Measure, Models, Put, Writer};
-use super::header::{END_BYTES, HEAD_BYTES, HEADER_BYTES, Head, Kind, header, version_for};
+use super::header::{END_BYTES, HEAD_BYTES, HEADER_BYTES, Kind, SectionHead, header, version_for};
 use super::payload::exact::Corrections;
 use super::payload::index::{Index, MAX_BLOCK_BITS, MIN_BLOCK_BITS};
 use super::payload::{State, Totals};
@@ -157,7 +157,7 @@ fn check(mt: MtRef<'_>, options: &EncodeOptions) -> Result<(), EncodeError> {
 
 /// A section that is ready to be written.
 struct Section {
-    head: Head,
+    head: SectionHead,
     payload: Vec<u8>,
 }
 
@@ -166,7 +166,7 @@ impl Section {
         if u32::try_from(payload.len() + HEAD_BYTES).is_err() {
             return Err(EncodeError::TooLong { what: "a section of more than 4 GiB" });
         }
-        Ok(Self { head: Head::new(kind, &payload), payload })
+        Ok(Self { head: SectionHead::new(kind, &payload), payload })
     }
 
     /// A section that begins with some bytes, the rest of which is coded.

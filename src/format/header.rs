@@ -122,13 +122,13 @@ impl Kind {
 
 /// The head of a section.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Head {
+pub struct SectionHead {
     pub kind: Kind,
     pub length: u32,
     pub crc: u32,
 }
 
-impl Head {
+impl SectionHead {
     /// The head for a payload.
     pub fn new(kind: Kind, payload: &[u8]) -> Self {
         // Writers check lengths before they come here.

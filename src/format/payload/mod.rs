@@ -247,7 +247,7 @@ pub fn write_base_head(out: &mut Vec<u8>, mt: MtRef<'_>) {
 pub struct BaseParts {
     base: BaseMesh,
     /// What files of vertex-based MTs tell besides.
-    vertex: vertex::Head,
+    vertex: vertex::InsertionRules,
     /// What files of half-edge MTs tell besides.
     half_edge: half_edge::BaseHead,
     levels: Vec<Vec<i32>>,
@@ -532,6 +532,49 @@ pub fn check_reference(mt: MtRef<'_>) -> Result<(), BaseMeshError> {
         MtRef::Edge(_) | MtRef::Vertex(_) | MtRef::HalfEdge(_) => Ok(()),
         MtRef::Explicit(mt) => explicit::check_reference(mt),
     }
+}
+
+/// Puts by how many codes each error of an update is below that of the update before.
+fn put_errors(out: &mut impl Put, family: Family, before: &mut [ErrorCode], errors: &[ErrorCode]) {
+    for (before, &error) in before.iter_mut().zip(errors) {
+        out.number(family, 0, u32::from(before.0.wrapping_sub(error.0)));
+        *before = error;
+    }
+}
+
+/// Turns the errors of the update before into those of the next one.
+fn read_errors(source: &mut Source<'_>, family: Family, errors: &mut [ErrorCode]) -> Result<(), FormatError> {
+    for error in errors {
+        let fall = u16::try_from(source.number(family, 0)?);
+        let fall = fall.map_err(|_| source.corrupt("an error is out of its range"))?;
+        error.0 = error.0.wrapping_sub(fall);
+    }
+    Ok(())
+}
+
+/// Puts the own errors of what an update removes: of each tetrahedron its quarterings, and whether it has the new vertex.
+fn put_quarterings(out: &mut impl Put, own_fall: u8, removed: impl Iterator<Item = (u8, bool)>) {
+    out.symbol(OWN_FALL, 0, u32::from(own_fall));
+    let mut before = 0;
+    for (own, is_home) in removed {
+        out.symbol(QUARTERINGS, 2 * before + u32::from(is_home), u32::from(own));
+        before = u32::from(own);
+    }
+}
+
+/// Reads them, of as many tetrahedra as there are in `are_home`; returns the fall of the own errors.
+fn read_quarterings(
+    source: &mut Source<'_>,
+    quarterings: &mut Vec<u8>,
+    are_home: impl Iterator<Item = bool>,
+) -> Result<u8, FormatError> {
+    let own_fall = source.symbol(OWN_FALL, 0)? as u8;
+    quarterings.clear();
+    for is_home in are_home {
+        let before = quarterings.last().map_or(0, |&before| u32::from(before));
+        quarterings.push(source.symbol(QUARTERINGS, 2 * before + u32::from(is_home))? as u8);
+    }
+    Ok(own_fall)
 }
 
 /// The largest error of an update.
