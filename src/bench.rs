@@ -10,7 +10,7 @@ use crate::mt::{Mt, MultiTessellation};
 use crate::refine::Request;
 use crate::session::{Session, SessionError};
 
-/// What a benchmark found. Rates are those of the fastest of several runs: the others only tell what else the
+/// What a benchmark found. Rates are those of the fastest of several runs: the others show what else the
 /// machine was doing.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BenchReport {
@@ -32,7 +32,7 @@ pub struct BenchReport {
     pub coarsen_updates: f64,
     /// Tetrahedra of the finest mesh searched per second for an isosurface in the middle of the field's range.
     pub isosurface_tets: f64,
-    /// Requests that change a little from frame to frame; these are not the fastest, but what is usual.
+    /// Requests that change a little from frame to frame; medians, not the fastest.
     pub coherent: Walks,
 }
 

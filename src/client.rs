@@ -46,7 +46,7 @@ pub enum ClientError {
     Session(#[from] SessionError),
 }
 
-/// How long is waited for bytes at a time where nobody waits for a mesh.
+/// How long to wait for bytes at a time if no caller waits for a mesh.
 const PATIENCE: Duration = Duration::from_secs(1);
 
 /// About how many bytes a step takes in.
@@ -94,10 +94,10 @@ impl<S: RangeSource> Client<S> {
         }
     }
 
-    /// Tells what mesh is wanted from now on, for [`Client::step`] to make it.
+    /// Sets the request, for [`Client::step`] to make its mesh.
     ///
     /// # Errors
-    /// If the request makes no sense for this MT; what was wanted before is then wanted still.
+    /// If the request makes no sense for this MT; the request before it then remains.
     pub fn request(&mut self, request: &Request) -> Result<(), ClientError> {
         self.remote.request(request, &[])?;
         // What is on its way may not be wanted any more.
@@ -123,7 +123,7 @@ impl<S: RangeSource> Client<S> {
         Ok(self.remote.step(go_on)?)
     }
 
-    /// Waits up to `patience` for more of what is wanted, and takes it in; tells whether all of it is here.
+    /// Waits up to `patience` for more of what is wanted, and takes it in; returns whether all of it is here.
     ///
     /// # Errors
     /// If the bytes do not come or are damaged.
@@ -159,7 +159,7 @@ impl<S: RangeSource> Client<S> {
         Ok(taken?)
     }
 
-    /// Tells the source what is wanted now; whether there is anything.
+    /// Gives the source the ranges that are wanted now; whether there are any.
     fn ask(&mut self) -> bool {
         let wanted = self.remote.wanted();
         self.source.want(&wanted);
@@ -171,7 +171,7 @@ impl<S: RangeSource> Client<S> {
         self.remote.session()
     }
 
-    /// The session. What is [requested](Session::request) here, nobody fetches until the next request.
+    /// The session. Blocks for a request [made here](Session::request) are not fetched before the next one.
     pub fn session_mut(&mut self) -> &mut Session {
         self.remote.session_mut()
     }

@@ -119,7 +119,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     output::result(arguments.json, &report, &rows(&report))
 }
 
-/// The most of the three: where the mesh is small beside the MT, so are what it knows of the MT's vertices and updates.
+/// The most of the three: where the mesh is small beside the MT, arrays by vertex and update of the MT count more.
 fn bytes_per_tet(walks: &bench::Walks) -> f64 {
     walks.roi.bytes_per_tet.max(walks.iso.bytes_per_tet).max(walks.view.bytes_per_tet)
 }

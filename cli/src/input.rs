@@ -68,18 +68,18 @@ fn reduce(mesh: &mut TetMesh, wanted: &FieldSelection<'_>) -> Option<Vec<String>
     Some(mesh.fields.iter().chain(&mesh.cell_fields).map(|field| field.name.clone()).collect())
 }
 
-/// Appends the fields of the later time steps. Steps of which no file tells the time are numbered from 0.
+/// Appends the fields of the later time steps. Steps without a time in their files are numbered from 0.
 fn append(mesh: &mut TetMesh, first: &Step, later: &[Step], options: &ReadOptions) -> Result<()> {
-    let told = first.time.or_else(|| time_of(mesh));
-    let mut times = vec![told.unwrap_or(0.0)];
+    let first_time = first.time.or_else(|| time_of(mesh));
+    let mut times = vec![first_time.unwrap_or(0.0)];
     set_time(mesh, times[0]);
     for (number, step) in later.iter().enumerate() {
         let name = step.path.display();
         let mut next = io::read_with(&step.path, options)?;
-        let time = match (step.time.or_else(|| time_of(&next)), told) {
+        let time = match (step.time.or_else(|| time_of(&next)), first_time) {
             (Some(time), Some(_)) => time,
             (None, None) => number as f64 + 1.0,
-            _ => bail!("{name}: some files tell their time and some do not; list all of them in a .pvd"),
+            _ => bail!("{name}: some files contain their time and some do not; list all of them in a .pvd"),
         };
         if times.contains(&time) {
             bail!("{name}: there is another time step at {time}; give each its own time, in a .pvd");

@@ -12,7 +12,7 @@ use std::time::Instant;
 use tetralod::io::PolyData;
 use tetralod::view::{MeshView, Place, Probe, Span};
 
-/// Tells what all fields are at points or along a line.
+/// Interpolates all fields at points or along a line.
 ///
 /// Along a line there is a row for each place where it enters or leaves a tetrahedron: the fields are linear in between.
 #[derive(clap::Args)]

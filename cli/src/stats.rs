@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 use tetralod::view::{FieldStats, Histogram};
 
-/// Tells the integral, the mean and the histogram of a field, exact for the field that is linear in every tetrahedron.
+/// Computes the integral, the mean and the histogram of a field, exact for the field that is linear in every tetrahedron.
 #[derive(clap::Args)]
 #[command(after_help = "Examples: tetralod stats engine.mt --error 1% --bins 20\n          \
                         tetralod stats engine.mt --error 1% --reference engine.vtu -o histogram.csv")]

@@ -1,4 +1,4 @@
-//! A run through an MT from the base to the reference mesh, for what its file tells of each block.
+//! A run through an MT from the base to the reference mesh, for what its file says of each block.
 
 use super::payload::index::BlockInfo;
 use super::{EncodeError, EncodeOptions};
@@ -39,7 +39,7 @@ fn scan_edge(mt: &EdgeMt, options: &EncodeOptions) -> Result<BlockScan, EncodeEr
     Ok(BlockScan { coded: Some(coded.into()), ..scan })
 }
 
-/// Blocks are pages, and do not tell on which others they depend: each can be used without.
+/// Blocks are pages without lists of those on which they depend: each can be used without.
 fn scan_half_edge(mt: &HalfEdgeMt, options: &EncodeOptions) -> Result<BlockScan, EncodeError> {
     let bits = options.block_bits;
     let coded = (mt.page_bits() != bits).then(|| mt.in_pages(bits));

@@ -46,7 +46,7 @@ pub enum EncodeError {
     Incomplete {
         /// Updates that are there.
         updates: u32,
-        /// Updates that the description tells.
+        /// Updates by the description.
         expected: u32,
     },
     /// No block can have so many updates.
@@ -214,7 +214,7 @@ fn sections(
     writer.finish(&mut payload);
     let counts = [mt.base().positions.len() as u64, mt.base().tets.len() as u64];
     if !payload::is_backed(counts, payload.len() - head) {
-        return Err(EncodeError::TooLong { what: "a base mesh that is told in so few bytes" });
+        return Err(EncodeError::TooLong { what: "a base mesh that is coded in so few bytes" });
     }
     shared.push(Section::new(Kind::BASE, payload)?);
     for field in 0..fields {
@@ -283,7 +283,7 @@ fn put_all(out: &mut impl Put, mt: MtRef<'_>, block_bits: u32) -> Result<(), Enc
     Ok(())
 }
 
-/// What the coded bytes of the file of an MT tell, part by part: names and bytes. Only for MTs that came from a file; exact
+/// How many bytes of the file of an MT code what: names and bytes. Only for MTs that came from a file; exact
 /// values are not among them.
 ///
 /// # Errors

@@ -31,7 +31,7 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadE
     Ok(mesh)
 }
 
-/// The time in the arrays of the whole data set, as VTK tells it.
+/// The time in the arrays of the whole data set, as VTK writes it.
 fn time_in(arrays: &[ArrayData]) -> Option<f64> {
     let array = arrays.iter().find(|array| array.name == "TimeValue")?;
     array.values.first().copied().filter(|time| time.is_finite())
@@ -249,7 +249,7 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Reads a METADATA block, which ends at an empty line; returns the unit of the array before it, if it tells one.
+    /// Reads a METADATA block, which ends at an empty line; returns the unit of the array before it, if there is one.
     fn metadata(&mut self) -> Option<String> {
         let mut unit = None;
         let mut is_unit = false;

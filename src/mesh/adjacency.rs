@@ -99,7 +99,7 @@ pub fn neighbors(tets: &[[u32; 4]]) -> Result<Vec<[u32; 4]>, MeshError> {
     match_faces(tets, &sorted_faces(tets)?, fits)
 }
 
-/// The neighbours by their [sorted faces](sorted_faces). `fits` may refuse a face of several tetrahedra; it is told whether the
+/// The neighbours by their [sorted faces](sorted_faces). `fits` may refuse a face of several tetrahedra; it gets whether the
 /// first two of them lie on the same side.
 pub(crate) fn match_faces<E>(
     tets: &[[u32; 4]],

@@ -112,8 +112,8 @@ mod tests {
         let mut turned = step(0.5);
         turned.tets[2].swap(0, 3);
         mesh.add_step(turned).unwrap();
-        let told: Vec<_> = mesh.fields.iter().map(|f| (f.name.as_str(), f.time)).collect();
-        assert_eq!(told, [("p", Some(0.0)), ("p", Some(0.5))]);
+        let fields: Vec<_> = mesh.fields.iter().map(|f| (f.name.as_str(), f.time)).collect();
+        assert_eq!(fields, [("p", Some(0.0)), ("p", Some(0.5))]);
     }
 
     #[test]

@@ -112,7 +112,7 @@ impl Session {
         fed
     }
 
-    /// Tells the session that no more bytes come.
+    /// Ends the file: no more bytes come.
     ///
     /// # Errors
     /// As [`Decoder::finish`]; what has arrived stays usable.
@@ -133,7 +133,7 @@ impl Session {
         self.front.as_ref().and(self.decoder.mt())
     }
 
-    /// The decoder: what the file tells of its blocks.
+    /// The decoder: the description of the file and its blocks.
     pub fn decoder(&self) -> &Decoder {
         &self.decoder
     }
@@ -162,10 +162,10 @@ impl Session {
         self.step(&mut |_| true)
     }
 
-    /// Tells what mesh is wanted from now on, for [`Session::step`] to make it.
+    /// Sets the request, for [`Session::step`] to make its mesh.
     ///
     /// # Errors
-    /// If the request makes no sense for this MT; what was wanted before is then wanted still.
+    /// If the request makes no sense for this MT; the request before it then remains.
     pub fn request(&mut self, request: &Request) -> Result<(), SessionError> {
         self.request_with(request, &[])
     }
@@ -193,7 +193,7 @@ impl Session {
         Ok(())
     }
 
-    /// Goes on towards the mesh that [`Session::request`] was told, until it is there or `go_on` says no, which is asked after
+    /// Goes on towards the mesh of the request, until it is there or `go_on` returns false, which is called after
     /// every update. The mesh is valid then and within the budget, whether it is done or not. It is not done where blocks came or
     /// went with this step, for there may be more to do with the others. Data is missing only if it is to come.
     ///
@@ -250,7 +250,7 @@ impl Session {
 
     /// Which entries of [`Session::view`] have changed since the last call: ranges of points and of tetrahedra in ascending
     /// order, with some entries among them that have not. What lies beyond the ends of the arrays is gone. The first call
-    /// tells of everything. Points change too when another field is shown.
+    /// gives everything. Points change too when another field is shown.
     pub fn take_changes(&mut self) -> MeshChanges {
         self.catch_up();
         let MeshView { positions, tets, .. } = view(self.front.as_ref(), &self.shown);
@@ -419,7 +419,7 @@ impl Session {
     }
 }
 
-/// What has changed since somebody last asked, so that they need not look at everything.
+/// What has changed since the last call, so that callers need not look at everything.
 #[derive(Debug, Default)]
 struct Behind {
     /// Kept from the first time on.

@@ -1,4 +1,4 @@
-//! A need that a JavaScript function tells: it gets many tetrahedra at once and says how urgent each one is.
+//! A need that a JavaScript function decides: it gets many tetrahedra at once and returns the excess of each.
 
 use super::error::WebError;
 use crate::geom::Lattice;
@@ -117,7 +117,7 @@ impl Criterion for Callback {
             });
             verdicts.extend(excesses.into_iter().map(|excess| Verdict { excess, slack: 0.0, dial: ANY }));
         }
-        // A function that fails asks for nothing from then on; its failure is told when the step ends.
+        // A function that fails asks for nothing from then on; the step returns its failure.
         verdicts.resize(tets.len(), Verdict::NEVER);
         verdicts
     }

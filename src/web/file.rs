@@ -53,7 +53,7 @@ impl File {
         self.remote.session_mut()
     }
 
-    /// Takes what the loader has complete, and tells it what is wanted then; whether there was anything.
+    /// Takes the complete ranges of the loader, and gives it those that are wanted then; whether there was any.
     pub fn supply(&mut self) -> Result<bool, WebError> {
         match &self.loader {
             Some(loader) => Ok(self.remote.supply(&mut loader.borrow_mut())?),

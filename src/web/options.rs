@@ -166,7 +166,7 @@ pub struct Asked {
     pub request: Request,
     /// The field that is shown, and that stats speak of.
     pub field: usize,
-    /// Needs that functions tell.
+    /// Needs that functions decide.
     pub custom: Vec<Arc<dyn Criterion>>,
     /// For each need of the request, what its bound is multiplied by to be in the unit in which it was asked.
     pub units: Vec<f64>,

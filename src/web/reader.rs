@@ -108,7 +108,7 @@ impl serde::de::Error for ReadError {
 /// A value, and which of its members are read.
 pub struct Reader {
     value: JsValue,
-    /// These names are somebody else's, if not ours alone.
+    /// The names that the second type of [`Reader::read_both`] reads.
     names: &'static [&'static str],
     is_ours: bool,
 }

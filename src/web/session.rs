@@ -34,7 +34,7 @@ impl CoreSession {
         Self { file: File::in_parts(fields, memory, loader), handed: 0 }
     }
 
-    /// Takes what the loader has complete, and tells it what is wanted then; whether there was anything.
+    /// Takes the complete ranges of the loader, and gives it those that are wanted then; whether there was any.
     pub fn supply(&mut self) -> Result<bool, WebError> {
         self.file.supply()
     }
@@ -78,7 +78,7 @@ impl CoreSession {
         self.step(f64::INFINITY, f64::INFINITY)
     }
 
-    /// Tells which mesh is wanted from now on, for `step` to make it.
+    /// Sets the request, for `step` to make its mesh.
     pub fn request(&mut self, options: &RefineOptions) -> Result<(), WebError> {
         self.file.request(options, None)
     }

@@ -34,7 +34,7 @@ pub struct Viewer {
     look: Look,
     camera: Camera,
     show: Show,
-    /// What the camera saw when the needs that follow it were last told.
+    /// The view that the needs which follow the camera have now.
     seen: View,
     /// Whether the mesh is not yet the one that was asked for.
     moving: bool,
@@ -148,7 +148,7 @@ impl Viewer {
         Ok(self.progress())
     }
 
-    /// Takes what the loader has complete, and tells it what is wanted then; whether there was anything.
+    /// Takes the complete ranges of the loader, and gives it those that are wanted then; whether there was any.
     pub fn supply(&mut self) -> Result<bool, WebError> {
         let Some(mut next) = self.next.take() else {
             let any = self.file.supply()?;
@@ -197,7 +197,7 @@ impl Viewer {
         self.bounds.map_or_else(Box::default, |bounds| flat(&bounds))
     }
 
-    /// Tells which mesh is wanted from now on, for `step` to make it. Views without a matrix follow the camera.
+    /// Sets the request, for `step` to make its mesh. Views without a matrix follow the camera.
     pub fn request(&mut self, options: &RefineOptions) -> Result<(), WebError> {
         let (seen, before) = (self.view(), self.file.asked.field);
         self.file.request(options, Some(&seen))?;
@@ -410,7 +410,7 @@ impl Viewer {
         View { matrix, viewport: self.renderer.size().map(f64::from) }
     }
 
-    /// Tells the needs that follow the camera where it is.
+    /// Gives the needs that follow the camera its view.
     fn follow_camera(&mut self) -> Result<(), WebError> {
         let seen = self.view();
         if self.file.asked.follows.is_empty() || seen == self.seen {

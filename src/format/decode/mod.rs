@@ -23,7 +23,7 @@ pub struct Progress {
     pub complete: bool,
     /// Bytes taken in.
     pub bytes: u64,
-    /// Bytes of the whole file, if it tells.
+    /// Bytes of the whole file, if it is known.
     pub total: Option<u64>,
     /// Updates that are there.
     pub updates: u32,
@@ -131,7 +131,7 @@ impl Decoder {
         Ok(self.progress())
     }
 
-    /// Tells the decoder that no more bytes come.
+    /// Ends the file: no more bytes come.
     ///
     /// # Errors
     /// [`FormatError::Truncated`] when the file should go on, or the error that an earlier `feed` gave.
@@ -153,7 +153,7 @@ impl Decoder {
         self.mt
     }
 
-    /// What the file tells of itself, with all of its fields; none before that section is there.
+    /// The description of the MT, with all fields of the file; none before that section is there.
     pub fn info(&self) -> Option<&MtInfo> {
         self.head.info.as_ref()
     }

@@ -226,7 +226,7 @@ impl Decoder {
         }
         let updates = index.updates(block, info.updates);
         if updates.is_empty() {
-            return Err(content.corrupt("there are more updates than the description tells"));
+            return Err(content.corrupt("there are more updates than the description says"));
         }
         Ok((block, updates))
     }
@@ -317,7 +317,7 @@ impl Decoder {
             return Err(self.corrupt("sections are missing or repeated"));
         }
         if self.total.is_some_and(|total| total != self.bytes) {
-            return Err(self.corrupt("the file is shorter than its header tells"));
+            return Err(self.corrupt("the file is shorter than its header says"));
         }
         self.stage = Stage::End;
         self.state = None;

@@ -18,7 +18,7 @@ const LEVEL: Family = STEP.numbers_after(1, 1);
 const REMOVED: Family = LEVEL.numbers_after(2, 2);
 /// Steps between the corners of inserted tetrahedra.
 const CORNER: Family = REMOVED.numbers_after(4, 4);
-/// All families, with names for what they tell.
+/// All families, with names for what they code.
 pub const PARTS: [(&str, Family); 6] = [
     ("errors", ERROR),
     ("partial order", COUNT),
@@ -49,11 +49,11 @@ pub fn at_hand(mt: &ExplicitMt, removed: &[u32], created: Range<u32>) -> Vec<u32
     vertices
 }
 
-/// The reference mesh must have as many vertices and tetrahedra as the description tells.
+/// The reference mesh must have as many vertices and tetrahedra as the description says.
 pub fn check_reference(mt: &ExplicitMt) -> Result<(), BaseMeshError> {
     let info = mt.info();
     if mt.reference_counts() != [info.vertices, info.tetrahedra] {
-        return Err(BaseMeshError::Info("the reference mesh has another size than the description tells"));
+        return Err(BaseMeshError::Info("the reference mesh has another size than the description says"));
     }
     Ok(())
 }
@@ -96,7 +96,7 @@ fn put_removed(out: &mut impl Put, mt: &ExplicitMt, u: UpdateId) {
     }
 }
 
-/// Corners are told by their places among the vertices at hand, which ascend. The first two corners of a tetrahedron
+/// Corners are coded by their places among the vertices at hand, which ascend. The first two corners of a tetrahedron
 /// ascend, too, and are the lowest; so do the tetrahedra.
 fn put_inserted(out: &mut impl Put, mt: &ExplicitMt, u: UpdateId) {
     let range = mt.inserted(u);
@@ -120,7 +120,7 @@ struct Parts {
     removed: Vec<u32>,
     inserted: Vec<[u32; 4]>,
     errors: Vec<ErrorCode>,
-    /// Of what is removed, where it is told.
+    /// Of what is removed, where the file contains them.
     quarterings: Vec<u8>,
     own_fall: u8,
     /// The last vertex of the update before.

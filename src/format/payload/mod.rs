@@ -187,7 +187,7 @@ pub fn families(kind: MtKind) -> Vec<Family> {
     parts(kind).into_iter().map(|(_, family)| family).collect()
 }
 
-/// The same, with a name for what each tells.
+/// The same, with a name for what each codes.
 pub fn parts(kind: MtKind) -> Vec<(&'static str, Family)> {
     let base = base::FAMILIES.into_iter().map(|family| ("base mesh", family));
     let own: &[(&str, Family)] = match kind {
@@ -246,9 +246,9 @@ pub fn write_base_head(out: &mut Vec<u8>, mt: MtRef<'_>) {
 #[derive(Debug, Default)]
 pub struct BaseParts {
     base: BaseMesh,
-    /// What files of vertex-based MTs tell besides.
+    /// What files of vertex-based MTs contain besides.
     vertex: vertex::InsertionRules,
-    /// What files of half-edge MTs tell besides.
+    /// What files of half-edge MTs contain besides.
     half_edge: half_edge::BaseHead,
     levels: Vec<Vec<i32>>,
 }
@@ -257,7 +257,7 @@ pub struct BaseParts {
 /// bytes could claim what fills all memory that is allowed.
 const MOST_IN_A_BYTE: u64 = 4096;
 
-/// Whether the bytes of a base mesh can tell so much.
+/// Whether a base mesh of so many bytes can be so large.
 pub fn is_backed([vertices, tets]: [u64; 2], bytes: usize) -> bool {
     vertices + tets <= MOST_IN_A_BYTE * (bytes as u64 + 1)
 }
@@ -276,7 +276,7 @@ pub fn read_base(
     let counts = [vertices, tets].map(u64::from);
     check_memory(info, counts, updates, limits)?;
     if !is_backed(counts, reader.len()) {
-        return Err(reader.corrupt("the base mesh claims more than its bytes can tell"));
+        return Err(reader.corrupt("the base mesh is larger than its bytes can code"));
     }
     let mut source = Source::new(reader, models)?;
     let mut parts = BaseParts { base: base::read(&mut source, vertices, tets)?, ..BaseParts::default() };
@@ -348,7 +348,7 @@ pub fn check_counts(info: &MtInfo, base_vertices: u64) -> Result<(), BaseMeshErr
         MtKind::Edge => edge::check_counts(info, base_vertices),
         MtKind::Vertex => vertex::check_counts(info, base_vertices),
         MtKind::HalfEdge => half_edge::check_counts(info, base_vertices),
-        // How many vertices and tetrahedra there are, every update tells; they are compared at the end.
+        // Vertices and tetrahedra are counted update by update, and compared at the end.
         MtKind::Explicit => Ok(()),
     }
 }
@@ -526,7 +526,7 @@ pub fn read_updates(
     }
 }
 
-/// Whether a complete MT has the reference mesh that its description tells, as far as that follows without a mesh.
+/// Whether the reference mesh of a complete MT is that of its description, as far as that follows without a mesh.
 pub fn check_reference(mt: MtRef<'_>) -> Result<(), BaseMeshError> {
     match mt {
         MtRef::Edge(_) | MtRef::Vertex(_) | MtRef::HalfEdge(_) => Ok(()),

@@ -8,7 +8,7 @@ use crate::mt::MAX_REMOVED;
 /// How a point and a tetrahedron lie to each other.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct View {
-    /// Bit `k` tells that the point is on the inner side of face `k`.
+    /// Bit `k` is set if the point is on the inner side of face `k`.
     seen: u8,
     /// Where the point is with respect to the sphere: 1 inside, -1 outside, 0 on it.
     sphere: i32,

@@ -1,9 +1,8 @@
-//! Vertex insertions, coded by what the mesh to which they are applied lets expect of them.
+//! Vertex insertions, coded as residuals against predictions from the mesh to which they are applied.
 //!
-//! Writer and reader apply every update to a mesh of their own. An insertion is told by a vertex near it, where it lies as
-//! seen from there, and which tetrahedra around it give way: these are reached face by face, starting from the one that
-//! the new vertex lies in. Who is parent of whom, what the node of the update says of its star, and how what it
-//! removes is built again follow from that.
+//! Writer and reader apply every update to a mesh of their own. An insertion is coded by a vertex near it, its offset from
+//! there, and which tetrahedra it removes: these are reached face by face, starting from the one that the new vertex lies
+//! in. Parents, the star of the new vertex, and how `u−` builds again what was removed follow from that.
 
 mod cavity;
 mod numbers;
@@ -25,7 +24,7 @@ pub use state::State;
 const ERROR: Family = base::LAST.numbers_after(1, 2);
 /// Whether all that is removed has the near vertex.
 const FAN: Family = ERROR.after(1, 2);
-/// How a coordinate differs from that of the near vertex: bits of the difference next to those of what is usual.
+/// How a coordinate differs from that of the near vertex: bits of the difference relative to those predicted.
 const OFFSET: Family = FAN.after(4, 112);
 /// Which of the tetrahedra that the new vertex lies in, as seen from the near one, is the first that is removed.
 const SEED: Family = OFFSET.after(1, 9);
@@ -42,7 +41,7 @@ const LEVEL: Family = SHORT.numbers_after(40, 1);
 /// The last family of vertex insertions.
 pub const LAST: Family = LEVEL;
 
-/// All families, with names for what they tell.
+/// All families, with names for what they code.
 pub const PARTS: [(&str, Family); 9] = [
     ("errors", ERROR),
     ("partial order", FAN),
@@ -55,7 +54,7 @@ pub const PARTS: [(&str, Family); 9] = [
     ("levels", LEVEL),
 ];
 
-/// The last [`SEED`]: none of them, its place is told.
+/// The last [`SEED`]: none of them, its place follows.
 const ELSEWHERE: u32 = 8;
 
 /// After so many updates their memory is looked at.
@@ -79,13 +78,13 @@ pub fn check_counts(info: &MtInfo, base_vertices: u64) -> Result<(), BaseMeshErr
     Ok(())
 }
 
-/// Puts what is to be known of all insertions: whether each makes the mesh larger, and the grain of the coordinates.
+/// Puts what all insertions have in common: whether each makes the mesh larger, and the granularity of the coordinates.
 pub fn put_head(out: &mut impl Put, mt: &VertexMt) {
     out.bits(u32::from(mt.always_grows()), 1);
     grain(mt).iter().for_each(|&x| out.bits(x as u32, 31));
 }
 
-/// What is known of all insertions.
+/// What all insertions of an MT have in common.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct InsertionRules {
     always_grows: bool,

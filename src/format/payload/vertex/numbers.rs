@@ -32,9 +32,9 @@ pub(super) fn read_one_of(source: &mut Source<'_>, count: u32) -> Result<u32, Fo
     Ok(if value < short { value } else { 2 * value + source.bits(1)? - short })
 }
 
-/// Along an axis, what is expected of a new vertex near `near`: the usual difference, the context, and what the difference
-/// is told from.
-pub(super) fn usual(state: &State, axis: usize) -> (u32, u32, i32) {
+/// Along an axis, the prediction for a new vertex near `near`: the bits of the difference, the context, and what the difference is
+/// relative to.
+pub(super) fn prediction(state: &State, axis: usize) -> (u32, u32, i32) {
     let grain = i64::from(state.grain[axis]);
     let (mut sum, mut size, mut level) = (0, 0, 1);
     for seen in &state.link {
@@ -56,7 +56,7 @@ pub(super) fn bits_of(x: u32) -> u32 {
 
 pub(super) fn put_position(out: &mut impl Put, state: &State, near: u32, position: [i32; 3]) {
     for (axis, x) in position.into_iter().enumerate() {
-        let (size, context, from) = usual(state, axis);
+        let (size, context, from) = prediction(state, axis);
         let offset = x.wrapping_sub(state.mesh.positions()[near as usize][axis]);
         let residual = (offset / state.grain[axis]).wrapping_sub(from);
         let length = residual.unsigned_abs();
@@ -81,7 +81,7 @@ pub(super) fn read_position(
 ) -> Result<[i32; 3], FormatError> {
     let mut position = state.mesh.positions()[near as usize];
     for (axis, x) in position.iter_mut().enumerate() {
-        let (size, context, from) = usual(state, axis);
+        let (size, context, from) = prediction(state, axis);
         let symbol = source.symbol(OFFSET, context)?;
         let mut residual = 0;
         if symbol > 0 {

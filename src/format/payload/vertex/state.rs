@@ -35,7 +35,7 @@ pub struct State {
     pub(super) given_up: Vec<[u32; 2]>,
     /// Tetrahedra of the star, in the direction of the new vertex.
     pub(super) cone: Vec<u32>,
-    /// Of what is removed, where it is told.
+    /// Of what is removed, where the file contains them.
     pub(super) quarterings: Vec<u8>,
     /// By tetrahedron: `epoch` if it is in the star, one more if it is removed, two more if it is
     /// not, three more if it cannot be.
@@ -137,8 +137,8 @@ impl State {
         true
     }
 
-    /// Chooses the vertex to tell an insertion from, and gathers what is around it; and tells whether all that is removed
-    /// is at it.
+    /// Chooses the near vertex of an insertion, and gathers what is around it; also returns whether all that is removed has
+    /// it.
     pub(super) fn near(&mut self, removed: &[u32], position: [i32; 3]) -> Option<(u32, bool)> {
         let tets: Vec<[u32; 4]> = removed.iter().map(|&t| self.mesh.tets()[t as usize]).collect();
         let mut vertices = tets.as_flattened().to_vec();

@@ -235,7 +235,7 @@ fn damage_makes_errors_or_other_mts() -> Result<(), FormatError> {
         damaged[bit / 8] ^= 1 << (bit % 8);
         if let Ok(other) = read(vec![damaged]) {
             assert!(other != mt);
-            // It can be spelled out, so all of its updates can be applied.
+            // It has an explicit form, so all of its updates can be applied.
             assert!(ExplicitMt::of(&other).is_ok());
         }
     }
