@@ -40,7 +40,7 @@ export function coreMethods(emit) {
   /** Counts the meshes that were asked for. */
   let goal = 0;
   const aim = (options) => {
-    session.aim(options);
+    session.request(options);
     goal++;
     parts?.turn();
   };

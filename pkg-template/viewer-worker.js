@@ -188,7 +188,7 @@ function partsCame(progress) {
 function followParts() {
   following = undefined;
   if (!parts || !ready || !aimed) return;
-  viewer.aimAgain();
+  viewer.requestAgain();
   invalidate();
 }
 
@@ -204,7 +204,7 @@ function forget() {
 
 /** Has the viewer aim at the request; throws if that cannot be met. */
 function aim() {
-  viewer.aim(request);
+  viewer.request(request);
   parts?.turn();
   aimed = true;
   goal++;
@@ -216,7 +216,7 @@ function aim() {
 function follow() {
   try {
     if (!aimed) aim();
-    viewer.aimAgain();
+    viewer.requestAgain();
     invalidate();
   } catch (error) {
     emit("error", flattenError(error));

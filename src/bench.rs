@@ -10,7 +10,7 @@ use crate::mt::{Mt, MultiTessellation};
 use crate::refine::Request;
 use crate::session::{Session, SessionError};
 
-/// What a benchmark found. Rates are those of the fastest of several runs: the others only tell what else the
+/// What a benchmark found. Rates are those of the fastest of several runs: the others show what else the
 /// machine was doing.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BenchReport {
@@ -32,7 +32,7 @@ pub struct BenchReport {
     pub coarsen_updates: f64,
     /// Tetrahedra of the finest mesh searched per second for an isosurface in the middle of the field's range.
     pub isosurface_tets: f64,
-    /// Requests that change a little from frame to frame; these are not the fastest, but what is usual.
+    /// Requests that change a little from frame to frame; medians, not the fastest.
     pub coherent: Walks,
 }
 
@@ -51,7 +51,7 @@ pub fn run(bytes: &[u8], clock: &mut dyn FnMut() -> f64, seconds: f64) -> Result
         report.runs += 1;
     }
     let mut session = Session::new();
-    session.feed(bytes).map_err(SessionError::Format)?;
+    session.feed(bytes)?;
     report.coherent = coherent::walks(&mut session, clock)?;
     let rate = |count: u32, time: f64| f64::from(count) / time.max(SHORTEST);
     report.decode_updates = rate(report.updates, best.decode);
@@ -95,10 +95,10 @@ fn once(
     report: &mut BenchReport,
 ) -> Result<Times, SessionError> {
     let mut times = Times::default();
-    let decoded = timed(clock, &mut times.decode, || decode(bytes)).map_err(SessionError::Format)?;
+    let decoded = timed(clock, &mut times.decode, || decode(bytes))?;
     report.updates = decoded.map_or(0, |mt| mt.updates());
     let mut session = Session::new();
-    session.feed(bytes).map_err(SessionError::Format)?;
+    session.feed(bytes)?;
     let middle = session.info().map_or(0.0, |info| 0.5 * (info.fields[0].min + info.fields[0].max));
     let finest = timed(clock, &mut times.refine, || session.refine(&Request::within(0.0)))?;
     // The view follows the mesh at its own cost, which is not that of the surface.

@@ -8,8 +8,8 @@ use crate::refine::{GoOn, RefineStats, Request};
 use crate::remote::Remote;
 use crate::session::{Session, SessionError};
 use crate::stream::{RangeSource, StreamError, WantedRange};
-use std::fmt;
 use std::time::Duration;
+use thiserror::Error;
 
 pub use crate::remote::Step;
 
@@ -32,39 +32,21 @@ impl Default for ClientOptions {
 }
 
 /// Why a client cannot do what it was asked for. The current mesh is valid all the same.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum ClientError {
     /// The bytes do not come.
-    Stream(StreamError),
+    #[error(transparent)]
+    Stream(#[from] StreamError),
     /// The bytes are not those of a sound MT file.
-    Format(FormatError),
+    #[error(transparent)]
+    Format(#[from] FormatError),
     /// The request makes no sense for this MT, or the MT is damaged.
-    Session(SessionError),
+    #[error(transparent)]
+    Session(#[from] SessionError),
 }
 
-impl fmt::Display for ClientError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Stream(error) => write!(f, "{error}"),
-            Self::Format(error) => write!(f, "{error}"),
-            Self::Session(error) => write!(f, "{error}"),
-        }
-    }
-}
-
-impl std::error::Error for ClientError {
-    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
-        // Each is printed as it is, so what stands behind it comes next.
-        match self {
-            Self::Stream(error) => error.source(),
-            Self::Format(error) => error.source(),
-            Self::Session(error) => error.source(),
-        }
-    }
-}
-
-/// How long is waited for bytes at a time where nobody waits for a mesh.
+/// How long to wait for bytes at a time if no caller waits for a mesh.
 const PATIENCE: Duration = Duration::from_secs(1);
 
 /// About how many bytes a step takes in.
@@ -88,7 +70,7 @@ impl<S: RangeSource> Client<S> {
         let mut client = Self { source, remote: Remote::in_parts(decode, memory) };
         while client.session().mesh().is_none() && !client.fetch(PATIENCE)? {}
         if client.session().mesh().is_none() {
-            client.session_mut().finish().map_err(ClientError::Format)?;
+            client.session_mut().finish()?;
         }
         Ok(client)
     }
@@ -99,7 +81,7 @@ impl<S: RangeSource> Client<S> {
     /// # Errors
     /// If the request makes no sense for this MT, or bytes that it needs do not come or are damaged.
     pub fn refine(&mut self, request: &Request) -> Result<RefineStats, ClientError> {
-        self.aim(request)?;
+        self.request(request)?;
         let mut before = RefineStats::default();
         loop {
             while !self.fetch(PATIENCE)? {}
@@ -112,12 +94,12 @@ impl<S: RangeSource> Client<S> {
         }
     }
 
-    /// Tells what mesh is wanted from now on, for [`Client::step`] to make it.
+    /// Sets the request, for [`Client::step`] to make its mesh.
     ///
     /// # Errors
-    /// If the request makes no sense for this MT; what was wanted before is then wanted still.
-    pub fn aim(&mut self, request: &Request) -> Result<(), ClientError> {
-        self.remote.aim(request, &[]).map_err(ClientError::Session)?;
+    /// If the request makes no sense for this MT; the request before it then remains.
+    pub fn request(&mut self, request: &Request) -> Result<(), ClientError> {
+        self.remote.request(request, &[])?;
         // What is on its way may not be wanted any more.
         self.ask();
         Ok(())
@@ -138,10 +120,10 @@ impl<S: RangeSource> Client<S> {
                 break;
             }
         }
-        self.remote.step(go_on).map_err(ClientError::Session)
+        Ok(self.remote.step(go_on)?)
     }
 
-    /// Waits up to `patience` for more of what is wanted, and takes it in; tells whether all of it is here.
+    /// Waits up to `patience` for more of what is wanted, and takes it in; returns whether all of it is here.
     ///
     /// # Errors
     /// If the bytes do not come or are damaged.
@@ -149,10 +131,10 @@ impl<S: RangeSource> Client<S> {
         if !self.remote.is_asking() && !self.ask() {
             return Ok(true);
         }
-        let Some((range, bytes)) = self.source.next(patience).map_err(ClientError::Stream)? else {
+        let Some((range, bytes)) = self.source.next(patience)? else {
             return Ok(false);
         };
-        self.remote.take(&range, &bytes).map_err(ClientError::Format)?;
+        self.remote.take(&range, &bytes)?;
         Ok(!self.remote.is_asking() && !self.ask())
     }
 
@@ -165,19 +147,19 @@ impl<S: RangeSource> Client<S> {
         let Some(range) = self.session().exact_range() else { return Ok(()) };
         self.source.want(&[WantedRange { range: range.clone(), priority: 0.0 }]);
         let bytes = loop {
-            match self.source.next(PATIENCE).map_err(ClientError::Stream)? {
+            match self.source.next(PATIENCE)? {
                 Some((arrived, bytes)) if arrived == range => break bytes,
                 // Something that was wanted before.
-                Some((other, bytes)) => self.remote.take(&other, &bytes).map_err(ClientError::Format)?,
+                Some((other, bytes)) => self.remote.take(&other, &bytes)?,
                 None => {}
             }
         };
-        let taken = self.remote.take_exact(&bytes).map_err(ClientError::Format);
+        let taken = self.remote.take_exact(&bytes);
         self.ask();
-        taken
+        Ok(taken?)
     }
 
-    /// Tells the source what is wanted now; whether there is anything.
+    /// Gives the source the ranges that are wanted now; whether there are any.
     fn ask(&mut self) -> bool {
         let wanted = self.remote.wanted();
         self.source.want(&wanted);
@@ -189,7 +171,7 @@ impl<S: RangeSource> Client<S> {
         self.remote.session()
     }
 
-    /// The session. What is [aimed](Session::aim) at here, nobody fetches until the next request.
+    /// The session. Blocks for a request [made here](Session::request) are not fetched before the next one.
     pub fn session_mut(&mut self) -> &mut Session {
         self.remote.session_mut()
     }

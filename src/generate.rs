@@ -1,9 +1,8 @@
 //! Meshes made by formula, the same on every platform: what the demo, the docs and the tests use.
 
-use std::f64::consts::FRAC_PI_4;
-use std::fmt;
-
 use crate::mesh::{Field, Grid, TetMesh};
+use std::f64::consts::FRAC_PI_4;
+use thiserror::Error;
 
 /// The names that [`by_name`] knows.
 pub const NAMES: [&str; 2] = ["bucky", "sphere-flow"];
@@ -14,11 +13,13 @@ const BUCKY_SIZES: [u32; 2] = [2, 512];
 const SPHERE_SIZES: [u32; 2] = [3, 101];
 
 /// Why nothing was generated.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum GenerateError {
     /// No generator has this name.
+    #[error("nothing named \"{0}\" can be generated; choose one of: {names}", names = NAMES.join(", "))]
     UnknownName(String),
     /// The size is too small or too large.
+    #[error("{name} cannot have size {size}; choose one from {} to {}", .limits[0], .limits[1])]
     Size {
         /// The generator.
         name: &'static str,
@@ -27,21 +28,6 @@ pub enum GenerateError {
         /// Smallest and largest size.
         limits: [u32; 2],
     },
-}
-
-impl std::error::Error for GenerateError {}
-
-impl fmt::Display for GenerateError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::UnknownName(name) => {
-                write!(f, "nothing named \"{name}\" can be generated; choose one of: {}", NAMES.join(", "))
-            }
-            Self::Size { name, size, limits: [low, high] } => {
-                write!(f, "{name} cannot have size {size}; choose one from {low} to {high}")
-            }
-        }
-    }
 }
 
 /// Generates the mesh called `name` (see [`NAMES`]) with `size` points along an edge.

@@ -4,7 +4,7 @@
 //! (decided exactly if the lattice has not moved it) or, where the boundary has moved, with that of the nearest boundary triangle.
 //!
 //! An MT promises that each reference vertex has *some* place in the mesh, no farther than the boundary may have
-//! moved, where the field is as near as promised. Where the boundary has moved this need not be the nearest place,
+//! moved, where the field is within its bound. Where the boundary has moved this need not be the nearest place,
 //! nor one in a tetrahedron that happens to contain the vertex. So when [`Part::promise`] is given, places on the
 //! boundary within its distance count as well, and the one that fits best is taken.
 
@@ -31,7 +31,7 @@ pub struct Part {
     pub roi: Option<Bounds>,
     /// Only in tetrahedra in which the field has a value of one of these ranges; everywhere if empty.
     pub ranges: Vec<[f64; 2]>,
-    /// What has been promised, if anything.
+    /// The bounds that are guaranteed, if any.
     pub promise: Option<Promise>,
 }
 
@@ -163,7 +163,7 @@ impl Measure<'_> {
         });
     }
 
-    /// Whether what is promised has been found at a point.
+    /// Whether the field is within its bound at a point.
     fn is_kept(&self, point: &Point) -> bool {
         self.part.promise.is_some_and(|promise| point.least.is_some_and(|(field, _)| field <= promise.field))
     }

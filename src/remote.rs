@@ -55,7 +55,7 @@ impl Remote {
         &self.session
     }
 
-    /// The session. What is [aimed](Session::aim) at here is wanted from the next call of [`Remote::wanted`] on.
+    /// The session. What is [requested](Session::request) at here is wanted from the next call of [`Remote::wanted`] on.
     pub fn session_mut(&mut self) -> &mut Session {
         &mut self.session
     }
@@ -70,12 +70,12 @@ impl Remote {
         self.fetched
     }
 
-    /// Tells what mesh is wanted from now on, for [`Remote::step`] to make it: see [`Session::aim_with`].
+    /// Sets the request, for [`Remote::step`] to make its mesh: see [`Session::request_with`].
     ///
     /// # Errors
-    /// If the request makes no sense for this MT; what was wanted before is then wanted still.
-    pub fn aim(&mut self, request: &Request, custom: &[Arc<dyn Criterion>]) -> Result<(), SessionError> {
-        self.session.aim_with(request, custom)
+    /// If the request makes no sense for this MT; the request before it then remains.
+    pub fn request(&mut self, request: &Request, custom: &[Arc<dyn Criterion>]) -> Result<(), SessionError> {
+        self.session.request_with(request, custom)
     }
 
     /// Goes on towards that mesh with what is here, until it is there or `go_on` says no.
@@ -127,7 +127,7 @@ impl Remote {
         self.session.take_exact(bytes)
     }
 
-    /// Takes all that `loader` has complete, and tells it what is wanted then; whether there was anything.
+    /// Takes all complete ranges of `loader`, and gives it those that are wanted then; whether there was any.
     ///
     /// # Errors
     /// As [`Remote::take`]; nothing is wanted then until the next call.

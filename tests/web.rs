@@ -107,7 +107,7 @@ fn steps_and_deltas_lead_to_the_same_mesh() {
     let whole = session.hash();
     session.refine(options(r#"{ "error": "100%" }"#).unchecked_ref()).expect("a good request");
     let mut copy: Vec<u32> = Vec::new();
-    session.aim(options(r#"{ "error": "2%" }"#).unchecked_ref()).expect("a good request");
+    session.request(options(r#"{ "error": "2%" }"#).unchecked_ref()).expect("a good request");
     for step in 0.. {
         assert!(step < 10_000, "it ends");
         let stats = session.step(f64::INFINITY, 100.0).expect("a good MT");

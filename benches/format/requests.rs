@@ -190,7 +190,7 @@ fn corners(set: &Set, set_name: &str, file: &[u8]) -> Result<Vec<String>> {
     for (name, part, side, error) in BOXES {
         let region = Bounds { min: at(part), max: at(part + side) };
         let mut client = open(file)?;
-        client.aim(&Need::within(error).inside(region).into())?;
+        client.request(&Need::within(error).inside(region).into())?;
         let mut rounds = 0;
         let stats = loop {
             let before = client.fetched();

@@ -61,7 +61,7 @@ pub fn run(path: &Path) -> Result<()> {
     let mut client = open(memory)?;
     let (mut most, mut most_beside, mut left_out, mut satisfied, mut largest) = (0, 0, 0, 0, 0);
     for stop in 0..STOPS {
-        client.aim(&request(client.session(), stop)?)?;
+        client.request(&request(client.session(), stop)?)?;
         let stats = loop {
             let step = client.step(Duration::ZERO, &mut |_| true)?;
             let progress = client.session().block_progress();

@@ -34,20 +34,25 @@ struct Report {
     refine: Refine,
     coarsen: Updates,
     isosurface: Tets,
-    coherent: Coherent,
+    #[serde(with = "Walks")]
+    coherent: bench::Walks,
     bytes_per_tet: f64,
 }
 
 /// Requests that change a little from frame to frame.
 #[derive(Serialize)]
-struct Coherent {
-    #[serde(rename = "box")]
-    roi: Walk,
-    iso: Walk,
-    view: Walk,
+#[serde(remote = "bench::Walks")]
+struct Walks {
+    #[serde(rename = "box", with = "Walk")]
+    roi: bench::Coherent,
+    #[serde(with = "Walk")]
+    iso: bench::Coherent,
+    #[serde(with = "Walk")]
+    view: bench::Coherent,
 }
 
 #[derive(Serialize)]
+#[serde(remote = "bench::Coherent")]
 struct Walk {
     median_ms: f64,
     p95_ms: f64,
@@ -56,14 +61,6 @@ struct Walk {
     cold_updates: u64,
     tetrahedra: u32,
     bytes_per_tet: f64,
-}
-
-impl From<bench::Coherent> for Walk {
-    fn from(walk: bench::Coherent) -> Self {
-        let bench::Coherent { median_ms, p95_ms, cold_ms, updates, cold_updates, tetrahedra, bytes_per_tet } =
-            walk;
-        Self { median_ms, p95_ms, cold_ms, updates, cold_updates, tetrahedra, bytes_per_tet }
-    }
 }
 
 #[derive(Serialize)]
@@ -109,17 +106,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         refine: Refine { updates_per_second: found.refine_updates, tets_per_second: found.refine_tets },
         coarsen: Updates { updates_per_second: found.coarsen_updates },
         isosurface: Tets { tets_per_second: found.isosurface_tets },
-        coherent: Coherent {
-            roi: found.coherent.roi.into(),
-            iso: found.coherent.iso.into(),
-            view: found.coherent.view.into(),
-        },
+        coherent: found.coherent,
         bytes_per_tet: bytes_per_tet(&found.coherent),
     };
     output::result(arguments.json, &report, &rows(&report))
 }
 
-/// The most of the three: where the mesh is small beside the MT, so are what it knows of the MT's vertices and updates.
+/// The most of the three: where the mesh is small beside the MT, arrays by vertex and update of the MT count more.
 fn bytes_per_tet(walks: &bench::Walks) -> f64 {
     walks.roi.bytes_per_tet.max(walks.iso.bytes_per_tet).max(walks.view.bytes_per_tet)
 }
@@ -159,8 +152,8 @@ fn random_points(count: usize) -> Vec<[i32; 3]> {
 }
 
 fn rows(report: &Report) -> [(&'static str, String); 10] {
-    let walk = |walk: &Walk| {
-        let Walk { median_ms, p95_ms, cold_ms, updates, .. } = walk;
+    let walk = |walk: &bench::Coherent| {
+        let bench::Coherent { median_ms, p95_ms, cold_ms, updates, .. } = walk;
         format!(
             "{median_ms:.2} ms a frame of {updates} updates, 95 % within {p95_ms:.2} ms; from the base mesh {cold_ms:.1} ms"
         )

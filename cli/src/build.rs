@@ -1,6 +1,6 @@
 //! `tetralod build`: a mesh to an MT file.
 
-use super::files;
+use super::files::{self, CRITERION, METHOD};
 use super::input::{self, FieldSelection};
 use super::output::{self, Verbosity};
 use anyhow::{Context, Result, anyhow};
@@ -92,10 +92,6 @@ pub struct Arguments {
     #[command(flatten)]
     verbosity: Verbosity,
 }
-
-/// The metadata keys under which a file tells how it was built.
-pub const METHOD: &str = "method";
-pub const CRITERION: &str = "criterion";
 
 /// Parses the name of a kind of MT.
 pub fn kind(text: &str) -> Result<MtKind> {
@@ -217,8 +213,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     let BuildResult { mt, summary, exact, .. } = build(arguments, &config, &mesh)?;
     drop(mesh);
-    let told = metadata(&config).into_iter().map(|(k, v)| (k.to_owned(), v.to_owned()));
-    let metadata = told.chain(arguments.metadata.iter().cloned()).collect();
+    let own = metadata(&config).into_iter().map(|(k, v)| (k.to_owned(), v.to_owned()));
+    let metadata = own.chain(arguments.metadata.iter().cloned()).collect();
     let options = EncodeOptions { block_bits: config.block_bits, check_margins: true, exact, metadata };
     let file_bytes = files::write_file(&arguments.output, |out| Ok(encode_to(&mt, &options, out)?))?;
     let report = report(&config, &summary, file_bytes, start.elapsed().as_secs_f64(), repaired);
@@ -311,7 +307,7 @@ fn construction(arguments: &Arguments, kind: MtKind) -> Result<Construction, Str
     }
 }
 
-/// What the file tells of how it was built.
+/// The metadata about how the file was built.
 fn metadata(config: &BuildConfig) -> Vec<(&'static str, &'static str)> {
     let criterion = config.construction.criterion().map(|criterion| (CRITERION, criterion.name()));
     criterion.into_iter().chain([(METHOD, config.construction.method().name())]).collect()

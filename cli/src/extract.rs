@@ -1,7 +1,7 @@
 //! `tetralod extract`: the mesh that a request needs, out of an MT file.
 
 use super::query::{Answer, EXAMPLES, Query};
-use super::{files, output};
+use super::{files, input, output};
 use anyhow::{Context, Result, bail};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -91,7 +91,7 @@ fn reference_units(session: &Session, info: &MtInfo, mesh: &CurrentMesh) -> TetM
 /// if there are no such needs.
 fn measure(input: &Path, answer: &Answer) -> Result<Option<Measured>> {
     let opened = &answer.opened;
-    let reference = files::read_reference(&[input.to_owned()], opened)?;
+    let reference = input::read_reference(&[input.to_owned()], opened)?;
     let info = opened.info()?;
     let name = &info.fields[answer.field].name;
     let field = reference.fields.iter().find(|field| info.fields[answer.field].is_of(field));

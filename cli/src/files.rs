@@ -1,7 +1,5 @@
 //! Files in and out: MT files are read as far as they are needed, from disk or from a server; outputs appear whole or not at all.
 
-use super::build::METHOD;
-use super::input::{self, FieldSelection};
 use anyhow::{Context, Result, bail};
 use std::fs;
 use std::fs::File;
@@ -11,12 +9,14 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tetralod::builder::Method;
 use tetralod::client::{Client, ClientOptions};
-use tetralod::io::CellData;
-use tetralod::mesh::{RepairReport, TetMesh};
 use tetralod::mt::{Mt, MtInfo};
 use tetralod::session::Session;
 use tetralod::stream::{Arrived, FileSource, HttpOptions, HttpSource, RangeSource, StreamError, WantedRange};
 use tetralod::verify::Reference;
+
+/// The metadata keys under which `build` writes how a file was built.
+pub const METHOD: &str = "method";
+pub const CRITERION: &str = "criterion";
 
 /// Bytes that are read at a time.
 const CHUNK: u64 = 1 << 20;
@@ -255,25 +255,6 @@ fn read_mt(mut source: Bytes) -> Result<Session> {
             return Ok(session);
         }
     }
-}
-
-/// Reads a mesh and mends what can be mended.
-pub fn read_mesh(path: &Path) -> Result<(TetMesh, RepairReport)> {
-    let wanted = FieldSelection { names: &[], all: true, cells: CellData::LeaveOut };
-    let (mesh, report) = input::read(&[path.to_owned()], &wanted)?;
-    input::expect_cells(&mesh, path)?;
-    Ok((mesh, report))
-}
-
-/// Reads what the MT was built from: time steps of a mesh or, where no more is needed, of points.
-pub fn read_reference(paths: &[PathBuf], opened: &Opened) -> Result<TetMesh> {
-    let names: Vec<String> = opened.info()?.fields.iter().map(|field| field.name.clone()).collect();
-    let (mesh, _) =
-        input::read(paths, &FieldSelection { names: &names, all: false, cells: CellData::Values })?;
-    if let (Reference::Mesh, Some(path)) = (opened.reference(), paths.first()) {
-        input::expect_cells(&mesh, path)?;
-    }
-    Ok(mesh)
 }
 
 /// The number of the field called `name`; the first field without a name.

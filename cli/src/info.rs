@@ -11,7 +11,7 @@ use tetralod::format::BlockInfo;
 use tetralod::mesh::VectorPart;
 use tetralod::mt::{FieldInfo, MtKind, MultiTessellation, stats};
 
-/// Tells what is in an MT file.
+/// Describes the content of an MT file.
 #[derive(clap::Args)]
 pub struct Arguments {
     /// The MT file, or its http(s) address.
@@ -38,7 +38,7 @@ struct Report {
     file_bytes: u64,
     bytes_per_vertex: f64,
     blocks: Blocks,
-    /// What the bytes of the file tell, as far as that is coded in common, and all others.
+    /// How many bytes of the file code what; symbols coded together are counted by what they describe.
     breakdown: Vec<FilePart>,
     memory: Memory,
     fields: Vec<Field>,
@@ -73,7 +73,7 @@ struct Field {
     floor: f64,
 }
 
-/// Which part of a vector a field is; its length if no component is told.
+/// Which part of a vector a field is; its length if there is no component.
 #[derive(Serialize)]
 struct Vector {
     name: String,

@@ -1,11 +1,12 @@
 //! Meshes from files: time steps put together, mended, fields at cells turned into fields at points.
 
-use super::files;
+use super::files::{self, Opened};
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 use tetralod::io;
 use tetralod::io::{CellData, ReadOptions, Step};
 use tetralod::mesh::{Field, RepairReport, TetMesh, repair};
+use tetralod::verify::Reference;
 
 /// Which fields of the files are read.
 pub struct FieldSelection<'a> {
@@ -67,18 +68,18 @@ fn reduce(mesh: &mut TetMesh, wanted: &FieldSelection<'_>) -> Option<Vec<String>
     Some(mesh.fields.iter().chain(&mesh.cell_fields).map(|field| field.name.clone()).collect())
 }
 
-/// Appends the fields of the later time steps. Steps of which no file tells the time are numbered from 0.
+/// Appends the fields of the later time steps. Steps without a time in their files are numbered from 0.
 fn append(mesh: &mut TetMesh, first: &Step, later: &[Step], options: &ReadOptions) -> Result<()> {
-    let told = first.time.or_else(|| time_of(mesh));
-    let mut times = vec![told.unwrap_or(0.0)];
+    let first_time = first.time.or_else(|| time_of(mesh));
+    let mut times = vec![first_time.unwrap_or(0.0)];
     set_time(mesh, times[0]);
     for (number, step) in later.iter().enumerate() {
         let name = step.path.display();
         let mut next = io::read_with(&step.path, options)?;
-        let time = match (step.time.or_else(|| time_of(&next)), told) {
+        let time = match (step.time.or_else(|| time_of(&next)), first_time) {
             (Some(time), Some(_)) => time,
             (None, None) => number as f64 + 1.0,
-            _ => bail!("{name}: some files tell their time and some do not; list all of them in a .pvd"),
+            _ => bail!("{name}: some files contain their time and some do not; list all of them in a .pvd"),
         };
         if times.contains(&time) {
             bail!("{name}: there is another time step at {time}; give each its own time, in a .pvd");
@@ -121,4 +122,22 @@ pub fn expect_cells(mesh: &TetMesh, path: &Path) -> Result<()> {
         return Err(tetralod::mesh::MeshError::Empty).with_context(|| path.display().to_string());
     }
     Ok(())
+}
+
+/// Reads a mesh and mends what can be mended.
+pub fn read_mesh(path: &Path) -> Result<(TetMesh, RepairReport)> {
+    let wanted = FieldSelection { names: &[], all: true, cells: CellData::LeaveOut };
+    let (mesh, report) = read(&[path.to_owned()], &wanted)?;
+    expect_cells(&mesh, path)?;
+    Ok((mesh, report))
+}
+
+/// Reads what the MT was built from: time steps of a mesh or, where no more is needed, of points.
+pub fn read_reference(paths: &[PathBuf], opened: &Opened) -> Result<TetMesh> {
+    let names: Vec<String> = opened.info()?.fields.iter().map(|field| field.name.clone()).collect();
+    let (mesh, _) = read(paths, &FieldSelection { names: &names, all: false, cells: CellData::Values })?;
+    if let (Reference::Mesh, Some(path)) = (opened.reference(), paths.first()) {
+        expect_cells(&mesh, path)?;
+    }
+    Ok(mesh)
 }

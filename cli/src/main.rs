@@ -14,6 +14,7 @@ mod input;
 mod isosurface;
 mod needs;
 mod output;
+mod parse;
 mod poly;
 mod probe;
 mod query;

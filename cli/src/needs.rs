@@ -1,206 +1,92 @@
 //! Needs as they are written on the command line and in files, and what they mean for an MT.
 
-use super::query::{parse_bounds, parse_list, parse_number, parse_numbers};
+use super::parse::{
+    Tolerance, parse_bounds, parse_list, parse_number, parse_numbers, parse_share, parse_size,
+};
 use super::{files, output};
 use anyhow::{Context, Result};
-use clap::error::ErrorKind;
-use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
+use clap::error::{ContextKind, ErrorKind};
+use clap::{Args, Command, FromArgMatches};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
+use std::error::Error;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use tetralod::geom::Bounds;
 use tetralod::mt::MtInfo;
-use tetralod::refine::{MAX_PLANES, Need, Part, RefineStats, Region, Transfer, Values, View};
+use tetralod::refine::{Need, Part, RefineStats, Region, Transfer, View};
 use tetralod::session::Session;
 
-/// An error in units of a field, or as a fraction of its range.
-#[derive(Clone, Copy, Debug)]
-pub enum Tolerance {
-    Absolute(f64),
-    Relative(f64),
-}
-
-impl FromStr for Tolerance {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let (number, relative) = percentage(text)?;
-        if number < 0.0 {
-            return Err("an error is not negative".to_owned());
-        }
-        Ok(if relative { Self::Relative(number / 100.0) } else { Self::Absolute(number) })
-    }
-}
-
-impl Tolerance {
-    /// As a fraction of the field's range.
-    pub fn relative(self, range: f64) -> f64 {
-        match self {
-            Self::Absolute(error) => error / range,
-            Self::Relative(error) => error,
-        }
-    }
-}
-
-/// A number, and whether % stands behind it.
-fn percentage(text: &str) -> Result<(f64, bool), String> {
-    match text.trim().strip_suffix('%') {
-        Some(number) => Ok((parse_number(number)?, true)),
-        None => Ok((parse_number(text)?, false)),
-    }
-}
-
-/// One entry of a need: the option `--NAME VALUE` of a command, and `NAME=VALUE` in `--need`.
-struct Key {
-    name: &'static str,
-    /// What the value looks like.
-    value: &'static str,
-    help: &'static str,
-    times: Times,
-}
-
-/// How often an entry may be given.
-#[derive(PartialEq)]
-enum Times {
-    Once,
-    Many,
-    /// Once, and only together with the entry of this name.
-    With(&'static str),
-}
-
-/// Regions limit values and the other way round; [`Group::set`] reads the values.
-const KEYS: [Key; 16] = [
-    Key {
-        name: "error",
-        value: "E|E%",
-        help: "Largest error, in units of the field, or with % of its range; 0 is the reference mesh [default: 0]",
-        times: Times::Once,
-    },
-    Key {
-        name: "box",
-        value: "x0,y0,z0,x1,y1,z1",
-        help: "Only inside this box, in model units; the mesh is as coarse as possible elsewhere. Regions are repeatable: \
-               their union is taken",
-        times: Times::Many,
-    },
-    Key {
-        name: "obox",
-        value: "cx,cy,cz,ax,…,bx,…,cx,…",
-        help: "Only inside this oriented box: its centre, and three orthogonal vectors from the centre to the middles of \
-               faces",
-        times: Times::Many,
-    },
-    Key {
-        name: "sphere",
-        value: "x,y,z,r",
-        help: "Only inside this sphere: centre and radius",
-        times: Times::Many,
-    },
-    Key { name: "half-space", value: "nx,ny,nz,d", help: "Only where n · p <= d", times: Times::Many },
-    Key {
-        name: "slab",
-        value: "nx,ny,nz,d,t",
-        help: "Only within a distance of t / 2 from the plane n · p = d",
-        times: Times::Many,
-    },
-    Key {
-        name: "convex",
-        value: "nx,ny,nz,d,nx,…",
-        help: "Only where n · p <= d for all of these planes, at most 16",
-        times: Times::Many,
-    },
-    Key {
-        name: "iso",
-        value: "V",
-        help: "Only around the isosurface at this value, in units of the field (repeatable)",
-        times: Times::Many,
-    },
-    Key {
-        name: "range",
-        value: "a,b",
-        help: "Only where the field has a value from a to b, in units of the field (repeatable)",
-        times: Times::Many,
-    },
-    Key {
-        name: "field",
-        value: "NAME",
-        help: "The field of all these values and errors [default: the first field]",
-        times: Times::Once,
-    },
-    Key {
-        name: "view",
-        value: "FILE.json",
-        help: "What a camera sees, within --pixels: a file with its matrix and viewport (repeatable)",
-        times: Times::Many,
-    },
-    Key {
-        name: "matrix",
-        value: "m0,…,m15",
-        help: "A camera without a file: the matrix from model space to clip space, column by column",
-        times: Times::With("viewport"),
-    },
-    Key {
-        name: "viewport",
-        value: "w,h",
-        help: "Width and height of the picture in pixels, for --matrix",
-        times: Times::With("matrix"),
-    },
-    Key {
-        name: "pixels",
-        value: "P",
-        help: "Largest error on the screen in pixels, for --view and --matrix [default: that in the file, or 1]",
-        times: Times::Once,
-    },
-    Key {
-        name: "transfer",
-        value: "FILE.json",
-        help: "What a transfer function makes visible, within --colour-error: a file with its points (repeatable)",
-        times: Times::Many,
-    },
-    Key {
-        name: "colour-error",
-        value: "C|C%",
-        help: "Largest change of colour or opacity, 0 to 1 or with %, for --transfer [default: that in the file, or 1%]",
-        times: Times::Once,
-    },
-];
-
-/// Heading in the help of the options that say what is needed.
+/// Heading in the help of the options that describe the mesh.
 pub const WHAT: &str = "What mesh";
-
-impl Key {
-    /// The option of this name. Its value is checked here and read by [`Group::set`].
-    fn option(&'static self) -> Arg {
-        let check = |text: &str| Group::default().set(self.name, text).map(|()| text.to_owned());
-        let option = Arg::new(self.name).long(self.name).value_name(self.value).help(self.help);
-        // Numbers may be negative, names of files and fields do not begin with a hyphen.
-        let is_name = ["FILE.json", "NAME"].contains(&self.value);
-        let option = option.value_parser(check).allow_hyphen_values(!is_name).help_heading(WHAT);
-        match self.times {
-            Times::Once => option,
-            Times::Many => option.action(ArgAction::Append),
-            Times::With(other) => option.requires(other),
-        }
-    }
-}
 
 /// Needs of one error: inside each of the regions where the field has one of the values, what each camera sees, and what
 /// each transfer function shows. Without any of these, everywhere.
-#[derive(Clone, Debug, Default)]
+///
+/// Each field is the option `--NAME VALUE` of a command, and `NAME=VALUE` in `--need`.
+#[derive(Clone, Debug, clap::Args)]
+#[command(next_help_heading = WHAT)]
 pub struct Group {
+    /// Largest error, in units of the field, or with % of its range; 0 is the reference mesh [default: 0]
+    #[arg(long, value_name = "E|E%", allow_hyphen_values = true)]
     error: Option<Tolerance>,
-    regions: Vec<Region>,
+    /// Only inside this box, in model units; the mesh is as coarse as possible elsewhere. Regions are repeatable: their
+    /// union is taken
+    #[arg(long = "box", value_name = "x0,y0,z0,x1,y1,z1", value_parser = parse_box, allow_hyphen_values = true)]
+    boxes: Vec<Region>,
+    /// Only inside this oriented box: its centre, and three orthogonal vectors from the centre to the middles of faces
+    #[arg(
+        long = "obox",
+        value_name = "cx,cy,cz,ax,…,bx,…,cx,…",
+        value_parser = parse_oriented_box,
+        allow_hyphen_values = true
+    )]
+    oriented_boxes: Vec<Region>,
+    /// Only inside this sphere: centre and radius
+    #[arg(long = "sphere", value_name = "x,y,z,r", value_parser = parse_sphere, allow_hyphen_values = true)]
+    spheres: Vec<Region>,
+    /// Only where n · p <= d
+    #[arg(long = "half-space", value_name = "nx,ny,nz,d", value_parser = parse_half_space, allow_hyphen_values = true)]
+    half_spaces: Vec<Region>,
+    /// Only within a distance of t / 2 from the plane n · p = d
+    #[arg(long = "slab", value_name = "nx,ny,nz,d,t", value_parser = parse_slab, allow_hyphen_values = true)]
+    slabs: Vec<Region>,
+    /// Only where n · p <= d for all of these planes, at most 16
+    #[arg(long, value_name = "nx,ny,nz,d,nx,…", value_parser = parse_convex, allow_hyphen_values = true)]
+    convex: Vec<Region>,
+    /// Only around the isosurface at this value, in units of the field (repeatable)
+    #[arg(long = "iso", value_name = "V", value_parser = parse_number, allow_hyphen_values = true)]
     isovalues: Vec<f64>,
-    /// Of values; isovalues are among them.
+    /// Only where the field has a value from a to b, in units of the field (repeatable)
+    #[arg(long = "range", value_name = "a,b", value_parser = parse_range, allow_hyphen_values = true)]
     ranges: Vec<[f64; 2]>,
+    /// The field of all these values and errors [default: the first field]
+    #[arg(long, value_name = "NAME")]
     field: Option<String>,
+    /// What a camera sees, within --pixels: a file with its matrix and viewport (repeatable)
+    #[arg(long = "view", value_name = "FILE.json")]
     views: Vec<PathBuf>,
+    /// A camera without a file: the matrix from model space to clip space, column by column
+    #[arg(
+        long,
+        value_name = "m0,…,m15",
+        value_parser = parse_matrix,
+        requires = "viewport",
+        allow_hyphen_values = true
+    )]
     matrix: Option<[f64; 16]>,
+    /// Width and height of the picture in pixels, for --matrix
+    #[arg(long, value_name = "w,h", value_parser = parse_viewport, requires = "matrix", allow_hyphen_values = true)]
     viewport: Option<[f64; 2]>,
+    /// Largest error on the screen in pixels, for --view and --matrix [default: that in the file, or 1]
+    #[arg(long, value_name = "P", value_parser = parse_size, allow_hyphen_values = true)]
     pixels: Option<f64>,
+    /// What a transfer function makes visible, within --colour-error: a file with its points (repeatable)
+    #[arg(long = "transfer", value_name = "FILE.json")]
     transfers: Vec<PathBuf>,
+    /// Largest change of colour or opacity, 0 to 1 or with %, for --transfer [default: that in the file, or 1%]
+    #[arg(long, value_name = "C|C%", value_parser = parse_share, allow_hyphen_values = true)]
     colour_error: Option<f64>,
 }
 
@@ -224,89 +110,46 @@ pub fn unit(need: &Need) -> &'static str {
     }
 }
 
-impl Args for Group {
-    fn augment_args(command: Command) -> Command {
-        command.args(KEYS.iter().map(Key::option))
-    }
-
-    fn augment_args_for_update(command: Command) -> Command {
-        Self::augment_args(command)
-    }
-}
-
-impl FromArgMatches for Group {
-    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
-        let mut group = Self::default();
-        group.update_from_arg_matches(matches)?;
-        Ok(group)
-    }
-
-    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
-        for Key { name, .. } in &KEYS {
-            for value in matches.get_many::<String>(name).into_iter().flatten() {
-                self.set(name, value).map_err(|wrong| clap::Error::raw(ErrorKind::InvalidValue, wrong))?;
-            }
-        }
-        Ok(())
-    }
-}
-
 impl FromStr for Group {
     type Err = String;
 
-    /// Reads `key=value; key=value; ...`.
+    /// Reads `key=value; key=value; ...` as the options `--key=value`.
     fn from_str(text: &str) -> Result<Self, String> {
-        let mut group = Self::default();
-        if text.split(';').all(|part| part.trim().is_empty()) {
-            return Err("it says nothing; give key=value, as in 'error=1%'".to_owned());
-        }
+        let mut options = Vec::new();
         for part in text.split(';').map(str::trim).filter(|part| !part.is_empty()) {
             let (key, value) =
                 part.split_once('=').ok_or_else(|| format!("'{part}' is not of the form key=value"))?;
-            let key = key.trim();
-            group.set(key, value.trim()).map_err(|wrong| format!("{key}: {wrong}"))?;
+            options.push(format!("--{}={}", key.trim(), value.trim()));
         }
+        if options.is_empty() {
+            return Err("it says nothing; give key=value, as in 'error=1%'".to_owned());
+        }
+        let command = Self::augment_args(Command::new("need").no_binary_name(true).disable_help_flag(true));
+        let matches = command.try_get_matches_from(options).map_err(|error| refusal(&error))?;
+        let group = Self::from_arg_matches(&matches).map_err(|error| refusal(&error))?;
         group.check()?;
         Ok(group)
     }
 }
 
-/// Sets what may be said once.
-fn once<T>(place: &mut Option<T>, value: T) -> Result<(), String> {
-    match place.replace(value) {
-        None => Ok(()),
-        Some(_) => Err("is there twice".to_owned()),
+/// What is wrong with a key or its value.
+fn refusal(error: &clap::Error) -> String {
+    let option = error.get(ContextKind::InvalidArg).map(ToString::to_string).unwrap_or_default();
+    let key = option.trim_start_matches('-').split(['=', ' ']).next().unwrap_or_default();
+    match (error.kind(), error.source()) {
+        (ErrorKind::UnknownArgument, _) => {
+            let command = Group::augment_args(Command::new("need"));
+            let keys: Vec<&str> = command.get_arguments().filter_map(clap::Arg::get_long).collect();
+            format!("{key}: is no key; there are {}", keys.join(", "))
+        }
+        (ErrorKind::ArgumentConflict, _) => format!("{key}: is there twice"),
+        (ErrorKind::MissingRequiredArgument, _) => "a camera has both a matrix and a viewport".to_owned(),
+        (_, Some(problem)) => format!("{key}: {problem}"),
+        _ => format!("{key}: the value cannot be used"),
     }
 }
 
 impl Group {
-    fn set(&mut self, key: &str, value: &str) -> Result<(), String> {
-        match key {
-            "error" => once(&mut self.error, value.parse()?)?,
-            "box" => self.regions.push(parse_bounds(value).map(Region::Box)?),
-            "obox" => self.regions.push(parse_oriented_box(value)?),
-            "sphere" => self.regions.push(parse_sphere(value)?),
-            "half-space" => self.regions.push(parse_half_space(value)?),
-            "slab" => self.regions.push(parse_slab(value)?),
-            "convex" => self.regions.push(parse_convex(value)?),
-            "iso" => {
-                let value = parse_number(value)?;
-                self.isovalues.push(value);
-                self.ranges.push([value, value]);
-            }
-            "range" => self.ranges.push(parse_range(value)?),
-            "field" => once(&mut self.field, value.to_owned())?,
-            "view" => self.views.push(value.into()),
-            "matrix" => once(&mut self.matrix, parse_numbers(value, "a matrix")?)?,
-            "viewport" => once(&mut self.viewport, parse_viewport(value)?)?,
-            "pixels" => once(&mut self.pixels, parse_size(value)?)?,
-            "transfer" => self.transfers.push(value.into()),
-            "colour-error" => once(&mut self.colour_error, parse_share(value)?)?,
-            _ => return Err(format!("is no key; there are {}", KEYS.map(|key| key.name).join(", "))),
-        }
-        Ok(())
-    }
-
     /// The files that it names.
     pub fn files(&self) -> impl Iterator<Item = &PathBuf> {
         self.views.iter().chain(&self.transfers)
@@ -334,7 +177,13 @@ impl Group {
 
     /// Whether there are regions or values.
     fn is_limited(&self) -> bool {
-        !self.regions.is_empty() || !self.ranges.is_empty()
+        self.regions().next().is_some() || !self.isovalues.is_empty() || !self.ranges.is_empty()
+    }
+
+    fn regions(&self) -> impl Iterator<Item = &Region> {
+        let kinds =
+            [&self.boxes, &self.oriented_boxes, &self.spheres, &self.half_spaces, &self.slabs, &self.convex];
+        kinds.into_iter().flatten()
     }
 
     fn has_camera(&self) -> bool {
@@ -392,24 +241,24 @@ impl Group {
 
     fn add_limited(&self, info: &MtInfo, field: usize, needs: &mut Vec<NamedNeed>) {
         let error = self.error.map_or(0.0, |error| error.relative(info.fields[field].range()));
-        let values = (!self.ranges.is_empty()).then(|| Values { field, ranges: self.ranges.clone() });
-        let of_values = values.as_ref().map(|values| describe_values(info, values));
-        let mut add = |region: Option<&Region>| {
-            let (part, name) = match (region, &values, &of_values) {
-                (None, Some(values), Some(name)) => (Part::Values(values.clone()), name.clone()),
-                (Some(region), Some(values), Some(name)) => {
-                    let part = Part::Both(region.clone(), values.clone());
-                    (part, format!("{}, {name}", describe_region(region)))
-                }
-                (Some(region), ..) => (Part::Region(region.clone()), describe_region(region)),
-                (None, ..) => (Part::Everywhere, "everywhere".to_owned()),
-            };
-            needs.push(NamedNeed { name, need: Need { error, field: None, part } });
-        };
-        if self.regions.is_empty() {
-            add(None);
-        } else {
-            self.regions.iter().for_each(|region| add(Some(region)));
+        let isovalues = self.isovalues.iter().map(|&value| [value, value]);
+        let ranges: Vec<[f64; 2]> = isovalues.chain(self.ranges.iter().copied()).collect();
+        let mut regions: Vec<Option<&Region>> = self.regions().map(Some).collect();
+        if regions.is_empty() {
+            regions.push(None);
+        }
+        for region in regions {
+            let (mut need, mut words) = (Need::within(error), Vec::new());
+            if let Some(region) = region {
+                need = need.inside(region.clone());
+                words.push(describe_region(region));
+            }
+            if !ranges.is_empty() {
+                need = need.between(field, ranges.clone());
+                words.push(describe_values(&info.fields[field].name, &ranges));
+            }
+            let name = if words.is_empty() { "everywhere".to_owned() } else { words.join(", ") };
+            needs.push(NamedNeed { name, need });
         }
     }
 }
@@ -472,12 +321,11 @@ fn is_apart(region: &Region, domain: &Bounds, near: f64) -> bool {
     }
 }
 
-fn describe_values(info: &MtInfo, values: &Values) -> String {
-    let say = |[a, b]: &[f64; 2]| {
+fn describe_values(field: &str, ranges: &[[f64; 2]]) -> String {
+    let describe = |[a, b]: &[f64; 2]| {
         if a == b { output::number(*a) } else { format!("{} to {}", output::number(*a), output::number(*b)) }
     };
-    let ranges: Vec<String> = values.ranges.iter().map(say).collect();
-    format!("{} at {}", info.fields[values.field].name, ranges.join(", "))
+    format!("{field} at {}", ranges.iter().map(describe).collect::<Vec<_>>().join(", "))
 }
 
 fn describe_region(region: &Region) -> String {
@@ -528,9 +376,14 @@ fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T> {
     serde_json::from_str(&text).with_context(name)
 }
 
-/// Refuses a direction of no length.
-fn direction(v: [f64; 3], what: &str) -> Result<[f64; 3], String> {
-    if v == [0.0; 3] { Err(format!("{what} is not 0,0,0")) } else { Ok(v) }
+/// A region whose numbers make sense.
+fn checked(region: Region) -> Result<Region, String> {
+    region.check()?;
+    Ok(region)
+}
+
+fn parse_box(text: &str) -> Result<Region, String> {
+    parse_bounds(text).map(Region::Box)
 }
 
 fn parse_oriented_box(text: &str) -> Result<Region, String> {
@@ -538,45 +391,41 @@ fn parse_oriented_box(text: &str) -> Result<Region, String> {
     let vector = |i: usize| [numbers[3 * i], numbers[3 * i + 1], numbers[3 * i + 2]];
     let halves = [vector(1), vector(2), vector(3)];
     for (i, a) in halves.into_iter().enumerate() {
-        direction(a, "the way from the centre to a face")?;
         let b = halves[(i + 1) % 3];
         let [dot, aa, bb] = [[a, b], [a, a], [b, b]].map(|[u, v]| u[0] * v[0] + u[1] * v[1] + u[2] * v[2]);
         if dot.abs() > 1e-6 * (aa * bb).sqrt() {
             return Err("the vectors of an oriented box are at right angles to each other".to_owned());
         }
     }
-    Ok(Region::OrientedBox { centre: vector(0), halves })
+    checked(Region::OrientedBox { centre: vector(0), halves })
 }
 
 fn parse_sphere(text: &str) -> Result<Region, String> {
     let [x, y, z, radius] = parse_numbers(text, "a sphere")?;
-    if radius < 0.0 {
-        return Err("a radius is not negative".to_owned());
-    }
-    Ok(Region::Sphere { centre: [x, y, z], radius })
+    checked(Region::Sphere { centre: [x, y, z], radius })
 }
 
 fn parse_half_space(text: &str) -> Result<Region, String> {
     let [x, y, z, offset] = parse_numbers(text, "a half-space")?;
-    Ok(Region::HalfSpace { normal: direction([x, y, z], "a normal")?, offset })
+    checked(Region::HalfSpace { normal: [x, y, z], offset })
 }
 
 fn parse_slab(text: &str) -> Result<Region, String> {
     let [x, y, z, offset, thickness] = parse_numbers(text, "a slab")?;
-    if thickness < 0.0 {
-        return Err("a thickness is not negative".to_owned());
-    }
-    Ok(Region::Slab { normal: direction([x, y, z], "a normal")?, offset, thickness })
+    checked(Region::Slab { normal: [x, y, z], offset, thickness })
 }
 
 fn parse_convex(text: &str) -> Result<Region, String> {
     let numbers = parse_list(text)?;
     let (planes, rest) = numbers.as_chunks::<4>();
-    if !rest.is_empty() || planes.len() > MAX_PLANES {
-        return Err(format!("there are 4 numbers a plane and at most {MAX_PLANES} planes"));
+    if !rest.is_empty() {
+        return Err("there are 4 numbers a plane".to_owned());
     }
-    planes.iter().try_for_each(|&[x, y, z, _]| direction([x, y, z], "a normal").map(drop))?;
-    Ok(Region::Convex(planes.to_vec()))
+    checked(Region::Convex(planes.to_vec()))
+}
+
+fn parse_matrix(text: &str) -> Result<[f64; 16], String> {
+    parse_numbers(text, "a matrix")
 }
 
 fn parse_range(text: &str) -> Result<[f64; 2], String> {
@@ -593,54 +442,15 @@ fn parse_viewport(text: &str) -> Result<[f64; 2], String> {
     }
 }
 
-/// A number that is not negative.
-pub fn parse_size(text: &str) -> Result<f64, String> {
-    let number = parse_number(text)?;
-    if number >= 0.0 { Ok(number) } else { Err(format!("'{text}' is negative")) }
-}
-
-/// A part of 1, or a percentage.
-fn parse_share(text: &str) -> Result<f64, String> {
-    let (number, percent) = percentage(text)?;
-    let share = if percent { number / 100.0 } else { number };
-    if share >= 0.0 { Ok(share) } else { Err(format!("'{text}' is negative")) }
-}
-
-/// A number of bytes; K, M and G stand for powers of 1024.
-pub fn parse_bytes(text: &str) -> Result<u64, String> {
-    let text = text.trim();
-    let digits = text.trim_end_matches(|c: char| !c.is_ascii_digit() && c != '.');
-    let shift = match text[digits.len()..].trim() {
-        "" | "B" => 0,
-        "K" | "k" | "KiB" => 10,
-        "M" | "MiB" => 20,
-        "G" | "GiB" => 30,
-        unit => return Err(format!("'{unit}' is no unit of bytes; there are K, M and G")),
-    };
-    let number = parse_size(digits)? * f64::from(1_u32 << shift);
-    // The largest number of bytes that a float still counts one by one.
-    if number <= (1_u64 << 53) as f64 { Ok(number as u64) } else { Err(format!("'{text}' is too much")) }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn bytes_have_units() {
-        let read = |text: &str| parse_bytes(text).ok();
-        assert_eq!(
-            ["17", "2K", "1.5M", "3 G", "1MiB"].map(read),
-            [Some(17), Some(2048), Some(3 << 19), Some(3 << 30), Some(1 << 20)]
-        );
-        assert_eq!(["", "K", "1T", "-1", "1e300G", "1 2"].map(read), [None; 6]);
-    }
-
-    #[test]
     fn a_need_is_read_from_keys_and_values() {
         let group: Group = "box=0,0,0,1,1,1; iso = -0.5;range=1,2; error=1%".parse().expect("a need");
-        assert_eq!(group.regions.len(), 1);
-        assert_eq!(group.ranges, [[-0.5, -0.5], [1.0, 2.0]]);
+        assert_eq!(group.regions().count(), 1);
+        assert_eq!((&group.isovalues[..], &group.ranges[..]), (&[-0.5][..], &[[1.0, 2.0]][..]));
         assert!(matches!(group.error, Some(Tolerance::Relative(x)) if x == 0.01));
         for (text, words) in [
             ("box", "key=value"),
@@ -652,7 +462,7 @@ mod tests {
             ("viewport=4,3", "both a matrix and a viewport"),
             ("colour-error=1%;iso=1", "there is none"),
             ("view=a.json;error=1", "outside"),
-            ("slab=0,0,0,1,1", "0,0,0"),
+            ("slab=0,0,0,1,1", "normal of some length"),
             ("obox=0,0,0,1,0,0,1,1,0,0,0,1", "right angles"),
             ("range=2,1", "smaller"),
         ] {

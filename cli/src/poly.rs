@@ -2,6 +2,7 @@
 
 use super::{files, output};
 use anyhow::Result;
+use clap::ValueEnum;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -15,7 +16,7 @@ pub struct Target {
     format: Format,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Format {
     Vtp,
     Stl,
@@ -29,16 +30,10 @@ impl FromStr for Target {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let path = PathBuf::from(text);
-        let ending = files::ending(&path);
-        let format = match ending.as_str() {
-            "vtp" => Format::Vtp,
-            "stl" => Format::Stl,
-            "ply" => Format::Ply,
-            "obj" => Format::Obj,
-            "csv" => Format::Csv,
-            _ => return Err("the file's name must end in .vtp, .stl, .ply, .obj or .csv".to_owned()),
-        };
-        Ok(Self { path, format })
+        match Format::from_str(&files::ending(&path), true) {
+            Ok(format) => Ok(Self { path, format }),
+            Err(_) => Err("the file's name must end in .vtp, .stl, .ply, .obj or .csv".to_owned()),
+        }
     }
 }
 

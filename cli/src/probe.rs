@@ -1,8 +1,9 @@
 //! `tetralod probe`: what the fields are at points and along a line.
 
 use super::output;
+use super::parse::parse_numbers;
 use super::poly::Target;
-use super::query::{Query, parse_numbers};
+use super::query::Query;
 use anyhow::{Context, Result};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -11,7 +12,7 @@ use std::time::Instant;
 use tetralod::io::PolyData;
 use tetralod::view::{MeshView, Place, Probe, Span};
 
-/// Tells what all fields are at points or along a line.
+/// Interpolates all fields at points or along a line.
 ///
 /// Along a line there is a row for each place where it enters or leaves a tetrahedron: the fields are linear in between.
 #[derive(clap::Args)]

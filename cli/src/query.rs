@@ -3,16 +3,15 @@
 //! The plain options make needs of one error; each `--need` makes others, with an error of its own. The mesh suits all.
 
 use super::files::{Bytes, Opened, PATIENCE};
-use super::needs::{Group, NamedNeed, Tolerance};
+use super::needs::{Group, NamedNeed};
+use super::parse::{Tolerance, parse_bytes, parse_count, parse_size};
 use super::{files, needs, output};
 use anyhow::{Context, Result};
 use serde::Serialize;
 use std::cell::Cell;
 use std::path::PathBuf;
-use std::str::FromStr;
 use std::time::{Duration, Instant};
 use tetralod::client::{Client, Step};
-use tetralod::geom::Bounds;
 use tetralod::mt::{MtInfo, UpdatePages};
 use tetralod::refine::{Budget, Need, Outcome, RefineStats, Request};
 
@@ -57,10 +56,10 @@ pub struct Query {
     #[arg(long, value_name = "N", value_parser = parse_count::<u32>, allow_hyphen_values = true, help_heading = LIMITS)]
     max_vertices: Option<u32>,
     /// At most this many bytes, 32 a tetrahedron and 16 a vertex; K, M and G are KiB, MiB and GiB.
-    #[arg(long, value_name = "N[K|M|G]", value_parser = needs::parse_bytes, allow_hyphen_values = true, help_heading = LIMITS)]
+    #[arg(long, value_name = "N[K|M|G]", value_parser = parse_bytes, allow_hyphen_values = true, help_heading = LIMITS)]
     max_bytes: Option<u64>,
     /// Stop refining after this many milliseconds: the mesh is valid but unfinished, and not the same each time.
-    #[arg(long, value_name = "MS", value_parser = needs::parse_size, allow_hyphen_values = true, help_heading = LIMITS)]
+    #[arg(long, value_name = "MS", value_parser = parse_size, allow_hyphen_values = true, help_heading = LIMITS)]
     max_ms: Option<f64>,
     /// Stop refining after this many updates: the mesh is valid but unfinished.
     #[arg(long, value_name = "N", value_parser = parse_count::<u64>, allow_hyphen_values = true, help_heading = LIMITS)]
@@ -122,7 +121,7 @@ impl Query {
         let needs = self.named_needs(info)?;
         let field = files::field_index(info, self.group.field())?;
         let budget = Budget { tets: self.budget, vertices: self.max_vertices, bytes: self.max_bytes };
-        client.aim(&Request { needs: needs.iter().map(|named| named.need.clone()).collect(), budget })?;
+        client.request(&Request { needs: needs.iter().map(|named| named.need.clone()).collect(), budget })?;
         while !client.fetch(PATIENCE)? {}
         fetch_more(&mut client)?;
         let start = Instant::now();
@@ -336,36 +335,4 @@ impl Answer {
     pub fn all_values(&self) -> Result<Vec<Vec<f32>>> {
         Ok((0..self.opened.info()?.fields.len()).map(|field| self.opened.session.values(field)).collect())
     }
-}
-
-/// A whole number that is not negative.
-fn parse_count<T: FromStr>(text: &str) -> Result<T, String> {
-    text.trim().parse().map_err(|_| format!("'{text}' is not a whole number of at least 0, or too large"))
-}
-
-/// A finite number.
-pub fn parse_number(text: &str) -> Result<f64, String> {
-    let number: f64 = text.trim().parse().map_err(|_| format!("'{text}' is not a number"))?;
-    if number.is_finite() { Ok(number) } else { Err(format!("'{text}' is not finite")) }
-}
-
-/// Finite numbers between commas.
-pub fn parse_list(text: &str) -> Result<Vec<f64>, String> {
-    text.split(',').map(parse_number).collect()
-}
-
-/// `N` finite numbers between commas; `what` has so many.
-pub fn parse_numbers<const N: usize>(text: &str, what: &str) -> Result<[f64; N], String> {
-    let numbers = parse_list(text)?;
-    let found = numbers.len();
-    numbers.try_into().map_err(|_| format!("{what} has {N} numbers, not {found}"))
-}
-
-/// A box by its smaller and its larger corner.
-pub fn parse_bounds(text: &str) -> Result<Bounds, String> {
-    let [x0, y0, z0, x1, y1, z1] = parse_numbers(text, "a box")?;
-    if x0 > x1 || y0 > y1 || z0 > z1 {
-        return Err("a box has its smaller corner first".to_owned());
-    }
-    Ok(Bounds { min: [x0, y0, z0], max: [x1, y1, z1] })
 }

@@ -1,8 +1,9 @@
 //! `tetralod slice`: the mesh in a plane.
 
 use super::output;
+use super::parse::{parse_number, parse_numbers};
 use super::poly::{Amount, Target};
-use super::query::{Query, parse_number, parse_numbers};
+use super::query::Query;
 use anyhow::Result;
 use serde::Serialize;
 use std::time::Instant;

@@ -1,15 +1,16 @@
 //! `tetralod stats`: integral, mean and histogram of a field over the mesh.
 
+use super::parse::parse_numbers;
 use super::poly::write_table;
-use super::query::{Answer, Query, parse_numbers};
-use super::{files, output};
+use super::query::{Answer, Query};
+use super::{files, input, output};
 use anyhow::{Context, Result, bail};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use tetralod::view::{FieldStats, Histogram};
 
-/// Tells the integral, the mean and the histogram of a field, exact for the field that is linear in every tetrahedron.
+/// Computes the integral, the mean and the histogram of a field, exact for the field that is linear in every tetrahedron.
 #[derive(clap::Args)]
 #[command(after_help = "Examples: tetralod stats engine.mt --error 1% --bins 20\n          \
                         tetralod stats engine.mt --error 1% --reference engine.vtu -o histogram.csv")]
@@ -152,7 +153,7 @@ fn of_mesh(answer: &Answer, mut sums: Sums) -> Result<Sums> {
 }
 
 fn compare(path: &Path, answer: &Answer, sums: &Sums, mut reference: Sums) -> Result<Compared> {
-    let (mesh, _) = files::read_mesh(path)?;
+    let (mesh, _) = input::read_mesh(path)?;
     let name = &answer.summary.field;
     let Some(field) = mesh.fields.iter().find(|field| field.name == *name) else {
         bail!("{}: there is no field '{name}'; give the mesh that the MT was built from", path.display());

@@ -1,9 +1,10 @@
 //! `tetralod streamlines`: the lines along which a vector field flows.
 
 use super::output;
+use super::parse::{parse_number, parse_numbers};
 use super::poly::Target;
 use super::probe::parse_point;
-use super::query::{Query, parse_number, parse_numbers};
+use super::query::Query;
 use anyhow::{Context, Result};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -191,7 +192,7 @@ fn components(fields: &[FieldInfo], vector: &str) -> Result<[usize; 3]> {
         let [Some(x), Some(y), Some(z)] = found else { return None };
         Some([x, y, z])
     };
-    let spelled: Vec<String> = vector.split(',').map(|name| name.trim().to_owned()).collect();
+    let names: Vec<String> = vector.split(',').map(|name| name.trim().to_owned()).collect();
     let suffixes = [
         ["_x", "_y", "_z"],
         ["_0", "_1", "_2"],
@@ -200,7 +201,7 @@ fn components(fields: &[FieldInfo], vector: &str) -> Result<[usize; 3]> {
         ["x", "y", "z"],
         ["X", "Y", "Z"],
     ];
-    let found = match <[String; 3]>::try_from(spelled) {
+    let found = match <[String; 3]>::try_from(names) {
         Ok(names) => numbers(names),
         Err(_) => suffixes.iter().find_map(|ends| numbers(ends.map(|end| format!("{vector}{end}")))),
     };

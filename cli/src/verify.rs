@@ -1,6 +1,6 @@
 //! `tetralod verify`: does an MT file keep its promises?
 
-use super::{files, output};
+use super::{files, input, output};
 use anyhow::Result;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -40,10 +40,10 @@ struct Report<'a> {
     failures: &'a [String],
 }
 
-/// What is over sooner tells nothing on the way.
+/// Shorter runs print no progress.
 const LONG: Duration = Duration::from_secs(10);
-/// Percent between two lines that tell how far it is.
-const TOLD_EVERY: u64 = 10;
+/// Percent between two lines of progress.
+const PRINT_EVERY: u64 = 10;
 /// Bytes for each tetrahedron and vertex of the reference mesh beside the MT and the input: two current meshes, the tetrahedra
 /// around each vertex, and what requests are answered with.
 const TET_BYTES: u64 = 140;
@@ -59,19 +59,19 @@ fn memory(mt: &Mt, input: &TetMesh) -> u64 {
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let opened = files::open_mt(&arguments.file)?;
     let reference = opened.reference();
-    let input = files::read_reference(&arguments.against, &opened)?;
+    let input = input::read_reference(&arguments.against, &opened)?;
     let about = memory(opened.mt()?, &input);
-    // Drawn on stderr, and only on a terminal; elsewhere lines tell how far it is, of what takes long.
+    // Drawn on stderr, and only on a terminal; elsewhere long runs print lines of progress.
     let start = Instant::now();
     let bar = ProgressBar::new(1);
     bar.set_style(ProgressStyle::with_template("{wide_bar} {percent:>3} %  about {eta} left")?);
-    let mut told = 0;
+    let mut printed = 0;
     let mut on_progress = |done: u32, total: u32| {
         bar.set_length(u64::from(total.max(1)));
         bar.set_position(u64::from(done));
         let percent = 100 * u64::from(done) / u64::from(total.max(1));
-        if bar.is_hidden() && !arguments.json && percent >= told + TOLD_EVERY && start.elapsed() >= LONG {
-            told = percent;
+        if bar.is_hidden() && !arguments.json && percent >= printed + PRINT_EVERY && start.elapsed() >= LONG {
+            printed = percent;
             eprintln!("{percent} % ({done} of {total} steps), about {} of memory", output::bytes(about));
         }
     };

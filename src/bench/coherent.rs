@@ -1,4 +1,4 @@
-//! Requests that change a little from frame to frame, as they do while somebody moves something.
+//! Requests that change a little from frame to frame, as they do while a user moves a region or a camera.
 
 use super::timed;
 use crate::geom::Bounds;

@@ -1,4 +1,4 @@
-//! A run through an MT from the base to the reference mesh, for what its file tells of each block.
+//! A run through an MT from the base to the reference mesh, for what its file says of each block.
 
 use super::payload::index::BlockInfo;
 use super::{EncodeError, EncodeOptions};

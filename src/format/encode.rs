@@ -2,14 +2,15 @@
 
 use super::block_scan::BlockScan;
 use super::coder::{Counts, Measure, Models, Put, Writer};
-use super::header::{END_BYTES, HEAD_BYTES, HEADER_BYTES, Head, Kind, header, version_for};
+use super::header::{END_BYTES, HEAD_BYTES, HEADER_BYTES, Kind, SectionHead, header, version_for};
 use super::payload::exact::Corrections;
 use super::payload::index::{Index, MAX_BLOCK_BITS, MIN_BLOCK_BITS};
 use super::payload::{State, Totals};
 use super::{payload, write};
 use crate::mt::{BaseMeshError, Exact, Mt, MultiTessellation, UpdateError, UpdatePages, VertexId};
 use std::collections::BTreeMap;
-use std::{fmt, io};
+use std::io;
+use thiserror::Error;
 
 /// What goes into a file besides the MT.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,25 +36,34 @@ impl Default for EncodeOptions {
 pub const BLOCK_BITS: u32 = 11;
 
 /// Why an MT cannot be written.
-#[derive(Debug)]
+#[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum EncodeError {
     /// Not all updates of the MT are there.
+    #[error(
+        "the MT has {updates} of the {expected} updates that its description contains; write it when it is complete"
+    )]
     Incomplete {
         /// Updates that are there.
         updates: u32,
-        /// Updates that the description tells.
+        /// Updates by the description.
         expected: u32,
     },
     /// No block can have so many updates.
+    #[error("a block cannot hold 2^{bits} updates; choose 4 to 16")]
     Blocks {
         /// log2 of the updates asked for.
         bits: u32,
     },
     /// An update of the MT cannot be applied.
+    #[error("the MT is damaged: {0}")]
     Update(UpdateError),
     /// The error of an update is not as far below that of one it depends on as selection relies on: what a request gives would
     /// depend on what was asked for before.
+    #[error(
+        "the errors of the MT do not fall along its partial order: in field {field} that of update {update} is too \
+         large for update {parent}, which it depends on; build the MT again"
+    )]
     Order {
         /// The update.
         update: u32,
@@ -63,53 +73,23 @@ pub enum EncodeError {
         field: usize,
     },
     /// Exact values are given for a field or a vertex that the reference mesh does not have.
+    #[error("the exact values of field {field} are not those of the reference mesh")]
     Exact {
         /// The field.
         field: usize,
     },
     /// Something is longer than the file can say.
+    #[error("{what} is too long for an MT file; shorten it")]
     TooLong {
         /// What it is.
         what: &'static str,
     },
     /// The description or the base mesh could not be read back.
-    Base(BaseMeshError),
+    #[error("the MT cannot be written")]
+    Base(#[source] BaseMeshError),
     /// The writer failed.
-    Write(io::Error),
-}
-
-impl fmt::Display for EncodeError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Incomplete { updates, expected } => write!(
-                f,
-                "the MT has {updates} of the {expected} updates that its description tells; write it when it is complete"
-            ),
-            Self::Blocks { bits } => write!(f, "a block cannot hold 2^{bits} updates; choose 4 to 16"),
-            Self::Update(error) => write!(f, "the MT is damaged: {error}"),
-            Self::Order { update, parent, field } => write!(
-                f,
-                "the errors of the MT do not fall along its partial order: in field {field} that of update {update} is too \
-                 large for update {parent}, which it depends on; build the MT again"
-            ),
-            Self::Exact { field } => {
-                write!(f, "the exact values of field {field} are not those of the reference mesh")
-            }
-            Self::TooLong { what } => write!(f, "{what} is too long for an MT file; shorten it"),
-            Self::Base(_) => f.write_str("the MT cannot be written"),
-            Self::Write(_) => f.write_str("the MT file could not be written"),
-        }
-    }
-}
-
-impl std::error::Error for EncodeError {
-    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
-        match self {
-            Self::Base(error) => Some(error),
-            Self::Write(error) => Some(error),
-            _ => None,
-        }
-    }
+    #[error("the MT file could not be written")]
+    Write(#[source] io::Error),
 }
 
 /// The bytes of an MT file.
@@ -172,7 +152,7 @@ fn check(mt: &Mt, options: &EncodeOptions) -> Result<(), EncodeError> {
 
 /// A section that is ready to be written.
 struct Section {
-    head: Head,
+    head: SectionHead,
     payload: Vec<u8>,
 }
 
@@ -181,7 +161,7 @@ impl Section {
         if u32::try_from(payload.len() + HEAD_BYTES).is_err() {
             return Err(EncodeError::TooLong { what: "a section of more than 4 GiB" });
         }
-        Ok(Self { head: Head::new(kind, &payload), payload })
+        Ok(Self { head: SectionHead::new(kind, &payload), payload })
     }
 
     /// A section that begins with some bytes, the rest of which is coded.
@@ -229,7 +209,7 @@ fn sections(
     writer.finish(&mut payload);
     let counts = [mt.base().positions.len() as u64, mt.base().tets.len() as u64];
     if !payload::is_backed(counts, payload.len() - head) {
-        return Err(EncodeError::TooLong { what: "a base mesh that is told in so few bytes" });
+        return Err(EncodeError::TooLong { what: "a base mesh that is coded in so few bytes" });
     }
     shared.push(Section::new(Kind::BASE, payload)?);
     for field in 0..fields {
@@ -298,7 +278,7 @@ fn put_all(out: &mut impl Put, mt: &Mt, block_bits: u32) -> Result<(), EncodeErr
     Ok(())
 }
 
-/// What the coded bytes of the file of an MT tell, part by part: names and bytes. Only for MTs that came from a file; exact
+/// How many bytes of the file of an MT code what: names and bytes. Only for MTs that came from a file; exact
 /// values are not among them.
 ///
 /// # Errors

@@ -1,15 +1,28 @@
 //! What can be wrong with an MT file, each with where and what to do.
 
 use crate::mt::{BaseMeshError, PageError, UpdateError};
-use std::fmt;
+use thiserror::Error;
 
-/// Why a stream of bytes is not, or not all of, a usable MT file.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// What to do about a file that is broken as such.
+const AGAIN: &str = "fetch the file again, or build it again if its source is the same";
+
+/// Why a stream of bytes is not, or not all of, a usable MT file. The texts contain those of inner errors, which are therefore no
+/// [sources](std::error::Error::source).
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum FormatError {
     /// The stream does not start like an MT file.
+    #[error(
+        "this is not an MT file; give a file made by `tetralod build` (for a URL, check that the server sends the \
+         file and not an error page)"
+    )]
     NotMt,
     /// The file has a version that this reader does not know.
+    #[error(
+        "the MT file has version {}.{}, this reader knows {}.{}; update tetralod, or build the file again with this \
+         version",
+        .found[0], .found[1], .supported[0], .supported[1]
+    )]
     UnsupportedVersion {
         /// Major and minor version of the file.
         found: [u16; 2],
@@ -17,6 +30,7 @@ pub enum FormatError {
         supported: [u16; 2],
     },
     /// The file relies on a section or a flag that this reader does not know.
+    #[error("the MT file needs {what} (at byte {offset}); update tetralod")]
     UnsupportedFeature {
         /// Where in the file, in bytes.
         offset: u64,
@@ -24,6 +38,7 @@ pub enum FormatError {
         what: &'static str,
     },
     /// The bytes contradict the specification or their checksum.
+    #[error("the MT file is damaged at byte {offset}: {what}; {AGAIN}")]
     Corrupt {
         /// Where in the file, in bytes.
         offset: u64,
@@ -31,11 +46,15 @@ pub enum FormatError {
         what: &'static str,
     },
     /// The stream ended before the file did; what has arrived is usable.
+    #[error("{} {AGAIN}", truncated(*.offset))]
     Truncated {
         /// Bytes that arrived.
         offset: u64,
     },
     /// The file needs more than [`Limits`](super::Limits) allow.
+    #[error(
+        "the MT file needs {needed} bytes for {what}, {limit} are allowed; raise the limit or build a smaller file"
+    )]
     Limit {
         /// What there is too much of.
         what: &'static str,
@@ -45,6 +64,7 @@ pub enum FormatError {
         limit: u64,
     },
     /// The file has no field of a name that was asked for.
+    #[error("the MT file has no field '{name}'; it has: {}", .known.join(", "))]
     Field {
         /// The name.
         name: String,
@@ -52,56 +72,25 @@ pub enum FormatError {
         known: Vec<String>,
     },
     /// A block does not belong where it was put.
+    #[error("the MT file is damaged: {0}; {AGAIN}")]
     Page(PageError),
     /// An update cannot be part of an MT.
+    #[error("the MT file is damaged: {0}; {AGAIN}")]
     Update(UpdateError),
     /// The base mesh or the description cannot be used.
+    #[error("the MT file is damaged: {0}; {AGAIN}")]
     Base(BaseMeshError),
 }
 
-/// What to do about a file that is broken as such.
-const AGAIN: &str = "fetch the file again, or build it again if its source is the same";
-
-impl fmt::Display for FormatError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NotMt => f.write_str(
-                "this is not an MT file; give a file made by `tetralod build` (for a URL, check that the server \
-                 sends the file and not an error page)",
-            ),
-            Self::UnsupportedVersion { found: [a, b], supported: [c, d] } => write!(
-                f,
-                "the MT file has version {a}.{b}, this reader knows {c}.{d}; update tetralod, or build the file \
-                 again with this version"
-            ),
-            Self::UnsupportedFeature { offset, what } => {
-                write!(f, "the MT file needs {what} (at byte {offset}); update tetralod")
-            }
-            Self::Corrupt { offset, what } => {
-                write!(f, "the MT file is damaged at byte {offset}: {what}; {AGAIN}")
-            }
-            Self::Truncated { offset: 0 } => write!(f, "the file is empty; {AGAIN}"),
-            Self::Truncated { offset } => write!(
-                f,
-                "the MT file ends too early, after {offset} bytes; what has arrived can be used, for the rest {AGAIN}"
-            ),
-            Self::Limit { what, needed, limit } => write!(
-                f,
-                "the MT file needs {needed} bytes for {what}, {limit} are allowed; raise the limit or build a \
-                 smaller file"
-            ),
-            Self::Field { name, known } => {
-                write!(f, "the MT file has no field '{name}'; it has: {}", known.join(", "))
-            }
-            Self::Page(error) => write!(f, "the MT file is damaged: {error}; {AGAIN}"),
-            Self::Update(error) => write!(f, "the MT file is damaged: {error}; {AGAIN}"),
-            Self::Base(error) => write!(f, "the MT file is damaged: {error}; {AGAIN}"),
-        }
+/// How much of a file there is that ends at byte `offset`.
+fn truncated(offset: u64) -> String {
+    match offset {
+        0 => "the file is empty;".to_owned(),
+        _ => format!(
+            "the MT file ends too early, after {offset} bytes; what has arrived can be used, for the rest"
+        ),
     }
 }
-
-// The Display texts contain those of the inner errors, so that one line tells all; hence no `source`.
-impl std::error::Error for FormatError {}
 
 impl From<UpdateError> for FormatError {
     fn from(error: UpdateError) -> Self {

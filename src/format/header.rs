@@ -21,17 +21,17 @@ pub const HEAD_BYTES: usize = 12;
 pub const END_BYTES: usize = HEAD_BYTES + 12;
 /// Flags that a reader must know.
 const CRITICAL_FLAGS: u32 = 0xFFFF;
-/// Of these: updates tell errors of the tetrahedra that they remove.
+/// Of these: updates contain errors of the tetrahedra that they remove.
 const TET_ERRORS: u32 = 1;
 
-/// What a header tells.
+/// What is in a header.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Start {
     /// Major and minor.
     pub version: [u16; 2],
     /// Bytes of the whole file, if the writer knew.
     pub total: Option<u64>,
-    /// Whether updates tell errors of the tetrahedra that they remove.
+    /// Whether updates contain errors of the tetrahedra that they remove.
     pub tet_errors: bool,
 }
 
@@ -122,13 +122,13 @@ impl Kind {
 
 /// The head of a section.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Head {
+pub struct SectionHead {
     pub kind: Kind,
     pub length: u32,
     pub crc: u32,
 }
 
-impl Head {
+impl SectionHead {
     /// The head for a payload.
     pub fn new(kind: Kind, payload: &[u8]) -> Self {
         // Writers check lengths before they come here.

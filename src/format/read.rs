@@ -24,6 +24,11 @@ impl<'a> Reader<'a> {
         FormatError::Corrupt { offset: self.offset, what }
     }
 
+    /// A section that cannot stand here.
+    pub fn out_of_place(&self) -> FormatError {
+        self.corrupt("a section is out of place")
+    }
+
     fn take(&mut self, count: usize) -> Result<&'a [u8]> {
         let Some((head, tail)) = self.bytes.split_at_checked(count) else {
             return Err(self.corrupt("the section is shorter than its content"));

@@ -11,7 +11,7 @@ pub(crate) struct Groups {
 }
 
 impl Groups {
-    /// Sorts what `list` tells: groups, each with a number that is in it. It is asked twice.
+    /// Sorts what `list` lists: groups, each with a number that is in it. It is called twice.
     pub fn new(count: usize, list: impl Fn(&mut dyn FnMut(usize, u32))) -> Self {
         let mut starts = vec![0_u32; count + 1];
         list(&mut |group, _| starts[group + 1] += 1);

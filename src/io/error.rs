@@ -1,9 +1,10 @@
 //! Why a file could not be read: where, what and what to do about it.
 
-use std::fmt;
+use thiserror::Error;
 
 /// A file that could not be read.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("{file}: {}{reason}", prefix(.place))]
 pub struct ReadError {
     /// The file's name as it was given.
     pub file: String,
@@ -14,17 +15,26 @@ pub struct ReadError {
 }
 
 /// What is wrong with a file.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum ReadReason {
     /// The file could not be opened or read.
+    #[error("{0}")]
     Io(String),
     /// The content is of no known kind.
+    #[error(
+        "not a format that is known here; give VTK XML (.vtu, .vti), legacy VTK (.vtk), or raw samples with a .json sidecar"
+    )]
     UnknownFormat,
     /// The text does not follow the rules of its format.
+    #[error("{0}; the file is damaged or not of this format")]
     Syntax(String),
     /// Something that every such file has is not there.
+    #[error("{0} is missing; write the file again")]
     Missing(String),
     /// The file ends, or a section ends, before its data is complete.
+    #[error(
+        "the data ends too early ({needed} needed, {found} left); the file is cut short or its header holds a wrong count"
+    )]
     Truncated {
         /// Bytes or numbers that are needed.
         needed: u64,
@@ -32,8 +42,12 @@ pub enum ReadReason {
         found: u64,
     },
     /// Compressed or encoded data is damaged.
+    #[error("the data is damaged: {0}; copy or write the file again")]
     Damaged(String),
     /// Two counts that must agree do not.
+    #[error(
+        "{what}: expected {expected}, found {found}; the header and the data disagree, write the file again"
+    )]
     Count {
         /// What is counted.
         what: String,
@@ -43,6 +57,7 @@ pub enum ReadReason {
         found: u64,
     },
     /// Valid, but not read here.
+    #[error("{what} cannot be read here; {remedy}")]
     Unsupported {
         /// What it is.
         what: String,
@@ -50,18 +65,28 @@ pub enum ReadReason {
         remedy: String,
     },
     /// There are cells that are not tetrahedra: VTK cell type and count.
+    #[error(
+        "{total} cells: {list}; only tetrahedra are read for now, split or remove the others (in ParaView: Tetrahedralize)",
+        list = .0.iter().map(|&(kind, n)| named_count(kind, n)).collect::<Vec<_>>().join(", "),
+        total = .0.iter().map(|c| c.1).sum::<u64>()
+    )]
     NotTetrahedra(Vec<(i64, u64)>),
     /// A value or coordinate is infinite or not a number.
+    #[error("the value at point {point} is infinite or not a number; replace it or leave this array out")]
     NotFinite {
         /// The point that it belongs to.
         point: u64,
     },
     /// A value of a field at cells is infinite or not a number.
+    #[error("the value at cell {cell} is infinite or not a number; replace it or leave this array out")]
     NotFiniteCell {
         /// The cell that it belongs to.
         cell: u64,
     },
     /// A cell refers to a point that does not exist.
+    #[error(
+        "cell {cell} refers to point {point}, but there are {points} points; the cells and the points do not belong together"
+    )]
     MissingPoint {
         /// The cell.
         cell: u64,
@@ -71,6 +96,7 @@ pub enum ReadReason {
         points: u64,
     },
     /// More than this program handles.
+    #[error("more than {limit} {what}; split the data")]
     TooLarge {
         /// What is counted.
         what: String,
@@ -79,66 +105,9 @@ pub enum ReadReason {
     },
 }
 
-impl std::error::Error for ReadError {}
-
-impl fmt::Display for ReadError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: ", self.file)?;
-        if !self.place.is_empty() {
-            write!(f, "{}: ", self.place)?;
-        }
-        write!(f, "{}", self.reason)
-    }
-}
-
-impl fmt::Display for ReadReason {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Io(error) => write!(f, "{error}"),
-            Self::UnknownFormat => write!(
-                f,
-                "not a format that is known here; give VTK XML (.vtu, .vti), legacy VTK (.vtk), or raw samples \
-                 with a .json sidecar"
-            ),
-            Self::Syntax(what) => write!(f, "{what}; the file is damaged or not of this format"),
-            Self::Missing(what) => write!(f, "{what} is missing; write the file again"),
-            Self::Truncated { needed, found } => write!(
-                f,
-                "the data ends too early ({needed} needed, {found} left); the file is cut short or its header \
-                 holds a wrong count"
-            ),
-            Self::Damaged(what) => write!(f, "the data is damaged: {what}; copy or write the file again"),
-            Self::Count { what, expected, found } => write!(
-                f,
-                "{what}: expected {expected}, found {found}; the header and the data disagree, write the file again"
-            ),
-            Self::Unsupported { what, remedy } => write!(f, "{what} cannot be read here; {remedy}"),
-            Self::NotTetrahedra(counts) => {
-                let total: u64 = counts.iter().map(|c| c.1).sum();
-                let list: Vec<String> = counts.iter().map(|&(kind, n)| named_count(kind, n)).collect();
-                write!(
-                    f,
-                    "{total} cells: {}; only tetrahedra are read for now, split or remove the others \
-                     (in ParaView: Tetrahedralize)",
-                    list.join(", ")
-                )
-            }
-            Self::NotFinite { point } => write!(
-                f,
-                "the value at point {point} is infinite or not a number; replace it or leave this array out"
-            ),
-            Self::NotFiniteCell { cell } => write!(
-                f,
-                "the value at cell {cell} is infinite or not a number; replace it or leave this array out"
-            ),
-            Self::MissingPoint { cell, point, points } => write!(
-                f,
-                "cell {cell} refers to point {point}, but there are {points} points; the cells and the points \
-                 do not belong together"
-            ),
-            Self::TooLarge { what, limit } => write!(f, "more than {limit} {what}; split the data"),
-        }
-    }
+/// A place in front of a reason; nothing for the whole file.
+fn prefix(place: &str) -> String {
+    if place.is_empty() { String::new() } else { format!("{place}: ") }
 }
 
 /// Gives a reason its place.

@@ -58,7 +58,7 @@ impl<'a> Collector<'a> {
             let mut fields = Vec::new();
             for c in 0..components {
                 let own = self.take_name(&format!("{name}_{}", component_name(components, c)));
-                // A vector has at most 255 components that tell which they are.
+                // The number of a component is a byte.
                 let vector = u8::try_from(c).ok().and_then(|c| part(Some(c)));
                 fields.push(Field { vector, ..Field::new(own, Vec::new()) });
             }
@@ -110,7 +110,7 @@ impl<'a> Collector<'a> {
         self.fields.extend(claim.fields);
     }
 
-    /// Tells the unit of the array that came last.
+    /// Sets the unit of the array that came last.
     pub fn set_unit_of_last(&mut self, unit: &str) {
         self.fields.iter_mut().rev().take(self.last).for_each(|field| field.unit = unit.to_owned());
         self.last = 0;

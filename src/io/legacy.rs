@@ -31,7 +31,7 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadE
     Ok(mesh)
 }
 
-/// The time in the arrays of the whole data set, as VTK tells it.
+/// The time in the arrays of the whole data set, as VTK writes it.
 fn time_in(arrays: &[ArrayData]) -> Option<f64> {
     let array = arrays.iter().find(|array| array.name == "TimeValue")?;
     array.values.first().copied().filter(|time| time.is_finite())
@@ -57,9 +57,7 @@ impl Kind {
             }),
         }
     }
-}
 
-impl Kind {
     fn is_integer(self) -> bool {
         match self {
             Self::Number(number) => number.is_integer(),
@@ -71,6 +69,10 @@ impl Kind {
 
 fn shortened(text: &str) -> String {
     text.chars().take(24).collect()
+}
+
+fn instead(found: &str, expected: &str) -> ReadReason {
+    ReadReason::Syntax(format!("\"{}\" instead of {expected}", shortened(found)))
 }
 
 /// A position in the file.
@@ -86,25 +88,18 @@ impl<'a> Reader<'a> {
     fn open(bytes: &'a [u8]) -> Result<(Self, String, Option<f64>), ReadReason> {
         let mut time = None;
         let mut file = Self { bytes, at: MAGIC.len(), binary: false, version: 0 };
-        let version = file.line()?;
-        file.version = version
-            .trim()
-            .split('.')
-            .next()
-            .and_then(|v| v.parse().ok())
-            .filter(|v| (1..=5).contains(v))
-            .ok_or_else(|| ReadReason::Unsupported {
-                what: format!("version \"{}\"", shortened(version.trim())),
-                remedy: "write it as version 1.0 to 5.1".into(),
-            })?;
+        let version = file.line()?.trim();
+        let major = version.split('.').next().and_then(|v| v.parse().ok()).filter(|v| (1..=5).contains(v));
+        file.version = major.ok_or_else(|| ReadReason::Unsupported {
+            what: format!("version \"{}\"", shortened(version)),
+            remedy: "write it as version 1.0 to 5.1".into(),
+        })?;
         // The title may hold any bytes.
         file.skip_line();
         file.binary = match file.word()?.to_ascii_lowercase().as_str() {
             "ascii" => false,
             "binary" => true,
-            other => {
-                return Err(ReadReason::Syntax(format!("\"{}\" is not ASCII or BINARY", shortened(other))));
-            }
+            other => return Err(instead(other, "ASCII or BINARY")),
         };
         loop {
             match file.word()?.to_ascii_lowercase().as_str() {
@@ -112,9 +107,7 @@ impl<'a> Reader<'a> {
                 // Field data may come before the data set.
                 "field" => time = time_in(&file.field_block()?).or(time),
                 "metadata" => _ = file.metadata(),
-                other => {
-                    return Err(ReadReason::Syntax(format!("\"{}\" instead of DATASET", shortened(other))));
-                }
+                other => return Err(instead(other, "DATASET")),
             }
         }
         let kind = file.word()?.to_ascii_lowercase();
@@ -249,7 +242,7 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Reads a METADATA block, which ends at an empty line; returns the unit of the array before it, if it tells one.
+    /// Reads a METADATA block, which ends at an empty line; returns the unit of the array before it, if there is one.
     fn metadata(&mut self) -> Option<String> {
         let mut unit = None;
         let mut is_unit = false;
@@ -333,14 +326,16 @@ struct ArrayData {
 }
 
 /// What the attributes that follow belong to.
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Clone, Copy, Default, PartialEq)]
 enum Owner {
+    #[default]
     Nothing,
     Points(usize),
     Cells(usize),
 }
 
 /// Everything after the data set's type.
+#[derive(Default)]
 struct Body<'a> {
     positions: Option<Vec<f64>>,
     /// Before version 5 counts and indices; since then indices alone.
@@ -361,21 +356,8 @@ struct Body<'a> {
 
 impl<'a> Body<'a> {
     fn new(options: &'a ReadOptions, time: Option<f64>) -> Self {
-        Self {
-            positions: None,
-            connectivity: Vec::new(),
-            offsets: Vec::new(),
-            cells: None,
-            types: Vec::new(),
-            dims: None,
-            origin: [0.0; 3],
-            spacing: None,
-            owner: Owner::Nothing,
-            fields: Collector::new(options.fields.as_deref()),
-            cell_fields: Collector::new(options.fields.as_deref()),
-            cell_data: options.cells,
-            time,
-        }
+        let [fields, cell_fields] = [(); 2].map(|()| Collector::new(options.fields.as_deref()));
+        Self { fields, cell_fields, cell_data: options.cells, time, ..Self::default() }
     }
 
     /// Reads the section that `keyword` announces.
@@ -440,8 +422,7 @@ impl<'a> Body<'a> {
         for (expected, length) in [("offsets", count), ("connectivity", size)] {
             let word = file.word()?;
             if !word.eq_ignore_ascii_case(expected) {
-                let expected = expected.to_ascii_uppercase();
-                return Err(ReadReason::Syntax(format!("\"{}\" instead of {expected}", shortened(word))));
+                return Err(instead(word, &expected.to_ascii_uppercase()));
             }
             let Kind::Number(number) = Kind::named(file.word()?)? else {
                 return Err(ReadReason::Syntax("indices that are not numbers".into()));
@@ -521,10 +502,6 @@ impl<'a> Body<'a> {
         })
     }
 
-    fn check_point_data(&self, expected: u64) -> Result<(), ReadReason> {
-        check_values(&self.fields, expected)
-    }
-
     /// The fields at cells, of which there are `cells`.
     fn take_cell_fields(&mut self, cells: usize) -> Result<Vec<Field>, ReadReason> {
         if self.cell_data == CellData::Values {
@@ -535,7 +512,7 @@ impl<'a> Body<'a> {
 
     fn checked_positions(&self) -> Result<Vec<[f64; 3]>, ReadError> {
         let coordinates = self.positions.as_deref().ok_or_else(|| missing("POINTS")).at(String::new)?;
-        self.check_point_data(coordinates.len() as u64 / 3).at(|| "POINT_DATA".into())?;
+        check_values(&self.fields, coordinates.len() as u64 / 3).at(|| "POINT_DATA".into())?;
         points_from(coordinates).at(|| "POINTS".into())
     }
 
@@ -580,7 +557,7 @@ impl<'a> Body<'a> {
         let place = || "DIMENSIONS".to_owned();
         let dims = self.dims.ok_or_else(|| ReadReason::Missing("DIMENSIONS".into())).at(place)?;
         let grid = image::checked_grid(dims, self.origin, self.spacing.unwrap_or([1.0; 3])).at(place)?;
-        self.check_point_data(dims.iter().product()).at(|| "POINT_DATA".into())?;
+        check_values(&self.fields, dims.iter().product()).at(|| "POINT_DATA".into())?;
         // Fewer cubes than points, which were counted.
         let cubes = dims.iter().map(|d| d - 1).product::<u64>() as usize;
         let cell_fields = self.take_cell_fields(cubes).at(|| "CELL_DATA".into())?;
@@ -618,7 +595,7 @@ fn scalar_components(file: &mut Reader<'_>) -> Result<usize, ReadReason> {
         .map_err(|_| ReadReason::Syntax(format!("\"{}\" is not a number of components", shortened(line))))?;
     let word = file.word()?;
     if !word.eq_ignore_ascii_case("lookup_table") {
-        return Err(ReadReason::Syntax(format!("\"{}\" instead of LOOKUP_TABLE", shortened(word))));
+        return Err(instead(word, "LOOKUP_TABLE"));
     }
     file.word()?;
     Ok(components)

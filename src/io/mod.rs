@@ -14,7 +14,7 @@
 //!
 //! Regular grids are split into tetrahedra, six a cube, and carry their [`Grid`](crate::mesh::Grid).
 //! Point arrays become scalar fields: an array of several components gives one field a component (`name_x`, ...) and
-//! `name_magnitude`. Units and times are kept where the file tells them. Arrays at cells are read where that is asked
+//! `name_magnitude`. Units and times are kept where the file contains them. Arrays at cells are read where that is asked
 //! for ([`ReadOptions::cells`]), arrays that are not numbers are left out.
 //! Time steps come in several files, which a `.pvd` may list: see [`steps`].
 //! Cells other than tetrahedra are refused. Readers check the file, not the mesh: see [`crate::mesh::repair`].
@@ -61,7 +61,7 @@ pub enum CellData {
     /// Leave them out.
     #[default]
     LeaveOut,
-    /// Keep their names alone, so that one who asks for them can be told what to do.
+    /// Keep their names alone, for messages that say how to read them.
     Names,
     /// Read them: see [`TetMesh::cells_to_points`].
     Values,
@@ -69,7 +69,7 @@ pub enum CellData {
 
 /// Reads the mesh or grid in the file at `path`; of raw samples either the samples or the sidecar may be given.
 ///
-/// The kind of a file is told by its content; only `.raw` and `.json` are told by their names.
+/// The kind of a file follows from its content; only `.raw` and `.json` are recognised by their names.
 ///
 /// # Errors
 /// If the file cannot be read, is damaged, or holds what is not read here: see [`ReadReason`].

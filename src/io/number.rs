@@ -29,6 +29,24 @@ macro_rules! decoded {
     }};
 }
 
+/// The same for numbers of the type `$number`.
+macro_rules! all_decoded {
+    ($number:expr, $bytes:expr, $big:expr, $into:ty) => {
+        match $number {
+            Self::I8 => decoded!($bytes, $big, $into, i8),
+            Self::U8 => decoded!($bytes, $big, $into, u8),
+            Self::I16 => decoded!($bytes, $big, $into, i16),
+            Self::U16 => decoded!($bytes, $big, $into, u16),
+            Self::I32 => decoded!($bytes, $big, $into, i32),
+            Self::U32 => decoded!($bytes, $big, $into, u32),
+            Self::I64 => decoded!($bytes, $big, $into, i64),
+            Self::U64 => decoded!($bytes, $big, $into, u64),
+            Self::F32 => decoded!($bytes, $big, $into, f32),
+            Self::F64 => decoded!($bytes, $big, $into, f64),
+        }
+    };
+}
+
 impl NumberType {
     /// By the name used in VTK XML files and in sidecars (in any case).
     pub fn named(name: &str) -> Option<Self> {
@@ -81,33 +99,12 @@ impl NumberType {
 
     /// The numbers in `bytes`; a rest that is shorter than a number is left out.
     pub fn floats(self, bytes: &[u8], big: bool) -> Vec<f64> {
-        match self {
-            Self::I8 => decoded!(bytes, big, f64, i8),
-            Self::U8 => decoded!(bytes, big, f64, u8),
-            Self::I16 => decoded!(bytes, big, f64, i16),
-            Self::U16 => decoded!(bytes, big, f64, u16),
-            Self::I32 => decoded!(bytes, big, f64, i32),
-            Self::U32 => decoded!(bytes, big, f64, u32),
-            Self::I64 => decoded!(bytes, big, f64, i64),
-            Self::U64 => decoded!(bytes, big, f64, u64),
-            Self::F32 => decoded!(bytes, big, f64, f32),
-            Self::F64 => decoded!(bytes, big, f64, f64),
-        }
+        all_decoded!(self, bytes, big, f64)
     }
 
     /// The numbers in `bytes` as indices. Unsigned numbers beyond `i64` wrap to negative ones, which no index is.
     pub fn integers(self, bytes: &[u8], big: bool) -> Result<Vec<i64>, ReadReason> {
-        Ok(match self {
-            Self::I8 => decoded!(bytes, big, i64, i8),
-            Self::U8 => decoded!(bytes, big, i64, u8),
-            Self::I16 => decoded!(bytes, big, i64, i16),
-            Self::U16 => decoded!(bytes, big, i64, u16),
-            Self::I32 => decoded!(bytes, big, i64, i32),
-            Self::U32 => decoded!(bytes, big, i64, u32),
-            Self::I64 => decoded!(bytes, big, i64, i64),
-            Self::U64 => decoded!(bytes, big, i64, u64),
-            Self::F32 | Self::F64 => return Err(not_integers()),
-        })
+        if self.is_integer() { Ok(all_decoded!(self, bytes, big, i64)) } else { Err(not_integers()) }
     }
 
     /// One number from text. Single precision is rounded as such, so that text and binary files agree.
@@ -118,7 +115,7 @@ impl NumberType {
 
     /// One index from text.
     pub fn parse_integer(self, text: &str) -> Result<i64, ReadReason> {
-        if matches!(self, Self::F32 | Self::F64) {
+        if !self.is_integer() {
             return Err(not_integers());
         }
         text.parse().map_err(|_| not_a_number(text))

@@ -14,7 +14,7 @@ use crate::io::{in_file, load, lower_extension};
 pub struct Step {
     /// The file.
     pub path: PathBuf,
-    /// The time, if the list tells it; the file may, too.
+    /// The time, if the list contains it; the file may, too.
     pub time: Option<f64>,
 }
 

@@ -64,15 +64,15 @@ pub(super) struct Array<'a> {
     pub piece: usize,
     attributes: Attributes,
     text: Cow<'a, str>,
-    /// The unit, if an `<InformationKey>` tells it.
+    /// The unit, if there is an `<InformationKey>` for it.
     unit: String,
 }
 
 impl Array<'_> {
-    /// The unit of the values; empty if it is not told. VTK has a key for it, others write an attribute.
+    /// The unit of the values; empty if there is none. VTK has a key for it, others write an attribute.
     pub fn unit(&self) -> &str {
-        let told = ["Unit", "Units", "unit", "units"].into_iter().find_map(|name| self.attributes.get(name));
-        told.unwrap_or(&self.unit).trim()
+        let unit = ["Unit", "Units", "unit", "units"].into_iter().find_map(|name| self.attributes.get(name));
+        unit.unwrap_or(&self.unit).trim()
     }
 
     /// The array's name; empty if it has none.
@@ -161,7 +161,7 @@ impl<'a> Document<'a> {
         parser.finish(data)
     }
 
-    /// The time that the data set is of, as VTK tells it; none if that is not a finite number.
+    /// The time of the data set, as VTK writes it; none if that is not a finite number.
     pub fn time(&self) -> Option<f64> {
         let array = self.field_data.iter().find(|array| array.name() == "TimeValue")?;
         let time = self.floats(array, 1, 1).ok()?.first().copied();

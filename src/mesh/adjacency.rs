@@ -99,7 +99,7 @@ pub fn neighbors(tets: &[[u32; 4]]) -> Result<Vec<[u32; 4]>, MeshError> {
     match_faces(tets, &sorted_faces(tets)?, fits)
 }
 
-/// The neighbours by their [sorted faces](sorted_faces). `fits` may refuse a face of several tetrahedra; it is told whether the
+/// The neighbours by their [sorted faces](sorted_faces). `fits` may refuse a face of several tetrahedra; it gets whether the
 /// first two of them lie on the same side.
 pub(crate) fn match_faces<E>(
     tets: &[[u32; 4]],
@@ -132,6 +132,19 @@ pub(crate) fn crowded(group: &[HalfFace]) -> MeshError {
     MeshError::CrowdedFace { face: group[0].key, tets: group.iter().map(|f| f.tet()).collect() }
 }
 
+/// Checks that every tetrahedron refers to existing points.
+pub(crate) fn check_indices(points: usize, tets: &[[u32; 4]]) -> Result<(), MeshError> {
+    if tets.len() > MAX_TETS {
+        return Err(MeshError::TooMany { tets: tets.len() });
+    }
+    for (tet, vertices) in (0_u32..).zip(tets) {
+        if let Some(&point) = vertices.iter().find(|&&v| v as usize >= points) {
+            return Err(MeshError::MissingPoint { tet, point, points });
+        }
+    }
+    Ok(())
+}
+
 /// The shape of a mesh, from its connectivity alone.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Topology {
@@ -158,7 +171,7 @@ impl Topology {
 /// # Errors
 /// As [`neighbors`], and if a tetrahedron names a point that is not there.
 pub fn topology(points: usize, tets: &[[u32; 4]]) -> Result<Topology, MeshError> {
-    super::check::check_indices(points, tets)?;
+    check_indices(points, tets)?;
     let neighbors = neighbors(tets)?;
     let boundary_faces = neighbors.iter().flatten().filter(|&&n| n == NONE).count();
     let stars = stars(points, tets);

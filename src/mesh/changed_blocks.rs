@@ -1,4 +1,4 @@
-//! Which entries of an array have changed since somebody last asked.
+//! Which entries of an array have changed since the last call.
 
 use std::ops::Range;
 

@@ -2,7 +2,7 @@
 
 use robust::{Coord, Coord3D};
 
-use crate::mesh::adjacency::{HalfFace, crowded, face_of, match_faces, sorted_faces};
+use crate::mesh::adjacency::{HalfFace, check_indices, crowded, face_of, match_faces, sorted_faces};
 use crate::mesh::{MeshError, TetMesh};
 
 /// Checks that `mesh` is valid: fields and indices fit, every tetrahedron is positive (decided exactly), and
@@ -49,19 +49,6 @@ pub(crate) fn check_arrays(mesh: &TetMesh) -> Result<(), MeshError> {
         return Err(MeshError::NotFinite { point });
     }
     check_indices(points, &mesh.tets)
-}
-
-/// Checks that every tetrahedron refers to existing points.
-pub(crate) fn check_indices(points: usize, tets: &[[u32; 4]]) -> Result<(), MeshError> {
-    if tets.len() > super::MAX_TETS {
-        return Err(MeshError::TooMany { tets: tets.len() });
-    }
-    for (tet, vertices) in (0_u32..).zip(tets) {
-        if let Some(&point) = vertices.iter().find(|&&v| v as usize >= points) {
-            return Err(MeshError::MissingPoint { tet, point, points });
-        }
-    }
-    Ok(())
 }
 
 /// Exact side tests over a set of positions.

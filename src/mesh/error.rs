@@ -1,18 +1,22 @@
 //! What can be wrong with a mesh, named by the cells of the file it came from.
 
-use std::fmt;
+use super::MAX_TETS;
+use thiserror::Error;
 
 /// Why a mesh cannot be used. Cells and points are numbered as in the input, from 0.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum MeshError {
     /// There is no tetrahedron, or none is left.
+    #[error("the mesh has no tetrahedron (left); check that the right file was given")]
     Empty,
     /// More tetrahedra than the arrays here can index.
+    #[error("{tets} tetrahedra are too many (at most {MAX_TETS}); split the mesh")]
     TooMany {
         /// How many there are.
         tets: usize,
     },
     /// A field is not as long as the list of points.
+    #[error("field \"{field}\" has {values} values for {points} points; give one value a point")]
     FieldLength {
         /// The field's name.
         field: String,
@@ -22,6 +26,7 @@ pub enum MeshError {
         points: usize,
     },
     /// A field at the cells is not as long as the list of cells.
+    #[error("field \"{field}\" has {values} values for {cells} cells; give one value a cell")]
     CellFieldLength {
         /// The field's name.
         field: String,
@@ -31,11 +36,13 @@ pub enum MeshError {
         cells: usize,
     },
     /// A point has an infinite or undefined coordinate.
+    #[error("point {point} has an infinite or undefined coordinate; mend it in the input")]
     NotFinite {
         /// The point.
         point: usize,
     },
     /// A tetrahedron refers to a point that does not exist.
+    #[error("cell {tet} refers to point {point}, but there are {points} points; mend the input")]
     MissingPoint {
         /// The cell.
         tet: u32,
@@ -45,21 +52,28 @@ pub enum MeshError {
         points: usize,
     },
     /// A tetrahedron has the same vertex twice.
+    #[error("cell {tet} has the same vertex twice; remove it")]
     RepeatedVertex {
         /// The cell.
         tet: u32,
     },
     /// A tetrahedron has no volume.
+    #[error("cell {tet} has no volume; repair the mesh first")]
     Flat {
         /// The cell.
         tet: u32,
     },
     /// A tetrahedron is turned inside out.
+    #[error("cell {tet} is turned inside out; repair the mesh first")]
     Inverted {
         /// The cell.
         tet: u32,
     },
     /// Three or more tetrahedra share a face.
+    #[error(
+        "face ({}, {}, {}) is shared by {} cells ({}), but at most two can meet in a face; remove overlapping cells",
+        .face[0], .face[1], .face[2], .tets.len(), listed(.tets)
+    )]
     CrowdedFace {
         /// The face's points.
         face: [u32; 3],
@@ -67,11 +81,19 @@ pub enum MeshError {
         tets: Vec<u32>,
     },
     /// Two tetrahedra lie on the same side of the face they share: the mesh is folded there.
+    #[error(
+        "cells {} and {} lie on the same side of the face they share: the mesh is folded there; remesh this region",
+        .tets[0], .tets[1]
+    )]
     Folded {
         /// The cells, in increasing order.
         tets: [u32; 2],
     },
     /// A tetrahedron without volume cannot be dropped without tearing the mesh.
+    #[error(
+        "cell {tet} has no volume and shares {shared} of its faces with other cells, so dropping it would tear the \
+         mesh; collapse it in a mesh editor or remesh this region"
+    )]
     InnerFlat {
         /// The cell.
         tet: u32,
@@ -79,56 +101,6 @@ pub enum MeshError {
         shared: u32,
     },
 }
-
-impl fmt::Display for MeshError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Empty => {
-                write!(f, "the mesh has no tetrahedron (left); check that the right file was given")
-            }
-            Self::TooMany { tets } => {
-                write!(f, "{tets} tetrahedra are too many (at most {}); split the mesh", super::MAX_TETS)
-            }
-            Self::FieldLength { field, values, points } => {
-                write!(f, "field \"{field}\" has {values} values for {points} points; give one value a point")
-            }
-            Self::CellFieldLength { field, values, cells } => {
-                write!(f, "field \"{field}\" has {values} values for {cells} cells; give one value a cell")
-            }
-            Self::NotFinite { point } => {
-                write!(f, "point {point} has an infinite or undefined coordinate; mend it in the input")
-            }
-            Self::MissingPoint { tet, point, points } => {
-                write!(f, "cell {tet} refers to point {point}, but there are {points} points; mend the input")
-            }
-            Self::RepeatedVertex { tet } => write!(f, "cell {tet} has the same vertex twice; remove it"),
-            Self::Flat { tet } => write!(f, "cell {tet} has no volume; repair the mesh first"),
-            Self::Inverted { tet } => write!(f, "cell {tet} is turned inside out; repair the mesh first"),
-            Self::CrowdedFace { face, tets } => write!(
-                f,
-                "face ({}, {}, {}) is shared by {} cells ({}), but at most two can meet in a face; \
-                 remove overlapping cells",
-                face[0],
-                face[1],
-                face[2],
-                tets.len(),
-                listed(tets)
-            ),
-            Self::Folded { tets: [a, b] } => write!(
-                f,
-                "cells {a} and {b} lie on the same side of the face they share: the mesh is folded there; \
-                 remesh this region"
-            ),
-            Self::InnerFlat { tet, shared } => write!(
-                f,
-                "cell {tet} has no volume and shares {shared} of its faces with other cells, so dropping it \
-                 would tear the mesh; collapse it in a mesh editor or remesh this region"
-            ),
-        }
-    }
-}
-
-impl std::error::Error for MeshError {}
 
 /// The first few of `tets`, as text.
 fn listed(tets: &[u32]) -> String {

@@ -1,5 +1,5 @@
 //! A tetrahedral mesh that grows over the faces of what is there, and a numbering of a mesh in the order in which it
-//! does: what the connectivity of a base mesh is told by. (Szymczak and Rossignac 1999; Gumhold, Guthe and Strasser 1999.)
+//! does: how the connectivity of a base mesh is coded. (Szymczak and Rossignac 1999; Gumhold, Guthe and Strasser 1999.)
 
 use super::FACES;
 #[cfg(any(feature = "build", test))]
@@ -15,7 +15,7 @@ const MOST_AROUND: usize = 256;
 /// What a face of the mesh is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
-    /// What lies behind it is not told yet.
+    /// What lies behind it is not coded yet.
     Open,
     /// Nothing lies behind it.
     Border,
@@ -46,7 +46,7 @@ pub(crate) struct Candidate {
     pub angle: f64,
 }
 
-/// The face behind which something is to be told next, and what there is around it.
+/// The face whose other side is coded next, and what is around it.
 #[derive(Clone, Debug)]
 pub(crate) struct Gate {
     /// Its vertices: the mesh is in front where they go round to the left.
@@ -126,7 +126,7 @@ impl Growth {
         found
     }
 
-    /// The next face behind which something is to be told.
+    /// The next face whose other side is to be coded.
     pub fn gate(&mut self) -> Option<Gate> {
         while *self.states.get(self.next)? != State::Open {
             self.next += 1;
@@ -204,7 +204,7 @@ impl Growth {
         ranked.into_iter().map(|(_, v)| v).collect()
     }
 
-    /// Tells that nothing lies behind the gate.
+    /// Marks the gate as a face of the boundary.
     pub fn close(&mut self) {
         self.states[self.next] = State::Border;
     }

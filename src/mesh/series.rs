@@ -1,62 +1,45 @@
 //! Time steps over one mesh.
 
-use std::fmt;
-
 use crate::mesh::{NONE, TetMesh};
+use thiserror::Error;
+
+/// What to do with steps over meshes that differ.
+const REMEDY: &str = "time steps must share one mesh: build an MT of each instead";
 
 /// Why two meshes are not time steps over one mesh. Cells and points are numbered as in the input, from 0.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum StepError {
     /// They do not have as many points.
+    #[error("the first time step has {} points, this one {}; {REMEDY}", .counts[0], .counts[1])]
     Points {
         /// Points of the first step and of this one.
         counts: [usize; 2],
     },
     /// They do not have as many cells.
+    #[error("the first time step has {} cells, this one {}; {REMEDY}", .counts[0], .counts[1])]
     Cells {
         /// Cells of the first step and of this one.
         counts: [usize; 2],
     },
     /// A point that cells use has moved.
+    #[error("point {point} is not where it is in the first time step; {REMEDY}")]
     Moved {
         /// The first such point.
         point: usize,
     },
     /// A cell has other points.
+    #[error("cell {cell} has other points than in the first time step; {REMEDY}")]
     Cell {
         /// The first such cell.
         cell: usize,
     },
     /// They do not have the same fields.
+    #[error("field \"{name}\" is in some time steps alone; choose fields that all of them have")]
     Field {
         /// The first one that only one of them has.
         name: String,
     },
 }
-
-impl fmt::Display for StepError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Points { counts: [first, this] } => {
-                write!(f, "the first time step has {first} points, this one {this}")?;
-            }
-            Self::Cells { counts: [first, this] } => {
-                write!(f, "the first time step has {first} cells, this one {this}")?;
-            }
-            Self::Moved { point } => write!(f, "point {point} is not where it is in the first time step")?,
-            Self::Cell { cell } => write!(f, "cell {cell} has other points than in the first time step")?,
-            Self::Field { name } => {
-                return write!(
-                    f,
-                    "field \"{name}\" is in some time steps alone; choose fields that all of them have"
-                );
-            }
-        }
-        write!(f, "; time steps must share one mesh: build an MT of each instead")
-    }
-}
-
-impl std::error::Error for StepError {}
 
 impl TetMesh {
     /// Appends the fields of another time step. Both are meshes as they were read: of what [`repair`](crate::mesh::repair)
@@ -129,8 +112,8 @@ mod tests {
         let mut turned = step(0.5);
         turned.tets[2].swap(0, 3);
         mesh.add_step(turned).unwrap();
-        let told: Vec<_> = mesh.fields.iter().map(|f| (f.name.as_str(), f.time)).collect();
-        assert_eq!(told, [("p", Some(0.0)), ("p", Some(0.5))]);
+        let fields: Vec<_> = mesh.fields.iter().map(|f| (f.name.as_str(), f.time)).collect();
+        assert_eq!(fields, [("p", Some(0.0)), ("p", Some(0.5))]);
     }
 
     #[test]

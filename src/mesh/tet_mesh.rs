@@ -50,7 +50,7 @@ pub struct Grid {
     pub spacing: [f64; 3],
 }
 
-/// A tetrahedral mesh with scalar fields at its points: plain arrays, nothing promised about validity.
+/// A tetrahedral mesh with scalar fields at its points: plain arrays that need not be valid.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TetMesh {
     /// Coordinates of the points, in model units.

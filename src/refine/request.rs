@@ -408,7 +408,11 @@ impl Transfer {
 }
 
 impl Region {
-    fn check(&self) -> Result<(), &'static str> {
+    /// Whether its numbers make sense.
+    ///
+    /// # Errors
+    /// What must hold.
+    pub fn check(&self) -> Result<(), &'static str> {
         let has_length = |v: &[f64; 3]| are_finite(v) && v.iter().any(|&x| x != 0.0);
         match self {
             // Infinite sides are as good as any.

@@ -28,7 +28,7 @@ pub struct BlockProgress {
     pub blocks: u32,
     /// Blocks that are here.
     pub here: u32,
-    /// Blocks that the request needs, as far as the index tells.
+    /// Blocks that the request needs, as far as the index shows.
     pub needed: u32,
     /// Blocks of those that are not to be fetched because there is no memory for them.
     pub left_out: u32,
@@ -42,7 +42,7 @@ const FIRST_BYTES: u64 = 1 << 16;
 /// How many bytes are asked for at a time where the file has to be read from end to end.
 const LATER_BYTES: u64 = 1 << 20;
 
-/// What a session knows of blocks.
+/// The blocks of a session.
 #[derive(Debug)]
 pub(super) struct Blocks {
     /// Bytes that blocks may take in memory.
@@ -124,7 +124,7 @@ impl Session {
     }
 
     /// Takes in bytes that were [wanted](Session::wanted): exactly one of the ranges, or less of it at the end of the file.
-    /// What nobody wants any more is passed over.
+    /// Bytes that are not wanted any more are ignored.
     ///
     /// # Errors
     /// When the bytes are damaged. What was there before stays usable.
@@ -181,7 +181,7 @@ impl Session {
                 blocks.waiting.insert(block, whole);
             }
             self.insert_waiting()?;
-            // What nobody has asked for does not wait for memory.
+            // A block that no request needs does not wait for memory.
             if let Some(blocks) = &mut self.blocks
                 && blocks.criterion.is_none()
                 && blocks.waiting.remove(&block).is_some()
@@ -197,7 +197,7 @@ impl Session {
         let mut next = self.next_complete();
         while let Some(block) = next {
             if !self.has_memory_for(block) {
-                self.make_place();
+                self.free_memory();
             }
             if !self.has_memory_for(block) {
                 // When the mesh has followed the request, more can go.
@@ -300,76 +300,83 @@ impl Session {
                 // The mesh shows now what else it needs.
                 self.plan();
             }
-            self.make_place();
+            self.free_memory();
             self.insert_waiting()?;
         }
         Ok(())
     }
 
-    /// Lets blocks go that the request does not need, those first that have not been needed for longest, until what is here
-    /// and what is wanted fit the memory. Those of which an update is applied stay, and what these depend on.
-    fn make_place(&mut self) {
-        let (Some(blocks), Some(mt), Some(index)) = (&self.blocks, self.decoder.mt(), self.decoder.index())
-        else {
-            return;
-        };
-        let mut planned = vec![false; index.blocks.len()];
-        let mut coming = 0;
-        for &(_, block) in &blocks.plan {
-            planned[block as usize] = true;
-            if !mt.has_page(block) {
-                coming += mt.bytes_of_page(block);
+    /// Drops blocks that the request does not need, until what is here and what is to come fit the memory.
+    fn free_memory(&mut self) {
+        for block in self.blocks_to_drop() {
+            let may_go = match (&mut self.front, self.decoder.mt()) {
+                (Some(front), Some(mt)) => front.leave(mt, block),
+                _ => false,
+            };
+            // Both have been checked, so neither refuses.
+            if !may_go || self.decoder.drop_block(block).is_err() {
+                return;
             }
         }
+    }
+
+    /// As many blocks as have to go, children before parents, those first that have not been needed for longest. Those of which an
+    /// update is applied stay, and those on which these depend.
+    fn blocks_to_drop(&self) -> Vec<u32> {
+        let mut leaving = Vec::new();
+        let (Some(blocks), Some(mt), Some(index)) = (&self.blocks, self.decoder.mt(), self.decoder.index())
+        else {
+            return leaving;
+        };
+        let coming = blocks.plan.iter().filter(|(_, block)| !mt.has_page(*block));
+        let coming: u64 = coming.map(|&(_, block)| mt.bytes_of_page(block)).sum();
         let mut excess = (mt.page_bytes() + coming).saturating_sub(blocks.memory);
         if excess == 0 {
-            return;
+            return leaving;
         }
-        // Pages that come without their parents are asked for one by one; what they have shown must not be forgotten.
-        if let (Some(front), Some(criterion), false) = (&self.front, &blocks.criterion, mt.needs_parents()) {
-            let fields = self.decoder.wanted_fields();
-            let bounds = |page: u32| errors_of(index, fields, page);
-            let telling = front.telling_pages(mt, &**criterion, |u| u.0 >> index.block_bits, bounds);
-            telling.into_iter().for_each(|block| planned[block as usize] = true);
-        }
-        let mut order: Vec<(u32, u32)> = (0..index.blocks.len() as u32)
-            .filter(|&block| mt.has_page(block) && !planned[block as usize])
-            .map(|block| (blocks.last_needed.get(block as usize).copied().unwrap_or(0), block))
-            .collect();
-        // Of the same age, children before parents.
-        order.sort_unstable_by_key(|&(age, block)| (age, std::cmp::Reverse(block)));
-        let mut held = vec![0_u32; index.blocks.len()];
-        for block in (0..index.blocks.len() as u32).filter(|&block| mt.has_page(block)) {
-            index.blocks[block as usize].parents.iter().for_each(|&parent| held[parent as usize] += 1);
-        }
-        let mut leaving = Vec::new();
+        let candidates = self.unneeded(blocks, mt, index);
+        let mut dependents = vec![0_u32; index.blocks.len()];
+        let here = (0..).zip(&index.blocks).filter(|(block, _)| mt.has_page(*block));
+        here.flat_map(|(_, info)| &info.parents).for_each(|&parent| dependents[parent as usize] += 1);
         // Parents may be older than their children: then they are looked at again when these are gone.
         let mut is_moving = true;
         while excess > 0 && is_moving {
             is_moving = false;
-            for &(_, block) in &order {
-                if excess == 0 || held[block as usize] > 0 || leaving.contains(&block) {
+            for &block in &candidates {
+                if excess == 0 || dependents[block as usize] > 0 || leaving.contains(&block) {
                     continue;
                 }
                 if self.front.as_ref().is_some_and(|front| is_in_use(front, index, mt, block)) {
                     continue;
                 }
                 excess = excess.saturating_sub(mt.bytes_of_page(block));
-                index.blocks[block as usize].parents.iter().for_each(|&parent| held[parent as usize] -= 1);
+                let parents = &index.blocks[block as usize].parents;
+                parents.iter().for_each(|&parent| dependents[parent as usize] -= 1);
                 leaving.push(block);
                 is_moving = true;
             }
         }
-        for block in leaving {
-            let may_go = match (&mut self.front, self.decoder.mt()) {
-                (Some(front), Some(mt)) => front.leave(mt, block),
-                _ => false,
-            };
-            // Both have been checked above, so neither refuses.
-            if !may_go || self.decoder.drop_block(block).is_err() {
-                break;
-            }
+        leaving
+    }
+
+    /// The blocks here that the request does not need, those first that have not been needed for longest.
+    fn unneeded(&self, blocks: &Blocks, mt: &Mt, index: &Index) -> Vec<u32> {
+        let mut is_needed = vec![false; index.blocks.len()];
+        blocks.plan.iter().for_each(|&(_, block)| is_needed[block as usize] = true);
+        // Pages that come without their parents are asked for one by one; what they have shown must not be forgotten.
+        if let (Some(front), Some(criterion), false) = (&self.front, &blocks.criterion, mt.needs_parents()) {
+            let fields = self.decoder.wanted_fields();
+            let bounds = |page: u32| errors_of(index, fields, page);
+            let telling = front.telling_pages(mt, &**criterion, |u| u.0 >> index.block_bits, bounds);
+            telling.into_iter().for_each(|block| is_needed[block as usize] = true);
         }
+        let here = (0..index.blocks.len() as u32).filter(|&block| mt.has_page(block));
+        let mut unneeded: Vec<u32> = here.filter(|&block| !is_needed[block as usize]).collect();
+        // Of the same age, children before parents.
+        unneeded.sort_unstable_by_key(|&block| {
+            (blocks.last_needed.get(block as usize).copied().unwrap_or(0), std::cmp::Reverse(block))
+        });
+        unneeded
     }
 }
 

@@ -15,39 +15,30 @@ use crate::refine::{
 };
 use crate::view::{IsoSurface, MeshView, NormalKind, Plane, Slice, SurfaceChanges};
 use blocks::Blocks;
-use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
+use thiserror::Error;
 
 pub use crate::format::Progress;
 pub use crate::refine::GoOn;
 
 /// Why a session cannot do what it was asked for. The current mesh is valid all the same.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum SessionError {
     /// The base mesh has not arrived yet.
+    #[error("the base mesh has not arrived yet; feed more of the file first")]
     NotReady,
     /// The request makes no sense for this MT.
-    Request(RequestError),
+    #[error(transparent)]
+    Request(#[from] RequestError),
     /// The isovalue is not a finite number.
+    #[error("the isovalue must be a finite number")]
     Isovalue,
     /// The MT turned out to be damaged when an update was applied.
-    Format(FormatError),
+    #[error(transparent)]
+    Format(#[from] FormatError),
 }
-
-impl fmt::Display for SessionError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NotReady => f.write_str("the base mesh has not arrived yet; feed more of the file first"),
-            Self::Request(error) => write!(f, "{error}"),
-            Self::Isovalue => f.write_str("the isovalue must be a finite number"),
-            Self::Format(error) => write!(f, "{error}"),
-        }
-    }
-}
-
-impl std::error::Error for SessionError {}
 
 /// A decoder, its MT and the current mesh.
 #[derive(Debug, Default)]
@@ -121,7 +112,7 @@ impl Session {
         fed
     }
 
-    /// Tells the session that no more bytes come.
+    /// Ends the file: no more bytes come.
     ///
     /// # Errors
     /// As [`Decoder::finish`]; what has arrived stays usable.
@@ -142,7 +133,7 @@ impl Session {
         self.front.as_ref().and(self.decoder.mt())
     }
 
-    /// The decoder: what the file tells of its blocks.
+    /// The decoder: the description of the file and its blocks.
     pub fn decoder(&self) -> &Decoder {
         &self.decoder
     }
@@ -167,28 +158,32 @@ impl Session {
     /// # Errors
     /// If the request makes no sense for this MT, or the MT turns out to be damaged.
     pub fn refine(&mut self, request: &Request) -> Result<RefineStats, SessionError> {
-        self.aim(request)?;
+        self.request(request)?;
         self.step(&mut |_| true)
     }
 
-    /// Tells what mesh is wanted from now on, for [`Session::step`] to make it.
+    /// Sets the request, for [`Session::step`] to make its mesh.
     ///
     /// # Errors
-    /// If the request makes no sense for this MT; what was wanted before is then wanted still.
-    pub fn aim(&mut self, request: &Request) -> Result<(), SessionError> {
-        self.aim_with(request, &[])
+    /// If the request makes no sense for this MT; the request before it then remains.
+    pub fn request(&mut self, request: &Request) -> Result<(), SessionError> {
+        self.request_with(request, &[])
     }
 
-    /// [`Session::aim`] with criteria of the caller's own beside the needs of `request`: see
+    /// [`Session::request`] with criteria of the caller's own beside the needs of `request`: see
     /// [`Custom`](crate::refine::Custom).
     ///
     /// # Errors
-    /// As [`Session::aim`].
-    pub fn aim_with(&mut self, request: &Request, custom: &[Arc<dyn Criterion>]) -> Result<(), SessionError> {
+    /// As [`Session::request`].
+    pub fn request_with(
+        &mut self,
+        request: &Request,
+        custom: &[Arc<dyn Criterion>],
+    ) -> Result<(), SessionError> {
         let (Some(front), Some(mt)) = (&mut self.front, self.decoder.mt()) else {
             return Err(SessionError::NotReady);
         };
-        request.check(mt.info()).map_err(SessionError::Request)?;
+        request.check(mt.info())?;
         let own = LodCriterion::new(mt.info(), request);
         let criterion = custom.iter().fold(own, |all, one| all.and(Arc::clone(one)));
         let criterion: Arc<dyn Criterion> = Arc::new(criterion);
@@ -198,7 +193,7 @@ impl Session {
         Ok(())
     }
 
-    /// Goes on towards the mesh that [`Session::aim`] was told, until it is there or `go_on` says no, which is asked after
+    /// Goes on towards the mesh of the request, until it is there or `go_on` returns false, which is called after
     /// every update. The mesh is valid then and within the budget, whether it is done or not. It is not done where blocks came or
     /// went with this step, for there may be more to do with the others. Data is missing only if it is to come.
     ///
@@ -209,9 +204,8 @@ impl Session {
         let (Some(front), Some(mt)) = (&mut self.front, self.decoder.mt()) else {
             return Err(SessionError::NotReady);
         };
-        let outcome =
-            front.step(mt, go_on).map_err(|error| SessionError::Format(FormatError::Update(error)))?;
-        self.after_step().map_err(SessionError::Format)?;
+        let outcome = front.step(mt, go_on).map_err(FormatError::from)?;
+        self.after_step()?;
         let done = outcome.done && self.block_progress() == before;
         let (Some(front), Some(mt)) = (&self.front, self.decoder.mt()) else {
             return Err(SessionError::NotReady);
@@ -256,7 +250,7 @@ impl Session {
 
     /// Which entries of [`Session::view`] have changed since the last call: ranges of points and of tetrahedra in ascending
     /// order, with some entries among them that have not. What lies beyond the ends of the arrays is gone. The first call
-    /// tells of everything. Points change too when another field is shown.
+    /// gives everything. Points change too when another field is shown.
     pub fn take_changes(&mut self) -> MeshChanges {
         self.catch_up();
         let MeshView { positions, tets, .. } = view(self.front.as_ref(), &self.shown);
@@ -425,7 +419,7 @@ impl Session {
     }
 }
 
-/// What has changed since somebody last asked, so that they need not look at everything.
+/// What has changed since the last call, so that callers need not look at everything.
 #[derive(Debug, Default)]
 struct Behind {
     /// Kept from the first time on.

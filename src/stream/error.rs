@@ -1,28 +1,55 @@
 //! Why bytes do not come, and what to change where they come from.
 
-use std::fmt;
+use thiserror::Error;
 
 /// Why a file cannot be read from where it is, or not any further.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum StreamError {
     /// The server answered with a status that is no success, every time it was asked.
+    #[error("the server answers with HTTP {0}; {advice}", advice = status_advice(*.0))]
     Status(u16),
     /// The connection failed or was cut, every time it was tried.
+    #[error(
+        "the server cannot be reached, or cuts every connection ({0}); check the address and that the server is running"
+    )]
     Network(String),
     /// Nothing came for as long as was to be waited.
+    #[error(
+        "the server sends nothing any more; check that it is not overloaded, and that nothing between holds answers back"
+    )]
     Timeout,
     /// The browser does not let this page read from that server.
+    #[error(
+        "this page may not read from that server; let the server send `Access-Control-Allow-Origin` with the origin of \
+         this page, or put the file on the page's own server"
+    )]
     Blocked,
     /// A web page came instead of the file.
+    #[error(
+        "the server sends a web page instead of the file; check the address, and that the server answers 404 for what \
+         it does not have and asks for no login"
+    )]
     WebPage,
     /// The server compresses what it sends, so that a range of it is no range of the file.
+    #[error(
+        "the server sends the file compressed (`Content-Encoding: {0}`), where parts of it are needed; switch \
+         compression off for this kind of file"
+    )]
     Encoded(String),
     /// The server answered with other bytes than it was asked for.
+    #[error(
+        "the server sends another part of the file than was asked for ({0}); mend or switch off Range requests on the \
+         server or the cache before it"
+    )]
     WrongRange(String),
     /// The file was replaced while it was being read.
+    #[error(
+        "the file on the server was replaced while it was being read; open it again, and give new versions new names"
+    )]
     Changed,
     /// A file on this machine cannot be read.
+    #[error("the file cannot be read ({0})")]
     Unreadable(String),
 }
 
@@ -36,48 +63,6 @@ impl StreamError {
         }
     }
 }
-
-impl fmt::Display for StreamError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Status(status) => write!(f, "the server answers with HTTP {status}; {}", status_advice(*status)),
-            Self::Network(detail) => write!(
-                f,
-                "the server cannot be reached, or cuts every connection ({detail}); check the address and that the \
-                 server is running"
-            ),
-            Self::Timeout => f.write_str(
-                "the server sends nothing any more; check that it is not overloaded, and that nothing between holds \
-                 answers back",
-            ),
-            Self::Blocked => f.write_str(
-                "this page may not read from that server; let the server send `Access-Control-Allow-Origin` with \
-                 the origin of this page, or put the file on the page's own server",
-            ),
-            Self::WebPage => f.write_str(
-                "the server sends a web page instead of the file; check the address, and that the server answers 404 \
-                 for what it does not have and asks for no login",
-            ),
-            Self::Encoded(encoding) => write!(
-                f,
-                "the server sends the file compressed (`Content-Encoding: {encoding}`), where parts of it are needed; \
-                 switch compression off for this kind of file"
-            ),
-            Self::WrongRange(found) => write!(
-                f,
-                "the server sends another part of the file than was asked for ({found}); mend or switch off Range \
-                 requests on the server or the cache before it"
-            ),
-            Self::Changed => f.write_str(
-                "the file on the server was replaced while it was being read; open it again, and give new versions \
-                 new names",
-            ),
-            Self::Unreadable(detail) => write!(f, "the file cannot be read ({detail})"),
-        }
-    }
-}
-
-impl std::error::Error for StreamError {}
 
 fn status_advice(status: u16) -> &'static str {
     match status {

@@ -313,13 +313,13 @@ impl Client {
         Self { agent: config.build().new_agent(), headers: options.headers.clone().into() }
     }
 
-    /// One request from beginning to end; `tell` says whether anybody still wants to know.
+    /// One request from beginning to end; `report` returns whether the answer is still wanted.
     fn run(
         &self,
         url: &str,
         range: Range<u64>,
         if_match: Option<String>,
-        tell: &mut dyn FnMut(What) -> bool,
+        report: &mut dyn FnMut(What) -> bool,
     ) {
         // Without an end where it is not known: some servers read numbers as 32 or 53 bits.
         let last = if range.end == u64::MAX { String::new() } else { (range.end - 1).to_string() };
@@ -333,11 +333,11 @@ impl Client {
         let response = match request.call() {
             Ok(response) => response,
             Err(error) => {
-                tell(What::Failed(failure(&error)));
+                report(What::Failed(failure(&error)));
                 return;
             }
         };
-        if !tell(What::Head(Box::new(OwnedResponseHead::of(url, &response)))) {
+        if !report(What::Head(Box::new(OwnedResponseHead::of(url, &response)))) {
             return;
         }
         let mut body = response.into_body().into_reader();
@@ -350,7 +350,7 @@ impl Client {
                 Err(error) => What::Failed(failure(&ureq::Error::from(error))),
             };
             let last = !matches!(what, What::Data(_));
-            if !tell(what) || last {
+            if !report(what) || last {
                 return;
             }
         }

@@ -58,7 +58,7 @@ pub struct WantedRange {
 pub enum Action {
     /// Ask for these bytes.
     Fetch {
-        /// The name of the request in all that is told of it.
+        /// The number by which the driver reports about the request.
         id: u32,
         /// The bytes.
         range: Range<u64>,
@@ -70,14 +70,14 @@ pub enum Action {
         /// The bytes.
         range: Range<u64>,
     },
-    /// Drop this request; nothing needs to be told of it any more.
+    /// Drop this request; it needs no further report.
     Cancel {
         /// Its name.
         id: u32,
     },
     /// Nothing to do before this time, unless something happens.
     Wait {
-        /// In milliseconds, by the clock that the driver tells.
+        /// In milliseconds, by the clock of the driver.
         until_ms: u64,
     },
 }
@@ -108,7 +108,7 @@ pub struct Traffic {
 
 /// Decides which bytes of a file to ask for next, and takes what comes.
 ///
-/// It does no I/O and knows no time: a driver tells it what happens, and when, and does what it says. So one machine
+/// It does no I/O and reads no clock: a driver reports what happens, and when, and carries out its actions. So one machine
 /// serves pages, programs and tests, and every fault of a network can be played to it. What it holds to: the bytes
 /// that come out are those of one version of the file; never more than
 /// [`max_requests`](LoaderOptions::max_requests) requests are open or waiting to be tried again; no byte is asked for
@@ -162,7 +162,7 @@ struct Pause {
     until: u64,
 }
 
-/// What tells one version of the file from another.
+/// What distinguishes one version of the file from another.
 #[derive(Debug, Default)]
 struct Version {
     total: Option<u64>,
@@ -183,7 +183,7 @@ impl Version {
         range.start.min(end)..range.end.min(end)
     }
 
-    /// Takes over what `head` tells; an error if that is of another version.
+    /// Takes over what is in `head`; an error if that is of another version.
     fn learn(&mut self, head: &ResponseHead) -> Result<(), StreamError> {
         agree(&mut self.total, head.total())?;
         let tag = head.strong_etag();
@@ -194,12 +194,12 @@ impl Version {
     }
 }
 
-fn agree<T: PartialEq>(known: &mut Option<T>, told: Option<T>) -> Result<(), StreamError> {
-    match (&known, told) {
+fn agree<T: PartialEq>(known: &mut Option<T>, found: Option<T>) -> Result<(), StreamError> {
+    match (&known, found) {
         (_, None) => Ok(()),
-        (Some(known), Some(told)) => (*known == told).then_some(()).ok_or(StreamError::Changed),
-        (None, told) => {
-            *known = told;
+        (Some(known), Some(found)) => (*known == found).then_some(()).ok_or(StreamError::Changed),
+        (None, found) => {
+            *known = found;
             Ok(())
         }
     }
@@ -349,7 +349,7 @@ impl Loader {
         self.reading.clear();
     }
 
-    /// Takes a range that a cache had, with its bytes; passed over if nobody waits for it any more.
+    /// Takes a range that a cache had, with its bytes; ignored if it is not wanted any more.
     pub fn put(&mut self, range: &Range<u64>, bytes: &[u8]) {
         self.reading.retain(|reading| reading != range);
         let there = range.start..range.end.min(range.start.saturating_add(bytes.len() as u64));
@@ -363,7 +363,7 @@ impl Loader {
         self.cached.retain(|cached| cached != range);
     }
 
-    /// The ranges that are complete and nobody has taken, those that came out of a cache left out.
+    /// The complete ranges that have not been taken, without those from a cache.
     pub fn uncached(&self) -> impl Iterator<Item = (&Range<u64>, &[u8])> {
         let new = self.ready.iter().filter(|(range, _)| !self.is_cached(range));
         new.map(|(range, bytes)| (range, &bytes[..]))
@@ -425,7 +425,7 @@ impl Loader {
         self.traffic
     }
 
-    /// Bytes that wait for the rest of their range, and complete ones that nobody has taken.
+    /// Bytes that wait for the rest of their range, and complete ones that have not been taken.
     pub fn held_bytes(&self) -> u64 {
         self.reassembly.len() + self.ready.iter().map(|(_, bytes)| bytes.len() as u64).sum::<u64>()
     }

@@ -3,7 +3,7 @@
 use super::range_set::RangeSet;
 use std::ops::Range;
 
-/// Runs of bytes of a file, in order and apart. They grow with what arrives, never with what somebody announces.
+/// Runs of bytes of a file, in order and apart. They grow with what arrives, never with what a header announces.
 #[derive(Debug, Default)]
 pub struct Reassembly {
     runs: Vec<Run>,

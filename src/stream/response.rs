@@ -96,7 +96,7 @@ impl ResponseHead<'_> {
         }
     }
 
-    /// The size of the whole file, where this head tells it.
+    /// The size of the whole file, if this head contains it.
     pub fn total(&self) -> Option<u64> {
         match (self.status, self.content_range) {
             (206 | 416, Some(text)) => parse_range(text)?.1,
@@ -122,7 +122,7 @@ fn is_web_page(kind: &str) -> bool {
     kind.get(..9).is_some_and(|start| start.eq_ignore_ascii_case(b"text/html"))
 }
 
-/// The part, if any, and the size of the whole, if told, of `bytes 0-9/20`, `bytes 0-9/*` or `bytes */20`.
+/// The part, if any, and the size of the whole, if there is one, of `bytes 0-9/20`, `bytes 0-9/*` or `bytes */20`.
 fn parse_range(text: &str) -> Option<(Option<Range<u64>>, Option<u64>)> {
     let (part, total) = text.trim().strip_prefix("bytes")?.trim_start().split_once('/')?;
     let total = if total == "*" { None } else { Some(total.trim().parse().ok()?) };

@@ -1,10 +1,11 @@
-//! A need that a JavaScript function tells: it gets many tetrahedra at once and says how urgent each one is.
+//! A need that a JavaScript function decides: it gets many tetrahedra at once and returns the excess of each.
 
 use super::error::WebError;
+use super::results::{floats, object};
 use crate::geom::Lattice;
 use crate::mt::{FieldInfo, MtInfo};
 use crate::refine::{ANY, Criterion, TetLook, Verdict};
-use js_sys::{Float32Array, Function, Object, Reflect};
+use js_sys::{Function, Object, Reflect};
 use std::cell::RefCell;
 use std::fmt;
 use wasm_bindgen::JsValue;
@@ -74,11 +75,10 @@ impl Callback {
             values.extend((tet.levels)(self.number).map(|level| self.field.value(level) as f32));
             errors.push((tet.error.error() * self.field.range()) as f32);
         }
-        let array = |numbers: &[f32]| Float32Array::from(numbers).into();
-        super::results::object(&[
-            ("positions", array(&positions)),
-            ("values", array(&values)),
-            ("errors", array(&errors)),
+        object(&[
+            ("positions", floats(&positions)),
+            ("values", floats(&values)),
+            ("errors", floats(&errors)),
             ("count", tets.len().into()),
         ])
     }
@@ -117,7 +117,7 @@ impl Criterion for Callback {
             });
             verdicts.extend(excesses.into_iter().map(|excess| Verdict { excess, slack: 0.0, dial: ANY }));
         }
-        // A function that fails asks for nothing from then on; its failure is told when the step ends.
+        // A function that fails asks for nothing from then on; the step returns its failure.
         verdicts.resize(tets.len(), Verdict::NEVER);
         verdicts
     }

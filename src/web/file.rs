@@ -53,7 +53,7 @@ impl File {
         self.remote.session_mut()
     }
 
-    /// Takes what the loader has complete, and tells it what is wanted then; whether there was anything.
+    /// Takes the complete ranges of the loader, and gives it those that are wanted then; whether there was any.
     pub fn supply(&mut self) -> Result<bool, WebError> {
         match &self.loader {
             Some(loader) => Ok(self.remote.supply(&mut loader.borrow_mut())?),
@@ -88,9 +88,9 @@ impl File {
     }
 
     /// What `options` ask for; `camera` is the one of the viewer, if there is one.
-    pub fn aim(&mut self, options: &JsValue, camera: Option<&View>) -> Result<(), WebError> {
+    pub fn request(&mut self, options: &JsValue, camera: Option<&View>) -> Result<(), WebError> {
         let asked = asked(options, self.info()?, camera)?;
-        self.remote.aim(&asked.request, &asked.custom)?;
+        self.remote.request(&asked.request, &asked.custom)?;
         self.session_mut().set_field(asked.field)?;
         self.asked = asked;
         Ok(())
@@ -98,8 +98,8 @@ impl File {
 
     /// What is asked for has changed a little.
     #[cfg(all(feature = "gpu", target_arch = "wasm32"))]
-    pub fn aim_again(&mut self) -> Result<(), WebError> {
-        Ok(self.remote.aim(&self.asked.request, &self.asked.custom)?)
+    pub fn request_again(&mut self) -> Result<(), WebError> {
+        Ok(self.remote.request(&self.asked.request, &self.asked.custom)?)
     }
 
     /// Goes on towards what was asked for, for about so many milliseconds or so many updates; each that is

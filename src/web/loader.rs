@@ -18,7 +18,7 @@ extern "C" {
     pub type JsRange;
 }
 
-/// A loader that requests tell what happens to them, and a file what it wants.
+/// A loader that requests report to, and that a file gives the ranges it wants.
 pub type SharedLoader = Rc<RefCell<Loader>>;
 
 /// Decides which bytes to fetch next. Times are in milliseconds, ends may be `Infinity`.
@@ -36,7 +36,7 @@ impl RangeLoader {
 
 #[wasm_bindgen]
 impl RangeLoader {
-    /// A loader of one file; what is `undefined` is as usual.
+    /// A loader of one file; `undefined` stands for the default.
     #[wasm_bindgen(constructor)]
     pub fn new(
         max_requests: Option<u32>,
@@ -47,17 +47,17 @@ impl RangeLoader {
         timeout_ms: Option<f64>,
         seed: f64,
     ) -> Self {
-        let usual = LoaderOptions::default();
-        let number = |given: Option<f64>, usual: u64| given.map_or(usual, |given| given as u64);
+        let default = LoaderOptions::default();
+        let number = |given: Option<f64>, default: u64| given.map_or(default, |given| given as u64);
         let loader = Loader::new(LoaderOptions {
-            max_requests: max_requests.map_or(usual.max_requests, |most| most as usize),
-            gap: number(gap, usual.gap),
-            max_request_bytes: number(max_request_bytes, usual.max_request_bytes),
-            retries: retries.unwrap_or(usual.retries),
-            backoff_ms: number(backoff_ms, usual.backoff_ms),
-            timeout_ms: number(timeout_ms, usual.timeout_ms),
+            max_requests: max_requests.map_or(default.max_requests, |most| most as usize),
+            gap: number(gap, default.gap),
+            max_request_bytes: number(max_request_bytes, default.max_request_bytes),
+            retries: retries.unwrap_or(default.retries),
+            backoff_ms: number(backoff_ms, default.backoff_ms),
+            timeout_ms: number(timeout_ms, default.timeout_ms),
             seed: seed.to_bits(),
-            ..usual
+            ..default
         });
         Self { loader: Rc::new(RefCell::new(loader)) }
     }
@@ -178,7 +178,7 @@ impl RangeLoader {
         self.loader.borrow().total().map(|total| total as f64)
     }
 
-    /// What names the version of the file, if the server tells.
+    /// What names the version of the file, if the server sends it.
     pub fn version(&self) -> Option<String> {
         self.loader.borrow().version().map(str::to_owned)
     }

@@ -2,7 +2,7 @@
 
 use super::callback::Callback;
 use super::error::WebError;
-use super::reader::{Reader, read};
+use super::reader::{ReadError, Reader, read};
 use crate::geom::Bounds;
 use crate::mt::MtInfo;
 use crate::refine::{Budget, Criterion, Need, Part, Region, Request, RequestError, Transfer, View};
@@ -166,7 +166,7 @@ pub struct Asked {
     pub request: Request,
     /// The field that is shown, and that stats speak of.
     pub field: usize,
-    /// Needs that functions tell.
+    /// Needs that functions decide.
     pub custom: Vec<Arc<dyn Criterion>>,
     /// For each need of the request, what its bound is multiplied by to be in the unit in which it was asked.
     pub units: Vec<f64>,
@@ -176,6 +176,10 @@ pub struct Asked {
 
 /// What `options` ask for, of the MT of `info`. `own` is the viewer's camera, for views that name none.
 pub fn asked(options: &JsValue, info: &MtInfo, own: Option<&View>) -> Result<Asked, WebError> {
+    parse(options, info, own).map_err(|error| error.with_value(options).into())
+}
+
+fn parse(options: &JsValue, info: &MtInfo, own: Option<&View>) -> Result<Asked, ReadError> {
     let mut parser = Parser { info, own, asked: Asked::default() };
     if options.is_undefined() || options.is_null() {
         parser.asked.request = parser.of_field(Need::within(0.0), 0).into();
@@ -206,14 +210,16 @@ pub fn asked(options: &JsValue, info: &MtInfo, own: Option<&View>) -> Result<Ask
 
 /// The index of a field that is named, or given by that index.
 pub fn field_index(info: &MtInfo, field: &JsValue) -> Result<usize, WebError> {
-    known_field(info, &read(field, "field")?).map_err(|problem| WebError::bad_option("field", &problem))
+    let index =
+        read(field).and_then(|value| known_field(info, &value).map_err(|problem| ReadError::new(&problem)));
+    index.map_err(|error| error.with_value(field).inside("field").into())
 }
 
 fn known_field(info: &MtInfo, field: &Value) -> Result<usize, String> {
     match field {
         Value::Text(name) => info.fields.iter().position(|field| field.name == *name).ok_or_else(|| {
             let known: Vec<&str> = info.fields.iter().map(|field| field.name.as_str()).collect();
-            format!("there is no field `{name}`, only {}", known.join(", "))
+            format!("there is no such field, only {}", known.join(", "))
         }),
         Value::Number(number) => {
             let index = *number as usize;
@@ -243,10 +249,10 @@ fn corners(numbers: &[f64]) -> Result<Bounds, &'static str> {
     Ok(Bounds { min: [x0, y0, z0], max: [x1, y1, z1] })
 }
 
-fn at_least_one(name: &str, number: Option<f64>) -> Result<Option<f64>, WebError> {
+fn at_least_one(name: &str, number: Option<f64>) -> Result<Option<f64>, ReadError> {
     match number {
         Some(number) if number.is_nan() || number < 1.0 => {
-            Err(WebError::bad_option(name, "must be a number of at least 1"))
+            Err(ReadError::new("must be a number of at least 1").inside(name))
         }
         _ => Ok(number),
     }
@@ -256,8 +262,8 @@ fn at_least_one(name: &str, number: Option<f64>) -> Result<Option<f64>, WebError
 struct Place(String);
 
 impl Place {
-    fn refuse(&self, name: &str, problem: &str) -> WebError {
-        WebError::bad_option(&format!("{}{name}", self.0), problem)
+    fn refuse(&self, name: &str, problem: &str) -> ReadError {
+        ReadError::new(problem).inside(&format!("{}{name}", self.0))
     }
 
     /// The same for the options of the option `name`.
@@ -266,13 +272,17 @@ impl Place {
     }
 
     /// Numbers of which there must be a certain count.
-    fn fixed<const N: usize>(&self, name: &str, numbers: &Numbers) -> Result<[f64; N], WebError> {
+    fn fixed<const N: usize>(&self, name: &str, numbers: &Numbers) -> Result<[f64; N], ReadError> {
         let fixed = <[f64; N]>::try_from(&numbers.0[..]);
         fixed.map_err(|_| self.refuse(name, &format!("must be {N} numbers")))
     }
 
     /// Rows of `N` numbers; none if the option is not there.
-    fn rows<const N: usize>(&self, name: &str, numbers: Option<&Numbers>) -> Result<Vec<[f64; N]>, WebError> {
+    fn rows<const N: usize>(
+        &self,
+        name: &str,
+        numbers: Option<&Numbers>,
+    ) -> Result<Vec<[f64; N]>, ReadError> {
         let (rows, rest) = numbers.map_or(&[][..], |Numbers(numbers)| numbers).as_chunks::<N>();
         if rest.is_empty() {
             return Ok(rows.to_vec());
@@ -281,10 +291,10 @@ impl Place {
     }
 
     /// An error as a part of `range`.
-    fn error(&self, name: &str, error: Option<&Value>, range: f64) -> Result<Option<f64>, WebError> {
+    fn error(&self, name: &str, error: Option<&Value>, range: f64) -> Result<Option<f64>, ReadError> {
         let relative = match error {
             None => return Ok(None),
-            Some(Value::Text(text)) => percentage(text).map_err(|problem| self.refuse(name, &problem))?,
+            Some(Value::Text(text)) => percentage(text).map_err(|problem| self.refuse(name, problem))?,
             Some(Value::Number(number)) => number / range,
             Some(Value::List(_)) => return Err(self.refuse(name, "must be a number or a percentage")),
         };
@@ -329,7 +339,7 @@ impl NeedOptions {
     }
 
     /// The option `kind` makes the need one of its own kind: of the others it has but these.
-    fn stands_alone(&self, kind: &str, besides: &[&str], at: &Place) -> Result<(), WebError> {
+    fn stands_alone(&self, kind: &str, besides: &[&str], at: &Place) -> Result<(), ReadError> {
         match self.names().find(|name| *name != kind && !besides.contains(name)) {
             Some(other) => {
                 let problem = format!(
@@ -342,7 +352,7 @@ impl NeedOptions {
     }
 
     /// The regions that are given, by their names.
-    fn regions(&self, at: &Place) -> Result<Vec<(&'static str, Region)>, WebError> {
+    fn regions(&self, at: &Place) -> Result<Vec<(&'static str, Region)>, ReadError> {
         let mut regions = Vec::new();
         if let Some(Numbers(numbers)) = &self.r#box {
             regions
@@ -374,7 +384,7 @@ impl NeedOptions {
     }
 
     /// The region that the need is limited to.
-    fn region(&self, at: &Place) -> Result<Option<(&'static str, Region)>, WebError> {
+    fn region(&self, at: &Place) -> Result<Option<(&'static str, Region)>, ReadError> {
         let mut regions = self.regions(at)?;
         if let [(name, _), (other, _), ..] = &regions[..] {
             let problem =
@@ -385,7 +395,7 @@ impl NeedOptions {
     }
 
     /// Isovalues and ranges of values.
-    fn ranges(&self, at: &Place) -> Result<Vec<[f64; 2]>, WebError> {
+    fn ranges(&self, at: &Place) -> Result<Vec<[f64; 2]>, ReadError> {
         let mut ranges: Vec<[f64; 2]> = at.rows("ranges", self.ranges.as_ref())?;
         if !ranges.iter().all(|[low, high]| low <= high) {
             return Err(at.refuse("ranges", "each must be two numbers, the smaller one first"));
@@ -408,7 +418,7 @@ struct Parser<'a> {
 
 impl Parser<'_> {
     /// Adds a need, which the option `name` makes what it is.
-    fn push(&mut self, at: &Place, name: &str, need: Need, unit: f64) -> Result<(), WebError> {
+    fn push(&mut self, at: &Place, name: &str, need: Need, unit: f64) -> Result<(), ReadError> {
         let alone = Request::from(need);
         alone.check(self.info).map_err(|error| match error {
             RequestError::Need { problem, .. } => at.refuse(name, problem),
@@ -419,7 +429,7 @@ impl Parser<'_> {
         Ok(())
     }
 
-    fn field(&self, need: &NeedOptions, at: &Place) -> Result<Option<usize>, WebError> {
+    fn field(&self, need: &NeedOptions, at: &Place) -> Result<Option<usize>, ReadError> {
         let index = need.field.as_ref().map(|field| known_field(self.info, field)).transpose();
         index.map_err(|problem| at.refuse("field", &problem))
     }
@@ -430,7 +440,7 @@ impl Parser<'_> {
     }
 
     /// The need that `options` describe.
-    fn need(&mut self, options: &NeedOptions, at: &Place) -> Result<(), WebError> {
+    fn need(&mut self, options: &NeedOptions, at: &Place) -> Result<(), ReadError> {
         let field = self.field(options, at)?.unwrap_or(self.asked.field);
         if options.view.is_some() {
             options.stands_alone("view", &[], at)?;
@@ -462,7 +472,7 @@ impl Parser<'_> {
         self.push(at, name, need, unit)
     }
 
-    fn view(&mut self, view: &ViewOptions, field: usize, at: &Place) -> Result<(), WebError> {
+    fn view(&mut self, view: &ViewOptions, field: usize, at: &Place) -> Result<(), ReadError> {
         let camera = match (&view.matrix, &view.viewport, self.own) {
             (Some(matrix), Some(viewport), _) => {
                 View { matrix: at.fixed("matrix", matrix)?, viewport: at.fixed("viewport", viewport)? }
@@ -486,23 +496,22 @@ impl Parser<'_> {
         }
     }
 
-    fn function(&mut self, options: &JsValue) -> Result<(), WebError> {
+    fn function(&mut self, options: &JsValue) -> Result<(), ReadError> {
         let function =
             Reflect::get(options, &"where".into()).ok().and_then(|where_| where_.dyn_into::<Function>().ok());
-        let function = function.ok_or_else(|| {
-            WebError::bad_option("where", "must be a function, or the URL of a module that has one")
-        })?;
+        let problem = "must be a function, or the URL of a module that has one";
+        let function = function.ok_or_else(|| ReadError::new(problem).inside("where"))?;
         self.asked.custom.push(Arc::new(Callback::new(function, self.info, self.asked.field)));
         Ok(())
     }
 }
 
 /// JavaScript reads the number: Rust's own way would bring tables of its own.
-fn percentage(text: &str) -> Result<f64, String> {
+fn percentage(text: &str) -> Result<f64, &'static str> {
     let number = text.trim().strip_suffix('%').map(str::trim_end).filter(|number| !number.is_empty());
     let number = number.and_then(|number| f64::try_from(JsValue::from(number)).ok()).unwrap_or(f64::NAN);
     if number.is_nan() {
-        return Err(format!("`{text}` is neither a number nor a percentage such as \"1%\""));
+        return Err("must be a number or a percentage such as \"1%\"");
     }
     Ok(number / 100.0)
 }

@@ -13,11 +13,20 @@ use serde::de::{
 };
 use serde::forward_to_deserialize_any;
 use std::fmt;
+use thiserror::Error;
+use wasm_bindgen::prelude::wasm_bindgen;
 use wasm_bindgen::{JsCast, JsValue};
 
-/// Reads `value`, which is the option `name`.
-pub fn read<T: DeserializeOwned>(value: &JsValue, name: &str) -> Result<T, WebError> {
-    T::deserialize(Reader::new(value.clone())).map_err(|error| error.inside(name).into())
+#[wasm_bindgen]
+extern "C" {
+    /// The global function of this name: a text for any value.
+    #[wasm_bindgen(js_name = String, catch)]
+    fn text(value: &JsValue) -> Result<String, JsValue>;
+}
+
+/// Reads `value`.
+pub fn read<T: DeserializeOwned>(value: &JsValue) -> Result<T, ReadError> {
+    T::deserialize(Reader::new(value.clone()))
 }
 
 /// An array, typed array or anything like one, as an array.
@@ -26,8 +35,9 @@ pub fn list(value: &JsValue) -> Option<Array> {
     (value.is_object() && has_length()).then(|| Array::from(value))
 }
 
-/// What cannot be read, and why.
-#[derive(Debug, Default)]
+/// An option that cannot be used, and why.
+#[derive(Debug, Error)]
+#[error("{path}: {problem}")]
 pub struct ReadError {
     /// The option, from the value on that was read; empty for that value itself.
     path: String,
@@ -36,13 +46,25 @@ pub struct ReadError {
 
 impl ReadError {
     #[inline(never)]
-    fn new(problem: &str) -> Self {
+    pub fn new(problem: &str) -> Self {
         Self { path: String::new(), problem: problem.to_owned() }
     }
 
-    /// The same error as the one of whoever reads `name`.
+    /// Adds what `options` contain at the path.
+    pub fn with_value(mut self, options: &JsValue) -> Self {
+        let names = self.path.split(['.', '[', ']']).filter(|name| !name.is_empty());
+        let value = names.fold(options.clone(), |value, name| {
+            Reflect::get(&value, &name.into()).unwrap_or(JsValue::UNDEFINED)
+        });
+        if let (false, Ok(text)) = (value.is_undefined(), text(&value)) {
+            self.problem += &format!("; given: {text}");
+        }
+        self
+    }
+
+    /// The error of the option `name`, in which this one was found.
     #[inline(never)]
-    fn inside(mut self, name: &str) -> Self {
+    pub fn inside(mut self, name: &str) -> Self {
         let between = if self.path.is_empty() || self.path.starts_with('[') { "" } else { "." };
         self.path = format!("{name}{between}{}", self.path);
         self
@@ -56,20 +78,12 @@ impl From<ReadError> for WebError {
     }
 }
 
-impl fmt::Display for ReadError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}", self.path, self.problem)
-    }
-}
-
-impl std::error::Error for ReadError {}
-
 impl serde::de::Error for ReadError {
     fn custom<T: fmt::Display>(problem: T) -> Self {
         Self::new(&problem.to_string())
     }
 
-    /// What was given instead is not told: formatting it would be larger than all of this.
+    /// [`ReadError::with_value`] adds the value: formatting `Unexpected` would be larger than all of this.
     fn invalid_type(_: Unexpected<'_>, expected: &dyn Expected) -> Self {
         Self::new(&format!("must be {expected}"))
     }
@@ -94,7 +108,7 @@ impl serde::de::Error for ReadError {
 /// A value, and which of its members are read.
 pub struct Reader {
     value: JsValue,
-    /// These names are somebody else's, if not ours alone.
+    /// The names that the second type of [`Reader::read_both`] reads.
     names: &'static [&'static str],
     is_ours: bool,
 }

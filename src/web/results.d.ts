@@ -38,7 +38,7 @@ export interface BlockProgress {
   all: number;
   /** Blocks that are here. */
   here: number;
-  /** Blocks that the request needs, as far as the file's index tells. */
+  /** Blocks that the request needs, as far as the file's index shows. */
   needed: number;
   /** Those of them that are not fetched because there is no room for them. */
   leftOut: number;

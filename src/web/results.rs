@@ -6,7 +6,7 @@ use crate::mt::{FieldInfo, MeshChanges, MtInfo};
 use crate::refine::RefineStats;
 use crate::session::{BlockProgress, Progress};
 use crate::view::{IsoSurface, MeshView};
-use js_sys::{Float32Array, Object, Reflect, Uint32Array};
+use js_sys::{Float32Array, Float64Array, Object, Reflect, Uint32Array};
 use serde::Serialize;
 use std::ops::Range;
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -236,11 +236,15 @@ pub fn iso_surface(surface: &IsoSurface) -> JsIsoSurface {
     ])
 }
 
-fn floats(values: &[f32]) -> JsValue {
+pub fn floats(values: &[f32]) -> JsValue {
     Float32Array::from(values).into()
 }
 
-fn integers(values: &[u32]) -> JsValue {
+pub fn doubles(values: &[f64]) -> JsValue {
+    Float64Array::from(values).into()
+}
+
+pub fn integers(values: &[u32]) -> JsValue {
     Uint32Array::from(values).into()
 }
 

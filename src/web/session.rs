@@ -34,7 +34,7 @@ impl CoreSession {
         Self { file: File::in_parts(fields, memory, loader), handed: 0 }
     }
 
-    /// Takes what the loader has complete, and tells it what is wanted then; whether there was anything.
+    /// Takes the complete ranges of the loader, and gives it those that are wanted then; whether there was any.
     pub fn supply(&mut self) -> Result<bool, WebError> {
         self.file.supply()
     }
@@ -74,13 +74,13 @@ impl CoreSession {
 
     /// Changes the current mesh to what `options` asks for, as far as the data has arrived.
     pub fn refine(&mut self, options: &RefineOptions) -> Result<JsStats, WebError> {
-        self.aim(options)?;
+        self.request(options)?;
         self.step(f64::INFINITY, f64::INFINITY)
     }
 
-    /// Tells which mesh is wanted from now on, for `step` to make it.
-    pub fn aim(&mut self, options: &RefineOptions) -> Result<(), WebError> {
-        self.file.aim(options, None)
+    /// Sets the request, for `step` to make its mesh.
+    pub fn request(&mut self, options: &RefineOptions) -> Result<(), WebError> {
+        self.file.request(options, None)
     }
 
     /// Goes on towards that mesh for about so many milliseconds or so many updates, whichever comes first.

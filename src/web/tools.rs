@@ -2,12 +2,13 @@
 
 use super::error::WebError;
 use super::options::field_index;
-use super::results::{JsIsoSurface, iso_surface};
+use super::results::{JsIsoSurface, doubles, floats, integers, iso_surface, object};
 use super::session::CoreSession;
 use crate::view::{
-    BoundarySurface, FieldStats, Histogram, NormalKind, Plane, Probe, Streamline, TraceOptions, Tracer,
+    BoundarySurface, FieldStats, Histogram, MeshView, NormalKind, Plane, Probe, Streamline, TraceOptions,
+    Tracer,
 };
-use js_sys::{Array, Float32Array, Float64Array, Object, Reflect, Uint32Array};
+use js_sys::{Array, Object, Reflect};
 use wasm_bindgen::prelude::wasm_bindgen;
 use wasm_bindgen::{JsCast, JsValue};
 
@@ -44,7 +45,7 @@ impl CoreSession {
         session.set_normal_kind(if smooth { NormalKind::Smooth } else { NormalKind::Gradient });
         let surface = session.isosurfaces(values)?;
         let js = iso_surface(surface);
-        set(js.as_ref(), "values", &Float32Array::from(&surface.values[..]));
+        set(js.as_ref(), "values", &floats(&surface.values));
         Ok(js)
     }
 
@@ -61,7 +62,7 @@ impl CoreSession {
         let js = surface(slice.positions(), slice.values(), slice.indices());
         let mut edges = Vec::new();
         slice.cell_edges(&mut edges);
-        set(&js, "edges", &Uint32Array::from(edges.as_flattened()));
+        set(&js, "edges", &integers(edges.as_flattened()));
         Ok(js.unchecked_into())
     }
 
@@ -92,11 +93,7 @@ impl CoreSession {
         let ends = spans.iter().flat_map(|span| [span.entry, span.exit]);
         let values: Vec<f64> = ends.map(|place| place.value(probe.mesh())).collect();
         let tets: Vec<u32> = spans.iter().map(|span| span.entry.tet).collect();
-        let js = Object::new();
-        set(&js, "at", &Float64Array::from(&at[..]));
-        set(&js, "values", &Float64Array::from(&values[..]));
-        set(&js, "tets", &Uint32Array::from(&tets[..]));
-        Ok(js.unchecked_into())
+        Ok(object(&[("at", doubles(&at)), ("values", doubles(&values)), ("tets", integers(&tets))]))
     }
 
     /// The streamlines from some seeds, three coordinates each, through the vector field of three fields.
@@ -129,7 +126,7 @@ impl CoreSession {
         let mut tracer = Tracer::new(mesh, vectors.each_ref().map(|v| &v[..]));
         let line = |seed: &[f64; 3]| {
             let line = tracer.trace(*seed, &options);
-            line.map_or(JsValue::UNDEFINED, |line| streamline(&line, mesh.field, mesh.tets))
+            line.map_or(JsValue::UNDEFINED, |line| streamline(&line, &mesh))
         };
         Ok(seeds.iter().map(line).collect::<Array>().unchecked_into())
     }
@@ -153,7 +150,6 @@ impl CoreSession {
         histogram.add_mesh(&mesh);
         let [min, max] = stats.range();
         let [below, above] = histogram.outside();
-        let js = Object::new();
         let numbers = [
             ("volume", stats.volume()),
             ("integral", stats.integral()),
@@ -164,37 +160,31 @@ impl CoreSession {
             ("below", below),
             ("above", above),
         ];
-        numbers.iter().for_each(|(name, number)| set(&js, name, &JsValue::from_f64(*number)));
         let edges: Vec<f64> = (0..=bins as usize).map(|b| histogram.edge(b)).collect();
-        set(&js, "histogram", &Float64Array::from(&histogram.volumes()[..]));
-        set(&js, "edges", &Float64Array::from(&edges[..]));
-        Ok(js.unchecked_into())
+        let arrays = [("histogram", doubles(&histogram.volumes())), ("edges", doubles(&edges))];
+        let numbers = numbers.map(|(name, number)| (name, number.into()));
+        Ok(object(&numbers.into_iter().chain(arrays).collect::<Vec<_>>()))
     }
 }
 
 fn surface(positions: &[[f32; 3]], values: &[f32], indices: &[[u32; 3]]) -> Object {
-    let js = Object::new();
-    set(&js, "positions", &Float32Array::from(positions.as_flattened()));
-    set(&js, "values", &Float32Array::from(values));
-    set(&js, "indices", &Uint32Array::from(indices.as_flattened()));
-    js
+    object(&[
+        ("positions", floats(positions.as_flattened())),
+        ("values", floats(values)),
+        ("indices", integers(indices.as_flattened())),
+    ])
 }
 
-fn streamline(line: &Streamline, field: &[f32], tets: &[[u32; 4]]) -> JsValue {
+fn streamline(line: &Streamline, mesh: &MeshView<'_>) -> JsValue {
     let positions: Vec<f64> = line.points.iter().flat_map(|point| point.position).collect();
     let times: Vec<f64> = line.points.iter().map(|point| point.time).collect();
-    let value = |tet: u32, weights: [f64; 4]| {
-        let values = tets[tet as usize].map(|p| f64::from(field[p as usize]));
-        (0..4).map(|i| weights[i] * values[i]).sum()
-    };
-    let values: Vec<f64> =
-        line.points.iter().map(|point| value(point.place.tet, point.place.weights)).collect();
-    let js = Object::new();
-    set(&js, "positions", &Float64Array::from(&positions[..]));
-    set(&js, "times", &Float64Array::from(&times[..]));
-    set(&js, "values", &Float64Array::from(&values[..]));
-    set(&js, "end", &line.end.name().into());
-    js.into()
+    let values: Vec<f64> = line.points.iter().map(|point| point.place.value(mesh)).collect();
+    object(&[
+        ("positions", doubles(&positions)),
+        ("times", doubles(&times)),
+        ("values", doubles(&values)),
+        ("end", line.end.name().into()),
+    ])
 }
 
 /// Setting a property on a fresh ordinary object cannot fail.

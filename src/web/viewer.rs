@@ -34,7 +34,7 @@ pub struct Viewer {
     look: Look,
     camera: Camera,
     show: Show,
-    /// What the camera saw when the needs that follow it were last told.
+    /// The view that the needs which follow the camera have now.
     seen: View,
     /// Whether the mesh is not yet the one that was asked for.
     moving: bool,
@@ -148,7 +148,7 @@ impl Viewer {
         Ok(self.progress())
     }
 
-    /// Takes what the loader has complete, and tells it what is wanted then; whether there was anything.
+    /// Takes the complete ranges of the loader, and gives it those that are wanted then; whether there was any.
     pub fn supply(&mut self) -> Result<bool, WebError> {
         let Some(mut next) = self.next.take() else {
             let any = self.file.supply()?;
@@ -197,10 +197,10 @@ impl Viewer {
         self.bounds.map_or_else(Box::default, |bounds| flat(&bounds))
     }
 
-    /// Tells which mesh is wanted from now on, for `step` to make it. Views without a matrix follow the camera.
-    pub fn aim(&mut self, options: &RefineOptions) -> Result<(), WebError> {
+    /// Sets the request, for `step` to make its mesh. Views without a matrix follow the camera.
+    pub fn request(&mut self, options: &RefineOptions) -> Result<(), WebError> {
         let (seen, before) = (self.view(), self.file.asked.field);
-        self.file.aim(options, Some(&seen))?;
+        self.file.request(options, Some(&seen))?;
         if self.file.asked.field != before {
             self.stale = Stale { boxes: self.stale.boxes, ..Stale::MESH };
         }
@@ -210,8 +210,8 @@ impl Viewer {
     }
 
     /// More of the file has come, and with it perhaps what was asked for.
-    #[wasm_bindgen(js_name = aimAgain)]
-    pub fn aim_again(&mut self) {
+    #[wasm_bindgen(js_name = requestAgain)]
+    pub fn request_again(&mut self) {
         self.moving = self.file.session().info().is_some();
     }
 
@@ -410,7 +410,7 @@ impl Viewer {
         View { matrix, viewport: self.renderer.size().map(f64::from) }
     }
 
-    /// Tells the needs that follow the camera where it is.
+    /// Gives the needs that follow the camera its view.
     fn follow_camera(&mut self) -> Result<(), WebError> {
         let seen = self.view();
         if self.file.asked.follows.is_empty() || seen == self.seen {
@@ -420,7 +420,7 @@ impl Viewer {
         for need in self.file.asked.follows.clone() {
             self.file.asked.request.needs[need].part = Part::View(seen);
         }
-        self.file.aim_again()
+        self.file.request_again()
     }
 
     /// Bytes have come: when the base mesh is there, look at it.

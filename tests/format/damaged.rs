@@ -1,8 +1,8 @@
 //! Promise: damage is detected, whatever it is; nothing panics, hangs, or takes memory that the bytes do not back.
 
 use crate::support::files::{
-    assemble, bytes_in_blocks, bytes_of, decode, half_edge, header, inserted, insertions, is_prefix, sample,
-    samples, sections, within,
+    assemble, bytes_in_blocks, bytes_of, decode, half_edge, header, inserted, insertions, is_prefix,
+    overwrite, sample, samples, sections, within,
 };
 use crate::support::strategies::config;
 use proptest::prelude::*;
@@ -269,10 +269,7 @@ proptest! {
         let mut sections = sections(&bytes_in_blocks(&samples(2, 300)[kind], 6));
         let which = which.index(sections.len());
         let payload = &mut sections[which].1;
-        for (place, value) in &changes {
-            let place = place.index(payload.len());
-            payload[place] = *value;
-        }
+        overwrite(payload, &changes);
         if let Some(cut) = cut {
             payload.truncate(cut.index(payload.len()));
         }

@@ -1,27 +1,17 @@
 //! Promise: versions 2 and 3 of the format do not change. What these small MTs are written as, byte for byte, is kept in
 //! `tests/golden`, and is read back; files of other versions are told apart.
 
-use crate::support::files::{assert_same, decode, field, header};
+use crate::support::files::{assert_same, decode, field, header, small_info};
 use std::fmt::Write;
 use tetralod::format::{EncodeOptions, FormatError, encode};
-use tetralod::geom::Lattice;
 use tetralod::mt::{
     BaseMesh, EdgeMtBuilder, ErrorCode, ExplicitMt, ExplicitUpdate, Mt, MtInfo, MtKind, MultiTessellation,
     VertexId, VertexSplit,
 };
 
 /// Two tetrahedra on one face, with one field of 8 bits; there are going to be `updates` updates.
-fn start(kind: MtKind, [vertices, tetrahedra, updates]: [u32; 3]) -> (MtInfo, BaseMesh) {
-    let info = MtInfo {
-        kind,
-        lattice: Lattice { origin: [0.0; 3], step: [0.5; 3], bits: 5 },
-        fields: vec![field("p", 8)],
-        vertices,
-        tetrahedra,
-        updates,
-        displacement_per_error: 2.0,
-        quantization: 0.0,
-    };
+fn start(kind: MtKind, counts: [u32; 3]) -> (MtInfo, BaseMesh) {
+    let info = small_info(kind, 5, vec![field("p", 8)], counts);
     let base = BaseMesh {
         positions: vec![[0, 8, 8], [16, 8, 8], [8, 8, 20], [8, 0, 8], [8, 20, 8]],
         values: vec![10, 20, 30, 200, 40],

@@ -5,7 +5,7 @@ use crate::reader::growth::Growth;
 use crate::reader::{self, File, plain};
 use crate::support::builder::{Plan, build, mt_of_splits};
 use crate::support::domains::{Domain, PlainMesh};
-use crate::support::files::encoded;
+use crate::support::files::{encoded, field, small_info};
 use crate::support::random::Random;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::ops::ControlFlow;
@@ -396,16 +396,11 @@ fn grown(mesh: &PlainMesh) -> PlainMesh {
 /// An MT without updates.
 fn base_only(mesh: &PlainMesh) -> EdgeMt {
     let mut random = Random::new(11);
-    let info = MtInfo {
-        kind: MtKind::Edge,
-        lattice: Lattice { origin: [0.0; 3], step: [1.0; 3], bits: 11 },
-        fields: vec![FieldInfo { name: "f".to_owned(), bits: 12, ..FieldInfo::default() }],
-        vertices: mesh.positions.len() as u32,
-        tetrahedra: mesh.tets.len() as u32,
-        updates: 0,
-        displacement_per_error: 1.0,
-        quantization: 0.0,
-    };
+    let fields = vec![FieldInfo { name: "f".to_owned(), bits: 12, ..FieldInfo::default() }];
+    let counts = [mesh.positions.len() as u32, mesh.tets.len() as u32, 0];
+    let lattice = Lattice { origin: [0.0; 3], step: [1.0; 3], bits: 11 };
+    let info =
+        MtInfo { lattice, displacement_per_error: 1.0, ..small_info(MtKind::Edge, 11, fields, counts) };
     let values = mesh.positions.iter().map(|_| random.between(0, 4095)).collect();
     EdgeMt::new(info, BaseMesh { positions: mesh.positions.clone(), values, tets: mesh.tets.clone() })
 }
@@ -413,25 +408,7 @@ fn base_only(mesh: &PlainMesh) -> EdgeMt {
 /// The worked example: two tetrahedra, one field of 8 bits, one update.
 #[test]
 fn the_example_is_written_and_read_as_specified() {
-    let field = FieldInfo {
-        name: "p".to_owned(),
-        min: -1.0,
-        max: 126.5,
-        origin: -1.0,
-        step: 0.5,
-        bits: 8,
-        ..FieldInfo::default()
-    };
-    let info = MtInfo {
-        kind: MtKind::Edge,
-        lattice: Lattice { origin: [0.0; 3], step: [0.5; 3], bits: 4 },
-        fields: vec![field],
-        vertices: 6,
-        tetrahedra: 3,
-        updates: 1,
-        displacement_per_error: 2.0,
-        quantization: 0.0,
-    };
+    let info = small_info(MtKind::Edge, 4, vec![field("p", 8)], [6, 3, 1]);
     let base = BaseMesh {
         positions: vec![[0, 0, 4], [8, 0, 4], [0, 8, 4], [2, 2, 12], [2, 2, 0]],
         values: vec![10, 20, 30, 200, 40],

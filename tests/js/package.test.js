@@ -336,8 +336,8 @@ for (const worker of [true, false]) {
     test("options with impossible values are refused by name", async () => {
       const mt = await open(bytes);
       await rejects(mt.refine(/** @type {any} */ ({ eror: 1 })), "bad-option", /`eror`/);
-      await rejects(mt.refine({ error: "lots" }), "bad-option", /`error`/);
-      await rejects(mt.refine({ box: [0, 0, 0] }), "bad-option", /`box`/);
+      await rejects(mt.refine({ error: "lots" }), "bad-option", /`error`.*given: lots/);
+      await rejects(mt.refine({ box: [0, 0, 0] }), "bad-option", /`box`.*given: 0,0,0/);
       await rejects(mt.refine({ field: "no such" }), "bad-option", /no such/);
       await rejects(mt.refine({ maxTets: -1 }), "bad-option", /`maxTets`/);
       await rejects(mt.refine(/** @type {any} */ (7)), "bad-option", /object/);

@@ -61,7 +61,7 @@ fn copies_follow_a_walk_of_requests_and_steps() {
         let mut copy = Copy::default();
         for i in 0_usize..60 {
             let request = &requests()[i * i % 7];
-            session.aim(request).expect("a good request");
+            session.request(request).expect("a good request");
             // Some steps are handed out, some are not, and some requests are replaced on the way.
             for step in 1..12 {
                 let mut updates = i + 3 * step;

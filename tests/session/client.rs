@@ -123,7 +123,7 @@ fn steps_give_valid_meshes_on_the_way() {
     let file = file(MtKind::Edge);
     let (source, _) = Counted::new(&file);
     let mut client = Client::open(source, ClientOptions::default()).expect("a sound file");
-    client.aim(&Request::within(0.0)).expect("a sensible request");
+    client.request(&Request::within(0.0)).expect("a sensible request");
     let mut steps = 0;
     loop {
         let mut left = 200;
@@ -238,7 +238,7 @@ fn without_io_it_is_the_same_machine() {
     let mut whole = Session::new();
     whole.feed(&file).expect("a sound file");
     for request in requests() {
-        remote.aim(&request, &[]).expect("a sensible request");
+        remote.request(&request, &[]).expect("a sensible request");
         let mut step = remote.step(&mut |_| true).expect("a sound file");
         while !step.complete {
             assert!(!step.stats.done || remote.session().is_waiting(), "there is a reason to go on");
@@ -257,7 +257,7 @@ fn without_io_it_is_the_same_machine() {
             (Loader::default(), Remote::in_parts(DecodeOptions::default(), u64::MAX));
         let opened = serve(&mut remote, &mut loader, &file[..end]);
         let found = opened.and_then(|()| {
-            remote.aim(&Request::within(0.0), &[]).expect("a sensible request");
+            remote.request(&Request::within(0.0), &[]).expect("a sensible request");
             remote.step(&mut |_| true).expect("a sound beginning");
             serve(&mut remote, &mut loader, &file[..end])
         });

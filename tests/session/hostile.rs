@@ -1,6 +1,6 @@
 //! Promise: whatever a file with good checksums holds, a session gives valid meshes or typed errors, and ends.
 
-use crate::support::files::{assemble, sections};
+use crate::support::files::{assemble, overwrite, sections};
 use crate::support::requests::requests;
 use crate::support::strategies::config;
 use proptest::prelude::*;
@@ -63,10 +63,7 @@ proptest! {
         let mut sections = sections(bytes);
         let which = which.index(sections.len());
         let payload = &mut sections[which].1;
-        for (place, value) in &changes {
-            let place = place.index(payload.len());
-            payload[place] = *value;
-        }
+        overwrite(payload, &changes);
         exercise(&assemble(&sections, *updates));
     }
 

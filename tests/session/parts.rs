@@ -97,7 +97,7 @@ fn has_the_mesh_of_the_whole_file(kind: MtKind) {
         settle(&mut session, &mut server, random, u64::MAX / 2);
         for _ in 0..12 {
             let request = requests(random);
-            session.aim(&request).expect("a sensible request");
+            session.request(&request).expect("a sensible request");
             assert!(settle(&mut session, &mut server, random, u64::MAX / 2));
             whole.refine(&request).expect("a sensible request");
             assert_eq!(session.hash(), whole.hash(), "{request:?}");
@@ -125,7 +125,7 @@ fn stays_within_the_room(kind: MtKind) {
     let (mut complete, mut left_out) = (0, 0);
     for _ in 0..40 {
         let request = requests(random);
-        session.aim(&request).expect("a sensible request");
+        session.request(&request).expect("a sensible request");
         let satisfied = settle(&mut session, &mut server, random, room);
         let progress = session.block_progress();
         assert!(progress.bytes <= room + 40_000);

@@ -1,6 +1,6 @@
 //! Promise: a session turns bytes into meshes while they arrive, and says what it cannot do.
 
-use crate::support::files::{assemble, sections};
+use crate::support::files::{assemble, sections, small_info};
 use tetralod::format::{EncodeOptions, FormatError, encode};
 use tetralod::geom::{Bounds, Lattice};
 use tetralod::mt::{
@@ -25,16 +25,9 @@ fn field(name: &str) -> FieldInfo {
 /// Two tetrahedra above and below a triangle. The first update splits a corner of the triangle upwards and
 /// downwards, the second, which depends on it, another one.
 fn two_splits(last_mask: u64) -> Result<EdgeMt, UpdateError> {
-    let info = MtInfo {
-        kind: MtKind::Edge,
-        lattice: Lattice { origin: [-1.0; 3], step: [0.5; 3], bits: 6 },
-        fields: vec![field("p"), field("q")],
-        vertices: 7,
-        tetrahedra: 4,
-        updates: 2,
-        displacement_per_error: 1.0,
-        quantization: 0.0,
-    };
+    let lattice = Lattice { origin: [-1.0; 3], step: [0.5; 3], bits: 6 };
+    let small = small_info(MtKind::Edge, 6, vec![field("p"), field("q")], [7, 4, 2]);
+    let info = MtInfo { lattice, displacement_per_error: 1.0, ..small };
     let base = BaseMesh {
         positions: vec![[8, 8, 8], [16, 8, 8], [8, 16, 8], [8, 8, 16], [8, 8, 0]],
         values: [10, 20, 30, 80, 90].into_iter().flat_map(|q| [q, 100 - q]).collect(),

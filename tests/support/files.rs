@@ -82,6 +82,28 @@ fn numbers() -> impl FnMut() -> u64 {
     }
 }
 
+/// The description of a small MT on a lattice with so many bits, with this many vertices, tetrahedra and updates.
+pub fn small_info(kind: MtKind, bits: u32, fields: Vec<FieldInfo>, counts: [u32; 3]) -> MtInfo {
+    let [vertices, tetrahedra, updates] = counts;
+    MtInfo {
+        kind,
+        lattice: Lattice { origin: [0.0; 3], step: [0.5; 3], bits },
+        fields,
+        vertices,
+        tetrahedra,
+        updates,
+        displacement_per_error: 2.0,
+        quantization: 0.0,
+    }
+}
+
+/// Overwrites bytes anywhere in a payload.
+pub fn overwrite(payload: &mut [u8], changes: &[(proptest::sample::Index, u8)]) {
+    for (place, value) in changes {
+        payload[place.index(payload.len())] = *value;
+    }
+}
+
 /// An explicit MT of `tets` separate tetrahedra, each of whose updates puts a vertex into one.
 pub fn insertions(tets: u32, fields: usize, updates: usize) -> ExplicitMt {
     let mut next = numbers();

@@ -88,6 +88,7 @@ fn run(command: &str, folder: &Path) -> String {
 
 /// Writes the files that `page` shows, in blocks such as "```json camera.json".
 fn write_files(page: &str, folder: &Path) {
+    // The first piece is the text before the first block.
     for block in page.split("\n```json ").skip(1) {
         let (name, rest) = block.split_once('\n').expect("a block has lines");
         let (shown, _) = rest.split_once("\n```").expect("a block ends");
@@ -171,6 +172,7 @@ fn anchors(page: &str) -> BTreeSet<String> {
 
 /// The targets of the links and pictures of a page, but those on the web.
 fn links(page: &str) -> Vec<&str> {
+    // The first piece is the text before the first link.
     let targets = page.split("](").skip(1).filter_map(|rest| rest.split_once(')'));
     targets.map(|(target, _)| target).filter(|target| !target.contains("://")).collect()
 }
@@ -215,6 +217,7 @@ fn the_files_that_are_named_to_developers_exist() {
     let files = files();
     for page in ["ARCHITECTURE.md", "CONTRIBUTING.md"] {
         let shown = content(page);
+        // Every second piece stands between two backticks.
         let named = shown.split('`').skip(1).step_by(2).filter(|name| {
             let ending = name.rsplit_once('.').map(|(_, ending)| ending);
             ending.is_some_and(|ending| ["rs", "js", "ts", "wgsl", "md"].contains(&ending))

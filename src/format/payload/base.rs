@@ -113,7 +113,7 @@ fn put_seed(out: &mut impl Put, base: &BaseMesh, growth: &mut Growth, tet: [u32;
     growth.add(tet);
 }
 
-/// Bits that tell the vertices apart.
+/// Bits of the number of a vertex.
 fn width(growth: &Growth) -> u32 {
     u32::BITS - (growth.positions.len() as u32).saturating_sub(1).leading_zeros()
 }
@@ -281,7 +281,7 @@ fn add_vertex(
         return Err(source.corrupt("a vertex of the base mesh is off the lattice"));
     }
     if growth.positions.len() >= vertices as usize {
-        return Err(source.corrupt("the base mesh has more vertices than it tells"));
+        return Err(source.corrupt("the base mesh has more vertices than it says"));
     }
     Ok(growth.add_vertex(position))
 }

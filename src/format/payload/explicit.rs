@@ -1,6 +1,6 @@
 //! Updates of explicit MTs, coded: numbers with a context for each kind of number.
 
-use super::{OWN_FALL, QUARTERINGS, check_bytes, largest, vertex};
+use super::{check_bytes, largest, put_errors, put_quarterings, read_errors, read_quarterings, vertex};
 use crate::format::coder::{Family, Put, Source};
 use crate::format::{FormatError, Limits};
 use crate::mt::{
@@ -20,7 +20,7 @@ const LEVEL: Family = STEP.numbers_after(1, 1);
 const REMOVED: Family = LEVEL.numbers_after(2, 2);
 /// Steps between the corners of inserted tetrahedra.
 const CORNER: Family = REMOVED.numbers_after(4, 4);
-/// All families, with names for what they tell.
+/// All families, with names for what they code.
 pub const PARTS: [(&str, Family); 6] = [
     ("errors", ERROR),
     ("partial order", COUNT),
@@ -51,11 +51,11 @@ pub fn at_hand(mt: &ExplicitMt, removed: &[u32], created: Range<u32>) -> Vec<u32
     vertices
 }
 
-/// The reference mesh must have as many vertices and tetrahedra as the description tells.
+/// The reference mesh must have as many vertices and tetrahedra as the description says.
 pub fn check_reference(mt: &ExplicitMt) -> Result<(), BaseMeshError> {
     let info = mt.info();
     if mt.reference_counts() != [info.vertices, info.tetrahedra] {
-        return Err(BaseMeshError::Info("the reference mesh has another size than the description tells"));
+        return Err(BaseMeshError::Info("the reference mesh has another size than the description says"));
     }
     Ok(())
 }
@@ -65,10 +65,7 @@ pub fn put(out: &mut impl Put, mt: &ExplicitMt, first: u32, end: u32) {
     let mut errors = vec![ErrorCode::MAX; mt.fields()];
     let (mut position, mut levels) = ([0; 3], vec![0; mt.fields()]);
     for u in (first..end).map(UpdateId) {
-        for (before, &error) in errors.iter_mut().zip(mt.errors(u)) {
-            out.number(ERROR, 0, u32::from(before.0.wrapping_sub(error.0)));
-            *before = error;
-        }
+        put_errors(out, ERROR, &mut errors, mt.errors(u));
         let created = mt.created(u);
         out.number(COUNT, 0, created.len() as u32);
         for v in created.map(VertexId) {
@@ -83,13 +80,8 @@ pub fn put(out: &mut impl Put, mt: &ExplicitMt, first: u32, end: u32) {
         }
         put_removed(out, mt, u);
         if mt.quarterings().is_some() {
-            out.symbol(OWN_FALL, 0, u32::from(mt.own_fall(u)));
-            let mut context = 0;
-            for &t in mt.removed(u).iter().rev() {
-                let own = u32::from(mt.quarterings_of(t));
-                out.symbol(QUARTERINGS, context, own);
-                context = 2 * own;
-            }
+            let own = mt.removed(u).iter().rev().map(|&t| (mt.quarterings_of(t), false));
+            put_quarterings(out, mt.own_fall(u), own);
         }
         put_inserted(out, mt, u);
     }
@@ -106,7 +98,7 @@ fn put_removed(out: &mut impl Put, mt: &ExplicitMt, u: UpdateId) {
     }
 }
 
-/// Corners are told by their places among the vertices at hand, which ascend. The first two corners of a tetrahedron
+/// Corners are coded by their places among the vertices at hand, which ascend. The first two corners of a tetrahedron
 /// ascend, too, and are the lowest; so do the tetrahedra.
 fn put_inserted(out: &mut impl Put, mt: &ExplicitMt, u: UpdateId) {
     let range = mt.inserted(u);
@@ -130,7 +122,7 @@ struct Parts {
     removed: Vec<u32>,
     inserted: Vec<[u32; 4]>,
     errors: Vec<ErrorCode>,
-    /// Of what is removed, where it is told.
+    /// Of what is removed, where the file contains them.
     quarterings: Vec<u8>,
     own_fall: u8,
     /// The last vertex of the update before.
@@ -170,11 +162,7 @@ pub fn read(
 impl Parts {
     /// Reads an update. Symbols may take no bits, so what the counts make of it is held within the limits.
     fn read(&mut self, source: &mut Source<'_>, mt: &ExplicitMt, limits: &Limits) -> Result<(), FormatError> {
-        for error in &mut self.errors {
-            let fall = u16::try_from(source.number(ERROR, 0)?);
-            let fall = fall.map_err(|_| source.corrupt("an error is out of its range"))?;
-            error.0 = error.0.wrapping_sub(fall);
-        }
+        read_errors(source, ERROR, &mut self.errors)?;
         let fits = |vertices: u32, removed: u32, inserted: u32| {
             let [vertices, removed, inserted] = [vertices, removed, inserted].map(|count| count as usize);
             check_bytes(mt.bytes() + bytes_of(vertices, mt.fields(), removed, inserted), limits)
@@ -186,7 +174,8 @@ impl Parts {
         fits(created, removed, 0)?;
         self.read_removed(source, removed, mt.tets().len() as u32)?;
         if mt.quarterings().is_some() {
-            self.read_quarterings(source, removed)?;
+            let none_is_home = (0..removed).map(|_| false);
+            self.own_fall = read_quarterings(source, &mut self.quarterings, none_is_home)?;
         }
         let first = mt.vertices();
         let Some(end) = first.checked_add(created) else {
@@ -222,18 +211,6 @@ impl Parts {
             let t = above.checked_sub(1).and_then(|newest| newest.checked_sub(distance));
             above = t.ok_or_else(|| source.corrupt("an update removes a tetrahedron that is not there"))?;
             self.removed.push(above);
-        }
-        Ok(())
-    }
-
-    fn read_quarterings(&mut self, source: &mut Source<'_>, count: u32) -> Result<(), FormatError> {
-        self.own_fall = source.symbol(OWN_FALL, 0)? as u8;
-        self.quarterings.clear();
-        let mut context = 0;
-        for _ in 0..count {
-            let own = source.symbol(QUARTERINGS, context)?;
-            self.quarterings.push(own as u8);
-            context = 2 * own;
         }
         Ok(())
     }

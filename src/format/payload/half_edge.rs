@@ -1,7 +1,7 @@
 //! `HALF` of a half-edge MT: a block of vertex insertions, without what they do to fields.
 //!
-//! Nothing here needs a mesh, or another block. The vertex forest is told from the near vertex down: each update lists the
-//! updates whose near vertex is its own. What removes the tetrahedra of its star is told as residuals: see
+//! Nothing here needs a mesh, or another block. The vertex forest is coded from the near vertex down: each update lists the
+//! updates whose near vertex is its own. What removes the tetrahedra of its star is coded as residuals: see
 //! `mt/half_edge_star.rs`.
 
 use super::edge::FieldPart;
@@ -42,10 +42,10 @@ pub const ERROR: Family = BIT.after(16, 256);
 /// Residuals of levels, by error.
 pub const LEVEL: Family = ERROR.numbers_after(128, 1);
 
-/// Lengths of offsets in bits that are told apart; what is longer is as long as the last.
+/// Lengths of offsets in bits that have contexts of their own; longer ones use the last.
 const LENGTHS: u32 = 22;
 
-/// All families, with names for what they tell.
+/// All families, with names for what they code.
 pub const PARTS: [(&str, Family); 13] = [
     ("base mesh", REMOVER),
     ("base mesh", BASE_INNER),
@@ -93,7 +93,7 @@ pub fn check_counts(info: &MtInfo, base_vertices: u64) -> Result<(), BaseMeshErr
     Ok(())
 }
 
-/// Where forest children are told relative to: the blocks named so far, the last first, each with the last child in it.
+/// What forest children are coded relative to: the blocks named so far, the last first, each with the last child in it.
 #[derive(Default)]
 struct Named {
     blocks: Vec<(u32, u32)>,

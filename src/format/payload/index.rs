@@ -8,7 +8,7 @@ use std::ops::Range;
 /// Most blocks that a block may depend on directly, so that an index is not larger than its file.
 const MAX_PARENTS: u32 = 1 << 20;
 
-/// What the index of a file tells of one block of updates.
+/// What the index of a file says of one block of updates.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct BlockInfo {
     /// Bytes of its sections, heads included: what all fields share, then field by field.
@@ -58,7 +58,7 @@ impl Index {
         first.min(end) as u32..(first + (1 << self.block_bits)).min(end) as u32
     }
 
-    /// Widens what is told of the blocks to what the file can say.
+    /// Widens the numbers of the blocks to those that the file can hold.
     pub fn round(&mut self, info: &MtInfo) {
         let (space, levels) = (shift(info.lattice.bits), info.fields.iter().map(|field| shift(field.bits)));
         let levels: Vec<u32> = levels.collect();
@@ -133,7 +133,7 @@ impl Index {
 pub const MIN_BLOCK_BITS: u32 = 4;
 pub const MAX_BLOCK_BITS: u32 = 16;
 
-/// The index tells places on a lattice of so many bits to eight.
+/// Places in the index are on a lattice of eight bits.
 fn shift(bits: u32) -> u32 {
     bits.saturating_sub(8)
 }

@@ -187,7 +187,7 @@ pub fn families(kind: MtKind) -> Vec<Family> {
     parts(kind).into_iter().map(|(_, family)| family).collect()
 }
 
-/// The same, with a name for what each tells.
+/// The same, with a name for what each codes.
 pub fn parts(kind: MtKind) -> Vec<(&'static str, Family)> {
     let base = base::FAMILIES.into_iter().map(|family| ("base mesh", family));
     let own: &[(&str, Family)] = match kind {
@@ -246,9 +246,9 @@ pub fn write_base_head(out: &mut Vec<u8>, mt: &Mt) {
 #[derive(Debug, Default)]
 pub struct BaseParts {
     base: BaseMesh,
-    /// What files of vertex-based MTs tell besides.
-    vertex: vertex::Head,
-    /// What files of half-edge MTs tell besides.
+    /// What files of vertex-based MTs contain besides.
+    vertex: vertex::InsertionRules,
+    /// What files of half-edge MTs contain besides.
     half_edge: half_edge::BaseHead,
     levels: Vec<Vec<i32>>,
 }
@@ -257,7 +257,7 @@ pub struct BaseParts {
 /// bytes could claim what fills all memory that is allowed.
 const MOST_IN_A_BYTE: u64 = 4096;
 
-/// Whether the bytes of a base mesh can tell so much.
+/// Whether a base mesh of so many bytes can be so large.
 pub fn is_backed([vertices, tets]: [u64; 2], bytes: usize) -> bool {
     vertices + tets <= MOST_IN_A_BYTE * (bytes as u64 + 1)
 }
@@ -276,7 +276,7 @@ pub fn read_base(
     let counts = [vertices, tets].map(u64::from);
     check_memory(info, counts, updates, limits)?;
     if !is_backed(counts, reader.len()) {
-        return Err(reader.corrupt("the base mesh claims more than its bytes can tell"));
+        return Err(reader.corrupt("the base mesh is larger than its bytes can code"));
     }
     let mut source = Source::new(reader, models)?;
     let mut parts = BaseParts { base: base::read(&mut source, vertices, tets)?, ..BaseParts::default() };
@@ -348,7 +348,7 @@ pub fn check_counts(info: &MtInfo, base_vertices: u64) -> Result<(), BaseMeshErr
         MtKind::Edge => edge::check_counts(info, base_vertices),
         MtKind::Vertex => vertex::check_counts(info, base_vertices),
         MtKind::HalfEdge => half_edge::check_counts(info, base_vertices),
-        // How many vertices and tetrahedra there are, every update tells; they are compared at the end.
+        // Vertices and tetrahedra are counted update by update, and compared at the end.
         MtKind::Explicit => Ok(()),
     }
 }
@@ -526,12 +526,55 @@ pub fn read_updates(
     }
 }
 
-/// Whether a complete MT has the reference mesh that its description tells, as far as that follows without a mesh.
+/// Whether the reference mesh of a complete MT is that of its description, as far as that follows without a mesh.
 pub fn check_reference(mt: &Mt) -> Result<(), BaseMeshError> {
     match mt {
         Mt::Edge(_) | Mt::Vertex(_) | Mt::HalfEdge(_) => Ok(()),
         Mt::Explicit(mt) => explicit::check_reference(mt),
     }
+}
+
+/// Puts by how many codes each error of an update is below that of the update before.
+fn put_errors(out: &mut impl Put, family: Family, before: &mut [ErrorCode], errors: &[ErrorCode]) {
+    for (before, &error) in before.iter_mut().zip(errors) {
+        out.number(family, 0, u32::from(before.0.wrapping_sub(error.0)));
+        *before = error;
+    }
+}
+
+/// Turns the errors of the update before into those of the next one.
+fn read_errors(source: &mut Source<'_>, family: Family, errors: &mut [ErrorCode]) -> Result<(), FormatError> {
+    for error in errors {
+        let fall = u16::try_from(source.number(family, 0)?);
+        let fall = fall.map_err(|_| source.corrupt("an error is out of its range"))?;
+        error.0 = error.0.wrapping_sub(fall);
+    }
+    Ok(())
+}
+
+/// Puts the own errors of what an update removes: of each tetrahedron its quarterings, and whether it has the new vertex.
+fn put_quarterings(out: &mut impl Put, own_fall: u8, removed: impl Iterator<Item = (u8, bool)>) {
+    out.symbol(OWN_FALL, 0, u32::from(own_fall));
+    let mut before = 0;
+    for (own, is_home) in removed {
+        out.symbol(QUARTERINGS, 2 * before + u32::from(is_home), u32::from(own));
+        before = u32::from(own);
+    }
+}
+
+/// Reads them, of as many tetrahedra as there are in `are_home`; returns the fall of the own errors.
+fn read_quarterings(
+    source: &mut Source<'_>,
+    quarterings: &mut Vec<u8>,
+    are_home: impl Iterator<Item = bool>,
+) -> Result<u8, FormatError> {
+    let own_fall = source.symbol(OWN_FALL, 0)? as u8;
+    quarterings.clear();
+    for is_home in are_home {
+        let before = quarterings.last().map_or(0, |&before| u32::from(before));
+        quarterings.push(source.symbol(QUARTERINGS, 2 * before + u32::from(is_home))? as u8);
+    }
+    Ok(own_fall)
 }
 
 /// The largest error of an update.

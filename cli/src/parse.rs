@@ -1,0 +1,117 @@
+//! Numbers on the command line: alone, in lists, with a percent sign or a unit.
+
+use std::str::FromStr;
+use tetralod::geom::Bounds;
+
+/// An error in units of a field, or as a fraction of its range.
+#[derive(Clone, Copy, Debug)]
+pub enum Tolerance {
+    Absolute(f64),
+    Relative(f64),
+}
+
+impl FromStr for Tolerance {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (number, relative) = percentage(text)?;
+        if number < 0.0 {
+            return Err("an error is not negative".to_owned());
+        }
+        Ok(if relative { Self::Relative(number / 100.0) } else { Self::Absolute(number) })
+    }
+}
+
+impl Tolerance {
+    /// As a fraction of the field's range.
+    pub fn relative(self, range: f64) -> f64 {
+        match self {
+            Self::Absolute(error) => error / range,
+            Self::Relative(error) => error,
+        }
+    }
+}
+
+/// A number, and whether % stands behind it.
+fn percentage(text: &str) -> Result<(f64, bool), String> {
+    match text.trim().strip_suffix('%') {
+        Some(number) => Ok((parse_number(number)?, true)),
+        None => Ok((parse_number(text)?, false)),
+    }
+}
+
+/// A whole number that is not negative.
+pub fn parse_count<T: FromStr>(text: &str) -> Result<T, String> {
+    text.trim().parse().map_err(|_| format!("'{text}' is not a whole number of at least 0, or too large"))
+}
+
+/// A finite number.
+pub fn parse_number(text: &str) -> Result<f64, String> {
+    let number: f64 = text.trim().parse().map_err(|_| format!("'{text}' is not a number"))?;
+    if number.is_finite() { Ok(number) } else { Err(format!("'{text}' is not finite")) }
+}
+
+/// Finite numbers between commas.
+pub fn parse_list(text: &str) -> Result<Vec<f64>, String> {
+    text.split(',').map(parse_number).collect()
+}
+
+/// `N` finite numbers between commas; `what` has so many.
+pub fn parse_numbers<const N: usize>(text: &str, what: &str) -> Result<[f64; N], String> {
+    let numbers = parse_list(text)?;
+    let found = numbers.len();
+    numbers.try_into().map_err(|_| format!("{what} has {N} numbers, not {found}"))
+}
+
+/// A box by its smaller and its larger corner.
+pub fn parse_bounds(text: &str) -> Result<Bounds, String> {
+    let [x0, y0, z0, x1, y1, z1] = parse_numbers(text, "a box")?;
+    if x0 > x1 || y0 > y1 || z0 > z1 {
+        return Err("a box has its smaller corner first".to_owned());
+    }
+    Ok(Bounds { min: [x0, y0, z0], max: [x1, y1, z1] })
+}
+
+/// A number that is not negative.
+pub fn parse_size(text: &str) -> Result<f64, String> {
+    let number = parse_number(text)?;
+    if number >= 0.0 { Ok(number) } else { Err(format!("'{text}' is negative")) }
+}
+
+/// A part of 1, or a percentage.
+pub fn parse_share(text: &str) -> Result<f64, String> {
+    let (number, percent) = percentage(text)?;
+    let share = if percent { number / 100.0 } else { number };
+    if share >= 0.0 { Ok(share) } else { Err(format!("'{text}' is negative")) }
+}
+
+/// A number of bytes; K, M and G stand for powers of 1024.
+pub fn parse_bytes(text: &str) -> Result<u64, String> {
+    let text = text.trim();
+    let digits = text.trim_end_matches(|c: char| !c.is_ascii_digit() && c != '.');
+    let shift = match text[digits.len()..].trim() {
+        "" | "B" => 0,
+        "K" | "k" | "KiB" => 10,
+        "M" | "MiB" => 20,
+        "G" | "GiB" => 30,
+        unit => return Err(format!("'{unit}' is no unit of bytes; there are K, M and G")),
+    };
+    let number = parse_size(digits)? * f64::from(1_u32 << shift);
+    // The largest number of bytes that a float still counts one by one.
+    if number <= (1_u64 << 53) as f64 { Ok(number as u64) } else { Err(format!("'{text}' is too much")) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_have_units() {
+        let read = |text: &str| parse_bytes(text).ok();
+        assert_eq!(
+            ["17", "2K", "1.5M", "3 G", "1MiB"].map(read),
+            [Some(17), Some(2048), Some(3 << 19), Some(3 << 30), Some(1 << 20)]
+        );
+        assert_eq!(["", "K", "1T", "-1", "1e300G", "1 2"].map(read), [None; 6]);
+    }
+}

@@ -1,0 +1,159 @@
+//! Blocks and exact values that come by themselves: where they are in the file, and how their bytes are taken.
+
+use super::Decoder;
+use crate::format::header::{END_BYTES, HEAD_BYTES, Kind, SectionHead};
+use crate::format::read::Reader;
+use crate::format::{BlockInfo, FormatError, payload};
+use crate::mt::{PageError, UpdatePages};
+use std::ops::Range;
+
+/// A whole section, its checksum verified, and the bytes behind it.
+struct Section<'a> {
+    kind: Kind,
+    content: Reader<'a>,
+    behind: &'a [u8],
+}
+
+/// The section at the start of `bytes`, which are at `offset` in the file; `short` is the error if there are too few of them.
+fn section(bytes: &[u8], offset: u64, short: impl Fn() -> FormatError) -> Result<Section<'_>, FormatError> {
+    let (head, behind) = bytes.split_first_chunk::<HEAD_BYTES>().ok_or_else(&short)?;
+    let head = SectionHead::parse(head);
+    let (payload, behind) = behind.split_at_checked(head.length as usize).ok_or_else(&short)?;
+    if SectionHead::new(head.kind, payload).crc != head.crc {
+        return Err(FormatError::Corrupt { offset, what: "the checksum of a section does not match" });
+    }
+    Ok(Section { kind: head.kind, content: Reader::new(payload, offset + HEAD_BYTES as u64), behind })
+}
+
+impl Decoder {
+    /// The bytes of the file that hold a block with the wanted fields, in ranges that do not touch; empty if there is no such
+    /// block.
+    pub fn block_ranges(&self, block: u32) -> Vec<Range<u64>> {
+        let mut ranges: Vec<Range<u64>> = Vec::new();
+        let Some(index) = &self.head.index else { return ranges };
+        let Some(info) = index.blocks.get(block as usize) else { return ranges };
+        let before: u64 = index.blocks[..block as usize].iter().map(BlockInfo::len).sum();
+        let Some(mut at) = self.head_end().and_then(|end| end.checked_add(before)) else { return ranges };
+        for (part, &length) in info.lengths.iter().enumerate() {
+            let Some(end) = at.checked_add(u64::from(length)) else { return Vec::new() };
+            if part == 0 || self.head.place(part - 1).is_some() {
+                match ranges.last_mut() {
+                    Some(last) if last.end == at => last.end = end,
+                    _ => ranges.push(at..end),
+                }
+            }
+            at = end;
+        }
+        ranges
+    }
+
+    /// Where the blocks begin in the file, or a byte behind where less is known; none before the index is there.
+    pub fn head_end(&self) -> Option<u64> {
+        let index = self.head.index.as_ref()?;
+        self.head.index_end.checked_add(index.shared)
+    }
+
+    /// The bytes of the file behind the blocks, where exact values are; none if there are none, or that is not known yet.
+    pub fn exact_range(&self) -> Option<Range<u64>> {
+        let index = self.head.index.as_ref()?;
+        let blocks = index.blocks.iter().try_fold(0_u64, |sum, block| sum.checked_add(block.len()))?;
+        let start = self.head_end()?.checked_add(blocks)?;
+        let end = self.total?.checked_sub(END_BYTES as u64)?;
+        (start < end).then_some(start..end)
+    }
+
+    /// Takes in the bytes of [`Decoder::exact_range`] where blocks come by themselves; once is enough.
+    ///
+    /// # Errors
+    /// When the bytes are damaged, or all that comes in front of the blocks is not there yet; nothing has changed then.
+    pub fn take_exact(&mut self, bytes: &[u8]) -> Result<(), FormatError> {
+        let Some(range) = self.exact_range().filter(|_| self.takes_blocks()) else {
+            return Err(self.corrupt("there are no exact values, or not yet"));
+        };
+        let before = std::mem::take(&mut self.exact);
+        let taken = self.read_exact_sections(bytes, range.start);
+        if taken.is_err() {
+            self.exact = before;
+        }
+        taken
+    }
+
+    fn read_exact_sections(&mut self, bytes: &[u8], start: u64) -> Result<(), FormatError> {
+        let mut rest = bytes;
+        while !rest.is_empty() {
+            let offset = start + (bytes.len() - rest.len()) as u64;
+            let corrupt = |what| FormatError::Corrupt { offset, what };
+            let short = || corrupt("the bytes behind the blocks do not end with a section");
+            let Section { kind, content, behind } = section(rest, offset, short)?;
+            match kind {
+                Kind::EXACT => self.open_exact(content)?,
+                kind if kind.is_skippable() && !kind.is_known() => {}
+                _ => return Err(corrupt("a section is out of place")),
+            }
+            rest = behind;
+        }
+        Ok(())
+    }
+
+    /// The block of which a range of [`Decoder::block_ranges`] begins at this byte of the file.
+    pub fn block_at(&self, start: u64) -> Option<u32> {
+        let index = self.head.index.as_ref()?;
+        let behind = start.checked_sub(self.head_end()?)?;
+        let mut end = 0_u64;
+        let block = index.blocks.iter().position(|block| {
+            end = end.saturating_add(block.len());
+            behind < end
+        })?;
+        let block = block as u32;
+        self.block_ranges(block).iter().any(|range| range.start == start).then_some(block)
+    }
+
+    /// Takes in a whole block of a half-edge or edge-based MT: the bytes of [`Decoder::block_ranges`], one after the other. In
+    /// edge-based MTs the blocks on which it depends must be there. Afterwards no more bytes can be fed in the order of the file.
+    ///
+    /// # Errors
+    /// When the bytes are damaged, or the block cannot be taken now; nothing has changed then.
+    pub fn take_block(&mut self, block: u32, bytes: &[u8]) -> Result<(), FormatError> {
+        let offset = self.block_ranges(block).first().map_or(0, |range| range.start);
+        let corrupt = |what| FormatError::Corrupt { offset, what };
+        let info = self.head.info.as_ref().filter(|info| info.kind.is_paged());
+        let (Some(_), Some(info)) = (&self.mt, info) else {
+            return Err(corrupt("there is no base mesh that blocks could be added to one by one"));
+        };
+        let short = || corrupt("a block is shorter than the index says");
+        let (fields, kinds) = (info.fields.len(), [payload::section_of(info.kind), Kind::FLDU]);
+        let mut open = None;
+        let mut rest = bytes;
+        for part in (0..=fields).filter(|&part| part == 0 || self.head.place(part - 1).is_some()) {
+            let at = offset + (bytes.len() - rest.len()) as u64;
+            let Section { kind, content, behind } = section(rest, at, short)?;
+            if kind != kinds[usize::from(part > 0)] {
+                return Err(FormatError::Corrupt { offset: at, what: "a section is out of place" });
+            }
+            if part == 0 {
+                open = Some(self.read_shared(content, Some(block))?);
+            } else if let Some(open) = &mut open {
+                self.head.read_field(open, content, Some(part - 1))?;
+            }
+            rest = behind;
+        }
+        if !rest.is_empty() {
+            return Err(corrupt("a block is longer than the index says"));
+        }
+        match open {
+            Some(open) => self.insert(open),
+            None => Err(short()),
+        }
+    }
+
+    /// Takes the updates of a block away, none of which may be applied to a mesh.
+    ///
+    /// # Errors
+    /// If the block is not there, or another one depends on it.
+    pub fn drop_block(&mut self, block: u32) -> Result<(), PageError> {
+        let Some(mt) = &mut self.mt else { return Err(PageError::Absent { page: block }) };
+        mt.remove_page(block)?;
+        mt.set_to_come(self.head.largest_of_others(mt));
+        Ok(())
+    }
+}

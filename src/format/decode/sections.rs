@@ -1,0 +1,326 @@
+//! Whole, verified sections of each kind, and what they add to the MT.
+
+use super::{Decoder, Stage};
+use crate::format::coder::{Models, Source};
+use crate::format::header::{HEAD_BYTES, Kind, SectionHead, Start, VERSION_AT, version_for};
+use crate::format::payload::edge::FieldPart;
+use crate::format::payload::exact::Corrections;
+use crate::format::payload::{BaseParts, Shared};
+use crate::format::read::Reader;
+use crate::format::{BlockInfo, FormatError, Index, payload};
+use crate::mt::{ErrorCode, Mt, MtInfo, MultiTessellation, UpdatePages};
+use std::ops::Range;
+
+/// What comes in front of the blocks.
+#[derive(Debug, Default)]
+pub(super) struct FileHead {
+    /// With all fields of the file.
+    pub(super) info: Option<MtInfo>,
+    /// Which of them are wanted.
+    pub(super) wanted: Vec<usize>,
+    pub(super) index: Option<Index>,
+    /// Where the index ends in the file.
+    pub(super) index_end: u64,
+    pub(super) models: Option<Models>,
+    /// Until all wanted fields are there; then it is in the MT.
+    pub(super) base: Option<BaseParts>,
+    /// How many fields' levels of the base mesh have been seen.
+    pub(super) base_fields: usize,
+    pub(super) start: Start,
+}
+
+impl FileHead {
+    /// The description of the MT with the fields that are wanted.
+    pub(super) fn wanted_info(&self) -> Option<MtInfo> {
+        let info = self.info.as_ref()?;
+        let fields = self.wanted.iter().filter_map(|&f| info.fields.get(f).cloned()).collect();
+        Some(MtInfo { fields, ..info.clone() })
+    }
+
+    /// The place among the wanted fields of a field of the file.
+    pub(super) fn place(&self, field: usize) -> Option<usize> {
+        self.wanted.iter().position(|&wanted| wanted == field)
+    }
+
+    pub(super) fn fields(&self) -> usize {
+        self.info.as_ref().map_or(0, |info| info.fields.len())
+    }
+
+    /// Reads the next field of a block.
+    pub(super) fn read_field(
+        &self,
+        open: &mut OpenBlock,
+        mut content: Reader<'_>,
+        expected: Option<usize>,
+    ) -> Result<(), FormatError> {
+        let [block, field] = [content.varint()?, content.varint()?];
+        let expected = expected.unwrap_or(open.seen);
+        if block != open.block || field as usize != expected {
+            return Err(content.corrupt("a field of a block is missing or repeated"));
+        }
+        open.seen = expected + 1;
+        let (Some(place), Some(models)) = (self.place(expected), &self.models) else { return Ok(()) };
+        let mut source = Source::new(content, models)?;
+        open.fields[place] = Some(open.shared.read_field(&mut source, open.updates.len() as u32)?);
+        source.end()
+    }
+
+    /// The largest error that an update can have which is not in the MT.
+    pub(super) fn largest_of_others(&self, mt: &Mt) -> ErrorCode {
+        let Some(index) = &self.index else { return ErrorCode::MAX };
+        let absent = (0..).zip(&index.blocks).filter(|(page, _)| !mt.has_page(*page));
+        let errors = absent.flat_map(|(_, block)| self.wanted.iter().map(|&field| block.errors[field]));
+        errors.max().unwrap_or(ErrorCode::ZERO)
+    }
+}
+
+/// A block of which not all has arrived.
+#[derive(Debug)]
+pub(super) struct OpenBlock {
+    pub(super) block: u32,
+    pub(super) updates: Range<u32>,
+    pub(super) shared: Shared,
+    /// How many fields have been seen.
+    pub(super) seen: usize,
+    /// The wanted ones of them.
+    pub(super) fields: Vec<Option<FieldPart>>,
+}
+
+impl Decoder {
+    /// Uses a whole, verified section.
+    pub(super) fn open(&mut self, head: SectionHead, content: Reader<'_>) -> Result<(), FormatError> {
+        match head.kind {
+            Kind::INFO => self.open_info(content)?,
+            Kind::INDX => self.open_index(content)?,
+            Kind::MODL => self.open_models(content)?,
+            Kind::BASE => self.open_base(content)?,
+            Kind::FLDB => self.open_base_field(content)?,
+            Kind::UPDT | Kind::HALF if self.block.is_none() => {
+                let expected = self.head.info.as_ref().map(|info| payload::section_of(info.kind));
+                if expected != Some(head.kind) {
+                    return Err(content.out_of_place());
+                }
+                let open = self.read_shared(content, None)?;
+                self.next_block += 1;
+                self.block = Some(open);
+            }
+            Kind::FLDU => self.open_field(content)?,
+            Kind::INSV | Kind::EXPL => self.open_columns(head.kind, content)?,
+            Kind::EXACT if self.mt.is_some() && self.block.is_none() => self.open_exact(content)?,
+            Kind::ENDF if self.mt.is_some() && self.block.is_none() => return self.end(content),
+            kind if kind.is_known() => return Err(content.out_of_place()),
+            kind if kind.is_skippable() => {}
+            _ => {
+                let offset = self.bytes - u64::from(head.length) - HEAD_BYTES as u64;
+                let what = "a kind of section that this reader does not know";
+                return Err(FormatError::UnsupportedFeature { offset, what });
+            }
+        }
+        self.chain.update(&head.crc.to_le_bytes());
+        self.sections = self.sections.wrapping_add(1);
+        Ok(())
+    }
+
+    pub(super) fn open_info(&mut self, content: Reader<'_>) -> Result<(), FormatError> {
+        if self.head.info.is_some() {
+            return Err(content.out_of_place());
+        }
+        let offset = self.bytes;
+        let (info, metadata) = payload::read_info(content)?;
+        if self.head.start.version[0] < version_for(info.kind)[0] {
+            let what = "the version of the file does not go with the kind of MT in it";
+            return Err(FormatError::Corrupt { offset: VERSION_AT, what });
+        }
+        if self.head.start.tet_errors && info.kind.is_paged() {
+            let what = "errors of tetrahedra in an MT that comes in pages";
+            return Err(FormatError::UnsupportedFeature { offset, what });
+        }
+        let names = &self.options.fields;
+        if let Some(name) = names.iter().find(|name| !info.fields.iter().any(|field| field.name == **name)) {
+            let known = info.fields.iter().map(|field| field.name.clone()).collect();
+            return Err(FormatError::Field { name: name.clone(), known });
+        }
+        let all = names.is_empty() || !info.kind.is_paged();
+        let is_wanted = |f: &usize| all || names.contains(&info.fields[*f].name);
+        self.head.wanted = (0..info.fields.len()).filter(is_wanted).collect();
+        if !self.options.in_parts {
+            // Refuse at once what cannot fit, not after half of it has been fetched.
+            payload::check_memory(&info, [0; 2], info.updates, &self.options.limits)?;
+        }
+        self.head.info = Some(info);
+        self.metadata = metadata;
+        Ok(())
+    }
+
+    pub(super) fn open_index(&mut self, content: Reader<'_>) -> Result<(), FormatError> {
+        let FileHead { info: Some(info), index: index @ None, .. } = &mut self.head else {
+            return Err(content.out_of_place());
+        };
+        let parts = if info.kind.is_paged() { 1 + info.fields.len() } else { 1 };
+        *index = Some(Index::read(content, info, parts)?);
+        self.head.index_end = self.bytes;
+        Ok(())
+    }
+
+    pub(super) fn open_models(&mut self, content: Reader<'_>) -> Result<(), FormatError> {
+        let FileHead { info: Some(info), index: Some(_), models: models @ None, .. } = &mut self.head else {
+            return Err(content.out_of_place());
+        };
+        *models = Some(Models::read(content, &payload::families(info.kind))?);
+        Ok(())
+    }
+
+    pub(super) fn open_base(&mut self, content: Reader<'_>) -> Result<(), FormatError> {
+        let in_place = self.head.base_fields == 0 && self.mt.is_none();
+        let bits = self.head.index.as_ref().map_or(0, |index| index.block_bits);
+        let (FileHead { info: Some(info), models: Some(models), base: base @ None, .. }, true) =
+            (&mut self.head, in_place)
+        else {
+            return Err(content.out_of_place());
+        };
+        let updates = if self.options.in_parts { 0 } else { info.updates };
+        *base = Some(payload::read_base(content, info, models, updates, bits, &self.options.limits)?);
+        Ok(())
+    }
+
+    pub(super) fn open_base_field(&mut self, mut content: Reader<'_>) -> Result<(), FormatError> {
+        let field = self.head.base_fields;
+        let had_base = self.head.base.is_some() || self.mt.is_some();
+        if !had_base || field >= self.head.fields() || content.varint()? as usize != field {
+            return Err(content.out_of_place());
+        }
+        self.head.base_fields += 1;
+        let is_wanted = self.head.place(field).is_some();
+        if let (true, FileHead { base: Some(base), models: Some(models), .. }) = (is_wanted, &mut self.head) {
+            base.read_field(content, models)?;
+        }
+        if self.head.base.as_ref().is_some_and(|base| base.fields() == self.head.wanted.len()) {
+            let bits = self.head.index.as_ref().map_or(0, |index| index.block_bits);
+            if let (Some(base), Some(info)) = (self.head.base.take(), self.head.wanted_info()) {
+                let (mut mt, state) = base.start(info, bits, self.head.start.tet_errors)?;
+                if let (Mt::HalfEdge(mt), Some(index)) = (&mut mt, &self.head.index) {
+                    let wanted = &self.head.wanted;
+                    let of_block =
+                        |block: &BlockInfo| wanted.iter().map(|&f| block.errors[f]).collect::<Vec<_>>();
+                    mt.set_page_bounds(index.blocks.iter().flat_map(of_block).collect());
+                }
+                (self.mt, self.state) = (Some(mt), state);
+            }
+        }
+        Ok(())
+    }
+
+    /// The updates of a block that comes next, or of the one that is expected.
+    pub(super) fn next_updates(
+        &self,
+        content: &mut Reader<'_>,
+        expected: Option<u32>,
+    ) -> Result<(u32, Range<u32>), FormatError> {
+        let (Some(index), Some(info)) = (&self.head.index, &self.head.info) else {
+            return Err(content.out_of_place());
+        };
+        let in_place = self.mt.is_some() && self.head.base_fields == info.fields.len();
+        let block = content.varint()?;
+        if !in_place && expected.is_none() || block != expected.unwrap_or(self.next_block) {
+            return Err(content.corrupt("a block of updates is missing or repeated"));
+        }
+        let updates = index.updates(block, info.updates);
+        if updates.is_empty() {
+            return Err(content.corrupt("there are more updates than the description says"));
+        }
+        Ok((block, updates))
+    }
+
+    pub(super) fn read_shared(
+        &self,
+        mut content: Reader<'_>,
+        expected: Option<u32>,
+    ) -> Result<OpenBlock, FormatError> {
+        let (block, updates) = self.next_updates(&mut content, expected)?;
+        let (Some(mt), Some(models)) = (&self.mt, &self.head.models) else {
+            return Err(content.out_of_place());
+        };
+        let mut source = Source::new(content, models)?;
+        let shared = Shared::read(&mut source, mt, updates.clone(), &self.options.limits)?;
+        source.end()?;
+        let fields = self.head.wanted.iter().map(|_| None).collect();
+        Ok(OpenBlock { block, updates, shared, seen: 0, fields })
+    }
+
+    pub(super) fn open_field(&mut self, content: Reader<'_>) -> Result<(), FormatError> {
+        let Some(mut open) = self.block.take() else {
+            return Err(content.out_of_place());
+        };
+        self.head.read_field(&mut open, content, None)?;
+        if open.seen < self.head.fields() {
+            self.block = Some(open);
+            return Ok(());
+        }
+        self.insert(open)
+    }
+
+    /// Adds a block that is complete.
+    pub(super) fn insert(&mut self, open: OpenBlock) -> Result<(), FormatError> {
+        let OpenBlock { block, shared, fields, .. } = open;
+        let fields: Vec<FieldPart> = fields.into_iter().flatten().collect();
+        let Some(mt) = &mut self.mt else { return Ok(()) };
+        shared.check_memory(mt, &self.options.limits)?;
+        shared.insert(mt, block, &fields)?;
+        mt.set_to_come(self.head.largest_of_others(mt));
+        Ok(())
+    }
+
+    pub(super) fn open_exact(&mut self, mut content: Reader<'_>) -> Result<(), FormatError> {
+        let (field, precision, count) = (content.varint()? as usize, content.varint()?, content.varint()?);
+        let (FileHead { info: Some(info), models: Some(models), .. }, 0 | 1) = (&self.head, precision) else {
+            return Err(content.out_of_place());
+        };
+        let is_new = self.exact.iter().all(|(known, _)| *known < field);
+        if field >= info.fields.len() || !is_new || count > info.vertices {
+            return Err(content.corrupt("exact values are not those of a field"));
+        }
+        if self.head.place(field).is_some() {
+            let mut source = Source::new(content, models)?;
+            let corrections = Corrections::read(&mut source, precision == 0, count)?;
+            source.end()?;
+            self.exact.push((field, corrections));
+        }
+        Ok(())
+    }
+
+    pub(super) fn open_columns(&mut self, kind: Kind, mut content: Reader<'_>) -> Result<(), FormatError> {
+        let (_, updates) = self.next_updates(&mut content, None)?;
+        match &mut self.mt {
+            Some(mt) if kind == payload::section_of(mt.info().kind) => {
+                self.next_block += 1;
+                let Some(models) = &self.head.models else { return Ok(()) };
+                let mut source = Source::new(content, models)?;
+                let count = updates.len() as u32;
+                payload::read_updates(&mut source, mt, count, self.state.as_mut(), &self.options.limits)?;
+                source.end()
+            }
+            _ => Err(content.out_of_place()),
+        }
+    }
+
+    pub(super) fn end(&mut self, content: Reader<'_>) -> Result<(), FormatError> {
+        let totals = payload::read_end(content)?;
+        let updates = self.mt.as_ref().map_or(0, Mt::present);
+        let expected = self.info().map_or(0, |info| info.updates);
+        if totals.updates != updates || updates != expected {
+            return Err(self.corrupt("updates are missing"));
+        }
+        if let Some(mt) = &self.mt {
+            payload::check_reference(mt)?;
+        }
+        if totals.sections != self.sections || totals.crc != self.chain.clone().finalize() {
+            return Err(self.corrupt("sections are missing or repeated"));
+        }
+        if self.total.is_some_and(|total| total != self.bytes) {
+            return Err(self.corrupt("the file is shorter than its header says"));
+        }
+        self.stage = Stage::End;
+        self.state = None;
+        Ok(())
+    }
+}

@@ -1,0 +1,253 @@
+//! Vertex insertions, coded as residuals against predictions from the mesh to which they are applied.
+//!
+//! Writer and reader apply every update to a mesh of their own. An insertion is coded by a vertex near it, its offset from
+//! there, and which tetrahedra it removes: these are reached face by face, starting from the one that the new vertex lies
+//! in. Parents, the star of the new vertex, and how `u−` builds again what was removed follow from that.
+
+mod cavity;
+mod numbers;
+mod state;
+#[cfg(test)]
+pub(super) mod tests;
+
+use super::{base, check_bytes, largest, put_errors, put_quarterings, read_errors, read_quarterings};
+use crate::format::coder::{Family, Put, Source};
+use crate::format::{FormatError, Limits};
+use crate::mt::{
+    Applied, ApplyUpdates, BaseMesh, BaseMeshError, Insertion, MtInfo, MultiTessellation, UpdateError,
+    UpdateId, UpdatePages, VertexMt,
+};
+use numbers::{put_levels, put_one_of, put_position, read_levels, read_one_of, read_position};
+pub use state::State;
+
+/// By how many codes an error is below the one before.
+const ERROR: Family = base::LAST.numbers_after(1, 2);
+/// Whether all that is removed has the near vertex.
+const FAN: Family = ERROR.after(1, 2);
+/// How a coordinate differs from that of the near vertex: bits of the difference relative to those predicted.
+const OFFSET: Family = FAN.after(4, 112);
+/// Which of the tetrahedra that the new vertex lies in, as seen from the near one, is the first that is removed.
+const SEED: Family = OFFSET.after(1, 9);
+/// Whether a tetrahedron is removed.
+const GROW: Family = SEED.after(108, 2);
+/// Whether a face of the boundary is given up that the new vertex sees.
+const GIVEN_UP: Family = GROW.after(1, 2);
+/// Whether the level is about as far off as the error allows.
+const FAR: Family = GIVEN_UP.after(20, 2);
+/// How much less than the error it is off, then.
+const SHORT: Family = FAR.numbers_after(1, 0);
+/// How far the level is from what is expected.
+const LEVEL: Family = SHORT.numbers_after(40, 1);
+/// The last family of vertex insertions.
+pub const LAST: Family = LEVEL;
+
+/// All families, with names for what they code.
+pub const PARTS: [(&str, Family); 9] = [
+    ("errors", ERROR),
+    ("partial order", FAN),
+    ("positions", OFFSET),
+    ("partial order", SEED),
+    ("partial order", GROW),
+    ("partial order", GIVEN_UP),
+    ("levels", FAR),
+    ("levels", SHORT),
+    ("levels", LEVEL),
+];
+
+/// The last [`SEED`]: none of them, its place follows.
+const ELSEWHERE: u32 = 8;
+
+/// After so many updates their memory is looked at.
+const MEASURED: u32 = 16;
+
+/// Bytes that every update takes in memory: a vertex, its own loop, the size of what it removes.
+pub fn least_update_bytes(info: &MtInfo) -> u64 {
+    let levels: u64 = info.fields.iter().map(|field| u64::from(field.bits)).sum();
+    (3 * u64::from(info.lattice.bits) + levels + 9) / 8 + 4
+}
+
+/// An insertion adds one vertex.
+pub fn check_counts(info: &MtInfo, base_vertices: u64) -> Result<(), BaseMeshError> {
+    let vertices = base_vertices + u64::from(info.updates);
+    if vertices != u64::from(info.vertices) {
+        return Err(BaseMeshError::Info("base vertices and updates do not add up to the reference vertices"));
+    }
+    if vertices >= u64::from(u32::MAX) {
+        return Err(BaseMeshError::Info("more vertices than 32 bits can number"));
+    }
+    Ok(())
+}
+
+/// Puts what all insertions have in common: whether each makes the mesh larger, and the granularity of the coordinates.
+pub fn put_head(out: &mut impl Put, mt: &VertexMt) {
+    out.bits(u32::from(mt.always_grows()), 1);
+    grain(mt).iter().for_each(|&x| out.bits(x as u32, 31));
+}
+
+/// What all insertions of an MT have in common.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct InsertionRules {
+    always_grows: bool,
+    grain: [i32; 3],
+}
+
+/// Reads that.
+pub fn read_head(source: &mut Source<'_>) -> Result<InsertionRules, FormatError> {
+    let always_grows = source.bits(1)? == 1;
+    let mut grain = [0; 3];
+    for x in &mut grain {
+        *x = source.bits(31)? as i32;
+    }
+    if grain.iter().any(|&x| x < 1) {
+        return Err(source.corrupt("the granularity of coordinates must be at least 1"));
+    }
+    Ok(InsertionRules { always_grows, grain })
+}
+
+/// An MT without updates, and what to read its updates with.
+pub fn start(
+    info: MtInfo,
+    base: BaseMesh,
+    rules: InsertionRules,
+    tet_errors: bool,
+) -> Result<(VertexMt, State), FormatError> {
+    let mt = VertexMt::growing(info, base, rules.always_grows, tet_errors)?;
+    let state = State::new(&mt, rules.grain)?;
+    Ok((mt, state))
+}
+
+/// The largest numbers that all coordinates are multiples of.
+fn grain(mt: &VertexMt) -> [i32; 3] {
+    let mut grain = [0_u32; 3];
+    let inserted = (0..mt.updates()).map(|u| mt.position(UpdateId(u)));
+    for position in mt.base().positions.iter().copied().chain(inserted) {
+        for (grain, x) in grain.iter_mut().zip(position) {
+            let mut rest = x.unsigned_abs();
+            while rest > 0 {
+                (*grain, rest) = (rest, *grain % rest);
+            }
+        }
+    }
+    grain.map(|x| i32::try_from(x).unwrap_or(1).max(1))
+}
+
+/// Puts the updates `first .. end`, which follow those that were put with this state before.
+///
+/// # Errors
+/// If the MT is damaged, or an update removes what does not hang together.
+pub fn put(
+    out: &mut impl Put,
+    mt: &VertexMt,
+    first: u32,
+    end: u32,
+    state: &mut State,
+) -> Result<(), UpdateError> {
+    (first..end).try_for_each(|u| put_update(out, mt, UpdateId(u), state))
+}
+
+fn put_update(out: &mut impl Put, mt: &VertexMt, u: UpdateId, state: &mut State) -> Result<(), UpdateError> {
+    let torn = UpdateError::Cavity { update: u.0 };
+    put_errors(out, ERROR, &mut state.errors, mt.errors(u));
+    let mut removed = Vec::new();
+    mt.find_removed(&mut state.mesh, u, &mut removed)?;
+    let position = mt.position(u);
+    let (near, fan) = state.near(&removed, position).ok_or(torn.clone())?;
+    out.symbol(FAN, 0, u32::from(fan));
+    put_one_of(out, near, state.mesh.positions().len() as u32);
+    put_position(out, state, near, position);
+    state.find_cone(near, position);
+    let seed = match state.cone.iter().take(ELSEWHERE as usize).position(|t| removed.contains(t)) {
+        Some(at) => {
+            out.symbol(SEED, 0, at as u32);
+            state.cone[at]
+        }
+        None => {
+            out.symbol(SEED, 0, ELSEWHERE);
+            state.sort_star();
+            let at = state.star.iter().position(|t| removed.contains(t)).ok_or(torn.clone())?;
+            put_one_of(out, at as u32, state.star.len() as u32);
+            state.star[at]
+        }
+    };
+    state.grow(seed, fan.then_some(near), position, &mut |t, context| {
+        let is_removed = removed.contains(&t);
+        out.symbol(GROW, context, u32::from(is_removed));
+        Ok::<_, UpdateError>(is_removed)
+    })?;
+    if state.removed.len() != removed.len() || !removed.iter().all(|t| state.removed.contains(t)) {
+        return Err(torn);
+    }
+    let given_up = mt.given_up(u);
+    state.list_given_up(position, &mut |place| {
+        let is_given_up = given_up.get(place).copied().unwrap_or(false);
+        out.symbol(GIVEN_UP, 0, u32::from(is_given_up));
+        Ok::<_, UpdateError>(is_given_up)
+    })?;
+    put_levels(out, mt, u, state, position);
+    if mt.has_tet_errors() {
+        let own = |&t: &u32| (mt.quarterings(&state.mesh, t), state.holds(t, position));
+        put_quarterings(out, mt.own_fall(u), state.removed.iter().map(own));
+    }
+    match mt.refine(&mut state.mesh, u)? {
+        Applied::Done => state.settle(u.0),
+        Applied::Blocked(_) => return Err(torn),
+    }
+    Ok(())
+}
+
+/// Reads `count` updates into the MT.
+pub fn read(
+    source: &mut Source<'_>,
+    mt: &mut VertexMt,
+    count: u32,
+    state: &mut State,
+    limits: &Limits,
+) -> Result<(), FormatError> {
+    for k in 1..=count {
+        read_update(source, mt, state)?;
+        if k.is_multiple_of(MEASURED) || k == count {
+            check_bytes(mt.bytes() + state.mesh.bytes(), limits)?;
+        }
+    }
+    mt.set_to_come(largest(&state.errors));
+    Ok(())
+}
+
+fn read_update(source: &mut Source<'_>, mt: &mut VertexMt, state: &mut State) -> Result<(), FormatError> {
+    read_errors(source, ERROR, &mut state.errors)?;
+    let fan = source.symbol(FAN, 0)? == 1;
+    let near = read_one_of(source, state.mesh.positions().len() as u32)?;
+    if !state.gather(near) {
+        return Err(source.corrupt("a vertex is inserted next to one with too many tetrahedra"));
+    }
+    let position = read_position(source, mt.info(), state, near)?;
+    state.find_cone(near, position);
+    let seed = match source.symbol(SEED, 0)? {
+        ELSEWHERE => {
+            state.sort_star();
+            let at = read_one_of(source, state.star.len() as u32)?;
+            state.star.get(at as usize).copied()
+        }
+        at => state.cone.get(at as usize).copied(),
+    };
+    let nothing = "an update removes a tetrahedron that is not there";
+    let seed = seed.ok_or_else(|| source.corrupt(nothing))?;
+    state.grow(seed, fan.then_some(near), position, &mut |_, context| {
+        Ok::<_, FormatError>(source.symbol(GROW, context)? == 1)
+    })?;
+    state.list_given_up(position, &mut |_| Ok::<_, FormatError>(source.symbol(GIVEN_UP, 0)? == 1))?;
+    let levels = read_levels(source, mt.info(), state, position)?;
+    let mut own_fall = 0;
+    if mt.has_tet_errors() {
+        let mut quarterings = std::mem::take(&mut state.quarterings);
+        let are_home = state.removed.iter().map(|&t| state.holds(t, position));
+        own_fall = read_quarterings(source, &mut quarterings, are_home)?;
+        state.quarterings = quarterings;
+    }
+    let State { mesh, removed, given_up, errors, quarterings, .. } = state;
+    let levels = &levels;
+    let insertion = Insertion { position, levels, removed, given_up, errors, quarterings, own_fall };
+    let update = mt.insert_into(mesh, &insertion)?;
+    state.settle(update.0);
+    Ok(())
+}
