@@ -32,9 +32,8 @@ pub fn edge_mt(
     if mesh.tets.is_empty() {
         return Err(BuildError::Empty);
     }
-    mesh::check(mesh).map_err(BuildError::Mesh)?;
-    let Topology { neighbors, non_manifold: frozen, .. } =
-        mesh::topology(mesh.positions.len(), &mesh.tets).map_err(BuildError::Mesh)?;
+    mesh::check(mesh)?;
+    let Topology { neighbors, non_manifold: frozen, .. } = mesh::topology(mesh.positions.len(), &mesh.tets)?;
     let quantized = quantize::quantize_cells(mesh, config)?;
     let diagonal = Bounds::of(&mesh.positions).diagonal();
     let info = MtInfo {

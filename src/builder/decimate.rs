@@ -50,9 +50,8 @@ pub(super) fn decimate(
     if mesh.tets.is_empty() {
         return Err(BuildError::Empty);
     }
-    mesh::check(mesh).map_err(BuildError::Mesh)?;
-    let Topology { neighbors, non_manifold, .. } =
-        mesh::topology(mesh.positions.len(), &mesh.tets).map_err(BuildError::Mesh)?;
+    mesh::check(mesh)?;
+    let Topology { neighbors, non_manifold, .. } = mesh::topology(mesh.positions.len(), &mesh.tets)?;
     let quantized = quantize::quantize_cells(mesh, config)?;
     let gift_wrap = match criterion {
         Criterion::HalfEdge => None,

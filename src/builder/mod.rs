@@ -62,8 +62,8 @@ use crate::mt::{
     ConvertError, ErrorCode, Exact, ExplicitMt, HalfEdgeMt, Mt, MtKind, MultiTessellation, UpdateError,
     UpdateId, VertexId,
 };
-use std::fmt;
 use std::ops::ControlFlow;
+use thiserror::Error;
 
 /// How to build.
 #[derive(Clone, Debug, PartialEq)]
@@ -187,169 +187,144 @@ pub struct BuildSummary {
 }
 
 /// Why no MT was built.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum BuildError {
     /// Kind, method and criterion do not go together.
+    #[error("{} does not go with {}: {instead}", .which[0], .which[1])]
     Combination {
         /// The two that do not.
         which: [String; 2],
         /// What goes with what.
         instead: &'static str,
     },
-    /// The MT could not be converted to the kind that was asked for.
-    Convert(ConvertError),
+    /// The MT could not be converted to the kind of the configuration.
+    #[error(transparent)]
+    Convert(#[from] ConvertError),
     /// The mesh has no tetrahedra.
+    #[error("the mesh has no tetrahedra; only insertion builds an MT of points alone")]
     Empty,
     /// The mesh has no point field.
+    #[error("the mesh has no point field: an MT needs at least one scalar at its points")]
     NoField,
-    /// A wanted field is not there.
+    /// The mesh has no field of this name.
+    #[error("there is no point field '{name}'; the mesh has: {}", .known.join(", "))]
     UnknownField {
-        /// The name asked for.
+        /// The name.
         name: String,
-        /// The names that are there.
+        /// The names of its fields.
         known: Vec<String>,
     },
-    /// A wanted field is one at cells.
+    /// The field has values at cells, not at points.
+    #[error(
+        "'{name}' is a field at cells, but an MT has fields at points; turn it into one at points first, as by \
+         TetMesh::cells_to_points"
+    )]
     CellField {
         /// Its name.
         name: String,
     },
     /// More fields than an MT can have.
+    #[error("{fields} fields and time steps are too many (at most 255); name those to keep")]
     TooManyFields {
-        /// How many are wanted.
+        /// How many were chosen.
         fields: usize,
     },
-    /// The values of a field are too far apart to subtract them.
+    /// The range of a field overflows.
+    #[error("the values of field '{field}' are too far apart; scale them down")]
     WideRange {
         /// The field.
         field: String,
     },
-    /// The finest lattice moves positions, or values, further than it may.
+    /// The finest lattice moves positions, or values, by more than the tolerance.
+    #[error("{}", tolerance_message(.field.as_deref(), *.reached))]
     Tolerance {
-        /// The field; none if positions are meant.
+        /// The field; none for positions.
         field: Option<String>,
         /// How far it moves them.
         reached: f64,
     },
     /// An option is out of its range.
+    #[error("option {name} must be {expected}")]
     Option {
         /// Its name.
         name: &'static str,
-        /// What it may be.
+        /// The allowed values.
         expected: &'static str,
     },
-    /// The mesh is not one to build on; repair it first.
-    Mesh(MeshError),
+    /// The mesh is not valid; repair it first.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
     /// A coordinate or a field value is not finite.
+    #[error("point {point} has a coordinate or a value that is not finite")]
     NotFinite {
         /// The point.
         point: u32,
     },
     /// A tetrahedron is too thin for the lattice.
+    #[error(
+        "cell {cell} is too thin for a lattice of {bits} bits: it turns flat or inside out{}",
+        thin_remedy(*.enough)
+    )]
     TooThin {
         /// The cell.
         cell: u32,
-        /// The bits that were asked for, or tried last.
+        /// The bits of the configuration, or those tried last.
         bits: u32,
-        /// The fewest bits that keep all cells positive, if it is not one of those.
+        /// The fewest bits that keep all cells positive, unless all are too few.
         enough: Option<u32>,
     },
     /// Fewer than four points, or all of them in one plane.
+    #[error("the points do not span a volume: there must be four that are not in one plane")]
     Flat,
-    /// Two points are in the same place.
+    /// Two points have the same position.
+    #[error(
+        "points {} and {} are in the same place on the lattice: remove one, or use more position bits (at most 30)",
+        .points[0],
+        .points[1]
+    )]
     SamePlace {
         /// The points.
         points: [u32; 2],
     },
-    /// More tetrahedra meet at a point than an MT can describe.
+    /// More tetrahedra share a point than an MT can describe.
+    #[error("too many tetrahedra meet around point {point} for insertion; build by decimation")]
     Crowded {
         /// The point.
         point: u32,
     },
     /// The mesh is not convex: insertion fills the convex hull of the points.
+    #[error("the mesh does not fill its convex hull, which insertion would do; build by decimation")]
     NotConvex,
     /// More vertices than an MT can number.
+    #[error("the mesh has more than 2^30 points; split it into parts")]
     TooLarge,
     /// The caller stopped the work.
+    #[error("stopped")]
     Stopped,
     /// The finished MT failed its own check: a bug in the builder, not in the input.
+    #[error("the built MT is not sound ({0}); please report this")]
     Internal(UpdateError),
 }
 
-impl fmt::Display for BuildError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Combination { which: [one, other], instead } => {
-                write!(f, "{one} does not go with {other}: {instead}")
-            }
-            Self::Convert(error) => write!(f, "{error}"),
-            Self::Empty => {
-                write!(f, "the mesh has no tetrahedra; only insertion builds an MT of points alone")
-            }
-            Self::NoField => {
-                write!(f, "the mesh has no point field: an MT needs at least one scalar at its points")
-            }
-            Self::UnknownField { name, known } => {
-                write!(f, "there is no point field '{name}'; the mesh has: {}", known.join(", "))
-            }
-            Self::Option { name, expected } => write!(f, "option {name} must be {expected}"),
-            Self::Mesh(error) => write!(f, "{error}"),
-            Self::NotFinite { point } => {
-                write!(f, "point {point} has a coordinate or a value that is not finite")
-            }
-            Self::CellField { name } => write!(
-                f,
-                "'{name}' is a field at cells, but an MT has fields at points; turn it into one at points first, as by TetMesh::cells_to_points"
-            ),
-            Self::TooManyFields { fields } => {
-                write!(f, "{fields} fields and time steps are too many (at most 255); name those to keep")
-            }
-            Self::WideRange { field } => {
-                write!(f, "the values of field '{field}' are too far apart; scale them down")
-            }
-            Self::Tolerance { field: Some(field), reached } => write!(
-                f,
-                "24 bits keep the values of field '{field}' within {reached:e}, no closer; allow a \
-                 larger tolerance, or keep its exact values"
-            ),
-            Self::Tolerance { field: None, reached } => write!(
-                f,
-                "30 bits keep the positions within {reached:e}, no closer; allow a larger tolerance"
-            ),
-            Self::TooThin { cell, bits, enough: Some(enough) } => write!(
-                f,
-                "cell {cell} is too thin for a lattice of {bits} bits: it turns flat or inside out; use {enough} \
-                 position bits"
-            ),
-            Self::TooThin { cell, bits, enough: None } => write!(
-                f,
-                "cell {cell} is too thin for a lattice of {bits} bits: it turns flat or inside out, and no lattice of at \
-                 most 30 bits keeps all cells; remove the cell"
-            ),
-            Self::Flat => {
-                write!(f, "the points do not span a volume: there must be four that are not in one plane")
-            }
-            Self::SamePlace { points: [a, b] } => write!(
-                f,
-                "points {a} and {b} are in the same place on the lattice: remove one, or use more position bits \
-                 (at most 30)"
-            ),
-            Self::Crowded { point } => {
-                write!(f, "too many tetrahedra meet around point {point} for insertion; build by decimation")
-            }
-            Self::NotConvex => write!(
-                f,
-                "the mesh does not fill its convex hull, which insertion would do; build by decimation"
-            ),
-            Self::TooLarge => write!(f, "the mesh has more than 2^30 points; split it into parts"),
-            Self::Stopped => write!(f, "stopped"),
-            Self::Internal(error) => write!(f, "the built MT is not sound ({error}); please report this"),
+fn tolerance_message(field: Option<&str>, reached: f64) -> String {
+    match field {
+        Some(field) => format!(
+            "24 bits keep the values of field '{field}' within {reached:e}, no closer; allow a larger tolerance, or keep \
+             its exact values"
+        ),
+        None => {
+            format!("30 bits keep the positions within {reached:e}, no closer; allow a larger tolerance")
         }
     }
 }
 
-impl std::error::Error for BuildError {}
+fn thin_remedy(enough: Option<u32>) -> String {
+    match enough {
+        Some(bits) => format!("; use {bits} position bits"),
+        None => ", and no lattice of at most 30 bits keeps all cells; remove the cell".to_owned(),
+    }
+}
 
 /// Builds an MT of `mesh`, which must be valid: see [`crate::mesh::repair`].
 ///
@@ -388,7 +363,7 @@ pub fn build(
     };
     let mt = match mt {
         mt if mt.info().kind == kind => mt,
-        mt => mt.convert(kind).map_err(BuildError::Convert)?,
+        mt => mt.convert(kind)?,
     };
     Ok(BuildResult { mt, summary, vertices, exact })
 }
@@ -400,7 +375,7 @@ fn half_edge_mt(
     vertices: &[VertexId],
     block_bits: u32,
 ) -> Result<(HalfEdgeMt, Vec<VertexId>), BuildError> {
-    let near = HalfEdgeMt::near_vertices(explicit).map_err(BuildError::Convert)?;
+    let near = HalfEdgeMt::near_vertices(explicit)?;
     let (mut starts, mut parents) = (vec![0], Vec::new());
     let all = || (0..explicit.updates()).map(UpdateId);
     for u in all() {
@@ -426,7 +401,7 @@ fn half_edge_mt(
         Some(update) => VertexId(base + new_numbers[update as usize]),
         None => *v,
     };
-    let mt = HalfEdgeMt::from_explicit(&explicit, block_bits).map_err(BuildError::Convert)?;
+    let mt = HalfEdgeMt::from_explicit(&explicit, block_bits)?;
     Ok((mt, vertices.iter().map(renamed).collect()))
 }
 

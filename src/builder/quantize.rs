@@ -148,7 +148,7 @@ pub(super) fn quantize(mesh: &TetMesh, config: &BuildConfig) -> Result<Quantized
 /// The same for a mesh whose cells are kept: errors are then measured at the input's own points.
 pub(super) fn quantize_cells(mesh: &TetMesh, config: &BuildConfig) -> Result<Quantized, BuildError> {
     let mut quantized = quantize(mesh, config)?;
-    quantized.homes = beside::homes(&mesh.tets, &quantized).map_err(BuildError::Mesh)?;
+    quantized.homes = beside::homes(&mesh.tets, &quantized)?;
     let mut losses = quantized.losses(&mesh.tets);
     // Where cells are thin for what varies across them, a finer lattice is what keeps the reference mesh near the input.
     let is_free = config.position_bits.is_none() && config.position_tolerance.is_none();
@@ -165,7 +165,7 @@ pub(super) fn quantize_cells(mesh: &TetMesh, config: &BuildConfig) -> Result<Qua
         let Ok(placed) = position_lattice::place(mesh, &finer) else { break };
         let Quantized { fields, levels, exact, .. } = quantized;
         quantized = Quantized::new(mesh, placed, fields, levels, exact);
-        quantized.homes = beside::homes(&mesh.tets, &quantized).map_err(BuildError::Mesh)?;
+        quantized.homes = beside::homes(&mesh.tets, &quantized)?;
         losses = quantized.losses(&mesh.tets);
     }
     for (field, loss) in quantized.fields.iter_mut().zip(losses) {

@@ -61,7 +61,7 @@ pub(super) fn inserted_mt(
         return Err(BuildError::TooLarge);
     }
     if !mesh.tets.is_empty() {
-        mesh::check(mesh).map_err(BuildError::Mesh)?;
+        mesh::check(mesh)?;
     }
     let quantized = quantize::quantize(mesh, config)?;
     let displacement_per_error = config.displacement * Bounds::of(&mesh.positions).diagonal();

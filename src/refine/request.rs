@@ -4,7 +4,7 @@ use super::MAX_PLANES;
 use crate::geom::Bounds;
 use crate::mt::MtInfo;
 use glam::DVec3;
-use std::fmt;
+use thiserror::Error;
 
 /// What mesh is wanted: the coarsest one that meets every need, as far as the budget allows.
 ///
@@ -291,17 +291,19 @@ impl Need {
 }
 
 /// Why a request makes no sense.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum RequestError {
     /// The MT has no field of this number.
+    #[error("there is no field number {index}; the MT has {fields}, counted from 0")]
     Field {
-        /// The number that was asked for.
+        /// The number in the request.
         index: usize,
         /// How many fields there are.
         fields: usize,
     },
-    /// A number in a need cannot be used.
+    /// A need contains an invalid number.
+    #[error("need number {need}: {problem}")]
     Need {
         /// Which need, counted from 0.
         need: usize,
@@ -309,19 +311,6 @@ pub enum RequestError {
         problem: &'static str,
     },
 }
-
-impl fmt::Display for RequestError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Field { index, fields } => {
-                write!(f, "there is no field number {index}; the MT has {fields}, counted from 0")
-            }
-            Self::Need { need, problem } => write!(f, "need number {need}: {problem}"),
-        }
-    }
-}
-
-impl std::error::Error for RequestError {}
 
 impl Request {
     /// Whether the request makes sense for an MT.
