@@ -91,7 +91,7 @@ impl Criterion {
         }
     }
 
-    /// What is used with a method if nothing else is asked for.
+    /// The default criterion of a method.
     pub fn usual(method: Method) -> Self {
         match method {
             Method::Insert => Self::Delaunay,
@@ -138,7 +138,7 @@ pub enum VertexMethod {
 }
 
 impl Construction {
-    /// The usual construction of a kind of MT.
+    /// The default construction of a kind of MT.
     pub fn usual(kind: MtKind) -> Self {
         let purpose = Purpose::default();
         match kind {

@@ -1,15 +1,15 @@
 //! From a tetrahedral mesh to a Multi-Tessellation, offline.
 //!
-//! [`build`] makes an MT of any kind by any method that goes with it: see [`Method`]. The usual one, [`Method::Decimate`],
-//! collapses vertices onto neighbours in rounds of removals that do not depend on each other; the removals in reverse are the
-//! updates of a half-edge MT. [`edge_mt`] is behind edge-based MTs: it
-//! collapses edges to their midpoints, cheapest first, until nothing can be collapsed any more; the
-//! collapses in reverse are the updates of an edge-based MT [§2.1]. The cost of a collapse is the largest error it
-//! leads to, evaluated exactly at every reference vertex that its star covers. The model is the greedy scheme of
-//! Cignoni, Costanza, Montani, Rocchini, Scopigno (*Simplification of tetrahedral meshes with accurate error
-//! evaluation*, 2000): a cheap prediction orders the candidates, the exact error decides.
+//! [`build`] makes an MT of any kind by any method that goes with it: see [`Method`]. The default,
+//! [`Method::Decimate`], collapses vertices onto neighbours in rounds of removals that do not depend on each other; the
+//! removals in reverse are the updates of a half-edge MT. [`edge_mt`] is behind edge-based MTs: it collapses edges to
+//! their midpoints, cheapest first, until nothing can be collapsed any more; the collapses in reverse are the updates
+//! of an edge-based MT [§2.1]. The cost of a collapse is the largest error it leads to, evaluated exactly at every
+//! reference vertex that its star covers. The model is the greedy scheme of Cignoni, Costanza, Montani, Rocchini,
+//! Scopigno (*Simplification of tetrahedral meshes with accurate error evaluation*, 2000): a cheap prediction orders
+//! the candidates, the exact error decides.
 //!
-//! What is promised:
+//! Guarantees:
 //! - **Errors** bound the deviation from the input's field at every reference vertex, where the input has it, for all consistent
 //!   sets, and grow along the partial order towards the base mesh. (By insertion: where the lattice has put it.)
 //! - **Topology** never changes: the link condition is checked inside and on the boundary, and vertices at which the
@@ -19,11 +19,10 @@
 //!   the boundary moves, that is counted into the error.
 //! - **Determinism**: the same input gives the same MT on every platform.
 //!
-//! Not promised: distant parts of a curved boundary may come to overlap where they were nearer to each other than
-//! the error allows the boundary to move.
+//! Not guaranteed: distant parts of a curved boundary may come to overlap where they were nearer to each other than the
+//! error allows the boundary to move.
 
 mod base;
-mod beside;
 mod block_order;
 mod boundary_distance;
 mod candidate_queue;
@@ -41,15 +40,17 @@ mod half_edge;
 mod history;
 mod hole;
 mod insert;
+mod location;
 mod method;
 mod order;
+mod outside_points;
+mod points;
 mod position_lattice;
 mod quantize;
 mod reach;
 mod removal;
 mod rounds;
 mod sequence;
-mod strays;
 mod vertex;
 mod work_mesh;
 
@@ -70,8 +71,8 @@ use thiserror::Error;
 pub struct BuildConfig {
     /// The kind of MT and how it is built.
     pub construction: Construction,
-    /// Names of the fields to keep, in this order; a vector's name stands for its components. Of a time series all steps
-    /// are kept. The first field of the mesh if empty.
+    /// Names of the fields to keep, in this order; a vector's name means its components. Of a time series all steps are
+    /// kept. The first field of the mesh if empty.
     pub fields: Vec<String>,
     /// Keep all fields but the lengths of vectors, which follow from their components; those that are named come first.
     pub all_fields: bool,
@@ -103,14 +104,14 @@ pub struct BuildConfig {
 }
 
 impl Default for BuildConfig {
-    /// The usual configuration for the usual kind, [`MtKind::HalfEdge`].
+    /// The default configuration of the default kind, [`MtKind::HalfEdge`].
     fn default() -> Self {
         Self::of(MtKind::HalfEdge)
     }
 }
 
 impl BuildConfig {
-    /// The usual configuration for a kind of MT.
+    /// The default configuration for a kind of MT.
     pub fn of(kind: MtKind) -> Self {
         Self {
             construction: Construction::usual(kind),
@@ -129,7 +130,7 @@ impl BuildConfig {
     }
 }
 
-/// How finely the values of a field are kept; what is lost remains as an error at full resolution.
+/// The precision of a field's values; the loss remains as an error at full resolution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FieldPrecision {
     /// By a lattice of so many bits, 1 to 24.
@@ -140,21 +141,21 @@ pub enum FieldPrecision {
     Fraction(f64),
 }
 
-/// How far the work has come; sent now and then, so that a caller can show it and stop it.
+/// The progress of the work; sent now and then, so that a caller can show it and stop the work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BuildProgress {
-    /// What is being done.
+    /// The current stage of the work.
     pub stage: &'static str,
     /// How much of it is done.
     pub done: u64,
-    /// All there is to do, as far as is known.
+    /// The whole work, as far as it is known.
     pub total: u64,
 }
 
 /// Receives progress; [`ControlFlow::Break`] stops the work.
 pub type OnProgress<'a> = &'a mut dyn FnMut(BuildProgress) -> ControlFlow<()>;
 
-/// An MT and how it came about.
+/// An MT, and facts about its construction.
 #[derive(Clone, Debug)]
 pub struct BuildResult<M = Mt> {
     /// The MT, complete and applied once from base to reference mesh.
@@ -163,11 +164,11 @@ pub struct BuildResult<M = Mt> {
     pub summary: BuildSummary,
     /// The MT's vertex for each point of the mesh.
     pub vertices: Vec<VertexId>,
-    /// The exact values of the fields that are wanted without loss, in the order of the MT's fields.
+    /// The exact values of the lossless fields, in the order of the MT's fields.
     pub exact: Vec<Exact>,
 }
 
-/// What came of a build.
+/// Counts of a finished build.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BuildSummary {
     /// Vertices of the reference mesh.
@@ -331,8 +332,7 @@ fn thin_remedy(enough: Option<u32>) -> String {
 /// Works on one thread and calls `progress` now and then.
 ///
 /// # Errors
-/// If the mesh is not valid, has none of the wanted fields, or does not fit the
-/// lattice; if `progress` breaks the work off.
+/// If the mesh is not valid, lacks a configured field, or does not fit the lattice; if `progress` stops the work.
 pub fn build(
     mesh: &TetMesh,
     config: &BuildConfig,
@@ -417,7 +417,7 @@ fn bounds_of_inserted(explicit: &ExplicitMt, u: UpdateId) -> [[i32; 3]; 2] {
         })
 }
 
-/// Adds what is to be told of an MT that is spelled out.
+/// Adds the summary of an explicit MT.
 fn summed_up(
     mesh: &TetMesh,
     config: &BuildConfig,

@@ -1,8 +1,8 @@
 //! The way to a request without a tight budget: what violates it is refined, what nothing asks for is undone.
 
-use super::front::{Asked, Front, GoOn, Task};
+use super::front::{Front, GoOn, Task, Violation};
 use super::look::{Open, TetErrors};
-use super::{TetLook, Verdict};
+use super::{TetData, Verdict};
 use crate::mt::{Applied, ApplyUpdates, CurrentMesh, MAX_QUARTERINGS, UpdateError, UpdateId};
 
 /// What came of the wish to apply an update with all that it depends on.
@@ -37,7 +37,7 @@ impl Front {
         task: &mut Task<'_, impl ApplyUpdates>,
         go_on: GoOn<'_>,
     ) -> Result<Way, UpdateError> {
-        self.watch_all(task.mt);
+        self.track_all(task.mt);
         if !task.budget.is_unlimited() {
             while let Some(u) = self.leaves.next().map(UpdateId) {
                 self.coarsen_unless_needed(task, u)?;
@@ -47,23 +47,27 @@ impl Front {
             }
         }
         loop {
-            while let Some(asked) = self.next_asked(task) {
-                if self.contains(asked.update) {
+            while let Some(violation) = self.next_violation(task) {
+                if self.contains(violation.update) {
                     continue;
                 }
                 // Between two steps holes are filled, and what was asked by then has moved.
-                if self.is_removed_by(task.mt, asked.tet, asked.update) {
-                    task.mt.start_at(&mut self.mesh, asked.tet);
+                if self.is_removed_by(task.mt, violation.tet, violation.update) {
+                    task.mt.start_at(&mut self.mesh, violation.tet);
                 }
-                match self.force(task, asked.update)? {
+                match self.force(task, violation.update)? {
                     // It is a leaf now; those that it forced are none.
                     Forced::Applied => {
-                        self.leaves.defer(asked.update.0, asked.verdict.slack, asked.verdict.dial);
+                        self.leaves.defer(
+                            violation.update.0,
+                            violation.verdict.slack,
+                            violation.verdict.component,
+                        );
                     }
                     // Nothing may ask for what was forced in vain.
                     Forced::Awaits(absent, forced) => {
                         forced.iter().for_each(|u| self.leaves.open(u.0));
-                        self.awaiting.insert((absent.0, asked.tet));
+                        self.awaiting.insert((absent.0, violation.tet));
                     }
                 }
                 self.open_touched();
@@ -82,11 +86,11 @@ impl Front {
     }
 
     /// Makes sure that everything is either judged or going to be.
-    fn watch_all(&mut self, mt: &impl ApplyUpdates) {
-        if self.watched {
+    fn track_all(&mut self, mt: &impl ApplyUpdates) {
+        if self.tracked {
             return;
         }
-        self.forget_watch();
+        self.untrack();
         for t in 0..self.mesh.tet_slots() as u32 {
             self.tets.open(t);
         }
@@ -95,12 +99,12 @@ impl Front {
                 self.leaves.open(u.0);
             }
         }
-        self.watched = true;
+        self.tracked = true;
     }
 
     /// The next update that a tetrahedron asks for. All open tetrahedra are judged before the first one is forced, so that
     /// those which several updates change are judged once.
-    fn next_asked(&mut self, task: &mut Task<'_, impl ApplyUpdates>) -> Option<Asked> {
+    fn next_violation(&mut self, task: &mut Task<'_, impl ApplyUpdates>) -> Option<Violation> {
         if self.pending.is_empty() && !self.tets.is_settled() {
             if task.criterion.is_batched() {
                 self.judge_batch(task);
@@ -109,7 +113,7 @@ impl Front {
                 self.judge_open(task);
             }
             // Parents have smaller numbers: in this order few updates are forced by others that wait too.
-            self.pending.sort_unstable_by_key(|asked| std::cmp::Reverse(asked.update));
+            self.pending.sort_unstable_by_key(|violation| std::cmp::Reverse(violation.update));
         }
         self.pending.pop()
     }
@@ -153,10 +157,10 @@ impl Front {
     }
 
     fn take_verdict(&mut self, tet: u32, update: UpdateId, verdict: Verdict) {
-        if verdict.asks() {
-            self.pending.push(Asked { update, tet, verdict });
+        if verdict.violates() {
+            self.pending.push(Violation { update, tet, verdict });
         } else {
-            self.tets.defer(tet, verdict.slack, verdict.dial);
+            self.tets.defer(tet, verdict.slack, verdict.component);
         }
     }
 
@@ -167,7 +171,7 @@ impl Front {
         let mesh = &self.mesh;
         let levels: Vec<_> =
             fetched.iter().map(|open| move |f: usize| open.tet.map(|v| mesh.levels(v)[f])).collect();
-        let looks: Vec<TetLook<'_>> =
+        let looks: Vec<TetData<'_>> =
             fetched.iter().zip(&levels).map(|(open, levels)| open.look(levels)).collect();
         let verdicts = task.criterion.judge_all(&looks);
         for (open, verdict) in fetched.iter().zip(verdicts) {
@@ -188,8 +192,8 @@ impl Front {
         match self.need(task, u, false)? {
             // It is looked at again when the child that is in the way is undone.
             None => Ok(false),
-            Some(verdict) if verdict.asks() => {
-                self.leaves.defer(u.0, verdict.slack, verdict.dial);
+            Some(verdict) if verdict.violates() => {
+                self.leaves.defer(u.0, verdict.slack, verdict.component);
                 Ok(false)
             }
             Some(verdict) => {
@@ -199,7 +203,7 @@ impl Front {
                 for i in 0..self.mesh.touched().len() {
                     let t = self.mesh.touched()[i];
                     if self.mesh.tet(t).is_some() {
-                        self.tets.defer(t, verdict.slack, verdict.dial);
+                        self.tets.defer(t, verdict.slack, verdict.component);
                     }
                 }
                 self.mesh.clear_touched();
@@ -215,7 +219,7 @@ impl Front {
     }
 
     pub(super) fn open_touched(&mut self) {
-        if self.watched {
+        if self.tracked {
             for i in 0..self.mesh.touched().len() {
                 self.tets.open(self.mesh.touched()[i]);
             }
@@ -239,10 +243,10 @@ impl Front {
         let mut look = |corners: &[[i32; 3]; 4], levels: &dyn Fn(usize) -> [i32; 4], own: u8| {
             let of_own = all_errors.get(usize::from(own)).and_then(Option::as_ref).or(all_errors[0].as_ref());
             let Some(TetErrors { largest, by_field }) = of_own else { return false };
-            let look = TetLook { corners, levels, error: *largest, errors: by_field, update: u };
+            let look = TetData { corners, levels, error: *largest, errors: by_field, update: u };
             let one = if ranked { task.criterion.rank(&look) } else { task.criterion.judge(&look) };
             all = all.or(one);
-            !ranked && one.asks() && one.slack > LONG
+            !ranked && one.violates() && one.slack > LONG
         };
         let looked = task.mt.look_at_removed(&mut self.mesh, u, &mut look)?;
         Ok((looked == Applied::Done).then_some(all))

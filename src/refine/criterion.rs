@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 /// A tetrahedron of the MT as criteria see it.
 #[derive(Clone, Copy)]
-pub struct TetLook<'a> {
+pub struct TetData<'a> {
     /// Positions of its corners on the lattice, in any positive order: what a criterion says must not depend on which.
     pub corners: &'a [[i32; 3]; 4],
     /// Levels of a field at its corners.
@@ -26,7 +26,7 @@ pub struct TetLook<'a> {
     pub update: UpdateId,
 }
 
-impl TetLook<'_> {
+impl TetData<'_> {
     /// Its error in one field, or the largest one of all.
     #[inline]
     pub fn error_of(&self, field: Option<usize>) -> ErrorCode {
@@ -43,27 +43,27 @@ pub struct Verdict {
     /// How far the criterion may move (see [`Criterion::distance`]) before the tetrahedron can begin or cease to violate it.
     /// Any smaller number is right as well.
     pub slack: f64,
-    /// Which movement counts: [`ANY`], or one of the criterion's own, up to [`DIALS`] - 1.
-    pub dial: u8,
+    /// Which movement counts: [`ANY`], or one of the criterion's own, up to [`COMPONENTS`] - 1.
+    pub component: u8,
 }
 
 /// Any movement of the criterion.
 pub const ANY: u8 = 0;
 /// So many sorts of movement can be told apart.
-pub const DIALS: usize = 8;
+pub const COMPONENTS: usize = 8;
 /// Planes of regions, and what a camera's picture ends at, move apart from each other: this and the next ones.
 const PLANES: u8 = 1;
-const PLANE_DIALS: usize = 6;
+const PLANE_COMPONENTS: usize = 6;
 /// Tolerances do.
 const TOLERANCE: u8 = 7;
 
 impl Verdict {
     /// What no criterion of the same kind will ever ask for.
-    pub const NEVER: Self = Self { excess: 0.0, slack: f64::INFINITY, dial: ANY };
+    pub const NEVER: Self = Self { excess: 0.0, slack: f64::INFINITY, component: ANY };
 
     /// Whether the tetrahedron violates the request.
     #[inline]
-    pub fn asks(self) -> bool {
+    pub fn violates(self) -> bool {
         self.excess > 1.0
     }
 
@@ -72,7 +72,7 @@ impl Verdict {
     #[inline]
     #[must_use]
     pub fn or(self, other: Self) -> Self {
-        match (self.asks(), other.asks()) {
+        match (self.violates(), other.violates()) {
             (true, false) => self,
             (false, true) => other,
             (false, false) if other.slack == f64::INFINITY && other.excess == 0.0 => self,
@@ -80,7 +80,7 @@ impl Verdict {
             (asks, _) => Self {
                 excess: self.excess.max(other.excess),
                 slack: if asks { self.slack.max(other.slack) } else { self.slack.min(other.slack) },
-                dial: if self.dial == other.dial { self.dial } else { ANY },
+                component: if self.component == other.component { self.component } else { ANY },
             },
         }
     }
@@ -89,17 +89,17 @@ impl Verdict {
 /// Says where a mesh is wanted at what error. See [`crate::refine`] for what monotone means.
 pub trait Criterion: Any + fmt::Debug + Send + Sync {
     /// Judges a tetrahedron. The result depends on nothing but `tet` and the criterion.
-    fn judge(&self, tet: &TetLook<'_>) -> Verdict;
+    fn judge(&self, tet: &TetData<'_>) -> Verdict;
 
     /// [`Criterion::judge`] with an excess that tells how urgent a violation is, so that violations can be compared. Asked
     /// for under a budget only, since it may cost more.
-    fn rank(&self, tet: &TetLook<'_>) -> Verdict {
+    fn rank(&self, tet: &TetData<'_>) -> Verdict {
         self.judge(tet)
     }
 
     /// Judges many tetrahedra at once, each as [`Criterion::judge`] would; for criteria that are
     /// [batched](Criterion::is_batched).
-    fn judge_all(&self, tets: &[TetLook<'_>]) -> Vec<Verdict> {
+    fn judge_all(&self, tets: &[TetData<'_>]) -> Vec<Verdict> {
         tets.iter().map(|tet| self.judge(tet)).collect()
     }
 
@@ -135,9 +135,9 @@ pub trait Criterion: Any + fmt::Debug + Send + Sync {
         f64::INFINITY
     }
 
-    /// The part of that distance which counts for verdicts of one [`Verdict::dial`].
-    fn turned(&self, before: &dyn Criterion, dial: u8) -> f64 {
-        let _ = dial;
+    /// The part of that distance which counts for verdicts of one [`Verdict::component`].
+    fn component_distance(&self, before: &dyn Criterion, component: u8) -> f64 {
+        let _ = component;
         self.distance(before)
     }
 }
@@ -217,7 +217,7 @@ impl Frame {
 
     /// How far from a region a tetrahedron may be and still count: as far as its error may have displaced it.
     #[inline]
-    pub fn margin(&self, tet: &TetLook<'_>) -> f64 {
+    pub fn margin(&self, tet: &TetData<'_>) -> f64 {
         tet.error.error() * self.displacement + self.guard * (1.0 - f64::from(tet.update.0) / self.updates)
     }
 }
@@ -227,12 +227,12 @@ impl Frame {
 struct Atom {
     /// The field whose error counts, if it is not the largest one of all.
     field: Option<usize>,
-    ask: Ask,
+    measure: Measure,
 }
 
 /// What an atom asks for.
 #[derive(Clone, Debug)]
-enum Ask {
+enum Measure {
     Field(FieldAtom),
     View { pixels: f64, camera: Camera },
     Transfer { error: f64, palette: Palette },
@@ -287,7 +287,7 @@ impl LodCriterion {
     }
 
     #[inline]
-    fn union(&self, tet: &TetLook<'_>, ranked: bool) -> Verdict {
+    fn union(&self, tet: &TetData<'_>, ranked: bool) -> Verdict {
         let corners = self.frame.place(tet.corners);
         let mut union = Verdict::NEVER;
         for atom in &self.atoms {
@@ -304,8 +304,8 @@ fn atoms(info: &MtInfo, frame: &Frame, need: &Need) -> Vec<Atom> {
     let tolerance = ErrorCode::at_most(need.error);
     // A single field's error is the largest.
     let error_of = |field: Option<usize>| field.filter(|_| info.fields.len() > 1);
-    let atom = |ask: Ask| Atom { field: error_of(need.measured_field()), ask };
-    let field = |shape: Option<Shape>, values| atom(Ask::Field(FieldAtom { tolerance, shape, values }));
+    let atom = |measure: Measure| Atom { field: error_of(need.measured_field()), measure };
+    let field = |shape: Option<Shape>, values| atom(Measure::Field(FieldAtom { tolerance, shape, values }));
     let ranges = |values: &Values| {
         let field = values.field.min(info.fields.len() - 1);
         let error_of = error_of(Some(field));
@@ -324,26 +324,28 @@ fn atoms(info: &MtInfo, frame: &Frame, need: &Need) -> Vec<Atom> {
             let shape = Shape::new(region, frame.middle);
             ranges(values).into_iter().map(|range| field(Some(shape.clone()), range)).collect()
         }
-        Part::View(view) => vec![atom(Ask::View { pixels: need.error, camera: Camera::new(view, frame) })],
+        Part::View(view) => {
+            vec![atom(Measure::View { pixels: need.error, camera: Camera::new(view, frame) })]
+        }
         Part::Transfer(transfer) => {
             let field = &info.fields[transfer.field.min(info.fields.len() - 1)];
-            vec![atom(Ask::Transfer { error: need.error, palette: Palette::new(transfer, field) })]
+            vec![atom(Measure::Transfer { error: need.error, palette: Palette::new(transfer, field) })]
         }
     }
 }
 
 impl Criterion for LodCriterion {
     #[inline]
-    fn judge(&self, tet: &TetLook<'_>) -> Verdict {
+    fn judge(&self, tet: &TetData<'_>) -> Verdict {
         self.union(tet, false)
     }
 
-    fn rank(&self, tet: &TetLook<'_>) -> Verdict {
+    fn rank(&self, tet: &TetData<'_>) -> Verdict {
         self.union(tet, true)
     }
 
-    fn judge_all(&self, tets: &[TetLook<'_>]) -> Vec<Verdict> {
-        let own = |tet: &TetLook<'_>| {
+    fn judge_all(&self, tets: &[TetData<'_>]) -> Vec<Verdict> {
+        let own = |tet: &TetData<'_>| {
             let corners = self.frame.place(tet.corners);
             let atoms = self.atoms.iter().map(|atom| atom.judge(&self.frame, tet, &corners, true));
             atoms.fold(Verdict::NEVER, Verdict::or)
@@ -360,8 +362,8 @@ impl Criterion for LodCriterion {
     }
 
     fn uniform(&self) -> Option<Vec<Tolerance>> {
-        let everywhere = |atom: &Atom| match atom.ask {
-            Ask::Field(FieldAtom { tolerance: error, shape: None, values: None }) => {
+        let everywhere = |atom: &Atom| match atom.measure {
+            Measure::Field(FieldAtom { tolerance: error, shape: None, values: None }) => {
                 Some(Tolerance { field: atom.field, error })
             }
             _ => None,
@@ -377,7 +379,9 @@ impl Criterion for LodCriterion {
     }
 
     fn tolerance(&self) -> ErrorCode {
-        let of = |atom: &Atom| if let Ask::Field(ask) = &atom.ask { Some(ask.tolerance) } else { None };
+        let of = |atom: &Atom| {
+            if let Measure::Field(measure) = &atom.measure { Some(measure.tolerance) } else { None }
+        };
         let unmeasured = if self.atoms.is_empty() { ErrorCode::ZERO } else { ErrorCode::MAX };
         let own = self.atoms.iter().filter_map(of).max().unwrap_or(unmeasured);
         self.custom.iter().fold(own, |largest, custom| largest.max(custom.tolerance()))
@@ -405,12 +409,14 @@ impl Criterion for LodCriterion {
         own.chain(custom).fold(0.0, f64::max)
     }
 
-    fn turned(&self, before: &dyn Criterion, dial: u8) -> f64 {
+    fn component_distance(&self, before: &dyn Criterion, component: u8) -> f64 {
         let any: &dyn Any = before;
         match any.downcast_ref::<Self>() {
-            Some(other) if dial != ANY && self.custom.is_empty() && self.atoms.len() == other.atoms.len() => {
+            Some(other)
+                if component != ANY && self.custom.is_empty() && self.atoms.len() == other.atoms.len() =>
+            {
                 let pairs = self.atoms.iter().zip(&other.atoms);
-                pairs.fold(0.0, |m, (a, b)| f64::max(m, a.turned(b, &self.frame, dial)))
+                pairs.fold(0.0, |m, (a, b)| f64::max(m, a.component_distance(b, &self.frame, component)))
             }
             _ => self.distance(before),
         }
@@ -420,38 +426,38 @@ impl Criterion for LodCriterion {
 impl Atom {
     // Once for all who ask: it is large.
     #[inline(never)]
-    fn judge(&self, frame: &Frame, tet: &TetLook<'_>, corners: &[DVec3; 4], ranked: bool) -> Verdict {
+    fn judge(&self, frame: &Frame, tet: &TetData<'_>, corners: &[DVec3; 4], ranked: bool) -> Verdict {
         let narrowed;
         let tet = if self.field.is_none() {
             tet
         } else {
-            narrowed = TetLook { error: tet.error_of(self.field), ..*tet };
+            narrowed = TetData { error: tet.error_of(self.field), ..*tet };
             &narrowed
         };
-        match &self.ask {
-            Ask::Field(atom) => atom.judge(frame, tet, corners),
-            Ask::View { pixels, camera } => camera.judge(frame, tet, corners, *pixels, ranked),
-            Ask::Transfer { error, palette } => {
+        match &self.measure {
+            Measure::Field(atom) => atom.judge(frame, tet, corners),
+            Measure::View { pixels, camera } => camera.judge(frame, tet, corners, *pixels, ranked),
+            Measure::Transfer { error, palette } => {
                 let change = palette.change(&(tet.levels)(palette.field), tet.error.error());
                 let (change, error) = (change, error.max(LEAST_ERROR));
                 if change <= 0.0 {
                     return Verdict::NEVER;
                 }
                 let slack = (octaves(change) - octaves(error)).abs();
-                Verdict { excess: change / error, slack, dial: ANY }
+                Verdict { excess: change / error, slack, component: ANY }
             }
         }
     }
 
     /// The part of the distance that counts for one dial; not [`ANY`].
-    fn turned(&self, before: &Self, frame: &Frame, dial: u8) -> f64 {
+    fn component_distance(&self, before: &Self, frame: &Frame, component: u8) -> f64 {
         if self.field != before.field {
             return f64::INFINITY;
         }
-        match (&self.ask, &before.ask) {
-            (Ask::Field(a), Ask::Field(b)) => a.turned(b, frame, dial),
-            (Ask::View { pixels: p, camera: a }, Ask::View { pixels: q, camera: b }) => {
-                a.turned(*p, b, *q, frame, usize::from(dial - PLANES))
+        match (&self.measure, &before.measure) {
+            (Measure::Field(a), Measure::Field(b)) => a.component_distance(b, frame, component),
+            (Measure::View { pixels: p, camera: a }, Measure::View { pixels: q, camera: b }) => {
+                a.component_distance(*p, b, *q, frame, usize::from(component - PLANES))
             }
             _ => self.distance(before, frame),
         }
@@ -461,12 +467,14 @@ impl Atom {
         if self.field != before.field {
             return f64::INFINITY;
         }
-        match (&self.ask, &before.ask) {
-            (Ask::Field(a), Ask::Field(b)) => a.distance(b, frame),
-            (Ask::View { pixels: p, camera: a }, Ask::View { pixels: q, camera: b }) => {
+        match (&self.measure, &before.measure) {
+            (Measure::Field(a), Measure::Field(b)) => a.distance(b, frame),
+            (Measure::View { pixels: p, camera: a }, Measure::View { pixels: q, camera: b }) => {
                 a.distance(*p, b, *q, frame)
             }
-            (Ask::Transfer { error: e, palette: a }, Ask::Transfer { error: f, palette: b }) if a == b => {
+            (Measure::Transfer { error: e, palette: a }, Measure::Transfer { error: f, palette: b })
+                if a == b =>
+            {
                 (octaves(e.max(LEAST_ERROR)) - octaves(f.max(LEAST_ERROR))).abs()
             }
             _ => f64::INFINITY,
@@ -475,8 +483,8 @@ impl Atom {
 }
 
 /// The dial of a plane.
-pub(super) fn dial_of(plane: Option<usize>) -> u8 {
-    plane.map_or(ANY, |plane| PLANES + (plane % PLANE_DIALS) as u8)
+pub(super) fn component_of(plane: Option<usize>) -> u8 {
+    plane.map_or(ANY, |plane| PLANES + (plane % PLANE_COMPONENTS) as u8)
 }
 
 /// Errors have codes that are 2^11 to the octave. An octave is as much as sixteen ways through the domain: regions move often,
@@ -490,7 +498,7 @@ fn octaves_between(a: ErrorCode, b: ErrorCode) -> f64 {
 
 impl FieldAtom {
     #[inline]
-    fn judge(&self, frame: &Frame, tet: &TetLook<'_>, corners: &[DVec3; 4]) -> Verdict {
+    fn judge(&self, frame: &Frame, tet: &TetData<'_>, corners: &[DVec3; 4]) -> Verdict {
         let exceeds = tet.error > self.tolerance;
         let mut conditions = Conditions::new();
         conditions.add(exceeds, octaves_between(tet.error, self.tolerance), TOLERANCE);
@@ -502,22 +510,22 @@ impl FieldAtom {
         if let Some(shape) = &self.shape {
             let margin = frame.margin(tet);
             let (outside, plane) = shape.least(corners, margin);
-            conditions.add(outside <= margin, (outside - margin).abs() / frame.reach, dial_of(plane));
+            conditions.add(outside <= margin, (outside - margin).abs() / frame.reach, component_of(plane));
         }
         if !conditions.all {
-            return Verdict { excess: 0.0, slack: conditions.missing, dial: conditions.dial };
+            return Verdict { excess: 0.0, slack: conditions.missing, component: conditions.component };
         }
         let excess = tet.error.error() / self.tolerance.error().max(LEAST_ERROR);
-        Verdict { excess, slack: conditions.held, dial: ANY }
+        Verdict { excess, slack: conditions.held, component: ANY }
     }
 
-    fn turned(&self, before: &Self, frame: &Frame, dial: u8) -> f64 {
-        if dial == TOLERANCE {
+    fn component_distance(&self, before: &Self, frame: &Frame, component: u8) -> f64 {
+        if component == TOLERANCE {
             return octaves_between(self.tolerance, before.tolerance);
         }
         match (&self.shape, &before.shape) {
             (Some(a), Some(b)) => {
-                a.approach(b, frame.half, usize::from(dial - PLANES), PLANE_DIALS) / frame.reach
+                a.approach(b, frame.half, usize::from(component - PLANES), PLANE_COMPONENTS) / frame.reach
             }
             _ => 0.0,
         }
@@ -549,21 +557,21 @@ struct Conditions {
     held: f64,
     /// The most that any one which does not hold lacks, and what it waits for.
     missing: f64,
-    dial: u8,
+    component: u8,
 }
 
 impl Conditions {
     fn new() -> Self {
-        Self { all: true, held: f64::INFINITY, missing: 0.0, dial: ANY }
+        Self { all: true, held: f64::INFINITY, missing: 0.0, component: ANY }
     }
 
     #[inline]
-    fn add(&mut self, holds: bool, slack: f64, dial: u8) {
+    fn add(&mut self, holds: bool, slack: f64, component: u8) {
         if holds {
             self.held = self.held.min(slack);
         } else {
             if self.all || slack > self.missing {
-                (self.missing, self.dial) = (slack, dial);
+                (self.missing, self.component) = (slack, component);
             }
             self.all = false;
         }

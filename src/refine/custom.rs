@@ -1,6 +1,6 @@
 //! Criteria of the caller's own.
 
-use super::{ANY, Criterion, TetLook, Verdict};
+use super::{ANY, Criterion, TetData, Verdict};
 use std::fmt;
 
 /// A criterion that a closure tells: how often the error of a tetrahedron exceeds what is wanted there (see
@@ -22,7 +22,7 @@ pub struct Custom<F> {
     monotone: bool,
 }
 
-impl<F: Fn(&TetLook<'_>) -> f64 + Send + Sync + 'static> Custom<F> {
+impl<F: Fn(&TetData<'_>) -> f64 + Send + Sync + 'static> Custom<F> {
     /// A criterion that is answered from the base mesh each time, as any closure can be.
     pub fn new(excess: F) -> Self {
         Self { excess, monotone: false }
@@ -41,11 +41,11 @@ impl<F> fmt::Debug for Custom<F> {
     }
 }
 
-impl<F: Fn(&TetLook<'_>) -> f64 + Send + Sync + 'static> Criterion for Custom<F> {
-    fn judge(&self, tet: &TetLook<'_>) -> Verdict {
+impl<F: Fn(&TetData<'_>) -> f64 + Send + Sync + 'static> Criterion for Custom<F> {
+    fn judge(&self, tet: &TetData<'_>) -> Verdict {
         let excess = (self.excess)(tet);
         // NaN asks for nothing. As nobody knows how long that is so, it is looked at again with every change.
-        Verdict { excess: if excess > 0.0 { excess } else { 0.0 }, slack: 0.0, dial: ANY }
+        Verdict { excess: if excess > 0.0 { excess } else { 0.0 }, slack: 0.0, component: ANY }
     }
 
     fn is_monotone(&self) -> bool {

@@ -4,7 +4,7 @@ use super::converge::Way;
 use super::ranked::Ranked;
 use super::timing_wheel::TimingWheels;
 use super::uniform::Wanted;
-use super::{ANY, Budget, Criterion, DIALS, Verdict};
+use super::{ANY, Budget, COMPONENTS, Criterion, Verdict};
 use crate::mesh::BitSet;
 use crate::mt::{ApplyUpdates, BaseMeshError, CurrentMesh, ErrorCode, UpdateError, UpdateId};
 use std::collections::BTreeSet;
@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 /// A consistent set of updates and its current mesh.
 ///
-/// [`Front::aim`] tells it what is wanted and [`Front::step`] brings it there, all at once or little by little;
+/// [`Front::request`] tells it what is wanted and [`Front::step`] brings it there, all at once or little by little;
 /// [`Front::satisfy`] does both. What comes out is the same as from the base mesh, whatever was asked for before. What it
 /// costs grows with the difference between the meshes, not with their size, as long as the request changes by little.
 #[derive(Clone, Debug)]
@@ -27,14 +27,14 @@ pub struct Front {
     pub(super) chunks: Vec<[ErrorCode; 2]>,
     pub(super) goal: Option<Goal>,
     /// Whether `tets` and `leaves` account for the whole mesh.
-    pub(super) watched: bool,
+    pub(super) tracked: bool,
     /// Tetrahedra that do not violate the criterion, by when they may.
     pub(super) tets: TimingWheels,
     /// Applied updates without applied children, by when nothing may ask for them any more; others that have got children
     /// since among them.
     pub(super) leaves: TimingWheels,
     /// Updates that tetrahedra ask for, the first one last, each with the tetrahedron and for how long that asks.
-    pub(super) pending: Vec<Asked>,
+    pub(super) pending: Vec<Violation>,
     /// Updates that are not here but that something waits for, each with a tetrahedron: the update removes it, or what removes
     /// it depends on the update.
     pub(super) awaiting: BTreeSet<(u32, u32)>,
@@ -52,7 +52,7 @@ pub(super) struct Goal {
 }
 
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Asked {
+pub(super) struct Violation {
     pub update: UpdateId,
     pub tet: u32,
     pub verdict: Verdict,
@@ -109,7 +109,7 @@ impl Front {
             known: 0,
             chunks: Vec::new(),
             goal: None,
-            watched: false,
+            tracked: false,
             tets: TimingWheels::default(),
             leaves: TimingWheels::default(),
             pending: Vec::new(),
@@ -165,12 +165,12 @@ impl Front {
         criterion: &(impl Criterion + Clone),
         budget: Budget,
     ) -> Result<Outcome, UpdateError> {
-        self.aim(mt, Arc::new(criterion.clone()), budget);
+        self.request(mt, Arc::new(criterion.clone()), budget);
         self.step(mt, &mut |_| true)
     }
 
     /// Tells what is wanted from now on. Nothing moves before [`Front::step`].
-    pub fn aim(&mut self, mt: &impl ApplyUpdates, criterion: Arc<dyn Criterion>, budget: Budget) {
+    pub fn request(&mut self, mt: &impl ApplyUpdates, criterion: Arc<dyn Criterion>, budget: Budget) {
         let before = self.goal.take();
         let distance = before.as_ref().map_or(f64::INFINITY, |goal| criterion.distance(&*goal.criterion));
         match before {
@@ -178,44 +178,47 @@ impl Front {
             before => {
                 let keeps = criterion.is_monotone() && !mt.has_tet_errors();
                 let known = before.as_ref().filter(|_| keeps).map(|goal| &*goal.criterion);
-                self.move_watch(distance, &*criterion, known);
+                self.advance_tracking(distance, &*criterion, known);
                 self.ranked.clear();
                 let outcome = Outcome::default();
                 self.goal = Some(Goal { criterion, budget, reached: false, outcome });
             }
         }
-        self.learn(mt);
+        self.sync(mt);
     }
 
     /// The criterion has moved: verdicts whose slack is used up are void; all of them, if they were not for one from which
     /// the way leads on.
-    fn move_watch(&mut self, distance: f64, criterion: &dyn Criterion, before: Option<&dyn Criterion>) {
+    fn advance_tracking(&mut self, distance: f64, criterion: &dyn Criterion, before: Option<&dyn Criterion>) {
         // Those judged for the last goal only.
-        for asked in std::mem::take(&mut self.pending) {
-            self.tets.open(asked.tet);
+        for violation in std::mem::take(&mut self.pending) {
+            self.tets.open(violation.tet);
         }
         match before {
-            Some(before) if self.watched && distance.is_finite() => {
-                for dial in 0..DIALS as u8 {
-                    let moved =
-                        if dial == ANY { distance } else { criterion.turned(before, dial).min(distance) };
-                    self.tets.advance(moved, dial);
-                    self.leaves.advance(moved, dial);
+            Some(before) if self.tracked && distance.is_finite() => {
+                for component in 0..COMPONENTS as u8 {
+                    let moved = if component == ANY {
+                        distance
+                    } else {
+                        criterion.component_distance(before, component).min(distance)
+                    };
+                    self.tets.advance(moved, component);
+                    self.leaves.advance(moved, component);
                 }
             }
-            _ => self.forget_watch(),
+            _ => self.untrack(),
         }
     }
 
-    pub(super) fn forget_watch(&mut self) {
-        self.watched = false;
+    pub(super) fn untrack(&mut self) {
+        self.tracked = false;
         self.tets.clear();
         self.leaves.clear();
         self.pending.clear();
         self.awaiting.clear();
     }
 
-    /// Goes on towards what [`Front::aim`] was told, until it is reached or `go_on` says no; that is asked after every update
+    /// Goes on towards what [`Front::request`] was told, until it is reached or `go_on` says no; that is asked after every update
     /// with those that it depends on. Without a goal nothing happens. The mesh is packed and within the budget afterwards.
     ///
     /// What is reached does not depend on the steps. On the way there the mesh is refined first, the coarsest parts before
@@ -224,7 +227,7 @@ impl Front {
     /// # Errors
     /// As [`Front::satisfy`].
     pub fn step(&mut self, mt: &impl ApplyUpdates, go_on: GoOn<'_>) -> Result<Outcome, UpdateError> {
-        self.learn(mt);
+        self.sync(mt);
         let Some(mut goal) = self.goal.take() else { return Ok(Outcome::default()) };
         // What was done for an earlier call does not count again.
         let answer = Outcome { refined: 0, forced: 0, coarsened: 0, judged: 0, ..goal.outcome };
@@ -234,7 +237,7 @@ impl Front {
             self.pack();
             if let Err(error) = moved {
                 // The state is unspecified after an error: the next goal judges everything again.
-                self.forget_watch();
+                self.untrack();
                 self.ranked.clear();
                 return Err(error);
             }
@@ -262,7 +265,7 @@ impl Front {
         // from the base mesh is the first one found for sure.
         let is_monotone = criterion.is_monotone() && !mt.has_tet_errors();
         let restarts = !is_monotone || !budget.is_unlimited() && !mt.always_grows();
-        if restarts && !self.watched && !self.ranked.is_running() {
+        if restarts && !self.tracked && !self.ranked.is_running() {
             self.coarsen_all(mt, outcome)?;
         }
         // Errors of updates say what is wanted as long as tetrahedra have none of their own.
@@ -270,7 +273,7 @@ impl Front {
         let mut task = Task { mt, criterion: &**criterion, budget: *budget, outcome };
         let done = match uniform {
             Some(tolerances) => {
-                self.forget_watch();
+                self.untrack();
                 self.satisfy_uniform(mt, Wanted::new(&tolerances), task.outcome, go_on)?
             }
             // Most budgets are there for safety: while they leave room, nothing needs to be compared.

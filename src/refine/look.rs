@@ -1,6 +1,6 @@
 //! Tetrahedra of the mesh as criteria see them.
 
-use super::{TetLook, Verdict};
+use super::{TetData, Verdict};
 use crate::mt::{ApplyUpdates, CurrentMesh, ErrorCode, UpdateId};
 use std::borrow::Cow;
 
@@ -14,9 +14,9 @@ pub(super) struct Open<'a> {
 }
 
 impl Open<'_> {
-    pub fn look<'a>(&'a self, levels: &'a dyn Fn(usize) -> [i32; 4]) -> TetLook<'a> {
+    pub fn look<'a>(&'a self, levels: &'a dyn Fn(usize) -> [i32; 4]) -> TetData<'a> {
         let Self { corners, errors, update, .. } = self;
-        TetLook { corners, levels, error: errors.largest, errors: &errors.by_field, update: *update }
+        TetData { corners, levels, error: errors.largest, errors: &errors.by_field, update: *update }
     }
 }
 
@@ -58,10 +58,10 @@ pub(super) fn see(
     tet: &[u32; 4],
     errors: &TetErrors<'_>,
     update: UpdateId,
-    judge: impl FnOnce(&TetLook<'_>) -> Verdict,
+    judge: impl FnOnce(&TetData<'_>) -> Verdict,
 ) -> Verdict {
     let corners = tet.map(|v| mesh.positions[v as usize]);
     let levels = |field: usize| tet.map(|v| mesh.levels(v)[field]);
     let TetErrors { largest: error, ref by_field } = *errors;
-    judge(&TetLook { corners: &corners, levels: &levels, error, errors: by_field, update })
+    judge(&TetData { corners: &corners, levels: &levels, error, errors: by_field, update })
 }

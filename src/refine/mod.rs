@@ -29,7 +29,7 @@
 //!
 //! **What is not here.** Updates that are not here are no updates: the mesh is the smallest that satisfies the request as far as
 //! those that are here go, and the answer tells whether more would be needed. When some arrive, what they remove is judged again;
-//! what leaves must not be applied ([`Front::arrived`], [`Front::leave`]).
+//! what leaves must not be applied ([`Front::page_inserted`], [`Front::prepare_eviction`]).
 //!
 //! **Steps.** [`Front::step`] stops whenever it is told to, with a valid mesh, and goes on from there.
 
@@ -50,7 +50,7 @@ mod tet_minimax;
 mod timing_wheel;
 mod uniform;
 
-pub use criterion::{ANY, Criterion, DIALS, LodCriterion, TetLook, Tolerance, Verdict};
+pub use criterion::{ANY, COMPONENTS, Criterion, LodCriterion, TetData, Tolerance, Verdict};
 pub use custom::Custom;
 pub use front::{Front, GoOn, Outcome};
 pub use request::{Budget, Need, Part, Region, Request, RequestError, Transfer, Values, View};

@@ -78,7 +78,7 @@ impl Front {
             // The last number there can be: nothing is added to what is wanted.
             let update = update.unwrap_or(UpdateId(mt.info().updates));
             let verdict = see(&self.mesh, tet, &errors, update, |look| criterion.rank(look));
-            if verdict.asks() {
+            if verdict.violates() {
                 let TetErrors { largest, by_field } = &errors;
                 let error = field.and_then(|field| by_field.get(field)).copied().unwrap_or(*largest);
                 all.error = all.error.max(error);

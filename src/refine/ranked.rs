@@ -159,7 +159,7 @@ impl Front {
 
     /// Fills both queues with what there is, and undoes what nothing asks for on the way.
     fn fill_queues(&mut self, task: &mut Task<'_, impl ApplyUpdates>) -> Result<(), UpdateError> {
-        self.forget_watch();
+        self.untrack();
         self.ranked.clear();
         self.ranked.state = State::Running;
         // Children have larger numbers, so one pass downwards sees each after all that depend on it.
@@ -182,10 +182,10 @@ impl Front {
     fn is_idle(&mut self, task: &mut Task<'_, impl ApplyUpdates>, u: UpdateId) -> Result<bool, UpdateError> {
         task.outcome.judged += 1;
         let Some(verdict) = self.need(task, u, true)? else { return Ok(false) };
-        if verdict.asks() {
+        if verdict.violates() {
             self.ranked.coarsenable.push(Reverse(rank(verdict.excess, u)));
         }
-        Ok(!verdict.asks())
+        Ok(!verdict.violates())
     }
 
     fn push_violation(&mut self, task: &mut Task<'_, impl ApplyUpdates>, t: u32) {
@@ -194,7 +194,7 @@ impl Front {
         task.outcome.judged += 1;
         let errors = TetErrors::of(task.mt, &self.mesh, t, u);
         let verdict = see(&self.mesh, &tet, &errors, u, |look| task.criterion.rank(look));
-        if verdict.asks() {
+        if verdict.violates() {
             self.ranked.refinable.push((rank(verdict.excess, u), t));
         }
     }

@@ -6,7 +6,7 @@
 //! ends in, so never too late and by at most an eighth of its slack too early, at a constant cost each time. Deferred lists of
 //! priorities in ROAM (Duchaineau et al. 1997) and timing wheels (Varghese and Lauck 1987) are the ideas behind this.
 
-use super::DIALS;
+use super::COMPONENTS;
 use crate::mt::PagedArray;
 use std::ops::Range;
 
@@ -19,7 +19,7 @@ const FINE: i32 = 3;
 /// Slots of a wheel: more than any slack in it can be away.
 const SLOTS: usize = 4 << FINE;
 /// Slots of a dial.
-const DIAL: usize = WHEELS as usize * SLOTS;
+const COMPONENT: usize = WHEELS as usize * SLOTS;
 /// To be judged: in [`TimingWheels::open`].
 const OPEN: u16 = u16::MAX - 1;
 /// Not waiting for anything.
@@ -29,18 +29,23 @@ const NOWHERE: u16 = u16::MAX;
 #[derive(Clone, Debug)]
 pub(super) struct TimingWheels {
     /// The slot of each thing, or [`OPEN`] or [`NOWHERE`].
-    place: PagedArray<u16>,
+    slot_of: PagedArray<u16>,
     /// What waits in each slot of each wheel, with entries that have moved on since.
     slots: Vec<Vec<u32>>,
     /// What is to be judged now; here, too, entries may have moved on.
     open: Vec<u32>,
     /// How far the criterion has moved in all, by dial.
-    now: [f64; DIALS],
+    now: [f64; COMPONENTS],
 }
 
 impl Default for TimingWheels {
     fn default() -> Self {
-        Self { place: PagedArray::new(NOWHERE), slots: Vec::new(), open: Vec::new(), now: [0.0; DIALS] }
+        Self {
+            slot_of: PagedArray::new(NOWHERE),
+            slots: Vec::new(),
+            open: Vec::new(),
+            now: [0.0; COMPONENTS],
+        }
     }
 }
 
@@ -48,8 +53,8 @@ impl TimingWheels {
     /// Has thing `id` judged.
     #[inline]
     pub fn open(&mut self, id: u32) {
-        if self.place.get(id) != OPEN {
-            self.place.set(id, OPEN);
+        if self.slot_of.get(id) != OPEN {
+            self.slot_of.set(id, OPEN);
             self.open.push(id);
         }
     }
@@ -58,8 +63,8 @@ impl TimingWheels {
     #[inline]
     pub fn next(&mut self) -> Option<u32> {
         while let Some(id) = self.open.pop() {
-            if self.place.get(id) == OPEN {
-                self.place.set(id, NOWHERE);
+            if self.slot_of.get(id) == OPEN {
+                self.slot_of.set(id, NOWHERE);
                 return Some(id);
             }
         }
@@ -78,16 +83,16 @@ impl TimingWheels {
 
     /// Has thing `id` judged again before that has moved by more than `slack` which the dial stands for.
     #[inline]
-    pub fn defer(&mut self, id: u32, slack: f64, dial: u8) {
-        let slot = self.slot(slack, usize::from(dial) % DIALS);
+    pub fn defer(&mut self, id: u32, slack: f64, component: u8) {
+        let slot = self.slot(slack, usize::from(component) % COMPONENTS);
         // If it is there already, that is early enough.
-        if self.place.get(id) == slot {
+        if self.slot_of.get(id) == slot {
             return;
         }
-        self.place.set(id, slot);
+        self.slot_of.set(id, slot);
         if slot != NOWHERE {
             if self.slots.is_empty() {
-                self.slots.resize(DIALS * DIAL, Vec::new());
+                self.slots.resize(COMPONENTS * COMPONENT, Vec::new());
             }
             self.slots[slot as usize].push(id);
         }
@@ -95,7 +100,7 @@ impl TimingWheels {
 
     /// The slot in which a slack that begins now ends.
     #[inline]
-    fn slot(&self, slack: f64, dial: usize) -> u16 {
+    fn slot(&self, slack: f64, component: usize) -> u16 {
         if slack == f64::INFINITY {
             return NOWHERE;
         }
@@ -105,19 +110,19 @@ impl TimingWheels {
         let wheel = (exponent - FIRST).clamp(0, WHEELS - 1);
         let per_slot = power(FINE - FIRST - wheel);
         // A slack that is too large for the last wheel ends in it all the same.
-        let now = self.now[dial];
+        let now = self.now[component];
         let end = now + slack.min(power(FIRST + wheel + 1));
         let first = (now * per_slot) as u64;
         // What is too small for the first wheel can end at any moment: that is the slot which begins next.
         let slot = ((end * per_slot) as u64).max(first + 1);
-        (dial * DIAL + wheel as usize * SLOTS + slot as usize % SLOTS) as u16
+        (component * COMPONENT + wheel as usize * SLOTS + slot as usize % SLOTS) as u16
     }
 
     /// A dial moves on by `distance`, which is finite: what waits for less is to be judged.
-    pub fn advance(&mut self, distance: f64, dial: u8) {
-        let dial = usize::from(dial) % DIALS;
-        let (from, to) = (self.now[dial], self.now[dial] + distance);
-        self.now[dial] = to;
+    pub fn advance(&mut self, distance: f64, component: u8) {
+        let component = usize::from(component) % COMPONENTS;
+        let (from, to) = (self.now[component], self.now[component] + distance);
+        self.now[component] = to;
         if self.slots.is_empty() || distance <= 0.0 {
             return;
         }
@@ -126,9 +131,9 @@ impl TimingWheels {
             let (first, last) = ((from * per_slot) as u64, (to * per_slot) as u64);
             // In the first wheel the next slot has what could change at any moment.
             let last = if wheel == 0 { last.max(first + 1) } else { last };
-            let turned = (last - first).min(SLOTS as u64);
-            for slot in (0..turned).map(|i| (last - i) as usize % SLOTS) {
-                self.flush(dial * DIAL + wheel as usize * SLOTS + slot);
+            let passed = (last - first).min(SLOTS as u64);
+            for slot in (0..passed).map(|i| (last - i) as usize % SLOTS) {
+                self.flush(component * COMPONENT + wheel as usize * SLOTS + slot);
             }
         }
     }
@@ -136,7 +141,7 @@ impl TimingWheels {
     fn flush(&mut self, slot: usize) {
         let mut list = std::mem::take(&mut self.slots[slot]);
         for id in list.drain(..) {
-            if self.place.get(id) == slot as u16 {
+            if self.slot_of.get(id) == slot as u16 {
                 self.open(id);
             }
         }
@@ -148,12 +153,12 @@ impl TimingWheels {
 
     /// Forgets things whose numbers are in a range.
     pub fn forget(&mut self, range: Range<u32>) {
-        self.place.forget(range);
+        self.slot_of.forget(range);
     }
 
     /// Forgets everything.
     pub fn clear(&mut self) {
-        self.place.clear();
+        self.slot_of.clear();
         self.open.clear();
         self.slots.iter_mut().for_each(Vec::clear);
     }
@@ -161,7 +166,7 @@ impl TimingWheels {
     /// Bytes of what there is, not of what is reserved for more.
     pub fn bytes(&self) -> u64 {
         let lists: usize = self.slots.iter().chain([&self.open]).map(Vec::len).sum();
-        (self.place.bytes() + 4 * lists + size_of_val(&self.slots[..])) as u64
+        (self.slot_of.bytes() + 4 * lists + size_of_val(&self.slots[..])) as u64
     }
 }
 
@@ -210,7 +215,7 @@ mod tests {
         waiting.defer(3, f64::INFINITY, 0);
         waiting.defer(5, f64::NAN, 0);
         waiting.advance(1e-9, 1);
-        assert!(waiting.is_settled(), "another dial");
+        assert!(waiting.is_settled(), "another component");
         waiting.advance(1e-9, 0);
         assert_eq!((waiting.next(), waiting.next()), (Some(5), None));
         waiting.advance(1e9, 0);

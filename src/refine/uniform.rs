@@ -62,7 +62,7 @@ impl Front {
         mt: &impl ApplyUpdates,
         outcome: &mut Outcome,
     ) -> Result<(), UpdateError> {
-        self.forget_watch();
+        self.untrack();
         self.sweep(mt, Wanted::new(&[]), false, outcome, &mut |_| true).map(drop)
     }
 
@@ -97,12 +97,12 @@ impl Front {
             let size = window_size(self.applied_count);
             while done < words && window.updates.len() < size {
                 let word = if applied { done } else { words - 1 - done };
-                self.push_unlike(mt, wanted, word, applied, &mut window.updates);
+                self.push_pending(mt, wanted, word, applied, &mut window.updates);
                 done += 1;
             }
             window.sort(mt, &self.mesh);
             for &u in &window.updates {
-                self.turn(mt, u, applied, &mut staying, outcome)?;
+                self.apply_or_undo(mt, u, applied, &mut staying, outcome)?;
                 if !go_on(outcome) {
                     return Ok(false);
                 }
@@ -112,7 +112,7 @@ impl Front {
     }
 
     /// Appends the updates of a word that a sweep has to apply, by rising number, or to undo, by falling number.
-    fn push_unlike(
+    fn push_pending(
         &self,
         mt: &impl ApplyUpdates,
         wanted: Wanted<'_>,
@@ -138,7 +138,7 @@ impl Front {
 
     /// Applies or undoes `u` and before it what is in the way. What has to stay for the sake of another update does so,
     /// which happens where errors grow along the partial order.
-    fn turn(
+    fn apply_or_undo(
         &mut self,
         mt: &impl ApplyUpdates,
         u: UpdateId,
@@ -149,10 +149,10 @@ impl Front {
         let mut next = Some(u).filter(|&u| self.contains(u) != applied);
         let mut waiting = Vec::new();
         while let Some(u) = next {
-            let turned =
+            let result =
                 if applied { mt.refine_marked(&mut self.mesh, u) } else { mt.coarsen(&mut self.mesh, u) };
             // What depends on an update that is not here is as if it were not here itself.
-            let is_cut_off = match &turned {
+            let is_cut_off = match &result {
                 Ok(Applied::Blocked(other)) => applied && *other < u && !mt.has(*other),
                 Err(UpdateError::Missing { .. }) => applied && mt.present() < mt.info().updates,
                 _ => false,
@@ -160,7 +160,7 @@ impl Front {
             if is_cut_off {
                 return Ok(());
             }
-            next = match turned? {
+            next = match result? {
                 Applied::Done => {
                     self.note(u, applied);
                     *(if applied { &mut outcome.refined } else { &mut outcome.coarsened }) += 1;

@@ -36,7 +36,7 @@ mod same;
 
 use crate::mesh::TetMesh;
 use crate::mt::{ApplyUpdates, ErrorCode, UpdateId, check_errors};
-use crate::refine::{Criterion, Front, LodCriterion, Need, Outcome, Part, Request, TetLook};
+use crate::refine::{Criterion, Front, LodCriterion, Need, Outcome, Part, Request, TetData};
 use deviation::{Deviation, TetErrors};
 use history::Numbers;
 use mesh_checks::PlainMesh;
@@ -314,7 +314,7 @@ impl<M: ApplyUpdates> Walk<'_, M> {
     }
 
     fn answer(&mut self, front: &mut Front, query: &Query, report: &mut VerifyReport) -> Result<(), String> {
-        front.aim(self.mt, Arc::new(query.criterion(self.mt.info())), query.request.budget);
+        front.request(self.mt, Arc::new(query.criterion(self.mt.info())), query.request.budget);
         for step in 1..=MOST_STEPS {
             let most = if step < MOST_STEPS { 1 << (self.numbers.next() % 16) } else { u64::MAX };
             let outcome = front
@@ -436,9 +436,9 @@ impl<M: ApplyUpdates> Case<'_, M> {
             let levels = |field: usize| tet.map(|v| mesh.mesh.levels(v)[field]);
             let errors = self.own_errors(mesh, t, update);
             let error = errors.iter().max().copied().unwrap_or_default();
-            let look = TetLook { corners: &corners, levels: &levels, error, errors: &errors, update };
+            let look = TetData { corners: &corners, levels: &levels, error, errors: &errors, update };
             let verdict = criterion.rank(&look);
-            if verdict.asks() {
+            if verdict.violates() {
                 let error = look.error_of(criterion.field());
                 largest = (largest.0.max(error), f64::max(largest.1, verdict.excess));
             }

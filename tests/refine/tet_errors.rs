@@ -13,7 +13,7 @@ use tetralod::mesh::{Field, TetMesh};
 use tetralod::mt::{
     ApplyUpdates, CurrentMesh, ErrorCode, ExplicitMt, Mt, MtKind, MultiTessellation, UpdateId, VertexId,
 };
-use tetralod::refine::{Criterion, Front, LodCriterion, Need, Region, Request, TetLook};
+use tetralod::refine::{Criterion, Front, LodCriterion, Need, Region, Request, TetData};
 use tetralod::verify;
 use tetralod::verify::Reference;
 
@@ -72,8 +72,8 @@ impl Subject {
         let tet = self.explicit.tets()[t as usize].map(VertexId);
         let corners = tet.map(|v| self.explicit.position(v));
         let levels = |field: usize| tet.map(|v| self.explicit.levels(v)[field]);
-        let look = TetLook { corners: &corners, levels: &levels, error, errors: &errors, update };
-        criterion.judge(&look).asks().then_some(update.0)
+        let look = TetData { corners: &corners, levels: &levels, error, errors: &errors, update };
+        criterion.judge(&look).violates().then_some(update.0)
     }
 
     /// The least set that holds the remover of every violating tetrahedron of the base mesh or of one of its updates, and the
@@ -233,7 +233,7 @@ fn a_request_gives_the_least_set_whatever_was_asked_for_before() {
             let wanted = subject.closure(&criterion, updates);
             // At times in several steps, or broken off by another request.
             if step % 3 == 1 {
-                vertex.aim(&subject.vertex, Arc::new(criterion.clone()), request.budget);
+                vertex.request(&subject.vertex, Arc::new(criterion.clone()), request.budget);
                 let most = random.bits() % 40;
                 vertex.step(&subject.vertex, &mut |done| done.refined + done.coarsened < most).unwrap();
             }

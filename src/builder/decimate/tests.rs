@@ -1,9 +1,9 @@
 //! Promises: what is removed can be inserted again, step by step, in sound meshes; errors bound the deviation.
 
 use super::{Criterion, Decimated, Decimator, Levels, Reference, State, WorkMesh, decimate, quantize};
-use crate::builder::beside::Home;
 use crate::builder::cost::largest;
 use crate::builder::gift_wrap::GiftWrap;
+use crate::builder::location::Location;
 use crate::builder::reach::Reach;
 use crate::builder::sequence::Insertion;
 use crate::builder::{BuildConfig, BuildError, Purpose};
@@ -253,13 +253,13 @@ fn is_within(
         values(result, tet, at).is_some_and(|values| field_error(result, point, &values) <= bound)
     };
     let step = DVec3::from_array(result.quantized.lattice.step);
-    let beside = |&(t, face): &(usize, [u32; 3])| {
+    let location = |&(t, face): &(usize, [u32; 3])| {
         let corner = |v: u32| DVec3::from_array(result.quantized.positions[v as usize].map(f64::from)) * step;
         let nearest = nearest_on_triangle(at * step, face.map(corner));
         let distance = nearest.distance(at * step);
         distance <= bound * result.displacement_per_error + 1e-9 && fits(tets[t], nearest / step)
     };
-    tets.iter().any(|tet| fits(*tet, at)) || border.iter().any(beside)
+    tets.iter().any(|tet| fits(*tet, at)) || border.iter().any(location)
 }
 
 /// How far a reference vertex is from the boundary.
@@ -532,7 +532,7 @@ fn vertices_outside_of_their_tetrahedra_are_known() {
     let middle = (0..).zip(&mesh.tets).find(|(_, tet)| tet.contains(&(4 * 81 + 4 * 9 + 4)));
     let (tet, _) = middle.expect("the vertex in the middle has tetrahedra");
     quantized.places[0] -= DVec3::splat(0.4);
-    quantized.homes = vec![Home { point: 0, tet, lambda: DVec3::ZERO, outside: true }];
+    quantized.locations = vec![Location { point: 0, tet, lambda: DVec3::ZERO, outside: true }];
     let topology = topology(mesh.positions.len(), &mesh.tets).expect("a conforming mesh");
     let work = WorkMesh::new(mesh.tets.clone(), topology.neighbors, mesh.positions.len());
     let reference = Reference::new(&quantized, &work, 1.0, f64::INFINITY);
@@ -545,7 +545,7 @@ fn vertices_outside_of_their_tetrahedra_are_known() {
         let State { mesh: now, buckets, .. } = &decimator.state;
         let own = (0..now.tets.len() as u32).find(|&t| buckets.inside.iter(t).any(|point| point == 0));
         buckets_of_it.insert(own.expect("it is in a bucket"));
-        assert!(buckets.strays.is_outside(0), "after {before} removals");
+        assert!(buckets.outside_points.is_outside(0), "after {before} removals");
         let after = decimator.sequence.steps.len();
         if !decimator.rounds.end(after - before, mesh.positions.len() - after) {
             break;
