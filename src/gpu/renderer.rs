@@ -114,7 +114,7 @@ impl Renderer {
     /// triangles, and in what lies beyond its ends. What is uploaded is that, so the cost goes with what has changed.
     ///
     /// # Errors
-    /// If it is too large for the device; then none is shown, and [`Renderer::set_surface`] has to come next.
+    /// If it is too large for the device; then no surface is shown, and [`Renderer::set_surface`] must be called next.
     pub fn update_surface(
         &mut self,
         surface: &IsoSurface,
@@ -140,7 +140,7 @@ impl Renderer {
         self.wire.update(&self.context, boxes)
     }
 
-    /// Draws a picture. `false` when the target cannot take one just now, such as a hidden canvas.
+    /// Draws a picture. `false` when the target is not available, such as a hidden canvas.
     ///
     /// # Errors
     /// If the device is lost or refused something, now or since the last picture.

@@ -1,4 +1,4 @@
-//! What a camera sees: its pyramid of vision, and how large an error looks.
+//! Views: the view frustum of a camera, and the size of errors in pixels.
 
 use super::View;
 use super::criterion::{ANY, Frame, TetData, Verdict, component_of};
@@ -9,27 +9,27 @@ use glam::{DMat4, DVec2, DVec3, DVec4};
 /// A camera in model units, seen from the middle of the domain.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Camera {
-    /// What bounds the picture, normals outwards.
+    /// The sides of the view frustum, normals outwards.
     sides: [Plane; 4],
     depth: Depth,
 }
 
-/// How the size of things on the screen depends on their depth.
+/// How sizes on the screen depend on depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Depth {
-    /// Things look smaller with their distance from this plane.
+    /// Sizes are divided by the distance from this plane.
     Perspective {
         plane: Plane,
-        /// Pixels · depth of a thing of length 1.
+        /// The pixels of a length of 1 at depth 1.
         pixels: f64,
     },
-    /// They do not: pixels of a thing of length 1.
+    /// Sizes do not depend on depth. The pixels of a length of 1.
     Parallel { pixels: f64 },
 }
 
-/// Depths that urgency is told by are this close to each other: 2^(-1/16).
+/// The ratio of successive depths in [`Camera::nearest_depth`]: 2^(-1/16).
 const STEP: f64 = 0.957_603_280_698_573_6;
-/// So many of them are told apart: down to 2^-24 of the largest depth.
+/// The number of these depths: down to 2^-24 of the largest one.
 const STEPS: usize = 24 * 16;
 
 impl Camera {
@@ -113,8 +113,8 @@ impl Camera {
         rows.least_by(threshold)
     }
 
-    /// The nearest depth at which a tetrahedron is seen, on a fixed scale: the same for all tetrahedra, so that a larger error
-    /// at the same place is never the less urgent.
+    /// The nearest depth at which a tetrahedron is seen, on a fixed scale: the same for all tetrahedra, so that a
+    /// larger error at the same place never has a smaller excess.
     fn nearest_depth(&self, corners: &[DVec3; 4], margin: f64, plane: &Plane, frame: &Frame) -> f64 {
         let deepest = self.deepest(frame);
         let at = |step: usize| deepest * power(step);
@@ -127,7 +127,7 @@ impl Camera {
         at(near)
     }
 
-    /// No point of the domain is further away, and the camera need not be inside.
+    /// An upper bound of the depth of all points of the domain; the camera may be outside.
     fn deepest(&self, frame: &Frame) -> f64 {
         match &self.depth {
             Depth::Perspective { plane, .. } => (2.0 * frame.reach - plane.offset).max(frame.reach),
@@ -135,8 +135,8 @@ impl Camera {
         }
     }
 
-    /// How far a side of the pyramid of vision, by its number, or with number 4 the depth up to which errors look large, is from
-    /// that of another camera; in the unit of [`Camera::distance`].
+    /// The distance between the same side of two view frustums, by its number, or with number 4 between the depths up
+    /// to which errors look large; in the unit of [`Camera::distance`].
     pub fn component_distance(
         &self,
         pixels: f64,
@@ -160,7 +160,7 @@ impl Camera {
         by_sides.max(self.depth_distance(pixels, other, other_pixels, frame))
     }
 
-    /// The same for the functions that tell by the depth whether an error looks large.
+    /// The same for the depth up to which errors look large.
     fn depth_distance(&self, pixels: f64, other: &Self, other_pixels: f64, frame: &Frame) -> f64 {
         match (&self.depth, &other.depth) {
             (Depth::Perspective { plane: a, pixels: p }, Depth::Perspective { plane: b, pixels: q }) => {
@@ -187,7 +187,7 @@ impl Camera {
     }
 }
 
-/// Points nearer to the middle of the domain are taken to be so far from it.
+/// The least distance from the middle of the domain that movements are relative to.
 fn nearest(frame: &Frame) -> f64 {
     0.5 * frame.reach
 }

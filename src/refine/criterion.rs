@@ -1,4 +1,4 @@
-//! Is this tetrahedron fine enough? Functions of a tetrahedron and the error that its removal has.
+//! LOD criteria: functions of a tetrahedron and its error.
 
 use super::camera::Camera;
 use super::palette::Palette;
@@ -14,11 +14,11 @@ use std::sync::Arc;
 /// A tetrahedron of the MT as criteria see it.
 #[derive(Clone, Copy)]
 pub struct TetData<'a> {
-    /// Positions of its corners on the lattice, in any positive order: what a criterion says must not depend on which.
+    /// Positions of its corners on the lattice, in any positive order: verdicts must not depend on which.
     pub corners: &'a [[i32; 3]; 4],
     /// Levels of a field at its corners.
     pub levels: &'a dyn Fn(usize) -> [i32; 4],
-    /// Its error, the largest one of all fields: that of the update that removes it, or what the MT knows of its own.
+    /// Its error, the largest one of all fields: that of the update that removes it, or its own error.
     pub error: ErrorCode,
     /// The same for each field.
     pub errors: &'a [ErrorCode],
@@ -34,31 +34,31 @@ impl TetData<'_> {
     }
 }
 
-/// What a criterion says of a tetrahedron.
+/// The result of a criterion for a tetrahedron.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Verdict {
-    /// How often its error exceeds what is wanted there: above 1 it violates the request and the update that removes it has
-    /// to be applied; the larger, the more urgent under a budget.
+    /// Its error divided by the allowed error: above 1 the tetrahedron violates the request, and its remover has to be
+    /// applied. Under a budget, larger values come first.
     pub excess: f64,
     /// How far the criterion may move (see [`Criterion::distance`]) before the tetrahedron can begin or cease to violate it.
     /// Any smaller number is right as well.
     pub slack: f64,
-    /// Which movement counts: [`ANY`], or one of the criterion's own, up to [`COMPONENTS`] - 1.
+    /// The component of the movement that counts: [`ANY`], or one of the criterion's own, up to [`COMPONENTS`] - 1.
     pub component: u8,
 }
 
 /// Any movement of the criterion.
 pub const ANY: u8 = 0;
-/// So many sorts of movement can be told apart.
+/// The number of components of movement.
 pub const COMPONENTS: usize = 8;
-/// Planes of regions, and what a camera's picture ends at, move apart from each other: this and the next ones.
+/// The components of the planes of regions and view frustums: this and the next ones.
 const PLANES: u8 = 1;
 const PLANE_COMPONENTS: usize = 6;
-/// Tolerances do.
+/// The component of tolerances.
 const TOLERANCE: u8 = 7;
 
 impl Verdict {
-    /// What no criterion of the same kind will ever ask for.
+    /// A tetrahedron that no criterion of the same kind can violate.
     pub const NEVER: Self = Self { excess: 0.0, slack: f64::INFINITY, component: ANY };
 
     /// Whether the tetrahedron violates the request.
@@ -67,8 +67,8 @@ impl Verdict {
         self.excess > 1.0
     }
 
-    /// What two criteria say together, of which one violation is enough: that lasts as long as the last one, and begins with
-    /// the first.
+    /// The verdict of the union of two criteria: a violation lasts until both end, and begins when the first one
+    /// begins.
     #[inline]
     #[must_use]
     pub fn or(self, other: Self) -> Self {
@@ -86,68 +86,68 @@ impl Verdict {
     }
 }
 
-/// Says where a mesh is wanted at what error. See [`crate::refine`] for what monotone means.
+/// Decides which tetrahedra violate a request. [`crate::refine`] defines *monotone*.
 pub trait Criterion: Any + fmt::Debug + Send + Sync {
-    /// Judges a tetrahedron. The result depends on nothing but `tet` and the criterion.
+    /// Evaluates a tetrahedron. The result depends only on `tet` and the criterion.
     fn judge(&self, tet: &TetData<'_>) -> Verdict;
 
-    /// [`Criterion::judge`] with an excess that tells how urgent a violation is, so that violations can be compared. Asked
-    /// for under a budget only, since it may cost more.
+    /// [`Criterion::judge`] with an exact excess, by which violations can be compared. Called under a budget only,
+    /// since it may cost more.
     fn rank(&self, tet: &TetData<'_>) -> Verdict {
         self.judge(tet)
     }
 
-    /// Judges many tetrahedra at once, each as [`Criterion::judge`] would; for criteria that are
+    /// Evaluates many tetrahedra at once, each as [`Criterion::judge`] does; for criteria that are
     /// [batched](Criterion::is_batched).
     fn judge_all(&self, tets: &[TetData<'_>]) -> Vec<Verdict> {
         tets.iter().map(|tet| self.judge(tet)).collect()
     }
 
-    /// Whether many tetrahedra at once are much cheaper to judge than one by one.
+    /// Whether evaluating many tetrahedra at once is much cheaper than one by one.
     fn is_batched(&self) -> bool {
         false
     }
 
-    /// The errors asked for everywhere, if nothing else is asked for.
+    /// The tolerances, if the criterion is the same everywhere.
     fn uniform(&self) -> Option<Vec<Tolerance>> {
         None
     }
 
-    /// The field whose errors the criterion asks for, if it is one alone.
+    /// The field whose errors the criterion measures, if it is a single one.
     fn field(&self) -> Option<usize> {
         None
     }
 
-    /// The largest error that can be left anywhere where the error of the field is what is wanted, if that can be told.
+    /// The largest tolerance of the field's error; [`ErrorCode::MAX`] if unknown.
     fn tolerance(&self) -> ErrorCode {
         ErrorCode::MAX
     }
 
-    /// Whether the criterion is monotone. One that is not is answered from the base mesh each time.
+    /// Whether the criterion is monotone. Others are refined from the base mesh each time.
     fn is_monotone(&self) -> bool {
         true
     }
 
-    /// How far this criterion is from the one that was in force before, in the unit of [`Verdict::slack`]. Infinity is always
-    /// right, and makes every tetrahedron be judged again.
+    /// The distance of this criterion from the one before, in the unit of [`Verdict::slack`]. Infinity is always
+    /// correct; every tetrahedron is then evaluated again.
     fn distance(&self, before: &dyn Criterion) -> f64 {
         let _ = before;
         f64::INFINITY
     }
 
-    /// The part of that distance which counts for verdicts of one [`Verdict::component`].
+    /// One component of that distance, for verdicts with this [`Verdict::component`].
     fn component_distance(&self, before: &dyn Criterion, component: u8) -> f64 {
         let _ = component;
         self.distance(before)
     }
 }
 
-/// An error that is asked for.
+/// The allowed error of a field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Tolerance {
-    /// Of which field; of all of them if none.
+    /// The field; all of them if none.
     pub field: Option<usize>,
-    /// The error that is good enough.
+    /// The largest allowed error.
     pub error: ErrorCode,
 }
 
@@ -176,9 +176,9 @@ pub(super) struct Frame {
     pub displacement: f64,
     /// Updates of the MT.
     updates: f64,
-    /// By how much regions are widened for the first update beyond what its error demands. It falls to 0 for the last one, by
-    /// more than rounding can amount to from one update to the next: parents have smaller numbers than their children, so
-    /// what is asked for is asked for in spite of rounding wherever a child is.
+    /// By how much regions are widened for the first update beyond its error. It falls to 0 for the last one, by more
+    /// than the rounding error from each update to the next. Parents have smaller numbers than their children, so
+    /// rounding cannot select a child without its parent.
     guard: f64,
 }
 
@@ -222,7 +222,7 @@ impl Frame {
     }
 }
 
-/// One need, with what it compares worked out. A need with several ranges of values becomes several atoms.
+/// A part of a need, prepared for evaluation. A need with several ranges of values becomes several atoms.
 #[derive(Clone, Debug)]
 struct Atom {
     /// The field whose error counts, if it is not the largest one of all.
@@ -230,7 +230,7 @@ struct Atom {
     measure: Measure,
 }
 
-/// What an atom asks for.
+/// The quantity that an atom bounds.
 #[derive(Clone, Debug)]
 enum Measure {
     Field(FieldAtom),
@@ -258,8 +258,8 @@ struct Range {
     levels: f64,
 }
 
-/// The smallest error that a ratio is taken with: below the smallest one that can be stored, so that any error violates an
-/// error of 0.
+/// The smallest divisor of an excess: below the smallest error that can be stored, so that any error violates an error
+/// of 0.
 const LEAST_ERROR: f64 = 1.0 / (1_u64 << 26) as f64;
 
 /// A scale on which a factor of 2 is a distance of [`OCTAVE`], without a logarithm: exact at powers of 2, linear between them.
@@ -269,8 +269,8 @@ pub(super) fn octaves(x: f64) -> f64 {
 }
 
 impl LodCriterion {
-    /// The criterion of `request` for an MT. A field that is not there is the caller's to refuse, and the budget is another
-    /// matter.
+    /// The criterion of `request` for an MT. The caller checks that its fields exist; the budget is not part of the
+    /// criterion.
     pub fn new(info: &MtInfo, request: &Request) -> Self {
         let frame = Frame::new(info);
         let monotone = !request.needs.iter().any(|need| matches!(need.part, Part::Both(..)));
@@ -278,7 +278,7 @@ impl LodCriterion {
         Self { frame, atoms, custom: Vec::new(), monotone }
     }
 
-    /// Adds a need that a criterion of the caller's own tells.
+    /// Adds a criterion of the caller's own to the union.
     #[must_use]
     pub fn and(mut self, custom: Arc<dyn Criterion>) -> Self {
         self.monotone &= custom.is_monotone();
@@ -387,8 +387,8 @@ impl Criterion for LodCriterion {
         self.custom.iter().fold(own, |largest, custom| largest.max(custom.tolerance()))
     }
 
-    /// One of the tetrahedra from which another was made meets the region and one takes a value of the range, but it need not
-    /// be the same one.
+    /// With region and values together, one of the tetrahedra that an update removes meets the region and one takes a
+    /// value of the range, but these may be different ones.
     fn is_monotone(&self) -> bool {
         self.monotone
     }
@@ -424,7 +424,7 @@ impl Criterion for LodCriterion {
 }
 
 impl Atom {
-    // Once for all who ask: it is large.
+    // Not inlined: it is large.
     #[inline(never)]
     fn judge(&self, frame: &Frame, tet: &TetData<'_>, corners: &[DVec3; 4], ranked: bool) -> Verdict {
         let narrowed;
@@ -449,7 +449,7 @@ impl Atom {
         }
     }
 
-    /// The part of the distance that counts for one dial; not [`ANY`].
+    /// One component of the distance; not [`ANY`].
     fn component_distance(&self, before: &Self, frame: &Frame, component: u8) -> f64 {
         if self.field != before.field {
             return f64::INFINITY;
@@ -482,13 +482,13 @@ impl Atom {
     }
 }
 
-/// The dial of a plane.
+/// The component of a plane.
 pub(super) fn component_of(plane: Option<usize>) -> u8 {
     plane.map_or(ANY, |plane| PLANES + (plane % PLANE_COMPONENTS) as u8)
 }
 
-/// Errors have codes that are 2^11 to the octave. An octave is as much as sixteen ways through the domain: regions move often,
-/// tolerances seldom, and what waits for the one is not to be woken by the other.
+/// Errors have codes that are 2^11 to the octave. An octave is as much as sixteen ways through the domain: regions move
+/// often, tolerances seldom, and each has a component of its own.
 const CODES: f64 = 2048.0 / OCTAVE;
 const OCTAVE: f64 = 16.0;
 
@@ -545,17 +545,17 @@ impl FieldAtom {
             }
             _ => f64::INFINITY,
         };
-        // Sides at the same infinity differ by NaN, which `max` passes over.
+        // Sides at the same infinity differ by NaN, which `max` ignores.
         errors.max(shapes).max(values)
     }
 }
 
-/// Conditions that must all hold: how long that lasts, or how long until it can be.
+/// The conjunction of conditions, with its slack.
 struct Conditions {
     all: bool,
-    /// The least that any one which holds can lose.
+    /// The least slack of the conditions that hold.
     held: f64,
-    /// The most that any one which does not hold lacks, and what it waits for.
+    /// The largest slack of the conditions that do not hold, and its component.
     missing: f64,
     component: u8,
 }

@@ -4,7 +4,7 @@ use super::{TetData, Verdict};
 use crate::mt::{ApplyUpdates, CurrentMesh, ErrorCode, UpdateId};
 use std::borrow::Cow;
 
-/// A tetrahedron that is to be judged, with what that takes.
+/// A tetrahedron to evaluate, with its data.
 pub(super) struct Open<'a> {
     pub t: u32,
     pub tet: [u32; 4],
@@ -44,14 +44,14 @@ impl<'a> TetErrors<'a> {
         Self::new(mt, u, mt.quarterings(mesh, t))
     }
 
-    /// Those of a tetrahedron of which only this is known.
+    /// Bounds of the errors of a tetrahedron.
     pub fn bounded_by(errors: &'a [ErrorCode]) -> Self {
         let largest = errors.iter().copied().fold(ErrorCode::ZERO, ErrorCode::max);
         Self { largest, by_field: Cow::Borrowed(errors) }
     }
 }
 
-/// Shows a tetrahedron of the mesh to `judge`.
+/// Calls `judge` with a tetrahedron of the mesh.
 #[inline]
 pub(super) fn see(
     mesh: &CurrentMesh,

@@ -1,4 +1,4 @@
-//! Updates that arrive and leave, one after the other or page by page, and what pages the front waits for.
+//! Updates that arrive one by one or in pages, pages that are evicted, and the pages that the front awaits.
 
 use super::Criterion;
 use super::front::{CHUNK_WORDS, Front, Violation};
@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 impl Front {
-    /// Takes note of updates that have arrived.
+    /// Registers updates that have arrived.
     pub(super) fn sync(&mut self, mt: &impl ApplyUpdates) {
         if mt.updates() <= self.known && !self.applied.words().is_empty() {
             return;
@@ -21,7 +21,7 @@ impl Front {
         self.add_updates(mt, arrived);
     }
 
-    /// Tells the mesh of updates that have arrived. What they remove is judged again, and nothing else.
+    /// Registers a range of updates. Only the tetrahedra that they remove are evaluated again.
     fn add_updates(&mut self, mt: &impl ApplyUpdates, updates: Range<u32>) {
         self.note_errors(mt, updates.clone());
         while let Some(&(u, t)) = self.awaiting.range((updates.start, 0)..(updates.end, 0)).next() {
@@ -33,7 +33,7 @@ impl Front {
         self.restart();
     }
 
-    /// The goal is another one with what is here now.
+    /// The goal has to be reached anew with the present updates.
     fn restart(&mut self) {
         self.ranked.clear();
         if let Some(goal) = &mut self.goal {
@@ -41,9 +41,8 @@ impl Front {
         }
     }
 
-    /// Takes note that a page of updates has come to the MT, with all on which it depends. Updates that are not here are no
-    /// updates: a mesh is what was asked for as far as those that are here go. Needs not be told of updates that came by
-    /// `push`, behind all others.
+    /// Registers a page that has been inserted into the MT, together with all pages on which it depends. Updates added
+    /// by `push`, after all others, need no call.
     pub fn page_inserted(&mut self, mt: &impl ApplyUpdates, page: u32) {
         let (updates, known) = (mt.page_updates(page), self.known);
         self.sync(mt);
@@ -53,8 +52,8 @@ impl Front {
         }
     }
 
-    /// Gets ready for a page of updates to be taken from the MT, which has to follow at once. False if that must not be, since
-    /// one of them is applied.
+    /// Prepares the eviction of a page from the MT, which must follow at once. False if one of its updates is applied:
+    /// then it must not be evicted.
     pub fn prepare_eviction(&mut self, mt: &impl ApplyUpdates, page: u32) -> bool {
         let updates = mt.page_updates(page);
         if updates.clone().any(|u| self.contains(UpdateId(u))) {
@@ -71,7 +70,7 @@ impl Front {
         true
     }
 
-    /// Takes note of the errors of updates that have arrived.
+    /// Records the errors of updates that have arrived.
     fn note_errors(&mut self, mt: &impl ApplyUpdates, updates: Range<u32>) {
         for u in updates {
             let chunk = u as usize / (64 * CHUNK_WORDS);
@@ -83,9 +82,8 @@ impl Front {
         }
     }
 
-    /// The pages that are not here but hold what removes a tetrahedron that violates the criterion, as far as what is known of
-    /// the page tells, or what such an update depends on; each with the largest excess. Only what the mesh shows at once:
-    /// more may be demanded when these have come. Ascending.
+    /// The absent pages with the remover of a tetrahedron that may violate the criterion, or with an update on which
+    /// that depends; each with the largest excess, ascending. More may be demanded when these have arrived.
     pub fn demanded_pages(
         &self,
         mt: &impl ApplyUpdates,
@@ -116,8 +114,8 @@ impl Front {
         pages
     }
 
-    /// The pages that are here and hold what removes a tetrahedron which might violate the criterion, as far as `bounds` of the
-    /// page tell: without them it would be unknown whether the mesh is what was asked for. Some are named several times.
+    /// The present pages with the remover of a tetrahedron that may violate the criterion by the `bounds` of the page:
+    /// without them it would be unknown whether the mesh satisfies the request. Some are listed several times.
     pub fn decisive_pages(
         &self,
         mt: &impl ApplyUpdates,
@@ -129,7 +127,7 @@ impl Front {
         for (t, tet) in (0..).zip(self.mesh.tets()) {
             let Some(u) = mt.remover(&self.mesh, t) else { continue };
             let page = page_of(u);
-            // Tetrahedra side by side are often removed by updates of a page.
+            // Neighbouring tetrahedra are often removed by updates of one page.
             if pages.last() == Some(&page) {
                 continue;
             }

@@ -1,4 +1,4 @@
-//! A transfer function, prepared to tell how much an error of the field can change a picture.
+//! A transfer function, tabulated to bound the change of a picture by an error of the field.
 
 use super::Transfer;
 use crate::mt::FieldInfo;
@@ -55,8 +55,8 @@ impl Palette {
         }
     }
 
-    /// How much an error, as a fraction of the field's range, can change what is seen of a tetrahedron with these levels, along a
-    /// ray through the whole model.
+    /// A bound of how much an error, as a fraction of the field's range, changes the picture of a tetrahedron with
+    /// these levels, along a ray through the whole model.
     pub fn change(&self, levels: &[i32; 4], error: f64) -> f64 {
         if error <= 0.0 {
             return 0.0;
@@ -125,7 +125,7 @@ impl Curve {
         Self { points: transfer.points.iter().map(weighted).collect() }
     }
 
-    /// What the channels are from `low` to `high`, and how steeply they change there at most, per unit of the field.
+    /// The range of the channels from `low` to `high`, and their largest change per unit of the field there.
     fn between(&self, low: f64, high: f64) -> (Extent, f32) {
         let mut extent = Extent::NONE;
         let mut steep = 0.0_f64;

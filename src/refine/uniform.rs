@@ -1,4 +1,4 @@
-//! Requests that errors alone decide: which updates they want needs no look at the mesh.
+//! Uniform requests: the errors of updates alone decide, not the mesh.
 
 use super::front::{CHUNK_WORDS, Front, GoOn};
 use super::sweep::{Window, window_size};
@@ -6,13 +6,13 @@ use super::{Outcome, Tolerance};
 use crate::mesh::BitSet;
 use crate::mt::{Applied, ApplyUpdates, ErrorCode, UpdateError, UpdateId};
 
-/// The updates that are asked for everywhere, by their errors alone.
+/// The updates that a uniform request needs, by their errors.
 #[derive(Clone, Copy)]
 pub(super) struct Wanted<'a> {
     tolerances: &'a [Tolerance],
-    /// What all of them have a larger error than.
+    /// All of them have a larger error than this.
     least: ErrorCode,
-    /// What has a larger error than this is wanted for sure.
+    /// All updates with a larger error than this are needed.
     sure: ErrorCode,
 }
 
@@ -35,7 +35,7 @@ impl<'a> Wanted<'a> {
     }
 }
 
-/// The updates that a sweep which undoes others leaves applied.
+/// The updates that stay applied in a sweep that undoes others.
 struct Staying<'a> {
     wanted: Wanted<'a>,
     /// Those on which such updates depend, as far as they were found; none where errors are monotone.
@@ -66,8 +66,8 @@ impl Front {
         self.sweep(mt, Wanted::new(&[]), false, outcome, &mut |_| true).map(drop)
     }
 
-    /// Undoes all updates within the tolerances and applies the others. Which these are, errors tell without a look at the
-    /// mesh; they are monotone along the partial order, so no update is in the way of what is undone.
+    /// Undoes all updates within the tolerances and applies the others. Errors alone decide. They are monotone along
+    /// the partial order, so no needed update depends on one that is undone.
     pub(super) fn satisfy_uniform(
         &mut self,
         mt: &impl ApplyUpdates,
@@ -78,8 +78,8 @@ impl Front {
         Ok(self.sweep(mt, wanted, false, outcome, go_on)? && self.sweep(mt, wanted, true, outcome, go_on)?)
     }
 
-    /// Applies all updates that are wanted, or undoes all others: windows by number, in each by place. What is in the way of
-    /// one is done before it. False if it was told to stop.
+    /// Applies all needed updates, or undoes all others: in windows by number, in each by place. Updates that block
+    /// another one come before it. False if the caller stopped it.
     fn sweep(
         &mut self,
         mt: &impl ApplyUpdates,
@@ -136,8 +136,8 @@ impl Front {
         }
     }
 
-    /// Applies or undoes `u` and before it what is in the way. What has to stay for the sake of another update does so,
-    /// which happens where errors grow along the partial order.
+    /// Applies or undoes `u`, after the updates that block it. Where errors grow along the partial order, an update
+    /// stays applied if a needed one depends on it.
     fn apply_or_undo(
         &mut self,
         mt: &impl ApplyUpdates,
@@ -151,7 +151,7 @@ impl Front {
         while let Some(u) = next {
             let result =
                 if applied { mt.refine_marked(&mut self.mesh, u) } else { mt.coarsen(&mut self.mesh, u) };
-            // What depends on an update that is not here is as if it were not here itself.
+            // An update that depends on a missing one counts as missing.
             let is_cut_off = match &result {
                 Ok(Applied::Blocked(other)) => applied && *other < u && !mt.has(*other),
                 Err(UpdateError::Missing { .. }) => applied && mt.present() < mt.info().updates,

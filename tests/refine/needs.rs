@@ -246,7 +246,7 @@ struct LodScaled {
 impl Criterion for LodScaled {
     fn judge(&self, tet: &TetData<'_>) -> Verdict {
         let verdict = self.criterion.rank(tet);
-        Verdict { excess: if verdict.excess >= self.by { 2.0 } else { 0.0 }, slack: 0.0, dial: ANY }
+        Verdict { excess: if verdict.excess >= self.by { 2.0 } else { 0.0 }, slack: 0.0, component: ANY }
     }
 }
 
@@ -290,7 +290,7 @@ proptest! {
         let errors = &[error; 3];
         let look = TetData { corners: &corners, levels: &level, error, errors, update: UpdateId(3) };
         let [old, new] = [&before, &after].map(|criterion| criterion.judge(&look));
-        let distance = after.turned(&before, old.dial);
+        let distance = after.component_distance(&before, old.component);
         prop_assert!(distance <= after.distance(&before));
         prop_assert!(old.violates() == new.violates() || old.slack <= distance, "{:?} {:?} {}", old, new, distance);
         prop_assert_eq!(old.violates(), before.rank(&look).violates());
