@@ -4,6 +4,7 @@ use super::candidate_queue::{CandidateQueue, Key, Levels};
 use super::collapse_check::{CheckedCollapse, Refusal, VertexMarks};
 use super::cost::{Buckets, Evaluator, Input, Reference, VertexData, largest};
 use super::history::Collapse;
+use super::points::squared_length;
 use super::work_mesh::WorkMesh;
 use super::{
     BuildConfig, BuildError, BuildProgress, BuildResult, BuildSummary, OnProgress, field_selection, history,
@@ -96,8 +97,6 @@ impl<'a> Builder<'a> {
     fn new(mesh: WorkMesh, reference: Reference<'a>, info: &MtInfo, frozen: Vec<bool>) -> Self {
         let quantized = reference.quantized;
         let points = quantized.positions.len();
-        let mut degrees = vec![0; points];
-        mesh.tets.iter().flatten().for_each(|&v| degrees[v as usize] += 1);
         let foot = |v: u32| reference.boundary.at(v).first().copied().unwrap_or(crate::mesh::NONE);
         let data = VertexData {
             positions: quantized.positions.clone(),
@@ -111,6 +110,7 @@ impl<'a> Builder<'a> {
             buckets: Buckets::new(mesh.tets.len(), quantized),
             marks: VertexMarks::new(points),
             versions: vec![0; points],
+            degrees: mesh.degrees(),
             mesh,
             data,
             reference,
@@ -120,7 +120,6 @@ impl<'a> Builder<'a> {
             collapse: CheckedCollapse::default(),
             evaluator: Evaluator::default(),
             history: Vec::new(),
-            degrees,
             floors: quantize::floors(info),
         }
     }
@@ -190,8 +189,7 @@ impl<'a> Builder<'a> {
 
     fn key(&self, error: f64, height: u32, star: u32, a: u32, b: u32) -> Key {
         let (p, q) = (self.data.positions[a as usize], self.data.positions[b as usize]);
-        let length: f32 = (0..3).map(|i| (i64::from(p[i]) - i64::from(q[i])) as f32).map(|d| d * d).sum();
-        Key::new(LEVELS.of(error), height + star, length, a, b)
+        Key::new(LEVELS.of(error), height + star, squared_length(p, q), a, b)
     }
 
     /// A predicted key: from second differences of the fields, and from the errors and depths of the ends.
@@ -237,21 +235,21 @@ impl<'a> Builder<'a> {
     fn perform(&mut self) {
         // Never zero: error 0 is to mean the reference mesh, with every update applied.
         let stored = |error: &f64, floor: &f64| ErrorCode::at_least(error.max(*floor)).max(ErrorCode(1));
-        let errors = self.evaluator.errors.iter().zip(&self.floors);
+        let errors = self.evaluator.placement.errors.iter().zip(&self.floors);
         let errors: Vec<ErrorCode> = errors.map(|(error, floor)| stored(error, floor)).collect();
         let code = errors.iter().copied().fold(ErrorCode::ZERO, ErrorCode::max);
         let v = self.data.positions.len() as u32;
         let Self { collapse, mesh, data, evaluator, .. } = self;
         self.history.push(Collapse::new(collapse, mesh, code, evaluator.steps));
         data.positions.push(collapse.position);
-        data.levels.extend_from_slice(&evaluator.levels);
+        data.levels.extend_from_slice(&evaluator.star.levels);
         data.errors.extend(errors.iter().map(|code| code.error()));
         data.height.push(evaluator.height);
         data.foot.push(evaluator.foot);
         let input = Input { collapse, mesh, data, reference: &self.reference };
         evaluator.move_points(&mut self.buckets, input);
-        for f in 0..evaluator.levels.len() {
-            let fields = evaluator.levels.len();
+        for f in 0..evaluator.star.levels.len() {
+            let fields = evaluator.star.levels.len();
             let [g, h] = [collapse.a, collapse.b].map(|w| self.gradients[w as usize * fields + f]);
             self.gradients.push((g + h) * 0.5);
         }

@@ -13,12 +13,13 @@
 use super::boundary_distance::BoundaryDistance;
 use super::collapse_check::CheckedCollapse;
 use super::outside_points::OutsidePoints;
-use super::points::{Lists, SLACK, as_vec, bounds, clamped, locate};
+use super::placement::{Placement, Replacement};
+use super::points::{Lists, SLACK, as_vec, bounds};
 use super::quantize::Quantized;
 use super::work_mesh::WorkMesh;
-use crate::geom::{nearest_on_triangle, orient3d};
+use crate::geom::orient3d;
 use crate::mesh::{EDGES, FACES, NONE};
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
 /// The vertices of the input, and those that collapses create.
 pub(super) struct VertexData {
@@ -76,47 +77,6 @@ pub(super) struct Reference<'a> {
     pub displacement_per_error: f64,
 }
 
-/// One tetrahedron of the star after the collapse.
-struct Cell {
-    /// `(λ_x, λ_y, λ_z)` of a point are this times its position relative to the centre.
-    barycentric: DMat3,
-    others: [u32; 3],
-    tet: u32,
-}
-
-/// A boundary triangle in model units.
-pub(super) struct Face {
-    corners: [DVec3; 3],
-    normal: DVec3,
-    /// The normal's length, squared.
-    area: f64,
-}
-
-impl Face {
-    pub fn new(corners: [DVec3; 3]) -> Self {
-        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
-        Self { corners, normal, area: normal.length_squared() }
-    }
-}
-
-/// The number of the face nearest to `p`, the nearest point there, and its distance.
-pub(super) fn nearest_face(p: DVec3, faces: &[Face]) -> (usize, DVec3, f64) {
-    let (mut least, mut found, mut nearest) = (f64::INFINITY, 0, p);
-    for (i, face) in faces.iter().enumerate() {
-        // No point of a triangle is nearer than its plane.
-        let height = (p - face.corners[0]).dot(face.normal);
-        if height * height > least * face.area {
-            continue;
-        }
-        let q = nearest_on_triangle(p, face.corners);
-        let distance = p.distance_squared(q);
-        if distance < least {
-            (least, found, nearest) = (distance, i, q);
-        }
-    }
-    (found, nearest, least.sqrt())
-}
-
 /// A collapse to evaluate, and what it is compared with.
 #[derive(Clone, Copy)]
 pub(super) struct Input<'a> {
@@ -129,23 +89,11 @@ pub(super) struct Input<'a> {
 /// Evaluates collapses; holds scratch space.
 #[derive(Default)]
 pub(super) struct Evaluator {
-    cells: Vec<Cell>,
-    /// Boundary triangles of the star: the cell and its corners, [`NONE`] for the centre. Those at the centre first.
-    border: Vec<(u32, [u32; 3])>,
+    pub star: NewStar,
+    pub placement: Placement,
     at_centre: usize,
-    /// The same triangles in model units with their normals, made when they are first needed.
-    faces: Vec<Face>,
     flat: bool,
     old_border: Vec<[u32; 3]>,
-    /// Where each point goes: point, cell, and whether it is outside.
-    moves: Vec<(u32, u32, bool)>,
-    /// Points of other buckets that are inside: point and cell.
-    foreign: Vec<(u32, u32)>,
-    border_moves: Vec<(u32, u32)>,
-    /// The levels of the new vertex.
-    pub levels: Vec<i32>,
-    /// The error of each field.
-    pub errors: Vec<f64>,
     /// The largest error of each field among the updates that this one will be a parent of.
     inherited: Vec<f64>,
     /// The triangle of the reference boundary near the new vertex.
@@ -155,9 +103,41 @@ pub(super) struct Evaluator {
     pub steps: [f64; 2],
 }
 
-/// Raises the errors of all fields to at least this.
-pub(super) fn raise(errors: &mut [f64], least: f64) {
-    errors.iter_mut().for_each(|error| *error = error.max(least));
+/// The star of the new vertex.
+#[derive(Default)]
+pub(super) struct NewStar {
+    /// For each tetrahedron its other corners.
+    others: Vec<[u32; 3]>,
+    /// Boundary triangles: the tetrahedron and the corners, [`NONE`] for the new vertex. Those at the new vertex first.
+    border: Vec<(u32, [u32; 3])>,
+    /// The levels of the new vertex.
+    pub levels: Vec<i32>,
+}
+
+impl Replacement for (Input<'_>, &NewStar) {
+    fn reference(&self) -> &Reference<'_> {
+        self.0.reference
+    }
+
+    fn border(&self) -> &[(u32, [u32; 3])] {
+        &self.1.border
+    }
+
+    fn corner(&self, v: u32) -> DVec3 {
+        let Input { collapse, data, reference, .. } = self.0;
+        reference.scaled(if v == NONE { collapse.position } else { data.positions[v as usize] })
+    }
+
+    fn levels(&self, cell: usize, field: usize) -> [i32; 4] {
+        let NewStar { others, levels, .. } = self.1;
+        let [x, y, z] = others[cell].map(|v| self.0.data.levels[v as usize * levels.len() + field]);
+        [levels[field], x, y, z]
+    }
+
+    fn relative(&self, q: DVec3, _: DVec3) -> DVec3 {
+        let Input { collapse, reference, .. } = self.0;
+        (q - reference.scaled(collapse.position)) / DVec3::from_array(reference.quantized.lattice.step)
+    }
 }
 
 /// The largest error of all fields.
@@ -169,46 +149,42 @@ pub(super) fn largest(errors: &[f64]) -> f64 {
 const NO_DISTANCE: f64 = 1e-8;
 
 impl Evaluator {
-    /// The error of the planned collapse, the largest one of all fields; any value above `limit` may be returned early once it is exceeded, then
-    /// as a lower bound.
+    /// The largest error of all fields; once it exceeds `limit`, any lower bound above `limit` may be returned.
     pub fn evaluate(&mut self, buckets: &Buckets, limit: f64, input: Input<'_>) -> f64 {
-        let Input { collapse, mesh, data, reference } = input;
+        let Input { collapse, reference, .. } = input;
         self.steps = [0.0; 2];
         self.halve_levels(input);
         let newest = self.inherit(input);
-        self.cells.clear();
-        self.cells.extend(
-            collapse.stay.iter().map(|&(s, _)| Cell::new(s.tet, s.corner as usize, collapse, mesh, data)),
-        );
-        self.collect_border(input);
+        self.lay_out_star(input);
         self.flat = self.is_flat(input);
         if newest {
             self.add_overshoot(input);
         }
         let foot = self.find_foot(input);
-        raise(&mut self.errors, foot);
-        if newest && largest(&self.errors) <= limit {
+        self.placement.raise(foot);
+        if newest && largest(&self.placement.errors) <= limit {
             let steps = self.steps_of_boundary(input);
             self.steps = steps.map(|distance| reference.least_error_of(distance));
             let step = self.steps[0].max(self.steps[1]);
-            let Self { errors, inherited, .. } = self;
-            errors.iter_mut().zip(inherited).for_each(|(error, own)| *error = error.max(*own + step));
+            let errors = self.placement.errors.iter_mut().zip(&self.inherited);
+            errors.for_each(|(error, own)| *error = error.max(*own + step));
         }
-        if collapse.on_boundary && !self.flat && largest(&self.errors) <= limit {
+        if collapse.on_boundary && !self.flat && largest(&self.placement.errors) <= limit {
             // Where it is flat, no point of the boundary gets further away than it is.
             let border = self.place_on_border(buckets, input);
-            raise(&mut self.errors, border);
+            self.placement.raise(border);
         }
-        let mut error = largest(&self.errors);
+        let Self { placement, star, old_border, .. } = self;
+        let new = (input, &*star);
+        let mut error = largest(&placement.errors);
         if error > limit {
             return error;
         }
-        self.moves.clear();
         let stars = collapse.stay.iter().enumerate().map(|(i, (s, _))| (s.tet, i));
         let fans = collapse.fan.iter().map(|&(tet, ..)| (tet, 0));
         for (tet, cell) in stars.chain(fans) {
             for point in buckets.inside.iter(tet) {
-                error = error.max(self.place(point, cell, input));
+                error = error.max(placement.place(point, cell, &new).0);
                 if error > limit {
                     return error;
                 }
@@ -217,72 +193,43 @@ impl Evaluator {
         // Those that the lattice has moved are in a bucket already.
         let is_new = |end: &u32| *end < reference.points && !reference.quantized.is_moved(*end);
         for end in [collapse.a, collapse.b].into_iter().filter(is_new) {
-            error = error.max(self.place(end, 0, input));
+            error = error.max(placement.place(end, 0, &new).0);
         }
-        error.max(self.compare_foreign(buckets, input))
-    }
-
-    /// The error at points of other buckets that the new star contains.
-    fn compare_foreign(&mut self, buckets: &Buckets, input: Input<'_>) -> f64 {
-        let Input { collapse, data, .. } = input;
-        self.foreign.clear();
-        let mut error = 0.0_f64;
-        let rim = self.old_border.iter().flatten().map(|&v| data.positions[v as usize]);
+        let rim = old_border.iter().flatten().map(|&v| input.data.positions[v as usize]);
         let changed = (collapse.on_boundary && !self.flat).then(|| bounds(rim.chain([collapse.position])));
-        for point in buckets.outside_points.candidates(removed(collapse), changed) {
-            error = error.max(self.compare_point(point, input));
-        }
-        error
-    }
-
-    fn compare_point(&mut self, point: u32, input: Input<'_>) -> f64 {
-        let Input { collapse, reference, .. } = input;
-        let relative = reference.quantized.places[point as usize] - as_vec(collapse.position);
-        let (cell, lambda, depth) = locate(self.cells.len(), 0, |i| self.cells[i].barycentric * relative);
-        if depth < -SLACK {
-            return 0.0;
-        }
-        self.foreign.push((point, cell as u32));
-        self.deviate(point, cell, clamped(lambda), input)
+        let candidates = buckets.outside_points.candidates(removed(collapse), changed);
+        error.max(placement.place_foreign(candidates, &new))
     }
 
     /// Moves the points to the buckets where [`Evaluator::evaluate`] found them to belong.
     pub fn move_points(&mut self, buckets: &mut Buckets, input: Input<'_>) {
-        if input.collapse.on_boundary && self.flat {
+        let collapse = input.collapse;
+        if collapse.on_boundary && self.flat {
             self.place_on_border(buckets, input);
         }
-        input.collapse.stay.iter().for_each(|(s, _)| buckets.inside.take(s.tet));
-        input.collapse.fan.iter().for_each(|&(tet, ..)| buckets.inside.take(tet));
-        removed(input.collapse).for_each(|tet| buckets.outside_points.clear(tet));
-        for &(point, cell, outside) in &self.moves {
-            buckets.inside.put(self.cells[cell as usize].tet, point);
-            buckets.outside_points.set_outside(point, outside);
+        for tet in removed(collapse) {
+            buckets.inside.take(tet);
+            buckets.outside_points.clear(tet);
+            if collapse.on_boundary {
+                buckets.border.take(tet);
+            }
         }
-        let foreign = self.foreign.iter();
-        foreign.for_each(|&(point, cell)| {
-            buckets.outside_points.add_foreign(self.cells[cell as usize].tet, point)
-        });
-        if input.collapse.on_boundary {
-            input.collapse.stay.iter().for_each(|(s, _)| buckets.border.take(s.tet));
-            input.collapse.fan.iter().for_each(|&(tet, ..)| buckets.border.take(tet));
-            let moves = self.border_moves.iter();
-            moves.for_each(|&(point, cell)| buckets.border.put(self.cells[cell as usize].tet, point));
-        }
+        self.placement.move_points(buckets, |cell| collapse.stay[cell as usize].0.tet);
     }
 
     fn halve_levels(&mut self, input: Input<'_>) {
         let Input { collapse, data, reference, .. } = input;
         let fields = reference.quantized.fields.len();
         let [a, b] = [collapse.a, collapse.b].map(|v| &data.levels[v as usize * fields..][..fields]);
-        self.levels.clear();
-        self.levels.extend(a.iter().zip(b).map(|(a, b)| b + ((a - b) >> 1)));
+        self.star.levels.clear();
+        self.star.levels.extend(a.iter().zip(b).map(|(a, b)| b + ((a - b) >> 1)));
     }
 
     /// Starts with the errors of the updates that this one will be a parent of; returns whether there are any. A
     /// tetrahedron was made by the collapse that made its newest vertex.
     fn inherit(&mut self, input: Input<'_>) -> bool {
         let Input { collapse, mesh, data, .. } = input;
-        let (fields, mut height) = (self.levels.len(), 0);
+        let (fields, mut height) = (self.star.levels.len(), 0);
         self.inherited.clear();
         self.inherited.resize(fields, 0.0);
         for tet in removed(collapse) {
@@ -292,7 +239,7 @@ impl Evaluator {
             height = height.max(data.height[newest]);
         }
         self.height = height + 1;
-        self.errors.clone_from(&self.inherited);
+        self.placement.errors.clone_from(&self.inherited);
         height > 0
     }
 
@@ -303,12 +250,12 @@ impl Evaluator {
         let fields = &reference.quantized.fields;
         let level = |v: u32, f: usize| data.levels[v as usize * fields.len() + f];
         for (f, field) in fields.iter().enumerate() {
-            let own = self.levels[f];
+            let own = self.star.levels[f];
             let (low, high) =
                 collapse.link.iter().map(|&v| level(v, f)).fold((own, own), |(l, h), x| (l.min(x), h.max(x)));
             let (a, b) = (level(collapse.a, f), level(collapse.b, f));
             let beyond = (a.max(b) - high).max(low - a.min(b)).max(0);
-            self.errors[f] += f64::from(beyond) * field.step / field.range() * (1.0 + 1e-9);
+            self.placement.errors[f] += f64::from(beyond) * field.step / field.range() * (1.0 + 1e-9);
         }
     }
 
@@ -343,14 +290,11 @@ impl Evaluator {
 
     /// How far a place, in steps of the lattice, is from the new boundary; 0 if a tetrahedron of the new star holds it.
     fn outside(&mut self, place: DVec3, input: Input<'_>) -> f64 {
-        let Input { collapse, reference, .. } = input;
-        let relative = place - as_vec(collapse.position);
-        let (.., depth) = locate(self.cells.len(), 0, |i| self.cells[i].barycentric * relative);
-        if depth >= -SLACK {
+        if self.placement.locate(place, 0).2 >= -SLACK {
             return 0.0;
         }
-        let step = DVec3::from_array(reference.quantized.lattice.step);
-        self.nearest(place * step, self.at_centre, input).2
+        let step = DVec3::from_array(input.reference.quantized.lattice.step);
+        self.placement.nearest(place * step, self.at_centre, &(input, &self.star)).2
     }
 
     /// Finds the part of the reference boundary that the new vertex is near to. Returns the distance as an error.
@@ -377,32 +321,34 @@ impl Evaluator {
     /// Finds where the reference vertices of the boundary go. Returns the largest error of their distances.
     fn place_on_border(&mut self, buckets: &Buckets, input: Input<'_>) -> f64 {
         let Input { collapse, reference, .. } = input;
-        self.border_moves.clear();
-        let mut largest = 0.0_f64;
         let ends = [collapse.a, collapse.b].into_iter().filter(|&end| end < reference.points);
-        for point in removed(collapse).flat_map(|tet| buckets.border.iter(tet)).chain(ends) {
-            let p = reference.scaled(reference.quantized.positions[point as usize]);
-            let (cell, _, distance) = self.nearest(p, usize::MAX, input);
-            self.border_moves.push((point, cell));
-            largest = largest.max(reference.error_at(point, distance));
-        }
-        largest
+        let points = removed(collapse).flat_map(|tet| buckets.border.iter(tet)).chain(ends);
+        self.placement.place_on_border(points, &(input, &self.star))
     }
 
-    /// The boundary triangles of the star, before and after.
-    fn collect_border(&mut self, input: Input<'_>) {
-        let Input { collapse, mesh, .. } = input;
-        self.border.clear();
-        self.faces.clear();
+    /// The star of the new vertex, and the boundary triangles at the ends before.
+    fn lay_out_star(&mut self, input: Input<'_>) {
+        let Input { collapse, mesh, data, .. } = input;
+        let Self { star: NewStar { others, border, .. }, placement, .. } = self;
+        others.clear();
+        others.extend(collapse.stay.iter().map(|(s, _)| {
+            let corners = mesh.tets[s.tet as usize];
+            [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]][s.corner as usize].map(|i: usize| corners[i])
+        }));
+        placement.start(others.iter().map(|&others| {
+            let [x, y, z] = others.map(|v| as_vec(data.positions[v as usize]));
+            [as_vec(collapse.position), x, y, z]
+        }));
+        border.clear();
         self.old_border.clear();
         self.at_centre = 0;
         if collapse.on_boundary {
             self.collect_border_at_centre(input);
-            self.at_centre = self.border.len();
+            self.at_centre = self.star.border.len();
         }
         for (i, &(s, _)) in collapse.stay.iter().enumerate() {
             if mesh.neighbors[s.tet as usize][s.corner as usize] == NONE {
-                self.border.push((i as u32, self.cells[i].others));
+                self.star.border.push((i as u32, self.star.others[i]));
             }
         }
     }
@@ -419,7 +365,9 @@ impl Evaluator {
             let centre = s.corner as usize;
             for k in (0..4).filter(|&k| k != centre && around[k] == NONE) {
                 self.old_border.push(FACES[k].map(|l| corners[l]));
-                self.border.push((i as u32, FACES[k].map(|l| if l == centre { NONE } else { corners[l] })));
+                self.star
+                    .border
+                    .push((i as u32, FACES[k].map(|l| if l == centre { NONE } else { corners[l] })));
             }
         }
     }
@@ -431,69 +379,6 @@ impl Evaluator {
         let Some(plane) = self.old_border.first().map(|t| t.map(at)) else { return false };
         let in_plane = |p: [i32; 3]| orient3d(plane[0], plane[1], plane[2], p) == 0;
         in_plane(collapse.position) && self.old_border.iter().flatten().all(|&v| in_plane(at(v)))
-    }
-
-    /// Finds the cell for a point, looking at `hint` first, and the error there.
-    fn place(&mut self, point: u32, hint: usize, input: Input<'_>) -> f64 {
-        let Input { collapse, reference, .. } = input;
-        let relative = reference.quantized.places[point as usize] - as_vec(collapse.position);
-        let (mut cell, mut lambda, depth) =
-            locate(self.cells.len(), hint, |i| self.cells[i].barycentric * relative);
-        let mut displaced = 0.0;
-        // The point stays outside of the mesh where no boundary is near, too: it was not in the star from the start.
-        let outside = depth < -SLACK;
-        if outside && !self.border.is_empty() {
-            let (p, moved) = reference.place(point);
-            let (found, q, distance) = self.nearest(p, usize::MAX, input);
-            let step = DVec3::from_array(reference.quantized.lattice.step);
-            let to_q = (q - reference.scaled(collapse.position)) / step;
-            (cell, lambda, displaced) =
-                (found as usize, self.cells[found as usize].barycentric * to_q, distance - moved);
-        }
-        self.moves.push((point, cell as u32, outside));
-        let lambda = clamped(lambda);
-        let displaced = reference.error_at(point, displaced);
-        raise(&mut self.errors, displaced);
-        self.deviate(point, cell, lambda, input).max(displaced)
-    }
-
-    /// The nearest of the first `count` boundary triangles after the collapse: its cell, the nearest point, and the
-    /// distance.
-    fn nearest(&mut self, p: DVec3, count: usize, input: Input<'_>) -> (u32, DVec3, f64) {
-        if self.faces.is_empty() {
-            self.lay_out_faces(input);
-        }
-        let (face, q, distance) = nearest_face(p, &self.faces[..count.min(self.faces.len())]);
-        (self.border.get(face).map_or(0, |&(cell, _)| cell), q, distance)
-    }
-
-    fn lay_out_faces(&mut self, input: Input<'_>) {
-        let Input { collapse, data, reference, .. } = input;
-        let at =
-            |v: u32| reference.scaled(if v == NONE { collapse.position } else { data.positions[v as usize] });
-        self.faces.extend(self.border.iter().map(|&(_, triangle)| Face::new(triangle.map(at))));
-    }
-
-    fn deviate(&mut self, point: u32, cell: usize, lambda: DVec3, input: Input<'_>) -> f64 {
-        let Input { data, reference, .. } = input;
-        let fields = reference.quantized.fields.len();
-        let Self { cells, levels, errors, .. } = self;
-        let corners = |f: usize| {
-            let [x, y, z] = cells[cell].others.map(|v| data.levels[v as usize * fields + f]);
-            [levels[f], x, y, z]
-        };
-        reference.quantized.deviation(point, lambda, corners, errors)
-    }
-}
-
-impl Cell {
-    fn new(tet: u32, centre: usize, collapse: &CheckedCollapse, mesh: &WorkMesh, data: &VertexData) -> Self {
-        let corners = mesh.tets[tet as usize];
-        let [i, j, k] = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]][centre];
-        let others = [corners[i], corners[j], corners[k]];
-        let [x, y, z] = others.map(|v| as_vec(data.positions[v as usize]) - as_vec(collapse.position));
-        // The orientation was found positive, so the matrix is regular.
-        Self { barycentric: DMat3::from_cols(x, y, z).inverse(), others, tet }
     }
 }
 
@@ -553,7 +438,12 @@ impl<'a> Reference<'a> {
     /// that alone puts outside is no displacement.
     pub fn place(&self, point: u32) -> (DVec3, f64) {
         let p = self.quantized.places[point as usize] * DVec3::from_array(self.quantized.lattice.step);
-        (p, p.distance(self.scaled(self.quantized.positions[point as usize])))
+        (p, p.distance(self.position(point)))
+    }
+
+    /// Where the lattice has put a reference vertex, in model units from the lattice's origin.
+    pub fn position(&self, point: u32) -> DVec3 {
+        self.scaled(self.quantized.positions[point as usize])
     }
 
     /// A lattice point in model units, from the lattice's origin.

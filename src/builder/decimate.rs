@@ -9,7 +9,7 @@ use super::removal::{RemovalSearch, State};
 use super::rounds::{Later, Rounds};
 use super::sequence::{Insertion, Sequence};
 use super::work_mesh::WorkMesh;
-use super::{BuildConfig, BuildError, BuildProgress, Criterion, OnProgress, Purpose, quantize};
+use super::{BuildConfig, BuildCriterion, BuildError, BuildProgress, OnProgress, Purpose, quantize};
 use crate::geom::Bounds;
 use crate::mesh;
 use crate::mesh::{NONE, TetMesh, Topology};
@@ -42,7 +42,7 @@ pub(super) struct Decimated {
 pub(super) fn decimate(
     mesh: &TetMesh,
     config: &BuildConfig,
-    (criterion, purpose): (Criterion, Purpose),
+    (criterion, purpose): (BuildCriterion, Purpose),
     progress: OnProgress<'_>,
 ) -> Result<Decimated, BuildError> {
     if mesh.positions.len() > MAX_UPDATES as usize {
@@ -55,8 +55,8 @@ pub(super) fn decimate(
     let Topology { neighbors, non_manifold, .. } = mesh::topology(mesh.positions.len(), &mesh.tets)?;
     let quantized = quantize::quantize_cells(mesh, config)?;
     let gift_wrap = match criterion {
-        Criterion::HalfEdge => None,
-        Criterion::Delaunay => Some(GiftWrap::new(&quantized.positions)),
+        BuildCriterion::HalfEdge => None,
+        BuildCriterion::Delaunay => Some(GiftWrap::new(&quantized.positions)),
     };
     let displacement_per_error = config.displacement * Bounds::of(&mesh.positions).diagonal();
     let work = WorkMesh::new(mesh.tets.clone(), neighbors, mesh.positions.len());
@@ -201,7 +201,7 @@ impl<'a> Decimator<'a> {
         let State { mesh, removals, degrees, .. } = state;
         // Never zero: error 0 is to mean the reference mesh, with every vertex in.
         let stored = |error: &f64| ErrorCode::at_least(*error).max(ErrorCode(1)).error();
-        let errors: Vec<f64> = best.cost.errors.iter().map(stored).collect();
+        let errors: Vec<f64> = best.cost.placement.errors.iter().map(stored).collect();
         let start = sequence.tets.len();
         sequence.tets.extend(hole.star.iter().map(|s| mesh.tets[s.tet as usize]));
         let middle = sequence.tets.len();

@@ -44,6 +44,7 @@ mod location;
 mod method;
 mod order;
 mod outside_points;
+mod placement;
 mod points;
 mod position_lattice;
 mod quantize;
@@ -56,7 +57,7 @@ mod work_mesh;
 
 pub use collapse::edge_mt;
 pub use delaunay::delaunay;
-pub use method::{Construction, Criterion, Method, Purpose, VertexMethod};
+pub use method::{BuildCriterion, Construction, Method, Purpose, VertexMethod};
 
 use crate::mesh::{MeshError, TetMesh};
 use crate::mt::{
@@ -345,7 +346,7 @@ pub fn build(
             BuildResult { mt: Mt::from(mt), summary, vertices, exact }
         }
         Construction::HalfEdge { purpose } => {
-            let how = (Criterion::HalfEdge, purpose);
+            let how = (BuildCriterion::HalfEdge, purpose);
             summed_up(mesh, config, vertex::decimated_mt(mesh, config, how, progress)?)?
         }
         Construction::Vertex(method) | Construction::ExplicitVertex(method) => {

@@ -78,3 +78,8 @@ pub(super) fn clamped(lambda: DVec3) -> DVec3 {
     let sum = inside.element_sum();
     if sum > 1.0 { inside / sum } else { inside }
 }
+
+/// The square of a distance, in steps of the lattice.
+pub(super) fn squared_length(p: [i32; 3], q: [i32; 3]) -> f32 {
+    (0..3).map(|i| (i64::from(p[i]) - i64::from(q[i])) as f32).map(|d| d * d).sum()
+}

@@ -8,6 +8,7 @@ use super::fill_cost::{FillCost, HoleCost, Input, Removals};
 use super::gift_wrap::GiftWrap;
 use super::half_edge::{Nearby, contract, keeps_topology};
 use super::hole::{Filling, Hole};
+use super::points::squared_length;
 use super::quantize::Quantized;
 use super::reach;
 use super::reach::{Reach, Ruler};
@@ -38,8 +39,6 @@ impl<'a> State<'a> {
     pub fn new(mesh: WorkMesh, reference: Reference<'a>, frozen: Vec<bool>, levels: Levels) -> Self {
         let quantized = reference.quantized;
         let points = quantized.positions.len();
-        let mut degrees = vec![0; points];
-        mesh.tets.iter().flatten().for_each(|&v| degrees[v as usize] += 1);
         Self {
             gradients: quantized.gradients(&mesh.tets),
             reference,
@@ -47,7 +46,7 @@ impl<'a> State<'a> {
             buckets: Buckets::new(mesh.tets.len(), quantized),
             removals: Removals::new(mesh.tets.len()),
             versions: vec![0; points],
-            degrees,
+            degrees: mesh.degrees(),
             reaches: reach::of_stars(&mesh.tets, &quantized.positions),
             ruler: Ruler::new(quantized),
             levels,
@@ -122,7 +121,9 @@ impl RemovalSearch {
 
     /// The key of a filling of the hole.
     fn key(&self, state: &State<'_>, candidate: &Candidate, b: u32) -> Key {
-        let length = if b == NONE { 0.0 } else { squared_length(state, self.hole.a, b) };
+        let positions = &state.reference.quantized.positions;
+        let length =
+            positions.get(b as usize).map_or(0.0, |&q| squared_length(positions[self.hole.a as usize], q));
         let second = state.second(self.hole.a, candidate.filling.tets.len() as u32);
         Key::new(state.levels.of(candidate.error), second, length, self.hole.a, b)
     }
@@ -191,11 +192,6 @@ impl RemovalSearch {
         best.evaluate(hole, hole_cost, state, limit);
         Some(self.key(state, &self.best, NONE))
     }
-}
-
-fn squared_length(state: &State<'_>, a: u32, b: u32) -> f32 {
-    let [p, q] = [a, b].map(|v| state.reference.quantized.positions[v as usize]);
-    (0..3).map(|i| (i64::from(p[i]) - i64::from(q[i])) as f32).map(|d| d * d).sum()
 }
 
 /// The second difference of the fields along an edge that is to be contracted to `b`, as an error.

@@ -3,7 +3,7 @@
 use super::quantize::Quantized;
 use super::sequence::Sequence;
 use super::{
-    BuildConfig, BuildError, Criterion, OnProgress, Purpose, VertexMethod, decimate, insert, quantize,
+    BuildConfig, BuildCriterion, BuildError, OnProgress, Purpose, VertexMethod, decimate, insert, quantize,
 };
 use crate::geom::Bounds;
 use crate::mesh;
@@ -36,7 +36,7 @@ pub(super) fn mt_by(
 pub(super) fn decimated_mt(
     mesh: &TetMesh,
     config: &BuildConfig,
-    how: (Criterion, Purpose),
+    how: (BuildCriterion, Purpose),
     progress: OnProgress<'_>,
 ) -> Result<(ExplicitMt, Vec<VertexId>), BuildError> {
     let built = decimate::decimate(mesh, config, how, progress)?;

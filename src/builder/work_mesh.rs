@@ -62,6 +62,13 @@ impl WorkMesh {
         Self { tets, neighbors, incident, unused: Vec::new() }
     }
 
+    /// The number of tetrahedra around each vertex.
+    pub fn degrees(&self) -> Vec<u32> {
+        let mut degrees = vec![0; self.incident.len()];
+        self.tets.iter().flatten().for_each(|&v| degrees[v as usize] += 1);
+        degrees
+    }
+
     /// Whether the vertex is in the mesh.
     pub fn has(&self, v: u32) -> bool {
         self.incident[v as usize] != NONE

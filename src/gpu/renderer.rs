@@ -2,7 +2,7 @@
 
 use crate::geom::Camera;
 use crate::gpu::cutaway::CutawayPass;
-use crate::gpu::pipeline::{FrameBinding, Recipe};
+use crate::gpu::pipeline::{FrameBinding, PipelineSpec};
 use crate::gpu::surface::SurfacePass;
 use crate::gpu::target::{Picture, Target};
 use crate::gpu::types::Frame;
@@ -60,7 +60,7 @@ impl Renderer {
     fn new(context: Context, target: Target) -> Result<Self, GpuError> {
         let frame = FrameBinding::new(&context);
         let format = target.format;
-        let background = Recipe {
+        let background = PipelineSpec {
             shader: "background",
             vertex: "vs",
             fragment: "fs",
@@ -70,7 +70,7 @@ impl Renderer {
             blends: false,
         };
         let renderer = Self {
-            background: background.cook(&context, &frame, format),
+            background: background.create(&context, &frame, format),
             surface: SurfacePass::new(&context, &frame, format),
             cutaway: CutawayPass::new(&context, &frame, format),
             wire: WirePass::new(&context, &frame, format),

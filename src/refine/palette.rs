@@ -42,14 +42,15 @@ impl Palette {
             (*extent, *steep) = curve.between(low, high);
             *steep = (f64::from(*steep) * field.step) as f32 * ROUND_UP;
         }
-        let joined = joined(&bins);
-        let contrast = (0..LEVELS).map(|level| largest(&contrast(&bins, &joined, level))).collect();
+        let joined = doubled(&bins, Extent::join);
+        let contrast = |level| doubled(&contrast(&bins, &joined, level), f32::max);
+        let contrast = (0..LEVELS).map(contrast).collect();
         Self {
             field: transfer.field,
             bins_per_level: 1.0 / (width / field.step),
             first_level: (field.min - field.origin) / field.step,
             levels,
-            steepness: largest(&steep),
+            steepness: doubled(&steep, f32::max),
             contrast,
             weight: 1.0 / transfer.unit_length,
         }
@@ -175,26 +176,13 @@ fn contrast(bins: &[Extent; BINS], joined: &[[Extent; BINS]], level: usize) -> [
     out
 }
 
-/// The extents of 1, 2, 4, … bins from each bin on.
-fn joined(bins: &[Extent; BINS]) -> Vec<[Extent; BINS]> {
+/// The union of 1, 2, 4, … bins from each bin on.
+fn doubled<T: Copy>(bins: &[T; BINS], union: impl Fn(T, T) -> T) -> Vec<[T; BINS]> {
     let mut levels = vec![*bins];
     for level in 1..LEVELS {
         let half = 1 << (level - 1);
         let last = &levels[level - 1];
-        levels.push(std::array::from_fn(|b| last[b].join(last[(b + half).min(BINS - 1)])));
-    }
-    levels
-}
-
-/// The largest of 1, 2, 4, … bins from each bin on.
-fn largest(bins: &[f32; BINS]) -> Largest {
-    let mut levels = vec![*bins];
-    for level in 1..LEVELS {
-        let half = 1 << (level - 1);
-        let mut next = levels[level - 1];
-        let last = levels[level - 1];
-        (0..BINS).for_each(|b| next[b] = last[b].max(last[(b + half).min(BINS - 1)]));
-        levels.push(next);
+        levels.push(std::array::from_fn(|b| union(last[b], last[(b + half).min(BINS - 1)])));
     }
     levels
 }

@@ -6,7 +6,7 @@ use crate::support::random::Random;
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::sync::{Arc, LazyLock};
-use tetralod::builder::{BuildConfig, BuildResult, Construction, Criterion as BuiltBy, Method, build};
+use tetralod::builder::{BuildConfig, BuildResult, Construction, BuildCriterion, Method, build};
 use tetralod::format::{Decoder, EncodeOptions, encode};
 use tetralod::geom::{Bounds, orient3d};
 use tetralod::mesh::{Field, TetMesh};
@@ -18,7 +18,7 @@ use tetralod::verify;
 use tetralod::verify::Reference;
 
 fn config(mesh: &TetMesh, kind: MtKind, tet_errors: bool) -> BuildConfig {
-    let plain = Construction::new(kind, Method::Insert, BuiltBy::Delaunay).expect("they go together");
+    let plain = Construction::new(kind, Method::Insert, BuildCriterion::Delaunay).expect("they go together");
     BuildConfig {
         construction: if tet_errors { plain.with_tet_errors().expect("they go together") } else { plain },
         fields: mesh.fields.iter().map(|field| field.name.clone()).collect(),
@@ -389,7 +389,7 @@ fn every_promise_is_kept() {
 #[test]
 fn other_methods_refuse() {
     for (kind, method) in [(MtKind::Vertex, Method::Decimate), (MtKind::Edge, Method::Collapse)] {
-        let plain = Construction::new(kind, method, BuiltBy::HalfEdge).expect("they go together");
+        let plain = Construction::new(kind, method, BuildCriterion::HalfEdge).expect("they go together");
         let error = plain.with_tet_errors().unwrap_err();
         assert!(error.to_string().contains("method insert"), "{error}");
     }
