@@ -32,7 +32,7 @@ export function emptyMesh() {
 export function applyChanges(mesh, delta) {
   const [is, wanted] = [mesh.changes.to, delta.changes.from];
   if (is !== wanted) {
-    const problem = `the delta leads on from mesh number ${wanted}, and this is number ${is}`;
+    const problem = `the delta applies to mesh number ${wanted}, and this is number ${is}`;
     throw new TetralodError("bad-option", `applyChanges: ${problem}`);
   }
   const count = { vertices: delta.vertexCount, tets: delta.tetCount };

@@ -27,24 +27,24 @@ async function load() {
 /** The methods that wait for bytes, beside which others are answered. */
 export const WAITING = ["openParts", "reach", "settled", "arrived"];
 
-export const REPLACED = "another mesh was asked for before all had come that this one needs";
+export const REPLACED = "another mesh was requested before all data for this one had arrived";
 
 /** What adds up over the steps of a refinement. */
 const SUMS = ["refined", "coarsened", "forced", "judged", "milliseconds"];
 
-/** The methods of one session, for `serve` or `Local`; `emit` tells what nobody asked for. */
+/** The methods of one session, for `serve` or `Local`; `emit` sends events. */
 export function coreMethods(emit) {
   let session;
   /** @type {Parts | undefined} */
   let parts;
-  /** Counts the meshes that were asked for. */
+  /** Counts the requests. */
   let goal = 0;
   const aim = (options) => {
     session.request(options);
     goal++;
     parts?.turn();
   };
-  /** One step; `more` says whether there is more to do, now or when more has come. */
+  /** One step; `more`: whether there is more to do, now or when more data has arrived. */
   const advance = (milliseconds, updates) => {
     const start = performance.now();
     parts?.look();
@@ -53,7 +53,7 @@ export function coreMethods(emit) {
     parts?.follow();
     return { stats, more: !stats.done || Boolean(parts?.hasMore) };
   };
-  /** Goes on with all that is here. */
+  /** Refines with all data that has arrived. */
   const advanceAll = () => {
     let all;
     let step;
@@ -64,13 +64,13 @@ export function coreMethods(emit) {
     } while (!step.stats.done);
     return step;
   };
-  /** Resolves when all is here that the mesh needs. What has come may show what else that is. */
+  /** Resolves when all data that the mesh needs has arrived. Arriving blocks may show that others are needed. */
   const settled = async () => {
     let done;
     do {
       await parts.settled();
       if (goal === 0) return;
-      // News stays news for those who follow the mesh.
+      // The changes are kept for callers that follow the mesh by deltas.
       ({ done } = session.step(Infinity, Infinity));
       parts.follow();
     } while (!done || parts.isWaiting);
@@ -82,7 +82,7 @@ export function coreMethods(emit) {
       await loadCore();
       session = new CoreSession(fields);
     },
-    /** Opens a file in parts; resolves to nothing where the server gives no ranges, and otherwise when the base mesh is there. */
+    /** Opens a file in parts; resolves to nothing without ranges of the server, else when the base mesh has arrived. */
     async openParts(url, { fields, memory, ...options }) {
       await loadCore();
       const make = (loader) => (session = CoreSession.inParts(fields, memory, loader));
@@ -101,7 +101,7 @@ export function coreMethods(emit) {
       const step = advanceAll();
       return partial || !step.stats.missing ? result(step, deltas) : { more: true };
     },
-    /** The same when all has come that it needs. */
+    /** The same when all data that it needs has arrived. */
     async reach(options, deltas) {
       aim(await received(options));
       const mine = goal;
@@ -145,7 +145,7 @@ export class Local {
   #methods;
   #closed = null;
 
-  /** @param {(name: string, data: any) => void} [onEvent] gets what the session tells unasked */
+  /** @param {(name: string, data: any) => void} [onEvent] gets the events of the session */
   constructor(onEvent = () => {}) {
     this.#methods = coreMethods(onEvent);
   }

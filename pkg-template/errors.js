@@ -26,7 +26,7 @@ export function flattenError(error) {
 /**
  * The error that a user sees for `error`, which came from wasm or out of a worker.
  *
- * An error without a `code` of ours is a trap in wasm or a mistake in the glue: `internal`.
+ * An error without a `code` of ours is a trap in wasm or a bug in the package: `internal`.
  */
 export function reviveError(error) {
   if (error instanceof TetralodError || error?.name === "AbortError") return error;

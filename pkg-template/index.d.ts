@@ -78,35 +78,35 @@ export type Source =
 /** How a source is read. */
 export interface ReadOptions {
   /**
-   * Names of the fields that are wanted; the others are not downloaded, where the file is fetched in parts, and are not
-   * there. Default: all.
+   * Names of the fields to read; the others are not downloaded, if the file is fetched in parts, and are not available.
+   * Default: all.
    */
   fields?: readonly string[];
   /**
-   * Bytes of memory for the blocks of a file that is fetched in parts. When they are used up, blocks that are not needed
-   * any more go; needed ones that do not fit are not fetched (`progress.blocks.leftOut`). Default: 512 MiB.
+   * Bytes of memory for the blocks of a file that is fetched in parts. When they are used up, blocks that are no longer
+   * needed are evicted; needed blocks that do not fit are not fetched (`progress.blocks.leftOut`). Default: 512 MiB.
    */
   memory?: number;
   /** The name of a cache (Cache Storage) in which the parts are kept for the next time. Default: none. */
   cache?: string;
   /** Whether to download the file as a whole, front to back. Default: only where the server gives no byte ranges. */
   whole?: boolean;
-  /** Headers that go along with every request for a URL; servers of other origins must allow them. */
+  /** Headers of every request for a URL; servers of other origins must allow them. */
   headers?: HeadersInit;
-  /** Whether cookies go along: as for `fetch`. */
+  /** Whether cookies are sent: as for `fetch`. */
   credentials?: RequestCredentials;
-  /** How often a part is asked for again when a request fails. Default: 5. */
+  /** How often a failed request for a part is repeated. Default: 5. */
   retries?: number;
   /** Milliseconds before the first of these; each later one waits about twice as long. Default: 500. */
   backoffMs?: number;
-  /** A request without a byte for so many milliseconds has failed. Default: 30000. */
+  /** A request fails after so many milliseconds without a byte. Default: 30000. */
   timeoutMs?: number;
-  /** So many bytes that are not wanted are rather fetched than asked around. Default: 16384. */
+  /** Ranges closer to each other than so many bytes are fetched as one. Default: 16384. */
   gap?: number;
 }
 
 export interface OpenOptions extends ReadOptions {
-  /** Ends the download; what is waited for then rejects with the signal's reason, by default an `AbortError`. */
+  /** Stops the download; pending calls reject with the signal's reason, by default an `AbortError`. */
   signal?: AbortSignal;
   /** Called whenever something has arrived and been decoded. */
   onProgress?: (progress: Progress) => void;
@@ -118,9 +118,9 @@ export interface OpenOptions extends ReadOptions {
   worker?: boolean;
 }
 
-/** What a refinement, or a step of one, did and how good the mesh is now. */
+/** The work of a refinement, or of a step of one, and the quality of the mesh. */
 export interface RefineStats extends CoreStats {
-  /** Time that it took, without making and sending the arrays. */
+  /** Time of refinement, without making and sending the arrays. */
   milliseconds: number;
 }
 
@@ -144,14 +144,14 @@ export interface StepOptions {
   signal?: AbortSignal;
 }
 
-/** The mesh of no tetrahedra: what {@link applyChanges} begins with where nothing has been handed out before. */
+/** A mesh without tetrahedra: {@link applyChanges} starts with it if no mesh has been returned before. */
 export function emptyMesh(): Mesh;
 
 /**
- * Makes of `mesh` the mesh that `delta` leads to, and returns it. The arrays are written where `delta.changes` says; those
- * that are too short are replaced by others with room to grow, so look at them through `mesh` each time.
+ * Applies `delta` to `mesh`, and returns it. The arrays are written where `delta.changes` says. Arrays that are too
+ * short are replaced by larger ones, so read them from `mesh` each time.
  *
- * A delta leads on from the mesh that was handed out right before it, whole or as a delta; others are refused.
+ * A delta applies to the mesh that was returned right before it, whole or as a delta; other meshes are refused.
  *
  * @example
  * const mesh = emptyMesh();
@@ -168,9 +168,9 @@ export class MultiTessellation {
   /**
    * Opens a volume. Resolves as soon as its base mesh has arrived.
    *
-   * A URL (text, `URL`, or a `Request` that gets) of `http` or `https` is fetched in parts, by byte ranges: just those
-   * blocks that the request needs, most important first. Where the server gives no ranges, with `whole`, and from all
-   * other sources the rest goes on arriving as a stream.
+   * A URL (text, `URL`, or a `Request` that gets) of `http` or `https` is fetched in parts, by byte ranges: only the
+   * blocks that the request needs, most important first. If the server gives no ranges, with `whole`, and from all
+   * other sources, the rest arrives as a stream.
    *
    * @example
    * await MultiTessellation.open("https://example.org/combustor.mt");
@@ -191,26 +191,26 @@ export class MultiTessellation {
   /**
    * Of a stream: resolves when the whole file has been decoded.
    *
-   * Of a file that is fetched in parts: another promise each time it is read, that resolves when all is here that the
-   * request needs that was made last; before the first one that is at once. Waiting for it does not change the mesh:
-   * call `refine` afterwards, which waits by itself.
+   * Of a file that is fetched in parts: another promise each time it is read, that resolves when everything that the
+   * last request needs has arrived; at once before the first request. It does not change the mesh: call `refine`, which
+   * waits by itself.
    *
-   * Rejects with what ended the download; what had arrived stays usable.
+   * Rejects with the error that ended the download; the data that has arrived stays usable.
    */
   readonly complete: Promise<void>;
 
   /**
-   * Goes on with a file that is fetched in parts after an error, which all that waits rejects with until then.
+   * Continues a file that is fetched in parts after an error. Until then, pending calls reject with that error.
    *
    * @throws {TetralodError} `changed` if the file was replaced on the server, `bad-source` if it is a stream: open it again
    */
   retry(): Promise<void>;
 
   /**
-   * Changes the current mesh to the one that is asked for and gives a copy of it. The cost is that of the difference
-   * from the last one. It resolves when all has arrived that the request needs, and rejects with `replaced` if another mesh is
-   * asked for before that, or with what ended the download. With `partial` it does at once what the data that is here
-   * allows; `stats.missing` tells whether more is on its way.
+   * Refines the current mesh to a request and returns a copy of it. The cost grows with the difference from the last
+   * mesh. It resolves when all data that the request needs has arrived. It rejects with `replaced` if another mesh is
+   * requested before that, or with the error that ended the download. With `partial` it resolves at once, with the best
+   * mesh of the data that has arrived; `stats.missing` says whether more data is to come.
    *
    * @example
    * await mt.refine({ error: "1%" });                                  // within 1 % of the field's range everywhere
@@ -230,15 +230,15 @@ export class MultiTessellation {
    * const matrix = camera.projectionMatrix.clone().multiply(camera.matrixWorldInverse);  // three.js
    * await mt.refine({ view: { matrix, viewport: [width, height], pixels: 1, outside: "10%" }, maxTets: 500_000 });
    *
-   * With `deltas` only what has changed since a mesh was last handed out is sent, for {@link applyChanges}.
+   * With `deltas` it returns only what has changed since the last returned mesh, for {@link applyChanges}.
    */
   refine(options?: RefineOptions, how?: { deltas?: false; partial?: boolean }): Promise<RefineResult>;
   refine(options: RefineOptions | undefined, how: { deltas: true; partial?: boolean }): Promise<RefineDelta>;
 
   /**
-   * The same in steps, each of which gives a mesh that is valid and within the budget. The loop ends when the mesh is the
-   * one that was asked for (`stats.done`), when another one is asked for by `refine` or `refineSteps`, or when it is left.
-   * Of a file that is fetched in parts it goes on as blocks arrive, and throws what ends the download.
+   * The same in steps, each of which gives a mesh that is valid and within the budget. The loop ends when the mesh
+   * meets the request (`stats.done`), when `refine` or `refineSteps` requests another one, or when the caller leaves
+   * it. For a file that is fetched in parts it continues as blocks arrive, and throws the error that ends the download.
    *
    * @example
    * const mesh = await mt.refine({ error: "5%" });
@@ -259,8 +259,8 @@ export class MultiTessellation {
   setField(field: string | number): Promise<void>;
 
   /**
-   * The isosurface of the current mesh at one value or several, in units of the field, with the value of each vertex. Normals
-   * point towards lower values: they are those of the field's gradient, or with `"smooth"` of the triangles.
+   * The isosurface of the current mesh at one value or several, in units of the field, with the value of each vertex.
+   * Normals point towards lower values: they are those of the field's gradient, or with `"smooth"` of the triangles.
    *
    * @example
    * const { positions, normals, indices } = await mt.isosurface(0.7);
@@ -271,7 +271,8 @@ export class MultiTessellation {
   ): Promise<IsoSurface & { values: Float32Array }>;
 
   /**
-   * The section of the current mesh with the plane of all points with `normal · p = offset`, facing the way the normal points.
+   * The section of the current mesh with the plane of all points with `normal · p = offset`, facing the way the normal
+   * points.
    *
    * @example
    * const cut = await mt.slice([0, 0, 1], 2.5);                       // z = 2.5
@@ -306,14 +307,14 @@ export class MultiTessellation {
   /** A hash of the current mesh: the same request gives the same hash on every machine. */
   hash(): Promise<string>;
 
-  /** Ends the download and the worker. Calls under way and later ones reject with code `freed`. */
+  /** Stops the download and the worker. Pending and later calls reject with code `freed`. */
   free(): void;
 
   /** The same as {@link MultiTessellation.free}, for `using mt = await MultiTessellation.open(...)`. */
   [Symbol.dispose](): void;
 }
 
-/** What went wrong, for programs. */
+/** The codes of errors, for programs. */
 export type ErrorCode =
   /** The source is not of a kind that can be read, or has been read already. */
   | "bad-source"
@@ -337,9 +338,9 @@ export type ErrorCode =
   | "limit"
   /** An option or argument is unknown or has an impossible value; the message names it. */
   | "bad-option"
-  /** Another mesh, or in the viewer another volume, was asked for before all had come that this one needs. */
+  /** Another mesh, or in the viewer another volume, was requested before all data for this one had arrived. */
   | "replaced"
-  /** Nothing has arrived yet that could be asked for. */
+  /** The base mesh has not arrived yet. */
   | "not-ready"
   /** The object has been freed. */
   | "freed"

@@ -12,7 +12,7 @@ import { abortable, nodeModule, openSource, pump, rangesOf } from "./stream.js";
 export { TetralodError, applyChanges, emptyMesh };
 
 const OPEN_OPTIONS = ["signal", "onProgress", "worker"];
-const NO_RETRY = "only what is fetched in parts can go on: open it again";
+const NO_RETRY = "only a file that is fetched in parts can be continued: open it again";
 const STEP_OPTIONS = ["budgetMs", "updates", "deltas", "signal"];
 
 /** A volume that is open: it can be refined while the rest of it is still arriving. */
@@ -27,7 +27,7 @@ export class MultiTessellation {
   #inWorker;
   /** Why nothing can be called any more. */
   #closed;
-  /** Counts the meshes that were asked for: each one replaces those before it. */
+  /** Counts the requests: each one replaces those before it. */
   #goal = 0;
 
   static async open(source, options = {}) {
@@ -191,7 +191,7 @@ export class MultiTessellation {
     this.#onProgress(progress);
   }
 
-  /** Resolves when the base mesh is there; the rest comes behind `complete`, or when it is needed. */
+  /** Resolves when the base mesh has arrived; `complete` waits for the rest. */
   async #begin(source, outer, fetching) {
     const forward = () => this.#stop.abort(outer.reason);
     outer?.addEventListener("abort", forward, { once: true });

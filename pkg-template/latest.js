@@ -3,7 +3,7 @@
  * sliders and pointers move faster than meshes can follow.
  */
 
-/** Calls of which one is under way and one waits; what comes later is merged into the waiting one. */
+/** Calls of which one is running and one waits; later ones are merged into the waiting one. */
 export class Latest {
   #run;
   #merge;

@@ -1,4 +1,4 @@
-/** Options on their way into wasm: what other libraries hold as objects becomes lists, and a module becomes its function. */
+/** Prepares options for wasm: objects of other libraries become lists, and the URL of a module becomes its function. */
 
 import { TetralodError } from "./errors.js";
 
@@ -6,7 +6,7 @@ import { TetralodError } from "./errors.js";
 const NETWORK = ["headers", "credentials", "retries", "backoffMs", "timeoutMs", "gap"];
 const READING = ["fields", "memory", "cache", "whole", ...NETWORK];
 
-/** Bytes that the blocks of a file may take in memory, unless somebody says otherwise. */
+/** The default of `memory`: bytes for the blocks of a file. */
 const MEMORY = 512 * 2 ** 20;
 
 /** The options of `READING`, checked, with their defaults; `others` are names that are handled elsewhere. */

@@ -1,7 +1,7 @@
 /**
- * A file on a server of which only those blocks come that are needed: the session in wasm takes what the loader has and tells it
- * what is wanted; this moves bytes with `Ranges`, and keeps the promises of those who wait. Runs where the session is, so that no
- * bytes cross between threads.
+ * A file on a server of which only the needed blocks are fetched: the session in wasm takes blocks from the loader and
+ * tells it which ones it needs; this module fetches bytes with `Ranges` and settles the promises of callers. It runs in
+ * the session's thread, so that no bytes cross between threads.
  */
 
 import { TetralodError, reviveError } from "./errors.js";
@@ -17,20 +17,20 @@ import { Ranges } from "./ranges.js";
  * @property {() => import("./index.js").BlockProgress} blocks
  */
 
-/** Keeps a session supplied with what it wants. */
+/** Fetches the blocks that a session needs. */
 export class Parts {
   #session;
   #ranges;
   #url;
   #onChange;
   #begun = deferred();
-  /** Those who wait until nothing is wanted, and those who wait for anything to come. */
+  /** Callers that wait until nothing is needed any more, and those that wait for any data. */
   #settled = [];
   #arrived = [];
   #failure;
   #closed = false;
   #due = false;
-  /** Whether anything has come since `look`. */
+  /** Whether data has arrived since `look`. */
   #hasNews = false;
 
   /**
@@ -38,7 +38,7 @@ export class Parts {
    * @param {(loader: object) => PartsSession} makeSession makes the session that the loader serves
    * @param {string} url
    * @param {import("./ranges.js").RangesOptions} options
-   * @param {(progress: object) => void} onChange hears of everything that comes
+   * @param {(progress: object) => void} onChange is called for all data that arrives
    * @param {(error: Error) => void} [onError] hears of what ends the fetching until `retry`
    */
   constructor(RangeLoader, makeSession, url, options, onChange, onError = () => {}) {
@@ -58,7 +58,7 @@ export class Parts {
   }
 
   /**
-   * Reads what stands in front of the blocks. Resolves to true when the base mesh is there; to false if the server gives
+   * Reads the file up to the first block. Resolves to true when the base mesh has arrived; to false if the server gives
    * no ranges: then nothing has been taken, and this is of no more use.
    */
   begin() {
@@ -66,7 +66,7 @@ export class Parts {
     return this.#begun.promise;
   }
 
-  /** Asks for what the session wants now, and for nothing else any more. */
+  /** Requests the blocks that the session needs now, and cancels other requests. */
   follow() {
     if (this.#closed || this.#failure) return;
     this.#supply();
@@ -81,7 +81,7 @@ export class Parts {
     this.#begun.resolve(false);
   }
 
-  /** Hands the session what has come; whether it could take it. */
+  /** Passes arrived data to the session; returns whether it was accepted. */
   #supply() {
     if (this.#closed || this.#failure) return false;
     try {
@@ -95,7 +95,7 @@ export class Parts {
     }
   }
 
-  /** Looks once at what is wanted after all that comes at a time. */
+  /** Asks the session once for its needs after all data of one turn. */
   #soon() {
     if (this.#due) return;
     this.#due = true;
@@ -123,26 +123,26 @@ export class Parts {
   /** What is known of the file as a whole. */
   get progress() {
     const blocks = this.#session.blocks();
-    // Half-edge and edge-based MTs come in blocks.
+    // Half-edge and edge-based MTs are fetched in blocks.
     return { ...this.#session.progress(), blocks: blocks.all > 0 ? blocks : undefined };
   }
 
-  /** Whether there is more to come. */
+  /** Whether more data is to come. */
   get isWaiting() {
     return this.#session.isWaiting;
   }
 
-  /** Whether there is more to come, or something has come since `look`. */
+  /** Whether more data is to come, or some has arrived since `look`. */
   get hasMore() {
     return this.isWaiting || this.#hasNews;
   }
 
-  /** Resolves when all that is wanted has come, rejects when it cannot. */
+  /** Resolves when all needed data has arrived, rejects when that fails. */
   settled() {
     return this.#wait(this.#settled, this.#failure || this.isWaiting);
   }
 
-  /** Resolves when anything has come since `look`, or another mesh is wanted. */
+  /** Resolves when data has arrived since `look`, or another mesh is requested. */
   arrived() {
     return this.#wait(this.#arrived, this.#failure || !this.#hasNews);
   }
@@ -152,7 +152,7 @@ export class Parts {
     this.#hasNews = false;
   }
 
-  /** Another mesh is wanted: those who wait for the one before look again. */
+  /** Another mesh is requested: wakes the callers that wait for the one before. */
   turn() {
     this.follow();
     this.#wake();
@@ -166,7 +166,7 @@ export class Parts {
     return waiting.promise;
   }
 
-  /** Goes on after an error. Blocks of another version of the file would not fit those that are here: that is no use. */
+  /** Continues after an error; not after `changed`, since blocks of different versions do not fit together. */
   retry() {
     if (this.#closed || !this.#failure) return;
     if (this.#failure.code === "changed") throw this.#failure;

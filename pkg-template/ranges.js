@@ -1,11 +1,11 @@
 /**
- * Byte ranges of a file on a server: the loader in wasm decides what to fetch, cancel or read from the cache, and when; this does
- * it, and hands over what comes. Nothing here knows what is wanted, or what the bytes mean.
+ * Byte ranges of a file on a server: the loader in wasm decides what to fetch, cancel or read from the cache, and when;
+ * this does it, and passes on the bytes that arrive. It does not interpret the bytes or decide which are needed.
  */
 
 import { TetralodError, reviveError } from "./errors.js";
 
-/** The headers that the loader wants to see, in its order. */
+/** The headers that the loader reads, in its order. */
 const FIELDS = [
   "content-range",
   "content-length",
@@ -19,7 +19,7 @@ const FIELDS = [
 /** Statuses of an address that is good no longer. */
 const GONE = [401, 403, 404, 410];
 
-/** A timer that comes so much later than it was set for has slept: that time does not count. */
+/** If a timer is later than this, the machine was asleep: that time does not count. */
 const LATE = 100;
 
 /**
@@ -29,7 +29,7 @@ const LATE = 100;
  * @property {RequestCredentials} [credentials]
  * @property {string} [cache] name of a cache (Cache Storage) in which ranges are kept for the next time, where there is one
  * @property {number} [maxRequests] at a time; 6
- * @property {number} [gap] unwanted bytes that are rather fetched than asked around; 16384
+ * @property {number} [gap] ranges closer than so many bytes are fetched as one; 16384
  * @property {number} [maxRequestBytes] 4 MiB
  * @property {number} [retries] of the same bytes; 5
  * @property {number} [backoffMs] before the first of these; 500
@@ -41,7 +41,7 @@ const LATE = 100;
  * @property {() => void} onComplete the loader has ranges that are complete: they are to be taken
  * @property {(servesRanges: boolean) => void} [onServer] hears once, before any range, whether the server gives ranges. May
  *   call `close`.
- * @property {(error: TetralodError) => void} onError nothing comes any more, until `retry` is called
+ * @property {(error: TetralodError) => void} onError no more data arrives until `retry` is called
  */
 
 /** The requests of one file. */
@@ -80,7 +80,7 @@ export class Ranges {
     this.#sink = sink;
   }
 
-  /** Decides what is done here; knows what is wanted. */
+  /** Decides what to fetch. */
   get loader() {
     return this.#loader;
   }
@@ -95,7 +95,7 @@ export class Ranges {
     this.go();
   }
 
-  /** What came is damaged: the cache may hold it, and is not used until `retry`. */
+  /** Data was damaged, perhaps in the cache, which is not used until `retry`. */
   forget() {
     this.#cached?.clear();
     this.#cached = undefined;
@@ -108,12 +108,12 @@ export class Ranges {
     return this.#closed ? undefined : this.#loader.total();
   }
 
-  /** Whether the server gives ranges; where it does not, everything passes by from the start for whatever is wanted. */
+  /** Whether the server gives ranges; if not, the file is read from its start. */
   get servesRanges() {
     return this.#closed ? undefined : this.#loader.servesRanges();
   }
 
-  /** What has been asked and has come: requests, bytes, and bytes that were wanted. */
+  /** Statistics: requests, bytes that have arrived, and bytes that were needed. */
   get traffic() {
     const [requests, received, used] = this.#closed ? [0, 0, 0] : this.#loader.traffic();
     return { requests, received, used };
@@ -138,7 +138,7 @@ export class Ranges {
     return this.#clock;
   }
 
-  /** Tells of what is complete, and does what the loader says: to be called when something else is wanted. */
+  /** Reports complete ranges and follows the loader: call it when the needs have changed. */
   go() {
     if (this.#closed) return;
     this.#learn();
@@ -200,7 +200,7 @@ export class Ranges {
     this.go();
   }
 
-  /** What the first answer tells: whether there are ranges, and of which version of the file, which opens the cache. */
+  /** Reads the first response: whether there are ranges, and the version of the file, which selects the cache. */
   #learn() {
     if (!this.#knowsServer && this.servesRanges !== undefined) {
       this.#knowsServer = true;
@@ -263,7 +263,7 @@ export class Ranges {
     return call(url, { signal, headers, credentials: this.#options.credentials, cache: "no-store" });
   }
 
-  /** Reads until the end, or until nobody wants to know. */
+  /** Reads until the end, or until the request is cancelled. */
   async #body(response, take) {
     const reader = response.body?.getReader();
     if (!reader) return;
@@ -275,8 +275,8 @@ export class Ranges {
   }
 
   /**
-   * Whether the browser, not the network, is in the way. It tells pages no difference; but without CORS, where nothing
-   * can be read of the answer, it lets requests through to a server that is there.
+   * Whether CORS, not the network, is the cause of a failure. Pages cannot see the difference; but a request without
+   * CORS, whose response cannot be read, succeeds if the server can be reached.
    */
   async #isBlocked(error, url, signal) {
     const page = globalThis.location?.origin;

@@ -98,7 +98,7 @@ export class Remote {
  *
  * @param {Endpoint} endpoint
  * @param {Record<string, (...args: any[]) => any>} methods
- * @param {string[]} [beside] names of methods that wait for something: calls that come later do not wait for them
+ * @param {string[]} [beside] names of methods that may wait for long: later calls do not wait for them
  * @returns {(name: string, data: any) => void} emits an event that the caller did not ask for
  */
 export function serve(endpoint, methods, beside = []) {

@@ -1,8 +1,8 @@
 /**
  * The worker behind `Viewer`: decodes, refines and draws, so that the page never waits for any of it.
  *
- * Frames are drawn when something has changed, at most one for each refresh of the screen. The mesh follows what is asked
- * for in steps between them, so that the camera waits for a step at most.
+ * Frames are drawn when something has changed, at most one for each refresh of the screen. Between frames the mesh is
+ * refined in steps, so that the camera waits for at most one step.
  */
 
 import init, { RangeLoader, Viewer } from "./tetralod_viewer.js";
@@ -20,22 +20,22 @@ const HIDDEN = 200;
 
 /** @type {Viewer | undefined} */
 let viewer;
-/** What fetches the blocks of a file that comes in parts. @type {Parts | undefined} */
+/** Fetches the blocks of a file that is read in parts. @type {Parts | undefined} */
 let parts;
-/** What `refine` was last asked for, and whether the viewer knows of it: it cannot before the base mesh is there. */
+/** The last request, and whether the viewer has it: it takes none before the base mesh has arrived. */
 let request = {};
 let aimed = false;
-/** Counts what was asked for; steps tell for which one they are. */
+/** Counts the requests; steps carry the number of their request. */
 let goal = 0;
-/** What has been done for it: the sums of the steps' numbers. */
+/** The work for it: the sums over its steps. */
 let total = {};
-/** When the mesh was last what was asked for, and how long that had taken. */
+/** When the last refinement ended, and how long it took. */
 let lastRefine = { end: -Infinity, took: 0 };
 let drawing = 0;
 let bytes = 0;
 let ready = false;
 let frameAsked = false;
-/** The mesh is going to follow what has come. */
+/** The timer of the next refinement with new data. */
 let following;
 let hidden;
 let broken = false;
@@ -113,7 +113,7 @@ const methods = {
     return { progress: mine.progress, info: { ...viewer.info(), bounds: Array.from(viewer.bounds()) } };
   },
 
-  /** Resolves when all has come that the mesh needs. What has come may show what else that is. */
+  /** Resolves when all data that the mesh needs has arrived. Arriving blocks may show that others are needed. */
   async settled() {
     const mine = parts;
     await mine?.settled();
@@ -136,7 +136,7 @@ const methods = {
     return progress;
   },
 
-  /** Resolves at once: steps towards the mesh are told as `stats`, with the number that this resolves to. */
+  /** Resolves at once, to the number of the request; its steps are reported as `stats` with this number. */
   async aim(options) {
     request = await received(options);
     aim();
@@ -176,7 +176,7 @@ const methods = {
 };
 const emit = serve(webEndpoint(globalThis), methods, ["openParts", "settled"]);
 
-/** Blocks have come: the mesh follows them as it follows a stream. */
+/** Blocks have arrived: refines with them, as with a stream. */
 function partsCame(progress) {
   bytes = progress.bytes;
   emit("progress", progress);
@@ -212,7 +212,7 @@ function aim() {
   invalidate();
 }
 
-/** Applies the last request to what has arrived since; a request that cannot be met is told, not thrown. */
+/** Applies the last request to new data; an error of the request is reported, not thrown. */
 function follow() {
   try {
     if (!aimed) aim();
@@ -223,13 +223,13 @@ function follow() {
   }
 }
 
-/** Goes on towards the mesh that is wanted, for about so many milliseconds, and tells how far that came. */
+/** Refines for about so many milliseconds, and reports the result. */
 function step(budget) {
   const start = performance.now();
   try {
     const stats = /** @type {any} */ (viewer.step(budget));
     const end = performance.now();
-    // A view that follows the camera may want other blocks.
+    // A view that follows the camera may need other blocks.
     parts?.follow();
     stats.milliseconds = end - start;
     for (const name of Object.keys(total)) total[name] += stats[name];
@@ -254,7 +254,7 @@ function invalidate() {
   nextFrame(draw);
 }
 
-/** No frame came: the page is hidden, or slow. */
+/** No frame was drawn: the page is hidden, or slow. */
 function stepUnseen() {
   hidden = undefined;
   if (broken || !ready || !viewer.moving) return;
@@ -276,7 +276,7 @@ function draw() {
     // The canvas may be hidden just now: then try again with the next refresh.
     else if (viewer.pending) invalidate();
   } catch (error) {
-    // A frame that fails would fail again: wait for a change, or for good if the GPU or the program is gone.
+    // A frame that fails would fail again: wait for a change, or stop if the GPU or the worker is lost.
     broken = error?.code === "device-lost" || error?.code === undefined;
     emit("error", flattenError(error));
   }
@@ -287,7 +287,7 @@ function draw() {
 async function drawn() {
   invalidate();
   const patience = new Promise((resolve) => setTimeout(resolve, 250));
-  // Of two refreshes, the first draws and the second comes after that picture.
+  // The first of two refreshes draws, the second follows when the picture is shown.
   const twice = new Promise((resolve) => nextFrame(() => nextFrame(resolve)));
   await Promise.race([twice, patience]);
 }

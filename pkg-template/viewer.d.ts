@@ -14,22 +14,22 @@ export { TetralodError } from "./index.js";
 
 /** How much of a file has arrived. */
 export interface ViewerProgress {
-  /** Whether the base mesh is there. */
+  /** Whether the base mesh has arrived. */
   ready: boolean;
-  /** Whether the whole file is there. */
+  /** Whether the whole file has arrived. */
   complete: boolean;
   /** Bytes decoded. */
   bytes: number;
   /** Updates decoded. */
   updates: number;
-  /** Size of the file where it is known. */
+  /** Size of the file, if known. */
   total: number | undefined;
-  /** Of a file that is fetched in parts: how its blocks stand. */
+  /** Of a file that is fetched in parts: the state of its blocks. */
   blocks?: BlockProgress;
 }
 
 /**
- * What the viewer's mesh is to be. A view without `matrix` and `viewport` is that of the viewer's own camera: the mesh
+ * A request for the viewer's mesh. A view without `matrix` and `viewport` is that of the viewer's own camera: the mesh
  * follows it.
  */
 export interface ViewerRefineOptions extends Omit<RefineOptions, "view" | "needs" | "where"> {
@@ -43,19 +43,19 @@ export interface ViewerRefineOptions extends Omit<RefineOptions, "view" | "needs
 export type OwnView = Pick<ViewOptions, "pixels" | "outside">;
 
 /**
- * How far the mesh is towards what was asked for last: all that was done for it so far. The mesh changes in steps of some
- * milliseconds between the frames; with the last one `done` is true.
+ * The work for the last request so far. The mesh changes in steps of some milliseconds between frames; `done` is true
+ * with the last one.
  */
 export interface ViewerStats extends RefineStats {
   /** Bytes of the file that had been decoded. */
   bytes: number;
-  /** Of a file that is fetched in parts: how its blocks stand. */
+  /** Of a file that is fetched in parts: the state of its blocks. */
   blocks?: BlockProgress;
 }
 
 /** A picture that was drawn. */
 export interface ViewerFrame {
-  /** How long the worker took to extract, upload and issue it. */
+  /** Time of the worker to extract, upload and draw it. */
   milliseconds: number;
   /** Triangles of the isosurface or of the cut-away view. */
   triangles: number;
@@ -73,13 +73,13 @@ export interface OpenedVolume {
   /** Its size in bytes where that is known. */
   total: number | undefined;
   /**
-   * Settles when the whole file is there, or with what went wrong; of a file that is fetched in parts, when all is there
-   * that the first request needs.
+   * Resolves when the whole file has arrived; for a file that is fetched in parts, when everything that the first
+   * request needs has arrived. Rejects with the error of the download.
    */
   finished: Promise<void>;
 }
 
-/** A plane; what lies on the side that `normal` points to is cut away. */
+/** A clip plane: the side that `normal` points to is hidden. */
 export interface ClipPlane {
   normal: [number, number, number];
   /** `normal · p` of its points. */
@@ -96,7 +96,7 @@ export interface ViewerEventMap {
 /**
  * Draws an MT on a canvas with WebGPU; decoding, refinement and drawing happen in a worker.
  *
- * Calls that come faster than the worker can follow replace each other: the last one wins.
+ * Calls that are faster than the worker replace each other: only the last one is carried out.
  *
  * ```js
  * const viewer = await Viewer.create(document.querySelector("canvas"));
@@ -107,30 +107,33 @@ export interface ViewerEventMap {
  */
 export class Viewer extends EventTarget {
   private constructor(canvas: HTMLCanvasElement);
-  /** Rejects with code `no-webgpu`, and the reason, where nothing can be drawn. */
+  /** Rejects with code `no-webgpu`, and the reason, if WebGPU is not available. */
   static check(): Promise<void>;
-  /** Takes the canvas over, for good. Rejects with code `no-webgpu` before it does so where there is no WebGPU. */
+  /** Transfers the canvas to the worker, permanently; rejects with code `no-webgpu` before that if there is no WebGPU. */
   static create(canvas: HTMLCanvasElement, options?: { signal?: AbortSignal }): Promise<Viewer>;
 
-  /** What is known of the volume; `undefined` until its base mesh is there. */
+  /** The description of the volume; `undefined` until its base mesh has arrived. */
   readonly info: MtInfo | undefined;
-  /** The GPU in words. */
+  /** The name of the GPU. */
   readonly adapter: string;
   /** Sixteen evenly spaced colours of the colour map as CSS colours. */
   readonly palette: string[];
 
   /**
    * Opens a volume in place of the one before; resolves when its base mesh has been drawn. URLs are fetched in parts where
-   * the server gives byte ranges: the mesh follows the blocks as they arrive.
+   * the server gives byte ranges: the mesh is refined as blocks arrive.
    */
   open(source: Source, options?: ReadOptions & { signal?: AbortSignal }): Promise<OpenedVolume>;
-  /** Of a file that is fetched in parts: resolves when all has come that the mesh needs, rejects with what prevents it. */
+  /**
+   * Of a file that is fetched in parts: resolves when all data that the mesh needs has arrived, rejects with the error
+   * that prevents it.
+   */
   settled(): Promise<void>;
-  /** Goes on with such a file after an error. Rejects with `changed` if it was replaced on the server: open it again. */
+  /** Continues such a file after an error. Rejects with `changed` if it was replaced on the server: open it again. */
   retry(): Promise<void>;
   /**
-   * Asks for another mesh. While the file streams in, and with the camera's own view while that moves, the mesh follows
-   * this request. Resolves when the mesh has been made; calls that were replaced meanwhile, together with the later one.
+   * Requests another mesh. While the file streams in, and with the camera's own view while that moves, the mesh follows
+   * this request. Resolves when the mesh is complete; a call that was replaced resolves together with the later one.
    *
    * @example
    * await viewer.refine({ view: { pixels: 1, outside: "10%" }, maxTets: 300_000 });
@@ -139,12 +142,12 @@ export class Viewer extends EventTarget {
   setMode(mode: "iso" | "cutaway"): Promise<void>;
   /** In field units. */
   setIsovalue(value: number): Promise<void>;
-  /** `null` cuts nothing away. */
+  /** `null` hides nothing. */
   setClip(plane: ClipPlane | null): Promise<void>;
   /** Shows a box, `[x0, y0, z0, x1, y1, z1]`, with handles; `null` hides it. Pass `box` to `refine` to use it. */
   setRoi(box: ArrayLike<number> | null): Promise<void>;
 
-  /** Turns the model to the right and upwards, in radians. */
+  /** Rotates the model to the right and upwards, in radians. */
   orbit(right: number, up: number): Promise<void>;
   /** Multiplies the distance to the model. */
   zoom(factor: number): Promise<void>;
@@ -155,12 +158,12 @@ export class Viewer extends EventTarget {
 
   /** The handle (0 to 5: lower and upper x, y, z) at a point of the canvas (−1 to 1, y upwards), or −1. */
   pickRoi(x: number, y: number): Promise<number>;
-  /** Moves a handle under a point; resolves to the box as it is then. */
+  /** Moves a handle under a point; resolves to the new box. */
   dragRoi(handle: number, x: number, y: number): Promise<number[]>;
 
-  /** A hash of the current mesh, the same wherever the same request was made. */
+  /** A hash of the current mesh: the same request gives the same hash on every machine. */
   hash(): Promise<string>;
-  /** Ends the worker; the canvas keeps its last picture. Calls under way and later ones reject with code `freed`. */
+  /** Stops the worker; the canvas keeps its last picture. Pending and later calls reject with code `freed`. */
   free(): void;
   [Symbol.dispose](): void;
 

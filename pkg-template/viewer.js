@@ -1,7 +1,7 @@
 /**
  * `Viewer`: an MT streamed from anywhere and drawn on a canvas with WebGPU, all of it in a worker.
  *
- * Calls that come faster than the worker can follow replace each other: the last one wins, and the promises of all
+ * Calls that are faster than the worker replace each other: only the last one is carried out, and the promises of all
  * resolve when it is done.
  */
 
@@ -30,10 +30,10 @@ export class Viewer extends EventTarget {
   #palette;
   #adapter;
   #stream = null;
-  /** For a file in parts: resolves when a mesh is asked for. */
+  /** For a file in parts: resolves when a mesh is requested. */
   #aimed;
   #aim = new Latest((options) => this.#remote.call("aim", [options]));
-  /** Those who wait for a mesh, by the number of what they asked for. */
+  /** Callers that wait for a mesh, by the number of their request. */
   #waiting = [];
   #update = new Latest((changes) => this.#remote.call("update", [changes]), mergeUpdates);
   #drag = new Latest(([handle, x, y]) => this.#remote.call("dragRoi", [handle, x, y]));
@@ -47,7 +47,7 @@ export class Viewer extends EventTarget {
   }
 
   /**
-   * Takes the canvas over, for good, and starts the worker.
+   * Transfers the canvas to the worker, permanently, and starts the worker.
    *
    * @param {HTMLCanvasElement} canvas
    * @param {{ signal?: AbortSignal }} [options]
@@ -93,7 +93,7 @@ export class Viewer extends EventTarget {
     try {
       this.#observer.observe(this.#canvas, { box: "device-pixel-content-box" });
     } catch {
-      // Safari knows no device pixels here.
+      // Safari does not support device pixels here.
       this.#observer.observe(this.#canvas);
     }
   }
@@ -109,7 +109,7 @@ export class Viewer extends EventTarget {
     if (!this.#settle(goal, ({ reject }) => reject(error))) this.#emit("error", error);
   }
 
-  /** Answers those who wait for this or for what it has replaced; whether anybody did. */
+  /** Settles the callers that wait for this request or one that it has replaced; returns whether there were any. */
   #settle(goal, how) {
     const settled = this.#waiting.filter((waiting) => waiting.goal <= goal);
     this.#waiting = this.#waiting.filter((waiting) => waiting.goal > goal);
@@ -121,12 +121,12 @@ export class Viewer extends EventTarget {
     this.dispatchEvent(new CustomEvent(name, { detail }));
   }
 
-  /** What is known of the volume; `undefined` until its base mesh is there. */
+  /** The description of the volume; `undefined` until its base mesh has arrived. */
   get info() {
     return this.#info;
   }
 
-  /** The GPU in words. */
+  /** The name of the GPU. */
   get adapter() {
     return this.#adapter;
   }
@@ -139,7 +139,7 @@ export class Viewer extends EventTarget {
 
   /**
    * Streams a volume in, in place of the one before. Resolves when its base mesh has been drawn; `finished` of the
-   * result when all of it is there.
+   * result when the whole file has arrived.
    *
    * @param {any} source
    * @param {{ signal?: AbortSignal, [how: string]: any }} [options]
@@ -163,7 +163,7 @@ export class Viewer extends EventTarget {
     });
     finished.catch(reject);
     const info = await ready;
-    // A failure after this point rejects `finished`, which nobody may be waiting for.
+    // A failure after this point rejects `finished`, which may have no handler.
     finished.catch((error) => {
       if (error?.name !== "AbortError") this.#emit("error", error);
     });
@@ -178,18 +178,18 @@ export class Viewer extends EventTarget {
     this.#info = opened.info;
     this.#aimed = resolve;
     const finished = abortable(promise.then(() => this.settled()), signal);
-    // The worker tells what goes wrong by itself.
+    // The worker reports errors by itself.
     finished.catch(() => {});
     this.#emit("progress", opened.progress);
     return { info: opened.info, name: url, total: opened.progress.total, finished };
   }
 
-  /** Of a file that is fetched in parts: resolves when all has come that the mesh needs now. */
+  /** Of a file that is fetched in parts: resolves when all data that the mesh needs now has arrived. */
   async settled() {
     await this.#remote.call("settled");
   }
 
-  /** Goes on after an error of the network. */
+  /** Continues after a network error. */
   async retry() {
     await this.#remote.call("retry");
   }
@@ -213,7 +213,7 @@ export class Viewer extends EventTarget {
   }
 
   /**
-   * Asks for another mesh; while the file streams in, and with `view` while the camera moves, the mesh follows this
+   * Requests another mesh; while the file streams in, and with `view` while the camera moves, the mesh follows this
    * request. Resolves when the mesh has been made; calls that were replaced meanwhile, with the later one.
    */
   async refine(options = {}) {
@@ -248,7 +248,7 @@ export class Viewer extends EventTarget {
     return this.#change({ roi: box ? Array.from(box) : null });
   }
 
-  /** Turns the model to the right and upwards, in radians. */
+  /** Rotates the model to the right and upwards, in radians. */
   orbit(right, up) {
     return this.#change({ orbit: [right, up] });
   }
@@ -273,12 +273,12 @@ export class Viewer extends EventTarget {
     return this.#remote.call("pickRoi", [x, y]);
   }
 
-  /** Moves a handle of the box under a point; resolves to the box as it is then. */
+  /** Moves a handle of the box under a point; resolves to the new box. */
   dragRoi(handle, x, y) {
     return this.#drag.call([handle, x, y]);
   }
 
-  /** A hash of the current mesh, the same wherever the same request was made. */
+  /** A hash of the current mesh: the same request gives the same hash on every machine. */
   hash() {
     return this.#remote.call("hash");
   }

@@ -1,8 +1,8 @@
 /**
- * Mouse, touch and keyboard over the canvas: turn, zoom, move, and drag the handles of the box.
+ * Mouse, touch and keyboard on the canvas: rotate, zoom, pan, and drag the handles of the box.
  *
- * One finger or the left button turns (or drags a handle); two fingers zoom and move; the right or middle button, or
- * the left one with Shift, moves.
+ * One finger or the left button rotates, or drags a handle; two fingers zoom and pan; the right or middle button, or
+ * the left one with Shift, pans.
  */
 
 /** Radians for a drag across the whole height of the canvas. */
@@ -17,11 +17,11 @@ const KEY_ZOOM = 1.15;
  * @param {{ onHome: () => void, onBox: (box: number[]) => void }} actions
  */
 export function attachControls(canvas, viewer, { onHome, onBox }) {
-  /** Where each pressed pointer was last. @type {Map<number, { x: number, y: number }>} */
+  /** The last position of each pressed pointer. @type {Map<number, { x: number, y: number }>} */
   const pointers = new Map();
-  /** The handle that is being dragged, −1 for none, null while that is being found out. */
+  /** The handle that is being dragged, −1 for none, null until `pickRoi` has answered. */
   let handle = -1;
-  /** Counts presses, so that a late answer about a handle is not taken for a later press. */
+  /** Counts presses: a late answer of `pickRoi` is for an earlier press and must be ignored. */
   let press = 0;
   let hovering = false;
 
@@ -106,7 +106,7 @@ export function attachControls(canvas, viewer, { onHome, onBox }) {
     "wheel",
     (event) => {
       event.preventDefault();
-      // Lines and pages as pixels; a pinch on a touchpad arrives as small steps with Ctrl.
+      // Lines and pages to pixels; a pinch on a touchpad arrives as small wheel steps with Ctrl.
       const pixels = event.deltaY * [1, 16, 400][event.deltaMode] * (event.ctrlKey ? 6 : 1);
       viewer.zoom(Math.exp(Math.max(-400, Math.min(400, pixels)) * 0.0015)).catch(ignore);
     },

@@ -1,13 +1,13 @@
 /**
- * The demo page: streams a volume, shows it, and turns the settings into requests.
+ * The demo page: streams a dataset, draws it, and makes requests of the settings.
  *
- * `?url=FILE` opens another volume. What the page knows is readable as `window.tetralodDemo` (for tests):
+ * `?url=FILE` opens another dataset. Tests read the state of the page from `window.tetralodDemo`:
  * `state` is "starting", "opening", "streaming", "complete", "failed" or "unsupported".
  */
 
 import { attachControls } from "./controls.js";
 
-/** @type {(id: string) => any} What an element can do is up to the page. */
+/** @type {(id: string) => any} Each caller knows the type of its element. */
 const $ = (id) => document.getElementById(id);
 /** @type {(selector: string) => Iterable<any>} */
 const all = (selector) => document.querySelectorAll(selector);
@@ -17,26 +17,26 @@ const demo = (window.tetralodDemo = {
   state: "starting",
   viewer: undefined,
   info: undefined,
-  /** Of the last mesh that was finished with all the data that it needs, and of the last step towards one. */
+  /** Statistics of the last complete mesh (all its data has arrived), and of the last step of refinement. */
   stats: undefined,
   step: undefined,
-  /** What the viewer was last asked for. */
+  /** The last request. */
   request: undefined,
   frame: undefined,
   frames: 0,
   error: undefined,
-  /** Of the first picture that shows the volume: bytes decoded and milliseconds since the page was opened. */
+  /** At the first picture that shows the dataset: bytes decoded and milliseconds since the page was opened. */
   firstFrameBytes: undefined,
   firstFrameMs: undefined,
   receivedBytes: 0,
   totalBytes: undefined,
-  /** Of a file that is fetched in parts: blocks that are here, and others. */
+  /** Of a file that is fetched in blocks: numbers of its blocks. */
   blocks: undefined,
 });
 
 /** @type {import("tetralod/viewer").Viewer} */
 let viewer;
-/** What was opened last, for "Try again". */
+/** What was opened last: the button "Try again" opens it again. */
 let source;
 let opening = 0;
 /** Corners of the box, [x0, y0, z0, x1, y1, z1]. */
@@ -50,7 +50,7 @@ start();
 
 async function start() {
   try {
-    // Imported here, so that a package that is missing is told like everything else.
+    // Imported here, so that a missing package is reported like other errors.
     const { Viewer } = await import("tetralod/viewer");
     viewer = demo.viewer = await Viewer.create(canvas);
   } catch (error) {
@@ -59,10 +59,10 @@ async function start() {
     demo.state = unsupported ? "unsupported" : "failed";
     $("panel").inert = true;
     $("loading").hidden = true;
-    say(unsupported ? "WebGPU is needed" : "The viewer did not start", error);
+    say(unsupported ? "This page needs WebGPU" : "The viewer could not start", error);
     return;
   }
-  $("gpu").textContent = viewer.adapter && `Drawn by ${viewer.adapter}`;
+  $("gpu").textContent = viewer.adapter && `GPU: ${viewer.adapter}`;
   $("legend-bar").style.background = `linear-gradient(90deg, ${viewer.palette.join(", ")})`;
   viewer.addEventListener("progress", ({ detail }) => showProgress(detail));
   viewer.addEventListener("stats", ({ detail }) => showStats(detail));
@@ -104,7 +104,7 @@ async function open(from) {
   }
 }
 
-/** Goes on with what is open, if it comes in blocks and is still the same file; otherwise opens it again. */
+/** Continues the download if the file comes in blocks and has not been replaced; otherwise opens it again. */
 async function retry() {
   if (!demo.info || !demo.blocks || demo.error?.code === "changed") return open(source);
   $("message").hidden = true;
@@ -120,15 +120,15 @@ async function retry() {
   }
 }
 
-/** What the updates of each kind of MT are. */
+/** The kinds of MT, with their updates. */
 const KINDS = {
-  "half-edge": "half-edge insertions",
-  edge: "vertex splits",
-  vertex: "vertex insertions",
-  explicit: "spelled out",
+  "half-edge": "half-edge (vertex insertions)",
+  edge: "edge (vertex splits)",
+  vertex: "vertex (vertex insertions)",
+  explicit: "explicit (any updates)",
 };
 
-/** The base mesh is there: fit the settings to it. */
+/** The base mesh has arrived: sets up the settings for it. */
 function arrive(info) {
   demo.info = info;
   $("n-kind").textContent = KINDS[info.kind] ?? info.kind;
@@ -147,7 +147,7 @@ function arrive(info) {
   refine();
 }
 
-/** Takes the field and the time step that the settings name. */
+/** Reads the field and the time step from the settings. */
 function chooseField() {
   const steps = fields.get($("field").value);
   $("time").max = steps.length - 1;
@@ -173,15 +173,15 @@ function fail(error) {
   $("loading").classList.add("done");
   $("retry").hidden = error.code === "device-lost" || error.code === "internal";
   const titles = {
-    network: "The volume could not be fetched",
-    cors: "The server does not let this page read the volume",
-    server: "The server does not send the volume as it is",
-    changed: "The volume was replaced on the server",
-    "device-lost": "The GPU was lost; reload the page",
-    truncated: "The file ends too early",
+    network: "The file could not be downloaded",
+    cors: "The server does not allow this page to read the file",
+    server: "The server does not send the bytes of the file",
+    changed: "The file was replaced on the server",
+    "device-lost": "The GPU was reset. Reload the page",
+    truncated: "The file is incomplete",
     "too-large": "The mesh is too large for this GPU",
   };
-  say(titles[error.code] ?? "The volume could not be shown", error);
+  say(titles[error.code] ?? "The file could not be opened", error);
 }
 
 function say(title, error) {
@@ -200,10 +200,10 @@ function say(title, error) {
 
 const checked = (name) => /** @type {HTMLInputElement} */ (document.querySelector(`[name=${name}]:checked`)).value;
 const mode = () => /** @type {"iso" | "cutaway"} */ (checked("mode"));
-const aim = () => checked("aim");
+const refineBy = () => checked("refine-by");
 
-/** Places of the error's slider: what is good enough where a view asks for more is coarser. */
-const errorPlaces = { field: 50, view: 78 };
+/** Positions of the slider of the field error: by screen error, it applies outside the view and may be coarser. */
+const errorPositions = { field: 50, view: 78 };
 
 /** 0 at the left end, then from 0.01 % to 100 % in equal ratios. */
 function errorPercent() {
@@ -231,13 +231,13 @@ function isovalue() {
 function refine() {
   if (!demo.info) return;
   const percent = errorPercent();
-  text("error-text", percent === 0 ? "0: the reference mesh" : percentage(percent), "error");
-  text("budget-text", budget() === undefined ? "no limit" : `${count(budget())} tetrahedra`, "budget");
+  text("error-text", percent === 0 ? "0 (full resolution)" : percentage(percent), "error");
+  text("budget-text", budget() === undefined ? "no limit" : `${count(budget())}`, "budget");
   text("pixels-text", pixels(errorPixels()), "pixels");
   /** @type {import("tetralod/viewer").ViewerRefineOptions} */
-  const options = { error: `${percent}%`, field: demo.info.fields.indexOf(field), maxTets: budget(), ...part() };
+  const options = { error: `${percent}%`, field: demo.info.fields.indexOf(field), maxTets: budget(), ...region() };
   if ($("focus").checked) options.isovalues = [isovalue()];
-  if (aim() === "view") options.needs = [{ view: { pixels: errorPixels() } }];
+  if (refineBy() === "view") options.needs = [{ view: { pixels: errorPixels() } }];
   demo.request = options;
   viewer.refine(options).catch((error) => {
     if (error.code !== "freed" && error.code !== "not-ready") fail(error);
@@ -258,7 +258,7 @@ function applyMode() {
   viewer.setMode(mode());
 }
 
-/** The plane of the cut. @returns {{ normal: [number, number, number], offset: number }} */
+/** The clip plane. @returns {{ normal: [number, number, number], offset: number }} */
 function plane() {
   const axis = Number($("axis").value);
   const [low, high] = [demo.info.bounds[axis], demo.info.bounds[axis + 3]];
@@ -274,19 +274,19 @@ function applyCut() {
   const { normal, offset } = plane();
   const at = normal[axis] * offset;
   const where = Math.abs(at) < (high - low) * 1e-4 ? 0 : Number(at.toPrecision(3));
-  text("cut-text", `${"xyz"[axis]} ${$("flip").checked ? "<" : ">"} ${where} is cut away`, "cut");
+  text("cut-text", `Hide ${"xyz"[axis]} ${$("flip").checked ? "<" : ">"} ${where}`, "cut");
   viewer.setClip({ normal, offset });
-  if ($("part").value === "cut") refine();
+  if ($("region").value === "cut") refine();
 }
 
-/** The part of space that the error counts in. */
-function part() {
+/** The region of the request. */
+function region() {
   const center = [0, 1, 2].map((i) => (box[i] + box[i + 3]) / 2);
   const radius = Math.min(...[0, 1, 2].map((i) => box[i + 3] - box[i])) / 2;
-  switch ($("part").value) {
+  switch ($("region").value) {
     case "box":
       return { box };
-    case "ball":
+    case "sphere":
       return { sphere: { center, radius } };
     case "cut":
       return { slab: plane() };
@@ -296,16 +296,16 @@ function part() {
 }
 
 function applyRoi() {
-  const on = ["box", "ball"].includes($("part").value);
+  const on = ["box", "sphere"].includes($("region").value);
   $("box").hidden = !on;
   viewer.setRoi(on ? box : null);
 }
 
-function applyAim() {
-  const view = aim() === "view";
-  for (const row of all("[data-aim]")) row.hidden = !view;
-  $("error-label").textContent = view ? "Error elsewhere" : "Error";
-  $("error").value = errorPlaces[aim()];
+function applyRefineBy() {
+  const view = refineBy() === "view";
+  for (const row of all("[data-refine-by]")) row.hidden = !view;
+  $("error-label").textContent = view ? "Maximum field error outside the view" : "Maximum field error";
+  $("error").value = errorPositions[refineBy()];
   refine();
 }
 
@@ -321,12 +321,12 @@ function boxWasDragged(moved) {
   refine();
 }
 
-/** A number was typed: used if it makes a box. */
+/** Takes the number that was typed if the box stays valid. */
 function boxWasTyped(input) {
   const typed = box.slice();
   typed[input.dataset.i] = input.valueAsNumber;
   const valid = [0, 1, 2].every((i) => typed[i] <= typed[i + 3]);
-  input.setCustomValidity(valid ? "" : "“from” must not be larger than “to”");
+  input.setCustomValidity(valid ? "" : "“min” must not be larger than “max”");
   input.reportValidity();
   if (!valid) return;
   box = typed;
@@ -346,9 +346,9 @@ function attachSettings() {
   on("cut", applyCut);
   on("axis", applyCut);
   on("flip", applyCut);
-  for (const radio of document.querySelectorAll("[name=aim]")) radio.addEventListener("change", applyAim);
+  for (const radio of document.querySelectorAll("[name=refine-by]")) radio.addEventListener("change", applyRefineBy);
   on("error", () => {
-    errorPlaces[aim()] = $("error").value;
+    errorPositions[refineBy()] = $("error").value;
     refine();
   });
   on("pixels", refine);
@@ -360,7 +360,7 @@ function attachSettings() {
       refine();
     });
   }
-  on("part", () => {
+  on("region", () => {
     if (!box) return;
     applyRoi();
     refine();
@@ -400,7 +400,7 @@ function attachFiles() {
   });
 }
 
-/** Names in the list of volumes what is open; a file or a URL that is not on it is added, in the place of the last. */
+/** Selects in the list what is open; a file or URL that is not in the list replaces the last one that was added. */
 function showInList(from) {
   const list = $("volume");
   const listed = [...list.options].find(({ value }) => value && value === from);
@@ -421,7 +421,7 @@ function showInList(from) {
 function showProgress({ bytes, total, complete, blocks }) {
   demo.receivedBytes = bytes;
   demo.blocks = blocks;
-  for (const part of all(".of-blocks")) part.hidden = !blocks;
+  for (const row of all(".of-blocks")) row.hidden = !blocks;
   if (blocks) return showBlocks(blocks, bytes);
   const known = total ?? demo.totalBytes;
   demo.totalBytes ??= total;
@@ -431,12 +431,12 @@ function showProgress({ bytes, total, complete, blocks }) {
   $("n-bytes").textContent = complete ? size(bytes) : amount;
 }
 
-/** Of a file in parts just what the mesh needs is fetched. */
+/** Shows the progress of a file that is fetched in blocks: only those that the mesh needs. */
 function showBlocks({ here, all, needed, leftOut }, bytes) {
   if (needed > 0) $("progress").value = Math.min(here / needed, 1);
   $("progress-text").textContent = `${count(here)} of ${count(all)} blocks`;
-  const room = leftOut > 0 ? `, no room for ${count(leftOut)}` : "";
-  $("n-blocks").textContent = `${count(here)} of ${count(all)}${room}`;
+  const excess = leftOut > 0 ? `, ${count(leftOut)} do not fit in memory` : "";
+  $("n-blocks").textContent = `${count(here)} of ${count(all)}${excess}`;
   $("n-bytes").textContent = size(bytes);
 }
 
@@ -452,9 +452,9 @@ function showStats(stats) {
     $("n-reference").textContent = count(info.tetrahedra);
     $("fill").style.width = `${(100 * stats.tetrahedra) / info.tetrahedra}%`;
   }
-  // On the way there no error is guaranteed yet.
+  // No error is guaranteed before the last step.
   if (!stats.done) return;
-  // Nor is that what was asked for, while more is on its way.
+  // The mesh is not complete while data is missing.
   if (!stats.missing) demo.stats = stats;
   const bound = percentage(stats.relativeErrorBound * 100);
   $("n-error").textContent = bound;
@@ -477,23 +477,23 @@ function showFrame(frame) {
   $("n-draw").textContent = milliseconds(frame.milliseconds);
 }
 
-const BUDGET_NOTE = "The mesh may have at most so many tetrahedra";
+const BUDGET_NOTE = "If the mesh would be larger, its error is as small as this number allows";
 
-/** What the budget allows instead of what was asked for. */
+/** The errors that the budget allows. */
 function achieved({ relativeErrorBound, bounds }) {
   const seen = bounds[1] === undefined ? "" : ` and ${pixels(bounds[1])} on screen`;
-  return `The best mesh of so many tetrahedra: within ${percentage(relativeErrorBound * 100)}${seen}`;
+  return `Too few for the requested error: the error is at most ${percentage(relativeErrorBound * 100)}${seen}`;
 }
 
 let waiting;
 
-/** Tells screen readers, once the numbers have come to rest. */
+/** Announces the numbers to screen readers when they have not changed for a while. */
 function announce(words) {
   clearTimeout(waiting);
   waiting = setTimeout(() => ($("status").textContent = words), 800);
 }
 
-/** Shows what a slider stands for, also to those who do not see it. */
+/** Shows the value of a slider, and gives it to screen readers. */
 function text(output, words, slider) {
   $(output).textContent = words;
   $(slider).setAttribute("aria-valuetext", words);
@@ -505,8 +505,8 @@ function percentage(percent) {
 }
 
 function pixels(n) {
-  // Where the camera is inside what would have to be refined, there is no bound.
-  if (n > 9999) return "any number of pixels";
+  // There is no bound if the camera is inside a tetrahedron with an error.
+  if (n > 9999) return "no bound";
   return `${Number(n.toPrecision(2))} ${n === 1 ? "pixel" : "pixels"}`;
 }
 
@@ -514,7 +514,7 @@ function count(n) {
   return n.toLocaleString("en");
 }
 
-/** A field value with as many digits as its range deserves. */
+/** A field value, with digits according to its range. */
 function short(value) {
   const range = field.max - field.min;
   if (Math.abs(value) < range * 1e-6) return "0";

@@ -10,7 +10,7 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::Instant;
 use tetralod::builder::{
-    BuildConfig, BuildError, BuildProgress, BuildResult, BuildSummary, Construction, Criterion,
+    BuildConfig, BuildCriterion, BuildError, BuildProgress, BuildResult, BuildSummary, Construction,
     FieldPrecision, Method, Purpose,
 };
 use tetralod::format::{EncodeOptions, encode_to};
@@ -38,7 +38,7 @@ pub struct Arguments {
     /// By what criterion vertices go or come: delaunay, or half-edge with decimate alone [default: half-edge with
     /// decimate].
     #[arg(long, value_name = "CRITERION", value_parser = criterion)]
-    criterion: Option<Criterion>,
+    criterion: Option<BuildCriterion>,
     /// What it is for, with decimate: uniform, the fewest tetrahedra at one error everywhere, or regions, which then take
     /// less around them with them [default: uniform].
     #[arg(long = "for", value_name = "PURPOSE", value_parser = purpose)]
@@ -166,8 +166,8 @@ fn method(text: &str) -> Result<Method> {
     named(text, &Method::ALL.map(|method| (method.name(), method)))
 }
 
-fn criterion(text: &str) -> Result<Criterion> {
-    named(text, &Criterion::ALL.map(|criterion| (criterion.name(), criterion)))
+fn criterion(text: &str) -> Result<BuildCriterion> {
+    named(text, &BuildCriterion::ALL.map(|criterion| (criterion.name(), criterion)))
 }
 
 fn purpose(text: &str) -> Result<Purpose> {
@@ -249,8 +249,8 @@ fn read(arguments: &Arguments, config: &BuildConfig) -> Result<(TetMesh, RepairR
 fn usual_kind(arguments: &Arguments) -> MtKind {
     match (arguments.method, arguments.criterion) {
         (Some(Method::Collapse), _) => MtKind::Edge,
-        (Some(Method::Insert), _) | (_, Some(Criterion::Delaunay)) => MtKind::Vertex,
-        (Some(Method::Decimate), _) | (_, Some(Criterion::HalfEdge)) => MtKind::HalfEdge,
+        (Some(Method::Insert), _) | (_, Some(BuildCriterion::Delaunay)) => MtKind::Vertex,
+        (Some(Method::Decimate), _) | (_, Some(BuildCriterion::HalfEdge)) => MtKind::HalfEdge,
         (None, None) if arguments.purpose.is_some() => MtKind::HalfEdge,
         (None, None) if arguments.tet_errors => MtKind::Vertex,
         (None, None) => BuildConfig::default().construction.kind(),
@@ -290,7 +290,7 @@ fn config(arguments: &Arguments) -> BuildConfig {
 fn construction(arguments: &Arguments, kind: MtKind) -> Result<Construction, String> {
     let usual = Construction::usual(kind).method();
     let method = arguments.method.unwrap_or(if arguments.tet_errors { Method::Insert } else { usual });
-    let criterion = arguments.criterion.unwrap_or(Criterion::usual(method));
+    let criterion = arguments.criterion.unwrap_or(BuildCriterion::usual(method));
     let refused = |error: BuildError| error.to_string();
     let mut construction = Construction::new(kind, method, criterion).map_err(refused)?;
     if arguments.tet_errors {
@@ -361,7 +361,7 @@ fn report(
     Report {
         kind: config.construction.kind().name(),
         method: config.construction.method().name(),
-        criterion: config.construction.criterion().map(Criterion::name),
+        criterion: config.construction.criterion().map(BuildCriterion::name),
         vertices: summary.vertices,
         tetrahedra: summary.tetrahedra,
         base_vertices: summary.base_vertices,

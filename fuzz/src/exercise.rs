@@ -130,7 +130,7 @@ fn arrive(decoder: &mut Decoder, front: &mut Front, block: u32, file: &[u8]) {
     match decoder.take_block(block, &bytes) {
         Ok(()) => {
             if let Some(mt) = decoder.mt() {
-                front.arrived(mt, block);
+                front.page_inserted(mt, block);
             }
         }
         Err(_) => assert_eq!(before, decoder.mt().map(|mt| mt.present()), "nothing changes"),
@@ -142,12 +142,12 @@ fn leave(decoder: &mut Decoder, front: &mut Front, block: u32) {
     let needed = decoder.index().is_some_and(|index| {
         (0..).zip(&index.blocks).any(|(other, info)| mt.has_page(other) && info.parents.contains(&block))
     });
-    if mt.has_page(block) && !needed && front.leave(mt, block) {
+    if mt.has_page(block) && !needed && front.prepare_eviction(mt, block) {
         // One that a lying index did not tell of may depend on it.
         if decoder.drop_block(block).is_err()
             && let Some(mt) = decoder.mt()
         {
-            front.arrived(mt, block);
+            front.page_inserted(mt, block);
         }
     }
 }

@@ -4,7 +4,7 @@ use anyhow::{Context, Result};
 use std::ops::ControlFlow;
 use std::path::Path;
 use tetralod::builder;
-use tetralod::builder::{BuildConfig, Construction, Criterion, Purpose, VertexMethod};
+use tetralod::builder::{BuildConfig, BuildCriterion, Construction, Purpose, VertexMethod};
 use tetralod::mesh::{Field, Grid, TetMesh, repair};
 use tetralod::mt::{CurrentMesh, Mt, MtInfo, MultiTessellation};
 use tetralod::refine::Request;
@@ -46,8 +46,8 @@ impl Recipe {
             Self::Edge => Construction::Edge,
             Self::Insert => Construction::Vertex(VertexMethod::Insert { tet_errors: false }),
             Self::InsertOwn => Construction::Vertex(VertexMethod::Insert { tet_errors: true }),
-            Self::Delaunay => Construction::Vertex(decimated(Criterion::Delaunay)),
-            Self::HalfEdge => Construction::Vertex(decimated(Criterion::HalfEdge)),
+            Self::Delaunay => Construction::Vertex(decimated(BuildCriterion::Delaunay)),
+            Self::HalfEdge => Construction::Vertex(decimated(BuildCriterion::HalfEdge)),
         };
         BuildConfig { construction, ..BuildConfig::default() }
     }

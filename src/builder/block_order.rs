@@ -28,10 +28,10 @@ pub(super) struct Updates<'a> {
 /// Requests are for boxes of this part of the whole, along each axis.
 const BOX: f64 = 0.1;
 
-/// Errors that are asked for lie between these, as often in any range of the same ratio.
+/// Requested errors are assumed to lie between these, log-uniformly.
 const ASKED_ERRORS: [f64; 2] = [1.0 / 8192.0, 0.25];
 
-/// Error zero is asked for this many times as often as all of these.
+/// Error zero is assumed to be requested this many times as often as all of these.
 const DOWN_TO_ZERO: f64 = 0.1;
 
 /// Of many blocks, no fewer than one in so many are parted from the rest.
@@ -71,8 +71,8 @@ impl Updates<'_> {
         reach
     }
 
-    /// Sorts the updates of each block by their near vertices, as far as the partial order allows: which update is whose child
-    /// is told in few bits then.
+    /// Sorts the updates of each block by their near vertices, as far as the partial order allows: which update is
+    /// whose child takes few bits then.
     fn sort_blocks(&self, order: &mut [u32], block_bits: u32) {
         let mut children: Vec<Vec<u32>> = vec![Vec::new(); self.count()];
         (0..self.count() as u32)
@@ -139,9 +139,9 @@ struct Parts<'a> {
     errors: &'a [ErrorCode],
     size: usize,
     sorted: [Vec<u32>; KEYS],
-    /// The sides of a box that is asked for.
+    /// The sides of a requested box.
     asked: [f64; 3],
-    /// The least and the largest error that is asked for. Codes are on a logarithmic scale.
+    /// The least and the largest requested error. Codes are on a logarithmic scale.
     asked_errors: [ErrorCode; 2],
 }
 

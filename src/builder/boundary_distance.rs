@@ -5,14 +5,14 @@ use crate::mesh::boundary_faces;
 use glam::DVec3;
 
 /// The boundary triangles of the reference mesh, in model units.
-pub(super) struct Skin {
+pub(super) struct BoundaryDistance {
     triangles: Vec<[DVec3; 3]>,
     corners: Vec<[u32; 3]>,
     /// The triangles at each vertex.
     around: Groups,
 }
 
-impl Skin {
+impl BoundaryDistance {
     pub fn new(tets: &[[u32; 4]], neighbors: &[[u32; 4]], positions: &[DVec3]) -> Self {
         let corners: Vec<[u32; 3]> = boundary_faces(tets, neighbors).map(|(_, face)| face).collect();
         let triangles = corners.iter().map(|face| face.map(|v| positions[v as usize])).collect();

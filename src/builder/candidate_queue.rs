@@ -1,15 +1,15 @@
-//! What to simplify next: candidates in the order of error level, depth plus star size, and length.
+//! The queue of candidates: by error level, then depth plus star size, then length.
 
 use super::Purpose;
 use crate::mt::ErrorCode;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// Errors that nobody tells apart are ordered by other things: depth of the partial order, size of the star, length of
-/// the edge. Below this error nobody cares; above it, levels group them.
+/// Candidates of similar error are ordered by depth of the partial order, size of the star and length of the edge.
+/// Errors below this one count as equal; larger ones are grouped in levels.
 const FINEST: f64 = 2e-4;
 
-/// How errors are grouped.
+/// The levels of error.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Levels {
     /// Bits of an error's code that do not count for its level.
@@ -22,7 +22,7 @@ impl Levels {
     /// Four for each power of two: each is about 2^¼ wide.
     pub const QUARTERS: Self = Self { bits: 9 };
 
-    /// What serves the purpose of an MT that is built by removing vertices.
+    /// The levels for a purpose.
     pub fn of_purpose(purpose: Purpose) -> Self {
         match purpose {
             Purpose::Uniform => Self::QUARTERS,
@@ -77,7 +77,7 @@ impl Key {
         (self.cost >> 32) as u32 & 0xffff
     }
 
-    /// Level, depth and star size: what has to be right before the candidate is carried out.
+    /// Level, depth and star size: these must be exact before the candidate is carried out.
     pub fn urgency(self) -> u32 {
         (self.cost >> 32) as u32
     }
@@ -92,16 +92,16 @@ impl Key {
 
 /// The candidates.
 #[derive(Default)]
-pub(super) struct Agenda {
-    /// Candidates of the level that is worked on, and of those before.
+pub(super) struct CandidateQueue {
+    /// Candidates of the current level and of earlier ones.
     queue: BinaryHeap<Reverse<Key>>,
     level: u16,
     /// Candidates of later levels.
     later: Vec<Vec<Key>>,
 }
 
-impl Agenda {
-    /// The level that is worked on.
+impl CandidateQueue {
+    /// The current level.
     pub fn level(&self) -> u16 {
         self.level
     }
@@ -111,8 +111,8 @@ impl Agenda {
         self.queue.pop().map(|Reverse(key)| key)
     }
 
-    /// Puts a candidate where it belongs: into the queue, or aside until its level is reached. Most candidates are
-    /// never reached at the level of their first prediction, so this keeps the queue short.
+    /// Adds a candidate to the queue, or to the list of its level if that is a later one. Most candidates are never
+    /// reached at the level of their first prediction, so this keeps the queue short.
     pub fn push(&mut self, key: Key) {
         if key.level() <= self.level {
             self.queue.push(Reverse(key));
@@ -125,7 +125,7 @@ impl Agenda {
         self.later[level].push(key);
     }
 
-    /// Goes on to the next level that has candidates; false if there is none.
+    /// Moves to the next level that has candidates; false if there is none.
     pub fn next_level(&mut self) -> bool {
         let first = usize::from(self.level) + 1;
         let next = (first..self.later.len()).find(|&level| !self.later[level].is_empty());

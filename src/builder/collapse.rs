@@ -1,9 +1,10 @@
-//! The driver: pick an edge, test it, collapse it, record it.
+//! Edge-based MTs by collapses: choose an edge, check it, collapse it, record it.
 
-use super::candidate_queue::{Agenda, Key, Levels};
-use super::collapse_check::{Plan, Refusal, VertexMarks};
-use super::cost::{Buckets, Evaluator, Reference, VertexData, largest};
+use super::candidate_queue::{CandidateQueue, Key, Levels};
+use super::collapse_check::{CheckedCollapse, Refusal, VertexMarks};
+use super::cost::{Buckets, Evaluator, Input, Reference, VertexData, largest};
 use super::history::Collapse;
+use super::points::squared_length;
 use super::work_mesh::WorkMesh;
 use super::{
     BuildConfig, BuildError, BuildProgress, BuildResult, BuildSummary, OnProgress, field_selection, history,
@@ -19,8 +20,8 @@ use crate::mt::{EdgeMt, ErrorCode, MAX_UPDATES, MtInfo, MtKind, MultiTessellatio
 /// Works on one thread and calls `progress` now and then.
 ///
 /// # Errors
-/// If the mesh is not valid, has none of the wanted fields, or does not fit the lattice; if an option is out of its
-/// range; if `progress` breaks the work off.
+/// If the mesh is not valid, lacks a configured field, or does not fit the lattice; if an option is out of its range;
+/// if `progress` stops the work.
 pub fn edge_mt(
     mesh: &TetMesh,
     config: &BuildConfig,
@@ -32,9 +33,8 @@ pub fn edge_mt(
     if mesh.tets.is_empty() {
         return Err(BuildError::Empty);
     }
-    mesh::check(mesh).map_err(BuildError::Mesh)?;
-    let Topology { neighbors, non_manifold: frozen, .. } =
-        mesh::topology(mesh.positions.len(), &mesh.tets).map_err(BuildError::Mesh)?;
+    mesh::check(mesh)?;
+    let Topology { neighbors, non_manifold: frozen, .. } = mesh::topology(mesh.positions.len(), &mesh.tets)?;
     let quantized = quantize::quantize_cells(mesh, config)?;
     let diagonal = Bounds::of(&mesh.positions).diagonal();
     let info = MtInfo {
@@ -67,7 +67,7 @@ pub fn edge_mt(
     Ok(BuildResult { mt, summary, vertices, exact })
 }
 
-/// How errors are grouped.
+/// The levels of error.
 const LEVELS: Levels = Levels::HALVES;
 
 struct Builder<'a> {
@@ -81,15 +81,15 @@ struct Builder<'a> {
     marks: VertexMarks,
     /// Counts the changes around each vertex.
     versions: Vec<u32>,
-    agenda: Agenda,
+    queue: CandidateQueue,
     /// Edges that could not be collapsed, with the sum of their ends' versions then.
     blocked: Vec<(u32, u32, u32)>,
-    plan: Plan,
+    collapse: CheckedCollapse,
     evaluator: Evaluator,
     history: Vec<Collapse>,
     /// Tetrahedra around each vertex.
     degrees: Vec<u32>,
-    /// What the lattices round off, as an error.
+    /// The rounding errors of the lattices.
     floors: Vec<f64>,
 }
 
@@ -97,9 +97,7 @@ impl<'a> Builder<'a> {
     fn new(mesh: WorkMesh, reference: Reference<'a>, info: &MtInfo, frozen: Vec<bool>) -> Self {
         let quantized = reference.quantized;
         let points = quantized.positions.len();
-        let mut degrees = vec![0; points];
-        mesh.tets.iter().flatten().for_each(|&v| degrees[v as usize] += 1);
-        let foot = |v: u32| reference.skin.at(v).first().copied().unwrap_or(crate::mesh::NONE);
+        let foot = |v: u32| reference.boundary.at(v).first().copied().unwrap_or(crate::mesh::NONE);
         let data = VertexData {
             positions: quantized.positions.clone(),
             levels: quantized.levels.clone(),
@@ -112,16 +110,16 @@ impl<'a> Builder<'a> {
             buckets: Buckets::new(mesh.tets.len(), quantized),
             marks: VertexMarks::new(points),
             versions: vec![0; points],
+            degrees: mesh.degrees(),
             mesh,
             data,
             reference,
             frozen,
-            agenda: Agenda::default(),
+            queue: CandidateQueue::default(),
             blocked: Vec::new(),
-            plan: Plan::default(),
+            collapse: CheckedCollapse::default(),
             evaluator: Evaluator::default(),
             history: Vec::new(),
-            degrees,
             floors: quantize::floors(info),
         }
     }
@@ -138,7 +136,7 @@ impl<'a> Builder<'a> {
                     return Err(BuildError::Stopped);
                 }
             }
-            let Some(key) = self.agenda.pop() else {
+            let Some(key) = self.queue.pop() else {
                 if self.next_level() {
                     continue;
                 }
@@ -156,18 +154,17 @@ impl<'a> Builder<'a> {
         edges.sort_unstable();
         edges.dedup();
         for (a, b) in edges {
-            self.agenda.push(self.predicted_key(a, b));
+            self.queue.push(self.predicted_key(a, b));
         }
     }
 
-    /// Goes on to the next level that has candidates; what was in the way at the lower ones may be gone, so that is
-    /// looked at again. False if nothing is left to do.
+    /// Moves to the next level that has candidates, and retries blocked edges. False if no candidates are left.
     fn next_level(&mut self) -> bool {
-        let more = self.agenda.next_level();
+        let more = self.queue.next_level();
         self.retry_blocked() || more
     }
 
-    /// Puts those blocked edges back whose neighbourhood has changed. Tells whether there were any.
+    /// Requeues the blocked edges whose neighbourhood has changed. Returns whether there were any.
     fn retry_blocked(&mut self) -> bool {
         let mut still = std::mem::take(&mut self.blocked);
         let before = still.len();
@@ -178,8 +175,8 @@ impl<'a> Builder<'a> {
             if self.edge_version(a, b) == versions {
                 return true;
             }
-            let key = self.predicted_key(a, b).no_earlier_than(self.agenda.level());
-            self.agenda.push(key);
+            let key = self.predicted_key(a, b).no_earlier_than(self.queue.level());
+            self.queue.push(key);
             false
         });
         self.blocked = still;
@@ -192,11 +189,10 @@ impl<'a> Builder<'a> {
 
     fn key(&self, error: f64, height: u32, star: u32, a: u32, b: u32) -> Key {
         let (p, q) = (self.data.positions[a as usize], self.data.positions[b as usize]);
-        let length: f32 = (0..3).map(|i| (i64::from(p[i]) - i64::from(q[i])) as f32).map(|d| d * d).sum();
-        Key::new(LEVELS.of(error), height + star, length, a, b)
+        Key::new(LEVELS.of(error), height + star, squared_length(p, q), a, b)
     }
 
-    /// A key from what the ends know: second differences of the fields, errors and depths so far.
+    /// A predicted key: from second differences of the fields, and from the errors and depths of the ends.
     fn predicted_key(&self, a: u32, b: u32) -> Key {
         let fields = &self.reference.quantized.fields;
         let (i, j) = (a as usize, b as usize);
@@ -210,14 +206,14 @@ impl<'a> Builder<'a> {
                 [u, v].map(|w| (rise - self.gradients[w].dot(q - p)).abs()).into_iter().fold(0.0, f64::max);
             error = error.max(0.5 * bend * field.step / field.range());
         }
-        // About six tetrahedra lie around an edge; they are in both stars and go.
+        // About six tetrahedra around the edge are in both stars and are removed.
         let star = (self.degrees[i] + self.degrees[j]).saturating_sub(12);
         self.key(error, self.data.height[i].max(self.data.height[j]) + 1, star, a, b)
     }
 
     fn try_collapse(&mut self, key: Key) {
         let Key { a, b, .. } = key;
-        match self.plan.make(&self.mesh, &mut self.marks, &self.data.positions, &self.frozen, a, b) {
+        match self.collapse.make(&self.mesh, &mut self.marks, &self.data.positions, &self.frozen, a, b) {
             Ok(()) => {}
             Err(Refusal::Blocked) => {
                 self.blocked.push((a, b, self.edge_version(a, b)));
@@ -225,12 +221,12 @@ impl<'a> Builder<'a> {
             }
             Err(Refusal::Gone | Refusal::Never) => return,
         }
-        let Self { plan, mesh, data, buckets, reference, evaluator, .. } = self;
+        let Self { collapse, mesh, data, buckets, reference, evaluator, .. } = self;
         let limit = LEVELS.largest(key.level());
-        let error = evaluator.evaluate(plan, mesh, data, buckets, reference, limit);
-        let exact = self.key(error, self.evaluator.height, self.plan.stay.len() as u32, a, b);
+        let error = evaluator.evaluate(buckets, limit, Input { collapse, mesh, data, reference });
+        let exact = self.key(error, self.evaluator.height, self.collapse.stay.len() as u32, a, b);
         if exact.urgency() > key.urgency() {
-            self.agenda.push(exact);
+            self.queue.push(exact);
             return;
         }
         self.perform();
@@ -239,43 +235,44 @@ impl<'a> Builder<'a> {
     fn perform(&mut self) {
         // Never zero: error 0 is to mean the reference mesh, with every update applied.
         let stored = |error: &f64, floor: &f64| ErrorCode::at_least(error.max(*floor)).max(ErrorCode(1));
-        let errors = self.evaluator.errors.iter().zip(&self.floors);
+        let errors = self.evaluator.placement.errors.iter().zip(&self.floors);
         let errors: Vec<ErrorCode> = errors.map(|(error, floor)| stored(error, floor)).collect();
         let code = errors.iter().copied().fold(ErrorCode::ZERO, ErrorCode::max);
         let v = self.data.positions.len() as u32;
-        let Self { plan, mesh, data, evaluator, .. } = self;
-        self.history.push(Collapse::new(plan, mesh, code, evaluator.steps));
-        data.positions.push(plan.position);
-        data.levels.extend_from_slice(&evaluator.levels);
+        let Self { collapse, mesh, data, evaluator, .. } = self;
+        self.history.push(Collapse::new(collapse, mesh, code, evaluator.steps));
+        data.positions.push(collapse.position);
+        data.levels.extend_from_slice(&evaluator.star.levels);
         data.errors.extend(errors.iter().map(|code| code.error()));
         data.height.push(evaluator.height);
         data.foot.push(evaluator.foot);
-        evaluator.settle(plan, data, &mut self.buckets, &self.reference);
-        for f in 0..evaluator.levels.len() {
-            let fields = evaluator.levels.len();
-            let [g, h] = [plan.a, plan.b].map(|w| self.gradients[w as usize * fields + f]);
+        let input = Input { collapse, mesh, data, reference: &self.reference };
+        evaluator.move_points(&mut self.buckets, input);
+        for f in 0..evaluator.star.levels.len() {
+            let fields = evaluator.star.levels.len();
+            let [g, h] = [collapse.a, collapse.b].map(|w| self.gradients[w as usize * fields + f]);
             self.gradients.push((g + h) * 0.5);
         }
-        self.degrees.push(plan.stay.len() as u32);
-        for &(tet, i, j) in &plan.fan {
+        self.degrees.push(collapse.stay.len() as u32);
+        for &(tet, i, j) in &collapse.fan {
             mesh.tets[tet as usize].iter().for_each(|&v| self.degrees[v as usize] -= 1);
             mesh.close(tet, i as usize, j as usize);
         }
         let mut first = crate::mesh::NONE;
-        for (s, _) in &plan.stay {
+        for (s, _) in &collapse.stay {
             mesh.tets[s.tet as usize][s.corner as usize] = v;
             first = s.tet;
         }
         mesh.incident.push(first);
-        mesh.incident[plan.a as usize] = crate::mesh::NONE;
-        mesh.incident[plan.b as usize] = crate::mesh::NONE;
+        mesh.incident[collapse.a as usize] = crate::mesh::NONE;
+        mesh.incident[collapse.b as usize] = crate::mesh::NONE;
         self.marks.push();
         self.versions.push(0);
-        for i in 0..self.plan.link.len() {
-            let x = self.plan.link[i];
+        for i in 0..self.collapse.link.len() {
+            let x = self.collapse.link[i];
             self.versions[x as usize] = self.versions[x as usize].wrapping_add(1);
             let key = self.predicted_key(x, v);
-            self.agenda.push(key);
+            self.queue.push(key);
         }
     }
 }

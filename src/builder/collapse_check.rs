@@ -1,4 +1,4 @@
-//! May this edge be collapsed? What comes of it? The tests that need no field: topology and orientation.
+//! Checks of an edge collapse that need no field: topology and orientation.
 
 use super::flat;
 use super::work_mesh::{StarTet, TetMarks, WorkMesh};
@@ -19,7 +19,7 @@ pub(super) enum Refusal {
 
 /// A collapse that topology and orientation allow. Reused from candidate to candidate.
 #[derive(Default)]
-pub(super) struct Plan {
+pub(super) struct CheckedCollapse {
     pub a: u32,
     pub b: u32,
     /// Where the edge goes.
@@ -39,7 +39,7 @@ pub(super) struct Plan {
     seen: TetMarks,
 }
 
-/// Marks on vertices around the edge that is looked at.
+/// Marks on vertices around an edge.
 pub(super) struct VertexMarks {
     marks: Vec<u32>,
     epoch: u32,
@@ -85,8 +85,8 @@ impl VertexMarks {
 /// Sides of a collapse have at most [`MAX_STAR`] tetrahedra, and those between them at most [`MAX_LINK`].
 const LARGEST_STAR: usize = MAX_STAR + MAX_LINK;
 
-impl Plan {
-    /// Plans the collapse of edge `ab`.
+impl CheckedCollapse {
+    /// Checks the collapse of edge `ab`.
     pub fn make(
         &mut self,
         mesh: &WorkMesh,

@@ -1,25 +1,27 @@
 //! The exact error of a collapse: what the field and the boundary lose, at every reference vertex concerned.
 //!
-//! Each reference vertex that is not a vertex of the mesh lives in the bucket of one tetrahedron: the one that
-//! contains it or, where the boundary has moved, the one with the nearest boundary triangle. A collapse takes it from
-//! a tetrahedron that it removes to one that it creates. So for every consistent set S, some tetrahedron of Σ_S had
-//! the vertex in its bucket, and the error recorded then bounds what Σ_S has there. A created tetrahedron is also compared with
-//! those that it contains but that are in other buckets ([`super::strays`]).
+//! Each reference vertex that is not a vertex of the mesh is in the bucket of one tetrahedron: the one that contains it
+//! or, where the boundary has moved, the one with the nearest boundary triangle. A collapse takes it from a tetrahedron
+//! that it removes to one that it creates. So for every consistent set S, some tetrahedron of Σ_S had the vertex in its
+//! bucket, and the error recorded then bounds what Σ_S has there. A created tetrahedron is also compared with those
+//! that it contains but that are in other buckets ([`super::outside_points`]).
 //!
 //! The boundary is kept track of in both directions. A created vertex is compared with the reference boundary itself:
 //! its distance from the mesh before says nothing, as step after step along chords would fill any hollow. And each
 //! reference vertex of the boundary has a second bucket, of the boundary triangle that is nearest to it.
 
-use super::boundary_distance::Skin;
-use super::collapse_check::Plan;
+use super::boundary_distance::BoundaryDistance;
+use super::collapse_check::CheckedCollapse;
+use super::outside_points::OutsidePoints;
+use super::placement::{Placement, Replacement};
+use super::points::{Lists, SLACK, as_vec, bounds};
 use super::quantize::Quantized;
-use super::strays::Strays;
 use super::work_mesh::WorkMesh;
-use crate::geom::{nearest_on_triangle, orient3d};
+use crate::geom::orient3d;
 use crate::mesh::{EDGES, FACES, NONE};
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
-/// What is known of each vertex, input and created.
+/// The vertices of the input, and those that collapses create.
 pub(super) struct VertexData {
     pub positions: Vec<[i32; 3]>,
     pub levels: Vec<i32>,
@@ -33,12 +35,12 @@ pub(super) struct VertexData {
 
 /// The reference vertices that belong to each tetrahedron.
 pub(super) struct Buckets {
-    /// Those that it stands for.
+    /// Points of the reference mesh in the tetrahedron.
     pub inside: Lists,
-    /// Those of the boundary that its boundary faces stand for.
+    /// Points of the reference boundary near its boundary faces.
     pub border: Lists,
-    /// Those that are not where their buckets are.
-    pub strays: Strays,
+    /// Points outside of the tetrahedron in whose bucket they are.
+    pub outside_points: OutsidePoints,
 }
 
 impl Buckets {
@@ -46,12 +48,12 @@ impl Buckets {
     pub fn new(tets: usize, quantized: &Quantized) -> Self {
         let points = quantized.places.len();
         let mut inside = Lists::new(tets, points);
-        let mut strays = Strays::new(tets, quantized.places.clone());
-        for home in &quantized.homes {
-            inside.put(home.tet, home.point);
-            strays.set_outside(home.point, home.outside);
+        let mut outside_points = OutsidePoints::new(tets, quantized.places.clone());
+        for location in &quantized.locations {
+            inside.put(location.tet, location.point);
+            outside_points.set_outside(location.point, location.outside);
         }
-        Self { inside, border: Lists::new(tets, points), strays }
+        Self { inside, border: Lists::new(tets, points), outside_points }
     }
 
     /// Empties the buckets of a tetrahedron, which may be a new one.
@@ -60,39 +62,7 @@ impl Buckets {
             lists.reserve(t);
             lists.take(t);
         }
-        self.strays.clear(t);
-    }
-}
-
-/// Disjoint lists of points, one for each tetrahedron.
-pub(super) struct Lists {
-    first: Vec<u32>,
-    next: Vec<u32>,
-}
-
-impl Lists {
-    pub fn new(tets: usize, points: usize) -> Self {
-        Self { first: vec![NONE; tets], next: vec![NONE; points] }
-    }
-
-    /// Makes room for the list of a tetrahedron.
-    pub fn reserve(&mut self, t: u32) {
-        if self.first.len() <= t as usize {
-            self.first.resize(t as usize + 1, NONE);
-        }
-    }
-
-    pub fn take(&mut self, t: u32) {
-        self.first[t as usize] = NONE;
-    }
-
-    pub fn put(&mut self, t: u32, point: u32) {
-        self.next[point as usize] = std::mem::replace(&mut self.first[t as usize], point);
-    }
-
-    pub fn iter(&self, t: u32) -> impl Iterator<Item = u32> {
-        let step = |p: u32| (p != NONE).then_some(p);
-        std::iter::successors(step(self.first[t as usize]), move |&p| step(self.next[p as usize]))
+        self.outside_points.clear(t);
     }
 }
 
@@ -100,92 +70,30 @@ impl Lists {
 pub(super) struct Reference<'a> {
     pub quantized: &'a Quantized,
     pub points: u32,
-    pub skin: Skin,
+    pub boundary: BoundaryDistance,
     /// Model units of displacement of the boundary that count as an error of 1, at each vertex of the reference mesh.
     allowances: Vec<f64>,
     /// The most of them.
     pub displacement_per_error: f64,
 }
 
-/// One tetrahedron of the star after the collapse.
-struct Cell {
-    /// `(λ_x, λ_y, λ_z)` of a point are this times its position relative to the centre.
-    barycentric: DMat3,
-    others: [u32; 3],
-    tet: u32,
-}
-
-/// A boundary triangle in model units.
-pub(super) struct Face {
-    corners: [DVec3; 3],
-    normal: DVec3,
-    /// The normal's length, squared.
-    area: f64,
-}
-
-impl Face {
-    pub fn new(corners: [DVec3; 3]) -> Self {
-        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
-        Self { corners, normal, area: normal.length_squared() }
-    }
-}
-
-/// The number of the face nearest to `p`, the nearest point there, and its distance.
-pub(super) fn nearest_face(p: DVec3, faces: &[Face]) -> (usize, DVec3, f64) {
-    let (mut least, mut found, mut nearest) = (f64::INFINITY, 0, p);
-    for (i, face) in faces.iter().enumerate() {
-        // No point of a triangle is nearer than its plane.
-        let height = (p - face.corners[0]).dot(face.normal);
-        if height * height > least * face.area {
-            continue;
-        }
-        let q = nearest_on_triangle(p, face.corners);
-        let distance = p.distance_squared(q);
-        if distance < least {
-            (least, found, nearest) = (distance, i, q);
-        }
-    }
-    (found, nearest, least.sqrt())
-}
-
-/// Which of so many tetrahedra a point lies in, or is least outside of: its barycentric coordinates there but for the
-/// first one, which `barycentric` gives, and how deep inside it lies. The one called `hint` is looked at first.
-pub(super) fn locate(cells: usize, hint: usize, barycentric: impl Fn(usize) -> DVec3) -> (usize, DVec3, f64) {
-    let (mut cell, mut lambda, mut depth) = (hint, DVec3::ZERO, f64::NEG_INFINITY);
-    let order = std::iter::once(hint).chain((0..cells).filter(|&i| i != hint));
-    for i in order {
-        let l = barycentric(i);
-        let inside = l.min_element().min(1.0 - l.element_sum());
-        if inside > depth {
-            (cell, lambda, depth) = (i, l, inside);
-        }
-        if inside >= 0.0 {
-            break;
-        }
-    }
-    (cell, lambda, depth)
+/// A collapse to evaluate, and what it is compared with.
+#[derive(Clone, Copy)]
+pub(super) struct Input<'a> {
+    pub collapse: &'a CheckedCollapse,
+    pub mesh: &'a WorkMesh,
+    pub data: &'a VertexData,
+    pub reference: &'a Reference<'a>,
 }
 
 /// Evaluates collapses; holds scratch space.
 #[derive(Default)]
 pub(super) struct Evaluator {
-    cells: Vec<Cell>,
-    /// Boundary triangles of the star: the cell and its corners, [`NONE`] for the centre. Those at the centre first.
-    border: Vec<(u32, [u32; 3])>,
+    pub star: NewStar,
+    pub placement: Placement,
     at_centre: usize,
-    /// The same triangles in model units with their normals, made when they are first needed.
-    faces: Vec<Face>,
     flat: bool,
     old_border: Vec<[u32; 3]>,
-    /// Where each point goes: point, cell, and whether it is outside.
-    moves: Vec<(u32, u32, bool)>,
-    /// Points of other buckets that are inside: point and cell.
-    visits: Vec<(u32, u32)>,
-    border_moves: Vec<(u32, u32)>,
-    /// The levels of the new vertex.
-    pub levels: Vec<i32>,
-    /// The error of each field.
-    pub errors: Vec<f64>,
     /// The largest error of each field among the updates that this one will be a parent of.
     inherited: Vec<f64>,
     /// The triangle of the reference boundary near the new vertex.
@@ -195,9 +103,41 @@ pub(super) struct Evaluator {
     pub steps: [f64; 2],
 }
 
-/// Raises the errors of all fields to at least this.
-pub(super) fn raise(errors: &mut [f64], least: f64) {
-    errors.iter_mut().for_each(|error| *error = error.max(least));
+/// The star of the new vertex.
+#[derive(Default)]
+pub(super) struct NewStar {
+    /// For each tetrahedron its other corners.
+    others: Vec<[u32; 3]>,
+    /// Boundary triangles: the tetrahedron and the corners, [`NONE`] for the new vertex. Those at the new vertex first.
+    border: Vec<(u32, [u32; 3])>,
+    /// The levels of the new vertex.
+    pub levels: Vec<i32>,
+}
+
+impl Replacement for (Input<'_>, &NewStar) {
+    fn reference(&self) -> &Reference<'_> {
+        self.0.reference
+    }
+
+    fn border(&self) -> &[(u32, [u32; 3])] {
+        &self.1.border
+    }
+
+    fn corner(&self, v: u32) -> DVec3 {
+        let Input { collapse, data, reference, .. } = self.0;
+        reference.scaled(if v == NONE { collapse.position } else { data.positions[v as usize] })
+    }
+
+    fn levels(&self, cell: usize, field: usize) -> [i32; 4] {
+        let NewStar { others, levels, .. } = self.1;
+        let [x, y, z] = others[cell].map(|v| self.0.data.levels[v as usize * levels.len() + field]);
+        [levels[field], x, y, z]
+    }
+
+    fn relative(&self, q: DVec3, _: DVec3) -> DVec3 {
+        let Input { collapse, reference, .. } = self.0;
+        (q - reference.scaled(collapse.position)) / DVec3::from_array(reference.quantized.lattice.step)
+    }
 }
 
 /// The largest error of all fields.
@@ -208,56 +148,43 @@ pub(super) fn largest(errors: &[f64]) -> f64 {
 /// Errors below this are far below the smallest that is stored.
 const NO_DISTANCE: f64 = 1e-8;
 
-/// Barycentric coordinates this far below zero are rounding errors of a point on a face.
-pub(super) const SLACK: f64 = 1e-9;
-
 impl Evaluator {
-    /// The error of the planned collapse, the largest one of all fields; any value above `limit` may be returned early once it is exceeded, then
-    /// as a lower bound.
-    pub fn evaluate(
-        &mut self,
-        plan: &Plan,
-        mesh: &WorkMesh,
-        data: &VertexData,
-        buckets: &Buckets,
-        reference: &Reference<'_>,
-        limit: f64,
-    ) -> f64 {
+    /// The largest error of all fields; once it exceeds `limit`, any lower bound above `limit` may be returned.
+    pub fn evaluate(&mut self, buckets: &Buckets, limit: f64, input: Input<'_>) -> f64 {
+        let Input { collapse, reference, .. } = input;
         self.steps = [0.0; 2];
-        self.halve_levels(plan, data, reference);
-        let newest = self.inherit(plan, mesh, data);
-        self.cells.clear();
-        self.cells
-            .extend(plan.stay.iter().map(|&(s, _)| Cell::new(s.tet, s.corner as usize, plan, mesh, data)));
-        self.collect_border(plan, mesh);
-        self.flat = self.is_flat(plan, data);
+        self.halve_levels(input);
+        let newest = self.inherit(input);
+        self.lay_out_star(input);
+        self.flat = self.is_flat(input);
         if newest {
-            self.add_overshoot(plan, data, reference);
+            self.add_overshoot(input);
         }
-        let foot = self.find_foot(plan, data, reference);
-        raise(&mut self.errors, foot);
-        if newest && largest(&self.errors) <= limit {
-            let steps = self.steps_of_boundary(plan, data, reference);
+        let foot = self.find_foot(input);
+        self.placement.raise(foot);
+        if newest && largest(&self.placement.errors) <= limit {
+            let steps = self.steps_of_boundary(input);
             self.steps = steps.map(|distance| reference.least_error_of(distance));
             let step = self.steps[0].max(self.steps[1]);
-            let Self { errors, inherited, .. } = self;
-            errors.iter_mut().zip(inherited).for_each(|(error, own)| *error = error.max(*own + step));
+            let errors = self.placement.errors.iter_mut().zip(&self.inherited);
+            errors.for_each(|(error, own)| *error = error.max(*own + step));
         }
-        if plan.on_boundary && !self.flat && largest(&self.errors) <= limit {
+        if collapse.on_boundary && !self.flat && largest(&self.placement.errors) <= limit {
             // Where it is flat, no point of the boundary gets further away than it is.
-            let border = self.place_on_border(plan, data, buckets, reference);
-            raise(&mut self.errors, border);
+            let border = self.place_on_border(buckets, input);
+            self.placement.raise(border);
         }
-        let mut error = largest(&self.errors);
+        let Self { placement, star, old_border, .. } = self;
+        let new = (input, &*star);
+        let mut error = largest(&placement.errors);
         if error > limit {
             return error;
         }
-        self.moves.clear();
-        let stars = plan.stay.iter().enumerate().map(|(i, (s, _))| (s.tet, i));
-        let fans = plan.fan.iter().map(|&(tet, ..)| (tet, 0));
+        let stars = collapse.stay.iter().enumerate().map(|(i, (s, _))| (s.tet, i));
+        let fans = collapse.fan.iter().map(|&(tet, ..)| (tet, 0));
         for (tet, cell) in stars.chain(fans) {
             for point in buckets.inside.iter(tet) {
-                error = error.max(self.place(point, cell, plan, data, reference));
+                error = error.max(placement.place(point, cell, &new).0);
                 if error > limit {
                     return error;
                 }
@@ -265,126 +192,93 @@ impl Evaluator {
         }
         // Those that the lattice has moved are in a bucket already.
         let is_new = |end: &u32| *end < reference.points && !reference.quantized.is_moved(*end);
-        for end in [plan.a, plan.b].into_iter().filter(is_new) {
-            error = error.max(self.place(end, 0, plan, data, reference));
+        for end in [collapse.a, collapse.b].into_iter().filter(is_new) {
+            error = error.max(placement.place(end, 0, &new).0);
         }
-        error.max(self.meet_strays(plan, data, buckets, reference))
-    }
-
-    /// The error at points of other buckets that the new star contains.
-    fn meet_strays(
-        &mut self,
-        plan: &Plan,
-        data: &VertexData,
-        buckets: &Buckets,
-        reference: &Reference<'_>,
-    ) -> f64 {
-        self.visits.clear();
-        let mut error = 0.0_f64;
-        let rim = self.old_border.iter().flatten().map(|&v| data.positions[v as usize]);
-        let changed = (plan.on_boundary && !self.flat).then(|| bounds(rim.chain([plan.position])));
-        for point in buckets.strays.met(removed(plan), changed) {
-            error = error.max(self.visit(point, plan, data, reference));
-        }
-        error
-    }
-
-    fn visit(&mut self, point: u32, plan: &Plan, data: &VertexData, reference: &Reference<'_>) -> f64 {
-        let relative = reference.quantized.places[point as usize] - as_vec(plan.position);
-        let (cell, lambda, depth) = locate(self.cells.len(), 0, |i| self.cells[i].barycentric * relative);
-        if depth < -SLACK {
-            return 0.0;
-        }
-        self.visits.push((point, cell as u32));
-        self.deviate(point, cell, clamped(lambda), data, reference)
+        let rim = old_border.iter().flatten().map(|&v| input.data.positions[v as usize]);
+        let changed = (collapse.on_boundary && !self.flat).then(|| bounds(rim.chain([collapse.position])));
+        let candidates = buckets.outside_points.candidates(removed(collapse), changed);
+        error.max(placement.place_foreign(candidates, &new))
     }
 
     /// Moves the points to the buckets where [`Evaluator::evaluate`] found them to belong.
-    pub fn settle(
-        &mut self,
-        plan: &Plan,
-        data: &VertexData,
-        buckets: &mut Buckets,
-        reference: &Reference<'_>,
-    ) {
-        if plan.on_boundary && self.flat {
-            self.place_on_border(plan, data, buckets, reference);
+    pub fn move_points(&mut self, buckets: &mut Buckets, input: Input<'_>) {
+        let collapse = input.collapse;
+        if collapse.on_boundary && self.flat {
+            self.place_on_border(buckets, input);
         }
-        plan.stay.iter().for_each(|(s, _)| buckets.inside.take(s.tet));
-        plan.fan.iter().for_each(|&(tet, ..)| buckets.inside.take(tet));
-        removed(plan).for_each(|tet| buckets.strays.clear(tet));
-        for &(point, cell, outside) in &self.moves {
-            buckets.inside.put(self.cells[cell as usize].tet, point);
-            buckets.strays.set_outside(point, outside);
+        for tet in removed(collapse) {
+            buckets.inside.take(tet);
+            buckets.outside_points.clear(tet);
+            if collapse.on_boundary {
+                buckets.border.take(tet);
+            }
         }
-        let visits = self.visits.iter();
-        visits.for_each(|&(point, cell)| buckets.strays.invite(self.cells[cell as usize].tet, point));
-        if plan.on_boundary {
-            plan.stay.iter().for_each(|(s, _)| buckets.border.take(s.tet));
-            plan.fan.iter().for_each(|&(tet, ..)| buckets.border.take(tet));
-            let moves = self.border_moves.iter();
-            moves.for_each(|&(point, cell)| buckets.border.put(self.cells[cell as usize].tet, point));
-        }
+        self.placement.move_points(buckets, |cell| collapse.stay[cell as usize].0.tet);
     }
 
-    fn halve_levels(&mut self, plan: &Plan, data: &VertexData, reference: &Reference<'_>) {
+    fn halve_levels(&mut self, input: Input<'_>) {
+        let Input { collapse, data, reference, .. } = input;
         let fields = reference.quantized.fields.len();
-        let [a, b] = [plan.a, plan.b].map(|v| &data.levels[v as usize * fields..][..fields]);
-        self.levels.clear();
-        self.levels.extend(a.iter().zip(b).map(|(a, b)| b + ((a - b) >> 1)));
+        let [a, b] = [collapse.a, collapse.b].map(|v| &data.levels[v as usize * fields..][..fields]);
+        self.star.levels.clear();
+        self.star.levels.extend(a.iter().zip(b).map(|(a, b)| b + ((a - b) >> 1)));
     }
 
-    /// Starts with the errors of the updates that this one will be a parent of; tells whether there are any.
-    /// A tetrahedron was made by the collapse that made its newest vertex.
-    fn inherit(&mut self, plan: &Plan, mesh: &WorkMesh, data: &VertexData) -> bool {
-        let (fields, mut height) = (self.levels.len(), 0);
+    /// Starts with the errors of the updates that this one will be a parent of; returns whether there are any. A
+    /// tetrahedron was made by the collapse that made its newest vertex.
+    fn inherit(&mut self, input: Input<'_>) -> bool {
+        let Input { collapse, mesh, data, .. } = input;
+        let (fields, mut height) = (self.star.levels.len(), 0);
         self.inherited.clear();
         self.inherited.resize(fields, 0.0);
-        for tet in removed(plan) {
+        for tet in removed(collapse) {
             let newest = mesh.tets[tet as usize].into_iter().fold(0, u32::max) as usize;
             let errors = &data.errors[newest * fields..][..fields];
             self.inherited.iter_mut().zip(errors).for_each(|(error, made)| *error = error.max(*made));
             height = height.max(data.height[newest]);
         }
         self.height = height + 1;
-        self.errors.clone_from(&self.inherited);
+        self.placement.errors.clone_from(&self.inherited);
         height > 0
     }
 
     /// Adds how much the ends exceed the range of values around the new vertex, as a fraction of the field's range: this
     /// makes the selection by isovalue monotone.
-    fn add_overshoot(&mut self, plan: &Plan, data: &VertexData, reference: &Reference<'_>) {
+    fn add_overshoot(&mut self, input: Input<'_>) {
+        let Input { collapse, data, reference, .. } = input;
         let fields = &reference.quantized.fields;
         let level = |v: u32, f: usize| data.levels[v as usize * fields.len() + f];
         for (f, field) in fields.iter().enumerate() {
-            let own = self.levels[f];
+            let own = self.star.levels[f];
             let (low, high) =
-                plan.link.iter().map(|&v| level(v, f)).fold((own, own), |(l, h), x| (l.min(x), h.max(x)));
-            let (a, b) = (level(plan.a, f), level(plan.b, f));
+                collapse.link.iter().map(|&v| level(v, f)).fold((own, own), |(l, h), x| (l.min(x), h.max(x)));
+            let (a, b) = (level(collapse.a, f), level(collapse.b, f));
             let beyond = (a.max(b) - high).max(low - a.min(b)).max(0);
-            self.errors[f] += f64::from(beyond) * field.step / field.range() * (1.0 + 1e-9);
+            self.placement.errors[f] += f64::from(beyond) * field.step / field.range() * (1.0 + 1e-9);
         }
     }
 
-    /// How far what there is at each end is outside of the new boundary: so much nearer to a region may a tetrahedron be that the
-    /// split creates than all that it removes.
-    fn steps_of_boundary(&mut self, plan: &Plan, data: &VertexData, reference: &Reference<'_>) -> [f64; 2] {
+    /// How far the mesh at each end is outside of the new boundary. The tetrahedra that the split creates may be nearer
+    /// to a region by so much than those that it removes.
+    fn steps_of_boundary(&mut self, input: Input<'_>) -> [f64; 2] {
+        let Input { collapse, data, .. } = input;
         let mut steps = [0.0_f64; 2];
-        if !plan.on_boundary || self.flat {
+        if !collapse.on_boundary || self.flat {
             return steps;
         }
         let at = |v: u32| as_vec(data.positions[v as usize]);
-        for (step, end) in steps.iter_mut().zip([plan.a, plan.b]) {
-            *step = self.outside(at(end), plan, data, reference);
+        for (step, end) in steps.iter_mut().zip([collapse.a, collapse.b]) {
+            *step = self.outside(at(end), input);
         }
         // Between the ends and the link the new boundary may be further away than at either.
         // The two triangles of an edge have it in opposite directions; one is enough.
         for i in 0..self.old_border.len() {
             let [x, y, z] = self.old_border[i];
             for [x, y] in [[x, y], [y, z], [z, x]] {
-                let at_end = [plan.a, plan.b].map(|end| end == x || end == y);
+                let at_end = [collapse.a, collapse.b].map(|end| end == x || end == y);
                 if x < y && at_end.contains(&true) {
-                    let distance = self.outside((at(x) + at(y)) * 0.5, plan, data, reference);
+                    let distance = self.outside((at(x) + at(y)) * 0.5, input);
                     for (step, _) in steps.iter_mut().zip(at_end).filter(|(_, at_end)| *at_end) {
                         *step = step.max(distance);
                     }
@@ -395,177 +289,96 @@ impl Evaluator {
     }
 
     /// How far a place, in steps of the lattice, is from the new boundary; 0 if a tetrahedron of the new star holds it.
-    fn outside(&mut self, place: DVec3, plan: &Plan, data: &VertexData, reference: &Reference<'_>) -> f64 {
-        let relative = place - as_vec(plan.position);
-        let (.., depth) = locate(self.cells.len(), 0, |i| self.cells[i].barycentric * relative);
-        if depth >= -SLACK {
+    fn outside(&mut self, place: DVec3, input: Input<'_>) -> f64 {
+        if self.placement.locate(place, 0).2 >= -SLACK {
             return 0.0;
         }
-        let step = DVec3::from_array(reference.quantized.lattice.step);
-        self.nearest(place * step, self.at_centre, plan, data, reference).2
+        let step = DVec3::from_array(input.reference.quantized.lattice.step);
+        self.placement.nearest(place * step, self.at_centre, &(input, &self.star)).2
     }
 
-    /// Finds the part of the reference boundary that the new vertex is near to. Returns the error that the distance
-    /// stands for.
-    fn find_foot(&mut self, plan: &Plan, data: &VertexData, reference: &Reference<'_>) -> f64 {
+    /// Finds the part of the reference boundary that the new vertex is near to. Returns the distance as an error.
+    fn find_foot(&mut self, input: Input<'_>) -> f64 {
+        let Input { collapse, data, reference, .. } = input;
         self.foot = NONE;
-        if !plan.on_boundary {
+        if !collapse.on_boundary {
             return 0.0;
         }
-        let centre = reference.scaled(plan.position);
+        let centre = reference.scaled(collapse.position);
         let enough = NO_DISTANCE * reference.displacement_per_error;
-        let (foot, distance) = reference.skin.walk(centre, data.foot[plan.a as usize], enough);
+        let (foot, distance) = reference.boundary.walk(centre, data.foot[collapse.a as usize], enough);
         self.foot = foot;
         if distance <= enough {
             return 0.0;
         }
-        let (other, less) = reference.skin.walk(centre, data.foot[plan.b as usize], enough);
+        let (other, less) = reference.boundary.walk(centre, data.foot[collapse.b as usize], enough);
         if less < distance {
             self.foot = other;
         }
         reference.error_from(self.foot, less.min(distance))
     }
 
-    /// Finds where the reference vertices of the boundary go. Returns the largest error that their distances stand for.
-    fn place_on_border(
-        &mut self,
-        plan: &Plan,
-        data: &VertexData,
-        buckets: &Buckets,
-        reference: &Reference<'_>,
-    ) -> f64 {
-        self.border_moves.clear();
-        let mut largest = 0.0_f64;
-        let ends = [plan.a, plan.b].into_iter().filter(|&end| end < reference.points);
-        for point in removed(plan).flat_map(|tet| buckets.border.iter(tet)).chain(ends) {
-            let p = reference.scaled(reference.quantized.positions[point as usize]);
-            let (cell, _, distance) = self.nearest(p, usize::MAX, plan, data, reference);
-            self.border_moves.push((point, cell));
-            largest = largest.max(reference.error_at(point, distance));
-        }
-        largest
+    /// Finds where the reference vertices of the boundary go. Returns the largest error of their distances.
+    fn place_on_border(&mut self, buckets: &Buckets, input: Input<'_>) -> f64 {
+        let Input { collapse, reference, .. } = input;
+        let ends = [collapse.a, collapse.b].into_iter().filter(|&end| end < reference.points);
+        let points = removed(collapse).flat_map(|tet| buckets.border.iter(tet)).chain(ends);
+        self.placement.place_on_border(points, &(input, &self.star))
     }
 
-    /// The boundary triangles of the star, before and after.
-    fn collect_border(&mut self, plan: &Plan, mesh: &WorkMesh) {
-        self.border.clear();
-        self.faces.clear();
+    /// The star of the new vertex, and the boundary triangles at the ends before.
+    fn lay_out_star(&mut self, input: Input<'_>) {
+        let Input { collapse, mesh, data, .. } = input;
+        let Self { star: NewStar { others, border, .. }, placement, .. } = self;
+        others.clear();
+        others.extend(collapse.stay.iter().map(|(s, _)| {
+            let corners = mesh.tets[s.tet as usize];
+            [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]][s.corner as usize].map(|i: usize| corners[i])
+        }));
+        placement.start(others.iter().map(|&others| {
+            let [x, y, z] = others.map(|v| as_vec(data.positions[v as usize]));
+            [as_vec(collapse.position), x, y, z]
+        }));
+        border.clear();
         self.old_border.clear();
         self.at_centre = 0;
-        if plan.on_boundary {
-            self.collect_border_at_centre(plan, mesh);
-            self.at_centre = self.border.len();
+        if collapse.on_boundary {
+            self.collect_border_at_centre(input);
+            self.at_centre = self.star.border.len();
         }
-        for (i, &(s, _)) in plan.stay.iter().enumerate() {
+        for (i, &(s, _)) in collapse.stay.iter().enumerate() {
             if mesh.neighbors[s.tet as usize][s.corner as usize] == NONE {
-                self.border.push((i as u32, self.cells[i].others));
+                self.star.border.push((i as u32, self.star.others[i]));
             }
         }
     }
 
-    fn collect_border_at_centre(&mut self, plan: &Plan, mesh: &WorkMesh) {
-        for &(tet, ..) in &plan.fan {
+    fn collect_border_at_centre(&mut self, input: Input<'_>) {
+        let Input { collapse, mesh, .. } = input;
+        for &(tet, ..) in &collapse.fan {
             let (corners, around) = (mesh.tets[tet as usize], mesh.neighbors[tet as usize]);
             let faces = (0..4).filter(|&k| around[k] == NONE);
             self.old_border.extend(faces.map(|k| FACES[k].map(|l| corners[l])));
         }
-        for (i, &(s, _)) in plan.stay.iter().enumerate() {
+        for (i, &(s, _)) in collapse.stay.iter().enumerate() {
             let (corners, around) = (mesh.tets[s.tet as usize], mesh.neighbors[s.tet as usize]);
             let centre = s.corner as usize;
             for k in (0..4).filter(|&k| k != centre && around[k] == NONE) {
                 self.old_border.push(FACES[k].map(|l| corners[l]));
-                self.border.push((i as u32, FACES[k].map(|l| if l == centre { NONE } else { corners[l] })));
+                self.star
+                    .border
+                    .push((i as u32, FACES[k].map(|l| if l == centre { NONE } else { corners[l] })));
             }
         }
     }
 
     /// Whether the boundary stays where it is: around both ends it is flat, and in the same plane.
-    fn is_flat(&self, plan: &Plan, data: &VertexData) -> bool {
+    fn is_flat(&self, input: Input<'_>) -> bool {
+        let Input { collapse, data, .. } = input;
         let at = |v: u32| data.positions[v as usize];
         let Some(plane) = self.old_border.first().map(|t| t.map(at)) else { return false };
         let in_plane = |p: [i32; 3]| orient3d(plane[0], plane[1], plane[2], p) == 0;
-        in_plane(plan.position) && self.old_border.iter().flatten().all(|&v| in_plane(at(v)))
-    }
-
-    /// Finds the cell for a point, looking at `hint` first, and the error there.
-    fn place(
-        &mut self,
-        point: u32,
-        hint: usize,
-        plan: &Plan,
-        data: &VertexData,
-        reference: &Reference<'_>,
-    ) -> f64 {
-        let relative = reference.quantized.places[point as usize] - as_vec(plan.position);
-        let (mut cell, mut lambda, depth) =
-            locate(self.cells.len(), hint, |i| self.cells[i].barycentric * relative);
-        let mut displaced = 0.0;
-        // The point stays outside of the mesh where no boundary is near, too: it was not in the star from the start.
-        let outside = depth < -SLACK;
-        if outside && !self.border.is_empty() {
-            let (p, moved) = reference.place(point);
-            let (found, q, distance) = self.nearest(p, usize::MAX, plan, data, reference);
-            let step = DVec3::from_array(reference.quantized.lattice.step);
-            let to_q = (q - reference.scaled(plan.position)) / step;
-            (cell, lambda, displaced) =
-                (found as usize, self.cells[found as usize].barycentric * to_q, distance - moved);
-        }
-        self.moves.push((point, cell as u32, outside));
-        let lambda = clamped(lambda);
-        let displaced = reference.error_at(point, displaced);
-        raise(&mut self.errors, displaced);
-        self.deviate(point, cell, lambda, data, reference).max(displaced)
-    }
-
-    /// The nearest of the first `count` boundary triangles after the collapse: its cell, the nearest point, and the
-    /// distance.
-    fn nearest(
-        &mut self,
-        p: DVec3,
-        count: usize,
-        plan: &Plan,
-        data: &VertexData,
-        reference: &Reference<'_>,
-    ) -> (u32, DVec3, f64) {
-        if self.faces.is_empty() {
-            self.lay_out_faces(plan, data, reference);
-        }
-        let (face, q, distance) = nearest_face(p, &self.faces[..count.min(self.faces.len())]);
-        (self.border.get(face).map_or(0, |&(cell, _)| cell), q, distance)
-    }
-
-    fn lay_out_faces(&mut self, plan: &Plan, data: &VertexData, reference: &Reference<'_>) {
-        let at =
-            |v: u32| reference.scaled(if v == NONE { plan.position } else { data.positions[v as usize] });
-        self.faces.extend(self.border.iter().map(|&(_, triangle)| Face::new(triangle.map(at))));
-    }
-
-    fn deviate(
-        &mut self,
-        point: u32,
-        cell: usize,
-        lambda: DVec3,
-        data: &VertexData,
-        reference: &Reference<'_>,
-    ) -> f64 {
-        let fields = reference.quantized.fields.len();
-        let Self { cells, levels, errors, .. } = self;
-        let corners = |f: usize| {
-            let [x, y, z] = cells[cell].others.map(|v| data.levels[v as usize * fields + f]);
-            [levels[f], x, y, z]
-        };
-        reference.quantized.deviation(point, lambda, corners, errors)
-    }
-}
-
-impl Cell {
-    fn new(tet: u32, centre: usize, plan: &Plan, mesh: &WorkMesh, data: &VertexData) -> Self {
-        let corners = mesh.tets[tet as usize];
-        let [i, j, k] = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]][centre];
-        let others = [corners[i], corners[j], corners[k]];
-        let [x, y, z] = others.map(|v| as_vec(data.positions[v as usize]) - as_vec(plan.position));
-        // The orientation was found positive, so the matrix is regular.
-        Self { barycentric: DMat3::from_cols(x, y, z).inverse(), others, tet }
+        in_plane(collapse.position) && self.old_border.iter().flatten().all(|&v| in_plane(at(v)))
     }
 }
 
@@ -591,7 +404,7 @@ impl<'a> Reference<'a> {
         Self {
             quantized,
             points: places.len() as u32,
-            skin: Skin::new(&mesh.tets, &mesh.neighbors, &places),
+            boundary: BoundaryDistance::new(&mesh.tets, &mesh.neighbors, &places),
             allowances: shortest.into_iter().map(allowance).collect(),
             displacement_per_error,
         }
@@ -609,7 +422,7 @@ impl<'a> Reference<'a> {
 
     /// The displacement from a triangle of the reference boundary that counts as an error of 1.
     pub fn allowance_from(&self, triangle: u32) -> f64 {
-        self.skin
+        self.boundary
             .corners(triangle)
             .map(|point| self.allowances[point as usize])
             .into_iter()
@@ -625,7 +438,12 @@ impl<'a> Reference<'a> {
     /// that alone puts outside is no displacement.
     pub fn place(&self, point: u32) -> (DVec3, f64) {
         let p = self.quantized.places[point as usize] * DVec3::from_array(self.quantized.lattice.step);
-        (p, p.distance(self.scaled(self.quantized.positions[point as usize])))
+        (p, p.distance(self.position(point)))
+    }
+
+    /// Where the lattice has put a reference vertex, in model units from the lattice's origin.
+    pub fn position(&self, point: u32) -> DVec3 {
+        self.scaled(self.quantized.positions[point as usize])
     }
 
     /// A lattice point in model units, from the lattice's origin.
@@ -635,23 +453,6 @@ impl<'a> Reference<'a> {
 }
 
 /// The tetrahedra that a collapse removes.
-fn removed(plan: &Plan) -> impl Iterator<Item = u32> {
-    plan.stay.iter().map(|(s, _)| s.tet).chain(plan.fan.iter().map(|&(tet, ..)| tet))
-}
-
-/// The corners of the box around lattice points.
-pub(super) fn bounds(places: impl Iterator<Item = [i32; 3]>) -> [DVec3; 2] {
-    let all = [DVec3::INFINITY, DVec3::NEG_INFINITY];
-    places.map(as_vec).fold(all, |[low, high], p| [low.min(p), high.max(p)])
-}
-
-pub(super) fn as_vec(q: [i32; 3]) -> DVec3 {
-    DVec3::from_array(q.map(f64::from))
-}
-
-/// Barycentric coordinates of a point just outside, moved inside.
-pub(super) fn clamped(lambda: DVec3) -> DVec3 {
-    let inside = lambda.max(DVec3::ZERO);
-    let sum = inside.element_sum();
-    if sum > 1.0 { inside / sum } else { inside }
+fn removed(collapse: &CheckedCollapse) -> impl Iterator<Item = u32> {
+    collapse.stay.iter().map(|(s, _)| s.tet).chain(collapse.fan.iter().map(|&(tet, ..)| tet))
 }

@@ -2,13 +2,14 @@
 
 use super::candidate_queue::{Key, Levels};
 use super::cost::Reference;
+use super::fill_cost::Input;
 use super::gift_wrap::GiftWrap;
 use super::quantize::Quantized;
-use super::removal::{Look, State};
+use super::removal::{RemovalSearch, State};
 use super::rounds::{Later, Rounds};
 use super::sequence::{Insertion, Sequence};
 use super::work_mesh::WorkMesh;
-use super::{BuildConfig, BuildError, BuildProgress, Criterion, OnProgress, Purpose, quantize};
+use super::{BuildConfig, BuildCriterion, BuildError, BuildProgress, OnProgress, Purpose, quantize};
 use crate::geom::Bounds;
 use crate::mesh;
 use crate::mesh::{NONE, TetMesh, Topology};
@@ -16,7 +17,7 @@ use crate::mt::{ErrorCode, MAX_UPDATES};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// The candidates of a round are looked at in so many batches.
+/// The candidates of a round are evaluated in so many batches.
 const BATCHES: usize = 64;
 
 /// Batches are at least so large.
@@ -25,7 +26,7 @@ const SMALLEST_BATCH: usize = 64;
 /// An edge that is contracted has about so many tetrahedra around it, at most.
 const LARGEST_FAN: u32 = 10;
 
-/// What [`decimate`] hands over.
+/// The result of [`decimate`].
 pub(super) struct Decimated {
     pub sequence: Sequence,
     pub quantized: Quantized,
@@ -41,7 +42,7 @@ pub(super) struct Decimated {
 pub(super) fn decimate(
     mesh: &TetMesh,
     config: &BuildConfig,
-    (criterion, purpose): (Criterion, Purpose),
+    (criterion, purpose): (BuildCriterion, Purpose),
     progress: OnProgress<'_>,
 ) -> Result<Decimated, BuildError> {
     if mesh.positions.len() > MAX_UPDATES as usize {
@@ -50,13 +51,12 @@ pub(super) fn decimate(
     if mesh.tets.is_empty() {
         return Err(BuildError::Empty);
     }
-    mesh::check(mesh).map_err(BuildError::Mesh)?;
-    let Topology { neighbors, non_manifold, .. } =
-        mesh::topology(mesh.positions.len(), &mesh.tets).map_err(BuildError::Mesh)?;
+    mesh::check(mesh)?;
+    let Topology { neighbors, non_manifold, .. } = mesh::topology(mesh.positions.len(), &mesh.tets)?;
     let quantized = quantize::quantize_cells(mesh, config)?;
     let gift_wrap = match criterion {
-        Criterion::HalfEdge => None,
-        Criterion::Delaunay => Some(GiftWrap::new(&quantized.positions)),
+        BuildCriterion::HalfEdge => None,
+        BuildCriterion::Delaunay => Some(GiftWrap::new(&quantized.positions)),
     };
     let displacement_per_error = config.displacement * Bounds::of(&mesh.positions).diagonal();
     let work = WorkMesh::new(mesh.tets.clone(), neighbors, mesh.positions.len());
@@ -86,7 +86,7 @@ fn turn_round(sequence: &mut Sequence) {
 struct Decimator<'a> {
     state: State<'a>,
     rounds: Rounds,
-    look: Look,
+    search: RemovalSearch,
     slots: Vec<u32>,
     /// The removals so far: each with the star in `inserted` and the filling in `removed`.
     sequence: Sequence,
@@ -95,7 +95,7 @@ struct Decimator<'a> {
 /// A candidate of a round.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Prospect {
-    /// What [`Key::second`] is going to be, or less.
+    /// A lower bound of [`Key::second`].
     guess: u32,
     vertex: u32,
     /// The best end to move it to; [`NONE`] if that is not known.
@@ -108,8 +108,8 @@ impl<'a> Decimator<'a> {
         let mut rounds = Rounds::new(state.levels.of(0.0), state.levels.last(), points);
         let free = (0..points as u32).filter(|&v| state.mesh.has(v) && !state.frozen[v as usize]);
         free.for_each(|v| rounds.wait(v));
-        let look = Look::new(gift_wrap, points);
-        Self { state, rounds, look, slots: Vec::new(), sequence: Sequence::default() }
+        let search = RemovalSearch::new(gift_wrap, points);
+        Self { state, rounds, search, slots: Vec::new(), sequence: Sequence::default() }
     }
 
     fn remove_all(&mut self, progress: OnProgress<'_>) -> Result<(), BuildError> {
@@ -124,8 +124,8 @@ impl<'a> Decimator<'a> {
         }
     }
 
-    /// Looks at the candidates of a round in batches, so that those that have come too near to a removal until then need not
-    /// be looked at, and removes what can be removed, in the order of the keys.
+    /// Evaluates the candidates of a round in batches and removes vertices in the order of the keys. Between batches,
+    /// candidates that are now too near to a removal drop out.
     fn round(&mut self, progress: OnProgress<'_>) -> Result<(), BuildError> {
         let candidates = self.candidates();
         let size = (candidates.len() / BATCHES).max(SMALLEST_BATCH);
@@ -160,14 +160,14 @@ impl<'a> Decimator<'a> {
         all
     }
 
-    /// Looks at a candidate, and puts it where it belongs. What cannot be removed is left alone until its neighbourhood
+    /// Evaluates a candidate, and queues or defers it. A vertex that cannot be removed waits until its neighbourhood
     /// changes.
     fn look_at(&mut self, Prospect { vertex, end, .. }: Prospect, ready: &mut BinaryHeap<Reverse<Key>>) {
         if self.rounds.waits(vertex) {
             return;
         }
         let level = self.rounds.level();
-        match self.look.at(&self.state, vertex, end, level) {
+        match self.search.at(&self.state, vertex, end, level) {
             Some(key) if key.level() <= level => ready.push(Reverse(key.no_earlier_than(level))),
             Some(key) => {
                 let version = self.state.versions[vertex as usize];
@@ -184,24 +184,24 @@ impl<'a> Decimator<'a> {
             if self.rounds.waits(key.a) {
                 continue;
             }
-            // The star is what it was, and so is the error. What is behind the other end of the edge may have changed, and
-            // topology depends on that.
+            // The star and the error are unchanged. The star of the other end may have changed, and the topology check
+            // depends on it.
             let level = self.rounds.level();
-            match self.look.at(&self.state, key.a, key.b, level) {
+            match self.search.at(&self.state, key.a, key.b, level) {
                 Some(found) if found.level() <= level => self.remove(),
                 _ => self.rounds.wait(key.a),
             }
         }
     }
 
-    /// Removes the vertex that was looked at last.
+    /// Removes the vertex that was evaluated last.
     fn remove(&mut self) {
-        let Self { state, look, slots, sequence, .. } = self;
-        let Look { hole, best, .. } = look;
-        let State { mesh, past, degrees, .. } = state;
+        let Self { state, search, slots, sequence, .. } = self;
+        let RemovalSearch { hole, best, .. } = search;
+        let State { mesh, removals, degrees, .. } = state;
         // Never zero: error 0 is to mean the reference mesh, with every vertex in.
         let stored = |error: &f64| ErrorCode::at_least(*error).max(ErrorCode(1)).error();
-        let errors: Vec<f64> = best.cost.errors.iter().map(stored).collect();
+        let errors: Vec<f64> = best.cost.placement.errors.iter().map(stored).collect();
         let start = sequence.tets.len();
         sequence.tets.extend(hole.star.iter().map(|s| mesh.tets[s.tet as usize]));
         let middle = sequence.tets.len();
@@ -217,17 +217,18 @@ impl<'a> Decimator<'a> {
             step,
         });
         hole.replace(mesh, &best.filling, slots);
-        past.errors.extend(errors);
-        past.makers.resize(mesh.tets.len(), NONE);
-        slots.iter().for_each(|&t| past.makers[t as usize] = removal);
-        best.cost.settle(hole, &best.filling, &mut state.buckets, &state.reference, slots);
+        removals.errors.extend(errors);
+        removals.makers.resize(mesh.tets.len(), NONE);
+        slots.iter().for_each(|&t| removals.makers[t as usize] = removal);
+        let input = Input { hole, filling: &best.filling, reference: &state.reference };
+        best.cost.move_points(&mut state.buckets, slots, input);
         let stars = &sequence.tets[start..middle];
         stars.iter().flatten().for_each(|&v| degrees[v as usize] -= 1);
         best.filling.tets.iter().flatten().for_each(|&v| degrees[v as usize] += 1);
         // The neighbours have other stars now, and may have become cheaper.
-        let reach = self.state.reaches[self.look.hole.a as usize];
-        for i in 0..self.look.hole.link.len() {
-            let v = self.look.hole.link[i];
+        let reach = self.state.reaches[self.search.hole.a as usize];
+        for i in 0..self.search.hole.link.len() {
+            let v = self.search.hole.link[i];
             self.state.versions[v as usize] = self.state.versions[v as usize].wrapping_add(1);
             // What was in the star of v, and is not any more, lies within the reach of this removal.
             self.state.reaches[v as usize].join(&reach);

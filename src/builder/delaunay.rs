@@ -1,10 +1,10 @@
 //! Incremental Delaunay triangulation of lattice points, exact and unique.
 //!
 //! Points are inserted one at a time: the tetrahedra in conflict with a point are removed and their union is filled
-//! with the point's star (Bowyer 1981, Watson 1981). A vertex at infinity closes the hull, so every face has two
-//! sides: behind each face of the hull is a *ghost*, a tetrahedron of that face and the vertex at infinity. Cospherical
-//! points are told apart by the symbolic perturbation of [`in_conflict`], so the result does not depend on the order
-//! of insertion, and a regular grid gets Kuhn's six tetrahedra in each of its cells.
+//! with the point's star (Bowyer 1981, Watson 1981). A vertex at infinity closes the hull, so every face has two sides:
+//! behind each face of the hull is a *ghost*, a tetrahedron of that face and the vertex at infinity. Cospherical points
+//! are separated by the symbolic perturbation of [`in_conflict`], so the result does not depend on the order of
+//! insertion, and a regular grid gets Kuhn's six tetrahedra in each of its cells.
 //!
 //! An insertion may be held to [`Limits`]. Then a conflict zone that is too large is cut to a star-shaped part of it:
 //! the mesh is no longer Delaunay there, and from then on every zone is checked to be star-shaped, and cut if not.
@@ -257,7 +257,7 @@ impl Triangulation {
 
     /// Plans the insertion of a point that tetrahedron `at` contains: says what would be removed and inserted.
     /// Only the last plan can be carried out, and only before anything else is done.
-    pub fn plan(&mut self, v: u32, at: u32, limits: &Limits) -> Result<(), BuildError> {
+    pub fn collapse(&mut self, v: u32, at: u32, limits: &Limits) -> Result<(), BuildError> {
         self.next_epoch();
         self.flood(v, at);
         self.is_cut = !(self.is_within(limits) && (self.exact || self.is_star_shaped(v)));
@@ -704,7 +704,7 @@ impl Triangulation {
         self.slots_in_use().filter(|&t| self.is_ghost(t)).map(area).sum()
     }
 
-    /// How many planes the hull has at a vertex: 3 stands for any larger number.
+    /// How many planes the hull has at a vertex: 3 means three or more.
     fn planes(&self, around: &[(u32, u32)]) -> usize {
         let mut planes: Vec<[[i32; 3]; 3]> = Vec::new();
         for &(_, t) in around {

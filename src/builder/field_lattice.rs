@@ -1,4 +1,4 @@
-//! The lattices of the fields: as coarse as what is asked for allows.
+//! The lattices of the fields: as coarse as the configuration allows.
 
 use super::{BuildConfig, BuildError, FieldPrecision};
 use crate::mesh::Field;

@@ -11,7 +11,7 @@ const MAX_FIELDS: usize = 255;
 pub(super) fn fields<'a>(mesh: &'a TetMesh, config: &BuildConfig) -> Result<Vec<&'a Field>, BuildError> {
     let mut chosen: Vec<&Field> = Vec::new();
     let mut add = |field: &'a Field| {
-        // A field that is asked for twice, by its own name and by its vector's, is there once.
+        // A field that is named twice, by its own name and by its vector's, is kept once.
         if !chosen.iter().any(|&c| std::ptr::eq(c, field)) {
             chosen.push(field);
         }
@@ -48,7 +48,7 @@ pub(super) fn fields<'a>(mesh: &'a TetMesh, config: &BuildConfig) -> Result<Vec<
     Ok(chosen)
 }
 
-/// The fields for which `wanted` holds in the order of the mesh, but the time steps of each one behind the other.
+/// The fields for which `wanted` holds, in the order of the mesh, with the time steps of each field together.
 fn in_steps(mesh: &TetMesh, wanted: impl Fn(&Field) -> bool) -> Vec<&Field> {
     let mut names: Vec<&str> = Vec::new();
     for field in mesh.fields.iter().filter(|field| wanted(field)) {
@@ -68,7 +68,7 @@ fn unknown(mesh: &TetMesh, name: &str) -> BuildError {
     BuildError::UnknownField { name: name.to_owned(), known }
 }
 
-/// The exact values of the fields that are wanted without loss; `vertices` has the MT's vertex for each point.
+/// The exact values of the lossless fields; `vertices` has the MT's vertex for each point.
 pub(super) fn exact_values(
     mesh: &TetMesh,
     config: &BuildConfig,

@@ -1,8 +1,8 @@
 //! Filling a hole by the Delaunay criterion, tetrahedron by tetrahedron from its faces.
 
-use super::cost::as_vec;
 use super::delaunay::shifted;
 use super::hole::{Filling, Hole, sorted};
+use super::points::as_vec;
 use crate::geom::{in_conflict, orient3d};
 use crate::mesh::{FACES, NONE};
 use glam::DVec3;
@@ -145,14 +145,14 @@ impl Pencil {
 }
 
 impl Near {
-    /// Whether it is positive; none if that is too close to tell.
+    /// Whether it is positive; none if rounding does not decide it.
     fn sign(self) -> Option<bool> {
         (self.value.abs() > self.slack).then_some(self.value > 0.0)
     }
 }
 
 impl Height {
-    /// Whether it is below the other, where both are in front of the face; none if that is too close to tell.
+    /// Whether it is below the other, where both are in front of the face; none if rounding does not decide it.
     fn is_below(&self, other: &Self) -> Option<bool> {
         let (a, b) = (self, other);
         let slack = a.over.slack * b.side.value.abs()
@@ -183,7 +183,7 @@ fn fits(hole: &Hole, positions: &[[i32; 3]], tets: &[[u32; 4]]) -> bool {
 }
 
 /// Whether the triangles that take the place of those at the removed vertex have the same rim. Where the boundary turns
-/// inwards, its planes go on inside the hole, and triangles there look like boundary to one that only knows planes.
+/// inwards, its planes continue inside the hole, where triangles in them are not boundary.
 fn fits_border(hole: &Hole, filling: &Filling) -> bool {
     let faces = || filling.border[..filling.moved].iter().map(|(_, face)| *face);
     let mut keys: Vec<[u32; 3]> = faces().map(sorted).collect();

@@ -16,8 +16,8 @@ const LARGEST_STAR: usize = 512;
 /// Fills the hole with tetrahedra at its link vertex `b`: false if one of them were not positive, or the boundary does
 /// not allow it.
 ///
-/// Inside, positive tetrahedra are all it takes: the hole is then star-shaped around `b`, too. Next to the boundary, which
-/// may have come to overlap itself, [`keeps_topology`] has to be asked as well.
+/// Inside, positive tetrahedra are all it takes: the hole is then star-shaped around `b`, too. Next to the boundary,
+/// which may have come to overlap itself, [`keeps_topology`] must hold, too.
 pub(super) fn contract(hole: &Hole, positions: &[[i32; 3]], b: u32, filling: &mut Filling) -> bool {
     filling.clear();
     if hole.on_boundary() && hole.border.iter().flatten().filter(|&&v| v == b).count() != 2 {
@@ -38,8 +38,8 @@ pub(super) fn contract(hole: &Hole, positions: &[[i32; 3]], b: u32, filling: &mu
         && lay_border(hole, b, filling)
 }
 
-/// Whether these tetrahedra, which all have `b`, hang together through faces. At the boundary the fan between the two ends
-/// may part the hole; an insertion finds what it removes by going through faces.
+/// Whether these tetrahedra, which all have `b`, are connected through faces. At the boundary the fan between the two
+/// ends may part the hole; an insertion finds what it removes by going through faces.
 fn hangs_together(tets: &[[u32; 4]], b: u32) -> bool {
     let mut reached = vec![false; tets.len()];
     let mut stack = vec![0];

@@ -1,7 +1,7 @@
 //! From recorded collapses to the updates of an MT.
 
 use super::base::{Numbered, number_base};
-use super::collapse_check::Plan;
+use super::collapse_check::CheckedCollapse;
 use super::cost::VertexData;
 use super::order::Updates;
 use super::work_mesh::WorkMesh;
@@ -26,9 +26,9 @@ pub(super) struct Collapse {
 
 impl Collapse {
     /// Records a plan that is about to be carried out in `mesh`.
-    pub fn new(plan: &Plan, mesh: &WorkMesh, error: ErrorCode, steps: [f64; 2]) -> Self {
-        let mut star: Vec<([u32; 3], u8)> = Vec::with_capacity(plan.stay.len());
-        for &(s, side) in &plan.stay {
+    pub fn new(collapse: &CheckedCollapse, mesh: &WorkMesh, error: ErrorCode, steps: [f64; 2]) -> Self {
+        let mut star: Vec<([u32; 3], u8)> = Vec::with_capacity(collapse.stay.len());
+        for &(s, side) in &collapse.stay {
             let tet = mesh.tets[s.tet as usize];
             let [i, j, k] = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]][s.corner as usize];
             let mut face = [tet[i], tet[j], tet[k]];
@@ -37,7 +37,7 @@ impl Collapse {
         }
         star.sort_unstable();
         let sides = star.iter().enumerate().fold(0, |bits, (i, &(_, side))| bits | u64::from(side) << i);
-        Self { ends: [plan.a, plan.b], sides, error, steps }
+        Self { ends: [collapse.a, collapse.b], sides, error, steps }
     }
 }
 
@@ -109,7 +109,7 @@ impl Found {
         }
     }
 
-    /// Takes note of an update that is about to be applied.
+    /// Records an update before it is applied.
     fn note(&mut self, mt: &EdgeMt, mesh: &mut CurrentMesh, u: UpdateId) -> Result<(), UpdateError> {
         let vertex = mt.update(u).vertex;
         let mut star = Vec::new();
@@ -129,7 +129,7 @@ impl Found {
     }
 }
 
-/// Of so many errors one is not rounded where it is raised.
+/// One in so many errors, the largest ones, is not rounded when it is raised.
 const LARGE: usize = 8;
 
 /// Collapses that are to become updates.
@@ -145,8 +145,8 @@ impl Replay<'_> {
     /// Raises errors until those of parents are as much larger as the selection by values and by place relies on: rounding them up
     /// took some of that away. `found` is of the collapses in the order `falling`.
     ///
-    /// What is raised is rounded up again, but for the largest errors: along a chain of updates that ask for a little each, rounding
-    /// would multiply them. There are few of these, and files spend a byte more on each.
+    /// Raised errors are rounded up again, except the largest ones: along a chain of updates, repeated rounding would
+    /// multiply them. There are few of these, and each takes one more byte in a file.
     fn restore_margins(&mut self, falling: &[u32], found: &Found) {
         let fields = found.margins.fields();
         let fine: Vec<ErrorCode> = (0..fields).map(|f| self.largest_from(f)).collect();
@@ -183,7 +183,7 @@ impl Replay<'_> {
         [0, 1, 2].map(|k| p[k] - q[k])
     }
 
-    /// Which end is which is free: the offset begins with a positive number, so files need not tell its sign.
+    /// Which end is which is free: the offset begins with a positive number, so files do not store its sign.
     fn is_turned(&self, collapse: usize) -> bool {
         self.difference(self.history[collapse].ends).into_iter().find(|&d| d != 0).is_some_and(|d| d < 0)
     }
@@ -202,65 +202,86 @@ impl Replay<'_> {
         mut found: Option<&mut Found>,
         progress: OnProgress<'_>,
     ) -> Result<(EdgeMt, Vec<VertexId>), BuildError> {
-        let (data, history) = (self.data, self.history);
         let (points, fields) = (info.vertices as usize, info.fields.len());
         let live = (0..self.base.tets.len() as u32).filter(|&t| self.base.is_live(t));
         let tets: Vec<[u32; 4]> = live.map(|t| self.base.tets[t as usize]).collect();
-        let Numbered { mesh: base_mesh, mut number, .. } =
-            number_base(&data.positions, &data.levels, fields, &tets);
-        let mut next = base_mesh.positions.len() as u32;
+        let Numbered { mesh: base_mesh, number, .. } =
+            number_base(&self.data.positions, &self.data.levels, fields, &tets);
         let mut builder = EdgeMtBuilder::new(info, base_mesh)
             .map_err(|_| BuildError::Internal(UpdateError::Vertex { update: 0, vertex: 0 }))?;
-        // The builder's number of each vertex of the MT.
-        let mut built: Vec<u32> = vec![0; number.len()];
-        number
-            .iter()
-            .enumerate()
-            .filter(|(_, v)| **v != NONE)
-            .for_each(|(i, &v)| built[v as usize] = i as u32);
-        let mut field_offsets = vec![0; fields];
+        let mut numbers = Numbers::new(number);
         for (done, &i) in order.iter().enumerate() {
             if done % 4096 == 0 {
-                let step = BuildProgress { stage: "order", done: done as u64, total: history.len() as u64 };
-                if progress(step).is_break() {
+                let (done, total) = (done as u64, self.history.len() as u64);
+                if progress(BuildProgress { stage: "order", done, total }).is_break() {
                     return Err(BuildError::Stopped);
                 }
             }
-            let Collapse { ends: [mut a, mut b], sides, .. } = history[i as usize];
-            let vertex = number[points + i as usize];
-            let is_turned = self.is_turned(i as usize);
-            if is_turned {
-                (a, b) = (b, a);
-            }
-            for end in [a, b] {
-                number[end as usize] = next;
-                if built.len() <= next as usize {
-                    built.resize(next as usize + 1, 0);
-                }
-                built[next as usize] = end;
-                next += 1;
-            }
-            for (f, offset) in field_offsets.iter_mut().enumerate() {
-                *offset = data.levels[a as usize * fields + f] - data.levels[b as usize * fields + f];
-            }
-            let mask = builder
-                .mesh()
-                .reorder_mask(VertexId(vertex), sides, is_turned, |v| built[v.0 as usize])
-                .ok_or(BuildError::Internal(UpdateError::Mask { update: done as u32 }))?;
-            let split = VertexSplit {
-                vertex: VertexId(vertex),
-                offset: self.difference([a, b]),
-                field_offsets: &field_offsets,
-                mask,
-                errors: &self.errors[i as usize * fields..][..fields],
-            };
-            let pushed = builder.push_seen(&split, |mt, mesh, u| match &mut found {
-                Some(found) => found.note(mt, mesh, u),
-                None => Ok(()),
-            });
-            pushed.map_err(BuildError::Internal)?;
+            let appended = self.append(&mut builder, &mut numbers, i as usize, found.as_deref_mut());
+            appended.map_err(BuildError::Internal)?;
         }
-        number.truncate(points);
-        Ok((builder.finish(), number.into_iter().map(VertexId).collect()))
+        numbers.of_mt.truncate(points);
+        Ok((builder.finish(), numbers.of_mt.into_iter().map(VertexId).collect()))
+    }
+
+    /// Appends a collapse as an update, and shows it to `found`.
+    fn append(
+        &self,
+        builder: &mut EdgeMtBuilder,
+        numbers: &mut Numbers,
+        collapse: usize,
+        found: Option<&mut Found>,
+    ) -> Result<UpdateId, UpdateError> {
+        let (levels, fields) = (&self.data.levels, builder.mt().info().fields.len());
+        let Collapse { ends: [mut a, mut b], sides, .. } = self.history[collapse];
+        let vertex = VertexId(numbers.of_mt[self.data.positions.len() - self.history.len() + collapse]);
+        let is_turned = self.is_turned(collapse);
+        if is_turned {
+            (a, b) = (b, a);
+        }
+        numbers.add(a);
+        numbers.add(b);
+        let offset = |f: usize| levels[a as usize * fields + f] - levels[b as usize * fields + f];
+        let field_offsets: Vec<i32> = (0..fields).map(offset).collect();
+        let update = builder.mt().updates();
+        let mask = builder
+            .mesh()
+            .reorder_mask(vertex, sides, is_turned, |v| numbers.built[v.0 as usize])
+            .ok_or(UpdateError::Mask { update })?;
+        let split = VertexSplit {
+            vertex,
+            offset: self.difference([a, b]),
+            field_offsets: &field_offsets,
+            mask,
+            errors: &self.errors[collapse * fields..][..fields],
+        };
+        builder.push_seen(&split, |mt, mesh, u| match found {
+            Some(found) => found.note(mt, mesh, u),
+            None => Ok(()),
+        })
+    }
+}
+
+/// The numbers of vertices in the builder and in the MT.
+struct Numbers {
+    /// The MT's number of each vertex of the builder; [`NONE`] for those that are not in the MT yet.
+    of_mt: Vec<u32>,
+    /// The builder's number of each vertex of the MT.
+    built: Vec<u32>,
+}
+
+impl Numbers {
+    /// The numbers of the base mesh, given those of the MT.
+    fn new(of_mt: Vec<u32>) -> Self {
+        let mut base: Vec<(u32, u32)> = (0..).zip(&of_mt).map(|(own, &v)| (v, own)).collect();
+        base.retain(|&(v, _)| v != NONE);
+        base.sort_unstable();
+        Self { of_mt, built: base.into_iter().map(|(_, own)| own).collect() }
+    }
+
+    /// Gives a vertex of the builder the next number of the MT.
+    fn add(&mut self, own: u32) {
+        self.of_mt[own as usize] = self.built.len() as u32;
+        self.built.push(own);
     }
 }

@@ -17,7 +17,7 @@ pub(super) struct Hole {
     pub a: u32,
     /// The tetrahedra around it.
     pub star: Vec<StarTet>,
-    /// Their faces opposite `a`, ordered so that `(face, a)` is a positive tetrahedron, and what is behind them.
+    /// Their faces opposite `a`, ordered so that `(face, a)` is a positive tetrahedron, and the neighbours there.
     pub faces: Vec<([u32; 3], u32)>,
     /// The vertices of these faces, each once.
     pub link: Vec<u32>,
@@ -46,7 +46,7 @@ pub(super) struct Filling {
 }
 
 impl Hole {
-    /// Looks at what the removal of `a` would leave.
+    /// Collects the hole that the removal of `a` would leave.
     pub fn open(&mut self, mesh: &WorkMesh, positions: &[[i32; 3]], a: u32) -> Result<(), Refusal> {
         self.a = a;
         if !mesh.star(a, MAX_HOLE, &mut self.seen, &mut self.star) {
@@ -158,7 +158,7 @@ impl Hole {
         for (i, _) in filling.tets.iter().enumerate() {
             slots.push(self.star.get(i).map_or_else(|| mesh.fresh(), |s| s.tet));
         }
-        // The filling lives in the first slots of the star, which must stay taken; those behind them are nobody's now.
+        // The filling takes the first slots of the star; the rest are freed.
         self.star.iter().skip(filling.tets.len()).for_each(|s| mesh.free(s.tet));
         mesh.incident[self.a as usize] = NONE;
         // Faces that wait for the tetrahedron on their other side: which tetrahedron has them, and where.

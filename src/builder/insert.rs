@@ -6,8 +6,8 @@
 //! the points of the tetrahedra that it removes to those that it creates.
 //!
 //! An MT of these insertions extracts more tetrahedra than the plain greedy mesh of the same error: an insertion has to
-//! have an error of at least those of all that depend on it, and some make worse tetrahedra than those that they remove,
-//! which only later ones mend. So a selective request can promise its error, and pays for it.
+//! have an error of at least those of all that depend on it, and some make worse tetrahedra than those that they
+//! remove, which later ones reduce. So a selective request keeps its error, at the cost of more updates.
 
 use super::delaunay::{MT_LIMITS, Triangulation, extreme_points};
 use super::quantize::Quantized;
@@ -17,11 +17,11 @@ use crate::geom::{NARROW_BITS, orient3d};
 use crate::mesh::NONE;
 use std::collections::BinaryHeap;
 
-/// Errors below this are not told apart: tetrahedra are then taken by size, the largest first, at the point next to
-/// their middle, so that the partial order stays shallow.
+/// Errors below this count as equal: tetrahedra are then taken by size, the largest first, at the point next to their
+/// middle, so that the partial order stays shallow.
 const FINEST: f64 = 2e-4;
 
-/// How often progress is told, in insertions.
+/// How often progress is reported, in insertions.
 const PROGRESS_STEPS: usize = 1024;
 
 /// Inserts all points of `quantized` into a triangulation of the corners of their hull. `tets` is the reference mesh,
@@ -29,7 +29,7 @@ const PROGRESS_STEPS: usize = 1024;
 ///
 /// # Errors
 /// If the points span no volume or two are equal, if the reference mesh does not fill its convex hull, if more
-/// tetrahedra would have to meet at a point than an MT can describe, or if `progress` breaks the work off.
+/// tetrahedra would have to meet at a point than an MT can describe, or if `progress` stops the work.
 pub(super) fn insert(
     quantized: &Quantized,
     tets: &[[u32; 4]],
@@ -72,7 +72,7 @@ fn volume(tets: &[[u32; 4]], quantized: &Quantized) -> i128 {
     tets.iter().map(six_volume).sum()
 }
 
-/// What is known of the tetrahedron in a slot.
+/// The tetrahedron in a slot.
 #[derive(Clone, Copy)]
 struct Bucket {
     /// The first of its points; the others follow in [`Greedy::next`].
@@ -116,8 +116,8 @@ impl Cell {
     }
 }
 
-/// The points in every tetrahedron, those on its boundary included, and its errors there: what it can promise by itself, in
-/// whatever mesh it is. Buckets do not do for that: a point on a face is in that of one side.
+/// The points in every tetrahedron, those on its boundary included, and its errors there: its own error, in whatever
+/// mesh it is. Buckets do not do for that: a point on a face is in that of one side.
 struct Closed {
     fields: usize,
     /// By slot.
@@ -205,7 +205,7 @@ struct Greedy<'a> {
     moves: Vec<(u32, u32)>,
     /// The fields' slopes, in levels a step: of each cell all fields.
     slopes: Vec<[f64; 3]>,
-    /// What the errors of tetrahedra by themselves take, where they are wanted.
+    /// Data for own errors of tetrahedra, if they are configured.
     closed: Option<Closed>,
     sequence: Sequence,
 }
@@ -263,7 +263,7 @@ impl<'a> Greedy<'a> {
                 self.weigh(p, 0, tet[3]);
                 p = self.next[p as usize];
             }
-            self.settle(0, slot);
+            self.move_points(0, slot);
         }
     }
 
@@ -316,7 +316,7 @@ impl<'a> Greedy<'a> {
         }
         for i in 0..self.cells.len() {
             if self.cells[i].first != NONE {
-                self.settle(i, self.mesh.star()[i]);
+                self.move_points(i, self.mesh.star()[i]);
             }
         }
         if self.heap.len() > 4 * self.live + 1024 {
@@ -327,7 +327,7 @@ impl<'a> Greedy<'a> {
 
     /// Plans the insertion of `v` and finds where the points go, and the errors there. Returns the largest.
     fn prepare(&mut self, v: u32, slot: u32) -> Result<f64, BuildError> {
-        self.mesh.plan(v, slot, &MT_LIMITS)?;
+        self.mesh.collapse(v, slot, &MT_LIMITS)?;
         self.lay_out_star(v);
         self.moves.clear();
         let mut cell = self.cells.iter().position(|cell| !cell.is_ghost()).unwrap_or(0);
@@ -396,8 +396,8 @@ impl<'a> Greedy<'a> {
         }
     }
 
-    /// The cells of the star of `v` in whose closure point `p` lies, given one of them. All of them hold the line from `v` to the
-    /// point, so they hang together through the sides that do.
+    /// The cells of the star of `v` in whose closure point `p` lies, given one of them. All of them hold the line from
+    /// `v` to the point, so they are connected through the sides that do.
     fn cells_around(&self, p: u32, v: u32, cell: usize, found: &mut Vec<usize>) {
         let arm = difference(self.mesh.position(p), self.mesh.position(v));
         found.clear();
@@ -530,7 +530,7 @@ impl<'a> Greedy<'a> {
     }
 
     /// Hands a cell's points over to a slot, and the slot to the heap.
-    fn settle(&mut self, cell: usize, slot: u32) {
+    fn move_points(&mut self, cell: usize, slot: u32) {
         let Cell { tet, first, error, worst, sides } = self.cells[cell];
         self.settle_fields(cell, slot);
         let bucket = &mut self.buckets[slot as usize];
@@ -691,7 +691,7 @@ mod tests {
         [all, inner]
     }
 
-    /// Carries all insertions out and holds each to what it promises. Returns the mesh in the end.
+    /// Carries out all insertions and checks the errors of each. Returns the final mesh.
     fn replayed(quantized: &Quantized, sequence: &Sequence) -> BTreeSet<[u32; 4]> {
         let mut mesh: BTreeSet<[u32; 4]> = sequence.base.iter().map(|&tet| sorted(tet)).collect();
         let mut vertices: BTreeSet<u32> = sequence.base.iter().flatten().copied().collect();
@@ -775,8 +775,8 @@ mod tests {
                     .finite_slots()
                     .find(|&t| contains(&triangulation, t, v, &positions))
                     .unwrap();
-                // What cannot be kept is an edge with too many tetrahedra around it; such points are left out.
-                if triangulation.plan(v, at, &limits).is_ok() {
+                // Points at an edge with too many tetrahedra around it cannot be inserted; they are left out.
+                if triangulation.collapse(v, at, &limits).is_ok() {
                     triangulation.carry_out(v);
                     assert!(triangulation.removed().len() <= limits.removed);
                 }

@@ -16,7 +16,7 @@ pub enum Method {
 
 /// What decides on the tetrahedra around a vertex that is removed or inserted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Criterion {
+pub enum BuildCriterion {
     /// They are Delaunay: no vertex lies in the circumsphere of one.
     Delaunay,
     /// The vertex is moved onto a neighbour.
@@ -79,7 +79,7 @@ impl Method {
     }
 }
 
-impl Criterion {
+impl BuildCriterion {
     /// All criteria.
     pub const ALL: [Self; 2] = [Self::Delaunay, Self::HalfEdge];
 
@@ -91,7 +91,7 @@ impl Criterion {
         }
     }
 
-    /// What is used with a method if nothing else is asked for.
+    /// The default criterion of a method.
     pub fn usual(method: Method) -> Self {
         match method {
             Method::Insert => Self::Delaunay,
@@ -105,7 +105,7 @@ impl Criterion {
 pub enum Construction {
     /// An edge-based MT, by [`Method::Collapse`].
     Edge,
-    /// A half-edge MT, by [`Method::Decimate`] with [`Criterion::HalfEdge`].
+    /// A half-edge MT, by [`Method::Decimate`] with [`BuildCriterion::HalfEdge`].
     HalfEdge {
         /// What it is built for.
         purpose: Purpose,
@@ -121,7 +121,7 @@ pub enum Construction {
 /// How the updates of a vertex-based MT are built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum VertexMethod {
-    /// [`Method::Insert`], always by [`Criterion::Delaunay`].
+    /// [`Method::Insert`], always by [`BuildCriterion::Delaunay`].
     Insert {
         /// Whether tetrahedra have errors of their own, two bits each (see
         /// [`quarterings`](crate::mt::ApplyUpdates::quarterings)): requests take fewer tetrahedra then, but each is
@@ -131,21 +131,21 @@ pub enum VertexMethod {
     /// [`Method::Decimate`].
     Decimate {
         /// How a vertex is removed.
-        criterion: Criterion,
+        criterion: BuildCriterion,
         /// What the MT is built for.
         purpose: Purpose,
     },
 }
 
 impl Construction {
-    /// The usual construction of a kind of MT.
+    /// The default construction of a kind of MT.
     pub fn usual(kind: MtKind) -> Self {
         let purpose = Purpose::default();
         match kind {
             MtKind::Edge => Self::Edge,
             MtKind::HalfEdge => Self::HalfEdge { purpose },
             MtKind::Vertex => {
-                Self::Vertex(VertexMethod::Decimate { criterion: Criterion::HalfEdge, purpose })
+                Self::Vertex(VertexMethod::Decimate { criterion: BuildCriterion::HalfEdge, purpose })
             }
             MtKind::Explicit => Self::ExplicitEdge,
         }
@@ -155,17 +155,17 @@ impl Construction {
     ///
     /// # Errors
     /// [`BuildError::Combination`], with what does go together.
-    pub fn new(kind: MtKind, method: Method, criterion: Criterion) -> Result<Self, BuildError> {
+    pub fn new(kind: MtKind, method: Method, criterion: BuildCriterion) -> Result<Self, BuildError> {
         let purpose = Purpose::default();
         let by_vertices = match (method, criterion) {
             (Method::Decimate, criterion) => Some(VertexMethod::Decimate { criterion, purpose }),
-            (Method::Insert, Criterion::Delaunay) => Some(VertexMethod::Insert { tet_errors: false }),
+            (Method::Insert, BuildCriterion::Delaunay) => Some(VertexMethod::Insert { tet_errors: false }),
             _ => None,
         };
         match (kind, method, by_vertices) {
             (MtKind::Edge, Method::Collapse, _) => Ok(Self::Edge),
             (MtKind::Explicit, Method::Collapse, _) => Ok(Self::ExplicitEdge),
-            (MtKind::HalfEdge, Method::Decimate, _) if criterion == Criterion::HalfEdge => {
+            (MtKind::HalfEdge, Method::Decimate, _) if criterion == BuildCriterion::HalfEdge => {
                 Ok(Self::HalfEdge { purpose })
             }
             (MtKind::Vertex, _, Some(method)) => Ok(Self::Vertex(method)),
@@ -234,12 +234,12 @@ impl Construction {
     }
 
     /// By what criterion vertices are removed or inserted; none for [`Method::Collapse`].
-    pub fn criterion(self) -> Option<Criterion> {
+    pub fn criterion(self) -> Option<BuildCriterion> {
         match self {
             Self::Edge | Self::ExplicitEdge => None,
-            Self::HalfEdge { .. } => Some(Criterion::HalfEdge),
+            Self::HalfEdge { .. } => Some(BuildCriterion::HalfEdge),
             Self::Vertex(method) | Self::ExplicitVertex(method) => Some(match method {
-                VertexMethod::Insert { .. } => Criterion::Delaunay,
+                VertexMethod::Insert { .. } => BuildCriterion::Delaunay,
                 VertexMethod::Decimate { criterion, .. } => criterion,
             }),
         }
@@ -247,7 +247,7 @@ impl Construction {
 }
 
 /// Why kind, method and criterion do not go together.
-fn contradiction(kind: MtKind, method: Method, criterion: Criterion) -> BuildError {
+fn contradiction(kind: MtKind, method: Method, criterion: BuildCriterion) -> BuildError {
     let of_kind = format!("kind {}", kind.name());
     let by_criterion = format!("criterion {}", criterion.name());
     let (which, instead) = match (kind, method) {

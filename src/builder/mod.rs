@@ -1,15 +1,15 @@
 //! From a tetrahedral mesh to a Multi-Tessellation, offline.
 //!
-//! [`build`] makes an MT of any kind by any method that goes with it: see [`Method`]. The usual one, [`Method::Decimate`],
-//! collapses vertices onto neighbours in rounds of removals that do not depend on each other; the removals in reverse are the
-//! updates of a half-edge MT. [`edge_mt`] is behind edge-based MTs: it
-//! collapses edges to their midpoints, cheapest first, until nothing can be collapsed any more; the
-//! collapses in reverse are the updates of an edge-based MT [§2.1]. The cost of a collapse is the largest error it
-//! leads to, evaluated exactly at every reference vertex that its star covers. The model is the greedy scheme of
-//! Cignoni, Costanza, Montani, Rocchini, Scopigno (*Simplification of tetrahedral meshes with accurate error
-//! evaluation*, 2000): a cheap prediction orders the candidates, the exact error decides.
+//! [`build`] makes an MT of any kind by any method that goes with it: see [`Method`]. The default,
+//! [`Method::Decimate`], collapses vertices onto neighbours in rounds of removals that do not depend on each other; the
+//! removals in reverse are the updates of a half-edge MT. [`edge_mt`] is behind edge-based MTs: it collapses edges to
+//! their midpoints, cheapest first, until nothing can be collapsed any more; the collapses in reverse are the updates
+//! of an edge-based MT [§2.1]. The cost of a collapse is the largest error it leads to, evaluated exactly at every
+//! reference vertex that its star covers. The model is the greedy scheme of Cignoni, Costanza, Montani, Rocchini,
+//! Scopigno (*Simplification of tetrahedral meshes with accurate error evaluation*, 2000): a cheap prediction orders
+//! the candidates, the exact error decides.
 //!
-//! What is promised:
+//! Guarantees:
 //! - **Errors** bound the deviation from the input's field at every reference vertex, where the input has it, for all consistent
 //!   sets, and grow along the partial order towards the base mesh. (By insertion: where the lattice has put it.)
 //! - **Topology** never changes: the link condition is checked inside and on the boundary, and vertices at which the
@@ -19,11 +19,10 @@
 //!   the boundary moves, that is counted into the error.
 //! - **Determinism**: the same input gives the same MT on every platform.
 //!
-//! Not promised: distant parts of a curved boundary may come to overlap where they were nearer to each other than
-//! the error allows the boundary to move.
+//! Not guaranteed: distant parts of a curved boundary may come to overlap where they were nearer to each other than the
+//! error allows the boundary to move.
 
 mod base;
-mod beside;
 mod block_order;
 mod boundary_distance;
 mod candidate_queue;
@@ -41,37 +40,40 @@ mod half_edge;
 mod history;
 mod hole;
 mod insert;
+mod location;
 mod method;
 mod order;
+mod outside_points;
+mod placement;
+mod points;
 mod position_lattice;
 mod quantize;
 mod reach;
 mod removal;
 mod rounds;
 mod sequence;
-mod strays;
 mod vertex;
 mod work_mesh;
 
 pub use collapse::edge_mt;
 pub use delaunay::delaunay;
-pub use method::{Construction, Criterion, Method, Purpose, VertexMethod};
+pub use method::{BuildCriterion, Construction, Method, Purpose, VertexMethod};
 
 use crate::mesh::{MeshError, TetMesh};
 use crate::mt::{
     ConvertError, ErrorCode, Exact, ExplicitMt, HalfEdgeMt, Mt, MtKind, MultiTessellation, UpdateError,
     UpdateId, VertexId,
 };
-use std::fmt;
 use std::ops::ControlFlow;
+use thiserror::Error;
 
 /// How to build.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BuildConfig {
     /// The kind of MT and how it is built.
     pub construction: Construction,
-    /// Names of the fields to keep, in this order; a vector's name stands for its components. Of a time series all steps
-    /// are kept. The first field of the mesh if empty.
+    /// Names of the fields to keep, in this order; a vector's name means its components. Of a time series all steps are
+    /// kept. The first field of the mesh if empty.
     pub fields: Vec<String>,
     /// Keep all fields but the lengths of vectors, which follow from their components; those that are named come first.
     pub all_fields: bool,
@@ -103,14 +105,14 @@ pub struct BuildConfig {
 }
 
 impl Default for BuildConfig {
-    /// The usual configuration for the usual kind, [`MtKind::HalfEdge`].
+    /// The default configuration of the default kind, [`MtKind::HalfEdge`].
     fn default() -> Self {
         Self::of(MtKind::HalfEdge)
     }
 }
 
 impl BuildConfig {
-    /// The usual configuration for a kind of MT.
+    /// The default configuration for a kind of MT.
     pub fn of(kind: MtKind) -> Self {
         Self {
             construction: Construction::usual(kind),
@@ -129,7 +131,7 @@ impl BuildConfig {
     }
 }
 
-/// How finely the values of a field are kept; what is lost remains as an error at full resolution.
+/// The precision of a field's values; the loss remains as an error at full resolution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FieldPrecision {
     /// By a lattice of so many bits, 1 to 24.
@@ -140,21 +142,21 @@ pub enum FieldPrecision {
     Fraction(f64),
 }
 
-/// How far the work has come; sent now and then, so that a caller can show it and stop it.
+/// The progress of the work; sent now and then, so that a caller can show it and stop the work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BuildProgress {
-    /// What is being done.
+    /// The current stage of the work.
     pub stage: &'static str,
     /// How much of it is done.
     pub done: u64,
-    /// All there is to do, as far as is known.
+    /// The whole work, as far as it is known.
     pub total: u64,
 }
 
 /// Receives progress; [`ControlFlow::Break`] stops the work.
 pub type OnProgress<'a> = &'a mut dyn FnMut(BuildProgress) -> ControlFlow<()>;
 
-/// An MT and how it came about.
+/// An MT, and facts about its construction.
 #[derive(Clone, Debug)]
 pub struct BuildResult<M = Mt> {
     /// The MT, complete and applied once from base to reference mesh.
@@ -163,11 +165,11 @@ pub struct BuildResult<M = Mt> {
     pub summary: BuildSummary,
     /// The MT's vertex for each point of the mesh.
     pub vertices: Vec<VertexId>,
-    /// The exact values of the fields that are wanted without loss, in the order of the MT's fields.
+    /// The exact values of the lossless fields, in the order of the MT's fields.
     pub exact: Vec<Exact>,
 }
 
-/// What came of a build.
+/// Counts of a finished build.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BuildSummary {
     /// Vertices of the reference mesh.
@@ -187,177 +189,151 @@ pub struct BuildSummary {
 }
 
 /// Why no MT was built.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum BuildError {
     /// Kind, method and criterion do not go together.
+    #[error("{} does not go with {}: {instead}", .which[0], .which[1])]
     Combination {
         /// The two that do not.
         which: [String; 2],
         /// What goes with what.
         instead: &'static str,
     },
-    /// The MT could not be converted to the kind that was asked for.
-    Convert(ConvertError),
+    /// The MT could not be converted to the kind of the configuration.
+    #[error(transparent)]
+    Convert(#[from] ConvertError),
     /// The mesh has no tetrahedra.
+    #[error("the mesh has no tetrahedra; only insertion builds an MT of points alone")]
     Empty,
     /// The mesh has no point field.
+    #[error("the mesh has no point field: an MT needs at least one scalar at its points")]
     NoField,
-    /// A wanted field is not there.
+    /// The mesh has no field of this name.
+    #[error("there is no point field '{name}'; the mesh has: {}", .known.join(", "))]
     UnknownField {
-        /// The name asked for.
+        /// The name.
         name: String,
-        /// The names that are there.
+        /// The names of its fields.
         known: Vec<String>,
     },
-    /// A wanted field is one at cells.
+    /// The field has values at cells, not at points.
+    #[error(
+        "'{name}' is a field at cells, but an MT has fields at points; turn it into one at points first, as by \
+         TetMesh::cells_to_points"
+    )]
     CellField {
         /// Its name.
         name: String,
     },
     /// More fields than an MT can have.
+    #[error("{fields} fields and time steps are too many (at most 255); name those to keep")]
     TooManyFields {
-        /// How many are wanted.
+        /// How many were chosen.
         fields: usize,
     },
-    /// The values of a field are too far apart to subtract them.
+    /// The range of a field overflows.
+    #[error("the values of field '{field}' are too far apart; scale them down")]
     WideRange {
         /// The field.
         field: String,
     },
-    /// The finest lattice moves positions, or values, further than it may.
+    /// The finest lattice moves positions, or values, by more than the tolerance.
+    #[error("{}", tolerance_message(.field.as_deref(), *.reached))]
     Tolerance {
-        /// The field; none if positions are meant.
+        /// The field; none for positions.
         field: Option<String>,
         /// How far it moves them.
         reached: f64,
     },
     /// An option is out of its range.
+    #[error("option {name} must be {expected}")]
     Option {
         /// Its name.
         name: &'static str,
-        /// What it may be.
+        /// The allowed values.
         expected: &'static str,
     },
-    /// The mesh is not one to build on; repair it first.
-    Mesh(MeshError),
+    /// The mesh is not valid; repair it first.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
     /// A coordinate or a field value is not finite.
+    #[error("point {point} has a coordinate or a value that is not finite")]
     NotFinite {
         /// The point.
         point: u32,
     },
     /// A tetrahedron is too thin for the lattice.
+    #[error(
+        "cell {cell} is too thin for a lattice of {bits} bits: it turns flat or inside out{}",
+        thin_remedy(*.enough)
+    )]
     TooThin {
         /// The cell.
         cell: u32,
-        /// The bits that were asked for, or tried last.
+        /// The bits of the configuration, or those tried last.
         bits: u32,
-        /// The fewest bits that keep all cells positive, if it is not one of those.
+        /// The fewest bits that keep all cells positive, unless all are too few.
         enough: Option<u32>,
     },
     /// Fewer than four points, or all of them in one plane.
+    #[error("the points do not span a volume: there must be four that are not in one plane")]
     Flat,
-    /// Two points are in the same place.
+    /// Two points have the same position.
+    #[error(
+        "points {} and {} are in the same place on the lattice: remove one, or use more position bits (at most 30)",
+        .points[0],
+        .points[1]
+    )]
     SamePlace {
         /// The points.
         points: [u32; 2],
     },
-    /// More tetrahedra meet at a point than an MT can describe.
+    /// More tetrahedra share a point than an MT can describe.
+    #[error("too many tetrahedra meet around point {point} for insertion; build by decimation")]
     Crowded {
         /// The point.
         point: u32,
     },
     /// The mesh is not convex: insertion fills the convex hull of the points.
+    #[error("the mesh does not fill its convex hull, which insertion would do; build by decimation")]
     NotConvex,
     /// More vertices than an MT can number.
+    #[error("the mesh has more than 2^30 points; split it into parts")]
     TooLarge,
     /// The caller stopped the work.
+    #[error("stopped")]
     Stopped,
     /// The finished MT failed its own check: a bug in the builder, not in the input.
+    #[error("the built MT is not sound ({0}); please report this")]
     Internal(UpdateError),
 }
 
-impl fmt::Display for BuildError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Combination { which: [one, other], instead } => {
-                write!(f, "{one} does not go with {other}: {instead}")
-            }
-            Self::Convert(error) => write!(f, "{error}"),
-            Self::Empty => {
-                write!(f, "the mesh has no tetrahedra; only insertion builds an MT of points alone")
-            }
-            Self::NoField => {
-                write!(f, "the mesh has no point field: an MT needs at least one scalar at its points")
-            }
-            Self::UnknownField { name, known } => {
-                write!(f, "there is no point field '{name}'; the mesh has: {}", known.join(", "))
-            }
-            Self::Option { name, expected } => write!(f, "option {name} must be {expected}"),
-            Self::Mesh(error) => write!(f, "{error}"),
-            Self::NotFinite { point } => {
-                write!(f, "point {point} has a coordinate or a value that is not finite")
-            }
-            Self::CellField { name } => write!(
-                f,
-                "'{name}' is a field at cells, but an MT has fields at points; turn it into one at points first, as by TetMesh::cells_to_points"
-            ),
-            Self::TooManyFields { fields } => {
-                write!(f, "{fields} fields and time steps are too many (at most 255); name those to keep")
-            }
-            Self::WideRange { field } => {
-                write!(f, "the values of field '{field}' are too far apart; scale them down")
-            }
-            Self::Tolerance { field: Some(field), reached } => write!(
-                f,
-                "24 bits keep the values of field '{field}' within {reached:e}, no closer; allow a \
-                 larger tolerance, or keep its exact values"
-            ),
-            Self::Tolerance { field: None, reached } => write!(
-                f,
-                "30 bits keep the positions within {reached:e}, no closer; allow a larger tolerance"
-            ),
-            Self::TooThin { cell, bits, enough: Some(enough) } => write!(
-                f,
-                "cell {cell} is too thin for a lattice of {bits} bits: it turns flat or inside out; use {enough} \
-                 position bits"
-            ),
-            Self::TooThin { cell, bits, enough: None } => write!(
-                f,
-                "cell {cell} is too thin for a lattice of {bits} bits: it turns flat or inside out, and no lattice of at \
-                 most 30 bits keeps all cells; remove the cell"
-            ),
-            Self::Flat => {
-                write!(f, "the points do not span a volume: there must be four that are not in one plane")
-            }
-            Self::SamePlace { points: [a, b] } => write!(
-                f,
-                "points {a} and {b} are in the same place on the lattice: remove one, or use more position bits \
-                 (at most 30)"
-            ),
-            Self::Crowded { point } => {
-                write!(f, "too many tetrahedra meet around point {point} for insertion; build by decimation")
-            }
-            Self::NotConvex => write!(
-                f,
-                "the mesh does not fill its convex hull, which insertion would do; build by decimation"
-            ),
-            Self::TooLarge => write!(f, "the mesh has more than 2^30 points; split it into parts"),
-            Self::Stopped => write!(f, "stopped"),
-            Self::Internal(error) => write!(f, "the built MT is not sound ({error}); please report this"),
+fn tolerance_message(field: Option<&str>, reached: f64) -> String {
+    match field {
+        Some(field) => format!(
+            "24 bits keep the values of field '{field}' within {reached:e}, no closer; allow a larger tolerance, or keep \
+             its exact values"
+        ),
+        None => {
+            format!("30 bits keep the positions within {reached:e}, no closer; allow a larger tolerance")
         }
     }
 }
 
-impl std::error::Error for BuildError {}
+fn thin_remedy(enough: Option<u32>) -> String {
+    match enough {
+        Some(bits) => format!("; use {bits} position bits"),
+        None => ", and no lattice of at most 30 bits keeps all cells; remove the cell".to_owned(),
+    }
+}
 
 /// Builds an MT of `mesh`, which must be valid: see [`crate::mesh::repair`].
 ///
 /// Works on one thread and calls `progress` now and then.
 ///
 /// # Errors
-/// If the mesh is not valid, has none of the wanted fields, or does not fit the
-/// lattice; if `progress` breaks the work off.
+/// If the mesh is not valid, lacks a configured field, or does not fit the lattice; if `progress` stops the work.
 pub fn build(
     mesh: &TetMesh,
     config: &BuildConfig,
@@ -370,7 +346,7 @@ pub fn build(
             BuildResult { mt: Mt::from(mt), summary, vertices, exact }
         }
         Construction::HalfEdge { purpose } => {
-            let how = (Criterion::HalfEdge, purpose);
+            let how = (BuildCriterion::HalfEdge, purpose);
             summed_up(mesh, config, vertex::decimated_mt(mesh, config, how, progress)?)?
         }
         Construction::Vertex(method) | Construction::ExplicitVertex(method) => {
@@ -388,7 +364,7 @@ pub fn build(
     };
     let mt = match mt {
         mt if mt.info().kind == kind => mt,
-        mt => mt.convert(kind).map_err(BuildError::Convert)?,
+        mt => mt.convert(kind)?,
     };
     Ok(BuildResult { mt, summary, vertices, exact })
 }
@@ -400,7 +376,7 @@ fn half_edge_mt(
     vertices: &[VertexId],
     block_bits: u32,
 ) -> Result<(HalfEdgeMt, Vec<VertexId>), BuildError> {
-    let near = HalfEdgeMt::near_vertices(explicit).map_err(BuildError::Convert)?;
+    let near = HalfEdgeMt::near_vertices(explicit)?;
     let (mut starts, mut parents) = (vec![0], Vec::new());
     let all = || (0..explicit.updates()).map(UpdateId);
     for u in all() {
@@ -426,7 +402,7 @@ fn half_edge_mt(
         Some(update) => VertexId(base + new_numbers[update as usize]),
         None => *v,
     };
-    let mt = HalfEdgeMt::from_explicit(&explicit, block_bits).map_err(BuildError::Convert)?;
+    let mt = HalfEdgeMt::from_explicit(&explicit, block_bits)?;
     Ok((mt, vertices.iter().map(renamed).collect()))
 }
 
@@ -442,7 +418,7 @@ fn bounds_of_inserted(explicit: &ExplicitMt, u: UpdateId) -> [[i32; 3]; 2] {
         })
 }
 
-/// Adds what is to be told of an MT that is spelled out.
+/// Adds the summary of an explicit MT.
 fn summed_up(
     mesh: &TetMesh,
     config: &BuildConfig,

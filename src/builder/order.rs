@@ -1,9 +1,9 @@
 //! In which order the updates of an MT are numbered: coarse to fine in blocks, so that files can be cut into them.
 //!
-//! Any order that extends the partial order will do. This one takes updates by falling error, a block at a time; in large
-//! models by bands of falling error, each several times as large as the one before, and in these place by place. Within
-//! a block come first the updates that depend on none of the block, then those that depend on these alone, and so on, the
-//! vertices that they split ascending: that is told in few bits.
+//! Any order that extends the partial order will do. This one takes updates by falling error, a block at a time; in
+//! large models by bands of falling error, each several times as large as the one before, and in these place by place.
+//! Within a block come first the updates that depend on none of the block, then those that depend on these alone, and
+//! so on, the vertices that they split ascending: that takes few bits.
 
 use crate::geom::morton;
 use std::collections::BTreeMap;
@@ -25,7 +25,7 @@ pub(super) struct Updates<'a> {
 /// Vertices that a split creates.
 const CREATED: u32 = 2;
 
-/// Models of so many updates or fewer are always fetched as a whole; nothing is gained by putting what is near together.
+/// Models of at most so many updates are always fetched as a whole, so sorting them by place gains nothing.
 const SMALL: usize = 1 << 17;
 
 /// A band ends where this many times as many updates have come as before it.

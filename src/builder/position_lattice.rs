@@ -1,4 +1,4 @@
-//! The lattice of the positions: as coarse as what is asked for and the cells allow.
+//! The lattice of the positions: as coarse as the configuration and the cells allow.
 
 use super::{BuildConfig, BuildError};
 use crate::geom::{Bounds, Lattice, WIDE_BITS, orient3d};
@@ -17,10 +17,10 @@ pub(super) struct Placed {
 }
 
 /// Puts the points on a lattice that keeps every cell positive or, where there are none, the points apart:
-/// - of as many bits as are asked for;
-/// - the coarsest one that keeps every point within the tolerance that is asked for;
-/// - if nothing is asked for, the coarsest one of at least [`FEWEST_BITS`], with [`SPARE_BITS`] more where it had to be
-///   finer.
+/// - of the configured number of bits;
+/// - the coarsest one that keeps every point within the configured tolerance;
+/// - if neither is configured, the coarsest one of at least [`FEWEST_BITS`], with [`SPARE_BITS`] more where it had to
+///   be finer.
 pub(super) fn place(mesh: &TetMesh, config: &BuildConfig) -> Result<Placed, BuildError> {
     match (config.position_bits, config.position_tolerance) {
         (Some(_), Some(_)) => {

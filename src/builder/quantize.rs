@@ -1,9 +1,9 @@
 //! The input on integer lattices: positions and field levels.
 
-use super::beside::Home;
-use super::cost::{as_vec, clamped};
+use super::location::Location;
+use super::points::{as_vec, clamped};
 use super::position_lattice::Placed;
-use super::{BuildConfig, BuildError, beside, field_lattice, field_selection, position_lattice};
+use super::{BuildConfig, BuildError, field_lattice, field_selection, location, position_lattice};
 use crate::geom::{Lattice, ON_LATTICE, WIDE_BITS};
 use crate::mesh::{Field, TetMesh};
 use crate::mt::{FieldInfo, MtInfo};
@@ -20,8 +20,8 @@ pub(super) struct Quantized {
     pub exact: Vec<f64>,
     /// The input's points in steps of the lattice, not rounded; the field is compared there.
     pub places: Vec<DVec3>,
-    /// Where those are that the lattice has moved; nothing where there are no cells.
-    pub homes: Vec<Home>,
+    /// The locations of the points that the lattice has moved; empty without cells.
+    pub locations: Vec<Location>,
     /// How far the lattice moves a point at most: see [`MtInfo::quantization`](crate::mt::MtInfo::quantization).
     pub quantization: f64,
 }
@@ -41,7 +41,7 @@ impl Quantized {
         };
         let places = mesh.positions.iter().zip(&positions).map(place).collect();
         let quantization = position_lattice::largest_move(mesh, &lattice, &positions);
-        Self { lattice, fields, positions, levels, exact, places, homes: Vec::new(), quantization }
+        Self { lattice, fields, positions, levels, exact, places, locations: Vec::new(), quantization }
     }
 
     /// Where the lattice has put a point, in its steps.
@@ -58,9 +58,14 @@ impl Quantized {
     /// range of each field, where the lattice of the positions has moved them.
     fn losses(&self, tets: &[[u32; 4]]) -> Vec<f64> {
         let mut losses = vec![0.0; self.fields.len()];
-        for home in &self.homes {
-            let tet = tets[home.tet as usize];
-            self.deviation(home.point, clamped(home.lambda), |f| tet.map(|v| self.level(v, f)), &mut losses);
+        for locate in &self.locations {
+            let tet = tets[locate.tet as usize];
+            self.deviation(
+                locate.point,
+                clamped(locate.lambda),
+                |f| tet.map(|v| self.level(v, f)),
+                &mut losses,
+            );
         }
         losses
     }
@@ -148,7 +153,7 @@ pub(super) fn quantize(mesh: &TetMesh, config: &BuildConfig) -> Result<Quantized
 /// The same for a mesh whose cells are kept: errors are then measured at the input's own points.
 pub(super) fn quantize_cells(mesh: &TetMesh, config: &BuildConfig) -> Result<Quantized, BuildError> {
     let mut quantized = quantize(mesh, config)?;
-    quantized.homes = beside::homes(&mesh.tets, &quantized).map_err(BuildError::Mesh)?;
+    quantized.locations = location::locations(&mesh.tets, &quantized.positions, &quantized.places)?;
     let mut losses = quantized.losses(&mesh.tets);
     // Where cells are thin for what varies across them, a finer lattice is what keeps the reference mesh near the input.
     let is_free = config.position_bits.is_none() && config.position_tolerance.is_none();
@@ -165,7 +170,7 @@ pub(super) fn quantize_cells(mesh: &TetMesh, config: &BuildConfig) -> Result<Qua
         let Ok(placed) = position_lattice::place(mesh, &finer) else { break };
         let Quantized { fields, levels, exact, .. } = quantized;
         quantized = Quantized::new(mesh, placed, fields, levels, exact);
-        quantized.homes = beside::homes(&mesh.tets, &quantized).map_err(BuildError::Mesh)?;
+        quantized.locations = location::locations(&mesh.tets, &quantized.positions, &quantized.places)?;
         losses = quantized.losses(&mesh.tets);
     }
     for (field, loss) in quantized.fields.iter_mut().zip(losses) {
@@ -174,8 +179,8 @@ pub(super) fn quantize_cells(mesh: &TetMesh, config: &BuildConfig) -> Result<Qua
     Ok(quantized)
 }
 
-/// Without other wishes the lattice of the positions is fine enough that the reference mesh has, where the input's points are, the
-/// input's values up to this fraction of the range, besides what the lattices of the fields round off.
+/// By default the position lattice is so fine that the reference mesh has the input's values at the input's points up
+/// to this fraction of the range, besides the rounding of the field lattices.
 const LARGEST_LOSS: f64 = 0.001;
 /// Bits by which it becomes finer at a time.
 const FINER_BITS: u32 = 2;

@@ -1,14 +1,14 @@
-//! Looking at the removal of a vertex: what would fill its hole, and at what error.
+//! The removal of a vertex: the best filling of its hole, and its error.
 //!
-//! All that is read is in [`State`], which no look changes, and all that is written in [`Look`]: so many candidates can be
-//! looked at side by side, each thread having its own [`Look`].
+//! A search reads [`State`] and writes only to its own [`RemovalSearch`], so candidates could be evaluated in parallel.
 
 use super::candidate_queue::{Key, Levels};
 use super::cost::{Buckets, Reference, largest};
-use super::fill_cost::{FillCost, Legacy, Past};
+use super::fill_cost::{FillCost, HoleCost, Input, Removals};
 use super::gift_wrap::GiftWrap;
 use super::half_edge::{Nearby, contract, keeps_topology};
 use super::hole::{Filling, Hole};
+use super::points::squared_length;
 use super::quantize::Quantized;
 use super::reach;
 use super::reach::{Reach, Ruler};
@@ -16,7 +16,7 @@ use super::work_mesh::WorkMesh;
 use crate::mesh::NONE;
 use glam::DVec3;
 
-/// All that it takes to look at a candidate, and that does not change while one looks.
+/// What the evaluation of a candidate reads.
 pub(super) struct State<'a> {
     pub mesh: WorkMesh,
     /// Average gradient of each field at each vertex, in levels per lattice step.
@@ -24,7 +24,7 @@ pub(super) struct State<'a> {
     pub reference: Reference<'a>,
     pub frozen: Vec<bool>,
     pub buckets: Buckets,
-    pub past: Past,
+    pub removals: Removals,
     /// Counts the changes around each vertex.
     pub versions: Vec<u32>,
     /// Tetrahedra around each vertex.
@@ -39,16 +39,14 @@ impl<'a> State<'a> {
     pub fn new(mesh: WorkMesh, reference: Reference<'a>, frozen: Vec<bool>, levels: Levels) -> Self {
         let quantized = reference.quantized;
         let points = quantized.positions.len();
-        let mut degrees = vec![0; points];
-        mesh.tets.iter().flatten().for_each(|&v| degrees[v as usize] += 1);
         Self {
             gradients: quantized.gradients(&mesh.tets),
             reference,
             frozen,
             buckets: Buckets::new(mesh.tets.len(), quantized),
-            past: Past::new(mesh.tets.len()),
+            removals: Removals::new(mesh.tets.len()),
             versions: vec![0; points],
-            degrees,
+            degrees: mesh.degrees(),
             reaches: reach::of_stars(&mesh.tets, &quantized.positions),
             ruler: Ruler::new(quantized),
             levels,
@@ -63,16 +61,16 @@ impl<'a> State<'a> {
     }
 }
 
-/// A look at one candidate: its hole, and the best filling. Reused from candidate to candidate.
-pub(super) struct Look {
+/// The evaluation of one candidate: its hole, and the best filling. Reused from candidate to candidate.
+pub(super) struct RemovalSearch {
     /// None where holes are filled by contracting edges.
     gift_wrap: Option<GiftWrap>,
     pub hole: Hole,
-    legacy: Legacy,
+    hole_cost: HoleCost,
     nearby: Nearby,
-    /// Link vertices by what is predicted of contracting the edge to them.
+    /// Link vertices with the predicted error of contracting the edge to them.
     ends: Vec<(f64, u32)>,
-    /// The filling that is looked at, and the best one so far.
+    /// The filling that is evaluated, and the best one so far.
     now: Candidate,
     pub best: Candidate,
 }
@@ -85,12 +83,19 @@ pub(super) struct Candidate {
     error: f64,
 }
 
-impl Look {
+impl Candidate {
+    fn evaluate(&mut self, hole: &Hole, hole_cost: &HoleCost, state: &State<'_>, limit: f64) {
+        let input = Input { hole, filling: &self.filling, reference: &state.reference };
+        self.error = self.cost.evaluate(hole_cost, &state.buckets, limit, input);
+    }
+}
+
+impl RemovalSearch {
     pub fn new(gift_wrap: Option<GiftWrap>, points: usize) -> Self {
         Self {
             gift_wrap,
             hole: Hole::default(),
-            legacy: Legacy::default(),
+            hole_cost: HoleCost::default(),
             nearby: Nearby::new(points),
             ends: Vec::new(),
             now: Candidate::default(),
@@ -98,16 +103,16 @@ impl Look {
         }
     }
 
-    /// Looks at the removal of `a`, by moving it to `end` unless that is [`NONE`]. Returns its key; none if it cannot be
-    /// removed. If the key's level is above `level`, it is a lower bound; else `best` is the filling to be made.
+    /// Evaluates the removal of `a`, by moving it to `end` unless that is [`NONE`]. Returns its key; none if it cannot
+    /// be removed. If the key's level is above `level`, it is a lower bound; else `best` is the filling to be made.
     pub fn at(&mut self, state: &State<'_>, a: u32, end: u32, level: u16) -> Option<Key> {
         self.hole.open(&state.mesh, &state.reference.quantized.positions, a).ok()?;
         if self.hole.star.len() < state.degrees[a as usize] as usize {
-            // What is around it touches itself elsewhere, which only an input that overlaps itself leads to.
+            // The tetrahedra around it are not connected through faces: the input overlaps itself.
             return None;
         }
-        self.legacy = state.past.legacy(&self.hole, &state.reference);
-        let least = state.levels.of(largest(&self.legacy.errors));
+        self.hole_cost = state.removals.hole_cost(&self.hole, &state.reference);
+        let least = state.levels.of(largest(&self.hole_cost.errors));
         if least > level {
             return Some(Key::new(least, 0, 0.0, a, NONE));
         }
@@ -116,7 +121,9 @@ impl Look {
 
     /// The key of a filling of the hole.
     fn key(&self, state: &State<'_>, candidate: &Candidate, b: u32) -> Key {
-        let length = if b == NONE { 0.0 } else { squared_length(state, self.hole.a, b) };
+        let positions = &state.reference.quantized.positions;
+        let length =
+            positions.get(b as usize).map_or(0.0, |&q| squared_length(positions[self.hole.a as usize], q));
         let second = state.second(self.hole.a, candidate.filling.tets.len() as u32);
         Key::new(state.levels.of(candidate.error), second, length, self.hole.a, b)
     }
@@ -142,9 +149,8 @@ impl Look {
                 continue;
             }
             let limit = state.levels.largest(found.map_or(level, |found| found.level().min(level)));
-            let Self { hole, legacy, now, .. } = self;
-            now.error =
-                now.cost.evaluate(hole, &now.filling, legacy, &state.buckets, &state.reference, limit);
+            let Self { hole, hole_cost, now, .. } = self;
+            now.evaluate(hole, hole_cost, state, limit);
             let key = self.key(state, &self.now, b);
             if found.is_none_or(|found| key < found) {
                 found = Some(key);
@@ -162,7 +168,7 @@ impl Look {
             return false;
         }
         // Inside, positive tetrahedra are all it takes.
-        if state.reference.skin.at(b).is_empty() {
+        if state.reference.boundary.at(b).is_empty() {
             return true;
         }
         let stays = hole.on_boundary() && state.frozen[b as usize];
@@ -171,7 +177,7 @@ impl Look {
 
     /// Fills the hole by the Delaunay criterion; the filling becomes `best`.
     fn wrap(&mut self, state: &State<'_>, level: u16) -> Option<Key> {
-        let Self { hole, legacy, best, gift_wrap, .. } = self;
+        let Self { hole, hole_cost, best, gift_wrap, .. } = self;
         let positions = &state.reference.quantized.positions;
         if !gift_wrap.as_mut()?.fill(hole, positions, &mut best.filling)
             || hole.tilts_flat(&best.filling, positions)
@@ -183,14 +189,9 @@ impl Look {
             return None;
         }
         let limit = state.levels.largest(level);
-        best.error = best.cost.evaluate(hole, &best.filling, legacy, &state.buckets, &state.reference, limit);
+        best.evaluate(hole, hole_cost, state, limit);
         Some(self.key(state, &self.best, NONE))
     }
-}
-
-fn squared_length(state: &State<'_>, a: u32, b: u32) -> f32 {
-    let [p, q] = [a, b].map(|v| state.reference.quantized.positions[v as usize]);
-    (0..3).map(|i| (i64::from(p[i]) - i64::from(q[i])) as f32).map(|d| d * d).sum()
 }
 
 /// The second difference of the fields along an edge that is to be contracted to `b`, as an error.

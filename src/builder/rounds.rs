@@ -1,17 +1,17 @@
-//! What to look at next: vertices in levels of error, and in each level in rounds.
+//! The order of removals: vertices in levels of error, and in each level in rounds.
 //!
-//! In a round no removal may touch what another one of the same round has made. That keeps chains of updates that depend
-//! on each other short, and all that a region needs near to it. All candidates of a round are looked at before any of
-//! them is carried out; as none changes the star of another one, what was found still holds when its turn comes. What comes
-//! too near to a removal waits for the next round. A round that removes little ends its level, and what waits is looked at
-//! again in the next level.
+//! In a round no removal may touch tetrahedra that another removal of the same round has made. That keeps chains of
+//! dependent updates short, and the updates that a region needs near to it. All candidates of a round are evaluated
+//! before any vertex is removed. No removal changes the star of another one, so the evaluations stay valid. Vertices
+//! too near to a removal wait for the next round. A round that removes few vertices ends its level; waiting vertices
+//! are evaluated again in the next level.
 
 use std::mem;
 
-/// A round that removes less than this part of the mesh's vertices, one in so many, ends its level.
+/// A round that removes less than one in so many of the mesh's vertices ends its level.
 const LITTLE: usize = 20;
 
-/// A vertex of a later level, and what was found when it was looked at.
+/// A vertex of a later level, with the result of its last evaluation.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Later {
     pub vertex: u32,
@@ -21,7 +21,7 @@ pub(super) struct Later {
     pub version: u32,
 }
 
-/// The vertices that are to be looked at.
+/// The vertices to evaluate.
 pub(super) struct Rounds {
     level: u16,
     last_level: u16,
@@ -33,43 +33,42 @@ pub(super) struct Rounds {
 }
 
 impl Rounds {
-    /// Nothing yet, at the first of these levels, of a mesh of so many vertices.
+    /// No vertices yet, at `first_level`.
     pub fn new(first_level: u16, last_level: u16, vertices: usize) -> Self {
         let later = vec![Vec::new(); usize::from(last_level) + 1];
         Self { level: first_level, last_level, waiting: Vec::new(), waits: vec![false; vertices], later }
     }
 
-    /// The level that is worked on.
+    /// The current level.
     pub fn level(&self) -> u16 {
         self.level
     }
 
-    /// Lets a vertex wait for the next round: it was not looked at yet, or its neighbourhood has changed.
+    /// Lets a vertex wait for the next round: it has not been evaluated, or its neighbourhood has changed.
     pub fn wait(&mut self, vertex: u32) {
         if !mem::replace(&mut self.waits[vertex as usize], true) {
             self.waiting.push(vertex);
         }
     }
 
-    /// Whether a vertex waits: in the midst of a round, whether the round has changed its star.
+    /// Whether a vertex waits. During a round: whether the round has changed its star.
     pub fn waits(&self, vertex: u32) -> bool {
         self.waits[vertex as usize]
     }
 
-    /// Puts a vertex off to a later level.
+    /// Defers a vertex to a later level.
     pub fn put_off(&mut self, level: u16, later: Later) {
         self.later[usize::from(level)].push(later);
     }
 
-    /// Starts a round: what waits, and what was put off to this level.
+    /// Starts a round: returns the waiting vertices, and those deferred to this level.
     pub fn start(&mut self) -> (Vec<u32>, Vec<Later>) {
         let waiting = mem::take(&mut self.waiting);
         waiting.iter().for_each(|&v| self.waits[v as usize] = false);
         (waiting, mem::take(&mut self.later[usize::from(self.level)]))
     }
 
-    /// Ends a round that has removed so many vertices of a mesh that has so many left. False if there is nothing to do
-    /// any more.
+    /// Ends a round; `left` vertices remain. False if no vertex can be removed any more.
     pub fn end(&mut self, removed: usize, left: usize) -> bool {
         let goes_on = !self.waiting.is_empty();
         if goes_on && (removed * LITTLE >= left + removed || self.level == self.last_level) {

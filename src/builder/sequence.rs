@@ -234,7 +234,7 @@ impl Source {
     }
 }
 
-/// What is known of each entry of [`Sequence::tets`] that is removed.
+/// For each entry of [`Sequence::tets`] that is removed: its origin.
 struct Arcs {
     /// Where a removed tetrahedron comes from.
     source: Vec<Source>,

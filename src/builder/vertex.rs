@@ -1,16 +1,16 @@
-//! Vertex-based MTs, by whichever builder.
+//! Vertex-based MTs, by decimation or insertion.
 
 use super::quantize::Quantized;
 use super::sequence::Sequence;
 use super::{
-    BuildConfig, BuildError, Criterion, OnProgress, Purpose, VertexMethod, decimate, insert, quantize,
+    BuildConfig, BuildCriterion, BuildError, OnProgress, Purpose, VertexMethod, decimate, insert, quantize,
 };
 use crate::geom::Bounds;
 use crate::mesh;
 use crate::mesh::TetMesh;
 use crate::mt::{ExplicitMt, MAX_UPDATES, MtInfo, MtKind, VertexId};
 
-/// Builds a vertex-based MT of `mesh` by this method, and spells it out.
+/// Builds a vertex-based MT of `mesh` by this method, as an explicit MT.
 ///
 /// # Errors
 /// As [`decimated_mt`] and [`inserted_mt`].
@@ -28,7 +28,7 @@ pub(super) fn mt_by(
     }
 }
 
-/// Builds a vertex-based MT of `mesh` by removing vertices, cheapest first, and spells it out: see
+/// Builds a vertex-based MT of `mesh` by removing vertices, cheapest first, as an explicit MT: see
 /// [`VertexMt::from_explicit`](crate::mt::VertexMt::from_explicit).
 ///
 /// # Errors
@@ -36,7 +36,7 @@ pub(super) fn mt_by(
 pub(super) fn decimated_mt(
     mesh: &TetMesh,
     config: &BuildConfig,
-    how: (Criterion, Purpose),
+    how: (BuildCriterion, Purpose),
     progress: OnProgress<'_>,
 ) -> Result<(ExplicitMt, Vec<VertexId>), BuildError> {
     let built = decimate::decimate(mesh, config, how, progress)?;
@@ -45,12 +45,12 @@ pub(super) fn decimated_mt(
 }
 
 /// Builds a vertex-based MT of the points of `mesh` by inserting them into a coarse mesh of their convex hull, the one
-/// with the largest error first, and spells it out. The reference mesh is the Delaunay triangulation of the points,
+/// with the largest error first, as an explicit MT. The reference mesh is the Delaunay triangulation of the points,
 /// whatever tetrahedra `mesh` has; it may have none.
 ///
 /// # Errors
 /// If the tetrahedra of `mesh` do not fill the convex hull of its points, two points coincide on the lattice or they
-/// span no volume; if an option is out of its range; if `progress` breaks the work off.
+/// span no volume; if an option is out of its range; if `progress` stops the work.
 pub(super) fn inserted_mt(
     mesh: &TetMesh,
     config: &BuildConfig,
@@ -61,7 +61,7 @@ pub(super) fn inserted_mt(
         return Err(BuildError::TooLarge);
     }
     if !mesh.tets.is_empty() {
-        mesh::check(mesh).map_err(BuildError::Mesh)?;
+        mesh::check(mesh)?;
     }
     let quantized = quantize::quantize(mesh, config)?;
     let displacement_per_error = config.displacement * Bounds::of(&mesh.positions).diagonal();

@@ -11,11 +11,11 @@ pub(super) struct WorkMesh {
     pub neighbors: Vec<[u32; 4]>,
     /// A tetrahedron at each vertex; [`NONE`] once the vertex is gone.
     pub incident: Vec<u32>,
-    /// Numbers of dead tetrahedra that [`WorkMesh::fresh`] may give away.
+    /// Numbers of dead tetrahedra that [`WorkMesh::fresh`] may reuse.
     unused: Vec<u32>,
 }
 
-/// Marks on tetrahedra. They are apart from the mesh, so that searches need not change it.
+/// Marks on tetrahedra. They are not part of the mesh, so that searches need not change it.
 #[derive(Default)]
 pub(super) struct TetMarks {
     marks: Vec<u32>,
@@ -23,7 +23,7 @@ pub(super) struct TetMarks {
 }
 
 impl TetMarks {
-    /// Takes all marks away, in a mesh of so many tetrahedra.
+    /// Clears all marks, for a mesh of so many tetrahedra.
     fn start(&mut self, tets: usize) {
         self.epoch = self.epoch.wrapping_add(1);
         if self.epoch == 0 {
@@ -62,6 +62,13 @@ impl WorkMesh {
         Self { tets, neighbors, incident, unused: Vec::new() }
     }
 
+    /// The number of tetrahedra around each vertex.
+    pub fn degrees(&self) -> Vec<u32> {
+        let mut degrees = vec![0; self.incident.len()];
+        self.tets.iter().flatten().for_each(|&v| degrees[v as usize] += 1);
+        degrees
+    }
+
     /// Whether the vertex is in the mesh.
     pub fn has(&self, v: u32) -> bool {
         self.incident[v as usize] != NONE
@@ -72,7 +79,7 @@ impl WorkMesh {
         self.tets[t as usize][0] != NONE
     }
 
-    /// The tetrahedra around `v` that hang together through faces, unless there are more than `most`.
+    /// The tetrahedra around `v` that are connected through faces; false if there are more than `most`.
     pub fn star(&self, v: u32, most: usize, marks: &mut TetMarks, star: &mut Vec<StarTet>) -> bool {
         marks.start(self.tets.len());
         star.clear();
@@ -114,13 +121,13 @@ impl WorkMesh {
         self.tets[t as usize] = [NONE; 4];
     }
 
-    /// Takes tetrahedron `t` out; its neighbours are left to the caller.
+    /// Removes tetrahedron `t`; the caller updates its neighbours.
     pub fn free(&mut self, t: u32) {
         self.tets[t as usize] = [NONE; 4];
         self.unused.push(t);
     }
 
-    /// The number of a tetrahedron yet to be filled in.
+    /// The number of a new tetrahedron, for the caller to fill in.
     pub fn fresh(&mut self) -> u32 {
         self.unused.pop().unwrap_or_else(|| {
             self.tets.push([NONE; 4]);

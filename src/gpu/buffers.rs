@@ -17,9 +17,9 @@ pub(super) struct GrowBuffer<T> {
 }
 
 impl<T: Pod> GrowBuffer<T> {
-    /// An empty buffer; `what` says in the plural what it holds.
+    /// An empty buffer; `what` names its content, in the plural.
     pub(super) fn new(what: &'static str, usage: wgpu::BufferUsages) -> Self {
-        // Copies to buffers come in units of four bytes.
+        // Copies to buffers are in units of four bytes.
         const { assert!(size_of::<T>().is_multiple_of(4) && size_of::<T>() > 0) };
         Self { what, usage: usage | wgpu::BufferUsages::COPY_DST, buffer: None, len: 0, of: PhantomData }
     }
@@ -33,7 +33,7 @@ impl<T: Pod> GrowBuffer<T> {
             let size = grown(bytes, context.device.limits().max_buffer_size).ok_or_else(|| {
                 GpuError::TooLarge { what: self.what, bytes, limit: context.device.limits().max_buffer_size }
             })?;
-            // Give the old memory back before asking for more.
+            // Free the old memory before allocating more.
             if let Some(old) = self.buffer.take() {
                 old.destroy();
             }

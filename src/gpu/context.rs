@@ -1,4 +1,4 @@
-//! The device, and what it says when something goes wrong.
+//! The device, and its errors.
 
 use crate::gpu::GpuError;
 use std::sync::{Arc, Mutex};
@@ -70,7 +70,7 @@ impl Context {
             .request_adapter(&options)
             .await
             .map_err(|error| GpuError::NoAdapter(error.to_string()))?;
-        // What WebGPU promises everywhere, but with the largest buffers that this device has: meshes are large.
+        // The default limits of WebGPU, but with the largest buffers of this device: meshes are large.
         let offered = adapter.limits();
         let limits = wgpu::Limits {
             max_buffer_size: offered.max_buffer_size,

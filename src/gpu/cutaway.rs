@@ -1,7 +1,7 @@
 //! Draws the cut-away tetrahedra: flat faces coloured by the field, with outlines.
 
 use crate::gpu::buffers::GrowBuffer;
-use crate::gpu::pipeline::{FrameBinding, Recipe, packed};
+use crate::gpu::pipeline::{FrameBinding, PipelineSpec, packed};
 use crate::gpu::{Context, GpuError};
 use crate::view::Cutaway;
 
@@ -15,7 +15,7 @@ pub(super) struct CutawayPass {
 impl CutawayPass {
     pub(super) fn new(context: &Context, frame: &FrameBinding, format: wgpu::TextureFormat) -> Self {
         let attributes = (wgpu::vertex_attr_array![0 => Float32x3], wgpu::vertex_attr_array![1 => Float32]);
-        let recipe = Recipe {
+        let spec = PipelineSpec {
             shader: "cutaway",
             vertex: "vs",
             fragment: "fs",
@@ -25,7 +25,7 @@ impl CutawayPass {
             blends: false,
         };
         Self {
-            pipeline: recipe.cook(context, frame, format),
+            pipeline: spec.create(context, frame, format),
             positions: GrowBuffer::new("corners of the cut-away faces", wgpu::BufferUsages::VERTEX),
             values: GrowBuffer::new("values of the cut-away faces", wgpu::BufferUsages::VERTEX),
         }

@@ -1,51 +1,36 @@
-//! What can go wrong between this program and a GPU.
+//! Errors of the GPU.
 
-use std::fmt;
+use thiserror::Error;
 
 /// A failure of the GPU, or of getting one.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Error)]
 pub enum GpuError {
-    /// There is no usable GPU, or the browser does not give one.
+    /// There is no usable GPU, or the browser does not give access to it.
+    #[error("no GPU adapter: {0}; use a browser with WebGPU switched on and hardware acceleration allowed")]
     NoAdapter(String),
-    /// The GPU refused to be opened.
+    /// The GPU could not be opened.
+    #[error("the GPU cannot be opened: {0}; close other pages that use it")]
     NoDevice(String),
-    /// The canvas cannot be drawn to.
+    /// WebGPU cannot draw to the canvas.
+    #[error("the canvas cannot be drawn to with WebGPU: {0}")]
     NoSurface(String),
-    /// The mesh needs a larger buffer than the device has.
+    /// The mesh needs a larger buffer than the device allows.
+    #[error(
+        "the {what} need {bytes} bytes in one buffer and this GPU allows {limit}; raise the error or set a smaller \
+         budget of tetrahedra"
+    )]
     TooLarge {
-        /// What the buffer was for.
+        /// What the buffer contains.
         what: &'static str,
-        /// How large it would have to be.
+        /// Its size.
         bytes: u64,
-        /// How large buffers can be.
+        /// The largest size that the device allows.
         limit: u64,
     },
-    /// The device is gone (driver reset, GPU unplugged, too little memory): a new renderer is needed.
+    /// The device is lost (driver reset, GPU unplugged, too little memory): create a new renderer.
+    #[error("the GPU was lost: {0}; create the viewer again")]
     DeviceLost(String),
     /// The device refused an operation.
+    #[error("the GPU refused an operation: {0}")]
     Refused(String),
 }
-
-impl fmt::Display for GpuError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NoAdapter(why) => write!(
-                f,
-                "no GPU adapter: {why}; use a browser with WebGPU switched on and hardware acceleration allowed"
-            ),
-            Self::NoDevice(why) => {
-                write!(f, "the GPU cannot be opened: {why}; close other pages that use it")
-            }
-            Self::NoSurface(why) => write!(f, "the canvas cannot be drawn to with WebGPU: {why}"),
-            Self::TooLarge { what, bytes, limit } => write!(
-                f,
-                "the {what} need {bytes} bytes in one buffer and this GPU allows {limit}; \
-                 raise the error or set a smaller budget of tetrahedra"
-            ),
-            Self::DeviceLost(why) => write!(f, "the GPU was lost: {why}; create the viewer again"),
-            Self::Refused(why) => write!(f, "the GPU refused an operation: {why}"),
-        }
-    }
-}
-
-impl std::error::Error for GpuError {}

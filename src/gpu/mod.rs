@@ -1,4 +1,4 @@
-//! The renderer, on wgpu: WebGPU in the browser, Vulkan in the tests. Knows no MT: it draws what [`crate::view`]
+//! The renderer, on wgpu: WebGPU in the browser, Vulkan in the tests. It uses no MT: it draws what [`crate::view`]
 //! computes.
 //!
 //! A [`Renderer`] owns a [`Context`] (the device), a target (a canvas, or an image to read back), and one pass for

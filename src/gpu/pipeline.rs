@@ -53,7 +53,7 @@ impl FrameBinding {
 }
 
 /// How one pipeline differs from the others.
-pub(super) struct Recipe<'a> {
+pub(super) struct PipelineSpec<'a> {
     pub shader: &'static str,
     pub vertex: &'static str,
     pub fragment: &'static str,
@@ -64,8 +64,8 @@ pub(super) struct Recipe<'a> {
     pub blends: bool,
 }
 
-impl Recipe<'_> {
-    pub(super) fn cook(
+impl PipelineSpec<'_> {
+    pub(super) fn create(
         &self,
         context: &Context,
         frame: &FrameBinding,

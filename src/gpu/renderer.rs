@@ -2,7 +2,7 @@
 
 use crate::geom::Camera;
 use crate::gpu::cutaway::CutawayPass;
-use crate::gpu::pipeline::{FrameBinding, Recipe};
+use crate::gpu::pipeline::{FrameBinding, PipelineSpec};
 use crate::gpu::surface::SurfacePass;
 use crate::gpu::target::{Picture, Target};
 use crate::gpu::types::Frame;
@@ -60,7 +60,7 @@ impl Renderer {
     fn new(context: Context, target: Target) -> Result<Self, GpuError> {
         let frame = FrameBinding::new(&context);
         let format = target.format;
-        let background = Recipe {
+        let background = PipelineSpec {
             shader: "background",
             vertex: "vs",
             fragment: "fs",
@@ -70,7 +70,7 @@ impl Renderer {
             blends: false,
         };
         let renderer = Self {
-            background: background.cook(&context, &frame, format),
+            background: background.create(&context, &frame, format),
             surface: SurfacePass::new(&context, &frame, format),
             cutaway: CutawayPass::new(&context, &frame, format),
             wire: WirePass::new(&context, &frame, format),
@@ -114,7 +114,7 @@ impl Renderer {
     /// triangles, and in what lies beyond its ends. What is uploaded is that, so the cost goes with what has changed.
     ///
     /// # Errors
-    /// If it is too large for the device; then none is shown, and [`Renderer::set_surface`] has to come next.
+    /// If it is too large for the device; then no surface is shown, and [`Renderer::set_surface`] must be called next.
     pub fn update_surface(
         &mut self,
         surface: &IsoSurface,
@@ -140,7 +140,7 @@ impl Renderer {
         self.wire.update(&self.context, boxes)
     }
 
-    /// Draws a picture. `false` when the target cannot take one just now, such as a hidden canvas.
+    /// Draws a picture. `false` when the target is not available, such as a hidden canvas.
     ///
     /// # Errors
     /// If the device is lost or refused something, now or since the last picture.

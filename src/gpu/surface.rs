@@ -1,7 +1,7 @@
 //! Draws the lit isosurface.
 
 use crate::gpu::buffers::GrowBuffer;
-use crate::gpu::pipeline::{FrameBinding, Recipe, packed};
+use crate::gpu::pipeline::{FrameBinding, PipelineSpec, packed};
 use crate::gpu::{Context, GpuError};
 use crate::view::IsoSurface;
 use std::ops::Range;
@@ -17,7 +17,7 @@ pub(super) struct SurfacePass {
 impl SurfacePass {
     pub(super) fn new(context: &Context, frame: &FrameBinding, format: wgpu::TextureFormat) -> Self {
         let attributes = [wgpu::vertex_attr_array![0 => Float32x3], wgpu::vertex_attr_array![1 => Float32x3]];
-        let recipe = Recipe {
+        let spec = PipelineSpec {
             shader: "surface",
             vertex: "vs",
             fragment: "fs",
@@ -27,7 +27,7 @@ impl SurfacePass {
             blends: false,
         };
         Self {
-            pipeline: recipe.cook(context, frame, format),
+            pipeline: spec.create(context, frame, format),
             positions: GrowBuffer::new("vertices of the isosurface", wgpu::BufferUsages::VERTEX),
             normals: GrowBuffer::new("normals of the isosurface", wgpu::BufferUsages::VERTEX),
             indices: GrowBuffer::new("triangles of the isosurface", wgpu::BufferUsages::INDEX),

@@ -1,4 +1,4 @@
-//! Where the picture goes: a canvas, or an image that can be read back.
+//! The target of drawing: a canvas, or an image that can be read back.
 
 use crate::gpu::{Context, GpuError, SAMPLES};
 use std::future::poll_fn;
@@ -23,7 +23,7 @@ enum Place {
     Image(wgpu::Texture),
 }
 
-/// A picture in the making.
+/// A picture being drawn.
 pub(super) enum Picture {
     Canvas(wgpu::SurfaceTexture),
     Image(wgpu::Texture),
@@ -81,14 +81,14 @@ impl Target {
         [self.samples, self.depth] = attachments(context, size, self.format);
     }
 
-    /// The next picture; `None` if there is nothing to draw on just now.
+    /// The next picture; `None` if the target is not available now.
     pub(super) fn next(&mut self, context: &Context) -> Result<Option<Picture>, GpuError> {
         let (format, size) = (self.format, self.size);
         let (surface, configured) = match &mut self.place {
             Place::Image(image) => return Ok(Some(Picture::Image(image.clone()))),
             Place::Canvas { surface, configured } => (surface, configured),
         };
-        // A surface that has changed is configured anew, once; then something else is wrong.
+        // A surface that has changed is configured again, once; a second failure is an error.
         for _ in 0..2 {
             if !*configured {
                 configure(context, surface, format, size)?;

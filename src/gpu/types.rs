@@ -1,10 +1,10 @@
-//! What the shaders read, laid out as they read it; and the look of the picture.
+//! The data that shaders read, in their layout, and the appearance of the picture.
 
 use crate::geom::{Bounds, Camera};
 use crate::view::{Colormap, VIRIDIS};
 use glam::DVec3;
 
-/// How the picture looks; colours are sRGB from 0 to 1.
+/// The appearance of the picture; colours are sRGB from 0 to 1.
 #[derive(Clone, Copy, Debug)]
 pub struct Look {
     /// The field values at the two ends of the colour map.

@@ -2,7 +2,7 @@
 
 use crate::geom::Bounds;
 use crate::gpu::buffers::GrowBuffer;
-use crate::gpu::pipeline::{FrameBinding, Recipe};
+use crate::gpu::pipeline::{FrameBinding, PipelineSpec};
 use crate::gpu::types::Line;
 use crate::gpu::{BoxLines, Context, GpuError};
 use crate::view::gizmo::BoxFace;
@@ -27,7 +27,7 @@ impl WirePass {
                 step_mode: wgpu::VertexStepMode::Instance,
                 attributes: &Line::ATTRIBUTES,
             })];
-            let recipe = Recipe {
+            let spec = PipelineSpec {
                 shader: "wire",
                 vertex,
                 fragment,
@@ -36,7 +36,7 @@ impl WirePass {
                 writes_depth: false,
                 blends: true,
             };
-            recipe.cook(context, frame, format)
+            spec.create(context, frame, format)
         };
         Self {
             hidden: pipeline("vs_line", "fs_hidden", wgpu::CompareFunction::Greater),

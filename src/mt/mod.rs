@@ -340,7 +340,7 @@ pub trait UpdatePages: MultiTessellation {
     }
 
     /// Takes the updates of a page away, none of which may be applied to a mesh that is still in use; that mesh must have
-    /// been told before, by [`Front::leave`](crate::refine::Front::leave). What needs the page must have gone before: see
+    /// been told before, by [`Front::prepare_eviction`](crate::refine::Front::prepare_eviction). What needs the page must have gone before: see
     /// [`UpdatePages::needs_parents`].
     ///
     /// # Errors

@@ -1,7 +1,7 @@
-//! What a camera sees: its pyramid of vision, and how large an error looks.
+//! Views: the view frustum of a camera, and the size of errors in pixels.
 
 use super::View;
-use super::criterion::{ANY, Frame, TetLook, Verdict, dial_of};
+use super::criterion::{ANY, Frame, TetData, Verdict, component_of};
 use super::shape::Plane;
 use super::tet_minimax::Rows;
 use glam::{DMat4, DVec2, DVec3, DVec4};
@@ -9,27 +9,27 @@ use glam::{DMat4, DVec2, DVec3, DVec4};
 /// A camera in model units, seen from the middle of the domain.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Camera {
-    /// What bounds the picture, normals outwards.
+    /// The sides of the view frustum, normals outwards.
     sides: [Plane; 4],
     depth: Depth,
 }
 
-/// How the size of things on the screen depends on their depth.
+/// How sizes on the screen depend on depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Depth {
-    /// Things look smaller with their distance from this plane.
+    /// Sizes are divided by the distance from this plane.
     Perspective {
         plane: Plane,
-        /// Pixels · depth of a thing of length 1.
+        /// The pixels of a length of 1 at depth 1.
         pixels: f64,
     },
-    /// They do not: pixels of a thing of length 1.
+    /// Sizes do not depend on depth. The pixels of a length of 1.
     Parallel { pixels: f64 },
 }
 
-/// Depths that urgency is told by are this close to each other: 2^(-1/16).
+/// The ratio of successive depths in [`Camera::nearest_depth`]: 2^(-1/16).
 const STEP: f64 = 0.957_603_280_698_573_6;
-/// So many of them are told apart: down to 2^-24 of the largest depth.
+/// The number of these depths: down to 2^-24 of the largest one.
 const STEPS: usize = 24 * 16;
 
 impl Camera {
@@ -52,41 +52,47 @@ impl Camera {
     }
 
     /// Whether `tet` is in the picture and its error looks larger than `pixels`: whether some of its points lie in the
-    /// pyramid of vision up to the depth at which the error has that size.
+    /// view frustum up to the depth at which the error has that size.
     pub fn judge(
         &self,
         frame: &Frame,
-        tet: &TetLook<'_>,
+        tet: &TetData<'_>,
         corners: &[DVec3; 4],
         pixels: f64,
         ranked: bool,
     ) -> Verdict {
         let length = tet.error.error() * frame.displacement;
-        if length <= 0.0 {
+        let is_small =
+            matches!(self.depth, Depth::Parallel { pixels: scale } if length * scale / pixels <= 1.0);
+        if length <= 0.0 || is_small {
+            // The verdict can only change with the scale, and cameras of different scales are infinitely far apart.
             return Verdict::NEVER;
         }
         let margin = frame.margin(tet);
-        let limit = match &self.depth {
-            // Another scale is far away, but the same one will never ask.
-            Depth::Parallel { pixels: scale } if length * scale / pixels <= 1.0 => return Verdict::NEVER,
-            Depth::Parallel { .. } => None,
-            Depth::Perspective { plane, pixels: scale } => {
-                Some((plane, (length * scale / pixels).min(2.0 * self.deepest(frame))))
-            }
-        };
-        let (outside, side) = self.outside(corners, margin, limit);
+        let (outside, side) = self.outside(corners, margin, self.depth_limit(frame, length, pixels));
         let slack = (outside - margin).abs() / away(corners, frame);
-        let verdict = |excess: f64, dial: u8| Verdict { excess, slack, dial };
-        match &self.depth {
-            Depth::Parallel { pixels: scale } => {
-                verdict(if outside <= margin { length * scale / pixels } else { 0.0 }, dial_of(side))
+        let (excess, component) = match &self.depth {
+            Depth::Parallel { pixels: scale } if outside <= margin => {
+                (length * scale / pixels, component_of(side))
             }
-            Depth::Perspective { .. } if outside > margin => verdict(0.0, dial_of(side)),
-            Depth::Perspective { .. } if !ranked => verdict(2.0, ANY),
+            Depth::Parallel { .. } => (0.0, component_of(side)),
+            Depth::Perspective { .. } if outside > margin => (0.0, component_of(side)),
+            Depth::Perspective { .. } if !ranked => (2.0, ANY),
             Depth::Perspective { plane, pixels: scale } => {
                 let depth = self.nearest_depth(corners, margin, plane, frame);
                 let excess = length * scale / (pixels.max(f64::MIN_POSITIVE) * depth) / STEP;
-                verdict(excess.clamp(1.0 + f64::EPSILON, f64::MAX), ANY)
+                (excess.clamp(1.0 + f64::EPSILON, f64::MAX), ANY)
+            }
+        };
+        Verdict { excess, slack, component }
+    }
+
+    /// The depth up to which an error of this length looks larger than `pixels`, and the plane that depths are measured from.
+    fn depth_limit(&self, frame: &Frame, length: f64, pixels: f64) -> Option<(&Plane, f64)> {
+        match &self.depth {
+            Depth::Parallel { .. } => None,
+            Depth::Perspective { plane, pixels: scale } => {
+                Some((plane, (length * scale / pixels).min(2.0 * self.deepest(frame))))
             }
         }
     }
@@ -107,8 +113,8 @@ impl Camera {
         rows.least_by(threshold)
     }
 
-    /// The nearest depth at which a tetrahedron is seen, on a fixed scale: the same for all tetrahedra, so that a larger error
-    /// at the same place is never the less urgent.
+    /// The nearest depth at which a tetrahedron is seen, on a fixed scale: the same for all tetrahedra, so that a
+    /// larger error at the same place never has a smaller excess.
     fn nearest_depth(&self, corners: &[DVec3; 4], margin: f64, plane: &Plane, frame: &Frame) -> f64 {
         let deepest = self.deepest(frame);
         let at = |step: usize| deepest * power(step);
@@ -121,7 +127,7 @@ impl Camera {
         at(near)
     }
 
-    /// No point of the domain is further away, and the camera need not be inside.
+    /// An upper bound of the depth of all points of the domain; the camera may be outside.
     fn deepest(&self, frame: &Frame) -> f64 {
         match &self.depth {
             Depth::Perspective { plane, .. } => (2.0 * frame.reach - plane.offset).max(frame.reach),
@@ -129,12 +135,19 @@ impl Camera {
         }
     }
 
-    /// How far a side of the pyramid of vision, by its number, or with number 4 the depth up to which errors look large, is from
-    /// that of another camera; in the unit of [`Camera::distance`].
-    pub fn turned(&self, pixels: f64, before: &Self, before_pixels: f64, frame: &Frame, side: usize) -> f64 {
+    /// The distance between the same side of two view frustums, by its number, or with number 4 between the depths up
+    /// to which errors look large; in the unit of [`Camera::distance`].
+    pub fn component_distance(
+        &self,
+        pixels: f64,
+        before: &Self,
+        before_pixels: f64,
+        frame: &Frame,
+        side: usize,
+    ) -> f64 {
         match (self.sides.get(side), before.sides.get(side)) {
             (Some(a), Some(b)) => a.turn(b, nearest(frame)),
-            _ => self.depth_turned(pixels, before, before_pixels, frame),
+            _ => self.depth_distance(pixels, before, before_pixels, frame),
         }
     }
 
@@ -143,12 +156,12 @@ impl Camera {
     /// middle less than others.
     pub fn distance(&self, pixels: f64, other: &Self, other_pixels: f64, frame: &Frame) -> f64 {
         let sides = self.sides.iter().zip(&other.sides);
-        let turned = sides.fold(0.0, |m: f64, (a, b)| m.max(a.turn(b, nearest(frame))));
-        turned.max(self.depth_turned(pixels, other, other_pixels, frame))
+        let by_sides = sides.fold(0.0, |m: f64, (a, b)| m.max(a.turn(b, nearest(frame))));
+        by_sides.max(self.depth_distance(pixels, other, other_pixels, frame))
     }
 
-    /// The same for the functions that tell by the depth whether an error looks large.
-    fn depth_turned(&self, pixels: f64, other: &Self, other_pixels: f64, frame: &Frame) -> f64 {
+    /// The same for the depth up to which errors look large.
+    fn depth_distance(&self, pixels: f64, other: &Self, other_pixels: f64, frame: &Frame) -> f64 {
         match (&self.depth, &other.depth) {
             (Depth::Perspective { plane: a, pixels: p }, Depth::Perspective { plane: b, pixels: q }) => {
                 // A limit is the error's length times such a scale, or twice the largest depth where that is less.
@@ -174,7 +187,7 @@ impl Camera {
     }
 }
 
-/// Points nearer to the middle of the domain are taken to be so far from it.
+/// The least distance from the middle of the domain that movements are relative to.
 fn nearest(frame: &Frame) -> f64 {
     0.5 * frame.reach
 }

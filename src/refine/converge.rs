@@ -1,43 +1,43 @@
-//! The way to a request without a tight budget: what violates it is refined, what nothing asks for is undone.
+//! Refinement without a tight budget: violations are refined, updates that nothing needs are undone.
 
-use super::front::{Asked, Front, GoOn, Task};
+use super::front::{Front, GoOn, Task, Violation};
 use super::look::{Open, TetErrors};
-use super::{TetLook, Verdict};
+use super::{TetData, Verdict};
 use crate::mt::{Applied, ApplyUpdates, CurrentMesh, MAX_QUARTERINGS, UpdateError, UpdateId};
 
-/// What came of the wish to apply an update with all that it depends on.
+/// The result of forcing an update.
 pub(super) enum Forced {
     /// It is applied.
     Applied,
-    /// It depends on an update that is not here. These others have been applied on the way to it.
+    /// It depends on an update that has not arrived. The others listed here have been applied.
     Awaits(UpdateId, Vec<UpdateId>),
 }
 
-/// How far [`Front::converge`] has come.
+/// The state of [`Front::converge`].
 pub(super) enum Way {
-    /// All the way.
+    /// Finished.
     Done,
-    /// It was told to stop.
+    /// Stopped by the caller.
     Paused,
     /// The budget is exceeded.
     Full,
 }
 
-/// Tetrahedra that are judged together.
+/// Tetrahedra that are evaluated together.
 const AT_ONCE: usize = 64;
 
-/// A violation that lasts so long need not be outdone by another one.
+/// With a violation of so much slack, the search for a longer one ends.
 const LONG: f64 = 1.0 / 16.0;
 
 impl Front {
-    /// Refines until no tetrahedron violates the criterion, and undoes what nothing asks for: afterwards, or first if there is a
-    /// budget. Then what is left is asked for, and the mesh only grows to what it is in the end.
+    /// Refines until no tetrahedron violates the criterion, and undoes unneeded updates: afterwards, or first if there
+    /// is a budget, so that the mesh then only grows.
     pub(super) fn converge(
         &mut self,
         task: &mut Task<'_, impl ApplyUpdates>,
         go_on: GoOn<'_>,
     ) -> Result<Way, UpdateError> {
-        self.watch_all(task.mt);
+        self.track_all(task.mt);
         if !task.budget.is_unlimited() {
             while let Some(u) = self.leaves.next().map(UpdateId) {
                 self.coarsen_unless_needed(task, u)?;
@@ -47,23 +47,27 @@ impl Front {
             }
         }
         loop {
-            while let Some(asked) = self.next_asked(task) {
-                if self.contains(asked.update) {
+            while let Some(violation) = self.next_violation(task) {
+                if self.contains(violation.update) {
                     continue;
                 }
-                // Between two steps holes are filled, and what was asked by then has moved.
-                if self.is_removed_by(task.mt, asked.tet, asked.update) {
-                    task.mt.start_at(&mut self.mesh, asked.tet);
+                // Packing between two steps may have moved the tetrahedron.
+                if self.is_removed_by(task.mt, violation.tet, violation.update) {
+                    task.mt.start_at(&mut self.mesh, violation.tet);
                 }
-                match self.force(task, asked.update)? {
-                    // It is a leaf now; those that it forced are none.
+                match self.force(task, violation.update)? {
+                    // It is a leaf now; the updates that it forced are not.
                     Forced::Applied => {
-                        self.leaves.defer(asked.update.0, asked.verdict.slack, asked.verdict.dial);
+                        self.leaves.defer(
+                            violation.update.0,
+                            violation.verdict.slack,
+                            violation.verdict.component,
+                        );
                     }
-                    // Nothing may ask for what was forced in vain.
+                    // The updates forced in vain may be unneeded.
                     Forced::Awaits(absent, forced) => {
                         forced.iter().for_each(|u| self.leaves.open(u.0));
-                        self.awaiting.insert((absent.0, asked.tet));
+                        self.awaiting.insert((absent.0, violation.tet));
                     }
                 }
                 self.open_touched();
@@ -81,12 +85,12 @@ impl Front {
         }
     }
 
-    /// Makes sure that everything is either judged or going to be.
-    fn watch_all(&mut self, mt: &impl ApplyUpdates) {
-        if self.watched {
+    /// Schedules the whole mesh for evaluation, unless it is tracked already.
+    fn track_all(&mut self, mt: &impl ApplyUpdates) {
+        if self.tracked {
             return;
         }
-        self.forget_watch();
+        self.untrack();
         for t in 0..self.mesh.tet_slots() as u32 {
             self.tets.open(t);
         }
@@ -95,12 +99,12 @@ impl Front {
                 self.leaves.open(u.0);
             }
         }
-        self.watched = true;
+        self.tracked = true;
     }
 
-    /// The next update that a tetrahedron asks for. All open tetrahedra are judged before the first one is forced, so that
-    /// those which several updates change are judged once.
-    fn next_asked(&mut self, task: &mut Task<'_, impl ApplyUpdates>) -> Option<Asked> {
+    /// The next violation. All due tetrahedra are evaluated before the first update is forced, so that those that
+    /// several updates change are evaluated once.
+    fn next_violation(&mut self, task: &mut Task<'_, impl ApplyUpdates>) -> Option<Violation> {
         if self.pending.is_empty() && !self.tets.is_settled() {
             if task.criterion.is_batched() {
                 self.judge_batch(task);
@@ -108,14 +112,13 @@ impl Front {
                 self.tets.sort();
                 self.judge_open(task);
             }
-            // Parents have smaller numbers: in this order few updates are forced by others that wait too.
-            self.pending.sort_unstable_by_key(|asked| std::cmp::Reverse(asked.update));
+            // Parents have smaller numbers: in this order few pending updates are forced by others.
+            self.pending.sort_unstable_by_key(|violation| std::cmp::Reverse(violation.update));
         }
         self.pending.pop()
     }
 
-    /// Judges all open tetrahedra, some at a time: what they need is fetched from all over the memory for all of them before
-    /// the first is judged.
+    /// Evaluates all due tetrahedra in groups: fetching the data of a group first hides memory latency.
     fn judge_open(&mut self, task: &mut Task<'_, impl ApplyUpdates>) {
         let mut fetched = Vec::with_capacity(AT_ONCE);
         while !self.tets.is_settled() {
@@ -128,7 +131,7 @@ impl Front {
         }
     }
 
-    /// Takes at most so many open tetrahedra to be judged, in place of those in `fetched`.
+    /// Replaces `fetched` by at most so many due tetrahedra.
     fn fetch_open<'a>(
         &mut self,
         task: &mut Task<'a, impl ApplyUpdates>,
@@ -139,7 +142,7 @@ impl Front {
         while fetched.len() < most {
             let Some(t) = self.tets.next() else { break };
             let Some(tet) = self.mesh.tet(t) else { continue };
-            // If its update is not here, it is judged when that arrives.
+            // If its update has not arrived, the tetrahedron is evaluated when that arrives.
             let Some(update) = task.mt.remover(&self.mesh, t) else {
                 let awaited = task.mt.awaited(&self.mesh, t);
                 self.awaiting.extend(awaited.map(|u| (u.0, t)));
@@ -153,21 +156,21 @@ impl Front {
     }
 
     fn take_verdict(&mut self, tet: u32, update: UpdateId, verdict: Verdict) {
-        if verdict.asks() {
-            self.pending.push(Asked { update, tet, verdict });
+        if verdict.violates() {
+            self.pending.push(Violation { update, tet, verdict });
         } else {
-            self.tets.defer(tet, verdict.slack, verdict.dial);
+            self.tets.defer(tet, verdict.slack, verdict.component);
         }
     }
 
-    /// Judges all open tetrahedra at once.
+    /// Evaluates all due tetrahedra at once.
     fn judge_batch(&mut self, task: &mut Task<'_, impl ApplyUpdates>) {
         let mut fetched = Vec::new();
         self.fetch_open(task, usize::MAX, &mut fetched);
         let mesh = &self.mesh;
         let levels: Vec<_> =
             fetched.iter().map(|open| move |f: usize| open.tet.map(|v| mesh.levels(v)[f])).collect();
-        let looks: Vec<TetLook<'_>> =
+        let looks: Vec<TetData<'_>> =
             fetched.iter().zip(&levels).map(|(open, levels)| open.look(levels)).collect();
         let verdicts = task.criterion.judge_all(&looks);
         for (open, verdict) in fetched.iter().zip(verdicts) {
@@ -175,7 +178,7 @@ impl Front {
         }
     }
 
-    /// Undoes an update that nothing asks for and none depends on; tells whether it did.
+    /// Undoes an update that nothing needs and none depends on; returns whether it did.
     fn coarsen_unless_needed(
         &mut self,
         task: &mut Task<'_, impl ApplyUpdates>,
@@ -186,20 +189,20 @@ impl Front {
         }
         task.outcome.judged += 1;
         match self.need(task, u, false)? {
-            // It is looked at again when the child that is in the way is undone.
+            // It is evaluated again when the blocking child is undone.
             None => Ok(false),
-            Some(verdict) if verdict.asks() => {
-                self.leaves.defer(u.0, verdict.slack, verdict.dial);
+            Some(verdict) if verdict.violates() => {
+                self.leaves.defer(u.0, verdict.slack, verdict.component);
                 Ok(false)
             }
             Some(verdict) => {
                 self.coarsen(task, u)?;
                 self.open_parents(task.mt);
-                // What has come back has just been judged.
+                // The restored tetrahedra have just been evaluated.
                 for i in 0..self.mesh.touched().len() {
                     let t = self.mesh.touched()[i];
                     if self.mesh.tet(t).is_some() {
-                        self.tets.defer(t, verdict.slack, verdict.dial);
+                        self.tets.defer(t, verdict.slack, verdict.component);
                     }
                 }
                 self.mesh.clear_touched();
@@ -208,14 +211,14 @@ impl Front {
         }
     }
 
-    /// The updates that created the tetrahedra which have come back may have no children any more.
+    /// The creators of the restored tetrahedra may have no children any more.
     fn open_parents(&mut self, mt: &impl ApplyUpdates) {
         let Self { mesh, leaves, .. } = self;
         creators_of_touched(mesh, mt).for_each(|parent| leaves.open(parent.0));
     }
 
     pub(super) fn open_touched(&mut self) {
-        if self.watched {
+        if self.tracked {
             for i in 0..self.mesh.touched().len() {
                 self.tets.open(self.mesh.touched()[i]);
             }
@@ -223,8 +226,8 @@ impl Front {
         self.mesh.clear_touched();
     }
 
-    /// What the criterion says of the tetrahedra that an applied update removed, taken together: it is there for its own
-    /// sake if one of them asks for it. None if a child is in the way.
+    /// The verdict on all tetrahedra that an applied update removed: the update is needed if one of them violates the
+    /// criterion. None if a child blocks it.
     pub(super) fn need(
         &mut self,
         task: &Task<'_, impl ApplyUpdates>,
@@ -239,16 +242,16 @@ impl Front {
         let mut look = |corners: &[[i32; 3]; 4], levels: &dyn Fn(usize) -> [i32; 4], own: u8| {
             let of_own = all_errors.get(usize::from(own)).and_then(Option::as_ref).or(all_errors[0].as_ref());
             let Some(TetErrors { largest, by_field }) = of_own else { return false };
-            let look = TetLook { corners, levels, error: *largest, errors: by_field, update: u };
+            let look = TetData { corners, levels, error: *largest, errors: by_field, update: u };
             let one = if ranked { task.criterion.rank(&look) } else { task.criterion.judge(&look) };
             all = all.or(one);
-            !ranked && one.asks() && one.slack > LONG
+            !ranked && one.violates() && one.slack > LONG
         };
         let looked = task.mt.look_at_removed(&mut self.mesh, u, &mut look)?;
         Ok((looked == Applied::Done).then_some(all))
     }
 
-    /// Applies `u` and all that it depends on, unless something of that is not here.
+    /// Applies `u` and the updates that it depends on, unless one of them has not arrived.
     pub(super) fn force(
         &mut self,
         task: &mut Task<'_, impl ApplyUpdates>,
@@ -291,7 +294,7 @@ impl Front {
     }
 }
 
-/// The updates that created the tetrahedra just changed, as often as they did.
+/// The creators of the tetrahedra just changed, with repetitions.
 pub(super) fn creators_of_touched<'a>(
     mesh: &'a CurrentMesh,
     mt: &'a impl ApplyUpdates,

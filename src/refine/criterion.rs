@@ -1,4 +1,4 @@
-//! Is this tetrahedron fine enough? Functions of a tetrahedron and the error that its removal has.
+//! LOD criteria: functions of a tetrahedron and its error.
 
 use super::camera::Camera;
 use super::palette::Palette;
@@ -13,12 +13,12 @@ use std::sync::Arc;
 
 /// A tetrahedron of the MT as criteria see it.
 #[derive(Clone, Copy)]
-pub struct TetLook<'a> {
-    /// Positions of its corners on the lattice, in any positive order: what a criterion says must not depend on which.
+pub struct TetData<'a> {
+    /// Positions of its corners on the lattice, in any positive order: verdicts must not depend on which.
     pub corners: &'a [[i32; 3]; 4],
     /// Levels of a field at its corners.
     pub levels: &'a dyn Fn(usize) -> [i32; 4],
-    /// Its error, the largest one of all fields: that of the update that removes it, or what the MT knows of its own.
+    /// Its error, the largest one of all fields: that of the update that removes it, or its own error.
     pub error: ErrorCode,
     /// The same for each field.
     pub errors: &'a [ErrorCode],
@@ -26,7 +26,7 @@ pub struct TetLook<'a> {
     pub update: UpdateId,
 }
 
-impl TetLook<'_> {
+impl TetData<'_> {
     /// Its error in one field, or the largest one of all.
     #[inline]
     pub fn error_of(&self, field: Option<usize>) -> ErrorCode {
@@ -34,45 +34,45 @@ impl TetLook<'_> {
     }
 }
 
-/// What a criterion says of a tetrahedron.
+/// The result of a criterion for a tetrahedron.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Verdict {
-    /// How often its error exceeds what is wanted there: above 1 it violates the request and the update that removes it has
-    /// to be applied; the larger, the more urgent under a budget.
+    /// Its error divided by the allowed error: above 1 the tetrahedron violates the request, and its remover has to be
+    /// applied. Under a budget, larger values come first.
     pub excess: f64,
     /// How far the criterion may move (see [`Criterion::distance`]) before the tetrahedron can begin or cease to violate it.
     /// Any smaller number is right as well.
     pub slack: f64,
-    /// Which movement counts: [`ANY`], or one of the criterion's own, up to [`DIALS`] - 1.
-    pub dial: u8,
+    /// The component of the movement that counts: [`ANY`], or one of the criterion's own, up to [`COMPONENTS`] - 1.
+    pub component: u8,
 }
 
 /// Any movement of the criterion.
 pub const ANY: u8 = 0;
-/// So many sorts of movement can be told apart.
-pub const DIALS: usize = 8;
-/// Planes of regions, and what a camera's picture ends at, move apart from each other: this and the next ones.
+/// The number of components of movement.
+pub const COMPONENTS: usize = 8;
+/// The components of the planes of regions and view frustums: this and the next ones.
 const PLANES: u8 = 1;
-const PLANE_DIALS: usize = 6;
-/// Tolerances do.
+const PLANE_COMPONENTS: usize = 6;
+/// The component of tolerances.
 const TOLERANCE: u8 = 7;
 
 impl Verdict {
-    /// What no criterion of the same kind will ever ask for.
-    pub const NEVER: Self = Self { excess: 0.0, slack: f64::INFINITY, dial: ANY };
+    /// A tetrahedron that no criterion of the same kind can violate.
+    pub const NEVER: Self = Self { excess: 0.0, slack: f64::INFINITY, component: ANY };
 
     /// Whether the tetrahedron violates the request.
     #[inline]
-    pub fn asks(self) -> bool {
+    pub fn violates(self) -> bool {
         self.excess > 1.0
     }
 
-    /// What two criteria say together, of which one violation is enough: that lasts as long as the last one, and begins with
-    /// the first.
+    /// The verdict of the union of two criteria: a violation lasts until both end, and begins when the first one
+    /// begins.
     #[inline]
     #[must_use]
     pub fn or(self, other: Self) -> Self {
-        match (self.asks(), other.asks()) {
+        match (self.violates(), other.violates()) {
             (true, false) => self,
             (false, true) => other,
             (false, false) if other.slack == f64::INFINITY && other.excess == 0.0 => self,
@@ -80,74 +80,74 @@ impl Verdict {
             (asks, _) => Self {
                 excess: self.excess.max(other.excess),
                 slack: if asks { self.slack.max(other.slack) } else { self.slack.min(other.slack) },
-                dial: if self.dial == other.dial { self.dial } else { ANY },
+                component: if self.component == other.component { self.component } else { ANY },
             },
         }
     }
 }
 
-/// Says where a mesh is wanted at what error. See [`crate::refine`] for what monotone means.
+/// Decides which tetrahedra violate a request. [`crate::refine`] defines *monotone*.
 pub trait Criterion: Any + fmt::Debug + Send + Sync {
-    /// Judges a tetrahedron. The result depends on nothing but `tet` and the criterion.
-    fn judge(&self, tet: &TetLook<'_>) -> Verdict;
+    /// Evaluates a tetrahedron. The result depends only on `tet` and the criterion.
+    fn judge(&self, tet: &TetData<'_>) -> Verdict;
 
-    /// [`Criterion::judge`] with an excess that tells how urgent a violation is, so that violations can be compared. Asked
-    /// for under a budget only, since it may cost more.
-    fn rank(&self, tet: &TetLook<'_>) -> Verdict {
+    /// [`Criterion::judge`] with an exact excess, by which violations can be compared. Called under a budget only,
+    /// since it may cost more.
+    fn rank(&self, tet: &TetData<'_>) -> Verdict {
         self.judge(tet)
     }
 
-    /// Judges many tetrahedra at once, each as [`Criterion::judge`] would; for criteria that are
+    /// Evaluates many tetrahedra at once, each as [`Criterion::judge`] does; for criteria that are
     /// [batched](Criterion::is_batched).
-    fn judge_all(&self, tets: &[TetLook<'_>]) -> Vec<Verdict> {
+    fn judge_all(&self, tets: &[TetData<'_>]) -> Vec<Verdict> {
         tets.iter().map(|tet| self.judge(tet)).collect()
     }
 
-    /// Whether many tetrahedra at once are much cheaper to judge than one by one.
+    /// Whether evaluating many tetrahedra at once is much cheaper than one by one.
     fn is_batched(&self) -> bool {
         false
     }
 
-    /// The errors asked for everywhere, if nothing else is asked for.
+    /// The tolerances, if the criterion is the same everywhere.
     fn uniform(&self) -> Option<Vec<Tolerance>> {
         None
     }
 
-    /// The field whose errors the criterion asks for, if it is one alone.
+    /// The field whose errors the criterion measures, if it is a single one.
     fn field(&self) -> Option<usize> {
         None
     }
 
-    /// The largest error that can be left anywhere where the error of the field is what is wanted, if that can be told.
+    /// The largest tolerance of the field's error; [`ErrorCode::MAX`] if unknown.
     fn tolerance(&self) -> ErrorCode {
         ErrorCode::MAX
     }
 
-    /// Whether the criterion is monotone. One that is not is answered from the base mesh each time.
+    /// Whether the criterion is monotone. Others are refined from the base mesh each time.
     fn is_monotone(&self) -> bool {
         true
     }
 
-    /// How far this criterion is from the one that was in force before, in the unit of [`Verdict::slack`]. Infinity is always
-    /// right, and makes every tetrahedron be judged again.
+    /// The distance of this criterion from the one before, in the unit of [`Verdict::slack`]. Infinity is always
+    /// correct; every tetrahedron is then evaluated again.
     fn distance(&self, before: &dyn Criterion) -> f64 {
         let _ = before;
         f64::INFINITY
     }
 
-    /// The part of that distance which counts for verdicts of one [`Verdict::dial`].
-    fn turned(&self, before: &dyn Criterion, dial: u8) -> f64 {
-        let _ = dial;
+    /// One component of that distance, for verdicts with this [`Verdict::component`].
+    fn component_distance(&self, before: &dyn Criterion, component: u8) -> f64 {
+        let _ = component;
         self.distance(before)
     }
 }
 
-/// An error that is asked for.
+/// The allowed error of a field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Tolerance {
-    /// Of which field; of all of them if none.
+    /// The field; all of them if none.
     pub field: Option<usize>,
-    /// The error that is good enough.
+    /// The largest allowed error.
     pub error: ErrorCode,
 }
 
@@ -176,9 +176,9 @@ pub(super) struct Frame {
     pub displacement: f64,
     /// Updates of the MT.
     updates: f64,
-    /// By how much regions are widened for the first update beyond what its error demands. It falls to 0 for the last one, by
-    /// more than rounding can amount to from one update to the next: parents have smaller numbers than their children, so
-    /// what is asked for is asked for in spite of rounding wherever a child is.
+    /// By how much regions are widened for the first update beyond its error. It falls to 0 for the last one, by more
+    /// than the rounding error from each update to the next. Parents have smaller numbers than their children, so
+    /// rounding cannot select a child without its parent.
     guard: f64,
 }
 
@@ -217,22 +217,22 @@ impl Frame {
 
     /// How far from a region a tetrahedron may be and still count: as far as its error may have displaced it.
     #[inline]
-    pub fn margin(&self, tet: &TetLook<'_>) -> f64 {
+    pub fn margin(&self, tet: &TetData<'_>) -> f64 {
         tet.error.error() * self.displacement + self.guard * (1.0 - f64::from(tet.update.0) / self.updates)
     }
 }
 
-/// One need, with what it compares worked out. A need with several ranges of values becomes several atoms.
+/// A part of a need, prepared for evaluation. A need with several ranges of values becomes several atoms.
 #[derive(Clone, Debug)]
 struct Atom {
     /// The field whose error counts, if it is not the largest one of all.
     field: Option<usize>,
-    ask: Ask,
+    measure: Measure,
 }
 
-/// What an atom asks for.
+/// The quantity that an atom bounds.
 #[derive(Clone, Debug)]
-enum Ask {
+enum Measure {
     Field(FieldAtom),
     View { pixels: f64, camera: Camera },
     Transfer { error: f64, palette: Palette },
@@ -258,8 +258,8 @@ struct Range {
     levels: f64,
 }
 
-/// The smallest error that a ratio is taken with: below the smallest one that can be stored, so that any error violates an
-/// error of 0.
+/// The smallest divisor of an excess: below the smallest error that can be stored, so that any error violates an error
+/// of 0.
 const LEAST_ERROR: f64 = 1.0 / (1_u64 << 26) as f64;
 
 /// A scale on which a factor of 2 is a distance of [`OCTAVE`], without a logarithm: exact at powers of 2, linear between them.
@@ -269,8 +269,8 @@ pub(super) fn octaves(x: f64) -> f64 {
 }
 
 impl LodCriterion {
-    /// The criterion of `request` for an MT. A field that is not there is the caller's to refuse, and the budget is another
-    /// matter.
+    /// The criterion of `request` for an MT. The caller checks that its fields exist; the budget is not part of the
+    /// criterion.
     pub fn new(info: &MtInfo, request: &Request) -> Self {
         let frame = Frame::new(info);
         let monotone = !request.needs.iter().any(|need| matches!(need.part, Part::Both(..)));
@@ -278,7 +278,7 @@ impl LodCriterion {
         Self { frame, atoms, custom: Vec::new(), monotone }
     }
 
-    /// Adds a need that a criterion of the caller's own tells.
+    /// Adds a criterion of the caller's own to the union.
     #[must_use]
     pub fn and(mut self, custom: Arc<dyn Criterion>) -> Self {
         self.monotone &= custom.is_monotone();
@@ -287,7 +287,7 @@ impl LodCriterion {
     }
 
     #[inline]
-    fn union(&self, tet: &TetLook<'_>, ranked: bool) -> Verdict {
+    fn union(&self, tet: &TetData<'_>, ranked: bool) -> Verdict {
         let corners = self.frame.place(tet.corners);
         let mut union = Verdict::NEVER;
         for atom in &self.atoms {
@@ -304,8 +304,8 @@ fn atoms(info: &MtInfo, frame: &Frame, need: &Need) -> Vec<Atom> {
     let tolerance = ErrorCode::at_most(need.error);
     // A single field's error is the largest.
     let error_of = |field: Option<usize>| field.filter(|_| info.fields.len() > 1);
-    let atom = |ask: Ask| Atom { field: error_of(need.measured_field()), ask };
-    let field = |shape: Option<Shape>, values| atom(Ask::Field(FieldAtom { tolerance, shape, values }));
+    let atom = |measure: Measure| Atom { field: error_of(need.measured_field()), measure };
+    let field = |shape: Option<Shape>, values| atom(Measure::Field(FieldAtom { tolerance, shape, values }));
     let ranges = |values: &Values| {
         let field = values.field.min(info.fields.len() - 1);
         let error_of = error_of(Some(field));
@@ -324,26 +324,28 @@ fn atoms(info: &MtInfo, frame: &Frame, need: &Need) -> Vec<Atom> {
             let shape = Shape::new(region, frame.middle);
             ranges(values).into_iter().map(|range| field(Some(shape.clone()), range)).collect()
         }
-        Part::View(view) => vec![atom(Ask::View { pixels: need.error, camera: Camera::new(view, frame) })],
+        Part::View(view) => {
+            vec![atom(Measure::View { pixels: need.error, camera: Camera::new(view, frame) })]
+        }
         Part::Transfer(transfer) => {
             let field = &info.fields[transfer.field.min(info.fields.len() - 1)];
-            vec![atom(Ask::Transfer { error: need.error, palette: Palette::new(transfer, field) })]
+            vec![atom(Measure::Transfer { error: need.error, palette: Palette::new(transfer, field) })]
         }
     }
 }
 
 impl Criterion for LodCriterion {
     #[inline]
-    fn judge(&self, tet: &TetLook<'_>) -> Verdict {
+    fn judge(&self, tet: &TetData<'_>) -> Verdict {
         self.union(tet, false)
     }
 
-    fn rank(&self, tet: &TetLook<'_>) -> Verdict {
+    fn rank(&self, tet: &TetData<'_>) -> Verdict {
         self.union(tet, true)
     }
 
-    fn judge_all(&self, tets: &[TetLook<'_>]) -> Vec<Verdict> {
-        let own = |tet: &TetLook<'_>| {
+    fn judge_all(&self, tets: &[TetData<'_>]) -> Vec<Verdict> {
+        let own = |tet: &TetData<'_>| {
             let corners = self.frame.place(tet.corners);
             let atoms = self.atoms.iter().map(|atom| atom.judge(&self.frame, tet, &corners, true));
             atoms.fold(Verdict::NEVER, Verdict::or)
@@ -360,8 +362,8 @@ impl Criterion for LodCriterion {
     }
 
     fn uniform(&self) -> Option<Vec<Tolerance>> {
-        let everywhere = |atom: &Atom| match atom.ask {
-            Ask::Field(FieldAtom { tolerance: error, shape: None, values: None }) => {
+        let everywhere = |atom: &Atom| match atom.measure {
+            Measure::Field(FieldAtom { tolerance: error, shape: None, values: None }) => {
                 Some(Tolerance { field: atom.field, error })
             }
             _ => None,
@@ -377,14 +379,16 @@ impl Criterion for LodCriterion {
     }
 
     fn tolerance(&self) -> ErrorCode {
-        let of = |atom: &Atom| if let Ask::Field(ask) = &atom.ask { Some(ask.tolerance) } else { None };
+        let of = |atom: &Atom| {
+            if let Measure::Field(measure) = &atom.measure { Some(measure.tolerance) } else { None }
+        };
         let unmeasured = if self.atoms.is_empty() { ErrorCode::ZERO } else { ErrorCode::MAX };
         let own = self.atoms.iter().filter_map(of).max().unwrap_or(unmeasured);
         self.custom.iter().fold(own, |largest, custom| largest.max(custom.tolerance()))
     }
 
-    /// One of the tetrahedra from which another was made meets the region and one takes a value of the range, but it need not
-    /// be the same one.
+    /// With region and values together, one of the tetrahedra that an update removes meets the region and one takes a
+    /// value of the range, but these may be different ones.
     fn is_monotone(&self) -> bool {
         self.monotone
     }
@@ -405,12 +409,14 @@ impl Criterion for LodCriterion {
         own.chain(custom).fold(0.0, f64::max)
     }
 
-    fn turned(&self, before: &dyn Criterion, dial: u8) -> f64 {
+    fn component_distance(&self, before: &dyn Criterion, component: u8) -> f64 {
         let any: &dyn Any = before;
         match any.downcast_ref::<Self>() {
-            Some(other) if dial != ANY && self.custom.is_empty() && self.atoms.len() == other.atoms.len() => {
+            Some(other)
+                if component != ANY && self.custom.is_empty() && self.atoms.len() == other.atoms.len() =>
+            {
                 let pairs = self.atoms.iter().zip(&other.atoms);
-                pairs.fold(0.0, |m, (a, b)| f64::max(m, a.turned(b, &self.frame, dial)))
+                pairs.fold(0.0, |m, (a, b)| f64::max(m, a.component_distance(b, &self.frame, component)))
             }
             _ => self.distance(before),
         }
@@ -418,40 +424,40 @@ impl Criterion for LodCriterion {
 }
 
 impl Atom {
-    // Once for all who ask: it is large.
+    // Not inlined: it is large.
     #[inline(never)]
-    fn judge(&self, frame: &Frame, tet: &TetLook<'_>, corners: &[DVec3; 4], ranked: bool) -> Verdict {
+    fn judge(&self, frame: &Frame, tet: &TetData<'_>, corners: &[DVec3; 4], ranked: bool) -> Verdict {
         let narrowed;
         let tet = if self.field.is_none() {
             tet
         } else {
-            narrowed = TetLook { error: tet.error_of(self.field), ..*tet };
+            narrowed = TetData { error: tet.error_of(self.field), ..*tet };
             &narrowed
         };
-        match &self.ask {
-            Ask::Field(atom) => atom.judge(frame, tet, corners),
-            Ask::View { pixels, camera } => camera.judge(frame, tet, corners, *pixels, ranked),
-            Ask::Transfer { error, palette } => {
+        match &self.measure {
+            Measure::Field(atom) => atom.judge(frame, tet, corners),
+            Measure::View { pixels, camera } => camera.judge(frame, tet, corners, *pixels, ranked),
+            Measure::Transfer { error, palette } => {
                 let change = palette.change(&(tet.levels)(palette.field), tet.error.error());
                 let (change, error) = (change, error.max(LEAST_ERROR));
                 if change <= 0.0 {
                     return Verdict::NEVER;
                 }
                 let slack = (octaves(change) - octaves(error)).abs();
-                Verdict { excess: change / error, slack, dial: ANY }
+                Verdict { excess: change / error, slack, component: ANY }
             }
         }
     }
 
-    /// The part of the distance that counts for one dial; not [`ANY`].
-    fn turned(&self, before: &Self, frame: &Frame, dial: u8) -> f64 {
+    /// One component of the distance; not [`ANY`].
+    fn component_distance(&self, before: &Self, frame: &Frame, component: u8) -> f64 {
         if self.field != before.field {
             return f64::INFINITY;
         }
-        match (&self.ask, &before.ask) {
-            (Ask::Field(a), Ask::Field(b)) => a.turned(b, frame, dial),
-            (Ask::View { pixels: p, camera: a }, Ask::View { pixels: q, camera: b }) => {
-                a.turned(*p, b, *q, frame, usize::from(dial - PLANES))
+        match (&self.measure, &before.measure) {
+            (Measure::Field(a), Measure::Field(b)) => a.component_distance(b, frame, component),
+            (Measure::View { pixels: p, camera: a }, Measure::View { pixels: q, camera: b }) => {
+                a.component_distance(*p, b, *q, frame, usize::from(component - PLANES))
             }
             _ => self.distance(before, frame),
         }
@@ -461,12 +467,14 @@ impl Atom {
         if self.field != before.field {
             return f64::INFINITY;
         }
-        match (&self.ask, &before.ask) {
-            (Ask::Field(a), Ask::Field(b)) => a.distance(b, frame),
-            (Ask::View { pixels: p, camera: a }, Ask::View { pixels: q, camera: b }) => {
+        match (&self.measure, &before.measure) {
+            (Measure::Field(a), Measure::Field(b)) => a.distance(b, frame),
+            (Measure::View { pixels: p, camera: a }, Measure::View { pixels: q, camera: b }) => {
                 a.distance(*p, b, *q, frame)
             }
-            (Ask::Transfer { error: e, palette: a }, Ask::Transfer { error: f, palette: b }) if a == b => {
+            (Measure::Transfer { error: e, palette: a }, Measure::Transfer { error: f, palette: b })
+                if a == b =>
+            {
                 (octaves(e.max(LEAST_ERROR)) - octaves(f.max(LEAST_ERROR))).abs()
             }
             _ => f64::INFINITY,
@@ -474,13 +482,13 @@ impl Atom {
     }
 }
 
-/// The dial of a plane.
-pub(super) fn dial_of(plane: Option<usize>) -> u8 {
-    plane.map_or(ANY, |plane| PLANES + (plane % PLANE_DIALS) as u8)
+/// The component of a plane.
+pub(super) fn component_of(plane: Option<usize>) -> u8 {
+    plane.map_or(ANY, |plane| PLANES + (plane % PLANE_COMPONENTS) as u8)
 }
 
-/// Errors have codes that are 2^11 to the octave. An octave is as much as sixteen ways through the domain: regions move often,
-/// tolerances seldom, and what waits for the one is not to be woken by the other.
+/// Errors have codes that are 2^11 to the octave. An octave is as much as sixteen ways through the domain: regions move
+/// often, tolerances seldom, and each has a component of its own.
 const CODES: f64 = 2048.0 / OCTAVE;
 const OCTAVE: f64 = 16.0;
 
@@ -490,7 +498,7 @@ fn octaves_between(a: ErrorCode, b: ErrorCode) -> f64 {
 
 impl FieldAtom {
     #[inline]
-    fn judge(&self, frame: &Frame, tet: &TetLook<'_>, corners: &[DVec3; 4]) -> Verdict {
+    fn judge(&self, frame: &Frame, tet: &TetData<'_>, corners: &[DVec3; 4]) -> Verdict {
         let exceeds = tet.error > self.tolerance;
         let mut conditions = Conditions::new();
         conditions.add(exceeds, octaves_between(tet.error, self.tolerance), TOLERANCE);
@@ -502,22 +510,22 @@ impl FieldAtom {
         if let Some(shape) = &self.shape {
             let margin = frame.margin(tet);
             let (outside, plane) = shape.least(corners, margin);
-            conditions.add(outside <= margin, (outside - margin).abs() / frame.reach, dial_of(plane));
+            conditions.add(outside <= margin, (outside - margin).abs() / frame.reach, component_of(plane));
         }
         if !conditions.all {
-            return Verdict { excess: 0.0, slack: conditions.missing, dial: conditions.dial };
+            return Verdict { excess: 0.0, slack: conditions.missing, component: conditions.component };
         }
         let excess = tet.error.error() / self.tolerance.error().max(LEAST_ERROR);
-        Verdict { excess, slack: conditions.held, dial: ANY }
+        Verdict { excess, slack: conditions.held, component: ANY }
     }
 
-    fn turned(&self, before: &Self, frame: &Frame, dial: u8) -> f64 {
-        if dial == TOLERANCE {
+    fn component_distance(&self, before: &Self, frame: &Frame, component: u8) -> f64 {
+        if component == TOLERANCE {
             return octaves_between(self.tolerance, before.tolerance);
         }
         match (&self.shape, &before.shape) {
             (Some(a), Some(b)) => {
-                a.approach(b, frame.half, usize::from(dial - PLANES), PLANE_DIALS) / frame.reach
+                a.approach(b, frame.half, usize::from(component - PLANES), PLANE_COMPONENTS) / frame.reach
             }
             _ => 0.0,
         }
@@ -537,33 +545,33 @@ impl FieldAtom {
             }
             _ => f64::INFINITY,
         };
-        // Sides at the same infinity differ by NaN, which `max` passes over.
+        // Sides at the same infinity differ by NaN, which `max` ignores.
         errors.max(shapes).max(values)
     }
 }
 
-/// Conditions that must all hold: how long that lasts, or how long until it can be.
+/// The conjunction of conditions, with its slack.
 struct Conditions {
     all: bool,
-    /// The least that any one which holds can lose.
+    /// The least slack of the conditions that hold.
     held: f64,
-    /// The most that any one which does not hold lacks, and what it waits for.
+    /// The largest slack of the conditions that do not hold, and its component.
     missing: f64,
-    dial: u8,
+    component: u8,
 }
 
 impl Conditions {
     fn new() -> Self {
-        Self { all: true, held: f64::INFINITY, missing: 0.0, dial: ANY }
+        Self { all: true, held: f64::INFINITY, missing: 0.0, component: ANY }
     }
 
     #[inline]
-    fn add(&mut self, holds: bool, slack: f64, dial: u8) {
+    fn add(&mut self, holds: bool, slack: f64, component: u8) {
         if holds {
             self.held = self.held.min(slack);
         } else {
             if self.all || slack > self.missing {
-                (self.missing, self.dial) = (slack, dial);
+                (self.missing, self.component) = (slack, component);
             }
             self.all = false;
         }

@@ -1,13 +1,12 @@
 //! Criteria of the caller's own.
 
-use super::{ANY, Criterion, TetLook, Verdict};
+use super::{ANY, Criterion, TetData, Verdict};
 use std::fmt;
 
-/// A criterion that a closure tells: how often the error of a tetrahedron exceeds what is wanted there (see
-/// [`Verdict::excess`]).
+/// A criterion from a closure that returns the excess of a tetrahedron (see [`Verdict::excess`]).
 ///
-/// Nobody knows how such a criterion changes from one request to the next, so everything is judged again each time; add it
-/// to other needs with [`LodCriterion::and`](super::LodCriterion::and).
+/// The change of such a criterion from one request to the next is unknown, so everything is evaluated again each time.
+/// Add it to other needs with [`LodCriterion::and`](super::LodCriterion::and).
 ///
 /// ```
 /// use tetralod::refine::Custom;
@@ -22,14 +21,14 @@ pub struct Custom<F> {
     monotone: bool,
 }
 
-impl<F: Fn(&TetLook<'_>) -> f64 + Send + Sync + 'static> Custom<F> {
-    /// A criterion that is answered from the base mesh each time, as any closure can be.
+impl<F: Fn(&TetData<'_>) -> f64 + Send + Sync + 'static> Custom<F> {
+    /// A criterion that is refined from the base mesh each time: correct for any closure.
     pub fn new(excess: F) -> Self {
         Self { excess, monotone: false }
     }
 
-    /// A criterion that the caller knows to be monotone (see [`crate::refine`]): it is answered from the mesh that is there.
-    /// If it is not, the mesh may depend on what was asked for before; it satisfies the criterion all the same.
+    /// A criterion that the caller knows to be monotone (see [`crate::refine`]): it is refined from the current mesh.
+    /// If it is not monotone, the mesh still satisfies it but may depend on earlier requests.
     pub fn monotone(excess: F) -> Self {
         Self { excess, monotone: true }
     }
@@ -41,11 +40,11 @@ impl<F> fmt::Debug for Custom<F> {
     }
 }
 
-impl<F: Fn(&TetLook<'_>) -> f64 + Send + Sync + 'static> Criterion for Custom<F> {
-    fn judge(&self, tet: &TetLook<'_>) -> Verdict {
+impl<F: Fn(&TetData<'_>) -> f64 + Send + Sync + 'static> Criterion for Custom<F> {
+    fn judge(&self, tet: &TetData<'_>) -> Verdict {
         let excess = (self.excess)(tet);
-        // NaN asks for nothing. As nobody knows how long that is so, it is looked at again with every change.
-        Verdict { excess: if excess > 0.0 { excess } else { 0.0 }, slack: 0.0, dial: ANY }
+        // NaN is no violation. The slack is unknown, so the tetrahedron is evaluated again after every change.
+        Verdict { excess: if excess > 0.0 { excess } else { 0.0 }, slack: 0.0, component: ANY }
     }
 
     fn is_monotone(&self) -> bool {

@@ -4,7 +4,7 @@ use super::converge::Way;
 use super::ranked::Ranked;
 use super::timing_wheel::TimingWheels;
 use super::uniform::Wanted;
-use super::{ANY, Budget, Criterion, DIALS, Verdict};
+use super::{ANY, Budget, COMPONENTS, Criterion, Verdict};
 use crate::mesh::BitSet;
 use crate::mt::{ApplyUpdates, BaseMeshError, CurrentMesh, ErrorCode, UpdateError, UpdateId};
 use std::collections::BTreeSet;
@@ -12,31 +12,30 @@ use std::sync::Arc;
 
 /// A consistent set of updates and its current mesh.
 ///
-/// [`Front::aim`] tells it what is wanted and [`Front::step`] brings it there, all at once or little by little;
-/// [`Front::satisfy`] does both. What comes out is the same as from the base mesh, whatever was asked for before. What it
-/// costs grows with the difference between the meshes, not with their size, as long as the request changes by little.
+/// [`Front::request`] sets the request and [`Front::step`] refines towards it, at once or in steps; [`Front::satisfy`]
+/// does both. The result is the same as from the base mesh, whatever was requested before. For small changes of the
+/// request, the cost grows with the difference between the meshes, not with their size.
 #[derive(Clone, Debug)]
 pub struct Front {
     pub(super) mesh: CurrentMesh,
     pub(super) applied: BitSet,
     pub(super) applied_count: u32,
-    /// How many updates of the MT the mesh knows of.
+    /// Number of updates of the MT that have been registered.
     pub(super) known: u32,
-    /// The least and the largest error of those that share [`CHUNK_WORDS`] words of `applied`: whole chunks are passed
-    /// over by these.
+    /// The least and the largest error of those that share [`CHUNK_WORDS`] words of `applied`: these allow whole chunks
+    /// to be skipped.
     pub(super) chunks: Vec<[ErrorCode; 2]>,
     pub(super) goal: Option<Goal>,
-    /// Whether `tets` and `leaves` account for the whole mesh.
-    pub(super) watched: bool,
-    /// Tetrahedra that do not violate the criterion, by when they may.
+    /// Whether `tets` and `leaves` cover the whole mesh.
+    pub(super) tracked: bool,
+    /// Tetrahedra that do not violate the criterion, with the end of their slack.
     pub(super) tets: TimingWheels,
-    /// Applied updates without applied children, by when nothing may ask for them any more; others that have got children
-    /// since among them.
+    /// Applied updates without applied children, with the end of their slack; some may have children by now.
     pub(super) leaves: TimingWheels,
-    /// Updates that tetrahedra ask for, the first one last, each with the tetrahedron and for how long that asks.
-    pub(super) pending: Vec<Asked>,
-    /// Updates that are not here but that something waits for, each with a tetrahedron: the update removes it, or what removes
-    /// it depends on the update.
+    /// Violations whose updates are still to be forced; the last one is next.
+    pub(super) pending: Vec<Violation>,
+    /// Awaited updates that have not arrived, each with a tetrahedron: the update removes it, or its remover depends on
+    /// the update.
     pub(super) awaiting: BTreeSet<(u32, u32)>,
     pub(super) ranked: Ranked,
 }
@@ -45,20 +44,20 @@ pub struct Front {
 pub(super) struct Goal {
     pub criterion: Arc<dyn Criterion>,
     pub budget: Budget,
-    /// Whether the front is there, as far as the MT is known.
+    /// Whether the goal is reached, as far as the MT has arrived.
     pub reached: bool,
-    /// The answer, once it is.
+    /// The outcome, once it is reached.
     pub outcome: Outcome,
 }
 
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Asked {
+pub(super) struct Violation {
     pub update: UpdateId,
     pub tet: u32,
     pub verdict: Verdict,
 }
 
-/// A goal on the way to it.
+/// The goal that is worked on, with its inputs.
 pub(super) struct Task<'a, M> {
     pub mt: &'a M,
     pub criterion: &'a dyn Criterion,
@@ -66,41 +65,41 @@ pub(super) struct Task<'a, M> {
     pub outcome: &'a mut Outcome,
 }
 
-/// What has been done on the way to a goal, and how good the mesh is.
+/// The work towards a goal, and the quality of the mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Outcome {
     /// Updates applied on the way.
     pub refined: u64,
-    /// Those of them that nothing asked for when they were applied, but an update that depends on them.
+    /// Those of them that were applied only because another update depends on them.
     pub forced: u64,
     /// Updates undone on the way.
     pub coarsened: u64,
-    /// Tetrahedra and updates that were judged on the way.
+    /// Tetrahedra and updates evaluated on the way.
     pub judged: u64,
-    /// Whether the front is where it was to go, as far as budget and data allow. The rest means something only then.
+    /// Whether the goal is reached, as far as budget and data allow. The fields below are meaningful only then.
     pub done: bool,
     /// The largest error left in the selected part, of the field that each need measures; [`ErrorCode::MAX`] where the
     /// criterion does not measure it so.
     pub error: ErrorCode,
-    /// How often the error exceeds what is wanted, at most; not above 1 if the request is satisfied.
+    /// The largest ratio of error to allowed error; not above 1 if the request is satisfied.
     pub excess: f64,
-    /// Whether the mesh is what was asked for; false when the budget did not allow it, or data is missing.
+    /// Whether the mesh satisfies the request; false when the budget did not allow it, or data is missing.
     pub satisfied: bool,
-    /// Whether data is missing: some tetrahedron violates the request as far as is known, and what may remove it is not here.
+    /// Whether data is missing: some tetrahedron may violate the request, and its remover has not arrived.
     pub missing: bool,
 }
 
-/// Words of the set of applied updates whose errors are summed up.
+/// Words of the set of applied updates in a chunk.
 pub(super) const CHUNK_WORDS: usize = 8;
 
-/// A bound on what [`Front::step`] does: told of what has been done so far, says whether to go on.
+/// Decides after each update whether [`Front::step`] continues, given the work so far.
 pub type GoOn<'a> = &'a mut dyn FnMut(&Outcome) -> bool;
 
 impl Front {
     /// The base mesh of `mt`: no update applied.
     ///
     /// # Errors
-    /// If the base mesh is not a valid mesh, or does not fit its description.
+    /// If the base mesh is not valid, or does not fit its description.
     pub fn new(mt: &impl ApplyUpdates) -> Result<Self, BaseMeshError> {
         Ok(Self {
             mesh: mt.start()?,
@@ -109,7 +108,7 @@ impl Front {
             known: 0,
             chunks: Vec::new(),
             goal: None,
-            watched: false,
+            tracked: false,
             tets: TimingWheels::default(),
             leaves: TimingWheels::default(),
             pending: Vec::new(),
@@ -123,7 +122,7 @@ impl Front {
         &self.mesh
     }
 
-    /// The current mesh, for what changes nothing but its records, like taking the list of changes.
+    /// The current mesh, for taking its list of changes.
     pub(crate) fn mesh_mut(&mut self) -> &mut CurrentMesh {
         &mut self.mesh
     }
@@ -144,8 +143,8 @@ impl Front {
         self.mesh.tet(t).is_some() && mt.remover(&self.mesh, t) == Some(u)
     }
 
-    /// Heap bytes of the queues that say what has to be judged again, and of the set of applied updates: entries that are there,
-    /// not what is reserved for more. The mesh itself has [`CurrentMesh::bytes`].
+    /// Heap bytes in use by the queues and the set of applied updates, without reserved capacity. The mesh itself has
+    /// [`CurrentMesh::bytes`].
     pub fn queue_bytes(&self) -> u64 {
         let own = size_of_val(self.applied.words())
             + size_of_val(&self.pending[..])
@@ -158,19 +157,19 @@ impl Front {
     /// fits, but never below the base mesh.
     ///
     /// # Errors
-    /// If the MT turns out to be damaged. The mesh is then valid still, but no answer to the request.
+    /// If the MT is damaged. The mesh is still valid, but does not satisfy the request.
     pub fn satisfy(
         &mut self,
         mt: &impl ApplyUpdates,
         criterion: &(impl Criterion + Clone),
         budget: Budget,
     ) -> Result<Outcome, UpdateError> {
-        self.aim(mt, Arc::new(criterion.clone()), budget);
+        self.request(mt, Arc::new(criterion.clone()), budget);
         self.step(mt, &mut |_| true)
     }
 
-    /// Tells what is wanted from now on. Nothing moves before [`Front::step`].
-    pub fn aim(&mut self, mt: &impl ApplyUpdates, criterion: Arc<dyn Criterion>, budget: Budget) {
+    /// Sets the request. The mesh does not change before [`Front::step`].
+    pub fn request(&mut self, mt: &impl ApplyUpdates, criterion: Arc<dyn Criterion>, budget: Budget) {
         let before = self.goal.take();
         let distance = before.as_ref().map_or(f64::INFINITY, |goal| criterion.distance(&*goal.criterion));
         match before {
@@ -178,63 +177,67 @@ impl Front {
             before => {
                 let keeps = criterion.is_monotone() && !mt.has_tet_errors();
                 let known = before.as_ref().filter(|_| keeps).map(|goal| &*goal.criterion);
-                self.move_watch(distance, &*criterion, known);
+                self.advance_tracking(distance, &*criterion, known);
                 self.ranked.clear();
                 let outcome = Outcome::default();
                 self.goal = Some(Goal { criterion, budget, reached: false, outcome });
             }
         }
-        self.learn(mt);
+        self.sync(mt);
     }
 
-    /// The criterion has moved: verdicts whose slack is used up are void; all of them, if they were not for one from which
-    /// the way leads on.
-    fn move_watch(&mut self, distance: f64, criterion: &dyn Criterion, before: Option<&dyn Criterion>) {
-        // Those judged for the last goal only.
-        for asked in std::mem::take(&mut self.pending) {
-            self.tets.open(asked.tet);
+    /// Makes verdicts due whose slack the movement of the criterion has used up; all of them, if `before` is no earlier
+    /// criterion to move from.
+    fn advance_tracking(&mut self, distance: f64, criterion: &dyn Criterion, before: Option<&dyn Criterion>) {
+        // These verdicts were for the last goal.
+        for violation in std::mem::take(&mut self.pending) {
+            self.tets.open(violation.tet);
         }
         match before {
-            Some(before) if self.watched && distance.is_finite() => {
-                for dial in 0..DIALS as u8 {
-                    let moved =
-                        if dial == ANY { distance } else { criterion.turned(before, dial).min(distance) };
-                    self.tets.advance(moved, dial);
-                    self.leaves.advance(moved, dial);
+            Some(before) if self.tracked && distance.is_finite() => {
+                for component in 0..COMPONENTS as u8 {
+                    let moved = if component == ANY {
+                        distance
+                    } else {
+                        criterion.component_distance(before, component).min(distance)
+                    };
+                    self.tets.advance(moved, component);
+                    self.leaves.advance(moved, component);
                 }
             }
-            _ => self.forget_watch(),
+            _ => self.untrack(),
         }
     }
 
-    pub(super) fn forget_watch(&mut self) {
-        self.watched = false;
+    pub(super) fn untrack(&mut self) {
+        self.tracked = false;
         self.tets.clear();
         self.leaves.clear();
         self.pending.clear();
         self.awaiting.clear();
     }
 
-    /// Goes on towards what [`Front::aim`] was told, until it is reached or `go_on` says no; that is asked after every update
-    /// with those that it depends on. Without a goal nothing happens. The mesh is packed and within the budget afterwards.
+    /// Refines towards the request until it is reached or `go_on` returns false; that is called after every update
+    /// together with those that it depends on. Does nothing without a request. The mesh is packed and within the budget
+    /// afterwards.
     ///
-    /// What is reached does not depend on the steps. On the way there the mesh is refined first, the coarsest parts before
-    /// the others, and coarsened then; under a budget the other way round.
+    /// The result does not depend on the steps. The mesh is first refined, the coarsest parts before the others, and
+    /// then coarsened; under a budget the other way round.
     ///
     /// # Errors
     /// As [`Front::satisfy`].
     pub fn step(&mut self, mt: &impl ApplyUpdates, go_on: GoOn<'_>) -> Result<Outcome, UpdateError> {
-        self.learn(mt);
+        self.sync(mt);
         let Some(mut goal) = self.goal.take() else { return Ok(Outcome::default()) };
-        // What was done for an earlier call does not count again.
+        // The work of an earlier call is not counted again.
         let answer = Outcome { refined: 0, forced: 0, coarsened: 0, judged: 0, ..goal.outcome };
         goal.outcome = if goal.reached { answer } else { Outcome::default() };
         if !goal.reached {
             let moved = self.go(mt, &mut goal, go_on);
             self.pack();
             if let Err(error) = moved {
-                // The state is unspecified after an error: the next goal judges everything again.
-                self.forget_watch();
+                // The state is unspecified after an error: everything is evaluated again for the next goal.
+                self.untrack();
                 self.ranked.clear();
                 return Err(error);
             }
@@ -247,7 +250,7 @@ impl Front {
         Ok(outcome)
     }
 
-    /// Fills the holes of the mesh; what moves is judged again where it is then.
+    /// Packs the mesh; the tetrahedra that move are evaluated again.
     fn pack(&mut self) {
         self.mesh.clear_touched();
         self.mesh.compact();
@@ -255,25 +258,25 @@ impl Front {
         self.open_touched();
     }
 
-    /// Whether the goal is reached is noted in it.
+    /// Works on a goal, and sets whether it is reached.
     fn go(&mut self, mt: &impl ApplyUpdates, goal: &mut Goal, go_on: GoOn<'_>) -> Result<(), UpdateError> {
         let Goal { criterion, budget, outcome, .. } = goal;
-        // Where updates may make the mesh smaller, several thresholds fit a budget with larger ones between them: only
-        // from the base mesh is the first one found for sure.
+        // If updates may make the mesh smaller, a budget may fit several thresholds with others between them: only a
+        // start from the base mesh surely finds the first one.
         let is_monotone = criterion.is_monotone() && !mt.has_tet_errors();
         let restarts = !is_monotone || !budget.is_unlimited() && !mt.always_grows();
-        if restarts && !self.watched && !self.ranked.is_running() {
+        if restarts && !self.tracked && !self.ranked.is_running() {
             self.coarsen_all(mt, outcome)?;
         }
-        // Errors of updates say what is wanted as long as tetrahedra have none of their own.
+        // Without own errors of tetrahedra, the errors of updates decide.
         let uniform = criterion.uniform().filter(|_| budget.is_unlimited() && !mt.has_tet_errors());
         let mut task = Task { mt, criterion: &**criterion, budget: *budget, outcome };
         let done = match uniform {
             Some(tolerances) => {
-                self.forget_watch();
+                self.untrack();
                 self.satisfy_uniform(mt, Wanted::new(&tolerances), task.outcome, go_on)?
             }
-            // Most budgets are there for safety: while they leave room, nothing needs to be compared.
+            // Most budgets are for safety: while the mesh is below the budget, excesses need not be compared.
             None if budget.is_unlimited() || !restarts && self.ranked.has_room() => {
                 match self.converge(&mut task, go_on)? {
                     Way::Done => true,

@@ -1,10 +1,10 @@
 //! Tetrahedra of the mesh as criteria see them.
 
-use super::{TetLook, Verdict};
+use super::{TetData, Verdict};
 use crate::mt::{ApplyUpdates, CurrentMesh, ErrorCode, UpdateId};
 use std::borrow::Cow;
 
-/// A tetrahedron that is to be judged, with what that takes.
+/// A tetrahedron to evaluate, with its data.
 pub(super) struct Open<'a> {
     pub t: u32,
     pub tet: [u32; 4],
@@ -14,9 +14,9 @@ pub(super) struct Open<'a> {
 }
 
 impl Open<'_> {
-    pub fn look<'a>(&'a self, levels: &'a dyn Fn(usize) -> [i32; 4]) -> TetLook<'a> {
+    pub fn look<'a>(&'a self, levels: &'a dyn Fn(usize) -> [i32; 4]) -> TetData<'a> {
         let Self { corners, errors, update, .. } = self;
-        TetLook { corners, levels, error: errors.largest, errors: &errors.by_field, update: *update }
+        TetData { corners, levels, error: errors.largest, errors: &errors.by_field, update: *update }
     }
 }
 
@@ -44,24 +44,24 @@ impl<'a> TetErrors<'a> {
         Self::new(mt, u, mt.quarterings(mesh, t))
     }
 
-    /// Those of a tetrahedron of which only this is known.
+    /// Bounds of the errors of a tetrahedron.
     pub fn bounded_by(errors: &'a [ErrorCode]) -> Self {
         let largest = errors.iter().copied().fold(ErrorCode::ZERO, ErrorCode::max);
         Self { largest, by_field: Cow::Borrowed(errors) }
     }
 }
 
-/// Shows a tetrahedron of the mesh to `judge`.
+/// Calls `judge` with a tetrahedron of the mesh.
 #[inline]
 pub(super) fn see(
     mesh: &CurrentMesh,
     tet: &[u32; 4],
     errors: &TetErrors<'_>,
     update: UpdateId,
-    judge: impl FnOnce(&TetLook<'_>) -> Verdict,
+    judge: impl FnOnce(&TetData<'_>) -> Verdict,
 ) -> Verdict {
     let corners = tet.map(|v| mesh.positions[v as usize]);
     let levels = |field: usize| tet.map(|v| mesh.levels(v)[field]);
     let TetErrors { largest: error, ref by_field } = *errors;
-    judge(&TetLook { corners: &corners, levels: &levels, error, errors: by_field, update })
+    judge(&TetData { corners: &corners, levels: &levels, error, errors: by_field, update })
 }

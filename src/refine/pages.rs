@@ -1,15 +1,15 @@
-//! Updates that arrive and leave, one after the other or page by page, and what pages the front waits for.
+//! Updates that arrive one by one or in pages, pages that are evicted, and the pages that the front awaits.
 
 use super::Criterion;
-use super::front::{Asked, CHUNK_WORDS, Front};
+use super::front::{CHUNK_WORDS, Front, Violation};
 use super::look::{TetErrors, see};
 use crate::mt::{ApplyUpdates, ErrorCode, UpdateId};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
 impl Front {
-    /// Takes note of updates that have arrived.
-    pub(super) fn learn(&mut self, mt: &impl ApplyUpdates) {
+    /// Registers updates that have arrived.
+    pub(super) fn sync(&mut self, mt: &impl ApplyUpdates) {
         if mt.updates() <= self.known && !self.applied.words().is_empty() {
             return;
         }
@@ -18,44 +18,43 @@ impl Front {
         self.applied.resize(self.known);
         self.chunks
             .resize(self.applied.words().len().div_ceil(CHUNK_WORDS), [ErrorCode::MAX, ErrorCode::ZERO]);
-        self.take_in(mt, arrived);
+        self.add_updates(mt, arrived);
     }
 
-    /// Tells the mesh of updates that have arrived. What they remove is judged again, and nothing else.
-    fn take_in(&mut self, mt: &impl ApplyUpdates, updates: Range<u32>) {
-        self.sum_up(mt, updates.clone());
+    /// Registers a range of updates. Only the tetrahedra that they remove are evaluated again.
+    fn add_updates(&mut self, mt: &impl ApplyUpdates, updates: Range<u32>) {
+        self.note_errors(mt, updates.clone());
         while let Some(&(u, t)) = self.awaiting.range((updates.start, 0)..(updates.end, 0)).next() {
             self.awaiting.remove(&(u, t));
             self.tets.open(t);
         }
         mt.page_inserted(&mut self.mesh, updates);
         self.open_touched();
-        self.begin_again();
+        self.restart();
     }
 
-    /// The goal is another one with what is here now.
-    fn begin_again(&mut self) {
+    /// The goal has to be reached anew with the present updates.
+    fn restart(&mut self) {
         self.ranked.clear();
         if let Some(goal) = &mut self.goal {
             goal.reached = false;
         }
     }
 
-    /// Takes note that a page of updates has come to the MT, with all on which it depends. Updates that are not here are no
-    /// updates: a mesh is what was asked for as far as those that are here go. Needs not be told of updates that came by
-    /// `push`, behind all others.
-    pub fn arrived(&mut self, mt: &impl ApplyUpdates, page: u32) {
+    /// Registers a page that has been inserted into the MT, together with all pages on which it depends. Updates added
+    /// by `push`, after all others, need no call.
+    pub fn page_inserted(&mut self, mt: &impl ApplyUpdates, page: u32) {
         let (updates, known) = (mt.page_updates(page), self.known);
-        self.learn(mt);
+        self.sync(mt);
         if updates.start < known {
             self.mesh.forget_proven(updates.start);
-            self.take_in(mt, updates);
+            self.add_updates(mt, updates);
         }
     }
 
-    /// Gets ready for a page of updates to be taken from the MT, which has to follow at once. False if that must not be, since
-    /// one of them is applied.
-    pub fn leave(&mut self, mt: &impl ApplyUpdates, page: u32) -> bool {
+    /// Prepares the eviction of a page from the MT, which must follow at once. False if one of its updates is applied:
+    /// then it must not be evicted.
+    pub fn prepare_eviction(&mut self, mt: &impl ApplyUpdates, page: u32) -> bool {
         let updates = mt.page_updates(page);
         if updates.clone().any(|u| self.contains(UpdateId(u))) {
             return false;
@@ -64,15 +63,15 @@ impl Front {
         self.leaves.forget(updates.clone());
         let (gone, kept) = std::mem::take(&mut self.pending)
             .into_iter()
-            .partition(|asked: &Asked| updates.contains(&asked.update.0));
+            .partition(|violation: &Violation| updates.contains(&violation.update.0));
         self.pending = kept;
-        self.awaiting.extend(Vec::into_iter(gone).map(|asked| (asked.update.0, asked.tet)));
-        self.begin_again();
+        self.awaiting.extend(Vec::into_iter(gone).map(|violation| (violation.update.0, violation.tet)));
+        self.restart();
         true
     }
 
-    /// Takes note of the errors of updates that have arrived.
-    fn sum_up(&mut self, mt: &impl ApplyUpdates, updates: Range<u32>) {
+    /// Records the errors of updates that have arrived.
+    fn note_errors(&mut self, mt: &impl ApplyUpdates, updates: Range<u32>) {
         for u in updates {
             let chunk = u as usize / (64 * CHUNK_WORDS);
             if chunk >= self.chunks.len() {
@@ -83,9 +82,8 @@ impl Front {
         }
     }
 
-    /// The pages that are not here but hold what removes a tetrahedron that violates the criterion, as far as what is known of
-    /// the page tells, or what such an update depends on; each with the largest excess. Only what the mesh shows at once:
-    /// more may be demanded when these have come. Ascending.
+    /// The absent pages with the remover of a tetrahedron that may violate the criterion, or with an update on which
+    /// that depends; each with the largest excess, ascending. More may be demanded when these have arrived.
     pub fn demanded_pages(
         &self,
         mt: &impl ApplyUpdates,
@@ -101,12 +99,12 @@ impl Front {
             let Some(errors) = errors else { return };
             let verdict =
                 see(&self.mesh, &tet, &errors, update.unwrap_or(absent), |look| criterion.rank(look));
-            if verdict.asks() {
+            if verdict.violates() {
                 let largest = pages.entry(page_of(absent)).or_insert(0.0_f64);
                 *largest = largest.max(verdict.excess);
             }
         };
-        if self.watched {
+        if self.tracked {
             self.awaiting.iter().for_each(|&(u, t)| demand(UpdateId(u), t));
         } else {
             let slots = 0..self.mesh.tet_slots() as u32;
@@ -116,9 +114,9 @@ impl Front {
         pages
     }
 
-    /// The pages that are here and hold what removes a tetrahedron which might violate the criterion, as far as `bounds` of the
-    /// page tell: without them it would be unknown whether the mesh is what was asked for. Some are named several times.
-    pub fn telling_pages(
+    /// The present pages with the remover of a tetrahedron that may violate the criterion by the `bounds` of the page:
+    /// without them it would be unknown whether the mesh satisfies the request. Some are listed several times.
+    pub fn decisive_pages(
         &self,
         mt: &impl ApplyUpdates,
         criterion: &dyn Criterion,
@@ -129,13 +127,13 @@ impl Front {
         for (t, tet) in (0..).zip(self.mesh.tets()) {
             let Some(u) = mt.remover(&self.mesh, t) else { continue };
             let page = page_of(u);
-            // Tetrahedra side by side are often removed by updates of a page.
+            // Neighbouring tetrahedra are often removed by updates of one page.
             if pages.last() == Some(&page) {
                 continue;
             }
             let bounds = bounds(page);
             let errors = TetErrors::bounded_by(&bounds);
-            if see(&self.mesh, tet, &errors, u, |look| criterion.judge(look)).asks() {
+            if see(&self.mesh, tet, &errors, u, |look| criterion.judge(look)).violates() {
                 pages.push(page);
             }
         }

@@ -1,4 +1,4 @@
-//! A transfer function, prepared to tell how much an error of the field can change a picture.
+//! A transfer function, tabulated to bound the change of a picture by an error of the field.
 
 use super::Transfer;
 use crate::mt::FieldInfo;
@@ -42,21 +42,22 @@ impl Palette {
             (*extent, *steep) = curve.between(low, high);
             *steep = (f64::from(*steep) * field.step) as f32 * ROUND_UP;
         }
-        let joined = joined(&bins);
-        let contrast = (0..LEVELS).map(|level| largest(&contrast(&bins, &joined, level))).collect();
+        let joined = doubled(&bins, Extent::join);
+        let contrast = |level| doubled(&contrast(&bins, &joined, level), f32::max);
+        let contrast = (0..LEVELS).map(contrast).collect();
         Self {
             field: transfer.field,
             bins_per_level: 1.0 / (width / field.step),
             first_level: (field.min - field.origin) / field.step,
             levels,
-            steepness: largest(&steep),
+            steepness: doubled(&steep, f32::max),
             contrast,
             weight: 1.0 / transfer.unit_length,
         }
     }
 
-    /// How much an error, as a fraction of the field's range, can change what is seen of a tetrahedron with these levels, along a
-    /// ray through the whole model.
+    /// A bound of how much an error, as a fraction of the field's range, changes the picture of a tetrahedron with
+    /// these levels, along a ray through the whole model.
     pub fn change(&self, levels: &[i32; 4], error: f64) -> f64 {
         if error <= 0.0 {
             return 0.0;
@@ -125,7 +126,7 @@ impl Curve {
         Self { points: transfer.points.iter().map(weighted).collect() }
     }
 
-    /// What the channels are from `low` to `high`, and how steeply they change there at most, per unit of the field.
+    /// The range of the channels from `low` to `high`, and their largest change per unit of the field there.
     fn between(&self, low: f64, high: f64) -> (Extent, f32) {
         let mut extent = Extent::NONE;
         let mut steep = 0.0_f64;
@@ -175,26 +176,13 @@ fn contrast(bins: &[Extent; BINS], joined: &[[Extent; BINS]], level: usize) -> [
     out
 }
 
-/// The extents of 1, 2, 4, … bins from each bin on.
-fn joined(bins: &[Extent; BINS]) -> Vec<[Extent; BINS]> {
+/// The union of 1, 2, 4, … bins from each bin on.
+fn doubled<T: Copy>(bins: &[T; BINS], union: impl Fn(T, T) -> T) -> Vec<[T; BINS]> {
     let mut levels = vec![*bins];
     for level in 1..LEVELS {
         let half = 1 << (level - 1);
         let last = &levels[level - 1];
-        levels.push(std::array::from_fn(|b| last[b].join(last[(b + half).min(BINS - 1)])));
-    }
-    levels
-}
-
-/// The largest of 1, 2, 4, … bins from each bin on.
-fn largest(bins: &[f32; BINS]) -> Largest {
-    let mut levels = vec![*bins];
-    for level in 1..LEVELS {
-        let half = 1 << (level - 1);
-        let mut next = levels[level - 1];
-        let last = levels[level - 1];
-        (0..BINS).for_each(|b| next[b] = last[b].max(last[(b + half).min(BINS - 1)]));
-        levels.push(next);
+        levels.push(std::array::from_fn(|b| union(last[b], last[(b + half).min(BINS - 1)])));
     }
     levels
 }

@@ -1,4 +1,4 @@
-//! How good the mesh is for a request.
+//! The quality of the mesh for a request.
 
 use super::front::{CHUNK_WORDS, Front, Goal};
 use super::look::{TetErrors, see};
@@ -6,18 +6,18 @@ use super::{Criterion, Outcome};
 use crate::mt::{ApplyUpdates, ErrorCode, UpdateId};
 use std::borrow::Cow;
 
-/// What violates a criterion.
+/// The violations of a criterion.
 struct Violations {
-    /// The largest error that can be left where something is wanted.
+    /// The largest error left in the selected part.
     error: ErrorCode,
     /// The largest excess; 1 if nothing violates it.
     excess: f64,
-    /// Whether what may remove one of the tetrahedra is not here.
+    /// Whether the remover of one of the tetrahedra has not arrived.
     missing: bool,
 }
 
 impl Front {
-    /// Works out how good the mesh is, which is packed.
+    /// Determines the quality of the mesh, which is packed.
     pub(super) fn report(&self, mt: &impl ApplyUpdates, goal: &mut Goal) {
         let complete = mt.present() >= mt.info().updates;
         let satisfied = goal.budget.is_unlimited() || self.ranked.has_room();
@@ -32,8 +32,8 @@ impl Front {
         goal.outcome = Outcome { done: true, error, excess, satisfied, missing, ..goal.outcome };
     }
 
-    /// No update that is not applied, here or not, has a larger error in this field, or in all of them if it is none. What
-    /// is at least `enough` is as good as any.
+    /// An upper bound of the errors of all updates that are not applied, whether they have arrived or not, in this
+    /// field or in all. The search stops at `enough`.
     pub fn largest_left(&self, mt: &impl ApplyUpdates, field: Option<usize>, enough: ErrorCode) -> ErrorCode {
         let error = |u: UpdateId| field.map_or_else(|| mt.error(u), |field| mt.error_of_field(u, field));
         let mut found = mt.to_come();
@@ -53,7 +53,7 @@ impl Front {
         found
     }
 
-    /// The largest error that can be left where something is wanted, and the largest excess of all tetrahedra that violate the
+    /// The largest error left in the selected part, and the largest excess of all tetrahedra that violate the
     /// criterion; 1 if none does. Takes time in proportion to the mesh.
     pub fn largest_violation(&self, mt: &impl ApplyUpdates, criterion: &dyn Criterion) -> (ErrorCode, f64) {
         let Violations { error, excess, .. } = self.violations(mt, criterion);
@@ -61,7 +61,7 @@ impl Front {
     }
 
     fn violations(&self, mt: &impl ApplyUpdates, criterion: &dyn Criterion) -> Violations {
-        // Where no budget is in the way, what violates the criterion waits for something.
+        // If the budget is not the limit, violations are due to missing data.
         let unlimited = self.ranked.has_room();
         let field = criterion.field();
         let to_come = vec![mt.to_come(); mt.info().fields.len()];
@@ -75,10 +75,10 @@ impl Front {
                 (None, Some(errors)) => TetErrors::bounded_by(errors),
                 (None, None) => TetErrors { largest: mt.to_come(), by_field: Cow::Borrowed(&to_come) },
             };
-            // The last number there can be: nothing is added to what is wanted.
+            // The last number: regions are not widened.
             let update = update.unwrap_or(UpdateId(mt.info().updates));
             let verdict = see(&self.mesh, tet, &errors, update, |look| criterion.rank(look));
-            if verdict.asks() {
+            if verdict.violates() {
                 let TetErrors { largest, by_field } = &errors;
                 let error = field.and_then(|field| by_field.get(field)).copied().unwrap_or(*largest);
                 all.error = all.error.max(error);
@@ -86,12 +86,13 @@ impl Front {
                 all.missing |= missing;
             }
         }
-        // What violates nothing is within the tolerance: with several needs, that of another one may be larger.
+        // Tetrahedra without violations are within the tolerance: with several needs, that of another one may be
+        // larger.
         all.error = all.error.max(self.within(mt, criterion));
         all
     }
 
-    /// The error that is left where nothing violates the criterion.
+    /// The error left where no tetrahedron violates the criterion.
     fn within(&self, mt: &impl ApplyUpdates, criterion: &dyn Criterion) -> ErrorCode {
         let tolerance = criterion.tolerance();
         self.largest_left(mt, criterion.field(), tolerance).min(tolerance)

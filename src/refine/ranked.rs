@@ -1,13 +1,13 @@
 //! Refinement under a budget: two queues over the front, as in the paper [§2.3].
 //!
-//! The most urgent violation is forced; when that exceeds the budget, the least urgent of what is applied is undone. This
-//! stops when the two meet: when what was forced last is what has to go. The mesh is then that of all updates above a
-//! threshold of urgency, the smallest threshold that fits. No set within the budget has a smaller largest excess, since each
-//! set with that excess contains this one; so no exchange can improve it.
+//! The violation of largest excess is forced; when the mesh exceeds the budget, the applied update of least excess is
+//! undone. This ends when the update forced last is the one to undo. The mesh is then that of all updates above a
+//! threshold of excess, the smallest threshold that fits. No set within the budget has a smaller largest excess, since
+//! each set with that excess contains this one.
 //!
-//! Where tetrahedra have errors of their own, what is forced may lead to violations that are more urgent. They belong to the
-//! threshold that has been reached: all that was applied since then goes when the budget is exceeded. Again the mesh is that
-//! of the smallest threshold that fits.
+//! With own errors, a forced update may create violations of larger excess. They belong to the threshold that has been
+//! reached: when the budget is exceeded, all updates applied since then are undone. Again the mesh is that of the
+//! smallest threshold that fits.
 
 use super::converge::{Forced, creators_of_touched};
 use super::front::{Front, GoOn, Task};
@@ -16,7 +16,7 @@ use crate::mt::{ApplyUpdates, UpdateError, UpdateId};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// The urgency of an update: larger excess first, ties coarse to fine. Parents rank before their children.
+/// The priority of an update: larger excess first, ties coarse to fine. Parents rank before their children.
 type Rank = (u64, Reverse<UpdateId>);
 
 /// Excesses are not negative, so their bits compare as they do.
@@ -30,13 +30,13 @@ pub(super) struct Ranked {
     state: State,
     /// Violating tetrahedra by the rank of the update that removes them.
     refinable: BinaryHeap<(Rank, u32)>,
-    /// Applied updates that may be without applied children, least urgent first.
+    /// Applied updates that may be without applied children, least excess first.
     coarsenable: BinaryHeap<Reverse<Rank>>,
-    /// Tetrahedra that packing the mesh has moved since the queues were looked at.
+    /// Tetrahedra that packing the mesh has moved since the last step.
     moved: Vec<u32>,
-    /// The least rank of what was forced.
+    /// The least rank of a forced update.
     threshold: Option<Rank>,
-    /// What has been applied since that was reached; kept where tetrahedra have errors of their own.
+    /// The updates applied since the threshold was reached; kept only with own errors.
     since: Vec<UpdateId>,
 }
 
@@ -45,7 +45,7 @@ enum State {
     /// The queues are empty.
     #[default]
     Idle,
-    /// They hold what there is.
+    /// They are in use.
     Running,
     /// Nothing violates the criterion.
     Satisfied,
@@ -54,7 +54,7 @@ enum State {
 }
 
 impl Ranked {
-    /// Forgets the queues. Whether the budget had room for the last request is remembered: as like as not it is so again.
+    /// Empties the queues. Keeps whether the budget sufficed for the last request: that likely holds for the next one.
     pub fn clear(&mut self) {
         if self.state == State::Running {
             self.state = State::Idle;
@@ -66,7 +66,7 @@ impl Ranked {
         self.since.clear();
     }
 
-    /// Something of this rank is about to be forced.
+    /// An update of this rank is about to be forced.
     fn reach(&mut self, rank: Rank) {
         if self.threshold.is_none_or(|threshold| rank < threshold) {
             self.threshold = Some(rank);
@@ -92,7 +92,7 @@ impl Ranked {
         self.state == State::Running
     }
 
-    /// Whether the budget allowed all that was asked for last, as far as is known.
+    /// Whether the budget sufficed for the last request, as far as is known.
     pub fn has_room(&self) -> bool {
         matches!(self.state, State::Idle | State::Satisfied)
     }
@@ -104,7 +104,7 @@ impl Ranked {
 }
 
 impl Front {
-    /// Moves to the mesh of the smallest excess that fits the budget. True when it is there.
+    /// Moves to the mesh of the smallest excess that fits the budget. True when that is reached.
     pub(super) fn ranked_converge(
         &mut self,
         task: &mut Task<'_, impl ApplyUpdates>,
@@ -137,7 +137,8 @@ impl Front {
                 continue;
             }
             if !task.mt.has_tet_errors() {
-                // A tetrahedron asked for it, so it is queued. What it forced is blocked by it, and comes back when it goes.
+                // A tetrahedron needs it, so it is queued. The updates that it forced are blocked by it and are queued
+                // when it is undone.
                 self.is_idle(task, u)?;
             }
             self.push_touched(task);
@@ -157,9 +158,9 @@ impl Front {
         Ok(true)
     }
 
-    /// Fills both queues with what there is, and undoes what nothing asks for on the way.
+    /// Fills both queues, and undoes unneeded updates.
     fn fill_queues(&mut self, task: &mut Task<'_, impl ApplyUpdates>) -> Result<(), UpdateError> {
-        self.forget_watch();
+        self.untrack();
         self.ranked.clear();
         self.ranked.state = State::Running;
         // Children have larger numbers, so one pass downwards sees each after all that depend on it.
@@ -177,15 +178,15 @@ impl Front {
         Ok(())
     }
 
-    /// Queues an update for coarsening if something asks for it. True if nothing does, neither the request nor a child: then it
-    /// is idle and can be undone.
+    /// Queues an update for coarsening if the request needs it. True if neither the request nor a child needs it: then
+    /// it is idle and can be undone.
     fn is_idle(&mut self, task: &mut Task<'_, impl ApplyUpdates>, u: UpdateId) -> Result<bool, UpdateError> {
         task.outcome.judged += 1;
         let Some(verdict) = self.need(task, u, true)? else { return Ok(false) };
-        if verdict.asks() {
+        if verdict.violates() {
             self.ranked.coarsenable.push(Reverse(rank(verdict.excess, u)));
         }
-        Ok(!verdict.asks())
+        Ok(!verdict.violates())
     }
 
     fn push_violation(&mut self, task: &mut Task<'_, impl ApplyUpdates>, t: u32) {
@@ -194,7 +195,7 @@ impl Front {
         task.outcome.judged += 1;
         let errors = TetErrors::of(task.mt, &self.mesh, t, u);
         let verdict = see(&self.mesh, &tet, &errors, u, |look| task.criterion.rank(look));
-        if verdict.asks() {
+        if verdict.violates() {
             self.ranked.refinable.push((rank(verdict.excess, u), t));
         }
     }
@@ -206,7 +207,7 @@ impl Front {
         self.mesh.clear_touched();
     }
 
-    /// Undoes all that was applied since the threshold was reached, if the budget is exceeded; tells whether it is.
+    /// Undoes all updates since the threshold was reached, if the budget is exceeded; returns whether it is.
     fn undo_threshold(&mut self, task: &mut Task<'_, impl ApplyUpdates>) -> Result<bool, UpdateError> {
         if task.budget.holds(self.mesh.vertex_count(), self.mesh.tet_count()) {
             return Ok(false);
@@ -219,7 +220,7 @@ impl Front {
         Ok(true)
     }
 
-    /// Undoes the least urgent updates until the budget is kept. Tells whether `last` was among them.
+    /// Undoes the updates of least excess until the budget is kept. Returns whether `last` was among them.
     fn trim(
         &mut self,
         task: &mut Task<'_, impl ApplyUpdates>,
@@ -229,7 +230,7 @@ impl Front {
         while !task.budget.holds(self.mesh.vertex_count(), self.mesh.tet_count()) {
             let Some(Reverse((_, Reverse(u)))) = self.ranked.coarsenable.pop() else { break };
             if !self.contains(u) || self.need(task, u, false)?.is_none() {
-                // With a child it comes back when that goes.
+                // With a child it is queued again when the child is undone.
                 continue;
             }
             self.undo(task, u)?;
@@ -238,7 +239,7 @@ impl Front {
         Ok(reached)
     }
 
-    /// Undoes `u` and whatever was there only for its sake.
+    /// Undoes `u` and the updates that only `u` needed.
     fn undo(&mut self, task: &mut Task<'_, impl ApplyUpdates>, u: UpdateId) -> Result<(), UpdateError> {
         let mut idle = vec![u];
         while let Some(u) = idle.pop() {

@@ -1,12 +1,12 @@
-//! What mesh is wanted: needs, and a budget.
+//! Requests: needs, and a budget.
 
 use super::MAX_PLANES;
 use crate::geom::Bounds;
 use crate::mt::MtInfo;
 use glam::DVec3;
-use std::fmt;
+use thiserror::Error;
 
-/// What mesh is wanted: the coarsest one that meets every need, as far as the budget allows.
+/// A request for the coarsest mesh that meets every need, as far as the budget allows.
 ///
 /// ```
 /// use tetralod::geom::Bounds;
@@ -18,34 +18,35 @@ use std::fmt;
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Request {
-    /// What the mesh is needed for; it is made to suit all of them. Without any, the base mesh will do.
+    /// The needs, all of which the mesh meets. Without any, it is the base mesh.
     pub needs: Vec<Need>,
-    /// How large the mesh may become.
+    /// The largest size of the mesh.
     pub budget: Budget,
 }
 
 /// A part of the volume and the error that the mesh may have there.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Need {
-    /// The largest error that is good enough, in the unit of `part`; 0 is the reference mesh, infinity asks for nothing.
-    /// Not negative, not NaN.
+    /// The largest allowed error, in the unit of `part`; 0 is the reference mesh, infinity allows any error. Not
+    /// negative, not NaN.
     pub error: f64,
-    /// Which field's error counts. If none is named it is that of the field which `part` names, and the largest one of all
-    /// fields where that names none, too. A transfer function always measures its own field.
+    /// The field whose error counts. By default it is the field that `part` names, or else the largest error of all
+    /// fields. A transfer function always measures its own field.
     pub field: Option<usize>,
-    /// Where that counts, and how the error is measured.
+    /// Where the error counts, and how it is measured.
     pub part: Part,
 }
 
 /// Where a need counts, and how it measures the error.
 ///
-/// In all but the last two the error is that of a field: a fraction of its range (0.01 is 1 %). Which field, the need says
-/// ([`Need::of_field`]) or the part; if neither does, it binds all fields of the MT, each relative to its own range.
+/// In all but the last two the error is that of a field: a fraction of its range (0.01 is 1 %). The need
+/// ([`Need::of_field`]) or the part names the field; if neither does, the error counts for all fields of the MT, each
+/// relative to its own range.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Part {
     /// The whole volume.
     Everywhere,
-    /// What lies in a region.
+    /// The inside of a region.
     Region(Region),
     /// Where a field takes values of a range; an isovalue is a range of one value.
     Values(Values),
@@ -53,7 +54,8 @@ pub enum Part {
     /// [`crate::refine`].
     Both(Region, Values),
     /// What a camera sees; the error is in pixels: the displacement that the field's error counts as
-    /// ([`MtInfo::displacement_per_error`](crate::mt::MtInfo::displacement_per_error)), as large as it can look.
+    /// ([`MtInfo::displacement_per_error`](crate::mt::MtInfo::displacement_per_error)), at its largest size on the
+    /// screen.
     View(View),
     /// What a transfer function makes visible; the error is one of colour and opacity, 0 to 1, see [`Transfer`].
     Transfer(Transfer),
@@ -94,7 +96,7 @@ pub enum Region {
         /// In units of the length of `normal`.
         offset: f64,
     },
-    /// What is close to a plane: all points with `|normal · p - offset| <= thickness / 2 · |normal|`.
+    /// All points close to a plane: those with `|normal · p - offset| <= thickness / 2 · |normal|`.
     Slab {
         /// At a right angle to the plane; of any length but 0.
         normal: [f64; 3],
@@ -103,7 +105,7 @@ pub enum Region {
         /// In model units; 0 is the plane itself.
         thickness: f64,
     },
-    /// What lies behind all of some planes `[nx, ny, nz, d]`: all points with `n · p <= d`. At most
+    /// The intersection of the half-spaces of some planes `[nx, ny, nz, d]`: all points with `n · p <= d`. At most
     /// [`MAX_PLANES`](crate::refine::MAX_PLANES).
     Convex(Vec<[f64; 4]>),
 }
@@ -165,7 +167,7 @@ pub struct Transfer {
     pub field: usize,
     /// Values in field units, ascending, each with its `[red, green, blue, opacity]` of 0 to 1; at least one.
     pub points: Vec<(f64, [f64; 4])>,
-    /// The way through the model, as a fraction of its diagonal, along which the opacities are what they say; positive.
+    /// The way through the model, as a fraction of its diagonal, along which the opacities apply; positive.
     pub unit_length: f64,
 }
 
@@ -201,7 +203,7 @@ impl Request {
         Need::within(error).into()
     }
 
-    /// Another need beside those that are there.
+    /// Adds a need.
     #[must_use]
     pub fn and(mut self, need: Need) -> Self {
         self.needs.push(need);
@@ -290,18 +292,20 @@ impl Need {
     }
 }
 
-/// Why a request makes no sense.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// Why a request is invalid.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum RequestError {
     /// The MT has no field of this number.
+    #[error("there is no field number {index}; the MT has {fields}, counted from 0")]
     Field {
-        /// The number that was asked for.
+        /// The number in the request.
         index: usize,
         /// How many fields there are.
         fields: usize,
     },
-    /// A number in a need cannot be used.
+    /// A need contains an invalid number.
+    #[error("need number {need}: {problem}")]
     Need {
         /// Which need, counted from 0.
         need: usize,
@@ -310,24 +314,11 @@ pub enum RequestError {
     },
 }
 
-impl fmt::Display for RequestError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Field { index, fields } => {
-                write!(f, "there is no field number {index}; the MT has {fields}, counted from 0")
-            }
-            Self::Need { need, problem } => write!(f, "need number {need}: {problem}"),
-        }
-    }
-}
-
-impl std::error::Error for RequestError {}
-
 impl Request {
-    /// Whether the request makes sense for an MT.
+    /// Checks a request for an MT.
     ///
     /// # Errors
-    /// The first need that does not, and why.
+    /// The first invalid need, and why.
     pub fn check(&self, info: &MtInfo) -> Result<(), RequestError> {
         for (i, need) in self.needs.iter().enumerate() {
             let named = match &need.part {

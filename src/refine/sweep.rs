@@ -1,8 +1,8 @@
-//! The order of work where the order is free: updates side by side in the model one after the other.
+//! The order of updates where it is free: by place, so that neighbouring updates follow each other.
 //!
-//! The mesh is a function of the set of updates, so any order that extends the partial order gives the same one. Numbers
-//! follow falling error, which jumps all over the model; a whole window of them, sorted by place, finds most of what it
-//! needs in the caches. New slots then lie side by side, too.
+//! The mesh is a function of the set of updates, so any order that extends the partial order gives the same one.
+//! Numbers follow falling error, which jumps all over the model. A window of updates, sorted by place, has better cache
+//! locality. New slots then lie side by side, too.
 
 use crate::geom::morton;
 use crate::mt::{ApplyUpdates, CurrentMesh, UpdateId};
@@ -11,8 +11,8 @@ use crate::mt::{ApplyUpdates, CurrentMesh, UpdateId};
 const CELL_BITS: u32 = 4;
 const CELLS: usize = 1 << (3 * CELL_BITS);
 
-/// How many updates are sorted at a time. Large windows bring more of them together and more that have to wait for
-/// others; while the mesh is small, it is in the caches anyway.
+/// How many updates are sorted at a time. Large windows bring more neighbours together, and more updates that are
+/// blocked by others; a small mesh is in the caches anyway.
 pub(super) fn window_size(applied: u32) -> usize {
     (applied as usize / 8).max(256)
 }
@@ -51,7 +51,7 @@ impl Window {
     }
 }
 
-/// The cell of a position, along a curve through all cells that seldom leaps far.
+/// The cell of a position, along a space-filling curve.
 fn cell(position: [i32; 3], shift: u32) -> u16 {
     let largest = (1 << CELL_BITS) - 1;
     morton(position.map(|x| (x >> shift).clamp(0, largest) as u32)) as u16

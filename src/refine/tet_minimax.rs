@@ -1,6 +1,7 @@
-//! The least value, over a tetrahedron, of the greatest of some linear functions: whether it meets a convex polyhedron.
+//! The least value, over a tetrahedron, of the greatest of some linear functions: whether it intersects a convex
+//! polyhedron.
 
-/// The most linear functions that are looked at together.
+/// The most linear functions.
 pub(super) const MAX_ROWS: usize = super::MAX_PLANES + 1;
 
 /// Linear functions by their values at the four corners of a tetrahedron.

@@ -1,134 +1,140 @@
-//! What has to be judged again, and when: tetrahedra and updates wait until the criterion has moved far enough.
+//! The schedule of evaluations: an item is evaluated again when the criterion has moved far enough.
 //!
-//! A criterion moves by [`Criterion::distance`](super::Criterion::distance) from one request to the next; a verdict holds
-//! until it has moved by the verdict's slack. What waits is kept in wheels, one for each power of two of slack, whose slots
-//! are an eighth of that wide: it is judged again when the way that the criterion has gone comes to the slot that its slack
-//! ends in, so never too late and by at most an eighth of its slack too early, at a constant cost each time. Deferred lists of
-//! priorities in ROAM (Duchaineau et al. 1997) and timing wheels (Varghese and Lauck 1987) are the ideas behind this.
+//! A criterion moves by [`Criterion::distance`](super::Criterion::distance) from one request to the next; a verdict
+//! holds until it has moved by the verdict's slack. Items are kept in wheels, one for each power of two of slack, with
+//! slots an eighth of that wide. An item is evaluated again when the total movement of the criterion reaches the slot
+//! in which its slack ends: never too late, at most an eighth of its slack too early, at constant cost. Deferred lists
+//! of priorities in ROAM (Duchaineau et al. 1997) and timing wheels (Varghese and Lauck 1987) are the ideas behind
+//! this.
 
-use super::DIALS;
+use super::COMPONENTS;
 use crate::mt::PagedArray;
 use std::ops::Range;
 
-/// Slacks from 2^-24 to 2^4 are told apart.
+/// The wheels cover slacks from 2^-24 to 2^4.
 const WHEELS: i32 = 28;
 /// The exponent of the first wheel.
 const FIRST: i32 = -24;
-/// log2 of how many slots a slack is from now, at least; at most it is twice that.
+/// log2 of the least number of slots from now to the end of a slack; the largest number is twice that.
 const FINE: i32 = 3;
-/// Slots of a wheel: more than any slack in it can be away.
+/// Slots of a wheel: more than any slack in it spans.
 const SLOTS: usize = 4 << FINE;
-/// Slots of a dial.
-const DIAL: usize = WHEELS as usize * SLOTS;
-/// To be judged: in [`TimingWheels::open`].
+/// Slots of a component.
+const COMPONENT: usize = WHEELS as usize * SLOTS;
+/// Due: in [`TimingWheels::open`].
 const OPEN: u16 = u16::MAX - 1;
-/// Not waiting for anything.
+/// Not scheduled.
 const NOWHERE: u16 = u16::MAX;
 
-/// Things, known by number, that wait to be judged again.
+/// Items (tetrahedra or updates), by number, with the time of their next evaluation.
 #[derive(Clone, Debug)]
 pub(super) struct TimingWheels {
-    /// The slot of each thing, or [`OPEN`] or [`NOWHERE`].
-    place: PagedArray<u16>,
-    /// What waits in each slot of each wheel, with entries that have moved on since.
+    /// The slot of each item, or [`OPEN`] or [`NOWHERE`].
+    slot_of: PagedArray<u16>,
+    /// The items in each slot of each wheel; entries may be outdated.
     slots: Vec<Vec<u32>>,
-    /// What is to be judged now; here, too, entries may have moved on.
+    /// The items that are due; entries may be outdated.
     open: Vec<u32>,
-    /// How far the criterion has moved in all, by dial.
-    now: [f64; DIALS],
+    /// The total movement of the criterion, by component.
+    now: [f64; COMPONENTS],
 }
 
 impl Default for TimingWheels {
     fn default() -> Self {
-        Self { place: PagedArray::new(NOWHERE), slots: Vec::new(), open: Vec::new(), now: [0.0; DIALS] }
+        Self {
+            slot_of: PagedArray::new(NOWHERE),
+            slots: Vec::new(),
+            open: Vec::new(),
+            now: [0.0; COMPONENTS],
+        }
     }
 }
 
 impl TimingWheels {
-    /// Has thing `id` judged.
+    /// Makes item `id` due.
     #[inline]
     pub fn open(&mut self, id: u32) {
-        if self.place.get(id) != OPEN {
-            self.place.set(id, OPEN);
+        if self.slot_of.get(id) != OPEN {
+            self.slot_of.set(id, OPEN);
             self.open.push(id);
         }
     }
 
-    /// The next thing to be judged, which is then in nobody's hands but the caller's.
+    /// Removes and returns the next item that is due.
     #[inline]
     pub fn next(&mut self) -> Option<u32> {
         while let Some(id) = self.open.pop() {
-            if self.place.get(id) == OPEN {
-                self.place.set(id, NOWHERE);
+            if self.slot_of.get(id) == OPEN {
+                self.slot_of.set(id, NOWHERE);
                 return Some(id);
             }
         }
         None
     }
 
-    /// Brings what is to be judged into the order of its numbers: what was made together lies together in memory.
+    /// Sorts the due items by number, for locality in memory.
     pub fn sort(&mut self) {
         self.open.sort_unstable();
     }
 
-    /// Whether nothing is to be judged.
+    /// Whether no item is due.
     pub fn is_settled(&self) -> bool {
         self.open.is_empty()
     }
 
-    /// Has thing `id` judged again before that has moved by more than `slack` which the dial stands for.
+    /// Schedules item `id` for before this component has moved by more than `slack`.
     #[inline]
-    pub fn defer(&mut self, id: u32, slack: f64, dial: u8) {
-        let slot = self.slot(slack, usize::from(dial) % DIALS);
-        // If it is there already, that is early enough.
-        if self.place.get(id) == slot {
+    pub fn defer(&mut self, id: u32, slack: f64, component: u8) {
+        let slot = self.slot(slack, usize::from(component) % COMPONENTS);
+        // The item is in this slot already.
+        if self.slot_of.get(id) == slot {
             return;
         }
-        self.place.set(id, slot);
+        self.slot_of.set(id, slot);
         if slot != NOWHERE {
             if self.slots.is_empty() {
-                self.slots.resize(DIALS * DIAL, Vec::new());
+                self.slots.resize(COMPONENTS * COMPONENT, Vec::new());
             }
             self.slots[slot as usize].push(id);
         }
     }
 
-    /// The slot in which a slack that begins now ends.
+    /// The slot in which a slack that starts now ends.
     #[inline]
-    fn slot(&self, slack: f64, dial: usize) -> u16 {
+    fn slot(&self, slack: f64, component: usize) -> u16 {
         if slack == f64::INFINITY {
             return NOWHERE;
         }
-        // NaN must not wait long.
+        // NaN is due at the next movement.
         let slack = if slack.is_nan() { 0.0 } else { slack };
         let exponent = (slack.to_bits() >> 52 & 0x7ff) as i32 - 1023;
         let wheel = (exponent - FIRST).clamp(0, WHEELS - 1);
         let per_slot = power(FINE - FIRST - wheel);
-        // A slack that is too large for the last wheel ends in it all the same.
-        let now = self.now[dial];
+        // A slack too large for the last wheel is put into that wheel.
+        let now = self.now[component];
         let end = now + slack.min(power(FIRST + wheel + 1));
         let first = (now * per_slot) as u64;
-        // What is too small for the first wheel can end at any moment: that is the slot which begins next.
+        // A slack too small for the first wheel is put into its next slot.
         let slot = ((end * per_slot) as u64).max(first + 1);
-        (dial * DIAL + wheel as usize * SLOTS + slot as usize % SLOTS) as u16
+        (component * COMPONENT + wheel as usize * SLOTS + slot as usize % SLOTS) as u16
     }
 
-    /// A dial moves on by `distance`, which is finite: what waits for less is to be judged.
-    pub fn advance(&mut self, distance: f64, dial: u8) {
-        let dial = usize::from(dial) % DIALS;
-        let (from, to) = (self.now[dial], self.now[dial] + distance);
-        self.now[dial] = to;
+    /// Moves a component by `distance`, which is finite: items whose slack ends become due.
+    pub fn advance(&mut self, distance: f64, component: u8) {
+        let component = usize::from(component) % COMPONENTS;
+        let (from, to) = (self.now[component], self.now[component] + distance);
+        self.now[component] = to;
         if self.slots.is_empty() || distance <= 0.0 {
             return;
         }
         for wheel in 0..WHEELS {
             let per_slot = power(FINE - FIRST - wheel);
             let (first, last) = ((from * per_slot) as u64, (to * per_slot) as u64);
-            // In the first wheel the next slot has what could change at any moment.
+            // The next slot of the first wheel also has the smallest slacks.
             let last = if wheel == 0 { last.max(first + 1) } else { last };
-            let turned = (last - first).min(SLOTS as u64);
-            for slot in (0..turned).map(|i| (last - i) as usize % SLOTS) {
-                self.flush(dial * DIAL + wheel as usize * SLOTS + slot);
+            let passed = (last - first).min(SLOTS as u64);
+            for slot in (0..passed).map(|i| (last - i) as usize % SLOTS) {
+                self.flush(component * COMPONENT + wheel as usize * SLOTS + slot);
             }
         }
     }
@@ -136,32 +142,32 @@ impl TimingWheels {
     fn flush(&mut self, slot: usize) {
         let mut list = std::mem::take(&mut self.slots[slot]);
         for id in list.drain(..) {
-            if self.place.get(id) == slot as u16 {
+            if self.slot_of.get(id) == slot as u16 {
                 self.open(id);
             }
         }
-        // Its memory is used again, unless it was much.
+        // Reuses its memory, unless it is large.
         if list.capacity() <= 1 << 12 {
             self.slots[slot] = list;
         }
     }
 
-    /// Forgets things whose numbers are in a range.
+    /// Removes the items of a range of numbers.
     pub fn forget(&mut self, range: Range<u32>) {
-        self.place.forget(range);
+        self.slot_of.forget(range);
     }
 
-    /// Forgets everything.
+    /// Removes all items.
     pub fn clear(&mut self) {
-        self.place.clear();
+        self.slot_of.clear();
         self.open.clear();
         self.slots.iter_mut().for_each(Vec::clear);
     }
 
-    /// Bytes of what there is, not of what is reserved for more.
+    /// Bytes in use, without reserved capacity.
     pub fn bytes(&self) -> u64 {
         let lists: usize = self.slots.iter().chain([&self.open]).map(Vec::len).sum();
-        (self.place.bytes() + 4 * lists + size_of_val(&self.slots[..])) as u64
+        (self.slot_of.bytes() + 4 * lists + size_of_val(&self.slots[..])) as u64
     }
 }
 
@@ -210,7 +216,7 @@ mod tests {
         waiting.defer(3, f64::INFINITY, 0);
         waiting.defer(5, f64::NAN, 0);
         waiting.advance(1e-9, 1);
-        assert!(waiting.is_settled(), "another dial");
+        assert!(waiting.is_settled(), "another component");
         waiting.advance(1e-9, 0);
         assert_eq!((waiting.next(), waiting.next()), (Some(5), None));
         waiting.advance(1e9, 0);

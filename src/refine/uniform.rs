@@ -1,4 +1,4 @@
-//! Requests that errors alone decide: which updates they want needs no look at the mesh.
+//! Uniform requests: the errors of updates alone decide, not the mesh.
 
 use super::front::{CHUNK_WORDS, Front, GoOn};
 use super::sweep::{Window, window_size};
@@ -6,13 +6,13 @@ use super::{Outcome, Tolerance};
 use crate::mesh::BitSet;
 use crate::mt::{Applied, ApplyUpdates, ErrorCode, UpdateError, UpdateId};
 
-/// The updates that are asked for everywhere, by their errors alone.
+/// The updates that a uniform request needs, by their errors.
 #[derive(Clone, Copy)]
 pub(super) struct Wanted<'a> {
     tolerances: &'a [Tolerance],
-    /// What all of them have a larger error than.
+    /// All of them have a larger error than this.
     least: ErrorCode,
-    /// What has a larger error than this is wanted for sure.
+    /// All updates with a larger error than this are needed.
     sure: ErrorCode,
 }
 
@@ -35,7 +35,7 @@ impl<'a> Wanted<'a> {
     }
 }
 
-/// The updates that a sweep which undoes others leaves applied.
+/// The updates that stay applied in a sweep that undoes others.
 struct Staying<'a> {
     wanted: Wanted<'a>,
     /// Those on which such updates depend, as far as they were found; none where errors are monotone.
@@ -62,12 +62,12 @@ impl Front {
         mt: &impl ApplyUpdates,
         outcome: &mut Outcome,
     ) -> Result<(), UpdateError> {
-        self.forget_watch();
+        self.untrack();
         self.sweep(mt, Wanted::new(&[]), false, outcome, &mut |_| true).map(drop)
     }
 
-    /// Undoes all updates within the tolerances and applies the others. Which these are, errors tell without a look at the
-    /// mesh; they are monotone along the partial order, so no update is in the way of what is undone.
+    /// Undoes all updates within the tolerances and applies the others. Errors alone decide. They are monotone along
+    /// the partial order, so no needed update depends on one that is undone.
     pub(super) fn satisfy_uniform(
         &mut self,
         mt: &impl ApplyUpdates,
@@ -78,8 +78,8 @@ impl Front {
         Ok(self.sweep(mt, wanted, false, outcome, go_on)? && self.sweep(mt, wanted, true, outcome, go_on)?)
     }
 
-    /// Applies all updates that are wanted, or undoes all others: windows by number, in each by place. What is in the way of
-    /// one is done before it. False if it was told to stop.
+    /// Applies all needed updates, or undoes all others: in windows by number, in each by place. Updates that block
+    /// another one come before it. False if the caller stopped it.
     fn sweep(
         &mut self,
         mt: &impl ApplyUpdates,
@@ -97,12 +97,12 @@ impl Front {
             let size = window_size(self.applied_count);
             while done < words && window.updates.len() < size {
                 let word = if applied { done } else { words - 1 - done };
-                self.push_unlike(mt, wanted, word, applied, &mut window.updates);
+                self.push_pending(mt, wanted, word, applied, &mut window.updates);
                 done += 1;
             }
             window.sort(mt, &self.mesh);
             for &u in &window.updates {
-                self.turn(mt, u, applied, &mut staying, outcome)?;
+                self.apply_or_undo(mt, u, applied, &mut staying, outcome)?;
                 if !go_on(outcome) {
                     return Ok(false);
                 }
@@ -112,7 +112,7 @@ impl Front {
     }
 
     /// Appends the updates of a word that a sweep has to apply, by rising number, or to undo, by falling number.
-    fn push_unlike(
+    fn push_pending(
         &self,
         mt: &impl ApplyUpdates,
         wanted: Wanted<'_>,
@@ -136,9 +136,9 @@ impl Front {
         }
     }
 
-    /// Applies or undoes `u` and before it what is in the way. What has to stay for the sake of another update does so,
-    /// which happens where errors grow along the partial order.
-    fn turn(
+    /// Applies or undoes `u`, after the updates that block it. Where errors grow along the partial order, an update
+    /// stays applied if a needed one depends on it.
+    fn apply_or_undo(
         &mut self,
         mt: &impl ApplyUpdates,
         u: UpdateId,
@@ -149,10 +149,10 @@ impl Front {
         let mut next = Some(u).filter(|&u| self.contains(u) != applied);
         let mut waiting = Vec::new();
         while let Some(u) = next {
-            let turned =
+            let result =
                 if applied { mt.refine_marked(&mut self.mesh, u) } else { mt.coarsen(&mut self.mesh, u) };
-            // What depends on an update that is not here is as if it were not here itself.
-            let is_cut_off = match &turned {
+            // An update that depends on a missing one counts as missing.
+            let is_cut_off = match &result {
                 Ok(Applied::Blocked(other)) => applied && *other < u && !mt.has(*other),
                 Err(UpdateError::Missing { .. }) => applied && mt.present() < mt.info().updates,
                 _ => false,
@@ -160,7 +160,7 @@ impl Front {
             if is_cut_off {
                 return Ok(());
             }
-            next = match turned? {
+            next = match result? {
                 Applied::Done => {
                     self.note(u, applied);
                     *(if applied { &mut outcome.refined } else { &mut outcome.coarsened }) += 1;

@@ -7,7 +7,7 @@
 use super::Session;
 use crate::format::{DecodeOptions, Decoder, FormatError, Index, Progress};
 use crate::mt::{ErrorCode, Mt, MultiTessellation, UpdateId, UpdatePages};
-use crate::refine::{Criterion, Front, TetLook};
+use crate::refine::{Criterion, Front, TetData};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
@@ -206,7 +206,7 @@ impl Session {
             let bytes = self.blocks.as_mut().and_then(|blocks| blocks.waiting.remove(&block));
             self.decoder.take_block(block, &bytes.unwrap_or_default())?;
             if let (Some(front), Some(mt)) = (&mut self.front, self.decoder.mt()) {
-                front.arrived(mt, block);
+                front.page_inserted(mt, block);
             }
             next = self.next_complete();
         }
@@ -310,7 +310,7 @@ impl Session {
     fn free_memory(&mut self) {
         for block in self.blocks_to_drop() {
             let may_go = match (&mut self.front, self.decoder.mt()) {
-                (Some(front), Some(mt)) => front.leave(mt, block),
+                (Some(front), Some(mt)) => front.prepare_eviction(mt, block),
                 _ => false,
             };
             // Both have been checked, so neither refuses.
@@ -367,7 +367,7 @@ impl Session {
         if let (Some(front), Some(criterion), false) = (&self.front, &blocks.criterion, mt.needs_parents()) {
             let fields = self.decoder.wanted_fields();
             let bounds = |page: u32| errors_of(index, fields, page);
-            let telling = front.telling_pages(mt, &**criterion, |u| u.0 >> index.block_bits, bounds);
+            let telling = front.decisive_pages(mt, &**criterion, |u| u.0 >> index.block_bits, bounds);
             telling.into_iter().for_each(|block| is_needed[block as usize] = true);
         }
         let here = (0..index.blocks.len() as u32).filter(|&block| mt.has_page(block));
@@ -485,7 +485,7 @@ fn excess(
         let is_even = (b + 3 - a) % 3 == 1;
         let corners = if is_even { path } else { [path[0], path[1], path[3], path[2]] }.map(corner);
         let update = UpdateId(first);
-        let look = TetLook { corners: &corners, levels: &levels, error, errors, update };
+        let look = TetData { corners: &corners, levels: &levels, error, errors, update };
         largest = largest.max(criterion.rank(&look).excess);
     }
     largest

@@ -187,7 +187,7 @@ impl Session {
         let own = LodCriterion::new(mt.info(), request);
         let criterion = custom.iter().fold(own, |all, one| all.and(Arc::clone(one)));
         let criterion: Arc<dyn Criterion> = Arc::new(criterion);
-        front.aim(mt, Arc::clone(&criterion), request.budget);
+        front.request(mt, Arc::clone(&criterion), request.budget);
         self.request.clone_from(request);
         self.plan_for(criterion);
         Ok(())

@@ -20,7 +20,7 @@ pub struct Deviation<'a> {
     values: Vec<f64>,
     boundary: TriangleGrid,
     boundary_vertices: Vec<u32>,
-    /// Every so many vertices are looked at.
+    /// One in so many vertices is measured.
     stride: usize,
     /// Rounding errors of distances.
     slack: f64,
@@ -37,8 +37,8 @@ pub struct Measured {
 const DESCRIBED: usize = 3;
 
 impl<'a> Deviation<'a> {
-    /// Prepares to compare with `input`, which has to be what `info` says.
-    /// About `vertices` of the reference vertices are looked at.
+    /// Prepares to compare with `input`, which has to be what `info` says. About `vertices` of the reference vertices
+    /// are measured.
     pub fn new(info: &'a MtInfo, input: &'a TetMesh, vertices: usize) -> Result<Self, String> {
         let (points, tets) = (input.positions.len(), input.tets.len());
         if (points, tets) != (info.vertices as usize, info.tetrahedra as usize) {
@@ -88,7 +88,7 @@ impl<'a> Deviation<'a> {
         PlainReference { positions: self.points.points(), levels: &self.levels, tets: &self.input.tets }
     }
 
-    /// What each of the needs asks of the reference vertices; `bounds` are what is guaranteed.
+    /// The errors that each need allows at the reference vertices; `bounds` are the guaranteed ones.
     pub fn asks<'n>(&self, needs: &'n [Need], bounds: &[f64]) -> Vec<Ask<'n>> {
         let ask = |(need, &bound): (&'n Need, &f64)| {
             let mut ask = Ask::new(self.info, self.input, need, bound);
@@ -99,7 +99,7 @@ impl<'a> Deviation<'a> {
         needs.iter().zip(bounds).map(ask).collect()
     }
 
-    /// Measures `mesh` where it is asked for. `errors` are those of its tetrahedra.
+    /// Measures `mesh` where needs apply. `errors` are those of its tetrahedra.
     pub fn measure(&self, mesh: &PlainMesh<'_>, errors: &TetErrors, asks: &[Ask<'_>]) -> Measured {
         let border = Border::of(mesh, self.info);
         let largest = errors.of.iter().copied().fold(0.0, f64::max);
@@ -141,7 +141,7 @@ struct Look<'a> {
     asks: &'a [Ask<'a>],
 }
 
-/// A place in the mesh that may stand for a reference vertex.
+/// A place in the mesh that represents a reference vertex.
 struct Place {
     tet: u32,
     weights: [f64; 4],
@@ -150,7 +150,7 @@ struct Place {
 }
 
 impl Look<'_> {
-    /// The error at every reference vertex that is wanted.
+    /// The error at every reference vertex to which a need applies.
     fn at_vertices(&self, found: &mut Measured) {
         let points = self.of.points.points().len();
         // For each need and vertex, the least part of what is allowed.
@@ -176,7 +176,7 @@ impl Look<'_> {
             let mut failures = Failures::default();
             for point in (0..points).filter(|&point| ask.allowed[point] < f64::INFINITY) {
                 let inside = least[point * self.asks.len() + k];
-                // Inside there is one place that stands for it; only what the boundary has left outside has a choice.
+                // A vertex inside of the mesh has one place; only one outside of the moved boundary has a choice.
                 let ratio = if inside.is_finite() { inside } else { self.ratio_at_border(ask, point as u32) };
                 found.worst_ratio = found.worst_ratio.max(ratio);
                 if ratio > 1.0 {
@@ -198,8 +198,8 @@ impl Look<'_> {
         )
     }
 
-    /// The error with which a place stands for a reference vertex, as a part of what is allowed; 0 if the need does not reach
-    /// it because it is clearly on one side of all values.
+    /// The error of a place that represents a reference vertex, as a fraction of the allowed one; 0 if the vertex is on
+    /// one side of all values of the need.
     fn ratio(&self, ask: &Ask<'_>, point: u32, place: &Place) -> f64 {
         let fields = &self.of.info.fields;
         let tet = self.mesh.tets[place.tet as usize];
@@ -228,12 +228,13 @@ impl Look<'_> {
         found / ask.allowed[point as usize]
     }
 
-    /// The least part of what is allowed with which some place of the boundary stands for a reference vertex.
+    /// The least error, as a fraction of the allowed one, of the places on the boundary that may represent a reference
+    /// vertex.
     fn ratio_at_border(&self, ask: &Ask<'_>, point: u32) -> f64 {
         let p = DVec3::from(self.of.input.positions[point as usize]);
         let per_error = self.of.info.displacement_per_error;
         let allowed = ask.allowed[point as usize];
-        // Tetrahedra that values pass by, or whose colour does not matter, may have any error.
+        // Tetrahedra without these values, or with no visible change of colour, may have any error.
         let reach = match &ask.need.part {
             Part::Transfer(_) => self.largest,
             Part::Values(_) | Part::Both(..) => allowed.max(self.largest),
@@ -241,7 +242,7 @@ impl Look<'_> {
             Part::Everywhere | Part::Region(_) => allowed,
         };
         let mut least = f64::INFINITY;
-        // What the lattice has moved the vertex by is no displacement.
+        // The rounding of the vertex to the lattice is no displacement.
         let moved =
             p.distance(DVec3::from(self.of.info.lattice.point(self.of.points.points()[point as usize])));
         let slack = moved + self.of.slack;
@@ -310,7 +311,7 @@ impl Look<'_> {
     }
 }
 
-/// Failures of one kind: some in full, of the others their number.
+/// Failures of one kind: the first ones in full, and their number.
 #[derive(Default)]
 struct Failures {
     described: Vec<String>,

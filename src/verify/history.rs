@@ -1,4 +1,4 @@
-//! Is the answer to a request the same whatever was asked for before? Tried with many requests, compared by their meshes alone.
+//! Checks that the mesh of a request does not depend on earlier requests, with many requests.
 
 use super::{Query, VerifyReport, note, satisfy};
 use crate::geom::Bounds;
@@ -10,12 +10,12 @@ use crate::refine::{Front, Need, Request};
 const VALUES: usize = 60;
 const BOXES: usize = 12;
 
-/// Every so many requests the reference mesh comes before.
+/// One in so many requests starts from the reference mesh.
 const FULL: u32 = 3;
 
 const ERRORS: [f64; 5] = [0.01, 0.0, 0.003, 0.03, 0.001];
 
-/// Numbers that look random; the same on every run (Xorshift, Marsaglia 2003).
+/// Pseudo-random numbers; the same on every run (Xorshift, Marsaglia 2003).
 pub struct Numbers(pub u64);
 
 impl Numbers {

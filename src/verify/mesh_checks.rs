@@ -1,4 +1,4 @@
-//! Is this a valid conforming mesh? Asked of plain arrays, with nothing but sorting and exact orientation.
+//! Checks that a mesh is valid and conforming, from plain arrays, by sorting and exact orientation only.
 
 use crate::geom::{Groups, orient3d};
 use crate::mesh::{FACES, NONE, boundary_faces, stars};
@@ -93,7 +93,7 @@ impl<'a> PlainMesh<'a> {
         }
     }
 
-    /// Compares adjacency with what the sorted faces with least vertex `v` say. Appends those of the boundary.
+    /// Compares adjacency with the sorted faces of least vertex `v`. Appends those of the boundary.
     fn check_faces(&self, v: u32, faces: &[Face], boundary: &mut Vec<[u32; 3]>) -> Result<(), String> {
         let across = |at: u32| self.neighbors[at as usize / 4][at as usize % 4];
         for group in faces.chunk_by(|a, b| a.0 == b.0) {
@@ -123,7 +123,7 @@ impl<'a> PlainMesh<'a> {
     }
 }
 
-/// The tetrahedra around each vertex: what is looked at vertex by vertex needs no list of all faces or edges.
+/// The tetrahedra around each vertex: checks vertex by vertex need no list of all faces or edges.
 struct Around<'a> {
     tets: &'a [[u32; 4]],
     stars: Groups,

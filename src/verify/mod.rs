@@ -1,10 +1,10 @@
-//! Does an MT keep its promises? Every one of them, re-checked against the mesh that it was built from.
+//! Verification: checks all guarantees of an MT against the mesh that it was built from.
 //!
-//! Nothing here trusts what refinement says of itself: meshes are checked from their plain arrays, errors are
-//! measured at every reference vertex, and every request is answered twice, from the base mesh and from whatever
-//! mesh the request before it left.
+//! Verification does not rely on the results of refinement: it checks meshes from their plain arrays, measures errors
+//! at every reference vertex, and makes every request twice, from the base mesh and from the mesh of the request
+//! before.
 //!
-//! What is promised and checked, for regions, values, views, transfer functions, their unions, and budgets:
+//! It checks, for regions, values, views, transfer functions, their unions, and budgets:
 //! - **Full circle**: error 0 gives the reference mesh, tetrahedron for tetrahedron, on the lattice; error ∞ the base.
 //!   Where the MT was built from points, the mesh that it gives at error 0 has those points and no others.
 //! - **Order**: the error of an update is at least that of every update that depends on it, and by as much larger as requests for
@@ -17,11 +17,10 @@
 //!   of `d / displacement_per_error`. In a view, the error is compared with the one that fills the pixels at that vertex; with a
 //!   transfer function, the colour of the interpolated value with that of the vertex.
 //! - **Boundary**: no vertex of the extracted boundary is further from the reference boundary than the bound allows.
-//! - **Isovalues**: a reference vertex whose error is larger lies on the same side of every range of values as all of its
-//!   tetrahedron, so no part of an isosurface is missed and none is shown that is less accurate than asked for.
-//! - **Answers**: `satisfied` and the bounds are true, budgets are kept, a larger budget never has a larger excess, and the
-//!   same request gives the same mesh whatever was asked for before and in whatever steps it is answered; asking for it
-//!   again changes nothing.
+//! - **Isovalues**: a reference vertex whose error is larger lies on the same side of every range of values as all of
+//!   its tetrahedron, so every part of an isosurface is present and as accurate as requested.
+//! - **Answers**: `satisfied` and the bounds are true, budgets are kept, a larger budget never has a larger excess, and
+//!   the same request gives the same mesh after any other request and in any steps; repeating it changes nothing.
 //! - **History**: a hundred more requests for values all over the range and for boxes, in random order, each from the base mesh and
 //!   from others.
 //! - **Steps**: between them the mesh is valid and within the budget.
@@ -36,23 +35,23 @@ mod same;
 
 use crate::mesh::TetMesh;
 use crate::mt::{ApplyUpdates, ErrorCode, UpdateId, check_errors};
-use crate::refine::{Criterion, Front, LodCriterion, Need, Outcome, Part, Request, TetLook};
+use crate::refine::{Criterion, Front, LodCriterion, Need, Outcome, Part, Request, TetData};
 use deviation::{Deviation, TetErrors};
 use history::Numbers;
 use mesh_checks::PlainMesh;
 use queries::Query;
 use std::sync::Arc;
 
-/// What came of a verification.
+/// The result of a verification.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct VerifyReport {
-    /// Whether every promise was kept.
+    /// Whether all checks passed.
     pub valid: bool,
     /// Requests that were made, each from the base mesh and from another mesh.
     pub queries: u32,
-    /// The largest measured error as a fraction of what was promised there; at most 1 if the promise was kept.
+    /// The largest measured error as a fraction of the guaranteed one; at most 1 if the guarantee holds.
     pub worst_error_ratio: f64,
-    /// Promises that were broken: the request, the place and the numbers. At most [`MAX_FAILURES`].
+    /// Failed checks: the request, the place and the numbers. At most [`MAX_FAILURES`].
     pub failures: Vec<String>,
 }
 
@@ -68,8 +67,8 @@ pub enum Reference {
     Points,
 }
 
-/// Checks `mt` against `input`, what it was built from (repaired if need be: [`crate::mesh::repair`]), with requests of every
-/// kind. `on_progress` is told how many of how many steps are done.
+/// Checks `mt` against `input`, what it was built from (repaired if need be: [`crate::mesh::repair`]), with requests of
+/// every kind. `on_progress` gets the number of steps done and of all steps.
 pub fn run<M: ApplyUpdates>(
     mt: &M,
     input: &TetMesh,
@@ -84,10 +83,10 @@ pub fn run<M: ApplyUpdates>(
     with(mt, input, reference, &plan, on_progress)
 }
 
-/// How much of a verification is done where all of it would take too long.
+/// The extent of a partial verification, for very large meshes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sample {
-    /// Requests of each sort, at most: those whose answers are looked at, and those of which only the way there is varied.
+    /// The most requests of each sort: those whose meshes are checked in full, and those of the history check.
     pub requests: usize,
     /// About so many reference vertices, spread over the mesh, at which errors are measured.
     pub vertices: usize,
@@ -110,8 +109,8 @@ impl Sample {
     }
 }
 
-/// [`run`] on a sample of the requests and of the reference vertices: for very large meshes. What is checked of a mesh without
-/// requests, and that the meshes which come out are valid, is checked as there.
+/// [`run`] on a sample of the requests and of the reference vertices: for very large meshes. Checks that need no
+/// request, and the validity of the meshes, are complete.
 pub fn run_sample<M: ApplyUpdates>(
     mt: &M,
     input: &TetMesh,
@@ -144,13 +143,13 @@ pub fn run_requests<M: ApplyUpdates>(
     with(mt, input, reference, &plan, on_progress)
 }
 
-/// What is tried with an MT.
+/// The requests to make.
 struct Plan {
-    /// Requests whose answers are looked at from all sides.
+    /// Requests whose meshes are checked in full.
     queries: Vec<Query>,
-    /// Requests of which only the way there is varied.
+    /// Requests for which only the independence of earlier requests is checked.
     histories: Vec<Query>,
-    /// About how many reference vertices are looked at.
+    /// About how many reference vertices are measured.
     vertices: usize,
 }
 
@@ -174,7 +173,7 @@ fn with<M: ApplyUpdates>(
     report
 }
 
-/// Failures that leave nothing more to check are returned, the others noted.
+/// Returns failures after which nothing can be checked; notes the others.
 fn verify<M: ApplyUpdates>(
     mt: &M,
     input: &TetMesh,
@@ -205,7 +204,7 @@ fn verify<M: ApplyUpdates>(
     history::check(mt, &base, histories, &mut |i| on_progress(2 * first + i, steps), report)
 }
 
-/// Of two requests that differ in their budgets alone, the one that allows more must not be answered worse.
+/// Of two requests that differ in their budgets alone, the one with the larger budget must not have a larger excess.
 fn check_monotone(queries: &[Query], excesses: &[f64], report: &mut VerifyReport) {
     let most = |limit: Option<u64>| limit.unwrap_or(u64::MAX);
     for (small, less) in queries.iter().zip(excesses) {
@@ -236,7 +235,7 @@ fn note(report: &mut VerifyReport, place: &dyn std::fmt::Display, failure: &str)
     }
 }
 
-/// Refines the base mesh to the reference mesh and coarsens it again. Returns what is to hold of every mesh.
+/// Refines the base mesh to the reference mesh and coarsens it again. Returns the properties that every mesh must have.
 fn check_full_circle(
     mt: &impl ApplyUpdates,
     deviation: &Deviation<'_>,
@@ -262,7 +261,7 @@ fn check_full_circle(
     mesh_checks::Shape::of(&deviation.reference()).map_err(|failure| format!("the input: {failure}"))
 }
 
-/// Refinement relies on errors that do not grow from an update to those that depend on it.
+/// Checks that errors do not grow from an update to those that depend on it; refinement relies on that.
 fn check_order(mt: &impl ApplyUpdates, report: &mut VerifyReport) {
     let place = &"errors along the partial order";
     match check_errors(mt) {
@@ -272,7 +271,7 @@ fn check_order(mt: &impl ApplyUpdates, report: &mut VerifyReport) {
     }
 }
 
-/// Answers all queries again, in an order that jumps about, each from the mesh that the query before left, in steps.
+/// Makes all requests again, in a mixed order and in steps, each from the mesh of the one before.
 struct Walk<'a, M> {
     mt: &'a M,
     base: &'a Front,
@@ -281,7 +280,7 @@ struct Walk<'a, M> {
     numbers: Numbers,
 }
 
-/// Steps that a request is answered in, at most.
+/// The most steps of a request.
 const MOST_STEPS: u32 = 5;
 
 impl<M: ApplyUpdates> Walk<'_, M> {
@@ -314,7 +313,7 @@ impl<M: ApplyUpdates> Walk<'_, M> {
     }
 
     fn answer(&mut self, front: &mut Front, query: &Query, report: &mut VerifyReport) -> Result<(), String> {
-        front.aim(self.mt, Arc::new(query.criterion(self.mt.info())), query.request.budget);
+        front.request(self.mt, Arc::new(query.criterion(self.mt.info())), query.request.budget);
         for step in 1..=MOST_STEPS {
             let most = if step < MOST_STEPS { 1 << (self.numbers.next() % 16) } else { u64::MAX };
             let outcome = front
@@ -325,7 +324,7 @@ impl<M: ApplyUpdates> Walk<'_, M> {
             }
             let mesh = PlainMesh::of(front.mesh());
             let checked = check_budget(query, &mesh, self.base);
-            // Looking at all of the mesh takes time: once for each request is enough.
+            // A check of the whole mesh takes time: once for each request is enough.
             let checked = if step > 1 { checked } else { checked.and_then(|()| mesh.check(self.shape)) };
             if let Err(failure) = checked {
                 note(report, query, &format!("between steps, {failure}"));
@@ -436,9 +435,9 @@ impl<M: ApplyUpdates> Case<'_, M> {
             let levels = |field: usize| tet.map(|v| mesh.mesh.levels(v)[field]);
             let errors = self.own_errors(mesh, t, update);
             let error = errors.iter().max().copied().unwrap_or_default();
-            let look = TetLook { corners: &corners, levels: &levels, error, errors: &errors, update };
+            let look = TetData { corners: &corners, levels: &levels, error, errors: &errors, update };
             let verdict = criterion.rank(&look);
-            if verdict.asks() {
+            if verdict.violates() {
                 let error = look.error_of(criterion.field());
                 largest = (largest.0.max(error), f64::max(largest.1, verdict.excess));
             }
@@ -446,7 +445,7 @@ impl<M: ApplyUpdates> Case<'_, M> {
         largest
     }
 
-    /// Is what refinement says of the mesh true?
+    /// Checks the statistics of refinement.
     fn check_answer(&self, mesh: &PlainMesh<'_>) -> Result<(), String> {
         let request = &self.query.request;
         let Outcome { error: reported, excess, satisfied, done, .. } = *self.outcome;

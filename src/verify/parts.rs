@@ -1,4 +1,4 @@
-//! What a need asks of single reference vertices, by the formulas of the request alone.
+//! The error that a need allows at a reference vertex, by the formulas of the request alone.
 
 use super::mesh_checks::PlainMesh;
 use crate::mesh::TetMesh;
@@ -11,8 +11,8 @@ pub struct Ask<'a> {
     pub need: &'a Need,
     /// In the need's unit.
     pub bound: f64,
-    /// The error that each reference vertex may have, in the unit of `need` where that is one of colour, else as a fraction of
-    /// the field's range; infinite where nothing is asked.
+    /// The error that each reference vertex may have, in the unit of `need` where that is one of colour, else as a
+    /// fraction of the field's range; infinite outside of the need's part.
     pub allowed: Vec<f64>,
 }
 

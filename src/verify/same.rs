@@ -4,7 +4,7 @@ use super::mesh_checks::{PlainMesh, PlainReference};
 use crate::geom::orient3d;
 use crate::mt::mix;
 
-/// How often neighbourhoods are compared: vertices at one place with equal values are told apart by what is around.
+/// Rounds of comparing neighbourhoods: vertices at one place with equal values are distinguished by their neighbours.
 const ROUNDS: usize = 4;
 
 /// Compares the two meshes up to the numbering of vertices and tetrahedra. Vertices correspond by position and level;

@@ -1,8 +1,8 @@
 //! What a surface keeps of the mesh that it was cut out of, so that it can follow the changes.
 //!
-//! A mesh tells its changes by blocks. A copy of points and tetrahedra tells which entries of these blocks really
-//! changed. Stars are walked through faces; the number of tetrahedra at each point tells when the domain is
-//! pinched there, so that a walk does not reach them all.
+//! A mesh reports its changes by blocks. Comparing with a copy of points and tetrahedra finds the entries that really
+//! changed. Stars are walked through faces; the number of tetrahedra at each point tells when the domain is pinched
+//! there, so that a walk does not reach them all.
 
 use super::MeshView;
 use crate::mesh::{BitSet, NONE};
@@ -28,7 +28,7 @@ struct Star {
     count: u32,
 }
 
-/// Of so many points one is many.
+/// More than one in so many points are many.
 const MANY: usize = 32;
 
 /// What has really changed.
@@ -36,7 +36,7 @@ const MANY: usize = 32;
 pub(super) struct Dirty {
     /// Tetrahedra that have other points, or a point with another position or value; each once.
     pub tets: Vec<u32>,
-    /// Points that have changed or lost a tetrahedron; some may be gone, and some come several times.
+    /// Points that have changed or lost a tetrahedron; some may be gone, and some are listed several times.
     points: Vec<u32>,
 }
 
@@ -157,8 +157,7 @@ impl MeshSnapshot {
         dirty.points.extend(moved);
     }
 
-    /// Finds the tetrahedra around a point; false if they do not hang together through faces, so that some are
-    /// missing.
+    /// Finds the tetrahedra around a point; false if they are not connected through faces, so that some are missing.
     pub fn star(&mut self, mesh: &MeshView<'_>, point: u32, found: &mut Vec<u32>) -> bool {
         found.clear();
         let Star { tet, count } = self.stars[point as usize];
@@ -171,7 +170,7 @@ impl MeshSnapshot {
         while let Some(t) = found.get(next).map(|t| *t as usize) {
             next += 1;
             for (corner, n) in mesh.tets[t].into_iter().zip(mesh.neighbors[t]) {
-                // Most have been seen; only the others are looked at.
+                // Most have been visited; only the others are examined.
                 if corner != point && !self.seen.has(n) && has(n) {
                     self.seen.insert(n);
                     found.push(n);

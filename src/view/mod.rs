@@ -1,4 +1,4 @@
-//! What is to be seen, computed on the CPU from slices. Knows no MT.
+//! Surfaces and measurements of a mesh, computed on the CPU from slices, without an MT.
 
 mod boundary;
 mod colormap;
@@ -23,8 +23,8 @@ pub use stream::{StreamEnd, StreamPoint, Streamline, TraceOptions, Tracer};
 
 use std::ops::Range;
 
-/// What has changed of a surface since that was last asked: ranges in ascending order. Beyond the ends of the arrays
-/// everything is gone.
+/// The changes of a surface since the last call: ranges in ascending order. Beyond the ends of the arrays everything is
+/// gone.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SurfaceChanges {
     /// Changed ranges of vertices.

@@ -1,7 +1,7 @@
 //! Where points and lines are in a mesh, and what the field is there.
 //!
 //! A point is found by walking through neighbours towards it. Where the walk ends at the boundary, which in a domain
-//! that is not convex need not mean that the point is outside, all tetrahedra are asked or, when that happens more
+//! that is not convex need not mean that the point is outside, all tetrahedra are searched or, when that happens more
 //! often, a grid of boxes over the mesh. All decisions are exact (Shewchuk 1997) for the coordinates given.
 //!
 //! What holds: a point of the domain, its boundary included, is found, and one outside is not; of several tetrahedra
@@ -17,16 +17,16 @@ use std::collections::BTreeSet;
 /// where a line passes through points and edges of the mesh.
 const SHORTEST: f64 = 1e-12;
 
-/// Steps of a walk before it is given up: exact, it ends in every mesh that is usual, but can be led in a circle.
+/// The most steps of a walk: it ends in most meshes, but can run in a circle in some.
 const MOST_STEPS: u32 = 10_000;
 
 /// Steps from the place before, after which a grid is the shorter way.
 const NEAR_STEPS: u32 = 12;
 
-/// Points that are looked for in all tetrahedra before a grid is made.
+/// Points located by searching all tetrahedra before a grid is made.
 const MOST_SCANS: u32 = 8;
 
-/// Tetrahedra that are looked at for a good start of a walk.
+/// Tetrahedra tried as the start of a walk.
 const STARTS: usize = 16;
 
 /// A place in a tetrahedron.
@@ -114,7 +114,7 @@ impl<'a> Probe<'a> {
         Some(Place { tet, weights: weights(sides) })
     }
 
-    /// The places of many points, with a grid if that pays.
+    /// The locations of many points, with a grid if there are enough.
     ///
     /// # Panics
     /// As [`Probe::locate`].
@@ -212,7 +212,7 @@ impl<'a> Probe<'a> {
         best.map(|(_, t)| t)
     }
 
-    /// Walks towards a point; none if that ended at the boundary or nowhere, or takes too many steps.
+    /// Walks towards a point; none if the walk ends at the boundary or takes too many steps.
     fn walk(&self, start: u32, p: [f64; 3], most_steps: u32) -> Option<u32> {
         let (mut t, mut from) = (start, NONE);
         for step in 0..most_steps {
@@ -242,7 +242,7 @@ impl<'a> Probe<'a> {
         None
     }
 
-    /// The smallest of the tetrahedra that hold the point and hang together there.
+    /// The smallest of the tetrahedra that contain the point and are connected there.
     fn smallest(&self, tet: u32, p: [f64; 3]) -> u32 {
         let mut found = BTreeSet::from([tet]);
         let mut stack = vec![tet];
@@ -322,8 +322,8 @@ fn clipped(ends: &[[f64; 2]; 4]) -> Option<(f64, f64)> {
     (enter < leave).then_some((enter, leave))
 }
 
-/// A quick look whether a tetrahedron may meet a segment. Each point of the mesh has a bit for every plane around the
-/// segment that it lies beyond; a tetrahedron whose corners have one in common is apart.
+/// A quick test whether a tetrahedron may intersect a segment. Each point of the mesh has a bit for every plane around
+/// the segment that it lies beyond; a tetrahedron whose corners have one in common is apart.
 struct NearLine {
     beyond: Vec<u16>,
 }
@@ -408,7 +408,7 @@ impl Grid {
         Self { min, max, scale: [0.0; 3], dims: [1; 3], tets: Groups::default() }
     }
 
-    /// About so many boxes, about as long as wide. Found by doubling the number along the axis where boxes are longest.
+    /// About so many boxes, nearly cubes. Found by doubling the number along the axis where boxes are longest.
     fn set_dims(&mut self, boxes: f64) {
         let extent = [0, 1, 2].map(|i| self.max[i] - self.min[i]);
         let mut dims = [1_usize; 3];

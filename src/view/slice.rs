@@ -156,7 +156,7 @@ impl Slice {
         self.splice(mesh, &plane, &dirty);
     }
 
-    /// Cuts the dirty tetrahedra anew.
+    /// Cuts the dirty tetrahedra again.
     fn splice(&mut self, mesh: &MeshView<'_>, plane: &Plane, dirty: &[u32]) {
         let Self { pieces, indices, positions, values, sides, .. } = self;
         let piece = |t, _| sides_of(sides, mesh, t).map_or(Polygon::default(), |of| polygon(mesh, t, of));
@@ -192,7 +192,7 @@ impl Slice {
         pieces.mark_all();
     }
 
-    /// Which parts of the arrays have changed since this was last asked.
+    /// The parts of the arrays that have changed since the last call.
     pub fn take_changes(&mut self) -> SurfaceChanges {
         self.pieces.take_changes()
     }

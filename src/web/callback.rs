@@ -4,7 +4,7 @@ use super::error::WebError;
 use super::results::{floats, object};
 use crate::geom::Lattice;
 use crate::mt::{FieldInfo, MtInfo};
-use crate::refine::{ANY, Criterion, TetLook, Verdict};
+use crate::refine::{ANY, Criterion, TetData, Verdict};
 use js_sys::{Function, Object, Reflect};
 use std::cell::RefCell;
 use std::fmt;
@@ -49,7 +49,7 @@ impl Callback {
     }
 
     /// What the function says of some tetrahedra.
-    fn excesses(&self, tets: &[TetLook<'_>]) -> Result<Vec<f64>, String> {
+    fn excesses(&self, tets: &[TetData<'_>]) -> Result<Vec<f64>, String> {
         // Not held during the call: the function may do whatever it likes.
         let function = FUNCTIONS.with_borrow(|functions| functions.slots[self.slot].clone());
         let Some(function) = function else { return Ok(vec![0.0; tets.len()]) };
@@ -65,7 +65,7 @@ impl Callback {
         Ok(numbers.iter().map(|number| number.as_f64().unwrap_or(0.0).max(0.0)).collect())
     }
 
-    fn batch(&self, tets: &[TetLook<'_>]) -> Object {
+    fn batch(&self, tets: &[TetData<'_>]) -> Object {
         let mut positions = Vec::with_capacity(12 * tets.len());
         let mut values = Vec::with_capacity(4 * tets.len());
         let mut errors = Vec::with_capacity(tets.len());
@@ -103,11 +103,11 @@ impl Drop for Callback {
 }
 
 impl Criterion for Callback {
-    fn judge(&self, tet: &TetLook<'_>) -> Verdict {
+    fn judge(&self, tet: &TetData<'_>) -> Verdict {
         self.judge_all(std::slice::from_ref(tet)).pop().unwrap_or(Verdict::NEVER)
     }
 
-    fn judge_all(&self, tets: &[TetLook<'_>]) -> Vec<Verdict> {
+    fn judge_all(&self, tets: &[TetData<'_>]) -> Vec<Verdict> {
         let mut verdicts = Vec::with_capacity(tets.len());
         for batch in tets.chunks(BATCH) {
             let excesses = if failed() { Ok(Vec::new()) } else { self.excesses(batch) };
@@ -115,7 +115,11 @@ impl Criterion for Callback {
                 FUNCTIONS.with_borrow_mut(|functions| functions.failure = Some(problem));
                 Vec::new()
             });
-            verdicts.extend(excesses.into_iter().map(|excess| Verdict { excess, slack: 0.0, dial: ANY }));
+            verdicts.extend(excesses.into_iter().map(|excess| Verdict {
+                excess,
+                slack: 0.0,
+                component: ANY,
+            }));
         }
         // A function that fails asks for nothing from then on; the step returns its failure.
         verdicts.resize(tets.len(), Verdict::NEVER);

@@ -4,7 +4,7 @@
 use crate::support::meshes::{bent, cube, hilly, linear};
 use std::ops::ControlFlow;
 use tetralod::builder::{
-    BuildConfig, BuildError, BuildResult, Construction, Criterion, FieldPrecision, Method, build,
+    BuildConfig, BuildCriterion, BuildError, BuildResult, Construction, FieldPrecision, Method, build,
 };
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::mesh::{Field, TetMesh, VectorPart};
@@ -15,15 +15,15 @@ use tetralod::refine::Request;
 use tetralod::session::Session;
 
 /// Every kind with every way to build it.
-const WAYS: [(MtKind, Method, Criterion); 8] = [
-    (MtKind::Edge, Method::Collapse, Criterion::HalfEdge),
-    (MtKind::Explicit, Method::Collapse, Criterion::HalfEdge),
-    (MtKind::Vertex, Method::Decimate, Criterion::HalfEdge),
-    (MtKind::Vertex, Method::Decimate, Criterion::Delaunay),
-    (MtKind::Explicit, Method::Decimate, Criterion::HalfEdge),
-    (MtKind::Vertex, Method::Insert, Criterion::Delaunay),
-    (MtKind::Explicit, Method::Insert, Criterion::Delaunay),
-    (MtKind::Explicit, Method::Decimate, Criterion::Delaunay),
+const WAYS: [(MtKind, Method, BuildCriterion); 8] = [
+    (MtKind::Edge, Method::Collapse, BuildCriterion::HalfEdge),
+    (MtKind::Explicit, Method::Collapse, BuildCriterion::HalfEdge),
+    (MtKind::Vertex, Method::Decimate, BuildCriterion::HalfEdge),
+    (MtKind::Vertex, Method::Decimate, BuildCriterion::Delaunay),
+    (MtKind::Explicit, Method::Decimate, BuildCriterion::HalfEdge),
+    (MtKind::Vertex, Method::Insert, BuildCriterion::Delaunay),
+    (MtKind::Explicit, Method::Insert, BuildCriterion::Delaunay),
+    (MtKind::Explicit, Method::Decimate, BuildCriterion::Delaunay),
 ];
 
 fn try_build(mesh: &TetMesh, config: &BuildConfig) -> Result<BuildResult, BuildError> {

@@ -3,12 +3,12 @@
 use crate::support::meshes::blocks;
 use crate::support::random::Random;
 use std::ops::ControlFlow;
-use tetralod::builder::{BuildConfig, Construction, Criterion, Method, build};
+use tetralod::builder::{BuildConfig, BuildCriterion, Construction, Method, build};
 use tetralod::mesh::{FACES, NONE, TetMesh};
 use tetralod::mt::{CurrentMesh, Mt, MtKind, MultiTessellation};
 use tetralod::refine::{Front, LodCriterion, Request};
 
-fn made(mesh: &TetMesh, kind: MtKind, criterion: Criterion) -> Mt {
+fn made(mesh: &TetMesh, kind: MtKind, criterion: BuildCriterion) -> Mt {
     let method = if kind == MtKind::Edge { Method::Collapse } else { Method::Decimate };
     let construction = Construction::new(kind, method, criterion).expect("they go together");
     let config = BuildConfig { construction, ..BuildConfig::of(MtKind::Edge) };
@@ -44,9 +44,9 @@ fn noisy_boxes_and_notched_ones_keep_their_faces() {
         // One outlier makes the rest small, so that errors of a few percent take away nearly all.
         mesh.fields[0].values[100] = 20_000.0;
         for (kind, criterion) in [
-            (MtKind::Edge, Criterion::HalfEdge),
-            (MtKind::Vertex, Criterion::HalfEdge),
-            (MtKind::Vertex, Criterion::Delaunay),
+            (MtKind::Edge, BuildCriterion::HalfEdge),
+            (MtKind::Vertex, BuildCriterion::HalfEdge),
+            (MtKind::Vertex, BuildCriterion::Delaunay),
         ] {
             let mt = made(&mesh, kind, criterion);
             let at = |axis: usize, part: f64| {

@@ -5,7 +5,7 @@
 use crate::support::meshes::built;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
-use tetralod::builder::{BuildConfig, Construction, Criterion, Method, build};
+use tetralod::builder::{BuildConfig, BuildCriterion, Construction, Method, build};
 use tetralod::mesh::{Grid, TetMesh, repair};
 use tetralod::mt::{ApplyUpdates, MtKind};
 use tetralod::verify::Reference;
@@ -31,9 +31,9 @@ fn check(name: &str, mesh: &TetMesh, most: u32) {
     let base = built.summary.base_vertices;
     assert!(base <= most, "{name}: {base} vertices in the base mesh");
     for (kind, method, criterion) in [
-        (MtKind::HalfEdge, Method::Decimate, Criterion::HalfEdge),
-        (MtKind::Vertex, Method::Decimate, Criterion::Delaunay),
-        (MtKind::Vertex, Method::Insert, Criterion::Delaunay),
+        (MtKind::HalfEdge, Method::Decimate, BuildCriterion::HalfEdge),
+        (MtKind::Vertex, Method::Decimate, BuildCriterion::Delaunay),
+        (MtKind::Vertex, Method::Insert, BuildCriterion::Delaunay),
     ] {
         // Insertion fills the convex hull; of these meshes, only the grids do.
         if method == Method::Insert && mesh.grid.is_none() {

@@ -12,7 +12,7 @@ use crate::support::random::Random;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use tetralod::builder::{BuildConfig, Construction, Criterion, FieldPrecision, Method};
+use tetralod::builder::{BuildConfig, BuildCriterion, Construction, FieldPrecision, Method};
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::generate;
 use tetralod::mesh::{Field, TetMesh};
@@ -155,13 +155,13 @@ fn insertions_into_tetrahedra_are_read_alike() {
     }
 }
 
-const METHODS: [(Method, Criterion); 3] = [
-    (Method::Decimate, Criterion::HalfEdge),
-    (Method::Decimate, Criterion::Delaunay),
-    (Method::Insert, Criterion::Delaunay),
+const METHODS: [(Method, BuildCriterion); 3] = [
+    (Method::Decimate, BuildCriterion::HalfEdge),
+    (Method::Decimate, BuildCriterion::Delaunay),
+    (Method::Insert, BuildCriterion::Delaunay),
 ];
 
-fn built(mesh: &TetMesh, (method, criterion): (Method, Criterion), config: BuildConfig) -> Mt {
+fn built(mesh: &TetMesh, (method, criterion): (Method, BuildCriterion), config: BuildConfig) -> Mt {
     let construction = Construction::new(MtKind::Vertex, method, criterion).expect("they go together");
     let config = BuildConfig { construction, ..config };
     tetralod::builder::build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a valid mesh").mt
@@ -333,7 +333,8 @@ fn a_changed_formula_would_be_noticed() {
 fn exact_values_are_read_alike() {
     let flow = generate::sphere_flow(6).expect("a small size");
     for (kind, method) in [(MtKind::Vertex, Method::Decimate), (MtKind::Edge, Method::Collapse)] {
-        let construction = Construction::new(kind, method, Criterion::HalfEdge).expect("they go together");
+        let construction =
+            Construction::new(kind, method, BuildCriterion::HalfEdge).expect("they go together");
         let config = BuildConfig { construction, all_lossless: true, ..precise(12, 9) };
         let built = tetralod::builder::build(&flow, &config, &mut |_| ControlFlow::Continue(()));
         let built = built.expect("a valid mesh");
@@ -369,7 +370,7 @@ fn compare_exact(file: &File, changes: &[Change], expected: &[Exact]) {
 fn errors_of_tetrahedra_are_read_alike() {
     let mesh = generate::bucky(7).expect("a size that is allowed");
     for kind in [MtKind::Vertex, MtKind::Explicit] {
-        let construction = Construction::new(kind, Method::Insert, Criterion::Delaunay)
+        let construction = Construction::new(kind, Method::Insert, BuildCriterion::Delaunay)
             .and_then(Construction::with_tet_errors)
             .expect("they go together");
         let config = BuildConfig { construction, ..BuildConfig::of(MtKind::Edge) };

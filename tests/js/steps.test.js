@@ -255,7 +255,7 @@ for (const worker of [true, false]) {
       const mt = await open();
       const delta = await mt.refine({ error: "5%" }, { deltas: true });
       const later = await mt.refine({ error: "1%" }, { deltas: true });
-      assert.throws(() => applyChanges(emptyMesh(), later), /leads on from mesh number 1/);
+      assert.throws(() => applyChanges(emptyMesh(), later), /applies to mesh number 1/);
       assert.throws(() => applyChanges(applyChanges(emptyMesh(), delta), delta), TetralodError);
       assert.throws(() => applyChanges(emptyMesh(), { ...delta, tets: delta.tets.subarray(4) }), TetralodError);
       assert.throws(() => applyChanges(emptyMesh(), { ...delta, tetCount: 3 }), TetralodError);

@@ -12,7 +12,7 @@ use tetralod::mt::{
     ApplyUpdates, ForestChild, HalfEdgeMt, HalfEdgeUpdate, Mt, MultiTessellation, PageError, UpdateId,
     UpdatePages, VertexId,
 };
-use tetralod::refine::{Budget, Criterion, Front, LodCriterion, Need, Part, Request, TetLook, Values};
+use tetralod::refine::{Budget, Criterion, Front, LodCriterion, Need, Part, Request, TetData, Values};
 
 struct Paged {
     subject: Subject,
@@ -45,7 +45,7 @@ impl Paged {
         let updates = self.whole.page_updates(page);
         let records: Vec<_> = updates.map(|u| self.whole.update(UpdateId(u)).expect("a whole MT")).collect();
         self.mt.insert_page(page, &records).expect("it is not here");
-        front.arrived(&self.mt, page);
+        front.page_inserted(&self.mt, page);
     }
 
     /// The updates that are here with all that they depend on.
@@ -65,8 +65,8 @@ impl Paged {
                 let tet = explicit.tets()[t as usize].map(VertexId);
                 let corners = tet.map(|v| explicit.position(v));
                 let levels = |field: usize| tet.map(|v| explicit.levels(v)[field]);
-                let look = TetLook { corners: &corners, levels: &levels, error, errors, update };
-                criterion.judge(&look).asks()
+                let look = TetData { corners: &corners, levels: &levels, error, errors, update };
+                criterion.judge(&look).violates()
             })
         };
         (0..explicit.updates()).filter(|&u| among[u as usize] && asks(u)).collect()
@@ -125,7 +125,7 @@ fn explore(mut paged: Paged, random: &mut Random) {
             let Some(&page) = choice.get(random.below(choice.len().max(1))) else { continue };
             if !leaving {
                 paged.insert(&mut front, page);
-            } else if front.leave(&paged.mt, page) {
+            } else if front.prepare_eviction(&paged.mt, page) {
                 paged.mt.remove_page(page).expect("it is here");
             }
         }
@@ -133,7 +133,7 @@ fn explore(mut paged: Paged, random: &mut Random) {
             now = request(&paged.subject, random);
         }
         // Pages may come and go while the front is on its way.
-        front.aim(&paged.mt, Arc::new(LodCriterion::new(paged.mt.info(), &now)), now.budget);
+        front.request(&paged.mt, Arc::new(LodCriterion::new(paged.mt.info(), &now)), now.budget);
         let most = random.below(20) as u64;
         front.step(&paged.mt, &mut |done| done.refined + done.coarsened < most).expect("a sound MT");
         front.mesh().check().expect("a valid mesh");
@@ -202,7 +202,7 @@ fn demanded_pages_are_enough_and_all_in_use() {
                 )
                 .expect("a sound MT");
             for page in here {
-                assert!(front.leave(&paged.mt, page), "nothing is applied");
+                assert!(front.prepare_eviction(&paged.mt, page), "nothing is applied");
                 paged.mt.remove_page(page).expect("it is here");
             }
         }
@@ -277,7 +277,7 @@ fn small_steps_end_where_a_large_one_does() {
                 1..5 => Budget { tets: Some(2 * tets), ..Budget::default() },
                 _ => Budget { tets: Some(random.below(tets as usize) as u32), ..Budget::default() },
             };
-            front.aim(mt, criterion.clone(), budget);
+            front.request(mt, criterion.clone(), budget);
             let most = 1 + random.below(12) as u64;
             // Some are given up on the way.
             let mut left = if random.below(3) == 0 { random.below(8) } else { usize::MAX };

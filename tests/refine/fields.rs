@@ -4,7 +4,7 @@
 use crate::subjects::{SUBJECTS, applied};
 use crate::support::meshes::{cube, hilly};
 use std::ops::ControlFlow;
-use tetralod::builder::{BuildConfig, Construction, Criterion, Method, build};
+use tetralod::builder::{BuildConfig, BuildCriterion, Construction, Method, build};
 use tetralod::geom::Bounds;
 use tetralod::mt::{EdgeMt, MtKind, MultiTessellation, UpdateId};
 use tetralod::refine::{LodCriterion, Need, Request, RequestError};
@@ -72,7 +72,8 @@ fn what_is_promised_of_a_field_holds_for_every_builder() {
         (MtKind::Vertex, Method::Decimate),
         (MtKind::Vertex, Method::Insert),
     ] {
-        let criterion = if method == Method::Insert { Criterion::Delaunay } else { Criterion::HalfEdge };
+        let criterion =
+            if method == Method::Insert { BuildCriterion::Delaunay } else { BuildCriterion::HalfEdge };
         let fields = names.clone();
         let construction = Construction::new(kind, method, criterion).expect("they go together");
         let config = BuildConfig { construction, fields, ..BuildConfig::of(MtKind::Edge) };

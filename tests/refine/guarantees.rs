@@ -14,7 +14,7 @@ use tetralod::geom::Bounds;
 use tetralod::mesh::{TetMesh, repair};
 use tetralod::mt::{ApplyUpdates, ExplicitMt, Mt, MultiTessellation, UpdateId, VertexId};
 use tetralod::refine::{
-    Budget, Criterion, Front, LodCriterion, Need, Region, Request, TetLook, Transfer, View,
+    Budget, Criterion, Front, LodCriterion, Need, Region, Request, TetData, Transfer, View,
 };
 use tetralod::verify::Reference;
 use tetralod::{generate, io, verify};
@@ -86,8 +86,8 @@ fn asked(explicit: &ExplicitMt, criterion: &LodCriterion) -> Vec<bool> {
         let corners = tet.map(|v| explicit.position(v));
         let levels = |field: usize| tet.map(|v| explicit.levels(v)[field]);
         let (error, errors) = (explicit.error(u), explicit.errors(u));
-        let look = TetLook { corners: &corners, levels: &levels, error, errors, update: u };
-        criterion.judge(&look).asks()
+        let look = TetData { corners: &corners, levels: &levels, error, errors, update: u };
+        criterion.judge(&look).violates()
     };
     let updates = (0..explicit.updates()).map(UpdateId);
     updates.map(|u| explicit.removed(u).iter().any(|&t| violates(u, t))).collect()

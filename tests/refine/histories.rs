@@ -5,7 +5,7 @@ use crate::support::files::encoded;
 use crate::support::meshes::{blocks, tampered};
 use crate::support::random::Random;
 use std::ops::ControlFlow;
-use tetralod::builder::{BuildConfig, Construction, Criterion, Method, build};
+use tetralod::builder::{BuildConfig, BuildCriterion, Construction, Method, build};
 use tetralod::format::{EncodeError, EncodeOptions};
 use tetralod::mesh::TetMesh;
 use tetralod::mt::{
@@ -24,8 +24,8 @@ fn noisy(cells: [u32; 3], noise: f64, seed: u64) -> TetMesh {
 
 fn made(mesh: &TetMesh, kind: MtKind) -> Mt {
     let (method, criterion) = match kind {
-        MtKind::Edge => (Method::Collapse, Criterion::HalfEdge),
-        _ => (Method::Decimate, Criterion::HalfEdge),
+        MtKind::Edge => (Method::Collapse, BuildCriterion::HalfEdge),
+        _ => (Method::Decimate, BuildCriterion::HalfEdge),
     };
     let construction = Construction::new(kind, method, criterion).expect("they go together");
     let config = BuildConfig { construction, ..BuildConfig::of(MtKind::Edge) };

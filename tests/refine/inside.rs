@@ -4,16 +4,16 @@
 use crate::at_vertices::{errors_inside, refined};
 use crate::support::meshes::blocks;
 use std::ops::ControlFlow;
-use tetralod::builder::{BuildConfig, Construction, Criterion, Method, build};
+use tetralod::builder::{BuildConfig, BuildCriterion, Construction, Method, build};
 use tetralod::mesh::TetMesh;
 use tetralod::mt::{Mt, MtKind, MultiTessellation};
 
 /// The kinds and builders that move a boundary.
-const WAYS: [(MtKind, Method, Criterion); 4] = [
-    (MtKind::Edge, Method::Collapse, Criterion::HalfEdge),
-    (MtKind::Vertex, Method::Decimate, Criterion::HalfEdge),
-    (MtKind::HalfEdge, Method::Decimate, Criterion::HalfEdge),
-    (MtKind::Vertex, Method::Decimate, Criterion::Delaunay),
+const WAYS: [(MtKind, Method, BuildCriterion); 4] = [
+    (MtKind::Edge, Method::Collapse, BuildCriterion::HalfEdge),
+    (MtKind::Vertex, Method::Decimate, BuildCriterion::HalfEdge),
+    (MtKind::HalfEdge, Method::Decimate, BuildCriterion::HalfEdge),
+    (MtKind::Vertex, Method::Decimate, BuildCriterion::Delaunay),
 ];
 
 /// Layers of cells around a part of a cylinder, or of a sphere, that are the thinner the nearer they are to it, across which the field
@@ -48,7 +48,7 @@ fn rough() -> TetMesh {
     boundary_layer([24, 12, 9], 1.5, 0.003, field)
 }
 
-fn made(mesh: &TetMesh, (kind, method, criterion): (MtKind, Method, Criterion)) -> Mt {
+fn made(mesh: &TetMesh, (kind, method, criterion): (MtKind, Method, BuildCriterion)) -> Mt {
     let construction = Construction::new(kind, method, criterion).expect("they go together");
     let config = BuildConfig { construction, ..BuildConfig::default() };
     build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt

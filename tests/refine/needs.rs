@@ -8,7 +8,7 @@ use std::sync::Arc;
 use tetralod::geom::{Bounds, Camera};
 use tetralod::mt::{ErrorCode, MultiTessellation, UpdateId};
 use tetralod::refine::{
-    ANY, Budget, Criterion, Custom, Front, LodCriterion, Need, Region, Request, TetLook, Transfer, Verdict,
+    ANY, Budget, Criterion, Custom, Front, LodCriterion, Need, Region, Request, TetData, Transfer, Verdict,
     View,
 };
 
@@ -152,7 +152,7 @@ proptest! {
             let request = request(subject, &wishes);
             prop_assert_eq!(request.check(subject.mt.info()), Ok(()));
             let criterion = LodCriterion::new(subject.mt.info(), &request);
-            front.aim(&subject.mt, Arc::new(criterion.clone()), request.budget);
+            front.request(&subject.mt, Arc::new(criterion.clone()), request.budget);
             let outcome = loop {
                 let mut left = updates;
                 let mut go_on = |_: &_| { left -= 1; left > 0 };
@@ -197,7 +197,7 @@ proptest! {
             };
             let request = Request { budget, ..request(subject, &wishes) };
             let criterion = LodCriterion::new(info, &request);
-            front.aim(&subject.mt, Arc::new(criterion.clone()), budget);
+            front.request(&subject.mt, Arc::new(criterion.clone()), budget);
             let outcome = loop {
                 let mut left = updates;
                 let outcome = front.step(&subject.mt, &mut |_| { left -= 1; left > 0 }).expect("a valid MT");
@@ -244,9 +244,9 @@ struct LodScaled {
 }
 
 impl Criterion for LodScaled {
-    fn judge(&self, tet: &TetLook<'_>) -> Verdict {
+    fn judge(&self, tet: &TetData<'_>) -> Verdict {
         let verdict = self.criterion.rank(tet);
-        Verdict { excess: if verdict.excess >= self.by { 2.0 } else { 0.0 }, slack: 0.0, dial: ANY }
+        Verdict { excess: if verdict.excess >= self.by { 2.0 } else { 0.0 }, slack: 0.0, component: ANY }
     }
 }
 
@@ -288,12 +288,12 @@ proptest! {
         let level = |f: usize| levels.map(|x| (x * f64::from((1 << info.fields[f].bits) - 1)) as i32);
         let error = ErrorCode::at_least(error * error);
         let errors = &[error; 3];
-        let look = TetLook { corners: &corners, levels: &level, error, errors, update: UpdateId(3) };
+        let look = TetData { corners: &corners, levels: &level, error, errors, update: UpdateId(3) };
         let [old, new] = [&before, &after].map(|criterion| criterion.judge(&look));
-        let distance = after.turned(&before, old.dial);
+        let distance = after.component_distance(&before, old.component);
         prop_assert!(distance <= after.distance(&before));
-        prop_assert!(old.asks() == new.asks() || old.slack <= distance, "{:?} {:?} {}", old, new, distance);
-        prop_assert_eq!(old.asks(), before.rank(&look).asks());
+        prop_assert!(old.violates() == new.violates() || old.slack <= distance, "{:?} {:?} {}", old, new, distance);
+        prop_assert_eq!(old.violates(), before.rank(&look).violates());
         prop_assert_eq!(before.distance(&before), 0.0);
     }
 }

@@ -10,7 +10,7 @@ use tetralod::mt::{
     ApplyUpdates, EdgeMt, EdgeUpdate, ErrorCode, MultiTessellation, PageError, UpdateError, UpdateId,
     UpdatePages, VertexId,
 };
-use tetralod::refine::{Budget, Criterion, Front, LodCriterion, Need, Request, TetLook};
+use tetralod::refine::{Budget, Criterion, Front, LodCriterion, Need, Request, TetData};
 
 /// A subject in pages, with what each depends on.
 struct Paged<'a> {
@@ -57,12 +57,12 @@ impl<'a> Paged<'a> {
 
     fn insert(&mut self, front: &mut Front, page: u32) {
         self.mt.insert_page(page, &self.splits(page)).expect("what it depends on is here");
-        front.arrived(&self.mt, page);
+        front.page_inserted(&self.mt, page);
     }
 
     /// Whether the page was let go.
     fn remove(&mut self, front: &mut Front, page: u32) -> bool {
-        let gone = front.leave(&self.mt, page);
+        let gone = front.prepare_eviction(&self.mt, page);
         if gone {
             self.mt.remove_page(page).expect("nothing depends on it");
         }
@@ -102,8 +102,8 @@ fn is_missing(paged: &Paged<'_>, set: &[bool], criterion: &LodCriterion) -> bool
             let update = UpdateId(explicit.updates());
             let error = ErrorCode::MAX;
             criterion
-                .judge(&TetLook { corners: &corners, levels: &levels, error, errors: &errors, update })
-                .asks()
+                .judge(&TetData { corners: &corners, levels: &levels, error, errors: &errors, update })
+                .violates()
         })
 }
 
@@ -148,7 +148,7 @@ fn explore(subject: &Subject, bits: u32, random: &mut Random) {
             now = request(subject, random);
         }
         // Pages may come and go while the front is on its way.
-        front.aim(&paged.mt, std::sync::Arc::new(LodCriterion::new(paged.mt.info(), &now)), now.budget);
+        front.request(&paged.mt, std::sync::Arc::new(LodCriterion::new(paged.mt.info(), &now)), now.budget);
         let most = random.below(20) as u64;
         front.step(&paged.mt, &mut |done| done.refined + done.coarsened < most).expect("a sound MT");
         front.mesh().check().expect("a valid mesh");
@@ -249,7 +249,7 @@ fn what_cannot_come_or_go_changes_nothing() {
     assert_eq!(paged.mt, before);
     let all = LodCriterion::new(paged.mt.info(), &Request::within(0.0));
     front.satisfy(&paged.mt, &all, Budget::default()).expect("a sound MT");
-    assert!((0..=page).filter(|&p| paged.has(p)).all(|p| !front.leave(&paged.mt, p)));
+    assert!((0..=page).filter(|&p| paged.has(p)).all(|p| !front.prepare_eviction(&paged.mt, p)));
     let mut mesh = front.mesh().clone();
     let absent = UpdateId(16 * (last - 1));
     assert!(!paged.mt.has(absent));

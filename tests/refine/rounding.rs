@@ -5,7 +5,7 @@ use crate::at_vertices::{errors_inside, refined};
 use crate::support::meshes::blocks;
 use crate::support::random::Random;
 use std::ops::ControlFlow;
-use tetralod::builder::{BuildConfig, Construction, Criterion, Method, build};
+use tetralod::builder::{BuildConfig, BuildCriterion, Construction, Method, build};
 use tetralod::mesh::TetMesh;
 use tetralod::mt::{CurrentMesh, Mt, MtInfo, MtKind, MultiTessellation};
 use tetralod::verify::Reference;
@@ -32,8 +32,8 @@ fn layers(thinnest: f64) -> TetMesh {
 
 fn made(mesh: &TetMesh, kind: MtKind, position_bits: Option<u32>) -> Mt {
     let (method, criterion) = match kind {
-        MtKind::Edge => (Method::Collapse, Criterion::HalfEdge),
-        _ => (Method::Decimate, Criterion::HalfEdge),
+        MtKind::Edge => (Method::Collapse, BuildCriterion::HalfEdge),
+        _ => (Method::Decimate, BuildCriterion::HalfEdge),
     };
     let construction = Construction::new(kind, method, criterion).expect("they go together");
     let config = BuildConfig { construction, position_bits, ..BuildConfig::default() };

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::sync::LazyLock;
 use tetralod::mesh::TetMesh;
 use tetralod::mt::{CurrentMesh, EdgeMt, ExplicitMt, MultiTessellation, UpdateId, VertexId};
-use tetralod::refine::{Criterion, Front, LodCriterion, Outcome, Request, TetLook};
+use tetralod::refine::{Criterion, Front, LodCriterion, Outcome, Request, TetData};
 
 /// An MT, its input and its oracle.
 pub struct Subject {
@@ -61,8 +61,8 @@ impl Subject {
         let tet = self.explicit.tets()[t as usize].map(VertexId);
         let corners = tet.map(|v| self.explicit.position(v));
         let levels = |field: usize| tet.map(|v| self.explicit.levels(v)[field]);
-        let look = TetLook { corners: &corners, levels: &levels, error, errors, update: u };
-        criterion.judge(&look).asks().then_some(u)
+        let look = TetData { corners: &corners, levels: &levels, error, errors, update: u };
+        criterion.judge(&look).violates().then_some(u)
     }
 
     /// The update that removes a tetrahedron of the explicit MT.

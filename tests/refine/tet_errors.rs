@@ -6,19 +6,19 @@ use crate::support::random::Random;
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::sync::{Arc, LazyLock};
-use tetralod::builder::{BuildConfig, BuildResult, Construction, Criterion as BuiltBy, Method, build};
+use tetralod::builder::{BuildConfig, BuildCriterion, BuildResult, Construction, Method, build};
 use tetralod::format::{Decoder, EncodeOptions, encode};
 use tetralod::geom::{Bounds, orient3d};
 use tetralod::mesh::{Field, TetMesh};
 use tetralod::mt::{
     ApplyUpdates, CurrentMesh, ErrorCode, ExplicitMt, Mt, MtKind, MultiTessellation, UpdateId, VertexId,
 };
-use tetralod::refine::{Criterion, Front, LodCriterion, Need, Region, Request, TetLook};
+use tetralod::refine::{Criterion, Front, LodCriterion, Need, Region, Request, TetData};
 use tetralod::verify;
 use tetralod::verify::Reference;
 
 fn config(mesh: &TetMesh, kind: MtKind, tet_errors: bool) -> BuildConfig {
-    let plain = Construction::new(kind, Method::Insert, BuiltBy::Delaunay).expect("they go together");
+    let plain = Construction::new(kind, Method::Insert, BuildCriterion::Delaunay).expect("they go together");
     BuildConfig {
         construction: if tet_errors { plain.with_tet_errors().expect("they go together") } else { plain },
         fields: mesh.fields.iter().map(|field| field.name.clone()).collect(),
@@ -72,8 +72,8 @@ impl Subject {
         let tet = self.explicit.tets()[t as usize].map(VertexId);
         let corners = tet.map(|v| self.explicit.position(v));
         let levels = |field: usize| tet.map(|v| self.explicit.levels(v)[field]);
-        let look = TetLook { corners: &corners, levels: &levels, error, errors: &errors, update };
-        criterion.judge(&look).asks().then_some(update.0)
+        let look = TetData { corners: &corners, levels: &levels, error, errors: &errors, update };
+        criterion.judge(&look).violates().then_some(update.0)
     }
 
     /// The least set that holds the remover of every violating tetrahedron of the base mesh or of one of its updates, and the
@@ -233,7 +233,7 @@ fn a_request_gives_the_least_set_whatever_was_asked_for_before() {
             let wanted = subject.closure(&criterion, updates);
             // At times in several steps, or broken off by another request.
             if step % 3 == 1 {
-                vertex.aim(&subject.vertex, Arc::new(criterion.clone()), request.budget);
+                vertex.request(&subject.vertex, Arc::new(criterion.clone()), request.budget);
                 let most = random.bits() % 40;
                 vertex.step(&subject.vertex, &mut |done| done.refined + done.coarsened < most).unwrap();
             }
@@ -389,7 +389,7 @@ fn every_promise_is_kept() {
 #[test]
 fn other_methods_refuse() {
     for (kind, method) in [(MtKind::Vertex, Method::Decimate), (MtKind::Edge, Method::Collapse)] {
-        let plain = Construction::new(kind, method, BuiltBy::HalfEdge).expect("they go together");
+        let plain = Construction::new(kind, method, BuildCriterion::HalfEdge).expect("they go together");
         let error = plain.with_tet_errors().unwrap_err();
         assert!(error.to_string().contains("method insert"), "{error}");
     }

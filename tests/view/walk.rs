@@ -2,7 +2,7 @@
 
 use crate::support::random::Random;
 use std::ops::{ControlFlow, Range};
-use tetralod::builder::{BuildConfig, Construction, Criterion, Method, build};
+use tetralod::builder::{BuildConfig, BuildCriterion, Construction, Method, build};
 use tetralod::mesh::TetMesh;
 use tetralod::mt::{
     Applied, ApplyUpdates, CurrentMesh, MeshChanges, Mt, MtKind, MultiTessellation, UpdateId, UpdatePages,
@@ -36,7 +36,8 @@ pub struct Walk {
 impl Walk {
     pub fn new(mesh: &TetMesh, (kind, method): (MtKind, Method)) -> Self {
         let fields = mesh.fields.iter().map(|field| field.name.clone()).collect();
-        let criterion = if method == Method::Insert { Criterion::Delaunay } else { Criterion::HalfEdge };
+        let criterion =
+            if method == Method::Insert { BuildCriterion::Delaunay } else { BuildCriterion::HalfEdge };
         let construction = Construction::new(kind, method, criterion).expect("they go together");
         let config = BuildConfig { construction, fields, ..BuildConfig::of(MtKind::Edge) };
         let mt = build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt;

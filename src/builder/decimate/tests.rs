@@ -1,9 +1,9 @@
 //! Promises: what is removed can be inserted again, step by step, in sound meshes; errors bound the deviation.
 
-use super::{Criterion, Decimated, Decimator, Levels, Reference, State, WorkMesh, decimate, quantize};
-use crate::builder::beside::Home;
+use super::{BuildCriterion, Decimated, Decimator, Levels, Reference, State, WorkMesh, decimate, quantize};
 use crate::builder::cost::largest;
 use crate::builder::gift_wrap::GiftWrap;
+use crate::builder::location::Location;
 use crate::builder::reach::Reach;
 use crate::builder::sequence::Insertion;
 use crate::builder::{BuildConfig, BuildError, Purpose};
@@ -14,13 +14,13 @@ use glam::{DMat3, DVec3};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 
-const CRITERIA: [Criterion; 2] = [Criterion::HalfEdge, Criterion::Delaunay];
+const CRITERIA: [BuildCriterion; 2] = [BuildCriterion::HalfEdge, BuildCriterion::Delaunay];
 
 /// Every criterion, and every purpose.
-const WAYS: [(Criterion, Purpose); 3] = [
-    (Criterion::HalfEdge, Purpose::Uniform),
-    (Criterion::HalfEdge, Purpose::Regions),
-    (Criterion::Delaunay, Purpose::Uniform),
+const WAYS: [(BuildCriterion, Purpose); 3] = [
+    (BuildCriterion::HalfEdge, Purpose::Uniform),
+    (BuildCriterion::HalfEdge, Purpose::Regions),
+    (BuildCriterion::Delaunay, Purpose::Uniform),
 ];
 
 fn hilly([x, y, z]: [f64; 3]) -> f64 {
@@ -78,11 +78,11 @@ fn domains() -> Vec<(&'static str, TetMesh)> {
     ]
 }
 
-fn built(mesh: &TetMesh, criterion: Criterion) -> Decimated {
+fn built(mesh: &TetMesh, criterion: BuildCriterion) -> Decimated {
     built_for(mesh, criterion, Purpose::default())
 }
 
-fn built_for(mesh: &TetMesh, criterion: Criterion, purpose: Purpose) -> Decimated {
+fn built_for(mesh: &TetMesh, criterion: BuildCriterion, purpose: Purpose) -> Decimated {
     let fields = mesh.fields.iter().map(|field| field.name.clone()).collect();
     let config = BuildConfig { fields, ..BuildConfig::of(MtKind::Edge) };
     decimate(mesh, &config, (criterion, purpose), &mut |_| ControlFlow::Continue(())).expect("a valid mesh")
@@ -253,13 +253,13 @@ fn is_within(
         values(result, tet, at).is_some_and(|values| field_error(result, point, &values) <= bound)
     };
     let step = DVec3::from_array(result.quantized.lattice.step);
-    let beside = |&(t, face): &(usize, [u32; 3])| {
+    let location = |&(t, face): &(usize, [u32; 3])| {
         let corner = |v: u32| DVec3::from_array(result.quantized.positions[v as usize].map(f64::from)) * step;
         let nearest = nearest_on_triangle(at * step, face.map(corner));
         let distance = nearest.distance(at * step);
         distance <= bound * result.displacement_per_error + 1e-9 && fits(tets[t], nearest / step)
     };
-    tets.iter().any(|tet| fits(*tet, at)) || border.iter().any(beside)
+    tets.iter().any(|tet| fits(*tet, at)) || border.iter().any(location)
 }
 
 /// How far a reference vertex is from the boundary.
@@ -364,7 +364,7 @@ fn the_boundary_moves_by_a_part_of_the_edges_there() {
 fn a_box_stays_delaunay() {
     let mut mesh = blocks([4; 3], |_| true);
     mesh.grid = Some(Grid { dims: [5; 3], origin: [0.0; 3], spacing: [0.25; 3] });
-    let result = built(&mesh, Criterion::Delaunay);
+    let result = built(&mesh, BuildCriterion::Delaunay);
     let at = |v: u32| result.quantized.positions[v as usize];
     let mut replay = Replay::new(&result.sequence.base);
     assert_eq!(replay.0.len(), 6, "a cube of six");
@@ -438,9 +438,10 @@ fn the_work_can_be_stopped() {
 fn a_boundary_that_may_not_move_costs_all() {
     let mesh = bent(blocks([4; 3], |_| true));
     let config = BuildConfig { displacement: 0.0, ..BuildConfig::of(MtKind::Edge) };
-    let result =
-        decimate(&mesh, &config, (Criterion::HalfEdge, Purpose::Uniform), &mut |_| ControlFlow::Continue(()))
-            .expect("a valid mesh");
+    let result = decimate(&mesh, &config, (BuildCriterion::HalfEdge, Purpose::Uniform), &mut |_| {
+        ControlFlow::Continue(())
+    })
+    .expect("a valid mesh");
     let mut replay = Replay::new(&result.sequence.base);
     let moves = |step: &&Insertion| step.step > 0.0;
     assert!(
@@ -483,7 +484,7 @@ fn the_removals_of_a_round_are_independent() {
             let levels = Levels::of_purpose(purpose);
             let reference = Reference::new(&quantized, &work, 1.0, f64::INFINITY);
             let state = State::new(work, reference, topology.non_manifold, levels);
-            let wrap = (criterion == Criterion::Delaunay).then(|| GiftWrap::new(&quantized.positions));
+            let wrap = (criterion == BuildCriterion::Delaunay).then(|| GiftWrap::new(&quantized.positions));
             let mut decimator = Decimator::new(state, wrap);
             // The removal that made each tetrahedron, and the boxes of the removals.
             let mut makers: BTreeMap<[u32; 4], usize> = BTreeMap::new();
@@ -532,7 +533,7 @@ fn vertices_outside_of_their_tetrahedra_are_known() {
     let middle = (0..).zip(&mesh.tets).find(|(_, tet)| tet.contains(&(4 * 81 + 4 * 9 + 4)));
     let (tet, _) = middle.expect("the vertex in the middle has tetrahedra");
     quantized.places[0] -= DVec3::splat(0.4);
-    quantized.homes = vec![Home { point: 0, tet, lambda: DVec3::ZERO, outside: true }];
+    quantized.locations = vec![Location { point: 0, tet, lambda: DVec3::ZERO, outside: true }];
     let topology = topology(mesh.positions.len(), &mesh.tets).expect("a conforming mesh");
     let work = WorkMesh::new(mesh.tets.clone(), topology.neighbors, mesh.positions.len());
     let reference = Reference::new(&quantized, &work, 1.0, f64::INFINITY);
@@ -545,7 +546,7 @@ fn vertices_outside_of_their_tetrahedra_are_known() {
         let State { mesh: now, buckets, .. } = &decimator.state;
         let own = (0..now.tets.len() as u32).find(|&t| buckets.inside.iter(t).any(|point| point == 0));
         buckets_of_it.insert(own.expect("it is in a bucket"));
-        assert!(buckets.strays.is_outside(0), "after {before} removals");
+        assert!(buckets.outside_points.is_outside(0), "after {before} removals");
         let after = decimator.sequence.steps.len();
         if !decimator.rounds.end(after - before, mesh.positions.len() - after) {
             break;

@@ -287,7 +287,7 @@ impl EdgeMt {
     }
 
     /// Takes the updates of a page away, none of which may be applied to a mesh that is still in use; that mesh must have
-    /// been told before, by [`Front::leave`](crate::refine::Front::leave). What depends on the page must have gone before.
+    /// been told before, by [`Front::prepare_eviction`](crate::refine::Front::prepare_eviction). What depends on the page must have gone before.
     ///
     /// # Errors
     /// If the page is not here, or another one that is splits a vertex of it. The MT is as it was then.

@@ -279,7 +279,7 @@ impl HalfEdgeMt {
     }
 
     /// Takes the updates of a page away, none of which may be applied to a mesh that is still in use; that mesh must have
-    /// been told before, by [`Front::leave`](crate::refine::Front::leave).
+    /// been told before, by [`Front::prepare_eviction`](crate::refine::Front::prepare_eviction).
     ///
     /// # Errors
     /// If the page is not here.

@@ -18,7 +18,7 @@ impl BlockRanges {
         self.0.iter().enumerate().filter(move |(_, range)| spans(range)).map(|(block, _)| block)
     }
 
-    /// Whether so many blocks are passed by `value` that looking for them is not worth while.
+    /// Whether `value` is in the ranges of so many blocks that selecting them is not worth while.
     pub fn is_passed_widely(&self, value: f32) -> bool {
         2 * self.blocks_at(value).count() > self.0.len()
     }

@@ -112,7 +112,7 @@ impl Gradients {
         self.means[start..].iter_mut().for_each(divide);
     }
 
-    /// Sets the gradient anew at a point where it is known, from the tetrahedra around it.
+    /// Recomputes the known gradient of a point from the tetrahedra around it.
     pub fn set(&mut self, mesh: &MeshView<'_>, point: u32, star: &mut [u32]) {
         let mean = &mut self.means[self.slots[point as usize] as usize];
         *mean = sum_of(mesh, star);

@@ -84,9 +84,9 @@ enum State {
     /// Nothing: there was no mesh yet.
     #[default]
     New,
-    /// The mesh of so many points and tetrahedra that came last.
+    /// The last mesh had so many points and tetrahedra.
     Of(usize, usize),
-    /// That too, but with normals of another kind.
+    /// The same, but the normals are of another kind.
     Stale,
 }
 
@@ -114,8 +114,7 @@ impl IsoSurface {
         self.extract_all(mesh, &[value]);
     }
 
-    /// Replaces this surface by those of `mesh` at `values`, one after the other; a value that comes again counts
-    /// once.
+    /// Replaces this surface by those of `mesh` at `values`, one after the other; duplicate values count once.
     ///
     /// Costs one pass over the tetrahedra for each value, and one for the normals if there is a surface.
     ///
@@ -132,7 +131,7 @@ impl IsoSurface {
         self.pieces.take_changes()
     }
 
-    /// Extracts everything anew, with the help of what is known of the mesh.
+    /// Extracts the whole surface, using the block ranges if there are any.
     fn rebuild(&mut self, mesh: &MeshView<'_>, isovalues: Vec<f32>) {
         let points = mesh.positions.len();
         self.isovalues = isovalues;
@@ -239,13 +238,13 @@ fn fraction(crossing: &Crossing, mesh: &MeshView<'_>, value: f32) -> f64 {
     crossing.fraction(f64::from(value), |end| f64::from(mesh.field[end as usize]))
 }
 
-/// In place of a normal that cannot be told.
+/// In place of an undefined normal.
 const NO_NORMAL: [f32; 3] = [0.0; 3];
 
 /// The normal of a vertex that has no other.
 const UP: [f32; 3] = [0.0, 0.0, 1.0];
 
-/// The isovalues as the field is rounded, without those that come again and those that are no number.
+/// The isovalues rounded like the field, without duplicates and NaN.
 fn distinct(values: &[f64]) -> Vec<f32> {
     let mut distinct = Vec::with_capacity(values.len());
     for value in values.iter().map(|value| *value as f32) {

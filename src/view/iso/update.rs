@@ -1,8 +1,8 @@
 //! Surfaces that follow a changing mesh.
 //!
-//! A surface learns what it must know for that step by step, so that who asks only once does not pay: the first
-//! extraction is a plain one; when the mesh then changes a little, or not at all, a copy of the mesh is made beside
-//! the second one; from then on tetrahedra that have changed are cut anew, and nothing else is.
+//! The data for updates is built step by step, so that a single extraction costs nothing extra: the first extraction is
+//! a plain one; the second one also makes a copy of the mesh, if that has changed by little; from then on only changed
+//! tetrahedra are cut again.
 
 use super::gradients::unit;
 use super::{
@@ -25,9 +25,9 @@ impl IsoSurface {
     /// or update only in these ranges of points and tetrahedra, and in what lies beyond the ends of shorter or longer
     /// arrays.
     ///
-    /// What it costs goes with what has changed: the ranges, which are compared with a copy, and the stars of points
-    /// that differ. Another isovalue, or another kind of normals, is extracted anew, where the field passes it; so is
-    /// everything when more than an eighth has changed.
+    /// The cost grows with the changes: the ranges, which are compared with a copy, and the stars of points that
+    /// differ. For other isovalues or another kind of normals, or when more than an eighth has changed, the surface is
+    /// extracted again.
     ///
     /// # Panics
     /// If the mesh names a point that it does not have.
@@ -68,7 +68,7 @@ impl IsoSurface {
         }
     }
 
-    /// Cuts the dirty tetrahedra anew.
+    /// Cuts the dirty tetrahedra again.
     fn splice(&mut self, mesh: &MeshView<'_>, dirty: &Dirty) {
         let Self { pieces, indices, isovalues, .. } = self;
         let piece = |t, which| polygon(mesh, t, isovalues[which as usize]);
@@ -127,7 +127,7 @@ impl IsoSurface {
         }
     }
 
-    /// Sets gradients anew that are not what they were, and adds the vertices that use them.
+    /// Recomputes changed gradients, and adds the vertices that use them.
     fn renew_gradients(&mut self, mesh: &MeshView<'_>, dirty: &Dirty, renew: &mut Vertices) {
         self.gradients.resize(mesh.positions.len());
         let Some(followed) = &mut self.followed else { return };

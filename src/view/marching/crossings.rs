@@ -12,9 +12,9 @@ pub(in crate::view) struct Crossing {
     pub which: u32,
 }
 
-/// All crossings, and a table to find them in.
+/// All crossings, and a hash table of them.
 ///
-/// The table is an open one with linear probing, at most half full. Nothing ever goes through it in its order.
+/// The table uses open addressing with linear probing and is at most half full. Nothing depends on its order.
 #[derive(Clone, Debug, Default)]
 pub(in crate::view) struct Crossings {
     /// One per vertex of the surface.
@@ -61,9 +61,9 @@ fn between(a: f32, b: f32, t: f64) -> f32 {
 }
 
 impl Crossings {
-    /// Takes out all crossings.
+    /// Removes all crossings.
     pub fn clear(&mut self) {
-        // Of a table that was much too large only as much stays as the last surface could use.
+        // Shrinks a table that is much too large for the last surface.
         let size = self.table.len().min((4 * self.list.len()).next_power_of_two().max(SMALLEST));
         self.list.clear();
         self.reset(size);
@@ -90,7 +90,7 @@ impl Crossings {
         let crossing = Crossing { ends, which };
         let mask = self.table.len().wrapping_sub(1);
         let mut at = self.start(crossing);
-        // A place that is free names a vertex that is not there.
+        // A free place contains `NONE`, which is no vertex.
         while let Some(vertex) = self.table.get(at & mask) {
             match self.list.get(*vertex as usize) {
                 Some(found) if *found == crossing => return *vertex,
@@ -117,7 +117,7 @@ impl Crossings {
         vertex
     }
 
-    /// Takes out vertex `v`; the last one takes its number.
+    /// Removes vertex `v`; the last one takes its number.
     pub fn swap_remove(&mut self, v: u32) {
         let hole = self.find(self.list[v as usize], v);
         self.free(hole);
@@ -139,7 +139,7 @@ impl Crossings {
         at
     }
 
-    /// Frees a place, and moves up what would not be found beyond it (Knuth, algorithm R of 6.4).
+    /// Frees a place, and moves entries that could not be found any more (Knuth, algorithm R of 6.4).
     fn free(&mut self, mut hole: usize) {
         let mask = self.table.len() - 1;
         let mut at = hole;

@@ -1,5 +1,5 @@
-//! What an edited surface has to know: the triangles of each tetrahedron and the triangles at each vertex, as lists
-//! that run through arrays.
+//! The lists of an edited surface: the triangles of each tetrahedron and the triangles at each vertex, as lists that
+//! run through arrays.
 
 use crate::mesh::NONE;
 
@@ -32,12 +32,12 @@ impl Links {
         links
     }
 
-    /// There are `tets` tetrahedra; those that go have no triangles.
+    /// Sets the number of tetrahedra; removed ones have no triangles.
     pub fn resize(&mut self, tets: usize) {
         self.heads.resize(tets, NONE);
     }
 
-    /// There are at least `vertices` vertices.
+    /// Makes space for so many vertices.
     pub fn make_room(&mut self, vertices: usize) {
         self.first.resize(vertices, NONE);
     }
@@ -46,7 +46,7 @@ impl Links {
         self.heads.len()
     }
 
-    /// Adds triangle `triangle`, the next one or one that was taken out.
+    /// Adds triangle `triangle`, the next one or one that was removed.
     pub fn put(&mut self, triangle: usize, indices: &[[u32; 3]], owner: u32) {
         if triangle == self.next.len() {
             self.next.push(NONE);
@@ -102,7 +102,7 @@ impl Links {
         }
     }
 
-    /// What names a corner in the list of vertex `v`.
+    /// The link to a corner in the list of vertex `v`.
     fn link_to(&mut self, v: u32, corner: u32) -> &mut u32 {
         let mut before = NONE;
         let mut at = self.first[v as usize];

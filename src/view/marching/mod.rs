@@ -1,8 +1,8 @@
 //! Surfaces cut out of a mesh by a function that is linear in every tetrahedron: marching tetrahedra, from scratch or kept
 //! up at the cost of what has changed.
 //!
-//! Who owns a surface gives the [`Polygon`] of each tetrahedron and sets what belongs to the vertices; [`Pieces`] shares the
-//! vertices among the polygons and knows whose each triangle is. What holds:
+//! The owner of a surface gives the [`Polygon`] of each tetrahedron and sets the data of the vertices; [`Pieces`]
+//! shares vertices among the polygons and records the tetrahedron of each triangle. Invariants:
 //! - Pieces of neighbouring tetrahedra share their vertices: one for each crossed edge or touched point. Every vertex
 //!   belongs to a triangle.
 //! - From scratch, triangles come in the order of their tetrahedra and vertices in the order in which they are first named.
@@ -26,7 +26,7 @@ pub(super) struct Pieces {
     owners: Vec<u32>,
     /// How many tetrahedra the mesh has.
     tets: usize,
-    /// There from the first edit after an extraction on.
+    /// Present from the first edit after an extraction on.
     links: Option<Box<Links>>,
     changed_vertices: ChangedBlocks,
     changed_triangles: ChangedBlocks,
@@ -60,7 +60,7 @@ struct Edit {
 const NO_TRIANGLE: [u32; 3] = [NONE; 3];
 
 impl Pieces {
-    /// Nothing, for a mesh of so many tetrahedra.
+    /// Removes all pieces, for a mesh of so many tetrahedra.
     pub fn clear(&mut self, tets: usize) {
         assert!(tets < 1 << 31, "too many tetrahedra");
         self.tets = tets;
@@ -69,7 +69,7 @@ impl Pieces {
         self.crossings.clear();
     }
 
-    /// How many tetrahedra the mesh had that came last.
+    /// Number of tetrahedra of the last mesh.
     pub fn tets(&self) -> usize {
         self.tets
     }
@@ -103,7 +103,7 @@ impl Pieces {
             .take_while(|(triangle, _)| triangle[0] != NONE)
     }
 
-    /// Everything is new to who asks for changes.
+    /// Marks everything as changed.
     pub fn mark_all(&mut self) {
         self.changed_vertices = ChangedBlocks::all(self.crossings.list.len());
         self.changed_triangles = ChangedBlocks::all(self.owners.len());
@@ -137,15 +137,15 @@ impl Pieces {
         self.owners.iter().map(sides).collect()
     }
 
-    /// Gets to know which triangles each tetrahedron and each vertex has.
+    /// Builds the lists of triangles of each tetrahedron and each vertex.
     pub fn follow(&mut self, triangles: &[[u32; 3]]) {
         let Self { tets, crossings, owners, .. } = self;
         self.links
             .get_or_insert_with(|| Box::new(Links::new(*tets, crossings.list.len(), triangles, owners)));
     }
 
-    /// Cuts the `dirty` tetrahedra anew, in `surfaces` surfaces, and takes away those from number `tets` on. Gives the
-    /// vertices whose place may have changed, and which may be new or unused.
+    /// Cuts the `dirty` tetrahedra again, in `surfaces` surfaces, and removes those from number `tets` on. Returns the
+    /// vertices whose position may have changed; some may be new or unused.
     pub fn recut(
         &mut self,
         triangles: &mut Vec<[u32; 3]>,
@@ -210,7 +210,7 @@ impl Pieces {
         }
     }
 
-    /// Has `set` place those of the vertices that are used; it tells whether that changes them. Those from number `old` on are
+    /// Calls `set` for the used vertices; it returns whether their position has changed. Those from number `old` on are
     /// new.
     pub fn place_again(
         &mut self,
@@ -225,7 +225,7 @@ impl Pieces {
         }
     }
 
-    /// Whether a tetrahedron has triangles in a surface that was [cut anew](Self::recut).
+    /// Whether a tetrahedron has triangles in a surface that was [recut](Self::recut).
     pub fn has_piece(&self, t: u32) -> bool {
         self.triangles_in(t).next().is_some()
     }
@@ -235,7 +235,7 @@ impl Pieces {
         self.links.as_ref().is_none_or(|links| links.is_used(v))
     }
 
-    /// The triangles at a vertex of a surface that was [cut anew](Self::recut).
+    /// The triangles at a vertex of a surface that was [recut](Self::recut).
     pub fn fan(&self, v: u32) -> impl Iterator<Item = u32> {
         self.links.iter().flat_map(move |links| links.fan(v))
     }

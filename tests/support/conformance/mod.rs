@@ -9,7 +9,7 @@ use crate::support::oracle::sorted;
 use crate::support::random::Random;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::ops::ControlFlow;
-use tetralod::builder::{BuildConfig, BuildResult, Construction, Criterion, Method, build};
+use tetralod::builder::{BuildConfig, BuildCriterion, BuildResult, Construction, Method, build};
 use tetralod::mesh::{Field, TetMesh};
 use tetralod::mt::{
     ApplyUpdates, CurrentMesh, EdgeMt, ExplicitMt, ExplicitUpdate, HalfEdgeMt, Mt, MtKind, MultiTessellation,
@@ -21,13 +21,14 @@ use tetralod::mt::{
 pub struct How {
     pub kind: MtKind,
     pub method: Method,
-    pub criterion: Criterion,
+    pub criterion: BuildCriterion,
 }
 
-pub const EDGE: How = How { kind: MtKind::Edge, method: Method::Collapse, criterion: Criterion::HalfEdge };
+pub const EDGE: How =
+    How { kind: MtKind::Edge, method: Method::Collapse, criterion: BuildCriterion::HalfEdge };
 pub const SPELLED_EDGE: How = How { kind: MtKind::Explicit, ..EDGE };
 pub const HALF_EDGE: How = How { kind: MtKind::Vertex, method: Method::Decimate, ..EDGE };
-pub const DELAUNAY: How = How { criterion: Criterion::Delaunay, ..HALF_EDGE };
+pub const DELAUNAY: How = How { criterion: BuildCriterion::Delaunay, ..HALF_EDGE };
 pub const INSERTED: How = How { method: Method::Insert, ..DELAUNAY };
 pub const PAGED: How = How { kind: MtKind::HalfEdge, ..HALF_EDGE };
 pub const SPELLED_VERTEX: How = How { kind: MtKind::Explicit, ..HALF_EDGE };

@@ -3,14 +3,13 @@
 //! Cells may be thinner than the lattice moves points: a point then lies in a cell that does not even have it as a corner. Errors are
 //! measured at the input's own points, so each point that the lattice has moved is in the bucket of such a cell from the start.
 
-use super::cost::SLACK;
-use super::quantize::Quantized;
+use super::points::{SLACK, as_vec, barycentric};
 use crate::mesh::{MeshError, NONE};
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
 /// A point of the input, and the cell on the lattice that it lies in or is least outside of.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Home {
+pub(super) struct Location {
     pub point: u32,
     pub tet: u32,
     /// Barycentric coordinates there, but for the first one.
@@ -18,56 +17,62 @@ pub(super) struct Home {
     pub outside: bool,
 }
 
-/// The homes of all points that the lattice has moved and that are corners of a cell.
-pub(super) fn homes(tets: &[[u32; 4]], quantized: &Quantized) -> Result<Vec<Home>, MeshError> {
-    let points = 0..quantized.positions.len() as u32;
-    if !points.clone().any(|point| quantized.is_moved(point)) {
+/// The locations of all points that the lattice has moved from `places` to `positions` and that are corners of a cell.
+pub(super) fn locations(
+    tets: &[[u32; 4]],
+    positions: &[[i32; 3]],
+    places: &[DVec3],
+) -> Result<Vec<Location>, MeshError> {
+    let points = 0..positions.len() as u32;
+    let is_moved = |point: u32| places[point as usize] != as_vec(positions[point as usize]);
+    if !points.clone().any(is_moved) {
         return Ok(Vec::new());
     }
     let neighbors = crate::mesh::neighbors(tets)?;
-    let mut first = vec![NONE; quantized.positions.len()];
+    let mut first = vec![NONE; positions.len()];
     for (t, tet) in (0..).zip(tets) {
         tet.iter().for_each(|&v| first[v as usize] = t);
     }
-    let mut search = Search { tets, neighbors: &neighbors, quantized, found: Vec::new() };
-    let moved = points.filter(|&point| quantized.is_moved(point) && first[point as usize] != NONE);
-    Ok(moved.map(|point| search.home(point, first[point as usize])).collect())
+    let mut search = Search { tets, neighbors: &neighbors, positions, places, found: Vec::new() };
+    let moved = points.filter(|&point| is_moved(point) && first[point as usize] != NONE);
+    Ok(moved.map(|point| search.locate(point, first[point as usize])).collect())
 }
 
 struct Search<'a> {
     tets: &'a [[u32; 4]],
     neighbors: &'a [[u32; 4]],
-    quantized: &'a Quantized,
-    /// The cells that have been reached, in this order.
+    positions: &'a [[i32; 3]],
+    places: &'a [DVec3],
+    /// The cells found so far, in the order of the search.
     found: Vec<u32>,
 }
 
 impl Search<'_> {
-    /// Goes from a cell at the point through all that are near the way from where the lattice has put it to where it was.
-    fn home(&mut self, point: u32, first: u32) -> Home {
-        let (place, rounded) = (self.quantized.places[point as usize], self.quantized.rounded(point));
+    /// Searches the cells whose bounding boxes touch that of the point before and after rounding, starting at `first`.
+    fn locate(&mut self, point: u32, first: u32) -> Location {
+        let (place, rounded) = (self.places[point as usize], as_vec(self.positions[point as usize]));
         let (low, high) = (place.min(rounded), place.max(rounded));
         self.found.clear();
         self.found.push(first);
-        let mut best = Home { point, tet: first, lambda: DVec3::ZERO, outside: true };
+        let mut best = Location { point, tet: first, lambda: DVec3::ZERO, outside: true };
         let mut deepest = f64::NEG_INFINITY;
         let mut next = 0;
         while next < self.found.len() {
             let t = self.found[next];
             next += 1;
-            let corners = self.tets[t as usize].map(|v| self.quantized.rounded(v));
+            let corners = self.tets[t as usize].map(|v| as_vec(self.positions[v as usize]));
             let lambda = barycentric(corners) * (place - corners[0]);
             let depth = lambda.min_element().min(1.0 - lambda.element_sum());
             if depth > deepest {
                 deepest = depth;
-                best = Home { tet: t, lambda, ..best };
+                best = Location { tet: t, lambda, ..best };
             }
             if depth >= 0.0 {
                 break;
             }
             for n in self.neighbors[t as usize].into_iter().filter(|&n| n != NONE) {
                 let tet = self.tets[n as usize];
-                let corners = tet.map(|v| self.quantized.rounded(v));
+                let corners = tet.map(|v| as_vec(self.positions[v as usize]));
                 let least = corners.into_iter().fold(DVec3::INFINITY, DVec3::min);
                 let most = corners.into_iter().fold(DVec3::NEG_INFINITY, DVec3::max);
                 let is_near = least.cmple(high).all() && most.cmpge(low).all();
@@ -76,12 +81,6 @@ impl Search<'_> {
                 }
             }
         }
-        Home { outside: deepest < -SLACK, ..best }
+        Location { outside: deepest < -SLACK, ..best }
     }
-}
-
-/// `(λ_1, λ_2, λ_3)` of a point are this times its position relative to corner 0.
-fn barycentric([a, b, c, d]: [DVec3; 4]) -> DMat3 {
-    // Cells are positive on the lattice, so the matrix is regular.
-    DMat3::from_cols(b - a, c - a, d - a).inverse()
 }

@@ -1,0 +1,164 @@
+//! Reference vertices outside of the tetrahedron in whose bucket they are.
+//!
+//! Such a vertex is in the bucket of the tetrahedron whose boundary triangle was nearest (see [`super::cost`]). When
+//! the boundary moves again, another tetrahedron may come to contain it. The vertex is then *foreign* there: the field
+//! is compared at foreign vertices as at those in the bucket, so the error of every tetrahedron bounds the deviation at
+//! all reference vertices inside. A foreign vertex also stays in its own bucket, for meshes without the other
+//! tetrahedron.
+
+use super::points::Lists;
+use glam::DVec3;
+
+/// The reference vertices outside of the tetrahedra in whose buckets they are.
+pub(super) struct OutsidePoints {
+    /// Whether a vertex is outside of the tetrahedron in whose bucket it is.
+    outside: Vec<bool>,
+    /// Whether a vertex is foreign to some tetrahedron.
+    is_foreign: Vec<bool>,
+    /// The foreign vertices of each tetrahedron.
+    foreign: Lists,
+    grid: Grid,
+    /// All that have ever been outside, by cell of the grid.
+    cells: Lists,
+    known: Vec<bool>,
+}
+
+/// A regular grid over all reference vertices.
+struct Grid {
+    places: Vec<DVec3>,
+    low: DVec3,
+    /// Cells in a unit of length.
+    density: DVec3,
+    cells: usize,
+}
+
+/// The most cells along an axis.
+const MOST_CELLS: usize = 128;
+
+impl OutsidePoints {
+    /// Of a mesh with so many tetrahedra and vertices at these places.
+    pub fn new(tets: usize, places: Vec<DVec3>) -> Self {
+        let points = places.len();
+        let grid = Grid::new(places);
+        Self {
+            outside: vec![false; points],
+            is_foreign: vec![false; points],
+            foreign: Lists::new(tets, points),
+            cells: Lists::new(grid.cells.pow(3), points),
+            known: vec![false; points],
+            grid,
+        }
+    }
+
+    /// The vertices of other buckets that the replacement of these tetrahedra may contain: their foreign vertices and,
+    /// if the boundary changes inside of the box `changed`, those in the box that no tetrahedron contains.
+    pub fn candidates(
+        &self,
+        tets: impl Iterator<Item = u32>,
+        changed: Option<[DVec3; 2]>,
+    ) -> impl Iterator<Item = u32> {
+        let foreign = tets.flat_map(|t| self.foreign.iter(t));
+        foreign.chain(changed.into_iter().flat_map(|[low, high]| self.between(low, high)))
+    }
+
+    /// The vertices between two corners of a box that no tetrahedron contains.
+    fn between(&self, low: DVec3, high: DVec3) -> impl Iterator<Item = u32> {
+        let [from, to] = [low, high].map(|p| self.grid.cell(p));
+        let rows = (from[0]..=to[0]).flat_map(move |x| (from[1]..=to[1]).map(move |y| self.grid.row(x, y)));
+        let cells = rows.flat_map(move |row| row + from[2]..=row + to[2]);
+        let all = cells.flat_map(|cell| self.cells.iter(cell as u32));
+        all.filter(move |&point| {
+            let place = self.grid.places[point as usize];
+            let is_inside = place.cmpge(low).all() && place.cmple(high).all();
+            is_inside && self.outside[point as usize] && !self.is_foreign[point as usize]
+        })
+    }
+
+    /// Removes the foreign vertices of a tetrahedron, which may be a new one.
+    pub fn clear(&mut self, t: u32) {
+        self.foreign.reserve(t);
+        self.foreign.iter(t).for_each(|point| self.is_foreign[point as usize] = false);
+        self.foreign.take(t);
+    }
+
+    /// Records whether a vertex is outside of the tetrahedron in whose bucket it is now.
+    pub fn set_outside(&mut self, point: u32, outside: bool) {
+        self.outside[point as usize] = outside;
+        if outside && !std::mem::replace(&mut self.known[point as usize], true) {
+            let [x, y, z] = self.grid.cell(self.grid.places[point as usize]);
+            self.cells.put((self.grid.row(x, y) + z) as u32, point);
+        }
+    }
+
+    /// Whether a vertex is known to be outside of the tetrahedron in whose bucket it is.
+    #[cfg(test)]
+    pub fn is_outside(&self, point: u32) -> bool {
+        self.outside[point as usize]
+    }
+
+    /// Makes a vertex that is outside of its own tetrahedron foreign to another one, unless it already is to some.
+    pub fn add_foreign(&mut self, t: u32, point: u32) {
+        if self.outside[point as usize] && !std::mem::replace(&mut self.is_foreign[point as usize], true) {
+            self.foreign.put(t, point);
+        }
+    }
+}
+
+impl Grid {
+    fn new(places: Vec<DVec3>) -> Self {
+        let low = places.iter().copied().fold(DVec3::INFINITY, DVec3::min);
+        let high = places.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+        let cells = (1..MOST_CELLS).take_while(|n| n.pow(3) < places.len()).last().unwrap_or(1);
+        let density = cells as f64 / (high - low).max(DVec3::splat(f64::MIN_POSITIVE));
+        Self { places, low, density, cells }
+    }
+
+    /// The cell of a place, or the nearest one.
+    fn cell(&self, place: DVec3) -> [usize; 3] {
+        let last = (self.cells - 1) as f64;
+        // Not a number where the domain has no extent.
+        ((place - self.low) * self.density).to_array().map(|x| x.max(0.0).min(last) as usize)
+    }
+
+    /// The number of the first cell of a row.
+    fn row(&self, x: usize, y: usize) -> usize {
+        (x * self.cells + y) * self.cells
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found(outside_points: &OutsidePoints) -> Vec<u32> {
+        let mut found: Vec<u32> = outside_points.between(DVec3::splat(0.5), DVec3::splat(3.5)).collect();
+        found.sort_unstable();
+        found
+    }
+
+    #[test]
+    fn those_outside_are_found_until_they_are_guests() {
+        let mut outside_points =
+            OutsidePoints::new(2, (0..40).map(|i| DVec3::splat(f64::from(i) * 0.25)).collect());
+        assert!(found(&outside_points).is_empty());
+        (0..8).for_each(|point| outside_points.set_outside(point, true));
+        assert_eq!(found(&outside_points), [2, 3, 4, 5, 6, 7]);
+        outside_points.add_foreign(1, 4);
+        outside_points.add_foreign(0, 4);
+        outside_points.add_foreign(5, 30);
+        assert_eq!(found(&outside_points), [2, 3, 5, 6, 7]);
+        let foreign = |outside_points: &OutsidePoints, t: u32| {
+            outside_points.candidates([t].into_iter(), None).collect::<Vec<u32>>()
+        };
+        assert_eq!((foreign(&outside_points, 0), foreign(&outside_points, 1)), (vec![], vec![4]));
+        let whole = [DVec3::ZERO, DVec3::splat(9.0)];
+        let mut candidates: Vec<u32> = outside_points.candidates([0, 1].into_iter(), Some(whole)).collect();
+        candidates.sort_unstable();
+        assert_eq!(candidates, [0, 1, 2, 3, 4, 5, 6, 7], "foreign and those outside, each once");
+        outside_points.set_outside(6, false);
+        outside_points.clear(1);
+        outside_points.clear(7);
+        assert_eq!(found(&outside_points), [2, 3, 4, 5, 7]);
+        assert_eq!((foreign(&outside_points, 1), foreign(&outside_points, 7)), (vec![], vec![]));
+    }
+}

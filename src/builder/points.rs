@@ -1,0 +1,85 @@
+//! Points and the tetrahedra that contain them: barycentric coordinates, and lists of points for each tetrahedron.
+
+use crate::mesh::NONE;
+use glam::{DMat3, DVec3};
+
+/// Barycentric coordinates this far below zero are rounding errors of a point on a face.
+pub(super) const SLACK: f64 = 1e-9;
+
+/// Disjoint lists of points, one for each tetrahedron.
+pub(super) struct Lists {
+    first: Vec<u32>,
+    next: Vec<u32>,
+}
+
+impl Lists {
+    pub fn new(tets: usize, points: usize) -> Self {
+        Self { first: vec![NONE; tets], next: vec![NONE; points] }
+    }
+
+    /// Makes room for the list of a tetrahedron.
+    pub fn reserve(&mut self, t: u32) {
+        if self.first.len() <= t as usize {
+            self.first.resize(t as usize + 1, NONE);
+        }
+    }
+
+    pub fn take(&mut self, t: u32) {
+        self.first[t as usize] = NONE;
+    }
+
+    pub fn put(&mut self, t: u32, point: u32) {
+        self.next[point as usize] = std::mem::replace(&mut self.first[t as usize], point);
+    }
+
+    pub fn iter(&self, t: u32) -> impl Iterator<Item = u32> {
+        let step = |p: u32| (p != NONE).then_some(p);
+        std::iter::successors(step(self.first[t as usize]), move |&p| step(self.next[p as usize]))
+    }
+}
+
+/// Which of so many tetrahedra a point lies in, or is least outside of: its barycentric coordinates there but for the
+/// first one, which `barycentric` gives, and how deep inside it lies. The tetrahedron `hint` is tested first.
+pub(super) fn locate(cells: usize, hint: usize, barycentric: impl Fn(usize) -> DVec3) -> (usize, DVec3, f64) {
+    let (mut cell, mut lambda, mut depth) = (hint, DVec3::ZERO, f64::NEG_INFINITY);
+    let order = std::iter::once(hint).chain((0..cells).filter(|&i| i != hint));
+    for i in order {
+        let l = barycentric(i);
+        let inside = l.min_element().min(1.0 - l.element_sum());
+        if inside > depth {
+            (cell, lambda, depth) = (i, l, inside);
+        }
+        if inside >= 0.0 {
+            break;
+        }
+    }
+    (cell, lambda, depth)
+}
+
+/// The matrix that makes `(λ_1, λ_2, λ_3)` of a point of its position relative to corner 0.
+pub(super) fn barycentric([a, b, c, d]: [DVec3; 4]) -> DMat3 {
+    // Cells are positive on the lattice, so the matrix is regular.
+    DMat3::from_cols(b - a, c - a, d - a).inverse()
+}
+
+/// The corners of the box around lattice points.
+pub(super) fn bounds(places: impl Iterator<Item = [i32; 3]>) -> [DVec3; 2] {
+    let all = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+    places.map(as_vec).fold(all, |[low, high], p| [low.min(p), high.max(p)])
+}
+
+pub(super) fn as_vec(q: [i32; 3]) -> DVec3 {
+    DVec3::from_array(q.map(f64::from))
+}
+
+/// Barycentric coordinates of a point just outside, moved inside.
+pub(super) fn clamped(lambda: DVec3) -> DVec3 {
+    let inside = lambda.max(DVec3::ZERO);
+    let sum = inside.element_sum();
+    if sum > 1.0 { inside / sum } else { inside }
+}
+
+/// The square of a distance, in steps of the lattice.
+pub(super) fn squared_length(p: [i32; 3], q: [i32; 3]) -> f32 {
+    (0..3).map(|i| (i64::from(p[i]) - i64::from(q[i])) as f32).map(|d| d * d).sum()
+}
