@@ -6,7 +6,7 @@ use crate::support::random::Random;
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::sync::{Arc, LazyLock};
-use tetralod::builder::{BuildConfig, BuildResult, Construction, BuildCriterion, Method, build};
+use tetralod::builder::{BuildConfig, BuildCriterion, BuildResult, Construction, Method, build};
 use tetralod::format::{Decoder, EncodeOptions, encode};
 use tetralod::geom::{Bounds, orient3d};
 use tetralod::mesh::{Field, TetMesh};
