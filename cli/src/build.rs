@@ -288,9 +288,9 @@ fn config(arguments: &Arguments) -> BuildConfig {
 
 /// How an MT of this kind is built, or why the options contradict each other.
 fn construction(arguments: &Arguments, kind: MtKind) -> Result<Construction, String> {
-    let usual = Construction::usual(kind).method();
+    let usual = Construction::default_for(kind).method();
     let method = arguments.method.unwrap_or(if arguments.tet_errors { Method::Insert } else { usual });
-    let criterion = arguments.criterion.unwrap_or(BuildCriterion::usual(method));
+    let criterion = arguments.criterion.unwrap_or(BuildCriterion::default_for(method));
     let refused = |error: BuildError| error.to_string();
     let mut construction = Construction::new(kind, method, criterion).map_err(refused)?;
     if arguments.tet_errors {

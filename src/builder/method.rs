@@ -92,7 +92,7 @@ impl BuildCriterion {
     }
 
     /// The default criterion of a method.
-    pub fn usual(method: Method) -> Self {
+    pub fn default_for(method: Method) -> Self {
         match method {
             Method::Insert => Self::Delaunay,
             Method::Collapse | Method::Decimate => Self::HalfEdge,
@@ -139,7 +139,7 @@ pub enum VertexMethod {
 
 impl Construction {
     /// The default construction of a kind of MT.
-    pub fn usual(kind: MtKind) -> Self {
+    pub fn default_for(kind: MtKind) -> Self {
         let purpose = Purpose::default();
         match kind {
             MtKind::Edge => Self::Edge,

@@ -115,7 +115,7 @@ impl BuildConfig {
     /// The default configuration for a kind of MT.
     pub fn of(kind: MtKind) -> Self {
         Self {
-            construction: Construction::usual(kind),
+            construction: Construction::default_for(kind),
             fields: Vec::new(),
             all_fields: false,
             position_bits: None,

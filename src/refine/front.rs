@@ -3,7 +3,7 @@
 use super::converge::Way;
 use super::ranked::Ranked;
 use super::timing_wheel::TimingWheels;
-use super::uniform::Wanted;
+use super::uniform::NeededUpdates;
 use super::{ANY, Budget, COMPONENTS, Criterion, Verdict};
 use crate::mesh::BitSet;
 use crate::mt::{ApplyUpdates, BaseMeshError, CurrentMesh, ErrorCode, UpdateError, UpdateId};
@@ -274,7 +274,7 @@ impl Front {
         let done = match uniform {
             Some(tolerances) => {
                 self.untrack();
-                self.satisfy_uniform(mt, Wanted::new(&tolerances), task.outcome, go_on)?
+                self.satisfy_uniform(mt, NeededUpdates::new(&tolerances), task.outcome, go_on)?
             }
             // Most budgets are for safety: while the mesh is below the budget, excesses need not be compared.
             None if budget.is_unlimited() || !restarts && self.ranked.has_room() => {

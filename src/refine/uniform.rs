@@ -8,7 +8,7 @@ use crate::mt::{Applied, ApplyUpdates, ErrorCode, UpdateError, UpdateId};
 
 /// The updates that a uniform request needs, by their errors.
 #[derive(Clone, Copy)]
-pub(super) struct Wanted<'a> {
+pub(super) struct NeededUpdates<'a> {
     tolerances: &'a [Tolerance],
     /// All of them have a larger error than this.
     least: ErrorCode,
@@ -16,7 +16,7 @@ pub(super) struct Wanted<'a> {
     sure: ErrorCode,
 }
 
-impl<'a> Wanted<'a> {
+impl<'a> NeededUpdates<'a> {
     pub fn new(tolerances: &'a [Tolerance]) -> Self {
         let least = tolerances.iter().map(|t| t.error).min();
         // One field may have a small error where another has a large one.
@@ -37,14 +37,14 @@ impl<'a> Wanted<'a> {
 
 /// The updates that stay applied in a sweep that undoes others.
 struct Staying<'a> {
-    wanted: Wanted<'a>,
+    needed: NeededUpdates<'a>,
     /// Those on which such updates depend, as far as they were found; none where errors are monotone.
     others: BitSet,
 }
 
 impl Staying<'_> {
     fn has(&self, mt: &impl ApplyUpdates, u: UpdateId) -> bool {
-        self.others.has(u.0) || self.wanted.has(mt, u)
+        self.others.has(u.0) || self.needed.has(mt, u)
     }
 
     #[cold]
@@ -63,7 +63,7 @@ impl Front {
         outcome: &mut Outcome,
     ) -> Result<(), UpdateError> {
         self.untrack();
-        self.sweep(mt, Wanted::new(&[]), false, outcome, &mut |_| true).map(drop)
+        self.sweep(mt, NeededUpdates::new(&[]), false, outcome, &mut |_| true).map(drop)
     }
 
     /// Undoes all updates within the tolerances and applies the others. Errors alone decide. They are monotone along
@@ -71,11 +71,11 @@ impl Front {
     pub(super) fn satisfy_uniform(
         &mut self,
         mt: &impl ApplyUpdates,
-        wanted: Wanted<'_>,
+        needed: NeededUpdates<'_>,
         outcome: &mut Outcome,
         go_on: GoOn<'_>,
     ) -> Result<bool, UpdateError> {
-        Ok(self.sweep(mt, wanted, false, outcome, go_on)? && self.sweep(mt, wanted, true, outcome, go_on)?)
+        Ok(self.sweep(mt, needed, false, outcome, go_on)? && self.sweep(mt, needed, true, outcome, go_on)?)
     }
 
     /// Applies all needed updates, or undoes all others: in windows by number, in each by place. Updates that block
@@ -83,13 +83,13 @@ impl Front {
     fn sweep(
         &mut self,
         mt: &impl ApplyUpdates,
-        wanted: Wanted<'_>,
+        needed: NeededUpdates<'_>,
         applied: bool,
         outcome: &mut Outcome,
         go_on: GoOn<'_>,
     ) -> Result<bool, UpdateError> {
         let mut window = Window::default();
-        let mut staying = Staying { wanted, others: BitSet::default() };
+        let mut staying = Staying { needed, others: BitSet::default() };
         let words = self.applied.words().len();
         let mut done = 0;
         while done < words {
@@ -97,7 +97,7 @@ impl Front {
             let size = window_size(self.applied_count);
             while done < words && window.updates.len() < size {
                 let word = if applied { done } else { words - 1 - done };
-                self.push_pending(mt, wanted, word, applied, &mut window.updates);
+                self.push_pending(mt, needed, word, applied, &mut window.updates);
                 done += 1;
             }
             window.sort(mt, &self.mesh);
@@ -115,7 +115,7 @@ impl Front {
     fn push_pending(
         &self,
         mt: &impl ApplyUpdates,
-        wanted: Wanted<'_>,
+        needed: NeededUpdates<'_>,
         word: usize,
         applied: bool,
         updates: &mut Vec<UpdateId>,
@@ -123,14 +123,14 @@ impl Front {
         let [least, largest] = self.chunks[word / CHUNK_WORDS];
         let bits = self.applied.words()[word];
         let mut rest = if applied { !bits } else { bits };
-        if rest == 0 || (if applied { largest <= wanted.least } else { least > wanted.sure }) {
+        if rest == 0 || (if applied { largest <= needed.least } else { least > needed.sure }) {
             return;
         }
         while rest != 0 {
             let bit = if applied { rest.trailing_zeros() } else { 63 - rest.leading_zeros() };
             rest &= !(1 << bit);
             let u = UpdateId(64 * word as u32 + bit);
-            if u.0 < self.known && wanted.has(mt, u) == applied {
+            if u.0 < self.known && needed.has(mt, u) == applied {
                 updates.push(u);
             }
         }

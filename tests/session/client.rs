@@ -24,7 +24,7 @@ const BLOCK_BITS: u32 = 6;
 fn file(kind: MtKind) -> Vec<u8> {
     // More than a client reads at first.
     let mesh = generate::bucky(25).expect("a size that is allowed");
-    let construction = Construction::usual(kind);
+    let construction = Construction::default_for(kind);
     let config = BuildConfig { construction, block_bits: BLOCK_BITS, ..BuildConfig::of(MtKind::Edge) };
     let mt = build(&mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a valid mesh").mt;
     encode(&mt, &EncodeOptions { block_bits: BLOCK_BITS, ..EncodeOptions::default() }).expect("a sound MT")
