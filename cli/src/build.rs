@@ -246,7 +246,7 @@ fn read(arguments: &Arguments, config: &BuildConfig) -> Result<(TetMesh, RepairR
 }
 
 /// The kind of MT that goes with the other options.
-fn usual_kind(arguments: &Arguments) -> MtKind {
+fn default_kind(arguments: &Arguments) -> MtKind {
     match (arguments.method, arguments.criterion) {
         (Some(Method::Collapse), _) => MtKind::Edge,
         (Some(Method::Insert), _) | (_, Some(BuildCriterion::Delaunay)) => MtKind::Vertex,
@@ -259,7 +259,7 @@ fn usual_kind(arguments: &Arguments) -> MtKind {
 
 /// How to build. Ends the program if the options contradict each other.
 fn config(arguments: &Arguments) -> BuildConfig {
-    let kind = arguments.kind.unwrap_or_else(|| usual_kind(arguments));
+    let kind = arguments.kind.unwrap_or_else(|| default_kind(arguments));
     let default = BuildConfig::of(kind);
     let precision: Vec<&Precision> = arguments.field_bits.iter().chain(&arguments.field_tolerance).collect();
     let for_all: Vec<FieldPrecision> =
@@ -288,8 +288,8 @@ fn config(arguments: &Arguments) -> BuildConfig {
 
 /// How an MT of this kind is built, or why the options contradict each other.
 fn construction(arguments: &Arguments, kind: MtKind) -> Result<Construction, String> {
-    let usual = Construction::default_for(kind).method();
-    let method = arguments.method.unwrap_or(if arguments.tet_errors { Method::Insert } else { usual });
+    let default = Construction::default_for(kind).method();
+    let method = arguments.method.unwrap_or(if arguments.tet_errors { Method::Insert } else { default });
     let criterion = arguments.criterion.unwrap_or(BuildCriterion::default_for(method));
     let refused = |error: BuildError| error.to_string();
     let mut construction = Construction::new(kind, method, criterion).map_err(refused)?;

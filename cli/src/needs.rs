@@ -140,9 +140,9 @@ fn refusal(error: &clap::Error) -> String {
         (ErrorKind::UnknownArgument, _) => {
             let command = Group::augment_args(Command::new("need"));
             let keys: Vec<&str> = command.get_arguments().filter_map(clap::Arg::get_long).collect();
-            format!("{key}: is no key; there are {}", keys.join(", "))
+            format!("{key}: is no key; the keys are {}", keys.join(", "))
         }
-        (ErrorKind::ArgumentConflict, _) => format!("{key}: is there twice"),
+        (ErrorKind::ArgumentConflict, _) => format!("{key}: is given twice"),
         (ErrorKind::MissingRequiredArgument, _) => "a camera has both a matrix and a viewport".to_owned(),
         (_, Some(problem)) => format!("{key}: {problem}"),
         _ => format!("{key}: the value cannot be used"),
@@ -278,7 +278,7 @@ pub fn warning(session: &Session, stats: &RefineStats, named: &NamedNeed) -> Opt
         let misses = |[low, high]: &[f64; 2]| *high < field.min || *low > field.max;
         if values.ranges.iter().all(misses) {
             let [min, max] = [number(field.min), number(field.max)];
-            return Some(format!("{}: the field has values from {min} to {max} alone", named.name));
+            return Some(format!("{}: the field has only values from {min} to {max}", named.name));
         }
     }
     let corners: Vec<[f64; 3]> = mesh.positions().iter().map(|&q| info.lattice.point(q)).collect();
@@ -287,7 +287,7 @@ pub fn warning(session: &Session, stats: &RefineStats, named: &NamedNeed) -> Opt
     let near = info.boundary_bound(stats.error_bound);
     region.filter(|region| is_apart(region, &domain, near)).map(|_| {
         let list = |p: [f64; 3]| p.map(number).join(",");
-        format!("{}: the mesh lies in the box {},{} alone", named.name, list(domain.min), list(domain.max))
+        format!("{}: the mesh lies inside the box {},{}", named.name, list(domain.min), list(domain.max))
     })
 }
 
@@ -394,7 +394,7 @@ fn parse_oriented_box(text: &str) -> Result<Region, String> {
         let b = halves[(i + 1) % 3];
         let [dot, aa, bb] = [[a, b], [a, a], [b, b]].map(|[u, v]| u[0] * v[0] + u[1] * v[1] + u[2] * v[2]);
         if dot.abs() > 1e-6 * (aa * bb).sqrt() {
-            return Err("the vectors of an oriented box are at right angles to each other".to_owned());
+            return Err("the vectors of an oriented box must be at right angles to each other".to_owned());
         }
     }
     checked(Region::OrientedBox { centre: vector(0), halves })
@@ -419,7 +419,7 @@ fn parse_convex(text: &str) -> Result<Region, String> {
     let numbers = parse_list(text)?;
     let (planes, rest) = numbers.as_chunks::<4>();
     if !rest.is_empty() {
-        return Err("there are 4 numbers a plane".to_owned());
+        return Err("a plane has 4 numbers".to_owned());
     }
     checked(Region::Convex(planes.to_vec()))
 }
@@ -430,7 +430,7 @@ fn parse_matrix(text: &str) -> Result<[f64; 16], String> {
 
 fn parse_range(text: &str) -> Result<[f64; 2], String> {
     let [low, high] = parse_numbers(text, "a range")?;
-    if low > high { Err("a range has its smaller value first".to_owned()) } else { Ok([low, high]) }
+    if low > high { Err("the smaller value of a range must come first".to_owned()) } else { Ok([low, high]) }
 }
 
 fn parse_viewport(text: &str) -> Result<[f64; 2], String> {
@@ -438,7 +438,7 @@ fn parse_viewport(text: &str) -> Result<[f64; 2], String> {
     if size.iter().all(|&x| x > 0.0) {
         Ok(size)
     } else {
-        Err("a viewport has some width and height".to_owned())
+        Err("the width and height of a viewport must be larger than 0".to_owned())
     }
 }
 

@@ -16,7 +16,7 @@ impl FromStr for Tolerance {
     fn from_str(text: &str) -> Result<Self, String> {
         let (number, relative) = percentage(text)?;
         if number < 0.0 {
-            return Err("an error is not negative".to_owned());
+            return Err("an error must be at least 0".to_owned());
         }
         Ok(if relative { Self::Relative(number / 100.0) } else { Self::Absolute(number) })
     }
@@ -67,7 +67,7 @@ pub fn parse_numbers<const N: usize>(text: &str, what: &str) -> Result<[f64; N],
 pub fn parse_bounds(text: &str) -> Result<Bounds, String> {
     let [x0, y0, z0, x1, y1, z1] = parse_numbers(text, "a box")?;
     if x0 > x1 || y0 > y1 || z0 > z1 {
-        return Err("a box has its smaller corner first".to_owned());
+        return Err("the smaller corner of a box must come first".to_owned());
     }
     Ok(Bounds { min: [x0, y0, z0], max: [x1, y1, z1] })
 }
@@ -94,11 +94,11 @@ pub fn parse_bytes(text: &str) -> Result<u64, String> {
         "K" | "k" | "KiB" => 10,
         "M" | "MiB" => 20,
         "G" | "GiB" => 30,
-        unit => return Err(format!("'{unit}' is no unit of bytes; there are K, M and G")),
+        unit => return Err(format!("'{unit}' is not a unit of bytes; the units are K, M and G")),
     };
     let number = parse_size(digits)? * f64::from(1_u32 << shift);
     // The largest number of bytes that a float still counts one by one.
-    if number <= (1_u64 << 53) as f64 { Ok(number as u64) } else { Err(format!("'{text}' is too much")) }
+    if number <= (1_u64 << 53) as f64 { Ok(number as u64) } else { Err(format!("'{text}' is too large")) }
 }
 
 #[cfg(test)]

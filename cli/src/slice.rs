@@ -40,7 +40,7 @@ fn parse_plane(text: &str) -> Result<Plane, String> {
     }
     let [x, y, z, offset] = parse_numbers(text, "a plane")?;
     if [x, y, z] == [0.0; 3] {
-        return Err("the normal of a plane is not 0,0,0".to_owned());
+        return Err("the normal of a plane must not be 0,0,0".to_owned());
     }
     Ok(Plane { normal: [x, y, z], offset })
 }

@@ -33,7 +33,7 @@ pub struct Arguments {
 
 fn parse_range(text: &str) -> Result<[f64; 2], String> {
     let [low, high] = parse_numbers(text, "a range")?;
-    if low < high { Ok([low, high]) } else { Err("a range has its smaller end first".to_owned()) }
+    if low < high { Ok([low, high]) } else { Err("the smaller end of a range must come first".to_owned()) }
 }
 
 /// The result as programs get it: volumes in cubic model units, values in units of the field.

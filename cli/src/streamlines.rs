@@ -70,7 +70,7 @@ struct SeedLine {
 fn parse_seeds(text: &str) -> Result<SeedLine, String> {
     let [x0, y0, z0, x1, y1, z1, count] = parse_numbers(text, "a line of seeds")?;
     if !(1.0..=1e6).contains(&count) || count.fract() != 0.0 {
-        return Err("the number of seeds is a whole number from 1 to 1000000".to_owned());
+        return Err("the number of seeds must be a whole number from 1 to 1000000".to_owned());
     }
     Ok(SeedLine { ends: [[x0, y0, z0], [x1, y1, z1]], count: count as u32 })
 }

@@ -51,13 +51,15 @@ impl ReadError {
     }
 
     /// Adds what `options` contain at the path.
+    #[inline(never)]
     pub fn with_value(mut self, options: &JsValue) -> Self {
-        let names = self.path.split(['.', '[', ']']).filter(|name| !name.is_empty());
-        let value = names.fold(options.clone(), |value, name| {
-            Reflect::get(&value, &name.into()).unwrap_or(JsValue::UNDEFINED)
-        });
+        let mut value = options.clone();
+        for name in self.path.split(['.', '[', ']']).filter(|name| !name.is_empty()) {
+            value = Reflect::get(&value, &name.into()).unwrap_or(JsValue::UNDEFINED);
+        }
         if let (false, Ok(text)) = (value.is_undefined(), text(&value)) {
-            self.problem += &format!("; given: {text}");
+            self.problem += "; given: ";
+            self.problem += &text;
         }
         self
     }

@@ -286,7 +286,7 @@ fn read_vertices(
         ready.sort_unstable();
         for v in ready {
             if vertices.len() as u32 >= count {
-                return Err(source.corrupt("a block has more splits than it tells"));
+                return Err(source.corrupt("a block has more splits than its header says"));
             }
             let created = old + 2 * vertices.len() as u32;
             vertices.push(v);
@@ -300,7 +300,7 @@ fn read_vertices(
         }
     }
     if vertices.len() as u32 != count {
-        return Err(source.corrupt("a block has fewer splits than it tells"));
+        return Err(source.corrupt("a block has fewer splits than its header says"));
     }
     Ok(vertices)
 }

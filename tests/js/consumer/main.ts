@@ -16,6 +16,7 @@ import {
   type Where,
 } from "tetralod";
 import { checkOptions } from "./options.js";
+import { refusal } from "./viewer.js";
 
 declare const process: { env: Record<string, string | undefined>; exitCode: number };
 
@@ -73,6 +74,7 @@ const good =
   whole.stats.bounds.length === 3 &&
   asked.stats.satisfied &&
   told.tets.length === 4 * asked.tetCount &&
-  failed === "bad-option";
+  failed === "bad-option" &&
+  (await refusal()) === "no-webgpu";
 console.log(`${info.vertices} vertices, ${mesh.stats.tetrahedra} tetrahedra extracted, hash ${hash}`);
 if (!good) throw new Error("the installed package does not do what its types say");
