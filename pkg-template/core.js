@@ -39,7 +39,7 @@ export function coreMethods(emit) {
   let parts;
   /** Counts the requests. */
   let goal = 0;
-  const aim = (options) => {
+  const setRequest = (options) => {
     session.request(options);
     goal++;
     parts?.turn();
@@ -97,13 +97,13 @@ export function coreMethods(emit) {
     info: () => session.info(),
     /** Without `partial`, nothing is handed out as long as data is missing that a stream will bring. */
     async refine(options, deltas, partial) {
-      aim(await received(options));
+      setRequest(await received(options));
       const step = advanceAll();
       return partial || !step.stats.missing ? result(step, deltas) : { more: true };
     },
     /** The same when all data that it needs has arrived. */
     async reach(options, deltas) {
-      aim(await received(options));
+      setRequest(await received(options));
       const mine = goal;
       let step = advanceAll();
       while (step.more) {
@@ -116,7 +116,7 @@ export function coreMethods(emit) {
       if (mine === goal) return result(step, deltas);
       throw new TetralodError("replaced", REPLACED);
     },
-    aim: async (options) => aim(await received(options)),
+    setRequest: async (options) => setRequest(await received(options)),
     step: (milliseconds, updates, deltas) => result(advance(milliseconds, updates), deltas),
     settled,
     arrived: () => parts.arrived(),

@@ -99,7 +99,7 @@ export class MultiTessellation {
     checkAmount("updates", updates, 1);
     signal?.throwIfAborted();
     const goal = ++this.#goal;
-    await this.#core.call("aim", [sendable(options, this.#inWorker)]);
+    await this.#core.call("setRequest", [sendable(options, this.#inWorker)]);
     for (let done = false; !done && goal === this.#goal; ) {
       signal?.throwIfAborted();
       const { more, ...step } = await this.#core.call("step", [budgetMs, updates, Boolean(deltas)]);

@@ -24,7 +24,7 @@ let viewer;
 let parts;
 /** The last request, and whether the viewer has it: it takes none before the base mesh has arrived. */
 let request = {};
-let aimed = false;
+let isRequested = false;
 /** Counts the requests; steps carry the number of their request. */
 let goal = 0;
 /** The work for it: the sums over its steps. */
@@ -137,9 +137,9 @@ const methods = {
   },
 
   /** Resolves at once, to the number of the request; its steps are reported as `stats` with this number. */
-  async aim(options) {
+  async setRequest(options) {
     request = await received(options);
-    aim();
+    setRequest();
     return goal;
   },
 
@@ -180,14 +180,14 @@ const emit = serve(webEndpoint(globalThis), methods, ["openParts", "settled"]);
 function partsCame(progress) {
   bytes = progress.bytes;
   emit("progress", progress);
-  if (!ready || !aimed) return;
+  if (!ready || !isRequested) return;
   const wait = Math.max(FOLLOW, 2 * lastRefine.took) - (performance.now() - lastRefine.end);
   following ??= setTimeout(followParts, Math.max(wait, 0));
 }
 
 function followParts() {
   following = undefined;
-  if (!parts || !ready || !aimed) return;
+  if (!parts || !ready || !isRequested) return;
   viewer.requestAgain();
   invalidate();
 }
@@ -195,18 +195,18 @@ function followParts() {
 /** Another volume has taken the place of the one before. */
 function forget() {
   request = {};
-  aimed = false;
+  isRequested = false;
   bytes = 0;
   ready = false;
   lastRefine = { end: -Infinity, took: 0 };
   invalidate();
 }
 
-/** Has the viewer aim at the request; throws if that cannot be met. */
-function aim() {
+/** Passes the request to the viewer; throws if it is not valid. */
+function setRequest() {
   viewer.request(request);
   parts?.turn();
-  aimed = true;
+  isRequested = true;
   goal++;
   total = { refined: 0, coarsened: 0, forced: 0, judged: 0, milliseconds: 0 };
   invalidate();
@@ -215,7 +215,7 @@ function aim() {
 /** Applies the last request to new data; an error of the request is reported, not thrown. */
 function follow() {
   try {
-    if (!aimed) aim();
+    if (!isRequested) setRequest();
     viewer.requestAgain();
     invalidate();
   } catch (error) {

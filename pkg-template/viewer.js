@@ -31,8 +31,8 @@ export class Viewer extends EventTarget {
   #adapter;
   #stream = null;
   /** For a file in parts: resolves when a mesh is requested. */
-  #aimed;
-  #aim = new Latest((options) => this.#remote.call("aim", [options]));
+  #requested;
+  #setRequest = new Latest((options) => this.#remote.call("setRequest", [options]));
   /** Callers that wait for a mesh, by the number of their request. */
   #waiting = [];
   #update = new Latest((changes) => this.#remote.call("update", [changes]), mergeUpdates);
@@ -176,7 +176,7 @@ export class Viewer extends EventTarget {
     const opened = await abortable(this.#remote.call("openParts", [url, options]), signal);
     if (!opened) return undefined;
     this.#info = opened.info;
-    this.#aimed = resolve;
+    this.#requested = resolve;
     const finished = abortable(promise.then(() => this.settled()), signal);
     // The worker reports errors by itself.
     finished.catch(() => {});
@@ -217,8 +217,8 @@ export class Viewer extends EventTarget {
    * request. Resolves when the mesh has been made; calls that were replaced meanwhile, with the later one.
    */
   async refine(options = {}) {
-    const goal = await this.#aim.call(sendable(options, true));
-    this.#aimed?.();
+    const goal = await this.#setRequest.call(sendable(options, true));
+    this.#requested?.();
     const waiting = { goal, ...deferred() };
     this.#waiting.push(waiting);
     return waiting.promise;

@@ -86,7 +86,7 @@ impl EdgeMt {
             let split = as_split(explicit, builder.mt(), u).map_err(refused)?;
             builder.push(&split.borrowed()).map_err(|error| refused(why_refused(&error)))?;
         }
-        // Masks tell which tetrahedra a split makes only together with the mesh.
+        // What a mask makes depends on the mesh, too.
         let mt = builder.finish();
         let made = ExplicitMt::of(&mt)?;
         let differs = |u: &UpdateId| !same(&made, explicit, *u);
@@ -132,14 +132,14 @@ impl Split {
     }
 }
 
-/// Update `u` as a split, as far as its own tetrahedra tell; `mt` holds the ones before it.
+/// Update `u` as a split, from its own tetrahedra; `mt` holds the ones before it.
 fn as_split(explicit: &ExplicitMt, mt: &EdgeMt, u: UpdateId) -> Result<Split, &'static str> {
     let removed: Vec<[u32; 4]> = explicit.removed(u).iter().map(|&t| explicit.tets()[t as usize]).collect();
     let range = explicit.inserted(u);
     let inserted = &explicit.tets()[range.start as usize..range.end as usize];
     let created = mt.created(u);
-    let knows = |v: VertexId| v.0 < explicit.vertices() && inserted.iter().any(|tet| tet.contains(&v.0));
-    if !created.into_iter().all(knows) {
+    let has = |v: VertexId| v.0 < explicit.vertices() && inserted.iter().any(|tet| tet.contains(&v.0));
+    if !created.into_iter().all(has) {
         return Err("it does not create the two vertices that come next");
     }
     if removed.len() > MAX_STAR {

@@ -4,7 +4,7 @@ use std::fmt;
 
 /// An error bound in 16 bits, rounded up when stored: 0, or from 3 · 10^-8 (2^-25) to 128 in steps of at most 0.05 %.
 ///
-/// Errors are relative: 1 is the full range of a field. Codes compare as the errors they stand for.
+/// Errors are relative: 1 is the full range of a field. Codes compare as their errors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ErrorCode(pub u16);
 
@@ -20,7 +20,7 @@ const BIAS: u32 = (127 - 25) << 11;
 impl ErrorCode {
     /// No error at all.
     pub const ZERO: Self = Self(0);
-    /// The largest error that can be stored; stands for "anything".
+    /// The largest error that can be stored: any error may be larger.
     pub const MAX: Self = Self(u16::MAX);
 
     /// The smallest code whose error is at least `error`; [`ErrorCode::MAX`] if there is none, and for NaN.
@@ -67,7 +67,7 @@ impl ErrorCode {
         u8::try_from(self.0.saturating_sub(other.0) / CODES_A_FALL).unwrap_or(u8::MAX)
     }
 
-    /// The error this code stands for.
+    /// The error of this code.
     pub fn error(self) -> f64 {
         if self.0 == 0 { 0.0 } else { f64::from(f32::from_bits((u32::from(self.0) + BIAS) << DROPPED)) }
     }
@@ -99,7 +99,7 @@ pub enum UpdateError {
         /// The update.
         update: u32,
     },
-    /// The offset is told by an edge that the link of the vertex does not have.
+    /// The offset is counted from an edge that the link of the vertex does not have.
     Edge {
         /// The update.
         update: u32,
@@ -114,7 +114,7 @@ pub enum UpdateError {
         /// The update.
         update: u32,
     },
-    /// The update arrived, but the mesh that it is applied to was not told: see
+    /// The update arrived, but the mesh that it is applied to was not updated: see
     /// [`updates_arrived`](super::UpdatePages::updates_arrived).
     UnknownToMesh {
         /// The update.
@@ -153,7 +153,7 @@ impl fmt::Display for UpdateError {
             ),
             Self::Missing { update } => write!(f, "update {update} is not here"),
             Self::UnknownToMesh { update } => {
-                write!(f, "the mesh has not been told that update {update} has arrived")
+                write!(f, "update {update} has arrived, but not in the mesh: call updates_arrived first")
             }
             Self::Error { update } => {
                 write!(f, "update {update} does not come after those it depends on, or lacks errors")

@@ -91,7 +91,7 @@ impl Margins {
         }
     }
 
-    /// [`Margins::next`], and what is wrong with the errors of the update, `u`: one that is larger than a parent's first.
+    /// [`Margins::next`], and the fault of the errors of update `u`: one that is larger than a parent's first.
     pub fn check(
         &mut self,
         mt: &impl ApplyUpdates,
@@ -121,7 +121,7 @@ impl Margins {
 
     /// Whether the error of an update is small enough for that of its parent.
     fn suits(&self, field: usize, [own, above]: [ErrorCode; 2], beyond: i32) -> bool {
-        // The largest error stands for any.
+        // The largest code bounds nothing.
         if own > above || above == ErrorCode::MAX {
             return own <= above;
         }

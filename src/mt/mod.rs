@@ -1,7 +1,7 @@
 //! The Multi-Tessellation itself [§2]: what it is made of and what every kind of it can do.
 //!
 //! [`EdgeMt`], [`VertexMt`] and [`HalfEdgeMt`] are the compact structures that files hold and programs use; [`ExplicitMt`]
-//! spells the same MTs out, as the oracle of tests. Both are immutable once they are complete. What changes is the [`CurrentMesh`], to which updates
+//! stores every tetrahedron, as the oracle of tests. Both are immutable once they are complete. What changes is the [`CurrentMesh`], to which updates
 //! are applied through the trait [`ApplyUpdates`].
 
 #[macro_use]
@@ -71,7 +71,7 @@ pub enum MtKind {
     /// Vertex insertions whose inverse collapses a vertex onto a neighbour, stored so that any part can be read without
     /// the rest.
     HalfEdge,
-    /// Updates of any kind, every tetrahedron spelled out [§3].
+    /// Updates of any kind, every tetrahedron stored [§3].
     Explicit,
 }
 
@@ -226,14 +226,14 @@ impl MtInfo {
         error * self.displacement_per_error + self.quantization
     }
 
-    /// Errors of tetrahedra by themselves are told down to this: what rounding alone can amount to, of the values
+    /// The smallest error that a tetrahedron has by itself: what rounding alone can amount to, of the values
     /// at corners and of those that are compared with.
     pub fn least_own_error(&self, field: usize) -> ErrorCode {
         ErrorCode::at_least(2.0 * self.floor(field))
     }
 }
 
-/// What came of the wish to apply an update.
+/// The result of applying or undoing an update.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Applied {
     /// The update is applied.
@@ -445,7 +445,7 @@ pub trait ApplyUpdates: UpdatePages {
         found: &mut Vec<u32>,
     ) -> Result<(), UpdateError>;
 
-    /// Whether all that `u+` created is still in the mesh, as far as can be told at a glance.
+    /// Whether all that `u+` created is still in the mesh, as far as its labels show.
     /// False means that some child of `u` is applied, or `u` is not.
     fn may_coarsen(&self, mesh: &CurrentMesh, u: UpdateId) -> bool;
 

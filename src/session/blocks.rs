@@ -371,12 +371,13 @@ impl Session {
             telling.into_iter().for_each(|block| is_needed[block as usize] = true);
         }
         let here = (0..index.blocks.len() as u32).filter(|&block| mt.has_page(block));
-        let mut unneeded: Vec<u32> = here.filter(|&block| !is_needed[block as usize]).collect();
         // Of the same age, children before parents.
-        unneeded.sort_unstable_by_key(|&block| {
-            (blocks.last_needed.get(block as usize).copied().unwrap_or(0), std::cmp::Reverse(block))
-        });
-        unneeded
+        let age = |block: u32| blocks.last_needed.get(block as usize).copied().unwrap_or(0);
+        let unneeded = here.filter(|&block| !is_needed[block as usize]);
+        let mut keys: Vec<u64> =
+            unneeded.map(|block| u64::from(age(block)) << 32 | u64::from(!block)).collect();
+        keys.sort_unstable();
+        keys.into_iter().map(|key| !(key as u32)).collect()
     }
 }
 

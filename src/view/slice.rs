@@ -102,15 +102,17 @@ impl Slice {
 
     /// Replaces `lines` by the sections of the mesh's faces, each once, in ascending order.
     pub fn cell_edges(&self, lines: &mut Vec<[u32; 2]>) {
-        lines.clear();
+        let mut keys = Vec::new();
         for (triangle, sides) in self.indices().iter().zip(self.cell_sides()) {
             for k in (0..3).filter(|k| sides >> k & 1 == 1) {
                 let [a, b] = [triangle[k], triangle[(k + 1) % 3]];
-                lines.push([a.min(b), a.max(b)]);
+                keys.push(u64::from(a.min(b)) << 32 | u64::from(a.max(b)));
             }
         }
-        lines.sort_unstable();
-        lines.dedup();
+        keys.sort_unstable();
+        keys.dedup();
+        lines.clear();
+        lines.extend(keys.into_iter().map(|key| [(key >> 32) as u32, key as u32]));
     }
 
     /// Replaces the section by that of `mesh` with `plane`. Costs one pass over the mesh.

@@ -36,7 +36,7 @@ impl RangeLoader {
 
 #[wasm_bindgen]
 impl RangeLoader {
-    /// A loader of one file; `undefined` stands for the default.
+    /// A loader of one file; `undefined` is the default.
     #[wasm_bindgen(constructor)]
     pub fn new(
         max_requests: Option<u32>,

@@ -31,7 +31,7 @@ const REQUEST: [&str; 5] = ["needs", "where", "maxTets", "maxVertices", "maxByte
 #[serde(deny_unknown_fields, rename_all = "camelCase")]
 struct RequestOptions {
     needs: Option<Vec<NeedOptions>>,
-    /// A function, which is no value that serde knows.
+    /// A function, which serde has no type for.
     r#where: Option<IgnoredAny>,
     max_tets: Option<f64>,
     max_vertices: Option<f64>,

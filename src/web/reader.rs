@@ -251,6 +251,8 @@ impl<'de> MapAccess<'de> for Members {
         seed.deserialize(key).map(Some).map_err(|error| self.refuse_name(error))
     }
 
+    // One copy for each type of value, not one for each member.
+    #[inline(never)]
     fn next_value_seed<V: DeserializeSeed<'de>>(&mut self, seed: V) -> Result<V::Value, ReadError> {
         let (name, reader) = self.value();
         seed.deserialize(reader).map_err(|error| error.inside(&name))

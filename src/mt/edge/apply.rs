@@ -35,7 +35,7 @@ impl EdgeMt {
     /// Applies update `u` (`u+`, a vertex split) to `mesh`, which must not contain it yet.
     ///
     /// # Errors
-    /// If the update does not fit the mesh, which only happens to a damaged MT, or if the mesh was not told of it by
+    /// If the update does not fit the mesh, which only happens to a damaged MT, or if the mesh was not updated by
     /// [`UpdatePages::updates_arrived`]; the mesh is unchanged then.
     pub(in crate::mt) fn apply_split(
         &self,
@@ -52,7 +52,7 @@ impl EdgeMt {
             return Ok(Applied::Blocked(self.created_by(vertex).ok_or(error)?));
         };
         if mesh.labels[p as usize].kind_word != KindWord(u.0) {
-            // The labels of a mesh that was not told of its updates cannot tell what is feasible.
+            // The labels of such a mesh do not show what is feasible.
             return Err(UpdateError::UnknownToMesh { update: u.0 });
         }
         let mut ring = take_ring(mesh);
@@ -89,7 +89,7 @@ impl EdgeMt {
             let step = link.step(ring, stored.edge).ok_or(UpdateError::Edge { update })?;
             offset = [0, 1, 2].map(|k| step[k].saturating_add(offset[k]));
         }
-        link.aim(ring, offset);
+        link.set_offset(ring, offset);
         link.guess_levels(ring, mesh, p, offset, &self.info().fields, |field, guess| {
             field_offsets[field] = field_offsets[field].saturating_add(guess);
         });

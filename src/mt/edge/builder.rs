@@ -98,7 +98,7 @@ fn to_residuals<'a>(
     let stored = gathered.map(|()| {
         let mut link = Link::new(&ring, mesh, mesh.positions[p as usize]);
         let (offset_residual, edge) = link.residual_offset(&ring, split.offset, info.lattice.bits);
-        link.aim(&ring, split.offset);
+        link.set_offset(&ring, split.offset);
         link.guess_levels(&ring, mesh, p, split.offset, &info.fields, |field, guess| {
             residuals.push(split.field_offsets[field].saturating_sub(guess));
         });

@@ -4,8 +4,8 @@
 //! the basic arithmetic of doubles, in an order that vertex numbers fix, and so is the same on every platform.
 //! `docs/format.md` gives it as formulas.
 //!
-//! **Offsets.** Edges of the link often have the length and the direction of the edge that comes, so files may tell which
-//! one, and by how much the offset differs from the step along it. **Sides.** A tetrahedron of the star goes rather to the
+//! **Offsets.** Edges of the link often have the length and the direction of the new edge, so an offset may be stored as the
+//! number of one and the difference to the step along it. **Sides.** A tetrahedron of the star goes rather to the
 //! end of the offset that it lies towards. Those of which that is most certain are decided first, and each of the others
 //! follows the majority of its neighbours that are decided. **Levels.** The field is taken to be linear: its gradient is
 //! that of least squares over the link, near vertices counting more.
@@ -50,8 +50,8 @@ impl Link {
         link
     }
 
-    /// The halves of the vertex are to be `offset` apart: what follows is guessed from that.
-    pub fn aim(&mut self, ring: &Ring, offset: [i32; 3]) {
+    /// Sets the offset between the halves of the vertex, from which sides and levels are predicted.
+    pub fn set_offset(&mut self, ring: &Ring, offset: [i32; 3]) {
         let offset = offset.map(i64::from);
         let count = ring.link_len.min(MAX_LINK);
         for (i, along) in self.along[..count].iter_mut().enumerate() {
@@ -97,7 +97,7 @@ impl Link {
         if is_back { step.map(|d| -d) } else { step }
     }
 
-    /// An offset as files tell it: what is to be added to the step along an edge, and the number of that; or the offset and 0.
+    /// The residual of an offset: the difference to the step along an edge, and the number of that; or the offset and 0.
     pub fn residual_offset(&self, ring: &Ring, offset: [i32; 3], bits: u32) -> ([i32; 3], u8) {
         let places = self.by_number(ring.link_len.min(MAX_LINK));
         // What is not counted from an edge has no sign in its first component.
@@ -114,7 +114,7 @@ impl Link {
         residual
     }
 
-    /// The order in which the sides of the star are told, the least certain first, and a bit for each tetrahedron that
+    /// The order in which the sides of the star are stored, the least certain first, and a bit for each tetrahedron that
     /// lies rather towards `v''`.
     fn certainty(&self, ring: &Ring) -> ([u8; MAX_STAR], u64) {
         let mut keys = [i32::MAX; MAX_STAR];
@@ -225,7 +225,7 @@ impl Link {
         p: u32,
         offset: [i32; 3],
         fields: &[FieldInfo],
-        mut tell: impl FnMut(usize, i32),
+        mut predicted: impl FnMut(usize, i32),
     ) {
         let count = ring.link_len.min(MAX_LINK);
         let (weights, places) = (self.weights(count, offset), self.by_number(count));
@@ -238,7 +238,7 @@ impl Link {
             }
             // Rounded towards zero, and held within what a difference of levels can be.
             let largest = 1 << info.bits;
-            tell(field, (sum as i32).clamp(-largest, largest));
+            predicted(field, (sum as i32).clamp(-largest, largest));
         }
     }
 }

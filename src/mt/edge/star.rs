@@ -383,7 +383,7 @@ impl CurrentMesh {
         own & MARK_MASK
     }
 
-    /// Collects the tetrahedra around the vertex in `slot`, as [`CurrentMesh::gather_ring`] does, and tells the largest
+    /// Collects the tetrahedra around the vertex in `slot`, as [`CurrentMesh::gather_ring`] does, and returns the largest
     /// number of a vertex of theirs. Stops at one that is larger than `largest`; where the star is too large, those that
     /// were found are searched all the same.
     #[inline]

@@ -73,8 +73,8 @@ pub struct EdgeUpdate<'a> {
     pub errors: &'a [ErrorCode],
 }
 
-/// A compact edge-based MT. With one field an update, and so a reference vertex, takes at most 36 bytes and 2 for the
-/// error; the base mesh, which is small, comes on top.
+/// A compact edge-based MT. With one field an update, and so a reference vertex, takes 32 bytes, on lattices of more
+/// than 17 bits 40, and 2 for the error; the base mesh, which is small, comes on top.
 ///
 /// It grows by [`push`](EdgeMt::push), coarse to fine; every prefix of an MT is an MT. Or else it comes and goes in pages of
 /// updates, by [`insert_page`](EdgeMt::insert_page) and [`remove_page`](EdgeMt::remove_page): every set of pages that holds
@@ -228,7 +228,7 @@ impl EdgeMt {
         Ok(UpdateId(update))
     }
 
-    /// What can be told of an update by itself.
+    /// Checks what does not need the mesh.
     fn check(&self, update: u32, new: &EdgeUpdate<'_>) -> Result<(), UpdateError> {
         let fits = |residual: i32, bits: u32| residual.unsigned_abs() <= 1 << bits;
         let fields = &self.info.fields;

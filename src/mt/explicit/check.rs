@@ -16,7 +16,7 @@ use crate::mt::{ExplicitMt, MultiTessellation, UpdateId, VertexId};
 use std::collections::BTreeSet;
 use std::fmt;
 
-/// What is wrong with an MT. `update` is the first where it shows; none stands for the base mesh.
+/// Why an MT is not valid. `update` is the first one that is not; none means the base mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum MtFault {

@@ -1,4 +1,4 @@
-//! Which faces and vertices of a mesh are occupancy, by which updates that are spelled out are held to a mesh.
+//! Which faces and vertices of a mesh are occupied: explicit updates that would overlap it are refused.
 
 use crate::mesh::FACES;
 use crate::mt::mesh::KindState;

@@ -1,4 +1,4 @@
-//! The explicit Multi-Tessellation [§3]: every tetrahedron, every update and the whole DAG spelled out.
+//! The explicit Multi-Tessellation [§3]: every tetrahedron, every update and the whole DAG is stored.
 //!
 //! It is independent of what kind of update the MT is made of, needs no geometry to find parents and children, and
 //! takes 24n + 28m bytes for n reference vertices and m tetrahedra by the paper's estimate. Here it is the baseline
@@ -19,7 +19,7 @@ use crate::mt::{
 use std::collections::HashMap;
 use std::ops::Range;
 
-/// An update with everything spelled out, on its way into an [`ExplicitMt`].
+/// An update of an [`ExplicitMt`]: all that it removes and inserts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ExplicitUpdate<'a> {
     /// Positions of the vertices that appear with `u+`; they are numbered as they come, after the base vertices.
@@ -35,7 +35,7 @@ pub struct ExplicitUpdate<'a> {
     pub errors: &'a [ErrorCode],
 }
 
-/// An MT with everything spelled out.
+/// An explicit MT.
 ///
 /// It grows by [`push`](ExplicitMt::push), coarse to fine; every prefix of an MT is an MT.
 #[derive(Clone, Debug, PartialEq)]
@@ -118,7 +118,7 @@ impl ExplicitMt {
     /// # Errors
     /// What it removes must be there, once and in no other update; what it inserts must be positive on the lattice, with
     /// vertices that are new or of what it removes. Whether it fits the mesh shows when it is applied; that errors do not grow
-    /// along the partial order, [`ExplicitMt::check`] tells.
+    /// along the partial order is checked by [`ExplicitMt::check`].
     pub fn push(&mut self, new: &ExplicitUpdate<'_>) -> Result<UpdateId, UpdateError> {
         let update = self.updates();
         let fields = self.info.fields.len();

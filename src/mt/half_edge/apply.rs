@@ -54,7 +54,7 @@ pub(in crate::mt) enum Search {
 type AtVertex = (u32, usize);
 
 impl HalfEdgeMt {
-    /// Collects T_u, or tells what has to be applied first.
+    /// Collects T_u, or returns what has to be applied first.
     fn collect_removed(
         &self,
         mesh: &mut CurrentMesh,

@@ -133,7 +133,7 @@ fn near_vertex(explicit: &ExplicitMt, u: UpdateId) -> Result<u32, ConvertError> 
 
 /// For each tetrahedron of an explicit MT the faces that go with it.
 struct InnerFaces {
-    /// Bit `i` stands for the face opposite the `i`-th corner in ascending order.
+    /// Bit `i` is that of the face opposite the `i`-th corner in ascending order.
     bits: Vec<u8>,
 }
 

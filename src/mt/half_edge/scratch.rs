@@ -47,7 +47,7 @@ pub(in crate::mt) struct Scratch {
     pub link_len: usize,
     /// Around the edge from the near to the new vertex: a link vertex, a gap, and the corner of that opposite the face
     /// which has the vertex.
-    pub ends: Vec<(u8, u8, u8)>,
+    pub ends: Vec<u32>,
     pub levels: Vec<i32>,
     pub gathered: Star,
     /// A hash of the label of each vertex of the link; then that of the new vertex.
@@ -112,7 +112,7 @@ impl Scratch {
         for corner in (0..4).filter(|&k| k != at && k != face) {
             // The face opposite this corner has the other one.
             let other = 6 - at - face - corner;
-            self.ends.push((corners[other], place as u8, corner as u8));
+            self.ends.push(u32::from_be_bytes([0, corners[other], place as u8, corner as u8]));
         }
         self.star[place] = new;
         self.star_len += 1;
@@ -129,14 +129,14 @@ impl Scratch {
         self.ends.sort_unstable();
         let (mut open, mut i) = (0, 0);
         while i < self.ends.len() {
-            let (v, gap, corner) = self.ends[i];
-            let next = self.ends.get(i + 1).filter(|next| next.0 == v);
-            let Some(&(_, other, side)) = next else {
+            let (v, gap, corner) = parts(self.ends[i]);
+            let next = self.ends.get(i + 1).map(|&end| parts(end)).filter(|next| next.0 == v);
+            let Some((_, other, side)) = next else {
                 open += 1;
                 i += 1;
                 continue;
             };
-            if self.ends.get(i + 2).is_some_and(|third| third.0 == v) {
+            if self.ends.get(i + 2).is_some_and(|&third| parts(third).0 == v) {
                 return None;
             }
             self.star[gap as usize % MOST].across[corner as usize & 3] = other;
@@ -147,15 +147,16 @@ impl Scratch {
             return None;
         }
         // From one end, or from anywhere, all must be met.
-        let first = self.ends[0].1;
+        let first = parts(self.ends[0]).1;
         let (mut met, mut from, mut at) = (1, NO_ENTRY, first);
         if open == 2 {
             let lone = |i: usize| {
-                let v = self.ends[i].0;
-                let same = |j: Option<usize>| j.and_then(|j| self.ends.get(j)).is_some_and(|e| e.0 == v);
+                let v = parts(self.ends[i]).0;
+                let end = |j: Option<usize>| j.and_then(|j| self.ends.get(j));
+                let same = |j: Option<usize>| end(j).is_some_and(|&end| parts(end).0 == v);
                 !same(i.checked_sub(1)) && !same(Some(i + 1))
             };
-            at = self.ends[(0..self.ends.len()).find(|&i| lone(i))?].1;
+            at = parts(self.ends[(0..self.ends.len()).find(|&i| lone(i))?]).1;
         }
         let start = at;
         loop {
@@ -237,6 +238,13 @@ impl Scratch {
             *level = mean(sum, total.max(1)) as i32;
         }
     }
+}
+
+/// The parts of an entry of [`Scratch::ends`].
+#[inline]
+fn parts(end: u32) -> (u8, u8, u8) {
+    let [_, vertex, gap, corner] = end.to_be_bytes();
+    (vertex, gap, corner)
 }
 
 /// The squared distance of a vertex from a position.

@@ -68,7 +68,7 @@ pub(in crate::mt) struct StarCode {
 }
 
 /// Writes or reads what cannot be predicted.
-trait Teller {
+trait CodeIo {
     /// Which of the choices it is.
     fn choose(&mut self, tet: usize, choices: &mut [Choice]) -> Option<Choice>;
     /// Of the candidates without a rank, 0 for none.
@@ -94,7 +94,7 @@ impl Reader<'_> {
     }
 }
 
-impl Teller for Reader<'_> {
+impl CodeIo for Reader<'_> {
     fn choose(&mut self, _: usize, choices: &mut [Choice]) -> Option<Choice> {
         let rank = usize::from(self.symbol());
         if rank == 0 {
@@ -140,7 +140,7 @@ struct Writer<'a> {
     bits: Vec<bool>,
 }
 
-impl Teller for Writer<'_> {
+impl CodeIo for Writer<'_> {
     fn choose(&mut self, tet: usize, choices: &mut [Choice]) -> Option<Choice> {
         choices.sort_by(comes_before);
         let remover = self.truth[tet].0;
@@ -189,7 +189,7 @@ impl HalfEdgeMt {
             Some((&count, rest)) => rest.split_at_checked(usize::from(count))?,
             None => (star, star),
         };
-        self.tell(mesh, u, position, (scratch, code), &mut Reader { symbols, bits, at: 0 })
+        self.code_with(mesh, u, position, (scratch, code), &mut Reader { symbols, bits, at: 0 })
     }
 
     /// The code of a star, given the remover and the inner faces of each of its tetrahedra. None if it has none.
@@ -202,7 +202,7 @@ impl HalfEdgeMt {
         truth: &[(u32, u8)],
     ) -> Option<Vec<u8>> {
         let mut writer = Writer { truth, symbols: Vec::new(), bits: Vec::new() };
-        self.tell(mesh, u, position, (scratch, &mut StarCode::default()), &mut writer)?;
+        self.code_with(mesh, u, position, (scratch, &mut StarCode::default()), &mut writer)?;
         let Writer { mut symbols, bits, .. } = writer;
         symbols.truncate(symbols.iter().rposition(|&s| s != 0).map_or(0, |last| last + 1));
         let used = bits.iter().rposition(|&bit| bit).map_or(0, |last| last + 1);
@@ -217,13 +217,13 @@ impl HalfEdgeMt {
         Some(code)
     }
 
-    fn tell(
+    fn code_with(
         &self,
         mesh: &CurrentMesh,
         u: UpdateId,
         position: [i32; 3],
         (scratch, code): (&mut Scratch, &mut StarCode),
-        teller: &mut impl Teller,
+        io: &mut impl CodeIo,
     ) -> Option<()> {
         let Scratch { star, star_len, link, link_len, hashes, tet_hashes, .. } = scratch;
         let (star, link) = (&mut star[..*star_len], &link[..*link_len]);
@@ -242,8 +242,8 @@ impl HalfEdgeMt {
         code.positions.clear();
         code.positions.extend(link.iter().map(|&slot| mesh.positions[slot as usize]));
         code.positions.push(position);
-        code.find_removers(&around, star, teller)?;
-        code.find_inner(&around, star, teller);
+        code.find_removers(&around, star, io)?;
+        code.find_inner(&around, star, io);
         Some(())
     }
 }
@@ -299,7 +299,7 @@ impl StarCode {
         &mut self,
         around: &Around<'_>,
         star: &mut [NewTet],
-        teller: &mut impl Teller,
+        io: &mut impl CodeIo,
     ) -> Option<()> {
         self.rank(around, star);
         self.decided.clear();
@@ -323,11 +323,11 @@ impl StarCode {
             let choices = &mut self.choices[i];
             let choices = &mut choices.all[..choices.len];
             weigh_by_neighbors(choices, &star[i], star, &self.decided);
-            let choice = teller.choose(i, choices)?;
+            let choice = io.choose(i, choices)?;
             self.decided[i] = true;
             let (corner, child) = match choice.remover {
                 NONE => continue,
-                FURTHER => match self.further(around, &star[i], i, teller)? {
+                FURTHER => match self.further(around, &star[i], i, io)? {
                     Some(found) => found,
                     None => continue,
                 },
@@ -370,7 +370,7 @@ impl StarCode {
         around: &Around<'_>,
         new: &NewTet,
         i: usize,
-        teller: &mut impl Teller,
+        io: &mut impl CodeIo,
     ) -> Option<Option<(u8, ForestChild)>> {
         let lists = around.lists_of(new);
         let mut rest = [0; 4];
@@ -388,7 +388,7 @@ impl StarCode {
                 .find(|found| found.1 == remover)
                 .map(|found| found.0)
         };
-        let index = teller.further(i, &mut index_of)?;
+        let index = io.further(i, &mut index_of)?;
         let mut found = None;
         for _ in 0..index {
             found = Some(pop_least(&lists, &mut rest)?);
@@ -396,10 +396,10 @@ impl StarCode {
         Some(found)
     }
 
-    fn find_inner(&mut self, around: &Around<'_>, star: &mut [NewTet], teller: &mut impl Teller) {
+    fn find_inner(&mut self, around: &Around<'_>, star: &mut [NewTet], io: &mut impl CodeIo) {
         self.order.clear();
         // Those that are not stored are as predicted.
-        let bits = teller.bits_left();
+        let bits = io.bits_left();
         for i in 0..star.len() {
             let new = star[i];
             if new.remover == NONE {
@@ -440,7 +440,7 @@ impl StarCode {
         }
         for (at, &(_, i, face)) in self.order.iter().enumerate() {
             let (i, face, guess) = (usize::from(i), usize::from(face & 3), face >> 7 == 1);
-            let is_inner = if at < stored { teller.is_inner(i, face, guess) } else { guess };
+            let is_inner = if at < stored { io.is_inner(i, face, guess) } else { guess };
             star[i].inner |= u8::from(is_inner) << face;
         }
     }
@@ -471,7 +471,7 @@ fn rank_tet(choices: &mut Choices, lists: &[&[ForestChild]; 4], corners: &[[i32;
 /// How much more likely a candidate is that removes a neighbour, and how much less one that leaves it.
 const AGREEMENT: f64 = 6.0;
 
-/// Weighs the choices for a tetrahedron anew by what is known of its neighbours in the star: T_u hangs together.
+/// Weighs the choices for a tetrahedron again by the removers of its neighbours in the star: T_u is connected.
 #[inline]
 fn weigh_by_neighbors(choices: &mut [Choice], new: &NewTet, star: &[NewTet], decided: &[bool]) {
     let (mut known, mut count) = ([(0, NONE); 4], 0);

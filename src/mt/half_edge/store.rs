@@ -12,8 +12,8 @@
 //!      | /      |     u-     | /      |
 //! ```
 //!
-//! Nothing of T_u is stored with `u`. When an update creates a tetrahedron, it tells which later update removes that, and
-//! which of its faces go with it. So T_u is what is reached from any of its tetrahedra through such faces, and what is in
+//! Nothing of T_u is stored with `u`. An update stores for each tetrahedron that it creates which later update removes it, and
+//! which of its faces are removed with it. So T_u is what is reached from any of its tetrahedra through such faces, and what is in
 //! the way of `u` is whatever else lies behind one. This needs no update but those applied: a file can be read in pages
 //! of updates, in any order, without the pages that these depend on.
 //!
@@ -73,7 +73,7 @@ pub struct HalfEdgeMt {
     base_marks: Vec<BaseMark>,
     base_children: Rows<ForestChild>,
     pub(super) pages: Pages<HalfEdgePage>,
-    /// The near vertex of each update, as far as the page that tells it is here.
+    /// The near vertex of each update, as far as the page that has it as a child is here.
     near: PagedArray<u32>,
     /// Page by page and field by field, what bounds the errors of a page that is not here.
     bounds: Vec<ErrorCode>,
@@ -189,7 +189,7 @@ impl HalfEdgeMt {
         if row.iter().all(fits) { Ok(()) } else { Err(UpdateError::OffLattice { update }) }
     }
 
-    /// What can be told of an update by itself.
+    /// Checks what does not need the mesh.
     fn check(&self, update: u32, new: &HalfEdgeUpdate<'_>) -> Result<(), UpdateError> {
         self.check_children(update, Some(update), new.children)?;
         let fields = &self.info.fields;
@@ -300,7 +300,7 @@ impl HalfEdgeMt {
     pub(in crate::mt) fn bounds_of(&self, u: UpdateId) -> &[ErrorCode] {
         let fields = self.zeros.len();
         let at = self.pages.page_of(u.0) as usize * fields;
-        // Nothing is known of a page without bounds: the first entries stand for all then.
+        // A page without bounds has those of the first entries.
         self.bounds.get(at..at + fields).or_else(|| self.bounds.get(..fields)).unwrap_or(&self.zeros)
     }
 
@@ -333,7 +333,7 @@ impl HalfEdgeMt {
         }
     }
 
-    /// The near vertex of update `u`; none if the page that tells it is not here.
+    /// The near vertex of update `u`; none if the page that has it as a child is not here.
     #[inline]
     pub fn near(&self, u: UpdateId) -> Option<VertexId> {
         Some(self.near.get(u.0)).filter(|&v| v != NONE).map(VertexId)

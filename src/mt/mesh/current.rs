@@ -39,7 +39,7 @@ impl Clone for Box<dyn KindState> {
     }
 }
 
-/// What [`CurrentMesh::take_changes`] tells.
+/// The result of [`CurrentMesh::take_changes`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct MeshChanges {
     /// Changed ranges of vertex slots.
@@ -79,7 +79,7 @@ pub struct CurrentMesh {
     /// The slot of each vertex of the MT, [`NONE`] when it is not in the mesh.
     pub(in crate::mt) slot_of: PagedArray<u32>,
     pub(crate) fields: usize,
-    /// What the MT knows each tetrahedron by; without entries for kinds of MT that need none.
+    /// The MT's tag of each tetrahedron; empty for kinds of MT that need none.
     pub(in crate::mt) tags: Vec<u32>,
     /// A byte that the kind keeps for each tetrahedron; none unless it asked for them.
     pub(super) tet_bytes: Vec<u8>,
@@ -364,7 +364,7 @@ impl CurrentMesh {
         self.marks.pop();
     }
 
-    /// Moves the last vertex into a hole, and tells from where to where; its tetrahedra are the caller's to rename.
+    /// Moves the last vertex into a hole. Returns from where to where; the caller must rename it in its tetrahedra.
     fn fill_vertex(&mut self, hole: u32) -> Option<[u32; 2]> {
         while self.labels.last().is_some_and(|l| l.vertex == NONE) {
             self.pop_vertex();

@@ -1,4 +1,4 @@
-//! Tags of tetrahedra: what an MT knows each by, and beside it a byte, for kinds of MT that need them.
+//! Tags of tetrahedra: a number that the MT gives each, and a byte beside it, for kinds of MT that need them.
 
 use super::current::CurrentMesh;
 use crate::mesh::NONE;
@@ -42,7 +42,7 @@ impl CurrentMesh {
         !self.tags.is_empty()
     }
 
-    /// What the MT knows tetrahedron `t` by.
+    /// The MT's tag of tetrahedron `t`.
     #[inline]
     pub(crate) fn tag(&self, t: u32) -> u32 {
         self.tags[t as usize]

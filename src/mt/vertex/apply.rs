@@ -1,7 +1,7 @@
 //! Vertex insertion and removal on the current mesh [§5]: the updates of the compact vertex-based MT.
 //!
 //! In the current mesh, the tag of a tetrahedron is the update that removes it. While that update has not arrived, the
-//! tag tells which child of the tetrahedron's creator it will be.
+//! tag is the number of that child of the tetrahedron's creator.
 
 use super::bit_string::width_of;
 use super::cavity::{Cavity, SLOTS, Wall, take_cavity};
@@ -32,7 +32,7 @@ struct Shape {
     children: u32,
     removed: usize,
     boundary: bool,
-    /// Where the bits are that tell which boundary faces of T_u are given up, and how many.
+    /// Where the bits are that say which boundary faces of T_u are given up, and how many.
     given_up: u64,
     given_up_len: u32,
     /// Where the removers of the star are, and how wide; each has the quarterings of its tetrahedron behind it.
@@ -200,29 +200,29 @@ impl VertexMt {
         let by_labels = |&t: &u32| {
             let mut tet = mesh.tets[t as usize].map(|v| mesh.labels[v as usize].vertex);
             tet.sort_unstable();
-            (tet, mesh.tet_byte(t))
+            (tet, u32::from(mesh.tet_byte(t)))
         };
-        let mut all: Vec<([u32; 4], u8)> = cavity.tets[..cavity.tets_len].iter().map(by_labels).collect();
+        let mut all: Vec<([u32; 4], u32)> = cavity.tets[..cavity.tets_len].iter().map(by_labels).collect();
         all.sort_unstable();
         let mut packed = Packed::default();
-        all.iter().enumerate().for_each(|(place, (_, own))| packed.set(place, *own));
+        all.iter().enumerate().for_each(|(place, (_, own))| packed.set(place, *own as u8));
         replaced.set(self.vertex(u).0, packed);
     }
 
     /// The quarterings of the tetrahedra of T_u that were built; none if they are not kept.
     fn kept_quarterings(&self, u: UpdateId, cavity: &Cavity) -> Option<[u8; GATHERED]> {
-        let Cavity { glue, replaced, .. } = cavity;
+        let Cavity { fill, replaced, .. } = cavity;
         let packed = replaced.as_ref()?.get(self.vertex(u).0);
         // Numbers are in the order of labels.
         let sorted = |(i, tet): (usize, &[u8; 4])| {
             let mut tet = *tet;
             tet.sort_unstable();
-            (tet, i)
+            u64::from(u32::from_be_bytes(tet)) << 32 | i as u64
         };
-        let mut all: Vec<([u8; 4], usize)> = glue.tets[..glue.len].iter().enumerate().map(sorted).collect();
+        let mut all: Vec<u64> = fill.tets[..fill.len].iter().enumerate().map(sorted).collect();
         all.sort_unstable();
         let mut kept = [0; GATHERED];
-        all.iter().enumerate().for_each(|(place, (_, i))| kept[*i] = packed.get(place));
+        all.iter().enumerate().for_each(|(place, key)| kept[*key as usize % GATHERED] = packed.get(place));
         Some(kept)
     }
 
@@ -236,7 +236,7 @@ impl VertexMt {
         self.child(u, child).filter(|_| child > 0).map(|child| child.0)
     }
 
-    /// Reveals updates to the tetrahedra around the vertices that these come with. False if others may be left to be told, or to look at
+    /// Marks tetrahedra around the parents of new updates with these. False if others may be left, or to look at
     /// all would be quicker.
     fn mark_arrived_around(&self, mesh: &mut CurrentMesh, updates: &Range<u32>) -> bool {
         let Some(growing) = &self.growing else { return false };
@@ -265,7 +265,7 @@ impl VertexMt {
             let found = star.iter().filter(|&&t| self.mark_arrived_at(mesh, t, updates)).count();
             missing = missing.saturating_sub(found);
         }
-        // Else the tetrahedra around a vertex do not all hang together, or the mesh knows of some updates already.
+        // Else the tetrahedra around a vertex are not all connected, or some have been marked before.
         missing == 0
     }
 
@@ -451,7 +451,7 @@ impl VertexMt {
         }
         // Other tetrahedra may have the same fingerprint by intent; none may be inside out.
         let at = |x: u8| mesh.positions[cavity.link[x as usize % MAX_AROUND] as usize];
-        let positive = cavity.glue.tets[..cavity.glue.len].iter().all(|tet| {
+        let positive = cavity.fill.tets[..cavity.fill.len].iter().all(|tet| {
             let [a, b, c, d] = tet.map(at);
             orient3d(a, b, c, d) > 0
         });
@@ -496,14 +496,14 @@ impl VertexMt {
             Some(apex) => Some(Close::With(apex)),
             None => code.close(&self.nodes, face, of_link),
         };
-        cavity.glue.build(&faces[..cavity.walls_len], !shape.boundary, close)?;
-        (cavity.glue.len == shape.removed).then_some(())
+        cavity.fill.build(&faces[..cavity.walls_len], !shape.boundary, close)?;
+        (cavity.fill.len == shape.removed).then_some(())
     }
 
     fn perform_removal(&self, mesh: &mut CurrentMesh, u: UpdateId, cavity: &mut Cavity) {
         let kept = self.kept_quarterings(u, cavity);
-        let Cavity { glue, star, walls, link, .. } = cavity;
-        let (old, new) = (star.len, glue.len);
+        let Cavity { fill, star, walls, link, .. } = cavity;
+        let (old, new) = (star.len, fill.len);
         let mut slots = [NONE; GATHERED];
         let reused = old.min(new);
         slots[..reused].copy_from_slice(&star.tets[..reused]);
@@ -517,9 +517,9 @@ impl VertexMt {
         }
         for i in 0..new {
             let t = slots[i];
-            let tet = glue.tets[i].map(|x| link[x as usize % MAX_AROUND]);
+            let tet = fill.tets[i].map(|x| link[x as usize % MAX_AROUND]);
             mesh.tets[t as usize] = tet;
-            for (side, across) in glue.across[i].iter().enumerate() {
+            for (side, across) in fill.across[i].iter().enumerate() {
                 mesh.neighbors[t as usize][side] = match *across {
                     Across::Nothing => NONE,
                     Across::Inside(j) => slots[j as usize],
@@ -623,7 +623,7 @@ impl ApplyUpdates for VertexMt {
         let rebuilt = self.rebuild(mesh, u, &mut cavity);
         if rebuilt == Ok(Applied::Done) {
             let kept = self.kept_quarterings(u, &cavity);
-            for (i, tet) in cavity.glue.tets[..cavity.glue.len].iter().enumerate() {
+            for (i, tet) in cavity.fill.tets[..cavity.fill.len].iter().enumerate() {
                 let tet = tet.map(|x| cavity.link[x as usize % MAX_AROUND]);
                 let levels = |field: usize| tet.map(|v| mesh.levels(v)[field]);
                 let own = kept.map_or(0, |kept| kept[i]);

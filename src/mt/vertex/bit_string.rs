@@ -82,7 +82,7 @@ fn low(width: u32) -> u64 {
     if width >= 64 { u64::MAX } else { (1 << width) - 1 }
 }
 
-/// Bits that it takes to tell the numbers `0 ..= largest` apart.
+/// Bits of the numbers `0 ..= largest`.
 #[inline]
 pub(crate) fn width_of(largest: u32) -> u32 {
     u32::BITS - largest.leading_zeros()

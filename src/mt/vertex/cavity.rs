@@ -1,7 +1,7 @@
 //! Scratch space for insertions and removals: T_u, the faces of Π_u and what lies beyond them.
 
 use super::bit_string::Bits;
-use super::cavity_fill::{Face, Glue, turned};
+use super::cavity_fill::{CavityFill, Face, turned};
 use super::limits::{MAX_AROUND, MAX_INSERTED};
 use super::shape_code::{Hole, write_removed};
 use super::sphere_order::Spheres;
@@ -32,7 +32,7 @@ pub(super) struct Wall {
 /// Scratch space for insertions and removals.
 #[derive(Clone, Debug)]
 pub(super) struct Cavity {
-    pub glue: Glue,
+    pub fill: CavityFill,
     pub star: Star,
     /// The slots of T_u.
     pub tets: [u32; GATHERED],
@@ -109,7 +109,7 @@ impl Fingerprint {
 impl Default for Cavity {
     fn default() -> Self {
         Self {
-            glue: Glue::default(),
+            fill: CavityFill::default(),
             star: Star::default(),
             tets: [0; GATHERED],
             tets_len: 0,
@@ -182,14 +182,14 @@ impl Cavity {
     pub fn fingerprint_built(&mut self, mesh: &CurrentMesh) {
         let prints = self.prints(mesh);
         self.fingerprint = Fingerprint::default();
-        for tet in &self.glue.tets[..self.glue.len] {
+        for tet in &self.fill.tets[..self.fill.len] {
             let of_corners = tet.iter().map(|&x| prints[x as usize % MAX_AROUND]);
             self.fingerprint.add(of_corners.fold(0, u32::wrapping_add));
         }
     }
 
     /// Finds the faces of Π_u around the tetrahedra that were gathered, and joins the new tetrahedra behind them. `given_up` is the
-    /// number of faces on the boundary where some of these are given up; which are, `is_given_up` tells by their places and by
+    /// number of faces on the boundary where some of these are given up; which are, is given by `is_given_up`, by their places and by
     /// tetrahedron and face.
     pub fn find_walls(
         &mut self,
@@ -323,7 +323,7 @@ impl Cavity {
             Spheres::of(positions[..self.link_len].iter().copied())
         };
         let (vertices, faces) = (self.link_len as u32, &faces[..self.walls_len]);
-        write_removed(&mut self.glue, &mut self.bits, Hole { vertices, faces, removed, on_boundary }, spheres)
+        write_removed(&mut self.fill, &mut self.bits, Hole { vertices, faces, removed, on_boundary }, spheres)
     }
 
     /// Whether all tetrahedra of the new star are positive, exactly.

@@ -49,7 +49,7 @@ const OF_LINK: u8 = 4;
 
 /// Scratch space, and the tetrahedra that were built last.
 #[derive(Clone, Debug)]
-pub(crate) struct Glue {
+pub(crate) struct CavityFill {
     open: [OpenFace; OPEN_FACES],
     open_len: usize,
     /// Open faces by their vertices: `epoch << 16 | index`.
@@ -61,7 +61,7 @@ pub(crate) struct Glue {
     pub across: [[Across; 4]; MAX_REMOVED],
 }
 
-impl Default for Glue {
+impl Default for CavityFill {
     fn default() -> Self {
         Self {
             open: [OpenFace::default(); OPEN_FACES],
@@ -93,7 +93,7 @@ fn key([a, b, c]: Face) -> u32 {
     u32::from(a) << 12 | u32::from(b.min(c)) << 6 | u32::from(b.max(c))
 }
 
-impl Glue {
+impl CavityFill {
     /// Builds tetrahedra behind `link`, the faces of Π_u in canonical order, turned. `close` says how to close each face;
     /// it gets whether the face is one of Π_u. None if the faces do not fit together: every face of Π_u must be
     /// closed, and with `whole` every other face as well.

@@ -1,7 +1,7 @@
 //! From an explicit MT to the compact vertex-based one, where every update is a vertex insertion.
 
 use super::bit_string::{Bits, width_of};
-use super::cavity_fill::{Face, Glue, turned};
+use super::cavity_fill::{CavityFill, Face, turned};
 use super::limits::{MAX_AROUND, MAX_INSERTED, MAX_REMOVED};
 use super::shape_code::{Hole, write_given_up, write_removed};
 use super::sphere_order::Spheres;
@@ -33,7 +33,7 @@ impl VertexMt {
             compact = compact.with_tet_errors(base).map_err(damaged)?;
         }
         let mut boundary: HashSet<[u32; 3]> = boundary_faces(mt);
-        let mut writer = Writer { mt, children: &children, glue: Box::default() };
+        let mut writer = Writer { mt, children: &children, fill: Box::default() };
         for u in (0..updates).map(UpdateId) {
             let node = writer.node(&compact, u, &mut boundary)?;
             compact.push(&node, mt.errors(u)).map_err(damaged)?;
@@ -68,7 +68,7 @@ fn sorted(mut face: [u32; 3]) -> [u32; 3] {
 struct Writer<'a> {
     mt: &'a ExplicitMt,
     children: &'a [Vec<u32>],
-    glue: Box<Glue>,
+    fill: Box<CavityFill>,
 }
 
 /// An insertion in canonical numbers.
@@ -213,7 +213,7 @@ impl Writer<'_> {
             return Err(torn);
         }
         let hole = Hole { vertices: link.len() as u32, faces: &faces, removed, on_boundary };
-        write_removed(&mut self.glue, bits, hole, spheres).ok_or(torn)
+        write_removed(&mut self.fill, bits, hole, spheres).ok_or(torn)
     }
 }
 

@@ -68,7 +68,7 @@ impl Growing {
     }
 
     /// The member of the loop of `owner` behind the `at`-th one, where 0 is the owner and `i` its `i`-th parent; and which of its
-    /// links goes on.
+    /// links leads on.
     pub fn next_in_loop(&self, owner: u32, at: usize) -> [u32; 2] {
         match self.parents(owner).get(at) {
             Some(&parent) => {

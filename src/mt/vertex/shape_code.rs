@@ -1,7 +1,7 @@
-//! How a node tells what its insertion removes: the bits behind its links.
+//! How a node stores what its insertion removes: the bits behind its links.
 
 use super::bit_string::{Bits, width_of};
-use super::cavity_fill::{Close, Face, Glue, turned};
+use super::cavity_fill::{CavityFill, Close, Face, turned};
 use super::limits::{COUNT_BITS, MAX_REMOVED};
 use super::sphere_order::{ApexCode, Spheres};
 use crate::mesh::FACES;
@@ -102,7 +102,7 @@ pub(in crate::mt) struct Hole<'a> {
 
 /// Appends how T_u fills Π_u, all faces of which are such of T_u.
 pub(in crate::mt) fn write_removed(
-    glue: &mut Glue,
+    fill: &mut CavityFill,
     bits: &mut Bits,
     Hole { vertices, faces, removed, on_boundary }: Hole<'_>,
     spheres: impl FnOnce() -> Spheres,
@@ -132,7 +132,7 @@ pub(in crate::mt) fn write_removed(
     };
     let spheres = spheres();
     let (mut plain, mut places) = (Vec::with_capacity(removed.len()), Vec::with_capacity(removed.len()));
-    let written = glue.build(faces, !on_boundary, |face, of_link| {
+    let written = fill.build(faces, !on_boundary, |face, of_link| {
         let apex = behind(face);
         let choices = choices(vertices, on_boundary, of_link)?;
         let (close, chosen) = match apex {
@@ -150,7 +150,7 @@ pub(in crate::mt) fn write_removed(
     written?;
     write_closed(bits, &plain, &places);
     // Each tetrahedron that was built is one of T_u, and no two are the same; these must be all.
-    (glue.len == removed.len()).then_some(())
+    (fill.len == removed.len()).then_some(())
 }
 
 /// A face as one number: its turned vertices, by six bits each.

@@ -114,7 +114,7 @@ pub(in crate::mt) enum ApexCode {
 }
 
 impl ApexCode {
-    /// All ways; a node tells the place here, in two bits.
+    /// All ways; a node stores the place here, in two bits.
     pub const ALL: [Self; 4] = [Self::Vertex, Self::Unary, Self::Halves, Self::Later];
 
     /// Bits and number of bits of a place, lowest first.

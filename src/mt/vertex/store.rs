@@ -1,18 +1,18 @@
 //! The compact vertex-based Multi-Tessellation [§2.2, §5].
 //!
-//! An update inserts a vertex into a star-shaped polyhedron Π_u: the tetrahedra T_u in it give way to the star of the
+//! An update inserts a vertex into a star-shaped polyhedron Π_u: the tetrahedra T_u in it are replaced by the star of the
 //! vertex. Base vertices are numbered first and update `k` inserts vertex `b + k`, so a tetrahedron was created by its
 //! vertex with the largest number.
 //!
 //! **The partial order** is kept in the loops of Klein and Gumhold [§5, Fig. 4]: the loop of an update is a cyclic list
-//! of the update and its parents. A link tells the next member and which of *its* links goes on; link 0 of an update is
+//! of the update and its parents. A link has the next member and which of *its* links leads on; link 0 of an update is
 //! that of its own loop, link `i` belongs to the loop of its `i`-th child. Following link 0 yields the parents, following
 //! link `i` leads to the `i`-th child.
 //!
 //! **A node** holds the vertex and what takes the place of the paper's two tasks:
-//! 1. *Find T_u in the current mesh.* Every tetrahedron knows which update removes it, from the moment it is created:
-//!    the node that creates it tells, for each tetrahedron of its star in canonical order, which child removes it. T_u is
-//!    then what hangs together around any tetrahedron that `u` removes, and complete when its size is the stored one.
+//! 1. *Find T_u in the current mesh.* Every tetrahedron has its remover from the moment it is created:
+//!    the node that creates it stores, for each tetrahedron of its star in canonical order, which child removes it. T_u is
+//!    then what is connected to any tetrahedron that `u` removes, and complete when its size is the stored one.
 //!    No seed is stored: the last tetrahedron that `u` was found to remove is in T_u when all parents of `u` are applied.
 //! 2. *Build T_u inside Π_u.* The faces of Π_u, and those that come up on the way, are closed one after the other in
 //!    canonical order; the code names the fourth vertex of the tetrahedron behind each, among those of Π_u: by
@@ -20,7 +20,7 @@
 //!    fewest bits. When all of
 //!    T_u meets in one vertex, as after a half-edge collapse, the code is that vertex.
 //!
-//! Where tetrahedra have errors of their own, the node that creates one tells with what removes it how often the errors of
+//! Where tetrahedra have errors of their own, the node that creates one stores with its remover how often the errors of
 //! that update can be quartered to bound those of the tetrahedron.
 //!
 //! The canonical order of the star is that of the sorted vertex numbers of the faces opposite the new vertex. It is the
@@ -34,7 +34,7 @@ use crate::mesh::NONE;
 use crate::mt::update_errors::Errors;
 use crate::mt::{BaseMesh, ErrorCode, MtInfo, MultiTessellation, UpdateError, UpdateId, VertexId};
 
-/// A member of a loop, and which of its links goes on.
+/// A member of a loop, and which of its links leads on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::mt) struct Link {
     pub node: u32,
@@ -60,7 +60,7 @@ pub struct VertexMt {
     pub(in crate::mt) base: BaseMesh,
     pub(in crate::mt) base_removers: Vec<u32>,
     /// The [quarterings](crate::mt::ApplyUpdates::quarterings) of each base tetrahedron, if tetrahedra have errors of
-    /// their own: then nodes tell those of the tetrahedra that they create.
+    /// their own: then nodes store those of the tetrahedra that they create.
     pub(in crate::mt) base_quarterings: Option<Vec<u8>>,
     /// The [fall](crate::mt::MultiTessellation::own_fall) of each update, then.
     pub(in crate::mt) own_falls: Vec<u8>,
@@ -91,7 +91,7 @@ const UNIT: u64 = 4;
 pub struct NodeBits(pub(in crate::mt) Bits);
 
 impl VertexMt {
-    /// An MT without updates. `base` must fit `info`: see [`BaseMesh::check`]. `base_removers` tells for each base
+    /// An MT without updates. `base` must fit `info`: see [`BaseMesh::check`]. `base_removers` has for each base
     /// tetrahedron which update removes it, [`u32::MAX`] if none does; `most_children` is the largest number of children
     /// that an update has, at most [`MAX_INSERTED`]; `always_grows` whether every insertion inserts more tetrahedra than
     /// it removes.
@@ -140,7 +140,7 @@ impl VertexMt {
     }
 
     /// The same MT, still without updates, with errors of tetrahedra: those of the base mesh are here, the nodes that are
-    /// pushed tell the others. See [`quarterings`](crate::mt::ApplyUpdates::quarterings).
+    /// pushed have the others. See [`quarterings`](crate::mt::ApplyUpdates::quarterings).
     ///
     /// # Errors
     /// If there is not one number of at most [`MAX_QUARTERINGS`](crate::mt::MAX_QUARTERINGS) for each base tetrahedron, or there

@@ -23,7 +23,7 @@ const USUAL_CHILDREN: usize = 8;
 pub(crate) struct Insertion<'a> {
     pub position: [i32; 3],
     pub levels: &'a [i32],
-    /// The slots of the tetrahedra that give way.
+    /// The slots of the tetrahedra that are removed.
     pub removed: &'a [u32],
     /// Slot and face of those of their faces on the boundary that are given up.
     pub given_up: &'a [[u32; 2]],
@@ -84,7 +84,7 @@ impl VertexMt {
         Ok(UpdateId(update))
     }
 
-    /// Marks the removed tetrahedra as such, and tells the tags that they had. None if one of them was removed before.
+    /// Marks the removed tetrahedra as such, and returns the tags that they had. None if one of them was removed before.
     pub(in crate::mt) fn take_away(
         &self,
         mesh: &mut CurrentMesh,

@@ -242,10 +242,10 @@ impl Pieces {
 
     /// The same in the order of an extraction.
     pub fn ordered_fan(&self, v: u32) -> Vec<u32> {
-        let mut fan: Vec<_> =
-            self.fan(v).map(|triangle| (self.owners[triangle as usize], triangle)).collect();
+        let key = |triangle: u32| u64::from(self.owners[triangle as usize]) << 32 | u64::from(triangle);
+        let mut fan: Vec<u64> = self.fan(v).map(key).collect();
         fan.sort_unstable();
-        fan.into_iter().map(|(_, triangle)| triangle).collect()
+        fan.into_iter().map(|key| key as u32).collect()
     }
 
     /// The triangles of a tetrahedron, as [`Self::fan`].

@@ -207,7 +207,7 @@ impl State {
                 (0..4).all(|k| inward[k] >= 0.0 || tet[k] == near)
             }));
         }
-        cone.sort_unstable_by_key(|&t| self.sorted(t));
+        self.sort(&mut cone);
         self.cone = cone;
     }
 
@@ -236,8 +236,15 @@ impl State {
 
     pub(super) fn sort_star(&mut self) {
         let mut star = std::mem::take(&mut self.star);
-        star.sort_unstable_by_key(|&t| self.sorted(t));
+        self.sort(&mut star);
         self.star = star;
+    }
+
+    /// Sorts tetrahedra by their sorted vertices.
+    fn sort(&self, tets: &mut [u32]) {
+        let mut sorted: Vec<([u32; 4], u32)> = tets.iter().map(|&t| (self.sorted(t), t)).collect();
+        sorted.sort_unstable();
+        tets.iter_mut().zip(sorted).for_each(|(t, (_, sorted))| *t = sorted);
     }
 
     /// The removed tetrahedron that the new vertex lies in; or is least far out of, for its size.
