@@ -2,7 +2,7 @@
 //!
 //! Nothing here needs a mesh, or another block. The vertex forest is coded from the near vertex down: each update lists the
 //! updates whose near vertex is its own. What removes the tetrahedra of its star is coded as residuals: see
-//! `mt/half_edge_star.rs`.
+//! `mt/half_edge/star_code.rs`.
 
 use super::edge::FieldPart;
 use super::{base, edge};

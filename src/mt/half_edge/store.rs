@@ -19,7 +19,7 @@
 //!
 //! The updates whose near vertex is `v` are the *children* of `v` in the vertex forest. They are stored with `v`, with
 //! the offset from `v` to the vertex that each inserts. Which of them removes a tetrahedron, and which faces, is coded as
-//! residuals against predictions from the star of the new vertex: see `half_edge_star`. That star is the same in every
+//! residuals against predictions from the star of the new vertex: see `mt/half_edge/star_code.rs`. That star is the same in every
 //! consistent set.
 
 use crate::mesh::NONE;
@@ -55,7 +55,7 @@ pub struct HalfEdgeUpdate<'a> {
     pub children: &'a [ForestChild],
     /// Field by field, what is to be added to the level predicted from Π_u.
     pub level_residuals: &'a [i32],
-    /// What removes the tetrahedra of the star, coded: see `half_edge_star`.
+    /// What removes the tetrahedra of the star, coded: see `mt/half_edge/star_code.rs`.
     pub star: &'a [u8],
     /// Field by field, what bounds the error of every tetrahedron that the update removes, and of all updates that depend on
     /// this one.

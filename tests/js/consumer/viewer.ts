@@ -1,5 +1,5 @@
 // What a page does with the viewer: each option and event type-checks, and without a page there is a clear error.
-import { type MtInfo } from "tetralod";
+import type { MtInfo } from "tetralod";
 import {
   TetralodError,
   Viewer,
