@@ -138,11 +138,16 @@ impl Camera {
         (clip.w > 0.0).then(|| DVec2::new(clip.x, clip.y) / clip.w)
     }
 
+    /// From the eye at distance 1 along the direction of view: half the width of the picture, half its height, and its middle.
+    pub fn frustum(&self, aspect: f64) -> [DVec3; 3] {
+        let half = (self.fov / 2.0).tan();
+        [self.right() * (half * positive(aspect)), self.up() * half, self.forward()]
+    }
+
     /// The ray of sight through a normalised screen point.
     pub fn ray(&self, screen: DVec2, aspect: f64) -> Ray {
-        let half = (self.fov / 2.0).tan();
-        let right = self.right() * (screen.x * half * positive(aspect));
-        let direction = (self.forward() + right + self.up() * (screen.y * half)).normalize();
+        let [right, up, forward] = self.frustum(aspect);
+        let direction = (forward + right * screen.x + up * screen.y).normalize();
         Ray { origin: self.eye(), direction }
     }
 }

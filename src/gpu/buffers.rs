@@ -76,6 +76,13 @@ impl<T: Pod> GrowBuffer<T> {
         self.len
     }
 
+    /// The contents for a group of bindings; `None` when empty.
+    pub(super) fn binding(&self) -> Option<wgpu::BindingResource<'_>> {
+        let buffer = self.buffer.as_ref().filter(|_| self.len > 0)?;
+        let size = std::num::NonZeroU64::new((self.len * size_of::<T>()) as u64);
+        Some(wgpu::BindingResource::Buffer(wgpu::BufferBinding { buffer, offset: 0, size }))
+    }
+
     /// What there is to bind; `None` when empty.
     pub(super) fn slice(&self) -> Option<wgpu::BufferSlice<'_>> {
         let buffer = self.buffer.as_ref().filter(|_| self.len > 0)?;

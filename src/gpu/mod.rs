@@ -14,6 +14,7 @@ mod renderer;
 mod surface;
 mod target;
 mod types;
+mod volume;
 mod wire;
 
 pub use context::Context;
@@ -25,9 +26,14 @@ pub use types::{BoxLines, Look};
 pub const SAMPLES: u32 = 4;
 
 /// The shaders, each complete: name and WGSL source.
-pub const SHADERS: [(&str, &str); 4] = [
+pub const SHADERS: [(&str, &str); 6] = [
     ("background", concat!(include_str!("shaders/common.wgsl"), include_str!("shaders/background.wgsl"))),
     ("surface", concat!(include_str!("shaders/common.wgsl"), include_str!("shaders/surface.wgsl"))),
     ("cutaway", concat!(include_str!("shaders/common.wgsl"), include_str!("shaders/cutaway.wgsl"))),
+    (
+        "volume_entries",
+        concat!(include_str!("shaders/common.wgsl"), include_str!("shaders/volume_entries.wgsl")),
+    ),
+    ("volume", concat!(include_str!("shaders/common.wgsl"), include_str!("shaders/volume.wgsl"))),
     ("wire", concat!(include_str!("shaders/common.wgsl"), include_str!("shaders/wire.wgsl"))),
 ];

@@ -9,6 +9,7 @@ use crate::gpu::{Context, SAMPLES, SHADERS};
 pub(super) struct FrameBinding {
     buffer: wgpu::Buffer,
     pub(super) group: wgpu::BindGroup,
+    pub(super) group_layout: wgpu::BindGroupLayout,
     layout: wgpu::PipelineLayout,
 }
 
@@ -44,7 +45,7 @@ impl FrameBinding {
             bind_group_layouts: &[Some(&group_layout)],
             immediate_size: 0,
         });
-        Self { buffer, group, layout }
+        Self { buffer, group, group_layout, layout }
     }
 
     pub(super) fn write(&self, context: &Context, frame: &Frame) {

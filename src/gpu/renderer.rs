@@ -6,9 +6,10 @@ use crate::gpu::pipeline::{FrameBinding, PipelineSpec};
 use crate::gpu::surface::SurfacePass;
 use crate::gpu::target::{Picture, Target};
 use crate::gpu::types::Frame;
+use crate::gpu::volume::VolumePass;
 use crate::gpu::wire::WirePass;
 use crate::gpu::{BoxLines, Context, GpuError, Look};
-use crate::view::{Cutaway, IsoSurface};
+use crate::view::{Cutaway, IsoSurface, Medium, MeshView};
 use std::ops::Range;
 
 /// Which view of the mesh is drawn.
@@ -19,6 +20,8 @@ pub enum Show {
     Surface,
     /// The cut-away tetrahedra.
     Cutaway,
+    /// Emission and absorption of the whole volume.
+    Volume,
 }
 
 /// Draws pictures of a mesh on a canvas or into an image.
@@ -30,6 +33,7 @@ pub struct Renderer {
     background: wgpu::RenderPipeline,
     surface: SurfacePass,
     cutaway: CutawayPass,
+    volume: VolumePass,
     wire: WirePass,
 }
 
@@ -73,6 +77,7 @@ impl Renderer {
             background: background.create(&context, &frame, format),
             surface: SurfacePass::new(&context, &frame, format),
             cutaway: CutawayPass::new(&context, &frame, format),
+            volume: VolumePass::new(&context, &frame, format),
             wire: WirePass::new(&context, &frame, format),
             context,
             target,
@@ -132,6 +137,14 @@ impl Renderer {
         self.cutaway.update(&self.context, cutaway)
     }
 
+    /// Replaces the volume: the mesh, and what its values look like. The eye must be outside of it.
+    ///
+    /// # Errors
+    /// If it is too large for the device; then none is shown.
+    pub fn set_volume(&mut self, mesh: &MeshView<'_>, medium: &Medium) -> Result<(), GpuError> {
+        self.volume.update(&self.context, mesh, medium)
+    }
+
     /// Replaces the boxes.
     ///
     /// # Errors
@@ -150,6 +163,9 @@ impl Renderer {
         self.frame.write(&self.context, &Frame::new(camera, look, self.target.size));
         let descriptor = wgpu::CommandEncoderDescriptor { label: Some("picture") };
         let mut encoder = self.context.device.create_command_encoder(&descriptor);
+        if show == Show::Volume {
+            self.volume.prepare(&self.context, &mut encoder, &self.frame, camera, self.target.size);
+        }
         self.encode(&mut encoder, &picture.view(), show);
         self.context.queue.submit([encoder.finish()]);
         if let Picture::Canvas(texture) = picture {
@@ -187,6 +203,7 @@ impl Renderer {
         match show {
             Show::Surface => self.surface.draw(&mut pass),
             Show::Cutaway => self.cutaway.draw(&mut pass),
+            Show::Volume => self.volume.draw(&mut pass),
         }
         self.wire.draw(&mut pass);
     }

@@ -11,6 +11,7 @@ mod probe;
 mod slice;
 mod stats;
 mod stream;
+mod volume;
 
 pub use boundary::{BoundarySurface, area, is_closed};
 pub use colormap::{Colormap, VIRIDIS};
@@ -20,6 +21,7 @@ pub use probe::{Place, Probe, Span};
 pub use slice::{Plane, Slice};
 pub use stats::{FieldStats, Histogram};
 pub use stream::{StreamEnd, StreamPoint, Streamline, TraceOptions, Tracer};
+pub use volume::{Light, Medium};
 
 use std::ops::Range;
 

@@ -13,5 +13,6 @@ mod shaders;
 mod slice;
 #[path = "../support/mod.rs"]
 mod support;
+mod volume;
 #[allow(dead_code, reason = "each test uses a part of it")]
 mod walk;
