@@ -34,7 +34,7 @@ pub struct MtStats {
     pub max_inserted: u32,
     /// What the compact MT really holds.
     pub compact_bytes: u64,
-    /// The same MT in the explicit structure [§3]: see [`ExplicitMt::bytes`](super::ExplicitMt::bytes).
+    /// The same MT in the explicit structure [§3]: see [`ExplicitMt::paper_bytes`](super::ExplicitMt::paper_bytes).
     pub explicit_bytes: u64,
     /// The reference mesh alone: positions, fields and four vertex indices for each tetrahedron.
     pub indexed_bytes: u64,

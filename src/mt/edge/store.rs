@@ -77,7 +77,7 @@ pub struct EdgeUpdate<'a> {
 /// than 17 bits 40, and 2 for the error; the base mesh, which is small, comes on top.
 ///
 /// It grows by [`push`](EdgeMt::push), coarse to fine; every prefix of an MT is an MT. Or else it comes and goes in pages of
-/// updates, by [`insert_page`](EdgeMt::insert_page) and [`remove_page`](EdgeMt::remove_page): every set of pages that holds
+/// updates, by [`insert_page`](EdgeMt::insert_page) and [`remove_page`](crate::mt::UpdatePages::remove_page): every set of pages that holds
 /// with each page all those on which it depends is an MT, too.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EdgeMt {

@@ -65,7 +65,7 @@ pub struct HalfEdgeUpdate<'a> {
 /// A compact half-edge MT.
 ///
 /// It grows by [`push`](Self::push), coarse to fine, or comes and goes in pages by [`insert_page`](Self::insert_page) and
-/// [`remove_page`](Self::remove_page), in any order. An update can be applied once it and all that it depends on are here.
+/// [`remove_page`](crate::mt::UpdatePages::remove_page), in any order. An update can be applied once it and all that it depends on are here.
 #[derive(Clone, Debug)]
 pub struct HalfEdgeMt {
     info: MtInfo,
