@@ -9,7 +9,7 @@ use crate::gpu::types::Frame;
 use crate::gpu::volume::VolumePass;
 use crate::gpu::wire::WirePass;
 use crate::gpu::{BoxLines, Context, GpuError, Look};
-use crate::view::{Cutaway, IsoSurface, Medium, MeshView};
+use crate::view::{Cutaway, IsoSurface, Medium, MeshView, Place};
 use std::ops::Range;
 
 /// Which view of the mesh is drawn.
@@ -137,12 +137,19 @@ impl Renderer {
         self.cutaway.update(&self.context, cutaway)
     }
 
-    /// Replaces the volume: the mesh, and what its values look like. The eye must be outside of it.
+    /// Replaces the volume: the mesh, and what its values look like. If the eye may be in it, call
+    /// [`Renderer::set_eye`] for each picture.
     ///
     /// # Errors
     /// If it is too large for the device; then none is shown.
     pub fn set_volume(&mut self, mesh: &MeshView<'_>, medium: &Medium) -> Result<(), GpuError> {
         self.volume.update(&self.context, mesh, medium)
+    }
+
+    /// Where the eye of the next pictures is in the mesh of [`Renderer::set_volume`], as [`Probe::locate`](crate::view::Probe::locate)
+    /// gives it; none outside.
+    pub fn set_eye(&mut self, mesh: &MeshView<'_>, place: Option<&Place>) {
+        self.volume.set_eye(mesh, place);
     }
 
     /// Replaces the boxes.

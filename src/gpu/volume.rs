@@ -7,7 +7,7 @@ use crate::gpu::pipeline::FrameBinding;
 use crate::gpu::target::DEPTH;
 use crate::gpu::{Context, GpuError, SAMPLES, SHADERS};
 use crate::mesh::{FACES, NONE};
-use crate::view::{MeshView, Medium};
+use crate::view::{Medium, MeshView, Place};
 
 /// Entries of the table of the medium.
 const TABLE: usize = 1024;
@@ -23,7 +23,12 @@ struct Uniform {
     up: [f32; 4],
     forward: [f32; 4],
     table: [f32; 4],
+    corners: [u32; 4],
+    start: [u32; 4],
 }
+
+/// No tetrahedron.
+const OUTSIDE: [u32; 4] = [NONE, 0, 0, 0];
 
 #[derive(Debug)]
 pub(super) struct VolumePass {
@@ -37,6 +42,8 @@ pub(super) struct VolumePass {
     medium: GrowBuffer<[f32; 4]>,
     /// First value of the table, values between two entries, number of entries.
     table: [f32; 4],
+    /// The points of the tetrahedron that the eye is in; its number and the bits of the value at the eye.
+    start: [[u32; 4]; 2],
     uniform: wgpu::Buffer,
     lists: Option<Lists>,
     group: Option<wgpu::BindGroup>,
@@ -53,7 +60,11 @@ struct Lists {
 }
 
 /// One storage or uniform buffer of a group.
-fn entry(binding: u32, ty: wgpu::BufferBindingType, visibility: wgpu::ShaderStages) -> wgpu::BindGroupLayoutEntry {
+fn entry(
+    binding: u32,
+    ty: wgpu::BufferBindingType,
+    visibility: wgpu::ShaderStages,
+) -> wgpu::BindGroupLayoutEntry {
     wgpu::BindGroupLayoutEntry {
         binding,
         visibility,
@@ -92,7 +103,12 @@ impl VolumePass {
         let storage = wgpu::BufferUsages::STORAGE;
         Self {
             list: pipeline(context, [&frame.group_layout, &list_layout], "volume_entries", Kind::List),
-            march: pipeline(context, [&frame.group_layout, &march_layout], "volume", Kind::March(format, blends)),
+            march: pipeline(
+                context,
+                [&frame.group_layout, &march_layout],
+                "volume",
+                Kind::March(format, blends),
+            ),
             list_layout,
             march_layout,
             points: GrowBuffer::new("points of the mesh", storage),
@@ -100,6 +116,7 @@ impl VolumePass {
             faces: GrowBuffer::new("faces of the boundary", storage),
             medium: GrowBuffer::new("entries of the transfer function", storage),
             table: [0.0; 4],
+            start: [[0; 4], OUTSIDE],
             uniform,
             lists: None,
             group: None,
@@ -107,7 +124,12 @@ impl VolumePass {
     }
 
     /// Replaces the mesh and the medium.
-    pub(super) fn update(&mut self, context: &Context, mesh: &MeshView<'_>, medium: &Medium) -> Result<(), GpuError> {
+    pub(super) fn update(
+        &mut self,
+        context: &Context,
+        mesh: &MeshView<'_>,
+        medium: &Medium,
+    ) -> Result<(), GpuError> {
         // Emptied first: if something does not fit, nothing is drawn.
         self.faces.write(context, &[])?;
         let points = mesh.positions.iter().zip(mesh.field).map(|(&[x, y, z], &value)| [x, y, z, value]);
@@ -115,9 +137,19 @@ impl VolumePass {
         let tets = mesh.tets.iter().zip(mesh.neighbors).map(|(tet, around)| packed(*tet, *around));
         self.tets.write(context, &tets.collect::<Vec<_>>())?;
         let (range, entries) = medium.table(TABLE);
-        self.table = [range[0] as f32, ((range[1] - range[0]) / (TABLE - 1) as f64) as f32, TABLE as f32, 0.0];
+        self.table =
+            [range[0] as f32, ((range[1] - range[0]) / (TABLE - 1) as f64) as f32, TABLE as f32, 0.0];
         self.medium.write(context, &entries)?;
+        self.start = [[0; 4], OUTSIDE];
         self.faces.write(context, &boundary(mesh))
+    }
+
+    /// Where in the mesh the eye is; none outside.
+    pub(super) fn set_eye(&mut self, mesh: &MeshView<'_>, place: Option<&Place>) {
+        self.start = place.map_or([[0; 4], OUTSIDE], |place| {
+            let value = (place.value(mesh) as f32).to_bits();
+            [mesh.tets[place.tet as usize], [place.tet, value, 0, 0]]
+        });
     }
 
     /// Lists where the rays enter; comes before the pass in which [`VolumePass::draw`] draws.
@@ -138,7 +170,15 @@ impl VolumePass {
         let Some(lists) = &self.lists else { return };
         let [right, up, forward] = camera.frustum(f64::from(size[0]) / f64::from(size[1]));
         let wide = |v: glam::DVec3| v.as_vec3().extend(0.0).to_array();
-        let uniform = Uniform { right: wide(right), up: wide(up), forward: wide(forward), table: self.table };
+        let [corners, start] = self.start;
+        let uniform = Uniform {
+            right: wide(right),
+            up: wide(up),
+            forward: wide(forward),
+            table: self.table,
+            corners,
+            start,
+        };
         context.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&uniform));
         encoder.clear_buffer(&lists.heads, 0, None);
         let group = |layout, resources: &[wgpu::BindingResource<'_>]| {
@@ -150,7 +190,8 @@ impl VolumePass {
             context.device.create_bind_group(&descriptor)
         };
         let (heads, nodes) = (lists.heads.as_entire_binding(), lists.nodes.as_entire_binding());
-        let listing = group(&self.list_layout, &[points.clone(), faces.clone(), heads.clone(), nodes.clone()]);
+        let listing =
+            group(&self.list_layout, &[points.clone(), faces.clone(), heads.clone(), nodes.clone()]);
         self.group = Some(group(
             &self.march_layout,
             &[points, faces, heads, nodes, tets, medium, self.uniform.as_entire_binding()],
@@ -186,7 +227,7 @@ impl VolumePass {
 impl Lists {
     fn new(context: &Context, size: [u32; 2]) -> Self {
         let pixels = u64::from(size[0]) * u64::from(size[1]);
-        let most = u64::from(context.device.limits().max_storage_buffer_binding_size);
+        let most = context.device.limits().max_storage_buffer_binding_size;
         let buffer = |label, bytes: u64| {
             context.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(label),
@@ -241,7 +282,12 @@ fn pipeline(
     let (target, count, cull_mode, depth) = match kind {
         Kind::List => {
             let write_mask = wgpu::ColorWrites::empty();
-            (wgpu::ColorTargetState { format: UNUSED, blend: None, write_mask }, 1, Some(wgpu::Face::Back), None)
+            (
+                wgpu::ColorTargetState { format: UNUSED, blend: None, write_mask },
+                1,
+                Some(wgpu::Face::Back),
+                None,
+            )
         }
         Kind::March(format, blend) => {
             let depth = wgpu::DepthStencilState {
@@ -312,6 +358,6 @@ mod tests {
 
     #[test]
     fn the_uniform_has_the_size_that_wgsl_gives_it() {
-        assert_eq!(size_of::<Uniform>(), 4 * 16);
+        assert_eq!(size_of::<Uniform>(), 6 * 16);
     }
 }

@@ -116,7 +116,9 @@ impl Medium {
     fn at(&self, value: f64) -> Knot {
         let after = self.knots.partition_point(|knot| knot.value <= value);
         match (after.checked_sub(1).map(|before| self.knots[before]), self.knots.get(after)) {
-            (Some(before), Some(after)) => before.towards(after, (value - before.value) / (after.value - before.value)),
+            (Some(before), Some(after)) => {
+                before.towards(after, (value - before.value) / (after.value - before.value))
+            }
             (Some(only), None) => Knot { value, ..only },
             (None, first) => first.map_or(self.knots[0], |first| Knot { value, ..*first }),
         }

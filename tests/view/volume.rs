@@ -6,7 +6,7 @@ use crate::support::meshes::{blocks, cube, hilly, linear};
 use crate::support::random::Random;
 use tetralod::geom::{Bounds, Camera};
 use tetralod::mesh::TetMesh;
-use tetralod::view::{Light, MeshView, Medium, Probe};
+use tetralod::view::{Light, Medium, MeshView, Probe};
 
 fn scene(mesh: &TetMesh) -> Scene {
     let positions = mesh.positions.iter().map(|p| p.map(|x| x as f32)).collect();
@@ -41,11 +41,9 @@ fn assert_near(found: Light, expected: Light, most: f64) {
 /// The same integral by very many short steps.
 fn by_steps(medium: &Medium, value: impl Fn(f64) -> Option<f64>, length: f64) -> Light {
     let steps = 200_000;
-    (0..steps).fold(Light::NONE, |light, i| {
-        match value((f64::from(i) + 0.5) / f64::from(steps)) {
-            Some(value) => light.over(medium.piece([value; 2], length / f64::from(steps))),
-            None => light,
-        }
+    (0..steps).fold(Light::NONE, |light, i| match value((f64::from(i) + 0.5) / f64::from(steps)) {
+        Some(value) => light.over(medium.piece([value; 2], length / f64::from(steps))),
+        None => light,
     })
 }
 
@@ -110,7 +108,8 @@ fn rays_through_a_hollow_domain_skip_what_is_outside() {
     let mut random = Random::new(5);
     let mut twice = 0;
     for _ in 0..40 {
-        let end = |random: &mut Random, x: f64| [x, 0.2 + 0.6 * random.fraction(), 0.2 + 0.6 * random.fraction()];
+        let end =
+            |random: &mut Random, x: f64| [x, 0.2 + 0.6 * random.fraction(), 0.2 + 0.6 * random.fraction()];
         let (from, to) = (end(&mut random, -0.2), end(&mut random, 1.2));
         let length = (0..3).map(|k| (to[k] - from[k]).powi(2)).sum::<f64>().sqrt();
         let mut probe = Probe::new(view);

@@ -21,6 +21,9 @@ struct Volume {
     forward: vec4f,
     // First value of the table, values between two entries, number of entries (w unused).
     table: vec4f,
+    // If the eye is in a tetrahedron: its points; its number, or NONE, and the bits of the value at the eye (z, w unused).
+    corners: vec4u,
+    start: vec4u,
 }
 
 const NONE = 0xffffffffu;
@@ -140,11 +143,30 @@ fn entry_of(face: u32, ray: Ray) -> vec2f {
     return crossing(seen(f.x, ray), seen(f.y, ray), seen(f.z, ray));
 }
 
-// Goes on from the face until the ray leaves the volume or no more light comes through.
-fn march(before: Light, face: u32, ray: Ray) -> Light {
+// From the eye to the face through which the ray leaves the tetrahedron that the eye is in, and on from there.
+fn from_inside(ray: Ray) -> Light {
+    let light = Light(vec3f(0.0), 1.0);
+    let c = volume.corners;
+    for (var k = 0u; k < 4u; k += 1u) {
+        // The points but for number k.
+        let ids = vec3u(c[(k + 1u) & 3u], c[(k + 2u) & 3u], c[(k + 3u) & 3u]);
+        let corners = array<Seen, 3>(seen(ids.x, ray), seen(ids.y, ray), seen(ids.z, ray));
+        let x = vec3f(area(corners[0], corners[1]), area(corners[1], corners[2]), area(corners[2], corners[0]));
+        let is_crossed = all(x >= vec3f(0.0)) || all(x <= vec3f(0.0));
+        let leave = crossing(corners[0], corners[1], corners[2]);
+        if is_crossed && leave.x > 0.0 {
+            let first = piece(light, bitcast<f32>(volume.start.y), leave.y, leave.x);
+            return march(first, ids, tets[5u * volume.start.x + rank(c[k], ids.x, ids.y, ids.z)], ray);
+        }
+    }
+    return light;
+}
+
+// Enters tetrahedron `first` through the face of three points, and goes on until the ray leaves the volume or no more light comes
+// through.
+fn march(before: Light, face: vec3u, first: u32, ray: Ray) -> Light {
     var light = before;
-    let f = faces[face];
-    var ids = f.xyz;
+    var ids = face;
     var a = seen(ids.x, ray);
     var b = seen(ids.y, ray);
     var c = seen(ids.z, ray);
@@ -154,7 +176,7 @@ fn march(before: Light, face: u32, ray: Ray) -> Light {
         c = other;
         ids = ids.xzy;
     }
-    var tet = f.w;
+    var tet = first;
     var enter = crossing(a, b, c);
     // A ray meets each tetrahedron once at most.
     let most = arrayLength(&tets) / 5u;
@@ -202,6 +224,9 @@ fn fs(@builtin(position) pixel: vec4f) -> @location(0) vec4f {
     let ray = Ray(direction, u, cross(direction, u));
 
     var light = Light(vec3f(0.0), 1.0);
+    if volume.start.x != NONE {
+        light = from_inside(ray);
+    }
     let head = heads[1u + u32(pixel.y) * u32(size.x) + u32(pixel.x)];
     var last = vec2f(-1e30, -1.0);
     loop {
@@ -218,7 +243,8 @@ fn fs(@builtin(position) pixel: vec4f) -> @location(0) vec4f {
         if next.x == 1e30 || light.transmittance <= DARK {
             break;
         }
-        light = march(light, u32(next.y), ray);
+        let face = faces[u32(next.y)];
+        light = march(light, face.xyz, face.w, ray);
         last = next;
     }
     return vec4f(light.colour, 1.0 - light.transmittance);
