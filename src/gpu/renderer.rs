@@ -33,7 +33,8 @@ pub struct Renderer {
     background: wgpu::RenderPipeline,
     surface: SurfacePass,
     cutaway: CutawayPass,
-    volume: VolumePass,
+    /// Made when there is a volume to draw: its pipelines take longer to compile than all others.
+    volume: Option<VolumePass>,
     wire: WirePass,
 }
 
@@ -77,7 +78,7 @@ impl Renderer {
             background: background.create(&context, &frame, format),
             surface: SurfacePass::new(&context, &frame, format),
             cutaway: CutawayPass::new(&context, &frame, format),
-            volume: VolumePass::new(&context, &frame, format),
+            volume: None,
             wire: WirePass::new(&context, &frame, format),
             context,
             target,
@@ -143,13 +144,16 @@ impl Renderer {
     /// # Errors
     /// If it is too large for the device; then none is shown.
     pub fn set_volume(&mut self, mesh: &MeshView<'_>, medium: &Medium) -> Result<(), GpuError> {
-        self.volume.update(&self.context, mesh, medium)
+        let (context, frame, format) = (&self.context, &self.frame, self.target.format);
+        self.volume
+            .get_or_insert_with(|| VolumePass::new(context, frame, format))
+            .update(context, mesh, medium)
     }
 
     /// Where the eye of the next pictures is in the mesh of [`Renderer::set_volume`], as [`Probe::locate`](crate::view::Probe::locate)
     /// gives it; none outside.
     pub fn set_eye(&mut self, mesh: &MeshView<'_>, place: Option<&Place>) {
-        self.volume.set_eye(mesh, place);
+        self.volume.iter_mut().for_each(|volume| volume.set_eye(mesh, place));
     }
 
     /// Replaces the boxes.
@@ -170,8 +174,8 @@ impl Renderer {
         self.frame.write(&self.context, &Frame::new(camera, look, self.target.size));
         let descriptor = wgpu::CommandEncoderDescriptor { label: Some("picture") };
         let mut encoder = self.context.device.create_command_encoder(&descriptor);
-        if show == Show::Volume {
-            self.volume.prepare(&self.context, &mut encoder, &self.frame, camera, self.target.size);
+        if let (Show::Volume, Some(volume)) = (show, &mut self.volume) {
+            volume.prepare(&self.context, &mut encoder, &self.frame, camera, self.target.size);
         }
         self.encode(&mut encoder, &picture.view(), show);
         self.context.queue.submit([encoder.finish()]);
@@ -210,7 +214,7 @@ impl Renderer {
         match show {
             Show::Surface => self.surface.draw(&mut pass),
             Show::Cutaway => self.cutaway.draw(&mut pass),
-            Show::Volume => self.volume.draw(&mut pass),
+            Show::Volume => self.volume.iter().for_each(|volume| volume.draw(&mut pass)),
         }
         self.wire.draw(&mut pass);
     }
