@@ -346,6 +346,7 @@ impl Viewer {
         match self.show {
             Show::Surface => self.surface_triangles,
             Show::Cutaway => self.cutaway.triangles(),
+            Show::Volume => 0,
         }
     }
 
