@@ -23,6 +23,8 @@ impl CutawayPass {
             depth: wgpu::CompareFunction::Less,
             writes_depth: true,
             blends: false,
+            group: None,
+            is_list: false,
         };
         Self {
             pipeline: spec.create(context, frame, format),

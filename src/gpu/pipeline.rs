@@ -9,7 +9,7 @@ use crate::gpu::{Context, SAMPLES, SHADERS};
 pub(super) struct FrameBinding {
     buffer: wgpu::Buffer,
     pub(super) group: wgpu::BindGroup,
-    pub(super) group_layout: wgpu::BindGroupLayout,
+    group_layout: wgpu::BindGroupLayout,
     layout: wgpu::PipelineLayout,
 }
 
@@ -63,6 +63,10 @@ pub(super) struct PipelineSpec<'a> {
     pub writes_depth: bool,
     /// Whether colours are premultiplied and laid over what is there.
     pub blends: bool,
+    /// What shaders reach beside the frame.
+    pub group: Option<&'a wgpu::BindGroupLayout>,
+    /// Whether it writes to buffers alone, of the faces that are seen from the front: once a pixel, without depth, and no colour.
+    pub is_list: bool,
 }
 
 impl PipelineSpec<'_> {
@@ -77,24 +81,43 @@ impl PipelineSpec<'_> {
             label: Some(self.shader),
             source: wgpu::ShaderSource::Wgsl(source.into()),
         });
+        let own;
+        let layout = match self.group {
+            None => &frame.layout,
+            Some(group) => {
+                own = context.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                    label: Some(self.shader),
+                    bind_group_layouts: &[Some(&frame.group_layout), Some(group)],
+                    immediate_size: 0,
+                });
+                &own
+            }
+        };
+        let depth = wgpu::DepthStencilState {
+            format: DEPTH,
+            depth_write_enabled: Some(self.writes_depth),
+            depth_compare: Some(self.depth),
+            stencil: wgpu::StencilState::default(),
+            bias: wgpu::DepthBiasState::default(),
+        };
         context.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some(self.fragment),
-            layout: Some(&frame.layout),
+            layout: Some(layout),
             vertex: wgpu::VertexState {
                 module: &module,
                 entry_point: Some(self.vertex),
                 compilation_options: wgpu::PipelineCompilationOptions::default(),
                 buffers: self.buffers,
             },
-            primitive: wgpu::PrimitiveState::default(),
-            depth_stencil: Some(wgpu::DepthStencilState {
-                format: DEPTH,
-                depth_write_enabled: Some(self.writes_depth),
-                depth_compare: Some(self.depth),
-                stencil: wgpu::StencilState::default(),
-                bias: wgpu::DepthBiasState::default(),
-            }),
-            multisample: wgpu::MultisampleState { count: SAMPLES, ..Default::default() },
+            primitive: wgpu::PrimitiveState {
+                cull_mode: self.is_list.then_some(wgpu::Face::Back),
+                ..Default::default()
+            },
+            depth_stencil: (!self.is_list).then_some(depth),
+            multisample: wgpu::MultisampleState {
+                count: if self.is_list { 1 } else { SAMPLES },
+                ..Default::default()
+            },
             fragment: Some(wgpu::FragmentState {
                 module: &module,
                 entry_point: Some(self.fragment),
@@ -102,7 +125,11 @@ impl PipelineSpec<'_> {
                 targets: &[Some(wgpu::ColorTargetState {
                     format,
                     blend: self.blends.then_some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
-                    write_mask: wgpu::ColorWrites::ALL,
+                    write_mask: if self.is_list {
+                        wgpu::ColorWrites::empty()
+                    } else {
+                        wgpu::ColorWrites::ALL
+                    },
                 })],
             }),
             multiview_mask: None,

@@ -73,6 +73,8 @@ impl Renderer {
             depth: wgpu::CompareFunction::Always,
             writes_depth: false,
             blends: false,
+            group: None,
+            is_list: false,
         };
         let renderer = Self {
             background: background.create(&context, &frame, format),

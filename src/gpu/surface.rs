@@ -25,6 +25,8 @@ impl SurfacePass {
             depth: wgpu::CompareFunction::Less,
             writes_depth: true,
             blends: false,
+            group: None,
+            is_list: false,
         };
         Self {
             pipeline: spec.create(context, frame, format),

@@ -3,9 +3,8 @@
 
 use crate::geom::Camera;
 use crate::gpu::buffers::GrowBuffer;
-use crate::gpu::pipeline::FrameBinding;
-use crate::gpu::target::DEPTH;
-use crate::gpu::{Context, GpuError, SAMPLES, SHADERS};
+use crate::gpu::pipeline::{FrameBinding, PipelineSpec};
+use crate::gpu::{Context, GpuError};
 use crate::mesh::{FACES, NONE};
 use crate::view::{Medium, MeshView, Place};
 
@@ -93,7 +92,17 @@ impl VolumePass {
         let mut entries: Vec<_> = (0..6).map(|binding| entry(binding, read, Stage::FRAGMENT)).collect();
         entries.push(entry(6, Ty::Uniform, Stage::FRAGMENT));
         let march_layout = layout("volume", &entries);
-        let blends = Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING);
+        let spec = |shader, group, is_list: bool| PipelineSpec {
+            shader,
+            vertex: "vs",
+            fragment: "fs",
+            buffers: &[],
+            depth: wgpu::CompareFunction::Always,
+            writes_depth: false,
+            blends: !is_list,
+            group: Some(group),
+            is_list,
+        };
         let uniform = context.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("volume"),
             size: size_of::<Uniform>() as u64,
@@ -102,13 +111,8 @@ impl VolumePass {
         });
         let storage = wgpu::BufferUsages::STORAGE;
         Self {
-            list: pipeline(context, [&frame.group_layout, &list_layout], "volume_entries", Kind::List),
-            march: pipeline(
-                context,
-                [&frame.group_layout, &march_layout],
-                "volume",
-                Kind::March(format, blends),
-            ),
+            list: spec("volume_entries", &list_layout, true).create(context, frame, UNUSED),
+            march: spec("volume", &march_layout, false).create(context, frame, format),
             list_layout,
             march_layout,
             points: GrowBuffer::new("points of the mesh", storage),
@@ -256,73 +260,6 @@ impl Lists {
 }
 
 const UNUSED: wgpu::TextureFormat = wgpu::TextureFormat::R8Unorm;
-
-/// Which of the two pipelines.
-enum Kind {
-    List,
-    March(wgpu::TextureFormat, Option<wgpu::BlendState>),
-}
-
-fn pipeline(
-    context: &Context,
-    groups: [&wgpu::BindGroupLayout; 2],
-    shader: &'static str,
-    kind: Kind,
-) -> wgpu::RenderPipeline {
-    let source = SHADERS.iter().find(|(name, _)| *name == shader).map_or("", |(_, source)| source);
-    let module = context.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some(shader),
-        source: wgpu::ShaderSource::Wgsl(source.into()),
-    });
-    let layout = context.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some(shader),
-        bind_group_layouts: &groups.map(Some),
-        immediate_size: 0,
-    });
-    let (target, count, cull_mode, depth) = match kind {
-        Kind::List => {
-            let write_mask = wgpu::ColorWrites::empty();
-            (
-                wgpu::ColorTargetState { format: UNUSED, blend: None, write_mask },
-                1,
-                Some(wgpu::Face::Back),
-                None,
-            )
-        }
-        Kind::March(format, blend) => {
-            let depth = wgpu::DepthStencilState {
-                format: DEPTH,
-                depth_write_enabled: Some(false),
-                depth_compare: Some(wgpu::CompareFunction::Always),
-                stencil: wgpu::StencilState::default(),
-                bias: wgpu::DepthBiasState::default(),
-            };
-            let write_mask = wgpu::ColorWrites::ALL;
-            (wgpu::ColorTargetState { format, blend, write_mask }, SAMPLES, None, Some(depth))
-        }
-    };
-    context.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some(shader),
-        layout: Some(&layout),
-        vertex: wgpu::VertexState {
-            module: &module,
-            entry_point: Some("vs"),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
-            buffers: &[],
-        },
-        primitive: wgpu::PrimitiveState { cull_mode, ..Default::default() },
-        depth_stencil: depth,
-        multisample: wgpu::MultisampleState { count, ..Default::default() },
-        fragment: Some(wgpu::FragmentState {
-            module: &module,
-            entry_point: Some("fs"),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
-            targets: &[Some(target)],
-        }),
-        multiview_mask: None,
-        cache: None,
-    })
-}
 
 /// A tetrahedron in 20 bytes: its neighbours in ascending order of the points opposite the faces to them, and the exclusive or of its
 /// points (Aman, Demirci, Güdükbay 2022: *Compact tetrahedralization-based acceleration structures for ray tracing*).

@@ -35,6 +35,8 @@ impl WirePass {
                 depth,
                 writes_depth: false,
                 blends: true,
+                group: None,
+                is_list: false,
             };
             spec.create(context, frame, format)
         };

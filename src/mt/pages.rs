@@ -188,6 +188,37 @@ impl<P: Page> Pages<P> {
     }
 }
 
+/// What [`MultiTessellation`](super::MultiTessellation) says of a kind whose updates are in `self.pages`.
+macro_rules! reads_pages {
+    () => {
+        fn info(&self) -> &MtInfo {
+            &self.info
+        }
+
+        fn base(&self) -> &BaseMesh {
+            &self.base
+        }
+
+        fn updates(&self) -> u32 {
+            self.pages.updates()
+        }
+
+        #[inline]
+        fn error(&self, u: UpdateId) -> ErrorCode {
+            self.pages.error(u)
+        }
+
+        #[inline]
+        fn errors(&self, u: UpdateId) -> &[ErrorCode] {
+            self.pages.errors(u)
+        }
+
+        fn to_come(&self) -> ErrorCode {
+            self.pages.to_come()
+        }
+    };
+}
+
 /// What [`UpdatePages`](super::UpdatePages) says of a kind whose updates are in `self.pages`.
 macro_rules! in_pages {
     () => {

@@ -23,6 +23,11 @@ struct Frame {
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 
+// Corner `i` of one triangle over the whole screen.
+fn over_screen(i: u32, depth: f32) -> vec4f {
+    return vec4f(select(-1.0, 3.0, i == 1u), select(-1.0, 3.0, i == 2u), depth, 1.0);
+}
+
 fn decode(c: vec3f) -> vec3f {
     return select(pow((c + 0.055) / 1.055, vec3f(2.4)), c / 12.92, c <= vec3f(0.04045));
 }

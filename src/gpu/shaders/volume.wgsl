@@ -208,9 +208,7 @@ fn march(before: Light, face: vec3u, first: u32, ray: Ray) -> Light {
 
 @vertex
 fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
-    let x = select(-1.0, 3.0, i == 1u);
-    let y = select(-1.0, 3.0, i == 2u);
-    return vec4f(x, y, 0.0, 1.0);
+    return over_screen(i, 0.0);
 }
 
 @fragment

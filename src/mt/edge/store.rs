@@ -386,35 +386,11 @@ fn new_page(record: Record, fields: usize, updates: usize) -> EdgePage {
 }
 
 impl MultiTessellation for EdgeMt {
-    fn info(&self) -> &MtInfo {
-        &self.info
-    }
-
-    fn base(&self) -> &BaseMesh {
-        &self.base
-    }
-
-    fn updates(&self) -> u32 {
-        self.pages.updates()
-    }
+    reads_pages!();
 
     /// A split adds the tetrahedra of its fan.
     fn always_grows(&self) -> bool {
         true
-    }
-
-    #[inline]
-    fn error(&self, u: UpdateId) -> ErrorCode {
-        self.pages.error(u)
-    }
-
-    #[inline]
-    fn errors(&self, u: UpdateId) -> &[ErrorCode] {
-        self.pages.errors(u)
-    }
-
-    fn to_come(&self) -> ErrorCode {
-        self.pages.to_come()
     }
 
     fn bytes(&self) -> u64 {

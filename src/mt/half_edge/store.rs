@@ -353,35 +353,11 @@ impl HalfEdgeMt {
 }
 
 impl MultiTessellation for HalfEdgeMt {
-    fn info(&self) -> &MtInfo {
-        &self.info
-    }
-
-    fn base(&self) -> &BaseMesh {
-        &self.base
-    }
-
-    fn updates(&self) -> u32 {
-        self.pages.updates()
-    }
+    reads_pages!();
 
     /// Each fills at least one gap.
     fn always_grows(&self) -> bool {
         true
-    }
-
-    #[inline]
-    fn error(&self, u: UpdateId) -> ErrorCode {
-        self.pages.error(u)
-    }
-
-    #[inline]
-    fn errors(&self, u: UpdateId) -> &[ErrorCode] {
-        self.pages.errors(u)
-    }
-
-    fn to_come(&self) -> ErrorCode {
-        self.pages.to_come()
     }
 
     fn bytes(&self) -> u64 {
