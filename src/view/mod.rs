@@ -2,6 +2,7 @@
 
 mod boundary;
 mod colormap;
+mod colour_scale;
 mod cutaway;
 pub mod gizmo;
 mod iso;
@@ -11,16 +12,22 @@ mod probe;
 mod slice;
 mod stats;
 mod stream;
+mod ticks;
 mod volume;
 
 pub use boundary::{BoundarySurface, area, is_closed};
-pub use colormap::{Colormap, VIRIDIS};
+pub use colormap::{
+    BALANCE, BATLOW, CIVIDIS, COOLWARM, Colormap, GREY, HALINE, ICE, INFERNO, LAJOLLA, LAPAZ, MAGMA, OSLO,
+    PLASMA, ROMA, THERMAL, TURBO, VIK, VIRIDIS,
+};
+pub use colour_scale::{ColourScale, ScaleError};
 pub use cutaway::{ClipPlane, Cutaway};
 pub use iso::{IsoSurface, NormalKind};
 pub use probe::{Place, Probe, Span};
 pub use slice::{Plane, Slice};
 pub use stats::{FieldStats, Histogram};
 pub use stream::{StreamEnd, StreamPoint, Streamline, TraceOptions, Tracer};
+pub use ticks::{Tick, linear_ticks, log_ticks};
 pub use volume::{Light, Medium};
 
 use std::ops::Range;
