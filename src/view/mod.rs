@@ -1,5 +1,6 @@
-//! Surfaces and measurements of a mesh, computed on the CPU from slices, without an MT.
+//! Surfaces and measurements of a mesh, computed on the CPU from slices, without an MT; colours of values, ticks and axes.
 
+mod axes;
 mod boundary;
 mod colormap;
 mod colour_scale;
@@ -15,6 +16,7 @@ mod stream;
 mod ticks;
 mod volume;
 
+pub use axes::{AxisTick, BoxAxis, BoxEdge, ScaleBar, box_axis, scale_bar, tick_edges};
 pub use boundary::{BoundarySurface, area, is_closed};
 pub use colormap::{
     BALANCE, BATLOW, CIVIDIS, COOLWARM, Colormap, GREY, HALINE, ICE, INFERNO, LAJOLLA, LAPAZ, MAGMA, OSLO,

@@ -296,11 +296,8 @@ mod tests {
     #[test]
     fn percentiles_invert_the_distribution() {
         let histogram = with(0.0, &[0.0, 1.0, 0.0, 3.0, 0.0], 0.0);
-        let fractions = [-1.0, f64::NAN, 0.0, 0.125, 0.25, 0.5, 1.0, 7.0];
-        assert_eq!(
-            fractions.map(|f| histogram.percentile(f)),
-            [1.0, 1.0, 1.0, 1.5, 2.0, 10.0 / 3.0, 4.0, 4.0]
-        );
+        let fractions = [-1.0, f64::NAN, 0.0, 0.125, 0.25, 0.4375, 1.0, 7.0];
+        assert_eq!(fractions.map(|f| histogram.percentile(f)), [1.0, 1.0, 1.0, 1.5, 2.0, 3.25, 4.0, 4.0]);
         let outside = with(1.0, &[1.0, 1.0], 1.0);
         let fractions = [0.0, 0.2, 0.25, 0.375, 0.5, 0.75, 0.8, 1.0];
         assert_eq!(fractions.map(|f| outside.percentile(f)), [0.0, 0.0, 0.0, 0.5, 1.0, 2.0, 2.0, 2.0]);
