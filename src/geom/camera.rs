@@ -13,8 +13,8 @@ const POLE_GAP: f64 = 0.01;
 /// The smallest and the largest distance from the target, in radii of the model.
 const DISTANCES: [f64; 2] = [0.02, 40.0];
 
-/// How far panning, flying and anything else may bring the target, the eye, or the target from the middle of the model,
-/// in radii of the model, so that the model cannot get lost.
+/// How far panning, flying and anything else may bring the target, the eye, or the target from the middle of
+/// the model, in radii of the model, so that the model cannot get lost.
 const PAN_LIMIT: f64 = 2.0;
 const FLY_LIMIT: f64 = 4.0;
 const LIMIT: f64 = 100.0;
@@ -29,8 +29,8 @@ pub enum Projection {
     /// What is farther away looks smaller.
     #[default]
     Perspective,
-    /// Parallel lines stay parallel, and sizes do not depend on distance. What is at the target has the size that it has
-    /// in perspective.
+    /// Parallel lines stay parallel, and sizes do not depend on distance. What is at the target has the size
+    /// that it has in perspective.
     Orthographic,
 }
 
@@ -82,11 +82,11 @@ pub enum CameraError {
 /// `origin[0] + x origin[1] + y origin[2]` and goes along `direction[0] + x direction[1] + y direction[2]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rays {
-    /// Where rays start. In perspective all start at the eye, and the last two are zero; in orthographic projection they
-    /// start on a plane in front of everything.
+    /// Where rays start. In perspective all start at the eye, and the last two are zero; in orthographic
+    /// projection they start on a plane in front of everything.
     pub origin: [DVec3; 3],
-    /// Where rays go; not normalised, but all have length 1 along the direction of view. In orthographic projection the
-    /// last two are zero.
+    /// Where rays go; not normalised, but all have length 1 along the direction of view. In orthographic
+    /// projection the last two are zero.
     pub direction: [DVec3; 3],
 }
 
@@ -149,8 +149,8 @@ impl Camera {
         camera
     }
 
-    /// Moves so that all of `bounds` is in view, its middle in the middle of the picture, without turning; as near as the
-    /// limits of [`Camera::zoom`] allow. Empty or unbounded boxes change nothing.
+    /// Moves so that all of `bounds` is in view, its middle in the middle of the picture, without turning; as
+    /// near as the limits of [`Camera::zoom`] allow. Empty or unbounded boxes change nothing.
     pub fn fit(&mut self, bounds: &Bounds, aspect: f64) {
         if has_size(bounds) {
             self.set_target(middle(bounds));
@@ -205,8 +205,8 @@ impl Camera {
         }
     }
 
-    /// Brings the camera where the state says, with each number held in the limits of the model. A state of this camera,
-    /// or of another one of the same model, is set as it is.
+    /// Brings the camera where the state says, with each number held in the limits of the model. A state of
+    /// this camera, or of another one of the same model, is set as it is.
     ///
     /// # Errors
     /// If a number is infinite or NaN; the camera stays as it was.
@@ -224,9 +224,9 @@ impl Camera {
         Ok(())
     }
 
-    /// The camera at `t` (0 to 1, held; NaN is 0) on a smooth way from one camera to another: straight for the target, with
-    /// an even factor for the distance, and around z the shorter way. The projection and the limits are those of `to`,
-    /// except at the start.
+    /// The camera at `t` (0 to 1, held; NaN is 0) on a smooth way from one camera to another: straight for
+    /// the target, with an even factor for the distance, and around z the shorter way. The projection and the
+    /// limits are those of `to`, except at the start.
     pub fn between(from: &Self, to: &Self, t: f64) -> Self {
         let t = if t > 0.0 { t.min(1.0) } else { return *from };
         if t == 1.0 {
@@ -262,8 +262,8 @@ impl Camera {
         self.centre + (p - self.centre).clamp_length_max(self.radius * radii)
     }
 
-    /// Where the camera is. In orthographic projection this is where the eye would be in perspective; what lies behind it
-    /// is seen as well.
+    /// Where the camera is. In orthographic projection this is where the eye would be in perspective; what
+    /// lies behind it is seen as well.
     pub fn eye(&self) -> DVec3 {
         self.target - self.forward() * self.distance
     }
@@ -300,7 +300,8 @@ impl Camera {
         self.set_angles(self.yaw, self.pitch + finite(pitch));
     }
 
-    /// Turns the view from where the eye is: `yaw` to the right, `pitch` upwards, in radians. Stops before the poles.
+    /// Turns the view from where the eye is: `yaw` to the right, `pitch` upwards, in radians. Stops before
+    /// the poles.
     pub fn look(&mut self, yaw: f64, pitch: f64) {
         let eye = self.eye();
         self.orbit(-finite(yaw), -finite(pitch));
@@ -321,8 +322,8 @@ impl Camera {
         self.set_angles(yaw, pitch);
     }
 
-    /// Moves the eye and the target to the right, upwards and forward, by multiples of the distance between them. The eye
-    /// stays near the model, or does not go farther away if it is not near.
+    /// Moves the eye and the target to the right, upwards and forward, by multiples of the distance between
+    /// them. The eye stays near the model, or does not go farther away if it is not near.
     pub fn fly(&mut self, right: f64, up: f64, forward: f64) {
         let by = self.right() * finite(right) + self.up() * finite(up) + self.forward() * finite(forward);
         let eye = self.eye();
@@ -337,8 +338,8 @@ impl Camera {
         self.set_distance(self.distance * factor);
     }
 
-    /// Zooms towards a normalised screen point: the point of the model that is there at the distance of the target stays
-    /// there, unless that would bring the target too far away from the model.
+    /// Zooms towards a normalised screen point: the point of the model that is there at the distance of the
+    /// target stays there, unless that would bring the target too far away from the model.
     pub fn zoom_at(&mut self, factor: f64, screen: DVec2, aspect: f64) {
         let before = self.distance;
         self.zoom(factor);
@@ -347,7 +348,8 @@ impl Camera {
         self.pan_to(self.target + aside * (before - self.distance));
     }
 
-    /// Moves the target so that what is seen moves by this fraction of the screen's height to the right and up.
+    /// Moves the target so that what is seen moves by this fraction of the screen's height to the right and
+    /// up.
     pub fn pan(&mut self, right: f64, up: f64) {
         let height = 2.0 * self.half_size(1.0)[1];
         self.pan_to(self.target - (self.right() * finite(right) + self.up() * finite(up)) * height);
@@ -359,9 +361,9 @@ impl Camera {
         self.target = self.near_model(target, limit);
     }
 
-    /// The distances of the near and the far clipping plane from the eye along the direction of view, in model units: as
-    /// tight around the model as the precision of the depth buffer wants. In orthographic projection the near one is in
-    /// front of everything, and may be negative.
+    /// The distances of the near and the far clipping plane from the eye along the direction of view, in
+    /// model units: as tight around the model as the precision of the depth buffer wants. In orthographic
+    /// projection the near one is in front of everything, and may be negative.
     pub fn clip(&self) -> [f64; 2] {
         let centre = self.depth(self.centre);
         let [near, far] = [centre - self.radius * 1.1, centre + self.radius * 1.1];
@@ -379,8 +381,8 @@ impl Camera {
         (p - self.eye()).dot(self.forward())
     }
 
-    /// How far `p` is from where its ray of sight starts, or in orthographic projection its [`Camera::depth`]: what is
-    /// nearer hides what is farther.
+    /// How far `p` is from where its ray of sight starts, or in orthographic projection its
+    /// [`Camera::depth`]: what is nearer hides what is farther.
     pub fn distance_to(&self, p: DVec3) -> f64 {
         match self.projection {
             Projection::Perspective => p.distance(self.eye()),

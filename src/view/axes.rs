@@ -47,7 +47,8 @@ impl BoxEdge {
         [from, to]
     }
 
-    /// Whether it is on the silhouette of the box: the camera sees one of its two faces from outside, the other one not.
+    /// Whether it is on the silhouette of the box: the camera sees one of its two faces from outside, the
+    /// other one not.
     pub fn is_on_silhouette(self, bounds: &Bounds, camera: &Camera) -> bool {
         let [first, second] = [0, 1].map(|i| sees_face(bounds, camera, self.others()[i], self.upper[i]));
         first != second
@@ -70,12 +71,12 @@ pub struct AxisTick {
 pub struct BoxAxis {
     /// The edge; to be given to the next [`tick_edges`].
     pub edge: BoxEdge,
-    /// The ends of the part of it that is on the screen, in normalised screen coordinates: that with the smaller
-    /// coordinate first.
+    /// The ends of the part of it that is on the screen, in normalised screen coordinates: that with the
+    /// smaller coordinate first.
     pub ends: [DVec2; 2],
-    /// Where labels go: away from the box, at a right angle to the edge as seen. Its length is 1, its unit the same in
-    /// both directions: a label that is so many pixels away from its tick is at the tick plus this direction times the
-    /// pixels (y upwards).
+    /// Where labels go: away from the box, at a right angle to the edge as seen. Its length is 1, its unit
+    /// the same in both directions: a label that is so many pixels away from its tick is at the tick plus
+    /// this direction times the pixels (y upwards).
     pub outward: DVec2,
     /// The ticks on the screen, ascending.
     pub ticks: Vec<AxisTick>,
@@ -92,13 +93,13 @@ pub struct ScaleBar {
     pub width: f64,
 }
 
-/// For x, y and z, the edge of a box that is best for ticks: on the silhouette, so that labels stand outside of the box;
-/// for x and y rather at the bottom, for z rather on the left.
+/// For x, y and z, the edge of a box that is best for ticks: on the silhouette, so that labels stand outside
+/// of the box; for x and y rather at the bottom, for z rather on the left.
 ///
-/// `None` for an axis that is seen end-on, whose edges all cross the picture of the box, or if the camera is in the box,
-/// or if no edge on the silhouette is on the screen. `previous` are the edges that were chosen last, or `[None; 3]`: they
-/// stay until they leave the silhouette or another edge is clearly better, so that labels do not jump to and fro. `aspect`
-/// is the width of the screen divided by its height.
+/// `None` for an axis that is seen end-on, whose edges all cross the picture of the box, or if the camera is
+/// in the box, or if no edge on the silhouette is on the screen. `previous` are the edges that were chosen
+/// last, or `[None; 3]`: they stay until they leave the silhouette or another edge is clearly better, so that
+/// labels do not jump to and fro. `aspect` is the width of the screen divided by its height.
 pub fn tick_edges(
     bounds: &Bounds,
     camera: &Camera,
@@ -116,8 +117,8 @@ pub fn tick_edges(
     })
 }
 
-/// The ticks of an edge that [`tick_edges`] chose. `spacing` is the smallest mean distance between ticks on the screen, in
-/// halves of its height (0.15, for example).
+/// The ticks of an edge that [`tick_edges`] chose. `spacing` is the smallest mean distance between ticks on
+/// the screen, in halves of its height (0.15, for example).
 ///
 /// `None` if no part of the edge is on the screen, or if it is seen as a point.
 ///
@@ -128,7 +129,8 @@ pub fn tick_edges(
 /// let bounds = Bounds { min: [0.0; 3], max: [10.0, 4.0, 4.0] };
 /// let camera = Camera::home(&bounds, 1.5);
 /// let edges = tick_edges(&bounds, &camera, 1.5, [None; 3]);
-/// let axis = box_axis(edges[0].expect("x is seen"), &bounds, &camera, 1.5, 0.2).expect("it is on the screen");
+/// let x = edges[0].expect("x is not seen end-on");
+/// let axis = box_axis(x, &bounds, &camera, 1.5, 0.2).expect("it is on the screen");
 /// assert_eq!(axis.ticks[0].tick.label, "0");
 /// assert!(axis.outward.y < 0.0);
 /// ```
@@ -162,8 +164,9 @@ pub fn box_axis(
     Some(BoxAxis { edge, ends, outward, ticks })
 }
 
-/// A bar of round length (1, 2, 2.5 or 5 times a power of ten, in model units) that takes 0.1 to 0.25 of the screen's width
-/// at the distance of the target; in orthographic projection, at any distance. `aspect` is width divided by height.
+/// A bar of round length (1, 2, 2.5 or 5 times a power of ten, in model units) that takes 0.1 to 0.25 of the
+/// screen's width at the distance of the target; in orthographic projection, at any distance. `aspect` is
+/// width divided by height.
 pub fn scale_bar(camera: &Camera, aspect: f64) -> ScaleBar {
     let whole = 2.0 * camera.half_size(aspect)[0];
     let Tick { value: length, label } = nice_below(whole * WIDEST_BAR);
@@ -191,8 +194,8 @@ fn merit(edge: BoxEdge, bounds: &Bounds, camera: &Camera, aspect: f64) -> Option
     Some((middle * DVec2::new(aspect, 1.0)).dot(wanted))
 }
 
-/// Which part of a line, as fractions of it, is on the screen and between the clipping planes (Liang and Barsky 1984, with
-/// homogeneous coordinates).
+/// Which part of a line, as fractions of it, is on the screen and between the clipping planes (Liang and
+/// Barsky 1984, with homogeneous coordinates).
 fn visible_part(ends: [DVec3; 2], camera: &Camera, aspect: f64) -> Option<[f64; 2]> {
     let matrix = camera.matrix(aspect);
     // How far a point is inside of the sides of the screen, and behind the near plane.
@@ -214,8 +217,8 @@ fn visible_part(ends: [DVec3; 2], camera: &Camera, aspect: f64) -> Option<[f64; 
     (part[0] < part[1]).then_some(part)
 }
 
-/// The one of the two directions across an edge that points away from the box. `on_edge` is a point of the edge; both are
-/// in halves of the screen's height.
+/// The one of the two directions across an edge that points away from the box. `on_edge` is a point of the
+/// edge; both are in halves of the screen's height.
 fn side(bounds: &Bounds, camera: &Camera, aspect: f64, on_edge: DVec2, across: DVec2) -> DVec2 {
     let corners = BoxEdge::parallel_to(0).into_iter().flat_map(|edge| edge.ends(bounds));
     let seen = corners.filter_map(|corner| camera.project(corner, aspect));

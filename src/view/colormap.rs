@@ -2,8 +2,8 @@
 
 mod tables;
 
-/// A colour map given by evenly spaced control colours (sRGB), linear in between. [`Colormap::ALL`] lists those that
-/// there are; each is within 4/255 of its published table in every channel.
+/// A colour map given by evenly spaced control colours (sRGB), linear in between. [`Colormap::ALL`] lists
+/// those that there are; each is within 4/255 of its published table in every channel.
 ///
 /// ```
 /// use tetralod::view::Colormap;
@@ -102,13 +102,14 @@ impl Colormap {
         Self::ALL.into_iter().find(|map| map.name == name)
     }
 
-    /// Whether it is for values on two sides of a middle one: brightest in the middle, with another hue on each side.
+    /// Whether it is for values on two sides of a middle one: brightest in the middle, with another hue on
+    /// each side.
     pub const fn is_diverging(&self) -> bool {
         self.is_diverging
     }
 
-    /// The colour at `fraction` of the range, as sRGB components from 0 to 1. Fractions outside 0 ..= 1 get the
-    /// colour of the nearer end, NaN that of the lower one.
+    /// The colour at `fraction` of the range, as sRGB components from 0 to 1. Fractions outside 0 ..= 1 get
+    /// the colour of the nearer end, NaN that of the lower one.
     pub fn at(&self, fraction: f32) -> [f32; 3] {
         let last = self.controls.len() - 1;
         let place = if fraction.is_nan() { 0.0 } else { fraction.clamp(0.0, 1.0) * last as f32 };

@@ -17,8 +17,8 @@ use thiserror::Error;
 pub struct ColourScale {
     /// The colours.
     pub map: Colormap,
-    /// The values that have the first and the last colour, in the field's units; what is outside has the same colours.
-    /// If both are the same, values below have the first colour, values above the last one.
+    /// The values that have the first and the last colour, in the field's units; what is outside has the same
+    /// colours. If both are the same, values below have the first colour, values above the last one.
     pub range: [f64; 2],
     /// Whether the colours run backwards: then the smallest value has the last colour of the map.
     pub is_reversed: bool,
@@ -35,13 +35,14 @@ pub enum ScaleError {
     NotFinite(f64),
     /// The range runs backwards.
     #[error(
-        "the range of a colour scale must ascend, {0} is larger than {1}; exchange them, and reverse the colours if \
-         that is what you want"
+        "the range of a colour scale must ascend, {0} is larger than {1}; exchange them, and reverse \
+         the colours if that is what you want"
     )]
     Descending(f64, f64),
     /// The range of a logarithmic scale, or its middle, is not positive.
     #[error(
-        "a logarithmic colour scale needs positive numbers, not {0}; start the range above 0, or make it linear"
+        "a logarithmic colour scale needs positive numbers, not {0}; start the range above 0, or \
+         make it linear"
     )]
     NotPositive(f64),
 }
@@ -55,7 +56,8 @@ impl ColourScale {
         Self { map, range, is_reversed: false, is_log: false }.validate()
     }
 
-    /// The scale itself, if its range is finite and ascending, or of one value, and positive if it is logarithmic.
+    /// The scale itself, if its range is finite and ascending, or of one value, and positive if it is
+    /// logarithmic.
     ///
     /// # Errors
     /// What is wrong with the range. Scales that are used nevertheless have colours, but no useful ones.
@@ -73,8 +75,8 @@ impl ColourScale {
         Ok(self)
     }
 
-    /// How far along the range a value is: 0 at its lower end and below, 1 at its upper end and above, whatever the
-    /// direction of the colours. NaN is at 0; the only value of a range is at 0.5.
+    /// How far along the range a value is: 0 at its lower end and below, 1 at its upper end and above,
+    /// whatever the direction of the colours. NaN is at 0; the only value of a range is at 0.5.
     pub fn fraction(&self, value: f64) -> f64 {
         let [low, high] = self.range;
         if value >= high {
@@ -86,7 +88,8 @@ impl ColourScale {
         if fraction > 0.0 { fraction.min(1.0) } else { 0.0 }
     }
 
-    /// The value at a fraction of the range, which is held to 0 ..= 1: the reverse of [`ColourScale::fraction`].
+    /// The value at a fraction of the range, which is held to 0 ..= 1: the reverse of
+    /// [`ColourScale::fraction`].
     pub fn value(&self, fraction: f64) -> f64 {
         let [low, high] = self.range;
         let t = if fraction > 0.0 { fraction.min(1.0) } else { 0.0 };
@@ -116,12 +119,13 @@ impl ColourScale {
         if self.is_log { log_ticks(self.range, count) } else { linear_ticks(self.range, count) }
     }
 
-    /// The scale with the smallest range around its own that has `middle` at fraction 0.5: for diverging maps, usually
-    /// with 0 in the middle. On a logarithmic scale the ends are the same factor away from the middle.
+    /// The scale with the smallest range around its own that has `middle` at fraction 0.5: for diverging
+    /// maps, usually with 0 in the middle. On a logarithmic scale the ends are the same factor away from the
+    /// middle.
     ///
     /// # Errors
-    /// If `middle` is infinite or NaN, if it is not positive and the scale is logarithmic, or if an end of the new range
-    /// would be too large for a number.
+    /// If `middle` is infinite or NaN, if it is not positive and the scale is logarithmic, or if an end of
+    /// the new range would be too large for a number.
     pub fn around(self, middle: f64) -> Result<Self, ScaleError> {
         let [low, high] = self.validate()?.range;
         if !middle.is_finite() {
@@ -140,11 +144,12 @@ impl ColourScale {
         Self { range, ..self }.validate()
     }
 
-    /// The scale with the range between two fractions of a volume, as [0.02, 0.98] to leave outliers out: 2 % of the
-    /// volume has values below that range, 2 % has values above it. See [`Histogram::percentile`].
+    /// The scale with the range between two fractions of a volume, as [0.02, 0.98] to leave outliers out: 2 %
+    /// of the volume has values below that range, 2 % has values above it. See [`Histogram::percentile`].
     ///
     /// # Errors
-    /// If the fractions descend, or if the scale is logarithmic and the lower one of the values is not positive.
+    /// If the fractions descend, or if the scale is logarithmic and the lower one of the values is not
+    /// positive.
     pub fn over(self, histogram: &Histogram, fractions: [f64; 2]) -> Result<Self, ScaleError> {
         Self { range: fractions.map(|fraction| histogram.percentile(fraction)), ..self }.validate()
     }

@@ -1,4 +1,5 @@
-//! Surfaces and measurements of a mesh, computed on the CPU from slices, without an MT; colours of values, ticks and axes.
+//! Surfaces and measurements of a mesh, computed on the CPU from slices, without an MT; colours of values,
+//! ticks and axes.
 
 mod axes;
 mod boundary;
@@ -34,8 +35,8 @@ pub use volume::{Light, Medium};
 
 use std::ops::Range;
 
-/// The changes of a surface since the last call: ranges in ascending order. Beyond the ends of the arrays everything is
-/// gone.
+/// The changes of a surface since the last call: ranges in ascending order. Beyond the ends of the arrays
+/// everything is gone.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SurfaceChanges {
     /// Changed ranges of vertices.

@@ -111,8 +111,8 @@ pub struct Histogram {
 }
 
 impl Histogram {
-    /// An empty histogram of so many equal bins (at least one) between two values. A bin holds its lower end; the last
-    /// one its upper end, too.
+    /// An empty histogram of so many equal bins (at least one) between two values. A bin holds its lower end;
+    /// the last one its upper end, too.
     ///
     /// # Panics
     /// If the values are not finite and in ascending order.
@@ -164,12 +164,12 @@ impl Histogram {
         [self.below.total(), self.above.total()]
     }
 
-    /// The value below which this fraction (0 to 1, held; NaN is 0) of the volume has its values; exact if the volume of
-    /// each bin is evenly spread over it.
+    /// The value below which this fraction (0 to 1, held; NaN is 0) of the volume has its values; exact if
+    /// the volume of each bin is evenly spread over it.
     ///
-    /// What lies outside of the bins counts: the answer is the lower end if it is below the first bin, the upper end if
-    /// it is above the last one. 0 and 1 give the ends of those bins that are not empty. Without any volume, all bins
-    /// are taken to have the same.
+    /// What lies outside of the bins counts: the answer is the lower end if it is below the first bin, the
+    /// upper end if it is above the last one. 0 and 1 give the ends of those bins that are not empty. Without
+    /// any volume, all bins are taken to have the same.
     pub fn percentile(&self, fraction: f64) -> f64 {
         let fraction = if fraction > 0.0 { fraction.min(1.0) } else { 0.0 };
         let volumes = self.volumes();
@@ -220,8 +220,8 @@ impl Histogram {
     }
 }
 
-/// The fraction of a tetrahedron in which the linear field with these values (ascending) at its corners is less than
-/// `x`: a cubic spline in `x`, in terms that are all positive.
+/// The fraction of a tetrahedron in which the linear field with these values (ascending) at its corners is
+/// less than `x`: a cubic spline in `x`, in terms that are all positive.
 fn fraction_below([a, b, c, d]: [f64; 4], x: f64) -> f64 {
     if x <= a {
         return 0.0;

@@ -1,7 +1,7 @@
 //! Ticks of axes and colour bars: round numbers in a range, with labels.
 //!
-//! Ticks are made as decimal numbers, an integer times a power of ten. So their labels are exact, and are written without
-//! the formatting of floating-point numbers, which is large in wasm.
+//! Ticks are made as decimal numbers, an integer times a power of ten. So their labels are exact, and are
+//! written without the formatting of floating-point numbers, which is large in wasm.
 
 use std::fmt::Write;
 
@@ -31,9 +31,10 @@ pub struct Tick {
 
 /// At most `count` ticks in a range, ascending, evenly spaced by 1, 2, 2.5 or 5 times a power of ten.
 ///
-/// All are inside the range or at its ends, which may be given in either order. Labels have as many decimals as tell the
-/// ticks apart. There is at least one tick if `count` is not 0 and both ends are finite; if the range is empty, or so
-/// small that there is no round number in it, it is the lower end, with six digits. No tick if an end is infinite or NaN.
+/// All are inside the range or at its ends, which may be given in either order. Labels have as many decimals
+/// as tell the ticks apart. There is at least one tick if `count` is not 0 and both ends are finite; if the
+/// range is empty, or so small that there is no round number in it, it is the lower end, with six digits. No
+/// tick if an end is infinite or NaN.
 ///
 /// ```
 /// let ticks = tetralod::view::linear_ticks([0.0, 1.1], 6);
@@ -54,11 +55,11 @@ pub fn linear_ticks(range: [f64; 2], count: usize) -> Vec<Tick> {
     values.into_iter().zip(labels_of(decimals)).map(|(value, label)| Tick { value, label }).collect()
 }
 
-/// At most `count` ticks in a range of positive numbers for a logarithmic axis, ascending: powers of ten, with 2 and 5
-/// times these if there is room, or only every second, third or further power if there is none.
+/// At most `count` ticks in a range of positive numbers for a logarithmic axis, ascending: powers of ten,
+/// with 2 and 5 times these if there is room, or only every second, third or further power if there is none.
 ///
-/// All are inside the range or at its ends, which may be given in either order. A range with fewer than two such numbers
-/// gets [`linear_ticks`]. No tick if an end is not positive, infinite or NaN.
+/// All are inside the range or at its ends, which may be given in either order. A range with fewer than two
+/// such numbers gets [`linear_ticks`]. No tick if an end is not positive, infinite or NaN.
 ///
 /// ```
 /// let ticks = tetralod::view::log_ticks([0.05, 20.0], 4);
@@ -89,13 +90,13 @@ pub fn log_ticks(range: [f64; 2], count: usize) -> Vec<Tick> {
     ticks.iter().map(|d| Tick { value: d.value(), label: d.label() }).collect()
 }
 
-/// The largest number of 1, 2, 2.5 and 5 times a power of ten that is at most `limit`, and its label; 1 if `limit` is not
-/// positive and finite.
+/// The largest number of 1, 2, 2.5 and 5 times a power of ten that is at most `limit`, and its label; 1 if
+/// `limit` is not positive and finite.
 pub(super) fn nice_below(limit: f64) -> Tick {
     let limit = if limit.is_finite() && limit > 0.0 { limit } else { 1.0 };
     let exponent = limit.log10().floor() as i32;
     let all = (exponent - 2..exponent + 2).flat_map(|e| STEPS.map(|digits| Decimal { digits, exponent: e }));
-    let found = all.filter(|d| d.value() <= limit && d.value() > 0.0).last();
+    let found = all.rev().find(|d| d.value() <= limit && d.value() > 0.0);
     found.map_or_else(
         || Tick { value: limit, label: Decimal::near(limit).label() },
         |d| Tick { value: d.value(), label: d.shortened().label() },
@@ -107,8 +108,8 @@ fn ascending([a, b]: [f64; 2]) -> Option<[f64; 2]> {
     (a.is_finite() && b.is_finite()).then(|| [a.min(b), a.max(b)])
 }
 
-/// The multiples of the smallest round step of which at most `count` are between two numbers. May be none, where the
-/// numbers are too close.
+/// The multiples of the smallest round step of which at most `count` are between two numbers. May be none,
+/// where the numbers are too close.
 fn multiples(low: f64, high: f64, count: usize) -> Vec<Decimal> {
     let largest = low.abs().max(high.abs());
     // No difference of both, which may be infinite.
@@ -329,8 +330,12 @@ mod tests {
         }
     }
 
+    fn config() -> ProptestConfig {
+        ProptestConfig { failure_persistence: None, cases: 2000, ..ProptestConfig::default() }
+    }
+
     proptest! {
-        #![proptest_config(ProptestConfig { failure_persistence: None, cases: 2000, ..ProptestConfig::default() })]
+        #![proptest_config(config())]
 
         #[test]
         fn ticks_of_any_range_keep_their_promise(range in range(), count in 0..30_usize) {

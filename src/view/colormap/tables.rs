@@ -1,7 +1,7 @@
 //! The control colours of all colour maps, as sRGB bytes.
 //!
-//! Each list was made from the published table of 256 colours: as few evenly spaced colours as keep linear interpolation
-//! within 4/255 of it in each channel.
+//! Each list was made from the published table of 256 colours: as few evenly spaced colours as keep linear
+//! interpolation within 4/255 of it in each channel.
 
 pub(super) const VIRIDIS: &[[u8; 3]] = &bytes([
     0x440154, 0x48186a, 0x472d7b, 0x424086, 0x3b528b, 0x33638d, 0x2c728e, 0x26828e, 0x21908c, 0x1f9f88,
