@@ -37,12 +37,13 @@ pub const INFERNO: Colormap = Colormap::plain("inferno", tables::INFERNO);
 /// yellow; bright at both ends.
 pub const PLASMA: Colormap = Colormap::plain("plasma", tables::PLASMA);
 
-/// *cividis* by Jamie Nuñez, Christopher Anderton and Ryan Renslow (*PLoS ONE*, 2018; matplotlib, BSD): blue
-/// to yellow; looks the same with red-green deficiencies.
+/// *cividis* by Jamie Nuñez, Christopher Anderton and Ryan Renslow (*PLoS ONE*, 2018; the table is
+/// matplotlib's, under its BSD-like licence): blue to yellow; looks the same with red-green deficiencies.
 pub const CIVIDIS: Colormap = Colormap::plain("cividis", tables::CIVIDIS);
 
-/// *turbo* by Anton Mikhailov (Google, Apache 2.0): a rainbow with smooth brightness, for details in values.
-/// It is brightest in the middle, so it is neither sequential nor diverging.
+/// *turbo* by Anton Mikhailov (Google, 2019; the table is matplotlib's, under its BSD-like licence): a
+/// rainbow with smooth brightness, for details in values. It is brightest in the middle, so it is neither
+/// sequential nor diverging.
 pub const TURBO: Colormap = Colormap::plain("turbo", tables::TURBO);
 
 /// *batlow* by Fabio Crameri (*Scientific colour maps*, MIT): dark blue to green to a light pink.
@@ -69,8 +70,8 @@ pub const ICE: Colormap = Colormap::plain("ice", tables::ICE);
 /// Black to white.
 pub const GREY: Colormap = Colormap::plain("grey", tables::GREY);
 
-/// *coolwarm* by Kenneth Moreland (*Diverging Color Maps for Scientific Visualization*, 2009; its table is in
-/// the public domain): blue to grey to red.
+/// *coolwarm* by Kenneth Moreland (*Diverging Color Maps for Scientific Visualization*, 2009; the table is
+/// matplotlib's, under its BSD-like licence): blue to grey to red.
 pub const COOLWARM: Colormap = Colormap::diverging("coolwarm", tables::COOLWARM);
 
 /// *vik* by Fabio Crameri (*Scientific colour maps*, MIT): blue to white to red.
