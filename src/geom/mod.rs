@@ -16,7 +16,7 @@ mod triangle_grid;
 mod weights;
 
 pub use bounds::Bounds;
-pub use camera::{Camera, Ray};
+pub use camera::{Camera, CameraError, CameraState, Projection, Ray, Rays, ViewPreset};
 pub(crate) use groups::Groups;
 pub use lattice::Lattice;
 pub(crate) use morton::morton;

@@ -172,7 +172,7 @@ impl VolumePass {
             self.lists = Some(Lists::new(context, size));
         }
         let Some(lists) = &self.lists else { return };
-        let [right, up, forward] = camera.frustum(f64::from(size[0]) / f64::from(size[1]));
+        let [forward, right, up] = camera.rays(f64::from(size[0]) / f64::from(size[1])).direction;
         let wide = |v: glam::DVec3| v.as_vec3().extend(0.0).to_array();
         let [corners, start] = self.start;
         let uniform = Uniform {

@@ -38,7 +38,7 @@ pub fn pick(bounds: &Bounds, camera: &Camera, screen: DVec2, aspect: f64, reach:
     let near = |face: &BoxFace| {
         let at = camera.project(face.handle(bounds), aspect)?;
         let away = (at - screen) * DVec2::new(aspect, 1.0);
-        (away.length() <= reach).then(|| face.handle(bounds).distance(camera.eye()))
+        (away.length() <= reach).then(|| camera.distance_to(face.handle(bounds)))
     };
     let found = BoxFace::ALL.iter().filter_map(|face| Some((near(face)?, *face)));
     found.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, face)| face)

@@ -1,7 +1,10 @@
-//! Surfaces and measurements of a mesh, computed on the CPU from slices, without an MT.
+//! Surfaces and measurements of a mesh, computed on the CPU from slices, without an MT; colours of values,
+//! ticks and axes.
 
+mod axes;
 mod boundary;
 mod colormap;
+mod colour_scale;
 mod cutaway;
 pub mod gizmo;
 mod iso;
@@ -11,22 +14,29 @@ mod probe;
 mod slice;
 mod stats;
 mod stream;
+mod ticks;
 mod volume;
 
+pub use axes::{AxisTick, BoxAxis, BoxEdge, ScaleBar, box_axis, scale_bar, tick_edges};
 pub use boundary::{BoundarySurface, area, is_closed};
-pub use colormap::{Colormap, VIRIDIS};
+pub use colormap::{
+    BALANCE, BATLOW, CIVIDIS, COOLWARM, Colormap, GREY, HALINE, ICE, INFERNO, LAJOLLA, LAPAZ, MAGMA, OSLO,
+    PLASMA, ROMA, THERMAL, TURBO, VIK, VIRIDIS,
+};
+pub use colour_scale::{ColourScale, ScaleError};
 pub use cutaway::{ClipPlane, Cutaway};
 pub use iso::{IsoSurface, NormalKind};
 pub use probe::{Place, Probe, Span};
 pub use slice::{Plane, Slice};
 pub use stats::{FieldStats, Histogram};
 pub use stream::{StreamEnd, StreamPoint, Streamline, TraceOptions, Tracer};
+pub use ticks::{Tick, linear_ticks, log_ticks};
 pub use volume::{Light, Medium};
 
 use std::ops::Range;
 
-/// The changes of a surface since the last call: ranges in ascending order. Beyond the ends of the arrays everything is
-/// gone.
+/// The changes of a surface since the last call: ranges in ascending order. Beyond the ends of the arrays
+/// everything is gone.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SurfaceChanges {
     /// Changed ranges of vertices.

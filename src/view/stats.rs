@@ -111,8 +111,8 @@ pub struct Histogram {
 }
 
 impl Histogram {
-    /// An empty histogram of so many equal bins (at least one) between two values. A bin holds its lower end; the last
-    /// one its upper end, too.
+    /// An empty histogram of so many equal bins (at least one) between two values. A bin holds its lower end;
+    /// the last one its upper end, too.
     ///
     /// # Panics
     /// If the values are not finite and in ascending order.
@@ -164,6 +164,36 @@ impl Histogram {
         [self.below.total(), self.above.total()]
     }
 
+    /// The value below which this fraction (0 to 1, held; NaN is 0) of the volume has its values; exact if
+    /// the volume of each bin is evenly spread over it.
+    ///
+    /// What lies outside of the bins counts: the answer is the lower end if it is below the first bin, the
+    /// upper end if it is above the last one. 0 and 1 give the ends of those bins that are not empty. Without
+    /// any volume, all bins are taken to have the same.
+    pub fn percentile(&self, fraction: f64) -> f64 {
+        let fraction = if fraction > 0.0 { fraction.min(1.0) } else { 0.0 };
+        let volumes = self.volumes();
+        let [below, above] = self.outside();
+        let total = below + volumes.iter().sum::<f64>() + above;
+        if total.is_nan() || total <= 0.0 {
+            return self.low * (1.0 - fraction) + self.high * fraction;
+        }
+        let mut left = fraction * total - below;
+        if left < 0.0 || (left == 0.0 && below > 0.0) {
+            return self.low;
+        }
+        let mut end = self.low;
+        for (b, volume) in volumes.into_iter().enumerate().filter(|(_, volume)| *volume > 0.0) {
+            end = self.edge(b + 1);
+            if left <= volume {
+                let t = left / volume;
+                return self.edge(b) * (1.0 - t) + end * t;
+            }
+            left -= volume;
+        }
+        if above > 0.0 { self.high } else { end }
+    }
+
     /// Where bin `b` starts; the end of the last one for the number of bins.
     pub fn edge(&self, b: usize) -> f64 {
         if b == self.bins.len() {
@@ -190,8 +220,8 @@ impl Histogram {
     }
 }
 
-/// The fraction of a tetrahedron in which the linear field with these values (ascending) at its corners is less than
-/// `x`: a cubic spline in `x`, in terms that are all positive.
+/// The fraction of a tetrahedron in which the linear field with these values (ascending) at its corners is
+/// less than `x`: a cubic spline in `x`, in terms that are all positive.
 fn fraction_below([a, b, c, d]: [f64; 4], x: f64) -> f64 {
     if x <= a {
         return 0.0;
@@ -252,6 +282,27 @@ mod tests {
         assert!((fraction_below([0.0, 0.0, 0.0, 1.0], 0.5) - 0.875).abs() < 1e-15);
         assert!((fraction_below([0.0, 1.0, 1.0, 1.0], 0.5) - 0.125).abs() < 1e-15);
         assert!((fraction_below([0.0, 0.0, 1.0, 1.0], 0.5) - 0.5).abs() < 1e-15);
+    }
+
+    /// A histogram with these volumes in bins of width 1.
+    fn with(below: f64, bins: &[f64], above: f64) -> Histogram {
+        let sum = |x: f64| Sum { sum: x, lost: 0.0 };
+        let mut histogram = Histogram::new(0.0, bins.len() as f64, bins.len());
+        histogram.bins = bins.iter().copied().map(sum).collect();
+        (histogram.below, histogram.above) = (sum(below), sum(above));
+        histogram
+    }
+
+    #[test]
+    fn percentiles_invert_the_distribution() {
+        let histogram = with(0.0, &[0.0, 1.0, 0.0, 3.0, 0.0], 0.0);
+        let fractions = [-1.0, f64::NAN, 0.0, 0.125, 0.25, 0.4375, 1.0, 7.0];
+        assert_eq!(fractions.map(|f| histogram.percentile(f)), [1.0, 1.0, 1.0, 1.5, 2.0, 3.25, 4.0, 4.0]);
+        let outside = with(1.0, &[1.0, 1.0], 1.0);
+        let fractions = [0.0, 0.2, 0.25, 0.375, 0.5, 0.75, 0.8, 1.0];
+        assert_eq!(fractions.map(|f| outside.percentile(f)), [0.0, 0.0, 0.0, 0.5, 1.0, 2.0, 2.0, 2.0]);
+        assert_eq!(with(0.0, &[0.0; 4], 0.0).percentile(0.25), 1.0);
+        assert_eq!(with(2.0, &[0.0; 4], 0.0).percentile(1.0), 0.0);
     }
 
     #[test]

@@ -182,16 +182,17 @@ impl Medium {
     pub fn picture(&self, mesh: MeshView<'_>, camera: &Camera, [width, height]: [u32; 2]) -> Vec<Light> {
         let mut probe = Probe::new(mesh);
         probe.make_grid();
-        let farthest = mesh.positions.iter().map(|p| camera.eye().distance(p.map(f64::from).into()));
-        let length = 1.01 * farthest.fold(0.0, f64::max);
         let aspect = f64::from(width) / f64::from(height);
+        let rays = camera.rays(aspect);
+        let distances = mesh.positions.iter().map(|p| rays.origin[0].distance(p.map(f64::from).into()));
+        let farthest = distances.fold(0.0, f64::max);
         let place = |i: u32, count: u32| 2.0 * (f64::from(i) + 0.5) / f64::from(count) - 1.0;
         let pixels = (0..height).flat_map(|row| (0..width).map(move |column| [column, row]));
         pixels
             .map(|[column, row]| {
-                let ray = camera.ray(DVec2::new(place(column, width), -place(row, height)), aspect);
-                let end = ray.origin + ray.direction * length;
-                self.along(&mesh, &probe.line(ray.origin.into(), end.into()), length)
+                let ray = rays.at(DVec2::new(place(column, width), -place(row, height)));
+                let length = 1.01 * (farthest + rays.origin[0].distance(ray.origin));
+                self.along(&mesh, &probe.line(ray.origin.into(), ray.at(length).into()), length)
             })
             .collect()
     }
