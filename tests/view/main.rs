@@ -11,6 +11,7 @@ mod scenes;
 #[cfg(feature = "gpu")]
 mod shaders;
 mod slice;
+mod solids;
 #[path = "../support/mod.rs"]
 mod support;
 mod volume;
