@@ -5,6 +5,7 @@ mod gpu_matches_cpu;
 mod iso_cases;
 mod iso_session;
 mod iso_update;
+mod pick;
 mod probe;
 #[allow(dead_code, reason = "each test uses a part of it")]
 mod scenes;
