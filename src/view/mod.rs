@@ -3,6 +3,7 @@
 mod boundary;
 mod colormap;
 mod cutaway;
+mod difference;
 pub mod gizmo;
 mod glyphs;
 mod iso;
@@ -20,6 +21,7 @@ mod volume;
 pub use boundary::{BoundarySurface, area, is_closed};
 pub use colormap::{Colormap, VIRIDIS};
 pub use cutaway::{ClipPlane, Cutaway};
+pub use difference::Difference;
 pub use glyphs::{ArrowLength, ArrowOptions};
 pub use iso::{IsoSurface, NormalKind};
 pub use pick::{MediumHit, SurfaceHit, Triangles, first_hit, first_hit_in};

@@ -1,5 +1,6 @@
 //! Promises of what is shown: isosurfaces, slices and probes, on the CPU and with the feature `vulkan` on the GPU.
 
+mod difference;
 #[cfg(feature = "vulkan")]
 mod gpu_matches_cpu;
 mod iso_cases;
