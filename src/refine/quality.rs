@@ -87,8 +87,8 @@ impl Front {
         all
     }
 
-    /// The update that removes tetrahedron `t`, if it is here, and the errors of the tetrahedron; where it is not, bounds of them,
-    /// `to_come` if nothing better is known.
+    /// The update that removes tetrahedron `t`, if it is here, and the errors of the tetrahedron; where it is
+    /// not, bounds of them, `to_come` if nothing better is known.
     fn errors_of<'a>(
         &self,
         mt: &'a impl ApplyUpdates,
@@ -104,9 +104,10 @@ impl Front {
         (update, errors)
     }
 
-    /// The error of each tetrahedron of the mesh, as the criterion of the last request sees it: that of the update which removes
-    /// it, or its own where it has one. If the criterion measures a single field it is the error in that field, else the largest
-    /// of all fields. Where the update has not arrived it is a bound; zero for tetrahedra of the reference mesh.
+    /// The error of each tetrahedron of the mesh, as the criterion of the last request sees it: that of the
+    /// update which removes it, or its own where it has one. If the criterion measures a single field it is
+    /// the error in that field, else the largest of all fields. Where the update has not arrived it is a
+    /// bound; zero for tetrahedra of the reference mesh.
     pub fn tet_errors(&self, mt: &impl ApplyUpdates) -> Vec<ErrorCode> {
         let to_come = vec![mt.to_come(); mt.info().fields.len()];
         (0..self.mesh.tets().len() as u32).map(|t| self.measured_error(mt, t, &to_come)).collect()
@@ -123,9 +124,9 @@ impl Front {
         field.and_then(|field| by_field.get(field)).copied().unwrap_or(largest)
     }
 
-    /// For each tetrahedron of the mesh whether it may violate the last request only because data has not arrived: the update
-    /// that removes it is not here, or, once the work is done as far as data allows, one that has to come before. None
-    /// when all updates are here, and without a request.
+    /// For each tetrahedron of the mesh whether it may violate the last request only because data has not
+    /// arrived: the update that removes it is not here, or, once the work is done as far as data allows, one
+    /// that has to come before. None when all updates are here, and without a request.
     pub fn missing_tets(&self, mt: &impl ApplyUpdates) -> Vec<bool> {
         let tets = self.mesh.tets();
         let Some(goal) = self.goal.as_ref().filter(|_| mt.present() < mt.info().updates) else {

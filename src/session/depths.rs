@@ -1,9 +1,10 @@
 //! How deep updates are in the partial order.
 //!
-//! The compact structures store no arcs, so the parents of an update are found by applying it: they created what it
-//! removes. The set of applied updates holds all ancestors of each of its members, so applying it once more, in the order
-//! of the numbers, gives the length of the longest path from the base mesh to each: the same as in the whole MT. Depths never change,
-//! so this is done only for meshes with updates that no mesh before had.
+//! The compact structures store no arcs, so the parents of an update are found by applying it: they created
+//! what it removes. The set of applied updates holds all ancestors of each of its members, so applying it
+//! once more, in the order of the numbers, gives the length of the longest path from the base mesh to each:
+//! the same as in the whole MT. Depths never change, so this is done only for meshes with updates that no
+//! mesh before had.
 
 use crate::mt::{Applied, ApplyUpdates, ReplayError, UpdateError, UpdateId};
 use crate::refine::Front;
@@ -21,7 +22,8 @@ impl Depths {
         u.and_then(|u| self.of.get(u.0 as usize)).copied().unwrap_or(0)
     }
 
-    /// Finds the depths of all updates that are applied. Takes as long as applying them, if some are not known yet.
+    /// Finds the depths of all updates that are applied. Takes as long as applying them, if some are not
+    /// known yet.
     ///
     /// # Errors
     /// If the MT is damaged.

@@ -17,8 +17,8 @@ pub enum TetQuantity {
     /// The error that refinement goes by, as a fraction of the field's range: see
     /// [`Front::tet_errors`](crate::refine::Front::tet_errors).
     Error,
-    /// Updates on the longest path of the partial order from the base mesh to the update that made the tetrahedron, itself
-    /// included; 0 in the base mesh.
+    /// Updates on the longest path of the partial order from the base mesh to the update that made the
+    /// tetrahedron, itself included; 0 in the base mesh.
     Depth,
     /// The block of the file that holds that update, counted from 1; 0 in the base mesh.
     Block,
@@ -64,8 +64,8 @@ impl fmt::Display for TetQuantity {
 impl Session {
     /// A number for each tetrahedron of [`Session::view`], in its order.
     ///
-    /// Costs a pass over the mesh; [`TetQuantity::Depth`] as much as refining the mesh from the base mesh, whenever it
-    /// has updates for which that has not been done before.
+    /// Costs a pass over the mesh; [`TetQuantity::Depth`] as much as refining the mesh from the base mesh,
+    /// whenever it has updates for which that has not been done before.
     ///
     /// # Errors
     /// If nothing has arrived yet; for [`TetQuantity::Depth`] also if the MT is damaged.

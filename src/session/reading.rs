@@ -21,8 +21,8 @@ pub struct Reading {
 }
 
 impl Session {
-    /// What is known of the current mesh at a point, in model units; none outside, and where it is not finite. Fields
-    /// are linear in the tetrahedron.
+    /// What is known of the current mesh at a point, in model units; none outside, and where it is not
+    /// finite. Fields are linear in the tetrahedron.
     ///
     /// # Errors
     /// If nothing has arrived yet.

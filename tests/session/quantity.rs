@@ -1,5 +1,5 @@
-//! Promise: the numbers of tetrahedra are what they say: sizes those of the geometry, errors within the request, depths grow as the
-//! mesh gets finer, and data is missing exactly while it is.
+//! Promise: the numbers of tetrahedra are what they say: sizes those of the geometry, errors within the
+//! request, depths grow as the mesh gets finer, and data is missing exactly while it is.
 
 use crate::support::meshes::{cube, hilly, linear};
 use crate::support::random::Random;
