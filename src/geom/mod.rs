@@ -10,7 +10,6 @@ mod point_grid;
 mod predicates;
 mod tet_box;
 mod triangle;
-#[cfg(feature = "build")]
 mod triangle_grid;
 #[cfg(feature = "build")]
 mod weights;
@@ -26,9 +25,7 @@ pub use predicates::{NARROW_BITS, WIDE_BITS, in_conflict, insphere, orient3d};
 pub(crate) use predicates::{det_i64, views_of_origin};
 pub use tet_box::{LatticeBox, tet_meets_box};
 pub use triangle::nearest_on_triangle;
-#[cfg(feature = "build")]
 pub(crate) use triangle::weights_on_triangle;
-#[cfg(feature = "build")]
 pub(crate) use triangle_grid::TriangleGrid;
 #[cfg(feature = "build")]
 pub(crate) use weights::{ON_LATTICE, weights_at};

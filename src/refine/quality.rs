@@ -68,13 +68,8 @@ impl Front {
         let incomplete = mt.present() < mt.info().updates;
         let mut all = Violations { error: ErrorCode::ZERO, excess: 1.0, missing: false };
         for (t, tet) in (0..).zip(self.mesh.tets()) {
-            let update = mt.remover(&self.mesh, t);
+            let (update, errors) = self.errors_of(mt, t, &to_come);
             let missing = incomplete && (update.is_none() || unlimited);
-            let errors = match (update, mt.awaited_errors(&self.mesh, t)) {
-                (Some(u), _) => TetErrors::of(mt, &self.mesh, t, u),
-                (None, Some(errors)) => TetErrors::bounded_by(errors),
-                (None, None) => TetErrors { largest: mt.to_come(), by_field: Cow::Borrowed(&to_come) },
-            };
             // The last number: regions are not widened.
             let update = update.unwrap_or(UpdateId(mt.info().updates));
             let verdict = see(&self.mesh, tet, &errors, update, |look| criterion.rank(look));
@@ -90,6 +85,65 @@ impl Front {
         // larger.
         all.error = all.error.max(self.within(mt, criterion));
         all
+    }
+
+    /// The update that removes tetrahedron `t`, if it is here, and the errors of the tetrahedron; where it is
+    /// not, bounds of them, `to_come` if nothing better is known.
+    fn errors_of<'a>(
+        &self,
+        mt: &'a impl ApplyUpdates,
+        t: u32,
+        to_come: &'a [ErrorCode],
+    ) -> (Option<UpdateId>, TetErrors<'a>) {
+        let update = mt.remover(&self.mesh, t);
+        let errors = match (update, mt.awaited_errors(&self.mesh, t)) {
+            (Some(u), _) => TetErrors::of(mt, &self.mesh, t, u),
+            (None, Some(errors)) => TetErrors::bounded_by(errors),
+            (None, None) => TetErrors { largest: mt.to_come(), by_field: Cow::Borrowed(to_come) },
+        };
+        (update, errors)
+    }
+
+    /// The error of each tetrahedron of the mesh, as the criterion of the last request sees it: that of the
+    /// update which removes it, or its own where it has one. If the criterion measures a single field it is
+    /// the error in that field, else the largest of all fields. Where the update has not arrived it is a
+    /// bound; zero for tetrahedra of the reference mesh.
+    pub fn tet_errors(&self, mt: &impl ApplyUpdates) -> Vec<ErrorCode> {
+        let to_come = vec![mt.to_come(); mt.info().fields.len()];
+        (0..self.mesh.tets().len() as u32).map(|t| self.measured_error(mt, t, &to_come)).collect()
+    }
+
+    /// [`Front::tet_errors`] of one tetrahedron of the mesh.
+    pub fn tet_error(&self, mt: &impl ApplyUpdates, t: u32) -> ErrorCode {
+        self.measured_error(mt, t, &vec![mt.to_come(); mt.info().fields.len()])
+    }
+
+    fn measured_error(&self, mt: &impl ApplyUpdates, t: u32, to_come: &[ErrorCode]) -> ErrorCode {
+        let field = self.goal.as_ref().and_then(|goal| goal.criterion.field());
+        let (_, TetErrors { largest, by_field }) = self.errors_of(mt, t, to_come);
+        field.and_then(|field| by_field.get(field)).copied().unwrap_or(largest)
+    }
+
+    /// For each tetrahedron of the mesh whether it may violate the last request only because data has not
+    /// arrived: the update that removes it is not here, or, once the work is done as far as data allows, one
+    /// that has to come before. None when all updates are here, and without a request.
+    pub fn missing_tets(&self, mt: &impl ApplyUpdates) -> Vec<bool> {
+        let tets = self.mesh.tets();
+        let Some(goal) = self.goal.as_ref().filter(|_| mt.present() < mt.info().updates) else {
+            return vec![false; tets.len()];
+        };
+        // What violates the request although all that is here has been done for it waits for something else.
+        let is_stuck = goal.reached && (goal.budget.is_unlimited() || self.ranked.has_room());
+        let to_come = vec![mt.to_come(); mt.info().fields.len()];
+        let is_missing = |(t, tet): (u32, &[u32; 4])| {
+            let (update, errors) = self.errors_of(mt, t, &to_come);
+            if update.is_some() && !is_stuck {
+                return false;
+            }
+            let update = update.unwrap_or(UpdateId(mt.info().updates));
+            see(&self.mesh, tet, &errors, update, |look| goal.criterion.judge(look)).violates()
+        };
+        (0..).zip(tets).map(is_missing).collect()
     }
 
     /// The error left where no tetrahedron violates the criterion.

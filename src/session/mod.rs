@@ -5,8 +5,13 @@
 //! arriving: a request is then met as far as the updates that are there allow, and made again when more are.
 
 mod blocks;
+mod depths;
+mod quantity;
+mod reading;
 
 pub use blocks::{BlockProgress, WantedBytes};
+pub use quantity::TetQuantity;
+pub use reading::Reading;
 
 use crate::format::{DecodeOptions, Decoder, FormatError, Limits};
 use crate::mt::{CurrentMesh, ErrorCode, Exact, MeshChanges, Mt, MtInfo, MultiTessellation};
@@ -15,6 +20,7 @@ use crate::refine::{
 };
 use crate::view::{IsoSurface, MeshView, NormalKind, Plane, Slice, SurfaceChanges};
 use blocks::Blocks;
+use depths::Depths;
 use std::ops::Range;
 use std::sync::Arc;
 use thiserror::Error;
@@ -62,6 +68,8 @@ pub struct Session {
     slice: Slice,
     /// The plane of the slice, and what has changed since that was last asked for.
     sliced: (Option<Plane>, Behind),
+    /// How deep the updates are that tetrahedra were asked for.
+    depths: Depths,
 }
 
 /// The current mesh in model units, kept up with the mesh at the cost of what changed.

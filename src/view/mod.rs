@@ -6,15 +6,20 @@ mod boundary;
 mod colormap;
 mod colour_scale;
 mod cutaway;
+mod difference;
 pub mod gizmo;
+mod glyphs;
 mod iso;
 mod marching;
 mod mesh_snapshot;
+mod pick;
 mod probe;
 mod slice;
+mod solids;
 mod stats;
 mod stream;
 mod ticks;
+mod tubes;
 mod volume;
 
 pub use axes::{AxisTick, BoxAxis, BoxEdge, ScaleBar, box_axis, scale_bar, tick_edges};
@@ -25,12 +30,17 @@ pub use colormap::{
 };
 pub use colour_scale::{ColourScale, ScaleError};
 pub use cutaway::{ClipPlane, Cutaway};
+pub use difference::Difference;
+pub use glyphs::{ArrowLength, ArrowOptions};
 pub use iso::{IsoSurface, NormalKind};
+pub use pick::{MediumHit, SurfaceHit, Triangles, first_hit, first_hit_in};
 pub use probe::{Place, Probe, Span};
 pub use slice::{Plane, Slice};
+pub use solids::Solids;
 pub use stats::{FieldStats, Histogram};
 pub use stream::{StreamEnd, StreamPoint, Streamline, TraceOptions, Tracer};
 pub use ticks::{Tick, linear_ticks, log_ticks};
+pub use tubes::{TubeEnd, TubeOptions};
 pub use volume::{Light, Medium};
 
 use std::ops::Range;

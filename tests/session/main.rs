@@ -6,6 +6,7 @@ mod client;
 mod hostile;
 mod kinds;
 mod parts;
+mod quantity;
 mod states;
 #[cfg(feature = "http")]
 mod stream_faults;

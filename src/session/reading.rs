@@ -1,0 +1,50 @@
+//! What a probe shows at a point.
+
+use super::quantity::size;
+use super::{Session, SessionError};
+use crate::mt::MultiTessellation;
+use crate::view::Probe;
+
+/// What is known of the current mesh at a point.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reading {
+    /// The point, in model units.
+    pub position: [f64; 3],
+    /// The value of each field there, in its own units.
+    pub values: Vec<f64>,
+    /// The tetrahedron that holds the point: an index into `tets` of [`Session::view`].
+    pub tet: u32,
+    /// Its size, as [`TetQuantity::Size`](super::TetQuantity::Size).
+    pub size: f64,
+    /// Its error, as [`TetQuantity::Error`](super::TetQuantity::Error): a fraction of the field's range.
+    pub error: f64,
+}
+
+impl Session {
+    /// What is known of the current mesh at a point, in model units; none outside, and where it is not
+    /// finite. Fields are linear in the tetrahedron.
+    ///
+    /// # Errors
+    /// If nothing has arrived yet.
+    pub fn reading(&mut self, point: [f64; 3]) -> Result<Option<Reading>, SessionError> {
+        let Some(place) = Probe::new(self.view()).locate(point) else {
+            return if self.front.is_some() { Ok(None) } else { Err(SessionError::NotReady) };
+        };
+        let (Some(front), Some(mt)) = (&self.front, self.decoder.mt()) else {
+            return Err(SessionError::NotReady);
+        };
+        let (mesh, info) = (front.mesh(), mt.info());
+        let Some(tet) = mesh.tet(place.tet) else { return Ok(None) };
+        let value = |field: usize| {
+            let at = |i: usize| place.weights[i] * info.fields[field].value(mesh.levels(tet[i])[field]);
+            (0..4).map(at).sum::<f64>()
+        };
+        Ok(Some(Reading {
+            position: point,
+            values: (0..info.fields.len()).map(value).collect(),
+            tet: place.tet,
+            size: size(&info.lattice, mesh, tet),
+            error: front.tet_error(mt, place.tet).error(),
+        }))
+    }
+}

@@ -1,0 +1,97 @@
+//! How much the field of one mesh differs from that of another one of the same domain: coarse against fine.
+
+use crate::geom::{TriangleGrid, weights_on_triangle};
+use crate::view::{BoundarySurface, FieldStats, MeshView, Probe};
+use glam::DVec3;
+
+/// The field of one mesh minus that of another one.
+///
+/// ```
+/// use tetralod::mesh::NONE;
+/// use tetralod::view::{Difference, MeshView};
+///
+/// let positions = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+/// let (tets, neighbors) = ([[0, 1, 2, 3]], [[NONE; 4]]);
+/// let mesh = |field| MeshView { positions: &positions, field, tets: &tets, neighbors: &neighbors };
+/// let difference = Difference::of(&mesh(&[3.0; 4]), mesh(&[1.0; 4])).expect("there is a tetrahedron");
+/// assert_eq!((difference.values, difference.largest), (vec![2.0; 4], 2.0));
+/// ```
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Difference {
+    /// One number for each point of the first mesh, in units of the field.
+    pub values: Vec<f32>,
+    /// The root of the mean square over the volume of the first mesh, of what is linear between the values; 0
+    /// without a volume.
+    pub root_mean_square: f64,
+    /// The largest absolute value; 0 if there is none.
+    pub largest: f64,
+    /// Points of the first mesh outside of the second one: these are compared with the nearest point of its
+    /// boundary.
+    pub outside: usize,
+}
+
+impl Difference {
+    /// The field of `mesh` at each of its points minus the field of `other` there; none if `other` has no
+    /// tetrahedra.
+    ///
+    /// At points whose coordinates are not finite the value is NaN, and counts for nothing in
+    /// [`Difference::largest`]; if a tetrahedron names such a point, the mean square is NaN.
+    ///
+    /// # Panics
+    /// If a mesh names a point or a neighbour that it does not have.
+    pub fn of(mesh: &MeshView<'_>, other: MeshView<'_>) -> Option<Self> {
+        if other.tets.is_empty() {
+            return None;
+        }
+        let mut boundary = None;
+        let points: Vec<[f64; 3]> = mesh.positions.iter().map(|p| p.map(f64::from)).collect();
+        let mut probe = Probe::new(other);
+        let places = probe.locate_all(&points);
+        let mut outside = 0;
+        let mut values = Vec::with_capacity(points.len());
+        for ((p, place), own) in points.iter().zip(places).zip(mesh.field) {
+            let there = match place {
+                Some(place) => place.value(&other),
+                None => {
+                    outside += 1;
+                    boundary.get_or_insert_with(|| Boundary::of(&other)).as_ref()?.nearest_value(*p)
+                }
+            };
+            values.push((f64::from(*own) - there) as f32);
+        }
+        let stats = FieldStats::of(&MeshView { field: &values, ..*mesh });
+        // Both are over the same volume, so their squares add up.
+        let square = stats.mean() * stats.mean() + stats.deviation() * stats.deviation();
+        let largest = values.iter().fold(0.0, |most: f64, value| most.max(f64::from(value.abs())));
+        Some(Self { values, root_mean_square: square.sqrt(), largest, outside })
+    }
+}
+
+/// The boundary of a mesh, and its triangles by place.
+struct Boundary {
+    surface: BoundarySurface,
+    grid: TriangleGrid,
+}
+
+impl Boundary {
+    /// None for a mesh without boundary.
+    fn of(mesh: &MeshView<'_>) -> Option<Self> {
+        let mut surface = BoundarySurface::new();
+        surface.extract(mesh);
+        let corner = |v: u32| DVec3::from(surface.positions[v as usize].map(f64::from));
+        let corners: Vec<[DVec3; 3]> = surface.indices.iter().map(|triangle| triangle.map(corner)).collect();
+        let is_usable = !corners.is_empty() && corners.iter().flatten().all(|p| p.is_finite());
+        is_usable.then(|| Self { surface, grid: TriangleGrid::new(corners) })
+    }
+
+    /// The value of the field at the nearest point; NaN if that is not known.
+    fn nearest_value(&self, p: [f64; 3]) -> f64 {
+        let p = DVec3::from(p);
+        let Some((triangle, at)) = p.is_finite().then(|| self.grid.nearest(p)).flatten() else {
+            return f64::NAN;
+        };
+        let weights = weights_on_triangle(at, self.grid.corners[triangle as usize]);
+        let vertices = self.surface.indices[triangle as usize];
+        (0..3).map(|i| weights[i] * f64::from(self.surface.values[vertices[i] as usize])).sum()
+    }
+}
