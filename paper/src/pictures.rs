@@ -8,8 +8,8 @@ use std::pin::pin;
 use std::task;
 use std::task::{Poll, Waker};
 use tetralod::geom::{Bounds, Camera};
-use tetralod::gpu::{BoxLines, GpuError, Look, Renderer, Show};
-use tetralod::view::{ClipPlane, Cutaway, IsoSurface};
+use tetralod::gpu::{BoxLines, CellStyle, Colouring, EdgeLook, GpuError, Lighting, Look, Renderer, Style};
+use tetralod::view::{ClipPlane, ColourScale, IsoSurface, Triangles, VIRIDIS};
 
 use crate::figures::Pair;
 use crate::query::Shown;
@@ -18,7 +18,7 @@ use crate::query::Shown;
 const SIZE: [u32; 2] = [640, 640];
 
 /// The background.
-const PAPER: [f32; 3] = [0.98; 3];
+const PAPER: [f32; 4] = [0.98, 0.98, 0.98, 1.0];
 
 /// Draws what is asked for; none where there is no adapter.
 pub struct Painter {
@@ -57,12 +57,12 @@ impl Painter {
     fn surface(&mut self, shown: &Shown, pair: &Pair, path: &Path) -> Result<()> {
         let mut surface = IsoSurface::new();
         surface.extract(&shown.view(), pair.isovalue);
-        // Facets drawn as faces of tetrahedra are: flat, with outlines.
-        let mut facets = Cutaway::new();
-        facets.positions = surface.indices.iter().flatten().map(|&v| surface.positions[v as usize]).collect();
-        facets.values = vec![0.8; facets.positions.len()];
-        self.renderer.set_cutaway(&facets)?;
-        self.picture(shown, pair, [0.0, 1.0], 0.6, path)
+        self.renderer.set_cells(None);
+        self.renderer.set_surface(0, &Triangles::from(&surface), None)?;
+        let sides = Colouring::Sides([VIRIDIS.at(0.8); 2]);
+        let (lighting, edges) = (Lighting::Flat, Some(EdgeLook::default()));
+        self.renderer.set_style(0, &Style { colouring: sides, lighting, edges, ..Style::default() });
+        self.picture(shown, pair, 0.6, path)
     }
 
     /// The tetrahedra behind a plane through the middle of the domain, or of the box.
@@ -70,16 +70,20 @@ impl Painter {
         let view = shown.view();
         let bounds = pair.roi.unwrap_or_else(|| bounds(shown));
         let middle = (bounds.min[1] + bounds.max[1]) / 2.0;
-        let mut cutaway = Cutaway::new();
-        cutaway.cut(&view, &ClipPlane { normal: [0.0, -1.0, 0.0], offset: -middle as f32 });
-        self.renderer.set_cutaway(&cutaway)?;
+        self.renderer.remove_surface(0);
         let low = view.field.iter().copied().fold(f32::INFINITY, f32::min);
         let high = view.field.iter().copied().fold(f32::NEG_INFINITY, f32::max);
         // The dark end of the colours would hide the edges.
-        self.picture(shown, pair, [low - 0.8 * (high - low), high], 0.97, path)
+        let range = [low - 0.8 * (high - low), high].map(f64::from);
+        let cells = CellStyle::default();
+        let style = Style { colouring: Colouring::Scale(ColourScale::new(VIRIDIS, range)?), ..cells.style };
+        let cut = ClipPlane { normal: [0.0, -1.0, 0.0], offset: -middle as f32 };
+        self.renderer.set_cells(Some(&CellStyle { style, cut, ..cells }));
+        self.renderer.update_mesh(&view, None)?;
+        self.picture(shown, pair, 0.97, path)
     }
 
-    fn picture(&mut self, shown: &Shown, pair: &Pair, range: [f32; 2], zoom: f64, path: &Path) -> Result<()> {
+    fn picture(&mut self, shown: &Shown, pair: &Pair, zoom: f64, path: &Path) -> Result<()> {
         let line = |bounds, colour, width| BoxLines { bounds, colour, width, handles: false };
         let domain = bounds(shown);
         let mut boxes = vec![line(domain, [0.45, 0.48, 0.52, 1.0], 1.0)];
@@ -87,9 +91,8 @@ impl Painter {
         self.renderer.set_boxes(&boxes)?;
         let mut camera = Camera::home(&domain, self.renderer.aspect());
         camera.zoom(zoom);
-        let look = Look { range, sky: PAPER, ground: PAPER, pixel_ratio: 0.6, ..Look::default() };
-        self.renderer.draw(Show::Cutaway, &camera, &look)?;
-        let pixels = wait(self.renderer.read())?;
+        let look = Look { sky: PAPER, ground: PAPER, pixel_ratio: 0.6, ..Look::default() };
+        let pixels = wait(self.renderer.picture(&camera, &look, 8))?;
         save(&pixels, self.renderer.size(), path).with_context(|| path.display().to_string())
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::gpu::{Context, GpuError};
 use bytemuck::Pod;
+use std::borrow::Cow;
 use std::marker::PhantomData;
 use std::ops::Range;
 
@@ -26,29 +27,13 @@ impl<T: Pod> GrowBuffer<T> {
 
     /// Replaces the contents.
     pub(super) fn write(&mut self, context: &Context, items: &[T]) -> Result<(), GpuError> {
+        self.clear();
+        self.update(context, items, &[])
+    }
+
+    /// Empties it; the memory is kept.
+    pub(super) fn clear(&mut self) {
         self.len = 0;
-        let bytes = size_of_val(items) as u64;
-        let held = self.buffer.as_ref().map_or(0, wgpu::Buffer::size);
-        if bytes > held {
-            let size = grown(bytes, context.device.limits().max_buffer_size).ok_or_else(|| {
-                GpuError::TooLarge { what: self.what, bytes, limit: context.device.limits().max_buffer_size }
-            })?;
-            // Free the old memory before allocating more.
-            if let Some(old) = self.buffer.take() {
-                old.destroy();
-            }
-            self.buffer = Some(context.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some(self.what),
-                size,
-                usage: self.usage,
-                mapped_at_creation: false,
-            }));
-        }
-        if let (Some(buffer), true) = (&self.buffer, bytes > 0) {
-            context.queue.write_buffer(buffer, 0, bytemuck::cast_slice(items));
-            self.len = items.len();
-        }
-        Ok(())
     }
 
     /// Makes the contents `items`, which differ from what is there in these ranges only, and in what lies beyond its end.
@@ -59,16 +44,53 @@ impl<T: Pod> GrowBuffer<T> {
         items: &[T],
         changed: &[Range<u32>],
     ) -> Result<(), GpuError> {
-        let held = self.buffer.as_ref().map_or(0, wgpu::Buffer::size);
-        let Some(buffer) = self.buffer.as_ref().filter(|_| size_of_val(items) as u64 <= held) else {
-            return self.write(context, items);
-        };
-        for range in uploads(changed, self.len, items.len()) {
-            let bytes = bytemuck::cast_slice(&items[range.clone()]);
-            context.queue.write_buffer(buffer, (range.start * size_of::<T>()) as u64, bytes);
+        self.update_with(context, items.len(), changed, |range| Cow::Borrowed(&items[range]))
+    }
+
+    /// The same of `len` items that are made for a range when they are written.
+    pub(super) fn update_with<'a>(
+        &mut self,
+        context: &Context,
+        len: usize,
+        changed: &[Range<u32>],
+        items: impl Fn(Range<usize>) -> Cow<'a, [T]>,
+    ) -> Result<(), GpuError> {
+        self.reserve(context, len)?;
+        let Some(buffer) = &self.buffer else { return Ok(()) };
+        for range in uploads(changed, self.len, len) {
+            let items = items(range.clone());
+            context.upload(buffer, range.start * size_of::<T>(), bytemuck::cast_slice(&items));
         }
-        self.len = items.len();
+        self.len = len;
         Ok(())
+    }
+
+    /// Makes room for so many items; what is there is lost if there is not.
+    fn reserve(&mut self, context: &Context, len: usize) -> Result<(), GpuError> {
+        let bytes = (len * size_of::<T>()) as u64;
+        if bytes <= self.buffer.as_ref().map_or(0, wgpu::Buffer::size) {
+            return Ok(());
+        }
+        self.len = 0;
+        let limit = context.largest_buffer(self.usage);
+        let too_large = GpuError::TooLarge { what: self.what, bytes, limit };
+        let size = grown(bytes, limit).ok_or(too_large)?;
+        // Free the old memory before allocating more.
+        if let Some(old) = self.buffer.take() {
+            old.destroy();
+        }
+        self.buffer = Some(context.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(self.what),
+            size,
+            usage: self.usage,
+            mapped_at_creation: false,
+        }));
+        Ok(())
+    }
+
+    /// Bytes of memory on the GPU.
+    pub(super) fn bytes(&self) -> u64 {
+        self.buffer.as_ref().map_or(0, wgpu::Buffer::size)
     }
 
     /// The number of items.

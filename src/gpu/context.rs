@@ -1,6 +1,7 @@
 //! The device, and its errors.
 
 use crate::gpu::GpuError;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
 /// An open device.
@@ -10,6 +11,8 @@ pub struct Context {
     pub(super) device: wgpu::Device,
     pub(super) queue: wgpu::Queue,
     trouble: Trouble,
+    /// Bytes written to buffers since the last question.
+    uploaded: AtomicU64,
 }
 
 /// The first thing that the device complained about; it calls back at times of its own choice.
@@ -87,6 +90,11 @@ impl Context {
             .request_device(&descriptor)
             .await
             .map_err(|error| GpuError::NoDevice(error.to_string()))?;
+        Ok(Self::of(adapter, device, queue))
+    }
+
+    /// A device that somebody else has opened.
+    pub fn of(adapter: wgpu::Adapter, device: wgpu::Device, queue: wgpu::Queue) -> Self {
         let trouble = Trouble::default();
         let (lost, refused) = (trouble.clone(), trouble.clone());
         device.set_device_lost_callback(move |reason, message| {
@@ -97,7 +105,26 @@ impl Context {
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
             refused.note(GpuError::Refused(error.to_string()));
         }));
-        Ok(Self { adapter, device, queue, trouble })
+        Self { adapter, device, queue, trouble, uploaded: AtomicU64::new(0) }
+    }
+
+    /// Writes to a buffer, and counts what is written.
+    pub(super) fn upload(&self, buffer: &wgpu::Buffer, offset: usize, bytes: &[u8]) {
+        self.queue.write_buffer(buffer, offset as u64, bytes);
+        self.uploaded.fetch_add(bytes.len() as u64, Ordering::Relaxed);
+    }
+
+    /// Bytes written to buffers of meshes and surfaces since the last call.
+    pub(super) fn take_uploaded(&self) -> u64 {
+        self.uploaded.swap(0, Ordering::Relaxed)
+    }
+
+    /// The size of the largest buffer that can be used like this.
+    pub(super) fn largest_buffer(&self, usage: wgpu::BufferUsages) -> u64 {
+        let limits = self.device.limits();
+        let is_storage = usage.contains(wgpu::BufferUsages::STORAGE);
+        let largest = limits.max_buffer_size;
+        if is_storage { largest.min(limits.max_storage_buffer_binding_size) } else { largest }
     }
 
     /// The GPU and its driver in words.

@@ -1,39 +1,48 @@
-//! The renderer, on wgpu: WebGPU in the browser, Vulkan in the tests. It uses no MT: it draws what [`crate::view`]
-//! computes.
+//! The renderer, on wgpu: WebGPU in the browser, Vulkan in native programs. It uses no MT: it draws slices of numbers, such as
+//! those that [`crate::view`] computes.
 //!
-//! A [`Renderer`] owns a [`Context`] (the device), a target (a canvas, or an image to read back), and one pass for
-//! each thing that is seen. Failures of the device arrive as [`GpuError`]s from [`Renderer::draw`], also those that
-//! the device reports late.
+//! A [`Renderer`] owns a [`Context`] (the device), a target (a canvas, an image to read back, or views that the caller gives),
+//! and the things that are drawn: the mesh as a volume or as tetrahedra, surfaces of triangles, and boxes. What is opaque is
+//! drawn with depth and samples; all else is listed for each pixel and composited in exact order. Failures of the device
+//! arrive as [`GpuError`]s from [`Renderer::draw`], also those that the device reports late.
 
 mod buffers;
+mod cells;
+mod composite;
 mod context;
-mod cutaway;
 mod error;
+mod fragments;
+mod mesh;
 mod pipeline;
+mod present;
 mod renderer;
+mod style;
 mod surface;
 mod target;
 mod types;
-mod volume;
 mod wire;
 
 pub use context::Context;
 pub use error::GpuError;
-pub use renderer::{Renderer, Show};
-pub use types::{BoxLines, Look};
+pub use renderer::Renderer;
+pub use style::{CellShape, CellStyle, Colouring, EdgeLook, Lighting, SIDES, Style};
+pub use types::{BoxLines, Look, MOST_CLIPS};
 
 /// Samples per pixel.
 pub const SAMPLES: u32 = 4;
 
+/// A shader from its files.
+macro_rules! shader {
+    ($($file:literal),*) => { concat!(include_str!("shaders/common.wgsl"), $(include_str!(concat!("shaders/", $file))),*) };
+}
+
 /// The shaders, each complete: name and WGSL source.
-pub const SHADERS: [(&str, &str); 6] = [
-    ("background", concat!(include_str!("shaders/common.wgsl"), include_str!("shaders/background.wgsl"))),
-    ("surface", concat!(include_str!("shaders/common.wgsl"), include_str!("shaders/surface.wgsl"))),
-    ("cutaway", concat!(include_str!("shaders/common.wgsl"), include_str!("shaders/cutaway.wgsl"))),
-    (
-        "volume_entries",
-        concat!(include_str!("shaders/common.wgsl"), include_str!("shaders/volume_entries.wgsl")),
-    ),
-    ("volume", concat!(include_str!("shaders/common.wgsl"), include_str!("shaders/volume.wgsl"))),
-    ("wire", concat!(include_str!("shaders/common.wgsl"), include_str!("shaders/wire.wgsl"))),
+pub const SHADERS: [(&str, &str); 7] = [
+    ("background", shader!("background.wgsl")),
+    ("surface", shader!("fragments.wgsl", "shading.wgsl", "surface.wgsl")),
+    ("cells", shader!("shading.wgsl", "cells.wgsl")),
+    ("volume_entries", shader!("fragments.wgsl", "crossing.wgsl", "volume_entries.wgsl")),
+    ("composite", shader!("crossing.wgsl", "composite.wgsl")),
+    ("wire", shader!("fragments.wgsl", "wire.wgsl")),
+    ("present", shader!("present.wgsl")),
 ];

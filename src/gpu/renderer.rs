@@ -1,45 +1,48 @@
-//! The whole picture: background, mesh, boxes.
+//! The whole picture: background, mesh, surfaces, boxes.
 
 use crate::geom::Camera;
-use crate::gpu::cutaway::CutawayPass;
-use crate::gpu::pipeline::{FrameBinding, PipelineSpec};
-use crate::gpu::surface::SurfacePass;
+use crate::gpu::cells::CellPass;
+use crate::gpu::composite::Composite;
+use crate::gpu::fragments::FragmentLists;
+use crate::gpu::mesh::MeshBuffers;
+use crate::gpu::pipeline::{Common, Output, PipelineSpec};
+use crate::gpu::present::Presenter;
+use crate::gpu::surface::{Surface, SurfacePipelines};
 use crate::gpu::target::{Picture, Target};
 use crate::gpu::types::Frame;
-use crate::gpu::volume::VolumePass;
 use crate::gpu::wire::WirePass;
-use crate::gpu::{BoxLines, Context, GpuError, Look};
-use crate::view::{Cutaway, IsoSurface, Medium, MeshView, Place};
+use crate::gpu::{BoxLines, CellStyle, Context, GpuError, Look, Style};
+use crate::view::{Medium, MeshView, Place, SurfaceChanges, Triangles};
+use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// Which view of the mesh is drawn.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Show {
-    /// The lit isosurface.
-    #[default]
-    Surface,
-    /// The cut-away tetrahedra.
-    Cutaway,
-    /// Emission and absorption of the whole volume.
-    Volume,
-}
-
-/// Draws pictures of a mesh on a canvas or into an image.
+/// Draws pictures of a mesh on a canvas, into an image, or into the views of another program.
+///
+/// What is drawn is what has been set: [surfaces](Renderer::set_surface), the [volume](Renderer::set_volume), the
+/// [tetrahedra](Renderer::set_cells), [boxes](Renderer::set_boxes). Volume and tetrahedra are those of
+/// [`Renderer::update_mesh`].
 #[derive(Debug)]
 pub struct Renderer {
     context: Context,
     target: Target,
-    frame: FrameBinding,
+    common: Common,
     background: wgpu::RenderPipeline,
-    surface: SurfacePass,
-    cutaway: CutawayPass,
-    /// Made when there is a volume to draw: its pipelines take longer to compile than all others.
-    volume: Option<VolumePass>,
+    surface_pipelines: SurfacePipelines,
+    surfaces: BTreeMap<u32, Surface>,
+    mesh: MeshBuffers,
+    /// Made when tetrahedra are drawn first.
+    cells: Option<CellPass>,
+    shows_cells: bool,
+    lists: FragmentLists,
+    composite: Composite,
     wire: WirePass,
+    presenter: Presenter,
+    /// What the last picture showed, and of how many it is the mean.
+    last: Option<(Camera, Look, u32)>,
 }
 
 impl Renderer {
-    /// Draws into an image of this many pixels; see [`Renderer::read`].
+    /// Draws into an image of this many pixels; see [`Renderer::picture`].
     ///
     /// # Errors
     /// If there is no adapter or it cannot be opened.
@@ -62,29 +65,45 @@ impl Renderer {
         Self::new(context, target)
     }
 
+    /// Draws with a device of another program into the views that [`Renderer::render`] gets, of this many pixels and this format
+    /// (8 bits a channel, without sRGB encoding by the device).
+    ///
+    /// # Errors
+    /// If the device refuses what the renderer takes.
+    pub fn with_device(
+        context: Context,
+        size: [u32; 2],
+        format: wgpu::TextureFormat,
+    ) -> Result<Self, GpuError> {
+        let target = Target::given(&context, size, format);
+        Self::new(context, target)
+    }
+
     fn new(context: Context, target: Target) -> Result<Self, GpuError> {
-        let frame = FrameBinding::new(&context);
-        let format = target.format;
+        let common = Common::new(&context, target.format);
         let background = PipelineSpec {
             shader: "background",
             vertex: "vs",
             fragment: "fs",
             buffers: &[],
-            depth: wgpu::CompareFunction::Always,
-            writes_depth: false,
-            blends: false,
-            group: None,
-            is_list: false,
+            groups: &[],
+            output: Output::Over(wgpu::CompareFunction::Always),
         };
         let renderer = Self {
-            background: background.create(&context, &frame, format),
-            surface: SurfacePass::new(&context, &frame, format),
-            cutaway: CutawayPass::new(&context, &frame, format),
-            volume: None,
-            wire: WirePass::new(&context, &frame, format),
+            background: background.create(&context, &common),
+            surface_pipelines: SurfacePipelines::new(&context, &common),
+            surfaces: BTreeMap::new(),
+            mesh: MeshBuffers::new(),
+            cells: None,
+            shows_cells: false,
+            lists: FragmentLists::new(&context),
+            composite: Composite::new(&context),
+            wire: WirePass::new(&context, &common),
+            presenter: Presenter::new(&context, &common),
+            last: None,
             context,
             target,
-            frame,
+            common,
         };
         renderer.context.check()?;
         Ok(renderer)
@@ -108,54 +127,102 @@ impl Renderer {
     /// Gives the target another size, held to at least one pixel and at most what the device can draw.
     pub fn resize(&mut self, size: [u32; 2]) {
         self.target.resize(&self.context, size);
+        self.last = None;
     }
 
-    /// Replaces the isosurface.
+    /// Makes surface number `key` these triangles. If `changes` are given, only those differ from the ones that it has, and what
+    /// lies beyond the ends of their arrays; what is uploaded is that, so the cost goes with what has changed.
+    ///
+    /// A surface has no look before [`Renderer::set_style`] but the default one.
     ///
     /// # Errors
-    /// If it is too large for the device; then none is shown.
-    pub fn set_surface(&mut self, surface: &IsoSurface) -> Result<(), GpuError> {
-        self.surface.update(&self.context, surface)
-    }
-
-    /// Makes the isosurface `surface`, which differs from the one that is there only in these ranges of vertices and of
-    /// triangles, and in what lies beyond its ends. What is uploaded is that, so the cost goes with what has changed.
-    ///
-    /// # Errors
-    /// If it is too large for the device; then no surface is shown, and [`Renderer::set_surface`] must be called next.
-    pub fn update_surface(
+    /// If it is too large for the device; then it is not drawn, and all of it must come next.
+    pub fn set_surface(
         &mut self,
-        surface: &IsoSurface,
-        vertices: &[Range<u32>],
-        triangles: &[Range<u32>],
+        key: u32,
+        triangles: &Triangles<'_>,
+        changes: Option<&SurfaceChanges>,
     ) -> Result<(), GpuError> {
-        self.surface.update_ranges(&self.context, surface, vertices, triangles)
+        let context = &self.context;
+        let surface = self.surfaces.entry(key).or_insert_with(|| {
+            let mut surface = Surface::new(context);
+            surface.set_style(context, &Style::default());
+            surface
+        });
+        surface.update(context, &self.surface_pipelines, triangles, changes)
     }
 
-    /// Replaces the cut-away faces.
+    /// How surface number `key` looks; does nothing if there is none.
+    pub fn set_style(&mut self, key: u32, style: &Style) {
+        if let Some(surface) = self.surfaces.get_mut(&key) {
+            surface.set_style(&self.context, style);
+        }
+    }
+
+    /// Removes surface number `key`, and frees its memory.
+    pub fn remove_surface(&mut self, key: u32) {
+        self.surfaces.remove(&key);
+    }
+
+    /// Triangles of all surfaces.
+    pub fn triangles(&self) -> usize {
+        self.surfaces.values().map(Surface::triangles).sum()
+    }
+
+    /// Draws the mesh as a volume of this medium, cut by the clip planes whose bit is set; none hides it. The mesh comes by
+    /// [`Renderer::update_mesh`].
     ///
     /// # Errors
-    /// If they are too large for the device; then none are shown.
-    pub fn set_cutaway(&mut self, cutaway: &Cutaway) -> Result<(), GpuError> {
-        self.cutaway.update(&self.context, cutaway)
+    /// If the device refuses it.
+    pub fn set_volume(&mut self, medium: Option<(&Medium, u32)>) -> Result<(), GpuError> {
+        self.composite.set_medium(&self.context, medium)?;
+        self.mesh.linked.set_needed(medium.is_some());
+        Ok(())
     }
 
-    /// Replaces the volume: the mesh, and what its values look like. If the eye may be in it, call
+    /// Draws the tetrahedra of the mesh in this style; none hides them. The mesh comes by [`Renderer::update_mesh`].
+    pub fn set_cells(&mut self, style: Option<&CellStyle>) {
+        self.shows_cells = style.is_some();
+        self.mesh.corners.set_needed(style.is_some());
+        if let Some(style) = style {
+            let (context, common) = (&self.context, &self.common);
+            self.cells.get_or_insert_with(|| CellPass::new(context, common)).set_style(context, style);
+        }
+    }
+
+    /// Gives each tetrahedron a value, for styles that colour by it. They are not drawn while the mesh has another number of
+    /// tetrahedra.
+    ///
+    /// # Errors
+    /// If they are too many for the device.
+    pub fn set_cell_values(&mut self, values: &[f32]) -> Result<(), GpuError> {
+        let (context, common) = (&self.context, &self.common);
+        self.cells.get_or_insert_with(|| CellPass::new(context, common)).set_values(context, values)
+    }
+
+    /// Whether volume or tetrahedra are to be drawn and have no mesh: [`Renderer::update_mesh`] must be called.
+    pub fn wants_mesh(&self) -> bool {
+        self.mesh.is_behind()
+    }
+
+    /// Brings the mesh of volume and tetrahedra up to date. `changes` are ranges of points and of tetrahedra that have changed since
+    /// the last call; without them all is replaced. Nothing is uploaded if nothing needs it. If the eye may be in the mesh, call
     /// [`Renderer::set_eye`] for each picture.
     ///
     /// # Errors
-    /// If it is too large for the device; then none is shown.
-    pub fn set_volume(&mut self, mesh: &MeshView<'_>, medium: &Medium) -> Result<(), GpuError> {
-        let (context, frame, format) = (&self.context, &self.frame, self.target.format);
-        self.volume
-            .get_or_insert_with(|| VolumePass::new(context, frame, format))
-            .update(context, mesh, medium)
+    /// If it is too large for the device; then none is drawn.
+    pub fn update_mesh(
+        &mut self,
+        mesh: &MeshView<'_>,
+        changes: Option<[&[Range<u32>]; 2]>,
+    ) -> Result<(), GpuError> {
+        self.composite.set_eye(mesh, None);
+        self.mesh.update(&self.context, mesh, changes)
     }
 
-    /// Where the eye of the next pictures is in the mesh of [`Renderer::set_volume`], as [`Probe::locate`](crate::view::Probe::locate)
-    /// gives it; none outside.
+    /// Where the eye of the next pictures is in the mesh, as [`Probe::locate`](crate::view::Probe::locate) gives it; none outside.
     pub fn set_eye(&mut self, mesh: &MeshView<'_>, place: Option<&Place>) {
-        self.volume.iter_mut().for_each(|volume| volume.set_eye(mesh, place));
+        self.composite.set_eye(mesh, place);
     }
 
     /// Replaces the boxes.
@@ -166,66 +233,240 @@ impl Renderer {
         self.wire.update(&self.context, boxes)
     }
 
+    /// Bytes of meshes and surfaces that were uploaded since the last call.
+    pub fn take_uploaded(&self) -> u64 {
+        self.context.take_uploaded()
+    }
+
+    /// Bytes of memory on the GPU that the mesh and the lists of pixels take.
+    pub fn gpu_bytes(&self) -> u64 {
+        self.mesh.bytes() + self.lists.bytes()
+    }
+
     /// Draws a picture. `false` when the target is not available, such as a hidden canvas.
     ///
     /// # Errors
     /// If the device is lost or refused something, now or since the last picture.
-    pub fn draw(&mut self, show: Show, camera: &Camera, look: &Look) -> Result<bool, GpuError> {
-        self.context.check()?;
-        let Some(picture) = self.target.next(&self.context)? else { return Ok(false) };
-        self.frame.write(&self.context, &Frame::new(camera, look, self.target.size));
-        let descriptor = wgpu::CommandEncoderDescriptor { label: Some("picture") };
-        let mut encoder = self.context.device.create_command_encoder(&descriptor);
-        if let (Show::Volume, Some(volume)) = (show, &mut self.volume) {
-            volume.prepare(&self.context, &mut encoder, &self.frame, camera, self.target.size);
+    pub fn draw(&mut self, camera: &Camera, look: &Look) -> Result<bool, GpuError> {
+        self.draw_on(camera, look, 0, None)
+    }
+
+    /// Draws the last picture again from places inside of its pixels a little beside their middles, and shows the mean of all
+    /// such pictures: edges get smooth. Does what [`Renderer::draw`] does; nothing if there is no picture. Anything that was set
+    /// since must be drawn by [`Renderer::draw`] first.
+    ///
+    /// # Errors
+    /// As [`Renderer::draw`].
+    pub fn draw_again(&mut self) -> Result<bool, GpuError> {
+        match self.last.take() {
+            Some((camera, look, count)) => self.draw_on(&camera, &look, count, None),
+            None => Ok(false),
         }
-        self.encode(&mut encoder, &picture.view(), show);
-        self.context.queue.submit([encoder.finish()]);
-        if let Picture::Canvas(texture) = picture {
+    }
+
+    /// How many pictures the one that is shown is the mean of.
+    pub fn drawn(&self) -> u32 {
+        self.last.as_ref().map_or(0, |last| last.2)
+    }
+
+    /// Draws a picture into a view of a texture, for renderers made by [`Renderer::with_device`]. The texture has the size of
+    /// [`Renderer::size`]; call [`Renderer::resize`] when it changes.
+    ///
+    /// # Errors
+    /// As [`Renderer::draw`].
+    pub fn render(&mut self, view: &wgpu::TextureView, camera: &Camera, look: &Look) -> Result<(), GpuError> {
+        self.draw_on(camera, look, 0, Some(view)).map(|_| ())
+    }
+
+    /// Whether the last picture lacked room for all that is not opaque: then it must be drawn again. It is known some time after
+    /// the picture.
+    pub fn is_short(&mut self) -> bool {
+        self.lists.is_short(&self.context)
+    }
+
+    fn draw_on(
+        &mut self,
+        camera: &Camera,
+        look: &Look,
+        count: u32,
+        given: Option<&wgpu::TextureView>,
+    ) -> Result<bool, GpuError> {
+        self.context.check()?;
+        let picture = match given {
+            Some(_) => None,
+            None => match self.target.next(&self.context)? {
+                Some(picture) => Some(picture),
+                None => return Ok(false),
+            },
+        };
+        let own = picture.as_ref().map(Picture::view);
+        let Some(view) = given.or(own.as_ref()) else { return Ok(false) };
+        self.common.write(&self.context, &Frame::new(camera, look, self.target.size, shift(count)));
+        self.encode(view, look, count);
+        if let Some(Picture::Canvas(texture)) = picture {
             self.context.queue.present(texture);
         }
+        self.last = Some((*camera, look.clone(), count + 1));
         self.context.check()?;
         Ok(true)
     }
 
-    fn encode(&self, encoder: &mut wgpu::CommandEncoder, picture: &wgpu::TextureView, show: Show) {
+    /// Draws into `view`, as number `count` of pictures whose mean is shown.
+    fn encode(&mut self, view: &wgpu::TextureView, look: &Look, count: u32) {
+        let descriptor = wgpu::CommandEncoderDescriptor { label: Some("picture") };
+        let mut encoder = self.context.device.create_command_encoder(&descriptor);
+        let has_lists = self.composite.has_volume() || self.surfaces.values().any(Surface::is_listed);
+        let has_composite = has_lists || look.shade[0] > 0.0;
+        if has_composite {
+            self.composite.prepare(&self.context, &self.common, &self.lists, has_lists);
+        }
+        if has_lists {
+            self.list(&mut encoder);
+        }
+        self.opaque(&mut encoder, has_composite);
+        if has_composite {
+            self.over(&mut encoder, look, has_lists);
+        }
+        let images = &self.target.images;
+        self.presenter.present(&self.context, &mut encoder, &self.common, images, count, view);
+        if has_lists {
+            self.lists.copy_count(&mut encoder);
+        }
+        self.context.queue.submit([encoder.finish()]);
+        if has_lists {
+            self.lists.read_count();
+        }
+    }
+
+    /// Fills the lists of what is not opaque.
+    fn list(&mut self, encoder: &mut wgpu::CommandEncoder) {
+        let (context, common) = (&self.context, &self.common);
+        self.surface_pipelines.prepare_lists(context, common, &self.lists.layout);
+        self.wire.prepare_lists(context, common, &self.lists.layout);
+        let mut pass = self.lists.begin(context, encoder, self.target.size);
+        pass.set_bind_group(0, &common.group, &[]);
+        self.composite.list(context, &self.mesh, &mut pass);
+        self.surface_pipelines.draw(&mut pass, self.surfaces.values(), true);
+        self.wire.list(context, &mut pass);
+    }
+
+    /// Draws what is opaque; without a composite after it also the lines over it.
+    fn opaque(&self, encoder: &mut wgpu::CommandEncoder, has_composite: bool) {
+        let images = &self.target.images;
+        let stored = if has_composite { wgpu::StoreOp::Store } else { wgpu::StoreOp::Discard };
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("picture"),
+            label: Some("opaque"),
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: &self.target.samples,
+                view: &images.samples,
                 depth_slice: None,
-                resolve_target: Some(picture),
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
-                    store: wgpu::StoreOp::Discard,
-                },
+                resolve_target: (!has_composite).then_some(&images.resolved),
+                ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT), store: stored },
             })],
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                view: &self.target.depth,
-                depth_ops: Some(wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(1.0),
-                    store: wgpu::StoreOp::Discard,
-                }),
+                view: &images.depth,
+                depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(1.0), store: stored }),
                 stencil_ops: None,
             }),
             ..Default::default()
         });
-        pass.set_bind_group(0, &self.frame.group, &[]);
+        pass.set_bind_group(0, &self.common.group, &[]);
         pass.set_pipeline(&self.background);
         pass.draw(0..3, 0..1);
-        match show {
-            Show::Surface => self.surface.draw(&mut pass),
-            Show::Cutaway => self.cutaway.draw(&mut pass),
-            Show::Volume => self.volume.iter().for_each(|volume| volume.draw(&mut pass)),
+        self.surface_pipelines.draw(&mut pass, self.surfaces.values(), false);
+        if let (true, Some(cells)) = (self.shows_cells, &self.cells) {
+            cells.draw(&self.context, &self.mesh, &mut pass);
         }
-        self.wire.draw(&mut pass);
+        if !has_composite {
+            self.wire.draw(&mut pass, false);
+        }
     }
 
-    /// Reads a headless picture back: `RGBA` bytes, rows from top to bottom.
+    /// Draws what is not opaque over it.
+    fn over(&self, encoder: &mut wgpu::CommandEncoder, look: &Look, has_lists: bool) {
+        let images = &self.target.images;
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("composite"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &images.samples,
+                depth_slice: None,
+                resolve_target: Some(&images.resolved),
+                ops: wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Discard },
+            })],
+            // Only read, so that shaders may read it, too.
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &images.depth,
+                depth_ops: None,
+                stencil_ops: None,
+            }),
+            ..Default::default()
+        });
+        pass.set_bind_group(0, &self.common.group, &[]);
+        let lists = has_lists.then_some(&self.lists);
+        self.composite.draw(&self.context, &self.mesh, lists, &images.depth, look.shade, &mut pass);
+        self.wire.draw(&mut pass, has_lists);
+    }
+
+    /// Draws a picture that is the mean of `samples` pictures, and reads it back: `RGBA` bytes, premultiplied, rows from top to
+    /// bottom. For renderers made by [`Renderer::headless`].
     ///
     /// # Errors
-    /// If the target is a canvas, or the device is lost.
+    /// If the target is no image, or the device is lost or refused something.
+    pub async fn picture(&mut self, camera: &Camera, look: &Look, samples: u32) -> Result<Vec<u8>, GpuError> {
+        loop {
+            self.draw(camera, look)?;
+            // Reading waits until everything before is done, and so the fragments are counted.
+            let first = self.read().await?;
+            if self.is_short() {
+                continue;
+            }
+            if samples <= 1 {
+                return Ok(first);
+            }
+            for _ in 1..samples {
+                self.draw_again()?;
+            }
+            return self.read().await;
+        }
+    }
+
+    /// Reads a headless picture back: `RGBA` bytes, premultiplied, rows from top to bottom.
+    ///
+    /// # Errors
+    /// If the target is no image, or the device is lost.
     pub async fn read(&self) -> Result<Vec<u8>, GpuError> {
         self.target.read(&self.context).await
+    }
+}
+
+/// Where in its pixels picture number `count` looks from: the middle, then evenly spread around it (Halton's sequence of the bases
+/// 2 and 3).
+fn shift(count: u32) -> [f64; 2] {
+    if count == 0 {
+        return [0.0; 2];
+    }
+    [2, 3].map(|base| {
+        let (mut rest, mut digit, mut sum) = (count, 1.0, 0.0);
+        while rest > 0 {
+            digit /= f64::from(base);
+            sum += digit * f64::from(rest % base);
+            rest /= base;
+        }
+        sum - 0.5
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shifts_stay_in_the_pixel_and_are_even() {
+        let all: Vec<_> = (0..64).map(shift).collect();
+        assert_eq!(all[0], [0.0; 2]);
+        assert!(all.iter().flatten().all(|s| (-0.5..0.5).contains(s)));
+        for k in 0..2 {
+            let mean = all.iter().map(|s| s[k]).sum::<f64>() / 64.0;
+            assert!(mean.abs() < 0.02, "{mean}");
+        }
     }
 }

@@ -1,72 +1,165 @@
-//! Draws the lit isosurface.
+//! Draws surfaces of triangles, each with a style of its own.
 
 use crate::gpu::buffers::GrowBuffer;
-use crate::gpu::pipeline::{FrameBinding, PipelineSpec, packed};
+use crate::gpu::pipeline::{Binding, Common, Output, PipelineSpec, group, group_layout, uniform};
+use crate::gpu::style::{Style, StyleUniform};
 use crate::gpu::{Context, GpuError};
-use crate::view::IsoSurface;
-use std::ops::Range;
+use crate::view::{SurfaceChanges, Triangles};
 
+/// The pipelines of all surfaces.
 #[derive(Debug)]
-pub(super) struct SurfacePass {
-    pipeline: wgpu::RenderPipeline,
-    positions: GrowBuffer<[f32; 3]>,
-    normals: GrowBuffer<[f32; 3]>,
-    indices: GrowBuffer<[u32; 3]>,
+pub(super) struct SurfacePipelines {
+    opaque: wgpu::RenderPipeline,
+    listed: Option<wgpu::RenderPipeline>,
+    layout: wgpu::BindGroupLayout,
 }
 
-impl SurfacePass {
-    pub(super) fn new(context: &Context, frame: &FrameBinding, format: wgpu::TextureFormat) -> Self {
-        let attributes = [wgpu::vertex_attr_array![0 => Float32x3], wgpu::vertex_attr_array![1 => Float32x3]];
-        let spec = PipelineSpec {
-            shader: "surface",
-            vertex: "vs",
-            fragment: "fs",
-            buffers: &[packed(&attributes[0]), packed(&attributes[1])],
-            depth: wgpu::CompareFunction::Less,
-            writes_depth: true,
-            blends: false,
-            group: None,
-            is_list: false,
-        };
-        Self {
-            pipeline: spec.create(context, frame, format),
-            positions: GrowBuffer::new("vertices of the isosurface", wgpu::BufferUsages::VERTEX),
-            normals: GrowBuffer::new("normals of the isosurface", wgpu::BufferUsages::VERTEX),
-            indices: GrowBuffer::new("triangles of the isosurface", wgpu::BufferUsages::INDEX),
-        }
+/// One surface.
+#[derive(Debug)]
+pub(super) struct Surface {
+    positions: GrowBuffer<[f32; 3]>,
+    normals: GrowBuffer<[f32; 3]>,
+    values: GrowBuffer<f32>,
+    indices: GrowBuffer<[u32; 3]>,
+    style: Style,
+    uniform: wgpu::Buffer,
+    group: Option<wgpu::BindGroup>,
+}
+
+impl SurfacePipelines {
+    pub(super) fn new(context: &Context, common: &Common) -> Self {
+        use Binding::{Uniform, Vertices};
+        let layout = group_layout(context, "surface", &[Uniform, Vertices, Vertices, Vertices, Vertices]);
+        let spec = spec("fs", &[], Output::Opaque { only_front: false });
+        let groups = [Some(&layout)];
+        let opaque = PipelineSpec { groups: &groups, ..spec }.create(context, common);
+        Self { opaque, listed: None, layout }
     }
 
-    pub(super) fn update(&mut self, context: &Context, surface: &IsoSurface) -> Result<(), GpuError> {
-        // Emptied first: if the vertices do not fit, old triangles must not draw from them.
-        self.indices.write(context, &[])?;
-        self.positions.write(context, &surface.positions)?;
-        self.normals.write(context, &surface.normals)?;
-        self.indices.write(context, &surface.indices)
-    }
-
-    /// The same with what differs from the surface that is there: ranges of vertices and of triangles.
-    pub(super) fn update_ranges(
+    /// Makes what surfaces with opacity take, once.
+    pub(super) fn prepare_lists(
         &mut self,
         context: &Context,
-        surface: &IsoSurface,
-        vertices: &[Range<u32>],
-        triangles: &[Range<u32>],
-    ) -> Result<(), GpuError> {
-        let updated = self.positions.update(context, &surface.positions, vertices);
-        let updated = updated.and_then(|()| self.normals.update(context, &surface.normals, vertices));
-        let updated = updated.and_then(|()| self.indices.update(context, &surface.indices, triangles));
-        // If something does not fit, old triangles must not draw from it.
-        updated.or_else(|error| self.indices.write(context, &[]).and(Err(error)))
+        common: &Common,
+        lists: &wgpu::BindGroupLayout,
+    ) {
+        let groups = [Some(&self.layout), Some(lists)];
+        let spec = spec("fs_list", &groups, Output::List { only_front: false });
+        self.listed.get_or_insert_with(|| spec.create(context, common));
     }
 
-    pub(super) fn draw(&self, pass: &mut wgpu::RenderPass<'_>) {
-        let slices = (self.positions.slice(), self.normals.slice(), self.indices.slice());
-        if let (Some(positions), Some(normals), Some(indices)) = slices {
-            pass.set_pipeline(&self.pipeline);
-            pass.set_vertex_buffer(0, positions);
-            pass.set_vertex_buffer(1, normals);
-            pass.set_index_buffer(indices, wgpu::IndexFormat::Uint32);
-            pass.draw_indexed(0..self.indices.len() as u32 * 3, 0, 0..1);
+    pub(super) fn draw<'a>(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        surfaces: impl Iterator<Item = &'a Surface>,
+        are_listed: bool,
+    ) {
+        let pipeline = if are_listed { self.listed.as_ref() } else { Some(&self.opaque) };
+        let Some(pipeline) = pipeline else { return };
+        pass.set_pipeline(pipeline);
+        for surface in surfaces.filter(|surface| surface.is_listed() == are_listed) {
+            if let Some(group) = &surface.group {
+                pass.set_bind_group(1, group, &[]);
+                pass.draw(0..surface.indices.len() as u32 * 3, 0..1);
+            }
         }
+    }
+}
+
+fn spec<'a>(
+    fragment: &'static str,
+    groups: &'a [Option<&'a wgpu::BindGroupLayout>],
+    output: Output,
+) -> PipelineSpec<'a> {
+    PipelineSpec { shader: "surface", vertex: "vs", fragment, buffers: &[], groups, output }
+}
+
+impl Surface {
+    pub(super) fn new(context: &Context) -> Self {
+        let storage = wgpu::BufferUsages::STORAGE;
+        Self {
+            positions: GrowBuffer::new("vertices of a surface", storage),
+            normals: GrowBuffer::new("normals of a surface", storage),
+            values: GrowBuffer::new("values of a surface", storage),
+            indices: GrowBuffer::new("triangles of a surface", storage),
+            style: Style::default(),
+            uniform: uniform::<StyleUniform>(context, "style"),
+            group: None,
+        }
+    }
+
+    /// Whether it is not opaque.
+    pub(super) fn is_listed(&self) -> bool {
+        self.style.opacity < 1.0
+    }
+
+    pub(super) fn triangles(&self) -> usize {
+        self.indices.len()
+    }
+
+    pub(super) fn set_style(&mut self, context: &Context, style: &Style) {
+        self.style = *style;
+        context.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&StyleUniform::from(style)));
+    }
+
+    /// Makes it these triangles, of which, if `changes` are given, only those differ from the ones that are there.
+    pub(super) fn update(
+        &mut self,
+        context: &Context,
+        pipelines: &SurfacePipelines,
+        triangles: &Triangles<'_>,
+        changes: Option<&SurfaceChanges>,
+    ) -> Result<(), GpuError> {
+        self.group = None;
+        let all = SurfaceChanges::default();
+        let SurfaceChanges { vertices, triangles: changed } = match changes {
+            Some(changes) => changes,
+            None => {
+                self.clear();
+                &all
+            }
+        };
+        self.positions.update(context, triangles.positions, vertices)?;
+        self.normals.update(context, or_one(triangles.normals, &[[0.0; 3]]), vertices)?;
+        self.values.update(context, or_one(triangles.values, &[0.0]), vertices)?;
+        if triangles.inner_sides.is_empty() {
+            self.indices.update(context, triangles.indices, changed)?;
+        } else {
+            let packed: Vec<_> = triangles.indices.iter().zip(triangles.inner_sides).map(packed).collect();
+            self.indices.update(context, &packed, changed)?;
+        }
+        let resources =
+            [self.positions.binding(), self.normals.binding(), self.values.binding(), self.indices.binding()];
+        let [Some(positions), Some(normals), Some(values), Some(indices)] = resources else { return Ok(()) };
+        let resources = [self.uniform.as_entire_binding(), positions, normals, values, indices];
+        self.group = Some(group(context, &pipelines.layout, &resources));
+        Ok(())
+    }
+
+    fn clear(&mut self) {
+        self.positions.clear();
+        self.normals.clear();
+        self.values.clear();
+        self.indices.clear();
+    }
+}
+
+/// A binding is never empty.
+fn or_one<'a, T>(items: &'a [T], one: &'a [T]) -> &'a [T] {
+    if items.is_empty() { one } else { items }
+}
+
+/// The corners of a triangle with a bit at those whose side to the next one is no edge.
+fn packed((triangle, inner): (&[u32; 3], &u8)) -> [u32; 3] {
+    [0, 1, 2].map(|k| triangle[k] | u32::from(inner >> k & 1) << 31)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sides_that_are_no_edges_have_a_bit() {
+        assert_eq!(packed((&[5, 6, 7], &0b010)), [5, 6 | 1 << 31, 7]);
     }
 }

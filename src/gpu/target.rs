@@ -13,14 +13,32 @@ pub(super) struct Target {
     place: Place,
     pub(super) size: [u32; 2],
     pub(super) format: wgpu::TextureFormat,
+    pub(super) images: Images,
+}
+
+/// What a picture is made in.
+#[derive(Debug)]
+pub(super) struct Images {
+    /// Colours and depths of all samples.
     pub(super) samples: wgpu::TextureView,
     pub(super) depth: wgpu::TextureView,
+    /// The colours of pixels; then the mean of several such pictures.
+    pub(super) resolved: wgpu::TextureView,
+    pub(super) mean: wgpu::TextureView,
 }
+
+/// Of the mean of several pictures: fine enough that one picture comes out as it went in.
+pub(super) const MEAN: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
 
 #[derive(Debug)]
 enum Place {
-    Canvas { surface: wgpu::Surface<'static>, configured: bool },
+    Canvas {
+        surface: wgpu::Surface<'static>,
+        configured: bool,
+    },
     Image(wgpu::Texture),
+    /// The caller gives a view for each picture.
+    Given,
 }
 
 /// A picture being drawn.
@@ -62,9 +80,13 @@ impl Target {
         Self::new(context, Place::Image(picture(context, size, format)), size, format)
     }
 
+    /// For pictures in views that the caller gives.
+    pub(super) fn given(context: &Context, size: [u32; 2], format: wgpu::TextureFormat) -> Self {
+        Self::new(context, Place::Given, held(context, size), format)
+    }
+
     fn new(context: &Context, place: Place, size: [u32; 2], format: wgpu::TextureFormat) -> Self {
-        let [samples, depth] = attachments(context, size, format);
-        Self { place, size, format, samples, depth }
+        Self { place, size, format, images: Images::new(context, size, format) }
     }
 
     /// Gives the target another size.
@@ -75,10 +97,11 @@ impl Target {
         }
         match &mut self.place {
             Place::Canvas { configured, .. } => *configured = false,
+            Place::Given => {}
             Place::Image(image) => *image = picture(context, size, self.format),
         }
         self.size = size;
-        [self.samples, self.depth] = attachments(context, size, self.format);
+        self.images = Images::new(context, size, self.format);
     }
 
     /// The next picture; `None` if the target is not available now.
@@ -86,6 +109,7 @@ impl Target {
         let (format, size) = (self.format, self.size);
         let (surface, configured) = match &mut self.place {
             Place::Image(image) => return Ok(Some(Picture::Image(image.clone()))),
+            Place::Given => return Ok(None),
             Place::Canvas { surface, configured } => (surface, configured),
         };
         // A surface that has changed is configured again, once; a second failure is an error.
@@ -182,7 +206,11 @@ fn configure(
         .get_default_config(&context.adapter, width, height)
         .ok_or_else(|| GpuError::NoSurface("this GPU cannot draw on it".to_owned()))?;
     config.format = format;
-    config.alpha_mode = wgpu::CompositeAlphaMode::Opaque;
+    // Pictures with a transparent background are premultiplied; where the canvas cannot show them, it is opaque.
+    let modes = surface.get_capabilities(&context.adapter).alpha_modes;
+    let premultiplied = wgpu::CompositeAlphaMode::PreMultiplied;
+    let is_offered = modes.contains(&premultiplied);
+    config.alpha_mode = if is_offered { premultiplied } else { wgpu::CompositeAlphaMode::Opaque };
     surface.configure(&context.device, &config);
     Ok(())
 }
@@ -198,13 +226,21 @@ fn picture(context: &Context, size: [u32; 2], format: wgpu::TextureFormat) -> wg
     texture(context, "picture", size, format, 1, usage)
 }
 
-/// The multisampled colours and depths.
-fn attachments(context: &Context, size: [u32; 2], format: wgpu::TextureFormat) -> [wgpu::TextureView; 2] {
-    [("samples", format), ("depth", DEPTH)].map(|(label, format)| {
-        let usage = wgpu::TextureUsages::RENDER_ATTACHMENT;
-        let image = texture(context, label, size, format, SAMPLES, usage);
-        image.create_view(&wgpu::TextureViewDescriptor::default())
-    })
+impl Images {
+    fn new(context: &Context, size: [u32; 2], format: wgpu::TextureFormat) -> Self {
+        use wgpu::TextureUsages as Usage;
+        let bound = Usage::RENDER_ATTACHMENT | Usage::TEXTURE_BINDING;
+        let view = |label, format, samples, usage| {
+            let image = texture(context, label, size, format, samples, usage);
+            image.create_view(&wgpu::TextureViewDescriptor::default())
+        };
+        Self {
+            samples: view("samples", format, SAMPLES, Usage::RENDER_ATTACHMENT),
+            depth: view("depth", DEPTH, SAMPLES, bound),
+            resolved: view("resolved", format, 1, bound),
+            mean: view("mean", MEAN, 1, bound),
+        }
+    }
 }
 
 fn texture(

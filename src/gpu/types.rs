@@ -1,38 +1,36 @@
-//! The data that shaders read, in their layout, and the appearance of the picture.
+//! The appearance of the picture, and the uniform of a frame in the layout of the shaders.
 
 use crate::geom::{Bounds, Camera};
-use crate::view::{Colormap, VIRIDIS};
-use glam::DVec3;
+use crate::view::ClipPlane;
+use glam::{DMat4, DVec2, DVec3, DVec4};
+
+/// Most planes that cut what is drawn; the six faces of a box count.
+pub const MOST_CLIPS: usize = 16;
 
 /// The appearance of the picture; colours are sRGB from 0 to 1.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Look {
-    /// The field values at the two ends of the colour map.
-    pub range: [f32; 2],
-    /// The colour map of the cut-away view.
-    pub colormap: Colormap,
-    /// The isosurface, seen from lower values.
-    pub front: [f32; 3],
-    /// The isosurface, seen from higher values.
-    pub back: [f32; 3],
-    /// The background at the top.
-    pub sky: [f32; 3],
-    /// The background at the bottom.
-    pub ground: [f32; 3],
+    /// The background at the top, and its opacity.
+    pub sky: [f32; 4],
+    /// The background at the bottom, and its opacity.
+    pub ground: [f32; 4],
     /// Pixels of the target per unit of the page's layout: widths of lines scale with it.
     pub pixel_ratio: f32,
+    /// What is cut away, where the style of a thing does not say otherwise; the first [`MOST_CLIPS`] count.
+    pub clips: Vec<ClipPlane>,
+    /// How dark places get that hardly any light reaches, 0 to 1; and how far away what hides the light may be, in model
+    /// units.
+    pub shade: [f32; 2],
 }
 
 impl Default for Look {
     fn default() -> Self {
         Self {
-            range: [0.0, 1.0],
-            colormap: VIRIDIS,
-            front: [0.93, 0.70, 0.36],
-            back: [0.38, 0.56, 0.72],
-            sky: [0.075, 0.09, 0.115],
-            ground: [0.27, 0.31, 0.365],
+            sky: [0.075, 0.09, 0.115, 1.0],
+            ground: [0.27, 0.31, 0.365, 1.0],
             pixel_ratio: 1.0,
+            clips: Vec::new(),
+            shade: [0.0, 1.0],
         }
     }
 }
@@ -55,42 +53,60 @@ pub struct BoxLines {
 #[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
 pub(super) struct Frame {
     view_projection: [[f32; 4]; 4],
+    /// Origin and direction of rays: in the middle, and the changes to the right and upper edges.
+    rays: [[f32; 4]; 6],
     eye: [f32; 4],
     key_light: [f32; 4],
     fill_light: [f32; 4],
     up: [f32; 4],
     viewport: [f32; 4],
-    range: [f32; 4],
-    front: [f32; 4],
-    back: [f32; 4],
+    depth: [f32; 4],
     sky: [f32; 4],
     ground: [f32; 4],
-    palette: [[f32; 4]; 16],
+    clips: [[f32; 4]; MOST_CLIPS],
 }
 
 impl Frame {
-    pub(super) fn new(camera: &Camera, look: &Look, [width, height]: [u32; 2]) -> Self {
-        let [w, h] = [width as f32, height as f32];
+    /// `shift` moves the picture by a part of a pixel, to the right and down.
+    pub(super) fn new(camera: &Camera, look: &Look, [width, height]: [u32; 2], shift: [f64; 2]) -> Self {
+        let [w, h] = [f64::from(width), f64::from(height)];
+        let moved = DVec2::new(2.0 * shift[0] / w, -2.0 * shift[1] / h);
+        let matrix = DMat4::from_translation(moved.extend(0.0)) * camera.matrix(w / h);
+        let rays = camera.rays(w / h);
+        let shifted = |[middle, x, y]: [DVec3; 3]| [middle - x * moved.x - y * moved.y, x, y].map(wide);
+        let ([o, ox, oy], [d, dx, dy]) = (shifted(rays.origin), shifted(rays.direction));
         let (right, up, back) = (camera.right(), camera.up(), -camera.forward());
         let light = |x: f64, y: f64, z: f64| wide((right * x + up * y + back * z).normalize());
-        let [low, high] = look.range;
-        let opaque = |c: [f32; 3]| [c[0], c[1], c[2], 1.0];
+        let is_parallel = rays.direction[1] == DVec3::ZERO;
+        let eye = if is_parallel { back.extend(0.0) } else { camera.eye().extend(1.0) };
+        let mut clips = [[0.0; 4]; MOST_CLIPS];
+        for (place, clip) in clips.iter_mut().zip(&look.clips) {
+            let [x, y, z] = clip.normal;
+            *place = [x, y, z, clip.offset];
+        }
+        let count = look.clips.len().min(MOST_CLIPS);
         Self {
-            view_projection: camera.view_projection(f64::from(width) / f64::from(height)).to_cols_array_2d(),
-            eye: wide(camera.eye()),
+            view_projection: matrix.as_mat4().to_cols_array_2d(),
+            rays: [o, ox, oy, d, dx, dy],
+            eye: eye.as_vec4().to_array(),
             // The lights move with the camera: the key from the upper left, the fill from the lower right.
             key_light: light(-0.5, 0.75, 0.8),
             fill_light: light(0.9, -0.25, 0.35),
             up: wide(up),
-            viewport: [w, h, look.pixel_ratio, 0.0],
-            range: [low, if high > low { 1.0 / (high - low) } else { 0.0 }, 0.0, 0.0],
-            front: opaque(look.front),
-            back: opaque(look.back),
-            sky: opaque(look.sky),
-            ground: opaque(look.ground),
-            palette: look.colormap.table::<16>().map(|c| c.map(|b| f32::from(b) / 255.0)),
+            viewport: [width as f32, height as f32, look.pixel_ratio, count as f32],
+            depth: depth_terms(&matrix, rays.origin[0], camera.forward()),
+            sky: look.sky,
+            ground: look.ground,
+            clips,
         }
     }
+}
+
+/// What gives, for a depth `d`, the distance from `origin` along `forward`: `(x − y d) / (z d − w)`.
+fn depth_terms(matrix: &DMat4, origin: DVec3, forward: DVec3) -> [f32; 4] {
+    let at: DVec4 = *matrix * origin.extend(1.0);
+    let slope: DVec4 = *matrix * forward.extend(0.0);
+    [at.z, at.w, slope.w, slope.z].map(|term| term as f32)
 }
 
 /// An instance of the wire shader: a line, or a handle at `from`.
@@ -116,14 +132,15 @@ fn wide(v: DVec3) -> [f32; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::mem::{offset_of, size_of};
+    use crate::geom::Projection;
+    use std::mem::offset_of;
 
     #[test]
     fn twins_have_the_sizes_and_places_that_wgsl_gives_them() {
-        assert_eq!(size_of::<Frame>(), 64 + 10 * 16 + 16 * 16);
-        assert_eq!(offset_of!(Frame, eye), 64);
-        assert_eq!(offset_of!(Frame, viewport), 128);
-        assert_eq!(offset_of!(Frame, palette), 224);
+        assert_eq!(size_of::<Frame>(), 64 + 14 * 16 + MOST_CLIPS * 16);
+        assert_eq!(offset_of!(Frame, eye), 160);
+        assert_eq!(offset_of!(Frame, viewport), 224);
+        assert_eq!(offset_of!(Frame, clips), 288);
         assert_eq!(size_of::<Line>(), 44);
         let places = Line::ATTRIBUTES.map(|a| a.offset as usize);
         let fields =
@@ -132,9 +149,22 @@ mod tests {
     }
 
     #[test]
-    fn a_constant_field_does_not_divide_by_zero() {
-        let camera = Camera::home(&Bounds { min: [0.0; 3], max: [1.0; 3] }, 1.0);
-        let look = Look { range: [3.0, 3.0], ..Look::default() };
-        assert_eq!(Frame::new(&camera, &look, [4, 4]).range, [3.0, 0.0, 0.0, 0.0]);
+    fn depths_give_distances_back() {
+        let bounds = Bounds { min: [0.0; 3], max: [2.0, 1.0, 1.0] };
+        for projection in [Projection::Perspective, Projection::Orthographic] {
+            let mut camera = Camera::home(&bounds, 1.5);
+            camera.set_projection(projection);
+            let frame = Frame::new(&camera, &Look::default(), [150, 100], [0.3, -0.2]);
+            let [x, y, z, w] = frame.depth.map(f64::from);
+            let matrix = camera.matrix(1.5);
+            let start = camera.rays(1.5).origin[0];
+            for along in [0.7, 1.0, 1.4] {
+                let p = start + camera.forward() * along * camera.distance();
+                let clip = matrix * p.extend(1.0);
+                let d = clip.z / clip.w;
+                let found = (x - y * d) / (z * d - w);
+                assert!((found / (along * camera.distance()) - 1.0).abs() < 1e-4, "{projection:?} {along}");
+            }
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::geom::Bounds;
 use crate::gpu::buffers::GrowBuffer;
-use crate::gpu::pipeline::{FrameBinding, PipelineSpec};
+use crate::gpu::pipeline::{Common, Output, PipelineSpec, group, group_layout};
 use crate::gpu::types::Line;
 use crate::gpu::{BoxLines, Context, GpuError};
 use crate::view::gizmo::BoxFace;
@@ -14,39 +14,54 @@ const HANDLE: f32 = 17.0;
 pub(super) struct WirePass {
     hidden: wgpu::RenderPipeline,
     seen: wgpu::RenderPipeline,
+    listed: Option<wgpu::RenderPipeline>,
     dots: wgpu::RenderPipeline,
     lines: GrowBuffer<Line>,
     handles: GrowBuffer<Line>,
 }
 
+/// One line or handle an instance.
+const BUFFERS: [Option<wgpu::VertexBufferLayout<'_>>; 1] = [Some(wgpu::VertexBufferLayout {
+    array_stride: size_of::<Line>() as u64,
+    step_mode: wgpu::VertexStepMode::Instance,
+    attributes: &Line::ATTRIBUTES,
+})];
+
 impl WirePass {
-    pub(super) fn new(context: &Context, frame: &FrameBinding, format: wgpu::TextureFormat) -> Self {
+    pub(super) fn new(context: &Context, common: &Common) -> Self {
         let pipeline = |vertex, fragment, depth| {
-            let buffers = [Some(wgpu::VertexBufferLayout {
-                array_stride: size_of::<Line>() as u64,
-                step_mode: wgpu::VertexStepMode::Instance,
-                attributes: &Line::ATTRIBUTES,
-            })];
-            let spec = PipelineSpec {
-                shader: "wire",
-                vertex,
-                fragment,
-                buffers: &buffers,
-                depth,
-                writes_depth: false,
-                blends: true,
-                group: None,
-                is_list: false,
-            };
-            spec.create(context, frame, format)
+            let output = Output::Over(depth);
+            let spec =
+                PipelineSpec { shader: "wire", vertex, fragment, buffers: &BUFFERS, groups: &[], output };
+            spec.create(context, common)
         };
         Self {
             hidden: pipeline("vs_line", "fs_hidden", wgpu::CompareFunction::Greater),
             seen: pipeline("vs_line", "fs_line", wgpu::CompareFunction::LessEqual),
+            listed: None,
             dots: pipeline("vs_handle", "fs_handle", wgpu::CompareFunction::Always),
             lines: GrowBuffer::new("lines", wgpu::BufferUsages::VERTEX),
             handles: GrowBuffer::new("handles", wgpu::BufferUsages::VERTEX),
         }
+    }
+
+    /// Makes what lines among other things that are not opaque take, once.
+    pub(super) fn prepare_lists(
+        &mut self,
+        context: &Context,
+        common: &Common,
+        lists: &wgpu::BindGroupLayout,
+    ) {
+        let nothing = group_layout(context, "nothing", &[]);
+        let spec = PipelineSpec {
+            shader: "wire",
+            vertex: "vs_line",
+            fragment: "fs_list",
+            buffers: &BUFFERS,
+            groups: &[Some(&nothing), Some(lists)],
+            output: Output::List { only_front: false },
+        };
+        self.listed.get_or_insert_with(|| spec.create(context, common));
     }
 
     pub(super) fn update(&mut self, context: &Context, boxes: &[BoxLines]) -> Result<(), GpuError> {
@@ -56,16 +71,30 @@ impl WirePass {
         self.handles.write(context, &handles)
     }
 
-    pub(super) fn draw(&self, pass: &mut wgpu::RenderPass<'_>) {
-        for (pipeline, items) in
-            [(&self.hidden, &self.lines), (&self.seen, &self.lines), (&self.dots, &self.handles)]
-        {
-            if let Some(slice) = items.slice() {
-                pass.set_pipeline(pipeline);
-                pass.set_vertex_buffer(0, slice);
-                pass.draw(0..6, 0..items.len() as u32);
-            }
+    /// Lists the lines among what is not opaque.
+    pub(super) fn list(&self, context: &Context, pass: &mut wgpu::RenderPass<'_>) {
+        if let Some(pipeline) = &self.listed {
+            let nothing = group_layout(context, "nothing", &[]);
+            pass.set_bind_group(1, &group(context, &nothing, &[]), &[]);
+            draw(pass, pipeline, &self.lines);
         }
+    }
+
+    /// Draws over everything else: lines, unless they have been listed, what of them is hidden, and handles.
+    pub(super) fn draw(&self, pass: &mut wgpu::RenderPass<'_>, are_listed: bool) {
+        draw(pass, &self.hidden, &self.lines);
+        if !are_listed {
+            draw(pass, &self.seen, &self.lines);
+        }
+        draw(pass, &self.dots, &self.handles);
+    }
+}
+
+fn draw(pass: &mut wgpu::RenderPass<'_>, pipeline: &wgpu::RenderPipeline, items: &GrowBuffer<Line>) {
+    if let Some(slice) = items.slice() {
+        pass.set_pipeline(pipeline);
+        pass.set_vertex_buffer(0, slice);
+        pass.draw(0..6, 0..items.len() as u32);
     }
 }
 

@@ -19,6 +19,7 @@ mod solids;
 mod stats;
 mod stream;
 mod ticks;
+mod triangles;
 mod tubes;
 mod volume;
 
@@ -33,13 +34,14 @@ pub use cutaway::{ClipPlane, Cutaway};
 pub use difference::Difference;
 pub use glyphs::{ArrowLength, ArrowOptions};
 pub use iso::{IsoSurface, NormalKind};
-pub use pick::{MediumHit, SurfaceHit, Triangles, first_hit, first_hit_in};
+pub use pick::{MediumHit, SurfaceHit, first_hit, first_hit_in};
 pub use probe::{Place, Probe, Span};
 pub use slice::{Plane, Slice};
 pub use solids::Solids;
 pub use stats::{FieldStats, Histogram};
 pub use stream::{StreamEnd, StreamPoint, Streamline, TraceOptions, Tracer};
 pub use ticks::{Tick, linear_ticks, log_ticks};
+pub use triangles::Triangles;
 pub use tubes::{TubeEnd, TubeOptions};
 pub use volume::{Light, Medium};
 

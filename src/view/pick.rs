@@ -6,21 +6,10 @@
 //! meets several triangles at once takes the first of them.
 
 use crate::geom::Ray;
-use crate::view::{BoundarySurface, ClipPlane, IsoSurface, Medium, MeshView, Place, Probe, Solids, Span};
+use crate::view::{ClipPlane, Medium, MeshView, Place, Probe, Span, Triangles};
 
 /// Halvings of the interval in which half of the light is lost: to the last bits of a number.
 const HALVINGS: u32 = 52;
-
-/// A surface of triangles as slices.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Triangles<'a> {
-    /// Vertices, in model units.
-    pub positions: &'a [[f32; 3]],
-    /// One number a vertex.
-    pub values: &'a [f32],
-    /// Triangles. Those that name a vertex which is not there are left out.
-    pub indices: &'a [[u32; 3]],
-}
 
 /// Where a ray meets a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,24 +37,6 @@ pub struct MediumHit {
     pub value: f64,
 }
 
-impl<'a> From<&'a IsoSurface> for Triangles<'a> {
-    fn from(surface: &'a IsoSurface) -> Self {
-        Self { positions: &surface.positions, values: &surface.values, indices: &surface.indices }
-    }
-}
-
-impl<'a> From<&'a BoundarySurface> for Triangles<'a> {
-    fn from(surface: &'a BoundarySurface) -> Self {
-        Self { positions: &surface.positions, values: &surface.values, indices: &surface.indices }
-    }
-}
-
-impl<'a> From<&'a Solids> for Triangles<'a> {
-    fn from(solids: &'a Solids) -> Self {
-        Self { positions: &solids.positions, values: &solids.values, indices: &solids.indices }
-    }
-}
-
 /// The first point of a surface along a ray, whichever side it shows; points with `normal · p > offset` for
 /// one of the planes are cut away. None if there is none, or the ray is not finite or has no direction. The
 /// direction may have any length.
@@ -81,6 +52,7 @@ impl<'a> From<&'a Solids> for Triangles<'a> {
 ///     positions: &[[0.0, 0.0, 2.0], [1.0, 0.0, 2.0], [0.0, 1.0, 2.0]],
 ///     values: &[0.0, 1.0, 0.0],
 ///     indices: &[[0, 1, 2]],
+///     ..Triangles::default()
 /// };
 /// let ray = Ray { origin: DVec3::new(0.25, 0.25, 0.0), direction: DVec3::Z };
 /// let hit = first_hit(&surface, &ray, &[]).expect("it is in the way");

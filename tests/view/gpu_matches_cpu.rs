@@ -6,8 +6,8 @@ use glam::{DVec2, DVec3};
 use std::pin::pin;
 use std::task::{Context as Task, Poll, Waker};
 use tetralod::geom::{Bounds, Camera};
-use tetralod::gpu::{BoxLines, GpuError, Look, Renderer, Show};
-use tetralod::view::{ClipPlane, Cutaway, IsoSurface, Light, Medium, Probe, VIRIDIS};
+use tetralod::gpu::{BoxLines, CellStyle, Colouring, GpuError, Look, Renderer, SIDES, Style};
+use tetralod::view::{ClipPlane, ColourScale, Cutaway, IsoSurface, Light, Medium, Probe, Triangles, VIRIDIS};
 
 const SIZE: [u32; 2] = [160, 120];
 const UNIT: Bounds = Bounds { min: [0.0; 3], max: [1.0; 3] };
@@ -37,9 +37,8 @@ fn renderer() -> Option<Renderer> {
     }
 }
 
-fn picture(renderer: &mut Renderer, show: Show, camera: &Camera, look: &Look) -> Vec<[f64; 3]> {
-    assert!(renderer.draw(show, camera, look).unwrap());
-    let bytes = wait(renderer.read()).unwrap();
+fn picture(renderer: &mut Renderer, camera: &Camera, look: &Look) -> Vec<[f64; 3]> {
+    let bytes = wait(renderer.picture(camera, look, 1)).unwrap();
     assert_eq!(bytes.len(), renderer.size().iter().product::<u32>() as usize * 4);
     assert!(bytes.chunks_exact(4).all(|p| p[3] == 255), "pictures are opaque");
     bytes.chunks_exact(4).map(|p| [p[0], p[1], p[2]].map(|c| f64::from(c) / 255.0)).collect()
@@ -96,6 +95,10 @@ fn vec(c: [f32; 3]) -> DVec3 {
     DVec3::from(c.map(f64::from))
 }
 
+fn rgb([r, g, b, _]: [f32; 4]) -> DVec3 {
+    vec([r, g, b])
+}
+
 struct Lights {
     key: DVec3,
     fill: DVec3,
@@ -120,12 +123,12 @@ impl Lights {
             + DVec3::new(0.07, 0.065, 0.06).lerp(DVec3::new(0.13, 0.15, 0.18), sky)
     }
 
-    fn surface(&self, hit: &Hit, look: &Look) -> DVec3 {
+    fn surface(&self, hit: &Hit) -> DVec3 {
         let view = (self.eye - hit.place).normalize();
         let normal = hit.data.normalize();
         let outside = normal.dot(view) + if hit.front { 0.2 } else { -0.2 } > 0.0;
         let n = if outside { normal } else { -normal };
-        let albedo = vec(if outside { look.front } else { look.back }).map(decode);
+        let albedo = vec(SIDES[usize::from(!outside)]).map(decode);
         let rim = (1.0 - n.dot(view).abs().min(1.0)).powi(3) * (0.5 + 0.5 * n.dot(self.up));
         let gloss = n.dot((view + self.key).normalize()).max(0.0).powi(50);
         let lit = albedo * self.diffuse(n) + DVec3::new(0.75, 0.85, 1.0) * (0.16 * rim) + 0.16 * gloss;
@@ -135,7 +138,7 @@ impl Lights {
 
 fn background(look: &Look, row: usize, rows: usize) -> DVec3 {
     let t = (row as f64 + 0.5) / rows as f64;
-    vec(look.sky).lerp(vec(look.ground), t * t * (3.0 - 2.0 * t))
+    rgb(look.sky).lerp(rgb(look.ground), t * t * (3.0 - 2.0 * t))
 }
 
 /// Compares the picture with `expected`, which says `None` where it cannot tell (close to a side, where samples of
@@ -199,7 +202,7 @@ fn the_lit_isosurface_matches_the_ray_caster() {
     for (value, turn) in [(0.3, 0.0), (-0.15, 0.8)] {
         let mut surface = IsoSurface::new();
         surface.extract(&scene.view(), value);
-        renderer.set_surface(&surface).unwrap();
+        renderer.set_surface(0, &Triangles::from(&surface), None).unwrap();
         let mut camera = Camera::home(&UNIT, aspect());
         camera.orbit(turn, -0.1);
         let triangles: Vec<_> = surface
@@ -211,13 +214,13 @@ fn the_lit_isosurface_matches_the_ray_caster() {
             })
             .collect();
         let lights = Lights::of(&camera);
-        let pixels = picture(&mut renderer, Show::Surface, &camera, &look);
+        let pixels = picture(&mut renderer, &camera, &look);
         let (hits, misses) = (std::cell::Cell::new(0), std::cell::Cell::new(0));
         let compared = compare(&pixels, |screen, row| {
             Some(match steady(&triangles, &camera, screen)? {
                 Some(hit) => {
                     hits.set(hits.get() + 1);
-                    lights.surface(&hit, &look)
+                    lights.surface(&hit)
                 }
                 None => {
                     misses.set(misses.get() + 1);
@@ -234,10 +237,17 @@ fn the_lit_isosurface_matches_the_ray_caster() {
 fn the_cutaway_matches_the_ray_caster() {
     let Some(mut renderer) = renderer() else { return };
     let scene = Scene::ball(2);
-    let look = Look { range: [-0.8, 1.0], ..Look::default() };
+    let look = Look::default();
     let mut cutaway = Cutaway::new();
-    cutaway.cut(&scene.view(), &ClipPlane { normal: [1.0, 0.4, 0.0], offset: 0.7 });
-    renderer.set_cutaway(&cutaway).unwrap();
+    let cut = ClipPlane { normal: [1.0, 0.4, 0.0], offset: 0.7 };
+    cutaway.cut(&scene.view(), &cut);
+    let scale = ColourScale::new(VIRIDIS, [-0.8, 1.0]).unwrap();
+    let cells = CellStyle::default();
+    let style = Style { colouring: Colouring::Scale(scale), ..cells.style };
+    renderer.set_cells(Some(&CellStyle { style, cut, ..cells }));
+    assert!(renderer.wants_mesh());
+    renderer.update_mesh(&scene.view(), None).unwrap();
+    assert!(!renderer.wants_mesh());
     let camera = Camera::home(&UNIT, aspect());
     let triangles: Vec<_> = cutaway
         .positions
@@ -249,7 +259,7 @@ fn the_cutaway_matches_the_ray_caster() {
         })
         .collect();
     let lights = Lights::of(&camera);
-    let pixels = picture(&mut renderer, Show::Cutaway, &camera, &look);
+    let pixels = picture(&mut renderer, &camera, &look);
     let compared = compare(&pixels, |screen, row| {
         let Some(hit) = steady(&triangles, &camera, screen)? else {
             return Some(background(&look, row, SIZE[1] as usize));
@@ -260,8 +270,7 @@ fn the_cutaway_matches_the_ray_caster() {
         }
         let [a, b, c] = triangles[hit.triangle].corners;
         let n = (b - a).cross(c - a).normalize();
-        let fraction = (hit.data.x - f64::from(look.range[0])) / f64::from(look.range[1] - look.range[0]);
-        let colour = vec(VIRIDIS.at(fraction as f32)).map(decode);
+        let colour = vec(scale.colour(hit.data.x)).map(decode);
         Some((colour * (DVec3::splat(0.62) + 0.55 * lights.diffuse(n))).map(encode))
     });
     assert!(compared > 8000, "only {compared} pixels were certain");
@@ -279,7 +288,7 @@ fn lines_and_handles_are_where_the_camera_puts_them() {
     let look = Look::default();
     let roi = BoxLines { bounds: UNIT, colour: [1.0, 0.2, 0.1, 1.0], width: 2.0, handles: true };
     renderer.set_boxes(&[roi]).unwrap();
-    let pixels = picture(&mut renderer, Show::Surface, &camera, &look);
+    let pixels = picture(&mut renderer, &camera, &look);
     let at = |p: DVec3| {
         let screen = camera.project(p, aspect()).unwrap();
         let x = ((screen.x + 1.0) / 2.0 * f64::from(SIZE[0])) as usize;
@@ -298,7 +307,7 @@ fn lines_and_handles_are_where_the_camera_puts_them() {
     let coloured = pixels.iter().filter(|p| red(**p) > 0.1).count();
     assert!((700..4000).contains(&coloured), "{coloured} coloured pixels");
     renderer.set_boxes(&[]).unwrap();
-    let empty = picture(&mut renderer, Show::Surface, &camera, &look);
+    let empty = picture(&mut renderer, &camera, &look);
     assert_eq!(empty.iter().filter(|p| red(**p) > 0.05).count(), 0);
 }
 
@@ -307,23 +316,28 @@ fn pictures_are_repeatable_and_follow_the_size() {
     let Some(mut renderer) = renderer() else { return };
     let mut surface = IsoSurface::new();
     surface.extract(&Scene::ball(5).view(), 0.2);
-    renderer.set_surface(&surface).unwrap();
+    renderer.set_surface(0, &Triangles::from(&surface), None).unwrap();
     let camera = Camera::home(&UNIT, aspect());
-    let first = picture(&mut renderer, Show::Surface, &camera, &Look::default());
+    let first = picture(&mut renderer, &camera, &Look::default());
     renderer.resize([33, 200]);
     assert_eq!(renderer.size(), [33, 200]);
-    let narrow = picture(&mut renderer, Show::Surface, &camera, &Look::default());
+    let narrow = picture(&mut renderer, &camera, &Look::default());
     assert_eq!(narrow.len(), 33 * 200);
     renderer.resize([0, u32::MAX]);
     let [width, height] = renderer.size();
     assert!(width == 1 && (2048..=1 << 20).contains(&height));
     renderer.resize(SIZE);
-    assert_eq!(picture(&mut renderer, Show::Surface, &camera, &Look::default()), first);
+    assert_eq!(picture(&mut renderer, &camera, &Look::default()), first);
     // An empty surface leaves the background.
     surface.extract(&Scene::ball(5).view(), 7.0);
-    renderer.set_surface(&surface).unwrap();
-    let empty = picture(&mut renderer, Show::Surface, &camera, &Look::default());
+    renderer.set_surface(0, &Triangles::from(&surface), None).unwrap();
+    let empty = picture(&mut renderer, &camera, &Look::default());
     assert!(empty.iter().all(|p| (p[0] - p[2]).abs() < 0.2) && empty != first);
+}
+
+fn plain() -> Look {
+    let colour = [0.2, 0.3, 0.4, 1.0];
+    Look { sky: colour, ground: colour, ..Look::default() }
 }
 
 /// The largest difference of a channel between the picture of the renderer and that of the slow twin, over all pixels.
@@ -334,11 +348,12 @@ fn volume_difference(
     camera: &Camera,
     name: &str,
 ) -> f64 {
-    let look = Look { sky: [0.2, 0.3, 0.4], ground: [0.2, 0.3, 0.4], ..Look::default() };
-    renderer.set_volume(&scene.view(), medium).unwrap();
+    let look = plain();
+    renderer.set_volume(Some((medium, u32::MAX))).unwrap();
+    renderer.update_mesh(&scene.view(), None).unwrap();
     let eye = Probe::new(scene.view()).locate(camera.eye().into());
     renderer.set_eye(&scene.view(), eye.as_ref());
-    let found = picture(renderer, Show::Volume, camera, &look);
+    let found = picture(renderer, camera, &look);
     let twin = medium.picture(scene.view(), camera, SIZE);
     if let Some(folder) = std::env::var_os("TETRALOD_PICTURES") {
         save(&std::path::Path::new(&folder).join(format!("{name}.ppm")), &found);

@@ -86,7 +86,8 @@ fn planes_cut_hits_away() {
     let square = |z: f32| [[-1.0, -1.0, z], [3.0, -1.0, z], [-1.0, 3.0, z]];
     let positions: Vec<[f32; 3]> = [1.0, 2.0, 3.0].into_iter().flat_map(square).collect();
     let indices = [[0, 1, 2], [3, 4, 5], [6, 8, 7]];
-    let surface = Triangles { positions: &positions, values: &[1.0; 9], indices: &indices };
+    let surface =
+        Triangles { positions: &positions, values: &[1.0; 9], indices: &indices, ..Triangles::default() };
     let ray = Ray { origin: DVec3::ZERO, direction: DVec3::Z };
     let first =
         |planes: &[ClipPlane]| first_hit(&surface, &ray, planes).map(|hit| (hit.triangle, hit.distance));
@@ -106,7 +107,8 @@ fn planes_cut_hits_away() {
 fn bad_rays_and_surfaces_are_not_hit() {
     let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [f32::NAN; 3], [0.0, 1.0, 1.0]];
     let indices = [[0, 1, 9], [0, 1, 2], [0, 0, 1], [0, 1, 3]];
-    let surface = Triangles { positions: &positions, values: &[1.0], indices: &indices };
+    let surface =
+        Triangles { positions: &positions, values: &[1.0], indices: &indices, ..Triangles::default() };
     let ray = Ray { origin: DVec3::new(0.2, 0.2, 0.0), direction: DVec3::Z };
     let hit = first_hit(&surface, &ray, &[]).expect("the last one is sound");
     assert!(hit.triangle == 3 && hit.value.is_nan(), "too few values");

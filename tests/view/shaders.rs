@@ -28,22 +28,31 @@ fn the_frame_has_the_layout_that_its_twin_has() {
         let Some((_, frame)) = found else { panic!("{name} lost the frame") };
         let naga::TypeInner::Struct { members, span } = &frame.inner else { panic!("{name}: no struct") };
         let places: Vec<_> = members.iter().map(|m| (m.name.clone().unwrap_or_default(), m.offset)).collect();
-        let expected = [
-            ("view_projection", 0),
-            ("eye", 64),
-            ("key_light", 80),
-            ("fill_light", 96),
-            ("up", 112),
-            ("viewport", 128),
-            ("range", 144),
-            ("front", 160),
-            ("back", 176),
-            ("sky", 192),
-            ("ground", 208),
-            ("palette", 224),
+        let names = [
+            "view_projection",
+            "origin",
+            "origin_x",
+            "origin_y",
+            "direction",
+            "direction_x",
+            "direction_y",
+            "eye",
+            "key_light",
+            "fill_light",
+            "up",
+            "viewport",
+            "depth",
+            "sky",
+            "ground",
+            "clips",
         ];
-        assert_eq!(places, expected.map(|(name, offset)| (name.to_owned(), offset)), "{name}");
-        assert_eq!(*span, 480, "{name}");
+        // A matrix of four vectors, then a vector each.
+        let expected =
+            names.iter().enumerate().map(|(i, name)| (*name, if i == 0 { 0 } else { 48 + 16 * i as u32 }));
+        let expected: Vec<_> = expected.collect();
+        let expected: Vec<_> = expected.iter().map(|(name, offset)| ((*name).to_owned(), *offset)).collect();
+        assert_eq!(places, expected, "{name}");
+        assert_eq!(*span, 544, "{name}");
     }
 }
 

@@ -1,55 +1,65 @@
-// What all shaders share: the values of a frame, and how light falls. Colours are linear until `encode`.
+// What all shaders share: the values of a frame. Twin: `Frame` in `gpu/types.rs`.
 
 struct Frame {
     view_projection: mat4x4f,
-    // Where the camera is (w unused).
+    // The ray of the pixel at (x, y), from -1 to 1, upwards: it starts at origin + x origin_x + y origin_y and goes
+    // along the same sum of directions (w unused).
+    origin: vec4f,
+    origin_x: vec4f,
+    origin_y: vec4f,
+    direction: vec4f,
+    direction_x: vec4f,
+    direction_y: vec4f,
+    // Where the camera is and 1; for parallel rays the direction towards it and 0.
     eye: vec4f,
     // Directions towards the two lights, and up on the screen (w unused).
     key_light: vec4f,
     fill_light: vec4f,
     up: vec4f,
-    // Width and height in pixels, and pixels per unit of the page's layout (w unused).
+    // Width and height in pixels, pixels per unit of the page's layout, the number of clip planes.
     viewport: vec4f,
-    // Smallest value of the field, one over its range (z, w unused).
-    range: vec4f,
-    // Front and back of the isosurface, the screen's top and bottom: sRGB (w unused).
-    front: vec4f,
-    back: vec4f,
+    // Distance from the rays' origins along the middle direction, for depth d: (x - y d) / (z d - w).
+    depth: vec4f,
+    // The screen's top and bottom: sRGB and opacity.
     sky: vec4f,
     ground: vec4f,
-    // Sixteen evenly spaced colours of the colour map: sRGB (w unused).
-    palette: array<vec4f, 16>,
+    // Points with xyz . p > w are cut away.
+    clips: array<vec4f, 16>,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;
+
+struct Ray {
+    origin: vec3f,
+    // Of length 1.
+    direction: vec3f,
+}
 
 // Corner `i` of one triangle over the whole screen.
 fn over_screen(i: u32, depth: f32) -> vec4f {
     return vec4f(select(-1.0, 3.0, i == 1u), select(-1.0, 3.0, i == 2u), depth, 1.0);
 }
 
-fn decode(c: vec3f) -> vec3f {
-    return select(pow((c + 0.055) / 1.055, vec3f(2.4)), c / 12.92, c <= vec3f(0.04045));
+// The ray through the middle of a pixel.
+fn ray_of(pixel: vec2f) -> Ray {
+    let at = (floor(pixel) + 0.5) / frame.viewport.xy * vec2f(2.0, -2.0) + vec2f(-1.0, 1.0);
+    let origin = frame.origin.xyz + at.x * frame.origin_x.xyz + at.y * frame.origin_y.xyz;
+    let direction = frame.direction.xyz + at.x * frame.direction_x.xyz + at.y * frame.direction_y.xyz;
+    return Ray(origin, normalize(direction));
 }
 
-fn encode(linear: vec3f) -> vec3f {
-    let c = clamp(linear, vec3f(0.0), vec3f(1.0));
-    return select(1.055 * pow(c, vec3f(1.0 / 2.4)) - 0.055, c * 12.92, c <= vec3f(0.0031308));
+// The direction from a point towards the eye.
+fn towards_eye(position: vec3f) -> vec3f {
+    return normalize(frame.eye.xyz - position * frame.eye.w);
 }
 
-// A soft key light and a cool fill light; `wrap` lets light reach around the terminator.
-fn diffuse(n: vec3f) -> vec3f {
-    let key = max((dot(n, frame.key_light.xyz) + 0.3) / 1.3, 0.0);
-    let fill = max((dot(n, frame.fill_light.xyz) + 0.5) / 1.5, 0.0);
-    let sky = 0.5 + 0.5 * dot(n, frame.up.xyz);
-    return vec3f(1.0, 0.97, 0.92) * (0.82 * key * key)
-        + vec3f(0.62, 0.74, 0.95) * (0.28 * fill)
-        + mix(vec3f(0.07, 0.065, 0.06), vec3f(0.13, 0.15, 0.18), sky);
-}
-
-// The colour of the map at a value of the field: linear.
-fn mapped(value: f32) -> vec3f {
-    let place = clamp((value - frame.range.x) * frame.range.y, 0.0, 1.0) * 15.0;
-    let below = min(u32(place), 14u);
-    return decode(mix(frame.palette[below].rgb, frame.palette[below + 1u].rgb, place - f32(below)));
+// Whether one of the clip planes whose bit is set in `mask` cuts a point away.
+fn is_clipped(position: vec3f, mask: u32) -> bool {
+    for (var i = 0u; i < u32(frame.viewport.w); i += 1u) {
+        let plane = frame.clips[i];
+        if (mask >> i & 1u) == 1u && dot(plane.xyz, position) > plane.w {
+            return true;
+        }
+    }
+    return false;
 }

@@ -1,4 +1,14 @@
-// The lit isosurface, both sides.
+// Triangles of a surface: isosurfaces, slices, boundaries, tubes, arrows. Corners are read from buffers, so that each
+// triangle knows its sides.
+
+// Three numbers a vertex.
+@group(1) @binding(1) var<storage, read> positions: array<f32>;
+@group(1) @binding(2) var<storage, read> normals: array<f32>;
+@group(1) @binding(3) var<storage, read> values: array<f32>;
+// Three corners a triangle; the top bit of corner k says that the side from it to the next one is no edge.
+@group(1) @binding(4) var<storage, read> indices: array<u32>;
+
+const IS_INNER = 0x80000000u;
 
 // Interpolated inside of the triangle also where it covers the pixel only in part: outside of a sliver the normal may
 // be anything.
@@ -6,27 +16,62 @@ struct Vertex {
     @builtin(position) clip: vec4f,
     @location(0) @interpolate(perspective, centroid) position: vec3f,
     @location(1) @interpolate(perspective, centroid) normal: vec3f,
+    @location(2) @interpolate(perspective, centroid) value: f32,
+    @location(3) @interpolate(flat) face: vec3f,
+    @location(4) sides: vec3f,
+}
+
+fn three(v: u32) -> vec3f {
+    return vec3f(positions[3u * v], positions[3u * v + 1u], positions[3u * v + 2u]);
 }
 
 @vertex
-fn vs(@location(0) position: vec3f, @location(1) normal: vec3f) -> Vertex {
-    return Vertex(frame.view_projection * vec4f(position, 1.0), position, normal);
+fn vs(@builtin(vertex_index) i: u32) -> Vertex {
+    let first = i - i % 3u;
+    let packed = vec3u(indices[first], indices[first + 1u], indices[first + 2u]);
+    let corners = packed & vec3u(~IS_INNER);
+    let p = array<vec3f, 3>(three(corners.x), three(corners.y), three(corners.z));
+    let v = corners[i % 3u];
+    // A side that is no edge is never near: the corner opposite to it has 1 everywhere.
+    let is_corner = vec3f(f32(i % 3u == 0u), f32(i % 3u == 1u), f32(i % 3u == 2u));
+    let inner = (packed.yzx & vec3u(IS_INNER)) != vec3u(0u);
+    var normal = vec3f(0.0);
+    if style.shape.y == 0.0 {
+        normal = vec3f(normals[3u * v], normals[3u * v + 1u], normals[3u * v + 2u]);
+    }
+    var value = 0.0;
+    if style.back.w > 0.0 {
+        value = values[v];
+    }
+    let position = p[i % 3u];
+    return Vertex(
+        frame.view_projection * vec4f(position, 1.0),
+        position,
+        normal,
+        value,
+        cross(p[1] - p[0], p[2] - p[0]),
+        select(is_corner, vec3f(1.0), inner),
+    );
+}
+
+fn seen(in: Vertex) -> Seen {
+    return Seen(in.position, in.normal, in.face, in.value, in.sides, fwidth(in.sides));
 }
 
 @fragment
-fn fs(in: Vertex, @builtin(front_facing) front: bool) -> @location(0) vec4f {
-    let view = normalize(frame.eye.xyz - in.position);
-    let smooth_normal = normalize(in.normal);
-    // The normal tells which side is seen, the triangle only where the normal is undecided: slivers, of which marching
-    // tetrahedra make many, may face anywhere.
-    let outside = dot(smooth_normal, view) + select(-0.2, 0.2, front) > 0.0;
-    let n = select(-smooth_normal, smooth_normal, outside);
-    let albedo = decode(select(frame.back.rgb, frame.front.rgb, outside));
-    // Interpolated normals may look away a little at silhouettes: no more light there than at the very edge.
-    let facing = min(abs(dot(n, view)), 1.0);
-    let rim = pow(1.0 - facing, 3.0) * (0.5 + 0.5 * dot(n, frame.up.xyz));
-    let half_way = normalize(view + frame.key_light.xyz);
-    let gloss = pow(max(dot(n, half_way), 0.0), 50.0);
-    let lit = albedo * diffuse(n) + vec3f(0.75, 0.85, 1.0) * (0.16 * rim) + vec3f(0.16 * gloss);
-    return vec4f(encode(lit), 1.0);
+fn fs(in: Vertex) -> @location(0) vec4f {
+    let what = seen(in);
+    if is_clipped(in.position, style.clips.x) {
+        discard;
+    }
+    return vec4f(shaded(what).rgb, 1.0);
+}
+
+@fragment
+fn fs_list(in: Vertex) -> @location(0) vec4f {
+    let colour = shaded(seen(in));
+    if !is_clipped(in.position, style.clips.x) {
+        append_colour(in.clip, in.position, vec4f(colour.rgb * colour.a, colour.a));
+    }
+    return vec4f(0.0);
 }

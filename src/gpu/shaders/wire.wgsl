@@ -7,6 +7,8 @@ struct Vertex {
     // Pixels across the line, or from the handle's middle.
     @location(1) offset: vec2f,
     @location(2) @interpolate(flat) radius: f32,
+    // In model units.
+    @location(3) position: vec3f,
 }
 
 // Corners of the quadrilateral's two triangles: x along (0 or 1), y across (-1 or 1).
@@ -21,13 +23,10 @@ fn shifted(clip: vec4f, pixels: vec2f) -> vec4f {
     return vec4f(clip.xy + pixels * 2.0 * clip.w / frame.viewport.xy, clip.z - 2e-5 * clip.w, clip.w);
 }
 
-// The end of a line, moved along it to the near side of the camera's plane.
-fn in_front(end: vec4f, other: vec4f) -> vec4f {
+// How far an end of a line is moved along it, to the near side of the camera's plane; 0 to 1.
+fn moved(end: vec4f, other: vec4f) -> f32 {
     let nearest = 1e-4 * max(abs(end.w), abs(other.w));
-    if end.w >= nearest || other.w <= nearest {
-        return end;
-    }
-    return mix(end, other, (nearest - end.w) / (other.w - end.w));
+    return select((nearest - end.w) / (other.w - end.w), 0.0, end.w >= nearest || other.w <= nearest);
 }
 
 @vertex
@@ -40,8 +39,9 @@ fn vs_line(
 ) -> Vertex {
     let first = frame.view_projection * vec4f(from_point, 1.0);
     let second = frame.view_projection * vec4f(to_point, 1.0);
-    let a = in_front(first, second);
-    let b = in_front(second, first);
+    let at = vec2f(moved(first, second), 1.0 - moved(second, first));
+    let a = mix(first, second, at.x);
+    let b = mix(first, second, at.y);
     let along = (b.xy / b.w - a.xy / a.w) * frame.viewport.xy;
     let direction = select(vec2f(1.0, 0.0), normalize(along), dot(along, along) > 1e-12);
     let radius = 0.5 * width * frame.viewport.z;
@@ -49,7 +49,8 @@ fn vs_line(
     let reach = radius + 1.0;
     let c = corner(i);
     let across = vec2f(-direction.y, direction.x) * c.y * reach;
-    return Vertex(shifted(select(a, b, c.x > 0.5), across), colour, vec2f(0.0, c.y * reach), radius);
+    let position = mix(from_point, to_point, mix(at.x, at.y, c.x));
+    return Vertex(shifted(select(a, b, c.x > 0.5), across), colour, vec2f(0.0, c.y * reach), radius, position);
 }
 
 @vertex
@@ -62,12 +63,21 @@ fn vs_handle(
     let radius = 0.5 * width * frame.viewport.z;
     let c = corner(i);
     let offset = vec2f(c.x * 2.0 - 1.0, c.y) * (radius + 1.0);
-    return Vertex(shifted(frame.view_projection * vec4f(middle, 1.0), offset), colour, offset, radius);
+    return Vertex(shifted(frame.view_projection * vec4f(middle, 1.0), offset), colour, offset, radius, middle);
 }
 
 @fragment
 fn fs_line(in: Vertex) -> @location(0) vec4f {
     return in.colour * clamp(in.radius + 0.5 - abs(in.offset.y), 0.0, 1.0);
+}
+
+@fragment
+fn fs_list(in: Vertex) -> @location(0) vec4f {
+    let colour = in.colour * clamp(in.radius + 0.5 - abs(in.offset.y), 0.0, 1.0);
+    if colour.a > 0.0 {
+        append_colour(in.clip, in.position, colour);
+    }
+    return vec4f(0.0);
 }
 
 // Hidden parts of lines shine through a little.

@@ -1,0 +1,81 @@
+//! Brings finished pictures to where they are seen: adds each to the mean of those before, and shows the mean.
+
+use crate::gpu::Context;
+use crate::gpu::pipeline::{Binding, Common, Output, PipelineSpec, group, group_layout};
+use crate::gpu::target::{Images, MEAN};
+
+#[derive(Debug)]
+pub(super) struct Presenter {
+    mean: wgpu::RenderPipeline,
+    shown: wgpu::RenderPipeline,
+    layout: wgpu::BindGroupLayout,
+    sampler: wgpu::Sampler,
+}
+
+impl Presenter {
+    pub(super) fn new(context: &Context, common: &Common) -> Self {
+        let layout = group_layout(context, "present", &[Binding::Picture, Binding::Sampler]);
+        let groups = [Some(&layout)];
+        let pipeline = |output| {
+            let spec = PipelineSpec {
+                shader: "present",
+                vertex: "vs",
+                fragment: "fs",
+                buffers: &[],
+                groups: &groups,
+                output,
+            };
+            spec.create(context, common)
+        };
+        let sampler = context.device.create_sampler(&wgpu::SamplerDescriptor {
+            label: Some("smooth"),
+            mag_filter: wgpu::FilterMode::Linear,
+            min_filter: wgpu::FilterMode::Linear,
+            ..Default::default()
+        });
+        Self {
+            mean: pipeline(Output::Mean(MEAN)),
+            shown: pipeline(Output::Whole(common.format)),
+            layout,
+            sampler,
+        }
+    }
+
+    /// Adds the picture to the mean of `count` pictures before it, and shows the mean on `target`.
+    pub(super) fn present(
+        &self,
+        context: &Context,
+        encoder: &mut wgpu::CommandEncoder,
+        common: &Common,
+        images: &Images,
+        count: u32,
+        target: &wgpu::TextureView,
+    ) {
+        let load =
+            if count == 0 { wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT) } else { wgpu::LoadOp::Load };
+        let clear = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
+        let steps =
+            [(&self.mean, &images.resolved, &images.mean, load), (&self.shown, &images.mean, target, clear)];
+        let weight = 1.0 / f64::from(count + 1);
+        for (pipeline, from, to, load) in steps {
+            let resources =
+                [wgpu::BindingResource::TextureView(from), wgpu::BindingResource::Sampler(&self.sampler)];
+            let ops = wgpu::Operations { load, store: wgpu::StoreOp::Store };
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some("present"),
+                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                    view: to,
+                    depth_slice: None,
+                    resolve_target: None,
+                    ops,
+                })],
+                ..Default::default()
+            });
+            pass.set_pipeline(pipeline);
+            pass.set_blend_constant(wgpu::Color { r: weight, g: weight, b: weight, a: weight });
+            pass.set_bind_group(0, &common.group, &[]);
+            pass.set_bind_group(1, &group(context, &self.layout, &resources), &[]);
+            pass.draw(0..3, 0..1);
+        }
+    }
+}

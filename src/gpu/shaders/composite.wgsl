@@ -1,0 +1,379 @@
+// What is not opaque, in exact order along the ray of each pixel, over what is: the volume, surfaces with opacity, and
+// shade where light hardly comes. Twin of the volume: `view/volume.rs`.
+//
+// The ray enters tetrahedra at the faces of the boundary that are listed for the pixel, nearest first, and goes on from
+// neighbour to neighbour. A tetrahedron takes five numbers: its four neighbours, in ascending order of the points opposite
+// the faces to them, and the exclusive or of its points. The ray knows the three points of the face through which it
+// enters, so that gives the fourth.
+
+@group(1) @binding(0) var<storage, read> points: array<vec4f>;
+// Of the boundary: three points, and the tetrahedron behind.
+@group(1) @binding(1) var<storage, read> faces: array<vec4u>;
+@group(1) @binding(2) var<storage, read> tets: array<u32>;
+// At evenly spaced values: colour and extinction; then the integrals up to the value of colour times extinction, and of
+// extinction.
+@group(1) @binding(3) var<storage, read> medium: array<vec4f>;
+// See `fragments.wgsl`.
+@group(1) @binding(4) var<storage, read> heads: array<u32>;
+@group(1) @binding(5) var<storage, read> nodes: array<u32>;
+@group(1) @binding(6) var<uniform> settings: Settings;
+@group(1) @binding(7) var depths: texture_depth_multisampled_2d;
+
+// Twin: `Settings` in `gpu/composite.rs`.
+struct Settings {
+    // First value of the table, values between two entries, number of entries (0 without a volume; w unused).
+    table: vec4f,
+    // If the eye is in a tetrahedron: its points; its number, or NONE, and the bits of the value at the eye; the clip
+    // planes that apply to the volume, a bit each (w unused).
+    corners: vec4u,
+    start: vec4u,
+    // Of the shade: strength, radius in model units (z, w unused).
+    shade: vec4f,
+}
+
+const NONE = 0xffffffffu;
+const IS_COLOUR = 0x80000000u;
+const FAR = 1e30;
+// Largest optical depth of a piece in which colours are mixed by their share alone.
+const PIECE_DEPTH = 0.25;
+const MOST_PIECES = 64.0;
+// What is behind so much does not change a picture of eight bits.
+const DARK = 0.002;
+
+// A surface with opacity on the ray.
+struct Layer {
+    distance: f32,
+    colour: u32,
+}
+
+// What has been seen of the ray so far.
+var<private> colour: vec3f;
+var<private> transmittance: f32;
+// The pixel's list, the next layer in it, and the distance of what is opaque.
+var<private> head: u32;
+var<private> layer: Layer;
+var<private> opaque: f32;
+// The part of the ray that is not cut away.
+var<private> limits: vec2f;
+
+fn at(value: f32) -> vec4f {
+    let last = settings.table.z - 1.0;
+    let place = clamp((value - settings.table.x) / settings.table.y, 0.0, last);
+    let below = min(u32(place), u32(last) - 1u);
+    return mix(medium[below], medium[below + 1u], place - f32(below));
+}
+
+// The integrals up to a value.
+fn integral(value: f32) -> vec4f {
+    let count = u32(settings.table.z);
+    let last = settings.table.z - 1.0;
+    let place = (value - settings.table.x) / settings.table.y;
+    let held = clamp(place, 0.0, last);
+    let below = min(u32(held), count - 2u);
+    let t = held - f32(below);
+    let low = emitted(medium[below]);
+    let step = emitted(medium[below + 1u]) - low;
+    let inside = medium[count + below] + settings.table.y * t * (low + 0.5 * t * step);
+    // Beyond the ends the medium is constant.
+    return inside + settings.table.y * (place - held) * emitted(at(value));
+}
+
+fn emitted(entry: vec4f) -> vec4f {
+    return vec4f(entry.rgb * entry.a, entry.a);
+}
+
+// The mean of emission and extinction between two values.
+fn mean(low: f32, high: f32) -> vec4f {
+    // Integrals of nearly the same values differ by less than they are rounded.
+    if abs(high - low) < settings.table.y {
+        return 0.5 * (emitted(at(low)) + emitted(at(high)));
+    }
+    return (integral(high) - integral(low)) / (high - low);
+}
+
+// Lays a premultiplied colour behind what has been seen.
+fn behind(premultiplied: vec3f, through: f32) {
+    colour += transmittance * premultiplied;
+    transmittance *= through;
+}
+
+// A piece of the ray in the volume, between two values.
+fn piece(low: f32, high: f32, length: f32) {
+    let whole = mean(low, high).a * length;
+    if whole <= 0.0 {
+        return;
+    }
+    let pieces = clamp(ceil(whole / PIECE_DEPTH), 1.0, MOST_PIECES);
+    var from_value = low;
+    for (var i = 1.0; i <= pieces; i += 1.0) {
+        let to_value = mix(low, high, i / pieces);
+        let part = mean(from_value, to_value);
+        let depth = part.a * length / pieces;
+        let through = exp(-depth);
+        if part.a > 0.0 {
+            behind(part.rgb / part.a * (1.0 - through), through);
+        }
+        from_value = to_value;
+    }
+}
+
+// The same between two places (distance and value), held to what is not cut away.
+fn held_piece(enter: vec2f, leave: vec2f) {
+    let from_place = max(enter.x, limits.x);
+    let to_place = min(leave.x, limits.y);
+    if to_place > from_place {
+        let slope = (leave.y - enter.y) / (leave.x - enter.x);
+        let low = enter.y + slope * (from_place - enter.x);
+        piece(low, enter.y + slope * (to_place - enter.x), to_place - from_place);
+    }
+}
+
+// The nearest layer of the pixel's list behind `last`. Layers at one distance come in the order of their colours, which
+// does not depend on the order of the list.
+fn layer_after(last: Layer) -> Layer {
+    var next = Layer(FAR, 0u);
+    for (var node = head; node != 0u;) {
+        let link = nodes[3u * node - 1u];
+        let distance = bitcast<f32>(nodes[3u * node - 3u]);
+        if (link & IS_COLOUR) != 0u && distance < opaque {
+            let found = Layer(distance, nodes[3u * node - 2u]);
+            let is_after = distance > last.distance || distance == last.distance && found.colour > last.colour;
+            if is_after && (distance < next.distance || distance == next.distance && found.colour < next.colour) {
+                next = found;
+            }
+        }
+        node = link & ~IS_COLOUR;
+    }
+    return next;
+}
+
+// Takes the layers in front of a distance.
+fn take_layers(distance: f32) {
+    while layer.distance < distance && transmittance > DARK {
+        let own = unpack4x8unorm(layer.colour);
+        behind(own.rgb, 1.0 - own.a);
+        layer = layer_after(layer);
+    }
+}
+
+// Goes through a part of a tetrahedron, with the layers in it.
+fn go_through(enter: vec2f, leave: vec2f) {
+    var here = enter;
+    while layer.distance < leave.x && transmittance > DARK {
+        let place = max(layer.distance, here.x);
+        let t = select((place - enter.x) / (leave.x - enter.x), 0.0, leave.x <= enter.x);
+        let there = vec2f(place, mix(enter.y, leave.y, t));
+        held_piece(here, there);
+        let own = unpack4x8unorm(layer.colour);
+        behind(own.rgb, 1.0 - own.a);
+        layer = layer_after(layer);
+        here = there;
+    }
+    held_piece(here, leave);
+}
+
+// Which of the neighbours of a tetrahedron is opposite `point`, the others being `a`, `b` and `c`.
+fn rank(point: u32, a: u32, b: u32, c: u32) -> u32 {
+    return u32(point > a) + u32(point > b) + u32(point > c);
+}
+
+// From the eye to the face through which the ray leaves the tetrahedron that the eye is in, and on from there.
+fn march_from_inside(by: Across) {
+    let c = settings.corners;
+    for (var k = 0u; k < 4u; k += 1u) {
+        // The points but for number k.
+        let ids = vec3u(c[(k + 1u) & 3u], c[(k + 2u) & 3u], c[(k + 3u) & 3u]);
+        let corners = array<SeenPoint, 3>(seen(ids.x, by), seen(ids.y, by), seen(ids.z, by));
+        let x = vec3f(area(corners[0], corners[1]), area(corners[1], corners[2]), area(corners[2], corners[0]));
+        let is_crossed = all(x >= vec3f(0.0)) || all(x <= vec3f(0.0));
+        let leave = crossing(corners[0], corners[1], corners[2]);
+        if is_crossed && leave.x > 0.0 {
+            go_through(vec2f(0.0, bitcast<f32>(settings.start.y)), leave);
+            march(ids, tets[5u * settings.start.x + rank(c[k], ids.x, ids.y, ids.z)], by);
+            return;
+        }
+    }
+}
+
+// Enters tetrahedron `first` through the face of three points, and goes on until the ray leaves the volume or no more light
+// comes through.
+fn march(face: vec3u, first: u32, by: Across) {
+    var ids = face;
+    var a = seen(ids.x, by);
+    var b = seen(ids.y, by);
+    var c = seen(ids.z, by);
+    if area(a, b) + area(b, c) + area(c, a) < 0.0 {
+        let other = b;
+        b = c;
+        c = other;
+        ids = ids.xzy;
+    }
+    var tet = first;
+    var enter = crossing(a, b, c);
+    // A ray meets each tetrahedron once at most.
+    let most = arrayLength(&tets) / 5u;
+    for (var step = 0u; step < most && tet != NONE && transmittance > DARK && enter.x < limits.y; step += 1u) {
+        let new_point = tets[5u * tet + 4u] ^ ids.x ^ ids.y ^ ids.z;
+        let d = seen(new_point, by);
+        let x = vec3f(area(a, d), area(b, d), area(c, d));
+        var left: u32;
+        if x.x <= 0.0 && x.y >= 0.0 {
+            left = rank(ids.z, ids.x, ids.y, new_point);
+            ids.z = new_point;
+            c = d;
+        } else if x.y <= 0.0 && x.z >= 0.0 {
+            left = rank(ids.x, ids.y, ids.z, new_point);
+            ids.x = new_point;
+            a = d;
+        } else {
+            left = rank(ids.y, ids.x, ids.z, new_point);
+            ids.y = new_point;
+            b = d;
+        }
+        tet = tets[5u * tet + left];
+        let there = crossing(a, b, c);
+        let leave = vec2f(max(there.x, enter.x), there.y);
+        go_through(enter, leave);
+        enter = leave;
+    }
+}
+
+// All parts of the volume on the ray, nearest first, and the layers in and between them.
+fn march_all(by: Across) {
+    if settings.start.x != NONE {
+        march_from_inside(by);
+    }
+    var last = vec2f(-FAR, -1.0);
+    loop {
+        // The nearest entry that has not been taken; of several at one place, by number.
+        var next = vec2f(FAR, 0.0);
+        for (var node = head; node != 0u;) {
+            let link = nodes[3u * node - 1u];
+            if (link & IS_COLOUR) == 0u {
+                let entry = vec2f(bitcast<f32>(nodes[3u * node - 3u]), f32(nodes[3u * node - 2u]));
+                let is_after = entry.x > last.x || entry.x == last.x && entry.y > last.y;
+                if is_after && (entry.x < next.x || entry.x == next.x && entry.y < next.y) {
+                    next = entry;
+                }
+            }
+            node = link & ~IS_COLOUR;
+        }
+        if next.x >= limits.y || transmittance <= DARK {
+            break;
+        }
+        take_layers(next.x);
+        let face = faces[u32(next.y)];
+        march(face.xyz, face.w, by);
+        last = next;
+    }
+}
+
+// The part of a ray that the clip planes leave of the volume, up to what is opaque.
+fn kept(ray: Ray) -> vec2f {
+    var range = vec2f(-FAR, opaque);
+    for (var i = 0u; i < u32(frame.viewport.w); i += 1u) {
+        if (settings.start.z >> i & 1u) == 1u {
+            let plane = frame.clips[i];
+            let height = plane.w - dot(plane.xyz, ray.origin);
+            let slope = dot(plane.xyz, ray.direction);
+            if slope > 0.0 {
+                range.y = min(range.y, height / slope);
+            } else if slope < 0.0 {
+                range.x = max(range.x, height / slope);
+            } else if height < 0.0 {
+                range.y = -FAR;
+            }
+        }
+    }
+    return range;
+}
+
+// How far along the ray of a pixel the depth of its first sample is.
+fn distance_of(pixel: vec2i, ray: Ray) -> f32 {
+    let depth = textureLoad(depths, pixel, 0);
+    if depth >= 1.0 {
+        return FAR;
+    }
+    let forward = (frame.depth.x - frame.depth.y * depth) / (frame.depth.z * depth - frame.depth.w);
+    return forward / dot(ray.direction, normalize(frame.direction.xyz));
+}
+
+fn place_of(pixel: vec2i) -> vec4f {
+    let ray = ray_of(vec2f(pixel));
+    let distance = distance_of(pixel, ray);
+    return vec4f(ray.origin + distance * ray.direction, f32(distance < FAR));
+}
+
+// The difference to a neighbour on one of both sides: to the nearer one, so that it does not reach over an edge.
+fn slope_of(middle: vec3f, before: vec4f, after: vec4f) -> vec3f {
+    let back = middle - before.xyz;
+    let ahead = after.xyz - middle;
+    let is_back = after.w == 0.0 || before.w > 0.0 && dot(back, back) < dot(ahead, ahead);
+    return select(ahead, back, is_back);
+}
+
+const TAPS = 14;
+
+// How much of the light of the sky does not come to an opaque place, 0 to 1, by what is near it on the screen (McGuire and
+// others, *The Alchemy screen-space ambient obscurance algorithm*, 2011).
+fn shade(pixel: vec2i) -> f32 {
+    let here = place_of(pixel);
+    if here.w == 0.0 || settings.shade.x <= 0.0 {
+        return 0.0;
+    }
+    let middle = here.xyz;
+    let x = slope_of(middle, place_of(pixel - vec2i(1, 0)), place_of(pixel + vec2i(1, 0)));
+    let y = slope_of(middle, place_of(pixel - vec2i(0, 1)), place_of(pixel + vec2i(0, 1)));
+    let view = towards_eye(middle);
+    var normal = cross(y, x);
+    if dot(normal, normal) == 0.0 {
+        return 0.0;
+    }
+    normal = normalize(normal) * select(-1.0, 1.0, dot(normal, view) > 0.0);
+    let radius = settings.shade.y;
+    // The radius on the screen, in pixels.
+    let beside = frame.view_projection * vec4f(middle + radius * normalize(frame.up.xyz), 1.0);
+    let own = frame.view_projection * vec4f(middle, 1.0);
+    let reach = clamp(length(beside.xy / beside.w - own.xy / own.w) * 0.5 * frame.viewport.y, 2.0, 90.0);
+    let noise = fract(52.9829189 * fract(dot(vec2f(pixel), vec2f(0.06711056, 0.00583715))));
+    var sum = 0.0;
+    for (var i = 0; i < TAPS; i += 1) {
+        let part = (f32(i) + 0.5) / f32(TAPS);
+        let angle = 6.2831853 * (part * 5.0 + noise);
+        let other = place_of(pixel + vec2i(reach * part * vec2f(cos(angle), sin(angle))));
+        let way = other.xyz - middle;
+        let size = dot(way, way);
+        if other.w > 0.0 && size < radius * radius {
+            let fade = 1.0 - size / (radius * radius);
+            sum += fade * max(dot(way, normal) - 0.02 * radius, 0.0) / sqrt(size + 1e-4 * radius * radius);
+        }
+    }
+    return clamp(settings.shade.x * 2.0 * sum / f32(TAPS), 0.0, 0.85);
+}
+
+@vertex
+fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
+    return over_screen(i, 0.0);
+}
+
+@fragment
+fn fs(@builtin(position) pixel: vec4f) -> @location(0) vec4f {
+    let ray = ray_of(pixel.xy);
+    colour = vec3f(0.0);
+    transmittance = 1.0;
+    opaque = distance_of(vec2i(pixel.xy), ray);
+    limits = kept(ray);
+    head = heads[1u + u32(pixel.y) * u32(frame.viewport.x) + u32(pixel.x)];
+    layer = layer_after(Layer(-FAR, 0u));
+    if settings.table.z > 0.0 {
+        march_all(across_of(ray));
+    }
+    take_layers(FAR);
+    return vec4f(colour, 1.0 - transmittance * (1.0 - shade(vec2i(pixel.xy))));
+}
+
+// Only the shade.
+@fragment
+fn fs_shade(@builtin(position) pixel: vec4f) -> @location(0) vec4f {
+    return vec4f(0.0, 0.0, 0.0, shade(vec2i(pixel.xy)));
+}

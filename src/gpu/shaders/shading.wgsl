@@ -1,0 +1,134 @@
+// How surfaces look: their colours, and how light falls on them. Colours are linear until `encode`. Twin: `Style` in
+// `gpu/style.rs`.
+
+struct Style {
+    // The sides that are seen from lower and from higher values: sRGB; in w opacity, and whether values give colours.
+    front: vec4f,
+    back: vec4f,
+    // Of values: the smallest (or its logarithm), one over the range of them, whether it is logarithmic (w unused).
+    scale: vec4f,
+    // Of edges: sRGB and strength.
+    edge: vec4f,
+    // Width of edges in units of the page's layout, 0 for none; in y 0 for smooth, 1 for flat, 2 for no light; how much
+    // tetrahedra are shrunk; diameter of points in units of the page's layout.
+    shape: vec4f,
+    // The clip planes that apply, a bit each; whether each tetrahedron has a value (z, w unused).
+    clips: vec4u,
+    // Tetrahedra with their centroid at xyz . p > w are taken away.
+    cut: vec4f,
+    // 256 evenly spaced colours of the scale, a byte a channel.
+    palette: array<vec4u, 64>,
+}
+
+@group(1) @binding(0) var<uniform> style: Style;
+
+fn decode(c: vec3f) -> vec3f {
+    return select(pow((c + 0.055) / 1.055, vec3f(2.4)), c / 12.92, c <= vec3f(0.04045));
+}
+
+fn encode(linear: vec3f) -> vec3f {
+    let c = clamp(linear, vec3f(0.0), vec3f(1.0));
+    return select(1.055 * pow(c, vec3f(1.0 / 2.4)) - 0.055, c * 12.92, c <= vec3f(0.0031308));
+}
+
+// A soft key light and a cool fill light; light reaches around the terminator a little.
+fn diffuse(n: vec3f) -> vec3f {
+    let key = max((dot(n, frame.key_light.xyz) + 0.3) / 1.3, 0.0);
+    let fill = max((dot(n, frame.fill_light.xyz) + 0.5) / 1.5, 0.0);
+    let sky = 0.5 + 0.5 * dot(n, frame.up.xyz);
+    return vec3f(1.0, 0.97, 0.92) * (0.82 * key * key)
+        + vec3f(0.62, 0.74, 0.95) * (0.28 * fill)
+        + mix(vec3f(0.07, 0.065, 0.06), vec3f(0.13, 0.15, 0.18), sky);
+}
+
+fn palette_entry(i: u32) -> vec3f {
+    return unpack4x8unorm(style.palette[i / 4u][i % 4u]).rgb;
+}
+
+// The colour of a value on the scale: linear.
+fn mapped(value: f32) -> vec3f {
+    let even = select(value, log(max(value, 1e-38)), style.scale.z > 0.0);
+    let place = clamp((even - style.scale.x) * style.scale.y, 0.0, 1.0) * 255.0;
+    let below = min(u32(place), 254u);
+    return decode(mix(palette_entry(below), palette_entry(below + 1u), place - f32(below)));
+}
+
+// What is seen of a surface at a place.
+struct Seen {
+    position: vec3f,
+    // Towards lower values; any length but zero.
+    normal: vec3f,
+    // Of the triangle: the side from which its corners are counter-clockwise. Any length.
+    face: vec3f,
+    value: f32,
+    // Of the place in the triangle: 0 along each side that is an edge, 1 at the corner opposite to it.
+    sides: vec3f,
+    slope: vec3f,
+}
+
+// Whether the side is seen that normals point to. Normals tell, and the triangle only where they are undecided: slivers,
+// of which marching tetrahedra make many, may face anywhere, so a triangle counts as far as it agrees with its normal.
+fn is_front(seen: Seen, n: vec3f, view: vec3f) -> bool {
+    let size = length(seen.face);
+    let facing = dot(seen.face, view);
+    if size == 0.0 {
+        return true;
+    }
+    let trust = smoothstep(0.5, 0.9, dot(seen.face, n) / size);
+    // A triangle that is seen from its back at a silhouette is one that the pixel's middle does not see.
+    return dot(n, view) + select(-0.06, 0.2, facing > 0.0) * select(trust, 1.0, facing > 0.0) > 0.0;
+}
+
+fn lit(albedo: vec3f, n: vec3f, view: vec3f) -> vec3f {
+    // Interpolated normals may look away a little at silhouettes: no more light there than at the very edge.
+    let facing = min(abs(dot(n, view)), 1.0);
+    let rim = pow(1.0 - facing, 3.0) * (0.5 + 0.5 * dot(n, frame.up.xyz));
+    let half_way = normalize(view + frame.key_light.xyz);
+    let gloss = pow(max(dot(n, half_way), 0.0), 50.0);
+    return albedo * diffuse(n) + vec3f(0.75, 0.85, 1.0) * (0.16 * rim) + vec3f(0.16 * gloss);
+}
+
+// How much of the edge colour there is at a place in a triangle. Edges fade out where faces are a few pixels large.
+fn edge_strength(seen: Seen) -> f32 {
+    if style.shape.x <= 0.0 {
+        return 0.0;
+    }
+    // Distance to each side in pixels.
+    let away = seen.sides / max(seen.slope, vec3f(1e-9));
+    let nearest = min(away.x, min(away.y, away.z));
+    let width = 0.5 * style.shape.x * frame.viewport.z;
+    let line = 1.0 - smoothstep(width - 0.5, width + 0.5, nearest);
+    let steepest = max(seen.slope.x, max(seen.slope.y, seen.slope.z));
+    return line * style.edge.a * (1.0 - smoothstep(0.08, 0.35, steepest * frame.viewport.z));
+}
+
+// sRGB and opacity.
+fn shaded(seen: Seen) -> vec4f {
+    let view = towards_eye(seen.position);
+    var colour: vec3f;
+    if style.shape.y == 0.0 {
+        let smooth_normal = normalize(seen.normal);
+        let front = is_front(seen, smooth_normal, view);
+        let fixed = decode(select(style.back.rgb, style.front.rgb, front));
+        var albedo = fixed;
+        if style.back.w > 0.0 {
+            albedo = mapped(seen.value);
+        }
+        colour = lit(albedo, select(-smooth_normal, smooth_normal, front), view);
+    } else {
+        let front = dot(seen.face, view) > 0.0;
+        var albedo = decode(select(style.back.rgb, style.front.rgb, front));
+        if style.back.w > 0.0 {
+            albedo = mapped(seen.value);
+        }
+        if style.shape.y == 1.0 {
+            // Mostly flat, so that the colours stay those of the legend.
+            let n = normalize(select(-seen.face, seen.face, front));
+            albedo *= vec3f(0.62) + 0.55 * diffuse(n);
+        }
+        colour = albedo;
+    }
+    let edge = edge_strength(seen);
+    let mixed = mix(encode(colour), style.edge.rgb, edge);
+    return vec4f(mixed, mix(style.front.w, 1.0, edge * step(0.001, style.front.w)));
+}
