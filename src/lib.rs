@@ -163,6 +163,8 @@ pub mod mesh;
 pub mod mt;
 pub mod refine;
 pub mod remote;
+#[cfg(feature = "gpu")]
+pub mod scene;
 pub mod session;
 pub mod stream;
 #[cfg(feature = "build")]

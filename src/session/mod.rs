@@ -256,6 +256,12 @@ impl Session {
         view(self.front.as_ref(), &self.shown)
     }
 
+    /// The mesh as the last call that brought it up to date left it, for readers that share the session.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn last_view(&self) -> MeshView<'_> {
+        view(self.front.as_ref(), &self.shown)
+    }
+
     /// Which entries of [`Session::view`] have changed since the last call: ranges of points and of tetrahedra in ascending
     /// order, with some entries among them that have not. What lies beyond the ends of the arrays is gone. The first call
     /// gives everything. Points change too when another field is shown.

@@ -125,6 +125,17 @@ impl IsoSurface {
         self.rebuild(mesh, distinct(values));
     }
 
+    /// The value at each vertex of another field of the mesh that the surface was made of, given by one number a point.
+    ///
+    /// # Panics
+    /// If there are fewer points or numbers than in that mesh.
+    pub fn interpolate(&self, mesh: &MeshView<'_>, field: &[f32]) -> Vec<f32> {
+        let value = |crossing: &Crossing| {
+            crossing.value(field, fraction(crossing, mesh, self.isovalues[crossing.which as usize]))
+        };
+        self.pieces.crossings.list.iter().map(value).collect()
+    }
+
     /// The ranges of vertices and of triangles that were written since the last call, in ascending order, for copies
     /// elsewhere. Anything beyond the ends of the arrays is gone.
     pub fn take_changes(&mut self) -> SurfaceChanges {

@@ -1,0 +1,283 @@
+//! A scene: what is shown of a session's mesh, kept up to date with it, and drawn by the [renderer](crate::gpu).
+//!
+//! [`SceneState`] says what is shown, as plain data. [`Scene::update`] computes what is out of date, and hands the renderer what has
+//! changed; nothing is computed that is not shown.
+
+mod objects;
+mod state;
+
+pub use state::{
+    ArrowState, Background, BoundaryState, CellKind, CellState, Colour, ColourState, IsosurfaceState,
+    MapName, PlaneState, SceneState, SliceState, StreamlineState, VolumeState,
+};
+
+use crate::geom::{Bounds, Camera};
+use crate::gpu::{BoxLines, GpuError, Look, MOST_CLIPS, Renderer};
+use crate::session::{Session, SessionError};
+use crate::view::{ClipPlane, ColourScale, Probe, ScaleError};
+use glam::DVec3;
+use objects::Objects;
+use thiserror::Error;
+
+/// The outline of the domain, on a dark and on a light background.
+const OUTLINE: [[f32; 4]; 2] = [[0.85, 0.9, 1.0, 0.35], [0.25, 0.28, 0.33, 0.6]];
+const REGION: [f32; 4] = [0.36, 0.86, 1.0, 1.0];
+
+/// Why a scene cannot be shown.
+#[derive(Clone, Debug, Error)]
+#[non_exhaustive]
+pub enum SceneError {
+    /// The GPU cannot draw it.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    /// The session cannot give what it shows.
+    #[error(transparent)]
+    Session(#[from] SessionError),
+    /// The colours have no range.
+    #[error("colours: {0}")]
+    Scale(#[from] ScaleError),
+    /// Something that the state names is not possible.
+    #[error("{what}: {problem}")]
+    State {
+        /// Which part of the state.
+        what: String,
+        /// What is wrong, and what to do.
+        problem: String,
+    },
+}
+
+impl SceneError {
+    fn state(what: impl Into<String>, problem: impl Into<String>) -> Self {
+        Self::State { what: what.into(), problem: problem.into() }
+    }
+}
+
+/// What the colours of a picture mean.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Legend {
+    /// The name of the field or the quantity.
+    pub label: String,
+    /// The colours of its values.
+    pub scale: ColourScale,
+}
+
+/// What is shown of a session's mesh.
+#[derive(Debug)]
+pub struct Scene {
+    renderer: Renderer,
+    state: SceneState,
+    objects: Objects,
+    /// The box around the base mesh, once it is there.
+    bounds: Option<Bounds>,
+    look: Look,
+    /// Whether the state has changed since the last update.
+    is_stale: bool,
+}
+
+impl Scene {
+    /// A scene that `renderer` draws.
+    pub fn new(renderer: Renderer) -> Self {
+        Self {
+            renderer,
+            state: SceneState::default(),
+            objects: Objects::default(),
+            bounds: None,
+            look: Look::default(),
+            is_stale: true,
+        }
+    }
+
+    /// The renderer.
+    pub fn renderer(&self) -> &Renderer {
+        &self.renderer
+    }
+
+    /// The renderer, to resize it for example.
+    pub fn renderer_mut(&mut self) -> &mut Renderer {
+        &mut self.renderer
+    }
+
+    /// What is shown.
+    pub fn state(&self) -> &SceneState {
+        &self.state
+    }
+
+    /// Changes what is shown, from the next [`Scene::update`] on.
+    ///
+    /// # Errors
+    /// If a part of it makes no sense whatever the volume is; then nothing changes.
+    pub fn set_state(&mut self, state: SceneState) -> Result<(), SceneError> {
+        check(&state)?;
+        self.state = state;
+        self.is_stale = true;
+        Ok(())
+    }
+
+    /// Pixels of the target per unit of the page's layout.
+    pub fn set_pixel_ratio(&mut self, ratio: f32) {
+        self.look.pixel_ratio = if ratio.is_finite() { ratio.clamp(0.25, 8.0) } else { 1.0 };
+    }
+
+    /// Another session comes: forgets the mesh of the last one. The state stays.
+    pub fn forget(&mut self) -> Result<(), SceneError> {
+        self.bounds = None;
+        self.is_stale = true;
+        self.objects.clear(&mut self.renderer)?;
+        Ok(())
+    }
+
+    /// The box around the base mesh; none until that is there.
+    pub fn bounds(&self) -> Option<&Bounds> {
+        self.bounds.as_ref()
+    }
+
+    /// What the colours mean, if anything is coloured by values.
+    pub fn legend(&self) -> Option<&Legend> {
+        self.objects.legend()
+    }
+
+    /// Triangles of all surfaces that are drawn.
+    pub fn triangles(&self) -> usize {
+        self.renderer.triangles()
+    }
+
+    /// Brings what is shown up to date with the session's mesh; whether anything has changed, so that a new picture is due.
+    ///
+    /// # Errors
+    /// If the state names what the volume does not have, or it does not fit on the GPU; what fits is shown.
+    pub fn update(&mut self, session: &mut Session) -> Result<bool, SceneError> {
+        if session.info().is_none() {
+            return Ok(std::mem::take(&mut self.is_stale));
+        }
+        if self.bounds.is_none() {
+            let positions = session.view().positions;
+            self.bounds = Some(positions.iter().fold(Bounds::EMPTY, |b, p| b.with(p.map(f64::from))));
+            self.is_stale = true;
+        }
+        let bounds = self.bounds.unwrap_or(Bounds::EMPTY);
+        let is_stale = std::mem::take(&mut self.is_stale);
+        if is_stale {
+            self.look = Look { pixel_ratio: self.look.pixel_ratio, ..look(&self.state, &bounds) };
+            self.renderer.set_boxes(&boxes(&self.state, &bounds))?;
+        }
+        let changed = self.objects.update(&mut self.renderer, session, &self.state, &bounds, is_stale)?;
+        Ok(changed || is_stale)
+    }
+
+    /// Draws a picture; `false` when the target is not available, such as a hidden canvas.
+    ///
+    /// # Errors
+    /// If the device is lost or refused something.
+    pub fn draw(&mut self, session: &mut Session, camera: &Camera) -> Result<bool, SceneError> {
+        self.place_eye(session, camera);
+        Ok(self.renderer.draw(camera, &self.look)?)
+    }
+
+    /// Draws a picture that is the mean of `samples` and reads it back, as [`Renderer::picture`] does.
+    ///
+    /// # Errors
+    /// If the target is no image, or the device is lost or refused something.
+    pub async fn picture(
+        &mut self,
+        session: &mut Session,
+        camera: &Camera,
+        samples: u32,
+    ) -> Result<Vec<u8>, SceneError> {
+        self.place_eye(session, camera);
+        Ok(self.renderer.picture(camera, &self.look, samples).await?)
+    }
+
+    /// Tells the renderer in which tetrahedron the eye is.
+    fn place_eye(&mut self, session: &mut Session, camera: &Camera) {
+        let (Some(_), Some(bounds)) = (&self.state.volume, &self.bounds) else { return };
+        let eye = camera.rays(1.0).origin[0];
+        let mesh = session.view();
+        let is_near = eye.cmpge(DVec3::from(bounds.min)).all() && eye.cmple(DVec3::from(bounds.max)).all();
+        let place = is_near.then(|| Probe::new(mesh).locate(eye.into())).flatten();
+        self.renderer.set_eye(&mesh, place.as_ref());
+    }
+}
+
+/// What makes no sense whatever the volume is.
+fn check(state: &SceneState) -> Result<(), SceneError> {
+    let plane = "must have a `normal` of three numbers, not all 0, and an `offset`";
+    for (i, clip) in state.clips.iter().enumerate().filter(|(_, clip)| !clip.is_plane()) {
+        return Err(SceneError::state(format!("clips[{i}]"), format!("{plane}; given: {clip:?}")));
+    }
+    for (i, slice) in state.slices.iter().enumerate() {
+        if !(PlaneState { normal: slice.normal, offset: slice.offset }).is_plane() {
+            return Err(SceneError::state(format!("slices[{i}]"), plane));
+        }
+    }
+    if let Some(cut) = state.cells.as_ref().and_then(|cells| cells.cut)
+        && !cut.is_plane()
+    {
+        return Err(SceneError::state("cells.cut", plane));
+    }
+    for (what, corners) in [("clipBox", &state.clip_box), ("region", &state.region)] {
+        if corners.as_ref().is_some_and(|corners| state::bounds(corners).is_none()) {
+            let problem =
+                "must be six numbers, x0, y0, z0, x1, y1, z1, each of the first at most that of the last";
+            return Err(SceneError::state(what, problem));
+        }
+    }
+    let planes = state.clips.len() + if state.clip_box.is_some() { 6 } else { 0 };
+    if planes > MOST_CLIPS {
+        let problem =
+            format!("at most {MOST_CLIPS} planes can cut, of which a box takes six; given: {planes}");
+        return Err(SceneError::state("clips", problem));
+    }
+    if state.isosurfaces.iter().any(|surface| surface.value.is_some_and(|value| !value.is_finite())) {
+        return Err(SceneError::state("isosurfaces", "values must be finite numbers"));
+    }
+    check_volume(state)
+}
+
+fn check_volume(state: &SceneState) -> Result<(), SceneError> {
+    let Some(volume) = &state.volume else { return Ok(()) };
+    let values: Vec<f64> =
+        volume.opacities.iter().map(|p| p[0]).chain(volume.points.iter().map(|p| p[0])).collect();
+    let of_points = volume.points.iter().flatten().chain(volume.opacities.iter().flatten());
+    if !of_points.into_iter().all(|x| x.is_finite()) {
+        return Err(SceneError::state("volume", "values and opacities must be finite numbers"));
+    }
+    if !values.is_sorted() || !volume.opacities.is_empty() && !volume.points.is_empty() {
+        let problem = "give `opacities` or `points`, not both, with ascending values";
+        return Err(SceneError::state("volume", problem));
+    }
+    if volume.unit_length.is_some_and(|length| !(length.is_finite() && length > 0.0)) {
+        return Err(SceneError::state("volume.unitLength", "must be a positive number"));
+    }
+    Ok(())
+}
+
+/// All clip planes: those of the state, then the faces of its box.
+fn clips(state: &SceneState) -> Vec<ClipPlane> {
+    let mut clips: Vec<ClipPlane> = state.clips.iter().map(PlaneState::clip).collect();
+    if let Some(bounds) = state.clip_box.as_ref().and_then(state::bounds) {
+        for axis in 0..3 {
+            let normal = |sign: f32| [0, 1, 2].map(|i| if i == axis { sign } else { 0.0 });
+            clips.push(ClipPlane { normal: normal(1.0), offset: bounds.max[axis] as f32 });
+            clips.push(ClipPlane { normal: normal(-1.0), offset: -bounds.min[axis] as f32 });
+        }
+    }
+    clips
+}
+
+fn look(state: &SceneState, bounds: &Bounds) -> Look {
+    let (sky, ground) = match state.background {
+        Background::Dark => (Look::default().sky, Look::default().ground),
+        Background::Light => ([0.985, 0.985, 0.99, 1.0], [0.93, 0.935, 0.945, 1.0]),
+        Background::Transparent => ([0.0; 4], [0.0; 4]),
+    };
+    let shade = [state.shade.clamp(0.0, 1.0) as f32, (0.05 * bounds.diagonal()) as f32];
+    Look { sky, ground, clips: clips(state), shade, ..Look::default() }
+}
+
+fn boxes(state: &SceneState, bounds: &Bounds) -> Vec<BoxLines> {
+    let colour = OUTLINE[usize::from(state.background != Background::Dark)];
+    let outline = BoxLines { bounds: *bounds, colour, width: 1.0, handles: false };
+    let region = state.region.as_ref().and_then(state::bounds);
+    let region = region.map(|bounds| BoxLines { bounds, colour: REGION, width: 2.0, handles: true });
+    state.outline.then_some(outline).into_iter().chain(region).collect()
+}

@@ -1,0 +1,503 @@
+//! What is computed from the mesh for a scene: surfaces, sections, tubes, values of tetrahedra.
+
+use super::state::{ArrowState, CellKind, CellState, ColourState, IsosurfaceState, StreamlineState};
+use super::{Legend, PlaneState, SceneError, SceneState, SliceState, VolumeState, clips};
+use crate::geom::Bounds;
+use crate::gpu::{CellShape, CellStyle, Colouring, EdgeLook, Lighting, Renderer, SIDES, Style};
+use crate::mt::MtInfo;
+use crate::session::{Session, TetQuantity};
+use crate::view::{
+    ArrowLength, ArrowOptions, BoundarySurface, ClipPlane, ColourScale, IsoSurface, Medium, MeshView, Slice,
+    Solids, TraceOptions, Tracer, Triangles, TubeOptions,
+};
+use std::ops::Range;
+
+/// Numbers of surfaces in the renderer: those of lists begin at these.
+const ISOSURFACES: u32 = 0;
+const SLICES: u32 = 1 << 16;
+const CAPS: u32 = 2 << 16;
+const BOUNDARY: u32 = 3 << 16;
+const TUBES: u32 = BOUNDARY + 1;
+const ARROWS: u32 = BOUNDARY + 2;
+
+/// The objects of a scene, with the memory to compute them again.
+#[derive(Debug, Default)]
+pub(super) struct Objects {
+    isosurfaces: Vec<Isosurface>,
+    slice: Slice,
+    boundary: BoundarySurface,
+    solids: Solids,
+    values: Vec<f32>,
+    /// How many surfaces of each list the renderer has.
+    slices: u32,
+    caps: u32,
+    legend: Option<Legend>,
+}
+
+#[derive(Debug, Default)]
+struct Isosurface {
+    surface: IsoSurface,
+    /// Whether the renderer has all of it, so that changes are enough.
+    is_whole: bool,
+}
+
+/// What an update reads.
+struct Input<'a> {
+    mesh: MeshView<'a>,
+    fields: &'a dyn Fn(usize) -> Vec<f32>,
+    info: &'a MtInfo,
+    /// The number of the field of `mesh`.
+    shown: usize,
+    state: &'a SceneState,
+    bounds: &'a Bounds,
+}
+
+impl Input<'_> {
+    /// The number of the field with a name; that of the mesh without one.
+    fn field(&self, what: &str, name: Option<&String>) -> Result<usize, SceneError> {
+        let Some(name) = name else { return Ok(self.shown) };
+        let found = self.info.fields.iter().position(|field| field.name == *name);
+        found.ok_or_else(|| {
+            let names = self.info.fields.iter().map(|field| field.name.as_str()).collect::<Vec<_>>();
+            let problem = format!("there is no field {name:?}; this volume has: {}", names.join(", "));
+            SceneError::state(what, problem)
+        })
+    }
+
+    /// The colours of a field; the range of the state is for the field that is shown.
+    fn scale(&self, field: usize) -> Result<ColourScale, SceneError> {
+        let field_info = &self.info.fields[field];
+        let own = [field_info.min, field_info.max];
+        scale(&self.state.colours, if field == self.shown { self.state.colours.range } else { None }, own)
+    }
+
+    fn vectors(&self, what: &str, names: &[String; 3]) -> Result<[Vec<f32>; 3], SceneError> {
+        let mut found = [0; 3];
+        for (place, name) in found.iter_mut().zip(names) {
+            *place = self.field(what, Some(name))?;
+        }
+        Ok(found.map(|field| (self.fields)(field)))
+    }
+
+    fn diagonal(&self) -> f64 {
+        self.bounds.diagonal()
+    }
+}
+
+/// The scale of a state: over `range` if there is one, else over what is there.
+fn scale(colours: &ColourState, range: Option<[f64; 2]>, own: [f64; 2]) -> Result<ColourScale, SceneError> {
+    let ColourState { map, reversed, log, .. } = *colours;
+    let scale = ColourScale { map: map.0, range: range.unwrap_or(own), is_reversed: reversed, is_log: log };
+    Ok(scale.validate()?)
+}
+
+/// The smallest and the largest number; 0 and 1 if there is none.
+fn range(values: &[f32]) -> [f64; 2] {
+    let finite = || values.iter().copied().filter(|value| value.is_finite());
+    let range = [finite().fold(f32::INFINITY, f32::min), finite().fold(f32::NEG_INFINITY, f32::max)];
+    if range[0] <= range[1] { range.map(f64::from) } else { [0.0, 1.0] }
+}
+
+impl Objects {
+    pub(super) fn legend(&self) -> Option<&Legend> {
+        self.legend.as_ref()
+    }
+
+    pub(super) fn clear(&mut self, renderer: &mut Renderer) -> Result<(), SceneError> {
+        let isosurfaces = ISOSURFACES..ISOSURFACES + self.isosurfaces.len() as u32;
+        let lists = isosurfaces.chain(SLICES..SLICES + self.slices).chain(CAPS..CAPS + self.caps);
+        lists.chain([BOUNDARY, TUBES, ARROWS]).for_each(|key| renderer.remove_surface(key));
+        renderer.set_volume(None)?;
+        renderer.set_cells(None);
+        *self = Self::default();
+        Ok(())
+    }
+
+    /// Computes what has changed; whether anything has.
+    pub(super) fn update(
+        &mut self,
+        renderer: &mut Renderer,
+        session: &mut Session,
+        state: &SceneState,
+        bounds: &Bounds,
+        is_stale: bool,
+    ) -> Result<bool, SceneError> {
+        let changes = session.take_changes();
+        let is_moved = !changes.vertices.is_empty() || !changes.tets.is_empty();
+        if !is_moved && !is_stale {
+            return Ok(false);
+        }
+        self.update_cells(renderer, session, state)?;
+        let shown = session.field();
+        let session = &*session;
+        let (mesh, Some(info)) = (session.last_view(), session.info()) else { return Ok(false) };
+        let fields = |field| session.values(field);
+        let input = Input { mesh, fields: &fields, info, shown, state, bounds };
+        self.update_volume(renderer, &input, is_stale)?;
+        renderer.update_mesh(&input.mesh, Some([&changes.vertices, &changes.tets]))?;
+        self.update_isosurfaces(renderer, &input, &changes.vertices, &changes.tets)?;
+        self.update_slices(renderer, &input)?;
+        self.update_boundary(renderer, &input)?;
+        self.update_streamlines(renderer, &input)?;
+        self.update_arrows(renderer, &input)?;
+        self.update_legend(&input)?;
+        Ok(true)
+    }
+
+    fn update_volume(
+        &mut self,
+        renderer: &mut Renderer,
+        input: &Input<'_>,
+        is_stale: bool,
+    ) -> Result<(), SceneError> {
+        if !is_stale {
+            return Ok(());
+        }
+        let Some(volume) = &input.state.volume else { return Ok(renderer.set_volume(None)?) };
+        let medium = medium(volume, &input.scale(input.shown)?, input.diagonal());
+        Ok(renderer.set_volume(Some((&medium, if volume.clipped { u32::MAX } else { 0 })))?)
+    }
+
+    fn update_isosurfaces(
+        &mut self,
+        renderer: &mut Renderer,
+        input: &Input<'_>,
+        vertices: &[Range<u32>],
+        tets: &[Range<u32>],
+    ) -> Result<(), SceneError> {
+        let wanted = input.state.isosurfaces.len();
+        for gone in wanted..self.isosurfaces.len() {
+            renderer.remove_surface(ISOSURFACES + gone as u32);
+        }
+        self.isosurfaces.resize_with(wanted, Isosurface::default);
+        let field = &input.info.fields[input.shown];
+        for (key, (own, state)) in
+            (ISOSURFACES..).zip(self.isosurfaces.iter_mut().zip(&input.state.isosurfaces))
+        {
+            let value = state.value.unwrap_or_else(|| f64::midpoint(field.min, field.max));
+            own.surface.update(&input.mesh, &[value], vertices, tets);
+            let changes = own.surface.take_changes();
+            let coloured = state.field.as_ref().map(|_| input.field("isosurfaces", state.field.as_ref()));
+            let coloured = coloured.transpose()?;
+            let values = coloured.map(|field| own.surface.interpolate(&input.mesh, &(input.fields)(field)));
+            let is_whole = std::mem::replace(&mut own.is_whole, false) && values.is_none();
+            let mut triangles = Triangles::from(&own.surface);
+            triangles.values = values.as_deref().unwrap_or_default();
+            renderer.set_surface(key, &triangles, is_whole.then_some(&changes))?;
+            own.is_whole = values.is_none();
+            let scale = coloured.map(|field| input.scale(field)).transpose()?;
+            renderer.set_style(key, &isosurface_style(state, scale));
+        }
+        Ok(())
+    }
+
+    fn update_slices(&mut self, renderer: &mut Renderer, input: &Input<'_>) -> Result<(), SceneError> {
+        for (key, slice) in (SLICES..).zip(&input.state.slices) {
+            self.update_slice(renderer, input, key, slice)?;
+        }
+        let count = input.state.slices.len() as u32;
+        (count..self.slices).for_each(|gone| renderer.remove_surface(SLICES + gone));
+        self.slices = count;
+        Ok(())
+    }
+
+    fn update_slice(
+        &mut self,
+        renderer: &mut Renderer,
+        input: &Input<'_>,
+        key: u32,
+        slice: &SliceState,
+    ) -> Result<(), SceneError> {
+        let field = input.field("slices", slice.field.as_ref())?;
+        let plane = PlaneState { normal: slice.normal, offset: slice.offset };
+        self.slice.extract(&input.mesh, &plane.plane());
+        let values =
+            (field != input.shown).then(|| self.slice.interpolate(&input.mesh, &(input.fields)(field)));
+        let inner: Vec<u8> = self.slice.cell_sides().iter().map(|sides| !sides & 7).collect();
+        let mut triangles = Triangles { inner_sides: &inner, ..Triangles::from(&self.slice) };
+        triangles.values = values.as_deref().unwrap_or(triangles.values);
+        renderer.set_surface(key, &triangles, None)?;
+        let style = Style {
+            colouring: Colouring::Scale(input.scale(field)?),
+            opacity: slice.opacity as f32,
+            lighting: Lighting::None,
+            edges: slice.edges.then(EdgeLook::default),
+            clips: if slice.clipped { other_clips(&clips(input.state), &plane.clip()) } else { 0 },
+        };
+        renderer.set_style(key, &style);
+        Ok(())
+    }
+
+    fn update_boundary(&mut self, renderer: &mut Renderer, input: &Input<'_>) -> Result<(), SceneError> {
+        let (had, all) = (self.caps, clips(input.state));
+        let Some(boundary) = &input.state.boundary else {
+            renderer.remove_surface(BOUNDARY);
+            (0..had).for_each(|gone| renderer.remove_surface(CAPS + gone));
+            self.caps = 0;
+            return Ok(());
+        };
+        self.boundary.extract(&input.mesh);
+        renderer.set_surface(BOUNDARY, &Triangles::from(&self.boundary), None)?;
+        let scale = Colouring::Scale(input.scale(input.shown)?);
+        let style = Style {
+            colouring: boundary.colour.map_or(scale, |colour| Colouring::Sides([colour.rgb(); 2])),
+            opacity: boundary.opacity as f32,
+            lighting: Lighting::Flat,
+            edges: boundary.edges.then(EdgeLook::default),
+            clips: if boundary.clipped { u32::MAX } else { 0 },
+        };
+        renderer.set_style(BOUNDARY, &style);
+        // What the planes cut open is closed.
+        let closed = if boundary.clipped { all.as_slice() } else { &[] };
+        for (key, clip) in (CAPS..).zip(closed) {
+            let ClipPlane { normal, offset } = *clip;
+            let cap = SliceState {
+                normal: normal.map(f64::from),
+                offset: f64::from(offset),
+                opacity: boundary.opacity,
+                edges: boundary.edges,
+                field: None,
+                clipped: true,
+            };
+            self.update_slice(renderer, input, key, &cap)?;
+        }
+        self.caps = closed.len() as u32;
+        (self.caps..had).for_each(|gone| renderer.remove_surface(CAPS + gone));
+        Ok(())
+    }
+
+    fn update_cells(
+        &mut self,
+        renderer: &mut Renderer,
+        session: &mut Session,
+        state: &SceneState,
+    ) -> Result<(), SceneError> {
+        let Some(cells) = &state.cells else {
+            renderer.set_cells(None);
+            return Ok(());
+        };
+        let quantity = quantity(cells)?;
+        let own = match quantity {
+            Some(quantity) => {
+                session.tet_quantity_into(quantity, &mut self.values)?;
+                renderer.set_cell_values(&self.values)?;
+                range(&self.values)
+            }
+            None => {
+                let field = session.info().and_then(|info| info.fields.get(session.field()));
+                field.map_or([0.0, 1.0], |field| [field.min, field.max])
+            }
+        };
+        let scale = scale(&state.colours, if quantity.is_none() { state.colours.range } else { None }, own)?;
+        self.legend = quantity.map(|quantity| Legend { label: quantity.name().to_owned(), scale });
+        renderer.set_cells(Some(&cell_style(cells, scale, quantity.is_some())));
+        Ok(())
+    }
+
+    fn update_streamlines(&mut self, renderer: &mut Renderer, input: &Input<'_>) -> Result<(), SceneError> {
+        let Some(state) = &input.state.streamlines else {
+            renderer.remove_surface(TUBES);
+            return Ok(());
+        };
+        let StreamlineState { fields, seeds, radius, field } = state;
+        let vectors = input.vectors("streamlines.fields", fields)?;
+        let mut tracer = Tracer::new(input.mesh, [&vectors[0], &vectors[1], &vectors[2]]);
+        let length = 4.0 * input.diagonal();
+        let mut lines = Vec::new();
+        for seed in seeds {
+            for backward in [false, true] {
+                let options = TraceOptions { backward, max_length: length, ..TraceOptions::default() };
+                lines.extend(tracer.trace(*seed, &options));
+            }
+        }
+        let radius = radius.unwrap_or(input.diagonal() / 400.0);
+        let options = TubeOptions { radius, ..TubeOptions::default() };
+        let values = field.as_ref().map(|_| input.field("streamlines.field", field.as_ref())).transpose()?;
+        match values {
+            None => self.solids.set_tubes(&lines, &options),
+            Some(field) => {
+                let numbers = (input.fields)(field);
+                let mesh = MeshView { field: &numbers, ..input.mesh };
+                self.solids.set_tubes_with(&lines, &options, |point| point.place.value(&mesh));
+            }
+        }
+        self.show_solids(renderer, input, TUBES, values)
+    }
+
+    fn update_arrows(&mut self, renderer: &mut Renderer, input: &Input<'_>) -> Result<(), SceneError> {
+        let Some(ArrowState { fields, spacing, field, constant }) = &input.state.arrows else {
+            renderer.remove_surface(ARROWS);
+            return Ok(());
+        };
+        let vectors = input.vectors("arrows.fields", fields)?;
+        let values = field.as_ref().map(|_| input.field("arrows.field", field.as_ref())).transpose()?;
+        let numbers = values.map(|field| (input.fields)(field));
+        let options = ArrowOptions {
+            spacing: spacing.unwrap_or(input.diagonal() / 20.0),
+            length: if *constant { ArrowLength::Constant } else { ArrowLength::Magnitude },
+            ..ArrowOptions::default()
+        };
+        let components = [vectors[0].as_slice(), &vectors[1], &vectors[2]];
+        self.solids.set_arrows(input.mesh, components, numbers.as_deref(), &options);
+        self.show_solids(renderer, input, ARROWS, values)
+    }
+
+    /// Draws the tubes or arrows, coloured by a field or by what they are made of.
+    fn show_solids(
+        &mut self,
+        renderer: &mut Renderer,
+        input: &Input<'_>,
+        key: u32,
+        field: Option<usize>,
+    ) -> Result<(), SceneError> {
+        renderer.set_surface(key, &Triangles::from(&self.solids), None)?;
+        let colours = match field {
+            Some(field) => input.scale(field)?,
+            None => scale(&input.state.colours, None, range(&self.solids.values))?,
+        };
+        renderer.set_style(key, &Style { colouring: Colouring::Scale(colours), ..Style::default() });
+        Ok(())
+    }
+
+    /// The legend of the field, unless tetrahedra have one of their own.
+    fn update_legend(&mut self, input: &Input<'_>) -> Result<(), SceneError> {
+        let state = input.state;
+        if state.cells.as_ref().is_some_and(|cells| quantity(cells).is_ok_and(|found| found.is_some())) {
+            return Ok(());
+        }
+        let is_mapped = state.volume.as_ref().is_some_and(|volume| volume.points.is_empty())
+            || !state.slices.is_empty()
+            || state.boundary.as_ref().is_some_and(|boundary| boundary.colour.is_none())
+            || state.cells.is_some();
+        let own = state.isosurfaces.iter().find_map(|surface| surface.field.as_ref());
+        let field = if is_mapped { Some(input.shown) } else { None };
+        let field = match (field, own) {
+            (None, Some(name)) => Some(input.field("isosurfaces", Some(name))?),
+            (field, _) => field,
+        };
+        let legend = |field: usize| {
+            let label = input.info.fields[field].name.clone();
+            input.scale(field).map(|scale| Legend { label, scale })
+        };
+        self.legend = field.map(legend).transpose()?;
+        Ok(())
+    }
+}
+
+/// The quantity that colours tetrahedra; none for the field.
+fn quantity(cells: &CellState) -> Result<Option<TetQuantity>, SceneError> {
+    if cells.colour_by == "field" {
+        return Ok(None);
+    }
+    let found = TetQuantity::named(&cells.colour_by);
+    found.map(Some).ok_or_else(|| {
+        let names = TetQuantity::ALL.map(TetQuantity::name).join(", ");
+        let problem = format!("must be one of field, {names}; given: {}", cells.colour_by);
+        SceneError::state("cells.colourBy", problem)
+    })
+}
+
+fn cell_style(cells: &CellState, scale: ColourScale, own_values: bool) -> CellStyle {
+    let edges = EdgeLook { width: cells.width as f32, ..EdgeLook::default() };
+    let has_edges = cells.edges || cells.shape == CellKind::Wire;
+    let style = Style {
+        colouring: Colouring::Scale(scale),
+        lighting: Lighting::Flat,
+        edges: has_edges.then_some(edges),
+        ..Style::default()
+    };
+    let shape = match cells.shape {
+        CellKind::Solid => CellShape::Solid(cells.shrink as f32),
+        CellKind::Wire => CellShape::Wire,
+        CellKind::Points => CellShape::Points(cells.width.max(1.0) as f32 * 4.0),
+    };
+    let cut = cells.cut.map_or(ClipPlane::NOTHING, |cut| cut.clip());
+    CellStyle { style, shape, cut, own_values }
+}
+
+fn isosurface_style(state: &IsosurfaceState, scale: Option<ColourScale>) -> Style {
+    let sides = Colouring::Sides(state.colour.map_or(SIDES, |colour| [colour.rgb(); 2]));
+    Style {
+        colouring: scale.map_or(sides, Colouring::Scale),
+        opacity: state.opacity as f32,
+        edges: state.edges.then(EdgeLook::default),
+        ..Style::default()
+    }
+}
+
+/// A bit for each clip plane but those that are the same plane as `own`, whichever side they cut away.
+fn other_clips(clips: &[ClipPlane], own: &ClipPlane) -> u32 {
+    let is_same = |clip: &ClipPlane, sign: f32| {
+        clip.normal == own.normal.map(|x| sign * x) && clip.offset == sign * own.offset
+    };
+    let others = clips.iter().enumerate().filter(|(_, clip)| !is_same(clip, 1.0) && !is_same(clip, -1.0));
+    others.fold(0, |mask, (i, _)| mask | 1 << i)
+}
+
+/// The medium of a state, with the colours of a scale where it has none of its own.
+fn medium(volume: &VolumeState, scale: &ColourScale, diagonal: f64) -> Medium {
+    let unit_length = volume.unit_length.unwrap_or(diagonal / 10.0);
+    if !volume.points.is_empty() {
+        let points = volume.points.iter().map(|&[value, r, g, b, a]| (value, [r, g, b, a]));
+        return Medium::new(&points.collect::<Vec<_>>(), unit_length);
+    }
+    let ramp = [[scale.range[0], 0.0], [scale.range[1], 0.5]];
+    let opacities = if volume.opacities.is_empty() { &ramp } else { volume.opacities.as_slice() };
+    Medium::new(&coloured(opacities, scale), unit_length)
+}
+
+/// Colours between two values of the scale, even in its own terms.
+const COLOURS: usize = 64;
+
+/// The values of `opacities` and of the colours of the scale, with both.
+fn coloured(opacities: &[[f64; 2]], scale: &ColourScale) -> Vec<(f64, [f64; 4])> {
+    let own = (0..=COLOURS).map(|i| scale.value(i as f64 / COLOURS as f64));
+    let mut values: Vec<f64> = opacities.iter().map(|point| point[0]).chain(own).collect();
+    values.sort_unstable_by(f64::total_cmp);
+    values.dedup();
+    let mut points = Vec::new();
+    for value in values {
+        let [r, g, b] = scale.colour(value).map(f64::from);
+        // Several opacities at one value are a step.
+        let same: Vec<f64> = opacities.iter().filter(|p| p[0] == value).map(|p| p[1]).collect();
+        let steps = if same.is_empty() { vec![opacity_at(opacities, value)] } else { same };
+        points.extend(steps.into_iter().map(|opacity| (value, [r, g, b, opacity])));
+    }
+    points
+}
+
+/// Linear between the points, constant beyond.
+fn opacity_at(opacities: &[[f64; 2]], value: f64) -> f64 {
+    let after = opacities.partition_point(|point| point[0] <= value);
+    match (after.checked_sub(1).map(|i| opacities[i]), opacities.get(after)) {
+        (Some([low, from]), Some([high, to])) => from + (to - from) * (value - low) / (high - low),
+        (Some(end), None) => end[1],
+        (None, Some(end)) => end[1],
+        (None, None) => 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::view::VIRIDIS;
+
+    #[test]
+    fn opacities_keep_their_steps_and_get_colours() {
+        let scale = ColourScale::new(VIRIDIS, [0.0, 1.0]).expect("a range");
+        let points = coloured(&[[0.2, 0.0], [0.5, 0.4], [0.5, 0.9], [0.8, 0.0]], &scale);
+        assert!(points.is_sorted_by(|a, b| a.0 <= b.0) && points.len() > 60);
+        let at = |value: f64| points.iter().filter(|p| p.0 == value).map(|p| p.1[3]).collect::<Vec<_>>();
+        assert_eq!(at(0.5), [0.4, 0.9]);
+        assert_eq!((at(0.0), at(1.0)), (vec![0.0], vec![0.0]));
+        assert!((opacity_at(&[[0.0, 0.0], [1.0, 0.5]], 0.5) - 0.25).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_plane_is_not_cut_by_itself() {
+        let x = ClipPlane { normal: [1.0, 0.0, 0.0], offset: 0.5 };
+        let back = ClipPlane { normal: [-1.0, 0.0, 0.0], offset: -0.5 };
+        let y = ClipPlane { normal: [0.0, 1.0, 0.0], offset: 0.5 };
+        assert_eq!(other_clips(&[x, y, back], &x), 0b010);
+    }
+}
