@@ -47,17 +47,22 @@ export function deferred() {
   return { promise, resolve, reject };
 }
 
+/** What adds up. */
+const MOVEMENTS = ["orbit", "pan", "fly", "look"];
+
 /** Two sets of changes as one: movements add up, of everything else the later one counts. */
 export function mergeUpdates(a, b) {
   const merged = { ...a, ...b };
-  // Going home forgets the movements before it.
-  if (b.home) {
-    for (const name of ["orbit", "pan", "zoom"]) if (b[name] === undefined) delete merged[name];
+  // A camera that is set forgets the movements before it.
+  if (b.home || b.side || b.camera) {
+    for (const name of [...MOVEMENTS, "zoom"]) if (b[name] === undefined) delete merged[name];
+    if (b.camera === undefined) delete merged.camera;
     return merged;
   }
-  for (const name of ["orbit", "pan"]) {
-    if (a[name] && b[name]) merged[name] = [a[name][0] + b[name][0], a[name][1] + b[name][1]];
+  for (const name of MOVEMENTS) {
+    if (a[name] && b[name]) merged[name] = a[name].map((amount, i) => amount + b[name][i]);
   }
-  if (a.zoom !== undefined && b.zoom !== undefined) merged.zoom = a.zoom * b.zoom;
+  // Both ends of a zoom are near each other: the later point stands for both.
+  if (a.zoom && b.zoom) merged.zoom = [a.zoom[0] * b.zoom[0], b.zoom[1], b.zoom[2]];
   return merged;
 }

@@ -50,7 +50,7 @@ const methods = {
     });
     viewer = await Viewer.create(canvas, width, height, ratio);
     invalidate();
-    return { adapter: viewer.adapter(), palette: viewer.palette() };
+    return { adapter: viewer.adapter() };
   },
 
   clear(fields) {
@@ -146,30 +146,36 @@ const methods = {
   /**
    * Applies what has been set since the last call, in one go.
    *
-   * @param {{ size?: [number, number, number], orbit?: [number, number], pan?: [number, number], [setting: string]: any }} settings
+   * @param {{ size?: [number, number, number], orbit?: [number, number], pan?: [number, number],
+   *   zoom?: [number, number, number], fly?: [number, number, number], look?: [number, number],
+   *   [setting: string]: any }} settings
    */
-  update({ mode, isovalue, clip, roi, orbit, zoom, pan, home, size }) {
+  update({ scene, camera, orbit, zoom, pan, fly, look, home, side, size }) {
     if (size) viewer.resize(...size);
-    if (mode !== undefined) viewer.setMode(mode);
-    if (isovalue !== undefined) viewer.setIsovalue(isovalue);
-    if (clip !== undefined) {
-      const [x, y, z] = clip?.normal ?? [0, 0, 0];
-      viewer.setClip(x, y, z, clip?.offset ?? 0);
-    }
-    if (roi !== undefined) viewer.setRoi(roi ? Float64Array.from(roi) : undefined);
+    if (scene) viewer.setScene(scene);
     if (home) viewer.home();
+    if (side) viewer.lookFrom(side);
+    if (camera) viewer.setCamera(camera);
     if (orbit) viewer.orbit(...orbit);
-    if (zoom !== undefined) viewer.zoom(zoom);
+    if (zoom) viewer.zoom(...zoom);
     if (pan) viewer.pan(...pan);
+    if (fly) viewer.fly(...fly);
+    if (look) viewer.look(...look);
     invalidate();
   },
 
-  pickRoi: (x, y) => viewer.pickRoi(x, y),
+  pickRegion: (x, y) => viewer.pickRegion(x, y),
 
-  dragRoi(handle, x, y) {
-    const box = viewer.dragRoi(handle, x, y);
+  dragRegion(handle, x, y) {
+    const box = viewer.dragRegion(handle, x, y);
     invalidate();
     return Array.from(box);
+  },
+
+  /** What is shown at a point; a plain object with the values of the fields by name. */
+  probe(x, y) {
+    const found = /** @type {any} */ (viewer.probe(x, y));
+    return found && { ...found, values: Object.fromEntries(found.values) };
   },
 
   hash: () => viewer.hash(),
@@ -271,16 +277,35 @@ function draw() {
     const start = performance.now();
     const drew = viewer.frame();
     const milliseconds = performance.now() - start;
-    if (drew) drawing = milliseconds;
-    if (drew) emit("frame", { milliseconds, triangles: viewer.triangles, bytes, ready });
+    if (drew) {
+      drawing = milliseconds;
+      const uploaded = viewer.takeUploaded();
+      emit("frame", { milliseconds, triangles: viewer.triangles, uploaded, bytes, ready });
+      report("camera", viewer.camera());
+      report("legend", viewer.legend());
+    }
     // The canvas may be hidden just now: then try again with the next refresh.
     else if (viewer.pending) invalidate();
+    // At rest the picture gets better with every refresh.
+    else if (viewer.canImprove && !viewer.moving) viewer.improve();
+    if (viewer.canImprove) invalidate();
   } catch (error) {
     // A frame that fails would fail again: wait for a change, or stop if the GPU or the worker is lost.
     broken = error?.code === "device-lost" || error?.code === undefined;
     emit("error", flattenError(error));
   }
   if (ready && viewer.moving) invalidate();
+}
+
+/** The last reports, as JSON. */
+const reported = new Map();
+
+/** Reports `data` if they differ from the last ones of this name. */
+function report(name, data) {
+  const text = JSON.stringify(data) ?? "";
+  if (reported.get(name) === text) return;
+  reported.set(name, text);
+  emit(name, data);
 }
 
 /** Resolves after a frame has been handed to the screen; soon in any case, since hidden pages have no frames. */

@@ -57,8 +57,10 @@ export interface ViewerStats extends RefineStats {
 export interface ViewerFrame {
   /** Time of the worker to extract, upload and draw it. */
   milliseconds: number;
-  /** Triangles of the isosurface or of the cut-away view. */
+  /** Triangles of all surfaces. */
   triangles: number;
+  /** Bytes that were uploaded to the GPU for it. */
+  uploaded: number;
   /** Bytes of the file that had been decoded. */
   bytes: number;
   /** Whether it shows a volume yet. */
@@ -79,18 +81,182 @@ export interface OpenedVolume {
   finished: Promise<void>;
 }
 
-/** A clip plane: the side that `normal` points to is hidden. */
-export interface ClipPlane {
+/** A plane, `normal · p = offset`. As a clip plane it cuts away the side that `normal` points to. */
+export interface PlaneState {
+  /** Any length but zero. */
   normal: [number, number, number];
   /** `normal · p` of its points. */
   offset: number;
 }
 
-export interface ViewerEventMap {
-  progress: CustomEvent<ViewerProgress>;
-  stats: CustomEvent<ViewerStats>;
-  frame: CustomEvent<ViewerFrame>;
-  error: CustomEvent<Error>;
+/** An isosurface. */
+export interface IsosurfaceState {
+  /** In field units; the middle of the field's range without it. */
+  value?: number;
+  /** 0 to 1; 1 without it. */
+  opacity?: number;
+  /** `"#rrggbb"`, for both sides; without it, and without `field`, each side has a colour of its own. */
+  colour?: string;
+  /** The name of the field whose values colour it. */
+  field?: string;
+  /** Draws the sides of its facets. */
+  edges?: boolean;
+}
+
+/** The volume, as emission and absorption. */
+export interface VolumeState {
+  /** Values in field units, ascending, each with an opacity (0 to 1); a ramp over the range of the colours without it. */
+  opacities?: [value: number, opacity: number][];
+  /** Values, each with red, green, blue and opacity (0 to 1): in place of `opacities` and the colours of the scene. */
+  points?: [value: number, red: number, green: number, blue: number, opacity: number][];
+  /** The way, in model units, that has these opacities; a tenth of the domain's diagonal without it. */
+  unitLength?: number;
+  /** Whether clip planes cut it; they do without it. */
+  clipped?: boolean;
+}
+
+/** A section with a plane, coloured by a field. */
+export interface SliceState extends PlaneState {
+  /** 0 to 1; 1 without it. */
+  opacity?: number;
+  /** Draws the edges of the tetrahedra that it cuts. */
+  edges?: boolean;
+  /** The field that colours it; the one that is shown without it. */
+  field?: string;
+  /** Whether clip planes cut it; they do without it. */
+  clipped?: boolean;
+}
+
+/** The surface of the domain. What clip planes cut open is closed. */
+export interface BoundaryState {
+  /** 0 to 1; 1 without it. */
+  opacity?: number;
+  /** Draws the edges of tetrahedra. */
+  edges?: boolean;
+  /** `"#rrggbb"`, in place of the colours of the values. */
+  colour?: string;
+  /** Whether clip planes cut it; they do without it. */
+  clipped?: boolean;
+}
+
+/** The tetrahedra as they are. */
+export interface CellState {
+  /** `"solid"` without it. */
+  shape?: "solid" | "wire" | "points";
+  /** By which part of their size they are shrunk, 0 to 1. */
+  shrink?: number;
+  /** Leaves out tetrahedra, as a whole, with their centroid on the side that `normal` points to. */
+  cut?: PlaneState;
+  /** What colours them; the field without it. */
+  colourBy?: "field" | "size" | "error" | "depth" | "block" | "missing";
+  /** Whether edges are drawn; they are without it. */
+  edges?: boolean;
+  /** Width of wires and edges, in CSS pixels; points are four times as large. */
+  width?: number;
+}
+
+/** Tubes along a vector field. */
+export interface StreamlineState {
+  /** The names of the fields along x, y and z. */
+  fields: [string, string, string];
+  /** Where they start, in model units. */
+  seeds: [number, number, number][];
+  /** In model units; 1/400 of the domain's diagonal without it. */
+  radius?: number;
+  /** The field that colours them; the speed without it. */
+  field?: string;
+}
+
+/** Arrows of a vector field. */
+export interface ArrowState {
+  /** The names of the fields along x, y and z. */
+  fields: [string, string, string];
+  /** From one to the next, in model units; 1/20 of the domain's diagonal without it. */
+  spacing?: number;
+  /** The field that colours them; the magnitude without it. */
+  field?: string;
+  /** Makes all of one length. */
+  constant?: boolean;
+}
+
+/** The colours of values. */
+export interface ColourState {
+  /** The name of a colour map, such as `"viridis"`, `"turbo"`, `"coolwarm"` or `"grey"`. */
+  map?: string;
+  /** The values with the first and the last colour; the range of what is coloured without it. */
+  range?: [number, number];
+  /** Lets the colours run backwards. */
+  reversed?: boolean;
+  /** A logarithmic scale; the range must be positive. */
+  log?: boolean;
+}
+
+/** Where the camera is. */
+export interface CameraState {
+  /** What it looks at, in model units. */
+  target: [number, number, number];
+  /** From there to the eye, in model units. */
+  distance: number;
+  /** The turn around z, in radians. */
+  yaw: number;
+  /** How far it looks from above, in radians. */
+  pitch: number;
+  projection: "perspective" | "orthographic";
+}
+
+/** What is drawn: any of these at once, in exact order, also where they are transparent. */
+export interface SceneState {
+  isosurfaces?: IsosurfaceState[];
+  volume?: VolumeState;
+  slices?: SliceState[];
+  boundary?: BoundaryState;
+  cells?: CellState;
+  streamlines?: StreamlineState;
+  arrows?: ArrowState;
+  /** Planes that cut away; with a `clipBox`, which counts as six, at most 16. */
+  clips?: PlaneState[];
+  /** Everything outside of this box is cut away: `[x0, y0, z0, x1, y1, z1]`. */
+  clipBox?: [number, number, number, number, number, number];
+  colours?: ColourState;
+  /** `"dark"` without it. */
+  background?: "dark" | "light" | "transparent";
+  /** How dark places get that hardly any light reaches, 0 to 1; 0.5 without it. */
+  shade?: number;
+  /** Whether the box around the domain is drawn; it is without it. */
+  outline?: boolean;
+  /** A box with handles. It is a picture only: pass `box` to `refine` to use it. */
+  region?: ArrayLike<number>;
+}
+
+/** All that can be set: what is drawn, and where from. Plain data, for JSON and URLs. */
+export interface ViewerState extends SceneState {
+  camera?: CameraState;
+}
+
+/** What the colours of the picture mean. */
+export interface Legend {
+  /** The name of the field, or what tetrahedra are coloured by. */
+  label: string;
+  range: [number, number];
+  log: boolean;
+  /** Evenly spaced CSS colours from the lower to the upper end of the range. */
+  colours: string[];
+  /** `fraction` is where the tick is in the range, 0 to 1. */
+  ticks: { value: number; label: string; fraction: number }[];
+}
+
+/** What is shown at a point. */
+export interface ViewerProbe {
+  /** In model units. */
+  position: [number, number, number];
+  /** The value of each field, by its name. */
+  values: Record<string, number>;
+  /** The number of the tetrahedron in the current mesh. */
+  tet: number;
+  /** Its longest edge, in model units. */
+  size: number;
+  /** Its error, as a fraction of the field's range. */
+  error: number;
 }
 
 /**
@@ -102,7 +268,8 @@ export interface ViewerEventMap {
  * const viewer = await Viewer.create(document.querySelector("canvas"));
  * const { info } = await viewer.open("bucky.mt");
  * await viewer.refine({ error: "1%" });
- * await viewer.setIsovalue((info.fields[0].min + info.fields[0].max) / 2);
+ * const [{ min, max }] = info.fields;
+ * await viewer.set({ isosurfaces: [{ value: min + 0.6 * (max - min), opacity: 0.5 }], volume: {} });
  * ```
  */
 export class Viewer extends EventTarget {
@@ -116,8 +283,10 @@ export class Viewer extends EventTarget {
   readonly info: MtInfo | undefined;
   /** The name of the GPU. */
   readonly adapter: string;
-  /** Sixteen evenly spaced colours of the colour map as CSS colours. */
-  readonly palette: string[];
+  /** What the colours mean; `undefined` where nothing is coloured by values. */
+  readonly legend: Legend | undefined;
+  /** All that is set, as plain data: `set` takes it. */
+  readonly state: ViewerState;
 
   /**
    * Opens a volume in place of the one before; resolves when its base mesh has been drawn. URLs are fetched in parts where
@@ -139,27 +308,37 @@ export class Viewer extends EventTarget {
    * await viewer.refine({ view: { pixels: 1, outside: "10%" }, maxTets: 300_000 });
    */
   refine(options?: ViewerRefineOptions): Promise<ViewerStats>;
-  setMode(mode: "iso" | "cutaway"): Promise<void>;
-  /** In field units. */
-  setIsovalue(value: number): Promise<void>;
-  /** `null` hides nothing. */
-  setClip(plane: ClipPlane | null): Promise<void>;
-  /** Shows a box, `[x0, y0, z0, x1, y1, z1]`, with handles; `null` hides it. Pass `box` to `refine` to use it. */
-  setRoi(box: ArrayLike<number> | null): Promise<void>;
+  /**
+   * Changes what is drawn, and the camera: what is named replaces what was there, `null` gives it its default, all else
+   * stays. Rejects with code `bad-option`, and changes nothing, if something is wrong.
+   *
+   * @example
+   * await viewer.set({ isosurfaces: [], slices: [{ normal: [0, 0, 1], offset: 0.5 }], colours: { map: "magma" } });
+   */
+  set(changes: { [K in keyof ViewerState]?: ViewerState[K] | null }): Promise<void>;
 
   /** Rotates the model to the right and upwards, in radians. */
   orbit(right: number, up: number): Promise<void>;
-  /** Multiplies the distance to the model. */
-  zoom(factor: number): Promise<void>;
+  /** Multiplies the distance to the model; the point of the canvas (−1 to 1, y upwards; its middle) stays where it is. */
+  zoom(factor: number, x?: number, y?: number): Promise<void>;
   /** Moves the picture by fractions of the canvas's height. */
   pan(right: number, up: number): Promise<void>;
   /** Shows the whole model from the front. */
   home(): Promise<void>;
 
-  /** The handle (0 to 5: lower and upper x, y, z) at a point of the canvas (−1 to 1, y upwards), or −1. */
-  pickRoi(x: number, y: number): Promise<number>;
-  /** Moves a handle under a point; resolves to the new box. */
-  dragRoi(handle: number, x: number, y: number): Promise<number[]>;
+  /** Shows the whole model from a side. */
+  lookFrom(side: "home" | "alongX" | "againstX" | "alongY" | "againstY" | "alongZ" | "againstZ"): Promise<void>;
+  /** Moves the eye to the right, up and ahead, by multiples of its distance to the model. */
+  fly(right: number, up: number, ahead: number): Promise<void>;
+  /** Turns the eye where it is, to the right and upwards, in radians. */
+  look(right: number, up: number): Promise<void>;
+
+  /** What is shown at a point of the canvas (−1 to 1, y upwards); `undefined` if nothing is there. */
+  probe(x: number, y: number): Promise<ViewerProbe | undefined>;
+  /** The handle of the region (0 to 5: lower and upper x, y, z) at a point of the canvas (−1 to 1, y upwards), or −1. */
+  pickRegion(x: number, y: number): Promise<number>;
+  /** Moves a handle of the region under a point; resolves to the new box. */
+  dragRegion(handle: number, x: number, y: number): Promise<number[]>;
 
   /** A hash of the current mesh: the same request gives the same hash on every machine. */
   hash(): Promise<string>;

@@ -22,12 +22,14 @@ const NO_PAGE = 'a viewer draws on a canvas of a page; elsewhere, use MultiTesse
 const USED_CANVAS =
   "`canvas` has been used by another viewer, or has a context of its own; give each viewer a new canvas element";
 
+/** What is drawn before something else is set: the isosurface in the middle of the field's range. */
+const SCENE = { isosurfaces: [{}] };
+
 export class Viewer extends EventTarget {
   #remote;
   #canvas;
   #observer;
   #info;
-  #palette;
   #adapter;
   #stream = null;
   /** For a file in parts: resolves when a mesh is requested. */
@@ -36,7 +38,11 @@ export class Viewer extends EventTarget {
   /** Callers that wait for a mesh, by the number of their request. */
   #waiting = [];
   #update = new Latest((changes) => this.#remote.call("update", [changes]), mergeUpdates);
-  #drag = new Latest(([handle, x, y]) => this.#remote.call("dragRoi", [handle, x, y]));
+  #drag = new Latest(([handle, x, y]) => this.#remote.call("dragRegion", [handle, x, y]));
+  #probe = new Latest(([x, y]) => this.#remote.call("probe", [x, y]));
+  #scene = SCENE;
+  #camera;
+  #legend;
 
   /** Rejects with code `no-webgpu` where nothing can be drawn; resolves to nothing where it can. */
   static async check() {
@@ -84,7 +90,6 @@ export class Viewer extends EventTarget {
     const [width, height] = pixels(this.#canvas.getBoundingClientRect());
     const created = await this.#remote.call("create", [offscreen, width, height, devicePixelRatio], [offscreen]);
     this.#adapter = created.adapter;
-    this.#palette = created.palette;
     this.#observer = new ResizeObserver(([entry]) => {
       const size = entry.devicePixelContentBoxSize?.[0];
       const [w, h] = size ? [size.inlineSize, size.blockSize] : pixels(entry.contentRect);
@@ -101,6 +106,8 @@ export class Viewer extends EventTarget {
   #heard(name, data) {
     if (name === "error") return this.#emit("error", reviveError(data));
     if (name === "failed") return this.#failed(data.goal, reviveError(data.error));
+    if (name === "camera") this.#camera = data;
+    if (name === "legend") this.#legend = data;
     this.#emit(name, data);
     if (name === "stats" && data.done) this.#settle(data.goal, ({ resolve }) => resolve(data));
   }
@@ -131,10 +138,14 @@ export class Viewer extends EventTarget {
     return this.#adapter;
   }
 
-  /** Sixteen evenly spaced colours of the colour map as CSS colours, for a legend. */
-  get palette() {
-    const bytes = this.#palette;
-    return Array.from({ length: bytes.length / 4 }, (_, i) => `rgb(${bytes.slice(i * 4, i * 4 + 3).join(" ")})`);
+  /** What the colours mean; `undefined` where nothing is coloured by values. */
+  get legend() {
+    return this.#legend;
+  }
+
+  /** All that is set: what is drawn, and `camera`. A copy, as plain data; `set` takes it. */
+  get state() {
+    return structuredClone({ ...this.#scene, camera: this.#camera });
   }
 
   /**
@@ -228,24 +239,23 @@ export class Viewer extends EventTarget {
     return this.#update.call(changes);
   }
 
-  /** `"iso"` or `"cutaway"`. */
-  setMode(mode) {
-    return this.#change({ mode });
-  }
-
-  /** The isosurface's value in field units. */
-  setIsovalue(isovalue) {
-    return this.#change({ isovalue });
-  }
-
-  /** Cuts away what lies beyond a plane, `{ normal, offset }`; `null` cuts nothing. */
-  async setClip(clip) {
-    return this.#change({ clip: clip ? plane(clip) : null });
-  }
-
-  /** Shows a box with handles; `null` hides it. It is a picture only: pass `box` to `refine` to use it. */
-  setRoi(box) {
-    return this.#change({ roi: box ? Array.from(box) : null });
+  /**
+   * Changes what is drawn, and the camera: what is named in `changes` replaces what was there, `null` gives it its default, all
+   * else stays. If something is wrong, nothing changes.
+   *
+   * @param {Record<string, any>} changes
+   */
+  async set({ camera, ...changes } = {}) {
+    const before = this.#scene;
+    const all = Object.entries({ ...before, ...sendable(changes, true) });
+    const scene = Object.fromEntries(all.filter(([, value]) => value !== null && value !== undefined));
+    this.#scene = scene;
+    try {
+      await this.#change(camera ? { scene, camera } : { scene });
+    } catch (error) {
+      if (this.#scene === scene) this.#scene = before;
+      throw error;
+    }
   }
 
   /** Rotates the model to the right and upwards, in radians. */
@@ -253,9 +263,9 @@ export class Viewer extends EventTarget {
     return this.#change({ orbit: [right, up] });
   }
 
-  /** Multiplies the distance to the model. */
-  zoom(factor) {
-    return this.#change({ zoom: factor });
+  /** Multiplies the distance to the model; the point of the canvas (−1 to 1, y upwards) stays where it is. */
+  zoom(factor, x = 0, y = 0) {
+    return this.#change({ zoom: [factor, x, y] });
   }
 
   /** Moves the picture by fractions of the canvas's height. */
@@ -268,14 +278,36 @@ export class Viewer extends EventTarget {
     return this.#change({ home: true });
   }
 
-  /** The handle of the box at a point (−1 to 1, y upwards), or −1. */
-  pickRoi(x, y) {
-    return this.#remote.call("pickRoi", [x, y]);
+  /** Shows the whole model from a side: `"home"`, `"alongX"`, `"againstX"`, and so on. */
+  lookFrom(side) {
+    return this.#change({ side });
   }
 
-  /** Moves a handle of the box under a point; resolves to the new box. */
-  dragRoi(handle, x, y) {
-    return this.#drag.call([handle, x, y]);
+  /** Moves the eye to the right, up and ahead, by multiples of its distance to the model. */
+  fly(right, up, ahead) {
+    return this.#change({ fly: [right, up, ahead] });
+  }
+
+  /** Turns the eye where it is, to the right and upwards, in radians. */
+  look(right, up) {
+    return this.#change({ look: [right, up] });
+  }
+
+  /** What is shown at a point of the canvas (−1 to 1, y upwards); `undefined` if nothing is there. */
+  probe(x, y) {
+    return this.#probe.call([x, y]);
+  }
+
+  /** The handle of the region at a point (−1 to 1, y upwards), or −1. */
+  pickRegion(x, y) {
+    return this.#remote.call("pickRegion", [x, y]);
+  }
+
+  /** Moves a handle of the region under a point; resolves to the new box. */
+  async dragRegion(handle, x, y) {
+    const region = await this.#drag.call([handle, x, y]);
+    this.#scene = { ...this.#scene, region };
+    return region;
   }
 
   /** A hash of the current mesh: the same request gives the same hash on every machine. */
@@ -310,15 +342,6 @@ function handOver(canvas) {
   } catch (error) {
     throw new TetralodError("bad-option", USED_CANVAS, { cause: error });
   }
-}
-
-/** A plane, as a worker takes it. */
-function plane({ normal, offset }) {
-  const numbers = [...Array.from(normal ?? []), offset];
-  if (numbers.length !== 4 || !numbers.every(Number.isFinite) || numbers.slice(0, 3).every((x) => x === 0)) {
-    throw new TetralodError("bad-option", "option `clip`: must have a `normal` of three numbers, not all 0, and an `offset`");
-  }
-  return { normal: numbers.slice(0, 3), offset };
 }
 
 function pixels({ width, height }) {

@@ -19,9 +19,9 @@ const KEY_ZOOM = 1.15;
 export function attachControls(canvas, viewer, { onHome, onBox }) {
   /** The last position of each pressed pointer. @type {Map<number, { x: number, y: number }>} */
   const pointers = new Map();
-  /** The handle that is being dragged, −1 for none, null until `pickRoi` has answered. */
+  /** The handle that is being dragged, −1 for none, null until `pickRegion` has answered. */
   let handle = -1;
-  /** Counts presses: a late answer of `pickRoi` is for an earlier press and must be ignored. */
+  /** Counts presses: a late answer of `pickRegion` is for an earlier press and must be ignored. */
   let press = 0;
   let hovering = false;
 
@@ -44,7 +44,7 @@ export function attachControls(canvas, viewer, { onHome, onBox }) {
       return;
     }
     handle = null;
-    const found = await viewer.pickRoi(...point(event)).catch(() => -1);
+    const found = await viewer.pickRegion(...point(event)).catch(() => -1);
     if (mine === press && handle === null) {
       handle = found;
       canvas.classList.toggle("on-handle", found >= 0);
@@ -71,7 +71,7 @@ export function attachControls(canvas, viewer, { onHome, onBox }) {
   });
 
   function drag(event) {
-    viewer.dragRoi(handle, ...point(event)).then(onBox, ignore);
+    viewer.dragRegion(handle, ...point(event)).then(onBox, ignore);
   }
 
   function pinch(event, dx, dy) {
@@ -86,7 +86,7 @@ export function attachControls(canvas, viewer, { onHome, onBox }) {
   async function hover(event) {
     if (hovering || event.pointerType === "touch") return;
     hovering = true;
-    const found = await viewer.pickRoi(...point(event)).catch(() => -1);
+    const found = await viewer.pickRegion(...point(event)).catch(() => -1);
     hovering = false;
     if (pointers.size === 0) canvas.classList.toggle("on-handle", found >= 0);
   }
@@ -108,7 +108,7 @@ export function attachControls(canvas, viewer, { onHome, onBox }) {
       event.preventDefault();
       // Lines and pages to pixels; a pinch on a touchpad arrives as small wheel steps with Ctrl.
       const pixels = event.deltaY * [1, 16, 400][event.deltaMode] * (event.ctrlKey ? 6 : 1);
-      viewer.zoom(Math.exp(Math.max(-400, Math.min(400, pixels)) * 0.0015)).catch(ignore);
+      viewer.zoom(Math.exp(Math.max(-400, Math.min(400, pixels)) * 0.0015), ...point(event)).catch(ignore);
     },
     { passive: false },
   );

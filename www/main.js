@@ -63,10 +63,10 @@ async function start() {
     return;
   }
   $("gpu").textContent = viewer.adapter && `GPU: ${viewer.adapter}`;
-  $("legend-bar").style.background = `linear-gradient(90deg, ${viewer.palette.join(", ")})`;
   viewer.addEventListener("progress", ({ detail }) => showProgress(detail));
   viewer.addEventListener("stats", ({ detail }) => showStats(detail));
   viewer.addEventListener("frame", ({ detail }) => showFrame(detail));
+  viewer.addEventListener("legend", ({ detail }) => showLegend(detail));
   viewer.addEventListener("error", ({ detail }) => fail(detail));
   attachControls(canvas, viewer, { onHome: home, onBox: boxWasDragged });
   attachSettings();
@@ -154,10 +154,6 @@ function chooseField() {
   $("time-row").hidden = steps.length < 2;
   field = demo.info.fields[steps[$("time").value]];
   if (field.time !== undefined) text("time-text", String(Number(field.time.toPrecision(6))), "time");
-  $("legend").hidden = false;
-  $("legend-name").textContent = field.unit ? `${field.name} in ${field.unit}` : field.name;
-  $("legend-min").textContent = short(field.min);
-  $("legend-max").textContent = short(field.max);
   applyIsovalue();
 }
 
@@ -199,7 +195,7 @@ function say(title, error) {
 /* Settings */
 
 const checked = (name) => /** @type {HTMLInputElement} */ (document.querySelector(`[name=${name}]:checked`)).value;
-const mode = () => /** @type {"iso" | "cutaway"} */ (checked("mode"));
+const mode = () => /** @type {"iso" | "volume" | "slice" | "solid" | "mesh"} */ (checked("mode"));
 const refineBy = () => checked("refine-by");
 
 /** Positions of the slider of the field error: by screen error, it applies outside the view and may be coarser. */
@@ -247,15 +243,53 @@ function refine() {
 function applyIsovalue() {
   const value = isovalue();
   text("isovalue-text", `${short(value)} ${field.unit}`.trim(), "isovalue");
-  $("legend-mark").style.left = `${$("isovalue").value / 10}%`;
-  viewer.setIsovalue(value);
+  draw();
   if ($("focus").checked) refine();
 }
 
 function applyMode() {
-  for (const row of all("[data-mode]")) row.hidden = row.dataset.mode !== mode();
-  $("legend-mark").hidden = mode() !== "iso";
-  viewer.setMode(mode());
+  for (const row of all("[data-mode]")) row.hidden = !row.dataset.mode.split(" ").includes(mode());
+  // Slices keep both sides.
+  $("flip").parentElement.hidden = mode() === "slice";
+  $("cut-label").textContent = mode() === "slice" ? "Plane" : "Clip plane";
+  applyCut();
+  draw();
+}
+
+/** Draws what the settings say. */
+function draw() {
+  if (!demo.info) return;
+  const opacity = $("opacity").value / 100;
+  text("opacity-text", `${$("opacity").value} %`, "opacity");
+  const colours = { map: $("map").value };
+  const nothing = { isosurfaces: [], volume: null, slices: [], boundary: null, cells: null, clips: [] };
+  const [low, high] = [field.min, field.max];
+  const shown = {
+    iso: { isosurfaces: [{ value: isovalue(), opacity }] },
+    volume: { volume: { opacities: [[low, 0], [low + 0.3 * (high - low), 0], [high, 0.8 * opacity]] } },
+    slice: { slices: [{ ...plane(), opacity, edges: true }] },
+    solid: { boundary: { opacity, edges: true }, clips: [plane()] },
+    mesh: { cells: { cut: plane(), colourBy: $("colour-by").value } },
+  }[mode()];
+  viewer.set({ ...nothing, ...shown, colours }).catch(fail);
+}
+
+/** The colour bar of what is drawn. */
+function showLegend(legend) {
+  $("legend").hidden = !legend;
+  if (!legend) return;
+  const { label, colours, ticks } = legend;
+  const unit = field?.name === label && field.unit;
+  $("legend-name").textContent = unit ? `${label} in ${unit}` : label;
+  $("legend-bar").style.background = `linear-gradient(90deg, ${colours.join(", ")})`;
+  $("legend-ticks").replaceChildren(
+    ...ticks.map(({ label: value, fraction }) => {
+      const tick = document.createElement("span");
+      tick.textContent = value;
+      tick.style.left = `${100 * fraction}%`;
+      return tick;
+    }),
+  );
 }
 
 /** The clip plane. @returns {{ normal: [number, number, number], offset: number }} */
@@ -274,8 +308,10 @@ function applyCut() {
   const { normal, offset } = plane();
   const at = normal[axis] * offset;
   const where = Math.abs(at) < (high - low) * 1e-4 ? 0 : Number(at.toPrecision(3));
-  text("cut-text", `Hide ${"xyz"[axis]} ${$("flip").checked ? "<" : ">"} ${where}`, "cut");
-  viewer.setClip({ normal, offset });
+  const side = $("flip").checked ? "<" : ">";
+  const shown = mode() === "slice" ? `${"xyz"[axis]} = ${where}` : `Hide ${"xyz"[axis]} ${side} ${where}`;
+  text("cut-text", shown, "cut");
+  draw();
   if ($("region").value === "cut") refine();
 }
 
@@ -298,7 +334,7 @@ function region() {
 function applyRoi() {
   const on = ["box", "sphere"].includes($("region").value);
   $("box").hidden = !on;
-  viewer.setRoi(on ? box : null);
+  viewer.set({ region: on ? box : null }).catch(fail);
 }
 
 function applyRefineBy() {
@@ -344,6 +380,7 @@ function attachSettings() {
   for (const radio of document.querySelectorAll("[name=mode]")) radio.addEventListener("change", applyMode);
   on("isovalue", () => field && applyIsovalue());
   on("cut", applyCut);
+  for (const id of ["opacity", "map", "colour-by"]) on(id, draw);
   on("axis", applyCut);
   on("flip", applyCut);
   for (const radio of document.querySelectorAll("[name=refine-by]")) radio.addEventListener("change", applyRefineBy);

@@ -24,7 +24,11 @@ const HOME: [f64; 2] = [-1.05, 0.42];
 
 /// How points become a picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "web", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "camelCase"))]
+#[cfg_attr(
+    any(feature = "web", feature = "gpu"),
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "camelCase")
+)]
 pub enum Projection {
     /// What is farther away looks smaller.
     #[default]
@@ -55,7 +59,11 @@ pub enum ViewPreset {
 
 /// Where a camera is, as plain numbers: to be kept, sent and set again.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "web", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "camelCase"))]
+#[cfg_attr(
+    any(feature = "web", feature = "gpu"),
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "camelCase")
+)]
 pub struct CameraState {
     /// What it looks at, in model units.
     pub target: [f64; 3],

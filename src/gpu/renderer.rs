@@ -15,6 +15,8 @@ use crate::gpu::{BoxLines, CellStyle, Context, GpuError, Look, Style};
 use crate::view::{Medium, MeshView, Place, SurfaceChanges, Triangles};
 use std::collections::BTreeMap;
 use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Draws pictures of a mesh on a canvas, into an image, or into the views of another program.
 ///
@@ -37,6 +39,8 @@ pub struct Renderer {
     composite: Composite,
     wire: WirePass,
     presenter: Presenter,
+    /// Pictures that the device has not finished.
+    in_flight: Arc<AtomicU32>,
     /// What the last picture showed, and of how many it is the mean.
     last: Option<(Camera, Look, u32)>,
 }
@@ -100,6 +104,7 @@ impl Renderer {
             composite: Composite::new(&context),
             wire: WirePass::new(&context, &common),
             presenter: Presenter::new(&context, &common),
+            in_flight: Arc::default(),
             last: None,
             context,
             target,
@@ -278,6 +283,18 @@ impl Renderer {
         self.draw_on(camera, look, 0, Some(view)).map(|_| ())
     }
 
+    /// How many pictures the device has not finished. Who draws on a canvas waits until there is at most one, so that the camera is
+    /// not behind.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    pub fn in_flight(&self) -> Result<u32, GpuError> {
+        // Native devices call back from here, browsers on their own.
+        let polled = self.context.device.poll(wgpu::PollType::Poll);
+        polled.map_err(|error| GpuError::Refused(error.to_string()))?;
+        Ok(self.in_flight.load(Ordering::Relaxed))
+    }
+
     /// Whether the last picture lacked room for all that is not opaque: then it must be drawn again. It is known some time after
     /// the picture.
     pub fn is_short(&mut self) -> bool {
@@ -333,6 +350,11 @@ impl Renderer {
             self.lists.copy_count(&mut encoder);
         }
         self.context.queue.submit([encoder.finish()]);
+        self.in_flight.fetch_add(1, Ordering::Relaxed);
+        let in_flight = self.in_flight.clone();
+        self.context.queue.on_submitted_work_done(move || {
+            in_flight.fetch_sub(1, Ordering::Relaxed);
+        });
         if has_lists {
             self.lists.read_count();
         }

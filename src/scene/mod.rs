@@ -11,7 +11,7 @@ pub use state::{
     MapName, PlaneState, SceneState, SliceState, StreamlineState, VolumeState,
 };
 
-use crate::geom::{Bounds, Camera};
+use crate::geom::{Bounds, Camera, Ray};
 use crate::gpu::{BoxLines, GpuError, Look, MOST_CLIPS, Renderer};
 use crate::session::{Session, SessionError};
 use crate::view::{ClipPlane, ColourScale, Probe, ScaleError};
@@ -185,6 +185,20 @@ impl Scene {
     ) -> Result<Vec<u8>, SceneError> {
         self.place_eye(session, camera);
         Ok(self.renderer.picture(camera, &self.look, samples).await?)
+    }
+
+    /// Draws the last picture again, for a smoother mean of several: see [`Renderer::draw_again`].
+    ///
+    /// # Errors
+    /// As [`Scene::draw`].
+    pub fn draw_again(&mut self) -> Result<bool, SceneError> {
+        Ok(self.renderer.draw_again()?)
+    }
+
+    /// The nearest point that is shown along a ray: of an isosurface, a slice, the boundary, or of the volume where half of the
+    /// light is lost; none if there is none.
+    pub fn pick(&self, session: &mut Session, ray: &Ray) -> Option<[f64; 3]> {
+        self.objects.pick(session, &self.state, &self.look.clips, ray, self.bounds.as_ref()?)
     }
 
     /// Tells the renderer in which tetrahedron the eye is.

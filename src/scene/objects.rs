@@ -2,14 +2,15 @@
 
 use super::state::{ArrowState, CellKind, CellState, ColourState, IsosurfaceState, StreamlineState};
 use super::{Legend, PlaneState, SceneError, SceneState, SliceState, VolumeState, clips};
-use crate::geom::Bounds;
+use crate::geom::{Bounds, Ray};
 use crate::gpu::{CellShape, CellStyle, Colouring, EdgeLook, Lighting, Renderer, SIDES, Style};
 use crate::mt::MtInfo;
 use crate::session::{Session, TetQuantity};
 use crate::view::{
-    ArrowLength, ArrowOptions, BoundarySurface, ClipPlane, ColourScale, IsoSurface, Medium, MeshView, Slice,
-    Solids, TraceOptions, Tracer, Triangles, TubeOptions,
+    ArrowLength, ArrowOptions, BoundarySurface, ClipPlane, ColourScale, IsoSurface, Medium, MeshView, Probe,
+    Slice, Solids, TraceOptions, Tracer, Triangles, TubeOptions, first_hit, first_hit_in,
 };
+use glam::DVec3;
 use std::ops::Range;
 
 /// Numbers of surfaces in the renderer: those of lists begin at these.
@@ -142,6 +143,41 @@ impl Objects {
         self.update_arrows(renderer, &input)?;
         self.update_legend(&input)?;
         Ok(true)
+    }
+
+    /// The nearest point along a ray of what is shown.
+    pub(super) fn pick(
+        &self,
+        session: &mut Session,
+        state: &SceneState,
+        clips: &[ClipPlane],
+        ray: &Ray,
+        bounds: &Bounds,
+    ) -> Option<[f64; 3]> {
+        let surfaces = self.isosurfaces.iter().map(|own| Triangles::from(&own.surface));
+        let boundary = state.boundary.as_ref().map(|_| Triangles::from(&self.boundary));
+        let hits = surfaces.chain(boundary).filter_map(|triangles| first_hit(&triangles, ray, clips));
+        let mut found: Vec<(f64, [f64; 3])> = hits.map(|hit| (hit.distance, hit.position)).collect();
+        let shown = session.field();
+        let info = session.info()?.fields.get(shown)?;
+        let own = [info.min, info.max];
+        let mut probe = Probe::new(session.view());
+        for slice in &state.slices {
+            let slope = ray.direction.dot(slice.normal.into());
+            let distance = (slice.offset - ray.origin.dot(slice.normal.into())) / slope;
+            let place = ray.at(distance);
+            let is_kept = clips.iter().all(|clip| is_kept(clip, place));
+            if distance > 0.0 && is_kept && probe.locate(place.into()).is_some() {
+                found.push((distance, place.into()));
+            }
+        }
+        if let (Some(volume), Ok(scale)) = (&state.volume, scale(&state.colours, state.colours.range, own)) {
+            let medium = medium(volume, &scale, bounds.diagonal());
+            probe.make_grid();
+            let hit = first_hit_in(&medium, &probe, ray, clips);
+            found.extend(hit.map(|hit| (hit.distance, hit.position)));
+        }
+        found.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, position)| position)
     }
 
     fn update_volume(
@@ -423,6 +459,13 @@ fn isosurface_style(state: &IsosurfaceState, scale: Option<ColourScale>) -> Styl
         edges: state.edges.then(EdgeLook::default),
         ..Style::default()
     }
+}
+
+/// Whether a plane leaves a point, but for rounding.
+fn is_kept(clip: &ClipPlane, point: DVec3) -> bool {
+    let normal = DVec3::from(clip.normal.map(f64::from));
+    let offset = f64::from(clip.offset);
+    normal.dot(point) <= offset + 1e-6 * (normal.length() + offset.abs())
 }
 
 /// A bit for each clip plane but those that are the same plane as `own`, whichever side they cut away.

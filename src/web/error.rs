@@ -52,6 +52,19 @@ impl From<crate::gpu::GpuError> for WebError {
     }
 }
 
+#[cfg(feature = "gpu")]
+impl From<crate::scene::SceneError> for WebError {
+    fn from(error: crate::scene::SceneError) -> Self {
+        use crate::scene::SceneError;
+        match error {
+            SceneError::Gpu(error) => error.into(),
+            SceneError::Session(error) => error.into(),
+            SceneError::State { what, problem } => Self::bad_option(&what, &problem),
+            SceneError::Scale(error) => Self::bad_option("colours", &error.to_string()),
+        }
+    }
+}
+
 impl From<WebError> for JsValue {
     fn from(error: WebError) -> Self {
         let js = js_sys::Error::new(&error.message);

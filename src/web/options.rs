@@ -233,12 +233,6 @@ fn known_field(info: &MtInfo, field: &Value) -> Result<usize, String> {
     }
 }
 
-/// The box of `[x0, y0, z0, x1, y1, z1]`.
-#[cfg(all(feature = "gpu", target_arch = "wasm32"))]
-pub fn bounds(numbers: &[f64]) -> Result<Bounds, WebError> {
-    corners(numbers).map_err(|problem| WebError::bad_option("box", problem))
-}
-
 fn corners(numbers: &[f64]) -> Result<Bounds, &'static str> {
     let &[x0, y0, z0, x1, y1, z1] = numbers else {
         return Err("must be six numbers: x0, y0, z0, x1, y1, z1");

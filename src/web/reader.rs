@@ -168,6 +168,9 @@ impl<'de> Deserializer<'de> for Reader {
         if let Some(text) = self.value.as_string() {
             return visitor.visit_string(text);
         }
+        if let Some(answer) = self.value.as_bool() {
+            return visitor.visit_bool(answer);
+        }
         if list(&self.value).is_some() {
             return self.deserialize_seq(visitor);
         }
@@ -196,13 +199,24 @@ impl<'de> Deserializer<'de> for Reader {
         visitor.visit_map(self.members()?)
     }
 
+    /// An enum is the name of one of its variants.
+    fn deserialize_enum<V: Visitor<'de>>(
+        self,
+        _name: &'static str,
+        _variants: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, ReadError> {
+        let name = self.value.as_string().ok_or_else(|| ReadError::new("must be a name"))?;
+        visitor.visit_enum(name.into_deserializer())
+    }
+
     fn deserialize_ignored_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, ReadError> {
         visitor.visit_unit()
     }
 
     forward_to_deserialize_any! {
         bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 char str string bytes byte_buf unit unit_struct newtype_struct
-        tuple tuple_struct map enum identifier
+        tuple tuple_struct map identifier
     }
 }
 

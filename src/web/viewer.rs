@@ -8,21 +8,27 @@
 use super::error::WebError;
 use super::file::File;
 use super::loader::RangeLoader;
-use super::options::{self, RefineOptions};
+use super::options::RefineOptions;
+use super::reader::read;
 use super::results::{self, JsBlocks, JsInfo, JsProgress, JsStats};
-use crate::geom::{Bounds, Camera};
-use crate::gpu::{BoxLines, Look, Renderer, Show};
+use crate::geom::{Bounds, Camera, CameraState, ViewPreset};
+use crate::gpu::Renderer;
 use crate::refine::{Part, View};
+use crate::scene::{Legend, Scene, SceneState};
 use crate::view::gizmo::{self, BoxFace};
-use crate::view::{ClipPlane, Cutaway};
 use glam::DVec2;
+use serde::Serialize;
 use wasm_bindgen::prelude::wasm_bindgen;
+use wasm_bindgen::{JsCast, JsValue};
 
 /// How close to a handle the pointer must be, in units of the page's layout.
 const REACH: f64 = 18.0;
 
-const DOMAIN_COLOUR: [f32; 4] = [0.85, 0.9, 1.0, 0.35];
-const ROI_COLOUR: [f32; 4] = [0.36, 0.86, 1.0, 1.0];
+/// Pictures of which the one at rest is the mean.
+const SAMPLES: u32 = 8;
+
+/// Ticks of the legend, at most.
+const TICKS: usize = 6;
 
 /// An MT and its picture on a canvas.
 #[wasm_bindgen]
@@ -30,38 +36,67 @@ pub struct Viewer {
     file: File,
     /// What takes the place of `file` when its first bytes are here.
     next: Option<File>,
-    renderer: Renderer,
-    look: Look,
+    scene: Scene,
     camera: Camera,
-    show: Show,
+    ratio: f64,
     /// The view that the needs which follow the camera have now.
     seen: View,
     /// Whether the mesh is not yet the one that was asked for.
     moving: bool,
-    isovalue: Option<f64>,
-    clip: ClipPlane,
-    cutaway: Cutaway,
-    /// The box around the base mesh, once it is there.
-    bounds: Option<Bounds>,
-    roi: Option<Bounds>,
-    stale: Stale,
-    /// Triangles of the isosurface that the renderer has.
-    surface_triangles: usize,
-    /// Whether the renderer has all of that surface, so that changes of it are enough.
-    surface_fits: bool,
+    /// Whether the picture is out of date.
+    is_stale: bool,
 }
 
-/// What the next frame must bring up to date.
-#[derive(Clone, Copy, Default)]
-struct Stale {
-    surface: bool,
-    cutaway: bool,
-    boxes: bool,
-    picture: bool,
+/// What the colours mean, for JavaScript.
+#[derive(Serialize)]
+struct LegendData<'a> {
+    label: &'a str,
+    range: [f64; 2],
+    log: bool,
+    /// Colours from the lower to the upper end of the range, `#rrggbb`.
+    colours: Vec<String>,
+    ticks: Vec<TickData>,
 }
 
-impl Stale {
-    const MESH: Self = Self { surface: true, cutaway: true, boxes: false, picture: true };
+/// A tick of the legend.
+#[derive(Serialize)]
+struct TickData {
+    value: f64,
+    label: String,
+    /// Where it is in the range, 0 to 1.
+    fraction: f64,
+}
+
+/// What is under the pointer.
+#[derive(Serialize)]
+struct ProbeData<'a> {
+    position: [f64; 3],
+    /// The value of each field, by its name.
+    values: Vec<(&'a str, f64)>,
+    tet: u32,
+    size: f64,
+    error: f64,
+}
+
+#[wasm_bindgen]
+extern "C" {
+    /// What is drawn, as JavaScript gives it: anything at all.
+    #[wasm_bindgen(typescript_type = "object")]
+    pub type JsScene;
+    /// Where the camera is.
+    #[wasm_bindgen(typescript_type = "CameraState")]
+    pub type JsCamera;
+    /// What the colours mean, or `undefined`.
+    #[wasm_bindgen(typescript_type = "Legend | undefined")]
+    pub type JsLegend;
+    /// What is at a point, or `undefined`.
+    #[wasm_bindgen(typescript_type = "object | undefined")]
+    pub type JsProbe;
+}
+
+/// Plain data for JavaScript.
+fn plain<T: JsCast>(data: &impl Serialize) -> T {
+    serde_wasm_bindgen::to_value(data).unwrap_or_default().unchecked_into()
 }
 
 #[wasm_bindgen]
@@ -76,34 +111,23 @@ impl Viewer {
         let target = wgpu::SurfaceTarget::OffscreenCanvas(canvas);
         let renderer = Renderer::on_surface(target, [width, height]).await?;
         let camera = Camera::home(&Bounds::EMPTY, renderer.aspect());
+        let mut scene = Scene::new(renderer);
+        scene.set_pixel_ratio(ratio);
         Ok(Self {
             file: File::default(),
             next: None,
-            look: Look { pixel_ratio: ratio, ..Look::default() },
+            scene,
             camera,
-            show: Show::default(),
+            ratio: f64::from(ratio),
             seen: View { matrix: [0.0; 16], viewport: [1.0; 2] },
             moving: false,
-            isovalue: None,
-            clip: ClipPlane::NOTHING,
-            cutaway: Cutaway::new(),
-            bounds: None,
-            roi: None,
-            stale: Stale { picture: true, ..Stale::default() },
-            surface_triangles: 0,
-            surface_fits: false,
-            renderer,
+            is_stale: true,
         })
     }
 
     /// The GPU in words.
     pub fn adapter(&self) -> String {
-        self.renderer.description()
-    }
-
-    /// Sixteen evenly spaced colours of the colour map, `RGBA` bytes, for a legend.
-    pub fn palette(&self) -> Vec<u8> {
-        self.look.colormap.table::<16>().concat()
+        self.scene.renderer().description()
     }
 
     /// Forgets the volume, for another one, that is fed from front to back; what the user has set about the view goes with it.
@@ -130,21 +154,15 @@ impl Viewer {
 
     fn show_file(&mut self, file: File) -> Result<(), WebError> {
         (self.file, self.next) = (file, None);
-        (self.bounds, self.roi, self.isovalue) = (None, None, None);
         self.moving = false;
-        self.clip = ClipPlane::NOTHING;
-        self.cutaway = Cutaway::new();
-        (self.surface_triangles, self.surface_fits) = (0, false);
-        self.renderer.set_surface(&crate::view::IsoSurface::new())?;
-        self.renderer.set_cutaway(&self.cutaway)?;
-        self.stale = Stale { boxes: true, picture: true, ..Stale::default() };
-        Ok(())
+        self.is_stale = true;
+        Ok(self.scene.forget()?)
     }
 
     /// Takes the next bytes of the file, however they were cut.
     pub fn feed(&mut self, bytes: &[u8]) -> Result<JsProgress, WebError> {
         self.file.session_mut().feed(bytes)?;
-        self.arrive();
+        self.arrive()?;
         Ok(self.progress())
     }
 
@@ -152,7 +170,7 @@ impl Viewer {
     pub fn supply(&mut self) -> Result<bool, WebError> {
         let Some(mut next) = self.next.take() else {
             let any = self.file.supply()?;
-            self.arrive();
+            self.arrive()?;
             return Ok(any);
         };
         let supplied = next.supply();
@@ -161,7 +179,7 @@ impl Viewer {
             return supplied;
         }
         self.show_file(next)?;
-        self.arrive();
+        self.arrive()?;
         supplied
     }
 
@@ -194,18 +212,19 @@ impl Viewer {
 
     /// The box around the mesh: `[x0, y0, z0, x1, y1, z1]`; empty until the base mesh is there.
     pub fn bounds(&self) -> Box<[f64]> {
-        self.bounds.map_or_else(Box::default, |bounds| flat(&bounds))
+        self.scene.bounds().map_or_else(Box::default, flat)
     }
 
     /// Sets the request, for `step` to make its mesh. Views without a matrix follow the camera.
     pub fn request(&mut self, options: &RefineOptions) -> Result<(), WebError> {
         let (seen, before) = (self.view(), self.file.asked.field);
         self.file.request(options, Some(&seen))?;
-        if self.file.asked.field != before {
-            self.stale = Stale { boxes: self.stale.boxes, ..Stale::MESH };
-        }
         (self.seen, self.moving) = (seen, true);
-        self.set_range();
+        if self.file.asked.field != before {
+            // The colours are those of another field.
+            self.scene.set_state(self.scene.state().clone())?;
+            self.is_stale = true;
+        }
         Ok(())
     }
 
@@ -228,9 +247,7 @@ impl Viewer {
         self.follow_camera()?;
         let stats = self.file.step(milliseconds, f64::INFINITY)?;
         self.moving = !stats.done;
-        if stats.refined + stats.coarsened > 0 {
-            self.stale = Stale { boxes: self.stale.boxes, ..Stale::MESH };
-        }
+        self.is_stale |= stats.refined + stats.coarsened > 0;
         self.file.stats(&stats)
     }
 
@@ -239,176 +256,202 @@ impl Viewer {
         self.file.hash()
     }
 
-    /// Chooses what is drawn: `"iso"` or `"cutaway"`.
-    #[wasm_bindgen(js_name = setMode)]
-    pub fn set_mode(&mut self, mode: &str) -> Result<(), WebError> {
-        self.show = match mode {
-            "iso" => Show::Surface,
-            "cutaway" => Show::Cutaway,
-            _ => return Err(WebError::bad_option("mode", "must be \"iso\" or \"cutaway\"")),
-        };
-        self.stale.picture = true;
+    /// Sets what is drawn: a [`SceneState`](crate::scene::SceneState) as a plain object.
+    #[wasm_bindgen(js_name = setScene)]
+    pub fn set_scene(&mut self, state: &JsScene) -> Result<(), WebError> {
+        let state: SceneState = read(state).map_err(|error| error.with_value(state))?;
+        self.scene.set_state(state)?;
+        self.is_stale = true;
         Ok(())
     }
 
-    /// The value of the isosurface, in field units; until it is set, the middle of the field's range.
-    #[wasm_bindgen(js_name = setIsovalue)]
-    pub fn set_isovalue(&mut self, value: f64) -> Result<(), WebError> {
-        if !value.is_finite() {
-            return Err(WebError::bad_option("isovalue", "must be a finite number"));
-        }
-        self.isovalue = Some(value);
-        self.stale.surface = true;
-        self.stale.picture = true;
+    /// Where the camera is.
+    pub fn camera(&self) -> JsCamera {
+        plain(&self.camera.state())
+    }
+
+    /// Moves the camera to where `camera` returned that it is.
+    #[wasm_bindgen(js_name = setCamera)]
+    pub fn set_camera(&mut self, state: &JsCamera) -> Result<(), WebError> {
+        let state: CameraState = read(state).map_err(|error| error.with_value(state))?;
+        let problem = self.camera.set_state(&state);
+        problem.map_err(|problem| WebError::bad_option("camera", &problem.to_string()))?;
+        self.is_stale = true;
         Ok(())
     }
 
-    /// Cuts away the tetrahedra with `normal · p > offset`; a normal of zeros cuts nothing away.
-    #[wasm_bindgen(js_name = setClip)]
-    pub fn set_clip(&mut self, x: f64, y: f64, z: f64, offset: f64) -> Result<(), WebError> {
-        if ![x, y, z, offset].iter().all(|number| number.is_finite()) {
-            return Err(WebError::bad_option("clip", "must be four finite numbers"));
-        }
-        let normal = [x, y, z].map(|number| number as f32);
-        self.clip =
-            if normal == [0.0; 3] { ClipPlane::NOTHING } else { ClipPlane { normal, offset: offset as f32 } };
-        self.stale.cutaway = true;
-        self.stale.picture = true;
-        Ok(())
+    /// What the colours mean; nothing where nothing is coloured by values.
+    pub fn legend(&self) -> JsLegend {
+        self.scene
+            .legend()
+            .map_or_else(|| JsValue::UNDEFINED.unchecked_into(), |legend| plain(&data_of(legend)))
     }
 
-    /// Shows the box of a region of interest, `[x0, y0, z0, x1, y1, z1]`, with handles; none hides it.
-    #[wasm_bindgen(js_name = setRoi)]
-    pub fn set_roi(&mut self, numbers: Option<Box<[f64]>>) -> Result<(), WebError> {
-        self.roi = numbers.map(|numbers| options::bounds(&numbers)).transpose()?;
-        self.stale.boxes = true;
-        self.stale.picture = true;
-        Ok(())
+    /// What is shown at a screen point: where it is, the value of each field, the size and the error of its tetrahedron; nothing if
+    /// nothing is there.
+    pub fn probe(&mut self, x: f64, y: f64) -> Result<JsProbe, WebError> {
+        let nothing = || Ok(JsValue::UNDEFINED.unchecked_into());
+        let ray = self.camera.ray(DVec2::new(x, y), self.aspect());
+        let Some(point) = self.scene.pick(self.file.session_mut(), &ray) else { return nothing() };
+        let Some(reading) = self.file.session_mut().reading(point)? else { return nothing() };
+        let names = self.file.info()?.fields.iter().map(|field| field.name.as_str());
+        Ok(plain(&ProbeData {
+            position: reading.position,
+            values: names.zip(reading.values).collect(),
+            tet: reading.tet,
+            size: reading.size,
+            error: reading.error,
+        }))
     }
 
-    /// The handle of the region of interest at a screen point: 0 to 5 for lower and upper x, y, z; −1 if none is.
-    #[wasm_bindgen(js_name = pickRoi)]
-    pub fn pick_roi(&self, x: f64, y: f64) -> i32 {
-        let Some(roi) = &self.roi else { return -1 };
-        let reach = 2.0 * REACH * f64::from(self.look.pixel_ratio) / f64::from(self.renderer.size()[1]);
-        let face = gizmo::pick(roi, &self.camera, DVec2::new(x, y), self.renderer.aspect(), reach);
+    /// The box that has handles.
+    fn region(&self) -> Option<Bounds> {
+        let [x0, y0, z0, x1, y1, z1] = self.scene.state().region?;
+        Some(Bounds { min: [x0, y0, z0], max: [x1, y1, z1] })
+    }
+
+    fn aspect(&self) -> f64 {
+        self.scene.renderer().aspect()
+    }
+
+    /// The handle of the region at a screen point: 0 to 5 for lower and upper x, y, z; −1 if none is.
+    #[wasm_bindgen(js_name = pickRegion)]
+    pub fn pick_region(&self, x: f64, y: f64) -> i32 {
+        let Some(region) = &self.region() else { return -1 };
+        let reach = 2.0 * REACH * self.ratio / f64::from(self.scene.renderer().size()[1]);
+        let face = gizmo::pick(region, &self.camera, DVec2::new(x, y), self.aspect(), reach);
         face.and_then(|face| BoxFace::ALL.iter().position(|other| *other == face)).map_or(-1, |i| i as i32)
     }
 
     /// Moves the face of `handle` under a screen point; gives the box as it is then.
-    #[wasm_bindgen(js_name = dragRoi)]
-    pub fn drag_roi(&mut self, handle: usize, x: f64, y: f64) -> Result<Box<[f64]>, WebError> {
-        let (Some(roi), Some(limits)) = (self.roi, self.bounds) else { return Err(WebError::not_ready()) };
+    #[wasm_bindgen(js_name = dragRegion)]
+    pub fn drag_region(&mut self, handle: usize, x: f64, y: f64) -> Result<Box<[f64]>, WebError> {
+        let (Some(region), Some(limits)) = (self.region(), self.scene.bounds().copied()) else {
+            return Err(WebError::not_ready());
+        };
         let face = BoxFace::ALL.get(handle);
         let face = face.ok_or_else(|| WebError::bad_option("handle", "must be 0 to 5"))?;
-        let ray = self.camera.ray(DVec2::new(x, y), self.renderer.aspect());
-        let moved = gizmo::drag(&roi, *face, &ray, &limits);
-        self.roi = Some(moved);
-        self.stale.boxes = true;
-        self.stale.picture = true;
-        Ok(flat(&moved))
+        let ray = self.camera.ray(DVec2::new(x, y), self.aspect());
+        let moved = gizmo::drag(&region, *face, &ray, &limits);
+        let numbers = flat(&moved);
+        let region = numbers.as_ref().try_into().ok();
+        self.scene.set_state(SceneState { region, ..self.scene.state().clone() })?;
+        self.is_stale = true;
+        Ok(numbers)
     }
 
     /// Turns around the model, in radians: the model follows to the right and upwards.
     pub fn orbit(&mut self, right: f64, up: f64) {
         self.camera.orbit(-right, -up);
-        self.stale.picture = true;
+        self.is_stale = true;
     }
 
-    /// Multiplies the distance to the model.
-    pub fn zoom(&mut self, factor: f64) {
-        self.camera.zoom(factor);
-        self.stale.picture = true;
+    /// Multiplies the distance to the model; what is at a screen point stays there.
+    pub fn zoom(&mut self, factor: f64, x: f64, y: f64) {
+        self.camera.zoom_at(factor, DVec2::new(x, y), self.aspect());
+        self.is_stale = true;
     }
 
     /// Moves what is seen by fractions of the canvas's height to the right and upwards.
     pub fn pan(&mut self, right: f64, up: f64) {
         self.camera.pan(right, up);
-        self.stale.picture = true;
+        self.is_stale = true;
     }
 
     /// Shows the whole model from the front.
     pub fn home(&mut self) {
-        self.camera = Camera::home(self.bounds.as_ref().unwrap_or(&Bounds::EMPTY), self.renderer.aspect());
-        self.stale.picture = true;
+        let bounds = self.scene.bounds().unwrap_or(&Bounds::EMPTY);
+        let projection = self.camera.projection();
+        self.camera = Camera::home(bounds, self.aspect());
+        self.camera.set_projection(projection);
+        self.is_stale = true;
+    }
+
+    /// Looks at the whole model from a side: `"home"`, or along an axis, such as `"alongX"` or `"againstZ"`.
+    #[wasm_bindgen(js_name = lookFrom)]
+    pub fn look_from(&mut self, side: &str) -> Result<(), WebError> {
+        let found = SIDES.iter().find(|(name, _)| *name == side);
+        let Some((_, preset)) = found else {
+            let names = SIDES.map(|(name, _)| name).join(", ");
+            return Err(WebError::bad_option("side", &format!("must be one of {names}; given: {side}")));
+        };
+        self.home();
+        let bounds = *self.scene.bounds().unwrap_or(&Bounds::EMPTY);
+        self.camera.turn_to(*preset);
+        self.camera.fit(&bounds, self.aspect());
+        Ok(())
+    }
+
+    /// Moves the eye to the right, up and ahead, by multiples of its distance to the model.
+    pub fn fly(&mut self, right: f64, up: f64, ahead: f64) {
+        self.camera.fly(right, up, ahead);
+        self.is_stale = true;
+    }
+
+    /// Turns the eye where it is, in radians.
+    pub fn look(&mut self, right: f64, up: f64) {
+        self.camera.look(right, up);
+        self.is_stale = true;
     }
 
     /// Gives the canvas another size in pixels; `ratio` is pixels per unit of the page's layout.
     pub fn resize(&mut self, width: u32, height: u32, ratio: f32) {
-        self.renderer.resize([width, height]);
-        self.look.pixel_ratio = if ratio.is_finite() { ratio.clamp(0.25, 8.0) } else { 1.0 };
-        self.stale.picture = true;
+        self.scene.renderer_mut().resize([width, height]);
+        self.scene.set_pixel_ratio(ratio);
+        self.ratio = f64::from(ratio);
+        self.is_stale = true;
     }
 
-    /// Triangles of the isosurface or the cut-away view in the last frame.
+    /// Triangles of all surfaces in the last frame.
     #[wasm_bindgen(getter)]
     pub fn triangles(&self) -> usize {
-        match self.show {
-            Show::Surface => self.surface_triangles,
-            Show::Cutaway => self.cutaway.triangles(),
-            Show::Volume => 0,
-        }
+        self.scene.triangles()
+    }
+
+    /// Bytes that were uploaded to the GPU since the last question.
+    #[wasm_bindgen(js_name = takeUploaded)]
+    pub fn take_uploaded(&self) -> f64 {
+        self.scene.renderer().take_uploaded() as f64
     }
 
     /// Whether the picture is out of date.
     #[wasm_bindgen(getter)]
     pub fn pending(&self) -> bool {
-        self.stale.picture
+        self.is_stale
+    }
+
+    /// Whether the picture gets better by [`Viewer::improve`].
+    #[wasm_bindgen(getter, js_name = canImprove)]
+    pub fn can_improve(&self) -> bool {
+        let drawn = self.scene.renderer().drawn();
+        !self.is_stale && 0 < drawn && drawn < SAMPLES
     }
 
     /// Draws if anything has changed since the last frame; says whether it has drawn.
     pub fn frame(&mut self) -> Result<bool, WebError> {
-        if !self.stale.picture {
+        // What the last picture had no room for is known some time after it.
+        self.is_stale |= self.scene.renderer_mut().is_short();
+        // A device that is behind gets no more to do: the camera would be late.
+        if !self.is_stale || self.scene.renderer().in_flight()? > 1 {
             return Ok(false);
         }
-        self.update()?;
-        let drawn = self.renderer.draw(self.show, &self.camera, &self.look)?;
-        self.stale.picture = !drawn;
+        // What cannot be shown is told once, and all else is drawn.
+        let updated = self.scene.update(self.file.session_mut());
+        let drawn = self.scene.draw(self.file.session_mut(), &self.camera)?;
+        self.is_stale = !drawn;
+        updated?;
         Ok(drawn)
     }
 
-    /// Computes and uploads what is out of date and will be seen.
-    fn update(&mut self) -> Result<(), WebError> {
-        if self.stale.boxes {
-            self.renderer.set_boxes(&self.boxes())?;
-            self.stale.boxes = false;
-        }
-        if self.bounds.is_none() {
-            return Ok(());
-        }
-        match self.show {
-            Show::Surface if self.stale.surface => {
-                let [low, high] = self.look.range;
-                let middle = f64::midpoint(f64::from(low), f64::from(high));
-                let value = self.isovalue.unwrap_or(middle);
-                self.file.session_mut().isosurface(value)?;
-                let changes = self.file.session_mut().take_surface_changes();
-                // Asked for again, it is as it was.
-                let surface = self.file.session_mut().isosurface(value)?;
-                self.surface_triangles = surface.indices.len();
-                // What did not fit was written in part, and is written as a whole when it fits again.
-                if std::mem::replace(&mut self.surface_fits, false) {
-                    self.renderer.update_surface(surface, &changes.vertices, &changes.triangles)?;
-                } else {
-                    self.renderer.set_surface(surface)?;
-                }
-                self.surface_fits = true;
-                self.stale.surface = false;
-            }
-            Show::Cutaway if self.stale.cutaway => {
-                self.cutaway.cut(&self.file.session_mut().view(), &self.clip);
-                self.renderer.set_cutaway(&self.cutaway)?;
-                self.stale.cutaway = false;
-            }
-            _ => {}
-        }
-        Ok(())
+    /// Adds one more picture to the mean of those that show what the last one does: edges get smooth.
+    pub fn improve(&mut self) -> Result<bool, WebError> {
+        Ok(self.scene.renderer().in_flight()? == 0 && self.scene.draw_again()?)
     }
 
     /// What the camera sees.
     fn view(&self) -> View {
-        let matrix = self.camera.view_projection(self.renderer.aspect()).to_cols_array().map(f64::from);
-        View { matrix, viewport: self.renderer.size().map(f64::from) }
+        let matrix = self.camera.view_projection(self.aspect()).to_cols_array().map(f64::from);
+        View { matrix, viewport: self.scene.renderer().size().map(f64::from) }
     }
 
     /// Gives the needs that follow the camera its view.
@@ -425,31 +468,42 @@ impl Viewer {
     }
 
     /// Bytes have come: when the base mesh is there, look at it.
-    fn arrive(&mut self) {
-        if self.bounds.is_some() || self.file.session().info().is_none() {
-            return;
+    fn arrive(&mut self) -> Result<(), WebError> {
+        if self.scene.bounds().is_none() && self.file.session().info().is_some() {
+            self.is_stale = true;
+            let updated = self.scene.update(self.file.session_mut());
+            self.home();
+            updated?;
         }
-        let positions = self.file.session_mut().view().positions;
-        let bounds = positions.iter().fold(Bounds::EMPTY, |b, p| b.with(p.map(f64::from)));
-        self.bounds = Some(bounds);
-        self.set_range();
-        self.home();
-        self.stale = Stale { boxes: true, ..Stale::MESH };
+        Ok(())
     }
+}
 
-    fn set_range(&mut self) {
-        if let Some(field) =
-            self.file.session().info().and_then(|info| info.fields.get(self.file.asked.field))
-        {
-            self.look.range = [field.min as f32, field.max as f32];
-        }
-    }
+/// The sides that the model is looked at from.
+const SIDES: [(&str, ViewPreset); 7] = [
+    ("home", ViewPreset::Home),
+    ("alongX", ViewPreset::AlongX),
+    ("againstX", ViewPreset::AgainstX),
+    ("alongY", ViewPreset::AlongY),
+    ("againstY", ViewPreset::AgainstY),
+    ("alongZ", ViewPreset::AlongZ),
+    ("againstZ", ViewPreset::AgainstZ),
+];
 
-    fn boxes(&self) -> Vec<BoxLines> {
-        let domain =
-            self.bounds.map(|bounds| BoxLines { bounds, colour: DOMAIN_COLOUR, width: 1.0, handles: false });
-        let roi = self.roi.map(|bounds| BoxLines { bounds, colour: ROI_COLOUR, width: 2.0, handles: true });
-        domain.into_iter().chain(roi).collect()
+fn data_of(legend: &Legend) -> LegendData<'_> {
+    let Legend { label, scale } = legend;
+    let hex = |[r, g, b, _]: [u8; 4]| format!("#{r:02x}{g:02x}{b:02x}");
+    let tick = |tick: crate::view::Tick| TickData {
+        value: tick.value,
+        label: tick.label,
+        fraction: scale.fraction(tick.value),
+    };
+    LegendData {
+        label,
+        range: scale.range,
+        log: scale.is_log,
+        colours: scale.table::<32>().map(hex).to_vec(),
+        ticks: scale.ticks(TICKS).into_iter().map(tick).collect(),
     }
 }
 

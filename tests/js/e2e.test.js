@@ -116,10 +116,22 @@ test("the page streams a volume, draws it, and its settings change mesh and pict
   await page.fill("#isovalue", "250");
   assert.ok(differing(surface, await picture(page, "isovalue")) > 0.01, "the isovalue changes the picture");
 
-  await page.locator("label", { hasText: "Cut-away" }).click();
-  const cut = await picture(page, "cutaway");
-  assertDrawn(cut);
-  assert.ok(differing(surface, cut) > 0.05, "the cut-away is another picture");
+  let cut = surface;
+  for (const view of ["Volume", "Slice", "Solid", "Mesh"]) {
+    await page.locator("label", { hasText: view }).first().click();
+    const shown = await picture(page, view.toLowerCase());
+    assertDrawn(shown);
+    assert.ok(differing(cut, shown) > 0.03, `${view} is another picture`);
+    const labels = await page.locator("#legend-ticks span").allTextContents();
+    assert.ok(labels.length >= 2 && new Set(labels).size === labels.length, `the colour bar has ticks: ${labels}`);
+    cut = shown;
+  }
+  await page.selectOption("#colour-by", "depth");
+  const depths = await picture(page, "depth");
+  assert.ok(differing(cut, depths) > 0.03, "the depth of refinement has other colours");
+  await page.waitForFunction(() => document.querySelector("#legend-name").textContent === "depth");
+  await page.selectOption("#colour-by", "field");
+  cut = await picture(page, "mesh-again");
 
   const canvas = await page.locator("#canvas").boundingBox();
   await page.mouse.move(canvas.x + 20, canvas.y + 20);
@@ -347,7 +359,7 @@ test("the package runs in a worker of the page, without a viewer", async () => {
     const { Viewer } = await import("tetralod/viewer");
     const canvas = document.createElement("canvas");
     const viewer = await Viewer.create(canvas);
-    const flat = await viewer.setClip({ normal: [0, 0, 0], offset: 1 }).catch(({ message }) => message);
+    const flat = await viewer.set({ clips: [{ normal: [0, 0, 0], offset: 1 }] }).catch(({ message }) => message);
     viewer.free();
     const used = await Viewer.create(canvas).catch(({ message }) => message);
     const abort = new AbortController();
@@ -357,7 +369,7 @@ test("the package runs in a worker of the page, without a viewer", async () => {
     return { tetrahedra: stats.tetrahedra, length: tets.length, same: one === two, followed, aborted, flat, used };
   });
   assert.ok(seen.tetrahedra > 0 && seen.tetrahedra <= 20_000);
-  assert.match(seen.flat, /`clip`/);
+  assert.match(seen.flat, /`clips\[0\]`/);
   assert.match(seen.used, /new canvas/);
   assert.equal(seen.length, 4 * seen.tetrahedra);
   assert.ok(seen.same, "the same request gives the same mesh from wherever one starts");

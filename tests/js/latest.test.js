@@ -40,14 +40,20 @@ test("a call that fails does not stop the ones after it", async () => {
 });
 
 test("movements that wait add up; of everything else the later one counts", () => {
-  const a = { orbit: [1, 2], zoom: 2, isovalue: 3, roi: null };
-  const b = { orbit: [10, 20], pan: [5, 6], zoom: 0.25, isovalue: 4 };
-  assert.deepEqual(mergeUpdates(a, b), { orbit: [11, 22], pan: [5, 6], zoom: 0.5, isovalue: 4, roi: null });
+  const a = { orbit: [1, 2], zoom: [2, 0, 0], scene: { volume: {} }, size: [4, 5, 1] };
+  const b = { orbit: [10, 20], pan: [5, 6], zoom: [0.25, 0.1, 0.2], scene: { slices: [] } };
+  assert.deepEqual(mergeUpdates(a, b), {
+    ...{ orbit: [11, 22], pan: [5, 6], zoom: [0.5, 0.1, 0.2] },
+    ...{ scene: { slices: [] }, size: [4, 5, 1] },
+  });
   assert.deepEqual(mergeUpdates({ pan: [1, 1] }, { pan: [2, 3], size: [4, 5, 1] }), { pan: [3, 4], size: [4, 5, 1] });
 });
 
 test("going home forgets the movements before it and keeps those after it", () => {
-  const home = mergeUpdates({ orbit: [1, 1], zoom: 3, mode: "iso" }, { home: true });
-  assert.deepEqual(home, { mode: "iso", home: true });
-  assert.deepEqual(mergeUpdates(home, { orbit: [2, 0] }), { mode: "iso", home: true, orbit: [2, 0] });
+  const home = mergeUpdates({ orbit: [1, 1], zoom: [3, 0, 0], scene: {} }, { home: true });
+  assert.deepEqual(home, { scene: {}, home: true });
+  assert.deepEqual(mergeUpdates(home, { orbit: [2, 0] }), { scene: {}, home: true, orbit: [2, 0] });
+  const camera = { target: [0, 0, 0], distance: 1, yaw: 0, pitch: 0, projection: "perspective" };
+  assert.deepEqual(mergeUpdates({ look: [1, 0], fly: [0, 0, 1] }, { camera }), { camera });
+  assert.deepEqual(mergeUpdates({ camera }, { home: true }), { home: true });
 });

@@ -57,7 +57,7 @@ fn towards_eye(position: vec3f) -> vec3f {
 fn is_clipped(position: vec3f, mask: u32) -> bool {
     for (var i = 0u; i < u32(frame.viewport.w); i += 1u) {
         let plane = frame.clips[i];
-        if (mask >> i & 1u) == 1u && dot(plane.xyz, position) > plane.w {
+        if ((mask >> i) & 1u) == 1u && dot(plane.xyz, position) > plane.w {
             return true;
         }
     }

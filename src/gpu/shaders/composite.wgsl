@@ -137,8 +137,8 @@ fn layer_after(last: Layer) -> Layer {
         let distance = bitcast<f32>(nodes[3u * node - 3u]);
         if (link & IS_COLOUR) != 0u && distance < opaque {
             let found = Layer(distance, nodes[3u * node - 2u]);
-            let is_after = distance > last.distance || distance == last.distance && found.colour > last.colour;
-            if is_after && (distance < next.distance || distance == next.distance && found.colour < next.colour) {
+            let is_after = distance > last.distance || (distance == last.distance && found.colour > last.colour);
+            if is_after && (distance < next.distance || (distance == next.distance && found.colour < next.colour)) {
                 next = found;
             }
         }
@@ -251,8 +251,8 @@ fn march_all(by: Across) {
             let link = nodes[3u * node - 1u];
             if (link & IS_COLOUR) == 0u {
                 let entry = vec2f(bitcast<f32>(nodes[3u * node - 3u]), f32(nodes[3u * node - 2u]));
-                let is_after = entry.x > last.x || entry.x == last.x && entry.y > last.y;
-                if is_after && (entry.x < next.x || entry.x == next.x && entry.y < next.y) {
+                let is_after = entry.x > last.x || (entry.x == last.x && entry.y > last.y);
+                if is_after && (entry.x < next.x || (entry.x == next.x && entry.y < next.y)) {
                     next = entry;
                 }
             }
@@ -272,7 +272,7 @@ fn march_all(by: Across) {
 fn kept(ray: Ray) -> vec2f {
     var range = vec2f(-FAR, opaque);
     for (var i = 0u; i < u32(frame.viewport.w); i += 1u) {
-        if (settings.start.z >> i & 1u) == 1u {
+        if ((settings.start.z >> i) & 1u) == 1u {
             let plane = frame.clips[i];
             let height = plane.w - dot(plane.xyz, ray.origin);
             let slope = dot(plane.xyz, ray.direction);
@@ -308,7 +308,7 @@ fn place_of(pixel: vec2i) -> vec4f {
 fn slope_of(middle: vec3f, before: vec4f, after: vec4f) -> vec3f {
     let back = middle - before.xyz;
     let ahead = after.xyz - middle;
-    let is_back = after.w == 0.0 || before.w > 0.0 && dot(back, back) < dot(ahead, ahead);
+    let is_back = after.w == 0.0 || (before.w > 0.0 && dot(back, back) < dot(ahead, ahead));
     return select(ahead, back, is_back);
 }
 

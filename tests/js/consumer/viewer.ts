@@ -3,16 +3,18 @@ import type { MtInfo } from "tetralod";
 import {
   TetralodError,
   Viewer,
-  type ClipPlane,
   type OpenedVolume,
   type OwnView,
+  type PlaneState,
   type ViewerFrame,
   type ViewerProgress,
+  type ViewerProbe,
   type ViewerRefineOptions,
+  type ViewerState,
   type ViewerStats,
 } from "tetralod/viewer";
 
-const half: ClipPlane = { normal: [0, 1, 0], offset: 0.5 };
+const half: PlaneState = { normal: [0, 1, 0], offset: 0.5 };
 const own: OwnView = { pixels: 2, outside: "10%" };
 const requests: ViewerRefineOptions[] = [
   { error: "1%", box: [0, 0, 0, 1, 1, 1], maxTets: 300_000 },
@@ -32,24 +34,33 @@ export async function page(canvas: HTMLCanvasElement): Promise<void> {
   const { info, finished }: OpenedVolume = await viewer.open("volume.mt", { fields: ["p"] });
   const known: MtInfo | undefined = viewer.info ?? info;
   for (const request of requests) (await viewer.refine(request)) satisfies ViewerStats;
-  await viewer.setMode("cutaway");
-  await viewer.setIsovalue(known.fields[0]?.min ?? 0);
-  await viewer.setClip(half);
-  await viewer.setRoi(new Float64Array(6));
-  await Promise.all([viewer.orbit(0.1, 0), viewer.zoom(2), viewer.pan(0.1, 0), viewer.home()]);
-  const box: number[] = await viewer.dragRoi(await viewer.pickRoi(0, 0), 0.1, 0);
-  await Promise.all([finished, viewer.settled(), viewer.retry(), viewer.setRoi(box), viewer.setClip(null)]);
-  const texts: string[] = [viewer.adapter, ...viewer.palette, await viewer.hash()];
+  const value: number = known.fields[0]?.min ?? 0;
+  await viewer.set({ isosurfaces: [{ value, opacity: 0.5, edges: true }, { colour: "#ff0000" }, { field: "p" }] });
+  await viewer.set({ volume: { opacities: [[0, 0], [1, 0.5]], unitLength: 0.1, clipped: false } });
+  await viewer.set({ slices: [{ ...half, opacity: 0.5, edges: true, field: "p", clipped: false }], clips: [half] });
+  await viewer.set({ boundary: { opacity: 0.2, edges: true, colour: "#ffffff" }, clipBox: [0, 0, 0, 1, 1, 1] });
+  await viewer.set({ cells: { shape: "wire", shrink: 0.2, cut: half, colourBy: "error", width: 2 } });
+  await viewer.set({ streamlines: { fields: ["u", "v", "w"], seeds: [[0, 0, 0]], radius: 0.1, field: "p" } });
+  await viewer.set({ arrows: { fields: ["u", "v", "w"], spacing: 0.1, constant: true }, outline: false });
+  await viewer.set({ colours: { map: "magma", range: [0, 1], reversed: true, log: true }, background: "light", shade: 0 });
+  await Promise.all([viewer.orbit(0.1, 0), viewer.zoom(2, 0, 0), viewer.pan(0.1, 0), viewer.home()]);
+  await Promise.all([viewer.fly(0, 0, 1), viewer.look(0.1, 0), viewer.lookFrom("alongX")]);
+  const box: number[] = await viewer.dragRegion(await viewer.pickRegion(0, 0), 0.1, 0);
+  await Promise.all([finished, viewer.settled(), viewer.retry(), viewer.set({ region: box, volume: null })]);
+  const state: ViewerState = viewer.state;
+  await viewer.set(JSON.parse(JSON.stringify(state)) as ViewerState);
+  const found: ViewerProbe | undefined = await viewer.probe(0, 0);
+  const texts: string[] = [viewer.adapter, viewer.legend?.label ?? "", `${found?.values["p"]}`, await viewer.hash()];
   texts.length satisfies number;
   viewer.free();
 }
 
 /** What must not compile. */
 export async function misuse(viewer: Viewer): Promise<void> {
-  // @ts-expect-error there is no such mode
-  await viewer.setMode("iso-surface");
+  // @ts-expect-error there is no such shape
+  await viewer.set({ cells: { shape: "round" } });
   // @ts-expect-error a plane has an offset
-  await viewer.setClip({ normal: [0, 1, 0] });
+  await viewer.set({ clips: [{ normal: [0, 1, 0] }] });
   // @ts-expect-error functions cannot go to the viewer's worker: it takes the URL of a module
   await viewer.refine({ where: () => [] });
   // @ts-expect-error the constructor is private
