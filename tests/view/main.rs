@@ -1,5 +1,6 @@
 //! Promises of what is shown: isosurfaces, slices and probes, on the CPU and with the feature `vulkan` on the GPU.
 
+mod cutaway;
 mod difference;
 #[cfg(feature = "vulkan")]
 mod gpu_matches_cpu;
@@ -12,10 +13,14 @@ mod probe;
 mod scenes;
 #[cfg(feature = "gpu")]
 mod shaders;
+#[cfg(feature = "vulkan")]
+mod silhouettes;
 mod slice;
 mod solids;
 #[path = "../support/mod.rs"]
 mod support;
+#[cfg(feature = "vulkan")]
+mod twin;
 mod volume;
 #[allow(dead_code, reason = "each test uses a part of it")]
 mod walk;
