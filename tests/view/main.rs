@@ -1,5 +1,9 @@
 //! Promises of what is shown: isosurfaces, slices and probes, on the CPU and with the feature `vulkan` on the GPU.
 
+#[cfg(feature = "vulkan")]
+mod by_ranges;
+#[cfg(feature = "vulkan")]
+mod cells;
 mod cutaway;
 mod difference;
 #[cfg(feature = "vulkan")]
@@ -7,8 +11,14 @@ mod gpu_matches_cpu;
 mod iso_cases;
 mod iso_session;
 mod iso_update;
+#[cfg(feature = "vulkan")]
+mod mixed;
+#[cfg(feature = "vulkan")]
+mod mixed_pictures;
 mod pick;
 mod probe;
+#[cfg(feature = "vulkan")]
+mod samples;
 #[allow(dead_code, reason = "each test uses a part of it")]
 mod scenes;
 #[cfg(feature = "gpu")]
