@@ -68,7 +68,7 @@ fn the_mean_of_many_pictures_gets_to_what_pixels_cover() {
             difference(&found, &exact)
         });
         println!("{name}: 1, 4, 16 pictures are {off:.3?} of 255 off");
-        assert!(off[1] < off[0] && off[2] < off[1] && off[2] < 0.5 * off[0], "{name}: {off:?}");
+        assert!(off[1] < off[0] && off[2] < off[1] && off[2] < 0.7 * off[0], "{name}: {off:?}");
         // The same again, from the beginning.
         assert!(mean(&mut renderer, &look, 16) == mean(&mut renderer, &look, 16));
     }
