@@ -18,8 +18,8 @@ pub struct Look {
     pub pixel_ratio: f32,
     /// What is cut away, where the style of a thing does not say otherwise; the first [`MOST_CLIPS`] count.
     pub clips: Vec<ClipPlane>,
-    /// How dark places get that hardly any light reaches, 0 to 1; and how far away what hides the light may be, in model
-    /// units.
+    /// How dark places get that hardly any light reaches, 0 to 1; and how far away what hides the light may
+    /// be, in model units.
     pub shade: [f32; 2],
 }
 
@@ -56,6 +56,7 @@ pub(super) struct Frame {
     /// Origin and direction of rays: in the middle, and the changes to the right and upper edges.
     rays: [[f32; 4]; 6],
     eye: [f32; 4],
+    /// In their last numbers, how much the picture is moved on the screen.
     key_light: [f32; 4],
     fill_light: [f32; 4],
     up: [f32; 4],
@@ -76,7 +77,10 @@ impl Frame {
         let shifted = |[middle, x, y]: [DVec3; 3]| [middle - x * moved.x - y * moved.y, x, y].map(wide);
         let ([o, ox, oy], [d, dx, dy]) = (shifted(rays.origin), shifted(rays.direction));
         let (right, up, back) = (camera.right(), camera.up(), -camera.forward());
-        let light = |x: f64, y: f64, z: f64| wide((right * x + up * y + back * z).normalize());
+        let light = |x: f64, y: f64, z: f64, moved: f64| {
+            let towards = (right * x + up * y + back * z).normalize();
+            towards.extend(moved).as_vec4().to_array()
+        };
         let is_parallel = rays.direction[1] == DVec3::ZERO;
         let eye = if is_parallel { back.extend(0.0) } else { camera.eye().extend(1.0) };
         let mut clips = [[0.0; 4]; MOST_CLIPS];
@@ -90,8 +94,8 @@ impl Frame {
             rays: [o, ox, oy, d, dx, dy],
             eye: eye.as_vec4().to_array(),
             // The lights move with the camera: the key from the upper left, the fill from the lower right.
-            key_light: light(-0.5, 0.75, 0.8),
-            fill_light: light(0.9, -0.25, 0.35),
+            key_light: light(-0.5, 0.75, 0.8, moved.x),
+            fill_light: light(0.9, -0.25, 0.35, moved.y),
             up: wide(up),
             viewport: [width as f32, height as f32, look.pixel_ratio, count as f32],
             depth: depth_terms(&matrix, rays.origin[0], camera.forward()),

@@ -3,9 +3,9 @@
 
 mod axes;
 mod boundary;
+mod clip;
 mod colormap;
 mod colour_scale;
-mod cutaway;
 mod difference;
 pub mod gizmo;
 mod glyphs;
@@ -25,12 +25,12 @@ mod volume;
 
 pub use axes::{AxisTick, BoxAxis, BoxEdge, ScaleBar, box_axis, scale_bar, tick_edges};
 pub use boundary::{BoundarySurface, area, is_closed};
+pub use clip::ClipPlane;
 pub use colormap::{
     BALANCE, BATLOW, CIVIDIS, COOLWARM, Colormap, GREY, HALINE, ICE, INFERNO, LAJOLLA, LAPAZ, MAGMA, OSLO,
     PLASMA, ROMA, THERMAL, TURBO, VIK, VIRIDIS,
 };
 pub use colour_scale::{ColourScale, ScaleError};
-pub use cutaway::{ClipPlane, Cutaway};
 pub use difference::Difference;
 pub use glyphs::{ArrowLength, ArrowOptions};
 pub use iso::{IsoSurface, NormalKind};

@@ -1,9 +1,10 @@
 //! Isosurfaces and cut-away views, case by case and against plain twins.
 
+use crate::cutaway::Cutaway;
 use crate::scenes::{Scene, distance_to_centre};
 use std::collections::{BTreeMap, BTreeSet};
 use tetralod::mesh::{EDGES, NONE};
-use tetralod::view::{ClipPlane, Cutaway, IsoSurface};
+use tetralod::view::{ClipPlane, IsoSurface};
 
 type Point = [f32; 3];
 

@@ -1,21 +1,36 @@
 //! Promises of what is shown: isosurfaces, slices and probes, on the CPU and with the feature `vulkan` on the GPU.
 
+#[cfg(feature = "vulkan")]
+mod by_ranges;
+#[cfg(feature = "vulkan")]
+mod cells;
+mod cutaway;
 mod difference;
 #[cfg(feature = "vulkan")]
 mod gpu_matches_cpu;
 mod iso_cases;
 mod iso_session;
 mod iso_update;
+#[cfg(feature = "vulkan")]
+mod mixed;
+#[cfg(feature = "vulkan")]
+mod mixed_pictures;
 mod pick;
 mod probe;
+#[cfg(feature = "vulkan")]
+mod samples;
 #[allow(dead_code, reason = "each test uses a part of it")]
 mod scenes;
 #[cfg(feature = "gpu")]
 mod shaders;
+#[cfg(feature = "vulkan")]
+mod silhouettes;
 mod slice;
 mod solids;
 #[path = "../support/mod.rs"]
 mod support;
+#[cfg(feature = "vulkan")]
+mod twin;
 mod volume;
 #[allow(dead_code, reason = "each test uses a part of it")]
 mod walk;

@@ -56,8 +56,9 @@ fn vs(@builtin(vertex_index) i: u32) -> Vertex {
     );
 }
 
+// Of whole tetrahedra fronts alone are drawn.
 fn seen(in: Vertex) -> Seen {
-    return Seen(in.position, in.face, in.face, in.value, in.sides, fwidth(in.sides));
+    return Seen(in.position, in.face, in.face, true, in.value, in.sides, fwidth(in.sides));
 }
 
 @fragment

@@ -2,8 +2,8 @@
 
 struct Frame {
     view_projection: mat4x4f,
-    // The ray of the pixel at (x, y), from -1 to 1, upwards: it starts at origin + x origin_x + y origin_y and goes
-    // along the same sum of directions (w unused).
+    // The ray of the pixel at (x, y), from -1 to 1, upwards: it starts at origin + x origin_x + y origin_y
+    // and goes along the same sum of directions (w unused).
     origin: vec4f,
     origin_x: vec4f,
     origin_y: vec4f,
@@ -12,7 +12,8 @@ struct Frame {
     direction_y: vec4f,
     // Where the camera is and 1; for parallel rays the direction towards it and 0.
     eye: vec4f,
-    // Directions towards the two lights, and up on the screen (w unused).
+    // Directions towards the two lights; in w how much the picture is moved on the screen to the right, and
+    // upwards; up on the screen (w unused).
     key_light: vec4f,
     fill_light: vec4f,
     up: vec4f,

@@ -1,17 +1,17 @@
-// What is not opaque, in exact order along the ray of each pixel, over what is: the volume, surfaces with opacity, and
-// shade where light hardly comes. Twin of the volume: `view/volume.rs`.
+// What is not opaque, in exact order along the ray of each pixel, over what is: the volume, surfaces with
+// opacity, and shade where light hardly comes. Twin of the volume: `view/volume.rs`.
 //
-// The ray enters tetrahedra at the faces of the boundary that are listed for the pixel, nearest first, and goes on from
-// neighbour to neighbour. A tetrahedron takes five numbers: its four neighbours, in ascending order of the points opposite
-// the faces to them, and the exclusive or of its points. The ray knows the three points of the face through which it
-// enters, so that gives the fourth.
+// The ray enters tetrahedra at the faces of the boundary that are listed for the pixel, nearest first, and
+// goes on from neighbour to neighbour. A tetrahedron takes five numbers: its four neighbours, in ascending
+// order of the points opposite the faces to them, and the exclusive or of its points. The ray knows the three
+// points of the face through which it enters, so that gives the fourth.
 
 @group(1) @binding(0) var<storage, read> points: array<vec4f>;
 // Of the boundary: three points, and the tetrahedron behind.
 @group(1) @binding(1) var<storage, read> faces: array<vec4u>;
 @group(1) @binding(2) var<storage, read> tets: array<u32>;
-// At evenly spaced values: colour and extinction; then the integrals up to the value of colour times extinction, and of
-// extinction.
+// At evenly spaced values: colour and extinction; then the integrals up to the value of colour times
+// extinction, and of extinction.
 @group(1) @binding(3) var<storage, read> medium: array<vec4f>;
 // See `fragments.wgsl`.
 @group(1) @binding(4) var<storage, read> heads: array<u32>;
@@ -23,8 +23,8 @@
 struct Settings {
     // First value of the table, values between two entries, number of entries (0 without a volume; w unused).
     table: vec4f,
-    // If the eye is in a tetrahedron: its points; its number, or NONE, and the bits of the value at the eye; the clip
-    // planes that apply to the volume, a bit each (w unused).
+    // If the eye is in a tetrahedron: its points; its number, or NONE, and the bits of the value at the eye;
+    // the clip planes that apply to the volume, a bit each (w unused).
     corners: vec4u,
     start: vec4u,
     // Of the shade: strength, radius in model units (z, w unused).
@@ -40,10 +40,11 @@ const MOST_PIECES = 64.0;
 // What is behind so much does not change a picture of eight bits.
 const DARK = 0.002;
 
-// A surface with opacity on the ray.
-struct Layer {
+// What the pixel's list has at a distance: see `fragments.wgsl`.
+struct Fragment {
     distance: f32,
-    colour: u32,
+    content: u32,
+    node: u32,
 }
 
 // What has been seen of the ray so far.
@@ -51,7 +52,7 @@ var<private> colour: vec3f;
 var<private> transmittance: f32;
 // The pixel's list, the next layer in it, and the distance of what is opaque.
 var<private> head: u32;
-var<private> layer: Layer;
+var<private> layer: Fragment;
 var<private> opaque: f32;
 // The part of the ray that is not cut away.
 var<private> limits: vec2f;
@@ -128,17 +129,29 @@ fn held_piece(enter: vec2f, leave: vec2f) {
     }
 }
 
-// The nearest layer of the pixel's list behind `last`. Layers at one distance come in the order of their colours, which
-// does not depend on the order of the list.
-fn layer_after(last: Layer) -> Layer {
-    var next = Layer(FAR, 0u);
+// By distance; at one distance by content, so that the order of the list does not matter: there nodes differ
+// in nothing else.
+fn is_before(a: Fragment, b: Fragment) -> bool {
+    if a.distance != b.distance {
+        return a.distance < b.distance;
+    }
+    if a.content != b.content {
+        return a.content < b.content;
+    }
+    return a.node < b.node;
+}
+
+const BEFORE_ALL = Fragment(-FAR, 0u, 0u);
+
+// The nearest fragment of a kind in the pixel's list behind `last` and in front of what is opaque.
+fn fragment_after(last: Fragment, kind: u32) -> Fragment {
+    var next = Fragment(FAR, NONE, NONE);
     for (var node = head; node != 0u;) {
         let link = nodes[3u * node - 1u];
         let distance = bitcast<f32>(nodes[3u * node - 3u]);
-        if (link & IS_COLOUR) != 0u && distance < opaque {
-            let found = Layer(distance, nodes[3u * node - 2u]);
-            let is_after = distance > last.distance || (distance == last.distance && found.colour > last.colour);
-            if is_after && (distance < next.distance || (distance == next.distance && found.colour < next.colour)) {
+        if (link & IS_COLOUR) == kind && distance < opaque {
+            let found = Fragment(distance, nodes[3u * node - 2u], node);
+            if is_before(last, found) && is_before(found, next) {
                 next = found;
             }
         }
@@ -147,12 +160,17 @@ fn layer_after(last: Layer) -> Layer {
     return next;
 }
 
+// Lays the next layer behind what has been seen.
+fn take_layer() {
+    let own = unpack4x8unorm(layer.content);
+    behind(own.rgb, 1.0 - own.a);
+    layer = fragment_after(layer, IS_COLOUR);
+}
+
 // Takes the layers in front of a distance.
 fn take_layers(distance: f32) {
     while layer.distance < distance && transmittance > DARK {
-        let own = unpack4x8unorm(layer.colour);
-        behind(own.rgb, 1.0 - own.a);
-        layer = layer_after(layer);
+        take_layer();
     }
 }
 
@@ -164,9 +182,7 @@ fn go_through(enter: vec2f, leave: vec2f) {
         let t = select((place - enter.x) / (leave.x - enter.x), 0.0, leave.x <= enter.x);
         let there = vec2f(place, mix(enter.y, leave.y, t));
         held_piece(here, there);
-        let own = unpack4x8unorm(layer.colour);
-        behind(own.rgb, 1.0 - own.a);
-        layer = layer_after(layer);
+        take_layer();
         here = there;
     }
     held_piece(here, leave);
@@ -177,7 +193,8 @@ fn rank(point: u32, a: u32, b: u32, c: u32) -> u32 {
     return u32(point > a) + u32(point > b) + u32(point > c);
 }
 
-// From the eye to the face through which the ray leaves the tetrahedron that the eye is in, and on from there.
+// From the eye to the face through which the ray leaves the tetrahedron that the eye is in, and on from
+// there.
 fn march_from_inside(by: Across) {
     let c = settings.corners;
     for (var k = 0u; k < 4u; k += 1u) {
@@ -195,8 +212,8 @@ fn march_from_inside(by: Across) {
     }
 }
 
-// Enters tetrahedron `first` through the face of three points, and goes on until the ray leaves the volume or no more light
-// comes through.
+// Enters tetrahedron `first` through the face of three points, and goes on until the ray leaves the volume or
+// no more light comes through.
 fn march(face: vec3u, first: u32, by: Across) {
     var ids = face;
     var a = seen(ids.x, by);
@@ -243,28 +260,13 @@ fn march_all(by: Across) {
     if settings.start.x != NONE {
         march_from_inside(by);
     }
-    var last = vec2f(-FAR, -1.0);
-    loop {
-        // The nearest entry that has not been taken; of several at one place, by number.
-        var next = vec2f(FAR, 0.0);
-        for (var node = head; node != 0u;) {
-            let link = nodes[3u * node - 1u];
-            if (link & IS_COLOUR) == 0u {
-                let entry = vec2f(bitcast<f32>(nodes[3u * node - 3u]), f32(nodes[3u * node - 2u]));
-                let is_after = entry.x > last.x || (entry.x == last.x && entry.y > last.y);
-                if is_after && (entry.x < next.x || (entry.x == next.x && entry.y < next.y)) {
-                    next = entry;
-                }
-            }
-            node = link & ~IS_COLOUR;
-        }
-        if next.x >= limits.y || transmittance <= DARK {
+    for (var entry = fragment_after(BEFORE_ALL, 0u);; entry = fragment_after(entry, 0u)) {
+        if entry.distance >= limits.y || transmittance <= DARK {
             break;
         }
-        take_layers(next.x);
-        let face = faces[u32(next.y)];
+        take_layers(entry.distance);
+        let face = faces[entry.content];
         march(face.xyz, face.w, by);
-        last = next;
     }
 }
 
@@ -288,9 +290,8 @@ fn kept(ray: Ray) -> vec2f {
     return range;
 }
 
-// How far along the ray of a pixel the depth of its first sample is.
-fn distance_of(pixel: vec2i, ray: Ray) -> f32 {
-    let depth = textureLoad(depths, pixel, 0);
+// How far along a ray a depth is.
+fn distance_of(depth: f32, ray: Ray) -> f32 {
     if depth >= 1.0 {
         return FAR;
     }
@@ -298,13 +299,29 @@ fn distance_of(pixel: vec2i, ray: Ray) -> f32 {
     return forward / dot(ray.direction, normalize(frame.direction.xyz));
 }
 
+// What is opaque in the middle of a pixel: on one surface the mean of the samples is that of the middle,
+// since they lie evenly around it, and depths are linear on the screen.
+fn middle_depth(pixel: vec2i) -> f32 {
+    var sum = 0.0;
+    var count = 0.0;
+    let samples = textureNumSamples(depths);
+    for (var i = 0u; i < samples; i += 1u) {
+        let depth = textureLoad(depths, pixel, i);
+        sum += select(0.0, depth, depth < 1.0);
+        count += f32(depth < 1.0);
+    }
+    return select(1.0, sum / max(count, 1.0), 2.0 * count >= f32(samples));
+}
+
+// The place of the first sample, and whether there is something opaque.
 fn place_of(pixel: vec2i) -> vec4f {
     let ray = ray_of(vec2f(pixel));
-    let distance = distance_of(pixel, ray);
+    let distance = distance_of(textureLoad(depths, pixel, 0), ray);
     return vec4f(ray.origin + distance * ray.direction, f32(distance < FAR));
 }
 
-// The difference to a neighbour on one of both sides: to the nearer one, so that it does not reach over an edge.
+// The difference to a neighbour on one of both sides: to the nearer one, so that it does not reach over an
+// edge.
 fn slope_of(middle: vec3f, before: vec4f, after: vec4f) -> vec3f {
     let back = middle - before.xyz;
     let ahead = after.xyz - middle;
@@ -314,8 +331,8 @@ fn slope_of(middle: vec3f, before: vec4f, after: vec4f) -> vec3f {
 
 const TAPS = 14;
 
-// How much of the light of the sky does not come to an opaque place, 0 to 1, by what is near it on the screen (McGuire and
-// others, *The Alchemy screen-space ambient obscurance algorithm*, 2011).
+// How much of the light of the sky does not come to an opaque place, 0 to 1, by what is near it on the screen
+// (McGuire and others, *The Alchemy screen-space ambient obscurance algorithm*, 2011).
 fn shade(pixel: vec2i) -> f32 {
     let here = place_of(pixel);
     if here.w == 0.0 || settings.shade.x <= 0.0 {
@@ -361,10 +378,10 @@ fn fs(@builtin(position) pixel: vec4f) -> @location(0) vec4f {
     let ray = ray_of(pixel.xy);
     colour = vec3f(0.0);
     transmittance = 1.0;
-    opaque = distance_of(vec2i(pixel.xy), ray);
+    opaque = distance_of(middle_depth(vec2i(pixel.xy)), ray);
     limits = kept(ray);
     head = heads[1u + u32(pixel.y) * u32(frame.viewport.x) + u32(pixel.x)];
-    layer = layer_after(Layer(-FAR, 0u));
+    layer = fragment_after(BEFORE_ALL, IS_COLOUR);
     if settings.table.z > 0.0 {
         march_all(across_of(ray));
     }

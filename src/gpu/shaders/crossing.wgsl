@@ -1,5 +1,5 @@
-// Where rays go through triangles. All points are seen in a plane across the ray, which passes through its origin: signs
-// of areas say on which side of a line through two points the ray passes.
+// Where rays go through triangles. All points are seen in a plane across the ray, which passes through its
+// origin: signs of areas say on which side of a line through two points the ray passes.
 
 // A point: across the ray, along it, and its value.
 struct SeenPoint {
@@ -32,12 +32,14 @@ fn area(a: SeenPoint, b: SeenPoint) -> f32 {
     return a.across.x * b.across.y - a.across.y * b.across.x;
 }
 
-// Where the ray goes through a triangle around it: along it, and the value.
+// Where the ray goes through a triangle around it: along it, and the value. Rounding may put the ray a little
+// outside, which is far away in a triangle that is seen from its edge: so the place is held to the triangle.
 fn crossing(a: SeenPoint, b: SeenPoint, c: SeenPoint) -> vec2f {
-    let weights = vec3f(area(b, c), area(c, a), area(a, b));
+    let areas = vec3f(area(b, c), area(c, a), area(a, b));
+    let weights = max(areas * select(1.0, -1.0, areas.x + areas.y + areas.z < 0.0), vec3f(0.0));
     let sum = weights.x + weights.y + weights.z;
     if sum == 0.0 {
-        return vec2f(max(a.along, max(b.along, c.along)), a.value);
+        return vec2f(a.along, a.value);
     }
     let along = vec3f(a.along, b.along, c.along);
     return vec2f(dot(weights, along), dot(weights, vec3f(a.value, b.value, c.value))) / sum;

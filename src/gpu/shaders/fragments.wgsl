@@ -1,7 +1,8 @@
-// Fragments that are not opaque, in a linked list for each pixel. `heads` has one more than the number of the first
-// node of each pixel; its first number counts the nodes. A node is three numbers: the bits of the distance along the
-// pixel's ray; what is there, which is a face of the boundary through which the ray enters the volume, or a colour,
-// premultiplied, a byte a channel; and one more than the number of the next node, whose top bit says which of both.
+// Fragments that are not opaque, in a linked list for each pixel. `heads` has one more than the number of the
+// first node of each pixel; its first number counts the nodes. A node is three numbers: the bits of the
+// distance along the pixel's ray; what is there, which is a face of the boundary through which the ray enters
+// the volume, or a colour, premultiplied, a byte a channel; and one more than the number of the next node,
+// whose top bit says which of both.
 
 @group(2) @binding(0) var<storage, read_write> heads: array<atomic<u32>>;
 @group(2) @binding(1) var<storage, read_write> nodes: array<u32>;
@@ -20,7 +21,9 @@ fn append(pixel: vec4f, distance: f32, content: u32, kind: u32) {
     }
 }
 
-fn append_colour(pixel: vec4f, position: vec3f, premultiplied: vec4f) {
+// `nearer` is how much nearer than it is it counts, as a part of its distance.
+fn append_colour(pixel: vec4f, position: vec3f, premultiplied: vec4f, nearer: f32) {
     let ray = ray_of(pixel.xy);
-    append(pixel, dot(position - ray.origin, ray.direction), pack4x8unorm(premultiplied), IS_COLOUR);
+    let distance = (1.0 - nearer) * dot(position - ray.origin, ray.direction);
+    append(pixel, distance, pack4x8unorm(premultiplied), IS_COLOUR);
 }

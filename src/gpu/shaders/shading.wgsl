@@ -1,16 +1,18 @@
-// How surfaces look: their colours, and how light falls on them. Colours are linear until `encode`. Twin: `Style` in
-// `gpu/style.rs`.
+// How surfaces look: their colours, and how light falls on them. Colours are linear until `encode`. Twin:
+// `Style` in `gpu/style.rs`.
 
 struct Style {
-    // The sides that are seen from lower and from higher values: sRGB; in w opacity, and whether values give colours.
+    // The sides that are seen from lower and from higher values: sRGB; in w opacity, and whether values give
+    // colours.
     front: vec4f,
     back: vec4f,
-    // Of values: the smallest (or its logarithm), one over the range of them, whether it is logarithmic (w unused).
+    // Of values: the smallest (or its logarithm), one over the range of them, whether it is logarithmic (w
+    // unused).
     scale: vec4f,
     // Of edges: sRGB and strength.
     edge: vec4f,
-    // Width of edges in units of the page's layout, 0 for none; in y 0 for smooth, 1 for flat, 2 for no light; how much
-    // tetrahedra are shrunk; diameter of points in units of the page's layout.
+    // Width of edges in units of the page's layout, 0 for none; in y 0 for smooth, 1 for flat, 2 for no
+    // light; how much tetrahedra are shrunk; diameter of points in units of the page's layout.
     shape: vec4f,
     // The clip planes that apply, a bit each; whether each tetrahedron has a value (z, w unused).
     clips: vec4u,
@@ -60,35 +62,30 @@ struct Seen {
     normal: vec3f,
     // Of the triangle: the side from which its corners are counter-clockwise. Any length.
     face: vec3f,
+    // Whether that side is seen. The rasteriser says so, for the triangle as it is drawn, with its corners
+    // moved to a fine grid: in front of each place of a closed surface it draws as many fronts as backs, the
+    // nearest of which is a front. Normals do not tell: interpolated over triangles that are coarse for the
+    // surface's bends, they point away from the eye in large parts of triangles that face it, and towards it
+    // where backs are seen. Nor does the sign of the triangle before its corners were moved: it is another
+    // one for triangles that are seen from their edge.
+    is_front: bool,
     value: f32,
     // Of the place in the triangle: 0 along each side that is an edge, 1 at the corner opposite to it.
     sides: vec3f,
     slope: vec3f,
 }
 
-// Whether the side is seen that normals point to. Normals tell, and the triangle only where they are undecided: slivers,
-// of which marching tetrahedra make many, may face anywhere, so a triangle counts as far as it agrees with its normal.
-fn is_front(seen: Seen, n: vec3f, view: vec3f) -> bool {
-    let size = length(seen.face);
-    let facing = dot(seen.face, view);
-    if size == 0.0 {
-        return true;
-    }
-    let trust = smoothstep(0.5, 0.9, dot(seen.face, n) / size);
-    // A triangle that is seen from its back at a silhouette is one that the pixel's middle does not see.
-    return dot(n, view) + select(-0.06, 0.2, facing > 0.0) * select(trust, 1.0, facing > 0.0) > 0.0;
-}
-
 fn lit(albedo: vec3f, n: vec3f, view: vec3f) -> vec3f {
-    // Interpolated normals may look away a little at silhouettes: no more light there than at the very edge.
-    let facing = min(abs(dot(n, view)), 1.0);
+    // Interpolated normals may look away: no more light there than at the very edge.
+    let facing = clamp(dot(n, view), 0.0, 1.0);
     let rim = pow(1.0 - facing, 3.0) * (0.5 + 0.5 * dot(n, frame.up.xyz));
     let half_way = normalize(view + frame.key_light.xyz);
     let gloss = pow(max(dot(n, half_way), 0.0), 50.0);
     return albedo * diffuse(n) + vec3f(0.75, 0.85, 1.0) * (0.16 * rim) + vec3f(0.16 * gloss);
 }
 
-// How much of the edge colour there is at a place in a triangle. Edges fade out where faces are a few pixels large.
+// How much of the edge colour there is at a place in a triangle. Edges fade out where faces are a few pixels
+// large.
 fn edge_strength(seen: Seen) -> f32 {
     if style.shape.x <= 0.0 {
         return 0.0;
@@ -104,29 +101,19 @@ fn edge_strength(seen: Seen) -> f32 {
 
 // sRGB and opacity.
 fn shaded(seen: Seen) -> vec4f {
-    let view = towards_eye(seen.position);
-    var colour: vec3f;
+    var albedo = decode(select(style.back.rgb, style.front.rgb, seen.is_front));
+    if style.back.w > 0.0 {
+        albedo = mapped(seen.value);
+    }
+    var colour = albedo;
     if style.shape.y == 0.0 {
         let smooth_normal = normalize(seen.normal);
-        let front = is_front(seen, smooth_normal, view);
-        let fixed = decode(select(style.back.rgb, style.front.rgb, front));
-        var albedo = fixed;
-        if style.back.w > 0.0 {
-            albedo = mapped(seen.value);
-        }
-        colour = lit(albedo, select(-smooth_normal, smooth_normal, front), view);
-    } else {
-        let front = dot(seen.face, view) > 0.0;
-        var albedo = decode(select(style.back.rgb, style.front.rgb, front));
-        if style.back.w > 0.0 {
-            albedo = mapped(seen.value);
-        }
-        if style.shape.y == 1.0 {
-            // Mostly flat, so that the colours stay those of the legend.
-            let n = normalize(select(-seen.face, seen.face, front));
-            albedo *= vec3f(0.62) + 0.55 * diffuse(n);
-        }
-        colour = albedo;
+        let n = select(-smooth_normal, smooth_normal, seen.is_front);
+        colour = lit(albedo, n, towards_eye(seen.position));
+    } else if style.shape.y == 1.0 {
+        // Mostly flat, so that the colours stay those of the legend.
+        let n = normalize(select(-seen.face, seen.face, seen.is_front));
+        colour = albedo * (vec3f(0.62) + 0.55 * diffuse(n));
     }
     let edge = edge_strength(seen);
     let mixed = mix(encode(colour), style.edge.rgb, edge);

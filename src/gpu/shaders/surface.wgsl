@@ -54,13 +54,13 @@ fn vs(@builtin(vertex_index) i: u32) -> Vertex {
     );
 }
 
-fn seen(in: Vertex) -> Seen {
-    return Seen(in.position, in.normal, in.face, in.value, in.sides, fwidth(in.sides));
+fn seen(in: Vertex, is_front: bool) -> Seen {
+    return Seen(in.position, in.normal, in.face, is_front, in.value, in.sides, fwidth(in.sides));
 }
 
 @fragment
-fn fs(in: Vertex) -> @location(0) vec4f {
-    let what = seen(in);
+fn fs(in: Vertex, @builtin(front_facing) is_front: bool) -> @location(0) vec4f {
+    let what = seen(in, is_front);
     if is_clipped(in.position, style.clips.x) {
         discard;
     }
@@ -68,10 +68,10 @@ fn fs(in: Vertex) -> @location(0) vec4f {
 }
 
 @fragment
-fn fs_list(in: Vertex) -> @location(0) vec4f {
-    let colour = shaded(seen(in));
+fn fs_list(in: Vertex, @builtin(front_facing) is_front: bool) -> @location(0) vec4f {
+    let colour = shaded(seen(in, is_front));
     if !is_clipped(in.position, style.clips.x) {
-        append_colour(in.clip, in.position, vec4f(colour.rgb * colour.a, colour.a));
+        append_colour(in.clip, in.position, vec4f(colour.rgb * colour.a, colour.a), 0.0);
     }
     return vec4f(0.0);
 }

@@ -1,5 +1,5 @@
-// Straight lines and round handles of a width in pixels: one instance each, six vertices that make a quadrilateral.
-// Colours are premultiplied sRGB.
+// Straight lines and round handles of a width in pixels: one instance each, six vertices that make a
+// quadrilateral. Colours are premultiplied sRGB.
 
 struct Vertex {
     @builtin(position) clip: vec4f,
@@ -19,8 +19,11 @@ fn corner(i: u32) -> vec2f {
 }
 
 fn shifted(clip: vec4f, pixels: vec2f) -> vec4f {
+    // Lines have soft edges, and are at the same place in all pictures of a mean: else their edges would get
+    // softer.
+    let aside = pixels * 2.0 / frame.viewport.xy - vec2f(frame.key_light.w, frame.fill_light.w);
     // A little nearer than the faces that the line runs along.
-    return vec4f(clip.xy + pixels * 2.0 * clip.w / frame.viewport.xy, clip.z - 2e-5 * clip.w, clip.w);
+    return vec4f(clip.xy + aside * clip.w, clip.z - 2e-5 * clip.w, clip.w);
 }
 
 // How far an end of a line is moved along it, to the near side of the camera's plane; 0 to 1.
@@ -75,7 +78,8 @@ fn fs_line(in: Vertex) -> @location(0) vec4f {
 fn fs_list(in: Vertex) -> @location(0) vec4f {
     let colour = in.colour * clamp(in.radius + 0.5 - abs(in.offset.y), 0.0, 1.0);
     if colour.a > 0.0 {
-        append_colour(in.clip, in.position, colour);
+        // In front of faces that the line runs along.
+        append_colour(in.clip, in.position, colour, 1e-4);
     }
     return vec4f(0.0);
 }

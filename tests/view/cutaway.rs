@@ -1,31 +1,11 @@
-//! The cut-away view: what is seen of the tetrahedra that lie behind a plane.
+//! The cut-away view on the CPU, as the renderer's twin: what is seen of the tetrahedra that lie behind a
+//! plane.
 //!
-//! Whole tetrahedra are kept or taken away, so the cut shows the mesh as it is. The triangles are those faces of
-//! kept tetrahedra that have no kept tetrahedron on their other side; all their sides are edges of tetrahedra, so a
-//! renderer draws outlines along the sides of every triangle.
+//! Whole tetrahedra are kept or taken away. The triangles are those faces of kept tetrahedra that have no
+//! kept tetrahedron on their other side.
 
-use crate::mesh::{FACES, NONE};
-use crate::view::MeshView;
-
-/// A plane `normal · p = offset`; the half-space in which the product is larger is cut away.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ClipPlane {
-    /// Points into the part that is cut away; any length but zero.
-    pub normal: [f32; 3],
-    /// `normal · p` of the points of the plane.
-    pub offset: f32,
-}
-
-impl ClipPlane {
-    /// The plane that cuts nothing away.
-    pub const NOTHING: Self = Self { normal: [0.0, 0.0, 1.0], offset: f32::INFINITY };
-
-    /// Whether a tetrahedron with these corners is kept: its centroid is on the plane or behind it.
-    pub fn keeps(&self, corners: [[f32; 3]; 4]) -> bool {
-        let side = |p: [f32; 3]| (0..3).map(|i| f64::from(self.normal[i]) * f64::from(p[i])).sum::<f64>();
-        corners.map(side).iter().sum::<f64>() <= 4.0 * f64::from(self.offset)
-    }
-}
+use tetralod::mesh::{FACES, NONE};
+use tetralod::view::{ClipPlane, MeshView};
 
 /// The visible triangles of the kept tetrahedra, flat, three corners each; the memory is used again.
 #[derive(Clone, Debug, Default)]
