@@ -61,3 +61,41 @@ fn broken_shaders_would_be_noticed() {
     let (_, source) = SHADERS[1];
     assert!(naga::front::wgsl::parse_str(&source.replace("normalize(", "normalise(")).is_err());
 }
+
+/// The first place where operators stand side by side that WGSL wants parentheses between: naga takes them, browsers do not.
+fn unclear(source: &str) -> Option<String> {
+    const GROUPS: [&[&str]; 2] = [&["&&", "||"], &["<<", ">>", " & ", " | ", " ^ "]];
+    for line in source.lines().map(|line| line.split("//").next().unwrap_or_default()) {
+        // Of each open parenthesis: the operators since it or since the last comma.
+        let mut seen = vec![Vec::new()];
+        for (i, c) in line.char_indices() {
+            match c {
+                '(' | '[' => seen.push(Vec::new()),
+                ')' | ']' if seen.len() > 1 => drop(seen.pop()),
+                ',' | ';' | '{' => seen.iter_mut().for_each(Vec::clear),
+                _ => {}
+            }
+            let operator = GROUPS.iter().flat_map(|g| *g).find(|o| line[i..].starts_with(**o));
+            let here = seen.last_mut().expect("one is always open");
+            here.extend(operator);
+            let mixed = |group: &&[&str]| {
+                let mut own = here.iter().filter(|o| group.contains(o));
+                own.next().is_some_and(|first| own.any(|other| other != first))
+            };
+            if GROUPS.iter().any(|group| mixed(group)) {
+                return Some(line.to_owned());
+            }
+        }
+    }
+    None
+}
+
+#[test]
+fn operators_that_browsers_want_parentheses_between_have_them() {
+    for (name, source) in SHADERS {
+        assert_eq!(unclear(source), None, "{name}");
+    }
+    assert!(unclear("let a = b || c && d;").is_some());
+    assert!(unclear("if mask >> i & 1u == 1u {").is_some());
+    assert!(unclear("let a = b || (c && d); let e = ((f >> g) & 1u) | h;").is_none());
+}

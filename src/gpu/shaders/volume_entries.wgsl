@@ -45,7 +45,7 @@ fn vs(@builtin(vertex_index) i: u32) -> Vertex {
 // the side, one of both faces there has it.
 fn is_right(a: SeenPoint, b: SeenPoint, first: u32, second: u32) -> bool {
     let size = area(a, b);
-    return size < 0.0 || size == 0.0 && first < second;
+    return size < 0.0 || (size == 0.0 && first < second);
 }
 
 @fragment
