@@ -33,7 +33,7 @@ const USUAL: [u32; 2] = [1280, 960];
 #[command(after_help = "\
 Examples: tetralod render engine.mt --isovalue 0.3 --isovalue 0.6 --opacity 50% --error 1% -o engine.png
           tetralod render engine.mt --mode boundary,wire --clip z=0.5 --map turbo --from +x -o inside.png
-          tetralod render engine.mt --mode cells --colour-by depth --shrink 20% --cut y=0.5 -o cells.png")]
+          tetralod render engine.mt --mode cells --colour-by depth --shrink 20% --cut x=0.5 -o cells.png")]
 pub struct Arguments {
     /// The picture to write, a .png file.
     #[arg(short, long, value_name = "FILE", value_parser = parse_png, required_unless_present = "print_scene")]

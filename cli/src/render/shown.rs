@@ -27,7 +27,7 @@ pub struct Shown {
     /// Isosurface at this value, in units of the field (repeatable) [default: the values of --iso, or the middle of the
     /// field's range].
     #[arg(long = "isovalue", value_name = "V", value_parser = parse_number, allow_hyphen_values = true)]
-    isovalues: Vec<f64>,
+    surfaces: Vec<f64>,
     /// Section with this plane: x=D, y=D or z=D, or the points p with n · p = D; in model units (repeatable) [default:
     /// through the middle, across y].
     #[arg(long = "slice", value_name = "nx,ny,nz,D", value_parser = parse_plane, allow_hyphen_values = true)]
@@ -183,7 +183,7 @@ impl Shown {
         // Those of a scene stay as they are.
         let has_cells = self.colour_by.is_some() || self.shrink.is_some() || self.cut.is_some();
         let implied = [
-            (Mode::Surface, !self.isovalues.is_empty()),
+            (Mode::Surface, !self.surfaces.is_empty()),
             (Mode::Slice, !self.slices.is_empty()),
             (Mode::Volume, self.opacities.is_some()),
             (Mode::Cells, has_cells && self.scene.is_none()),
@@ -213,7 +213,7 @@ impl Shown {
     fn add(&self, mode: Mode, state: &mut SceneState, query: &Query, about: &About<'_>) -> Result<()> {
         match mode {
             Mode::Surface => {
-                let given = &self.isovalues;
+                let given = &self.surfaces;
                 let values = if given.is_empty() { query.isovalues() } else { given };
                 let like = state.isosurfaces.first().cloned().unwrap_or_default();
                 if !values.is_empty() {
@@ -256,7 +256,7 @@ impl Shown {
     fn refuse_idle(&self, state: &SceneState) {
         let faces = !state.isosurfaces.is_empty() || !state.slices.is_empty() || state.boundary.is_some();
         let idle = [
-            ("isovalue", !self.isovalues.is_empty() && state.isosurfaces.is_empty(), "surface"),
+            ("isovalue", !self.surfaces.is_empty() && state.isosurfaces.is_empty(), "surface"),
             ("slice", !self.slices.is_empty() && state.slices.is_empty(), "slice"),
             ("opacities", self.opacities.is_some() && state.volume.is_none(), "volume"),
             ("colour-by", self.colour_by.is_some() && state.cells.is_none(), "cells, wire or points"),
