@@ -26,7 +26,8 @@ const CAMERA: &str = "Camera";
 /// The size of a picture in which lines have their width in pixels; in larger ones they get wider.
 const USUAL: [u32; 2] = [1280, 960];
 
-/// Draws a picture of the mesh: isosurfaces, the volume, sections, the boundary, tetrahedra, together if need be.
+/// Draws a picture of the mesh: isosurfaces, the volume, sections, the boundary, tetrahedra, together if need
+/// be.
 ///
 /// It draws with Vulkan, on a GPU or in software. The same command gives the same picture on the same device.
 #[derive(clap::Args)]
@@ -45,7 +46,13 @@ pub struct Arguments {
     #[command(flatten)]
     placed: Placed,
     /// Width and height in pixels.
-    #[arg(long, value_name = "WxH", value_parser = parse_dimensions, default_value = "1280x960", help_heading = PICTURE)]
+    #[arg(
+        long,
+        value_name = "WxH",
+        default_value = "1280x960",
+        value_parser = parse_dimensions,
+        help_heading = PICTURE
+    )]
     size: Dimensions,
     /// How many pictures, from a little beside one another, the picture is the mean of: more are smoother.
     #[arg(
@@ -235,7 +242,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     arguments.query.print(&report, rows(output, &report), (&answer.summary, seconds))
 }
 
-/// Draws the mean of `samples` pictures: premultiplied `RGBA`. Its progress is drawn on stderr, and only on a terminal.
+/// Draws the mean of `samples` pictures: premultiplied `RGBA`. Its progress is drawn on stderr, and only on a
+/// terminal.
 fn draw(
     scene: &mut Scene,
     session: &mut Session,
@@ -310,7 +318,8 @@ fn renderer(size: [u32; 2]) -> Result<Renderer> {
         let [width, height] = size;
         let device = renderer.description();
         return Err(anyhow!(
-            "--size {width}x{height}: this device ({device}) draws pictures of at most {longest} x {longest} pixels"
+            "--size {width}x{height}: pictures of this device ({device}) have at most {longest} x {longest} \
+             pixels"
         ));
     }
     renderer.resize(size);
@@ -321,8 +330,9 @@ fn renderer(size: [u32; 2]) -> Result<Renderer> {
 fn explained(error: SceneError) -> anyhow::Error {
     match error {
         SceneError::Gpu(GpuError::NoAdapter(why)) => anyhow!(
-            "there is no Vulkan adapter to draw with ({why}); install the driver of the GPU, or Mesa's software driver \
-             (package mesa-vulkan-drivers of Debian, Ubuntu and Fedora, vulkan-swrast of Arch Linux)"
+            "there is no Vulkan adapter to draw with ({why}); install the driver of the GPU, or \
+             Mesa's software driver (package mesa-vulkan-drivers of Debian, Ubuntu and Fedora, vulkan-swrast \
+             of Arch Linux)"
         ),
         SceneError::Gpu(GpuError::NoDevice(why)) => {
             anyhow!("the GPU cannot be opened: {why}; end other programs that use it")

@@ -21,22 +21,24 @@ const COLOURS: &str = "Colours";
 #[derive(clap::Args)]
 #[command(next_help_heading = SHOWN)]
 pub struct Shown {
-    /// What is shown; several between commas. Without it, what the options below are for, or else the surface.
+    /// What is shown; several between commas. Without it, what the options below are for, or else the
+    /// surface.
     #[arg(long = "mode", value_name = "MODE,…", value_delimiter = ',')]
     modes: Vec<Mode>,
-    /// Isosurface at this value, in units of the field (repeatable) [default: the values of --iso, or the middle of the
-    /// field's range].
+    /// Isosurface at this value, in units of the field (repeatable) [default: the values of --iso, or the
+    /// middle of the field's range].
     #[arg(long = "isovalue", value_name = "V", value_parser = parse_number, allow_hyphen_values = true)]
     surfaces: Vec<f64>,
-    /// Section with this plane: x=D, y=D or z=D, or the points p with n · p = D; in model units (repeatable) [default:
-    /// through the middle, across y].
+    /// Section with this plane: x=D, y=D or z=D, or the points p with n · p = D; in model units (repeatable)
+    /// [default: through the middle, across y].
     #[arg(long = "slice", value_name = "nx,ny,nz,D", value_parser = parse_plane, allow_hyphen_values = true)]
     slices: Vec<Plane>,
     /// Opacity of isosurfaces, sections and boundary, 0 to 1 or with % [default: 1].
     #[arg(long, value_name = "O|O%", value_parser = parse_opacity, allow_hyphen_values = true)]
     opacity: Option<f64>,
-    /// Opacities of the volume: ascending values of the field, each with the opacity (0 to 1) of a tenth of the model's
-    /// diagonal [default: that of --transfer with its colours, or from 0 to 0.5 over the range of the colours].
+    /// Opacities of the volume: ascending values of the field, each with the opacity (0 to 1) of a tenth of
+    /// the model's diagonal [default: that of --transfer with its colours, or from 0 to 0.5 over the range of
+    /// the colours].
     #[arg(long, value_name = "v,o,v,o,…", value_parser = parse_opacities, allow_hyphen_values = true)]
     opacities: Option<Opacities>,
     /// What colours tetrahedra: the field, or a property of each.
@@ -67,7 +69,13 @@ pub struct Shown {
     #[arg(long, value_name = "NAME", value_parser = parse_map, help_heading = COLOURS)]
     map: Option<MapName>,
     /// The values with the first and the last colour [default: the range of the field].
-    #[arg(long, value_name = "a,b", value_parser = parse_range, allow_hyphen_values = true, help_heading = COLOURS)]
+    #[arg(
+        long,
+        value_name = "a,b",
+        value_parser = parse_range,
+        help_heading = COLOURS,
+        allow_hyphen_values = true
+    )]
     colour_range: Option<[f64; 2]>,
     /// Colours follow the logarithm of values; their range must be positive.
     #[arg(long, help_heading = COLOURS)]

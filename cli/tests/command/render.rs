@@ -1,5 +1,5 @@
-//! Promise: `render` draws each kind of picture, of the size that is asked for, the same each time, and refuses what it cannot
-//! draw.
+//! Promise: `render` draws each kind of picture, of the size that is asked for, the same each time, and
+//! refuses what it cannot draw.
 //!
 //! Where there is no Vulkan adapter, what draws is skipped; `TETRALOD_NEED_GPU` makes that a failure.
 
