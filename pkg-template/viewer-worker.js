@@ -32,6 +32,13 @@ let total = {};
 /** When the last refinement ended, and how long it took. */
 let lastRefine = { end: -Infinity, took: 0 };
 let drawing = 0;
+/** When the last picture was begun, while the GPU has not finished it; and how long it took to finish the one before. */
+let begun;
+let took = 0;
+/** The part of the pixels, in each direction, with which a picture takes about as long as it should. */
+let scale = 1;
+/** Sharpens the picture when nothing changes any more. */
+let resting;
 let bytes = 0;
 let ready = false;
 let frameAsked = false;
@@ -39,6 +46,13 @@ let frameAsked = false;
 let following;
 let hidden;
 let broken = false;
+
+/** A picture while something moves should take so long, of these scales, and is sharp again so much later (in ms). */
+const TARGET = 60;
+const SCALES = [1, 0.7, 0.5, 0.35, 0.25];
+const REST = 250;
+/** Pictures that take longer than this are drawn once, not several times for smooth edges. */
+const SLOW = 100;
 
 const nextFrame =
   typeof requestAnimationFrame === "function" ? requestAnimationFrame : (then) => setTimeout(then, 16);
@@ -161,6 +175,8 @@ const methods = {
     if (pan) viewer.pan(...pan);
     if (fly) viewer.fly(...fly);
     if (look) viewer.look(...look);
+    if (size) current = 1;
+    else move();
     invalidate();
   },
 
@@ -274,11 +290,13 @@ function draw() {
   hidden = undefined;
   if (ready && viewer.moving) step(Math.min(Math.max(drawing, STEP[0]), STEP[1]));
   try {
+    observe();
     const start = performance.now();
     const drew = viewer.frame();
     const milliseconds = performance.now() - start;
     if (drew) {
       drawing = milliseconds;
+      begun = start;
       const uploaded = viewer.takeUploaded();
       emit("frame", { milliseconds, triangles: viewer.triangles, uploaded, bytes, ready });
       report("camera", viewer.camera());
@@ -287,14 +305,45 @@ function draw() {
     // The canvas may be hidden just now: then try again with the next refresh.
     else if (viewer.pending) invalidate();
     // At rest the picture gets better with every refresh.
-    else if (viewer.canImprove && !viewer.moving) viewer.improve();
-    if (viewer.canImprove) invalidate();
+    else if (canImprove()) viewer.improve();
+    if (begun !== undefined || canImprove()) invalidate();
   } catch (error) {
     // A frame that fails would fail again: wait for a change, or stop if the GPU or the worker is lost.
     broken = error?.code === "device-lost" || error?.code === undefined;
     emit("error", flattenError(error));
   }
   if (ready && viewer.moving) invalidate();
+}
+
+const canImprove = () => viewer.canImprove && !viewer.moving && took < SLOW && resting === undefined;
+
+/** Looks whether the GPU has finished the last picture, and chooses the scale of the next ones by its time. */
+function observe() {
+  if (begun === undefined || viewer.inFlight > 0) return;
+  took = performance.now() - begun;
+  begun = undefined;
+  const wanted = current * Math.sqrt(TARGET / took);
+  scale = SCALES.find((one) => one <= wanted) ?? SCALES.at(-1);
+}
+
+/** The scale that is set. */
+let current = 1;
+
+function setScale(wanted) {
+  if (wanted === current) return;
+  current = wanted;
+  viewer.setScale(wanted);
+}
+
+/** Something moves: draws as finely as there is time for, and finely a little later. */
+function move() {
+  setScale(scale);
+  clearTimeout(resting);
+  resting = setTimeout(() => {
+    resting = undefined;
+    setScale(1);
+    invalidate();
+  }, REST);
 }
 
 /** The last reports, as JSON. */

@@ -81,13 +81,14 @@ pub fn ending(path: &Path) -> String {
 }
 
 /// What output files are called, and which command writes them.
-const ENDINGS: [(&[&str], &str); 4] = [
+const ENDINGS: [(&[&str], &str); 5] = [
     (&["mt"], "`tetralod build` writes .mt"),
     (&["vtu"], "`tetralod extract` writes .vtu"),
     (
         &["vtp", "stl", "ply", "obj", "csv"],
         "`tetralod surface`, `isosurface`, `slice`, `probe` and `streamlines` write .vtp, .stl, .ply, .obj and .csv",
     ),
+    (&["png"], "`tetralod render` writes .png"),
     (&["vti", "vtk", "pvd", "raw", "json"], "this command does not write that format"),
 ];
 

@@ -1,4 +1,5 @@
-//! The command `tetralod`: builds MT files, looks into them, takes meshes out of them, checks and times them.
+//! The command `tetralod`: builds MT files, looks into them, takes meshes and pictures out of them, checks
+//! and times them.
 //!
 //! One file a subcommand, each with its arguments and a `run`. Exit codes: 0 done, 1 failed (or a check failed),
 //! 2 wrong usage, 130 interrupted. Results go to stdout, everything else to stderr.
@@ -18,6 +19,8 @@ mod parse;
 mod poly;
 mod probe;
 mod query;
+#[cfg(feature = "render")]
+mod render;
 mod serve;
 mod slice;
 mod stats;
@@ -50,6 +53,8 @@ enum Command {
     Probe(Box<probe::Arguments>),
     Streamlines(Box<streamlines::Arguments>),
     Stats(Box<stats::Arguments>),
+    #[cfg(feature = "render")]
+    Render(Box<render::Arguments>),
     Verify(verify::Arguments),
     Bench(bench::Arguments),
     Serve(serve::Arguments),
@@ -93,6 +98,8 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Probe(arguments) => probe::run(&arguments)?,
         Command::Streamlines(arguments) => streamlines::run(&arguments)?,
         Command::Stats(arguments) => stats::run(&arguments)?,
+        #[cfg(feature = "render")]
+        Command::Render(arguments) => render::run(&arguments)?,
         Command::Serve(arguments) => serve::run(&arguments)?,
     }
     Ok(ExitCode::SUCCESS)

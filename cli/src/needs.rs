@@ -1,7 +1,7 @@
 //! Needs as they are written on the command line and in files, and what they mean for an MT.
 
 use super::parse::{
-    Tolerance, parse_bounds, parse_list, parse_number, parse_numbers, parse_share, parse_size,
+    Tolerance, parse_bounds, parse_list, parse_number, parse_numbers, parse_range, parse_share, parse_size,
 };
 use super::{files, output};
 use anyhow::{Context, Result};
@@ -163,6 +163,16 @@ impl Group {
     /// The field's name, if there is one.
     pub fn field(&self) -> Option<&str> {
         self.field.as_deref()
+    }
+
+    /// The points of the first transfer function and its unit length, as a part of the model's diagonal, if
+    /// there is one and it is of the field that is shown.
+    #[cfg(feature = "render")]
+    pub fn shown(&self, field: &str) -> Result<Option<(Vec<[f64; 5]>, f64)>> {
+        let Some(path) = self.transfers.first() else { return Ok(None) };
+        let file: TransferFile = read_json(path)?;
+        let is_of_it = file.field.as_deref().is_none_or(|name| name == field);
+        Ok(is_of_it.then_some((file.points, file.unit_length)))
     }
 
     /// Whether it says neither where the mesh is needed nor how accurate it is to be.
@@ -370,7 +380,7 @@ fn whole() -> f64 {
     1.0
 }
 
-fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T> {
+pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T> {
     let name = || path.display().to_string();
     let text = fs::read_to_string(path).with_context(name)?;
     serde_json::from_str(&text).with_context(name)
@@ -426,11 +436,6 @@ fn parse_convex(text: &str) -> Result<Region, String> {
 
 fn parse_matrix(text: &str) -> Result<[f64; 16], String> {
     parse_numbers(text, "a matrix")
-}
-
-fn parse_range(text: &str) -> Result<[f64; 2], String> {
-    let [low, high] = parse_numbers(text, "a range")?;
-    if low > high { Err("the smaller value of a range must come first".to_owned()) } else { Ok([low, high]) }
 }
 
 fn parse_viewport(text: &str) -> Result<[f64; 2], String> {

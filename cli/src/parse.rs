@@ -2,6 +2,7 @@
 
 use std::str::FromStr;
 use tetralod::geom::Bounds;
+use tetralod::view::Plane;
 
 /// An error in units of a field, or as a fraction of its range.
 #[derive(Clone, Copy, Debug)]
@@ -70,6 +71,28 @@ pub fn parse_bounds(text: &str) -> Result<Bounds, String> {
         return Err("the smaller corner of a box must come first".to_owned());
     }
     Ok(Bounds { min: [x0, y0, z0], max: [x1, y1, z1] })
+}
+
+/// A plane: x=D, y=D or z=D, or its normal and n · p.
+pub fn parse_plane(text: &str) -> Result<Plane, String> {
+    if let Some((axis, offset)) = text.split_once('=') {
+        let axis = ["x", "y", "z"].iter().position(|name| *name == axis.trim());
+        let axis = axis.ok_or_else(|| format!("'{text}' is not x=, y= or z= and a number"))?;
+        let mut normal = [0.0; 3];
+        normal[axis] = 1.0;
+        return Ok(Plane { normal, offset: parse_number(offset)? });
+    }
+    let [x, y, z, offset] = parse_numbers(text, "a plane")?;
+    if [x, y, z] == [0.0; 3] {
+        return Err("the normal of a plane must not be 0,0,0".to_owned());
+    }
+    Ok(Plane { normal: [x, y, z], offset })
+}
+
+/// Two values, the smaller one first.
+pub fn parse_range(text: &str) -> Result<[f64; 2], String> {
+    let [low, high] = parse_numbers(text, "a range")?;
+    if low > high { Err("the smaller value of a range must come first".to_owned()) } else { Ok([low, high]) }
 }
 
 /// A number that is not negative.

@@ -81,6 +81,18 @@ impl Query {
         self.group.isovalues()
     }
 
+    /// The transfer function that the mesh is refined for, as [`Group::shown`] gives it.
+    #[cfg(feature = "render")]
+    pub fn transfer(&self, field: &str) -> Result<Option<(Vec<[f64; 5]>, f64)>> {
+        self.group.shown(field)
+    }
+
+    /// The field's name, if there is one.
+    #[cfg(feature = "render")]
+    pub fn field(&self) -> Option<&str> {
+        self.group.field()
+    }
+
     fn named_needs(&self, info: &MtInfo) -> Result<Vec<NamedNeed>> {
         let mut needs = Vec::new();
         // Without any other need, the mesh is the reference mesh everywhere.

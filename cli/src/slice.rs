@@ -1,7 +1,7 @@
 //! `tetralod slice`: the mesh in a plane.
 
 use super::output;
-use super::parse::{parse_number, parse_numbers};
+use super::parse::parse_plane;
 use super::poly::{Amount, Target};
 use super::query::Query;
 use anyhow::Result;
@@ -28,21 +28,6 @@ pub struct Arguments {
     /// The surface to write: .vtp, .stl (without edges), .ply, .obj, or .csv for its points.
     #[arg(short, long, value_name = "FILE")]
     output: Target,
-}
-
-fn parse_plane(text: &str) -> Result<Plane, String> {
-    if let Some((axis, offset)) = text.split_once('=') {
-        let axis = ["x", "y", "z"].iter().position(|name| *name == axis.trim());
-        let axis = axis.ok_or_else(|| format!("'{text}' is not x=, y= or z= and a number"))?;
-        let mut normal = [0.0; 3];
-        normal[axis] = 1.0;
-        return Ok(Plane { normal, offset: parse_number(offset)? });
-    }
-    let [x, y, z, offset] = parse_numbers(text, "a plane")?;
-    if [x, y, z] == [0.0; 3] {
-        return Err("the normal of a plane must not be 0,0,0".to_owned());
-    }
-    Ok(Plane { normal: [x, y, z], offset })
 }
 
 /// The result as programs get it.

@@ -135,6 +135,16 @@ impl Renderer {
         self.last = None;
     }
 
+    /// Draws the next pictures with fewer pixels, and stretches them: `scale` of each direction, 0.1 to 1. Makes a slow device
+    /// answer sooner. A new size of the target sets it back to 1.
+    pub fn set_scale(&mut self, scale: f64) {
+        let before = self.target.drawn_size;
+        self.target.scale(&self.context, if scale.is_finite() { scale.clamp(0.1, 1.0) } else { 1.0 });
+        if self.target.drawn_size != before {
+            self.last = None;
+        }
+    }
+
     /// Makes surface number `key` these triangles. If `changes` are given, only those differ from the ones that it has, and what
     /// lies beyond the ends of their arrays; what is uploaded is that, so the cost goes with what has changed.
     ///
@@ -318,7 +328,10 @@ impl Renderer {
         };
         let own = picture.as_ref().map(Picture::view);
         let Some(view) = given.or(own.as_ref()) else { return Ok(false) };
-        self.common.write(&self.context, &Frame::new(camera, look, self.target.size, shift(count)));
+        self.common.write(
+            &self.context,
+            &Frame::new(camera, &self.scaled(look), self.target.drawn_size, shift(count)),
+        );
         self.encode(view, look, count);
         if let Some(Picture::Canvas(texture)) = picture {
             self.context.queue.present(texture);
@@ -326,6 +339,12 @@ impl Renderer {
         self.last = Some((*camera, look.clone(), count + 1));
         self.context.check()?;
         Ok(true)
+    }
+
+    /// What makes lines as wide on the target as `look` wants them.
+    fn scaled(&self, look: &Look) -> Look {
+        let scale = self.target.drawn_size[1] as f32 / self.target.size[1] as f32;
+        Look { pixel_ratio: look.pixel_ratio * scale, ..look.clone() }
     }
 
     /// Draws into `view`, as number `count` of pictures whose mean is shown.
@@ -365,7 +384,7 @@ impl Renderer {
         let (context, common) = (&self.context, &self.common);
         self.surface_pipelines.prepare_lists(context, common, &self.lists.layout);
         self.wire.prepare_lists(context, common, &self.lists.layout);
-        let mut pass = self.lists.begin(context, encoder, self.target.size);
+        let mut pass = self.lists.begin(context, encoder, self.target.drawn_size);
         pass.set_bind_group(0, &common.group, &[]);
         self.composite.list(context, &self.mesh, &mut pass);
         self.surface_pipelines.draw(&mut pass, self.surfaces.values(), true);

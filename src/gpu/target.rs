@@ -12,6 +12,8 @@ pub(super) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 pub(super) struct Target {
     place: Place,
     pub(super) size: [u32; 2],
+    /// Of the images that pictures are made in; they are stretched to `size`.
+    pub(super) drawn_size: [u32; 2],
     pub(super) format: wgpu::TextureFormat,
     pub(super) images: Images,
 }
@@ -86,7 +88,7 @@ impl Target {
     }
 
     fn new(context: &Context, place: Place, size: [u32; 2], format: wgpu::TextureFormat) -> Self {
-        Self { place, size, format, images: Images::new(context, size, format) }
+        Self { place, size, drawn_size: size, format, images: Images::new(context, size, format) }
     }
 
     /// Gives the target another size.
@@ -101,7 +103,16 @@ impl Target {
             Place::Image(image) => *image = picture(context, size, self.format),
         }
         self.size = size;
-        self.images = Images::new(context, size, self.format);
+        self.scale(context, 1.0);
+    }
+
+    /// Draws pictures of this part of the size in each direction.
+    pub(super) fn scale(&mut self, context: &Context, scale: f64) {
+        let size = held(context, self.size.map(|s| (f64::from(s) * scale).round() as u32));
+        if size != self.drawn_size {
+            self.drawn_size = size;
+            self.images = Images::new(context, size, self.format);
+        }
     }
 
     /// The next picture; `None` if the target is not available now.

@@ -215,7 +215,7 @@ impl Scene {
 /// What makes no sense whatever the volume is.
 fn check(state: &SceneState) -> Result<(), SceneError> {
     let plane = "must have a `normal` of three numbers, not all 0, and an `offset`";
-    for (i, clip) in state.clips.iter().enumerate().filter(|(_, clip)| !clip.is_plane()) {
+    if let Some((i, clip)) = state.clips.iter().enumerate().find(|(_, clip)| !clip.is_plane()) {
         return Err(SceneError::state(format!("clips[{i}]"), format!("{plane}; given: {clip:?}")));
     }
     for (i, slice) in state.slices.iter().enumerate() {

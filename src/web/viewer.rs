@@ -402,6 +402,19 @@ impl Viewer {
         self.is_stale = true;
     }
 
+    /// Draws the next pictures with this part of their pixels in each direction, and stretches them.
+    #[wasm_bindgen(js_name = setScale)]
+    pub fn set_scale(&mut self, scale: f64) {
+        self.scene.renderer_mut().set_scale(scale);
+        self.is_stale |= self.scene.renderer().drawn() == 0;
+    }
+
+    /// Pictures that the GPU has not finished.
+    #[wasm_bindgen(getter, js_name = inFlight)]
+    pub fn in_flight(&self) -> Result<u32, WebError> {
+        Ok(self.scene.renderer().in_flight()?)
+    }
+
     /// Triangles of all surfaces in the last frame.
     #[wasm_bindgen(getter)]
     pub fn triangles(&self) -> usize {

@@ -1,5 +1,5 @@
 //! Promise: the library links nothing that only the command needs, TLS only with the feature `http`, and the command
-//! knows neither the renderer nor JavaScript.
+//! knows the renderer only with the feature `render`, and never JavaScript.
 
 use std::process::Command;
 
@@ -35,8 +35,11 @@ fn the_library_links_nothing_of_the_command() {
 }
 
 #[test]
-fn the_command_links_neither_the_renderer_nor_javascript() {
+fn the_command_links_the_renderer_only_to_render_and_no_javascript() {
+    let all = linked("tetralod-cli", "render");
+    assert!(["wgpu", "png"].iter().all(|name| all.iter().any(|found| found == name)), "{all:?}");
+    assert_without(&all, &["wasm-bindgen", "js-sys", "web-sys"]);
     let command = linked("tetralod-cli", "");
     assert!(command.iter().any(|found| found == "tetralod"), "{command:?}");
-    assert_without(&command, &["wgpu", "naga", "wasm-bindgen", "js-sys", "web-sys"]);
+    assert_without(&command, &["wgpu", "naga", "png", "wasm-bindgen", "js-sys", "web-sys"]);
 }

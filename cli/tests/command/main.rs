@@ -5,6 +5,8 @@ mod fields;
 mod linking;
 mod readme;
 mod remote;
+#[cfg(feature = "render")]
+mod render;
 mod serve;
 mod support;
 mod surfaces;

@@ -40,17 +40,22 @@ fn content(page: &str) -> String {
 }
 
 /// `page` with what `run` answers to the commands in its blocks of kind `console` in place of what is shown.
-fn answered(page: &str, mut run: impl FnMut(&str) -> String) -> String {
-    let (mut fresh, mut inside) = (String::new(), false);
+fn answered(page: &str, mut run: impl FnMut(&str) -> Option<String>) -> String {
+    // A command without an answer keeps what is shown.
+    let (mut fresh, mut inside, mut keeps) = (String::new(), false, false);
     for line in page.lines() {
         if line.starts_with("```") {
-            inside = line == START;
+            (inside, keeps) = (line == START, false);
         }
         let command = line.strip_prefix(PROMPT).filter(|_| inside);
-        if !inside || line == START || command.is_some() {
+        if !inside || line == START || command.is_some() || keeps {
             fresh.extend([line, "\n"]);
         }
-        fresh.extend(command.map(&mut run));
+        if let Some(command) = command {
+            let answer = run(command);
+            keeps = answer.is_none();
+            fresh.extend(answer);
+        }
     }
     fresh
 }
@@ -104,12 +109,23 @@ fn check_page(page: &str) {
     let update = std::env::var_os("TETRALOD_UPDATE_README").is_some();
     // Smaller data will do for the names.
     let size = if update { "--size 33" } else { "--size 9" };
-    let fresh = answered(&shown, |command| run(&command.replace("--size 33", size), &path));
+    let fresh = answered(&shown, |command| {
+        let is_possible = !command.starts_with("render ") || can_render();
+        is_possible.then(|| run(&command.replace("--size 33", size), &path))
+    });
     if update {
         fs::write(root().join(page), fresh).expect("the page can be written");
     } else {
         assert_eq!(without_values(&shown), without_values(&fresh), "{page}");
     }
+}
+
+/// Whether there is something to draw with.
+fn can_render() -> bool {
+    #[cfg(feature = "render")]
+    return support::has_adapter();
+    #[cfg(not(feature = "render"))]
+    return false;
 }
 
 #[test]
@@ -266,10 +282,11 @@ fn the_numbers_of_the_readme_are_measured() {
 fn only_answers_are_replaced() {
     let readme =
         "a  b\n$ tetralod no\n```console\n$ tetralod yes\nold  1\n    2\n$ tetralod too\n```\nc  d\n";
-    let fresh = answered(readme, |command| format!("{command}  new\n"));
+    let fresh = answered(readme, |command| Some(format!("{command}  new\n")));
     let expected =
         "a  b\n$ tetralod no\n```console\n$ tetralod yes\nyes  new\n$ tetralod too\ntoo  new\n```\nc  d\n";
     assert_eq!(fresh, expected);
+    assert_eq!(answered(readme, |_| None), readme);
     let block = "a  b\n```console\n$ tetralod yes\nold  1\n    2\n```\nc  d\n";
     assert_eq!(without_values(block), "a  b\n```console\n$ tetralod yes\nold\n```\nc  d\n");
     assert_eq!(

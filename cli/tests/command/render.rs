@@ -1,0 +1,206 @@
+//! Promise: `render` draws each kind of picture, of the size that is asked for, the same each time, and
+//! refuses what it cannot draw.
+//!
+//! Where there is no Vulkan adapter, what draws is skipped; `TETRALOD_NEED_GPU` makes that a failure.
+
+use crate::support::{Folder, bad, bucky, good, has_adapter, json, run, text};
+use std::fs;
+use std::fs::File;
+use std::io::BufReader;
+
+/// A coarse mesh in a small picture, for software that draws.
+const SMALL: [&str; 6] = ["--size", "120x90", "--samples", "2", "--error", "10%"];
+
+struct Picture {
+    size: [u32; 2],
+    /// Bytes of a pixel.
+    channels: usize,
+    bytes: Vec<u8>,
+    about: String,
+}
+
+impl Picture {
+    fn read(path: &str) -> Self {
+        let decoder = png::Decoder::new(BufReader::new(File::open(path).expect("a picture")));
+        let mut reader = decoder.read_info().expect("PNG");
+        let mut bytes = vec![0; reader.output_buffer_size().expect("a size")];
+        let info = reader.next_frame(&mut bytes).expect("pixels");
+        reader.finish().expect("the end");
+        let software = &reader.info().uncompressed_latin1_text;
+        assert!(
+            software.iter().any(|chunk| chunk.keyword == "Software" && chunk.text.starts_with("tetralod "))
+        );
+        let about = &reader.info().utf8_text;
+        let about = about.iter().find(|chunk| chunk.keyword == "Description").expect("a description");
+        let about = about.get_text().expect("UTF-8");
+        Self { size: [info.width, info.height], channels: info.color_type.samples(), bytes, about }
+    }
+
+    /// How many pixels differ from those of another picture.
+    fn differing(&self, other: &Self) -> usize {
+        let pairs = self.bytes.chunks(self.channels).zip(other.bytes.chunks(other.channels));
+        pairs.filter(|(a, b)| a != b).count()
+    }
+}
+
+/// Draws with some more options.
+fn draw(mt: &str, out: &str, options: &[&str]) -> Picture {
+    good(&[&["render", mt, "-o", out], &SMALL[..], options].concat());
+    Picture::read(out)
+}
+
+#[test]
+fn each_mode_is_a_picture_of_its_own_and_the_same_each_time() {
+    if !has_adapter() {
+        return;
+    }
+    let folder = Folder::new("modes");
+    let [input, mt, out] = ["a.vti", "a.mt", "a.png"].map(|name| folder.path(name));
+    bucky(9, &input, &mt);
+    let empty = draw(&mt, &out, &["--isovalue", "99"]);
+    let mut drawn: Vec<Picture> = Vec::new();
+    for mode in ["surface", "volume", "slice", "boundary", "cells", "wire", "points", "surface,slice,wire"] {
+        let picture = draw(&mt, &out, &["--mode", mode]);
+        assert_eq!((picture.size, picture.channels), ([120, 90], 3), "{mode}");
+        assert!(picture.differing(&empty) > 300, "{mode} is blank");
+        assert!(drawn.iter().all(|other| picture.differing(other) > 50), "{mode} is like another mode");
+        assert!(picture.about.starts_with("a.mt: density, "), "{}", picture.about);
+        let first = fs::read(&out).expect("a picture");
+        draw(&mt, &out, &["--mode", mode]);
+        assert!(first == fs::read(&out).expect("a picture"), "{mode} is not the same again");
+        drawn.push(picture);
+    }
+}
+
+#[test]
+fn options_change_the_picture() {
+    if !has_adapter() {
+        return;
+    }
+    let folder = Folder::new("options");
+    let [input, mt, out] = ["a.vti", "a.mt", "a.png"].map(|name| folder.path(name));
+    bucky(9, &input, &mt);
+    let boundary = ["--mode", "boundary,surface"];
+    let before = draw(&mt, &out, &boundary);
+    let sets: [&[&str]; 12] = [
+        &["--clip", "y=0.5"],
+        &["--clip-box", "0,0.5,0,1,1,1"],
+        &["--edges"],
+        &["--opacity", "40%"],
+        &["--map", "turbo"],
+        &["--colour-range", "-1,2"],
+        &["--reversed"],
+        &["--background", "light"],
+        &["--from", "-x"],
+        &["--turn", "20,-10"],
+        &["--zoom", "1.5"],
+        &["--orthographic"],
+    ];
+    for options in sets {
+        let after = draw(&mt, &out, &[&boundary, options].concat());
+        assert!(after.differing(&before) > 100, "{options:?} changes nothing");
+    }
+    let before = draw(&mt, &out, &["--mode", "cells"]);
+    for options in [["--colour-by", "size"], ["--shrink", "30%"], ["--cut", "y=0.5"]] {
+        assert!(draw(&mt, &out, &options).differing(&before) > 100, "{options:?} changes nothing");
+    }
+    // A part of the range is visible.
+    let before = draw(&mt, &out, &["--mode", "volume"]);
+    let after = draw(&mt, &out, &["--opacities", "0.4,0,0.6,0.9"]);
+    assert!(after.differing(&before) > 100);
+    let report = json(&[&["render", &mt, "-o", &out, "--json", "--mode", "slice"], &SMALL[..]].concat());
+    assert_eq!((&report["width"], &report["colours"]["of"]), (&120.into(), &"density".into()));
+}
+
+#[test]
+fn a_transparent_picture_has_nothing_in_its_corners() {
+    if !has_adapter() {
+        return;
+    }
+    let folder = Folder::new("transparent");
+    let [input, mt, out] = ["a.vti", "a.mt", "a.png"].map(|name| folder.path(name));
+    bucky(9, &input, &mt);
+    let picture = draw(&mt, &out, &["--mode", "boundary", "--background", "transparent"]);
+    assert_eq!(picture.channels, 4);
+    let alpha = |x: usize, y: usize| picture.bytes[(y * 120 + x) * 4 + 3];
+    assert_eq!([alpha(0, 0), alpha(119, 0), alpha(0, 89), alpha(119, 89)], [0; 4]);
+    assert_eq!(alpha(60, 45), 255);
+}
+
+#[test]
+fn a_scene_is_printed_and_read() {
+    let folder = Folder::new("scene");
+    let [input, mt, out, scene] = ["a.vti", "a.mt", "a.png", "a.json"].map(|name| folder.path(name));
+    bucky(9, &input, &mt);
+    let options = ["--mode", "slice,cells", "--map", "magma", "--shrink", "0.5", "--clip", "x=0.5"];
+    let printed = json(&[&["render", &mt, "--print-scene"], &options[..]].concat());
+    assert_eq!(printed["colours"]["map"], "magma");
+    assert_eq!(printed["slices"][0]["offset"], 0.5);
+    assert_eq!(printed["clips"][0]["normal"][0], 1.0);
+    fs::write(&scene, printed.to_string()).expect("a file");
+    let again = json(&["render", &mt, "--print-scene", "--scene", &scene]);
+    assert_eq!(again, printed);
+    let other =
+        json(&["render", &mt, "--print-scene", "--scene", &scene, "--shrink", "0.1", "--isovalue", "1"]);
+    assert_eq!((&other["cells"]["shrink"], &other["isosurfaces"][0]["value"]), (&0.1.into(), &1.0.into()));
+    assert_eq!(other["slices"], printed["slices"]);
+    // The volume looks as what the mesh is refined for.
+    let colours = folder.path("colours.json");
+    let points = r#"{ "points": [[0, 0, 0, 1, 0], [1, 1, 0, 0, 0.5]], "unit_length": 0.2 }"#;
+    fs::write(&colours, points).expect("a file");
+    let volume = json(&["render", &mt, "--print-scene", "--mode", "volume", "--transfer", &colours]);
+    assert_eq!(volume["volume"]["points"][1][4], 0.5);
+    fs::write(&scene, "{ \"isosurface\": [] }").expect("a file");
+    bad(1, &["render", &mt, "--print-scene", "--scene", &scene], &["a.json", "isosurface"]);
+    if has_adapter() {
+        fs::write(&scene, printed.to_string()).expect("a file");
+        let [a, b] = [draw(&mt, &out, &options), draw(&mt, &out, &["--scene", &scene])];
+        assert_eq!(a.differing(&b), 0);
+    }
+}
+
+#[test]
+fn what_cannot_be_drawn_is_refused() {
+    let folder = Folder::new("refused");
+    let [input, mt, out] = ["a.vti", "a.mt", "a.png"].map(|name| folder.path(name));
+    bucky(5, &input, &mt);
+    let wrong: [(&[&str], &[&str]); 13] = [
+        (&["--map", "jet"], &["--map", "must be a colour map", "viridis", "balance"]),
+        (&["--mode", "cloud"], &["--mode", "volume", "points"]),
+        (&["--mode", "cells,wire"], &["one of the modes"]),
+        (&["--mode", "surface", "--shrink", "0.2"], &["--shrink", "add the mode cells"]),
+        (&["--mode", "cells", "--opacity", "0.2"], &["--opacity", "surface, slice or boundary"]),
+        (&["--mode", "cells", "--colour-by", "weight"], &["depth", "missing"]),
+        (&["--size", "100"], &["--size", "1280x960"]),
+        (&["--samples", "0"], &["--samples", "1..=1024"]),
+        (&["--from", "x"], &["--from", "+x", "home"]),
+        (&["--zoom", "0"], &["larger than 0"]),
+        (&["--opacities", "1,0.5,0.5,0"], &["must ascend"]),
+        (&["--colour-range", "2,1"], &["smaller value of a range"]),
+        (&["--slice", "0,0,0,1"], &["normal of a plane"]),
+    ];
+    for (options, words) in wrong {
+        bad(2, &[&["render", &mt, "-o", &out], options].concat(), words);
+    }
+    bad(2, &["render", &mt], &["--output"]);
+    bad(2, &["render", &mt, "-o", "a.jpg"], &[".png"]);
+    bad(1, &["extract", &mt, "-o", &out], &["`tetralod render` writes .png"]);
+    let mut without = crate::support::command(&["render", &mt, "-o", &out]);
+    let without =
+        without.env("VK_DRIVER_FILES", "none").env("VK_ICD_FILENAMES", "none").output().expect("it starts");
+    let error = text(&without.stderr);
+    assert!(without.status.code() == Some(1) && error.contains("mesa-vulkan-drivers"), "{error}");
+    if has_adapter() {
+        bad(1, &["render", &mt, "-o", &out, "--size", "999999x9"], &["--size", "at most"]);
+        let planes = ["--clip", "x=1"].repeat(17);
+        let planes: Vec<&str> = [&["render", &mt, "-o", &out], &planes[..]].concat();
+        bad(1, &planes, &["at most 16"]);
+        bad(
+            1,
+            &["render", &mt, "-o", &out, "--log", "--colour-range=-1,1", "--mode", "slice"],
+            &["logarithmic"],
+        );
+        let warned = run(&["render", &mt, "-o", &out, "--isovalue", "9", "--size", "9x9", "--samples", "1"]);
+        assert!(text(&warned.stderr).contains("warning: isovalue 9: density has only values from"));
+    }
+}
