@@ -62,12 +62,19 @@ fn broken_shaders_would_be_noticed() {
     assert!(naga::front::wgsl::parse_str(&source.replace("normalize(", "normalise(")).is_err());
 }
 
-/// The first place where operators stand side by side that WGSL wants parentheses between: naga takes them, browsers do not.
+/// The first line where operators stand side by side that WGSL wants parentheses between: naga takes them,
+/// browsers do not.
 fn unclear(source: &str) -> Option<String> {
     const GROUPS: [&[&str]; 2] = [&["&&", "||"], &["<<", ">>", " & ", " | ", " ^ "]];
+    let mixes = |here: &[&str]| {
+        GROUPS.iter().any(|group| {
+            let mut own = here.iter().filter(|operator| group.contains(operator));
+            own.next().is_some_and(|first| own.any(|other| other != first))
+        })
+    };
     for line in source.lines().map(|line| line.split("//").next().unwrap_or_default()) {
         // Of each open parenthesis: the operators since it or since the last comma.
-        let mut seen = vec![Vec::new()];
+        let mut seen: Vec<Vec<&str>> = vec![Vec::new()];
         for (i, c) in line.char_indices() {
             match c {
                 '(' | '[' => seen.push(Vec::new()),
@@ -75,14 +82,11 @@ fn unclear(source: &str) -> Option<String> {
                 ',' | ';' | '{' => seen.iter_mut().for_each(Vec::clear),
                 _ => {}
             }
-            let operator = GROUPS.iter().flat_map(|g| *g).find(|o| line[i..].starts_with(**o));
             let here = seen.last_mut().expect("one is always open");
-            here.extend(operator);
-            let mixed = |group: &&[&str]| {
-                let mut own = here.iter().filter(|o| group.contains(o));
-                own.next().is_some_and(|first| own.any(|other| other != first))
-            };
-            if GROUPS.iter().any(|group| mixed(group)) {
+            for group in GROUPS {
+                here.extend(group.iter().copied().filter(|operator| line[i..].starts_with(operator)));
+            }
+            if mixes(here) {
                 return Some(line.to_owned());
             }
         }
