@@ -259,6 +259,17 @@ export interface ViewerProbe {
   error: number;
 }
 
+export interface ViewerEventMap {
+  progress: CustomEvent<ViewerProgress>;
+  stats: CustomEvent<ViewerStats>;
+  frame: CustomEvent<ViewerFrame>;
+  /** The camera has moved. */
+  camera: CustomEvent<CameraState>;
+  /** The colours mean something else. */
+  legend: CustomEvent<Legend | undefined>;
+  error: CustomEvent<Error>;
+}
+
 /**
  * Draws an MT on a canvas with WebGPU; decoding, refinement and drawing happen in a worker.
  *

@@ -40,6 +40,7 @@ export class Viewer extends EventTarget {
   #update = new Latest((changes) => this.#remote.call("update", [changes]), mergeUpdates);
   #drag = new Latest(([handle, x, y]) => this.#remote.call("dragRegion", [handle, x, y]));
   #probe = new Latest(([x, y]) => this.#remote.call("probe", [x, y]));
+  /** What is drawn. @type {Record<string, any>} */
   #scene = SCENE;
   #camera;
   #legend;

@@ -264,9 +264,11 @@ function draw() {
   const colours = { map: $("map").value };
   const nothing = { isosurfaces: [], volume: null, slices: [], boundary: null, cells: null, clips: [] };
   const [low, high] = [field.min, field.max];
+  /** @type {[number, number][]} */
+  const opacities = [[low, 0], [low + 0.3 * (high - low), 0], [high, 0.8 * opacity]];
   const shown = {
     iso: { isosurfaces: [{ value: isovalue(), opacity }] },
-    volume: { volume: { opacities: [[low, 0], [low + 0.3 * (high - low), 0], [high, 0.8 * opacity]] } },
+    volume: { volume: { opacities } },
     slice: { slices: [{ ...plane(), opacity, edges: true }] },
     solid: { boundary: { opacity, edges: true }, clips: [plane()] },
     mesh: { cells: { cut: plane(), colourBy: $("colour-by").value } },

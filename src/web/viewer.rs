@@ -84,10 +84,10 @@ extern "C" {
     #[wasm_bindgen(typescript_type = "object")]
     pub type JsScene;
     /// Where the camera is.
-    #[wasm_bindgen(typescript_type = "CameraState")]
+    #[wasm_bindgen(typescript_type = "object")]
     pub type JsCamera;
     /// What the colours mean, or `undefined`.
-    #[wasm_bindgen(typescript_type = "Legend | undefined")]
+    #[wasm_bindgen(typescript_type = "object | undefined")]
     pub type JsLegend;
     /// What is at a point, or `undefined`.
     #[wasm_bindgen(typescript_type = "object | undefined")]

@@ -26,11 +26,12 @@ const LAYERS: [(&str, &[&str]); 18] = [
     ("client", &["format", "refine", "remote", "session", "stream"]),
     ("bench", &["geom", "format", "mt", "refine", "session"]),
     ("gpu", &["geom", "mesh", "view"]),
+    ("scene", &["geom", "mt", "session", "view", "gpu"]),
     (
         "web",
         &[
             "geom", "mesh", "mt", "format", "refine", "view", "session", "stream", "remote", "bench", "gpu",
-            "io", "builder",
+            "scene", "io", "builder",
         ],
     ),
 ];
