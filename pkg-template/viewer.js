@@ -91,6 +91,7 @@ export class Viewer extends EventTarget {
     const [width, height] = pixels(this.#canvas.getBoundingClientRect());
     const created = await this.#remote.call("create", [offscreen, width, height, devicePixelRatio], [offscreen]);
     this.#adapter = created.adapter;
+    await this.#change({ scene: this.#scene });
     this.#observer = new ResizeObserver(([entry]) => {
       const size = entry.devicePixelContentBoxSize?.[0];
       const [w, h] = size ? [size.inlineSize, size.blockSize] : pixels(entry.contentRect);
