@@ -319,7 +319,7 @@ test("each region that the page offers is refined", async () => {
     await page.waitForFunction(() => window.tetralodDemo.stats, undefined, { timeout: PATIENCE });
     sizes[region] = (await demo(page, "stats")).tetrahedra;
     assert.ok(sizes[region] < everywhere.tetrahedra, region);
-    await page.locator("label", { hasText: "Cut-away" }).click();
+    await page.locator("label", { hasText: "Mesh" }).first().click();
     await settle(page);
     await page.screenshot({ path: fileURLToPath(new URL(`page-region-${region}.png`, pictures)) });
   }
