@@ -219,9 +219,10 @@ async fn call(object: &JsValue, method: &str) -> JsValue {
 #[wasm_bindgen_test]
 async fn the_renderer_draws_the_isosurface() {
     use tetralod::geom::{Bounds, Camera};
-    use tetralod::gpu::{Look, Renderer, Show};
+    use tetralod::gpu::{Look, Renderer};
     use tetralod::refine::Request;
     use tetralod::session::Session;
+    use tetralod::view::Triangles;
 
     const SIZE: [u32; 2] = [128, 96];
     let mut session = Session::new();
@@ -231,8 +232,9 @@ async fn the_renderer_draws_the_isosurface() {
     let camera = Camera::home(&Bounds { min: [0.0; 3], max: [1.0; 3] }, renderer.aspect());
     // The ball is warm, the background cool. Empty space between the atoms at 0.5; nothing at all above the maximum.
     for (value, warm) in [(0.5, 500..4000), (99.0, 0..1)] {
-        renderer.set_surface(session.isosurface(value).expect("a surface")).expect("it fits");
-        assert!(renderer.draw(Show::Surface, &camera, &Look::default()).expect("a picture"));
+        let surface = Triangles::from(session.isosurface(value).expect("a surface"));
+        renderer.set_surface(0, &surface, None).expect("it fits");
+        assert!(renderer.draw(&camera, &Look::default()).expect("a picture"));
         let pixels = renderer.read().await.expect("pixels");
         assert_eq!(pixels.len(), (SIZE[0] * SIZE[1] * 4) as usize);
         let seen = pixels.chunks_exact(4).filter(|p| p[0] > p[2].saturating_add(20)).count();
@@ -245,9 +247,10 @@ async fn the_renderer_draws_the_isosurface() {
 #[wasm_bindgen_test]
 async fn a_surface_is_kept_up_by_what_has_changed() {
     use tetralod::geom::{Bounds, Camera};
-    use tetralod::gpu::{Look, Renderer, Show};
+    use tetralod::gpu::{Look, Renderer};
     use tetralod::refine::{Need, Request};
     use tetralod::session::Session;
+    use tetralod::view::Triangles;
 
     const SIZE: [u32; 2] = [96, 96];
     let mut session = Session::new();
@@ -264,12 +267,12 @@ async fn a_surface_is_kept_up_by_what_has_changed() {
         let value = if i < 8 { 0.5 } else { 0.55 };
         session.isosurface(value).expect("a surface");
         let changes = session.take_surface_changes();
-        let surface = session.isosurface(value).expect("a surface");
-        whole.set_surface(surface).expect("it fits");
-        parts.update_surface(surface, &changes.vertices, &changes.triangles).expect("it fits");
+        let surface = Triangles::from(session.isosurface(value).expect("a surface"));
+        whole.set_surface(0, &surface, None).expect("it fits");
+        parts.set_surface(0, &surface, Some(&changes)).expect("it fits");
         let mut pictures = Vec::new();
         for renderer in [&mut whole, &mut parts] {
-            assert!(renderer.draw(Show::Surface, &camera, &Look::default()).expect("a picture"));
+            assert!(renderer.draw(&camera, &Look::default()).expect("a picture"));
             pictures.push(renderer.read().await.expect("pixels"));
         }
         assert_eq!(pictures[0], pictures[1], "step {i}");
