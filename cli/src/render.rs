@@ -12,13 +12,10 @@ use serde::Serialize;
 use shown::{About, Shown};
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::pin::pin;
-use std::task::{Context as Task, Poll, Waker};
 use std::time::Instant;
 use tetralod::geom::{Bounds, Camera, Projection, ViewPreset};
-use tetralod::gpu::{GpuError, Renderer};
+use tetralod::gpu::{GpuError, Renderer, wait};
 use tetralod::scene::{Background, Legend, Scene, SceneError};
-use tetralod::session::Session;
 
 const PICTURE: &str = "Picture";
 const CAMERA: &str = "Camera";
@@ -214,7 +211,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let mut answer = arguments.query.answer()?;
     let start = Instant::now();
     let about = About {
-        bounds: bounds(&mut answer.opened.session),
+        bounds: answer.opened.session.view().bounds(),
         field: &answer.opened.info()?.fields[answer.field],
     };
     let state = arguments.shown.state(&arguments.query, &about)?;
@@ -226,7 +223,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     scene.set_state(state).map_err(explained)?;
     let session = &mut answer.opened.session;
     scene.update(session).map_err(explained)?;
-    let pixels = draw(&mut scene, session, &camera, arguments.samples).map_err(explained)?;
+    let bar = ProgressBar::new(u64::from(arguments.samples));
+    let picture = scene.picture(session, &camera, arguments.samples, |count| bar.set_position(count.into()));
+    let pixels = wait(picture).map_err(explained)?;
+    bar.finish_and_clear();
     let report = Report {
         width: size[0],
         height: size[1],
@@ -240,32 +240,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     files::write_file(output, |out| picture.write(out))?;
     let seconds = start.elapsed().as_secs_f64();
     arguments.query.print(&report, rows(output, &report), (&answer.summary, seconds))
-}
-
-/// Draws the mean of `samples` pictures: premultiplied `RGBA`. Its progress is drawn on stderr, and only on a
-/// terminal.
-fn draw(
-    scene: &mut Scene,
-    session: &mut Session,
-    camera: &Camera,
-    samples: u32,
-) -> Result<Vec<u8>, SceneError> {
-    let bar = ProgressBar::new(u64::from(samples));
-    let mut pixels = loop {
-        scene.draw(session, camera)?;
-        // Reading waits until the picture is done, and shows whether there was room for all of it.
-        let pixels = wait(scene.renderer().read())?;
-        if !scene.renderer_mut().is_short() {
-            break pixels;
-        }
-    };
-    for count in 1..samples {
-        bar.set_position(u64::from(count));
-        scene.renderer_mut().draw_again()?;
-        pixels = wait(scene.renderer().read())?;
-    }
-    bar.finish_and_clear();
-    Ok(pixels)
 }
 
 fn rows(output: &Path, report: &Report) -> Vec<(&'static str, String)> {
@@ -298,15 +272,10 @@ fn description(file: &Path, report: &Report, mesh: &Summary) -> String {
 fn print_scene(arguments: &Arguments) -> Result<()> {
     let name = || arguments.query.file.display().to_string();
     let mut opened = files::Opened::of(files::open_parts(&arguments.query.file).with_context(name)?);
-    let bounds = bounds(&mut opened.session);
+    let bounds = opened.session.view().bounds();
     let info = opened.info()?;
     let field = &info.fields[files::field_index(info, arguments.query.field()).with_context(name)?];
     output::json(&arguments.shown.state(&arguments.query, &About { bounds, field })?)
-}
-
-/// The box around the mesh.
-fn bounds(session: &mut Session) -> Bounds {
-    session.view().positions.iter().fold(Bounds::EMPTY, |bounds, p| bounds.with(p.map(f64::from)))
 }
 
 /// A renderer of pictures of this size.
@@ -341,17 +310,6 @@ fn explained(error: SceneError) -> anyhow::Error {
             anyhow!("the GPU was lost: {why}; draw a smaller --size or a mesh of a smaller --budget")
         }
         other => other.into(),
-    }
-}
-
-/// Runs a future that makes progress whenever it is asked to, as those of native devices do.
-fn wait<T>(future: impl Future<Output = T>) -> T {
-    let mut future = pin!(future);
-    loop {
-        if let Poll::Ready(value) = future.as_mut().poll(&mut Task::from_waker(Waker::noop())) {
-            return value;
-        }
-        std::thread::yield_now();
     }
 }
 

@@ -4,11 +4,10 @@ use anyhow::{Context, Result};
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
-use std::pin::pin;
-use std::task;
-use std::task::{Poll, Waker};
-use tetralod::geom::{Bounds, Camera};
-use tetralod::gpu::{BoxLines, CellStyle, Colouring, EdgeLook, GpuError, Lighting, Look, Renderer, Style};
+use tetralod::geom::Camera;
+use tetralod::gpu::{
+    BoxLines, CellStyle, Colouring, EdgeLook, GpuError, Lighting, Look, Renderer, Style, wait,
+};
 use tetralod::view::{ClipPlane, ColourScale, IsoSurface, Triangles, VIRIDIS};
 
 use crate::figures::Pair;
@@ -68,7 +67,7 @@ impl Painter {
     /// The tetrahedra behind a plane through the middle of the domain, or of the box.
     fn mesh(&mut self, shown: &Shown, pair: &Pair, path: &Path) -> Result<()> {
         let view = shown.view();
-        let bounds = pair.roi.unwrap_or_else(|| bounds(shown));
+        let bounds = pair.roi.unwrap_or_else(|| shown.view().bounds());
         let middle = (bounds.min[1] + bounds.max[1]) / 2.0;
         self.renderer.remove_surface(0);
         let low = view.field.iter().copied().fold(f32::INFINITY, f32::min);
@@ -85,7 +84,7 @@ impl Painter {
 
     fn picture(&mut self, shown: &Shown, pair: &Pair, zoom: f64, path: &Path) -> Result<()> {
         let line = |bounds, colour, width| BoxLines { bounds, colour, width, handles: false };
-        let domain = bounds(shown);
+        let domain = shown.view().bounds();
         let mut boxes = vec![line(domain, [0.45, 0.48, 0.52, 1.0], 1.0)];
         boxes.extend(pair.roi.map(|roi| line(roi, [0.85, 0.2, 0.1, 1.0], 2.0)));
         self.renderer.set_boxes(&boxes)?;
@@ -95,10 +94,6 @@ impl Painter {
         let pixels = wait(self.renderer.picture(&camera, &look, 8))?;
         save(&pixels, self.renderer.size(), path).with_context(|| path.display().to_string())
     }
-}
-
-fn bounds(shown: &Shown) -> Bounds {
-    Bounds::of(&shown.view().positions.iter().map(|p| p.map(f64::from)).collect::<Vec<_>>())
 }
 
 /// Writes a picture without its opacity, which is full everywhere.
@@ -111,15 +106,4 @@ fn save(rgba: &[u8], [width, height]: [u32; 2], path: &Path) -> Result<()> {
     let mut writer = encoder.write_header()?;
     writer.write_image_data(&rgb)?;
     Ok(writer.finish()?)
-}
-
-/// Runs a future that makes progress whenever it is asked to, as those of native devices do.
-fn wait<T>(future: impl Future<Output = T>) -> T {
-    let mut future = pin!(future);
-    loop {
-        if let Poll::Ready(value) = future.as_mut().poll(&mut task::Context::from_waker(Waker::noop())) {
-            return value;
-        }
-        std::thread::yield_now();
-    }
 }

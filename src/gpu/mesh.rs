@@ -5,7 +5,6 @@ use crate::gpu::buffers::GrowBuffer;
 use crate::gpu::{Context, GpuError};
 use crate::mesh::boundary_faces;
 use crate::view::MeshView;
-use std::borrow::Cow;
 use std::ops::Range;
 
 #[derive(Debug)]
@@ -37,22 +36,14 @@ impl<T: bytemuck::Pod> Part<T> {
         self.is_current &= is_needed;
     }
 
-    fn update<'a>(
-        &mut self,
-        context: &Context,
-        len: usize,
-        changed: &[Range<u32>],
-        items: impl Fn(Range<usize>) -> Cow<'a, [T]>,
-    ) -> Result<(), GpuError> {
+    /// The buffer that an update must fill, if it is needed; empty if it lacks an update. If that fails, all
+    /// is forgotten.
+    fn begin_update(&mut self) -> Option<&mut GrowBuffer<T>> {
         if !self.is_current {
             self.buffer.clear();
         }
-        self.is_current = false;
-        if self.is_needed {
-            self.buffer.update_with(context, len, changed, items)?;
-            self.is_current = true;
-        }
-        Ok(())
+        self.is_current = self.is_needed;
+        self.is_needed.then_some(&mut self.buffer)
     }
 }
 
@@ -104,12 +95,14 @@ impl MeshBuffers {
             let both = mesh.positions[range.clone()].iter().zip(&mesh.field[range]);
             both.map(|(&[x, y, z], &value)| [x, y, z, value]).collect()
         })?;
-        self.corners.update(context, mesh.tets.len(), tets, |range| Cow::Borrowed(&mesh.tets[range]))?;
-        self.linked.update(context, mesh.tets.len(), tets, |range| {
-            let both = mesh.tets[range.clone()].iter().zip(&mesh.neighbors[range]);
-            both.map(|(tet, around)| linked(*tet, *around)).collect()
-        })?;
-        if self.linked.is_needed {
+        if let Some(corners) = self.corners.begin_update() {
+            corners.update(context, mesh.tets, tets)?;
+        }
+        if let Some(buffer) = self.linked.begin_update() {
+            buffer.update_with(context, mesh.tets.len(), tets, |range| {
+                let both = mesh.tets[range.clone()].iter().zip(&mesh.neighbors[range]);
+                both.map(|(tet, around)| linked(*tet, *around)).collect()
+            })?;
             let faces = boundary_faces(mesh.tets, mesh.neighbors);
             self.faces.write(context, &faces.map(|(t, [a, b, c])| [a, b, c, t]).collect::<Vec<_>>())?;
         }

@@ -31,6 +31,26 @@ pub use types::{BoxLines, Look, MOST_CLIPS};
 /// Samples per pixel.
 pub const SAMPLES: u32 = 4;
 
+/// Runs a future of a native device to its end: such futures make progress when they are asked.
+///
+/// ```no_run
+/// # fn main() -> Result<(), tetralod::gpu::GpuError> {
+/// let renderer = tetralod::gpu::wait(tetralod::gpu::Renderer::headless([640, 480]))?;
+/// # Ok(())
+/// # }
+/// ```
+#[cfg(not(target_arch = "wasm32"))]
+pub fn wait<T>(future: impl Future<Output = T>) -> T {
+    let mut future = std::pin::pin!(future);
+    let mut task = std::task::Context::from_waker(std::task::Waker::noop());
+    loop {
+        if let std::task::Poll::Ready(value) = future.as_mut().poll(&mut task) {
+            return value;
+        }
+        std::thread::yield_now();
+    }
+}
+
 /// A shader from its files.
 macro_rules! shader {
     ($($file:literal),*) => { concat!(include_str!("shaders/common.wgsl"), $(include_str!(concat!("shaders/", $file))),*) };

@@ -388,7 +388,7 @@ impl Renderer {
         pass.set_bind_group(0, &common.group, &[]);
         self.composite.list(context, &self.mesh, &mut pass);
         self.surface_pipelines.draw(&mut pass, self.surfaces.values(), true);
-        self.wire.list(context, &mut pass);
+        self.wire.list(&mut pass);
     }
 
     /// Draws what is opaque; without a composite after it also the lines over it.
@@ -453,21 +453,36 @@ impl Renderer {
     /// # Errors
     /// If the target is no image, or the device is lost or refused something.
     pub async fn picture(&mut self, camera: &Camera, look: &Look, samples: u32) -> Result<Vec<u8>, GpuError> {
-        loop {
+        self.picture_with(camera, look, samples, |_| {}).await
+    }
+
+    /// [`Renderer::picture`] that tells how many of the pictures are drawn, after each.
+    ///
+    /// # Errors
+    /// As [`Renderer::picture`].
+    pub async fn picture_with(
+        &mut self,
+        camera: &Camera,
+        look: &Look,
+        samples: u32,
+        mut drawn: impl FnMut(u32),
+    ) -> Result<Vec<u8>, GpuError> {
+        // Reading waits until everything before is done: fragments are counted then, and devices never have
+        // more than a picture to do.
+        let mut pixels = loop {
             self.draw(camera, look)?;
-            // Reading waits until everything before is done, and so the fragments are counted.
-            let first = self.read().await?;
-            if self.is_short() {
-                continue;
+            let pixels = self.read().await?;
+            if !self.is_short() {
+                break pixels;
             }
-            if samples <= 1 {
-                return Ok(first);
-            }
-            for _ in 1..samples {
-                self.draw_again()?;
-            }
-            return self.read().await;
+        };
+        drawn(1);
+        for count in 2..=samples {
+            self.draw_again()?;
+            pixels = self.read().await?;
+            drawn(count);
         }
+        Ok(pixels)
     }
 
     /// Reads a headless picture back: `RGBA` bytes, premultiplied, rows from top to bottom.

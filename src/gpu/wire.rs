@@ -14,7 +14,8 @@ const HANDLE: f32 = 17.0;
 pub(super) struct WirePass {
     hidden: wgpu::RenderPipeline,
     seen: wgpu::RenderPipeline,
-    listed: Option<wgpu::RenderPipeline>,
+    /// With the group of bindings before that of the lists, which is empty.
+    listed: Option<(wgpu::RenderPipeline, wgpu::BindGroup)>,
     dots: wgpu::RenderPipeline,
     lines: GrowBuffer<Line>,
     handles: GrowBuffer<Line>,
@@ -52,6 +53,9 @@ impl WirePass {
         common: &Common,
         lists: &wgpu::BindGroupLayout,
     ) {
+        if self.listed.is_some() {
+            return;
+        }
         let nothing = group_layout(context, "nothing", &[]);
         let spec = PipelineSpec {
             shader: "wire",
@@ -61,7 +65,7 @@ impl WirePass {
             groups: &[Some(&nothing), Some(lists)],
             output: Output::List { only_front: false },
         };
-        self.listed.get_or_insert_with(|| spec.create(context, common));
+        self.listed = Some((spec.create(context, common), group(context, &nothing, &[])));
     }
 
     pub(super) fn update(&mut self, context: &Context, boxes: &[BoxLines]) -> Result<(), GpuError> {
@@ -72,10 +76,9 @@ impl WirePass {
     }
 
     /// Lists the lines among what is not opaque.
-    pub(super) fn list(&self, context: &Context, pass: &mut wgpu::RenderPass<'_>) {
-        if let Some(pipeline) = &self.listed {
-            let nothing = group_layout(context, "nothing", &[]);
-            pass.set_bind_group(1, &group(context, &nothing, &[]), &[]);
+    pub(super) fn list(&self, pass: &mut wgpu::RenderPass<'_>) {
+        if let Some((pipeline, nothing)) = &self.listed {
+            pass.set_bind_group(1, nothing, &[]);
             draw(pass, pipeline, &self.lines);
         }
     }

@@ -150,8 +150,7 @@ impl Scene {
             return Ok(std::mem::take(&mut self.is_stale));
         }
         if self.bounds.is_none() {
-            let positions = session.view().positions;
-            self.bounds = Some(positions.iter().fold(Bounds::EMPTY, |b, p| b.with(p.map(f64::from))));
+            self.bounds = Some(session.view().bounds());
             self.is_stale = true;
         }
         let bounds = self.bounds.unwrap_or(Bounds::EMPTY);
@@ -173,7 +172,7 @@ impl Scene {
         Ok(self.renderer.draw(camera, &self.look)?)
     }
 
-    /// Draws a picture that is the mean of `samples` and reads it back, as [`Renderer::picture`] does.
+    /// Draws a picture that is the mean of `samples` and reads it back, as [`Renderer::picture_with`] does.
     ///
     /// # Errors
     /// If the target is no image, or the device is lost or refused something.
@@ -182,9 +181,10 @@ impl Scene {
         session: &mut Session,
         camera: &Camera,
         samples: u32,
+        drawn: impl FnMut(u32),
     ) -> Result<Vec<u8>, SceneError> {
         self.place_eye(session, camera);
-        Ok(self.renderer.picture(camera, &self.look, samples).await?)
+        Ok(self.renderer.picture_with(camera, &self.look, samples, drawn).await?)
     }
 
     /// Draws the last picture again, for a smoother mean of several: see [`Renderer::draw_again`].
@@ -214,19 +214,15 @@ impl Scene {
 
 /// What makes no sense whatever the volume is.
 fn check(state: &SceneState) -> Result<(), SceneError> {
-    let plane = "must have a `normal` of three numbers, not all 0, and an `offset`";
-    if let Some((i, clip)) = state.clips.iter().enumerate().find(|(_, clip)| !clip.is_plane()) {
-        return Err(SceneError::state(format!("clips[{i}]"), format!("{plane}; given: {clip:?}")));
-    }
-    for (i, slice) in state.slices.iter().enumerate() {
-        if !(PlaneState { normal: slice.normal, offset: slice.offset }).is_plane() {
-            return Err(SceneError::state(format!("slices[{i}]"), plane));
-        }
-    }
-    if let Some(cut) = state.cells.as_ref().and_then(|cells| cells.cut)
-        && !cut.is_plane()
-    {
-        return Err(SceneError::state("cells.cut", plane));
+    let clips = state.clips.iter().enumerate().map(|(i, clip)| (format!("clips[{i}]"), *clip));
+    let slices = state.slices.iter().enumerate().map(|(i, slice)| (format!("slices[{i}]"), slice.plane()));
+    let cut = state.cells.as_ref().and_then(|cells| cells.cut).map(|cut| ("cells.cut".to_owned(), cut));
+    if let Some((what, plane)) = clips.chain(slices).chain(cut).find(|(_, plane)| !plane.is_plane()) {
+        let PlaneState { normal, offset } = plane;
+        let problem = format!(
+            "must have a `normal` of three numbers, not all 0, and an `offset`; given: {normal:?}, {offset}"
+        );
+        return Err(SceneError::state(what, problem));
     }
     for (what, corners) in [("clipBox", &state.clip_box), ("region", &state.region)] {
         if corners.as_ref().is_some_and(|corners| state::bounds(corners).is_none()) {

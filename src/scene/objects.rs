@@ -1,7 +1,7 @@
 //! What is computed from the mesh for a scene: surfaces, sections, tubes, values of tetrahedra.
 
 use super::state::{ArrowState, CellKind, CellState, ColourState, IsosurfaceState, StreamlineState};
-use super::{Legend, PlaneState, SceneError, SceneState, SliceState, VolumeState, clips};
+use super::{Legend, SceneError, SceneState, SliceState, VolumeState, clips};
 use crate::geom::{Bounds, Ray};
 use crate::gpu::{CellShape, CellStyle, Colouring, EdgeLook, Lighting, Renderer, SIDES, Style};
 use crate::mt::MtInfo;
@@ -10,7 +10,6 @@ use crate::view::{
     ArrowLength, ArrowOptions, BoundarySurface, ClipPlane, ColourScale, IsoSurface, Medium, MeshView, Probe,
     Slice, Solids, TraceOptions, Tracer, Triangles, TubeOptions, first_hit, first_hit_in,
 };
-use glam::DVec3;
 use std::ops::Range;
 
 /// Numbers of surfaces in the renderer: those of lists begin at these.
@@ -166,7 +165,7 @@ impl Objects {
             let slope = ray.direction.dot(slice.normal.into());
             let distance = (slice.offset - ray.origin.dot(slice.normal.into())) / slope;
             let place = ray.at(distance);
-            let is_kept = clips.iter().all(|clip| is_kept(clip, place));
+            let is_kept = clips.iter().all(|clip| clip.keeps_point(place.into()));
             if distance > 0.0 && is_kept && probe.locate(place.into()).is_some() {
                 found.push((distance, place.into()));
             }
@@ -245,7 +244,7 @@ impl Objects {
         slice: &SliceState,
     ) -> Result<(), SceneError> {
         let field = input.field("slices", slice.field.as_ref())?;
-        let plane = PlaneState { normal: slice.normal, offset: slice.offset };
+        let plane = slice.plane();
         self.slice.extract(&input.mesh, &plane.plane());
         let values =
             (field != input.shown).then(|| self.slice.interpolate(&input.mesh, &(input.fields)(field)));
@@ -371,7 +370,6 @@ impl Objects {
         let options = ArrowOptions {
             spacing: spacing.unwrap_or(input.diagonal() / 20.0),
             length: if *constant { ArrowLength::Constant } else { ArrowLength::Magnitude },
-            ..ArrowOptions::default()
         };
         let components = [vectors[0].as_slice(), &vectors[1], &vectors[2]];
         self.solids.set_arrows(input.mesh, components, numbers.as_deref(), &options);
@@ -459,13 +457,6 @@ fn isosurface_style(state: &IsosurfaceState, scale: Option<ColourScale>) -> Styl
         edges: state.edges.then(EdgeLook::default),
         ..Style::default()
     }
-}
-
-/// Whether a plane leaves a point, but for rounding.
-fn is_kept(clip: &ClipPlane, point: DVec3) -> bool {
-    let normal = DVec3::from(clip.normal.map(f64::from));
-    let offset = f64::from(clip.offset);
-    normal.dot(point) <= offset + 1e-6 * (normal.length() + offset.abs())
 }
 
 /// A bit for each clip plane but those that are the same plane as `own`, whichever side they cut away.

@@ -152,6 +152,12 @@ pub struct SliceState {
     pub clipped: bool,
 }
 
+impl SliceState {
+    pub(super) fn plane(&self) -> PlaneState {
+        PlaneState { normal: self.normal, offset: self.offset }
+    }
+}
+
 fn one() -> f64 {
     1.0
 }

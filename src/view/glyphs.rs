@@ -33,15 +33,13 @@ pub enum ArrowLength {
 pub struct ArrowOptions {
     /// From one point of the grid to the next along each axis, in model units; positive.
     pub spacing: f64,
-    /// Sides of an arrow, 3 to 16; other numbers are taken for the nearest of these.
-    pub sides: u32,
     /// How long arrows are.
     pub length: ArrowLength,
 }
 
 impl Default for ArrowOptions {
     fn default() -> Self {
-        Self { spacing: 0.1, sides: 8, length: ArrowLength::Magnitude }
+        Self { spacing: 0.1, length: ArrowLength::Magnitude }
     }
 }
 
@@ -73,7 +71,7 @@ impl Solids {
         field: Option<&[f32]>,
         options: &ArrowOptions,
     ) -> usize {
-        self.restart(options.sides);
+        self.clear();
         let points = mesh.positions.len();
         let is_complete = vectors.into_iter().chain(field).all(|numbers| numbers.len() >= points);
         let is_usable = options.spacing > 0.0 && options.spacing.is_finite();

@@ -45,6 +45,7 @@ pub use triangles::Triangles;
 pub use tubes::{TubeEnd, TubeOptions};
 pub use volume::{Light, Medium};
 
+use crate::geom::Bounds;
 use std::ops::Range;
 
 /// The changes of a surface since the last call: ranges in ascending order. Beyond the ends of the arrays
@@ -69,4 +70,11 @@ pub struct MeshView<'a> {
     /// `neighbors[t][i]` is the tetrahedron across face `i` (opposite vertex `i`) of `t`, or
     /// [`crate::mesh::NONE`] on the boundary.
     pub neighbors: &'a [[u32; 4]],
+}
+
+impl MeshView<'_> {
+    /// The box around all points.
+    pub fn bounds(&self) -> Bounds {
+        self.positions.iter().fold(Bounds::EMPTY, |bounds, p| bounds.with(p.map(f64::from)))
+    }
 }

@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 ///
 /// What holds: the surface of each body is closed and faces outwards. Along sharp edges, as those of a flat
 /// end, it has two vertices at each place, one for the normal of either side.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Solids {
     /// Vertices, in model units.
     pub positions: Vec<[f32; 3]>,
@@ -20,7 +20,7 @@ pub struct Solids {
     pub values: Vec<f32>,
     /// Triangles, counter-clockwise when seen from outside.
     pub indices: Vec<[u32; 3]>,
-    /// Scratch: points of the unit circle.
+    /// Points of the unit circle: a side of each body begins at each.
     circle: Vec<[f64; 2]>,
 }
 
@@ -80,21 +80,36 @@ impl Frame {
     }
 }
 
+impl Default for Solids {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl Solids {
-    /// Nothing yet.
+    /// Nothing yet; bodies will have eight sides.
     pub fn new() -> Self {
-        Self::default()
+        Self::with_sides(8)
     }
 
-    /// Starts again, with bodies of so many sides.
-    pub(super) fn restart(&mut self, sides: u32) {
+    /// Nothing yet; bodies will have so many sides, 3 to 16. Other numbers are taken for the nearest of these.
+    pub fn with_sides(sides: u32) -> Self {
+        let sides = sides.clamp(FEWEST_SIDES, MOST_SIDES);
+        Self {
+            positions: Vec::new(),
+            normals: Vec::new(),
+            values: Vec::new(),
+            indices: Vec::new(),
+            circle: (0..sides).map(|k| circle_point(k, sides)).collect(),
+        }
+    }
+
+    /// Removes all bodies.
+    pub(super) fn clear(&mut self) {
         self.positions.clear();
         self.normals.clear();
         self.values.clear();
         self.indices.clear();
-        let sides = sides.clamp(FEWEST_SIDES, MOST_SIDES);
-        self.circle.clear();
-        self.circle.extend((0..sides).map(|k| circle_point(k, sides)));
     }
 
     /// How many sides the bodies have.

@@ -18,24 +18,26 @@ pub struct Triangles<'a> {
     pub inner_sides: &'a [u8],
 }
 
-impl<'a> From<&'a IsoSurface> for Triangles<'a> {
-    fn from(surface: &'a IsoSurface) -> Self {
-        let IsoSurface { positions, normals, values, indices, .. } = surface;
-        Self { positions, normals, values, indices, inner_sides: &[] }
-    }
+/// Of what has normals.
+macro_rules! from_curved {
+    ($($surface:ty),*) => {$(
+        impl<'a> From<&'a $surface> for Triangles<'a> {
+            fn from(surface: &'a $surface) -> Self {
+                let normals = &surface.normals;
+                let values = &surface.values;
+                let (positions, indices) = (&surface.positions, &surface.indices);
+                Self { positions, normals, values, indices, inner_sides: &[] }
+            }
+        }
+    )*};
 }
+
+from_curved!(IsoSurface, Solids);
 
 impl<'a> From<&'a BoundarySurface> for Triangles<'a> {
     fn from(surface: &'a BoundarySurface) -> Self {
         let BoundarySurface { positions, values, indices, .. } = surface;
         Self { positions, normals: &[], values, indices, inner_sides: &[] }
-    }
-}
-
-impl<'a> From<&'a Solids> for Triangles<'a> {
-    fn from(solids: &'a Solids) -> Self {
-        let Solids { positions, normals, values, indices, .. } = solids;
-        Self { positions, normals, values, indices, inner_sides: &[] }
     }
 }
 

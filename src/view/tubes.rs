@@ -33,15 +33,13 @@ pub enum TubeEnd {
 pub struct TubeOptions {
     /// From the line to the vertices, in model units; positive.
     pub radius: f64,
-    /// Sides of a tube, 3 to 16; other numbers are taken for the nearest of these.
-    pub sides: u32,
     /// How tubes end.
     pub ends: TubeEnd,
 }
 
 impl Default for TubeOptions {
     fn default() -> Self {
-        Self { radius: 0.01, sides: 8, ends: TubeEnd::Flat }
+        Self { radius: 0.01, ends: TubeEnd::Flat }
     }
 }
 
@@ -73,8 +71,8 @@ impl Solids {
     /// let place = Place { tet: 0, weights: [0.25; 4] };
     /// let at = |x: f64| StreamPoint { position: [x, 0.0, 0.0], time: x, vector: [1.0, 0.0, 0.0], place };
     /// let line = Streamline { points: vec![at(0.0), at(1.0)], end: StreamEnd::Boundary };
-    /// let mut solids = Solids::new();
-    /// solids.set_tubes(&[line], &TubeOptions { radius: 0.1, sides: 6, ..TubeOptions::default() });
+    /// let mut solids = Solids::with_sides(6);
+    /// solids.set_tubes(&[line], &TubeOptions { radius: 0.1, ..TubeOptions::default() });
     /// assert_eq!(solids.indices.len(), 2 * 6 + 2 * 4); // six sides, two ends
     /// ```
     pub fn set_tubes(&mut self, lines: &[Streamline], options: &TubeOptions) {
@@ -89,7 +87,7 @@ impl Solids {
         options: &TubeOptions,
         mut value: impl FnMut(&StreamPoint) -> f64,
     ) {
-        self.restart(options.sides);
+        self.clear();
         if !(options.radius > 0.0 && options.radius.is_finite()) {
             return;
         }

@@ -5,7 +5,7 @@ use crate::mixed::Mixed;
 use crate::scenes::Scene;
 use crate::twin::{self, UNIT};
 use tetralod::geom::{Camera, Projection};
-use tetralod::gpu::{Colouring, Lighting, Look, Renderer, SIDES, Style};
+use tetralod::gpu::{Colouring, Lighting, Look, Renderer, SIDES, Style, wait};
 use tetralod::view::{ClipPlane, ColourScale, IsoSurface, Medium, Plane, Slice, Triangles, VIRIDIS};
 
 const SIZE: [u32; 2] = [96, 72];
@@ -134,7 +134,7 @@ fn lists_get_as_long_as_pictures_need() {
     camera.zoom(0.45);
     // Each pixel needs 24 fragments, but there is room for a few.
     renderer.draw(&camera, &mixed.look).unwrap();
-    let short = twin::colours(&twin::wait(renderer.read()).unwrap());
+    let short = twin::colours(&wait(renderer.read()).unwrap());
     assert!(renderer.is_short());
     let expected = mixed.expected(&camera, SIZE);
     let worst = |pixels: &[[f64; 3]]| 255.0 * twin::compare(pixels, |pixel| expected[pixel]).worst;

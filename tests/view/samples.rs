@@ -4,7 +4,7 @@
 use crate::scenes::Scene;
 use crate::twin::{self, UNIT};
 use tetralod::geom::Camera;
-use tetralod::gpu::{BoxLines, Look, Renderer, Style};
+use tetralod::gpu::{BoxLines, Look, Renderer, Style, wait};
 use tetralod::view::{IsoSurface, Medium, Triangles};
 
 const SIZE: [u32; 2] = [120, 90];
@@ -26,7 +26,7 @@ fn camera() -> Camera {
 }
 
 fn mean(renderer: &mut Renderer, look: &Look, pictures: u32) -> Vec<[f64; 3]> {
-    twin::colours(&twin::wait(renderer.picture(&camera(), look, pictures)).unwrap())
+    twin::colours(&wait(renderer.picture(&camera(), look, pictures)).unwrap())
 }
 
 /// The mean of the pixels of a large picture.
@@ -106,7 +106,7 @@ fn what_is_drawn_on_nothing_can_be_laid_over_anything() {
                 Look { sky: colour, ground: colour, shade: [shade, 0.2], ..Look::default() }
             };
             for pictures in [1, 3] {
-                let bytes = twin::wait(renderer.picture(&camera(), &on(0.0), pictures)).unwrap();
+                let bytes = wait(renderer.picture(&camera(), &on(0.0), pictures)).unwrap();
                 assert!(bytes.chunks_exact(4).all(|p| p[..3].iter().all(|c| *c <= p[3].saturating_add(1))));
                 assert!(bytes.chunks_exact(4).any(|p| p[3] == 0), "there is nothing in the corners");
                 let opaque = mean(&mut renderer, &on(1.0), pictures);

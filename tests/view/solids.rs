@@ -84,10 +84,10 @@ const ENDS: [TubeEnd; 2] = [TubeEnd::Flat, TubeEnd::Round];
 fn straight_tubes_are_prisms() {
     let (r, length) = (0.2, 3.0);
     let straight = line((0..4).map(|i| [1.0 + f64::from(i), 0.5, -0.5]));
-    let mut solids = Solids::new();
     for sides in 3..=16 {
+        let mut solids = Solids::with_sides(sides);
         for ends in ENDS {
-            solids.set_tubes(std::slice::from_ref(&straight), &TubeOptions { radius: r, sides, ends });
+            solids.set_tubes(std::slice::from_ref(&straight), &TubeOptions { radius: r, ends });
             check(&solids, "a straight tube");
             check_normals(&solids, "a straight tube");
             assert!(solids.values.iter().all(|v| *v == 5.0), "the speed");
@@ -121,8 +121,8 @@ fn curved_tubes_have_the_area_of_their_length() {
     };
     let spiral = line((0..=300).map(at));
     let length: f64 = (0..300).map(|i| sub(at(i + 1), at(i))).map(|d| dot(d, d).sqrt()).sum();
-    let mut solids = Solids::new();
-    let options = TubeOptions { radius: r, sides: 16, ends: TubeEnd::Flat };
+    let mut solids = Solids::with_sides(16);
+    let options = TubeOptions { radius: r, ends: TubeEnd::Flat };
     solids.set_tubes(&[spiral], &options);
     check(&solids, "a spiral");
     check_normals(&solids, "a spiral");
@@ -146,9 +146,9 @@ fn sharp_turns_are_not_pinched() {
         let (sin, cos) = turn.to_radians().sin_cos();
         let bent = line([[0.0; 3], [2.0, 0.0, 0.0], [2.0 + 2.0 * cos, 2.0 * sin, 0.0]]);
         for ends in ENDS {
-            let mut solids = Solids::new();
+            let mut solids = Solids::with_sides(12);
             let radius = 0.1;
-            solids.set_tubes(std::slice::from_ref(&bent), &TubeOptions { radius, sides: 12, ends });
+            solids.set_tubes(std::slice::from_ref(&bent), &TubeOptions { radius, ends });
             check(&solids, "a bend");
             for p in &solids.positions {
                 let d = sub(p.map(f64::from), [2.0, 0.0, 0.0]);
@@ -162,7 +162,7 @@ fn sharp_turns_are_not_pinched() {
 
 #[test]
 fn bad_lines_have_no_tubes() {
-    let mut solids = Solids::new();
+    let mut solids = Solids::with_sides(99);
     let good = line([[0.0; 3], [1.0, 0.0, 0.0]]);
     for lines in [vec![], vec![line([])], vec![line([[1.0; 3]])], vec![line([[1.0; 3]; 5])]] {
         solids.set_tubes(std::slice::from_ref(&good), &TubeOptions::default());
@@ -175,9 +175,7 @@ fn bad_lines_have_no_tubes() {
         assert!(solids.indices.is_empty());
     }
     let broken = line([[0.0; 3], [f64::NAN; 3], [1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]]);
-    solids.set_tubes_with(&[broken, good], &TubeOptions { sides: 99, ..TubeOptions::default() }, |p| {
-        p.position[0]
-    });
+    solids.set_tubes_with(&[broken, good], &TubeOptions::default(), |p| p.position[0]);
     check(&solids, "a line with gaps");
     assert_eq!(solids.values.iter().copied().fold(0.0, f32::max), 2.0);
     assert_eq!(solids.indices.len(), (2 * 16 * 2 + 14 * 2) + (2 * 16 + 14 * 2), "sixteen sides");
@@ -204,9 +202,9 @@ fn arrows_are_closed_and_as_long_as_their_vectors() {
     let count = view.positions.len();
     let zero = vec![0.0; count];
     let along_z: Vec<f32> = view.positions.iter().map(|p| 1.0 + p[0]).collect();
-    let mut solids = Solids::new();
     for sides in [3, 8, 16] {
-        let options = ArrowOptions { spacing: 0.2, sides, length: ArrowLength::Magnitude };
+        let mut solids = Solids::with_sides(sides);
+        let options = ArrowOptions { spacing: 0.2, length: ArrowLength::Magnitude };
         let arrows = solids.set_arrows(view, [&zero, &zero, &along_z], None, &options);
         assert_eq!(arrows, 125, "five along each axis");
         check(&solids, "arrows");
@@ -225,7 +223,8 @@ fn arrows_are_closed_and_as_long_as_their_vectors() {
             );
         }
     }
-    let options = ArrowOptions { spacing: 0.3, length: ArrowLength::Constant, ..ArrowOptions::default() };
+    let mut solids = Solids::new();
+    let options = ArrowOptions { spacing: 0.3, length: ArrowLength::Constant };
     let arrows = solids.set_arrows(view, [&zero, &zero, &along_z], Some(view.field), &options);
     assert_eq!(arrows, 27);
     assert!((0..arrows).all(|arrow| (reach(&solids, arrow, arrows) - 0.3).abs() < 1e-6));
@@ -240,7 +239,7 @@ fn bad_fields_have_no_arrows() {
     let scene = scene();
     let view = scene.view();
     let [zero, nan, one] = [0.0, f32::NAN, 1.0].map(|x| vec![x; view.positions.len()]);
-    let mut solids = Solids::new();
+    let mut solids = Solids::with_sides(3);
     let options = ArrowOptions::default();
     assert_eq!(solids.set_arrows(view, [&zero, &zero, &zero], None, &options), 0);
     assert_eq!(solids.set_arrows(view, [&zero, &nan, &one], None, &options), 0);
@@ -251,7 +250,7 @@ fn bad_fields_have_no_arrows() {
         assert_eq!(solids.set_arrows(view, [&zero, &one, &one], None, &options), 0);
     }
     assert_eq!(solids.set_arrows(Scene::default().view(), [&[], &[], &[]], None, &options), 0);
-    let tiny = ArrowOptions { spacing: 1e-200, sides: 3, ..options };
+    let tiny = ArrowOptions { spacing: 1e-200, ..options };
     let arrows = solids.set_arrows(view, [&zero, &one, &one], None, &tiny);
     assert!(arrows > 1000 && arrows <= 1 << 18, "the spacing is doubled: {arrows}");
 }

@@ -5,24 +5,11 @@ use crate::scenes::{Scene, distance_to_centre};
 use crate::support::meshes::{blocks, linear};
 use glam::{DVec2, DVec3};
 use std::path::Path;
-use std::pin::pin;
-use std::task::{Context as Task, Poll, Waker};
 use tetralod::geom::{Bounds, Camera, Ray};
-use tetralod::gpu::{Colouring, GpuError, Lighting, Look, Renderer, Style};
+use tetralod::gpu::{Colouring, GpuError, Lighting, Look, Renderer, Style, wait};
 use tetralod::view::{Medium, Triangles};
 
 pub const UNIT: Bounds = Bounds { min: [0.0; 3], max: [1.0; 3] };
-
-/// Runs a future that makes progress whenever it is asked to, as those of native devices do.
-pub fn wait<T>(future: impl Future<Output = T>) -> T {
-    let mut future = pin!(future);
-    loop {
-        if let Poll::Ready(value) = future.as_mut().poll(&mut Task::from_waker(Waker::noop())) {
-            return value;
-        }
-        std::thread::yield_now();
-    }
-}
 
 /// A renderer, or `None` after saying that this machine has no adapter. Set `TETRALOD_NEED_GPU` to make that
 /// a failure.

@@ -43,6 +43,14 @@ impl Picture {
     }
 }
 
+/// A folder, a small MT in it, and the name of a picture.
+fn prepared(name: &str, size: u32) -> (Folder, String, String) {
+    let folder = Folder::new(name);
+    let [input, mt, out] = ["a.vti", "a.mt", "a.png"].map(|name| folder.path(name));
+    bucky(size, &input, &mt);
+    (folder, mt, out)
+}
+
 /// Draws with some more options.
 fn draw(mt: &str, out: &str, options: &[&str]) -> Picture {
     good(&[&["render", mt, "-o", out], &SMALL[..], options].concat());
@@ -54,9 +62,7 @@ fn each_mode_is_a_picture_of_its_own_and_the_same_each_time() {
     if !has_adapter() {
         return;
     }
-    let folder = Folder::new("modes");
-    let [input, mt, out] = ["a.vti", "a.mt", "a.png"].map(|name| folder.path(name));
-    bucky(9, &input, &mt);
+    let (_folder, mt, out) = prepared("modes", 9);
     let empty = draw(&mt, &out, &["--isovalue", "99"]);
     let mut drawn: Vec<Picture> = Vec::new();
     for mode in ["surface", "volume", "slice", "boundary", "cells", "wire", "points", "surface,slice,wire"] {
@@ -77,9 +83,7 @@ fn options_change_the_picture() {
     if !has_adapter() {
         return;
     }
-    let folder = Folder::new("options");
-    let [input, mt, out] = ["a.vti", "a.mt", "a.png"].map(|name| folder.path(name));
-    bucky(9, &input, &mt);
+    let (_folder, mt, out) = prepared("options", 9);
     let boundary = ["--mode", "boundary,surface"];
     let before = draw(&mt, &out, &boundary);
     let sets: [&[&str]; 12] = [
@@ -117,9 +121,7 @@ fn a_transparent_picture_has_nothing_in_its_corners() {
     if !has_adapter() {
         return;
     }
-    let folder = Folder::new("transparent");
-    let [input, mt, out] = ["a.vti", "a.mt", "a.png"].map(|name| folder.path(name));
-    bucky(9, &input, &mt);
+    let (_folder, mt, out) = prepared("transparent", 9);
     let picture = draw(&mt, &out, &["--mode", "boundary", "--background", "transparent"]);
     assert_eq!(picture.channels, 4);
     let alpha = |x: usize, y: usize| picture.bytes[(y * 120 + x) * 4 + 3];
@@ -129,9 +131,8 @@ fn a_transparent_picture_has_nothing_in_its_corners() {
 
 #[test]
 fn a_scene_is_printed_and_read() {
-    let folder = Folder::new("scene");
-    let [input, mt, out, scene] = ["a.vti", "a.mt", "a.png", "a.json"].map(|name| folder.path(name));
-    bucky(9, &input, &mt);
+    let (folder, mt, out) = prepared("scene", 9);
+    let scene = folder.path("a.json");
     let options = ["--mode", "slice,cells", "--map", "magma", "--shrink", "0.5", "--clip", "x=0.5"];
     let printed = json(&[&["render", &mt, "--print-scene"], &options[..]].concat());
     assert_eq!(printed["colours"]["map"], "magma");
@@ -161,9 +162,7 @@ fn a_scene_is_printed_and_read() {
 
 #[test]
 fn what_cannot_be_drawn_is_refused() {
-    let folder = Folder::new("refused");
-    let [input, mt, out] = ["a.vti", "a.mt", "a.png"].map(|name| folder.path(name));
-    bucky(5, &input, &mt);
+    let (_folder, mt, out) = prepared("refused", 5);
     let wrong: [(&[&str], &[&str]); 13] = [
         (&["--map", "jet"], &["--map", "must be a colour map", "viridis", "balance"]),
         (&["--mode", "cloud"], &["--mode", "volume", "points"]),

@@ -74,9 +74,8 @@ fn fs(in: Vertex) -> @location(0) vec4f {
 @fragment
 fn fs_wire(in: Vertex) -> @location(0) vec4f {
     let what = seen(in);
-    let away = what.sides / max(what.slope, vec3f(1e-9));
-    let nearest = min(away.x, min(away.y, away.z));
-    if nearest > 0.5 * max(style.shape.x * frame.viewport.z, 1.0) || is_clipped(in.position, style.clips.x) {
+    let width = 0.5 * max(style.shape.x * frame.viewport.z, 1.0);
+    if nearest_side(what) > width || is_clipped(in.position, style.clips.x) {
         discard;
     }
     var colour = style.edge.rgb;
@@ -97,12 +96,11 @@ struct Point {
 @vertex
 fn vs_point(@builtin(vertex_index) i: u32, @builtin(instance_index) number: u32) -> Point {
     let point = points[number];
-    let x = f32(i == 1u || i == 2u || i == 4u) * 2.0 - 1.0;
-    let y = select(-1.0, 1.0, i == 2u || i == 4u || i == 5u);
+    let offset = square_corner(i);
     let middle = frame.view_projection * vec4f(point.xyz, 1.0);
-    let pixels = 0.5 * style.shape.w * frame.viewport.z * vec2f(x, y);
+    let pixels = 0.5 * style.shape.w * frame.viewport.z * offset;
     let clip = vec4f(middle.xy + pixels * 2.0 * middle.w / frame.viewport.xy, middle.zw);
-    return Point(clip, point.xyz, point.w, vec2f(x, y));
+    return Point(clip, point.xyz, point.w, offset);
 }
 
 // A ball of the point's colour.

@@ -41,6 +41,13 @@ fn over_screen(i: u32, depth: f32) -> vec4f {
     return vec4f(select(-1.0, 3.0, i == 1u), select(-1.0, 3.0, i == 2u), depth, 1.0);
 }
 
+// Corner `i` of the two triangles of a square from -1 to 1.
+fn square_corner(i: u32) -> vec2f {
+    let x = i == 1u || i == 2u || i == 4u;
+    let y = i == 2u || i == 4u || i == 5u;
+    return vec2f(select(-1.0, 1.0, x), select(-1.0, 1.0, y));
+}
+
 // The ray through the middle of a pixel.
 fn ray_of(pixel: vec2f) -> Ray {
     let at = (floor(pixel) + 0.5) / frame.viewport.xy * vec2f(2.0, -2.0) + vec2f(-1.0, 1.0);

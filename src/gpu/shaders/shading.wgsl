@@ -84,17 +84,20 @@ fn lit(albedo: vec3f, n: vec3f, view: vec3f) -> vec3f {
     return albedo * diffuse(n) + vec3f(0.75, 0.85, 1.0) * (0.16 * rim) + vec3f(0.16 * gloss);
 }
 
+// The distance to the nearest side that is an edge, in pixels.
+fn nearest_side(seen: Seen) -> f32 {
+    let away = seen.sides / max(seen.slope, vec3f(1e-9));
+    return min(away.x, min(away.y, away.z));
+}
+
 // How much of the edge colour there is at a place in a triangle. Edges fade out where faces are a few pixels
 // large.
 fn edge_strength(seen: Seen) -> f32 {
     if style.shape.x <= 0.0 {
         return 0.0;
     }
-    // Distance to each side in pixels.
-    let away = seen.sides / max(seen.slope, vec3f(1e-9));
-    let nearest = min(away.x, min(away.y, away.z));
     let width = 0.5 * style.shape.x * frame.viewport.z;
-    let line = 1.0 - smoothstep(width - 0.5, width + 0.5, nearest);
+    let line = 1.0 - smoothstep(width - 0.5, width + 0.5, nearest_side(seen));
     let steepest = max(seen.slope.x, max(seen.slope.y, seen.slope.z));
     return line * style.edge.a * (1.0 - smoothstep(0.08, 0.35, steepest * frame.viewport.z));
 }
