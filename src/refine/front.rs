@@ -89,6 +89,10 @@ pub struct Outcome {
     pub missing: bool,
 }
 
+/// From a mesh of so many times what is wanted it is quicker to go back to the base mesh, and to refine from there,
+/// than to undo one update after the other.
+pub(super) const FAR: u32 = 3;
+
 /// Words of the set of applied updates in a chunk.
 pub(super) const CHUNK_WORDS: usize = 8;
 
@@ -265,7 +269,9 @@ impl Front {
         // start from the base mesh surely finds the first one.
         let is_monotone = criterion.is_monotone() && !mt.has_tet_errors();
         let restarts = !is_monotone || !budget.is_unlimited() && !mt.always_grows();
-        if restarts && !self.tracked && !self.ranked.is_running() {
+        let far = FAR as usize;
+        let is_far = !budget.holds(self.mesh.vertex_count() / far, self.mesh.tet_count() / far);
+        if (restarts && !self.tracked || is_far) && !self.ranked.is_running() {
             self.coarsen_all(mt, outcome)?;
         }
         // Without own errors of tetrahedra, the errors of updates decide.

@@ -1,10 +1,13 @@
 //! Uniform requests: the errors of updates alone decide, not the mesh.
 
-use super::front::{CHUNK_WORDS, Front, GoOn};
+use super::front::{CHUNK_WORDS, FAR, Front, GoOn};
 use super::sweep::{Window, window_size};
 use super::{Outcome, Tolerance};
 use crate::mesh::BitSet;
 use crate::mt::{Applied, ApplyUpdates, ErrorCode, UpdateError, UpdateId};
+
+/// One in so many of the known updates are few.
+const FEW: u32 = 16;
 
 /// The updates that a uniform request needs, by their errors.
 #[derive(Clone, Copy)]
@@ -56,14 +59,35 @@ impl Staying<'_> {
 }
 
 impl Front {
-    /// Back to the base mesh.
+    /// Back to the base mesh: by a new one, which costs nothing that grows with the mesh but a look at each update
+    /// that is known, or by undoing updates if they are few.
     pub(super) fn coarsen_all(
         &mut self,
         mt: &impl ApplyUpdates,
         outcome: &mut Outcome,
     ) -> Result<(), UpdateError> {
         self.untrack();
-        self.sweep(mt, NeededUpdates::new(&[]), false, outcome, &mut |_| true).map(drop)
+        let are_few = self.applied_count <= self.known / FEW;
+        let (false, Ok(start)) = (are_few, mt.start()) else {
+            return self.sweep(mt, NeededUpdates::new(&[]), false, outcome, &mut |_| true).map(drop);
+        };
+        self.mesh.start_again(start);
+        outcome.coarsened += u64::from(self.applied_count);
+        self.applied = BitSet::default();
+        self.applied.resize(self.known);
+        self.applied_count = 0;
+        mt.page_inserted(&mut self.mesh, 0..self.known);
+        self.mesh.clear_touched();
+        Ok(())
+    }
+
+    /// Whether an update is applied for so few that are needed that it is quicker to start from the base mesh.
+    fn is_mostly_unneeded(&self, mt: &impl ApplyUpdates, needed: NeededUpdates<'_>) -> bool {
+        let most = self.applied_count / FAR;
+        let wanted = (0..self.known).filter(|u| needed.has(mt, UpdateId(*u)));
+        most > 0
+            && self.applied_count > self.known / FEW
+            && wanted.take(most as usize + 1).count() <= most as usize
     }
 
     /// Undoes all updates within the tolerances and applies the others. Errors alone decide. They are monotone along
@@ -75,6 +99,9 @@ impl Front {
         outcome: &mut Outcome,
         go_on: GoOn<'_>,
     ) -> Result<bool, UpdateError> {
+        if self.is_mostly_unneeded(mt, needed) {
+            self.coarsen_all(mt, outcome)?;
+        }
         Ok(self.sweep(mt, needed, false, outcome, go_on)? && self.sweep(mt, needed, true, outcome, go_on)?)
     }
 

@@ -149,3 +149,44 @@ fn errors_that_do_not_fall_are_not_written() {
         assert!(matches!(refused, Err(EncodeError::Order { .. })), "{refused:?}");
     }
 }
+
+/// From a mesh that is much finer than what is wanted, the work is that from the base mesh, however fine it was.
+#[test]
+fn much_coarser_meshes_cost_what_they_cost_from_the_base_mesh() {
+    let mesh = noisy([12, 11, 10], 0.05, 6);
+    for kind in MtKind::ALL {
+        let mt = match kind {
+            MtKind::HalfEdge => {
+                let config = BuildConfig::of(kind);
+                build(&mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt
+            }
+            MtKind::Explicit => made(&mesh, MtKind::Edge).convert(kind).expect("any MT can be spelled out"),
+            kind => made(&mesh, kind),
+        };
+        let name = kind.name();
+        let base = Front::new(&mt).expect("a valid base mesh");
+        let all = Request::within(0.0);
+        let mut checked = 0;
+        for request in [all.clone().at_most(900), Request::within(0.2), Need::within(0.05).into()] {
+            let coarse = LodCriterion::new(mt.info(), &request);
+            let (mut fresh, mut walk) = (base.clone(), base.clone());
+            walk.satisfy(&mt, &LodCriterion::new(mt.info(), &all), all.budget).expect("a valid MT");
+            let (full, applied) = (walk.mesh().tet_count(), walk.applied_count());
+            let expected = fresh.satisfy(&mt, &coarse, request.budget).expect("a valid MT");
+            let outcome = walk.satisfy(&mt, &coarse, request.budget).expect("a valid MT");
+            assert_eq!(walk.mesh().hash(), fresh.mesh().hash(), "{name}: {request:?}");
+            walk.mesh().check().expect("a valid mesh");
+            if fresh.applied_count() > applied / 4 || 4 * fresh.mesh().tet_count() > full {
+                continue;
+            }
+            checked += 1;
+            assert_eq!((outcome.refined, outcome.judged), (expected.refined, expected.judged), "{name}");
+            assert_eq!(outcome.coarsened, u64::from(applied) + expected.coarsened, "{name}: {request:?}");
+            // And back again: everything is applied once more.
+            let again = walk.satisfy(&mt, &LodCriterion::new(mt.info(), &all), all.budget);
+            assert_eq!(again.expect("a valid MT").refined, u64::from(applied - fresh.applied_count()));
+            assert_eq!(walk.mesh().tet_count(), full, "{name}");
+        }
+        assert!(checked > 0, "{name}: no request is much coarser");
+    }
+}

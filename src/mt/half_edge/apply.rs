@@ -35,6 +35,10 @@ impl KindState for State {
     fn copy(&self) -> Box<dyn KindState> {
         Box::new(self.clone())
     }
+
+    fn is_of_updates(&self) -> bool {
+        true
+    }
 }
 
 fn take_state(mesh: &mut CurrentMesh) -> Box<State> {

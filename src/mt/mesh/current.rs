@@ -24,6 +24,11 @@ pub(in crate::mt) trait KindState: Any + Send + Sync {
 
     /// A copy, for a copy of the mesh.
     fn copy(&self) -> Box<dyn KindState>;
+
+    /// Whether it says nothing about the mesh, only about updates: then it holds when the mesh starts again.
+    fn is_of_updates(&self) -> bool {
+        false
+    }
 }
 
 /// Without its content: whatever a trait object can do is compiled into every program.
@@ -156,6 +161,16 @@ impl CurrentMesh {
         };
         mesh.find_pinched();
         Ok(mesh)
+    }
+
+    /// Becomes `start`, the base mesh of the same MT. What is known of updates is kept: those that have been applied before
+    /// are applied more quickly.
+    pub(crate) fn start_again(&mut self, start: Self) {
+        let before = std::mem::replace(self, start);
+        self.proven = before.proven;
+        if let Some(state) = before.kind_state.filter(|state| state.is_of_updates()) {
+            self.kind_state = Some(state);
+        }
     }
 
     /// Finds the vertices whose tetrahedra do not all hang together through faces at the vertex.
