@@ -5,6 +5,7 @@ import { TetralodError, reviveError } from "./errors.js";
 import { received } from "./options.js";
 import { Parts } from "./parts.js";
 import { nodeModule } from "./stream.js";
+import { meshToolMethods } from "./tools.js";
 
 let loading;
 
@@ -124,15 +125,7 @@ export function coreMethods(emit) {
     /** Ends the fetching; the mesh stays usable. */
     halt: () => parts?.close(new TetralodError("freed", "the download was ended")),
     setField: (name) => session.setField(name),
-    isosurface: (values, smooth) => session.isosurfaces(values, smooth),
-    slice: (normal, offset) => session.slice(normal, offset),
-    surface: () => session.surface(),
-    probe: (points) => session.probe(points),
-    line: (from, to) => session.line(from, to),
-    streamlines: (fields, seeds, backward, maxLength, maxSteps) =>
-      session.streamlines(fields, seeds, backward, maxLength, maxSteps),
-    stats: (bins, low, high) => session.stats(bins, low, high),
-    hash: () => session.hash(),
+    ...meshToolMethods(() => session),
     free() {
       parts?.close(new TetralodError("freed", "this MultiTessellation has been freed"));
       session?.free();

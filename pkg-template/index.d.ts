@@ -159,10 +159,64 @@ export function emptyMesh(): Mesh;
  */
 export function applyChanges(mesh: Mesh, delta: MeshDelta): Mesh;
 
+/** What can be got out of the current mesh: the same calls in `MultiTessellation` and in `Viewer`. */
+export interface MeshTools {
+  /**
+   * The isosurface of the current mesh at one value or several, in units of the field, with the value of each vertex.
+   * Normals point towards lower values: they are those of the field's gradient, or with `"smooth"` of the triangles.
+   *
+   * @example
+   * const { positions, normals, indices } = await mt.isosurface(0.7);
+   */
+  isosurface(
+    values: number | ArrayLike<number>,
+    how?: { normals?: "gradient" | "smooth" },
+  ): Promise<IsoSurface & { values: Float32Array }>;
+
+  /**
+   * The section of the current mesh with the plane of all points with `normal · p = offset`, facing the way the normal
+   * points.
+   *
+   * @example
+   * const cut = await mt.slice([0, 0, 1], 2.5);                       // z = 2.5
+   */
+  slice(normal: ArrayLike<number>, offset: number): Promise<Slice>;
+
+  /** The boundary of the current mesh, facing outwards. */
+  surface(): Promise<Surface>;
+
+  /** The field at some points, three coordinates each, in model units; NaN outside of the mesh. */
+  probe(points: ArrayLike<number>): Promise<Float64Array>;
+
+  /** The field along a line, in parts that are linear. */
+  line(from: ArrayLike<number>, to: ArrayLike<number>): Promise<LineProfile>;
+
+  /**
+   * The streamlines from some seeds, three coordinates each, through the vector field whose components are three fields;
+   * `undefined` for seeds outside of the mesh. `maxLength` is in model units.
+   *
+   * @example
+   * const lines = await mt.streamlines(["u", "v", "w"], [0, 0, 0, 1, 0, 0]);
+   */
+  streamlines(
+    fields: [string, string, string],
+    seeds: ArrayLike<number>,
+    how?: { backward?: boolean; maxLength?: number; maxSteps?: number },
+  ): Promise<(Streamline | undefined)[]>;
+
+  /** Volume, integral, mean and a histogram by volume (100 bins over the field's range, if not said otherwise). */
+  stats(how?: { bins?: number; range?: ArrayLike<number> }): Promise<FieldStats>;
+
+  /** A hash of the current mesh: the same request gives the same hash on every machine. */
+  hash(): Promise<string>;
+}
+
+declare const WithMeshTools: { new (): MeshTools; prototype: MeshTools };
+
 /**
  * A volume that is open. Calls are answered in the order in which they were made.
  */
-export class MultiTessellation {
+export class MultiTessellation extends WithMeshTools {
   private constructor();
 
   /**
@@ -258,55 +312,6 @@ export class MultiTessellation {
    */
   setField(field: string | number): Promise<void>;
 
-  /**
-   * The isosurface of the current mesh at one value or several, in units of the field, with the value of each vertex.
-   * Normals point towards lower values: they are those of the field's gradient, or with `"smooth"` of the triangles.
-   *
-   * @example
-   * const { positions, normals, indices } = await mt.isosurface(0.7);
-   */
-  isosurface(
-    values: number | ArrayLike<number>,
-    how?: { normals?: "gradient" | "smooth" },
-  ): Promise<IsoSurface & { values: Float32Array }>;
-
-  /**
-   * The section of the current mesh with the plane of all points with `normal · p = offset`, facing the way the normal
-   * points.
-   *
-   * @example
-   * const cut = await mt.slice([0, 0, 1], 2.5);                       // z = 2.5
-   */
-  slice(normal: ArrayLike<number>, offset: number): Promise<Slice>;
-
-  /** The boundary of the current mesh, facing outwards. */
-  surface(): Promise<Surface>;
-
-  /** The field at some points, three coordinates each, in model units; NaN outside of the mesh. */
-  probe(points: ArrayLike<number>): Promise<Float64Array>;
-
-  /** The field along a line, in parts that are linear. */
-  line(from: ArrayLike<number>, to: ArrayLike<number>): Promise<LineProfile>;
-
-  /**
-   * The streamlines from some seeds, three coordinates each, through the vector field whose components are three fields;
-   * `undefined` for seeds outside of the mesh. `maxLength` is in model units.
-   *
-   * @example
-   * const lines = await mt.streamlines(["u", "v", "w"], [0, 0, 0, 1, 0, 0]);
-   */
-  streamlines(
-    fields: [string, string, string],
-    seeds: ArrayLike<number>,
-    how?: { backward?: boolean; maxLength?: number; maxSteps?: number },
-  ): Promise<(Streamline | undefined)[]>;
-
-  /** Volume, integral, mean and a histogram by volume (100 bins over the field's range, if not said otherwise). */
-  stats(how?: { bins?: number; range?: ArrayLike<number> }): Promise<FieldStats>;
-
-  /** A hash of the current mesh: the same request gives the same hash on every machine. */
-  hash(): Promise<string>;
-
   /** Stops the download and the worker. Pending and later calls reject with code `freed`. */
   free(): void;
 
@@ -348,7 +353,7 @@ export type ErrorCode =
   | "wasm"
   /** The browser has no WebGPU, or it gives no adapter (viewer only). */
   | "no-webgpu"
-  /** The GPU was reset or removed; make a new viewer (viewer only). */
+  /** The GPU was reset or removed, and could not be opened again; make a new viewer (viewer only). */
   | "device-lost"
   /** The mesh is larger than this GPU can hold (viewer only). */
   | "too-large"

@@ -8,6 +8,7 @@ import { TetralodError } from "./errors.js";
 import { openOptions, sendable } from "./options.js";
 import { Remote, nodeEndpoint, webEndpoint } from "./rpc.js";
 import { abortable, nodeModule, openSource, pump, rangesOf } from "./stream.js";
+import { checkAmount, checkNames, setCaller, withMeshTools } from "./tools.js";
 
 export { TetralodError, applyChanges, emptyMesh };
 
@@ -16,7 +17,7 @@ const NO_RETRY = "only a file that is fetched in parts can be continued: open it
 const STEP_OPTIONS = ["budgetMs", "updates", "deltas", "signal"];
 
 /** A volume that is open: it can be refined while the rest of it is still arriving. */
-export class MultiTessellation {
+export class MultiTessellation extends withMeshTools(Object) {
   #core;
   #info;
   #progress = { ready: false, complete: false, bytes: 0, total: undefined, updates: 0 };
@@ -48,6 +49,8 @@ export class MultiTessellation {
 
   /** @private use `MultiTessellation.open` */
   constructor(core, inWorker, onProgress) {
+    super();
+    setCaller(this, (method, args) => this.#core.call(method, args));
     this.#core = core;
     this.#inWorker = inWorker;
     this.#onProgress = onProgress;
@@ -112,56 +115,6 @@ export class MultiTessellation {
 
   async setField(field) {
     await this.#core.call("setField", [field]);
-  }
-
-  async isosurface(values, how = {}) {
-    checkNames(how, ["normals"]);
-    const { normals = "gradient" } = how;
-    if (normals !== "gradient" && normals !== "smooth") {
-      throw new TetralodError("bad-option", 'option `normals`: must be "gradient" or "smooth"');
-    }
-    const list = typeof values === "number" ? [values] : values;
-    return this.#core.call("isosurface", [numbers("isosurface", list), normals === "smooth"]);
-  }
-
-  async slice(normal, offset) {
-    checkNumber("offset", offset);
-    return this.#core.call("slice", [numbers("normal", normal), offset]);
-  }
-
-  async surface() {
-    return this.#core.call("surface");
-  }
-
-  async probe(points) {
-    return this.#core.call("probe", [numbers("points", points)]);
-  }
-
-  async line(from, to) {
-    return this.#core.call("line", [numbers("from", from), numbers("to", to)]);
-  }
-
-  async streamlines(fields, seeds, how = {}) {
-    checkNames(how, ["backward", "maxLength", "maxSteps"]);
-    const { backward = false, maxLength = Infinity, maxSteps = 10_000 } = how;
-    if (!Array.isArray(fields) || fields.length !== 3 || fields.some((name) => typeof name !== "string")) {
-      throw new TetralodError("bad-option", "streamlines: a vector field is the names of three fields");
-    }
-    checkAmount("maxLength", maxLength, 0);
-    checkAmount("maxSteps", maxSteps, 1);
-    return this.#core.call("streamlines", [fields, numbers("seeds", seeds), Boolean(backward), maxLength, maxSteps]);
-  }
-
-  async stats(how = {}) {
-    checkNames(how, ["bins", "range"]);
-    const { bins = 100, range = [NaN, NaN] } = how;
-    checkAmount("bins", bins, 1);
-    if (range?.length !== 2) throw new TetralodError("bad-option", "option `range`: must be two numbers");
-    return this.#core.call("stats", [bins, range[0], range[1]]);
-  }
-
-  async hash() {
-    return this.#core.call("hash");
   }
 
   free() {
@@ -240,31 +193,6 @@ export class MultiTessellation {
     const finish = async () => report(await this.#core.call("finish"));
     await pump(opened, { feed, finish }, signal);
   }
-}
-
-function checkNames(options, names) {
-  for (const name of Object.keys(options)) {
-    if (names.includes(name)) continue;
-    throw new TetralodError("bad-option", `option \`${name}\`: there is none of this name, only ${names.join(", ")}`);
-  }
-}
-
-function checkAmount(name, value, least) {
-  if (typeof value === "number" && value >= least) return;
-  throw new TetralodError("bad-option", `option \`${name}\`: must be a number of at least ${least}`);
-}
-
-/** A list of numbers, as wasm takes it; which numbers will do is its to say. */
-function numbers(name, list) {
-  const isList = Array.isArray(list) || (ArrayBuffer.isView(list) && !(list instanceof DataView));
-  if (!isList || !Array.prototype.every.call(list, (number) => typeof number === "number")) {
-    throw new TetralodError("bad-option", `option \`${name}\`: must be a list of numbers`);
-  }
-  return Float64Array.from(/** @type {ArrayLike<number>} */ (list));
-}
-
-function checkNumber(name, number) {
-  if (typeof number !== "number") throw new TetralodError("bad-option", `option \`${name}\`: must be a number`);
 }
 
 function startWorker(onEvent) {

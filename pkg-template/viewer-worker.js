@@ -5,11 +5,12 @@
  * refined in steps, so that the camera waits for at most one step.
  */
 
-import init, { RangeLoader, Viewer } from "./tetralod_viewer.js";
+import init, { Gpu, RangeLoader, Viewer } from "./tetralod_viewer.js";
 import { TetralodError, flattenError } from "./errors.js";
 import { received } from "./options.js";
 import { Parts } from "./parts.js";
 import { serve, webEndpoint } from "./rpc.js";
+import { meshToolMethods } from "./tools.js";
 
 /** While a file streams in, the mesh follows it this often (in ms), and at most half of the time is spent on that. */
 const FOLLOW = 120;
@@ -46,11 +47,22 @@ let frameAsked = false;
 let following;
 let hidden;
 let broken = false;
+/** How long a picture should take while something moves (in ms). */
+let frameTime = 60;
+/** Tetrahedra of the mesh, and how many a picture can have while something moves. */
+let tets = 0;
+let affordable = Infinity;
+/** The number that the mesh is held to now. @type {number | undefined} */
+let held;
 
-/** A picture while something moves should take so long, of these scales, and is sharp again so much later (in ms). */
-const TARGET = 60;
+/** Pictures have these parts of the pixels, in each direction, while something moves. */
 const SCALES = [1, 0.7, 0.5, 0.35, 0.25];
+/** After so long without movement, the picture is made sharp again (in ms). */
 const REST = 250;
+/** Where fewer pixels do not help, a mesh of fewer tetrahedra is drawn while something moves, but of no fewer than these. */
+const FEWEST_TETS = 10_000;
+/** How often it is looked whether the GPU is lost while nothing is drawn (in ms). */
+const CHECK = 1000;
 /** Pictures that take longer than this are drawn once, not several times for smooth edges. */
 const SLOW = 100;
 
@@ -58,11 +70,22 @@ const nextFrame =
   typeof requestAnimationFrame === "function" ? requestAnimationFrame : (then) => setTimeout(then, 16);
 
 const methods = {
-  async create(canvas, width, height, ratio) {
+  async create(canvas, width, height, ratio, milliseconds) {
     await init().catch((error) => {
       throw new TetralodError("wasm", `the wasm module did not load: ${error?.message ?? error}`);
     });
-    viewer = await Viewer.create(canvas, width, height, ratio);
+    frameTime = milliseconds;
+    viewer = new Viewer(await Gpu.open(canvas, width, height), ratio);
+    setInterval(check, CHECK);
+    invalidate();
+    return { adapter: viewer.adapter() };
+  },
+
+  /** Opens the GPU again after it was lost, for another canvas, and draws everything anew. */
+  async restore(canvas, width, height, ratio) {
+    viewer.setGpu(await Gpu.open(canvas, width, height));
+    viewer.resize(width, height, ratio);
+    [broken, begun, current] = [false, undefined, 1];
     invalidate();
     return { adapter: viewer.adapter() };
   },
@@ -131,7 +154,7 @@ const methods = {
   async settled() {
     const mine = parts;
     await mine?.settled();
-    while (mine && mine === parts && !broken && (following !== undefined || viewer.moving)) {
+    while (mine && mine === parts && !broken && (following !== undefined || viewer.moving || held !== undefined)) {
       await drawn();
       await mine.settled();
     }
@@ -188,13 +211,20 @@ const methods = {
     return Array.from(box);
   },
 
-  /** What is shown at a point; a plain object with the values of the fields by name. */
-  probe(x, y) {
-    const found = /** @type {any} */ (viewer.probe(x, y));
+  freeze(on) {
+    viewer.freeze(on);
+    invalidate();
+  },
+
+  /** What is shown at a point of the canvas; a plain object with the values of the fields by name. */
+  pick(x, y) {
+    const found = /** @type {any} */ (viewer.pick(x, y));
     return found && { ...found, values: Object.fromEntries(found.values) };
   },
 
-  hash: () => viewer.hash(),
+  mesh: () => viewer.mesh(),
+
+  ...meshToolMethods(() => viewer),
 };
 const emit = serve(webEndpoint(globalThis), methods, ["openParts", "settled"]);
 
@@ -220,6 +250,7 @@ function forget() {
   isRequested = false;
   bytes = 0;
   ready = false;
+  held = undefined;
   lastRefine = { end: -Infinity, took: 0 };
   invalidate();
 }
@@ -255,9 +286,12 @@ function step(budget) {
     parts?.follow();
     stats.milliseconds = end - start;
     for (const name of Object.keys(total)) total[name] += stats[name];
-    if (stats.done) lastRefine = { end, took: total.milliseconds };
-    emit("stats", { ...stats, ...total, bytes, goal, blocks: parts?.progress.blocks });
-    if (stats.done) Object.keys(total).forEach((name) => (total[name] = 0));
+    tets = stats.tetrahedra;
+    // A mesh that is held to fewer tetrahedra while something moves is not the one that was asked for.
+    const done = stats.done && held === undefined;
+    if (done) lastRefine = { end, took: total.milliseconds };
+    emit("stats", { ...stats, ...total, done, bytes, goal, blocks: parts?.progress.blocks });
+    if (done) Object.keys(total).forEach((name) => (total[name] = 0));
   } catch (error) {
     emit("failed", { goal, error: flattenError(error) });
   }
@@ -308,11 +342,26 @@ function draw() {
     else if (canImprove()) viewer.improve();
     if (begun !== undefined || canImprove()) invalidate();
   } catch (error) {
-    // A frame that fails would fail again: wait for a change, or stop if the GPU or the worker is lost.
-    broken = error?.code === "device-lost" || error?.code === undefined;
-    emit("error", flattenError(error));
+    failed(error);
   }
   if (ready && viewer.moving) invalidate();
+}
+
+/** A frame that fails would fail again: wait for a change, for a GPU in place of a lost one, or stop if the worker is lost. */
+function failed(error) {
+  const isLost = error?.code === "device-lost";
+  broken = isLost || error?.code === undefined;
+  emit(isLost ? "lost" : "error", flattenError(error));
+}
+
+/** Looks whether the GPU is lost while nothing is drawn: what the canvas shows is lost with it. */
+function check() {
+  if (broken) return;
+  try {
+    viewer.check();
+  } catch (error) {
+    failed(error);
+  }
 }
 
 const canImprove = () => viewer.canImprove && !viewer.moving && took < SLOW && resting === undefined;
@@ -322,8 +371,21 @@ function observe() {
   if (begun === undefined || viewer.inFlight > 0) return;
   took = performance.now() - begun;
   begun = undefined;
-  const wanted = current * Math.sqrt(TARGET / took);
+  const wanted = current * Math.sqrt(frameTime / took);
   scale = SCALES.find((one) => one <= wanted) ?? SCALES.at(-1);
+  if (resting === undefined) return;
+  // Where the fewest pixels still take too long, fewer tetrahedra help.
+  if (took > 1.5 * frameTime && current === SCALES.at(-1)) affordable = Math.max(FEWEST_TETS, (tets * frameTime) / took);
+  else if (took < frameTime / 2 && held !== undefined) affordable = Math.min(1.5 * affordable, 2 ** 31);
+}
+
+/** Holds the mesh to what can be drawn while something moves, or lets it become what was asked for. */
+function limit(on) {
+  const most = on && (held !== undefined || tets > affordable) ? Math.round(affordable) : undefined;
+  if (!ready || !isRequested || most === held) return;
+  held = most;
+  viewer.limit(most);
+  parts?.follow();
 }
 
 /** The scale that is set. */
@@ -338,10 +400,12 @@ function setScale(wanted) {
 /** Something moves: draws as finely as there is time for, and finely a little later. */
 function move() {
   setScale(scale);
+  limit(true);
   clearTimeout(resting);
   resting = setTimeout(() => {
     resting = undefined;
     setScale(1);
+    limit(false);
     invalidate();
   }, REST);
 }

@@ -1,6 +1,8 @@
 /// <reference lib="esnext.disposable" />
 import type {
   BlockProgress,
+  Mesh,
+  MeshTools,
   MtInfo,
   Need,
   ReadOptions,
@@ -246,7 +248,7 @@ export interface Legend {
 }
 
 /** What is shown at a point. */
-export interface ViewerProbe {
+export interface PickedPoint {
   /** In model units. */
   position: [number, number, number];
   /** The value of each field, by its name. */
@@ -259,6 +261,15 @@ export interface ViewerProbe {
   error: number;
 }
 
+export interface ViewerOptions {
+  signal?: AbortSignal;
+  /**
+   * How long a picture should take while something moves, in milliseconds; 60 without it. Where pictures take longer, they
+   * have fewer pixels, then fewer tetrahedra; at rest they get sharp again. `Infinity` always draws everything.
+   */
+  frameTime?: number;
+}
+
 export interface ViewerEventMap {
   progress: CustomEvent<ViewerProgress>;
   stats: CustomEvent<ViewerStats>;
@@ -267,8 +278,12 @@ export interface ViewerEventMap {
   camera: CustomEvent<CameraState>;
   /** The colours mean something else. */
   legend: CustomEvent<Legend | undefined>;
+  /** The GPU was lost, as when its driver is reset, and has been opened again. All is drawn as before. */
+  restored: CustomEvent<{ adapter: string }>;
   error: CustomEvent<Error>;
 }
+
+declare const EventTargetWithMeshTools: { new (): EventTarget & MeshTools; prototype: EventTarget & MeshTools };
 
 /**
  * Draws an MT on a canvas with WebGPU; decoding, refinement and drawing happen in a worker.
@@ -283,12 +298,12 @@ export interface ViewerEventMap {
  * await viewer.set({ isosurfaces: [{ value: min + 0.6 * (max - min), opacity: 0.5 }], volume: {} });
  * ```
  */
-export class Viewer extends EventTarget {
+export class Viewer extends EventTargetWithMeshTools {
   private constructor(canvas: HTMLCanvasElement);
   /** Rejects with code `no-webgpu`, and the reason, if WebGPU is not available. */
   static check(): Promise<void>;
   /** Transfers the canvas to the worker, permanently; rejects with code `no-webgpu` before that if there is no WebGPU. */
-  static create(canvas: HTMLCanvasElement, options?: { signal?: AbortSignal }): Promise<Viewer>;
+  static create(canvas: HTMLCanvasElement, options?: ViewerOptions): Promise<Viewer>;
 
   /** The description of the volume; `undefined` until its base mesh has arrived. */
   readonly info: MtInfo | undefined;
@@ -320,6 +335,11 @@ export class Viewer extends EventTarget {
    */
   refine(options?: ViewerRefineOptions): Promise<ViewerStats>;
   /**
+   * Keeps the mesh as it is, wherever the camera goes and whatever is requested, to look at it from elsewhere; with `false`
+   * it follows again. Requests wait meanwhile.
+   */
+  freeze(on?: boolean): Promise<void>;
+  /**
    * Changes what is drawn, and the camera: what is named replaces what was there, `null` gives it its default, all else
    * stays. Rejects with code `bad-option`, and changes nothing, if something is wrong.
    *
@@ -345,14 +365,19 @@ export class Viewer extends EventTarget {
   look(right: number, up: number): Promise<void>;
 
   /** What is shown at a point of the canvas (−1 to 1, y upwards); `undefined` if nothing is there. */
-  probe(x: number, y: number): Promise<ViewerProbe | undefined>;
+  pick(x: number, y: number): Promise<PickedPoint | undefined>;
   /** The handle of the region (0 to 5: lower and upper x, y, z) at a point of the canvas (−1 to 1, y upwards), or −1. */
   pickRegion(x: number, y: number): Promise<number>;
   /** Moves a handle of the region under a point; resolves to the new box. */
   dragRegion(handle: number, x: number, y: number): Promise<number[]>;
 
-  /** A hash of the current mesh: the same request gives the same hash on every machine. */
-  hash(): Promise<string>;
+  /**
+   * A copy of the mesh that is shown, in arrays that belong to the caller.
+   *
+   * @example
+   * const { positions, tets } = await viewer.mesh();
+   */
+  mesh(): Promise<Omit<Mesh, "changes">>;
   /** Stops the worker; the canvas keeps its last picture. Pending and later calls reject with code `freed`. */
   free(): void;
   [Symbol.dispose](): void;

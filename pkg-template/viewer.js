@@ -10,6 +10,7 @@ import { Latest, deferred, mergeUpdates } from "./latest.js";
 import { openOptions, sendable } from "./options.js";
 import { Remote, webEndpoint } from "./rpc.js";
 import { abortable, openSource, pump, rangesOf } from "./stream.js";
+import { checkAmount, setCaller, withMeshTools } from "./tools.js";
 
 export { TetralodError } from "./errors.js";
 
@@ -22,13 +23,18 @@ const NO_PAGE = 'a viewer draws on a canvas of a page; elsewhere, use MultiTesse
 const USED_CANVAS =
   "`canvas` has been used by another viewer, or has a context of its own; give each viewer a new canvas element";
 
+/** A GPU that is lost is opened again after these waits (in ms): drivers take some time to start. */
+const WAITS = [0, 500, 2000, 8000];
+
 /** What is drawn before something else is set: the isosurface in the middle of the field's range. */
 const SCENE = { isosurfaces: [{}] };
 
-export class Viewer extends EventTarget {
+export class Viewer extends withMeshTools(EventTarget) {
   #remote;
   #canvas;
   #observer;
+  /** What the picture is on after the GPU was lost. @type {HTMLCanvasElement | undefined} */
+  #cover;
   #info;
   #adapter;
   #stream = null;
@@ -39,7 +45,7 @@ export class Viewer extends EventTarget {
   #waiting = [];
   #update = new Latest((changes) => this.#remote.call("update", [changes]), mergeUpdates);
   #drag = new Latest(([handle, x, y]) => this.#remote.call("dragRegion", [handle, x, y]));
-  #probe = new Latest(([x, y]) => this.#remote.call("probe", [x, y]));
+  #pick = new Latest(([x, y]) => this.#remote.call("pick", [x, y]));
   /** What is drawn. @type {Record<string, any>} */
   #scene = SCENE;
   #camera;
@@ -57,10 +63,11 @@ export class Viewer extends EventTarget {
    * Transfers the canvas to the worker, permanently, and starts the worker.
    *
    * @param {HTMLCanvasElement} canvas
-   * @param {{ signal?: AbortSignal }} [options]
+   * @param {{ signal?: AbortSignal, frameTime?: number }} [options]
    */
-  static async create(canvas, { signal } = {}) {
+  static async create(canvas, { signal, frameTime = 60 } = {}) {
     signal?.throwIfAborted();
+    checkAmount("frameTime", frameTime, 1);
     if (typeof HTMLCanvasElement === "undefined") throw new TetralodError("no-webgpu", NO_PAGE);
     if (!(canvas instanceof HTMLCanvasElement)) {
       throw new TetralodError("bad-option", "`canvas` must be a canvas element");
@@ -69,7 +76,7 @@ export class Viewer extends EventTarget {
     signal?.throwIfAborted();
     const viewer = new Viewer(canvas);
     try {
-      await viewer.#start();
+      await viewer.#start(frameTime);
       signal?.throwIfAborted();
     } catch (error) {
       viewer.free();
@@ -81,20 +88,23 @@ export class Viewer extends EventTarget {
   /** @private Use `Viewer.create`. */
   constructor(canvas) {
     super();
+    setCaller(this, (method, args) => this.#remote.call(method, args));
     this.#canvas = canvas;
     const worker = new Worker(new URL("./viewer-worker.js", import.meta.url), { type: "module" });
     this.#remote = new Remote(webEndpoint(worker), (name, data) => this.#heard(name, data));
   }
 
-  async #start() {
+  async #start(frameTime) {
     const offscreen = handOver(this.#canvas);
     const [width, height] = pixels(this.#canvas.getBoundingClientRect());
-    const created = await this.#remote.call("create", [offscreen, width, height, devicePixelRatio], [offscreen]);
+    const args = [offscreen, width, height, devicePixelRatio, frameTime];
+    const created = await this.#remote.call("create", args, [offscreen]);
     this.#adapter = created.adapter;
     await this.#change({ scene: this.#scene });
     this.#observer = new ResizeObserver(([entry]) => {
       const size = entry.devicePixelContentBoxSize?.[0];
       const [w, h] = size ? [size.inlineSize, size.blockSize] : pixels(entry.contentRect);
+      this.#cover?.setAttribute("style", coverStyle(this.#canvas));
       this.#change({ size: [Math.max(1, w), Math.max(1, h), devicePixelRatio] });
     });
     try {
@@ -107,11 +117,38 @@ export class Viewer extends EventTarget {
 
   #heard(name, data) {
     if (name === "error") return this.#emit("error", reviveError(data));
+    if (name === "lost") return this.#restore(reviveError(data));
     if (name === "failed") return this.#failed(data.goal, reviveError(data.error));
     if (name === "camera") this.#camera = data;
     if (name === "legend") this.#legend = data;
     this.#emit(name, data);
     if (name === "stats" && data.done) this.#settle(data.goal, ({ resolve }) => resolve(data));
+  }
+
+  /**
+   * Opens a GPU in place of the one that was lost. Where a browser loses the process of the GPU, a canvas that was handed
+   * to a worker never shows a picture again (Chromium 148): another one covers it, and lets the pointer through.
+   */
+  async #restore(error) {
+    for (const wait of WAITS) {
+      await new Promise((resolve) => setTimeout(resolve, wait));
+      const cover = document.createElement("canvas");
+      cover.setAttribute("style", coverStyle(this.#canvas));
+      cover.ariaHidden = "true";
+      const offscreen = cover.transferControlToOffscreen();
+      const args = [offscreen, ...pixels(this.#canvas.getBoundingClientRect()), devicePixelRatio];
+      try {
+        const { adapter } = await this.#remote.call("restore", args, [offscreen]);
+        this.#cover?.remove();
+        this.#canvas.after(cover);
+        [this.#cover, this.#adapter] = [cover, adapter];
+        this.#emit("restored", { adapter });
+        return;
+      } catch (again) {
+        error = again;
+      }
+    }
+    this.#emit("error", error);
   }
 
   #failed(goal, error) {
@@ -237,6 +274,11 @@ export class Viewer extends EventTarget {
     return waiting.promise;
   }
 
+  /** Keeps the mesh as it is, wherever the camera goes and whatever is requested; with `false` it follows again. */
+  freeze(on = true) {
+    return this.#remote.call("freeze", [Boolean(on)]);
+  }
+
   #change(changes) {
     return this.#update.call(changes);
   }
@@ -296,8 +338,8 @@ export class Viewer extends EventTarget {
   }
 
   /** What is shown at a point of the canvas (−1 to 1, y upwards); `undefined` if nothing is there. */
-  probe(x, y) {
-    return this.#probe.call([x, y]);
+  pick(x, y) {
+    return this.#pick.call([x, y]);
   }
 
   /** The handle of the region at a point (−1 to 1, y upwards), or −1. */
@@ -312,9 +354,9 @@ export class Viewer extends EventTarget {
     return region;
   }
 
-  /** A hash of the current mesh: the same request gives the same hash on every machine. */
-  hash() {
-    return this.#remote.call("hash");
+  /** A copy of the mesh that is shown. */
+  mesh() {
+    return this.#remote.call("mesh");
   }
 
   /** Ends the worker. The canvas keeps its last picture and cannot be used again. */
@@ -344,6 +386,12 @@ function handOver(canvas) {
   } catch (error) {
     throw new TetralodError("bad-option", USED_CANVAS, { cause: error });
   }
+}
+
+/** The style of a canvas that covers another one. */
+function coverStyle({ offsetLeft, offsetTop, offsetWidth, offsetHeight }) {
+  const place = `left: ${offsetLeft}px; top: ${offsetTop}px; width: ${offsetWidth}px; height: ${offsetHeight}px`;
+  return `position: absolute; pointer-events: none; ${place}`;
 }
 
 function pixels({ width, height }) {

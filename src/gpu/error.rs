@@ -27,7 +27,8 @@ pub enum GpuError {
         /// The largest size that the device allows.
         limit: u64,
     },
-    /// The device is lost (driver reset, GPU unplugged, too little memory): create a new renderer.
+    /// The device is lost (driver reset, GPU unplugged, too little memory): make a new renderer, and give it to
+    /// [`Scene::set_renderer`](crate::scene::Scene::set_renderer).
     #[error("the GPU was lost: {0}; create the viewer again")]
     DeviceLost(String),
     /// The device refused an operation.

@@ -248,6 +248,14 @@ impl Renderer {
         self.wire.update(&self.context, boxes)
     }
 
+    /// Whether the device is well: it calls back at times of its own choice, so this is known between pictures, too.
+    ///
+    /// # Errors
+    /// If it is lost, or has refused something since the last call.
+    pub fn check(&self) -> Result<(), GpuError> {
+        self.context.check()
+    }
+
     /// Bytes of meshes and surfaces that were uploaded since the last call.
     pub fn take_uploaded(&self) -> u64 {
         self.context.take_uploaded()

@@ -87,6 +87,14 @@ impl Scene {
         }
     }
 
+    /// Draws with another renderer, as when the device of the one before is lost. All is computed and uploaded
+    /// again.
+    pub fn set_renderer(&mut self, renderer: Renderer) {
+        self.renderer = renderer;
+        self.objects = Objects::default();
+        self.is_stale = true;
+    }
+
     /// The renderer.
     pub fn renderer(&self) -> &Renderer {
         &self.renderer

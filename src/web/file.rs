@@ -7,7 +7,7 @@ use super::options::{Asked, asked};
 use super::results::{self, JsBlocks, JsProgress, JsStats};
 use crate::format::DecodeOptions;
 use crate::mt::MtInfo;
-use crate::refine::{RefineStats, View};
+use crate::refine::{RefineStats, Request, View};
 use crate::remote::{Remote, Step};
 use crate::session::{Progress, Session};
 use wasm_bindgen::JsValue;
@@ -29,6 +29,8 @@ pub struct File {
     remote: Remote,
     loader: Option<SharedLoader>,
     pub asked: Asked,
+    /// A budget of tetrahedra besides that of the request.
+    limit: Option<u32>,
 }
 
 impl File {
@@ -90,7 +92,7 @@ impl File {
     /// What `options` ask for; `camera` is the one of the viewer, if there is one.
     pub fn request(&mut self, options: &JsValue, camera: Option<&View>) -> Result<(), WebError> {
         let asked = asked(options, self.info()?, camera)?;
-        self.remote.request(&asked.request, &asked.custom)?;
+        self.remote.request(&self.limited(&asked.request), &asked.custom)?;
         self.session_mut().set_field(asked.field)?;
         self.asked = asked;
         Ok(())
@@ -99,7 +101,20 @@ impl File {
     /// What is asked for has changed a little.
     #[cfg(all(feature = "gpu", target_arch = "wasm32"))]
     pub fn request_again(&mut self) -> Result<(), WebError> {
-        Ok(self.remote.request(&self.asked.request, &self.asked.custom)?)
+        Ok(self.remote.request(&self.limited(&self.asked.request), &self.asked.custom)?)
+    }
+
+    fn limited(&self, request: &Request) -> Request {
+        let mut request = request.clone();
+        request.budget.tets = request.budget.tets.into_iter().chain(self.limit).min();
+        request
+    }
+
+    /// Holds the mesh to so many tetrahedra, whatever is asked for; none lets it be.
+    #[cfg(all(feature = "gpu", target_arch = "wasm32"))]
+    pub fn limit(&mut self, tets: Option<u32>) -> Result<(), WebError> {
+        self.limit = tets;
+        if self.session().info().is_none() { Ok(()) } else { self.request_again() }
     }
 
     /// Goes on towards what was asked for, for about so many milliseconds or so many updates; each that is

@@ -179,14 +179,25 @@ pub struct Changes {
     pub to: u32,
 }
 
+/// Setting a property on a fresh ordinary object cannot fail.
+pub fn set(object: &JsValue, name: &str, value: &JsValue) {
+    let _ = Reflect::set(object, &name.into(), value);
+}
+
 /// A copy of `mesh` outside wasm memory.
 pub fn mesh(mesh: &MeshView<'_>, changes: &Changes) -> JsMesh {
+    let arrays: JsMesh = mesh_arrays(mesh);
+    set(arrays.as_ref(), "changes", &ranges(changes));
+    arrays
+}
+
+/// The same for callers that do not follow its changes.
+pub fn mesh_arrays(mesh: &MeshView<'_>) -> JsMesh {
     object(&[
         ("positions", floats(mesh.positions.as_flattened())),
         ("field", floats(mesh.field)),
         ("tets", integers(mesh.tets.as_flattened())),
         ("neighbors", integers(mesh.neighbors.as_flattened())),
-        ("changes", ranges(changes)),
     ])
 }
 

@@ -14,7 +14,7 @@ use wasm_bindgen::prelude::wasm_bindgen;
 #[wasm_bindgen]
 #[derive(Default)]
 pub struct CoreSession {
-    file: File,
+    pub(super) file: File,
     /// How many meshes have been handed out.
     handed: u32,
 }
@@ -113,12 +113,7 @@ impl CoreSession {
         Ok(results::iso_surface(self.session_mut().isosurface(value)?))
     }
 
-    /// A hash of the current mesh, the same wherever the same request was made.
-    pub fn hash(&self) -> String {
-        self.file.hash()
-    }
-
-    pub(super) fn session_mut(&mut self) -> &mut Session {
+    fn session_mut(&mut self) -> &mut Session {
         self.file.session_mut()
     }
 
@@ -129,7 +124,7 @@ impl CoreSession {
         Ok(Changes { ranges: self.session_mut().take_changes(), to: self.handed })
     }
 
-    pub(super) fn known(&self) -> Result<&MtInfo, WebError> {
+    fn known(&self) -> Result<&MtInfo, WebError> {
         self.file.info()
     }
 }

@@ -10,7 +10,7 @@ use super::file::File;
 use super::loader::RangeLoader;
 use super::options::RefineOptions;
 use super::reader::read;
-use super::results::{self, JsBlocks, JsInfo, JsProgress, JsStats};
+use super::results::{self, JsBlocks, JsInfo, JsMesh, JsProgress, JsStats};
 use crate::geom::{Bounds, Camera, CameraState, ViewPreset};
 use crate::gpu::Renderer;
 use crate::refine::{Part, View};
@@ -33,7 +33,7 @@ const TICKS: usize = 6;
 /// An MT and its picture on a canvas.
 #[wasm_bindgen]
 pub struct Viewer {
-    file: File,
+    pub(super) file: File,
     /// What takes the place of `file` when its first bytes are here.
     next: Option<File>,
     scene: Scene,
@@ -43,6 +43,8 @@ pub struct Viewer {
     seen: View,
     /// Whether the mesh is not yet the one that was asked for.
     moving: bool,
+    /// Whether the mesh stays as it is.
+    is_frozen: bool,
     /// Whether the picture is out of date.
     is_stale: bool,
 }
@@ -99,21 +101,29 @@ fn plain<T: JsCast>(data: &impl Serialize) -> T {
     serde_wasm_bindgen::to_value(data).unwrap_or_default().unchecked_into()
 }
 
+/// A GPU that draws on a canvas.
+#[wasm_bindgen]
+pub struct Gpu(Renderer);
+
+#[wasm_bindgen]
+impl Gpu {
+    /// Opens the GPU for `canvas`, which must not have a context of another kind.
+    pub async fn open(canvas: web_sys::OffscreenCanvas, width: u32, height: u32) -> Result<Gpu, WebError> {
+        let target = wgpu::SurfaceTarget::OffscreenCanvas(canvas);
+        Ok(Self(Renderer::on_surface(target, [width, height]).await?))
+    }
+}
+
 #[wasm_bindgen]
 impl Viewer {
-    /// Opens the GPU for `canvas`, which must not have a context yet.
-    pub async fn create(
-        canvas: web_sys::OffscreenCanvas,
-        width: u32,
-        height: u32,
-        ratio: f32,
-    ) -> Result<Viewer, WebError> {
-        let target = wgpu::SurfaceTarget::OffscreenCanvas(canvas);
-        let renderer = Renderer::on_surface(target, [width, height]).await?;
+    /// Draws with `gpu`.
+    #[wasm_bindgen(constructor)]
+    pub fn new(gpu: Gpu, ratio: f32) -> Viewer {
+        let Gpu(renderer) = gpu;
         let camera = Camera::home(&Bounds::EMPTY, renderer.aspect());
         let mut scene = Scene::new(renderer);
         scene.set_pixel_ratio(ratio);
-        Ok(Self {
+        Self {
             file: File::default(),
             next: None,
             scene,
@@ -121,8 +131,26 @@ impl Viewer {
             ratio: f64::from(ratio),
             seen: View { matrix: [0.0; 16], viewport: [1.0; 2] },
             moving: false,
+            is_frozen: false,
             is_stale: true,
-        })
+        }
+    }
+
+    /// Draws with another GPU, after the one before was lost.
+    #[wasm_bindgen(js_name = setGpu)]
+    pub fn set_gpu(&mut self, gpu: Gpu) {
+        self.scene.set_renderer(gpu.0);
+        self.is_stale = true;
+    }
+
+    /// Fails if the GPU is lost.
+    pub fn check(&self) -> Result<(), WebError> {
+        Ok(self.scene.renderer().check()?)
+    }
+
+    /// Width and height of the canvas in pixels.
+    pub fn size(&self) -> Box<[u32]> {
+        Box::new(self.scene.renderer().size())
     }
 
     /// The GPU in words.
@@ -237,7 +265,22 @@ impl Viewer {
     /// Whether `step` has something to do.
     #[wasm_bindgen(getter)]
     pub fn moving(&self) -> bool {
+        !self.is_frozen && self.is_behind()
+    }
+
+    fn is_behind(&self) -> bool {
         self.moving || !self.file.asked.follows.is_empty() && self.view() != self.seen
+    }
+
+    /// Keeps the mesh as it is, whatever is asked for and wherever the camera goes; or lets it follow again.
+    pub fn freeze(&mut self, is_frozen: bool) {
+        self.is_frozen = is_frozen;
+    }
+
+    /// Holds the mesh to so many tetrahedra for a time, if the request allows more; `undefined` ends that.
+    pub fn limit(&mut self, tets: Option<u32>) -> Result<(), WebError> {
+        self.moving = self.file.session().info().is_some();
+        self.file.limit(tets)
     }
 
     /// Goes on towards the mesh that is wanted for about so many milliseconds.
@@ -251,9 +294,10 @@ impl Viewer {
         self.file.stats(&stats)
     }
 
-    /// A hash of the current mesh, the same wherever the same request was made.
-    pub fn hash(&self) -> String {
-        self.file.hash()
+    /// A copy of the mesh that is shown.
+    pub fn mesh(&mut self) -> Result<JsMesh, WebError> {
+        self.file.info()?;
+        Ok(results::mesh_arrays(&self.file.session_mut().view()))
     }
 
     /// Sets what is drawn: a [`SceneState`](crate::scene::SceneState) as a plain object.
@@ -289,7 +333,7 @@ impl Viewer {
 
     /// What is shown at a screen point: where it is, the value of each field, the size and the error of its tetrahedron; nothing if
     /// nothing is there.
-    pub fn probe(&mut self, x: f64, y: f64) -> Result<JsProbe, WebError> {
+    pub fn pick(&mut self, x: f64, y: f64) -> Result<JsProbe, WebError> {
         let nothing = || Ok(JsValue::UNDEFINED.unchecked_into());
         let ray = self.camera.ray(DVec2::new(x, y), self.aspect());
         let Some(point) = self.scene.pick(self.file.session_mut(), &ray) else { return nothing() };

@@ -1,5 +1,6 @@
 // One Chromium for the tests and the benchmark, with the flags that `webdriver.json` gives the wasm tests too.
 import { readFile } from "node:fs/promises";
+import { createServer } from "node:http";
 import { chromium } from "playwright-core";
 
 const config = JSON.parse(await readFile(new URL("../../webdriver.json", import.meta.url), "utf8"));
@@ -17,4 +18,32 @@ export function address() {
   const page = process.env.TETRALOD_PAGE;
   if (!page) throw new Error("TETRALOD_PAGE is not set: run this through `cargo xtask`");
   return page;
+}
+
+const TYPES = { html: "text/html", js: "text/javascript", css: "text/css", wasm: "application/wasm" };
+
+/**
+ * Serves the package under `/pkg/`, the demo page's files, and by `answer` all that is neither.
+ *
+ * @param {(request: import("node:http").IncomingMessage, response: import("node:http").ServerResponse) => void} answer
+ */
+export async function servePackage(answer) {
+  /** Names of the files of the package that were asked for. @type {string[]} */
+  const asked = [];
+  const server = createServer(async (request, response) => {
+    const { pathname } = new URL(request.url ?? "/", "http://x");
+    const [, inPackage] = /^\/pkg\/([\w.-]+)$/.exec(pathname) ?? [];
+    const own = inPackage ? `../../pkg/${inPackage}` : `../../www${pathname}`;
+    const content = /\.\w+$/.test(pathname) && (await readFile(new URL(own, import.meta.url)).catch(() => undefined));
+    if (inPackage) asked.push(inPackage);
+    if (!content) return answer(request, response);
+    response.writeHead(200, { "content-type": TYPES[pathname.split(".").pop() ?? ""] ?? "text/plain" }).end(content);
+  });
+  await new Promise((resolve) => server.listen(0, "127.0.0.1", () => resolve(undefined)));
+  const { port } = /** @type {import("node:net").AddressInfo} */ (server.address());
+  const close = () => {
+    server.closeAllConnections();
+    server.close();
+  };
+  return { address: `http://127.0.0.1:${port}/`, asked, close };
 }

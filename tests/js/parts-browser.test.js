@@ -1,14 +1,12 @@
 // The page in a real browser, on a file that is fetched in parts from a server that the test plays.
 import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
-import { createServer } from "node:http";
 import { after, before, test } from "node:test";
-import { launch } from "./browser.js";
+import { launch, servePackage } from "./browser.js";
 
 const folder = process.env.TETRALOD_FIXTURE;
 assert.ok(folder, "TETRALOD_FIXTURE is not set: run `cargo xtask test e2e`");
 const bytes = await readFile(`${folder}/blocks-half-edge.mt`);
-const TYPES = { html: "text/html", js: "text/javascript", css: "text/css", wasm: "application/wasm" };
 const PATIENCE = 60_000;
 
 let browser;
@@ -19,24 +17,17 @@ let works = true;
 let sent = 0;
 
 before(async () => {
-  server = createServer(async (request, response) => {
-    const { pathname } = new URL(request.url, "http://x");
-    if (pathname === "/model.mt") return sendModel(request, response);
-    const name = pathname === "/" ? "index.html" : pathname.slice(1);
-    const inPackage = name.startsWith("pkg/");
-    const file = new URL(inPackage ? `../../${name}` : `../../www/${name}`, import.meta.url);
-    const content = await readFile(file).catch(() => undefined);
-    if (!content) return response.writeHead(404).end();
-    response.writeHead(200, { "content-type": TYPES[name.split(".").pop()] ?? "text/plain" }).end(content);
+  server = await servePackage((request, response) => {
+    if (request.url === "/model.mt") return sendModel(request, response);
+    const home = new URL("../../www/index.html", import.meta.url);
+    readFile(home).then((page) => response.setHeader("content-type", "text/html").end(page));
   });
-  await new Promise((resolve) => server.listen(0, "127.0.0.1", resolve));
-  base = `http://127.0.0.1:${server.address().port}/`;
+  base = server.address;
   browser = await launch();
 });
 
 after(async () => {
   await browser?.close();
-  server?.closeAllConnections();
   server?.close();
 });
 

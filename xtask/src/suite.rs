@@ -232,8 +232,10 @@ fn e2e() -> Result<()> {
     let server = demo::start_server(&tetralod, 0)?;
     shell::run(node_test("ranges-browser.test.js").env("CHROMIUM", &browser.chromium))?;
     with_fixture(|| {
-        let mut command = node_test("parts-browser.test.js");
-        shell::run(fixture_env(command.env("CHROMIUM", &browser.chromium)))
+        for name in ["parts-browser.test.js", "viewer-browser.test.js"] {
+            shell::run(fixture_env(node_test(name).env("CHROMIUM", &browser.chromium)))?;
+        }
+        Ok(())
     })?;
     let mut command = node_test("e2e.test.js");
     shell::run(command.env("TETRALOD_PAGE", &server.address).env("CHROMIUM", browser.chromium))

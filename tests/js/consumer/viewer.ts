@@ -8,7 +8,7 @@ import {
   type PlaneState,
   type ViewerFrame,
   type ViewerProgress,
-  type ViewerProbe,
+  type PickedPoint,
   type ViewerRefineOptions,
   type ViewerState,
   type ViewerStats,
@@ -49,7 +49,11 @@ export async function page(canvas: HTMLCanvasElement): Promise<void> {
   await Promise.all([finished, viewer.settled(), viewer.retry(), viewer.set({ region: box, volume: null })]);
   const state: ViewerState = viewer.state;
   await viewer.set(JSON.parse(JSON.stringify(state)) as ViewerState);
-  const found: ViewerProbe | undefined = await viewer.probe(0, 0);
+  await Promise.all([viewer.freeze(), viewer.freeze(false)]);
+  const [{ tets }, slice] = await Promise.all([viewer.mesh(), viewer.slice([0, 0, 1], 0.5)]);
+  [tets, slice.indices] satisfies Uint32Array[];
+  await Viewer.create(canvas, { frameTime: Infinity });
+  const found: PickedPoint | undefined = await viewer.pick(0, 0);
   const texts: string[] = [viewer.adapter, viewer.legend?.label ?? "", `${found?.values["p"]}`, await viewer.hash()];
   texts.length satisfies number;
   viewer.free();
