@@ -22,6 +22,9 @@ mod target;
 mod types;
 mod wire;
 
+/// The version of wgpu that the renderer takes devices of.
+pub use wgpu;
+
 pub use context::Context;
 pub use error::GpuError;
 pub use renderer::Renderer;

@@ -180,6 +180,20 @@ impl Scene {
         Ok(self.renderer.draw(camera, &self.look)?)
     }
 
+    /// Draws a picture into a view of a texture, as [`Renderer::render`] does.
+    ///
+    /// # Errors
+    /// As [`Scene::draw`].
+    pub fn render(
+        &mut self,
+        view: &wgpu::TextureView,
+        session: &mut Session,
+        camera: &Camera,
+    ) -> Result<(), SceneError> {
+        self.place_eye(session, camera);
+        Ok(self.renderer.render(view, camera, &self.look)?)
+    }
+
     /// Draws a picture that is the mean of `samples` and reads it back, as [`Renderer::picture_with`] does.
     ///
     /// # Errors
