@@ -211,6 +211,11 @@ const methods = {
     return Array.from(box);
   },
 
+  keep() {
+    viewer.keep();
+    invalidate();
+  },
+
   freeze(on) {
     viewer.freeze(on);
     invalidate();

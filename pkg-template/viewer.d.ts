@@ -181,6 +181,17 @@ export interface ArrowState {
   constant?: boolean;
 }
 
+/** Two meshes beside each other. */
+export interface CompareState {
+  /** Where the kept one ends and the current one begins, as a fraction of the width; 0.5 without it. */
+  at?: number;
+  /**
+   * Colours the current one by its field minus that of the kept one, with a range that is symmetric around 0; `"coolwarm"` or
+   * another diverging map shows it best.
+   */
+  difference?: boolean;
+}
+
 /** The colours of values. */
 export interface ColourState {
   /** The name of a colour map, such as `"viridis"`, `"turbo"`, `"coolwarm"` or `"grey"`. */
@@ -226,6 +237,8 @@ export interface SceneState {
   shade?: number;
   /** Whether the box around the domain is drawn; it is without it. */
   outline?: boolean;
+  /** The mesh that was kept by `keep` on the left, the current one on the right. */
+  compare?: CompareState;
   /** A box with handles. It is a picture only: pass `box` to `refine` to use it. */
   region?: ArrayLike<number>;
 }
@@ -334,6 +347,16 @@ export class Viewer extends EventTargetWithMeshTools {
    * await viewer.refine({ view: { pixels: 1, outside: "10%" }, maxTets: 300_000 });
    */
   refine(options?: ViewerRefineOptions): Promise<ViewerStats>;
+  /**
+   * Keeps a copy of the mesh as it is, with all fields, in place of one that was kept before; another volume forgets it.
+   *
+   * @example
+   * await viewer.refine({ error: "10%" });
+   * await viewer.keep();
+   * await viewer.refine({ error: "1%" });
+   * await viewer.set({ compare: { at: 0.5 } }); // coarse on the left, fine on the right
+   */
+  keep(): Promise<void>;
   /**
    * Keeps the mesh as it is, wherever the camera goes and whatever is requested, to look at it from elsewhere; with `false`
    * it follows again. Requests wait meanwhile.

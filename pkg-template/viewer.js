@@ -274,6 +274,11 @@ export class Viewer extends withMeshTools(EventTarget) {
     return waiting.promise;
   }
 
+  /** Keeps a copy of the mesh as it is, which `compare` shows beside later ones. */
+  keep() {
+    return this.#remote.call("keep");
+  }
+
   /** Keeps the mesh as it is, wherever the camera goes and whatever is requested; with `false` it follows again. */
   freeze(on = true) {
     return this.#remote.call("freeze", [Boolean(on)]);

@@ -4,15 +4,15 @@ use crate::gpu::GpuError;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
-/// An open device.
-#[derive(Debug)]
+/// An open device. Copies are of the same one.
+#[derive(Clone, Debug)]
 pub struct Context {
     pub(super) adapter: wgpu::Adapter,
     pub(super) device: wgpu::Device,
     pub(super) queue: wgpu::Queue,
     trouble: Trouble,
     /// Bytes written to buffers since the last question.
-    uploaded: AtomicU64,
+    uploaded: Arc<AtomicU64>,
 }
 
 /// The first thing that the device complained about; it calls back at times of its own choice.
@@ -105,7 +105,7 @@ impl Context {
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
             refused.note(GpuError::Refused(error.to_string()));
         }));
-        Self { adapter, device, queue, trouble, uploaded: AtomicU64::new(0) }
+        Self { adapter, device, queue, trouble, uploaded: Arc::default() }
     }
 
     /// Writes to a buffer, and counts what is written.

@@ -4,6 +4,13 @@ use crate::gpu::Context;
 use crate::gpu::pipeline::{Binding, Common, Output, PipelineSpec, group, group_layout};
 use crate::gpu::target::{Images, MEAN};
 
+/// Where a finished picture is shown.
+pub(super) struct PictureView<'a> {
+    pub(super) view: &'a wgpu::TextureView,
+    /// The only part that is changed: x, y, width and height in pixels.
+    pub(super) part: Option<[u32; 4]>,
+}
+
 #[derive(Debug)]
 pub(super) struct Presenter {
     mean: wgpu::RenderPipeline,
@@ -49,15 +56,18 @@ impl Presenter {
         common: &Common,
         images: &Images,
         count: u32,
-        target: &wgpu::TextureView,
+        target: &PictureView<'_>,
     ) {
         let load =
             if count == 0 { wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT) } else { wgpu::LoadOp::Load };
         let clear = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
-        let steps =
-            [(&self.mean, &images.resolved, &images.mean, load), (&self.shown, &images.mean, target, clear)];
+        let shown = if target.part.is_some() { wgpu::LoadOp::Load } else { clear };
+        let steps = [
+            (&self.mean, &images.resolved, &images.mean, load, None),
+            (&self.shown, &images.mean, target.view, shown, target.part),
+        ];
         let weight = 1.0 / f64::from(count + 1);
-        for (pipeline, from, to, load) in steps {
+        for (pipeline, from, to, load, part) in steps {
             let resources =
                 [wgpu::BindingResource::TextureView(from), wgpu::BindingResource::Sampler(&self.sampler)];
             let ops = wgpu::Operations { load, store: wgpu::StoreOp::Store };
@@ -71,6 +81,9 @@ impl Presenter {
                 })],
                 ..Default::default()
             });
+            if let Some([x, y, width, height]) = part {
+                pass.set_scissor_rect(x, y, width, height);
+            }
             pass.set_pipeline(pipeline);
             pass.set_blend_constant(wgpu::Color { r: weight, g: weight, b: weight, a: weight });
             pass.set_bind_group(0, &common.group, &[]);

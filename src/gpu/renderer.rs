@@ -6,7 +6,7 @@ use crate::gpu::composite::Composite;
 use crate::gpu::fragments::FragmentLists;
 use crate::gpu::mesh::MeshBuffers;
 use crate::gpu::pipeline::{Common, Output, PipelineSpec};
-use crate::gpu::present::Presenter;
+use crate::gpu::present::{PictureView, Presenter};
 use crate::gpu::surface::{Surface, SurfacePipelines};
 use crate::gpu::target::{Picture, Target};
 use crate::gpu::types::Frame;
@@ -43,6 +43,9 @@ pub struct Renderer {
     in_flight: Arc<AtomicU32>,
     /// What the last picture showed, and of how many it is the mean.
     last: Option<(Camera, Look, u32)>,
+    /// What draws the left part of pictures, and how wide that is, as a fraction.
+    beside: Option<Box<Renderer>>,
+    split: f64,
 }
 
 impl Renderer {
@@ -106,12 +109,36 @@ impl Renderer {
             presenter: Presenter::new(&context, &common),
             in_flight: Arc::default(),
             last: None,
+            beside: None,
+            split: 0.0,
             context,
             target,
             common,
         };
         renderer.context.check()?;
         Ok(renderer)
+    }
+
+    /// Another renderer on the same device, with things of its own: the left part of pictures is its, as wide as
+    /// [`Renderer::set_split`] says. Size, scale, camera and look are those of this one.
+    ///
+    /// # Errors
+    /// If the device refuses what it takes.
+    pub fn beside(&mut self) -> Result<&mut Self, GpuError> {
+        if self.beside.is_none() {
+            let other = Self::with_device(self.context.clone(), self.target.size, self.target.format)?;
+            self.beside = Some(Box::new(other));
+        }
+        self.beside.as_deref_mut().ok_or_else(|| GpuError::Refused("it was just made".to_owned()))
+    }
+
+    /// How wide the left part is that [`Renderer::beside`] draws, as a fraction of the width, 0 to 1; at 0 that renderer and
+    /// all of its things are freed.
+    pub fn set_split(&mut self, split: f64) {
+        self.split = if split.is_finite() { split.clamp(0.0, 1.0) } else { 0.0 };
+        if self.split == 0.0 {
+            self.beside = None;
+        }
     }
 
     /// The GPU and its driver in words.
@@ -263,7 +290,8 @@ impl Renderer {
 
     /// Bytes of memory on the GPU that the mesh and the lists of pixels take.
     pub fn gpu_bytes(&self) -> u64 {
-        self.mesh.bytes() + self.lists.bytes()
+        let beside = self.beside.as_ref().map_or(0, |other| other.gpu_bytes());
+        self.mesh.bytes() + self.lists.bytes() + beside
     }
 
     /// Draws a picture. `false` when the target is not available, such as a hidden canvas.
@@ -316,7 +344,9 @@ impl Renderer {
     /// Whether the last picture lacked room for all that is not opaque: then it must be drawn again. It is known some time after
     /// the picture.
     pub fn is_short(&mut self) -> bool {
-        self.lists.is_short(&self.context)
+        // Both must be asked: to ask is what makes room.
+        let beside = self.beside.as_mut().is_some_and(|other| other.is_short());
+        self.lists.is_short(&self.context) | beside
     }
 
     fn draw_on(
@@ -336,17 +366,24 @@ impl Renderer {
         };
         let own = picture.as_ref().map(Picture::view);
         let Some(view) = given.or(own.as_ref()) else { return Ok(false) };
-        self.common.write(
-            &self.context,
-            &Frame::new(camera, &self.scaled(look), self.target.drawn_size, shift(count)),
-        );
-        self.encode(view, look, count);
+        self.encode(&PictureView { view, part: None }, camera, look, count);
+        self.draw_beside(view, camera, look, count);
         if let Some(Picture::Canvas(texture)) = picture {
             self.context.queue.present(texture);
         }
         self.last = Some((*camera, look.clone(), count + 1));
         self.context.check()?;
         Ok(true)
+    }
+
+    /// Draws the left part.
+    fn draw_beside(&mut self, view: &wgpu::TextureView, camera: &Camera, look: &Look, count: u32) {
+        let ([width, height], [drawn, _]) = (self.target.size, self.target.drawn_size);
+        let part = (self.split * f64::from(width)).round() as u32;
+        let Some(other) = self.beside.as_mut().filter(|_| part > 0) else { return };
+        other.resize([width, height]);
+        other.set_scale(f64::from(drawn) / f64::from(width));
+        other.encode(&PictureView { view, part: Some([0, 0, part, height]) }, camera, look, count);
     }
 
     /// What makes lines as wide on the target as `look` wants them.
@@ -356,7 +393,9 @@ impl Renderer {
     }
 
     /// Draws into `view`, as number `count` of pictures whose mean is shown.
-    fn encode(&mut self, view: &wgpu::TextureView, look: &Look, count: u32) {
+    fn encode(&mut self, view: &PictureView<'_>, camera: &Camera, look: &Look, count: u32) {
+        let frame = Frame::new(camera, &self.scaled(look), self.target.drawn_size, shift(count));
+        self.common.write(&self.context, &frame);
         let descriptor = wgpu::CommandEncoderDescriptor { label: Some("picture") };
         let mut encoder = self.context.device.create_command_encoder(&descriptor);
         let has_lists = self.composite.has_volume() || self.surfaces.values().any(Surface::is_listed);

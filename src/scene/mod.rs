@@ -3,12 +3,13 @@
 //! [`SceneState`] says what is shown, as plain data. [`Scene::update`] computes what is out of date, and hands the renderer what has
 //! changed; nothing is computed that is not shown.
 
+mod kept;
 mod objects;
 mod state;
 
 pub use state::{
-    ArrowState, Background, BoundaryState, CellKind, CellState, Colour, ColourState, IsosurfaceState,
-    MapName, PlaneState, SceneState, SliceState, StreamlineState, VolumeState,
+    ArrowState, Background, BoundaryState, CellKind, CellState, Colour, ColourState, CompareState,
+    IsosurfaceState, MapName, PlaneState, SceneState, SliceState, StreamlineState, VolumeState,
 };
 
 use crate::geom::{Bounds, Camera, Ray};
@@ -16,7 +17,8 @@ use crate::gpu::{BoxLines, GpuError, Look, MOST_CLIPS, Renderer};
 use crate::session::{Session, SessionError};
 use crate::view::{ClipPlane, ColourScale, Probe, ScaleError};
 use glam::DVec3;
-use objects::Objects;
+use kept::Kept;
+use objects::{Objects, Shown};
 use thiserror::Error;
 
 /// The outline of the domain, on a dark and on a light background.
@@ -67,6 +69,7 @@ pub struct Scene {
     renderer: Renderer,
     state: SceneState,
     objects: Objects,
+    kept: Option<Kept>,
     /// The box around the base mesh, once it is there.
     bounds: Option<Bounds>,
     look: Look,
@@ -81,6 +84,7 @@ impl Scene {
             renderer,
             state: SceneState::default(),
             objects: Objects::default(),
+            kept: None,
             bounds: None,
             look: Look::default(),
             is_stale: true,
@@ -92,7 +96,22 @@ impl Scene {
     pub fn set_renderer(&mut self, renderer: Renderer) {
         self.renderer = renderer;
         self.objects = Objects::default();
+        if let Some(kept) = &mut self.kept {
+            kept.objects = Objects::default();
+        }
         self.is_stale = true;
+    }
+
+    /// Keeps a copy of the mesh as it is, with all of its fields, to be compared with later ones: see
+    /// [`SceneState::compare`]. It takes the place of one that was kept before.
+    ///
+    /// # Errors
+    /// If nothing has arrived yet.
+    pub fn keep(&mut self, session: &mut Session) -> Result<(), SceneError> {
+        self.renderer.set_split(0.0);
+        self.kept = Some(Kept::of(session)?);
+        self.is_stale = true;
+        Ok(())
     }
 
     /// The renderer.
@@ -130,6 +149,8 @@ impl Scene {
     pub fn forget(&mut self) -> Result<(), SceneError> {
         self.bounds = None;
         self.is_stale = true;
+        self.kept = None;
+        self.renderer.set_split(0.0);
         self.objects.clear(&mut self.renderer)?;
         Ok(())
     }
@@ -167,8 +188,31 @@ impl Scene {
             self.look = Look { pixel_ratio: self.look.pixel_ratio, ..look(&self.state, &bounds) };
             self.renderer.set_boxes(&boxes(&self.state, &bounds))?;
         }
-        let changed = self.objects.update(&mut self.renderer, session, &self.state, &bounds, is_stale)?;
+        let other =
+            self.kept.as_ref().filter(|_| self.state.compare.is_some_and(|compare| compare.difference));
+        let shown = Shown {
+            state: &self.state,
+            bounds: &bounds,
+            other: other.map(|kept| kept.view(session.field())),
+        };
+        let changed = self.objects.update(&mut self.renderer, session, &shown, is_stale)?;
+        if is_stale {
+            self.update_kept(session, &bounds)?;
+        }
         Ok(changed || is_stale)
+    }
+
+    /// Shows the mesh that was kept beside the current one, if it is to be shown.
+    fn update_kept(&mut self, session: &Session, bounds: &Bounds) -> Result<(), SceneError> {
+        let at = self.state.compare.map_or(0.0, |compare| compare.at);
+        let (Some(kept), Some(info), true) = (&mut self.kept, session.info(), at > 0.0) else {
+            self.renderer.set_split(0.0);
+            return Ok(());
+        };
+        self.renderer.set_split(at);
+        let other = self.renderer.beside()?;
+        other.set_boxes(&boxes(&self.state, bounds))?;
+        kept.update(other, info, session.field(), &self.state, bounds)
     }
 
     /// Draws a picture; `false` when the target is not available, such as a hidden canvas.
@@ -252,6 +296,9 @@ fn check(state: &SceneState) -> Result<(), SceneError> {
                 "must be six numbers, x0, y0, z0, x1, y1, z1, each of the first at most that of the last";
             return Err(SceneError::state(what, problem));
         }
+    }
+    if state.compare.is_some_and(|compare| !(0.0..=1.0).contains(&compare.at)) {
+        return Err(SceneError::state("compare.at", "must be a fraction of the width, 0 to 1"));
     }
     let planes = state.clips.len() + if state.clip_box.is_some() { 6 } else { 0 };
     if planes > MOST_CLIPS {

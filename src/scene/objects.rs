@@ -4,13 +4,13 @@ use super::state::{ArrowState, CellKind, CellState, ColourState, IsosurfaceState
 use super::{Legend, SceneError, SceneState, SliceState, VolumeState, clips};
 use crate::geom::{Bounds, Ray};
 use crate::gpu::{CellShape, CellStyle, Colouring, EdgeLook, Lighting, Renderer, SIDES, Style};
-use crate::mt::MtInfo;
+use crate::mt::{MeshChanges, MtInfo};
 use crate::session::{Session, TetQuantity};
 use crate::view::{
-    ArrowLength, ArrowOptions, BoundarySurface, ClipPlane, ColourScale, IsoSurface, Medium, MeshView, Probe,
-    Slice, Solids, TraceOptions, Tracer, Triangles, TubeOptions, first_hit, first_hit_in,
+    ArrowLength, ArrowOptions, BoundarySurface, ClipPlane, ColourScale, Difference, IsoSurface, Medium,
+    MeshView, Probe, Slice, Solids, TraceOptions, Tracer, Triangles, TubeOptions, first_hit, first_hit_in,
 };
-use std::ops::Range;
+use std::borrow::Cow;
 
 /// Numbers of surfaces in the renderer: those of lists begin at these.
 const ISOSURFACES: u32 = 0;
@@ -27,11 +27,14 @@ pub(super) struct Objects {
     slice: Slice,
     boundary: BoundarySurface,
     solids: Solids,
-    values: Vec<f32>,
+    /// A number for each tetrahedron.
+    pub values: Vec<f32>,
     /// How many surfaces of each list the renderer has.
     slices: u32,
     caps: u32,
     legend: Option<Legend>,
+    /// Whether the mesh of the renderer has the difference to another mesh in place of its field.
+    shows_difference: bool,
 }
 
 #[derive(Debug, Default)]
@@ -41,15 +44,36 @@ struct Isosurface {
     is_whole: bool,
 }
 
+/// What is to be shown of a session's mesh.
+pub(super) struct Shown<'a> {
+    pub state: &'a SceneState,
+    pub bounds: &'a Bounds,
+    /// The mesh whose field is taken from that of the session's.
+    pub other: Option<MeshView<'a>>,
+}
+
+impl Shown<'_> {
+    /// What colours tetrahedra; none for the field.
+    fn quantity(&self) -> Result<Option<TetQuantity>, SceneError> {
+        self.state.cells.as_ref().map_or(Ok(None), quantity)
+    }
+}
+
 /// What an update reads.
-struct Input<'a> {
-    mesh: MeshView<'a>,
-    fields: &'a dyn Fn(usize) -> Vec<f32>,
-    info: &'a MtInfo,
-    /// The number of the field of `mesh`.
-    shown: usize,
-    state: &'a SceneState,
-    bounds: &'a Bounds,
+pub(super) struct Input<'a> {
+    /// Its field colours things: that of the mesh, or the difference to another mesh.
+    pub mesh: MeshView<'a>,
+    /// The field of the mesh, which isosurfaces follow.
+    pub field: &'a [f32],
+    /// The largest absolute value of the difference, if that is shown.
+    pub largest_difference: Option<f64>,
+    pub fields: &'a dyn Fn(usize) -> Vec<f32>,
+    pub info: &'a MtInfo,
+    /// The number of the field.
+    pub shown: usize,
+    pub state: &'a SceneState,
+    pub bounds: &'a Bounds,
+    pub changes: &'a MeshChanges,
 }
 
 impl Input<'_> {
@@ -66,9 +90,19 @@ impl Input<'_> {
 
     /// The colours of a field; the range of the state is for the field that is shown.
     fn scale(&self, field: usize) -> Result<ColourScale, SceneError> {
+        if let Some(largest) = self.largest_difference.filter(|_| field == self.shown) {
+            let most = if largest > 0.0 { largest } else { 1.0 };
+            return scale(&ColourState { log: false, ..self.state.colours.clone() }, None, [-most, most]);
+        }
         let field_info = &self.info.fields[field];
         let own = [field_info.min, field_info.max];
         scale(&self.state.colours, if field == self.shown { self.state.colours.range } else { None }, own)
+    }
+
+    /// What colours by a field: its values, or the difference.
+    fn values(&self, field: usize) -> Cow<'_, [f32]> {
+        let is_difference = field == self.shown && self.largest_difference.is_some();
+        if is_difference { self.mesh.field.into() } else { (self.fields)(field).into() }
     }
 
     fn vectors(&self, what: &str, names: &[String; 3]) -> Result<[Vec<f32>; 3], SceneError> {
@@ -118,30 +152,61 @@ impl Objects {
         &mut self,
         renderer: &mut Renderer,
         session: &mut Session,
-        state: &SceneState,
-        bounds: &Bounds,
+        shown: &Shown<'_>,
         is_stale: bool,
     ) -> Result<bool, SceneError> {
-        let changes = session.take_changes();
+        let mut changes = session.take_changes();
         let is_moved = !changes.vertices.is_empty() || !changes.tets.is_empty();
         if !is_moved && !is_stale {
             return Ok(false);
         }
-        self.update_cells(renderer, session, state)?;
-        let shown = session.field();
+        if let Some(quantity) = shown.quantity()? {
+            session.tet_quantity_into(quantity, &mut self.values)?;
+        }
+        let field = session.field();
         let session = &*session;
         let (mesh, Some(info)) = (session.last_view(), session.info()) else { return Ok(false) };
+        let difference = shown.other.as_ref().and_then(|other| Difference::of(&mesh, *other));
+        if self.shows_difference || difference.is_some() {
+            // Each point has another value.
+            changes.vertices = MeshChanges::of_all_vertices(mesh.positions.len()).vertices;
+        }
+        self.shows_difference = difference.is_some();
         let fields = |field| session.values(field);
-        let input = Input { mesh, fields: &fields, info, shown, state, bounds };
-        self.update_volume(renderer, &input, is_stale)?;
-        renderer.update_mesh(&input.mesh, Some([&changes.vertices, &changes.tets]))?;
-        self.update_isosurfaces(renderer, &input, &changes.vertices, &changes.tets)?;
-        self.update_slices(renderer, &input)?;
-        self.update_boundary(renderer, &input)?;
-        self.update_streamlines(renderer, &input)?;
-        self.update_arrows(renderer, &input)?;
-        self.update_legend(&input)?;
+        let (values, largest) = difference.map(|of| (of.values, of.largest)).unzip();
+        let coloured = MeshView { field: values.as_deref().unwrap_or(mesh.field), ..mesh };
+        let input = Input {
+            state: shown.state,
+            bounds: shown.bounds,
+            mesh: coloured,
+            field: mesh.field,
+            largest_difference: largest,
+            fields: &fields,
+            info,
+            shown: field,
+            changes: &changes,
+        };
+        self.update_from(renderer, &input, is_stale)?;
         Ok(true)
+    }
+
+    /// Computes what has changed of one mesh; the values of its tetrahedra are there if they are shown.
+    pub(super) fn update_from(
+        &mut self,
+        renderer: &mut Renderer,
+        input: &Input<'_>,
+        is_stale: bool,
+    ) -> Result<(), SceneError> {
+        self.update_cells(renderer, input)?;
+        self.update_volume(renderer, input, is_stale)?;
+        let MeshChanges { vertices, tets } = input.changes;
+        renderer.update_mesh(&input.mesh, Some([vertices, tets]))?;
+        self.update_isosurfaces(renderer, input)?;
+        self.update_slices(renderer, input)?;
+        self.update_boundary(renderer, input)?;
+        self.update_streamlines(renderer, input)?;
+        self.update_arrows(renderer, input)?;
+        self.update_legend(input)
     }
 
     /// The nearest point along a ray of what is shown.
@@ -185,7 +250,8 @@ impl Objects {
         input: &Input<'_>,
         is_stale: bool,
     ) -> Result<(), SceneError> {
-        if !is_stale {
+        // The colours of a difference are those of its range, which changes with the mesh.
+        if !is_stale && input.largest_difference.is_none() {
             return Ok(());
         }
         let Some(volume) = &input.state.volume else { return Ok(renderer.set_volume(None)?) };
@@ -193,13 +259,9 @@ impl Objects {
         Ok(renderer.set_volume(Some((&medium, if volume.clipped { u32::MAX } else { 0 })))?)
     }
 
-    fn update_isosurfaces(
-        &mut self,
-        renderer: &mut Renderer,
-        input: &Input<'_>,
-        vertices: &[Range<u32>],
-        tets: &[Range<u32>],
-    ) -> Result<(), SceneError> {
+    fn update_isosurfaces(&mut self, renderer: &mut Renderer, input: &Input<'_>) -> Result<(), SceneError> {
+        let MeshChanges { vertices, tets } = input.changes;
+        let mesh = MeshView { field: input.field, ..input.mesh };
         let wanted = input.state.isosurfaces.len();
         for gone in wanted..self.isosurfaces.len() {
             renderer.remove_surface(ISOSURFACES + gone as u32);
@@ -210,11 +272,12 @@ impl Objects {
             (ISOSURFACES..).zip(self.isosurfaces.iter_mut().zip(&input.state.isosurfaces))
         {
             let value = state.value.unwrap_or_else(|| f64::midpoint(field.min, field.max));
-            own.surface.update(&input.mesh, &[value], vertices, tets);
+            own.surface.update(&mesh, &[value], vertices, tets);
             let changes = own.surface.take_changes();
-            let coloured = state.field.as_ref().map(|_| input.field("isosurfaces", state.field.as_ref()));
-            let coloured = coloured.transpose()?;
-            let values = coloured.map(|field| own.surface.interpolate(&input.mesh, &(input.fields)(field)));
+            let is_coloured = state.field.is_some() || input.largest_difference.is_some();
+            let coloured =
+                is_coloured.then(|| input.field("isosurfaces", state.field.as_ref())).transpose()?;
+            let values = coloured.map(|field| own.surface.interpolate(&mesh, &input.values(field)));
             let is_whole = std::mem::replace(&mut own.is_whole, false) && values.is_none();
             let mut triangles = Triangles::from(&own.surface);
             triangles.values = values.as_deref().unwrap_or_default();
@@ -301,29 +364,19 @@ impl Objects {
         Ok(())
     }
 
-    fn update_cells(
-        &mut self,
-        renderer: &mut Renderer,
-        session: &mut Session,
-        state: &SceneState,
-    ) -> Result<(), SceneError> {
-        let Some(cells) = &state.cells else {
+    fn update_cells(&mut self, renderer: &mut Renderer, input: &Input<'_>) -> Result<(), SceneError> {
+        let Some(cells) = &input.state.cells else {
             renderer.set_cells(None);
             return Ok(());
         };
         let quantity = quantity(cells)?;
-        let own = match quantity {
-            Some(quantity) => {
-                session.tet_quantity_into(quantity, &mut self.values)?;
+        let scale = match quantity {
+            Some(_) => {
                 renderer.set_cell_values(&self.values)?;
-                range(&self.values)
+                scale(&input.state.colours, None, range(&self.values))?
             }
-            None => {
-                let field = session.info().and_then(|info| info.fields.get(session.field()));
-                field.map_or([0.0, 1.0], |field| [field.min, field.max])
-            }
+            None => input.scale(input.shown)?,
         };
-        let scale = scale(&state.colours, if quantity.is_none() { state.colours.range } else { None }, own)?;
         self.legend = quantity.map(|quantity| Legend { label: quantity.name().to_owned(), scale });
         renderer.set_cells(Some(&cell_style(cells, scale, quantity.is_some())));
         Ok(())
@@ -404,13 +457,16 @@ impl Objects {
             || state.boundary.as_ref().is_some_and(|boundary| boundary.colour.is_none())
             || state.cells.is_some();
         let own = state.isosurfaces.iter().find_map(|surface| surface.field.as_ref());
+        let is_mapped = is_mapped || input.largest_difference.is_some();
         let field = if is_mapped { Some(input.shown) } else { None };
         let field = match (field, own) {
             (None, Some(name)) => Some(input.field("isosurfaces", Some(name))?),
             (field, _) => field,
         };
         let legend = |field: usize| {
-            let label = input.info.fields[field].name.clone();
+            let name = &input.info.fields[field].name;
+            let is_difference = field == input.shown && input.largest_difference.is_some();
+            let label = if is_difference { format!("difference of {name}") } else { name.clone() };
             input.scale(field).map(|scale| Legend { label, scale })
         };
         self.legend = field.map(legend).transpose()?;
@@ -419,7 +475,7 @@ impl Objects {
 }
 
 /// The quantity that colours tetrahedra; none for the field.
-fn quantity(cells: &CellState) -> Result<Option<TetQuantity>, SceneError> {
+pub(super) fn quantity(cells: &CellState) -> Result<Option<TetQuantity>, SceneError> {
     if cells.colour_by == "field" {
         return Ok(None);
     }

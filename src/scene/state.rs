@@ -39,6 +39,8 @@ pub struct SceneState {
     pub outline: bool,
     /// A box with handles: `[x0, y0, z0, x1, y1, z1]`. A picture only.
     pub region: Option<[f64; 6]>,
+    /// The mesh beside the one that was kept: see [`Scene::keep`](super::Scene::keep).
+    pub compare: Option<CompareState>,
 }
 
 impl Default for SceneState {
@@ -58,6 +60,7 @@ impl Default for SceneState {
             shade: 0.5,
             outline: true,
             region: None,
+            compare: None,
         }
     }
 }
@@ -303,6 +306,23 @@ pub struct ArrowState {
     pub field: Option<String>,
     /// Whether all have the same length.
     pub constant: bool,
+}
+
+/// The mesh that was kept on the left, the current one on the right.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "camelCase")]
+pub struct CompareState {
+    /// Where the one ends and the other begins, as a fraction of the width.
+    pub at: f64,
+    /// Whether the current mesh is coloured by its field minus that of the mesh that was kept, with a range of colours
+    /// that is symmetric around 0.
+    pub difference: bool,
+}
+
+impl Default for CompareState {
+    fn default() -> Self {
+        Self { at: 0.5, difference: false }
+    }
 }
 
 /// The colours of values.

@@ -272,6 +272,12 @@ impl Viewer {
         self.moving || !self.file.asked.follows.is_empty() && self.view() != self.seen
     }
 
+    /// Keeps a copy of the mesh, to be compared with later ones.
+    pub fn keep(&mut self) -> Result<(), WebError> {
+        self.is_stale = true;
+        Ok(self.scene.keep(self.file.session_mut())?)
+    }
+
     /// Keeps the mesh as it is, whatever is asked for and wherever the camera goes; or lets it follow again.
     pub fn freeze(&mut self, is_frozen: bool) {
         self.is_frozen = is_frozen;

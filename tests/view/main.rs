@@ -4,6 +4,7 @@
 mod by_ranges;
 #[cfg(feature = "vulkan")]
 mod cells;
+mod compare;
 mod cutaway;
 mod difference;
 #[cfg(feature = "vulkan")]

@@ -53,6 +53,14 @@ pub struct MeshChanges {
     pub tets: Vec<Range<u32>>,
 }
 
+impl MeshChanges {
+    /// Every vertex has changed, no tetrahedron has.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn of_all_vertices(count: usize) -> Self {
+        Self { vertices: std::iter::once(0..count as u32).collect(), tets: Vec::new() }
+    }
+}
+
 /// The labels of the vertex in a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Labels {

@@ -49,7 +49,7 @@ export async function page(canvas: HTMLCanvasElement): Promise<void> {
   await Promise.all([finished, viewer.settled(), viewer.retry(), viewer.set({ region: box, volume: null })]);
   const state: ViewerState = viewer.state;
   await viewer.set(JSON.parse(JSON.stringify(state)) as ViewerState);
-  await Promise.all([viewer.freeze(), viewer.freeze(false)]);
+  await Promise.all([viewer.keep(), viewer.set({ compare: { at: 0.3, difference: true } }), viewer.freeze(), viewer.freeze(false)]);
   const [{ tets }, slice] = await Promise.all([viewer.mesh(), viewer.slice([0, 0, 1], 0.5)]);
   [tets, slice.indices] satisfies Uint32Array[];
   await Viewer.create(canvas, { frameTime: Infinity });
