@@ -245,11 +245,11 @@ export interface Legend {
   ticks: { value: number; label: string; fraction: number }[];
 }
 
-/** What is shown at a point. */
+/** What is at a point. */
 export interface ViewerProbe {
   /** In model units. */
   position: [number, number, number];
-  /** The value of each field, by its name. */
+  /** The value of each field, by its name; of fields with several time steps at the time that is shown. */
   values: Record<string, number>;
   /** The number of the tetrahedron in the current mesh. */
   tet: number;
@@ -257,6 +257,43 @@ export interface ViewerProbe {
   size: number;
   /** Its error, as a fraction of the field's range. */
   error: number;
+}
+
+/** An edge of the box around the domain that shows the ticks of an axis. */
+export interface AxisOverlay {
+  /** 0 to 2 for x, y, z. */
+  axis: number;
+  /** The ends of the edge's part on the canvas, at the smaller coordinate first. */
+  ends: [[x: number, y: number], [x: number, y: number]];
+  /** Where labels go: away from the box, a direction of length 1 in pixels, y upwards. */
+  outward: [x: number, y: number];
+  /** Ascending. */
+  ticks: { label: string; at: [x: number, y: number] }[];
+}
+
+/** What an overlay over the picture draws. Points are points of the canvas: −1 to 1, y upwards. */
+export interface Overlay {
+  /** At most one for each axis; none for an axis that is seen end-on. */
+  axes: AxisOverlay[];
+  /**
+   * A bar of a round length. `width` is its length as a fraction of the canvas's width. In perspective it holds at the distance
+   * of the camera's target; `everywhere` is true where it holds at any distance.
+   */
+  scaleBar: { label: string; length: number; width: number; everywhere: boolean };
+  /** Right, up and towards the eye, as directions in the model. */
+  rotation: [right: number[], up: number[], towards: number[]];
+  /** From the model to clip space, column by column: with it points of the model can be drawn over the picture. */
+  matrix: number[];
+}
+
+/** How much of the volume has which values of the field that is shown. */
+export interface ViewerHistogram {
+  /** The values at the lower end of the first bin and at the upper end of the last one. */
+  range: [number, number];
+  /** The volume of each bin, in model units, cubed. */
+  volumes: Float64Array;
+  /** The values below which the fractions lie that were asked for. */
+  percentiles: number[];
 }
 
 export interface ViewerEventMap {
@@ -267,6 +304,8 @@ export interface ViewerEventMap {
   camera: CustomEvent<CameraState>;
   /** The colours mean something else. */
   legend: CustomEvent<Legend | undefined>;
+  /** What an overlay draws has changed, with the picture that has just been drawn. */
+  overlay: CustomEvent<Overlay | undefined>;
   error: CustomEvent<Error>;
 }
 
@@ -296,6 +335,8 @@ export class Viewer extends EventTarget {
   readonly adapter: string;
   /** What the colours mean; `undefined` where nothing is coloured by values. */
   readonly legend: Legend | undefined;
+  /** What an overlay over the last picture draws; `undefined` until the base mesh has arrived. */
+  readonly overlay: Overlay | undefined;
   /** All that is set, as plain data: `set` takes it. */
   readonly state: ViewerState;
 
@@ -346,6 +387,43 @@ export class Viewer extends EventTarget {
 
   /** What is shown at a point of the canvas (−1 to 1, y upwards); `undefined` if nothing is there. */
   probe(x: number, y: number): Promise<ViewerProbe | undefined>;
+  /** What is at a point of the model, in the current mesh; `undefined` outside of it. */
+  reading(point: ArrayLike<number> & Iterable<number>): Promise<ViewerProbe | undefined>;
+  /**
+   * The field that is shown at evenly spaced points of a segment, its ends among them (200 if not said otherwise), in the current
+   * mesh; NaN outside of it.
+   */
+  profile(
+    from: ArrayLike<number> & Iterable<number>,
+    to: ArrayLike<number> & Iterable<number>,
+    options?: { samples?: number },
+  ): Promise<Float64Array>;
+  /**
+   * How much of the volume of the current mesh has which values of the field that is shown, in 100 bins over the field's range if
+   * not said otherwise; and the values below which `fractions` (0 to 1) of the volume lie.
+   *
+   * @example
+   * const { percentiles } = await viewer.histogram({ fractions: [0.02, 0.98] });
+   */
+  histogram(options?: {
+    bins?: number;
+    range?: ArrayLike<number>;
+    fractions?: ArrayLike<number>;
+  }): Promise<ViewerHistogram>;
+  /**
+   * A picture of what is drawn, as a PNG of any size; the size of the canvas without one. It is the mean of `samples` pictures (16
+   * without it, at most 256), so that edges are smooth. Frames wait until it is ready.
+   *
+   * @example
+   * const blob = await viewer.screenshot({ width: 3840, height: 2160, background: "transparent" });
+   */
+  screenshot(options?: {
+    width?: number;
+    height?: number;
+    samples?: number;
+    /** That of the scene without it. */
+    background?: SceneState["background"];
+  }): Promise<Blob>;
   /** The handle of the region (0 to 5: lower and upper x, y, z) at a point of the canvas (−1 to 1, y upwards), or −1. */
   pickRegion(x: number, y: number): Promise<number>;
   /** Moves a handle of the region under a point; resolves to the new box. */

@@ -44,6 +44,9 @@ export class Viewer extends EventTarget {
   #scene = SCENE;
   #camera;
   #legend;
+  #overlay;
+  /** Of the canvas, in pixels. */
+  #size;
 
   /** Rejects with code `no-webgpu` where nothing can be drawn; resolves to nothing where it can. */
   static async check() {
@@ -88,14 +91,15 @@ export class Viewer extends EventTarget {
 
   async #start() {
     const offscreen = handOver(this.#canvas);
-    const [width, height] = pixels(this.#canvas.getBoundingClientRect());
+    const [width, height] = (this.#size = pixels(this.#canvas.getBoundingClientRect()));
     const created = await this.#remote.call("create", [offscreen, width, height, devicePixelRatio], [offscreen]);
     this.#adapter = created.adapter;
     await this.#change({ scene: this.#scene });
     this.#observer = new ResizeObserver(([entry]) => {
       const size = entry.devicePixelContentBoxSize?.[0];
       const [w, h] = size ? [size.inlineSize, size.blockSize] : pixels(entry.contentRect);
-      this.#change({ size: [Math.max(1, w), Math.max(1, h), devicePixelRatio] });
+      this.#size = [Math.max(1, w), Math.max(1, h)];
+      this.#change({ size: [...this.#size, devicePixelRatio] });
     });
     try {
       this.#observer.observe(this.#canvas, { box: "device-pixel-content-box" });
@@ -110,6 +114,7 @@ export class Viewer extends EventTarget {
     if (name === "failed") return this.#failed(data.goal, reviveError(data.error));
     if (name === "camera") this.#camera = data;
     if (name === "legend") this.#legend = data;
+    if (name === "overlay") this.#overlay = data;
     this.#emit(name, data);
     if (name === "stats" && data.done) this.#settle(data.goal, ({ resolve }) => resolve(data));
   }
@@ -143,6 +148,11 @@ export class Viewer extends EventTarget {
   /** What the colours mean; `undefined` where nothing is coloured by values. */
   get legend() {
     return this.#legend;
+  }
+
+  /** What an overlay over the last picture draws; `undefined` until the base mesh has arrived. */
+  get overlay() {
+    return this.#overlay;
   }
 
   /** All that is set: what is drawn, and `camera`. A copy, as plain data; `set` takes it. */
@@ -300,6 +310,33 @@ export class Viewer extends EventTarget {
     return this.#probe.call([x, y]);
   }
 
+  /** What is at a point of the model, in the current mesh; `undefined` outside of it. */
+  reading([x, y, z]) {
+    return this.#remote.call("reading", [x, y, z]);
+  }
+
+  /** The field along a segment, at evenly spaced points; NaN outside of the mesh. */
+  profile(from, to, { samples = 200 } = {}) {
+    return this.#remote.call("profile", [Float64Array.from([...from, ...to]), samples]);
+  }
+
+  /** How much of the volume has which values of the field. */
+  histogram({ bins = 100, range = [Number.NaN, Number.NaN], fractions = [] } = {}) {
+    return this.#remote.call("histogram", [bins, Array.from(range), Float64Array.from(fractions)]);
+  }
+
+  /**
+   * A picture of what is drawn, as a PNG; the canvas keeps its own.
+   *
+   * @param {{ width?: number, height?: number, samples?: number, background?: string }} [options]
+   */
+  screenshot({ width = this.#size[0], height = this.#size[1], samples = 16, background } = {}) {
+    for (const [name, value] of Object.entries({ width, height, samples })) {
+      if (!(Number.isInteger(value) && value > 0)) return Promise.reject(badOption(name, "must be a positive integer"));
+    }
+    return this.#remote.call("screenshot", [width, height, samples, background]);
+  }
+
   /** The handle of the region at a point (−1 to 1, y upwards), or −1. */
   pickRegion(x, y) {
     return this.#remote.call("pickRegion", [x, y]);
@@ -329,6 +366,10 @@ export class Viewer extends EventTarget {
   [Symbol.dispose ?? Symbol.for("Symbol.dispose")]() {
     this.free();
   }
+}
+
+function badOption(name, problem) {
+  return new TetralodError("bad-option", `option \`${name}\`: ${problem}`);
 }
 
 /** An error of the file's contents says which file. */

@@ -13,6 +13,12 @@ mod session;
 mod tools;
 #[cfg(all(feature = "gpu", target_arch = "wasm32"))]
 mod viewer;
+#[cfg(all(feature = "gpu", target_arch = "wasm32"))]
+mod viewer_overlay;
+#[cfg(all(feature = "gpu", target_arch = "wasm32"))]
+mod viewer_screenshot;
+#[cfg(all(feature = "gpu", target_arch = "wasm32"))]
+mod viewer_values;
 
 pub use loader::RangeLoader;
 pub use session::CoreSession;

@@ -4,9 +4,11 @@ import {
   TetralodError,
   Viewer,
   type OpenedVolume,
+  type Overlay,
   type OwnView,
   type PlaneState,
   type ViewerFrame,
+  type ViewerHistogram,
   type ViewerProgress,
   type ViewerProbe,
   type ViewerRefineOptions,
@@ -50,6 +52,13 @@ export async function page(canvas: HTMLCanvasElement): Promise<void> {
   const state: ViewerState = viewer.state;
   await viewer.set(JSON.parse(JSON.stringify(state)) as ViewerState);
   const found: ViewerProbe | undefined = await viewer.probe(0, 0);
+  viewer.addEventListener("overlay", ({ detail }) => void (detail satisfies Overlay | undefined));
+  const label: string | undefined = viewer.overlay?.axes[0]?.ticks[0]?.label ?? viewer.overlay?.scaleBar.label;
+  const again: ViewerProbe | undefined = await viewer.reading(found?.position ?? [0, 0, 0]);
+  const along: Float64Array = await viewer.profile([0, 0, 0], new Float32Array(3), { samples: 10 });
+  const spread: ViewerHistogram = await viewer.histogram({ bins: 10, range: [0, 1], fractions: [0.02, 0.98] });
+  const shots: Blob[] = [await viewer.screenshot(), await viewer.screenshot({ width: 9, height: 9, background: "light" })];
+  [label, again?.size, along[0], spread.percentiles[0], shots.length] satisfies (string | number | undefined)[];
   const texts: string[] = [viewer.adapter, viewer.legend?.label ?? "", `${found?.values["p"]}`, await viewer.hash()];
   texts.length satisfies number;
   viewer.free();
