@@ -7,9 +7,10 @@
 
 import { ColourSettings } from "./colours.js";
 import { attachControls } from "./controls.js";
-import { rake, vectorsOf } from "./flow.js";
+import { FlowSettings } from "./flow.js";
+import { count, milliseconds, nameOf, percentage, pixels, rounded, size } from "./format.js";
 import { OverlayView } from "./overlay.js";
-import { attachPicture } from "./picture.js";
+import { attachPicture, lookFrom } from "./picture.js";
 import { Probes } from "./probes.js";
 import { TransferEditor } from "./transfer.js";
 
@@ -50,10 +51,8 @@ let probes;
 let colours;
 /** @type {TransferEditor} */
 let transfer;
-/** The vectors of the file: the names of their components. @type {Map<string, [string, string, string]>} */
-let vectors = new Map();
-/** Seeds of streamlines that were placed by clicks. @type {[number, number, number][]} */
-let seeds = [];
+/** @type {FlowSettings} */
+let flow;
 /** Whether time steps follow each other by themselves. */
 let playing = false;
 /** What was opened last: the button "Try again" opens it again. */
@@ -99,6 +98,7 @@ async function start() {
     isFlying: () => $("fly").checked,
   });
   attachColours();
+  flow = new FlowSettings({ overlay, onChange: draw });
   attachSettings();
   attachPicture(viewer, { canvas, overlay, onChange: draw, onError: fail });
   attachFiles();
@@ -108,7 +108,7 @@ async function start() {
 /** What lies over the picture: axes, probes, the plot. */
 function attachOverlay() {
   const covered = ["legend"].map($);
-  overlay = new OverlayView($("overlay"), { covered, onSide: (side) => viewer.lookFrom(side) });
+  overlay = new OverlayView($("overlay"), { covered, onSide: (side) => lookFrom(viewer, side).catch(fail) });
   viewer.addEventListener("overlay", ({ detail }) => (overlay.data = detail));
   const parts = { readout: $("readout"), cards: $("cards"), marquee: $("marquee") };
   const plot = { plot: $("plot"), plotTitle: $("plot-title"), plotArea: $("plot-area") };
@@ -146,13 +146,12 @@ async function showHistogram() {
 /** A click on the picture: a seed of a streamline on the plane in the view of the flow, a probe in all others. */
 async function clicked(point) {
   if (!demo.info) return;
-  if (mode() !== "flow") return probes.pin(point).catch(fail);
-  const axis = Number($("axis").value);
-  const found = overlay.onPlane(point, axis, placeOfPlane());
-  if (!found) return;
-  seeds = [...seeds, found];
-  draw();
+  if (mode() === "flow") flow.click(point, seedPlane());
+  else probes.pin(point).catch(fail);
 }
+
+/** The plane of the seeds. */
+const seedPlane = () => ({ axis: Number($("axis").value), at: placeOfPlane() });
 
 /** A rectangle is being spanned on the picture, or has been: makes a box of what is seen at its ends. */
 async function spanBox(from, to, points) {
@@ -228,12 +227,7 @@ const KINDS = {
 function arrive(info) {
   demo.info = info;
   probes.clear();
-  seeds = [];
-  vectors = vectorsOf(info.fields);
-  $("vector").replaceChildren(...[...vectors.keys()].map((name) => new Option(name, name)));
-  $("flow").disabled = vectors.size === 0;
-  $("flow-label").title = vectors.size === 0 ? "This dataset has no vectors" : "";
-  if (mode() === "flow" && vectors.size === 0) $("surface").click();
+  flow.fields = info.fields;
   stop();
   $("n-kind").textContent = KINDS[info.kind] ?? info.kind;
   fields = new Map();
@@ -356,7 +350,7 @@ function followingStep() {
 
 function applyIsovalue() {
   const value = isovalue();
-  text("isovalue-text", `${short(value)} ${field.unit}`.trim(), "isovalue");
+  text("isovalue-text", `${rounded(value, field.max - field.min)} ${field.unit}`.trim(), "isovalue");
   draw();
   if ($("focus").checked) refine();
 }
@@ -378,7 +372,7 @@ function draw() {
   const opacity = $("opacity").value / 100;
   text("opacity-text", `${$("opacity").value} %`, "opacity");
   // The range is one of the field.
-  const others = { mesh: $("colour-by").value !== "field", flow: $("flow-colour").value !== "field" };
+  const others = { mesh: $("colour-by").value !== "field", flow: !flow.isByField };
   $("range").hidden = others[mode()] ?? false;
   const nothing = { isosurfaces: [], volume: null, slices: [], boundary: null, cells: null, clips: [] };
   const noFlow = { streamlines: null, arrows: null };
@@ -388,36 +382,17 @@ function draw() {
     slice: () => ({ slices: [{ ...plane(), opacity, edges: true }] }),
     solid: () => ({ boundary: { opacity, edges: true }, clips: [plane()] }),
     mesh: () => ({ cells: { cut: plane(), colourBy: $("colour-by").value } }),
-    flow,
+    flow: () => flow.state({ bounds: demo.info.bounds, plane: seedPlane(), field }),
   }[mode()]();
   viewer.set({ ...nothing, ...noFlow, ...shown, colours: colours.state, background: $("background").value }).catch(fail);
-}
-
-/** Streamlines from the seeds, and arrows. */
-function flow() {
-  const components = vectors.get($("vector").value);
-  const [axis, count] = [Number($("axis").value), Number($("rake").value)];
-  const { bounds } = demo.info;
-  const at = (placeOfPlane() - bounds[axis]) / (bounds[axis + 3] - bounds[axis]);
-  text("rake-text", count === 0 ? "none" : `${count} × ${count}`, "rake");
-  $("no-seeds").hidden = seeds.length === 0;
-  overlay.quad = { axis, at: placeOfPlane(), bounds, seeds };
-  const by = $("flow-colour").value === "field" ? { field: field.name } : {};
-  const all = [...rake(bounds, { axis, at, count }), ...seeds];
-  return {
-    streamlines: { fields: components, seeds: all, ...by },
-    arrows: $("arrows").checked ? { fields: components, ...by } : null,
-    boundary: $("flow-boundary").checked ? { opacity: 0.12, colour: "#9fb0c4" } : null,
-  };
 }
 
 /** The colour bar of what is drawn. */
 function showLegend(legend) {
   $("legend").hidden = !legend;
-  overlay.refresh();
-  if (!legend) return;
+  if (!legend) return overlay.refresh();
   const { label, ticks } = legend;
-  const unit = field?.name === label && field.unit;
+  const unit = unitOf(label);
   $("legend-name").textContent = unit ? `${label} in ${unit}` : label;
   if (label === field?.name) transfer.colours = colours.gradient(legend);
   $("legend-bar").style.background = `linear-gradient(90deg, ${legend.colours.join(", ")})`;
@@ -430,6 +405,13 @@ function showLegend(legend) {
     }),
   );
   leaveOutOverlaps($("legend-ticks"));
+  overlay.refresh();
+}
+
+/** The unit of what a legend is of: a field, or the length of the vector that is shown. */
+function unitOf(label) {
+  if (field?.name === label) return field.unit;
+  return mode() === "flow" ? flow.unit : "";
 }
 
 /** Hides the ticks whose words would touch those of the one before. */
@@ -567,11 +549,7 @@ function attachSettings() {
   for (const radio of document.querySelectorAll("[name=mode]")) radio.addEventListener("change", applyMode);
   on("isovalue", () => field && applyIsovalue());
   on("cut", applyCut);
-  for (const id of ["opacity", "colour-by", "vector", "flow-colour", "rake", "arrows", "flow-boundary"]) on(id, draw);
-  on("no-seeds", () => {
-    seeds = [];
-    draw();
-  }, "click");
+  for (const id of ["opacity", "colour-by"]) on(id, draw);
   document.addEventListener("keydown", (event) => event.key === "Escape" && probes.clear());
   on("play", () => (playing ? stop() : play()), "click");
   on("axis", applyCut);
@@ -729,40 +707,4 @@ function announce(words) {
 function text(output, words, slider) {
   $(output).textContent = words;
   $(slider).setAttribute("aria-valuetext", words);
-}
-
-function percentage(percent) {
-  if (percent === 0) return "0";
-  return percent < 100 ? `${Number(percent.toPrecision(2))} %` : `${count(Math.round(percent))} %`;
-}
-
-function pixels(n) {
-  // There is no bound if the camera is inside a tetrahedron with an error.
-  if (n > 9999) return "no bound";
-  return `${Number(n.toPrecision(2))} ${n === 1 ? "pixel" : "pixels"}`;
-}
-
-function count(n) {
-  return n.toLocaleString("en");
-}
-
-/** A field value, with digits according to its range. */
-function short(value) {
-  const range = field.max - field.min;
-  if (Math.abs(value) < range * 1e-6) return "0";
-  const magnitude = Math.abs(value);
-  return magnitude >= 1e5 || magnitude < 1e-3 ? value.toExponential(2) : String(Number(value.toPrecision(4)));
-}
-
-function size(bytes) {
-  if (bytes < 1e3) return `${bytes} B`;
-  return bytes < 999_500 ? `${(bytes / 1e3).toFixed(0)} kB` : `${(bytes / 1e6).toFixed(2)} MB`;
-}
-
-function milliseconds(ms) {
-  return `${ms < 10 ? ms.toFixed(1) : ms.toFixed(0)} ms`;
-}
-
-function nameOf(from) {
-  return from.name ?? String(from).split(/[?#]/)[0].split("/").pop();
 }

@@ -213,7 +213,7 @@ export class OverlayView {
       farthest = Math.max(farthest, Math.abs(out[0]) * (box.right - box.left) + Math.abs(out[1]) * LABEL.height);
     }
     // The name is at the middle, or where there is room for it.
-    const places = [0.5, 0.4, 0.6, 0.3, 0.7, 0.15, 0.85, 0, 1].map((part) => {
+    const places = [0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8, 0.1, 0.9, 0, 1].map((part) => {
       const point = [0, 1].map((i) => from[i] + (to[i] - from[i]) * part);
       return labelBox(away(point, GAP + farthest + 5), out, NAMES[axis]);
     });
@@ -222,15 +222,14 @@ export class OverlayView {
     return group;
   }
 
-  /** The scale bar at the bottom left, beside the legend or above it. */
+  /** The scale bar at the bottom left, above the legend. */
   #scaleBar({ label, width, everywhere }, taken, bottom) {
     const length = width * this.#svg.clientWidth;
-    const words = everywhere ? label : `${label} at the distance of the target`;
+    const words = everywhere ? label : `${label} at the target`;
     const wide = Math.max(length, words.length * LABEL.width * 0.92);
     const legend = taken.find((box) => box.left < 60 && box.bottom > bottom - 60);
-    const isBeside = legend && legend.right + wide + 30 < this.#svg.clientWidth;
-    const left = isBeside ? legend.right + 16 : 20;
-    const base = legend && !isBeside ? legend.top - 12 : bottom - 20;
+    const left = 26;
+    const base = legend ? legend.top - 14 : bottom - 24;
     const bar = element("path", { d: `M${left} ${base - 6}v6h${length}v-6`, class: "bar" });
     const group = element("g", { class: "scale-bar" });
     const box = { left: left - 8, top: base - 27, right: left + wide + 8, bottom: base + 8 };

@@ -10,7 +10,7 @@ const $ = (id) => document.getElementById(id);
  */
 export function attachPicture(viewer, { canvas, overlay, onChange, onError }) {
   $("side").addEventListener("input", () => {
-    viewer.lookFrom($("side").value).catch(onError);
+    lookFrom(viewer, $("side").value).catch(onError);
     $("side").value = "";
   });
   $("background").addEventListener("input", () => {
@@ -25,6 +25,15 @@ export function attachPicture(viewer, { canvas, overlay, onChange, onError }) {
   });
   $("axes").addEventListener("input", () => (overlay.showsAxes = $("axes").checked));
   $("shot").addEventListener("click", () => save(viewer, canvas).catch(onError));
+}
+
+/** The model as it fills the picture leaves no room for the labels of axes: from so many times as far it does. */
+const ROOM = 1.18;
+
+/** Looks at the whole model from a side, with room around it. */
+export function lookFrom(viewer, side) {
+  const looked = viewer.lookFrom(side);
+  return side === "home" ? looked : Promise.all([looked, viewer.zoom(ROOM)]);
 }
 
 /** Makes a screenshot, and saves it as a file. */

@@ -5,6 +5,7 @@
  * the points at its ends.
  */
 
+import { rounded } from "./format.js";
 import { element } from "./overlay.js";
 import { linePlot } from "./plot.js";
 
@@ -236,12 +237,4 @@ function hint() {
   const words = document.createElement("small");
   words.textContent = "Click at a second point for a plot";
   return words;
-}
-
-/** A number with digits according to the range that it is from. */
-export function rounded(value, range) {
-  const magnitude = Math.abs(value);
-  if (magnitude < Math.abs(range) * 1e-6 || value === 0) return "0";
-  const digits = magnitude >= 1e5 || magnitude < 1e-3 ? value.toExponential(2) : String(Number(value.toPrecision(4)));
-  return digits.replace("-", "−");
 }

@@ -5,8 +5,8 @@
  * dragging it far out. With the keyboard, Tab goes from point to point, arrows move, Delete removes, Insert or + adds.
  */
 
+import { rounded } from "./format.js";
 import { element } from "./overlay.js";
-import { rounded } from "./probes.js";
 
 /** The drawing, in its own units; the curve has room around it for whole points. */
 const SIZE = { width: 300, height: 120, margin: 9 };

@@ -260,10 +260,12 @@ impl Viewer {
         let (mut numbers, labels) = (Vec::new(), Array::new());
         if let Some(Legend { label, scale }) = self.scene.legend() {
             labels.push(&label.as_str().into());
-            numbers.extend([scale.range[0], scale.range[1], f64::from(u8::from(scale.is_log))]);
-            numbers.extend(scale.table::<32>().iter().flat_map(|colour| &colour[..3]).map(|c| f64::from(*c)));
+            numbers.extend_from_slice(&[scale.range[0], scale.range[1], f64::from(u8::from(scale.is_log))]);
+            for [red, green, blue, _] in scale.table::<32>() {
+                numbers.extend_from_slice(&[red, green, blue].map(f64::from));
+            }
             for tick in scale.ticks(TICKS) {
-                numbers.extend([scale.fraction(tick.value), tick.value]);
+                numbers.extend_from_slice(&[scale.fraction(tick.value), tick.value]);
                 labels.push(&tick.label.into());
             }
         }
@@ -285,8 +287,10 @@ impl Viewer {
         let session = self.file.session_mut();
         let Some(reading) = session.reading(point)? else { return Ok(None) };
         let [x, y, z] = reading.position;
-        let known = [x, y, z, f64::from(reading.tet), reading.size, reading.error, session.field() as f64];
-        Ok(Some(known.into_iter().chain(reading.values).collect()))
+        let shown = session.field() as f64;
+        let mut known = vec![x, y, z, f64::from(reading.tet), reading.size, reading.error, shown];
+        known.extend_from_slice(&reading.values);
+        Ok(Some(known.into()))
     }
 
     /// The box that has handles.

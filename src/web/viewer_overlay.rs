@@ -27,11 +27,11 @@ impl Viewer {
             let ScaleBar { length, label, width } = scale_bar(&camera, aspect);
             let everywhere = camera.projection() == Projection::Orthographic;
             labels.push(&label.into());
-            numbers.extend([length, width, f64::from(u8::from(everywhere))]);
+            numbers.extend_from_slice(&[length, width, f64::from(u8::from(everywhere))]);
             for direction in [camera.right(), camera.up(), -camera.forward()] {
-                numbers.extend(direction.to_array());
+                numbers.extend_from_slice(&direction.to_array());
             }
-            numbers.extend(self.view().matrix);
+            numbers.extend_from_slice(&self.view().matrix);
             let spacing = 2.0 * TICK_SPACING * self.ratio / f64::from(self.scene.renderer().size()[1]);
             self.tick_edges = tick_edges(&bounds, &camera, aspect, self.tick_edges);
             let edges = self.tick_edges.into_iter().flatten();
@@ -46,11 +46,11 @@ impl Viewer {
 fn put(BoxAxis { edge, ends: [from, to], outward, ticks }: BoxAxis, numbers: &mut Vec<f64>, labels: &Array) {
     numbers.push(edge.axis as f64);
     for point in [from, to, outward] {
-        numbers.extend(point.to_array());
+        numbers.extend_from_slice(&point.to_array());
     }
     numbers.push(ticks.len() as f64);
     for tick in ticks {
-        numbers.extend(tick.screen.to_array());
+        numbers.extend_from_slice(&tick.screen.to_array());
         labels.push(&tick.tick.label.into());
     }
 }

@@ -52,8 +52,12 @@ impl Viewer {
         demand((1..=MOST).contains(&bins), "bins", "must be 1 to 65536")?;
         let mut histogram = Histogram::new(low, high, bins as usize);
         histogram.add_mesh(&self.file.session_mut().view());
-        let values = fractions.iter().map(|fraction| histogram.percentile(*fraction));
-        Ok([low, high].into_iter().chain(values).chain(histogram.volumes()).collect())
+        let mut numbers = vec![low, high];
+        for fraction in fractions {
+            numbers.push(histogram.percentile(*fraction));
+        }
+        numbers.extend_from_slice(&histogram.volumes());
+        Ok(numbers.into())
     }
 }
 

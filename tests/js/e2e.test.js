@@ -339,6 +339,12 @@ async function openSmall() {
   return page;
 }
 
+/** The middle of the canvas on the page. @returns {Promise<[number, number]>} */
+async function middle(page) {
+  const { x, y, width, height } = await page.locator("#canvas").boundingBox();
+  return [x + width / 2, y + height / 2];
+}
+
 /** The boxes of elements on the screen. */
 const boxes = (page, selector) =>
   page.locator(selector).evaluateAll((found) =>
@@ -541,6 +547,45 @@ test("the eye flies, and rotations run out unless less motion is asked for", asy
   await page.keyboard.up("w");
   assert.deepEqual(page.complaints, []);
   await page.close();
+});
+
+test("a flow has streamlines, arrows and time steps that play", async () => {
+  const page = await open("data/bucky-explicit.mt");
+  await reach(page, "complete");
+  assert.ok(await page.locator("#flow").isDisabled(), "there are no vectors");
+  await page.close();
+
+  const flow = await open("data/abc-flow.mt");
+  await reach(flow, "complete");
+  await show(flow, "Flow");
+  const tubes = await picture(flow, "flow");
+  assertDrawn(tubes);
+  assert.match(await flow.locator("#legend-name").innerText(), /^speed in m\/s$/);
+  const seeds = () => flow.evaluate(() => window.tetralodDemo.viewer.state.streamlines.seeds.length);
+  assert.equal(await seeds(), 64);
+  await flow.mouse.click(...(await middle(flow)));
+  await flow.waitForFunction(() => window.tetralodDemo.viewer.state.streamlines.seeds.length === 65);
+  const placed = await flow.evaluate(() => window.tetralodDemo.viewer.state.streamlines.seeds[64]);
+  assert.ok(Math.abs(placed[1] - Math.PI) < 1e-6, `on the plane: ${placed}`);
+  await flow.locator("#no-seeds").click();
+  await flow.check("#arrows");
+  await flow.selectOption("#flow-colour", "field");
+  assert.ok(differing(tubes, await picture(flow, "arrows")) > 0.03, "there are arrows");
+  assert.equal(await flow.locator("#legend-name").innerText(), "pressure");
+  await flow.uncheck("#arrows");
+  await flow.screenshot({ path: fileURLToPath(new URL("page-flow.png", pictures)) });
+
+  // Each step has vectors of its own; the one that comes next is refined with it.
+  const first = await picture(flow, "flow-step");
+  await setSlider(flow, "time", 2);
+  assert.ok(differing(first, await picture(flow, "flow-later")) > 0.01, "other vectors");
+  await flow.locator("#play").click();
+  await flow.waitForFunction(() => document.querySelector("#time-text").textContent === "5", undefined, { timeout: PATIENCE });
+  assert.equal((await demo(flow, "request")).needs.length, 1);
+  await flow.locator("#play").click();
+  assert.equal(await flow.locator("#play").innerText(), "Play");
+  assert.deepEqual(flow.complaints, []);
+  await flow.close();
 });
 
 test("the package runs in a worker of the page, without a viewer", async () => {
