@@ -153,11 +153,17 @@ async function clicked(point) {
 /** The plane of the seeds. */
 const seedPlane = () => ({ axis: Number($("axis").value), at: placeOfPlane() });
 
+/** Where the rectangle that is being spanned ends. */
+let spanEnd = { x: 0, y: 0 };
+
 /** A rectangle is being spanned on the picture, or has been: makes a box of what is seen at its ends. */
 async function spanBox(from, to, points) {
+  if (from) spanEnd = to;
   probes.marquee(from, to);
-  const spanned = points && (await probes.boxBetween(...points));
+  if (!points) return;
+  const spanned = await probes.boxBetween(...points);
   if (spanned) useBox(spanned);
+  else probes.note("Both ends of the rectangle must be on what is drawn", spanEnd);
 }
 
 /** Refines in this box. */

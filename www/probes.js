@@ -131,11 +131,18 @@ export class Probes {
     Object.assign(marquee.style, { left: `${x}px`, top: `${y}px`, width: `${width}px`, height: `${height}px` });
   }
 
+  /** Shows words at a place of the page until the pointer moves. */
+  note(words, place) {
+    this.#asked++;
+    this.#readOut(words, place);
+  }
+
+  /** Shows what a probe has found, or words. @param {Probe | string | undefined} found */
   #readOut(found, place = undefined) {
     const { readout } = this.#stage;
     readout.hidden = !found;
     if (!found) return;
-    readout.replaceChildren(this.#list(found));
+    readout.replaceChildren(typeof found === "string" ? found : this.#list(found));
     const stage = readout.parentElement.getBoundingClientRect();
     const [x, y] = [place.x - stage.left, place.y - stage.top];
     const { offsetWidth, offsetHeight } = readout;
@@ -153,7 +160,8 @@ export class Probes {
       [term.textContent, description.textContent] = [name, value];
       list.append(term, description);
     };
-    const fields = [...new Map(this.#fields().map((field) => [field.name, field])).values()];
+    const byName = new Map([this.#shown(), ...this.#fields()].map((field) => [field.name, field]));
+    const fields = [...byName.values()];
     for (const field of fields.slice(0, MOST_FIELDS)) {
       add(field.name, `${rounded(values[field.name], field.max - field.min)} ${field.unit}`.trim());
     }
@@ -196,10 +204,11 @@ export class Probes {
       marks.push(element("line", { x1, y1, x2, y2, class: "between" }));
     }
     const stage = this.#stage.cards;
-    [...stage.children].forEach((card, i) => {
+    let last;
+    for (const [i, card] of [...stage.children].entries()) {
       const place = places[i];
       card.hidden = !place;
-      if (!place) return;
+      if (!place) continue;
       const [x, y] = place;
       marks.push(element("circle", { cx: x, cy: y, r: 8 }), element("text", { x, y: y + 4 }, NAMES[i]));
       const other = places[1 - i];
@@ -208,9 +217,17 @@ export class Probes {
       const fitsRight = x + 16 + card.offsetWidth < stage.clientWidth;
       const fitsLeft = x - 16 - card.offsetWidth > 0;
       const left = (wantsRight && fitsRight) || !fitsLeft ? x + 16 : x - 16 - card.offsetWidth;
-      const top = Math.min(Math.max(y - card.offsetHeight / 2, 4), stage.clientHeight - card.offsetHeight - 4);
+      const [width, height] = [card.offsetWidth, card.offsetHeight];
+      const held = (top) => Math.min(Math.max(top, 4), stage.clientHeight - height - 4);
+      let top = held(y - height / 2);
+      if (last && left < last.left + last.width && last.left < left + width && Math.abs(top - last.top) < height) {
+        // Below the card before, or above it where there is more room.
+        const isRoomBelow = last.top + last.height + height < stage.clientHeight - 8;
+        top = held(isRoomBelow ? last.top + last.height + 4 : last.top - height - 4);
+      }
       card.style.transform = `translate(${Math.round(left)}px, ${Math.round(top)}px)`;
-    });
+      last = { left, top, width, height };
+    }
     this.#marks.replaceChildren(...marks);
   }
 

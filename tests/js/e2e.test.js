@@ -427,6 +427,16 @@ test("the pointer reads values, clicks keep probes, and two of them give a plot"
   assert.equal(await page.locator("#region").inputValue(), "box");
   await page.keyboard.press("Escape");
   assert.equal(await page.locator(".card").count(), 0);
+  // A drag with Alt makes a box of what is at its ends.
+  await page.selectOption("#region", "");
+  await page.keyboard.down("Alt");
+  await page.mouse.move(...at(0.45, 0.45));
+  await page.mouse.down();
+  await page.mouse.move(...at(0.55, 0.55), { steps: 3 });
+  await page.mouse.up();
+  await page.keyboard.up("Alt");
+  await page.waitForFunction(() => document.querySelector("#region").matches(":has([value=box]:checked)"), undefined, { timeout: PATIENCE });
+  assert.ok(await page.locator("#marquee").isHidden());
   assert.deepEqual(page.complaints, []);
   await page.close();
 });
