@@ -179,7 +179,6 @@ impl Objects {
         found.extend(state.cells.as_ref().and_then(|cells| first_cell(&probe, cells, clips, ray, bounds)));
         if let (Some(volume), Ok(scale)) = (&state.volume, scale(&state.colours, state.colours.range, own)) {
             let medium = medium(volume, &scale, bounds.diagonal());
-            probe.make_grid();
             let hit = first_hit_in(&medium, &probe, ray, clips);
             found.extend(hit.map(|hit| (hit.distance, hit.position)));
         }
