@@ -204,8 +204,18 @@ export interface MeshTools {
     how?: { backward?: boolean; maxLength?: number; maxSteps?: number },
   ): Promise<(Streamline | undefined)[]>;
 
-  /** Volume, integral, mean and a histogram by volume (100 bins over the field's range, if not said otherwise). */
-  stats(how?: { bins?: number; range?: ArrayLike<number> }): Promise<FieldStats>;
+  /**
+   * Volume, integral, mean and a histogram by volume (100 bins over the field's range, if not said otherwise); and the values
+   * below which `fractions` (0 to 1) of the volume lie, as exactly as the bins are fine.
+   *
+   * @example
+   * const { percentiles } = await mt.stats({ bins: 1000, fractions: [0.02, 0.98] });
+   */
+  stats(how?: {
+    bins?: number;
+    range?: ArrayLike<number>;
+    fractions?: ArrayLike<number>;
+  }): Promise<FieldStats>;
 
   /** A hash of the current mesh: the same request gives the same hash on every machine. */
   hash(): Promise<string>;

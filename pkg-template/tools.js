@@ -57,11 +57,11 @@ export const withMeshTools = (Base) =>
     }
 
     async stats(how = {}) {
-      checkNames(how, ["bins", "range"]);
-      const { bins = 100, range = [NaN, NaN] } = how;
+      checkNames(how, ["bins", "range", "fractions"]);
+      const { bins = 100, range = [NaN, NaN], fractions = [] } = how;
       checkAmount("bins", bins, 1);
       if (range?.length !== 2) throw new TetralodError("bad-option", "option `range`: must be two numbers");
-      return call(this, "stats", [bins, range[0], range[1]]);
+      return call(this, "stats", [bins, range[0], range[1], numbers("fractions", fractions)]);
     }
 
     async hash() {
@@ -82,7 +82,7 @@ export const meshToolMethods = (session) => ({
   line: (from, to) => session().line(from, to),
   streamlines: (fields, seeds, backward, maxLength, maxSteps) =>
     session().streamlines(fields, seeds, backward, maxLength, maxSteps),
-  stats: (bins, low, high) => session().stats(bins, low, high),
+  stats: (bins, low, high, fractions) => session().stats(bins, low, high, fractions),
   hash: () => session().hash(),
 });
 

@@ -19,6 +19,11 @@ const STEP = [6, 30];
 /** Hidden pages have no frames: their meshes follow in steps this far apart (in ms). */
 const HIDDEN = 200;
 
+/** Colours of a legend. */
+const COLOURS = 32;
+/** A screenshot is the mean of so many pictures at most. */
+const MOST_SAMPLES = 256;
+
 /** @type {Viewer | undefined} */
 let viewer;
 /** Fetches the blocks of a file that is read in parts. @type {Parts | undefined} */
@@ -54,6 +59,10 @@ let tets = 0;
 let affordable = Infinity;
 /** The number that the mesh is held to now. @type {number | undefined} */
 let held;
+/** What is drawn. */
+let shown = {};
+/** Whether a screenshot is being made: frames wait for it. */
+let isTaking = false;
 
 /** Pictures have these parts of the pixels, in each direction, while something moves. */
 const SCALES = [1, 0.7, 0.5, 0.35, 0.25];
@@ -189,7 +198,10 @@ const methods = {
    */
   update({ scene, camera, orbit, zoom, pan, fly, look, home, side, size }) {
     if (size) viewer.resize(...size);
-    if (scene) viewer.setScene(scene);
+    if (scene) {
+      viewer.setScene(scene);
+      shown = scene;
+    }
     if (home) viewer.home();
     if (side) viewer.lookFrom(side);
     if (camera) viewer.setCamera(camera);
@@ -206,9 +218,10 @@ const methods = {
   pickRegion: (x, y) => viewer.pickRegion(x, y),
 
   dragRegion(handle, x, y) {
-    const box = viewer.dragRegion(handle, x, y);
+    const region = Array.from(viewer.dragRegion(handle, x, y));
+    shown = { ...shown, region };
     invalidate();
-    return Array.from(box);
+    return region;
   },
 
   keep() {
@@ -221,10 +234,33 @@ const methods = {
     invalidate();
   },
 
-  /** What is shown at a point of the canvas; a plain object with the values of the fields by name. */
-  pick(x, y) {
-    const found = /** @type {any} */ (viewer.pick(x, y));
-    return found && { ...found, values: Object.fromEntries(found.values) };
+  /** What is shown at a point of the canvas. */
+  pick: (x, y) => reading(viewer.pick(x, y)),
+
+  /** What is at a point of the model. */
+  reading: (x, y, z) => reading(viewer.reading(x, y, z)),
+
+  /** A picture of any size; what is on the canvas of the page stays. */
+  async screenshot(width, height, samples, background) {
+    const canvas = new OffscreenCanvas(width, height);
+    isTaking = true;
+    try {
+      if (background !== undefined) viewer.setScene({ ...shown, background });
+      viewer.beginScreenshot(canvas);
+      // How much memory transparent parts take is known after a picture.
+      do {
+        viewer.drawScreenshot(1);
+        await idle();
+      } while (viewer.isScreenshotShort());
+      viewer.drawScreenshot(Math.min(samples, MOST_SAMPLES));
+      // At once: the canvas is empty in the next task.
+      return await canvas.convertToBlob({ type: "image/png" });
+    } finally {
+      viewer.endScreenshot();
+      if (background !== undefined) viewer.setScene(shown);
+      isTaking = false;
+      invalidate();
+    }
   },
 
   mesh: () => viewer.mesh(),
@@ -232,6 +268,18 @@ const methods = {
   ...meshToolMethods(() => viewer),
 };
 const emit = serve(webEndpoint(globalThis), methods, ["openParts", "settled"]);
+
+/** What a probe has found, made of the numbers of the viewer. */
+function reading(numbers) {
+  if (!numbers) return undefined;
+  const [x, y, z, tet, size, error, shown, ...values] = numbers;
+  const { fields } = viewer.info();
+  // Of the time steps of a field that which is shown counts, or the first.
+  const all = values.map((value, i) => ({ ...fields[i], value })).reverse();
+  const now = all.filter(({ time }) => time === fields[shown].time);
+  const byName = Object.fromEntries([...all, ...now].map(({ name, value }) => [name, value]));
+  return { position: [x, y, z], values: byName, tet, size, error };
+}
 
 /** Blocks have arrived: refines with them, as with a stream. */
 function partsCame(progress) {
@@ -323,8 +371,16 @@ function stepUnseen() {
   hidden = setTimeout(stepUnseen, HIDDEN / 4);
 }
 
+/** Resolves when the GPU has finished all pictures. */
+async function idle() {
+  do await new Promise((resolve) => setTimeout(resolve, 16));
+  while (viewer.inFlight > 0);
+}
+
 function draw() {
   frameAsked = false;
+  // It is drawn when the screenshot is ready.
+  if (isTaking) return;
   clearTimeout(hidden);
   hidden = undefined;
   if (ready && viewer.moving) step(Math.min(Math.max(drawing, STEP[0]), STEP[1]));
@@ -339,7 +395,8 @@ function draw() {
       const uploaded = viewer.takeUploaded();
       emit("frame", { milliseconds, triangles: viewer.triangles, uploaded, bytes, ready });
       report("camera", viewer.camera());
-      report("legend", viewer.legend());
+      report("legend", legend());
+      report("overlay", overlay());
     }
     // The canvas may be hidden just now: then try again with the next refresh.
     else if (viewer.pending) invalidate();
@@ -367,6 +424,38 @@ function check() {
   } catch (error) {
     failed(error);
   }
+}
+
+/** Numbers and labels of the viewer. @returns {[Float64Array, string[]]} */
+const numbersAndLabels = (/** @type {any} */ answer) => answer;
+
+/** What the colours mean, made of the numbers and labels of the viewer. */
+function legend() {
+  const [numbers, [label, ...labels]] = numbersAndLabels(viewer.legend());
+  if (numbers.length === 0) return undefined;
+  const [low, high, log, ...rest] = numbers;
+  const parts = rest.splice(0, 3 * COLOURS).map((part) => part.toString(16).padStart(2, "0"));
+  const colours = Array.from({ length: COLOURS }, (_, i) => `#${parts.slice(3 * i, 3 * i + 3).join("")}`);
+  const ticks = labels.map((words, i) => ({ value: rest[2 * i + 1], label: words, fraction: rest[2 * i] }));
+  return { label, range: [low, high], log: log > 0, colours, ticks };
+}
+
+/** What an overlay draws, made of the numbers and labels of the viewer. */
+function overlay() {
+  const [numbers, [barLabel, ...labels]] = numbersAndLabels(viewer.overlay());
+  if (numbers.length === 0) return undefined;
+  let at = 0;
+  const take = (count) => Array.from(numbers.subarray(at, (at += count)));
+  const [length, width, everywhere] = take(3);
+  const rotation = [take(3), take(3), take(3)];
+  const matrix = take(16);
+  const axes = [];
+  while (at < numbers.length) {
+    const [axis, ends, outward, [count]] = [take(1)[0], [take(2), take(2)], take(2), take(1)];
+    const ticks = labels.splice(0, count).map((label) => ({ label, at: take(2) }));
+    axes.push({ axis, ends, outward, ticks });
+  }
+  return { axes, scaleBar: { label: barLabel, length, width, everywhere: everywhere > 0 }, rotation, matrix };
 }
 
 const canImprove = () => viewer.canImprove && !viewer.moving && took < SLOW && resting === undefined;

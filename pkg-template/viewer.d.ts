@@ -260,11 +260,11 @@ export interface Legend {
   ticks: { value: number; label: string; fraction: number }[];
 }
 
-/** What is shown at a point. */
-export interface PickedPoint {
+/** What is at a point. */
+export interface Reading {
   /** In model units. */
   position: [number, number, number];
-  /** The value of each field, by its name. */
+  /** The value of each field, by its name; of fields with several time steps at the time that is shown. */
   values: Record<string, number>;
   /** The number of the tetrahedron in the current mesh. */
   tet: number;
@@ -283,6 +283,33 @@ export interface ViewerOptions {
   frameTime?: number;
 }
 
+/** An edge of the box around the domain that shows the ticks of an axis. */
+export interface AxisOverlay {
+  /** 0 to 2 for x, y, z. */
+  axis: number;
+  /** The ends of the edge's part on the canvas, at the smaller coordinate first. */
+  ends: [[x: number, y: number], [x: number, y: number]];
+  /** Where labels go: away from the box, a direction of length 1 in pixels, y upwards. */
+  outward: [x: number, y: number];
+  /** Ascending. */
+  ticks: { label: string; at: [x: number, y: number] }[];
+}
+
+/** What an overlay over the picture draws. Points are points of the canvas: −1 to 1, y upwards. */
+export interface Overlay {
+  /** At most one for each axis; none for an axis that is seen end-on. */
+  axes: AxisOverlay[];
+  /**
+   * A bar of a round length. `width` is its length as a fraction of the canvas's width. In perspective it holds at the distance
+   * of the camera's target; `everywhere` is true where it holds at any distance.
+   */
+  scaleBar: { label: string; length: number; width: number; everywhere: boolean };
+  /** Right, up and towards the eye, as directions in the model. */
+  rotation: [right: number[], up: number[], towards: number[]];
+  /** From the model to clip space, column by column: with it points of the model can be drawn over the picture. */
+  matrix: number[];
+}
+
 export interface ViewerEventMap {
   progress: CustomEvent<ViewerProgress>;
   stats: CustomEvent<ViewerStats>;
@@ -293,6 +320,8 @@ export interface ViewerEventMap {
   legend: CustomEvent<Legend | undefined>;
   /** The GPU was lost, as when its driver is reset, and has been opened again. All is drawn as before. */
   restored: CustomEvent<{ adapter: string }>;
+  /** What an overlay draws has changed, with the picture that has just been drawn. */
+  overlay: CustomEvent<Overlay | undefined>;
   error: CustomEvent<Error>;
 }
 
@@ -324,6 +353,8 @@ export class Viewer extends EventTargetWithMeshTools {
   readonly adapter: string;
   /** What the colours mean; `undefined` where nothing is coloured by values. */
   readonly legend: Legend | undefined;
+  /** What an overlay over the last picture draws; `undefined` until the base mesh has arrived. */
+  readonly overlay: Overlay | undefined;
   /** All that is set, as plain data: `set` takes it. */
   readonly state: ViewerState;
 
@@ -388,7 +419,23 @@ export class Viewer extends EventTargetWithMeshTools {
   look(right: number, up: number): Promise<void>;
 
   /** What is shown at a point of the canvas (−1 to 1, y upwards); `undefined` if nothing is there. */
-  pick(x: number, y: number): Promise<PickedPoint | undefined>;
+  pick(x: number, y: number): Promise<Reading | undefined>;
+  /** What is at a point of the model, in the current mesh; `undefined` outside of it. */
+  reading(point: ArrayLike<number> & Iterable<number>): Promise<Reading | undefined>;
+  /**
+   * A picture of what is drawn, as a PNG of any size; the size of the canvas without one. It is the mean of `samples` pictures (16
+   * without it, at most 256), so that edges are smooth. Frames wait until it is ready.
+   *
+   * @example
+   * const blob = await viewer.screenshot({ width: 3840, height: 2160, background: "transparent" });
+   */
+  screenshot(options?: {
+    width?: number;
+    height?: number;
+    samples?: number;
+    /** That of the scene without it. */
+    background?: SceneState["background"];
+  }): Promise<Blob>;
   /** The handle of the region (0 to 5: lower and upper x, y, z) at a point of the canvas (−1 to 1, y upwards), or −1. */
   pickRegion(x: number, y: number): Promise<number>;
   /** Moves a handle of the region under a point; resolves to the new box. */

@@ -50,6 +50,9 @@ export class Viewer extends withMeshTools(EventTarget) {
   #scene = SCENE;
   #camera;
   #legend;
+  #overlay;
+  /** Of the canvas, in pixels. */
+  #size;
 
   /** Rejects with code `no-webgpu` where nothing can be drawn; resolves to nothing where it can. */
   static async check() {
@@ -96,7 +99,7 @@ export class Viewer extends withMeshTools(EventTarget) {
 
   async #start(frameTime) {
     const offscreen = handOver(this.#canvas);
-    const [width, height] = pixels(this.#canvas.getBoundingClientRect());
+    const [width, height] = (this.#size = pixels(this.#canvas.getBoundingClientRect()));
     const args = [offscreen, width, height, devicePixelRatio, frameTime];
     const created = await this.#remote.call("create", args, [offscreen]);
     this.#adapter = created.adapter;
@@ -105,7 +108,8 @@ export class Viewer extends withMeshTools(EventTarget) {
       const size = entry.devicePixelContentBoxSize?.[0];
       const [w, h] = size ? [size.inlineSize, size.blockSize] : pixels(entry.contentRect);
       this.#cover?.setAttribute("style", coverStyle(this.#canvas));
-      this.#change({ size: [Math.max(1, w), Math.max(1, h), devicePixelRatio] });
+      this.#size = [Math.max(1, w), Math.max(1, h)];
+      this.#change({ size: [...this.#size, devicePixelRatio] });
     });
     try {
       this.#observer.observe(this.#canvas, { box: "device-pixel-content-box" });
@@ -121,6 +125,7 @@ export class Viewer extends withMeshTools(EventTarget) {
     if (name === "failed") return this.#failed(data.goal, reviveError(data.error));
     if (name === "camera") this.#camera = data;
     if (name === "legend") this.#legend = data;
+    if (name === "overlay") this.#overlay = data;
     this.#emit(name, data);
     if (name === "stats" && data.done) this.#settle(data.goal, ({ resolve }) => resolve(data));
   }
@@ -180,6 +185,11 @@ export class Viewer extends withMeshTools(EventTarget) {
   /** What the colours mean; `undefined` where nothing is coloured by values. */
   get legend() {
     return this.#legend;
+  }
+
+  /** What an overlay over the last picture draws; `undefined` until the base mesh has arrived. */
+  get overlay() {
+    return this.#overlay;
   }
 
   /** All that is set: what is drawn, and `camera`. A copy, as plain data; `set` takes it. */
@@ -347,6 +357,23 @@ export class Viewer extends withMeshTools(EventTarget) {
     return this.#pick.call([x, y]);
   }
 
+  /** What is at a point of the model, in the current mesh; `undefined` outside of it. */
+  reading([x, y, z]) {
+    return this.#remote.call("reading", [x, y, z]);
+  }
+
+  /**
+   * A picture of what is drawn, as a PNG; the canvas keeps its own.
+   *
+   * @param {{ width?: number, height?: number, samples?: number, background?: string }} [options]
+   */
+  screenshot({ width = this.#size[0], height = this.#size[1], samples = 16, background } = {}) {
+    for (const [name, value] of Object.entries({ width, height, samples })) {
+      if (!(Number.isInteger(value) && value > 0)) return Promise.reject(badOption(name, "must be a positive integer"));
+    }
+    return this.#remote.call("screenshot", [width, height, samples, background]);
+  }
+
   /** The handle of the region at a point (−1 to 1, y upwards), or −1. */
   pickRegion(x, y) {
     return this.#remote.call("pickRegion", [x, y]);
@@ -376,6 +403,10 @@ export class Viewer extends withMeshTools(EventTarget) {
   [Symbol.dispose ?? Symbol.for("Symbol.dispose")]() {
     this.free();
   }
+}
+
+function badOption(name, problem) {
+  return new TetralodError("bad-option", `option \`${name}\`: ${problem}`);
 }
 
 /** An error of the file's contents says which file. */

@@ -5,7 +5,14 @@
  * `state` is "starting", "opening", "streaming", "complete", "failed" or "unsupported".
  */
 
+import { ColourSettings } from "./colours.js";
 import { attachControls } from "./controls.js";
+import { FlowSettings } from "./flow.js";
+import { count, milliseconds, nameOf, percentage, pixels, rounded, size } from "./format.js";
+import { OverlayView } from "./overlay.js";
+import { attachPicture, lookFrom } from "./picture.js";
+import { Probes } from "./probes.js";
+import { TransferEditor } from "./transfer.js";
 
 /** @type {(id: string) => any} Each caller knows the type of its element. */
 const $ = (id) => document.getElementById(id);
@@ -36,6 +43,18 @@ const demo = (window.tetralodDemo = {
 
 /** @type {import("tetralod/viewer").Viewer} */
 let viewer;
+/** @type {OverlayView} */
+let overlay;
+/** @type {Probes} */
+let probes;
+/** @type {ColourSettings} */
+let colours;
+/** @type {TransferEditor} */
+let transfer;
+/** @type {FlowSettings} */
+let flow;
+/** Whether time steps follow each other by themselves. */
+let playing = false;
 /** What was opened last: the button "Try again" opens it again. */
 let source;
 let opening = 0;
@@ -68,10 +87,91 @@ async function start() {
   viewer.addEventListener("frame", ({ detail }) => showFrame(detail));
   viewer.addEventListener("legend", ({ detail }) => showLegend(detail));
   viewer.addEventListener("error", ({ detail }) => fail(detail));
-  attachControls(canvas, viewer, { onHome: home, onBox: boxWasDragged });
+  attachOverlay();
+  attachControls(canvas, viewer, {
+    onHome: home,
+    onBox: boxWasDragged,
+    onClick: clicked,
+    onHover: (point, place) => demo.info && probes.hover(point, place),
+    onLeave: () => probes.leave(),
+    onSpan: spanBox,
+    isFlying: () => $("fly").checked,
+  });
+  attachColours();
+  flow = new FlowSettings({ overlay, onChange: draw });
   attachSettings();
+  attachPicture(viewer, { canvas, overlay, onChange: draw, onError: fail });
   attachFiles();
   open(new URLSearchParams(location.search).get("url") ?? $("volume").value);
+}
+
+/** What lies over the picture: axes, probes, the plot. */
+function attachOverlay() {
+  const covered = ["legend"].map($);
+  overlay = new OverlayView($("overlay"), { covered, onSide: (side) => lookFrom(viewer, side).catch(fail) });
+  viewer.addEventListener("overlay", ({ detail }) => (overlay.data = detail));
+  const parts = { readout: $("readout"), cards: $("cards"), marquee: $("marquee") };
+  const plot = { plot: $("plot"), plotTitle: $("plot-title"), plotArea: $("plot-area") };
+  const stage = { ...parts, ...plot };
+  const svg = $("overlay");
+  probes = new Probes({ viewer, overlay, svg, stage, fields: () => demo.info.fields, shown: () => field });
+  $("unpin").addEventListener("click", () => probes.clear());
+  $("box-of-pins").addEventListener("click", () => {
+    const [one, other] = probes.pins;
+    if (other) useBox(probes.boxOf(one.position, other.position));
+  });
+}
+
+/** The colours of values, and the transfer function. */
+function attachColours() {
+  const parts = { map: $("map"), reversed: $("reversed"), log: $("log"), preset: $("range-preset") };
+  const range = { low: $("range-low"), high: $("range-high"), note: $("range-note") };
+  const percentiles = async (fractions) => (await viewer.stats({ bins: 1000, fractions })).percentiles;
+  colours = new ColourSettings({ ...parts, ...range }, { percentiles, onChange: draw });
+  const ends = { low: $("transfer-low"), high: $("transfer-high"), chosen: $("transfer-chosen"), bar: $("transfer-bar") };
+  const buttons = { preset: $("transfer-preset"), add: $("transfer-add"), remove: $("transfer-remove") };
+  transfer = new TransferEditor(
+    { svg: $("transfer"), ...ends, ...buttons },
+    { isovalue: () => $("isovalue").value / 1000, onChange: draw },
+  );
+}
+
+/** Shows the histogram of the field where the transfer function is edited. */
+async function showHistogram() {
+  if (mode() !== "volume" || !demo.info) return;
+  transfer.volumes = (await viewer.stats({ bins: 100 })).histogram;
+}
+
+/** A click on the picture: a seed of a streamline on the plane in the view of the flow, a probe in all others. */
+async function clicked(point) {
+  if (!demo.info) return;
+  if (mode() === "flow") flow.click(point, seedPlane());
+  else probes.pin(point).catch(fail);
+}
+
+/** The plane of the seeds. */
+const seedPlane = () => ({ axis: Number($("axis").value), at: placeOfPlane() });
+
+/** Where the rectangle that is being spanned ends. */
+let spanEnd = { x: 0, y: 0 };
+
+/** A rectangle is being spanned on the picture, or has been: makes a box of what is seen at its ends. */
+async function spanBox(from, to, points) {
+  if (from) spanEnd = to;
+  probes.marquee(from, to);
+  if (!points) return;
+  const spanned = await probes.boxBetween(...points);
+  if (spanned) useBox(spanned);
+  else probes.note("Both ends of the rectangle must be on what is drawn", spanEnd);
+}
+
+/** Refines in this box. */
+function useBox(wanted) {
+  box = wanted;
+  $("region").value = "box";
+  showBox();
+  applyRoi();
+  refine();
 }
 
 /* Opening and streaming */
@@ -131,6 +231,9 @@ const KINDS = {
 /** The base mesh has arrived: sets up the settings for it. */
 function arrive(info) {
   demo.info = info;
+  probes.clear();
+  flow.fields = info.fields;
+  stop();
   $("n-kind").textContent = KINDS[info.kind] ?? info.kind;
   fields = new Map();
   info.fields.forEach(({ name }, number) => fields.set(name, [...(fields.get(name) ?? []), number]));
@@ -153,6 +256,8 @@ function chooseField() {
   $("time").max = steps.length - 1;
   $("time-row").hidden = steps.length < 2;
   field = demo.info.fields[steps[$("time").value]];
+  transfer.field = field;
+  colours.setField(field).catch(fail);
   if (field.time !== undefined) text("time-text", String(Number(field.time.toPrecision(6))), "time");
   applyIsovalue();
 }
@@ -195,7 +300,7 @@ function say(title, error) {
 /* Settings */
 
 const checked = (name) => /** @type {HTMLInputElement} */ (document.querySelector(`[name=${name}]:checked`)).value;
-const mode = () => /** @type {"iso" | "volume" | "slice" | "solid" | "mesh"} */ (checked("mode"));
+const mode = () => /** @type {"iso" | "volume" | "slice" | "solid" | "mesh" | "flow"} */ (checked("mode"));
 const refineBy = () => checked("refine-by");
 
 /** Positions of the slider of the field error: by screen error, it applies outside the view and may be coarser. */
@@ -234,24 +339,34 @@ function refine() {
   const options = { error: `${percent}%`, field: demo.info.fields.indexOf(field), maxTets: budget(), ...region() };
   if ($("focus").checked) options.isovalues = [isovalue()];
   if (refineBy() === "view") options.needs = [{ view: { pixels: errorPixels() } }];
+  // The step that comes next is refined with the one that is shown, so that it is there when it is shown.
+  if (playing) options.needs = [...(options.needs ?? []), { error: `${percent}%`, field: followingStep() }];
   demo.request = options;
-  viewer.refine(options).catch((error) => {
+  return viewer.refine(options).catch((error) => {
     if (error.code !== "freed" && error.code !== "not-ready") fail(error);
   });
 }
 
+/** The number of the field at the time step after the one that is shown. */
+function followingStep() {
+  const steps = fields.get(field.name);
+  return steps[(steps.indexOf(demo.info.fields.indexOf(field)) + 1) % steps.length];
+}
+
 function applyIsovalue() {
   const value = isovalue();
-  text("isovalue-text", `${short(value)} ${field.unit}`.trim(), "isovalue");
+  text("isovalue-text", `${rounded(value, field.max - field.min)} ${field.unit}`.trim(), "isovalue");
   draw();
   if ($("focus").checked) refine();
 }
 
 function applyMode() {
   for (const row of all("[data-mode]")) row.hidden = !row.dataset.mode.split(" ").includes(mode());
-  // Slices keep both sides.
-  $("flip").parentElement.hidden = mode() === "slice";
-  $("cut-label").textContent = mode() === "slice" ? "Plane" : "Clip plane";
+  // Slices and seeds have no side.
+  $("flip").parentElement.hidden = isPlane();
+  $("cut-label").textContent = isPlane() ? "Plane" : "Clip plane";
+  overlay.quad = undefined;
+  showHistogram().catch(fail);
   applyCut();
   draw();
 }
@@ -261,29 +376,31 @@ function draw() {
   if (!demo.info) return;
   const opacity = $("opacity").value / 100;
   text("opacity-text", `${$("opacity").value} %`, "opacity");
-  const colours = { map: $("map").value };
+  // The range is one of the field.
+  const others = { mesh: $("colour-by").value !== "field", flow: !flow.isByField };
+  $("range").hidden = others[mode()] ?? false;
   const nothing = { isosurfaces: [], volume: null, slices: [], boundary: null, cells: null, clips: [] };
-  const [low, high] = [field.min, field.max];
-  /** @type {[number, number][]} */
-  const opacities = [[low, 0], [low + 0.3 * (high - low), 0], [high, 0.8 * opacity]];
+  const noFlow = { streamlines: null, arrows: null };
   const shown = {
-    iso: { isosurfaces: [{ value: isovalue(), opacity }] },
-    volume: { volume: { opacities } },
-    slice: { slices: [{ ...plane(), opacity, edges: true }] },
-    solid: { boundary: { opacity, edges: true }, clips: [plane()] },
-    mesh: { cells: { cut: plane(), colourBy: $("colour-by").value } },
-  }[mode()];
-  viewer.set({ ...nothing, ...shown, colours }).catch(fail);
+    iso: () => ({ isosurfaces: [{ value: isovalue(), opacity }] }),
+    volume: () => ({ volume: { opacities: transfer.opacities(field, opacity) } }),
+    slice: () => ({ slices: [{ ...plane(), opacity, edges: true }] }),
+    solid: () => ({ boundary: { opacity, edges: true }, clips: [plane()] }),
+    mesh: () => ({ cells: { cut: plane(), colourBy: $("colour-by").value } }),
+    flow: () => flow.state({ bounds: demo.info.bounds, plane: seedPlane(), field }),
+  }[mode()]();
+  viewer.set({ ...nothing, ...noFlow, ...shown, colours: colours.state, background: $("background").value }).catch(fail);
 }
 
 /** The colour bar of what is drawn. */
 function showLegend(legend) {
   $("legend").hidden = !legend;
-  if (!legend) return;
-  const { label, colours, ticks } = legend;
-  const unit = field?.name === label && field.unit;
+  if (!legend) return overlay.refresh();
+  const { label, ticks } = legend;
+  const unit = unitOf(label);
   $("legend-name").textContent = unit ? `${label} in ${unit}` : label;
-  $("legend-bar").style.background = `linear-gradient(90deg, ${colours.join(", ")})`;
+  if (label === field?.name) transfer.colours = colours.gradient(legend);
+  $("legend-bar").style.background = `linear-gradient(90deg, ${legend.colours.join(", ")})`;
   $("legend-ticks").replaceChildren(
     ...ticks.map(({ label: value, fraction }) => {
       const tick = document.createElement("span");
@@ -292,15 +409,42 @@ function showLegend(legend) {
       return tick;
     }),
   );
+  leaveOutOverlaps($("legend-ticks"));
+  overlay.refresh();
+}
+
+/** The unit of what a legend is of: a field, or the length of the vector that is shown. */
+function unitOf(label) {
+  if (field?.name === label) return field.unit;
+  return mode() === "flow" ? flow.unit : "";
+}
+
+/** Hides the ticks whose words would touch those of the one before. */
+function leaveOutOverlaps(ticks) {
+  let end = Number.NEGATIVE_INFINITY;
+  for (const tick of ticks.children) {
+    const { left, right } = tick.getBoundingClientRect();
+    tick.hidden = left < end + 4;
+    if (!tick.hidden) end = right;
+  }
+}
+
+/** Whether the plane is one to look at, and cuts nothing away. */
+const isPlane = () => mode() === "slice" || mode() === "flow";
+
+/** The coordinate of the plane along its axis. */
+function placeOfPlane() {
+  const axis = Number($("axis").value);
+  const [low, high] = [demo.info.bounds[axis], demo.info.bounds[axis + 3]];
+  return low + ((high - low) * $("cut").value) / 1000;
 }
 
 /** The clip plane. @returns {{ normal: [number, number, number], offset: number }} */
 function plane() {
   const axis = Number($("axis").value);
-  const [low, high] = [demo.info.bounds[axis], demo.info.bounds[axis + 3]];
   const sign = $("flip").checked ? -1 : 1;
   const along = (other) => (other === axis ? sign : 0);
-  return { normal: [along(0), along(1), along(2)], offset: sign * (low + ((high - low) * $("cut").value) / 1000) };
+  return { normal: [along(0), along(1), along(2)], offset: sign * placeOfPlane() };
 }
 
 function applyCut() {
@@ -311,7 +455,7 @@ function applyCut() {
   const at = normal[axis] * offset;
   const where = Math.abs(at) < (high - low) * 1e-4 ? 0 : Number(at.toPrecision(3));
   const side = $("flip").checked ? "<" : ">";
-  const shown = mode() === "slice" ? `${"xyz"[axis]} = ${where}` : `Hide ${"xyz"[axis]} ${side} ${where}`;
+  const shown = isPlane() ? `${"xyz"[axis]} = ${where}` : `Hide ${"xyz"[axis]} ${side} ${where}`;
   text("cut-text", shown, "cut");
   draw();
   if ($("region").value === "cut") refine();
@@ -376,13 +520,43 @@ function home() {
   viewer.home();
 }
 
+/** Shows the time steps one after the other, each when the mesh of the one before is complete. */
+function play() {
+  playing = true;
+  showPlaying();
+  nextStep();
+}
+
+function stop() {
+  playing = false;
+  showPlaying();
+}
+
+function showPlaying() {
+  $("play").textContent = playing ? "Pause" : "Play";
+  $("play").setAttribute("aria-pressed", String(playing));
+}
+
+/** How long a time step is shown at least (in ms). */
+const STEP_TIME = 150;
+
+async function nextStep() {
+  const shownFor = new Promise((resolve) => setTimeout(resolve, STEP_TIME));
+  $("time").value = (Number($("time").value) + 1) % (Number($("time").max) + 1);
+  chooseField();
+  await Promise.all([refine(), shownFor]);
+  if (playing) nextStep();
+}
+
 function attachSettings() {
   const on = (id, then, name = "input") => $(id).addEventListener(name, then);
   $("panel").addEventListener("submit", (event) => event.preventDefault());
   for (const radio of document.querySelectorAll("[name=mode]")) radio.addEventListener("change", applyMode);
   on("isovalue", () => field && applyIsovalue());
   on("cut", applyCut);
-  for (const id of ["opacity", "map", "colour-by"]) on(id, draw);
+  for (const id of ["opacity", "colour-by"]) on(id, draw);
+  document.addEventListener("keydown", (event) => event.key === "Escape" && probes.clear());
+  on("play", () => (playing ? stop() : play()), "click");
   on("axis", applyCut);
   on("flip", applyCut);
   for (const radio of document.querySelectorAll("[name=refine-by]")) radio.addEventListener("change", applyRefineBy);
@@ -495,6 +669,8 @@ function showStats(stats) {
   if (!stats.done) return;
   // The mesh is not complete while data is missing.
   if (!stats.missing) demo.stats = stats;
+  probes.refresh();
+  showHistogram().catch(fail);
   const bound = percentage(stats.relativeErrorBound * 100);
   $("n-error").textContent = bound;
   $("budget-note").textContent = stats.satisfied || budget() === undefined ? BUDGET_NOTE : achieved(stats);
@@ -536,40 +712,4 @@ function announce(words) {
 function text(output, words, slider) {
   $(output).textContent = words;
   $(slider).setAttribute("aria-valuetext", words);
-}
-
-function percentage(percent) {
-  if (percent === 0) return "0";
-  return percent < 100 ? `${Number(percent.toPrecision(2))} %` : `${count(Math.round(percent))} %`;
-}
-
-function pixels(n) {
-  // There is no bound if the camera is inside a tetrahedron with an error.
-  if (n > 9999) return "no bound";
-  return `${Number(n.toPrecision(2))} ${n === 1 ? "pixel" : "pixels"}`;
-}
-
-function count(n) {
-  return n.toLocaleString("en");
-}
-
-/** A field value, with digits according to its range. */
-function short(value) {
-  const range = field.max - field.min;
-  if (Math.abs(value) < range * 1e-6) return "0";
-  const magnitude = Math.abs(value);
-  return magnitude >= 1e5 || magnitude < 1e-3 ? value.toExponential(2) : String(Number(value.toPrecision(4)));
-}
-
-function size(bytes) {
-  if (bytes < 1e3) return `${bytes} B`;
-  return bytes < 999_500 ? `${(bytes / 1e3).toFixed(0)} kB` : `${(bytes / 1e6).toFixed(2)} MB`;
-}
-
-function milliseconds(ms) {
-  return `${ms < 10 ? ms.toFixed(1) : ms.toFixed(0)} ms`;
-}
-
-function nameOf(from) {
-  return from.name ?? String(from).split(/[?#]/)[0].split("/").pop();
 }

@@ -407,6 +407,8 @@ impl Camera {
     }
 
     /// From model space to clip space, with double precision.
+    // One copy for all who project points: it is large in wasm.
+    #[inline(never)]
     pub(crate) fn matrix(&self, aspect: f64) -> DMat4 {
         let [near, far] = self.clip();
         let projection = match self.projection {
@@ -425,6 +427,7 @@ impl Camera {
     }
 
     /// The normalised screen point of `p`; `None` if it lies behind a perspective camera.
+    #[inline(never)]
     pub fn project(&self, p: DVec3, aspect: f64) -> Option<DVec2> {
         let clip = self.matrix(aspect) * p.extend(1.0);
         (clip.w > 0.0).then(|| DVec2::new(clip.x, clip.y) / clip.w)

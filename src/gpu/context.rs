@@ -57,10 +57,16 @@ impl Context {
         target: impl Into<wgpu::SurfaceTarget<'static>>,
     ) -> Result<(Self, wgpu::Surface<'static>), GpuError> {
         let instance = instance()?;
-        let surface =
-            instance.create_surface(target).map_err(|error| GpuError::NoSurface(error.to_string()))?;
+        let surface = surface(&instance, target)?;
         let context = Self::open(&instance, Some(&surface)).await?;
         Ok((context, surface))
+    }
+
+    /// Another surface to draw on.
+    pub(super) fn surface(
+        target: impl Into<wgpu::SurfaceTarget<'static>>,
+    ) -> Result<wgpu::Surface<'static>, GpuError> {
+        surface(&instance()?, target)
     }
 
     async fn open(instance: &wgpu::Instance, surface: Option<&wgpu::Surface<'_>>) -> Result<Self, GpuError> {
@@ -144,6 +150,13 @@ impl Context {
     pub fn check(&self) -> Result<(), GpuError> {
         self.trouble.take().map_or(Ok(()), Err)
     }
+}
+
+fn surface(
+    instance: &wgpu::Instance,
+    target: impl Into<wgpu::SurfaceTarget<'static>>,
+) -> Result<wgpu::Surface<'static>, GpuError> {
+    instance.create_surface(target).map_err(|error| GpuError::NoSurface(error.to_string()))
 }
 
 fn instance() -> Result<wgpu::Instance, GpuError> {

@@ -49,6 +49,11 @@ impl FragmentLists {
         Self { layout, lists: None, wanted: 0, counted: Arc::default() }
     }
 
+    /// Empty lists for pictures of another target.
+    pub(super) fn another(&self) -> Self {
+        Self { layout: self.layout.clone(), lists: None, wanted: 0, counted: Arc::default() }
+    }
+
     /// Begins the pass that fills the lists, for a picture of this size.
     pub(super) fn begin<'a>(
         &mut self,

@@ -16,6 +16,7 @@ mod mesh;
 mod pipeline;
 mod present;
 mod renderer;
+mod side_target;
 mod style;
 mod surface;
 mod target;
@@ -28,6 +29,7 @@ pub use wgpu;
 pub use context::Context;
 pub use error::GpuError;
 pub use renderer::Renderer;
+pub use side_target::SideTarget;
 pub use style::{CellShape, CellStyle, Colouring, EdgeLook, Lighting, SIDES, Style};
 pub use types::{BoxLines, Look, MOST_CLIPS};
 

@@ -25,8 +25,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 /// [`Renderer::update_mesh`].
 #[derive(Debug)]
 pub struct Renderer {
-    context: Context,
-    target: Target,
+    pub(super) context: Context,
+    pub(super) target: Target,
     common: Common,
     background: wgpu::RenderPipeline,
     surface_pipelines: SurfacePipelines,
@@ -35,14 +35,14 @@ pub struct Renderer {
     /// Made when tetrahedra are drawn first.
     cells: Option<CellPass>,
     shows_cells: bool,
-    lists: FragmentLists,
+    pub(super) lists: FragmentLists,
     composite: Composite,
     wire: WirePass,
     presenter: Presenter,
     /// Pictures that the device has not finished.
     in_flight: Arc<AtomicU32>,
     /// What the last picture showed, and of how many it is the mean.
-    last: Option<(Camera, Look, u32)>,
+    pub(super) last: Option<(Camera, Look, u32)>,
     /// What draws the left part of pictures, and how wide that is, as a fraction.
     beside: Option<Box<Renderer>>,
     split: f64,

@@ -217,10 +217,11 @@ fn configure(
         .get_default_config(&context.adapter, width, height)
         .ok_or_else(|| GpuError::NoSurface("this GPU cannot draw on it".to_owned()))?;
     config.format = format;
-    // Pictures with a transparent background are premultiplied; where the canvas cannot show them, it is opaque.
+    // Pictures with a transparent background are premultiplied; where the canvas cannot show them, it is opaque. Canvases of pages
+    // can, though wgpu does not list it.
     let modes = surface.get_capabilities(&context.adapter).alpha_modes;
     let premultiplied = wgpu::CompositeAlphaMode::PreMultiplied;
-    let is_offered = modes.contains(&premultiplied);
+    let is_offered = cfg!(target_arch = "wasm32") || modes.contains(&premultiplied);
     config.alpha_mode = if is_offered { premultiplied } else { wgpu::CompositeAlphaMode::Opaque };
     surface.configure(&context.device, &config);
     Ok(())

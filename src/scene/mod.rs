@@ -13,7 +13,7 @@ pub use state::{
 };
 
 use crate::geom::{Bounds, Camera, Ray};
-use crate::gpu::{BoxLines, GpuError, Look, MOST_CLIPS, Renderer};
+use crate::gpu::{BoxLines, GpuError, Look, MOST_CLIPS, Renderer, SideTarget};
 use crate::session::{Session, SessionError};
 use crate::view::{ClipPlane, ColourScale, Probe, ScaleError};
 use glam::DVec3;
@@ -251,6 +251,21 @@ impl Scene {
     ) -> Result<Vec<u8>, SceneError> {
         self.place_eye(session, camera);
         Ok(self.renderer.picture_with(camera, &self.look, samples, drawn).await?)
+    }
+
+    /// Draws a picture on another target, as the mean of `samples`, with lines as wide in its parts as they are on the own one.
+    ///
+    /// # Errors
+    /// As [`Scene::draw`].
+    pub fn draw_on(
+        &mut self,
+        target: &mut SideTarget,
+        session: &mut Session,
+        camera: &Camera,
+        samples: u32,
+    ) -> Result<(), SceneError> {
+        self.place_eye(session, camera);
+        Ok(self.renderer.draw_on_side(target, camera, &self.look, samples)?)
     }
 
     /// Draws the last picture again, for a smoother mean of several: see [`Renderer::draw_again`].

@@ -35,6 +35,8 @@ pub(super) struct Objects {
     legend: Option<Legend>,
     /// Whether the mesh of the renderer has the difference to another mesh in place of its field.
     shows_difference: bool,
+    /// The legend of tubes or arrows, which is shown where nothing else has one.
+    solids_legend: Option<Legend>,
 }
 
 #[derive(Debug, Default)]
@@ -77,11 +79,13 @@ pub(super) struct Input<'a> {
 }
 
 impl Input<'_> {
-    /// The number of the field with a name; that of the mesh without one.
+    /// The number of the field with a name, of the time step that is shown if it has that; that of the mesh without one.
     fn field(&self, what: &str, name: Option<&String>) -> Result<usize, SceneError> {
         let Some(name) = name else { return Ok(self.shown) };
-        let found = self.info.fields.iter().position(|field| field.name == *name);
-        found.ok_or_else(|| {
+        let time = self.info.fields[self.shown].time;
+        let all = || self.info.fields.iter().enumerate().filter(|(_, field)| field.name == *name);
+        let found = all().find(|(_, field)| field.time == time).or_else(|| all().next());
+        found.map(|(number, _)| number).ok_or_else(|| {
             let names = self.info.fields.iter().map(|field| field.name.as_str()).collect::<Vec<_>>();
             let problem = format!("there is no field {name:?}; this volume has: {}", names.join(", "));
             SceneError::state(what, problem)
@@ -204,6 +208,7 @@ impl Objects {
         self.update_isosurfaces(renderer, input)?;
         self.update_slices(renderer, input)?;
         self.update_boundary(renderer, input)?;
+        self.solids_legend = None;
         self.update_streamlines(renderer, input)?;
         self.update_arrows(renderer, input)?;
         self.update_legend(input)
@@ -235,9 +240,9 @@ impl Objects {
                 found.push((distance, place.into()));
             }
         }
+        found.extend(state.cells.as_ref().and_then(|cells| first_cell(&probe, cells, clips, ray, bounds)));
         if let (Some(volume), Ok(scale)) = (&state.volume, scale(&state.colours, state.colours.range, own)) {
             let medium = medium(volume, &scale, bounds.diagonal());
-            probe.make_grid();
             let hit = first_hit_in(&medium, &probe, ray, clips);
             found.extend(hit.map(|hit| (hit.distance, hit.position)));
         }
@@ -409,7 +414,7 @@ impl Objects {
                 self.solids.set_tubes_with(&lines, &options, |point| point.place.value(&mesh));
             }
         }
-        self.show_solids(renderer, input, TUBES, values)
+        self.show_solids(renderer, input, TUBES, values, "speed")
     }
 
     fn update_arrows(&mut self, renderer: &mut Renderer, input: &Input<'_>) -> Result<(), SceneError> {
@@ -426,16 +431,17 @@ impl Objects {
         };
         let components = [vectors[0].as_slice(), &vectors[1], &vectors[2]];
         self.solids.set_arrows(input.mesh, components, numbers.as_deref(), &options);
-        self.show_solids(renderer, input, ARROWS, values)
+        self.show_solids(renderer, input, ARROWS, values, "magnitude")
     }
 
-    /// Draws the tubes or arrows, coloured by a field or by what they are made of.
+    /// Draws the tubes or arrows, coloured by a field or by `own`, what they are made of.
     fn show_solids(
         &mut self,
         renderer: &mut Renderer,
         input: &Input<'_>,
         key: u32,
         field: Option<usize>,
+        own: &str,
     ) -> Result<(), SceneError> {
         renderer.set_surface(key, &Triangles::from(&self.solids), None)?;
         let colours = match field {
@@ -443,6 +449,8 @@ impl Objects {
             None => scale(&input.state.colours, None, range(&self.solids.values))?,
         };
         renderer.set_style(key, &Style { colouring: Colouring::Scale(colours), ..Style::default() });
+        let label = field.map_or(own, |field| &input.info.fields[field].name).to_owned();
+        self.solids_legend.get_or_insert(Legend { label, scale: colours });
         Ok(())
     }
 
@@ -469,9 +477,32 @@ impl Objects {
             let label = if is_difference { format!("difference of {name}") } else { name.clone() };
             input.scale(field).map(|scale| Legend { label, scale })
         };
-        self.legend = field.map(legend).transpose()?;
+        self.legend = field.map(legend).transpose()?.or_else(|| self.solids_legend.clone());
         Ok(())
     }
+}
+
+/// Where a ray enters the first tetrahedron that is drawn, and how far away that is. Tetrahedra count as if they were not shrunk.
+fn first_cell(
+    probe: &Probe<'_>,
+    cells: &CellState,
+    clips: &[ClipPlane],
+    ray: &Ray,
+    bounds: &Bounds,
+) -> Option<(f64, [f64; 3])> {
+    let reach = ray.origin.distance(bounds.min.into()) + bounds.diagonal();
+    let cut = cells.cut.map_or(ClipPlane::NOTHING, |cut| cut.clip());
+    let mesh = probe.mesh();
+    let spans = probe.line(ray.origin.into(), ray.at(reach).into());
+    // A little inside, so that the point is in this tetrahedron and not in the one before.
+    let places =
+        spans.iter().map(|span| (span.entry.tet, (span.from + 1e-6 * (span.to - span.from)) * reach));
+    let is_drawn = |tet: u32, distance: f64| {
+        let corners = mesh.tets[tet as usize].map(|p| mesh.positions[p as usize]);
+        cut.keeps(corners) && clips.iter().all(|clip| clip.keeps_point(ray.at(distance).into()))
+    };
+    let (_, distance) = places.into_iter().find(|(tet, distance)| is_drawn(*tet, *distance))?;
+    Some((distance, ray.at(distance).into()))
 }
 
 /// The quantity that colours tetrahedra; none for the field.

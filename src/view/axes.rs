@@ -106,15 +106,21 @@ pub fn tick_edges(
     aspect: f64,
     previous: [Option<BoxEdge>; 3],
 ) -> [Option<BoxEdge>; 3] {
-    [0, 1, 2].map(|axis| {
-        let rank = |edge: &BoxEdge| {
-            let bonus = if previous[axis] == Some(*edge) { BETTER } else { 0.0 };
-            Some((merit(*edge, bounds, camera, aspect)? + bonus, *edge))
-        };
-        let silhouette = |edge: &BoxEdge| edge.is_on_silhouette(bounds, camera);
-        let ranked = BoxEdge::parallel_to(axis).into_iter().filter(silhouette).filter_map(|edge| rank(&edge));
-        ranked.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, edge)| edge)
-    })
+    let mut chosen = [None; 3];
+    for (axis, best) in chosen.iter_mut().enumerate() {
+        let mut most = f64::NEG_INFINITY;
+        for edge in BoxEdge::parallel_to(axis) {
+            if !edge.is_on_silhouette(bounds, camera) {
+                continue;
+            }
+            let Some(merit) = merit(edge, bounds, camera, aspect) else { continue };
+            let merit = if previous[axis] == Some(edge) { merit + BETTER } else { merit };
+            if merit >= most {
+                (most, *best) = (merit, Some(edge));
+            }
+        }
+    }
+    chosen
 }
 
 /// The ticks of an edge that [`tick_edges`] chose. `spacing` is the smallest mean distance between ticks on
@@ -220,11 +226,17 @@ fn visible_part(ends: [DVec3; 2], camera: &Camera, aspect: f64) -> Option<[f64; 
 /// The one of the two directions across an edge that points away from the box. `on_edge` is a point of the
 /// edge; both are in halves of the screen's height.
 fn side(bounds: &Bounds, camera: &Camera, aspect: f64, on_edge: DVec2, across: DVec2) -> DVec2 {
-    let corners = BoxEdge::parallel_to(0).into_iter().flat_map(|edge| edge.ends(bounds));
-    let seen = corners.filter_map(|corner| camera.project(corner, aspect));
-    let away = seen.map(|p| (p * DVec2::new(aspect, 1.0) - on_edge).dot(across));
-    // All of them are on one side, but for rounding.
-    let farthest = away.max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
+    let ends = [bounds.min, bounds.max];
+    let mut farthest = 0.0_f64;
+    for corner in 0..8_usize {
+        let place = DVec3::from([0, 1, 2].map(|axis| ends[corner >> axis & 1][axis]));
+        let Some(seen) = camera.project(place, aspect) else { continue };
+        // All of them are on one side, but for rounding.
+        let away = (seen * DVec2::new(aspect, 1.0) - on_edge).dot(across);
+        if away.abs() > farthest.abs() {
+            farthest = away;
+        }
+    }
     if farthest > 0.0 { -across } else { across }
 }
 

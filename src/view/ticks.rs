@@ -95,12 +95,15 @@ pub fn log_ticks(range: [f64; 2], count: usize) -> Vec<Tick> {
 pub(super) fn nice_below(limit: f64) -> Tick {
     let limit = if limit.is_finite() && limit > 0.0 { limit } else { 1.0 };
     let exponent = limit.log10().floor() as i32;
-    let all = (exponent - 2..exponent + 2).flat_map(|e| STEPS.map(|digits| Decimal { digits, exponent: e }));
-    let found = all.rev().find(|d| d.value() <= limit && d.value() > 0.0);
-    found.map_or_else(
-        || Tick { value: limit, label: Decimal::near(limit).label() },
-        |d| Tick { value: d.value(), label: d.shortened().label() },
-    )
+    for exponent in (exponent - 2..exponent + 2).rev() {
+        for digits in STEPS.into_iter().rev() {
+            let found = Decimal { digits, exponent };
+            if found.value() <= limit && found.value() > 0.0 {
+                return Tick { value: found.value(), label: found.shortened().label() };
+            }
+        }
+    }
+    Tick { value: limit, label: Decimal::near(limit).label() }
 }
 
 /// The ends of a range in ascending order, if they are finite.

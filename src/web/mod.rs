@@ -13,6 +13,10 @@ mod session;
 mod tools;
 #[cfg(all(feature = "gpu", target_arch = "wasm32"))]
 mod viewer;
+#[cfg(all(feature = "gpu", target_arch = "wasm32"))]
+mod viewer_overlay;
+#[cfg(all(feature = "gpu", target_arch = "wasm32"))]
+mod viewer_screenshot;
 
 pub use loader::RangeLoader;
 pub use session::CoreSession;

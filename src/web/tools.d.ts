@@ -53,4 +53,6 @@ export interface FieldStats {
   above: number;
   /** Ends of the bins: one more than there are bins. */
   edges: Float64Array;
+  /** The values below which the fractions of the volume lie that were asked for. */
+  percentiles: Float64Array;
 }

@@ -140,8 +140,15 @@ macro_rules! mesh_tools {
                 Ok(seeds.iter().map(line).collect::<Array>().unchecked_into())
             }
 
-            /// Sums over the current mesh, and a histogram by volume of so many bins from `low` to `high`.
-            pub fn stats(&mut self, bins: u32, low: f64, high: f64) -> Result<JsStats, WebError> {
+            /// Sums over the current mesh, a histogram by volume of so many bins from `low` to `high`, and the values below
+            /// which these fractions of the volume lie.
+            pub fn stats(
+                &mut self,
+                bins: u32,
+                low: f64,
+                high: f64,
+                fractions: &[f64],
+            ) -> Result<JsStats, WebError> {
                 let field = self.file.session_mut().field();
                 let info = &self.file.info()?.fields[field];
                 let low = if low.is_nan() { info.min } else { low };
@@ -170,7 +177,13 @@ macro_rules! mesh_tools {
                     ("above", above),
                 ];
                 let edges: Vec<f64> = (0..=bins as usize).map(|b| histogram.edge(b)).collect();
-                let arrays = [("histogram", doubles(&histogram.volumes())), ("edges", doubles(&edges))];
+                let percentiles: Vec<f64> =
+                    fractions.iter().map(|part| histogram.percentile(*part)).collect();
+                let arrays = [
+                    ("histogram", doubles(&histogram.volumes())),
+                    ("edges", doubles(&edges)),
+                    ("percentiles", doubles(&percentiles)),
+                ];
                 let numbers = numbers.map(|(name, number)| (name, number.into()));
                 Ok(object(&numbers.into_iter().chain(arrays).collect::<Vec<_>>()))
             }

@@ -12,11 +12,13 @@ use super::options::RefineOptions;
 use super::reader::read;
 use super::results::{self, JsBlocks, JsInfo, JsMesh, JsProgress, JsStats};
 use crate::geom::{Bounds, Camera, CameraState, ViewPreset};
-use crate::gpu::Renderer;
+use crate::gpu::{Renderer, SideTarget};
 use crate::refine::{Part, View};
 use crate::scene::{Legend, Scene, SceneState};
+use crate::view::BoxEdge;
 use crate::view::gizmo::{self, BoxFace};
 use glam::DVec2;
+use js_sys::{Array, Float64Array};
 use serde::Serialize;
 use wasm_bindgen::prelude::wasm_bindgen;
 use wasm_bindgen::{JsCast, JsValue};
@@ -36,9 +38,9 @@ pub struct Viewer {
     pub(super) file: File,
     /// What takes the place of `file` when its first bytes are here.
     next: Option<File>,
-    scene: Scene,
-    camera: Camera,
-    ratio: f64,
+    pub(super) scene: Scene,
+    pub(super) camera: Camera,
+    pub(super) ratio: f64,
     /// The view that the needs which follow the camera have now.
     seen: View,
     /// Whether the mesh is not yet the one that was asked for.
@@ -46,38 +48,11 @@ pub struct Viewer {
     /// Whether the mesh stays as it is.
     is_frozen: bool,
     /// Whether the picture is out of date.
-    is_stale: bool,
-}
-
-/// What the colours mean, for JavaScript.
-#[derive(Serialize)]
-struct LegendData<'a> {
-    label: &'a str,
-    range: [f64; 2],
-    log: bool,
-    /// Colours from the lower to the upper end of the range, `#rrggbb`.
-    colours: Vec<String>,
-    ticks: Vec<TickData>,
-}
-
-/// A tick of the legend.
-#[derive(Serialize)]
-struct TickData {
-    value: f64,
-    label: String,
-    /// Where it is in the range, 0 to 1.
-    fraction: f64,
-}
-
-/// What is under the pointer.
-#[derive(Serialize)]
-struct ProbeData<'a> {
-    position: [f64; 3],
-    /// The value of each field, by its name.
-    values: Vec<(&'a str, f64)>,
-    tet: u32,
-    size: f64,
-    error: f64,
+    pub(super) is_stale: bool,
+    /// The edges of the box whose ticks the overlay shows.
+    pub(super) tick_edges: [Option<BoxEdge>; 3],
+    /// The picture beside the canvas that is being made.
+    pub(super) screenshot: Option<SideTarget>,
 }
 
 #[wasm_bindgen]
@@ -88,12 +63,6 @@ extern "C" {
     /// Where the camera is.
     #[wasm_bindgen(typescript_type = "object")]
     pub type JsCamera;
-    /// What the colours mean, or `undefined`.
-    #[wasm_bindgen(typescript_type = "object | undefined")]
-    pub type JsLegend;
-    /// What is at a point, or `undefined`.
-    #[wasm_bindgen(typescript_type = "object | undefined")]
-    pub type JsProbe;
 }
 
 /// Plain data for JavaScript.
@@ -133,6 +102,8 @@ impl Viewer {
             moving: false,
             is_frozen: false,
             is_stale: true,
+            tick_edges: [None; 3],
+            screenshot: None,
         }
     }
 
@@ -146,11 +117,6 @@ impl Viewer {
     /// Fails if the GPU is lost.
     pub fn check(&self) -> Result<(), WebError> {
         Ok(self.scene.renderer().check()?)
-    }
-
-    /// Width and height of the canvas in pixels.
-    pub fn size(&self) -> Box<[u32]> {
-        Box::new(self.scene.renderer().size())
     }
 
     /// The GPU in words.
@@ -330,28 +296,51 @@ impl Viewer {
         Ok(())
     }
 
-    /// What the colours mean; nothing where nothing is coloured by values.
-    pub fn legend(&self) -> JsLegend {
-        self.scene
-            .legend()
-            .map_or_else(|| JsValue::UNDEFINED.unchecked_into(), |legend| plain(&data_of(legend)))
+    /// What the colours mean, as a list of numbers and a list of labels, as [`Viewer::overlay`] does; both are empty where nothing is
+    /// coloured by values.
+    ///
+    /// The numbers are: the range, whether the scale is logarithmic, red, green and blue of 32 colours (to 255), and for each tick
+    /// where it is in the range (of 1) and its value. The labels are that of the scale and those of the ticks.
+    pub fn legend(&self) -> Array {
+        let (mut numbers, labels) = (Vec::new(), Array::new());
+        if let Some(Legend { label, scale }) = self.scene.legend() {
+            labels.push(&label.as_str().into());
+            numbers.extend_from_slice(&[scale.range[0], scale.range[1], f64::from(u8::from(scale.is_log))]);
+            for [red, green, blue, _] in scale.table::<32>() {
+                numbers.extend_from_slice(&[red, green, blue].map(f64::from));
+            }
+            for tick in scale.ticks(TICKS) {
+                numbers.extend_from_slice(&[scale.fraction(tick.value), tick.value]);
+                labels.push(&tick.label.into());
+            }
+        }
+        numbers_and_labels(&numbers, labels)
     }
 
-    /// What is shown at a screen point: where it is, the value of each field, the size and the error of its tetrahedron; nothing if
-    /// nothing is there.
-    pub fn pick(&mut self, x: f64, y: f64) -> Result<JsProbe, WebError> {
-        let nothing = || Ok(JsValue::UNDEFINED.unchecked_into());
+    /// What is known of the current mesh at a point, in model units: as [`Viewer::pick`]; nothing outside of the mesh.
+    pub fn reading(&mut self, x: f64, y: f64, z: f64) -> Result<Option<Box<[f64]>>, WebError> {
+        self.reading_at([x, y, z])
+    }
+
+    /// What is shown at a screen point: its place, the number of its tetrahedron, the size and the error of that, the number of
+    /// the field that is shown, and the value of each field; nothing if nothing is there.
+    pub fn pick(&mut self, x: f64, y: f64) -> Result<Option<Box<[f64]>>, WebError> {
         let ray = self.camera.ray(DVec2::new(x, y), self.aspect());
-        let Some(point) = self.scene.pick(self.file.session_mut(), &ray) else { return nothing() };
-        let Some(reading) = self.file.session_mut().reading(point)? else { return nothing() };
-        let names = self.file.info()?.fields.iter().map(|field| field.name.as_str());
-        Ok(plain(&ProbeData {
-            position: reading.position,
-            values: names.zip(reading.values).collect(),
-            tet: reading.tet,
-            size: reading.size,
-            error: reading.error,
-        }))
+        match self.scene.pick(self.file.session_mut(), &ray) {
+            Some(point) => self.reading_at(point),
+            None => Ok(None),
+        }
+    }
+
+    /// What is known of the mesh at a point of the model; nothing outside of it.
+    fn reading_at(&mut self, point: [f64; 3]) -> Result<Option<Box<[f64]>>, WebError> {
+        let session = self.file.session_mut();
+        let Some(reading) = session.reading(point)? else { return Ok(None) };
+        let [x, y, z] = reading.position;
+        let shown = session.field() as f64;
+        let mut known = vec![x, y, z, f64::from(reading.tet), reading.size, reading.error, shown];
+        known.extend_from_slice(&reading.values);
+        Ok(Some(known.into()))
     }
 
     /// The box that has handles.
@@ -360,7 +349,7 @@ impl Viewer {
         Some(Bounds { min: [x0, y0, z0], max: [x1, y1, z1] })
     }
 
-    fn aspect(&self) -> f64 {
+    pub(super) fn aspect(&self) -> f64 {
         self.scene.renderer().aspect()
     }
 
@@ -512,7 +501,7 @@ impl Viewer {
     }
 
     /// What the camera sees.
-    fn view(&self) -> View {
+    pub(super) fn view(&self) -> View {
         let matrix = self.camera.view_projection(self.aspect()).to_cols_array().map(f64::from);
         View { matrix, viewport: self.scene.renderer().size().map(f64::from) }
     }
@@ -553,21 +542,9 @@ const SIDES: [(&str, ViewPreset); 7] = [
     ("againstZ", ViewPreset::AgainstZ),
 ];
 
-fn data_of(legend: &Legend) -> LegendData<'_> {
-    let Legend { label, scale } = legend;
-    let hex = |[r, g, b, _]: [u8; 4]| format!("#{r:02x}{g:02x}{b:02x}");
-    let tick = |tick: crate::view::Tick| TickData {
-        value: tick.value,
-        label: tick.label,
-        fraction: scale.fraction(tick.value),
-    };
-    LegendData {
-        label,
-        range: scale.range,
-        log: scale.is_log,
-        colours: scale.table::<32>().map(hex).to_vec(),
-        ticks: scale.ticks(TICKS).into_iter().map(tick).collect(),
-    }
+/// A list of numbers and one of labels: objects of types of their own would make the module larger.
+pub(super) fn numbers_and_labels(numbers: &[f64], labels: Array) -> Array {
+    [JsValue::from(Float64Array::from(numbers)), labels.into()].into_iter().collect()
 }
 
 fn flat(bounds: &Bounds) -> Box<[f64]> {

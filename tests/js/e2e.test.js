@@ -47,11 +47,11 @@ async function setSlider(page, id, value) {
   return demo(page, "stats");
 }
 
-/** A screenshot of the canvas without the legend and the progress bar, saved as `name`, and its numbers. */
+/** A screenshot of the canvas without what lies over it, saved as `name`, and its numbers. */
 async function picture(page, name) {
   await settle(page);
   const path = fileURLToPath(new URL(`${name}.png`, pictures));
-  const style = "#legend, #loading { visibility: hidden }";
+  const style = "#legend, #loading, #overlay, #cards, #readout { visibility: hidden !important }";
   return study(page, await page.locator("#canvas").screenshot({ path, style }));
 }
 
@@ -326,6 +326,277 @@ test("each region that the page offers is refined", async () => {
   assert.ok(sizes.sphere < sizes.box, "the sphere is in the box");
   assert.deepEqual(page.complaints, []);
   await page.close();
+});
+
+/** Turns to a view of the page. */
+const show = (page, view) => page.locator("label", { hasText: view }).first().click();
+
+/** The small volume at a coarse mesh, so that pictures come soon. */
+async function openSmall() {
+  const page = await open("data/bucky-explicit.mt");
+  await reach(page, "complete");
+  await setSlider(page, "error", 70);
+  return page;
+}
+
+/** The middle of the canvas on the page. @returns {Promise<[number, number]>} */
+async function middle(page) {
+  const { x, y, width, height } = await page.locator("#canvas").boundingBox();
+  return [x + width / 2, y + height / 2];
+}
+
+/** The boxes of elements on the screen. */
+const boxes = (page, selector) =>
+  page.locator(selector).evaluateAll((found) =>
+    found.map((one) => one.getBoundingClientRect()).filter(({ width }) => width > 0).map(({ left, top, right, bottom }) => ({ left, top, right, bottom })),
+  );
+
+test("axes, scale bar and cube lie over the picture, and labels over nothing", async () => {
+  const page = await openSmall();
+  await show(page, "Slice");
+  for (const side of ["home", "alongX", "againstZ"]) {
+    await page.selectOption("#side", side);
+    await settle(page);
+    const legend = await boxes(page, "#legend");
+    const labels = await boxes(page, "#overlay .axis text, #overlay .scale-bar text");
+    assert.ok(labels.length >= 5, `${side}: ${labels.length} labels`);
+    const all = [...legend, ...labels];
+    const overlaps = (a, b) => a.left < b.right - 1 && b.left < a.right - 1 && a.top < b.bottom - 3 && b.top < a.bottom - 3;
+    for (const [i, one] of all.entries()) {
+      for (const other of all.slice(i + 1)) assert.ok(!overlaps(one, other), `${side}: ${JSON.stringify([one, other])}`);
+    }
+    await page.screenshot({ path: fileURLToPath(new URL(`page-axes-${side}.png`, pictures)) });
+  }
+  // A click on a face of the cube looks at it from the front.
+  await page.selectOption("#side", "home");
+  await settle(page);
+  await page.locator("#overlay .face-z:not([hidden]) text").click();
+  await settle(page);
+  const { camera } = await page.evaluate(() => window.tetralodDemo.viewer.state);
+  assert.ok(camera.pitch > 1.5, `from above: ${camera.pitch}`);
+  await page.check("#orthographic");
+  await settle(page);
+  assert.equal(await page.evaluate(() => window.tetralodDemo.viewer.overlay.scaleBar.everywhere), true);
+  await page.uncheck("#axes");
+  assert.equal(await page.locator("#overlay .axis").count(), 0);
+  await page.selectOption("#background", "light");
+  await page.check("#axes");
+  await settle(page);
+  await page.screenshot({ path: fileURLToPath(new URL("page-light.png", pictures)) });
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("the pointer reads values, clicks keep probes, and two of them give a plot", async () => {
+  const page = await openSmall();
+  await show(page, "Slice");
+  await settle(page);
+  const canvas = await page.locator("#canvas").boundingBox();
+  const at = (x, y) => /** @type {[number, number]} */ ([canvas.x + x * canvas.width, canvas.y + y * canvas.height]);
+  await page.mouse.move(...at(0.5, 0.5));
+  await page.locator("#readout").waitFor({ timeout: PATIENCE });
+  assert.match(await page.locator("#readout").innerText(), /density\s+[\d.]+\s+position\s.*cell size\s.*cell error\s+[\d.]+ %/s);
+  await page.mouse.click(...at(0.45, 0.5));
+  await page.locator(".card").waitFor();
+  await page.mouse.click(...at(0.58, 0.4));
+  await page.locator("#plot path").waitFor();
+  assert.equal(await page.locator(".card").count(), 2);
+  const before = await boxes(page, ".pins circle");
+  await page.locator("#canvas").focus();
+  await page.keyboard.press("ArrowLeft");
+  await settle(page);
+  await page.screenshot({ path: fileURLToPath(new URL("page-probes.png", pictures)) });
+  assert.notDeepEqual(await boxes(page, ".pins circle"), before, "probes follow the camera");
+  // What the plot shows: the ends of the profile are the values of the probes.
+  const [ends, outside, wrong] = await page.evaluate(async () => {
+    const { viewer, info } = window.tetralodDemo;
+    const [x0, y0, z0, x1, y1, z1] = info.bounds;
+    const middle = [(x0 + x1) / 2, (y0 + y1) / 2, (z0 + z1) / 2];
+    const corner = [x0 + (x1 - x0) / 8, y0 + (y1 - y0) / 8, z0 + (z1 - z0) / 8];
+    const readings = [await viewer.reading(corner), await viewer.reading(middle)];
+    const { at, values } = await viewer.line(corner, middle);
+    const beyond = await viewer.line([x0 - 1, y0, z0], middle);
+    const wrong = await viewer.line(corner, [1]).catch(({ code, message }) => [code, message]);
+    const ends = [readings.map(({ values }) => values.density), at[0], values[0], values.at(-1)];
+    return [ends, beyond.at[0] > 0, wrong];
+  });
+  assert.ok(Math.abs(ends[0][0] - ends[2]) < 1e-6 && Math.abs(ends[0][1] - ends[3]) < 1e-6 && ends[1] === 0, JSON.stringify(ends));
+  assert.ok(outside, "there is no value outside");
+  assert.equal(wrong[0], "bad-option");
+  assert.match(wrong[1], /`to`/);
+  await page.locator("#box-of-pins").click();
+  assert.equal(await page.locator("#region").inputValue(), "box");
+  await page.keyboard.press("Escape");
+  assert.equal(await page.locator(".card").count(), 0);
+  // A drag with Alt makes a box of what is at its ends.
+  await page.selectOption("#region", "");
+  await page.keyboard.down("Alt");
+  await page.mouse.move(...at(0.45, 0.45));
+  await page.mouse.down();
+  await page.mouse.move(...at(0.55, 0.55), { steps: 3 });
+  await page.mouse.up();
+  await page.keyboard.up("Alt");
+  await page.waitForFunction(() => document.querySelector("#region").matches(":has([value=box]:checked)"), undefined, { timeout: PATIENCE });
+  assert.ok(await page.locator("#marquee").isHidden());
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("colours have ranges, and the transfer function is edited", async () => {
+  const page = await openSmall();
+  await show(page, "Solid");
+  await settle(page);
+  const range = () => page.evaluate(() => window.tetralodDemo.viewer.legend.range);
+  const whole = await range();
+  await page.selectOption("#range-preset", "percentiles");
+  await settle(page);
+  const middle = await range();
+  assert.ok(middle[0] > whole[0] && middle[1] < whole[1], `${middle} within ${whole}`);
+  await page.selectOption("#range-preset", "symmetric");
+  await settle(page);
+  assert.equal((await range())[0], -whole[1]);
+  await page.fill("#range-low", "0.25");
+  await settle(page);
+  assert.deepEqual(await range(), [0.25, Number(whole[1].toPrecision(5))]);
+  await page.check("#log");
+  await page.check("#reversed");
+  await settle(page);
+  assert.ok(await page.evaluate(() => window.tetralodDemo.viewer.legend.log));
+  await page.selectOption("#range-preset", "data");
+  await page.uncheck("#log");
+
+  await show(page, "Volume");
+  await page.locator("#transfer .volumes").waitFor();
+  const opacities = () => page.evaluate(() => window.tetralodDemo.viewer.state.volume.opacities);
+  const ramp = await opacities();
+  await page.selectOption("#transfer-preset", "peak");
+  assert.equal((await opacities()).length, ramp.length + 2);
+  const editor = await page.locator("#transfer").boundingBox();
+  // A press beside the points adds one, and takes it along.
+  await page.mouse.move(editor.x + 0.2 * editor.width, editor.y + 0.5 * editor.height);
+  await page.mouse.down();
+  await page.mouse.move(editor.x + 0.25 * editor.width, editor.y + 0.3 * editor.height, { steps: 3 });
+  await page.mouse.up();
+  const added = await opacities();
+  assert.equal(added.length, ramp.length + 3);
+  assert.ok(added[1][1] > 0.6 && added[1][1] < 0.85, String(added[1]));
+  await page.keyboard.press("ArrowDown");
+  assert.ok((await opacities())[1][1] < added[1][1], "the keyboard moves points");
+  await page.keyboard.press("Delete");
+  assert.equal((await opacities()).length, ramp.length + 2);
+  await page.locator("#transfer-add").click();
+  assert.equal((await opacities()).length, ramp.length + 3);
+  assertDrawn(await picture(page, "transfer"));
+  await page.screenshot({ path: fileURLToPath(new URL("page-transfer.png", pictures)) });
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("screenshots have any size and background, and leave the canvas as it is", async () => {
+  const page = await openSmall();
+  const before = await picture(page, "before-screenshot");
+  const seen = await page.evaluate(async () => {
+    const { viewer } = window.tetralodDemo;
+    const look = async (options) => {
+      const image = await createImageBitmap(await viewer.screenshot(options));
+      const context = new OffscreenCanvas(image.width, image.height).getContext("2d");
+      context.drawImage(image, 0, 0);
+      const pixel = (x, y) => Array.from(context.getImageData(x, y, 1, 1).data);
+      return { size: [image.width, image.height], corner: pixel(2, 2), middle: pixel(image.width / 2, image.height / 2) };
+    };
+    const refused = await viewer.screenshot({ width: 0 }).catch(({ code }) => code);
+    const huge = await viewer.screenshot({ width: 100_000, height: 8 }).catch(({ code }) => code);
+    const light = await look({ width: 640, height: 360, samples: 4, background: "light" });
+    const clear = await look({ width: 200, height: 300, samples: 1, background: "transparent" });
+    return { light, clear, refused, huge, state: viewer.state.background };
+  });
+  assert.deepEqual(seen.light.size, [640, 360]);
+  assert.ok(Math.min(...seen.light.corner) > 240, `light: ${seen.light.corner}`);
+  assert.deepEqual(seen.clear.size, [200, 300]);
+  assert.equal(seen.clear.corner[3], 0, "the background is transparent");
+  assert.equal(seen.clear.middle[3], 255, "the surface is not");
+  assert.equal(seen.refused, "bad-option");
+  assert.notEqual(seen.huge, undefined);
+  assert.ok(differing(before, await picture(page, "after-screenshot")) < 0.005, "the canvas is as it was");
+  const download = page.waitForEvent("download");
+  await page.locator("#shot").click();
+  assert.match((await download).suggestedFilename(), /^tetralod-\d+x\d+\.png$/);
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("the eye flies, and rotations run out unless less motion is asked for", async () => {
+  const page = await openSmall();
+  const camera = () => page.evaluate(() => window.tetralodDemo.viewer.state.camera);
+  const swing = async () => {
+    const canvas = await page.locator("#canvas").boundingBox();
+    await page.mouse.move(canvas.x + 50, canvas.y + 60);
+    await page.mouse.down();
+    for (let i = 1; i < 8; i++) await page.mouse.move(canvas.x + 50 + 12 * i, canvas.y + 60);
+    await page.mouse.up();
+    await settle(page);
+    return camera();
+  };
+  const first = await camera();
+  await page.emulateMedia({ reducedMotion: "reduce" });
+  const still = await swing();
+  // As far as the pointer went: 84 pixels.
+  const height = await page.locator("#canvas").evaluate((canvas) => canvas.clientHeight);
+  const turned = (from, to) => Math.abs(Math.atan2(Math.sin(to.yaw - from.yaw), Math.cos(to.yaw - from.yaw)));
+  assert.ok(Math.abs(turned(first, still) - (3.2 * 84) / height) < 0.01, `${turned(first, still)}`);
+  await page.emulateMedia({ reducedMotion: "no-preference" });
+  assert.ok(turned(still, await swing()) > turned(first, still) + 0.005, "the rotation goes on");
+  await page.check("#fly");
+  await page.locator("#canvas").focus();
+  const start = await camera();
+  await page.keyboard.down("w");
+  await page.waitForFunction(
+    (target) => window.tetralodDemo.viewer.state.camera.target.some((x, i) => x !== target[i]),
+    start.target,
+    { timeout: PATIENCE },
+  );
+  await page.keyboard.up("w");
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("a flow has streamlines, arrows and time steps that play", async () => {
+  const page = await open("data/bucky-explicit.mt");
+  await reach(page, "complete");
+  assert.ok(await page.locator("#flow").isDisabled(), "there are no vectors");
+  await page.close();
+
+  const flow = await open("data/abc-flow.mt");
+  await reach(flow, "complete");
+  await show(flow, "Flow");
+  const tubes = await picture(flow, "flow");
+  assertDrawn(tubes);
+  assert.match(await flow.locator("#legend-name").innerText(), /^speed in m\/s$/);
+  const seeds = () => flow.evaluate(() => window.tetralodDemo.viewer.state.streamlines.seeds.length);
+  assert.equal(await seeds(), 64);
+  await flow.mouse.click(...(await middle(flow)));
+  await flow.waitForFunction(() => window.tetralodDemo.viewer.state.streamlines.seeds.length === 65);
+  const placed = await flow.evaluate(() => window.tetralodDemo.viewer.state.streamlines.seeds[64]);
+  assert.ok(Math.abs(placed[1] - Math.PI) < 1e-6, `on the plane: ${placed}`);
+  await flow.locator("#no-seeds").click();
+  await flow.check("#arrows");
+  await flow.selectOption("#flow-colour", "field");
+  assert.ok(differing(tubes, await picture(flow, "arrows")) > 0.03, "there are arrows");
+  assert.equal(await flow.locator("#legend-name").innerText(), "pressure");
+  await flow.uncheck("#arrows");
+  await flow.screenshot({ path: fileURLToPath(new URL("page-flow.png", pictures)) });
+
+  // Each step has vectors of its own; the one that comes next is refined with it.
+  const first = await picture(flow, "flow-step");
+  await setSlider(flow, "time", 2);
+  assert.ok(differing(first, await picture(flow, "flow-later")) > 0.01, "other vectors");
+  await flow.locator("#play").click();
+  await flow.waitForFunction(() => document.querySelector("#time-text").textContent === "5", undefined, { timeout: PATIENCE });
+  assert.equal((await demo(flow, "request")).needs.length, 1);
+  await flow.locator("#play").click();
+  assert.equal(await flow.locator("#play").innerText(), "Play");
+  assert.deepEqual(flow.complaints, []);
+  await flow.close();
 });
 
 test("the package runs in a worker of the page, without a viewer", async () => {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 
 use crate::serve::Server;
-use crate::{package, shell};
+use crate::{flow, package, shell};
 
 /// Where the page looks for its volumes.
 const DATA: &str = "www/data";
@@ -71,7 +71,25 @@ pub fn make_data(tetralod: &Path) -> Result<()> {
         shell::run(shell::command(tetralod, ["build", "--kind", kind]).arg(&input).arg("-o").arg(&part))?;
         fs::rename(&part, &mt)?;
     }
-    Ok(())
+    make_flow(tetralod)
+}
+
+/// Makes the volume with vectors and time steps.
+fn make_flow(tetralod: &Path) -> Result<()> {
+    let mt = Path::new(DATA).join("abc-flow.mt");
+    if is_newer(&mt, tetralod) {
+        return Ok(());
+    }
+    println!("making {}", mt.display());
+    let inputs: Vec<PathBuf> =
+        (0..flow::STEPS).map(|step| Path::new("target").join(format!("abc-flow-{step}.vti"))).collect();
+    for (input, step) in inputs.iter().zip(0..) {
+        flow::write(input, step)?;
+    }
+    let part = Path::new("target/abc-flow.mt");
+    let fields = ["--field", "pressure", "--field", "velocity", "--unit", "velocity=m/s", "-o"];
+    shell::run(shell::command(tetralod, ["build"]).args(&inputs).args(fields).arg(part))?;
+    fs::rename(part, &mt).context("moving the flow")
 }
 
 fn is_newer(file: &Path, than: &Path) -> bool {

@@ -8,6 +8,7 @@ mod bench_format;
 mod browser;
 mod demo;
 mod fixture;
+mod flow;
 mod package;
 mod paper;
 mod random;

@@ -1,14 +1,15 @@
 // What a page does with the viewer: each option and event type-checks, and without a page there is a clear error.
-import type { MtInfo } from "tetralod";
+import type { LineProfile, MtInfo } from "tetralod";
 import {
   TetralodError,
   Viewer,
   type OpenedVolume,
+  type Overlay,
   type OwnView,
   type PlaneState,
   type ViewerFrame,
   type ViewerProgress,
-  type PickedPoint,
+  type Reading,
   type ViewerRefineOptions,
   type ViewerState,
   type ViewerStats,
@@ -53,7 +54,14 @@ export async function page(canvas: HTMLCanvasElement): Promise<void> {
   const [{ tets }, slice] = await Promise.all([viewer.mesh(), viewer.slice([0, 0, 1], 0.5)]);
   [tets, slice.indices] satisfies Uint32Array[];
   await Viewer.create(canvas, { frameTime: Infinity });
-  const found: PickedPoint | undefined = await viewer.pick(0, 0);
+  const found: Reading | undefined = await viewer.pick(0, 0);
+  viewer.addEventListener("overlay", ({ detail }) => void (detail satisfies Overlay | undefined));
+  const label: string | undefined = viewer.overlay?.axes[0]?.ticks[0]?.label ?? viewer.overlay?.scaleBar.label;
+  const again: Reading | undefined = await viewer.reading(found?.position ?? [0, 0, 0]);
+  const along: LineProfile = await viewer.line([0, 0, 0], new Float32Array(3));
+  const { percentiles } = await viewer.stats({ bins: 10, range: [0, 1], fractions: [0.02, 0.98] });
+  const shots: Blob[] = [await viewer.screenshot(), await viewer.screenshot({ width: 9, height: 9, background: "light" })];
+  [label, again?.size, along.at[0], percentiles[0], shots.length] satisfies (string | number | undefined)[];
   const texts: string[] = [viewer.adapter, viewer.legend?.label ?? "", `${found?.values["p"]}`, await viewer.hash()];
   texts.length satisfies number;
   viewer.free();

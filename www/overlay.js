@@ -1,0 +1,285 @@
+/**
+ * What is drawn over the picture: axes with ticks, a scale bar, a cube that shows how the camera is turned, and whatever
+ * else has a place in the model.
+ *
+ * All of it is placed again with every picture. Labels that would lie over another one, over the legend or outside of the
+ * picture are left out.
+ */
+
+const SVG = "http://www.w3.org/2000/svg";
+
+/** Widths of characters and heights of lines of labels, in pixels. */
+const LABEL = { width: 7, height: 15 };
+/** Of the ends of ticks and of labels from the axis, in pixels. */
+const TICK = 6;
+const GAP = 10;
+/** Half an edge of the cube, and its distance from the corner of the picture. */
+const CUBE = { size: 21, right: 48, top: 50 };
+
+const NAMES = ["x", "y", "z"];
+
+/** The faces of the cube: their normals, their names, and the sides that show them from the front. */
+const FACES = NAMES.flatMap((name, axis) =>
+  [1, -1].map((sign) => ({
+    axis,
+    sign,
+    label: `${sign < 0 ? "−" : "+"}${name}`,
+    side: `${sign < 0 ? "along" : "against"}${name.toUpperCase()}`,
+  })),
+);
+
+/** @typedef {{ left: number, top: number, right: number, bottom: number }} Box */
+/** @typedef {ArrayLike<number> & Iterable<number>} Coordinates */
+
+/** @type {(name: string, attributes?: Record<string, any>, text?: string) => SVGElement} */
+export function element(name, attributes = {}, text = undefined) {
+  const made = document.createElementNS(SVG, name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, String(value));
+  if (text !== undefined) made.textContent = text;
+  return made;
+}
+
+export class OverlayView {
+  #svg;
+  #moving = element("g");
+  #faces;
+  /** @type {import("tetralod/viewer").Overlay | undefined} */
+  #data;
+  #showsAxes = true;
+  /** @type {{ axis: number, at: number, bounds: number[], seeds: number[][] } | undefined} */
+  #quad;
+  /** What lies over the picture, and must stay free of labels: elements of the page. @type {HTMLElement[]} */
+  #covered;
+  /** What is told when places on the screen have changed. @type {(() => void)[]} */
+  #followers = [];
+
+  /**
+   * @param {SVGSVGElement} svg lies over the canvas
+   * @param {{ covered: HTMLElement[], onSide: (side: any) => void }} how
+   */
+  constructor(svg, { covered, onSide }) {
+    this.#svg = svg;
+    this.#covered = covered;
+    this.#faces = FACES.map((face) => {
+      const group = element("g", { class: `face face-${NAMES[face.axis]}` });
+      group.append(element("polygon"), element("text", {}, face.label), element("title", {}, `Look at ${face.label}`));
+      group.addEventListener("click", () => onSide(face.side));
+      return { ...face, group };
+    });
+    svg.replaceChildren(this.#moving, ...this.#faces.map(({ group }) => group));
+    new ResizeObserver(() => this.#draw()).observe(svg);
+  }
+
+  /** What the viewer says with its event `overlay`. */
+  set data(data) {
+    this.#data = data;
+    this.#draw();
+  }
+
+  set showsAxes(shows) {
+    this.#showsAxes = shows;
+    this.#draw();
+  }
+
+  /** A plane across the box, and points on it; undefined for none. */
+  set quad(quad) {
+    this.#quad = quad;
+    this.#draw();
+  }
+
+  /**
+   * The point of the plane of an axis at a coordinate that is seen at a point of the canvas; undefined if that is not in the box.
+   *
+   * @returns {[number, number, number] | undefined}
+   */
+  onPlane([x, y], axis, at) {
+    const [m, bounds] = [this.#data?.matrix, this.#quad?.bounds];
+    if (!m || !bounds) return undefined;
+    const [first, second] = [(axis + 1) % 3, (axis + 2) % 3];
+    // Two linear equations for the two other coordinates.
+    const equation = (i, screen) => {
+      const part = (column) => m[4 * column + i] - screen * m[4 * column + 3];
+      return [part(first), part(second), -(part(axis) * at + part(3))];
+    };
+    const [[a, b, e], [c, d, f]] = [equation(0, x), equation(1, y)];
+    const determinant = a * d - b * c;
+    /** @type {[number, number, number]} */
+    const found = [0, 0, 0];
+    [found[axis], found[first], found[second]] = [at, (e * d - b * f) / determinant, (a * f - e * c) / determinant];
+    const isInside = found.every((value, i) => value >= bounds[i] && value <= bounds[i + 3]);
+    return isInside && this.project(found) ? found : undefined;
+  }
+
+  /** The outline of the plane, and the points on it. */
+  #plane() {
+    const group = element("g", { class: "plane" });
+    if (!this.#quad) return group;
+    const { axis, at, bounds, seeds } = this.#quad;
+    const corner = (one, other) => {
+      const p = [0, 0, 0];
+      [p[axis], p[(axis + 1) % 3], p[(axis + 2) % 3]] = [at, bounds[((axis + 1) % 3) + 3 * one], bounds[((axis + 2) % 3) + 3 * other]];
+      return this.project(p);
+    };
+    const corners = [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)];
+    if (corners.every(Boolean)) group.append(element("polygon", { points: corners.map((p) => p.join()).join(" ") }));
+    for (const place of seeds.map((seed) => this.project(seed)).filter(Boolean)) {
+      group.append(element("circle", { cx: place[0], cy: place[1], r: 3.5 }));
+    }
+    return group;
+  }
+
+  /** Draws again, because what covers the picture has changed. */
+  refresh() {
+    this.#draw();
+  }
+
+  /** Calls `then` whenever places on the screen have changed. */
+  follow(then) {
+    this.#followers.push(then);
+  }
+
+  /** Where a point of the model is on the screen, in pixels; undefined behind the eye. @param {Coordinates} point */
+  project(point) {
+    const [x, y, z] = point;
+    const m = this.#data?.matrix;
+    if (!m) return undefined;
+    const row = (i) => m[i] * x + m[4 + i] * y + m[8 + i] * z + m[12 + i];
+    const w = row(3);
+    return w > 0 ? this.#pixels([row(0) / w, row(1) / w]) : undefined;
+  }
+
+  /** A point of the canvas (−1 to 1, y upwards) in pixels. @param {Coordinates} point */
+  #pixels(point) {
+    const [x, y] = point;
+    const { clientWidth, clientHeight } = this.#svg;
+    return [((x + 1) / 2) * clientWidth, ((1 - y) / 2) * clientHeight];
+  }
+
+  #draw() {
+    const data = this.#data;
+    this.#svg.toggleAttribute("hidden", !data);
+    if (!data) return;
+    const [right, bottom] = [this.#svg.clientWidth, this.#svg.clientHeight];
+    const hasCube = this.#showsAxes && right > 260;
+    /** @type {Box[]} */
+    const taken = this.#takenBoxes();
+    if (hasCube) taken.push({ left: right - 2 * CUBE.right, top: 0, right, bottom: 2 * CUBE.top });
+    const fits = (box) => box.left > 2 && box.top > 2 && box.right < right - 2 && box.bottom < bottom - 2;
+    const isFree = (box) => fits(box) && !taken.some((other) => overlap(box, other));
+    const place = (box) => isFree(box) && taken.push(box) > 0;
+    /** @type {SVGElement[]} */
+    const parts = [this.#plane()];
+    if (this.#showsAxes) {
+      // It takes its place first, and is drawn over the axes.
+      const bar = this.#scaleBar(data.scaleBar, taken, bottom);
+      parts.push(...data.axes.map((axis) => this.#axis(axis, place)), bar);
+    }
+    this.#moving.replaceChildren(...parts);
+    this.#turnCube(data.rotation, right, hasCube);
+    for (const then of this.#followers) then();
+  }
+
+  /** What covers the picture, in pixels of it. @returns {Box[]} */
+  #takenBoxes() {
+    const { left, top } = this.#svg.getBoundingClientRect();
+    const shown = this.#covered.filter((over) => over.offsetParent !== null && over.clientHeight > 0);
+    return shown.map((over) => {
+      const box = over.getBoundingClientRect();
+      const margin = 4;
+      return {
+        left: box.left - left - margin,
+        top: box.top - top - margin,
+        right: box.right - left + margin,
+        bottom: box.bottom - top + margin,
+      };
+    });
+  }
+
+  /** @param {import("tetralod/viewer").AxisOverlay} axis @param {(box: Box) => boolean} place */
+  #axis({ axis, ends, outward, ticks }, place) {
+    const group = element("g", { class: `axis axis-${NAMES[axis]}` });
+    const [from, to] = ends.map((end) => this.#pixels(end));
+    const out = [outward[0], -outward[1]];
+    const away = (from, distance) => [from[0] + out[0] * distance, from[1] + out[1] * distance];
+    group.append(line(from, to));
+    let farthest = 0;
+    for (const { label, at } of ticks) {
+      const point = this.#pixels(at);
+      group.append(line(point, away(point, TICK)));
+      const words = label.replace("-", "−");
+      const box = labelBox(away(point, GAP), out, words);
+      if (!place(box)) continue;
+      group.append(text(box, words));
+      farthest = Math.max(farthest, Math.abs(out[0]) * (box.right - box.left) + Math.abs(out[1]) * LABEL.height);
+    }
+    // The name is at the middle, or where there is room for it.
+    const places = [0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8, 0.1, 0.9, 0, 1].map((part) => {
+      const point = [0, 1].map((i) => from[i] + (to[i] - from[i]) * part);
+      return labelBox(away(point, GAP + farthest + 5), out, NAMES[axis]);
+    });
+    const free = places.find(place);
+    if (free) group.append(text(free, NAMES[axis], "name"));
+    return group;
+  }
+
+  /** The scale bar at the bottom left, above the legend. */
+  #scaleBar({ label, width, everywhere }, taken, bottom) {
+    const length = width * this.#svg.clientWidth;
+    const words = everywhere ? label : `${label} at the target`;
+    const wide = Math.max(length, words.length * LABEL.width * 0.92);
+    const legend = taken.find((box) => box.left < 60 && box.bottom > bottom - 60);
+    const left = 26;
+    const base = legend ? legend.top - 14 : bottom - 24;
+    const bar = element("path", { d: `M${left} ${base - 6}v6h${length}v-6`, class: "bar" });
+    const group = element("g", { class: "scale-bar" });
+    const box = { left: left - 8, top: base - 27, right: left + wide + 8, bottom: base + 8 };
+    const size = { width: box.right - box.left, height: box.bottom - box.top };
+    group.append(element("rect", { x: box.left, y: box.top, rx: 6, ...size }));
+    group.append(bar, element("text", { x: left, y: base - 11 }, words));
+    taken.push(box);
+    return group;
+  }
+
+  #turnCube([rightward, upward, towards], width, isShown) {
+    const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    const centre = [width - CUBE.right, CUBE.top];
+    const place = (p) => [centre[0] + CUBE.size * dot(rightward, p), centre[1] - CUBE.size * dot(upward, p)];
+    for (const { axis, sign, group } of this.#faces) {
+      const facing = sign * towards[axis];
+      group.toggleAttribute("hidden", !isShown || facing < 0.02);
+      const at = (first, second) => {
+        const p = [0, 0, 0];
+        [p[axis], p[(axis + 1) % 3], p[(axis + 2) % 3]] = [sign, first, second];
+        return place(p);
+      };
+      const corners = [at(-1, -1), at(1, -1), at(1, 1), at(-1, 1)];
+      const [polygon, label] = group.children;
+      polygon.setAttribute("points", corners.map((corner) => corner.join()).join(" "));
+      const [x, y] = at(0, 0);
+      label.setAttribute("x", x);
+      label.setAttribute("y", String(y + 4));
+      label.toggleAttribute("hidden", facing < 0.35);
+    }
+  }
+}
+
+function line(from, to) {
+  return element("line", { x1: from[0], y1: from[1], x2: to[0], y2: to[1] });
+}
+
+/** The box of a label whose nearest point to the axis is `at`, in the direction `out` from it. @returns {Box} */
+function labelBox(at, out, words) {
+  const [[x, y], [outX, outY]] = [at, out];
+  const [width, height] = [words.length * LABEL.width, LABEL.height];
+  const left = x + ((outX - 1) * width) / 2;
+  const top = y + ((outY - 1) * height) / 2;
+  return { left, top, right: left + width, bottom: top + height };
+}
+
+function text({ left, right, bottom }, words, kind = "label") {
+  return element("text", { x: (left + right) / 2, y: bottom - 3.5, class: kind }, words);
+}
+
+function overlap(a, b) {
+  return a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+}

@@ -1,0 +1,54 @@
+/** The settings of the picture: where it is looked at from, background, projection, axes, flying, screenshots. */
+
+/** @type {(id: string) => any} Each caller knows the type of its element. */
+const $ = (id) => document.getElementById(id);
+
+/**
+ * @param {import("tetralod/viewer").Viewer} viewer
+ * @param {{ canvas: HTMLCanvasElement, overlay: import("./overlay.js").OverlayView, onChange: () => void,
+ *   onError: (error: any) => void }} page `onChange` draws again, with the background of the settings
+ */
+export function attachPicture(viewer, { canvas, overlay, onChange, onError }) {
+  $("side").addEventListener("input", () => {
+    lookFrom(viewer, $("side").value).catch(onError);
+    $("side").value = "";
+  });
+  $("background").addEventListener("input", () => {
+    $("stage").dataset.background = $("background").value;
+    onChange();
+  });
+  $("orthographic").addEventListener("input", () => {
+    const { camera } = viewer.state;
+    if (!camera) return;
+    const projection = $("orthographic").checked ? "orthographic" : "perspective";
+    viewer.set({ camera: { ...camera, projection } }).catch(onError);
+  });
+  $("axes").addEventListener("input", () => (overlay.showsAxes = $("axes").checked));
+  $("shot").addEventListener("click", () => save(viewer, canvas).catch(onError));
+}
+
+/** The model as it fills the picture leaves no room for the labels of axes: from so many times as far it does. */
+const ROOM = 1.18;
+
+/** Looks at the whole model from a side, with room around it. */
+export function lookFrom(viewer, side) {
+  const looked = viewer.lookFrom(side);
+  return side === "home" ? looked : Promise.all([looked, viewer.zoom(ROOM)]);
+}
+
+/** Makes a screenshot, and saves it as a file. */
+async function save(viewer, canvas) {
+  const button = $("shot");
+  const factor = Number($("shot-scale").value) * devicePixelRatio;
+  const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((length) => Math.round(length * factor));
+  button.disabled = true;
+  try {
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(await viewer.screenshot({ width, height }));
+    link.download = `tetralod-${width}x${height}.png`;
+    link.click();
+    URL.revokeObjectURL(link.href);
+  } finally {
+    button.disabled = false;
+  }
+}

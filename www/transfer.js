@@ -1,0 +1,258 @@
+/**
+ * The editor of the transfer function: which opacity each value of the field has, over the histogram of the field.
+ *
+ * Points are dragged with the mouse or a finger. A press beside them adds one; a double click removes one, and so does
+ * dragging it far out. With the keyboard, Tab goes from point to point, arrows move, Delete removes, Insert or + adds.
+ */
+
+import { rounded } from "./format.js";
+import { element } from "./overlay.js";
+
+/** The drawing, in its own units; the curve has room around it for whole points. */
+const SIZE = { width: 300, height: 120, margin: 9 };
+/** How near a press must be to a point, in these units, and how far outside a point is dropped. */
+const REACH = 14;
+const DROP = 40;
+/** How far an arrow key moves a point, and with Shift. */
+const STEP = [0.01, 0.1];
+
+/**
+ * A point: its value as a fraction of the field's range, and its opacity.
+ *
+ * @typedef {[at: number, opacity: number]} Point
+ */
+
+/** Functions to begin with; `at` is the fraction of the isovalue. @type {Record<string, (at: number) => Point[]>} */
+const PRESETS = {
+  ramp: () => [[0, 0], [0.3, 0], [1, 0.8]],
+  peak: () => [[0, 0], [0.38, 0], [0.5, 0.8], [0.62, 0], [1, 0]],
+  step: (at) => [[0, 0], [at, 0], [at, 0.5], [1, 0.5]],
+  shells: () => [[0, 0], [0.3, 0], [0.34, 0.25], [0.38, 0], [0.62, 0], [0.66, 0.7], [0.7, 0], [1, 0]],
+};
+
+export class TransferEditor {
+  #parts;
+  #onChange;
+  /** @type {Point[]} */
+  #points = PRESETS.ramp(0.5);
+  #selected = 2;
+  /** The volume of each bin of the histogram. */
+  #volumes = new Float64Array(0);
+  /** @type {import("tetralod").FieldInfo | undefined} */
+  #field;
+  #dragging = false;
+
+  /**
+   * @param {{ svg: SVGSVGElement, bar: HTMLElement, low: HTMLElement, high: HTMLElement, chosen: HTMLElement,
+   *   preset: HTMLSelectElement, add: HTMLButtonElement, remove: HTMLButtonElement }} parts
+   * @param {{ isovalue: () => number, onChange: () => void }} how `isovalue` as a fraction of the range
+   */
+  constructor(parts, { isovalue, onChange }) {
+    this.#parts = parts;
+    this.#onChange = onChange;
+    parts.preset.addEventListener("input", () => {
+      const preset = PRESETS[parts.preset.value];
+      if (preset) this.#set(preset(isovalue()), 0);
+    });
+    parts.add.addEventListener("click", () => this.#add());
+    parts.remove.addEventListener("click", () => this.#remove());
+    const { svg } = parts;
+    svg.setAttribute("viewBox", `0 0 ${SIZE.width} ${SIZE.height}`);
+    svg.addEventListener("pointerdown", (event) => this.#press(event));
+    svg.addEventListener("pointermove", (event) => this.#drag(event));
+    for (const name of ["pointerup", "pointercancel"]) svg.addEventListener(name, (event) => this.#drop(event));
+    svg.addEventListener("dblclick", (event) => this.#near(event) >= 0 && this.#remove());
+    svg.addEventListener("keydown", (event) => this.#key(event));
+    this.#draw();
+  }
+
+  /** The opacities for the viewer, for values of a field, each times `factor`. @returns {[number, number][]} */
+  opacities({ min, max }, factor) {
+    return this.#points.map(([at, opacity]) => [min + at * (max - min), opacity * factor]);
+  }
+
+  /** What the values are of. The points stay where they are in its range. @param {import("tetralod").FieldInfo} field */
+  set field(field) {
+    this.#field = field;
+    this.#parts.low.textContent = rounded(field.min, field.max - field.min);
+    this.#parts.high.textContent = rounded(field.max, field.max - field.min);
+    this.#draw();
+  }
+
+  /** The volume of the mesh in each of equal bins of the field's range. */
+  set volumes(volumes) {
+    this.#volumes = volumes;
+    this.#draw();
+  }
+
+  /** The colours of the field's range, for the bar below the curve. @param {string} gradient in CSS */
+  set colours(gradient) {
+    this.#parts.bar.style.background = gradient;
+  }
+
+  /** @param {Point[]} points @param {number} selected */
+  #set(points, selected) {
+    this.#points = points;
+    this.#selected = Math.min(Math.max(selected, 0), points.length - 1);
+    this.#draw();
+    this.#onChange();
+  }
+
+  /** Moves the chosen point; it stays between its neighbours. */
+  #move(at, opacity) {
+    const i = this.#selected;
+    const lower = this.#points[i - 1]?.[0] ?? 0;
+    const upper = this.#points[i + 1]?.[0] ?? 1;
+    const points = [...this.#points];
+    points[i] = [Math.min(Math.max(at, lower), upper), Math.min(Math.max(opacity, 0), 1)];
+    this.#parts.preset.value = "";
+    this.#set(points, i);
+  }
+
+  /** Adds a point: where it is given, or else in the middle between the chosen one and the next. */
+  #add(at = undefined, opacity = undefined) {
+    if (at === undefined) {
+      const i = Math.min(this.#selected, this.#points.length - 2);
+      const [one, next] = [this.#points[i], this.#points[i + 1]];
+      return this.#add((one[0] + next[0]) / 2, (one[1] + next[1]) / 2);
+    }
+    const place = this.#points.findIndex((point) => point[0] > at);
+    const i = place < 0 ? this.#points.length : place;
+    this.#parts.preset.value = "";
+    this.#set([...this.#points.slice(0, i), [at, opacity], ...this.#points.slice(i)], i);
+  }
+
+  /** Removes the chosen point; two remain. */
+  #remove() {
+    if (this.#points.length <= 2) return;
+    this.#parts.preset.value = "";
+    const i = this.#selected;
+    this.#dragging = false;
+    this.#set([...this.#points.slice(0, i), ...this.#points.slice(i + 1)], i);
+  }
+
+  #press(event) {
+    event.preventDefault();
+    this.#parts.svg.setPointerCapture(event.pointerId);
+    const near = this.#near(event);
+    this.#dragging = true;
+    if (near >= 0) {
+      this.#selected = near;
+      this.#draw();
+    } else this.#add(...this.#place(event));
+    this.#focus();
+  }
+
+  #drag(event) {
+    if (!this.#dragging) return;
+    const [at, opacity] = this.#place(event);
+    const height = SIZE.height - 2 * SIZE.margin;
+    const outside = Math.max(-opacity, opacity - 1) * height;
+    this.#parts.svg.classList.toggle("dropping", outside > DROP && this.#points.length > 2);
+    this.#move(at, opacity);
+  }
+
+  #drop(event) {
+    const { svg } = this.#parts;
+    if (this.#dragging && event.type === "pointerup" && svg.classList.contains("dropping")) this.#remove();
+    svg.classList.remove("dropping");
+    this.#dragging = false;
+  }
+
+  #key(event) {
+    const i = Array.from(this.#parts.svg.querySelectorAll("circle")).indexOf(event.target);
+    if (i < 0) return;
+    this.#selected = i;
+    const step = STEP[event.shiftKey ? 1 : 0];
+    const [at, opacity] = this.#points[i];
+    const moves = { ArrowLeft: [-step, 0], ArrowRight: [step, 0], ArrowUp: [0, step], ArrowDown: [0, -step] };
+    const move = moves[event.key];
+    if (move) this.#move(at + move[0], opacity + move[1]);
+    else if (event.key === "Delete" || event.key === "Backspace") this.#remove();
+    else if (event.key === "Insert" || event.key === "+") this.#add();
+    else return;
+    event.preventDefault();
+    this.#focus();
+  }
+
+  #focus() {
+    /** @type {SVGElement} */ (this.#parts.svg.querySelectorAll("circle")[this.#selected])?.focus();
+  }
+
+  /** Where an event is: a fraction of the range, held to it, and an opacity, which may be outside. @returns {Point} */
+  #place(event) {
+    const box = this.#parts.svg.getBoundingClientRect();
+    const x = ((event.clientX - box.left) / box.width) * SIZE.width - SIZE.margin;
+    const y = ((event.clientY - box.top) / box.height) * SIZE.height - SIZE.margin;
+    const at = x / (SIZE.width - 2 * SIZE.margin);
+    return [Math.min(Math.max(at, 0), 1), 1 - y / (SIZE.height - 2 * SIZE.margin)];
+  }
+
+  /** The point near an event, or −1. */
+  #near(event) {
+    const [x, y] = point(this.#place(event));
+    const distances = this.#points.map((other) => Math.hypot(point(other)[0] - x, point(other)[1] - y));
+    const nearest = Math.min(...distances);
+    return nearest <= REACH ? distances.indexOf(nearest) : -1;
+  }
+
+  #draw() {
+    const { svg, chosen, remove } = this.#parts;
+    const [first, last] = [this.#points[0], this.#points[this.#points.length - 1]];
+    const curve = [[0, first[1]], ...this.#points, [1, last[1]]].map((p) => point(/** @type {Point} */ (p)).join(" "));
+    const base = [point([1, 0]).join(" "), point([0, 0]).join(" ")];
+    const circles = this.#points.map((one, i) => {
+      const [cx, cy] = point(one);
+      const label = `Point ${i + 1} of ${this.#points.length}: ${this.#words(one)}`;
+      const isChosen = i === this.#selected;
+      const attributes = { cx, cy, r: isChosen ? 7 : 5.5, tabindex: 0, role: "button", "aria-label": label };
+      return element("circle", { ...attributes, class: isChosen ? "chosen" : "" });
+    });
+    // The circles stay in the page, so that the one with the focus keeps it.
+    const before = svg.querySelectorAll("circle");
+    if (before.length === circles.length) {
+      before.forEach((circle, i) => {
+        for (const { name, value } of circles[i].attributes) circle.setAttribute(name, value);
+      });
+    }
+    const shapes = [
+      element("path", { d: this.#histogramPath(), class: "volumes" }),
+      element("path", { d: `M${curve.join("L")}L${base.join("L")}Z`, class: "area" }),
+      element("path", { d: `M${curve.join("L")}`, class: "curve" }),
+    ];
+    const kept = before.length === circles.length ? Array.from(before) : circles;
+    svg.querySelectorAll("path").forEach((path) => path.remove());
+    svg.prepend(...shapes);
+    if (kept === circles) {
+      before.forEach((circle) => circle.remove());
+      svg.append(...circles);
+    }
+    chosen.textContent = this.#words(this.#points[this.#selected]);
+    remove.disabled = this.#points.length <= 2;
+  }
+
+  /** The histogram as an area. Its heights are square roots: what is rare is seen, too. */
+  #histogramPath() {
+    const most = Math.sqrt(this.#volumes.reduce((a, b) => Math.max(a, b), 0));
+    if (!(most > 0)) return "";
+    const count = this.#volumes.length;
+    const steps = Array.from(this.#volumes, (volume, i) => {
+      const height = Math.sqrt(Math.max(volume, 0)) / most;
+      return [point([i / count, height]), point([(i + 1) / count, height])].map((p) => p.join(" ")).join("L");
+    });
+    return `M${point([0, 0]).join(" ")}L${steps.join("L")}L${point([1, 0]).join(" ")}Z`;
+  }
+
+  #words([at, opacity]) {
+    const { min = 0, max = 1, unit = "" } = this.#field ?? {};
+    const value = `${rounded(min + at * (max - min), max - min)} ${unit}`.trim();
+    return `value ${value}, opacity ${Math.round(100 * opacity)} %`;
+  }
+}
+
+/** Where a point is in the drawing. @param {Point} point */
+function point([at, opacity]) {
+  const x = SIZE.margin + at * (SIZE.width - 2 * SIZE.margin);
+  const y = SIZE.margin + (1 - opacity) * (SIZE.height - 2 * SIZE.margin);
+  return [Number(x.toFixed(2)), Number(y.toFixed(2))];
+}
