@@ -1,7 +1,7 @@
 //! In a real browser: the core gives the meshes that the native program gives, and WebGPU is there.
 //!
 //! `cargo xtask test wasm` makes the fixture and runs this; TETRALOD_FIXTURE is its folder.
-#![cfg(all(target_arch = "wasm32", feature = "web"))]
+#![cfg(all(target_arch = "wasm32", feature = "web-session"))]
 
 use js_sys::{Array, Float32Array, Function, JSON, Promise, Reflect, Uint32Array};
 use tetralod::web::CoreSession;

@@ -126,7 +126,7 @@ function attachOverlay() {
 function attachColours() {
   const parts = { map: $("map"), reversed: $("reversed"), log: $("log"), preset: $("range-preset") };
   const range = { low: $("range-low"), high: $("range-high"), note: $("range-note") };
-  const percentiles = async (fractions) => (await viewer.stats({ bins: 1000, fractions })).percentiles;
+  const percentiles = async (fractions) => Array.from((await viewer.stats({ bins: 1000, fractions })).percentiles);
   colours = new ColourSettings({ ...parts, ...range }, { percentiles, onChange: draw });
   const ends = { low: $("transfer-low"), high: $("transfer-high"), chosen: $("transfer-chosen"), bar: $("transfer-bar") };
   const buttons = { preset: $("transfer-preset"), add: $("transfer-add"), remove: $("transfer-remove") };

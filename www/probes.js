@@ -18,7 +18,7 @@ const MOST_FIELDS = 8;
 
 const NAMES = ["A", "B"];
 
-/** @typedef {import("tetralod/viewer").ViewerProbe} Probe */
+/** @typedef {import("tetralod/viewer").Reading} Probe */
 
 export class Probes {
   #viewer;

@@ -1,14 +1,18 @@
 //! The JavaScript API: a thin façade over [`session`](crate::session) for wasm-bindgen. The package's JavaScript
 //! (`pkg-template/`) wraps it with streams, workers and promises; nothing here waits or does I/O.
 
+#[cfg(feature = "web-session")]
 mod bench;
 mod callback;
 mod error;
 mod file;
 mod loader;
+#[cfg(feature = "web-session")]
+mod mesh_changes;
 mod options;
 mod reader;
 mod results;
+#[cfg(feature = "web-session")]
 mod session;
 mod tools;
 #[cfg(all(feature = "gpu", target_arch = "wasm32"))]
@@ -19,6 +23,7 @@ mod viewer_overlay;
 mod viewer_screenshot;
 
 pub use loader::RangeLoader;
+#[cfg(feature = "web-session")]
 pub use session::CoreSession;
 #[cfg(all(feature = "gpu", target_arch = "wasm32"))]
 pub use viewer::Viewer;

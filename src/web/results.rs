@@ -1,14 +1,12 @@
 //! What JavaScript gets: plain objects, and typed arrays that own their memory.
 
 use super::options::Asked;
-use crate::bench::{BenchReport, Coherent};
-use crate::mt::{FieldInfo, MeshChanges, MtInfo};
+use crate::mt::{FieldInfo, MtInfo};
 use crate::refine::RefineStats;
 use crate::session::{BlockProgress, Progress};
 use crate::view::{IsoSurface, MeshView};
 use js_sys::{Float32Array, Float64Array, Object, Reflect, Uint32Array};
 use serde::Serialize;
-use std::ops::Range;
 use wasm_bindgen::prelude::wasm_bindgen;
 use wasm_bindgen::{JsCast, JsValue};
 
@@ -17,9 +15,6 @@ const TYPES: &str = include_str!("results.d.ts");
 
 #[wasm_bindgen]
 extern "C" {
-    /// The outcome of a benchmark as `tetralod bench --json` gives it.
-    #[wasm_bindgen(typescript_type = "object")]
-    pub type JsBench;
     /// Decoding progress as a plain object.
     #[wasm_bindgen(typescript_type = "Progress")]
     pub type JsProgress;
@@ -169,14 +164,8 @@ pub fn stats(stats: &RefineStats, info: &MtInfo, asked: &Asked) -> JsStats {
 }
 
 /// A value that serde describes. Numbers are `f64` where they may not fit 32 bits: all else would be refused or a `BigInt`.
-fn value<T: JsCast>(described: &impl Serialize) -> T {
+pub fn value<T: JsCast>(described: &impl Serialize) -> T {
     serde_wasm_bindgen::to_value(described).unwrap_or_default().unchecked_into()
-}
-
-/// What has changed in a mesh since one was handed out before, and the number of this one.
-pub struct Changes {
-    pub ranges: MeshChanges,
-    pub to: u32,
 }
 
 /// Setting a property on a fresh ordinary object cannot fail.
@@ -185,13 +174,6 @@ pub fn set(object: &JsValue, name: &str, value: &JsValue) {
 }
 
 /// A copy of `mesh` outside wasm memory.
-pub fn mesh(mesh: &MeshView<'_>, changes: &Changes) -> JsMesh {
-    let arrays: JsMesh = mesh_arrays(mesh);
-    set(arrays.as_ref(), "changes", &ranges(changes));
-    arrays
-}
-
-/// The same for callers that do not follow its changes.
 pub fn mesh_arrays(mesh: &MeshView<'_>) -> JsMesh {
     object(&[
         ("positions", floats(mesh.positions.as_flattened())),
@@ -199,43 +181,6 @@ pub fn mesh_arrays(mesh: &MeshView<'_>) -> JsMesh {
         ("tets", integers(mesh.tets.as_flattened())),
         ("neighbors", integers(mesh.neighbors.as_flattened())),
     ])
-}
-
-/// A copy of those parts of `mesh` that have changed.
-pub fn delta(mesh: &MeshView<'_>, changes: &Changes) -> JsDelta {
-    let MeshChanges { vertices, tets } = &changes.ranges;
-    object(&[
-        ("vertexCount", mesh.positions.len().into()),
-        ("tetCount", mesh.tets.len().into()),
-        ("changes", ranges(changes)),
-        ("positions", floats(&parts(mesh.positions.as_flattened(), vertices, 3))),
-        ("field", floats(&parts(mesh.field, vertices, 1))),
-        ("tets", integers(&parts(mesh.tets.as_flattened(), tets, 4))),
-        ("neighbors", integers(&parts(mesh.neighbors.as_flattened(), tets, 4))),
-    ])
-}
-
-fn ranges(changes: &Changes) -> JsValue {
-    let flat = |ranges: &[Range<u32>]| {
-        integers(&ranges.iter().flat_map(|range| [range.start, range.end]).collect::<Vec<_>>())
-    };
-    let MeshChanges { vertices, tets } = &changes.ranges;
-    let all: Object = object(&[
-        ("from", (changes.to - 1).into()),
-        ("to", changes.to.into()),
-        ("vertices", flat(vertices)),
-        ("tets", flat(tets)),
-    ]);
-    all.into()
-}
-
-/// The ranges of items of `size` numbers, one behind the other.
-fn parts<T: Copy>(numbers: &[T], ranges: &[Range<u32>], size: usize) -> Vec<T> {
-    let mut parts = Vec::with_capacity(size * ranges.iter().map(Range::len).sum::<usize>());
-    for range in ranges {
-        parts.extend_from_slice(&numbers[size * range.start as usize..size * range.end as usize]);
-    }
-    parts
 }
 
 /// A copy of `surface` outside wasm memory.
@@ -267,60 +212,4 @@ pub fn object<T: JsCast>(members: &[(&str, JsValue)]) -> T {
         let _ = Reflect::set(&object, &(*name).into(), value);
     }
     object.unchecked_into()
-}
-
-/// `report` with the names of `tetralod bench --json`.
-pub fn bench(report: &BenchReport) -> JsBench {
-    let updates = |rate| Rates { updates_per_second: Some(rate), tets_per_second: None };
-    let tets = |rate| Rates { updates_per_second: None, tets_per_second: Some(rate) };
-    let walks = &report.coherent;
-    value(&BenchObject {
-        updates: report.updates,
-        tetrahedra: report.tetrahedra,
-        runs: report.runs,
-        decode: updates(report.decode_updates),
-        refine: Rates { tets_per_second: Some(report.refine_tets), ..updates(report.refine_updates) },
-        coarsen: updates(report.coarsen_updates),
-        isosurface: tets(report.isosurface_tets),
-        coherent: Walks { r#box: walk(&walks.roi), iso: walk(&walks.iso), view: walk(&walks.view) },
-    })
-}
-
-#[derive(Serialize)]
-struct BenchObject {
-    updates: u32,
-    tetrahedra: u32,
-    runs: u32,
-    decode: Rates,
-    refine: Rates,
-    coarsen: Rates,
-    isosurface: Rates,
-    coherent: Walks,
-}
-
-#[derive(Serialize)]
-struct Rates {
-    #[serde(skip_serializing_if = "Option::is_none")]
-    updates_per_second: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    tets_per_second: Option<f64>,
-}
-
-#[derive(Serialize)]
-struct Walks {
-    r#box: Walk,
-    iso: Walk,
-    view: Walk,
-}
-
-#[derive(Serialize)]
-struct Walk {
-    median_ms: f64,
-    p95_ms: f64,
-    cold_ms: f64,
-}
-
-fn walk(walk: &Coherent) -> Walk {
-    let Coherent { median_ms, p95_ms, cold_ms, .. } = *walk;
-    Walk { median_ms, p95_ms, cold_ms }
 }

@@ -3,8 +3,9 @@
 use super::error::WebError;
 use super::file::File;
 use super::loader::RangeLoader;
+use super::mesh_changes::{self, Changes};
 use super::options::{RefineOptions, field_index};
-use super::results::{self, Changes, JsBlocks, JsDelta, JsInfo, JsIsoSurface, JsMesh, JsProgress, JsStats};
+use super::results::{self, JsBlocks, JsDelta, JsInfo, JsIsoSurface, JsMesh, JsProgress, JsStats};
 use crate::mt::MtInfo;
 use crate::session::Session;
 use wasm_bindgen::JsValue;
@@ -99,13 +100,13 @@ impl CoreSession {
     /// The current mesh, and what has changed in it since `mesh` or `delta` was last called.
     pub fn mesh(&mut self) -> Result<JsMesh, WebError> {
         let changes = self.changes()?;
-        Ok(results::mesh(&self.session_mut().view(), &changes))
+        Ok(mesh_changes::mesh(&self.session_mut().view(), &changes))
     }
 
     /// Of the current mesh only what has changed since `mesh` or `delta` was last called.
     pub fn delta(&mut self) -> Result<JsDelta, WebError> {
         let changes = self.changes()?;
-        Ok(results::delta(&self.session_mut().view(), &changes))
+        Ok(mesh_changes::delta(&self.session_mut().view(), &changes))
     }
 
     /// The isosurface of the current mesh at `value`, in field units.

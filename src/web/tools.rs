@@ -3,6 +3,7 @@
 use super::error::WebError;
 use super::options::field_index;
 use super::results::{JsIsoSurface, doubles, floats, integers, iso_surface, object, set};
+#[cfg(feature = "web-session")]
 use super::session::CoreSession;
 #[cfg(all(feature = "gpu", target_arch = "wasm32"))]
 use super::viewer::Viewer;
@@ -196,6 +197,7 @@ macro_rules! mesh_tools {
     };
 }
 
+#[cfg(feature = "web-session")]
 mesh_tools!(CoreSession);
 #[cfg(all(feature = "gpu", target_arch = "wasm32"))]
 mesh_tools!(Viewer);
