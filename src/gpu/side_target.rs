@@ -14,10 +14,15 @@ pub struct SideTarget {
 }
 
 impl Renderer {
-    /// Another target of this many pixels, such as a canvas that is not shown.
+    /// The largest width and height of a picture that the device can draw.
+    pub fn largest_picture(&self) -> u32 {
+        self.context.device.limits().max_texture_dimension_2d
+    }
+
+    /// Another target of this many pixels, held as in [`Renderer::resize`], such as a canvas that is not shown.
     ///
     /// # Errors
-    /// If it cannot be drawn to, or the device cannot draw so many pixels.
+    /// If it cannot be drawn to.
     pub fn side_target(
         &self,
         target: impl Into<wgpu::SurfaceTarget<'static>>,
@@ -25,11 +30,6 @@ impl Renderer {
     ) -> Result<SideTarget, GpuError> {
         let surface = Context::surface(target)?;
         let target = Target::canvas(&self.context, surface, size)?;
-        if target.size != size {
-            let [width, height] = target.size;
-            let problem = format!("this GPU draws at most {width} × {height} pixels of such a picture");
-            return Err(GpuError::NoSurface(problem));
-        }
         Ok(SideTarget { target, lists: self.lists.another() })
     }
 

@@ -10,6 +10,11 @@ impl Viewer {
     #[wasm_bindgen(js_name = beginScreenshot)]
     pub fn begin_screenshot(&mut self, canvas: web_sys::OffscreenCanvas) -> Result<(), WebError> {
         let size = [canvas.width(), canvas.height()];
+        let most = self.scene.renderer().largest_picture();
+        if size.into_iter().any(|length| length > most) {
+            let problem = format!("must be at most {most} on this GPU, and `height` as well");
+            return Err(WebError::bad_option("width", &problem));
+        }
         let target = wgpu::SurfaceTarget::OffscreenCanvas(canvas);
         self.screenshot = Some(self.scene.renderer().side_target(target, size)?);
         Ok(())
