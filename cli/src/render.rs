@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use std::pin::pin;
 use std::task::{Context as Task, Poll, Waker};
 use std::time::Instant;
-use tetralod::geom::{Bounds, Camera, Projection, ViewPreset};
+use tetralod::geom::{Bounds, Camera, CameraState, Projection, ViewPreset};
 use tetralod::gpu::{GpuError, Renderer};
 use tetralod::scene::{Background, Legend, Scene, SceneError};
 use tetralod::session::Session;
@@ -169,6 +169,7 @@ struct Report {
     /// Of isosurfaces, sections, the boundary, tubes and arrows.
     triangles: usize,
     colours: Option<Colours>,
+    camera: CameraState,
     device: String,
 }
 
@@ -233,6 +234,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         samples: arguments.samples,
         triangles: scene.triangles(),
         colours: scene.legend().map(Colours::of),
+        camera: camera.state(),
         device: scene.renderer().description(),
     };
     let about = description(&arguments.query.file, &report, &answer.summary);
@@ -340,7 +342,8 @@ fn explained(error: SceneError) -> anyhow::Error {
         SceneError::Gpu(GpuError::DeviceLost(why)) => {
             anyhow!("the GPU was lost: {why}; draw a smaller --size or a mesh of a smaller --budget")
         }
-        other => other.into(),
+        // The text of these holds that of their cause.
+        other => anyhow!("{other}"),
     }
 }
 

@@ -139,9 +139,9 @@ impl Objects {
         self.update_isosurfaces(renderer, &input, &changes.vertices, &changes.tets)?;
         self.update_slices(renderer, &input)?;
         self.update_boundary(renderer, &input)?;
+        self.update_legend(&input)?;
         self.update_streamlines(renderer, &input)?;
         self.update_arrows(renderer, &input)?;
-        self.update_legend(&input)?;
         Ok(true)
     }
 
@@ -391,6 +391,12 @@ impl Objects {
             Some(field) => input.scale(field)?,
             None => scale(&input.state.colours, None, range(&self.solids.values))?,
         };
+        // Where nothing else is coloured by values, the legend is theirs.
+        if self.legend.is_none() {
+            let own = if key == TUBES { "speed" } else { "magnitude" };
+            let label = field.map_or(own, |field| &input.info.fields[field].name).to_owned();
+            self.legend = Some(Legend { label, scale: colours });
+        }
         renderer.set_style(key, &Style { colouring: Colouring::Scale(colours), ..Style::default() });
         Ok(())
     }
