@@ -13,7 +13,7 @@ use shown::{About, Shown};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use tetralod::geom::{Bounds, Camera, Projection, ViewPreset};
+use tetralod::geom::{Bounds, Camera, CameraState, Projection, ViewPreset};
 use tetralod::gpu::{GpuError, Renderer, wait};
 use tetralod::scene::{Background, Legend, Scene, SceneError};
 
@@ -166,6 +166,7 @@ struct Report {
     /// Of isosurfaces, sections, the boundary, tubes and arrows.
     triangles: usize,
     colours: Option<Colours>,
+    camera: CameraState,
     device: String,
 }
 
@@ -233,6 +234,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         samples: arguments.samples,
         triangles: scene.triangles(),
         colours: scene.legend().map(Colours::of),
+        camera: camera.state(),
         device: scene.renderer().description(),
     };
     let about = description(&arguments.query.file, &report, &answer.summary);
@@ -309,7 +311,8 @@ fn explained(error: SceneError) -> anyhow::Error {
         SceneError::Gpu(GpuError::DeviceLost(why)) => {
             anyhow!("the GPU was lost: {why}; draw a smaller --size or a mesh of a smaller --budget")
         }
-        other => other.into(),
+        // The text of these holds that of their cause.
+        other => anyhow!("{other}"),
     }
 }
 

@@ -288,6 +288,11 @@ impl Renderer {
         self.context.take_uploaded()
     }
 
+    /// Bytes of memory on the GPU that the mesh takes.
+    pub fn mesh_bytes(&self) -> u64 {
+        self.mesh.bytes()
+    }
+
     /// Bytes of memory on the GPU that the mesh and the lists of pixels take.
     pub fn gpu_bytes(&self) -> u64 {
         let beside = self.beside.as_ref().map_or(0, |other| other.gpu_bytes());

@@ -53,7 +53,7 @@ pub struct BoxLines {
 #[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
 pub(super) struct Frame {
     view_projection: [[f32; 4]; 4],
-    /// Origin and direction of rays: in the middle, and the changes to the right and upper edges.
+    /// Origin and direction of rays: in the middle, and the changes to the right and upper edges; in w their lengths.
     rays: [[f32; 4]; 6],
     eye: [f32; 4],
     /// In their last numbers, how much the picture is moved on the screen.
@@ -74,7 +74,9 @@ impl Frame {
         let moved = DVec2::new(2.0 * shift[0] / w, -2.0 * shift[1] / h);
         let matrix = DMat4::from_translation(moved.extend(0.0)) * camera.matrix(w / h);
         let rays = camera.rays(w / h);
-        let shifted = |[middle, x, y]: [DVec3; 3]| [middle - x * moved.x - y * moved.y, x, y].map(wide);
+        let with_length = |v: DVec3| v.extend(v.length()).as_vec4().to_array();
+        let shifted =
+            |[middle, x, y]: [DVec3; 3]| [middle - x * moved.x - y * moved.y, x, y].map(with_length);
         let ([o, ox, oy], [d, dx, dy]) = (shifted(rays.origin), shifted(rays.direction));
         let (right, up, back) = (camera.right(), camera.up(), -camera.forward());
         let light = |x: f64, y: f64, z: f64, moved: f64| {

@@ -35,8 +35,6 @@ pub(super) struct Objects {
     legend: Option<Legend>,
     /// Whether the mesh of the renderer has the difference to another mesh in place of its field.
     shows_difference: bool,
-    /// The legend of tubes or arrows, which is shown where nothing else has one.
-    solids_legend: Option<Legend>,
 }
 
 #[derive(Debug, Default)]
@@ -208,10 +206,9 @@ impl Objects {
         self.update_isosurfaces(renderer, input)?;
         self.update_slices(renderer, input)?;
         self.update_boundary(renderer, input)?;
-        self.solids_legend = None;
+        self.update_legend(input)?;
         self.update_streamlines(renderer, input)?;
-        self.update_arrows(renderer, input)?;
-        self.update_legend(input)
+        self.update_arrows(renderer, input)
     }
 
     /// The nearest point along a ray of what is shown.
@@ -450,7 +447,8 @@ impl Objects {
         };
         renderer.set_style(key, &Style { colouring: Colouring::Scale(colours), ..Style::default() });
         let label = field.map_or(own, |field| &input.info.fields[field].name).to_owned();
-        self.solids_legend.get_or_insert(Legend { label, scale: colours });
+        // Where nothing else is coloured by values, the legend is theirs.
+        self.legend.get_or_insert(Legend { label, scale: colours });
         Ok(())
     }
 
@@ -477,7 +475,7 @@ impl Objects {
             let label = if is_difference { format!("difference of {name}") } else { name.clone() };
             input.scale(field).map(|scale| Legend { label, scale })
         };
-        self.legend = field.map(legend).transpose()?.or_else(|| self.solids_legend.clone());
+        self.legend = field.map(legend).transpose()?;
         Ok(())
     }
 }

@@ -4,11 +4,15 @@
 mod by_ranges;
 #[cfg(feature = "vulkan")]
 mod cells;
+mod colour_error;
 mod compare;
 mod cutaway;
+#[cfg(feature = "vulkan")]
+mod data_sets;
 mod difference;
 #[cfg(feature = "vulkan")]
 mod gpu_matches_cpu;
+mod integrals;
 mod iso_cases;
 mod iso_session;
 mod iso_update;

@@ -6,14 +6,15 @@ use anyhow::{Context, Result, bail};
 use serde_json::Value;
 
 use crate::serve::Server;
-use crate::{bench_build, bench_format, browser, demo, package, shell};
+use crate::{bench_build, bench_format, bench_pictures, browser, demo, package, shell};
 
-/// Measures `FILE.mt`, or the demo's volume; with `--browser` also in Chromium. With `--build`, the builders instead, with `--format` the files.
+/// Measures `FILE.mt`, or the demo's volume; with `--browser` also in Chromium. With `--build`, the builders instead, with `--format` the files, with `--pictures` the renderer.
 pub fn run(args: &[String]) -> Result<()> {
     match args {
         [build] if build == "--build" => return bench_build::run(false),
         [build, large] if build == "--build" && large == "--large" => return bench_build::run(true),
         [format] if format == "--format" => return bench_format::run(),
+        [pictures, options @ ..] if pictures == "--pictures" => return bench_pictures::run(options),
         _ => {}
     }
     let (mut file, mut in_browser) = (None, false);
@@ -22,7 +23,9 @@ pub fn run(args: &[String]) -> Result<()> {
             "--browser" => in_browser = true,
             path if !path.starts_with('-') && file.is_none() => file = Some(PathBuf::from(path)),
             other => {
-                bail!("`bench` knows one FILE.mt and --browser, --build [--large] or --format, not `{other}`")
+                bail!(
+                    "`bench` knows one FILE.mt and --browser, --build [--large], --format or --pictures, not `{other}`"
+                )
             }
         }
     }

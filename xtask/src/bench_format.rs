@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 
-use crate::shell;
+use crate::{bench_pictures, shell};
 
-const PAGE: &str = "docs/benchmarks.md";
+pub const PAGE: &str = "docs/benchmarks.md";
 
 /// Generated volumes in the tables, by points along a side, those of which only requests are measured, and that of the walk.
 const SIZES: [u32; 2] = [33, 65];
@@ -21,7 +21,7 @@ const KINDS: [&str; 2] = ["edge", "half-edge"];
 const HEAD: &str = "\
 # Benchmarks of MT files
 
-Written by `cargo xtask bench --format`, over the data sets in the folder that `TETRALOD_DATA` names and generated volumes.
+Written by `cargo xtask bench --format`, its last part by `cargo xtask bench --pictures`, over the data sets in the folder that `TETRALOD_DATA` names and generated volumes.
 Bytes are the same on every machine; speeds are of the machine that it ran on.
 
 ## Bytes
@@ -83,7 +83,7 @@ pub fn run() -> Result<()> {
         let walk = bench("walk", &[absolute(&file)?])?;
         write!(walks, "The generated volume of {WALKED}³ points, kind {kind}.\n\n{walk}\n")?;
     }
-    let page = [HEAD, "\n", &table, PICTURE, &requests, WALK, &walks].concat();
+    let page = [HEAD, "\n", &table, PICTURE, &requests, WALK, &walks, &bench_pictures::part()].concat();
     fs::write(PAGE, page).with_context(|| PAGE.to_owned())?;
     println!("wrote {PAGE}");
     Ok(())

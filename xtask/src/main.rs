@@ -5,6 +5,7 @@
 mod bench;
 mod bench_build;
 mod bench_format;
+mod bench_pictures;
 mod browser;
 mod demo;
 mod fixture;
@@ -32,6 +33,9 @@ usage: cargo xtask COMMAND
   bench [FILE.mt] [--browser]    measure decoding, refinement and isosurfaces; natively, or also in the browser
   bench --build [--large]        measure triangulation, insertion and the kinds of MT side by side
   bench --format                 measure MT files and what requests need of them; writes docs/benchmarks.md
+  bench --pictures [OPTION...]   measure the renderer in each mode, on the GPU or in software; writes its part of
+                                 docs/benchmarks.md. Options: --size WxH --tets N,N,... --grid N --file FILE.mt
+                                 --pictures N --modes A,B,...
   paper                          do the paper's experiments again and write docs/paper.md with plots and pictures";
 
 fn main() -> ExitCode {

@@ -2,6 +2,8 @@
 
 mod commands;
 mod fields;
+#[cfg(feature = "render")]
+mod gallery;
 mod linking;
 mod readme;
 mod remote;

@@ -11,14 +11,14 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 const START: &str = "```console";
-const PROMPT: &str = "$ tetralod ";
+pub const PROMPT: &str = "$ tetralod ";
 
 /// The pages with commands. Each is run in a folder of its own.
 const PAGES: [&str; 3] = ["README.md", "docs/command.md", "docs/input.md"];
 /// The pages that are the manual of the command.
 const MANUAL: [&str; 4] = ["docs/command.md", "docs/hosting.md", "docs/input.md", "docs/promises.md"];
 /// The pages whose links are followed.
-const LINKED: [&str; 10] = [
+const LINKED: [&str; 11] = [
     "ARCHITECTURE.md",
     "CHANGELOG.md",
     "CONTRIBUTING.md",
@@ -26,16 +26,17 @@ const LINKED: [&str; 10] = [
     "docs/benchmarks.md",
     "docs/command.md",
     "docs/format.md",
+    "docs/gallery.md",
     "docs/hosting.md",
     "docs/input.md",
     "docs/promises.md",
 ];
 /// The root of the repository.
-fn root() -> PathBuf {
+pub fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-fn content(page: &str) -> String {
+pub fn content(page: &str) -> String {
     fs::read_to_string(root().join(page)).unwrap_or_else(|error| panic!("{page}: {error}"))
 }
 
@@ -77,7 +78,7 @@ fn without_values(page: &str) -> String {
 }
 
 /// The arguments of a command line, which may be in single quotes.
-fn arguments(command: &str) -> Vec<&str> {
+pub fn arguments(command: &str) -> Vec<&str> {
     let quoted = command.split('\'').enumerate();
     let parts =
         quoted.map(|(i, part)| if i % 2 == 0 { part.split_whitespace().collect() } else { vec![part] });
@@ -92,7 +93,7 @@ fn run(command: &str, folder: &Path) -> String {
 }
 
 /// Writes the files that `page` shows, in blocks such as "```json camera.json".
-fn write_files(page: &str, folder: &Path) {
+pub fn write_files(page: &str, folder: &Path) {
     // The first piece is the text before the first block.
     for block in page.split("\n```json ").skip(1) {
         let (name, rest) = block.split_once('\n').expect("a block has lines");

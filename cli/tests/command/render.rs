@@ -11,16 +11,16 @@ use std::io::BufReader;
 /// A coarse mesh in a small picture, for software that draws.
 const SMALL: [&str; 6] = ["--size", "120x90", "--samples", "2", "--error", "10%"];
 
-struct Picture {
-    size: [u32; 2],
+pub struct Picture {
+    pub size: [u32; 2],
     /// Bytes of a pixel.
-    channels: usize,
-    bytes: Vec<u8>,
+    pub channels: usize,
+    pub bytes: Vec<u8>,
     about: String,
 }
 
 impl Picture {
-    fn read(path: &str) -> Self {
+    pub fn read(path: &str) -> Self {
         let decoder = png::Decoder::new(BufReader::new(File::open(path).expect("a picture")));
         let mut reader = decoder.read_info().expect("PNG");
         let mut bytes = vec![0; reader.output_buffer_size().expect("a size")];

@@ -3,7 +3,7 @@
 struct Frame {
     view_projection: mat4x4f,
     // The ray of the pixel at (x, y), from -1 to 1, upwards: it starts at origin + x origin_x + y origin_y
-    // and goes along the same sum of directions (w unused).
+    // and goes along the same sum of directions (in w their lengths).
     origin: vec4f,
     origin_x: vec4f,
     origin_y: vec4f,

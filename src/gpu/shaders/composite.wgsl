@@ -348,11 +348,15 @@ fn shade(pixel: vec2i) -> f32 {
     }
     normal = normalize(normal) * select(-1.0, 1.0, dot(normal, view) > 0.0);
     let radius = settings.shade.y;
-    // The radius on the screen, in pixels.
-    let beside = frame.view_projection * vec4f(middle + radius * normalize(frame.up.xyz), 1.0);
-    let own = frame.view_projection * vec4f(middle, 1.0);
-    let reach = clamp(length(beside.xy / beside.w - own.xy / own.w) * 0.5 * frame.viewport.y, 2.0, 90.0);
-    let noise = fract(52.9829189 * fract(dot(vec2f(pixel), vec2f(0.06711056, 0.00583715))));
+    // The radius on the screen, in pixels. Not by the matrix: Mesa's software driver would compile the shader again for
+    // each new one, which takes a second.
+    let ahead = frame.direction.xyz;
+    let depth = dot(middle - frame.origin.xyz, ahead) / dot(ahead, ahead);
+    let half_height = frame.origin_y.w + depth * frame.direction_y.w;
+    let reach = clamp(radius / half_height * 0.5 * frame.viewport.y, 2.0, 90.0);
+    // Each picture of a mean looks in other directions, so that the noise of one is not left in the mean.
+    let turn = 0.5 * frame.key_light.w * frame.viewport.x;
+    let noise = fract(52.9829189 * fract(dot(vec2f(pixel), vec2f(0.06711056, 0.00583715))) + turn);
     var sum = 0.0;
     for (var i = 0; i < TAPS; i += 1) {
         let part = (f32(i) + 0.5) / f32(TAPS);

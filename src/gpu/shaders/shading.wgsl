@@ -90,16 +90,28 @@ fn nearest_side(seen: Seen) -> f32 {
     return min(away.x, min(away.y, away.z));
 }
 
-// How much of the edge colour there is at a place in a triangle. Edges fade out where faces are a few pixels
-// large.
+// How much of the edge colour there is at a place in a triangle. Edges fade out where they are a few pixels long:
+// both triangles at an edge agree about that. One that is thinner than its lines draws none.
 fn edge_strength(seen: Seen) -> f32 {
     if style.shape.x <= 0.0 {
         return 0.0;
     }
+    let slope = max(seen.slope, vec3f(1e-9));
+    // Of the distance to each side in pixels.
     let width = 0.5 * style.shape.x * frame.viewport.z;
-    let line = 1.0 - smoothstep(width - 0.5, width + 0.5, nearest_side(seen));
-    let steepest = max(seen.slope.x, max(seen.slope.y, seen.slope.z));
-    return line * style.edge.a * (1.0 - smoothstep(0.08, 0.35, steepest * frame.viewport.z));
+    let lines = 1.0 - smoothstep(vec3f(width - 0.5), vec3f(width + 0.5), seen.sides / slope);
+    let steepest = max(slope.x, max(slope.y, slope.z)) * frame.viewport.z;
+    // Without the heights over all sides, by the least that is known.
+    var fade = vec3f(1.0 - smoothstep(0.08, 0.35, steepest));
+    let middle = 0.5 * (slope.x + slope.y + slope.z);
+    let product = middle * (middle - slope.x) * (middle - slope.y) * (middle - slope.z);
+    if min(slope.x, min(slope.y, slope.z)) > 1e-6 && product > 0.0 {
+        // The slopes are one over the heights, and so the area is one over four times the root of the product.
+        let lengths = slope / (2.0 * sqrt(product) * frame.viewport.z);
+        fade = smoothstep(vec3f(3.0), vec3f(12.0), lengths) * (1.0 - smoothstep(0.5, 2.0, steepest));
+    }
+    let strength = lines * fade;
+    return style.edge.a * max(strength.x, max(strength.y, strength.z));
 }
 
 // sRGB and opacity.

@@ -1,0 +1,62 @@
+//! `cargo xtask bench --pictures`: how fast the renderer draws; writes its part of `docs/benchmarks.md`.
+
+use std::fs;
+
+use anyhow::{Context, Result};
+
+use crate::bench_format::PAGE;
+use crate::shell;
+
+const TITLE: &str = "\n## Pictures\n";
+
+const HEAD: &str = "
+A headless renderer draws the generated volume at the smallest error that its number of tetrahedra allows, a picture at a
+time, while the camera turns and isovalue or plane move. *compute*: what the session and the scene compute on one thread
+of the CPU for a new isovalue, plane or set of tubes and arrows, with its upload; for volume, boundary and cells nothing but the
+style changes. *draw*: until the device has finished the picture. Both are medians. *GPU* is the memory of the mesh and of
+the lists of pixels, *bytes/tet* that of the mesh alone. The goal in software is 4 pictures a second in each mode.
+";
+
+/// What the page says of pictures, with the title; empty if nothing.
+pub fn part() -> String {
+    let page = fs::read_to_string(PAGE).unwrap_or_default();
+    page.find(TITLE).map_or_else(String::new, |at| page[at..].to_owned())
+}
+
+/// Measures with the options of the benchmark, and puts its table into the page, in place of the one of the same adapter
+/// and size.
+pub fn run(options: &[String]) -> Result<()> {
+    let mut command =
+        shell::cargo(["bench", "--package", "tetralod", "--features", "vulkan", "--bench", "pictures"]);
+    let table = shell::output(command.args(["--", "run"]).args(options))?;
+    println!("{table}");
+    let page = fs::read_to_string(PAGE).with_context(|| PAGE.to_owned())?;
+    let (others, old) = page.split_at(page.find(TITLE).unwrap_or(page.len()));
+    fs::write(PAGE, [others, TITLE, HEAD, &tables(old, &table)].concat()).with_context(|| PAGE.to_owned())?;
+    println!("wrote {PAGE}");
+    Ok(())
+}
+
+/// The tables of a part, with `fresh` in place of the one of the same title.
+fn tables(part: &str, fresh: &str) -> String {
+    let title = |table: &str| table.lines().next().unwrap_or_default().to_owned();
+    // The first piece is the text before the first table.
+    let old = part.split("\n### ").skip(1).map(|table| format!("### {}", table.trim_end()));
+    let mut all: Vec<String> = old.filter(|table| title(table) != title(fresh)).collect();
+    all.push(fresh.trim_end().to_owned());
+    all.iter().map(|table| format!("\n{table}\n")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{HEAD, tables};
+
+    #[test]
+    fn a_table_takes_the_place_of_its_predecessor() {
+        let first = tables("", "### a\n\n| 1 |\n");
+        assert_eq!(first, "\n### a\n\n| 1 |\n");
+        let both = tables(&[HEAD, &first].concat(), "### b\n\n| 2 |\n");
+        assert_eq!(both, "\n### a\n\n| 1 |\n\n### b\n\n| 2 |\n");
+        assert_eq!(tables(&[HEAD, &both].concat(), "### a\n\n| 3 |"), "\n### b\n\n| 2 |\n\n### a\n\n| 3 |\n");
+    }
+}
