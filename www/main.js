@@ -6,6 +6,7 @@
  */
 
 import { ColourSettings } from "./colours.js";
+import { Comparison } from "./compare.js";
 import { attachControls } from "./controls.js";
 import { FlowSettings } from "./flow.js";
 import { count, milliseconds, nameOf, percentage, pixels, rounded, size } from "./format.js";
@@ -57,6 +58,8 @@ let flow;
 let playing = false;
 /** What was opened last: the button "Try again" opens it again. */
 let source;
+/** @type {Comparison} */
+let comparison;
 let opening = 0;
 /** Corners of the box, [x0, y0, z0, x1, y1, z1]. */
 let box;
@@ -100,6 +103,7 @@ async function start() {
   attachColours();
   flow = new FlowSettings({ overlay, onChange: draw });
   attachSettings();
+  comparison = new Comparison(viewer, { onChange: draw, onError: fail });
   attachPicture(viewer, { canvas, overlay, onChange: draw, onError: fail });
   attachFiles();
   open(new URLSearchParams(location.search).get("url") ?? $("volume").value);
@@ -183,6 +187,7 @@ async function open(from) {
   Object.assign(demo, { state: "opening", error: undefined, info: undefined, stats: undefined });
   Object.assign(demo, { firstFrameBytes: undefined, firstFrameMs: undefined, receivedBytes: 0, totalBytes: undefined });
   demo.blocks = undefined;
+  comparison.forget();
   $("message").hidden = true;
   $("legend").hidden = true;
   $("loading").classList.remove("done");
@@ -389,7 +394,11 @@ function draw() {
     mesh: () => ({ cells: { cut: plane(), colourBy: $("colour-by").value } }),
     flow: () => flow.state({ bounds: demo.info.bounds, plane: seedPlane(), field }),
   }[mode()]();
-  viewer.set({ ...nothing, ...noFlow, ...shown, colours: colours.state, background: $("background").value }).catch(fail);
+  const compare = comparison.state;
+  // A difference has values on both sides of 0.
+  const diverging = compare?.difference ? { map: "coolwarm" } : {};
+  const looks = { colours: { ...colours.state, ...diverging }, background: $("background").value, compare };
+  viewer.set({ ...nothing, ...noFlow, ...shown, ...looks }).catch(fail);
 }
 
 /** The colour bar of what is drawn. */
@@ -689,6 +698,7 @@ function showFrame(frame) {
     demo.firstFrameMs = performance.now();
   }
   $("n-triangles").textContent = count(frame.triangles);
+  $("n-uploaded").textContent = size(frame.uploaded);
   $("n-draw").textContent = milliseconds(frame.milliseconds);
 }
 

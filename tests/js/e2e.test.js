@@ -51,7 +51,7 @@ async function setSlider(page, id, value) {
 async function picture(page, name) {
   await settle(page);
   const path = fileURLToPath(new URL(`${name}.png`, pictures));
-  const style = "#legend, #loading, #overlay, #cards, #readout { visibility: hidden !important }";
+  const style = "#legend, #loading, #overlay, #cards, #readout, #divider { visibility: hidden !important }";
   return study(page, await page.locator("#canvas").screenshot({ path, style }));
 }
 
@@ -71,7 +71,7 @@ function study(page, png) {
     };
     const covered = pixels.filter(isCovered);
     const sample = Array.from(pixels.filter((_, i) => i % 97 === 0));
-    return { colours: new Set(covered).size, covered: covered.length / pixels.length, pixels: sample };
+    return { colours: new Set(covered).size, covered: covered.length / pixels.length, pixels: sample, width: image.width };
   }, png.toString("base64"));
 }
 
@@ -521,6 +521,35 @@ test("screenshots have any size and background, and leave the canvas as it is", 
   const download = page.waitForEvent("download");
   await page.locator("#shot").click();
   assert.match((await download).suggestedFilename(), /^tetralod-\d+x\d+\.png$/);
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("a mesh that was kept is shown beside the current one, or the difference of their fields", async () => {
+  const page = await openSmall();
+  const coarse = await picture(page, "compare-coarse");
+  await page.locator("#keep").click();
+  await setSlider(page, "error", 0);
+  const both = await picture(page, "compare");
+  /** How many of the sampled pixels of a half differ; the two pixels of the divider are hidden. */
+  const differing = (left) => {
+    const isHere = (i) => (97 * i) % both.width < both.width / 2 === left;
+    return both.pixels.filter((pixel, i) => isHere(i) && pixel !== coarse.pixels[i]).length;
+  };
+  assert.equal(differing(true), 0, "on the left is the mesh that was kept");
+  assert.ok(differing(false) > 20, "on the right the current one");
+  await page.screenshot({ path: fileURLToPath(new URL("page-compare.png", pictures)) });
+  await page.locator("#difference").check();
+  await show(page, "Slice");
+  await settle(page);
+  assert.match(await page.textContent("#legend-name"), /^difference of density/);
+  const [low, high] = await page.evaluate(() => window.tetralodDemo.viewer.legend.range);
+  assert.ok(low === -high && high > 0, `${low} to ${high}`);
+  await page.screenshot({ path: fileURLToPath(new URL("page-difference.png", pictures)) });
+  await page.locator("#keep").click();
+  await settle(page);
+  assert.ok(await page.isHidden("#divider"));
+  assert.equal(await page.textContent("#legend-name"), "density");
   assert.deepEqual(page.complaints, []);
   await page.close();
 });
