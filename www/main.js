@@ -372,8 +372,8 @@ function applyMode() {
   $("cut-label").textContent = isPlane() ? "Plane" : "Clip plane";
   overlay.quad = undefined;
   showHistogram().catch(fail);
+  // Draws, too.
   applyCut();
-  draw();
 }
 
 /** Draws what the settings say. */

@@ -574,7 +574,14 @@ test("the eye flies, and rotations run out unless less motion is asked for", asy
   const turned = (from, to) => Math.abs(Math.atan2(Math.sin(to.yaw - from.yaw), Math.cos(to.yaw - from.yaw)));
   assert.ok(Math.abs(turned(first, still) - (3.2 * 84) / height) < 0.01, `${turned(first, still)}`);
   await page.emulateMedia({ reducedMotion: "no-preference" });
-  assert.ok(turned(still, await swing()) > turned(first, still) + 0.005, "the rotation goes on");
+  // The pointer may have rested before it was let go of, on a busy machine: then it is swung again.
+  let goesOn = false;
+  for (let from = still, tries = 0; !goesOn && tries < 10; tries++) {
+    const to = await swing();
+    goesOn = turned(from, to) > turned(first, still) + 0.005;
+    from = to;
+  }
+  assert.ok(goesOn, "the rotation goes on");
   await page.check("#fly");
   await page.locator("#canvas").focus();
   const start = await camera();
