@@ -228,9 +228,13 @@ impl Objects {
         let info = session.info()?.fields.get(shown)?;
         let own = [info.min, info.max];
         let mut probe = Probe::new(session.view());
-        for slice in &state.slices {
-            let slope = ray.direction.dot(slice.normal.into());
-            let distance = (slice.offset - ray.origin.dot(slice.normal.into())) / slope;
+        // What clip planes cut open is closed by sections with them.
+        let is_closed = state.boundary.as_ref().is_some_and(|boundary| boundary.clipped);
+        let caps = clips.iter().filter(|_| is_closed);
+        let caps = caps.map(|clip| (clip.normal.map(f64::from).into(), f64::from(clip.offset)));
+        let sections = state.slices.iter().map(|slice| (DVec3::from(slice.normal), slice.offset));
+        for (normal, offset) in sections.chain(caps) {
+            let distance = (offset - ray.origin.dot(normal)) / ray.direction.dot(normal);
             let place = ray.at(distance);
             let is_kept = clips.iter().all(|clip| clip.keeps_point(place.into()));
             if distance > 0.0 && is_kept && probe.locate(place.into()).is_some() {

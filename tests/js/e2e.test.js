@@ -424,6 +424,17 @@ test("the pointer reads values, clicks keep probes, and two of them give a plot"
   assert.ok(outside, "there is no value outside");
   assert.equal(wrong[0], "bad-option");
   assert.match(wrong[1], /`to`/);
+  // What is cut open is closed: the cut is in front of the boundary behind it. Cells are hit, too.
+  for (const view of ["Solid", "Mesh"]) {
+    await show(page, view);
+    await settle(page);
+    const [found, cut] = await page.evaluate(async () => {
+      const { viewer, info } = window.tetralodDemo;
+      return [await viewer.pick(0, 0), (info.bounds[1] + info.bounds[4]) / 2];
+    });
+    assert.ok(Math.abs(found.position[1] - cut) < (view === "Solid" ? 1e-6 : found.size), `${view}: ${JSON.stringify(found)}`);
+  }
+  await show(page, "Slice");
   await page.locator("#box-of-pins").click();
   assert.equal(await page.locator("#region").inputValue(), "box");
   await page.keyboard.press("Escape");
