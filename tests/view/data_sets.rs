@@ -35,7 +35,7 @@ fn read(path: &Path) -> Result<TetMesh, String> {
 
 /// A grid with every n-th point.
 fn thinned(mesh: TetMesh) -> TetMesh {
-    let Some(grid) = mesh.grid.clone() else { return mesh };
+    let Some(grid) = mesh.grid else { return mesh };
     let step = grid.dims.iter().map(|n| (n - 1).div_ceil(MOST_CELLS)).max().unwrap_or(1).max(1);
     let dims = grid.dims.map(|n| (n - 1) / step + 1);
     let fields = mesh.fields.iter().map(|field| {
