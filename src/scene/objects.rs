@@ -10,6 +10,7 @@ use crate::view::{
     ArrowLength, ArrowOptions, BoundarySurface, ClipPlane, ColourScale, Difference, IsoSurface, Medium,
     MeshView, Probe, Slice, Solids, TraceOptions, Tracer, Triangles, TubeOptions, first_hit, first_hit_in,
 };
+use glam::DVec3;
 use std::borrow::Cow;
 
 /// Numbers of surfaces in the renderer: those of lists begin at these.
