@@ -7,6 +7,7 @@
 //! arrive as [`GpuError`]s from [`Renderer::draw`], also those that the device reports late.
 
 mod buffers;
+mod cell_parts;
 mod cells;
 mod composite;
 mod context;

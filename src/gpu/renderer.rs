@@ -244,7 +244,8 @@ impl Renderer {
 
     /// Whether volume or tetrahedra are to be drawn and have no mesh: [`Renderer::update_mesh`] must be called.
     pub fn wants_mesh(&self) -> bool {
-        self.mesh.is_behind()
+        let are_cells_behind = self.shows_cells && self.cells.as_ref().is_some_and(CellPass::is_behind);
+        self.mesh.is_behind() || are_cells_behind
     }
 
     /// Brings the mesh of volume and tetrahedra up to date. `changes` are ranges of points and of tetrahedra that have changed since
@@ -259,6 +260,12 @@ impl Renderer {
         changes: Option<[&[Range<u32>]; 2]>,
     ) -> Result<(), GpuError> {
         self.composite.set_eye(mesh, None);
+        let is_same = changes.is_some_and(|[points, tets]| points.is_empty() && tets.is_empty());
+        if let Some(cells) =
+            self.cells.as_mut().filter(|cells| self.shows_cells && (cells.is_behind() || !is_same))
+        {
+            cells.update(&self.context, mesh)?;
+        }
         self.mesh.update(&self.context, mesh, changes)
     }
 
@@ -296,7 +303,8 @@ impl Renderer {
     /// Bytes of memory on the GPU that the mesh and the lists of pixels take.
     pub fn gpu_bytes(&self) -> u64 {
         let beside = self.beside.as_ref().map_or(0, |other| other.gpu_bytes());
-        self.mesh.bytes() + self.lists.bytes() + beside
+        let cells = self.cells.as_ref().map_or(0, CellPass::bytes);
+        self.mesh.bytes() + cells + self.lists.bytes() + beside
     }
 
     /// Draws a picture. `false` when the target is not available, such as a hidden canvas.
@@ -411,7 +419,7 @@ impl Renderer {
         if has_lists {
             self.list(&mut encoder);
         }
-        self.opaque(&mut encoder, has_composite);
+        self.opaque(&mut encoder, !look.clips.is_empty(), has_composite);
         if has_composite {
             self.over(&mut encoder, look, has_lists);
         }
@@ -444,7 +452,7 @@ impl Renderer {
     }
 
     /// Draws what is opaque; without a composite after it also the lines over it.
-    fn opaque(&self, encoder: &mut wgpu::CommandEncoder, has_composite: bool) {
+    fn opaque(&self, encoder: &mut wgpu::CommandEncoder, has_clips: bool, has_composite: bool) {
         let images = &self.target.images;
         let stored = if has_composite { wgpu::StoreOp::Store } else { wgpu::StoreOp::Discard };
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
@@ -467,7 +475,7 @@ impl Renderer {
         pass.draw(0..3, 0..1);
         self.surface_pipelines.draw(&mut pass, self.surfaces.values(), false);
         if let (true, Some(cells)) = (self.shows_cells, &self.cells) {
-            cells.draw(&self.context, &self.mesh, &mut pass);
+            cells.draw(&self.context, &self.mesh, has_clips, &mut pass);
         }
         if !has_composite {
             self.wire.draw(&mut pass, false);

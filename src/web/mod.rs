@@ -1,6 +1,12 @@
 //! The JavaScript API: a thin façade over [`session`](crate::session) for wasm-bindgen. The package's JavaScript
 //! (`pkg-template/`) wraps it with streams, workers and promises; nothing here waits or does I/O.
 
+// Without a class that uses it, nothing here is used.
+#![cfg_attr(
+    not(any(feature = "web-session", all(feature = "gpu", target_arch = "wasm32"))),
+    allow(dead_code)
+)]
+
 #[cfg(feature = "web-session")]
 mod bench;
 mod callback;
@@ -14,6 +20,7 @@ mod reader;
 mod results;
 #[cfg(feature = "web-session")]
 mod session;
+#[cfg(any(feature = "web-session", all(feature = "gpu", target_arch = "wasm32")))]
 mod tools;
 #[cfg(all(feature = "gpu", target_arch = "wasm32"))]
 mod viewer;

@@ -6,6 +6,9 @@
 @group(1) @binding(2) var<storage, read> tets: array<vec4u>;
 // A value for each tetrahedron, if the style says so.
 @group(1) @binding(3) var<storage, read> tet_values: array<f32>;
+// Faces, four times the tetrahedron plus the corner opposite to the face; or edges, three numbers each: two points and
+// a tetrahedron.
+@group(1) @binding(4) var<storage, read> parts: array<u32>;
 
 struct Vertex {
     @builtin(position) clip: vec4f,
@@ -34,10 +37,23 @@ fn vs(@builtin(vertex_index) i: u32) -> Vertex {
     if dot(style.cut.xyz, centroid) > style.cut.w {
         return nothing;
     }
+    return corner(i / 12u, i % 12u / 3u, i % 3u, corners, 1.0 - style.shape.z);
+}
+
+// An outer face of whole tetrahedra.
+@vertex
+fn vs_face(@builtin(vertex_index) i: u32) -> Vertex {
+    let part = parts[i / 3u];
+    let tet = tets[part / 4u];
+    let corners = array<vec4f, 4>(points[tet.x], points[tet.y], points[tet.z], points[tet.w]);
+    return corner(part / 4u, part % 4u, i % 3u, corners, 1.0);
+}
+
+// Corner k of a face of a tetrahedron with these corners, of which so much is kept.
+fn corner(t: u32, number: u32, k: u32, corners: array<vec4f, 4>, kept: f32) -> Vertex {
     var faces = FACES;
-    let face = faces[i % 12u / 3u];
-    let k = i % 3u;
-    let kept = 1.0 - style.shape.z;
+    let face = faces[number];
+    let centroid = 0.25 * (corners[0].xyz + corners[1].xyz + corners[2].xyz + corners[3].xyz);
     let p = array<vec3f, 3>(
         mix(centroid, corners[face.x].xyz, kept),
         mix(centroid, corners[face.y].xyz, kept),
@@ -45,7 +61,7 @@ fn vs(@builtin(vertex_index) i: u32) -> Vertex {
     );
     var value = corners[face[k]].w;
     if style.clips.y > 0u {
-        value = tet_values[i / 12u];
+        value = tet_values[t];
     }
     return Vertex(
         frame.view_projection * vec4f(p[k], 1.0),
@@ -70,12 +86,38 @@ fn fs(in: Vertex) -> @location(0) vec4f {
     return vec4f(shaded(what).rgb, 1.0);
 }
 
-// Edges alone.
+struct EdgePoint {
+    @builtin(position) clip: vec4f,
+    @location(0) position: vec3f,
+    @location(1) value: f32,
+}
+
+// An edge as a line of a width in pixels.
+@vertex
+fn vs_edge(@builtin(vertex_index) i: u32) -> EdgePoint {
+    let first = 3u * (i / 6u);
+    let from_point = points[parts[first]];
+    let to_point = points[parts[first + 1u]];
+    let from_clip = frame.view_projection * vec4f(from_point.xyz, 1.0);
+    let to_clip = frame.view_projection * vec4f(to_point.xyz, 1.0);
+    let at = vec2f(moved(from_clip, to_clip), 1.0 - moved(to_clip, from_clip));
+    let a = mix(from_clip, to_clip, at.x);
+    let b = mix(from_clip, to_clip, at.y);
+    let c = square_corner(i % 6u);
+    let radius = 0.5 * max(style.shape.x * frame.viewport.z, 1.0);
+    let aside = beside_line(a, b) * c.y * radius * 2.0 / frame.viewport.xy;
+    let end = select(a, b, c.x > 0.0);
+    let place = mix(from_point, to_point, select(at.x, at.y, c.x > 0.0));
+    var value = place.w;
+    if style.clips.y > 0u {
+        value = tet_values[parts[first + 2u]];
+    }
+    return EdgePoint(vec4f(end.xy + aside * end.w, end.zw), place.xyz, value);
+}
+
 @fragment
-fn fs_wire(in: Vertex) -> @location(0) vec4f {
-    let what = seen(in);
-    let width = 0.5 * max(style.shape.x * frame.viewport.z, 1.0);
-    if nearest_side(what) > width || is_clipped(in.position, style.clips.x) {
+fn fs_edge(in: EdgePoint) -> @location(0) vec4f {
+    if is_clipped(in.position, style.clips.x) {
         discard;
     }
     var colour = style.edge.rgb;

@@ -48,6 +48,19 @@ fn square_corner(i: u32) -> vec2f {
     return vec2f(select(-1.0, 1.0, x), select(-1.0, 1.0, y));
 }
 
+// How far an end of a line is moved along it, to the near side of the camera's plane; 0 to 1.
+fn moved(end: vec4f, other: vec4f) -> f32 {
+    let nearest = 1e-4 * max(abs(end.w), abs(other.w));
+    return select((nearest - end.w) / (other.w - end.w), 0.0, end.w >= nearest || other.w <= nearest);
+}
+
+// The direction on the screen across a line between two points in front of the camera, of length 1.
+fn beside_line(a: vec4f, b: vec4f) -> vec2f {
+    let along = (b.xy / b.w - a.xy / a.w) * frame.viewport.xy;
+    let direction = select(vec2f(1.0, 0.0), normalize(along), dot(along, along) > 1e-12);
+    return vec2f(-direction.y, direction.x);
+}
+
 // The ray through the middle of a pixel.
 fn ray_of(pixel: vec2f) -> Ray {
     let at = (floor(pixel) + 0.5) / frame.viewport.xy * vec2f(2.0, -2.0) + vec2f(-1.0, 1.0);

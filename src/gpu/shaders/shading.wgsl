@@ -84,12 +84,6 @@ fn lit(albedo: vec3f, n: vec3f, view: vec3f) -> vec3f {
     return albedo * diffuse(n) + vec3f(0.75, 0.85, 1.0) * (0.16 * rim) + vec3f(0.16 * gloss);
 }
 
-// The distance to the nearest side that is an edge, in pixels.
-fn nearest_side(seen: Seen) -> f32 {
-    let away = seen.sides / max(seen.slope, vec3f(1e-9));
-    return min(away.x, min(away.y, away.z));
-}
-
 // How much of the edge colour there is at a place in a triangle. Edges fade out where they are a few pixels long:
 // both triangles at an edge agree about that. One that is thinner than its lines draws none.
 fn edge_strength(seen: Seen) -> f32 {

@@ -11,25 +11,12 @@ struct Vertex {
     @location(3) position: vec3f,
 }
 
-// Corners of the quadrilateral's two triangles: x along (0 or 1), y across (-1 or 1).
-fn corner(i: u32) -> vec2f {
-    let x = f32(i == 1u || i == 2u || i == 4u);
-    let y = select(-1.0, 1.0, i == 2u || i == 4u || i == 5u);
-    return vec2f(x, y);
-}
-
 fn shifted(clip: vec4f, pixels: vec2f) -> vec4f {
     // Lines have soft edges, and are at the same place in all pictures of a mean: else their edges would get
     // softer.
     let aside = pixels * 2.0 / frame.viewport.xy - vec2f(frame.key_light.w, frame.fill_light.w);
     // A little nearer than the faces that the line runs along.
     return vec4f(clip.xy + aside * clip.w, clip.z - 2e-5 * clip.w, clip.w);
-}
-
-// How far an end of a line is moved along it, to the near side of the camera's plane; 0 to 1.
-fn moved(end: vec4f, other: vec4f) -> f32 {
-    let nearest = 1e-4 * max(abs(end.w), abs(other.w));
-    return select((nearest - end.w) / (other.w - end.w), 0.0, end.w >= nearest || other.w <= nearest);
 }
 
 @vertex
@@ -45,15 +32,13 @@ fn vs_line(
     let at = vec2f(moved(first, second), 1.0 - moved(second, first));
     let a = mix(first, second, at.x);
     let b = mix(first, second, at.y);
-    let along = (b.xy / b.w - a.xy / a.w) * frame.viewport.xy;
-    let direction = select(vec2f(1.0, 0.0), normalize(along), dot(along, along) > 1e-12);
     let radius = 0.5 * width * frame.viewport.z;
     // One pixel more on each side for a soft edge.
     let reach = radius + 1.0;
-    let c = corner(i);
-    let across = vec2f(-direction.y, direction.x) * c.y * reach;
-    let position = mix(from_point, to_point, mix(at.x, at.y, c.x));
-    return Vertex(shifted(select(a, b, c.x > 0.5), across), colour, vec2f(0.0, c.y * reach), radius, position);
+    let c = square_corner(i);
+    let across = beside_line(a, b) * c.y * reach;
+    let position = mix(from_point, to_point, select(at.x, at.y, c.x > 0.0));
+    return Vertex(shifted(select(a, b, c.x > 0.0), across), colour, vec2f(0.0, c.y * reach), radius, position);
 }
 
 @vertex
@@ -64,8 +49,7 @@ fn vs_handle(
     @location(3) width: f32,
 ) -> Vertex {
     let radius = 0.5 * width * frame.viewport.z;
-    let c = corner(i);
-    let offset = vec2f(c.x * 2.0 - 1.0, c.y) * (radius + 1.0);
+    let offset = square_corner(i) * (radius + 1.0);
     return Vertex(shifted(frame.view_projection * vec4f(middle, 1.0), offset), colour, offset, radius, middle);
 }
 
