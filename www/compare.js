@@ -38,13 +38,16 @@ export class Comparison {
 
   /** What the viewer is to show of it. */
   get state() {
-    return this.#isKept ? { at: Number($("split").value) / 100, difference: $("difference").checked } : null;
+    // The difference is shown on all of the picture: one legend cannot tell the colours of both halves.
+    const difference = $("difference").checked;
+    return this.#isKept ? { at: difference ? 0 : Number($("split").value) / 100, difference } : null;
   }
 
   #show() {
     $("keep").textContent = this.#isKept ? "Forget the kept mesh" : "Keep this mesh";
     $("comparison").hidden = !this.#isKept;
-    $("divider").hidden = !this.#isKept;
+    $("split").disabled = $("difference").checked;
+    $("divider").hidden = !this.#isKept || $("difference").checked;
     $("divider").style.left = `${$("split").value}%`;
   }
 }

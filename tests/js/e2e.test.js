@@ -556,7 +556,11 @@ test("a mesh that was kept is shown beside the current one, or the difference of
   assert.match(await page.textContent("#legend-name"), /^difference of density/);
   const [low, high] = await page.evaluate(() => window.tetralodDemo.viewer.legend.range);
   assert.ok(low === -high && high > 0, `${low} to ${high}`);
+  assert.ok(await page.isHidden("#divider"), "all of the picture shows the difference");
   await page.screenshot({ path: fileURLToPath(new URL("page-difference.png", pictures)) });
+  await page.locator("#difference").uncheck();
+  await settle(page);
+  assert.ok(await page.isVisible("#divider"));
   await page.locator("#keep").click();
   await settle(page);
   assert.ok(await page.isHidden("#divider"));

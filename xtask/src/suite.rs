@@ -195,7 +195,7 @@ fn node_tool(path: &str, args: &[&str]) -> Command {
 fn node_test(file: &str) -> Command {
     shell::command(
         "node",
-        ["--test", "--test-reporter=spec", "--test-timeout=300000", &format!("tests/js/{file}")],
+        ["--test", "--test-reporter=spec", "--test-timeout=900000", &format!("tests/js/{file}")],
     )
 }
 
