@@ -26,6 +26,7 @@ mod wire;
 
 /// The version of wgpu that the renderer takes devices of.
 pub use wgpu;
+pub use wgpu::TextureView;
 
 pub use context::Context;
 pub use error::GpuError;

@@ -13,7 +13,7 @@ pub use state::{
 };
 
 use crate::geom::{Bounds, Camera, Ray};
-use crate::gpu::{BoxLines, GpuError, Look, MOST_CLIPS, Renderer, SideTarget};
+use crate::gpu::{BoxLines, GpuError, Look, MOST_CLIPS, Renderer, SideTarget, TextureView};
 use crate::session::{Session, SessionError};
 use crate::view::{ClipPlane, ColourScale, Probe, ScaleError};
 use glam::DVec3;
@@ -230,7 +230,7 @@ impl Scene {
     /// As [`Scene::draw`].
     pub fn render(
         &mut self,
-        view: &wgpu::TextureView,
+        view: &TextureView,
         session: &mut Session,
         camera: &Camera,
     ) -> Result<(), SceneError> {
