@@ -331,11 +331,13 @@ test("each region that the page offers is refined", async () => {
 /** Turns to a view of the page. */
 const show = (page, view) => page.locator("label", { hasText: view }).first().click();
 
-/** The small volume at a coarse mesh, so that pictures come soon. */
-async function openSmall() {
+/** The small volume at a coarse mesh, so that pictures come soon, in a view of the page. */
+async function openSmall(view = "Isosurface") {
   const page = await open("data/bucky-explicit.mt");
   await reach(page, "complete");
   await setSlider(page, "error", 70);
+  await show(page, view);
+  await settle(page);
   return page;
 }
 
@@ -352,8 +354,7 @@ const boxes = (page, selector) =>
   );
 
 test("axes, scale bar and cube lie over the picture, and labels over nothing", async () => {
-  const page = await openSmall();
-  await show(page, "Slice");
+  const page = await openSmall("Slice");
   for (const side of ["home", "alongX", "againstZ"]) {
     await page.selectOption("#side", side);
     await settle(page);
@@ -388,9 +389,7 @@ test("axes, scale bar and cube lie over the picture, and labels over nothing", a
 });
 
 test("the pointer reads values, clicks keep probes, and two of them give a plot", async () => {
-  const page = await openSmall();
-  await show(page, "Slice");
-  await settle(page);
+  const page = await openSmall("Slice");
   const canvas = await page.locator("#canvas").boundingBox();
   const at = (x, y) => /** @type {[number, number]} */ ([canvas.x + x * canvas.width, canvas.y + y * canvas.height]);
   await page.mouse.move(...at(0.5, 0.5));
@@ -454,9 +453,7 @@ test("the pointer reads values, clicks keep probes, and two of them give a plot"
 });
 
 test("colours have ranges, and the transfer function is edited", async () => {
-  const page = await openSmall();
-  await show(page, "Solid");
-  await settle(page);
+  const page = await openSmall("Solid");
   const range = () => page.evaluate(() => window.tetralodDemo.viewer.legend.range);
   const whole = await range();
   await page.selectOption("#range-preset", "percentiles");
