@@ -1,6 +1,7 @@
 //! A mesh that was kept, to be shown beside later ones.
 
-use super::objects::{Input, Objects, quantity};
+use super::objects::{Input, Objects};
+use super::styles::quantity;
 use super::{SceneError, SceneState};
 use crate::geom::Bounds;
 use crate::gpu::Renderer;

@@ -5,7 +5,9 @@
 
 mod kept;
 mod objects;
+mod pick;
 mod state;
+mod styles;
 
 pub use state::{
     ArrowState, Background, BoundaryState, CellKind, CellState, Colour, ColourState, CompareState,
@@ -276,8 +278,8 @@ impl Scene {
         Ok(self.renderer.draw_again()?)
     }
 
-    /// The nearest point that is shown along a ray: of an isosurface, a slice, the boundary, or of the volume where half of the
-    /// light is lost; none if there is none.
+    /// The nearest point that is shown along a ray: of an isosurface, a slice, the boundary, a tetrahedron, a streamline, an
+    /// arrow, or of the volume where half of the light is lost; none if there is none.
     pub fn pick(&self, session: &mut Session, ray: &Ray) -> Option<[f64; 3]> {
         self.objects.pick(session, &self.state, &self.look.clips, ray, self.bounds.as_ref()?)
     }

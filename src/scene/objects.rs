@@ -1,16 +1,16 @@
 //! What is computed from the mesh for a scene: surfaces, sections, tubes, values of tetrahedra.
 
-use super::state::{ArrowState, CellKind, CellState, ColourState, IsosurfaceState, StreamlineState};
-use super::{Legend, SceneError, SceneState, SliceState, VolumeState, clips};
-use crate::geom::{Bounds, Ray};
-use crate::gpu::{CellShape, CellStyle, Colouring, EdgeLook, Lighting, Renderer, SIDES, Style};
+use super::state::{ArrowState, ColourState, StreamlineState};
+use super::styles::{cell_style, isosurface_style, medium, other_clips, quantity, range, scale};
+use super::{Legend, SceneError, SceneState, SliceState, clips};
+use crate::geom::Bounds;
+use crate::gpu::{Colouring, EdgeLook, Lighting, Renderer, Style};
 use crate::mt::{MeshChanges, MtInfo};
 use crate::session::{Session, TetQuantity};
 use crate::view::{
-    ArrowLength, ArrowOptions, BoundarySurface, ClipPlane, ColourScale, Difference, IsoSurface, Medium,
-    MeshView, Probe, Slice, Solids, TraceOptions, Tracer, Triangles, TubeOptions, first_hit, first_hit_in,
+    ArrowLength, ArrowOptions, BoundarySurface, ClipPlane, ColourScale, Difference, IsoSurface, MeshView,
+    Slice, Solids, TraceOptions, Tracer, Triangles, TubeOptions,
 };
-use glam::DVec3;
 use std::borrow::Cow;
 
 /// Numbers of surfaces in the renderer: those of lists begin at these.
@@ -24,10 +24,11 @@ const ARROWS: u32 = BOUNDARY + 2;
 /// The objects of a scene, with the memory to compute them again.
 #[derive(Debug, Default)]
 pub(super) struct Objects {
-    isosurfaces: Vec<Isosurface>,
+    pub(super) isosurfaces: Vec<Isosurface>,
     slice: Slice,
-    boundary: BoundarySurface,
-    solids: Solids,
+    pub(super) boundary: BoundarySurface,
+    pub(super) tubes: Solids,
+    pub(super) arrows: Solids,
     /// A number for each tetrahedron.
     pub values: Vec<f32>,
     /// How many surfaces of each list the renderer has.
@@ -39,8 +40,8 @@ pub(super) struct Objects {
 }
 
 #[derive(Debug, Default)]
-struct Isosurface {
-    surface: IsoSurface,
+pub(super) struct Isosurface {
+    pub(super) surface: IsoSurface,
     /// Whether the renderer has all of it, so that changes are enough.
     is_whole: bool,
 }
@@ -121,20 +122,6 @@ impl Input<'_> {
     }
 }
 
-/// The scale of a state: over `range` if there is one, else over what is there.
-fn scale(colours: &ColourState, range: Option<[f64; 2]>, own: [f64; 2]) -> Result<ColourScale, SceneError> {
-    let ColourState { map, reversed, log, .. } = *colours;
-    let scale = ColourScale { map: map.0, range: range.unwrap_or(own), is_reversed: reversed, is_log: log };
-    Ok(scale.validate()?)
-}
-
-/// The smallest and the largest number; 0 and 1 if there is none.
-fn range(values: &[f32]) -> [f64; 2] {
-    let finite = || values.iter().copied().filter(|value| value.is_finite());
-    let range = [finite().fold(f32::INFINITY, f32::min), finite().fold(f32::NEG_INFINITY, f32::max)];
-    if range[0] <= range[1] { range.map(f64::from) } else { [0.0, 1.0] }
-}
-
 impl Objects {
     pub(super) fn legend(&self) -> Option<&Legend> {
         self.legend.as_ref()
@@ -210,45 +197,6 @@ impl Objects {
         self.update_legend(input)?;
         self.update_streamlines(renderer, input)?;
         self.update_arrows(renderer, input)
-    }
-
-    /// The nearest point along a ray of what is shown.
-    pub(super) fn pick(
-        &self,
-        session: &mut Session,
-        state: &SceneState,
-        clips: &[ClipPlane],
-        ray: &Ray,
-        bounds: &Bounds,
-    ) -> Option<[f64; 3]> {
-        let surfaces = self.isosurfaces.iter().map(|own| Triangles::from(&own.surface));
-        let boundary = state.boundary.as_ref().map(|_| Triangles::from(&self.boundary));
-        let hits = surfaces.chain(boundary).filter_map(|triangles| first_hit(&triangles, ray, clips));
-        let mut found: Vec<(f64, [f64; 3])> = hits.map(|hit| (hit.distance, hit.position)).collect();
-        let shown = session.field();
-        let info = session.info()?.fields.get(shown)?;
-        let own = [info.min, info.max];
-        let mut probe = Probe::new(session.view());
-        // What clip planes cut open is closed by sections with them.
-        let is_closed = state.boundary.as_ref().is_some_and(|boundary| boundary.clipped);
-        let caps = clips.iter().filter(|_| is_closed);
-        let caps = caps.map(|clip| (clip.normal.map(f64::from).into(), f64::from(clip.offset)));
-        let sections = state.slices.iter().map(|slice| (DVec3::from(slice.normal), slice.offset));
-        for (normal, offset) in sections.chain(caps) {
-            let distance = (offset - ray.origin.dot(normal)) / ray.direction.dot(normal);
-            let place = ray.at(distance);
-            let is_kept = clips.iter().all(|clip| clip.keeps_point(place.into()));
-            if distance > 0.0 && is_kept && probe.locate(place.into()).is_some() {
-                found.push((distance, place.into()));
-            }
-        }
-        found.extend(state.cells.as_ref().and_then(|cells| first_cell(&probe, cells, clips, ray, bounds)));
-        if let (Some(volume), Ok(scale)) = (&state.volume, scale(&state.colours, state.colours.range, own)) {
-            let medium = medium(volume, &scale, bounds.diagonal());
-            let hit = first_hit_in(&medium, &probe, ray, clips);
-            found.extend(hit.map(|hit| (hit.distance, hit.position)));
-        }
-        found.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, position)| position)
     }
 
     fn update_volume(
@@ -409,11 +357,11 @@ impl Objects {
         let options = TubeOptions { radius, ..TubeOptions::default() };
         let values = field.as_ref().map(|_| input.field("streamlines.field", field.as_ref())).transpose()?;
         match values {
-            None => self.solids.set_tubes(&lines, &options),
+            None => self.tubes.set_tubes(&lines, &options),
             Some(field) => {
                 let numbers = (input.fields)(field);
                 let mesh = MeshView { field: &numbers, ..input.mesh };
-                self.solids.set_tubes_with(&lines, &options, |point| point.place.value(&mesh));
+                self.tubes.set_tubes_with(&lines, &options, |point| point.place.value(&mesh));
             }
         }
         self.show_solids(renderer, input, TUBES, values, "speed")
@@ -432,7 +380,7 @@ impl Objects {
             length: if *constant { ArrowLength::Constant } else { ArrowLength::Magnitude },
         };
         let components = [vectors[0].as_slice(), &vectors[1], &vectors[2]];
-        self.solids.set_arrows(input.mesh, components, numbers.as_deref(), &options);
+        self.arrows.set_arrows(input.mesh, components, numbers.as_deref(), &options);
         self.show_solids(renderer, input, ARROWS, values, "magnitude")
     }
 
@@ -445,10 +393,11 @@ impl Objects {
         field: Option<usize>,
         own: &str,
     ) -> Result<(), SceneError> {
-        renderer.set_surface(key, &Triangles::from(&self.solids), None)?;
+        let solids = if key == TUBES { &self.tubes } else { &self.arrows };
+        renderer.set_surface(key, &Triangles::from(solids), None)?;
         let colours = match field {
             Some(field) => input.scale(field)?,
-            None => scale(&input.state.colours, None, range(&self.solids.values))?,
+            None => scale(&input.state.colours, None, range(&solids.values))?,
         };
         renderer.set_style(key, &Style { colouring: Colouring::Scale(colours), ..Style::default() });
         let label = field.map_or(own, |field| &input.info.fields[field].name).to_owned();
@@ -482,146 +431,5 @@ impl Objects {
         };
         self.legend = field.map(legend).transpose()?;
         Ok(())
-    }
-}
-
-/// Where a ray enters the first tetrahedron that is drawn, and how far away that is. Tetrahedra count as if they were not shrunk.
-fn first_cell(
-    probe: &Probe<'_>,
-    cells: &CellState,
-    clips: &[ClipPlane],
-    ray: &Ray,
-    bounds: &Bounds,
-) -> Option<(f64, [f64; 3])> {
-    let reach = ray.origin.distance(bounds.min.into()) + bounds.diagonal();
-    let cut = cells.cut.map_or(ClipPlane::NOTHING, |cut| cut.clip());
-    let mesh = probe.mesh();
-    let spans = probe.line(ray.origin.into(), ray.at(reach).into());
-    // A little inside, so that the point is in this tetrahedron and not in the one before.
-    let places =
-        spans.iter().map(|span| (span.entry.tet, (span.from + 1e-6 * (span.to - span.from)) * reach));
-    let is_drawn = |tet: u32, distance: f64| {
-        let corners = mesh.tets[tet as usize].map(|p| mesh.positions[p as usize]);
-        cut.keeps(corners) && clips.iter().all(|clip| clip.keeps_point(ray.at(distance).into()))
-    };
-    let (_, distance) = places.into_iter().find(|(tet, distance)| is_drawn(*tet, *distance))?;
-    Some((distance, ray.at(distance).into()))
-}
-
-/// The quantity that colours tetrahedra; none for the field.
-pub(super) fn quantity(cells: &CellState) -> Result<Option<TetQuantity>, SceneError> {
-    if cells.colour_by == "field" {
-        return Ok(None);
-    }
-    let found = TetQuantity::named(&cells.colour_by);
-    found.map(Some).ok_or_else(|| {
-        let names = TetQuantity::ALL.map(TetQuantity::name).join(", ");
-        let problem = format!("must be one of field, {names}; given: {}", cells.colour_by);
-        SceneError::state("cells.colourBy", problem)
-    })
-}
-
-fn cell_style(cells: &CellState, scale: ColourScale, own_values: bool) -> CellStyle {
-    let edges = EdgeLook { width: cells.width as f32, ..EdgeLook::default() };
-    let has_edges = cells.edges || cells.shape == CellKind::Wire;
-    let style = Style {
-        colouring: Colouring::Scale(scale),
-        lighting: Lighting::Flat,
-        edges: has_edges.then_some(edges),
-        ..Style::default()
-    };
-    let shape = match cells.shape {
-        CellKind::Solid => CellShape::Solid(cells.shrink as f32),
-        CellKind::Wire => CellShape::Wire,
-        CellKind::Points => CellShape::Points(cells.width.max(1.0) as f32 * 4.0),
-    };
-    let cut = cells.cut.map_or(ClipPlane::NOTHING, |cut| cut.clip());
-    CellStyle { style, shape, cut, own_values }
-}
-
-fn isosurface_style(state: &IsosurfaceState, scale: Option<ColourScale>) -> Style {
-    let sides = Colouring::Sides(state.colour.map_or(SIDES, |colour| [colour.rgb(); 2]));
-    Style {
-        colouring: scale.map_or(sides, Colouring::Scale),
-        opacity: state.opacity as f32,
-        edges: state.edges.then(EdgeLook::default),
-        ..Style::default()
-    }
-}
-
-/// A bit for each clip plane but those that are the same plane as `own`, whichever side they cut away.
-fn other_clips(clips: &[ClipPlane], own: &ClipPlane) -> u32 {
-    let is_same = |clip: &ClipPlane, sign: f32| {
-        clip.normal == own.normal.map(|x| sign * x) && clip.offset == sign * own.offset
-    };
-    let others = clips.iter().enumerate().filter(|(_, clip)| !is_same(clip, 1.0) && !is_same(clip, -1.0));
-    others.fold(0, |mask, (i, _)| mask | 1 << i)
-}
-
-/// The medium of a state, with the colours of a scale where it has none of its own.
-fn medium(volume: &VolumeState, scale: &ColourScale, diagonal: f64) -> Medium {
-    let unit_length = volume.unit_length.unwrap_or(diagonal / 10.0);
-    if !volume.points.is_empty() {
-        let points = volume.points.iter().map(|&[value, r, g, b, a]| (value, [r, g, b, a]));
-        return Medium::new(&points.collect::<Vec<_>>(), unit_length);
-    }
-    let ramp = [[scale.range[0], 0.0], [scale.range[1], 0.5]];
-    let opacities = if volume.opacities.is_empty() { &ramp } else { volume.opacities.as_slice() };
-    Medium::new(&coloured(opacities, scale), unit_length)
-}
-
-/// Colours between two values of the scale, even in its own terms.
-const COLOURS: usize = 64;
-
-/// The values of `opacities` and of the colours of the scale, with both.
-fn coloured(opacities: &[[f64; 2]], scale: &ColourScale) -> Vec<(f64, [f64; 4])> {
-    let own = (0..=COLOURS).map(|i| scale.value(i as f64 / COLOURS as f64));
-    let mut values: Vec<f64> = opacities.iter().map(|point| point[0]).chain(own).collect();
-    values.sort_unstable_by(f64::total_cmp);
-    values.dedup();
-    let mut points = Vec::new();
-    for value in values {
-        let [r, g, b] = scale.colour(value).map(f64::from);
-        // Several opacities at one value are a step.
-        let same: Vec<f64> = opacities.iter().filter(|p| p[0] == value).map(|p| p[1]).collect();
-        let steps = if same.is_empty() { vec![opacity_at(opacities, value)] } else { same };
-        points.extend(steps.into_iter().map(|opacity| (value, [r, g, b, opacity])));
-    }
-    points
-}
-
-/// Linear between the points, constant beyond.
-fn opacity_at(opacities: &[[f64; 2]], value: f64) -> f64 {
-    let after = opacities.partition_point(|point| point[0] <= value);
-    match (after.checked_sub(1).map(|i| opacities[i]), opacities.get(after)) {
-        (Some([low, from]), Some([high, to])) => from + (to - from) * (value - low) / (high - low),
-        (Some(end), None) => end[1],
-        (None, Some(end)) => end[1],
-        (None, None) => 0.0,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::view::VIRIDIS;
-
-    #[test]
-    fn opacities_keep_their_steps_and_get_colours() {
-        let scale = ColourScale::new(VIRIDIS, [0.0, 1.0]).expect("a range");
-        let points = coloured(&[[0.2, 0.0], [0.5, 0.4], [0.5, 0.9], [0.8, 0.0]], &scale);
-        assert!(points.is_sorted_by(|a, b| a.0 <= b.0) && points.len() > 60);
-        let at = |value: f64| points.iter().filter(|p| p.0 == value).map(|p| p.1[3]).collect::<Vec<_>>();
-        assert_eq!(at(0.5), [0.4, 0.9]);
-        assert_eq!((at(0.0), at(1.0)), (vec![0.0], vec![0.0]));
-        assert!((opacity_at(&[[0.0, 0.0], [1.0, 0.5]], 0.5) - 0.25).abs() < 1e-12);
-    }
-
-    #[test]
-    fn a_plane_is_not_cut_by_itself() {
-        let x = ClipPlane { normal: [1.0, 0.0, 0.0], offset: 0.5 };
-        let back = ClipPlane { normal: [-1.0, 0.0, 0.0], offset: -0.5 };
-        let y = ClipPlane { normal: [0.0, 1.0, 0.0], offset: 0.5 };
-        assert_eq!(other_clips(&[x, y, back], &x), 0b010);
     }
 }

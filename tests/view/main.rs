@@ -5,6 +5,7 @@ mod by_ranges;
 #[cfg(feature = "vulkan")]
 mod cells;
 mod colour_error;
+#[cfg(feature = "vulkan")]
 mod compare;
 mod cutaway;
 #[cfg(feature = "vulkan")]
@@ -24,6 +25,8 @@ mod pick;
 mod probe;
 #[cfg(feature = "vulkan")]
 mod samples;
+#[cfg(feature = "vulkan")]
+mod scene_pick;
 #[allow(dead_code, reason = "each test uses a part of it")]
 mod scenes;
 #[cfg(feature = "gpu")]
