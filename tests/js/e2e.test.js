@@ -20,6 +20,7 @@ after(() => browser?.close());
 /** A new page with `volume` opened; its errors are collected in `complaints`. */
 async function open(volume, prepare = async (_page) => {}) {
   const page = await browser.newPage({ viewport: { width: 1100, height: 760 } });
+  page.setDefaultTimeout(PATIENCE);
   page.complaints = [];
   page.on("pageerror", (error) => page.complaints.push(String(error)));
   page.on("console", (message) => message.type() === "error" && page.complaints.push(message.text()));
@@ -332,7 +333,7 @@ test("each region that the page offers is refined", async () => {
 const show = (page, view) => page.locator("label", { hasText: view }).first().click();
 
 /** The small volume at a coarse mesh, so that pictures come soon, in a view of the page. */
-async function openSmall(view = "Isosurface") {
+async function openSmall(view = "Surface") {
   const page = await open("data/bucky-explicit.mt");
   await reach(page, "complete");
   await setSlider(page, "error", 70);
