@@ -7,7 +7,7 @@
     allow(dead_code)
 )]
 
-#[cfg(feature = "web-session")]
+#[cfg(feature = "web-bench")]
 mod bench;
 mod callback;
 mod error;

@@ -47,11 +47,10 @@ fn native(file: &Path) -> Result<Rates> {
 /// A page that holds the wasm module alone runs the benchmark; Node starts the browser and prints what it found.
 fn browser(file: &Path) -> Result<Rates> {
     let browser = browser::require()?;
-    package::build(&[])?;
-    let data = Path::new("target/bench");
-    std::fs::create_dir_all(data)?;
-    std::fs::copy(file, data.join("volume.mt")).with_context(|| file.display().to_string())?;
-    let mounts = [("/pkg", package::PKG), ("/data", "target/bench")];
+    let folder = Path::new("target/bench");
+    package::build_bench(folder)?;
+    std::fs::copy(file, folder.join("volume.mt")).with_context(|| file.display().to_string())?;
+    let mounts = [("/bench", "target/bench")];
     let server = Server::start(&shell::released_command()?, "tests/js/bench", &mounts, 0)?;
     let mut command = shell::command("node", ["tests/js/bench/run.js"]);
     command.env("TETRALOD_PAGE", &server.address).env("CHROMIUM", browser.chromium);

@@ -62,6 +62,14 @@ pub fn build(args: &[String]) -> Result<()> {
     report(Path::new(PKG))
 }
 
+/// Compiles the module with the benchmark, which the package does not have, into `folder`.
+pub fn build_bench(folder: &Path) -> Result<()> {
+    check_versions()?;
+    shell::add_wasm_target()?;
+    shell::install_node_tools()?;
+    compile(&Module { name: "tetralod_bench", features: "web-bench" }, folder)
+}
+
 /// wasm-bindgen's macro and its command line speak a private protocol: they must be the same version.
 fn check_versions() -> Result<()> {
     let lock = fs::read_to_string("Cargo.lock").context("Cargo.lock")?;

@@ -74,7 +74,7 @@ pub const ALL: [&str; 5] = [
     "--exclude",
     "xtask",
     "--features",
-    "tetralod/http,tetralod/vulkan,tetralod/web-session,paper/pictures",
+    "tetralod/http,tetralod/vulkan,tetralod/web-bench,paper/pictures",
 ];
 
 /// The native command as it was compiled for the tests, optimised and with every assertion.

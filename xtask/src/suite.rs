@@ -94,7 +94,7 @@ fn features() -> Result<()> {
     lint_library("", &[])?;
     lint_library("build", &[])?;
     shell::add_wasm_target()?;
-    lint_library("web-session", &["--target", shell::WASM])?;
+    lint_library("web-bench", &["--target", shell::WASM])?;
     with_fixture(|| {
         let args = ["clippy", "--package", "tetralod", "--lib", "--test", "web", "--target", shell::WASM];
         shell::run(fixture_env(shell::cargo(args).args(WEB_FEATURES).args(["--", "-D", "warnings"])))
@@ -144,7 +144,7 @@ fn npm_package() -> Result<()> {
     package::build(&[])
 }
 
-const WEB_FEATURES: [&str; 3] = ["--no-default-features", "--features", "web-session,gpu"];
+const WEB_FEATURES: [&str; 3] = ["--no-default-features", "--features", "web-bench,gpu"];
 
 fn wasm() -> Result<()> {
     let browser = browser::require()?;

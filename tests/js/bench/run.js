@@ -7,9 +7,9 @@ try {
   page.on("pageerror", (error) => console.error(error));
   await page.goto(address());
   const report = await page.evaluate(async () => {
-    const { default: init, bench } = await import("/pkg/tetralod_core.js");
+    const { default: init, bench } = await import("/bench/tetralod_bench.js");
     await init();
-    const response = await fetch("/data/volume.mt");
+    const response = await fetch("/bench/volume.mt");
     return bench(new Uint8Array(await response.arrayBuffer()), 2);
   });
   console.log(JSON.stringify(report));
