@@ -12,6 +12,8 @@
  * const surface = await mt.isosurface(0.7);
  * mt.free();
  * ```
+ *
+ * @module
  */
 
 import type {

@@ -1,4 +1,19 @@
 /// <reference lib="esnext.disposable" />
+/**
+ * Draws an MT on a canvas with WebGPU, and gives of its mesh what `MultiTessellation` gives.
+ *
+ * ```js
+ * import { Viewer } from "tetralod/viewer";
+ *
+ * const viewer = await Viewer.create(document.querySelector("canvas"));
+ * await viewer.open("bucky.mt");
+ * await viewer.refine({ error: "1%" });
+ * await viewer.set({ isosurfaces: [{ value: 0.5 }] });
+ * ```
+ *
+ * @module
+ */
+
 import type {
   BlockProgress,
   Mesh,
