@@ -11,7 +11,7 @@ use anyhow::{Context, Result, bail, ensure};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 
-use crate::shell;
+use crate::{licences, shell};
 
 /// Where the package is put together.
 pub const PKG: &str = "pkg";
@@ -60,6 +60,14 @@ pub fn build(args: &[String]) -> Result<()> {
     }
     assemble(staging)?;
     report(Path::new(PKG))
+}
+
+/// Builds `pkg/` where there is none yet, as steps need that are run by themselves on a fresh checkout.
+pub fn ensure_built() -> Result<()> {
+    if Path::new(PKG).join("package.json").is_file() {
+        return shell::install_node_tools();
+    }
+    build(&[])
 }
 
 /// wasm-bindgen's macro and its command line speak a private protocol: they must be the same version.
@@ -119,7 +127,8 @@ fn assemble(staging: &Path) -> Result<()> {
     for licence in ["LICENSE-MIT", "LICENSE-APACHE"] {
         fs::copy(licence, staging.join(licence)).context(licence)?;
     }
-    check_package_version(staging)?;
+    licences::write(staging, MODULES.iter().map(|module| module.features))?;
+    version()?;
     remake(Path::new(PKG))?;
     for file in files_of(staging)? {
         fs::rename(staging.join(&file), Path::new(PKG).join(&file))
@@ -128,13 +137,18 @@ fn assemble(staging: &Path) -> Result<()> {
     Ok(())
 }
 
-fn check_package_version(staging: &Path) -> Result<()> {
-    let text = fs::read_to_string(staging.join("package.json")).context("pkg-template/package.json")?;
-    let json: serde_json::Value = serde_json::from_str(&text).context("pkg-template/package.json")?;
+/// The one version of the crates and the npm package.
+pub fn version() -> Result<String> {
+    let path = "pkg-template/package.json";
+    let text = fs::read_to_string(path).context(path)?;
+    let json: serde_json::Value = serde_json::from_str(&text).context(path)?;
+    let npm = json["version"].as_str().unwrap_or_default();
     let lock = fs::read_to_string("Cargo.lock").context("Cargo.lock")?;
-    let (npm, cargo) = (json["version"].as_str().unwrap_or_default(), locked(&lock, "tetralod")?);
-    ensure!(npm == cargo, "pkg-template/package.json is version {npm}, the crate is {cargo}");
-    Ok(())
+    for package in ["tetralod", "tetralod-cli"] {
+        let cargo = locked(&lock, package)?;
+        ensure!(npm == cargo, "{path} is version {npm}, the crate {package} is {cargo}");
+    }
+    Ok(npm.to_owned())
 }
 
 fn files_of(folder: &Path) -> Result<Vec<String>> {
