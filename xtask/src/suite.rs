@@ -172,9 +172,10 @@ fn js() -> Result<()> {
     shell::run(&mut node_test("latest.test.js"))?;
     shell::run(&mut node_test("ranges.test.js"))?;
     with_fixture(|| {
-        shell::run(fixture_env(&mut node_test("package.test.js")))?;
-        shell::run(fixture_env(&mut node_test("parts.test.js")))?;
-        shell::run(fixture_env(&mut node_test("steps.test.js")))
+        for name in ["package.test.js", "parts.test.js", "steps.test.js", "places.test.js"] {
+            shell::run(fixture_env(&mut node_test(name)))?;
+        }
+        Ok(())
     })
 }
 
@@ -232,7 +233,7 @@ fn e2e() -> Result<()> {
     let server = demo::start_server(&tetralod, 0)?;
     shell::run(node_test("ranges-browser.test.js").env("CHROMIUM", &browser.chromium))?;
     with_fixture(|| {
-        for name in ["parts-browser.test.js", "viewer-browser.test.js"] {
+        for name in ["parts-browser.test.js", "viewer-browser.test.js", "places-browser.test.js"] {
             shell::run(fixture_env(node_test(name).env("CHROMIUM", &browser.chromium)))?;
         }
         Ok(())

@@ -1,0 +1,13 @@
+/**
+ * Where the files of the core are: beside this module. Vite and webpack know these two forms, and put the files where the
+ * URLs lead. `tetralod/inline` has another module in place of this one (`xtask/inline.js`).
+ */
+
+/** The wasm module of the core. @returns {URL | Promise<Uint8Array>} */
+export const coreWasm = () => new URL("./tetralod_core_bg.wasm", import.meta.url);
+
+/** The worker of the core in a page, from the page's own origin. @returns {Worker} */
+export const startCore = () => new Worker(new URL("./worker.js", import.meta.url), { type: "module" });
+
+/** The address of that worker where nothing is bundled. No form that a bundler knows: it would copy the file once more. */
+export const coreScript = () => new URL("./worker.js", /** @type {URL} */ (coreWasm()));
