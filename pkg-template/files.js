@@ -1,6 +1,6 @@
 /**
  * Where the files of the core are: beside this module. Vite and webpack know these two forms, and put the files where the
- * URLs lead. `tetralod/inline` has another module in place of this one (`xtask/inline.js`).
+ * URLs lead. `tetralod/inline` has another module in place of this one (`xtask/js/inline-files.mjs`).
  */
 
 /** The wasm module of the core. @returns {URL | Promise<Uint8Array>} */
@@ -11,3 +11,6 @@ export const startCore = () => new Worker(new URL("./worker.js", import.meta.url
 
 /** The address of that worker where nothing is bundled. No form that a bundler knows: it would copy the file once more. */
 export const coreScript = () => new URL("./worker.js", /** @type {URL} */ (coreWasm()));
+
+/** What else helps when it does not start. */
+export const coreRemedy = ', import "tetralod/inline", which needs no other file, or open with `worker: false`';

@@ -4,7 +4,7 @@
 
 import { applyChanges, emptyMesh } from "./changes.js";
 import { Local, REPLACED } from "./core.js";
-import { coreScript, coreWasm, startCore } from "./files.js";
+import { coreRemedy, coreScript, coreWasm, startCore } from "./files.js";
 import { TetralodError } from "./errors.js";
 import { openOptions, sendable } from "./options.js";
 import { PLACES, absoluteUrl, loadWasm, startWorker } from "./start.js";
@@ -205,7 +205,7 @@ const CORE = {
   entry: "tetralod/worker",
   start: startCore,
   script: coreScript,
-  remedy: ', import "tetralod/inline", which needs no other file, or open with `worker: false`',
+  remedy: coreRemedy,
 };
 
 /** The bytes of the wasm module, where they are in this one; elsewhere the worker finds its file. */

@@ -56,7 +56,7 @@ function begin(kind, url, isGiven) {
   const node = nodeModule("node:worker_threads");
   if (node && url) return nodeEndpoint(new node.Worker(url));
   if (url && isForeign(url)) return foreignEndpoint(url);
-  return webEndpoint(isGiven ? new Worker(url, { type: "module" }) : kind.start());
+  return endpointOf(isGiven ? new Worker(url, { type: "module" }) : kind.start());
 }
 
 /** The caller's own worker; in Node one of `worker_threads`. */

@@ -2,3 +2,8 @@
 interface Window {
   tetralodDemo: any;
 }
+// What `xtask/js/inline.mjs` puts into the bundle.
+declare module "embedded:*" {
+  const text: string;
+  export default text;
+}

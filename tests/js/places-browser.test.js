@@ -1,8 +1,10 @@
 // Where the package is served from, in a real browser: under a strict Content-Security-Policy, from another origin, from addresses
 // that the page names; and what is said where that cannot work.
 import assert from "node:assert/strict";
-import { readFile } from "node:fs/promises";
+import { mkdir, readFile, writeFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
+import { fileURLToPath } from "node:url";
+import { build } from "esbuild";
 import { launch, servePackage } from "./browser.js";
 
 const folder = process.env.TETRALOD_FIXTURE;
@@ -18,15 +20,17 @@ assert.ok(strict && cdn, "the README has two policies");
 const PAGE = `<!doctype html><canvas width="200" height="150"></canvas>`;
 
 /** What a page does, in modules of its own: inline scripts are forbidden. */
-const MODULES = {
-  "core.js": (from) => `
-    import { MultiTessellation } from "${from}index.js";
+const core = (path) => `
+    import { MultiTessellation } from "${path}";
     export async function run(options) {
       const mt = await MultiTessellation.open("/model.mt", { whole: true, ...options });
       await mt.complete;
       await mt.refine(${JSON.stringify(options)});
       return mt.hash();
-    }`,
+    }`;
+const MODULES = {
+  "core.js": (from) => core(`${from}index.js`),
+  "inline.js": (from) => core(`${from}inline.js`),
   "viewer.js": (from) => `
     import { Viewer } from "${from}viewer.js";
     export async function run(options) {
@@ -40,6 +44,28 @@ const MODULES = {
 let browser;
 /** Servers, by name. */
 const servers = {};
+
+/** A page that is one file, with the package, its worker, its wasm module and the volume in it. */
+async function singleFile() {
+  const { outputFiles } = await build({
+    stdin: {
+      contents: `
+        import { MultiTessellation } from "./inline.js";
+        const bytes = Uint8Array.from(atob("${file.toString("base64")}"), (c) => c.charCodeAt(0));
+        window.run = async (how) => {
+          const mt = await MultiTessellation.open(bytes, how);
+          await mt.complete;
+          await mt.refine(${JSON.stringify(options)});
+          return mt.hash();
+        };`,
+      resolveDir: fileURLToPath(new URL("../../pkg", import.meta.url)),
+    },
+    bundle: true,
+    format: "iife",
+    write: false,
+  });
+  return outputFiles[0].text;
+}
 
 /** A server with the page, and modules that import the package from `from`. */
 async function serve(headers, from = () => "/pkg/") {
@@ -66,6 +92,7 @@ before(async () => {
   const without = (name) => strict.split("; ").filter((directive) => !directive.startsWith(name)).join("; ");
   servers.noWorker = await serve({ "content-security-policy": `${without("worker-src")}; worker-src 'none'` });
   servers.noWasm = await serve({ "content-security-policy": strict.replace(" 'wasm-unsafe-eval'", "") });
+  servers.inline = await serve({ "content-security-policy": strict.replace("worker-src 'self'", "worker-src 'self' blob:") });
   browser = await launch();
 });
 
@@ -88,7 +115,7 @@ async function run(server, module, how = {}) {
   return { found, complaints };
 }
 
-for (const module of Object.keys(MODULES)) {
+for (const module of ["core.js", "viewer.js"]) {
   const own = (server) => servers[server].address.slice(0, -1);
 
   test(`${module}: the strict policy of the README is enough`, async () => {
@@ -129,3 +156,25 @@ for (const module of Object.keys(MODULES)) {
     await open("open", { workerUrl: `/pkg/${other}` }, "worker", /must lead to the same version/);
   });
 }
+
+test("inline.js: its worker is a blob, which the policy must allow", async () => {
+  assert.deepEqual(await run("inline", "inline.js"), { found: hash, complaints: [] });
+  const { found } = await run("strict", "inline.js");
+  assert.equal(found.code, "worker", JSON.stringify(found));
+  assert.match(found.message, /allow blob: in worker-src/);
+  assert.equal((await run("strict", "inline.js", { workerUrl: "/pkg/worker.js" })).found, hash);
+});
+
+test("the inline entry works in a page that is one file, from file:", async () => {
+  const folder = new URL("../../target/e2e/", import.meta.url);
+  await mkdir(folder, { recursive: true });
+  const path = new URL("single.html", folder);
+  const script = (await singleFile()).replaceAll("</script", "<\\/script");
+  await writeFile(path, `<!doctype html><meta charset="utf-8"><script>${script}</script>`);
+  const page = await browser.newPage();
+  await page.goto(path.href);
+  for (const how of [{}, { worker: false }]) {
+    assert.equal(await page.evaluate((how) => /** @type {any} */ (window).run(how), how), hash);
+  }
+  await page.close();
+});

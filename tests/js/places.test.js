@@ -61,6 +61,19 @@ test("worker and wasm are taken from other places, or from a worker that is pass
   await works({ worker: new Worker(at("worker.js")), wasmUrl: at("tetralod_core_bg.wasm").href });
 });
 
+test("the inline entry needs no other file, in a worker and in the caller's thread", async () => {
+  const text = await readFile(at("inline.js"), "utf8");
+  const inline = await import(`data:text/javascript;base64,${Buffer.from(text).toString("base64")}`);
+  assert.deepEqual(Object.keys(inline).sort(), Object.keys(await import(at("index.js").href)).sort());
+  for (const worker of [true, false]) {
+    const mt = await inline.MultiTessellation.open(bytes, { worker });
+    await mt.complete;
+    await mt.refine(options);
+    assert.equal(await mt.hash(), hash);
+    mt.free();
+  }
+});
+
 test("a worker that does not start, or is another one, is an error of configuration that says what to do", async () => {
   const open = (how) => MultiTessellation.open(bytes, how);
   await rejects(open({ workerUrl: at("no-such-worker.js") }), "worker", /no-such-worker\.js.*Set `workerUrl`.*"tetralod\/worker".*inline/);

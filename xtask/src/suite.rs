@@ -200,8 +200,8 @@ fn node_test(file: &str) -> Command {
     )
 }
 
-/// Packs the package as npm would publish it, installs the archive in a project of its own outside the repository's
-/// `node_modules`, and compiles and runs that project.
+/// Packs the package as npm would publish it, has its entries and types checked by publint and are-the-types-wrong, installs the
+/// archive in a project of its own outside the repository's `node_modules`, and compiles and runs that project.
 fn consumer() -> Result<()> {
     with_package()?;
     let (source, project) = (Path::new("tests/js/consumer"), shell::root().join("target/consumer"));
@@ -219,6 +219,15 @@ fn consumer() -> Result<()> {
     )?;
     let archive = project.join(packed.trim());
     ensure!(archive.is_file(), "npm pack said `{}` but wrote no such file", packed.trim());
+    shell::run(&mut node_tool("publint/src/cli.js", &["--strict", package::PKG]))?;
+    // The files that are no modules have no types; the scripts of workers export nothing.
+    let untyped = ["--profile", "esm-only", "--exclude-entrypoints", "core.wasm", "viewer.wasm"];
+    shell::run(
+        node_tool("@arethetypeswrong/cli/dist/index.js", &["--format", "table-flipped", "--no-emoji"])
+            .args(["--no-color", "--quiet"])
+            .arg(&archive)
+            .args(untyped),
+    )?;
     let install = ["install", "--no-save", "--offline", "--loglevel=error"];
     shell::run(shell::npm(install).arg(&archive).current_dir(&project))?;
     shell::run(node_tool("typescript/bin/tsc", &["--project"]).arg(&project))?;
