@@ -1,3 +1,4 @@
+/// <reference path="../../pkg/element.d.ts" />
 // What the demo page tells the tests (`www/main.js`), and the names under which it imports the package.
 interface Window {
   tetralodDemo: any;

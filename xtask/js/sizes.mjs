@@ -17,6 +17,7 @@ const { build } = createRequire(new URL("../../tests/js/package.json", import.me
 const LIMITS = {
   ".": 13_000,
   "./viewer": 7_500,
+  "./element": 9_500,
   "./inline": 410_000,
   "./worker": 8_500,
   "./viewer-worker": 18_000,

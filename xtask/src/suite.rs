@@ -242,8 +242,9 @@ fn e2e() -> Result<()> {
     let server = demo::start_server(&tetralod, 0)?;
     shell::run(node_test("ranges-browser.test.js").env("CHROMIUM", &browser.chromium))?;
     with_fixture(|| {
-        for name in ["parts-browser.test.js", "viewer-browser.test.js", "places-browser.test.js"] {
-            shell::run(fixture_env(node_test(name).env("CHROMIUM", &browser.chromium)))?;
+        let names = ["parts-browser", "viewer-browser", "places-browser", "element-browser"];
+        for name in names.map(|name| format!("{name}.test.js")) {
+            shell::run(fixture_env(node_test(&name).env("CHROMIUM", &browser.chromium)))?;
         }
         Ok(())
     })?;
