@@ -1,4 +1,5 @@
-//! `cargo xtask build`: the two wasm modules and the hand-written JavaScript, merged into `pkg/`.
+//! `cargo xtask build`: the two wasm modules and the hand-written JavaScript, merged into `pkg/`, with `inline.js`, which
+//! `xtask/js/inline.mjs` makes of them; `xtask/js/sizes.mjs` has the limit of each entry.
 //!
 //! The core (decoder, refinement, isosurfaces) and the viewer (the same with the renderer) are separate modules, so
 //! that a page which draws by its own means does not download a renderer.
@@ -59,7 +60,8 @@ pub fn build(args: &[String]) -> Result<()> {
         compile(module, staging)?;
     }
     assemble(staging)?;
-    report(Path::new(PKG))
+    report(Path::new(PKG))?;
+    shell::run(&mut shell::command("node", ["xtask/js/sizes.mjs", PKG]))
 }
 
 /// Builds `pkg/` where there is none yet, as steps need that are run by themselves on a fresh checkout.
@@ -129,6 +131,7 @@ fn assemble(staging: &Path) -> Result<()> {
     }
     licences::write(staging, MODULES.iter().map(|module| module.features))?;
     version()?;
+    shell::run(shell::command("node", ["xtask/js/inline.mjs"]).arg(staging))?;
     remake(Path::new(PKG))?;
     for file in files_of(staging)? {
         fs::rename(staging.join(&file), Path::new(PKG).join(&file))

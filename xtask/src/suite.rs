@@ -179,9 +179,10 @@ fn js() -> Result<()> {
     shell::run(&mut node_test("latest.test.js"))?;
     shell::run(&mut node_test("ranges.test.js"))?;
     with_fixture(|| {
-        shell::run(fixture_env(&mut node_test("package.test.js")))?;
-        shell::run(fixture_env(&mut node_test("parts.test.js")))?;
-        shell::run(fixture_env(&mut node_test("steps.test.js")))
+        for name in ["package.test.js", "parts.test.js", "steps.test.js", "places.test.js"] {
+            shell::run(fixture_env(&mut node_test(name)))?;
+        }
+        Ok(())
     })
 }
 
@@ -198,8 +199,8 @@ fn node_test(file: &str) -> Command {
     )
 }
 
-/// Packs the package as npm would publish it, installs the archive in a project of its own outside the repository's
-/// `node_modules`, and compiles and runs that project.
+/// Packs the package as npm would publish it, has its entries and types checked by publint and are-the-types-wrong, installs the
+/// archive in a project of its own outside the repository's `node_modules`, and compiles and runs that project.
 fn consumer() -> Result<()> {
     package::ensure_built()?;
     let (source, project) = (Path::new("tests/js/consumer"), shell::root().join("target/consumer"));
@@ -217,6 +218,15 @@ fn consumer() -> Result<()> {
     )?;
     let archive = project.join(packed.trim());
     ensure!(archive.is_file(), "npm pack said `{}` but wrote no such file", packed.trim());
+    shell::run(&mut node_tool("publint/src/cli.js", &["--strict", package::PKG]))?;
+    // The files that are no modules have no types; the scripts of workers export nothing.
+    let untyped = ["--profile", "esm-only", "--exclude-entrypoints", "core.wasm", "viewer.wasm"];
+    shell::run(
+        node_tool("@arethetypeswrong/cli/dist/index.js", &["--format", "table-flipped", "--no-emoji"])
+            .args(["--no-color", "--quiet"])
+            .arg(&archive)
+            .args(untyped),
+    )?;
     let install = ["install", "--no-save", "--offline", "--loglevel=error"];
     shell::run(shell::npm(install).arg(&archive).current_dir(&project))?;
     shell::run(node_tool("typescript/bin/tsc", &["--project"]).arg(&project))?;
@@ -244,8 +254,9 @@ fn e2e() -> Result<()> {
     let server = demo::start_server(&tetralod, 0)?;
     shell::run(node_test("ranges-browser.test.js").env("CHROMIUM", &browser.chromium))?;
     with_fixture(|| {
-        for name in ["parts-browser.test.js", "viewer-browser.test.js"] {
-            shell::run(fixture_env(node_test(name).env("CHROMIUM", &browser.chromium)))?;
+        let names = ["parts-browser", "viewer-browser", "places-browser", "element-browser"];
+        for name in names.map(|name| format!("{name}.test.js")) {
+            shell::run(fixture_env(node_test(&name).env("CHROMIUM", &browser.chromium)))?;
         }
         Ok(())
     })?;
