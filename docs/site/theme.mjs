@@ -20,8 +20,12 @@ const source = (reflection) => {
   return file && relative(root, file).replaceAll("\\", "/");
 };
 
+/** Headings that do not say what the page is where they stand among others. @type {Record<string, string>} */
+const TITLES = { "pkg-template/README.md": "The npm package" };
+
 /** The title of a page is its first heading. */
 function title(page) {
+  if (page in TITLES) return TITLES[page];
   const heading = /^# (.*)$/m.exec(readFileSync(root + page, "utf8"));
   if (!heading) throw new Error(`${page} has no heading`);
   return heading[1].replaceAll("`", "");
@@ -33,7 +37,7 @@ class Router extends KindRouter {
   getIdealBaseName(reflection) {
     if (!(reflection instanceof DocumentReflection)) return super.getIdealBaseName(reflection);
     const page = source(reflection) ?? reflection.name;
-    return page.replace(/^docs\//, "").replace(/\.md$/, "").toLowerCase();
+    return page.replace(/^docs\//, "").replace("pkg-template/README", "package").replace(/\.md$/, "").toLowerCase();
   }
 }
 
@@ -82,7 +86,7 @@ export function load(app) {
  * @param {any} parser of markdown-it
  */
 export function readers(parser) {
-  const titles = new Map(Object.values(groups).flat().map((page) => [basename(page), title(page)]));
+  const titles = new Map(Object.values(groups).flat().filter((page) => !page.endsWith("README.md")).map((page) => [basename(page), title(page)]));
   parser.core.ruler.push("tetralod", (/** @type {any} */ state) => {
     for (const [i, block] of state.tokens.entries()) {
       if (block.type !== "inline") continue;

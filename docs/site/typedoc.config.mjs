@@ -8,7 +8,8 @@ const path = (name) => fileURLToPath(new URL(name, root));
 const json = (name) => JSON.parse(readFileSync(new URL(name, root), "utf8"));
 
 const { exports } = json("pkg/package.json");
-const types = Object.values(exports).flatMap((entry) => entry.types ?? []);
+// Scripts for workers have nothing to import.
+const types = Object.values(exports).flatMap((entry) => (entry.types && entry.types !== "./worker.d.ts" ? entry.types : []));
 
 /** @type {Partial<import("typedoc").TypeDocOptions>} */
 export default {
@@ -31,7 +32,7 @@ export default {
   markdownItLoader: readers,
   markdownItOptions: { html: true, linkify: false },
   customCss: path("docs/site/site.css"),
-  highlightLanguages: ["console", "html", "javascript", "json", "nginx", "rust", "sh", "text", "typescript", "xml", "yaml"],
+  highlightLanguages: ["console", "html", "javascript", "json", "jsx", "nginx", "rust", "sh", "text", "typescript", "xml", "yaml"],
   searchInDocuments: true,
   navigation: { includeFolders: false },
   sort: ["kind", "source-order"],

@@ -113,7 +113,7 @@ async function serve(folder) {
 
 /** The part of a canvas that differs from its left edge: backgrounds go from top to bottom. */
 async function covered(page) {
-  const png = (await page.locator("canvas").screenshot()).toString("base64");
+  const png = (await page.locator("canvas").first().screenshot()).toString("base64");
   return study.evaluate(async (base64) => {
     const bitmap = await createImageBitmap(await (await fetch(`data:image/png;base64,${base64}`)).blob());
     const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext("2d");

@@ -7,8 +7,6 @@ import { fileURLToPath } from "node:url";
 
 const pkg = fileURLToPath(new URL("../../pkg/", import.meta.url));
 
-/** The wasm modules; `wasm-bindgen` makes four files of each. */
-const MODULES = ["tetralod_core", "tetralod_viewer"];
 const FILES = [
   "LICENSE-APACHE",
   "LICENSE-MIT",
@@ -16,26 +14,45 @@ const FILES = [
   "THIRD-PARTY-LICENSES.txt",
   "changes.js",
   "core.js",
+  "element.d.ts",
+  "element.js",
   "errors.js",
+  "files.js",
   "index.d.ts",
   "index.js",
+  "inline.d.ts",
+  "inline.js",
   "latest.js",
   "options.js",
   "package.json",
   "parts.js",
   "ranges.js",
   "rpc.js",
+  "start.js",
   "stream.js",
+  // The types of the other module are not public.
+  "tetralod_core.d.ts",
+  "tetralod_core.js",
+  "tetralod_core_bg.wasm",
+  "tetralod_viewer.js",
+  "tetralod_viewer_bg.wasm",
   "tools.js",
+  "version.js",
   "viewer-worker.js",
   "viewer.d.ts",
   "viewer.js",
+  "worker.d.ts",
   "worker.js",
-  ...MODULES.flatMap((name) => [`${name}.d.ts`, `${name}.js`, `${name}_bg.wasm`, `${name}_bg.wasm.d.ts`]),
 ];
 
 const [packed] = JSON.parse(execFileSync("npm", ["pack", "--dry-run", "--json"], { cwd: pkg, encoding: "utf8", stdio: ["ignore", "pipe", "ignore"] }));
 const manifest = JSON.parse(await readFile(`${pkg}package.json`, "utf8"));
+
+test("the changes on top are those of this version", async () => {
+  const changes = await readFile(new URL("../../CHANGELOG.md", import.meta.url), "utf8");
+  const [top] = /^## .*$/m.exec(changes) ?? [];
+  assert.ok(top?.includes(manifest.version), `CHANGELOG.md begins with ${top}`);
+});
 
 test("the package holds these files", () => {
   assert.deepEqual(packed.files.map(({ path }) => path).sort(), FILES.sort());

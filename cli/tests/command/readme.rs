@@ -14,12 +14,13 @@ const START: &str = "```console";
 pub const PROMPT: &str = "$ tetralod ";
 
 /// The pages with commands. Each is run in a folder of its own.
-const PAGES: [&str; 10] = [
+const PAGES: [&str; 11] = [
     "README.md",
     "docs/README.md",
     "docs/command.md",
     "docs/csp-and-cors.md",
     "docs/howto/big-models.md",
+    "docs/howto/element.md",
     "docs/howto/fields-and-time.md",
     "docs/howto/my-data.md",
     "docs/howto/three.md",
