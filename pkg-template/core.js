@@ -3,27 +3,24 @@
 import init, { CoreSession, RangeLoader } from "./tetralod_core.js";
 import { TetralodError, reviveError } from "./errors.js";
 import { received } from "./options.js";
+import { coreWasm } from "./files.js";
 import { Parts } from "./parts.js";
-import { nodeModule } from "./stream.js";
+import { wasmError, wasmOf } from "./start.js";
 import { meshToolMethods } from "./tools.js";
+import { VERSION } from "./version.js";
 
 let loading;
 
-/** Compiles the wasm module once per thread. */
-export function loadCore() {
-  loading ??= load().catch((error) => {
+/** Compiles the wasm module once per thread; without `wasm`, its address or its bytes, the one of the package. */
+export function loadCore(wasm) {
+  loading ??= load(wasm ?? coreWasm()).catch((error) => {
     loading = undefined;
-    throw new TetralodError("wasm", `the wasm module did not load: ${error?.message ?? error}`, { cause: error });
+    throw wasmError(error, "tetralod/core.wasm");
   });
   return loading;
 }
 
-async function load() {
-  const url = new URL("./tetralod_core_bg.wasm", import.meta.url);
-  // Node cannot fetch files; browsers compile while they download.
-  const fs = url.protocol === "file:" ? nodeModule("node:fs/promises") : undefined;
-  return init({ module_or_path: fs ? await fs.readFile(url) : url });
-}
+const load = async (wasm) => init({ module_or_path: await wasmOf(wasm) });
 
 /** The methods that wait for bytes, beside which others are answered. */
 export const WAITING = ["openParts", "reach", "settled", "arrived"];
@@ -79,6 +76,10 @@ export function coreMethods(emit) {
   /** The mesh as it is now, or what has changed in it, after a step. */
   const result = ({ stats, more }, deltas) => ({ ...(deltas ? session.delta() : session.mesh()), stats, more });
   return {
+    async load(wasm) {
+      await loadCore(wasm);
+      return { name: "core", version: VERSION };
+    },
     async start(fields) {
       await loadCore();
       session = new CoreSession(fields);

@@ -12,6 +12,8 @@
  * const surface = await mt.isosurface(0.7);
  * mt.free();
  * ```
+ *
+ * @module
  */
 
 import type {
@@ -105,6 +107,13 @@ export interface ReadOptions {
   gap?: number;
 }
 
+/** A worker of `worker_threads`, in Node. */
+export interface NodeWorker {
+  postMessage(message: any, transfer?: readonly any[]): void;
+  on(event: string, listener: (value: any) => void): unknown;
+  terminate(): unknown;
+}
+
 export interface OpenOptions extends ReadOptions {
   /** Stops the download; pending calls reject with the signal's reason, by default an `AbortError`. */
   signal?: AbortSignal;
@@ -114,8 +123,27 @@ export interface OpenOptions extends ReadOptions {
    * Whether decoding and refinement run in a worker of their own (a Web Worker; in Node a `worker_threads` worker), so
    * that the caller's thread never stalls. Default true. With false everything runs in the caller's thread: simpler to
    * debug, and enough for scripts.
+   *
+   * Or a worker that you have made of `tetralod/worker`; it belongs to the volume from then on, and `free` ends it.
    */
-  worker?: boolean;
+  worker?: boolean | Worker | NodeWorker;
+  /**
+   * The address of the worker's file, as your server or bundler gives it: that of `tetralod/worker`. A relative address is
+   * relative to the page. From another origin (a CDN), which must allow it by CORS, it is started by a small worker that
+   * imports it. Default: the file beside this module.
+   *
+   * @example
+   * await MultiTessellation.open(source, { workerUrl: "/assets/worker.js", wasmUrl: "/assets/core.wasm" });
+   * @throws {TetralodError} `worker` if nothing starts there, or a worker of another version
+   */
+  workerUrl?: string | URL;
+  /**
+   * The address of the wasm file, `tetralod/core.wasm`. A relative address is relative to the page. Default: the file beside
+   * the worker's.
+   *
+   * @throws {TetralodError} `wasm` if it cannot be loaded or compiled
+   */
+  wasmUrl?: string | URL;
 }
 
 /** The work of a refinement, or of a step of one, and the quality of the mesh. */
@@ -359,7 +387,12 @@ export type ErrorCode =
   | "not-ready"
   /** The object has been freed. */
   | "freed"
-  /** The wasm module could not be loaded. */
+  /**
+   * The worker did not start: its file is not where the page looks for it, is not JavaScript or of another version, or a
+   * Content-Security-Policy forbids it. The message says what to change.
+   */
+  | "worker"
+  /** The wasm module could not be loaded or compiled; the message says what to change. */
   | "wasm"
   /** The browser has no WebGPU, or it gives no adapter (viewer only). */
   | "no-webgpu"
@@ -369,7 +402,7 @@ export type ErrorCode =
   | "too-large"
   /** The GPU refused a command; a mistake in this package, please report it (viewer only). */
   | "gpu"
-  /** A mistake in this package: please report it. */
+  /** A mistake in this package, also in a worker that had started: please report it. */
   | "internal";
 
 /** The errors of this package. Aborts are not among them: they reject with the signal's own reason. */

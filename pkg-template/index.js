@@ -4,15 +4,16 @@
 
 import { applyChanges, emptyMesh } from "./changes.js";
 import { Local, REPLACED } from "./core.js";
+import { coreRemedy, coreScript, coreWasm, startCore } from "./files.js";
 import { TetralodError } from "./errors.js";
 import { openOptions, sendable } from "./options.js";
-import { Remote, nodeEndpoint, webEndpoint } from "./rpc.js";
-import { abortable, nodeModule, openSource, pump, rangesOf } from "./stream.js";
+import { PLACES, absoluteUrl, loadWasm, startWorker } from "./start.js";
+import { abortable, openSource, pump, rangesOf } from "./stream.js";
 import { checkAmount, checkNames, setCaller, withMeshTools } from "./tools.js";
 
 export { TetralodError, applyChanges, emptyMesh };
 
-const OPEN_OPTIONS = ["signal", "onProgress", "worker"];
+const OPEN_OPTIONS = ["signal", "onProgress", ...PLACES];
 const NO_RETRY = "only a file that is fetched in parts can be continued: open it again";
 const STEP_OPTIONS = ["budgetMs", "updates", "deltas", "signal"];
 
@@ -32,14 +33,17 @@ export class MultiTessellation extends withMeshTools(Object) {
   #goal = 0;
 
   static async open(source, options = {}) {
-    const { signal, onProgress = () => {}, worker = true, ...how } = options;
+    const { signal, onProgress = () => {}, worker = true, workerUrl, wasmUrl, ...how } = options;
     const fetching = openOptions(how, OPEN_OPTIONS);
+    const wasm = wasmUrl === undefined ? await embedded() : absoluteUrl("wasmUrl", wasmUrl).href;
     signal?.throwIfAborted();
+    if (!worker && workerUrl !== undefined) throw new TetralodError("bad-option", "option `workerUrl`: goes with `worker: true` only");
     let mt;
     const onEvent = (_, progress) => mt.#tell(progress);
-    mt = new MultiTessellation(worker ? startWorker(onEvent) : new Local(onEvent), Boolean(worker), onProgress);
+    const core = worker ? startWorker(CORE, { worker, workerUrl }, onEvent) : new Local(onEvent);
+    mt = new MultiTessellation(core, Boolean(worker), onProgress);
     try {
-      await mt.#begin(source, signal, fetching);
+      await Promise.all([loadWasm(core, CORE, wasm), mt.#begin(source, signal, fetching)]);
     } catch (error) {
       mt.#close(error);
       throw error;
@@ -195,8 +199,17 @@ export class MultiTessellation extends withMeshTools(Object) {
   }
 }
 
-function startWorker(onEvent) {
-  const node = nodeModule("node:worker_threads");
-  if (node) return new Remote(nodeEndpoint(new node.Worker(new URL("./worker.js", import.meta.url))), onEvent);
-  return new Remote(webEndpoint(new Worker(new URL("./worker.js", import.meta.url), { type: "module" })), onEvent);
+/** The worker of this class. */
+const CORE = {
+  name: "core",
+  entry: "tetralod/worker",
+  start: startCore,
+  script: coreScript,
+  remedy: coreRemedy,
+};
+
+/** The bytes of the wasm module, where they are in this one; elsewhere the worker finds its file. */
+async function embedded() {
+  const wasm = coreWasm();
+  return wasm instanceof URL ? undefined : wasm;
 }

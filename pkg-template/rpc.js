@@ -22,7 +22,7 @@ export function webEndpoint(target) {
     post: (message, transfer = []) => target.postMessage(message, transfer),
     onMessage: (listener) => target.addEventListener("message", (event) => listener(event.data)),
     onError: (listener) => {
-      target.addEventListener("error", (event) => listener(event.error ?? event.message ?? "the worker did not start"));
+      target.addEventListener("error", (event) => listener(event.error ?? event.message));
       target.addEventListener("messageerror", () => listener("a message could not be read"));
     },
     close: () => target.terminate?.(),
@@ -44,22 +44,33 @@ export function nodeEndpoint(target) {
   };
 }
 
+const failure = (error) => new TetralodError("internal", `the worker failed: ${error?.message ?? error ?? "no reason given"}`);
+
 /** The caller's side. */
 export class Remote {
   #endpoint;
   #pending = new Map();
   #next = 0;
   #closed = null;
+  /** Whether the worker has answered: then it has started. */
+  #started = false;
+  #notStarted;
 
   /**
    * @param {Endpoint} endpoint
    * @param {(name: string, data: any) => void} [onEvent] gets what the worker emits unasked
+   * @param {(error: any) => Error | Promise<Error>} [notStarted] makes the error for a worker that fails before it has answered
    */
-  constructor(endpoint, onEvent = () => {}) {
+  constructor(endpoint, onEvent = () => {}, notStarted = failure) {
     this.#endpoint = endpoint;
+    this.#notStarted = notStarted;
     endpoint.onMessage((message) => ("event" in message ? onEvent(message.event, message.data) : this.#settle(message)));
-    endpoint.onError?.((error) => this.close(new TetralodError("internal", `the worker failed: ${error?.message ?? error}`)));
+    endpoint.onError?.((error) => this.#failed(error));
     endpoint.hold?.(false);
+  }
+
+  async #failed(error) {
+    if (!this.#closed) this.close(await (this.#started ? failure : this.#notStarted)(error));
   }
 
   /** Calls `method` over there; `transfer` lists the buffers in `args` to move instead of copying. */
@@ -84,6 +95,7 @@ export class Remote {
   }
 
   #settle({ id, result, error }) {
+    this.#started = true;
     const call = this.#pending.get(id);
     if (!call) return;
     this.#pending.delete(id);

@@ -86,11 +86,12 @@ export const meshToolMethods = (session) => ({
   hash: () => session().hash(),
 });
 
-/** Refuses options that there are not. */
-export function checkNames(options, names) {
+/** Refuses options that there are not; `others` are handled elsewhere. */
+export function checkNames(options, names, others = []) {
   for (const name of Object.keys(options)) {
     if (names.includes(name)) continue;
-    throw new TetralodError("bad-option", `option \`${name}\`: there is none of this name, only ${names.join(", ")}`);
+    const all = [...others, ...names].join(", ");
+    throw new TetralodError("bad-option", `option \`${name}\`: there is none of this name, only ${all}`);
   }
 }
 

@@ -10,7 +10,9 @@ import { TetralodError, flattenError } from "./errors.js";
 import { received } from "./options.js";
 import { Parts } from "./parts.js";
 import { serve, webEndpoint } from "./rpc.js";
+import { wasmError, wasmOf } from "./start.js";
 import { meshToolMethods } from "./tools.js";
+import { VERSION } from "./version.js";
 
 /** While a file streams in, the mesh follows it this often (in ms), and at most half of the time is spent on that. */
 const FOLLOW = 120;
@@ -79,10 +81,16 @@ const nextFrame =
   typeof requestAnimationFrame === "function" ? requestAnimationFrame : (then) => setTimeout(then, 16);
 
 const methods = {
+  /** Compiles the wasm module; without `wasm`, its address, the one of the package. */
+  async load(wasm) {
+    const source = wasm ?? new URL("./tetralod_viewer_bg.wasm", import.meta.url);
+    await wasmOf(source)
+      .then((found) => init({ module_or_path: found }))
+      .catch((error) => Promise.reject(wasmError(error, "tetralod/viewer.wasm")));
+    return { name: "viewer", version: VERSION };
+  },
+
   async create(canvas, width, height, ratio, milliseconds) {
-    await init().catch((error) => {
-      throw new TetralodError("wasm", `the wasm module did not load: ${error?.message ?? error}`);
-    });
     frameTime = milliseconds;
     viewer = new Viewer(await Gpu.open(canvas, width, height), ratio);
     setInterval(check, CHECK);

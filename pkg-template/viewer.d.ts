@@ -1,4 +1,19 @@
 /// <reference lib="esnext.disposable" />
+/**
+ * Draws an MT on a canvas with WebGPU, and gives of its mesh what `MultiTessellation` gives.
+ *
+ * ```js
+ * import { Viewer } from "tetralod/viewer";
+ *
+ * const viewer = await Viewer.create(document.querySelector("canvas"));
+ * await viewer.open("bucky.mt");
+ * await viewer.refine({ error: "1%" });
+ * await viewer.set({ isosurfaces: [{ value: 0.5 }] });
+ * ```
+ *
+ * @module
+ */
+
 import type {
   BlockProgress,
   Mesh,
@@ -281,6 +296,25 @@ export interface ViewerOptions {
    * have fewer pixels, then fewer tetrahedra; at rest they get sharp again. `Infinity` always draws everything.
    */
   frameTime?: number;
+  /** A worker that you have made of `tetralod/viewer-worker`; it belongs to the viewer from then on. Default: its own. */
+  worker?: true | Worker;
+  /**
+   * The address of the worker's file, as your server or bundler gives it: that of `tetralod/viewer-worker`. A relative address is
+   * relative to the page. From another origin (a CDN), which must allow it by CORS, it is started by a small worker that
+   * imports it. Default: the file beside this module.
+   *
+   * @example
+   * await Viewer.create(canvas, { workerUrl: "/assets/viewer-worker.js", wasmUrl: "/assets/viewer.wasm" });
+   * @throws {TetralodError} `worker` if nothing starts there, or a worker of another version
+   */
+  workerUrl?: string | URL;
+  /**
+   * The address of the wasm file, `tetralod/viewer.wasm`. A relative address is relative to the page. Default: the file beside
+   * the worker's.
+   *
+   * @throws {TetralodError} `wasm` if it cannot be loaded or compiled
+   */
+  wasmUrl?: string | URL;
 }
 
 /** An edge of the box around the domain that shows the ticks of an axis. */

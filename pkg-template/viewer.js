@@ -8,9 +8,9 @@
 import { TetralodError, reviveError } from "./errors.js";
 import { Latest, deferred, mergeUpdates } from "./latest.js";
 import { openOptions, sendable } from "./options.js";
-import { Remote, webEndpoint } from "./rpc.js";
+import { PLACES, absoluteUrl, loadWasm, startWorker } from "./start.js";
 import { abortable, openSource, pump, rangesOf } from "./stream.js";
-import { checkAmount, setCaller, withMeshTools } from "./tools.js";
+import { checkAmount, checkNames, setCaller, withMeshTools } from "./tools.js";
 
 export { TetralodError } from "./errors.js";
 
@@ -22,6 +22,15 @@ const NO_ADAPTER =
 const NO_PAGE = 'a viewer draws on a canvas of a page; elsewhere, use MultiTessellation of "tetralod"';
 const USED_CANVAS =
   "`canvas` has been used by another viewer, or has a context of its own; give each viewer a new canvas element";
+
+/** The worker of a viewer. */
+const VIEWER = {
+  name: "viewer",
+  entry: "tetralod/viewer-worker",
+  start: () => new Worker(new URL("./viewer-worker.js", import.meta.url), { type: "module" }),
+  script: () => new URL("./viewer-worker.js", new URL("./tetralod_viewer_bg.wasm", import.meta.url)),
+  remedy: ", or pass a `worker` that you have made",
+};
 
 /** A GPU that is lost is opened again after these waits (in ms): drivers take some time to start. */
 const WAITS = [0, 500, 2000, 8000];
@@ -66,10 +75,11 @@ export class Viewer extends withMeshTools(EventTarget) {
    * Transfers the canvas to the worker, permanently, and starts the worker.
    *
    * @param {HTMLCanvasElement} canvas
-   * @param {{ signal?: AbortSignal, frameTime?: number }} [options]
+   * @param {{ signal?: AbortSignal, frameTime?: number, worker?: any, workerUrl?: string | URL, wasmUrl?: string | URL }} [options]
    */
-  static async create(canvas, { signal, frameTime = 60 } = {}) {
+  static async create(canvas, { signal, frameTime = 60, ...places } = {}) {
     signal?.throwIfAborted();
+    checkNames(places, PLACES, ["signal", "frameTime"]);
     checkAmount("frameTime", frameTime, 1);
     if (typeof HTMLCanvasElement === "undefined") throw new TetralodError("no-webgpu", NO_PAGE);
     if (!(canvas instanceof HTMLCanvasElement)) {
@@ -77,8 +87,11 @@ export class Viewer extends withMeshTools(EventTarget) {
     }
     await Viewer.check();
     signal?.throwIfAborted();
-    const viewer = new Viewer(canvas);
+    const viewer = new Viewer(canvas, places);
     try {
+      const { wasmUrl } = places;
+      await loadWasm(viewer.#remote, VIEWER, wasmUrl === undefined ? undefined : absoluteUrl("wasmUrl", wasmUrl).href);
+      signal?.throwIfAborted();
       await viewer.#start(frameTime);
       signal?.throwIfAborted();
     } catch (error) {
@@ -89,12 +102,11 @@ export class Viewer extends withMeshTools(EventTarget) {
   }
 
   /** @private Use `Viewer.create`. */
-  constructor(canvas) {
+  constructor(canvas, places) {
     super();
     setCaller(this, (method, args) => this.#remote.call(method, args));
     this.#canvas = canvas;
-    const worker = new Worker(new URL("./viewer-worker.js", import.meta.url), { type: "module" });
-    this.#remote = new Remote(webEndpoint(worker), (name, data) => this.#heard(name, data));
+    this.#remote = startWorker(VIEWER, places, (name, data) => this.#heard(name, data));
   }
 
   async #start(frameTime) {
@@ -107,7 +119,7 @@ export class Viewer extends withMeshTools(EventTarget) {
     this.#observer = new ResizeObserver(([entry]) => {
       const size = entry.devicePixelContentBoxSize?.[0];
       const [w, h] = size ? [size.inlineSize, size.blockSize] : pixels(entry.contentRect);
-      this.#cover?.setAttribute("style", coverStyle(this.#canvas));
+      if (this.#cover) this.#cover.style.cssText = coverStyle(this.#canvas);
       this.#size = [Math.max(1, w), Math.max(1, h)];
       this.#change({ size: [...this.#size, devicePixelRatio] });
     });
@@ -138,7 +150,8 @@ export class Viewer extends withMeshTools(EventTarget) {
     for (const wait of WAITS) {
       await new Promise((resolve) => setTimeout(resolve, wait));
       const cover = document.createElement("canvas");
-      cover.setAttribute("style", coverStyle(this.#canvas));
+      // Not as an attribute, which a Content-Security-Policy forbids.
+      cover.style.cssText = coverStyle(this.#canvas);
       cover.ariaHidden = "true";
       const offscreen = cover.transferControlToOffscreen();
       const args = [offscreen, ...pixels(this.#canvas.getBoundingClientRect()), devicePixelRatio];

@@ -26,8 +26,9 @@ const TYPES = { html: "text/html", js: "text/javascript", css: "text/css", wasm:
  * Serves the package under `/pkg/`, the demo page's files, and by `answer` all that is neither.
  *
  * @param {(request: import("node:http").IncomingMessage, response: import("node:http").ServerResponse) => void} answer
+ * @param {Record<string, string>} [headers] go along with every answer
  */
-export async function servePackage(answer) {
+export async function servePackage(answer, headers = {}) {
   /** Names of the files of the package that were asked for. @type {string[]} */
   const asked = [];
   const server = createServer(async (request, response) => {
@@ -36,6 +37,7 @@ export async function servePackage(answer) {
     const own = inPackage ? `../../pkg/${inPackage}` : `../../www${pathname}`;
     const content = /\.\w+$/.test(pathname) && (await readFile(new URL(own, import.meta.url)).catch(() => undefined));
     if (inPackage) asked.push(inPackage);
+    for (const [name, value] of Object.entries(headers)) response.setHeader(name, value);
     if (!content) return answer(request, response);
     response.writeHead(200, { "content-type": TYPES[pathname.split(".").pop() ?? ""] ?? "text/plain" }).end(content);
   });

@@ -1,4 +1,10 @@
+/// <reference path="../../pkg/element.d.ts" />
 // What the demo page tells the tests (`www/main.js`), and the names under which it imports the package.
 interface Window {
   tetralodDemo: any;
+}
+// What `xtask/js/inline.mjs` puts into the bundle.
+declare module "embedded:*" {
+  const text: string;
+  export default text;
 }

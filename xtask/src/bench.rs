@@ -6,14 +6,16 @@ use anyhow::{Context, Result, bail};
 use serde_json::Value;
 
 use crate::serve::Server;
-use crate::{bench_build, bench_format, bench_pictures, browser, demo, package, shell};
+use crate::{bench_beside_vtk, bench_build, bench_format, bench_pictures, browser, demo, package, shell};
 
-/// Measures `FILE.mt`, or the demo's volume; with `--browser` also in Chromium. With `--build`, the builders instead, with `--format` the files, with `--pictures` the renderer.
+/// Measures `FILE.mt`, or the demo's volume; with `--browser` also in Chromium. With `--build`, the builders instead, with `--format` the files, with `--pictures` the renderer,
+/// with `--beside-vtk` the same volumes in other programs.
 pub fn run(args: &[String]) -> Result<()> {
     match args {
         [build] if build == "--build" => return bench_build::run(false),
         [build, large] if build == "--build" && large == "--large" => return bench_build::run(true),
         [format] if format == "--format" => return bench_format::run(),
+        [beside, options @ ..] if beside == "--beside-vtk" => return bench_beside_vtk::run(options),
         [pictures, options @ ..] if pictures == "--pictures" => return bench_pictures::run(options),
         _ => {}
     }
@@ -24,7 +26,7 @@ pub fn run(args: &[String]) -> Result<()> {
             path if !path.starts_with('-') && file.is_none() => file = Some(PathBuf::from(path)),
             other => {
                 bail!(
-                    "`bench` knows one FILE.mt and --browser, --build [--large], --format or --pictures, not `{other}`"
+                    "`bench` knows one FILE.mt and --browser, --build [--large], --format, --pictures or --beside-vtk, not `{other}`"
                 )
             }
         }

@@ -3,16 +3,20 @@
 #![forbid(unsafe_code)]
 
 mod bench;
+mod bench_beside_vtk;
 mod bench_build;
 mod bench_format;
 mod bench_pictures;
 mod browser;
 mod demo;
+mod docs;
 mod fixture;
 mod flow;
+mod licences;
 mod package;
 mod paper;
 mod random;
+mod release;
 mod serve;
 mod shell;
 mod suite;
@@ -26,9 +30,11 @@ usage: cargo xtask COMMAND
 
   build                          build the npm package into pkg/
   demo [--port N] [--no-serve]   build everything, make the demo's data, serve the page on localhost
+  docs                           make the documentation's site in target/docs
   test [STEP...]                 every check, or the named steps; `test --list` names them
   test --quick                   formatting, lints and native tests; not: other feature sets, documentation, the longest
                                  tests, real data, JavaScript, wasm, browsers
+  release [vX.Y.Z]               check that everything can be published, as this version; publishes nothing
   random [MINUTES]               the tests with random inputs for 30 minutes, each time with another TETRALOD_SEED
   bench [FILE.mt] [--browser]    measure decoding, refinement and isosurfaces; natively, or also in the browser
   bench --build [--large]        measure triangulation, insertion and the kinds of MT side by side
@@ -36,6 +42,7 @@ usage: cargo xtask COMMAND
   bench --pictures [OPTION...]   measure the renderer in each mode, on the GPU or in software; writes its part of
                                  docs/benchmarks.md. Options: --size WxH --tets N,N,... --grid N --file FILE.mt
                                  --pictures N --modes A,B,...
+  bench --beside-vtk             measure the same volumes in a browser with VTK's programs; writes docs/beside-vtk.md
   paper                          do the paper's experiments again and write docs/paper.md with plots and pictures";
 
 fn main() -> ExitCode {
@@ -60,10 +67,12 @@ fn run() -> Result<()> {
     match command.as_str() {
         "build" => package::build(rest),
         "demo" => demo::run(rest),
+        "docs" => docs::run(rest),
         "test" => suite::run(rest),
         "bench" => bench::run(rest),
         "paper" => paper::run(rest),
         "random" => random::run(rest),
+        "release" => release::run(rest),
         other => bail!("there is no command `{other}`\n{USAGE}"),
     }
 }

@@ -1,4 +1,5 @@
-//! `cargo xtask build`: the two wasm modules and the hand-written JavaScript, merged into `pkg/`.
+//! `cargo xtask build`: the two wasm modules and the hand-written JavaScript, merged into `pkg/`, with `inline.js`, which
+//! `xtask/js/inline.mjs` makes of them; `xtask/js/sizes.mjs` has the limit of each entry.
 //!
 //! The core (decoder, refinement, isosurfaces) and the viewer (the same with the renderer) are separate modules, so
 //! that a page which draws by its own means does not download a renderer.
@@ -11,7 +12,7 @@ use anyhow::{Context, Result, bail, ensure};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 
-use crate::shell;
+use crate::{licences, shell};
 
 /// Where the package is put together.
 pub const PKG: &str = "pkg";
@@ -59,7 +60,16 @@ pub fn build(args: &[String]) -> Result<()> {
         compile(module, staging)?;
     }
     assemble(staging)?;
-    report(Path::new(PKG))
+    report(Path::new(PKG))?;
+    shell::run(&mut shell::command("node", ["xtask/js/sizes.mjs", PKG]))
+}
+
+/// Builds `pkg/` where there is none yet, as steps need that are run by themselves on a fresh checkout.
+pub fn ensure_built() -> Result<()> {
+    if Path::new(PKG).join("package.json").is_file() {
+        return shell::install_node_tools();
+    }
+    build(&[])
 }
 
 /// Compiles the module with the benchmark, which the package does not have, into `folder`.
@@ -127,7 +137,9 @@ fn assemble(staging: &Path) -> Result<()> {
     for licence in ["LICENSE-MIT", "LICENSE-APACHE"] {
         fs::copy(licence, staging.join(licence)).context(licence)?;
     }
-    check_package_version(staging)?;
+    licences::write(staging, MODULES.iter().map(|module| module.features))?;
+    version()?;
+    shell::run(shell::command("node", ["xtask/js/inline.mjs"]).arg(staging))?;
     remake(Path::new(PKG))?;
     for file in files_of(staging)? {
         fs::rename(staging.join(&file), Path::new(PKG).join(&file))
@@ -136,13 +148,18 @@ fn assemble(staging: &Path) -> Result<()> {
     Ok(())
 }
 
-fn check_package_version(staging: &Path) -> Result<()> {
-    let text = fs::read_to_string(staging.join("package.json")).context("pkg-template/package.json")?;
-    let json: serde_json::Value = serde_json::from_str(&text).context("pkg-template/package.json")?;
+/// The one version of the crates and the npm package.
+pub fn version() -> Result<String> {
+    let path = "pkg-template/package.json";
+    let text = fs::read_to_string(path).context(path)?;
+    let json: serde_json::Value = serde_json::from_str(&text).context(path)?;
+    let npm = json["version"].as_str().unwrap_or_default();
     let lock = fs::read_to_string("Cargo.lock").context("Cargo.lock")?;
-    let (npm, cargo) = (json["version"].as_str().unwrap_or_default(), locked(&lock, "tetralod")?);
-    ensure!(npm == cargo, "pkg-template/package.json is version {npm}, the crate is {cargo}");
-    Ok(())
+    for package in ["tetralod", "tetralod-cli"] {
+        let cargo = locked(&lock, package)?;
+        ensure!(npm == cargo, "{path} is version {npm}, the crate {package} is {cargo}");
+    }
+    Ok(npm.to_owned())
 }
 
 fn files_of(folder: &Path) -> Result<Vec<String>> {

@@ -105,8 +105,12 @@ pub fn add_wasm_target() -> Result<()> {
 
 /// Installs the development tools of `tests/js` where they are missing or out of date.
 pub fn install_node_tools() -> Result<()> {
+    install_node_packages(Path::new("tests/js"))
+}
+
+/// Installs what `package-lock.json` in `folder` names where it is missing or out of date.
+pub fn install_node_packages(folder: &Path) -> Result<()> {
     check_node()?;
-    let folder = Path::new("tests/js");
     let (lock, done) = (folder.join("package-lock.json"), folder.join("node_modules/.package-lock.json"));
     let newer =
         |a: &Path, b: &Path| Some(a.metadata().ok()?.modified().ok()? > b.metadata().ok()?.modified().ok()?);

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, ensure};
 
-use crate::{browser, demo, fixture, package, shell};
+use crate::{browser, demo, docs, fixture, package, shell};
 
 struct Step {
     name: &'static str,
@@ -18,7 +18,7 @@ struct Step {
     run: fn() -> Result<()>,
 }
 
-const STEPS: [Step; 10] = [
+const STEPS: [Step; 12] = [
     Step { name: "fmt", what: "formatting", run: fmt },
     Step { name: "clippy", what: "lints of everything native", run: clippy },
     Step { name: "features", what: "lints of the feature sets that are shipped", run: features },
@@ -28,6 +28,12 @@ const STEPS: [Step; 10] = [
     Step { name: "wasm", what: "the core and a WebGPU adapter in headless Chromium", run: wasm },
     Step { name: "js", what: "lints and types of all JavaScript, and the package in Node", run: js },
     Step { name: "consumer", what: "installing and type-checking the packed package", run: consumer },
+    Step {
+        name: "site",
+        what: "the documentation's site: its links, and that it needs no network",
+        run: site,
+    },
+    Step { name: "pages", what: "the examples of README.md and docs/ in Node and Chromium", run: pages },
     Step { name: "e2e", what: "the demo page in headless Chromium", run: e2e },
 ];
 
@@ -166,24 +172,18 @@ fn fixture_env(command: &mut Command) -> &mut Command {
 }
 
 fn js() -> Result<()> {
-    with_package()?;
+    package::ensure_built()?;
     shell::run(&mut node_tool("@biomejs/biome/bin/biome", &["lint", "--error-on-warnings"]))?;
     shell::run(&mut node_tool("typescript/bin/tsc", &["--project", "tests/js"]))?;
+    shell::run(&mut node_test("pack.test.js"))?;
     shell::run(&mut node_test("latest.test.js"))?;
     shell::run(&mut node_test("ranges.test.js"))?;
     with_fixture(|| {
-        shell::run(fixture_env(&mut node_test("package.test.js")))?;
-        shell::run(fixture_env(&mut node_test("parts.test.js")))?;
-        shell::run(fixture_env(&mut node_test("steps.test.js")))
+        for name in ["package.test.js", "parts.test.js", "steps.test.js", "places.test.js"] {
+            shell::run(fixture_env(&mut node_test(name)))?;
+        }
+        Ok(())
     })
-}
-
-/// The steps that use the package build it when they are run by themselves on a fresh checkout.
-fn with_package() -> Result<()> {
-    if Path::new(package::PKG).join("package.json").is_file() {
-        return shell::install_node_tools();
-    }
-    package::build(&[])
 }
 
 fn node_tool(path: &str, args: &[&str]) -> Command {
@@ -199,10 +199,10 @@ fn node_test(file: &str) -> Command {
     )
 }
 
-/// Packs the package as npm would publish it, installs the archive in a project of its own outside the repository's
-/// `node_modules`, and compiles and runs that project.
+/// Packs the package as npm would publish it, has its entries and types checked by publint and are-the-types-wrong, installs the
+/// archive in a project of its own outside the repository's `node_modules`, and compiles and runs that project.
 fn consumer() -> Result<()> {
-    with_package()?;
+    package::ensure_built()?;
     let (source, project) = (Path::new("tests/js/consumer"), shell::root().join("target/consumer"));
     if project.exists() {
         std::fs::remove_dir_all(&project)?;
@@ -218,22 +218,45 @@ fn consumer() -> Result<()> {
     )?;
     let archive = project.join(packed.trim());
     ensure!(archive.is_file(), "npm pack said `{}` but wrote no such file", packed.trim());
+    shell::run(&mut node_tool("publint/src/cli.js", &["--strict", package::PKG]))?;
+    // The files that are no modules have no types; the scripts of workers export nothing.
+    let untyped = ["--profile", "esm-only", "--exclude-entrypoints", "core.wasm", "viewer.wasm"];
+    shell::run(
+        node_tool("@arethetypeswrong/cli/dist/index.js", &["--format", "table-flipped", "--no-emoji"])
+            .args(["--no-color", "--quiet"])
+            .arg(&archive)
+            .args(untyped),
+    )?;
     let install = ["install", "--no-save", "--offline", "--loglevel=error"];
     shell::run(shell::npm(install).arg(&archive).current_dir(&project))?;
     shell::run(node_tool("typescript/bin/tsc", &["--project"]).arg(&project))?;
     with_fixture(|| shell::run(fixture_env(shell::command("node", ["dist/main.js"]).current_dir(&project))))
 }
 
+fn site() -> Result<()> {
+    docs::build()?;
+    shell::run(node_test("site.test.js").env("CHROMIUM", browser::require()?.chromium))
+}
+
+fn pages() -> Result<()> {
+    package::ensure_built()?;
+    shell::install_node_packages(Path::new(docs::SOURCES))?;
+    let mut command = node_test("docs.test.js");
+    command.env("TETRALOD", shell::tested_command()?).env("CHROMIUM", browser::require()?.chromium);
+    shell::run(&mut command)
+}
+
 fn e2e() -> Result<()> {
     let browser = browser::require()?;
-    with_package()?;
+    package::ensure_built()?;
     let tetralod = shell::tested_command()?;
     demo::make_data(&tetralod)?;
     let server = demo::start_server(&tetralod, 0)?;
     shell::run(node_test("ranges-browser.test.js").env("CHROMIUM", &browser.chromium))?;
     with_fixture(|| {
-        for name in ["parts-browser.test.js", "viewer-browser.test.js"] {
-            shell::run(fixture_env(node_test(name).env("CHROMIUM", &browser.chromium)))?;
+        let names = ["parts-browser", "viewer-browser", "places-browser", "element-browser"];
+        for name in names.map(|name| format!("{name}.test.js")) {
+            shell::run(fixture_env(node_test(&name).env("CHROMIUM", &browser.chromium)))?;
         }
         Ok(())
     })?;

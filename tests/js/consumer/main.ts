@@ -64,7 +64,7 @@ const examples = await checkOptions(source);
 
 const good =
   chunks > 0 &&
-  examples === 39 &&
+  examples === 41 &&
   positions.length === 3 * mesh.stats.vertices &&
   mesh.tets.length === 4 * mesh.stats.tetrahedra &&
   surface.indices.length % 3 === 0 &&

@@ -77,6 +77,8 @@ const openings: Examples<OpenOptions> = {
   signal: { signal: new AbortController().signal },
   onProgress: { onProgress: () => {} },
   worker: { worker: false },
+  workerUrl: { workerUrl: import.meta.resolve("tetralod/worker") },
+  wasmUrl: { wasmUrl: new URL(import.meta.resolve("tetralod/core.wasm")) },
 };
 
 /** The members that a result has by its type, each with the kinds of value that it may have. */

@@ -1,0 +1,65 @@
+//! `cargo xtask bench --beside-vtk`: the same volumes in a browser, with tetralod and with VTK's programs from npm; writes
+//! `docs/beside-vtk.md`.
+
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Context, Result, bail};
+
+use crate::{browser, package, shell};
+
+const PAGE: &str = "docs/beside-vtk.md";
+const SOURCES: &str = "benches/beside_vtk";
+const DATA: &str = "target/beside-vtk";
+
+const HEAD: &str = "\
+# Beside VTK in a browser
+
+Written by `cargo xtask bench --beside-vtk`, which installs the other programs from npm, generates the volumes and drives headless
+Chromium (`benches/beside_vtk`). Each number is the median of three visits with a new browser.
+
+- **vtk.js** (`@kitware/vtk.js` 37.4.3, bundled by esbuild) reads the grid and extracts the isosurface in JavaScript. It has no tetrahedra.
+- **F3D** (`f3d` 3.5.0) is VTK, compiled to WebAssembly, with readers for many formats. It reads the tetrahedra and draws their
+  boundary.
+- **VTK.wasm** (`@kitware/vtk-wasm` 3.0.5) is not measured: its npm package loads the WebAssembly from another site, which this
+  measurement does without.
+- **tetralod** draws a mesh within 1 % of the field's range: for the isosurface only around its value. The others draw the
+  full data.
+
+*program*: JavaScript and WebAssembly, compressed by gzip. *file*: the whole volume, as `tetralod generate` writes it (`.vti` and
+`.vtu` are compressed by zlib) or as an MT file. *fetched*: what was read of it. *first picture* is the time from the start of
+the navigation to the first picture, for tetralod of a coarse mesh; *full picture*, to the picture that does not change any more.
+The columns with 20 Mbit/s have a server that sends no faster, and answers after 40 ms. *memory*: of all processes of the browser with the
+full picture, less than those of an empty page. *frame*: from one picture to the next while the camera turns, 640 × 480 pixels,
+drawn in software, since the machine has no GPU: WebGL by vtk.js and F3D, WebGPU by tetralod.
+
+";
+
+/// The volumes: name, data set and size, and the format for the others.
+const VOLUMES: [(&str, &str, &str, &str); 2] =
+    [("bucky", "bucky", "65", "vti"), ("flow", "sphere-flow", "32", "vtu")];
+
+/// Measures and writes the page.
+pub fn run(args: &[String]) -> Result<()> {
+    if let Some(arg) = args.first() {
+        bail!("`bench --beside-vtk` takes no argument, got `{arg}`");
+    }
+    package::ensure_built()?;
+    shell::install_node_packages(Path::new(SOURCES))?;
+    make_data(&shell::released_command()?)?;
+    let mut command = shell::command("node", [format!("{SOURCES}/run.js")]);
+    let tables = shell::output(command.env("CHROMIUM", browser::require()?.chromium))?;
+    fs::write(PAGE, [HEAD, &tables].concat()).with_context(|| PAGE.to_owned())?;
+    println!("wrote {PAGE}");
+    Ok(())
+}
+
+fn make_data(tetralod: &Path) -> Result<()> {
+    fs::create_dir_all(DATA)?;
+    for (name, set, size, extension) in VOLUMES {
+        let (input, mt) = (format!("{DATA}/{name}.{extension}"), format!("{DATA}/{name}.mt"));
+        shell::run(&mut shell::command(tetralod, ["generate", set, "--size", size, "-o", &input]))?;
+        shell::run(&mut shell::command(tetralod, ["build", &input, "-o", &mt]))?;
+    }
+    Ok(())
+}

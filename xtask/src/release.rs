@@ -1,0 +1,56 @@
+//! `cargo xtask release`: whether everything can be published, without publishing it.
+
+use std::fs;
+
+use anyhow::{Context, Result, bail, ensure};
+
+use crate::{package, shell};
+
+/// Checks the version and what would be uploaded; with a tag, such as `v0.1.0`, also that it names this version.
+pub fn run(args: &[String]) -> Result<()> {
+    let version = package::version()?;
+    match args {
+        [] => {}
+        [tag] => {
+            ensure!(*tag == format!("v{version}"), "the tag is {tag}, the version {version}");
+            check_changes(&fs::read_to_string("CHANGELOG.md").context("CHANGELOG.md")?, &version)?;
+        }
+        _ => bail!("`release` takes one tag, got {}", args.join(" ")),
+    }
+    package::build(&[])?;
+    // One of these needs the other, which is not on crates.io yet: cargo takes it from here.
+    shell::run(&mut shell::cargo([
+        "publish",
+        "--dry-run",
+        "--package",
+        "tetralod",
+        "--package",
+        "tetralod-cli",
+    ]))?;
+    shell::run(shell::npm(["publish", "--dry-run", "--access", "public"]).current_dir(package::PKG))
+}
+
+/// A version that is published is no longer called unreleased.
+fn check_changes(changes: &str, version: &str) -> Result<()> {
+    let heading = changes.lines().find(|line| line.starts_with("## ")).unwrap_or_default();
+    let rest = heading.strip_prefix("## ").and_then(|rest| rest.strip_prefix(version)).unwrap_or("?");
+    ensure!(
+        rest.is_empty() || rest.starts_with(" ("),
+        "CHANGELOG.md begins with `{heading}`, not with `## {version}`"
+    );
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::check_changes;
+
+    #[test]
+    fn the_changes_of_the_version_are_on_top() {
+        assert!(check_changes("# Changelog\n\n## 0.1.0 (2026-12-01)\n\n## 0.0.9\n", "0.1.0").is_ok());
+        assert!(check_changes("## 0.1.0\n", "0.1.0").is_ok());
+        for wrong in ["## Unreleased: 0.1.0\n## 0.1.0\n", "## 0.1.01\n", "## 0.0.9\n## 0.1.0\n", ""] {
+            assert!(check_changes(wrong, "0.1.0").is_err(), "{wrong}");
+        }
+    }
+}
