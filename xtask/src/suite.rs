@@ -18,7 +18,7 @@ struct Step {
     run: fn() -> Result<()>,
 }
 
-const STEPS: [Step; 10] = [
+const STEPS: [Step; 11] = [
     Step { name: "fmt", what: "formatting", run: fmt },
     Step { name: "clippy", what: "lints of everything native", run: clippy },
     Step { name: "features", what: "lints of the feature sets that are shipped", run: features },
@@ -28,6 +28,7 @@ const STEPS: [Step; 10] = [
     Step { name: "wasm", what: "the core and a WebGPU adapter in headless Chromium", run: wasm },
     Step { name: "js", what: "lints and types of all JavaScript, and the package in Node", run: js },
     Step { name: "consumer", what: "installing and type-checking the packed package", run: consumer },
+    Step { name: "examples", what: "building the example projects, and their pictures", run: examples },
     Step { name: "e2e", what: "the demo page in headless Chromium", run: e2e },
 ];
 
@@ -232,6 +233,13 @@ fn consumer() -> Result<()> {
     shell::run(shell::npm(install).arg(&archive).current_dir(&project))?;
     shell::run(node_tool("typescript/bin/tsc", &["--project"]).arg(&project))?;
     with_fixture(|| shell::run(fixture_env(shell::command("node", ["dist/main.js"]).current_dir(&project))))
+}
+
+/// The projects of `examples/js`, with the packed package, in headless Chromium and in Node.
+fn examples() -> Result<()> {
+    let browser = browser::require()?;
+    with_package()?;
+    with_fixture(|| shell::run(fixture_env(node_test("examples.test.js").env("CHROMIUM", &browser.chromium))))
 }
 
 fn e2e() -> Result<()> {
