@@ -18,7 +18,7 @@ struct Step {
     run: fn() -> Result<()>,
 }
 
-const STEPS: [Step; 12] = [
+const STEPS: [Step; 13] = [
     Step { name: "fmt", what: "formatting", run: fmt },
     Step { name: "clippy", what: "lints of everything native", run: clippy },
     Step { name: "features", what: "lints of the feature sets that are shipped", run: features },
@@ -34,6 +34,7 @@ const STEPS: [Step; 12] = [
         run: site,
     },
     Step { name: "pages", what: "the examples of README.md and docs/ in Node and Chromium", run: pages },
+    Step { name: "examples", what: "building the example projects, and their pictures", run: examples },
     Step { name: "e2e", what: "the demo page in headless Chromium", run: e2e },
 ];
 
@@ -244,6 +245,13 @@ fn pages() -> Result<()> {
     let mut command = node_test("docs.test.js");
     command.env("TETRALOD", shell::tested_command()?).env("CHROMIUM", browser::require()?.chromium);
     shell::run(&mut command)
+}
+
+/// The projects of `examples/js`, with the packed package, in headless Chromium and in Node.
+fn examples() -> Result<()> {
+    let browser = browser::require()?;
+    with_package()?;
+    with_fixture(|| shell::run(fixture_env(node_test("examples.test.js").env("CHROMIUM", &browser.chromium))))
 }
 
 fn e2e() -> Result<()> {
