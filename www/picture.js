@@ -24,6 +24,7 @@ export function attachPicture(viewer, { canvas, overlay, onChange, onError }) {
     viewer.set({ camera: { ...camera, projection } }).catch(onError);
   });
   $("axes").addEventListener("input", () => (overlay.showsAxes = $("axes").checked));
+  $("home").addEventListener("click", () => viewer.home().catch(onError));
   $("shot").addEventListener("click", () => save(viewer, canvas).catch(onError));
 }
 

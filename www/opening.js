@@ -1,0 +1,98 @@
+/** Opening a volume, and following its download. */
+
+import { $ } from "./dom.js";
+import { chooseField, setFields } from "./fields.js";
+import { nameOf } from "./format.js";
+import { fail, hideMessage } from "./messages.js";
+import { demo, page } from "./page.js";
+import { applyRegion, inner } from "./region.js";
+import { refine } from "./request.js";
+import { applyMode } from "./scene.js";
+
+/** The kinds of MT, with their updates. */
+const KINDS = {
+  "half-edge": "half-edge (vertex insertions)",
+  edge: "edge (vertex splits)",
+  vertex: "vertex (vertex insertions)",
+  explicit: "explicit (any updates)",
+};
+
+/** What was opened last: the button "Try again" opens it again. @type {string | File} */
+let source;
+let opening = 0;
+
+/** Opens a volume: a URL, or a file of the user. @param {string | File} from */
+export async function open(from) {
+  source = from;
+  showInList(from);
+  const mine = ++opening;
+  Object.assign(demo, { state: "opening", error: undefined, info: undefined, stats: undefined });
+  Object.assign(demo, { firstFrameBytes: undefined, firstFrameMs: undefined, receivedBytes: 0, totalBytes: undefined });
+  demo.blocks = undefined;
+  page.comparison.forget();
+  hideMessage();
+  $("legend").hidden = true;
+  $("loading").classList.remove("done");
+  $("progress").removeAttribute("value");
+  $("progress-text").textContent = `Opening ${nameOf(from)}…`;
+  try {
+    const opened = await page.viewer.open(from);
+    if (mine !== opening) return;
+    demo.totalBytes = opened.total;
+    if (demo.state === "opening") demo.state = "streaming";
+    arrive(opened.info);
+    await opened.finished;
+    if (mine !== opening) return;
+    demo.state = "complete";
+    demo.totalBytes ??= demo.receivedBytes;
+    $("loading").classList.add("done");
+  } catch (error) {
+    if (mine === opening && error?.name !== "AbortError") fail(error);
+  }
+}
+
+/** Continues the download if the file comes in blocks and has not been replaced; otherwise opens it again. */
+export async function retry() {
+  if (!demo.info || !demo.blocks || demo.error?.code === "changed") return open(source);
+  hideMessage();
+  demo.error = undefined;
+  demo.state = "streaming";
+  const mine = opening;
+  try {
+    await page.viewer.retry();
+    await page.viewer.settled();
+    if (mine === opening && demo.state === "streaming") demo.state = "complete";
+  } catch (error) {
+    if (mine === opening && demo.state === "streaming") fail(error);
+  }
+}
+
+/** The base mesh has arrived: sets up the settings for it. */
+function arrive(info) {
+  demo.info = info;
+  page.probes.clear();
+  page.flow.fields = info.fields;
+  $("n-kind").textContent = KINDS[info.kind] ?? info.kind;
+  setFields(info.fields);
+  page.box = inner(info.bounds);
+  chooseField();
+  // Draws, too.
+  applyMode();
+  applyRegion();
+  refine();
+}
+
+/** Selects in the list what is open; a file or URL that is not in the list replaces the last one that was added. */
+function showInList(from) {
+  const list = $("volume");
+  const listed = [...list.options].find(({ value }) => value && value === from);
+  if (listed) {
+    listed.selected = true;
+    return;
+  }
+  list.querySelector("[data-other]")?.remove();
+  const option = new Option(nameOf(from), "", true, true);
+  option.dataset.other = "";
+  option.disabled = true;
+  list.append(option);
+}

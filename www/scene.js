@@ -1,0 +1,166 @@
+/** What is drawn: the view, the isovalue, the plane, colours, and the colour bar. */
+
+import { $, all, checked, text } from "./dom.js";
+import { rounded } from "./format.js";
+import { fail } from "./messages.js";
+import { demo, page } from "./page.js";
+import { refine } from "./request.js";
+
+export const mode = () => /** @type {"iso" | "volume" | "slice" | "solid" | "mesh" | "flow"} */ (checked("mode"));
+
+/** The isovalue has so many digits: as many as links keep. */
+const DIGITS = 6;
+
+/** In units of the field. */
+export function isovalue() {
+  const { min, max } = page.field;
+  return page.isovalue ?? (min + max) / 2;
+}
+
+/** Where a value is in the field's range, 0 to 1. */
+export function fractionOf(value) {
+  const { min, max } = page.field;
+  return max > min ? Math.min(Math.max((value - min) / (max - min), 0), 1) : 0.5;
+}
+
+/** Takes an isovalue at a fraction of the field's range. */
+export function setIsovalue(fraction) {
+  const { min, max } = page.field;
+  page.isovalue = Number((min + fraction * (max - min)).toPrecision(DIGITS));
+  applyIsovalue();
+}
+
+/** Shows the isovalue, which may be one of the volume before: values carry over. */
+export function applyIsovalue() {
+  const { min, max, unit } = page.field;
+  const value = isovalue();
+  $("isovalue").value = 1000 * fractionOf(value);
+  text("isovalue-text", `${rounded(value, max - min)} ${unit}`.trim(), "isovalue");
+  draw();
+  if ($("focus").checked) refine();
+}
+
+/** Shows the settings of the view. */
+export function applyMode() {
+  for (const row of all("[data-mode]")) row.hidden = !row.dataset.mode.split(" ").includes(mode());
+  // Slices and seeds have no side.
+  $("flip").parentElement.hidden = isPlane();
+  $("cut-label").textContent = isPlane() ? "Plane" : "Clip plane";
+  page.overlay.quad = undefined;
+  showHistogram().catch(fail);
+  // Draws, too.
+  applyCut();
+}
+
+/** Shows the histogram of the field where the transfer function is edited. */
+export async function showHistogram() {
+  if (mode() !== "volume" || !demo.info) return;
+  page.transfer.volumes = (await page.viewer.stats({ bins: 100 })).histogram;
+}
+
+/** Draws what the settings say. */
+export function draw() {
+  if (!demo.info) return;
+  const { viewer, field, flow, transfer, colours, comparison } = page;
+  const opacity = $("opacity").value / 100;
+  text("opacity-text", `${$("opacity").value} %`, "opacity");
+  // The range is one of the field.
+  const others = { mesh: $("colour-by").value !== "field", flow: !flow.isByField };
+  $("range").hidden = others[mode()] ?? false;
+  const nothing = { isosurfaces: [], volume: null, slices: [], boundary: null, cells: null, clips: [] };
+  const noFlow = { streamlines: null, arrows: null };
+  const shown = {
+    iso: () => ({ isosurfaces: [{ value: isovalue(), opacity }] }),
+    volume: () => ({ volume: { opacities: transfer.opacities(field, opacity) } }),
+    slice: () => ({ slices: [{ ...plane(), opacity, edges: true }] }),
+    solid: () => ({ boundary: { opacity, edges: true }, clips: [plane()] }),
+    mesh: () => ({ cells: { cut: plane(), colourBy: $("colour-by").value } }),
+    flow: () => flow.state({ bounds: demo.info.bounds, plane: seedPlane(), field }),
+  }[mode()]();
+  const compare = comparison.state;
+  // A difference has values on both sides of 0.
+  const diverging = compare?.difference ? { map: "coolwarm" } : {};
+  const looks = { colours: { ...colours.state, ...diverging }, background: $("background").value, compare };
+  viewer.set(/** @type {any} */ ({ ...nothing, ...noFlow, ...shown, ...looks })).catch(fail);
+}
+
+/** The colour bar of what is drawn. */
+export function showLegend(legend) {
+  const { overlay, field, transfer, colours } = page;
+  $("legend").hidden = !legend;
+  if (!legend) return overlay.refresh();
+  const { label, ticks } = legend;
+  const unit = unitOf(label);
+  $("legend-name").textContent = unit ? `${label} in ${unit}` : label;
+  if (label === field?.name) transfer.colours = colours.gradient(legend);
+  $("legend-bar").style.background = `linear-gradient(90deg, ${legend.colours.join(", ")})`;
+  $("legend-ticks").replaceChildren(
+    ...ticks.map(({ label: value, fraction }) => {
+      const tick = document.createElement("span");
+      tick.textContent = value;
+      tick.style.left = `${100 * fraction}%`;
+      return tick;
+    }),
+  );
+  leaveOutOverlaps($("legend-ticks"));
+  overlay.refresh();
+}
+
+/** The unit of what a legend is of: a field, or the length of the vector that is shown. */
+export function unitOf(label) {
+  if (page.field?.name === label) return page.field.unit;
+  return mode() === "flow" ? page.flow.unit : "";
+}
+
+/** Hides the ticks whose words would touch those of the one before. */
+function leaveOutOverlaps(ticks) {
+  let end = Number.NEGATIVE_INFINITY;
+  for (const tick of ticks.children) {
+    const { left, right } = tick.getBoundingClientRect();
+    tick.hidden = left < end + 4;
+    if (!tick.hidden) end = right;
+  }
+}
+
+/** Whether the plane is one to look at, and cuts nothing away. */
+const isPlane = () => mode() === "slice" || mode() === "flow";
+
+/** The coordinate of the plane along its axis. */
+function placeOfPlane() {
+  const axis = Number($("axis").value);
+  const [low, high] = [demo.info.bounds[axis], demo.info.bounds[axis + 3]];
+  return low + ((high - low) * $("cut").value) / 1000;
+}
+
+/** The plane of the seeds. */
+export const seedPlane = () => ({ axis: Number($("axis").value), at: placeOfPlane() });
+
+/** The clip plane. @returns {{ normal: [number, number, number], offset: number }} */
+export function plane() {
+  const axis = Number($("axis").value);
+  const sign = $("flip").checked ? -1 : 1;
+  const along = (other) => (other === axis ? sign : 0);
+  return { normal: [along(0), along(1), along(2)], offset: sign * placeOfPlane() };
+}
+
+/** Shows where the plane is. */
+export function applyCut() {
+  if (!demo.info) return;
+  const axis = Number($("axis").value);
+  const [low, high] = [demo.info.bounds[axis], demo.info.bounds[axis + 3]];
+  const { normal, offset } = plane();
+  const at = normal[axis] * offset;
+  const where = Math.abs(at) < (high - low) * 1e-4 ? 0 : Number(at.toPrecision(3));
+  const side = $("flip").checked ? "<" : ">";
+  const shown = isPlane() ? `${"xyz"[axis]} = ${where}` : `Hide ${"xyz"[axis]} ${side} ${where}`;
+  text("cut-text", shown, "cut");
+  draw();
+  if ($("region").value === "cut") refine();
+}
+
+export function attachScene() {
+  for (const radio of all("[name=mode]")) radio.addEventListener("change", applyMode);
+  $("isovalue").addEventListener("input", () => page.field && setIsovalue($("isovalue").value / 1000));
+  for (const id of ["cut", "axis", "flip"]) $(id).addEventListener("input", applyCut);
+  for (const id of ["opacity", "colour-by"]) $(id).addEventListener("input", draw);
+}
