@@ -19,10 +19,9 @@ export function setFields(all) {
   fields = new Map();
   all.forEach(({ name }, number) => fields.set(name, [...(fields.get(name) ?? []), number]));
   for (const steps of fields.values()) steps.sort((a, b) => all[a].time - all[b].time);
-  const before = $("field").value;
   $("field").replaceChildren(...[...fields.keys()].map((name) => new Option(name, name)));
-  if (fields.has(before)) $("field").value = before;
   $("field-row").hidden = fields.size < 2;
+  $("time").max = Math.max(...[...fields.values()].map((steps) => steps.length)) - 1;
   $("time").value = 0;
 }
 
@@ -31,6 +30,7 @@ export function chooseField() {
   const steps = fields.get($("field").value);
   $("time").max = steps.length - 1;
   $("time-row").hidden = steps.length < 2;
+  if ($("time").value >= steps.length) $("time").value = 0;
   const field = demo.info.fields[steps[$("time").value]];
   page.field = field;
   page.transfer.field = field;

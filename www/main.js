@@ -7,9 +7,10 @@ import { $ } from "./dom.js";
 import { attachFields } from "./fields.js";
 import { attachFiles } from "./files.js";
 import { FlowSettings } from "./flow.js";
+import { attachKeys } from "./keys.js";
 import { attachMessages, fail, say } from "./messages.js";
 import { showFrame, showProgress, showStats } from "./numbers.js";
-import { open, retry } from "./opening.js";
+import { open, retry, setFirst } from "./opening.js";
 import { OverlayView } from "./overlay.js";
 import { demo, page } from "./page.js";
 import { attachPicture, lookFrom } from "./picture.js";
@@ -17,6 +18,8 @@ import { Probes } from "./probes.js";
 import { attachRegion, boxWasDragged, useBox } from "./region.js";
 import { attachRequest } from "./request.js";
 import { attachScene, draw, fractionOf, isovalue, mode, seedPlane, showLegend } from "./scene.js";
+import { attachShare } from "./share.js";
+import { attachState, read } from "./state.js";
 import { TransferEditor } from "./transfer.js";
 
 const canvas = $("canvas");
@@ -54,7 +57,12 @@ async function start() {
   attachRegion();
   attachPicture(viewer, { canvas, overlay: page.overlay, onChange: draw, onError: fail });
   attachFiles();
-  open(new URLSearchParams(location.search).get("url") ?? $("volume").value);
+  attachState(viewer);
+  attachShare();
+  attachKeys();
+  const { url = "", ...words } = read(location.hash);
+  setFirst(new URLSearchParams(location.search).get("url") ?? $("volume").value);
+  open(url, words);
 }
 
 /** The viewer; nothing where it cannot start, with a message. */

@@ -1,13 +1,11 @@
 /** Opening a volume, and following its download. */
 
 import { $ } from "./dom.js";
-import { chooseField, setFields } from "./fields.js";
+import { setFields } from "./fields.js";
 import { nameOf } from "./format.js";
 import { fail, hideMessage } from "./messages.js";
 import { demo, page } from "./page.js";
-import { applyRegion, inner } from "./region.js";
-import { refine } from "./request.js";
-import { applyMode } from "./scene.js";
+import { arriveWith, carriedOver } from "./state.js";
 
 /** The kinds of MT, with their updates. */
 const KINDS = {
@@ -20,9 +18,44 @@ const KINDS = {
 /** What was opened last: the button "Try again" opens it again. @type {string | File} */
 let source;
 let opening = 0;
+/** What the page opens by itself. */
+let first = "";
+/** Files of the user, by their names: undo may come back to them. @type {Map<string, File>} */
+const files = new Map();
+const FILE = "file:";
 
-/** Opens a volume: a URL, or a file of the user. @param {string | File} from */
-export async function open(from) {
+/** Says what is open where no address says anything else. @param {string} url */
+export function setFirst(url) {
+  first = url;
+}
+
+/** What is open, as in the address of the page. */
+export function sourceWords() {
+  if (source instanceof File) return `${FILE}${source.name}`;
+  return source === first ? "" : source;
+}
+
+/** The volume that words of an address mean; undefined for a file that is not here. */
+function sourceOf(words) {
+  if (words === "") return first;
+  return words.startsWith(FILE) ? files.get(words.slice(FILE.length)) : words;
+}
+
+/**
+ * Opens a volume: a URL, a file of the user, or what the words of an address mean. Shows it with the state `words`; without
+ * them the settings stay, as far as they have a meaning there.
+ *
+ * @param {string | File} wanted
+ * @param {Record<string, string>} [words]
+ */
+export async function open(wanted, words) {
+  if (wanted instanceof File) files.set(wanted.name, wanted);
+  const from = typeof wanted === "string" ? sourceOf(wanted) : wanted;
+  if (!from) {
+    fail({ code: "no-file", message: `The file ${wanted.slice(FILE.length)} is not part of the link. Open it from your disk` });
+    return source ? undefined : open(first);
+  }
+  const shown = words ?? (demo.info ? carriedOver() : {});
   source = from;
   showInList(from);
   const mine = ++opening;
@@ -40,7 +73,7 @@ export async function open(from) {
     if (mine !== opening) return;
     demo.totalBytes = opened.total;
     if (demo.state === "opening") demo.state = "streaming";
-    arrive(opened.info);
+    arrive(opened.info, shown);
     await opened.finished;
     if (mine !== opening) return;
     demo.state = "complete";
@@ -68,18 +101,13 @@ export async function retry() {
 }
 
 /** The base mesh has arrived: sets up the settings for it. */
-function arrive(info) {
+function arrive(info, words) {
   demo.info = info;
   page.probes.clear();
   page.flow.fields = info.fields;
   $("n-kind").textContent = KINDS[info.kind] ?? info.kind;
   setFields(info.fields);
-  page.box = inner(info.bounds);
-  chooseField();
-  // Draws, too.
-  applyMode();
-  applyRegion();
-  refine();
+  arriveWith(words);
 }
 
 /** Selects in the list what is open; a file or URL that is not in the list replaces the last one that was added. */

@@ -13,6 +13,8 @@ import { linePlot } from "./plot.js";
 const QUICK = 40;
 const REST = 150;
 const MOST_PINS = 2;
+/** Positions in links have so many digits. */
+const DIGITS = 6;
 /** Fields that a list shows, at most. */
 const MOST_FIELDS = 8;
 
@@ -57,6 +59,24 @@ export class Probes {
 
   get pins() {
     return this.#pins;
+  }
+
+  /** The positions of the points that are kept, as numbers. */
+  get words() {
+    return String(this.#pins.flatMap(({ position }) => position.map((x) => Number(x.toPrecision(DIGITS)))));
+  }
+
+  set words(words) {
+    if (words === this.words) return;
+    const all = words ? words.split(",").map(Number) : [];
+    const points = [all.slice(0, 3), all.slice(3, 6)].filter((point) => point.length === 3 && point.every(Number.isFinite));
+    const mine = (this.#pins = []);
+    this.#setPins(mine);
+    if (points.length === 0) return;
+    Promise.all(points.map((point) => this.#viewer.reading(point))).then(
+      (found) => this.#pins === mine && this.#setPins(found.filter(Boolean)),
+      () => {},
+    );
   }
 
   /** The pointer is at a point of the canvas, (−1 to 1, y upwards), and at a place of the page. */

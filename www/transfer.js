@@ -22,6 +22,9 @@ const STEP = [0.01, 0.1];
  * @typedef {[at: number, opacity: number]} Point
  */
 
+/** The function that there is first. */
+const FIRST = "ramp";
+
 /** Functions to begin with; `at` is the fraction of the isovalue. @type {Record<string, (at: number) => Point[]>} */
 const PRESETS = {
   ramp: () => [[0, 0], [0.3, 0], [1, 0.8]],
@@ -33,8 +36,9 @@ const PRESETS = {
 export class TransferEditor {
   #parts;
   #onChange;
+  #isovalue;
   /** @type {Point[]} */
-  #points = PRESETS.ramp(0.5);
+  #points = PRESETS[FIRST](0.5);
   #selected = 2;
   /** The volume of each bin of the histogram. */
   #volumes = new Float64Array(0);
@@ -50,6 +54,7 @@ export class TransferEditor {
   constructor(parts, { isovalue, onChange }) {
     this.#parts = parts;
     this.#onChange = onChange;
+    this.#isovalue = isovalue;
     parts.preset.addEventListener("input", () => {
       const preset = PRESETS[parts.preset.value];
       if (preset) this.#set(preset(isovalue()), 0);
@@ -69,6 +74,23 @@ export class TransferEditor {
   /** The opacities for the viewer, for values of a field, each times `factor`. @returns {[number, number][]} */
   opacities({ min, max }, factor) {
     return this.#points.map(([at, opacity]) => [min + at * (max - min), opacity * factor]);
+  }
+
+  /** The name of a preset, or the points as numbers; nothing for what there is first. */
+  get words() {
+    const { value } = this.#parts.preset;
+    return value === FIRST ? "" : value || String(this.#points.flat());
+  }
+
+  set words(words) {
+    const values = words.split(",").map(Number);
+    const isPoints = values.length >= 4 && values.length % 2 === 0 && values.every((x) => x >= 0 && x <= 1);
+    const name = Object.hasOwn(PRESETS, words) ? words : FIRST;
+    this.#parts.preset.value = isPoints ? "" : name;
+    const pairs = values.flatMap((at, i) => (i % 2 === 0 ? [/** @type {Point} */ ([at, values[i + 1]])] : []));
+    this.#points = isPoints ? pairs : PRESETS[name](this.#isovalue());
+    this.#selected = Math.min(this.#selected, this.#points.length - 1);
+    this.#draw();
   }
 
   /** What the values are of. The points stay where they are in its range. @param {import("tetralod").FieldInfo} field */
@@ -104,7 +126,9 @@ export class TransferEditor {
     const lower = this.#points[i - 1]?.[0] ?? 0;
     const upper = this.#points[i + 1]?.[0] ?? 1;
     const points = [...this.#points];
-    points[i] = [Math.min(Math.max(at, lower), upper), Math.min(Math.max(opacity, 0), 1)];
+    // As many digits as links keep.
+    const short = (x) => Number(x.toFixed(4));
+    points[i] = [short(Math.min(Math.max(at, lower), upper)), short(Math.min(Math.max(opacity, 0), 1))];
     this.#parts.preset.value = "";
     this.#set(points, i);
   }

@@ -51,7 +51,7 @@ async function setSlider(page, id, value) {
 async function picture(page, name) {
   await settle(page);
   const path = fileURLToPath(new URL(`${name}.png`, pictures));
-  const style = "#legend, #loading, #overlay, #cards, #readout, #divider { visibility: hidden !important }";
+  const style = "#legend, #loading, #overlay, #cards, #readout, #divider, #note { visibility: hidden !important } canvas { outline: none !important }";
   return study(page, await page.locator("#canvas").screenshot({ path, style }));
 }
 
@@ -697,5 +697,58 @@ test("the package runs in a worker of the page, without a viewer", async () => {
   assert.ok(seen.same, "the same request gives the same mesh from wherever one starts");
   assert.ok(seen.followed, "deltas add up to the mesh");
   assert.equal(seen.aborted, "AbortError");
+  await page.close();
+});
+
+/** Waits until the address has what a pattern matches. */
+const addressed = (page, pattern) => page.waitForFunction((source) => new RegExp(source).test(location.hash), pattern.source, { timeout: PATIENCE });
+
+test("the address has the whole state: a reload gives the same picture, undo and redo go back and forth", async () => {
+  const page = await openSmall();
+  const first = await picture(page, "state-first");
+  await page.fill("#isovalue", "250");
+  await addressed(page, /isovalue=/);
+  await show(page, "Solid");
+  await page.selectOption("#map", "magma");
+  await page.selectOption("#region", "box");
+  await addressed(page, /view=solid.*map=magma.*region=box/);
+  await page.locator("#canvas").focus();
+  for (const key of ["ArrowLeft", "ArrowUp", "+"]) await page.keyboard.press(key);
+  await addressed(page, /camera=/);
+  const before = await picture(page, "state-before");
+  const [address, request] = [page.url(), await demo(page, "request")];
+  await page.reload();
+  await reach(page, "complete");
+  assert.equal(differing(before, await picture(page, "state-after")), 0, "the same picture");
+  assert.deepEqual(await demo(page, "request"), request);
+  await settle(page);
+  assert.equal(page.url(), address, "the state stays as it was");
+
+  // Another page with the copied link shows the same, and steps of what is done there are undone.
+  await page.locator("#share").click();
+  await page.locator("#note").waitFor();
+  await page.selectOption("#map", "viridis");
+  await page.waitForFunction(() => !location.hash.includes("magma"), undefined, { timeout: PATIENCE });
+  await page.locator("#undo").click();
+  assert.equal(page.url(), address);
+  assert.equal(await page.inputValue("#map"), "magma");
+  assert.ok(await page.locator("#undo").isDisabled(), "there is no more to undo");
+  await page.keyboard.press("Control+Shift+Z");
+  assert.equal(await page.inputValue("#map"), "viridis");
+  await page.keyboard.press("Control+Z");
+  assert.equal(differing(before, await picture(page, "state-undone")), 0, "the same picture again");
+  await page.locator("#reset").click();
+  await page.waitForFunction(() => location.hash === "", undefined, { timeout: PATIENCE });
+  await setSlider(page, "error", 70);
+  assert.ok(differing(first, await picture(page, "state-reset")) < 0.005, "the first picture");
+
+  // The isovalue carries over by value.
+  await page.fill("#isovalue", "250");
+  const value = await page.textContent("#isovalue-text");
+  await page.selectOption("#volume", "data/bucky.mt");
+  await reach(page, "complete");
+  assert.equal(Number(await page.textContent("#isovalue-text")).toFixed(2), Number(value).toFixed(2));
+  await addressed(page, /url=data\/bucky.mt.*isovalue=/);
+  assert.deepEqual(page.complaints, []);
   await page.close();
 });
