@@ -22,3 +22,15 @@ export function announce(words) {
   clearTimeout(waiting);
   waiting = setTimeout(() => ($("status").textContent = words), 800);
 }
+
+/** Dialogs close with their button, and by a press beside them. */
+export function attachDialogs() {
+  for (const dialog of all("dialog")) {
+    dialog.querySelector("[data-close]").addEventListener("click", () => dialog.close());
+    dialog.addEventListener("pointerdown", (event) => {
+      const { left, right, top, bottom } = dialog.getBoundingClientRect();
+      const isInside = event.clientX >= left && event.clientX <= right && event.clientY >= top && event.clientY <= bottom;
+      if (event.target === dialog && !isInside) dialog.close();
+    });
+  }
+}

@@ -20,6 +20,7 @@ export function setFields(all) {
   all.forEach(({ name }, number) => fields.set(name, [...(fields.get(name) ?? []), number]));
   for (const steps of fields.values()) steps.sort((a, b) => all[a].time - all[b].time);
   $("field").replaceChildren(...[...fields.keys()].map((name) => new Option(name, name)));
+  $("surface-colour").replaceChildren(new Option("two sides", ""), ...[...fields.keys()].map((name) => new Option(name, name)));
   $("field-row").hidden = fields.size < 2;
   $("time").max = Math.max(...[...fields.values()].map((steps) => steps.length)) - 1;
   $("time").value = 0;

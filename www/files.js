@@ -5,11 +5,12 @@ import { open } from "./opening.js";
 
 /** Takes files that the user has chosen or dropped. What else than MT files is to be read goes here. @param {File[]} files */
 export function takeFiles(files) {
-  if (files.length > 0) open(files[0]);
+  if (files.length === 0) return;
+  $("gallery").close();
+  open(files[0]);
 }
 
 export function attachFiles() {
-  $("volume").addEventListener("change", () => open($("volume").value));
   $("choose").addEventListener("click", () => $("file").click());
   $("file").addEventListener("change", () => {
     const files = [...$("file").files];

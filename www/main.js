@@ -3,10 +3,11 @@
 import { ColourSettings } from "./colours.js";
 import { Comparison } from "./compare.js";
 import { attachControls } from "./controls.js";
-import { $ } from "./dom.js";
+import { $, attachDialogs } from "./dom.js";
 import { attachFields } from "./fields.js";
 import { attachFiles } from "./files.js";
 import { FlowSettings } from "./flow.js";
+import { attachGallery, openGallery, readVolumes, sceneOf, showPoster } from "./gallery.js";
 import { attachKeys } from "./keys.js";
 import { attachMessages, fail, say } from "./messages.js";
 import { showFrame, showProgress, showStats } from "./numbers.js";
@@ -20,6 +21,8 @@ import { attachRequest } from "./request.js";
 import { attachScene, draw, fractionOf, isovalue, mode, seedPlane, showLegend } from "./scene.js";
 import { attachShare } from "./share.js";
 import { attachState, read } from "./state.js";
+import { attachTabs } from "./tabs.js";
+import { attachTheme } from "./theme.js";
 import { TransferEditor } from "./transfer.js";
 
 const canvas = $("canvas");
@@ -29,6 +32,12 @@ start();
 async function start() {
   $("panel").addEventListener("submit", (event) => event.preventDefault());
   attachMessages({ onRetry: retry });
+  attachDialogs();
+  attachTabs();
+  attachTheme();
+  attachKeys();
+  const listed = readVolumes();
+  listed.then(() => demo.state === "starting" && showPoster(wantedUrl() ?? ""));
   const viewer = await makeViewer();
   if (!viewer) return;
   page.viewer = demo.viewer = viewer;
@@ -55,14 +64,29 @@ async function start() {
   attachFields();
   attachRequest();
   attachRegion();
-  attachPicture(viewer, { canvas, overlay: page.overlay, onChange: draw, onError: fail });
+  attachPicture(viewer, { canvas, overlay: page.overlay, onError: fail });
   attachFiles();
   attachState(viewer);
   attachShare();
-  attachKeys();
+  attachGallery();
+  await begin(listed);
+}
+
+/** What the address of the page asks for. */
+const wantedUrl = () => read(location.hash).url ?? new URLSearchParams(location.search).get("url") ?? undefined;
+
+/** Opens what the address asks for, or the first volume of the list. */
+async function begin(listed) {
   const { url = "", ...words } = read(location.hash);
-  setFirst(new URLSearchParams(location.search).get("url") ?? $("volume").value);
-  open(url, words);
+  const asked = new URLSearchParams(location.search).get("url");
+  const first = asked ?? (await listed)?.url;
+  if (!first && !url) {
+    $("growth").textContent = "";
+    return openGallery();
+  }
+  setFirst(first ?? "");
+  const isPlain = !asked && Object.keys(words).length === 0 && !url;
+  open(url, isPlain ? sceneOf(first) : words);
 }
 
 /** The viewer; nothing where it cannot start, with a message. */
@@ -75,8 +99,9 @@ async function makeViewer() {
     demo.error = { code: error.code, message: error.message };
     const unsupported = error.code === "no-webgpu";
     demo.state = unsupported ? "unsupported" : "failed";
-    $("panel").inert = true;
+    $("side-panel").inert = true;
     $("loading").hidden = true;
+    $("growth").textContent = "";
     say(unsupported ? "This page needs WebGPU" : "The viewer could not start", error);
     return undefined;
   }
@@ -84,7 +109,7 @@ async function makeViewer() {
 
 /** What lies over the picture: axes, probes, the plot. */
 function attachOverlay(viewer) {
-  const covered = ["legend"].map($);
+  const covered = ["legend", "growth"].map($);
   const overlay = new OverlayView($("overlay"), { covered, onSide: (side) => lookFrom(viewer, side).catch(fail) });
   viewer.addEventListener("overlay", ({ detail }) => (overlay.data = detail));
   const parts = { readout: $("readout"), cards: $("cards"), marquee: $("marquee") };
@@ -94,7 +119,6 @@ function attachOverlay(viewer) {
   const probes = new Probes({ viewer, overlay, svg, stage, fields: () => demo.info.fields, shown: () => page.field });
   Object.assign(page, { overlay, probes });
   $("unpin").addEventListener("click", () => probes.clear());
-  document.addEventListener("keydown", (event) => event.key === "Escape" && probes.clear());
   $("box-of-pins").addEventListener("click", () => {
     const [one, other] = probes.pins;
     if (other) useBox(probes.boxOf(one.position, other.position));

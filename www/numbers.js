@@ -1,7 +1,7 @@
 /** The numbers of the page: what has arrived, how good the mesh is, and what a picture takes. */
 
 import { $, all, announce } from "./dom.js";
-import { count, milliseconds, percentage, pixels, size } from "./format.js";
+import { count, milliseconds, percentage, pixels, size, vtuBytes } from "./format.js";
 import { fail } from "./messages.js";
 import { demo, page } from "./page.js";
 import { budget, errorPixels } from "./request.js";
@@ -17,14 +17,26 @@ export function showProgress({ bytes, total, complete, blocks }) {
   demo.totalBytes ??= total;
   if (known) $("progress").value = bytes / known;
   const amount = known ? `${size(bytes)} of ${size(known)}` : size(bytes);
-  $("progress-text").textContent = complete ? `${size(bytes)} received` : amount;
+  showGrowth();
   $("n-bytes").textContent = complete ? size(bytes) : amount;
+}
+
+/** How large the volume is, and how little of it has come. */
+export function showGrowth() {
+  const { info, totalBytes, receivedBytes } = demo;
+  if (!info) return;
+  const { vertices, tetrahedra } = info;
+  const whole = totalBytes ? `, ${size(totalBytes)} as MT` : "";
+  const arrived = document.createElement("b");
+  arrived.textContent = size(receivedBytes);
+  const words = `${count(tetrahedra)} tetrahedra: ${size(vtuBytes({ vertices, tetrahedra, fields: info.fields.length }))} as VTU${whole}, `;
+  $("growth").replaceChildren(words, arrived, demo.state === "complete" ? " fetched" : " so far");
 }
 
 /** Shows the progress of a file that is fetched in blocks: only those that the mesh needs. */
 function showBlocks({ here, all, needed, leftOut }, bytes) {
   if (needed > 0) $("progress").value = Math.min(here / needed, 1);
-  $("progress-text").textContent = `${count(here)} of ${count(all)} blocks`;
+  showGrowth();
   const excess = leftOut > 0 ? `, ${count(leftOut)} do not fit in memory` : "";
   $("n-blocks").textContent = `${count(here)} of ${count(all)}${excess}`;
   $("n-bytes").textContent = size(bytes);
@@ -64,6 +76,7 @@ export function showFrame(frame) {
   if (demo.firstFrameBytes === undefined) {
     demo.firstFrameBytes = frame.bytes;
     demo.firstFrameMs = performance.now();
+    $("poster").hidden = true;
   }
   $("n-triangles").textContent = count(frame.triangles);
   $("n-uploaded").textContent = size(frame.uploaded);

@@ -4,6 +4,7 @@ import { $ } from "./dom.js";
 import { setFields } from "./fields.js";
 import { nameOf } from "./format.js";
 import { fail, hideMessage } from "./messages.js";
+import { showGrowth } from "./numbers.js";
 import { demo, page } from "./page.js";
 import { arriveWith, carriedOver } from "./state.js";
 
@@ -67,7 +68,7 @@ export async function open(wanted, words) {
   $("legend").hidden = true;
   $("loading").classList.remove("done");
   $("progress").removeAttribute("value");
-  $("progress-text").textContent = `Opening ${nameOf(from)}…`;
+  $("growth").textContent = `Opening ${nameOf(from)}…`;
   try {
     const opened = await page.viewer.open(from);
     if (mine !== opening) return;
@@ -78,6 +79,7 @@ export async function open(wanted, words) {
     if (mine !== opening) return;
     demo.state = "complete";
     demo.totalBytes ??= demo.receivedBytes;
+    showGrowth();
     $("loading").classList.add("done");
   } catch (error) {
     if (mine === opening && error?.name !== "AbortError") fail(error);
@@ -120,7 +122,7 @@ function showInList(from) {
   }
   list.querySelector("[data-other]")?.remove();
   const option = new Option(nameOf(from), "", true, true);
-  option.dataset.other = "";
+  option.dataset.other = typeof from === "string" ? from : "";
   option.disabled = true;
   list.append(option);
 }

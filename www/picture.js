@@ -5,17 +5,13 @@ const $ = (id) => document.getElementById(id);
 
 /**
  * @param {import("tetralod/viewer").Viewer} viewer
- * @param {{ canvas: HTMLCanvasElement, overlay: import("./overlay.js").OverlayView, onChange: () => void,
- *   onError: (error: any) => void }} page `onChange` draws again, with the background of the settings
+ * @param {{ canvas: HTMLCanvasElement, overlay: import("./overlay.js").OverlayView,
+ *   onError: (error: any) => void }} page
  */
-export function attachPicture(viewer, { canvas, overlay, onChange, onError }) {
+export function attachPicture(viewer, { canvas, overlay, onError }) {
   $("side").addEventListener("input", () => {
     lookFrom(viewer, $("side").value).catch(onError);
     $("side").value = "";
-  });
-  $("background").addEventListener("input", () => {
-    $("stage").dataset.background = $("background").value;
-    onChange();
   });
   $("orthographic").addEventListener("input", () => {
     const { camera } = viewer.state;
@@ -25,7 +21,15 @@ export function attachPicture(viewer, { canvas, overlay, onChange, onError }) {
   });
   $("axes").addEventListener("input", () => (overlay.showsAxes = $("axes").checked));
   $("home").addEventListener("click", () => viewer.home().catch(onError));
+  $("full").addEventListener("click", fullScreen);
   $("shot").addEventListener("click", () => save(viewer, canvas).catch(onError));
+}
+
+/** Shows the picture on the whole screen, or no longer. */
+export function fullScreen() {
+  const change = document.fullscreenElement ? document.exitFullscreen() : $("stage").requestFullscreen?.();
+  // Where the browser does not allow it, the page stays as it is.
+  change?.catch(() => {});
 }
 
 /** The model as it fills the picture leaves no room for the labels of axes: from so many times as far it does. */

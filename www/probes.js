@@ -31,6 +31,8 @@ export class Probes {
   #marks = element("g", { class: "pins" });
   /** The points that are kept. @type {Probe[]} */
   #pins = [];
+  /** The words of points that are being read. @type {string | undefined} */
+  #coming;
   /** The number of the last question about the pointer: late answers are ignored. */
   #asked = 0;
   #took = 0;
@@ -63,7 +65,7 @@ export class Probes {
 
   /** The positions of the points that are kept, as numbers. */
   get words() {
-    return String(this.#pins.flatMap(({ position }) => position.map((x) => Number(x.toPrecision(DIGITS)))));
+    return this.#coming ?? String(this.#pins.flatMap(({ position }) => position.map((x) => Number(x.toPrecision(DIGITS)))));
   }
 
   set words(words) {
@@ -73,6 +75,7 @@ export class Probes {
     const mine = (this.#pins = []);
     this.#setPins(mine);
     if (points.length === 0) return;
+    this.#coming = words;
     Promise.all(points.map((point) => this.#viewer.reading(point))).then(
       (found) => this.#pins === mine && this.#setPins(found.filter(Boolean)),
       () => {},
@@ -193,6 +196,7 @@ export class Probes {
   }
 
   #setPins(pins) {
+    this.#coming = undefined;
     this.#pins = pins;
     const cards = pins.map((pin, i) => {
       const card = document.createElement("div");

@@ -5,6 +5,7 @@ import { rounded } from "./format.js";
 import { fail } from "./messages.js";
 import { demo, page } from "./page.js";
 import { refine } from "./request.js";
+import { background } from "./theme.js";
 
 export const mode = () => /** @type {"iso" | "volume" | "slice" | "solid" | "mesh" | "flow"} */ (checked("mode"));
 
@@ -65,12 +66,14 @@ export function draw() {
   const opacity = $("opacity").value / 100;
   text("opacity-text", `${$("opacity").value} %`, "opacity");
   // The range is one of the field.
-  const others = { mesh: $("colour-by").value !== "field", flow: !flow.isByField };
+  const by = $("surface-colour").value;
+  const others = { iso: by !== field.name, mesh: $("colour-by").value !== "field", flow: !flow.isByField };
+  $("colours").hidden = mode() === "iso" && !by;
   $("range").hidden = others[mode()] ?? false;
   const nothing = { isosurfaces: [], volume: null, slices: [], boundary: null, cells: null, clips: [] };
   const noFlow = { streamlines: null, arrows: null };
   const shown = {
-    iso: () => ({ isosurfaces: [{ value: isovalue(), opacity }] }),
+    iso: () => ({ isosurfaces: [{ value: isovalue(), opacity, ...(by ? { field: by } : {}) }] }),
     volume: () => ({ volume: { opacities: transfer.opacities(field, opacity) } }),
     slice: () => ({ slices: [{ ...plane(), opacity, edges: true }] }),
     solid: () => ({ boundary: { opacity, edges: true }, clips: [plane()] }),
@@ -80,8 +83,16 @@ export function draw() {
   const compare = comparison.state;
   // A difference has values on both sides of 0.
   const diverging = compare?.difference ? { map: "coolwarm" } : {};
-  const looks = { colours: { ...colours.state, ...diverging }, background: $("background").value, compare };
+  const range = mode() === "iso" && by && by !== field.name ? { range: ownRange(by) } : {};
+  const looks = { colours: { ...colours.state, ...range, ...diverging }, background: background(), compare };
   viewer.set(/** @type {any} */ ({ ...nothing, ...noFlow, ...shown, ...looks })).catch(fail);
+}
+
+/** The range of a field that is not the one that is shown; symmetric about 0 where it has values on both sides. */
+function ownRange(name) {
+  const { min, max } = demo.info.fields.find((field) => field.name === name);
+  const most = Math.max(-min, max);
+  return min < 0 && max > 0 ? [-most, most] : [min, max];
 }
 
 /** The colour bar of what is drawn. */
@@ -108,7 +119,8 @@ export function showLegend(legend) {
 
 /** The unit of what a legend is of: a field, or the length of the vector that is shown. */
 export function unitOf(label) {
-  if (page.field?.name === label) return page.field.unit;
+  const field = [page.field, ...(demo.info?.fields ?? [])].find((one) => one?.name === label);
+  if (field) return field.unit;
   return mode() === "flow" ? page.flow.unit : "";
 }
 
@@ -162,5 +174,5 @@ export function attachScene() {
   for (const radio of all("[name=mode]")) radio.addEventListener("change", applyMode);
   $("isovalue").addEventListener("input", () => page.field && setIsovalue($("isovalue").value / 1000));
   for (const id of ["cut", "axis", "flip"]) $(id).addEventListener("input", applyCut);
-  for (const id of ["opacity", "colour-by"]) $(id).addEventListener("input", draw);
+  for (const id of ["opacity", "colour-by", "surface-colour"]) $(id).addEventListener("input", draw);
 }

@@ -9,12 +9,32 @@ const NOTE = 4000;
 
 let timer;
 
-/** Shows words for a while. Screen readers announce them. */
-export function note(words) {
+/**
+ * Shows words for a while; with something to do, until it is done or another note comes. Screen readers announce them.
+ *
+ * @param {string} words
+ * @param {{ label: string, act: () => void }} [action]
+ */
+export function note(words, action) {
   clearTimeout(timer);
-  $("note").textContent = words;
+  const hide = () => ($("note").hidden = true);
+  $("note").replaceChildren(words);
   $("note").hidden = false;
-  timer = setTimeout(() => ($("note").hidden = true), NOTE);
+  if (!action) {
+    timer = setTimeout(hide, NOTE);
+    return;
+  }
+  const close = { label: "Close", act: () => {} };
+  for (const { label, act } of [action, close]) {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.textContent = label;
+    button.addEventListener("click", () => {
+      hide();
+      act();
+    });
+    $("note").append(" ", button);
+  }
 }
 
 /** Copies the address of the page, which has its whole state. */

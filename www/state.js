@@ -12,6 +12,7 @@ import { demo, page } from "./page.js";
 import { applyRegion, inner } from "./region.js";
 import { applyRefineBy, errorPositions } from "./request.js";
 import { applyMode } from "./scene.js";
+import { applyTheme } from "./theme.js";
 
 /** The state is written when nothing has changed for so long (in ms). */
 const QUIET = 300;
@@ -72,6 +73,7 @@ function makeEntries() {
   return {
     view: radios("mode"),
     field: list("field"),
+    "surface-colour": list("surface-colour"),
     vector: list("vector"),
     isovalue: {
       get: () => String(page.isovalue ?? ""),
@@ -99,6 +101,10 @@ let entries;
 /** The camera as a volume is shown first. @type {import("tetralod/viewer").CameraState | undefined} */
 let home;
 
+/** The words of a camera that was set, until the viewer has it. @type {string | undefined} */
+let awaited;
+let isSet = true;
+
 const wordsOf = (camera) => {
   const { target, distance, yaw, pitch, projection } = camera;
   const all = [...target, distance, yaw, pitch].map((x) => Number(x.toPrecision(CAMERA_DIGITS)));
@@ -108,7 +114,7 @@ const wordsOf = (camera) => {
 function cameraWords() {
   const { camera } = page.viewer.state;
   home ??= camera;
-  const words = camera ? wordsOf(camera) : "";
+  const words = awaited ?? (camera ? wordsOf(camera) : "");
   return home && words === wordsOf(home) ? "" : words;
 }
 
@@ -119,8 +125,17 @@ function setCamera(words) {
   $("orthographic").checked = isWhole && isOrthographic;
   /** @type {"orthographic" | "perspective"} */
   const projection = isOrthographic ? "orthographic" : "perspective";
-  if (isWhole) page.viewer.set({ camera: { target: [x, y, z], distance, yaw, pitch, projection } }).catch(fail);
-  else if (home) page.viewer.set({ camera: home }).catch(fail);
+  const camera = isWhole ? { target: /** @type {[number, number, number]} */ ([x, y, z]), distance, yaw, pitch, projection } : home;
+  if (!camera) return;
+  awaited = wordsOf(camera);
+  isSet = false;
+  const mine = awaited;
+  page.viewer.set({ camera }).then(() => (isSet ||= mine === awaited), fail);
+}
+
+function cameraMoved({ detail }) {
+  if (isSet || wordsOf(detail) === awaited) awaited = undefined;
+  changed();
 }
 
 /** The state of the page now, as a plain object. @returns {Words} */
@@ -153,14 +168,14 @@ export function arriveWith(words) {
 function show(words) {
   const { transfer, ...others } = entries;
   for (const [name, { set }] of Object.entries(others)) set(words[name] ?? "");
-  $("stage").dataset.background = $("background").value;
   page.overlay.showsAxes = $("axes").checked;
   chooseField();
   // The step of a transfer function is at the isovalue of the field.
   transfer.set(words.transfer ?? "");
-  // Draws, too.
   applyMode();
   applyRegion();
+  // Draws, too.
+  applyTheme();
   applyRefineBy();
 }
 
@@ -224,7 +239,7 @@ export function reset() {
 
 export function attachState(viewer) {
   entries = makeEntries();
-  viewer.addEventListener("camera", changed);
+  viewer.addEventListener("camera", cameraMoved);
   for (const name of ["input", "change", "click", "keyup", "pointerup"]) document.addEventListener(name, changed);
   window.addEventListener("hashchange", () => restore(read(location.hash)));
   $("undo").addEventListener("click", undo);

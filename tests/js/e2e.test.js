@@ -51,7 +51,7 @@ async function setSlider(page, id, value) {
 async function picture(page, name) {
   await settle(page);
   const path = fileURLToPath(new URL(`${name}.png`, pictures));
-  const style = "#legend, #loading, #overlay, #cards, #readout, #divider, #note { visibility: hidden !important } canvas { outline: none !important }";
+  const style = "#legend, #growth, #overlay, #cards, #readout, #divider, #note { visibility: hidden !important } canvas { outline: none !important }";
   return study(page, await page.locator("#canvas").screenshot({ path, style }));
 }
 
@@ -150,6 +150,7 @@ test("the page streams a volume, draws it, and its settings change mesh and pict
   });
   assert.ok(panel <= 0, `the settings are ${panel} pixels wider than their column`);
   await page.screenshot({ path: fileURLToPath(new URL("page.png", pictures)) });
+  await page.locator("#tab-data").click();
   await page.locator("#n-blocks").scrollIntoViewIfNeeded();
   await page.screenshot({ path: fileURLToPath(new URL("page-numbers.png", pictures)) });
   assert.deepEqual(page.complaints, []);
@@ -530,6 +531,7 @@ test("screenshots have any size and background, and leave the canvas as it is", 
   assert.equal(seen.huge, "bad-option");
   assert.ok(differing(before, await picture(page, "after-screenshot")) < 0.005, "the canvas is as it was");
   const download = page.waitForEvent("download");
+  await page.locator("#tab-export").click();
   await page.locator("#shot").click();
   assert.match((await download).suggestedFilename(), /^tetralod-\d+x\d+\.png$/);
   assert.deepEqual(page.complaints, []);

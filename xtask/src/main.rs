@@ -10,12 +10,15 @@ mod browser;
 mod demo;
 mod fixture;
 mod flow;
+mod helix;
 mod package;
 mod paper;
 mod random;
 mod serve;
 mod shell;
 mod suite;
+mod volumes;
+mod vti;
 
 use std::process::ExitCode;
 
@@ -25,7 +28,8 @@ const USAGE: &str = "\
 usage: cargo xtask COMMAND
 
   build                          build the npm package into pkg/
-  demo [--port N] [--no-serve]   build everything, make the demo's data, serve the page on localhost
+  demo [--port N] [--no-serve] [--small]   build everything, make the demo's data, serve the page on localhost; a large
+                                 volume is made in the background, unless with --small
   test [STEP...]                 every check, or the named steps; `test --list` names them
   test --quick                   formatting, lints and native tests; not: other feature sets, documentation, the longest
                                  tests, real data, JavaScript, wasm, browsers
