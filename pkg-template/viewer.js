@@ -49,6 +49,7 @@ export class Viewer extends withMeshTools(EventTarget) {
   /** What is drawn. @type {Record<string, any>} */
   #scene = SCENE;
   #camera;
+  #frameTime;
   #legend;
   #overlay;
   /** Of the canvas, in pixels. */
@@ -66,9 +67,9 @@ export class Viewer extends withMeshTools(EventTarget) {
    * Transfers the canvas to the worker, permanently, and starts the worker.
    *
    * @param {HTMLCanvasElement} canvas
-   * @param {{ signal?: AbortSignal, frameTime?: number }} [options]
+   * @param {{ signal?: AbortSignal, frameTime?: number, prefetch?: string | URL }} [options]
    */
-  static async create(canvas, { signal, frameTime = 60 } = {}) {
+  static async create(canvas, { signal, frameTime = 60, prefetch } = {}) {
     signal?.throwIfAborted();
     checkAmount("frameTime", frameTime, 1);
     if (typeof HTMLCanvasElement === "undefined") throw new TetralodError("no-webgpu", NO_PAGE);
@@ -78,8 +79,9 @@ export class Viewer extends withMeshTools(EventTarget) {
     await Viewer.check();
     signal?.throwIfAborted();
     const viewer = new Viewer(canvas);
+    viewer.#frameTime = frameTime;
     try {
-      await viewer.#start(frameTime);
+      await viewer.#start(frameTime, prefetch && new URL(prefetch, location.href).href);
       signal?.throwIfAborted();
     } catch (error) {
       viewer.free();
@@ -97,10 +99,10 @@ export class Viewer extends withMeshTools(EventTarget) {
     this.#remote = new Remote(webEndpoint(worker), (name, data) => this.#heard(name, data));
   }
 
-  async #start(frameTime) {
+  async #start(frameTime, prefetch) {
     const offscreen = handOver(this.#canvas);
     const [width, height] = (this.#size = pixels(this.#canvas.getBoundingClientRect()));
-    const args = [offscreen, width, height, devicePixelRatio, frameTime];
+    const args = [offscreen, width, height, devicePixelRatio, frameTime, prefetch];
     const created = await this.#remote.call("create", args, [offscreen]);
     this.#adapter = created.adapter;
     await this.#change({ scene: this.#scene });
@@ -190,6 +192,17 @@ export class Viewer extends withMeshTools(EventTarget) {
   /** What an overlay over the last picture draws; `undefined` until the base mesh has arrived. */
   get overlay() {
     return this.#overlay;
+  }
+
+  /** How long a picture should take while something moves, in milliseconds. */
+  get frameTime() {
+    return this.#frameTime;
+  }
+
+  set frameTime(milliseconds) {
+    checkAmount("frameTime", milliseconds, 1);
+    this.#frameTime = milliseconds;
+    this.#remote.call("setFrameTime", [milliseconds]).catch(() => {});
   }
 
   /** All that is set: what is drawn, and `camera`. A copy, as plain data; `set` takes it. */
