@@ -35,7 +35,9 @@ let timer;
 
 /** Reads the list; resolves to the volume that is shown where no address says another one. @returns {Promise<Listed | undefined>} */
 export async function readVolumes() {
-  const list = await fetch(LIST, { cache: "no-cache" })
+  // The first time the page has asked for it ahead.
+  const isFirst = volumes.length === 0;
+  const list = await fetch(LIST, isFirst ? {} : { cache: "no-cache" })
     .then((response) => (response.ok ? response.json() : undefined))
     .catch(() => undefined);
   if (!list) return volumes[0];

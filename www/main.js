@@ -4,10 +4,13 @@ import { ColourSettings } from "./colours.js";
 import { Comparison } from "./compare.js";
 import { attachControls } from "./controls.js";
 import { $, attachDialogs } from "./dom.js";
+import { attachData, record } from "./data.js";
+import { attachExport } from "./export.js";
 import { attachFields } from "./fields.js";
 import { attachFiles } from "./files.js";
 import { FlowSettings } from "./flow.js";
 import { attachGallery, openGallery, readVolumes, sceneOf, showPoster } from "./gallery.js";
+import { attachHistogram } from "./histogram.js";
 import { attachKeys } from "./keys.js";
 import { attachMessages, fail, say } from "./messages.js";
 import { showFrame, showProgress, showStats } from "./numbers.js";
@@ -18,7 +21,7 @@ import { attachPicture, lookFrom } from "./picture.js";
 import { Probes } from "./probes.js";
 import { attachRegion, boxWasDragged, useBox } from "./region.js";
 import { attachRequest } from "./request.js";
-import { attachScene, draw, fractionOf, isovalue, mode, seedPlane, showLegend } from "./scene.js";
+import { attachScene, draw, fractionOf, isovalue, mode, seedPlane, setIsovalue, showLegend } from "./scene.js";
 import { attachShare } from "./share.js";
 import { attachState, read } from "./state.js";
 import { attachTabs } from "./tabs.js";
@@ -38,13 +41,14 @@ async function start() {
   attachKeys();
   const listed = readVolumes();
   listed.then(() => demo.state === "starting" && showPoster(wantedUrl() ?? ""));
-  const viewer = await makeViewer();
+  const viewer = await makeViewer(listed);
   if (!viewer) return;
   page.viewer = demo.viewer = viewer;
   $("gpu").textContent = viewer.adapter && `GPU: ${viewer.adapter}`;
   viewer.addEventListener("progress", ({ detail }) => showProgress(detail));
   viewer.addEventListener("stats", ({ detail }) => showStats(detail));
   viewer.addEventListener("frame", ({ detail }) => showFrame(detail));
+  for (const name of ["progress", "stats", "frame"]) viewer.addEventListener(name, (event) => record(name, /** @type {CustomEvent} */ (event).detail));
   viewer.addEventListener("legend", ({ detail }) => showLegend(detail));
   viewer.addEventListener("error", ({ detail }) => fail(detail));
   attachOverlay(viewer);
@@ -64,16 +68,21 @@ async function start() {
   attachFields();
   attachRequest();
   attachRegion();
-  attachPicture(viewer, { canvas, overlay: page.overlay, onError: fail });
+  attachPicture(viewer, { overlay: page.overlay, onError: fail });
   attachFiles();
   attachState(viewer);
   attachShare();
   attachGallery();
+  attachHistogram();
+  attachData();
+  attachExport(canvas);
   await begin(listed);
 }
 
 /** What the address of the page asks for. */
-const wantedUrl = () => read(location.hash).url ?? new URLSearchParams(location.search).get("url") ?? undefined;
+function wantedUrl() {
+  return read(location.hash).url ?? new URLSearchParams(location.search).get("url") ?? undefined;
+}
 
 /** Opens what the address asks for, or the first volume of the list. */
 async function begin(listed) {
@@ -90,11 +99,11 @@ async function begin(listed) {
 }
 
 /** The viewer; nothing where it cannot start, with a message. */
-async function makeViewer() {
+async function makeViewer(listed) {
   try {
     // Imported here, so that a missing package is reported like other errors.
-    const { Viewer } = await import("tetralod/viewer");
-    return await Viewer.create(canvas);
+    const [{ Viewer }, prefetch] = await Promise.all([import("tetralod/viewer"), wantedUrl() ?? listed.then((first) => first?.url)]);
+    return await Viewer.create(canvas, prefetch?.startsWith("file:") ? {} : { prefetch });
   } catch (error) {
     demo.error = { code: error.code, message: error.message };
     const unsupported = error.code === "no-webgpu";
@@ -135,7 +144,7 @@ function attachColours(viewer) {
   const buttons = { preset: $("transfer-preset"), add: $("transfer-add"), remove: $("transfer-remove") };
   page.transfer = new TransferEditor(
     { svg: $("transfer"), ...ends, ...buttons },
-    { isovalue: () => fractionOf(isovalue()), onChange: draw },
+    { isovalue: () => (page.field ? fractionOf(isovalue()) : 0.5), onIsovalue: setIsovalue, onChange: draw },
   );
 }
 

@@ -5,7 +5,7 @@ import { count, milliseconds, percentage, pixels, size, vtuBytes } from "./forma
 import { fail } from "./messages.js";
 import { demo, page } from "./page.js";
 import { budget, errorPixels } from "./request.js";
-import { showHistogram } from "./scene.js";
+import { showEmpty, showHistogram } from "./scene.js";
 
 /** @param {import("tetralod/viewer").ViewerProgress} progress */
 export function showProgress({ bytes, total, complete, blocks }) {
@@ -63,13 +63,24 @@ export function showStats(stats) {
   const bound = percentage(stats.relativeErrorBound * 100);
   $("n-error").textContent = bound;
   $("budget-note").textContent = stats.satisfied || budget() === undefined ? BUDGET_NOTE : achieved(stats);
+  $("error-achieved").textContent = `Achieved: ${bound}`;
+  $("budget-achieved").textContent = `Achieved: ${count(stats.tetrahedra)} tetrahedra. ${limit(stats)}`;
   const seen = stats.bounds[1];
   $("n-pixels").textContent = seen === undefined ? "–" : pixels(seen);
+  $("pixels-achieved").textContent = seen === undefined ? "" : `Achieved: ${pixels(seen)}`;
   $("n-pixels").classList.toggle("short", seen > errorPixels());
   announce(`${count(stats.tetrahedra)} tetrahedra, error ${bound}`);
 }
 
+/** What keeps the mesh from being finer. */
+function limit({ satisfied, missing }) {
+  if (demo.blocks?.leftOut > 0) return "Limited by memory";
+  if (missing) return "Limited by the network: data is on its way";
+  return satisfied ? "Limited by the error" : "Limited by this number";
+}
+
 export function showFrame(frame) {
+  showEmpty(frame);
   demo.frame = frame;
   demo.frames++;
   if (!frame.ready) return;

@@ -1,14 +1,14 @@
-/** The settings of the picture: where it is looked at from, background, projection, axes, flying, screenshots. */
+/** The settings of the picture: where it is looked at from, background, projection, axes, flying, full screen. */
 
 /** @type {(id: string) => any} Each caller knows the type of its element. */
 const $ = (id) => document.getElementById(id);
 
 /**
  * @param {import("tetralod/viewer").Viewer} viewer
- * @param {{ canvas: HTMLCanvasElement, overlay: import("./overlay.js").OverlayView,
+ * @param {{ overlay: import("./overlay.js").OverlayView,
  *   onError: (error: any) => void }} page
  */
-export function attachPicture(viewer, { canvas, overlay, onError }) {
+export function attachPicture(viewer, { overlay, onError }) {
   $("side").addEventListener("input", () => {
     lookFrom(viewer, $("side").value).catch(onError);
     $("side").value = "";
@@ -22,7 +22,6 @@ export function attachPicture(viewer, { canvas, overlay, onError }) {
   $("axes").addEventListener("input", () => (overlay.showsAxes = $("axes").checked));
   $("home").addEventListener("click", () => viewer.home().catch(onError));
   $("full").addEventListener("click", fullScreen);
-  $("shot").addEventListener("click", () => save(viewer, canvas).catch(onError));
 }
 
 /** Shows the picture on the whole screen, or no longer. */
@@ -39,21 +38,4 @@ const ROOM = 1.18;
 export function lookFrom(viewer, side) {
   const looked = viewer.lookFrom(side);
   return side === "home" ? looked : Promise.all([looked, viewer.zoom(ROOM)]);
-}
-
-/** Makes a screenshot, and saves it as a file. */
-async function save(viewer, canvas) {
-  const button = $("shot");
-  const factor = Number($("shot-scale").value) * devicePixelRatio;
-  const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((length) => Math.round(length * factor));
-  button.disabled = true;
-  try {
-    const link = document.createElement("a");
-    link.href = URL.createObjectURL(await viewer.screenshot({ width, height }));
-    link.download = `tetralod-${width}x${height}.png`;
-    link.click();
-    URL.revokeObjectURL(link.href);
-  } finally {
-    button.disabled = false;
-  }
 }

@@ -36,6 +36,7 @@ export function applyRegion() {
   const on = ["box", "sphere"].includes($("region").value);
   $("box").hidden = !on;
   showNumbers();
+  showSphere();
   page.viewer.set({ region: on ? page.box : null }).catch(fail);
 }
 
@@ -51,6 +52,7 @@ export function useBox(wanted) {
 export function boxWasDragged(moved) {
   page.box = rounded(moved);
   showNumbers();
+  showSphere();
   refine();
 }
 
@@ -60,6 +62,11 @@ export function inner(bounds) {
 }
 
 const rounded = (numbers) => Array.from(numbers, (x) => Number(x.toPrecision(DIGITS)));
+
+/** The box has handles that the viewer draws; the sphere in it is drawn over the picture. */
+function showSphere() {
+  page.overlay.sphere = $("region").value === "sphere" ? sphereIn(page.box) : undefined;
+}
 
 function showNumbers() {
   for (const input of all("#box input")) {

@@ -63,7 +63,15 @@ export function applyRefineBy() {
   refine();
 }
 
+/** Takes the time of a picture while something moves. */
+export function applyFrameTime() {
+  const milliseconds = Number($("frame-time").value);
+  text("frame-time-text", `${milliseconds} ms`, "frame-time");
+  page.viewer.frameTime = milliseconds;
+}
+
 export function attachRequest() {
+  $("frame-time").addEventListener("input", applyFrameTime);
   for (const radio of all("[name=refine-by]")) radio.addEventListener("change", applyRefineBy);
   $("error").addEventListener("input", () => {
     errorPositions[refineBy()] = $("error").value;

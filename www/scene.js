@@ -2,6 +2,7 @@
 
 import { $, all, checked, text } from "./dom.js";
 import { rounded } from "./format.js";
+import { showHistogramLine, showVolumes } from "./histogram.js";
 import { fail } from "./messages.js";
 import { demo, page } from "./page.js";
 import { refine } from "./request.js";
@@ -36,7 +37,10 @@ export function applyIsovalue() {
   const { min, max, unit } = page.field;
   const value = isovalue();
   $("isovalue").value = 1000 * fractionOf(value);
-  text("isovalue-text", `${rounded(value, max - min)} ${unit}`.trim(), "isovalue");
+  const words = `${rounded(value, max - min)} ${unit}`.trim();
+  text("isovalue-text", words, "isovalue");
+  page.transfer.showIsovalue(words);
+  showHistogramLine(fractionOf(value));
   draw();
   if ($("focus").checked) refine();
 }
@@ -53,10 +57,12 @@ export function applyMode() {
   applyCut();
 }
 
-/** Shows the histogram of the field where the transfer function is edited. */
+/** Shows the histogram of the field where the isovalue and the transfer function are chosen. */
 export async function showHistogram() {
-  if (mode() !== "volume" || !demo.info) return;
-  page.transfer.volumes = (await page.viewer.stats({ bins: 100 })).histogram;
+  if (!["iso", "volume"].includes(mode()) || !demo.info) return;
+  const { histogram } = await page.viewer.stats({ bins: 100 });
+  page.transfer.volumes = histogram;
+  showVolumes(histogram);
 }
 
 /** Draws what the settings say. */
@@ -74,7 +80,7 @@ export function draw() {
   const noFlow = { streamlines: null, arrows: null };
   const shown = {
     iso: () => ({ isosurfaces: [{ value: isovalue(), opacity, ...(by ? { field: by } : {}) }] }),
-    volume: () => ({ volume: { opacities: transfer.opacities(field, opacity) } }),
+    volume: () => ({ volume: { opacities: transfer.opacities(field, opacity) }, isosurfaces: $("volume-surface").checked ? [{ value: isovalue() }] : [] }),
     slice: () => ({ slices: [{ ...plane(), opacity, edges: true }] }),
     solid: () => ({ boundary: { opacity, edges: true }, clips: [plane()] }),
     mesh: () => ({ cells: { cut: plane(), colourBy: $("colour-by").value } }),
@@ -104,6 +110,7 @@ export function showLegend(legend) {
   const unit = unitOf(label);
   $("legend-name").textContent = unit ? `${label} in ${unit}` : label;
   if (label === field?.name) transfer.colours = colours.gradient(legend);
+  $("legend-bar").dataset.colours = legend.colours.join(" ");
   $("legend-bar").style.background = `linear-gradient(90deg, ${legend.colours.join(", ")})`;
   $("legend-ticks").replaceChildren(
     ...ticks.map(({ label: value, fraction }) => {
@@ -170,9 +177,26 @@ export function applyCut() {
   if ($("region").value === "cut") refine();
 }
 
+/** Says so where the surface is empty. @param {import("tetralod/viewer").ViewerFrame} frame */
+export function showEmpty({ ready, triangles }) {
+  const isEmpty = mode() === "iso" && ready && page.field !== undefined && triangles === 0 && demo.step?.done === true;
+  if (isEmpty !== $("empty").hidden) return;
+  $("empty").hidden = !isEmpty;
+  if (!isEmpty) return;
+  const { name, min, max } = page.field;
+  const [value, low, high] = [isovalue(), min, max].map((x) => rounded(x, max - min));
+  const isOutside = isovalue() < min || isovalue() > max;
+  const words = isOutside ? `${value} is outside of the range of ${name}, ${low} to ${high}` : `${name} does not pass ${value} in this mesh`;
+  $("empty-text").textContent = `There is no surface: ${words}.`;
+}
+
 export function attachScene() {
   for (const radio of all("[name=mode]")) radio.addEventListener("change", applyMode);
   $("isovalue").addEventListener("input", () => page.field && setIsovalue($("isovalue").value / 1000));
+  $("empty-middle").addEventListener("click", () => {
+    setIsovalue(0.5);
+    $("isovalue").focus();
+  });
   for (const id of ["cut", "axis", "flip"]) $(id).addEventListener("input", applyCut);
-  for (const id of ["opacity", "colour-by", "surface-colour"]) $(id).addEventListener("input", draw);
+  for (const id of ["opacity", "colour-by", "surface-colour", "volume-surface"]) $(id).addEventListener("input", draw);
 }

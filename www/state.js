@@ -10,7 +10,7 @@ import { fail } from "./messages.js";
 import { open, sourceWords } from "./opening.js";
 import { demo, page } from "./page.js";
 import { applyRegion, inner } from "./region.js";
-import { applyRefineBy, errorPositions } from "./request.js";
+import { applyFrameTime, applyRefineBy, errorPositions } from "./request.js";
 import { applyMode } from "./scene.js";
 import { applyTheme } from "./theme.js";
 
@@ -68,7 +68,7 @@ function errorPosition(kind) {
 /** @returns {Record<string, Entry>} */
 function makeEntries() {
   const ids = ["opacity", "colour-by", "flow-colour", "rake", "arrows", "flow-boundary", "map", "reversed", "log"];
-  const more = ["time", "cut", "axis", "flip", "pixels", "budget", "region", "focus", "background", "axes", "fly"];
+  const more = ["time", "cut", "axis", "flip", "pixels", "budget", "region", "focus", "background", "axes", "fly", "volume-surface", "frame-time"];
   const simple = Object.fromEntries([...ids, ...more].map((id) => [id, control(id)]));
   return {
     view: radios("mode"),
@@ -176,6 +176,7 @@ function show(words) {
   applyRegion();
   // Draws, too.
   applyTheme();
+  applyFrameTime();
   applyRefineBy();
 }
 

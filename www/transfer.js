@@ -37,6 +37,10 @@ export class TransferEditor {
   #parts;
   #onChange;
   #isovalue;
+  #onIsovalue;
+  /** The isovalue over the curve: a line with a handle at its top. */
+  #marker = element("g", { class: "isovalue", tabindex: 0, role: "slider", "aria-label": "Isovalue", "aria-valuemin": 0, "aria-valuemax": 1000 });
+  #draggingIsovalue = false;
   /** @type {Point[]} */
   #points = PRESETS[FIRST](0.5);
   #selected = 2;
@@ -49,12 +53,17 @@ export class TransferEditor {
   /**
    * @param {{ svg: SVGSVGElement, bar: HTMLElement, low: HTMLElement, high: HTMLElement, chosen: HTMLElement,
    *   preset: HTMLSelectElement, add: HTMLButtonElement, remove: HTMLButtonElement }} parts
-   * @param {{ isovalue: () => number, onChange: () => void }} how `isovalue` as a fraction of the range
+   * @param {{ isovalue: () => number, onIsovalue: (fraction: number) => void, onChange: () => void }} how
+   *   `isovalue` as a fraction of the range
    */
-  constructor(parts, { isovalue, onChange }) {
+  constructor(parts, { isovalue, onIsovalue, onChange }) {
     this.#parts = parts;
     this.#onChange = onChange;
     this.#isovalue = isovalue;
+    this.#onIsovalue = onIsovalue;
+    const handle = `M-6 0h12v7l-6 6-6-6z`;
+    this.#marker.append(element("line", { y1: 0, y2: SIZE.height }), element("path", { d: handle, class: "handle" }), element("title", {}, "Isovalue"));
+    parts.svg.append(this.#marker);
     parts.preset.addEventListener("input", () => {
       const preset = PRESETS[parts.preset.value];
       if (preset) this.#set(preset(isovalue()), 0);
@@ -155,9 +164,22 @@ export class TransferEditor {
     this.#set([...this.#points.slice(0, i), ...this.#points.slice(i + 1)], i);
   }
 
+  /** The isovalue, or what it is called, has changed. */
+  showIsovalue(words) {
+    const [x] = point([this.#isovalue(), 0]);
+    this.#marker.setAttribute("transform", `translate(${x} 0)`);
+    this.#marker.setAttribute("aria-valuenow", String(Math.round(1000 * this.#isovalue())));
+    this.#marker.setAttribute("aria-valuetext", words);
+  }
+
   #press(event) {
     event.preventDefault();
     this.#parts.svg.setPointerCapture(event.pointerId);
+    if (event.target instanceof Element && event.target.closest(".handle")) {
+      this.#draggingIsovalue = true;
+      this.#marker.focus();
+      return;
+    }
     const near = this.#near(event);
     this.#dragging = true;
     if (near >= 0) {
@@ -168,6 +190,7 @@ export class TransferEditor {
   }
 
   #drag(event) {
+    if (this.#draggingIsovalue) return this.#onIsovalue(this.#place(event)[0]);
     if (!this.#dragging) return;
     const [at, opacity] = this.#place(event);
     const height = SIZE.height - 2 * SIZE.margin;
@@ -177,6 +200,7 @@ export class TransferEditor {
   }
 
   #drop(event) {
+    this.#draggingIsovalue = false;
     const { svg } = this.#parts;
     if (this.#dragging && event.type === "pointerup" && svg.classList.contains("dropping")) this.#remove();
     svg.classList.remove("dropping");
@@ -184,6 +208,7 @@ export class TransferEditor {
   }
 
   #key(event) {
+    if (event.target === this.#marker) return this.#isovalueKey(event);
     const i = Array.from(this.#parts.svg.querySelectorAll("circle")).indexOf(event.target);
     if (i < 0) return;
     this.#selected = i;
@@ -197,6 +222,14 @@ export class TransferEditor {
     else return;
     event.preventDefault();
     this.#focus();
+  }
+
+  #isovalueKey(event) {
+    const move = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 }[event.key];
+    if (!move) return;
+    event.preventDefault();
+    const at = this.#isovalue() + move * STEP[event.shiftKey ? 1 : 0];
+    this.#onIsovalue(Math.min(Math.max(at, 0), 1));
   }
 
   #focus() {
@@ -240,12 +273,12 @@ export class TransferEditor {
       });
     }
     const shapes = [
-      element("path", { d: this.#histogramPath(), class: "volumes" }),
+      element("path", { d: histogramPath(this.#volumes), class: "volumes" }),
       element("path", { d: `M${curve.join("L")}L${base.join("L")}Z`, class: "area" }),
       element("path", { d: `M${curve.join("L")}`, class: "curve" }),
     ];
     const kept = before.length === circles.length ? Array.from(before) : circles;
-    svg.querySelectorAll("path").forEach((path) => path.remove());
+    svg.querySelectorAll(":scope > path").forEach((path) => path.remove());
     svg.prepend(...shapes);
     if (kept === circles) {
       before.forEach((circle) => circle.remove());
@@ -255,23 +288,23 @@ export class TransferEditor {
     remove.disabled = this.#points.length <= 2;
   }
 
-  /** The histogram as an area. Its heights are square roots: what is rare is seen, too. */
-  #histogramPath() {
-    const most = Math.sqrt(this.#volumes.reduce((a, b) => Math.max(a, b), 0));
-    if (!(most > 0)) return "";
-    const count = this.#volumes.length;
-    const steps = Array.from(this.#volumes, (volume, i) => {
-      const height = Math.sqrt(Math.max(volume, 0)) / most;
-      return [point([i / count, height]), point([(i + 1) / count, height])].map((p) => p.join(" ")).join("L");
-    });
-    return `M${point([0, 0]).join(" ")}L${steps.join("L")}L${point([1, 0]).join(" ")}Z`;
-  }
-
   #words([at, opacity]) {
     const { min = 0, max = 1, unit = "" } = this.#field ?? {};
     const value = `${rounded(min + at * (max - min), max - min)} ${unit}`.trim();
     return `value ${value}, opacity ${Math.round(100 * opacity)} %`;
   }
+}
+
+/** A histogram as an area. Its heights are square roots: what is rare is seen, too. @param {ArrayLike<number>} volumes */
+export function histogramPath(volumes) {
+  const most = Math.sqrt(Array.from(volumes).reduce((a, b) => Math.max(a, b), 0));
+  if (!(most > 0)) return "";
+  const count = volumes.length;
+  const steps = Array.from(volumes, (volume, i) => {
+    const height = Math.sqrt(Math.max(volume, 0)) / most;
+    return [point([i / count, height]), point([(i + 1) / count, height])].map((p) => p.join(" ")).join("L");
+  });
+  return `M${point([0, 0]).join(" ")}L${steps.join("L")}L${point([1, 0]).join(" ")}Z`;
 }
 
 /** Where a point is in the drawing. @param {Point} point */
