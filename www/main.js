@@ -33,7 +33,7 @@ const canvas = $("canvas");
 start();
 
 async function start() {
-  $("panel").addEventListener("submit", (event) => event.preventDefault());
+  $("settings").addEventListener("submit", (event) => event.preventDefault());
   attachMessages({ onRetry: retry });
   attachDialogs();
   attachTabs();

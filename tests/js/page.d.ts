@@ -1,4 +1,4 @@
-// What the demo page tells the tests (`www/main.js`), and the names under which it imports the package.
+// What the demo page tells the tests (`www/page.js`), and the names under which it imports the package.
 interface Window {
   tetralodDemo: any;
 }
