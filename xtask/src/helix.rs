@@ -137,7 +137,7 @@ mod tests {
     fn atoms_are_inside_and_on_two_strands() {
         let height = WIDTH / (POINTS[0] - 1) as f64 * (POINTS[2] - 1) as f64;
         let atoms = atoms(height);
-        assert!(atoms.len() > 400, "{}", atoms.len());
+        assert!(atoms.len() > 300, "{}", atoms.len());
         for Atom { place: [x, y, z], .. } in &atoms {
             let radius = (x - WIDTH / 2.0).hypot(y - WIDTH / 2.0);
             assert!(radius + 4.0 * SIGMA < WIDTH / 2.0, "{radius}");
