@@ -127,6 +127,11 @@ export class Parts {
     return { ...this.#session.progress(), blocks: blocks.all > 0 ? blocks : undefined };
   }
 
+  /** Requests, bytes that have arrived, and bytes that were needed. */
+  get traffic() {
+    return this.#ranges.traffic;
+  }
+
   /** Whether more data is to come. */
   get isWaiting() {
     return this.#session.isWaiting;

@@ -112,9 +112,10 @@ function notStarted(kind, place, error) {
  * @param {{ call: (method: string, args: any[]) => Promise<any> }} core
  * @param {Kind} kind
  * @param {any} wasm its address or its bytes; without it the one beside the worker
+ * @param {string} [ahead] the URL of a file that is opened next, whose first bytes are fetched meanwhile (viewers only)
  */
-export async function loadWasm(core, kind, wasm) {
-  const found = await core.call("load", [wasm]);
+export async function loadWasm(core, kind, wasm, ahead = undefined) {
+  const found = await core.call("load", [wasm, ahead]);
   if (found?.name === kind.name && found.version === VERSION) return;
   const other = found ? `tetralod ${found.version}, ${found.name}` : "something else";
   const wanted = `"${kind.entry}" of tetralod ${VERSION} is needed`;

@@ -21,6 +21,9 @@ const STEP = [6, 30];
 /** Hidden pages have no frames: their meshes follow in steps this far apart (in ms). */
 const HIDDEN = 200;
 
+/** So many bytes of a file are fetched ahead: as many as its first request asks for. */
+const HEAD = 65536;
+
 /** Colours of a legend. */
 const COLOURS = 32;
 /** A screenshot is the mean of so many pictures at most. */
@@ -81,8 +84,12 @@ const nextFrame =
   typeof requestAnimationFrame === "function" ? requestAnimationFrame : (then) => setTimeout(then, 16);
 
 const methods = {
-  /** Compiles the wasm module; without `wasm`, its address, the one of the package. */
-  async load(wasm) {
+  /**
+   * Compiles the wasm module; without `wasm`, its address, the one of the package. `ahead` is the URL of a file that is opened next:
+   * its first bytes are fetched meanwhile.
+   */
+  async load(wasm, ahead) {
+    if (ahead !== undefined) fetchAhead(ahead);
     const source = wasm ?? new URL("./tetralod_viewer_bg.wasm", import.meta.url);
     await wasmOf(source)
       .then((found) => init({ module_or_path: found }))
@@ -154,7 +161,7 @@ const methods = {
       };
     };
     const onError = (error) => ready && !viewer.isOpening && emit("error", flattenError(error));
-    const mine = (parts = new Parts(RangeLoader, make, url, options, partsCame, onError));
+    const mine = (parts = new Parts(RangeLoader, make, url, { ...options, ...takeAhead(url) }, partsCame, onError));
     const served = await mine.begin();
     if (mine !== parts) throw new TetralodError("replaced", "another volume was opened");
     if (!served) {
@@ -164,7 +171,7 @@ const methods = {
     ready = true;
     invalidate();
     await drawn();
-    return { progress: mine.progress, info: { ...viewer.info(), bounds: Array.from(viewer.bounds()) } };
+    return { progress: { ...mine.progress, traffic: mine.traffic }, info: { ...viewer.info(), bounds: Array.from(viewer.bounds()) } };
   },
 
   /** Resolves when all data that the mesh needs has arrived. Arriving blocks may show that others are needed. */
@@ -223,6 +230,10 @@ const methods = {
     invalidate();
   },
 
+  setFrameTime(milliseconds) {
+    frameTime = milliseconds;
+  },
+
   pickRegion: (x, y) => viewer.pickRegion(x, y),
 
   dragRegion(handle, x, y) {
@@ -277,6 +288,33 @@ const methods = {
 };
 const emit = serve(webEndpoint(globalThis), methods, ["openParts", "settled"]);
 
+/** The first bytes of a file that will be opened. @type {{ url: string, range: string, response: Promise<Response> } | undefined} */
+let ahead;
+
+/** Fetches them while the wasm module loads. */
+function fetchAhead(url) {
+  const range = `bytes=0-${HEAD - 1}`;
+  const response = fetch(url, { headers: { range }, cache: "no-store" });
+  // Whoever opens the file hears of an error.
+  response.catch(() => {});
+  ahead = { url, range, response };
+}
+
+/** A `fetch` whose first answer is already on its way, if it is for this file. */
+function takeAhead(url) {
+  let mine = ahead;
+  ahead = undefined;
+  if (mine?.url !== url) return {};
+  return {
+    fetch(address, init) {
+      const isIt = mine && address === mine.url && init.headers.get("range") === mine.range;
+      const response = isIt ? mine.response : fetch(address, init);
+      mine = undefined;
+      return response;
+    },
+  };
+}
+
 /** What a probe has found, made of the numbers of the viewer. */
 function reading(numbers) {
   if (!numbers) return undefined;
@@ -292,7 +330,7 @@ function reading(numbers) {
 /** Blocks have arrived: refines with them, as with a stream. */
 function partsCame(progress) {
   bytes = progress.bytes;
-  emit("progress", progress);
+  emit("progress", { ...progress, traffic: parts?.traffic });
   if (!ready || !isRequested) return;
   const wait = Math.max(FOLLOW, 2 * lastRefine.took) - (performance.now() - lastRefine.end);
   following ??= setTimeout(followParts, Math.max(wait, 0));

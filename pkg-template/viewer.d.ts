@@ -43,6 +43,8 @@ export interface ViewerProgress {
   total: number | undefined;
   /** Of a file that is fetched in parts: the state of its blocks. */
   blocks?: BlockProgress;
+  /** Of such a file: requests so far, bytes that have arrived with them, and how many of these were needed. */
+  traffic?: { requests: number; received: number; used: number };
 }
 
 /**
@@ -315,6 +317,8 @@ export interface ViewerOptions {
    * @throws {TetralodError} `wasm` if it cannot be loaded or compiled
    */
   wasmUrl?: string | URL;
+  /** The URL of the volume that is opened first: its first bytes are fetched while the wasm module loads. */
+  prefetch?: string | URL;
 }
 
 /** An edge of the box around the domain that shows the ticks of an axis. */
@@ -389,6 +393,8 @@ export class Viewer extends EventTargetWithMeshTools {
   readonly legend: Legend | undefined;
   /** What an overlay over the last picture draws; `undefined` until the base mesh has arrived. */
   readonly overlay: Overlay | undefined;
+  /** As in `ViewerOptions`; it can be changed. */
+  frameTime: number;
   /** All that is set, as plain data: `set` takes it. */
   readonly state: ViewerState;
 

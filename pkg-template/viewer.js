@@ -58,6 +58,7 @@ export class Viewer extends withMeshTools(EventTarget) {
   /** What is drawn. @type {Record<string, any>} */
   #scene = SCENE;
   #camera;
+  #frameTime;
   #legend;
   #overlay;
   /** Of the canvas, in pixels. */
@@ -75,11 +76,14 @@ export class Viewer extends withMeshTools(EventTarget) {
    * Transfers the canvas to the worker, permanently, and starts the worker.
    *
    * @param {HTMLCanvasElement} canvas
-   * @param {{ signal?: AbortSignal, frameTime?: number, worker?: any, workerUrl?: string | URL, wasmUrl?: string | URL }} [options]
+   * @param {{
+   *   signal?: AbortSignal, frameTime?: number, prefetch?: string | URL,
+   *   worker?: any, workerUrl?: string | URL, wasmUrl?: string | URL,
+   * }} [options]
    */
-  static async create(canvas, { signal, frameTime = 60, ...places } = {}) {
+  static async create(canvas, { signal, frameTime = 60, prefetch, ...places } = {}) {
     signal?.throwIfAborted();
-    checkNames(places, PLACES, ["signal", "frameTime"]);
+    checkNames(places, PLACES, ["signal", "frameTime", "prefetch"]);
     checkAmount("frameTime", frameTime, 1);
     if (typeof HTMLCanvasElement === "undefined") throw new TetralodError("no-webgpu", NO_PAGE);
     if (!(canvas instanceof HTMLCanvasElement)) {
@@ -88,9 +92,12 @@ export class Viewer extends withMeshTools(EventTarget) {
     await Viewer.check();
     signal?.throwIfAborted();
     const viewer = new Viewer(canvas, places);
+    viewer.#frameTime = frameTime;
     try {
       const { wasmUrl } = places;
-      await loadWasm(viewer.#remote, VIEWER, wasmUrl === undefined ? undefined : absoluteUrl("wasmUrl", wasmUrl).href);
+      const wasm = wasmUrl === undefined ? undefined : absoluteUrl("wasmUrl", wasmUrl).href;
+      const ahead = prefetch === undefined ? undefined : absoluteUrl("prefetch", prefetch).href;
+      await loadWasm(viewer.#remote, VIEWER, wasm, ahead);
       signal?.throwIfAborted();
       await viewer.#start(frameTime);
       signal?.throwIfAborted();
@@ -203,6 +210,17 @@ export class Viewer extends withMeshTools(EventTarget) {
   /** What an overlay over the last picture draws; `undefined` until the base mesh has arrived. */
   get overlay() {
     return this.#overlay;
+  }
+
+  /** How long a picture should take while something moves, in milliseconds. */
+  get frameTime() {
+    return this.#frameTime;
+  }
+
+  set frameTime(milliseconds) {
+    checkAmount("frameTime", milliseconds, 1);
+    this.#frameTime = milliseconds;
+    this.#remote.call("setFrameTime", [milliseconds]).catch(() => {});
   }
 
   /** All that is set: what is drawn, and `camera`. A copy, as plain data; `set` takes it. */

@@ -16,6 +16,8 @@ export class ColourSettings {
   #field;
   /** The range of the colours, or undefined for that of the field. @type {[number, number] | undefined} */
   #range;
+  /** Whether the range is that of a link, whichever field is shown. */
+  #isGiven = false;
   /** Counts the choices of a range: late answers are ignored. */
   #chosen = 0;
 
@@ -39,6 +41,24 @@ export class ColourSettings {
     return { map: map.value, reversed: reversed.checked, log: log.checked, range: this.#range };
   }
 
+  /** The preset of the range, or the numbers that were typed; nothing for the range of the data. */
+  get words() {
+    const { value } = this.#parts.preset;
+    if (value === "custom") return String(this.#range ?? "");
+    return value === "data" ? "" : value;
+  }
+
+  set words(words) {
+    const { preset } = this.#parts;
+    const [low, high] = words.split(",").map(Number);
+    const isRange = low < high;
+    const isPreset = ["percentiles", "symmetric"].includes(words);
+    preset.value = isRange ? "custom" : isPreset ? words : "data";
+    this.#range = isRange ? [low, high] : undefined;
+    // The range is one of the field that is shown next.
+    this.#isGiven = isRange;
+  }
+
   /** The gradient over the whole range of the field, of colours that are even over the range of a legend. */
   gradient({ colours, range, log }) {
     const { min, max } = this.#field ?? { min: 0, max: 1 };
@@ -52,7 +72,8 @@ export class ColourSettings {
 
   /** Another field is shown: the range that was typed in is not one of its own. @param {FieldInfo} field */
   async setField(field) {
-    const isOther = field.name !== this.#field?.name;
+    const isOther = field.name !== this.#field?.name && !this.#isGiven;
+    this.#isGiven = false;
     this.#field = field;
     const { preset, log } = this.#parts;
     if (isOther && preset.value === "custom") preset.value = "data";

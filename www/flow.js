@@ -6,6 +6,9 @@ const $ = (id) => document.getElementById(id);
 /** The surface of the domain around them. */
 const BOUNDARY = { opacity: 0.12, colour: "#9fb0c4" };
 
+/** Seeds have so many digits: as many as links keep. */
+const DIGITS = 8;
+
 /** @typedef {import("tetralod").FieldInfo} FieldInfo */
 /** @typedef {[number, number, number]} Point */
 
@@ -39,7 +42,18 @@ export class FlowSettings {
     const hasNone = this.#vectors.size === 0;
     $("flow").disabled = hasNone;
     $("flow-label").title = hasNone ? "This dataset has no vectors" : "";
-    if (hasNone && $("flow").checked) $("surface").click();
+    if (hasNone && $("flow").checked) $("surface").checked = true;
+  }
+
+  /** The seeds that were placed by clicks, as numbers. */
+  get words() {
+    return String(this.#seeds.flat());
+  }
+
+  set words(words) {
+    const values = words ? words.split(",").map(Number) : [];
+    const all = values.every(Number.isFinite) ? values : [];
+    this.#seeds = all.flatMap((x, i) => (i % 3 === 0 && i + 2 < all.length ? [/** @type {Point} */ ([x, all[i + 1], all[i + 2]])] : []));
   }
 
   /** Whether the colours are those of the field that is shown. */
@@ -57,7 +71,7 @@ export class FlowSettings {
   click(point, { axis, at }) {
     const found = this.#overlay.onPlane(point, axis, at);
     if (!found) return;
-    this.#seeds = [...this.#seeds, found];
+    this.#seeds = [...this.#seeds, /** @type {Point} */ (found.map((x) => Number(x.toPrecision(DIGITS))))];
     this.#onChange();
   }
 

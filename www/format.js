@@ -17,7 +17,14 @@ export function count(n) {
 
 export function size(bytes) {
   if (bytes < 1e3) return `${bytes} B`;
-  return bytes < 999_500 ? `${(bytes / 1e3).toFixed(0)} kB` : `${(bytes / 1e6).toFixed(2)} MB`;
+  if (bytes < 999_500) return `${(bytes / 1e3).toFixed(0)} kB`;
+  const megabytes = bytes / 1e6;
+  return megabytes < 999.5 ? `${megabytes < 99.5 ? megabytes.toPrecision(3) : megabytes.toFixed(0)} MB` : `${(megabytes / 1e3).toPrecision(3)} GB`;
+}
+
+/** The bytes of a mesh as a VTU file, not compressed: coordinates, corners and ends of cells in 8 bytes, types in 1, values in 4. */
+export function vtuBytes({ vertices, tetrahedra, fields }) {
+  return vertices * (3 * 8 + 4 * fields) + tetrahedra * (5 * 8 + 1);
 }
 
 export function milliseconds(ms) {

@@ -16,6 +16,9 @@ const GAP = 10;
 /** Half an edge of the cube, and its distance from the corner of the picture. */
 const CUBE = { size: 21, right: 48, top: 50 };
 
+/** Parts of a circle. */
+const CIRCLE = 48;
+
 const NAMES = ["x", "y", "z"];
 
 /** The faces of the cube: their normals, their names, and the sides that show them from the front. */
@@ -48,6 +51,8 @@ export class OverlayView {
   #showsAxes = true;
   /** @type {{ axis: number, at: number, bounds: number[], seeds: number[][] } | undefined} */
   #quad;
+  /** @type {{ center: number[], radius: number } | undefined} */
+  #sphere;
   /** What lies over the picture, and must stay free of labels: elements of the page. @type {HTMLElement[]} */
   #covered;
   /** What is told when places on the screen have changed. @type {(() => void)[]} */
@@ -84,6 +89,12 @@ export class OverlayView {
   /** A plane across the box, and points on it; undefined for none. */
   set quad(quad) {
     this.#quad = quad;
+    this.#draw();
+  }
+
+  /** A sphere, drawn as three circles; undefined for none. */
+  set sphere(sphere) {
+    this.#sphere = sphere;
     this.#draw();
   }
 
@@ -128,6 +139,23 @@ export class OverlayView {
     return group;
   }
 
+  /** Circles around the sphere, across each axis. */
+  #circles() {
+    const group = element("g", { class: "sphere" });
+    if (!this.#sphere) return group;
+    const { center, radius } = this.#sphere;
+    for (const axis of [0, 1, 2]) {
+      const points = Array.from({ length: CIRCLE + 1 }, (_, i) => {
+        const point = center.slice();
+        point[(axis + 1) % 3] += radius * Math.cos((2 * Math.PI * i) / CIRCLE);
+        point[(axis + 2) % 3] += radius * Math.sin((2 * Math.PI * i) / CIRCLE);
+        return this.project(point);
+      });
+      if (points.every(Boolean)) group.append(element("polyline", { points: points.map((p) => p.join()).join(" ") }));
+    }
+    return group;
+  }
+
   /** Draws again, because what covers the picture has changed. */
   refresh() {
     this.#draw();
@@ -168,7 +196,7 @@ export class OverlayView {
     const isFree = (box) => fits(box) && !taken.some((other) => overlap(box, other));
     const place = (box) => isFree(box) && taken.push(box) > 0;
     /** @type {SVGElement[]} */
-    const parts = [this.#plane()];
+    const parts = [this.#plane(), this.#circles()];
     if (this.#showsAxes) {
       // It takes its place first, and is drawn over the axes.
       const bar = this.#scaleBar(data.scaleBar, taken, bottom);

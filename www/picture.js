@@ -1,21 +1,17 @@
-/** The settings of the picture: where it is looked at from, background, projection, axes, flying, screenshots. */
+/** The settings of the picture: where it is looked at from, background, projection, axes, flying, full screen. */
 
 /** @type {(id: string) => any} Each caller knows the type of its element. */
 const $ = (id) => document.getElementById(id);
 
 /**
  * @param {import("tetralod/viewer").Viewer} viewer
- * @param {{ canvas: HTMLCanvasElement, overlay: import("./overlay.js").OverlayView, onChange: () => void,
- *   onError: (error: any) => void }} page `onChange` draws again, with the background of the settings
+ * @param {{ overlay: import("./overlay.js").OverlayView,
+ *   onError: (error: any) => void }} page
  */
-export function attachPicture(viewer, { canvas, overlay, onChange, onError }) {
+export function attachPicture(viewer, { overlay, onError }) {
   $("side").addEventListener("input", () => {
     lookFrom(viewer, $("side").value).catch(onError);
     $("side").value = "";
-  });
-  $("background").addEventListener("input", () => {
-    $("stage").dataset.background = $("background").value;
-    onChange();
   });
   $("orthographic").addEventListener("input", () => {
     const { camera } = viewer.state;
@@ -24,7 +20,15 @@ export function attachPicture(viewer, { canvas, overlay, onChange, onError }) {
     viewer.set({ camera: { ...camera, projection } }).catch(onError);
   });
   $("axes").addEventListener("input", () => (overlay.showsAxes = $("axes").checked));
-  $("shot").addEventListener("click", () => save(viewer, canvas).catch(onError));
+  $("home").addEventListener("click", () => viewer.home().catch(onError));
+  $("full").addEventListener("click", fullScreen);
+}
+
+/** Shows the picture on the whole screen, or no longer. */
+export function fullScreen() {
+  const change = document.fullscreenElement ? document.exitFullscreen() : $("stage").requestFullscreen?.();
+  // Where the browser does not allow it, the page stays as it is.
+  change?.catch(() => {});
 }
 
 /** The model as it fills the picture leaves no room for the labels of axes: from so many times as far it does. */
@@ -34,21 +38,4 @@ const ROOM = 1.18;
 export function lookFrom(viewer, side) {
   const looked = viewer.lookFrom(side);
   return side === "home" ? looked : Promise.all([looked, viewer.zoom(ROOM)]);
-}
-
-/** Makes a screenshot, and saves it as a file. */
-async function save(viewer, canvas) {
-  const button = $("shot");
-  const factor = Number($("shot-scale").value) * devicePixelRatio;
-  const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((length) => Math.round(length * factor));
-  button.disabled = true;
-  try {
-    const link = document.createElement("a");
-    link.href = URL.createObjectURL(await viewer.screenshot({ width, height }));
-    link.download = `tetralod-${width}x${height}.png`;
-    link.click();
-    URL.revokeObjectURL(link.href);
-  } finally {
-    button.disabled = false;
-  }
 }

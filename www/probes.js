@@ -13,6 +13,8 @@ import { linePlot } from "./plot.js";
 const QUICK = 40;
 const REST = 150;
 const MOST_PINS = 2;
+/** Positions in links have so many digits. */
+const DIGITS = 6;
 /** Fields that a list shows, at most. */
 const MOST_FIELDS = 8;
 
@@ -29,6 +31,8 @@ export class Probes {
   #marks = element("g", { class: "pins" });
   /** The points that are kept. @type {Probe[]} */
   #pins = [];
+  /** The words of points that are being read. @type {string | undefined} */
+  #coming;
   /** The number of the last question about the pointer: late answers are ignored. */
   #asked = 0;
   #took = 0;
@@ -57,6 +61,25 @@ export class Probes {
 
   get pins() {
     return this.#pins;
+  }
+
+  /** The positions of the points that are kept, as numbers. */
+  get words() {
+    return this.#coming ?? String(this.#pins.flatMap(({ position }) => position.map((x) => Number(x.toPrecision(DIGITS)))));
+  }
+
+  set words(words) {
+    if (words === this.words) return;
+    const all = words ? words.split(",").map(Number) : [];
+    const points = [all.slice(0, 3), all.slice(3, 6)].filter((point) => point.length === 3 && point.every(Number.isFinite));
+    const mine = (this.#pins = []);
+    this.#setPins(mine);
+    if (points.length === 0) return;
+    this.#coming = words;
+    Promise.all(points.map((point) => this.#viewer.reading(point))).then(
+      (found) => this.#pins === mine && this.#setPins(found.filter(Boolean)),
+      () => {},
+    );
   }
 
   /** The pointer is at a point of the canvas, (−1 to 1, y upwards), and at a place of the page. */
@@ -173,6 +196,7 @@ export class Probes {
   }
 
   #setPins(pins) {
+    this.#coming = undefined;
     this.#pins = pins;
     const cards = pins.map((pin, i) => {
       const card = document.createElement("div");

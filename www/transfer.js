@@ -22,6 +22,9 @@ const STEP = [0.01, 0.1];
  * @typedef {[at: number, opacity: number]} Point
  */
 
+/** The function that there is first. */
+const FIRST = "ramp";
+
 /** Functions to begin with; `at` is the fraction of the isovalue. @type {Record<string, (at: number) => Point[]>} */
 const PRESETS = {
   ramp: () => [[0, 0], [0.3, 0], [1, 0.8]],
@@ -33,8 +36,13 @@ const PRESETS = {
 export class TransferEditor {
   #parts;
   #onChange;
+  #isovalue;
+  #onIsovalue;
+  /** The isovalue over the curve: a line with a handle at its top. */
+  #marker = element("g", { class: "isovalue", tabindex: 0, role: "slider", "aria-label": "Isovalue", "aria-valuemin": 0, "aria-valuemax": 1000 });
+  #draggingIsovalue = false;
   /** @type {Point[]} */
-  #points = PRESETS.ramp(0.5);
+  #points = PRESETS[FIRST](0.5);
   #selected = 2;
   /** The volume of each bin of the histogram. */
   #volumes = new Float64Array(0);
@@ -45,11 +53,17 @@ export class TransferEditor {
   /**
    * @param {{ svg: SVGSVGElement, bar: HTMLElement, low: HTMLElement, high: HTMLElement, chosen: HTMLElement,
    *   preset: HTMLSelectElement, add: HTMLButtonElement, remove: HTMLButtonElement }} parts
-   * @param {{ isovalue: () => number, onChange: () => void }} how `isovalue` as a fraction of the range
+   * @param {{ isovalue: () => number, onIsovalue: (fraction: number) => void, onChange: () => void }} how
+   *   `isovalue` as a fraction of the range
    */
-  constructor(parts, { isovalue, onChange }) {
+  constructor(parts, { isovalue, onIsovalue, onChange }) {
     this.#parts = parts;
     this.#onChange = onChange;
+    this.#isovalue = isovalue;
+    this.#onIsovalue = onIsovalue;
+    const handle = `M-6 0h12v7l-6 6-6-6z`;
+    this.#marker.append(element("line", { y1: 0, y2: SIZE.height }), element("path", { d: handle, class: "handle" }), element("title", {}, "Isovalue"));
+    parts.svg.append(this.#marker);
     parts.preset.addEventListener("input", () => {
       const preset = PRESETS[parts.preset.value];
       if (preset) this.#set(preset(isovalue()), 0);
@@ -69,6 +83,23 @@ export class TransferEditor {
   /** The opacities for the viewer, for values of a field, each times `factor`. @returns {[number, number][]} */
   opacities({ min, max }, factor) {
     return this.#points.map(([at, opacity]) => [min + at * (max - min), opacity * factor]);
+  }
+
+  /** The name of a preset, or the points as numbers; nothing for what there is first. */
+  get words() {
+    const { value } = this.#parts.preset;
+    return value === FIRST ? "" : value || String(this.#points.flat());
+  }
+
+  set words(words) {
+    const values = words.split(",").map(Number);
+    const isPoints = values.length >= 4 && values.length % 2 === 0 && values.every((x) => x >= 0 && x <= 1);
+    const name = Object.hasOwn(PRESETS, words) ? words : FIRST;
+    this.#parts.preset.value = isPoints ? "" : name;
+    const pairs = values.flatMap((at, i) => (i % 2 === 0 ? [/** @type {Point} */ ([at, values[i + 1]])] : []));
+    this.#points = isPoints ? pairs : PRESETS[name](this.#isovalue());
+    this.#selected = Math.min(this.#selected, this.#points.length - 1);
+    this.#draw();
   }
 
   /** What the values are of. The points stay where they are in its range. @param {import("tetralod").FieldInfo} field */
@@ -104,7 +135,9 @@ export class TransferEditor {
     const lower = this.#points[i - 1]?.[0] ?? 0;
     const upper = this.#points[i + 1]?.[0] ?? 1;
     const points = [...this.#points];
-    points[i] = [Math.min(Math.max(at, lower), upper), Math.min(Math.max(opacity, 0), 1)];
+    // As many digits as links keep.
+    const short = (x) => Number(x.toFixed(4));
+    points[i] = [short(Math.min(Math.max(at, lower), upper)), short(Math.min(Math.max(opacity, 0), 1))];
     this.#parts.preset.value = "";
     this.#set(points, i);
   }
@@ -131,9 +164,22 @@ export class TransferEditor {
     this.#set([...this.#points.slice(0, i), ...this.#points.slice(i + 1)], i);
   }
 
+  /** The isovalue, or what it is called, has changed. */
+  showIsovalue(words) {
+    const [x] = point([this.#isovalue(), 0]);
+    this.#marker.setAttribute("transform", `translate(${x} 0)`);
+    this.#marker.setAttribute("aria-valuenow", String(Math.round(1000 * this.#isovalue())));
+    this.#marker.setAttribute("aria-valuetext", words);
+  }
+
   #press(event) {
     event.preventDefault();
     this.#parts.svg.setPointerCapture(event.pointerId);
+    if (event.target instanceof Element && event.target.closest(".handle")) {
+      this.#draggingIsovalue = true;
+      this.#marker.focus();
+      return;
+    }
     const near = this.#near(event);
     this.#dragging = true;
     if (near >= 0) {
@@ -144,6 +190,7 @@ export class TransferEditor {
   }
 
   #drag(event) {
+    if (this.#draggingIsovalue) return this.#onIsovalue(this.#place(event)[0]);
     if (!this.#dragging) return;
     const [at, opacity] = this.#place(event);
     const height = SIZE.height - 2 * SIZE.margin;
@@ -153,6 +200,7 @@ export class TransferEditor {
   }
 
   #drop(event) {
+    this.#draggingIsovalue = false;
     const { svg } = this.#parts;
     if (this.#dragging && event.type === "pointerup" && svg.classList.contains("dropping")) this.#remove();
     svg.classList.remove("dropping");
@@ -160,6 +208,7 @@ export class TransferEditor {
   }
 
   #key(event) {
+    if (event.target === this.#marker) return this.#isovalueKey(event);
     const i = Array.from(this.#parts.svg.querySelectorAll("circle")).indexOf(event.target);
     if (i < 0) return;
     this.#selected = i;
@@ -173,6 +222,14 @@ export class TransferEditor {
     else return;
     event.preventDefault();
     this.#focus();
+  }
+
+  #isovalueKey(event) {
+    const move = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 }[event.key];
+    if (!move) return;
+    event.preventDefault();
+    const at = this.#isovalue() + move * STEP[event.shiftKey ? 1 : 0];
+    this.#onIsovalue(Math.min(Math.max(at, 0), 1));
   }
 
   #focus() {
@@ -216,12 +273,12 @@ export class TransferEditor {
       });
     }
     const shapes = [
-      element("path", { d: this.#histogramPath(), class: "volumes" }),
+      element("path", { d: histogramPath(this.#volumes), class: "volumes" }),
       element("path", { d: `M${curve.join("L")}L${base.join("L")}Z`, class: "area" }),
       element("path", { d: `M${curve.join("L")}`, class: "curve" }),
     ];
     const kept = before.length === circles.length ? Array.from(before) : circles;
-    svg.querySelectorAll("path").forEach((path) => path.remove());
+    svg.querySelectorAll(":scope > path").forEach((path) => path.remove());
     svg.prepend(...shapes);
     if (kept === circles) {
       before.forEach((circle) => circle.remove());
@@ -231,23 +288,23 @@ export class TransferEditor {
     remove.disabled = this.#points.length <= 2;
   }
 
-  /** The histogram as an area. Its heights are square roots: what is rare is seen, too. */
-  #histogramPath() {
-    const most = Math.sqrt(this.#volumes.reduce((a, b) => Math.max(a, b), 0));
-    if (!(most > 0)) return "";
-    const count = this.#volumes.length;
-    const steps = Array.from(this.#volumes, (volume, i) => {
-      const height = Math.sqrt(Math.max(volume, 0)) / most;
-      return [point([i / count, height]), point([(i + 1) / count, height])].map((p) => p.join(" ")).join("L");
-    });
-    return `M${point([0, 0]).join(" ")}L${steps.join("L")}L${point([1, 0]).join(" ")}Z`;
-  }
-
   #words([at, opacity]) {
     const { min = 0, max = 1, unit = "" } = this.#field ?? {};
     const value = `${rounded(min + at * (max - min), max - min)} ${unit}`.trim();
     return `value ${value}, opacity ${Math.round(100 * opacity)} %`;
   }
+}
+
+/** A histogram as an area. Its heights are square roots: what is rare is seen, too. @param {ArrayLike<number>} volumes */
+export function histogramPath(volumes) {
+  const most = Math.sqrt(Array.from(volumes).reduce((a, b) => Math.max(a, b), 0));
+  if (!(most > 0)) return "";
+  const count = volumes.length;
+  const steps = Array.from(volumes, (volume, i) => {
+    const height = Math.sqrt(Math.max(volume, 0)) / most;
+    return [point([i / count, height]), point([(i + 1) / count, height])].map((p) => p.join(" ")).join("L");
+  });
+  return `M${point([0, 0]).join(" ")}L${steps.join("L")}L${point([1, 0]).join(" ")}Z`;
 }
 
 /** Where a point is in the drawing. @param {Point} point */

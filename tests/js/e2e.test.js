@@ -1,98 +1,14 @@
 // The demo page in a real browser, with WebGPU, on the demo's data. Screenshots go to `target/e2e/` for inspection.
 import assert from "node:assert/strict";
-import { mkdir, readFile } from "node:fs/promises";
+import { readFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
 import { fileURLToPath } from "node:url";
-import { address, launch } from "./browser.js";
+import { address } from "./browser.js";
+import { addressed, assertDrawn, begin, demo, differing, end, newPage, open, PATIENCE, picture, pictures, reach, setSlider, settle, show, study } from "./drive.js";
 
-const pictures = new URL("../../target/e2e/", import.meta.url);
-const PATIENCE = 90_000;
+before(begin);
 
-let browser;
-
-before(async () => {
-  await mkdir(pictures, { recursive: true });
-  browser = await launch();
-});
-
-after(() => browser?.close());
-
-/** A new page with `volume` opened; its errors are collected in `complaints`. */
-async function open(volume, prepare = async (_page) => {}) {
-  const page = await browser.newPage({ viewport: { width: 1100, height: 760 } });
-  page.setDefaultTimeout(PATIENCE);
-  page.complaints = [];
-  page.on("pageerror", (error) => page.complaints.push(String(error)));
-  page.on("console", (message) => message.type() === "error" && page.complaints.push(message.text()));
-  await prepare(page);
-  await page.goto(`${address()}?url=${encodeURIComponent(volume)}`);
-  return page;
-}
-
-/** Waits for a state of the page; fails with the state that it is in. */
-async function reach(page, state) {
-  const reached = page.waitForFunction((wanted) => window.tetralodDemo?.state === wanted, state, { timeout: PATIENCE });
-  await reached.catch(async () => {
-    const { viewer, ...found } = await page.evaluate(() => ({ ...window.tetralodDemo, viewer: undefined }));
-    assert.fail(`the page is not ${state}: ${JSON.stringify(found)} ${page.complaints}`);
-  });
-}
-
-const demo = (page, name) => page.evaluate((name) => JSON.parse(JSON.stringify(window.tetralodDemo[name] ?? null)), name);
-
-/** Changes an input as a user does and waits for the refinement that follows. */
-async function setSlider(page, id, value) {
-  await page.evaluate(() => (window.tetralodDemo.stats = undefined));
-  await page.fill(`#${id}`, String(value));
-  await page.waitForFunction(() => window.tetralodDemo.stats, undefined, { timeout: PATIENCE });
-  return demo(page, "stats");
-}
-
-/** A screenshot of the canvas without what lies over it, saved as `name`, and its numbers. */
-async function picture(page, name) {
-  await settle(page);
-  const path = fileURLToPath(new URL(`${name}.png`, pictures));
-  const style = "#legend, #loading, #overlay, #cards, #readout, #divider { visibility: hidden !important }";
-  return study(page, await page.locator("#canvas").screenshot({ path, style }));
-}
-
-/** The share of a picture that is not background, the number of colours there, and a sample of all pixels. */
-function study(page, png) {
-  return page.evaluate(async (base64) => {
-    const bytes = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
-    const image = await createImageBitmap(new Blob([bytes], { type: "image/png" }));
-    const context = new OffscreenCanvas(image.width, image.height).getContext("2d");
-    context.drawImage(image, 0, 0);
-    const pixels = new Uint32Array(context.getImageData(0, 0, image.width, image.height).data.buffer);
-    // In each row, the background has one colour but for noise; the outline of the focus is left of the fifth pixel.
-    const channels = (pixel) => [pixel & 255, (pixel >> 8) & 255, (pixel >> 16) & 255];
-    const isCovered = (pixel, i) => {
-      const background = channels(pixels[i - (i % image.width) + 4]);
-      return channels(pixel).some((value, c) => Math.abs(value - background[c]) > 8);
-    };
-    const covered = pixels.filter(isCovered);
-    const sample = Array.from(pixels.filter((_, i) => i % 97 === 0));
-    return { colours: new Set(covered).size, covered: covered.length / pixels.length, pixels: sample, width: image.width };
-  }, png.toString("base64"));
-}
-
-/** Waits until no frame has been drawn for a while, and the mesh is what was asked for. */
-async function settle(page) {
-  for (let seen = -1; ; ) {
-    const [frames, step] = [await demo(page, "frames"), await demo(page, "step")];
-    if (frames === seen && step?.done !== false) return;
-    seen = frames;
-    await page.waitForTimeout(400);
-  }
-}
-
-const differing = (a, b) => a.pixels.filter((pixel, i) => pixel !== b.pixels[i]).length / a.pixels.length;
-
-/** Something is drawn on the background, larger than the lines of the bounding box, and it is lit. */
-function assertDrawn({ colours, covered }) {
-  assert.ok(covered > 0.03, `only ${(100 * covered).toFixed(1)} % of the picture is covered`);
-  assert.ok(colours > 50, `only ${colours} colours`);
-}
+after(end);
 
 test("the page streams a volume, draws it, and its settings change mesh and picture", async () => {
   const page = await open("data/bucky.mt");
@@ -151,6 +67,7 @@ test("the page streams a volume, draws it, and its settings change mesh and pict
   });
   assert.ok(panel <= 0, `the settings are ${panel} pixels wider than their column`);
   await page.screenshot({ path: fileURLToPath(new URL("page.png", pictures)) });
+  await page.locator("#tab-data").click();
   await page.locator("#n-blocks").scrollIntoViewIfNeeded();
   await page.screenshot({ path: fileURLToPath(new URL("page-numbers.png", pictures)) });
   assert.deepEqual(page.complaints, []);
@@ -174,7 +91,7 @@ for (const [name, html] of [
   ["package's README", around(await block("pkg-template/README.md", "```js\nimport { Viewer }"))],
 ]) {
   test(`the page of the ${name} draws the volume`, async () => {
-    const page = await browser.newPage({ viewport: { width: 500, height: 500 } });
+    const page = await newPage({ viewport: { width: 500, height: 500 } });
     const complaints = [];
     page.on("pageerror", (error) => complaints.push(String(error)));
     // The package and the volume are on the server; the page lies beside them.
@@ -328,9 +245,6 @@ test("each region that the page offers is refined", async () => {
   assert.deepEqual(page.complaints, []);
   await page.close();
 });
-
-/** Turns to a view of the page. */
-const show = (page, view) => page.locator("label", { hasText: view }).first().click();
 
 /** The small volume at a coarse mesh, so that pictures come soon, in a view of the page. */
 async function openSmall(view = "Surface") {
@@ -528,6 +442,7 @@ test("screenshots have any size and background, and leave the canvas as it is", 
   assert.equal(seen.huge, "bad-option");
   assert.ok(differing(before, await picture(page, "after-screenshot")) < 0.005, "the canvas is as it was");
   const download = page.waitForEvent("download");
+  await page.locator("#tab-export").click();
   await page.locator("#shot").click();
   assert.match((await download).suggestedFilename(), /^tetralod-\d+x\d+\.png$/);
   assert.deepEqual(page.complaints, []);
@@ -695,5 +610,55 @@ test("the package runs in a worker of the page, without a viewer", async () => {
   assert.ok(seen.same, "the same request gives the same mesh from wherever one starts");
   assert.ok(seen.followed, "deltas add up to the mesh");
   assert.equal(seen.aborted, "AbortError");
+  await page.close();
+});
+
+test("the address has the whole state: a reload gives the same picture, undo and redo go back and forth", async () => {
+  const page = await openSmall();
+  const first = await picture(page, "state-first");
+  await page.fill("#isovalue", "250");
+  await addressed(page, /isovalue=/);
+  await show(page, "Solid");
+  await page.selectOption("#map", "magma");
+  await page.selectOption("#region", "box");
+  await addressed(page, /view=solid.*map=magma.*region=box/);
+  await page.locator("#canvas").focus();
+  for (const key of ["ArrowLeft", "ArrowUp", "+"]) await page.keyboard.press(key);
+  await addressed(page, /camera=/);
+  const before = await picture(page, "state-before");
+  const [address, request] = [page.url(), await demo(page, "request")];
+  await page.reload();
+  await reach(page, "complete");
+  assert.equal(differing(before, await picture(page, "state-after")), 0, "the same picture");
+  assert.deepEqual(await demo(page, "request"), request);
+  await settle(page);
+  assert.equal(page.url(), address, "the state stays as it was");
+
+  // Another page with the copied link shows the same, and steps of what is done there are undone.
+  await page.locator("#share").click();
+  await page.locator("#note").waitFor();
+  await page.selectOption("#map", "viridis");
+  await page.waitForFunction(() => !location.hash.includes("magma"), undefined, { timeout: PATIENCE });
+  await page.locator("#undo").click();
+  assert.equal(page.url(), address);
+  assert.equal(await page.inputValue("#map"), "magma");
+  assert.ok(await page.locator("#undo").isDisabled(), "there is no more to undo");
+  await page.keyboard.press("Control+Shift+Z");
+  assert.equal(await page.inputValue("#map"), "viridis");
+  await page.keyboard.press("Control+Z");
+  assert.equal(differing(before, await picture(page, "state-undone")), 0, "the same picture again");
+  await page.locator("#reset").click();
+  await page.waitForFunction(() => location.hash === "", undefined, { timeout: PATIENCE });
+  await setSlider(page, "error", 70);
+  assert.ok(differing(first, await picture(page, "state-reset")) < 0.005, "the first picture");
+
+  // The isovalue carries over by value.
+  await page.fill("#isovalue", "250");
+  const value = await page.textContent("#isovalue-text");
+  await page.selectOption("#volume", "data/bucky.mt");
+  await reach(page, "complete");
+  assert.equal(Number(await page.textContent("#isovalue-text")).toFixed(2), Number(value).toFixed(2));
+  await addressed(page, /url=data\/bucky.mt.*isovalue=/);
+  assert.deepEqual(page.complaints, []);
   await page.close();
 });

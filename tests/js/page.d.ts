@@ -1,5 +1,5 @@
 /// <reference path="../../pkg/element.d.ts" />
-// What the demo page tells the tests (`www/main.js`), and the names under which it imports the package.
+// What the demo page tells the tests (`www/page.js`), and the names under which it imports the package.
 interface Window {
   tetralodDemo: any;
 }

@@ -2,99 +2,84 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::thread;
 
 use anyhow::{Context, Result, bail};
 
 use crate::serve::Server;
-use crate::{flow, package, shell};
+use crate::volumes::{self, DATA, LARGE, SMALL};
+use crate::{package, shell};
 
-/// Where the page looks for its volumes.
-const DATA: &str = "www/data";
+/// The memory that the large volume takes to build, in KiB: some 450 bytes a tetrahedron, and its data.
+const LARGE_MEMORY: u64 = 7 << 20;
 
-/// A volume of the demo: the name of its MT file, and how its data is generated and built.
-struct Volume {
-    name: &'static str,
-    data: &'static str,
-    extension: &'static str,
-    size: &'static str,
-    kind: &'static str,
-}
-
-/// One of each kind of MT: the page opens all alike.
-const VOLUMES: [Volume; 5] = [
-    Volume { name: "bucky", data: "bucky", extension: "vti", size: "65", kind: "half-edge" },
-    Volume { name: "sphere-flow", data: "sphere-flow", extension: "vtu", size: "24", kind: "half-edge" },
-    Volume { name: "sphere-flow-edge", data: "sphere-flow", extension: "vtu", size: "24", kind: "edge" },
-    Volume { name: "sphere-flow-vertex", data: "sphere-flow", extension: "vtu", size: "24", kind: "vertex" },
-    Volume { name: "bucky-explicit", data: "bucky", extension: "vti", size: "17", kind: "explicit" },
-];
-
-/// Builds all, and serves until interrupted.
+/// Builds all, and serves until interrupted. The large volume is made meanwhile, and appears in the page.
 pub fn run(args: &[String]) -> Result<()> {
-    let (mut port, mut serve) = (8080, true);
+    let (mut port, mut serve, mut small) = (8080, true, false);
     let mut args = args.iter();
     while let Some(arg) = args.next() {
         match arg.as_str() {
             "--no-serve" => serve = false,
+            "--small" => small = true,
             "--port" => {
                 let value = args.next().context("--port needs a number")?;
                 port = value.parse().with_context(|| format!("--port {value}"))?;
             }
-            other => bail!("`demo` knows --port N and --no-serve, not `{other}`"),
+            other => bail!("`demo` knows --port N, --small and --no-serve, not `{other}`"),
         }
     }
     package::build(&[])?;
     let tetralod = shell::released_command()?;
     make_data(&tetralod)?;
-    if serve { serve_page(&tetralod, port) } else { Ok(()) }
+    if !serve {
+        return Ok(());
+    }
+    if !small && has_memory() {
+        volumes::write_list(&tetralod, Some(&LARGE))?;
+        let tetralod = tetralod.clone();
+        thread::spawn(move || make_large(&tetralod));
+    }
+    serve_page(&tetralod, port)
 }
 
-/// The largest of the demo's volumes, made if necessary: also what the benchmark measures.
+/// Makes the large volume with what the machine has left. An error does not end the page.
+fn make_large(tetralod: &Path) {
+    let prefix: &[&str] = if shell::find("nice").is_some() { &["nice", "-n", "19"] } else { &[] };
+    let made = volumes::make(tetralod, &LARGE, prefix);
+    if let Err(error) = made.and_then(|()| volumes::write_list(tetralod, None)) {
+        eprintln!("the large volume was not made: {error:#}");
+        if let Err(error) = volumes::write_list(tetralod, None) {
+            eprintln!("{error:#}");
+        }
+    }
+}
+
+/// Whether there is memory for the large volume. Where the system does not say, there is.
+fn has_memory() -> bool {
+    let available = fs::read_to_string("/proc/meminfo").ok().and_then(|text| {
+        let line = text.lines().find(|line| line.starts_with("MemAvailable:"))?;
+        line.split_whitespace().nth(1)?.parse::<u64>().ok()
+    });
+    let is_enough = available.is_none_or(|kilobytes| kilobytes >= LARGE_MEMORY);
+    if !is_enough {
+        println!("the large volume is left out: it needs {} GiB of free memory", LARGE_MEMORY >> 20);
+    }
+    is_enough
+}
+
+/// The largest of the demo's small volumes, made if necessary: also what the benchmark measures.
 pub fn bench_volume() -> Result<PathBuf> {
     make_data(&shell::released_command()?)?;
     Ok(Path::new(DATA).join("bucky.mt"))
 }
 
-/// Makes the MT files that are missing or older than the command that builds them.
+/// Makes the small volumes that are missing or older than the command that builds them, and the list of all.
 pub fn make_data(tetralod: &Path) -> Result<()> {
     fs::create_dir_all(DATA)?;
-    for Volume { name, data, extension, size, kind } in VOLUMES {
-        let mt = Path::new(DATA).join(format!("{name}.mt"));
-        if is_newer(&mt, tetralod) {
-            continue;
-        }
-        println!("making {}", mt.display());
-        let input = Path::new("target").join(format!("{name}.{extension}"));
-        shell::run(shell::command(tetralod, ["generate", data, "--size", size, "-o"]).arg(&input))?;
-        // Built beside and moved, so that an interrupted build is not taken for a finished one.
-        let part = Path::new("target").join(format!("{name}.mt"));
-        shell::run(shell::command(tetralod, ["build", "--kind", kind]).arg(&input).arg("-o").arg(&part))?;
-        fs::rename(&part, &mt)?;
+    for volume in &SMALL {
+        volumes::make(tetralod, volume, &[])?;
     }
-    make_flow(tetralod)
-}
-
-/// Makes the volume with vectors and time steps.
-fn make_flow(tetralod: &Path) -> Result<()> {
-    let mt = Path::new(DATA).join("abc-flow.mt");
-    if is_newer(&mt, tetralod) {
-        return Ok(());
-    }
-    println!("making {}", mt.display());
-    let inputs: Vec<PathBuf> =
-        (0..flow::STEPS).map(|step| Path::new("target").join(format!("abc-flow-{step}.vti"))).collect();
-    for (input, step) in inputs.iter().zip(0..) {
-        flow::write(input, step)?;
-    }
-    let part = Path::new("target/abc-flow.mt");
-    let fields = ["--field", "pressure", "--field", "velocity", "--unit", "velocity=m/s", "-o"];
-    shell::run(shell::command(tetralod, ["build"]).args(&inputs).args(fields).arg(part))?;
-    fs::rename(part, &mt).context("moving the flow")
-}
-
-fn is_newer(file: &Path, than: &Path) -> bool {
-    let modified = |path: &Path| path.metadata().and_then(|data| data.modified()).ok();
-    matches!((modified(file), modified(than)), (Some(file), Some(than)) if file >= than)
+    volumes::write_list(tetralod, None)
 }
 
 /// Serves the page as a web site would: the package at `pkg/`, everything else from `www/`.

@@ -1,12 +1,12 @@
 //! The demo's volume with vectors and time steps: the flow of Arnold, Beltrami and Childress in a cube of one period, which drifts
-//! along the diagonal. Grids of VTK in ASCII, one a time step.
+//! along the diagonal.
 
 use std::f64::consts::TAU;
-use std::fmt::Write;
-use std::fs;
 use std::path::Path;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
+
+use crate::vti::{self, Array, Grid};
 
 /// Points along an edge of the grid.
 const POINTS: usize = 21;
@@ -19,27 +19,16 @@ const AMPLITUDES: [f64; 3] = [1.0, 0.816_496_580_927_726, 0.577_350_269_189_625_
 
 /// Writes one time step as a `.vti` file with `pressure` and the vector `velocity`.
 pub fn write(path: &Path, step: u32) -> Result<()> {
-    let spacing = TAU / (POINTS - 1) as f64;
+    let grid = Grid { points: [POINTS; 3], spacing: TAU / (POINTS - 1) as f64 };
     let drift = TAU * f64::from(step) / f64::from(STEPS);
-    let (mut pressure, mut velocity) = (String::new(), String::new());
-    for i in 0..POINTS.pow(3) {
-        let place = [i % POINTS, i / POINTS % POINTS, i / POINTS.pow(2)].map(|k| k as f64 * spacing - drift);
-        let [u, v, w] = flow(place);
-        // Bernoulli's: the same energy everywhere.
-        writeln!(pressure, "{:.5}", -0.5 * (u * u + v * v + w * w))?;
-        writeln!(velocity, "{u:.5} {v:.5} {w:.5}")?;
-    }
-    let end = POINTS - 1;
-    let extent = format!("0 {end} 0 {end} 0 {end}");
-    let text = format!(
-        r#"<VTKFile type="ImageData" version="1.0" byte_order="LittleEndian">
-<ImageData WholeExtent="{extent}" Origin="0 0 0" Spacing="{spacing} {spacing} {spacing}"><Piece Extent="{extent}"><PointData>
-<DataArray type="Float32" Name="pressure" format="ascii">{pressure}</DataArray>
-<DataArray type="Float32" Name="velocity" NumberOfComponents="3" format="ascii">{velocity}</DataArray>
-</PointData></Piece></ImageData></VTKFile>
-"#
-    );
-    fs::write(path, text).with_context(|| path.display().to_string())
+    let velocities: Vec<[f64; 3]> = (0..grid.len()).map(|i| flow(grid.place(i).map(|x| x - drift))).collect();
+    // Bernoulli's: the same energy everywhere.
+    let pressure = velocities.iter().map(|[u, v, w]| -0.5 * (u * u + v * v + w * w)).collect();
+    let arrays = [
+        Array { name: "pressure", components: 1, values: pressure },
+        Array { name: "velocity", components: 3, values: velocities.into_flattened() },
+    ];
+    vti::write(path, &grid, &arrays)
 }
 
 fn flow([x, y, z]: [f64; 3]) -> [f64; 3] {

@@ -12,6 +12,7 @@ mod demo;
 mod docs;
 mod fixture;
 mod flow;
+mod helix;
 mod licences;
 mod package;
 mod paper;
@@ -20,6 +21,8 @@ mod release;
 mod serve;
 mod shell;
 mod suite;
+mod volumes;
+mod vti;
 
 use std::process::ExitCode;
 
@@ -29,7 +32,8 @@ const USAGE: &str = "\
 usage: cargo xtask COMMAND
 
   build                          build the npm package into pkg/
-  demo [--port N] [--no-serve]   build everything, make the demo's data, serve the page on localhost
+  demo [--port N] [--no-serve] [--small]   build everything, make the demo's data, serve the page on localhost; a large
+                                 volume is made in the background, unless with --small
   docs                           make the documentation's site in target/docs
   test [STEP...]                 every check, or the named steps; `test --list` names them
   test --quick                   formatting, lints and native tests; not: other feature sets, documentation, the longest

@@ -179,6 +179,7 @@ fn js() -> Result<()> {
     shell::run(&mut node_test("pack.test.js"))?;
     shell::run(&mut node_test("latest.test.js"))?;
     shell::run(&mut node_test("ranges.test.js"))?;
+    shell::run(&mut node_test("writers.test.js"))?;
     with_fixture(|| {
         for name in ["package.test.js", "parts.test.js", "steps.test.js", "places.test.js"] {
             shell::run(fixture_env(&mut node_test(name)))?;
@@ -268,6 +269,9 @@ fn e2e() -> Result<()> {
         }
         Ok(())
     })?;
-    let mut command = node_test("e2e.test.js");
-    shell::run(command.env("TETRALOD_PAGE", &server.address).env("CHROMIUM", browser.chromium))
+    for name in ["e2e.test.js", "page.test.js"] {
+        let mut command = node_test(name);
+        shell::run(command.env("TETRALOD_PAGE", &server.address).env("CHROMIUM", &browser.chromium))?;
+    }
+    Ok(())
 }

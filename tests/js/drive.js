@@ -1,0 +1,103 @@
+// Driving the demo page: what its tests have in common. Screenshots go to `target/e2e/` for inspection.
+import assert from "node:assert/strict";
+import { mkdir } from "node:fs/promises";
+import { fileURLToPath } from "node:url";
+import { address, launch } from "./browser.js";
+
+export const pictures = new URL("../../target/e2e/", import.meta.url);
+export const PATIENCE = 90_000;
+
+let browser;
+
+export async function begin() {
+  await mkdir(pictures, { recursive: true });
+  browser = await launch();
+}
+
+export const end = () => browser?.close();
+
+export const newPage = (options) => browser.newPage(options);
+
+/** A new page with `volume` opened; its errors are collected in `complaints`. */
+export async function open(volume, prepare = async (_page) => {}, options = {}) {
+  const page = await newPage({ viewport: { width: 1100, height: 760 }, ...options });
+  page.setDefaultTimeout(PATIENCE);
+  page.complaints = [];
+  page.on("pageerror", (error) => page.complaints.push(String(error)));
+  page.on("console", (message) => message.type() === "error" && page.complaints.push(message.text()));
+  await prepare(page);
+  await page.goto(`${address()}?url=${encodeURIComponent(volume)}`);
+  return page;
+}
+
+/** Waits for a state of the page; fails with the state that it is in. */
+export async function reach(page, state) {
+  const reached = page.waitForFunction((wanted) => window.tetralodDemo?.state === wanted, state, { timeout: PATIENCE });
+  await reached.catch(async () => {
+    const { viewer, ...found } = await page.evaluate(() => ({ ...window.tetralodDemo, viewer: undefined }));
+    assert.fail(`the page is not ${state}: ${JSON.stringify(found)} ${page.complaints}`);
+  });
+}
+
+export const demo = (page, name) => page.evaluate((name) => JSON.parse(JSON.stringify(window.tetralodDemo[name] ?? null)), name);
+
+/** Changes an input as a user does and waits for the refinement that follows. */
+export async function setSlider(page, id, value) {
+  await page.evaluate(() => (window.tetralodDemo.stats = undefined));
+  await page.fill(`#${id}`, String(value));
+  await page.waitForFunction(() => window.tetralodDemo.stats, undefined, { timeout: PATIENCE });
+  return demo(page, "stats");
+}
+
+/** A screenshot of the canvas without what lies over it, saved as `name`, and its numbers. */
+export async function picture(page, name) {
+  await settle(page);
+  const path = fileURLToPath(new URL(`${name}.png`, pictures));
+  const style = "#legend, #growth, #overlay, #cards, #readout, #divider, #note { visibility: hidden !important } canvas { outline: none !important }";
+  return study(page, await page.locator("#canvas").screenshot({ path, style }));
+}
+
+/** The share of a picture that is not background, the number of colours there, and a sample of all pixels. */
+export function study(page, png) {
+  return page.evaluate(async (base64) => {
+    const bytes = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
+    const image = await createImageBitmap(new Blob([bytes], { type: "image/png" }));
+    const context = new OffscreenCanvas(image.width, image.height).getContext("2d");
+    context.drawImage(image, 0, 0);
+    const pixels = new Uint32Array(context.getImageData(0, 0, image.width, image.height).data.buffer);
+    // In each row, the background has one colour but for noise; the outline of the focus is left of the fifth pixel.
+    const channels = (pixel) => [pixel & 255, (pixel >> 8) & 255, (pixel >> 16) & 255];
+    const isCovered = (pixel, i) => {
+      const background = channels(pixels[i - (i % image.width) + 4]);
+      return channels(pixel).some((value, c) => Math.abs(value - background[c]) > 8);
+    };
+    const covered = pixels.filter(isCovered);
+    const sample = Array.from(pixels.filter((_, i) => i % 97 === 0));
+    return { colours: new Set(covered).size, covered: covered.length / pixels.length, pixels: sample, width: image.width };
+  }, png.toString("base64"));
+}
+
+/** Waits until no frame has been drawn for a while, and the mesh is what was asked for. */
+export async function settle(page) {
+  for (let seen = -1; ; ) {
+    const [frames, step] = [await demo(page, "frames"), await demo(page, "step")];
+    if (frames === seen && step?.done !== false) return;
+    seen = frames;
+    await page.waitForTimeout(400);
+  }
+}
+
+export const differing = (a, b) => a.pixels.filter((pixel, i) => pixel !== b.pixels[i]).length / a.pixels.length;
+
+/** Something is drawn on the background, larger than the lines of the bounding box, and it is lit. */
+export function assertDrawn({ colours, covered }) {
+  assert.ok(covered > 0.03, `only ${(100 * covered).toFixed(1)} % of the picture is covered`);
+  assert.ok(colours > 50, `only ${colours} colours`);
+}
+
+/** Turns to a view of the page. */
+export const show = (page, view) => page.locator("label", { hasText: view }).first().click();
+
+/** Waits until the address has what a pattern matches. */
+export const addressed = (page, pattern) =>
+  page.waitForFunction((source) => new RegExp(source).test(location.hash), pattern.source, { timeout: PATIENCE });

@@ -1,0 +1,36 @@
+/** Elements of the page. */
+
+/** @type {(id: string) => any} Each caller knows the type of its element. */
+export const $ = (id) => document.getElementById(id);
+
+/** @type {(selector: string) => any[]} */
+export const all = (selector) => Array.from(document.querySelectorAll(selector));
+
+/** The value of the chosen one of some radio buttons. @param {string} name */
+export const checked = (name) => /** @type {HTMLInputElement} */ (document.querySelector(`[name=${name}]:checked`)).value;
+
+/** Shows the value of a slider, and gives it to screen readers. */
+export function text(output, words, slider) {
+  $(output).textContent = words;
+  $(slider).setAttribute("aria-valuetext", words);
+}
+
+let waiting;
+
+/** Announces words to screen readers when they have not changed for a while. */
+export function announce(words) {
+  clearTimeout(waiting);
+  waiting = setTimeout(() => ($("status").textContent = words), 800);
+}
+
+/** Dialogs close with their button, and by a press beside them. */
+export function attachDialogs() {
+  for (const dialog of all("dialog")) {
+    dialog.querySelector("[data-close]").addEventListener("click", () => dialog.close());
+    dialog.addEventListener("pointerdown", (event) => {
+      const { left, right, top, bottom } = dialog.getBoundingClientRect();
+      const isInside = event.clientX >= left && event.clientX <= right && event.clientY >= top && event.clientY <= bottom;
+      if (event.target === dialog && !isInside) dialog.close();
+    });
+  }
+}

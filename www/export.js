@@ -1,0 +1,98 @@
+/** Files made of what is shown: the picture, the mesh, surfaces, probes. */
+
+import { $, all } from "./dom.js";
+import { count } from "./format.js";
+import { fail } from "./messages.js";
+import { demo, page } from "./page.js";
+import { compose } from "./compose.js";
+import { isovalue, plane } from "./scene.js";
+import { note } from "./share.js";
+import { onTab } from "./tabs.js";
+import { csv, glb, ply, stl, vtk, vtu } from "./writers.js";
+
+/** @typedef {import("./writers.js").Triangles} Triangles */
+
+function saveAs(name, parts, type) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(new Blob(parts, { type }));
+  link.download = name;
+  link.click();
+  // Once the browser has begun to save it.
+  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+}
+
+/** The triangles that are chosen. @returns {Promise<Triangles>} */
+async function triangles() {
+  const { viewer, field } = page;
+  const kind = $("surface-kind").value;
+  if (kind === "isosurface") {
+    const surface = await viewer.isosurface(isovalue());
+    return { ...surface, name: field.name };
+  }
+  const { normal, offset } = plane();
+  const surface = kind === "slice" ? await viewer.slice(normal, offset) : await viewer.surface();
+  return { ...surface, name: field.name };
+}
+
+/** The values at the probes, and along the line between two of them. */
+async function probes() {
+  const { pins } = page.probes;
+  if (pins.length === 0) return undefined;
+  const names = Object.keys(pins[0].values);
+  const head = ["what", "x", "y", "z", "distance", ...names];
+  const row = (what, position, distance, values) => [what, ...position, distance, ...names.map((name) => values[name])];
+  const distance = (to) => Math.hypot(...to.map((x, i) => x - pins[0].position[i]));
+  const rows = pins.map(({ position, values }, i) => row(`probe ${"AB"[i]}`, position, distance(position), values));
+  if (pins.length < 2) return csv([head, ...rows]);
+  const [from, to] = pins.map(({ position }) => position);
+  const { at, values } = await page.viewer.line(from, to);
+  const onLine = Array.from(at, (part, i) => {
+    const position = from.map((x, axis) => x + part * (to[axis] - x));
+    return row("line", position, distance(position), { [page.field.name]: values[i] });
+  });
+  return csv([head, ...rows, ...onLine]);
+}
+
+/** How each file is made. @type {Record<string, () => Promise<[parts: BlobPart[] | undefined, type: string]>>} */
+const MAKERS = {
+  vtu: async () => [vtu(await page.viewer.mesh(), page.field.name), "application/xml"],
+  vtk: async () => [vtk(await page.viewer.mesh(), page.field.name), "application/octet-stream"],
+  stl: async () => [stl(await triangles()), "model/stl"],
+  ply: async () => [ply(await triangles()), "application/octet-stream"],
+  glb: async () => [glb(await triangles()), "model/gltf-binary"],
+  csv: async () => [await probes(), "text/csv"],
+};
+
+async function exportAs(kind) {
+  if (!demo.info) return;
+  const [parts, type] = await MAKERS[kind]();
+  if (!parts) return note("There is no probe: click on the picture first");
+  saveAs(`tetralod.${kind}`, parts, type);
+}
+
+async function savePicture(canvas) {
+  const factor = Number($("shot-scale").value) * devicePixelRatio;
+  const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((length) => Math.round(length * factor));
+  const picture = await page.viewer.screenshot({ width, height });
+  const all = $("shot-overlay").checked ? await compose(picture, { width, height, canvas }) : picture;
+  saveAs(`tetralod-${width}x${height}.png`, [all], "image/png");
+}
+
+/** Runs what a button is for, which may take a while. */
+function onPress(button, act) {
+  button.addEventListener("click", async () => {
+    button.disabled = true;
+    await act().catch(fail);
+    button.disabled = false;
+  });
+}
+
+/** @param {HTMLCanvasElement} canvas */
+export function attachExport(canvas) {
+  onPress($("shot"), () => savePicture(canvas));
+  for (const button of all("[data-export]")) onPress(button, () => exportAs(button.dataset.export));
+  onTab((name) => {
+    if (name !== "export" || !demo.step) return;
+    $("mesh-words").textContent = `The mesh as it is shown: ${count(demo.step.tetrahedra)} tetrahedra with ${page.field.name}`;
+  });
+}

@@ -1,0 +1,130 @@
+/**
+ * The volumes of the page: a list of data sets and a gallery, from a file that whoever makes the volumes writes beside them. The
+ * page looks for a new one now and then: large volumes may still be in the making.
+ */
+
+import { $ } from "./dom.js";
+import { count, size, vtuBytes } from "./format.js";
+import { open, sourceWords } from "./opening.js";
+import { note } from "./share.js";
+import { read } from "./state.js";
+
+const LIST = "data/volumes.json";
+/** How often it is looked whether a volume in the making is ready (in ms). */
+const LOOK = 15_000;
+
+/**
+ * @typedef {object} Listed
+ * @property {string} url
+ * @property {string} title
+ * @property {string} sentence
+ * @property {string} scene how it is shown first: words, as in the address of the page
+ * @property {string} [picture]
+ * @property {boolean} isShown whether it is in the gallery
+ * @property {number} vertices
+ * @property {number} tetrahedra
+ * @property {number} fields
+ * @property {number} bytes
+ */
+
+/** @type {Listed[]} */
+let volumes = [];
+/** @type {{ title: string }[]} */
+let pending = [];
+let timer;
+
+/** Reads the list; resolves to the volume that is shown where no address says another one. @returns {Promise<Listed | undefined>} */
+export async function readVolumes() {
+  // The first time the page has asked for it ahead.
+  const isFirst = volumes.length === 0;
+  const list = await fetch(LIST, isFirst ? {} : { cache: "no-cache" })
+    .then((response) => (response.ok ? response.json() : undefined))
+    .catch(() => undefined);
+  if (!list) return volumes[0];
+  const before = new Set(volumes.map(({ url }) => url));
+  [volumes, pending] = [list.volumes, list.pending ?? []];
+  if (before.size > 0) announceNew(before);
+  showList();
+  showGallery();
+  clearTimeout(timer);
+  if (pending.length > 0) timer = setTimeout(readVolumes, LOOK);
+  return volumes[0];
+}
+
+/** The picture of a volume before it has arrived. */
+export function showPoster(url) {
+  const picture = volumes.find((volume) => volume.url === url)?.picture;
+  $("poster").hidden = !picture;
+  if (picture) $("poster").src = picture;
+}
+
+/** The words of the scene with which a volume is shown first. */
+export const sceneOf = (url) => read(volumes.find((volume) => volume.url === url)?.scene ?? "");
+
+function announceNew(before) {
+  const fresh = volumes.find(({ url }) => !before.has(url));
+  if (!fresh) return;
+  note(`${fresh.title} is ready`, { label: "Open", act: () => openListed(fresh) });
+}
+
+/** The list of data sets. What is open and not in it stays. */
+function showList() {
+  const list = $("volume");
+  const other = list.querySelector("[data-other]");
+  const chosen = other ? other.dataset.other : list.value;
+  const isListed = volumes.some(({ url }) => url === chosen);
+  list.replaceChildren(...volumes.map(({ url, title }) => new Option(title, url)), ...(other && !isListed ? [other] : []));
+  if (isListed) list.value = chosen;
+}
+
+function showGallery() {
+  const shown = volumes.filter(({ isShown }) => isShown);
+  $("gallery-list").replaceChildren(...shown.map(card));
+  $("gallery-pending").hidden = pending.length === 0;
+  $("gallery-pending").textContent = pending.map(({ title }) => `${title} is being made, and appears here when it is ready.`).join(" ");
+}
+
+/** @param {Listed} volume */
+function card(volume) {
+  const { title, sentence, picture, tetrahedra, bytes } = volume;
+  const [item, button] = [document.createElement("li"), document.createElement("button")];
+  button.type = "button";
+  if (picture) {
+    const image = document.createElement("img");
+    Object.assign(image, { src: picture, alt: "", width: 480, height: 300, loading: "lazy" });
+    button.append(image);
+  }
+  const [name, words, sizes] = ["b", "span", "small"].map((tag) => document.createElement(tag));
+  name.textContent = title;
+  words.textContent = sentence;
+  sizes.textContent = `${count(tetrahedra)} tetrahedra, ${size(vtuBytes(volume))} as VTU, ${size(bytes)} as MT`;
+  button.append(name, words, sizes);
+  button.addEventListener("click", () => openListed(volume));
+  item.append(button);
+  return item;
+}
+
+/** @param {Listed} volume */
+function openListed({ url, scene }) {
+  $("gallery").close();
+  open(url, { url, ...read(scene) });
+}
+
+export function openGallery() {
+  readVolumes();
+  $("gallery").showModal();
+}
+
+export function attachGallery() {
+  $("volume").addEventListener("change", () => open($("volume").value));
+  $("open-gallery").addEventListener("click", openGallery);
+  $("open-url").addEventListener("submit", (event) => {
+    event.preventDefault();
+    const url = $("url").value.trim();
+    if (!url) return;
+    $("gallery").close();
+    open(url);
+  });
+  // A new volume may be there when the user comes back.
+  window.addEventListener("focus", () => sourceWords() !== undefined && readVolumes());
+}

@@ -1,0 +1,118 @@
+/** The keys of the page: one table, from which the overlay with all keys is made. `controls.js` has what those of the picture do. */
+
+import { $ } from "./dom.js";
+import { openGallery } from "./gallery.js";
+import { page } from "./page.js";
+import { fullScreen } from "./picture.js";
+import { share } from "./share.js";
+import { redo, undo } from "./state.js";
+import { showTab } from "./tabs.js";
+import { switchTheme } from "./theme.js";
+
+/**
+ * A key, or several of the same meaning: letters are those of the key without Shift, `Ctrl` is also the command key. Without `act`,
+ * the picture acts on it while it has the focus.
+ *
+ * @typedef {{ keys: string[], what: string, act?: (event: KeyboardEvent) => void }} Key
+ */
+
+const VIEWS = ["Surface", "Volume", "Slice", "Solid", "Mesh", "Flow"];
+
+/** Chooses a view by its number. */
+function chooseView(number) {
+  const radio = /** @type {HTMLInputElement} */ (document.querySelectorAll("[name=mode]")[number - 1]);
+  if (radio && !radio.disabled) radio.click();
+}
+
+/** @type {Record<string, Key[]>} */
+const TABLE = {
+  "In the picture": [
+    { keys: ["←", "→", "↑", "↓"], what: "rotate" },
+    { keys: ["Shift + arrows"], what: "pan" },
+    { keys: ["+", "−"], what: "zoom" },
+    { keys: ["Home", "R"], what: "reset the camera" },
+    { keys: ["P"], what: "probe the middle" },
+    { keys: ["W", "A", "S", "D", "Q", "E"], what: "fly, with the setting Fly; with Shift faster" },
+  ],
+  "Everywhere": [
+    ...VIEWS.map((name, i) => ({ keys: [String(i + 1)], what: name, act: () => chooseView(i + 1) })),
+    { keys: ["V"], what: "to the picture", act: () => $("canvas").focus() },
+    { keys: ["I"], what: "to the isovalue", act: () => toControl("isovalue") },
+    { keys: ["O"], what: "gallery and files", act: openGallery },
+    { keys: ["G"], what: "settings", act: () => showTab("settings") },
+    { keys: ["N"], what: "data: what has arrived", act: () => showTab("data") },
+    { keys: ["X"], what: "export", act: () => showTab("export") },
+    { keys: ["L"], what: "copy the link", act: share },
+    { keys: ["F"], what: "full screen", act: fullScreen },
+    { keys: ["T"], what: "light or dark page", act: switchTheme },
+    { keys: ["Ctrl + Z"], what: "undo", act: undo },
+    { keys: ["Ctrl + Shift + Z", "Ctrl + Y"], what: "redo", act: redo },
+    { keys: ["Esc"], what: "remove probes, close a message", act: dismiss },
+    { keys: ["?"], what: "this list", act: showKeys },
+  ],
+};
+
+function toControl(id) {
+  showTab("settings");
+  $(id).focus();
+}
+
+function dismiss() {
+  if (!$("message").hidden) $("message").hidden = true;
+  else page.probes?.clear();
+}
+
+export function showKeys() {
+  if ($("keys").open) return;
+  $("keys-list").replaceChildren(
+    ...Object.entries(TABLE).map(([title, keys]) => {
+      const [section, heading, list] = ["section", "h3", "dl"].map((tag) => document.createElement(tag));
+      heading.textContent = title;
+      list.append(...keys.flatMap(row));
+      section.append(heading, list);
+      return section;
+    }),
+  );
+  $("keys").showModal();
+}
+
+/** @param {Key} key */
+function row({ keys, what }) {
+  const [term, description] = [document.createElement("dt"), document.createElement("dd")];
+  description.textContent = what;
+  for (const key of keys) {
+    const cap = document.createElement("kbd");
+    cap.textContent = key;
+    term.append(cap, " ");
+  }
+  return [term, description];
+}
+
+/** What the table calls the key of an event. */
+function nameOf(event) {
+  const isLetter = /^[a-z]$/i.test(event.key);
+  const modifiers = [(event.ctrlKey || event.metaKey) && "Ctrl", isLetter && event.shiftKey && "Shift"].filter(Boolean);
+  return [...modifiers, isLetter ? event.key.toUpperCase() : event.key === "Escape" ? "Esc" : event.key].join(" + ");
+}
+
+/** Where letters are text. */
+const isTyping = (target) =>
+  target instanceof HTMLElement && target.matches("select, input:not([type=range], [type=checkbox], [type=radio]), textarea");
+
+const ACTIONS = new Map(
+  Object.values(TABLE)
+    .flat()
+    .flatMap(({ keys, act }) => (act ? keys.map((key) => /** @type {const} */ ([key, act])) : [])),
+);
+
+export function attachKeys() {
+  $("keys-open").addEventListener("click", showKeys);
+  document.addEventListener("keydown", (event) => {
+    if (event.defaultPrevented || event.altKey || isTyping(event.target)) return;
+    const act = ACTIONS.get(nameOf(event));
+    // Dialogs have their own keys.
+    if (!act || document.querySelector("dialog[open]")) return;
+    event.preventDefault();
+    act(event);
+  });
+}

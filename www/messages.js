@@ -1,0 +1,46 @@
+/** Messages over the picture: errors, and what to do. */
+
+import { $ } from "./dom.js";
+import { demo } from "./page.js";
+
+const TITLES = {
+  network: "The file could not be downloaded",
+  cors: "The server does not allow this page to read the file",
+  server: "The server does not send the bytes of the file",
+  changed: "The file was replaced on the server",
+  "device-lost": "The GPU was reset. Reload the page",
+  truncated: "The file is incomplete",
+  "too-large": "The mesh is too large for this GPU",
+};
+
+/** Errors that may be gone when the same is tried again. */
+const PASSING = ["network", "server", "changed", "truncated", "timeout"];
+
+/** Shows what went wrong. What has arrived stays usable. */
+export function fail(error) {
+  demo.error = { code: error.code, message: error.message };
+  demo.state = "failed";
+  $("loading").classList.add("done");
+  $("retry").hidden = !PASSING.includes(error.code);
+  say(TITLES[error.code] ?? "The file could not be opened", error);
+}
+
+/** Shows a message. It can be closed, and keeps out of the way of what is drawn. */
+export function say(title, error) {
+  $("message-title").textContent = title;
+  const words = error.message ?? String(error);
+  // A message that starts with a file's name keeps it as it is.
+  const start = words.includes(": ") ? words.charAt(0) : words.charAt(0).toUpperCase();
+  $("message-text").textContent = `${start}${words.slice(1)}`;
+  $("message").classList.toggle("beside", demo.firstFrameBytes !== undefined);
+  $("message").hidden = false;
+}
+
+export function attachMessages({ onRetry }) {
+  $("dismiss").addEventListener("click", hideMessage);
+  $("retry").addEventListener("click", onRetry);
+}
+
+export function hideMessage() {
+  $("message").hidden = true;
+}

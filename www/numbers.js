@@ -1,0 +1,103 @@
+/** The numbers of the page: what has arrived, how good the mesh is, and what a picture takes. */
+
+import { $, all, announce } from "./dom.js";
+import { count, milliseconds, percentage, pixels, size, vtuBytes } from "./format.js";
+import { fail } from "./messages.js";
+import { demo, page } from "./page.js";
+import { budget, errorPixels } from "./request.js";
+import { showEmpty, showHistogram } from "./scene.js";
+
+/** @param {import("tetralod/viewer").ViewerProgress} progress */
+export function showProgress({ bytes, total, complete, blocks }) {
+  demo.receivedBytes = bytes;
+  demo.blocks = blocks;
+  for (const row of all(".of-blocks")) row.hidden = !blocks;
+  if (blocks) return showBlocks(blocks, bytes);
+  const known = total ?? demo.totalBytes;
+  demo.totalBytes ??= total;
+  if (known) $("progress").value = bytes / known;
+  const amount = known ? `${size(bytes)} of ${size(known)}` : size(bytes);
+  showGrowth();
+  $("n-bytes").textContent = complete ? size(bytes) : amount;
+}
+
+/** How large the volume is, and how little of it has come. */
+export function showGrowth() {
+  const { info, totalBytes, receivedBytes } = demo;
+  if (!info) return;
+  const { vertices, tetrahedra } = info;
+  const whole = totalBytes ? `, ${size(totalBytes)} as MT` : "";
+  const arrived = document.createElement("b");
+  arrived.textContent = size(receivedBytes);
+  const words = `${count(tetrahedra)} tetrahedra: ${size(vtuBytes({ vertices, tetrahedra, fields: info.fields.length }))} as VTU${whole}, `;
+  $("growth").replaceChildren(words, arrived, demo.state === "complete" ? " fetched" : " so far");
+}
+
+/** Shows the progress of a file that is fetched in blocks: only those that the mesh needs. */
+function showBlocks({ here, all, needed, leftOut }, bytes) {
+  if (needed > 0) $("progress").value = Math.min(here / needed, 1);
+  showGrowth();
+  const excess = leftOut > 0 ? `, ${count(leftOut)} do not fit in memory` : "";
+  $("n-blocks").textContent = `${count(here)} of ${count(all)}${excess}`;
+  $("n-bytes").textContent = size(bytes);
+}
+
+export function showStats(stats) {
+  demo.step = stats;
+  const { info } = demo;
+  $("n-current").textContent = count(stats.tetrahedra);
+  const all = info ? ` of ${count(info.updates)}` : "";
+  $("n-applied").textContent = `${count(stats.applied)}${all}`;
+  $("n-updates").textContent = `+${count(stats.refined)} −${count(stats.coarsened)}`;
+  $("n-refine").textContent = `${milliseconds(stats.milliseconds)}${stats.done ? "" : "…"}`;
+  if (info) {
+    $("n-reference").textContent = count(info.tetrahedra);
+    $("fill").style.width = `${(100 * stats.tetrahedra) / info.tetrahedra}%`;
+  }
+  // No error is guaranteed before the last step.
+  if (!stats.done) return;
+  // The mesh is not complete while data is missing.
+  if (!stats.missing) demo.stats = stats;
+  page.probes.refresh();
+  showHistogram().catch(fail);
+  const bound = percentage(stats.relativeErrorBound * 100);
+  $("n-error").textContent = bound;
+  $("budget-note").textContent = stats.satisfied || budget() === undefined ? BUDGET_NOTE : achieved(stats);
+  $("error-achieved").textContent = `Achieved: ${bound}`;
+  $("budget-achieved").textContent = `Achieved: ${count(stats.tetrahedra)} tetrahedra. ${limit(stats)}`;
+  const seen = stats.bounds[1];
+  $("n-pixels").textContent = seen === undefined ? "–" : pixels(seen);
+  $("pixels-achieved").textContent = seen === undefined ? "" : `Achieved: ${pixels(seen)}`;
+  $("n-pixels").classList.toggle("short", seen > errorPixels());
+  announce(`${count(stats.tetrahedra)} tetrahedra, error ${bound}`);
+}
+
+/** What keeps the mesh from being finer. */
+function limit({ satisfied, missing }) {
+  if (demo.blocks?.leftOut > 0) return "Limited by memory";
+  if (missing) return "Limited by the network: data is on its way";
+  return satisfied ? "Limited by the error" : "Limited by this number";
+}
+
+export function showFrame(frame) {
+  showEmpty(frame);
+  demo.frame = frame;
+  demo.frames++;
+  if (!frame.ready) return;
+  if (demo.firstFrameBytes === undefined) {
+    demo.firstFrameBytes = frame.bytes;
+    demo.firstFrameMs = performance.now();
+    $("poster").hidden = true;
+  }
+  $("n-triangles").textContent = count(frame.triangles);
+  $("n-uploaded").textContent = size(frame.uploaded);
+  $("n-draw").textContent = milliseconds(frame.milliseconds);
+}
+
+const BUDGET_NOTE = "If the mesh would be larger, its error is as small as this number allows";
+
+/** The errors that the budget allows. */
+function achieved({ relativeErrorBound, bounds }) {
+  const seen = bounds[1] === undefined ? "" : ` and ${pixels(bounds[1])} on screen`;
+  return `Too few for the requested error: the error is at most ${percentage(relativeErrorBound * 100)}${seen}`;
+}

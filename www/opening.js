@@ -1,0 +1,128 @@
+/** Opening a volume, and following its download. */
+
+import { $ } from "./dom.js";
+import { setFields } from "./fields.js";
+import { nameOf } from "./format.js";
+import { fail, hideMessage } from "./messages.js";
+import { showGrowth } from "./numbers.js";
+import { demo, page } from "./page.js";
+import { arriveWith, carriedOver } from "./state.js";
+
+/** The kinds of MT, with their updates. */
+const KINDS = {
+  "half-edge": "half-edge (vertex insertions)",
+  edge: "edge (vertex splits)",
+  vertex: "vertex (vertex insertions)",
+  explicit: "explicit (any updates)",
+};
+
+/** What was opened last: the button "Try again" opens it again. @type {string | File} */
+let source;
+let opening = 0;
+/** What the page opens by itself. */
+let first = "";
+/** Files of the user, by their names: undo may come back to them. @type {Map<string, File>} */
+const files = new Map();
+const FILE = "file:";
+
+/** Says what is open where no address says anything else. @param {string} url */
+export function setFirst(url) {
+  first = url;
+}
+
+/** What is open, as in the address of the page. */
+export function sourceWords() {
+  if (source instanceof File) return `${FILE}${source.name}`;
+  return source === first ? "" : source;
+}
+
+/** The volume that words of an address mean; undefined for a file that is not here. */
+function sourceOf(words) {
+  if (words === "") return first;
+  return words.startsWith(FILE) ? files.get(words.slice(FILE.length)) : words;
+}
+
+/**
+ * Opens a volume: a URL, a file of the user, or what the words of an address mean. Shows it with the state `words`; without
+ * them the settings stay, as far as they have a meaning there.
+ *
+ * @param {string | File} wanted
+ * @param {Record<string, string>} [words]
+ */
+export async function open(wanted, words) {
+  if (wanted instanceof File) files.set(wanted.name, wanted);
+  const from = typeof wanted === "string" ? sourceOf(wanted) : wanted;
+  if (!from) {
+    fail({ code: "no-file", message: `The file ${wanted.slice(FILE.length)} is not part of the link. Open it from your disk` });
+    return source ? undefined : open(first);
+  }
+  const shown = words ?? (demo.info ? carriedOver() : {});
+  source = from;
+  showInList(from);
+  const mine = ++opening;
+  Object.assign(demo, { state: "opening", error: undefined, info: undefined, stats: undefined });
+  Object.assign(demo, { firstFrameBytes: undefined, firstFrameMs: undefined, receivedBytes: 0, totalBytes: undefined });
+  demo.blocks = undefined;
+  page.comparison.forget();
+  hideMessage();
+  $("legend").hidden = true;
+  $("loading").classList.remove("done");
+  $("progress").removeAttribute("value");
+  $("growth").textContent = `Opening ${nameOf(from)}…`;
+  try {
+    const opened = await page.viewer.open(from);
+    if (mine !== opening) return;
+    demo.totalBytes = opened.total;
+    if (demo.state === "opening") demo.state = "streaming";
+    arrive(opened.info, shown);
+    await opened.finished;
+    if (mine !== opening) return;
+    demo.state = "complete";
+    demo.totalBytes ??= demo.receivedBytes;
+    showGrowth();
+    $("loading").classList.add("done");
+  } catch (error) {
+    if (mine === opening && error?.name !== "AbortError") fail(error);
+  }
+}
+
+/** Continues the download if the file comes in blocks and has not been replaced; otherwise opens it again. */
+export async function retry() {
+  if (!demo.info || !demo.blocks || demo.error?.code === "changed") return open(source);
+  hideMessage();
+  demo.error = undefined;
+  demo.state = "streaming";
+  const mine = opening;
+  try {
+    await page.viewer.retry();
+    await page.viewer.settled();
+    if (mine === opening && demo.state === "streaming") demo.state = "complete";
+  } catch (error) {
+    if (mine === opening && demo.state === "streaming") fail(error);
+  }
+}
+
+/** The base mesh has arrived: sets up the settings for it. */
+function arrive(info, words) {
+  demo.info = info;
+  page.probes.clear();
+  page.flow.fields = info.fields;
+  $("n-kind").textContent = KINDS[info.kind] ?? info.kind;
+  setFields(info.fields);
+  arriveWith(words);
+}
+
+/** Selects in the list what is open; a file or URL that is not in the list replaces the last one that was added. */
+function showInList(from) {
+  const list = $("volume");
+  const listed = [...list.options].find(({ value }) => value && value === from);
+  if (listed) {
+    listed.selected = true;
+    return;
+  }
+  list.querySelector("[data-other]")?.remove();
+  const option = new Option(nameOf(from), "", true, true);
+  option.dataset.other = typeof from === "string" ? from : "";
+  option.disabled = true;
+  list.append(option);
+}

@@ -1,0 +1,100 @@
+/** The region of the request: a box with handles, the sphere in it, or the side of the clip plane that is shown. */
+
+import { $, all } from "./dom.js";
+import { fail } from "./messages.js";
+import { page } from "./page.js";
+import { refine } from "./request.js";
+import { plane } from "./scene.js";
+
+/** Numbers of the box have so many digits: as many as links keep. */
+const DIGITS = 6;
+
+/** What the request says of it. */
+export function region() {
+  const { box } = page;
+  switch ($("region").value) {
+    case "box":
+      return { box };
+    case "sphere":
+      return { sphere: sphereIn(box) };
+    case "cut":
+      return { slab: plane() };
+    default:
+      return {};
+  }
+}
+
+/** The largest sphere in a box, around its middle. */
+export function sphereIn(box) {
+  const center = [0, 1, 2].map((i) => (box[i] + box[i + 3]) / 2);
+  const radius = Math.min(...[0, 1, 2].map((i) => box[i + 3] - box[i])) / 2;
+  return { center, radius };
+}
+
+/** Shows the region that is chosen. */
+export function applyRegion() {
+  const on = ["box", "sphere"].includes($("region").value);
+  $("box").hidden = !on;
+  showNumbers();
+  showSphere();
+  page.viewer.set({ region: on ? page.box : null }).catch(fail);
+}
+
+/** Refines in this box. */
+export function useBox(wanted) {
+  page.box = rounded(wanted);
+  $("region").value = "box";
+  applyRegion();
+  refine();
+}
+
+/** A handle in the picture was dragged. */
+export function boxWasDragged(moved) {
+  page.box = rounded(moved);
+  showNumbers();
+  showSphere();
+  refine();
+}
+
+/** The middle half of a box. */
+export function inner(bounds) {
+  return rounded(bounds.map((value, i) => value + (bounds[(i + 3) % 6] - value) / 4));
+}
+
+const rounded = (numbers) => Array.from(numbers, (x) => Number(x.toPrecision(DIGITS)));
+
+/** The box has handles that the viewer draws; the sphere in it is drawn over the picture. */
+function showSphere() {
+  page.overlay.sphere = $("region").value === "sphere" ? sphereIn(page.box) : undefined;
+}
+
+function showNumbers() {
+  for (const input of all("#box input")) {
+    if (document.activeElement !== input) input.value = Number(page.box[input.dataset.i].toPrecision(5));
+  }
+}
+
+/** Takes the number that was typed if the box stays valid. */
+function boxWasTyped(input) {
+  const typed = page.box.slice();
+  typed[input.dataset.i] = input.valueAsNumber;
+  const valid = [0, 1, 2].every((i) => typed[i] <= typed[i + 3]);
+  input.setCustomValidity(valid ? "" : "“min” must not be larger than “max”");
+  input.reportValidity();
+  if (!valid) return;
+  page.box = rounded(typed);
+  applyRegion();
+  refine();
+}
+
+export function attachRegion() {
+  $("region").addEventListener("input", () => {
+    if (!page.box) return;
+    applyRegion();
+    refine();
+  });
+  for (const input of all("#box input")) {
+    input.addEventListener("input", () => boxWasTyped(input));
+    input.addEventListener("blur", showNumbers);
+  }
+}

@@ -1,0 +1,202 @@
+/** What is drawn: the view, the isovalue, the plane, colours, and the colour bar. */
+
+import { $, all, checked, text } from "./dom.js";
+import { rounded } from "./format.js";
+import { showHistogramLine, showVolumes } from "./histogram.js";
+import { fail } from "./messages.js";
+import { demo, page } from "./page.js";
+import { refine } from "./request.js";
+import { background } from "./theme.js";
+
+export const mode = () => /** @type {"iso" | "volume" | "slice" | "solid" | "mesh" | "flow"} */ (checked("mode"));
+
+/** The isovalue has so many digits: as many as links keep. */
+const DIGITS = 6;
+
+/** In units of the field. */
+export function isovalue() {
+  const { min, max } = page.field;
+  return page.isovalue ?? (min + max) / 2;
+}
+
+/** Where a value is in the field's range, 0 to 1. */
+export function fractionOf(value) {
+  const { min, max } = page.field;
+  return max > min ? Math.min(Math.max((value - min) / (max - min), 0), 1) : 0.5;
+}
+
+/** Takes an isovalue at a fraction of the field's range. */
+export function setIsovalue(fraction) {
+  const { min, max } = page.field;
+  page.isovalue = Number((min + fraction * (max - min)).toPrecision(DIGITS));
+  applyIsovalue();
+}
+
+/** Shows the isovalue, which may be one of the volume before: values carry over. */
+export function applyIsovalue() {
+  const { min, max, unit } = page.field;
+  const value = isovalue();
+  $("isovalue").value = 1000 * fractionOf(value);
+  const words = `${rounded(value, max - min)} ${unit}`.trim();
+  text("isovalue-text", words, "isovalue");
+  page.transfer.showIsovalue(words);
+  showHistogramLine(fractionOf(value));
+  draw();
+  if ($("focus").checked) refine();
+}
+
+/** Shows the settings of the view. */
+export function applyMode() {
+  for (const row of all("[data-mode]")) row.hidden = !row.dataset.mode.split(" ").includes(mode());
+  // Slices and seeds have no side.
+  $("flip").parentElement.hidden = isPlane();
+  $("cut-label").textContent = isPlane() ? "Plane" : "Clip plane";
+  page.overlay.quad = undefined;
+  showHistogram().catch(fail);
+  // Draws, too.
+  applyCut();
+}
+
+/** Shows the histogram of the field where the isovalue and the transfer function are chosen. */
+export async function showHistogram() {
+  if (!["iso", "volume"].includes(mode()) || !demo.info) return;
+  const { histogram } = await page.viewer.stats({ bins: 100 });
+  page.transfer.volumes = histogram;
+  showVolumes(histogram);
+}
+
+/** Draws what the settings say. */
+export function draw() {
+  if (!demo.info) return;
+  const { viewer, field, flow, transfer, colours, comparison } = page;
+  const opacity = $("opacity").value / 100;
+  text("opacity-text", `${$("opacity").value} %`, "opacity");
+  // The range is one of the field.
+  const by = $("surface-colour").value;
+  const others = { iso: by !== field.name, mesh: $("colour-by").value !== "field", flow: !flow.isByField };
+  $("colours").hidden = mode() === "iso" && !by;
+  $("range").hidden = others[mode()] ?? false;
+  const nothing = { isosurfaces: [], volume: null, slices: [], boundary: null, cells: null, clips: [] };
+  const noFlow = { streamlines: null, arrows: null };
+  const shown = {
+    iso: () => ({ isosurfaces: [{ value: isovalue(), opacity, ...(by ? { field: by } : {}) }] }),
+    volume: () => ({ volume: { opacities: transfer.opacities(field, opacity) }, isosurfaces: $("volume-surface").checked ? [{ value: isovalue() }] : [] }),
+    slice: () => ({ slices: [{ ...plane(), opacity, edges: true }] }),
+    solid: () => ({ boundary: { opacity, edges: true }, clips: [plane()] }),
+    mesh: () => ({ cells: { cut: plane(), colourBy: $("colour-by").value } }),
+    flow: () => flow.state({ bounds: demo.info.bounds, plane: seedPlane(), field }),
+  }[mode()]();
+  const compare = comparison.state;
+  // A difference has values on both sides of 0.
+  const diverging = compare?.difference ? { map: "coolwarm" } : {};
+  const range = mode() === "iso" && by && by !== field.name ? { range: ownRange(by) } : {};
+  const looks = { colours: { ...colours.state, ...range, ...diverging }, background: background(), compare };
+  viewer.set(/** @type {any} */ ({ ...nothing, ...noFlow, ...shown, ...looks })).catch(fail);
+}
+
+/** The range of a field that is not the one that is shown; symmetric about 0 where it has values on both sides. */
+function ownRange(name) {
+  const { min, max } = demo.info.fields.find((field) => field.name === name);
+  const most = Math.max(-min, max);
+  return min < 0 && max > 0 ? [-most, most] : [min, max];
+}
+
+/** The colour bar of what is drawn. */
+export function showLegend(legend) {
+  const { overlay, field, transfer, colours } = page;
+  $("legend").hidden = !legend;
+  if (!legend) return overlay.refresh();
+  const { label, ticks } = legend;
+  const unit = unitOf(label);
+  $("legend-name").textContent = unit ? `${label} in ${unit}` : label;
+  if (label === field?.name) transfer.colours = colours.gradient(legend);
+  $("legend-bar").dataset.colours = legend.colours.join(" ");
+  $("legend-bar").style.background = `linear-gradient(90deg, ${legend.colours.join(", ")})`;
+  $("legend-ticks").replaceChildren(
+    ...ticks.map(({ label: value, fraction }) => {
+      const tick = document.createElement("span");
+      tick.textContent = value;
+      tick.style.left = `${100 * fraction}%`;
+      return tick;
+    }),
+  );
+  leaveOutOverlaps($("legend-ticks"));
+  overlay.refresh();
+}
+
+/** The unit of what a legend is of: a field, or the length of the vector that is shown. */
+export function unitOf(label) {
+  const field = [page.field, ...(demo.info?.fields ?? [])].find((one) => one?.name === label);
+  if (field) return field.unit;
+  return mode() === "flow" ? page.flow.unit : "";
+}
+
+/** Hides the ticks whose words would touch those of the one before. */
+function leaveOutOverlaps(ticks) {
+  let end = Number.NEGATIVE_INFINITY;
+  for (const tick of ticks.children) {
+    const { left, right } = tick.getBoundingClientRect();
+    tick.hidden = left < end + 4;
+    if (!tick.hidden) end = right;
+  }
+}
+
+/** Whether the plane is one to look at, and cuts nothing away. */
+const isPlane = () => mode() === "slice" || mode() === "flow";
+
+/** The coordinate of the plane along its axis. */
+function placeOfPlane() {
+  const axis = Number($("axis").value);
+  const [low, high] = [demo.info.bounds[axis], demo.info.bounds[axis + 3]];
+  return low + ((high - low) * $("cut").value) / 1000;
+}
+
+/** The plane of the seeds. */
+export const seedPlane = () => ({ axis: Number($("axis").value), at: placeOfPlane() });
+
+/** The clip plane. @returns {{ normal: [number, number, number], offset: number }} */
+export function plane() {
+  const axis = Number($("axis").value);
+  const sign = $("flip").checked ? -1 : 1;
+  const along = (other) => (other === axis ? sign : 0);
+  return { normal: [along(0), along(1), along(2)], offset: sign * placeOfPlane() };
+}
+
+/** Shows where the plane is. */
+export function applyCut() {
+  if (!demo.info) return;
+  const axis = Number($("axis").value);
+  const [low, high] = [demo.info.bounds[axis], demo.info.bounds[axis + 3]];
+  const { normal, offset } = plane();
+  const at = normal[axis] * offset;
+  const where = Math.abs(at) < (high - low) * 1e-4 ? 0 : Number(at.toPrecision(3));
+  const side = $("flip").checked ? "<" : ">";
+  const shown = isPlane() ? `${"xyz"[axis]} = ${where}` : `Hide ${"xyz"[axis]} ${side} ${where}`;
+  text("cut-text", shown, "cut");
+  draw();
+  if ($("region").value === "cut") refine();
+}
+
+/** Says so where the surface is empty. @param {import("tetralod/viewer").ViewerFrame} frame */
+export function showEmpty({ ready, triangles }) {
+  const isEmpty = mode() === "iso" && ready && page.field !== undefined && triangles === 0 && demo.step?.done === true;
+  if (isEmpty !== $("empty").hidden) return;
+  $("empty").hidden = !isEmpty;
+  if (!isEmpty) return;
+  const { name, min, max } = page.field;
+  const [value, low, high] = [isovalue(), min, max].map((x) => rounded(x, max - min));
+  const isOutside = isovalue() < min || isovalue() > max;
+  const words = isOutside ? `${value} is outside of the range of ${name}, ${low} to ${high}` : `${name} does not pass ${value} in this mesh`;
+  $("empty-text").textContent = `There is no surface: ${words}.`;
+}
+
+export function attachScene() {
+  for (const radio of all("[name=mode]")) radio.addEventListener("change", applyMode);
+  $("isovalue").addEventListener("input", () => page.field && setIsovalue($("isovalue").value / 1000));
+  $("empty-middle").addEventListener("click", () => {
+    setIsovalue(0.5);
+    $("isovalue").focus();
+  });
+  for (const id of ["cut", "axis", "flip"]) $(id).addEventListener("input", applyCut);
+  for (const id of ["opacity", "colour-by", "surface-colour", "volume-surface"]) $(id).addEventListener("input", draw);
+}

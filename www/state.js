@@ -1,0 +1,249 @@
+/**
+ * The whole state of the page as one plain object of words: what is open, all settings, the camera. It is in the address of the
+ * page, so that a reload or a link shows the same, and undo and redo go back and forth in it. Words that are the default are
+ * left out.
+ */
+
+import { $, all, checked } from "./dom.js";
+import { chooseField, isPlaying } from "./fields.js";
+import { fail } from "./messages.js";
+import { open, sourceWords } from "./opening.js";
+import { demo, page } from "./page.js";
+import { applyRegion, inner } from "./region.js";
+import { applyFrameTime, applyRefineBy, errorPositions } from "./request.js";
+import { applyMode } from "./scene.js";
+import { applyTheme } from "./theme.js";
+
+/** The state is written when nothing has changed for so long (in ms). */
+const QUIET = 300;
+/** So many states can be undone. */
+const MOST = 200;
+/** Digits of numbers of the camera; those of the mesh's request have fewer, and are rounded before they are used. */
+const CAMERA_DIGITS = 9;
+
+/** @typedef {Record<string, string>} Words */
+/** @typedef {{ get: () => string, set: (words: string) => void }} Entry */
+
+const numbers = (words) => words.split(",").map(Number);
+const isNumbers = (words, count) => numbers(words).length === count && numbers(words).every(Number.isFinite);
+
+/** A control whose default is what it has in the page as it was loaded. @returns {Entry} */
+function control(id) {
+  const element = $(id);
+  const isBox = element.type === "checkbox";
+  const read = () => (isBox ? String(Number(element.checked)) : element.value);
+  const initial = read();
+  const set = (words) => (isBox ? (element.checked = words === "1") : (element.value = words));
+  return { get: () => (read() === initial ? "" : read()), set: (words) => set(words || initial) };
+}
+
+/** A list whose options come from the file; the default is the first. @returns {Entry} */
+function list(id) {
+  const set = (words) => {
+    const at = [...$(id).options].findIndex(({ value }) => value === words);
+    $(id).selectedIndex = Math.max(at, 0);
+  };
+  return { get: () => ($(id).selectedIndex > 0 ? $(id).value : ""), set };
+}
+
+/** Radio buttons of a name. @returns {Entry} */
+function radios(name) {
+  const initial = checked(name);
+  const set = (words) => {
+    const wanted = all(`[name=${name}]`).find(({ value, disabled }) => value === words && !disabled);
+    (wanted ?? all(`[name=${name}]`).find(({ value }) => value === initial)).checked = true;
+  };
+  return { get: () => (checked(name) === initial ? "" : checked(name)), set };
+}
+
+/** A position of the slider of errors. @returns {Entry} */
+function errorPosition(kind) {
+  const initial = String(errorPositions[kind]);
+  return {
+    get: () => (String(errorPositions[kind]) === initial ? "" : String(errorPositions[kind])),
+    set: (words) => (errorPositions[kind] = Number(words || initial)),
+  };
+}
+
+/** @returns {Record<string, Entry>} */
+function makeEntries() {
+  const ids = ["opacity", "colour-by", "flow-colour", "rake", "arrows", "flow-boundary", "map", "reversed", "log"];
+  const more = ["time", "cut", "axis", "flip", "pixels", "budget", "region", "focus", "background", "axes", "fly", "volume-surface", "frame-time"];
+  const simple = Object.fromEntries([...ids, ...more].map((id) => [id, control(id)]));
+  return {
+    view: radios("mode"),
+    field: list("field"),
+    "surface-colour": list("surface-colour"),
+    vector: list("vector"),
+    isovalue: {
+      get: () => String(page.isovalue ?? ""),
+      set: (words) => (page.isovalue = words && isNumbers(words, 1) ? Number(words) : undefined),
+    },
+    ...simple,
+    refine: radios("refine-by"),
+    error: errorPosition("field"),
+    outside: errorPosition("view"),
+    box: {
+      get: () => (String(page.box) === String(inner(demo.info.bounds)) ? "" : String(page.box)),
+      set: (words) => (page.box = isNumbers(words, 6) ? numbers(words) : inner(demo.info.bounds)),
+    },
+    range: { get: () => page.colours.words, set: (words) => (page.colours.words = words) },
+    transfer: { get: () => page.transfer.words, set: (words) => (page.transfer.words = words) },
+    seeds: { get: () => page.flow.words, set: (words) => (page.flow.words = words) },
+    probes: { get: () => page.probes.words, set: (words) => (page.probes.words = words) },
+    camera: { get: cameraWords, set: setCamera },
+  };
+}
+
+/** @type {Record<string, Entry>} */
+let entries;
+
+/** The camera as a volume is shown first. @type {import("tetralod/viewer").CameraState | undefined} */
+let home;
+
+/** The words of a camera that was set, until the viewer has it. @type {string | undefined} */
+let awaited;
+let isSet = true;
+
+const wordsOf = (camera) => {
+  const { target, distance, yaw, pitch, projection } = camera;
+  const all = [...target, distance, yaw, pitch].map((x) => Number(x.toPrecision(CAMERA_DIGITS)));
+  return `${all}${projection === "orthographic" ? ",orthographic" : ""}`;
+};
+
+function cameraWords() {
+  const { camera } = page.viewer.state;
+  home ??= camera;
+  const words = awaited ?? (camera ? wordsOf(camera) : "");
+  return home && words === wordsOf(home) ? "" : words;
+}
+
+function setCamera(words) {
+  const [x, y, z, distance, yaw, pitch] = numbers(words);
+  const isOrthographic = words.endsWith(",orthographic");
+  const isWhole = [x, y, z, distance, yaw, pitch].every(Number.isFinite) && distance > 0;
+  $("orthographic").checked = isWhole && isOrthographic;
+  /** @type {"orthographic" | "perspective"} */
+  const projection = isOrthographic ? "orthographic" : "perspective";
+  const camera = isWhole ? { target: /** @type {[number, number, number]} */ ([x, y, z]), distance, yaw, pitch, projection } : home;
+  if (!camera) return;
+  awaited = wordsOf(camera);
+  isSet = false;
+  const mine = awaited;
+  page.viewer.set({ camera }).then(() => (isSet ||= mine === awaited), fail);
+}
+
+function cameraMoved({ detail }) {
+  if (isSet || wordsOf(detail) === awaited) awaited = undefined;
+  changed();
+}
+
+/** The state of the page now, as a plain object. @returns {Words} */
+export function stateNow() {
+  const words = { url: sourceWords(), ...Object.fromEntries(Object.entries(entries).map(([name, { get }]) => [name, get()])) };
+  return Object.fromEntries(Object.entries(words).filter(([, word]) => word !== ""));
+}
+
+/** As it is written in the address. Commas and slashes need no escapes there. @param {Words} words */
+function written(words) {
+  return new URLSearchParams(words).toString().replaceAll("%2C", ",").replaceAll("%2F", "/");
+}
+
+/** @returns {Words} */
+export const read = (text) => Object.fromEntries(new URLSearchParams(text.replace(/^#/, "")));
+
+/** What stays when another volume takes the place of one: all that has no place in its model. @returns {Words} */
+export function carriedOver() {
+  const { camera, box, seeds, probes, time, url, ...rest } = stateNow();
+  return rest;
+}
+
+/** A volume has arrived: shows it with these words, or as it is by default. @param {Words} words */
+export function arriveWith(words) {
+  home = page.viewer.state.camera;
+  show(words);
+}
+
+/** Shows a state of the volume that is open. @param {Words} words */
+function show(words) {
+  const { transfer, ...others } = entries;
+  for (const [name, { set }] of Object.entries(others)) set(words[name] ?? "");
+  page.overlay.showsAxes = $("axes").checked;
+  chooseField();
+  // The step of a transfer function is at the isovalue of the field.
+  transfer.set(words.transfer ?? "");
+  applyMode();
+  applyRegion();
+  // Draws, too.
+  applyTheme();
+  applyFrameTime();
+  applyRefineBy();
+}
+
+/** Shows a state: opens its volume if that is another one. @param {Words} words */
+export function restore(words) {
+  const { url = "" } = words;
+  if (url !== sourceWords() || !demo.info) open(url, words);
+  else show(words);
+}
+
+/** States before this one, and those that were undone. */
+const [past, future] = [/** @type {string[]} */ ([]), /** @type {string[]} */ ([])];
+/** @type {string | undefined} */
+let now;
+let timer;
+
+/** Something may have changed: writes the state when it rests. */
+export function changed() {
+  clearTimeout(timer);
+  timer = setTimeout(save, QUIET);
+}
+
+/** Writes the state into the address, and remembers the one before. */
+export function save() {
+  clearTimeout(timer);
+  if (!demo.info || isPlaying()) return;
+  const words = written(stateNow());
+  if (words === now) return;
+  if (now !== undefined) past.push(now);
+  if (past.length > MOST) past.shift();
+  future.length = 0;
+  set(words);
+}
+
+function set(words) {
+  now = words;
+  $("undo").disabled = past.length === 0;
+  $("redo").disabled = future.length === 0;
+  // Without a hash, the address of the page as it is.
+  history.replaceState(null, "", words ? `#${words}` : `${location.pathname}${location.search}`);
+}
+
+function step(from, to) {
+  save();
+  if (from.length === 0) return;
+  to.push(now);
+  const words = from.pop();
+  set(words);
+  restore(read(words));
+}
+
+export const undo = () => step(past, future);
+export const redo = () => step(future, past);
+
+/** Shows the volume as it is by default. */
+export function reset() {
+  const { url } = stateNow();
+  restore(url === undefined ? {} : { url });
+  changed();
+}
+
+export function attachState(viewer) {
+  entries = makeEntries();
+  viewer.addEventListener("camera", cameraMoved);
+  for (const name of ["input", "change", "click", "keyup", "pointerup"]) document.addEventListener(name, changed);
+  window.addEventListener("hashchange", () => restore(read(location.hash)));
+  $("undo").addEventListener("click", undo);
+  $("redo").addEventListener("click", redo);
+  $("reset").addEventListener("click", reset);
+}
