@@ -1,11 +1,20 @@
-// One Chromium for the tests and the benchmark, with the flags that `webdriver.json` gives the wasm tests too.
+// One browser for the tests and the benchmark: Chromium with the flags that `webdriver.json` gives the wasm tests too, or Firefox.
 import { readFile } from "node:fs/promises";
 import { createServer } from "node:http";
 import { chromium } from "playwright-core";
+import puppeteer from "puppeteer-core";
 
 const config = JSON.parse(await readFile(new URL("../../webdriver.json", import.meta.url), "utf8"));
 
+/**
+ * The browser that the variables CHROMIUM or FIREFOX name. Playwright drives Chromium only as it is; pages of Puppeteer, which
+ * drives any Firefox, have the same `goto`, `evaluate` and `close`.
+ *
+ * @returns {Promise<any>}
+ */
 export function launch() {
+  const { FIREFOX } = process.env;
+  if (FIREFOX) return puppeteer.launch({ browser: "firefox", executablePath: FIREFOX, headless: true });
   const executablePath = process.env.CHROMIUM;
   if (!executablePath) throw new Error("CHROMIUM is not set: run this through `cargo xtask`");
   // Playwright's own choice of headless mode and of features would contradict the flags.

@@ -1,4 +1,4 @@
-//! Chromium with WebGPU: finding it, installing it where that is allowed, and running wasm tests in it.
+//! Chromium with WebGPU, and Firefox: finding them, installing them where that is allowed, and running wasm tests in Chromium.
 
 use std::path::PathBuf;
 use std::process::Command;
@@ -37,17 +37,46 @@ fn find() -> Option<Browser> {
     Some(Browser { chromium, driver })
 }
 
+const FIREFOXES: [&str; 2] = ["firefox-esr", "firefox"];
+
+/// Firefox, for tests that need no GPU: the variable FIREFOX, what PATH has, or a fresh installation. None after saying so where it
+/// cannot be installed; set `TETRALOD_NEED_FIREFOX` to make that a failure.
+pub fn firefox() -> Result<Option<PathBuf>> {
+    let find = || FIREFOXES.iter().find_map(|name| shell::find(name));
+    let given = std::env::var_os("FIREFOX").map(PathBuf::from).filter(|path| path.is_file());
+    if let Some(found) = given.or_else(find) {
+        return Ok(Some(found));
+    }
+    match install_packages(
+        "Firefox",
+        &["firefox-esr"],
+        "Firefox is needed: install it, or set FIREFOX to its path",
+    ) {
+        Ok(()) => Ok(Some(find().context("Firefox was installed but `firefox-esr` is not in PATH")?)),
+        Err(error) if std::env::var_os("TETRALOD_NEED_FIREFOX").is_none() => {
+            println!("skipped: the tests in Firefox ({error:#})");
+            Ok(None)
+        }
+        Err(error) => Err(error),
+    }
+}
+
 const BY_HAND: &str = "Chromium and chromedriver are needed: install the packages `chromium` and `chromium-driver` \
                        (Debian; elsewhere any Chromium 113 or later), or set CHROMIUM and CHROMEDRIVER to their paths";
 
 fn install() -> Result<()> {
-    let Some(apt) = shell::find("apt-get") else { bail!(BY_HAND) };
+    install_packages("Chromium", &["chromium", "chromium-driver"], BY_HAND)
+}
+
+/// Installs packages of Debian; `by_hand` says what to do where that cannot be done.
+fn install_packages(what: &str, packages: &[&str], by_hand: &'static str) -> Result<()> {
+    let Some(apt) = shell::find("apt-get") else { bail!(by_hand) };
     let rights: &[&str] = match () {
         () if shell::output(&mut shell::command("id", ["-u"]))?.trim() == "0" => &[],
         () if shell::succeeds(&mut shell::command("sudo", ["-n", "true"])) => &["sudo", "-n"],
-        () => bail!(BY_HAND),
+        () => bail!(by_hand),
     };
-    println!("installing Chromium with apt");
+    println!("installing {what} with apt");
     let apt = apt.to_string_lossy();
     let with_rights = |args: &[&str]| -> Command {
         let words: Vec<&str> =
@@ -56,9 +85,9 @@ fn install() -> Result<()> {
         command.env("DEBIAN_FRONTEND", "noninteractive");
         command
     };
-    shell::run(&mut with_rights(&["update", "-qq"])).context(BY_HAND)?;
-    let packages = ["install", "-y", "-qq", "--no-install-recommends", "chromium", "chromium-driver"];
-    shell::run(&mut with_rights(&packages)).context(BY_HAND)
+    shell::run(&mut with_rights(&["update", "-qq"])).context(by_hand)?;
+    let install = ["install", "-y", "-qq", "--no-install-recommends"];
+    shell::run(&mut with_rights(&[&install, packages].concat())).context(by_hand)
 }
 
 /// `cargo test` for wasm, with this program as the runner and `browser` as the place to run; not started yet.

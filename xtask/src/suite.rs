@@ -35,7 +35,7 @@ const STEPS: [Step; 13] = [
     },
     Step { name: "pages", what: "the examples of README.md and docs/ in Node and Chromium", run: pages },
     Step { name: "examples", what: "building the example projects, and their pictures", run: examples },
-    Step { name: "e2e", what: "the demo page in headless Chromium", run: e2e },
+    Step { name: "e2e", what: "the package and the demo page in headless browsers", run: e2e },
 ];
 
 /// What `--quick` runs.
@@ -195,10 +195,12 @@ fn node_tool(path: &str, args: &[&str]) -> Command {
 }
 
 fn node_test(file: &str) -> Command {
-    shell::command(
-        "node",
-        ["--test", "--test-reporter=spec", "--test-timeout=900000", &format!("tests/js/{file}")],
-    )
+    let file = format!("tests/js/{file}");
+    let mut command =
+        shell::command("node", ["--test", "--test-reporter=spec", "--test-timeout=900000", &file]);
+    // It would take the place of Chromium.
+    command.env_remove("FIREFOX");
+    command
 }
 
 /// Packs the package as npm would publish it, has its entries and types checked by publint and are-the-types-wrong, installs the
@@ -251,7 +253,7 @@ fn pages() -> Result<()> {
 /// The projects of `examples/js`, with the packed package, in headless Chromium and in Node.
 fn examples() -> Result<()> {
     let browser = browser::require()?;
-    with_package()?;
+    package::ensure_built()?;
     with_fixture(|| shell::run(fixture_env(node_test("examples.test.js").env("CHROMIUM", &browser.chromium))))
 }
 
@@ -261,13 +263,16 @@ fn e2e() -> Result<()> {
     let tetralod = shell::tested_command()?;
     demo::make_data(&tetralod)?;
     let server = demo::start_server(&tetralod, 0)?;
-    shell::run(node_test("ranges-browser.test.js").env("CHROMIUM", &browser.chromium))?;
     with_fixture(|| {
-        let names = ["parts-browser", "viewer-browser", "places-browser", "element-browser"];
-        for name in names.map(|name| format!("{name}.test.js")) {
-            shell::run(fixture_env(node_test(&name).env("CHROMIUM", &browser.chromium)))?;
+        let test = |name: &str, variable: &str, path: &Path| {
+            shell::run(fixture_env(node_test(&format!("{name}-browser.test.js")).env(variable, path)))
+        };
+        for name in ["core", "ranges", "parts", "viewer", "places", "element"] {
+            test(name, "CHROMIUM", &browser.chromium)?;
         }
-        Ok(())
+        let Some(firefox) = browser::firefox()? else { return Ok(()) };
+        println!("what needs no GPU, in Firefox");
+        ["core", "ranges"].into_iter().try_for_each(|name| test(name, "FIREFOX", &firefox))
     })?;
     for name in ["e2e.test.js", "page.test.js"] {
         let mut command = node_test(name);
