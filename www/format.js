@@ -11,8 +11,9 @@ export function pixels(n) {
   return `${Number(n.toPrecision(2))} ${n === 1 ? "pixel" : "pixels"}`;
 }
 
+/** A whole number. By hand: the first number that `toLocaleString` formats takes some 90 ms. */
 export function count(n) {
-  return n.toLocaleString("en");
+  return String(n).replace(/\B(?=(\d{3})+$)/g, ",");
 }
 
 export function size(bytes) {

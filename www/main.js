@@ -30,8 +30,6 @@ import { TransferEditor } from "./transfer.js";
 
 const canvas = $("canvas");
 
-start();
-
 async function start() {
   $("settings").addEventListener("submit", (event) => event.preventDefault());
   attachMessages({ onRetry: retry });
@@ -41,6 +39,8 @@ async function start() {
   attachKeys();
   const listed = readVolumes();
   listed.then(() => demo.state === "starting" && showPoster(wantedUrl() ?? ""));
+  // Texts and controls are painted first: to start the GPU takes a while.
+  await painted();
   const viewer = await makeViewer(listed);
   if (!viewer) return;
   page.viewer = demo.viewer = viewer;
@@ -77,6 +77,15 @@ async function start() {
   attachData();
   attachExport(canvas);
   await begin(listed);
+}
+
+/** How long a paint is waited for (in ms): hidden pages have none. */
+const PAINT = 200;
+
+/** Resolves when the page has been painted. */
+function painted() {
+  const twice = new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
+  return Promise.race([twice, new Promise((resolve) => setTimeout(resolve, PAINT))]);
 }
 
 /** What the address of the page asks for. */
@@ -168,3 +177,5 @@ async function spanBox(from, to, points) {
   if (spanned) useBox(spanned);
   else probes.note("Both ends of the rectangle must be on what is drawn", spanEnd);
 }
+
+start();
