@@ -51,6 +51,8 @@ class Theme extends DefaultTheme {
       return { text: document.name, path: this.router.getFullUrl(document), kind: ReflectionKind.Document };
     };
     const modules = super.buildNavigation(project).filter((element) => element.kind === ReflectionKind.Module);
+    const order = Object.keys(manifest.exports).map((entry) => entry.replace(".", manifest.name));
+    modules.sort((a, b) => order.indexOf(a.text) - order.indexOf(b.text));
     const pages = Object.entries(groups).map(([text, names]) => ({ text, children: names.map(link) }));
     const [first, ...others] = pages;
     return [{ text: "Start", path: "index.html" }, first, { text: API, children: modules }, ...others];
