@@ -357,6 +357,23 @@ export class MultiTessellation extends WithMeshTools {
   [Symbol.dispose](): void;
 }
 
+/** Which surface `tetralod/three` and `tetralod/vtk` show: one of these. */
+export type SurfaceOptions =
+  | {
+      /** At one value or several, in units of the field. */
+      isosurface: number | ArrayLike<number>;
+      /** Those of the field's gradient (default), or of the triangles. */
+      normals?: "gradient" | "smooth";
+    }
+  | {
+      /** The section with the plane of all points with `normal · p = offset`. */
+      slice: { normal: ArrayLike<number>; offset: number };
+    }
+  | {
+      /** The boundary of the mesh. */
+      boundary: true;
+    };
+
 /** The codes of errors, for programs. */
 export type ErrorCode =
   /** The source is not of a kind that can be read, or has been read already. */

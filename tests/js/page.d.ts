@@ -8,3 +8,6 @@ declare module "embedded:*" {
   const text: string;
   export default text;
 }
+// Optional peers: the examples install them.
+declare module "three";
+declare module "@kitware/vtk.js/*";

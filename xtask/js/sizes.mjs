@@ -18,6 +18,8 @@ const LIMITS = {
   ".": 13_000,
   "./viewer": 7_500,
   "./element": 9_500,
+  "./three": 2_500,
+  "./vtk": 2_500,
   "./inline": 410_000,
   "./worker": 8_500,
   "./viewer-worker": 18_000,

@@ -18,7 +18,7 @@ struct Step {
     run: fn() -> Result<()>,
 }
 
-const STEPS: [Step; 12] = [
+const STEPS: [Step; 13] = [
     Step { name: "fmt", what: "formatting", run: fmt },
     Step { name: "clippy", what: "lints of everything native", run: clippy },
     Step { name: "features", what: "lints of the feature sets that are shipped", run: features },
@@ -28,6 +28,7 @@ const STEPS: [Step; 12] = [
     Step { name: "wasm", what: "the core and a WebGPU adapter in headless Chromium", run: wasm },
     Step { name: "js", what: "lints and types of all JavaScript, and the package in Node", run: js },
     Step { name: "consumer", what: "installing and type-checking the packed package", run: consumer },
+    Step { name: "examples", what: "building the example projects, and their pictures", run: examples },
     Step {
         name: "site",
         what: "the documentation's site: its links, and that it needs no network",
@@ -244,6 +245,13 @@ fn pages() -> Result<()> {
     let mut command = node_test("docs.test.js");
     command.env("TETRALOD", shell::tested_command()?).env("CHROMIUM", browser::require()?.chromium);
     shell::run(&mut command)
+}
+
+/// The projects of `examples/js`, with the packed package, in headless Chromium and in Node.
+fn examples() -> Result<()> {
+    let browser = browser::require()?;
+    package::ensure_built()?;
+    with_fixture(|| shell::run(fixture_env(node_test("examples.test.js").env("CHROMIUM", &browser.chromium))))
 }
 
 fn e2e() -> Result<()> {

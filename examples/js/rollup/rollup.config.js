@@ -1,0 +1,11 @@
+import { copyFile } from "node:fs/promises";
+import { fileURLToPath } from "node:url";
+import resolve from "@rollup/plugin-node-resolve";
+
+const wasm = fileURLToPath(import.meta.resolve("tetralod/core.wasm"));
+
+export default {
+  input: { main: "main.js", worker: "tetralod/worker" },
+  output: { dir: "dist", entryFileNames: "[name].js", chunkFileNames: "[name].js" },
+  plugins: [resolve(), { name: "wasm", writeBundle: () => copyFile(wasm, "dist/tetralod_core_bg.wasm") }],
+};

@@ -1,0 +1,55 @@
+/// <reference lib="esnext.disposable" />
+/**
+ * Surfaces of a volume in three.js (an optional peer dependency).
+ *
+ * ```js
+ * import { createSurface } from "tetralod/three";
+ *
+ * const surface = await createSurface(mt, { isosurface: 0.5 });
+ * scene.add(new THREE.Mesh(surface.geometry, new THREE.MeshStandardMaterial()));
+ * await mt.refine({ error: "0.1%", isovalues: [0.5] });
+ * await surface.update(); // writes into the same geometry
+ * ```
+ */
+
+import type { BufferGeometry } from "three";
+import type { MeshTools, SurfaceOptions } from "./index.js";
+
+export type { SurfaceOptions };
+
+/** A geometry that shows a surface of the current mesh. */
+export interface ThreeSurface {
+  /**
+   * Always the same object. Its attributes are `position`, `normal` (of isosurfaces; others want `flatShading`), `value` (in units
+   * of the field) and, with the option `color`, `color`. They are longer than what is drawn: the draw range and the bounding box
+   * and sphere are set.
+   */
+  readonly geometry: BufferGeometry;
+  /**
+   * Extracts the surface from the mesh as it is now, and writes it into `geometry`. Where arrays are too short, it replaces
+   * them. `what` asks for another surface, now and later. Of calls that are faster than the worker, the last one counts.
+   *
+   * @throws {TetralodError} `bad-option` if `what` is wrong, `freed` if the volume has been freed
+   */
+  update(what?: SurfaceOptions): Promise<BufferGeometry>;
+  /** Frees the memory on the GPU. The volume stays open. */
+  dispose(): void;
+  [Symbol.dispose](): void;
+}
+
+export interface ThreeOptions {
+  /** The module `three`, for a page that has loaded it in its own way. Default: it is imported by this name. */
+  three?: typeof import("three");
+  /**
+   * The colour of a value: red, green and blue, 0 to 1, in the working colour space of three.js; for materials with `vertexColors`.
+   * Default: no colours.
+   */
+  color?: (value: number) => ArrayLike<number>;
+}
+
+/**
+ * A geometry with a surface of the current mesh of `volume`: a `MultiTessellation` or a `Viewer`.
+ *
+ * @throws {TetralodError} `bad-option` if `what` is wrong, `not-ready` if the base mesh has not arrived
+ */
+export function createSurface(volume: MeshTools, what: SurfaceOptions, options?: ThreeOptions): Promise<ThreeSurface>;
