@@ -21,7 +21,10 @@ const source = (reflection) => {
 };
 
 /** Headings that do not say what the page is where they stand among others. @type {Record<string, string>} */
-const TITLES = { "pkg-template/README.md": "The npm package" };
+const TITLES = {
+  "pkg-template/README.md": "The npm package",
+  "examples/js/README.md": "Example projects: bundlers, React, Node",
+};
 
 /** The title of a page is its first heading. */
 function title(page) {
@@ -37,7 +40,7 @@ class Router extends KindRouter {
   getIdealBaseName(reflection) {
     if (!(reflection instanceof DocumentReflection)) return super.getIdealBaseName(reflection);
     const page = source(reflection) ?? reflection.name;
-    return page.replace(/^docs\//, "").replace("pkg-template/README", "package").replace(/\.md$/, "").toLowerCase();
+    return page.replace(/^docs\//, "").replace("pkg-template/README", "package").replace("examples/js/README", "howto/examples").replace(/\.md$/, "").toLowerCase();
   }
 }
 
