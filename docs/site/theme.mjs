@@ -21,7 +21,10 @@ const source = (reflection) => {
 };
 
 /** Headings that do not say what the page is where they stand among others. @type {Record<string, string>} */
-const TITLES = { "pkg-template/README.md": "The npm package" };
+const TITLES = {
+  "pkg-template/README.md": "The npm package",
+  "examples/js/README.md": "Example projects: bundlers, React, Node",
+};
 
 /** The title of a page is its first heading. */
 function title(page) {
@@ -37,7 +40,7 @@ class Router extends KindRouter {
   getIdealBaseName(reflection) {
     if (!(reflection instanceof DocumentReflection)) return super.getIdealBaseName(reflection);
     const page = source(reflection) ?? reflection.name;
-    return page.replace(/^docs\//, "").replace("pkg-template/README", "package").replace(/\.md$/, "").toLowerCase();
+    return page.replace(/^docs\//, "").replace("pkg-template/README", "package").replace("examples/js/README", "howto/examples").replace(/\.md$/, "").toLowerCase();
   }
 }
 
@@ -51,6 +54,8 @@ class Theme extends DefaultTheme {
       return { text: document.name, path: this.router.getFullUrl(document), kind: ReflectionKind.Document };
     };
     const modules = super.buildNavigation(project).filter((element) => element.kind === ReflectionKind.Module);
+    const order = Object.keys(manifest.exports).map((entry) => entry.replace(".", manifest.name));
+    modules.sort((a, b) => order.indexOf(a.text) - order.indexOf(b.text));
     const pages = Object.entries(groups).map(([text, names]) => ({ text, children: names.map(link) }));
     const [first, ...others] = pages;
     return [{ text: "Start", path: "index.html" }, first, { text: API, children: modules }, ...others];

@@ -27,9 +27,10 @@ Chromium (`benches/beside_vtk`). Each number is the median of three visits with 
   full data.
 
 *program*: JavaScript and WebAssembly, compressed by gzip. *file*: the whole volume, as `tetralod generate` writes it (`.vti` and
-`.vtu` are compressed by zlib) or as an MT file. *fetched*: what was read of it. *first picture* is the time from the start of
-the navigation to the first picture, for tetralod of a coarse mesh; *full picture*, to the picture that does not change any more.
-The columns with 20 Mbit/s have a server that sends no faster, and answers after 40 ms. *memory*: of all processes of the browser with the
+`.vtu` are compressed by zlib) or as an MT file. *fetched*: what was read of it. *first picture*: the time from the start of
+the navigation to the first picture; for tetralod it shows the base mesh, in which little can be recognised. *within 5 %*: to a picture of a
+mesh within 5 % of the field's range. *full picture*: to the picture that does not change any more.
+The rows with 20 Mbit/s have a server that sends no faster, and answers after 40 ms. *memory*: of all processes of the browser with the
 full picture, less than those of an empty page. *frame*: from one picture to the next while the camera turns, 640 × 480 pixels,
 drawn in software, since the machine has no GPU: WebGL by vtk.js and F3D, WebGPU by tetralod.
 
