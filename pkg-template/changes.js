@@ -14,6 +14,28 @@ const ARRAYS = [
   ["neighbors", "tets", 4],
 ];
 
+/** The bits by which wasm knows the arrays of these names; all of them without names. */
+export function arrayBits(names) {
+  if (names === undefined) return 2 ** ARRAYS.length - 1;
+  const all = ARRAYS.map(([name]) => name);
+  const isGood = Array.isArray(names) && names.every((name) => all.includes(name));
+  if (!isGood) throw new TetralodError("bad-option", `option \`arrays\`: must be a list of ${all.join(", ")}`);
+  return all.reduce((bits, name, at) => (names.includes(name) ? bits + 2 ** at : bits), 0);
+}
+
+/**
+ * The arrays in the memory of wasm itself.
+ *
+ * @param {ArrayBuffer} buffer
+ * @param {Uint32Array} places address and length of each
+ * @param {number} bits
+ */
+export function arraysIn(buffer, places, bits) {
+  const kinds = [Float32Array, Float32Array, Uint32Array, Uint32Array];
+  const entries = ARRAYS.map(([name], at) => [name, new kinds[at](buffer, places[2 * at], places[2 * at + 1])]);
+  return Object.fromEntries(entries.filter((_, at) => (bits >> at) & 1));
+}
+
 /** A mesh of no tetrahedra, for `applyChanges` to begin with. */
 export function emptyMesh() {
   return {
@@ -27,7 +49,7 @@ export function emptyMesh() {
 
 /**
  * Makes of `mesh` the mesh that `delta` leads to, and returns it. Its arrays are written where `delta.changes` says; those
- * that are too short are replaced by others with room to grow.
+ * that are too short are replaced by others with room to grow, those that the delta lacks are removed.
  */
 export function applyChanges(mesh, delta) {
   const [is, wanted] = [mesh.changes.to, delta.changes.from];
@@ -37,6 +59,12 @@ export function applyChanges(mesh, delta) {
   }
   const count = { vertices: delta.vertexCount, tets: delta.tetCount };
   for (const [name, kind, size] of ARRAYS) {
+    if (!delta[name]) {
+      // It would be that of another mesh.
+      delete mesh[name];
+      continue;
+    }
+    if (!mesh[name]) throw new TetralodError("bad-option", `applyChanges: the delta has \`${name}\`, and the mesh has not`);
     const array = resized(mesh[name], size * count[kind]);
     copyRanges(array, delta[name], delta.changes[kind], size);
     mesh[name] = array;

@@ -150,6 +150,30 @@ export interface OpenOptions extends ReadOptions {
 export interface RefineStats extends CoreStats {
   /** Time of refinement, without making and sending the arrays. */
   milliseconds: number;
+  /**
+   * What keeps the mesh from being finer: `error`: it is as accurate as was asked for, or the finest that there is; `budget`: it has
+   * as many tetrahedra as were allowed; `network`: data is on its way; `memory`: blocks that it needs do not fit into `memory`.
+   * `undefined` until `done`.
+   */
+  limitedBy: "error" | "budget" | "network" | "memory" | undefined;
+}
+
+/** The arrays of a mesh. */
+export type MeshArray = "positions" | "field" | "tets" | "neighbors";
+
+/** How a mesh is handed out. */
+export interface ResultOptions<A extends MeshArray = MeshArray> {
+  /** Whether to return at once what is possible with the data that has arrived. Default: false. */
+  partial?: boolean;
+  /** The arrays to return; none with `[]`. Default: all four. What you do not use need not be made and sent. */
+  arrays?: readonly A[];
+  /**
+   * With `worker: false`: the arrays are those of the volume itself, in the memory of wasm, not copies. Read them at once: they
+   * are valid until the next call of this or another volume in this thread, and must not be written to. Default: false.
+   *
+   * @throws {TetralodError} `bad-option` with a worker, and with `deltas`
+   */
+  zeroCopy?: boolean;
 }
 
 /** The mesh after a refinement, in arrays that belong to the caller. */
@@ -163,11 +187,13 @@ export interface RefineDelta extends MeshDelta {
 }
 
 /** How far each step of a refinement goes. */
-export interface StepOptions {
+export interface StepOptions<A extends MeshArray = MeshArray> {
   /** About so many milliseconds. Default 8, or no limit if `updates` is given. */
   budgetMs?: number;
   /** So many updates. Default: no limit. */
   updates?: number;
+  /** The arrays to return, as for `refine`. Default: all four. */
+  arrays?: readonly A[];
   /** Ends the loop between two steps: it throws the signal's reason. The mesh stays as it is then. */
   signal?: AbortSignal;
 }
@@ -179,16 +205,23 @@ export function emptyMesh(): Mesh;
  * Applies `delta` to `mesh`, and returns it. The arrays are written where `delta.changes` says. Arrays that are too
  * short are replaced by larger ones, so read them from `mesh` each time.
  *
- * A delta applies to the mesh that was returned right before it, whole or as a delta; other meshes are refused.
+ * A delta applies to the mesh that was returned right before it, whole or as a delta; other meshes are refused. Arrays that the
+ * delta lacks, as its `arrays` say, are removed from the mesh.
  *
  * @example
  * const mesh = emptyMesh();
  * applyChanges(mesh, await mt.refine({ error: "1%" }, { deltas: true }));
  */
-export function applyChanges(mesh: Mesh, delta: MeshDelta): Mesh;
+export function applyChanges<M extends Partial<Mesh> & Pick<Mesh, "changes">>(
+  mesh: M,
+  delta: Partial<MeshDelta> & Pick<MeshDelta, "changes" | "vertexCount" | "tetCount">,
+): M;
 
-/** What can be got out of the current mesh: the same calls in `MultiTessellation` and in `Viewer`. */
-export interface MeshTools {
+/**
+ * What can be got out of the current mesh: the same calls in `MultiTessellation` and in `Viewer`. `Aside` is what
+ * `MultiTessellation` takes besides.
+ */
+export interface MeshTools<Aside = { request?: never }> {
   /**
    * The isosurface of the current mesh at one value or several, in units of the field, with the value of each vertex.
    * Normals point towards lower values: they are those of the field's gradient, or with `"smooth"` of the triangles.
@@ -198,7 +231,7 @@ export interface MeshTools {
    */
   isosurface(
     values: number | ArrayLike<number>,
-    how?: { normals?: "gradient" | "smooth" },
+    how?: { normals?: "gradient" | "smooth" } & Aside,
   ): Promise<IsoSurface & { values: Float32Array }>;
 
   /**
@@ -208,16 +241,16 @@ export interface MeshTools {
    * @example
    * const cut = await mt.slice([0, 0, 1], 2.5);                       // z = 2.5
    */
-  slice(normal: ArrayLike<number>, offset: number): Promise<Slice>;
+  slice(normal: ArrayLike<number>, offset: number, how?: Aside): Promise<Slice>;
 
   /** The boundary of the current mesh, facing outwards. */
-  surface(): Promise<Surface>;
+  surface(how?: Aside): Promise<Surface>;
 
   /** The field at some points, three coordinates each, in model units; NaN outside of the mesh. */
-  probe(points: ArrayLike<number>): Promise<Float64Array>;
+  probe(points: ArrayLike<number>, how?: Aside): Promise<Float64Array>;
 
   /** The field along a line, in parts that are linear. */
-  line(from: ArrayLike<number>, to: ArrayLike<number>): Promise<LineProfile>;
+  line(from: ArrayLike<number>, to: ArrayLike<number>, how?: Aside): Promise<LineProfile>;
 
   /**
    * The streamlines from some seeds, three coordinates each, through the vector field whose components are three fields;
@@ -229,7 +262,7 @@ export interface MeshTools {
   streamlines(
     fields: [string, string, string],
     seeds: ArrayLike<number>,
-    how?: { backward?: boolean; maxLength?: number; maxSteps?: number },
+    how?: { backward?: boolean; maxLength?: number; maxSteps?: number } & Aside,
   ): Promise<(Streamline | undefined)[]>;
 
   /**
@@ -239,17 +272,43 @@ export interface MeshTools {
    * @example
    * const { percentiles } = await mt.stats({ bins: 1000, fractions: [0.02, 0.98] });
    */
-  stats(how?: {
-    bins?: number;
-    range?: ArrayLike<number>;
-    fractions?: ArrayLike<number>;
-  }): Promise<FieldStats>;
+  stats(
+    how?: {
+      bins?: number;
+      range?: ArrayLike<number>;
+      fractions?: ArrayLike<number>;
+    } & Aside,
+  ): Promise<FieldStats>;
 
   /** A hash of the current mesh: the same request gives the same hash on every machine. */
   hash(): Promise<string>;
 }
 
-declare const WithMeshTools: { new (): MeshTools; prototype: MeshTools };
+/** For a call that answers from another mesh. */
+export interface AsideOptions {
+  /**
+   * Answers from the mesh of this request, and leaves the current mesh as it is. It waits for the data that the request needs. There
+   * is one more mesh for all such calls, as of {@link MultiTessellation.view}; a `field` is named in the request.
+   *
+   * @example
+   * const { indices } = await mt.isosurface(0.7, { request: { error: "1%", isovalues: [0.7] } });
+   * @throws {TetralodError} `bad-source` if the volume is a stream, which cannot be read again
+   */
+  request?: RefineOptions;
+}
+
+/** The events of a volume, each with its `detail`. */
+export interface MultiTessellationEventMap {
+  /** Something has arrived and been decoded: as `onProgress`. */
+  progress: CustomEvent<Progress>;
+  /** `refine` or a step of `refineSteps` has made a mesh. */
+  stats: CustomEvent<RefineStats>;
+  /** The download has ended with an error; `retry` continues where that is possible. */
+  error: CustomEvent<Error>;
+}
+
+type Tools = EventTarget & MeshTools<AsideOptions>;
+declare const WithMeshTools: { new (): Tools; prototype: Tools };
 
 /**
  * A volume that is open. Calls are answered in the order in which they were made.
@@ -322,10 +381,19 @@ export class MultiTessellation extends WithMeshTools {
    * const matrix = camera.projectionMatrix.clone().multiply(camera.matrixWorldInverse);  // three.js
    * await mt.refine({ view: { matrix, viewport: [width, height], pixels: 1, outside: "10%" }, maxTets: 500_000 });
    *
+   * @example
+   * const { positions, tets } = await mt.refine({ error: "1%" }, { arrays: ["positions", "tets"] });
+   *
    * With `deltas` it returns only what has changed since the last returned mesh, for {@link applyChanges}.
    */
-  refine(options?: RefineOptions, how?: { deltas?: false; partial?: boolean }): Promise<RefineResult>;
-  refine(options: RefineOptions | undefined, how: { deltas: true; partial?: boolean }): Promise<RefineDelta>;
+  refine<A extends MeshArray = MeshArray>(
+    options?: RefineOptions,
+    how?: ResultOptions<A> & { deltas?: false },
+  ): Promise<Pick<RefineResult, A | "changes" | "stats">>;
+  refine<A extends MeshArray = MeshArray>(
+    options: RefineOptions | undefined,
+    how: Omit<ResultOptions<A>, "zeroCopy"> & { deltas: true },
+  ): Promise<Pick<RefineDelta, A | "changes" | "stats" | "vertexCount" | "tetCount">>;
 
   /**
    * The same in steps, each of which gives a mesh that is valid and within the budget. The loop ends when the mesh
@@ -338,11 +406,27 @@ export class MultiTessellation extends WithMeshTools {
    *   draw(applyChanges(mesh, step), step.changes);
    * }
    */
-  refineSteps(options?: RefineOptions, how?: StepOptions & { deltas?: false }): AsyncGenerator<RefineResult, void, void>;
-  refineSteps(
+  refineSteps<A extends MeshArray = MeshArray>(
+    options?: RefineOptions,
+    how?: StepOptions<A> & { deltas?: false },
+  ): AsyncGenerator<Pick<RefineResult, A | "changes" | "stats">, void, void>;
+  refineSteps<A extends MeshArray = MeshArray>(
     options: RefineOptions | undefined,
-    how: StepOptions & { deltas: true },
-  ): AsyncGenerator<RefineDelta, void, void>;
+    how: StepOptions<A> & { deltas: true },
+  ): AsyncGenerator<Pick<RefineDelta, A | "changes" | "stats" | "vertexCount" | "tetCount">, void, void>;
+
+  /**
+   * Another mesh of the same volume, for a second part of a program: its requests do not change this mesh, nor those of this one
+   * the other. It has memory of its own for its mesh and its blocks, and shares the worker. Of a file in parts, what either fetches
+   * from now on is there for both; it is kept compressed as long as there are views. Other sources are read again. `free` ends a view;
+   * that of the volume ends all of its views.
+   *
+   * @example
+   * const overview = await mt.view();
+   * await Promise.all([mt.refine({ error: "0.1%" }), overview.refine({ maxTets: 10_000 })]);
+   * @throws {TetralodError} `bad-source` if the volume is a stream, which cannot be read again
+   */
+  view(options?: Pick<OpenOptions, "signal" | "onProgress">): Promise<MultiTessellation>;
 
   /**
    * Chooses the field that isosurfaces follow, by name or by number in `info.fields`, without changing the mesh; `refine`
@@ -352,6 +436,17 @@ export class MultiTessellation extends WithMeshTools {
 
   /** Stops the download and the worker. Pending and later calls reject with code `freed`. */
   free(): void;
+
+  addEventListener<K extends keyof MultiTessellationEventMap>(
+    type: K,
+    listener: (event: MultiTessellationEventMap[K]) => void,
+    options?: boolean | AddEventListenerOptions,
+  ): void;
+  addEventListener(
+    type: string,
+    listener: EventListenerOrEventListenerObject | null,
+    options?: boolean | AddEventListenerOptions,
+  ): void;
 
   /** The same as {@link MultiTessellation.free}, for `using mt = await MultiTessellation.open(...)`. */
   [Symbol.dispose](): void;

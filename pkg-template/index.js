@@ -2,23 +2,25 @@
  * tetralod: very large tetrahedral volumes, streamed and refined where it counts. See README.md.
  */
 
-import { applyChanges, emptyMesh } from "./changes.js";
+import { applyChanges, arrayBits, emptyMesh } from "./changes.js";
 import { Local, REPLACED } from "./core.js";
 import { coreRemedy, coreScript, coreWasm, startCore } from "./files.js";
-import { TetralodError } from "./errors.js";
+import { TetralodError, reviveError } from "./errors.js";
 import { openOptions, sendable } from "./options.js";
 import { PLACES, absoluteUrl, loadWasm, startWorker } from "./start.js";
-import { abortable, openSource, pump, rangesOf } from "./stream.js";
+import { abortable, isRepeatable, openSource, pump, rangesOf } from "./stream.js";
 import { checkAmount, checkNames, setCaller, withMeshTools } from "./tools.js";
 
 export { TetralodError, applyChanges, emptyMesh };
 
 const OPEN_OPTIONS = ["signal", "onProgress", ...PLACES];
 const NO_RETRY = "only a file that is fetched in parts can be continued: open it again";
-const STEP_OPTIONS = ["budgetMs", "updates", "deltas", "signal"];
+const STEP_OPTIONS = ["budgetMs", "updates", "deltas", "arrays", "signal"];
+const NO_VIEW = "a stream is read only once; for views, open a URL, a Blob or bytes in memory";
+const NO_ZERO_COPY = "needs `worker: false`, and no `deltas`: no other thread has this memory";
 
 /** A volume that is open: it can be refined while the rest of it is still arriving. */
-export class MultiTessellation extends withMeshTools(Object) {
+export class MultiTessellation extends withMeshTools(EventTarget) {
   #core;
   #info;
   #progress = { ready: false, complete: false, bytes: 0, total: undefined, updates: 0 };
@@ -31,6 +33,13 @@ export class MultiTessellation extends withMeshTools(Object) {
   #closed;
   /** Counts the requests: each one replaces those before it. */
   #goal = 0;
+  #source;
+  #fetching;
+  /** Other meshes of the volume. @type {Set<MultiTessellation>} */
+  #views = new Set();
+  /** The one for calls with a request of their own, and the last of these. @type {Promise<MultiTessellation> | undefined} */
+  #aside;
+  #asked = Promise.resolve();
 
   static async open(source, options = {}) {
     const { signal, onProgress = () => {}, worker = true, workerUrl, wasmUrl, ...how } = options;
@@ -39,22 +48,18 @@ export class MultiTessellation extends withMeshTools(Object) {
     signal?.throwIfAborted();
     if (!worker && workerUrl !== undefined) throw new TetralodError("bad-option", "option `workerUrl`: goes with `worker: true` only");
     let mt;
-    const onEvent = (_, progress) => mt.#tell(progress);
+    const onEvent = (name, data) => mt.#heard(name, data);
     const core = worker ? startWorker(CORE, { worker, workerUrl }, onEvent) : new Local(onEvent);
     mt = new MultiTessellation(core, Boolean(worker), onProgress);
-    try {
-      await Promise.all([loadWasm(core, CORE, wasm), mt.#begin(source, signal, fetching)]);
-    } catch (error) {
-      mt.#close(error);
-      throw error;
-    }
-    return mt;
+    return mt.#opened(source, signal, fetching, loadWasm(core, CORE, wasm));
   }
 
   /** @private use `MultiTessellation.open` */
   constructor(core, inWorker, onProgress) {
     super();
-    setCaller(this, (method, args) => this.#core.call(method, args));
+    setCaller(this, (method, args, request) =>
+      request === undefined ? this.#core.call(method, args) : this.#askAside(request, method, args),
+    );
     this.#core = core;
     this.#inWorker = inWorker;
     this.#onProgress = onProgress;
@@ -75,19 +80,35 @@ export class MultiTessellation extends withMeshTools(Object) {
     return settled;
   }
 
+  /** @param {{ signal?: AbortSignal, onProgress?: (progress: any) => void }} [how] */
+  async view({ signal, onProgress = () => {}, ...others } = {}) {
+    checkNames(others, [], ["signal", "onProgress"]);
+    if (this.#closed) throw this.#closed;
+    if (!isRepeatable(this.#source)) throw new TetralodError("bad-source", NO_VIEW);
+    signal?.throwIfAborted();
+    let view;
+    const core = this.#core.view((name, data) => view.#heard(name, data));
+    view = new MultiTessellation(core, this.#inWorker, onProgress);
+    this.#views.add(view);
+    return view.#opened(this.#source, signal, this.#fetching, undefined);
+  }
+
   async retry() {
     if (this.#complete) throw new TetralodError("bad-source", NO_RETRY);
     await this.#wait("retry");
   }
 
   async refine(options = {}, how = {}) {
-    checkNames(how, ["deltas", "partial"]);
-    const { deltas = false, partial = false } = how;
+    checkNames(how, ["deltas", "partial", "arrays", "zeroCopy"]);
+    const { deltas = false, partial = false, zeroCopy = false } = how;
+    if (zeroCopy && (this.#inWorker || deltas)) throw new TetralodError("bad-option", `option \`zeroCopy\`: ${NO_ZERO_COPY}`);
+    const what = { deltas: Boolean(deltas), arrays: arrayBits(how.arrays), zeroCopy: Boolean(zeroCopy) };
     const sent = sendable(options, this.#inWorker);
     const goal = ++this.#goal;
     const ask = async (method, ...more) => {
-      const args = [sent, Boolean(deltas), ...more];
+      const args = [sent, what, ...more];
       const { more: _, ...result } = await this.#wait(method, args, method === "reach");
+      if (result.stats) this.#emit("stats", result.stats);
       return result;
     };
     if (!partial && !this.#complete) return ask("reach");
@@ -105,11 +126,13 @@ export class MultiTessellation extends withMeshTools(Object) {
     checkAmount("budgetMs", budgetMs, 0);
     checkAmount("updates", updates, 1);
     signal?.throwIfAborted();
+    const what = { deltas: Boolean(deltas), arrays: arrayBits(how.arrays) };
     const goal = ++this.#goal;
     await this.#core.call("setRequest", [sendable(options, this.#inWorker)]);
     for (let done = false; !done && goal === this.#goal; ) {
       signal?.throwIfAborted();
-      const { more, ...step } = await this.#core.call("step", [budgetMs, updates, Boolean(deltas)]);
+      const { more, ...step } = await this.#core.call("step", [budgetMs, updates, what]);
+      this.#emit("stats", step.stats);
       yield step;
       done = !more;
       if (!more || !step.stats.done || goal !== this.#goal) continue;
@@ -131,8 +154,23 @@ export class MultiTessellation extends withMeshTools(Object) {
 
   #close(reason) {
     this.#closed ??= reason;
+    for (const view of this.#views) view.#close(reason);
     this.#stop.abort(reason);
     this.#core.close(reason);
+  }
+
+  /** Answers from the mesh of another request; the current mesh stays as it is. One such call after the other. */
+  #askAside(request, method, args) {
+    const answer = async () => {
+      this.#aside ??= this.view();
+      this.#aside.catch(() => (this.#aside = undefined));
+      const aside = await this.#aside;
+      await aside.refine(request, { arrays: [] });
+      return aside.#core.call(method, args);
+    };
+    const answered = this.#asked.then(answer);
+    this.#asked = answered.catch(() => {});
+    return answered;
   }
 
   /** A call that may wait for bytes: the end of the download ends the wait. */
@@ -143,9 +181,32 @@ export class MultiTessellation extends withMeshTools(Object) {
     return waits ? abortable(called, this.#stop.signal) : called;
   }
 
+  #heard(name, data) {
+    if (name === "progress") this.#tell(data);
+    // Before that, `open` rejects with it.
+    if (name === "error" && this.#info && !this.#closed) this.#emit("error", reviveError(data));
+  }
+
   #tell(progress) {
     this.#progress = progress;
     this.#onProgress(progress);
+    this.#emit("progress", progress);
+  }
+
+  #emit(name, detail) {
+    this.dispatchEvent(new CustomEvent(name, { detail }));
+  }
+
+  /** Reads `source`; what fails ends it. */
+  async #opened(source, signal, fetching, loaded) {
+    [this.#source, this.#fetching] = [source, fetching];
+    try {
+      await Promise.all([loaded, this.#begin(source, signal, fetching)]);
+    } catch (error) {
+      this.#close(error);
+      throw error;
+    }
+    return this;
   }
 
   /** Resolves when the base mesh has arrived; `complete` waits for the rest. */
@@ -182,7 +243,7 @@ export class MultiTessellation extends withMeshTools(Object) {
     };
     this.#complete = this.#stream(source, fetching, starting, onProgress).finally(then);
     // Whoever does not wait for the end must not get an unhandled rejection for it.
-    this.#complete.catch(() => {});
+    this.#complete.catch((error) => this.#info && !this.#stop.signal.aborted && this.#emit("error", error));
     signal.throwIfAborted();
     await Promise.race([ready, this.#complete]);
     if (!this.#info) throw new TetralodError("truncated", "the file ended before its base mesh");

@@ -27,6 +27,7 @@ const LATE = 100;
  * @property {typeof fetch} [fetch] used in place of the global one, for instance to sign requests
  * @property {HeadersInit} [headers] go along with each request; other origins must allow them
  * @property {RequestCredentials} [credentials]
+ * @property {SharedRanges} [shared] ranges that several sessions of one file have, in place of `cache`
  * @property {string} [cache] name of a cache (Cache Storage) in which ranges are kept for the next time, where there is one
  * @property {number} [maxRequests] at a time; 6
  * @property {number} [gap] ranges closer than so many bytes are fetched as one; 16384
@@ -59,8 +60,9 @@ export class Ranges {
   #clock = 0;
   #seen = performance.now();
   #due = Infinity;
-  /** @type {Cached | undefined} */
+  /** @type {Cached | SharedVersion | undefined} */
   #cached;
+  #leave = () => {};
   #failed = false;
   #closed = false;
   #knowsServer = false;
@@ -124,6 +126,7 @@ export class Ranges {
     if (this.#closed) return;
     this.#closed = true;
     clearTimeout(this.#timer);
+    this.#leave();
     for (const controller of this.#open.values()) controller.abort();
     this.#open.clear();
     this.#loader.free();
@@ -207,11 +210,17 @@ export class Ranges {
       this.#sink.onServer?.(this.servesRanges);
       if (this.#closed) return;
     }
-    const { cache } = this.#options;
-    if (this.#cached || this.#forgets || !cache || !globalThis.caches) return;
+    const { cache = "", shared } = this.#options;
+    const isKept = cache !== "" && globalThis.caches;
+    if (this.#cached || this.#forgets || !(isKept || shared)) return;
     const version = this.#loader.version();
     if (version === undefined) return;
-    const cached = (this.#cached = new Cached(this.#url, version));
+    const cached = isKept ? new Cached(this.#url, version) : shared.of(version);
+    this.#cached = cached;
+    if (cached instanceof SharedVersion) {
+      this.#leave();
+      this.#leave = cached.join((start, end) => cached === this.#cached && this.#loader.addCached(Float64Array.of(start, end)));
+    }
     cached.open(cache).then((found) => {
       if (this.#closed || cached !== this.#cached) return;
       this.#loader.addCached(Float64Array.from(found));
@@ -284,6 +293,67 @@ export class Ranges {
     if (this.#options.fetch) return false;
     const probe = fetch(url, { mode: "no-cors", method: "HEAD", cache: "no-store", signal });
     return probe.then(() => true, () => false);
+  }
+}
+
+/** Ranges that the sessions of one file share in memory, as long as there are several. */
+export class SharedRanges {
+  /** @type {Map<string, SharedVersion>} */
+  #versions = new Map();
+  #sessions = 1;
+
+  /** Those of one version of the file. */
+  of(version) {
+    const found = this.#versions.get(version) ?? new SharedVersion(() => this.#sessions > 1);
+    this.#versions.set(version, found);
+    return found;
+  }
+
+  /** There is one more session, or one less: the last one needs nothing of this. */
+  count(change) {
+    this.#sessions += change;
+    if (this.#sessions > 1) return;
+    for (const version of this.#versions.values()) version.clear();
+  }
+}
+
+/** Those of one version; the same calls as `Cached` has. */
+class SharedVersion {
+  #isShared;
+  /** @type {Map<string, Uint8Array>} */
+  #ranges = new Map();
+  /** What hears of ranges that come. @type {Set<(start: number, end: number) => void>} */
+  #heard = new Set();
+
+  constructor(isShared) {
+    this.#isShared = isShared;
+  }
+
+  get isOpen() {
+    return this.#isShared();
+  }
+
+  join(hear) {
+    this.#heard.add(hear);
+    return () => this.#heard.delete(hear);
+  }
+
+  async open(_name) {
+    return [...this.#ranges.keys()].flatMap((key) => key.split("-").map(Number));
+  }
+
+  async get(start, end) {
+    return this.#ranges.get(`${start}-${end}`);
+  }
+
+  async put(start, end, bytes) {
+    this.#ranges.set(`${start}-${end}`, bytes);
+    for (const hear of this.#heard) hear(start, end);
+    return false;
+  }
+
+  clear() {
+    this.#ranges.clear();
   }
 }
 

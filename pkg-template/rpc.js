@@ -46,12 +46,30 @@ export function nodeEndpoint(target) {
 
 const failure = (error) => new TetralodError("internal", `the worker failed: ${error?.message ?? error ?? "no reason given"}`);
 
+/** One end of a `MessageChannel`, in a page and in Node. @param {any} port */
+export function portEndpoint(port) {
+  return {
+    post: (message, transfer = []) => port.postMessage(message, transfer),
+    onMessage: (listener) => {
+      port.addEventListener("message", (event) => listener(event.data));
+      port.start();
+    },
+    close: () => {
+      port.postMessage({ method: "free", args: [] });
+      port.close();
+    },
+    hold: (keepAlive) => (keepAlive ? port.ref?.() : port.unref?.()),
+  };
+}
+
 /** The caller's side. */
 export class Remote {
   #endpoint;
   #pending = new Map();
   #next = 0;
   #closed = null;
+  /** Other sessions in the worker. @type {Set<Remote>} */
+  #views = new Set();
   /** Whether the worker has answered: then it has started. */
   #started = false;
   #notStarted;
@@ -91,7 +109,17 @@ export class Remote {
     for (const { reject } of this.#pending.values()) reject(reason);
     this.#pending.clear();
     this.#endpoint.hold?.(false);
+    for (const view of this.#views) view.close(reason);
     this.#endpoint.close?.();
+  }
+
+  /** Another session in the worker, over the same bytes. */
+  view(onEvent) {
+    const { port1, port2 } = new MessageChannel();
+    const view = new Remote(portEndpoint(port1), onEvent);
+    this.#views.add(view);
+    this.call("view", [port2], [port2]).catch((error) => view.close(error));
+    return view;
   }
 
   #settle({ id, result, error }) {

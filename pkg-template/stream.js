@@ -194,6 +194,12 @@ export function rangesOf(source, { headers, credentials } = {}) {
   return { url, headers: [...own], credentials: credentials ?? request?.credentials };
 }
 
+/** Whether `source` can be read again. @param {any} source */
+export function isRepeatable(source) {
+  if (isInstance(source, "Request")) return source.method === "GET";
+  return urlOf(source) !== undefined || isInstance(source, "Blob") || source instanceof ArrayBuffer || ArrayBuffer.isView(source);
+}
+
 /** `url` as it means the same in a worker; as it is where it means nothing. */
 function absolute(url) {
   try {

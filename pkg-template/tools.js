@@ -2,14 +2,18 @@
 
 import { TetralodError } from "./errors.js";
 
-/** What passes a call on to the session, of each object with these calls. @type {WeakMap<object, (method: string, args?: any[]) => Promise<any>>} */
+/**
+ * What passes a call on to the session, of each object with these calls; with `request`, to the mesh that this asks for.
+ *
+ * @type {WeakMap<object, (method: string, args: any[], request?: object) => Promise<any>>}
+ */
 const callers = new WeakMap();
 
 /** Says what passes the calls of `object` on to its session. */
 export const setCaller = (object, call) => callers.set(object, call);
 
 /** Passes a call on. */
-const call = (object, method, args = []) => /** @type {any} */ (callers.get(object))(method, args);
+const call = (object, method, args, request) => /** @type {any} */ (callers.get(object))(method, args, request);
 
 /**
  * A class with these calls.
@@ -19,53 +23,58 @@ const call = (object, method, args = []) => /** @type {any} */ (callers.get(obje
 export const withMeshTools = (Base) =>
   class extends Base {
     async isosurface(values, how = {}) {
-      checkNames(how, ["normals"]);
-      const { normals = "gradient" } = how;
+      checkNames(how, ["normals", "request"]);
+      const { normals = "gradient", request } = how;
       if (normals !== "gradient" && normals !== "smooth") {
         throw new TetralodError("bad-option", 'option `normals`: must be "gradient" or "smooth"');
       }
       const list = typeof values === "number" ? [values] : values;
-      return call(this, "isosurface", [numbers("isosurface", list), normals === "smooth"]);
+      return call(this, "isosurface", [numbers("isosurface", list), normals === "smooth"], request);
     }
 
-    async slice(normal, offset) {
+    async slice(normal, offset, how = {}) {
+      checkNames(how, ["request"]);
       if (typeof offset !== "number") throw new TetralodError("bad-option", "option `offset`: must be a number");
-      return call(this, "slice", [numbers("normal", normal), offset]);
+      return call(this, "slice", [numbers("normal", normal), offset], how.request);
     }
 
-    async surface() {
-      return call(this, "surface");
+    async surface(how = {}) {
+      checkNames(how, ["request"]);
+      return call(this, "surface", [], how.request);
     }
 
-    async probe(points) {
-      return call(this, "probe", [numbers("points", points)]);
+    async probe(points, how = {}) {
+      checkNames(how, ["request"]);
+      return call(this, "probe", [numbers("points", points)], how.request);
     }
 
-    async line(from, to) {
-      return call(this, "line", [numbers("from", from), numbers("to", to)]);
+    async line(from, to, how = {}) {
+      checkNames(how, ["request"]);
+      return call(this, "line", [numbers("from", from), numbers("to", to)], how.request);
     }
 
     async streamlines(fields, seeds, how = {}) {
-      checkNames(how, ["backward", "maxLength", "maxSteps"]);
+      checkNames(how, ["backward", "maxLength", "maxSteps", "request"]);
       const { backward = false, maxLength = Infinity, maxSteps = 10_000 } = how;
       if (!Array.isArray(fields) || fields.length !== 3 || fields.some((name) => typeof name !== "string")) {
         throw new TetralodError("bad-option", "streamlines: a vector field is the names of three fields");
       }
       checkAmount("maxLength", maxLength, 0);
       checkAmount("maxSteps", maxSteps, 1);
-      return call(this, "streamlines", [fields, numbers("seeds", seeds), Boolean(backward), maxLength, maxSteps]);
+      const args = [fields, numbers("seeds", seeds), Boolean(backward), maxLength, maxSteps];
+      return call(this, "streamlines", args, how.request);
     }
 
     async stats(how = {}) {
-      checkNames(how, ["bins", "range", "fractions"]);
+      checkNames(how, ["bins", "range", "fractions", "request"]);
       const { bins = 100, range = [NaN, NaN], fractions = [] } = how;
       checkAmount("bins", bins, 1);
       if (range?.length !== 2) throw new TetralodError("bad-option", "option `range`: must be two numbers");
-      return call(this, "stats", [bins, range[0], range[1], numbers("fractions", fractions)]);
+      return call(this, "stats", [bins, range[0], range[1], numbers("fractions", fractions)], how.request);
     }
 
     async hash() {
-      return call(this, "hash");
+      return call(this, "hash", []);
     }
   };
 
@@ -85,6 +94,21 @@ export const meshToolMethods = (session) => ({
   stats: (bins, low, high, fractions) => session().stats(bins, low, high, fractions),
   hash: () => session().hash(),
 });
+
+/**
+ * What keeps a mesh from being finer.
+ *
+ * @param {{ done: boolean, satisfied: boolean, missing: boolean }} stats
+ * @param {{ leftOut: number } | undefined} blocks of a file in parts
+ * @param {Record<string, any>} request
+ */
+export function limitOf({ done, satisfied, missing }, blocks, request) {
+  if (!done) return undefined;
+  if (satisfied) return "error";
+  if (missing) return "network";
+  if (blocks && blocks.leftOut > 0) return "memory";
+  return ["maxTets", "maxVertices", "maxBytes"].some((name) => request[name] !== undefined) ? "budget" : "error";
+}
 
 /** Refuses options that there are not; `others` are handled elsewhere. */
 export function checkNames(options, names, others = []) {

@@ -11,7 +11,7 @@ import { received } from "./options.js";
 import { Parts } from "./parts.js";
 import { serve, webEndpoint } from "./rpc.js";
 import { wasmError, wasmOf } from "./start.js";
-import { meshToolMethods } from "./tools.js";
+import { limitOf, meshToolMethods } from "./tools.js";
 import { VERSION } from "./version.js";
 
 /** While a file streams in, the mesh follows it this often (in ms), and at most half of the time is spent on that. */
@@ -389,7 +389,8 @@ function step(budget) {
     // A mesh that is held to fewer tetrahedra while something moves is not the one that was asked for.
     const done = stats.done && held === undefined;
     if (done) lastRefine = { end, took: total.milliseconds };
-    emit("stats", { ...stats, ...total, done, bytes, goal, blocks: parts?.progress.blocks });
+    const { blocks } = parts?.progress ?? {};
+    emit("stats", { ...stats, ...total, done, bytes, goal, blocks, limitedBy: limitOf({ ...stats, done }, blocks, request) });
     if (done) Object.keys(total).forEach((name) => (total[name] = 0));
   } catch (error) {
     emit("failed", { goal, error: flattenError(error) });

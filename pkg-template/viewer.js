@@ -111,7 +111,10 @@ export class Viewer extends withMeshTools(EventTarget) {
   /** @private Use `Viewer.create`. */
   constructor(canvas, places) {
     super();
-    setCaller(this, (method, args) => this.#remote.call(method, args));
+    setCaller(this, (method, args, request) => {
+      if (request !== undefined) throw badOption("request", "a viewer has one mesh; open the volume as MultiTessellation, too");
+      return this.#remote.call(method, args);
+    });
     this.#canvas = canvas;
     this.#remote = startWorker(VIEWER, places, (name, data) => this.#heard(name, data));
   }

@@ -88,7 +88,7 @@ fn same_hashes(mt: &[u8], hashes: &str, piece: usize) {
 fn arrays_fit_the_stats_and_each_other() {
     let mut session = fed(MT, MT.len());
     let stats = session.refine(options(r#"{ "error": "1%" }"#).unchecked_ref()).expect("a good request");
-    let mesh = session.mesh().expect("a mesh");
+    let mesh = session.mesh(15).expect("a mesh");
     let floats = |name| get(&mesh, name).unchecked_into::<Float32Array>().to_vec();
     let integers = |name| get(&mesh, name).unchecked_into::<Uint32Array>().to_vec();
     let (vertices, tetrahedra) = (number(&stats, "vertices") as usize, number(&stats, "tetrahedra") as usize);
@@ -111,7 +111,7 @@ fn steps_and_deltas_lead_to_the_same_mesh() {
     for step in 0.. {
         assert!(step < 10_000, "it ends");
         let stats = session.step(f64::INFINITY, 100.0).expect("a good MT");
-        let delta = session.delta().expect("a mesh");
+        let delta = session.delta(15).expect("a mesh");
         let [ranges, tets] = [get(&get(&delta, "changes"), "tets"), get(&delta, "tets")]
             .map(|array| array.unchecked_into::<Uint32Array>().to_vec());
         copy.resize(4 * number(&delta, "tetCount") as usize, 0);
@@ -126,7 +126,7 @@ fn steps_and_deltas_lead_to_the_same_mesh() {
         }
     }
     assert_eq!(session.hash(), whole);
-    let mesh = session.mesh().expect("a mesh");
+    let mesh = session.mesh(15).expect("a mesh");
     assert_eq!(get(&mesh, "tets").unchecked_into::<Uint32Array>().to_vec(), copy);
 }
 
@@ -157,7 +157,7 @@ fn a_function_tells_where_the_mesh_is_wanted() {
 #[wasm_bindgen_test]
 fn broken_files_and_requests_are_refused_with_a_code() {
     let mut early = CoreSession::new(Vec::new());
-    assert_eq!(code(early.mesh().err().expect("refused")), "not-ready");
+    assert_eq!(code(early.mesh(15).err().expect("refused")), "not-ready");
     assert_eq!(code(early.feed(b"<!doctype html><title>404</title>").err().expect("refused")), "not-mt");
 
     let half = MT.len() / 2;

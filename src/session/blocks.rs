@@ -8,6 +8,7 @@ use super::Session;
 use crate::format::{DecodeOptions, Decoder, FormatError, Index, Progress};
 use crate::mt::{ErrorCode, Mt, MultiTessellation, UpdateId, UpdatePages};
 use crate::refine::{Criterion, Front, TetData};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
@@ -51,6 +52,8 @@ pub(super) struct Blocks {
     fed: u64,
     /// What has come of blocks that are not complete, by where it begins.
     pieces: BTreeMap<u64, Vec<u8>>,
+    /// The beginning of a range of a block, and where that begins: it came with what stands in front of the blocks.
+    beginning: Option<(u64, Vec<u8>)>,
     /// Complete blocks that wait for others.
     waiting: BTreeMap<u32, Vec<u8>>,
     /// What is to be here, most important first, as far as there is memory for it.
@@ -73,6 +76,7 @@ impl Session {
             memory,
             fed: 0,
             pieces: BTreeMap::new(),
+            beginning: None,
             waiting: BTreeMap::new(),
             plan: Vec::new(),
             needed: 0,
@@ -99,7 +103,7 @@ impl Session {
             }
             let ranges = self.decoder.block_ranges(block).into_iter();
             let missing = ranges.filter(|range| !blocks.pieces.contains_key(&range.start));
-            wanted.extend(missing.map(|range| WantedBytes { range, priority }));
+            wanted.extend(missing.map(|range| WantedBytes { range: blocks.rest_of(range), priority }));
         }
         wanted
     }
@@ -144,6 +148,7 @@ impl Session {
             }
             return Ok(self.progress());
         }
+        let (start, bytes) = blocks.with_beginning(start, bytes);
         let Some(block) = self.decoder.block_at(start) else { return Ok(self.progress()) };
         let ranges = self.decoder.block_ranges(block);
         let fits = ranges.iter().any(|range| range.start == start && range.end - start == bytes.len() as u64);
@@ -153,6 +158,7 @@ impl Session {
         }
         let Some(blocks) = &mut self.blocks else { return Ok(self.progress()) };
         blocks.pieces.insert(start, bytes.to_vec());
+        blocks.beginning.take_if(|(at, _)| *at == start);
         if ranges.iter().all(|range| blocks.pieces.contains_key(&range.start)) {
             let parts: Vec<Vec<u8>> =
                 ranges.iter().filter_map(|range| blocks.pieces.remove(&range.start)).collect();
@@ -172,6 +178,11 @@ impl Session {
         loop {
             let ranges = self.decoder.block_ranges(block);
             if !ranges.last().is_some_and(|last| last.end <= end && ranges[0].start >= head.max(start)) {
+                if let (Some(blocks), Some(first)) = (&mut self.blocks, ranges.first())
+                    && first.start >= head.max(start)
+                {
+                    blocks.keep_beginning(&ranges, start, bytes);
+                }
                 return Ok(());
             }
             let part =
@@ -384,8 +395,40 @@ impl Session {
 impl Blocks {
     /// Bytes of what waits to be put together.
     fn bytes_beside(&self) -> u64 {
-        let all = self.pieces.values().chain(self.waiting.values());
+        let beginning = self.beginning.iter().map(|(_, bytes)| bytes);
+        let all = self.pieces.values().chain(self.waiting.values()).chain(beginning);
         all.map(|bytes| bytes.len() as u64).sum()
+    }
+
+    /// What is missing of a range of a block.
+    fn rest_of(&self, range: Range<u64>) -> Range<u64> {
+        match &self.beginning {
+            Some((start, bytes)) if *start == range.start => start + bytes.len() as u64..range.end,
+            _ => range,
+        }
+    }
+
+    /// Bytes that have come, with the beginning that they continue.
+    fn with_beginning<'a>(&self, start: u64, bytes: &'a [u8]) -> (u64, Cow<'a, [u8]>) {
+        match &self.beginning {
+            Some((first, begun)) if first + begun.len() as u64 == start => {
+                (*first, Cow::Owned([begun, bytes].concat()))
+            }
+            _ => (start, Cow::Borrowed(bytes)),
+        }
+    }
+
+    /// Keeps what has come of the `ranges` of a block that goes on behind `bytes`, which begin at `start`.
+    fn keep_beginning(&mut self, ranges: &[Range<u64>], start: u64, bytes: &[u8]) {
+        let end = start + bytes.len() as u64;
+        for range in ranges.iter().filter(|range| (start..end).contains(&range.start)) {
+            let come = bytes[(range.start - start) as usize..(range.end.min(end) - start) as usize].to_vec();
+            if range.end <= end {
+                self.pieces.insert(range.start, come);
+            } else {
+                self.beginning = Some((range.start, come));
+            }
+        }
     }
 }
 

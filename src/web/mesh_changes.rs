@@ -1,6 +1,6 @@
 //! Meshes and what has changed in them, for JavaScript that follows them.
 
-use super::results::{JsDelta, JsMesh, floats, integers, mesh_arrays, object, set};
+use super::results::{JsDelta, JsMesh, floats, integers, mesh_arrays, object, put_arrays, set};
 use crate::mt::MeshChanges;
 use crate::view::MeshView;
 use js_sys::Object;
@@ -13,25 +13,37 @@ pub struct Changes {
     pub to: u32,
 }
 
-/// A copy of `mesh` outside wasm memory, with what has changed in it.
-pub fn mesh(mesh: &MeshView<'_>, changes: &Changes) -> JsMesh {
-    let arrays: JsMesh = mesh_arrays(mesh);
-    set(arrays.as_ref(), "changes", &ranges(changes));
-    arrays
+/// A copy of the `wanted` arrays of `view` (see [`put_arrays`]) outside wasm memory, with what has changed in it.
+pub fn mesh(view: &MeshView<'_>, changes: &Changes, wanted: u32) -> JsMesh {
+    let mesh = mesh_arrays(view, wanted);
+    set(mesh.as_ref(), "changes", &ranges(changes));
+    mesh
 }
 
-/// A copy of those parts of `mesh` that have changed.
-pub fn delta(mesh: &MeshView<'_>, changes: &Changes) -> JsDelta {
+/// A copy of those parts of the `wanted` arrays of `mesh` that have changed.
+pub fn delta(mesh: &MeshView<'_>, changes: &Changes, wanted: u32) -> JsDelta {
     let MeshChanges { vertices, tets } = &changes.ranges;
-    object(&[
+    let delta: JsDelta = object(&[
         ("vertexCount", mesh.positions.len().into()),
         ("tetCount", mesh.tets.len().into()),
         ("changes", ranges(changes)),
-        ("positions", floats(&parts(mesh.positions.as_flattened(), vertices, 3))),
-        ("field", floats(&parts(mesh.field, vertices, 1))),
-        ("tets", integers(&parts(mesh.tets.as_flattened(), tets, 4))),
-        ("neighbors", integers(&parts(mesh.neighbors.as_flattened(), tets, 4))),
-    ])
+    ]);
+    put_arrays(delta.as_ref(), wanted, |at| match at {
+        0 => floats(&parts(mesh.positions.as_flattened(), vertices, 3)),
+        1 => floats(&parts(mesh.field, vertices, 1)),
+        2 => integers(&parts(mesh.tets.as_flattened(), tets, 4)),
+        _ => integers(&parts(mesh.neighbors.as_flattened(), tets, 4)),
+    });
+    delta
+}
+
+/// Where the arrays of `mesh` are in wasm memory: an address and a number of elements each.
+pub fn places(mesh: &MeshView<'_>) -> Vec<usize> {
+    let MeshView { positions, field, tets, neighbors } = mesh;
+    let floats = [positions.as_flattened(), field].map(|array| (array.as_ptr() as usize, array.len()));
+    let integers = [tets, neighbors].map(|array| array.as_flattened());
+    let integers = integers.map(|array| (array.as_ptr() as usize, array.len()));
+    floats.into_iter().chain(integers).flat_map(|(address, length)| [address, length]).collect()
 }
 
 fn ranges(changes: &Changes) -> JsValue {

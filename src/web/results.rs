@@ -173,14 +173,26 @@ pub fn set(object: &JsValue, name: &str, value: &JsValue) {
     let _ = Reflect::set(object, &name.into(), value);
 }
 
-/// A copy of `mesh` outside wasm memory.
-pub fn mesh_arrays(mesh: &MeshView<'_>) -> JsMesh {
-    object(&[
-        ("positions", floats(mesh.positions.as_flattened())),
-        ("field", floats(mesh.field)),
-        ("tets", integers(mesh.tets.as_flattened())),
-        ("neighbors", integers(mesh.neighbors.as_flattened())),
-    ])
+/// The arrays of a mesh; of a set of them, bit `i` is that of the `i`-th.
+const ARRAYS: [&str; 4] = ["positions", "field", "tets", "neighbors"];
+
+/// A copy of the `wanted` arrays of `mesh` outside wasm memory.
+pub fn mesh_arrays(mesh: &MeshView<'_>, wanted: u32) -> JsMesh {
+    let arrays: JsMesh = object(&[]);
+    put_arrays(arrays.as_ref(), wanted, |at| match at {
+        0 => floats(mesh.positions.as_flattened()),
+        1 => floats(mesh.field),
+        2 => integers(mesh.tets.as_flattened()),
+        _ => integers(mesh.neighbors.as_flattened()),
+    });
+    arrays
+}
+
+/// Puts the `wanted` ones of the arrays of a mesh into `object`.
+pub fn put_arrays(object: &JsValue, wanted: u32, array: impl Fn(usize) -> JsValue) {
+    for (at, name) in ARRAYS.iter().enumerate().filter(|(at, _)| wanted >> at & 1 == 1) {
+        set(object, name, &array(at));
+    }
 }
 
 /// A copy of `surface` outside wasm memory.

@@ -97,16 +97,23 @@ impl CoreSession {
         Ok(self.session_mut().set_field(index)?)
     }
 
-    /// The current mesh, and what has changed in it since `mesh` or `delta` was last called.
-    pub fn mesh(&mut self) -> Result<JsMesh, WebError> {
+    /// The current mesh, and what has changed in it since `mesh` or `delta` was last called. `arrays` is a set of bits: 1 for
+    /// positions, 2 for the field, 4 for tetrahedra, 8 for neighbours.
+    pub fn mesh(&mut self, arrays: u32) -> Result<JsMesh, WebError> {
         let changes = self.changes()?;
-        Ok(mesh_changes::mesh(&self.session_mut().view(), &changes))
+        Ok(mesh_changes::mesh(&self.session_mut().view(), &changes, arrays))
     }
 
     /// Of the current mesh only what has changed since `mesh` or `delta` was last called.
-    pub fn delta(&mut self) -> Result<JsDelta, WebError> {
+    pub fn delta(&mut self, arrays: u32) -> Result<JsDelta, WebError> {
         let changes = self.changes()?;
-        Ok(mesh_changes::delta(&self.session_mut().view(), &changes))
+        Ok(mesh_changes::delta(&self.session_mut().view(), &changes, arrays))
+    }
+
+    /// Where those four arrays are in wasm memory, until the next call: address and number of elements of each.
+    pub fn places(&mut self) -> Result<Vec<usize>, WebError> {
+        self.known()?;
+        Ok(mesh_changes::places(&self.session_mut().view()))
     }
 
     /// The isosurface of the current mesh at `value`, in field units.

@@ -269,7 +269,7 @@ impl Viewer {
     /// A copy of the mesh that is shown.
     pub fn mesh(&mut self) -> Result<JsMesh, WebError> {
         self.file.info()?;
-        Ok(results::mesh_arrays(&self.file.session_mut().view()))
+        Ok(results::mesh_arrays(&self.file.session_mut().view(), 0b1111))
     }
 
     /// Sets what is drawn: a [`SceneState`](crate::scene::SceneState) as a plain object.

@@ -181,7 +181,7 @@ fn js() -> Result<()> {
     shell::run(&mut node_test("ranges.test.js"))?;
     shell::run(&mut node_test("writers.test.js"))?;
     with_fixture(|| {
-        for name in ["package.test.js", "parts.test.js", "steps.test.js", "places.test.js"] {
+        for name in ["package.test.js", "parts.test.js", "steps.test.js", "places.test.js", "views.test.js"] {
             shell::run(fixture_env(&mut node_test(name)))?;
         }
         Ok(())

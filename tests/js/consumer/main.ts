@@ -48,6 +48,13 @@ for await (const step of mt.refineSteps(seen, { budgetMs: 2, deltas: true })) {
 const whole: RefineResult = await mt.refine(seen);
 const followed = copy.tets.length === whole.tets.length && copy.tets.every((vertex, i) => vertex === whole.tets[i]);
 
+mt.addEventListener("progress", ({ detail }) => void (detail.bytes satisfies number));
+mt.addEventListener("stats", ({ detail }) => void (detail.limitedBy satisfies string | undefined));
+mt.addEventListener("error", ({ detail }) => void detail.message);
+const view: MultiTessellation = await mt.view({ onProgress: () => {} });
+const { tets: some, stats: limited } = await view.refine({ error: "5%" }, { arrays: ["tets"] });
+const beside: IsoSurface = await mt.isosurface(0.5, { normals: "smooth", request: { error: "10%" } });
+
 const local = await MultiTessellation.open(source, { worker: false });
 const where: Where = ({ errors }) => errors.map((error) => error / 0.1);
 const asked = await local.refine({ where }, { deltas: true });
@@ -64,7 +71,7 @@ const examples = await checkOptions(source);
 
 const good =
   chunks > 0 &&
-  examples === 41 &&
+  examples === 45 &&
   positions.length === 3 * mesh.stats.vertices &&
   mesh.tets.length === 4 * mesh.stats.tetrahedra &&
   surface.indices.length % 3 === 0 &&
@@ -72,6 +79,9 @@ const good =
   steps > 0 &&
   followed &&
   whole.stats.bounds.length === 3 &&
+  some.length === 4 * limited.tetrahedra &&
+  limited.limitedBy === "error" &&
+  beside.indices.length > 0 &&
   asked.stats.satisfied &&
   told.tets.length === 4 * asked.tetCount &&
   failed === "bad-option" &&

@@ -12,6 +12,12 @@ export async function misuse(mt: MultiTessellation): Promise<void> {
   await mt.refine({ view: { matrix: new Float32Array(16), pixels: 1 } });
   // @ts-expect-error a whole mesh has no count: that is what a delta has
   (await mt.refine({})).tetCount;
+  // @ts-expect-error an array that was not asked for is not there
+  (await mt.refine({}, { arrays: ["tets"] })).positions;
+  // @ts-expect-error a mesh has no such array
+  await mt.refine({}, { arrays: ["normals"] });
+  // @ts-expect-error there is no such event
+  mt.addEventListener("stats", ({ detail }) => detail.bytes);
   // @ts-expect-error an isovalue is a number
   await mt.isosurface("high");
   // @ts-expect-error a number is no source

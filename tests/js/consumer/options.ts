@@ -9,6 +9,7 @@ import {
   type Progress,
   type RefineOptions,
   type RefineStats,
+  type ResultOptions,
   type StepOptions,
   type TransferOptions,
   type ViewOptions,
@@ -60,7 +61,14 @@ const requests: Examples<RefineOptions> = {
 const steps: Examples<StepOptions> = {
   budgetMs: { budgetMs: 1 },
   updates: { updates: 50 },
+  arrays: { arrays: ["positions", "tets"] },
   signal: { signal: new AbortController().signal },
+};
+
+const results: Examples<ResultOptions> = {
+  partial: { partial: true },
+  arrays: { arrays: ["field"] },
+  zeroCopy: { zeroCopy: true },
 };
 
 const openings: Examples<OpenOptions> = {
@@ -102,6 +110,7 @@ const stats: Members<RefineStats> = {
   missing: "boolean",
   done: "boolean",
   milliseconds: "number",
+  limitedBy: "string undefined",
 };
 
 const infos: Members<MtInfo> = {
@@ -172,6 +181,10 @@ export async function checkOptions(source: URL): Promise<number> {
     const isBudgeted = [options.maxTets, options.maxVertices, options.maxBytes].some((most) => most !== undefined);
     if (!done.satisfied && !isBudgeted) throw new Error(`not satisfied: ${Object.keys(options).join(", ")}`);
     hasMembers("stats", done, stats);
+    count++;
+  }
+  for (const how of Object.values(results)) {
+    if (!(await mt.refine({ error: "5%" }, how)).stats.done) throw new Error("not done");
     count++;
   }
   for (const options of Object.values(steps)) {

@@ -73,6 +73,8 @@ export async function page(canvas: HTMLCanvasElement): Promise<void> {
 export async function misuse(viewer: Viewer): Promise<void> {
   // @ts-expect-error there is no such shape
   await viewer.set({ cells: { shape: "round" } });
+  // @ts-expect-error a viewer has one mesh
+  await viewer.surface({ request: { error: "1%" } });
   // @ts-expect-error a plane has an offset
   await viewer.set({ clips: [{ normal: [0, 1, 0] }] });
   // @ts-expect-error functions cannot go to the viewer's worker: it takes the URL of a module
