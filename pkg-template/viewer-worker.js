@@ -132,6 +132,8 @@ const methods = {
     if (first) stepAll();
     if (!first) return { progress };
     await drawn();
+    // Whoever opened it finds the camera that looks at it, also where the picture takes long.
+    report("camera", viewer.camera());
     return { progress, info: { ...viewer.info(), bounds: Array.from(viewer.bounds()) } };
   },
 
@@ -171,6 +173,7 @@ const methods = {
     ready = true;
     invalidate();
     await drawn();
+    report("camera", viewer.camera());
     return { progress: { ...mine.progress, traffic: mine.traffic }, info: { ...viewer.info(), bounds: Array.from(viewer.bounds()) } };
   },
 

@@ -97,7 +97,9 @@ function card(volume) {
   const [name, words, sizes] = ["b", "span", "small"].map((tag) => document.createElement(tag));
   name.textContent = title;
   words.textContent = sentence;
-  sizes.textContent = `${count(tetrahedra)} tetrahedra, ${size(vtuBytes(volume))} as VTU, ${size(bytes)} as MT`;
+  // Numbers stay with their units.
+  const amount = (number) => size(number).replace(" ", "\u00a0");
+  sizes.textContent = `${count(tetrahedra)} tetrahedra, ${amount(vtuBytes(volume))} as VTU, ${amount(bytes)} as MT`;
   button.append(name, words, sizes);
   button.addEventListener("click", () => openListed(volume));
   item.append(button);

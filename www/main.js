@@ -38,7 +38,8 @@ async function start() {
   attachTheme();
   attachKeys();
   const listed = readVolumes();
-  listed.then(() => demo.state === "starting" && showPoster(wantedUrl() ?? ""));
+  // A picture of it, until it is drawn: for good where it cannot be.
+  listed.then((first) => ["starting", "unsupported"].includes(demo.state) && showPoster(wantedUrl() ?? first?.url));
   // Texts and controls are painted first: to start the GPU takes a while.
   await painted();
   const viewer = await makeViewer(listed);

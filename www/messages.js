@@ -32,7 +32,7 @@ export function say(title, error) {
   // A message that starts with a file's name keeps it as it is.
   const start = words.includes(": ") ? words.charAt(0) : words.charAt(0).toUpperCase();
   $("message-text").textContent = `${start}${words.slice(1)}`;
-  $("message").classList.toggle("beside", demo.firstFrameBytes !== undefined);
+  $("message").classList.toggle("beside", demo.firstFrameBytes !== undefined || demo.state === "unsupported");
   $("message").hidden = false;
 }
 

@@ -20,7 +20,7 @@ export const newPage = (options) => browser.newPage(options);
 
 /** A new page with `volume` opened; its errors are collected in `complaints`. */
 export async function open(volume, prepare = async (_page) => {}, options = {}) {
-  const page = await newPage({ viewport: { width: 1100, height: 760 }, ...options });
+  const page = await newPage({ viewport: { width: 960, height: 660 }, ...options });
   page.setDefaultTimeout(PATIENCE);
   page.complaints = [];
   page.on("pageerror", (error) => page.complaints.push(String(error)));
@@ -80,6 +80,8 @@ export function study(page, png) {
 /** Waits until no frame has been drawn for a while, and the mesh is what was asked for. */
 export async function settle(page) {
   for (let seen = -1; ; ) {
+    // What was set before has reached the worker.
+    await page.evaluate(() => window.tetralodDemo.viewer?.pickRegion(0, 0));
     const [frames, step] = [await demo(page, "frames"), await demo(page, "step")];
     if (frames === seen && step?.done !== false) return;
     seen = frames;

@@ -108,7 +108,7 @@ test("the gallery opens scenes with the counts of the paper, and files are opene
   await page.click("#open-gallery");
   await page.locator("#gallery li").first().waitFor();
   const cards = await page.locator("#gallery li").allInnerTexts();
-  assert.ok(cards.length >= 5 && cards.every((card) => /tetrahedra, [\d.]+ MB as VTU, .*as MT/.test(card)), String(cards));
+  assert.ok(cards.length >= 5 && cards.every((card) => /tetrahedra, [\d.]+\sMB as VTU, .*as MT/.test(card)), String(cards));
   const choose = async (title) => {
     await page.evaluate(() => (window.tetralodDemo.stats = undefined));
     await page.locator("#gallery li", { hasText: title }).click();

@@ -56,7 +56,7 @@ pub const LARGE: Volume = Volume {
                12.4 million tetrahedra, of which the page fetches what the picture needs.",
     data: Data::Helix,
     build: &["--all-fields"],
-    scene: "isovalue=0.55&surface-colour=charge&map=coolwarm&error=50&axes=0&camera=14,14,32.67,104,-0.75,0.12",
+    scene: "isovalue=0.55&surface-colour=charge&map=coolwarm&error=50&axes=0&camera=14,14,32.67,116,-0.75,0.12",
     picture: &["--isovalue", "0.55", "--error", "1%", "--no-outline", "--zoom", "1.5"],
     is_shown: true,
 };
@@ -219,7 +219,9 @@ pub fn make(tetralod: &Path, volume: &Volume, prefix: &[&str]) -> Result<()> {
     if volume.is_shown && !is_newer(&picture, &mt) {
         let mut args = vec!["render".to_owned(), mt.display().to_string()];
         args.extend(volume.picture.iter().map(|arg| (*arg).to_owned()));
-        args.extend(["--size", "480x300", "--samples", "4", "-o"].map(str::to_owned));
+        args.extend(
+            ["--size", "480x300", "--samples", "4", "--background", "transparent", "-o"].map(str::to_owned),
+        );
         args.push(picture.display().to_string());
         // Without Vulkan there are no thumbnails; the page does without.
         if let Err(error) = run(args) {
