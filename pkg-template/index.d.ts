@@ -89,7 +89,7 @@ export interface ReadOptions {
   memory?: number;
   /** The name of a cache (Cache Storage) in which the parts are kept for the next time. Default: none. */
   cache?: string;
-  /** Whether to download the file as a whole, front to back. Default: only where the server gives no byte ranges. */
+  /** Whether to read the file as a whole, front to back. Default: only where the server gives no byte ranges. */
   whole?: boolean;
   /** Headers of every request for a URL; servers of other origins must allow them. */
   headers?: HeadersInit;
@@ -233,8 +233,8 @@ export class MultiTessellation extends WithMeshTools {
    * Opens a volume. Resolves as soon as its base mesh has arrived.
    *
    * A URL (text, `URL`, or a `Request` that gets) of `http` or `https` is fetched in parts, by byte ranges: only the
-   * blocks that the request needs, most important first. If the server gives no ranges, with `whole`, and from all
-   * other sources, the rest arrives as a stream.
+   * blocks that the request needs, most important first. A `File` or `Blob` is read so, too, by slices. If the server gives
+   * no ranges, with `whole`, and from all other sources, the rest arrives as a stream.
    *
    * @example
    * await MultiTessellation.open("https://example.org/combustor.mt");
