@@ -299,11 +299,12 @@ export class Ranges {
  */
 function sliceOf(blob) {
   return async (_, { headers }) => {
-    const [, start, last] = /^bytes=(\d+)-(\d*)$/.exec(headers.get("range"));
+    const [, first, last] = /^bytes=(\d+)-(\d*)$/.exec(headers.get("range"));
+    const start = Number(first);
     const end = last === "" ? blob.size : Math.min(Number(last) + 1, blob.size);
     if (start >= end) return new Response(null, { status: 416, headers: { "content-range": `bytes */${blob.size}` } });
     const range = { "content-range": `bytes ${start}-${end - 1}/${blob.size}`, "content-length": String(end - start), etag: '"blob"' };
-    return new Response(blob.slice(Number(start), end), { status: 206, headers: range });
+    return new Response(blob.slice(start, end), { status: 206, headers: range });
   };
 }
 

@@ -184,11 +184,10 @@ function bytesOf(value) {
  * @returns {{ url: string, headers?: [string, string][], credentials?: RequestCredentials, blob?: Blob, name?: string } | undefined}
  */
 export function rangesOf(source, { headers, credentials } = {}) {
-  // A Blob without content is a file that ended too early.
-  if (isInstance(source, "Blob") && source.size > 0) {
+  // A Blob without content is a file that ended too early. Node 20 crashes when a worker reads a Blob that is backed by a file.
+  if (isInstance(source, "Blob") && source.size > 0 && !nodeModule("node:worker_threads")) {
     const name = source.name || "blob";
-    // A File without its name is a Blob, which every runtime can send to a worker.
-    return { url: `blob:${encodeURIComponent(name)}`, blob: source.slice(), name };
+    return { url: `blob:${encodeURIComponent(name)}`, blob: source, name };
   }
   const given = urlOf(source);
   const url = given === undefined ? "" : absolute(given);

@@ -120,31 +120,10 @@ for (const worker of [true, false]) {
         await mt.complete;
         assert.equal((await mt.refine({ error: 0 })).stats.tetrahedra, mt.info.tetrahedra, name);
         assert.equal(mt.progress.bytes, bytes.length, name);
-        // A Blob is read in parts, as far as it is needed.
-        if (name !== "a blob") assert.equal(mt.progress.complete, true, name);
+        assert.equal(mt.progress.complete, true, name);
         mt.free();
       }
       assert.deepEqual(bytes, copy);
-    });
-
-    test("a file of the user is read by slices, as far as it is needed", async () => {
-      const large = await readFile(`${folder}/blocks-half-edge.mt`);
-      const mt = await open(new File([large], "large.mt"));
-      const { stats } = await mt.refine({ error: "5%" });
-      assert.ok(stats.satisfied && !stats.missing);
-      assert.ok(mt.progress.bytes < large.length / 2, `${mt.progress.bytes} of ${large.length} bytes`);
-      const early = mt.progress.bytes;
-      assert.equal((await mt.refine({ error: 0 })).stats.tetrahedra, mt.info.tetrahedra);
-      assert.ok(mt.progress.bytes > early);
-      mt.free();
-      const whole = await open(new File([large], "large.mt"), { whole: true });
-      await whole.complete;
-      assert.equal(whole.progress.complete, true);
-      whole.free();
-      await rejects(open(new File([large.subarray(0, 5000)], "cut.mt")).then((mt) => mt.refine({ error: 0 })), "truncated", /^cut\.mt: /);
-      await rejects(open(new File(["no mesh at all"], "other.mt")), "not-mt", /^other\.mt: /);
-      await rejects(open(new File([], "empty.mt")), "truncated", /^empty\.mt: /);
-      await rejects(open(new File(["<!doctype html>"], "page.mt", { type: "text/html" })), "not-mt", /^page\.mt: /);
     });
 
     test("arrays are consistent and the mesh is closed", async () => {
