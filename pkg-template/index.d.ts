@@ -233,8 +233,8 @@ export class MultiTessellation extends WithMeshTools {
    * Opens a volume. Resolves as soon as its base mesh has arrived.
    *
    * A URL (text, `URL`, or a `Request` that gets) of `http` or `https` is fetched in parts, by byte ranges: only the
-   * blocks that the request needs, most important first. A `File` or `Blob` is read so, too, by slices. If the server gives
-   * no ranges, with `whole`, and from all other sources, the rest arrives as a stream.
+   * blocks that the request needs, most important first. In pages a `File` or `Blob` is read so, too, by slices. If the
+   * server gives no ranges, with `whole`, and from all other sources, the rest arrives as a stream.
    *
    * @example
    * await MultiTessellation.open("https://example.org/combustor.mt");
@@ -369,6 +369,14 @@ export type ErrorCode =
   | "too-large"
   /** The GPU refused a command; a mistake in this package, please report it (viewer only). */
   | "gpu"
+  /** The file is of no format that can be built from (`tetralod/build` only). */
+  | "unknown-format"
+  /** The file has cells, or is of a type, that cannot be read here; the message says what to do (`tetralod/build` only). */
+  | "unsupported"
+  /** The mesh cannot be built: the message says which cell or point, and why (`tetralod/build` only). */
+  | "bad-mesh"
+  /** The files, or the work, need more memory than a wasm module can have (`tetralod/build` only). */
+  | "memory"
   /** A mistake in this package: please report it. */
   | "internal";
 

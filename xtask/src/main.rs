@@ -9,6 +9,7 @@ mod bench_pictures;
 mod browser;
 mod demo;
 mod fixture;
+mod fixture_builds;
 mod flow;
 mod package;
 mod paper;

@@ -1,7 +1,7 @@
-//! `cargo xtask build`: the two wasm modules and the hand-written JavaScript, merged into `pkg/`.
+//! `cargo xtask build`: the three wasm modules and the hand-written JavaScript, merged into `pkg/`.
 //!
-//! The core (decoder, refinement, isosurfaces) and the viewer (the same with the renderer) are separate modules, so
-//! that a page which draws by its own means does not download a renderer.
+//! The core (decoder, refinement, isosurfaces), the viewer (the same with the renderer) and the builder are separate modules, so
+//! that a page which draws by its own means does not download a renderer, and one that shows files no builder.
 
 use std::fs;
 use std::io::Write;
@@ -25,14 +25,18 @@ pub const PKG: &str = "pkg";
 /// types that are sorted, and one reader for each type of option, 377 kB.
 const CORE_LIMIT: usize = 380_000;
 
+/// The builder, with brotli as servers compress it: the readers of all formats, and the builders of all kinds.
+const BUILD_LIMIT: usize = 460_000;
+
 struct Module {
     name: &'static str,
     features: &'static str,
 }
 
-const MODULES: [Module; 2] = [
+const MODULES: [Module; 3] = [
     Module { name: "tetralod_core", features: "web-session" },
     Module { name: "tetralod_viewer", features: "web,gpu" },
+    Module { name: "tetralod_build", features: "web-build" },
 ];
 
 /// What `wasm-opt` may use: what rustc and wasm-bindgen use already, and nothing beyond.
@@ -151,16 +155,27 @@ fn remake(folder: &Path) -> Result<()> {
 }
 
 fn report(pkg: &Path) -> Result<()> {
-    println!("{:<28} {:>10} {:>10}", "pkg/", "bytes", "gzipped");
+    println!("{:<28} {:>10} {:>10} {:>10}", "pkg/", "bytes", "gzipped", "brotli");
     for module in &MODULES {
         let file = format!("{}_bg.wasm", module.name);
         let bytes = fs::read(pkg.join(&file)).with_context(|| file.clone())?;
         let gzipped = gzipped(&bytes)?;
-        println!("{file:<28} {:>10} {gzipped:>10}", bytes.len());
+        let brotli = brotli(&pkg.join(&file))?;
+        println!("{file:<28} {:>10} {gzipped:>10} {brotli:>10}", bytes.len());
         let too_big = module.name == "tetralod_core" && gzipped > CORE_LIMIT;
         ensure!(!too_big, "{file} is {gzipped} bytes gzipped; the limit is {CORE_LIMIT}");
+        let too_big = module.name == "tetralod_build" && brotli > BUILD_LIMIT;
+        ensure!(!too_big, "{file} is {brotli} bytes with brotli; the limit is {BUILD_LIMIT}");
     }
     Ok(())
+}
+
+/// The size of a file as servers send it with brotli; Node has the compressor.
+fn brotli(file: &Path) -> Result<usize> {
+    let script = "const { readFileSync } = require('node:fs'); const { brotliCompressSync } = require('node:zlib'); \
+                  console.log(brotliCompressSync(readFileSync(process.argv[1])).length)";
+    let printed = shell::output(shell::command("node", ["-e", script]).arg(file))?;
+    printed.trim().parse().with_context(|| format!("the size of {}", file.display()))
 }
 
 fn gzipped(bytes: &[u8]) -> Result<usize> {

@@ -95,6 +95,7 @@ fn features() -> Result<()> {
     lint_library("build", &[])?;
     shell::add_wasm_target()?;
     lint_library("web-session", &["--target", shell::WASM])?;
+    lint_library("web-build", &["--target", shell::WASM])?;
     with_fixture(|| {
         let args = ["clippy", "--package", "tetralod", "--lib", "--test", "web", "--target", shell::WASM];
         shell::run(fixture_env(shell::cargo(args).args(WEB_FEATURES).args(["--", "-D", "warnings"])))
@@ -173,6 +174,7 @@ fn js() -> Result<()> {
     shell::run(&mut node_test("ranges.test.js"))?;
     with_fixture(|| {
         shell::run(fixture_env(&mut node_test("package.test.js")))?;
+        shell::run(fixture_env(&mut node_test("build.test.js")))?;
         shell::run(fixture_env(&mut node_test("parts.test.js")))?;
         shell::run(fixture_env(&mut node_test("steps.test.js")))
     })
