@@ -5,6 +5,7 @@
  * `state` is "starting", "opening", "streaming", "complete", "failed" or "unsupported".
  */
 
+import { takeMesh } from "./build.js";
 import { ColourSettings } from "./colours.js";
 import { Comparison } from "./compare.js";
 import { attachControls } from "./controls.js";
@@ -600,9 +601,9 @@ function attachFiles() {
   $("volume").addEventListener("change", () => open($("volume").value));
   $("choose").addEventListener("click", () => $("file").click());
   $("file").addEventListener("change", () => {
-    const [file] = $("file").files;
+    const files = [...$("file").files];
     $("file").value = "";
-    if (file) open(file);
+    if (files.length > 0 && !takeMesh(files, open)) open(files[0]);
   });
   const carriesFile = (event) => event.dataTransfer?.types.includes("Files");
   window.addEventListener("dragover", (event) => {
@@ -617,8 +618,8 @@ function attachFiles() {
     $("drop").hidden = true;
     if (!carriesFile(event)) return;
     event.preventDefault();
-    const [file] = event.dataTransfer.files;
-    if (file) open(file);
+    const files = [...event.dataTransfer.files];
+    if (files.length > 0 && !takeMesh(files, open)) open(files[0]);
   });
 }
 

@@ -234,7 +234,7 @@ fn e2e() -> Result<()> {
     let server = demo::start_server(&tetralod, 0)?;
     shell::run(node_test("ranges-browser.test.js").env("CHROMIUM", &browser.chromium))?;
     with_fixture(|| {
-        for name in ["parts-browser.test.js", "viewer-browser.test.js"] {
+        for name in ["parts-browser.test.js", "viewer-browser.test.js", "build-browser.test.js"] {
             shell::run(fixture_env(node_test(name).env("CHROMIUM", &browser.chromium)))?;
         }
         Ok(())
