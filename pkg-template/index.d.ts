@@ -91,7 +91,7 @@ export interface ReadOptions {
   memory?: number;
   /** The name of a cache (Cache Storage) in which the parts are kept for the next time. Default: none. */
   cache?: string;
-  /** Whether to download the file as a whole, front to back. Default: only where the server gives no byte ranges. */
+  /** Whether to read the file as a whole, front to back. Default: only where the server gives no byte ranges. */
   whole?: boolean;
   /** Headers of every request for a URL; servers of other origins must allow them. */
   headers?: HeadersInit;
@@ -320,8 +320,8 @@ export class MultiTessellation extends WithMeshTools {
    * Opens a volume. Resolves as soon as its base mesh has arrived.
    *
    * A URL (text, `URL`, or a `Request` that gets) of `http` or `https` is fetched in parts, by byte ranges: only the
-   * blocks that the request needs, most important first. If the server gives no ranges, with `whole`, and from all
-   * other sources, the rest arrives as a stream.
+   * blocks that the request needs, most important first. In pages a `File` or `Blob` is read so, too, by slices. If the
+   * server gives no ranges, with `whole`, and from all other sources, the rest arrives as a stream.
    *
    * @example
    * await MultiTessellation.open("https://example.org/combustor.mt");
@@ -514,6 +514,14 @@ export type ErrorCode =
   | "too-large"
   /** The GPU refused a command; a mistake in this package, please report it (viewer only). */
   | "gpu"
+  /** The file is of no format that can be built from (`tetralod/build` only). */
+  | "unknown-format"
+  /** The file has cells, or is of a type, that cannot be read here; the message says what to do (`tetralod/build` only). */
+  | "unsupported"
+  /** The mesh cannot be built: the message says which cell or point, and why (`tetralod/build` only). */
+  | "bad-mesh"
+  /** The files, or the work, need more memory than a wasm module can have (`tetralod/build` only). */
+  | "memory"
   /** A mistake in this package, also in a worker that had started: please report it. */
   | "internal";
 

@@ -21,7 +21,8 @@ import { Ranges } from "./ranges.js";
 export class Parts {
   #session;
   #ranges;
-  #url;
+  /** What to call the file in messages. */
+  #name;
   #onChange;
   #begun = deferred();
   /** Callers that wait until nothing is needed any more, and those that wait for any data. */
@@ -42,7 +43,7 @@ export class Parts {
    * @param {(error: Error) => void} [onError] hears of what ends the fetching until `retry`
    */
   constructor(RangeLoader, makeSession, url, options, onChange, onError = () => {}) {
-    this.#url = url;
+    this.#name = options.name ?? url;
     this.#onChange = onChange;
     const sink = {
       // Without ranges each look at the file would be one at all of it.
@@ -90,7 +91,7 @@ export class Parts {
     } catch (error) {
       const known = reviveError(error);
       this.#ranges.forget();
-      this.#fail(new TetralodError(known.code, `${this.#url}: ${known.message}`, { cause: error }));
+      this.#fail(new TetralodError(known.code, `${this.#name}: ${known.message}`, { cause: error }));
       return false;
     }
   }

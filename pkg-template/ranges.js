@@ -35,6 +35,8 @@ const LATE = 100;
  * @property {number} [retries] of the same bytes; 5
  * @property {number} [backoffMs] before the first of these; 500
  * @property {number} [timeoutMs] without a byte; 30000
+ * @property {Blob} [blob] is read instead of a server
+ * @property {string} [name] stands for the address in messages
  */
 
 /**
@@ -75,6 +77,8 @@ export class Ranges {
    * @param {RangesOptions} [options]
    */
   constructor(RangeLoader, url, sink, options = {}) {
+    // What a file of the user does not give at once, it does not give later.
+    if (options.blob) options = { ...options, fetch: sliceOf(options.blob), retries: 0, cache: undefined };
     const { maxRequests, gap, maxRequestBytes, retries, backoffMs, timeoutMs } = options;
     this.#loader = new RangeLoader(maxRequests, gap, maxRequestBytes, retries, backoffMs, timeoutMs, Math.random());
     this.#url = this.#ledTo = new URL(url, globalThis.location?.href).href;
@@ -160,7 +164,8 @@ export class Ranges {
       if (this.#failed) return;
       this.#failed = true;
       const known = reviveError(error);
-      this.#sink.onError(new TetralodError(known.code, `${this.#url}: ${known.message}`, { cause: error }));
+      const name = this.#options.name ?? this.#url;
+      this.#sink.onError(new TetralodError(known.code, `${name}: ${known.message}`, { cause: error }));
     }
   }
 
@@ -355,6 +360,22 @@ class SharedVersion {
   clear() {
     this.#ranges.clear();
   }
+}
+
+/**
+ * Answers requests for ranges of `blob` as a server would, by slices of it.
+ *
+ * @returns {typeof fetch}
+ */
+function sliceOf(blob) {
+  return async (_, { headers }) => {
+    const [, first, last] = /^bytes=(\d+)-(\d*)$/.exec(headers.get("range"));
+    const start = Number(first);
+    const end = last === "" ? blob.size : Math.min(Number(last) + 1, blob.size);
+    if (start >= end) return new Response(null, { status: 416, headers: { "content-range": `bytes */${blob.size}` } });
+    const range = { "content-range": `bytes ${start}-${end - 1}/${blob.size}`, "content-length": String(end - start), etag: '"blob"' };
+    return new Response(blob.slice(start, end), { status: 206, headers: range });
+  };
 }
 
 /** Ranges of one version of one file in Cache Storage. Nothing depends on it: whatever fails is as if it were empty. */

@@ -177,13 +177,18 @@ function bytesOf(value) {
 }
 
 /**
- * What `Ranges` needs to fetch `source` in parts, if that is a file on a server: its address, and what goes along.
+ * What `Ranges` needs to fetch `source` in parts, if that is a file on a server or of the user: its address, and what goes along.
  *
  * @param {import("./index.js").Source} source
  * @param {{ headers?: HeadersInit, credentials?: RequestCredentials }} [along] goes along with a request
- * @returns {{ url: string, headers?: [string, string][], credentials?: RequestCredentials } | undefined}
+ * @returns {{ url: string, headers?: [string, string][], credentials?: RequestCredentials, blob?: Blob, name?: string } | undefined}
  */
 export function rangesOf(source, { headers, credentials } = {}) {
+  // A Blob without content is a file that ended too early. Node 20 crashes when a worker reads a Blob that is backed by a file.
+  if (isInstance(source, "Blob") && source.size > 0 && !nodeModule("node:worker_threads")) {
+    const name = source.name || "blob";
+    return { url: `blob:${encodeURIComponent(name)}`, blob: source, name };
+  }
   const given = urlOf(source);
   const url = given === undefined ? "" : absolute(given);
   if (!/^https?:/.test(url)) return undefined;

@@ -275,7 +275,7 @@ export class Viewer extends withMeshTools(EventTarget) {
     // The worker reports errors by itself.
     finished.catch(() => {});
     this.#emit("progress", opened.progress);
-    return { info: opened.info, name: url, total: opened.progress.total, finished };
+    return { info: opened.info, name: options.name ?? url, total: opened.progress.total, finished };
   }
 
   /** Of a file that is fetched in parts: resolves when all data that the mesh needs now has arrived. */

@@ -58,7 +58,7 @@
 //! | `http` | `stream::HttpSource` | MT files on servers, in native programs |
 //! | `gpu` | module `gpu`: the renderer on wgpu, with WebGPU as its only backend | pages; add a backend of wgpu for native use |
 //! | `vulkan` | `gpu` with wgpu's Vulkan backend | testing the renderer without a browser |
-//! | `web` | module `web`: the JavaScript API, with `gpu` also the viewer | `wasm32-unknown-unknown` |
+//! | `web` | module `web`: the JavaScript API, with `gpu` also the viewer, with `build` (`web-build`) the builder | `wasm32-unknown-unknown` |
 //!
 //! The command `tetralod` is a crate of its own, `tetralod-cli`.
 //!

@@ -1,13 +1,14 @@
 /** Volumes of the user: chosen, or dropped on the page. */
 
+import { takeMesh } from "./build.js";
 import { $ } from "./dom.js";
 import { open } from "./opening.js";
 
-/** Takes files that the user has chosen or dropped. What else than MT files is to be read goes here. @param {File[]} files */
+/** Takes files that the user has chosen or dropped: an MT file to open, or a mesh to build one of. @param {File[]} files */
 export function takeFiles(files) {
   if (files.length === 0) return;
   $("gallery").close();
-  open(files[0]);
+  if (!takeMesh(files, open)) open(files[0]);
 }
 
 export function attachFiles() {

@@ -1,7 +1,7 @@
 //! `tetralod build`: a mesh to an MT file.
 
-use super::files::{self, CRITERION, METHOD};
-use super::input::{self, FieldSelection};
+use super::files;
+use super::input;
 use super::output::{self, Verbosity};
 use anyhow::{Context, Result, anyhow};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -11,10 +11,10 @@ use std::path::PathBuf;
 use std::time::Instant;
 use tetralod::builder::{
     BuildConfig, BuildCriterion, BuildError, BuildProgress, BuildResult, BuildSummary, Construction,
-    FieldPrecision, Method, Purpose,
+    ConstructionChoice, FieldPrecision, Method, Purpose,
 };
 use tetralod::format::{EncodeOptions, encode_to};
-use tetralod::io::CellData;
+use tetralod::io::{CellData, FieldSelection};
 use tetralod::mesh::{Field, RepairReport, TetMesh};
 use tetralod::mt::MtKind;
 
@@ -156,8 +156,9 @@ fn last_pair(text: &str) -> Result<(String, String)> {
 /// Keys do not hold `=`, values may.
 fn first_pair(text: &str) -> Result<(String, String)> {
     let (key, value) = text.split_once('=').context("it must be KEY=VALUE")?;
-    if key.is_empty() || [METHOD, CRITERION].contains(&key) {
-        anyhow::bail!("a key must not be empty, '{METHOD}' or '{CRITERION}'");
+    let [method, criterion] = Construction::METADATA_KEYS;
+    if key.is_empty() || [method, criterion].contains(&key) {
+        anyhow::bail!("a key must not be empty, '{method}' or '{criterion}'");
     }
     Ok((key.to_owned(), value.to_owned()))
 }
@@ -213,8 +214,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     let BuildResult { mt, summary, exact, .. } = build(arguments, &config, &mesh)?;
     drop(mesh);
-    let own = metadata(&config).into_iter().map(|(k, v)| (k.to_owned(), v.to_owned()));
-    let metadata = own.chain(arguments.metadata.iter().cloned()).collect();
+    let metadata =
+        config.construction.metadata().into_iter().chain(arguments.metadata.iter().cloned()).collect();
     let options = EncodeOptions { block_bits: config.block_bits, check_margins: true, exact, metadata };
     let file_bytes = files::write_file(&arguments.output, |out| Ok(encode_to(&mt, &options, out)?))?;
     let report = report(&config, &summary, file_bytes, start.elapsed().as_secs_f64(), repaired);
@@ -245,22 +246,11 @@ fn read(arguments: &Arguments, config: &BuildConfig) -> Result<(TetMesh, RepairR
     Ok((mesh, repaired))
 }
 
-/// The kind of MT that goes with the other options.
-fn default_kind(arguments: &Arguments) -> MtKind {
-    match (arguments.method, arguments.criterion) {
-        (Some(Method::Collapse), _) => MtKind::Edge,
-        (Some(Method::Insert), _) | (_, Some(BuildCriterion::Delaunay)) => MtKind::Vertex,
-        (Some(Method::Decimate), _) | (_, Some(BuildCriterion::HalfEdge)) => MtKind::HalfEdge,
-        (None, None) if arguments.purpose.is_some() => MtKind::HalfEdge,
-        (None, None) if arguments.tet_errors => MtKind::Vertex,
-        (None, None) => BuildConfig::default().construction.kind(),
-    }
-}
-
 /// How to build. Ends the program if the options contradict each other.
 fn config(arguments: &Arguments) -> BuildConfig {
-    let kind = arguments.kind.unwrap_or_else(|| default_kind(arguments));
-    let default = BuildConfig::of(kind);
+    let &Arguments { kind, method, criterion, purpose, tet_errors, .. } = arguments;
+    let choice = ConstructionChoice { kind, method, criterion, purpose, tet_errors };
+    let default = BuildConfig::of(choice.kind());
     let precision: Vec<&Precision> = arguments.field_bits.iter().chain(&arguments.field_tolerance).collect();
     let for_all: Vec<FieldPrecision> =
         precision.iter().filter(|p| p.name.is_none()).map(|p| p.precision).collect();
@@ -271,7 +261,7 @@ fn config(arguments: &Arguments) -> BuildConfig {
     }
     let of_one = |p: &&Precision| p.name.clone().map(|name| (name, p.precision));
     BuildConfig {
-        construction: construction(arguments, kind).unwrap_or_else(|wrong| super::refuse_usage(&wrong)),
+        construction: construction(&choice).unwrap_or_else(|wrong| super::refuse_usage(&wrong)),
         fields: arguments.fields.clone(),
         all_fields: arguments.all_fields,
         position_bits: arguments.position_bits,
@@ -286,31 +276,18 @@ fn config(arguments: &Arguments) -> BuildConfig {
     }
 }
 
-/// How an MT of this kind is built, or why the options contradict each other.
-fn construction(arguments: &Arguments, kind: MtKind) -> Result<Construction, String> {
-    let default = Construction::default_for(kind).method();
-    let method = arguments.method.unwrap_or(if arguments.tet_errors { Method::Insert } else { default });
-    let criterion = arguments.criterion.unwrap_or(BuildCriterion::default_for(method));
+/// How an MT is built, or why the options contradict each other, by the names of the options where that says more.
+fn construction(choice: &ConstructionChoice) -> Result<Construction, String> {
     let refused = |error: BuildError| error.to_string();
-    let mut construction = Construction::new(kind, method, criterion).map_err(refused)?;
-    if arguments.tet_errors {
-        construction = construction.with_tet_errors().map_err(refused)?;
-    }
-    if method == Method::Collapse && arguments.criterion.is_some() {
+    let by_collapse = choice.method() == Method::Collapse;
+    let criterion = choice.criterion.filter(|_| !by_collapse);
+    let (kind, method) = (Some(choice.kind()), Some(choice.method()));
+    let choice_without = ConstructionChoice { kind, method, criterion, purpose: None, ..*choice };
+    choice_without.construction().map_err(refused)?;
+    if by_collapse && choice.criterion.is_some() {
         return Err("--criterion goes with --method insert or decimate, not with collapse".to_owned());
     }
-    match arguments.purpose {
-        Some(purpose) => {
-            construction.with_purpose(purpose).map_err(|_| "--for goes with --method decimate".to_owned())
-        }
-        None => Ok(construction),
-    }
-}
-
-/// The metadata about how the file was built.
-fn metadata(config: &BuildConfig) -> Vec<(&'static str, &'static str)> {
-    let criterion = config.construction.criterion().map(|criterion| (CRITERION, criterion.name()));
-    criterion.into_iter().chain([(METHOD, config.construction.method().name())]).collect()
+    choice.construction().map_err(|_| "--for goes with --method decimate".to_owned())
 }
 
 fn build(arguments: &Arguments, config: &BuildConfig, mesh: &TetMesh) -> Result<BuildResult> {

@@ -7,16 +7,12 @@ use std::io::{BufWriter, Cursor, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
-use tetralod::builder::Method;
+use tetralod::builder::{Construction, Method};
 use tetralod::client::{Client, ClientOptions};
 use tetralod::mt::{Mt, MtInfo};
 use tetralod::session::Session;
 use tetralod::stream::{Arrived, FileSource, HttpOptions, HttpSource, RangeSource, StreamError, WantedRange};
 use tetralod::verify::Reference;
-
-/// The metadata keys under which `build` writes how a file was built.
-pub const METHOD: &str = "method";
-pub const CRITERION: &str = "criterion";
 
 /// Bytes that are read at a time.
 const CHUNK: u64 = 1 << 20;
@@ -171,7 +167,8 @@ impl Opened {
     /// What its reference mesh has in common with the input, by what the builder wrote into the file.
     pub fn reference(&self) -> Reference {
         let mut metadata = self.session.metadata().iter();
-        let method = metadata.find(|(key, _)| key == METHOD).map(|(_, value)| value.as_str());
+        let method =
+            metadata.find(|(key, _)| *key == Construction::METADATA_KEYS[0]).map(|(_, value)| value.as_str());
         let found = Method::ALL.into_iter().find(|m| Some(m.name()) == method);
         if found.is_none_or(Method::keeps_the_mesh) { Reference::Mesh } else { Reference::Points }
     }

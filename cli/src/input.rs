@@ -4,19 +4,9 @@ use super::files::{self, Opened};
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 use tetralod::io;
-use tetralod::io::{CellData, ReadOptions, Step};
-use tetralod::mesh::{Field, RepairReport, TetMesh, repair};
+use tetralod::io::{CellData, FieldSelection};
+use tetralod::mesh::{RepairReport, TetMesh, repair};
 use tetralod::verify::Reference;
-
-/// Which fields of the files are read.
-pub struct FieldSelection<'a> {
-    /// Names of fields, a vector's for its components; the first field if there are none and not all are wanted.
-    pub names: &'a [String],
-    /// All fields.
-    pub all: bool,
-    /// What to do with fields at cells. Their values are turned into fields at points.
-    pub cells: CellData,
-}
 
 /// Reads the time steps in `paths`, each a mesh or a list of such, as one mesh, and mends what can be mended. Points
 /// without any cell are as they are.
@@ -31,75 +21,15 @@ pub fn read(paths: &[PathBuf], wanted: &FieldSelection<'_>) -> Result<(TetMesh, 
         // Read errors name the file themselves.
         steps.extend(io::steps(path)?);
     }
-    let (first, later) = steps.split_first().context("no input is given")?;
-    let mut options = ReadOptions { fields: None, cells: wanted.cells };
-    let mut mesh = io::read_with(&first.path, &options)?;
-    if !later.is_empty() {
-        if let Some(names) = reduce(&mut mesh, wanted) {
-            options.fields = Some(names);
-            append(&mut mesh, first, later, &options)?;
-        }
-    } else if let Some(time) = first.time {
-        set_time(&mut mesh, time);
-    }
-    let (mut mesh, report) = mend(mesh, &first.path)?;
+    let named: Vec<_> = steps.iter().map(|step| (step.path.display().to_string(), step.time)).collect();
+    let mesh = io::read_time_steps(&named, wanted, &mut |number, options| {
+        io::read_with(&steps[number].path, options)
+    })?;
+    let (mut mesh, report) = mend(mesh, &steps[0].path)?;
     if wanted.cells == CellData::Values {
         mesh.cells_to_points();
     }
     Ok((mesh, report))
-}
-
-/// Leaves the fields that are wanted; returns their names. None if one is missing: that is for the builder to refuse, who
-/// names those that are there.
-fn reduce(mesh: &mut TetMesh, wanted: &FieldSelection<'_>) -> Option<Vec<String>> {
-    let any = |test: &dyn Fn(&Field) -> bool| mesh.fields.iter().chain(&mesh.cell_fields).any(test);
-    if !wanted.names.iter().all(|name| any(&|field| field.answers_to(name))) {
-        return None;
-    }
-    if wanted.names.is_empty() && !wanted.all {
-        // Where points have no field, the first one comes from the cells.
-        mesh.fields.truncate(1);
-        mesh.cell_fields.truncate(usize::from(mesh.fields.is_empty()));
-    } else {
-        let keep = |field: &Field| wanted.all || wanted.names.iter().any(|name| field.answers_to(name));
-        mesh.fields.retain(keep);
-        mesh.cell_fields.retain(keep);
-    }
-    Some(mesh.fields.iter().chain(&mesh.cell_fields).map(|field| field.name.clone()).collect())
-}
-
-/// Appends the fields of the later time steps. Steps without a time in their files are numbered from 0.
-fn append(mesh: &mut TetMesh, first: &Step, later: &[Step], options: &ReadOptions) -> Result<()> {
-    let first_time = first.time.or_else(|| time_of(mesh));
-    let mut times = vec![first_time.unwrap_or(0.0)];
-    set_time(mesh, times[0]);
-    for (number, step) in later.iter().enumerate() {
-        let name = step.path.display();
-        let mut next = io::read_with(&step.path, options)?;
-        let time = match (step.time.or_else(|| time_of(&next)), first_time) {
-            (Some(time), Some(_)) => time,
-            (None, None) => number as f64 + 1.0,
-            _ => bail!("{name}: some files contain their time and some do not; list all of them in a .pvd"),
-        };
-        if times.contains(&time) {
-            bail!("{name}: there is another time step at {time}; give each its own time, in a .pvd");
-        }
-        times.push(time);
-        set_time(&mut next, time);
-        let same = |field: &Field| options.fields.as_ref().is_some_and(|names| names.contains(&field.name));
-        next.fields.retain(same);
-        next.cell_fields.retain(same);
-        mesh.add_step(next).with_context(|| name.to_string())?;
-    }
-    Ok(())
-}
-
-fn time_of(mesh: &TetMesh) -> Option<f64> {
-    mesh.fields.iter().chain(&mesh.cell_fields).find_map(|field| field.time)
-}
-
-fn set_time(mesh: &mut TetMesh, time: f64) {
-    mesh.fields.iter_mut().chain(&mut mesh.cell_fields).for_each(|field| field.time = Some(time));
 }
 
 fn mend(mesh: TetMesh, path: &Path) -> Result<(TetMesh, RepairReport)> {

@@ -132,7 +132,8 @@ impl<'a> Builder<'a> {
             if steps.is_multiple_of(1024) {
                 let done = self.history.len() as u64;
                 let total = u64::from(self.reference.points);
-                if progress(BuildProgress { stage: "collapse", done, total }).is_break() {
+                let tetrahedra = Some(self.mesh.live());
+                if progress(BuildProgress { stage: "collapse", done, total, tetrahedra }).is_break() {
                     return Err(BuildError::Stopped);
                 }
             }

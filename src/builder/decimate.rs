@@ -133,7 +133,8 @@ impl<'a> Decimator<'a> {
         for batch in candidates.chunks(size) {
             let done = self.sequence.steps.len() as u64;
             let total = u64::from(self.state.reference.points);
-            if progress(BuildProgress { stage: "remove", done, total }).is_break() {
+            let tetrahedra = Some(self.state.mesh.live());
+            if progress(BuildProgress { stage: "remove", done, total, tetrahedra }).is_break() {
                 return Err(BuildError::Stopped);
             }
             self.remove_before(batch[0].guess, &mut ready);

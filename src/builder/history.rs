@@ -213,7 +213,7 @@ impl Replay<'_> {
         for (done, &i) in order.iter().enumerate() {
             if done % 4096 == 0 {
                 let (done, total) = (done as u64, self.history.len() as u64);
-                if progress(BuildProgress { stage: "order", done, total }).is_break() {
+                if progress(BuildProgress { stage: "order", done, total, tetrahedra: None }).is_break() {
                     return Err(BuildError::Stopped);
                 }
             }

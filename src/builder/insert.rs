@@ -270,9 +270,8 @@ impl<'a> Greedy<'a> {
     fn insert_all(&mut self, count: usize, progress: OnProgress<'_>) -> Result<(), BuildError> {
         for done in 0..count {
             if done % PROGRESS_STEPS == 0 {
-                let report =
-                    BuildProgress { stage: "inserting points", done: done as u64, total: count as u64 };
-                if progress(report).is_break() {
+                let (done, total, tetrahedra) = (done as u64, count as u64, Some(self.live as u32));
+                if progress(BuildProgress { stage: "insert", done, total, tetrahedra }).is_break() {
                     return Err(BuildError::Stopped);
                 }
             }

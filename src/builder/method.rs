@@ -137,7 +137,73 @@ pub enum VertexMethod {
     },
 }
 
+/// What a user has chosen of a [`Construction`]; the rest follows from it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ConstructionChoice {
+    /// The kind of MT.
+    pub kind: Option<MtKind>,
+    /// How it is built.
+    pub method: Option<Method>,
+    /// By what criterion.
+    pub criterion: Option<BuildCriterion>,
+    /// What for.
+    pub purpose: Option<Purpose>,
+    /// Whether tetrahedra have errors of their own.
+    pub tet_errors: bool,
+}
+
+impl ConstructionChoice {
+    /// The kind of MT that goes with the choice.
+    pub fn kind(&self) -> MtKind {
+        let by_others = match (self.method, self.criterion) {
+            (Some(Method::Collapse), _) => MtKind::Edge,
+            (Some(Method::Insert), _) | (_, Some(BuildCriterion::Delaunay)) => MtKind::Vertex,
+            (Some(Method::Decimate), _) | (_, Some(BuildCriterion::HalfEdge)) => MtKind::HalfEdge,
+            (None, None) if self.purpose.is_some() => MtKind::HalfEdge,
+            (None, None) if self.tet_errors => MtKind::Vertex,
+            (None, None) => MtKind::HalfEdge,
+        };
+        self.kind.unwrap_or(by_others)
+    }
+
+    /// The method that goes with the choice.
+    pub fn method(&self) -> Method {
+        let default = Construction::default_for(self.kind()).method();
+        self.method.unwrap_or(if self.tet_errors { Method::Insert } else { default })
+    }
+
+    /// The construction that goes with the choice.
+    ///
+    /// # Errors
+    /// [`BuildError::Combination`] if what was chosen does not go together.
+    pub fn construction(&self) -> Result<Construction, BuildError> {
+        let method = self.method();
+        let criterion = self.criterion.unwrap_or(BuildCriterion::default_for(method));
+        let mut construction = Construction::new(self.kind(), method, criterion)?;
+        if self.tet_errors {
+            construction = construction.with_tet_errors()?;
+        }
+        if method == Method::Collapse && self.criterion.is_some() {
+            return Err(BuildError::Combination {
+                which: ["a criterion".to_owned(), method.described()],
+                instead: "a criterion goes with methods insert and decimate",
+            });
+        }
+        self.purpose.map_or(Ok(construction), |purpose| construction.with_purpose(purpose))
+    }
+}
+
 impl Construction {
+    /// The keys under which [`Construction::metadata`] says how a file was built.
+    pub const METADATA_KEYS: [&str; 2] = ["method", "criterion"];
+
+    /// The entries of a file's metadata that say how it was built.
+    pub fn metadata(self) -> Vec<(String, String)> {
+        let names = [Some(self.method().name()), self.criterion().map(BuildCriterion::name)];
+        let entry = |(key, name): (&str, Option<&str>)| Some((key.to_owned(), name?.to_owned()));
+        Self::METADATA_KEYS.into_iter().zip(names).filter_map(entry).collect()
+    }
+
     /// The default construction of a kind of MT.
     pub fn default_for(kind: MtKind) -> Self {
         let purpose = Purpose::default();

@@ -57,7 +57,7 @@ mod work_mesh;
 
 pub use collapse::edge_mt;
 pub use delaunay::delaunay;
-pub use method::{BuildCriterion, Construction, Method, Purpose, VertexMethod};
+pub use method::{BuildCriterion, Construction, ConstructionChoice, Method, Purpose, VertexMethod};
 
 use crate::mesh::{MeshError, TetMesh};
 use crate::mt::{
@@ -151,6 +151,8 @@ pub struct BuildProgress {
     pub done: u64,
     /// The whole work, as far as it is known.
     pub total: u64,
+    /// Tetrahedra of the mesh as it is now; none in stages that do not change it.
+    pub tetrahedra: Option<u32>,
 }
 
 /// Receives progress; [`ControlFlow::Break`] stops the work.

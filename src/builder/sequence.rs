@@ -72,8 +72,8 @@ impl Sequence {
         let mut ids = vec![NONE; self.tets.len()];
         for (done, &i) in order.iter().enumerate() {
             if done % 4096 == 0 {
-                let step = BuildProgress { stage: "order", done: done as u64, total: order.len() as u64 };
-                if progress(step).is_break() {
+                let (done, total) = (done as u64, order.len() as u64);
+                if progress(BuildProgress { stage: "order", done, total, tetrahedra: None }).is_break() {
                     return Err(BuildError::Stopped);
                 }
             }

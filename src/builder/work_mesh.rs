@@ -13,6 +13,8 @@ pub(super) struct WorkMesh {
     pub incident: Vec<u32>,
     /// Numbers of dead tetrahedra that [`WorkMesh::fresh`] may reuse.
     unused: Vec<u32>,
+    /// How many tetrahedra are dead.
+    dead: usize,
 }
 
 /// Marks on tetrahedra. They are not part of the mesh, so that searches need not change it.
@@ -59,7 +61,7 @@ impl WorkMesh {
         for (t, tet) in tets.iter().enumerate() {
             tet.iter().for_each(|&v| incident[v as usize] = t as u32);
         }
-        Self { tets, neighbors, incident, unused: Vec::new() }
+        Self { tets, neighbors, incident, unused: Vec::new(), dead: 0 }
     }
 
     /// The number of tetrahedra around each vertex.
@@ -72,6 +74,11 @@ impl WorkMesh {
     /// Whether the vertex is in the mesh.
     pub fn has(&self, v: u32) -> bool {
         self.incident[v as usize] != NONE
+    }
+
+    /// How many tetrahedra are in the mesh.
+    pub fn live(&self) -> u32 {
+        (self.tets.len() - self.dead) as u32
     }
 
     /// Whether the tetrahedron is in the mesh.
@@ -119,21 +126,25 @@ impl WorkMesh {
             self.incident[tet[k] as usize] = beyond_i;
         }
         self.tets[t as usize] = [NONE; 4];
+        self.dead += 1;
     }
 
     /// Removes tetrahedron `t`; the caller updates its neighbours.
     pub fn free(&mut self, t: u32) {
         self.tets[t as usize] = [NONE; 4];
         self.unused.push(t);
+        self.dead += 1;
     }
 
     /// The number of a new tetrahedron, for the caller to fill in.
     pub fn fresh(&mut self) -> u32 {
-        self.unused.pop().unwrap_or_else(|| {
-            self.tets.push([NONE; 4]);
-            self.neighbors.push([NONE; 4]);
-            (self.tets.len() - 1) as u32
-        })
+        if let Some(t) = self.unused.pop() {
+            self.dead -= 1;
+            return t;
+        }
+        self.tets.push([NONE; 4]);
+        self.neighbors.push([NONE; 4]);
+        (self.tets.len() - 1) as u32
     }
 
     fn relink(&mut self, t: u32, from: u32, to: u32) {

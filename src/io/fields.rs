@@ -106,8 +106,9 @@ impl<'a> Collector<'a> {
     }
 
     /// Appends the fields of an array without their values.
-    pub fn keep_names(&mut self, claim: Claim) {
-        self.fields.extend(claim.fields);
+    pub fn keep_names(&mut self, claim: Claim, unit: &str) {
+        self.last = claim.fields.len();
+        self.fields.extend(claim.fields.into_iter().map(|field| Field { unit: unit.to_owned(), ..field }));
     }
 
     /// Sets the unit of the array that came last.

@@ -3,7 +3,7 @@
 use crate::io::error::{At, ReadError, ReadReason};
 use crate::io::vtu::PieceReader;
 use crate::io::xml::Document;
-use crate::io::{CellData, ReadOptions};
+use crate::io::{CellData, ReadOptions, Survey, vtu};
 use crate::mesh::{Field, Grid, TetMesh};
 
 /// Most points of a grid: 512³. Its tetrahedra take some 13 GB.
@@ -66,10 +66,16 @@ pub(super) fn read(document: &Document<'_>, options: &ReadOptions) -> Result<Tet
         _ if cubes.iter().any(|part| !part.fields.is_empty()) => {
             assemble(cubes, cubes_of(whole)).at(whole_place)?
         }
-        Some(piece) if options.cells == CellData::Names => reader((0, piece)).field_names()?,
+        Some(piece) if options.cells == CellData::Names => reader((0, piece)).field_names("CellData")?,
         _ => Vec::new(),
     };
     grid_mesh(grid, fields, cubes).at(whole_place)
+}
+
+/// Says what a document of type `ImageData` contains.
+pub(super) fn survey(document: &Document<'_>) -> Result<Survey, ReadError> {
+    let (grid, _) = read_grid(document).at(|| "<ImageData>".to_owned())?;
+    Ok(Survey::of_grid("vti", grid, vtu::names(document)?))
 }
 
 /// The first and last cube along each axis of a box of points.

@@ -7,8 +7,8 @@
 use crate::io::error::{At, ReadError, ReadReason};
 use crate::io::fields::Collector;
 use crate::io::number::NumberType;
-use crate::io::{CellData, ReadOptions, cells, image, points_from};
-use crate::mesh::{Field, TetMesh};
+use crate::io::{CellData, ReadOptions, Survey, cells, image, points_from};
+use crate::mesh::{Field, Grid, TetMesh};
 
 /// How every legacy file starts.
 pub(super) const MAGIC: &[u8] = b"# vtk DataFile Version ";
@@ -24,11 +24,29 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadE
     let time = body.time;
     let mut mesh = match kind.as_str() {
         "unstructured_grid" => body.unstructured(file.version >= 5)?,
-        "polydata" => body.points()?,
+        "polydata" => body.points_alone()?,
         _ => body.structured()?,
     };
     mesh.fields.iter_mut().chain(&mut mesh.cell_fields).for_each(|field| field.time = time);
     Ok(mesh)
+}
+
+/// Says what a legacy VTK file contains; steps over its numbers.
+pub(super) fn survey(bytes: &[u8]) -> Result<Survey, ReadError> {
+    let (mut file, kind, _) = Reader::open(bytes).at(|| "header".into())?;
+    file.skims = true;
+    let options = ReadOptions { fields: None, cells: CellData::Names };
+    let mut body = Body { skims: true, ..Body::new(&options, None) };
+    while let Some(keyword) = file.next_word().at(|| "body".into())? {
+        let keyword = keyword.to_ascii_lowercase();
+        body.section(&mut file, &keyword).at(|| shortened(&keyword).to_ascii_uppercase())?;
+    }
+    if kind == "structured_points" {
+        return Ok(Survey::of_grid("vtk", body.grid()?, [body.fields.fields, body.cell_fields.fields]));
+    }
+    let (fields, cell_fields) = (body.fields.fields, body.cell_fields.fields);
+    let cells = body.cells.unwrap_or(0) as u64;
+    Ok(Survey { format: "vtk", points: body.points as u64, cells, grid: None, fields, cell_fields })
 }
 
 /// The time in the arrays of the whole data set, as VTK writes it.
@@ -81,13 +99,15 @@ struct Reader<'a> {
     at: usize,
     binary: bool,
     version: u32,
+    /// Steps over numbers instead of reading them.
+    skims: bool,
 }
 
 impl<'a> Reader<'a> {
     /// Reads the header up to the data set's type, in lower case, and the time that the data set is of.
     fn open(bytes: &'a [u8]) -> Result<(Self, String, Option<f64>), ReadReason> {
         let mut time = None;
-        let mut file = Self { bytes, at: MAGIC.len(), binary: false, version: 0 };
+        let mut file = Self { bytes, at: MAGIC.len(), binary: false, version: 0, skims: false };
         let version = file.line()?.trim();
         let major = version.split('.').next().and_then(|v| v.parse().ok()).filter(|v| (1..=5).contains(v));
         file.version = major.ok_or_else(|| ReadReason::Unsupported {
@@ -194,6 +214,16 @@ impl<'a> Reader<'a> {
         Ok(values)
     }
 
+    /// Steps over `count` numbers of text.
+    fn skip_words(&mut self, count: usize) -> Result<(), ReadReason> {
+        for found in 0..count {
+            if self.next_word()?.is_none() {
+                return Err(ReadReason::Truncated { needed: count as u64, found: found as u64 });
+            }
+        }
+        Ok(())
+    }
+
     /// The numbers of an array whose announcing line was read but for its end; `None` for text.
     fn floats(&mut self, count: Option<usize>, kind: Kind) -> Result<Option<Vec<f64>>, ReadReason> {
         let count =
@@ -202,7 +232,15 @@ impl<'a> Reader<'a> {
         match kind {
             Kind::Number(number) if self.binary => {
                 let bytes = self.take(count.checked_mul(number.size()))?;
-                Ok(Some(number.floats(bytes, true)))
+                Ok(Some(if self.skims { Vec::new() } else { number.floats(bytes, true) }))
+            }
+            Kind::Bit if self.binary && self.skims => {
+                self.take(Some(count.div_ceil(8)))?;
+                Ok(Some(Vec::new()))
+            }
+            Kind::Number(_) | Kind::Bit if self.skims => {
+                self.skip_words(count)?;
+                Ok(Some(Vec::new()))
             }
             Kind::Number(number) => self.words(count, |w| number.parse_float(w)).map(Some),
             Kind::Bit if self.binary => {
@@ -218,7 +256,10 @@ impl<'a> Reader<'a> {
         self.skip_line();
         if self.binary {
             let bytes = self.take(count.checked_mul(number.size()))?;
-            number.integers(bytes, true)
+            if self.skims { Ok(Vec::new()) } else { number.integers(bytes, true) }
+        } else if self.skims {
+            self.skip_words(count)?;
+            Ok(Vec::new())
         } else {
             self.words(count, |w| number.parse_integer(w))
         }
@@ -352,6 +393,10 @@ struct Body<'a> {
     cell_fields: Collector<'a>,
     cell_data: CellData,
     time: Option<f64>,
+    /// How many points there are.
+    points: usize,
+    /// Whether the file gives no numbers.
+    skims: bool,
 }
 
 impl<'a> Body<'a> {
@@ -368,6 +413,7 @@ impl<'a> Body<'a> {
         match keyword {
             "points" => {
                 let count = file.count()?;
+                self.points = count;
                 let kind = Kind::named(file.word()?)?;
                 let values = file.floats(count.checked_mul(3), kind)?;
                 self.positions =
@@ -486,6 +532,11 @@ impl<'a> Body<'a> {
             _ => return Ok(()),
         };
         let ArrayData { name, components, values: numbers, integer, unit } = array;
+        if self.skims {
+            let claim = fields.claim(&name, components)?;
+            claim.into_iter().for_each(|claim| fields.keep_names(claim, &unit));
+            return Ok(());
+        }
         if tuples.checked_mul(components) != Some(numbers.len()) {
             let what = format!("values of \"{name}\"");
             let expected = (tuples as u64).saturating_mul(components as u64);
@@ -493,7 +544,7 @@ impl<'a> Body<'a> {
         }
         let Some(claim) = fields.claim(&name, components)? else { return Ok(()) };
         if !values {
-            fields.keep_names(claim);
+            fields.keep_names(claim, &unit);
             return Ok(());
         }
         fields.fill(claim, numbers, integer, &unit).map_err(|reason| match (self.owner, reason) {
@@ -516,7 +567,7 @@ impl<'a> Body<'a> {
         points_from(coordinates).at(|| "POINTS".into())
     }
 
-    fn points(self) -> Result<TetMesh, ReadError> {
+    fn points_alone(self) -> Result<TetMesh, ReadError> {
         Ok(TetMesh { positions: self.checked_positions()?, fields: self.fields.fields, ..TetMesh::default() })
     }
 
@@ -553,13 +604,18 @@ impl<'a> Body<'a> {
         Ok(cells.iter().flat_map(|c| &c[1..]).copied().collect())
     }
 
-    fn structured(mut self) -> Result<TetMesh, ReadError> {
+    fn grid(&self) -> Result<Grid, ReadError> {
         let place = || "DIMENSIONS".to_owned();
         let dims = self.dims.ok_or_else(|| ReadReason::Missing("DIMENSIONS".into())).at(place)?;
-        let grid = image::checked_grid(dims, self.origin, self.spacing.unwrap_or([1.0; 3])).at(place)?;
-        check_values(&self.fields, dims.iter().product()).at(|| "POINT_DATA".into())?;
+        image::checked_grid(dims, self.origin, self.spacing.unwrap_or([1.0; 3])).at(place)
+    }
+
+    fn structured(mut self) -> Result<TetMesh, ReadError> {
+        let grid = self.grid()?;
+        let product = |less: u32| grid.dims.iter().map(|&d| u64::from(d - less)).product::<u64>();
+        check_values(&self.fields, product(0)).at(|| "POINT_DATA".into())?;
         // Fewer cubes than points, which were counted.
-        let cubes = dims.iter().map(|d| d - 1).product::<u64>() as usize;
+        let cubes = product(1) as usize;
         let cell_fields = self.take_cell_fields(cubes).at(|| "CELL_DATA".into())?;
         image::grid_mesh(grid, self.fields.fields, cell_fields).at(|| "POINT_DATA".into())
     }

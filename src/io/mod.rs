@@ -29,6 +29,8 @@ mod payload;
 mod pvd;
 mod raw;
 mod surface;
+mod survey;
+mod time_steps;
 mod vtu;
 mod write;
 mod xml;
@@ -38,6 +40,8 @@ pub use error::{ReadError, ReadReason};
 pub use image::MAX_GRID_POINTS;
 pub use pvd::{Step, steps};
 pub use surface::{PolyData, write_csv, write_obj, write_ply, write_stl, write_vtp};
+pub use survey::{Survey, survey, survey_raw};
+pub use time_steps::{FieldSelection, TimeStepsError, read_time_steps};
 pub use write::{write_vti, write_vtu};
 
 use std::path::Path;
@@ -105,7 +109,7 @@ pub fn read_bytes(name: &str, bytes: &[u8]) -> Result<TetMesh, ReadError> {
 /// # Errors
 /// As [`read_with`].
 pub fn read_bytes_with(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadError> {
-    let start = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
+    let start = without_mark(bytes);
     let result = if bytes.starts_with(legacy::MAGIC) {
         legacy::read(bytes, options)
     } else if start.starts_with(b"<") {
@@ -144,20 +148,27 @@ fn read_xml(bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadError> {
     let mut mesh = match document.kind.as_str() {
         "UnstructuredGrid" => vtu::read(&document, options)?,
         "ImageData" => image::read(&document, options)?,
-        "Collection" => {
-            let what = "a list of time steps as one mesh".into();
-            let remedy = "give one of the files that it lists".into();
-            return Err(ReadReason::Unsupported { what, remedy }).at(String::new);
-        }
-        other => {
-            let what = format!("a data set of type {other}");
-            let remedy = "give an UnstructuredGrid of tetrahedra or ImageData".into();
-            return Err(ReadReason::Unsupported { what, remedy }).at(String::new);
-        }
+        other => return Err(not_read(other)).at(String::new),
     };
     let time = document.time();
     mesh.fields.iter_mut().chain(&mut mesh.cell_fields).for_each(|field| field.time = time);
     Ok(mesh)
+}
+
+/// Why an XML file of this type is refused.
+fn not_read(kind: &str) -> ReadReason {
+    let (what, remedy) = match kind {
+        "Collection" => ("a list of time steps as one mesh".into(), "give one of the files that it lists"),
+        other => {
+            (format!("a data set of type {other}"), "give an UnstructuredGrid of tetrahedra or ImageData")
+        }
+    };
+    ReadReason::Unsupported { what, remedy: remedy.into() }
+}
+
+/// XML may have a byte order mark and white space in front of it.
+fn without_mark(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start()
 }
 
 fn load(path: &Path) -> Result<Vec<u8>, ReadError> {

@@ -8,8 +8,8 @@
 use serde_json::Value;
 
 use crate::io::error::ReadReason;
-use crate::io::image;
 use crate::io::number::NumberType;
+use crate::io::{Survey, image};
 use crate::mesh::{Field, Grid, TetMesh};
 
 /// What a sidecar says.
@@ -52,6 +52,13 @@ impl Sidecar {
         let field = text("field").unwrap_or("value").to_owned();
         let unit = text("unit").unwrap_or_default().to_owned();
         Ok(Self { file, grid: image::checked_grid(dims, origin, spacing)?, number, big, field, unit })
+    }
+
+    /// What it describes.
+    pub fn survey(&self) -> Survey {
+        let (unit, integer) = (self.unit.clone(), self.number.is_integer());
+        let field = Field { unit, integer, ..Field::new(self.field.clone(), Vec::new()) };
+        Survey::of_grid("raw", self.grid, [vec![field], Vec::new()])
     }
 
     /// The mesh of these samples.

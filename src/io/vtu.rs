@@ -4,7 +4,7 @@
 use crate::io::error::{At, ReadError, ReadReason};
 use crate::io::fields::Collector;
 use crate::io::xml::{Array, Document, Piece};
-use crate::io::{CellData, ReadOptions, cells, points_from};
+use crate::io::{CellData, ReadOptions, Survey, cells, points_from};
 use crate::mesh::{Field, TetMesh};
 
 /// Reads a document of type `UnstructuredGrid`. The points of different pieces stay different points.
@@ -15,6 +15,27 @@ pub(super) fn read(document: &Document<'_>, options: &ReadOptions) -> Result<Tet
         join(&mut mesh, part, i == 0).at(|| format!("piece {i}, <PointData>"))?;
     }
     Ok(mesh)
+}
+
+/// Says what a document of type `UnstructuredGrid` contains.
+pub(super) fn survey(document: &Document<'_>) -> Result<Survey, ReadError> {
+    let (mut points, mut cells) = (0_u64, 0_u64);
+    for (i, piece) in document.pieces.iter().enumerate() {
+        for (name, sum) in [("NumberOfPoints", &mut points), ("NumberOfCells", &mut cells)] {
+            let count = piece.attributes.count(name).at(|| format!("piece {i}"))?;
+            *sum = sum.saturating_add(count as u64);
+        }
+    }
+    let [fields, cell_fields] = names(document)?;
+    Ok(Survey { format: "vtu", points, cells, grid: None, fields, cell_fields })
+}
+
+/// The fields at points and at cells of the first piece, without values.
+pub(super) fn names(document: &Document<'_>) -> Result<[Vec<Field>; 2], ReadError> {
+    let Some(piece) = document.pieces.first() else { return Ok([Vec::new(), Vec::new()]) };
+    let options = &ReadOptions::default();
+    let reader = PieceReader { document, piece, number: 0, options };
+    Ok([reader.field_names("PointData")?, reader.field_names("CellData")?])
 }
 
 /// Reads what is wanted of one piece.
@@ -49,7 +70,7 @@ impl PieceReader<'_, '_> {
         let cell_fields = match self.options.cells {
             _ if tets.len() < cells => Vec::new(),
             CellData::LeaveOut => Vec::new(),
-            CellData::Names => self.field_names()?,
+            CellData::Names => self.field_names("CellData")?,
             CellData::Values => self.cell_fields(cells)?,
         };
         Ok(TetMesh { positions, fields, tets, grid: None, cell_fields })
@@ -81,13 +102,13 @@ impl PieceReader<'_, '_> {
         })
     }
 
-    /// The fields at cells without their values.
-    pub fn field_names(&self) -> Result<Vec<Field>, ReadError> {
+    /// The fields in a section without their values.
+    pub fn field_names(&self, section: &str) -> Result<Vec<Field>, ReadError> {
         let mut collector = Collector::new(self.options.fields.as_deref());
-        for array in self.piece.section("CellData").filter(|array| array.number_type().is_some()) {
+        for array in self.piece.section(section).filter(|array| array.number_type().is_some()) {
             let components = array.components().at(|| array.place())?;
             if let Some(claim) = collector.claim(array.name(), components).at(|| array.place())? {
-                collector.keep_names(claim);
+                collector.keep_names(claim, array.unit());
             }
         }
         Ok(collector.fields)

@@ -8,11 +8,16 @@ use wasm_bindgen::JsValue;
 /// A typed error of the core, or a wrong argument, on its way to JavaScript.
 #[derive(Debug)]
 pub struct WebError {
-    code: &'static str,
-    message: String,
+    pub(super) code: &'static str,
+    pub(super) message: String,
 }
 
 impl WebError {
+    /// An error with this code.
+    pub fn new(code: &'static str, message: String) -> Self {
+        Self { code, message }
+    }
+
     /// A call that the state of the session does not allow.
     pub fn not_ready() -> Self {
         Self {

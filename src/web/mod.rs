@@ -9,14 +9,26 @@
 
 #[cfg(feature = "web-bench")]
 mod bench;
+#[cfg(feature = "web-build")]
+mod build;
+#[cfg(feature = "web-build")]
+mod build_memory;
+#[cfg(feature = "web-build")]
+mod build_options;
+#[cfg(any(feature = "web-session", feature = "gpu"))]
 mod callback;
 mod error;
+#[cfg(any(feature = "web-session", feature = "gpu"))]
 mod file;
+#[cfg(any(feature = "web-session", feature = "gpu"))]
 mod loader;
 #[cfg(feature = "web-session")]
 mod mesh_changes;
+#[cfg(any(feature = "web-session", feature = "gpu"))]
 mod options;
+#[cfg(any(feature = "web-session", feature = "gpu"))]
 mod reader;
+#[cfg(any(feature = "web-session", feature = "gpu"))]
 mod results;
 #[cfg(feature = "web-session")]
 mod session;
@@ -29,6 +41,9 @@ mod viewer_overlay;
 #[cfg(all(feature = "gpu", target_arch = "wasm32"))]
 mod viewer_screenshot;
 
+#[cfg(feature = "web-build")]
+pub use build::MeshBuilder;
+#[cfg(any(feature = "web-session", feature = "gpu"))]
 pub use loader::RangeLoader;
 #[cfg(feature = "web-session")]
 pub use session::CoreSession;

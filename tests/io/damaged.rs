@@ -6,7 +6,7 @@ use tetralod::mesh::TetMesh;
 use tetralod::{io, mesh};
 
 /// A few small files, one of each kind, and what they hold.
-fn files() -> Vec<(String, Vec<u8>, TetMesh)> {
+pub fn files() -> Vec<(String, Vec<u8>, TetMesh)> {
     let mut list = Vec::new();
     let style = |format, compressor, big| Style { format, compressor, wide: big, big, ..Style::PLAIN };
     for style in [

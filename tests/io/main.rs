@@ -7,3 +7,4 @@ mod fields;
 mod files;
 mod real;
 mod surfaces;
+mod survey;

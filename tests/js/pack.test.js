@@ -12,6 +12,9 @@ const FILES = [
   "LICENSE-MIT",
   "README.md",
   "THIRD-PARTY-LICENSES.txt",
+  "build-worker.js",
+  "build.d.ts",
+  "build.js",
   "changes.js",
   "core.js",
   "element.d.ts",
@@ -31,7 +34,10 @@ const FILES = [
   "start.js",
   "stream.js",
   "surfaces.js",
-  // The types of the other module are not public.
+  "tetralod_build.d.ts",
+  "tetralod_build.js",
+  "tetralod_build_bg.wasm",
+  // The types of the viewer's module are not public.
   "tetralod_core.d.ts",
   "tetralod_core.js",
   "tetralod_core_bg.wasm",

@@ -20,11 +20,13 @@ const LIMITS = {
   "./element": 9_500,
   "./three": 2_500,
   "./vtk": 2_500,
+  "./build": 4_000,
   "./inline": 410_000,
   "./worker": 8_500,
   "./viewer-worker": 18_000,
   "./core.wasm": 306_000,
   "./viewer.wasm": 450_000,
+  "./build.wasm": 460_000,
 };
 
 const folder = resolve(process.argv[2]);

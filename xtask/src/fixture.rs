@@ -7,7 +7,7 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use serde_json::{Value, json};
 
-use crate::shell;
+use crate::{fixture_builds, shell};
 
 /// Where the fixture is made; the wasm tests include its files.
 pub const FOLDER: &str = "target/fixture";
@@ -41,7 +41,8 @@ pub fn make(tetralod: &Path) -> Result<()> {
         let [mt, hashes] = [format!("small-{kind}.mt"), format!("hashes-{kind}.json")];
         make_one(tetralod, &grid, &folder.join(mt), &folder.join(hashes), arguments)?;
     }
-    make_blocks(tetralod, folder)
+    make_blocks(tetralod, folder)?;
+    fixture_builds::make(tetralod, folder)
 }
 
 /// Makes `blocks-edge.mt` and `blocks-half-edge.mt`, files of hundreds of blocks, and `fields.mt`, one of two fields.

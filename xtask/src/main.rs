@@ -11,6 +11,7 @@ mod browser;
 mod demo;
 mod docs;
 mod fixture;
+mod fixture_builds;
 mod flow;
 mod helix;
 mod licences;

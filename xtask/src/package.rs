@@ -1,8 +1,8 @@
-//! `cargo xtask build`: the two wasm modules and the hand-written JavaScript, merged into `pkg/`, with `inline.js`, which
+//! `cargo xtask build`: the three wasm modules and the hand-written JavaScript, merged into `pkg/`, with `inline.js`, which
 //! `xtask/js/inline.mjs` makes of them; `xtask/js/sizes.mjs` has the limit of each entry.
 //!
-//! The core (decoder, refinement, isosurfaces) and the viewer (the same with the renderer) are separate modules, so
-//! that a page which draws by its own means does not download a renderer.
+//! The core (decoder, refinement, isosurfaces), the viewer (the same with the renderer) and the builder are separate modules, so
+//! that a page which draws by its own means does not download a renderer, and one that shows files no builder.
 
 use std::fs;
 use std::io::Write;
@@ -31,9 +31,10 @@ struct Module {
     features: &'static str,
 }
 
-const MODULES: [Module; 2] = [
+const MODULES: [Module; 3] = [
     Module { name: "tetralod_core", features: "web-session" },
     Module { name: "tetralod_viewer", features: "web,gpu" },
+    Module { name: "tetralod_build", features: "web-build" },
 ];
 
 /// What `wasm-opt` may use: what rustc and wasm-bindgen use already, and nothing beyond.

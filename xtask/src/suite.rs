@@ -102,6 +102,7 @@ fn features() -> Result<()> {
     lint_library("build", &[])?;
     shell::add_wasm_target()?;
     lint_library("web-bench", &["--target", shell::WASM])?;
+    lint_library("web-build", &["--target", shell::WASM])?;
     with_fixture(|| {
         let args = ["clippy", "--package", "tetralod", "--lib", "--test", "web", "--target", shell::WASM];
         shell::run(fixture_env(shell::cargo(args).args(WEB_FEATURES).args(["--", "-D", "warnings"])))
@@ -181,7 +182,14 @@ fn js() -> Result<()> {
     shell::run(&mut node_test("ranges.test.js"))?;
     shell::run(&mut node_test("writers.test.js"))?;
     with_fixture(|| {
-        for name in ["package.test.js", "parts.test.js", "steps.test.js", "places.test.js", "views.test.js"] {
+        for name in [
+            "package.test.js",
+            "build.test.js",
+            "parts.test.js",
+            "steps.test.js",
+            "places.test.js",
+            "views.test.js",
+        ] {
             shell::run(fixture_env(&mut node_test(name)))?;
         }
         Ok(())
@@ -267,7 +275,7 @@ fn e2e() -> Result<()> {
         let test = |name: &str, variable: &str, path: &Path| {
             shell::run(fixture_env(node_test(&format!("{name}-browser.test.js")).env(variable, path)))
         };
-        for name in ["core", "ranges", "parts", "viewer", "places", "element"] {
+        for name in ["core", "ranges", "parts", "viewer", "places", "element", "build"] {
             test(name, "CHROMIUM", &browser.chromium)?;
         }
         let Some(firefox) = browser::firefox()? else { return Ok(()) };

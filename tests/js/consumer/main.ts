@@ -15,6 +15,7 @@ import {
   type Source,
   type Where,
 } from "tetralod";
+import { checkBuild } from "./build.js";
 import { checkOptions } from "./options.js";
 import { refusal } from "./viewer.js";
 
@@ -68,10 +69,12 @@ const failed: ErrorCode | undefined = await mt.refine({ error: -1 }).then(
 mt.free();
 
 const examples = await checkOptions(source);
+const built = await checkBuild();
 
 const good =
   chunks > 0 &&
   examples === 45 &&
+  built === 21 &&
   positions.length === 3 * mesh.stats.vertices &&
   mesh.tets.length === 4 * mesh.stats.tetrahedra &&
   surface.indices.length % 3 === 0 &&

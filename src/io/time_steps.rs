@@ -1,0 +1,136 @@
+//! Time steps in several files, as one mesh.
+
+use thiserror::Error;
+
+use crate::io::{CellData, ReadError, ReadOptions};
+use crate::mesh::{Field, StepError, TetMesh};
+
+/// Which fields of the files of a mesh are wanted.
+#[derive(Clone, Copy, Debug)]
+pub struct FieldSelection<'a> {
+    /// Names of fields, a vector's for its components; the first field if there are none and not all are wanted.
+    pub names: &'a [String],
+    /// All fields.
+    pub all: bool,
+    /// What to do with fields at cells.
+    pub cells: CellData,
+}
+
+/// Why files are not the time steps of one mesh.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum TimeStepsError {
+    /// No file was given.
+    #[error("no input is given")]
+    None,
+    /// A file could not be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The mesh, or its fields, are not those of the first time step.
+    #[error("{file}: {error}")]
+    Step {
+        /// The file.
+        file: String,
+        /// The difference.
+        error: StepError,
+    },
+    /// Only some of the files contain their time.
+    #[error("{file}: some files contain their time and some do not; list all of them in a .pvd")]
+    MixedTimes {
+        /// The first file that differs from those before it.
+        file: String,
+    },
+    /// Two files are of the same time.
+    #[error("{file}: there is another time step at {time}; give each its own time, in a .pvd")]
+    SameTime {
+        /// The second one.
+        file: String,
+        /// The time.
+        time: f64,
+    },
+}
+
+/// Reads time steps as one mesh, as files have it: see [`crate::mesh::repair`]. `steps` are the name of each file, for errors, and
+/// its time if that is known; `read` reads the file of a number.
+///
+/// The first step is kept with all that is read of it, of later ones nothing but their fields.
+///
+/// # Errors
+/// If a file cannot be read, or the files are not time steps of one mesh.
+pub fn read_time_steps(
+    steps: &[(String, Option<f64>)],
+    wanted: &FieldSelection<'_>,
+    read: &mut dyn FnMut(usize, &ReadOptions) -> Result<TetMesh, ReadError>,
+) -> Result<TetMesh, TimeStepsError> {
+    let ((_, first_time), later) = steps.split_first().ok_or(TimeStepsError::None)?;
+    let mut options = ReadOptions { fields: None, cells: wanted.cells };
+    let mut mesh = read(0, &options)?;
+    if !later.is_empty() {
+        if let Some(names) = reduce(&mut mesh, wanted) {
+            options.fields = Some(names);
+            append(&mut mesh, *first_time, later, &options, read)?;
+        }
+    } else if let Some(time) = *first_time {
+        set_time(&mut mesh, time);
+    }
+    Ok(mesh)
+}
+
+/// Leaves the fields that are wanted; returns their names. None if one is missing: that is for the builder to refuse, who
+/// names those that are there.
+fn reduce(mesh: &mut TetMesh, wanted: &FieldSelection<'_>) -> Option<Vec<String>> {
+    let any = |test: &dyn Fn(&Field) -> bool| mesh.fields.iter().chain(&mesh.cell_fields).any(test);
+    if !wanted.names.iter().all(|name| any(&|field| field.answers_to(name))) {
+        return None;
+    }
+    if wanted.names.is_empty() && !wanted.all {
+        // Where points have no field, the first one comes from the cells.
+        mesh.fields.truncate(1);
+        mesh.cell_fields.truncate(usize::from(mesh.fields.is_empty()));
+    } else {
+        let keep = |field: &Field| wanted.all || wanted.names.iter().any(|name| field.answers_to(name));
+        mesh.fields.retain(keep);
+        mesh.cell_fields.retain(keep);
+    }
+    Some(mesh.fields.iter().chain(&mesh.cell_fields).map(|field| field.name.clone()).collect())
+}
+
+/// Appends the fields of the later time steps. Steps without a time in their files are numbered from 0.
+fn append(
+    mesh: &mut TetMesh,
+    first_time: Option<f64>,
+    later: &[(String, Option<f64>)],
+    options: &ReadOptions,
+    read: &mut dyn FnMut(usize, &ReadOptions) -> Result<TetMesh, ReadError>,
+) -> Result<(), TimeStepsError> {
+    let first_time = first_time.or_else(|| time_of(mesh));
+    let mut times = vec![first_time.unwrap_or(0.0)];
+    set_time(mesh, times[0]);
+    for (number, (file, time)) in later.iter().enumerate() {
+        let file = || file.clone();
+        let mut next = read(number + 1, options)?;
+        let time = match (time.or_else(|| time_of(&next)), first_time) {
+            (Some(time), Some(_)) => time,
+            (None, None) => number as f64 + 1.0,
+            _ => return Err(TimeStepsError::MixedTimes { file: file() }),
+        };
+        if times.contains(&time) {
+            return Err(TimeStepsError::SameTime { file: file(), time });
+        }
+        times.push(time);
+        set_time(&mut next, time);
+        let same = |field: &Field| options.fields.as_ref().is_some_and(|names| names.contains(&field.name));
+        next.fields.retain(same);
+        next.cell_fields.retain(same);
+        mesh.add_step(next).map_err(|error| TimeStepsError::Step { file: file(), error })?;
+    }
+    Ok(())
+}
+
+fn time_of(mesh: &TetMesh) -> Option<f64> {
+    mesh.fields.iter().chain(&mesh.cell_fields).find_map(|field| field.time)
+}
+
+fn set_time(mesh: &mut TetMesh, time: f64) {
+    mesh.fields.iter_mut().chain(&mut mesh.cell_fields).for_each(|field| field.time = Some(time));
+}

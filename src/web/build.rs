@@ -1,0 +1,533 @@
+//! The class that builds MT files in a page: files of a mesh go in, the bytes of an MT file come out. All of it happens in one call
+//! on one thread, so JavaScript puts it into a worker of its own and ends that to stop the work.
+
+use super::build_memory::{Forecast, LARGEST_MEMORY};
+use super::build_options::{BuildOptions, build_options};
+use super::error::WebError;
+use crate::builder::{self, BuildConfig, BuildError, BuildProgress, BuildSummary};
+use crate::format::{EncodeError, EncodeOptions, encode};
+use crate::geom::Bounds;
+use crate::io::{
+    self, CellData, FieldSelection, ReadError, ReadOptions, ReadReason, Survey, TimeStepsError,
+    read_time_steps,
+};
+use crate::mesh::{self, Field, MeshError, TetMesh};
+use js_sys::{Function, Object, Reflect, Uint8Array};
+use serde::Serialize;
+use std::cell::RefCell;
+use std::ops::ControlFlow;
+use wasm_bindgen::prelude::wasm_bindgen;
+use wasm_bindgen::{JsCast, JsValue};
+
+#[wasm_bindgen(typescript_custom_section)]
+const TYPES: &str = include_str!("build.d.ts");
+
+#[wasm_bindgen]
+extern "C" {
+    /// What is in the files, as a plain object.
+    #[wasm_bindgen(typescript_type = "InputInfo")]
+    pub type JsInputInfo;
+    /// The MT file and what was done.
+    #[wasm_bindgen(typescript_type = "{ bytes: Uint8Array<ArrayBuffer>, report: CoreBuildReport }")]
+    pub type JsBuilt;
+    /// Options as JavaScript gives them: anything at all.
+    #[wasm_bindgen(typescript_type = "CoreBuildOptions | undefined")]
+    pub type JsBuildOptions;
+}
+
+thread_local! {
+    /// Hears of panics, which end as traps without a message.
+    static ON_PANIC: RefCell<Option<Function>> = RefCell::default();
+}
+
+/// The files of a mesh, and the MT that is built of them.
+#[wasm_bindgen]
+pub struct MeshBuilder {
+    files: Vec<InputFile>,
+    /// Bytes of memory that may be used.
+    memory: u64,
+}
+
+/// The file of a time step, or of the whole mesh.
+#[derive(Default)]
+struct InputFile {
+    name: String,
+    bytes: Vec<u8>,
+    sidecar: Option<(String, Vec<u8>)>,
+}
+
+impl InputFile {
+    fn survey(&self) -> Result<Survey, WebError> {
+        Ok(match &self.sidecar {
+            Some((name, sidecar)) => io::survey_raw(name, sidecar)?,
+            None => io::survey(&self.name, &self.bytes)?,
+        })
+    }
+
+    fn read(&self, options: &ReadOptions) -> Result<TetMesh, ReadError> {
+        match &self.sidecar {
+            // What is wrong with the sidecar alone was found before.
+            Some((_, sidecar)) => io::read_raw(&self.name, sidecar, &self.bytes),
+            None => io::read_bytes_with(&self.name, &self.bytes, options),
+        }
+    }
+
+    fn size(&self) -> u64 {
+        (self.bytes.len() + self.sidecar.as_ref().map_or(0, |(_, bytes)| bytes.len())) as u64
+    }
+}
+
+#[wasm_bindgen]
+impl MeshBuilder {
+    /// Without files, and with so many bytes of memory at most; all that a wasm module can have if not given. `on_panic` hears the
+    /// message of a panic before it becomes a trap.
+    #[wasm_bindgen(constructor)]
+    pub fn new(on_panic: Function, memory: Option<f64>) -> Self {
+        ON_PANIC.set(Some(on_panic));
+        std::panic::set_hook(Box::new(|info| {
+            ON_PANIC.with_borrow(|hook| {
+                let message = JsValue::from_str(&info.to_string());
+                // Nothing can be done about an error of the hook.
+                hook.iter().for_each(|hook| _ = hook.call1(&JsValue::UNDEFINED, &message));
+            });
+        }));
+        let memory = memory.map_or(LARGEST_MEMORY, |bytes| (bytes.max(0.0) as u64).min(LARGEST_MEMORY));
+        Self { files: Vec::new(), memory }
+    }
+
+    /// Begins a file of so many bytes, which `append` brings. Each further file is a time step.
+    #[wasm_bindgen(js_name = addFile)]
+    pub fn add_file(&mut self, name: String, size: f64) -> Result<(), WebError> {
+        let held: u64 = self.files.iter().map(InputFile::size).sum();
+        let whole = held.saturating_add(size.max(0.0) as u64);
+        if whole > self.memory {
+            return Err(self.too_large(&name, whole));
+        }
+        let mut file = InputFile { name, ..InputFile::default() };
+        // The size fits: it is at most that of the memory, which is less than 2^32.
+        if file.bytes.try_reserve_exact(size.max(0.0) as usize).is_err() {
+            return Err(self.too_large(&file.name, whole));
+        }
+        self.files.push(file);
+        Ok(())
+    }
+
+    /// Appends bytes to the file that was begun last.
+    pub fn append(&mut self, bytes: &[u8]) -> Result<(), WebError> {
+        let memory = self.memory;
+        let Some(file) = self.files.last_mut() else { return Err(no_file()) };
+        if file.bytes.try_reserve(bytes.len()).is_err() {
+            return Err(too_large(&file.name, file.size() + bytes.len() as u64, memory));
+        }
+        file.bytes.extend_from_slice(bytes);
+        Ok(())
+    }
+
+    /// The JSON beside the raw samples that were begun last.
+    #[wasm_bindgen(js_name = addSidecar)]
+    pub fn add_sidecar(&mut self, name: String, bytes: &[u8]) -> Result<(), WebError> {
+        let Some(file) = self.files.last_mut() else { return Err(no_file()) };
+        file.sidecar = Some((name, bytes.to_vec()));
+        Ok(())
+    }
+
+    /// What is in the files, and whether it can be built with these options. The points are read for their bounds, if there is
+    /// enough memory.
+    pub fn inspect(&self, options: JsBuildOptions) -> Result<JsInputInfo, WebError> {
+        let options = build_options(&options)?;
+        let (first, survey) = self.first()?;
+        let forecast = self.forecast(&survey, &options);
+        let bounds = match &survey.grid {
+            Some(grid) => Some(Bounds::of(&[grid.point([0; 3]), grid.point(grid.dims.map(|d| d - 1))])),
+            None if forecast.reading > self.memory => None,
+            None => {
+                let options = ReadOptions { fields: Some(Vec::new()), cells: CellData::LeaveOut };
+                let points = first.read(&options)?.positions;
+                Some(Bounds::of(&points)).filter(|_| !points.is_empty())
+            }
+        };
+        Ok(info(&survey, bounds, forecast.peak(), self.memory))
+    }
+
+    /// Builds the MT file. `progress` gets the stage of the work, how much of it is done, the whole, and the tetrahedra that are left
+    /// where they change; if it returns `true`, the work stops. The files are gone then.
+    pub fn build(&mut self, options: JsBuildOptions, progress: &Function) -> Result<JsBuilt, WebError> {
+        let options = build_options(&options)?;
+        let (_, survey) = self.first()?;
+        let fields = self.wanted(&survey, &options)?;
+        let forecast = self.forecast(&survey, &options);
+        if forecast.peak() > self.memory {
+            return Err(no_memory(&survey, forecast.peak(), self.memory));
+        }
+        let stages = Stages { progress, stopped: false };
+        self.build_of(fields, options, stages)
+    }
+}
+
+impl MeshBuilder {
+    fn first(&self) -> Result<(&InputFile, Survey), WebError> {
+        let first = self.files.first().ok_or_else(no_file)?;
+        Ok((first, first.survey()?))
+    }
+
+    fn too_large(&self, name: &str, bytes: u64) -> WebError {
+        too_large(name, bytes, self.memory)
+    }
+
+    fn forecast(&self, survey: &Survey, options: &BuildOptions) -> Forecast {
+        let files = self.files.iter().map(InputFile::size).sum();
+        Forecast::of(survey, files, self.files.len() as u64, options)
+    }
+
+    /// The names of the fields that are read; none for all. Refuses those that are not there before anything is read.
+    fn wanted(&self, survey: &Survey, options: &BuildOptions) -> Result<Option<Vec<String>>, WebError> {
+        let BuildOptions { config, cells, .. } = options;
+        let has = |fields: &[Field], name: &str| fields.iter().any(|field| field.answers_to(name));
+        for name in &config.fields {
+            if has(&survey.fields, name) || *cells && has(&survey.cell_fields, name) {
+                continue;
+            }
+            if has(&survey.cell_fields, name) {
+                return Err(BuildError::CellField { name: name.clone() }.into());
+            }
+            let all = survey.fields.iter().chain(survey.cell_fields.iter().filter(|_| *cells));
+            let known = all.map(|field| field.name.clone()).collect();
+            return Err(BuildError::UnknownField { name: name.clone(), known }.into());
+        }
+        let first = survey.fields.first().or(survey.cell_fields.first().filter(|_| *cells));
+        Ok(match first {
+            _ if config.all_fields => None,
+            _ if !config.fields.is_empty() => Some(config.fields.clone()),
+            Some(first) => Some(vec![first.name.clone()]),
+            None => None,
+        })
+    }
+
+    fn build_of(
+        &mut self,
+        fields: Option<Vec<String>>,
+        options: BuildOptions,
+        mut stages: Stages<'_>,
+    ) -> Result<JsBuilt, WebError> {
+        let BuildOptions { config, cells, units, metadata } = options;
+        let name = self.files.first().map(|file| file.name.clone()).unwrap_or_default();
+        let mesh = self.read(fields, &config, cells, &mut stages)?;
+        stages.begin("repair")?;
+        let (mut mesh, repaired) = if mesh.tets.is_empty() {
+            expect_points(&mesh, &config, &name)?;
+            (mesh, String::new())
+        } else {
+            let (mesh, report) = mesh::repair(mesh).map_err(|error| bad_mesh(&name, &error))?;
+            (mesh, report.to_string())
+        };
+        if cells {
+            mesh.cells_to_points();
+        }
+        set_units(&mut mesh, &units)?;
+        let built = builder::build(&mesh, &config, &mut |step| stages.step(&step));
+        let built = built.map_err(|error| in_input(&name, error))?;
+        drop(mesh);
+        stages.begin("encode")?;
+        let metadata = config.construction.metadata().into_iter().chain(metadata).collect();
+        let exact = built.exact;
+        let encoding = EncodeOptions { block_bits: config.block_bits, check_margins: true, exact, metadata };
+        let bytes = encode(&built.mt, &encoding)?;
+        Ok(result(&bytes, &config, &built.summary, &repaired))
+    }
+
+    /// The mesh as the files have it. Each file is dropped when it was read.
+    fn read(
+        &mut self,
+        fields: Option<Vec<String>>,
+        config: &BuildConfig,
+        cells: bool,
+        stages: &mut Stages<'_>,
+    ) -> Result<TetMesh, WebError> {
+        let files = std::mem::take(&mut self.files);
+        let steps: Vec<_> = files.iter().map(|file| (file.name.clone(), None)).collect();
+        let mut files: Vec<_> = files.into_iter().map(Some).collect();
+        let total = steps.len() as u64;
+        let cells = if cells { CellData::Values } else { CellData::Names };
+        let wanted = FieldSelection { names: &config.fields, all: config.all_fields, cells };
+        let mut read = |number: usize, options: &ReadOptions| {
+            let file = files.get_mut(number).and_then(Option::take).unwrap_or_default();
+            stages.count("parse", number as u64, total);
+            let fields = options.fields.clone().or(fields.clone());
+            file.read(&ReadOptions { fields, cells: options.cells })
+        };
+        let mesh = read_time_steps(&steps, &wanted, &mut read)?;
+        if stages.stopped { Err(BuildError::Stopped.into()) } else { Ok(mesh) }
+    }
+}
+
+/// Tells JavaScript how far the work is.
+struct Stages<'a> {
+    progress: &'a Function,
+    stopped: bool,
+}
+
+impl Stages<'_> {
+    fn tell(&mut self, stage: &str, done: u64, total: u64, tetrahedra: Option<u32>) {
+        let numbers = js_sys::Array::of4(
+            &stage.into(),
+            &(done as f64).into(),
+            &(total as f64).into(),
+            &tetrahedra.map_or(JsValue::UNDEFINED, Into::into),
+        );
+        // A function that throws stops the work, too.
+        let goes_on = self.progress.apply(&JsValue::UNDEFINED, &numbers).is_ok_and(|stop| stop.is_falsy());
+        self.stopped |= !goes_on;
+    }
+
+    fn count(&mut self, stage: &str, done: u64, total: u64) {
+        self.tell(stage, done, total, None);
+    }
+
+    fn begin(&mut self, stage: &str) -> Result<(), WebError> {
+        self.count(stage, 0, 1);
+        if self.stopped { Err(BuildError::Stopped.into()) } else { Ok(()) }
+    }
+
+    fn step(&mut self, step: &BuildProgress) -> ControlFlow<()> {
+        self.tell(step.stage, step.done, step.total, step.tetrahedra);
+        if self.stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+}
+
+/// Points without cells go with insertion alone.
+fn expect_points(mesh: &TetMesh, config: &BuildConfig, name: &str) -> Result<(), WebError> {
+    if !config.construction.method().keeps_the_mesh() {
+        return Ok(());
+    }
+    if mesh.positions.is_empty() {
+        return Err(bad_mesh(name, &MeshError::Empty));
+    }
+    let what = "there are points but no tetrahedra; method \"insert\" with kind \"vertex\" makes an MT of points alone";
+    Err(WebError::new("bad-mesh", format!("{name}: {what}")))
+}
+
+fn set_units(mesh: &mut TetMesh, units: &[(String, String)]) -> Result<(), WebError> {
+    for (name, unit) in units {
+        let is_meant = |field: &&mut Field| {
+            field.name == *name || field.vector.as_ref().is_some_and(|vector| vector.name == *name)
+        };
+        let mut found = false;
+        mesh.fields.iter_mut().filter(is_meant).for_each(|field| {
+            field.unit.clone_from(unit);
+            found = true;
+        });
+        if !found {
+            return Err(WebError::bad_option("units", &format!("there is no field '{name}'")));
+        }
+    }
+    Ok(())
+}
+
+#[derive(Serialize)]
+#[serde(rename_all = "camelCase")]
+struct InfoObject<'a> {
+    format: &'static str,
+    points: f64,
+    tetrahedra: f64,
+    dims: Option<[u32; 3]>,
+    bounds: Option<[f64; 6]>,
+    fields: Vec<FieldObject<'a>>,
+    memory: MemoryObject,
+}
+
+#[derive(Serialize)]
+struct FieldObject<'a> {
+    name: &'a str,
+    at: &'static str,
+    unit: &'a str,
+    vector: Option<VectorObject<'a>>,
+}
+
+#[derive(Serialize)]
+struct VectorObject<'a> {
+    name: &'a str,
+    component: Option<u8>,
+}
+
+#[derive(Serialize)]
+struct MemoryObject {
+    needed: f64,
+    available: f64,
+    fits: bool,
+}
+
+fn info(survey: &Survey, bounds: Option<Bounds>, needed: u64, available: u64) -> JsInputInfo {
+    let at_points = survey.fields.iter().map(|field| field_object("points", field));
+    let at_cells = survey.cell_fields.iter().map(|field| field_object("cells", field));
+    object(&InfoObject {
+        format: survey.format,
+        points: survey.points as f64,
+        tetrahedra: survey.cells as f64,
+        dims: survey.grid.map(|grid| grid.dims),
+        bounds: bounds.map(|Bounds { min: [x0, y0, z0], max: [x1, y1, z1] }| [x0, y0, z0, x1, y1, z1]),
+        fields: at_points.chain(at_cells).collect(),
+        memory: MemoryObject {
+            needed: needed as f64,
+            available: available as f64,
+            fits: needed <= available,
+        },
+    })
+    .unchecked_into()
+}
+
+fn field_object<'a>(at: &'static str, field: &'a Field) -> FieldObject<'a> {
+    let vector = field.vector.as_ref();
+    let vector = vector.map(|part| VectorObject { name: &part.name, component: part.component });
+    FieldObject { name: &field.name, at, unit: &field.unit, vector }
+}
+
+#[derive(Serialize)]
+#[serde(rename_all = "camelCase")]
+struct ReportObject<'a> {
+    kind: &'static str,
+    method: &'static str,
+    criterion: Option<&'static str>,
+    vertices: u32,
+    tetrahedra: u32,
+    base_vertices: u32,
+    base_tetrahedra: u32,
+    updates: u32,
+    depth: u32,
+    position_bits: u32,
+    repaired: &'a str,
+}
+
+fn result(bytes: &[u8], config: &BuildConfig, summary: &BuildSummary, repaired: &str) -> JsBuilt {
+    let construction = config.construction;
+    let report = object(&ReportObject {
+        kind: construction.kind().name(),
+        method: construction.method().name(),
+        criterion: construction.criterion().map(builder::BuildCriterion::name),
+        vertices: summary.vertices,
+        tetrahedra: summary.tetrahedra,
+        base_vertices: summary.base_vertices,
+        base_tetrahedra: summary.base_tetrahedra,
+        updates: summary.updates,
+        depth: summary.depth,
+        position_bits: summary.position_bits,
+        repaired,
+    });
+    let built = Object::new();
+    for (name, value) in [("bytes", Uint8Array::from(bytes).into()), ("report", report)] {
+        // Setting a property on a fresh ordinary object cannot fail.
+        let _ = Reflect::set(&built, &name.into(), &value);
+    }
+    built.unchecked_into()
+}
+
+fn object(described: &impl Serialize) -> JsValue {
+    serde_wasm_bindgen::to_value(described).unwrap_or_default()
+}
+
+fn no_file() -> WebError {
+    WebError::new("bad-source", "no file is given".to_owned())
+}
+
+fn too_large(name: &str, bytes: u64, memory: u64) -> WebError {
+    let [bytes, memory] = [bytes, memory].map(megabytes);
+    let remedy = "use the command `tetralod build`";
+    WebError::new(
+        "memory",
+        format!("{name}: the files have {bytes} MB, but there are {memory} MB of memory; {remedy}"),
+    )
+}
+
+fn no_memory(survey: &Survey, needed: u64, memory: u64) -> WebError {
+    let [needed, memory] = [needed, memory].map(megabytes);
+    let remedy = "choose fewer fields, or use the command `tetralod build`";
+    WebError::new(
+        "memory",
+        format!(
+            "building {} tetrahedra needs about {needed} MB of memory, but there are {memory} MB; {remedy}",
+            survey.cells
+        ),
+    )
+}
+
+fn megabytes(bytes: u64) -> u64 {
+    bytes.div_ceil(1_000_000)
+}
+
+fn bad_mesh(name: &str, error: &MeshError) -> WebError {
+    WebError::new("bad-mesh", format!("{name}: {error}"))
+}
+
+/// An error of the builder with the name of the file, where it is about what that contains.
+fn in_input(name: &str, error: BuildError) -> WebError {
+    let WebError { code, message } = error.into();
+    let is_input = code == "bad-mesh";
+    WebError::new(code, if is_input { format!("{name}: {message}") } else { message })
+}
+
+impl From<ReadError> for WebError {
+    fn from(error: ReadError) -> Self {
+        let code = match error.reason {
+            ReadReason::Io(_) => "bad-source",
+            ReadReason::UnknownFormat => "unknown-format",
+            ReadReason::Unsupported { .. } | ReadReason::NotTetrahedra(_) => "unsupported",
+            ReadReason::Truncated { .. } => "truncated",
+            ReadReason::TooLarge { .. } => "limit",
+            ReadReason::NotFinite { .. } | ReadReason::NotFiniteCell { .. } => "bad-mesh",
+            ReadReason::Syntax(_)
+            | ReadReason::Missing(_)
+            | ReadReason::Damaged(_)
+            | ReadReason::Count { .. }
+            | ReadReason::MissingPoint { .. } => "corrupt",
+        };
+        Self::new(code, error.to_string())
+    }
+}
+
+impl From<TimeStepsError> for WebError {
+    fn from(error: TimeStepsError) -> Self {
+        match error {
+            TimeStepsError::Read(error) => error.into(),
+            TimeStepsError::None => no_file(),
+            error => Self::new("bad-mesh", error.to_string()),
+        }
+    }
+}
+
+impl From<BuildError> for WebError {
+    fn from(error: BuildError) -> Self {
+        let code = match error {
+            BuildError::Combination { .. }
+            | BuildError::UnknownField { .. }
+            | BuildError::CellField { .. }
+            | BuildError::TooManyFields { .. }
+            | BuildError::Tolerance { .. }
+            | BuildError::Option { .. } => "bad-option",
+            BuildError::TooLarge => "limit",
+            BuildError::Stopped => "stopped",
+            BuildError::Internal(_) | BuildError::Convert(_) => "internal",
+            _ => "bad-mesh",
+        };
+        let option = option_for(&error).map(|name| format!(" (option {name})"));
+        Self::new(code, format!("{error}{}", option.unwrap_or_default()))
+    }
+}
+
+/// The option that does what the error advises.
+fn option_for(error: &BuildError) -> Option<&'static str> {
+    Some(match error {
+        BuildError::Empty => "`method`",
+        BuildError::CellField { .. } => "`cellToPoint`",
+        BuildError::Tolerance { field: Some(_), .. } => "`fieldTolerance` or `lossless`",
+        BuildError::Tolerance { field: None, .. } => "`positionTolerance`",
+        BuildError::TooThin { enough: Some(_), .. } | BuildError::SamePlace { .. } => "`positionBits`",
+        BuildError::Crowded { .. } | BuildError::NotConvex => "`method`",
+        _ => return None,
+    })
+}
+
+impl From<EncodeError> for WebError {
+    fn from(error: EncodeError) -> Self {
+        let code = if matches!(error, EncodeError::TooLong { .. }) { "bad-option" } else { "internal" };
+        Self::new(code, error.to_string())
+    }
+}

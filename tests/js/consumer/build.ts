@@ -1,0 +1,87 @@
+// Building, as a program that installed the package does it: every option in use, and the result opens.
+import { MultiTessellation } from "tetralod";
+import {
+  TetralodError,
+  build,
+  inspect,
+  type BuildOptions,
+  type BuildPhase,
+  type BuildProgress,
+  type BuildReport,
+  type InputField,
+  type InputInfo,
+  type MeshSource,
+} from "tetralod/build";
+
+/** For each option of `T` something that has it. */
+type Examples<T> = { [Name in keyof T]-?: T & Required<Pick<T, Name>> };
+
+const SAMPLES = Array.from({ length: 64 }, (_, i) => (i * i) % 23);
+const GRID = [
+  "# vtk DataFile Version 3.0",
+  "grid",
+  "ASCII",
+  "DATASET STRUCTURED_POINTS",
+  "DIMENSIONS 4 4 4",
+  "ORIGIN 0 0 0",
+  "SPACING 1 1 1",
+  "POINT_DATA 64",
+  "SCALARS p float 1",
+  "LOOKUP_TABLE default",
+  SAMPLES.join(" "),
+].join("\n");
+
+const fractions = new Map<BuildPhase, number>();
+
+const examples: Examples<BuildOptions> = {
+  kind: { kind: "edge" },
+  method: { method: "insert" },
+  criterion: { kind: "vertex", criterion: "delaunay" },
+  purpose: { purpose: "regions" },
+  tetErrors: { tetErrors: true },
+  fields: { fields: ["p"] },
+  allFields: { allFields: true },
+  cellToPoint: { cellToPoint: false },
+  units: { units: { p: "Pa" } },
+  metadata: { metadata: { about: "an example" } },
+  positionBits: { positionBits: 12 },
+  positionTolerance: { positionTolerance: 0.01 },
+  fieldBits: { fieldBits: { p: 12 } },
+  fieldTolerance: { fieldTolerance: "1%" },
+  lossless: { lossless: ["p"] },
+  displacement: { displacement: "20%" },
+  displacementEdges: { displacementEdges: Number.POSITIVE_INFINITY },
+  blockUpdates: { blockUpdates: 64 },
+  signal: { signal: AbortSignal.timeout(600_000) },
+  memory: { memory: 1e9 },
+  onProgress: { onProgress: (progress: BuildProgress) => void fractions.set(progress.phase, progress.fraction) },
+};
+
+/** Builds with each option; returns how many options there are. */
+export async function checkBuild(): Promise<number> {
+  const source: MeshSource = new Blob([GRID]);
+  const info: InputInfo = await inspect(source);
+  const field: InputField | undefined = info.fields[0];
+  if (field?.name !== "p" || !info.memory.fits || info.bounds?.[3] !== 3) throw new Error("this is not what is in the file");
+  for (const options of Object.values(examples)) {
+    const { bytes, report }: { bytes: Uint8Array<ArrayBuffer>; report: BuildReport } = await build(source, options);
+    const mt = await MultiTessellation.open(bytes);
+    if (mt.info.tetrahedra !== report.tetrahedra || report.tetrahedra < 100) throw new Error("it is not what was built");
+    mt.free();
+  }
+  if (fractions.get("encode") !== 1) throw new Error("the end is not told");
+  const refused = await build({ raw: new Uint8Array(8), json: new Blob(["{}"]) }).catch((error: unknown) => error);
+  if (!(refused instanceof TetralodError) || refused.code !== "corrupt") throw new Error("this is not refused");
+  return Object.keys(examples).length;
+}
+
+export async function misuse(): Promise<void> {
+  // @ts-expect-error a number is no file
+  await build(7);
+  // @ts-expect-error there is no such kind
+  await build(new Blob(), { kind: "cubes" });
+  // @ts-expect-error raw samples have a JSON beside them
+  await inspect({ raw: new Blob() });
+  // @ts-expect-error inspecting has no progress
+  await inspect(new Blob(), { onProgress() {} });
+}

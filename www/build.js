@@ -1,0 +1,190 @@
+/** Files of meshes, dropped or chosen: a dialog that builds an MT file of them in a worker, opens it, and saves it. */
+
+import { count, nameOf, size } from "./format.js";
+
+/** Names of files that an MT can be built of. */
+const MESH = /\.(vtu|vti|vtk|raw|json)$/i;
+
+/** What the phases of the work are called. */
+const PHASES = {
+  read: "Reading the file",
+  parse: "Decoding",
+  repair: "Checking the mesh",
+  remove: "Removing vertices",
+  collapse: "Collapsing edges",
+  insert: "Inserting vertices",
+  order: "Putting updates in order",
+  encode: "Writing",
+};
+
+/** The dialog that is open. @type {BuildDialog | undefined} */
+let shown;
+
+/**
+ * Takes `files` if they are a mesh, not an MT file: then true. `open` gets the MT file that is built of them.
+ *
+ * @param {File[]} files
+ * @param {(file: File) => unknown} open
+ */
+export function takeMesh(files, open) {
+  if (!files.some(({ name }) => MESH.test(name))) return false;
+  shown?.close();
+  shown = new BuildDialog(files, open);
+  return true;
+}
+
+/** An element with text or elements in it. */
+function element(name, properties = {}, ...content) {
+  const made = Object.assign(document.createElement(name), properties);
+  made.append(...content);
+  return made;
+}
+
+class BuildDialog {
+  #files;
+  #open;
+  #stop = new AbortController();
+  /** Counts the forecasts that were asked for. */
+  #asked = 0;
+  #name;
+  #about = element("p", { textContent: "Reading…" });
+  #fields = element("fieldset", { hidden: true });
+  #memory = element("p");
+  #bar = element("progress", { max: 1, value: 0, ariaLabel: "Progress of the build", hidden: true });
+  #status = element("p", { role: "status" });
+  #error = element("p", { className: "bad", role: "alert", hidden: true });
+  #start = element("button", { type: "button", textContent: "Build", disabled: true });
+  #save = element("a", { className: "button", textContent: "Save .mt", hidden: true });
+  #cancel = element("button", { type: "button", textContent: "Cancel" });
+  #dialog = element("dialog", { className: "build" });
+
+  constructor(files, open) {
+    this.#files = files;
+    this.#open = open;
+    this.#name = nameOf(files.find(({ name }) => !/\.json$/i.test(name)) ?? files[0]);
+    const title = element("h2", { textContent: `Build an MT file of ${this.#name}` });
+    title.id = "build-title";
+    this.#dialog.setAttribute("aria-labelledby", title.id);
+    const buttons = element("div", { className: "buttons" }, this.#start, this.#save, this.#cancel);
+    const parts = [title, this.#about, this.#fields, this.#memory, this.#bar, this.#status, this.#error, buttons];
+    this.#dialog.append(...parts);
+    this.#start.addEventListener("click", () => this.#build());
+    this.#cancel.addEventListener("click", () => this.close());
+    this.#dialog.addEventListener("close", () => this.#leave());
+    document.body.append(this.#dialog);
+    this.#dialog.showModal();
+    this.#inspect();
+  }
+
+  close() {
+    this.#dialog.close();
+  }
+
+  /** Ends all work. */
+  #leave() {
+    this.#stop.abort();
+    this.#dialog.remove();
+    if (this.#save.href) URL.revokeObjectURL(this.#save.href);
+    if (shown === this) shown = undefined;
+  }
+
+  /** The chosen fields and how the mesh is built of them. */
+  get #options() {
+    const boxes = [...this.#fields.querySelectorAll("input")].filter((box) => box.checked);
+    const cellToPoint = boxes.some((box) => box.dataset.at === "cells");
+    return { fields: boxes.map((box) => box.value), cellToPoint, signal: this.#stop.signal };
+  }
+
+  async #inspect() {
+    try {
+      const { inspect } = await import("tetralod/build");
+      const info = await inspect(this.#files, { signal: this.#stop.signal });
+      const { format, points, tetrahedra, fields } = info;
+      this.#about.textContent = `${format}, ${count(points)} points, ${count(tetrahedra)} tetrahedra`;
+      this.#showFields(fields);
+      this.#showMemory(info.memory);
+      this.#start.focus();
+    } catch (error) {
+      this.#fail(error);
+    }
+  }
+
+  #showFields(fields) {
+    const boxes = fields.map(({ name, at, unit }, i) => {
+      const box = element("input", { type: "checkbox", value: name, checked: i === 0 });
+      box.dataset.at = at;
+      const label = `${name}${unit && ` (${unit})`}${at === "cells" ? ", at cells" : ""}`;
+      return element("label", {}, box, ` ${label}`);
+    });
+    this.#fields.replaceChildren(element("legend", { textContent: "Fields" }), ...boxes);
+    this.#fields.hidden = boxes.length === 0;
+    this.#fields.addEventListener("change", () => this.#forecast());
+  }
+
+  /** The memory depends on the fields. */
+  async #forecast() {
+    this.#start.disabled = true;
+    const mine = ++this.#asked;
+    const { fields } = this.#options;
+    if (fields.length === 0) return;
+    try {
+      const { inspect } = await import("tetralod/build");
+      const { memory } = await inspect(this.#files, this.#options);
+      if (mine === this.#asked) this.#showMemory(memory);
+    } catch (error) {
+      this.#fail(error);
+    }
+  }
+
+  #showMemory({ needed, available, fits }) {
+    const much = `about ${size(needed)} of memory`;
+    this.#memory.textContent = fits
+      ? `The build needs ${much}. Nothing leaves this machine.`
+      : `The build needs ${much}, more than the ${size(available)} that a page has: use the command "tetralod build".`;
+    this.#memory.classList.toggle("bad", !fits);
+    this.#start.disabled = !fits;
+  }
+
+  async #build() {
+    const options = this.#options;
+    this.#start.disabled = true;
+    this.#fields.disabled = true;
+    this.#bar.hidden = false;
+    this.#error.hidden = true;
+    try {
+      const { build } = await import("tetralod/build");
+      const onProgress = (progress) => this.#showProgress(progress);
+      const { bytes, report } = await build(this.#files, { ...options, onProgress });
+      this.#finish(new File([bytes], `${this.#name.replace(MESH, "")}.mt`), report);
+    } catch (error) {
+      this.#fail(error);
+      this.#start.disabled = false;
+      this.#fields.disabled = false;
+    }
+  }
+
+  #showProgress({ phase, fraction, tetrahedra }) {
+    this.#bar.value = fraction;
+    const left = tetrahedra === undefined ? "" : `, ${count(tetrahedra)} tetrahedra`;
+    this.#status.textContent = `${PHASES[phase]}${left}`;
+  }
+
+  #finish(file, { tetrahedra, seconds, repaired }) {
+    const mended = repaired && ` (${repaired})`;
+    this.#status.textContent = `${count(tetrahedra)} tetrahedra in ${size(file.size)}, built in ${seconds.toFixed(1)} s${mended}`;
+    this.#start.hidden = true;
+    this.#save.hidden = false;
+    this.#save.href = URL.createObjectURL(file);
+    this.#save.download = file.name;
+    this.#cancel.textContent = "Close";
+    this.#cancel.focus();
+    this.#open(file);
+  }
+
+  #fail(error) {
+    if (error?.name === "AbortError") return;
+    this.#error.textContent = error.message;
+    this.#error.hidden = false;
+    this.#bar.hidden = true;
+  }
+}
