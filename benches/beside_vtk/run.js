@@ -2,7 +2,7 @@
 // started by `cargo xtask bench --beside-vtk`. Memory is read from /proc, so this needs Linux.
 import { mkdir, readdir, readFile } from "node:fs/promises";
 import { createServer } from "node:http";
-import { cpus } from "node:os";
+import { cpus, loadavg } from "node:os";
 import { extname, join } from "node:path";
 import { fileURLToPath } from "node:url";
 import { gzipSync } from "node:zlib";
@@ -158,6 +158,8 @@ await build({
   format: "esm",
 });
 const tables = [];
+const load = () => loadavg()[0].toFixed(0);
+const before = load();
 for (const { title, tools } of SCENES) {
   const columns = [];
   for (const tool of tools) {
@@ -175,4 +177,5 @@ for (const { title, tools } of SCENES) {
 const browser = await launch();
 const version = browser.version();
 await browser.close();
-console.log(`${tables.join("\n")}\nChromium ${version} without a GPU (SwiftShader), Node ${process.version}, ${cpus().length} × ${cpus()[0].model}.`);
+console.log(`${tables.join("\n")}\nChromium ${version} without a GPU (SwiftShader), Node ${process.version}, ${cpus().length} × ${cpus()[0].model}.
+Load average ${before} before and ${load()} after; above 2 or so, times say little but how the programs compare.`);
