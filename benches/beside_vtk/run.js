@@ -2,7 +2,7 @@
 // started by `cargo xtask bench --beside-vtk`. Memory is read from /proc, so this needs Linux.
 import { mkdir, readdir, readFile } from "node:fs/promises";
 import { createServer } from "node:http";
-import { cpus } from "node:os";
+import { cpus, loadavg } from "node:os";
 import { extname, join } from "node:path";
 import { fileURLToPath } from "node:url";
 import { gzipSync } from "node:zlib";
@@ -111,7 +111,7 @@ async function visit(tool, link) {
     const page = await browser.newPage({ viewport: { width: 640, height: 480 } });
     page.on("pageerror", (error) => console.error(tool.name, error));
     await page.goto("about:blank");
-    const empty = await memory();
+    const [empty, blank] = [await memory(), await page.screenshot()];
     await page.goto(server.address + tool.page);
     await page.waitForFunction(() => window.shown, undefined, { timeout: 300_000 });
     const { first, near, shown } = await page.evaluate(() => {
@@ -125,7 +125,8 @@ async function visit(tool, link) {
       for (let i = 0; i < turns; i++) await window.turn();
       return (performance.now() - start) / turns;
     }, TURNS);
-    await page.screenshot({ path: join(root, "target/beside-vtk", `${tool.file}.png`) });
+    const picture = await page.screenshot({ path: join(root, "target/beside-vtk", `${tool.file}.png`) });
+    if (picture.equals(blank)) throw new Error(`${tool.page} shows nothing`);
     return { ...server.sent, first, near, shown, memory: taken, frame };
   } finally {
     await browser.close();
@@ -139,7 +140,7 @@ const median = (numbers) => numbers.sort((a, b) => a - b)[numbers.length >> 1];
 async function measure(tool, link) {
   const visits = [];
   // The server compresses programs when they are first asked for.
-  await visit(tool);
+  if (!link) await visit(tool);
   for (let i = 0; i < RUNS; i++) visits.push(await visit(tool, link));
   return Object.fromEntries(Object.keys(visits[0]).map((key) => [key, median(visits.map((visit) => visit[key]))]));
 }
@@ -157,6 +158,8 @@ await build({
   format: "esm",
 });
 const tables = [];
+const load = () => loadavg()[0].toFixed(0);
+const before = load();
 for (const { title, tools } of SCENES) {
   const columns = [];
   for (const tool of tools) {
@@ -174,4 +177,5 @@ for (const { title, tools } of SCENES) {
 const browser = await launch();
 const version = browser.version();
 await browser.close();
-console.log(`${tables.join("\n")}\nChromium ${version} without a GPU (SwiftShader), Node ${process.version}, ${cpus().length} × ${cpus()[0].model}.`);
+console.log(`${tables.join("\n")}\nChromium ${version} without a GPU (SwiftShader), Node ${process.version}, ${cpus().length} × ${cpus()[0].model}.
+Load average ${before} before and ${load()} after; above 2 or so, times say little but how the programs compare.`);
