@@ -26,7 +26,12 @@ const core = (path) => `
       const mt = await MultiTessellation.open("/model.mt", { whole: true, ...options });
       await mt.complete;
       await mt.refine(${JSON.stringify(options)});
-      return mt.hash();
+      const view = await mt.view();
+      await view.complete;
+      await view.refine(${JSON.stringify(options)});
+      const hashes = [await mt.hash(), await view.hash()];
+      mt.free();
+      return hashes[0] === hashes[1] ? hashes[0] : hashes.join(", ");
     }`;
 const MODULES = {
   "core.js": (from) => core(`${from}index.js`),

@@ -15,9 +15,9 @@ const { build } = createRequire(new URL("../../tests/js/package.json", import.me
 
 /** Bytes. An entry that outgrows its limit needs a reason for a higher one, in the message of the commit that raises it. */
 const LIMITS = {
-  ".": 13_000,
+  ".": 14_000,
   "./viewer": 7_500,
-  "./element": 9_500,
+  "./element": 10_000,
   "./three": 2_500,
   "./vtk": 2_500,
   "./build": 4_000,
