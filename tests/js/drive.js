@@ -16,7 +16,12 @@ export async function begin() {
 
 export const end = () => browser?.close();
 
-export const newPage = (options) => browser.newPage(options);
+export async function newPage(options) {
+  const page = await browser.newPage(options);
+  // Software that draws a volume on a busy machine keeps everything else waiting.
+  page.setDefaultTimeout(PATIENCE);
+  return page;
+}
 
 /** A new page with `volume` opened; its errors are collected in `complaints`. */
 export async function open(volume, prepare = async (_page) => {}, options = {}) {
