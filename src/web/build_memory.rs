@@ -15,8 +15,8 @@ const FIXED: u64 = 4 << 20;
 /// differ by a third from one size to the next, so this is the most.
 fn bytes_a_tetrahedron(construction: Construction) -> u64 {
     match (construction.method(), construction.kind()) {
-        (Method::Insert, _) => 720,
-        (Method::Collapse, MtKind::Explicit) => 600,
+        (Method::Insert, _) => 680,
+        (Method::Collapse, MtKind::Explicit) => 800,
         (Method::Collapse, _) => 340,
         (Method::Decimate, _) => 620,
     }
