@@ -80,11 +80,13 @@ async function start() {
   await begin(listed);
 }
 
-/** How long a paint is waited for (in ms): hidden pages have none. */
-const PAINT = 200;
+/** How long a paint is waited for (in ms). */
+const PAINT = 1000;
 
 /** Resolves when the page has been painted. */
 function painted() {
+  // Hidden pages are not painted.
+  if (document.hidden) return undefined;
   const twice = new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
   return Promise.race([twice, new Promise((resolve) => setTimeout(resolve, PAINT))]);
 }
