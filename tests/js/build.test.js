@@ -10,6 +10,7 @@ import { fileURLToPath, pathToFileURL } from "node:url";
 import { promisify } from "node:util";
 import { TetralodError, build, inspect } from "../../pkg/build.js";
 import { MultiTessellation } from "../../pkg/index.js";
+import { rejects } from "./rejects.js";
 
 const folder = process.env.TETRALOD_FIXTURE;
 assert.ok(folder, "TETRALOD_FIXTURE is not set: run `cargo xtask test js`");
@@ -44,14 +45,6 @@ after(() => {
 async function noneAlive() {
   while (alive.size > 0) await new Promise((resolve) => setTimeout(resolve, 10));
 }
-
-const rejects = (promise, code, message = /./) =>
-  assert.rejects(promise, (error) => {
-    assert.ok(error instanceof TetralodError, String(error));
-    assert.equal(error.code, code, error.message);
-    assert.match(error.message, message);
-    return true;
-  });
 
 describe("the bytes are those of the native program", () => {
   assert.ok(cases.length >= 10);

@@ -3,6 +3,9 @@ import assert from "node:assert/strict";
 import { mkdir } from "node:fs/promises";
 import { fileURLToPath } from "node:url";
 import { address, launch } from "./browser.js";
+import { study } from "./study.js";
+
+export { assertDrawn, differing, study } from "./study.js";
 
 export const pictures = new URL("../../target/e2e/", import.meta.url);
 export const PATIENCE = 90_000;
@@ -62,26 +65,6 @@ export async function picture(page, name) {
   return study(page, await page.locator("#canvas").screenshot({ path, style }));
 }
 
-/** The share of a picture that is not background, the number of colours there, and a sample of all pixels. */
-export function study(page, png) {
-  return page.evaluate(async (base64) => {
-    const bytes = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
-    const image = await createImageBitmap(new Blob([bytes], { type: "image/png" }));
-    const context = new OffscreenCanvas(image.width, image.height).getContext("2d");
-    context.drawImage(image, 0, 0);
-    const pixels = new Uint32Array(context.getImageData(0, 0, image.width, image.height).data.buffer);
-    // In each row, the background has one colour but for noise; the outline of the focus is left of the fifth pixel.
-    const channels = (pixel) => [pixel & 255, (pixel >> 8) & 255, (pixel >> 16) & 255];
-    const isCovered = (pixel, i) => {
-      const background = channels(pixels[i - (i % image.width) + 4]);
-      return channels(pixel).some((value, c) => Math.abs(value - background[c]) > 8);
-    };
-    const covered = pixels.filter(isCovered);
-    const sample = Array.from(pixels.filter((_, i) => i % 97 === 0));
-    return { colours: new Set(covered).size, covered: covered.length / pixels.length, pixels: sample, width: image.width };
-  }, png.toString("base64"));
-}
-
 /** Waits until no frame has been drawn for a while, and the mesh is what was asked for. */
 export async function settle(page) {
   for (let seen = -1; ; ) {
@@ -92,14 +75,6 @@ export async function settle(page) {
     seen = frames;
     await page.waitForTimeout(400);
   }
-}
-
-export const differing = (a, b) => a.pixels.filter((pixel, i) => pixel !== b.pixels[i]).length / a.pixels.length;
-
-/** Something is drawn on the background, larger than the lines of the bounding box, and it is lit. */
-export function assertDrawn({ colours, covered }) {
-  assert.ok(covered > 0.03, `only ${(100 * covered).toFixed(1)} % of the picture is covered`);
-  assert.ok(colours > 50, `only ${colours} colours`);
 }
 
 /** Turns to a view of the page. */

@@ -7,6 +7,7 @@ import { after, before, describe, test } from "node:test";
 import { pathToFileURL } from "node:url";
 import { MultiTessellation, TetralodError } from "../../pkg/index.js";
 import { Viewer } from "../../pkg/viewer.js";
+import { rejects } from "./rejects.js";
 
 const folder = process.env.TETRALOD_FIXTURE;
 assert.ok(folder, "TETRALOD_FIXTURE is not set: run `cargo xtask test js`");
@@ -46,14 +47,6 @@ after(() => {
   server.closeAllConnections();
   server.close();
 });
-
-const rejects = (promise, code, message = /./) =>
-  assert.rejects(promise, (error) => {
-    assert.ok(error instanceof TetralodError, String(error));
-    assert.equal(error.code, code, error.message);
-    assert.match(error.message, message);
-    return true;
-  });
 
 /** The area of triangles. */
 function area({ positions, indices }) {

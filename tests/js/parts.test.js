@@ -9,7 +9,8 @@ import { join } from "node:path";
 import { after, before, beforeEach, describe, test } from "node:test";
 import { fileURLToPath } from "node:url";
 import { promisify } from "node:util";
-import { MultiTessellation, TetralodError } from "../../pkg/index.js";
+import { MultiTessellation } from "../../pkg/index.js";
+import { rejects } from "./rejects.js";
 
 const folder = process.env.TETRALOD_FIXTURE;
 assert.ok(folder, "TETRALOD_FIXTURE is not set: run `cargo xtask test js`");
@@ -82,14 +83,6 @@ function good(range, response) {
 function whole(_, response) {
   response.writeHead(200, { "content-length": bytes.length }).end(bytes);
 }
-
-const rejects = (promise, code, message = /./) =>
-  assert.rejects(promise, (error) => {
-    assert.ok(error instanceof TetralodError, String(error));
-    assert.equal(error.code, code, error.message);
-    assert.match(error.message, message);
-    return true;
-  });
 
 /** The hash of each request's mesh from the whole file. */
 const hashesOf = async (file) => {

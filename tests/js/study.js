@@ -3,7 +3,7 @@ import assert from "node:assert/strict";
 
 /**
  * The share of a picture that is not background, the number of colours there, and a sample of all pixels. In each row the
- * background is the colour of the fifth pixel.
+ * background is the colour of the fifth pixel, but for noise; the outline of the focus is left of that.
  *
  * @param {import("playwright-core").Page} page any page, which decodes the picture
  * @param {Buffer} png
@@ -22,7 +22,7 @@ export function study(page, png) {
     };
     const covered = pixels.filter(isCovered);
     const sample = Array.from(pixels.filter((_, i) => i % 97 === 0));
-    return { colours: new Set(covered).size, covered: covered.length / pixels.length, sample };
+    return { colours: new Set(covered).size, covered: covered.length / pixels.length, pixels: sample, width: image.width };
   }, png.toString("base64"));
 }
 
@@ -33,4 +33,4 @@ export function assertDrawn({ colours, covered }, what = "the picture") {
 }
 
 /** The share of the pixels in which two pictures differ. */
-export const differing = (a, b) => a.sample.filter((pixel, i) => pixel !== b.sample[i]).length / a.sample.length;
+export const differing = (a, b) => a.pixels.filter((pixel, i) => pixel !== b.pixels[i]).length / a.pixels.length;

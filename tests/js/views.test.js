@@ -5,6 +5,7 @@ import { readFile } from "node:fs/promises";
 import { createServer } from "node:http";
 import { after, before, beforeEach, describe, test } from "node:test";
 import { MultiTessellation, TetralodError, applyChanges, emptyMesh } from "../../pkg/index.js";
+import { rejects } from "./rejects.js";
 
 const folder = process.env.TETRALOD_FIXTURE;
 assert.ok(folder, "TETRALOD_FIXTURE is not set: run `cargo xtask test js`");
@@ -43,14 +44,6 @@ after(() => {
   server.closeAllConnections();
   server.close();
 });
-
-const rejects = (promise, code, message = /./) =>
-  assert.rejects(promise, (error) => {
-    assert.ok(error instanceof TetralodError, String(error));
-    assert.equal(error.code, code, error.message);
-    assert.match(error.message, message);
-    return true;
-  });
 
 /** How many bytes have been sent more than once. */
 function sentTwice() {
