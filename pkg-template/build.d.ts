@@ -41,18 +41,15 @@ export interface BuildProgress {
   tetrahedra: number | undefined;
 }
 
-/** What both calls take. */
-interface WorkOptions extends CoreBuildOptions {
+/** What both calls take: what is forecast depends on the kind and on the fields. */
+export interface InspectOptions extends CoreBuildOptions {
   /** Ends the work, and its worker, at once; the call rejects with the signal's reason. */
   signal?: AbortSignal;
   /** Bytes of memory that may be used. Default and most: what a wasm module can have, nearly 4 GiB. */
   memory?: number;
 }
 
-/** What is forecast depends on the kind and on the fields. */
-export type InspectOptions = WorkOptions;
-
-export interface BuildOptions extends WorkOptions {
+export interface BuildOptions extends InspectOptions {
   onProgress?: (progress: BuildProgress) => void;
 }
 
