@@ -3,7 +3,9 @@
 import init, { MeshBuilder } from "./tetralod_build.js";
 import { TetralodError } from "./errors.js";
 import { nodeEndpoint, serve, webEndpoint } from "./rpc.js";
+import { wasmError, wasmOf } from "./start.js";
 import { nodeModule, openSource } from "./stream.js";
+import { VERSION } from "./version.js";
 
 /** Milliseconds between two reports of one phase. */
 const PAUSE = 50;
@@ -11,18 +13,11 @@ const PAUSE = 50;
 /** The message of the panic that ended the module, if there was one. */
 let panic;
 
-async function load() {
-  const url = new URL("./tetralod_build_bg.wasm", import.meta.url);
-  const fs = url.protocol === "file:" ? nodeModule("node:fs/promises") : undefined;
-  try {
-    return await init({ module_or_path: fs ? await fs.readFile(url) : url });
-  } catch (error) {
-    throw new TetralodError("wasm", `the wasm module did not load: ${error?.message ?? error}`, { cause: error });
-  }
-}
+/** What the wasm module exports, once it is there. */
+let wasm;
 
 /** Runs `work` on the module. A trap becomes an error that says what ended it. */
-async function guarded(wasm, work) {
+async function guarded(work) {
   try {
     return await work();
   } catch (error) {
@@ -93,21 +88,27 @@ function reporter() {
 }
 
 /** One call of the builder with the files in it. */
-async function withFiles(steps, memory, report, work) {
-  const wasm = await load();
-  return guarded(wasm, async () => {
+function withFiles(steps, memory, report, work) {
+  return guarded(async () => {
     const builder = new MeshBuilder((message) => (panic = message), memory);
     await read(builder, steps, report);
-    return work(builder, wasm);
+    return work(builder);
   });
 }
 
 const methods = {
+  /** Compiles the wasm module; without `source`, its address, the one of the package. */
+  async load(source) {
+    wasm = await wasmOf(source ?? new URL("./tetralod_build_bg.wasm", import.meta.url))
+      .then((found) => init({ module_or_path: found }))
+      .catch((error) => Promise.reject(wasmError(error, "tetralod/build.wasm")));
+    return { name: "build", version: VERSION };
+  },
   inspect: (steps, options, memory) => withFiles(steps, memory, () => {}, (builder) => builder.inspect(options)),
   async build(steps, options, memory) {
     const start = performance.now();
     const report = reporter();
-    return withFiles(steps, memory, report, (builder, wasm) => {
+    return withFiles(steps, memory, report, (builder) => {
       const built = builder.build(options, report);
       const seconds = (performance.now() - start) / 1000;
       const memoryBytes = wasm.memory.buffer.byteLength;

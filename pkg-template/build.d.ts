@@ -47,6 +47,19 @@ export interface InspectOptions extends CoreBuildOptions {
   signal?: AbortSignal;
   /** Bytes of memory that may be used. Default and most: what a wasm module can have, nearly 4 GiB. */
   memory?: number;
+  /**
+   * The address of the worker's file, `tetralod/build-worker`, as your server or bundler gives it; as for `Viewer.create`. Default:
+   * the file beside this module.
+   *
+   * @throws {TetralodError} `worker` if nothing starts there, or a worker of another version
+   */
+  workerUrl?: string | URL;
+  /**
+   * The address of the wasm file, `tetralod/build.wasm`. Default: the file beside the worker's.
+   *
+   * @throws {TetralodError} `wasm` if it cannot be loaded or compiled
+   */
+  wasmUrl?: string | URL;
 }
 
 export interface BuildOptions extends InspectOptions {

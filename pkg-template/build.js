@@ -3,12 +3,20 @@
  */
 
 import { TetralodError } from "./errors.js";
-import { Remote, nodeEndpoint, webEndpoint } from "./rpc.js";
+import { absoluteUrl, loadWasm, startWorker } from "./start.js";
 import { nodeModule } from "./stream.js";
 
 export { TetralodError };
 
 const KINDS = "give a File, Blob, ArrayBuffer, Uint8Array, URL, { raw, json }, or a list of these for time steps";
+
+const BUILDER = {
+  name: "build",
+  entry: "tetralod/build-worker",
+  start: () => new Worker(new URL("./build-worker.js", import.meta.url), { type: "module" }),
+  script: () => new URL("./build-worker.js", new URL("./tetralod_build_bg.wasm", import.meta.url)),
+  remedy: "",
+};
 
 /** How far the work is at the begin of each phase; what changes the mesh takes most of the time. */
 const BEGINS = { read: 0, parse: 0.05, repair: 0.1, remove: 0.15, collapse: 0.15, insert: 0.15, order: 0.85, encode: 0.95 };
@@ -40,15 +48,17 @@ export function inspect(source, options = {}) {
  * @param {import("./build.js").InspectOptions} options
  * @param {(name: string, data: any) => void} onEvent
  */
-async function inWorker(method, source, { signal, memory, ...options }, onEvent) {
+async function inWorker(method, source, { signal, memory, workerUrl, wasmUrl, ...options }, onEvent) {
   signal?.throwIfAborted();
   if (memory !== undefined && !(memory >= 0)) throw refusedOption("memory", "must be a number that is not negative");
+  const wasm = wasmUrl === undefined ? undefined : absoluteUrl("wasmUrl", wasmUrl).href;
   const steps = await stepsOf(source);
   signal?.throwIfAborted();
-  const remote = new Remote(startWorker(), onEvent);
+  const remote = startWorker(BUILDER, { workerUrl }, onEvent);
   const onAbort = () => remote.close(signal.reason);
   signal?.addEventListener("abort", onAbort, { once: true });
   try {
+    await loadWasm(remote, BUILDER, wasm);
     return await remote.call(method, [steps, options, memory]);
   } catch (error) {
     if (error?.name === "DataCloneError") throw refusedOption("options", "must be plain data");
@@ -109,10 +119,4 @@ function absolute(url) {
   } catch {
     throw new TetralodError("bad-source", `${url}: this is no URL; ${KINDS}`);
   }
-}
-
-function startWorker() {
-  const node = nodeModule("node:worker_threads");
-  if (node) return nodeEndpoint(new node.Worker(new URL("./build-worker.js", import.meta.url)));
-  return webEndpoint(new Worker(new URL("./build-worker.js", import.meta.url), { type: "module" }));
 }

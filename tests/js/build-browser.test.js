@@ -60,6 +60,27 @@ test("a chosen file is built in a worker of the page, and opens", async () => {
   assert.deepEqual(complaints, []);
 });
 
+test("worker and wasm file are found where the options say, and what is wrong there is told", async () => {
+  await page.setInputFiles("input", `${folder}/small.vti`);
+  const found = await page.evaluate(async () => {
+    const { build } = await import("/pkg/build.js");
+    const [file] = document.querySelector("input").files;
+    const outcome = (options) => build(file, options).then(({ bytes }) => bytes.length, ({ code, message }) => `${code}: ${message}`);
+    return {
+      given: await outcome({ workerUrl: "/pkg/build-worker.js", wasmUrl: "/pkg/tetralod_build_bg.wasm" }),
+      page: await outcome({ workerUrl: "/page.html" }),
+      other: await outcome({ workerUrl: "/pkg/worker.js" }),
+      wasm: await outcome({ wasmUrl: "/page" }),
+      address: await outcome({ wasmUrl: "http://[" }),
+    };
+  });
+  assert.equal(found.given, (await readFile(`${folder}/small.mt`)).length);
+  assert.match(found.page, /^worker: .*text\/html.*tetralod\/build-worker/);
+  assert.match(found.other, /^worker: .*core.*tetralod\/build-worker/);
+  assert.match(found.wasm, /^wasm: .*tetralod\/build\.wasm/);
+  assert.match(found.address, /^bad-option: .*wasmUrl/);
+});
+
 test("an MT file of the user is read by slices, as far as it is needed", async () => {
   await page.setInputFiles("input", `${folder}/blocks-half-edge.mt`);
   const result = await page.evaluate(async () => {

@@ -24,6 +24,7 @@ const LIMITS = {
   "./inline": 410_000,
   "./worker": 8_500,
   "./viewer-worker": 18_000,
+  "./build-worker": 5_500,
   "./core.wasm": 306_000,
   "./viewer.wasm": 450_000,
   "./build.wasm": 460_000,

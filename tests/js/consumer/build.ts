@@ -54,6 +54,8 @@ const examples: Examples<BuildOptions> = {
   blockUpdates: { blockUpdates: 64 },
   signal: { signal: AbortSignal.timeout(600_000) },
   memory: { memory: 1e9 },
+  workerUrl: { workerUrl: import.meta.resolve("tetralod/build-worker") },
+  wasmUrl: { wasmUrl: new URL(import.meta.resolve("tetralod/build.wasm")) },
   onProgress: { onProgress: (progress: BuildProgress) => void fractions.set(progress.phase, progress.fraction) },
 };
 
