@@ -61,7 +61,7 @@ export async function setSlider(page, id, value) {
 export async function picture(page, name) {
   await settle(page);
   const path = fileURLToPath(new URL(`${name}.png`, pictures));
-  const style = "#legend, #growth, #overlay, #cards, #readout, #divider, #note { visibility: hidden !important } canvas { outline: none !important }";
+  const style = "#legend, #loading, #growth, #overlay, #cards, #readout, #divider, #note { visibility: hidden !important } canvas { outline: none !important }";
   return study(page, await page.locator("#canvas").screenshot({ path, style }));
 }
 
