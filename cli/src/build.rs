@@ -89,6 +89,9 @@ pub struct Arguments {
     /// half-edge].
     #[arg(long, value_name = "N", value_parser = block_bits)]
     block_updates: Option<u32>,
+    /// Threads to build with, all cores if not given. The file does not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
     #[command(flatten)]
     verbosity: Verbosity,
 }
@@ -205,6 +208,10 @@ struct Report {
 pub fn run(arguments: &Arguments) -> Result<()> {
     let start = Instant::now();
     let config = config(arguments);
+    if let Some(threads) = arguments.threads {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
+        pool.build_global().context("starting the threads")?;
+    }
     files::check_ending(&arguments.output, "mt")?;
     files::check_output(&arguments.output, &arguments.inputs)?;
     let (mesh, repaired) = read(arguments, &config)?;

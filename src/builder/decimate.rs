@@ -7,6 +7,7 @@ use super::gift_wrap::GiftWrap;
 use super::quantize::Quantized;
 use super::removal::{RemovalSearch, State};
 use super::rounds::{Later, Rounds};
+use super::searches::Searches;
 use super::sequence::{Insertion, Sequence};
 use super::work_mesh::WorkMesh;
 use super::{BuildConfig, BuildCriterion, BuildError, BuildProgress, OnProgress, Purpose, quantize};
@@ -86,7 +87,10 @@ fn turn_round(sequence: &mut Sequence) {
 struct Decimator<'a> {
     state: State<'a>,
     rounds: Rounds,
+    /// That of the vertex which is removed next.
     search: RemovalSearch,
+    /// Those of candidates.
+    searches: Searches,
     slots: Vec<u32>,
     /// The removals so far: each with the star in `inserted` and the filling in `removed`.
     sequence: Sequence,
@@ -108,8 +112,9 @@ impl<'a> Decimator<'a> {
         let mut rounds = Rounds::new(state.levels.of(0.0), state.levels.last(), points);
         let free = (0..points as u32).filter(|&v| state.mesh.has(v) && !state.frozen[v as usize]);
         free.for_each(|v| rounds.wait(v));
+        let searches = Searches::new(gift_wrap.as_ref(), points);
         let search = RemovalSearch::new(gift_wrap, points);
-        Self { state, rounds, search, slots: Vec::new(), sequence: Sequence::default() }
+        Self { state, rounds, search, searches, slots: Vec::new(), sequence: Sequence::default() }
     }
 
     fn remove_all(&mut self, progress: OnProgress<'_>) -> Result<(), BuildError> {
@@ -138,7 +143,7 @@ impl<'a> Decimator<'a> {
                 return Err(BuildError::Stopped);
             }
             self.remove_before(batch[0].guess, &mut ready);
-            batch.iter().for_each(|prospect| self.look_at(*prospect, &mut ready));
+            self.look_at(batch, &mut ready);
         }
         self.remove_before(u32::MAX, &mut ready);
         Ok(())
@@ -161,20 +166,22 @@ impl<'a> Decimator<'a> {
         all
     }
 
-    /// Evaluates a candidate, and queues or defers it. A vertex that cannot be removed waits until its neighbourhood
+    /// Evaluates candidates, and queues or defers each. A vertex that cannot be removed waits until its neighbourhood
     /// changes.
-    fn look_at(&mut self, Prospect { vertex, end, .. }: Prospect, ready: &mut BinaryHeap<Reverse<Key>>) {
-        if self.rounds.waits(vertex) {
-            return;
-        }
+    fn look_at(&mut self, batch: &[Prospect], ready: &mut BinaryHeap<Reverse<Key>>) {
+        let left = batch.iter().filter(|prospect| !self.rounds.waits(prospect.vertex));
+        let candidates: Vec<(u32, u32)> = left.map(|&Prospect { vertex, end, .. }| (vertex, end)).collect();
         let level = self.rounds.level();
-        match self.search.at(&self.state, vertex, end, level) {
-            Some(key) if key.level() <= level => ready.push(Reverse(key.no_earlier_than(level))),
-            Some(key) => {
-                let version = self.state.versions[vertex as usize];
-                self.rounds.put_off(key.level(), Later { vertex, end: key.b, version });
+        let keys = self.searches.at(&self.state, &candidates, level);
+        for ((vertex, _), key) in candidates.into_iter().zip(keys) {
+            match key {
+                Some(key) if key.level() <= level => ready.push(Reverse(key.no_earlier_than(level))),
+                Some(key) => {
+                    let version = self.state.versions[vertex as usize];
+                    self.rounds.put_off(key.level(), Later { vertex, end: key.b, version });
+                }
+                None => {}
             }
-            None => {}
         }
     }
 

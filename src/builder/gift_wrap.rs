@@ -6,19 +6,22 @@ use super::points::as_vec;
 use crate::geom::{in_conflict, orient3d};
 use crate::mesh::{FACES, NONE};
 use glam::DVec3;
+use std::sync::Arc;
 
 /// The most tetrahedra that fill a hole.
 const MAX_FILLING: usize = 128;
 
 /// Fills holes; holds scratch space.
+#[derive(Clone)]
 pub(super) struct GiftWrap {
     /// Near each other where the lattice allows it: small numbers make in-sphere tests cheap.
-    points: Vec<[i32; 3]>,
+    points: Arc<[[i32; 3]]>,
     /// Faces that still need a tetrahedron on the side to which they are positive.
     open: Vec<OpenFace>,
 }
 
 /// A face with its vertices in increasing order, too, and the tetrahedron behind it: [`NONE`] outside of the hole.
+#[derive(Clone, Copy)]
 struct OpenFace {
     face: [u32; 3],
     key: [u32; 3],
@@ -27,7 +30,7 @@ struct OpenFace {
 
 impl GiftWrap {
     pub fn new(positions: &[[i32; 3]]) -> Self {
-        Self { points: shifted(positions), open: Vec::new() }
+        Self { points: shifted(positions).into(), open: Vec::new() }
     }
 
     /// Fills a hole: false if the Delaunay tetrahedra of its vertices do not fit it, or its boundary is curved.

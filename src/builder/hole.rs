@@ -21,6 +21,8 @@ pub(super) struct Hole {
     pub faces: Vec<([u32; 3], u32)>,
     /// The vertices of these faces, each once.
     pub link: Vec<u32>,
+    /// For each of `link` how many of the faces have it.
+    faces_at: Vec<u8>,
     /// Edges `xy` of the boundary triangles `axy`, which are ordered as seen from outside.
     pub border: Vec<[u32; 2]>,
     /// The planes of those triangles, if there are no more than two.
@@ -54,6 +56,7 @@ impl Hole {
         }
         self.faces.clear();
         self.link.clear();
+        self.faces_at.clear();
         self.border.clear();
         for &StarTet { tet, corner } in &self.star {
             let (corners, around) = (mesh.tets[tet as usize], mesh.neighbors[tet as usize]);
@@ -66,8 +69,12 @@ impl Hole {
                 self.border.push([1, 2].map(|i| corners[face[(at + i) % 3]]));
             }
             for v in [x, y, z] {
-                if !self.link.contains(&v) {
-                    self.link.push(v);
+                match self.link.iter().position(|&other| other == v) {
+                    Some(i) => self.faces_at[i] += 1,
+                    None => {
+                        self.link.push(v);
+                        self.faces_at.push(1);
+                    }
                 }
             }
             if self.link.len() > MAX_LINK {
@@ -107,6 +114,12 @@ impl Hole {
             let product = |k: usize| i128::from(n[k]) * i128::from(d[k]);
             product(0) + product(1) + product(2) > 0
         }
+    }
+
+    /// How many tetrahedra there are if the vertex moves to `b`, which is in the link.
+    pub fn left_at(&self, b: u32) -> usize {
+        let at = self.link.iter().position(|&v| v == b);
+        self.star.len() - at.map_or(0, |i| usize::from(self.faces_at[i]))
     }
 
     /// Whether the vertex is on the boundary.

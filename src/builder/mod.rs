@@ -51,6 +51,7 @@ mod quantize;
 mod reach;
 mod removal;
 mod rounds;
+mod searches;
 mod sequence;
 mod vertex;
 mod work_mesh;
@@ -332,7 +333,8 @@ fn thin_remedy(enough: Option<u32>) -> String {
 
 /// Builds an MT of `mesh`, which must be valid: see [`crate::mesh::repair`].
 ///
-/// Works on one thread and calls `progress` now and then.
+/// With the feature `parallel` it uses the threads of rayon's current pool. The result does not depend on how many there are.
+/// Calls `progress` now and then, on the thread that it was called from.
 ///
 /// # Errors
 /// If the mesh is not valid, lacks a configured field, or does not fit the lattice; if `progress` stops the work.

@@ -119,13 +119,13 @@ impl RemovalSearch {
         if self.gift_wrap.is_none() { self.find_end(state, end, level) } else { self.wrap(state, level) }
     }
 
-    /// The key of a filling of the hole.
-    fn key(&self, state: &State<'_>, candidate: &Candidate, b: u32) -> Key {
+    /// The key of a filling of the hole with so many tetrahedra and this error.
+    fn key(&self, state: &State<'_>, tets: usize, error: f64, b: u32) -> Key {
         let positions = &state.reference.quantized.positions;
         let length =
             positions.get(b as usize).map_or(0.0, |&q| squared_length(positions[self.hole.a as usize], q));
-        let second = state.second(self.hole.a, candidate.filling.tets.len() as u32);
-        Key::new(state.levels.of(candidate.error), second, length, self.hole.a, b)
+        let second = state.second(self.hole.a, tets as u32);
+        Key::new(state.levels.of(error), second, length, self.hole.a, b)
     }
 
     /// Finds the best edge to contract: the one to `known` unless that is [`NONE`]. Its filling becomes `best`.
@@ -143,15 +143,19 @@ impl RemovalSearch {
             self.ends.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
         }
         let mut found: Option<Key> = None;
+        let least = largest(&self.hole_cost.errors);
         for i in 0..self.ends.len() {
             let b = self.ends[i].1;
-            if !self.contract(state, b) {
+            // Its error is at least that of the hole. So most ends cannot be better than the best one so far, whatever
+            // their own is.
+            let is_worse = |found| self.key(state, self.hole.left_at(b), least, b) > found;
+            if found.is_some_and(is_worse) || !self.contract(state, b) {
                 continue;
             }
             let limit = state.levels.largest(found.map_or(level, |found| found.level().min(level)));
             let Self { hole, hole_cost, now, .. } = self;
             now.evaluate(hole, hole_cost, state, limit);
-            let key = self.key(state, &self.now, b);
+            let key = self.key(state, self.now.filling.tets.len(), self.now.error, b);
             if found.is_none_or(|found| key < found) {
                 found = Some(key);
                 std::mem::swap(&mut self.now, &mut self.best);
@@ -190,7 +194,7 @@ impl RemovalSearch {
         }
         let limit = state.levels.largest(level);
         best.evaluate(hole, hole_cost, state, limit);
-        Some(self.key(state, &self.best, NONE))
+        Some(self.key(state, self.best.filling.tets.len(), self.best.error, NONE))
     }
 }
 

@@ -1,6 +1,8 @@
 //! Promises: what is removed can be inserted again, step by step, in sound meshes; errors bound the deviation.
 
-use super::{BuildCriterion, Decimated, Decimator, Levels, Reference, State, WorkMesh, decimate, quantize};
+use super::{
+    BuildCriterion, Decimated, Decimator, Key, Levels, Reference, State, WorkMesh, decimate, quantize,
+};
 use crate::builder::cost::largest;
 use crate::builder::gift_wrap::GiftWrap;
 use crate::builder::location::Location;
@@ -553,4 +555,54 @@ fn vertices_outside_of_their_tetrahedra_are_known() {
         }
     }
     assert!(buckets_of_it.len() > 2, "it has come from bucket to bucket");
+}
+
+/// Most neighbours are not evaluated: they cannot be better than the best one so far. That finds the same as evaluating each.
+#[test]
+fn the_best_neighbour_is_found() {
+    for (name, mesh) in domains() {
+        let quantized = quantize::quantize(&mesh, &BuildConfig::of(MtKind::Edge)).expect("a valid mesh");
+        let topology = topology(mesh.positions.len(), &mesh.tets).expect("a conforming mesh");
+        let work = WorkMesh::new(mesh.tets.clone(), topology.neighbors, mesh.positions.len());
+        let levels = Levels::of_purpose(Purpose::Uniform);
+        let reference = Reference::new(&quantized, &work, 1.0, f64::INFINITY);
+        let mut decimator = Decimator::new(State::new(work, reference, topology.non_manifold, levels), None);
+        let (mut compared, mut several) = (0, 0);
+        for _ in 0..6 {
+            let Decimator { state, search, .. } = &mut decimator;
+            let vertices =
+                (0..mesh.positions.len() as u32).filter(|&v| state.mesh.has(v) && !state.frozen[v as usize]);
+            for v in vertices.collect::<Vec<u32>>() {
+                for level in [levels.of(0.01), levels.of(0.1), levels.last()] {
+                    let found = search.at(state, v, NONE, level).filter(|key| key.level() <= level);
+                    let link = search.hole.link.clone();
+                    let each = link.iter().filter_map(|&end| search.at(state, v, end, level));
+                    let all: Vec<Key> = each.filter(|key| key.level() <= level).collect();
+                    assert!(found == all.iter().min().copied(), "{name}: vertex {v}");
+                    compared += usize::from(found.is_some());
+                    several += usize::from(all.len() > 1);
+                }
+            }
+            decimator.round(&mut |_| ControlFlow::Continue(())).expect("not stopped");
+            let (removed, left) = (decimator.sequence.steps.len(), mesh.positions.len());
+            decimator.rounds.end(removed, left - removed);
+        }
+        assert!(name == "one cell" || compared > 0 && several > 0, "{name}: {compared}, {several}");
+    }
+}
+
+#[cfg(feature = "parallel")]
+#[test]
+fn the_number_of_threads_does_not_matter() {
+    let mesh = bent(blocks([7; 3], |_| true));
+    for (criterion, purpose) in WAYS {
+        let of = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            pool.install(|| built_for(&mesh, criterion, purpose).sequence)
+        };
+        let one = of(1);
+        [2, 3, 8]
+            .into_iter()
+            .for_each(|threads| assert!(of(threads) == one, "{criterion:?} {purpose:?} {threads}"));
+    }
 }

@@ -1,0 +1,52 @@
+//! The evaluation of many candidates that do not depend on each other, on all threads where there are several.
+
+use super::candidate_queue::Key;
+use super::gift_wrap::GiftWrap;
+use super::removal::{RemovalSearch, State};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// A candidate: the vertex to be removed, and the best neighbour to move it to, or [`NONE`](crate::mesh::NONE) if that is not known.
+pub(super) type Removal = (u32, u32);
+
+/// A search for each thread. The results do not depend on how many there are.
+pub(super) struct Searches {
+    all: Vec<Mutex<RemovalSearch>>,
+}
+
+impl Searches {
+    /// For a mesh of so many vertices, and the threads of rayon's current pool.
+    pub fn new(gift_wrap: Option<&GiftWrap>, vertices: usize) -> Self {
+        #[cfg(feature = "parallel")]
+        let threads = rayon::current_num_threads();
+        #[cfg(not(feature = "parallel"))]
+        let threads = 1;
+        let search = |_| Mutex::new(RemovalSearch::new(gift_wrap.cloned(), vertices));
+        Self { all: (0..threads).map(search).collect() }
+    }
+
+    /// The search of this thread.
+    fn own(&self) -> MutexGuard<'_, RemovalSearch> {
+        #[cfg(feature = "parallel")]
+        let thread = rayon::current_thread_index().unwrap_or(0);
+        #[cfg(not(feature = "parallel"))]
+        let thread = 0;
+        // Each evaluation starts anew, also after one that was broken off.
+        self.all[thread % self.all.len()].lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What [`RemovalSearch::at`] finds for each candidate, in their order.
+    pub fn at(&self, state: &State<'_>, candidates: &[Removal], level: u16) -> Vec<Option<Key>> {
+        let find = |&(vertex, end): &Removal| self.own().at(state, vertex, end, level);
+        #[cfg(feature = "parallel")]
+        {
+            use rayon::prelude::*;
+            candidates.par_iter().with_min_len(SHARE).map(find).collect()
+        }
+        #[cfg(not(feature = "parallel"))]
+        candidates.iter().map(find).collect()
+    }
+}
+
+/// A thread takes at least so many candidates at a time.
+#[cfg(feature = "parallel")]
+const SHARE: usize = 16;
