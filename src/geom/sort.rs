@@ -37,8 +37,18 @@ mod tests {
 
     #[test]
     fn keys_are_in_the_total_order() {
-        let mut numbers =
-            [f64::NEG_INFINITY, -2.5, -f64::MIN_POSITIVE, -0.0, 0.0, 5e-324, 1.0, 1.5, f64::INFINITY, f64::NAN];
+        let mut numbers = [
+            f64::NEG_INFINITY,
+            -2.5,
+            -f64::MIN_POSITIVE,
+            -0.0,
+            0.0,
+            5e-324,
+            1.0,
+            1.5,
+            f64::INFINITY,
+            f64::NAN,
+        ];
         numbers.reverse();
         numbers.sort_by_key(|x| total_order(*x));
         assert!(numbers.is_sorted_by(|a, b| a.total_cmp(b).is_lt()), "{numbers:?}");

@@ -282,9 +282,9 @@ impl Session {
         };
         plan.iter().for_each(|&(_, block)| blocks.last_needed[block as usize] = blocks.plans);
         // What a block depends on is as important and has a smaller number.
-        let key = |&(priority, block): &(f64, u32)| u128::from(!total_order(priority)) << 32 | u128::from(block);
-        let mut order: Vec<u128> =
-            (0..).zip(&plan).map(|(place, entry)| key(entry) << 32 | place).collect();
+        let key =
+            |&(priority, block): &(f64, u32)| u128::from(!total_order(priority)) << 32 | u128::from(block);
+        let mut order: Vec<u128> = (0..).zip(&plan).map(|(place, entry)| key(entry) << 32 | place).collect();
         order.sort_unstable();
         plan = order.into_iter().map(|key| plan[key as u32 as usize]).collect();
         blocks.needed = plan.len() as u32;

@@ -20,6 +20,8 @@ pub const PKG: &str = "pkg";
 
 struct Module {
     name: &'static str,
+    /// The name of the JavaScript that it imports.
+    script: &'static str,
     features: &'static str,
 }
 
@@ -27,10 +29,10 @@ struct Module {
 const CORES: [&str; 2] = ["tetralod_core", "tetralod_all_kinds"];
 
 const MODULES: [Module; 4] = [
-    Module { name: CORES[0], features: "web-session" },
-    Module { name: CORES[1], features: "web-session,all-kinds" },
-    Module { name: "tetralod_viewer", features: "web,gpu,all-kinds" },
-    Module { name: "tetralod_build", features: "web-build" },
+    Module { name: CORES[0], script: CORES[0], features: "web-session" },
+    Module { name: CORES[1], script: CORES[0], features: "web-session,all-kinds" },
+    Module { name: "tetralod_viewer", script: "tetralod_viewer", features: "web,gpu,all-kinds" },
+    Module { name: "tetralod_build", script: "tetralod_build", features: "web-build" },
 ];
 
 /// What `wasm-opt` may use: what rustc and wasm-bindgen use already, and nothing beyond.
@@ -75,7 +77,10 @@ pub fn build_bench(folder: &Path) -> Result<()> {
     check_versions()?;
     shell::add_wasm_target()?;
     shell::install_node_tools()?;
-    compile(&Module { name: "tetralod_bench", features: "web-bench,all-kinds" }, folder)
+    compile(
+        &Module { name: "tetralod_bench", script: "tetralod_bench", features: "web-bench,all-kinds" },
+        folder,
+    )
 }
 
 /// wasm-bindgen's macro and its command line speak a private protocol: they must be the same version.
@@ -97,40 +102,44 @@ fn locked<'a>(lock: &'a str, package: &str) -> Result<&'a str> {
 }
 
 fn compile(module: &Module, out: &Path) -> Result<()> {
-    let Module { name, features } = module;
+    let Module { name, script, features } = module;
     println!("building {name} ({features})");
     let args = ["build", "--package", "tetralod", "--lib", "--profile", "wasm", "--target", shell::WASM];
     let mut command = shell::cargo(args);
-    command.args(["--no-default-features", "--features", features, "--config", &rust_flags()?]);
+    command.args(["--no-default-features", "--features", features, "--config", &path_free()?]);
     shell::run(&mut command)?;
     let wasm = Path::new("target").join(shell::WASM).join("wasm/tetralod.wasm");
     let path = |path: &Path| path.to_string_lossy().into_owned();
+    let made = out.join("made");
     let bindgen =
-        ["wasm-bindgen", "--target", "web", "--out-name", name, "--out-dir", &path(out), &path(&wasm)];
+        ["wasm-bindgen", "--target", "web", "--out-name", script, "--out-dir", &path(&made), &path(&wasm)];
     wasm_bindgen_cli::wasm_bindgen::run_cli_with_args(bindgen)?;
+    for file in files_of(&made)? {
+        fs::rename(made.join(&file), out.join(file.replacen(script, name, 1)))
+            .with_context(|| format!("moving {file}"))?;
+    }
+    fs::remove_dir(&made).with_context(|| made.display().to_string())?;
     optimise(&out.join(format!("{name}_bg.wasm")))
 }
 
-/// The option `wasmUrl` may lead to either core, so the script of the one must fit the other.
+/// The option `wasmUrl` may lead to either core, so both must have the same script. It is there twice, since one that runs
+/// belongs to one module.
 fn check_cores(folder: &Path) -> Result<()> {
-    let script = |name: &str| -> Result<String> {
+    let [script, other] = CORES.map(|name| {
         let path = folder.join(format!("{name}.js"));
-        Ok(fs::read_to_string(&path).with_context(|| path.display().to_string())?.replace(name, ""))
-    };
-    ensure!(script(CORES[0])? == script(CORES[1])?, "{} and {} have other imports or exports", CORES[0], CORES[1]);
+        fs::read(&path).with_context(|| path.display().to_string())
+    });
+    ensure!(script? == other?, "{} and {} differ in their imports or exports", CORES[0], CORES[1]);
     Ok(())
 }
 
-/// What is inlined at most, in LLVM's unit; 225 by itself. The modules are a twentieth smaller, and as fast.
-const INLINE_THRESHOLD: &str = "-Cllvm-args=-inline-threshold=75";
-
 /// Panic messages name source files: the same bytes must come out on every machine, and no home folder in them.
-fn rust_flags() -> Result<String> {
+fn path_free() -> Result<String> {
     let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
     let home =
         home.or_else(|| Some(std::env::home_dir()?.join(".cargo"))).context("there is no home folder")?;
     let flag = format!("--remap-path-prefix={}=cargo", home.display());
-    Ok(format!("target.{}.rustflags={}", shell::WASM, serde_json::json!([flag, INLINE_THRESHOLD])))
+    Ok(format!("target.{}.rustflags={}", shell::WASM, serde_json::json!([flag])))
 }
 
 fn optimise(wasm: &Path) -> Result<()> {

@@ -234,8 +234,15 @@ fn consumer() -> Result<()> {
     ensure!(archive.is_file(), "npm pack said `{}` but wrote no such file", packed.trim());
     shell::run(&mut node_tool("publint/src/cli.js", &["--strict", package::PKG]))?;
     // The files that are no modules have no types; the scripts of workers export nothing.
-    let untyped =
-        ["--profile", "esm-only", "--exclude-entrypoints", "core.wasm", "all-kinds.wasm", "viewer.wasm", "build.wasm"];
+    let untyped = [
+        "--profile",
+        "esm-only",
+        "--exclude-entrypoints",
+        "core.wasm",
+        "all-kinds.wasm",
+        "viewer.wasm",
+        "build.wasm",
+    ];
     shell::run(
         node_tool("@arethetypeswrong/cli/dist/index.js", &["--format", "table-flipped", "--no-emoji"])
             .args(["--no-color", "--quiet"])
