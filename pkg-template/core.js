@@ -7,7 +7,7 @@ import { TetralodError, flattenError, reviveError } from "./errors.js";
 import { received } from "./options.js";
 import { allKindsWasm, coreWasm } from "./files.js";
 import { Parts } from "./parts.js";
-import { SharedRanges } from "./ranges.js";
+import { FirstResponse, SharedRanges } from "./ranges.js";
 import { portEndpoint, serve } from "./rpc.js";
 import { wasmError, wasmOf } from "./start.js";
 import { limitOf, meshToolMethods } from "./tools.js";
@@ -162,9 +162,17 @@ export function coreMethods(emit, shared = new SharedRanges()) {
       return progress;
     },
     /** Opens a file in parts; resolves to nothing without ranges of the server, else when the base mesh has arrived. */
-    openParts(url, options) {
-      const open = () => openParts(url, options);
-      return orWithAllKinds(open, open);
+    async openParts(url, options) {
+      // What has come for one module is not fetched again for the other.
+      const first = new FirstResponse();
+      const open = () => openParts(url, { ...options, first });
+      const again = () => {
+        first.begin();
+        return open();
+      };
+      const opened = await orWithAllKinds(open, again);
+      first.take();
+      return opened;
     },
     finish: () => session.finish(),
     info: () => session.info(),
