@@ -1,33 +1,47 @@
 /** The wasm core behind the methods that `MultiTessellation` calls: in a worker, or in the caller's own thread. */
 
-import init, { CoreSession, RangeLoader } from "./tetralod_core.js";
+import initCore, { CoreSession, RangeLoader } from "./tetralod_core.js";
+import initAllKinds, { CoreSession as AllKindsSession, RangeLoader as AllKindsLoader } from "./tetralod_all_kinds.js";
 import { arraysIn } from "./changes.js";
 import { TetralodError, flattenError, reviveError } from "./errors.js";
 import { received } from "./options.js";
-import { coreWasm } from "./files.js";
+import { allKindsWasm, coreWasm } from "./files.js";
 import { Parts } from "./parts.js";
-import { SharedRanges } from "./ranges.js";
+import { FirstResponse, SharedRanges } from "./ranges.js";
 import { portEndpoint, serve } from "./rpc.js";
 import { wasmError, wasmOf } from "./start.js";
 import { limitOf, meshToolMethods } from "./tools.js";
 import { VERSION } from "./version.js";
 
-let loading;
-/** That of wasm. @type {WebAssembly.Memory} */
-let memory;
-
-/** Compiles the wasm module once per thread; without `wasm`, its address or its bytes, the one of the package. */
-export function loadCore(wasm) {
-  loading ??= load(wasm ?? coreWasm()).catch((error) => {
-    loading = undefined;
-    throw wasmError(error, "tetralod/core.wasm");
-  });
-  return loading;
+/**
+ * A wasm module that is compiled once per thread.
+ *
+ * @param {(options: object) => Promise<{ memory: WebAssembly.Memory }>} init
+ * @param {{ Session: typeof CoreSession, Loader: typeof RangeLoader }} classes
+ * @param {() => any} place the address of the package's own, or its bytes
+ * @param {string} entry
+ */
+function lazily(init, classes, place, entry) {
+  let loading;
+  const load = async (wasm) => {
+    const { memory } = await init({ module_or_path: await wasmOf(wasm) });
+    return { ...classes, memory };
+  };
+  /** Without `wasm`, its address or its bytes, the one of the package. */
+  return (wasm = undefined) => {
+    loading ??= load(wasm ?? place()).catch((error) => {
+      loading = undefined;
+      throw wasmError(error, entry);
+    });
+    return loading;
+  };
 }
 
-async function load(wasm) {
-  ({ memory } = await init({ module_or_path: await wasmOf(wasm) }));
-}
+/** The module that is enough for half-edge MTs. */
+export const loadCore = lazily(initCore, { Session: CoreSession, Loader: RangeLoader }, coreWasm, "tetralod/core.wasm");
+
+/** The one for MTs of the other kinds: a page that opens none does not download it. */
+const loadAllKinds = lazily(initAllKinds, { Session: AllKindsSession, Loader: AllKindsLoader }, allKindsWasm, "tetralod/all-kinds.wasm");
 
 /** The methods that wait for bytes, beside which others are answered. */
 export const WAITING = ["openParts", "reach", "settled", "arrived"];
@@ -39,7 +53,15 @@ const SUMS = ["refined", "coarsened", "forced", "judged", "milliseconds"];
 
 /** The methods of one session, for `serve` or `Local`; `emit` sends events, `shared` are the ranges of all sessions of the file. */
 export function coreMethods(emit, shared = new SharedRanges()) {
+  /** The wasm module: first the one for half-edge MTs, which says what is of another kind. */
+  let load = loadCore;
+  /** @type {Awaited<ReturnType<typeof loadCore>>} */
+  let wasm;
+  /** @type {CoreSession | undefined} */
   let session;
+  /** What has come of a stream until its base mesh is there, and the fields that are wanted of it. @type {Uint8Array[] | undefined} */
+  let head;
+  let wanted;
   /** The last request. @type {Record<string, any>} */
   let request = {};
   /** @type {Parts | undefined} */
@@ -89,28 +111,69 @@ export function coreMethods(emit, shared = new SharedRanges()) {
     if (!zeroCopy) return { ...(deltas ? session.delta(arrays) : session.mesh(arrays)), stats, more };
     const { changes } = session.mesh(0);
     const places = session.places();
-    return { ...arraysIn(memory.buffer, places, arrays), changes, stats, more };
+    return { ...arraysIn(wasm.memory.buffer, places, arrays), changes, stats, more };
+  };
+  const close = (reason) => {
+    parts?.close(reason);
+    session?.free();
+    [session, parts] = [undefined, undefined];
+  };
+  /** Begins with the file again, with the other module, where this one has no MTs of its kind. */
+  const orWithAllKinds = async (first, again) => {
+    try {
+      return await first();
+    } catch (error) {
+      if (error?.code !== "kind" || load === loadAllKinds) throw error;
+      close();
+      load = loadAllKinds;
+      return again();
+    }
+  };
+  const start = async () => {
+    wasm = await load();
+    session = new wasm.Session(wanted);
+  };
+  const feedAll = async () => {
+    await start();
+    let progress;
+    for (const bytes of head) progress = session.feed(bytes);
+    return progress;
+  };
+  const openParts = async (url, { fields, memory, ...options }) => {
+    wasm = await load();
+    const make = (loader) => (session = wasm.Session.inParts(fields, memory, loader));
+    parts = new Parts(wasm.Loader, make, url, { ...options, shared }, (progress) => emit("progress", progress), (error) => emit("error", flattenError(error)));
+    if (await parts.begin()) return { info: session.info(), progress: parts.progress };
+    return close();
   };
   return {
     async load(wasm) {
       await loadCore(wasm);
       return { name: "core", version: VERSION };
     },
-    async start(fields) {
-      await loadCore();
-      session = new CoreSession(fields);
+    start(fields) {
+      [head, wanted] = [[], fields];
+      return start();
+    },
+    async feed(bytes) {
+      head?.push(bytes);
+      const progress = await orWithAllKinds(() => session.feed(bytes), feedAll);
+      if (progress.ready) head = undefined;
+      return progress;
     },
     /** Opens a file in parts; resolves to nothing without ranges of the server, else when the base mesh has arrived. */
-    async openParts(url, { fields, memory, ...options }) {
-      await loadCore();
-      const make = (loader) => (session = CoreSession.inParts(fields, memory, loader));
-      parts = new Parts(RangeLoader, make, url, { ...options, shared }, (progress) => emit("progress", progress), (error) => emit("error", flattenError(error)));
-      if (await parts.begin()) return { info: session.info(), progress: parts.progress };
-      session.free();
-      [session, parts] = [undefined, undefined];
-      return undefined;
+    async openParts(url, options) {
+      // What has come for one module is not fetched again for the other.
+      const first = new FirstResponse();
+      const open = () => openParts(url, { ...options, first });
+      const again = () => {
+        first.begin();
+        return open();
+      };
+      const opened = await orWithAllKinds(open, again);
+      first.take();
+      return opened;
     },
-    feed: (bytes) => session.feed(bytes),
     finish: () => session.finish(),
     info: () => session.info(),
     /** Without `partial`, nothing is handed out as long as data is missing that a stream will bring. */
@@ -153,10 +216,7 @@ export function coreMethods(emit, shared = new SharedRanges()) {
       };
       const tell = serve(portEndpoint(port), { ...methods, free }, WAITING);
     },
-    free() {
-      parts?.close(new TetralodError("freed", "this MultiTessellation has been freed"));
-      session?.free();
-    },
+    free: () => close(new TetralodError("freed", "this MultiTessellation has been freed")),
   };
 }
 

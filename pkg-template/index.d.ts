@@ -138,8 +138,11 @@ export interface OpenOptions extends ReadOptions {
    */
   workerUrl?: string | URL;
   /**
-   * The address of the wasm file, `tetralod/core.wasm`. A relative address is relative to the page. Default: the file beside
-   * the worker's.
+   * The address of the wasm file, `tetralod/core.wasm` or `tetralod/all-kinds.wasm`. A relative address is relative to the page.
+   * Default: the file beside the worker's.
+   *
+   * `tetralod/core.wasm` is enough for half-edge MTs, the kind that `tetralod build` makes. When a file of another kind is opened,
+   * `tetralod/all-kinds.wasm` is loaded besides, from beside the worker; name it here to load only that one.
    *
    * @throws {TetralodError} `wasm` if it cannot be loaded or compiled
    */

@@ -50,11 +50,12 @@
 //! # Features
 //!
 //! The core (decoder, refinement, isosurfaces on the CPU) is always there and needs no I/O, no GPU and no JavaScript:
-//! `default-features = false` is enough for a program that shows MT files. Features add the rest:
+//! `default-features = false` is enough for a program that shows half-edge MTs, which the builders make by default. Features add the rest:
 //!
 //! | feature | adds | for |
 //! |---|---|---|
 //! | `build` (default) | modules `io`, `generate`, `builder`, `measure`, `verify` | making MTs, natively or in wasm |
+//! | `all-kinds` (default) | MTs of the other kinds; without it, decoders refuse their files ([`FormatError::Kind`](format::FormatError::Kind)) and their constructors panic | files of any kind |
 //! | `http` | `stream::HttpSource` | MT files on servers, in native programs |
 //! | `gpu` | module `gpu`: the renderer on wgpu, with WebGPU as its only backend | pages; add a backend of wgpu for native use |
 //! | `vulkan` | `gpu` with wgpu's Vulkan backend | testing the renderer without a browser |

@@ -6,7 +6,7 @@ use super::header::{END_BYTES, HEAD_BYTES, HEADER_BYTES, Kind, SectionHead, head
 use super::payload::exact::Corrections;
 use super::payload::index::{Index, MAX_BLOCK_BITS, MIN_BLOCK_BITS};
 use super::payload::{State, Totals};
-use super::{payload, write};
+use super::{checksum, payload, write};
 use crate::mt::{BaseMeshError, Exact, Mt, MultiTessellation, UpdateError, UpdatePages, VertexId};
 use std::collections::BTreeMap;
 use std::io;
@@ -116,7 +116,7 @@ pub fn encode_to(mt: &Mt, options: &EncodeOptions, writer: &mut dyn io::Write) -
     let sections = sections(mt, &options.metadata, &mut index, &exact)?;
     let mut total = HEADER_BYTES as u64 + END_BYTES as u64;
     let mut totals = Totals { updates: mt.updates(), sections: sections.len() as u32, crc: 0 };
-    let mut chain = crc32fast::Hasher::new();
+    let mut chain = checksum::Hasher::new();
     for section in &sections {
         total += section.len();
         chain.update(&section.head.crc.to_le_bytes());

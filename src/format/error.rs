@@ -1,6 +1,6 @@
 //! What can be wrong with an MT file, each with where and what to do.
 
-use crate::mt::{BaseMeshError, PageError, UpdateError};
+use crate::mt::{BaseMeshError, MtKind, PageError, UpdateError};
 use thiserror::Error;
 
 /// What to do about a file that is broken as such.
@@ -36,6 +36,12 @@ pub enum FormatError {
         offset: u64,
         /// What the reader does not know.
         what: &'static str,
+    },
+    /// This build of the crate has no MTs of the kind in the file.
+    #[error("the file has an MT of the kind '{}', which this program was built without; build it with the feature `all-kinds`", .kind.name())]
+    Kind {
+        /// The kind.
+        kind: MtKind,
     },
     /// The bytes contradict the specification or their checksum.
     #[error("the MT file is damaged at byte {offset}: {what}; {AGAIN}")]

@@ -1,6 +1,6 @@
 //! The fixed parts of a file: its header and the heads of its sections.
 
-use super::FormatError;
+use super::{FormatError, checksum};
 use crate::mt::MtKind;
 
 /// First bytes of every MT file. The high bit, CR LF and Ctrl-Z show transfers that meddle with text.
@@ -48,7 +48,7 @@ pub fn header(total: u64, version: [u16; 2], tet_errors: bool) -> [u8; HEADER_BY
     bytes[10..12].copy_from_slice(&version[1].to_le_bytes());
     bytes[12..16].copy_from_slice(&(if tet_errors { TET_ERRORS } else { 0 }).to_le_bytes());
     bytes[16..24].copy_from_slice(&total.to_le_bytes());
-    let crc = crc32fast::hash(&bytes[..28]);
+    let crc = checksum::hash(&bytes[..28]);
     bytes[28..].copy_from_slice(&crc.to_le_bytes());
     bytes
 }
@@ -65,7 +65,7 @@ pub fn parse_header(bytes: &[u8; HEADER_BYTES]) -> Result<Start, FormatError> {
     }
     let u16_at = |i: usize| u16::from_le_bytes([bytes[i], bytes[i + 1]]);
     let u32_at = |i: usize| u32_of(&bytes[i..]);
-    if u32_at(28) != crc32fast::hash(&bytes[..28]) {
+    if u32_at(28) != checksum::hash(&bytes[..28]) {
         return Err(FormatError::Corrupt { offset: 0, what: "the checksum of the header does not match" });
     }
     let found = [u16_at(8), u16_at(10)];
@@ -156,8 +156,8 @@ impl SectionHead {
     }
 
     /// A checksum that has taken in kind and length and waits for the payload.
-    pub fn hasher(&self) -> crc32fast::Hasher {
-        let mut hasher = crc32fast::Hasher::new();
+    pub fn hasher(&self) -> checksum::Hasher {
+        let mut hasher = checksum::Hasher::new();
         hasher.update(&self.to_bytes()[..8]);
         hasher
     }

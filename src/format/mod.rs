@@ -6,6 +6,7 @@
 #![doc = include_str!("../../docs/format.md")]
 
 mod block_scan;
+mod checksum;
 mod coder;
 mod decode;
 mod encode;

@@ -6,24 +6,34 @@ use crate::mesh::{FACES, MeshError, NONE};
 /// Most tetrahedra in a mesh: its faces, four a tetrahedron, are counted in 32 bits.
 pub const MAX_TETS: usize = (1 << 30) - 1;
 
-/// One side of a face: the face of one tetrahedron.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct HalfFace {
-    /// The face's vertices in increasing order.
-    pub key: [u32; 3],
-    /// `4 · tet + i` for face `i`.
-    code: u32,
-}
+/// One side of a face: the face of one tetrahedron. A number, for sorting: the face's vertices in increasing order, and
+/// `4 · tet + i` for face `i`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct HalfFace(u128);
 
 impl HalfFace {
+    fn new([a, b, c]: [u32; 3], code: u32) -> Self {
+        let number = [b, c, code].iter().fold(u128::from(a), |number, &part| number << 32 | u128::from(part));
+        Self(number)
+    }
+
+    /// The face's vertices in increasing order.
+    fn vertices(self) -> [u32; 3] {
+        [96, 64, 32].map(|shift| (self.0 >> shift) as u32)
+    }
+
+    fn code(self) -> u32 {
+        self.0 as u32
+    }
+
     /// The tetrahedron that this face belongs to.
     pub fn tet(self) -> u32 {
-        self.code >> 2
+        self.code() >> 2
     }
 
     /// Which of its tetrahedron's faces it is.
     pub fn face(self) -> usize {
-        (self.code & 3) as usize
+        (self.code() & 3) as usize
     }
 
     /// Whether sorting its vertices turns it around.
@@ -54,25 +64,25 @@ pub(crate) fn sorted_faces(tets: &[[u32; 4]]) -> Result<Vec<HalfFace>, MeshError
         // Few tetrahedra with huge indices must not size the table.
         shift += 1;
     }
-    let bucket = |key: [u32; 3]| (key[0] >> shift) as usize;
+    let bucket = |face: HalfFace| (face.vertices()[0] >> shift) as usize;
     let mut starts = vec![0_u32; (largest >> shift) as usize + 2];
     for face in half_faces(tets) {
-        starts[bucket(face.key) + 1] += 1;
+        starts[bucket(face) + 1] += 1;
     }
     for i in 1..starts.len() {
         starts[i] += starts[i - 1];
     }
     let mut next = starts.clone();
-    let mut sorted = vec![HalfFace { key: [0; 3], code: 0 }; 4 * tets.len()];
+    let mut sorted = vec![0_u128; 4 * tets.len()];
     for face in half_faces(tets) {
-        let slot = &mut next[bucket(face.key)];
-        sorted[*slot as usize] = face;
+        let slot = &mut next[bucket(face)];
+        sorted[*slot as usize] = face.0;
         *slot += 1;
     }
     for ends in starts.windows(2) {
         sorted[ends[0] as usize..ends[1] as usize].sort_unstable();
     }
-    Ok(sorted)
+    Ok(sorted.into_iter().map(HalfFace).collect())
 }
 
 fn half_faces(tets: &[[u32; 4]]) -> impl Iterator<Item = HalfFace> + '_ {
@@ -80,14 +90,14 @@ fn half_faces(tets: &[[u32; 4]]) -> impl Iterator<Item = HalfFace> + '_ {
         (0..4_u32).map(move |i| {
             let mut key = face_of(*tet, i as usize);
             key.sort_unstable();
-            HalfFace { key, code: 4 * t + i }
+            HalfFace::new(key, 4 * t + i)
         })
     })
 }
 
 /// The groups of equal faces, each with all tetrahedra around it.
 pub(crate) fn face_groups(sorted: &[HalfFace]) -> impl Iterator<Item = &[HalfFace]> {
-    sorted.chunk_by(|a, b| a.key == b.key)
+    sorted.chunk_by(|a, b| a.0 >> 32 == b.0 >> 32)
 }
 
 /// The neighbours of each tetrahedron: entry `i` lies across face `i`, or is [`NONE`] at the boundary.
@@ -129,7 +139,7 @@ pub(crate) fn boundary_faces<'a>(
 
 /// The error for a face with three or more tetrahedra.
 pub(crate) fn crowded(group: &[HalfFace]) -> MeshError {
-    MeshError::CrowdedFace { face: group[0].key, tets: group.iter().map(|f| f.tet()).collect() }
+    MeshError::CrowdedFace { face: group[0].vertices(), tets: group.iter().map(|f| f.tet()).collect() }
 }
 
 /// Checks that every tetrahedron refers to existing points.

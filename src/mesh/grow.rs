@@ -6,7 +6,7 @@ use super::FACES;
 use super::NONE;
 #[cfg(any(feature = "build", test))]
 use super::neighbors;
-use crate::geom::orient3d;
+use crate::geom::{orient3d, sort_few, total_order};
 use glam::DVec3;
 
 /// Most faces around a vertex that are looked at.
@@ -138,7 +138,9 @@ impl Growth {
         for [u, v, w] in [[a, b, c], [b, c, a], [c, a, b]] {
             self.look_across(&mut gate, [u, v, w]);
         }
-        gate.candidates[..gate.count].sort_by(|a, b| b.faces.cmp(&a.faces).then(a.angle.total_cmp(&b.angle)));
+        sort_few(&mut gate.candidates[..gate.count], |a, b| {
+            b.faces.cmp(&a.faces).then(a.angle.total_cmp(&b.angle)).is_lt()
+        });
         Some(gate)
     }
 
@@ -193,15 +195,16 @@ impl Growth {
         found.dedup();
         let [a, b, c] = gate.face.map(|v| self.positions[v as usize]);
         let candidates = gate.candidates();
-        let mut ranked: Vec<(f64, u32)> = Vec::new();
+        let mut ranked: Vec<u128> = Vec::new();
         for v in found {
             let p = self.positions[v as usize];
             if candidates.iter().all(|known| known.vertex != v) && orient3d(a, b, c, p) > 0 {
-                ranked.push((reach([a, b, c], p), v));
+                let reach = total_order(reach([a, b, c], p));
+                ranked.push(u128::from(reach) << 32 | u128::from(v));
             }
         }
-        ranked.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
-        ranked.into_iter().map(|(_, v)| v).collect()
+        ranked.sort_unstable();
+        ranked.into_iter().map(|key| key as u32).collect()
     }
 
     /// Marks the gate as a face of the boundary.

@@ -15,6 +15,7 @@ mod explicit;
 mod half_edge;
 mod margins;
 mod mesh;
+mod other_kinds;
 mod ranks;
 mod replay;
 mod stats;

@@ -113,9 +113,18 @@ impl Front {
                 self.judge_open(task);
             }
             // Parents have smaller numbers: in this order few pending updates are forced by others.
-            self.pending.sort_unstable_by_key(|violation| std::cmp::Reverse(violation.update));
+            self.sort_pending();
         }
         self.pending.pop()
+    }
+
+    /// Sorts what is pending by falling number of the update.
+    fn sort_pending(&mut self) {
+        let key = |violation: &Violation| u64::from(!violation.update.0) << 32;
+        let mut order: Vec<u64> =
+            (0..).zip(&self.pending).map(|(place, violation)| key(violation) | place).collect();
+        order.sort_unstable();
+        self.pending = order.iter().map(|key| self.pending[*key as u32 as usize]).collect();
     }
 
     /// Evaluates all due tetrahedra in groups: fetching the data of a group first hides memory latency.

@@ -4,7 +4,6 @@ use super::Criterion;
 use super::front::{CHUNK_WORDS, Front, Violation};
 use super::look::{TetErrors, see};
 use crate::mt::{ApplyUpdates, ErrorCode, UpdateId};
-use std::collections::BTreeMap;
 use std::ops::Range;
 
 impl Front {
@@ -89,8 +88,9 @@ impl Front {
         mt: &impl ApplyUpdates,
         criterion: &dyn Criterion,
         page_of: impl Fn(UpdateId) -> u32,
-    ) -> BTreeMap<u32, f64> {
-        let mut pages = BTreeMap::new();
+    ) -> Vec<(u32, f64)> {
+        // Pages with excesses, which sort as their bits do: they are larger than 1.
+        let mut demands: Vec<u128> = Vec::new();
         let mut demand = |absent: UpdateId, t: u32| {
             let Some(tet) = self.mesh.tet(t) else { return };
             let update = mt.remover(&self.mesh, t);
@@ -100,8 +100,7 @@ impl Front {
             let verdict =
                 see(&self.mesh, &tet, &errors, update.unwrap_or(absent), |look| criterion.rank(look));
             if verdict.violates() {
-                let largest = pages.entry(page_of(absent)).or_insert(0.0_f64);
-                *largest = largest.max(verdict.excess);
+                demands.push(u128::from(page_of(absent)) << 64 | u128::from(verdict.excess.to_bits()));
             }
         };
         if self.tracked {
@@ -111,7 +110,9 @@ impl Front {
             slots.filter_map(|t| mt.awaited(&self.mesh, t).map(|u| (u, t))).for_each(|(u, t)| demand(u, t));
             self.awaiting.iter().for_each(|&(u, t)| demand(UpdateId(u), t));
         }
-        pages
+        demands.sort_unstable();
+        let largest = demands.chunk_by(|a, b| a >> 64 == b >> 64).filter_map(<[u128]>::last);
+        largest.map(|&demand| ((demand >> 64) as u32, f64::from_bits(demand as u64))).collect()
     }
 
     /// The present pages with the remover of a tetrahedron that may violate the criterion by the `bounds` of the page:

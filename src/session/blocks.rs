@@ -6,6 +6,7 @@
 
 use super::Session;
 use crate::format::{DecodeOptions, Decoder, FormatError, Index, Progress};
+use crate::geom::total_order;
 use crate::mt::{ErrorCode, Mt, MultiTessellation, UpdateId, UpdatePages};
 use crate::refine::{Criterion, Front, TetData};
 use std::borrow::Cow;
@@ -54,8 +55,8 @@ pub(super) struct Blocks {
     pieces: BTreeMap<u64, Vec<u8>>,
     /// The beginning of a range of a block, and where that begins: it came with what stands in front of the blocks.
     beginning: Option<(u64, Vec<u8>)>,
-    /// Complete blocks that wait for others.
-    waiting: BTreeMap<u32, Vec<u8>>,
+    /// Complete blocks that wait for others. Numbers as long as those of `pieces`: a type of its own would add much to the wasm.
+    waiting: BTreeMap<u64, Vec<u8>>,
     /// What is to be here, most important first, as far as there is memory for it.
     plan: Vec<(f64, u32)>,
     needed: u32,
@@ -98,7 +99,7 @@ impl Session {
         let Some(mt) = self.decoder.mt().filter(|mt| mt.is_paged()) else { return Vec::new() };
         let mut wanted = Vec::new();
         for &(priority, block) in &blocks.plan {
-            if mt.has_page(block) || blocks.waiting.contains_key(&block) {
+            if mt.has_page(block) || blocks.waiting.contains_key(&u64::from(block)) {
                 continue;
             }
             let ranges = self.decoder.block_ranges(block).into_iter();
@@ -162,7 +163,7 @@ impl Session {
         if ranges.iter().all(|range| blocks.pieces.contains_key(&range.start)) {
             let parts: Vec<Vec<u8>> =
                 ranges.iter().filter_map(|range| blocks.pieces.remove(&range.start)).collect();
-            blocks.waiting.insert(block, parts.concat());
+            blocks.waiting.insert(block.into(), parts.concat());
             self.insert_waiting()?;
         }
         Ok(self.progress())
@@ -189,13 +190,13 @@ impl Session {
                 |range: &Range<u64>| &bytes[(range.start - start) as usize..(range.end - start) as usize];
             let whole: Vec<u8> = ranges.iter().flat_map(part).copied().collect();
             if let Some(blocks) = &mut self.blocks {
-                blocks.waiting.insert(block, whole);
+                blocks.waiting.insert(block.into(), whole);
             }
             self.insert_waiting()?;
             // A block that no request needs does not wait for memory.
             if let Some(blocks) = &mut self.blocks
                 && blocks.criterion.is_none()
-                && blocks.waiting.remove(&block).is_some()
+                && blocks.waiting.remove(&block.into()).is_some()
             {
                 return Ok(());
             }
@@ -214,7 +215,7 @@ impl Session {
                 // When the mesh has followed the request, more can go.
                 break;
             }
-            let bytes = self.blocks.as_mut().and_then(|blocks| blocks.waiting.remove(&block));
+            let bytes = self.blocks.as_mut().and_then(|blocks| blocks.waiting.remove(&block.into()));
             self.decoder.take_block(block, &bytes.unwrap_or_default())?;
             if let (Some(front), Some(mt)) = (&mut self.front, self.decoder.mt()) {
                 front.page_inserted(mt, block);
@@ -234,11 +235,11 @@ impl Session {
     fn next_complete(&self) -> Option<u32> {
         let (blocks, index) = (self.blocks.as_ref()?, self.decoder.index()?);
         let mt = self.decoder.mt()?;
-        let ready = |block: &&u32| {
-            let parents = index.blocks.get(**block as usize).map_or(&[][..], |info| &info.parents);
+        let ready = |block: &u32| {
+            let parents = index.blocks.get(*block as usize).map_or(&[][..], |info| &info.parents);
             parents.iter().all(|&parent| mt.has_page(parent))
         };
-        blocks.waiting.keys().find(ready).copied()
+        blocks.waiting.keys().map(|&block| block as u32).find(ready)
     }
 
     /// How the blocks stand.
@@ -281,7 +282,11 @@ impl Session {
         };
         plan.iter().for_each(|&(_, block)| blocks.last_needed[block as usize] = blocks.plans);
         // What a block depends on is as important and has a smaller number.
-        plan.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let key =
+            |&(priority, block): &(f64, u32)| u128::from(!total_order(priority)) << 32 | u128::from(block);
+        let mut order: Vec<u128> = (0..).zip(&plan).map(|(place, entry)| key(entry) << 32 | place).collect();
+        order.sort_unstable();
+        plan = order.into_iter().map(|key| plan[key as u32 as usize]).collect();
         blocks.needed = plan.len() as u32;
         // Pages with applied updates do not go: what comes has to fit beside them.
         let mut taken = match &self.front {
@@ -299,7 +304,7 @@ impl Session {
         blocks.left_out = blocks.needed - plan.len() as u32;
         blocks.plan = plan;
         let is_planned = |block: u32| blocks.plan.iter().any(|&(_, planned)| planned == block);
-        blocks.waiting.retain(|&block, _| is_planned(block));
+        blocks.waiting.retain(|&block, _| is_planned(block as u32));
         let decoder = &self.decoder;
         blocks.pieces.retain(|&start, _| decoder.block_at(start).is_some_and(is_planned));
     }

@@ -7,11 +7,10 @@
 //! What holds: a point of the domain, its boundary included, is found, and one outside is not; of several tetrahedra
 //! that meet at a point the one with the smallest number is taken.
 
-use crate::geom::Groups;
+use crate::geom::{Groups, sort_few, total_order};
 use crate::mesh::{FACES, NONE};
 use crate::view::MeshView;
 use robust::Coord3D;
-use std::collections::BTreeSet;
 
 /// Pieces of a line that are shorter than this fraction of it are left out, and gaps are closed: rounding makes them
 /// where a line passes through points and edges of the mesh.
@@ -175,7 +174,7 @@ impl<'a> Probe<'a> {
                 (0..self.mesh.tets.len() as u32).filter(|&t| near.meets(&self.mesh, t)).for_each(&mut clip);
             }
         }
-        parts.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
+        sort_parts(&mut parts);
         let mut spans: Vec<Span> = Vec::new();
         for (enter, leave, t) in parts {
             let done = spans.last().map_or(f64::NEG_INFINITY, |span| span.to);
@@ -244,19 +243,19 @@ impl<'a> Probe<'a> {
 
     /// The smallest of the tetrahedra that contain the point and are connected there.
     fn smallest(&self, tet: u32, p: [f64; 3]) -> u32 {
-        let mut found = BTreeSet::from([tet]);
-        let mut stack = vec![tet];
-        while let Some(t) = stack.pop() {
+        let mut found = vec![tet];
+        let mut next = 0;
+        while let Some(&t) = found.get(next) {
+            next += 1;
             let Some(sides) = self.sides(t, p) else { continue };
             let around = self.mesh.neighbors[t as usize];
             for n in (0..4).filter(|&i| sides[i] == 0.0 && around[i] != NONE).map(|i| around[i]) {
                 if !found.contains(&n) && self.holds(n, p) {
-                    found.insert(n);
-                    stack.push(n);
+                    found.push(n);
                 }
             }
         }
-        found.first().copied().unwrap_or(tet)
+        found.into_iter().min().unwrap_or(tet)
     }
 
     /// On which side of each face a point is: positive outside, with the exact sign; none for a tetrahedron that
@@ -290,6 +289,18 @@ impl<'a> Probe<'a> {
         let is_even = [[0, 1, 2], [1, 2, 0], [2, 0, 1]].iter().any(|turn| turn.map(|k| face[k]) == sorted);
         let side = orient(a, b, c, p);
         if is_even { side } else { -side }
+    }
+}
+
+/// Sorts the parts of a segment, each from where to where in which tetrahedron, by these.
+fn sort_parts(parts: &mut Vec<(f64, f64, u32)>) {
+    let key = |from: f64| u128::from(total_order(from)) << 64;
+    let mut order: Vec<u128> = (0..).zip(&*parts).map(|(place, part)| key(part.0) | place).collect();
+    order.sort_unstable();
+    *parts = order.into_iter().map(|key| parts[key as usize]).collect();
+    // Those that begin at the same place are around one vertex.
+    for same in parts.chunk_by_mut(|a, b| a.0.total_cmp(&b.0).is_eq()) {
+        sort_few(same, |a, b| a.1.total_cmp(&b.1).then(a.2.cmp(&b.2)).is_lt());
     }
 }
 
@@ -478,7 +489,7 @@ impl Grid {
             if (d[i] * self.scale[i]).abs() > (d[long] * self.scale[long]).abs() { i } else { long }
         });
         let mut ends = [from[long], to[long]];
-        ends.sort_unstable_by(f64::total_cmp);
+        sort_few(&mut ends, |a, b| a.total_cmp(b).is_lt());
         if ends[1] < self.min[long] || ends[0] > self.max[long] {
             return found;
         }
@@ -492,7 +503,7 @@ impl Grid {
             let s = if d[long] == 0.0 { [0.0, 1.0] } else { s };
             let range = [0, 1, 2].map(|i| {
                 let mut x = s.map(|s| from[i] + s * d[i]);
-                x.sort_unstable_by(f64::total_cmp);
+                sort_few(&mut x, |a, b| a.total_cmp(b).is_lt());
                 let slack = 1e-12 * (from[i].abs() + to[i].abs());
                 if i == long {
                     [layer, layer]

@@ -85,6 +85,7 @@ fn format_code(error: &FormatError) -> &'static str {
         FormatError::UnsupportedVersion { .. } | FormatError::UnsupportedFeature { .. } => {
             "unsupported-version"
         }
+        FormatError::Kind { .. } => "kind",
         FormatError::Corrupt { .. }
         | FormatError::Update(_)
         | FormatError::Base(_)

@@ -59,6 +59,24 @@ for (const [name, hashes] of Object.entries(FILES)) {
   });
 }
 
+test("only files of other kinds than half-edge have the module with all kinds loaded", async () => {
+  const loaded = [];
+  for (const name of ["small.mt", "small-vertex.mt"]) {
+    const fresh = await browser.newPage();
+    await fresh.goto(server.address);
+    const before = server.asked.length;
+    await fresh.evaluate(async (name) => {
+      const { MultiTessellation } = await import("tetralod");
+      const mt = await MultiTessellation.open(`/${name}`);
+      await mt.refine({ error: 0 });
+      mt.free();
+    }, name);
+    loaded.push(server.asked.slice(before).filter((file) => file.endsWith(".wasm")));
+    await fresh.close();
+  }
+  assert.deepEqual(loaded, [["tetralod_core_bg.wasm"], ["tetralod_core_bg.wasm", "tetralod_all_kinds_bg.wasm"]]);
+});
+
 test("what was ended is refused by name", async () => {
   const code = await page.evaluate(async () => {
     const { MultiTessellation } = await import("tetralod");

@@ -61,16 +61,37 @@ test("worker and wasm are taken from other places, or from a worker that is pass
   await works({ worker: new Worker(at("worker.js")), wasmUrl: at("tetralod_core_bg.wasm").href });
 });
 
+test("a file of another kind than half-edge has the module with all kinds loaded, or `wasmUrl` leads to that one", async () => {
+  const other = new Uint8Array(await readFile(`${folder}/small-vertex.mt`));
+  const [first] = JSON.parse(await readFile(`${folder}/hashes-vertex.json`, "utf8"));
+  const pieces = async function* () {
+    for (let at = 0; at < other.length; at += 100) yield other.slice(at, at + 100);
+  };
+  const wasmUrl = at("tetralod_all_kinds_bg.wasm");
+  for (const [source, how] of [[other, {}], [pieces(), {}], [pieces(), { worker: false }], [new Blob([other]), {}], [other, { wasmUrl }]]) {
+    const mt = await MultiTessellation.open(source, how);
+    await mt.complete;
+    await mt.refine(first.options);
+    assert.equal(await mt.hash(), first.hash);
+    mt.free();
+  }
+  await works({ wasmUrl });
+});
+
 test("the inline entry needs no other file, in a worker and in the caller's thread", async () => {
   const text = await readFile(at("inline.js"), "utf8");
   const inline = await import(`data:text/javascript;base64,${Buffer.from(text).toString("base64")}`);
   assert.deepEqual(Object.keys(inline).sort(), Object.keys(await import(at("index.js").href)).sort());
+  const other = new Uint8Array(await readFile(`${folder}/small-explicit.mt`));
+  const [explicit] = JSON.parse(await readFile(`${folder}/hashes-explicit.json`, "utf8"));
   for (const worker of [true, false]) {
-    const mt = await inline.MultiTessellation.open(bytes, { worker });
-    await mt.complete;
-    await mt.refine(options);
-    assert.equal(await mt.hash(), hash);
-    mt.free();
+    for (const [source, expected] of [[bytes, { options, hash }], [other, explicit]]) {
+      const mt = await inline.MultiTessellation.open(source, { worker });
+      await mt.complete;
+      await mt.refine(expected.options);
+      assert.equal(await mt.hash(), expected.hash);
+      mt.free();
+    }
   }
 });
 

@@ -90,7 +90,7 @@ impl Paged {
         if self.mt.info().fields.len() == 1 {
             let bits = self.mt.page_bits();
             let demanded = front.demanded_pages(&self.mt, &criterion, |u| u.0 >> bits);
-            assert!(demanded.keys().all(|&page| !self.mt.has_page(page)));
+            assert!(demanded.iter().all(|&(page, _)| !self.mt.has_page(page)));
             assert!(!lacks || !demanded.is_empty(), "{request:?}");
         }
     }
@@ -184,7 +184,7 @@ fn demanded_pages_are_enough_and_all_in_use() {
                 if demanded.is_empty() {
                     break;
                 }
-                demanded.into_keys().for_each(|page| paged.insert(&mut front, page));
+                demanded.into_iter().for_each(|(page, _)| paged.insert(&mut front, page));
             }
             let all = vec![true; paged.whole.info().updates as usize];
             let wanted = paged.subject.closure(paged.asked(&criterion, &all));

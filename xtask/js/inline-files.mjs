@@ -11,8 +11,9 @@ let bytes;
 /** @type {string | undefined} */
 let url;
 
-/** The bytes of the wasm module. */
+/** The bytes of the wasm module with MTs of all kinds. */
 export const coreWasm = () => (bytes ??= unpacked());
+export const allKindsWasm = coreWasm;
 
 async function unpacked() {
   const stream = new Blob([Uint8Array.from(atob(packed), (c) => c.charCodeAt(0))]).stream();

@@ -1,6 +1,6 @@
 /**
- * Writes `inline.js` of the package in a folder that has all its other files: `index.js` with the wasm module (deflated, as
- * text) and the worker in it. One file, that imports nothing.
+ * Writes `inline.js` of the package in a folder that has all its other files: `index.js` with the wasm module for MTs of all
+ * kinds (deflated, as text) and the worker in it. One file, that imports nothing.
  *
  * node xtask/js/inline.mjs FOLDER
  */
@@ -35,7 +35,7 @@ const replacing = (modules) => ({
   },
 });
 
-const wasm = deflateSync(await readFile(join(folder, "tetralod_core_bg.wasm")), { level: 9 });
+const wasm = deflateSync(await readFile(join(folder, "tetralod_all_kinds_bg.wasm")), { level: 9 });
 
 const worker = await build({
   ...OPTIONS,
@@ -43,7 +43,7 @@ const worker = await build({
   format: "iife",
   write: false,
   // The page sends it the bytes.
-  plugins: [replacing({ "./files.js": { contents: "export const coreWasm = () => undefined;" } })],
+  plugins: [replacing({ "./files.js": { contents: "export const coreWasm = () => undefined; export const allKindsWasm = coreWasm;" } })],
 });
 
 await build({

@@ -95,13 +95,15 @@ fn clippy() -> Result<()> {
     shell::run(&mut shell::cargo(["clippy", "--package", "xtask", "--all-targets", "--", "-D", "warnings"]))
 }
 
-/// The core alone, which must not need any feature; with the builders, as `paper` has it; and what goes into the package,
-/// the second with its tests in the browser.
+/// The core alone, which must not need any feature; with MTs of all kinds; with the builders, as `paper` has it; and what goes
+/// into the package, the viewer with the tests in the browser.
 fn features() -> Result<()> {
     lint_library("", &[])?;
+    lint_library("all-kinds", &[])?;
     lint_library("build", &[])?;
     shell::add_wasm_target()?;
-    lint_library("web-bench", &["--target", shell::WASM])?;
+    lint_library("web-session", &["--target", shell::WASM])?;
+    lint_library("web-bench,all-kinds", &["--target", shell::WASM])?;
     lint_library("web-build", &["--target", shell::WASM])?;
     with_fixture(|| {
         let args = ["clippy", "--package", "tetralod", "--lib", "--test", "web", "--target", shell::WASM];
@@ -152,7 +154,7 @@ fn npm_package() -> Result<()> {
     package::build(&[])
 }
 
-const WEB_FEATURES: [&str; 3] = ["--no-default-features", "--features", "web-bench,gpu"];
+const WEB_FEATURES: [&str; 3] = ["--no-default-features", "--features", "web-bench,gpu,all-kinds"];
 
 fn wasm() -> Result<()> {
     let browser = browser::require()?;
@@ -232,8 +234,15 @@ fn consumer() -> Result<()> {
     ensure!(archive.is_file(), "npm pack said `{}` but wrote no such file", packed.trim());
     shell::run(&mut node_tool("publint/src/cli.js", &["--strict", package::PKG]))?;
     // The files that are no modules have no types; the scripts of workers export nothing.
-    let untyped =
-        ["--profile", "esm-only", "--exclude-entrypoints", "core.wasm", "viewer.wasm", "build.wasm"];
+    let untyped = [
+        "--profile",
+        "esm-only",
+        "--exclude-entrypoints",
+        "core.wasm",
+        "all-kinds.wasm",
+        "viewer.wasm",
+        "build.wasm",
+    ];
     shell::run(
         node_tool("@arethetypeswrong/cli/dist/index.js", &["--format", "table-flipped", "--no-emoji"])
             .args(["--no-color", "--quiet"])

@@ -7,7 +7,7 @@ use super::header::{END_BYTES, HEAD_BYTES, HEADER_BYTES, Kind, SectionHead, may_
 use super::payload::exact::Corrections;
 use super::payload::{Metadata, State};
 use super::read::Reader;
-use super::{FormatError, Index, Limits};
+use super::{FormatError, Index, Limits, checksum};
 use crate::mt::{Mt, MtInfo, UpdatePages};
 use sections::{FileHead, OpenBlock};
 
@@ -37,7 +37,7 @@ enum Stage {
     /// A section's content: `start` is its place in the file, `left` the bytes that are missing.
     Payload {
         head: SectionHead,
-        hasher: crc32fast::Hasher,
+        hasher: checksum::Hasher,
         start: u64,
         left: u32,
     },
@@ -73,7 +73,7 @@ pub struct Decoder {
     total: Option<u64>,
     sections: u32,
     /// Over the checksums of all sections.
-    chain: crc32fast::Hasher,
+    chain: checksum::Hasher,
     metadata: Metadata,
     head: FileHead,
     mt: Option<Mt>,
@@ -103,7 +103,7 @@ impl Decoder {
             bytes: 0,
             total: None,
             sections: 0,
-            chain: crc32fast::Hasher::new(),
+            chain: checksum::Hasher::new(),
             metadata: Metadata::new(),
             head: FileHead::default(),
             mt: None,

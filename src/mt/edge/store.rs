@@ -16,6 +16,7 @@
 //! `mt/edge/predict.rs`. [`EdgeMtBuilder`](crate::mt::EdgeMtBuilder) makes them from plain vertex splits.
 
 use crate::mesh::NONE;
+use crate::mt::other_kinds::OtherKind;
 use crate::mt::pages::{Page, Pages};
 use crate::mt::update_errors::Errors;
 use crate::mt::{
@@ -87,6 +88,7 @@ pub struct EdgeMt {
     base_splits: Vec<i32>,
     pub(super) pages: Pages<EdgePage>,
     pub(super) record: Record,
+    kind: OtherKind,
 }
 
 /// Updates that come and go together, each with all that belongs to it side by side.
@@ -191,6 +193,7 @@ impl EdgeMt {
             pages: Pages::new(info.updates, bits),
             record: Record::new(&info),
             info,
+            kind: OtherKind::new(),
         }
     }
 

@@ -9,6 +9,7 @@
 
 use crate::geom::orient3d;
 use crate::mesh::NONE;
+use crate::mt::other_kinds::OtherKind;
 use crate::mt::pages::Rows;
 use crate::mt::replay::{ReplayError, canonical, replay};
 use crate::mt::update_errors::Errors;
@@ -61,6 +62,7 @@ pub struct ExplicitMt {
     pub(super) to_come: ErrorCode,
     /// Whether every update so far inserts more tetrahedra than it removes.
     pub(in crate::mt) always_grows: bool,
+    kind: OtherKind,
 }
 
 /// What an explicit MT consists of, in numbers.
@@ -110,6 +112,7 @@ impl ExplicitMt {
             to_come: ErrorCode::MAX,
             always_grows: true,
             base,
+            kind: OtherKind::new(),
         }
     }
 

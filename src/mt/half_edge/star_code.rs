@@ -16,7 +16,7 @@
 
 use super::scratch::{MOST, NO_ENTRY, NewTet, Scratch};
 use super::store::{ForestChild, HalfEdgeMt};
-use crate::geom::orient3d;
+use crate::geom::{orient3d, sort_few};
 use crate::mesh::NONE;
 use crate::mt::mesh::paged_array::PagedArray;
 use crate::mt::mesh::tet::TURN;
@@ -57,8 +57,8 @@ pub(in crate::mt) struct StarCode {
     choices: Vec<Choices>,
     /// The vertices of the link, and then the new one.
     positions: Vec<[i32; 3]>,
-    /// What has to be stored, by rising certainty: a key, tetrahedron and face.
-    order: Vec<(u64, u8, u8)>,
+    /// What has to be stored, by rising certainty: see [`entry`].
+    order: Vec<u128>,
     /// The corner of each tetrahedron that is the near vertex of its remover.
     near: Vec<u8>,
     /// From that corner to the vertex that its remover inserts.
@@ -104,7 +104,7 @@ impl CodeIo for Reader<'_> {
                 .copied()
                 .reduce(|best, choice| if comes_before(&choice, &best).is_lt() { choice } else { best });
         }
-        choices.sort_by(comes_before);
+        sort_few(choices, |a, b| comes_before(a, b).is_lt());
         choices.get(rank).copied()
     }
 
@@ -142,7 +142,7 @@ struct Writer<'a> {
 
 impl CodeIo for Writer<'_> {
     fn choose(&mut self, tet: usize, choices: &mut [Choice]) -> Option<Choice> {
-        choices.sort_by(comes_before);
+        sort_few(choices, |a, b| comes_before(a, b).is_lt());
         let remover = self.truth[tet].0;
         let rank = choices.iter().position(|choice| choice.remover == remover);
         let rank = rank.or_else(|| choices.iter().position(|choice| choice.remover == FURTHER))?;
@@ -289,6 +289,16 @@ fn key(certainty: f64, hash: u64) -> u64 {
     level << 52 | hash >> 12
 }
 
+/// A key with a tetrahedron and a face, in one number: these decide where keys are equal.
+fn entry(key: u64, tet: u8, face: u8) -> u128 {
+    u128::from(key) << 16 | u128::from(tet) << 8 | u128::from(face)
+}
+
+/// Tetrahedron and face of such a number.
+fn parts(entry: u128) -> (usize, u8) {
+    (usize::from((entry >> 8) as u8), entry as u8)
+}
+
 /// Choices by falling weight, equal ones by the weights that they had first, and then as they came.
 fn comes_before(a: &Choice, b: &Choice) -> std::cmp::Ordering {
     b.weight.total_cmp(&a.weight).then(b.first_weight.total_cmp(&a.first_weight))
@@ -310,7 +320,7 @@ impl StarCode {
             if choices.len > 1 {
                 let largest =
                     choices.all[..choices.len].iter().fold(0.0, |w: f64, choice| w.max(choice.weight));
-                self.order.push((key(largest, around.tet_hashes[i]), i as u8, 0));
+                self.order.push(entry(key(largest, around.tet_hashes[i]), i as u8, 0));
             }
         }
         self.near.clear();
@@ -319,7 +329,7 @@ impl StarCode {
         self.offsets.resize(star.len(), [0; 3]);
         self.order.sort_unstable();
         for at in 0..self.order.len() {
-            let i = usize::from(self.order[at].1);
+            let (i, _) = parts(self.order[at]);
             let choices = &mut self.choices[i];
             let choices = &mut choices.all[..choices.len];
             weigh_by_neighbors(choices, &star[i], star, &self.decided);
@@ -431,15 +441,16 @@ impl StarCode {
                 let face_hash = around.hashes[usize::from(new.corners[face]).min(around.hashes.len() - 1)]
                     .rotate_left(17);
                 let key = key((sine - STEEP).abs(), around.tet_hashes[i].wrapping_add(face_hash));
-                self.order.push((key, i as u8, face as u8 | guess << 7));
+                self.order.push(entry(key, i as u8, face as u8 | guess << 7));
             }
         }
         let stored = bits.min(self.order.len());
         if stored > 0 {
             self.order.sort_unstable();
         }
-        for (at, &(_, i, face)) in self.order.iter().enumerate() {
-            let (i, face, guess) = (usize::from(i), usize::from(face & 3), face >> 7 == 1);
+        for (at, &entry) in self.order.iter().enumerate() {
+            let (i, face) = parts(entry);
+            let (face, guess) = (usize::from(face & 3), face >> 7 == 1);
             let is_inner = if at < stored { io.is_inner(i, face, guess) } else { guess };
             star[i].inner |= u8::from(is_inner) << face;
         }

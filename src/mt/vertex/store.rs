@@ -31,6 +31,7 @@ use super::growing::Growing;
 use super::limits::{COUNT_BITS, MAX_INSERTED, MAX_REMOVED};
 use super::tet_errors::MAX_QUARTERINGS;
 use crate::mesh::NONE;
+use crate::mt::other_kinds::OtherKind;
 use crate::mt::update_errors::Errors;
 use crate::mt::{BaseMesh, ErrorCode, MtInfo, MultiTessellation, UpdateError, UpdateId, VertexId};
 
@@ -79,6 +80,7 @@ pub struct VertexMt {
     shape_bits: u64,
     /// While the nodes have neither links nor removers: what is instead of them.
     pub(in crate::mt) growing: Option<Box<Growing>>,
+    kind: OtherKind,
 }
 
 /// Nodes whose starts are relative to a common one: with at most 255 fields a node takes less than 2^14 bits.
@@ -136,6 +138,7 @@ impl VertexMt {
             to_come: ErrorCode::MAX,
             shape_bits: 0,
             growing: None,
+            kind: OtherKind::new(),
         })
     }
 
