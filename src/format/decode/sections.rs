@@ -5,6 +5,7 @@ use crate::format::coder::{Models, Source};
 use crate::format::header::{HEAD_BYTES, Kind, SectionHead, Start, VERSION_AT, version_for};
 use crate::format::payload::edge::FieldPart;
 use crate::format::payload::exact::Corrections;
+use crate::format::payload::histogram::Histograms;
 use crate::format::payload::{BaseParts, Shared};
 use crate::format::read::Reader;
 use crate::format::{BlockInfo, FormatError, Index, payload};
@@ -21,6 +22,7 @@ pub(super) struct FileHead {
     pub(super) index: Option<Index>,
     /// Where the index ends in the file.
     pub(super) index_end: u64,
+    pub(super) histograms: Option<Histograms>,
     pub(super) models: Option<Models>,
     /// Until all wanted fields are there; then it is in the MT.
     pub(super) base: Option<BaseParts>,
@@ -92,6 +94,7 @@ impl Decoder {
         match head.kind {
             Kind::INFO => self.open_info(content)?,
             Kind::INDX => self.open_index(content)?,
+            Kind::HIST => self.open_histograms(content)?,
             Kind::MODL => self.open_models(content)?,
             Kind::BASE => self.open_base(content)?,
             Kind::FLDB => self.open_base_field(content)?,
@@ -127,7 +130,7 @@ impl Decoder {
         }
         let offset = self.bytes;
         let (info, metadata) = payload::read_info(content)?;
-        if self.head.start.version[0] < version_for(info.kind)[0] {
+        if self.head.start.version[0] < version_for(info.kind, false)[0] {
             let what = "the version of the file does not go with the kind of MT in it";
             return Err(FormatError::Corrupt { offset: VERSION_AT, what });
         }
@@ -159,6 +162,16 @@ impl Decoder {
         let parts = if info.kind.is_paged() { 1 + info.fields.len() } else { 1 };
         *index = Some(Index::read(content, info, parts)?);
         self.head.index_end = self.bytes;
+        Ok(())
+    }
+
+    pub(super) fn open_histograms(&mut self, content: Reader<'_>) -> Result<(), FormatError> {
+        let fields = self.head.fields();
+        let FileHead { index: Some(_), histograms: histograms @ None, models: None, .. } = &mut self.head
+        else {
+            return Err(content.out_of_place());
+        };
+        *histograms = Some(Histograms::read(content, fields)?);
         Ok(())
     }
 

@@ -6,6 +6,7 @@ pub mod edge;
 pub mod exact;
 mod explicit;
 pub mod half_edge;
+pub mod histogram;
 pub mod index;
 mod vertex;
 

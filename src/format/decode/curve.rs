@@ -1,0 +1,78 @@
+//! How many bytes of a file a mesh of some error takes, as the index shows.
+
+use super::Decoder;
+use crate::format::{BlockInfo, Index};
+use crate::mt::ErrorCode;
+use std::collections::BTreeMap;
+
+/// A mesh of which error can be had for how many bytes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ErrorBytes {
+    /// The error of the whole mesh, as a fraction of the field's range; infinite if it may be any.
+    pub error: f64,
+    /// Bytes of the file, from its head on.
+    pub bytes: u64,
+}
+
+impl Decoder {
+    /// How many bytes have to come for a mesh whose error in a wanted field, by its place among these, is nowhere above some
+    /// value. Errors fall, bytes grow; the last error is 0. For an error in between, the next entry holds. Empty before the index
+    /// is there.
+    ///
+    /// `fetched` bytes from the start of the file come whatever is asked for, if what stands in front of the blocks is not longer.
+    ///
+    /// Files of half-edge and edge-based MTs come by blocks: these are the bytes of exactly the blocks that
+    /// [`Session::wanted`](crate::session::Session::wanted) names for such a request of a new session, with the wanted fields. Files of other kinds come
+    /// from front to back: this many bytes are enough, and at most two blocks could be left out.
+    pub fn bytes_by_error(&self, place: usize, fetched: u64) -> Vec<ErrorBytes> {
+        let (Some(info), Some(index), Some(head)) = (&self.head.info, &self.head.index, self.head_end())
+        else {
+            return Vec::new();
+        };
+        let Some(&field) = self.head.wanted.get(place) else { return Vec::new() };
+        let limit = self.total.unwrap_or(u64::MAX);
+        let fetched = fetched.max(head).min(limit);
+        let needed =
+            if info.kind.is_paged() { needed_by_blocks(index, field) } else { needed_in_order(index) };
+        let mut bytes_of: BTreeMap<ErrorCode, u64> = BTreeMap::new();
+        for (block, &code) in (0..).zip(&needed) {
+            let ranges = self.block_ranges(block).into_iter();
+            let missing = ranges.map(|range| range.end.saturating_sub(range.start.max(fetched)));
+            *bytes_of.entry(code).or_default() += missing.sum::<u64>();
+        }
+        bytes_of.remove(&ErrorCode::ZERO);
+        let mut curve = Vec::new();
+        let mut bytes = fetched;
+        for (code, more) in bytes_of.into_iter().rev().filter(|(_, more)| *more > 0) {
+            let error = if code == ErrorCode::MAX { f64::INFINITY } else { code.error() };
+            curve.push(ErrorBytes { error, bytes });
+            bytes = bytes.saturating_add(more).min(limit);
+        }
+        curve.push(ErrorBytes { error: 0.0, bytes });
+        curve
+    }
+}
+
+/// For each block the error below which a request needs it: the largest of its own and of those that depend on it.
+fn needed_by_blocks(index: &Index, field: usize) -> Vec<ErrorCode> {
+    let mut needed: Vec<ErrorCode> = index.blocks.iter().map(|block| block.errors[field]).collect();
+    for (at, block) in index.blocks.iter().enumerate().rev() {
+        for &parent in &block.parents {
+            needed[parent as usize] = needed[parent as usize].max(needed[at]);
+        }
+    }
+    needed
+}
+
+/// The same where the file is read in order: whether a block was the last that is needed is known when the next one is there.
+/// Until then any field may still have the largest error of the last update.
+fn needed_in_order(index: &Index) -> Vec<ErrorCode> {
+    let largest = |block: &BlockInfo| block.errors.iter().copied().max().unwrap_or(ErrorCode::ZERO);
+    let mut needed: Vec<ErrorCode> = index.blocks.iter().map(largest).collect();
+    for at in (1..needed.len()).rev() {
+        needed[at - 1] = needed[at - 1].max(needed[at]);
+    }
+    needed.insert(0, ErrorCode::MAX);
+    needed.truncate(index.blocks.len());
+    needed
+}
