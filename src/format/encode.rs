@@ -23,7 +23,7 @@ pub struct EncodeOptions {
     pub check_margins: bool,
     /// Exact values of fields at the vertices of the reference mesh.
     pub exact: Vec<Exact>,
-    /// A histogram of each field over the reference mesh, some 100 bytes each, in front of the base mesh: see
+    /// A histogram of each field over the reference mesh, some 160 bytes each, in front of the base mesh: see
     /// [`Decoder::histogram`](super::Decoder::histogram).
     pub histograms: bool,
     /// Free keys and values, kept as they are. What is here makes the bytes: leave out dates and paths.

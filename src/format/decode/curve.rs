@@ -2,7 +2,7 @@
 
 use super::Decoder;
 use crate::format::{BlockInfo, Index};
-use crate::mt::ErrorCode;
+use crate::mt::{ErrorCode, FieldInfo};
 use std::collections::BTreeMap;
 
 /// A mesh of which error can be had for how many bytes.
@@ -12,6 +12,14 @@ pub struct ErrorBytes {
     pub error: f64,
     /// Bytes of the file, from its head on.
     pub bytes: u64,
+}
+
+impl ErrorBytes {
+    /// The error in units of the field: a request for it is one for [`ErrorBytes::error`], never for less.
+    pub fn error_in_units(&self, field: &FieldInfo) -> f64 {
+        let error = self.error * field.range();
+        if error / field.range() < self.error { error.next_up() } else { error }
+    }
 }
 
 impl Decoder {

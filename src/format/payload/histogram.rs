@@ -5,7 +5,7 @@ use crate::format::{FormatError, write};
 use crate::mesh::Histogram;
 use crate::mt::{CurrentMesh, FieldInfo, MtInfo};
 
-/// Bins of what is written: about 100 bytes a field.
+/// Bins of what is written: about 160 bytes a field.
 const BINS: usize = 64;
 /// The most bins that are read.
 const MAX_BINS: u32 = 1 << 10;
