@@ -52,7 +52,8 @@ export interface FieldInfo {
  * - *Half-edge and edge:* exactly the bytes of the blocks that are fetched for `refine({ error })` or `refine({ relativeError })` of this
  *   field after `open`, with what stands in front of them. It is less where blocks are here or in the cache already, and a little
  *   more where requests reach over gaps (see `gap`).
- * - *Vertex and explicit:* these come from front to back, and this many bytes are enough; it may be up to two blocks less. The rest
+ * - *Vertex and explicit:* these come from front to back, and this many bytes are enough. It may be less, by two blocks and by what the
+ *   index rounds errors up, at most an eighth. The rest
  *   of the file comes all the same.
  *
  * @example

@@ -102,8 +102,8 @@ test("a worker that loads but never answers ends in time, with an error that say
   const slow = `data:text/javascript,${encodeURIComponent(`
     import { parentPort } from "node:worker_threads";
     const answer = (id) => parentPort.postMessage({ id, result: { name: "core", version: "0.0.1" } });
-    parentPort.on("message", ({ id, method }) => (method === "hello" ? answer(id) : setTimeout(answer, 600, id)));`)}`;
-  await rejects(MultiTessellation.open(bytes, { workerUrl: slow, ...how }), "worker", /tetralod 0\.0\.1/);
+    parentPort.on("message", ({ id, method }) => (method === "hello" ? answer(id) : setTimeout(answer, 6000, id)));`)}`;
+  await rejects(MultiTessellation.open(bytes, { workerUrl: slow, workerTimeoutMs: 5000 }), "worker", /tetralod 0\.0\.1/);
   await works({ workerTimeoutMs: Infinity });
 });
 

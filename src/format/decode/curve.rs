@@ -31,7 +31,8 @@ impl Decoder {
     ///
     /// Files of half-edge and edge-based MTs come by blocks: these are the bytes of exactly the blocks that
     /// [`Session::wanted`](crate::session::Session::wanted) names for such a request of a new session, with the wanted fields. Files of other kinds come
-    /// from front to back: this many bytes are enough, and at most two blocks could be left out.
+    /// from front to back: this many bytes are enough. At most two blocks fewer are enough for an error that is lower by an eighth, which
+    /// is by how much the index rounds errors up.
     pub fn bytes_by_error(&self, place: usize, fetched: u64) -> Vec<ErrorBytes> {
         let (Some(info), Some(index), Some(head)) = (&self.head.info, &self.head.index, self.head_end())
         else {

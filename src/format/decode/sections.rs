@@ -67,12 +67,16 @@ impl FileHead {
         source.end()
     }
 
-    /// The largest error that an update can have which is not in the MT.
-    pub(super) fn largest_of_others(&self, mt: &Mt) -> ErrorCode {
-        let Some(index) = &self.index else { return ErrorCode::MAX };
-        let absent = (0..).zip(&index.blocks).filter(|(page, _)| !mt.has_page(*page));
-        let errors = absent.flat_map(|(_, block)| self.wanted.iter().map(|&field| block.errors[field]));
-        errors.max().unwrap_or(ErrorCode::ZERO)
+    /// The largest errors that an update can have which is not in the MT, by wanted field.
+    pub(super) fn largest_of_others(&self, mt: &Mt) -> Vec<ErrorCode> {
+        let mut largest = vec![ErrorCode::ZERO; self.wanted.len()];
+        let blocks = self.index.iter().flat_map(|index| &index.blocks);
+        for (_, block) in (0..).zip(blocks).filter(|(page, _)| !mt.has_page(*page)) {
+            for (error, &field) in largest.iter_mut().zip(&self.wanted) {
+                *error = (*error).max(block.errors[field]);
+            }
+        }
+        largest
     }
 }
 
@@ -279,7 +283,7 @@ impl Decoder {
         let Some(mt) = &mut self.mt else { return Ok(()) };
         shared.check_memory(mt, &self.options.limits)?;
         shared.insert(mt, block, &fields)?;
-        mt.set_to_come(self.head.largest_of_others(mt));
+        mt.set_to_come(&self.head.largest_of_others(mt));
         Ok(())
     }
 

@@ -578,11 +578,6 @@ fn read_quarterings(
     Ok(own_fall)
 }
 
-/// The largest error of an update.
-fn largest(errors: &[ErrorCode]) -> ErrorCode {
-    errors.iter().copied().fold(ErrorCode::ZERO, ErrorCode::max)
-}
-
 /// The totals at the end of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Totals {
