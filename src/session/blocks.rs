@@ -110,6 +110,15 @@ impl Session {
 
     /// How many bytes of the file a session [in parts](Session::in_parts) fetches for a mesh of some error, if it asks for nothing
     /// else: [`Decoder::bytes_by_error`] with what is always fetched at first.
+    ///
+    /// ```
+    /// # use tetralod::session::Session;
+    /// # fn print(session: &Session) {
+    /// for point in session.bytes_by_error(0) {
+    ///     println!("within {} % of the range: {} bytes", 100.0 * point.error, point.bytes);
+    /// }
+    /// # }
+    /// ```
     pub fn bytes_by_error(&self, place: usize) -> Vec<ErrorBytes> {
         let shared = self.decoder.index().map_or(0, |index| index.shared);
         let index_end = self.decoder.head_end().unwrap_or(0).saturating_sub(shared);

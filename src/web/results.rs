@@ -108,9 +108,13 @@ pub fn info(session: &Session) -> Option<JsInfo> {
         let histogram = session.decoder().histogram(place);
         set(&field, "histogram", &histogram.map_or(JsValue::NULL, |shares| doubles(&shares)));
         let curve = session.bytes_by_error(place);
-        let errors: Vec<f64> = curve.iter().map(|point| point.error_in_units(&info.fields[place])).collect();
-        let bytes: Vec<f64> = curve.iter().map(|point| point.bytes as f64).collect();
-        let curve: JsValue = object(&[("errors", doubles(&errors)), ("bytes", doubles(&bytes))]);
+        let list = || Float64Array::new_with_length(curve.len() as u32);
+        let (errors, bytes) = (list(), list());
+        for (at, point) in (0..).zip(&curve) {
+            errors.set_index(at, point.error_in_units(&info.fields[place]));
+            bytes.set_index(at, point.bytes as f64);
+        }
+        let curve: JsValue = object(&[("errors", errors.into()), ("bytes", bytes.into())]);
         set(&field, "curve", &curve);
     }
     Some(described)

@@ -3,7 +3,6 @@
 use super::Decoder;
 use crate::format::{BlockInfo, Index};
 use crate::mt::{ErrorCode, FieldInfo};
-use std::collections::BTreeMap;
 
 /// A mesh of which error can be had for how many bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,23 +42,36 @@ impl Decoder {
         let fetched = fetched.max(head).min(limit);
         let needed =
             if info.kind.is_paged() { needed_by_blocks(index, field) } else { needed_in_order(index) };
-        let mut bytes_of: BTreeMap<ErrorCode, u64> = BTreeMap::new();
-        for (block, &code) in (0..).zip(&needed) {
-            let ranges = self.block_ranges(block).into_iter();
-            let missing = ranges.map(|range| range.end.saturating_sub(range.start.max(fetched)));
-            *bytes_of.entry(code).or_default() += missing.sum::<u64>();
+        let mut is_wanted = vec![false; info.fields.len()];
+        self.head.wanted.iter().for_each(|&wanted| is_wanted[wanted] = true);
+        // Codes in the index are multiples of 256, or all ones.
+        let mut bytes_of = [0_u64; 256];
+        let mut at = head;
+        for (block, code) in index.blocks.iter().zip(needed) {
+            for (part, &length) in block.lengths.iter().enumerate() {
+                let end = at.saturating_add(u64::from(length));
+                if part == 0 || is_wanted[part - 1] {
+                    let missing = end.saturating_sub(at.max(fetched));
+                    let bytes = &mut bytes_of[usize::from(code.0 >> 8)];
+                    *bytes = bytes.saturating_add(missing);
+                }
+                at = end;
+            }
         }
-        bytes_of.remove(&ErrorCode::ZERO);
         let mut curve = Vec::new();
         let mut bytes = fetched;
-        for (code, more) in bytes_of.into_iter().rev().filter(|(_, more)| *more > 0) {
-            let error = if code == ErrorCode::MAX { f64::INFINITY } else { code.error() };
-            curve.push(ErrorBytes { error, bytes });
-            bytes = bytes.saturating_add(more).min(limit);
+        for code in (1..=u8::MAX).rev().filter(|&code| bytes_of[usize::from(code)] > 0) {
+            curve.push(ErrorBytes { error: error_of(code), bytes });
+            bytes = bytes.saturating_add(bytes_of[usize::from(code)]).min(limit);
         }
         curve.push(ErrorBytes { error: 0.0, bytes });
         curve
     }
+}
+
+/// The error that a byte of the index stands for.
+fn error_of(code: u8) -> f64 {
+    if code == u8::MAX { f64::INFINITY } else { ErrorCode(u16::from(code) << 8).error() }
 }
 
 /// For each block the error below which a request needs it: the largest of its own and of those that depend on it.

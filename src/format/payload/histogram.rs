@@ -13,21 +13,23 @@ const MAX_BINS: u32 = 1 << 10;
 const WHOLE: f64 = (1_u32 << 20) as f64;
 
 /// The shares of each bin of each field of a file, as they are stored.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Histograms {
-    shares: Vec<Vec<u32>>,
+    bins: usize,
+    /// Field by field.
+    shares: Vec<u32>,
 }
 
 impl Histograms {
     /// Those of the fields of a mesh.
     pub fn of(info: &MtInfo, mesh: &CurrentMesh) -> Self {
-        let shares = info.fields.iter().enumerate().map(|(number, field)| of_field(number, field, mesh));
-        Self { shares: shares.collect() }
+        let shares = info.fields.iter().enumerate().flat_map(|(number, field)| of_field(number, field, mesh));
+        Self { bins: BINS, shares: shares.collect() }
     }
 
     pub fn write(&self, out: &mut Vec<u8>) {
-        write::varint(out, BINS as u64);
-        self.shares.iter().flatten().for_each(|&share| write::varint(out, u64::from(share)));
+        write::varint(out, self.bins as u64);
+        self.shares.iter().for_each(|&share| write::varint(out, u64::from(share)));
     }
 
     /// Reads those of so many fields.
@@ -37,16 +39,16 @@ impl Histograms {
             return Err(reader.corrupt("a histogram must have 1 to 1024 bins"));
         }
         let mut shares = Vec::new();
-        for _ in 0..fields {
-            shares.push((0..bins).map(|_| reader.varint()).collect::<Result<_, _>>()?);
+        for _ in 0..fields * bins as usize {
+            shares.push(reader.varint()?);
         }
         reader.end()?;
-        Ok(Self { shares })
+        Ok(Self { bins: bins as usize, shares })
     }
 
     /// The shares of a field, whose sum is 1, or which are all 0.
     pub fn shares(&self, field: usize) -> Option<Vec<f64>> {
-        let stored = self.shares.get(field)?;
+        let stored = self.shares.chunks(self.bins).nth(field)?;
         let sum: u64 = stored.iter().copied().map(u64::from).sum();
         Some(stored.iter().map(|&share| f64::from(share) / (sum as f64).max(1.0)).collect())
     }
