@@ -55,6 +55,15 @@ export interface InspectOptions extends CoreBuildOptions {
    */
   workerUrl?: string | URL;
   /**
+   * How long the worker may take to load its script and answer, in milliseconds: a number of at least 0, `Infinity` for any time.
+   * Default 30 000. Its work, and the download of the wasm file, are not limited by this.
+   *
+   * @example
+   * await build(file, { workerTimeoutMs: 5000 });
+   * @throws {TetralodError} `worker` if it does not answer in time
+   */
+  workerTimeoutMs?: number;
+  /**
    * The address of the wasm file, `tetralod/build.wasm`. Default: the file beside the worker's.
    *
    * @throws {TetralodError} `wasm` if it cannot be loaded or compiled

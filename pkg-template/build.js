@@ -48,13 +48,13 @@ export function inspect(source, options = {}) {
  * @param {import("./build.js").InspectOptions} options
  * @param {(name: string, data: any) => void} onEvent
  */
-async function inWorker(method, source, { signal, memory, workerUrl, wasmUrl, ...options }, onEvent) {
+async function inWorker(method, source, { signal, memory, workerUrl, workerTimeoutMs, wasmUrl, ...options }, onEvent) {
   signal?.throwIfAborted();
   if (memory !== undefined && !(memory >= 0)) throw refusedOption("memory", "must be a number that is not negative");
   const wasm = wasmUrl === undefined ? undefined : absoluteUrl("wasmUrl", wasmUrl).href;
   const steps = await stepsOf(source);
   signal?.throwIfAborted();
-  const remote = startWorker(BUILDER, { workerUrl }, onEvent);
+  const remote = startWorker(BUILDER, { workerUrl, workerTimeoutMs }, onEvent);
   const onAbort = () => remote.close(signal.reason);
   signal?.addEventListener("abort", onAbort, { once: true });
   try {

@@ -138,6 +138,15 @@ export interface OpenOptions extends ReadOptions {
    */
   workerUrl?: string | URL;
   /**
+   * How long the worker may take to load its script and answer, in milliseconds: a number of at least 0, `Infinity` for any time.
+   * Default 30 000. Its work, and the download of the wasm file, are not limited by this.
+   *
+   * @example
+   * await MultiTessellation.open(source, { workerTimeoutMs: 5000 });
+   * @throws {TetralodError} `worker` if it does not answer in time
+   */
+  workerTimeoutMs?: number;
+  /**
    * The address of the wasm file, `tetralod/core.wasm` or `tetralod/all-kinds.wasm`. A relative address is relative to the page.
    * Default: the file beside the worker's.
    *
@@ -503,8 +512,8 @@ export type ErrorCode =
   /** The object has been freed. */
   | "freed"
   /**
-   * The worker did not start: its file is not where the page looks for it, is not JavaScript or of another version, or a
-   * Content-Security-Policy forbids it. The message says what to change.
+   * The worker did not start or does not answer: its file is not where the page looks for it, is not JavaScript or of another
+   * version, or a Content-Security-Policy forbids it. The message says what to change.
    */
   | "worker"
   /** The wasm module could not be loaded or compiled; the message says what to change. */

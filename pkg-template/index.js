@@ -42,14 +42,14 @@ export class MultiTessellation extends withMeshTools(EventTarget) {
   #asked = Promise.resolve();
 
   static async open(source, options = {}) {
-    const { signal, onProgress = () => {}, worker = true, workerUrl, wasmUrl, ...how } = options;
+    const { signal, onProgress = () => {}, worker = true, workerUrl, workerTimeoutMs, wasmUrl, ...how } = options;
     const fetching = openOptions(how, OPEN_OPTIONS);
     const wasm = wasmUrl === undefined ? await embedded() : absoluteUrl("wasmUrl", wasmUrl).href;
     signal?.throwIfAborted();
     if (!worker && workerUrl !== undefined) throw new TetralodError("bad-option", "option `workerUrl`: goes with `worker: true` only");
     let mt;
     const onEvent = (name, data) => mt.#heard(name, data);
-    const core = worker ? startWorker(CORE, { worker, workerUrl }, onEvent) : new Local(onEvent);
+    const core = worker ? startWorker(CORE, { worker, workerUrl, workerTimeoutMs }, onEvent) : new Local(onEvent);
     mt = new MultiTessellation(core, Boolean(worker), onProgress);
     return mt.#opened(source, signal, fetching, loadWasm(core, CORE, wasm));
   }

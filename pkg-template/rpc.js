@@ -87,6 +87,20 @@ export class Remote {
     endpoint.hold?.(false);
   }
 
+  /**
+   * Ends a worker that does not answer in time: browsers do not report a script that loads and never listens.
+   *
+   * @param {number} milliseconds
+   * @param {string} problem why it is ended
+   */
+  async greet(milliseconds, problem) {
+    // Timers cannot wait longer.
+    const timer = milliseconds < 2 ** 31 ? setTimeout(() => this.#failed(problem), milliseconds) : undefined;
+    // Any answer will do, also that of another version; what else ends the worker rejects the calls that follow.
+    await this.call("hello").catch(() => {});
+    clearTimeout(timer);
+  }
+
   async #failed(error) {
     if (!this.#closed) this.close(await (this.#started ? failure : this.#notStarted)(error));
   }
@@ -144,6 +158,7 @@ export class Remote {
 export function serve(endpoint, methods, beside = []) {
   let queue = Promise.resolve();
   endpoint.onMessage((message) => {
+    if (message.method === "hello") return endpoint.post({ id: message.id });
     queue = queue.then(() => {
       const answered = answer(endpoint, methods, message);
       return beside.includes(message.method) ? undefined : answered;

@@ -20,7 +20,10 @@ import { VERSION } from "./version.js";
  */
 
 /** The options that choose a worker, and the address of the wasm module. */
-export const PLACES = ["worker", "workerUrl", "wasmUrl"];
+export const PLACES = ["worker", "workerUrl", "workerTimeoutMs", "wasmUrl"];
+
+/** How long a worker may take to load its script and answer, in milliseconds; its work may take any time. */
+const TIMEOUT = 30_000;
 
 /** An address that means the same in a worker. */
 export function absoluteUrl(name, url) {
@@ -35,14 +38,22 @@ export function absoluteUrl(name, url) {
  * Starts a worker.
  *
  * @param {Kind} kind
- * @param {{ worker?: any, workerUrl?: string | URL }} options
+ * @param {{ worker?: any, workerUrl?: string | URL, workerTimeoutMs?: number }} options
  * @param {(name: string, data: any) => void} onEvent
  */
-export function startWorker(kind, { worker = true, workerUrl }, onEvent) {
+export function startWorker(kind, { worker = true, workerUrl, workerTimeoutMs = TIMEOUT }, onEvent) {
   if (worker !== true && workerUrl !== undefined) {
     throw new TetralodError("bad-option", "option `workerUrl`: goes with `worker: true` only");
   }
-  if (worker !== true) return new Remote(endpointOf(worker), onEvent, (error) => notStarted(kind, undefined, error));
+  if (!(workerTimeoutMs >= 0)) throw new TetralodError("bad-option", "option `workerTimeoutMs`: must be a number that is not negative");
+  const remote = worker === true ? ownWorker(kind, workerUrl, onEvent) : givenWorker(kind, worker, onEvent);
+  remote.greet(workerTimeoutMs, `it has not answered within ${workerTimeoutMs / 1000} s; with \`workerTimeoutMs\` it has more time`);
+  return remote;
+}
+
+const givenWorker = (kind, worker, onEvent) => new Remote(endpointOf(worker), onEvent, (error) => notStarted(kind, undefined, error));
+
+function ownWorker(kind, workerUrl, onEvent) {
   const url = workerUrl === undefined ? kind.script() : absoluteUrl("workerUrl", workerUrl);
   try {
     const endpoint = begin(kind, url, workerUrl !== undefined);

@@ -311,6 +311,15 @@ export interface ViewerOptions {
    */
   workerUrl?: string | URL;
   /**
+   * How long the worker may take to load its script and answer, in milliseconds: a number of at least 0, `Infinity` for any time.
+   * Default 30 000. Its work, and the download of the wasm file, are not limited by this.
+   *
+   * @example
+   * await Viewer.create(canvas, { workerTimeoutMs: 5000 });
+   * @throws {TetralodError} `worker` if it does not answer in time
+   */
+  workerTimeoutMs?: number;
+  /**
    * The address of the wasm file, `tetralod/viewer.wasm`. A relative address is relative to the page. Default: the file beside
    * the worker's.
    *

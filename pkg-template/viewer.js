@@ -78,7 +78,7 @@ export class Viewer extends withMeshTools(EventTarget) {
    * @param {HTMLCanvasElement} canvas
    * @param {{
    *   signal?: AbortSignal, frameTime?: number, prefetch?: string | URL,
-   *   worker?: any, workerUrl?: string | URL, wasmUrl?: string | URL,
+   *   worker?: any, workerUrl?: string | URL, workerTimeoutMs?: number, wasmUrl?: string | URL,
    * }} [options]
    */
   static async create(canvas, { signal, frameTime = 60, prefetch, ...places } = {}) {

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 use tetralod::builder::{
     BuildConfig, BuildCriterion, BuildError, BuildProgress, BuildResult, BuildSummary, Construction,
-    ConstructionChoice, FieldPrecision, Method, Purpose,
+    ConstructionChoice, FieldPrecision, Method, Purpose, Remedy,
 };
 use tetralod::format::{EncodeOptions, encode_to};
 use tetralod::io::{CellData, FieldSelection};
@@ -223,7 +223,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     drop(mesh);
     let metadata =
         config.construction.metadata().into_iter().chain(arguments.metadata.iter().cloned()).collect();
-    let options = EncodeOptions { block_bits: config.block_bits, check_margins: true, exact, metadata };
+    let options = EncodeOptions {
+        block_bits: config.block_bits,
+        check_margins: true,
+        exact,
+        histograms: true,
+        metadata,
+    };
     let file_bytes = files::write_file(&arguments.output, |out| Ok(encode_to(&mt, &options, out)?))?;
     let report = report(&config, &summary, file_bytes, start.elapsed().as_secs_f64(), repaired);
     arguments.verbosity.print(&report, &rows(arguments, &report))
@@ -315,22 +321,22 @@ fn build(arguments: &Arguments, config: &BuildConfig, mesh: &TetMesh) -> Result<
         ControlFlow::Continue(())
     });
     bar.finish_and_clear();
-    let failed = |error: BuildError| match option_for(&error) {
+    let failed = |error: BuildError| match error.remedy().and_then(options_of) {
         Some(option) => anyhow!("{error} ({option})"),
         None => error.into(),
     };
     result.map_err(failed).with_context(|| arguments.inputs[0].display().to_string())
 }
 
-/// The option that does what the error advises.
-fn option_for(error: &BuildError) -> Option<&'static str> {
-    Some(match error {
-        BuildError::Empty => "--method insert",
-        BuildError::CellField { .. } => "--cell-to-point",
-        BuildError::Tolerance { field: Some(_), .. } => "--field-tolerance, --lossless",
-        BuildError::Tolerance { field: None, .. } => "--position-tolerance",
-        BuildError::TooThin { enough: Some(_), .. } | BuildError::SamePlace { .. } => "--position-bits",
-        BuildError::Crowded { .. } | BuildError::NotConvex => "--method decimate",
+/// The options that do what a remedy says. `Remedy` may grow.
+fn options_of(remedy: Remedy) -> Option<&'static str> {
+    Some(match remedy {
+        Remedy::Insert => "--method insert",
+        Remedy::Decimate => "--method decimate",
+        Remedy::CellsToPoints => "--cell-to-point",
+        Remedy::FieldTolerance => "--field-tolerance, --lossless",
+        Remedy::PositionTolerance => "--position-tolerance",
+        Remedy::PositionBits => "--position-bits",
         _ => return None,
     })
 }

@@ -7,7 +7,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use tetralod::format;
-use tetralod::format::BlockInfo;
+use tetralod::format::{BlockInfo, ErrorBytes};
 use tetralod::mesh::VectorPart;
 use tetralod::mt::{FieldInfo, MtKind, MultiTessellation, stats};
 
@@ -71,6 +71,19 @@ struct Field {
     quantization: f64,
     /// The error that is left at full resolution, as a fraction of the range.
     floor: f64,
+    /// The share of the volume in each of equal bins of the range, if the file says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    histogram: Option<Vec<f64>>,
+    /// What a mesh of the whole domain takes: errors fall, bytes grow.
+    curve: Vec<CurvePoint>,
+}
+
+#[derive(Clone, Serialize)]
+struct CurvePoint {
+    /// As a fraction of the range; null where the error may be any.
+    error: Option<f64>,
+    /// Of the file, from its beginning on.
+    bytes: u64,
 }
 
 /// Which part of a vector a field is; its length if there is no component.
@@ -126,7 +139,9 @@ fn report(opened: &Opened) -> Result<Report> {
     let field = |(number, field): (usize, &FieldInfo)| {
         let FieldInfo { name, unit, vector, time, min, max, bits, quantization, .. } = field.clone();
         let vector = vector.map(|VectorPart { name, component }| Vector { name, component });
-        Field { name, unit, vector, time, min, max, bits, quantization, floor: info.floor(number) }
+        let floor = info.floor(number);
+        let (histogram, curve) = (opened.session.decoder().histogram(number), curve(opened, number));
+        Field { name, unit, vector, time, min, max, bits, quantization, floor, histogram, curve }
     };
     let [[x0, y0, z0], [x1, y1, z1]] = stats.bounds.map(|corner| info.lattice.point(corner));
     Ok(Report {
@@ -158,6 +173,13 @@ fn report(opened: &Opened) -> Result<Report> {
         tets_per_update: stats.inserted_per_update(),
         metadata: opened.session.metadata().iter().cloned().collect(),
     })
+}
+
+fn curve(opened: &Opened, field: usize) -> Vec<CurvePoint> {
+    let points = opened.session.bytes_by_error(field).into_iter();
+    points
+        .map(|ErrorBytes { error, bytes }| CurvePoint { error: Some(error).filter(|e| e.is_finite()), bytes })
+        .collect()
 }
 
 fn blocks(opened: &Opened) -> Result<Blocks> {
@@ -228,6 +250,30 @@ fn field_row(steps: &[Field]) -> String {
     format!("{name}{part}: {min} to {max}{unit}, {bits} bits, {worst}{time}")
 }
 
+/// Errors at which a row says what a mesh takes, as fractions of the range.
+const SHOWN_ERRORS: [f64; 5] = [0.1, 0.03, 0.01, 0.003, 0.001];
+
+/// The bytes of meshes of a field, for people.
+fn curve_row(curve: &[CurvePoint]) -> String {
+    let bytes_at = |error: f64| curve.iter().find(|point| point.error.is_some_and(|known| known <= error));
+    let shown = SHOWN_ERRORS.into_iter().filter_map(|error| Some((error, bytes_at(error)?.bytes)));
+    let part =
+        |(error, bytes): (f64, u64)| format!("{} % {}", output::number(100.0 * error), output::count(bytes));
+    let all = curve.last().map(|point| format!("all {}", output::count(point.bytes)));
+    shown.map(part).chain(all).collect::<Vec<_>>().join(", ")
+}
+
+/// A histogram for people, a letter a bin; heights are square roots, so that what is rare is seen.
+fn histogram_row(shares: &[f64]) -> String {
+    const HEIGHTS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
+    let most = shares.iter().copied().fold(0.0, f64::max).sqrt();
+    let height = |share: &f64| match share.sqrt() / most {
+        part if part > 0.0 => HEIGHTS[((part * 8.0).ceil() as usize).clamp(1, 8) - 1],
+        _ => ' ',
+    };
+    shares.iter().map(height).collect::<String>().trim_end().to_owned()
+}
+
 fn part_row(part: &FilePart, file_bytes: u64) -> String {
     let share = output::percent(part.bytes / file_bytes.max(1) as f64);
     format!("{}: {:.2} per vertex ({share})", part.name, part.bytes_per_vertex)
@@ -277,7 +323,12 @@ fn rows(report: &Report) -> Vec<(&str, String)> {
         ("position bits", format!("{}, {}", report.position_bits, rounded(report.position_quantization))),
     ];
     let steps = |a: &Field, b: &Field| a.name == b.name;
-    rows.extend(report.fields.chunk_by(steps).map(|steps| ("field", field_row(steps))));
+    for steps in report.fields.chunk_by(steps) {
+        rows.push(("field", field_row(steps)));
+        // Time steps are alike.
+        rows.extend(steps[0].histogram.as_deref().map(|shares| ("  values", histogram_row(shares))));
+        rows.push(("  bytes at error", curve_row(&steps[0].curve)));
+    }
     rows.extend(report.breakdown.iter().map(|part| ("bytes of", part_row(part, report.file_bytes))));
     for (key, value) in &report.metadata {
         rows.push((key, value.clone()));

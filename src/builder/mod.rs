@@ -49,6 +49,7 @@ mod points;
 mod position_lattice;
 mod quantize;
 mod reach;
+mod remedy;
 mod removal;
 mod rounds;
 mod searches;
@@ -59,6 +60,7 @@ mod work_mesh;
 pub use collapse::edge_mt;
 pub use delaunay::delaunay;
 pub use method::{BuildCriterion, Construction, ConstructionChoice, Method, Purpose, VertexMethod};
+pub use remedy::Remedy;
 
 use crate::mesh::{MeshError, TetMesh};
 use crate::mt::{

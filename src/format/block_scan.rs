@@ -1,5 +1,6 @@
 //! A run through an MT from the base to the reference mesh, for what its file says of each block.
 
+use super::payload::histogram::Histograms;
 use super::payload::index::BlockInfo;
 use super::{EncodeError, EncodeOptions};
 use crate::mt::{
@@ -15,6 +16,8 @@ pub struct BlockScan {
     pub in_blocks: Option<Mt>,
     /// For each vertex of the reference mesh, ascending, its number and its levels.
     pub reference: Vec<(u32, Vec<i32>)>,
+    /// Of that mesh, if they are to be written.
+    pub histograms: Option<Histograms>,
 }
 
 impl BlockScan {
@@ -43,11 +46,12 @@ fn run(mt: &impl ApplyUpdates, options: &EncodeOptions) -> Result<BlockScan, Enc
         first = end;
     }
     mesh.compact();
+    let histograms = options.histograms.then(|| Histograms::of(mt.info(), &mesh));
     let slots = 0..mesh.positions().len() as u32;
     let mut reference: Vec<(u32, Vec<i32>)> =
         slots.map(|slot| (mesh.vertex(slot).0, mesh.levels(slot).to_vec())).collect();
     reference.sort_unstable();
-    Ok(BlockScan { blocks, in_blocks: None, reference })
+    Ok(BlockScan { blocks, in_blocks: None, reference, histograms })
 }
 
 fn scan_block(

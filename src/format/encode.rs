@@ -4,6 +4,7 @@ use super::block_scan::BlockScan;
 use super::coder::{Counts, Measure, Models, Put, Writer};
 use super::header::{END_BYTES, HEAD_BYTES, HEADER_BYTES, Kind, SectionHead, header, version_for};
 use super::payload::exact::Corrections;
+use super::payload::histogram::Histograms;
 use super::payload::index::{Index, MAX_BLOCK_BITS, MIN_BLOCK_BITS};
 use super::payload::{State, Totals};
 use super::{checksum, payload, write};
@@ -22,13 +23,22 @@ pub struct EncodeOptions {
     pub check_margins: bool,
     /// Exact values of fields at the vertices of the reference mesh.
     pub exact: Vec<Exact>,
+    /// A histogram of each field over the reference mesh, some 160 bytes each, in front of the base mesh: see
+    /// [`Decoder::histogram`](super::Decoder::histogram).
+    pub histograms: bool,
     /// Free keys and values, kept as they are. What is here makes the bytes: leave out dates and paths.
     pub metadata: BTreeMap<String, String>,
 }
 
 impl Default for EncodeOptions {
     fn default() -> Self {
-        Self { block_bits: BLOCK_BITS, check_margins: false, exact: Vec::new(), metadata: BTreeMap::new() }
+        Self {
+            block_bits: BLOCK_BITS,
+            check_margins: false,
+            exact: Vec::new(),
+            histograms: false,
+            metadata: BTreeMap::new(),
+        }
     }
 }
 
@@ -108,12 +118,12 @@ pub fn encode(mt: &Mt, options: &EncodeOptions) -> Result<Vec<u8>, EncodeError> 
 /// As [`encode`], and when `writer` fails.
 pub fn encode_to(mt: &Mt, options: &EncodeOptions, writer: &mut dyn io::Write) -> Result<u64, EncodeError> {
     check(mt, options)?;
-    let BlockScan { blocks, in_blocks, reference } = BlockScan::of(mt, options)?;
+    let BlockScan { blocks, in_blocks, reference, histograms } = BlockScan::of(mt, options)?;
     let mt = in_blocks.as_ref().unwrap_or(mt);
     let mut index = Index { block_bits: options.block_bits, shared: 0, blocks };
     index.round(mt.info());
     let exact = corrections(mt, &options.exact, &reference)?;
-    let sections = sections(mt, &options.metadata, &mut index, &exact)?;
+    let sections = sections(mt, &options.metadata, &mut index, histograms.as_ref(), &exact)?;
     let mut total = HEADER_BYTES as u64 + END_BYTES as u64;
     let mut totals = Totals { updates: mt.updates(), sections: sections.len() as u32, crc: 0 };
     let mut chain = checksum::Hasher::new();
@@ -126,7 +136,7 @@ pub fn encode_to(mt: &Mt, options: &EncodeOptions, writer: &mut dyn io::Write) -
     payload::write_end(&mut end, totals);
     let end = Section::new(Kind::ENDF, end)?;
     let mut put = |bytes: &[u8]| writer.write_all(bytes).map_err(EncodeError::Write);
-    put(&header(total, version_for(mt.info().kind), mt.has_tet_errors()))?;
+    put(&header(total, version_for(mt.info().kind, options.histograms), mt.has_tet_errors()))?;
     for section in sections.iter().chain([&end]) {
         put(&section.head.to_bytes())?;
         put(&section.payload)?;
@@ -190,6 +200,7 @@ fn sections(
     mt: &Mt,
     metadata: &BTreeMap<String, String>,
     index: &mut Index,
+    histograms: Option<&Histograms>,
     exact: &[(u32, Corrections)],
 ) -> Result<Vec<Section>, EncodeError> {
     let fields = mt.info().fields.len();
@@ -198,6 +209,11 @@ fn sections(
     exact.iter().for_each(|(_, corrections)| corrections.put(&mut counts));
     let models = Models::new(&counts);
     let mut shared = Vec::new();
+    if let Some(histograms) = histograms {
+        let mut payload = Vec::new();
+        histograms.write(&mut payload);
+        shared.push(Section::new(Kind::HIST, payload)?);
+    }
     let mut payload = Vec::new();
     models.write(&mut payload);
     shared.push(Section::new(Kind::MODL, payload)?);

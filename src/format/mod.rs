@@ -17,7 +17,7 @@ mod payload;
 mod read;
 mod write;
 
-pub use decode::{DecodeOptions, Decoder, Progress};
+pub use decode::{DecodeOptions, Decoder, ErrorBytes, Progress};
 pub use encode::{BLOCK_BITS, EncodeError, EncodeOptions, breakdown, encode, encode_to};
 pub use error::FormatError;
 pub use limits::Limits;

@@ -7,6 +7,7 @@ mod changed_blocks;
 mod check;
 mod error;
 mod grow;
+mod histogram;
 mod kuhn;
 mod repair;
 mod series;
@@ -23,6 +24,8 @@ pub use error::MeshError;
 #[cfg(any(feature = "build", test))]
 pub(crate) use grow::growth_order;
 pub(crate) use grow::{Gate, Growth};
+pub use histogram::Histogram;
+pub(crate) use histogram::{Sum, volume_of};
 pub use kuhn::kuhn_tets;
 pub use repair::{RepairReport, repair};
 pub use series::StepError;

@@ -301,6 +301,11 @@ pub trait MultiTessellation {
     /// No update that is not here (yet) has a larger error; [`ErrorCode::ZERO`] if all are.
     fn to_come(&self) -> ErrorCode;
 
+    /// The same in one field, which may be less.
+    fn to_come_in(&self, _field: usize) -> ErrorCode {
+        self.to_come()
+    }
+
     /// Bytes of everything that the MT holds, base mesh and errors included.
     fn bytes(&self) -> u64;
 }
@@ -331,9 +336,9 @@ pub trait UpdatePages: MultiTessellation {
         first.min(end) as u32..(first + (1 << self.page_bits())).min(end) as u32
     }
 
-    /// Declares that no update which is still to come has a larger error than this; until then, any may come. Without effect
-    /// once all are here.
-    fn set_to_come(&mut self, bound: ErrorCode);
+    /// Declares that no update which is still to come has larger errors than these, by field; until then, any may come. Without
+    /// effect once all are here.
+    fn set_to_come(&mut self, bounds: &[ErrorCode]);
 
     /// Whether page `page` is here. False for kinds without pages.
     fn has_page(&self, _page: u32) -> bool {

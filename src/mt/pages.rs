@@ -32,14 +32,15 @@ pub(super) struct Pages<P> {
     updates: u32,
     present: u32,
     bytes: u64,
-    to_come: ErrorCode,
+    /// By field; empty as long as nothing is known, and when all are present.
+    to_come: Vec<ErrorCode>,
 }
 
 impl<P: Page> Pages<P> {
     /// None yet, of an MT of `total` updates.
     pub fn new(total: u32, bits: u32) -> Self {
         let bits = bits.min(MAX_PAGE_BITS);
-        Self { pages: Vec::new(), bits, total, updates: 0, present: 0, bytes: 0, to_come: ErrorCode::MAX }
+        Self { pages: Vec::new(), bits, total, updates: 0, present: 0, bytes: 0, to_come: Vec::new() }
     }
 
     pub fn bits(&self) -> u32 {
@@ -118,12 +119,23 @@ impl<P: Page> Pages<P> {
         self.find(u.0).map_or(&[], |(page, place)| page.errors().of(place))
     }
 
-    pub fn set_to_come(&mut self, bound: ErrorCode) {
-        self.to_come = if self.present == self.total { ErrorCode::MAX } else { bound };
+    pub fn set_to_come(&mut self, bounds: &[ErrorCode]) {
+        self.to_come.clear();
+        if self.present < self.total {
+            self.to_come.extend_from_slice(bounds);
+        }
     }
 
     pub fn to_come(&self) -> ErrorCode {
-        if self.present >= self.total { ErrorCode::ZERO } else { self.to_come }
+        self.unless_present(self.to_come.iter().copied().max())
+    }
+
+    pub fn to_come_in(&self, field: usize) -> ErrorCode {
+        self.unless_present(self.to_come.get(field).copied())
+    }
+
+    fn unless_present(&self, bound: Option<ErrorCode>) -> ErrorCode {
+        if self.present >= self.total { ErrorCode::ZERO } else { bound.unwrap_or(ErrorCode::MAX) }
     }
 
     /// Adds an update behind all that are present: `push` puts it into its page, which `new` makes if it is the first of it.
@@ -216,6 +228,10 @@ macro_rules! reads_pages {
         fn to_come(&self) -> ErrorCode {
             self.pages.to_come()
         }
+
+        fn to_come_in(&self, field: usize) -> ErrorCode {
+            self.pages.to_come_in(field)
+        }
     };
 }
 
@@ -231,8 +247,8 @@ macro_rules! in_pages {
             self.pages.present()
         }
 
-        fn set_to_come(&mut self, bound: ErrorCode) {
-            self.pages.set_to_come(bound);
+        fn set_to_come(&mut self, bounds: &[ErrorCode]) {
+            self.pages.set_to_come(bounds);
         }
 
         fn page_bits(&self) -> u32 {

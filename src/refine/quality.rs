@@ -36,7 +36,7 @@ impl Front {
     /// field or in all. The search stops at `enough`.
     pub fn largest_left(&self, mt: &impl ApplyUpdates, field: Option<usize>, enough: ErrorCode) -> ErrorCode {
         let error = |u: UpdateId| field.map_or_else(|| mt.error(u), |field| mt.error_of_field(u, field));
-        let mut found = mt.to_come();
+        let mut found = field.map_or_else(|| mt.to_come(), |field| mt.to_come_in(field));
         for (chunk, words) in self.applied.words().chunks(CHUNK_WORDS).enumerate() {
             if found >= enough {
                 break;
@@ -64,7 +64,7 @@ impl Front {
         // If the budget is not the limit, violations are due to missing data.
         let unlimited = self.ranked.has_room();
         let field = criterion.field();
-        let to_come = vec![mt.to_come(); mt.info().fields.len()];
+        let to_come = to_come_by_field(mt);
         let incomplete = mt.present() < mt.info().updates;
         let mut all = Violations { error: ErrorCode::ZERO, excess: 1.0, missing: false };
         for (t, tet) in (0..).zip(self.mesh.tets()) {
@@ -109,13 +109,13 @@ impl Front {
     /// the error in that field, else the largest of all fields. Where the update has not arrived it is a
     /// bound; zero for tetrahedra of the reference mesh.
     pub fn tet_errors(&self, mt: &impl ApplyUpdates) -> Vec<ErrorCode> {
-        let to_come = vec![mt.to_come(); mt.info().fields.len()];
+        let to_come = to_come_by_field(mt);
         (0..self.mesh.tets().len() as u32).map(|t| self.measured_error(mt, t, &to_come)).collect()
     }
 
     /// [`Front::tet_errors`] of one tetrahedron of the mesh.
     pub fn tet_error(&self, mt: &impl ApplyUpdates, t: u32) -> ErrorCode {
-        self.measured_error(mt, t, &vec![mt.to_come(); mt.info().fields.len()])
+        self.measured_error(mt, t, &to_come_by_field(mt))
     }
 
     fn measured_error(&self, mt: &impl ApplyUpdates, t: u32, to_come: &[ErrorCode]) -> ErrorCode {
@@ -134,7 +134,7 @@ impl Front {
         };
         // What violates the request although all that is here has been done for it waits for something else.
         let is_stuck = goal.reached && (goal.budget.is_unlimited() || self.ranked.has_room());
-        let to_come = vec![mt.to_come(); mt.info().fields.len()];
+        let to_come = to_come_by_field(mt);
         let is_missing = |(t, tet): (u32, &[u32; 4])| {
             let (update, errors) = self.errors_of(mt, t, &to_come);
             if update.is_some() && !is_stuck {
@@ -151,4 +151,9 @@ impl Front {
         let tolerance = criterion.tolerance();
         self.largest_left(mt, criterion.field(), tolerance).min(tolerance)
     }
+}
+
+/// The largest errors of updates that are not here.
+fn to_come_by_field(mt: &impl ApplyUpdates) -> Vec<ErrorCode> {
+    (0..mt.info().fields.len()).map(|field| mt.to_come_in(field)).collect()
 }

@@ -5,7 +5,7 @@
 //! not need any more go when the memory that they may take is short.
 
 use super::Session;
-use crate::format::{DecodeOptions, Decoder, FormatError, Index, Progress};
+use crate::format::{DecodeOptions, Decoder, ErrorBytes, FormatError, Index, Progress};
 use crate::geom::total_order;
 use crate::mt::{ErrorCode, Mt, MultiTessellation, UpdateId, UpdatePages};
 use crate::refine::{Criterion, Front, TetData};
@@ -107,6 +107,23 @@ impl Session {
             wanted.extend(missing.map(|range| WantedBytes { range: blocks.rest_of(range), priority }));
         }
         wanted
+    }
+
+    /// How many bytes of the file a session [in parts](Session::in_parts) fetches for a mesh of some error, if it asks for nothing
+    /// else: [`Decoder::bytes_by_error`] with what is always fetched at first.
+    ///
+    /// ```
+    /// # use tetralod::session::Session;
+    /// # fn print(session: &Session) {
+    /// for point in session.bytes_by_error(0) {
+    ///     println!("within {} % of the range: {} bytes", 100.0 * point.error, point.bytes);
+    /// }
+    /// # }
+    /// ```
+    pub fn bytes_by_error(&self, place: usize) -> Vec<ErrorBytes> {
+        let shared = self.decoder.index().map_or(0, |index| index.shared);
+        let index_end = self.decoder.head_end().unwrap_or(0).saturating_sub(shared);
+        self.decoder.bytes_by_error(place, index_end.next_multiple_of(FIRST_BYTES))
     }
 
     /// Up to where the file is still to be read in order; none when that is done.

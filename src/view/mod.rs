@@ -23,6 +23,7 @@ mod triangles;
 mod tubes;
 mod volume;
 
+pub use crate::mesh::Histogram;
 pub use axes::{AxisTick, BoxAxis, BoxEdge, ScaleBar, box_axis, scale_bar, tick_edges};
 pub use boundary::{BoundarySurface, area, is_closed};
 pub use clip::ClipPlane;
@@ -38,7 +39,7 @@ pub use pick::{MediumHit, SurfaceHit, first_hit, first_hit_in};
 pub use probe::{Place, Probe, Span};
 pub use slice::{Plane, Slice};
 pub use solids::Solids;
-pub use stats::{FieldStats, Histogram};
+pub use stats::FieldStats;
 pub use stream::{StreamEnd, StreamPoint, Streamline, TraceOptions, Tracer};
 pub use ticks::{Tick, linear_ticks, log_ticks};
 pub use triangles::Triangles;

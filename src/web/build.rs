@@ -4,7 +4,7 @@
 use super::build_memory::{Forecast, LARGEST_MEMORY};
 use super::build_options::{BuildOptions, build_options};
 use super::error::WebError;
-use crate::builder::{self, BuildConfig, BuildError, BuildProgress, BuildSummary};
+use crate::builder::{self, BuildConfig, BuildError, BuildProgress, BuildSummary, Remedy};
 use crate::format::{EncodeError, EncodeOptions, encode};
 use crate::geom::Bounds;
 use crate::io::{
@@ -229,8 +229,13 @@ impl MeshBuilder {
         drop(mesh);
         stages.begin("encode")?;
         let metadata = config.construction.metadata().into_iter().chain(metadata).collect();
-        let exact = built.exact;
-        let encoding = EncodeOptions { block_bits: config.block_bits, check_margins: true, exact, metadata };
+        let encoding = EncodeOptions {
+            block_bits: config.block_bits,
+            check_margins: true,
+            exact: built.exact,
+            histograms: true,
+            metadata,
+        };
         let bytes = encode(&built.mt, &encoding)?;
         Ok(result(&bytes, &config, &built.summary, &repaired))
     }
@@ -507,22 +512,20 @@ impl From<BuildError> for WebError {
             BuildError::Internal(_) | BuildError::Convert(_) => "internal",
             _ => "bad-mesh",
         };
-        let option = option_for(&error).map(|name| format!(" (option {name})"));
+        let option = error.remedy().map(|remedy| format!(" (option {})", options_of(remedy)));
         Self::new(code, format!("{error}{}", option.unwrap_or_default()))
     }
 }
 
-/// The option that does what the error advises.
-fn option_for(error: &BuildError) -> Option<&'static str> {
-    Some(match error {
-        BuildError::Empty => "`method`",
-        BuildError::CellField { .. } => "`cellToPoint`",
-        BuildError::Tolerance { field: Some(_), .. } => "`fieldTolerance` or `lossless`",
-        BuildError::Tolerance { field: None, .. } => "`positionTolerance`",
-        BuildError::TooThin { enough: Some(_), .. } | BuildError::SamePlace { .. } => "`positionBits`",
-        BuildError::Crowded { .. } | BuildError::NotConvex => "`method`",
-        _ => return None,
-    })
+/// The options of the page that do what a remedy says.
+fn options_of(remedy: Remedy) -> &'static str {
+    match remedy {
+        Remedy::Insert | Remedy::Decimate => "`method`",
+        Remedy::CellsToPoints => "`cellToPoint`",
+        Remedy::FieldTolerance => "`fieldTolerance` or `lossless`",
+        Remedy::PositionTolerance => "`positionTolerance`",
+        Remedy::PositionBits => "`positionBits`",
+    }
 }
 
 impl From<EncodeError> for WebError {

@@ -30,6 +30,43 @@ export interface FieldInfo {
   vector: { name: string; component: number | undefined } | undefined;
   /** The error that is left in the reference mesh, in field units: what storing it rounds off. No bound is smaller. */
   floor: number;
+  /**
+   * Which share of the volume of the reference mesh has values in each of equal bins from `min` to `max`: 64 numbers from 0 to 1
+   * with the sum 1, each within 0.000001. It is in the file's head, so it does not depend on the current mesh; `null` for files
+   * that have none, made before there were any.
+   *
+   * @example
+   * const { min, max, histogram } = mt.info.fields[0];
+   * const most = histogram && histogram.indexOf(Math.max(...histogram));
+   * if (histogram) console.log("most of the volume is near", min + ((most + 0.5) / histogram.length) * (max - min));
+   */
+  histogram: Float64Array | null;
+  /** What a mesh of some error takes. */
+  curve: ErrorCurve;
+}
+
+/**
+ * How many bytes have to be fetched for a mesh that is nowhere further from the reference mesh than some error: known from the
+ * file's index, before any block has arrived. For an error in between, the next entry holds.
+ *
+ * - *Half-edge and edge:* exactly the bytes of the blocks that are fetched for `refine({ error })` or `refine({ relativeError })` of this
+ *   field after `open`, with what stands in front of them. It is less where blocks are here or in the cache already, and a little
+ *   more where requests reach over gaps (see `gap`).
+ * - *Vertex and explicit:* these come from front to back, and this many bytes are enough. It may be less, by two blocks and by what the
+ *   index rounds errors up, at most an eighth. The rest
+ *   of the file comes all the same.
+ *
+ * @example
+ * const { errors, bytes } = mt.info.fields[0].curve;
+ * const budget = 5e6;
+ * const last = bytes.findLastIndex((count) => count <= budget);
+ * if (last >= 0) await mt.refine({ error: errors[last] }); // the best mesh for 5 MB
+ */
+export interface ErrorCurve {
+  /** Errors in field units, falling: at first perhaps `Infinity`, the base mesh; the last is 0, the reference mesh. */
+  errors: Float64Array;
+  /** Bytes of the file from its beginning on, for each of the errors; growing. */
+  bytes: Float64Array;
 }
 
 /** How the blocks of a file stand of which only those come that are needed. */

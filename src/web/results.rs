@@ -3,9 +3,9 @@
 use super::options::Asked;
 use crate::mt::{FieldInfo, MtInfo};
 use crate::refine::RefineStats;
-use crate::session::{BlockProgress, Progress};
+use crate::session::{BlockProgress, Progress, Session};
 use crate::view::{IsoSurface, MeshView};
-use js_sys::{Float32Array, Float64Array, Object, Reflect, Uint32Array};
+use js_sys::{Array, Float32Array, Float64Array, Object, Reflect, Uint32Array};
 use serde::Serialize;
 use wasm_bindgen::prelude::wasm_bindgen;
 use wasm_bindgen::{JsCast, JsValue};
@@ -99,8 +99,28 @@ struct VectorObject<'a> {
     component: Option<u8>,
 }
 
-/// `info` for JavaScript.
-pub fn info(info: &MtInfo) -> JsInfo {
+/// What is known of the MT of a session, for JavaScript.
+pub fn info(session: &Session) -> Option<JsInfo> {
+    let info = session.info()?;
+    let described = describe(info);
+    let fields = Reflect::get(described.as_ref(), &"fields".into()).unwrap_or_default();
+    for (place, field) in Array::from(&fields).iter().enumerate() {
+        let histogram = session.decoder().histogram(place);
+        set(&field, "histogram", &histogram.map_or(JsValue::NULL, |shares| doubles(&shares)));
+        let curve = session.bytes_by_error(place);
+        let list = || Float64Array::new_with_length(curve.len() as u32);
+        let (errors, bytes) = (list(), list());
+        for (at, point) in (0..).zip(&curve) {
+            errors.set_index(at, point.error_in_units(&info.fields[place]));
+            bytes.set_index(at, point.bytes as f64);
+        }
+        let curve: JsValue = object(&[("errors", errors.into()), ("bytes", bytes.into())]);
+        set(&field, "curve", &curve);
+    }
+    Some(described)
+}
+
+fn describe(info: &MtInfo) -> JsInfo {
     let [x0, y0, z0] = info.lattice.origin;
     let [x1, y1, z1] = info.lattice.point([1 << info.lattice.bits; 3]);
     value(&InfoObject {

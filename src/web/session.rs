@@ -70,7 +70,7 @@ impl CoreSession {
 
     /// What is known of the MT; `undefined` until the base mesh is there.
     pub fn info(&self) -> Option<JsInfo> {
-        self.file.session().info().map(results::info)
+        results::info(self.file.session())
     }
 
     /// Changes the current mesh to what `options` asks for, as far as the data has arrived.

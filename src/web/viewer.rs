@@ -201,7 +201,7 @@ impl Viewer {
 
     /// What is known of the MT; `undefined` until the base mesh is there.
     pub fn info(&self) -> Option<JsInfo> {
-        self.file.session().info().map(results::info)
+        results::info(self.file.session())
     }
 
     /// The box around the mesh: `[x0, y0, z0, x1, y1, z1]`; empty until the base mesh is there.

@@ -113,7 +113,7 @@ fn a_half_edge_mt_in_a_file_of_version_2_is_refused() {
 fn files_of_the_first_version_are_told_apart() {
     let found = decode(&bytes_of(include_str!("../golden/v1-edge.hex")));
     let error = found.expect_err("version 1 is no longer read");
-    assert_eq!(error, FormatError::UnsupportedVersion { found: [1, 0], supported: [3, 0] });
+    assert_eq!(error, FormatError::UnsupportedVersion { found: [1, 0], supported: [3, 1] });
     let text = error.to_string();
     assert!(text.contains("1.0") && text.contains("build the file again"), "{text}");
 }

@@ -3,6 +3,7 @@
 mod blocks;
 mod damaged;
 mod golden;
+mod histograms;
 #[allow(dead_code, reason = "each test uses a part of it")]
 mod reader;
 mod reference;

@@ -41,8 +41,8 @@ fn skipped_sections_are_checked_but_not_kept() {
 #[test]
 fn unknown_critical_sections_are_refused_where_they_stand() {
     let mut sections = sections(&bytes_of(&sample(1, 20)));
-    let offset = 32 + sections[..5].iter().map(|(_, p)| 12 + p.len() as u64).sum::<u64>();
-    sections.insert(5, (*b"UPDC", vec![1, 2, 3]));
+    let offset = 32 + sections[..6].iter().map(|(_, p)| 12 + p.len() as u64).sum::<u64>();
+    sections.insert(6, (*b"UPDC", vec![1, 2, 3]));
     let mut decoder = Decoder::default();
     let error = decoder.feed(&assemble(&sections, 20)).expect_err("a section that must be known");
     assert!(matches!(error, FormatError::UnsupportedFeature { offset: o, .. } if o == offset), "{error:?}");
@@ -60,7 +60,7 @@ fn versions_and_flags() {
     assert!(with(header([3, 0], 0, total)).is_ok(), "version 3 has all of version 2");
     assert!(with(header([2, 0], 1 << 16, total)).is_ok(), "a hint");
     for found in [[0, 9], [1, 0], [1, 9], [4, 0]] {
-        let other = FormatError::UnsupportedVersion { found, supported: [3, 0] };
+        let other = FormatError::UnsupportedVersion { found, supported: [3, 1] };
         assert_eq!(with(header(found, 0, total)), Err(other));
     }
     let critical = with(header([2, 0], 1 << 15, total));
@@ -90,7 +90,7 @@ fn other_files_are_called_so_at_once() {
 fn every_error_says_what_to_do() {
     let errors = [
         FormatError::NotMt,
-        FormatError::UnsupportedVersion { found: [4, 0], supported: [3, 0] },
+        FormatError::UnsupportedVersion { found: [4, 0], supported: [3, 1] },
         FormatError::UnsupportedFeature { offset: 12, what: "a flag" },
         FormatError::Corrupt { offset: 99, what: "a number" },
         FormatError::Truncated { offset: 99 },

@@ -122,7 +122,7 @@ test("the gallery opens scenes with the counts of the paper, and files are opene
   assert.equal(await page.evaluate(async () => (await window.tetralodDemo.viewer.isosurface(0.81)).indices.length / 3), 18_206);
   await screenshot(page, "page-figure-6");
   await page.click("#open-gallery");
-  assert.equal(await choose("Figure 7"), 156_581);
+  assert.equal(await choose("Figure 7"), 155_875);
 
   await page.click("#open-gallery");
   await page.fill("#url", SMALL);

@@ -144,6 +144,30 @@ for (const [kind, worker] of Object.keys(blocks).flatMap((kind) => /** @type {[s
       mt.free();
     });
 
+    test("the file's head says how values are spread, and what a mesh of some error takes", async () => {
+      const mt = await open({ gap: 0 });
+      const [{ min, max, histogram, curve }] = mt.info.fields;
+      assert.equal(histogram.length, 64);
+      assert.ok(Math.abs(histogram.reduce((a, b) => a + b) - 1) < 1e-9 && histogram.every((share) => share >= 0));
+      const { errors, bytes: costs } = curve;
+      assert.ok(errors instanceof Float64Array && costs instanceof Float64Array && errors.length === costs.length);
+      assert.ok(errors.length > 10 && errors.at(-1) === 0 && costs.at(-1) <= bytes.length, `${errors}; ${costs}`);
+      for (let i = 1; i < errors.length; i++) assert.ok(errors[i] < errors[i - 1] && costs[i] > costs[i - 1]);
+      assert.equal(sent, costs[0], "what comes first");
+      for (const i of [2, errors.length >> 1, errors.length - 1]) {
+        await mt.refine({ error: errors[i] });
+        assert.equal(sent, costs[i], `error ${errors[i]}`);
+      }
+      const { histogram: volumes } = await mt.stats({ bins: 64, range: [min, max] });
+      const volume = volumes.reduce((a, b) => a + b);
+      // Views have single precision, so values at the end of a bin may be in the next one.
+      let difference = 0;
+      volumes.forEach((bin, i) => assert.ok(Math.abs((difference += bin / volume - histogram[i])) < 1e-3, `bin ${i}: ${difference}`));
+      const view = await mt.view();
+      assert.deepEqual(view.info, mt.info);
+      mt.free();
+    });
+
     test("what is here is given at once, and says that more is on its way", async () => {
       const mt = await open();
       let release;

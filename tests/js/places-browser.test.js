@@ -80,6 +80,7 @@ async function serve(headers, from = () => "/pkg/") {
     if (MODULES[name]) return response.setHeader("content-type", "text/javascript").end(MODULES[name](from()));
     if (url === "/") return response.setHeader("content-type", "text/html").end(PAGE);
     if (url === "/broken.js") return response.setHeader("content-type", "text/javascript").end("throw new Error('broken')");
+    if (url === "/silent.js") return response.setHeader("content-type", "text/javascript").end("onmessage = () => {};");
     if (url.startsWith("/page")) return response.setHeader("content-type", "text/html").end(PAGE);
     return response.writeHead(404).end();
   }, headers);
@@ -152,6 +153,8 @@ for (const module of ["core.js", "viewer.js"]) {
     await open("open", { workerUrl: "/none.js" }, "worker", /\/none\.js answers HTTP 404.*Set `workerUrl`/);
     await open("open", { workerUrl: "/page.html" }, "worker", /\/page\.html is served as text\/html/);
     await open("open", { workerUrl: "/broken.js" }, "worker", /broken/);
+    const silent = { workerUrl: "/silent.js", workerTimeoutMs: 500 };
+    await open("open", silent, "worker", /\/silent\.js; it has not answered within 0\.5 s.*Set `workerUrl`/);
     await open("open", { workerUrl: `${own("closed")}/pkg/worker.js` }, "worker", /cannot be fetched/);
     await open("open", { wasmUrl: "/none.wasm" }, "wasm", /\/none\.wasm: HTTP 404.*`wasmUrl`/);
     await open("open", { wasmUrl: "/page.wasm" }, "wasm", /page\.wasm: the server sends a page/);

@@ -4,6 +4,7 @@ import { readFile } from "node:fs/promises";
 import { createServer } from "node:http";
 import { after, before, test } from "node:test";
 import { Worker } from "node:worker_threads";
+import { build, inspect } from "../../pkg/build.js";
 import { MultiTessellation, TetralodError } from "../../pkg/index.js";
 import { VERSION } from "../../pkg/version.js";
 
@@ -105,6 +106,26 @@ test("a worker that does not start, or is another one, is an error of configurat
   await rejects(open({ workerUrl: other({ name: "viewer", version: VERSION }) }), "worker", /viewer; "tetralod\/worker"/);
   const ends = new URL("data:text/javascript,process.exit(0)");
   await rejects(open({ worker: new Worker(ends) }), "worker", /the worker ended/);
+});
+
+test("a worker that loads but never answers ends in time, with an error that says so", async () => {
+  const silent = new URL("data:text/javascript,setInterval(() => {}, 1000)");
+  const unheard = /it has not answered within 0\.3 s.*`workerTimeoutMs`.*Set `workerUrl`/;
+  const how = { workerTimeoutMs: 300 };
+  await rejects(MultiTessellation.open(bytes, { workerUrl: silent, ...how }), "worker", unheard);
+  await rejects(MultiTessellation.open(bytes, { worker: new Worker(silent), ...how }), "worker", unheard);
+  await rejects(build(new URL("no-such.vtu", base), { workerUrl: silent, ...how }), "worker", /0\.3 s.*"tetralod\/build-worker"/);
+  await rejects(inspect(new URL("no-such.vtu", base), { workerUrl: silent, ...how }), "worker", /0\.3 s.*"tetralod\/build-worker"/);
+  for (const workerTimeoutMs of [-1, NaN, "soon"]) {
+    await rejects(MultiTessellation.open(bytes, { workerTimeoutMs: /** @type {any} */ (workerTimeoutMs) }), "bad-option", /workerTimeoutMs/);
+  }
+  // The time is for the first answer: what comes later may take longer.
+  const slow = `data:text/javascript,${encodeURIComponent(`
+    import { parentPort } from "node:worker_threads";
+    const answer = (id) => parentPort.postMessage({ id, result: { name: "core", version: "0.0.1" } });
+    parentPort.on("message", ({ id, method }) => (method === "hello" ? answer(id) : setTimeout(answer, 6000, id)));`)}`;
+  await rejects(MultiTessellation.open(bytes, { workerUrl: slow, workerTimeoutMs: 5000 }), "worker", /tetralod 0\.0\.1/);
+  await works({ workerTimeoutMs: Infinity });
 });
 
 test("a wasm module that does not load is an error of configuration that names its address and what came", async () => {

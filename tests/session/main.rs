@@ -3,6 +3,7 @@
 mod bench;
 mod changes;
 mod client;
+mod curve;
 mod hostile;
 mod kinds;
 mod parts;

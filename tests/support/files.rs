@@ -177,7 +177,7 @@ pub fn samples(fields: usize, updates: usize) -> [Mt; 4] {
 pub fn options() -> EncodeOptions {
     let pairs = [("tool", "a test"), ("ключ", "значение"), ("empty", "")];
     let metadata = pairs.map(|(k, v)| (k.to_owned(), v.to_owned())).into();
-    EncodeOptions { block_bits: 8, metadata, ..EncodeOptions::default() }
+    EncodeOptions { block_bits: 8, histograms: true, metadata, ..EncodeOptions::default() }
 }
 
 /// [`encode`] for an MT of one kind, too.
@@ -354,6 +354,7 @@ pub fn assemble(sections: &[([u8; 4], Vec<u8>)], updates: u32) -> Vec<u8> {
     end.extend(crc32(&[&crcs]).to_le_bytes());
     let body = [framed.concat(), section(b"ENDF", &end)].concat();
     let of_half_edges = sections.iter().any(|(kind, payload)| kind == b"INFO" && payload.first() == Some(&3));
-    let version = if of_half_edges { [3, 0] } else { [2, 0] };
+    let has_histograms = sections.iter().any(|(kind, _)| kind == b"hist");
+    let version = [if of_half_edges { 3 } else { 2 }, u16::from(has_histograms)];
     [header(version, 0, 32 + body.len() as u64), body].concat()
 }

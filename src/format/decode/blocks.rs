@@ -153,7 +153,7 @@ impl Decoder {
     pub fn drop_block(&mut self, block: u32) -> Result<(), PageError> {
         let Some(mt) = &mut self.mt else { return Err(PageError::Absent { page: block }) };
         mt.remove_page(block)?;
-        mt.set_to_come(self.head.largest_of_others(mt));
+        mt.set_to_come(&self.head.largest_of_others(mt));
         Ok(())
     }
 }

@@ -1,6 +1,7 @@
 //! Bytes of any split to a growing MT.
 
 mod blocks;
+mod curve;
 mod sections;
 
 use super::header::{END_BYTES, HEAD_BYTES, HEADER_BYTES, Kind, SectionHead, may_be_mt, parse_header};
@@ -9,6 +10,7 @@ use super::payload::{Metadata, State};
 use super::read::Reader;
 use super::{FormatError, Index, Limits, checksum};
 use crate::mt::{Mt, MtInfo, UpdatePages};
+pub use curve::ErrorBytes;
 use sections::{FileHead, OpenBlock};
 
 /// Most bytes that are kept allocated between sections.
@@ -182,6 +184,13 @@ impl Decoder {
     pub fn exact(&self, place: usize) -> Option<&Corrections> {
         let field = self.head.wanted.get(place)?;
         self.exact.iter().find(|(known, _)| known == field).map(|(_, corrections)| corrections)
+    }
+
+    /// Which share of the volume of the reference mesh has values in each of equal bins of a wanted field's range (from its smallest
+    /// to its largest value), by its place among the wanted fields. None if the file does not say, or not yet.
+    pub fn histogram(&self, place: usize) -> Option<Vec<f64>> {
+        let field = self.head.wanted.get(place)?;
+        self.head.histograms.as_ref()?.shares(*field)
     }
 
     /// How far the stream has come.

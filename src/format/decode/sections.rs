@@ -5,6 +5,7 @@ use crate::format::coder::{Models, Source};
 use crate::format::header::{HEAD_BYTES, Kind, SectionHead, Start, VERSION_AT, version_for};
 use crate::format::payload::edge::FieldPart;
 use crate::format::payload::exact::Corrections;
+use crate::format::payload::histogram::Histograms;
 use crate::format::payload::{BaseParts, Shared};
 use crate::format::read::Reader;
 use crate::format::{BlockInfo, FormatError, Index, payload};
@@ -21,6 +22,7 @@ pub(super) struct FileHead {
     pub(super) index: Option<Index>,
     /// Where the index ends in the file.
     pub(super) index_end: u64,
+    pub(super) histograms: Option<Histograms>,
     pub(super) models: Option<Models>,
     /// Until all wanted fields are there; then it is in the MT.
     pub(super) base: Option<BaseParts>,
@@ -65,12 +67,16 @@ impl FileHead {
         source.end()
     }
 
-    /// The largest error that an update can have which is not in the MT.
-    pub(super) fn largest_of_others(&self, mt: &Mt) -> ErrorCode {
-        let Some(index) = &self.index else { return ErrorCode::MAX };
-        let absent = (0..).zip(&index.blocks).filter(|(page, _)| !mt.has_page(*page));
-        let errors = absent.flat_map(|(_, block)| self.wanted.iter().map(|&field| block.errors[field]));
-        errors.max().unwrap_or(ErrorCode::ZERO)
+    /// The largest errors that an update can have which is not in the MT, by wanted field.
+    pub(super) fn largest_of_others(&self, mt: &Mt) -> Vec<ErrorCode> {
+        let mut largest = vec![ErrorCode::ZERO; self.wanted.len()];
+        let blocks = self.index.iter().flat_map(|index| &index.blocks);
+        for (_, block) in (0..).zip(blocks).filter(|(page, _)| !mt.has_page(*page)) {
+            for (error, &field) in largest.iter_mut().zip(&self.wanted) {
+                *error = (*error).max(block.errors[field]);
+            }
+        }
+        largest
     }
 }
 
@@ -92,6 +98,7 @@ impl Decoder {
         match head.kind {
             Kind::INFO => self.open_info(content)?,
             Kind::INDX => self.open_index(content)?,
+            Kind::HIST => self.open_histograms(content)?,
             Kind::MODL => self.open_models(content)?,
             Kind::BASE => self.open_base(content)?,
             Kind::FLDB => self.open_base_field(content)?,
@@ -127,7 +134,7 @@ impl Decoder {
         }
         let offset = self.bytes;
         let (info, metadata) = payload::read_info(content)?;
-        if self.head.start.version[0] < version_for(info.kind)[0] {
+        if self.head.start.version[0] < version_for(info.kind, false)[0] {
             let what = "the version of the file does not go with the kind of MT in it";
             return Err(FormatError::Corrupt { offset: VERSION_AT, what });
         }
@@ -159,6 +166,16 @@ impl Decoder {
         let parts = if info.kind.is_paged() { 1 + info.fields.len() } else { 1 };
         *index = Some(Index::read(content, info, parts)?);
         self.head.index_end = self.bytes;
+        Ok(())
+    }
+
+    pub(super) fn open_histograms(&mut self, content: Reader<'_>) -> Result<(), FormatError> {
+        let fields = self.head.fields();
+        let FileHead { index: Some(_), histograms: histograms @ None, models: None, .. } = &mut self.head
+        else {
+            return Err(content.out_of_place());
+        };
+        *histograms = Some(Histograms::read(content, fields)?);
         Ok(())
     }
 
@@ -266,7 +283,7 @@ impl Decoder {
         let Some(mt) = &mut self.mt else { return Ok(()) };
         shared.check_memory(mt, &self.options.limits)?;
         shared.insert(mt, block, &fields)?;
-        mt.set_to_come(self.head.largest_of_others(mt));
+        mt.set_to_come(&self.head.largest_of_others(mt));
         Ok(())
     }
 

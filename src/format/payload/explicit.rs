@@ -1,6 +1,6 @@
 //! Updates of explicit MTs, coded: numbers with a context for each kind of number.
 
-use super::{check_bytes, largest, put_errors, put_quarterings, read_errors, read_quarterings, vertex};
+use super::{check_bytes, put_errors, put_quarterings, read_errors, read_quarterings, vertex};
 use crate::format::coder::{Family, Put, Source};
 use crate::format::{FormatError, Limits};
 use crate::mt::{
@@ -155,7 +155,7 @@ pub fn read(
         mt.set_own_fall(update, parts.own_fall);
         removed.iter().zip(quarterings).for_each(|(&t, &own)| mt.set_quarterings_of(t, own));
     }
-    mt.set_to_come(largest(&parts.errors));
+    mt.set_to_come(&parts.errors);
     Ok(())
 }
 

@@ -6,6 +6,7 @@ pub mod edge;
 pub mod exact;
 mod explicit;
 pub mod half_edge;
+pub mod histogram;
 pub mod index;
 mod vertex;
 
@@ -578,11 +579,6 @@ fn read_quarterings(
         quarterings.push(source.symbol(QUARTERINGS, 2 * before + u32::from(is_home))? as u8);
     }
     Ok(own_fall)
-}
-
-/// The largest error of an update.
-fn largest(errors: &[ErrorCode]) -> ErrorCode {
-    errors.iter().copied().fold(ErrorCode::ZERO, ErrorCode::max)
 }
 
 /// The totals at the end of a file.

@@ -189,8 +189,9 @@ fn perform(
 }
 
 impl UpdatePages for ExplicitMt {
-    fn set_to_come(&mut self, bound: ErrorCode) {
-        self.to_come = if self.updates() == self.info().updates { ErrorCode::MAX } else { bound };
+    fn set_to_come(&mut self, bounds: &[ErrorCode]) {
+        let bound = bounds.iter().copied().max().filter(|_| self.updates() < self.info().updates);
+        self.to_come = bound.unwrap_or(ErrorCode::MAX);
     }
 
     fn page_inserted(&self, mesh: &mut CurrentMesh, updates: Range<u32>) {

@@ -8,6 +8,7 @@ pub mod growth;
 pub mod half_edge;
 mod half_edge_guess;
 pub mod half_edge_mesh;
+mod histogram;
 pub mod insertions;
 pub mod plain;
 pub mod spelled;
@@ -32,6 +33,8 @@ pub struct File {
     /// Flag 0: updates tell errors of the tetrahedra that they remove.
     pub tet_errors: bool,
     pub index: Index,
+    /// By field; empty if there are none.
+    pub histograms: Vec<Vec<u32>>,
     tables: Vec<Table>,
     pub base: Growth,
     /// In files of kind 1.
@@ -63,6 +66,8 @@ pub fn open(file: &[u8]) -> (File, Parts<'_>) {
     assert!(info.kind != 3 || file[8] == 3, "a kind of version 3");
     let section = next(b"INDX");
     let (index, index_end) = (wire::index(section.payload, &info), section.range[1]);
+    let histograms = histogram::find(front, &info);
+    assert!(histograms.is_empty() || file[10] > 0, "what minor version 1 adds");
     let tables = coded::tables(next(b"MODL").payload, info.kind);
     let mut payload = next(b"BASE").payload;
     let [vertices, tets] = [payload.varint(), payload.varint()];
@@ -111,7 +116,20 @@ pub fn open(file: &[u8]) -> (File, Parts<'_>) {
     let tet_errors = file[12] & 1 == 1;
     assert!(!tet_errors || [1, 2].contains(&info.kind));
     (
-        File { info, tet_errors, index, tables, base, start, forest, base_levels, splits, exact, blocks },
+        File {
+            info,
+            tet_errors,
+            index,
+            histograms,
+            tables,
+            base,
+            start,
+            forest,
+            base_levels,
+            splits,
+            exact,
+            blocks,
+        },
         parts_of,
     )
 }

@@ -55,6 +55,7 @@ const examples: Examples<BuildOptions> = {
   signal: { signal: AbortSignal.timeout(600_000) },
   memory: { memory: 1e9 },
   workerUrl: { workerUrl: import.meta.resolve("tetralod/build-worker") },
+  workerTimeoutMs: { workerTimeoutMs: 60_000 },
   wasmUrl: { wasmUrl: new URL(import.meta.resolve("tetralod/build.wasm")) },
   onProgress: { onProgress: (progress: BuildProgress) => void fractions.set(progress.phase, progress.fraction) },
 };

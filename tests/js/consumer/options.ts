@@ -86,6 +86,7 @@ const openings: Examples<OpenOptions> = {
   onProgress: { onProgress: () => {} },
   worker: { worker: false },
   workerUrl: { workerUrl: import.meta.resolve("tetralod/worker") },
+  workerTimeoutMs: { workerTimeoutMs: 60_000 },
   wasmUrl: { wasmUrl: new URL(import.meta.resolve("tetralod/core.wasm")) },
 };
 

@@ -53,7 +53,7 @@ export async function page(canvas: HTMLCanvasElement): Promise<void> {
   await Promise.all([viewer.keep(), viewer.set({ compare: { at: 0.3, difference: true } }), viewer.freeze(), viewer.freeze(false)]);
   const [{ tets }, slice] = await Promise.all([viewer.mesh(), viewer.slice([0, 0, 1], 0.5)]);
   [tets, slice.indices] satisfies Uint32Array[];
-  const fast = await Viewer.create(canvas, { frameTime: Infinity, prefetch: "bucky.mt", workerUrl: "/viewer-worker.js", wasmUrl: new URL("https://example.org/v.wasm") });
+  const fast = await Viewer.create(canvas, { frameTime: Infinity, prefetch: "bucky.mt", workerUrl: "/viewer-worker.js", workerTimeoutMs: Number.POSITIVE_INFINITY, wasmUrl: new URL("https://example.org/v.wasm") });
   fast.frameTime = 30;
   await Viewer.create(canvas, { worker: new Worker("/viewer-worker.js", { type: "module" }) });
   const found: Reading | undefined = await viewer.pick(0, 0);

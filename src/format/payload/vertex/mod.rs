@@ -10,7 +10,7 @@ mod state;
 #[cfg(test)]
 pub(super) mod tests;
 
-use super::{base, check_bytes, largest, put_errors, put_quarterings, read_errors, read_quarterings};
+use super::{base, check_bytes, put_errors, put_quarterings, read_errors, read_quarterings};
 use crate::format::coder::{Family, Put, Source};
 use crate::format::{FormatError, Limits};
 use crate::mt::{
@@ -209,7 +209,7 @@ pub fn read(
             check_bytes(mt.bytes() + state.mesh.bytes(), limits)?;
         }
     }
-    mt.set_to_come(largest(&state.errors));
+    mt.set_to_come(&state.errors);
     Ok(())
 }
 

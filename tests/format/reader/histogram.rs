@@ -1,0 +1,17 @@
+//! Histograms of the fields.
+
+use super::wire::{Info, Section};
+
+/// The shares of the volume, by field and bin; none if the file has none.
+pub fn find(front: &[Section<'_>], info: &Info) -> Vec<Vec<u32>> {
+    let mut found = (0..).zip(front).filter(|(_, section)| &section.kind == b"hist");
+    let Some((place, section)) = found.next() else { return Vec::new() };
+    assert!(place == 2 && found.next().is_none(), "once, behind INFO and INDX");
+    let mut payload = section.payload;
+    let bins = payload.varint();
+    assert!((1..=1024).contains(&bins));
+    let histograms = info.fields.iter().map(|_| (0..bins).map(|_| payload.varint()).collect());
+    let histograms = histograms.collect();
+    payload.end();
+    histograms
+}
