@@ -56,6 +56,7 @@ export async function open(wanted, words) {
     fail({ code: "no-file", message: `The file ${wanted.slice(FILE.length)} is not part of the link. Open it from your disk` });
     return source ? undefined : open(first);
   }
+  const before = { info: demo.info, stats: demo.stats, source, received: demo.receivedBytes, total: demo.totalBytes };
   const shown = words ?? (demo.info ? carriedOver() : {});
   source = from;
   showInList(from);
@@ -70,20 +71,41 @@ export async function open(wanted, words) {
   $("progress").removeAttribute("value");
   $("growth").textContent = `Opening ${nameOf(from)}…`;
   try {
-    const opened = await page.viewer.open(from);
+    const { info, total, finished } = await page.viewer.open(from);
     if (mine !== opening) return;
-    demo.totalBytes = opened.total;
+    demo.totalBytes = total;
     if (demo.state === "opening") demo.state = "streaming";
-    arrive(opened.info, shown);
-    await opened.finished;
+    arrive(info, shown);
+    await finished;
     if (mine !== opening) return;
     demo.state = "complete";
     demo.totalBytes ??= demo.receivedBytes;
     showGrowth();
     $("loading").classList.add("done");
+    opened(from);
   } catch (error) {
-    if (mine === opening && error?.name !== "AbortError") fail(error);
+    if (mine !== opening || error?.name === "AbortError") return;
+    fail(error);
+    stay(before);
   }
+}
+
+/** What could not be opened has not taken the place of the volume before: that stays, with its settings. */
+function stay({ info, stats, source: from, received, total }) {
+  if (!info || page.viewer.info !== info) return;
+  source = from;
+  Object.assign(demo, { info, stats, receivedBytes: received, totalBytes: total });
+  showInList(from);
+  showGrowth();
+  $("legend").hidden = !page.viewer.legend;
+}
+
+/** What is told when a volume has been opened. @type {(from: string | File) => unknown} */
+let opened = () => {};
+
+/** Calls `then` when a volume is complete. @param {typeof opened} then */
+export function onOpened(then) {
+  opened = then;
 }
 
 /** Continues the download if the file comes in blocks and has not been replaced; otherwise opens it again. */
@@ -113,7 +135,7 @@ function arrive(info, words) {
 }
 
 /** Selects in the list what is open; a file or URL that is not in the list replaces the last one that was added. */
-function showInList(from) {
+export function showInList(from) {
   const list = $("volume");
   const listed = [...list.options].find(({ value }) => value && value === from);
   if (listed) {

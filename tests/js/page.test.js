@@ -257,3 +257,217 @@ test("pictures, meshes, surfaces, probes and numbers are saved", async () => {
   assert.deepEqual(page.complaints, []);
   await page.close();
 });
+
+test("any views are shown together, and what is beside the view stays when its settings are turned to", async () => {
+  const page = await open(SMALL, undefined, VIEWPORT);
+  await reach(page, "complete");
+  await setSlider(page, "error", 70);
+  const scene = () => page.evaluate(() => Object.entries(window.tetralodDemo.viewer.state).filter(([, part]) => (Array.isArray(part) ? part.length > 0 : true)).map(([name]) => name));
+  const has = async (...names) => {
+    const found = await scene();
+    const parts = ["isosurfaces", "volume", "slices", "boundary", "cells", "streamlines"];
+    assert.deepEqual(parts.filter((part) => found.includes(part)), names);
+  };
+  await has("isosurfaces");
+  const alone = await picture(page, "together-surface");
+  assert.ok(await page.locator("[name=also][value=iso]").isHidden(), "the view itself needs no box");
+  assert.ok(await page.locator("[name=also][value=flow]").isDisabled(), "there are no vectors");
+  await page.getByLabel("Slice").last().check();
+  await press(page, "Shift+4");
+  await has("isosurfaces", "slices", "boundary");
+  await addressed(page, /also=slice,solid/);
+  const together = await picture(page, "together-three");
+  assert.ok(differing(alone, together) > 0.05, "there is more to see");
+  await screenshot(page, "page-together");
+
+  // To the settings of the slice: the surface stays beside it, and each has an opacity of its own.
+  await show(page, "Slice");
+  await has("isosurfaces", "slices", "boundary");
+  assert.ok(await page.getByLabel("Surface").last().isChecked());
+  assert.equal(differing(together, await picture(page, "together-turned")), 0, "the picture stays");
+  await page.fill("#opacity", "40");
+  await addressed(page, /view=slice&also=iso,solid&opacity=40/);
+  const opacities = () => page.evaluate(() => [window.tetralodDemo.viewer.state.isosurfaces[0], window.tetralodDemo.viewer.state.slices[0]].map(({ opacity }) => opacity));
+  assert.deepEqual(await opacities(), [1, 0.4]);
+  // What is not shown beside the view takes its place.
+  await show(page, "Mesh");
+  await has("isosurfaces", "boundary", "cells");
+  await page.selectOption("#shape", "points");
+  assert.equal(await page.evaluate(() => window.tetralodDemo.viewer.state.cells.shape), "points");
+  await show(page, "Surface");
+  await has("isosurfaces", "boundary", "cells");
+  assert.ok(await page.getByLabel("Points").isChecked(), "the points stay, too");
+  await page.getByLabel("Mesh wires").check();
+  assert.ok(!(await page.getByLabel("Points").isChecked()), "a mesh is drawn in one way");
+  await has("isosurfaces", "boundary", "cells");
+
+  await addressed(page, /also=solid,wires/);
+  const [address, before] = [page.url(), await picture(page, "together-before")];
+  await page.reload();
+  await reach(page, "complete");
+  assert.equal(differing(before, await picture(page, "together-reloaded")), 0, "a link shows the same");
+  assert.equal(page.url(), address);
+  await press(page, "Shift+5");
+  await has("isosurfaces", "boundary");
+  await addressed(page, /also=solid(&|$)/);
+  await press(page, "Control+z");
+  await has("isosurfaces", "boundary", "cells");
+  await page.click("#reset");
+  await has("isosurfaces");
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("a handle of the region is dragged, and the mesh follows", async () => {
+  const page = await open("data/bucky.mt", undefined, VIEWPORT);
+  await reach(page, "complete");
+  await setSlider(page, "error", 40);
+  await page.evaluate(() => (window.tetralodDemo.stats = undefined));
+  await page.selectOption("#region", "box");
+  await page.waitForFunction(() => window.tetralodDemo.stats, undefined, { timeout: PATIENCE });
+  await settle(page);
+  const [before, box] = [await demo(page, "stats"), (await demo(page, "request")).box];
+  // Where the handle in the middle of the face of largest x is on the screen.
+  const [x, y] = await page.evaluate(([x0, y0, z0, x1, y1, z1]) => {
+    const { matrix } = window.tetralodDemo.viewer.overlay;
+    const point = [x1, (y0 + y1) / 2, (z0 + z1) / 2, 1];
+    const [cx, cy, , cw] = [0, 1, 2, 3].map((i) => point.reduce((sum, value, k) => sum + value * matrix[4 * k + i], 0));
+    const { left, top, width, height } = document.querySelector("#canvas").getBoundingClientRect();
+    return [left + ((cx / cw + 1) / 2) * width, top + ((1 - cy / cw) / 2) * height];
+  }, box);
+  await page.mouse.move(x, y);
+  await page.waitForFunction(() => document.querySelector("#canvas").classList.contains("on-handle"), undefined, { timeout: PATIENCE });
+  const camera = await page.evaluate(() => window.tetralodDemo.viewer.state.camera);
+  await page.mouse.down();
+  // The page asks the viewer what was pressed.
+  await settle(page);
+  await page.mouse.move(x - 40, y - 8, { steps: 6 });
+  await page.mouse.up();
+  await page.waitForFunction((x1) => window.tetralodDemo.request.box[3] < x1 - 0.02, box[3], { timeout: PATIENCE });
+  await settle(page);
+  const moved = (await demo(page, "request")).box;
+  assert.deepEqual(moved.toSpliced(3, 1), box.toSpliced(3, 1), "only this face");
+  assert.equal(Number(await page.inputValue("#box [data-i='3']")), Number(moved[3].toPrecision(5)));
+  assert.ok((await demo(page, "stats")).tetrahedra < before.tetrahedra, "a smaller box needs fewer tetrahedra");
+  assert.deepEqual(await page.evaluate(() => window.tetralodDemo.viewer.state.camera), camera, "the camera stays");
+  await screenshot(page, "page-dragged");
+  await page.keyboard.press("Control+z");
+  await page.waitForFunction((x1) => window.tetralodDemo.request.box[3] === x1, box[3], { timeout: PATIENCE });
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+/** Drops a file on the page, as a person drags it there from a folder. */
+const drop = (page, name, text) =>
+  page.evaluate(([name, text]) => {
+    const dataTransfer = new DataTransfer();
+    dataTransfer.items.add(new File([text], name));
+    for (const type of ["dragenter", "dragover", "drop"]) window.dispatchEvent(new DragEvent(type, { dataTransfer, cancelable: true }));
+  }, [name, text]);
+
+/** A VTU file of a grid of `n` cubes in each direction, each of six tetrahedra, with the distance to the middle as its field. */
+function gridFile(n) {
+  const range = (count) => Array.from({ length: count }, (_, i) => i);
+  const points = range((n + 1) ** 3).map((i) => [i % (n + 1), Math.floor(i / (n + 1)) % (n + 1), Math.floor(i / (n + 1) ** 2)]);
+  const at = ([x, y, z]) => x + (n + 1) * (y + (n + 1) * z);
+  // From the lowest corner of a cube to the highest, along its axes in each order.
+  const orders = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
+  const cells = points.filter((p) => p.every((x) => x < n)).flatMap((corner) => orders.map((order) => {
+    const path = [corner];
+    for (const axis of order) path.push(path[path.length - 1].map((x, i) => (i === axis ? x + 1 : x)));
+    return path.map(at);
+  }));
+  const values = points.map((p) => Math.hypot(...p.map((x) => x / n - 0.5)));
+  const array = (type, name, numbers, more = "") => `<DataArray type="${type}" Name="${name}" ${more} format="ascii">${numbers.flat().join(" ")}</DataArray>`;
+  return `<VTKFile type="UnstructuredGrid" version="1.0"><UnstructuredGrid><Piece NumberOfPoints="${points.length}" NumberOfCells="${cells.length}">
+<PointData>${array("Float64", "distance", values)}</PointData><Points>${array("Float64", "Points", points, 'NumberOfComponents="3"')}</Points>
+<Cells>${array("Int64", "connectivity", cells)}${array("Int64", "offsets", cells.map((_, i) => 4 * (i + 1)))}${array("UInt8", "types", cells.map(() => 10))}</Cells>
+</Piece></UnstructuredGrid></VTKFile>`;
+}
+
+test("a dropped VTU is built and shown, a broken file leaves all as it is", async () => {
+  const page = await open(SMALL, undefined, VIEWPORT);
+  await reach(page, "complete");
+  const before = await picture(page, "drop-before");
+  const name = await page.locator("#volume option:checked").innerText();
+  const dialog = page.locator("dialog.build");
+
+  // A build that is cancelled, and files that are broken: the picture and its settings stay.
+  await drop(page, "grid.vtu", gridFile(24));
+  await dialog.getByText("82,944 tetrahedra").waitFor({ timeout: PATIENCE });
+  await dialog.getByRole("button", { name: "Build" }).click();
+  await dialog.locator("progress").waitFor();
+  await dialog.getByRole("button", { name: "Cancel" }).click();
+  await dialog.waitFor({ state: "detached" });
+  await drop(page, "broken.vtu", "<VTKFile type='Nothing'>");
+  await dialog.locator("[role=alert]").waitFor({ timeout: PATIENCE });
+  assert.match(await dialog.locator("[role=alert]").innerText(), /broken\.vtu/);
+  await dialog.getByRole("button", { name: "Cancel" }).click();
+  for (const [file, text] of [["broken.mt", "hello"], ["empty.mt", ""]]) {
+    await drop(page, file, text);
+    await page.locator("#message").waitFor({ timeout: PATIENCE });
+    assert.match(await page.innerText("#message"), new RegExp(file.replace(".", "\\.")));
+    assert.ok(await page.locator("#retry").isHidden(), "the same file would fail again");
+    await screenshot(page, `page-${file}`);
+    await page.click("#dismiss");
+    assert.equal(differing(before, await picture(page, `drop-${file}`)), 0, `${file}: the picture stays`);
+    assert.equal(await page.locator("#volume option:checked").innerText(), name);
+  }
+  await page.fill("#isovalue", "700");
+  assert.ok(differing(before, await picture(page, "drop-isovalue")) > 0.01, "the settings work on");
+  await setSlider(page, "error", 60);
+
+  await drop(page, "grid.vtu", gridFile(10));
+  await dialog.getByText("1,331 points, 6,000 tetrahedra").waitFor({ timeout: PATIENCE });
+  await dialog.getByRole("button", { name: "Build" }).click();
+  await page.waitForFunction(() => window.tetralodDemo.info?.tetrahedra === 6000 && window.tetralodDemo.state === "complete", undefined, { timeout: PATIENCE });
+  await screenshot(page, "page-built");
+  await dialog.getByRole("button", { name: "Close" }).click();
+  assertDrawn(await picture(page, "drop-built"));
+  assert.equal(await page.locator("#volume option:checked").innerText(), "grid.mt");
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("the data view shows where the blocks are, and the memory of the GPU", async () => {
+  const page = await open("data/bucky.mt", undefined, VIEWPORT);
+  await reach(page, "complete");
+  await press(page, "n");
+  const counts = () => page.evaluate(() => [...document.querySelectorAll("#blocks-counts b")].map(({ textContent }) => Number(textContent.replaceAll(",", ""))));
+  await page.locator("#blocks-canvas").waitFor({ timeout: PATIENCE });
+  await settle(page);
+  const map = await page.evaluate(async () => {
+    const { viewer, info } = window.tetralodDemo;
+    const { bounds, states } = await viewer.blockMap();
+    const isInside = bounds.every((value, i) => value >= info.bounds[i % 3] && value <= info.bounds[3 + (i % 3)]);
+    const isBox = bounds.every((value, i) => i % 6 > 2 || value < bounds[i + 3]);
+    return { count: states.length, boxes: bounds.length / 6, isInside, isBox, states: [...new Set(states)].sort() };
+  });
+  const { all } = await demo(page, "blocks");
+  assert.deepEqual([map.count, map.boxes, map.isInside, map.isBox], [all, all, true, true]);
+  assert.ok(map.states.includes(0) && map.states.includes(2));
+  const [inUse, fetched, missing] = await counts();
+  assert.ok(inUse > 0 && missing > 0 && inUse + fetched + missing === all, `${[inUse, fetched, missing]} of ${all}`);
+  // The map is drawn, and turns with the picture.
+  const drawn = () => page.evaluate(() => /** @type {HTMLCanvasElement} */ (document.querySelector("#blocks-canvas")).toDataURL());
+  const first = await drawn();
+  await page.evaluate(() => window.tetralodDemo.viewer.orbit(0.5, 0));
+  await settle(page);
+  assert.notEqual(await drawn(), first);
+  await page.locator("#blocks-canvas").scrollIntoViewIfNeeded();
+  await screenshot(page, "page-blocks");
+  await page.evaluate(() => window.tetralodDemo.viewer.refine({ error: "0%" }).then(() => window.tetralodDemo.viewer.settled()));
+  await page.waitForFunction((missing) => Number(document.querySelector("#blocks-counts .missing b").textContent) < missing, missing, { timeout: PATIENCE });
+
+  const row = () => page.evaluate(() => [...document.querySelectorAll("#traffic dt")].find(({ textContent }) => textContent === "Memory on the GPU")?.nextElementSibling.textContent);
+  assert.match(await row(), /^[\d.]+ [kMG]B$/);
+  const { gpuBytes: surface } = await demo(page, "frame");
+  await press(page, "5");
+  await settle(page);
+  const { gpuBytes: mesh } = await demo(page, "frame");
+  const pixels = await page.locator("#canvas").evaluate(({ clientWidth, clientHeight }) => clientWidth * clientHeight);
+  // Four samples and their depths alone are 32 bytes a pixel.
+  assert.ok(surface > 32 * pixels && mesh > surface, `${surface} and ${mesh} bytes for ${pixels} pixels`);
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
