@@ -70,8 +70,9 @@ function projection({ width, height }) {
   const { bounds } = demo.info;
   const [right, up, towards] = page.overlay.rotation;
   const middle = [0, 1, 2].map((i) => (bounds[i] + bounds[i + 3]) / 2);
-  const reach = Math.hypot(...[0, 1, 2].map((i) => bounds[i + 3] - bounds[i])) / 2;
-  const scale = (Math.min(width, height) / 2 - MARGIN) / reach;
+  // How far the corners of the volume are from its middle, to the right and upwards.
+  const reach = (direction) => direction.reduce((sum, x, i) => sum + Math.abs(x) * (bounds[i + 3] - bounds[i]), 0) / 2;
+  const scale = Math.min((width / 2 - MARGIN) / reach(right), (height / 2 - MARGIN) / reach(up));
   const along = (direction, point) => direction.reduce((sum, x, i) => sum + x * (point[i] - middle[i]), 0);
   return {
     place: (point) => [width / 2 + scale * along(right, point), height / 2 - scale * along(up, point)],

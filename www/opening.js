@@ -56,7 +56,7 @@ export async function open(wanted, words) {
     fail({ code: "no-file", message: `The file ${wanted.slice(FILE.length)} is not part of the link. Open it from your disk` });
     return source ? undefined : open(first);
   }
-  const before = { info: demo.info, stats: demo.stats, source, received: demo.receivedBytes, total: demo.totalBytes };
+  const before = { ...demo, source };
   const shown = words ?? (demo.info ? carriedOver() : {});
   source = from;
   showInList(from);
@@ -85,16 +85,16 @@ export async function open(wanted, words) {
     opened(from);
   } catch (error) {
     if (mine !== opening || error?.name === "AbortError") return;
-    fail(error);
     stay(before);
+    fail(error);
   }
 }
 
 /** What could not be opened has not taken the place of the volume before: that stays, with its settings. */
-function stay({ info, stats, source: from, received, total }) {
-  if (!info || page.viewer.info !== info) return;
+function stay({ source: from, ...before }) {
+  if (!before.info || page.viewer.info !== before.info) return;
   source = from;
-  Object.assign(demo, { info, stats, receivedBytes: received, totalBytes: total });
+  Object.assign(demo, { ...before, frames: demo.frames });
   showInList(from);
   showGrowth();
   $("legend").hidden = !page.viewer.legend;

@@ -169,7 +169,9 @@ impl Viewer {
             return Ok(any);
         };
         let supplied = next.supply();
-        if matches!(supplied, Ok(false)) {
+        // A file that is broken from its beginning does not take the place of one that is sound.
+        let is_known = next.session().info().is_some();
+        if matches!(supplied, Ok(false)) || supplied.is_err() && !is_known {
             self.next = Some(next);
             return supplied;
         }

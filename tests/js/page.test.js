@@ -4,7 +4,7 @@ import { readFile } from "node:fs/promises";
 import { createRequire } from "node:module";
 import { after, before, test } from "node:test";
 import { fileURLToPath } from "node:url";
-import { addressed, assertDrawn, begin, demo, differing, end, open, PATIENCE, picture, pictures, reach, setSlider, settle, show } from "./drive.js";
+import { addressed, assertDrawn, begin, demo, differing, drop, end, open, PATIENCE, picture, pictures, reach, setSlider, settle, show } from "./drive.js";
 
 before(begin);
 
@@ -67,17 +67,22 @@ test("all is reached with keys, and the list of keys has them", async () => {
   await page.close();
 });
 
-test("the page has no accessibility violations, light or dark", async () => {
-  const page = await open(SMALL, undefined, VIEWPORT);
-  await reach(page, "complete");
+/** A function that fails where a page has accessibility violations. */
+async function checker(page) {
   await page.addScriptTag({ content: await readFile(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8") });
-  const check = async (name) => {
+  return async (name) => {
     const found = await page.evaluate(async () => {
       const { violations } = await /** @type {any} */ (window).axe.run(document, { resultTypes: ["violations"] });
       return violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ html, failureSummary }) => `${html} ${failureSummary}`).join("; ")}`);
     });
     assert.deepEqual(found, [], name);
   };
+}
+
+test("the page has no accessibility violations, light or dark", async () => {
+  const page = await open(SMALL, undefined, VIEWPORT);
+  await reach(page, "complete");
+  const check = await checker(page);
   const dialog = async (name, id, key) => {
     await press(page, key);
     await check(name);
@@ -86,7 +91,7 @@ test("the page has no accessibility violations, light or dark", async () => {
   };
   for (const colorScheme of /** @type {const} */ (["dark", "light"])) {
     await page.emulateMedia({ colorScheme });
-    for (const view of ["Surface", "Volume", "Slice", "Mesh"]) {
+    for (const view of ["Surface", "Volume", "Slice", "Solid", "Mesh"]) {
       await press(page, "g");
       await show(page, view);
       await check(`${view}, ${colorScheme}`);
@@ -97,6 +102,51 @@ test("the page has no accessibility violations, light or dark", async () => {
     await check(`export, ${colorScheme}`);
     await dialog(`keys, ${colorScheme}`, "keys", "?");
     await dialog(`gallery, ${colorScheme}`, "gallery", "o");
+  }
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("nor has it with several views, probes, a region, messages, the map of blocks, and the dialog of a build", async () => {
+  const page = await open("data/abc-flow.mt", undefined, VIEWPORT);
+  await reach(page, "complete");
+  await setSlider(page, "error", 80);
+  const check = await checker(page);
+  for (const colorScheme of /** @type {const} */ (["dark", "light"])) {
+    await page.emulateMedia({ colorScheme });
+    const look = (name) => check(`${name}, ${colorScheme}`);
+    await press(page, "6");
+    await look("Flow");
+    await press(page, "Shift+1");
+    await press(page, "Shift+5");
+    await look("Flow with surface and wires");
+    await page.selectOption("#region", "box");
+    await press(page, "1");
+    for (const x of [0.45, 0.58]) {
+      const { x: left, y: top, width, height } = await page.locator("#canvas").boundingBox();
+      await page.mouse.click(left + x * width, top + 0.5 * height);
+    }
+    await page.locator("#plot path").waitFor({ timeout: PATIENCE });
+    await look("probes and a region");
+    await screenshot(page, `page-probes-${colorScheme}`);
+    await press(page, "Escape");
+    await page.evaluate(() => (location.hash = "#isovalue=99"));
+    await page.locator("#empty").waitFor({ timeout: PATIENCE });
+    await look("an empty surface");
+    await page.click("#empty-middle");
+    await drop(page, "broken.mt", "hello");
+    await page.locator("#message").waitFor({ timeout: PATIENCE });
+    await look("a message");
+    await page.click("#dismiss");
+    await drop(page, "broken.vtu", "hello");
+    await page.locator("dialog.build [role=alert]").waitFor({ timeout: PATIENCE });
+    await look("a build that fails");
+    await page.keyboard.press("Escape");
+    await page.locator("dialog.build").waitFor({ state: "detached" });
+    await page.click("#share");
+    await page.locator("#note").waitFor();
+    await look("a note");
+    await page.click("#reset");
   }
   assert.deepEqual(page.complaints, []);
   await page.close();
@@ -258,6 +308,9 @@ test("pictures, meshes, surfaces, probes and numbers are saved", async () => {
   await page.close();
 });
 
+/** The box of what can be shown beside the view. */
+const also = (page, name) => page.locator(`[name=also][value=${name}]`);
+
 test("any views are shown together, and what is beside the view stays when its settings are turned to", async () => {
   const page = await open(SMALL, undefined, VIEWPORT);
   await reach(page, "complete");
@@ -270,9 +323,9 @@ test("any views are shown together, and what is beside the view stays when its s
   };
   await has("isosurfaces");
   const alone = await picture(page, "together-surface");
-  assert.ok(await page.locator("[name=also][value=iso]").isHidden(), "the view itself needs no box");
-  assert.ok(await page.locator("[name=also][value=flow]").isDisabled(), "there are no vectors");
-  await page.getByLabel("Slice").last().check();
+  assert.ok(await also(page, "iso").isHidden(), "the view itself needs no box");
+  assert.ok(await also(page, "flow").isDisabled(), "there are no vectors");
+  await also(page, "slice").check();
   await press(page, "Shift+4");
   await has("isosurfaces", "slices", "boundary");
   await addressed(page, /also=slice,solid/);
@@ -283,7 +336,7 @@ test("any views are shown together, and what is beside the view stays when its s
   // To the settings of the slice: the surface stays beside it, and each has an opacity of its own.
   await show(page, "Slice");
   await has("isosurfaces", "slices", "boundary");
-  assert.ok(await page.getByLabel("Surface").last().isChecked());
+  assert.ok(await also(page, "iso").isChecked());
   assert.equal(differing(together, await picture(page, "together-turned")), 0, "the picture stays");
   await page.fill("#opacity", "40");
   await addressed(page, /view=slice&also=iso,solid&opacity=40/);
@@ -296,9 +349,9 @@ test("any views are shown together, and what is beside the view stays when its s
   assert.equal(await page.evaluate(() => window.tetralodDemo.viewer.state.cells.shape), "points");
   await show(page, "Surface");
   await has("isosurfaces", "boundary", "cells");
-  assert.ok(await page.getByLabel("Points").isChecked(), "the points stay, too");
-  await page.getByLabel("Mesh wires").check();
-  assert.ok(!(await page.getByLabel("Points").isChecked()), "a mesh is drawn in one way");
+  assert.ok(await also(page, "points").isChecked(), "the points stay, too");
+  await also(page, "wires").check();
+  assert.ok(!(await also(page, "points").isChecked()), "a mesh is drawn in one way");
   await has("isosurfaces", "boundary", "cells");
 
   await addressed(page, /also=solid,wires/);
@@ -357,78 +410,6 @@ test("a handle of the region is dragged, and the mesh follows", async () => {
   await page.close();
 });
 
-/** Drops a file on the page, as a person drags it there from a folder. */
-const drop = (page, name, text) =>
-  page.evaluate(([name, text]) => {
-    const dataTransfer = new DataTransfer();
-    dataTransfer.items.add(new File([text], name));
-    for (const type of ["dragenter", "dragover", "drop"]) window.dispatchEvent(new DragEvent(type, { dataTransfer, cancelable: true }));
-  }, [name, text]);
-
-/** A VTU file of a grid of `n` cubes in each direction, each of six tetrahedra, with the distance to the middle as its field. */
-function gridFile(n) {
-  const range = (count) => Array.from({ length: count }, (_, i) => i);
-  const points = range((n + 1) ** 3).map((i) => [i % (n + 1), Math.floor(i / (n + 1)) % (n + 1), Math.floor(i / (n + 1) ** 2)]);
-  const at = ([x, y, z]) => x + (n + 1) * (y + (n + 1) * z);
-  // From the lowest corner of a cube to the highest, along its axes in each order.
-  const orders = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
-  const cells = points.filter((p) => p.every((x) => x < n)).flatMap((corner) => orders.map((order) => {
-    const path = [corner];
-    for (const axis of order) path.push(path[path.length - 1].map((x, i) => (i === axis ? x + 1 : x)));
-    return path.map(at);
-  }));
-  const values = points.map((p) => Math.hypot(...p.map((x) => x / n - 0.5)));
-  const array = (type, name, numbers, more = "") => `<DataArray type="${type}" Name="${name}" ${more} format="ascii">${numbers.flat().join(" ")}</DataArray>`;
-  return `<VTKFile type="UnstructuredGrid" version="1.0"><UnstructuredGrid><Piece NumberOfPoints="${points.length}" NumberOfCells="${cells.length}">
-<PointData>${array("Float64", "distance", values)}</PointData><Points>${array("Float64", "Points", points, 'NumberOfComponents="3"')}</Points>
-<Cells>${array("Int64", "connectivity", cells)}${array("Int64", "offsets", cells.map((_, i) => 4 * (i + 1)))}${array("UInt8", "types", cells.map(() => 10))}</Cells>
-</Piece></UnstructuredGrid></VTKFile>`;
-}
-
-test("a dropped VTU is built and shown, a broken file leaves all as it is", async () => {
-  const page = await open(SMALL, undefined, VIEWPORT);
-  await reach(page, "complete");
-  const before = await picture(page, "drop-before");
-  const name = await page.locator("#volume option:checked").innerText();
-  const dialog = page.locator("dialog.build");
-
-  // A build that is cancelled, and files that are broken: the picture and its settings stay.
-  await drop(page, "grid.vtu", gridFile(24));
-  await dialog.getByText("82,944 tetrahedra").waitFor({ timeout: PATIENCE });
-  await dialog.getByRole("button", { name: "Build" }).click();
-  await dialog.locator("progress").waitFor();
-  await dialog.getByRole("button", { name: "Cancel" }).click();
-  await dialog.waitFor({ state: "detached" });
-  await drop(page, "broken.vtu", "<VTKFile type='Nothing'>");
-  await dialog.locator("[role=alert]").waitFor({ timeout: PATIENCE });
-  assert.match(await dialog.locator("[role=alert]").innerText(), /broken\.vtu/);
-  await dialog.getByRole("button", { name: "Cancel" }).click();
-  for (const [file, text] of [["broken.mt", "hello"], ["empty.mt", ""]]) {
-    await drop(page, file, text);
-    await page.locator("#message").waitFor({ timeout: PATIENCE });
-    assert.match(await page.innerText("#message"), new RegExp(file.replace(".", "\\.")));
-    assert.ok(await page.locator("#retry").isHidden(), "the same file would fail again");
-    await screenshot(page, `page-${file}`);
-    await page.click("#dismiss");
-    assert.equal(differing(before, await picture(page, `drop-${file}`)), 0, `${file}: the picture stays`);
-    assert.equal(await page.locator("#volume option:checked").innerText(), name);
-  }
-  await page.fill("#isovalue", "700");
-  assert.ok(differing(before, await picture(page, "drop-isovalue")) > 0.01, "the settings work on");
-  await setSlider(page, "error", 60);
-
-  await drop(page, "grid.vtu", gridFile(10));
-  await dialog.getByText("1,331 points, 6,000 tetrahedra").waitFor({ timeout: PATIENCE });
-  await dialog.getByRole("button", { name: "Build" }).click();
-  await page.waitForFunction(() => window.tetralodDemo.info?.tetrahedra === 6000 && window.tetralodDemo.state === "complete", undefined, { timeout: PATIENCE });
-  await screenshot(page, "page-built");
-  await dialog.getByRole("button", { name: "Close" }).click();
-  assertDrawn(await picture(page, "drop-built"));
-  assert.equal(await page.locator("#volume option:checked").innerText(), "grid.mt");
-  assert.deepEqual(page.complaints, []);
-  await page.close();
-});
-
 test("the data view shows where the blocks are, and the memory of the GPU", async () => {
   const page = await open("data/bucky.mt", undefined, VIEWPORT);
   await reach(page, "complete");
@@ -456,18 +437,17 @@ test("the data view shows where the blocks are, and the memory of the GPU", asyn
   assert.notEqual(await drawn(), first);
   await page.locator("#blocks-canvas").scrollIntoViewIfNeeded();
   await screenshot(page, "page-blocks");
-  await page.evaluate(() => window.tetralodDemo.viewer.refine({ error: "0%" }).then(() => window.tetralodDemo.viewer.settled()));
+  await page.evaluate(() => window.tetralodDemo.viewer.refine({ error: "0.03%" }).then(() => window.tetralodDemo.viewer.settled()));
   await page.waitForFunction((missing) => Number(document.querySelector("#blocks-counts .missing b").textContent) < missing, missing, { timeout: PATIENCE });
 
   const row = () => page.evaluate(() => [...document.querySelectorAll("#traffic dt")].find(({ textContent }) => textContent === "Memory on the GPU")?.nextElementSibling.textContent);
   assert.match(await row(), /^[\d.]+ [kMG]B$/);
   const { gpuBytes: surface } = await demo(page, "frame");
   await press(page, "5");
-  await settle(page);
-  const { gpuBytes: mesh } = await demo(page, "frame");
+  await page.waitForFunction((before) => window.tetralodDemo.frame.gpuBytes > before, surface, { timeout: PATIENCE });
   const pixels = await page.locator("#canvas").evaluate(({ clientWidth, clientHeight }) => clientWidth * clientHeight);
   // Four samples and their depths alone are 32 bytes a pixel.
-  assert.ok(surface > 32 * pixels && mesh > surface, `${surface} and ${mesh} bytes for ${pixels} pixels`);
+  assert.ok(surface > 32 * pixels, `${surface} bytes for ${pixels} pixels`);
   assert.deepEqual(page.complaints, []);
   await page.close();
 });
