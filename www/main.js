@@ -14,7 +14,7 @@ import { attachHistogram } from "./histogram.js";
 import { attachKeys } from "./keys.js";
 import { attachMessages, fail, say } from "./messages.js";
 import { showFrame, showProgress, showStats } from "./numbers.js";
-import { onOpened, open, retry, setFirst, showInList } from "./opening.js";
+import { isRemote, onOpened, open, retry, setFirst, showInList } from "./opening.js";
 import { OverlayView } from "./overlay.js";
 import { demo, page } from "./page.js";
 import { mode } from "./parts.js";
@@ -33,7 +33,7 @@ const canvas = $("canvas");
 
 async function start() {
   $("settings").addEventListener("submit", (event) => event.preventDefault());
-  attachMessages({ onRetry: retry });
+  attachMessages({ onRetry: retry, isRemote });
   attachDialogs();
   attachTabs();
   attachTheme();
@@ -130,6 +130,7 @@ async function makeViewer(listed) {
     const unsupported = error.code === "no-webgpu";
     demo.state = unsupported ? "unsupported" : "failed";
     $("side-panel").inert = true;
+    for (const id of ["volume", "open-gallery", "reset", "share"]) $(id).disabled = true;
     $("loading").hidden = true;
     $("growth").textContent = "";
     say(unsupported ? "This page needs WebGPU" : "The viewer could not start", error);

@@ -16,8 +16,10 @@ const KINDS = {
   explicit: "explicit (any updates)",
 };
 
-/** What was opened last: the button "Try again" opens it again. @type {string | File} */
+/** What is open. @type {string | File} */
 let source;
+/** What was opened last, perhaps in vain: the button "Try again" opens it again. @type {string | File} */
+let tried;
 let opening = 0;
 /** What the page opens by itself. */
 let first = "";
@@ -29,6 +31,9 @@ const FILE = "file:";
 export function setFirst(url) {
   first = url;
 }
+
+/** Whether what was opened last comes from a server. */
+export const isRemote = () => !(tried instanceof File);
 
 /** What is open, as in the address of the page. */
 export function sourceWords() {
@@ -58,7 +63,7 @@ export async function open(wanted, words) {
   }
   const before = { ...demo, source };
   const shown = words ?? (demo.info ? carriedOver() : {});
-  source = from;
+  source = tried = from;
   showInList(from);
   const mine = ++opening;
   Object.assign(demo, { state: "opening", error: undefined, info: undefined, stats: undefined });
@@ -110,7 +115,7 @@ export function onOpened(then) {
 
 /** Continues the download if the file comes in blocks and has not been replaced; otherwise opens it again. */
 export async function retry() {
-  if (!demo.info || !demo.blocks || demo.error?.code === "changed") return open(source);
+  if (tried !== source || !demo.info || !demo.blocks || demo.error?.code === "changed") return open(tried);
   hideMessage();
   demo.error = undefined;
   demo.state = "streaming";

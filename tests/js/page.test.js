@@ -451,3 +451,30 @@ test("the data view shows where the blocks are, and the memory of the GPU", asyn
   assert.deepEqual(page.complaints, []);
   await page.close();
 });
+
+test("volumes without pictures get some: drawn ones, then those that the page has taken", async () => {
+  const prepare = (page) =>
+    page.route("**/data/volumes.json", async (route) => {
+      const list = await (await route.fetch()).json();
+      for (const volume of list.volumes) Object.assign(volume, { picture: null, isShown: true });
+      await route.fulfill({ json: list });
+    });
+  const page = await open(SMALL, prepare, { viewport: { width: 400, height: 400 } });
+  await reach(page, "complete");
+  const pictures = async () => {
+    await page.click("#open-gallery");
+    await page.locator("#gallery li").first().waitFor();
+    await page.waitForFunction(() => [...document.querySelectorAll("#gallery img")].every((image) => image instanceof HTMLImageElement && image.complete));
+    return page.evaluate(() => [...document.querySelectorAll("#gallery img")].map((image) => image instanceof HTMLImageElement && [image.src.slice(0, 14), image.naturalWidth]));
+  };
+  const drawn = await pictures();
+  assert.ok(drawn.length > 3 && drawn.every(([, width]) => width > 0), JSON.stringify(drawn));
+  await screenshot(page, "page-drawn-pictures");
+  await page.keyboard.press("Escape");
+  await page.waitForFunction(() => Object.keys(localStorage).some((key) => key.startsWith("tetralod-picture data/bucky-explicit.mt")), undefined, { timeout: PATIENCE });
+  const taken = await pictures();
+  assert.equal(taken.filter(([start]) => start.startsWith("data:image/web")).length, 1, "of the volume that was shown");
+  await screenshot(page, "page-taken-pictures");
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
