@@ -114,6 +114,7 @@ export function draw() {
   const { viewer, flow, colours, comparison } = page;
   text("opacity-text", `${$("opacity").value} %`, "opacity");
   text("shrink-text", `${$("shrink").value} %`, "shrink");
+  text("shade-text", `${$("shade").value} %`, "shade");
   const by = $("surface-colour").value;
   $("colours").hidden = mode() === "iso" && !by && !beside().some((name) => name !== "solid");
   $("range").hidden = !isByField();
@@ -124,7 +125,8 @@ export function draw() {
   // A difference has values on both sides of 0.
   const diverging = compare?.difference ? { map: "coolwarm" } : {};
   const range = shows("iso") && by && !isByField() ? { range: ownRange(by) } : {};
-  const looks = { colours: { ...colours.state, ...range, ...diverging }, background: background(), compare };
+  const box = { outline: $("outline").checked, shade: $("shade").value / 100 };
+  const looks = { colours: { ...colours.state, ...range, ...diverging }, background: background(), compare, ...box };
   viewer.set(/** @type {any} */ (Object.assign(nothing, ...parts, looks))).catch(fail);
 }
 
@@ -232,5 +234,5 @@ export function attachScene() {
     $("isovalue").focus();
   });
   for (const id of ["cut", "axis", "flip"]) $(id).addEventListener("input", applyCut);
-  for (const id of ["colour-by", "surface-colour"]) $(id).addEventListener("input", draw);
+  for (const id of ["colour-by", "surface-colour", "outline", "shade"]) $(id).addEventListener("input", draw);
 }

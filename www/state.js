@@ -68,7 +68,7 @@ function errorPosition(kind) {
 
 /** @returns {Record<string, Entry>} */
 function makeEntries() {
-  const ids = ["shape", "shrink", "colour-by", "flow-colour", "rake", "arrows", "flow-boundary", "map", "reversed", "log"];
+  const ids = ["shape", "shrink", "outline", "shade", "inside", "colour-by", "flow-colour", "rake", "arrows", "flow-boundary", "map", "reversed", "log"];
   const more = ["time", "cut", "axis", "flip", "pixels", "budget", "region", "focus", "background", "axes", "fly", "frame-time"];
   const simple = Object.fromEntries([...ids, ...more].map((id) => [id, control(id)]));
   return {

@@ -406,6 +406,12 @@ test("a handle of the region is dragged, and the mesh follows", async () => {
   await screenshot(page, "page-dragged");
   await page.keyboard.press("Control+z");
   await page.waitForFunction((x1) => window.tetralodDemo.request.box[3] === x1, box[3], { timeout: PATIENCE });
+  await page.check("#inside");
+  await addressed(page, /inside=1/);
+  assert.deepEqual(await page.evaluate(() => window.tetralodDemo.viewer.state.clipBox), box);
+  const inside = await picture(page, "region-inside");
+  await page.uncheck("#inside");
+  assert.ok(differing(inside, await picture(page, "region-outside")) > 0.02, "what is outside was cut away");
   assert.deepEqual(page.complaints, []);
   await page.close();
 });
@@ -464,6 +470,8 @@ test("volumes without pictures get some: drawn ones, then those that the page ha
   const pictures = async () => {
     await page.click("#open-gallery");
     await page.locator("#gallery li").first().waitFor();
+    // Those that are not in sight are loaded later.
+    await page.evaluate(() => document.querySelectorAll("#gallery img").forEach((image) => image.setAttribute("loading", "eager")));
     await page.waitForFunction(() => [...document.querySelectorAll("#gallery img")].every((image) => image instanceof HTMLImageElement && image.complete));
     return page.evaluate(() => [...document.querySelectorAll("#gallery img")].map((image) => image instanceof HTMLImageElement && [image.src.slice(0, 14), image.naturalWidth]));
   };
