@@ -181,6 +181,7 @@ fn js() -> Result<()> {
     shell::run(&mut node_test("latest.test.js"))?;
     shell::run(&mut node_test("ranges.test.js"))?;
     shell::run(&mut node_test("writers.test.js"))?;
+    shell::run(&mut node_test("bins.test.js"))?;
     with_fixture(|| {
         for name in [
             "package.test.js",
