@@ -287,6 +287,15 @@ const methods = {
 
   mesh: () => viewer.mesh(),
 
+  /** Where the blocks of the file are, and which of them are here; nothing where it has none. */
+  blockMap() {
+    const numbers = viewer.blockMap();
+    const count = numbers.length / 7;
+    if (count === 0) return undefined;
+    const bounds = numbers.filter((_, i) => i % 7 < 6);
+    return { bounds, states: Uint8Array.from({ length: count }, (_, i) => numbers[7 * i + 6]) };
+  },
+
   ...meshToolMethods(() => viewer),
 };
 const emit = serve(webEndpoint(globalThis), methods, ["openParts", "settled"]);
@@ -443,7 +452,7 @@ function draw() {
       drawing = milliseconds;
       begun = start;
       const uploaded = viewer.takeUploaded();
-      emit("frame", { milliseconds, triangles: viewer.triangles, uploaded, bytes, ready });
+      emit("frame", { milliseconds, triangles: viewer.triangles, uploaded, gpuBytes: viewer.gpuBytes, bytes, ready });
       report("camera", viewer.camera());
       report("legend", legend());
       report("overlay", overlay());

@@ -80,10 +80,26 @@ export interface ViewerFrame {
   triangles: number;
   /** Bytes that were uploaded to the GPU for it. */
   uploaded: number;
+  /**
+   * Bytes of memory on the GPU of all buffers and textures that pictures are made of and in; those of the canvas itself belong to the
+   * browser and are not counted.
+   */
+  gpuBytes: number;
   /** Bytes of the file that had been decoded. */
   bytes: number;
   /** Whether it shows a volume yet. */
   ready: boolean;
+}
+
+/** The blocks of a file in space, in the order of the file. */
+export interface BlockMap {
+  /**
+   * Six numbers for each block, in model units: the lower and the upper corner of a box that holds all tetrahedra that the
+   * block changes. Boxes overlap; those of the first blocks, which are the coarsest, are as large as the volume.
+   */
+  bounds: Float64Array;
+  /** For each block 0: not fetched, 1: fetched, 2: fetched, and the current mesh uses it. */
+  states: Uint8Array;
 }
 
 /** A volume that has been opened. */
@@ -497,6 +513,8 @@ export class Viewer extends EventTargetWithMeshTools {
    * const { positions, tets } = await viewer.mesh();
    */
   mesh(): Promise<Omit<Mesh, "changes">>;
+  /** Where the blocks of the file are, and which of them are here; `undefined` for a file without blocks. */
+  blockMap(): Promise<BlockMap | undefined>;
   /** Stops the worker; the canvas keeps its last picture. Pending and later calls reject with code `freed`. */
   free(): void;
   [Symbol.dispose](): void;

@@ -425,6 +425,11 @@ export class Viewer extends withMeshTools(EventTarget) {
     return this.#remote.call("mesh");
   }
 
+  /** Where the blocks of the file are, and which of them are here; `undefined` where it has none. */
+  blockMap() {
+    return this.#remote.call("blockMap");
+  }
+
   /** Ends the worker. The canvas keeps its last picture and cannot be used again. */
   free() {
     this.#stream?.abort(new DOMException("the viewer was freed", "AbortError"));

@@ -1,5 +1,6 @@
 /** What has arrived, and what it has bought: the panel of data. */
 
+import { attachBlockMap, showBlockMap } from "./blockmap.js";
 import { $, all } from "./dom.js";
 import { count, milliseconds, percentage, size } from "./format.js";
 import { element } from "./overlay.js";
@@ -24,6 +25,7 @@ let meshes = [];
 let frames = [];
 let last = 0;
 let uploaded = 0;
+let gpuBytes = 0;
 /** @type {import("tetralod/viewer").ViewerProgress["traffic"]} */
 let traffic;
 /** The file that all this is of. */
@@ -37,6 +39,7 @@ export function record(name, detail) {
     [meshes, frames, uploaded, traffic] = [[], [], 0, undefined];
   }
   if (name === "progress") traffic = detail.traffic ?? traffic;
+  if (name === "stats") demo.blocks = detail.blocks ?? demo.blocks;
   if (name === "stats" && detail.done) mesh(detail);
   if (name === "frame") frame(detail);
   if (isDue) return;
@@ -52,7 +55,8 @@ function mesh({ bytes, relativeErrorBound, tetrahedra }) {
   if (meshes.length > MESHES) meshes.shift();
 }
 
-function frame({ milliseconds: time, uploaded: bytes }) {
+function frame({ milliseconds: time, uploaded: bytes, gpuBytes: held }) {
+  gpuBytes = held;
   const now = performance.now();
   const interval = now - last < MOVEMENT ? now - last : undefined;
   last = now;
@@ -110,12 +114,13 @@ function showBlocks() {
   const { blocks } = demo;
   const [here, coming] = all("#blocks-bar i");
   const words = blocks
-    ? `${count(blocks.here)} of ${count(blocks.all)} blocks are here, the request needs ${count(blocks.needed)}`
+    ? `${count(blocks.here)} of ${count(blocks.all)} blocks are here${blocks.needed > 0 ? `, the request needs ${count(blocks.needed)}` : ""}`
     : "This file comes as a whole";
   here.style.width = blocks ? `${(100 * blocks.here) / blocks.all}%` : "100%";
   coming.style.width = blocks ? `${(100 * Math.max(blocks.needed - blocks.here, 0)) / blocks.all}%` : "0";
   $("blocks-bar").setAttribute("aria-label", words);
   $("blocks-words").textContent = words;
+  showBlockMap();
 }
 
 function showTraffic() {
@@ -124,6 +129,7 @@ function showTraffic() {
     ["Requests", traffic ? count(traffic.requests) : "1"],
     ["Of these needed", size(traffic?.used ?? demo.receivedBytes)],
     ["Memory of blocks", demo.blocks ? size(demo.blocks.bytes) : "–"],
+    ["Memory on the GPU", size(gpuBytes)],
     ["Uploaded to the GPU", size(uploaded)],
     ["First picture", demo.firstFrameMs ? `after ${milliseconds(demo.firstFrameMs)}` : "–"],
     ["Bytes until then", demo.firstFrameBytes ? size(demo.firstFrameBytes) : "–"],
@@ -169,6 +175,7 @@ export function report() {
     blocks: demo.blocks,
     traffic,
     uploaded,
+    gpuBytes,
     meshes,
     frames,
     gpu: page.viewer.adapter,
@@ -181,10 +188,12 @@ function map(colourBy) {
   $("colour-by").value = colourBy;
   const radio = /** @type {HTMLInputElement} */ (document.querySelector("[name=mode][value=mesh]"));
   radio.checked = true;
+  $("shape").value = "solid";
   applyMode();
 }
 
 export function attachData() {
+  attachBlockMap();
   onTab((name) => name === "data" && show());
   new ResizeObserver(() => shownTab() === "data" && show()).observe($("data-panel"));
   $("map-blocks").addEventListener("click", () => map("block"));

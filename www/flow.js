@@ -3,9 +3,6 @@
 /** @type {(id: string) => any} Each caller knows the type of its element. */
 const $ = (id) => document.getElementById(id);
 
-/** The surface of the domain around them. */
-const BOUNDARY = { opacity: 0.12, colour: "#9fb0c4" };
-
 /** Seeds have so many digits: as many as links keep. */
 const DIGITS = 8;
 
@@ -43,6 +40,8 @@ export class FlowSettings {
     $("flow").disabled = hasNone;
     $("flow-label").title = hasNone ? "This dataset has no vectors" : "";
     if (hasNone && $("flow").checked) $("surface").checked = true;
+    $("also-flow").disabled = hasNone;
+    if (hasNone) $("also-flow").checked = false;
   }
 
   /** The seeds that were placed by clicks, as numbers. */
@@ -75,8 +74,13 @@ export class FlowSettings {
     this.#onChange();
   }
 
+  /** The plane of the seeds, with those that were clicked, for the overlay. */
+  quad({ bounds, plane: { axis, at } }) {
+    return { axis, at, bounds, seeds: this.#seeds };
+  }
+
   /**
-   * What is drawn, with the plane of the seeds over it.
+   * What is drawn.
    *
    * @param {{ bounds: number[], plane: { axis: number, at: number }, field: FieldInfo }} shown
    */
@@ -87,13 +91,11 @@ export class FlowSettings {
     $("rake-text").textContent = words;
     $("rake").setAttribute("aria-valuetext", words);
     $("no-seeds").hidden = this.#seeds.length === 0;
-    this.#overlay.quad = { axis, at, bounds, seeds: this.#seeds };
     const by = this.isByField ? { field: field.name } : {};
     const part = (at - bounds[axis]) / (bounds[axis + 3] - bounds[axis]);
     return {
       streamlines: { fields, seeds: [...rake(bounds, { axis, at: part, count }), ...this.#seeds], ...by },
-      arrows: $("arrows").checked ? { fields, ...by } : null,
-      boundary: $("flow-boundary").checked ? BOUNDARY : null,
+      ...($("arrows").checked ? { arrows: { fields, ...by } } : {}),
     };
   }
 }

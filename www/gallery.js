@@ -8,6 +8,7 @@ import { count, size, vtuBytes } from "./format.js";
 import { open, sourceWords } from "./opening.js";
 import { note } from "./share.js";
 import { read } from "./state.js";
+import { pictureOf, taken, takePicture } from "./thumbnails.js";
 
 const LIST = "data/volumes.json";
 /** How often it is looked whether a volume in the making is ready (in ms). */
@@ -53,13 +54,21 @@ export async function readVolumes() {
 
 /** The picture of a volume before it has arrived. */
 export function showPoster(url) {
-  const picture = volumes.find((volume) => volume.url === url)?.picture;
+  const volume = listed(url);
+  const picture = volume && (volume.picture ?? taken(volume));
   $("poster").hidden = !picture;
   if (picture) $("poster").src = picture;
 }
 
+const listed = (url) => volumes.find((volume) => volume.url === url);
+
 /** The words of the scene with which a volume is shown first. */
-export const sceneOf = (url) => read(volumes.find((volume) => volume.url === url)?.scene ?? "");
+export const sceneOf = (url) => read(listed(url)?.scene ?? "");
+
+/** A volume has been shown: whoever made it may have had no GPU to draw a picture of it. */
+export async function shown(url) {
+  await takePicture(listed(url)).catch(() => {});
+}
 
 function announceNew(before) {
   const fresh = volumes.find(({ url }) => !before.has(url));
@@ -86,14 +95,12 @@ function showGallery() {
 
 /** @param {Listed} volume */
 function card(volume) {
-  const { title, sentence, picture, tetrahedra, bytes } = volume;
+  const { title, sentence, tetrahedra, bytes } = volume;
   const [item, button] = [document.createElement("li"), document.createElement("button")];
   button.type = "button";
-  if (picture) {
-    const image = document.createElement("img");
-    Object.assign(image, { src: picture, alt: "", width: 480, height: 300, loading: "lazy" });
-    button.append(image);
-  }
+  const image = document.createElement("img");
+  Object.assign(image, { src: pictureOf(volume), alt: "", width: 480, height: 300, loading: "lazy" });
+  button.append(image);
   const [name, words, sizes] = ["b", "span", "small"].map((tag) => document.createElement(tag));
   name.textContent = title;
   words.textContent = sentence;

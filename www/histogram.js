@@ -1,16 +1,17 @@
 /** The histogram of the field above the slider of the isovalue: a press or a drag on it chooses the isovalue. */
 
-import { $ } from "./dom.js";
+import { histogramPath, isLogarithmic, SIZE } from "./bins.js";
+import { $, all } from "./dom.js";
 import { page } from "./page.js";
 import { setIsovalue } from "./scene.js";
-import { histogramPath } from "./transfer.js";
 
-/** The drawing, and the margin of its area, as in the editor of the transfer function. */
-const [WIDTH, MARGIN] = [300, 9];
+const { width: WIDTH, margin: MARGIN } = SIZE;
 
 /** @param {ArrayLike<number>} volumes the volume of the mesh in each of equal bins of the field's range */
 export function showVolumes(volumes) {
   $("histogram-volumes").setAttribute("d", histogramPath(volumes));
+  const words = `Volume of each value, as ${isLogarithmic(volumes) ? "logarithms" : "square roots"}`;
+  for (const note of all(".histogram-note")) note.textContent = words;
 }
 
 /** Shows where the isovalue is. @param {number} fraction of the field's range */

@@ -3,6 +3,7 @@
 import { $ } from "./dom.js";
 import { openGallery } from "./gallery.js";
 import { page } from "./page.js";
+import { toggle } from "./parts.js";
 import { fullScreen } from "./picture.js";
 import { share } from "./share.js";
 import { redo, undo } from "./state.js";
@@ -17,6 +18,9 @@ import { switchTheme } from "./theme.js";
  */
 
 const VIEWS = ["Surface", "Volume", "Slice", "Solid", "Mesh", "Flow"];
+/** What can be shown beside the view, with Shift and these digits. */
+const BESIDE = ["surface", "volume", "slice", "boundary", "mesh wires", "flow", "points"];
+const DIGITS = BESIDE.map((_, i) => i + 1);
 
 /** Chooses a view by its number. */
 function chooseView(number) {
@@ -36,6 +40,7 @@ const TABLE = {
   ],
   "Everywhere": [
     ...VIEWS.map((name, i) => ({ keys: [String(i + 1)], what: name, act: () => chooseView(i + 1) })),
+    { keys: DIGITS.map((digit) => `Shift + ${digit}`), what: `also show: ${BESIDE.join(", ")}`, act: ({ code }) => toggle(Number(code.slice(-1))) },
     { keys: ["V"], what: "to the picture", act: () => $("canvas").focus() },
     { keys: ["I"], what: "to the isovalue", act: () => toControl("isovalue") },
     { keys: ["O"], what: "gallery and files", act: openGallery },
@@ -89,10 +94,12 @@ function row({ keys, what }) {
 }
 
 /** What the table calls the key of an event. */
-function nameOf(event) {
-  const isLetter = /^[a-z]$/i.test(event.key);
-  const modifiers = [(event.ctrlKey || event.metaKey) && "Ctrl", isLetter && event.shiftKey && "Shift"].filter(Boolean);
-  return [...modifiers, isLetter ? event.key.toUpperCase() : event.key === "Escape" ? "Esc" : event.key].join(" + ");
+function nameOf({ key, code, ctrlKey, metaKey, shiftKey }) {
+  const isLetter = /^[a-z]$/i.test(key);
+  // With Shift, a digit is another character, which depends on the keyboard.
+  const digit = shiftKey && /^Digit\d$/.test(code) ? code.slice(-1) : undefined;
+  const modifiers = [(ctrlKey || metaKey) && "Ctrl", (isLetter || digit) && shiftKey && "Shift"].filter(Boolean);
+  return [...modifiers, digit ?? (isLetter ? key.toUpperCase() : key === "Escape" ? "Esc" : key)].join(" + ");
 }
 
 /** Where letters are text. */

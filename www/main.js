@@ -9,19 +9,20 @@ import { attachExport } from "./export.js";
 import { attachFields } from "./fields.js";
 import { attachFiles } from "./files.js";
 import { FlowSettings } from "./flow.js";
-import { attachGallery, openGallery, readVolumes, sceneOf, showPoster } from "./gallery.js";
+import { attachGallery, openGallery, readVolumes, sceneOf, shown, showPoster } from "./gallery.js";
 import { attachHistogram } from "./histogram.js";
 import { attachKeys } from "./keys.js";
 import { attachMessages, fail, say } from "./messages.js";
 import { showFrame, showProgress, showStats } from "./numbers.js";
-import { open, retry, setFirst } from "./opening.js";
+import { isRemote, onOpened, open, retry, setFirst, showInList } from "./opening.js";
 import { OverlayView } from "./overlay.js";
 import { demo, page } from "./page.js";
+import { mode } from "./parts.js";
 import { attachPicture, lookFrom } from "./picture.js";
 import { Probes } from "./probes.js";
 import { attachRegion, boxWasDragged, useBox } from "./region.js";
 import { attachRequest } from "./request.js";
-import { attachScene, draw, fractionOf, isovalue, mode, seedPlane, setIsovalue, showLegend } from "./scene.js";
+import { attachScene, draw, fractionOf, isovalue, seedPlane, setIsovalue, showLegend } from "./scene.js";
 import { attachShare } from "./share.js";
 import { attachState, read } from "./state.js";
 import { attachTabs } from "./tabs.js";
@@ -32,14 +33,14 @@ const canvas = $("canvas");
 
 async function start() {
   $("settings").addEventListener("submit", (event) => event.preventDefault());
-  attachMessages({ onRetry: retry });
+  attachMessages({ onRetry: retry, isRemote });
   attachDialogs();
   attachTabs();
   attachTheme();
   attachKeys();
   const listed = readVolumes();
   // A picture of it, until it is drawn: for good where it cannot be.
-  listed.then((first) => ["starting", "unsupported"].includes(demo.state) && showPoster(wantedUrl() ?? first?.url));
+  listed.then((first) => ["starting", "unsupported"].includes(demo.state) && introduce(wantedUrl() ?? first?.url));
   // Texts and controls are painted first: to start the GPU takes a while.
   await painted();
   const viewer = await makeViewer(listed);
@@ -74,10 +75,18 @@ async function start() {
   attachState(viewer);
   attachShare();
   attachGallery();
+  onOpened(shown);
   attachHistogram();
   attachData();
   attachExport(canvas);
   await begin(listed);
+}
+
+/** Shows what will be opened, before there is anything to draw it with. @param {string | undefined} url */
+function introduce(url) {
+  if (!url) return;
+  showPoster(url);
+  showInList(url);
 }
 
 /** How long a paint is waited for (in ms). */
@@ -121,6 +130,7 @@ async function makeViewer(listed) {
     const unsupported = error.code === "no-webgpu";
     demo.state = unsupported ? "unsupported" : "failed";
     $("side-panel").inert = true;
+    for (const id of ["volume", "open-gallery", "reset", "share"]) $(id).disabled = true;
     $("loading").hidden = true;
     $("growth").textContent = "";
     say(unsupported ? "This page needs WebGPU" : "The viewer could not start", error);

@@ -21,7 +21,7 @@ export function fail(error) {
   demo.error = { code: error.code, message: error.message };
   demo.state = "failed";
   $("loading").classList.add("done");
-  $("retry").hidden = !PASSING.includes(error.code);
+  $("retry").hidden = !(PASSING.includes(error.code) && isElsewhere());
   say(TITLES[error.code] ?? "The file could not be opened", error);
 }
 
@@ -36,7 +36,12 @@ export function say(title, error) {
   $("message").hidden = false;
 }
 
-export function attachMessages({ onRetry }) {
+/** Whether what is opened comes from a server: a file of the user would fail again. */
+let isElsewhere = () => true;
+
+/** @param {{ onRetry: () => void, isRemote: () => boolean }} page */
+export function attachMessages({ onRetry, isRemote }) {
+  isElsewhere = isRemote;
   $("dismiss").addEventListener("click", hideMessage);
   $("retry").addEventListener("click", onRetry);
 }

@@ -16,8 +16,10 @@ const KINDS = {
   explicit: "explicit (any updates)",
 };
 
-/** What was opened last: the button "Try again" opens it again. @type {string | File} */
+/** What is open. @type {string | File} */
 let source;
+/** What was opened last, perhaps in vain: the button "Try again" opens it again. @type {string | File} */
+let tried;
 let opening = 0;
 /** What the page opens by itself. */
 let first = "";
@@ -29,6 +31,9 @@ const FILE = "file:";
 export function setFirst(url) {
   first = url;
 }
+
+/** Whether what was opened last comes from a server. */
+export const isRemote = () => !(tried instanceof File);
 
 /** What is open, as in the address of the page. */
 export function sourceWords() {
@@ -56,8 +61,9 @@ export async function open(wanted, words) {
     fail({ code: "no-file", message: `The file ${wanted.slice(FILE.length)} is not part of the link. Open it from your disk` });
     return source ? undefined : open(first);
   }
+  const before = { ...demo, source };
   const shown = words ?? (demo.info ? carriedOver() : {});
-  source = from;
+  source = tried = from;
   showInList(from);
   const mine = ++opening;
   Object.assign(demo, { state: "opening", error: undefined, info: undefined, stats: undefined });
@@ -70,25 +76,46 @@ export async function open(wanted, words) {
   $("progress").removeAttribute("value");
   $("growth").textContent = `Opening ${nameOf(from)}…`;
   try {
-    const opened = await page.viewer.open(from);
+    const { info, total, finished } = await page.viewer.open(from);
     if (mine !== opening) return;
-    demo.totalBytes = opened.total;
+    demo.totalBytes = total;
     if (demo.state === "opening") demo.state = "streaming";
-    arrive(opened.info, shown);
-    await opened.finished;
+    arrive(info, shown);
+    await finished;
     if (mine !== opening) return;
     demo.state = "complete";
     demo.totalBytes ??= demo.receivedBytes;
     showGrowth();
     $("loading").classList.add("done");
+    opened(from);
   } catch (error) {
-    if (mine === opening && error?.name !== "AbortError") fail(error);
+    if (mine !== opening || error?.name === "AbortError") return;
+    stay(before);
+    fail(error);
   }
+}
+
+/** What could not be opened has not taken the place of the volume before: that stays, with its settings. */
+function stay({ source: from, ...before }) {
+  if (!before.info || page.viewer.info !== before.info) return;
+  source = from;
+  Object.assign(demo, { ...before, frames: demo.frames });
+  showInList(from);
+  showGrowth();
+  $("legend").hidden = !page.viewer.legend;
+}
+
+/** What is told when a volume has been opened. @type {(from: string | File) => unknown} */
+let opened = () => {};
+
+/** Calls `then` when a volume is complete. @param {typeof opened} then */
+export function onOpened(then) {
+  opened = then;
 }
 
 /** Continues the download if the file comes in blocks and has not been replaced; otherwise opens it again. */
 export async function retry() {
-  if (!demo.info || !demo.blocks || demo.error?.code === "changed") return open(source);
+  if (tried !== source || !demo.info || !demo.blocks || demo.error?.code === "changed") return open(tried);
   hideMessage();
   demo.error = undefined;
   demo.state = "streaming";
@@ -113,7 +140,7 @@ function arrive(info, words) {
 }
 
 /** Selects in the list what is open; a file or URL that is not in the list replaces the last one that was added. */
-function showInList(from) {
+export function showInList(from) {
   const list = $("volume");
   const listed = [...list.options].find(({ value }) => value && value === from);
   if (listed) {

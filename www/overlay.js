@@ -81,6 +81,11 @@ export class OverlayView {
     this.#draw();
   }
 
+  /** Right, up and towards the eye, as directions in the model; undefined while nothing is drawn. */
+  get rotation() {
+    return this.#data?.rotation;
+  }
+
   set showsAxes(shows) {
     this.#showsAxes = shows;
     this.#draw();

@@ -35,10 +35,14 @@ export function sphereIn(box) {
 export function applyRegion() {
   const on = ["box", "sphere"].includes($("region").value);
   $("box").hidden = !on;
+  $("inside-row").hidden = !on;
   showNumbers();
   showSphere();
-  page.viewer.set({ region: on ? page.box : null }).catch(fail);
+  page.viewer.set({ region: on ? page.box : null, clipBox: on ? clipBox() : null }).catch(fail);
 }
+
+/** Outside of which everything is cut away. @returns {any} */
+const clipBox = () => ($("inside").checked ? page.box : null);
 
 /** Refines in this box. */
 export function useBox(wanted) {
@@ -53,6 +57,7 @@ export function boxWasDragged(moved) {
   page.box = rounded(moved);
   showNumbers();
   showSphere();
+  page.viewer.set({ clipBox: clipBox() }).catch(fail);
   refine();
 }
 
@@ -93,6 +98,7 @@ export function attachRegion() {
     applyRegion();
     refine();
   });
+  $("inside").addEventListener("input", () => page.box && applyRegion());
   for (const input of all("#box input")) {
     input.addEventListener("input", () => boxWasTyped(input));
     input.addEventListener("blur", showNumbers);

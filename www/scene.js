@@ -1,14 +1,16 @@
 /** What is drawn: the view, the isovalue, the plane, colours, and the colour bar. */
 
-import { $, all, checked, text } from "./dom.js";
+import { $, text } from "./dom.js";
 import { rounded } from "./format.js";
 import { showHistogramLine, showVolumes } from "./histogram.js";
 import { fail } from "./messages.js";
 import { demo, page } from "./page.js";
+import { attachParts, beside, hasEdges, mode, opacityOf, showParts, shows } from "./parts.js";
 import { refine } from "./request.js";
 import { background } from "./theme.js";
 
-export const mode = () => /** @type {"iso" | "volume" | "slice" | "solid" | "mesh" | "flow"} */ (checked("mode"));
+/** The surface of the domain around other parts. */
+const SHELL = { opacity: 0.12, colour: "#9fb0c4" };
 
 /** The isovalue has so many digits: as many as links keep. */
 const DIGITS = 6;
@@ -47,11 +49,10 @@ export function applyIsovalue() {
 
 /** Shows the settings of the view. */
 export function applyMode() {
-  for (const row of all("[data-mode]")) row.hidden = !row.dataset.mode.split(" ").includes(mode());
+  showParts();
   // Slices and seeds have no side.
   $("flip").parentElement.hidden = isPlane();
   $("cut-label").textContent = isPlane() ? "Plane" : "Clip plane";
-  page.overlay.quad = undefined;
   showHistogram().catch(fail);
   // Draws, too.
   applyCut();
@@ -65,33 +66,68 @@ export async function showHistogram() {
   showVolumes(histogram);
 }
 
+/** Wires beside other parts are thin; points are four times as large (in pixels). */
+const THIN = 0.7;
+
+/** Cells beside other parts: those in front of a plane that is looked at would hide it. */
+const cellsBeside = () => ({ colourBy: $("colour-by").value, ...(mode() === "slice" ? { cut: plane() } : {}) });
+
+/** What each part of the picture adds to the scene. @type {Record<string, () => import("tetralod/viewer").SceneState>} */
+const PARTS = {
+  iso() {
+    const by = $("surface-colour").value;
+    const isBy = by ? { field: by } : {};
+    return { isosurfaces: [{ value: isovalue(), opacity: opacityOf("iso"), edges: hasEdges("iso"), ...isBy }] };
+  },
+  volume: () => ({ volume: { opacities: page.transfer.opacities(page.field, opacityOf("volume")) } }),
+  // What is cut open at the same plane would cover it.
+  slice: () => ({ slices: [{ ...plane(), opacity: opacityOf("slice"), edges: hasEdges("slice"), clipped: false }] }),
+  solid() {
+    if (mode() !== "solid") return { boundary: SHELL };
+    return { boundary: { opacity: opacityOf("solid"), edges: hasEdges("solid") }, clips: [plane()] };
+  },
+  mesh() {
+    const shrink = Number($("shrink").value) / 100;
+    return { cells: { shape: $("shape").value, shrink, cut: plane(), colourBy: $("colour-by").value, edges: hasEdges("mesh") } };
+  },
+  wires: () => ({ cells: { shape: "wire", width: THIN, ...cellsBeside() } }),
+  points: () => ({ cells: { shape: "points", width: THIN, ...cellsBeside() } }),
+  flow() {
+    const { flow, field } = page;
+    const whole = flow.state({ bounds: demo.info.bounds, plane: seedPlane(), field });
+    return mode() === "flow" ? { ...whole, boundary: $("flow-boundary").checked ? SHELL : undefined } : whole;
+  },
+};
+
+/** Whether anything has the colours of the field that is shown, whose range can be chosen. */
+function isByField() {
+  const by = $("surface-colour").value;
+  const cells = $("colour-by").value === "field";
+  const is = { iso: by === page.field.name, mesh: cells, wires: cells, points: cells, flow: page.flow.isByField };
+  // Around other parts, the boundary has a colour of its own.
+  return is[mode()] ?? (["volume", "slice", "solid"].includes(mode()) || beside().some((name) => is[name] ?? name !== "solid"));
+}
+
 /** Draws what the settings say. */
 export function draw() {
   if (!demo.info) return;
-  const { viewer, field, flow, transfer, colours, comparison } = page;
-  const opacity = $("opacity").value / 100;
+  const { viewer, flow, colours, comparison } = page;
   text("opacity-text", `${$("opacity").value} %`, "opacity");
-  // The range is one of the field.
+  text("shrink-text", `${$("shrink").value} %`, "shrink");
+  text("shade-text", `${$("shade").value} %`, "shade");
   const by = $("surface-colour").value;
-  const others = { iso: by !== field.name, mesh: $("colour-by").value !== "field", flow: !flow.isByField };
-  $("colours").hidden = mode() === "iso" && !by;
-  $("range").hidden = others[mode()] ?? false;
-  const nothing = { isosurfaces: [], volume: null, slices: [], boundary: null, cells: null, clips: [] };
-  const noFlow = { streamlines: null, arrows: null };
-  const shown = {
-    iso: () => ({ isosurfaces: [{ value: isovalue(), opacity, ...(by ? { field: by } : {}) }] }),
-    volume: () => ({ volume: { opacities: transfer.opacities(field, opacity) }, isosurfaces: $("volume-surface").checked ? [{ value: isovalue() }] : [] }),
-    slice: () => ({ slices: [{ ...plane(), opacity, edges: true }] }),
-    solid: () => ({ boundary: { opacity, edges: true }, clips: [plane()] }),
-    mesh: () => ({ cells: { cut: plane(), colourBy: $("colour-by").value } }),
-    flow: () => flow.state({ bounds: demo.info.bounds, plane: seedPlane(), field }),
-  }[mode()]();
+  $("colours").hidden = mode() === "iso" && !by && !beside().some((name) => name !== "solid");
+  $("range").hidden = !isByField();
+  page.overlay.quad = mode() === "flow" ? flow.quad({ bounds: demo.info.bounds, plane: seedPlane() }) : undefined;
+  const nothing = { isosurfaces: [], volume: null, slices: [], boundary: null, cells: null, clips: [], streamlines: null, arrows: null };
+  const parts = [...beside(), mode()].map((name) => PARTS[name]());
   const compare = comparison.state;
   // A difference has values on both sides of 0.
   const diverging = compare?.difference ? { map: "coolwarm" } : {};
-  const range = mode() === "iso" && by && by !== field.name ? { range: ownRange(by) } : {};
-  const looks = { colours: { ...colours.state, ...range, ...diverging }, background: background(), compare };
-  viewer.set(/** @type {any} */ ({ ...nothing, ...noFlow, ...shown, ...looks })).catch(fail);
+  const range = shows("iso") && by && !isByField() ? { range: ownRange(by) } : {};
+  const box = { outline: $("outline").checked, shade: $("shade").value / 100 };
+  const looks = { colours: { ...colours.state, ...range, ...diverging }, background: background(), compare, ...box };
+  viewer.set(/** @type {any} */ (Object.assign(nothing, ...parts, looks))).catch(fail);
 }
 
 /** The range of a field that is not the one that is shown; symmetric about 0 where it has values on both sides. */
@@ -128,7 +164,7 @@ export function showLegend(legend) {
 export function unitOf(label) {
   const field = [page.field, ...(demo.info?.fields ?? [])].find((one) => one?.name === label);
   if (field) return field.unit;
-  return mode() === "flow" ? page.flow.unit : "";
+  return shows("flow") ? page.flow.unit : "";
 }
 
 /** Hides the ticks whose words would touch those of the one before. */
@@ -191,12 +227,12 @@ export function showEmpty({ ready, triangles }) {
 }
 
 export function attachScene() {
-  for (const radio of all("[name=mode]")) radio.addEventListener("change", applyMode);
+  attachParts({ onView: applyMode, onChange: draw });
   $("isovalue").addEventListener("input", () => page.field && setIsovalue($("isovalue").value / 1000));
   $("empty-middle").addEventListener("click", () => {
     setIsovalue(0.5);
     $("isovalue").focus();
   });
   for (const id of ["cut", "axis", "flip"]) $(id).addEventListener("input", applyCut);
-  for (const id of ["opacity", "colour-by", "surface-colour", "volume-surface"]) $(id).addEventListener("input", draw);
+  for (const id of ["colour-by", "surface-colour", "outline", "shade"]) $(id).addEventListener("input", draw);
 }

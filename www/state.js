@@ -9,6 +9,7 @@ import { chooseField, isPlaying } from "./fields.js";
 import { fail } from "./messages.js";
 import { open, sourceWords } from "./opening.js";
 import { demo, page } from "./page.js";
+import { words as ofParts } from "./parts.js";
 import { applyRegion, inner } from "./region.js";
 import { applyFrameTime, applyRefineBy, errorPositions } from "./request.js";
 import { applyMode } from "./scene.js";
@@ -67,11 +68,14 @@ function errorPosition(kind) {
 
 /** @returns {Record<string, Entry>} */
 function makeEntries() {
-  const ids = ["opacity", "colour-by", "flow-colour", "rake", "arrows", "flow-boundary", "map", "reversed", "log"];
-  const more = ["time", "cut", "axis", "flip", "pixels", "budget", "region", "focus", "background", "axes", "fly", "volume-surface", "frame-time"];
+  const ids = ["shape", "shrink", "outline", "shade", "inside", "colour-by", "flow-colour", "rake", "arrows", "flow-boundary", "map", "reversed", "log"];
+  const more = ["time", "cut", "axis", "flip", "pixels", "budget", "region", "focus", "background", "axes", "fly", "frame-time"];
   const simple = Object.fromEntries([...ids, ...more].map((id) => [id, control(id)]));
   return {
     view: radios("mode"),
+    also: ofParts.also,
+    opacity: ofParts.opacity,
+    edges: ofParts.edges,
     field: list("field"),
     "surface-colour": list("surface-colour"),
     vector: list("vector"),

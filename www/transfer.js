@@ -5,11 +5,10 @@
  * dragging it far out. With the keyboard, Tab goes from point to point, arrows move, Delete removes, Insert or + adds.
  */
 
+import { histogramPath, place as point, SIZE } from "./bins.js";
 import { rounded } from "./format.js";
 import { element } from "./overlay.js";
 
-/** The drawing, in its own units; the curve has room around it for whole points. */
-const SIZE = { width: 300, height: 120, margin: 9 };
 /** How near a press must be to a point, in these units, and how far outside a point is dropped. */
 const REACH = 14;
 const DROP = 40;
@@ -293,23 +292,4 @@ export class TransferEditor {
     const value = `${rounded(min + at * (max - min), max - min)} ${unit}`.trim();
     return `value ${value}, opacity ${Math.round(100 * opacity)} %`;
   }
-}
-
-/** A histogram as an area. Its heights are square roots: what is rare is seen, too. @param {ArrayLike<number>} volumes */
-export function histogramPath(volumes) {
-  const most = Math.sqrt(Array.from(volumes).reduce((a, b) => Math.max(a, b), 0));
-  if (!(most > 0)) return "";
-  const count = volumes.length;
-  const steps = Array.from(volumes, (volume, i) => {
-    const height = Math.sqrt(Math.max(volume, 0)) / most;
-    return [point([i / count, height]), point([(i + 1) / count, height])].map((p) => p.join(" ")).join("L");
-  });
-  return `M${point([0, 0]).join(" ")}L${steps.join("L")}L${point([1, 0]).join(" ")}Z`;
-}
-
-/** Where a point is in the drawing. @param {Point} point */
-function point([at, opacity]) {
-  const x = SIZE.margin + at * (SIZE.width - 2 * SIZE.margin);
-  const y = SIZE.margin + (1 - opacity) * (SIZE.height - 2 * SIZE.margin);
-  return [Number(x.toFixed(2)), Number(y.toFixed(2))];
 }

@@ -91,6 +91,11 @@ impl Composite {
         Ok(())
     }
 
+    /// Bytes of memory on the GPU.
+    pub(super) fn bytes(&self) -> u64 {
+        self.medium.bytes()
+    }
+
     pub(super) fn has_volume(&self) -> bool {
         self.table[2] > 0.0
     }

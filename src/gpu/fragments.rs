@@ -3,6 +3,7 @@
 
 use crate::gpu::Context;
 use crate::gpu::pipeline::{Binding, UNUSED, group, group_layout};
+use crate::gpu::target::image_bytes;
 use std::sync::{Arc, Mutex};
 
 /// Room for so many fragments a pixel, on the average, to begin with.
@@ -143,6 +144,11 @@ impl FragmentLists {
     /// Bytes of memory on the GPU.
     pub(super) fn bytes(&self) -> u64 {
         self.lists.as_ref().map_or(0, |lists| lists.heads.size() + lists.nodes.size())
+    }
+
+    /// Bytes of the image that the pass has to have.
+    pub(super) fn image_bytes(&self) -> u64 {
+        self.lists.as_ref().map_or(0, |lists| image_bytes(&lists.unused))
     }
 }
 

@@ -307,6 +307,16 @@ impl Renderer {
         self.mesh.bytes() + cells + self.lists.bytes() + beside
     }
 
+    /// Bytes of memory on the GPU of all that pictures are made of and in: meshes, surfaces, lines, lists of pixels, samples and
+    /// depths. The pictures of a canvas itself belong to the browser and do not count, nor do settings of a few bytes.
+    pub fn memory(&self) -> u64 {
+        let cells = self.cells.as_ref().map_or(0, CellPass::bytes);
+        let surfaces: u64 = self.surfaces.values().map(Surface::bytes).sum();
+        let drawn = self.mesh.bytes() + cells + surfaces + self.wire.bytes() + self.composite.bytes();
+        let images = self.target.images.bytes() + self.lists.image_bytes();
+        drawn + self.lists.bytes() + images + self.beside.as_ref().map_or(0, |other| other.memory())
+    }
+
     /// Draws a picture. `false` when the target is not available, such as a hidden canvas.
     ///
     /// # Errors

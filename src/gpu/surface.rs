@@ -97,6 +97,11 @@ impl Surface {
         self.indices.len()
     }
 
+    /// Bytes of memory on the GPU.
+    pub(super) fn bytes(&self) -> u64 {
+        self.positions.bytes() + self.normals.bytes() + self.values.bytes() + self.indices.bytes()
+    }
+
     pub(super) fn set_style(&mut self, context: &Context, style: &Style) {
         self.style = *style;
         context.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&StyleUniform::from(style)));

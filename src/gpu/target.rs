@@ -253,6 +253,18 @@ impl Images {
             mean: view("mean", MEAN, 1, bound),
         }
     }
+
+    /// Bytes of memory on the GPU.
+    pub(super) fn bytes(&self) -> u64 {
+        [&self.samples, &self.depth, &self.resolved, &self.mean].map(image_bytes).iter().sum()
+    }
+}
+
+/// Bytes of memory on the GPU of an image that is seen as a whole.
+pub(super) fn image_bytes(view: &wgpu::TextureView) -> u64 {
+    let image = view.texture();
+    let pixels = u64::from(image.width()) * u64::from(image.height()) * u64::from(image.sample_count());
+    pixels * u64::from(image.format().block_copy_size(None).unwrap_or(0))
 }
 
 fn texture(

@@ -75,6 +75,11 @@ impl WirePass {
         self.handles.write(context, &handles)
     }
 
+    /// Bytes of memory on the GPU.
+    pub(super) fn bytes(&self) -> u64 {
+        self.lines.bytes() + self.handles.bytes()
+    }
+
     /// Lists the lines among what is not opaque.
     pub(super) fn list(&self, pass: &mut wgpu::RenderPass<'_>) {
         if let Some((pipeline, nothing)) = &self.listed {

@@ -6,7 +6,7 @@
 
 use super::Session;
 use crate::format::{DecodeOptions, Decoder, ErrorBytes, FormatError, Index, Progress};
-use crate::geom::total_order;
+use crate::geom::{Bounds, total_order};
 use crate::mt::{ErrorCode, Mt, MultiTessellation, UpdateId, UpdatePages};
 use crate::refine::{Criterion, Front, TetData};
 use std::borrow::Cow;
@@ -36,6 +36,26 @@ pub struct BlockProgress {
     pub left_out: u32,
     /// Bytes in memory of the blocks that are here, and of what waits to be put together.
     pub bytes: u64,
+}
+
+/// A block of the file, in space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MappedBlock {
+    /// A box, in units of the model, that holds all tetrahedra that its updates remove or insert.
+    pub bounds: Bounds,
+    /// Whether it is here.
+    pub state: BlockState,
+}
+
+/// What a session has of a block.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum BlockState {
+    /// It is not here.
+    Missing,
+    /// It is here.
+    Here,
+    /// It is here, and the mesh has some of its updates.
+    InUse,
 }
 
 /// How many bytes are asked for at first: as a rule more than stands in front of the blocks of a small file.
@@ -273,6 +293,21 @@ impl Session {
             left_out: blocks.left_out + without_memory,
             bytes: blocks.bytes_beside() + mt.page_bytes(),
         }
+    }
+
+    /// Where the blocks are, in the order of the file, and which of them are here; none where the file has no index.
+    pub fn block_map(&self) -> Vec<MappedBlock> {
+        let paged = self.decoder.mt().filter(|mt| mt.is_paged());
+        let (Some(mt), Some(index)) = (paged, self.decoder.index()) else { return Vec::new() };
+        let lattice = &mt.info().lattice;
+        let state = |block: u32| match &self.front {
+            _ if !mt.has_page(block) => BlockState::Missing,
+            Some(front) if is_in_use(front, index, mt, block) => BlockState::InUse,
+            _ => BlockState::Here,
+        };
+        let bounds = |[min, max]: [[i32; 3]; 2]| Bounds { min: lattice.point(min), max: lattice.point(max) };
+        let blocks = (0..).zip(&index.blocks);
+        blocks.map(|(block, info)| MappedBlock { bounds: bounds(info.bounds), state: state(block) }).collect()
     }
 
     /// The request is another one: works out what it needs. Where the mesh shows that, it has to move first: what a mesh that was made

@@ -9,7 +9,7 @@ mod depths;
 mod quantity;
 mod reading;
 
-pub use blocks::{BlockProgress, WantedBytes};
+pub use blocks::{BlockProgress, BlockState, MappedBlock, WantedBytes};
 pub use quantity::TetQuantity;
 pub use reading::Reading;
 

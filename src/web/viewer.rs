@@ -15,6 +15,7 @@ use crate::geom::{Bounds, Camera, CameraState, ViewPreset};
 use crate::gpu::{Renderer, SideTarget};
 use crate::refine::{Part, View};
 use crate::scene::{Legend, Scene, SceneState};
+use crate::session::MappedBlock;
 use crate::view::BoxEdge;
 use crate::view::gizmo::{self, BoxFace};
 use glam::DVec2;
@@ -168,7 +169,9 @@ impl Viewer {
             return Ok(any);
         };
         let supplied = next.supply();
-        if matches!(supplied, Ok(false)) {
+        // A file that is broken from its beginning does not take the place of one that is sound.
+        let is_known = next.session().info().is_some();
+        if matches!(supplied, Ok(false)) || supplied.is_err() && !is_known {
             self.next = Some(next);
             return supplied;
         }
@@ -191,6 +194,14 @@ impl Viewer {
     /// How the blocks stand.
     pub fn blocks(&self) -> JsBlocks {
         self.coming().blocks()
+    }
+
+    /// Where the blocks are: of each the lower and the upper corner of its box, in units of the model, and whether it is not here (0),
+    /// here (1), or used by the mesh (2). Empty where the file has no index.
+    #[wasm_bindgen(js_name = blockMap)]
+    pub fn block_map(&self) -> Box<[f64]> {
+        let of = |block: MappedBlock| flat(&block.bounds).into_iter().chain([f64::from(block.state as u8)]);
+        self.file.session().block_map().into_iter().flat_map(of).collect()
     }
 
     /// The file has ended: refuses one that was cut short.
@@ -464,6 +475,12 @@ impl Viewer {
     #[wasm_bindgen(js_name = takeUploaded)]
     pub fn take_uploaded(&self) -> f64 {
         self.scene.renderer().take_uploaded() as f64
+    }
+
+    /// Bytes of memory on the GPU that pictures are made of and in.
+    #[wasm_bindgen(getter, js_name = gpuBytes)]
+    pub fn gpu_bytes(&self) -> f64 {
+        self.scene.renderer().memory() as f64
     }
 
     /// Whether the picture is out of date.

@@ -154,10 +154,22 @@ test("the page draws every dataset of the demo, of every kind of MT", async () =
 });
 
 test("a browser without WebGPU gets a message, not a blank page", async () => {
-  const page = await open("data/bucky.mt", (page) =>
-    page.addInitScript(() => Object.defineProperty(Navigator.prototype, "gpu", { get: () => undefined })),
-  );
+  const page = await open("data/sphere-flow.mt", async (page) => {
+    await page.addInitScript(() => Object.defineProperty(Navigator.prototype, "gpu", { get: () => undefined }));
+    // Whoever made the volumes had a GPU.
+    await page.route("**/data/volumes.json", async (route) => {
+      const list = await (await route.fetch()).json();
+      for (const volume of list.volumes) volume.picture = `${volume.url}.svg`;
+      await route.fulfill({ json: list });
+    });
+    const body = '<svg xmlns="http://www.w3.org/2000/svg" width="9" height="9"/>';
+    await page.route("**/*.mt.svg", (route) => route.fulfill({ contentType: "image/svg+xml", body }));
+  });
   await reach(page, "unsupported");
+  await page.locator("#poster").waitFor();
+  assert.equal(await page.locator("#poster").getAttribute("src"), "data/sphere-flow.mt.svg", "a picture of what was asked for");
+  assert.equal(await page.locator("#volume option:checked").innerText(), "Flow past a sphere");
+  assert.ok(await page.locator("#open-gallery").isDisabled(), "nothing can be opened");
   const message = page.locator("#message");
   assert.ok(await message.isVisible());
   assert.match(await message.innerText(), /WebGPU/);

@@ -4,7 +4,7 @@ import { readFile } from "node:fs/promises";
 import { createRequire } from "node:module";
 import { after, before, test } from "node:test";
 import { fileURLToPath } from "node:url";
-import { addressed, assertDrawn, begin, demo, differing, end, open, PATIENCE, picture, pictures, reach, setSlider, settle, show } from "./drive.js";
+import { addressed, assertDrawn, begin, demo, differing, drop, end, open, PATIENCE, picture, pictures, reach, setSlider, settle, show } from "./drive.js";
 
 before(begin);
 
@@ -67,17 +67,22 @@ test("all is reached with keys, and the list of keys has them", async () => {
   await page.close();
 });
 
-test("the page has no accessibility violations, light or dark", async () => {
-  const page = await open(SMALL, undefined, VIEWPORT);
-  await reach(page, "complete");
+/** A function that fails where a page has accessibility violations. */
+async function checker(page) {
   await page.addScriptTag({ content: await readFile(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8") });
-  const check = async (name) => {
+  return async (name) => {
     const found = await page.evaluate(async () => {
       const { violations } = await /** @type {any} */ (window).axe.run(document, { resultTypes: ["violations"] });
       return violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ html, failureSummary }) => `${html} ${failureSummary}`).join("; ")}`);
     });
     assert.deepEqual(found, [], name);
   };
+}
+
+test("the page has no accessibility violations, light or dark", async () => {
+  const page = await open(SMALL, undefined, VIEWPORT);
+  await reach(page, "complete");
+  const check = await checker(page);
   const dialog = async (name, id, key) => {
     await press(page, key);
     await check(name);
@@ -86,7 +91,7 @@ test("the page has no accessibility violations, light or dark", async () => {
   };
   for (const colorScheme of /** @type {const} */ (["dark", "light"])) {
     await page.emulateMedia({ colorScheme });
-    for (const view of ["Surface", "Volume", "Slice", "Mesh"]) {
+    for (const view of ["Surface", "Volume", "Slice", "Solid", "Mesh"]) {
       await press(page, "g");
       await show(page, view);
       await check(`${view}, ${colorScheme}`);
@@ -97,6 +102,51 @@ test("the page has no accessibility violations, light or dark", async () => {
     await check(`export, ${colorScheme}`);
     await dialog(`keys, ${colorScheme}`, "keys", "?");
     await dialog(`gallery, ${colorScheme}`, "gallery", "o");
+  }
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("nor has it with several views, probes, a region, messages, the map of blocks, and the dialog of a build", async () => {
+  const page = await open("data/abc-flow.mt", undefined, VIEWPORT);
+  await reach(page, "complete");
+  await setSlider(page, "error", 80);
+  const check = await checker(page);
+  for (const colorScheme of /** @type {const} */ (["dark", "light"])) {
+    await page.emulateMedia({ colorScheme });
+    const look = (name) => check(`${name}, ${colorScheme}`);
+    await press(page, "6");
+    await look("Flow");
+    await press(page, "Shift+1");
+    await press(page, "Shift+5");
+    await look("Flow with surface and wires");
+    await page.selectOption("#region", "box");
+    await press(page, "1");
+    for (const x of [0.45, 0.58]) {
+      const { x: left, y: top, width, height } = await page.locator("#canvas").boundingBox();
+      await page.mouse.click(left + x * width, top + 0.5 * height);
+    }
+    await page.locator("#plot path").waitFor({ timeout: PATIENCE });
+    await look("probes and a region");
+    await screenshot(page, `page-probes-${colorScheme}`);
+    await press(page, "Escape");
+    await page.evaluate(() => (location.hash = "#isovalue=99"));
+    await page.locator("#empty").waitFor({ timeout: PATIENCE });
+    await look("an empty surface");
+    await page.click("#empty-middle");
+    await drop(page, "broken.mt", "hello");
+    await page.locator("#message").waitFor({ timeout: PATIENCE });
+    await look("a message");
+    await page.click("#dismiss");
+    await drop(page, "broken.vtu", "hello");
+    await page.locator("dialog.build [role=alert]").waitFor({ timeout: PATIENCE });
+    await look("a build that fails");
+    await page.keyboard.press("Escape");
+    await page.locator("dialog.build").waitFor({ state: "detached" });
+    await page.click("#share");
+    await page.locator("#note").waitFor();
+    await look("a note");
+    await page.click("#reset");
   }
   assert.deepEqual(page.complaints, []);
   await page.close();
@@ -254,6 +304,185 @@ test("pictures, meshes, surfaces, probes and numbers are saved", async () => {
   assert.equal(copied.stats.tetrahedra, stats.tetrahedra);
   assert.ok(copied.meshes.length > 0 && copied.frames.length > 0 && copied.received > 0);
   await screenshot(page, "page-data");
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+/** The box of what can be shown beside the view. */
+const also = (page, name) => page.locator(`[name=also][value=${name}]`);
+
+test("any views are shown together, and what is beside the view stays when its settings are turned to", async () => {
+  const page = await open(SMALL, undefined, VIEWPORT);
+  await reach(page, "complete");
+  await setSlider(page, "error", 70);
+  const scene = () => page.evaluate(() => Object.entries(window.tetralodDemo.viewer.state).filter(([, part]) => (Array.isArray(part) ? part.length > 0 : true)).map(([name]) => name));
+  const has = async (...names) => {
+    const found = await scene();
+    const parts = ["isosurfaces", "volume", "slices", "boundary", "cells", "streamlines"];
+    assert.deepEqual(parts.filter((part) => found.includes(part)), names);
+  };
+  await has("isosurfaces");
+  const alone = await picture(page, "together-surface");
+  assert.ok(await also(page, "iso").isHidden(), "the view itself needs no box");
+  assert.ok(await also(page, "flow").isDisabled(), "there are no vectors");
+  await also(page, "slice").check();
+  await press(page, "Shift+4");
+  await has("isosurfaces", "slices", "boundary");
+  await addressed(page, /also=slice,solid/);
+  const together = await picture(page, "together-three");
+  assert.ok(differing(alone, together) > 0.05, "there is more to see");
+  await screenshot(page, "page-together");
+
+  // To the settings of the slice: the surface stays beside it, and each has an opacity of its own.
+  await show(page, "Slice");
+  await has("isosurfaces", "slices", "boundary");
+  assert.ok(await also(page, "iso").isChecked());
+  assert.equal(differing(together, await picture(page, "together-turned")), 0, "the picture stays");
+  await page.fill("#opacity", "40");
+  await addressed(page, /view=slice&also=iso,solid&opacity=40/);
+  const opacities = () => page.evaluate(() => [window.tetralodDemo.viewer.state.isosurfaces[0], window.tetralodDemo.viewer.state.slices[0]].map(({ opacity }) => opacity));
+  assert.deepEqual(await opacities(), [1, 0.4]);
+  // What is not shown beside the view takes its place.
+  await show(page, "Mesh");
+  await has("isosurfaces", "boundary", "cells");
+  await page.selectOption("#shape", "points");
+  assert.equal(await page.evaluate(() => window.tetralodDemo.viewer.state.cells.shape), "points");
+  await show(page, "Surface");
+  await has("isosurfaces", "boundary", "cells");
+  assert.ok(await also(page, "points").isChecked(), "the points stay, too");
+  await also(page, "wires").check();
+  assert.ok(!(await also(page, "points").isChecked()), "a mesh is drawn in one way");
+  await has("isosurfaces", "boundary", "cells");
+
+  await addressed(page, /also=solid,wires/);
+  const [address, before] = [page.url(), await picture(page, "together-before")];
+  await page.reload();
+  await reach(page, "complete");
+  assert.equal(differing(before, await picture(page, "together-reloaded")), 0, "a link shows the same");
+  assert.equal(page.url(), address);
+  await press(page, "Shift+5");
+  await has("isosurfaces", "boundary");
+  await addressed(page, /also=solid(&|$)/);
+  await press(page, "Control+z");
+  await has("isosurfaces", "boundary", "cells");
+  await page.click("#reset");
+  await has("isosurfaces");
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("a handle of the region is dragged, and the mesh follows", async () => {
+  const page = await open("data/bucky.mt", undefined, VIEWPORT);
+  await reach(page, "complete");
+  await setSlider(page, "error", 40);
+  await page.evaluate(() => (window.tetralodDemo.stats = undefined));
+  await page.selectOption("#region", "box");
+  await page.waitForFunction(() => window.tetralodDemo.stats, undefined, { timeout: PATIENCE });
+  await settle(page);
+  const [before, box] = [await demo(page, "stats"), (await demo(page, "request")).box];
+  // Where the handle in the middle of the face of largest x is on the screen.
+  const [x, y] = await page.evaluate(([x0, y0, z0, x1, y1, z1]) => {
+    const { matrix } = window.tetralodDemo.viewer.overlay;
+    const point = [x1, (y0 + y1) / 2, (z0 + z1) / 2, 1];
+    const [cx, cy, , cw] = [0, 1, 2, 3].map((i) => point.reduce((sum, value, k) => sum + value * matrix[4 * k + i], 0));
+    const { left, top, width, height } = document.querySelector("#canvas").getBoundingClientRect();
+    return [left + ((cx / cw + 1) / 2) * width, top + ((1 - cy / cw) / 2) * height];
+  }, box);
+  await page.mouse.move(x, y);
+  await page.waitForFunction(() => document.querySelector("#canvas").classList.contains("on-handle"), undefined, { timeout: PATIENCE });
+  const camera = await page.evaluate(() => window.tetralodDemo.viewer.state.camera);
+  await page.mouse.down();
+  // The page asks the viewer what was pressed.
+  await settle(page);
+  await page.mouse.move(x - 40, y - 8, { steps: 6 });
+  await page.mouse.up();
+  await page.waitForFunction((x1) => window.tetralodDemo.request.box[3] < x1 - 0.02, box[3], { timeout: PATIENCE });
+  await settle(page);
+  const moved = (await demo(page, "request")).box;
+  assert.deepEqual(moved.toSpliced(3, 1), box.toSpliced(3, 1), "only this face");
+  assert.equal(Number(await page.inputValue("#box [data-i='3']")), Number(moved[3].toPrecision(5)));
+  assert.ok((await demo(page, "stats")).tetrahedra < before.tetrahedra, "a smaller box needs fewer tetrahedra");
+  assert.deepEqual(await page.evaluate(() => window.tetralodDemo.viewer.state.camera), camera, "the camera stays");
+  await screenshot(page, "page-dragged");
+  await page.keyboard.press("Control+z");
+  await page.waitForFunction((x1) => window.tetralodDemo.request.box[3] === x1, box[3], { timeout: PATIENCE });
+  await page.check("#inside");
+  await addressed(page, /inside=1/);
+  assert.deepEqual(await page.evaluate(() => window.tetralodDemo.viewer.state.clipBox), box);
+  const inside = await picture(page, "region-inside");
+  await page.uncheck("#inside");
+  assert.ok(differing(inside, await picture(page, "region-outside")) > 0.02, "what is outside was cut away");
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("the data view shows where the blocks are, and the memory of the GPU", async () => {
+  const page = await open("data/bucky.mt", undefined, VIEWPORT);
+  await reach(page, "complete");
+  await press(page, "n");
+  const counts = () => page.evaluate(() => [...document.querySelectorAll("#blocks-counts b")].map(({ textContent }) => Number(textContent.replaceAll(",", ""))));
+  await page.locator("#blocks-canvas").waitFor({ timeout: PATIENCE });
+  await settle(page);
+  const map = await page.evaluate(async () => {
+    const { viewer, info } = window.tetralodDemo;
+    const { bounds, states } = await viewer.blockMap();
+    const isInside = bounds.every((value, i) => value >= info.bounds[i % 3] && value <= info.bounds[3 + (i % 3)]);
+    const isBox = bounds.every((value, i) => i % 6 > 2 || value < bounds[i + 3]);
+    return { count: states.length, boxes: bounds.length / 6, isInside, isBox, states: [...new Set(states)].sort() };
+  });
+  const { all } = await demo(page, "blocks");
+  assert.deepEqual([map.count, map.boxes, map.isInside, map.isBox], [all, all, true, true]);
+  assert.ok(map.states.includes(0) && map.states.includes(2));
+  const [inUse, fetched, missing] = await counts();
+  assert.ok(inUse > 0 && missing > 0 && inUse + fetched + missing === all, `${[inUse, fetched, missing]} of ${all}`);
+  // The map is drawn, and turns with the picture.
+  const drawn = () => page.evaluate(() => /** @type {HTMLCanvasElement} */ (document.querySelector("#blocks-canvas")).toDataURL());
+  const first = await drawn();
+  await page.evaluate(() => window.tetralodDemo.viewer.orbit(0.5, 0));
+  await settle(page);
+  assert.notEqual(await drawn(), first);
+  await page.locator("#blocks-canvas").scrollIntoViewIfNeeded();
+  await screenshot(page, "page-blocks");
+  await page.evaluate(() => window.tetralodDemo.viewer.refine({ error: "0.03%" }).then(() => window.tetralodDemo.viewer.settled()));
+  await page.waitForFunction((missing) => Number(document.querySelector("#blocks-counts .missing b").textContent) < missing, missing, { timeout: PATIENCE });
+
+  const row = () => page.evaluate(() => [...document.querySelectorAll("#traffic dt")].find(({ textContent }) => textContent === "Memory on the GPU")?.nextElementSibling.textContent);
+  assert.match(await row(), /^[\d.]+ [kMG]B$/);
+  const { gpuBytes: surface } = await demo(page, "frame");
+  await press(page, "5");
+  await page.waitForFunction((before) => window.tetralodDemo.frame.gpuBytes > before, surface, { timeout: PATIENCE });
+  const pixels = await page.locator("#canvas").evaluate(({ clientWidth, clientHeight }) => clientWidth * clientHeight);
+  // Four samples and their depths alone are 32 bytes a pixel.
+  assert.ok(surface > 32 * pixels, `${surface} bytes for ${pixels} pixels`);
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("volumes without pictures get some: drawn ones, then those that the page has taken", async () => {
+  const prepare = (page) =>
+    page.route("**/data/volumes.json", async (route) => {
+      const list = await (await route.fetch()).json();
+      for (const volume of list.volumes) Object.assign(volume, { picture: null, isShown: true });
+      await route.fulfill({ json: list });
+    });
+  const page = await open(SMALL, prepare, { viewport: { width: 400, height: 400 } });
+  await reach(page, "complete");
+  const pictures = async () => {
+    await page.click("#open-gallery");
+    await page.locator("#gallery li").first().waitFor();
+    // Those that are not in sight are loaded later.
+    await page.evaluate(() => document.querySelectorAll("#gallery img").forEach((image) => image.setAttribute("loading", "eager")));
+    await page.waitForFunction(() => [...document.querySelectorAll("#gallery img")].every((image) => image instanceof HTMLImageElement && image.complete));
+    return page.evaluate(() => [...document.querySelectorAll("#gallery img")].map((image) => image instanceof HTMLImageElement && [image.src.slice(0, 14), image.naturalWidth]));
+  };
+  const drawn = await pictures();
+  assert.ok(drawn.length > 3 && drawn.every(([, width]) => width > 0), JSON.stringify(drawn));
+  await screenshot(page, "page-drawn-pictures");
+  await page.keyboard.press("Escape");
+  await page.waitForFunction(() => Object.keys(localStorage).some((key) => key.startsWith("tetralod-picture data/bucky-explicit.mt")), undefined, { timeout: PATIENCE });
+  const taken = await pictures();
+  assert.equal(taken.filter(([start]) => start.startsWith("data:image/web")).length, 1, "of the volume that was shown");
+  await screenshot(page, "page-taken-pictures");
   assert.deepEqual(page.complaints, []);
   await page.close();
 });

@@ -9,7 +9,7 @@ use tetralod::generate;
 use tetralod::geom::Bounds;
 use tetralod::mt::{CurrentMesh, MtKind};
 use tetralod::refine::{Need, Request};
-use tetralod::session::Session;
+use tetralod::session::{BlockState, MappedBlock, Session};
 
 const BLOCK_BITS: u32 = 6;
 
@@ -17,7 +17,11 @@ const BLOCK_BITS: u32 = 6;
 const KINDS: [MtKind; 2] = [MtKind::Edge, MtKind::HalfEdge];
 
 fn file(kind: MtKind) -> Vec<u8> {
-    let mesh = generate::bucky(15).expect("a size that is allowed");
+    file_of(kind, 15)
+}
+
+fn file_of(kind: MtKind, size: u32) -> Vec<u8> {
+    let mesh = generate::bucky(size).expect("a size that is allowed");
     let config = BuildConfig { block_bits: BLOCK_BITS, ..BuildConfig::of(kind) };
     let mt = build(&mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a valid mesh").mt;
     encode(&mt, &EncodeOptions { block_bits: BLOCK_BITS, ..EncodeOptions::default() }).expect("a sound MT")
@@ -139,4 +143,55 @@ fn stays_within_the_room(kind: MtKind) {
         }
     }
     assert!(complete > 3 && left_out > 3, "both happen: {complete}, {left_out}");
+}
+
+#[test]
+fn the_map_of_blocks_tells_where_they_are_and_which_are_used() {
+    KINDS.into_iter().for_each(has_a_map);
+}
+
+fn has_a_map(kind: MtKind) {
+    // Larger than what is fetched at first.
+    let file = file_of(kind, 26);
+    let mut server = Server { file: &file, given: 0 };
+    let mut session = Session::in_parts(DecodeOptions::default(), u64::MAX);
+    assert!(session.block_map().is_empty(), "nothing is known before the index is here");
+    let corner = Bounds { min: [0.0; 3], max: [0.3; 3] };
+    let random = &mut Random::new(9);
+    while session.info().is_none() {
+        let head = session.wanted()[0].range.clone();
+        let bytes = server.get(head.clone());
+        session.take(head.start, &bytes).expect("a sound file");
+    }
+    session.request(&Request::from(Need::within(0.1).inside(corner))).expect("a sensible request");
+    assert!(settle(&mut session, &mut server, random, u64::MAX / 2));
+
+    let (map, progress) = (session.block_map(), session.block_progress());
+    let count = |state| map.iter().filter(|block| block.state == state).count();
+    assert_eq!(map.len(), progress.blocks as usize);
+    assert_eq!(count(BlockState::Missing), (progress.blocks - progress.here) as usize);
+    assert!(count(BlockState::Missing) > 0, "{kind:?}: not all is fetched");
+    assert!(count(BlockState::InUse) > 0);
+    let whole = session.info().expect("it is open").lattice;
+    let largest = whole.point([1 << whole.bits; 3]);
+    for block in &map {
+        let Bounds { min, max } = block.bounds;
+        for axis in 0..3 {
+            assert!(whole.origin[axis] <= min[axis] && min[axis] < max[axis] && max[axis] <= largest[axis]);
+        }
+    }
+    // The mesh uses blocks where the request is.
+    let is_near = |bounds: &Bounds| bounds.min.iter().all(|&x| x <= corner.max[0]);
+    assert!(map.iter().any(|block| block.state == BlockState::InUse && is_near(&block.bounds)));
+
+    session.request(&Request::within(1.0)).expect("a sensible request");
+    settle(&mut session, &mut server, random, u64::MAX / 2);
+    let (before, map) = (map, session.block_map());
+    let count = |map: &[MappedBlock], least| map.iter().filter(|block| block.state >= least).count();
+    assert!(count(&map, BlockState::InUse) < count(&before, BlockState::InUse), "a coarser mesh uses less");
+    assert_eq!(
+        count(&map, BlockState::Here),
+        count(&before, BlockState::Here),
+        "there is room for what is here"
+    );
 }

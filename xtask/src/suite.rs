@@ -183,6 +183,7 @@ fn js() -> Result<()> {
     shell::run(&mut node_test("latest.test.js"))?;
     shell::run(&mut node_test("ranges.test.js"))?;
     shell::run(&mut node_test("writers.test.js"))?;
+    shell::run(&mut node_test("bins.test.js"))?;
     with_fixture(|| {
         for name in [
             "package.test.js",
@@ -292,7 +293,7 @@ fn e2e() -> Result<()> {
         println!("what needs no GPU, in Firefox");
         ["core", "ranges"].into_iter().try_for_each(|name| test(name, "FIREFOX", &firefox))
     })?;
-    for name in ["e2e.test.js", "page.test.js"] {
+    for name in ["e2e.test.js", "page.test.js", "drop.test.js"] {
         let mut command = node_test(name);
         shell::run(command.env("TETRALOD_PAGE", &server.address).env("CHROMIUM", &browser.chromium))?;
     }

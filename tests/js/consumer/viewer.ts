@@ -3,6 +3,7 @@ import type { LineProfile, MtInfo } from "tetralod";
 import {
   TetralodError,
   Viewer,
+  type BlockMap,
   type OpenedVolume,
   type Overlay,
   type OwnView,
@@ -51,6 +52,8 @@ export async function page(canvas: HTMLCanvasElement): Promise<void> {
   const state: ViewerState = viewer.state;
   await viewer.set(JSON.parse(JSON.stringify(state)) as ViewerState);
   await Promise.all([viewer.keep(), viewer.set({ compare: { at: 0.3, difference: true } }), viewer.freeze(), viewer.freeze(false)]);
+  const blocks: BlockMap | undefined = await viewer.blockMap();
+  [blocks?.bounds.length, blocks?.states[0]] satisfies (number | undefined)[];
   const [{ tets }, slice] = await Promise.all([viewer.mesh(), viewer.slice([0, 0, 1], 0.5)]);
   [tets, slice.indices] satisfies Uint32Array[];
   const fast = await Viewer.create(canvas, { frameTime: Infinity, prefetch: "bucky.mt", workerUrl: "/viewer-worker.js", workerTimeoutMs: Number.POSITIVE_INFINITY, wasmUrl: new URL("https://example.org/v.wasm") });
