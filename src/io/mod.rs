@@ -19,6 +19,7 @@
 //! Time steps come in several files, which a `.pvd` may list: see [`steps`].
 //! Cells other than tetrahedra are refused. Readers check the file, not the mesh: see [`crate::mesh::repair`].
 
+mod cell_shapes;
 mod cells;
 mod error;
 mod fields;
@@ -27,7 +28,9 @@ mod legacy;
 mod number;
 mod payload;
 mod pvd;
+mod pvtu;
 mod raw;
+mod structured;
 mod surface;
 mod survey;
 mod time_steps;
@@ -44,7 +47,7 @@ pub use survey::{Survey, survey, survey_raw};
 pub use time_steps::{FieldSelection, TimeStepsError, read_time_steps};
 pub use write::{write_vti, write_vtu};
 
-use std::path::Path;
+use std::path::{Component, Path};
 
 use crate::io::error::At;
 use crate::mesh::TetMesh;
@@ -90,7 +93,7 @@ pub fn read_with(path: &Path, options: &ReadOptions) -> Result<TetMesh, ReadErro
     match lower_extension(path).as_str() {
         "json" => read_raw_by_sidecar(path, None),
         "raw" => read_raw_by_sidecar(&path.with_extension("json"), Some(path)),
-        _ => read_bytes_with(&name, &load(path)?, options),
+        _ => read_in(&name, &load(path)?, options, &|file| load_beside(path, file)),
     }
 }
 
@@ -107,13 +110,30 @@ pub fn read_bytes(name: &str, bytes: &[u8]) -> Result<TetMesh, ReadError> {
 /// Reads what is wanted from the bytes of a file, otherwise as [`read_bytes`].
 ///
 /// # Errors
-/// As [`read_with`].
+/// As [`read_with`], and if the file refers to others.
 pub fn read_bytes_with(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadError> {
+    let alone = |file: &str| {
+        let what = format!("a file that needs another (\"{file}\")");
+        Err(ReadReason::Unsupported { what, remedy: "give it by its path, with the other beside it".into() })
+    };
+    read_in(name, bytes, options, &alone)
+}
+
+/// Gets the bytes of another file, by its path from the folder of the one that is read.
+type Beside<'a> = &'a dyn Fn(&str) -> Result<Vec<u8>, ReadReason>;
+
+/// Reads a file that may refer to others.
+fn read_in(
+    name: &str,
+    bytes: &[u8],
+    options: &ReadOptions,
+    beside: Beside<'_>,
+) -> Result<TetMesh, ReadError> {
     let start = without_mark(bytes);
     let result = if bytes.starts_with(legacy::MAGIC) {
         legacy::read(bytes, options)
     } else if start.starts_with(b"<") {
-        read_xml(start, options)
+        read_xml(start, options, beside)
     } else {
         Err(ReadReason::UnknownFormat).at(String::new)
     };
@@ -143,14 +163,20 @@ fn read_raw_by_sidecar(sidecar_path: &Path, samples_path: Option<&Path>) -> Resu
     sidecar.mesh(&samples).at(String::new).map_err(|e| in_file(e, &samples_path.display().to_string()))
 }
 
-fn read_xml(bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadError> {
+fn read_xml(bytes: &[u8], options: &ReadOptions, beside: Beside<'_>) -> Result<TetMesh, ReadError> {
     let document = xml::Document::parse(bytes)?;
+    let mut time = document.time();
     let mut mesh = match document.kind.as_str() {
         "UnstructuredGrid" => vtu::read(&document, options)?,
         "ImageData" => image::read(&document, options)?,
+        structured::RECTILINEAR | structured::CURVILINEAR => structured::read(&document, options)?,
+        "PUnstructuredGrid" => {
+            let (mesh, of_pieces) = pvtu::read(&document, options, beside)?;
+            time = time.or(of_pieces);
+            mesh
+        }
         other => return Err(not_read(other)).at(String::new),
     };
-    let time = document.time();
     mesh.fields.iter_mut().chain(&mut mesh.cell_fields).for_each(|field| field.time = time);
     Ok(mesh)
 }
@@ -159,9 +185,11 @@ fn read_xml(bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadError> {
 fn not_read(kind: &str) -> ReadReason {
     let (what, remedy) = match kind {
         "Collection" => ("a list of time steps as one mesh".into(), "give one of the files that it lists"),
-        other => {
-            (format!("a data set of type {other}"), "give an UnstructuredGrid of tetrahedra or ImageData")
-        }
+        "PUnstructuredGrid" => ("a list of pieces".into(), "give one of the files that it lists"),
+        other => (
+            format!("a data set of type {other}"),
+            "give an UnstructuredGrid, a StructuredGrid, a RectilinearGrid or ImageData",
+        ),
     };
     ReadReason::Unsupported { what, remedy: remedy.into() }
 }
@@ -176,8 +204,20 @@ fn load(path: &Path) -> Result<Vec<u8>, ReadError> {
     bytes.at(String::new).map_err(|e| in_file(e, &path.display().to_string()))
 }
 
+/// Reads a file that another one refers to, which must lie in the folder of that or below.
+fn load_beside(path: &Path, file: &str) -> Result<Vec<u8>, ReadReason> {
+    let below = |part: Component<'_>| matches!(part, Component::Normal(_) | Component::CurDir);
+    if file.is_empty() || !Path::new(file).components().all(below) {
+        let what = format!("a file in another folder (\"{file}\")");
+        let remedy = "put the files beside the one that refers to them, or below it".into();
+        return Err(ReadReason::Unsupported { what, remedy });
+    }
+    std::fs::read(path.with_file_name("").join(file)).map_err(|e| ReadReason::Io(format!("\"{file}\": {e}")))
+}
+
+/// Names the file of an error that does not name another one.
 fn in_file(error: ReadError, name: &str) -> ReadError {
-    ReadError { file: name.to_owned(), ..error }
+    if error.file.is_empty() { ReadError { file: name.to_owned(), ..error } } else { error }
 }
 
 fn lower_extension(path: &Path) -> String {

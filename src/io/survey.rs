@@ -1,17 +1,17 @@
 //! What a file contains, without its values: for questions before it is read, and for the memory that reading needs.
 
 use crate::io::error::{At, ReadError, ReadReason};
-use crate::io::{image, in_file, legacy, raw, vtu, xml};
+use crate::io::{image, in_file, legacy, raw, structured, vtu, xml};
 use crate::mesh::{Field, Grid};
 
 /// What a file says that it contains. The data may be damaged even so.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Survey {
-    /// The format: `"vtu"`, `"vti"`, `"vtk"` or `"raw"`.
+    /// The format: `"vtu"`, `"vti"`, `"vtr"`, `"vts"`, `"vtk"` or `"raw"`.
     pub format: &'static str,
     /// Its points.
     pub points: u64,
-    /// Its cells; of a grid the tetrahedra that it is split into.
+    /// The tetrahedra, at most, that its cells are or are split into.
     pub cells: u64,
     /// The grid, if it is one.
     pub grid: Option<Grid>,
@@ -61,6 +61,7 @@ fn survey_xml(bytes: &[u8]) -> Result<Survey, ReadError> {
     match document.kind.as_str() {
         "UnstructuredGrid" => vtu::survey(&document),
         "ImageData" => image::survey(&document),
+        structured::RECTILINEAR | structured::CURVILINEAR => structured::survey(&document),
         other => Err(super::not_read(other)).at(String::new),
     }
 }

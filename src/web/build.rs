@@ -469,7 +469,7 @@ impl From<ReadError> for WebError {
         let code = match error.reason {
             ReadReason::Io(_) => "bad-source",
             ReadReason::UnknownFormat => "unknown-format",
-            ReadReason::Unsupported { .. } | ReadReason::NotTetrahedra(_) => "unsupported",
+            ReadReason::Unsupported { .. } | ReadReason::CellTypes(_) => "unsupported",
             ReadReason::Truncated { .. } => "truncated",
             ReadReason::TooLarge { .. } => "limit",
             ReadReason::NotFinite { .. } | ReadReason::NotFiniteCell { .. } => "bad-mesh",

@@ -1,10 +1,12 @@
 //! Promises of the exchange formats.
 
+mod cells;
 mod damaged;
 mod encodings;
 mod fields;
 #[allow(dead_code, reason = "each test uses a part of it")]
 mod files;
+mod pieces;
 mod real;
 mod surfaces;
 mod survey;

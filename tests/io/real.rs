@@ -68,13 +68,6 @@ fn files_that_must_be_refused() {
     for (name, reason) in [
         ("native/Armadillo_Tetra_4406_for_test_broken.vtu", "expected 4407, found 4406"),
         ("native/liver_for_test_broken.vtk", "is not known"),
-        (
-            "native/uGridEx.vtk",
-            "12 cells: 1 vertex, 2 lines, 2 triangles, 1 triangle strip, 1 polygon, 1 quad, 2 tetrahedra, 2 hexahedra",
-        ),
-        ("native/QuadraticTetra.vtu", "96 cells: 96 quadratic tetrahedra"),
-        ("native/manifoldCheck1.vtu", "4 cells: 4 hexahedra"),
-        ("native/manifoldCheck2.vtu", "4 cells: 4 hexahedra"),
         ("native/6_tetra_bad.msh", "not a format that is known"),
         ("native/piece.bin.v41.msh", "not a format that is known"),
         ("native/unit_ball.mesh", "not a format that is known"),
@@ -117,6 +110,9 @@ const GOOD: &[Expected] = &[
     ("native/cylinder.vtk", 354, 1348, 1, 440, ""),
     ("native/cut-cylinder.vtk", 1147, 3279, 2, 2286, ""),
     ("native/Tetrahedron.vtu", 35, 96, 1, 48, ""),
+    ("native/QuadraticTetra.vtu", 189, 768, 1, 192, ""),
+    ("native/manifoldCheck1.vtu", 24, 24, 3, 44, "repaired: turned 24 inverted tetrahedra"),
+    ("native/uGridEx.vtk", 18, 14, 2, 28, "repaired: dropped 9 unused points"),
     ("native/Armadillo_Tetra_4406.vtu", 1446, 4406, 1, 2532, ""),
     (
         "native/bracket_appended_compressed.vtu",
