@@ -24,7 +24,9 @@ pub enum ReadReason {
     Io(String),
     /// The content is of no known kind.
     #[error(
-        "not a format that is known here; give VTK XML (.vtu, .vti), legacy VTK (.vtk), or raw samples with a .json sidecar"
+        "not a format that is known here; give VTK XML (.vtu, .vti, .vts, .vtr), legacy VTK (.vtk){}, or raw samples with a \
+         .json sidecar",
+        if cfg!(feature = "formats") { ", Gmsh (.msh), Medit (.mesh), TetGen (.node, .ele), Netgen (.vol), NRRD or MetaImage" } else { "" }
     )]
     UnknownFormat,
     /// The text does not follow the rules of its format.

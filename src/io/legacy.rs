@@ -672,8 +672,11 @@ impl<'a> Body<'a> {
             expect("coordinates", dims[axis] as usize, found).at(|| name.to_owned())?;
         }
         let coordinates = std::mem::take(&mut self.coordinates);
-        check_values(&self.fields, dims.iter().map(|d| u64::from(*d)).product())
-            .at(|| "POINT_DATA".into())?;
+        // Without, a few coordinates claim any size.
+        if self.tuples < structured::cubes(dims) {
+            let what = "an array with a value for every point or cell".into();
+            return Err(ReadReason::Missing(what)).at(String::new);
+        }
         self.curvilinear(structured::rectilinear(&coordinates))
     }
 

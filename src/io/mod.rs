@@ -4,8 +4,16 @@
 //! |---|---|---|---|
 //! | VTK XML unstructured grid | `.vtu` | all encodings, several pieces | appended raw, zlib |
 //! | VTK XML image data | `.vti` | all encodings, several pieces | appended raw, zlib |
-//! | legacy VTK, versions 1.0 to 5.1 | `.vtk` | ASCII and binary; unstructured grids, structured points | |
+//! | legacy VTK, versions 1.0 to 5.1 | `.vtk` | ASCII and binary; unstructured, structured and rectilinear grids, structured points | |
+//! | VTK XML structured and rectilinear grids | `.vts`, `.vtr` | all encodings, several pieces | |
+//! | VTK XML unstructured grid in several files | `.pvtu` | by [`read`] | |
 //! | raw samples | `.raw` + `.json` | any numeric type and byte order | |
+//! | Gmsh, versions 1 to 4.1 | `.msh` | text and binary; feature `formats` | |
+//! | Medit | `.mesh`, `.sol` | text; feature `formats` | |
+//! | TetGen | `.node` + `.ele` | by [`read`]; feature `formats` | |
+//! | Netgen | `.vol` | feature `formats` | |
+//! | NRRD | `.nrrd`, `.nhdr` | raw, gzip, text; feature `formats` | |
+//! | `MetaImage` | `.mha`, `.mhd` | raw, zlib; feature `formats` | |
 //! | VTK XML poly data | `.vtp` | | appended raw, zlib |
 //! | STL | `.stl` | | binary, triangles alone |
 //! | PLY | `.ply` | | binary, little-endian |
@@ -17,12 +25,15 @@
 //! `name_magnitude`. Units and times are kept where the file contains them. Arrays at cells are read where that is asked
 //! for ([`ReadOptions::cells`]), arrays that are not numbers are left out.
 //! Time steps come in several files, which a `.pvd` may list: see [`steps`].
-//! Cells other than tetrahedra are refused. Readers check the file, not the mesh: see [`crate::mesh::repair`].
+//! Cells of other types are split into tetrahedra that fit those of their neighbours, linear and quadratic ones; cells without a
+//! volume are left out beside them. Readers check the file, not the mesh: see [`crate::mesh::repair`].
 
 mod cell_shapes;
 mod cells;
 mod error;
 mod fields;
+#[cfg(feature = "formats")]
+mod formats;
 mod image;
 mod legacy;
 mod number;
@@ -76,7 +87,7 @@ pub enum CellData {
 
 /// Reads the mesh or grid in the file at `path`; of raw samples either the samples or the sidecar may be given.
 ///
-/// The kind of a file follows from its content; only `.raw` and `.json` are recognised by their names.
+/// The kind of a file follows from its content; only `.raw`, `.json`, `.node` and `.ele` are recognised by their names.
 ///
 /// # Errors
 /// If the file cannot be read, is damaged, or holds what is not read here: see [`ReadReason`].
@@ -93,6 +104,8 @@ pub fn read_with(path: &Path, options: &ReadOptions) -> Result<TetMesh, ReadErro
     match lower_extension(path).as_str() {
         "json" => read_raw_by_sidecar(path, None),
         "raw" => read_raw_by_sidecar(&path.with_extension("json"), Some(path)),
+        #[cfg(feature = "formats")]
+        "node" | "ele" => formats::tetgen::read(path, options),
         _ => read_in(&name, &load(path)?, options, &|file| load_beside(path, file)),
     }
 }
@@ -135,9 +148,26 @@ fn read_in(
     } else if start.starts_with(b"<") {
         read_xml(start, options, beside)
     } else {
-        Err(ReadReason::UnknownFormat).at(String::new)
+        read_other(name, bytes, options, beside)
     };
     result.map_err(|e| in_file(e, name))
+}
+
+/// Reads a format that is not VTK's.
+#[cfg(feature = "formats")]
+fn read_other(
+    name: &str,
+    bytes: &[u8],
+    options: &ReadOptions,
+    beside: Beside<'_>,
+) -> Result<TetMesh, ReadError> {
+    formats::read(name, bytes, options, beside)
+        .unwrap_or_else(|| Err(ReadReason::UnknownFormat).at(String::new))
+}
+
+#[cfg(not(feature = "formats"))]
+fn read_other(_: &str, _: &[u8], _: &ReadOptions, _: Beside<'_>) -> Result<TetMesh, ReadError> {
+    Err(ReadReason::UnknownFormat).at(String::new)
 }
 
 /// Reads raw samples, given their JSON sidecar:

@@ -1,13 +1,16 @@
 //! What a file contains, without its values: for questions before it is read, and for the memory that reading needs.
 
 use crate::io::error::{At, ReadError, ReadReason};
+#[cfg(feature = "formats")]
+use crate::io::{CellData, ReadOptions, formats};
 use crate::io::{image, in_file, legacy, raw, structured, vtu, xml};
 use crate::mesh::{Field, Grid};
 
 /// What a file says that it contains. The data may be damaged even so.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Survey {
-    /// The format: `"vtu"`, `"vti"`, `"vtr"`, `"vts"`, `"vtk"` or `"raw"`.
+    /// The format: `"vtu"`, `"vti"`, `"vtr"`, `"vts"`, `"vtk"`, `"raw"`, or with the feature `formats`
+    /// `"gmsh"`, `"medit"`, `"netgen"`, `"nrrd"` or `"metaimage"`.
     pub format: &'static str,
     /// Its points.
     pub points: u64,
@@ -42,9 +45,32 @@ pub fn survey(name: &str, bytes: &[u8]) -> Result<Survey, ReadError> {
     } else if start.starts_with(b"<") {
         survey_xml(start)
     } else {
-        Err(ReadReason::UnknownFormat).at(String::new)
+        survey_other(name, bytes)
     };
     result.map_err(|e| in_file(e, name))
+}
+
+/// Says what a file of a format contains that is not VTK's: these are read for it.
+#[cfg(feature = "formats")]
+fn survey_other(name: &str, bytes: &[u8]) -> Result<Survey, ReadError> {
+    let Some(format) = formats::name(bytes) else { return Err(ReadReason::UnknownFormat).at(String::new) };
+    let options = ReadOptions { fields: None, cells: CellData::Names };
+    let mesh = super::read_bytes_with(name, bytes, &options)?;
+    let described =
+        |fields: Vec<Field>| fields.into_iter().map(|field| Field { values: Vec::new(), ..field });
+    Ok(Survey {
+        format,
+        points: mesh.positions.len() as u64,
+        cells: mesh.tets.len() as u64,
+        grid: mesh.grid,
+        fields: described(mesh.fields).collect(),
+        cell_fields: described(mesh.cell_fields).collect(),
+    })
+}
+
+#[cfg(not(feature = "formats"))]
+fn survey_other(_: &str, _: &[u8]) -> Result<Survey, ReadError> {
+    Err(ReadReason::UnknownFormat).at(String::new)
 }
 
 /// Says what the JSON sidecar of raw samples describes.
