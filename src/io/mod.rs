@@ -54,7 +54,7 @@ pub use error::{ReadError, ReadReason};
 pub use image::MAX_GRID_POINTS;
 pub use pvd::{Step, steps};
 pub use surface::{PolyData, write_csv, write_obj, write_ply, write_stl, write_vtp};
-pub use survey::{Survey, survey, survey_raw};
+pub use survey::{Survey, format_of, survey, survey_raw};
 pub use time_steps::{FieldSelection, TimeStepsError, read_time_steps};
 pub use write::{write_vti, write_vtu};
 

@@ -82,6 +82,41 @@ pub fn survey_raw(name: &str, sidecar: &[u8]) -> Result<Survey, ReadError> {
     Ok(sidecar.survey())
 }
 
+/// What the format of a file with these bytes is called, as [`Survey::format`] has it; none if it is not known. The rest of the
+/// content is not looked at.
+pub fn format_of(bytes: &[u8]) -> Option<&'static str> {
+    let start = super::without_mark(bytes);
+    if bytes.starts_with(legacy::MAGIC) {
+        return Some("vtk");
+    }
+    if !start.starts_with(b"<") {
+        return format_of_other(bytes);
+    }
+    // The root element names the type within its first words.
+    let head =
+        String::from_utf8_lossy(start.get(..start.len().min(1 << 12)).unwrap_or_default()).into_owned();
+    let (_, kind) = head.split_once("<VTKFile")?.1.split_once("type=")?;
+    let kind = kind.get(1..)?.split(['"', '\'']).next()?;
+    let formats = [
+        ("UnstructuredGrid", "vtu"),
+        ("ImageData", "vti"),
+        (structured::RECTILINEAR, "vtr"),
+        (structured::CURVILINEAR, "vts"),
+        ("PUnstructuredGrid", "pvtu"),
+    ];
+    formats.iter().find(|(name, _)| *name == kind).map(|(_, format)| *format)
+}
+
+#[cfg(feature = "formats")]
+fn format_of_other(bytes: &[u8]) -> Option<&'static str> {
+    formats::name(bytes)
+}
+
+#[cfg(not(feature = "formats"))]
+fn format_of_other(_: &[u8]) -> Option<&'static str> {
+    None
+}
+
 fn survey_xml(bytes: &[u8]) -> Result<Survey, ReadError> {
     let document = xml::Document::parse(bytes)?;
     match document.kind.as_str() {

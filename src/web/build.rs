@@ -11,7 +11,7 @@ use crate::io::{
     self, CellData, FieldSelection, ReadError, ReadOptions, ReadReason, Survey, TimeStepsError,
     read_time_steps,
 };
-use crate::mesh::{self, Field, MeshError, TetMesh};
+use crate::mesh::{self, Field, GeometryField, MeshError, TetMesh};
 use js_sys::{Function, Object, Reflect, Uint8Array};
 use serde::Serialize;
 use std::cell::RefCell;
@@ -184,7 +184,8 @@ impl MeshBuilder {
         let BuildOptions { config, cells, .. } = options;
         let has = |fields: &[Field], name: &str| fields.iter().any(|field| field.answers_to(name));
         for name in &config.fields {
-            if has(&survey.fields, name) || *cells && has(&survey.cell_fields, name) {
+            let is_there = has(&survey.fields, name) || *cells && has(&survey.cell_fields, name);
+            if is_there || GeometryField::named(name).is_some() && !has(&survey.cell_fields, name) {
                 continue;
             }
             if has(&survey.cell_fields, name) {
@@ -223,6 +224,7 @@ impl MeshBuilder {
         if cells {
             mesh.cells_to_points();
         }
+        mesh.add_geometry_fields(&config.fields);
         set_units(&mut mesh, &units)?;
         let built = builder::build(&mesh, &config, &mut |step| stages.step(&step));
         let built = built.map_err(|error| in_input(&name, error))?;
@@ -516,6 +518,7 @@ impl From<BuildError> for WebError {
 fn option_for(error: &BuildError) -> Option<&'static str> {
     Some(match error {
         BuildError::Empty => "`method`",
+        BuildError::NoField => "`fields`",
         BuildError::CellField { .. } => "`cellToPoint`",
         BuildError::Tolerance { field: Some(_), .. } => "`fieldTolerance` or `lossless`",
         BuildError::Tolerance { field: None, .. } => "`positionTolerance`",
