@@ -6,6 +6,8 @@ mod encodings;
 mod fields;
 #[allow(dead_code, reason = "each test uses a part of it")]
 mod files;
+#[cfg(feature = "formats")]
+mod meshers;
 mod pieces;
 mod real;
 mod surfaces;

@@ -174,3 +174,29 @@ fn meshes_that_cannot_be_mended_name_their_cells() {
     });
     assert_ne!(positive[0], positive[1], "cells {tets:?}");
 }
+
+#[cfg(feature = "formats")]
+#[test]
+fn files_of_meshers() {
+    let Some(folder) = real_data() else { return };
+    for (name, points, tets, repaired) in [
+        ("native/liver.msh", 181, 596, (181, 596)),
+        ("native/6_tetra_bad.msh", 17, 6, (12, 6)),
+        ("native/homology.asc.v22.msh", 1961, 7392, (1961, 7392)),
+        ("native/piece.bin.v22.msh", 3939, 13179, (3915, 13179)),
+        ("native/piece.asc.v40.msh", 4096, 13676, (4096, 13676)),
+        ("native/piece.asc.v41.msh", 4094, 13370, (4094, 13370)),
+        ("native/unit_ball.mesh", 363, 1110, (362, 1110)),
+        ("native/octopus-low.mesh", 452, 1140, (452, 1140)),
+    ] {
+        let mesh = read(&folder, name);
+        assert_eq!((mesh.positions.len(), mesh.tets.len()), (points, tets), "{name}");
+        let (mended, _) = mesh::repair(mesh).unwrap_or_else(|e| panic!("{name}: {e}"));
+        assert_eq!((mended.positions.len(), mended.tets.len()), repaired, "{name}");
+    }
+    let [text, binary] = ["asc", "bin"].map(|kind| read(&folder, &format!("native/piece.{kind}.v41.msh")));
+    assert_eq!(text.tets, binary.tets);
+    let pairs = text.positions.as_flattened().iter().zip(binary.positions.as_flattened());
+    pairs
+        .for_each(|(text, binary)| assert!((text - binary).abs() <= 1e-14 * binary.abs(), "{text} {binary}"));
+}

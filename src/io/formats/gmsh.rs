@@ -416,7 +416,7 @@ mod tests {
             assert!(TWO.contains(from));
             read(TWO.replacen(from, to, 1).as_bytes(), &EVERYTHING).unwrap_err().to_string()
         };
-        assert!(refused("9 0 1 0", "9 0 x 0").contains("$Nodes, line 11: \"x\" is not a number"));
+        assert!(refused("9 0 1 0", "9 0 x 0").contains("$Nodes, line 12: \"x\" is not a number"));
         assert!(refused("2.2 0 8", "3.0 0 8").contains("version \"3.0\" cannot be read here"));
         assert!(refused("7 2 9 4\n", "7 2 9 5\n").contains("node 5 is missing"));
         assert!(refused("5 4 3 6", "5 99 3 6").contains("elements of type 99"));
