@@ -133,11 +133,24 @@ impl Split {
     }
 }
 
-/// Splits cells of these types, which end at `ends` in `connectivity`, both of which were checked.
-pub(super) fn split(
-    types: &[i64],
-    ends: &[i64],
-    connectivity: &[i64],
+/// Cells as a file lists them, whose ends were checked.
+#[derive(Debug, Default)]
+pub(super) struct CellList {
+    pub types: Vec<i64>,
+    /// Where the points of each cell end in the list of all.
+    pub ends: Vec<i64>,
+    pub connectivity: Vec<i64>,
+}
+
+impl CellList {
+    /// Splits the cells, and drops them.
+    pub fn split(self, numbering: &Numbering) -> Result<Split, ReadReason> {
+        split(&self, numbering)
+    }
+}
+
+fn split(
+    CellList { types, ends, connectivity }: &CellList,
     numbering: &Numbering,
 ) -> Result<Split, ReadReason> {
     let tets = most_tets(types)?;
@@ -186,7 +199,8 @@ mod tests {
         let connectivity: Vec<i64> = (0..3).chain(0..4).chain(0..8).collect();
         let ends = [3, 7, 15];
         assert_eq!(checked_ends(&types, &ends), Ok(15));
-        let split = split(&types, &ends, &connectivity, &numbering(8)).unwrap();
+        let cells = CellList { types: types.to_vec(), ends: ends.to_vec(), connectivity };
+        let split = cells.split(&numbering(8)).unwrap();
         assert_eq!((split.tets.len(), split.tets[0]), (7, [100, 101, 102, 103]));
         let mut fields = [Field::new("m", vec![5.0, 6.0, 7.0]), Field::new("only named", Vec::new())];
         split.spread(&mut fields);
@@ -204,9 +218,13 @@ mod tests {
         assert!(wrong(&[5, 13]).contains("cell 0, a tetrahedron, has 5 points, not 4"));
         assert!(wrong(&[-1, 3]).contains("before it begins"));
         assert!(wrong(&[4, i64::MIN]).contains("before it begins"));
-        let missing = |point| split(&[10], &[4], &[0, 1, 2, point], &numbering(4)).unwrap_err();
+        let split = |connectivity: &[i64]| {
+            let cells = CellList { types: vec![10], ends: vec![4], connectivity: connectivity.to_vec() };
+            cells.split(&numbering(4))
+        };
+        let missing = |point| split(&[0, 1, 2, point]).unwrap_err();
         assert_eq!(missing(4), ReadReason::MissingPoint { cell: 0, point: 4, points: 4 });
         assert_eq!(missing(-1), ReadReason::MissingPoint { cell: 0, point: -1, points: 4 });
-        assert!(matches!(split(&[10], &[4], &[0, 1], &numbering(4)), Err(ReadReason::Missing(_))));
+        assert!(matches!(split(&[0, 1]), Err(ReadReason::Missing(_))));
     }
 }

@@ -4,7 +4,7 @@
 //! Binary numbers are big-endian and start right after the line that announces them. Version 5 lists cells as
 //! offsets and connectivity, older ones as counts followed by indices.
 
-use crate::io::cells::Numbering;
+use crate::io::cells::{CellList, Numbering};
 use crate::io::error::{At, ReadError, ReadReason};
 use crate::io::fields::Collector;
 use crate::io::number::NumberType;
@@ -609,7 +609,8 @@ impl<'a> Body<'a> {
         let list = if since_5 { self.indices_by_offsets(cells) } else { self.indices_by_counts(cells) };
         let (ends, connectivity) = list.at(|| "CELLS".into())?;
         let numbering = Numbering::From { first: 0, points: positions.len() };
-        let split = cells::split(&self.types, &ends, &connectivity, &numbering).at(|| "CELLS".into())?;
+        let types = std::mem::take(&mut self.types);
+        let split = CellList { types, ends, connectivity }.split(&numbering).at(|| "CELLS".into())?;
         let mut cell_fields = self.take_cell_fields(cells).at(|| "CELL_DATA".into())?;
         split.spread(&mut cell_fields);
         Ok(TetMesh {

@@ -1,7 +1,7 @@
 //! VTK XML unstructured grids (`.vtu`), all encodings, any number of pieces. What has vertices alone as cells is a mesh of
 //! points without tetrahedra.
 
-use crate::io::cells::{Numbering, Split};
+use crate::io::cells::{CellList, Numbering};
 use crate::io::error::{At, ReadError, ReadReason};
 use crate::io::fields::Collector;
 use crate::io::xml::{Array, Document, Piece};
@@ -72,9 +72,11 @@ impl PieceReader<'_, '_> {
         let place = || self.place();
         let points = self.piece.attributes.count("NumberOfPoints").at(place)?;
         let cells = self.piece.attributes.count("NumberOfCells").at(place)?;
+        let listed = self.cells(cells)?;
         let positions = self.points(points)?;
         let numbering = numbers(&positions).at(place)?;
-        let split = self.cells(cells, &numbering)?;
+        let split = listed.map(|listed| listed.split(&numbering)).transpose();
+        let split = split.at(|| format!("{}, <Cells>, array \"connectivity\"", place()))?;
         let fields = self.fields("PointData", points)?;
         let mut cell_fields = match self.options.cells {
             // Where all cells were left out, so is what is known of them.
@@ -142,10 +144,10 @@ impl PieceReader<'_, '_> {
         points_from(&values).at(|| array.place())
     }
 
-    /// The tetrahedra; none if the piece has points alone.
-    fn cells(&self, cells: usize, numbering: &Numbering) -> Result<Option<Split>, ReadError> {
+    /// The cells; none if the piece has points alone.
+    fn cells(&self, cells: usize) -> Result<Option<CellList>, ReadError> {
         if cells == 0 {
-            return Ok(Some(Split::default()));
+            return Ok(Some(CellList::default()));
         }
         let find = |name: &str| -> Result<&Array<'_>, ReadError> {
             let found = self.piece.section("Cells").find(|a| a.name() == name);
@@ -164,7 +166,7 @@ impl PieceReader<'_, '_> {
         let connectivity = find("connectivity")?;
         let list = self.document.integers(connectivity, length).at(|| connectivity.place())?;
         self.leave_out_ghosts(&mut kinds)?;
-        cells::split(&kinds, &ends, &list, numbering).map(Some).at(|| connectivity.place())
+        Ok(Some(CellList { types: kinds, ends, connectivity: list }))
     }
 
     /// The tetrahedra at most that the cells become.

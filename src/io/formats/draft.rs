@@ -1,6 +1,6 @@
 //! A mesh as the files of meshers list it, before its cells are split.
 
-use crate::io::cells::{self, Numbering};
+use crate::io::cells::{self, CellList, Numbering};
 use crate::io::error::ReadReason;
 use crate::io::fields::Collector;
 use crate::io::{CellData, ReadOptions, points_from};
@@ -10,9 +10,7 @@ use crate::mesh::{Field, TetMesh};
 pub(super) struct Draft<'a> {
     pub options: &'a ReadOptions,
     pub coordinates: Vec<f64>,
-    types: Vec<i64>,
-    ends: Vec<i64>,
-    connectivity: Vec<i64>,
+    list: CellList,
     pub fields: Collector<'a>,
     pub cell_fields: Collector<'a>,
 }
@@ -20,20 +18,19 @@ pub(super) struct Draft<'a> {
 impl<'a> Draft<'a> {
     pub fn new(options: &'a ReadOptions) -> Self {
         let [fields, cell_fields] = [(); 2].map(|()| Collector::new(options.fields.as_deref()));
-        let (types, ends, connectivity) = Default::default();
-        Self { options, coordinates: Vec::new(), types, ends, connectivity, fields, cell_fields }
+        Self { options, coordinates: Vec::new(), list: CellList::default(), fields, cell_fields }
     }
 
     /// How many cells there are.
     pub fn cells(&self) -> usize {
-        self.types.len()
+        self.list.types.len()
     }
 
     /// Appends a cell of VTK's type `kind`, with its points in the order that VTK has.
     pub fn add_cell(&mut self, kind: i64, points: impl IntoIterator<Item = i64>) {
-        self.types.push(kind);
-        self.connectivity.extend(points);
-        self.ends.push(self.connectivity.len() as i64);
+        self.list.types.push(kind);
+        self.list.connectivity.extend(points);
+        self.list.ends.push(self.list.connectivity.len() as i64);
     }
 
     /// Keeps an array with values at points.
@@ -82,13 +79,14 @@ impl<'a> Draft<'a> {
             return Err(ReadReason::TooLarge { what: "points".into(), limit: u64::from(u32::MAX) });
         }
         let fields = expect_values(self.fields.fields, positions.len())?;
-        if self.types.is_empty() {
+        if self.list.types.is_empty() {
             return Ok(TetMesh { positions, fields, ..TetMesh::default() });
         }
-        cells::checked_ends(&self.types, &self.ends)?;
+        let cells = self.list.types.len();
+        cells::checked_ends(&self.list.types, &self.list.ends)?;
         let numbering = Numbering::From { first: 0, points: positions.len() };
-        let split = cells::split(&self.types, &self.ends, &self.connectivity, &numbering)?;
-        let mut cell_fields = expect_values(self.cell_fields.fields, self.types.len())?;
+        let split = self.list.split(&numbering)?;
+        let mut cell_fields = expect_values(self.cell_fields.fields, cells)?;
         split.spread(&mut cell_fields);
         Ok(TetMesh { positions, fields, tets: split.tets, grid: None, cell_fields })
     }
