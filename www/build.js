@@ -3,7 +3,7 @@
 import { count, nameOf, size } from "./format.js";
 
 /** Names of files that an MT can be built of. */
-const MESH = /\.(vtu|vti|vtk|raw|json)$/i;
+const MESH = /\.(vtu|vti|vts|vtr|vtk|raw|json)$/i;
 
 /** What the phases of the work are called. */
 const PHASES = {

@@ -21,10 +21,15 @@ use tetralod::mt::MtKind;
 /// Turns a tetrahedral mesh or a regular grid into an MT file.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// Mesh or grid: .vtu, .vti, .vtk, or .raw with a .json beside it; points without cells for --method insert. Several,
-    /// or a .pvd, are time steps over one mesh.
+    /// Mesh or grid: .vtu, .pvtu, .vti, .vts, .vtr, .vtk, Gmsh .msh, Medit .mesh, TetGen .node or .ele, Netgen .vol, .nrrd, .mha or
+    /// .mhd, or .raw with a .json beside it; - is the standard input. Points without cells go with --method insert. Several, or a
+    /// .pvd, are time steps over one mesh.
     #[arg(required = true, value_name = "INPUT")]
     inputs: Vec<PathBuf>,
+    /// The format of the standard input, which is refused if its content is another one: vtu, vti, vts, vtr, vtk, gmsh, medit,
+    /// netgen, nrrd or metaimage [default: what its content says].
+    #[arg(long, value_name = "FORMAT")]
+    format: Option<String>,
     /// The MT file to write.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
@@ -47,7 +52,8 @@ pub struct Arguments {
     /// tetrahedra, but every one is answered from the base mesh. With --method insert only.
     #[arg(long)]
     tet_errors: bool,
-    /// A field to keep (repeatable, in this order), or a vector with all its components; the first field if not given.
+    /// A field to keep (repeatable, in this order), or a vector with all its components; the first field if not given. Where the
+    /// input has none of these names: distance (from the middle of the bounding box), x, y, z, or none, for the shape alone.
     #[arg(long = "field", value_name = "NAME")]
     fields: Vec<String>,
     /// Keep all fields but the lengths of vectors.
@@ -239,7 +245,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 fn read(arguments: &Arguments, config: &BuildConfig) -> Result<(TetMesh, RepairReport)> {
     let cells = if arguments.cell_to_point { CellData::Values } else { CellData::Names };
     let wanted = FieldSelection { names: &config.fields, all: config.all_fields, cells };
-    let (mut mesh, repaired) = input::read(&arguments.inputs, &wanted)?;
+    input::expect_format(&arguments.inputs, arguments.format.as_deref());
+    let (mut mesh, repaired) = input::read_as(&arguments.inputs, &wanted, arguments.format.as_deref())?;
     if config.construction.method().keeps_the_mesh() {
         input::expect_cells(&mesh, &arguments.inputs[0])?;
     }
@@ -333,6 +340,7 @@ fn options_of(remedy: Remedy) -> Option<&'static str> {
     Some(match remedy {
         Remedy::Insert => "--method insert",
         Remedy::Decimate => "--method decimate",
+        Remedy::Field => "--field",
         Remedy::CellsToPoints => "--cell-to-point",
         Remedy::FieldTolerance => "--field-tolerance, --lossless",
         Remedy::PositionTolerance => "--position-tolerance",

@@ -2,6 +2,7 @@
 
 use super::files::{self, Opened};
 use anyhow::{Context, Result, bail};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use tetralod::io;
 use tetralod::io::{CellData, FieldSelection};
@@ -13,6 +14,27 @@ use tetralod::verify::Reference;
 ///
 /// The first step is kept with all that is wanted, of later ones nothing but their fields.
 pub fn read(paths: &[PathBuf], wanted: &FieldSelection<'_>) -> Result<(TetMesh, RepairReport)> {
+    read_as(paths, wanted, None)
+}
+
+/// What a path stands for the standard input.
+const STANDARD_INPUT: &str = "-";
+
+/// Ends the program if a format is given for files.
+pub fn expect_format(paths: &[PathBuf], format: Option<&str>) {
+    if format.is_some() && !paths.iter().any(|path| path == Path::new(STANDARD_INPUT)) {
+        super::refuse_usage(
+            "--format goes with the standard input, '-'; the content of files says what they are",
+        );
+    }
+}
+
+/// As [`read`], of which the standard input has a format.
+pub fn read_as(
+    paths: &[PathBuf],
+    wanted: &FieldSelection<'_>,
+    format: Option<&str>,
+) -> Result<(TetMesh, RepairReport)> {
     let mut steps = Vec::new();
     for path in paths {
         if let Some(scheme) = files::scheme(path) {
@@ -21,15 +43,34 @@ pub fn read(paths: &[PathBuf], wanted: &FieldSelection<'_>) -> Result<(TetMesh, 
         // Read errors name the file themselves.
         steps.extend(io::steps(path)?);
     }
+    let mut input = Vec::new();
+    if steps.iter().any(|step| step.path == Path::new(STANDARD_INPUT)) {
+        std::io::stdin().read_to_end(&mut input).context("the standard input could not be read")?;
+        check_format(&input, format)?;
+    }
     let named: Vec<_> = steps.iter().map(|step| (step.path.display().to_string(), step.time)).collect();
-    let mesh = io::read_time_steps(&named, wanted, &mut |number, options| {
-        io::read_with(&steps[number].path, options)
+    let mesh = io::read_time_steps(&named, wanted, &mut |number, options| match &steps[number].path {
+        path if path == Path::new(STANDARD_INPUT) => io::read_bytes_with("standard input", &input, options),
+        path => io::read_with(path, options),
     })?;
+    drop(input);
     let (mut mesh, report) = mend(mesh, &steps[0].path)?;
     if wanted.cells == CellData::Values {
         mesh.cells_to_points();
     }
+    mesh.add_geometry_fields(wanted.names);
     Ok((mesh, report))
+}
+
+/// Refuses bytes that are not of the format that was given.
+fn check_format(bytes: &[u8], format: Option<&str>) -> Result<()> {
+    let found = io::format_of(bytes);
+    match (format, found) {
+        (Some(format), Some(found)) if format != found => {
+            bail!("standard input: its content is {found}, not {format} as --format says")
+        }
+        _ => Ok(()),
+    }
 }
 
 fn mend(mesh: TetMesh, path: &Path) -> Result<(TetMesh, RepairReport)> {

@@ -63,6 +63,18 @@ fn mts() -> Result<Vec<(String, Vec<u8>)>, Box<dyn Error>> {
     Ok(files)
 }
 
+/// A tetrahedron, or a cube of samples, in formats that are not VTK's.
+const OTHER_FORMATS: [(&str, &str); 6] = [
+    ("ascii-2.msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n$Elements\n1\n\
+        5 4 2 6 2 1 2 3 4\n$EndElements\n$NodeData\n1\n\"T\"\n1\n0\n3\n0\n1\n4\n1 1\n2 2\n3 3\n4 4\n$EndNodeData\n"),
+    ("ascii-4.msh", "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 4 1 4\n3 2 0 4\n1\n2\n3\n4\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n\
+        $EndNodes\n$Elements\n1 1 5 5\n3 2 4 1\n5 1 2 3 4\n$EndElements\n"),
+    ("a.mesh", "MeshVersionFormatted 1\nDimension 3\nVertices 4\n0 0 0 0\n1 0 0 0\n0 1 0 0\n0 0 1 0\nTetrahedra 1\n1 2 3 4 0\nEnd\n"),
+    ("a.vol", "mesh3d\ndimension 3\nvolumeelements\n1\n7 4 1 3 2 4\npoints\n4\n0 0 0\n1 0 0\n0 1 0\n0 0 1\nendmesh\n"),
+    ("a.nrrd", "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 2 2\nencoding: raw\n\nABCDEFGH"),
+    ("a.mha", "NDims = 3\nDimSize = 2 2 2\nElementType = MET_UCHAR\nElementDataFile = LOCAL\nABCDEFGH"),
+];
+
 /// Small meshes in every format that is read.
 fn meshes() -> Result<Vec<(String, Vec<u8>)>, Box<dyn Error>> {
     let mesh = by_name("bucky", 3)?;
@@ -90,5 +102,6 @@ fn meshes() -> Result<Vec<(String, Vec<u8>)>, Box<dyn Error>> {
     files.push(("plain.vtu".into(), plain.into()));
     let sidecar = "{\"dims\": [2, 2, 2], \"type\": \"uint8\", \"endian\": \"little\", \"spacing\": [1, 1, 1], \"origin\": [0, 0, 0], \"field\": \"p\"}\0abcdefgh";
     files.push(("samples.raw".into(), sidecar.into()));
+    files.extend(OTHER_FORMATS.map(|(name, content)| (name.to_owned(), content.into())));
     Ok(files)
 }

@@ -212,7 +212,10 @@ pub enum BuildError {
     #[error("the mesh has no tetrahedra; only insertion builds an MT of points alone")]
     Empty,
     /// The mesh has no point field.
-    #[error("the mesh has no point field: an MT needs at least one scalar at its points")]
+    #[error(
+        "the mesh has no point field, and an MT needs at least one scalar at its points: name a field of the geometry (distance, x, \
+         y, z or none)"
+    )]
     NoField,
     /// The mesh has no field of this name.
     #[error("there is no point field '{name}'; the mesh has: {}", .known.join(", "))]

@@ -10,6 +10,8 @@ pub enum Remedy {
     Insert,
     /// Build by [decimation](super::Method::Decimate): it keeps the mesh as it is.
     Decimate,
+    /// Name a field, or what of the geometry is to be one.
+    Field,
     /// Turn fields at cells into fields at points: see [`TetMesh::cells_to_points`](crate::mesh::TetMesh::cells_to_points).
     CellsToPoints,
     /// Allow a larger tolerance of the values of fields, or keep their exact values.
@@ -25,6 +27,7 @@ impl BuildError {
     pub fn remedy(&self) -> Option<Remedy> {
         match self {
             Self::Empty => Some(Remedy::Insert),
+            Self::NoField => Some(Remedy::Field),
             Self::CellField { .. } => Some(Remedy::CellsToPoints),
             Self::Tolerance { field: Some(_), .. } => Some(Remedy::FieldTolerance),
             Self::Tolerance { field: None, .. } => Some(Remedy::PositionTolerance),

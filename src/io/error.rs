@@ -2,6 +2,8 @@
 
 use thiserror::Error;
 
+use crate::io::cell_shapes::PYRAMID_14;
+
 /// A file that could not be read.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("{file}: {}{reason}", prefix(.place))]
@@ -22,7 +24,9 @@ pub enum ReadReason {
     Io(String),
     /// The content is of no known kind.
     #[error(
-        "not a format that is known here; give VTK XML (.vtu, .vti), legacy VTK (.vtk), or raw samples with a .json sidecar"
+        "not a format that is known here; give VTK XML (.vtu, .vti, .vts, .vtr), legacy VTK (.vtk){}, or raw samples with a \
+         .json sidecar",
+        if cfg!(feature = "formats") { ", Gmsh (.msh), Medit (.mesh), TetGen (.node, .ele), Netgen (.vol), NRRD or MetaImage" } else { "" }
     )]
     UnknownFormat,
     /// The text does not follow the rules of its format.
@@ -64,13 +68,14 @@ pub enum ReadReason {
         /// What to do instead.
         remedy: String,
     },
-    /// There are cells that are not tetrahedra: VTK cell type and count.
+    /// There are cells that cannot be split into tetrahedra, or none that has a volume: VTK cell type and count of all.
     #[error(
-        "{total} cells: {list}; only tetrahedra are read for now, split or remove the others (in ParaView: Tetrahedralize)",
+        "{total} cells: {list}; tetrahedra, hexahedra, voxels, wedges, pyramids and prisms are read, also quadratic ones, and what \
+         has no volume is left out beside them: convert the others (in ParaView: Tetrahedralize)",
         list = .0.iter().map(|&(kind, n)| named_count(kind, n)).collect::<Vec<_>>().join(", "),
         total = .0.iter().map(|c| c.1).sum::<u64>()
     )]
-    NotTetrahedra(Vec<(i64, u64)>),
+    CellTypes(Vec<(i64, u64)>),
     /// A value or coordinate is infinite or not a number.
     #[error("the value at point {point} is infinite or not a number; replace it or leave this array out")]
     NotFinite {
@@ -124,7 +129,20 @@ impl<T> At<T> for Result<T, ReadReason> {
 
 /// "1 hexahedron", "3 wedges", "2 cells of type 99".
 fn named_count(kind: i64, count: u64) -> String {
-    let (one, many) = match kind {
+    match names(kind) {
+        Some((one, many)) => format!("{count} {}", if count == 1 { one } else { many }),
+        None => format!("{count} {} of type {kind}", if count == 1 { "cell" } else { "cells" }),
+    }
+}
+
+/// What a cell of this type is called.
+pub(super) fn cell_name(kind: i64) -> String {
+    names(kind).map_or_else(|| format!("cell of type {kind}"), |(one, _)| one.to_owned())
+}
+
+/// What one cell of this type, by VTK's number, is called, and several.
+fn names(kind: i64) -> Option<(&'static str, &'static str)> {
+    Some(match kind {
         0 => ("empty cell", "empty cells"),
         1 => ("vertex", "vertices"),
         2 => ("poly-vertex", "poly-vertices"),
@@ -150,11 +168,12 @@ fn named_count(kind: i64, count: u64) -> String {
         26 => ("quadratic wedge", "quadratic wedges"),
         27 => ("quadratic pyramid", "quadratic pyramids"),
         29 => ("triquadratic hexahedron", "triquadratic hexahedra"),
+        32 => ("biquadratic wedge", "biquadratic wedges"),
         42 => ("polyhedron", "polyhedra"),
         71 => ("Lagrange tetrahedron", "Lagrange tetrahedra"),
+        72 => ("Lagrange hexahedron", "Lagrange hexahedra"),
         78 => ("Bezier tetrahedron", "Bezier tetrahedra"),
-        _ if count == 1 => return format!("1 cell of type {kind}"),
-        _ => return format!("{count} cells of type {kind}"),
-    };
-    format!("{count} {}", if count == 1 { one } else { many })
+        PYRAMID_14 => ("quadratic pyramid of 14 points", "quadratic pyramids of 14 points"),
+        _ => return None,
+    })
 }

@@ -1,4 +1,4 @@
-//! Regular grids: VTK XML image data (`.vti`), and the grid's checks that all grid formats share.
+//! Regular grids: VTK XML image data (`.vti`), and what all grid formats share: checks, and grids in pieces.
 
 use crate::io::error::{At, ReadError, ReadReason};
 use crate::io::vtu::PieceReader;
@@ -10,7 +10,7 @@ use crate::mesh::{Field, Grid, TetMesh};
 pub const MAX_GRID_POINTS: u64 = 1 << 27;
 
 /// First and last index along x, y and z.
-type Extent = [i64; 6];
+pub(super) type Extent = [i64; 6];
 
 /// A grid that was checked: at least two points along each axis, finite, not too large.
 pub(super) fn checked_grid(dims: [u64; 3], origin: [f64; 3], spacing: [f64; 3]) -> Result<Grid, ReadReason> {
@@ -42,11 +42,15 @@ pub(super) fn grid_mesh(grid: Grid, fields: Vec<Field>, cubes: Vec<Field>) -> Re
     }
     let mut mesh = TetMesh::from_grid(grid, fields);
     mesh.cell_fields = cubes;
-    for field in &mut mesh.cell_fields {
-        // The tetrahedra of a cube follow one another.
+    sixfold(&mut mesh.cell_fields);
+    Ok(mesh)
+}
+
+/// Fields at cubes as fields at the tetrahedra of these, which follow one another.
+pub(super) fn sixfold(fields: &mut [Field]) {
+    for field in fields {
         field.values = field.values.iter().flat_map(|&value| [value; 6]).collect();
     }
-    Ok(mesh)
 }
 
 /// Reads a document of type `ImageData`.
@@ -62,14 +66,26 @@ pub(super) fn read(document: &Document<'_>, options: &ReadOptions) -> Result<Tet
         }
     }
     let fields = assemble(parts, whole).at(whole_place)?;
-    let cubes = match document.pieces.first() {
-        _ if cubes.iter().any(|part| !part.fields.is_empty()) => {
-            assemble(cubes, cubes_of(whole)).at(whole_place)?
-        }
-        Some(piece) if options.cells == CellData::Names => reader((0, piece)).field_names("CellData")?,
-        _ => Vec::new(),
-    };
+    let cubes = whole_cubes(document, options, cubes, whole)?;
     grid_mesh(grid, fields, cubes).at(whole_place)
+}
+
+/// The fields at the cubes of the whole grid, put together of those of its pieces.
+pub(super) fn whole_cubes(
+    document: &Document<'_>,
+    options: &ReadOptions,
+    parts: Vec<Part>,
+    whole: Extent,
+) -> Result<Vec<Field>, ReadError> {
+    if parts.iter().any(|part| !part.fields.is_empty()) {
+        return assemble(parts, cubes_of(whole)).at(|| format!("<{}>", document.kind));
+    }
+    match document.pieces.first() {
+        Some(piece) if options.cells == CellData::Names => {
+            PieceReader { document, piece, number: 0, options }.field_names("CellData")
+        }
+        _ => Ok(Vec::new()),
+    }
 }
 
 /// Says what a document of type `ImageData` contains.
@@ -79,13 +95,13 @@ pub(super) fn survey(document: &Document<'_>) -> Result<Survey, ReadError> {
 }
 
 /// The first and last cube along each axis of a box of points.
-fn cubes_of(mut extent: Extent) -> Extent {
+pub(super) fn cubes_of(mut extent: Extent) -> Extent {
     [1, 3, 5].into_iter().for_each(|i| extent[i] = extent[i].saturating_sub(1));
     extent
 }
 
 /// The fields at the cubes of a piece; none if it is flat.
-fn read_cubes(reader: &PieceReader<'_, '_>, whole: Extent) -> Result<Option<Part>, ReadError> {
+pub(super) fn read_cubes(reader: &PieceReader<'_, '_>, whole: Extent) -> Result<Option<Part>, ReadError> {
     let extent = reader.piece.attributes.numbers("Extent").at(|| reader.place())?;
     let extent = cubes_of(extent.unwrap_or(whole));
     let Ok(dims) = dims_in(extent, cubes_of(whole)) else { return Ok(None) };
@@ -94,9 +110,9 @@ fn read_cubes(reader: &PieceReader<'_, '_>, whole: Extent) -> Result<Option<Part
 }
 
 /// A piece of a grid: where it is and its fields.
-struct Part {
-    extent: Extent,
-    fields: Vec<Field>,
+pub(super) struct Part {
+    pub extent: Extent,
+    pub fields: Vec<Field>,
 }
 
 fn read_part(reader: &PieceReader<'_, '_>, whole: Extent) -> Result<Part, ReadError> {
@@ -131,7 +147,7 @@ fn read_grid(document: &Document<'_>) -> Result<(Grid, Extent), ReadReason> {
 }
 
 /// How many points `extent` has along each axis; it must lie in `whole`.
-fn dims_in(extent: Extent, whole: Extent) -> Result<[u64; 3], ReadReason> {
+pub(super) fn dims_in(extent: Extent, whole: Extent) -> Result<[u64; 3], ReadReason> {
     let outside = || ReadReason::Syntax(format!("extent {extent:?} is empty or not in {whole:?}"));
     let mut dims = [0; 3];
     for (i, dim) in dims.iter_mut().enumerate() {
@@ -145,7 +161,7 @@ fn dims_in(extent: Extent, whole: Extent) -> Result<[u64; 3], ReadReason> {
 }
 
 /// The fields of the whole grid.
-fn assemble(mut parts: Vec<Part>, whole: Extent) -> Result<Vec<Field>, ReadReason> {
+pub(super) fn assemble(mut parts: Vec<Part>, whole: Extent) -> Result<Vec<Field>, ReadReason> {
     if let [part] = parts.as_mut_slice()
         && part.extent == whole
     {

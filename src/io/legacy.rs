@@ -4,14 +4,19 @@
 //! Binary numbers are big-endian and start right after the line that announces them. Version 5 lists cells as
 //! offsets and connectivity, older ones as counts followed by indices.
 
+use crate::io::cells::{CellList, Numbering};
 use crate::io::error::{At, ReadError, ReadReason};
 use crate::io::fields::Collector;
 use crate::io::number::NumberType;
-use crate::io::{CellData, ReadOptions, Survey, cells, image, points_from};
+use crate::io::{CellData, ReadOptions, Survey, cells, image, points_from, structured};
 use crate::mesh::{Field, Grid, TetMesh};
 
 /// How every legacy file starts.
 pub(super) const MAGIC: &[u8] = b"# vtk DataFile Version ";
+
+/// The types of data sets that are read.
+const KINDS: [&str; 5] =
+    ["unstructured_grid", "structured_points", "structured_grid", "rectilinear_grid", "polydata"];
 
 /// Reads a legacy VTK file.
 pub(super) fn read(bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadError> {
@@ -25,6 +30,8 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadE
     let mut mesh = match kind.as_str() {
         "unstructured_grid" => body.unstructured(file.version >= 5)?,
         "polydata" => body.points_alone()?,
+        "structured_grid" => body.curvilinear(Vec::new())?,
+        "rectilinear_grid" => body.rectilinear()?,
         _ => body.structured()?,
     };
     mesh.fields.iter_mut().chain(&mut mesh.cell_fields).for_each(|field| field.time = time);
@@ -44,9 +51,13 @@ pub(super) fn survey(bytes: &[u8]) -> Result<Survey, ReadError> {
     if kind == "structured_points" {
         return Ok(Survey::of_grid("vtk", body.grid()?, [body.fields.fields, body.cell_fields.fields]));
     }
+    let (points, cells) = match body.dims {
+        Some(dims) => (dims.iter().fold(1_u64, |n, d| n.saturating_mul(*d)), structured::most_tets(dims)),
+        None if cells::are_points(&body.types) => (body.points as u64, 0),
+        None => (body.points as u64, cells::most_tets(&body.types).at(|| "CELL_TYPES".into())?),
+    };
     let (fields, cell_fields) = (body.fields.fields, body.cell_fields.fields);
-    let cells = body.cells.unwrap_or(0) as u64;
-    Ok(Survey { format: "vtk", points: body.points as u64, cells, grid: None, fields, cell_fields })
+    Ok(Survey { format: "vtk", points, cells, grid: None, fields, cell_fields })
 }
 
 /// The time in the arrays of the whole data set, as VTK writes it.
@@ -131,9 +142,9 @@ impl<'a> Reader<'a> {
             }
         }
         let kind = file.word()?.to_ascii_lowercase();
-        if !["unstructured_grid", "structured_points", "polydata"].contains(&kind.as_str()) {
+        if !KINDS.contains(&kind.as_str()) {
             let what = format!("a data set of type {}", shortened(&kind).to_ascii_uppercase());
-            let remedy = "give an unstructured grid of tetrahedra or structured points".into();
+            let remedy = "give an unstructured, structured or rectilinear grid, or structured points".into();
             return Err(ReadReason::Unsupported { what, remedy });
         }
         Ok((file, kind, time))
@@ -379,6 +390,8 @@ enum Owner {
 #[derive(Default)]
 struct Body<'a> {
     positions: Option<Vec<f64>>,
+    /// Those of a rectilinear grid, along each axis.
+    coordinates: [Vec<f64>; 3],
     /// Before version 5 counts and indices; since then indices alone.
     connectivity: Vec<i64>,
     /// Since version 5: where each cell starts, and the end.
@@ -395,6 +408,8 @@ struct Body<'a> {
     time: Option<f64>,
     /// How many points there are.
     points: usize,
+    /// The most values of a component that an array had.
+    tuples: usize,
     /// Whether the file gives no numbers.
     skims: bool,
 }
@@ -422,7 +437,18 @@ impl<'a> Body<'a> {
             "cells" => self.cells(file)?,
             "cell_types" => {
                 let count = file.count()?;
+                // A survey counts them, too.
+                let skims = std::mem::take(&mut file.skims);
                 self.types = file.integers(count, NumberType::I32)?;
+                file.skims = skims;
+            }
+            "x_coordinates" | "y_coordinates" | "z_coordinates" => {
+                let count = file.count()?;
+                let kind = Kind::named(file.word()?)?;
+                let values = file.floats(Some(count), kind)?;
+                let values = values.ok_or_else(|| ReadReason::Syntax("coordinates made of text".into()))?;
+                let axis = usize::from(keyword.as_bytes()[0] - b'x');
+                self.coordinates[axis] = values;
             }
             // Only poly data has these.
             "vertices" => {
@@ -524,6 +550,7 @@ impl<'a> Body<'a> {
 
     /// Makes fields of an array at points and, if they are asked for, at cells; others are read and left out.
     fn keep(&mut self, array: ArrayData) -> Result<(), ReadReason> {
+        self.tuples = self.tuples.max(array.values.len() / array.components.max(1));
         let (fields, tuples, values) = match self.owner {
             Owner::Points(points) => (&mut self.fields, points, true),
             Owner::Cells(cells) if self.cell_data != CellData::LeaveOut => {
@@ -578,36 +605,94 @@ impl<'a> Body<'a> {
         if cells > 0 && cells::are_points(&self.types) {
             return Ok(TetMesh { positions, fields: self.fields.fields, ..TetMesh::default() });
         }
-        cells::only_tetrahedra(&self.types).at(|| "CELL_TYPES".into())?;
+        cells::most_tets(&self.types).at(|| "CELL_TYPES".into())?;
         let list = if since_5 { self.indices_by_offsets(cells) } else { self.indices_by_counts(cells) };
-        let tets = list.and_then(|l| cells::tetrahedra(&l, positions.len(), 0)).at(|| "CELLS".into())?;
-        let cell_fields = self.take_cell_fields(cells).at(|| "CELL_DATA".into())?;
-        Ok(TetMesh { positions, fields: self.fields.fields, tets, cell_fields, ..TetMesh::default() })
+        let (ends, connectivity) = list.at(|| "CELLS".into())?;
+        let numbering = Numbering::From { first: 0, points: positions.len() };
+        let types = std::mem::take(&mut self.types);
+        let split = CellList { types, ends, connectivity }.split(&numbering).at(|| "CELLS".into())?;
+        let mut cell_fields = self.take_cell_fields(cells).at(|| "CELL_DATA".into())?;
+        split.spread(&mut cell_fields);
+        Ok(TetMesh {
+            positions,
+            fields: self.fields.fields,
+            tets: split.tets,
+            cell_fields,
+            ..TetMesh::default()
+        })
     }
 
-    fn indices_by_offsets(&self, cells: usize) -> Result<Vec<i64>, ReadReason> {
-        let starts = self.offsets.first();
-        if starts.is_some_and(|s| *s != 0) {
+    /// Where each cell ends in the list of indices, and that.
+    fn indices_by_offsets(&mut self, cells: usize) -> Result<(Vec<i64>, Vec<i64>), ReadReason> {
+        let mut ends = std::mem::take(&mut self.offsets);
+        if ends.first().is_some_and(|s| *s != 0) {
             return Err(ReadReason::Syntax("the offsets do not start at 0".into()));
         }
-        cells::ends_of_tetrahedra(self.offsets.get(1..).unwrap_or_default())?;
-        expect("numbers in the cell list", 4 * cells, self.connectivity.len())?;
-        Ok(self.connectivity.clone())
+        ends.drain(..ends.len().min(1));
+        expect("offsets of cells", cells, ends.len())?;
+        let length = cells::checked_ends(&self.types, &ends)?;
+        expect("numbers in the cell list", length, self.connectivity.len())?;
+        Ok((ends, std::mem::take(&mut self.connectivity)))
     }
 
-    fn indices_by_counts(&self, cells: usize) -> Result<Vec<i64>, ReadReason> {
-        expect("numbers in the cell list", 5 * cells, self.connectivity.len())?;
-        let (cells, _) = self.connectivity.as_chunks::<5>();
-        if let Some(i) = cells.iter().position(|c| c[0] != 4) {
-            return Err(ReadReason::Syntax(format!("tetrahedron {i} does not have four points")));
+    fn indices_by_counts(&mut self, cells: usize) -> Result<(Vec<i64>, Vec<i64>), ReadReason> {
+        let counted = std::mem::take(&mut self.connectivity);
+        let short = || ReadReason::Count {
+            what: "cells in the cell list".into(),
+            expected: cells as u64,
+            found: counted.len() as u64,
+        };
+        let mut ends = Vec::with_capacity(cells);
+        let mut connectivity = Vec::with_capacity(counted.len());
+        let mut rest = counted.as_slice();
+        for _ in 0..cells {
+            let (&count, after) = rest.split_first().ok_or_else(short)?;
+            let count =
+                usize::try_from(count).ok().filter(|count| *count <= after.len()).ok_or_else(short)?;
+            let (cell, after) = after.split_at(count);
+            connectivity.extend_from_slice(cell);
+            ends.push(connectivity.len() as i64);
+            rest = after;
         }
-        Ok(cells.iter().flat_map(|c| &c[1..]).copied().collect())
+        expect("numbers in the cell list", counted.len() - rest.len(), counted.len())?;
+        cells::checked_ends(&self.types, &ends)?;
+        Ok((ends, connectivity))
     }
 
     fn grid(&self) -> Result<Grid, ReadError> {
         let place = || "DIMENSIONS".to_owned();
         let dims = self.dims.ok_or_else(|| ReadReason::Missing("DIMENSIONS".into())).at(place)?;
         image::checked_grid(dims, self.origin, self.spacing.unwrap_or([1.0; 3])).at(place)
+    }
+
+    /// A grid whose coordinates are given along each axis.
+    fn rectilinear(mut self) -> Result<TetMesh, ReadError> {
+        let dims = structured::checked_dims(self.dims.unwrap_or_default()).at(|| "DIMENSIONS".to_owned())?;
+        for (axis, name) in ["X_COORDINATES", "Y_COORDINATES", "Z_COORDINATES"].into_iter().enumerate() {
+            let found = self.coordinates[axis].len();
+            expect("coordinates", dims[axis] as usize, found).at(|| name.to_owned())?;
+        }
+        let coordinates = std::mem::take(&mut self.coordinates);
+        // Without, a few coordinates claim any size.
+        if self.tuples < structured::cubes(dims) {
+            let what = "an array with a value for every point or cell".into();
+            return Err(ReadReason::Missing(what)).at(String::new);
+        }
+        self.curvilinear(structured::rectilinear(&coordinates))
+    }
+
+    /// A grid of which each point has a place of its own: these, or those of the section POINTS.
+    fn curvilinear(mut self, positions: Vec<f64>) -> Result<TetMesh, ReadError> {
+        let place = || "DIMENSIONS".to_owned();
+        let dims = self.dims.ok_or_else(|| missing("DIMENSIONS")).at(place)?;
+        let dims = structured::checked_dims(dims).at(place)?;
+        if !positions.is_empty() {
+            self.positions = Some(positions);
+        }
+        let positions = self.checked_positions()?;
+        let cubes = structured::cubes(dims);
+        let cell_fields = self.take_cell_fields(cubes).at(|| "CELL_DATA".into())?;
+        structured::mesh(dims, positions, self.fields.fields, cell_fields).at(|| "POINTS".into())
     }
 
     fn structured(mut self) -> Result<TetMesh, ReadError> {

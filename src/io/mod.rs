@@ -4,8 +4,16 @@
 //! |---|---|---|---|
 //! | VTK XML unstructured grid | `.vtu` | all encodings, several pieces | appended raw, zlib |
 //! | VTK XML image data | `.vti` | all encodings, several pieces | appended raw, zlib |
-//! | legacy VTK, versions 1.0 to 5.1 | `.vtk` | ASCII and binary; unstructured grids, structured points | |
+//! | legacy VTK, versions 1.0 to 5.1 | `.vtk` | ASCII and binary; unstructured, structured and rectilinear grids, structured points | |
+//! | VTK XML structured and rectilinear grids | `.vts`, `.vtr` | all encodings, several pieces | |
+//! | VTK XML unstructured grid in several files | `.pvtu` | by [`read`] | |
 //! | raw samples | `.raw` + `.json` | any numeric type and byte order | |
+//! | Gmsh, versions 1 to 4.1 | `.msh` | text and binary; feature `formats` | |
+//! | Medit | `.mesh`, `.sol` | text; feature `formats` | |
+//! | TetGen | `.node` + `.ele` | by [`read`]; feature `formats` | |
+//! | Netgen | `.vol` | feature `formats` | |
+//! | NRRD | `.nrrd`, `.nhdr` | raw, gzip, text; feature `formats` | |
+//! | `MetaImage` | `.mha`, `.mhd` | raw, zlib; feature `formats` | |
 //! | VTK XML poly data | `.vtp` | | appended raw, zlib |
 //! | STL | `.stl` | | binary, triangles alone |
 //! | PLY | `.ply` | | binary, little-endian |
@@ -17,17 +25,23 @@
 //! `name_magnitude`. Units and times are kept where the file contains them. Arrays at cells are read where that is asked
 //! for ([`ReadOptions::cells`]), arrays that are not numbers are left out.
 //! Time steps come in several files, which a `.pvd` may list: see [`steps`].
-//! Cells other than tetrahedra are refused. Readers check the file, not the mesh: see [`crate::mesh::repair`].
+//! Cells of other types are split into tetrahedra that fit those of their neighbours, linear and quadratic ones; cells without a
+//! volume are left out beside them. Readers check the file, not the mesh: see [`crate::mesh::repair`].
 
+mod cell_shapes;
 mod cells;
 mod error;
 mod fields;
+#[cfg(feature = "formats")]
+mod formats;
 mod image;
 mod legacy;
 mod number;
 mod payload;
 mod pvd;
+mod pvtu;
 mod raw;
+mod structured;
 mod surface;
 mod survey;
 mod time_steps;
@@ -40,11 +54,11 @@ pub use error::{ReadError, ReadReason};
 pub use image::MAX_GRID_POINTS;
 pub use pvd::{Step, steps};
 pub use surface::{PolyData, write_csv, write_obj, write_ply, write_stl, write_vtp};
-pub use survey::{Survey, survey, survey_raw};
+pub use survey::{Survey, format_of, survey, survey_raw};
 pub use time_steps::{FieldSelection, TimeStepsError, read_time_steps};
 pub use write::{write_vti, write_vtu};
 
-use std::path::Path;
+use std::path::{Component, Path};
 
 use crate::io::error::At;
 use crate::mesh::TetMesh;
@@ -73,7 +87,7 @@ pub enum CellData {
 
 /// Reads the mesh or grid in the file at `path`; of raw samples either the samples or the sidecar may be given.
 ///
-/// The kind of a file follows from its content; only `.raw` and `.json` are recognised by their names.
+/// The kind of a file follows from its content; only `.raw`, `.json`, `.node` and `.ele` are recognised by their names.
 ///
 /// # Errors
 /// If the file cannot be read, is damaged, or holds what is not read here: see [`ReadReason`].
@@ -90,7 +104,9 @@ pub fn read_with(path: &Path, options: &ReadOptions) -> Result<TetMesh, ReadErro
     match lower_extension(path).as_str() {
         "json" => read_raw_by_sidecar(path, None),
         "raw" => read_raw_by_sidecar(&path.with_extension("json"), Some(path)),
-        _ => read_bytes_with(&name, &load(path)?, options),
+        #[cfg(feature = "formats")]
+        "node" | "ele" => formats::tetgen::read(path, options),
+        _ => read_in(&name, &load(path)?, options, &|file| load_beside(path, file)),
     }
 }
 
@@ -107,17 +123,51 @@ pub fn read_bytes(name: &str, bytes: &[u8]) -> Result<TetMesh, ReadError> {
 /// Reads what is wanted from the bytes of a file, otherwise as [`read_bytes`].
 ///
 /// # Errors
-/// As [`read_with`].
+/// As [`read_with`], and if the file refers to others.
 pub fn read_bytes_with(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadError> {
+    let alone = |file: &str| {
+        let what = format!("a file that needs another (\"{file}\")");
+        Err(ReadReason::Unsupported { what, remedy: "give it by its path, with the other beside it".into() })
+    };
+    read_in(name, bytes, options, &alone)
+}
+
+/// Gets the bytes of another file, by its path from the folder of the one that is read.
+type Beside<'a> = &'a dyn Fn(&str) -> Result<Vec<u8>, ReadReason>;
+
+/// Reads a file that may refer to others.
+fn read_in(
+    name: &str,
+    bytes: &[u8],
+    options: &ReadOptions,
+    beside: Beside<'_>,
+) -> Result<TetMesh, ReadError> {
     let start = without_mark(bytes);
     let result = if bytes.starts_with(legacy::MAGIC) {
         legacy::read(bytes, options)
     } else if start.starts_with(b"<") {
-        read_xml(start, options)
+        read_xml(start, options, beside)
     } else {
-        Err(ReadReason::UnknownFormat).at(String::new)
+        read_other(name, bytes, options, beside)
     };
     result.map_err(|e| in_file(e, name))
+}
+
+/// Reads a format that is not VTK's.
+#[cfg(feature = "formats")]
+fn read_other(
+    name: &str,
+    bytes: &[u8],
+    options: &ReadOptions,
+    beside: Beside<'_>,
+) -> Result<TetMesh, ReadError> {
+    formats::read(name, bytes, options, beside)
+        .unwrap_or_else(|| Err(ReadReason::UnknownFormat).at(String::new))
+}
+
+#[cfg(not(feature = "formats"))]
+fn read_other(_: &str, _: &[u8], _: &ReadOptions, _: Beside<'_>) -> Result<TetMesh, ReadError> {
+    Err(ReadReason::UnknownFormat).at(String::new)
 }
 
 /// Reads raw samples, given their JSON sidecar:
@@ -143,14 +193,20 @@ fn read_raw_by_sidecar(sidecar_path: &Path, samples_path: Option<&Path>) -> Resu
     sidecar.mesh(&samples).at(String::new).map_err(|e| in_file(e, &samples_path.display().to_string()))
 }
 
-fn read_xml(bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadError> {
+fn read_xml(bytes: &[u8], options: &ReadOptions, beside: Beside<'_>) -> Result<TetMesh, ReadError> {
     let document = xml::Document::parse(bytes)?;
+    let mut time = document.time();
     let mut mesh = match document.kind.as_str() {
         "UnstructuredGrid" => vtu::read(&document, options)?,
         "ImageData" => image::read(&document, options)?,
+        structured::RECTILINEAR | structured::CURVILINEAR => structured::read(&document, options)?,
+        "PUnstructuredGrid" => {
+            let (mesh, of_pieces) = pvtu::read(&document, options, beside)?;
+            time = time.or(of_pieces);
+            mesh
+        }
         other => return Err(not_read(other)).at(String::new),
     };
-    let time = document.time();
     mesh.fields.iter_mut().chain(&mut mesh.cell_fields).for_each(|field| field.time = time);
     Ok(mesh)
 }
@@ -159,9 +215,11 @@ fn read_xml(bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadError> {
 fn not_read(kind: &str) -> ReadReason {
     let (what, remedy) = match kind {
         "Collection" => ("a list of time steps as one mesh".into(), "give one of the files that it lists"),
-        other => {
-            (format!("a data set of type {other}"), "give an UnstructuredGrid of tetrahedra or ImageData")
-        }
+        "PUnstructuredGrid" => ("a list of pieces".into(), "give one of the files that it lists"),
+        other => (
+            format!("a data set of type {other}"),
+            "give an UnstructuredGrid, a StructuredGrid, a RectilinearGrid or ImageData",
+        ),
     };
     ReadReason::Unsupported { what, remedy: remedy.into() }
 }
@@ -176,8 +234,20 @@ fn load(path: &Path) -> Result<Vec<u8>, ReadError> {
     bytes.at(String::new).map_err(|e| in_file(e, &path.display().to_string()))
 }
 
+/// Reads a file that another one refers to, which must lie in the folder of that or below.
+fn load_beside(path: &Path, file: &str) -> Result<Vec<u8>, ReadReason> {
+    let below = |part: Component<'_>| matches!(part, Component::Normal(_) | Component::CurDir);
+    if file.is_empty() || !Path::new(file).components().all(below) {
+        let what = format!("a file in another folder (\"{file}\")");
+        let remedy = "put the files beside the one that refers to them, or below it".into();
+        return Err(ReadReason::Unsupported { what, remedy });
+    }
+    std::fs::read(path.with_file_name("").join(file)).map_err(|e| ReadReason::Io(format!("\"{file}\": {e}")))
+}
+
+/// Names the file of an error that does not name another one.
 fn in_file(error: ReadError, name: &str) -> ReadError {
-    ReadError { file: name.to_owned(), ..error }
+    if error.file.is_empty() { ReadError { file: name.to_owned(), ..error } } else { error }
 }
 
 fn lower_extension(path: &Path) -> String {

@@ -107,6 +107,27 @@ impl NumberType {
         if self.is_integer() { Ok(all_decoded!(self, bytes, big, i64)) } else { Err(not_integers()) }
     }
 
+    /// Appends the bytes of a number.
+    #[cfg(feature = "formats")]
+    pub fn put(self, value: f64, big: bool, bytes: &mut Vec<u8>) {
+        let start = bytes.len();
+        match self {
+            Self::I8 => bytes.extend((value as i8).to_le_bytes()),
+            Self::U8 => bytes.extend((value as u8).to_le_bytes()),
+            Self::I16 => bytes.extend((value as i16).to_le_bytes()),
+            Self::U16 => bytes.extend((value as u16).to_le_bytes()),
+            Self::I32 => bytes.extend((value as i32).to_le_bytes()),
+            Self::U32 => bytes.extend((value as u32).to_le_bytes()),
+            Self::I64 => bytes.extend((value as i64).to_le_bytes()),
+            Self::U64 => bytes.extend((value as u64).to_le_bytes()),
+            Self::F32 => bytes.extend((value as f32).to_le_bytes()),
+            Self::F64 => bytes.extend(value.to_le_bytes()),
+        }
+        if big {
+            bytes[start..].reverse();
+        }
+    }
+
     /// One number from text. Single precision is rounded as such, so that text and binary files agree.
     pub fn parse_float(self, text: &str) -> Result<f64, ReadReason> {
         let value = if self == Self::F32 { text.parse::<f32>().map(f64::from) } else { text.parse::<f64>() };

@@ -1,17 +1,20 @@
 //! What a file contains, without its values: for questions before it is read, and for the memory that reading needs.
 
 use crate::io::error::{At, ReadError, ReadReason};
-use crate::io::{image, in_file, legacy, raw, vtu, xml};
+#[cfg(feature = "formats")]
+use crate::io::{CellData, ReadOptions, formats};
+use crate::io::{image, in_file, legacy, raw, structured, vtu, xml};
 use crate::mesh::{Field, Grid};
 
 /// What a file says that it contains. The data may be damaged even so.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Survey {
-    /// The format: `"vtu"`, `"vti"`, `"vtk"` or `"raw"`.
+    /// The format: `"vtu"`, `"vti"`, `"vtr"`, `"vts"`, `"vtk"`, `"raw"`, or with the feature `formats`
+    /// `"gmsh"`, `"medit"`, `"netgen"`, `"nrrd"` or `"metaimage"`.
     pub format: &'static str,
     /// Its points.
     pub points: u64,
-    /// Its cells; of a grid the tetrahedra that it is split into.
+    /// The tetrahedra, at most, that its cells are or are split into.
     pub cells: u64,
     /// The grid, if it is one.
     pub grid: Option<Grid>,
@@ -42,9 +45,32 @@ pub fn survey(name: &str, bytes: &[u8]) -> Result<Survey, ReadError> {
     } else if start.starts_with(b"<") {
         survey_xml(start)
     } else {
-        Err(ReadReason::UnknownFormat).at(String::new)
+        survey_other(name, bytes)
     };
     result.map_err(|e| in_file(e, name))
+}
+
+/// Says what a file of a format contains that is not VTK's: these are read for it.
+#[cfg(feature = "formats")]
+fn survey_other(name: &str, bytes: &[u8]) -> Result<Survey, ReadError> {
+    let Some(format) = formats::name(bytes) else { return Err(ReadReason::UnknownFormat).at(String::new) };
+    let options = ReadOptions { fields: None, cells: CellData::Names };
+    let mesh = super::read_bytes_with(name, bytes, &options)?;
+    let described =
+        |fields: Vec<Field>| fields.into_iter().map(|field| Field { values: Vec::new(), ..field });
+    Ok(Survey {
+        format,
+        points: mesh.positions.len() as u64,
+        cells: mesh.tets.len() as u64,
+        grid: mesh.grid,
+        fields: described(mesh.fields).collect(),
+        cell_fields: described(mesh.cell_fields).collect(),
+    })
+}
+
+#[cfg(not(feature = "formats"))]
+fn survey_other(_: &str, _: &[u8]) -> Result<Survey, ReadError> {
+    Err(ReadReason::UnknownFormat).at(String::new)
 }
 
 /// Says what the JSON sidecar of raw samples describes.
@@ -56,11 +82,47 @@ pub fn survey_raw(name: &str, sidecar: &[u8]) -> Result<Survey, ReadError> {
     Ok(sidecar.survey())
 }
 
+/// What the format of a file with these bytes is called, as [`Survey::format`] has it; none if it is not known. The rest of the
+/// content is not looked at.
+pub fn format_of(bytes: &[u8]) -> Option<&'static str> {
+    let start = super::without_mark(bytes);
+    if bytes.starts_with(legacy::MAGIC) {
+        return Some("vtk");
+    }
+    if !start.starts_with(b"<") {
+        return format_of_other(bytes);
+    }
+    // The root element names the type within its first words.
+    let head =
+        String::from_utf8_lossy(start.get(..start.len().min(1 << 12)).unwrap_or_default()).into_owned();
+    let (_, kind) = head.split_once("<VTKFile")?.1.split_once("type=")?;
+    let kind = kind.get(1..)?.split(['"', '\'']).next()?;
+    let formats = [
+        ("UnstructuredGrid", "vtu"),
+        ("ImageData", "vti"),
+        (structured::RECTILINEAR, "vtr"),
+        (structured::CURVILINEAR, "vts"),
+        ("PUnstructuredGrid", "pvtu"),
+    ];
+    formats.iter().find(|(name, _)| *name == kind).map(|(_, format)| *format)
+}
+
+#[cfg(feature = "formats")]
+fn format_of_other(bytes: &[u8]) -> Option<&'static str> {
+    formats::name(bytes)
+}
+
+#[cfg(not(feature = "formats"))]
+fn format_of_other(_: &[u8]) -> Option<&'static str> {
+    None
+}
+
 fn survey_xml(bytes: &[u8]) -> Result<Survey, ReadError> {
     let document = xml::Document::parse(bytes)?;
     match document.kind.as_str() {
         "UnstructuredGrid" => vtu::survey(&document),
         "ImageData" => image::survey(&document),
+        structured::RECTILINEAR | structured::CURVILINEAR => structured::survey(&document),
         other => Err(super::not_read(other)).at(String::new),
     }
 }

@@ -3,7 +3,7 @@
 use thiserror::Error;
 
 use crate::io::{CellData, ReadError, ReadOptions};
-use crate::mesh::{Field, StepError, TetMesh};
+use crate::mesh::{Field, GeometryField, StepError, TetMesh};
 
 /// Which fields of the files of a mesh are wanted.
 #[derive(Clone, Copy, Debug)]
@@ -80,7 +80,9 @@ pub fn read_time_steps(
 /// names those that are there.
 fn reduce(mesh: &mut TetMesh, wanted: &FieldSelection<'_>) -> Option<Vec<String>> {
     let any = |test: &dyn Fn(&Field) -> bool| mesh.fields.iter().chain(&mesh.cell_fields).any(test);
-    if !wanted.names.iter().all(|name| any(&|field| field.answers_to(name))) {
+    let is_known =
+        |name: &String| GeometryField::named(name).is_some() || any(&|field| field.answers_to(name));
+    if !wanted.names.iter().all(is_known) {
         return None;
     }
     if wanted.names.is_empty() && !wanted.all {

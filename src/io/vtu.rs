@@ -1,6 +1,7 @@
-//! VTK XML unstructured grids (`.vtu`), all encodings, any number of pieces. Vertices as cells are left out: what has no
-//! others is a mesh of points without tetrahedra.
+//! VTK XML unstructured grids (`.vtu`), all encodings, any number of pieces. What has vertices alone as cells is a mesh of
+//! points without tetrahedra.
 
+use crate::io::cells::{CellList, Numbering};
 use crate::io::error::{At, ReadError, ReadReason};
 use crate::io::fields::Collector;
 use crate::io::xml::{Array, Document, Piece};
@@ -11,20 +12,31 @@ use crate::mesh::{Field, TetMesh};
 pub(super) fn read(document: &Document<'_>, options: &ReadOptions) -> Result<TetMesh, ReadError> {
     let mut mesh = TetMesh::default();
     for (i, piece) in document.pieces.iter().enumerate() {
-        let part = PieceReader { document, piece, number: i, options }.read(mesh.positions.len())?;
+        let first = mesh.positions.len();
+        let part = PieceReader { document, piece, number: i, options }.read(&mut |points| {
+            Ok(Numbering::From { first: first_number(first, points.len())?, points: points.len() })
+        })?;
         join(&mut mesh, part, i == 0).at(|| format!("piece {i}, <PointData>"))?;
     }
     Ok(mesh)
 }
 
-/// Says what a document of type `UnstructuredGrid` contains.
+/// The number of the first of so many points behind others.
+pub(super) fn first_number(first: usize, points: usize) -> Result<u32, ReadReason> {
+    let end = first.checked_add(points).and_then(|end| u32::try_from(end).ok());
+    let too_large = || ReadReason::TooLarge { what: "points".into(), limit: u64::from(u32::MAX) };
+    end.map(|_| first as u32).ok_or_else(too_large)
+}
+
+/// Says what a document of type `UnstructuredGrid` contains; of its arrays only the types of cells are decoded.
 pub(super) fn survey(document: &Document<'_>) -> Result<Survey, ReadError> {
     let (mut points, mut cells) = (0_u64, 0_u64);
-    for (i, piece) in document.pieces.iter().enumerate() {
-        for (name, sum) in [("NumberOfPoints", &mut points), ("NumberOfCells", &mut cells)] {
-            let count = piece.attributes.count(name).at(|| format!("piece {i}"))?;
-            *sum = sum.saturating_add(count as u64);
-        }
+    let options = &ReadOptions::default();
+    for (number, piece) in document.pieces.iter().enumerate() {
+        let reader = PieceReader { document, piece, number, options };
+        let count = piece.attributes.count("NumberOfPoints").at(|| reader.place())?;
+        points = points.saturating_add(count as u64);
+        cells = cells.saturating_add(reader.most_tets()?);
     }
     let [fields, cell_fields] = names(document)?;
     Ok(Survey { format: "vtu", points, cells, grid: None, fields, cell_fields })
@@ -52,34 +64,36 @@ impl PieceReader<'_, '_> {
         format!("piece {}", self.number)
     }
 
-    /// An unstructured grid, whose first point gets number `first`.
-    fn read(&self, first: usize) -> Result<TetMesh, ReadError> {
+    /// An unstructured grid. Its points are numbered as `numbers` says, which gets their positions.
+    pub fn read(
+        &self,
+        numbers: &mut dyn FnMut(&[[f64; 3]]) -> Result<Numbering, ReadReason>,
+    ) -> Result<TetMesh, ReadError> {
         let place = || self.place();
         let points = self.piece.attributes.count("NumberOfPoints").at(place)?;
         let cells = self.piece.attributes.count("NumberOfCells").at(place)?;
-        let first = points
-            .checked_add(first)
-            .and_then(|end| u32::try_from(end).ok())
-            .map(|_| first as u32)
-            .ok_or_else(|| ReadReason::TooLarge { what: "points".into(), limit: u64::from(u32::MAX) })
-            .at(place)?;
-        let tets = self.cells(cells, points, first)?;
+        let listed = self.cells(cells)?;
         let positions = self.points(points)?;
+        let numbering = numbers(&positions).at(place)?;
+        let split = listed.map(|listed| listed.split(&numbering)).transpose();
+        let split = split.at(|| format!("{}, <Cells>, array \"connectivity\"", place()))?;
         let fields = self.fields("PointData", points)?;
-        // Where all cells were left out, so is what is known of them.
-        let cell_fields = match self.options.cells {
-            _ if tets.len() < cells => Vec::new(),
+        let mut cell_fields = match self.options.cells {
+            // Where all cells were left out, so is what is known of them.
+            _ if split.is_none() => Vec::new(),
             CellData::LeaveOut => Vec::new(),
             CellData::Names => self.field_names("CellData")?,
             CellData::Values => self.cell_fields(cells)?,
         };
-        Ok(TetMesh { positions, fields, tets, grid: None, cell_fields })
+        let split = split.unwrap_or_default();
+        split.spread(&mut cell_fields);
+        Ok(TetMesh { positions, fields, tets: split.tets, grid: None, cell_fields })
     }
 
     /// The fields in a section, each of `tuples` values.
     pub fn fields(&self, section: &str, tuples: usize) -> Result<Vec<Field>, ReadError> {
         let mut collector = Collector::new(self.options.fields.as_deref());
-        for array in self.piece.section(section) {
+        for array in self.piece.section(section).filter(|array| is_field(array)) {
             let Some(number) = array.number_type() else { continue };
             let components = array.components().at(|| array.place())?;
             let Some(claim) = collector.claim(array.name(), components).at(|| array.place())? else {
@@ -105,7 +119,7 @@ impl PieceReader<'_, '_> {
     /// The fields in a section without their values.
     pub fn field_names(&self, section: &str) -> Result<Vec<Field>, ReadError> {
         let mut collector = Collector::new(self.options.fields.as_deref());
-        for array in self.piece.section(section).filter(|array| array.number_type().is_some()) {
+        for array in self.piece.section(section).filter(|array| is_field(array)) {
             let components = array.components().at(|| array.place())?;
             if let Some(claim) = collector.claim(array.name(), components).at(|| array.place())? {
                 collector.keep_names(claim, array.unit());
@@ -114,7 +128,7 @@ impl PieceReader<'_, '_> {
         Ok(collector.fields)
     }
 
-    fn points(&self, points: usize) -> Result<Vec<[f64; 3]>, ReadError> {
+    pub fn points(&self, points: usize) -> Result<Vec<[f64; 3]>, ReadError> {
         let Some(array) = self.piece.section("Points").next() else {
             if points == 0 {
                 return Ok(Vec::new());
@@ -130,9 +144,10 @@ impl PieceReader<'_, '_> {
         points_from(&values).at(|| array.place())
     }
 
-    fn cells(&self, cells: usize, points: usize, first: u32) -> Result<Vec<[u32; 4]>, ReadError> {
+    /// The cells; none if the piece has points alone.
+    fn cells(&self, cells: usize) -> Result<Option<CellList>, ReadError> {
         if cells == 0 {
-            return Ok(Vec::new());
+            return Ok(Some(CellList::default()));
         }
         let find = |name: &str| -> Result<&Array<'_>, ReadError> {
             let found = self.piece.section("Cells").find(|a| a.name() == name);
@@ -140,23 +155,61 @@ impl PieceReader<'_, '_> {
             found.ok_or_else(missing).at(|| self.place())
         };
         let types = find("types")?;
-        let kinds = self.document.integers(types, cells).at(|| types.place())?;
+        let mut kinds = self.document.integers(types, cells).at(|| types.place())?;
         if cells::are_points(&kinds) {
-            return Ok(Vec::new());
+            return Ok(None);
         }
-        cells::only_tetrahedra(&kinds).at(|| types.place())?;
+        cells::most_tets(&kinds).at(|| types.place())?;
         let offsets = find("offsets")?;
         let ends = self.document.integers(offsets, cells).at(|| offsets.place())?;
-        cells::ends_of_tetrahedra(&ends).at(|| offsets.place())?;
+        let length = cells::checked_ends(&kinds, &ends).at(|| offsets.place())?;
         let connectivity = find("connectivity")?;
-        // The offsets were read, so there are fewer cells than bytes in memory and this does not overflow.
-        let list = self.document.integers(connectivity, 4 * cells).at(|| connectivity.place())?;
-        cells::tetrahedra(&list, points, first).at(|| connectivity.place())
+        let list = self.document.integers(connectivity, length).at(|| connectivity.place())?;
+        self.leave_out_ghosts(&mut kinds)?;
+        Ok(Some(CellList { types: kinds, ends, connectivity: list }))
+    }
+
+    /// The tetrahedra at most that the cells become.
+    fn most_tets(&self) -> Result<u64, ReadError> {
+        let cells = self.piece.attributes.count("NumberOfCells").at(|| self.place())?;
+        let Some(types) = self.piece.section("Cells").find(|a| a.name() == "types").filter(|_| cells > 0)
+        else {
+            return Ok(0);
+        };
+        let kinds = self.document.integers(types, cells).at(|| types.place())?;
+        if cells::are_points(&kinds) { Ok(0) } else { cells::most_tets(&kinds).at(|| types.place()) }
+    }
+
+    /// Makes empty cells of those that are another piece's, or hidden.
+    fn leave_out_ghosts(&self, kinds: &mut [i64]) -> Result<(), ReadError> {
+        for array in self.piece.section("CellData") {
+            let left_out = match array.name() {
+                GHOST_TYPE => GHOST_OR_HIDDEN,
+                GHOST_LEVELS => i64::MAX,
+                _ => continue,
+            };
+            let flags = self.document.integers(array, kinds.len()).at(|| array.place())?;
+            let ghosts = kinds.iter_mut().zip(flags).filter(|(_, flags)| flags & left_out != 0);
+            ghosts.for_each(|(kind, _)| *kind = cells::EMPTY);
+        }
+        Ok(())
     }
 }
 
+/// Arrays at cells and points by which VTK marks what belongs to another piece, or is hidden: flags of each, and how far it is
+/// from the piece in old files.
+const GHOST_TYPE: &str = "vtkGhostType";
+const GHOST_LEVELS: &str = "vtkGhostLevels";
+/// The flags of cells that another piece has, and of those that are hidden.
+const GHOST_OR_HIDDEN: i64 = 1 | 32;
+
+/// Whether an array is a field, not a mark of VTK's.
+fn is_field(array: &Array<'_>) -> bool {
+    array.number_type().is_some() && ![GHOST_TYPE, GHOST_LEVELS].contains(&array.name())
+}
+
 /// Appends a piece, which must have the fields of those before it.
-fn join(mesh: &mut TetMesh, part: TetMesh, is_first: bool) -> Result<(), ReadReason> {
+pub(super) fn join(mesh: &mut TetMesh, part: TetMesh, is_first: bool) -> Result<(), ReadReason> {
     if is_first {
         *mesh = part;
         return Ok(());

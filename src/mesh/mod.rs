@@ -6,6 +6,8 @@ mod cell_data;
 mod changed_blocks;
 mod check;
 mod error;
+#[cfg(feature = "build")]
+mod geometry_field;
 mod grow;
 mod histogram;
 mod kuhn;
@@ -21,6 +23,8 @@ pub(crate) use bit_set::BitSet;
 pub(crate) use changed_blocks::{BLOCK, ChangedBlocks};
 pub use check::check;
 pub use error::MeshError;
+#[cfg(feature = "build")]
+pub use geometry_field::GeometryField;
 #[cfg(any(feature = "build", test))]
 pub(crate) use grow::growth_order;
 pub(crate) use grow::{Gate, Growth};

@@ -11,7 +11,7 @@ use crate::io::{
     self, CellData, FieldSelection, ReadError, ReadOptions, ReadReason, Survey, TimeStepsError,
     read_time_steps,
 };
-use crate::mesh::{self, Field, MeshError, TetMesh};
+use crate::mesh::{self, Field, GeometryField, MeshError, TetMesh};
 use js_sys::{Function, Object, Reflect, Uint8Array};
 use serde::Serialize;
 use std::cell::RefCell;
@@ -184,7 +184,8 @@ impl MeshBuilder {
         let BuildOptions { config, cells, .. } = options;
         let has = |fields: &[Field], name: &str| fields.iter().any(|field| field.answers_to(name));
         for name in &config.fields {
-            if has(&survey.fields, name) || *cells && has(&survey.cell_fields, name) {
+            let is_there = has(&survey.fields, name) || *cells && has(&survey.cell_fields, name);
+            if is_there || GeometryField::named(name).is_some() && !has(&survey.cell_fields, name) {
                 continue;
             }
             if has(&survey.cell_fields, name) {
@@ -223,6 +224,7 @@ impl MeshBuilder {
         if cells {
             mesh.cells_to_points();
         }
+        mesh.add_geometry_fields(&config.fields);
         set_units(&mut mesh, &units)?;
         let built = builder::build(&mesh, &config, &mut |step| stages.step(&step));
         let built = built.map_err(|error| in_input(&name, error))?;
@@ -474,7 +476,7 @@ impl From<ReadError> for WebError {
         let code = match error.reason {
             ReadReason::Io(_) => "bad-source",
             ReadReason::UnknownFormat => "unknown-format",
-            ReadReason::Unsupported { .. } | ReadReason::NotTetrahedra(_) => "unsupported",
+            ReadReason::Unsupported { .. } | ReadReason::CellTypes(_) => "unsupported",
             ReadReason::Truncated { .. } => "truncated",
             ReadReason::TooLarge { .. } => "limit",
             ReadReason::NotFinite { .. } | ReadReason::NotFiniteCell { .. } => "bad-mesh",
@@ -521,6 +523,7 @@ impl From<BuildError> for WebError {
 fn options_of(remedy: Remedy) -> &'static str {
     match remedy {
         Remedy::Insert | Remedy::Decimate => "`method`",
+        Remedy::Field => "`fields`",
         Remedy::CellsToPoints => "`cellToPoint`",
         Remedy::FieldTolerance => "`fieldTolerance` or `lossless`",
         Remedy::PositionTolerance => "`positionTolerance`",

@@ -27,6 +27,13 @@ pub fn files() -> Vec<(String, Vec<u8>, TetMesh)> {
         }
     }
     list.push(("points.vtk".into(), sample_points_vtk(true), grid_sample()));
+    list.push(("a.vtr".into(), sample_vtr(style(Format::AppendedRaw, "ZLib", false)), uneven_sample()));
+    list.push(("a.vts".into(), sample_vts(style(Format::Ascii, "", false)), uneven_sample()));
+    list.push(("rectilinear.vtk".into(), sample_rectilinear_vtk(true), uneven_sample()));
+    list.push(("structured.vtk".into(), sample_structured_vtk(false), uneven_sample()));
+    list.push(("mixed.vtu".into(), mixed_vtu(style(Format::Ascii, "", false)), mixed_sample()));
+    list.push(("mixed 3.0.vtk".into(), mixed_vtk("3.0", true), mixed_sample()));
+    list.push(("mixed 5.1.vtk".into(), mixed_vtk("5.1", false), mixed_sample()));
     list
 }
 
@@ -203,9 +210,10 @@ fn errors_say_file_place_reason_and_remedy() {
          number; replace it or leave this array out"
     );
     assert_eq!(
-        text("\n10 10 10 10", "\n12 12 13 5"),
-        "dir/a.vtu: piece 0, <Cells>, array \"types\": 12 cells: 1 triangle, 8 tetrahedra, 2 hexahedra, 1 wedge; only \
-         tetrahedra are read for now, split or remove the others (in ParaView: Tetrahedralize)"
+        text("\n10 10 10 10", "\n42 42 13 5"),
+        "dir/a.vtu: piece 0, <Cells>, array \"types\": 12 cells: 1 triangle, 8 tetrahedra, 1 wedge, 2 polyhedra; \
+         tetrahedra, hexahedra, voxels, wedges, pyramids and prisms are read, also quadratic ones, and what has no volume is \
+         left out beside them: convert the others (in ParaView: Tetrahedralize)"
     );
     assert_eq!(
         text("\n0 1 4 10", "\n0 1 4 12"),
@@ -214,7 +222,7 @@ fn errors_say_file_place_reason_and_remedy() {
     );
     assert!(text("\n0 1 4 10", "\n0 -1 4 10").contains("refers to point -1"));
     assert!(text("\n-1.5 0.25 1000", "\n-1.5 0.25 inf").contains("array \"Points\": the value at point 0"));
-    assert!(text("4 8 12", "4 9 12").contains("tetrahedron 1 does not have four points"));
+    assert!(text("4 8 12", "4 9 12").contains("cell 1, a tetrahedron, has 5 points, not 4"));
     assert!(text("Name=\"types\"", "Name=\"tapes\"").contains("array \"types\" of <Cells> is missing"));
     assert!(
         text("format=\"ascii\"", "format=\"appended\" offset=\"0\"").contains("<AppendedData> is missing")

@@ -115,7 +115,7 @@ pub fn xml(style: Style, kind: &str, dataset: &str, pieces: &[(String, Vec<Array
     let mut body = String::new();
     for (attributes, arrays) in pieces {
         body += &format!("<Piece {attributes}>");
-        for section in ["PointData", "CellData", "Points", "Cells"] {
+        for section in ["PointData", "CellData", "Points", "Coordinates", "Cells"] {
             body += &format!("<{section}>\n");
             for array in arrays.iter().filter(|a| a.section == section) {
                 body += &xml_array(style, array, &mut data);
@@ -366,4 +366,172 @@ pub fn sample_sidecar(kind: &str, endian: &str) -> String {
         "{{\"dims\": [4, 3, 2], \"type\": \"{kind}\", \"endian\": \"{endian}\", \"spacing\": [0.5, 1, 0.25], \
          \"origin\": [1, 2, -3], \"field\": \"density\"}}"
     )
+}
+
+/// The positions of a grid whose points are not evenly spaced, along each axis.
+const UNEVEN: [&[f64]; 3] = [&[0.0, 1.0, 4.0], &[-2.0, 0.5], &[0.0, 0.25, 8.0]];
+
+/// A grid whose points are not evenly spaced.
+pub fn uneven_sample() -> TetMesh {
+    let grid = Grid { dims: [3, 2, 3], origin: [0.0; 3], spacing: [1.0; 3] };
+    let mut mesh = TetMesh::from_grid(grid, Vec::new());
+    let at = |axis: usize, index: f64| UNEVEN[axis][index as usize];
+    mesh.positions.iter_mut().for_each(|p| *p = [at(0, p[0]), at(1, p[1]), at(2, p[2])]);
+    mesh.grid = None;
+    let values = (0..18).map(|i| f64::from(i) * 1.5).collect();
+    mesh.fields = vec![Field::new("density", values)];
+    mesh
+}
+
+fn uneven_file(style: Style, kind: &'static str, places: Vec<Array>) -> Vec<u8> {
+    let mut arrays =
+        vec![Array::new("PointData", "density", "Float64", 1, &uneven_sample().fields[0].values)];
+    arrays.extend(places);
+    xml(style, kind, "WholeExtent=\"0 2 5 6 0 2\"", &[("Extent=\"0 2 5 6 0 2\"".to_owned(), arrays)])
+}
+
+/// [`uneven_sample`] as a `.vtr` file.
+pub fn sample_vtr(style: Style) -> Vec<u8> {
+    let axis = |axis: usize| Array::new("Coordinates", "", "Float32", 1, UNEVEN[axis]);
+    uneven_file(style, "RectilinearGrid", (0..3).map(axis).collect())
+}
+
+/// [`uneven_sample`] as a `.vts` file.
+pub fn sample_vts(style: Style) -> Vec<u8> {
+    let points = uneven_sample().positions.into_flattened();
+    uneven_file(style, "StructuredGrid", vec![Array::new("Points", "Points", "Float64", 3, &points)])
+}
+
+fn uneven_vtk(binary: bool, kind: &str, places: &[(String, &[f64])]) -> Vec<u8> {
+    let encoding = if binary { "BINARY" } else { "ASCII" };
+    let head = format!("# vtk DataFile Version 3.0\ntitle\n{encoding}\nDATASET {kind}\nDIMENSIONS 3 2 3\n");
+    let mut file = head.into_bytes();
+    for (announcement, numbers) in places {
+        file.extend(format!("{announcement} double\n").bytes());
+        file.extend(legacy_numbers(binary, "Float64", numbers));
+    }
+    file.extend(b"POINT_DATA 18\nSCALARS density double\nLOOKUP_TABLE default\n");
+    file.extend(legacy_numbers(binary, "Float64", &uneven_sample().fields[0].values));
+    file
+}
+
+/// [`uneven_sample`] as a legacy rectilinear grid.
+pub fn sample_rectilinear_vtk(binary: bool) -> Vec<u8> {
+    let axis =
+        |(name, axis): (&str, usize)| (format!("{name}_COORDINATES {}", UNEVEN[axis].len()), UNEVEN[axis]);
+    uneven_vtk(binary, "RECTILINEAR_GRID", &[("X", 0), ("Y", 1), ("Z", 2)].map(axis))
+}
+
+/// [`uneven_sample`] as a legacy structured grid.
+pub fn sample_structured_vtk(binary: bool) -> Vec<u8> {
+    let points = uneven_sample().positions.into_flattened();
+    uneven_vtk(binary, "STRUCTURED_GRID", &[("POINTS 18".to_owned(), &points)])
+}
+
+/// A hexahedron, a wedge and a pyramid beside it, a tetrahedron on the wedge, and a triangle: types and points.
+const MIXED: [(u8, &[u32]); 5] = [
+    (12, &[0, 1, 2, 3, 4, 5, 6, 7]),
+    (5, &[0, 1, 2]),
+    (13, &[1, 8, 5, 2, 9, 6]),
+    (14, &[4, 5, 6, 7, 10]),
+    (10, &[1, 8, 5, 11]),
+];
+const MIXED_POINTS: [[f64; 3]; 12] = [
+    [0.0, 0.0, 0.0],
+    [1.0, 0.0, 0.0],
+    [1.0, 1.0, 0.0],
+    [0.0, 1.0, 0.0],
+    [0.0, 0.0, 1.0],
+    [1.0, 0.0, 1.0],
+    [1.0, 1.0, 1.0],
+    [0.0, 1.0, 1.0],
+    [2.0, 0.0, 0.0],
+    [2.0, 1.0, 0.0],
+    [0.5, 0.5, 2.0],
+    [1.5, -1.0, 0.5],
+];
+
+/// What a file of these cells is read as: the rule by which they are split is written here once more, by hand.
+pub fn mixed_sample() -> TetMesh {
+    let tets = vec![
+        // The hexahedron: its lowest vertex to the faces that it is not on.
+        [0, 4, 5, 6],
+        [0, 4, 6, 7],
+        [0, 1, 2, 6],
+        [0, 1, 6, 5],
+        [0, 2, 3, 7],
+        [0, 2, 7, 6],
+        // The wedge.
+        [1, 2, 6, 9],
+        [1, 5, 8, 9],
+        [1, 5, 9, 6],
+        // The pyramid.
+        [4, 5, 6, 10],
+        [4, 6, 7, 10],
+        [1, 8, 5, 11],
+    ];
+    let values = (0..12).map(|i| f64::from(i) * 0.5).collect();
+    TetMesh {
+        positions: MIXED_POINTS.to_vec(),
+        fields: vec![Field::new("p", values)],
+        tets,
+        ..TetMesh::default()
+    }
+}
+
+/// [`mixed_sample`] as a `.vtu` file with a field `m` at its cells: their numbers.
+pub fn mixed_vtu(style: Style) -> Vec<u8> {
+    let ids: Vec<f64> = MIXED.iter().flat_map(|(_, points)| points.iter().map(|p| f64::from(*p))).collect();
+    let mut end = 0.0;
+    let ends: Vec<f64> = MIXED
+        .iter()
+        .map(|(_, points)| {
+            end += points.len() as f64;
+            end
+        })
+        .collect();
+    let types: Vec<f64> = MIXED.iter().map(|(kind, _)| f64::from(*kind)).collect();
+    let arrays = vec![
+        Array::new("PointData", "p", "Float32", 1, &mixed_sample().fields[0].values),
+        Array::new("CellData", "m", "Float64", 1, &[0.0, 1.0, 2.0, 3.0, 4.0]),
+        Array::new("Points", "Points", "Float32", 3, MIXED_POINTS.as_flattened()),
+        Array::new("Cells", "connectivity", "Int32", 1, &ids),
+        Array::new("Cells", "offsets", "Int64", 1, &ends),
+        Array::new("Cells", "types", "UInt8", 1, &types),
+    ];
+    xml(style, "UnstructuredGrid", "", &[("NumberOfPoints=\"12\" NumberOfCells=\"5\"".to_owned(), arrays)])
+}
+
+/// The same as a legacy file.
+pub fn mixed_vtk(version: &str, binary: bool) -> Vec<u8> {
+    let encoding = if binary { "BINARY" } else { "ASCII" };
+    let mut file = format!(
+        "# vtk DataFile Version {version}\ntitle\n{encoding}\nDATASET UNSTRUCTURED_GRID\nPOINTS 12 float\n"
+    )
+    .into_bytes();
+    file.extend(legacy_numbers(binary, "Float32", MIXED_POINTS.as_flattened()));
+    let ids: Vec<f64> = MIXED.iter().flat_map(|(_, points)| points.iter().map(|p| f64::from(*p))).collect();
+    if version.starts_with('5') {
+        file.extend(format!("CELLS 6 {}\nOFFSETS vtktypeint64\n", ids.len()).bytes());
+        let mut offsets = vec![0.0];
+        MIXED.iter().for_each(|(_, points)| offsets.push(offsets[offsets.len() - 1] + points.len() as f64));
+        file.extend(legacy_numbers(binary, "Int64", &offsets));
+        file.extend(b"CONNECTIVITY vtktypeint64\n");
+        file.extend(legacy_numbers(binary, "Int64", &ids));
+    } else {
+        let counted = |(_, points): &(u8, &[u32])| -> Vec<f64> {
+            std::iter::once(points.len() as f64).chain(points.iter().map(|p| f64::from(*p))).collect()
+        };
+        let list: Vec<f64> = MIXED.iter().flat_map(counted).collect();
+        file.extend(format!("CELLS 5 {}\n", list.len()).bytes());
+        file.extend(legacy_numbers(binary, "Int32", &list));
+    }
+    file.extend(b"CELL_TYPES 5\n");
+    let types: Vec<f64> = MIXED.iter().map(|(kind, _)| f64::from(*kind)).collect();
+    file.extend(legacy_numbers(binary, "Int32", &types));
+    file.extend(b"CELL_DATA 5\nSCALARS m double\nLOOKUP_TABLE default\n");
+    file.extend(legacy_numbers(binary, "Float64", &[0.0, 1.0, 2.0, 3.0, 4.0]));
+    file.extend(b"POINT_DATA 12\nSCALARS p float\nLOOKUP_TABLE default\n");
+    file.extend(legacy_numbers(binary, "Float32", &mixed_sample().fields[0].values));
+    file
 }

@@ -1,10 +1,14 @@
 //! Promises of the exchange formats.
 
+mod cells;
 mod damaged;
 mod encodings;
 mod fields;
 #[allow(dead_code, reason = "each test uses a part of it")]
 mod files;
+#[cfg(feature = "formats")]
+mod meshers;
+mod pieces;
 mod real;
 mod surfaces;
 mod survey;

@@ -68,16 +68,6 @@ fn files_that_must_be_refused() {
     for (name, reason) in [
         ("native/Armadillo_Tetra_4406_for_test_broken.vtu", "expected 4407, found 4406"),
         ("native/liver_for_test_broken.vtk", "is not known"),
-        (
-            "native/uGridEx.vtk",
-            "12 cells: 1 vertex, 2 lines, 2 triangles, 1 triangle strip, 1 polygon, 1 quad, 2 tetrahedra, 2 hexahedra",
-        ),
-        ("native/QuadraticTetra.vtu", "96 cells: 96 quadratic tetrahedra"),
-        ("native/manifoldCheck1.vtu", "4 cells: 4 hexahedra"),
-        ("native/manifoldCheck2.vtu", "4 cells: 4 hexahedra"),
-        ("native/6_tetra_bad.msh", "not a format that is known"),
-        ("native/piece.bin.v41.msh", "not a format that is known"),
-        ("native/unit_ball.mesh", "not a format that is known"),
     ] {
         let error = refused(&folder, name).to_string();
         assert!(error.contains(reason), "{error}");
@@ -117,6 +107,9 @@ const GOOD: &[Expected] = &[
     ("native/cylinder.vtk", 354, 1348, 1, 440, ""),
     ("native/cut-cylinder.vtk", 1147, 3279, 2, 2286, ""),
     ("native/Tetrahedron.vtu", 35, 96, 1, 48, ""),
+    ("native/QuadraticTetra.vtu", 189, 768, 1, 192, ""),
+    ("native/manifoldCheck1.vtu", 24, 24, 3, 44, "repaired: turned 24 inverted tetrahedra"),
+    ("native/uGridEx.vtk", 14, 14, 2, 26, "repaired: dropped 13 unused points"),
     ("native/Armadillo_Tetra_4406.vtu", 1446, 4406, 1, 2532, ""),
     (
         "native/bracket_appended_compressed.vtu",
@@ -180,4 +173,30 @@ fn meshes_that_cannot_be_mended_name_their_cells() {
         mesh::check(&one).is_ok()
     });
     assert_ne!(positive[0], positive[1], "cells {tets:?}");
+}
+
+#[cfg(feature = "formats")]
+#[test]
+fn files_of_meshers() {
+    let Some(folder) = real_data() else { return };
+    for (name, points, tets, repaired) in [
+        ("native/liver.msh", 181, 596, (181, 596)),
+        ("native/6_tetra_bad.msh", 17, 6, (17, 6)),
+        ("native/homology.asc.v22.msh", 1961, 7392, (1961, 7392)),
+        ("native/piece.bin.v22.msh", 3939, 13179, (3915, 13179)),
+        ("native/piece.asc.v40.msh", 4096, 13676, (4096, 13676)),
+        ("native/piece.asc.v41.msh", 4094, 13370, (4094, 13370)),
+        ("native/unit_ball.mesh", 363, 1110, (362, 1110)),
+        ("native/octopus-low.mesh", 452, 1140, (452, 1140)),
+    ] {
+        let mesh = read(&folder, name);
+        assert_eq!((mesh.positions.len(), mesh.tets.len()), (points, tets), "{name}");
+        let (mended, _) = mesh::repair(mesh).unwrap_or_else(|e| panic!("{name}: {e}"));
+        assert_eq!((mended.positions.len(), mended.tets.len()), repaired, "{name}");
+    }
+    let [text, binary] = ["asc", "bin"].map(|kind| read(&folder, &format!("native/piece.{kind}.v41.msh")));
+    assert_eq!(text.tets, binary.tets);
+    let pairs = text.positions.as_flattened().iter().zip(binary.positions.as_flattened());
+    pairs
+        .for_each(|(text, binary)| assert!((text - binary).abs() <= 1e-14 * binary.abs(), "{text} {binary}"));
 }

@@ -1,6 +1,6 @@
 //! Promises of the command for several fields, time steps, fields at cells, units and precision.
 
-use crate::support::{Folder, bad, good, json, number, run, text};
+use crate::support::{Folder, bad, command, good, json, number, run, text};
 use std::fs;
 use std::fs::File;
 use tetralod::io;
@@ -189,4 +189,49 @@ fn precision_is_asked_for_and_told() {
         assert_eq!(output.status.code(), Some(code), "{more:?}: {error}");
         assert!(error.contains(word), "{more:?}: {error}");
     }
+}
+
+/// The same mesh without its field.
+fn bare() -> String {
+    TWO_CELLS.split("CELL_DATA").next().expect("what comes before").to_owned()
+}
+
+#[test]
+fn a_mesh_without_a_field_is_built_for_its_shape() {
+    let folder = Folder::new("shape");
+    let [input, mt, out] = ["a.vtk", "a.mt", "b.vtu"].map(|name| folder.path(name));
+    fs::write(&input, bare()).expect("a new file");
+    bad(1, &["build", &input, "-o", &mt], &["no point field", "distance", "--field"]);
+    bad(1, &["build", &input, "-o", &mt, "--field", "w"], &["'w'"]);
+    for (name, range) in [("x", [0.0, 1.0]), ("z", [-3.0, 1.0]), ("none", [0.0, 0.0])] {
+        good(&["build", &input, "-o", &mt, "--field", name, "--quiet"]);
+        json(&["extract", &mt, "-o", &out, "--json"]);
+        let field = &io::read(out.as_ref()).expect("a mesh").fields[0];
+        assert_eq!(field.name, name);
+        let mut values = field.values.clone();
+        values.sort_by(f64::total_cmp);
+        for (value, expected) in [(values[0], range[0]), (values[4], range[1])] {
+            assert!((value - expected).abs() < 1e-3, "{name}: {value} instead of {expected}");
+        }
+        good(&["verify", &mt, "--against", &input, "--quick"]);
+    }
+}
+
+#[test]
+fn the_standard_input_is_read() {
+    let folder = Folder::new("stdin");
+    let [input, mt, same] = ["a.vtk", "a.mt", "b.mt"].map(|name| folder.path(name));
+    fs::write(&input, bare()).expect("a new file");
+    good(&["build", &input, "-o", &mt, "--field", "x", "--quiet"]);
+    let piped = |arguments: &[&str]| {
+        let file = fs::File::open(&input).expect("a file");
+        command(arguments).stdin(file).output().expect("the command starts")
+    };
+    let built = piped(&["build", "-", "-o", &same, "--field", "x", "--quiet", "--format", "vtk"]);
+    assert!(built.status.success(), "{}", text(&built.stderr));
+    assert_eq!(fs::read(&mt).expect("a file"), fs::read(&same).expect("a file"));
+    let refused = piped(&["build", "-", "-o", &same, "--field", "x", "--format", "gmsh"]);
+    let error = text(&refused.stderr);
+    assert!(!refused.status.success() && error.contains("vtk, not gmsh"), "{error}");
+    bad(2, &["build", &input, "-o", &mt, "--format", "vtk"], &["--format", "'-'"]);
 }

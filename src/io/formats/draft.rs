@@ -1,0 +1,105 @@
+//! A mesh as the files of meshers list it, before its cells are split.
+
+use crate::io::cells::{self, CellList, Numbering};
+use crate::io::error::ReadReason;
+use crate::io::fields::Collector;
+use crate::io::{CellData, ReadOptions, points_from};
+use crate::mesh::{Field, TetMesh};
+
+/// Points, cells and fields as they were read.
+pub(super) struct Draft<'a> {
+    pub options: &'a ReadOptions,
+    pub coordinates: Vec<f64>,
+    list: CellList,
+    pub fields: Collector<'a>,
+    pub cell_fields: Collector<'a>,
+}
+
+impl<'a> Draft<'a> {
+    pub fn new(options: &'a ReadOptions) -> Self {
+        let [fields, cell_fields] = [(); 2].map(|()| Collector::new(options.fields.as_deref()));
+        Self { options, coordinates: Vec::new(), list: CellList::default(), fields, cell_fields }
+    }
+
+    /// How many cells there are.
+    pub fn cells(&self) -> usize {
+        self.list.types.len()
+    }
+
+    /// Appends a cell of VTK's type `kind`, with its points in the order that VTK has.
+    pub fn add_cell(&mut self, kind: i64, points: impl IntoIterator<Item = i64>) {
+        self.list.types.push(kind);
+        self.list.connectivity.extend(points);
+        self.list.ends.push(self.list.connectivity.len() as i64);
+    }
+
+    /// Keeps an array with values at points.
+    pub fn at_points(
+        &mut self,
+        name: &str,
+        components: usize,
+        values: Vec<f64>,
+        integer: bool,
+    ) -> Result<(), ReadReason> {
+        match self.fields.claim(name, components)? {
+            Some(claim) => self.fields.fill(claim, values, integer, ""),
+            None => Ok(()),
+        }
+    }
+
+    /// Keeps an array with values at cells, if that is wanted.
+    pub fn at_cells(
+        &mut self,
+        name: &str,
+        components: usize,
+        values: Vec<f64>,
+        integer: bool,
+    ) -> Result<(), ReadReason> {
+        if self.options.cells == CellData::LeaveOut {
+            return Ok(());
+        }
+        match self.cell_fields.claim(name, components)? {
+            Some(claim) if self.options.cells == CellData::Names => self.cell_fields.keep_names(claim, ""),
+            Some(claim) => {
+                let filled = self.cell_fields.fill(claim, values, integer, "");
+                filled.map_err(|reason| match reason {
+                    ReadReason::NotFinite { point } => ReadReason::NotFiniteCell { cell: point },
+                    reason => reason,
+                })?;
+            }
+            None => {}
+        }
+        Ok(())
+    }
+
+    /// The mesh. Without cells it has points alone.
+    pub fn finish(self) -> Result<TetMesh, ReadReason> {
+        let positions = points_from(&self.coordinates)?;
+        if positions.len() > u32::MAX as usize {
+            return Err(ReadReason::TooLarge { what: "points".into(), limit: u64::from(u32::MAX) });
+        }
+        let fields = expect_values(self.fields.fields, positions.len())?;
+        if self.list.types.is_empty() {
+            return Ok(TetMesh { positions, fields, ..TetMesh::default() });
+        }
+        let cells = self.list.types.len();
+        cells::checked_ends(&self.list.types, &self.list.ends)?;
+        let numbering = Numbering::From { first: 0, points: positions.len() };
+        let split = self.list.split(&numbering)?;
+        let mut cell_fields = expect_values(self.cell_fields.fields, cells)?;
+        split.spread(&mut cell_fields);
+        Ok(TetMesh { positions, fields, tets: split.tets, grid: None, cell_fields })
+    }
+}
+
+/// Checks that fields have as many values as there are points or cells, or none.
+fn expect_values(fields: Vec<Field>, expected: usize) -> Result<Vec<Field>, ReadReason> {
+    match fields.iter().find(|field| !field.values.is_empty() && field.values.len() != expected) {
+        Some(Field { name, values, .. }) => Err(ReadReason::Count {
+            what: format!("values of \"{name}\""),
+            expected: expected as u64,
+            found: values.len() as u64,
+        }),
+        None => Ok(fields),
+    }
+}

@@ -1,0 +1,90 @@
+//! Formats of meshers and of imaging, which the builder in pages does not have (feature `formats`).
+//!
+//! Each is recognised by its first words, but for TetGen's, whose files are lists of numbers.
+
+mod draft;
+mod gmsh;
+mod gmsh_cells;
+mod gmsh_sections;
+mod medit;
+mod metaimage;
+mod netgen;
+mod nrrd;
+mod scanner;
+pub(super) mod tetgen;
+mod volume;
+
+use std::path::Path;
+
+use crate::io::error::ReadError;
+use crate::io::{Beside, ReadOptions};
+use crate::mesh::TetMesh;
+
+/// A format that is recognised by its content.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Format {
+    Gmsh,
+    Medit,
+    Netgen,
+    Nrrd,
+    MetaImage,
+}
+
+impl Format {
+    /// The format of a file that begins with these bytes, if it is one of these.
+    fn of(bytes: &[u8]) -> Option<Self> {
+        let start = bytes.trim_ascii_start();
+        if start.starts_with(nrrd::MAGIC) {
+            return Some(Self::Nrrd);
+        }
+        if gmsh::FIRST.iter().any(|first| start.starts_with(first.as_bytes())) {
+            return Some(Self::Gmsh);
+        }
+        if metaimage::is_header(start) {
+            return Some(Self::MetaImage);
+        }
+        match scanner::Scanner::with_comments(bytes).next_word().ok()?? {
+            medit::FIRST => Some(Self::Medit),
+            netgen::FIRST => Some(Self::Netgen),
+            _ => None,
+        }
+    }
+
+    /// As [`Survey::format`](crate::io::Survey::format) calls it.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Gmsh => "gmsh",
+            Self::Medit => "medit",
+            Self::Netgen => "netgen",
+            Self::Nrrd => "nrrd",
+            Self::MetaImage => "metaimage",
+        }
+    }
+}
+
+/// What the format of these bytes is called, if it is one of these.
+pub(super) fn name(bytes: &[u8]) -> Option<&'static str> {
+    Format::of(bytes).map(Format::name)
+}
+
+/// Reads the bytes of a file called `name`; none if they are of no format that is known here.
+pub(super) fn read(
+    name: &str,
+    bytes: &[u8],
+    options: &ReadOptions,
+    beside: Beside<'_>,
+) -> Option<Result<TetMesh, ReadError>> {
+    Some(match Format::of(bytes)? {
+        Format::Gmsh => gmsh::read(bytes, options),
+        Format::Medit => medit::read(bytes, &sibling(name, "sol"), options, beside),
+        Format::Netgen => netgen::read(bytes, options),
+        Format::Nrrd => nrrd::read(bytes, options, beside),
+        Format::MetaImage => metaimage::read(bytes, options, beside),
+    })
+}
+
+/// The name of the file beside the one called `name` that has another ending.
+fn sibling(name: &str, ending: &str) -> String {
+    let path = Path::new(name).with_extension(ending);
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}

@@ -1,0 +1,90 @@
+//! Samples on a grid, as files of images have them.
+
+use std::io::Read;
+
+use crate::io::error::ReadReason;
+use crate::io::fields::Collector;
+use crate::io::number::NumberType;
+use crate::io::{ReadOptions, image, structured};
+use crate::mesh::TetMesh;
+
+/// What a header says of the samples that follow.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Volume {
+    pub dims: [u64; 3],
+    /// Values of a sample.
+    pub components: usize,
+    pub number: NumberType,
+    /// Whether numbers have their most significant byte first.
+    pub big: bool,
+    pub origin: [f64; 3],
+    /// The step from one sample to the next along each axis of the grid.
+    pub steps: [[f64; 3]; 3],
+    pub field: String,
+}
+
+impl Volume {
+    /// How many bytes the samples have.
+    pub fn bytes(&self) -> Result<usize, ReadReason> {
+        structured::checked_dims(self.dims)?;
+        let sizes = [self.components, self.number.size()].into_iter();
+        let points = self.dims.iter().map(|d| *d as usize);
+        let bytes = points.chain(sizes).try_fold(1_usize, usize::checked_mul);
+        bytes.ok_or_else(|| ReadReason::TooLarge { what: "bytes of samples".into(), limit: u64::MAX })
+    }
+
+    /// The mesh of these samples.
+    pub fn mesh(&self, samples: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadReason> {
+        let expected = self.bytes()?;
+        if samples.len() != expected {
+            let (expected, found) = (expected as u64, samples.len() as u64);
+            return Err(ReadReason::Count { what: "bytes of samples".into(), expected, found });
+        }
+        let mut fields = Collector::new(options.fields.as_deref());
+        if let Some(claim) = fields.claim(&self.field, self.components)? {
+            let values = self.number.floats(samples, self.big);
+            fields.fill(claim, values, self.number.is_integer(), "")?;
+        }
+        let dims = structured::checked_dims(self.dims)?;
+        let along = [0, 1, 2].map(|i| self.steps[i][i]);
+        let is_aligned = (0..9).all(|k| k / 3 == k % 3 || self.steps[k / 3][k % 3] == 0.0);
+        if is_aligned && along.iter().all(|step| *step > 0.0) {
+            let grid = image::checked_grid(self.dims, self.origin, along)?;
+            return Ok(TetMesh::from_grid(grid, fields.fields));
+        }
+        let place = |x: u32, y: u32, z: u32| {
+            let by = [x, y, z].map(f64::from);
+            [0, 1, 2].map(|i| self.origin[i] + (0..3).map(|axis| by[axis] * self.steps[axis][i]).sum::<f64>())
+        };
+        let mut positions = Vec::with_capacity(dims.iter().map(|d| *d as usize).product());
+        for z in 0..dims[2] {
+            for y in 0..dims[1] {
+                positions.extend((0..dims[0]).map(|x| place(x, y, z)));
+            }
+        }
+        if positions.as_flattened().iter().any(|x| !x.is_finite()) {
+            return Err(ReadReason::Syntax("the origin or a direction of the grid is not finite".into()));
+        }
+        structured::mesh(dims, positions, fields.fields, Vec::new())
+    }
+}
+
+/// What `reader` unpacks, which has to be `expected` bytes.
+pub(super) fn unpacked(reader: impl Read, expected: usize) -> Result<Vec<u8>, ReadReason> {
+    let mut bytes = Vec::new();
+    let mut limited = reader.take(expected as u64 + 1);
+    limited.read_to_end(&mut bytes).map_err(|error| ReadReason::Damaged(error.to_string()))?;
+    Ok(bytes)
+}
+
+/// Numbers that stand in one line of a header.
+pub(super) fn numbers<T: std::str::FromStr>(text: &str, key: &str) -> Result<Vec<T>, ReadReason> {
+    let parsed: Result<Vec<T>, _> = text.split_ascii_whitespace().map(str::parse).collect();
+    parsed.map_err(|_| ReadReason::Syntax(format!("{key} \"{text}\" is not a list of numbers")))
+}
+
+/// The same where there must be three.
+pub(super) fn three<T: std::str::FromStr>(text: &str, key: &str) -> Result<[T; 3], ReadReason> {
+    let list = numbers(text, key)?;
+    list.try_into().map_err(|_| ReadReason::Syntax(format!("{key} \"{text}\" is not three numbers")))
+}

@@ -1,0 +1,96 @@
+//! VTK XML unstructured grids in several files (`.pvtu`): a list of `.vtu` files beside it, as parallel programs write them.
+//!
+//! Points of different pieces that lie in exactly the same place are one point of the mesh, so that pieces meet; points of
+//! one piece stay different. Cells are split with the numbers of the whole mesh, on which both sides of an interface agree.
+//! Cells that a piece repeats of another (VTK's ghosts) are left out.
+
+use std::collections::{HashMap, HashSet};
+
+use crate::io::cells::Numbering;
+use crate::io::error::{At, ReadError, ReadReason};
+use crate::io::vtu::{PieceReader, first_number, join};
+use crate::io::xml::Document;
+use crate::io::{Beside, ReadOptions, in_file, without_mark};
+use crate::mesh::TetMesh;
+
+/// Reads a document of type `PUnstructuredGrid`, and the time of its pieces.
+pub(super) fn read(
+    document: &Document<'_>,
+    options: &ReadOptions,
+    beside: Beside<'_>,
+) -> Result<(TetMesh, Option<f64>), ReadError> {
+    let mut whole = Whole::default();
+    let mut time = None;
+    for (number, piece) in document.pieces.iter().enumerate() {
+        let missing = || ReadReason::Missing("attribute Source".into());
+        let source = piece.attributes.get("Source").ok_or_else(missing).at(|| format!("piece {number}"))?;
+        let bytes = beside(source).at(|| format!("piece {number}"))?;
+        let of_piece = whole.append(&bytes, options).map_err(|error| in_file(error, source))?;
+        time = time.or(of_piece);
+    }
+    Ok((whole.mesh, time))
+}
+
+/// What was read of the pieces so far.
+#[derive(Default)]
+struct Whole {
+    mesh: TetMesh,
+    /// The first point at each place.
+    known: HashMap<[u64; 3], u32>,
+    has_pieces: bool,
+}
+
+impl Whole {
+    /// Appends the pieces in a file; returns its time.
+    fn append(&mut self, bytes: &[u8], options: &ReadOptions) -> Result<Option<f64>, ReadError> {
+        let document = Document::parse(without_mark(bytes))?;
+        if document.kind != "UnstructuredGrid" {
+            let what = format!("a piece of type {}", document.kind);
+            let remedy = "list files of type UnstructuredGrid".into();
+            return Err(ReadReason::Unsupported { what, remedy }).at(String::new);
+        }
+        for (number, piece) in document.pieces.iter().enumerate() {
+            let reader = PieceReader { document: &document, piece, number, options };
+            let first = self.mesh.positions.len();
+            // The points that no earlier piece has.
+            let mut new = Vec::new();
+            let mut part = reader.read(&mut |points| {
+                let numbers;
+                (numbers, new) = self.numbered(points, first)?;
+                Ok(Numbering::Each(numbers))
+            })?;
+            keep(&mut part.positions, &new);
+            part.fields.iter_mut().for_each(|field| keep(&mut field.values, &new));
+            for (number, point) in (first as u32..).zip(&part.positions) {
+                self.known.entry(place(*point)).or_insert(number);
+            }
+            let is_first = !std::mem::replace(&mut self.has_pieces, true);
+            join(&mut self.mesh, part, is_first).at(|| format!("piece {number}, <PointData>"))?;
+        }
+        Ok(document.time())
+    }
+
+    /// The numbers of a piece's points, and which of them are new, from number `first` on.
+    fn numbered(&self, points: &[[f64; 3]], first: usize) -> Result<(Vec<u32>, Vec<usize>), ReadReason> {
+        first_number(first, points.len())?;
+        let (mut numbers, mut new, mut taken) = (Vec::new(), Vec::new(), HashSet::new());
+        for (index, point) in points.iter().enumerate() {
+            let known = self.known.get(&place(*point)).copied().filter(|&number| taken.insert(number));
+            numbers.push(known.unwrap_or((first + new.len()) as u32));
+            if known.is_none() {
+                new.push(index);
+            }
+        }
+        Ok((numbers, new))
+    }
+}
+
+/// The bits of a position; zero has two signs.
+fn place(point: [f64; 3]) -> [u64; 3] {
+    point.map(|x| (x + 0.0).to_bits())
+}
+
+/// Keeps the values with these indices, which ascend.
+fn keep<T: Copy>(values: &mut Vec<T>, indices: &[usize]) {
+    *values = indices.iter().map(|&i| values[i]).collect();
+}
