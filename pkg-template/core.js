@@ -57,7 +57,6 @@ export function coreMethods(emit, shared = new SharedRanges()) {
   let load = loadCore;
   /** @type {Awaited<ReturnType<typeof loadCore>>} */
   let wasm;
-  /** @type {CoreSession | undefined} */
   let session;
   /** What has come of a stream until its base mesh is there, and the fields that are wanted of it. @type {Uint8Array[] | undefined} */
   let head;

@@ -3,6 +3,7 @@
 use super::front::{Front, GoOn, Task, Violation};
 use super::look::{Open, TetErrors};
 use super::{TetData, Verdict};
+use crate::geom::sort_few;
 use crate::mt::{Applied, ApplyUpdates, CurrentMesh, MAX_QUARTERINGS, UpdateError, UpdateId};
 
 /// The result of forcing an update.
@@ -25,6 +26,9 @@ pub(super) enum Way {
 
 /// Tetrahedra that are evaluated together.
 const AT_ONCE: usize = 64;
+
+/// So many violations are sorted where they are.
+const FEW: usize = 16;
 
 /// With a violation of so much slack, the search for a longer one ends.
 const LONG: f64 = 1.0 / 16.0;
@@ -120,6 +124,9 @@ impl Front {
 
     /// Sorts what is pending by falling number of the update.
     fn sort_pending(&mut self) {
+        if self.pending.len() <= FEW {
+            return sort_few(&mut self.pending, |a, b| a.update > b.update);
+        }
         let key = |violation: &Violation| u64::from(!violation.update.0) << 32;
         let mut order: Vec<u64> =
             (0..).zip(&self.pending).map(|(place, violation)| key(violation) | place).collect();

@@ -69,7 +69,9 @@ test("a file of another kind than half-edge has the module with all kinds loaded
     for (let at = 0; at < other.length; at += 100) yield other.slice(at, at + 100);
   };
   const wasmUrl = at("tetralod_all_kinds_bg.wasm");
-  for (const [source, how] of [[other, {}], [pieces(), {}], [pieces(), { worker: false }], [new Blob([other]), {}], [other, { wasmUrl }]]) {
+  /** @type {[import("../../pkg/index.js").Source, object][]} */
+  const ways = [[other, {}], [pieces(), {}], [pieces(), { worker: false }], [new Blob([other]), {}], [other, { wasmUrl }]];
+  for (const [source, how] of ways) {
     const mt = await MultiTessellation.open(source, how);
     await mt.complete;
     await mt.refine(first.options);

@@ -15,17 +15,18 @@ const { build } = createRequire(new URL("../../tests/js/package.json", import.me
 
 /** Bytes. An entry that outgrows its limit needs a reason for a higher one, in the message of the commit that raises it. */
 const LIMITS = {
-  ".": 14_000,
+  ".": 15_300,
   "./viewer": 7_500,
   "./element": 10_000,
   "./three": 2_500,
   "./vtk": 2_500,
   "./build": 4_000,
-  "./inline": 410_000,
-  "./worker": 8_500,
+  "./inline": 361_000,
+  "./worker": 9_700,
   "./viewer-worker": 18_000,
   "./build-worker": 5_500,
-  "./core.wasm": 306_000,
+  "./core.wasm": 200_000,
+  "./all-kinds.wasm": 267_000,
   "./viewer.wasm": 450_000,
   "./build.wasm": 460_000,
 };

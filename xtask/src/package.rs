@@ -146,7 +146,7 @@ fn optimise(wasm: &Path) -> Result<()> {
     let tool = "tests/js/node_modules/binaryen/bin/wasm-opt";
     // Functions with one caller are inlined by rustc already, where that pays.
     let inlining = "--one-caller-inline-max-function-size=0";
-    let mut command = shell::command("node", [tool, "-O2", inlining, "--strip-debug", "--strip-producers"]);
+    let mut command = shell::command("node", [tool, "-O3", inlining, "--strip-debug", "--strip-producers"]);
     shell::run(command.args(WASM_FEATURES).arg(wasm).arg("-o").arg(wasm))
 }
 
