@@ -3,7 +3,7 @@
 
 use std::ops::ControlFlow;
 use tetralod::builder::{BuildConfig, build};
-use tetralod::format::{DecodeOptions, Decoder, EncodeOptions, ErrorBytes, encode};
+use tetralod::format::{BlockInfo, DecodeOptions, Decoder, EncodeOptions, ErrorBytes, encode};
 use tetralod::generate;
 use tetralod::mesh::Field;
 use tetralod::mt::MtKind;
@@ -129,8 +129,7 @@ fn files_that_come_in_order_are_good_enough_by_then() {
         let curve = whole.bytes_by_error(0, 0);
         check_order(&curve);
         assert!(curve.len() > 5, "{kind:?}: {curve:?}");
-        let largest =
-            whole.index().expect("an index").blocks.iter().map(|block| block.len()).max().unwrap_or(0);
+        let largest = whole.index().expect("an index").blocks.iter().map(BlockInfo::len).max().unwrap_or(0);
         for error in errors_of(&curve) {
             let needed = needed_in_order(&file, error);
             // The index rounds errors up.
