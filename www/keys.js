@@ -18,9 +18,8 @@ import { switchTheme } from "./theme.js";
  */
 
 const VIEWS = ["Surface", "Volume", "Slice", "Solid", "Mesh", "Flow"];
-/** What can be shown beside the view, with Shift and these digits. */
-const BESIDE = ["surface", "volume", "slice", "boundary", "mesh wires", "flow", "points"];
-const DIGITS = BESIDE.map((_, i) => i + 1);
+/** What can be shown beside the view, with Shift and a digit. */
+const BESIDE = ["the surface", "the volume", "the slice", "the boundary", "mesh wires", "the flow", "points"];
 
 /** Chooses a view by its number. */
 function chooseView(number) {
@@ -40,7 +39,7 @@ const TABLE = {
   ],
   "Everywhere": [
     ...VIEWS.map((name, i) => ({ keys: [String(i + 1)], what: name, act: () => chooseView(i + 1) })),
-    { keys: DIGITS.map((digit) => `Shift + ${digit}`), what: `also show: ${BESIDE.join(", ")}`, act: ({ code }) => toggle(Number(code.slice(-1))) },
+    ...BESIDE.map((name, i) => ({ keys: [`Shift + ${i + 1}`], what: `also show ${name}`, act: () => toggle(i + 1) })),
     { keys: ["V"], what: "to the picture", act: () => $("canvas").focus() },
     { keys: ["I"], what: "to the isovalue", act: () => toControl("isovalue") },
     { keys: ["O"], what: "gallery and files", act: openGallery },
