@@ -22,8 +22,9 @@ pub(super) struct Recipe {
 
 const TETRAHEDRON: &[&[u8]] = &[&[1, 2, 3], &[0, 3, 2], &[0, 1, 3], &[0, 2, 1]];
 const PYRAMID: &[&[u8]] = &[&[0, 3, 2, 1], &[0, 1, 4], &[1, 2, 4], &[2, 3, 4], &[3, 0, 4]];
-/// VTK's order: the normal of the first triangle points outward.
-const WEDGE: &[&[u8]] = &[&[0, 1, 2], &[3, 5, 4], &[0, 3, 4, 1], &[1, 4, 5, 2], &[2, 5, 3, 0]];
+/// The normal of the first triangle points inward, as in VTK's parametric coordinates and in Gmsh (VTK's manual says the
+/// opposite).
+const WEDGE: &[&[u8]] = &[&[0, 2, 1], &[3, 4, 5], &[0, 1, 4, 3], &[1, 2, 5, 4], &[2, 0, 3, 5]];
 const HEXAHEDRON: &[&[u8]] =
     &[&[0, 3, 2, 1], &[4, 5, 6, 7], &[0, 1, 5, 4], &[1, 2, 6, 5], &[2, 3, 7, 6], &[3, 0, 4, 7]];
 
@@ -91,11 +92,11 @@ fn part(faces: &[&[u8]], points: Option<&[u8]>) -> Part {
     faces.iter().map(|face| face.iter().map(number).collect()).collect()
 }
 
-/// A prism over a polygon of `n` corners, whose normal points outward as that of a wedge.
+/// A prism over a polygon of `n` corners, whose normal points inward as that of a wedge.
 fn prism(n: u8) -> Part {
     let next = |i: u8| (i + 1) % n;
-    let sides = (0..n).map(|i| vec![i, n + i, n + next(i), next(i)]);
-    [(0..n).collect(), (n..2 * n).rev().collect()].into_iter().chain(sides).collect()
+    let sides = (0..n).map(|i| vec![i, next(i), n + next(i), n + i]);
+    [(0..n).rev().collect(), (n..2 * n).collect()].into_iter().chain(sides).collect()
 }
 
 /// A cell with a point at the middle of each edge: a part at each corner, and the one that is left between the middles.
@@ -206,7 +207,7 @@ mod tests {
     /// Where the points of a cell of each type lie, and its volume.
     fn cell(kind: i64) -> (Vec<[f64; 3]>, f64) {
         let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
-        let triangle = [[0.0, 0.0], [0.0, 1.0], [1.0, 0.0]];
+        let triangle = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
         let layers = |polygon: &[[f64; 2]]| -> Vec<[f64; 3]> {
             [0.0, 1.0].iter().flat_map(|z| polygon.iter().map(move |p| [p[0], p[1], *z])).collect()
         };
@@ -220,7 +221,7 @@ mod tests {
         let mut pyramid: Vec<[f64; 3]> = layers(&square)[..4].to_vec();
         pyramid.push([0.25, 0.5, 1.0]);
         let round = |n: u32| -> Vec<[f64; 3]> {
-            let corner = |i: u32| f64::from(i) / f64::from(n) * -std::f64::consts::TAU;
+            let corner = |i: u32| f64::from(i) / f64::from(n) * std::f64::consts::TAU;
             layers(&(0..n).map(|i| [corner(i).cos(), corner(i).sin()]).collect::<Vec<_>>())
         };
         let area = |n: f64| n / 2.0 * (std::f64::consts::TAU / n).sin();

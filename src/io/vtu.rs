@@ -58,6 +58,9 @@ pub(super) struct PieceReader<'a, 'd> {
     pub options: &'a ReadOptions,
 }
 
+/// Numbers the points of a piece, given their positions.
+type NumberPoints<'a> = &'a mut dyn FnMut(&[[f64; 3]]) -> Result<Numbering, ReadReason>;
+
 impl PieceReader<'_, '_> {
     /// How to call the piece in an error.
     pub fn place(&self) -> String {
@@ -65,10 +68,7 @@ impl PieceReader<'_, '_> {
     }
 
     /// An unstructured grid. Its points are numbered as `numbers` says, which gets their positions.
-    pub fn read(
-        &self,
-        numbers: &mut dyn FnMut(&[[f64; 3]]) -> Result<Numbering, ReadReason>,
-    ) -> Result<TetMesh, ReadError> {
+    pub fn read(&self, numbers: NumberPoints<'_>) -> Result<TetMesh, ReadError> {
         let place = || self.place();
         let points = self.piece.attributes.count("NumberOfPoints").at(place)?;
         let cells = self.piece.attributes.count("NumberOfCells").at(place)?;

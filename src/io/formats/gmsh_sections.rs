@@ -99,14 +99,19 @@ fn read_node_blocks(mesh: &mut Mesh<'_>, numbers: &mut Numbers<'_, '_>) -> Resul
             (true, true) => dimension.clamp(0, 3),
             (true, false) => 3,
         };
-        let mut tags = Vec::with_capacity(numbers.file.capacity(count));
         if is_newest {
+            // All tags come first.
+            let mut tags = Vec::with_capacity(numbers.file.capacity(count));
             for _ in 0..count {
                 tags.push(numbers.wide()?);
             }
+            for tag in tags {
+                add_node(mesh, numbers, tag, parameters)?;
+            }
+            continue;
         }
-        for i in 0..count {
-            let tag = if is_newest { tags[i] } else { numbers.tag()? };
+        for _ in 0..count {
+            let tag = numbers.tag()?;
             add_node(mesh, numbers, tag, parameters)?;
         }
     }

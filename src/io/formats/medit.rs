@@ -15,8 +15,8 @@ pub(super) const FIRST: &str = "MeshVersionFormatted";
 const CELLS: [(&str, i64, &[usize]); 5] = [
     ("Tetrahedra", 10, &[0, 1, 2, 3]),
     ("Hexahedra", 12, &[0, 1, 2, 3, 4, 5, 6, 7]),
-    ("Prisms", 13, &[0, 2, 1, 3, 5, 4]),
-    ("Pentahedra", 13, &[0, 2, 1, 3, 5, 4]),
+    ("Prisms", 13, &[0, 1, 2, 3, 4, 5]),
+    ("Pentahedra", 13, &[0, 1, 2, 3, 4, 5]),
     ("Pyramids", 14, &[0, 1, 2, 3, 4]),
 ];
 
@@ -96,6 +96,9 @@ fn read_solution(file: &mut Scanner<'_>, draft: &mut Draft<'_>) -> Result<(), Re
                 let count = file.number()?;
                 let components: Vec<usize> =
                     (0..file.number::<usize>()?).map(|_| components(file)).collect::<Result<_, _>>()?;
+                if components.is_empty() {
+                    return Err(ReadReason::Syntax("a solution without values".into()));
+                }
                 let mut arrays = vec![Vec::new(); components.len()];
                 for _ in 0..count {
                     for (array, components) in arrays.iter_mut().zip(&components) {
