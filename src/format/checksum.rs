@@ -79,7 +79,7 @@ mod tests {
     #[test]
     fn tables_give_the_checksum_of_crc32fast() {
         assert_eq!(tables::hash(b"123456789"), 0xCBF4_3926);
-        let bytes: Vec<u8> = (0..2000_u32).map(|i| (i * i >> 3) as u8).collect();
+        let bytes: Vec<u8> = (0..2000_u32).map(|i| ((i * i) >> 3) as u8).collect();
         for len in 0..bytes.len() {
             assert_eq!(tables::hash(&bytes[..len]), crc32fast::hash(&bytes[..len]), "{len} bytes");
         }
