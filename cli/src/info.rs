@@ -204,7 +204,7 @@ fn breakdown(opened: &Opened) -> Result<Vec<FilePart>> {
     let mut parts = format::breakdown(opened.mt()?, index.block_bits)?;
     parts.push(("header, description and index", index_bytes as f64));
     let known: f64 = parts.iter().map(|(_, bytes)| bytes).sum();
-    parts.push(("heads and ends of sections", opened.bytes as f64 - known));
+    parts.push(("histograms, heads and ends of sections", opened.bytes as f64 - known));
     // Few files keep any.
     parts.retain(|(name, bytes)| *bytes != 0.0 || !["exact values", "errors of tetrahedra"].contains(name));
     let vertices = f64::from(opened.info()?.vertices.max(1));

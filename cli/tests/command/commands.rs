@@ -342,10 +342,11 @@ fn kinds_are_built_and_converted() {
         assert_eq!(info[key], report[key], "{key}");
     }
     let of_edge = json(&["info", &edge, "--json"]);
-    for key in
-        ["bounds", "fields", "depth", "arcs_per_node", "tets_per_update", "base_tetrahedra", "metadata"]
-    {
+    for key in ["bounds", "depth", "arcs_per_node", "tets_per_update", "base_tetrahedra", "metadata"] {
         assert_eq!(info[key], of_edge[key], "{key}");
+    }
+    for key in ["name", "min", "max", "bits", "quantization", "floor", "histogram"] {
+        assert_eq!(info["fields"][0][key], of_edge["fields"][0][key], "{key}");
     }
     assert!(
         good(&["info", &edge]).contains("edge collapse") && good(&["info", &spelled]).contains("explicit")

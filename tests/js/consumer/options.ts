@@ -132,6 +132,8 @@ const fields: Members<FieldInfo> = {
   time: "number undefined",
   vector: "object undefined",
   floor: "number",
+  histogram: "object",
+  curve: "object",
 };
 
 const progresses: Members<Progress> = {
