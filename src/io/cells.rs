@@ -23,6 +23,12 @@ pub(super) fn are_points(types: &[i64]) -> bool {
     types.iter().all(|t| VERTICES.contains(t))
 }
 
+/// How many points a cell without a volume has, where that follows from its type.
+fn points_of_flat(kind: i64) -> Option<i64> {
+    let known = [(1, 1), (3, 2), (5, 3), (8, 4), (9, 4), (21, 3), (22, 6), (23, 8), (28, 9)];
+    known.iter().find(|(flat, _)| *flat == kind).map(|(_, points)| *points)
+}
+
 /// Whether a file may list cells of this type, which are then left out.
 pub(super) fn is_flat(kind: i64) -> bool {
     FLAT.contains(&kind)
@@ -90,7 +96,7 @@ impl Numbering {
 pub(super) fn checked_ends(types: &[i64], ends: &[i64]) -> Result<usize, ReadReason> {
     let (mut start, mut recipes) = (0, Recipes::default());
     for (cell, (&kind, &end)) in types.iter().zip(ends).enumerate() {
-        let needed = recipes.of(kind).map(|recipe| recipe.points as i64);
+        let needed = recipes.of(kind).map(|recipe| recipe.points as i64).or_else(|| points_of_flat(kind));
         let found = end.checked_sub(start).filter(|n| *n >= 0);
         let found = found
             .ok_or_else(|| ReadReason::Syntax(format!("cell {cell} ends at {end}, before it begins")))?;
@@ -217,6 +223,8 @@ mod tests {
         assert!(wrong(&[4, 8]).contains("cell 1, a hexahedron, has 4 points, not 8"));
         assert!(wrong(&[5, 13]).contains("cell 0, a tetrahedron, has 5 points, not 4"));
         assert!(wrong(&[-1, 3]).contains("before it begins"));
+        let flat = checked_ends(&[1], &[4]).unwrap_err().to_string();
+        assert!(flat.contains("cell 0, a vertex, has 4 points, not 1"), "{flat}");
         assert!(wrong(&[4, i64::MIN]).contains("before it begins"));
         let split = |connectivity: &[i64]| {
             let cells = CellList { types: vec![10], ends: vec![4], connectivity: connectivity.to_vec() };
