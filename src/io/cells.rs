@@ -3,8 +3,6 @@
 //! Cells with a volume are split by the recipes of `cell_shapes`; those without one (vertices, lines, polygons), which
 //! meshers write beside them for boundaries, are left out. What cannot be split is refused, counted by type.
 
-use std::collections::BTreeMap;
-
 use crate::io::cell_shapes::{Recipe, recipe};
 use crate::io::error::{ReadReason, cell_name};
 use crate::mesh::Field;
@@ -18,9 +16,18 @@ const VERTICES: [i64; 2] = [1, 2];
 /// And for cells without a volume: linear, quadratic, and of any order.
 const FLAT: [i64; 22] = [EMPTY, 1, 2, 3, 4, 5, 6, 7, 8, 9, 21, 22, 23, 28, 30, 34, 35, 36, 68, 69, 70, 75];
 
+/// More types of cells than any format has.
+const MOST_TYPES: usize = 256;
+
 /// Whether the cells are vertices and poly-vertices alone, as of data sets that are only points.
 pub(super) fn are_points(types: &[i64]) -> bool {
     types.iter().all(|t| VERTICES.contains(t))
+}
+
+/// How many points a cell without a volume has, where that follows from its type.
+fn points_of_flat(kind: i64) -> Option<i64> {
+    let known = [(1, 1), (3, 2), (5, 3), (8, 4), (9, 4), (21, 3), (22, 6), (23, 8), (28, 9)];
+    known.iter().find(|(flat, _)| *flat == kind).map(|(_, points)| *points)
 }
 
 /// Whether a file may list cells of this type, which are then left out.
@@ -31,31 +38,48 @@ pub(super) fn is_flat(kind: i64) -> bool {
 /// The tetrahedra at most that cells of these types become. Refuses types that cannot be split, and cells none of which has a
 /// volume, with the number of each type.
 pub(super) fn most_tets(types: &[i64]) -> Result<u64, ReadReason> {
-    let mut counts = BTreeMap::new();
-    for kind in types {
-        *counts.entry(*kind).or_insert(0_u64) += 1;
+    // There are few types; a map would cost pages more bytes than it saves time.
+    let mut counts: Vec<(i64, u64)> = Vec::new();
+    for &kind in types {
+        if let Some(known) = counts.iter().position(|(known, _)| *known == kind) {
+            counts[known].1 += 1;
+        } else if counts.len() == MOST_TYPES {
+            return Err(ReadReason::TooLarge { what: "types of cells".into(), limit: MOST_TYPES as u64 });
+        } else {
+            counts.push((kind, 1));
+        }
     }
+    counts.sort_unstable();
     let mut tets = 0_u64;
-    for (&kind, &count) in &counts {
+    for &(kind, count) in &counts {
         match recipe(kind) {
             Some(recipe) => tets = tets.saturating_add(count.saturating_mul(recipe.most_tets() as u64)),
             None if is_flat(kind) => {}
-            None => return Err(ReadReason::CellTypes(counts.into_iter().collect())),
+            None => return Err(ReadReason::CellTypes(counts)),
         }
     }
     if tets == 0 && !types.is_empty() {
-        return Err(ReadReason::CellTypes(counts.into_iter().collect()));
+        return Err(ReadReason::CellTypes(counts));
     }
     Ok(tets)
 }
 
-/// Recipes that were looked up.
+/// Recipes that were looked up, each with its type. There are few types, and neighbours in a file mostly have the same.
 #[derive(Default)]
-struct Recipes(BTreeMap<i64, Option<Recipe>>);
+struct Recipes {
+    known: Vec<(i64, Option<Recipe>)>,
+    last: usize,
+}
 
 impl Recipes {
     fn of(&mut self, kind: i64) -> Option<&Recipe> {
-        self.0.entry(kind).or_insert_with(|| recipe(kind)).as_ref()
+        if self.known.get(self.last).is_none_or(|(known, _)| *known != kind) {
+            self.last = self.known.iter().position(|(known, _)| *known == kind).unwrap_or(self.known.len());
+            if self.last == self.known.len() {
+                self.known.push((kind, recipe(kind)));
+            }
+        }
+        self.known[self.last].1.as_ref()
     }
 }
 
@@ -64,6 +88,7 @@ pub(super) enum Numbering {
     /// As many points, of which the first has this number.
     From { first: u32, points: usize },
     /// Each has its own.
+    #[cfg(feature = "formats")]
     Each(Vec<u32>),
 }
 
@@ -71,6 +96,7 @@ impl Numbering {
     fn points(&self) -> usize {
         match self {
             Self::From { points, .. } => *points,
+            #[cfg(feature = "formats")]
             Self::Each(numbers) => numbers.len(),
         }
     }
@@ -79,6 +105,7 @@ impl Numbering {
         let index = usize::try_from(point).ok().filter(|p| *p < self.points());
         let number = index.and_then(|p| match self {
             Self::From { first, .. } => u32::try_from(p).ok().and_then(|p| p.checked_add(*first)),
+            #[cfg(feature = "formats")]
             Self::Each(numbers) => numbers.get(p).copied(),
         });
         let points = self.points() as u64;
@@ -90,7 +117,7 @@ impl Numbering {
 pub(super) fn checked_ends(types: &[i64], ends: &[i64]) -> Result<usize, ReadReason> {
     let (mut start, mut recipes) = (0, Recipes::default());
     for (cell, (&kind, &end)) in types.iter().zip(ends).enumerate() {
-        let needed = recipes.of(kind).map(|recipe| recipe.points as i64);
+        let needed = recipes.of(kind).map(|recipe| recipe.points as i64).or_else(|| points_of_flat(kind));
         let found = end.checked_sub(start).filter(|n| *n >= 0);
         let found = found
             .ok_or_else(|| ReadReason::Syntax(format!("cell {cell} ends at {end}, before it begins")))?;
@@ -217,6 +244,8 @@ mod tests {
         assert!(wrong(&[4, 8]).contains("cell 1, a hexahedron, has 4 points, not 8"));
         assert!(wrong(&[5, 13]).contains("cell 0, a tetrahedron, has 5 points, not 4"));
         assert!(wrong(&[-1, 3]).contains("before it begins"));
+        let flat = checked_ends(&[1], &[4]).unwrap_err().to_string();
+        assert!(flat.contains("cell 0, a vertex, has 4 points, not 1"), "{flat}");
         assert!(wrong(&[4, i64::MIN]).contains("before it begins"));
         let split = |connectivity: &[i64]| {
             let cells = CellList { types: vec![10], ends: vec![4], connectivity: connectivity.to_vec() };

@@ -6,7 +6,7 @@
 //! | VTK XML image data | `.vti` | all encodings, several pieces | appended raw, zlib |
 //! | legacy VTK, versions 1.0 to 5.1 | `.vtk` | ASCII and binary; unstructured, structured and rectilinear grids, structured points | |
 //! | VTK XML structured and rectilinear grids | `.vts`, `.vtr` | all encodings, several pieces | |
-//! | VTK XML unstructured grid in several files | `.pvtu` | by [`read`] | |
+//! | VTK XML unstructured grid in several files | `.pvtu` | by [`read`]; feature `formats` | |
 //! | raw samples | `.raw` + `.json` | any numeric type and byte order | |
 //! | Gmsh, versions 1 to 4.1 | `.msh` | text and binary; feature `formats` | |
 //! | Medit | `.mesh`, `.sol` | text; feature `formats` | |
@@ -39,6 +39,7 @@ mod legacy;
 mod number;
 mod payload;
 mod pvd;
+#[cfg(feature = "formats")]
 mod pvtu;
 mod raw;
 mod structured;
@@ -201,7 +202,7 @@ fn read_xml(bytes: &[u8], options: &ReadOptions, beside: Beside<'_>) -> Result<T
         "ImageData" => image::read(&document, options)?,
         structured::RECTILINEAR | structured::CURVILINEAR => structured::read(&document, options)?,
         "PUnstructuredGrid" => {
-            let (mesh, of_pieces) = pvtu::read(&document, options, beside)?;
+            let (mesh, of_pieces) = read_pieces(&document, options, beside)?;
             time = time.or(of_pieces);
             mesh
         }
@@ -209,6 +210,25 @@ fn read_xml(bytes: &[u8], options: &ReadOptions, beside: Beside<'_>) -> Result<T
     };
     mesh.fields.iter_mut().chain(&mut mesh.cell_fields).for_each(|field| field.time = time);
     Ok(mesh)
+}
+
+/// Reads the pieces that are listed, and their time.
+#[cfg(feature = "formats")]
+fn read_pieces(
+    document: &xml::Document<'_>,
+    options: &ReadOptions,
+    beside: Beside<'_>,
+) -> Result<(TetMesh, Option<f64>), ReadError> {
+    pvtu::read(document, options, beside)
+}
+
+#[cfg(not(feature = "formats"))]
+fn read_pieces(
+    document: &xml::Document<'_>,
+    _: &ReadOptions,
+    _: Beside<'_>,
+) -> Result<(TetMesh, Option<f64>), ReadError> {
+    Err(not_read(&document.kind)).at(String::new)
 }
 
 /// Why an XML file of this type is refused.

@@ -8,6 +8,7 @@ mod fields;
 mod files;
 #[cfg(feature = "formats")]
 mod meshers;
+#[cfg(feature = "formats")]
 mod pieces;
 mod real;
 mod surfaces;

@@ -12,7 +12,8 @@ fn described(fields: &[Field]) -> Vec<(&str, &str, Option<&VectorPart>)> {
 
 fn assert_agrees(survey: &Survey, mesh: &TetMesh, name: &str) {
     assert_eq!(survey.points, mesh.positions.len() as u64, "{name}");
-    assert_eq!(survey.cells, mesh.tets.len() as u64, "{name}");
+    // Hexahedra with points that are the same become fewer tetrahedra.
+    assert!(survey.cells >= mesh.tets.len() as u64, "{name}");
     assert_eq!(survey.grid, mesh.grid, "{name}");
     assert_eq!(described(&survey.fields), described(&mesh.fields), "{name}");
     assert_eq!(described(&survey.cell_fields), described(&mesh.cell_fields), "{name}");
@@ -26,6 +27,8 @@ fn of_every_format_and_encoding() {
     for (name, file, _) in files() {
         let survey = io::survey(&name, &file).unwrap();
         assert_agrees(&survey, &io::read_bytes_with(&name, &file, &EVERYTHING).unwrap(), &name);
+        let mesh = io::read_bytes(&name, &file).unwrap();
+        assert_eq!(survey.cells, mesh.tets.len() as u64, "{name}");
         assert!(name.ends_with(survey.format), "{name} is {}", survey.format);
         assert!(!survey.fields.is_empty(), "{name}");
     }
