@@ -80,6 +80,13 @@ function show() {
   showFrames();
 }
 
+/** The bytes that the index of the file states for meshes of the whole volume. @returns {{ bytes: number, error: number }[]} */
+function stated() {
+  const { curve, min, max } = page.field ?? {};
+  if (!curve) return [];
+  return Array.from(curve.errors, (error, i) => ({ error: error / (max - min || 1), bytes: curve.bytes[i] }));
+}
+
 /** The error against bytes; errors in equal ratios. */
 function showBought() {
   const svg = $("bought");
@@ -102,7 +109,10 @@ function showBought() {
     parts.push(element("text", { x: x(at), y: height - bottom + 15 }, at === 0 ? "0" : size(at)));
   }
   parts.push(element("text", { x: (left + width - right) / 2, y: height - 4 }, "bytes that had arrived"));
-  parts.push(element("path", { d: `M${good.map(({ bytes, error }) => `${x(bytes).toFixed(1)} ${y(error).toFixed(1)}`).join("L")}` }));
+  const line = (points) => `M${points.map(({ bytes, error }) => `${x(bytes).toFixed(1)} ${y(error).toFixed(1)}`).join("L")}`;
+  const seen = stated().filter(({ error, bytes }) => bytes <= most && error >= 10 ** low && error <= 10 ** high);
+  if (seen.length > 1) parts.push(element("path", { d: line(seen), class: "stated" }));
+  parts.push(element("path", { d: line(good) }));
   parts.push(...good.map(({ bytes, error }) => element("circle", { cx: x(bytes), cy: y(error), r: 2.5 })));
   svg.replaceChildren(...parts);
   const end = good[good.length - 1];

@@ -61,7 +61,8 @@ export function applyMode() {
 /** Shows the histogram of the field where the isovalue and the transfer function are chosen. */
 export async function showHistogram() {
   if (!["iso", "volume"].includes(mode()) || !demo.info) return;
-  const { histogram } = await page.viewer.stats({ bins: 100 });
+  // That of the file is of the reference mesh; without it, that of the mesh which is shown.
+  const histogram = page.field?.histogram ?? (await page.viewer.stats({ bins: 100 })).histogram;
   page.transfer.volumes = histogram;
   showVolumes(histogram);
 }
