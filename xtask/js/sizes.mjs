@@ -27,7 +27,7 @@ const LIMITS = {
   "./build-worker": 5_500,
   "./core.wasm": 200_000,
   "./all-kinds.wasm": 267_000,
-  "./viewer.wasm": 450_000,
+  "./viewer.wasm": 425_000,
   "./build.wasm": 460_000,
 };
 
