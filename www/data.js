@@ -94,9 +94,12 @@ function showBought() {
   if (good.length === 0) return svg.replaceChildren();
   const { clientWidth: width, clientHeight: height } = svg;
   const [left, right, top, bottom] = [52, 12, 8, 34];
-  const most = Math.max(...good.map(({ bytes }) => bytes)) * 1.04;
-  const logs = good.map(({ error }) => Math.log10(error));
-  const [low, high] = [Math.floor(Math.min(...logs)), Math.max(Math.ceil(Math.max(...logs)), Math.floor(Math.min(...logs)) + 1)];
+  const low = Math.floor(Math.log10(Math.min(...good.map(({ error }) => error))));
+  // What the file states for errors down to that scale, so that one sees what more bytes would buy.
+  const near = stated().filter(({ error }) => error >= 10 ** low && error <= 1);
+  const most = Math.max(...[...good, ...near].map(({ bytes }) => bytes)) * 1.04;
+  const largest = Math.max(...[...good, ...near].map(({ error }) => error));
+  const high = Math.max(Math.ceil(Math.log10(largest)), low + 1);
   const x = (bytes) => left + (bytes / most) * (width - left - right);
   const y = (error) => top + ((high - Math.log10(error)) / (high - low)) * (height - top - bottom);
   const parts = [];
@@ -108,10 +111,9 @@ function showBought() {
   for (const { at } of ticks(0, most, Math.max(2, Math.floor(width / 100)))) {
     parts.push(element("text", { x: x(at), y: height - bottom + 15 }, at === 0 ? "0" : size(at)));
   }
-  parts.push(element("text", { x: (left + width - right) / 2, y: height - 4 }, "bytes that had arrived"));
+  parts.push(element("text", { x: (left + width - right) / 2, y: height - 4 }, "bytes that have arrived"));
   const line = (points) => `M${points.map(({ bytes, error }) => `${x(bytes).toFixed(1)} ${y(error).toFixed(1)}`).join("L")}`;
-  const seen = stated().filter(({ error, bytes }) => bytes <= most && error >= 10 ** low && error <= 10 ** high);
-  if (seen.length > 1) parts.push(element("path", { d: line(seen), class: "stated" }));
+  if (near.length > 1) parts.push(element("path", { d: line(near), class: "stated" }));
   parts.push(element("path", { d: line(good) }));
   parts.push(...good.map(({ bytes, error }) => element("circle", { cx: x(bytes), cy: y(error), r: 2.5 })));
   svg.replaceChildren(...parts);
