@@ -68,7 +68,14 @@ fn several_fields_with_units_times_and_metadata() {
     let [again, explicit] = ["c.mt", "d.mt"].map(|name| folder.path(name));
     good(&["build", &input, "-o", &again, "--quiet", "--field", "U", "--meta", "case=1"]);
     good(&["convert", &again, "-o", &explicit, "--kind", "explicit", "--quiet"]);
-    let [a, b] = [&again, &explicit].map(|path| json(&["info", path, "--json"]));
+    let [a, b] = [&again, &explicit].map(|path| {
+        let mut info = json(&["info", path, "--json"]);
+        let fields = info["fields"].as_array_mut().expect("a list");
+        // How many bytes a mesh takes depends on the kind.
+        fields.iter_mut().for_each(|field| _ = field.as_object_mut().expect("a field").remove("curve"));
+        info
+    });
+    assert_eq!(a["fields"].as_array().map(Vec::len), Some(3));
     assert_eq!((&a["fields"], &a["metadata"]), (&b["fields"], &b["metadata"]));
 }
 
