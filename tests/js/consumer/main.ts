@@ -73,8 +73,8 @@ const built = await checkBuild();
 
 const good =
   chunks > 0 &&
-  examples === 45 &&
-  built === 23 &&
+  examples === 46 &&
+  built === 24 &&
   positions.length === 3 * mesh.stats.vertices &&
   mesh.tets.length === 4 * mesh.stats.tetrahedra &&
   surface.indices.length % 3 === 0 &&
