@@ -19,6 +19,7 @@
 import type {
   BlockProgress,
   CoreStats,
+  ErrorCurve,
   FieldError,
   FieldInfo,
   FieldStats,
@@ -43,6 +44,7 @@ import type {
 
 export type {
   BlockProgress,
+  ErrorCurve,
   FieldError,
   FieldInfo,
   FieldStats,

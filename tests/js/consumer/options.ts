@@ -2,6 +2,7 @@
 import {
   MultiTessellation,
   type BlockProgress,
+  type ErrorCurve,
   type FieldInfo,
   type MtInfo,
   type Need,
@@ -136,6 +137,11 @@ const fields: Members<FieldInfo> = {
   curve: "object",
 };
 
+const curves: Members<ErrorCurve> = {
+  errors: "object",
+  bytes: "object",
+};
+
 const progresses: Members<Progress> = {
   ready: "boolean",
   complete: "boolean",
@@ -175,7 +181,10 @@ export async function checkOptions(source: URL): Promise<number> {
   const mt = await MultiTessellation.open(source, { worker: false });
   await mt.complete;
   hasMembers("info", mt.info, infos);
-  mt.info.fields.forEach((field) => hasMembers("field", field, fields));
+  for (const field of mt.info.fields) {
+    hasMembers("field", field, fields);
+    hasMembers("curve", field.curve, curves);
+  }
   hasMembers("progress", mt.progress, progresses);
   const all: RefineOptions[] = Object.values(requests);
   all.push(...Object.values(views).map((view) => ({ view })), ...Object.values(transfers).map((transfer) => ({ error: 0.1, transfer })));
