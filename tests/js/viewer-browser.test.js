@@ -115,10 +115,13 @@ test("where pictures take too long the mesh is coarser while something moves, an
       await viewer.orbit(0.05, 0);
       await new Promise(requestAnimationFrame);
     }
-    const early = events.filter(({ name, detail }) => name === "stats" && detail.done).length;
+    // On a busy machine there may be time for the whole mesh between two movements.
+    const { full } = window.tetralodDemo;
+    const done = events.filter(({ name, detail }) => name === "stats" && detail.done);
+    const early = done.filter(({ detail }) => detail.tetrahedra !== full.tetrahedra).length;
     const moving = least();
     await new Promise((resolve) => viewer.addEventListener("stats", ({ detail }) => detail.done && resolve(detail)));
-    return { early, moving, full: window.tetralodDemo.full.tetrahedra, same: before === (await viewer.hash()) };
+    return { early, moving, full: full.tetrahedra, same: before === (await viewer.hash()) };
   });
   assert.ok(seen.moving < seen.full / 2, JSON.stringify(seen));
   assert.equal(seen.early, 0, "a mesh for movement is not the one that was asked for");
