@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::thread;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 
 use crate::serve::Server;
 use crate::volumes::{self, DATA, LARGE, SMALL};
@@ -13,7 +13,7 @@ use crate::{package, shell};
 /// The memory that the large volume takes to build, in KiB: some 450 bytes a tetrahedron, and its data.
 const LARGE_MEMORY: u64 = 7 << 20;
 
-/// Builds all, and serves until interrupted. The large volume is made meanwhile, and appears in the page.
+/// Builds what the page needs first, and serves until interrupted. The rest of the package and the large volume are made meanwhile.
 pub fn run(args: &[String]) -> Result<()> {
     let (mut port, mut serve, mut small) = (8080, true, false);
     let mut args = args.iter();
@@ -28,11 +28,13 @@ pub fn run(args: &[String]) -> Result<()> {
             other => bail!("`demo` knows --port N, --small and --no-serve, not `{other}`"),
         }
     }
-    package::build(&[])?;
+    // Both take minutes: side by side, no core is idle.
+    let viewer = thread::spawn(package::build_viewer);
     let tetralod = shell::released_command()?;
     make_data(&tetralod)?;
+    viewer.join().map_err(|_| anyhow!("a thread that builds the viewer panicked"))??;
     if !serve {
-        return Ok(());
+        return package::build(&[]);
     }
     if !small && has_memory() {
         volumes::write_list(&tetralod, Some(&LARGE))?;
@@ -90,6 +92,12 @@ pub fn start_server(tetralod: &Path, port: u16) -> Result<Server> {
 fn serve_page(tetralod: &Path, port: u16) -> Result<()> {
     // Somebody else on the port is no reason to fail: any other will do.
     let server = start_server(tetralod, port).or_else(|_| start_server(tetralod, 0))?;
-    println!("\nThe demo is at {}   (Ctrl-C ends it)", server.address);
+    let address = format!("\nThe demo is at {}   (Ctrl-C ends it)", server.address);
+    println!("{address}");
+    // What the page does not load by itself: above all the module that builds files dropped on it.
+    thread::spawn(move || match package::build(&[]) {
+        Ok(()) => println!("{address}"),
+        Err(error) => eprintln!("the page cannot build meshes: {error:#}"),
+    });
     server.wait()
 }

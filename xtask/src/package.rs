@@ -28,10 +28,13 @@ struct Module {
 /// The core, and the same for MTs of all kinds.
 const CORES: [&str; 2] = ["tetralod_core", "tetralod_all_kinds"];
 
+const VIEWER: Module =
+    Module { name: "tetralod_viewer", script: "tetralod_viewer", features: "web,gpu,all-kinds" };
+
 const MODULES: [Module; 4] = [
     Module { name: CORES[0], script: CORES[0], features: "web-session" },
     Module { name: CORES[1], script: CORES[0], features: "web-session,all-kinds" },
-    Module { name: "tetralod_viewer", script: "tetralod_viewer", features: "web,gpu,all-kinds" },
+    VIEWER,
     Module { name: "tetralod_build", script: "tetralod_build", features: "web-build" },
 ];
 
@@ -50,9 +53,7 @@ pub fn build(args: &[String]) -> Result<()> {
     if let Some(arg) = args.first() {
         bail!("`build` takes no argument, got `{arg}`");
     }
-    check_versions()?;
-    shell::add_wasm_target()?;
-    shell::install_node_tools()?;
+    prepare()?;
     let staging = Path::new("target/pkg-staging");
     remake(staging)?;
     for module in &MODULES {
@@ -64,9 +65,27 @@ pub fn build(args: &[String]) -> Result<()> {
     shell::run(&mut shell::command("node", ["xtask/js/sizes.mjs", PKG]))
 }
 
-/// Builds `pkg/` where there is none yet, as steps need that are run by themselves on a fresh checkout.
+/// Puts into `pkg/` what the demo's page needs to draw: all scripts but `inline.js`, and the viewer's module. [`build`] makes the
+/// rest.
+pub fn build_viewer() -> Result<()> {
+    prepare()?;
+    let staging = Path::new("target/pkg-viewer");
+    remake(staging)?;
+    compile(&VIEWER, staging)?;
+    copy_scripts(staging)?;
+    move_files(staging, Path::new(PKG))
+}
+
+fn prepare() -> Result<()> {
+    check_versions()?;
+    shell::add_wasm_target()?;
+    shell::install_node_tools()
+}
+
+/// Builds `pkg/` where there is no complete one yet, as steps need that are run by themselves on a fresh checkout.
 pub fn ensure_built() -> Result<()> {
-    if Path::new(PKG).join("package.json").is_file() {
+    // It is made last.
+    if Path::new(PKG).join("inline.js").is_file() {
         return shell::install_node_tools();
     }
     build(&[])
@@ -74,9 +93,7 @@ pub fn ensure_built() -> Result<()> {
 
 /// Compiles the module with the benchmark, which the package does not have, into `folder`.
 pub fn build_bench(folder: &Path) -> Result<()> {
-    check_versions()?;
-    shell::add_wasm_target()?;
-    shell::install_node_tools()?;
+    prepare()?;
     compile(
         &Module { name: "tetralod_bench", script: "tetralod_bench", features: "web-bench,all-kinds" },
         folder,
@@ -150,22 +167,36 @@ fn optimise(wasm: &Path) -> Result<()> {
     shell::run(command.args(WASM_FEATURES).arg(wasm).arg("-o").arg(wasm))
 }
 
-/// The package is put together beside `pkg/` and swapped in, so that a failed build leaves the last good one.
+/// The package is put together beside `pkg/` and moved there, so that a failed build leaves the last good one.
 fn assemble(staging: &Path) -> Result<()> {
-    let template = Path::new("pkg-template");
-    for file in files_of(template)? {
-        fs::copy(template.join(&file), staging.join(&file)).with_context(|| format!("copying {file}"))?;
-    }
+    copy_scripts(staging)?;
     for licence in ["LICENSE-MIT", "LICENSE-APACHE"] {
         fs::copy(licence, staging.join(licence)).context(licence)?;
     }
     licences::write(staging, MODULES.iter().map(|module| module.features))?;
     version()?;
     shell::run(shell::command("node", ["xtask/js/inline.mjs"]).arg(staging))?;
-    remake(Path::new(PKG))?;
-    for file in files_of(staging)? {
-        fs::rename(staging.join(&file), Path::new(PKG).join(&file))
-            .with_context(|| format!("moving {file}"))?;
+    let files = files_of(staging)?;
+    move_files(staging, Path::new(PKG))?;
+    for old in files_of(Path::new(PKG))?.iter().filter(|old| !files.contains(old)) {
+        fs::remove_file(Path::new(PKG).join(old)).with_context(|| format!("removing {old}"))?;
+    }
+    Ok(())
+}
+
+fn copy_scripts(folder: &Path) -> Result<()> {
+    let template = Path::new("pkg-template");
+    for file in files_of(template)? {
+        fs::copy(template.join(&file), folder.join(&file)).with_context(|| format!("copying {file}"))?;
+    }
+    Ok(())
+}
+
+/// One by one: a server may be reading the files that these replace.
+fn move_files(from: &Path, to: &Path) -> Result<()> {
+    fs::create_dir_all(to).with_context(|| format!("making {}", to.display()))?;
+    for file in files_of(from)? {
+        fs::rename(from.join(&file), to.join(&file)).with_context(|| format!("moving {file}"))?;
     }
     Ok(())
 }
