@@ -122,9 +122,11 @@ test("nor has it with several views, probes, a region, messages, the map of bloc
     await look("Flow with surface and wires");
     await page.selectOption("#region", "box");
     await press(page, "1");
-    for (const x of [0.45, 0.58]) {
+    await settle(page);
+    for (const [i, x] of [0.45, 0.58].entries()) {
       const { x: left, y: top, width, height } = await page.locator("#canvas").boundingBox();
       await page.mouse.click(left + x * width, top + 0.5 * height);
+      await page.locator(".card").nth(i).waitFor({ timeout: PATIENCE });
     }
     await page.locator("#plot path").waitFor({ timeout: PATIENCE });
     await look("probes and a region");
