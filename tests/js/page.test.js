@@ -318,10 +318,12 @@ test("any views are shown together, and what is beside the view stays when its s
   await reach(page, "complete");
   await setSlider(page, "error", 70);
   const scene = () => page.evaluate(() => Object.entries(window.tetralodDemo.viewer.state).filter(([, part]) => (Array.isArray(part) ? part.length > 0 : true)).map(([name]) => name));
+  const parts = ["isosurfaces", "volume", "slices", "boundary", "cells", "streamlines"];
   const has = async (...names) => {
-    const found = await scene();
-    const parts = ["isosurfaces", "volume", "slices", "boundary", "cells", "streamlines"];
-    assert.deepEqual(parts.filter((part) => found.includes(part)), names);
+    const found = async () => (await scene()).filter((part) => parts.includes(part)).sort();
+    // The viewer gets a scene some time after a control was changed.
+    for (const until = Date.now() + PATIENCE; String(await found()) !== String([...names].sort()) && Date.now() < until; ) await page.waitForTimeout(50);
+    assert.deepEqual(await found(), [...names].sort());
   };
   await has("isosurfaces");
   const alone = await picture(page, "together-surface");
