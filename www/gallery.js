@@ -67,7 +67,9 @@ export const sceneOf = (url) => read(listed(url)?.scene ?? "");
 
 /** A volume has been shown: whoever made it may have had no GPU to draw a picture of it. */
 export async function shown(url) {
-  await takePicture(listed(url)).catch(() => {});
+  const isNew = await takePicture(listed(url)).catch(() => false);
+  // The list that is open is made again when it is opened the next time.
+  if (isNew && !$("gallery").open) showGallery();
 }
 
 function announceNew(before) {

@@ -166,6 +166,8 @@ export function carriedOver() {
 export function arriveWith(words) {
   home = page.viewer.state.camera;
   show(words);
+  // What is changed first can be undone, too, however soon.
+  if (now === undefined) save();
 }
 
 /** Shows a state of the volume that is open. @param {Words} words */

@@ -35,12 +35,15 @@ export function taken({ url, bytes }) {
 /** What the gallery shows of a volume. @param {import("./gallery.js").Listed} volume */
 export const pictureOf = (volume) => volume.picture ?? taken(volume) ?? drawing(volume.title);
 
-/** Takes a picture of the volume that is open, if it has none. @param {import("./gallery.js").Listed | undefined} volume */
+/**
+ * Takes a picture of the volume that is open, if it has none. Resolves to whether it did.
+ * @param {import("./gallery.js").Listed | undefined} volume
+ */
 export async function takePicture(volume) {
-  if (!volume || volume.picture || taken(volume)) return;
+  if (!volume || volume.picture || taken(volume)) return false;
   const { info } = demo;
   await new Promise((resolve) => setTimeout(resolve, REST));
-  if (info !== demo.info || demo.state !== "complete") return;
+  if (info !== demo.info || demo.state !== "complete") return false;
   const image = await createImageBitmap(await page.viewer.screenshot({ ...SIZE, background: "dark" }));
   const canvas = new OffscreenCanvas(SIZE.width, SIZE.height);
   canvas.getContext("2d").drawImage(image, 0, 0);
@@ -52,7 +55,9 @@ export async function takePicture(volume) {
   });
   try {
     localStorage.setItem(`${KEY}${volume.url} ${volume.bytes}`, text);
+    return true;
   } catch {
     // There is no room: it is taken again the next time.
+    return false;
   }
 }

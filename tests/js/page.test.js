@@ -474,9 +474,12 @@ test("volumes without pictures get some: drawn ones, then those that the page ha
   const pictures = async () => {
     await page.click("#open-gallery");
     await page.locator("#gallery li").first().waitFor();
-    // Those that are not in sight are loaded later.
-    await page.evaluate(() => document.querySelectorAll("#gallery img").forEach((image) => image.setAttribute("loading", "eager")));
-    await page.waitForFunction(() => [...document.querySelectorAll("#gallery img")].every((image) => image instanceof HTMLImageElement && image.complete));
+    await page.waitForFunction(() => {
+      const images = [...document.querySelectorAll("#gallery img")].filter((image) => image instanceof HTMLImageElement);
+      // Those that are not in sight would be loaded later; the list may be made again meanwhile.
+      for (const image of images) image.loading = "eager";
+      return images.length > 0 && images.every((image) => image.complete);
+    });
     return page.evaluate(() => [...document.querySelectorAll("#gallery img")].map((image) => image instanceof HTMLImageElement && [image.src.slice(0, 14), image.naturalWidth]));
   };
   const drawn = await pictures();
