@@ -38,7 +38,7 @@ pub(super) fn is_flat(kind: i64) -> bool {
 /// The tetrahedra at most that cells of these types become. Refuses types that cannot be split, and cells none of which has a
 /// volume, with the number of each type.
 pub(super) fn most_tets(types: &[i64]) -> Result<u64, ReadReason> {
-    // There are few types; a map would cost pages more bytes than it saves time.
+    // There are few types, so a list is as quick as a map.
     let mut counts: Vec<(i64, u64)> = Vec::new();
     for &kind in types {
         if let Some(known) = counts.iter().position(|(known, _)| *known == kind) {
