@@ -3,6 +3,8 @@
 //! Cells with a volume are split by the recipes of `cell_shapes`; those without one (vertices, lines, polygons), which
 //! meshers write beside them for boundaries, are left out. What cannot be split is refused, counted by type.
 
+use std::collections::BTreeMap;
+
 use crate::io::cell_shapes::{Recipe, recipe};
 use crate::io::error::{ReadReason, cell_name};
 use crate::mesh::Field;
@@ -15,9 +17,6 @@ pub(super) const TETRAHEDRON: i64 = 10;
 const VERTICES: [i64; 2] = [1, 2];
 /// And for cells without a volume: linear, quadratic, and of any order.
 const FLAT: [i64; 22] = [EMPTY, 1, 2, 3, 4, 5, 6, 7, 8, 9, 21, 22, 23, 28, 30, 34, 35, 36, 68, 69, 70, 75];
-
-/// More types of cells than any format has.
-const MOST_TYPES: usize = 256;
 
 /// Whether the cells are vertices and poly-vertices alone, as of data sets that are only points.
 pub(super) fn are_points(types: &[i64]) -> bool {
@@ -38,48 +37,31 @@ pub(super) fn is_flat(kind: i64) -> bool {
 /// The tetrahedra at most that cells of these types become. Refuses types that cannot be split, and cells none of which has a
 /// volume, with the number of each type.
 pub(super) fn most_tets(types: &[i64]) -> Result<u64, ReadReason> {
-    // There are few types, so a list is as quick as a map.
-    let mut counts: Vec<(i64, u64)> = Vec::new();
-    for &kind in types {
-        if let Some(known) = counts.iter().position(|(known, _)| *known == kind) {
-            counts[known].1 += 1;
-        } else if counts.len() == MOST_TYPES {
-            return Err(ReadReason::TooLarge { what: "types of cells".into(), limit: MOST_TYPES as u64 });
-        } else {
-            counts.push((kind, 1));
-        }
+    let mut counts = BTreeMap::new();
+    for kind in types {
+        *counts.entry(*kind).or_insert(0_u64) += 1;
     }
-    counts.sort_unstable();
     let mut tets = 0_u64;
-    for &(kind, count) in &counts {
+    for (&kind, &count) in &counts {
         match recipe(kind) {
             Some(recipe) => tets = tets.saturating_add(count.saturating_mul(recipe.most_tets() as u64)),
             None if is_flat(kind) => {}
-            None => return Err(ReadReason::CellTypes(counts)),
+            None => return Err(ReadReason::CellTypes(counts.into_iter().collect())),
         }
     }
     if tets == 0 && !types.is_empty() {
-        return Err(ReadReason::CellTypes(counts));
+        return Err(ReadReason::CellTypes(counts.into_iter().collect()));
     }
     Ok(tets)
 }
 
-/// Recipes that were looked up, each with its type. There are few types, and neighbours in a file mostly have the same.
+/// Recipes that were looked up.
 #[derive(Default)]
-struct Recipes {
-    known: Vec<(i64, Option<Recipe>)>,
-    last: usize,
-}
+struct Recipes(BTreeMap<i64, Option<Recipe>>);
 
 impl Recipes {
     fn of(&mut self, kind: i64) -> Option<&Recipe> {
-        if self.known.get(self.last).is_none_or(|(known, _)| *known != kind) {
-            self.last = self.known.iter().position(|(known, _)| *known == kind).unwrap_or(self.known.len());
-            if self.last == self.known.len() {
-                self.known.push((kind, recipe(kind)));
-            }
-        }
-        self.known[self.last].1.as_ref()
+        self.0.entry(kind).or_insert_with(|| recipe(kind)).as_ref()
     }
 }
 

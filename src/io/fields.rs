@@ -150,6 +150,11 @@ fn length(vector: &[f64]) -> f64 {
     largest * vector.iter().map(|x| (x / largest) * (x / largest)).sum::<f64>().sqrt()
 }
 
+/// One component of values that have so many each, one value after the other.
+pub(super) fn component_of(values: &[f64], component: usize, components: usize) -> Vec<f64> {
+    values.iter().skip(component).step_by(components).copied().collect()
+}
+
 /// What a component of so many is called.
 pub(super) fn component_name(components: usize, c: usize) -> String {
     const AXES: [&str; 3] = ["x", "y", "z"];

@@ -4,6 +4,7 @@
 //! Every cube is split as that of a regular grid, so neighbours agree.
 
 use crate::io::error::{At, ReadError, ReadReason};
+use crate::io::fields::component_of;
 use crate::io::image::{self, Extent, MAX_GRID_POINTS, Part};
 use crate::io::vtu::PieceReader;
 use crate::io::xml::Document;
@@ -115,9 +116,8 @@ fn read_part(reader: &PieceReader<'_, '_>, whole: Extent) -> Result<Part, ReadEr
     } else {
         reader.points(points)?.into_flattened()
     };
-    let axis = |i: usize| coordinates.iter().skip(i).step_by(3).copied().collect();
-    let mut fields: Vec<Field> =
-        AXES.iter().enumerate().map(|(i, name)| Field::new(*name, axis(i))).collect();
+    let axis = |(i, name): (usize, &&str)| Field::new(*name, component_of(&coordinates, i, 3));
+    let mut fields: Vec<Field> = AXES.iter().enumerate().map(axis).collect();
     fields.extend(reader.fields("PointData", points)?);
     Ok(Part { extent, fields })
 }

@@ -128,6 +128,18 @@ async function covered(page) {
   }, png);
 }
 
+/** Calls `then` with a folder that has the files of a page, and the address of a server of it, for as long as that takes. */
+async function served(page, then) {
+  const folder = await prepare(page);
+  const { address, stop } = await serve(folder);
+  try {
+    await then({ folder, address });
+  } finally {
+    stop();
+    await rm(folder, { recursive: true });
+  }
+}
+
 /** Opens a page, collects its complaints, and calls `then` when it has been loaded. */
 async function visit(address, then, options = {}) {
   const context = await browser.newContext({ viewport: { width: 700, height: 600 }, ...options });
@@ -166,9 +178,7 @@ for (const page of await pages()) {
   const runnable = found.filter(({ language, name }) => language === "html" || /\.mjs$/.test(name ?? ""));
   if (page === "README.md" || runnable.length === 0) continue;
   test(`the examples of ${page} work`, async (t) => {
-    const folder = await prepare(page);
-    const { address, stop } = await serve(folder);
-    try {
+    await served(page, async ({ folder, address }) => {
       for (const { name, code } of runnable) {
         await t.test(name, async () => {
           if (name.endsWith(".mjs")) {
@@ -182,39 +192,28 @@ for (const page of await pages()) {
           }
         });
       }
-    } finally {
-      stop();
-      await rm(folder, { recursive: true });
-    }
+    });
   });
 }
 
-test("a file that the reader chooses is opened", async () => {
-  const folder = await prepare("docs/howto/my-data.md");
-  const { address, stop } = await serve(folder);
-  try {
+test("a file that the reader chooses is opened", () =>
+  served("docs/howto/my-data.md", async ({ folder, address }) => {
     await visit(`${address}open-file.html`, async (page) => {
       await page.locator("input").setInputFiles(join(folder, "flow.mt"));
       await page.waitForFunction(() => /^\d+ of \d+ tetrahedra/.test(document.querySelector("pre").textContent), undefined, { timeout: PATIENCE });
     });
-  } finally {
-    stop();
-    await rm(folder, { recursive: true });
-  }
-});
+  }));
 
-test("the page for a strict Content-Security-Policy also works where every file has that policy, and says so where it is stricter", async () => {
-  const folder = await prepare("docs/csp-and-cors.md");
-  const { address, stop } = await serve(folder);
-  const page = await readFile(join(folder, "csp.html"), "utf8");
-  const [, policy] = /Content-Security-Policy" content="([^"]*)"/.exec(page);
-  const withPolicy = (policy) => async (opened) => {
-    await opened.route("**/*", async (route) => {
-      const response = await route.fetch();
-      await route.fulfill({ response, headers: { ...response.headers(), "content-security-policy": policy } });
-    });
-  };
-  try {
+test("the page for a strict Content-Security-Policy also works where every file has that policy, and says so where it is stricter", () =>
+  served("docs/csp-and-cors.md", async ({ folder, address }) => {
+    const page = await readFile(join(folder, "csp.html"), "utf8");
+    const [, policy] = /Content-Security-Policy" content="([^"]*)"/.exec(page);
+    const withPolicy = (policy) => async (opened) => {
+      await opened.route("**/*", async (route) => {
+        const response = await route.fetch();
+        await route.fulfill({ response, headers: { ...response.headers(), "content-security-policy": policy } });
+      });
+    };
     await visit("about:blank", async (opened, complaints) => {
       await withPolicy(policy)(opened);
       await opened.goto(`${address}csp.html`);
@@ -229,11 +228,7 @@ test("the page for a strict Content-Security-Policy also works where every file 
     for (let i = 0; i < 100 && errors.length === 0; i++) await refused.waitForTimeout(100);
     assert.match(errors.join(), /wasm/i);
     await context.close();
-  } finally {
-    stop();
-    await rm(folder, { recursive: true });
-  }
-});
+  }));
 
 test("every block is run or checked, or the reason is known", async () => {
   for (const page of await pages()) {
@@ -258,6 +253,7 @@ test("JSON and YAML can be read", async () => {
 
 const nginx = ["/usr/sbin/nginx", "/usr/local/bin/nginx", "/opt/homebrew/bin/nginx"].find(existsSync);
 
+// Nobody has to install a server to develop this; the skip is printed.
 test("the configuration of nginx does what the page says", { skip: nginx ? false : "there is no nginx" }, async () => {
   const [{ code }] = (await blocks("docs/hosting.md")).filter(({ language }) => language === "nginx");
   const folder = await mkdtemp(join(tmpdir(), "tetralod-nginx-"));

@@ -171,6 +171,7 @@ fn number_type(name: &str) -> Option<NumberType> {
 
 /// Vectors as `(1,0,0) (0,1,0)`; `none` stands for an axis that is not one of space.
 fn vectors(text: &str) -> Result<Vec<[f64; 3]>, ReadReason> {
+    // What stands in front of the first bracket belongs to no vector.
     let parts = text.split('(').skip(1);
     let vector = |part: &str| -> Option<[f64; 3]> {
         let (inside, _) = part.split_once(')')?;

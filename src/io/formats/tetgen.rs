@@ -6,6 +6,7 @@
 use std::path::Path;
 
 use crate::io::error::{At, ReadError, ReadReason};
+use crate::io::fields::component_of;
 use crate::io::formats::draft::Draft;
 use crate::io::formats::scanner::Scanner;
 use crate::io::{ReadOptions, in_file, load};
@@ -52,7 +53,7 @@ fn read_nodes(file: &mut Scanner<'_>, draft: &mut Draft<'_>) -> Result<i64, Read
         }
     }
     for i in 0..attributes.min(values.len()) {
-        let of_one = values.iter().skip(i).step_by(attributes).copied().collect();
+        let of_one = component_of(&values, i, attributes);
         draft.at_points(&format!("attribute_{}", i + 1), 1, of_one, false)?;
     }
     Ok(first)
@@ -76,7 +77,7 @@ fn read_cells(file: &mut Scanner<'_>, draft: &mut Draft<'_>, first: i64) -> Resu
         }
     }
     for i in 0..attributes.min(values.len()) {
-        let of_one = values.iter().skip(i).step_by(attributes).copied().collect();
+        let of_one = component_of(&values, i, attributes);
         draft.at_cells(&format!("region_{}", i + 1), 1, of_one, false)?;
     }
     Ok(())
