@@ -34,3 +34,10 @@ export function assertDrawn({ colours, covered }, what = "the picture") {
 
 /** The share of the pixels in which two pictures differ. */
 export const differing = (a, b) => a.pixels.filter((pixel, i) => pixel !== b.pixels[i]).length / a.pixels.length;
+
+/** How far two pictures are apart: the mean over the channels of the sampled pixels, of 255. */
+export function distance(a, b) {
+  const channels = (pixel) => [pixel & 255, (pixel >> 8) & 255, (pixel >> 16) & 255];
+  const apart = a.pixels.flatMap((pixel, i) => channels(pixel).map((value, c) => Math.abs(value - channels(b.pixels[i])[c])));
+  return apart.reduce((sum, one) => sum + one, 0) / apart.length;
+}
