@@ -1,20 +1,20 @@
-//! Vertex-based MTs from fine to coarse: pick a vertex, remove it, record it [§2.2, §5].
+//! From fine to coarse: pick a vertex, remove it, record it [§2.2, §5].
 
 use super::candidate_queue::{Key, Levels};
 use super::cost::Reference;
 use super::fill_cost::Input;
 use super::gift_wrap::GiftWrap;
+use super::hole::{Filling, Hole};
 use super::quantize::Quantized;
 use super::removal::{RemovalSearch, State};
 use super::rounds::{Later, Rounds};
 use super::searches::Searches;
-use super::sequence::{Insertion, Sequence};
 use super::work_mesh::WorkMesh;
 use super::{BuildConfig, BuildCriterion, BuildError, BuildProgress, OnProgress, Purpose, quantize};
 use crate::geom::Bounds;
 use crate::mesh;
 use crate::mesh::{NONE, TetMesh, Topology};
-use crate::mt::{ErrorCode, MAX_UPDATES};
+use crate::mt::{ErrorCode, MAX_UPDATES, MtInfo};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
@@ -28,11 +28,42 @@ const SMALLEST_BATCH: usize = 64;
 const LARGEST_FAN: u32 = 10;
 
 /// The result of [`decimate`].
-pub(super) struct Decimated {
-    pub sequence: Sequence,
+pub(super) struct Decimated<R> {
+    pub record: R,
     pub quantized: Quantized,
-    /// Model units of displacement that count as an error of 1.
-    pub displacement_per_error: f64,
+    /// What is known of the MT; not how many updates it has.
+    pub info: MtInfo,
+}
+
+/// Takes down the removals in the order in which they are made.
+pub(super) trait Record {
+    /// No removals yet, from a mesh of so many tetrahedra.
+    fn new(info: &MtInfo, tets: usize) -> Self;
+
+    /// How many removals there are.
+    fn len(&self) -> usize;
+
+    /// Adds a removal that has just been carried out.
+    fn add(&mut self, removed: &Removed<'_>, quantized: &Quantized);
+
+    /// Ends with the tetrahedra that are left, those that begin with [`NONE`] being dead; and the removal that made each.
+    fn finish(&mut self, tets: &[[u32; 4]], makers: &[u32]);
+}
+
+/// A removal.
+pub(super) struct Removed<'a> {
+    pub hole: &'a Hole,
+    pub filling: &'a Filling,
+    /// The tetrahedra in which the filling is now.
+    pub slots: &'a [u32],
+    /// The removals that made the tetrahedra of the mesh before, [`NONE`] for those of the reference mesh.
+    pub makers: &'a [u32],
+    /// The neighbour that the vertex was moved to; [`NONE`] where the hole was filled otherwise.
+    pub end: u32,
+    /// The error of each field, as it is stored.
+    pub errors: &'a [f64],
+    /// How far the boundary has moved, as an error.
+    pub step: f64,
 }
 
 /// Removes vertices of `mesh`, cheapest first, until no more can be removed. `mesh` must be valid: see
@@ -40,12 +71,12 @@ pub(super) struct Decimated {
 ///
 /// # Errors
 /// As [`super::edge_mt`].
-pub(super) fn decimate(
+pub(super) fn decimate<R: Record>(
     mesh: &TetMesh,
     config: &BuildConfig,
     (criterion, purpose): (BuildCriterion, Purpose),
     progress: OnProgress<'_>,
-) -> Result<Decimated, BuildError> {
+) -> Result<Decimated<R>, BuildError> {
     if mesh.positions.len() > MAX_UPDATES as usize {
         return Err(BuildError::TooLarge);
     }
@@ -64,27 +95,17 @@ pub(super) fn decimate(
     let levels = Levels::of_purpose(purpose);
     let reference = Reference::new(&quantized, &work, displacement_per_error, config.displacement_edges);
     let state = State::new(work, reference, non_manifold, levels);
-    let mut decimator = Decimator::new(state, gift_wrap);
+    let info = quantized.info(mesh.tets.len(), displacement_per_error);
+    let record = R::new(&info, state.mesh.tets.len());
+    let mut decimator = Decimator::new(state, gift_wrap, record);
     decimator.remove_all(progress)?;
-    let Decimator { state, mut sequence, .. } = decimator;
-    sequence.base = state.mesh.tets.iter().copied().filter(|tet| tet[0] != NONE).collect();
-    turn_round(&mut sequence);
-    Ok(Decimated { sequence, quantized, displacement_per_error })
+    let Decimator { state, mut record, .. } = decimator;
+    record.finish(&state.mesh.tets, &state.removals.makers);
+    drop(state);
+    Ok(Decimated { record, quantized, info })
 }
 
-/// Makes insertions, coarse to fine, of removals in the order in which they were made.
-fn turn_round(sequence: &mut Sequence) {
-    let all = sequence.tets.len();
-    sequence.tets.reverse();
-    sequence.steps.reverse();
-    for step in &mut sequence.steps {
-        for range in [&mut step.removed, &mut step.inserted] {
-            *range = all - range.end..all - range.start;
-        }
-    }
-}
-
-struct Decimator<'a> {
+struct Decimator<'a, R> {
     state: State<'a>,
     rounds: Rounds,
     /// That of the vertex which is removed next.
@@ -92,8 +113,8 @@ struct Decimator<'a> {
     /// Those of candidates.
     searches: Searches,
     slots: Vec<u32>,
-    /// The removals so far: each with the star in `inserted` and the filling in `removed`.
-    sequence: Sequence,
+    /// The removals so far.
+    record: R,
 }
 
 /// A candidate of a round.
@@ -106,23 +127,23 @@ struct Prospect {
     end: u32,
 }
 
-impl<'a> Decimator<'a> {
-    fn new(state: State<'a>, gift_wrap: Option<GiftWrap>) -> Self {
+impl<'a, R: Record> Decimator<'a, R> {
+    fn new(state: State<'a>, gift_wrap: Option<GiftWrap>, record: R) -> Self {
         let points = state.versions.len();
         let mut rounds = Rounds::new(state.levels.of(0.0), state.levels.last(), points);
         let free = (0..points as u32).filter(|&v| state.mesh.has(v) && !state.frozen[v as usize]);
         free.for_each(|v| rounds.wait(v));
         let searches = Searches::new(gift_wrap.as_ref(), points);
         let search = RemovalSearch::new(gift_wrap, points);
-        Self { state, rounds, search, searches, slots: Vec::new(), sequence: Sequence::default() }
+        Self { state, rounds, search, searches, slots: Vec::new(), record }
     }
 
     fn remove_all(&mut self, progress: OnProgress<'_>) -> Result<(), BuildError> {
         let vertices = (0..self.state.reference.points).filter(|&v| self.state.mesh.has(v)).count();
         loop {
-            let before = self.sequence.steps.len();
+            let before = self.record.len();
             self.round(progress)?;
-            let after = self.sequence.steps.len();
+            let after = self.record.len();
             if !self.rounds.end(after - before, vertices - after) {
                 return Ok(());
             }
@@ -136,7 +157,7 @@ impl<'a> Decimator<'a> {
         let size = (candidates.len() / BATCHES).max(SMALLEST_BATCH);
         let mut ready = BinaryHeap::new();
         for batch in candidates.chunks(size) {
-            let done = self.sequence.steps.len() as u64;
+            let done = self.record.len() as u64;
             let total = u64::from(self.state.reference.points);
             let tetrahedra = Some(self.state.mesh.live());
             if progress(BuildProgress { stage: "remove", done, total, tetrahedra }).is_break() {
@@ -204,34 +225,32 @@ impl<'a> Decimator<'a> {
 
     /// Removes the vertex that was evaluated last.
     fn remove(&mut self) {
-        let Self { state, search, slots, sequence, .. } = self;
+        let Self { state, search, slots, record, .. } = self;
         let RemovalSearch { hole, best, .. } = search;
-        let State { mesh, removals, degrees, .. } = state;
+        let State { mesh, removals, degrees, reference, .. } = state;
         // Never zero: error 0 is to mean the reference mesh, with every vertex in.
         let stored = |error: &f64| ErrorCode::at_least(*error).max(ErrorCode(1)).error();
         let errors: Vec<f64> = best.cost.placement.errors.iter().map(stored).collect();
-        let start = sequence.tets.len();
-        sequence.tets.extend(hole.star.iter().map(|s| mesh.tets[s.tet as usize]));
-        let middle = sequence.tets.len();
-        sequence.tets.extend_from_slice(&best.filling.tets);
-        let end = sequence.tets.len();
-        let step = best.cost.step;
-        let removal = sequence.steps.len() as u32;
-        sequence.steps.push(Insertion {
-            vertex: hole.a,
-            removed: middle..end,
-            inserted: start..middle,
-            errors: errors.clone(),
-            step,
-        });
+        let removal = record.len() as u32;
         hole.replace(mesh, &best.filling, slots);
-        removals.errors.extend(errors);
         removals.makers.resize(mesh.tets.len(), NONE);
+        let removed = Removed {
+            hole,
+            filling: &best.filling,
+            slots,
+            makers: &removals.makers,
+            end: search.best_end,
+            errors: &errors,
+            step: best.cost.step,
+        };
+        record.add(&removed, reference.quantized);
+        removals.errors.extend(errors);
         slots.iter().for_each(|&t| removals.makers[t as usize] = removal);
-        let input = Input { hole, filling: &best.filling, reference: &state.reference };
+        let input = Input { hole, filling: &best.filling, reference };
         best.cost.move_points(&mut state.buckets, slots, input);
-        let stars = &sequence.tets[start..middle];
-        stars.iter().flatten().for_each(|&v| degrees[v as usize] -= 1);
+        let star = hole.faces.iter().flat_map(|(face, _)| face);
+        star.for_each(|&v| degrees[v as usize] -= 1);
+        degrees[hole.a as usize] -= hole.star.len() as u32;
         best.filling.tets.iter().flatten().for_each(|&v| degrees[v as usize] += 1);
         // The neighbours have other stars now, and may have become cheaper.
         let reach = self.state.reaches[self.search.hole.a as usize];

@@ -28,6 +28,7 @@ mod boundary_distance;
 mod candidate_queue;
 mod collapse;
 mod collapse_check;
+mod collapses;
 mod cost;
 mod decimate;
 mod delaunay;
@@ -57,6 +58,9 @@ mod sequence;
 mod vertex;
 mod work_mesh;
 
+use collapses::Collapses;
+use decimate::Decimated;
+
 pub use collapse::edge_mt;
 pub use delaunay::delaunay;
 pub use method::{BuildCriterion, Construction, ConstructionChoice, Method, Purpose, VertexMethod};
@@ -64,8 +68,7 @@ pub use remedy::Remedy;
 
 use crate::mesh::{MeshError, TetMesh};
 use crate::mt::{
-    ConvertError, ErrorCode, Exact, ExplicitMt, HalfEdgeMt, Mt, MtKind, MultiTessellation, UpdateError,
-    UpdateId, VertexId,
+    ConvertError, Exact, ExplicitMt, Mt, MtKind, MultiTessellation, UpdateError, UpdateId, VertexId,
 };
 use std::ops::ControlFlow;
 use thiserror::Error;
@@ -349,82 +352,36 @@ pub fn build(
     progress: OnProgress<'_>,
 ) -> Result<BuildResult, BuildError> {
     let kind = config.construction.kind();
-    let BuildResult { mt, summary, vertices, exact } = match config.construction {
+    let result = match config.construction {
         Construction::Edge | Construction::ExplicitEdge => {
             let BuildResult { mt, summary, vertices, exact } = edge_mt(mesh, config, progress)?;
             BuildResult { mt: Mt::from(mt), summary, vertices, exact }
         }
-        Construction::HalfEdge { purpose } => {
-            let how = (BuildCriterion::HalfEdge, purpose);
-            summed_up(mesh, config, vertex::decimated_mt(mesh, config, how, progress)?)?
-        }
+        Construction::HalfEdge { purpose } => half_edge_mt(mesh, config, purpose, progress)?,
         Construction::Vertex(method) | Construction::ExplicitVertex(method) => {
             summed_up(mesh, config, vertex::mt_by(method, mesh, config, progress)?)?
         }
     };
     // Conversions keep the numbers of the vertices.
-    let (mt, vertices, exact) = match mt {
-        Mt::Explicit(explicit) if kind == MtKind::HalfEdge => {
-            let (mt, vertices) = half_edge_mt(&explicit, &vertices, config.block_bits.clamp(4, 16))?;
-            let exact = field_selection::exact_values(mesh, config, &vertices)?;
-            (mt.into(), vertices, exact)
-        }
-        mt => (mt, vertices, exact),
-    };
-    let mt = match mt {
-        mt if mt.info().kind == kind => mt,
-        mt => mt.convert(kind)?,
-    };
-    Ok(BuildResult { mt, summary, vertices, exact })
-}
-
-/// The half-edge MT of an explicit one, its updates in blocks by what they reach, and its vertex for each point, given those
-/// of the explicit one.
-fn half_edge_mt(
-    explicit: &ExplicitMt,
-    vertices: &[VertexId],
-    block_bits: u32,
-) -> Result<(HalfEdgeMt, Vec<VertexId>), BuildError> {
-    let near = HalfEdgeMt::near_vertices(explicit)?;
-    let (mut starts, mut parents) = (vec![0], Vec::new());
-    let all = || (0..explicit.updates()).map(UpdateId);
-    for u in all() {
-        parents.extend_from_slice(explicit.parents(u));
-        starts.push(parents.len() as u32);
+    match result.mt.info().kind == kind {
+        true => Ok(result),
+        false => Ok(BuildResult { mt: result.mt.convert(kind)?, ..result }),
     }
-    let boxes: Vec<[[i32; 3]; 2]> = all().map(|u| bounds_of_inserted(explicit, u)).collect();
-    let errors: Vec<ErrorCode> = all().map(|u| explicit.error(u)).collect();
-    let base = explicit.base().positions.len() as u32;
-    let updates = block_order::Updates {
-        base,
-        near: &near,
-        starts: &starts,
-        parents: &parents,
-        boxes: &boxes,
-        errors: &errors,
-    };
-    let order = updates.order(block_bits);
-    let explicit = explicit.reordered(&order).map_err(BuildError::Internal)?;
-    let mut new_numbers = vec![0; order.len()];
-    (0..).zip(&order).for_each(|(new, &old)| new_numbers[old as usize] = new);
-    let renamed = |v: &VertexId| match v.0.checked_sub(base) {
-        Some(update) => VertexId(base + new_numbers[update as usize]),
-        None => *v,
-    };
-    let mt = HalfEdgeMt::from_explicit(&explicit, block_bits)?;
-    Ok((mt, vertices.iter().map(renamed).collect()))
 }
 
-/// The box around the tetrahedra that an update inserts.
-fn bounds_of_inserted(explicit: &ExplicitMt, u: UpdateId) -> [[i32; 3]; 2] {
-    let tets = explicit.inserted(u);
-    let corners = explicit.tets()[tets.start as usize..tets.end as usize].as_flattened();
-    corners
-        .iter()
-        .map(|&v| explicit.position(VertexId(v)))
-        .fold([[i32::MAX; 3], [i32::MIN; 3]], |[low, high], p| {
-            [[0, 1, 2].map(|k| low[k].min(p[k])), [0, 1, 2].map(|k| high[k].max(p[k]))]
-        })
+/// The half-edge MT of `mesh`, its updates in blocks by what they reach.
+fn half_edge_mt(
+    mesh: &TetMesh,
+    config: &BuildConfig,
+    purpose: Purpose,
+    progress: OnProgress<'_>,
+) -> Result<BuildResult, BuildError> {
+    let how = (BuildCriterion::HalfEdge, purpose);
+    let Decimated::<Collapses> { record, quantized, info } = decimate::decimate(mesh, config, how, progress)?;
+    let block_bits = config.block_bits.clamp(4, 16);
+    let (mt, vertices, summary) = record.half_edge_mt(info, &quantized, block_bits, progress)?;
+    let exact = field_selection::exact_values(mesh, config, &vertices)?;
+    Ok(BuildResult { mt: mt.into(), summary, vertices, exact })
 }
 
 /// Adds the summary of an explicit MT.

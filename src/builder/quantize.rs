@@ -6,7 +6,7 @@ use super::position_lattice::Placed;
 use super::{BuildConfig, BuildError, field_lattice, field_selection, location, position_lattice};
 use crate::geom::{Lattice, ON_LATTICE, WIDE_BITS};
 use crate::mesh::{Field, TetMesh};
-use crate::mt::{FieldInfo, MtInfo};
+use crate::mt::{FieldInfo, MtInfo, MtKind};
 use glam::DVec3;
 
 /// The reference mesh on its lattices.
@@ -42,6 +42,21 @@ impl Quantized {
         let places = mesh.positions.iter().zip(&positions).map(place).collect();
         let quantization = position_lattice::largest_move(mesh, &lattice, &positions);
         Self { lattice, fields, positions, levels, exact, places, locations: Vec::new(), quantization }
+    }
+
+    /// What is known of the MT of a mesh of so many tetrahedra; not how many updates it has. `displacement_per_error`: model units of
+    /// displacement that count as an error of 1.
+    pub fn info(&self, tetrahedra: usize, displacement_per_error: f64) -> MtInfo {
+        MtInfo {
+            kind: MtKind::Explicit,
+            lattice: self.lattice,
+            fields: self.fields.clone(),
+            vertices: self.positions.len() as u32,
+            tetrahedra: tetrahedra as u32,
+            updates: 0,
+            displacement_per_error,
+            quantization: self.quantization,
+        }
     }
 
     /// Where the lattice has put a point, in its steps.

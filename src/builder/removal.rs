@@ -73,6 +73,8 @@ pub(super) struct RemovalSearch {
     /// The filling that is evaluated, and the best one so far.
     now: Candidate,
     pub best: Candidate,
+    /// The vertex that `best` moves the removed one to; [`NONE`] if it is another filling.
+    pub best_end: u32,
 }
 
 /// A filling and its cost.
@@ -100,6 +102,7 @@ impl RemovalSearch {
             ends: Vec::new(),
             now: Candidate::default(),
             best: Candidate::default(),
+            best_end: NONE,
         }
     }
 
@@ -158,6 +161,7 @@ impl RemovalSearch {
             let key = self.key(state, self.now.filling.tets.len(), self.now.error, b);
             if found.is_none_or(|found| key < found) {
                 found = Some(key);
+                self.best_end = b;
                 std::mem::swap(&mut self.now, &mut self.best);
             }
         }

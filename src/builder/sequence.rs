@@ -1,6 +1,7 @@
 //! What the builders of vertex-based MTs hand over: vertex insertions, coarse to fine.
 
 use super::base::{Numbered, number_base};
+use super::decimate::{Record, Removed};
 use super::quantize::Quantized;
 use super::{BuildError, BuildProgress, OnProgress, quantize};
 use crate::mesh::NONE;
@@ -43,19 +44,51 @@ pub(super) struct Insertion {
     pub step: f64,
 }
 
+/// Of removals in the order in which they are made it becomes one of insertions.
+impl Record for Sequence {
+    fn new(_: &MtInfo, _: usize) -> Self {
+        Self::default()
+    }
+
+    fn len(&self) -> usize {
+        self.steps.len()
+    }
+
+    fn add(&mut self, removed: &Removed<'_>, _: &Quantized) {
+        let Removed { hole, filling, errors, step, .. } = *removed;
+        let start = self.tets.len();
+        self.tets.extend(hole.faces.iter().map(|&([x, y, z], _)| [x, y, z, hole.a]));
+        let middle = self.tets.len();
+        self.tets.extend_from_slice(&filling.tets);
+        let end = self.tets.len();
+        let (removed, inserted) = (middle..end, start..middle);
+        self.steps.push(Insertion { vertex: hole.a, removed, inserted, errors: errors.to_vec(), step });
+    }
+
+    fn finish(&mut self, tets: &[[u32; 4]], _: &[u32]) {
+        self.base = tets.iter().copied().filter(|tet| tet[0] != NONE).collect();
+        let all = self.tets.len();
+        self.tets.reverse();
+        self.steps.reverse();
+        for step in &mut self.steps {
+            for range in [&mut step.removed, &mut step.inserted] {
+                *range = all - range.end..all - range.start;
+            }
+        }
+    }
+}
+
 impl Sequence {
-    /// The MT of these insertions, with errors that take few bits in a file if they are `coarse`, and its vertex for each
-    /// reference point. They come in the order of falling error, as far as equal errors leave it open in
+    /// The MT of these insertions, and its vertex for each reference point. They come in the order of falling error, as far as equal errors leave it open in
     /// the order of the sequence: errors are made monotone along the DAG first, so this extends the partial order.
     pub fn explicit_mt(
         &self,
         mut info: MtInfo,
         quantized: &Quantized,
-        coarse: bool,
         progress: OnProgress<'_>,
     ) -> Result<(ExplicitMt, Vec<VertexId>), BuildError> {
         let arcs = self.arcs(quantized.positions.len())?;
-        let errors = self.monotone_errors(quantized, &arcs, &quantize::floors(&info), coarse);
+        let errors = self.monotone_errors(quantized, &arcs, &quantize::floors(&info));
         let mut order: Vec<u32> = (0..self.steps.len() as u32).collect();
         let fields = info.fields.len();
         let errors_of = |i: u32| &errors[i as usize * fields..][..fields];
@@ -175,19 +208,11 @@ impl Sequence {
 
     /// Errors by insertion and field that are at least those of all insertions that depend on each, by so much more that selection by isovalue
     /// and by box is monotone: see [`Quantized::overshoot`], and `step_of_boundary` in the builders' costs.
-    fn monotone_errors(
-        &self,
-        quantized: &Quantized,
-        arcs: &Arcs,
-        floors: &[f64],
-        coarse: bool,
-    ) -> Vec<ErrorCode> {
-        // Rounded before others are derived from it, an error keeps its distance to these.
-        let round = |code: ErrorCode| if coarse { code.coarse() } else { code };
+    fn monotone_errors(&self, quantized: &Quantized, arcs: &Arcs, floors: &[f64]) -> Vec<ErrorCode> {
         // Never zero: error 0 is to mean the reference mesh, with every update applied.
         let fields = quantized.fields.len();
         let own = |(at, error): (usize, &f64)| {
-            round(ErrorCode::at_least(error.max(floors[at % fields])).max(ErrorCode(1)))
+            ErrorCode::at_least(error.max(floors[at % fields])).max(ErrorCode(1))
         };
         let all = self.steps.iter().flat_map(|step| &step.errors).enumerate();
         let mut errors: Vec<ErrorCode> = all.map(own).collect();
@@ -206,7 +231,7 @@ impl Sequence {
             parents.dedup();
             for p in parents.iter().map(|&p| p as usize) {
                 for (own, above) in (i * fields..(i + 1) * fields).zip(p * fields..) {
-                    let least = round(ErrorCode::at_least(errors[own].error() + more[above]));
+                    let least = ErrorCode::at_least(errors[own].error() + more[above]);
                     errors[above] = errors[above].max(least);
                 }
             }

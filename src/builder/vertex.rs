@@ -1,6 +1,6 @@
 //! Vertex-based MTs, by decimation or insertion.
 
-use super::quantize::Quantized;
+use super::decimate::Decimated;
 use super::sequence::Sequence;
 use super::{
     BuildConfig, BuildCriterion, BuildError, OnProgress, Purpose, VertexMethod, decimate, insert, quantize,
@@ -8,7 +8,7 @@ use super::{
 use crate::geom::Bounds;
 use crate::mesh;
 use crate::mesh::TetMesh;
-use crate::mt::{ExplicitMt, MAX_UPDATES, MtInfo, MtKind, VertexId};
+use crate::mt::{ExplicitMt, MAX_UPDATES, VertexId};
 
 /// Builds a vertex-based MT of `mesh` by this method, as an explicit MT.
 ///
@@ -39,9 +39,8 @@ pub(super) fn decimated_mt(
     how: (BuildCriterion, Purpose),
     progress: OnProgress<'_>,
 ) -> Result<(ExplicitMt, Vec<VertexId>), BuildError> {
-    let built = decimate::decimate(mesh, config, how, progress)?;
-    let coarse = config.construction.kind() == MtKind::HalfEdge;
-    spell_out(&built.sequence, &built.quantized, built.displacement_per_error, coarse, progress)
+    let Decimated::<Sequence> { record, quantized, info } = decimate::decimate(mesh, config, how, progress)?;
+    record.explicit_mt(info, &quantized, progress)
 }
 
 /// Builds a vertex-based MT of the points of `mesh` by inserting them into a coarse mesh of their convex hull, the one
@@ -66,27 +65,8 @@ pub(super) fn inserted_mt(
     let quantized = quantize::quantize(mesh, config)?;
     let displacement_per_error = config.displacement * Bounds::of(&mesh.positions).diagonal();
     let sequence = insert::insert(&quantized, &mesh.tets, tet_errors, progress)?;
-    spell_out(&sequence, &quantized, displacement_per_error, false, progress)
-}
-
-fn spell_out(
-    sequence: &Sequence,
-    quantized: &Quantized,
-    displacement_per_error: f64,
-    coarse: bool,
-    progress: OnProgress<'_>,
-) -> Result<(ExplicitMt, Vec<VertexId>), BuildError> {
     let grown: usize = sequence.steps.iter().map(|step| step.inserted.len()).sum();
     let shrunk: usize = sequence.steps.iter().map(|step| step.removed.len()).sum();
-    let info = MtInfo {
-        kind: MtKind::Explicit,
-        lattice: quantized.lattice,
-        fields: quantized.fields.clone(),
-        vertices: quantized.positions.len() as u32,
-        tetrahedra: (sequence.base.len() + grown - shrunk) as u32,
-        updates: 0,
-        displacement_per_error,
-        quantization: quantized.quantization,
-    };
-    sequence.explicit_mt(info, quantized, coarse, progress)
+    let info = quantized.info(sequence.base.len() + grown - shrunk, displacement_per_error);
+    sequence.explicit_mt(info, &quantized, progress)
 }

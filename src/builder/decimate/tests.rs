@@ -1,17 +1,15 @@
 //! Promises: what is removed can be inserted again, step by step, in sound meshes; errors bound the deviation.
 
-use super::{
-    BuildCriterion, Decimated, Decimator, Key, Levels, Reference, State, WorkMesh, decimate, quantize,
-};
+use super::{BuildCriterion, Decimated, Decimator, Key, Levels, Reference, State, WorkMesh, quantize};
 use crate::builder::cost::largest;
 use crate::builder::gift_wrap::GiftWrap;
 use crate::builder::location::Location;
 use crate::builder::reach::Reach;
-use crate::builder::sequence::Insertion;
-use crate::builder::{BuildConfig, BuildError, Purpose};
+use crate::builder::sequence::{Insertion, Sequence};
+use crate::builder::{BuildConfig, BuildError, Construction, OnProgress, Purpose};
 use crate::geom::{in_conflict, nearest_on_triangle, orient3d};
 use crate::mesh::{EDGES, FACES, Field, Grid, NONE, TetMesh, repair, topology};
-use crate::mt::{ErrorCode, MAX_LINK, MtKind};
+use crate::mt::{ErrorCode, ExplicitMt, HalfEdgeMt, MAX_LINK, MtKind, MultiTessellation, UpdateId, VertexId};
 use glam::{DMat3, DVec3};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
@@ -80,11 +78,20 @@ fn domains() -> Vec<(&'static str, TetMesh)> {
     ]
 }
 
-fn built(mesh: &TetMesh, criterion: BuildCriterion) -> Decimated {
+fn decimate(
+    mesh: &TetMesh,
+    config: &BuildConfig,
+    how: (BuildCriterion, Purpose),
+    progress: OnProgress<'_>,
+) -> Result<Decimated<Sequence>, BuildError> {
+    super::decimate(mesh, config, how, progress)
+}
+
+fn built(mesh: &TetMesh, criterion: BuildCriterion) -> Decimated<Sequence> {
     built_for(mesh, criterion, Purpose::default())
 }
 
-fn built_for(mesh: &TetMesh, criterion: BuildCriterion, purpose: Purpose) -> Decimated {
+fn built_for(mesh: &TetMesh, criterion: BuildCriterion, purpose: Purpose) -> Decimated<Sequence> {
     let fields = mesh.fields.iter().map(|field| field.name.clone()).collect();
     let config = BuildConfig { fields, ..BuildConfig::of(MtKind::Edge) };
     decimate(mesh, &config, (criterion, purpose), &mut |_| ControlFlow::Continue(())).expect("a valid mesh")
@@ -95,7 +102,7 @@ fn sorted(mut tet: [u32; 4]) -> [u32; 4] {
     tet
 }
 
-fn six_volumes(result: &Decimated, tets: &[[u32; 4]]) -> i128 {
+fn six_volumes(result: &Decimated<Sequence>, tets: &[[u32; 4]]) -> i128 {
     let six = |tet: &[u32; 4]| {
         let [a, b, c, d] = tet.map(|v| result.quantized.positions[v as usize]);
         orient3d(a, b, c, d)
@@ -112,11 +119,11 @@ impl Replay {
         Self(base.iter().map(|&tet| (sorted(tet), tet)).collect())
     }
 
-    fn insert(&mut self, result: &Decimated, step: &Insertion) {
-        for &tet in &result.sequence.tets[step.removed.clone()] {
+    fn insert(&mut self, result: &Decimated<Sequence>, step: &Insertion) {
+        for &tet in &result.record.tets[step.removed.clone()] {
             assert!(self.0.remove(&sorted(tet)).is_some(), "what is removed is there");
         }
-        for &tet in &result.sequence.tets[step.inserted.clone()] {
+        for &tet in &result.record.tets[step.inserted.clone()] {
             assert!(tet.contains(&step.vertex));
             assert!(self.0.insert(sorted(tet), tet).is_none(), "what is inserted is new");
         }
@@ -162,18 +169,18 @@ fn every_step_of_a_replay_is_a_sound_mesh() {
             let result = built_for(&mesh, criterion, purpose);
             let points = mesh.positions.len();
             let expected = shape(points, &mesh.tets);
-            let mut replay = Replay::new(&result.sequence.base);
-            let mut present: BTreeSet<u32> = result.sequence.base.iter().flatten().copied().collect();
+            let mut replay = Replay::new(&result.record.base);
+            let mut present: BTreeSet<u32> = result.record.base.iter().flatten().copied().collect();
             assert_eq!(
                 shape(points, &replay.tets()),
                 expected,
                 "{name} {criterion:?} {purpose:?}: the base mesh"
             );
-            for step in &result.sequence.steps {
+            for step in &result.record.steps {
                 assert!(present.insert(step.vertex), "a vertex comes once");
                 replay.insert(&result, step);
                 let [removed, inserted] =
-                    [&step.removed, &step.inserted].map(|r| &result.sequence.tets[r.clone()]);
+                    [&step.removed, &step.inserted].map(|r| &result.record.tets[r.clone()]);
                 let link: BTreeSet<u32> = inserted.iter().flatten().copied().collect();
                 assert!(link.len() <= MAX_LINK + 1 && inserted.len() <= 60 && removed.len() <= 128);
                 let volumes = [removed, inserted].map(|tets| six_volumes(&result, tets));
@@ -196,7 +203,7 @@ fn errors_follow_the_dependencies() {
     for (name, mesh) in domains() {
         for (criterion, purpose) in WAYS {
             let result = built_for(&mesh, criterion, purpose);
-            let sequence = &result.sequence;
+            let sequence = &result.record;
             // Which insertion made each tetrahedron.
             let mut makers: BTreeMap<[u32; 4], usize> = BTreeMap::new();
             for (i, step) in sequence.steps.iter().enumerate() {
@@ -220,7 +227,7 @@ fn errors_follow_the_dependencies() {
 }
 
 /// The field of a mesh at a point of one of its tetrahedra, in levels.
-fn values(result: &Decimated, tet: [u32; 4], at: DVec3) -> Option<Vec<f64>> {
+fn values(result: &Decimated<Sequence>, tet: [u32; 4], at: DVec3) -> Option<Vec<f64>> {
     let corner = |v: u32| DVec3::from_array(result.quantized.positions[v as usize].map(f64::from));
     let [w, x, y, z] = tet.map(corner);
     let l = DMat3::from_cols(x - w, y - w, z - w).inverse() * (at - w);
@@ -234,7 +241,7 @@ fn values(result: &Decimated, tet: [u32; 4], at: DVec3) -> Option<Vec<f64>> {
 }
 
 /// The largest difference from the reference, as a fraction of the ranges.
-fn field_error(result: &Decimated, point: usize, values: &[f64]) -> f64 {
+fn field_error(result: &Decimated<Sequence>, point: usize, values: &[f64]) -> f64 {
     let fields = &result.quantized.fields;
     let exact = &result.quantized.exact[point * fields.len()..];
     let error =
@@ -244,7 +251,7 @@ fn field_error(result: &Decimated, point: usize, values: &[f64]) -> f64 {
 
 /// Whether a reference vertex is within `bound`: in a tetrahedron, or beside a boundary triangle.
 fn is_within(
-    result: &Decimated,
+    result: &Decimated<Sequence>,
     tets: &[[u32; 4]],
     border: &[(usize, [u32; 3])],
     point: usize,
@@ -259,13 +266,13 @@ fn is_within(
         let corner = |v: u32| DVec3::from_array(result.quantized.positions[v as usize].map(f64::from)) * step;
         let nearest = nearest_on_triangle(at * step, face.map(corner));
         let distance = nearest.distance(at * step);
-        distance <= bound * result.displacement_per_error + 1e-9 && fits(tets[t], nearest / step)
+        distance <= bound * result.info.displacement_per_error + 1e-9 && fits(tets[t], nearest / step)
     };
     tets.iter().any(|tet| fits(*tet, at)) || border.iter().any(location)
 }
 
 /// How far a reference vertex is from the boundary.
-fn distance(result: &Decimated, border: &[(usize, [u32; 3])], point: u32) -> f64 {
+fn distance(result: &Decimated<Sequence>, border: &[(usize, [u32; 3])], point: u32) -> f64 {
     let step = DVec3::from_array(result.quantized.lattice.step);
     let at = |v: u32| DVec3::from_array(result.quantized.positions[v as usize].map(f64::from)) * step;
     let to = |(_, face): &(usize, [u32; 3])| at(point).distance(nearest_on_triangle(at(point), face.map(at)));
@@ -300,15 +307,15 @@ fn every_reference_vertex_is_within_the_error() {
             let rim = boundary_vertices(&mesh);
             for bound in [0.003, 0.02, 0.06, 0.15, 0.4] {
                 // Errors are monotone, so that these insertions do not need the others.
-                let mut replay = Replay::new(&result.sequence.base);
-                let wanted = result.sequence.steps.iter().filter(|step| largest(&step.errors) > bound);
+                let mut replay = Replay::new(&result.record.base);
+                let wanted = result.record.steps.iter().filter(|step| largest(&step.errors) > bound);
                 wanted.for_each(|step| replay.insert(&result, step));
                 let tets = replay.tets();
                 let border = border_of(&mesh, &tets);
                 let allowed = bound * (1.0 + 1e-6) + 1e-5;
                 for &point in &rim {
                     let distance = distance(&result, &border, point);
-                    let most = bound * result.displacement_per_error + 1e-9;
+                    let most = bound * result.info.displacement_per_error + 1e-9;
                     assert!(
                         distance <= most,
                         "{name} {criterion:?} {purpose:?}: boundary point {point} at {bound}"
@@ -347,13 +354,14 @@ fn the_boundary_moves_by_a_part_of_the_edges_there() {
         }
         let rim = boundary_vertices(&mesh);
         for bound in [0.05, 0.2, 0.5] {
-            let mut replay = Replay::new(&result.sequence.base);
-            let wanted = result.sequence.steps.iter().filter(|step| largest(&step.errors) > bound);
+            let mut replay = Replay::new(&result.record.base);
+            let wanted = result.record.steps.iter().filter(|step| largest(&step.errors) > bound);
             wanted.for_each(|step| replay.insert(&result, step));
             let tets = replay.tets();
             let border = border_of(&mesh, &tets);
             for &point in &rim {
-                let allowed = bound * (most * shortest[point as usize]).min(result.displacement_per_error);
+                let allowed =
+                    bound * (most * shortest[point as usize]).min(result.info.displacement_per_error);
                 let found = distance(&result, &border, point);
                 assert!(found <= allowed + 1e-9, "{how:?} {bound}: {point} by {found}");
             }
@@ -368,10 +376,10 @@ fn a_box_stays_delaunay() {
     mesh.grid = Some(Grid { dims: [5; 3], origin: [0.0; 3], spacing: [0.25; 3] });
     let result = built(&mesh, BuildCriterion::Delaunay);
     let at = |v: u32| result.quantized.positions[v as usize];
-    let mut replay = Replay::new(&result.sequence.base);
+    let mut replay = Replay::new(&result.record.base);
     assert_eq!(replay.0.len(), 6, "a cube of six");
-    let mut present: BTreeSet<u32> = result.sequence.base.iter().flatten().copied().collect();
-    for step in &result.sequence.steps {
+    let mut present: BTreeSet<u32> = result.record.base.iter().flatten().copied().collect();
+    for step in &result.record.steps {
         replay.insert(&result, step);
         present.insert(step.vertex);
         for tet in replay.0.values() {
@@ -387,11 +395,11 @@ fn bases_are_small_and_boxes_keep_their_volume() {
     let mesh = blocks([8; 3], |_| true);
     for criterion in CRITERIA {
         let result = built(&mesh, criterion);
-        assert!(result.sequence.base.len() < 20, "{criterion:?}: {}", result.sequence.base.len());
+        assert!(result.record.base.len() < 20, "{criterion:?}: {}", result.record.base.len());
         let whole = six_volumes(&result, &mesh.tets);
-        let mut replay = Replay::new(&result.sequence.base);
+        let mut replay = Replay::new(&result.record.base);
         result
-            .sequence
+            .record
             .steps
             .iter()
             .filter(|step| largest(&step.errors) > 0.05)
@@ -408,7 +416,7 @@ fn vertices_at_which_parts_touch_stay() {
     assert!(frozen.iter().any(|&f| f));
     for criterion in CRITERIA {
         let result = built(&mesh, criterion);
-        assert!(result.sequence.steps.iter().all(|step| !frozen[step.vertex as usize]));
+        assert!(result.record.steps.iter().all(|step| !frozen[step.vertex as usize]));
     }
 }
 
@@ -416,10 +424,7 @@ fn vertices_at_which_parts_touch_stay() {
 fn the_same_input_gives_the_same_sequence() {
     let mesh = bent(blocks([5; 3], |_| true));
     for (criterion, purpose) in WAYS {
-        assert_eq!(
-            built_for(&mesh, criterion, purpose).sequence,
-            built_for(&mesh, criterion, purpose).sequence
-        );
+        assert_eq!(built_for(&mesh, criterion, purpose).record, built_for(&mesh, criterion, purpose).record);
     }
 }
 
@@ -444,18 +449,13 @@ fn a_boundary_that_may_not_move_costs_all() {
         ControlFlow::Continue(())
     })
     .expect("a valid mesh");
-    let mut replay = Replay::new(&result.sequence.base);
+    let mut replay = Replay::new(&result.record.base);
     let moves = |step: &&Insertion| step.step > 0.0;
     assert!(
-        result
-            .sequence
-            .steps
-            .iter()
-            .filter(moves)
-            .all(|step| largest(&step.errors) == ErrorCode::MAX.error())
+        result.record.steps.iter().filter(moves).all(|step| largest(&step.errors) == ErrorCode::MAX.error())
     );
-    assert!(result.sequence.steps.iter().any(|step| step.step > 0.0));
-    result.sequence.steps.iter().for_each(|step| replay.insert(&result, step));
+    assert!(result.record.steps.iter().any(|step| step.step > 0.0));
+    result.record.steps.iter().for_each(|step| replay.insert(&result, step));
     assert_eq!(replay.0.len(), mesh.tets.len());
 }
 
@@ -467,9 +467,9 @@ fn the_finest_lattice_will_do() {
         let result =
             decimate(&mesh, &config, (criterion, Purpose::Uniform), &mut |_| ControlFlow::Continue(()));
         let result = result.expect("a valid mesh");
-        assert!(!result.sequence.steps.is_empty(), "{criterion:?}");
-        let mut replay = Replay::new(&result.sequence.base);
-        result.sequence.steps.iter().for_each(|step| replay.insert(&result, step));
+        assert!(!result.record.steps.is_empty(), "{criterion:?}");
+        let mut replay = Replay::new(&result.record.base);
+        result.record.steps.iter().for_each(|step| replay.insert(&result, step));
         assert_eq!(replay.0.len(), mesh.tets.len());
     }
 }
@@ -487,7 +487,7 @@ fn the_removals_of_a_round_are_independent() {
             let reference = Reference::new(&quantized, &work, 1.0, f64::INFINITY);
             let state = State::new(work, reference, topology.non_manifold, levels);
             let wrap = (criterion == BuildCriterion::Delaunay).then(|| GiftWrap::new(&quantized.positions));
-            let mut decimator = Decimator::new(state, wrap);
+            let mut decimator = Decimator::new(state, wrap, Sequence::default());
             // The removal that made each tetrahedron, and the boxes of the removals.
             let mut makers: BTreeMap<[u32; 4], usize> = BTreeMap::new();
             let mut boxes: Vec<Reach> = Vec::new();
@@ -495,7 +495,7 @@ fn the_removals_of_a_round_are_independent() {
             loop {
                 let start = boxes.len();
                 decimator.round(&mut |_| ControlFlow::Continue(())).expect("not stopped");
-                let sequence = &decimator.sequence;
+                let sequence = &decimator.record;
                 // Those before `start` are of earlier rounds, and have been looked at.
                 for (i, step) in sequence.steps.iter().enumerate().skip(start) {
                     let mut reach = Reach::default();
@@ -540,21 +540,66 @@ fn vertices_outside_of_their_tetrahedra_are_known() {
     let work = WorkMesh::new(mesh.tets.clone(), topology.neighbors, mesh.positions.len());
     let reference = Reference::new(&quantized, &work, 1.0, f64::INFINITY);
     let state = State::new(work, reference, topology.non_manifold, Levels::of_purpose(Purpose::Uniform));
-    let mut decimator = Decimator::new(state, None);
+    let mut decimator = Decimator::new(state, None, Sequence::default());
     let mut buckets_of_it = BTreeSet::new();
     loop {
-        let before = decimator.sequence.steps.len();
+        let before = decimator.record.steps.len();
         decimator.round(&mut |_| ControlFlow::Continue(())).expect("not stopped");
         let State { mesh: now, buckets, .. } = &decimator.state;
         let own = (0..now.tets.len() as u32).find(|&t| buckets.inside.iter(t).any(|point| point == 0));
         buckets_of_it.insert(own.expect("it is in a bucket"));
         assert!(buckets.outside_points.is_outside(0), "after {before} removals");
-        let after = decimator.sequence.steps.len();
+        let after = decimator.record.steps.len();
         if !decimator.rounds.end(after - before, mesh.positions.len() - after) {
             break;
         }
     }
     assert!(buckets_of_it.len() > 2, "it has come from bucket to bucket");
+}
+
+/// What an MT does at the insertion of each reference point: the tetrahedra that it removes and inserts, in numbers of points.
+type Insertions = BTreeMap<u32, [BTreeSet<[u32; 4]>; 2]>;
+
+fn insertions(mt: &ExplicitMt, vertices: &[VertexId]) -> Insertions {
+    let points: BTreeMap<VertexId, u32> = vertices.iter().copied().zip(0..).collect();
+    let tet = |t: u32| sorted(mt.tets()[t as usize].map(|v| points[&VertexId(v)]));
+    let all = (0..mt.updates()).map(UpdateId);
+    all.map(|u| {
+        let removed = mt.removed(u).iter().map(|&t| tet(t)).collect();
+        (points[&VertexId(mt.created(u).start)], [removed, mt.inserted(u).map(tet).collect()])
+    })
+    .collect()
+}
+
+/// A half-edge MT is made without a list of tetrahedra. It has the updates of the explicit MT that is made of one.
+#[test]
+fn collapses_make_the_updates_of_the_explicit_structure() {
+    for (name, mesh) in domains() {
+        for purpose in [Purpose::Uniform, Purpose::Regions] {
+            let Decimated { record, quantized, info } = built_for(&mesh, BuildCriterion::HalfEdge, purpose);
+            let go_on = &mut |_| ControlFlow::Continue(());
+            let (expected, vertices) = record.explicit_mt(info, &quantized, go_on).expect("sound insertions");
+            let expected = insertions(&expected, &vertices);
+            let fields = mesh.fields.iter().map(|field| field.name.clone()).collect();
+            let construction = Construction::HalfEdge { purpose };
+            let config = BuildConfig { fields, construction, ..BuildConfig::default() };
+            let built = crate::builder::build(&mesh, &config, go_on).expect("a valid mesh");
+            assert_eq!(built.summary.updates as usize, expected.len(), "{name}");
+            let own = ExplicitMt::of(&built.mt).expect("a sound MT");
+            assert_eq!(own.check(), Ok(()), "{name} {purpose:?}");
+            assert!(insertions(&own, &built.vertices) == expected, "{name} {purpose:?}");
+            // Conversion finds the near vertices and the inner faces by itself.
+            let converted = HalfEdgeMt::from_explicit(&own, 8).expect("inverse half-edge collapses");
+            let again = ExplicitMt::of(&converted).expect("a sound MT");
+            assert!(again == own, "{name} {purpose:?}");
+            let depth = |u: u32, depths: &[u32]| {
+                own.parents(UpdateId(u)).iter().map(|&p| depths[p as usize]).max().unwrap_or(0) + 1
+            };
+            let mut depths = Vec::new();
+            (0..own.updates()).for_each(|u| depths.push(depth(u, &depths)));
+            assert_eq!(Some(built.summary.depth), depths.into_iter().max().or(Some(0)), "{name}");
+        }
+    }
 }
 
 /// Most neighbours are not evaluated: they cannot be better than the best one so far. That finds the same as evaluating each.
@@ -566,7 +611,11 @@ fn the_best_neighbour_is_found() {
         let work = WorkMesh::new(mesh.tets.clone(), topology.neighbors, mesh.positions.len());
         let levels = Levels::of_purpose(Purpose::Uniform);
         let reference = Reference::new(&quantized, &work, 1.0, f64::INFINITY);
-        let mut decimator = Decimator::new(State::new(work, reference, topology.non_manifold, levels), None);
+        let mut decimator = Decimator::new(
+            State::new(work, reference, topology.non_manifold, levels),
+            None,
+            Sequence::default(),
+        );
         let (mut compared, mut several) = (0, 0);
         for _ in 0..6 {
             let Decimator { state, search, .. } = &mut decimator;
@@ -584,7 +633,7 @@ fn the_best_neighbour_is_found() {
                 }
             }
             decimator.round(&mut |_| ControlFlow::Continue(())).expect("not stopped");
-            let (removed, left) = (decimator.sequence.steps.len(), mesh.positions.len());
+            let (removed, left) = (decimator.record.steps.len(), mesh.positions.len());
             decimator.rounds.end(removed, left - removed);
         }
         assert!(name == "one cell" || compared > 0 && several > 0, "{name}: {compared}, {several}");
@@ -598,7 +647,7 @@ fn the_number_of_threads_does_not_matter() {
     for (criterion, purpose) in WAYS {
         let of = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-            pool.install(|| built_for(&mesh, criterion, purpose).sequence)
+            pool.install(|| built_for(&mesh, criterion, purpose).record)
         };
         let one = of(1);
         [2, 3, 8]

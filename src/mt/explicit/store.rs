@@ -263,40 +263,6 @@ impl ExplicitMt {
         Ok(explicit)
     }
 
-    /// The same updates in another order, which must extend the partial order; `order` has the old number of each. Each must
-    /// create one vertex.
-    ///
-    /// # Errors
-    /// If an update comes before another on which it depends.
-    #[cfg(feature = "build")]
-    pub(crate) fn reordered(&self, order: &[u32]) -> Result<Self, UpdateError> {
-        let base = self.base.positions.len() as u32;
-        let mut mt = Self::new(self.info.clone(), self.base.clone());
-        let mut vertices: Vec<u32> = (0..self.vertices()).collect();
-        let mut ids: Vec<u32> = (0..self.tets.len() as u32).collect();
-        for (new, &old) in (0..).zip(order) {
-            let u = UpdateId(old);
-            let vertex = VertexId(self.created(u).start);
-            vertices[vertex.0 as usize] = base + new;
-            let name = |t: u32| canonical(self.tets[t as usize].map(|v| vertices[v as usize]));
-            let inserted: Vec<[u32; 4]> = self.inserted(u).map(name).collect();
-            let removed: Vec<u32> = self.removed(u).iter().map(|&t| ids[t as usize]).collect();
-            let first = mt.tets.len() as u32;
-            mt.push(&ExplicitUpdate {
-                positions: &[self.position(vertex)],
-                levels: self.levels(vertex),
-                removed: &removed,
-                inserted: &inserted,
-                errors: self.errors(u),
-            })?;
-            for (t, tet) in self.inserted(u).zip(&inserted) {
-                let place = mt.tets[first as usize..].binary_search(tet);
-                ids[t as usize] = first + place.map_err(|_| UpdateError::Cavity { update: new })? as u32;
-            }
-        }
-        Ok(mt)
-    }
-
     /// Number of vertices that appear in any mesh of the MT.
     pub fn vertices(&self) -> u32 {
         self.positions.len() as u32

@@ -1,24 +1,10 @@
 //! From an explicit MT to the compact half-edge one, where every update inserts a vertex that collapses onto a neighbour.
 
-use super::apply::Search;
-use super::scratch::{NEW, Scratch};
-use super::store::{BaseMark, ForestChild, HalfEdgeMt, HalfEdgeUpdate};
+use super::builder::{HalfEdgeBuilder, NextUpdate, Remover, damaged, refused};
+use super::store::{BaseMark, ForestChild, HalfEdgeMt};
 use crate::mesh::NONE;
 use crate::mt::replay::canonical;
-use crate::mt::{
-    Applied, ApplyUpdates, ConvertError, CurrentMesh, ExplicitMt, MtInfo, MtKind, MultiTessellation,
-    ReplayError, UpdateError, UpdateId, VertexId,
-};
-
-const NOT_HALF_EDGE: &str = "it is not the inverse of a half-edge collapse";
-
-fn refused(update: u32) -> ConvertError {
-    ConvertError::Update { update, why: NOT_HALF_EDGE }
-}
-
-fn damaged(error: UpdateError) -> ConvertError {
-    ConvertError::Damaged(ReplayError::Update(error))
-}
+use crate::mt::{ConvertError, ExplicitMt, MtInfo, MtKind, MultiTessellation, UpdateId, VertexId};
 
 impl HalfEdgeMt {
     /// The compact form of an explicit MT whose updates are inverse half-edge collapses, its updates in the same order, in
@@ -29,7 +15,8 @@ impl HalfEdgeMt {
     pub fn from_explicit(explicit: &ExplicitMt, page_bits: u32) -> Result<Self, ConvertError> {
         let updates = explicit.updates();
         let base = explicit.base().positions.len() as u32;
-        let near = Self::near_vertices(explicit)?;
+        let near: Vec<u32> =
+            (0..updates).map(|u| near_vertex(explicit, UpdateId(u))).collect::<Result<_, _>>()?;
         let mut children: Vec<Vec<ForestChild>> = vec![Vec::new(); explicit.vertices() as usize];
         for (u, &v) in (0..).zip(&near) {
             let [from, to] = [VertexId(v), VertexId(base + u)].map(|v| explicit.position(v));
@@ -43,70 +30,33 @@ impl HalfEdgeMt {
         }
         let info = MtInfo { kind: MtKind::HalfEdge, updates, ..explicit.info().clone() };
         let (of_base, of_updates) = children.split_at(base as usize);
-        let mut mt = Self::new(info, explicit.base().clone(), marks, of_base, page_bits).map_err(damaged)?;
-        let mut mesh = mt.start().map_err(|error| ConvertError::Damaged(error.into()))?;
-        let mut scratch = Box::<Scratch>::default();
+        let mt = Self::new(info, explicit.base().clone(), marks, of_base, page_bits).map_err(damaged)?;
+        let mut builder = HalfEdgeBuilder::new(mt)?;
         for (u, children) in (0..).zip(of_updates) {
-            mt.add(explicit, &inner, &mut mesh, &mut scratch, u, children)?;
+            let id = UpdateId(u);
+            let levels = explicit.levels(VertexId(base + u));
+            let next = NextUpdate { children, levels, errors: explicit.errors(id) };
+            builder.push(&next, |star, removers| removers_of(explicit, &inner, id, star, removers))?;
         }
-        Ok(mt)
+        Ok(builder.finish())
     }
+}
 
-    /// The near vertex of each update of an explicit MT.
-    ///
-    /// # Errors
-    /// If an update is no inverse half-edge collapse.
-    pub(crate) fn near_vertices(explicit: &ExplicitMt) -> Result<Vec<u32>, ConvertError> {
-        (0..explicit.updates()).map(|u| near_vertex(explicit, UpdateId(u))).collect()
+/// What removes the tetrahedra that an update inserts. None if they are others.
+fn removers_of(
+    explicit: &ExplicitMt,
+    inner: &InnerFaces,
+    u: UpdateId,
+    star: &[[u32; 4]],
+    removers: &mut Vec<Remover>,
+) -> Option<()> {
+    let range = explicit.inserted(u);
+    let inserted = &explicit.tets()[range.start as usize..range.end as usize];
+    for &tet in star {
+        let t = range.start + inserted.binary_search(&canonical(tet)).ok()? as u32;
+        removers.push((explicit.removed_by(t).map_or(NONE, |c| c.0), inner.of(t, tet)));
     }
-
-    /// Adds an update and applies it.
-    fn add(
-        &mut self,
-        explicit: &ExplicitMt,
-        inner: &InnerFaces,
-        mesh: &mut CurrentMesh,
-        scratch: &mut Scratch,
-        u: u32,
-        children: &[ForestChild],
-    ) -> Result<(), ConvertError> {
-        let fields = self.info().fields.len();
-        let zeros = vec![0; fields];
-        let id = UpdateId(u);
-        let record =
-            HalfEdgeUpdate { children, level_residuals: &zeros, star: &[], errors: explicit.errors(id) };
-        self.push(&record).map_err(damaged)?;
-        let position =
-            self.prepare(mesh, id, Search::Nearby, scratch).map_err(damaged)?.map_err(|_| refused(u))?;
-        let vertex = self.vertex(id);
-        let levels = explicit.levels(vertex);
-        let residuals: Vec<i32> = levels.iter().zip(&scratch.levels).map(|(a, b)| a - b).collect();
-        // The tetrahedra of the star in the explicit MT.
-        let slot_of = |corner: u8| match corner {
-            NEW => vertex.0,
-            x => mesh.vertex(scratch.link[x as usize % scratch.link.len()]).0,
-        };
-        let range = explicit.inserted(id);
-        let inserted = &explicit.tets()[range.start as usize..range.end as usize];
-        if inserted.len() != scratch.star_len {
-            return Err(refused(u));
-        }
-        let mut truth = Vec::with_capacity(inserted.len());
-        for new in &scratch.star[..scratch.star_len] {
-            let tet = new.corners.map(slot_of);
-            let at = inserted.binary_search(&canonical(tet)).map_err(|_| refused(u))?;
-            let t = range.start + at as u32;
-            truth.push((explicit.removed_by(t).map_or(NONE, |c| c.0), inner.of(t, tet)));
-        }
-        scratch.hash_star(mesh, vertex.0);
-        let star = self.code_star(mesh, id, position, scratch, &truth).ok_or(refused(u))?;
-        self.set_last_star(&star, &residuals);
-        match self.refine(mesh, id).map_err(damaged)? {
-            Applied::Done => mesh.clear_touched(),
-            Applied::Blocked(_) => return Err(refused(u)),
-        }
-        Ok(())
-    }
+    (inserted.len() == star.len()).then_some(())
 }
 
 /// The vertex that all tetrahedra have which an update removes. It stays in the mesh.

@@ -192,17 +192,21 @@ impl HalfEdgeMt {
         self.code_with(mesh, u, position, (scratch, code), &mut Reader { symbols, bits, at: 0 })
     }
 
-    /// The code of a star, given the remover and the inner faces of each of its tetrahedra. None if it has none.
+    /// The code of a star, given the remover and the inner faces of each of its tetrahedra, which are in the scratch space then.
+    /// None if it has none.
     pub(in crate::mt) fn code_star(
         &self,
         mesh: &CurrentMesh,
         u: UpdateId,
         position: [i32; 3],
-        scratch: &mut Scratch,
+        scratch: (&mut Scratch, &mut StarCode),
         truth: &[(u32, u8)],
     ) -> Option<Vec<u8>> {
+        if truth.len() != scratch.0.star_len {
+            return None;
+        }
         let mut writer = Writer { truth, symbols: Vec::new(), bits: Vec::new() };
-        self.code_with(mesh, u, position, (scratch, &mut StarCode::default()), &mut writer)?;
+        self.code_with(mesh, u, position, scratch, &mut writer)?;
         let Writer { mut symbols, bits, .. } = writer;
         symbols.truncate(symbols.iter().rposition(|&s| s != 0).map_or(0, |last| last + 1));
         let used = bits.iter().rposition(|&bit| bit).map_or(0, |last| last + 1);
