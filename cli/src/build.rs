@@ -225,8 +225,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if !repaired.is_empty() && !arguments.verbosity.quiet {
         eprintln!("{}: {repaired}", arguments.inputs[0].display());
     }
-    let BuildResult { mt, summary, exact, .. } = build(arguments, &config, &mesh)?;
-    drop(mesh);
+    let BuildResult { mt, summary, exact, .. } = build(arguments, &config, mesh)?;
     let metadata =
         config.construction.metadata().into_iter().chain(arguments.metadata.iter().cloned()).collect();
     let options = EncodeOptions {
@@ -310,13 +309,13 @@ fn construction(choice: &ConstructionChoice) -> Result<Construction, String> {
     choice.construction().map_err(|_| "--for goes with --method decimate".to_owned())
 }
 
-fn build(arguments: &Arguments, config: &BuildConfig, mesh: &TetMesh) -> Result<BuildResult> {
+fn build(arguments: &Arguments, config: &BuildConfig, mesh: TetMesh) -> Result<BuildResult> {
     // Drawn on stderr, and only on a terminal.
     let bar = if arguments.verbosity.quiet { ProgressBar::hidden() } else { ProgressBar::new(0) };
     let style = "{msg:<12} {wide_bar} {percent:>3} %  {pos}/{len}  {elapsed_precise}  about {eta} left";
     bar.set_style(ProgressStyle::with_template(style).context("the style of the progress bar")?);
     let mut stage = "";
-    let result = tetralod::builder::build(mesh, config, &mut |progress: BuildProgress| {
+    let result = tetralod::builder::build_owned(mesh, config, &mut |progress: BuildProgress| {
         bar.set_length(progress.total.max(1));
         if progress.stage != stage {
             stage = progress.stage;

@@ -1,7 +1,7 @@
 //! Checks of an edge collapse that need no field: topology and orientation.
 
 use super::flat;
-use super::work_mesh::{StarTet, TetMarks, WorkMesh};
+use super::work_mesh::{StarTet, TetSet, WorkMesh};
 use crate::geom::orient3d;
 use crate::mesh::{FACES, NONE};
 use crate::mt::{MAX_LINK, MAX_STAR};
@@ -36,7 +36,7 @@ pub(super) struct CheckedCollapse {
     star_a: Vec<StarTet>,
     star_b: Vec<StarTet>,
     edges: Vec<(u32, u32)>,
-    seen: TetMarks,
+    seen: TetSet,
 }
 
 /// Marks on vertices around an edge.

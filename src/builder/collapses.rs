@@ -48,18 +48,26 @@ pub(super) struct Collapses {
     faces: Vec<([u32; 3], u32)>,
 }
 
+/// A star has about so many tetrahedra, or a few less.
+const USUAL_STAR: usize = 25;
+
 impl Record for Collapses {
     fn new(info: &MtInfo, tets: usize) -> Self {
+        // Lists that grow by doubling would take twice as much. What is never written takes no memory.
+        let (most, fields) = (info.vertices as usize, info.fields.len());
+        let stars = most * USUAL_STAR;
+        let mut starts = Vec::with_capacity(most + 1);
+        starts.push(0);
         Self {
-            fields: info.fields.len(),
+            fields,
             floors: quantize::floors(info),
-            vertices: Vec::new(),
-            near: Vec::new(),
-            errors: Vec::new(),
-            boxes: Vec::new(),
-            starts: vec![0],
-            makers: Vec::new(),
-            inner: Vec::new(),
+            vertices: Vec::with_capacity(most),
+            near: Vec::with_capacity(most),
+            errors: Vec::with_capacity(most * fields),
+            boxes: Vec::with_capacity(most),
+            starts,
+            makers: Vec::with_capacity(stars),
+            inner: Vec::with_capacity(stars),
             inner_now: vec![0; tets],
             base: Vec::new(),
             base_marks: Vec::new(),

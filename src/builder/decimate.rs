@@ -15,8 +15,10 @@ use crate::geom::Bounds;
 use crate::mesh;
 use crate::mesh::{NONE, TetMesh, Topology};
 use crate::mt::{ErrorCode, MAX_UPDATES, MtInfo};
+use std::borrow::Cow;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::mem;
 
 /// The candidates of a round are evaluated in so many batches.
 const BATCHES: usize = 64;
@@ -67,12 +69,12 @@ pub(super) struct Removed<'a> {
 }
 
 /// Removes vertices of `mesh`, cheapest first, until no more can be removed. `mesh` must be valid: see
-/// [`crate::mesh::repair`].
+/// [`crate::mesh::repair`]. Of a mesh that is owned the tetrahedra are gone then.
 ///
 /// # Errors
 /// As [`super::edge_mt`].
 pub(super) fn decimate<R: Record>(
-    mesh: &TetMesh,
+    mesh: &mut Cow<'_, TetMesh>,
     config: &BuildConfig,
     (criterion, purpose): (BuildCriterion, Purpose),
     progress: OnProgress<'_>,
@@ -91,11 +93,13 @@ pub(super) fn decimate<R: Record>(
         BuildCriterion::Delaunay => Some(GiftWrap::new(&quantized.positions)),
     };
     let displacement_per_error = config.displacement * Bounds::of(&mesh.positions).diagonal();
-    let work = WorkMesh::new(mesh.tets.clone(), neighbors, mesh.positions.len());
+    let tetrahedra = mesh.tets.len();
+    let points = mesh.positions.len();
+    let work = WorkMesh::new(take_tets(mesh), neighbors, points);
     let levels = Levels::of_purpose(purpose);
     let reference = Reference::new(&quantized, &work, displacement_per_error, config.displacement_edges);
     let state = State::new(work, reference, non_manifold, levels);
-    let info = quantized.info(mesh.tets.len(), displacement_per_error);
+    let info = quantized.info(tetrahedra, displacement_per_error);
     let record = R::new(&info, state.mesh.tets.len());
     let mut decimator = Decimator::new(state, gift_wrap, record);
     decimator.remove_all(progress)?;
@@ -103,6 +107,13 @@ pub(super) fn decimate<R: Record>(
     record.finish(&state.mesh.tets, &state.removals.makers);
     drop(state);
     Ok(Decimated { record, quantized, info })
+}
+
+fn take_tets(mesh: &mut Cow<'_, TetMesh>) -> Vec<[u32; 4]> {
+    match mesh {
+        Cow::Borrowed(mesh) => mesh.tets.clone(),
+        Cow::Owned(mesh) => mem::take(&mut mesh.tets),
+    }
 }
 
 struct Decimator<'a, R> {
@@ -233,7 +244,6 @@ impl<'a, R: Record> Decimator<'a, R> {
         let errors: Vec<f64> = best.cost.placement.errors.iter().map(stored).collect();
         let removal = record.len() as u32;
         hole.replace(mesh, &best.filling, slots);
-        removals.makers.resize(mesh.tets.len(), NONE);
         let removed = Removed {
             hole,
             filling: &best.filling,

@@ -2,7 +2,7 @@
 
 use super::collapse_check::VertexMarks;
 use super::hole::{Filling, Hole};
-use super::work_mesh::{StarTet, TetMarks, WorkMesh};
+use super::work_mesh::{StarTet, TetSet, WorkMesh};
 use crate::mesh::NONE;
 
 const NEAR_A: u32 = 1;
@@ -76,14 +76,14 @@ fn lay_border(hole: &Hole, b: u32, filling: &mut Filling) -> bool {
 /// Scratch space of [`keeps_topology`].
 pub(super) struct Nearby {
     marks: VertexMarks,
-    seen: TetMarks,
+    seen: TetSet,
     star: Vec<StarTet>,
 }
 
 impl Nearby {
     /// Of a mesh of so many vertices.
     pub fn new(vertices: usize) -> Self {
-        Self { marks: VertexMarks::new(vertices), seen: TetMarks::default(), star: Vec::new() }
+        Self { marks: VertexMarks::new(vertices), seen: TetSet::default(), star: Vec::new() }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::collapse_check::Refusal;
 use super::flat;
-use super::work_mesh::{StarTet, TetMarks, WorkMesh};
+use super::work_mesh::{StarTet, TetSet, WorkMesh};
 use crate::geom::{NARROW_BITS, orient3d};
 use crate::mesh::{FACES, NONE};
 use crate::mt::MAX_LINK;
@@ -34,7 +34,7 @@ pub(super) struct Hole {
     sides: Vec<([i32; 3], [i64; 3])>,
     /// Whether orientations fit `i64`.
     narrow: bool,
-    seen: TetMarks,
+    seen: TetSet,
 }
 
 /// Tetrahedra that fill a hole.
@@ -165,13 +165,12 @@ impl Hole {
         self.is_flat() && moved.map(|&(_, t)| t.map(|v| positions[v as usize])).all(|t| self.in_plane(t))
     }
 
-    /// Fills the hole. Returns the numbers of the new tetrahedra, in the order of the filling.
+    /// Fills the hole, with fewer tetrahedra than were in it. Returns their numbers, in the order of the filling.
     pub fn replace(&self, mesh: &mut WorkMesh, filling: &Filling, slots: &mut Vec<u32>) {
-        slots.clear();
-        for (i, _) in filling.tets.iter().enumerate() {
-            slots.push(self.star.get(i).map_or_else(|| mesh.fresh(), |s| s.tet));
-        }
+        assert!(filling.tets.len() < self.star.len(), "a removal makes the mesh smaller");
         // The filling takes the first slots of the star; the rest are freed.
+        slots.clear();
+        slots.extend(self.star[..filling.tets.len()].iter().map(|s| s.tet));
         self.star.iter().skip(filling.tets.len()).for_each(|s| mesh.free(s.tet));
         mesh.incident[self.a as usize] = NONE;
         // Faces that wait for the tetrahedron on their other side: which tetrahedron has them, and where.

@@ -70,6 +70,7 @@ use crate::mesh::{MeshError, TetMesh};
 use crate::mt::{
     ConvertError, Exact, ExplicitMt, Mt, MtKind, MultiTessellation, UpdateError, UpdateId, VertexId,
 };
+use std::borrow::Cow;
 use std::ops::ControlFlow;
 use thiserror::Error;
 
@@ -351,15 +352,35 @@ pub fn build(
     config: &BuildConfig,
     progress: OnProgress<'_>,
 ) -> Result<BuildResult, BuildError> {
+    build_cow(Cow::Borrowed(mesh), config, progress)
+}
+
+/// As [`build`], but takes the mesh: its tetrahedra become those that the builder works on, which saves 16 bytes of memory for each.
+///
+/// # Errors
+/// As [`build`].
+pub fn build_owned(
+    mesh: TetMesh,
+    config: &BuildConfig,
+    progress: OnProgress<'_>,
+) -> Result<BuildResult, BuildError> {
+    build_cow(Cow::Owned(mesh), config, progress)
+}
+
+fn build_cow(
+    mut mesh: Cow<'_, TetMesh>,
+    config: &BuildConfig,
+    progress: OnProgress<'_>,
+) -> Result<BuildResult, BuildError> {
     let kind = config.construction.kind();
     let result = match config.construction {
         Construction::Edge | Construction::ExplicitEdge => {
-            let BuildResult { mt, summary, vertices, exact } = edge_mt(mesh, config, progress)?;
+            let BuildResult { mt, summary, vertices, exact } = edge_mt(&mesh, config, progress)?;
             BuildResult { mt: Mt::from(mt), summary, vertices, exact }
         }
-        Construction::HalfEdge { purpose } => half_edge_mt(mesh, config, purpose, progress)?,
+        Construction::HalfEdge { purpose } => half_edge_mt(&mut mesh, config, purpose, progress)?,
         Construction::Vertex(method) | Construction::ExplicitVertex(method) => {
-            summed_up(mesh, config, vertex::mt_by(method, mesh, config, progress)?)?
+            summed_up(&mesh, config, vertex::mt_by(method, &mesh, config, progress)?)?
         }
     };
     // Conversions keep the numbers of the vertices.
@@ -371,7 +392,7 @@ pub fn build(
 
 /// The half-edge MT of `mesh`, its updates in blocks by what they reach.
 fn half_edge_mt(
-    mesh: &TetMesh,
+    mesh: &mut Cow<'_, TetMesh>,
     config: &BuildConfig,
     purpose: Purpose,
     progress: OnProgress<'_>,

@@ -9,6 +9,7 @@ use crate::geom::Bounds;
 use crate::mesh;
 use crate::mesh::TetMesh;
 use crate::mt::{ExplicitMt, MAX_UPDATES, VertexId};
+use std::borrow::Cow;
 
 /// Builds a vertex-based MT of `mesh` by this method, as an explicit MT.
 ///
@@ -39,7 +40,8 @@ pub(super) fn decimated_mt(
     how: (BuildCriterion, Purpose),
     progress: OnProgress<'_>,
 ) -> Result<(ExplicitMt, Vec<VertexId>), BuildError> {
-    let Decimated::<Sequence> { record, quantized, info } = decimate::decimate(mesh, config, how, progress)?;
+    let Decimated::<Sequence> { record, quantized, info } =
+        decimate::decimate(&mut Cow::Borrowed(mesh), config, how, progress)?;
     record.explicit_mt(info, &quantized, progress)
 }
 

@@ -1,7 +1,7 @@
 //! The mesh that the builder edits: topology only.
 //!
 //! Vertices are numbered as they come: those of the input first, then one for each collapse. Tetrahedra keep their
-//! numbers; those that a collapse removes are marked dead. Removals of vertices use dead numbers again.
+//! numbers; those that a collapse removes are marked dead. What fills the hole of a removed vertex takes the numbers of its star.
 
 use crate::mesh::NONE;
 
@@ -11,40 +11,62 @@ pub(super) struct WorkMesh {
     pub neighbors: Vec<[u32; 4]>,
     /// A tetrahedron at each vertex; [`NONE`] once the vertex is gone.
     pub incident: Vec<u32>,
-    /// Numbers of dead tetrahedra that [`WorkMesh::fresh`] may reuse.
-    unused: Vec<u32>,
     /// How many tetrahedra are dead.
     dead: usize,
 }
 
-/// Marks on tetrahedra. They are not part of the mesh, so that searches need not change it.
+/// A small set of tetrahedra: a hash table with open addressing. It takes far less memory than a mark on each tetrahedron, and stays
+/// in the cache.
 #[derive(Default)]
-pub(super) struct TetMarks {
-    marks: Vec<u32>,
-    epoch: u32,
+pub(super) struct TetSet {
+    /// Twice as many places as tetrahedra at least, a power of two; [`NONE`] where there is none.
+    table: Vec<u32>,
+    len: usize,
 }
 
-impl TetMarks {
-    /// Clears all marks, for a mesh of so many tetrahedra.
-    fn start(&mut self, tets: usize) {
-        self.epoch = self.epoch.wrapping_add(1);
-        if self.epoch == 0 {
-            self.marks.fill(0);
-            self.epoch = 1;
-        }
-        if self.marks.len() < tets {
-            self.marks.resize(tets, 0);
+impl TetSet {
+    /// Empties the set.
+    fn clear(&mut self) {
+        if self.len > 0 {
+            self.table.fill(NONE);
+            self.len = 0;
         }
     }
 
+    /// Adds a tetrahedron; false if it is there already.
     #[inline]
-    fn has(&self, t: u32) -> bool {
-        self.marks[t as usize] == self.epoch
+    fn insert(&mut self, t: u32) -> bool {
+        if 2 * self.len >= self.table.len() {
+            self.grow();
+        }
+        let place = self.place(t);
+        let is_new = self.table[place] == NONE;
+        self.table[place] = t;
+        self.len += usize::from(is_new);
+        is_new
     }
 
+    /// Where a tetrahedron is, or would be put.
     #[inline]
-    fn add(&mut self, t: u32) {
-        self.marks[t as usize] = self.epoch;
+    fn place(&self, t: u32) -> usize {
+        let mask = self.table.len() - 1;
+        // Fibonacci hashing: the highest bits of the product depend on all of the number.
+        let mut place = (t.wrapping_mul(0x9E37_79B9) >> 16) as usize & mask;
+        while self.table[place] != NONE && self.table[place] != t {
+            place = (place + 1) & mask;
+        }
+        place
+    }
+
+    #[cold]
+    fn grow(&mut self) {
+        let size = (2 * self.table.len()).max(128);
+        for t in std::mem::replace(&mut self.table, vec![NONE; size]) {
+            if t != NONE {
+                let place = self.place(t);
+                self.table[place] = t;
+            }
+        }
     }
 }
 
@@ -61,7 +83,7 @@ impl WorkMesh {
         for (t, tet) in tets.iter().enumerate() {
             tet.iter().for_each(|&v| incident[v as usize] = t as u32);
         }
-        Self { tets, neighbors, incident, unused: Vec::new(), dead: 0 }
+        Self { tets, neighbors, incident, dead: 0 }
     }
 
     /// The number of tetrahedra around each vertex.
@@ -87,20 +109,22 @@ impl WorkMesh {
     }
 
     /// The tetrahedra around `v` that are connected through faces; false if there are more than `most`.
-    pub fn star(&self, v: u32, most: usize, marks: &mut TetMarks, star: &mut Vec<StarTet>) -> bool {
-        marks.start(self.tets.len());
+    pub fn star(&self, v: u32, most: usize, seen: &mut TetSet, star: &mut Vec<StarTet>) -> bool {
+        seen.clear();
         star.clear();
-        self.reach(self.incident[v as usize], v, marks, star);
+        let first = self.incident[v as usize];
+        seen.insert(first);
+        star.push(self.star_tet(first, v));
         let mut next = 0;
         while next < star.len() {
             let StarTet { tet, corner } = star[next];
             next += 1;
             for (i, n) in self.neighbors[tet as usize].into_iter().enumerate() {
-                if i != corner as usize && n != NONE && !marks.has(n) {
+                if i != corner as usize && n != NONE && seen.insert(n) {
                     if star.len() == most {
                         return false;
                     }
-                    self.reach(n, v, marks, star);
+                    star.push(self.star_tet(n, v));
                 }
             }
         }
@@ -108,12 +132,11 @@ impl WorkMesh {
     }
 
     #[inline]
-    fn reach(&self, t: u32, v: u32, marks: &mut TetMarks, star: &mut Vec<StarTet>) {
-        marks.add(t);
+    fn star_tet(&self, t: u32, v: u32) -> StarTet {
         let tet = self.tets[t as usize];
         let corner =
             usize::from(tet[1] == v) | (usize::from(tet[2] == v) << 1) | (usize::from(tet[3] == v) * 3);
-        star.push(StarTet { tet: t, corner: corner as u8 });
+        StarTet { tet: t, corner: corner as u8 }
     }
 
     /// Removes fan tetrahedron `t`, whose corners `i` and `j` are the ends of the collapsing edge.
@@ -132,19 +155,7 @@ impl WorkMesh {
     /// Removes tetrahedron `t`; the caller updates its neighbours.
     pub fn free(&mut self, t: u32) {
         self.tets[t as usize] = [NONE; 4];
-        self.unused.push(t);
         self.dead += 1;
-    }
-
-    /// The number of a new tetrahedron, for the caller to fill in.
-    pub fn fresh(&mut self) -> u32 {
-        if let Some(t) = self.unused.pop() {
-            self.dead -= 1;
-            return t;
-        }
-        self.tets.push([NONE; 4]);
-        self.neighbors.push([NONE; 4]);
-        (self.tets.len() - 1) as u32
     }
 
     fn relink(&mut self, t: u32, from: u32, to: u32) {

@@ -226,9 +226,8 @@ impl MeshBuilder {
         }
         mesh.add_geometry_fields(&config.fields);
         set_units(&mut mesh, &units)?;
-        let built = builder::build(&mesh, &config, &mut |step| stages.step(&step));
+        let built = builder::build_owned(mesh, &config, &mut |step| stages.step(&step));
         let built = built.map_err(|error| in_input(&name, error))?;
-        drop(mesh);
         stages.begin("encode")?;
         let metadata = config.construction.metadata().into_iter().chain(metadata).collect();
         let encoding = EncodeOptions {

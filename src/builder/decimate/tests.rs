@@ -11,6 +11,7 @@ use crate::geom::{in_conflict, nearest_on_triangle, orient3d};
 use crate::mesh::{EDGES, FACES, Field, Grid, NONE, TetMesh, repair, topology};
 use crate::mt::{ErrorCode, ExplicitMt, HalfEdgeMt, MAX_LINK, MtKind, MultiTessellation, UpdateId, VertexId};
 use glam::{DMat3, DVec3};
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 
@@ -84,7 +85,7 @@ fn decimate(
     how: (BuildCriterion, Purpose),
     progress: OnProgress<'_>,
 ) -> Result<Decimated<Sequence>, BuildError> {
-    super::decimate(mesh, config, how, progress)
+    super::decimate(&mut Cow::Borrowed(mesh), config, how, progress)
 }
 
 fn built(mesh: &TetMesh, criterion: BuildCriterion) -> Decimated<Sequence> {
