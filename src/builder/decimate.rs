@@ -62,8 +62,8 @@ pub(super) struct Removed<'a> {
     pub makers: &'a [u32],
     /// The neighbour that the vertex was moved to; [`NONE`] where the hole was filled otherwise.
     pub end: u32,
-    /// The error of each field, as it is stored.
-    pub errors: &'a [f64],
+    /// The error of each field.
+    pub errors: &'a [ErrorCode],
     /// How far the boundary has moved, as an error.
     pub step: f64,
 }
@@ -240,8 +240,8 @@ impl<'a, R: Record> Decimator<'a, R> {
         let RemovalSearch { hole, best, .. } = search;
         let State { mesh, removals, degrees, reference, .. } = state;
         // Never zero: error 0 is to mean the reference mesh, with every vertex in.
-        let stored = |error: &f64| ErrorCode::at_least(*error).max(ErrorCode(1)).error();
-        let errors: Vec<f64> = best.cost.placement.errors.iter().map(stored).collect();
+        let stored = |error: &f64| ErrorCode::at_least(*error).max(ErrorCode(1));
+        let errors: Vec<ErrorCode> = best.cost.placement.errors.iter().map(stored).collect();
         let removal = record.len() as u32;
         hole.replace(mesh, &best.filling, slots);
         let removed = Removed {

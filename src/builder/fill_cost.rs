@@ -9,6 +9,7 @@ use super::hole::{Filling, Hole};
 use super::placement::{Placement, Replacement};
 use super::points::{SLACK, as_vec, bounds};
 use crate::mesh::NONE;
+use crate::mt::ErrorCode;
 use glam::DVec3;
 
 /// The removals so far.
@@ -17,7 +18,7 @@ pub(super) struct Removals {
     /// The removal that made each tetrahedron; [`NONE`] for those of the reference mesh.
     pub makers: Vec<u32>,
     /// The errors of each removal, field by field.
-    pub errors: Vec<f64>,
+    pub errors: Vec<ErrorCode>,
 }
 
 /// What a removal costs whatever fills its hole.
@@ -78,16 +79,17 @@ impl Removals {
     /// What the hole's tetrahedra leave to the removal of its vertex.
     pub fn hole_cost(&self, hole: &Hole, reference: &Reference<'_>) -> HoleCost {
         let fields = reference.quantized.fields.len();
-        let mut inherited = vec![0.0_f64; fields];
+        let mut inherited = vec![ErrorCode::ZERO; fields];
         let mut depends = false;
         for s in &hole.star {
             let maker = self.makers[s.tet as usize];
             if maker != NONE {
                 let errors = &self.errors[maker as usize * fields..][..fields];
-                inherited.iter_mut().zip(errors).for_each(|(error, made)| *error = error.max(*made));
+                inherited.iter_mut().zip(errors).for_each(|(error, made)| *error = (*error).max(*made));
                 depends = true;
             }
         }
+        let inherited: Vec<f64> = inherited.iter().map(|code| code.error()).collect();
         let mut errors = inherited.clone();
         if depends {
             let overshoot = |f: usize| reference.quantized.overshoot(hole.a, &hole.link, f);

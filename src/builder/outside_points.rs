@@ -8,6 +8,7 @@
 
 use super::points::Lists;
 use glam::DVec3;
+use std::sync::Arc;
 
 /// The reference vertices outside of the tetrahedra in whose buckets they are.
 pub(super) struct OutsidePoints {
@@ -25,7 +26,7 @@ pub(super) struct OutsidePoints {
 
 /// A regular grid over all reference vertices.
 struct Grid {
-    places: Vec<DVec3>,
+    places: Arc<[DVec3]>,
     low: DVec3,
     /// Cells in a unit of length.
     density: DVec3,
@@ -37,7 +38,7 @@ const MOST_CELLS: usize = 128;
 
 impl OutsidePoints {
     /// Of a mesh with so many tetrahedra and vertices at these places.
-    pub fn new(tets: usize, places: Vec<DVec3>) -> Self {
+    pub fn new(tets: usize, places: Arc<[DVec3]>) -> Self {
         let points = places.len();
         let grid = Grid::new(places);
         Self {
@@ -105,7 +106,7 @@ impl OutsidePoints {
 }
 
 impl Grid {
-    fn new(places: Vec<DVec3>) -> Self {
+    fn new(places: Arc<[DVec3]>) -> Self {
         let low = places.iter().copied().fold(DVec3::INFINITY, DVec3::min);
         let high = places.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
         let cells = (1..MOST_CELLS).take_while(|n| n.pow(3) < places.len()).last().unwrap_or(1);

@@ -18,7 +18,7 @@ pub(super) trait Replacement {
     fn relative(&self, q: DVec3, origin: DVec3) -> DVec3;
 }
 
-/// A new tetrahedron.
+/// A new tetrahedron: where its points are.
 #[derive(Clone, Copy)]
 struct Cell {
     /// `(λ_1, λ_2, λ_3)` of a point are this times its position relative to corner 0.
@@ -44,11 +44,13 @@ impl Face {
 /// The new cells of points, and the errors of the fields there; reused for each candidate.
 #[derive(Default)]
 pub(super) struct Placement {
-    cells: Vec<Cell>,
+    corners: Vec<[DVec3; 4]>,
+    /// The cells, made when they are first needed.
+    cells: Vec<Option<Cell>>,
     /// The boundary triangles, made when they are first needed.
     faces: Vec<Face>,
-    /// For each point its cell, and whether it is outside.
-    moves: Vec<(u32, u32, bool)>,
+    /// For each point its cell, or the complement of its number if the point is outside.
+    moves: Vec<(u32, i32)>,
     /// Points of other buckets that are inside: point and cell.
     foreign: Vec<(u32, u32)>,
     border_moves: Vec<(u32, u32)>,
@@ -59,9 +61,10 @@ pub(super) struct Placement {
 impl Placement {
     /// Starts with the cells of these corners, in steps of the lattice, and no points.
     pub fn start(&mut self, corners: impl Iterator<Item = [DVec3; 4]>) {
+        self.corners.clear();
+        self.corners.extend(corners);
         self.cells.clear();
-        // The orientation was found positive, so the matrices are regular.
-        self.cells.extend(corners.map(|all| Cell { barycentric: barycentric(all), origin: all[0] }));
+        self.cells.resize(self.corners.len(), None);
         self.faces.clear();
         self.moves.clear();
         self.foreign.clear();
@@ -74,8 +77,18 @@ impl Placement {
     }
 
     /// The cell that contains a position, in steps of the lattice, or is nearest to it: see [`locate`].
-    pub fn locate(&self, position: DVec3, hint: usize) -> (usize, DVec3, f64) {
-        locate(self.cells.len(), hint, |i| self.cells[i].barycentric * (position - self.cells[i].origin))
+    pub fn locate(&mut self, position: DVec3, hint: usize) -> (usize, DVec3, f64) {
+        locate(self.cells.len(), hint, |i| {
+            let Cell { barycentric, origin } = self.cell(i);
+            barycentric * (position - origin)
+        })
+    }
+
+    #[inline]
+    fn cell(&mut self, i: usize) -> Cell {
+        // The orientation was found positive, so the matrices are regular.
+        let make = || Cell { barycentric: barycentric(self.corners[i]), origin: self.corners[i][0] };
+        *self.cells[i].get_or_insert_with(make)
     }
 
     /// Finds the cell for a point, testing `hint` first. Returns the error there and the cell.
@@ -89,11 +102,11 @@ impl Placement {
             let (p, moved) = reference.place(point);
             let (found, q, distance) = self.nearest(p, usize::MAX, new);
             cell = found as usize;
-            let Cell { barycentric, origin } = self.cells[cell];
+            let Cell { barycentric, origin } = self.cell(cell);
             lambda = barycentric * new.relative(q, origin);
             displaced = distance - moved;
         }
-        self.moves.push((point, cell as u32, outside));
+        self.moves.push((point, if outside { !(cell as i32) } else { cell as i32 }));
         let displaced = reference.error_at(point, displaced);
         self.raise(displaced);
         (self.compare(point, cell, lambda, new).max(displaced), cell)
@@ -156,8 +169,9 @@ impl Placement {
 
     /// Puts the points into the buckets of their new cells; `tets` are the numbers of the cells.
     pub fn move_points(&self, buckets: &mut Buckets, tets: impl Fn(u32) -> u32) {
-        for &(point, cell, outside) in &self.moves {
-            buckets.inside.put(tets(cell), point);
+        for &(point, cell) in &self.moves {
+            let outside = cell < 0;
+            buckets.inside.put(tets(if outside { !cell } else { cell }.unsigned_abs()), point);
             buckets.outside_points.set_outside(point, outside);
         }
         self.foreign.iter().for_each(|&(point, cell)| buckets.outside_points.add_foreign(tets(cell), point));

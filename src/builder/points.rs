@@ -40,7 +40,11 @@ impl Lists {
 
 /// Which of so many tetrahedra a point lies in, or is least outside of: its barycentric coordinates there but for the
 /// first one, which `barycentric` gives, and how deep inside it lies. The tetrahedron `hint` is tested first.
-pub(super) fn locate(cells: usize, hint: usize, barycentric: impl Fn(usize) -> DVec3) -> (usize, DVec3, f64) {
+pub(super) fn locate(
+    cells: usize,
+    hint: usize,
+    mut barycentric: impl FnMut(usize) -> DVec3,
+) -> (usize, DVec3, f64) {
     let (mut cell, mut lambda, mut depth) = (hint, DVec3::ZERO, f64::NEG_INFINITY);
     let order = std::iter::once(hint).chain((0..cells).filter(|&i| i != hint));
     for i in order {

@@ -8,6 +8,7 @@ use crate::geom::{Lattice, ON_LATTICE, WIDE_BITS};
 use crate::mesh::{Field, TetMesh};
 use crate::mt::{FieldInfo, MtInfo, MtKind};
 use glam::DVec3;
+use std::sync::Arc;
 
 /// The reference mesh on its lattices.
 pub(super) struct Quantized {
@@ -19,7 +20,7 @@ pub(super) struct Quantized {
     /// The input's values in units of levels, not rounded; errors are measured against these.
     pub exact: Vec<f64>,
     /// The input's points in steps of the lattice, not rounded; the field is compared there.
-    pub places: Vec<DVec3>,
+    pub places: Arc<[DVec3]>,
     /// The locations of the points that the lattice has moved; empty without cells.
     pub locations: Vec<Location>,
     /// How far the lattice moves a point at most: see [`MtInfo::quantization`](crate::mt::MtInfo::quantization).

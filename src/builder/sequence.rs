@@ -62,7 +62,8 @@ impl Record for Sequence {
         self.tets.extend_from_slice(&filling.tets);
         let end = self.tets.len();
         let (removed, inserted) = (middle..end, start..middle);
-        self.steps.push(Insertion { vertex: hole.a, removed, inserted, errors: errors.to_vec(), step });
+        let errors = errors.iter().map(|code| code.error()).collect();
+        self.steps.push(Insertion { vertex: hole.a, removed, inserted, errors, step });
     }
 
     fn finish(&mut self, tets: &[[u32; 4]], _: &[u32]) {

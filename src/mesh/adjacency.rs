@@ -17,11 +17,19 @@ impl HalfFace {
         Self(number)
     }
 
+    /// The face of a code: see [`HalfFace::code`].
+    fn of(tets: &[[u32; 4]], code: u32) -> Self {
+        let mut key = face_of(tets[(code >> 2) as usize], (code & 3) as usize);
+        key.sort_unstable();
+        Self::new(key, code)
+    }
+
     /// The face's vertices in increasing order.
     fn vertices(self) -> [u32; 3] {
         [96, 64, 32].map(|shift| (self.0 >> shift) as u32)
     }
 
+    /// Four times its tetrahedron, and which of that one's faces it is.
     fn code(self) -> u32 {
         self.0 as u32
     }
@@ -52,52 +60,66 @@ fn is_odd([a, b, c]: [u32; 3]) -> bool {
     (a > b) ^ (a > c) ^ (b > c)
 }
 
-/// All faces of `tets`, equal ones side by side, in increasing order of key and then of tetrahedron.
-pub(crate) fn sorted_faces(tets: &[[u32; 4]]) -> Result<Vec<HalfFace>, MeshError> {
-    if tets.len() > MAX_TETS {
-        return Err(MeshError::TooMany { tets: tets.len() });
+/// All faces of tetrahedra, by their smallest vertices. The rest is sorted when they are read: that takes a quarter of the memory of a
+/// sorted list.
+pub(crate) struct FaceTable<'a> {
+    tets: &'a [[u32; 4]],
+    /// Where the faces of each bucket begin; one more than there are buckets.
+    starts: Vec<u32>,
+    /// Of each face what [`HalfFace::code`] tells.
+    codes: Vec<u32>,
+}
+
+impl<'a> FaceTable<'a> {
+    /// # Errors
+    /// If there are more than [`MAX_TETS`].
+    pub fn new(tets: &'a [[u32; 4]]) -> Result<Self, MeshError> {
+        if tets.len() > MAX_TETS {
+            return Err(MeshError::TooMany { tets: tets.len() });
+        }
+        let largest = tets.iter().flatten().max().copied().unwrap_or(0);
+        let mut shift = 0;
+        while (largest >> shift) as usize > 4 * tets.len() + 64 {
+            // Few tetrahedra with huge indices must not size the table.
+            shift += 1;
+        }
+        let bucket = |face: HalfFace| (face.vertices()[0] >> shift) as usize;
+        let mut starts = vec![0_u32; (largest >> shift) as usize + 2];
+        for face in half_faces(tets) {
+            starts[bucket(face) + 1] += 1;
+        }
+        for i in 1..starts.len() {
+            starts[i] += starts[i - 1];
+        }
+        let mut next = starts.clone();
+        let mut codes = vec![0_u32; 4 * tets.len()];
+        for face in half_faces(tets) {
+            let slot = &mut next[bucket(face)];
+            codes[*slot as usize] = face.code();
+            *slot += 1;
+        }
+        Ok(Self { tets, starts, codes })
     }
-    // Counting sort by the smallest vertex, then a comparison sort inside the short buckets.
-    let largest = tets.iter().flatten().max().copied().unwrap_or(0);
-    let mut shift = 0;
-    while (largest >> shift) as usize > 4 * tets.len() + 64 {
-        // Few tetrahedra with huge indices must not size the table.
-        shift += 1;
+
+    /// Shows all groups of equal faces, in increasing order of their vertices, each with all tetrahedra around it in increasing order.
+    ///
+    /// # Errors
+    /// The first one of `see`.
+    pub fn each_group<E>(&self, mut see: impl FnMut(&[HalfFace]) -> Result<(), E>) -> Result<(), E> {
+        let mut bucket: Vec<HalfFace> = Vec::new();
+        for ends in self.starts.windows(2) {
+            let codes = &self.codes[ends[0] as usize..ends[1] as usize];
+            bucket.clear();
+            bucket.extend(codes.iter().map(|&code| HalfFace::of(self.tets, code)));
+            bucket.sort_unstable_by_key(|face| face.0);
+            bucket.chunk_by(|a, b| a.0 >> 32 == b.0 >> 32).try_for_each(&mut see)?;
+        }
+        Ok(())
     }
-    let bucket = |face: HalfFace| (face.vertices()[0] >> shift) as usize;
-    let mut starts = vec![0_u32; (largest >> shift) as usize + 2];
-    for face in half_faces(tets) {
-        starts[bucket(face) + 1] += 1;
-    }
-    for i in 1..starts.len() {
-        starts[i] += starts[i - 1];
-    }
-    let mut next = starts.clone();
-    let mut sorted = vec![0_u128; 4 * tets.len()];
-    for face in half_faces(tets) {
-        let slot = &mut next[bucket(face)];
-        sorted[*slot as usize] = face.0;
-        *slot += 1;
-    }
-    for ends in starts.windows(2) {
-        sorted[ends[0] as usize..ends[1] as usize].sort_unstable();
-    }
-    Ok(sorted.into_iter().map(HalfFace).collect())
 }
 
 fn half_faces(tets: &[[u32; 4]]) -> impl Iterator<Item = HalfFace> + '_ {
-    (0_u32..).zip(tets).flat_map(|(t, tet)| {
-        (0..4_u32).map(move |i| {
-            let mut key = face_of(*tet, i as usize);
-            key.sort_unstable();
-            HalfFace::new(key, 4 * t + i)
-        })
-    })
-}
-
-/// The groups of equal faces, each with all tetrahedra around it.
-pub(crate) fn face_groups(sorted: &[HalfFace]) -> impl Iterator<Item = &[HalfFace]> {
-    sorted.chunk_by(|a, b| a.0 >> 32 == b.0 >> 32)
+    (0..4 * tets.len() as u32).map(|code| HalfFace::of(tets, code))
 }
 
 /// The neighbours of each tetrahedron: entry `i` lies across face `i`, or is [`NONE`] at the boundary.
@@ -106,23 +128,25 @@ pub(crate) fn face_groups(sorted: &[HalfFace]) -> impl Iterator<Item = &[HalfFac
 /// If three or more tetrahedra share a face, or there are more than [`MAX_TETS`].
 pub fn neighbors(tets: &[[u32; 4]]) -> Result<Vec<[u32; 4]>, MeshError> {
     let fits = |group: &[HalfFace], _| if group.len() > 2 { Err(crowded(group)) } else { Ok(()) };
-    match_faces(tets, &sorted_faces(tets)?, fits)
+    match_faces(&FaceTable::new(tets)?, fits)
 }
 
-/// The neighbours by their [sorted faces](sorted_faces). `fits` may refuse a face of several tetrahedra; it gets whether the
+/// The neighbours of the tetrahedra of a table of faces. `fits` may refuse a face of several tetrahedra; it gets whether the
 /// first two of them lie on the same side.
 pub(crate) fn match_faces<E>(
-    tets: &[[u32; 4]],
-    sorted: &[HalfFace],
+    faces: &FaceTable<'_>,
     fits: impl Fn(&[HalfFace], bool) -> Result<(), E>,
 ) -> Result<Vec<[u32; 4]>, E> {
+    let tets = faces.tets;
     let mut neighbors = vec![[NONE; 4]; tets.len()];
-    for group in face_groups(sorted) {
-        let [a, b, ..] = group else { continue };
-        fits(group, a.is_odd(tets) == b.is_odd(tets))?;
-        neighbors[a.tet() as usize][a.face()] = b.tet();
-        neighbors[b.tet() as usize][b.face()] = a.tet();
-    }
+    faces.each_group(|group| {
+        if let [a, b, ..] = group {
+            fits(group, a.is_odd(tets) == b.is_odd(tets))?;
+            neighbors[a.tet() as usize][a.face()] = b.tet();
+            neighbors[b.tet() as usize][b.face()] = a.tet();
+        }
+        Ok(())
+    })?;
     Ok(neighbors)
 }
 

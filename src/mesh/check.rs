@@ -2,7 +2,7 @@
 
 use robust::{Coord, Coord3D};
 
-use crate::mesh::adjacency::{HalfFace, check_indices, crowded, face_of, match_faces, sorted_faces};
+use crate::mesh::adjacency::{FaceTable, HalfFace, check_indices, crowded, face_of, match_faces};
 use crate::mesh::{MeshError, TetMesh};
 
 /// Checks that `mesh` is valid: fields and indices fit, every tetrahedron is positive (decided exactly), and
@@ -27,7 +27,7 @@ pub fn check(mesh: &TetMesh) -> Result<(), MeshError> {
         [_, _] => Ok(()),
         _ => Err(crowded(group)),
     };
-    match_faces(&mesh.tets, &sorted_faces(&mesh.tets)?, fits).map(drop)
+    match_faces(&FaceTable::new(&mesh.tets)?, fits).map(drop)
 }
 
 /// Checks what holds before geometry is looked at: lengths, finite coordinates, indices in range.

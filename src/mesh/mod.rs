@@ -17,8 +17,8 @@ mod tet_mesh;
 
 #[cfg(feature = "build")]
 pub(crate) use adjacency::stars;
+pub(crate) use adjacency::{FaceTable, boundary_faces, match_faces};
 pub use adjacency::{MAX_TETS, Topology, neighbors, topology};
-pub(crate) use adjacency::{boundary_faces, match_faces, sorted_faces};
 pub(crate) use bit_set::BitSet;
 pub(crate) use changed_blocks::{BLOCK, ChangedBlocks};
 pub use check::check;

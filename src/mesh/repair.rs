@@ -18,7 +18,7 @@
 
 use std::fmt;
 
-use crate::mesh::adjacency::{HalfFace, crowded, face_groups, match_faces, sorted_faces};
+use crate::mesh::adjacency::{FaceTable, HalfFace, crowded, match_faces};
 use crate::mesh::check::{Sides, check_arrays};
 use crate::mesh::{FACES, MeshError, NONE, TetMesh};
 
@@ -169,14 +169,15 @@ impl Work {
     fn drop_duplicates(&mut self) -> Result<(), MeshError> {
         let mut repeats = vec![false; self.mesh.tets.len()];
         let apex = |f: &HalfFace| self.mesh.tets[f.tet() as usize][f.face()];
-        for group in face_groups(&sorted_faces(&self.mesh.tets)?) {
+        FaceTable::new(&self.mesh.tets)?.each_group(|group| {
             // The first of a group repeats nothing: each is compared with those before it.
             for (i, face) in group.iter().enumerate().skip(1) {
                 // Groups are short except in broken meshes, where looking at the first few is enough to refuse.
                 let earlier = &group[..i.min(16)];
                 repeats[face.tet() as usize] |= earlier.iter().any(|e| apex(e) == apex(face));
             }
-        }
+            Ok::<(), MeshError>(())
+        })?;
         self.report.duplicate_tets = self.retain(|t, _| !repeats[t]);
         Ok(())
     }
@@ -207,7 +208,7 @@ impl Work {
             [_, _] => Ok(()),
             _ => Err(self.with_cells(crowded(group))),
         };
-        match_faces(&self.mesh.tets, &sorted_faces(&self.mesh.tets)?, fits)
+        match_faces(&FaceTable::new(&self.mesh.tets)?, fits)
     }
 
     /// `error` with the input's numbers.

@@ -1,7 +1,7 @@
 //! Corners, faces and neighbours of tetrahedra.
 
 use super::base::BaseMeshError;
-use crate::mesh::{FACES, match_faces, sorted_faces};
+use crate::mesh::{FACES, FaceTable, match_faces};
 
 /// `TURN[4 * i + j]`: corners `i` and `j` of a tetrahedron and the other two, such that the last three see the first
 /// as the vertices of its opposite face in [`FACES`] do: an even permutation.
@@ -29,8 +29,8 @@ pub(crate) fn corner_of(array: &[u32; 4], value: u32) -> usize {
 
 /// Finds the neighbour across every face. Each face may be shared by two tetrahedra that lie on its two sides.
 pub(crate) fn face_neighbors(tets: &[[u32; 4]]) -> Result<Vec<[u32; 4]>, BaseMeshError> {
-    let faces = sorted_faces(tets).map_err(|_| BaseMeshError::Info("it has too many tetrahedra"))?;
-    match_faces(tets, &faces, |group, folded| {
+    let faces = FaceTable::new(tets).map_err(|_| BaseMeshError::Info("it has too many tetrahedra"))?;
+    match_faces(&faces, |group, folded| {
         let first = group.iter().find(|face| face.is_odd(tets)).unwrap_or(&group[0]);
         if folded || group.len() > 2 { Err(BaseMeshError::Face(first.tet())) } else { Ok(()) }
     })
