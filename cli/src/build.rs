@@ -2,7 +2,8 @@
 
 use super::files;
 use super::input;
-use super::output::{self, Verbosity};
+use super::output::{self, Verbosity, bytes, count};
+use super::parse;
 use anyhow::{Context, Result, anyhow};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -11,7 +12,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 use tetralod::builder::{
     BuildConfig, BuildCriterion, BuildError, BuildProgress, BuildResult, BuildSummary, Construction,
-    ConstructionChoice, FieldPrecision, Method, Purpose, Remedy,
+    ConstructionChoice, FieldPrecision, Method, Purpose, Remedy, memory_needed,
 };
 use tetralod::format::{EncodeOptions, encode_to};
 use tetralod::io::{CellData, FieldSelection};
@@ -98,6 +99,10 @@ pub struct Arguments {
     /// Threads to build with, all cores if not given. The file does not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
+    /// The most memory that building may take, as 8G: what needs more, by its counts, is refused before the work begins. K, M and G
+    /// are powers of 1024.
+    #[arg(long, value_name = "BYTES", value_parser = parse::parse_bytes)]
+    memory: Option<u64>,
     #[command(flatten)]
     verbosity: Verbosity,
 }
@@ -225,6 +230,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if !repaired.is_empty() && !arguments.verbosity.quiet {
         eprintln!("{}: {repaired}", arguments.inputs[0].display());
     }
+    expect_memory(arguments, &config, &mesh)?;
     let BuildResult { mt, summary, exact, .. } = build(arguments, &config, mesh)?;
     let metadata =
         config.construction.metadata().into_iter().chain(arguments.metadata.iter().cloned()).collect();
@@ -263,6 +269,34 @@ fn read(arguments: &Arguments, config: &BuildConfig) -> Result<(TetMesh, RepairR
         }
     }
     Ok((mesh, repaired))
+}
+
+/// From so much memory on, the command says what it needs.
+const MUCH_MEMORY: u64 = 1 << 30;
+
+/// Says how much memory building takes where that is much, and refuses what needs more than is allowed.
+fn expect_memory(arguments: &Arguments, config: &BuildConfig, mesh: &TetMesh) -> Result<()> {
+    let (points, tetrahedra) = (mesh.positions.len() as u64, mesh.tets.len() as u64);
+    let is_kept = |field: &&Field| config.fields.iter().any(|name| field.answers_to(name));
+    let fields = match config.all_fields {
+        true => mesh.fields.len(),
+        false => mesh.fields.iter().filter(is_kept).count(),
+    };
+    let needed = memory_needed(config.construction, points, tetrahedra, fields.max(1) as u64);
+    let what = format!("building {} tetrahedra takes about {}", count(tetrahedra), bytes(needed));
+    match arguments.memory {
+        Some(most) if needed > most => Err(anyhow!(
+            "{what} of memory, more than --memory allows ({}): allow more, keep fewer fields, or build a coarser mesh",
+            bytes(most)
+        ))
+        .with_context(|| arguments.inputs[0].display().to_string()),
+        _ => {
+            if needed >= MUCH_MEMORY && !arguments.verbosity.quiet {
+                eprintln!("{}: {what} of memory at most", arguments.inputs[0].display());
+            }
+            Ok(())
+        }
+    }
 }
 
 /// How to build. Ends the program if the options contradict each other.

@@ -138,10 +138,10 @@ impl Collapses {
         (errors, step): (&[ErrorCode], f64),
         quantized: &Quantized,
     ) {
-        for f in 0..self.fields {
+        for (f, error) in errors.iter().enumerate() {
             // Never zero: error 0 is to mean the reference mesh, with every update applied. Rounded before others are derived from
             // it, an error keeps its distance to these.
-            let own = errors[f].max(ErrorCode::at_least(self.floors[f])).max(ErrorCode(1)).coarse();
+            let own = error.max(&ErrorCode::at_least(self.floors[f])).max(&ErrorCode(1)).coarse();
             let of = |&maker: &u32| self.errors[maker as usize * self.fields + f];
             let made = self.makers[first..].iter().filter(|&&maker| maker != NONE);
             let least = made.map(of).max().map_or(own, |largest| {

@@ -42,6 +42,7 @@ mod history;
 mod hole;
 mod insert;
 mod location;
+mod memory;
 mod method;
 mod order;
 mod outside_points;
@@ -63,6 +64,7 @@ use decimate::Decimated;
 
 pub use collapse::edge_mt;
 pub use delaunay::delaunay;
+pub use memory::memory_needed;
 pub use method::{BuildCriterion, Construction, ConstructionChoice, Method, Purpose, VertexMethod};
 pub use remedy::Remedy;
 

@@ -1,29 +1,14 @@
 //! How much memory a build needs: known before it begins, from counts alone.
 
 use super::build_options::BuildOptions;
-use crate::builder::{Construction, Method};
+use crate::builder::memory_needed;
 use crate::io::Survey;
-use crate::mt::MtKind;
 
 /// The most memory that is relied on: a wasm module has 2^32 bytes, of which the allocator cannot use all.
 pub const LARGEST_MEMORY: u64 = (1 << 32) - (1 << 28);
 
 /// Bytes that are taken before any file.
 const FIXED: u64 = 4 << 20;
-
-/// Bytes that building takes for a tetrahedron of the reference mesh with one field, measured in wasm: arrays that grow by doubling make it
-/// differ by a third from one size to the next, so this is the most.
-fn bytes_a_tetrahedron(construction: Construction) -> u64 {
-    match (construction.method(), construction.kind()) {
-        (Method::Insert, _) => 680,
-        (Method::Collapse, MtKind::Explicit) => 800,
-        (Method::Collapse, _) => 340,
-        (Method::Decimate, _) => 620,
-    }
-}
-
-/// Tetrahedra of a triangulation for each hundred of its points.
-const TRIANGULATED: u64 = 680;
 
 /// The memory that a build needs at most, in bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,17 +30,7 @@ impl Forecast {
         let decoding = points.saturating_mul(24).max(cells.saturating_mul(72));
         let reading = [files, mesh, values, decoding, FIXED];
         let construction = options.config.construction;
-        let tetrahedra = match construction.method() {
-            Method::Insert => points.saturating_mul(TRIANGULATED) / 100,
-            Method::Collapse | Method::Decimate => cells,
-        };
-        let building = tetrahedra.saturating_mul(bytes_a_tetrahedron(construction));
-        let more =
-            points.saturating_mul(fields.saturating_sub(1)).saturating_mul(match construction.method() {
-                Method::Collapse => 400,
-                Method::Insert | Method::Decimate => 120,
-            });
-        let building = [building, more, FIXED];
+        let building = [memory_needed(construction, points, cells, fields), FIXED];
         let sum = |all: &[u64]| all.iter().fold(0_u64, |sum, bytes| sum.saturating_add(*bytes));
         Self { reading: sum(&reading), building: sum(&building) }
     }

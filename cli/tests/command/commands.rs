@@ -10,6 +10,17 @@ use std::time::{Duration, Instant};
 use tetralod::mesh::{Field, TetMesh};
 
 #[test]
+fn what_needs_too_much_memory_is_refused_before_it_is_built() {
+    let folder = Folder::new("memory");
+    let [input, mt] = ["b.vti", "a.mt"].map(|name| folder.path(name));
+    good(&["generate", "bucky", "--size", "9", "-o", &input]);
+    let limited = ["build", &input, "-o", &mt, "--memory", "300K"];
+    bad(1, &limited, &["b.vti", "3 072 tetrahedra", "--memory allows"]);
+    assert!(!Path::new(&mt).exists());
+    good(&["build", &input, "-o", &mt, "--memory", "8M"]);
+}
+
+#[test]
 fn from_data_to_a_checked_mesh() {
     let folder = Folder::new("chain");
     for (name, size, input) in [("bucky", "9", "b.vti"), ("sphere-flow", "4", "s.vtu")] {
