@@ -46,6 +46,8 @@ let drawing = 0;
 /** When the last picture was begun, while the GPU has not finished it; and how long it took to finish the one before. */
 let begun;
 let took = 0;
+/** Whether the GPU has finished a picture: the first one waits for pipelines to be compiled, so its time says nothing. */
+let isWarm = false;
 /** The part of the pixels, in each direction, with which a picture takes about as long as it should. */
 let scale = 1;
 /** Sharpens the picture when nothing changes any more. */
@@ -77,12 +79,8 @@ const REST = 250;
 const FEWEST_TETS = 10_000;
 /** How often it is looked whether the GPU is lost while nothing is drawn (in ms). */
 const CHECK = 1000;
-/** Pictures that take longer than this are drawn twice, not many times for smooth edges. */
+/** Pictures that take longer than this are drawn once, not several times for smooth edges. */
 const SLOW = 100;
-/** Whether the second picture of the same was slow, too: the first may have waited for pipelines to be compiled. */
-let isSlow = false;
-/** Whether the picture that was begun shows what the one before does. */
-let isRepeated = false;
 
 const nextFrame =
   typeof requestAnimationFrame === "function" ? requestAnimationFrame : (then) => setTimeout(then, 16);
@@ -113,7 +111,7 @@ const methods = {
   async restore(canvas, width, height, ratio) {
     viewer.setGpu(await Gpu.open(canvas, width, height));
     viewer.resize(width, height, ratio);
-    [broken, begun, current, isSlow] = [false, undefined, 1, false];
+    [broken, begun, current, isWarm] = [false, undefined, 1, false];
     invalidate();
     return { adapter: viewer.adapter() };
   },
@@ -222,7 +220,6 @@ const methods = {
     if (size) viewer.resize(...size);
     if (scene) {
       viewer.setScene(scene);
-      isSlow = false;
       shown = scene;
     }
     if (home) viewer.home();
@@ -455,7 +452,7 @@ function draw() {
     const milliseconds = performance.now() - start;
     if (drew) {
       drawing = milliseconds;
-      [begun, isRepeated] = [start, false];
+      begun = start;
       const uploaded = viewer.takeUploaded();
       emit("frame", { milliseconds, triangles: viewer.triangles, uploaded, gpuBytes: viewer.gpuBytes, bytes, ready });
       report("camera", viewer.camera());
@@ -465,7 +462,7 @@ function draw() {
     // The canvas may be hidden just now: then try again with the next refresh.
     else if (viewer.pending) invalidate();
     // At rest the picture gets better with every refresh.
-    else if (canImprove() && viewer.improve()) [begun, isRepeated] = [start, true];
+    else if (canImprove() && viewer.improve() && took === 0) begun = start;
     if (begun !== undefined || canImprove()) invalidate();
   } catch (error) {
     failed(error);
@@ -522,14 +519,13 @@ function overlay() {
   return { axes, scaleBar: { label: barLabel, length, width, everywhere: everywhere > 0 }, rotation, matrix };
 }
 
-const canImprove = () => viewer.canImprove && !viewer.moving && !(isSlow && took >= SLOW) && resting === undefined;
+const canImprove = () => viewer.canImprove && !viewer.moving && took < SLOW && resting === undefined;
 
 /** Looks whether the GPU has finished the last picture, and chooses the scale of the next ones by its time. */
 function observe() {
   if (begun === undefined || viewer.inFlight > 0) return;
-  took = performance.now() - begun;
-  begun = undefined;
-  isSlow = took >= SLOW && (isSlow || isRepeated);
+  took = isWarm ? performance.now() - begun : 0;
+  [begun, isWarm] = [undefined, true];
   const wanted = current * Math.sqrt(frameTime / took);
   scale = SCALES.find((one) => one <= wanted) ?? SCALES.at(-1);
   if (resting === undefined) return;
