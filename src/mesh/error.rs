@@ -113,7 +113,8 @@ pub enum MeshError {
     WeldDistance,
     /// Points of a cell would become one, or the cell would be flattened or turned inside out.
     #[error(
-        "cell {tet} is too thin for this weld distance: its points would become one, or change sides; give a smaller one"
+        "welding at this distance would flatten cell {tet}, turn it inside out or make two of its points one; give a \
+         smaller distance"
     )]
     WeldTooFar {
         /// The cell.

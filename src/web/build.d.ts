@@ -101,9 +101,12 @@ export interface RepairReport {
   nonManifoldEdges: number;
   /** Points at which the boundary touches itself, the ends of such edges among them. */
   nonManifoldVertices: number;
-  /** Faces of the boundary of which each point lies at the place of another point. */
+  /**
+   * Faces of the boundary that lie on others: with the same three corners, or two with the same four corners as two others, which meet
+   * in the other diagonal.
+   */
   openSeamFaces: number;
-  /** Those of them that `repair: "weld"` closes. */
+  /** Those of the first kind, which `repair: "weld"` closes. */
   weldableFaces: number;
 }
 

@@ -16,10 +16,10 @@ pub struct MeshFindings {
     pub non_manifold_edges: usize,
     /// Points at which the boundary touches itself, those at the ends of such edges among them.
     pub non_manifold_vertices: usize,
-    /// Faces of the boundary of which each point lies at the place of another point: the two sides of seams that are
-    /// open.
+    /// Faces of the boundary that lie on others, which are the two sides of an open seam: with the same three corners, or
+    /// two with the same four corners as two others, which meet in the other diagonal.
     pub open_seam_faces: usize,
-    /// Those of them that [`RepairLevel::Weld`] closes. The others lie on faces that are cut differently.
+    /// Those of the first kind, which [`RepairLevel::Weld`] closes.
     pub weldable_faces: usize,
 }
 
@@ -63,47 +63,104 @@ pub fn findings(mesh: &TetMesh, distance: f64) -> Result<MeshFindings, MeshError
     let TetMesh { positions, tets, .. } = mesh;
     check_indices(positions.len(), tets)?;
     let neighbors = neighbors(tets)?;
-    let faces: Vec<[u32; 3]> = boundary_faces(tets, &neighbors).map(|(_, face)| face).collect();
+    let faces: Vec<(u32, [u32; 3])> = boundary_faces(tets, &neighbors).collect();
     let mut on_boundary = vec![false; positions.len()];
-    faces.iter().flatten().for_each(|&v| on_boundary[v as usize] = true);
+    faces.iter().flat_map(|(_, face)| face).for_each(|&v| on_boundary[v as usize] = true);
     let non_manifold = non_manifold(positions.len(), tets, &neighbors, |v| on_boundary[v]);
-    let boundary_points = (0..).zip(&on_boundary).filter(|(_, is)| **is).map(|(v, _)| v).collect();
-    let places = places(positions, boundary_points, distance);
-    let mut seam_faces = seam_faces(&faces, &places, &on_boundary);
-    seam_faces.sort_unstable();
-    let is_closed = |pair: &&[([u32; 3], bool)]| matches!(pair, [(_, a), (_, b)] if a != b);
+    let points = (0..).zip(&on_boundary).filter(|(_, is)| **is).map(|(v, _)| v).collect();
+    let edges = edges(&faces);
+    let seams = Seams { faces: &faces, places: places(positions, points, distance) };
+    let mut open = vec![false; faces.len()];
+    seams.mark_equal_faces(&mut open);
+    let weldable_faces = count(&open);
+    seams.mark_equal_quads(&edges, &mut open);
     Ok(MeshFindings {
         components: components(&neighbors),
-        non_manifold_edges: crowded_edges(&faces),
-        non_manifold_vertices: non_manifold.iter().filter(|&&marked| marked).count(),
-        open_seam_faces: seam_faces.len(),
-        weldable_faces: 2 * seam_faces.chunk_by(|a, b| a.0 == b.0).filter(is_closed).count(),
+        non_manifold_edges: edges.chunk_by(same_edge).filter(|run| run.len() > 2).count(),
+        non_manifold_vertices: count(&non_manifold),
+        open_seam_faces: count(&open),
+        weldable_faces,
     })
 }
 
-/// The faces whose points all lie at the places of others: their places in increasing order, and whether that turns
-/// them around.
-fn seam_faces(faces: &[[u32; 3]], places: &[u32], on_boundary: &[bool]) -> Vec<([u32; 3], bool)> {
-    let mut points_at = vec![0_u8; places.len()];
-    for (&place, _) in places.iter().zip(on_boundary).filter(|(_, is)| **is) {
-        points_at[place as usize] = points_at[place as usize].saturating_add(1);
-    }
-    let has_twin = |v: &u32| points_at[places[*v as usize] as usize] > 1;
-    let placed = |face: &[u32; 3]| {
-        let mut places = face.map(|v| places[v as usize]);
-        let odd = is_odd(places);
-        places.sort_unstable();
-        (places, odd)
-    };
-    let is_face = |([a, b, c], _): &([u32; 3], bool)| a != b && b != c;
-    faces.iter().filter(|face| face.iter().all(has_twin)).map(placed).filter(is_face).collect()
+fn count(marked: &[bool]) -> usize {
+    marked.iter().filter(|&&marked| marked).count()
 }
 
-/// How many edges have more than two of the faces.
-fn crowded_edges(faces: &[[u32; 3]]) -> usize {
-    let edge = |a: u32, b: u32| [a.min(b), a.max(b)];
-    let mut edges: Vec<[u32; 2]> =
-        faces.iter().flat_map(|&[a, b, c]| [edge(a, b), edge(b, c), edge(c, a)]).collect();
+/// An edge of the boundary by its points, and the number of a face there.
+type EdgeOfFace = ([u32; 2], u32);
+
+fn same_edge(a: &EdgeOfFace, b: &EdgeOfFace) -> bool {
+    a.0 == b.0
+}
+
+/// The edges of all faces, equal ones side by side.
+fn edges(faces: &[(u32, [u32; 3])]) -> Vec<EdgeOfFace> {
+    let of_face = |(number, (_, [a, b, c])): (u32, &(u32, [u32; 3]))| {
+        [[a, b], [b, c], [c, a]].map(|[a, b]| ([*a.min(b), *a.max(b)], number))
+    };
+    let mut edges: Vec<EdgeOfFace> = (0..).zip(faces).flat_map(of_face).collect();
     edges.sort_unstable();
-    edges.chunk_by(|a, b| a == b).filter(|run| run.len() > 2).count()
+    edges
+}
+
+/// The boundary, for the search of faces that lie on each other.
+struct Seams<'a> {
+    /// Each with its tetrahedron, and its points as they are seen from outside.
+    faces: &'a [(u32, [u32; 3])],
+    /// The place of each point.
+    places: Vec<u32>,
+}
+
+impl Seams<'_> {
+    fn placed<const N: usize>(&self, points: [u32; N]) -> [u32; N] {
+        points.map(|v| self.places[v as usize])
+    }
+
+    /// Marks pairs of faces at the same places that are seen from opposite sides.
+    fn mark_equal_faces(&self, open: &mut [bool]) {
+        let key = |(number, (_, face)): (u32, &(u32, [u32; 3]))| {
+            let mut places = self.placed(*face);
+            let odd = is_odd(places);
+            places.sort_unstable();
+            (places, odd, number)
+        };
+        let mut keys: Vec<_> = (0..).zip(self.faces).map(key).collect();
+        keys.sort_unstable();
+        for run in keys.chunk_by(|a, b| a.0 == b.0) {
+            if let [(_, false, a), (_, true, b)] = *run {
+                open[a as usize] = true;
+                open[b as usize] = true;
+            }
+        }
+    }
+
+    /// Marks pairs of faces with a common edge that have the same four places as another pair, across the other diagonal.
+    fn mark_equal_quads(&self, edges: &[EdgeOfFace], open: &mut [bool]) {
+        let mut quads = Vec::new();
+        for run in edges.chunk_by(same_edge) {
+            // Where several sheets meet in an edge, it is not clear which faces are side by side.
+            let [(edge, a), (_, b)] = *run else { continue };
+            let [(t, face), (u, other)] = [a, b].map(|number| self.faces[number as usize]);
+            let beyond = |face: [u32; 3]| face.into_iter().find(|v| !edge.contains(v));
+            let (Some(v), Some(w)) = (beyond(face), beyond(other)) else { continue };
+            let mut diagonal = self.placed(edge);
+            diagonal.sort_unstable();
+            let mut quad = self.placed([edge[0], edge[1], v, w]);
+            quad.sort_unstable();
+            // Two faces of one tetrahedron meet in an edge of it, not in the diagonal of a quad.
+            if t != u && quad.windows(2).all(|pair| pair[0] != pair[1]) {
+                quads.push((quad, diagonal, [a, b]));
+            }
+        }
+        quads.sort_unstable();
+        for run in quads.chunk_by(|a, b| a.0 == b.0) {
+            let crosses = |x: &[u32; 2], y: &[u32; 2]| x.iter().all(|v| !y.contains(v));
+            for (_, diagonal, pair) in run {
+                if run.iter().any(|(_, other, _)| crosses(diagonal, other)) {
+                    pair.iter().for_each(|&face| open[face as usize] = true);
+                }
+            }
+        }
+    }
 }
