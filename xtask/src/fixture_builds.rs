@@ -121,7 +121,9 @@ fn make_blocks(folder: &Path) -> Result<()> {
     let ways = [[1, 3, 7], [2, 6, 7], [4, 5, 7], [1, 7, 5], [2, 7, 3], [4, 7, 6]];
     let mut cells = String::new();
     for first in [0, 8] {
-        ways.iter().try_for_each(|[b, c, d]| writeln!(cells, "4 {first} {} {} {}", first + b, first + c, first + d))?;
+        ways.iter().try_for_each(|[b, c, d]| {
+            writeln!(cells, "4 {first} {} {} {}", first + b, first + c, first + d)
+        })?;
     }
     let types = ["10"; 12].join(" ");
     let values = (0..16).map(|i| (i * i).to_string()).collect::<Vec<_>>().join(" ");

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use glam::DVec3;
+
 use super::weld::places;
 use crate::mesh::adjacency::{check_indices, components, is_odd, non_manifold};
 use crate::mesh::{MeshError, RepairLevel, TetMesh, boundary_faces, neighbors};
@@ -69,7 +71,7 @@ pub fn findings(mesh: &TetMesh, distance: f64) -> Result<MeshFindings, MeshError
     let non_manifold = non_manifold(positions.len(), tets, &neighbors, |v| on_boundary[v]);
     let points = (0..).zip(&on_boundary).filter(|(_, is)| **is).map(|(v, _)| v).collect();
     let edges = edges(&faces);
-    let seams = Seams { faces: &faces, places: places(positions, points, distance) };
+    let seams = Seams { faces: &faces, positions, places: places(positions, points, distance) };
     let mut open = vec![false; faces.len()];
     seams.mark_equal_faces(&mut open);
     let weldable_faces = count(&open);
@@ -108,6 +110,7 @@ fn edges(faces: &[(u32, [u32; 3])]) -> Vec<EdgeOfFace> {
 struct Seams<'a> {
     /// Each with its tetrahedron, and its points as they are seen from outside.
     faces: &'a [(u32, [u32; 3])],
+    positions: &'a [[f64; 3]],
     /// The place of each point.
     places: Vec<u32>,
 }
@@ -146,21 +149,37 @@ impl Seams<'_> {
             let (Some(v), Some(w)) = (beyond(face), beyond(other)) else { continue };
             let mut diagonal = self.placed(edge);
             diagonal.sort_unstable();
-            let mut quad = self.placed([edge[0], edge[1], v, w]);
+            let mut points = [edge[0], edge[1], v, w];
+            points.sort_unstable();
+            let mut quad = self.placed(points);
             quad.sort_unstable();
             // Two faces of one tetrahedron meet in an edge of it, not in the diagonal of a quad.
             if t != u && quad.windows(2).all(|pair| pair[0] != pair[1]) {
-                quads.push((quad, diagonal, [a, b]));
+                quads.push((quad, diagonal, points, [a, b]));
             }
         }
         quads.sort_unstable();
         for run in quads.chunk_by(|a, b| a.0 == b.0) {
-            let crosses = |x: &[u32; 2], y: &[u32; 2]| x.iter().all(|v| !y.contains(v));
-            for (_, diagonal, pair) in run {
-                if run.iter().any(|(_, other, _)| crosses(diagonal, other)) {
+            for (_, diagonal, points, pair) in run {
+                let lies_on = |(_, other, others, _): &(_, [u32; 2], [u32; 4], _)| {
+                    // What is between them, if all points are the same, may also be the gap that a missing cell left.
+                    diagonal.iter().all(|v| !other.contains(v)) && (points != others || self.is_thin(*points))
+                };
+                if run.iter().any(lies_on) {
                     pair.iter().for_each(|&face| open[face as usize] = true);
                 }
             }
         }
+    }
+
+    /// Whether four points lie in a plane, nearly.
+    fn is_thin(&self, points: [u32; 4]) -> bool {
+        /// Six times the volume, of a tetrahedron whose longest side along an axis is 1.
+        const THIN: f64 = 1e-3;
+        let [a, b, c, d] = points.map(|v| DVec3::from_array(self.positions[v as usize]));
+        let sides = [b - a, c - a, d - a];
+        let scale = sides.iter().fold(0.0_f64, |most, side| most.max(side.abs().max_element()));
+        let [u, v, w] = sides.map(|side| side / scale);
+        u.cross(v).dot(w).abs() < THIN
     }
 }

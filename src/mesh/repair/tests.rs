@@ -251,6 +251,17 @@ fn a_tetrahedron_alone_and_a_hole_between_cells_of_one_side_have_no_seam() {
 }
 
 #[test]
+fn a_flat_gap_between_shared_points_is_a_seam_and_the_gap_of_a_missing_cell_is_not() {
+    // Both pyramids have the points of the square, but not its diagonal.
+    let tets = [BELOW, ABOVE].concat();
+    assert_eq!(found(&mesh(&SQUARE, &tets)).open_seam_faces, 4);
+    let mut points = SQUARE;
+    points[2][2] = 0.3;
+    let found = found(&mesh(&points, &tets));
+    assert_eq!((found.open_seam_faces, found.components), (0, 2));
+}
+
+#[test]
 fn points_within_the_weld_distance_become_one() {
     let (points, tets) = two_pyramids(ABOVE_ALIKE, 0.01);
     assert!(welded(&points, &tets, 0.0).unwrap().1.is_empty());
