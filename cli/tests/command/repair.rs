@@ -23,7 +23,7 @@ fn each_level_says_what_it_did_and_what_is_left() {
     let folder = Folder::new("repair");
     let [input, mt] = ["a.vtu", "a.mt"].map(|name| folder.path(name));
     write_blocks(&input, 0.0, |_| {});
-    let build = |more: &[&str]| json(&[&["build", &input, "-o", &mt, "--json", "--quiet"], more].concat());
+    let build = |more: &[&str]| json(&[&["build", &input, "-o", &mt, "--json"], more].concat());
     let bytes = || std::fs::read(&mt).expect("a file");
 
     let safe = build(&[]);
@@ -55,7 +55,7 @@ fn points_are_welded_within_a_distance() {
     let folder = Folder::new("weld-distance");
     let [input, mt] = ["a.vtu", "a.mt"].map(|name| folder.path(name));
     write_blocks(&input, 0.25, |_| {});
-    let build = ["build", &input, "-o", &mt, "--json", "--quiet", "--repair", "weld"];
+    let build = ["build", &input, "-o", &mt, "--json", "--repair", "weld"];
     assert_eq!(json(&build)["repair"]["welded_points"], 0);
     let welded = json(&[&build[..], &["--weld-distance", "0.25"]].concat());
     let repair = &welded["repair"];
@@ -72,12 +72,12 @@ fn meshes_and_options_are_refused_with_the_reason() {
     let [input, mt] = ["a.vtu", "a.mt"].map(|name| folder.path(name));
     write_blocks(&input, 0.0, |mesh| mesh.tets[3].swap(0, 1));
     let build = ["build", &input, "-o", &mt];
-    let safe = good(&[&build[..], &["--json", "--quiet"]].concat());
+    let safe = good(&[&build[..], &["--json"]].concat());
     assert!(safe.contains("turned 1 inverted tetrahedron"));
     let none = [&build[..], &["--repair", "none"]].concat();
     bad(1, &none, &["a.vtu", "level \"safe\" repairs it: turned 1 inverted tetrahedron"]);
     bad(2, &[&build[..], &["--weld-distance", "0.1"]].concat(), &["--weld-distance goes with --repair weld"]);
-    bad(2, &[&build[..], &["--repair", "weld", "--weld-distance", "-1"]].concat(), &["--weld-distance"]);
+    bad(2, &[&build[..], &["--repair", "weld", "--weld-distance=-1"]].concat(), &["--weld-distance"]);
     bad(2, &[&build[..], &["--repair", "all"]].concat(), &["none, safe, weld"]);
     bad(2, &[&build[..], &["--meta", "repair=by hand"]].concat(), &["'repair'"]);
 }
