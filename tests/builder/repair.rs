@@ -79,9 +79,8 @@ fn blocks(shift: f64) -> impl Strategy<Value = (TetMesh, usize)> {
             }));
         }
         let count = points.len();
-        let number = |v: u32| (v as usize * 7 + (order % 1000) as usize) % count;
-        // Seven and the count have no common divisor, or the numbers stay as they are.
-        let number = |v: u32| if count % 7 == 0 { v as usize } else { number(v) };
+        // Another number for each: the prime is larger than the count.
+        let number = |v: u32| (v as usize * 1009 + (order % 1000) as usize) % count;
         let mut positions = vec![[0.0; 3]; count];
         for (v, (_, of_whole)) in (0..).zip(&points) {
             let at = whole.positions[*of_whole as usize];
