@@ -13,10 +13,10 @@
  * ```
  */
 
-import type { CoreBuildOptions, CoreBuildReport, InputField, InputInfo } from "./tetralod_build.js";
+import type { CoreBuildOptions, CoreBuildReport, InputField, InputInfo, RepairReport } from "./tetralod_build.js";
 
 export { TetralodError, type ErrorCode } from "./index.js";
-export type { InputField, InputInfo };
+export type { InputField, InputInfo, RepairReport };
 
 /** The content of a file. Bytes in memory are copied, not taken away. */
 export type FileSource = Blob | ArrayBuffer | ArrayBufferView | URL | string;

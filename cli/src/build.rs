@@ -4,6 +4,7 @@ use super::files;
 use super::input;
 use super::output::{self, Verbosity, bytes, count};
 use super::parse;
+use super::repair::{Repair, RepairOptions};
 use anyhow::{Context, Result, anyhow};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -16,7 +17,7 @@ use tetralod::builder::{
 };
 use tetralod::format::{EncodeOptions, encode_to};
 use tetralod::io::{CellData, FieldSelection};
-use tetralod::mesh::{Field, RepairReport, TetMesh};
+use tetralod::mesh::{Field, RepairLevel, RepairReport, TetMesh};
 use tetralod::mt::MtKind;
 
 /// Turns a tetrahedral mesh or a regular grid into an MT file.
@@ -63,6 +64,8 @@ pub struct Arguments {
     /// Turn fields at cells into fields at points: the mean of the cells around, weighted by volume.
     #[arg(long)]
     cell_to_point: bool,
+    #[command(flatten)]
+    repair: RepairOptions,
     /// The unit of a field or vector (repeatable).
     #[arg(long = "unit", value_name = "NAME=UNIT", value_parser = last_pair)]
     units: Vec<(String, String)>,
@@ -171,8 +174,9 @@ fn last_pair(text: &str) -> Result<(String, String)> {
 fn first_pair(text: &str) -> Result<(String, String)> {
     let (key, value) = text.split_once('=').context("it must be KEY=VALUE")?;
     let [method, criterion] = Construction::METADATA_KEYS;
-    if key.is_empty() || [method, criterion].contains(&key) {
-        anyhow::bail!("a key must not be empty, '{method}' or '{criterion}'");
+    let repair = RepairLevel::METADATA_KEY;
+    if key.is_empty() || [method, criterion, repair].contains(&key) {
+        anyhow::bail!("a key must not be empty, '{method}', '{criterion}' or '{repair}'");
     }
     Ok((key.to_owned(), value.to_owned()))
 }
@@ -190,7 +194,7 @@ fn purpose(text: &str) -> Result<Purpose> {
 }
 
 /// What has this name.
-fn named<T: Copy>(text: &str, all: &[(&str, T)]) -> Result<T> {
+pub fn named<T: Copy>(text: &str, all: &[(&str, T)]) -> Result<T> {
     let found = all.iter().find(|(name, _)| *name == text).map(|&(_, value)| value);
     let names: Vec<&str> = all.iter().map(|(name, _)| *name).collect();
     found.with_context(|| format!("it must be one of: {}", names.join(", ")))
@@ -213,7 +217,10 @@ struct Report {
     file_bytes: u64,
     bytes_per_vertex: f64,
     seconds: f64,
+    /// What was done in words; the same and more is in `repair`.
     repaired: String,
+    /// Of points without cells nothing is repaired.
+    repair: Option<Repair>,
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
@@ -225,15 +232,19 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     files::check_ending(&arguments.output, "mt")?;
     files::check_output(&arguments.output, &arguments.inputs)?;
-    let (mesh, repaired) = read(arguments, &config)?;
+    let level = arguments.repair.level();
+    let (mesh, repaired) = read(arguments, &config, level)?;
+    let repair = Repair::of(&mesh, level, &repaired)?;
     let repaired = repaired.to_string();
-    if !repaired.is_empty() && !arguments.verbosity.quiet {
-        eprintln!("{}: {repaired}", arguments.inputs[0].display());
+    for line in [Some(&repaired), repair.as_ref().map(|repair| &repair.kept)].into_iter().flatten() {
+        if !line.is_empty() && !arguments.verbosity.quiet {
+            eprintln!("{}: {line}", arguments.inputs[0].display());
+        }
     }
     expect_memory(arguments, &config, &mesh)?;
     let BuildResult { mt, summary, exact, .. } = build(arguments, &config, mesh)?;
-    let metadata =
-        config.construction.metadata().into_iter().chain(arguments.metadata.iter().cloned()).collect();
+    let built = config.construction.metadata().into_iter().chain(level.metadata());
+    let metadata = built.chain(arguments.metadata.iter().cloned()).collect();
     let options = EncodeOptions {
         block_bits: config.block_bits,
         check_margins: true,
@@ -242,16 +253,18 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         metadata,
     };
     let file_bytes = files::write_file(&arguments.output, |out| Ok(encode_to(&mt, &options, out)?))?;
-    let report = report(&config, &summary, file_bytes, start.elapsed().as_secs_f64(), repaired);
+    let seconds = start.elapsed().as_secs_f64();
+    let report = Report { repair, ..report(&config, &summary, file_bytes, seconds, repaired) };
     arguments.verbosity.print(&report, &rows(arguments, &report))
 }
 
 /// Reads what is wanted of the input.
-fn read(arguments: &Arguments, config: &BuildConfig) -> Result<(TetMesh, RepairReport)> {
+fn read(arguments: &Arguments, config: &BuildConfig, level: RepairLevel) -> Result<(TetMesh, RepairReport)> {
     let cells = if arguments.cell_to_point { CellData::Values } else { CellData::Names };
     let wanted = FieldSelection { names: &config.fields, all: config.all_fields, cells };
     input::expect_format(&arguments.inputs, arguments.format.as_deref());
-    let (mut mesh, repaired) = input::read_as(&arguments.inputs, &wanted, arguments.format.as_deref())?;
+    let format = arguments.format.as_deref();
+    let (mut mesh, repaired) = input::read_as(&arguments.inputs, &wanted, level, format)?;
     if config.construction.method().keeps_the_mesh() {
         input::expect_cells(&mesh, &arguments.inputs[0])?;
     }
@@ -404,6 +417,7 @@ fn report(
         bytes_per_vertex: file_bytes as f64 / f64::from(summary.vertices.max(1)),
         seconds,
         repaired,
+        repair: None,
     }
 }
 

@@ -9,6 +9,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tetralod::builder::{Construction, Method};
 use tetralod::client::{Client, ClientOptions};
+use tetralod::mesh::RepairLevel;
 use tetralod::mt::{Mt, MtInfo};
 use tetralod::session::Session;
 use tetralod::stream::{Arrived, FileSource, HttpOptions, HttpSource, RangeSource, StreamError, WantedRange};
@@ -171,6 +172,11 @@ impl Opened {
             metadata.find(|(key, _)| *key == Construction::METADATA_KEYS[0]).map(|(_, value)| value.as_str());
         let found = Method::ALL.into_iter().find(|m| Some(m.name()) == method);
         if found.is_none_or(Method::keeps_the_mesh) { Reference::Mesh } else { Reference::Points }
+    }
+
+    /// How the input was mended, by what the builder wrote into the file.
+    pub fn repair_level(&self) -> RepairLevel {
+        RepairLevel::from_metadata(self.session.metadata())
     }
 }
 

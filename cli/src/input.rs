@@ -6,15 +6,19 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use tetralod::io;
 use tetralod::io::{CellData, FieldSelection};
-use tetralod::mesh::{RepairReport, TetMesh, repair};
+use tetralod::mesh::{RepairLevel, RepairReport, TetMesh, repair_at};
 use tetralod::verify::Reference;
 
-/// Reads the time steps in `paths`, each a mesh or a list of such, as one mesh, and mends what can be mended. Points
+/// Reads the time steps in `paths`, each a mesh or a list of such, as one mesh, and mends it at this level. Points
 /// without any cell are as they are.
 ///
 /// The first step is kept with all that is wanted, of later ones nothing but their fields.
-pub fn read(paths: &[PathBuf], wanted: &FieldSelection<'_>) -> Result<(TetMesh, RepairReport)> {
-    read_as(paths, wanted, None)
+pub fn read(
+    paths: &[PathBuf],
+    wanted: &FieldSelection<'_>,
+    level: RepairLevel,
+) -> Result<(TetMesh, RepairReport)> {
+    read_as(paths, wanted, level, None)
 }
 
 /// What a path stands for the standard input.
@@ -33,6 +37,7 @@ pub fn expect_format(paths: &[PathBuf], format: Option<&str>) {
 pub fn read_as(
     paths: &[PathBuf],
     wanted: &FieldSelection<'_>,
+    level: RepairLevel,
     format: Option<&str>,
 ) -> Result<(TetMesh, RepairReport)> {
     let mut steps = Vec::new();
@@ -54,7 +59,7 @@ pub fn read_as(
         path => io::read_with(path, options),
     })?;
     drop(input);
-    let (mut mesh, report) = mend(mesh, &steps[0].path)?;
+    let (mut mesh, report) = mend(mesh, level, &steps[0].path)?;
     if wanted.cells == CellData::Values {
         mesh.cells_to_points();
     }
@@ -73,11 +78,11 @@ fn check_format(bytes: &[u8], format: Option<&str>) -> Result<()> {
     }
 }
 
-fn mend(mesh: TetMesh, path: &Path) -> Result<(TetMesh, RepairReport)> {
+fn mend(mesh: TetMesh, level: RepairLevel, path: &Path) -> Result<(TetMesh, RepairReport)> {
     if mesh.tets.is_empty() {
         return Ok((mesh, RepairReport::default()));
     }
-    repair(mesh).with_context(|| path.display().to_string())
+    repair_at(mesh, level).with_context(|| path.display().to_string())
 }
 
 /// Refuses a mesh that has points but no cells, for those that need cells.
@@ -98,15 +103,16 @@ pub fn expect_cells(mesh: &TetMesh, path: &Path) -> Result<()> {
 /// Reads a mesh and mends what can be mended.
 pub fn read_mesh(path: &Path) -> Result<(TetMesh, RepairReport)> {
     let wanted = FieldSelection { names: &[], all: true, cells: CellData::LeaveOut };
-    let (mesh, report) = read(&[path.to_owned()], &wanted)?;
+    let (mesh, report) = read(&[path.to_owned()], &wanted, RepairLevel::Safe)?;
     expect_cells(&mesh, path)?;
     Ok((mesh, report))
 }
 
-/// Reads what the MT was built from: time steps of a mesh or, where no more is needed, of points.
+/// Reads what the MT was built from: time steps of a mesh, mended as it was then, or, where no more is needed, of points.
 pub fn read_reference(paths: &[PathBuf], opened: &Opened) -> Result<TetMesh> {
     let names: Vec<String> = opened.info()?.fields.iter().map(|field| field.name.clone()).collect();
-    let (mesh, _) = read(paths, &FieldSelection { names: &names, all: false, cells: CellData::Values })?;
+    let wanted = FieldSelection { names: &names, all: false, cells: CellData::Values };
+    let (mesh, _) = read(paths, &wanted, opened.repair_level())?;
     if let (Reference::Mesh, Some(path)) = (opened.reference(), paths.first()) {
         expect_cells(&mesh, path)?;
     }

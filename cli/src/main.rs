@@ -21,6 +21,7 @@ mod probe;
 mod query;
 #[cfg(feature = "render")]
 mod render;
+mod repair;
 mod serve;
 mod slice;
 mod stats;

@@ -56,7 +56,7 @@ pub(crate) fn face_of(tet: [u32; 4], i: usize) -> [u32; 3] {
 }
 
 /// Whether sorting three different numbers takes an odd number of swaps.
-fn is_odd([a, b, c]: [u32; 3]) -> bool {
+pub(crate) fn is_odd([a, b, c]: [u32; 3]) -> bool {
     (a > b) ^ (a > c) ^ (b > c)
 }
 
@@ -208,15 +208,24 @@ pub fn topology(points: usize, tets: &[[u32; 4]]) -> Result<Topology, MeshError>
     check_indices(points, tets)?;
     let neighbors = neighbors(tets)?;
     let boundary_faces = neighbors.iter().flatten().filter(|&&n| n == NONE).count();
+    let non_manifold = non_manifold(points, tets, &neighbors, |_| true);
+    Ok(Topology { components: components(&neighbors), boundary_faces, non_manifold, neighbors })
+}
+
+/// For each vertex whether the mesh is not a 3-manifold there, as [`Topology`] has it, of those that are `wanted`.
+pub(crate) fn non_manifold(
+    points: usize,
+    tets: &[[u32; 4]],
+    neighbors: &[[u32; 4]],
+    wanted: impl Fn(usize) -> bool,
+) -> Vec<bool> {
     let stars = stars(points, tets);
     let mut scratch = LinkScratch::default();
-    let non_manifold = (0..points)
-        .map(|v| {
-            let star = stars.of(v);
-            !star.is_empty() && !scratch.link_is_sphere_or_disc(v as u32, star, tets, &neighbors)
-        })
-        .collect();
-    Ok(Topology { components: components(&neighbors), boundary_faces, non_manifold, neighbors })
+    let mut is_marked = |v: usize| {
+        let star = stars.of(v);
+        wanted(v) && !star.is_empty() && !scratch.link_is_sphere_or_disc(v as u32, star, tets, neighbors)
+    };
+    (0..points).map(&mut is_marked).collect()
 }
 
 /// The tetrahedra around each of so many vertices, in increasing order.
@@ -284,19 +293,21 @@ impl LinkScratch {
 
 /// Disjoint groups of small numbers.
 #[derive(Default)]
-struct DisjointSets {
+pub(crate) struct DisjointSets {
     parents: Vec<u32>,
     count: usize,
 }
 
 impl DisjointSets {
-    fn reset(&mut self, len: usize) {
+    /// So many groups of one number each.
+    pub fn reset(&mut self, len: usize) {
         self.parents.clear();
         self.parents.extend(0..len as u32);
         self.count = len;
     }
 
-    fn root(&mut self, mut i: usize) -> usize {
+    /// The smallest number of the group of `i`.
+    pub fn root(&mut self, mut i: usize) -> usize {
         while self.parents[i] as usize != i {
             self.parents[i] = self.parents[self.parents[i] as usize];
             i = self.parents[i] as usize;
@@ -304,7 +315,8 @@ impl DisjointSets {
         i
     }
 
-    fn join(&mut self, a: usize, b: usize) {
+    /// Makes one group of those of `a` and `b`.
+    pub fn join(&mut self, a: usize, b: usize) {
         let (a, b) = (self.root(a), self.root(b));
         if a != b {
             self.parents[a.max(b)] = a.min(b) as u32;
@@ -313,7 +325,8 @@ impl DisjointSets {
     }
 }
 
-fn components(neighbors: &[[u32; 4]]) -> usize {
+/// Parts that hang together by faces.
+pub(crate) fn components(neighbors: &[[u32; 4]]) -> usize {
     let mut groups = DisjointSets::default();
     groups.reset(neighbors.len());
     for (t, sides) in neighbors.iter().enumerate() {

@@ -100,6 +100,26 @@ pub enum MeshError {
         /// How many of its faces are shared with other cells.
         shared: u32,
     },
+    /// The mesh is to be used as it is, but needs repair.
+    #[error(
+        "repair level \"none\" leaves the mesh as it is, which is not valid; level \"safe\" repairs it: {repairs}"
+    )]
+    NeedsRepair {
+        /// What has to be done.
+        repairs: String,
+    },
+    /// The weld distance is not a number, infinite or negative.
+    #[error("the weld distance must be a finite number that is not negative")]
+    WeldDistance,
+    /// Points of a cell would become one, or the cell would be flattened or turned inside out.
+    #[error(
+        "welding at this distance would flatten cell {tet}, turn it inside out or make two of its points one; give a \
+         smaller distance"
+    )]
+    WeldTooFar {
+        /// The cell.
+        tet: u32,
+    },
 }
 
 /// The first few of `tets`, as text.

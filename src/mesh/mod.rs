@@ -31,7 +31,7 @@ pub(crate) use grow::{Gate, Growth};
 pub use histogram::Histogram;
 pub(crate) use histogram::{Sum, volume_of};
 pub use kuhn::kuhn_tets;
-pub use repair::{RepairReport, repair};
+pub use repair::{MeshFindings, RepairLevel, RepairReport, findings, repair, repair_at};
 pub use series::StepError;
 pub use tet_mesh::{Field, Grid, TetMesh, VectorPart};
 

@@ -44,6 +44,13 @@ export interface CoreBuildOptions {
   allFields?: boolean;
   /** Whether fields at cells become fields at points: the mean of the cells around, weighted by volume. */
   cellToPoint?: boolean;
+  /**
+   * What is repaired: nothing (a mesh that needs it is refused), what has only one sensible repair, or also points that lie on each other,
+   * where that closes open seams or joins blocks that touch. Default: `"safe"`.
+   */
+  repair?: "none" | "safe" | "weld";
+  /** How far apart points may be that `"weld"` makes one, in model units; less than the shortest edge. Default: 0. */
+  weldDistance?: number;
   /** The units of fields or vectors, by name. */
   units?: Readonly<Record<string, string>>;
   /** Entries of the file's metadata. */
@@ -66,6 +73,43 @@ export interface CoreBuildOptions {
   blockUpdates?: number;
 }
 
+/** What was done to a mesh before it was built, and what of it is kept though it is unusual: counts. */
+export interface RepairReport {
+  level: "none" | "safe" | "weld";
+  weldDistance: number;
+  /** Points at one place that an edge joined. */
+  mergedPoints: number;
+  /** Points replaced by another one so that open seams closed. */
+  weldedPoints: number;
+  /** Those of both which had another field value than the point that stayed. */
+  differingValues: number;
+  /** Dropped, because two of their points are one. */
+  collapsedTetrahedra: number;
+  /** Dropped, because an earlier one has the same points. */
+  duplicateTetrahedra: number;
+  /** Turned, because they were inside out. */
+  turnedTetrahedra: number;
+  /** Dropped from the boundary, because they have no volume. */
+  flatTetrahedra: number;
+  /** Dropped, because no tetrahedron uses them. */
+  unusedPoints: number;
+  /** What follows in words; empty for a mesh of one part whose boundary is a surface without open seams. */
+  kept: string;
+  /** Parts that hang together by faces. */
+  components: number;
+  /** Edges with more than two faces of the boundary, which touches itself there. */
+  nonManifoldEdges: number;
+  /** Points at which the boundary touches itself, the ends of such edges among them. */
+  nonManifoldVertices: number;
+  /**
+   * Faces of the boundary that lie on others: with the same three corners, or two with the same four corners as two others, which meet
+   * in the other diagonal.
+   */
+  openSeamFaces: number;
+  /** Those of the first kind, which `repair: "weld"` closes. */
+  weldableFaces: number;
+}
+
 /** What was built. */
 export interface CoreBuildReport {
   kind: "half-edge" | "edge" | "vertex" | "explicit";
@@ -82,4 +126,6 @@ export interface CoreBuildReport {
   positionBits: number;
   /** What was mended in the mesh, in words; empty if nothing was. */
   repaired: string;
+  /** The same in numbers, and what was found and kept. `undefined` for points without cells. */
+  repair: RepairReport | undefined;
 }

@@ -11,7 +11,7 @@ use crate::io::{
     self, CellData, FieldSelection, ReadError, ReadOptions, ReadReason, Survey, TimeStepsError,
     read_time_steps,
 };
-use crate::mesh::{self, Field, GeometryField, MeshError, TetMesh};
+use crate::mesh::{self, Field, GeometryField, MeshError, MeshFindings, RepairLevel, RepairReport, TetMesh};
 use js_sys::{Function, Object, Reflect, Uint8Array};
 use serde::Serialize;
 use std::cell::RefCell;
@@ -210,16 +210,18 @@ impl MeshBuilder {
         options: BuildOptions,
         mut stages: Stages<'_>,
     ) -> Result<JsBuilt, WebError> {
-        let BuildOptions { config, cells, units, metadata } = options;
+        let BuildOptions { config, cells, repair: level, units, metadata } = options;
         let name = self.files.first().map(|file| file.name.clone()).unwrap_or_default();
         let mesh = self.read(fields, &config, cells, &mut stages)?;
         stages.begin("repair")?;
         let (mut mesh, repaired) = if mesh.tets.is_empty() {
             expect_points(&mesh, &config, &name)?;
-            (mesh, String::new())
+            (mesh, None)
         } else {
-            let (mesh, report) = mesh::repair(mesh).map_err(|error| bad_mesh(&name, &error))?;
-            (mesh, report.to_string())
+            let bad_mesh = |error| bad_mesh(&name, &error);
+            let (mesh, done) = mesh::repair_at(mesh, level).map_err(bad_mesh)?;
+            let found = mesh::findings(&mesh, level.weld_distance()).map_err(bad_mesh)?;
+            (mesh, Some((done, RepairObject::of(level, &done, &found))))
         };
         if cells {
             mesh.cells_to_points();
@@ -229,7 +231,8 @@ impl MeshBuilder {
         let built = builder::build_owned(mesh, &config, &mut |step| stages.step(&step));
         let built = built.map_err(|error| in_input(&name, error))?;
         stages.begin("encode")?;
-        let metadata = config.construction.metadata().into_iter().chain(metadata).collect();
+        let built_by = config.construction.metadata().into_iter().chain(level.metadata());
+        let metadata = built_by.chain(metadata).collect();
         let encoding = EncodeOptions {
             block_bits: config.block_bits,
             check_margins: true,
@@ -238,7 +241,9 @@ impl MeshBuilder {
             metadata,
         };
         let bytes = encode(&built.mt, &encoding)?;
-        Ok(result(&bytes, &config, &built.summary, &repaired))
+        let (repaired, repair) =
+            repaired.map_or_else(Default::default, |(done, repair)| (done.to_string(), Some(repair)));
+        Ok(result(&bytes, &config, &built.summary, &repaired, repair))
     }
 
     /// The mesh as the files have it. Each file is dropped when it was read.
@@ -401,9 +406,60 @@ struct ReportObject<'a> {
     depth: u32,
     position_bits: u32,
     repaired: &'a str,
+    repair: Option<RepairObject>,
 }
 
-fn result(bytes: &[u8], config: &BuildConfig, summary: &BuildSummary, repaired: &str) -> JsBuilt {
+#[derive(Serialize)]
+#[serde(rename_all = "camelCase")]
+struct RepairObject {
+    level: &'static str,
+    weld_distance: f64,
+    merged_points: usize,
+    welded_points: usize,
+    differing_values: usize,
+    collapsed_tetrahedra: usize,
+    duplicate_tetrahedra: usize,
+    turned_tetrahedra: usize,
+    flat_tetrahedra: usize,
+    unused_points: usize,
+    kept: String,
+    components: usize,
+    non_manifold_edges: usize,
+    non_manifold_vertices: usize,
+    open_seam_faces: usize,
+    weldable_faces: usize,
+}
+
+impl RepairObject {
+    fn of(level: RepairLevel, done: &RepairReport, found: &MeshFindings) -> Self {
+        Self {
+            level: level.name(),
+            weld_distance: level.weld_distance(),
+            merged_points: done.merged_points,
+            welded_points: done.welded_points,
+            differing_values: done.differing_values,
+            collapsed_tetrahedra: done.collapsed_tets,
+            duplicate_tetrahedra: done.duplicate_tets,
+            turned_tetrahedra: done.turned_tets,
+            flat_tetrahedra: done.flat_tets,
+            unused_points: done.unused_points,
+            kept: found.to_string(),
+            components: found.components,
+            non_manifold_edges: found.non_manifold_edges,
+            non_manifold_vertices: found.non_manifold_vertices,
+            open_seam_faces: found.open_seam_faces,
+            weldable_faces: found.weldable_faces,
+        }
+    }
+}
+
+fn result(
+    bytes: &[u8],
+    config: &BuildConfig,
+    summary: &BuildSummary,
+    repaired: &str,
+    repair: Option<RepairObject>,
+) -> JsBuilt {
     let construction = config.construction;
     let report = object(&ReportObject {
         kind: construction.kind().name(),
@@ -417,6 +473,7 @@ fn result(bytes: &[u8], config: &BuildConfig, summary: &BuildSummary, repaired: 
         depth: summary.depth,
         position_bits: summary.position_bits,
         repaired,
+        repair,
     });
     let built = Object::new();
     for (name, value) in [("bytes", Uint8Array::from(bytes).into()), ("report", report)] {

@@ -2,12 +2,13 @@
 
 use super::error::WebError;
 use crate::builder::{BuildConfig, BuildCriterion, ConstructionChoice, FieldPrecision, Method, Purpose};
+use crate::mesh::RepairLevel;
 use crate::mt::MtKind;
 use js_sys::{Array, Object, Reflect};
 use wasm_bindgen::{JsCast, JsValue};
 
 /// The names of all options.
-const NAMES: [&str; 18] = [
+const NAMES: [&str; 20] = [
     "kind",
     "method",
     "criterion",
@@ -16,6 +17,8 @@ const NAMES: [&str; 18] = [
     "fields",
     "allFields",
     "cellToPoint",
+    "repair",
+    "weldDistance",
     "units",
     "metadata",
     "positionBits",
@@ -33,6 +36,8 @@ pub struct BuildOptions {
     pub config: BuildConfig,
     /// Whether fields at cells become fields at points.
     pub cells: bool,
+    /// What is mended in the mesh.
+    pub repair: RepairLevel,
     /// Units of fields or vectors.
     pub units: Vec<(String, String)>,
     /// Entries of the file's metadata.
@@ -81,11 +86,19 @@ pub fn build_options(options: &JsValue) -> Result<BuildOptions, WebError> {
     if let Some((key, _)) = metadata.iter().find(|(key, _)| is_reserved(key)) {
         return Err(WebError::bad_option("metadata", &format!("the key \"{key}\" is empty or reserved")));
     }
-    Ok(BuildOptions { config, cells: from.answer("cellToPoint")?, units: from.pairs("units")?, metadata })
+    Ok(BuildOptions {
+        config,
+        cells: from.answer("cellToPoint")?,
+        repair: from.repair()?,
+        units: from.pairs("units")?,
+        metadata,
+    })
 }
 
 fn is_reserved(key: &str) -> bool {
-    key.is_empty() || crate::builder::Construction::METADATA_KEYS.contains(&key)
+    key.is_empty()
+        || key == RepairLevel::METADATA_KEY
+        || crate::builder::Construction::METADATA_KEYS.contains(&key)
 }
 
 fn check_names(options: &JsValue) -> Result<(), WebError> {
@@ -205,6 +218,16 @@ impl Options<'_> {
             WebError::bad_option(name, "must be a percentage as \"20%\", or a number that is not negative")
         };
         found.filter(|x| x.is_finite()).map(Some).ok_or_else(refused)
+    }
+
+    fn repair(&self) -> Result<RepairLevel, WebError> {
+        let level = self.name("repair", &RepairLevel::ALL.map(|level| (level.name(), level)))?;
+        let distance = self.number("weldDistance", 0.0, f64::MAX, "a number that is not negative")?;
+        match (level.unwrap_or_default(), distance) {
+            (level, None) => Ok(level),
+            (RepairLevel::Weld { .. }, Some(distance)) => Ok(RepairLevel::Weld { distance }),
+            _ => Err(WebError::bad_option("weldDistance", "goes with `repair: \"weld\"`")),
+        }
     }
 
     fn block_bits(&self) -> Result<Option<u32>, WebError> {

@@ -2,7 +2,9 @@
 
 use crate::support::strategies::config;
 use proptest::prelude::*;
-use tetralod::mesh::{Field, Grid, TetMesh, check, repair, topology};
+use tetralod::mesh::{
+    Field, Grid, MeshError, MeshFindings, RepairLevel, TetMesh, check, findings, repair, repair_at, topology,
+};
 
 /// Six times the volume; exact for the small integer coordinates used here.
 fn six_volume(mesh: &TetMesh, tet: [u32; 4]) -> f64 {
@@ -57,8 +59,93 @@ fn dirty_grid() -> impl Strategy<Value = (TetMesh, usize, usize)> {
     )
 }
 
+/// Blocks of a grid, each with points of its own, which are off by at most `shift` in each coordinate; and how many
+/// points are too many. Cells come and points are numbered in any order.
+fn blocks(shift: f64) -> impl Strategy<Value = (TetMesh, usize)> {
+    let block_of_cube = prop::collection::vec(0..3_u32, 12);
+    let offsets = prop::collection::vec([-1.0..1.0, -1.0..1.0, -1.0..1.0], 180);
+    (block_of_cube, offsets, any::<u64>()).prop_map(move |(block_of_cube, offsets, order)| {
+        let grid = Grid { dims: [4, 3, 3], origin: [0.0; 3], spacing: [1.0; 3] };
+        let whole = TetMesh::from_grid(grid, Vec::new());
+        let mut points: Vec<(u32, u32)> = Vec::new();
+        let mut tets = Vec::new();
+        for (tet, block) in whole.tets.iter().zip(block_of_cube.iter().flat_map(|block| [block; 6])) {
+            tets.push(tet.map(|v| {
+                let point = (*block, v);
+                points.iter().position(|p| *p == point).unwrap_or_else(|| {
+                    points.push(point);
+                    points.len() - 1
+                }) as u32
+            }));
+        }
+        let count = points.len();
+        // Another number for each: the prime is larger than the count.
+        let number = |v: u32| (v as usize * 1009 + (order % 1000) as usize) % count;
+        let mut positions = vec![[0.0; 3]; count];
+        for (v, (_, of_whole)) in (0..).zip(&points) {
+            let at = whole.positions[*of_whole as usize];
+            positions[number(v)] = [0, 1, 2].map(|i| at[i] + shift * offsets[v as usize][i]);
+        }
+        tets.iter_mut().flatten().for_each(|v| *v = number(*v) as u32);
+        tets.rotate_left((order % 71) as usize);
+        let values = (0..count).map(|i| i as f64).collect();
+        let mesh = TetMesh { positions, tets, fields: vec![Field::new("f", values)], ..TetMesh::default() };
+        (mesh, count - whole.positions.len())
+    })
+}
+
+proptest! {
+    #![proptest_config(config(256, 47))]
+
+    #[test]
+    fn blocks_that_touch_are_welded_into_the_whole(exact in blocks(0.0), near in blocks(0.01)) {
+        for ((mesh, doubled), distance) in [(exact, 0.0), (near, 0.04)] {
+            let (mended, report) = repair_at(mesh.clone(), RepairLevel::Weld { distance }).unwrap();
+            prop_assert_eq!(check(&mended), Ok(()));
+            prop_assert_eq!((mended.positions.len(), report.welded_points), (36, doubled));
+            let one = MeshFindings { components: 1, ..MeshFindings::default() };
+            prop_assert_eq!(findings(&mended, distance), Ok(one));
+            prop_assert_eq!(topology(36, &mended.tets).unwrap().boundary_faces, 2 * 2 * (3 * 2 + 3 * 2 + 2 * 2));
+            let before = findings(&mesh, distance).unwrap();
+            prop_assert_eq!(before.open_seam_faces, before.weldable_faces);
+            // Points that stay are where they were, with their values.
+            for (p, value) in mended.positions.iter().zip(&mended.fields[0].values) {
+                prop_assert_eq!(mesh.positions[*value as usize], *p);
+            }
+        }
+    }
+}
+
 proptest! {
     #![proptest_config(config(20_000, 41))]
+
+    #[test]
+    fn what_is_welded_is_valid(mesh in soup(), distance in prop::sample::select(vec![0.0, 0.5, 1.0])) {
+        let level = RepairLevel::Weld { distance };
+        if let Ok((mended, report)) = repair_at(mesh.clone(), level) {
+            prop_assert_eq!(check(&mended), Ok(()));
+            prop_assert_eq!(report.is_empty(), mended == mesh, "{}", report);
+            if let Ok((safe, done)) = repair(mesh.clone()) && report.welded_points == 0 {
+                prop_assert_eq!((&safe, done), (&mended, report));
+            }
+            findings(&mended, distance).unwrap();
+        }
+    }
+
+    #[test]
+    fn without_repair_valid_meshes_alone_are_taken(mesh in soup()) {
+        match (repair_at(mesh.clone(), RepairLevel::None), repair(mesh.clone())) {
+            (Ok((kept, _)), Ok((mended, report))) => {
+                prop_assert!(report.is_empty());
+                prop_assert_eq!((&kept, &mended), (&mesh, &mesh));
+            }
+            (Err(MeshError::NeedsRepair { repairs }), Ok((_, report))) => {
+                prop_assert_eq!(format!("repaired: {repairs}"), report.to_string());
+            }
+            (Err(error), Err(same)) => prop_assert_eq!(error, same),
+            (result, _) => prop_assert!(false, "{:?}", result),
+        }
+    }
 
     #[test]
     fn what_is_accepted_is_valid_and_as_full_as_before(mesh in soup()) {

@@ -6,7 +6,7 @@ use crate::support::meshes::built;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use tetralod::builder::{BuildConfig, BuildCriterion, Construction, Method, build};
-use tetralod::mesh::{Grid, TetMesh, repair};
+use tetralod::mesh::{Grid, MeshFindings, RepairLevel, TetMesh, findings, repair, repair_at};
 use tetralod::mt::{ApplyUpdates, MtKind};
 use tetralod::verify::Reference;
 use tetralod::{io, verify};
@@ -129,5 +129,89 @@ fn meshes_with_something_wrong_or_unusual() {
 fn meshes_of_many_kinds() {
     for name in ["disk_out_ref", "cylinder_flow", "piezo_micro", "hand", "piece"] {
         file(&format!("{name}.vtu"), 1000);
+    }
+}
+
+/// What becomes of a broken mesh at the levels none, safe and weld: valid, or refused with this in the reason.
+type Fate = Result<(), &'static str>;
+
+const BROKEN: [(&str, [Fate; 3]); 9] = [
+    ("robust/angular_sector.vtu", [Ok(()); 3]),
+    ("robust/can_crushed.vtu", [Err("the mesh is folded there"); 3]),
+    ("robust/manifold_check0.vtu", [Ok(()); 3]),
+    ("robust/manifold_check1.vtu", [Ok(()); 3]),
+    ("robust/manifold_check2.vtu", [Err("is shared by 3 cells"); 3]),
+    ("robust/ossicles.vtu", [Ok(()); 3]),
+    ("robust/post_slit.vtu", [Ok(()); 3]),
+    ("robust/raptor_8418.vtu", [Err("level \"safe\" repairs it: dropped 3 unused points"), Ok(()), Ok(())]),
+    #[cfg(feature = "formats")]
+    (
+        "native/6_tetra_bad.msh",
+        [Err("level \"safe\" repairs it: turned 1 inverted tetrahedron"), Ok(()), Ok(())],
+    ),
+];
+
+#[test]
+fn broken_meshes_end_in_a_valid_mt_or_a_reason_at_each_level() {
+    let Some(data) = data() else { return };
+    for (name, fates) in BROKEN {
+        let mesh = io::read(&data.join(name)).expect("a file that can be read");
+        let mut last = None;
+        for (level, fate) in RepairLevel::ALL.into_iter().zip(fates) {
+            match (repair_at(mesh.clone(), level), fate) {
+                (Err(error), Err(reason)) => assert!(error.to_string().contains(reason), "{name}: {error}"),
+                (Ok((mut mended, _)), Ok(())) => {
+                    if mended.fields.is_empty() {
+                        mended.add_geometry_fields(&["distance".to_owned()]);
+                    }
+                    // The same mesh gives the same MT.
+                    if last.as_ref() != Some(&mended) {
+                        let config = BuildConfig::of(MtKind::HalfEdge);
+                        let mt =
+                            build(&mended, &config, &mut |_| ControlFlow::Continue(())).expect("an MT").mt;
+                        keeps_promises(&format!("{name}, {}", level.name()), &mt, &mended, Reference::Mesh);
+                    }
+                    last = Some(mended);
+                }
+                (result, _) => panic!("{name}, {}: {:?}", level.name(), result.map(|(_, report)| report)),
+            }
+        }
+    }
+    for name in ["native/Armadillo_Tetra_4406_for_test_broken.vtu", "native/liver_for_test_broken.vtk"] {
+        io::read(&data.join(name)).expect_err("no mesh");
+    }
+}
+
+#[test]
+fn what_is_found_in_broken_meshes_and_what_welding_closes() {
+    let Some(data) = data() else { return };
+    let one = MeshFindings { components: 1, ..MeshFindings::default() };
+    let touching = |components, non_manifold_edges, non_manifold_vertices| MeshFindings {
+        components,
+        non_manifold_edges,
+        non_manifold_vertices,
+        ..one
+    };
+    let open = |components, open_seam_faces, weldable_faces| MeshFindings {
+        components,
+        open_seam_faces,
+        weldable_faces,
+        ..one
+    };
+    for (name, before, welded, after) in [
+        ("angular_sector", open(7, 3456, 3456), 1014, one),
+        ("post_slit", open(1, 280, 0), 0, open(1, 280, 0)),
+        ("ossicles", touching(1, 18, 33), 0, touching(1, 18, 33)),
+        ("raptor_8418", touching(1, 9, 22), 0, touching(1, 9, 22)),
+        ("manifold_check0", touching(4, 0, 3), 0, touching(4, 0, 3)),
+        ("manifold_check1", touching(3, 2, 4), 0, touching(3, 2, 4)),
+    ] {
+        let mesh = io::read(&data.join(format!("robust/{name}.vtu"))).expect("a file that can be read");
+        let (mended, _) = repair(mesh.clone()).expect("a mesh that can be repaired");
+        assert_eq!(findings(&mended, 0.0), Ok(before), "{name}");
+        let level = RepairLevel::Weld { distance: 0.0 };
+        let (mended, report) = repair_at(mesh, level).expect("a mesh that can be welded");
+        assert_eq!(report.welded_points, welded, "{name}");
+        assert_eq!(findings(&mended, 0.0), Ok(after), "{name}");
     }
 }

@@ -77,6 +77,17 @@ test("what was built opens, and meshes of it are within their error", async () =
   mt.free();
 });
 
+test("what was repaired, and what was found and kept, is reported", async () => {
+  const repair = async (options) => (await build(await file("blocks.vtk"), options)).report.repair;
+  const open = await repair({});
+  assert.deepEqual([open.level, open.components, open.openSeamFaces, open.kept], ["safe", 2, 0, "kept: 2 parts that share no face"]);
+  const welded = await repair({ repair: "weld", weldDistance: 0.25 });
+  assert.deepEqual([welded.weldedPoints, welded.differingValues, welded.components, welded.kept], [4, 4, 1, ""]);
+  await rejects(repair({ repair: "weld", weldDistance: 1 }), "bad-mesh", /blocks\.vtk.*smaller distance/);
+  await rejects(repair({ weldDistance: 1 }), "bad-option", /`weldDistance`.*"weld"/);
+  await rejects(repair({ repair: "all" }), "bad-option", /`repair`.*"none", "safe", "weld"/);
+});
+
 test("files are inspected before they are built", async () => {
   const grid = await inspect(await file("small.vti"));
   assert.deepEqual([grid.format, grid.dims, grid.points, grid.tetrahedra], ["vti", [17, 17, 17], 17 ** 3, 6 * 16 ** 3]);

@@ -53,6 +53,12 @@ fn builds() -> Vec<(&'static [&'static str], &'static [&'static str], Value)> {
             &["--cell-to-point", "--field", "material"],
             json!({ "cellToPoint": true, "fields": ["material"] }),
         ),
+        (&["blocks.vtk"], &["--repair", "none"], json!({ "repair": "none" })),
+        (
+            &["blocks.vtk"],
+            &["--repair", "weld", "--weld-distance", "0.25"],
+            json!({ "repair": "weld", "weldDistance": 0.25 }),
+        ),
     ]
 }
 
@@ -101,7 +107,31 @@ fn make_inputs(folder: &Path) -> Result<()> {
     let material = words(&mut (0..cells.len()).map(|i| (i % 5).to_string()));
     writeln!(tets, "CELL_DATA {}\nSCALARS material int 1\nLOOKUP_TABLE default\n{material}", cells.len())?;
     writeln!(tets, "POINT_DATA {points}\nVECTORS v float\n{vectors}")?;
-    Ok(fs::write(folder.join("tets.vtk"), tets)?)
+    fs::write(folder.join("tets.vtk"), tets)?;
+    make_blocks(folder)
+}
+
+/// Two cubes that touch, each with points of its own, which are a quarter apart.
+fn make_blocks(folder: &Path) -> Result<()> {
+    let mut points = String::new();
+    for x in [0.0, 1.0, 1.25, 2.25] {
+        [[0, 0], [1, 0], [0, 1], [1, 1]].iter().try_for_each(|[y, z]| writeln!(points, "{x} {y} {z}"))?;
+    }
+    // Points are numbered along y, z and x; the second half of the ways is turned.
+    let ways = [[1, 3, 7], [2, 6, 7], [4, 5, 7], [1, 7, 5], [2, 7, 3], [4, 7, 6]];
+    let mut cells = String::new();
+    for first in [0, 8] {
+        ways.iter().try_for_each(|[b, c, d]| {
+            writeln!(cells, "4 {first} {} {} {}", first + b, first + c, first + d)
+        })?;
+    }
+    let types = ["10"; 12].join(" ");
+    let values = (0..16).map(|i| (i * i).to_string()).collect::<Vec<_>>().join(" ");
+    let blocks = format!(
+        "# vtk DataFile Version 3.0\nblocks\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 16 float\n{points}CELLS 12 60\n{cells}\
+         CELL_TYPES 12\n{types}\nPOINT_DATA 16\nSCALARS p float 1\nLOOKUP_TABLE default\n{values}\n"
+    );
+    Ok(fs::write(folder.join("blocks.vtk"), blocks)?)
 }
 
 /// Six tetrahedra around the diagonal of each cube of the grid.

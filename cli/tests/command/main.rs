@@ -9,6 +9,7 @@ mod readme;
 mod remote;
 #[cfg(feature = "render")]
 mod render;
+mod repair;
 mod serve;
 mod support;
 mod surfaces;

@@ -11,6 +11,7 @@ import {
   type InputField,
   type InputInfo,
   type MeshSource,
+  type RepairReport,
 } from "tetralod/build";
 
 /** For each option of `T` something that has it. */
@@ -42,6 +43,8 @@ const examples: Examples<BuildOptions> = {
   fields: { fields: ["p"] },
   allFields: { allFields: true },
   cellToPoint: { cellToPoint: false },
+  repair: { repair: "none" },
+  weldDistance: { repair: "weld", weldDistance: 0.25 },
   units: { units: { p: "Pa" } },
   metadata: { metadata: { about: "an example" } },
   positionBits: { positionBits: 12 },
@@ -71,6 +74,8 @@ export async function checkBuild(): Promise<number> {
     const mt = await MultiTessellation.open(bytes);
     if (mt.info.tetrahedra !== report.tetrahedra || report.tetrahedra < 100) throw new Error("it is not what was built");
     mt.free();
+    const repair: RepairReport | undefined = report.repair;
+    if (repair?.level !== (options.repair ?? "safe") || repair.components !== 1 || repair.kept !== "") throw new Error("this is not repaired");
   }
   if (fractions.get("encode") !== 1) throw new Error("the end is not told");
   const refused = await build({ raw: new Uint8Array(8), json: new Blob(["{}"]) }).catch((error: unknown) => error);

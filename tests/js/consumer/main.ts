@@ -74,7 +74,7 @@ const built = await checkBuild();
 const good =
   chunks > 0 &&
   examples === 46 &&
-  built === 24 &&
+  built === 26 &&
   positions.length === 3 * mesh.stats.vertices &&
   mesh.tets.length === 4 * mesh.stats.tetrahedra &&
   surface.indices.length % 3 === 0 &&

@@ -8,26 +8,40 @@
 //!    twice is dropped: its other two faces coincide, so its neighbours meet.
 //! 2. *Duplicates*: of several tetrahedra with the same four vertices the first stays.
 //! 3. *Inverted tetrahedra* are turned round.
-//! 4. The two tetrahedra of a shared face must then lie on opposite sides of it; a mesh that is folded is refused.
-//! 5. *Flat tetrahedra* are dropped at the boundary, where those faces that are boundary look to one side and
+//! 4. *Open seams*, at level [`RepairLevel::Weld`] alone: where two faces of which neither has a neighbour lie on each
+//!    other, seen from opposite sides, their points become one; the first stays where it is. Tetrahedra that lie on
+//!    each other become duplicates, of which the first stays. A mesh of which a tetrahedron would become flat or
+//!    inverted is refused.
+//! 5. The two tetrahedra of a shared face must then lie on opposite sides of it; a mesh that is folded is refused.
+//! 6. *Flat tetrahedra* are dropped at the boundary, where those faces that are boundary look to one side and
 //!    those that are shared to the other: the domain stays the same and the shared faces become its boundary.
 //!    Any other flat tetrahedron is refused.
-//! 6. *Unused points* are dropped.
+//! 7. *Unused points* are dropped.
 //!
-//! Whether a tetrahedron is flat or inverted is decided exactly.
+//! Whether a tetrahedron is flat or inverted is decided exactly. At level [`RepairLevel::None`] a mesh is refused to
+//! which any rule applies.
+
+mod findings;
+mod level;
+mod weld;
+
+pub use findings::{MeshFindings, findings};
+pub use level::RepairLevel;
 
 use std::fmt;
 
-use crate::mesh::adjacency::{FaceTable, HalfFace, crowded, match_faces};
+use crate::mesh::adjacency::{DisjointSets, FaceTable, HalfFace, crowded, match_faces};
 use crate::mesh::check::{Sides, check_arrays};
 use crate::mesh::{FACES, MeshError, NONE, TetMesh};
 
-/// What [`repair`] did; displays as one line, empty when there was nothing to do.
+/// What [`repair_at`] did; displays as one line, empty when there was nothing to do.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RepairReport {
     /// Points merged into a coincident one.
     pub merged_points: usize,
-    /// Merged points of which a field value differed from that of the point that stayed.
+    /// Points merged into another one so that an open seam closed.
+    pub welded_points: usize,
+    /// Merged and welded points of which a field value differed from that of the point that stayed.
     pub differing_values: usize,
     /// Tetrahedra dropped because two of their vertices are one.
     pub collapsed_tets: usize,
@@ -46,10 +60,9 @@ impl RepairReport {
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
     }
-}
 
-impl fmt::Display for RepairReport {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    /// What was done, in words.
+    fn actions(&self) -> String {
         let mut done = Vec::new();
         let mut say = |count: usize, before: &str, one: &str, many: &str| {
             if count > 0 {
@@ -57,32 +70,70 @@ impl fmt::Display for RepairReport {
             }
         };
         say(self.merged_points, "merged", "coincident point", "coincident points");
+        say(self.welded_points, "welded", "point of an open seam", "points of open seams");
         say(self.differing_values, "of which", "had another field value", "had other field values");
         say(self.collapsed_tets, "dropped", "collapsed tetrahedron", "collapsed tetrahedra");
         say(self.duplicate_tets, "dropped", "duplicate tetrahedron", "duplicate tetrahedra");
         say(self.turned_tets, "turned", "inverted tetrahedron", "inverted tetrahedra");
         say(self.flat_tets, "dropped", "flat boundary tetrahedron", "flat boundary tetrahedra");
         say(self.unused_points, "dropped", "unused point", "unused points");
-        if done.is_empty() { Ok(()) } else { write!(f, "repaired: {}", done.join(", ")) }
+        done.join(", ")
     }
 }
 
-/// Mends `mesh` by the rules of this module; the result passes [`crate::mesh::check`].
+impl fmt::Display for RepairReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.is_empty() { Ok(()) } else { write!(f, "repaired: {}", self.actions()) }
+    }
+}
+
+/// Mends `mesh` at the level [`RepairLevel::Safe`]; the result passes [`crate::mesh::check`].
 ///
 /// # Errors
 /// If something cannot be mended; cells and points are numbered as in `mesh`.
 pub fn repair(mesh: TetMesh) -> Result<(TetMesh, RepairReport), MeshError> {
+    repair_at(mesh, RepairLevel::Safe)
+}
+
+/// Mends `mesh` by the rules of this level; the result passes [`crate::mesh::check`]. [`findings`] says what is unusual
+/// about it.
+///
+/// ```
+/// use tetralod::mesh::{RepairLevel, TetMesh, findings, repair_at};
+///
+/// // Two tetrahedra on one face, of which each has its own points.
+/// let corners = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+/// let positions = [&corners[..], &[[0.0, 0.0, 1.0]], &corners, &[[0.0, 0.0, -1.0]]].concat();
+/// let mesh = TetMesh { positions, tets: vec![[0, 1, 2, 3], [4, 6, 5, 7]], ..TetMesh::default() };
+/// assert_eq!(findings(&mesh, 0.0)?.weldable_faces, 2);
+///
+/// let (mesh, report) = repair_at(mesh, RepairLevel::Weld { distance: 0.0 })?;
+/// assert_eq!(report.to_string(), "repaired: welded 3 points of open seams");
+/// assert_eq!(findings(&mesh, 0.0)?.components, 1);
+/// # Ok::<(), tetralod::mesh::MeshError>(())
+/// ```
+///
+/// # Errors
+/// If something cannot be mended, or may not be at this level; cells and points are numbered as in `mesh`.
+pub fn repair_at(mesh: TetMesh, level: RepairLevel) -> Result<(TetMesh, RepairReport), MeshError> {
     check_arrays(&mesh)?;
     let mut work = Work::new(mesh);
     work.merge_collapsed_edges();
     work.drop_collapsed();
     work.drop_duplicates()?;
-    let flat = work.turn_inverted();
+    let mut flat = work.turn_inverted();
+    if let RepairLevel::Weld { distance } = level {
+        work.weld(&flat, distance)?;
+        flat = work.turn_inverted();
+    }
     let faces = work.conforming_faces(&flat)?;
     work.drop_flat(flat, &faces)?;
     work.drop_unused_points();
     if work.mesh.tets.is_empty() {
         return Err(MeshError::Empty);
+    }
+    if level == RepairLevel::None && !work.report.is_empty() {
+        return Err(MeshError::NeedsRepair { repairs: work.report.actions() });
     }
     debug_assert_eq!(crate::mesh::check(&work.mesh), Ok(()), "repair must give a valid mesh");
     Ok((work.mesh, work.report))
@@ -133,30 +184,26 @@ impl Work {
                 }
             }
         }
+        self.report.merged_points = self.merge(&pairs);
+    }
+
+    /// Makes one point of each pair; returns how many points that replaced.
+    fn merge(&mut self, pairs: &[(u32, u32)]) -> usize {
         if pairs.is_empty() {
-            return;
+            return 0;
         }
-        let mut target: Vec<u32> = (0..positions.len() as u32).collect();
-        let root = |target: &[u32], mut v: u32| {
-            while target[v as usize] != v {
-                v = target[v as usize];
-            }
-            v
-        };
-        for (a, b) in pairs {
-            let (a, b) = (root(&target, a), root(&target, b));
-            target[a.max(b) as usize] = a.min(b);
+        let mut sets = DisjointSets::default();
+        sets.reset(self.mesh.positions.len());
+        pairs.iter().for_each(|&(a, b)| sets.join(a as usize, b as usize));
+        let target: Vec<usize> = (0..self.mesh.positions.len()).map(|v| sets.root(v)).collect();
+        let mut merged = 0;
+        for (v, &to) in target.iter().enumerate().filter(|&(v, &to)| v != to) {
+            merged += 1;
+            let differs = |f: &crate::mesh::Field| f.values[v] != f.values[to];
+            self.report.differing_values += usize::from(self.mesh.fields.iter().any(differs));
         }
-        // Targets are smaller than their sources, so one pass upwards resolves chains.
-        for v in 0..target.len() {
-            target[v] = target[target[v] as usize];
-            if target[v] as usize != v {
-                self.report.merged_points += 1;
-                let differs = |f: &crate::mesh::Field| f.values[v] != f.values[target[v] as usize];
-                self.report.differing_values += usize::from(self.mesh.fields.iter().any(differs));
-            }
-        }
-        self.mesh.tets.iter_mut().flatten().for_each(|v| *v = target[*v as usize]);
+        self.mesh.tets.iter_mut().flatten().for_each(|v| *v = target[*v as usize] as u32);
+        merged
     }
 
     /// Rule 1, the tetrahedra.
@@ -178,7 +225,7 @@ impl Work {
             }
             Ok::<(), MeshError>(())
         })?;
-        self.report.duplicate_tets = self.retain(|t, _| !repeats[t]);
+        self.report.duplicate_tets += self.retain(|t, _| !repeats[t]);
         Ok(())
     }
 
@@ -199,7 +246,24 @@ impl Work {
         flat
     }
 
-    /// Rule 4; returns the neighbours.
+    /// Rule 4.
+    fn weld(&mut self, flat: &[bool], distance: f64) -> Result<(), MeshError> {
+        if !(distance >= 0.0 && distance.is_finite()) {
+            return Err(MeshError::WeldDistance);
+        }
+        let pairs = weld::seam_pairs(&self.mesh, flat, distance).map_err(|error| self.with_cells(error))?;
+        self.report.welded_points = self.merge(&pairs);
+        if distance > 0.0 {
+            let sides = Sides::new(&self.mesh.positions);
+            let changed = |(tet, flat): (&[u32; 4], &bool)| !flat && sides.of(*tet) != 1;
+            if let Some(t) = self.mesh.tets.iter().zip(flat).position(changed) {
+                return Err(MeshError::WeldTooFar { tet: self.cells[t] });
+            }
+        }
+        if pairs.is_empty() { Ok(()) } else { self.drop_duplicates() }
+    }
+
+    /// Rule 5; returns the neighbours.
     fn conforming_faces(&self, flat: &[bool]) -> Result<Vec<[u32; 4]>, MeshError> {
         let fits = |group: &[HalfFace], folded: bool| match group {
             [a, b] if folded && !flat[a.tet() as usize] && !flat[b.tet() as usize] => {
@@ -217,11 +281,12 @@ impl Work {
             MeshError::CrowdedFace { face, tets } => {
                 MeshError::CrowdedFace { face, tets: tets.iter().map(|&t| self.cells[t as usize]).collect() }
             }
+            MeshError::WeldTooFar { tet } => MeshError::WeldTooFar { tet: self.cells[tet as usize] },
             other => other,
         }
     }
 
-    /// Rule 5: peels flat tetrahedra off the boundary until none can go.
+    /// Rule 6: peels flat tetrahedra off the boundary until none can go.
     fn drop_flat(&mut self, mut flat: Vec<bool>, neighbors: &[[u32; 4]]) -> Result<(), MeshError> {
         let tets = &self.mesh.tets;
         let sides = Sides::new(&self.mesh.positions);
@@ -247,7 +312,7 @@ impl Work {
         Ok(())
     }
 
-    /// Rule 6.
+    /// Rule 7.
     fn drop_unused_points(&mut self) {
         let mut used = vec![false; self.mesh.positions.len()];
         self.mesh.tets.iter().flatten().for_each(|&v| used[v as usize] = true);
@@ -257,7 +322,8 @@ impl Work {
             return;
         }
         // Merged points are counted as merged, not as unused.
-        self.report.unused_points = dropped - self.report.merged_points.min(dropped);
+        let merged = self.report.merged_points + self.report.welded_points;
+        self.report.unused_points = dropped - merged.min(dropped);
         let mut next = 0;
         let index: Vec<u32> = used.iter().map(|&u| if u { (next, next += 1).0 } else { NONE }).collect();
         self.mesh.tets.iter_mut().flatten().for_each(|v| *v = index[*v as usize]);
@@ -292,167 +358,4 @@ fn may_go(sides: [i32; 4], shared: [bool; 4]) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::mesh::{Field, check, kuhn_tets};
-
-    fn mesh(positions: &[[f64; 3]], tets: &[[u32; 4]]) -> TetMesh {
-        let values = (0..positions.len()).map(|i| i as f64).collect();
-        let fields = vec![Field::new("f", values)];
-        TetMesh { positions: positions.to_vec(), tets: tets.to_vec(), fields, ..TetMesh::default() }
-    }
-
-    fn repaired(positions: &[[f64; 3]], tets: &[[u32; 4]]) -> (TetMesh, RepairReport) {
-        let (mesh, report) = repair(mesh(positions, tets)).unwrap();
-        check(&mesh).unwrap();
-        (mesh, report)
-    }
-
-    /// A unit square at z = 0 (points 0..4), apexes below (4) and above (5).
-    const SQUARE: [[f64; 3]; 6] = [
-        [0.0, 0.0, 0.0],
-        [1.0, 0.0, 0.0],
-        [1.0, 1.0, 0.0],
-        [0.0, 1.0, 0.0],
-        [0.4, 0.5, -1.0],
-        [0.4, 0.5, 1.0],
-    ];
-    /// The flat tetrahedron on the square.
-    const SLIVER: [u32; 4] = [0, 1, 2, 3];
-    /// Two below the square, cut along 0-2; positive.
-    const BELOW: [[u32; 4]; 2] = [[0, 2, 1, 4], [0, 3, 2, 4]];
-    /// Two above the square, cut along 1-3; positive.
-    const ABOVE: [[u32; 4]; 2] = [[0, 1, 3, 5], [1, 2, 3, 5]];
-
-    #[test]
-    fn a_good_mesh_is_left_alone() {
-        let (out, report) = repaired(&SQUARE[..5], &BELOW);
-        assert_eq!((out, report.to_string()), (mesh(&SQUARE[..5], &BELOW), String::new()));
-        assert!(report.is_empty());
-    }
-
-    #[test]
-    fn unused_points_go_and_fields_follow() {
-        let (out, report) = repaired(&SQUARE, &BELOW);
-        assert_eq!(report, RepairReport { unused_points: 1, ..RepairReport::default() });
-        assert_eq!(report.to_string(), "repaired: dropped 1 unused point");
-        assert_eq!(out.fields[0].values, [0.0, 1.0, 2.0, 3.0, 4.0]);
-    }
-
-    #[test]
-    fn inverted_tetrahedra_are_turned() {
-        let (out, report) = repaired(&SQUARE[..5], &[BELOW[0], [3, 0, 2, 4]]);
-        assert_eq!(report, RepairReport { turned_tets: 1, ..RepairReport::default() });
-        assert_eq!(out.tets, [BELOW[0], [3, 0, 4, 2]]);
-        assert_eq!(report.to_string(), "repaired: turned 1 inverted tetrahedron");
-    }
-
-    #[test]
-    fn folds_are_refused() {
-        // The second tetrahedron's apex was pulled through the shared face.
-        let points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.1, 0.1, 1.0], [0.2, 0.2, 0.5]];
-        let error = repair(mesh(&points, &[[0, 1, 2, 3], [0, 2, 1, 4]])).unwrap_err();
-        assert_eq!(error, MeshError::Folded { tets: [0, 1] });
-    }
-
-    #[test]
-    fn boundary_slivers_go() {
-        let (out, report) = repaired(&SQUARE[..5], &[SLIVER, BELOW[0], BELOW[1]]);
-        assert_eq!(report, RepairReport { flat_tets: 1, ..RepairReport::default() });
-        assert_eq!(out.tets, BELOW);
-    }
-
-    #[test]
-    fn fields_at_cells_follow_their_cells() {
-        let mut input = mesh(&SQUARE[..5], &[BELOW[0], SLIVER, BELOW[1], BELOW[0]]);
-        input.cell_fields = vec![Field::new("m", vec![1.0, 2.0, 3.0, 4.0]), Field::new("named", Vec::new())];
-        let (out, _) = repair(input).unwrap();
-        assert_eq!(out.cell_fields[0].values, [1.0, 3.0]);
-        assert!(out.cell_fields[1].values.is_empty());
-    }
-
-    #[test]
-    fn slivers_go_in_layers() {
-        // Two flat ones on top of the sliver, of which the second has to go before the first can.
-        let mut points = SQUARE[..5].to_vec();
-        points.push([0.5, 0.4, 0.0]);
-        let tets = [BELOW[0], BELOW[1], SLIVER, [0, 1, 3, 5], [1, 2, 3, 5]];
-        let (out, report) = repaired(&points, &tets);
-        assert_eq!(out.tets, BELOW);
-        assert_eq!((report.flat_tets, report.unused_points), (3, 1));
-    }
-
-    #[test]
-    fn isolated_flat_tetrahedra_go() {
-        let (out, report) = repaired(&SQUARE, &[[0, 1, 2, 3], [0, 1, 4, 5]]);
-        assert_eq!((out.tets.len(), report.flat_tets), (1, 1));
-    }
-
-    #[test]
-    fn inner_slivers_are_refused() {
-        let tets = [BELOW[0], BELOW[1], SLIVER, ABOVE[0], ABOVE[1]];
-        let error = repair(mesh(&SQUARE, &tets)).unwrap_err();
-        assert_eq!(error, MeshError::InnerFlat { tet: 2, shared: 4 });
-        assert!(error.to_string().contains("cell 2"));
-    }
-
-    #[test]
-    fn slivers_half_covered_are_refused() {
-        for tets in [
-            vec![BELOW[0], SLIVER, ABOVE[0]],
-            vec![BELOW[0], SLIVER],
-            vec![BELOW[0], BELOW[1], SLIVER, ABOVE[1]],
-        ] {
-            let sliver = tets.iter().position(|t| *t == SLIVER).unwrap();
-            let error = repair(mesh(&SQUARE, &tets)).unwrap_err();
-            assert_eq!(error, MeshError::InnerFlat { tet: sliver as u32, shared: tets.len() as u32 - 1 });
-        }
-    }
-
-    #[test]
-    fn collapsed_edges_are_merged_and_their_neighbours_meet() {
-        // A prism split in three whose top edge 3-4 has length zero.
-        let points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 1.0]];
-        let (out, report) = repaired(&points, &[[0, 1, 2, 3], [1, 2, 3, 4]]);
-        assert_eq!(out.tets, [[0, 1, 2, 3]]);
-        assert_eq!((report.merged_points, report.collapsed_tets, report.unused_points), (1, 1, 0));
-        assert_eq!(report.differing_values, 1);
-        assert_eq!(out.positions.len(), 4);
-    }
-
-    #[test]
-    fn coincident_points_without_an_edge_stay_apart() {
-        // Two tetrahedra that touch in a face but share no point.
-        let points = [SQUARE[0], SQUARE[1], SQUARE[2], SQUARE[4], SQUARE[0], SQUARE[1], SQUARE[2], SQUARE[5]];
-        let (out, report) = repaired(&points, &[[0, 2, 1, 3], [4, 5, 6, 7]]);
-        assert!(report.is_empty());
-        assert_eq!(out.positions.len(), 8);
-    }
-
-    #[test]
-    fn duplicates_go_and_crowds_are_refused_with_the_numbers_of_the_input() {
-        let (out, report) = repaired(&SQUARE[..5], &[BELOW[0], BELOW[1], [4, 2, 0, 1], BELOW[0]]);
-        assert_eq!((out.tets.as_slice(), report.duplicate_tets), (&BELOW[..], 2));
-        let points = [SQUARE[0], SQUARE[1], SQUARE[2], SQUARE[4], SQUARE[5], [0.3, 0.3, 2.0]];
-        let tets = [[0, 1, 2, 3], [0, 1, 1, 3], [0, 1, 2, 4], [0, 1, 2, 5]];
-        let error = repair(mesh(&points, &tets)).unwrap_err();
-        assert_eq!(error, MeshError::CrowdedFace { face: [0, 1, 2], tets: vec![0, 2, 3] });
-    }
-
-    #[test]
-    fn nothing_left_is_an_error() {
-        assert_eq!(repair(mesh(&SQUARE, &[SLIVER])).unwrap_err(), MeshError::Empty);
-        assert_eq!(repair(mesh(&SQUARE, &[])).unwrap_err(), MeshError::Empty);
-    }
-
-    #[test]
-    fn a_grid_with_every_other_tetrahedron_inverted_comes_back() {
-        let grid = crate::mesh::Grid { dims: [4, 3, 3], origin: [0.0; 3], spacing: [0.1, 0.2, 0.3] };
-        let mut mesh = TetMesh::from_grid(grid, Vec::new());
-        mesh.tets.iter_mut().step_by(2).for_each(|t| t.swap(0, 1));
-        let (out, report) = repair(mesh).unwrap();
-        check(&out).unwrap();
-        assert_eq!(report.turned_tets, kuhn_tets([4, 3, 3]).len() / 2);
-        assert_eq!(out.grid, Some(grid));
-    }
-}
+mod tests;
