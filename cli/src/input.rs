@@ -5,7 +5,7 @@ use anyhow::{Context, Result, bail};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use tetralod::io;
-use tetralod::io::{CellData, FieldSelection};
+use tetralod::io::{CellData, FieldSelection, ReadOptions};
 use tetralod::mesh::{RepairReport, TetMesh, repair};
 use tetralod::verify::Reference;
 
@@ -49,9 +49,14 @@ pub fn read_as(
         check_format(&input, format)?;
     }
     let named: Vec<_> = steps.iter().map(|step| (step.path.display().to_string(), step.time)).collect();
-    let mesh = io::read_time_steps(&named, wanted, &mut |number, options| match &steps[number].path {
-        path if path == Path::new(STANDARD_INPUT) => io::read_bytes_with("standard input", &input, options),
-        path => io::read_with(path, options),
+    let mesh = io::read_time_steps(&named, wanted, &mut |number, options| {
+        let options = &ReadOptions { step: steps[number].number, ..options.clone() };
+        match &steps[number].path {
+            path if path == Path::new(STANDARD_INPUT) => {
+                io::read_bytes_with("standard input", &input, options)
+            }
+            path => io::read_with(path, options),
+        }
     })?;
     drop(input);
     let (mut mesh, report) = mend(mesh, &steps[0].path)?;

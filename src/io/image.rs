@@ -134,9 +134,19 @@ fn read_grid(document: &Document<'_>) -> Result<(Grid, Extent), ReadReason> {
         .ok_or_else(|| ReadReason::Missing("attribute WholeExtent".into()))?;
     let origin = attributes.numbers("Origin")?.unwrap_or([0.0; 3]);
     let spacing: [f64; 3] = attributes.numbers("Spacing")?.unwrap_or([1.0; 3]);
+    let direction: Option<[f64; 9]> = attributes.numbers("Direction")?;
+    placed_grid(whole, origin, spacing, direction.as_ref().map(|direction| &direction[..]))
+}
+
+/// The grid of VTK's image data, which may not be turned.
+pub(super) fn placed_grid(
+    whole: Extent,
+    origin: [f64; 3],
+    spacing: [f64; 3],
+    direction: Option<&[f64]>,
+) -> Result<(Grid, Extent), ReadReason> {
     let identity = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
-    let direction: [f64; 9] = attributes.numbers("Direction")?.unwrap_or(identity);
-    if direction != identity {
+    if let Some(direction) = direction.filter(|direction| **direction != identity) {
         let what = format!("a grid turned by Direction=\"{direction:?}\"");
         return Err(ReadReason::Unsupported { what, remedy: "resample it along the axes".into() });
     }

@@ -14,6 +14,8 @@
 //! | Netgen | `.vol` | feature `formats` | |
 //! | NRRD | `.nrrd`, `.nhdr` | raw, gzip, text; feature `formats` | |
 //! | `MetaImage` | `.mha`, `.mhd` | raw, zlib; feature `formats` | |
+//! | VTKHDF | `.vtkhdf`, `.hdf` | unstructured grids and image data; feature `hdf5` | |
+//! | Exodus II | `.exo`, `.ex2`, `.e` | feature `hdf5` | |
 //! | VTK XML poly data | `.vtp` | | appended raw, zlib |
 //! | STL | `.stl` | | binary, triangles alone |
 //! | PLY | `.ply` | | binary, little-endian |
@@ -24,7 +26,7 @@
 //! Point arrays become scalar fields: an array of several components gives one field a component (`name_x`, ...) and
 //! `name_magnitude`. Units and times are kept where the file contains them. Arrays at cells are read where that is asked
 //! for ([`ReadOptions::cells`]), arrays that are not numbers are left out.
-//! Time steps come in several files, which a `.pvd` may list: see [`steps`].
+//! Time steps come in several files, which a `.pvd` may list, or in one that has several: see [`steps`].
 //! Cells of other types are split into tetrahedra that fit those of their neighbours, linear and quadratic ones; cells without a
 //! volume are left out beside them. Readers check the file, not the mesh: see [`crate::mesh::repair`].
 
@@ -72,6 +74,8 @@ pub struct ReadOptions {
     pub fields: Option<Vec<String>>,
     /// What to do with fields at cells.
     pub cells: CellData,
+    /// Which step to read of a file that has several (see [`Step::number`]): the first one is 0. Others have one.
+    pub step: usize,
 }
 
 /// What to do with fields at cells.
@@ -107,8 +111,20 @@ pub fn read_with(path: &Path, options: &ReadOptions) -> Result<TetMesh, ReadErro
         "raw" => read_raw_by_sidecar(&path.with_extension("json"), Some(path)),
         #[cfg(feature = "formats")]
         "node" | "ele" => formats::tetgen::read(path, options),
-        _ => read_in(&name, &load(path)?, options, &|file| load_beside(path, file)),
+        _ => read_ranges(path, options)
+            .unwrap_or_else(|| read_in(&name, &load(path)?, options, &|file| load_beside(path, file))),
     }
+}
+
+/// Reads what is wanted of a file of a format that need not be read as a whole; none if it is another one.
+#[cfg(feature = "hdf5")]
+fn read_ranges(path: &Path, options: &ReadOptions) -> Option<Result<TetMesh, ReadError>> {
+    formats::hdf5::read_at(path, options)
+}
+
+#[cfg(not(feature = "hdf5"))]
+fn read_ranges(_: &Path, _: &ReadOptions) -> Option<Result<TetMesh, ReadError>> {
+    None
 }
 
 /// Reads a mesh or grid from the bytes of a file; `name` is used in errors alone.

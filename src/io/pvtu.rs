@@ -8,7 +8,7 @@ use std::collections::{HashMap, HashSet};
 
 use crate::io::cells::Numbering;
 use crate::io::error::{At, ReadError, ReadReason};
-use crate::io::vtu::{PieceReader, first_number, join};
+use crate::io::vtu::{NumberPoints, PieceReader, first_number, join};
 use crate::io::xml::Document;
 use crate::io::{Beside, ReadOptions, in_file, without_mark};
 use crate::mesh::TetMesh;
@@ -33,8 +33,8 @@ pub(super) fn read(
 
 /// What was read of the pieces so far.
 #[derive(Default)]
-struct Whole {
-    mesh: TetMesh,
+pub(super) struct Whole {
+    pub mesh: TetMesh,
     /// The first point at each place.
     known: HashMap<[u64; 3], u32>,
     has_pieces: bool,
@@ -51,23 +51,33 @@ impl Whole {
         }
         for (number, piece) in document.pieces.iter().enumerate() {
             let reader = PieceReader { document: &document, piece, number, options };
-            let first = self.mesh.positions.len();
-            // The points that no earlier piece has.
-            let mut new = Vec::new();
-            let mut part = reader.read(&mut |points| {
-                let numbers;
-                (numbers, new) = self.numbered(points, first)?;
-                Ok(Numbering::Each(numbers))
-            })?;
-            keep(&mut part.positions, &new);
-            part.fields.iter_mut().for_each(|field| keep(&mut field.values, &new));
-            for (number, point) in (first as u32..).zip(&part.positions) {
-                self.known.entry(place(*point)).or_insert(number);
-            }
-            let is_first = !std::mem::replace(&mut self.has_pieces, true);
-            join(&mut self.mesh, part, is_first).at(|| format!("piece {number}, <PointData>"))?;
+            let place = || format!("piece {number}, <PointData>");
+            self.add(&mut |numbers| reader.read(numbers), &place)?;
         }
         Ok(document.time())
+    }
+
+    /// Appends the piece that `read` reads, given how to number its points; `place` is where its fields are.
+    pub fn add(
+        &mut self,
+        read: &mut dyn FnMut(NumberPoints<'_>) -> Result<TetMesh, ReadError>,
+        place: &dyn Fn() -> String,
+    ) -> Result<(), ReadError> {
+        let first = self.mesh.positions.len();
+        // The points that no earlier piece has.
+        let mut new = Vec::new();
+        let mut part = read(&mut |points| {
+            let numbers;
+            (numbers, new) = self.numbered(points, first)?;
+            Ok(Numbering::Each(numbers))
+        })?;
+        keep(&mut part.positions, &new);
+        part.fields.iter_mut().for_each(|field| keep(&mut field.values, &new));
+        for (number, point) in (first as u32..).zip(&part.positions) {
+            self.known.entry(bits(*point)).or_insert(number);
+        }
+        let is_first = !std::mem::replace(&mut self.has_pieces, true);
+        join(&mut self.mesh, part, is_first).at(place)
     }
 
     /// The numbers of a piece's points, and which of them are new, from number `first` on.
@@ -75,7 +85,7 @@ impl Whole {
         first_number(first, points.len())?;
         let (mut numbers, mut new, mut taken) = (Vec::new(), Vec::new(), HashSet::new());
         for (index, point) in points.iter().enumerate() {
-            let known = self.known.get(&place(*point)).copied().filter(|&number| taken.insert(number));
+            let known = self.known.get(&bits(*point)).copied().filter(|&number| taken.insert(number));
             numbers.push(known.unwrap_or((first + new.len()) as u32));
             if known.is_none() {
                 new.push(index);
@@ -86,7 +96,7 @@ impl Whole {
 }
 
 /// The bits of a position; zero has two signs.
-fn place(point: [f64; 3]) -> [u64; 3] {
+fn bits(point: [f64; 3]) -> [u64; 3] {
     point.map(|x| (x + 0.0).to_bits())
 }
 

@@ -3,15 +3,23 @@
 //! Each is recognised by its first words, but for TetGen's, whose files are lists of numbers.
 
 mod draft;
+#[cfg(feature = "hdf5")]
+mod exodus;
+#[cfg(feature = "hdf5")]
+mod exodus_cells;
 mod gmsh;
 mod gmsh_cells;
 mod gmsh_sections;
+#[cfg(feature = "hdf5")]
+pub(super) mod hdf5;
 mod medit;
 mod metaimage;
 mod netgen;
 mod nrrd;
 mod scanner;
 pub(super) mod tetgen;
+#[cfg(feature = "hdf5")]
+mod vtkhdf;
 mod volume;
 
 use std::path::Path;
@@ -64,6 +72,10 @@ impl Format {
 
 /// What the format of these bytes is called, if it is one of these.
 pub(super) fn name(bytes: &[u8]) -> Option<&'static str> {
+    #[cfg(feature = "hdf5")]
+    if let Some(name) = hdf5::name(bytes) {
+        return Some(name);
+    }
     Format::of(bytes).map(Format::name)
 }
 
@@ -74,6 +86,10 @@ pub(super) fn read(
     options: &ReadOptions,
     beside: Beside<'_>,
 ) -> Option<Result<TetMesh, ReadError>> {
+    #[cfg(feature = "hdf5")]
+    if hdf5::is_known(bytes) {
+        return Some(hdf5::read(bytes, options));
+    }
     Some(match Format::of(bytes)? {
         Format::Gmsh => gmsh::read(bytes, options),
         Format::Medit => medit::read(bytes, &sibling(name, "sol"), options, beside),
