@@ -1,4 +1,5 @@
-//! VTK XML unstructured grids in several files (`.pvtu`): a list of `.vtu` files beside it, as parallel programs write them.
+//! VTK XML data sets in several files (`.pvtu`, `.pvti`, `.pvtr`, `.pvts`): a list of files beside it with a piece each, as
+//! parallel programs write them. What follows is of unstructured grids; the pieces of others say where they belong.
 //!
 //! Points of different pieces that lie in exactly the same place are one point of the mesh, so that pieces meet; points of
 //! one piece stay different. Cells are split with the numbers of the whole mesh, on which both sides of an interface agree.
@@ -10,7 +11,7 @@ use crate::io::cells::Numbering;
 use crate::io::error::{At, ReadError, ReadReason};
 use crate::io::vtu::{NumberPoints, PieceReader, first_number, join};
 use crate::io::xml::Document;
-use crate::io::{Beside, ReadOptions, in_file, without_mark};
+use crate::io::{Beside, IN_FILES, ReadFile, ReadOptions, in_file, without_mark};
 use crate::mesh::TetMesh;
 
 /// Reads a document of type `PUnstructuredGrid`, and the time of its pieces.
@@ -20,15 +21,35 @@ pub(super) fn read(
     beside: Beside<'_>,
 ) -> Result<(TetMesh, Option<f64>), ReadError> {
     let mut whole = Whole::default();
+    let time = for_each_file(document, beside, &mut |file| whole.append(file, options))?;
+    Ok((whole.mesh, time))
+}
+
+/// Has `read` read the files that are listed, one after the other; returns the time of the first one that has one.
+pub(super) fn for_each_file(
+    document: &Document<'_>,
+    beside: Beside<'_>,
+    read: ReadFile<'_>,
+) -> Result<Option<f64>, ReadError> {
     let mut time = None;
     for (number, piece) in document.pieces.iter().enumerate() {
         let missing = || ReadReason::Missing("attribute Source".into());
         let source = piece.attributes.get("Source").ok_or_else(missing).at(|| format!("piece {number}"))?;
         let bytes = beside(source).at(|| format!("piece {number}"))?;
-        let of_piece = whole.append(&bytes, options).map_err(|error| in_file(error, source))?;
-        time = time.or(of_piece);
+        let mut read_file = || {
+            let file = Document::parse(without_mark(&bytes))?;
+            if document.kind.strip_prefix(IN_FILES) != Some(&file.kind) {
+                let what = format!("a piece of type {}", file.kind);
+                let remedy = format!("list files of type {}", document.kind.trim_start_matches(IN_FILES));
+                return Err(ReadReason::Unsupported { what, remedy }).at(String::new);
+            }
+            read(&file)?;
+            Ok(file.time())
+        };
+        let of_file = read_file().map_err(|error| in_file(error, source))?;
+        time = time.or(of_file);
     }
-    Ok((whole.mesh, time))
+    Ok(time)
 }
 
 /// What was read of the pieces so far.
@@ -41,20 +62,14 @@ pub(super) struct Whole {
 }
 
 impl Whole {
-    /// Appends the pieces in a file; returns its time.
-    fn append(&mut self, bytes: &[u8], options: &ReadOptions) -> Result<Option<f64>, ReadError> {
-        let document = Document::parse(without_mark(bytes))?;
-        if document.kind != "UnstructuredGrid" {
-            let what = format!("a piece of type {}", document.kind);
-            let remedy = "list files of type UnstructuredGrid".into();
-            return Err(ReadReason::Unsupported { what, remedy }).at(String::new);
-        }
+    /// Appends the pieces in a file.
+    fn append(&mut self, document: &Document<'_>, options: &ReadOptions) -> Result<(), ReadError> {
         for (number, piece) in document.pieces.iter().enumerate() {
-            let reader = PieceReader { document: &document, piece, number, options };
+            let reader = PieceReader { document, piece, number, options };
             let place = || format!("piece {number}, <PointData>");
             self.add(&mut |numbers| reader.read(numbers), &place)?;
         }
-        Ok(document.time())
+        Ok(())
     }
 
     /// Appends the piece that `read` reads, given how to number its points; `place` is where its fields are.

@@ -103,6 +103,9 @@ pub fn format_of(bytes: &[u8]) -> Option<&'static str> {
         (structured::RECTILINEAR, "vtr"),
         (structured::CURVILINEAR, "vts"),
         ("PUnstructuredGrid", "pvtu"),
+        ("PImageData", "pvti"),
+        ("PRectilinearGrid", "pvtr"),
+        ("PStructuredGrid", "pvts"),
     ];
     formats.iter().find(|(name, _)| *name == kind).map(|(_, format)| *format)
 }

@@ -8,7 +8,7 @@ use crate::io::ReadOptions;
 use crate::io::error::{At, ReadError, ReadReason};
 use crate::io::formats::draft::Draft;
 use crate::io::formats::exodus_cells::{Element, element};
-use crate::io::formats::hdf5::netcdf_reason;
+use crate::io::formats::hdf5::{checked_times, netcdf_reason};
 use crate::mesh::TetMesh;
 
 /// A file.
@@ -29,9 +29,8 @@ struct Block {
 pub(super) fn times(file: &NcFile) -> Result<Vec<f64>, ReadError> {
     let root = file.root_group().map_err(netcdf_reason).at(String::new)?;
     let reader = Reader { file, root, step: 0 };
-    // Zero has two signs.
-    let times = reader.values_if("time_whole").at(|| "time_whole".into())?.unwrap_or_default();
-    Ok(times.into_iter().map(|time| time + 0.0).collect())
+    let times = reader.values_if("time_whole").and_then(|times| checked_times(times.unwrap_or_default()));
+    times.at(|| "time_whole".into())
 }
 
 /// Reads a mesh.
@@ -65,7 +64,10 @@ impl Reader<'_> {
 
     fn size(&self, name: &str) -> Result<u64, ReadReason> {
         let dimension = self.root.dimension(name);
-        let missing = || ReadReason::Missing(format!("dimension \"{name}\" of Exodus"));
+        let missing = || ReadReason::Unsupported {
+            what: format!("a file in HDF5 or netCDF without \"{name}\", so neither VTKHDF nor Exodus,"),
+            remedy: "give one of these, or save it as .vtu".into(),
+        };
         dimension.map(|dimension| dimension.size).ok_or_else(missing)
     }
 
@@ -112,7 +114,8 @@ impl Reader<'_> {
         let number = |name: &str, start: &str| name.strip_prefix(start)?.parse::<usize>().ok();
         let names = || self.root.variables.iter().map(NcVariable::name);
         if let Some(faces) = names().find(|name| number(name, "facconn").is_some()) {
-            let polyhedra = self.variable(faces).map_or(0, |faces| faces.shape().first().copied().unwrap_or(0));
+            let polyhedra =
+                self.variable(faces).map_or(0, |faces| faces.shape().first().copied().unwrap_or(0));
             return Err(ReadReason::CellTypes(vec![(POLYHEDRON, polyhedra)])).at(|| faces.to_owned());
         }
         let mut numbers: Vec<usize> = names().filter_map(|name| number(name, "connect")).collect();
@@ -137,7 +140,9 @@ impl Reader<'_> {
         let points = shape.get(1).map_or(1, |points| usize::try_from(*points).unwrap_or(usize::MAX));
         let unknown = || ReadReason::Unsupported {
             what: format!("a block of elements \"{kind}\" of {points} points"),
-            remedy: "save the mesh with tetrahedra, hexahedra, wedges and pyramids of the first or second order".into(),
+            remedy:
+                "save the mesh with tetrahedra, hexahedra, wedges and pyramids of the first or second order"
+                    .into(),
         };
         let Element::Solid(cell, order) = element(kind, points).ok_or_else(unknown)? else { return Ok(None) };
         let list = self.values(name, &[])?;
@@ -151,7 +156,8 @@ impl Reader<'_> {
     /// The number of each element's block, by which users know it.
     fn numbers_of_blocks(&self, blocks: &[Block]) -> Result<Vec<f64>, ReadReason> {
         let known = self.values_if("eb_prop1")?.unwrap_or_default();
-        let number = |block: &Block| known.get(block.number.wrapping_sub(1)).copied().unwrap_or(block.number as f64);
+        let number =
+            |block: &Block| known.get(block.number.wrapping_sub(1)).copied().unwrap_or(block.number as f64);
         Ok(blocks.iter().flat_map(|block| std::iter::repeat_n(number(block), block.elements)).collect())
     }
 
@@ -245,11 +251,11 @@ fn joined(names: &[String]) -> Vec<(String, Vec<usize>)> {
 
 /// The name of the vector whose components have these names, if they are such.
 fn vector_of(names: &[String]) -> Option<&str> {
-    let start = |name: &'_ str, axis: char| -> Option<usize> {
-        let is_axis = name.ends_with(axis) || name.ends_with(axis.to_ascii_uppercase());
-        is_axis.then_some(name.len() - 1)
+    let start = |(name, axis): (&'_ String, char)| -> Option<usize> {
+        let start = name.strip_suffix(axis).or_else(|| name.strip_suffix(axis.to_ascii_uppercase()));
+        start.map(str::len)
     };
-    let ends = names.iter().zip(['x', 'y', 'z']).map(|(name, axis)| start(name, axis)).collect::<Option<Vec<_>>>()?;
+    let ends = names.iter().zip(['x', 'y', 'z']).map(start).collect::<Option<Vec<_>>>()?;
     let first = names.first()?.get(..*ends.first()?)?;
     let same = names.iter().zip(&ends).all(|(name, &end)| name.get(..end) == Some(first));
     let stem = first.trim_end_matches(['_', '-', '.', ' ']);
@@ -272,5 +278,6 @@ mod tests {
         assert_eq!(names(&["x", "y", "z"]), [of("x", &[0]), of("y", &[1]), of("z", &[2])]);
         assert_eq!(names(&["ax", "ay", "bz"]).len(), 3);
         assert_eq!(names(&["ax", "ay"]).len(), 2);
+        assert_eq!(names(&["", "", ""]).len(), 3);
     }
 }

@@ -13,14 +13,12 @@ pub(super) enum Element {
 }
 
 /// Beginnings of the names of elements without a volume.
-const FLAT: [&str; 14] = [
-    "SHE", "TRI", "QUA", "BAR", "BEA", "TRU", "EDG", "SPH", "CIR", "POI", "NOD", "NSI", "LIN", "NUL",
-];
+const FLAT: [&str; 14] =
+    ["SHE", "TRI", "QUA", "BAR", "BEA", "TRU", "EDG", "SPH", "CIR", "POI", "NOD", "NSI", "LIN", "NUL"];
 
 const HEXAHEDRON_20: &[usize] = &[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 16, 17, 18, 19, 12, 13, 14, 15];
-const HEXAHEDRON_27: &[usize] = &[
-    0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 16, 17, 18, 19, 12, 13, 14, 15, 23, 24, 25, 26, 21, 22, 20,
-];
+const HEXAHEDRON_27: &[usize] =
+    &[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 16, 17, 18, 19, 12, 13, 14, 15, 23, 24, 25, 26, 21, 22, 20];
 const WEDGE_15: &[usize] = &[0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 13, 14, 9, 10, 11];
 const WEDGE_18: &[usize] = &[0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 13, 14, 9, 10, 11, 15, 16, 17];
 const FIRST: &[usize] = &[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13];
@@ -55,7 +53,9 @@ mod tests {
 
     /// A point for each corner of an element of Exodus and each middle of an edge, a face or the whole, as sums of corners.
     fn sums(corners: &[[i64; 3]], middles: &[&[usize]]) -> Vec<[i64; 3]> {
-        let middle = |of: &&[usize]| [0, 1, 2].map(|i| of.iter().map(|&c| 12 * corners[c][i]).sum::<i64>() / of.len() as i64);
+        let middle = |of: &&[usize]| {
+            [0, 1, 2].map(|i| of.iter().map(|&c| 12 * corners[c][i]).sum::<i64>() / of.len() as i64)
+        };
         corners.iter().map(|c| c.map(|x| 12 * x)).chain(middles.iter().map(middle)).collect()
     }
 
@@ -71,7 +71,9 @@ mod tests {
         let volume = |tet: &[u32; 4]| {
             let [a, b, c, d] = tet.map(place);
             let [u, v, w] = [b, c, d].map(|p| [0, 1, 2].map(|i| p[i] - a[i]));
-            u[0] * (v[1] * w[2] - v[2] * w[1]) + u[1] * (v[2] * w[0] - v[0] * w[2]) + u[2] * (v[0] * w[1] - v[1] * w[0])
+            u[0] * (v[1] * w[2] - v[2] * w[1])
+                + u[1] * (v[2] * w[0] - v[0] * w[2])
+                + u[2] * (v[0] * w[1] - v[1] * w[0])
         };
         tets.iter().map(volume).collect()
     }
@@ -79,13 +81,40 @@ mod tests {
     const CUBE: [[i64; 3]; 8] =
         [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]];
     const CUBE_MIDDLES: [&[usize]; 19] = [
-        &[0, 1], &[1, 2], &[2, 3], &[3, 0], &[0, 4], &[1, 5], &[2, 6], &[3, 7], &[4, 5], &[5, 6], &[6, 7], &[7, 4],
-        &[0, 1, 2, 3, 4, 5, 6, 7], &[0, 1, 2, 3], &[4, 5, 6, 7], &[0, 3, 4, 7], &[1, 2, 5, 6], &[0, 1, 4, 5], &[2, 3, 6, 7],
+        &[0, 1],
+        &[1, 2],
+        &[2, 3],
+        &[3, 0],
+        &[0, 4],
+        &[1, 5],
+        &[2, 6],
+        &[3, 7],
+        &[4, 5],
+        &[5, 6],
+        &[6, 7],
+        &[7, 4],
+        &[0, 1, 2, 3, 4, 5, 6, 7],
+        &[0, 1, 2, 3],
+        &[4, 5, 6, 7],
+        &[0, 3, 4, 7],
+        &[1, 2, 5, 6],
+        &[0, 1, 4, 5],
+        &[2, 3, 6, 7],
     ];
     const PRISM: [[i64; 3]; 6] = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1]];
     const PRISM_MIDDLES: [&[usize]; 12] = [
-        &[0, 1], &[1, 2], &[2, 0], &[0, 3], &[1, 4], &[2, 5], &[3, 4], &[4, 5], &[5, 3],
-        &[0, 1, 4, 3], &[1, 2, 5, 4], &[2, 0, 3, 5],
+        &[0, 1],
+        &[1, 2],
+        &[2, 0],
+        &[0, 3],
+        &[1, 4],
+        &[2, 5],
+        &[3, 4],
+        &[4, 5],
+        &[5, 3],
+        &[0, 1, 4, 3],
+        &[1, 2, 5, 4],
+        &[2, 0, 3, 5],
     ];
     const TETRAHEDRON: [[i64; 3]; 4] = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]];
     const TETRAHEDRON_MIDDLES: [&[usize]; 6] = [&[0, 1], &[1, 2], &[2, 0], &[0, 3], &[1, 3], &[2, 3]];

@@ -9,8 +9,8 @@ use std::sync::Arc;
 use hdf5_reader::error::Error;
 use hdf5_reader::storage::DynStorage;
 use hdf5_reader::{
-    Attribute, BlockCacheStorage, BytesStorage, Dataset, Datatype, FileStorage, H5Type, Hdf5File, OpenOptions, SliceInfo,
-    SliceInfoElem,
+    Attribute, BlockCacheStorage, BytesStorage, Dataset, Datatype, FileStorage, H5Type, Hdf5File,
+    OpenOptions, SliceInfo, SliceInfoElem,
 };
 use netcdf_reader::{NcFile, NcOpenOptions};
 
@@ -125,9 +125,7 @@ pub(super) fn reason(error: Error) -> ReadReason {
             other => other,
         },
         Error::Io(error) => ReadReason::Io(error.to_string()),
-        Error::UnexpectedEof { needed, available, .. } => {
-            ReadReason::Truncated { needed, found: available }
-        }
+        Error::UnexpectedEof { needed, available, .. } => ReadReason::Truncated { needed, found: available },
         Error::UnsupportedFilter(_) | Error::UnsupportedEncoding(_) => ReadReason::Unsupported {
             what: format!("a file with {what}"),
             remedy: "write it again without compression, or with zlib (deflate)".into(),
@@ -146,9 +144,7 @@ pub(super) fn netcdf_reason(error: netcdf_reader::Error) -> ReadReason {
     match error {
         Error::Hdf5(error) => reason(error),
         Error::Io(error) => ReadReason::Io(error.to_string()),
-        Error::UnexpectedEof { needed, available, .. } => {
-            ReadReason::Truncated { needed, found: available }
-        }
+        Error::UnexpectedEof { needed, available, .. } => ReadReason::Truncated { needed, found: available },
         _ => ReadReason::Damaged(what),
     }
 }
@@ -166,13 +162,21 @@ pub(super) fn number_kind(dataset: &Dataset) -> Option<bool> {
 macro_rules! numbers {
     ($dataset:expr, $selection:expr, $into:ty) => {
         match *$dataset.dtype() {
-            Datatype::FixedPoint { size: 1, signed: true, .. } => Some(part($dataset, $selection, |x: i8| x as $into)),
+            Datatype::FixedPoint { size: 1, signed: true, .. } => {
+                Some(part($dataset, $selection, |x: i8| x as $into))
+            }
             Datatype::FixedPoint { size: 1, .. } => Some(part($dataset, $selection, |x: u8| x as $into)),
-            Datatype::FixedPoint { size: 2, signed: true, .. } => Some(part($dataset, $selection, |x: i16| x as $into)),
+            Datatype::FixedPoint { size: 2, signed: true, .. } => {
+                Some(part($dataset, $selection, |x: i16| x as $into))
+            }
             Datatype::FixedPoint { size: 2, .. } => Some(part($dataset, $selection, |x: u16| x as $into)),
-            Datatype::FixedPoint { size: 4, signed: true, .. } => Some(part($dataset, $selection, |x: i32| x as $into)),
+            Datatype::FixedPoint { size: 4, signed: true, .. } => {
+                Some(part($dataset, $selection, |x: i32| x as $into))
+            }
             Datatype::FixedPoint { size: 4, .. } => Some(part($dataset, $selection, |x: u32| x as $into)),
-            Datatype::FixedPoint { size: 8, signed: true, .. } => Some(part($dataset, $selection, |x: i64| x as $into)),
+            Datatype::FixedPoint { size: 8, signed: true, .. } => {
+                Some(part($dataset, $selection, |x: i64| x as $into))
+            }
             Datatype::FixedPoint { size: 8, .. } => Some(part($dataset, $selection, |x: u64| x as $into)),
             _ => None,
         }
@@ -223,6 +227,15 @@ pub(super) fn attribute_values(attribute: &Attribute) -> Result<Vec<f64>, ReadRe
         Datatype::FloatingPoint { size: 8, .. } => list(attribute, |x: f64| x),
         _ => Err(ReadReason::Syntax(format!("attribute \"{}\" does not hold numbers", attribute.name))),
     }
+}
+
+/// The times of steps, which must be finite.
+pub(super) fn checked_times(times: Vec<f64>) -> Result<Vec<f64>, ReadReason> {
+    if times.iter().any(|time| !time.is_finite()) {
+        return Err(ReadReason::Syntax("a time is not a number".into()));
+    }
+    // Zero has two signs.
+    Ok(times.into_iter().map(|time| time + 0.0).collect())
 }
 
 /// All values of a dataset as indices.

@@ -12,7 +12,7 @@ use crate::mesh::TetMesh;
 pub(super) const FIRST: &str = "MeshVersionFormatted";
 
 /// The cells with a volume: VTK's type, and which of Medit's vertices is each of VTK's.
-const CELLS: [(&str, i64, &[usize]); 5] = [
+pub(super) const CELLS: [(&str, i64, &[usize]); 5] = [
     ("Tetrahedra", 10, &[0, 1, 2, 3]),
     ("Hexahedra", 12, &[0, 1, 2, 3, 4, 5, 6, 7]),
     ("Prisms", 13, &[0, 1, 2, 3, 4, 5]),
@@ -117,9 +117,13 @@ fn read_solution(file: &mut Scanner<'_>, draft: &mut Draft<'_>) -> Result<(), Re
     Ok(())
 }
 
-/// Values of a scalar, a vector or a symmetric tensor.
 fn components(file: &mut Scanner<'_>) -> Result<usize, ReadReason> {
-    match file.number::<u32>()? {
+    components_of(file.number()?)
+}
+
+/// How many values a scalar, a vector or a symmetric tensor has.
+pub(super) fn components_of(kind: i64) -> Result<usize, ReadReason> {
+    match kind {
         1 => Ok(1),
         2 => Ok(3),
         3 => Ok(6),

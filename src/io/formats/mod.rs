@@ -13,14 +13,15 @@ mod gmsh_sections;
 #[cfg(feature = "hdf5")]
 pub(super) mod hdf5;
 mod medit;
+mod medit_binary;
 mod metaimage;
 mod netgen;
 mod nrrd;
 mod scanner;
 pub(super) mod tetgen;
+mod volume;
 #[cfg(feature = "hdf5")]
 mod vtkhdf;
-mod volume;
 
 use std::path::Path;
 
@@ -33,6 +34,7 @@ use crate::mesh::TetMesh;
 enum Format {
     Gmsh,
     Medit,
+    MeditBinary,
     Netgen,
     Nrrd,
     MetaImage,
@@ -48,6 +50,9 @@ impl Format {
         if gmsh::FIRST.iter().any(|first| start.starts_with(first.as_bytes())) {
             return Some(Self::Gmsh);
         }
+        if medit_binary::is_first(bytes) {
+            return Some(Self::MeditBinary);
+        }
         if metaimage::is_header(start) {
             return Some(Self::MetaImage);
         }
@@ -62,7 +67,7 @@ impl Format {
     fn name(self) -> &'static str {
         match self {
             Self::Gmsh => "gmsh",
-            Self::Medit => "medit",
+            Self::Medit | Self::MeditBinary => "medit",
             Self::Netgen => "netgen",
             Self::Nrrd => "nrrd",
             Self::MetaImage => "metaimage",
@@ -93,6 +98,7 @@ pub(super) fn read(
     Some(match Format::of(bytes)? {
         Format::Gmsh => gmsh::read(bytes, options),
         Format::Medit => medit::read(bytes, &sibling(name, "sol"), options, beside),
+        Format::MeditBinary => medit_binary::read(bytes, &sibling(name, "solb"), options, beside),
         Format::Netgen => netgen::read(bytes, options),
         Format::Nrrd => nrrd::read(bytes, options, beside),
         Format::MetaImage => metaimage::read(bytes, options, beside),

@@ -10,7 +10,7 @@ use crate::io::cells::{self, CellList, Numbering};
 use crate::io::error::{At, ReadError, ReadReason};
 use crate::io::fields::Collector;
 use crate::io::formats::hdf5::{
-    all_integers, attribute_values, floats, integers, number_kind, reason, row_length, rows,
+    all_integers, attribute_values, checked_times, floats, integers, number_kind, reason, row_length, rows,
 };
 use crate::io::image::{self, Extent};
 use crate::io::pvtu::Whole;
@@ -22,8 +22,6 @@ use crate::mesh::{Field, Grid, TetMesh};
 pub(super) const ROOT: &str = "VTKHDF";
 /// The version that this was written for; later ones of the same major version add to it.
 const MAJOR_VERSIONS: [f64; 2] = [1.0, 2.0];
-/// Most pieces of a file: as many processes as the largest machines have.
-const MAX_PIECES: usize = 1 << 24;
 
 /// A file, and which of its steps is read.
 struct Reader<'a> {
@@ -54,7 +52,8 @@ pub(super) fn read(file: &Hdf5File, options: &ReadOptions) -> Result<TetMesh, Re
     let version = reader.attribute("Version").at(place)?;
     if !version.first().is_some_and(|major| MAJOR_VERSIONS.contains(major)) {
         let what = format!("version {version:?} of VTKHDF");
-        return Err(ReadReason::Unsupported { what, remedy: "write it as version 2, or as .vtu".into() }).at(place);
+        return Err(ReadReason::Unsupported { what, remedy: "write it as version 2, or as .vtu".into() })
+            .at(place);
     }
     let root = file.group(ROOT).map_err(reason).at(place)?;
     let kind = root.attribute("Type").and_then(|kind| kind.read_string()).map_err(reason).at(place)?;
@@ -123,9 +122,7 @@ impl Reader<'_> {
 
     fn times(&self) -> Result<Vec<f64>, ReadReason> {
         let Some(values) = self.dataset_if("Steps/Values")? else { return Ok(Vec::new()) };
-        let times = floats(&values, 0..rows(&values))?;
-        // Zero has two signs.
-        Ok(times.into_iter().map(|time| time + 0.0).collect())
+        checked_times(floats(&values, 0..rows(&values))?)
     }
 
     /// The entry of this step in an array of beginnings; none without steps or without the array.
@@ -158,7 +155,7 @@ impl Reader<'_> {
         };
         let [points, cells, ids] =
             [list("NumberOfPoints")?, list("NumberOfCells")?, list("NumberOfConnectivityIds")?];
-        if [cells.len(), ids.len()] != [points.len(); 2] || points.len() > MAX_PIECES {
+        if [cells.len(), ids.len()] != [points.len(); 2] {
             let [expected, found] = [points.len() as u64, cells.len().min(ids.len()) as u64];
             return Err(ReadReason::Count { what: "pieces".into(), expected, found });
         }
@@ -304,7 +301,8 @@ impl Reader<'_> {
                 collector.keep_names(claim, "");
                 continue;
             }
-            let filled = values(&dataset, components).and_then(|values| collector.fill(claim, values, integer, ""));
+            let filled =
+                values(&dataset, components).and_then(|values| collector.fill(claim, values, integer, ""));
             filled.map_err(|reason| if at_cells { reason.at_cells() } else { reason }).at(place)?;
         }
         Ok(collector.fields)
