@@ -5,7 +5,7 @@ use anyhow::{Context, Result, bail};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use tetralod::io;
-use tetralod::io::{CellData, FieldSelection, ReadOptions};
+use tetralod::io::{CellData, FieldSelection, ReadOptions, Step};
 use tetralod::mesh::{RepairReport, TetMesh, repair};
 use tetralod::verify::Reference;
 
@@ -14,7 +14,7 @@ use tetralod::verify::Reference;
 ///
 /// The first step is kept with all that is wanted, of later ones nothing but their fields.
 pub fn read(paths: &[PathBuf], wanted: &FieldSelection<'_>) -> Result<(TetMesh, RepairReport)> {
-    read_as(paths, wanted, None)
+    read_as(paths, wanted, None, None)
 }
 
 /// What a path stands for the standard input.
@@ -29,19 +29,16 @@ pub fn expect_format(paths: &[PathBuf], format: Option<&str>) {
     }
 }
 
-/// As [`read`], of which the standard input has a format.
+/// As [`read`], of which the standard input has a format, and only one time step is wanted if `step` is given.
 pub fn read_as(
     paths: &[PathBuf],
     wanted: &FieldSelection<'_>,
     format: Option<&str>,
+    step: Option<usize>,
 ) -> Result<(TetMesh, RepairReport)> {
-    let mut steps = Vec::new();
-    for path in paths {
-        if let Some(scheme) = files::scheme(path) {
-            bail!("{}: meshes are not read by {scheme}; fetch the file first", path.display());
-        }
-        // Read errors name the file themselves.
-        steps.extend(io::steps(path)?);
+    let mut steps = steps(paths)?;
+    if let Some(step) = step {
+        choose(&mut steps, step)?;
     }
     let mut input = Vec::new();
     if steps.iter().any(|step| step.path == Path::new(STANDARD_INPUT)) {
@@ -65,6 +62,39 @@ pub fn read_as(
     }
     mesh.add_geometry_fields(wanted.names);
     Ok((mesh, report))
+}
+
+/// The time steps in these files.
+fn steps(paths: &[PathBuf]) -> Result<Vec<Step>> {
+    let mut steps = Vec::new();
+    for path in paths {
+        if let Some(scheme) = files::scheme(path) {
+            bail!("{}: meshes are not read by {scheme}; fetch the file first", path.display());
+        }
+        // Read errors name the file themselves.
+        steps.extend(io::steps(path)?);
+    }
+    Ok(steps)
+}
+
+/// Which of the time steps in these files is the one of this time, if the files say so.
+fn step_at(paths: &[PathBuf], time: f64) -> Result<Option<usize>> {
+    Ok(steps(paths)?.iter().position(|step| step.time == Some(time)))
+}
+
+/// Leaves one of the time steps. How many there are in the standard input is known when it was read.
+fn choose(steps: &mut Vec<Step>, step: usize) -> Result<()> {
+    if let [only] = steps.as_mut_slice()
+        && only.path == Path::new(STANDARD_INPUT)
+    {
+        only.number = step;
+        return Ok(());
+    }
+    if step >= steps.len() {
+        bail!("--step {step}: there are {} time steps, and the first one is 0", steps.len());
+    }
+    *steps = vec![steps.swap_remove(step)];
+    Ok(())
 }
 
 /// Refuses bytes that are not of the format that was given.
@@ -110,8 +140,14 @@ pub fn read_mesh(path: &Path) -> Result<(TetMesh, RepairReport)> {
 
 /// Reads what the MT was built from: time steps of a mesh or, where no more is needed, of points.
 pub fn read_reference(paths: &[PathBuf], opened: &Opened) -> Result<TetMesh> {
-    let names: Vec<String> = opened.info()?.fields.iter().map(|field| field.name.clone()).collect();
-    let (mesh, _) = read(paths, &FieldSelection { names: &names, all: false, cells: CellData::Values })?;
+    let fields = &opened.info()?.fields;
+    let names: Vec<String> = fields.iter().map(|field| field.name.clone()).collect();
+    let wanted = FieldSelection { names: &names, all: false, cells: CellData::Values };
+    // Of several time steps it may have been built from one.
+    let time = fields.first().and_then(|field| field.time);
+    let is_one = fields.iter().all(|field| field.time == time);
+    let step = time.filter(|_| is_one).map(|time| step_at(paths, time)).transpose()?.flatten();
+    let (mesh, _) = read_as(paths, &wanted, None, step)?;
     if let (Reference::Mesh, Some(path)) = (opened.reference(), paths.first()) {
         expect_cells(&mesh, path)?;
     }
