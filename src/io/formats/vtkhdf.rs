@@ -74,6 +74,9 @@ pub(super) fn read(file: &Hdf5File, options: &ReadOptions) -> Result<TetMesh, Re
     Ok(mesh)
 }
 
+/// Reads what is wanted of an array of so many components.
+type ReadValues<'a> = &'a dyn Fn(&Dataset, usize) -> Result<Vec<f64>, ReadReason>;
+
 /// Where a piece begins in the arrays, and how much of each is its own.
 #[derive(Clone, Debug)]
 struct Piece {
@@ -281,11 +284,7 @@ impl Reader<'_> {
     }
 
     /// The fields in a group, whose values `values` reads, given how many components there are.
-    fn collect(
-        &self,
-        group: &str,
-        values: &dyn Fn(&Dataset, usize) -> Result<Vec<f64>, ReadReason>,
-    ) -> Result<Vec<Field>, ReadError> {
+    fn collect(&self, group: &str, values: ReadValues<'_>) -> Result<Vec<Field>, ReadError> {
         let at_cells = group == "CellData";
         let mut collector = Collector::new(self.options.fields.as_deref());
         for name in self.members(group).at(|| format!("{ROOT}/{group}"))? {
