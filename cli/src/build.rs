@@ -23,15 +23,19 @@ use tetralod::mt::MtKind;
 /// Turns a tetrahedral mesh or a regular grid into an MT file.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// Mesh or grid: .vtu, .pvtu, .vti, .vts, .vtr, .vtk, Gmsh .msh, Medit .mesh, TetGen .node or .ele, Netgen .vol, .nrrd, .mha or
-    /// .mhd, or .raw with a .json beside it; - is the standard input. Points without cells go with --method insert. Several, or a
-    /// .pvd, are time steps over one mesh.
+    /// Mesh or grid: .vtu, .vti, .vts, .vtr, the lists .pvtu, .pvti, .pvts and .pvtr, .vtk, .vtkhdf, Exodus .exo, .ex2 or .e, Gmsh .msh,
+    /// Medit .mesh or .meshb, TetGen .node or .ele, Netgen .vol, .nrrd, .mha or .mhd, or .raw with a .json beside it; - is the
+    /// standard input. Points without cells go with --method insert. Several, a .pvd, and what a file has of them are time steps over
+    /// one mesh.
     #[arg(required = true, value_name = "INPUT")]
     inputs: Vec<PathBuf>,
-    /// The format of the standard input, which is refused if its content is another one: vtu, vti, vts, vtr, vtk, gmsh, medit,
-    /// netgen, nrrd or metaimage [default: what its content says].
+    /// The format of the standard input, which is refused if its content is another one: vtu, vti, vts, vtr, vtk, vtkhdf,
+    /// exodus, gmsh, medit, netgen, nrrd or metaimage [default: what its content says].
     #[arg(long, value_name = "FORMAT")]
     format: Option<String>,
+    /// Build one of the time steps alone; the first one is 0.
+    #[arg(long, value_name = "N")]
+    step: Option<usize>,
     /// The MT file to write.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
@@ -264,7 +268,8 @@ fn read(arguments: &Arguments, config: &BuildConfig, level: RepairLevel) -> Resu
     let wanted = FieldSelection { names: &config.fields, all: config.all_fields, cells };
     input::expect_format(&arguments.inputs, arguments.format.as_deref());
     let format = arguments.format.as_deref();
-    let (mut mesh, repaired) = input::read_as(&arguments.inputs, &wanted, level, format)?;
+    let (mut mesh, repaired) =
+        input::read_as(&arguments.inputs, &wanted, level, (format, arguments.step))?;
     if config.construction.method().keeps_the_mesh() {
         input::expect_cells(&mesh, &arguments.inputs[0])?;
     }

@@ -5,7 +5,7 @@ use anyhow::{Context, Result, bail};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use tetralod::io;
-use tetralod::io::{CellData, FieldSelection};
+use tetralod::io::{CellData, FieldSelection, ReadOptions, Step};
 use tetralod::mesh::{RepairLevel, RepairReport, TetMesh, repair_at};
 use tetralod::verify::Reference;
 
@@ -18,7 +18,7 @@ pub fn read(
     wanted: &FieldSelection<'_>,
     level: RepairLevel,
 ) -> Result<(TetMesh, RepairReport)> {
-    read_as(paths, wanted, level, None)
+    read_as(paths, wanted, level, (None, None))
 }
 
 /// What a path stands for the standard input.
@@ -33,20 +33,16 @@ pub fn expect_format(paths: &[PathBuf], format: Option<&str>) {
     }
 }
 
-/// As [`read`], of which the standard input has a format.
+/// As [`read`], of which the standard input has a format, and only one time step is wanted if `step` is given.
 pub fn read_as(
     paths: &[PathBuf],
     wanted: &FieldSelection<'_>,
     level: RepairLevel,
-    format: Option<&str>,
+    (format, step): (Option<&str>, Option<usize>),
 ) -> Result<(TetMesh, RepairReport)> {
-    let mut steps = Vec::new();
-    for path in paths {
-        if let Some(scheme) = files::scheme(path) {
-            bail!("{}: meshes are not read by {scheme}; fetch the file first", path.display());
-        }
-        // Read errors name the file themselves.
-        steps.extend(io::steps(path)?);
+    let mut steps = steps(paths)?;
+    if let Some(step) = step {
+        choose(&mut steps, step)?;
     }
     let mut input = Vec::new();
     if steps.iter().any(|step| step.path == Path::new(STANDARD_INPUT)) {
@@ -54,9 +50,14 @@ pub fn read_as(
         check_format(&input, format)?;
     }
     let named: Vec<_> = steps.iter().map(|step| (step.path.display().to_string(), step.time)).collect();
-    let mesh = io::read_time_steps(&named, wanted, &mut |number, options| match &steps[number].path {
-        path if path == Path::new(STANDARD_INPUT) => io::read_bytes_with("standard input", &input, options),
-        path => io::read_with(path, options),
+    let mesh = io::read_time_steps(&named, wanted, &mut |number, options| {
+        let options = &ReadOptions { step: steps[number].number, ..options.clone() };
+        match &steps[number].path {
+            path if path == Path::new(STANDARD_INPUT) => {
+                io::read_bytes_with("standard input", &input, options)
+            }
+            path => io::read_with(path, options),
+        }
     })?;
     drop(input);
     let (mut mesh, report) = mend(mesh, level, &steps[0].path)?;
@@ -65,6 +66,39 @@ pub fn read_as(
     }
     mesh.add_geometry_fields(wanted.names);
     Ok((mesh, report))
+}
+
+/// The time steps in these files.
+fn steps(paths: &[PathBuf]) -> Result<Vec<Step>> {
+    let mut steps = Vec::new();
+    for path in paths {
+        if let Some(scheme) = files::scheme(path) {
+            bail!("{}: meshes are not read by {scheme}; fetch the file first", path.display());
+        }
+        // Read errors name the file themselves.
+        steps.extend(io::steps(path)?);
+    }
+    Ok(steps)
+}
+
+/// Which of the time steps in these files is the one of this time, if the files say so.
+fn step_at(paths: &[PathBuf], time: f64) -> Result<Option<usize>> {
+    Ok(steps(paths)?.iter().position(|step| step.time == Some(time)))
+}
+
+/// Leaves one of the time steps. How many there are in the standard input is known when it was read.
+fn choose(steps: &mut Vec<Step>, step: usize) -> Result<()> {
+    if let [only] = steps.as_mut_slice()
+        && only.path == Path::new(STANDARD_INPUT)
+    {
+        only.number = step;
+        return Ok(());
+    }
+    if step >= steps.len() {
+        bail!("--step {step}: there are {} time steps, and the first one is 0", steps.len());
+    }
+    *steps = vec![steps.swap_remove(step)];
+    Ok(())
 }
 
 /// Refuses bytes that are not of the format that was given.
@@ -110,9 +144,14 @@ pub fn read_mesh(path: &Path) -> Result<(TetMesh, RepairReport)> {
 
 /// Reads what the MT was built from: time steps of a mesh, mended as it was then, or, where no more is needed, of points.
 pub fn read_reference(paths: &[PathBuf], opened: &Opened) -> Result<TetMesh> {
-    let names: Vec<String> = opened.info()?.fields.iter().map(|field| field.name.clone()).collect();
+    let fields = &opened.info()?.fields;
+    let names: Vec<String> = fields.iter().map(|field| field.name.clone()).collect();
     let wanted = FieldSelection { names: &names, all: false, cells: CellData::Values };
-    let (mesh, _) = read(paths, &wanted, opened.repair_level())?;
+    // Of several time steps it may have been built from one.
+    let time = fields.first().and_then(|field| field.time);
+    let is_one = fields.iter().all(|field| field.time == time);
+    let step = time.filter(|_| is_one).map(|time| step_at(paths, time)).transpose()?.flatten();
+    let (mesh, _) = read_as(paths, &wanted, opened.repair_level(), (None, step))?;
     if let (Reference::Mesh, Some(path)) = (opened.reference(), paths.first()) {
         expect_cells(&mesh, path)?;
     }

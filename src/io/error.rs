@@ -24,8 +24,9 @@ pub enum ReadReason {
     Io(String),
     /// The content is of no known kind.
     #[error(
-        "not a format that is known here; give VTK XML (.vtu, .vti, .vts, .vtr), legacy VTK (.vtk){}, or raw samples with a \
+        "not a format that is known here; give VTK XML (.vtu, .vti, .vts, .vtr), legacy VTK (.vtk){}{}, or raw samples with a \
          .json sidecar",
+        if cfg!(feature = "hdf5") { ", VTKHDF, Exodus" } else { "" },
         if cfg!(feature = "formats") { ", Gmsh (.msh), Medit (.mesh), TetGen (.node, .ele), Netgen (.vol), NRRD or MetaImage" } else { "" }
     )]
     UnknownFormat,
@@ -108,6 +109,16 @@ pub enum ReadReason {
         /// The largest number allowed.
         limit: u64,
     },
+}
+
+impl ReadReason {
+    /// The same of a field at cells: what was a point is a cell.
+    pub(super) fn at_cells(self) -> Self {
+        match self {
+            Self::NotFinite { point } => Self::NotFiniteCell { cell: point },
+            reason => reason,
+        }
+    }
 }
 
 /// A place in front of a reason; nothing for the whole file.

@@ -3,7 +3,7 @@
 use crate::io::error::{At, ReadError, ReadReason};
 use crate::io::vtu::PieceReader;
 use crate::io::xml::Document;
-use crate::io::{CellData, ReadOptions, Survey, vtu};
+use crate::io::{Beside, CellData, ReadOptions, Survey, for_each_file, vtu};
 use crate::mesh::{Field, Grid, TetMesh};
 
 /// Most points of a grid: 512³. Its tetrahedra take some 13 GB.
@@ -53,38 +53,54 @@ pub(super) fn sixfold(fields: &mut [Field]) {
     }
 }
 
-/// Reads a document of type `ImageData`.
-pub(super) fn read(document: &Document<'_>, options: &ReadOptions) -> Result<TetMesh, ReadError> {
-    let whole_place = || "<ImageData>".to_owned();
-    let (grid, whole) = read_grid(document).at(whole_place)?;
-    let (mut parts, mut cubes) = (Vec::new(), Vec::new());
-    let reader = |(number, piece)| PieceReader { document, piece, number, options };
-    for piece in document.pieces.iter().enumerate().map(reader) {
-        parts.push(read_part(&piece, whole)?);
-        if options.cells == CellData::Values {
-            cubes.extend(read_cubes(&piece, whole)?);
-        }
-    }
-    let fields = assemble(parts, whole).at(whole_place)?;
-    let cubes = whole_cubes(document, options, cubes, whole)?;
-    grid_mesh(grid, fields, cubes).at(whole_place)
-}
-
-/// The fields at the cubes of the whole grid, put together of those of its pieces.
-pub(super) fn whole_cubes(
+/// Reads a document of type `ImageData`, or `PImageData` with the files that it lists, and its time.
+pub(super) fn read(
     document: &Document<'_>,
     options: &ReadOptions,
-    parts: Vec<Part>,
-    whole: Extent,
-) -> Result<Vec<Field>, ReadError> {
-    if parts.iter().any(|part| !part.fields.is_empty()) {
-        return assemble(parts, cubes_of(whole)).at(|| format!("<{}>", document.kind));
-    }
-    match document.pieces.first() {
-        Some(piece) if options.cells == CellData::Names => {
-            PieceReader { document, piece, number: 0, options }.field_names("CellData")
+    beside: Beside<'_>,
+) -> Result<(TetMesh, Option<f64>), ReadError> {
+    let whole_place = || format!("<{}>", document.kind);
+    let (grid, whole) = read_grid(document).at(whole_place)?;
+    let mut parts = Vec::new();
+    let mut cubes = Cubes::default();
+    let time = for_each_file(document, beside, &mut |file| {
+        for (number, piece) in file.pieces.iter().enumerate() {
+            let reader = PieceReader { document: file, piece, number, options };
+            parts.push(read_part(&reader, whole)?);
+            cubes.add(&reader, whole)?;
         }
-        _ => Ok(Vec::new()),
+        Ok(())
+    })?;
+    let fields = assemble(parts, whole).at(whole_place)?;
+    let cubes = cubes.finish(whole).at(whole_place)?;
+    Ok((grid_mesh(grid, fields, cubes).at(whole_place)?, time))
+}
+
+/// The fields at the cubes of a grid in pieces.
+#[derive(Default)]
+pub(super) struct Cubes {
+    parts: Vec<Part>,
+    /// Without values, where only names are asked for.
+    names: Vec<Field>,
+}
+
+impl Cubes {
+    /// Reads what is wanted of a piece.
+    pub fn add(&mut self, reader: &PieceReader<'_, '_>, whole: Extent) -> Result<(), ReadError> {
+        match reader.options.cells {
+            CellData::Values => self.parts.extend(read_cubes(reader, whole)?),
+            CellData::Names if self.names.is_empty() => self.names = reader.field_names("CellData")?,
+            CellData::Names | CellData::LeaveOut => {}
+        }
+        Ok(())
+    }
+
+    /// The fields of the whole grid.
+    pub fn finish(self, whole: Extent) -> Result<Vec<Field>, ReadReason> {
+        if self.parts.iter().all(|part| part.fields.is_empty()) {
+            return Ok(self.names);
+        }
+        assemble(self.parts, cubes_of(whole))
     }
 }
 
@@ -101,7 +117,7 @@ pub(super) fn cubes_of(mut extent: Extent) -> Extent {
 }
 
 /// The fields at the cubes of a piece; none if it is flat.
-pub(super) fn read_cubes(reader: &PieceReader<'_, '_>, whole: Extent) -> Result<Option<Part>, ReadError> {
+fn read_cubes(reader: &PieceReader<'_, '_>, whole: Extent) -> Result<Option<Part>, ReadError> {
     let extent = reader.piece.attributes.numbers("Extent").at(|| reader.place())?;
     let extent = cubes_of(extent.unwrap_or(whole));
     let Ok(dims) = dims_in(extent, cubes_of(whole)) else { return Ok(None) };
@@ -134,9 +150,19 @@ fn read_grid(document: &Document<'_>) -> Result<(Grid, Extent), ReadReason> {
         .ok_or_else(|| ReadReason::Missing("attribute WholeExtent".into()))?;
     let origin = attributes.numbers("Origin")?.unwrap_or([0.0; 3]);
     let spacing: [f64; 3] = attributes.numbers("Spacing")?.unwrap_or([1.0; 3]);
+    let direction: Option<[f64; 9]> = attributes.numbers("Direction")?;
+    placed_grid(whole, origin, spacing, direction.as_ref().map(|direction| &direction[..]))
+}
+
+/// The grid of VTK's image data, which may not be turned.
+pub(super) fn placed_grid(
+    whole: Extent,
+    origin: [f64; 3],
+    spacing: [f64; 3],
+    direction: Option<&[f64]>,
+) -> Result<(Grid, Extent), ReadReason> {
     let identity = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
-    let direction: [f64; 9] = attributes.numbers("Direction")?.unwrap_or(identity);
-    if direction != identity {
+    if let Some(direction) = direction.filter(|direction| **direction != identity) {
         let what = format!("a grid turned by Direction=\"{direction:?}\"");
         return Err(ReadReason::Unsupported { what, remedy: "resample it along the axes".into() });
     }

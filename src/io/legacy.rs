@@ -42,7 +42,7 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadE
 pub(super) fn survey(bytes: &[u8]) -> Result<Survey, ReadError> {
     let (mut file, kind, _) = Reader::open(bytes).at(|| "header".into())?;
     file.skims = true;
-    let options = ReadOptions { fields: None, cells: CellData::Names };
+    let options = ReadOptions { fields: None, cells: CellData::Names, step: 0 };
     let mut body = Body { skims: true, ..Body::new(&options, None) };
     while let Some(keyword) = file.next_word().at(|| "body".into())? {
         let keyword = keyword.to_ascii_lowercase();

@@ -6,14 +6,16 @@
 //! | VTK XML image data | `.vti` | all encodings, several pieces | appended raw, zlib |
 //! | legacy VTK, versions 1.0 to 5.1 | `.vtk` | ASCII and binary; unstructured, structured and rectilinear grids, structured points | |
 //! | VTK XML structured and rectilinear grids | `.vts`, `.vtr` | all encodings, several pieces | |
-//! | VTK XML unstructured grid in several files | `.pvtu` | by [`read`]; feature `formats` | |
+//! | VTK XML, each of these in several files | `.pvtu`, `.pvti`, `.pvtr`, `.pvts` | by [`read`]; feature `formats` | |
 //! | raw samples | `.raw` + `.json` | any numeric type and byte order | |
 //! | Gmsh, versions 1 to 4.1 | `.msh` | text and binary; feature `formats` | |
-//! | Medit | `.mesh`, `.sol` | text; feature `formats` | |
+//! | Medit | `.mesh`, `.sol`, `.meshb`, `.solb` | text and binary; feature `formats` | |
 //! | TetGen | `.node` + `.ele` | by [`read`]; feature `formats` | |
 //! | Netgen | `.vol` | feature `formats` | |
 //! | NRRD | `.nrrd`, `.nhdr` | raw, gzip, text; feature `formats` | |
 //! | `MetaImage` | `.mha`, `.mhd` | raw, zlib; feature `formats` | |
+//! | VTKHDF | `.vtkhdf`, `.hdf` | unstructured grids and image data; feature `hdf5` | |
+//! | Exodus II | `.exo`, `.ex2`, `.e` | feature `hdf5` | |
 //! | VTK XML poly data | `.vtp` | | appended raw, zlib |
 //! | STL | `.stl` | | binary, triangles alone |
 //! | PLY | `.ply` | | binary, little-endian |
@@ -24,7 +26,7 @@
 //! Point arrays become scalar fields: an array of several components gives one field a component (`name_x`, ...) and
 //! `name_magnitude`. Units and times are kept where the file contains them. Arrays at cells are read where that is asked
 //! for ([`ReadOptions::cells`]), arrays that are not numbers are left out.
-//! Time steps come in several files, which a `.pvd` may list: see [`steps`].
+//! Time steps come in several files, which a `.pvd` may list, or in one that has several: see [`steps`].
 //! Cells of other types are split into tetrahedra that fit those of their neighbours, linear and quadratic ones; cells without a
 //! volume are left out beside them. Readers check the file, not the mesh: see [`crate::mesh::repair`].
 
@@ -72,6 +74,8 @@ pub struct ReadOptions {
     pub fields: Option<Vec<String>>,
     /// What to do with fields at cells.
     pub cells: CellData,
+    /// Which step to read of a file that has several (see [`Step::number`]): the first one is 0. Others have one.
+    pub step: usize,
 }
 
 /// What to do with fields at cells.
@@ -107,8 +111,20 @@ pub fn read_with(path: &Path, options: &ReadOptions) -> Result<TetMesh, ReadErro
         "raw" => read_raw_by_sidecar(&path.with_extension("json"), Some(path)),
         #[cfg(feature = "formats")]
         "node" | "ele" => formats::tetgen::read(path, options),
-        _ => read_in(&name, &load(path)?, options, &|file| load_beside(path, file)),
+        _ => read_ranges(path, options)
+            .unwrap_or_else(|| read_in(&name, &load(path)?, options, &|file| load_beside(path, file))),
     }
+}
+
+/// Reads what is wanted of a file of a format that need not be read as a whole; none if it is another one.
+#[cfg(feature = "hdf5")]
+fn read_ranges(path: &Path, options: &ReadOptions) -> Option<Result<TetMesh, ReadError>> {
+    formats::hdf5::read_at(path, options)
+}
+
+#[cfg(not(feature = "hdf5"))]
+fn read_ranges(_: &Path, _: &ReadOptions) -> Option<Result<TetMesh, ReadError>> {
+    None
 }
 
 /// Reads a mesh or grid from the bytes of a file; `name` is used in errors alone.
@@ -196,20 +212,57 @@ fn read_raw_by_sidecar(sidecar_path: &Path, samples_path: Option<&Path>) -> Resu
 
 fn read_xml(bytes: &[u8], options: &ReadOptions, beside: Beside<'_>) -> Result<TetMesh, ReadError> {
     let document = xml::Document::parse(bytes)?;
-    let mut time = document.time();
-    let mut mesh = match document.kind.as_str() {
-        "UnstructuredGrid" => vtu::read(&document, options)?,
-        "ImageData" => image::read(&document, options)?,
-        structured::RECTILINEAR | structured::CURVILINEAR => structured::read(&document, options)?,
-        "PUnstructuredGrid" => {
-            let (mesh, of_pieces) = read_pieces(&document, options, beside)?;
-            time = time.or(of_pieces);
-            mesh
-        }
-        other => return Err(not_read(other)).at(String::new),
+    let (mut mesh, of_pieces) = match document.kind.as_str() {
+        "UnstructuredGrid" => (vtu::read(&document, options)?, None),
+        "PUnstructuredGrid" => read_pieces(&document, options, beside)?,
+        kind => match kind.strip_prefix(IN_FILES).unwrap_or(kind) {
+            "ImageData" => image::read(&document, options, beside)?,
+            structured::RECTILINEAR | structured::CURVILINEAR => {
+                structured::read(&document, options, beside)?
+            }
+            _ => return Err(not_read(kind)).at(String::new),
+        },
     };
+    let time = document.time().or(of_pieces);
     mesh.fields.iter_mut().chain(&mut mesh.cell_fields).for_each(|field| field.time = time);
     Ok(mesh)
+}
+
+/// What the types of documents begin with that list files with pieces.
+const IN_FILES: char = 'P';
+
+/// Reads a document with the pieces of a grid.
+type ReadFile<'a> = &'a mut dyn FnMut(&xml::Document<'_>) -> Result<(), ReadError>;
+
+/// Has `read` read the document, or the files that it lists; returns the time of the first one that has one.
+fn for_each_file(
+    document: &xml::Document<'_>,
+    beside: Beside<'_>,
+    read: ReadFile<'_>,
+) -> Result<Option<f64>, ReadError> {
+    if !document.kind.starts_with(IN_FILES) {
+        read(document)?;
+        return Ok(document.time());
+    }
+    read_listed(document, beside, read)
+}
+
+#[cfg(feature = "formats")]
+fn read_listed(
+    document: &xml::Document<'_>,
+    beside: Beside<'_>,
+    read: ReadFile<'_>,
+) -> Result<Option<f64>, ReadError> {
+    pvtu::for_each_file(document, beside, read)
+}
+
+#[cfg(not(feature = "formats"))]
+fn read_listed(
+    document: &xml::Document<'_>,
+    _: Beside<'_>,
+    _: ReadFile<'_>,
+) -> Result<Option<f64>, ReadError> {
+    Err(not_read(&document.kind)).at(String::new)
 }
 
 /// Reads the pieces that are listed, and their time.
@@ -235,7 +288,9 @@ fn read_pieces(
 fn not_read(kind: &str) -> ReadReason {
     let (what, remedy) = match kind {
         "Collection" => ("a list of time steps as one mesh".into(), "give one of the files that it lists"),
-        "PUnstructuredGrid" => ("a list of pieces".into(), "give one of the files that it lists"),
+        "PUnstructuredGrid" | "PImageData" | "PRectilinearGrid" | "PStructuredGrid" => {
+            ("a list of pieces".into(), "give one of the files that it lists")
+        }
         other => (
             format!("a data set of type {other}"),
             "give an UnstructuredGrid, a StructuredGrid, a RectilinearGrid or ImageData",

@@ -6,6 +6,8 @@ use quick_xml::Reader;
 use quick_xml::events::Event;
 
 use crate::io::error::{At, ReadError, ReadReason};
+#[cfg(feature = "hdf5")]
+use crate::io::formats;
 use crate::io::xml::Attributes;
 use crate::io::{in_file, load, lower_extension};
 
@@ -16,22 +18,41 @@ pub struct Step {
     pub path: PathBuf,
     /// The time, if the list contains it; the file may, too.
     pub time: Option<f64>,
+    /// Which of the steps in the file it is: for [`ReadOptions::step`](crate::io::ReadOptions::step).
+    pub number: usize,
 }
 
-/// The time steps that the file at `path` stands for: those that it lists if it is a `.pvd`, in ascending order, else
-/// itself alone.
+/// The time steps that the file at `path` stands for: those that it lists if it is a `.pvd`, in ascending order, those that it
+/// has if it is VTKHDF or Exodus, else itself alone.
 ///
 /// # Errors
 /// If the list cannot be read, is damaged or empty, or has several files for one time.
 pub fn steps(path: &Path) -> Result<Vec<Step>, ReadError> {
     if lower_extension(path) != "pvd" {
-        return Ok(vec![Step { path: path.to_owned(), time: None }]);
+        let step = |(number, time)| Step { path: path.to_owned(), time, number };
+        let times = times_in(path)?;
+        // The reader of a file with one step knows its time.
+        if times.len() < 2 {
+            return Ok(vec![step((0, None))]);
+        }
+        return Ok(times.into_iter().map(Some).enumerate().map(step).collect());
     }
     let listed = load(path).and_then(|bytes| parse(&bytes).at(String::new));
     let listed = listed.map_err(|error| in_file(error, &path.display().to_string()))?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    let step = |(time, file): (f64, String)| Step { path: folder.join(file), time: Some(time) };
+    let step = |(time, file): (f64, String)| Step { path: folder.join(file), time: Some(time), number: 0 };
     Ok(listed.into_iter().map(step).collect())
+}
+
+/// The times of the steps in a file that may have several.
+#[cfg(feature = "hdf5")]
+fn times_in(path: &Path) -> Result<Vec<f64>, ReadError> {
+    formats::hdf5::times_at(path)
+}
+
+#[cfg(not(feature = "hdf5"))]
+fn times_in(_: &Path) -> Result<Vec<f64>, ReadError> {
+    Ok(Vec::new())
 }
 
 /// Times and files, in ascending order.

@@ -8,7 +8,7 @@ use crate::io::fields::component_of;
 use crate::io::image::{self, Extent, MAX_GRID_POINTS, Part};
 use crate::io::vtu::PieceReader;
 use crate::io::xml::Document;
-use crate::io::{CellData, ReadOptions, Survey, points_from, vtu};
+use crate::io::{Beside, ReadOptions, Survey, for_each_file, points_from, vtu};
 use crate::mesh::{Field, TetMesh, kuhn_tets};
 
 /// Points along each axis: at least two, and not too many together.
@@ -53,18 +53,24 @@ pub(super) fn mesh(
     Ok(TetMesh { positions, fields, tets: kuhn_tets(dims), grid: None, cell_fields })
 }
 
-/// Reads a document of type `RectilinearGrid` or `StructuredGrid`.
-pub(super) fn read(document: &Document<'_>, options: &ReadOptions) -> Result<TetMesh, ReadError> {
+/// Reads a document of type `RectilinearGrid` or `StructuredGrid`, or a list of files with the pieces of one, and its time.
+pub(super) fn read(
+    document: &Document<'_>,
+    options: &ReadOptions,
+    beside: Beside<'_>,
+) -> Result<(TetMesh, Option<f64>), ReadError> {
     let place = || format!("<{}>", document.kind);
     let (whole, dims) = whole(document).at(place)?;
-    let (mut parts, mut cubes) = (Vec::new(), Vec::new());
-    for (number, piece) in document.pieces.iter().enumerate() {
-        let reader = PieceReader { document, piece, number, options };
-        parts.push(read_part(&reader, whole)?);
-        if options.cells == CellData::Values {
-            cubes.extend(image::read_cubes(&reader, whole)?);
+    let mut parts = Vec::new();
+    let mut cubes = image::Cubes::default();
+    let time = for_each_file(document, beside, &mut |file| {
+        for (number, piece) in file.pieces.iter().enumerate() {
+            let reader = PieceReader { document: file, piece, number, options };
+            parts.push(read_part(&reader, whole)?);
+            cubes.add(&reader, whole)?;
         }
-    }
+        Ok(())
+    })?;
     // The first three are the coordinates.
     let mut fields = image::assemble(parts, whole).at(place)?;
     if fields.len() < AXES.len() {
@@ -74,8 +80,8 @@ pub(super) fn read(document: &Document<'_>, options: &ReadOptions) -> Result<Tet
     let coordinates = |i: usize| fields.iter().map(move |field| field.values[i]);
     let points: Vec<f64> = (0..fields[0].values.len()).flat_map(coordinates).collect();
     let positions = points_from(&points).at(place)?;
-    let cubes = image::whole_cubes(document, options, cubes, whole)?;
-    mesh(dims.map(|d| d as u32), positions, rest, cubes).at(place)
+    let cubes = cubes.finish(whole).at(place)?;
+    Ok((mesh(dims.map(|d| d as u32), positions, rest, cubes).at(place)?, time))
 }
 
 /// Says what a document of type `RectilinearGrid` or `StructuredGrid` contains.

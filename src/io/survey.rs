@@ -10,7 +10,7 @@ use crate::mesh::{Field, Grid};
 #[derive(Clone, Debug, PartialEq)]
 pub struct Survey {
     /// The format: `"vtu"`, `"vti"`, `"vtr"`, `"vts"`, `"vtk"`, `"raw"`, or with the feature `formats`
-    /// `"gmsh"`, `"medit"`, `"netgen"`, `"nrrd"` or `"metaimage"`.
+    /// `"gmsh"`, `"medit"`, `"netgen"`, `"nrrd"` or `"metaimage"`, with the feature `hdf5` `"vtkhdf"` or `"exodus"`.
     pub format: &'static str,
     /// Its points.
     pub points: u64,
@@ -54,7 +54,7 @@ pub fn survey(name: &str, bytes: &[u8]) -> Result<Survey, ReadError> {
 #[cfg(feature = "formats")]
 fn survey_other(name: &str, bytes: &[u8]) -> Result<Survey, ReadError> {
     let Some(format) = formats::name(bytes) else { return Err(ReadReason::UnknownFormat).at(String::new) };
-    let options = ReadOptions { fields: None, cells: CellData::Names };
+    let options = ReadOptions { cells: CellData::Names, ..ReadOptions::default() };
     let mesh = super::read_bytes_with(name, bytes, &options)?;
     let described =
         |fields: Vec<Field>| fields.into_iter().map(|field| Field { values: Vec::new(), ..field });
@@ -103,6 +103,9 @@ pub fn format_of(bytes: &[u8]) -> Option<&'static str> {
         (structured::RECTILINEAR, "vtr"),
         (structured::CURVILINEAR, "vts"),
         ("PUnstructuredGrid", "pvtu"),
+        ("PImageData", "pvti"),
+        ("PRectilinearGrid", "pvtr"),
+        ("PStructuredGrid", "pvts"),
     ];
     formats.iter().find(|(name, _)| *name == kind).map(|(_, format)| *format)
 }

@@ -63,7 +63,7 @@ pub fn read_time_steps(
     read: &mut dyn FnMut(usize, &ReadOptions) -> Result<TetMesh, ReadError>,
 ) -> Result<TetMesh, TimeStepsError> {
     let ((_, first_time), later) = steps.split_first().ok_or(TimeStepsError::None)?;
-    let mut options = ReadOptions { fields: None, cells: wanted.cells };
+    let mut options = ReadOptions { cells: wanted.cells, ..ReadOptions::default() };
     let mut mesh = read(0, &options)?;
     if !later.is_empty() {
         if let Some(names) = reduce(&mut mesh, wanted) {

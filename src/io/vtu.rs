@@ -59,7 +59,7 @@ pub(super) struct PieceReader<'a, 'd> {
 }
 
 /// Numbers the points of a piece, given their positions.
-type NumberPoints<'a> = &'a mut dyn FnMut(&[[f64; 3]]) -> Result<Numbering, ReadReason>;
+pub(super) type NumberPoints<'a> = &'a mut dyn FnMut(&[[f64; 3]]) -> Result<Numbering, ReadReason>;
 
 impl PieceReader<'_, '_> {
     /// How to call the piece in an error.
@@ -107,13 +107,8 @@ impl PieceReader<'_, '_> {
 
     /// The fields at cells.
     pub fn cell_fields(&self, cells: usize) -> Result<Vec<Field>, ReadError> {
-        self.fields("CellData", cells).map_err(|error| match error.reason {
-            // A point that is named in an error about a field at cells is a cell.
-            ReadReason::NotFinite { point } => {
-                ReadError { reason: ReadReason::NotFiniteCell { cell: point }, ..error }
-            }
-            _ => error,
-        })
+        let named = |error: ReadError| ReadError { reason: error.reason.at_cells(), ..error };
+        self.fields("CellData", cells).map_err(named)
     }
 
     /// The fields in a section without their values.
@@ -198,10 +193,10 @@ impl PieceReader<'_, '_> {
 
 /// Arrays at cells and points by which VTK marks what belongs to another piece, or is hidden: flags of each, and how far it is
 /// from the piece in old files.
-const GHOST_TYPE: &str = "vtkGhostType";
+pub(super) const GHOST_TYPE: &str = "vtkGhostType";
 const GHOST_LEVELS: &str = "vtkGhostLevels";
 /// The flags of cells that another piece has, and of those that are hidden.
-const GHOST_OR_HIDDEN: i64 = 1 | 32;
+pub(super) const GHOST_OR_HIDDEN: i64 = 1 | 32;
 
 /// Whether an array is a field, not a mark of VTK's.
 fn is_field(array: &Array<'_>) -> bool {

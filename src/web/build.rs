@@ -141,7 +141,7 @@ impl MeshBuilder {
             Some(grid) => Some(Bounds::of(&[grid.point([0; 3]), grid.point(grid.dims.map(|d| d - 1))])),
             None if forecast.reading > self.memory => None,
             None => {
-                let options = ReadOptions { fields: Some(Vec::new()), cells: CellData::LeaveOut };
+                let options = ReadOptions { fields: Some(Vec::new()), cells: CellData::LeaveOut, step: 0 };
                 let points = first.read(&options)?.positions;
                 Some(Bounds::of(&points)).filter(|_| !points.is_empty())
             }
@@ -264,7 +264,7 @@ impl MeshBuilder {
             let file = files.get_mut(number).and_then(Option::take).unwrap_or_default();
             stages.count("parse", number as u64, total);
             let fields = options.fields.clone().or(fields.clone());
-            file.read(&ReadOptions { fields, cells: options.cells })
+            file.read(&ReadOptions { fields, ..options.clone() })
         };
         let mesh = read_time_steps(&steps, &wanted, &mut read)?;
         if stages.stopped { Err(BuildError::Stopped.into()) } else { Ok(mesh) }

@@ -13,7 +13,7 @@ fn cells(cells: CellData) -> ReadOptions {
 }
 
 fn only(names: &[&str], cells: CellData) -> ReadOptions {
-    ReadOptions { fields: Some(names.iter().map(|&name| name.to_owned()).collect()), cells }
+    ReadOptions { fields: Some(names.iter().map(|&name| name.to_owned()).collect()), cells, step: 0 }
 }
 
 fn names(mesh: &TetMesh) -> Vec<&str> {

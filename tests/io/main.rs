@@ -6,6 +6,8 @@ mod encodings;
 mod fields;
 #[allow(dead_code, reason = "each test uses a part of it")]
 mod files;
+#[cfg(feature = "hdf5")]
+mod hdf5;
 #[cfg(feature = "formats")]
 mod meshers;
 #[cfg(feature = "formats")]

@@ -122,3 +122,90 @@ fn pieces_that_cannot_be_read_are_named() {
     let alone = io::read_bytes("a.pvtu", list(&["0.vtu"]).as_bytes()).unwrap_err().to_string();
     assert!(alone.contains("a file that needs another (\"0.vtu\")"), "{alone}");
 }
+
+/// The part of a sample grid between two indices along x, as a file of its type.
+fn slab(whole: &TetMesh, kind: &str, dims: [usize; 3], first: [i64; 3], [from, to]: [usize; 2]) -> Vec<u8> {
+    let inside = |i: &usize| (from..=to).contains(&(i % dims[0]));
+    let points: Vec<usize> = (0..whole.positions.len()).filter(inside).collect();
+    let values: Vec<f64> = points.iter().map(|&i| whole.fields[0].values[i]).collect();
+    let mut arrays = vec![Array::new("PointData", "density", "Float64", 1, &values)];
+    let cubes: Vec<f64> =
+        (from..to).cycle().take((to - from) * (dims[1] - 1) * (dims[2] - 1)).map(|x| x as f64).collect();
+    arrays.push(Array::new("CellData", "x", "Int32", 1, &cubes));
+    let steps = [1, dims[0], dims[0] * dims[1]];
+    match kind {
+        "RectilinearGrid" => {
+            for axis in 0..3 {
+                let range = if axis == 0 { from..=to } else { 0..=dims[axis] - 1 };
+                let along: Vec<f64> = range.map(|i| whole.positions[i * steps[axis]][axis]).collect();
+                arrays.push(Array::new("Coordinates", "", "Float64", 1, &along));
+            }
+        }
+        "StructuredGrid" => {
+            let places: Vec<f64> = points.iter().flat_map(|&i| whole.positions[i]).collect();
+            arrays.push(Array::new("Points", "Points", "Float64", 3, &places));
+        }
+        _ => {}
+    }
+    let extent = extent(dims, first, [from, to]);
+    let dataset = format!("WholeExtent=\"{extent}\" Origin=\"0 2 -2.75\" Spacing=\"0.5 1 0.25\"");
+    xml(Style::PLAIN, kind, &dataset, &[(format!("Extent=\"{extent}\""), arrays)])
+}
+
+fn extent(dims: [usize; 3], first: [i64; 3], [from, to]: [usize; 2]) -> String {
+    let ends = [[from, to], [0, dims[1] - 1], [0, dims[2] - 1]];
+    let words: Vec<String> =
+        (0..3).flat_map(|axis| ends[axis].map(|end| (first[axis] + end as i64).to_string())).collect();
+    words.join(" ")
+}
+
+#[test]
+fn grids_in_several_files_are_put_together() {
+    let folder = Folder::new("grids");
+    let (even, uneven) = (grid_sample(), uneven_sample());
+    for (kind, ending, whole, dims, first) in [
+        ("ImageData", "vti", &even, [4, 3, 2], [2, 0, -1]),
+        ("RectilinearGrid", "vtr", &uneven, [3, 2, 3], [0, 5, 0]),
+        ("StructuredGrid", "vts", &uneven, [3, 2, 3], [0, 5, 0]),
+    ] {
+        let last = dims[0] - 1;
+        let mut pieces = String::new();
+        for (number, ends) in [[1, last], [0, 1]].into_iter().enumerate() {
+            let name = format!("parts/{number}.{ending}");
+            folder.write(&name, &slab(whole, kind, dims, first, ends));
+            pieces += &format!("<Piece Extent=\"{}\" Source=\"{name}\"/>", extent(dims, first, ends));
+        }
+        let list = |pieces: &str| {
+            format!(
+                "<VTKFile type=\"P{kind}\"><P{kind} WholeExtent=\"{}\" Origin=\"0 2 -2.75\" Spacing=\"0.5 1 0.25\">\
+                 {pieces}</P{kind}></VTKFile>",
+                extent(dims, first, [0, last])
+            )
+        };
+        let path = folder.write(&format!("a.p{ending}"), list(&pieces).as_bytes());
+        let options = io::ReadOptions { cells: io::CellData::Values, ..io::ReadOptions::default() };
+        let found = io::read_with(&path, &options).unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(
+            (&found.positions, &found.tets, found.grid),
+            (&whole.positions, &whole.tets, whole.grid),
+            "{kind}"
+        );
+        assert_eq!(found.fields[0].values, whole.fields[0].values, "{kind}");
+        // Six tetrahedra a cube, whose number along x is the value.
+        let along = |cell: usize| ((cell / 6) % last) as f64;
+        assert_eq!(
+            found.cell_fields[0].values,
+            (0..found.tets.len()).map(along).collect::<Vec<_>>(),
+            "{kind}"
+        );
+        assert_eq!(io::format_of(list(&pieces).as_bytes()), Some(format!("p{ending}").as_str()));
+        let cut = folder
+            .write(&format!("b.p{ending}"), list(pieces.split_inclusive("/>").next().unwrap()).as_bytes());
+        let error = io::read(&cut).unwrap_err().to_string();
+        assert!(error.contains("a piece of the grid is missing"), "{error}");
+        let wrong = folder
+            .write("c.pvtx", list(&pieces).replace(&format!("P{kind}"), "PUnstructuredGrid").as_bytes());
+        let error = io::read(&wrong).unwrap_err().to_string();
+        assert!(error.contains(&format!("a piece of type {kind}")), "{error}");
+    }
+}

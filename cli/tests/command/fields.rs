@@ -79,17 +79,33 @@ fn several_fields_with_units_times_and_metadata() {
     assert_eq!((&a["fields"], &a["metadata"]), (&b["fields"], &b["metadata"]));
 }
 
+/// The fields of an MT with the times that they are of.
+fn times(path: &str) -> Vec<(String, f64)> {
+    let info = json(&["info", path, "--json"]);
+    let fields = info["fields"].as_array().expect("a list").iter();
+    fields.map(|f| (f["name"].as_str().expect("a name").to_owned(), number(f, "time"))).collect()
+}
+
+#[test]
+fn a_file_with_several_time_steps_gives_all_or_one() {
+    let folder = Folder::new("steps-in-a-file");
+    let mt = folder.path("a.mt");
+    let input = format!("{}/../tests/data/steps.vtkhdf", env!("CARGO_MANIFEST_DIR"));
+    for (more, expected) in [(&[][..], &[0.0, 0.5, 2.0][..]), (&["--step", "1"], &[0.5])] {
+        good(&[&["build", &input, "-o", &mt, "--quiet"], more].concat());
+        let expected: Vec<_> = expected.iter().map(|time| ("p".to_owned(), *time)).collect();
+        assert_eq!(times(&mt), expected);
+        assert_eq!(json(&["verify", &mt, "--against", &input, "--json"])["valid"], true);
+    }
+    bad(1, &["build", &input, "-o", &mt, "--step", "3"], &["--step 3", "there are 3 time steps"]);
+}
+
 #[test]
 fn time_steps_share_one_mesh() {
     let folder = Folder::new("time-steps");
     let [first, second, mt, list] = ["a.vtu", "b.vtu", "s.mt", "s.pvd"].map(|name| folder.path(name));
     write(&first, &step(None, 1.0));
     write(&second, &step(None, -2.0));
-    let times = |path: &str| -> Vec<(String, f64)> {
-        let info = json(&["info", path, "--json"]);
-        let fields = info["fields"].as_array().expect("a list").iter();
-        fields.map(|f| (f["name"].as_str().expect("a name").to_owned(), number(f, "time"))).collect()
-    };
     let fields = ["--field", "U_y", "--field", "p", "--quiet"];
     good(&[&["build", &first, &second, "-o", &mt], &fields[..]].concat());
     let pairs = |a: f64, b: f64| [("U_y", a), ("U_y", b), ("p", a), ("p", b)].map(|(n, t)| (n.to_owned(), t));

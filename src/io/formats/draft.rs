@@ -41,8 +41,19 @@ impl<'a> Draft<'a> {
         values: Vec<f64>,
         integer: bool,
     ) -> Result<(), ReadReason> {
+        self.read_at_points(name, components, integer, || Ok(values))
+    }
+
+    /// The same with values that are read only if they are wanted.
+    pub fn read_at_points(
+        &mut self,
+        name: &str,
+        components: usize,
+        integer: bool,
+        read: impl FnOnce() -> Result<Vec<f64>, ReadReason>,
+    ) -> Result<(), ReadReason> {
         match self.fields.claim(name, components)? {
-            Some(claim) => self.fields.fill(claim, values, integer, ""),
+            Some(claim) => self.fields.fill(claim, read()?, integer, ""),
             None => Ok(()),
         }
     }
@@ -55,17 +66,24 @@ impl<'a> Draft<'a> {
         values: Vec<f64>,
         integer: bool,
     ) -> Result<(), ReadReason> {
+        self.read_at_cells(name, components, integer, || Ok(values))
+    }
+
+    /// The same with values that are read only if they are wanted.
+    pub fn read_at_cells(
+        &mut self,
+        name: &str,
+        components: usize,
+        integer: bool,
+        read: impl FnOnce() -> Result<Vec<f64>, ReadReason>,
+    ) -> Result<(), ReadReason> {
         if self.options.cells == CellData::LeaveOut {
             return Ok(());
         }
         match self.cell_fields.claim(name, components)? {
             Some(claim) if self.options.cells == CellData::Names => self.cell_fields.keep_names(claim, ""),
             Some(claim) => {
-                let filled = self.cell_fields.fill(claim, values, integer, "");
-                filled.map_err(|reason| match reason {
-                    ReadReason::NotFinite { point } => ReadReason::NotFiniteCell { cell: point },
-                    reason => reason,
-                })?;
+                self.cell_fields.fill(claim, read()?, integer, "").map_err(ReadReason::at_cells)?;
             }
             None => {}
         }

@@ -1,14 +1,14 @@
 //! Gmsh's meshes (`.msh`): versions 1, 2, 4.0 and 4.1, ASCII and binary in either byte order; elements of the first and second
 //! order; views at nodes and elements. Elements without a volume are left out, as are partitions and periodicity.
 //!
-//! The numbers of geometric entities become the field `entity` at cells, those of physical groups (versions 1 and 2) `physical`.
+//! The numbers of geometric entities become the field `entity` at cells, those of physical groups `physical`.
 
 use std::collections::HashMap;
 
 use crate::io::ReadOptions;
 use crate::io::error::{At, ReadError, ReadReason};
 use crate::io::formats::draft::Draft;
-use crate::io::formats::gmsh_sections::{read_elements, read_nodes};
+use crate::io::formats::gmsh_sections::{read_elements, read_entities, read_nodes};
 use crate::io::formats::scanner::Scanner;
 use crate::io::number::NumberType;
 use crate::mesh::TetMesh;
@@ -68,6 +68,8 @@ pub(super) struct Mesh<'a> {
     pub cell_tags: Vec<i64>,
     pub entities: Vec<f64>,
     pub physical: Vec<f64>,
+    /// The physical group of each volume, by its tag, if it has one; none if no volume has one.
+    pub groups: HashMap<i64, Option<i64>>,
     views: Vec<View>,
 }
 
@@ -89,6 +91,7 @@ impl<'a> Mesh<'a> {
             cell_tags: Vec::new(),
             entities: Vec::new(),
             physical: Vec::new(),
+            groups: HashMap::new(),
             views: Vec::new(),
         }
     }
@@ -107,6 +110,7 @@ impl<'a> Mesh<'a> {
                     read_elements(self, file, layout)?
                 }
             }
+            "$Entities" => read_entities(self, file, self.layout.ok_or_else(missing)?)?,
             "$Nodes" => read_nodes(self, file, self.layout.ok_or_else(missing)?)?,
             "$Elements" => read_elements(self, file, self.layout.ok_or_else(missing)?)?,
             "$NodeData" | "$ElementData" => {
@@ -262,7 +266,7 @@ mod tests {
     use super::*;
     use crate::io::CellData;
 
-    const EVERYTHING: ReadOptions = ReadOptions { fields: None, cells: CellData::Values };
+    const EVERYTHING: ReadOptions = ReadOptions { fields: None, cells: CellData::Values, step: 0 };
 
     /// A tetrahedron and a triangle, with tags that are not in order.
     pub(super) const TWO: &str = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n1\n3 1 \"a $b\"\n$EndPhysicalNames\n\
@@ -393,6 +397,26 @@ mod tests {
         }
         let mesh = read(TWO.as_bytes(), &EVERYTHING).unwrap();
         assert!(mesh.cell_fields.iter().any(|f| f.name == "physical" && f.values == [6.0]));
+    }
+
+    #[test]
+    fn groups_of_volumes_in_version_4() {
+        let [four_one, four, _] = ascii();
+        let groups = |text: &str| {
+            let mesh = read(text.as_bytes(), &EVERYTHING).unwrap();
+            mesh.cell_fields.iter().find(|f| f.name == "physical").map(|f| f.values.clone())
+        };
+        assert_eq!(groups(&four_one), None);
+        let in_group = four_one.replace(
+            "0 0 0 1\n2 0 0 0 1 1 1 0 0",
+            "1 1 0 2\n9 0 0 0 1 5\n\
+            8 0 0 0 1 1 1 1 4 2 9 -9\n2 0 0 0 1 1 1 2 -6 3 1 8\n3 0 0 0 1 1 1 0 0",
+        );
+        assert_eq!(groups(&in_group), Some(vec![6.0]));
+        // The volume of the elements is the one that is in no group.
+        assert_eq!(groups(&in_group.replace("\n3 2 4 1\n", "\n3 3 4 1\n")), Some(vec![0.0]));
+        let entities = "$Entities\n1 0 0 1\n9 0 0 0 1 1 1 0\n2 0 0 0 1 1 1 1 6 0\n$EndEntities\n$Nodes";
+        assert_eq!(groups(&four.replacen("$Nodes", entities, 1)), Some(vec![6.0]));
     }
 
     #[test]

@@ -56,11 +56,56 @@ impl Numbers<'_, '_> {
         }
     }
 
+    /// The first tag of a list, if it has one. Where the sign says how an entity is turned, it is left out.
+    fn first_tag(&mut self) -> Result<Option<i64>, ReadReason> {
+        let mut first = None;
+        for _ in 0..self.count()? {
+            let tag = self.int()?;
+            first = first.or(Some(tag.saturating_abs()));
+        }
+        Ok(first)
+    }
+
     /// The dimension and the tag of a geometric entity.
     fn entity(&mut self) -> Result<(i64, i64), ReadReason> {
         let (first, second) = (self.int()?, self.int()?);
         Ok(if self.layout.version == Version::Four { (second, first) } else { (first, second) })
     }
+}
+
+/// Reads `$Entities` of versions 4.0 and 4.1 up to its end: the physical groups of volumes, the first one of each.
+pub(super) fn read_entities(
+    mesh: &mut Mesh<'_>,
+    file: &mut Scanner<'_>,
+    layout: Layout,
+) -> Result<(), ReadReason> {
+    let mut numbers = Numbers { file, layout };
+    numbers.end_line();
+    let mut counts = [0; 4];
+    for count in &mut counts {
+        *count = numbers.count()?;
+    }
+    for (dimension, count) in counts.into_iter().enumerate() {
+        // A point has a place, all others, and the points of version 4.0, a box.
+        let floats = if dimension == 0 && layout.version == Version::FourOne { 3 } else { 6 };
+        for _ in 0..count {
+            let tag = numbers.int()?;
+            for _ in 0..floats {
+                numbers.float()?;
+            }
+            let group = numbers.first_tag()?;
+            if dimension > 0 {
+                numbers.first_tag()?;
+            }
+            if dimension == 3 {
+                mesh.groups.insert(tag, group);
+            }
+        }
+    }
+    if mesh.groups.values().all(Option::is_none) {
+        mesh.groups.clear();
+    }
+    Ok(())
 }
 
 /// Reads `$Nodes` up to its end.
@@ -217,10 +262,12 @@ fn read_element_blocks(mesh: &mut Mesh<'_>, numbers: &mut Numbers<'_, '_>) -> Re
     }
     for _ in 0..blocks {
         let (_, entity) = numbers.entity()?;
+        // What is in no group is in group 0, as version 2 has it.
+        let group = mesh.groups.get(&entity).map(|group| group.unwrap_or(0));
         let element = known(numbers.int()?)?;
         for _ in 0..numbers.count()? {
             let tag = numbers.tag()?;
-            add_element(mesh, numbers, element, tag, [None, Some(entity)])?;
+            add_element(mesh, numbers, element, tag, [group, Some(entity)])?;
         }
     }
     Ok(())

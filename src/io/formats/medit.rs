@@ -12,7 +12,7 @@ use crate::mesh::TetMesh;
 pub(super) const FIRST: &str = "MeshVersionFormatted";
 
 /// The cells with a volume: VTK's type, and which of Medit's vertices is each of VTK's.
-const CELLS: [(&str, i64, &[usize]); 5] = [
+pub(super) const CELLS: [(&str, i64, &[usize]); 5] = [
     ("Tetrahedra", 10, &[0, 1, 2, 3]),
     ("Hexahedra", 12, &[0, 1, 2, 3, 4, 5, 6, 7]),
     ("Prisms", 13, &[0, 1, 2, 3, 4, 5]),
@@ -117,9 +117,13 @@ fn read_solution(file: &mut Scanner<'_>, draft: &mut Draft<'_>) -> Result<(), Re
     Ok(())
 }
 
-/// Values of a scalar, a vector or a symmetric tensor.
 fn components(file: &mut Scanner<'_>) -> Result<usize, ReadReason> {
-    match file.number::<u32>()? {
+    components_of(file.number()?)
+}
+
+/// How many values a scalar, a vector or a symmetric tensor has.
+pub(super) fn components_of(kind: i64) -> Result<usize, ReadReason> {
+    match kind {
         1 => Ok(1),
         2 => Ok(3),
         3 => Ok(6),
@@ -137,7 +141,7 @@ mod tests {
     const SOL: &str = "MeshVersionFormatted 2\nDimension 3\nSolAtVertices\n5\n2 1 2\n1 0 0 9\n2 0 0 9\n3 0 0 9\n4 0 0 9\n5 0 0 9\nEnd\n";
 
     fn read_both(mesh: &str, sol: &str) -> Result<TetMesh, ReadError> {
-        let options = ReadOptions { fields: None, cells: CellData::Values };
+        let options = ReadOptions { fields: None, cells: CellData::Values, step: 0 };
         let beside = |name: &str| match (name, sol) {
             ("a.sol", "") => Err(ReadReason::Io("none".into())),
             ("a.sol", sol) => Ok(sol.as_bytes().to_vec()),

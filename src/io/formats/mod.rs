@@ -1,18 +1,27 @@
-//! Formats of meshers and of imaging, which the builder in pages does not have (feature `formats`).
+//! Formats of meshers, of imaging and in HDF5, which the builder in pages does not have (features `formats` and `hdf5`).
 //!
 //! Each is recognised by its first words, but for TetGen's, whose files are lists of numbers.
 
 mod draft;
+#[cfg(feature = "hdf5")]
+mod exodus;
+#[cfg(feature = "hdf5")]
+mod exodus_cells;
 mod gmsh;
 mod gmsh_cells;
 mod gmsh_sections;
+#[cfg(feature = "hdf5")]
+pub(super) mod hdf5;
 mod medit;
+mod medit_binary;
 mod metaimage;
 mod netgen;
 mod nrrd;
 mod scanner;
 pub(super) mod tetgen;
 mod volume;
+#[cfg(feature = "hdf5")]
+mod vtkhdf;
 
 use std::path::Path;
 
@@ -25,6 +34,7 @@ use crate::mesh::TetMesh;
 enum Format {
     Gmsh,
     Medit,
+    MeditBinary,
     Netgen,
     Nrrd,
     MetaImage,
@@ -40,6 +50,9 @@ impl Format {
         if gmsh::FIRST.iter().any(|first| start.starts_with(first.as_bytes())) {
             return Some(Self::Gmsh);
         }
+        if medit_binary::is_first(bytes) {
+            return Some(Self::MeditBinary);
+        }
         if metaimage::is_header(start) {
             return Some(Self::MetaImage);
         }
@@ -54,7 +67,7 @@ impl Format {
     fn name(self) -> &'static str {
         match self {
             Self::Gmsh => "gmsh",
-            Self::Medit => "medit",
+            Self::Medit | Self::MeditBinary => "medit",
             Self::Netgen => "netgen",
             Self::Nrrd => "nrrd",
             Self::MetaImage => "metaimage",
@@ -64,6 +77,10 @@ impl Format {
 
 /// What the format of these bytes is called, if it is one of these.
 pub(super) fn name(bytes: &[u8]) -> Option<&'static str> {
+    #[cfg(feature = "hdf5")]
+    if let Some(name) = hdf5::name(bytes) {
+        return Some(name);
+    }
     Format::of(bytes).map(Format::name)
 }
 
@@ -74,9 +91,14 @@ pub(super) fn read(
     options: &ReadOptions,
     beside: Beside<'_>,
 ) -> Option<Result<TetMesh, ReadError>> {
+    #[cfg(feature = "hdf5")]
+    if hdf5::is_known(bytes) {
+        return Some(hdf5::read(bytes, options));
+    }
     Some(match Format::of(bytes)? {
         Format::Gmsh => gmsh::read(bytes, options),
         Format::Medit => medit::read(bytes, &sibling(name, "sol"), options, beside),
+        Format::MeditBinary => medit_binary::read(bytes, &sibling(name, "solb"), options, beside),
         Format::Netgen => netgen::read(bytes, options),
         Format::Nrrd => nrrd::read(bytes, options, beside),
         Format::MetaImage => metaimage::read(bytes, options, beside),

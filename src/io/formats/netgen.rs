@@ -1,4 +1,4 @@
-//! Netgen's meshes (`.vol`): linear cells and quadratic tetrahedra. The number of the material becomes the field `material` at cells.
+//! Netgen's meshes (`.vol`): linear cells, and quadratic tetrahedra, pyramids and prisms. The number of the material becomes the field `material` at cells.
 
 use crate::io::ReadOptions;
 use crate::io::error::{At, ReadError, ReadReason};
@@ -17,6 +17,8 @@ fn cell(points: usize) -> Option<(i64, &'static [usize])> {
         6 => (13, &[0, 2, 1, 3, 5, 4]),
         8 => (12, &[0, 3, 2, 1, 4, 7, 6, 5]),
         10 => (24, &[0, 2, 1, 3, 5, 7, 4, 6, 9, 8]),
+        13 => (27, &[0, 3, 2, 1, 4, 7, 6, 8, 5, 9, 12, 11, 10]),
+        15 => (26, &[0, 2, 1, 3, 5, 4, 7, 8, 6, 13, 14, 12, 9, 11, 10]),
         _ => return None,
     })
 }
@@ -60,9 +62,9 @@ fn add_cell(file: &mut Scanner<'_>, draft: &mut Draft<'_>) -> Result<(), ReadRea
     let count: usize = file.number()?;
     let (kind, order) = cell(count).ok_or_else(|| ReadReason::Unsupported {
         what: format!("a cell of {count} points"),
-        remedy: "save the mesh with linear cells, or quadratic tetrahedra".into(),
+        remedy: "save the mesh with linear cells, or with quadratic tetrahedra, pyramids and prisms".into(),
     })?;
-    let mut points = [0_i64; 10];
+    let mut points = [0_i64; 15];
     for point in &mut points[..count] {
         // They are numbered from 1.
         *point = file.number::<i64>()?.saturating_sub(1);
@@ -81,7 +83,7 @@ mod tests {
         # X Y Z\npoints\n4\n0 0 0\n1 0 0\n0 1 0\n0 0 1\nmaterials\n1\n1 steel\nendmesh\n";
 
     fn read_text(text: &str) -> Result<TetMesh, ReadError> {
-        read(text.as_bytes(), &ReadOptions { fields: None, cells: CellData::Values })
+        read(text.as_bytes(), &ReadOptions { fields: None, cells: CellData::Values, step: 0 })
     }
 
     #[test]
@@ -93,6 +95,35 @@ mod tests {
             ("material", &vec![7.0])
         );
         (0..MESH.len()).for_each(|length| drop(read_text(&MESH[..length])));
+    }
+
+    /// The edges of Netgen's quadratic cells in the order of the points at their middle, of which the first is behind the
+    /// corners, and those of VTK's.
+    type Edges = &'static [[usize; 2]];
+    const EDGES: [(usize, Edges, Edges); 2] = [
+        (
+            13,
+            &[[0, 1], [3, 2], [3, 0], [1, 2], [0, 4], [1, 4], [2, 4], [3, 4]],
+            &[[0, 1], [1, 2], [2, 3], [3, 0], [0, 4], [1, 4], [2, 4], [3, 4]],
+        ),
+        (
+            15,
+            &[[0, 1], [0, 2], [1, 2], [0, 3], [1, 4], [2, 5], [3, 4], [3, 5], [4, 5]],
+            &[[0, 1], [1, 2], [2, 0], [3, 4], [4, 5], [5, 3], [0, 3], [1, 4], [2, 5]],
+        ),
+    ];
+
+    #[test]
+    fn middles_of_edges_are_where_vtk_has_them() {
+        for (points, edges, of_vtk) in EDGES {
+            let (_, order) = cell(points).unwrap();
+            let corners = points - edges.len();
+            for (i, [a, b]) in of_vtk.iter().enumerate() {
+                let [c, d] = edges[order[corners + i] - corners];
+                let expected = [order[*a], order[*b]];
+                assert!([c, d] == expected || [d, c] == expected, "{points} {i}");
+            }
+        }
     }
 
     #[test]
