@@ -34,8 +34,7 @@ struct Atom {
 pub(super) fn layers(size: u32) -> LayeredGrid {
     let last = size - 1;
     let spacing = WIDTH / f64::from(last);
-    let grid =
-        Grid { dims: [size, size, last * 7 / 3 + 1], origin: [0.0; 3], spacing: [spacing; 3] };
+    let grid = Grid { dims: [size, size, last * 7 / 3 + 1], origin: [0.0; 3], spacing: [spacing; 3] };
     let atoms = atoms(f64::from(grid.dims[2] - 1) * spacing);
     let arrays = ["density", "charge"].map(|name| GridArray { name, components: 1, is_single: true });
     LayeredGrid::new(grid, arrays.to_vec(), move |array, z, values| {

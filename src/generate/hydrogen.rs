@@ -48,7 +48,8 @@ impl Orbital {
         let Self { n, l, m } = self;
         let m = m.unsigned_abs();
         let two_over_n = 2.0 / f64::from(n);
-        let radial = (two_over_n * two_over_n * two_over_n * factorials(n - l - 1, n + l) / f64::from(2 * n)).sqrt();
+        let radial =
+            (two_over_n * two_over_n * two_over_n * factorials(n - l - 1, n + l) / f64::from(2 * n)).sqrt();
         let angular = (f64::from(2 * l + 1) / (4.0 * PI) * factorials(l - m, l + m)).sqrt();
         let powers = (0..l).fold(1.0, |power, _| power * two_over_n);
         radial * angular * powers * if m == 0 { 1.0 } else { SQRT_2 }

@@ -44,7 +44,9 @@ pub enum GenerateError {
         limits: [u32; 2],
     },
     /// A grid has too many points for a mesh.
-    #[error("{points} points are more than a mesh can number; write the grid (.vti), or choose a smaller size")]
+    #[error(
+        "{points} points are more than a mesh can number; write the grid (.vti), or choose a smaller size"
+    )]
     Points {
         /// Those of the grid.
         points: u64,

@@ -32,8 +32,7 @@ fn time_steps_are_files_beside_their_list() {
     let [list, mt] = ["flow.pvd", "flow.mt"].map(|name| folder.path(name));
     good(&["generate", "abc-flow", "--size", "5", "--steps", "3", "-o", &list]);
     assert_eq!(folder.names(), ["flow-0.vti", "flow-1.vti", "flow-2.vti", "flow.pvd"]);
-    let times: Vec<_> =
-        steps(Path::new(&list)).expect("a list").into_iter().map(|step| step.time).collect();
+    let times: Vec<_> = steps(Path::new(&list)).expect("a list").into_iter().map(|step| step.time).collect();
     assert_eq!(times, [Some(0.0), Some(1.0), Some(2.0)]);
     good(&["build", &list, "--field", "velocity", "-o", &mt, "--quiet"]);
     let info = json(&["info", &mt, "--json"]);
