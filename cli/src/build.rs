@@ -268,8 +268,7 @@ fn read(arguments: &Arguments, config: &BuildConfig, level: RepairLevel) -> Resu
     let wanted = FieldSelection { names: &config.fields, all: config.all_fields, cells };
     input::expect_format(&arguments.inputs, arguments.format.as_deref());
     let format = arguments.format.as_deref();
-    let (mut mesh, repaired) =
-        input::read_as(&arguments.inputs, &wanted, level, (format, arguments.step))?;
+    let (mut mesh, repaired) = input::read_as(&arguments.inputs, &wanted, level, (format, arguments.step))?;
     if config.construction.method().keeps_the_mesh() {
         input::expect_cells(&mesh, &arguments.inputs[0])?;
     }

@@ -1,7 +1,7 @@
 //! `tetralod extract`: the mesh that a request needs, out of an MT file.
 
 use super::query::{Answer, EXAMPLES, Query};
-use super::{files, input, output};
+use super::{files, input, npz, output};
 use anyhow::{Context, Result, bail};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ use tetralod::session::Session;
 pub struct Arguments {
     #[command(flatten)]
     query: Query,
-    /// The mesh to write: .vtu.
+    /// The mesh to write: .vtu, or .npz for NumPy.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// Compare with the mesh that the MT was built from, where regions and values (or nothing) say that the field matters.
@@ -34,7 +34,10 @@ struct Report {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
-    files::check_ending(&arguments.output, "vtu")?;
+    let is_npz = files::ending(&arguments.output) == "npz";
+    if !is_npz {
+        files::check_ending(&arguments.output, "vtu")?;
+    }
     let inputs = arguments.measure.iter().chain(arguments.query.files());
     files::check_output(&arguments.output, inputs)?;
     let answer = arguments.query.answer_exactly()?;
@@ -42,7 +45,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let measured = arguments.measure.as_deref().map(|input| measure(input, &answer)).transpose()?.flatten();
     let mesh = opened.session.mesh().context("there is no mesh")?;
     let mesh = reference_units(&opened.session, opened.info()?, mesh);
-    files::write_file(&arguments.output, |out| Ok(tetralod::io::write_vtu(&mesh, out)?))?;
+    if is_npz {
+        npz::write_mesh(&mesh, &arguments.output)?;
+    } else {
+        files::write_file(&arguments.output, |out| Ok(tetralod::io::write_vtu(&mesh, out)?))?;
+    }
     let report = Report {
         measured_error: measured.as_ref().map(|measured| measured.error),
         hash: format!("{:016x}", opened.session.hash()),

@@ -3,7 +3,7 @@
 use anyhow::{Context, Result, bail};
 use std::fs;
 use std::fs::File;
-use std::io::{BufWriter, Cursor, Write};
+use std::io::{BufWriter, Cursor, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -80,10 +80,10 @@ pub fn ending(path: &Path) -> String {
 /// What output files are called, and which command writes them.
 const ENDINGS: [(&[&str], &str); 5] = [
     (&["mt"], "`tetralod build` writes .mt"),
-    (&["vtu"], "`tetralod extract` writes .vtu"),
+    (&["vtu", "npz"], "`tetralod extract` writes .vtu and .npz"),
     (
         &["vtp", "stl", "ply", "obj", "csv"],
-        "`tetralod surface`, `isosurface`, `slice`, `probe` and `streamlines` write .vtp, .stl, .ply, .obj and .csv",
+        "`tetralod surface`, `isosurface`, `slice`, `probe` and `streamlines` write .vtp, .stl, .ply, .obj, .csv and .npz",
     ),
     (&["png"], "`tetralod render` writes .png"),
     (&["vti", "vtk", "pvd", "raw", "json"], "this command does not write that format"),
@@ -130,6 +130,23 @@ pub fn write_file<T>(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> Re
         let _ = fs::remove_file(&partial_path);
     }
     placed.with_context(failed)
+}
+
+/// What can be gone back in.
+pub trait WriteSeek: Write + Seek {}
+
+impl<T: Write + Seek> WriteSeek for T {}
+
+/// As [`write_file`], for formats whose beginning is written when the rest is there. Pipes get all of it at the end.
+pub fn write_seekable(path: &Path, write: impl FnOnce(&mut dyn WriteSeek) -> Result<()>) -> Result<()> {
+    write_file(path, |out| {
+        if out.stream_position().is_ok() {
+            return write(out);
+        }
+        let mut whole = Cursor::new(Vec::new());
+        write(&mut whole)?;
+        Ok(out.write_all(whole.get_ref())?)
+    })
 }
 
 /// Where the output grows: beside its place, so that it can be moved there at once.

@@ -16,7 +16,7 @@ use tetralod::view::is_closed;
 pub struct Arguments {
     #[command(flatten)]
     query: Query,
-    /// The surface to write: .vtp, .stl, .ply, .obj, or .csv for its points.
+    /// The surface to write: .vtp, .stl, .ply, .obj, .npz, or .csv for its points.
     #[arg(short, long, value_name = "FILE")]
     output: Target,
 }

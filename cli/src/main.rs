@@ -14,6 +14,7 @@ mod info;
 mod input;
 mod isosurface;
 mod needs;
+mod npz;
 mod output;
 mod parse;
 mod poly;

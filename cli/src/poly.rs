@@ -1,6 +1,6 @@
 //! Where surfaces, lines and points go: a file whose ending says of what format it is.
 
-use super::{files, output};
+use super::{files, npz, output};
 use anyhow::Result;
 use clap::ValueEnum;
 use serde::Serialize;
@@ -23,6 +23,7 @@ enum Format {
     Ply,
     Obj,
     Csv,
+    Npz,
 }
 
 impl FromStr for Target {
@@ -32,7 +33,7 @@ impl FromStr for Target {
         let path = PathBuf::from(text);
         match Format::from_str(&files::ending(&path), true) {
             Ok(format) => Ok(Self { path, format }),
-            Err(_) => Err("the file's name must end in .vtp, .stl, .ply, .obj or .csv".to_owned()),
+            Err(_) => Err("the file's name must end in .vtp, .stl, .ply, .obj, .csv or .npz".to_owned()),
         }
     }
 }
@@ -47,12 +48,13 @@ impl Target {
     pub fn write(&self, data: &PolyData) -> Result<()> {
         match self.format {
             Format::Csv => self.write_table(&points_table(data)),
+            Format::Npz => npz::write_surface(data, &self.path),
             _ => files::write_file(&self.path, |out| {
                 match self.format {
                     Format::Vtp => write_vtp(data, out)?,
                     Format::Stl => write_stl(data, out)?,
                     Format::Ply => write_ply(data, out)?,
-                    Format::Obj | Format::Csv => write_obj(data, out)?,
+                    Format::Obj | Format::Csv | Format::Npz => write_obj(data, out)?,
                 }
                 Ok(())
             }),

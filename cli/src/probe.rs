@@ -27,7 +27,7 @@ pub struct Arguments {
     samples: Option<u32>,
     #[command(flatten)]
     query: Query,
-    /// The values to write: .csv, or .vtp, .ply, .obj for the points and lines with their values.
+    /// The values to write: .csv, or .vtp, .ply, .obj, .npz for the points and lines with their values.
     #[arg(short, long, value_name = "FILE")]
     output: Option<Target>,
 }

@@ -25,7 +25,7 @@ pub struct Arguments {
     edges: bool,
     #[command(flatten)]
     query: Query,
-    /// The surface to write: .vtp, .stl (without edges), .ply, .obj, or .csv for its points.
+    /// The surface to write: .vtp, .stl (without edges), .ply, .obj, .npz, or .csv for its points.
     #[arg(short, long, value_name = "FILE")]
     output: Target,
 }

@@ -40,7 +40,7 @@ pub struct Arguments {
     max_steps: u32,
     #[command(flatten)]
     query: Query,
-    /// The lines to write: .vtp, .ply, .obj, or .csv for their points.
+    /// The lines to write: .vtp, .ply, .obj, .npz, or .csv for their points.
     #[arg(short, long, value_name = "FILE")]
     output: Target,
 }

@@ -15,7 +15,7 @@ use tetralod::view::BoundarySurface;
 pub struct Arguments {
     #[command(flatten)]
     query: Query,
-    /// The surface to write: .vtp, .stl, .ply, .obj, or .csv for its points.
+    /// The surface to write: .vtp, .stl, .ply, .obj, .npz, or .csv for its points.
     #[arg(short, long, value_name = "FILE")]
     output: Target,
 }

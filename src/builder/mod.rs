@@ -347,6 +347,29 @@ fn thin_remedy(enough: Option<u32>) -> String {
 /// With the feature `parallel` it uses the threads of rayon's current pool. The result does not depend on how many there are.
 /// Calls `progress` now and then, on the thread that it was called from.
 ///
+/// ```
+/// use std::ops::ControlFlow;
+/// use std::sync::atomic::{AtomicBool, Ordering};
+/// use tetralod::builder::{BuildConfig, BuildError, build};
+///
+/// let mesh = tetralod::generate::bucky(9)?;
+/// let mut lines = Vec::new();
+/// let built = build(&mesh, &BuildConfig::default(), &mut |at| {
+///     lines.push(format!("{}: {} of {}", at.stage, at.done, at.total));
+///     ControlFlow::Continue(())
+/// })?;
+/// assert_eq!(built.summary.tetrahedra, 6 * 8 * 8 * 8);
+/// assert!(!lines.is_empty());
+///
+/// // Another thread, or a handler of signals, may set this at any time.
+/// let cancelled = AtomicBool::new(true);
+/// let stopped = build(&mesh, &BuildConfig::default(), &mut |_| {
+///     if cancelled.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+/// });
+/// assert!(matches!(stopped, Err(BuildError::Stopped)));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// If the mesh is not valid, lacks a configured field, or does not fit the lattice; if `progress` stops the work.
 pub fn build(

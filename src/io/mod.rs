@@ -50,16 +50,18 @@ mod survey;
 mod time_steps;
 mod vtu;
 mod write;
+mod write_layers;
 mod xml;
 mod xz;
 
 pub use error::{ReadError, ReadReason};
 pub use image::MAX_GRID_POINTS;
-pub use pvd::{Step, steps};
+pub use pvd::{Step, steps, write_pvd};
 pub use surface::{PolyData, write_csv, write_obj, write_ply, write_stl, write_vtp};
 pub use survey::{Survey, format_of, survey, survey_raw};
 pub use time_steps::{FieldSelection, TimeStepsError, read_time_steps};
-pub use write::{write_vti, write_vtu};
+pub use write::{PointArray, point_arrays, write_vti, write_vtu};
+pub use write_layers::write_vti_layers;
 
 use std::path::{Component, Path};
 

@@ -1,5 +1,7 @@
 //! Lists of time steps: ParaView's collections (`.pvd`).
 
+use std::io;
+use std::io::Write;
 use std::path::{Component, Path, PathBuf};
 
 use quick_xml::Reader;
@@ -8,6 +10,7 @@ use quick_xml::events::Event;
 use crate::io::error::{At, ReadError, ReadReason};
 #[cfg(feature = "hdf5")]
 use crate::io::formats;
+use crate::io::write::escaped;
 use crate::io::xml::Attributes;
 use crate::io::{in_file, load, lower_extension};
 
@@ -53,6 +56,19 @@ fn times_in(path: &Path) -> Result<Vec<f64>, ReadError> {
 #[cfg(not(feature = "hdf5"))]
 fn times_in(_: &Path) -> Result<Vec<f64>, ReadError> {
     Ok(Vec::new())
+}
+
+/// Writes a list of time steps, whose files lie in the list's folder or below it; those without a time are numbered from 0.
+///
+/// # Errors
+/// If `out` fails.
+pub fn write_pvd(steps: &[Step], out: &mut impl Write) -> io::Result<()> {
+    writeln!(out, "<VTKFile type=\"Collection\" version=\"1.0\">\n  <Collection>")?;
+    for (number, Step { path, time, .. }) in steps.iter().enumerate() {
+        let (time, file) = (time.unwrap_or(number as f64), escaped(&path.to_string_lossy()));
+        writeln!(out, "    <DataSet timestep=\"{time:?}\" file=\"{file}\"/>")?;
+    }
+    writeln!(out, "  </Collection>\n</VTKFile>")
 }
 
 /// Times and files, in ascending order.
@@ -123,6 +139,15 @@ mod tests {
         let entries = "<DataSet timestep=\"1.5\" part=\"0\" file=\"b/1.vtu\"/>\
                        <DataSet timestep=\"-0.5\" group=\"\" file=\"0.vtu\"></DataSet>";
         assert_eq!(list(entries).unwrap(), [(-0.5, "0.vtu".into()), (1.5, "b/1.vtu".into())]);
+    }
+
+    #[test]
+    fn what_is_written_is_read_again() {
+        let step = |file: &str, time| Step { path: file.into(), time, number: 0 };
+        let mut list = Vec::new();
+        write_pvd(&[step("a & \"b\".vti", None), step("c/d.vti", Some(1.5))], &mut list).unwrap();
+        let expected = [(0.0, "a & \"b\".vti".to_owned()), (1.5, "c/d.vti".to_owned())];
+        assert_eq!(parse(&list).unwrap(), expected);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Writes VTK XML files: version 1.0, little-endian, appended raw data, zlib blocks, 64-bit headers.
 
-use std::fmt::Write as _;
+use std::fmt::{Display, Write as _};
 use std::io;
 use std::io::Write;
 
@@ -8,12 +8,14 @@ use flate2::Compression;
 use flate2::write::ZlibEncoder;
 
 use crate::io::fields;
-use crate::mesh::{Field, TetMesh};
+use crate::mesh::{Field, Grid, TetMesh};
 
 /// Bytes of a block before compression, as VTK has it.
-const BLOCK: usize = 32768;
+pub(super) const BLOCK: usize = 32768;
 /// Largest integer up to which `f64` holds all.
 const MAX_EXACT_INTEGER: f64 = 9_007_199_254_740_992.0;
+/// What follows the appended data.
+pub(super) const TAIL: &[u8] = b"\n  </AppendedData>\n</VTKFile>\n";
 /// VTK's number for a tetrahedron.
 const TETRAHEDRON: u8 = 10;
 
@@ -54,6 +56,13 @@ pub fn write_vti(mesh: &TetMesh, out: &mut impl Write) -> io::Result<()> {
     };
     let mut data = Appended::default();
     let arrays = point_data(mesh, &mut data)?;
+    let (extent, attributes) = image_attributes(&grid);
+    let body = format!("{}    <Piece Extent=\"{extent}\">\n{arrays}    </Piece>\n", field_data(mesh));
+    write_file("ImageData", &attributes, &body, &data.bytes, out)
+}
+
+/// The extent of a grid, and the attributes of its element `<ImageData>`.
+pub(super) fn image_attributes(grid: &Grid) -> (String, String) {
     let last = grid.dims.map(|d| d.saturating_sub(1));
     let extent = format!("0 {} 0 {} 0 {}", last[0], last[1], last[2]);
     let three = |v: [f64; 3]| format!("{:?} {:?} {:?}", v[0], v[1], v[2]);
@@ -62,8 +71,7 @@ pub fn write_vti(mesh: &TetMesh, out: &mut impl Write) -> io::Result<()> {
         three(grid.origin),
         three(grid.spacing)
     );
-    let body = format!("{}    <Piece Extent=\"{extent}\">\n{arrays}    </Piece>\n", field_data(mesh));
-    write_file("ImageData", &attributes, &body, &data.bytes, out)
+    (extent, attributes)
 }
 
 pub(super) fn write_file(
@@ -73,48 +81,76 @@ pub(super) fn write_file(
     data: &[u8],
     out: &mut impl Write,
 ) -> io::Result<()> {
+    write_head(kind, attributes, body, out)?;
+    out.write_all(data)?;
+    out.write_all(TAIL)
+}
+
+/// All in front of the appended data.
+pub(super) fn write_head(kind: &str, attributes: &str, body: &str, out: &mut impl Write) -> io::Result<()> {
     write!(
         out,
         "<?xml version=\"1.0\"?>\n<VTKFile type=\"{kind}\" version=\"1.0\" byte_order=\"LittleEndian\" \
          header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n  <{kind}{attributes}>\n{body}  </{kind}>\n\
          \x20 <AppendedData encoding=\"raw\">\n   _"
-    )?;
-    out.write_all(data)?;
-    out.write_all(b"\n  </AppendedData>\n</VTKFile>\n")
+    )
 }
 
-/// The element `<PointData>`, its arrays appended to `data`. Components that follow one another become a vector again, and
-/// its length, which follows from them, is left out.
-fn point_data(mesh: &TetMesh, data: &mut Appended) -> io::Result<String> {
+/// An array of values at the points of a mesh, as files have it: a field, or the components of a vector.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PointArray<'a> {
+    /// Its name, with the time where there are several steps of it.
+    pub name: String,
+    /// The field, or one for each component.
+    pub components: &'a [Field],
+}
+
+impl PointArray<'_> {
+    /// The values, those of a point one behind the other.
+    pub fn values(&self) -> impl Iterator<Item = f64> + '_ {
+        let points = self.components.first().map_or(0, |field| field.values.len());
+        (0..points).flat_map(|i| self.components.iter().map(move |field| field.values[i]))
+    }
+}
+
+/// The fields of a mesh as arrays. Components that follow one another become a vector again, and its length, which follows from
+/// them, is left out.
+///
+/// # Errors
+/// With [`io::ErrorKind::InvalidInput`] if a field is not as long as there are points.
+pub fn point_arrays(mesh: &TetMesh) -> io::Result<Vec<PointArray<'_>>> {
     let points = mesh.positions.len();
     if let Some(Field { name, values, .. }) = mesh.fields.iter().find(|f| f.values.len() != points) {
         let problem = format!("field \"{name}\" has {} values for {points} points", values.len());
         return Err(io::Error::new(io::ErrorKind::InvalidInput, problem));
     }
-    let mut arrays = String::new();
-    let mut scalars = None;
+    let mut arrays = Vec::new();
     let mut vectors: Vec<(&str, Option<f64>)> = Vec::new();
     let mut rest = mesh.fields.as_slice();
     while let Some(first) = rest.first() {
-        let (array, behind) = rest.split_at(components(rest));
+        let (components, behind) = rest.split_at(components(rest));
         rest = behind;
         let vector = first.vector.as_ref().map(|vector| vector.name.as_str());
         let name = match vector {
-            Some(vector) if array.len() > 1 => {
+            Some(vector) if components.len() > 1 => {
                 vectors.push((vector, first.time));
                 vector
             }
             Some(vector) if is_length(first) && vectors.contains(&(vector, first.time)) => continue,
             _ => &first.name,
         };
-        let name = name_at_time(mesh, first, name);
-        arrays.push_str(&point_array(array, &name, data)?);
-        if array.len() == 1 && scalars.is_none() {
-            scalars = Some(name);
-        }
+        arrays.push(PointArray { name: name_at_time(mesh, first, name), components });
     }
-    let scalars = scalars.map(|name| format!(" Scalars=\"{}\"", escaped(&name))).unwrap_or_default();
-    Ok(format!("      <PointData{scalars}>\n{arrays}      </PointData>\n"))
+    Ok(arrays)
+}
+
+/// The element `<PointData>`, its arrays appended to `data`.
+fn point_data(mesh: &TetMesh, data: &mut Appended) -> io::Result<String> {
+    let arrays = point_arrays(mesh)?;
+    let scalars = arrays.iter().find(|array| array.components.len() == 1);
+    let scalars = scalars.map(|array| format!(" Scalars=\"{}\"", escaped(&array.name))).unwrap_or_default();
+    let elements = arrays.iter().map(|array| element(array, data)).collect::<io::Result<String>>()?;
+    Ok(format!("      <PointData{scalars}>\n{elements}      </PointData>\n"))
 }
 
 fn is_length(field: &Field) -> bool {
@@ -144,11 +180,10 @@ fn name_at_time(mesh: &TetMesh, field: &Field, name: &str) -> String {
     }
 }
 
-/// An array of these components.
-fn point_array(fields: &[Field], name: &str, data: &mut Appended) -> io::Result<String> {
-    let points = fields.first().map_or(0, |field| field.values.len());
-    let values: Vec<f64> =
-        (0..points).flat_map(|i| fields.iter().map(move |field| field.values[i])).collect();
+/// The element of an array, its values appended to `data`.
+fn element(array: &PointArray<'_>, data: &mut Appended) -> io::Result<String> {
+    let fields = array.components;
+    let values: Vec<f64> = array.values().collect();
     // Integers beyond this were rounded when they were read.
     let fits = |v: &f64| v.fract() == 0.0 && v.abs() <= MAX_EXACT_INTEGER;
     let (kind, offset) = if fields.iter().all(|field| field.integer) && values.iter().all(fits) {
@@ -156,7 +191,7 @@ fn point_array(fields: &[Field], name: &str, data: &mut Appended) -> io::Result<
     } else {
         ("Float64", data.append(&values, f64::to_le_bytes)?)
     };
-    let element = array(kind, name, fields.len(), offset);
+    let element = self::array(kind, &array.name, fields.len(), offset);
     let unit = fields.first().map_or("", |field| field.unit.as_str());
     if unit.is_empty() {
         return Ok(element);
@@ -181,7 +216,7 @@ fn field_data(mesh: &TetMesh) -> String {
     }
 }
 
-pub(super) fn array(kind: &str, name: &str, components: usize, offset: usize) -> String {
+pub(super) fn array(kind: &str, name: &str, components: usize, offset: impl Display) -> String {
     format!(
         "        <DataArray type=\"{kind}\" Name=\"{}\" NumberOfComponents=\"{components}\" format=\"appended\" \
          offset=\"{offset}\"/>\n",
@@ -205,6 +240,13 @@ pub(super) fn escaped(text: &str) -> String {
     result
 }
 
+/// A block by itself.
+pub(super) fn compressed(plain: &[u8]) -> io::Result<Vec<u8>> {
+    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
+    encoder.write_all(plain)?;
+    encoder.finish()
+}
+
 /// The data after the underscore.
 #[derive(Default)]
 pub(super) struct Appended {
@@ -226,11 +268,9 @@ impl Appended {
         let mut packed = Vec::new();
         for block in values.chunks(per_block) {
             let plain: Vec<u8> = block.iter().copied().flat_map(&encode).collect();
-            let before = packed.len();
-            let mut encoder = ZlibEncoder::new(&mut packed, Compression::default());
-            encoder.write_all(&plain)?;
-            encoder.finish()?;
-            header.push((packed.len() - before) as u64);
+            let block = compressed(&plain)?;
+            header.push(block.len() as u64);
+            packed.extend(block);
         }
         self.bytes.extend(header.iter().flat_map(|n| n.to_le_bytes()));
         self.bytes.append(&mut packed);

@@ -40,6 +40,7 @@ const ELSEWHERE = {
   "docs/csp-and-cors.md": ["text: headers"],
   "docs/format.md": ["text: not a program"],
   "docs/hosting.md": ["sh: needs an account of S3"],
+  "docs/howto/notebooks.md": ["python: needs NumPy and PyVista"],
 };
 
 /** Pages that open without a volume: their test is below. */

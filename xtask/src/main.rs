@@ -12,8 +12,6 @@ mod demo;
 mod docs;
 mod fixture;
 mod fixture_builds;
-mod flow;
-mod helix;
 mod licences;
 mod package;
 mod paper;
@@ -23,7 +21,6 @@ mod serve;
 mod shell;
 mod suite;
 mod volumes;
-mod vti;
 
 use std::process::ExitCode;
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use serde_json::{Value, json};
 
-use crate::{flow, helix, shell};
+use crate::shell;
 
 /// Where the page looks for its volumes.
 pub const DATA: &str = "www/data";
@@ -20,10 +20,6 @@ enum Data {
     Generated { name: &'static str, size: &'static str, extension: &'static str },
     /// The mesh that inserting the points of the bucky ball of this size ends with: what `docs/paper.md` makes edge-based MTs of.
     Inserted { size: &'static str },
-    /// The flow with its time steps.
-    Flow,
-    /// The large volume.
-    Helix,
 }
 
 /// A volume of the demo.
@@ -56,7 +52,7 @@ pub const LARGE: Volume = Volume {
     title: "Double helix",
     sentence: "A model of DNA: two backbones and the pairs of bases between them, with density and charge. \
                12.4 million tetrahedra, of which the page fetches what the picture needs.",
-    data: Data::Helix,
+    data: Data::Generated { name: "helix", size: "97", extension: "vti" },
     build: &["--all-fields"],
     scene: "isovalue=0.55&surface-colour=charge&map=coolwarm&error=50&axes=0&camera=14,14,32.67,116,-0.75,0.12",
     picture: &["--isovalue", "0.55", "--error", "1%", "--no-outline", "--zoom", "1.5"],
@@ -101,7 +97,7 @@ pub const SMALL: [Volume; 8] = [
         title: "ABC flow",
         sentence: "Pressure and velocity of a flow in eight time steps: press Play, or turn to the view Flow for \
                    streamlines and arrows.",
-        data: Data::Flow,
+        data: Data::Generated { name: "abc-flow", size: "21", extension: "pvd" },
         build: &["--field", "pressure", "--field", "velocity", "--unit", "velocity=m/s"],
         scene: "view=flow",
         picture: &[
@@ -252,16 +248,6 @@ fn write_data(volume: &Volume, run: &impl Fn(Vec<String>) -> Result<()>) -> Resu
             run(words(&["build", &points, "--kind", "vertex", "--method", "insert", "-o", &mt]))?;
             run(words(&["extract", &mt, "--error", "0", "-o", &mesh]))?;
             Ok(vec![mesh.into()])
-        }
-        Data::Flow => (0..flow::STEPS)
-            .map(|step| {
-                let input = in_target(format!("{}-{step}.vti", volume.name));
-                flow::write(&input, step).map(|()| input)
-            })
-            .collect(),
-        Data::Helix => {
-            let input = in_target(format!("{}.vti", volume.name));
-            helix::write(&input).map(|()| vec![input])
         }
     }
 }

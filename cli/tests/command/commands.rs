@@ -746,6 +746,9 @@ fn an_interrupt_leaves_what_was_there() {
     let writing = || folder.names().iter().any(|name| name.ends_with(".partial"));
     let code = interrupt(&["generate", "bucky", "--size", "64", "-o", &out], writing);
     assert_eq!(code, Some(130));
+    // The same while a grid is written layer by layer.
+    let code = interrupt(&["generate", "bucky", "--size", "200", "-o", &folder.path("big.vti")], writing);
+    assert_eq!(code, Some(130));
     assert_eq!(folder.names(), ["big.vtu"]);
     assert_eq!(fs::read(&out).expect("it is there"), b"old");
 

@@ -4,7 +4,9 @@ mod commands;
 mod fields;
 #[cfg(feature = "render")]
 mod gallery;
+mod generate;
 mod linking;
+mod npz;
 mod readme;
 mod remote;
 #[cfg(feature = "render")]

@@ -14,7 +14,7 @@ const START: &str = "```console";
 pub const PROMPT: &str = "$ tetralod ";
 
 /// The pages with commands. Each is run in a folder of its own.
-const PAGES: [&str; 14] = [
+const PAGES: [&str; 15] = [
     "README.md",
     "docs/README.md",
     "docs/command.md",
@@ -25,6 +25,7 @@ const PAGES: [&str; 14] = [
     "docs/howto/fields-and-time.md",
     "docs/howto/know-a-file.md",
     "docs/howto/my-data.md",
+    "docs/howto/notebooks.md",
     "docs/howto/several-meshes.md",
     "docs/howto/three.md",
     "docs/howto/views.md",

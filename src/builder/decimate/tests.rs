@@ -535,7 +535,7 @@ fn vertices_outside_of_their_tetrahedra_are_known() {
     // The corner of the cube is beside it, and in the bucket of a tetrahedron in its middle.
     let middle = (0..).zip(&mesh.tets).find(|(_, tet)| tet.contains(&(4 * 81 + 4 * 9 + 4)));
     let (tet, _) = middle.expect("the vertex in the middle has tetrahedra");
-    quantized.places[0] -= DVec3::splat(0.4);
+    std::sync::Arc::get_mut(&mut quantized.places).expect("nobody else has them")[0] -= DVec3::splat(0.4);
     quantized.locations = vec![Location { point: 0, tet, lambda: DVec3::ZERO, outside: true }];
     let topology = topology(mesh.positions.len(), &mesh.tets).expect("a conforming mesh");
     let work = WorkMesh::new(mesh.tets.clone(), topology.neighbors, mesh.positions.len());

@@ -1,17 +1,11 @@
-//! The demo's large volume: a model of DNA in its usual form, as the electron densities of its atoms might be. Its proportions
-//! are those of textbooks; it is no measured molecule.
+//! A model of DNA in its usual form, as the electron densities of its atoms might be. Its proportions are those of textbooks; it is no
+//! measured molecule.
 
+use crate::generate::abc_flow::rounded;
+use crate::mesh::{Grid, GridArray, LayeredGrid};
 use std::f64::consts::PI;
-use std::path::Path;
 
-use anyhow::Result;
-
-use crate::vti::{self, Array, Grid};
-
-/// The points of the grid: its 96 × 96 × 224 cells are 12,386,304 tetrahedra.
-pub const POINTS: [usize; 3] = [97, 97, 225];
-
-/// Of the box, in ångströms.
+/// Of the box, in ångströms; it is 7/3 times as high.
 const WIDTH: f64 = 28.0;
 
 /// From one pair of bases to the next: along the axis, and around it.
@@ -36,31 +30,39 @@ struct Atom {
     charge: f64,
 }
 
-/// Writes the volume as a `.vti` file with `density` and `charge`.
-pub fn write(path: &Path) -> Result<()> {
-    let grid = Grid { points: POINTS, spacing: WIDTH / (POINTS[0] - 1) as f64 };
-    let height = (POINTS[2] - 1) as f64 * grid.spacing;
-    let (mut density, mut charge) = (vec![0.0; grid.len()], vec![0.0; grid.len()]);
-    for Atom { place, weight, charge: q } in atoms(height) {
-        let first = place.map(|x| ((x - REACH) / grid.spacing).ceil().max(0.0) as usize);
-        let last = [0, 1, 2].map(|i| (((place[i] + REACH) / grid.spacing) as usize).min(POINTS[i] - 1));
-        for z in first[2]..=last[2] {
-            for y in first[1]..=last[1] {
-                for x in first[0]..=last[0] {
-                    let i = x + POINTS[0] * (y + POINTS[1] * z);
-                    let [dx, dy, dz] = [0, 1, 2].map(|axis| grid.place(i)[axis] - place[axis]);
-                    let part = weight * (-(dx * dx + dy * dy + dz * dz) / (2.0 * SIGMA * SIGMA)).exp();
-                    density[i] += part;
-                    charge[i] += part * q;
+/// `density` and `charge`, with `size` points across.
+pub(super) fn layers(size: u32) -> LayeredGrid {
+    let last = size - 1;
+    let spacing = WIDTH / f64::from(last);
+    let grid = Grid { dims: [size, size, last * 7 / 3 + 1], origin: [0.0; 3], spacing: [spacing; 3] };
+    let atoms = atoms(f64::from(grid.dims[2] - 1) * spacing);
+    let arrays = ["density", "charge"].map(|name| GridArray { name, components: 1, is_single: true });
+    LayeredGrid::new(grid, arrays.to_vec(), move |array, z, values| {
+        for Atom { place, weight, charge } in &atoms {
+            let [x, y, own_z] = *place;
+            let Some((_, factor)) = near(own_z, spacing).find(|(i, _)| *i == z as usize) else { continue };
+            let factor = factor * weight * if array == 0 { 1.0 } else { *charge };
+            let is_inside = |(i, _): &(usize, f64)| *i < size as usize;
+            let xs: Vec<_> = near(x, spacing).filter(is_inside).collect();
+            for (y, fy) in near(y, spacing).filter(is_inside) {
+                for (x, fx) in &xs {
+                    values[x + size as usize * y] += factor * fy * fx;
                 }
             }
         }
-    }
-    let arrays = [
-        Array { name: "density", components: 1, values: density },
-        Array { name: "charge", components: 1, values: charge },
-    ];
-    vti::write(path, &grid, &arrays)
+        values.iter_mut().for_each(|value| *value = rounded(*value));
+    })
+}
+
+/// The planes across an axis that an atom at `place` reaches, each with the part of its density there.
+fn near(place: f64, spacing: f64) -> impl Iterator<Item = (usize, f64)> {
+    let first = ((place - REACH) / spacing).ceil().max(0.0) as usize;
+    let last = ((place + REACH) / spacing) as usize;
+    let factor = move |i: usize| {
+        let d = i as f64 * spacing - place;
+        (i, libm::exp(-d * d / (2.0 * SIGMA * SIGMA)))
+    };
+    (first..=last).map(factor)
 }
 
 /// The atoms of as many pairs of bases as there is room for.
@@ -68,7 +70,7 @@ fn atoms(height: f64) -> Vec<Atom> {
     let pairs = ((height - 2.0 * REACH) / RISE) as usize;
     let bottom = (height - RISE * (pairs - 1) as f64) / 2.0;
     let at = |radius: f64, angle: f64, z: f64| {
-        [WIDTH / 2.0 + radius * angle.cos(), WIDTH / 2.0 + radius * angle.sin(), z]
+        [WIDTH / 2.0 + radius * libm::cos(angle), WIDTH / 2.0 + radius * libm::sin(angle), z]
     };
     let mut atoms = Vec::new();
     for pair in 0..pairs {
@@ -110,7 +112,7 @@ fn bases(from: [f64; 3], to: [f64; 3], base: u8) -> Vec<Atom> {
     let ring = |centre: f64, count: usize, charge: f64| {
         (0..count).map(move |i| {
             let turn = 2.0 * PI * i as f64 / count as f64;
-            let (ahead, aside) = (1.35 * turn.cos() / length, 1.35 * turn.sin() / length);
+            let (ahead, aside) = (1.35 * libm::cos(turn) / length, 1.35 * libm::sin(turn) / length);
             let place = [
                 from[0] + (centre + ahead) * along[0] - aside * along[1],
                 from[1] + (centre + ahead) * along[1] + aside * along[0],
@@ -135,7 +137,7 @@ mod tests {
 
     #[test]
     fn atoms_are_inside_and_on_two_strands() {
-        let height = WIDTH / (POINTS[0] - 1) as f64 * (POINTS[2] - 1) as f64;
+        let height = WIDTH * 7.0 / 3.0;
         let atoms = atoms(height);
         assert!(atoms.len() > 300, "{}", atoms.len());
         for Atom { place: [x, y, z], .. } in &atoms {
@@ -145,11 +147,5 @@ mod tests {
         }
         let phosphates = atoms.iter().filter(|atom| atom.charge == -1.0).count();
         assert!(phosphates.is_multiple_of(2) && phosphates > 20, "{phosphates}");
-    }
-
-    #[test]
-    fn the_volume_is_large() {
-        let cells: usize = POINTS.iter().map(|points| points - 1).product();
-        assert!(6 * cells > 10_000_000);
     }
 }
