@@ -24,8 +24,10 @@ pub(super) struct Collapses {
     floors: Vec<f64>,
     /// The vertex that each removes.
     vertices: Vec<u32>,
-    /// The vertex that it is moved to.
+    /// A vertex that all tetrahedra have which fill the hole: it may count as moved to it.
     near: Vec<u32>,
+    /// Further such vertices with as many tetrahedra around them: the collapse and the vertex.
+    also_near: Vec<(u32, u32)>,
     /// Collapse by collapse and field by field. They are at least those of all collapses before on which it depends, by so much more
     /// that selection by isovalue and by box is monotone: see [`Quantized::overshoot`], and `step_of_boundary` in the builders' costs.
     errors: Vec<ErrorCode>,
@@ -63,6 +65,7 @@ impl Record for Collapses {
             floors: quantize::floors(info),
             vertices: Vec::with_capacity(most),
             near: Vec::with_capacity(most),
+            also_near: Vec::new(),
             errors: Vec::with_capacity(most * fields),
             boxes: Vec::with_capacity(most),
             starts,
@@ -94,9 +97,8 @@ impl Record for Collapses {
         self.add_errors(hole, first, (errors, step), quantized);
         self.boxes.push(bounds(hole, &quantized.positions));
         self.vertices.push(hole.a);
-        let near = self.near_vertex(removed);
-        self.near.push(near);
-        self.mark_filling(removed, near);
+        self.add_near(removed);
+        self.mark_filling(removed);
     }
 
     fn finish(&mut self, tets: &[[u32; 4]], makers: &[u32]) {
@@ -152,20 +154,23 @@ impl Collapses {
         }
     }
 
-    /// The vertex that all tetrahedra have which fill the hole. With several, any will do: the one with the most tetrahedra around it
-    /// keeps them.
-    fn near_vertex(&self, removed: &Removed<'_>) -> u32 {
+    /// Finds the vertices that all tetrahedra have which fill the hole. With several, any will do: the one with the most tetrahedra
+    /// around it keeps them.
+    fn add_near(&mut self, removed: &Removed<'_>) {
         let Removed { hole, filling, end, .. } = *removed;
-        let is_face = |tet: [u32; 4], i: usize| self.is_face(&sorted(without(tet, i)));
         let moves = |tet: &[u32; 4], v: u32| {
-            tet.iter().position(|&corner| corner == v).is_some_and(|i| is_face(*tet, i))
+            let at = tet.iter().position(|&corner| corner == v);
+            at.is_some_and(|i| self.is_face(&sorted(without(*tet, i))))
         };
-        let [first, rest @ ..] = &filling.tets[..] else { return end };
-        let shared = |v: &u32| rest.iter().all(|tet| tet.contains(v));
-        let all_move = |v: &u32| *v == end || filling.tets.iter().all(|tet| moves(tet, *v));
+        let shared = |v: &&u32| **v == end || filling.tets.iter().all(|tet| moves(tet, **v));
         let around = |v: &u32| hole.faces.iter().filter(|(face, _)| face.contains(v)).count();
-        let near = first.iter().filter(|v| shared(v)).filter(|v| all_move(v));
-        near.copied().max_by_key(|v| (around(v), *v)).unwrap_or(end)
+        let first = filling.tets.first().copied().unwrap_or([end; 4]);
+        let found: Vec<(usize, u32)> = first.iter().filter(shared).map(|v| (around(v), *v)).collect();
+        let most = found.iter().map(|(around, _)| *around).max();
+        let mut best = found.iter().filter(|(around, _)| Some(*around) == most).map(|(_, v)| *v);
+        let collapse = self.near.len() as u32;
+        self.near.push(best.next().unwrap_or(end));
+        self.also_near.extend(best.map(|v| (collapse, v)));
     }
 
     /// Whether three vertices in increasing order are a face of the hole.
@@ -173,12 +178,12 @@ impl Collapses {
         self.faces.binary_search_by(|(other, _)| other.cmp(face)).is_ok()
     }
 
-    /// Notes which faces of the filling are inside.
-    fn mark_filling(&mut self, removed: &Removed<'_>, near: u32) {
+    /// Notes which faces of the filling are inside: those that are no face of the hole. Those opposite a near vertex all are.
+    fn mark_filling(&mut self, removed: &Removed<'_>) {
         for (&t, &tet) in removed.slots.iter().zip(&removed.filling.tets) {
             let mut tet = tet;
             tet.sort_unstable();
-            let inside = |&i: &usize| tet[i] != near && !self.is_face(&without(tet, i));
+            let inside = |&i: &usize| !self.is_face(&without(tet, i));
             self.inner_now[t as usize] = (0..4).filter(inside).fold(0, |bits, i| bits | 1 << i);
         }
     }
@@ -186,7 +191,7 @@ impl Collapses {
     /// The half-edge MT whose updates undo these collapses, in blocks of `2^block_bits` by what they reach, and its vertex for each
     /// reference point.
     pub fn half_edge_mt(
-        self,
+        mut self,
         mut info: MtInfo,
         quantized: &Quantized,
         block_bits: u32,
@@ -209,7 +214,7 @@ impl Collapses {
     }
 
     /// The collapses in the order of their updates, and the length of the longest chain of updates that depend on each other.
-    fn order(&self, numbered: &Numbered, block_bits: u32) -> (Vec<u32>, u32) {
+    fn order(&mut self, numbered: &Numbered, block_bits: u32) -> (Vec<u32>, u32) {
         let count = self.vertices.len();
         // Errors are monotone, so this extends the partial order.
         let mut falling: Vec<u32> = (0..count as u32).rev().collect();
@@ -220,14 +225,17 @@ impl Collapses {
         let base = numbered.mesh.positions.len() as u32;
         let mut removed_by = vec![NONE; numbered.number.len()];
         (0..).zip(&self.vertices).for_each(|(c, &v): (u32, _)| removed_by[v as usize] = c);
-        let near = |&c: &u32| {
-            let v = self.near[c as usize] as usize;
-            match removed_by[v] {
-                NONE => numbered.number[v],
-                remover => base + places[remover as usize],
-            }
+        let label = |v: u32| match removed_by[v as usize] {
+            NONE => numbered.number[v as usize],
+            remover => base + places[remover as usize],
         };
-        let near: Vec<u32> = falling.iter().map(near).collect();
+        for &(c, v) in &self.also_near {
+            let near = &mut self.near[c as usize];
+            if label(v) > label(*near) {
+                *near = v;
+            }
+        }
+        let near: Vec<u32> = falling.iter().map(|&c| label(self.near[c as usize])).collect();
         let boxes: Vec<[[i32; 3]; 2]> = falling.iter().map(|&c| self.boxes[c as usize]).collect();
         let largest = |&c: &u32| self.errors_of(c).iter().copied().fold(ErrorCode::ZERO, ErrorCode::max);
         let errors: Vec<ErrorCode> = falling.iter().map(largest).collect();
