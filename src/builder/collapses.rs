@@ -18,6 +18,7 @@ use crate::mt::{
 use std::cmp::Reverse;
 
 /// Half-edge collapses in the order in which they are made. Vertices are numbers of reference points.
+#[derive(Default)]
 pub(super) struct Collapses {
     fields: usize,
     /// For each field the least error that is stored.
@@ -54,28 +55,25 @@ pub(super) struct Collapses {
 const USUAL_STAR: usize = 25;
 
 impl Record for Collapses {
-    fn new(info: &MtInfo, tets: usize) -> Self {
+    fn start(&mut self, info: &MtInfo, tets: usize) {
         // Lists that grow by doubling would take twice as much. What is never written takes no memory.
         let (most, fields) = (info.vertices as usize, info.fields.len());
         let stars = most * USUAL_STAR;
         let mut starts = Vec::with_capacity(most + 1);
         starts.push(0);
-        Self {
+        *self = Self {
             fields,
             floors: quantize::floors(info),
             vertices: Vec::with_capacity(most),
             near: Vec::with_capacity(most),
-            also_near: Vec::new(),
             errors: Vec::with_capacity(most * fields),
             boxes: Vec::with_capacity(most),
             starts,
             makers: Vec::with_capacity(stars),
             inner: Vec::with_capacity(stars),
             inner_now: vec![0; tets],
-            base: Vec::new(),
-            base_marks: Vec::new(),
-            faces: Vec::new(),
-        }
+            ..Self::default()
+        };
     }
 
     fn len(&self) -> usize {

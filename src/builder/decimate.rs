@@ -39,8 +39,8 @@ pub(super) struct Decimated<R> {
 
 /// Takes down the removals in the order in which they are made.
 pub(super) trait Record {
-    /// No removals yet, from a mesh of so many tetrahedra.
-    fn new(info: &MtInfo, tets: usize) -> Self;
+    /// Begins, without removals yet, for a mesh of so many tetrahedra.
+    fn start(&mut self, info: &MtInfo, tets: usize);
 
     /// How many removals there are.
     fn len(&self) -> usize;
@@ -73,12 +73,25 @@ pub(super) struct Removed<'a> {
 ///
 /// # Errors
 /// As [`super::edge_mt`].
-pub(super) fn decimate<R: Record>(
+pub(super) fn decimate<R: Record + Default>(
+    mesh: &mut Cow<'_, TetMesh>,
+    config: &BuildConfig,
+    how: (BuildCriterion, Purpose),
+    progress: OnProgress<'_>,
+) -> Result<Decimated<R>, BuildError> {
+    let mut record = R::default();
+    let (quantized, info) = decimate_into(&mut record, mesh, config, how, progress)?;
+    Ok(Decimated { record, quantized, info })
+}
+
+/// The same for any record, compiled once.
+fn decimate_into(
+    record: &mut dyn Record,
     mesh: &mut Cow<'_, TetMesh>,
     config: &BuildConfig,
     (criterion, purpose): (BuildCriterion, Purpose),
     progress: OnProgress<'_>,
-) -> Result<Decimated<R>, BuildError> {
+) -> Result<(Quantized, MtInfo), BuildError> {
     if mesh.positions.len() > MAX_UPDATES as usize {
         return Err(BuildError::TooLarge);
     }
@@ -100,13 +113,13 @@ pub(super) fn decimate<R: Record>(
     let reference = Reference::new(&quantized, &work, displacement_per_error, config.displacement_edges);
     let state = State::new(work, reference, non_manifold, levels);
     let info = quantized.info(tetrahedra, displacement_per_error);
-    let record = R::new(&info, state.mesh.tets.len());
+    record.start(&info, state.mesh.tets.len());
     let mut decimator = Decimator::new(state, gift_wrap, record);
     decimator.remove_all(progress)?;
-    let Decimator { state, mut record, .. } = decimator;
+    let Decimator { state, record, .. } = decimator;
     record.finish(&state.mesh.tets, &state.removals.makers);
     drop(state);
-    Ok(Decimated { record, quantized, info })
+    Ok((quantized, info))
 }
 
 fn take_tets(mesh: &mut Cow<'_, TetMesh>) -> Vec<[u32; 4]> {
@@ -116,7 +129,7 @@ fn take_tets(mesh: &mut Cow<'_, TetMesh>) -> Vec<[u32; 4]> {
     }
 }
 
-struct Decimator<'a, R> {
+struct Decimator<'a, R: ?Sized> {
     state: State<'a>,
     rounds: Rounds,
     /// That of the vertex which is removed next.
@@ -125,7 +138,7 @@ struct Decimator<'a, R> {
     searches: Searches,
     slots: Vec<u32>,
     /// The removals so far.
-    record: R,
+    record: &'a mut R,
 }
 
 /// A candidate of a round.
@@ -138,8 +151,8 @@ struct Prospect {
     end: u32,
 }
 
-impl<'a, R: Record> Decimator<'a, R> {
-    fn new(state: State<'a>, gift_wrap: Option<GiftWrap>, record: R) -> Self {
+impl<'a, R: Record + ?Sized> Decimator<'a, R> {
+    fn new(state: State<'a>, gift_wrap: Option<GiftWrap>, record: &'a mut R) -> Self {
         let points = state.versions.len();
         let mut rounds = Rounds::new(state.levels.of(0.0), state.levels.last(), points);
         let free = (0..points as u32).filter(|&v| state.mesh.has(v) && !state.frozen[v as usize]);

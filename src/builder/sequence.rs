@@ -46,9 +46,7 @@ pub(super) struct Insertion {
 
 /// Of removals in the order in which they are made it becomes one of insertions.
 impl Record for Sequence {
-    fn new(_: &MtInfo, _: usize) -> Self {
-        Self::default()
-    }
+    fn start(&mut self, _: &MtInfo, _: usize) {}
 
     fn len(&self) -> usize {
         self.steps.len()

@@ -488,7 +488,8 @@ fn the_removals_of_a_round_are_independent() {
             let reference = Reference::new(&quantized, &work, 1.0, f64::INFINITY);
             let state = State::new(work, reference, topology.non_manifold, levels);
             let wrap = (criterion == BuildCriterion::Delaunay).then(|| GiftWrap::new(&quantized.positions));
-            let mut decimator = Decimator::new(state, wrap, Sequence::default());
+            let mut record = Sequence::default();
+            let mut decimator = Decimator::new(state, wrap, &mut record);
             // The removal that made each tetrahedron, and the boxes of the removals.
             let mut makers: BTreeMap<[u32; 4], usize> = BTreeMap::new();
             let mut boxes: Vec<Reach> = Vec::new();
@@ -541,7 +542,8 @@ fn vertices_outside_of_their_tetrahedra_are_known() {
     let work = WorkMesh::new(mesh.tets.clone(), topology.neighbors, mesh.positions.len());
     let reference = Reference::new(&quantized, &work, 1.0, f64::INFINITY);
     let state = State::new(work, reference, topology.non_manifold, Levels::of_purpose(Purpose::Uniform));
-    let mut decimator = Decimator::new(state, None, Sequence::default());
+    let mut record = Sequence::default();
+    let mut decimator = Decimator::new(state, None, &mut record);
     let mut buckets_of_it = BTreeSet::new();
     loop {
         let before = decimator.record.steps.len();
@@ -612,11 +614,9 @@ fn the_best_neighbour_is_found() {
         let work = WorkMesh::new(mesh.tets.clone(), topology.neighbors, mesh.positions.len());
         let levels = Levels::of_purpose(Purpose::Uniform);
         let reference = Reference::new(&quantized, &work, 1.0, f64::INFINITY);
-        let mut decimator = Decimator::new(
-            State::new(work, reference, topology.non_manifold, levels),
-            None,
-            Sequence::default(),
-        );
+        let mut record = Sequence::default();
+        let state = State::new(work, reference, topology.non_manifold, levels);
+        let mut decimator = Decimator::new(state, None, &mut record);
         let (mut compared, mut several) = (0, 0);
         for _ in 0..6 {
             let Decimator { state, search, .. } = &mut decimator;
