@@ -53,7 +53,7 @@ fn builds() -> Vec<(&'static [&'static str], &'static [&'static str], Value)> {
             &["--cell-to-point", "--field", "material"],
             json!({ "cellToPoint": true, "fields": ["material"] }),
         ),
-        (&["blocks.vtk"], &["--repair", "none"], json!({ "repair": "none" })),
+        (&["small.vti"], &["--repair", "none"], json!({ "repair": "none" })),
         (
             &["blocks.vtk"],
             &["--repair", "weld", "--weld-distance", "0.25"],
