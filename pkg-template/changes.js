@@ -14,9 +14,12 @@ const ARRAYS = [
   ["neighbors", "tets", 4],
 ];
 
+/** The bits of all arrays. */
+const ALL = 2 ** ARRAYS.length - 1;
+
 /** The bits by which wasm knows the arrays of these names; all of them without names. */
 export function arrayBits(names) {
-  if (names === undefined) return 2 ** ARRAYS.length - 1;
+  if (names === undefined) return ALL;
   const all = ARRAYS.map(([name]) => name);
   const isGood = Array.isArray(names) && names.every((name) => all.includes(name));
   if (!isGood) throw new TetralodError("bad-option", `option \`arrays\`: must be a list of ${all.join(", ")}`);
@@ -34,6 +37,24 @@ export function arraysIn(buffer, places, bits) {
   const kinds = [Float32Array, Float32Array, Uint32Array, Uint32Array];
   const entries = ARRAYS.map(([name], at) => [name, new kinds[at](buffer, places[2 * at], places[2 * at + 1])]);
   return Object.fromEntries(entries.filter((_, at) => (bits >> at) & 1));
+}
+
+/**
+ * Copies what has changed in a mesh from the memory of one wasm module to that of another.
+ *
+ * @param {[ArrayBuffer, Uint32Array]} from a memory, and address and length of each array
+ * @param {[ArrayBuffer, Uint32Array]} to the same of the copy, which has room for as much
+ * @param {{ vertices: Uint32Array, tets: Uint32Array }} changed start and end of each range
+ */
+export function copyChanged([from, places], [to, copies], changed) {
+  const [source, target] = [arraysIn(from, places, ALL), arraysIn(to, copies, ALL)];
+  for (const [name, kind, size] of ARRAYS) {
+    const ranges = changed[kind];
+    for (let i = 0; i < ranges.length; i += 2) {
+      const start = size * ranges[i];
+      target[name].set(source[name].subarray(start, size * ranges[i + 1]), start);
+    }
+  }
 }
 
 /** A mesh of no tetrahedra, for `applyChanges` to begin with. */

@@ -2,26 +2,29 @@
 
 import initCore, { CoreSession, RangeLoader } from "./tetralod_core.js";
 import initAllKinds, { CoreSession as AllKindsSession, RangeLoader as AllKindsLoader } from "./tetralod_all_kinds.js";
-import { arraysIn } from "./changes.js";
+import initTools, { MeshTools } from "./tetralod_tools.js";
+import { arraysIn, copyChanged } from "./changes.js";
 import { TetralodError, flattenError, reviveError } from "./errors.js";
 import { received } from "./options.js";
-import { allKindsWasm, coreWasm } from "./files.js";
+import { allKindsWasm, coreWasm, toolsWasm } from "./files.js";
 import { Parts } from "./parts.js";
 import { FirstResponse, SharedRanges } from "./ranges.js";
 import { portEndpoint, serve } from "./rpc.js";
 import { wasmError, wasmOf } from "./start.js";
-import { limitOf, meshToolMethods } from "./tools.js";
+import { copyToolMethods, limitOf } from "./tools.js";
 import { VERSION } from "./version.js";
 
 /**
  * A wasm module that is compiled once per thread.
  *
+ * @template T
  * @param {(options: object) => Promise<{ memory: WebAssembly.Memory }>} init
- * @param {{ Session: typeof CoreSession, Loader: typeof RangeLoader }} classes
+ * @param {T} classes
  * @param {() => any} place the address of the package's own, or its bytes
  * @param {string} entry
+ * @param {string} [option] what else may say where it is
  */
-function lazily(init, classes, place, entry) {
+function lazily(init, classes, place, entry, option) {
   let loading;
   const load = async (wasm) => {
     const { memory } = await init({ module_or_path: await wasmOf(wasm) });
@@ -31,7 +34,7 @@ function lazily(init, classes, place, entry) {
   return (wasm = undefined) => {
     loading ??= load(wasm ?? place()).catch((error) => {
       loading = undefined;
-      throw wasmError(error, entry);
+      throw wasmError(error, entry, option);
     });
     return loading;
   };
@@ -42,6 +45,12 @@ export const loadCore = lazily(initCore, { Session: CoreSession, Loader: RangeLo
 
 /** The one for MTs of the other kinds: a page that opens none does not download it. */
 const loadAllKinds = lazily(initAllKinds, { Session: AllKindsSession, Loader: AllKindsLoader }, allKindsWasm, "tetralod/all-kinds.wasm");
+
+/** Where the caller says that the one with the tools is. */
+let toolsPlace;
+
+/** The one with the tools for meshes: a page that only wants the mesh does not download it. */
+const loadTools = lazily(initTools, { Tools: MeshTools }, () => toolsPlace ?? toolsWasm(), "tetralod/tools.wasm", "toolsUrl");
 
 /** The methods that wait for bytes, beside which others are answered. */
 export const WAITING = ["openParts", "reach", "settled", "arrived"];
@@ -58,6 +67,8 @@ export function coreMethods(emit, shared = new SharedRanges()) {
   /** @type {Awaited<ReturnType<typeof loadCore>>} */
   let wasm;
   let session;
+  /** What works on a copy of the mesh. @type {MeshTools | undefined} */
+  let tools;
   /** What has come of a stream until its base mesh is there, and the fields that are wanted of it. @type {Uint8Array[] | undefined} */
   let head;
   let wanted;
@@ -112,10 +123,24 @@ export function coreMethods(emit, shared = new SharedRanges()) {
     const places = session.places();
     return { ...arraysIn(wasm.memory.buffer, places, arrays), changes, stats, more };
   };
+  /** The tools, with the mesh as it is now: what has changed since the last time is copied. */
+  const toolsNow = async () => {
+    const { Tools, memory } = await loadTools();
+    const changed = session.copied(!tools);
+    const made = tools ?? new Tools();
+    // If this fails, the next call begins with another copy.
+    tools = undefined;
+    const places = session.places();
+    const copies = made.change(places[1] / 3, places[5] / 4, changed.vertices, changed.tets);
+    copyChanged([wasm.memory.buffer, places], [memory.buffer, copies], changed);
+    tools = made;
+    return tools;
+  };
   const close = (reason) => {
     parts?.close(reason);
     session?.free();
-    [session, parts] = [undefined, undefined];
+    tools?.free();
+    [session, parts, tools] = [undefined, undefined, undefined];
   };
   /** Begins with the file again, with the other module, where this one has no MTs of its kind. */
   const orWithAllKinds = async (first, again) => {
@@ -146,7 +171,8 @@ export function coreMethods(emit, shared = new SharedRanges()) {
     return close();
   };
   return {
-    async load(wasm) {
+    async load(wasm, tools) {
+      toolsPlace = tools ?? toolsPlace;
       await loadCore(wasm);
       return { name: "core", version: VERSION };
     },
@@ -204,7 +230,7 @@ export function coreMethods(emit, shared = new SharedRanges()) {
     /** Ends the fetching; the mesh stays usable. */
     halt: () => parts?.close(new TetralodError("freed", "the download was ended")),
     setField: (name) => session.setField(name),
-    ...meshToolMethods(() => session),
+    ...copyToolMethods(() => session, toolsNow),
     /** Begins another session over the same bytes, which is called through `port`. */
     view(port) {
       shared.count(1);

@@ -158,6 +158,14 @@ export interface OpenOptions extends ReadOptions {
    * @throws {TetralodError} `wasm` if it cannot be loaded or compiled
    */
   wasmUrl?: string | URL;
+  /**
+   * The address of the wasm file with the tools for meshes, `tetralod/tools.wasm`. A relative address is relative to the page.
+   * Default: the file beside the worker's. It is loaded by the first call of `isosurface`, `slice`, `surface`, `probe`, `line`,
+   * `streamlines` or `stats`, once for all volumes of a thread.
+   *
+   * @throws {TetralodError} `wasm` from these calls if it cannot be loaded or compiled
+   */
+  toolsUrl?: string | URL;
 }
 
 /** The work of a refinement, or of a step of one, and the quality of the mesh. */

@@ -96,6 +96,30 @@ export const meshToolMethods = (session) => ({
 });
 
 /**
+ * The same where the tools are in another module than the session, on a copy of its mesh.
+ *
+ * @param {() => any} session
+ * @param {() => Promise<any>} tools with the mesh as it is now
+ */
+export const copyToolMethods = (session, tools) => ({
+  isosurface: async (values, smooth) => (await tools()).isosurfaces(values, smooth),
+  slice: async (normal, offset) => (await tools()).slice(normal, offset),
+  surface: async () => (await tools()).surface(),
+  probe: async (points) => (await tools()).probe(points),
+  line: async (from, to) => (await tools()).line(from, to),
+  async streamlines(fields, ...how) {
+    const on = await tools();
+    return on.streamlines(...fields.map((name) => session().values(name)), ...how);
+  },
+  async stats(bins, low, high, fractions) {
+    const on = await tools();
+    const [min, max] = session().range();
+    return on.stats(bins, Number.isNaN(low) ? min : low, Number.isNaN(high) ? max : high, fractions);
+  },
+  hash: () => session().hash(),
+});
+
+/**
  * What keeps a mesh from being finer.
  *
  * @param {{ done: boolean, satisfied: boolean, missing: boolean }} stats

@@ -16,10 +16,12 @@ import { VERSION } from "./version.js";
 
 /** While a file streams in, the mesh follows it this often (in ms), and at most half of the time is spent on that. */
 const FOLLOW = 120;
-/** A step is as long as the last picture took, but not shorter or longer than this (in ms). */
+/** While something moves a step is as long as the last picture took, but not shorter or longer than this (in ms). */
 const STEP = [6, 30];
-/** Hidden pages have no frames: their meshes follow in steps this far apart (in ms). */
-const HIDDEN = 200;
+/** At rest nobody waits for the next picture: a step may take so long (in ms). */
+const LONG_STEP = 50;
+/** Hidden pages have no frames, slow ones few: after so long without one (in ms) the mesh follows between them. */
+const HIDDEN = 100;
 
 /** So many bytes of a file are fetched ahead: as many as its first request asks for. */
 const HEAD = 65536;
@@ -428,8 +430,8 @@ function invalidate() {
 function stepUnseen() {
   hidden = undefined;
   if (broken || !ready || !viewer.moving) return;
-  step(HIDDEN / 4);
-  hidden = setTimeout(stepUnseen, HIDDEN / 4);
+  step(LONG_STEP);
+  hidden = setTimeout(stepUnseen, resting === undefined ? 0 : LONG_STEP);
 }
 
 /** Resolves when the GPU has finished all pictures. */
@@ -444,7 +446,7 @@ function draw() {
   if (isTaking) return;
   clearTimeout(hidden);
   hidden = undefined;
-  if (ready && viewer.moving) step(Math.min(Math.max(drawing, STEP[0]), STEP[1]));
+  if (ready && viewer.moving) step(resting === undefined ? LONG_STEP : Math.min(Math.max(drawing, STEP[0]), STEP[1]));
   try {
     observe();
     const start = performance.now();

@@ -8,6 +8,10 @@
 //! nor one in a tetrahedron that happens to contain the vertex. So when [`Part::promise`] is given, places on the
 //! boundary within its distance count as well, and the one that fits best is taken.
 
+mod angles;
+
+pub use angles::CellAngles;
+
 use crate::geom::{Bounds, PointGrid, TriangleGrid, weights_at, weights_on_triangle};
 use crate::mesh::boundary_faces;
 use crate::mt::{CurrentMesh, FieldInfo, MtInfo};

@@ -1,6 +1,8 @@
 /** Files of meshes, dropped or chosen: a dialog that builds an MT file of them in a worker, opens it, and saves it. */
 
+import { element } from "./dom.js";
 import { count, nameOf, size } from "./format.js";
+import { RepairControls, repairWords } from "./repair.js";
 
 /** Names of files that an MT can be built of. */
 const MESH = /\.(vtu|vti|vts|vtr|vtk|raw|json)$/i;
@@ -33,13 +35,6 @@ export function takeMesh(files, open) {
   return true;
 }
 
-/** An element with text or elements in it. */
-function element(name, properties = {}, ...content) {
-  const made = Object.assign(document.createElement(name), properties);
-  made.append(...content);
-  return made;
-}
-
 class BuildDialog {
   #files;
   #open;
@@ -48,10 +43,13 @@ class BuildDialog {
   #asked = 0;
   #name;
   #about = element("p", { textContent: "Reading…" });
-  #fields = element("fieldset", { hidden: true });
+  #fields = element("fieldset", { className: "choices", hidden: true });
+  #repair = new RepairControls();
   #memory = element("p");
   #bar = element("progress", { max: 1, value: 0, ariaLabel: "Progress of the build", hidden: true });
-  #status = element("p", { role: "status" });
+  #status = element("p");
+  /** What the repair did. */
+  #repaired = element("ul", { hidden: true });
   #error = element("p", { className: "bad", role: "alert", hidden: true });
   #start = element("button", { type: "button", textContent: "Build", disabled: true });
   #save = element("a", { className: "button", textContent: "Save .mt", hidden: true });
@@ -66,8 +64,9 @@ class BuildDialog {
     title.id = "build-title";
     this.#dialog.setAttribute("aria-labelledby", title.id);
     const buttons = element("div", { className: "buttons" }, this.#start, this.#save, this.#cancel);
-    const parts = [title, this.#about, this.#fields, this.#memory, this.#bar, this.#status, this.#error, buttons];
-    this.#dialog.append(...parts);
+    const said = element("div", { role: "status" }, this.#status, this.#repaired);
+    const settings = [this.#fields, this.#repair.fieldset, this.#memory];
+    this.#dialog.append(title, this.#about, ...settings, this.#bar, said, this.#error, buttons);
     this.#start.addEventListener("click", () => this.#build());
     this.#cancel.addEventListener("click", () => this.close());
     this.#dialog.addEventListener("close", () => this.#leave());
@@ -88,7 +87,7 @@ class BuildDialog {
     if (shown === this) shown = undefined;
   }
 
-  /** The chosen fields and how the mesh is built of them. */
+  /** The chosen fields. */
   get #options() {
     const boxes = [...this.#fields.querySelectorAll("input")].filter((box) => box.checked);
     const cellToPoint = boxes.some((box) => box.dataset.at === "cells");
@@ -102,6 +101,7 @@ class BuildDialog {
       const { format, points, tetrahedra, fields } = info;
       this.#about.textContent = `${format}, ${count(points)} points, ${count(tetrahedra)} tetrahedra`;
       this.#showFields(fields);
+      this.#repair.fieldset.hidden = tetrahedra === 0;
       this.#showMemory(info.memory);
       this.#start.focus();
     } catch (error) {
@@ -146,21 +146,30 @@ class BuildDialog {
   }
 
   async #build() {
-    const options = this.#options;
-    this.#start.disabled = true;
-    this.#fields.disabled = true;
-    this.#bar.hidden = false;
-    this.#error.hidden = true;
+    if (!this.#repair.isValid()) return;
+    const options = { ...this.#options, ...this.#repair.options };
+    this.#setBusy(true);
+    for (const part of [this.#error, this.#repaired, this.#save]) part.hidden = true;
+    this.#cancel.textContent = "Cancel";
     try {
       const { build } = await import("tetralod/build");
       const onProgress = (progress) => this.#showProgress(progress);
       const { bytes, report } = await build(this.#files, { ...options, onProgress });
+      this.#setBusy(false);
       this.#finish(new File([bytes], `${this.#name.replace(MESH, "")}.mt`), report);
     } catch (error) {
+      this.#setBusy(false);
+      this.#status.textContent = "";
       this.#fail(error);
-      this.#start.disabled = false;
-      this.#fields.disabled = false;
+      if (error?.code === "bad-mesh") this.#repair.focus();
+      else this.#start.focus();
     }
+  }
+
+  /** Nothing can be chosen while the build runs. */
+  #setBusy(isBusy) {
+    for (const control of [this.#start, this.#fields, this.#repair.fieldset]) control.disabled = isBusy;
+    this.#bar.hidden = !isBusy;
   }
 
   #showProgress({ phase, fraction, tetrahedra }) {
@@ -169,11 +178,16 @@ class BuildDialog {
     this.#status.textContent = `${PHASES[phase]}${left}`;
   }
 
-  #finish(file, { tetrahedra, seconds, repaired }) {
-    const mended = repaired && ` (${repaired})`;
-    this.#status.textContent = `${count(tetrahedra)} tetrahedra in ${size(file.size)}, built in ${seconds.toFixed(1)} s${mended}`;
-    this.#start.hidden = true;
+  #finish(file, report) {
+    const { tetrahedra, seconds } = report;
+    this.#status.textContent = `${count(tetrahedra)} tetrahedra in ${size(file.size)}, built in ${seconds.toFixed(1)} s`;
+    const words = repairWords(report).map((textContent) => element("li", { textContent }));
+    this.#repaired.replaceChildren(...words);
+    this.#repaired.hidden = words.length === 0;
+    // Other fields, or another repair, may turn out to be better.
+    this.#start.textContent = "Build again";
     this.#save.hidden = false;
+    if (this.#save.href) URL.revokeObjectURL(this.#save.href);
     this.#save.href = URL.createObjectURL(file);
     this.#save.download = file.name;
     this.#cancel.textContent = "Close";

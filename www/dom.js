@@ -6,6 +6,13 @@ export const $ = (id) => document.getElementById(id);
 /** @type {(selector: string) => any[]} */
 export const all = (selector) => Array.from(document.querySelectorAll(selector));
 
+/** A new element with text or elements in it. @type {(name: string, properties?: object, ...content: (string | Node)[]) => any} */
+export function element(name, properties = {}, ...content) {
+  const made = Object.assign(document.createElement(name), properties);
+  made.append(...content);
+  return made;
+}
+
 /** The value of the chosen one of some radio buttons. @param {string} name */
 export const checked = (name) => /** @type {HTMLInputElement} */ (document.querySelector(`[name=${name}]:checked`)).value;
 

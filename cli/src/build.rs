@@ -4,31 +4,62 @@ use super::files;
 use super::input;
 use super::output::{self, Verbosity, bytes, count};
 use super::parse;
+use super::parts::{self, InPieces};
 use super::repair::{Repair, RepairOptions};
+use super::restrictions::{Angles, RestrictionOptions};
 use anyhow::{Context, Result, anyhow};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
+use tetralod::builder::parts::PartsError;
 use tetralod::builder::{
     BuildConfig, BuildCriterion, BuildError, BuildProgress, BuildResult, BuildSummary, Construction,
     ConstructionChoice, FieldPrecision, Method, Purpose, Remedy, memory_needed,
 };
 use tetralod::format::{EncodeOptions, encode_to};
-use tetralod::io::{CellData, FieldSelection};
-use tetralod::mesh::{Field, RepairLevel, RepairReport, TetMesh};
+use tetralod::io::{CellData, FieldSelection, PieceCounts, Pieces, ReadOptions};
+use tetralod::mesh::{Field, GeometryField, RepairLevel, RepairReport, TetMesh};
 use tetralod::mt::MtKind;
 
 /// Turns a tetrahedral mesh or a regular grid into an MT file.
 #[derive(clap::Args)]
 pub struct Arguments {
+    #[command(flatten)]
+    options: BuildOptions,
+    /// The MT file to write.
+    #[arg(short, long, value_name = "FILE", required_unless_present = "part")]
+    output: Option<PathBuf>,
+    /// Build one part of N of what `tetralod part` has parted; INPUT is its folder then. The first part is 0.
+    #[arg(long, value_name = "I/N", conflicts_with_all = ["output", "memory"], value_parser = parts::of_all)]
+    part: Option<[u32; 2]>,
+    /// Threads to build with, all cores if not given. The file does not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+    /// Build in so many parts, a power of two, as many at a time as there are threads: on several cores this is faster, and takes less
+    /// memory, than one part. The file depends on it; it is a little larger.
+    #[arg(long, value_name = "N", conflicts_with = "part")]
+    parts: Option<u32>,
+    /// The most memory that building may take, as 8G: what needs more, by its counts, is built in parts (kind half-edge), in a folder
+    /// beside the output that is removed afterwards; what needs more than that is refused before the work begins. K, M and G are powers
+    /// of 1024.
+    #[arg(long, value_name = "BYTES", value_parser = parse::parse_bytes)]
+    memory: Option<u64>,
+    #[command(flatten)]
+    verbosity: Verbosity,
+}
+
+/// What is built, and how: the same for a whole and for parts.
+#[derive(clap::Args)]
+pub struct BuildOptions {
     /// Mesh or grid: .vtu, .vti, .vts, .vtr, the lists .pvtu, .pvti, .pvts and .pvtr, .vtk, .vtkhdf, Exodus .exo, .ex2 or .e, Gmsh .msh,
     /// Medit .mesh or .meshb, TetGen .node or .ele, Netgen .vol, .nrrd, .mha or .mhd, or .raw with a .json beside it; - is the
     /// standard input. Points without cells go with --method insert. Several, a .pvd, and what a file has of them are time steps over
     /// one mesh.
     #[arg(required = true, value_name = "INPUT")]
-    inputs: Vec<PathBuf>,
+    pub inputs: Vec<PathBuf>,
     /// The format of the standard input, which is refused if its content is another one: vtu, vti, vts, vtr, vtk, vtkhdf,
     /// exodus, gmsh, medit, netgen, nrrd or metaimage [default: what its content says].
     #[arg(long, value_name = "FORMAT")]
@@ -36,9 +67,6 @@ pub struct Arguments {
     /// Build one of the time steps alone; the first one is 0.
     #[arg(long, value_name = "N")]
     step: Option<usize>,
-    /// The MT file to write.
-    #[arg(short, long, value_name = "FILE")]
-    output: PathBuf,
     /// The kind of MT: half-edge (the best for regions), edge, vertex or explicit [default: what goes with the other options, else half-edge].
     #[arg(long, value_name = "KIND", value_parser = kind)]
     kind: Option<MtKind>,
@@ -50,8 +78,8 @@ pub struct Arguments {
     /// decimate].
     #[arg(long, value_name = "CRITERION", value_parser = criterion)]
     criterion: Option<BuildCriterion>,
-    /// What it is for, with decimate: uniform, the fewest tetrahedra at one error everywhere, or regions, which then take
-    /// less around them with them [default: uniform].
+    /// What it is for, with decimate: uniform, the fewest tetrahedra at one error everywhere; regions, which then take
+    /// less around them with them; or mean, a smaller mean error at the same number of tetrahedra [default: uniform].
     #[arg(long = "for", value_name = "PURPOSE", value_parser = purpose)]
     purpose: Option<Purpose>,
     /// Keep for each tetrahedron how far its own error is below that of the update that removes it: requests take fewer
@@ -69,7 +97,7 @@ pub struct Arguments {
     #[arg(long)]
     cell_to_point: bool,
     #[command(flatten)]
-    repair: RepairOptions,
+    pub repair: RepairOptions,
     /// The unit of a field or vector (repeatable).
     #[arg(long = "unit", value_name = "NAME=UNIT", value_parser = last_pair)]
     units: Vec<(String, String)>,
@@ -99,19 +127,12 @@ pub struct Arguments {
     /// [default: 10].
     #[arg(long, value_name = "N", value_parser = lengths)]
     displacement_edges: Option<f64>,
+    #[command(flatten)]
+    pub restrictions: RestrictionOptions,
     /// Updates in a block, the least that can be fetched of the file by itself: a power of two, 16 to 65536 [default: 2048, 256 for kind
     /// half-edge].
     #[arg(long, value_name = "N", value_parser = block_bits)]
     block_updates: Option<u32>,
-    /// Threads to build with, all cores if not given. The file does not depend on it.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
-    threads: Option<u16>,
-    /// The most memory that building may take, as 8G: what needs more, by its counts, is refused before the work begins. K, M and G
-    /// are powers of 1024.
-    #[arg(long, value_name = "BYTES", value_parser = parse::parse_bytes)]
-    memory: Option<u64>,
-    #[command(flatten)]
-    verbosity: Verbosity,
 }
 
 /// Parses the name of a kind of MT.
@@ -205,7 +226,7 @@ pub fn named<T: Copy>(text: &str, all: &[(&str, T)]) -> Result<T> {
 }
 
 /// The summary as programs get it.
-#[derive(Serialize)]
+#[derive(Default, Serialize)]
 struct Report {
     kind: &'static str,
     method: &'static str,
@@ -218,6 +239,9 @@ struct Report {
     updates: u32,
     depth: u32,
     position_bits: u32,
+    /// How far interfaces between regions have moved, in model units, if they may.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    interface_deviation: Option<f64>,
     file_bytes: u64,
     bytes_per_vertex: f64,
     seconds: f64,
@@ -225,30 +249,75 @@ struct Report {
     repaired: String,
     /// Of points without cells nothing is repaired.
     repair: Option<Repair>,
+    /// With a bound for them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    angles: Option<Angles>,
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
     let start = Instant::now();
-    let config = config(arguments);
+    let Arguments { options, verbosity, .. } = arguments;
     if let Some(threads) = arguments.threads {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
         pool.build_global().context("starting the threads")?;
     }
-    files::check_ending(&arguments.output, "mt")?;
-    files::check_output(&arguments.output, &arguments.inputs)?;
-    let level = arguments.repair.level();
-    let (mesh, repaired) = read(arguments, &config, level)?;
-    let repair = Repair::of(&mesh, level, &repaired)?;
-    let repaired = repaired.to_string();
-    for line in [Some(&repaired), repair.as_ref().map(|repair| &repair.kept)].into_iter().flatten() {
-        if !line.is_empty() && !arguments.verbosity.quiet {
-            eprintln!("{}: {line}", arguments.inputs[0].display());
-        }
+    if let Some([index, all]) = arguments.part {
+        return parts::build_part(&options.inputs, [index, all], verbosity);
     }
-    expect_memory(arguments, &config, &mesh)?;
-    let BuildResult { mt, summary, exact, .. } = build(arguments, &config, mesh)?;
-    let built = config.construction.metadata().into_iter().chain(level.metadata());
-    let metadata = built.chain(arguments.metadata.iter().cloned()).collect();
+    let Some(output) = &arguments.output else { return Err(anyhow!("-o FILE is missing")) };
+    let mut config = options.config();
+    config.keep_points = options.restrictions.points()?;
+    files::check_ending(output, "mt")?;
+    files::check_output(output, &options.inputs)?;
+    let level = options.repair.level();
+    let may_part = arguments.parts.is_some() || arguments.memory.is_some();
+    if let Some(built) = build_pieces(arguments, &config, output)? {
+        return finish(arguments, &config, (built, start), repaired_as(String::new()));
+    }
+    let (mut mesh, mut repaired) = options.read(&config, level, may_part)?;
+    let [points, tetrahedra] = mesh.counts();
+    let way = way(arguments, &config, [points, tetrahedra, kept_fields(&config, &mesh)], None)?;
+    if way == Way::Whole && mesh.is_grid_alone() {
+        mesh.expand_grid();
+        (mesh, repaired) = input::mend(mesh, level, &options.inputs[0])?;
+    }
+    let repair = options.repair_of(&mesh, &repaired, way, verbosity)?;
+    let mut angles = config.min_dihedral.map(|_| Angles::of_reference(&mesh));
+    let result = match way {
+        Way::Whole => build(arguments, &config, mesh)?,
+        Way::Parts(count) => {
+            let whole = parts::Whole::Mesh(mesh);
+            let side_by_side = rayon::current_num_threads().min(count as usize);
+            let metadata = options.metadata(&config);
+            let parting = parts::Parting { whole, config: &config, count, metadata, side_by_side };
+            parting.build(output, verbosity).with_context(|| options.name())??
+        }
+    };
+    angles.iter_mut().for_each(|angles| angles.add_base(&result.mt));
+    finish(
+        arguments,
+        &config,
+        (result, start),
+        Report { repair, angles, ..repaired_as(repaired.to_string()) },
+    )
+}
+
+/// A report of nothing but what was repaired.
+fn repaired_as(repaired: String) -> Report {
+    Report { repaired, ..Report::default() }
+}
+
+/// Writes the MT, and says what there is; `known` has what is known of the repair and the angles.
+fn finish(
+    arguments: &Arguments,
+    config: &BuildConfig,
+    (result, start): (BuildResult, Instant),
+    known: Report,
+) -> Result<()> {
+    let Arguments { options, verbosity, output, .. } = arguments;
+    let Some(output) = output else { return Err(anyhow!("-o FILE is missing")) };
+    let BuildResult { mt, summary, exact, .. } = result;
+    let metadata = options.metadata(config);
     let options = EncodeOptions {
         block_bits: config.block_bits,
         check_margins: true,
@@ -256,93 +325,265 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         histograms: true,
         metadata,
     };
-    let file_bytes = files::write_file(&arguments.output, |out| Ok(encode_to(&mt, &options, out)?))?;
+    let file_bytes = files::write_file(output, |out| Ok(encode_to(&mt, &options, out)?))?;
     let seconds = start.elapsed().as_secs_f64();
-    let report = Report { repair, ..report(&config, &summary, file_bytes, seconds, repaired) };
-    arguments.verbosity.print(&report, &rows(arguments, &report))
+    let Report { repaired, repair, angles, .. } = known;
+    let report = Report { repair, angles, ..report(config, &summary, file_bytes, seconds, repaired) };
+    verbosity.print(&report, &rows(output, &report))
 }
 
-/// Reads what is wanted of the input.
-fn read(arguments: &Arguments, config: &BuildConfig, level: RepairLevel) -> Result<(TetMesh, RepairReport)> {
-    let cells = if arguments.cell_to_point { CellData::Values } else { CellData::Names };
-    let wanted = FieldSelection { names: &config.fields, all: config.all_fields, cells };
-    input::expect_format(&arguments.inputs, arguments.format.as_deref());
-    let format = arguments.format.as_deref();
-    let (mut mesh, repaired) = input::read_as(&arguments.inputs, &wanted, level, (format, arguments.step))?;
-    if config.construction.method().keeps_the_mesh() {
-        input::expect_cells(&mesh, &arguments.inputs[0])?;
+/// Builds a mesh in several files in parts, without reading it as a whole; none if it is another one, or is not to be built in parts.
+fn build_pieces(arguments: &Arguments, config: &BuildConfig, output: &Path) -> Result<Option<BuildResult>> {
+    let Arguments { options, verbosity, .. } = arguments;
+    let is_whole = arguments.parts == Some(1) || arguments.parts.is_none() && arguments.memory.is_none();
+    // Angles are told of the whole.
+    if is_whole || config.min_dihedral.is_some() {
+        return Ok(None);
     }
-    for (name, unit) in &arguments.units {
-        let is_meant = |field: &&mut Field| {
-            field.name == *name || field.vector.as_ref().is_some_and(|vector| vector.name == *name)
+    options.in_pieces(config, |input| {
+        let way = match arguments.parts {
+            Some(count) => Way::Parts(count),
+            None => {
+                let PieceCounts { points, tetrahedra, pieces, largest, fields } = input.pieces.counts()?;
+                let fields = if config.all_fields { fields } else { (config.fields.len() as u64).max(1) };
+                way(arguments, config, [points, tetrahedra, fields], Some([pieces, largest]))?
+            }
         };
-        let mut found = 0;
-        mesh.fields.iter_mut().filter(is_meant).for_each(|field| {
-            field.unit.clone_from(unit);
-            found += 1;
-        });
-        if found == 0 {
-            anyhow::bail!("--unit {name}={unit}: there is no field '{name}'");
+        let Way::Parts(count) = way else { return Ok(None) };
+        let side_by_side = rayon::current_num_threads().min(count as usize);
+        let metadata = options.metadata(config);
+        let whole = parts::Whole::Pieces(input);
+        let parting = parts::Parting { whole, config, count, metadata, side_by_side };
+        match parting.build(output, verbosity).with_context(|| options.name())? {
+            Ok(built) => Ok(Some(built)),
+            Err(why) => {
+                options.tell(&why, verbosity);
+                Ok(None)
+            }
+        }
+    })
+}
+
+/// How a mesh is built.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Way {
+    Whole,
+    /// In so many parts.
+    Parts(u32),
+}
+
+impl BuildOptions {
+    /// The name of the input, for messages.
+    pub fn name(&self) -> String {
+        self.inputs[0].display().to_string()
+    }
+
+    /// What the file is to say of itself.
+    pub fn metadata(&self, config: &BuildConfig) -> BTreeMap<String, String> {
+        let built = config.construction.metadata().into_iter().chain(self.repair.level().metadata());
+        built.chain(self.metadata.iter().cloned()).collect()
+    }
+
+    /// Tells what was repaired, and what was found.
+    pub fn repair_of(
+        &self,
+        mesh: &TetMesh,
+        repaired: &RepairReport,
+        way: Way,
+        verbosity: &Verbosity,
+    ) -> Result<Option<Repair>> {
+        // To look through a grid takes more memory than its parts do, and nothing is wrong with it.
+        let is_sound = way != Way::Whole && mesh.grid.is_some();
+        let repair = if is_sound { None } else { Repair::of(mesh, self.repair.level(), repaired)? };
+        let repaired = repaired.to_string();
+        for line in [Some(&repaired), repair.as_ref().map(|repair| &repair.kept)].into_iter().flatten() {
+            if !line.is_empty() && !verbosity.quiet {
+                eprintln!("{}: {line}", self.name());
+            }
+        }
+        Ok(repair)
+    }
+
+    /// Reads what is wanted of the input.
+    ///
+    /// If it may be built in parts, a regular grid comes without points and tetrahedra where only its values are needed.
+    pub fn read(
+        &self,
+        config: &BuildConfig,
+        level: RepairLevel,
+        in_parts: bool,
+    ) -> Result<(TetMesh, RepairReport)> {
+        let with_labels = !config.preserve.is_empty();
+        let cells = if self.cell_to_point || with_labels { CellData::Values } else { CellData::Names };
+        let wanted = FieldSelection { names: &config.fields, all: config.all_fields, cells };
+        let needs_points = |name: &String| GeometryField::named(name).is_some();
+        let alone = in_parts
+            && cells == CellData::Names
+            && config.min_dihedral.is_none()
+            && !config.fields.iter().any(needs_points);
+        input::expect_format(&self.inputs, self.format.as_deref());
+        let format = self.format.as_deref();
+        let (mut mesh, repaired) =
+            input::read_cells(&self.inputs, &wanted, level, (format, self.step), alone)?;
+        let is_label = |field: &&Field| config.preserve.contains(&field.name);
+        let labels: Vec<Field> = mesh.cell_fields.iter().filter(is_label).cloned().collect();
+        match self.cell_to_point {
+            true => mesh.cells_to_points(),
+            false => mesh.cell_fields.iter_mut().for_each(|field| field.values = Vec::new()),
+        }
+        mesh.cell_fields.extend(labels);
+        mesh.add_geometry_fields(&config.fields);
+        if config.construction.method().keeps_the_mesh() {
+            input::expect_cells(&mesh, &self.inputs[0])?;
+        }
+        self.set_units(&mut mesh)?;
+        Ok((mesh, repaired))
+    }
+
+    fn set_units(&self, mesh: &mut TetMesh) -> Result<()> {
+        for (name, unit) in &self.units {
+            let is_meant = |field: &&mut Field| {
+                field.name == *name || field.vector.as_ref().is_some_and(|vector| vector.name == *name)
+            };
+            let mut found = 0;
+            mesh.fields.iter_mut().filter(is_meant).for_each(|field| {
+                field.unit.clone_from(unit);
+                found += 1;
+            });
+            if found == 0 {
+                anyhow::bail!("--unit {name}={unit}: there is no field '{name}'");
+            }
+        }
+        Ok(())
+    }
+
+    /// The pieces of the input, if it is a list of such that can be read one by one; `prepare` does what the options say to each.
+    pub fn in_pieces<T>(
+        &self,
+        config: &BuildConfig,
+        work: impl FnOnce(InPieces<'_>) -> Result<Option<T>>,
+    ) -> Result<Option<T>> {
+        let needs_points = |name: &String| GeometryField::named(name).is_some();
+        let needs_whole = self.cell_to_point
+            || matches!(self.repair.level(), RepairLevel::Weld { .. })
+            || config.fields.iter().any(needs_points);
+        let [path] = &self.inputs[..] else { return Ok(None) };
+        if needs_whole || files::ending(path) != "pvtu" {
+            return Ok(None);
+        }
+        let steps = tetralod::io::steps(path)?;
+        let [step] = &steps[..] else { return Ok(None) };
+        if self.step.is_some_and(|step| step != 0) {
+            return Ok(None);
+        }
+        let options = ReadOptions { cells: CellData::Names, step: step.number, ..ReadOptions::default() };
+        let Some(pieces) = Pieces::open(&step.path, &options)? else { return Ok(None) };
+        let prepare = |mesh: &mut TetMesh| {
+            if step.time.is_some() {
+                mesh.fields.iter_mut().for_each(|field| field.time = step.time);
+            }
+            self.set_units(mesh)
+        };
+        work(InPieces { pieces, prepare: &prepare })
+    }
+
+    /// Tells why pieces are read as a whole after all.
+    pub fn tell(&self, why: &PartsError, verbosity: &Verbosity) {
+        if !verbosity.quiet {
+            eprintln!("{}: {why}; so it is", self.name());
         }
     }
-    Ok((mesh, repaired))
 }
 
-/// From so much memory on, the command says what it needs.
-const MUCH_MEMORY: u64 = 1 << 30;
-
-/// Says how much memory building takes where that is much, and refuses what needs more than is allowed.
-fn expect_memory(arguments: &Arguments, config: &BuildConfig, mesh: &TetMesh) -> Result<()> {
-    let (points, tetrahedra) = (mesh.positions.len() as u64, mesh.tets.len() as u64);
+/// How many fields of a mesh are kept.
+fn kept_fields(config: &BuildConfig, mesh: &TetMesh) -> u64 {
     let is_kept = |field: &&Field| config.fields.iter().any(|name| field.answers_to(name));
     let fields = match config.all_fields {
         true => mesh.fields.len(),
         false => mesh.fields.iter().filter(is_kept).count(),
     };
-    let needed = memory_needed(config.construction, points, tetrahedra, fields.max(1) as u64);
+    fields.max(1) as u64
+}
+
+/// From so much memory on, the command says what it needs.
+const MUCH_MEMORY: u64 = 1 << 30;
+
+/// Says how much memory building takes where that is much, and chooses how to keep to what is allowed.
+///
+/// Of a mesh of so many points, tetrahedra and fields; if it comes in pieces, there are so many, and the largest one has so many
+/// tetrahedra.
+fn way(
+    arguments: &Arguments,
+    config: &BuildConfig,
+    [points, tetrahedra, fields]: [u64; 3],
+    pieces: Option<[u64; 2]>,
+) -> Result<Way> {
+    let Arguments { options, verbosity, .. } = arguments;
+    let needed = memory_needed(config.construction, points, tetrahedra, fields);
     let what = format!("building {} tetrahedra takes about {}", count(tetrahedra), bytes(needed));
+    let tell = |line: String| {
+        if !verbosity.quiet {
+            eprintln!("{}: {line}", options.name());
+        }
+    };
+    if let Some(parts) = arguments.parts {
+        return Ok(if parts == 1 { Way::Whole } else { Way::Parts(parts) });
+    }
     match arguments.memory {
-        Some(most) if needed > most => Err(anyhow!(
-            "{what} of memory, more than --memory allows ({}): allow more, keep fewer fields, or build a coarser mesh",
-            bytes(most)
-        ))
-        .with_context(|| arguments.inputs[0].display().to_string()),
-        _ => {
-            if needed >= MUCH_MEMORY && !arguments.verbosity.quiet {
-                eprintln!("{}: {what} of memory at most", arguments.inputs[0].display());
+        Some(most) if needed > most => {
+            if let Some(parts) = parts::count_for(config, [points, tetrahedra, fields], pieces, most) {
+                tell(format!("{what} of memory at once, so it is built in {parts} parts"));
+                return Ok(Way::Parts(parts));
             }
-            Ok(())
+            Err(anyhow!(
+                "{what} of memory, more than --memory allows ({}): allow more, keep fewer fields, or build a coarser mesh",
+                bytes(most)
+            ))
+            .with_context(|| options.name())
+        }
+        _ => {
+            if needed >= MUCH_MEMORY {
+                tell(format!("{what} of memory at most"));
+            }
+            Ok(Way::Whole)
         }
     }
 }
 
-/// How to build. Ends the program if the options contradict each other.
-fn config(arguments: &Arguments) -> BuildConfig {
-    let &Arguments { kind, method, criterion, purpose, tet_errors, .. } = arguments;
-    let choice = ConstructionChoice { kind, method, criterion, purpose, tet_errors };
-    let default = BuildConfig::of(choice.kind());
-    let precision: Vec<&Precision> = arguments.field_bits.iter().chain(&arguments.field_tolerance).collect();
-    let for_all: Vec<FieldPrecision> =
-        precision.iter().filter(|p| p.name.is_none()).map(|p| p.precision).collect();
-    if for_all.len() > 1 {
-        super::refuse_usage(
-            "--field-bits and --field-tolerance without a name are for all fields: give one of them",
-        );
-    }
-    let of_one = |p: &&Precision| p.name.clone().map(|name| (name, p.precision));
-    BuildConfig {
-        construction: construction(&choice).unwrap_or_else(|wrong| super::refuse_usage(&wrong)),
-        fields: arguments.fields.clone(),
-        all_fields: arguments.all_fields,
-        position_bits: arguments.position_bits,
-        position_tolerance: arguments.position_tolerance,
-        field_precision: for_all.first().copied().unwrap_or(default.field_precision),
-        precision_of: precision.iter().filter_map(of_one).collect(),
-        lossless: arguments.lossless.iter().filter(|name| !name.is_empty()).cloned().collect(),
-        all_lossless: arguments.lossless.iter().any(String::is_empty),
-        displacement: arguments.displacement.unwrap_or(default.displacement),
-        displacement_edges: arguments.displacement_edges.unwrap_or(default.displacement_edges),
-        block_bits: arguments.block_updates.unwrap_or(default.block_bits),
+impl BuildOptions {
+    /// How to build. Ends the program if the options contradict each other.
+    pub fn config(&self) -> BuildConfig {
+        let &Self { kind, method, criterion, purpose, tet_errors, .. } = self;
+        let choice = ConstructionChoice { kind, method, criterion, purpose, tet_errors };
+        let default = BuildConfig::of(choice.kind());
+        let precision: Vec<&Precision> = self.field_bits.iter().chain(&self.field_tolerance).collect();
+        let for_all: Vec<FieldPrecision> =
+            precision.iter().filter(|p| p.name.is_none()).map(|p| p.precision).collect();
+        if for_all.len() > 1 {
+            super::refuse_usage(
+                "--field-bits and --field-tolerance without a name are for all fields: give one of them",
+            );
+        }
+        let of_one = |p: &&Precision| p.name.clone().map(|name| (name, p.precision));
+        BuildConfig {
+            construction: construction(&choice).unwrap_or_else(|wrong| super::refuse_usage(&wrong)),
+            fields: self.fields.clone(),
+            all_fields: self.all_fields,
+            position_bits: self.position_bits,
+            position_tolerance: self.position_tolerance,
+            field_precision: for_all.first().copied().unwrap_or(default.field_precision),
+            precision_of: precision.iter().filter_map(of_one).collect(),
+            lossless: self.lossless.iter().filter(|name| !name.is_empty()).cloned().collect(),
+            all_lossless: self.lossless.iter().any(String::is_empty),
+            displacement: self.displacement.unwrap_or(default.displacement),
+            displacement_edges: self.displacement_edges.unwrap_or(default.displacement_edges),
+            min_dihedral: self.restrictions.min_dihedral,
+            feature_angle: self.restrictions.feature_angle,
+            preserve: self.restrictions.preserve.clone(),
+            preserve_within: self.restrictions.preserve_within.unwrap_or(default.preserve_within),
+            keep_points: Vec::new(),
+            block_bits: self.block_updates.unwrap_or(default.block_bits),
+        }
     }
 }
 
@@ -361,12 +602,30 @@ fn construction(choice: &ConstructionChoice) -> Result<Construction, String> {
 }
 
 fn build(arguments: &Arguments, config: &BuildConfig, mesh: TetMesh) -> Result<BuildResult> {
-    // Drawn on stderr, and only on a terminal.
-    let bar = if arguments.verbosity.quiet { ProgressBar::hidden() } else { ProgressBar::new(0) };
+    let result = with_progress(&arguments.verbosity, |progress| {
+        tetralod::builder::build_owned(mesh, config, progress)
+    })?;
+    result.map_err(failed).with_context(|| arguments.options.name())
+}
+
+/// Why building failed, with the option that helps.
+pub fn failed(error: BuildError) -> anyhow::Error {
+    match error.remedy().and_then(options_of) {
+        Some(option) => anyhow!("{error} ({option})"),
+        None => error.into(),
+    }
+}
+
+/// Shows the progress of some work, on stderr and only on a terminal.
+pub fn with_progress<T>(
+    verbosity: &Verbosity,
+    work: impl FnOnce(&mut dyn FnMut(BuildProgress) -> ControlFlow<()>) -> T,
+) -> Result<T> {
+    let bar = if verbosity.quiet { ProgressBar::hidden() } else { ProgressBar::new(0) };
     let style = "{msg:<12} {wide_bar} {percent:>3} %  {pos}/{len}  {elapsed_precise}  about {eta} left";
     bar.set_style(ProgressStyle::with_template(style).context("the style of the progress bar")?);
     let mut stage = "";
-    let result = tetralod::builder::build_owned(mesh, config, &mut |progress: BuildProgress| {
+    let result = work(&mut |progress: BuildProgress| {
         bar.set_length(progress.total.max(1));
         if progress.stage != stage {
             stage = progress.stage;
@@ -378,11 +637,7 @@ fn build(arguments: &Arguments, config: &BuildConfig, mesh: TetMesh) -> Result<B
         ControlFlow::Continue(())
     });
     bar.finish_and_clear();
-    let failed = |error: BuildError| match error.remedy().and_then(options_of) {
-        Some(option) => anyhow!("{error} ({option})"),
-        None => error.into(),
-    };
-    result.map_err(failed).with_context(|| arguments.inputs[0].display().to_string())
+    Ok(result)
 }
 
 /// The options that do what a remedy says. `Remedy` may grow.
@@ -417,18 +672,20 @@ fn report(
         updates: summary.updates,
         depth: summary.depth,
         position_bits: summary.position_bits,
+        interface_deviation: (config.preserve_within > 0.0).then_some(summary.interface_deviation),
         file_bytes,
         bytes_per_vertex: file_bytes as f64 / f64::from(summary.vertices.max(1)),
         seconds,
         repaired,
         repair: None,
+        angles: None,
     }
 }
 
-fn rows(arguments: &Arguments, report: &Report) -> Vec<(&'static str, String)> {
+fn rows(output: &Path, report: &Report) -> Vec<(&'static str, String)> {
     let removed = f64::from(report.tetrahedra.saturating_sub(report.base_tetrahedra));
-    vec![
-        ("file", arguments.output.display().to_string()),
+    let mut rows = vec![
+        ("file", output.display().to_string()),
         ("reference mesh", output::mesh(report.vertices, report.tetrahedra)),
         ("base mesh", output::mesh(report.base_vertices, report.base_tetrahedra)),
         (
@@ -446,5 +703,11 @@ fn rows(arguments: &Arguments, report: &Report) -> Vec<(&'static str, String)> {
                 removed / report.seconds
             ),
         ),
-    ]
+    ];
+    let moved = report
+        .interface_deviation
+        .map(|moved| ("interfaces moved", format!("{} at most", output::number(moved))));
+    rows.extend(moved);
+    rows.extend(report.angles.iter().flat_map(Angles::rows));
+    rows
 }

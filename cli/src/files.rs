@@ -12,7 +12,9 @@ use tetralod::client::{Client, ClientOptions};
 use tetralod::mesh::RepairLevel;
 use tetralod::mt::{Mt, MtInfo};
 use tetralod::session::Session;
-use tetralod::stream::{Arrived, FileSource, HttpOptions, HttpSource, RangeSource, StreamError, WantedRange};
+use tetralod::stream::{Arrived, FileSource, RangeSource, StreamError, WantedRange};
+#[cfg(feature = "http")]
+use tetralod::stream::{HttpOptions, HttpSource};
 use tetralod::verify::Reference;
 
 /// Bytes that are read at a time.
@@ -24,10 +26,10 @@ pub const PATIENCE: Duration = Duration::from_secs(1);
 /// Exit code after Ctrl-C, as shells have it.
 pub const INTERRUPTED: i32 = 130;
 
-/// The unfinished output, if there is one. Whoever holds the lock decides what becomes of it.
-static PARTIAL: Mutex<Option<PathBuf>> = Mutex::new(None);
+/// Unfinished outputs, and folders that are not kept. Whoever holds the lock decides what becomes of them.
+static PARTIAL: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-fn partial() -> MutexGuard<'static, Option<PathBuf>> {
+fn partial() -> MutexGuard<'static, Vec<PathBuf>> {
     // A path is whole even if a thread panicked while it held the lock.
     PARTIAL.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -37,8 +39,8 @@ pub fn remove_partial_output_on_interrupt() -> Result<()> {
     let interrupted = || {
         // Reassembly to the end: no file can be created or put in place any more.
         let partial = partial();
-        if let Some(path) = &*partial {
-            let _ = fs::remove_file(path);
+        for path in &*partial {
+            let _ = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
         }
         eprintln!("\ninterrupted");
         std::process::exit(INTERRUPTED);
@@ -111,7 +113,7 @@ pub fn write_file<T>(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> Re
     let file = {
         let mut partial = partial();
         let file = File::create(&partial_path).with_context(failed)?;
-        *partial = Some(partial_path.clone());
+        partial.push(partial_path.clone());
         file
     };
     let mut out = BufWriter::new(file);
@@ -121,7 +123,7 @@ pub fn write_file<T>(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> Re
     });
     drop(out);
     let mut partial = partial();
-    *partial = None;
+    partial.retain(|path| *path != partial_path);
     let placed = written.and_then(|done| {
         fs::rename(&partial_path, path)?;
         Ok(done)
@@ -130,6 +132,21 @@ pub fn write_file<T>(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> Re
         let _ = fs::remove_file(&partial_path);
     }
     placed.with_context(failed)
+}
+
+/// Works in a folder beside the place of an output; it is gone afterwards, also if the work fails.
+pub fn in_folder_beside<T>(path: &Path, work: impl FnOnce(&Path) -> Result<T>) -> Result<T> {
+    let folder = partial_path(path)?.with_extension("parts");
+    {
+        let mut partial = partial();
+        fs::create_dir(&folder).with_context(|| format!("{} could not be made", folder.display()))?;
+        partial.push(folder.clone());
+    }
+    let done = work(&folder);
+    let mut partial = partial();
+    partial.retain(|path| *path != folder);
+    let _ = fs::remove_dir_all(&folder);
+    done
 }
 
 /// What can be gone back in.
@@ -217,8 +234,13 @@ impl RangeSource for Bytes {
 impl Bytes {
     /// Of a path, or of an address that begins with `http://` or `https://`.
     fn of(path: &Path) -> Result<Self> {
+        #[cfg(feature = "http")]
         if let Some(url) = url(path) {
             return Ok(Self(Box::new(HttpSource::new(url, HttpOptions::default()))));
+        }
+        #[cfg(not(feature = "http"))]
+        if url(path).is_some() {
+            bail!("this command was compiled without the feature `http`: it reads files, not addresses");
         }
         if let Some(scheme) = scheme(path) {
             bail!(

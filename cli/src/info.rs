@@ -1,21 +1,29 @@
 //! `tetralod info`: what is in an MT file.
 
-use super::files::Opened;
+use super::files::{Opened, PATIENCE};
 use super::{files, output};
 use anyhow::{Context, Result};
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use tetralod::format;
 use tetralod::format::{BlockInfo, ErrorBytes};
 use tetralod::mesh::VectorPart;
 use tetralod::mt::{FieldInfo, MtKind, MultiTessellation, stats};
+use tetralod::refine::Request;
 
-/// Describes the content of an MT file.
+/// Describes the content of an MT file. Of large files only what stands in front of the updates is read.
 #[derive(clap::Args)]
 pub struct Arguments {
     /// The MT file, or its http(s) address.
     file: PathBuf,
+    /// Read a file of more than 4 MiB to its end, too: check its bytes, and tell what its structure costs, for which all updates are
+    /// applied once (about 60 bytes of memory for each tetrahedron).
+    #[arg(long)]
+    full: bool,
+    /// Read no more than what stands in front of the updates of a smaller file, too.
+    #[arg(long, conflicts_with = "full")]
+    head: bool,
     /// Print a JSON object.
     #[arg(long)]
     json: bool,
@@ -38,21 +46,30 @@ struct Report {
     file_bytes: u64,
     bytes_per_vertex: f64,
     blocks: Blocks,
-    /// How many bytes of the file code what; symbols coded together are counted by what they describe.
-    breakdown: Vec<FilePart>,
-    memory: Memory,
     fields: Vec<Field>,
-    /// Of the reference mesh: x0, y0, z0, x1, y1, z1.
+    /// Of the reference mesh: x0, y0, z0, x1, y1, z1. Where the file was not read to its end, of all its meshes, or a little more.
     bounds: [f64; 6],
     position_bits: u32,
     /// How far the lattice moves a vertex at most, in model units.
     position_quantization: f64,
     /// The displacement of the boundary, in model units, that counts as an error of 1; of less in small cells.
     displacement_per_error: f64,
+    /// Whether the file was read to its end.
+    full: bool,
+    #[serde(flatten)]
+    structure: Option<Structure>,
+    metadata: BTreeMap<String, String>,
+}
+
+/// What only all updates tell.
+#[derive(Serialize)]
+struct Structure {
     depth: u32,
     arcs_per_node: f64,
     tets_per_update: f64,
-    metadata: BTreeMap<String, String>,
+    memory: Memory,
+    /// How many bytes of the file code what; symbols coded together are counted by what they describe.
+    breakdown: Vec<FilePart>,
 }
 
 #[derive(Serialize)]
@@ -127,15 +144,78 @@ struct Memory {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let opened = files::open_mt(&arguments.file)?;
-    let report = report(&opened).with_context(|| arguments.file.display().to_string())?;
-    output::result(arguments.json, &report, &rows(&report))
+    let Arguments { file, full, head, json } = arguments;
+    let what = || file.display().to_string();
+    let most = if *head { 0 } else { LARGE };
+    let large = if *full { None } else { open_head(file, most).with_context(what)? };
+    let is_read = large.is_none();
+    let opened = match large {
+        Some(opened) => opened,
+        None => files::open_mt(file)?,
+    };
+    let report = report(&opened, is_read).with_context(what)?;
+    output::result(*json, &report, &rows(&report))
 }
 
-fn report(opened: &Opened) -> Result<Report> {
+/// Files of more bytes are not read to their end unless that is asked for.
+const LARGE: u64 = 4 << 20;
+
+/// Opens a file of more than so many bytes of which the head says what is in it; none if it is another one.
+fn open_head(path: &Path, most: u64) -> Result<Option<Opened>> {
+    let is_small =
+        files::scheme(path).is_none() && std::fs::metadata(path).is_ok_and(|found| found.len() <= most);
+    // A pipe can be read only once.
+    if is_small || std::fs::metadata(path).is_ok_and(|found| !found.is_file()) {
+        return Ok(None);
+    }
+    let mut client = files::open_parts(path)?;
+    let is_large = client.total().is_some_and(|bytes| bytes > most);
+    if !is_large || client.session().info().is_none_or(|info| !info.kind.is_paged()) {
+        return Ok(None);
+    }
+    client.request(&Request::within(f64::INFINITY))?;
+    while !client.fetch(PATIENCE)? {}
+    Ok(Some(Opened::of(client)))
+}
+
+/// What the structure of the MT costs, and the box around the reference mesh on the lattice.
+fn structure(opened: &Opened) -> Result<(Structure, [[i32; 3]; 2])> {
+    let stats = stats(opened.mt()?)?;
+    let structure = Structure {
+        depth: stats.depth,
+        arcs_per_node: stats.arcs_per_update(),
+        tets_per_update: stats.inserted_per_update(),
+        memory: Memory {
+            compact_bytes: stats.compact_bytes,
+            explicit_bytes: stats.explicit_bytes,
+            indexed_bytes: stats.indexed_bytes,
+            adjacency_bytes: stats.adjacency_bytes,
+        },
+        breakdown: breakdown(opened)?,
+    };
+    Ok((structure, stats.bounds))
+}
+
+/// A box on the lattice that holds all meshes, by the index.
+fn bounds(opened: &Opened) -> Result<[[i32; 3]; 2]> {
+    let index = opened.session.decoder().index().context("the file has no index")?;
+    let of_base = opened.mt()?.base().positions.iter().map(|&p| [p, p]);
+    let all = of_base.chain(index.blocks.iter().map(|block| block.bounds));
+    let both = all.reduce(|[low, high], [from, to]| {
+        [[0, 1, 2].map(|k| low[k].min(from[k])), [0, 1, 2].map(|k| high[k].max(to[k]))]
+    });
+    Ok(both.unwrap_or_default())
+}
+
+fn report(opened: &Opened, is_read: bool) -> Result<Report> {
     let (mt, info) = (opened.mt()?, opened.info()?);
     let base_tetrahedra = mt.base().tets.len();
-    let stats = stats(mt)?;
+    let (structure, bounds) = if is_read {
+        let (structure, bounds) = structure(opened)?;
+        (Some(structure), bounds)
+    } else {
+        (None, bounds(opened)?)
+    };
     let field = |(number, field): (usize, &FieldInfo)| {
         let FieldInfo { name, unit, vector, time, min, max, bits, quantization, .. } = field.clone();
         let vector = vector.map(|VectorPart { name, component }| Vector { name, component });
@@ -143,7 +223,7 @@ fn report(opened: &Opened) -> Result<Report> {
         let (histogram, curve) = (opened.session.decoder().histogram(number), curve(opened, number));
         Field { name, unit, vector, time, min, max, bits, quantization, floor, histogram, curve }
     };
-    let [[x0, y0, z0], [x1, y1, z1]] = stats.bounds.map(|corner| info.lattice.point(corner));
+    let [[x0, y0, z0], [x1, y1, z1]] = bounds.map(|corner| info.lattice.point(corner));
     Ok(Report {
         kind: info.kind.name(),
         updates_are: words(info.kind),
@@ -156,21 +236,13 @@ fn report(opened: &Opened) -> Result<Report> {
         file_bytes: opened.bytes,
         bytes_per_vertex: opened.bytes as f64 / f64::from(info.vertices.max(1)),
         blocks: blocks(opened)?,
-        breakdown: breakdown(opened)?,
-        memory: Memory {
-            compact_bytes: stats.compact_bytes,
-            explicit_bytes: stats.explicit_bytes,
-            indexed_bytes: stats.indexed_bytes,
-            adjacency_bytes: stats.adjacency_bytes,
-        },
         fields: info.fields.iter().enumerate().map(field).collect(),
         bounds: [x0, y0, z0, x1, y1, z1],
         position_bits: info.lattice.bits,
         position_quantization: info.quantization,
         displacement_per_error: info.displacement_per_error,
-        depth: stats.depth,
-        arcs_per_node: stats.arcs_per_update(),
-        tets_per_update: stats.inserted_per_update(),
+        full: is_read,
+        structure,
         metadata: opened.session.metadata().iter().cloned().collect(),
     })
 }
@@ -281,19 +353,18 @@ fn part_row(part: &FilePart, file_bytes: u64) -> String {
 
 fn rows(report: &Report) -> Vec<(&str, String)> {
     let [x0, y0, z0, x1, y1, z1] = report.bounds.map(output::number);
-    let memory = &report.memory;
+    let structure = report.structure.as_ref();
+    let depth = structure.map_or(String::new(), |all| format!(", at most {} deep", output::count(all.depth)));
     let mut rows = vec![
         ("kind", report.updates_are.to_owned()),
         ("reference mesh", output::mesh(report.vertices, report.tetrahedra)),
         ("base mesh", output::mesh(report.base_vertices, report.base_tetrahedra)),
-        (
-            "updates",
-            format!("{}, at most {} deep", output::count(report.updates), output::count(report.depth)),
-        ),
-        (
-            "",
-            format!("{:.2} tetrahedra, {:.2} arcs per update", report.tets_per_update, report.arcs_per_node),
-        ),
+        ("updates", format!("{}{depth}", output::count(report.updates))),
+    ];
+    rows.extend(structure.map(|all| {
+        ("", format!("{:.2} tetrahedra, {:.2} arcs per update", all.tets_per_update, all.arcs_per_node))
+    }));
+    rows.extend([
         ("errors", if report.tet_errors { "of tetrahedra, 2 bits each" } else { "of updates" }.to_owned()),
         ("file size", output::bytes(report.file_bytes)),
         ("bytes per vertex", format!("{:.2}", report.bytes_per_vertex)),
@@ -315,13 +386,19 @@ fn rows(report: &Report) -> Vec<(&str, String)> {
                 output::percent(report.blocks.index_bytes as f64 / report.file_bytes.max(1) as f64)
             ),
         ),
-        ("in memory", output::bytes(memory.compact_bytes)),
-        ("  explicit", output::bytes(memory.explicit_bytes)),
-        ("reference alone", output::bytes(memory.indexed_bytes)),
-        ("  with adjacency", output::bytes(memory.adjacency_bytes)),
+    ]);
+    if let Some(Structure { memory, .. }) = structure {
+        rows.extend([
+            ("in memory", output::bytes(memory.compact_bytes)),
+            ("  explicit", output::bytes(memory.explicit_bytes)),
+            ("reference alone", output::bytes(memory.indexed_bytes)),
+            ("  with adjacency", output::bytes(memory.adjacency_bytes)),
+        ]);
+    }
+    rows.extend([
         ("bounds", format!("({x0}, {y0}, {z0}) to ({x1}, {y1}, {z1})")),
         ("position bits", format!("{}, {}", report.position_bits, rounded(report.position_quantization))),
-    ];
+    ]);
     let steps = |a: &Field, b: &Field| a.name == b.name;
     for steps in report.fields.chunk_by(steps) {
         rows.push(("field", field_row(steps)));
@@ -329,9 +406,16 @@ fn rows(report: &Report) -> Vec<(&str, String)> {
         rows.extend(steps[0].histogram.as_deref().map(|shares| ("  values", histogram_row(shares))));
         rows.push(("  bytes at error", curve_row(&steps[0].curve)));
     }
-    rows.extend(report.breakdown.iter().map(|part| ("bytes of", part_row(part, report.file_bytes))));
+    let parts = structure.iter().flat_map(|all| &all.breakdown);
+    rows.extend(parts.map(|part| ("bytes of", part_row(part, report.file_bytes))));
     for (key, value) in &report.metadata {
         rows.push((key, value.clone()));
+    }
+    if !report.full {
+        rows.push((
+            "",
+            "the updates were not read: --full reads them, and tells what the structure costs".to_owned(),
+        ));
     }
     rows
 }

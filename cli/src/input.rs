@@ -38,7 +38,24 @@ pub fn read_as(
     paths: &[PathBuf],
     wanted: &FieldSelection<'_>,
     level: RepairLevel,
+    which: (Option<&str>, Option<usize>),
+) -> Result<(TetMesh, RepairReport)> {
+    let (mut mesh, report) = read_cells(paths, wanted, level, which, false)?;
+    if wanted.cells == CellData::Values {
+        mesh.cells_to_points();
+    }
+    mesh.add_geometry_fields(wanted.names);
+    Ok((mesh, report))
+}
+
+/// As [`read_as`], but fields at cells stay there, and there are no fields of the geometry. A regular grid may come `alone`, without
+/// points and tetrahedra: it is not mended.
+pub fn read_cells(
+    paths: &[PathBuf],
+    wanted: &FieldSelection<'_>,
+    level: RepairLevel,
     (format, step): (Option<&str>, Option<usize>),
+    alone: bool,
 ) -> Result<(TetMesh, RepairReport)> {
     let mut steps = steps(paths)?;
     if let Some(step) = step {
@@ -56,16 +73,12 @@ pub fn read_as(
             path if path == Path::new(STANDARD_INPUT) => {
                 io::read_bytes_with("standard input", &input, options)
             }
+            path if alone && steps.len() == 1 => io::read_unexpanded(path, options),
             path => io::read_with(path, options),
         }
     })?;
     drop(input);
-    let (mut mesh, report) = mend(mesh, level, &steps[0].path)?;
-    if wanted.cells == CellData::Values {
-        mesh.cells_to_points();
-    }
-    mesh.add_geometry_fields(wanted.names);
-    Ok((mesh, report))
+    mend(mesh, level, &steps[0].path)
 }
 
 /// The time steps in these files.
@@ -112,7 +125,8 @@ fn check_format(bytes: &[u8], format: Option<&str>) -> Result<()> {
     }
 }
 
-fn mend(mesh: TetMesh, level: RepairLevel, path: &Path) -> Result<(TetMesh, RepairReport)> {
+/// Mends a mesh at this level.
+pub fn mend(mesh: TetMesh, level: RepairLevel, path: &Path) -> Result<(TetMesh, RepairReport)> {
     if mesh.tets.is_empty() {
         return Ok((mesh, RepairReport::default()));
     }
@@ -121,6 +135,9 @@ fn mend(mesh: TetMesh, level: RepairLevel, path: &Path) -> Result<(TetMesh, Repa
 
 /// Refuses a mesh that has points but no cells, for those that need cells.
 pub fn expect_cells(mesh: &TetMesh, path: &Path) -> Result<()> {
+    if mesh.is_grid_alone() {
+        return Ok(());
+    }
     if mesh.tets.is_empty() && !mesh.positions.is_empty() {
         bail!(
             "{}: there are points but no tetrahedra; build --kind vertex --method insert makes an MT of points alone",
@@ -144,6 +161,13 @@ pub fn read_mesh(path: &Path) -> Result<(TetMesh, RepairReport)> {
 
 /// Reads what the MT was built from: time steps of a mesh, mended as it was then, or, where no more is needed, of points.
 pub fn read_reference(paths: &[PathBuf], opened: &Opened) -> Result<TetMesh> {
+    let mut mesh = read_reference_alone(paths, opened)?;
+    mesh.expand_grid();
+    Ok(mesh)
+}
+
+/// As [`read_reference`], but a regular grid comes without points and tetrahedra where only its values are needed.
+pub fn read_reference_alone(paths: &[PathBuf], opened: &Opened) -> Result<TetMesh> {
     let fields = &opened.info()?.fields;
     let names: Vec<String> = fields.iter().map(|field| field.name.clone()).collect();
     let wanted = FieldSelection { names: &names, all: false, cells: CellData::Values };
@@ -151,7 +175,17 @@ pub fn read_reference(paths: &[PathBuf], opened: &Opened) -> Result<TetMesh> {
     let time = fields.first().and_then(|field| field.time);
     let is_one = fields.iter().all(|field| field.time == time);
     let step = time.filter(|_| is_one).map(|time| step_at(paths, time)).transpose()?.flatten();
-    let (mesh, _) = read_as(paths, &wanted, opened.repair_level(), (None, step))?;
+    let level = opened.repair_level();
+    let (mut mesh, _) = read_cells(paths, &wanted, level, (None, step), true)?;
+    let is_known = |name: &String| mesh.fields.iter().any(|field| field.answers_to(name));
+    if mesh.is_grid_alone() && !names.iter().all(is_known) {
+        // Fields of the geometry need its points.
+        mesh.expand_grid();
+    }
+    if !mesh.is_grid_alone() {
+        mesh.cells_to_points();
+        mesh.add_geometry_fields(wanted.names);
+    }
     if let (Reference::Mesh, Some(path)) = (opened.reference(), paths.first()) {
         expect_cells(&mesh, path)?;
     }

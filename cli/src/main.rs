@@ -13,16 +13,20 @@ mod generate;
 mod info;
 mod input;
 mod isosurface;
+mod join;
 mod needs;
 mod npz;
 mod output;
 mod parse;
+mod part;
+mod parts;
 mod poly;
 mod probe;
 mod query;
 #[cfg(feature = "render")]
 mod render;
 mod repair;
+mod restrictions;
 mod serve;
 mod slice;
 mod stats;
@@ -46,6 +50,8 @@ struct Arguments {
 enum Command {
     Generate(generate::Arguments),
     Build(Box<build::Arguments>),
+    Part(Box<part::Arguments>),
+    Join(join::Arguments),
     Convert(convert::Arguments),
     Info(info::Arguments),
     Extract(Box<extract::Arguments>),
@@ -89,6 +95,8 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
     match command {
         Command::Generate(arguments) => generate::run(&arguments)?,
         Command::Build(arguments) => build::run(&arguments)?,
+        Command::Part(arguments) => part::run(&arguments)?,
+        Command::Join(arguments) => join::run(&arguments)?,
         Command::Convert(arguments) => convert::run(&arguments)?,
         Command::Info(arguments) => info::run(&arguments)?,
         Command::Verify(arguments) => return verify::run(&arguments),

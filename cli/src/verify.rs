@@ -1,7 +1,8 @@
 //! `tetralod verify`: does an MT file keep its promises?
 
+use super::files::Opened;
 use super::{files, input, output};
-use anyhow::Result;
+use anyhow::{Context, Result, bail};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -10,7 +11,7 @@ use std::time::{Duration, Instant};
 use tetralod::mesh::TetMesh;
 use tetralod::mt::{Mt, MultiTessellation};
 use tetralod::verify;
-use tetralod::verify::{Sample, VerifyReport};
+use tetralod::verify::{Reference, Sample, VerifyReport};
 
 /// Checks every promise of an MT file against the mesh that it was built from; exit code 1 if one is broken.
 #[derive(clap::Args)]
@@ -23,6 +24,10 @@ pub struct Arguments {
     /// Only a sample: fewer requests, and errors measured at about 20 000 vertices. For very large meshes.
     #[arg(long)]
     quick: bool,
+    /// Only N requests, for files that do not fit into memory: one for the whole domain, the others for boxes all over it and for values in
+    /// boxes. Each is answered from the file anew, by the blocks that it needs, and its mesh is compared with the input there.
+    #[arg(long, value_name = "N", conflicts_with = "quick", value_parser = clap::value_parser!(u32).range(1..))]
+    samples: Option<u32>,
     /// Print a JSON object.
     #[arg(long)]
     json: bool,
@@ -36,7 +41,11 @@ struct Report<'a> {
     /// Whether only a sample was checked.
     quick: bool,
     /// About what it took.
-    memory_bytes: u64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    memory_bytes: Option<u64>,
+    /// What was read of the file, all requests together.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    bytes_read: Option<u64>,
     failures: &'a [String],
 }
 
@@ -57,6 +66,9 @@ fn memory(mt: &Mt, input: &TetMesh) -> u64 {
 }
 
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    if let Some(count) = arguments.samples {
+        return run_samples(arguments, count).with_context(|| arguments.file.display().to_string());
+    }
     let opened = files::open_mt(&arguments.file)?;
     let reference = opened.reference();
     let input = input::read_reference(&arguments.against, &opened)?;
@@ -81,21 +93,73 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         verify::run(opened.mt()?, &input, reference, &mut on_progress)
     };
     bar.finish_and_clear();
-    print(arguments, &report, about)?;
+    print(arguments, &report, Took { memory_bytes: Some(about), bytes_read: None })?;
     Ok(if report.valid { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-fn print(arguments: &Arguments, report: &VerifyReport, memory_bytes: u64) -> Result<()> {
-    let &Arguments { quick, json, .. } = arguments;
+/// A mesh of the whole domain is one that takes at most this part of the file, or so many bytes.
+const COARSE_PART: u64 = 64;
+const COARSE_BYTES: u64 = 1 << 20;
+
+/// Makes requests one by one, each from a session of its own.
+fn run_samples(arguments: &Arguments, count: u32) -> Result<ExitCode> {
+    let &Arguments { ref file, ref against, json, .. } = arguments;
+    let first = files::open_parts(file)?;
+    let all = first.total().unwrap_or(u64::MAX);
+    let opened = Opened::of(first);
+    if opened.reference() == Reference::Points {
+        bail!(
+            "--samples are compared with the cells of the input; this file was built from points alone: verify it without"
+        );
+    }
+    let input = input::read_reference_alone(against, &opened)?;
+    let most = (all / COARSE_PART).max(COARSE_BYTES);
+    let curve = opened.session.bytes_by_error(0);
+    let coarse = curve.iter().take_while(|point| point.bytes <= most).last();
+    let coarse = coarse.map_or(f64::INFINITY, |point| point.error);
+    let samples = verify::samples(opened.info()?, &input, count as usize, coarse);
+    drop(opened);
+    let mut whole = VerifyReport { valid: true, ..VerifyReport::default() };
+    let mut read = 0;
+    let bar = if json { ProgressBar::hidden() } else { ProgressBar::new(u64::from(count)) };
+    for sample in &samples {
+        let mut client = files::open_parts(file)?;
+        client.refine(&sample.request)?;
+        read += client.fetched();
+        let mt = client.session().mt().context("the MT has no base mesh")?;
+        let report = verify::run_request(mt, &input, sample);
+        whole.valid &= report.valid;
+        whole.queries += report.queries;
+        whole.worst_error_ratio = whole.worst_error_ratio.max(report.worst_error_ratio);
+        whole.failures.extend(report.failures);
+        whole.failures.truncate(verify::MAX_FAILURES);
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    print(arguments, &whole, Took { memory_bytes: None, bytes_read: Some(read) })?;
+    Ok(if whole.valid { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// What a verification took.
+struct Took {
+    memory_bytes: Option<u64>,
+    bytes_read: Option<u64>,
+}
+
+fn print(arguments: &Arguments, report: &VerifyReport, took: Took) -> Result<()> {
+    let &Arguments { quick, json, samples, .. } = arguments;
+    let (quick, Took { memory_bytes, bytes_read }) = (quick || samples.is_some(), took);
     let VerifyReport { valid, queries, worst_error_ratio, ref failures, .. } = *report;
     let verdict = if valid { "every promise is kept" } else { "promises are broken" };
+    let verdict = if samples.is_some() && valid { "every promise is kept by the samples" } else { verdict };
     let mut rows = vec![
         ("verdict", verdict.to_owned()),
         ("requests", output::count(queries)),
         ("worst error", format!("{} of what is promised", output::percent(worst_error_ratio))),
-        ("memory", format!("about {}", output::bytes(memory_bytes))),
     ];
+    rows.extend(memory_bytes.map(|bytes| ("memory", format!("about {}", output::bytes(bytes)))));
+    rows.extend(bytes_read.map(|bytes| ("read", format!("{} of the file", output::bytes(bytes)))));
     rows.extend(failures.iter().map(|failure| ("broken", failure.clone())));
-    let report = Report { valid, queries, worst_error_ratio, quick, memory_bytes, failures };
+    let report = Report { valid, queries, worst_error_ratio, quick, memory_bytes, bytes_read, failures };
     output::result(json, &report, &rows)
 }

@@ -32,7 +32,7 @@ export default {
   markdownItLoader: readers,
   markdownItOptions: { html: true, linkify: false },
   customCss: path("docs/site/site.css"),
-  highlightLanguages: ["console", "html", "javascript", "json", "jsx", "nginx", "python", "rust", "sh", "text", "typescript", "xml", "yaml"],
+  highlightLanguages: ["console", "dockerfile", "html", "javascript", "json", "jsx", "nginx", "python", "rust", "sh", "text", "typescript", "xml", "yaml"],
   searchInDocuments: true,
   navigation: { includeFolders: false },
   sort: ["kind", "source-order"],

@@ -23,6 +23,8 @@ pub(super) struct Updates<'a> {
     pub boxes: &'a [[[i32; 3]; 2]],
     /// The largest error of each. It does not grow along the partial order.
     pub errors: &'a [ErrorCode],
+    /// The sides of the whole domain, if the updates are of a part of it.
+    pub domain: Option<[i32; 3]>,
 }
 
 /// Requests are for boxes of this part of the whole, along each axis.
@@ -52,7 +54,7 @@ impl Updates<'_> {
     /// The updates in the new order, in blocks of `2^block_bits`.
     pub fn order(&self, block_bits: u32) -> Vec<u32> {
         let reach = self.reach();
-        let mut order = Parts::new(&reach, self.errors, 1 << block_bits).order();
+        let mut order = Parts::new(&reach, self, 1 << block_bits).order();
         self.sort_blocks(&mut order, block_bits);
         order
     }
@@ -146,7 +148,8 @@ struct Parts<'a> {
 }
 
 impl<'a> Parts<'a> {
-    fn new(reach: &'a [[[i32; 3]; 2]], errors: &'a [ErrorCode], size: usize) -> Self {
+    fn new(reach: &'a [[[i32; 3]; 2]], updates: &Updates<'a>, size: usize) -> Self {
+        let errors = updates.errors;
         let key = |key: usize, u: u32| -> i64 {
             let [low, high] = &reach[u as usize];
             match key {
@@ -163,7 +166,8 @@ impl<'a> Parts<'a> {
         });
         let mut whole = Hull::EMPTY;
         reach.iter().zip(errors).for_each(|(reach, &error)| whole.add(reach, error));
-        let sides = [0, 1, 2].map(|k| f64::from(whole.high[k]) - f64::from(whole.low[k]));
+        let own = [0, 1, 2].map(|k| f64::from(whole.high[k]) - f64::from(whole.low[k]));
+        let sides = updates.domain.map_or(own, |domain| domain.map(f64::from));
         let asked = sides.map(|side| BOX * side + 1.0);
         Self { reach, errors, size, sorted, asked, asked_errors: ASKED_ERRORS.map(ErrorCode::at_least) }
     }
@@ -261,6 +265,7 @@ mod tests {
             parents: &parents,
             boxes: &boxes,
             errors: &errors,
+            domain: None,
         };
         let order = updates.order(4);
         let mut numbers = vec![u32::MAX; count as usize];

@@ -13,13 +13,24 @@ pub(super) struct BoundaryDistance {
 }
 
 impl BoundaryDistance {
+    /// Of the triangles without a neighbour.
     pub fn new(tets: &[[u32; 4]], neighbors: &[[u32; 4]], positions: &[DVec3]) -> Self {
-        let corners: Vec<[u32; 3]> = boundary_faces(tets, neighbors).map(|(_, face)| face).collect();
+        Self::of(boundary_faces(tets, neighbors).map(|(_, face)| face).collect(), positions)
+    }
+
+    /// Of these triangles, counter-clockwise when seen from outside.
+    pub fn of(corners: Vec<[u32; 3]>, positions: &[DVec3]) -> Self {
         let triangles = corners.iter().map(|face| face.map(|v| positions[v as usize])).collect();
         let around = Groups::new(positions.len(), |add| {
             (0..).zip(&corners).for_each(|(t, face)| face.iter().for_each(|v| add(*v as usize, t)));
         });
         Self { triangles, corners, around }
+    }
+
+    /// All triangles.
+    #[cfg(feature = "parts")]
+    pub fn all(&self) -> &[[u32; 3]] {
+        &self.corners
     }
 
     /// The triangles at a vertex of the reference mesh.

@@ -3,12 +3,16 @@
 use super::candidate_queue::{CandidateQueue, Key, Levels};
 use super::collapse_check::{CheckedCollapse, Refusal, VertexMarks};
 use super::cost::{Buckets, Evaluator, Input, Reference, VertexData, largest};
+use super::dihedral::LeastAngle;
+use super::flat::Feature;
 use super::history::Collapse;
 use super::points::squared_length;
+use super::preserve::kept_points;
+use super::restrictions::cannot_preserve;
 use super::work_mesh::WorkMesh;
 use super::{
-    BuildConfig, BuildError, BuildProgress, BuildResult, BuildSummary, OnProgress, field_selection, history,
-    quantize,
+    BuildConfig, BuildError, BuildProgress, BuildResult, BuildSummary, Method, OnProgress, field_selection,
+    history, quantize,
 };
 use crate::geom::Bounds;
 use crate::mesh;
@@ -34,8 +38,13 @@ pub fn edge_mt(
         return Err(BuildError::Empty);
     }
     mesh::check(mesh)?;
-    let Topology { neighbors, non_manifold: frozen, .. } = mesh::topology(mesh.positions.len(), &mesh.tets)?;
+    if !config.preserve.is_empty() {
+        return Err(cannot_preserve(format!("method {}", Method::Collapse.name())));
+    }
+    let Topology { neighbors, non_manifold: mut frozen, .. } =
+        mesh::topology(mesh.positions.len(), &mesh.tets)?;
     let quantized = quantize::quantize_cells(mesh, config)?;
+    frozen.iter_mut().zip(kept_points(config, mesh)?).for_each(|(frozen, kept)| *frozen |= kept);
     let diagonal = Bounds::of(&mesh.positions).diagonal();
     let info = MtInfo {
         kind: MtKind::Edge,
@@ -50,6 +59,8 @@ pub fn edge_mt(
     let work = WorkMesh::new(mesh.tets.clone(), neighbors, mesh.positions.len());
     let reference = Reference::new(&quantized, &work, info.displacement_per_error, config.displacement_edges);
     let mut builder = Builder::new(work, reference, &info, frozen);
+    builder.collapse.feature = Feature::of(config)?;
+    builder.collapse.angle = LeastAngle::of(config, &quantized)?;
     builder.collapse_all(progress)?;
     let Builder { mesh: base, data, history, .. } = builder;
     let depth = data.height.iter().copied().max().unwrap_or(0);
@@ -62,6 +73,7 @@ pub fn edge_mt(
         updates: mt.updates(),
         position_bits: mt.info().lattice.bits,
         depth,
+        interface_deviation: 0.0,
     };
     let exact = field_selection::exact_values(mesh, config, &vertices)?;
     Ok(BuildResult { mt, summary, vertices, exact })
@@ -99,7 +111,7 @@ impl<'a> Builder<'a> {
         let points = quantized.positions.len();
         let foot = |v: u32| reference.boundary.at(v).first().copied().unwrap_or(crate::mesh::NONE);
         let data = VertexData {
-            positions: quantized.positions.clone(),
+            positions: quantized.positions.to_vec(),
             levels: quantized.levels.clone(),
             errors: vec![0.0; points * quantized.fields.len()],
             height: vec![0; points],

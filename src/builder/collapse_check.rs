@@ -1,6 +1,8 @@
 //! Checks of an edge collapse that need no field: topology and orientation.
 
+use super::dihedral::LeastAngle;
 use super::flat;
+use super::flat::Feature;
 use super::work_mesh::{StarTet, TetSet, WorkMesh};
 use crate::geom::orient3d;
 use crate::mesh::{FACES, NONE};
@@ -33,6 +35,10 @@ pub(super) struct CheckedCollapse {
     /// The vertices around, each once.
     pub link: Vec<u32>,
     pub on_boundary: bool,
+    /// What the boundary's features are.
+    pub feature: Feature,
+    /// How sharp the new cells may be.
+    pub angle: Option<LeastAngle>,
     star_a: Vec<StarTet>,
     star_b: Vec<StarTet>,
     edges: Vec<(u32, u32)>,
@@ -113,6 +119,7 @@ impl CheckedCollapse {
         self.check_link_condition(mesh, marks)?;
         self.place(positions);
         self.check_orientation(mesh, positions)?;
+        self.check_angles(mesh, positions)?;
         if self.on_boundary { self.check_flat(mesh, positions) } else { Ok(()) }
     }
 
@@ -124,7 +131,7 @@ impl CheckedCollapse {
                 let faces = (0..4).filter(move |&k| k != s.corner as usize && around[k] == NONE);
                 faces.map(move |k| FACES[k].map(|l| positions[corners[l] as usize]))
             });
-            if let Some(planes) = flat::planes(triangles)
+            if let Some(planes) = flat::planes(triangles, self.feature)
                 && !planes.iter().all(|plane| flat::is_in(plane, self.position))
             {
                 return Err(Refusal::Blocked);
@@ -322,5 +329,18 @@ impl CheckedCollapse {
             }
         }
         Ok(())
+    }
+
+    /// Whether the cells are good enough for those that they take the place of.
+    fn check_angles(&self, mesh: &WorkMesh, positions: &[[i32; 3]]) -> Result<(), Refusal> {
+        let Some(angle) = &self.angle else { return Ok(()) };
+        let at = |tet: u32| mesh.tets[tet as usize].map(|v| positions[v as usize]);
+        let old = self.stay.iter().map(|(s, _)| s.tet).chain(self.fan.iter().map(|&(tet, ..)| tet)).map(at);
+        let new = self.stay.iter().map(|&(StarTet { tet, corner }, _)| {
+            let mut corners = at(tet);
+            corners[corner as usize] = self.position;
+            corners
+        });
+        if angle.allows(old, new) { Ok(()) } else { Err(Refusal::Blocked) }
     }
 }

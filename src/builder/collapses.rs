@@ -4,6 +4,7 @@
 //! collapse takes away is removed by the update whose inverse has made it. So no tetrahedron is recorded, only the collapse that made
 //! each of a star, and which of its faces were inside of that collapse's filling.
 
+use super::append::{Appender, Ordered, without};
 use super::base::{Numbered, number_base};
 use super::block_order;
 use super::decimate::{Record, Removed};
@@ -11,16 +12,15 @@ use super::hole::{Hole, sorted};
 use super::quantize::Quantized;
 use super::{BuildError, BuildProgress, BuildSummary, OnProgress, quantize};
 use crate::mesh::NONE;
-use crate::mt::{
-    BaseMark, ConvertError, ErrorCode, ForestChild, HalfEdgeBuilder, HalfEdgeMt, MtInfo, NextUpdate, Remover,
-    ReplayError, UpdateError, VertexId,
-};
+use crate::mt::{ErrorCode, HalfEdgeMt, MtInfo, VertexId};
 use std::cmp::Reverse;
 
 /// Half-edge collapses in the order in which they are made. Vertices are numbers of reference points.
 #[derive(Default)]
 pub(super) struct Collapses {
     fields: usize,
+    /// Collapses that have been made elsewhere before: numbers of makers begin with these, which have errors and nothing else here.
+    earlier: u32,
     /// For each field the least error that is stored.
     floors: Vec<f64>,
     /// The vertex that each removes.
@@ -32,7 +32,8 @@ pub(super) struct Collapses {
     /// Collapse by collapse and field by field. They are at least those of all collapses before on which it depends, by so much more
     /// that selection by isovalue and by box is monotone: see [`Quantized::overshoot`], and `step_of_boundary` in the builders' costs.
     errors: Vec<ErrorCode>,
-    /// The box around the star of each vertex: its lowest and its highest corner.
+    /// The box around the star of each vertex: its lowest and its highest corner. After collapses elsewhere that around all that the
+    /// collapse depends on.
     boxes: Vec<[[i32; 3]; 2]>,
     /// Where the tetrahedra of each star begin in `makers`; one more than there are collapses.
     starts: Vec<usize>,
@@ -56,24 +57,7 @@ const USUAL_STAR: usize = 25;
 
 impl Record for Collapses {
     fn start(&mut self, info: &MtInfo, tets: usize) {
-        // Lists that grow by doubling would take twice as much. What is never written takes no memory.
-        let (most, fields) = (info.vertices as usize, info.fields.len());
-        let stars = most * USUAL_STAR;
-        let mut starts = Vec::with_capacity(most + 1);
-        starts.push(0);
-        *self = Self {
-            fields,
-            floors: quantize::floors(info),
-            vertices: Vec::with_capacity(most),
-            near: Vec::with_capacity(most),
-            errors: Vec::with_capacity(most * fields),
-            boxes: Vec::with_capacity(most),
-            starts,
-            makers: Vec::with_capacity(stars),
-            inner: Vec::with_capacity(stars),
-            inner_now: vec![0; tets],
-            ..Self::default()
-        };
+        *self = Self::resume(info, Vec::new(), vec![0; tets]);
     }
 
     fn len(&self) -> usize {
@@ -93,7 +77,11 @@ impl Record for Collapses {
         }
         self.starts.push(self.makers.len());
         self.add_errors(hole, first, (errors, step), quantized);
-        self.boxes.push(bounds(hole, &quantized.positions));
+        self.boxes.push(match self.earlier {
+            0 => bounds(hole, &quantized.positions),
+            // What it depends on may have been made elsewhere.
+            _ => removed.reach.ends(),
+        });
         self.vertices.push(hole.a);
         self.add_near(removed);
         self.mark_filling(removed);
@@ -115,14 +103,76 @@ fn bounds(hole: &Hole, positions: &[[i32; 3]]) -> [[i32; 3]; 2] {
     })
 }
 
-/// Three of four vertices in increasing order: all but the `i`-th.
-fn without(tet: [u32; 4], i: usize) -> [u32; 3] {
-    [0, 1, 2].map(|k| tet[if k < i { k } else { k + 1 }])
+/// A collapse as an update needs it.
+pub(super) struct Collapse<'a> {
+    pub vertex: u32,
+    pub errors: &'a [ErrorCode],
+    /// See [`Collapses::makers`] and [`Collapses::inner`].
+    pub star: (&'a [u32], &'a [u8]),
 }
 
 impl Collapses {
+    /// Begins after collapses that were made elsewhere and have these errors, for a mesh whose tetrahedra have these inner faces.
+    pub fn resume(info: &MtInfo, earlier: Vec<ErrorCode>, inner: Vec<u8>) -> Self {
+        // Lists that grow by doubling would take twice as much. What is never written takes no memory.
+        let (most, fields) = (info.vertices as usize, info.fields.len());
+        let stars = most * USUAL_STAR;
+        let mut starts = Vec::with_capacity(most + 1);
+        starts.push(0);
+        let mut errors = earlier;
+        let earlier = (errors.len() / fields.max(1)) as u32;
+        errors.reserve_exact(most * fields);
+        Self {
+            fields,
+            earlier,
+            floors: quantize::floors(info),
+            vertices: Vec::with_capacity(most),
+            near: Vec::with_capacity(most),
+            errors,
+            boxes: Vec::with_capacity(most),
+            starts,
+            makers: Vec::with_capacity(stars),
+            inner: Vec::with_capacity(stars),
+            inner_now: inner,
+            ..Self::default()
+        }
+    }
+
+    /// A collapse of this record.
+    pub fn get(&self, collapse: u32) -> Collapse<'_> {
+        let star = self.starts[collapse as usize]..self.starts[collapse as usize + 1];
+        Collapse {
+            vertex: self.vertices[collapse as usize],
+            errors: self.errors_of(collapse),
+            star: (&self.makers[star.clone()], &self.inner[star]),
+        }
+    }
+
+    /// The tetrahedra that are left.
+    #[cfg(feature = "parts")]
+    pub fn tets_left(&self) -> &[[u32; 4]] {
+        &self.base
+    }
+
+    /// The errors of what made a tetrahedron, here or elsewhere.
+    pub fn errors_of_maker(&self, maker: u32) -> &[ErrorCode] {
+        &self.errors[maker as usize * self.fields..][..self.fields]
+    }
+
+    /// The near vertex of a collapse.
+    #[cfg(feature = "parts")]
+    pub fn near(&self, collapse: u32) -> u32 {
+        self.near[collapse as usize]
+    }
+
+    /// For each tetrahedron that is left, in their order, what made it and which of its faces were inside.
+    #[cfg(feature = "parts")]
+    pub fn marks_left(&self) -> &[(u32, u8)] {
+        &self.base_marks
+    }
+
     fn errors_of(&self, collapse: u32) -> &[ErrorCode] {
-        &self.errors[collapse as usize * self.fields..][..self.fields]
+        self.errors_of_maker(self.earlier + collapse)
     }
 
     /// The collapses that made the star of another one: the updates that depend on its inverse.
@@ -197,7 +247,10 @@ impl Collapses {
     ) -> Result<(HalfEdgeMt, Vec<VertexId>, BuildSummary), BuildError> {
         info.updates = self.vertices.len() as u32;
         let numbered = number_base(&quantized.positions, &quantized.levels, self.fields, &self.base);
-        let (order, depth) = self.order(&numbered, block_bits);
+        let base = numbered.mesh.positions.len() as u32;
+        let (order, depth) = self.order((base, |v| numbered.number[v as usize]), block_bits, None);
+        // For the order alone.
+        (self.boxes, self.also_near) = (Vec::new(), Vec::new());
         let summary = BuildSummary {
             vertices: info.vertices,
             tetrahedra: info.tetrahedra,
@@ -206,13 +259,20 @@ impl Collapses {
             updates: info.updates,
             position_bits: info.lattice.bits,
             depth,
+            interface_deviation: 0.0,
         };
         let (mt, vertices) = self.append_all(info, numbered, &order, (quantized, block_bits), progress)?;
         Ok((mt, vertices, summary))
     }
 
-    /// The collapses in the order of their updates, and the length of the longest chain of updates that depend on each other.
-    fn order(&mut self, numbered: &Numbered, block_bits: u32) -> (Vec<u32>, u32) {
+    /// The collapses in the order of their updates, and the length of the longest chain of updates that depend on each other. `number`
+    /// gives the numbers, below `base`, of those vertices that are left; `domain` the sides of the whole if this is a part of it.
+    pub fn order(
+        &mut self,
+        (base, number): (u32, impl Fn(u32) -> u32),
+        block_bits: u32,
+        domain: Option<[i32; 3]>,
+    ) -> (Vec<u32>, u32) {
         let count = self.vertices.len();
         // Errors are monotone, so this extends the partial order.
         let mut falling: Vec<u32> = (0..count as u32).rev().collect();
@@ -220,12 +280,11 @@ impl Collapses {
         let mut places = vec![0; count];
         (0..).zip(&falling).for_each(|(place, &c)| places[c as usize] = place);
         let (starts, parents) = self.parents(&falling, &places);
-        let base = numbered.mesh.positions.len() as u32;
-        let mut removed_by = vec![NONE; numbered.number.len()];
+        let mut removed_by = vec![NONE; self.vertices.iter().max().map_or(0, |&v| v as usize + 1)];
         (0..).zip(&self.vertices).for_each(|(c, &v): (u32, _)| removed_by[v as usize] = c);
-        let label = |v: u32| match removed_by[v as usize] {
-            NONE => numbered.number[v as usize],
-            remover => base + places[remover as usize],
+        let label = |v: u32| match removed_by.get(v as usize) {
+            None | Some(&NONE) => number(v),
+            Some(&remover) => base + places[remover as usize],
         };
         for &(c, v) in &self.also_near {
             let near = &mut self.near[c as usize];
@@ -250,6 +309,7 @@ impl Collapses {
             parents: &parents,
             boxes: &boxes,
             errors: &errors,
+            domain,
         };
         let order = updates.order(block_bits).into_iter().map(|u| falling[u as usize]).collect();
         (order, depth)
@@ -261,7 +321,8 @@ impl Collapses {
         let mut each = |see: &mut dyn FnMut(u32, u32)| {
             for (parent, &c) in (0..).zip(falling) {
                 distinct.clear();
-                distinct.extend(self.makers_of(c).iter().filter(|&&maker| maker != NONE));
+                let makers = self.makers_of(c).iter().filter(|&&maker| maker != NONE);
+                distinct.extend(makers.filter_map(|maker| maker.checked_sub(self.earlier)));
                 distinct.sort_unstable();
                 distinct.dedup();
                 distinct.iter().for_each(|&child| see(parent, places[child as usize]));
@@ -289,81 +350,33 @@ impl Collapses {
         (quantized, block_bits): (&Quantized, u32),
         progress: OnProgress<'_>,
     ) -> Result<(HalfEdgeMt, Vec<VertexId>), BuildError> {
-        let Numbered { mesh, mut number, places } = numbered;
-        let base = mesh.positions.len();
         let mut update_of = vec![0; order.len()];
-        for (u, &c) in (0..).zip(order) {
-            update_of[c as usize] = u;
-            number[self.vertices[c as usize] as usize] = base as u32 + u;
-        }
-        let mut points = vec![NONE; base + order.len()];
-        let known = (0..).zip(&number).filter(|(_, v)| **v != NONE);
-        known.for_each(|(point, &v): (u32, _)| points[v as usize] = point);
-        let remover = |(maker, inner): (u32, u8)| -> Remover {
-            (if maker == NONE { NONE } else { update_of[maker as usize] }, inner)
+        (0..).zip(order).for_each(|(u, &c): (u32, _)| update_of[c as usize] = u);
+        let mark = |(maker, inner): (u32, u8)| match maker {
+            NONE => (NONE, inner),
+            maker => (update_of[maker as usize], inner),
         };
-        let mut marks = Vec::with_capacity(mesh.tets.len());
-        for (tet, &place) in mesh.tets.iter().zip(&places) {
-            let (remover, inner) = remover(self.base_marks[place as usize]);
-            marks.push(BaseMark { remover, inner: by_corner(inner, tet.map(|v| points[v as usize])) });
-        }
-        let (starts, children) = self.forest(order, &number, &quantized.positions);
-        let children_of = |v: usize| &children[starts[v] as usize..starts[v + 1] as usize];
-        let of_base: Vec<Vec<ForestChild>> = (0..base).map(|v| children_of(v).to_vec()).collect();
-        let sound = |error: UpdateError| ConvertError::from(ReplayError::Update(error));
-        let mt = HalfEdgeMt::new(info, mesh, marks, &of_base, block_bits).map_err(sound)?;
-        let mut builder = HalfEdgeBuilder::new(mt)?;
-        let mut faces: Vec<([u32; 3], usize)> = Vec::new();
+        let [vertices, near] = [&self.vertices, &self.near]
+            .map(|all| order.iter().map(|&c| all[c as usize]).collect::<Vec<u32>>());
+        let base_marks: Vec<(u32, u8)> = self.base_marks.iter().copied().map(mark).collect();
+        let updates = Ordered { vertices: &vertices, near: &near, base_marks: &base_marks };
+        let reference = (&quantized.positions[..], &quantized.levels[..]);
+        let mut appender = Appender::new(info, numbered, &updates, reference, block_bits)?;
         for (u, &c) in order.iter().enumerate() {
-            if u % 4096 == 0 {
-                let (done, total) = (u as u64, order.len() as u64);
-                if progress(BuildProgress { stage: "order", done, total, tetrahedra: None }).is_break() {
-                    return Err(BuildError::Stopped);
-                }
-            }
-            let vertex = self.vertices[c as usize];
-            let levels = &quantized.levels[vertex as usize * self.fields..][..self.fields];
-            let next = NextUpdate { children: children_of(base + u), levels, errors: self.errors_of(c) };
-            let star = self.starts[c as usize]..self.starts[c as usize + 1];
-            builder.push(&next, |tets, removers| {
-                faces.clear();
-                for (i, tet) in tets.iter().enumerate() {
-                    let corners = tet.map(|v| points[v as usize]);
-                    let at = corners.iter().position(|&v| v == vertex)?;
-                    faces.push((sorted(without(corners, at)), i));
-                }
-                faces.sort_unstable();
-                removers.resize(tets.len(), (NONE, 0));
-                for (&(_, i), at) in faces.iter().zip(star.clone()) {
-                    let (remover, inner) = remover((self.makers[at], self.inner[at]));
-                    removers[i] = (remover, by_corner(inner, tets[i].map(|v| points[v as usize])));
-                }
-                (tets.len() == star.len()).then_some(())
-            })?;
+            report(u, order.len(), progress)?;
+            let Collapse { vertex, errors, star: (makers, inner), .. } = self.get(c);
+            appender.push(
+                vertex,
+                errors,
+                makers.iter().zip(inner).map(|(&maker, &inner)| mark((maker, inner))),
+            )?;
         }
-        Ok((builder.finish(), number.into_iter().map(VertexId).collect()))
-    }
-
-    /// The updates by near vertex, each with where it inserts its own: where those of each vertex begin, and all.
-    fn forest(&self, order: &[u32], number: &[u32], positions: &[[i32; 3]]) -> (Vec<u32>, Vec<ForestChild>) {
-        let near = |c: u32| self.near[c as usize];
-        let mut starts = vec![0_u32; number.len() + 1];
-        order.iter().for_each(|&c| starts[number[near(c) as usize] as usize + 1] += 1);
-        (0..number.len()).for_each(|v| starts[v + 1] += starts[v]);
-        let mut next = starts.clone();
-        let mut children = vec![ForestChild::default(); order.len()];
-        for (update, &c) in (0..).zip(order) {
-            let [from, to] = [near(c), self.vertices[c as usize]].map(|v| positions[v as usize]);
-            let place = &mut next[number[near(c) as usize] as usize];
-            children[*place as usize] = ForestChild { update, offset: [0, 1, 2].map(|k| to[k] - from[k]) };
-            *place += 1;
-        }
-        (starts, children)
+        Ok(appender.finish())
     }
 }
 
-/// Bits of the vertices of a tetrahedron in ascending order, by its corners.
-fn by_corner(bits: u8, tet: [u32; 4]) -> u8 {
-    let rank = |v: u32| tet.iter().filter(|&&other| other < v).count();
-    (0..4).fold(0, |all, corner| all | (bits >> rank(tet[corner]) & 1) << corner)
+/// Reports now and then how many of all updates have been appended.
+pub(super) fn report(done: usize, total: usize, progress: OnProgress<'_>) -> Result<(), BuildError> {
+    let at = BuildProgress { stage: "order", done: done as u64, total: total as u64, tetrahedra: None };
+    if done.is_multiple_of(4096) && progress(at).is_break() { Err(BuildError::Stopped) } else { Ok(()) }
 }

@@ -14,11 +14,11 @@ use super::boundary_distance::BoundaryDistance;
 use super::collapse_check::CheckedCollapse;
 use super::outside_points::OutsidePoints;
 use super::placement::{Placement, Replacement};
-use super::points::{Lists, SLACK, as_vec, bounds};
+use super::points::{Lists, SLACK, SparseLists, as_vec, bounds};
 use super::quantize::Quantized;
 use super::work_mesh::WorkMesh;
 use crate::geom::orient3d;
-use crate::mesh::{EDGES, FACES, NONE};
+use crate::mesh::{FACES, NONE};
 use glam::DVec3;
 
 /// The vertices of the input, and those that collapses create.
@@ -38,7 +38,7 @@ pub(super) struct Buckets {
     /// Points of the reference mesh in the tetrahedron.
     pub inside: Lists,
     /// Points of the reference boundary near its boundary faces.
-    pub border: Lists,
+    pub border: SparseLists,
     /// Points outside of the tetrahedron in whose bucket they are.
     pub outside_points: OutsidePoints,
 }
@@ -46,22 +46,21 @@ pub(super) struct Buckets {
 impl Buckets {
     /// Of a mesh with so many tetrahedra.
     pub fn new(tets: usize, quantized: &Quantized) -> Self {
-        let points = quantized.places.len();
+        let points = quantized.positions.len();
         let mut inside = Lists::new(tets, points);
-        let mut outside_points = OutsidePoints::new(tets, quantized.places.clone());
+        let mut outside_points = OutsidePoints::new(quantized.places.clone());
         for location in &quantized.locations {
             inside.put(location.tet, location.point);
             outside_points.set_outside(location.point, location.outside);
         }
-        Self { inside, border: Lists::new(tets, points), outside_points }
+        Self { inside, border: SparseLists::default(), outside_points }
     }
 
     /// Empties the buckets of a tetrahedron, which may be a new one.
     pub fn clear(&mut self, t: u32) {
-        for lists in [&mut self.inside, &mut self.border] {
-            lists.reserve(t);
-            lists.take(t);
-        }
+        self.inside.reserve(t);
+        self.inside.take(t);
+        self.border.take(t);
         self.outside_points.clear(t);
     }
 }
@@ -126,6 +125,12 @@ impl Replacement for (Input<'_>, &NewStar) {
     fn corner(&self, v: u32) -> DVec3 {
         let Input { collapse, data, reference, .. } = self.0;
         reference.scaled(if v == NONE { collapse.position } else { data.positions[v as usize] })
+    }
+
+    fn corners(&self, cell: usize) -> [DVec3; 4] {
+        let Input { collapse, data, .. } = self.0;
+        let [x, y, z] = self.1.others[cell].map(|v| as_vec(data.positions[v as usize]));
+        [as_vec(collapse.position), x, y, z]
     }
 
     fn levels(&self, cell: usize, field: usize) -> [i32; 4] {
@@ -290,7 +295,7 @@ impl Evaluator {
 
     /// How far a place, in steps of the lattice, is from the new boundary; 0 if a tetrahedron of the new star holds it.
     fn outside(&mut self, place: DVec3, input: Input<'_>) -> f64 {
-        if self.placement.locate(place, 0).2 >= -SLACK {
+        if self.placement.locate(place, 0, &(input, &self.star)).2 >= -SLACK {
             return 0.0;
         }
         let step = DVec3::from_array(input.reference.quantized.lattice.step);
@@ -328,17 +333,14 @@ impl Evaluator {
 
     /// The star of the new vertex, and the boundary triangles at the ends before.
     fn lay_out_star(&mut self, input: Input<'_>) {
-        let Input { collapse, mesh, data, .. } = input;
+        let Input { collapse, mesh, .. } = input;
         let Self { star: NewStar { others, border, .. }, placement, .. } = self;
         others.clear();
         others.extend(collapse.stay.iter().map(|(s, _)| {
             let corners = mesh.tets[s.tet as usize];
             [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]][s.corner as usize].map(|i: usize| corners[i])
         }));
-        placement.start(others.iter().map(|&others| {
-            let [x, y, z] = others.map(|v| as_vec(data.positions[v as usize]));
-            [as_vec(collapse.position), x, y, z]
-        }));
+        placement.start(others.len());
         border.clear();
         self.old_border.clear();
         self.at_centre = 0;
@@ -386,16 +388,18 @@ impl<'a> Reference<'a> {
     /// A displacement by `edges` times the shortest edge at a vertex counts as an error of 1 there, but at most one of
     /// `displacement_per_error`.
     pub fn new(quantized: &'a Quantized, mesh: &WorkMesh, displacement_per_error: f64, edges: f64) -> Self {
-        let step = DVec3::from_array(quantized.lattice.step);
-        let places: Vec<DVec3> = quantized.positions.iter().map(|&q| as_vec(q) * step).collect();
-        let mut shortest = vec![f64::INFINITY; places.len()];
-        for tet in &mesh.tets {
-            for [a, b] in EDGES.map(|edge| edge.map(|i| tet[i] as usize)) {
-                let squared = places[a].distance_squared(places[b]);
-                shortest[a] = shortest[a].min(squared);
-                shortest[b] = shortest[b].min(squared);
-            }
-        }
+        let shortest = quantized.shortest_edges(&mesh.tets);
+        let boundary = BoundaryDistance::new(&mesh.tets, &mesh.neighbors, &quantized.scaled());
+        Self::of(quantized, boundary, shortest, (displacement_per_error, edges))
+    }
+
+    /// The same, given the boundary of the reference mesh and for each of its vertices the square of the shortest edge there.
+    pub fn of(
+        quantized: &'a Quantized,
+        boundary: BoundaryDistance,
+        shortest: Vec<f64>,
+        (displacement_per_error, edges): (f64, f64),
+    ) -> Self {
         // With no displacement allowed any movement is an infinite error.
         let allowance = |squared: f64| {
             let own = if edges > 0.0 { edges * squared.sqrt() } else { 0.0 };
@@ -403,8 +407,8 @@ impl<'a> Reference<'a> {
         };
         Self {
             quantized,
-            points: places.len() as u32,
-            boundary: BoundaryDistance::new(&mesh.tets, &mesh.neighbors, &places),
+            points: shortest.len() as u32,
+            boundary,
             allowances: shortest.into_iter().map(allowance).collect(),
             displacement_per_error,
         }
@@ -437,7 +441,7 @@ impl<'a> Reference<'a> {
     /// Where a reference vertex is in the input, in model units from the lattice's origin, and how far the lattice has moved it: what
     /// that alone puts outside is no displacement.
     pub fn place(&self, point: u32) -> (DVec3, f64) {
-        let p = self.quantized.places[point as usize] * DVec3::from_array(self.quantized.lattice.step);
+        let p = self.quantized.places.at(point) * DVec3::from_array(self.quantized.lattice.step);
         (p, p.distance(self.position(point)))
     }
 

@@ -6,11 +6,15 @@ use super::fill_cost::Input;
 use super::gift_wrap::GiftWrap;
 use super::hole::{Filling, Hole};
 use super::quantize::Quantized;
+use super::reach::Reach;
 use super::removal::{RemovalSearch, State};
+use super::restrictions::Restrictions;
 use super::rounds::{Later, Rounds};
 use super::searches::Searches;
 use super::work_mesh::WorkMesh;
-use super::{BuildConfig, BuildCriterion, BuildError, BuildProgress, OnProgress, Purpose, quantize};
+use super::{
+    BuildConfig, BuildCriterion, BuildError, BuildProgress, OnProgress, Purpose, field_selection, quantize,
+};
 use crate::geom::Bounds;
 use crate::mesh;
 use crate::mesh::{NONE, TetMesh, Topology};
@@ -35,6 +39,8 @@ pub(super) struct Decimated<R> {
     pub quantized: Quantized,
     /// What is known of the MT; not how many updates it has.
     pub info: MtInfo,
+    /// How far interfaces between regions have moved, in model units.
+    pub interface_deviation: f64,
 }
 
 /// Takes down the removals in the order in which they are made.
@@ -66,10 +72,12 @@ pub(super) struct Removed<'a> {
     pub errors: &'a [ErrorCode],
     /// How far the boundary has moved, as an error.
     pub step: f64,
+    /// Where it and all that it depends on take place.
+    pub reach: Reach,
 }
 
 /// Removes vertices of `mesh`, cheapest first, until no more can be removed. `mesh` must be valid: see
-/// [`crate::mesh::repair`]. Of a mesh that is owned the tetrahedra are gone then.
+/// [`crate::mesh::repair`]. Of a mesh that is owned only the fields are left then whose exact values are kept.
 ///
 /// # Errors
 /// As [`super::edge_mt`].
@@ -80,8 +88,8 @@ pub(super) fn decimate<R: Record + Default>(
     progress: OnProgress<'_>,
 ) -> Result<Decimated<R>, BuildError> {
     let mut record = R::default();
-    let (quantized, info) = decimate_into(&mut record, mesh, config, how, progress)?;
-    Ok(Decimated { record, quantized, info })
+    let (quantized, info, interface_deviation) = decimate_into(&mut record, mesh, config, how, progress)?;
+    Ok(Decimated { record, quantized, info, interface_deviation })
 }
 
 /// The same for any record, compiled once.
@@ -91,7 +99,7 @@ fn decimate_into(
     config: &BuildConfig,
     (criterion, purpose): (BuildCriterion, Purpose),
     progress: OnProgress<'_>,
-) -> Result<(Quantized, MtInfo), BuildError> {
+) -> Result<(Quantized, MtInfo, f64), BuildError> {
     if mesh.positions.len() > MAX_UPDATES as usize {
         return Err(BuildError::TooLarge);
     }
@@ -105,32 +113,42 @@ fn decimate_into(
         BuildCriterion::HalfEdge => None,
         BuildCriterion::Delaunay => Some(GiftWrap::new(&quantized.positions)),
     };
+    let restrictions = Restrictions::of(config, mesh, &quantized, criterion)?;
     let displacement_per_error = config.displacement * Bounds::of(&mesh.positions).diagonal();
     let tetrahedra = mesh.tets.len();
     let points = mesh.positions.len();
-    let work = WorkMesh::new(take_tets(mesh), neighbors, points);
+    let work = WorkMesh::new(take_tets(mesh, config), neighbors, points);
     let levels = Levels::of_purpose(purpose);
     let reference = Reference::new(&quantized, &work, displacement_per_error, config.displacement_edges);
-    let state = State::new(work, reference, non_manifold, levels);
+    let mut state = State::new(work, reference, non_manifold, levels);
+    state.restrictions = restrictions;
     let info = quantized.info(tetrahedra, displacement_per_error);
     record.start(&info, state.mesh.tets.len());
     let mut decimator = Decimator::new(state, gift_wrap, record);
     decimator.remove_all(progress)?;
     let Decimator { state, record, .. } = decimator;
     record.finish(&state.mesh.tets, &state.removals.makers);
+    let interface_deviation = state.restrictions.interface_deviation();
     drop(state);
-    Ok((quantized, info))
+    Ok((quantized, info, interface_deviation))
 }
 
-fn take_tets(mesh: &mut Cow<'_, TetMesh>) -> Vec<[u32; 4]> {
+/// Takes the tetrahedra out of a mesh that is owned, and frees what is not needed any more.
+fn take_tets(mesh: &mut Cow<'_, TetMesh>, config: &BuildConfig) -> Vec<[u32; 4]> {
     match mesh {
         Cow::Borrowed(mesh) => mesh.tets.clone(),
-        Cow::Owned(mesh) => mem::take(&mut mesh.tets),
+        Cow::Owned(mesh) => {
+            mesh.positions = Vec::new();
+            if !field_selection::keeps_exact_values(config) {
+                mesh.fields = Vec::new();
+            }
+            mem::take(&mut mesh.tets)
+        }
     }
 }
 
-struct Decimator<'a, R: ?Sized> {
-    state: State<'a>,
+pub(super) struct Decimator<'a, R: ?Sized> {
+    pub state: State<'a>,
     rounds: Rounds,
     /// That of the vertex which is removed next.
     search: RemovalSearch,
@@ -138,7 +156,7 @@ struct Decimator<'a, R: ?Sized> {
     searches: Searches,
     slots: Vec<u32>,
     /// The removals so far.
-    record: &'a mut R,
+    pub record: &'a mut R,
 }
 
 /// A candidate of a round.
@@ -152,23 +170,29 @@ struct Prospect {
 }
 
 impl<'a, R: Record + ?Sized> Decimator<'a, R> {
-    fn new(state: State<'a>, gift_wrap: Option<GiftWrap>, record: &'a mut R) -> Self {
+    pub fn new(state: State<'a>, gift_wrap: Option<GiftWrap>, record: &'a mut R) -> Self {
         let points = state.versions.len();
         let mut rounds = Rounds::new(state.levels.of(0.0), state.levels.last(), points);
         let free = (0..points as u32).filter(|&v| state.mesh.has(v) && !state.frozen[v as usize]);
         free.for_each(|v| rounds.wait(v));
-        let searches = Searches::new(gift_wrap.as_ref(), points);
-        let search = RemovalSearch::new(gift_wrap, points);
+        let searches = Searches::new(gift_wrap.as_ref());
+        let search = RemovalSearch::new(gift_wrap);
         Self { state, rounds, search, searches, slots: Vec::new(), record }
     }
 
-    fn remove_all(&mut self, progress: OnProgress<'_>) -> Result<(), BuildError> {
+    pub fn remove_all(&mut self, progress: OnProgress<'_>) -> Result<(), BuildError> {
+        self.remove_until(0, progress)
+    }
+
+    /// Removes vertices until no more can be removed, or a round leaves at most so many tetrahedra.
+    pub fn remove_until(&mut self, enough: u32, progress: OnProgress<'_>) -> Result<(), BuildError> {
         let vertices = (0..self.state.reference.points).filter(|&v| self.state.mesh.has(v)).count();
         loop {
             let before = self.record.len();
+            self.state.weigh_squares(vertices - before);
             self.round(progress)?;
             let after = self.record.len();
-            if !self.rounds.end(after - before, vertices - after) {
+            if !self.rounds.end(after - before, vertices - after) || self.state.mesh.live() <= enough {
                 return Ok(());
             }
         }
@@ -251,11 +275,11 @@ impl<'a, R: Record + ?Sized> Decimator<'a, R> {
     fn remove(&mut self) {
         let Self { state, search, slots, record, .. } = self;
         let RemovalSearch { hole, best, .. } = search;
-        let State { mesh, removals, degrees, reference, .. } = state;
+        let State { mesh, removals, degrees, reference, reaches, restrictions, .. } = state;
         // Never zero: error 0 is to mean the reference mesh, with every vertex in.
         let stored = |error: &f64| ErrorCode::at_least(*error).max(ErrorCode(1));
         let errors: Vec<ErrorCode> = best.cost.placement.errors.iter().map(stored).collect();
-        let removal = record.len() as u32;
+        let removal = (removals.errors.len() / errors.len()) as u32;
         hole.replace(mesh, &best.filling, slots);
         let removed = Removed {
             hole,
@@ -265,7 +289,9 @@ impl<'a, R: Record + ?Sized> Decimator<'a, R> {
             end: search.best_end,
             errors: &errors,
             step: best.cost.step,
+            reach: reaches[hole.a as usize],
         };
+        restrictions.contracted(hole, search.best_end, slots, &reference.quantized.positions);
         record.add(&removed, reference.quantized);
         removals.errors.extend(errors);
         slots.iter().for_each(|&t| removals.makers[t as usize] = removal);

@@ -71,15 +71,26 @@ fn shared_lattice(steps: &[&Field], config: &BuildConfig) -> Result<FieldInfo, B
 
 /// A lattice of step 1 that holds every value of a field of integers, if there is one.
 fn integer_lattice(steps: &[&Field], min: f64, max: f64) -> Option<FieldInfo> {
-    let is_exact = |x: &f64| x.fract() == 0.0 && x.abs() <= MAX_EXACT_INTEGER;
     let bits = (1..=MAX_FIELD_BITS).find(|&bits| max - min < f64::from(1_u32 << bits))?;
-    let all = steps.iter().all(|field| field.integer && field.values.iter().all(is_exact));
+    let all = steps.iter().all(|field| field.integer && field.values.iter().all(is_exact_integer));
     let name = steps[0].name.clone();
     all.then(|| FieldInfo { name, min, max, origin: min, step: 1.0, bits, ..FieldInfo::default() })
 }
 
+/// Whether a configuration asks for lattices as coarse as a tolerance allows.
+#[cfg(feature = "parts")]
+pub(super) fn has_tolerance(config: &BuildConfig) -> bool {
+    let given = config.precision_of.iter().map(|(_, precision)| precision).chain([&config.field_precision]);
+    given.into_iter().any(|precision| !matches!(precision, FieldPrecision::Bits(_)))
+}
+
+/// Whether a value is an integer that doubles tell from its neighbours.
+pub(super) fn is_exact_integer(x: &f64) -> bool {
+    x.fract() == 0.0 && x.abs() <= MAX_EXACT_INTEGER
+}
+
 /// How far the lattice moves a value, rounded up.
-fn loss(info: &FieldInfo, value: f64) -> f64 {
+pub(super) fn loss(info: &FieldInfo, value: f64) -> f64 {
     let away = (info.value(info.nearest(value)) - value).abs();
     if away == 0.0 { 0.0 } else { away.next_up() }
 }

@@ -68,12 +68,20 @@ fn unknown(mesh: &TetMesh, name: &str) -> BuildError {
     BuildError::UnknownField { name: name.to_owned(), known }
 }
 
+/// Whether the exact values of any field may be wanted.
+pub(super) fn keeps_exact_values(config: &BuildConfig) -> bool {
+    config.all_lossless || !config.lossless.is_empty()
+}
+
 /// The exact values of the lossless fields; `vertices` has the MT's vertex for each point.
 pub(super) fn exact_values(
     mesh: &TetMesh,
     config: &BuildConfig,
     vertices: &[VertexId],
 ) -> Result<Vec<Exact>, BuildError> {
+    if !keeps_exact_values(config) {
+        return Ok(Vec::new());
+    }
     let is_wanted =
         |field: &Field| config.all_lossless || config.lossless.iter().any(|name| field.answers_to(name));
     let table = |(number, field): (usize, &Field)| {

@@ -7,7 +7,7 @@
 use super::cost::{Buckets, Reference, largest};
 use super::hole::{Filling, Hole};
 use super::placement::{Placement, Replacement};
-use super::points::{SLACK, as_vec, bounds};
+use super::points::{SLACK, bounds};
 use crate::mesh::NONE;
 use crate::mt::ErrorCode;
 use glam::DVec3;
@@ -30,6 +30,8 @@ pub(super) struct HoleCost {
     pub depends: bool,
     /// The least error of this removal in each field.
     pub errors: Vec<f64>,
+    /// Scratch space: the removals that it depends on.
+    makers: Vec<u32>,
 }
 
 /// A hole, a filling of it, and what it is compared with.
@@ -53,6 +55,10 @@ impl Replacement for Input<'_> {
         self.reference.position(v)
     }
 
+    fn corners(&self, cell: usize) -> [DVec3; 4] {
+        self.filling.tets[cell].map(|v| self.reference.quantized.rounded(v))
+    }
+
     fn levels(&self, cell: usize, field: usize) -> [i32; 4] {
         self.filling.tets[cell].map(|v| self.reference.quantized.level(v, field))
     }
@@ -69,6 +75,8 @@ pub(super) struct FillCost {
     flat: bool,
     /// How far the boundary moves, as an error.
     pub step: f64,
+    /// The sum of the squares of the errors at all points that are placed.
+    pub squares: f64,
 }
 
 impl Removals {
@@ -77,25 +85,24 @@ impl Removals {
     }
 
     /// What the hole's tetrahedra leave to the removal of its vertex.
-    pub fn hole_cost(&self, hole: &Hole, reference: &Reference<'_>) -> HoleCost {
+    pub fn find_hole_cost(&self, hole: &Hole, reference: &Reference<'_>, cost: &mut HoleCost) {
         let fields = reference.quantized.fields.len();
-        let mut inherited = vec![ErrorCode::ZERO; fields];
-        let mut depends = false;
-        for s in &hole.star {
-            let maker = self.makers[s.tet as usize];
-            if maker != NONE {
-                let errors = &self.errors[maker as usize * fields..][..fields];
-                inherited.iter_mut().zip(errors).for_each(|(error, made)| *error = (*error).max(*made));
-                depends = true;
-            }
+        let HoleCost { inherited, depends, errors, makers } = cost;
+        inherited.clear();
+        // All are read before any is looked at: the memory delivers several at a time.
+        makers.clear();
+        makers.extend(hole.star.iter().map(|s| self.makers[s.tet as usize]));
+        makers.retain(|&maker| maker != NONE);
+        *depends = !makers.is_empty();
+        for f in 0..fields {
+            let of = |&maker: &u32| self.errors[maker as usize * fields + f];
+            inherited.push(makers.iter().map(of).max().unwrap_or(ErrorCode::ZERO).error());
         }
-        let inherited: Vec<f64> = inherited.iter().map(|code| code.error()).collect();
-        let mut errors = inherited.clone();
-        if depends {
+        errors.clone_from(inherited);
+        if *depends {
             let overshoot = |f: usize| reference.quantized.overshoot(hole.a, &hole.link, f);
             errors.iter_mut().enumerate().for_each(|(f, error)| *error += overshoot(f));
         }
-        HoleCost { inherited, depends, errors }
     }
 }
 
@@ -105,9 +112,12 @@ impl FillCost {
         let Input { hole, filling, reference } = input;
         let positions = &reference.quantized.positions;
         self.step = 0.0;
-        self.placement.start(filling.tets.iter().map(|tet| tet.map(|v| as_vec(positions[v as usize]))));
+        self.placement.start(filling.tets.len());
         self.placement.errors.clone_from(&hole_cost.errors);
-        self.compare_centre(input);
+        self.squares = {
+            let own = self.compare_centre(input);
+            own * own
+        };
         if largest(&self.placement.errors) > limit {
             return largest(&self.placement.errors);
         }
@@ -129,7 +139,7 @@ impl FillCost {
             }
             placement.raise(chords(filling, reference));
         }
-        let placement = &mut self.placement;
+        let Self { placement, squares, .. } = self;
         let mut error = largest(&placement.errors);
         let mut hint = 0;
         for s in &hole.star {
@@ -137,6 +147,7 @@ impl FillCost {
                 let (own, cell) = placement.place(point, hint, &input);
                 hint = cell;
                 error = error.max(own);
+                *squares += own * own;
                 if error > limit {
                     return error;
                 }
@@ -148,18 +159,18 @@ impl FillCost {
         error.max(placement.place_foreign(candidates, &input))
     }
 
-    /// Compares the field at the removed vertex first: the error is mostly largest there. If the lattice has moved the
-    /// vertex, it is in a bucket already.
-    fn compare_centre(&mut self, input: Input<'_>) {
+    /// Compares the field at the removed vertex first: the error is mostly largest there. Returns it; 0 if the lattice has moved the
+    /// vertex, which is in a bucket then.
+    fn compare_centre(&mut self, input: Input<'_>) -> f64 {
         let (a, quantized) = (input.hole.a, input.reference.quantized);
         if !quantized.is_moved(a) {
-            self.placement.place(a, 0, &input);
-            return;
+            return self.placement.place(a, 0, &input).0;
         }
-        let (cell, lambda, depth) = self.placement.locate(quantized.places[a as usize], 0);
+        let (cell, lambda, depth) = self.placement.locate(quantized.places.at(a), 0, &input);
         if depth >= -SLACK {
             self.placement.compare(a, cell, lambda, &input);
         }
+        0.0
     }
 
     /// Moves the points to the buckets where [`FillCost::evaluate`] found them to belong. `slots` are the numbers of the

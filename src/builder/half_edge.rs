@@ -1,122 +1,126 @@
 //! Filling a hole by contracting an edge: all that was at its one end moves to the other, which stays where it is.
 
-use super::collapse_check::VertexMarks;
-use super::hole::{Filling, Hole};
+use super::hole::{FaceSet, Filling, Hole};
 use super::work_mesh::{StarTet, TetSet, WorkMesh};
 use crate::mesh::NONE;
 
-const NEAR_A: u32 = 1;
-const ON_FAN: u32 = 2;
-const BORDER_A: u32 = 4;
-const FAN_END: u32 = 8;
+const NEAR_A: u8 = 1;
+const ON_FAN: u8 = 2;
+const BORDER_A: u8 = 4;
+const FAN_END: u8 = 8;
 
 /// Around larger stars than this no edge along the boundary is contracted.
 const LARGEST_STAR: usize = 512;
 
-/// Fills the hole with tetrahedra at its link vertex `b`: false if one of them were not positive, or the boundary does
+/// Fills the hole with tetrahedra at its `i`-th link vertex, once [`Hole::find_sides`] was called: false if one of them were not positive, or the boundary does
 /// not allow it.
 ///
 /// Inside, positive tetrahedra are all it takes: the hole is then star-shaped around `b`, too. Next to the boundary,
 /// which may have come to overlap itself, [`keeps_topology`] must hold, too.
-pub(super) fn contract(hole: &Hole, positions: &[[i32; 3]], b: u32, filling: &mut Filling) -> bool {
+pub(super) fn contract(hole: &Hole, i: usize, filling: &mut Filling) -> bool {
     filling.clear();
+    let b = hole.link[i];
     if hole.on_boundary() && hole.border.iter().flatten().filter(|&&v| v == b).count() != 2 {
         // An edge through the inside between two boundary vertices, or from the boundary into the inside.
         return false;
     }
-    let p = positions[b as usize];
-    for (i, &(face, _)) in hole.faces.iter().enumerate() {
-        if !face.contains(&b) {
-            if !hole.is_seen(i, p) {
-                return false;
-            }
-            filling.tets.push([face[0], face[1], face[2], b]);
-        }
+    let cells = hole.others(i);
+    if cells == 0 || !hole.is_seen_from(i) || (hole.on_boundary() && !hangs_together(hole, cells)) {
+        return false;
     }
-    !filling.tets.is_empty()
-        && (!hole.on_boundary() || hangs_together(&filling.tets, b))
-        && lay_border(hole, b, filling)
+    filling.tets.extend(bits(cells).map(|face| {
+        let [x, y, z] = hole.faces[face].0;
+        [x, y, z, b]
+    }));
+    lay_border(hole, b, cells, filling)
 }
 
-/// Whether these tetrahedra, which all have `b`, are connected through faces. At the boundary the fan between the two
-/// ends may part the hole; an insertion finds what it removes by going through faces.
-fn hangs_together(tets: &[[u32; 4]], b: u32) -> bool {
-    let mut reached = vec![false; tets.len()];
-    let mut stack = vec![0];
-    let mut count = 0;
-    while let Some(i) = stack.pop() {
-        if std::mem::replace(&mut reached[i], true) {
-            continue;
-        }
-        count += 1;
-        let shared = |other: &[u32; 4]| other.iter().filter(|&&v| v != b && tets[i].contains(&v)).count();
-        stack.extend((0..tets.len()).filter(|&j| !reached[j] && shared(&tets[j]) == 2));
-    }
-    count == tets.len()
+/// The faces of a set, ascending.
+fn bits(mut faces: FaceSet) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let first = (faces != 0).then(|| faces.trailing_zeros() as usize)?;
+        faces &= faces - 1;
+        Some(first)
+    })
 }
 
-/// The boundary triangles of a filling. False if one of them would belong to a tetrahedron outside of the hole.
-fn lay_border(hole: &Hole, b: u32, filling: &mut Filling) -> bool {
-    let Filling { tets, border, moved } = filling;
+/// Whether the tetrahedra between these faces and a further vertex are connected through faces. At the boundary the fan between the
+/// two ends may part the hole; an insertion finds what it removes by going through faces.
+fn hangs_together(hole: &Hole, cells: FaceSet) -> bool {
+    let mut left = cells & (cells - 1);
+    let mut stack = cells ^ left;
+    while stack != 0 {
+        let face = stack.trailing_zeros() as usize;
+        stack &= stack - 1;
+        let beside = hole.faces_beside(face) & left;
+        left ^= beside;
+        stack |= beside;
+    }
+    left == 0
+}
+
+/// The boundary triangles of the filling that has tetrahedra between `b` and these faces. False if one of them would belong to a
+/// tetrahedron outside of the hole.
+fn lay_border(hole: &Hole, b: u32, cells: FaceSet, filling: &mut Filling) -> bool {
+    // Tetrahedra come in the order of their faces.
+    let cell_with = |vertices: &[u32]| {
+        // All of them have `b`.
+        let faces = hole.faces_with(vertices.iter().filter(|&&v| v != b)) & cells;
+        let before = (faces & faces.wrapping_neg()).wrapping_sub(1) & cells;
+        (faces != 0).then(|| before.count_ones())
+    };
+    let Filling { border, moved, .. } = filling;
     for &[x, y] in hole.border.iter().filter(|edge| !edge.contains(&b)) {
-        let Some(cell) = tets.iter().position(|tet| tet.contains(&x) && tet.contains(&y)) else {
-            return false;
-        };
-        border.push((cell as u32, [b, x, y]));
+        let Some(cell) = cell_with(&[x, y]) else { return false };
+        border.push((cell, [b, x, y]));
     }
     *moved = border.len();
     for &([x, y, z], _) in hole.faces.iter().filter(|(_, outer)| *outer == NONE) {
-        let owner = tets.iter().position(|tet| [x, y, z].iter().all(|v| tet.contains(v)));
-        let Some(cell) = owner else { return false };
-        border.push((cell as u32, [x, z, y]));
+        let Some(cell) = cell_with(&[x, y, z]) else { return false };
+        border.push((cell, [x, z, y]));
     }
     true
 }
 
 /// Scratch space of [`keeps_topology`].
+#[derive(Default)]
 pub(super) struct Nearby {
-    marks: VertexMarks,
+    /// For each link vertex what it is next to.
+    flags: Vec<u8>,
     seen: TetSet,
     star: Vec<StarTet>,
 }
 
-impl Nearby {
-    /// Of a mesh of so many vertices.
-    pub fn new(vertices: usize) -> Self {
-        Self { marks: VertexMarks::new(vertices), seen: TetSet::default(), star: Vec::new() }
-    }
-}
-
-/// The link condition, with the boundary closed by a cone from a vertex ω outside.
+/// The link condition for the edge to the link vertex `i`, with the boundary closed by a cone from a vertex ω outside.
 /// (Dey, Edelsbrunner, Guha, Nekhayev: *Topology preserving edge contraction*, 1999.)
-pub(super) fn keeps_topology(hole: &Hole, mesh: &WorkMesh, scratch: &mut Nearby, b: u32) -> bool {
-    let Nearby { marks, seen, star } = scratch;
+pub(super) fn keeps_topology(hole: &Hole, mesh: &WorkMesh, scratch: &mut Nearby, i: usize) -> bool {
+    let Nearby { flags, seen, star } = scratch;
+    let b = hole.link[i];
     if !mesh.star(b, LARGEST_STAR, seen, star) {
         return false;
     }
-    mark(hole, marks, b);
-    let has_edge = |x: u32, y: u32| hole.faces.iter().any(|(face, _)| face.contains(&x) && face.contains(&y));
-    let in_fan =
-        |x: u32, y: u32| hole.faces.iter().any(|(face, _)| [b, x, y].iter().all(|v| face.contains(v)));
+    flag(hole, flags, i);
     let has_border = |x: u32, y: u32| hole.border.iter().any(|&edge| edge == [x, y] || edge == [y, x]);
     for &StarTet { tet, corner } in star.iter() {
         let (corners, around) = (mesh.tets[tet as usize], mesh.neighbors[tet as usize]);
+        // Of the corners, where they are in the link.
+        let places = corners.map(|v| hole.place(v));
         for k in (0..4).filter(|&k| k != corner as usize) {
-            let mut rest = (0..4)
-                .filter(|&l| l != k && l != corner as usize)
-                .map(|l| corners[l])
-                .filter(|&v| v != hole.a);
+            let mut rest = (0..4).filter(|&l| l != k && l != corner as usize && corners[l] != hole.a);
             let (Some(x), Some(y)) = (rest.next(), rest.next()) else { continue };
-            let [m, n] = [x, y].map(|v| marks.get(v));
+            let [m, n] = [x, y].map(|l| places[l].map_or(0, |place| flags[place]));
             if [m, n].iter().any(|m| m & (NEAR_A | ON_FAN) == NEAR_A) {
                 // Next to both ends, but a b x is no triangle.
                 return false;
             }
-            if m & n & NEAR_A != 0 && has_edge(x, y) && !in_fan(x, y) {
+            if let (Some(x), Some(y)) = (places[x], places[y])
+                && hole.has_edge(x, y)
+                && !hole.has_face(x, y, i)
+            {
                 return false;
             }
-            let pinches = |m: u32| m & (BORDER_A | FAN_END) == BORDER_A;
-            if around[k] == NONE && (pinches(m) || pinches(n) || has_border(x, y)) {
+            let pinches = |m: u8| m & (BORDER_A | FAN_END) == BORDER_A;
+            if around[k] == NONE && (pinches(m) || pinches(n) || has_border(corners[x], corners[y])) {
                 return false;
             }
         }
@@ -124,14 +128,12 @@ pub(super) fn keeps_topology(hole: &Hole, mesh: &WorkMesh, scratch: &mut Nearby,
     true
 }
 
-fn mark(hole: &Hole, marks: &mut VertexMarks, b: u32) {
-    marks.start();
-    for (face, _) in &hole.faces {
-        let flags = if face.contains(&b) { NEAR_A | ON_FAN } else { NEAR_A };
-        face.iter().for_each(|&v| _ = marks.add(v, flags));
-    }
+/// Flags the vertices of the link for the edge to the `i`-th.
+fn flag(hole: &Hole, flags: &mut Vec<u8>, i: usize) {
+    flags.clear();
+    flags.extend((0..hole.link.len()).map(|v| if hole.has_edge(v, i) { NEAR_A | ON_FAN } else { NEAR_A }));
     for edge in &hole.border {
-        let flags = if edge.contains(&b) { BORDER_A | FAN_END } else { BORDER_A };
-        edge.iter().for_each(|&v| _ = marks.add(v, flags));
+        let new = if edge.contains(&hole.link[i]) { BORDER_A | FAN_END } else { BORDER_A };
+        edge.iter().filter_map(|&v| hole.place(v)).for_each(|place| flags[place] |= new);
     }
 }

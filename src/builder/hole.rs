@@ -2,8 +2,10 @@
 
 use super::collapse_check::Refusal;
 use super::flat;
-use super::work_mesh::{StarTet, TetSet, WorkMesh};
-use crate::geom::{NARROW_BITS, orient3d};
+use super::flat::Feature;
+use super::sides::Sides;
+use super::work_mesh::{ELSEWHERE, StarTet, TetSet, WorkMesh};
+use crate::geom::orient3d;
 use crate::mesh::{FACES, NONE};
 use crate::mt::MAX_LINK;
 
@@ -21,8 +23,13 @@ pub(super) struct Hole {
     pub faces: Vec<([u32; 3], u32)>,
     /// The vertices of these faces, each once.
     pub link: Vec<u32>,
-    /// For each of `link` how many of the faces have it.
-    faces_at: Vec<u8>,
+    /// Where the vertices of `link` are.
+    pub points: Vec<[i32; 3]>,
+    /// The corners of each of `faces`, by their places in `link`.
+    corners: Vec<[u8; 3]>,
+    /// For each of `link` which of the faces have it.
+    faces_at: Vec<FaceSet>,
+    places: LinkPlaces,
     /// Edges `xy` of the boundary triangles `axy`, which are ordered as seen from outside.
     pub border: Vec<[u32; 2]>,
     /// The planes of those triangles, if there are no more than two.
@@ -30,11 +37,67 @@ pub(super) struct Hole {
     many_planes: bool,
     /// Whether the boundary must stay where it is: see [`flat::planes`].
     stays: bool,
-    /// For each of `faces` a corner and the normal.
-    sides: Vec<([i32; 3], [i64; 3])>,
-    /// Whether orientations fit `i64`.
-    narrow: bool,
+    /// What the boundary's features are.
+    pub feature: Feature,
+    /// The planes of the faces, once [`Hole::find_sides`] has found them.
+    sides: Sides,
     seen: TetSet,
+}
+
+/// A set of faces of a hole: bit `i` is that of the `i`-th.
+pub(super) type FaceSet = u64;
+
+const _: () = assert!(MAX_HOLE <= FaceSet::BITS as usize);
+
+/// Finds the places of vertices in a link: a hash table with open addressing, at most a quarter full.
+struct LinkPlaces([u8; LINK_TABLE]);
+
+const LINK_TABLE: usize = 256;
+const NO_PLACE: u8 = u8::MAX;
+
+impl Default for LinkPlaces {
+    fn default() -> Self {
+        Self([NO_PLACE; LINK_TABLE])
+    }
+}
+
+impl LinkPlaces {
+    /// Where the search for `v` begins: Fibonacci hashing, as in `TetSet`.
+    #[inline]
+    fn first(v: u32) -> u32 {
+        v.wrapping_mul(0x9E37_79B9) >> 24
+    }
+
+    /// The place of `v` in the link, if it is there.
+    #[inline]
+    fn find(&self, link: &[u32], v: u32) -> Option<usize> {
+        let mut at = Self::first(v);
+        loop {
+            match self.0[at as usize % LINK_TABLE] {
+                NO_PLACE => return None,
+                place if link[usize::from(place)] == v => return Some(usize::from(place)),
+                _ => at += 1,
+            }
+        }
+    }
+
+    /// The place of `v` in the link, at the end of which it is put if it is new.
+    #[inline]
+    fn place(&mut self, link: &mut Vec<u32>, v: u32) -> u8 {
+        let mut at = Self::first(v);
+        loop {
+            let slot = &mut self.0[at as usize % LINK_TABLE];
+            if *slot == NO_PLACE {
+                *slot = link.len() as u8;
+                link.push(v);
+                return *slot;
+            }
+            if link[usize::from(*slot)] == v {
+                return *slot;
+            }
+            at += 1;
+        }
+    }
 }
 
 /// Tetrahedra that fill a hole.
@@ -54,72 +117,120 @@ impl Hole {
         if !mesh.star(a, MAX_HOLE, &mut self.seen, &mut self.star) {
             return Err(Refusal::Blocked);
         }
-        self.faces.clear();
-        self.link.clear();
-        self.faces_at.clear();
-        self.border.clear();
-        for &StarTet { tet, corner } in &self.star {
+        self.clear();
+        for at in 0..self.star.len() {
+            let StarTet { tet, corner } = self.star[at];
             let (corners, around) = (mesh.tets[tet as usize], mesh.neighbors[tet as usize]);
-            let corner = corner as usize;
-            let [x, y, z] = FACES[corner].map(|k| corners[k]);
-            self.faces.push(([x, z, y], around[corner]));
-            for k in (0..4).filter(|&k| k != corner && around[k] == NONE) {
-                let face = FACES[k];
-                let at = face.iter().position(|&l| l == corner).unwrap_or(0);
-                self.border.push([1, 2].map(|i| corners[face[(at + i) % 3]]));
-            }
-            for v in [x, y, z] {
-                match self.link.iter().position(|&other| other == v) {
-                    Some(i) => self.faces_at[i] += 1,
-                    None => {
-                        self.link.push(v);
-                        self.faces_at.push(1);
-                    }
-                }
+            let corner = usize::from(corner) % 4;
+            let [x, y, z] = FACES[corner];
+            self.add_face([corners[x], corners[y], corners[z]], around[corner], positions);
+            if around.contains(&NONE) {
+                self.add_border(corners, around, corner);
             }
             if self.link.len() > MAX_LINK {
                 return Err(Refusal::Blocked);
             }
         }
         self.find_planes(positions);
-        self.find_sides(positions);
         Ok(())
     }
 
-    fn find_sides(&mut self, positions: &[[i32; 3]]) {
-        let at = |v: u32| positions[v as usize];
-        let (mut low, mut high) = ([i32::MAX; 3], [i32::MIN; 3]);
-        for p in self.link.iter().map(|&v| at(v)) {
-            low = [0, 1, 2].map(|i| low[i].min(p[i]));
-            high = [0, 1, 2].map(|i| high[i].max(p[i]));
-        }
-        // As in `orient3d`: differences up to 2^20 make sums of products below 2^63.
-        self.narrow = (0..3).all(|i| high[i] - low[i] <= 1 << NARROW_BITS);
-        self.sides.clear();
-        self.sides.extend(self.faces.iter().map(|(face, _)| {
-            let [x, y, z] = face.map(at);
-            let [u, v] = [y, z].map(|p| [0, 1, 2].map(|i| i64::from(p[i] - x[i])));
-            let minor = |i: usize, j: usize| u[i] * v[j] - u[j] * v[i];
-            (x, [minor(1, 2), minor(2, 0), minor(0, 1)])
-        }));
+    fn clear(&mut self) {
+        self.faces.clear();
+        self.link.clear();
+        self.points.clear();
+        self.corners.clear();
+        self.faces_at.clear();
+        self.places = LinkPlaces::default();
+        self.border.clear();
     }
 
-    /// Whether face `i` and a link vertex at `p` make a positive tetrahedron.
-    pub fn is_seen(&self, i: usize, p: [i32; 3]) -> bool {
-        let (x, n) = self.sides[i];
-        let d = [0, 1, 2].map(|k| i64::from(p[k] - x[k]));
-        if self.narrow {
-            n[0] * d[0] + n[1] * d[1] + n[2] * d[2] > 0
-        } else {
-            let product = |k: usize| i128::from(n[k]) * i128::from(d[k]);
-            product(0) + product(1) + product(2) > 0
+    /// Adds the face of a tetrahedron of the star opposite the vertex, and what lies there.
+    #[inline]
+    fn add_face(&mut self, [x, y, z]: [u32; 3], outer: u32, positions: &[[i32; 3]]) {
+        let own = 1 << self.faces.len();
+        let i = self.add_corner(x, own, positions);
+        let j = self.add_corner(y, own, positions);
+        let k = self.add_corner(z, own, positions);
+        self.faces.push(([x, z, y], outer));
+        self.corners.push([i, k, j]);
+    }
+
+    /// Adds a corner of a face, which is `own`. Returns its place in the link.
+    #[inline]
+    fn add_corner(&mut self, v: u32, own: FaceSet, positions: &[[i32; 3]]) -> u8 {
+        let place = self.places.place(&mut self.link, v);
+        match self.faces_at.get_mut(usize::from(place)) {
+            Some(faces) => *faces |= own,
+            None => {
+                self.faces_at.push(own);
+                self.points.push(positions[v as usize]);
+            }
+        }
+        place
+    }
+
+    /// Adds the boundary triangles of a tetrahedron at the vertex, its `corner`.
+    fn add_border(&mut self, corners: [u32; 4], around: [u32; 4], corner: usize) {
+        for k in (0..4).filter(|&k| k != corner && around[k] == NONE) {
+            let face = FACES[k];
+            let at = face.iter().position(|&l| l == corner).unwrap_or(0);
+            self.border.push([1, 2].map(|i| corners[face[(at + i) % 3]]));
         }
     }
 
-    /// How many tetrahedra there are if the vertex moves to `b`, which is in the link.
-    pub fn left_at(&self, b: u32) -> usize {
-        let at = self.link.iter().position(|&v| v == b);
-        self.star.len() - at.map_or(0, |i| usize::from(self.faces_at[i]))
+    /// Gets ready for [`Hole::is_seen_from`].
+    pub fn find_sides(&mut self) {
+        self.sides.find(&self.points, &self.corners);
+    }
+
+    /// Whether all faces but those at link vertex `i` make positive tetrahedra with it.
+    #[inline]
+    pub fn is_seen_from(&self, i: usize) -> bool {
+        self.sides.are_seen_from(self.points[i], self.others(i))
+    }
+
+    /// The faces that link vertex `i` is no corner of.
+    #[inline]
+    pub fn others(&self, i: usize) -> FaceSet {
+        let all = FaceSet::MAX >> (FaceSet::BITS as usize - self.faces.len());
+        all & !self.faces_at[i]
+    }
+
+    /// The faces that have all of these vertices.
+    pub fn faces_with<'a>(&self, vertices: impl Iterator<Item = &'a u32>) -> FaceSet {
+        let at = |v: &u32| self.place(*v).map_or(0, |i| self.faces_at[i]);
+        vertices.map(at).fold(FaceSet::MAX, |all, faces| all & faces)
+    }
+
+    /// The faces that share an edge with a face, and itself.
+    pub fn faces_beside(&self, face: usize) -> FaceSet {
+        let [x, y, z] = self.corners[face].map(|i| self.faces_at[usize::from(i)]);
+        x & y | y & z | z & x
+    }
+
+    /// The place of a vertex in the link.
+    #[inline]
+    pub fn place(&self, v: u32) -> Option<usize> {
+        self.places.find(&self.link, v)
+    }
+
+    /// Whether an edge of the link joins these of its vertices, or they are the same.
+    #[inline]
+    pub fn has_edge(&self, x: usize, y: usize) -> bool {
+        self.faces_at[x] & self.faces_at[y] != 0
+    }
+
+    /// Whether a face of the hole has these three of the link's vertices.
+    #[inline]
+    pub fn has_face(&self, x: usize, y: usize, z: usize) -> bool {
+        self.faces_at[x] & self.faces_at[y] & self.faces_at[z] != 0
+    }
+
+    /// How many tetrahedra there are if the vertex moves to link vertex `i`.
+    #[inline]
+    pub fn left_at(&self, i: usize) -> u32 {
+        self.others(i).count_ones()
     }
 
     /// Whether the vertex is on the boundary.
@@ -129,9 +240,13 @@ impl Hole {
 
     fn find_planes(&mut self, positions: &[[i32; 3]]) {
         self.planes.clear();
-        self.many_planes = false;
+        (self.many_planes, self.stays) = (false, false);
+        if !self.on_boundary() {
+            return;
+        }
         let at = |v: u32| positions[v as usize];
-        self.stays = flat::planes(self.border.iter().map(|&[x, y]| [self.a, x, y].map(at))).is_some();
+        self.stays =
+            flat::planes(self.border.iter().map(|&[x, y]| [self.a, x, y].map(at)), self.feature).is_some();
         for &[x, y] in &self.border {
             let [p, q, r] = [self.a, x, y].map(at);
             if !self.planes.iter().any(|&[a, b, c]| orient3d(a, b, c, q) == 0 && orient3d(a, b, c, r) == 0) {
@@ -176,8 +291,10 @@ impl Hole {
         // Faces that wait for the tetrahedron on their other side: which tetrahedron has them, and where.
         let mut open: Vec<([u32; 3], u32, usize)> = Vec::with_capacity(3 * self.faces.len());
         for &(face, outer) in self.faces.iter().filter(|(_, outer)| *outer != NONE) {
-            let corners = mesh.tets[outer as usize];
-            let side = corners.iter().position(|v| !face.contains(v)).unwrap_or(0);
+            let side = match outer {
+                ELSEWHERE => 0,
+                _ => mesh.tets[outer as usize].iter().position(|v| !face.contains(v)).unwrap_or(0),
+            };
             open.push((sorted(face), outer, side));
         }
         for (&t, &corners) in slots.iter().zip(&filling.tets) {
@@ -190,7 +307,9 @@ impl Hole {
                     Some(i) => {
                         let (_, n, back) = open.swap_remove(i);
                         mesh.neighbors[t as usize][side] = n;
-                        mesh.neighbors[n as usize][back] = t;
+                        if n != ELSEWHERE {
+                            mesh.neighbors[n as usize][back] = t;
+                        }
                     }
                     None => open.push((key, t, side)),
                 }

@@ -3,6 +3,7 @@
 //! Cells may be thinner than the lattice moves points: a point then lies in a cell that does not even have it as a corner. Errors are
 //! measured at the input's own points, so each point that the lattice has moved is in the bucket of such a cell from the start.
 
+use super::places::Places;
 use super::points::{SLACK, as_vec, barycentric};
 use crate::mesh::{MeshError, NONE};
 use glam::DVec3;
@@ -21,11 +22,10 @@ pub(super) struct Location {
 pub(super) fn locations(
     tets: &[[u32; 4]],
     positions: &[[i32; 3]],
-    places: &[DVec3],
+    places: &Places,
 ) -> Result<Vec<Location>, MeshError> {
     let points = 0..positions.len() as u32;
-    let is_moved = |point: u32| places[point as usize] != as_vec(positions[point as usize]);
-    if !points.clone().any(is_moved) {
+    if !places.any_moved() {
         return Ok(Vec::new());
     }
     let neighbors = crate::mesh::neighbors(tets)?;
@@ -34,15 +34,76 @@ pub(super) fn locations(
         tet.iter().for_each(|&v| first[v as usize] = t);
     }
     let mut search = Search { tets, neighbors: &neighbors, positions, places, found: Vec::new() };
-    let moved = points.filter(|&point| is_moved(point) && first[point as usize] != NONE);
+    let moved = points.filter(|&point| places.is_moved(point) && first[point as usize] != NONE);
     Ok(moved.map(|point| search.locate(point, first[point as usize])).collect())
+}
+
+/// The locations of these points.
+#[cfg(feature = "parts")]
+pub(super) fn locations_of(
+    tets: &[[u32; 4]],
+    positions: &[[i32; 3]],
+    places: &Places,
+    points: impl Iterator<Item = u32>,
+) -> Result<Vec<Location>, MeshError> {
+    let neighbors = crate::mesh::neighbors(tets)?;
+    let mut first = vec![NONE; positions.len()];
+    for (t, tet) in (0..).zip(tets) {
+        tet.iter().for_each(|&v| first[v as usize] = t);
+    }
+    let mut search = Search { tets, neighbors: &neighbors, positions, places, found: Vec::new() };
+    Ok(points.map(|point| search.locate(point, first[point as usize])).collect())
+}
+
+/// The same of a piece of a mesh: the locations that the piece alone tells, and the other points that the lattice has moved. Those of
+/// `is_shared` belong to other pieces, too.
+#[cfg(feature = "parts")]
+pub(super) fn locations_in_piece(
+    tets: &[[u32; 4]],
+    positions: &[[i32; 3]],
+    places: &Places,
+    is_shared: &[bool],
+) -> Result<(Vec<Location>, Vec<u32>), MeshError> {
+    if tets.is_empty() || !places.any_moved() {
+        return Ok((Vec::new(), Vec::new()));
+    }
+    let neighbors = crate::mesh::neighbors(tets)?;
+    // Behind these faces there may be more.
+    let is_open = |t: u32| {
+        (0..4).any(|i| {
+            let across = neighbors[t as usize][i];
+            let face = (0..4).filter(|&k| k != i).map(|k| tets[t as usize][k]);
+            across == NONE && face.into_iter().all(|v| is_shared[v as usize])
+        })
+    };
+    let mut first = vec![NONE; positions.len()];
+    for (t, tet) in (0..).zip(tets) {
+        tet.iter().for_each(|&v| first[v as usize] = t);
+    }
+    let mut search = Search { tets, neighbors: &neighbors, positions, places, found: Vec::new() };
+    let (mut located, mut beyond) = (Vec::new(), Vec::new());
+    for point in (0..positions.len() as u32).filter(|&point| places.is_moved(point)) {
+        // What only other pieces use is theirs.
+        if is_shared[point as usize] {
+            beyond.push(point);
+            continue;
+        }
+        let location = search.locate(point, first[point as usize]);
+        // The search may go on behind each tetrahedron that it has found.
+        if search.found.iter().any(|&t| is_open(t)) {
+            beyond.push(point);
+        } else {
+            located.push(location);
+        }
+    }
+    Ok((located, beyond))
 }
 
 struct Search<'a> {
     tets: &'a [[u32; 4]],
     neighbors: &'a [[u32; 4]],
     positions: &'a [[i32; 3]],
-    places: &'a [DVec3],
+    places: &'a Places,
     /// The cells found so far, in the order of the search.
     found: Vec<u32>,
 }
@@ -50,7 +111,7 @@ struct Search<'a> {
 impl Search<'_> {
     /// Searches the cells whose bounding boxes touch that of the point before and after rounding, starting at `first`.
     fn locate(&mut self, point: u32, first: u32) -> Location {
-        let (place, rounded) = (self.places[point as usize], as_vec(self.positions[point as usize]));
+        let (place, rounded) = (self.places.at(point), as_vec(self.positions[point as usize]));
         let (low, high) = (place.min(rounded), place.max(rounded));
         self.found.clear();
         self.found.push(first);

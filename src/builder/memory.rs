@@ -10,13 +10,58 @@ fn bytes_a_tetrahedron(construction: Construction) -> u64 {
         (Method::Insert, _) => 680,
         (Method::Collapse, MtKind::Explicit) => 800,
         (Method::Collapse, _) => 340,
-        (Method::Decimate, MtKind::HalfEdge) => 200,
+        (Method::Decimate, MtKind::HalfEdge) => 180,
         (Method::Decimate, _) => 620,
     }
 }
 
 /// Tetrahedra of a triangulation for each hundred of its points.
 const TRIANGULATED: u64 = 680;
+
+/// The memory in bytes that building in `parts` takes at most at any time (see [`parts`](super::parts)), `at_a_time` of them side by
+/// side, of a mesh of so many points, tetrahedra and fields. One process holds the mesh while it is parted. A forecast, as
+/// [`memory_needed`].
+#[cfg(feature = "parts")]
+pub fn memory_needed_in_parts([points, tetrahedra, fields]: [u64; 3], parts: u32, at_a_time: u32) -> u64 {
+    let parting = tetrahedra.saturating_mul(24).saturating_add(points.saturating_mul(100 + 24 * fields));
+    parting.max(after_parting([points, tetrahedra, fields], parts, at_a_time))
+}
+
+/// The same for a mesh that is parted [piece by piece](super::parts::Piecewise), of so many pieces, the largest of which has so many
+/// tetrahedra: the whole mesh is never in memory, but what is near the places at which pieces meet. Pieces are taken to be as long as they
+/// are wide; long ones meet at more places.
+#[cfg(feature = "parts")]
+pub fn memory_needed_in_pieces(
+    counts: [u64; 3],
+    [pieces, largest]: [u64; 2],
+    parts: u32,
+    at_a_time: u32,
+) -> u64 {
+    let [points, tetrahedra, fields] = counts;
+    let each = 120 + 16 * fields;
+    let piece = largest.saturating_mul(each);
+    let part = (tetrahedra / u64::from(parts.max(1))).saturating_mul(each);
+    let pieces = pieces.max(1);
+    // Six sides of cubes, each of which two of them share.
+    let side = (points as f64 / pieces as f64).cbrt();
+    let meeting = if pieces > 1 { (3.0 * pieces as f64 * side * side) as u64 } else { 0 };
+    let near = meeting.saturating_mul(900 + 100 * fields).saturating_add(points.saturating_mul(8));
+    let parting = piece.max(part).saturating_add(near);
+    parting.max(after_parting(counts, parts, at_a_time))
+}
+
+/// What the steps after parting take.
+#[cfg(feature = "parts")]
+fn after_parting([points, tetrahedra, fields]: [u64; 3], parts: u32, at_a_time: u32) -> u64 {
+    let of_points = |bytes: u64| points.saturating_mul(bytes);
+    let of_tets = |bytes: u64| tetrahedra.saturating_mul(bytes);
+    let whole = of_tets(200).saturating_add(of_points(120 * fields.saturating_sub(1)));
+    let part = whole / u64::from(parts.max(1)) * u64::from(at_a_time);
+    // What is left of the children is an eighth of their tetrahedra, with all of their points.
+    let joining = of_tets(200) / 8 + of_points(200 + 60 * fields);
+    let assembling = of_tets(60).saturating_add(of_points(90 + 30 * fields));
+    part.max(joining).max(assembling)
+}
 
 /// The memory in bytes that [`build`](super::build) and [`encode`](crate::format::encode) take at most for a mesh of so many points,
 /// tetrahedra and fields (vectors count by their parts, time series by their steps), the mesh included. A forecast: measured for
@@ -28,7 +73,7 @@ const TRIANGULATED: u64 = 680;
 /// // A grid of 256³ points: six tetrahedra a cell.
 /// let construction = BuildConfig::default().construction;
 /// let bytes = memory_needed(construction, 256_u64.pow(3), 6 * 255_u64.pow(3), 1);
-/// assert!((15..25).contains(&(bytes >> 30)), "about 19 GiB");
+/// assert!((15..20).contains(&(bytes >> 30)), "about 17 GiB");
 /// ```
 pub fn memory_needed(construction: Construction, points: u64, tetrahedra: u64, fields: u64) -> u64 {
     let tetrahedra = match construction.method() {

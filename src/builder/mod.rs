@@ -22,6 +22,7 @@
 //! Not guaranteed: distant parts of a curved boundary may come to overlap where they were nearer to each other than the
 //! error allows the boundary to move.
 
+mod append;
 mod base;
 mod block_order;
 mod boundary_distance;
@@ -32,6 +33,7 @@ mod collapses;
 mod cost;
 mod decimate;
 mod delaunay;
+mod dihedral;
 mod field_lattice;
 mod field_selection;
 mod fill_cost;
@@ -41,21 +43,28 @@ mod half_edge;
 mod history;
 mod hole;
 mod insert;
+mod interface;
 mod location;
 mod memory;
 mod method;
 mod order;
 mod outside_points;
+#[cfg(feature = "parts")]
+pub mod parts;
 mod placement;
+mod places;
 mod points;
 mod position_lattice;
+mod preserve;
 mod quantize;
 mod reach;
 mod remedy;
 mod removal;
+mod restrictions;
 mod rounds;
 mod searches;
 mod sequence;
+mod sides;
 mod vertex;
 mod work_mesh;
 
@@ -65,6 +74,8 @@ use decimate::Decimated;
 pub use collapse::edge_mt;
 pub use delaunay::delaunay;
 pub use memory::memory_needed;
+#[cfg(feature = "parts")]
+pub use memory::{memory_needed_in_parts, memory_needed_in_pieces};
 pub use method::{BuildCriterion, Construction, ConstructionChoice, Method, Purpose, VertexMethod};
 pub use remedy::Remedy;
 
@@ -108,6 +119,20 @@ pub struct BuildConfig {
     /// The same in lengths of the shortest edge of the reference mesh at each place, where that is less; infinite where cells do not
     /// matter. With 10, an error of 1 % allows the boundary to move by a tenth of such an edge.
     pub displacement_edges: f64,
+    /// No update makes a cell with a smaller dihedral angle than so many degrees, 0 to 70, unless one of the cells that it takes the
+    /// place of had a smaller one still. Not by [`Method::Insert`].
+    pub min_dihedral: Option<f64>,
+    /// From so many degrees on, 1 to 90, two flat parts of the boundary meet at a crease that stays where it is; 60 if none.
+    /// Not by [`Method::Insert`].
+    pub feature_angle: Option<f64>,
+    /// Names of labels, integers at cells or points: the surfaces between cells of different labels stay the sets of points that they are.
+    /// A label at points is that of a cell, the least one at its corners. Only by [`Method::Decimate`] with [`BuildCriterion::HalfEdge`].
+    pub preserve: Vec<String>,
+    /// How far, in model units, curved parts of these surfaces may move to have fewer triangles; 0 if they stay. Where a surface ends, at
+    /// the boundary or at a third region, it stays.
+    pub preserve_within: f64,
+    /// Places of points of the mesh that stay in all meshes, in model units. Not by [`Method::Insert`].
+    pub keep_points: Vec<[f64; 3]>,
     /// log2 of the updates that files are going to have in a block, 4 to 16: within a block of an edge-based MT updates are
     /// numbered so that they take few bits. Encode with the same.
     pub block_bits: u32,
@@ -135,6 +160,11 @@ impl BuildConfig {
             all_lossless: false,
             displacement: 0.2,
             displacement_edges: 10.0,
+            min_dihedral: None,
+            feature_angle: None,
+            preserve: Vec::new(),
+            preserve_within: 0.0,
+            keep_points: Vec::new(),
             block_bits: kind.usual_block_bits(),
         }
     }
@@ -181,7 +211,7 @@ pub struct BuildResult<M = Mt> {
 }
 
 /// Counts of a finished build.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BuildSummary {
     /// Vertices of the reference mesh.
     pub vertices: u32,
@@ -197,6 +227,8 @@ pub struct BuildSummary {
     pub position_bits: u32,
     /// Length of the longest chain of updates, each of which depends on the one before.
     pub depth: u32,
+    /// How far interfaces between regions have moved, in model units; see [`BuildConfig::preserve_within`].
+    pub interface_deviation: f64,
 }
 
 /// Why no MT was built.
@@ -239,6 +271,35 @@ pub enum BuildError {
     CellField {
         /// Its name.
         name: String,
+    },
+    /// The mesh has no label of this name.
+    #[error("there is no label '{name}' at cells or points; the mesh has: {}", .known.join(", "))]
+    UnknownLabel {
+        /// The name.
+        name: String,
+        /// The names of its fields.
+        known: Vec<String>,
+    },
+    /// A label is not an integer.
+    #[error("'{name}' is no label: labels are integers, but number {at} is {value}")]
+    Label {
+        /// Its name.
+        name: String,
+        /// The cell or point.
+        at: u32,
+        /// Its value.
+        value: f64,
+    },
+    /// There is no point where one is to be kept.
+    #[error(
+        "there is no point to keep at {} {} {}: give the coordinates of points of the mesh, to a millionth of its diagonal",
+        .place[0],
+        .place[1],
+        .place[2]
+    )]
+    NoPoint {
+        /// Where it was to be.
+        place: [f64; 3],
     },
     /// More fields than an MT can have.
     #[error("{fields} fields and time steps are too many (at most 255); name those to keep")]
@@ -398,6 +459,7 @@ fn build_cow(
     progress: OnProgress<'_>,
 ) -> Result<BuildResult, BuildError> {
     let kind = config.construction.kind();
+    restrictions::check(config)?;
     let result = match config.construction {
         Construction::Edge | Construction::ExplicitEdge => {
             let BuildResult { mt, summary, vertices, exact } = edge_mt(&mesh, config, progress)?;
@@ -423,9 +485,11 @@ fn half_edge_mt(
     progress: OnProgress<'_>,
 ) -> Result<BuildResult, BuildError> {
     let how = (BuildCriterion::HalfEdge, purpose);
-    let Decimated::<Collapses> { record, quantized, info } = decimate::decimate(mesh, config, how, progress)?;
+    let Decimated::<Collapses> { record, quantized, info, interface_deviation } =
+        decimate::decimate(mesh, config, how, progress)?;
     let block_bits = config.block_bits.clamp(4, 16);
     let (mt, vertices, summary) = record.half_edge_mt(info, &quantized, block_bits, progress)?;
+    let summary = BuildSummary { interface_deviation, ..summary };
     let exact = field_selection::exact_values(mesh, config, &vertices)?;
     Ok(BuildResult { mt: mt.into(), summary, vertices, exact })
 }
@@ -434,7 +498,7 @@ fn half_edge_mt(
 fn summed_up(
     mesh: &TetMesh,
     config: &BuildConfig,
-    (mt, vertices): (ExplicitMt, Vec<VertexId>),
+    (mt, vertices, interface_deviation): (ExplicitMt, Vec<VertexId>, f64),
 ) -> Result<BuildResult, BuildError> {
     let mut depths: Vec<u32> = Vec::new();
     for u in (0..mt.updates()).map(UpdateId) {
@@ -450,6 +514,7 @@ fn summed_up(
         updates: mt.updates(),
         position_bits: info.lattice.bits,
         depth: depths.into_iter().max().unwrap_or(0),
+        interface_deviation,
     };
     let exact = field_selection::exact_values(mesh, config, &vertices)?;
     Ok(BuildResult { mt: mt.into(), summary, vertices, exact })

@@ -6,9 +6,9 @@
 //! all reference vertices inside. A foreign vertex also stays in its own bucket, for meshes without the other
 //! tetrahedron.
 
-use super::points::Lists;
+use super::places::Places;
+use super::points::SparseLists;
 use glam::DVec3;
-use std::sync::Arc;
 
 /// The reference vertices outside of the tetrahedra in whose buckets they are.
 pub(super) struct OutsidePoints {
@@ -17,16 +17,16 @@ pub(super) struct OutsidePoints {
     /// Whether a vertex is foreign to some tetrahedron.
     is_foreign: Vec<bool>,
     /// The foreign vertices of each tetrahedron.
-    foreign: Lists,
+    foreign: SparseLists,
     grid: Grid,
     /// All that have ever been outside, by cell of the grid.
-    cells: Lists,
+    cells: SparseLists,
     known: Vec<bool>,
 }
 
 /// A regular grid over all reference vertices.
 struct Grid {
-    places: Arc<[DVec3]>,
+    places: Places,
     low: DVec3,
     /// Cells in a unit of length.
     density: DVec3,
@@ -37,15 +37,15 @@ struct Grid {
 const MOST_CELLS: usize = 128;
 
 impl OutsidePoints {
-    /// Of a mesh with so many tetrahedra and vertices at these places.
-    pub fn new(tets: usize, places: Arc<[DVec3]>) -> Self {
+    /// Of a mesh with vertices at these places.
+    pub fn new(places: Places) -> Self {
         let points = places.len();
         let grid = Grid::new(places);
         Self {
             outside: vec![false; points],
             is_foreign: vec![false; points],
-            foreign: Lists::new(tets, points),
-            cells: Lists::new(grid.cells.pow(3), points),
+            foreign: SparseLists::default(),
+            cells: SparseLists::default(),
             known: vec![false; points],
             grid,
         }
@@ -69,15 +69,20 @@ impl OutsidePoints {
         let cells = rows.flat_map(move |row| row + from[2]..=row + to[2]);
         let all = cells.flat_map(|cell| self.cells.iter(cell as u32));
         all.filter(move |&point| {
-            let place = self.grid.places[point as usize];
+            let place = self.grid.places.at(point);
             let is_inside = place.cmpge(low).all() && place.cmple(high).all();
             is_inside && self.outside[point as usize] && !self.is_foreign[point as usize]
         })
     }
 
+    /// The vertices that are foreign to a tetrahedron.
+    #[cfg(feature = "parts")]
+    pub fn foreign_to(&self, t: u32) -> impl Iterator<Item = u32> {
+        self.foreign.iter(t)
+    }
+
     /// Removes the foreign vertices of a tetrahedron, which may be a new one.
     pub fn clear(&mut self, t: u32) {
-        self.foreign.reserve(t);
         self.foreign.iter(t).for_each(|point| self.is_foreign[point as usize] = false);
         self.foreign.take(t);
     }
@@ -86,13 +91,13 @@ impl OutsidePoints {
     pub fn set_outside(&mut self, point: u32, outside: bool) {
         self.outside[point as usize] = outside;
         if outside && !std::mem::replace(&mut self.known[point as usize], true) {
-            let [x, y, z] = self.grid.cell(self.grid.places[point as usize]);
+            let [x, y, z] = self.grid.cell(self.grid.places.at(point));
             self.cells.put((self.grid.row(x, y) + z) as u32, point);
         }
     }
 
     /// Whether a vertex is known to be outside of the tetrahedron in whose bucket it is.
-    #[cfg(test)]
+    #[cfg(any(test, feature = "parts"))]
     pub fn is_outside(&self, point: u32) -> bool {
         self.outside[point as usize]
     }
@@ -106,9 +111,9 @@ impl OutsidePoints {
 }
 
 impl Grid {
-    fn new(places: Arc<[DVec3]>) -> Self {
-        let low = places.iter().copied().fold(DVec3::INFINITY, DVec3::min);
-        let high = places.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+    fn new(places: Places) -> Self {
+        let low = places.iter().fold(DVec3::INFINITY, DVec3::min);
+        let high = places.iter().fold(DVec3::NEG_INFINITY, DVec3::max);
         let cells = (1..MOST_CELLS).take_while(|n| n.pow(3) < places.len()).last().unwrap_or(1);
         let density = cells as f64 / (high - low).max(DVec3::splat(f64::MIN_POSITIVE));
         Self { places, low, density, cells }
@@ -139,8 +144,10 @@ mod tests {
 
     #[test]
     fn those_outside_are_found_until_they_are_guests() {
-        let mut outside_points =
-            OutsidePoints::new(2, (0..40).map(|i| DVec3::splat(f64::from(i) * 0.25)).collect());
+        let mut outside_points = OutsidePoints::new(Places::new(
+            vec![[0; 3]; 40].into(),
+            (0..40).map(|i| DVec3::splat(f64::from(i) * 0.25)),
+        ));
         assert!(found(&outside_points).is_empty());
         (0..8).for_each(|point| outside_points.set_outside(point, true));
         assert_eq!(found(&outside_points), [2, 3, 4, 5, 6, 7]);

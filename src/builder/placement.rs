@@ -1,7 +1,7 @@
 //! Where the points of replaced tetrahedra go, and the errors there: the common part of collapses and removals.
 
 use super::cost::{Buckets, Reference};
-use super::points::{SLACK, barycentric, clamped, locate};
+use super::points::{SLACK, barycentric, clamped};
 use crate::geom::nearest_on_triangle;
 use glam::{DMat3, DVec3};
 
@@ -12,6 +12,8 @@ pub(super) trait Replacement {
     fn border(&self) -> &[(u32, [u32; 3])];
     /// A corner of a boundary triangle in model units, from the lattice's origin.
     fn corner(&self, v: u32) -> DVec3;
+    /// The corners of a cell, in steps of the lattice.
+    fn corners(&self, cell: usize) -> [DVec3; 4];
     /// The levels of a field at the corners of a cell.
     fn levels(&self, cell: usize, field: usize) -> [i32; 4];
     /// A position in model units, relative to the origin of a cell, in steps of the lattice.
@@ -19,7 +21,7 @@ pub(super) trait Replacement {
 }
 
 /// A new tetrahedron: where its points are.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 struct Cell {
     /// `(λ_1, λ_2, λ_3)` of a point are this times its position relative to corner 0.
     barycentric: DMat3,
@@ -44,9 +46,9 @@ impl Face {
 /// The new cells of points, and the errors of the fields there; reused for each candidate.
 #[derive(Default)]
 pub(super) struct Placement {
-    corners: Vec<[DVec3; 4]>,
-    /// The cells, made when they are first needed.
-    cells: Vec<Option<Cell>>,
+    /// The cells, if they are made: that is done when they are first needed.
+    cells: Vec<Cell>,
+    made: Vec<bool>,
     /// The boundary triangles, made when they are first needed.
     faces: Vec<Face>,
     /// For each point its cell, or the complement of its number if the point is outside.
@@ -59,12 +61,13 @@ pub(super) struct Placement {
 }
 
 impl Placement {
-    /// Starts with the cells of these corners, in steps of the lattice, and no points.
-    pub fn start(&mut self, corners: impl Iterator<Item = [DVec3; 4]>) {
-        self.corners.clear();
-        self.corners.extend(corners);
-        self.cells.clear();
-        self.cells.resize(self.corners.len(), None);
+    /// Starts with so many cells, and no points.
+    pub fn start(&mut self, cells: usize) {
+        if self.cells.len() < cells {
+            self.cells.resize_with(cells, Cell::default);
+        }
+        self.made.clear();
+        self.made.resize(cells, false);
         self.faces.clear();
         self.moves.clear();
         self.foreign.clear();
@@ -76,39 +79,59 @@ impl Placement {
         self.errors.iter_mut().for_each(|error| *error = error.max(least));
     }
 
-    /// The cell that contains a position, in steps of the lattice, or is nearest to it: see [`locate`].
-    pub fn locate(&mut self, position: DVec3, hint: usize) -> (usize, DVec3, f64) {
-        locate(self.cells.len(), hint, |i| {
-            let Cell { barycentric, origin } = self.cell(i);
-            barycentric * (position - origin)
-        })
+    /// The cell that contains a position, in steps of the lattice, or is least outside of: its barycentric coordinates there but for
+    /// the first one, and how deep inside it lies. The cell `hint` is tested first.
+    pub fn locate(&mut self, position: DVec3, hint: usize, new: &impl Replacement) -> (usize, DVec3, f64) {
+        let (mut cell, mut lambda, mut depth) = self.try_cell(hint, position, new);
+        let mut next = 0;
+        while depth < 0.0 && next < self.made.len() {
+            if next != hint {
+                let other = self.try_cell(next, position, new);
+                if other.2 > depth {
+                    (cell, lambda, depth) = other;
+                }
+            }
+            next += 1;
+        }
+        (cell, lambda, depth)
+    }
+
+    /// The barycentric coordinates of a position in a cell, and how deep inside it lies.
+    #[inline]
+    fn try_cell(&mut self, i: usize, position: DVec3, new: &impl Replacement) -> (usize, DVec3, f64) {
+        let Cell { barycentric, origin } = self.cell(i, new);
+        let lambda = *barycentric * (position - *origin);
+        (i, lambda, lambda.min_element().min(1.0 - lambda.element_sum()))
     }
 
     #[inline]
-    fn cell(&mut self, i: usize) -> Cell {
-        // The orientation was found positive, so the matrices are regular.
-        let make = || Cell { barycentric: barycentric(self.corners[i]), origin: self.corners[i][0] };
-        *self.cells[i].get_or_insert_with(make)
+    fn cell(&mut self, i: usize, new: &impl Replacement) -> &Cell {
+        if !self.made[i] {
+            // The orientation was found positive, so the matrices are regular.
+            let corners = new.corners(i);
+            self.cells[i] = Cell { barycentric: barycentric(corners), origin: corners[0] };
+            self.made[i] = true;
+        }
+        &self.cells[i]
     }
 
     /// Finds the cell for a point, testing `hint` first. Returns the error there and the cell.
     pub fn place(&mut self, point: u32, hint: usize, new: &impl Replacement) -> (f64, usize) {
         let reference = new.reference();
-        let (mut cell, mut lambda, depth) = self.locate(reference.quantized.places[point as usize], hint);
-        let mut displaced = 0.0;
+        let (mut cell, mut lambda, depth) = self.locate(reference.quantized.places.at(point), hint, new);
         // The point stays outside of the mesh where no boundary is near, too: it was not in the star from the start.
         let outside = depth < -SLACK;
+        let mut displaced = 0.0;
         if outside && !new.border().is_empty() {
             let (p, moved) = reference.place(point);
             let (found, q, distance) = self.nearest(p, usize::MAX, new);
             cell = found as usize;
-            let Cell { barycentric, origin } = self.cell(cell);
-            lambda = barycentric * new.relative(q, origin);
-            displaced = distance - moved;
+            let Cell { barycentric, origin } = self.cell(cell, new);
+            lambda = *barycentric * new.relative(q, *origin);
+            displaced = reference.error_at(point, distance - moved);
+            self.raise(displaced);
         }
         self.moves.push((point, if outside { !(cell as i32) } else { cell as i32 }));
-        let displaced = reference.error_at(point, displaced);
-        self.raise(displaced);
         (self.compare(point, cell, lambda, new).max(displaced), cell)
     }
 
@@ -117,7 +140,7 @@ impl Placement {
         self.foreign.clear();
         let mut error = 0.0_f64;
         for point in points {
-            let (cell, lambda, depth) = self.locate(new.reference().quantized.places[point as usize], 0);
+            let (cell, lambda, depth) = self.locate(new.reference().quantized.places.at(point), 0, new);
             if depth >= -SLACK {
                 self.foreign.push((point, cell as u32));
                 error = error.max(self.compare(point, cell, lambda, new));

@@ -2,6 +2,8 @@
 
 use crate::mesh::NONE;
 use glam::{DMat3, DVec3};
+use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
 
 /// Barycentric coordinates this far below zero are rounding errors of a point on a face.
 pub(super) const SLACK: f64 = 1e-9;
@@ -38,26 +40,49 @@ impl Lists {
     }
 }
 
-/// Which of so many tetrahedra a point lies in, or is least outside of: its barycentric coordinates there but for the
-/// first one, which `barycentric` gives, and how deep inside it lies. The tetrahedron `hint` is tested first.
-pub(super) fn locate(
-    cells: usize,
-    hint: usize,
-    mut barycentric: impl FnMut(usize) -> DVec3,
-) -> (usize, DVec3, f64) {
-    let (mut cell, mut lambda, mut depth) = (hint, DVec3::ZERO, f64::NEG_INFINITY);
-    let order = std::iter::once(hint).chain((0..cells).filter(|&i| i != hint));
-    for i in order {
-        let l = barycentric(i);
-        let inside = l.min_element().min(1.0 - l.element_sum());
-        if inside > depth {
-            (cell, lambda, depth) = (i, l, inside);
-        }
-        if inside >= 0.0 {
-            break;
+/// The same where few tetrahedra have any points: those without take no memory.
+#[derive(Default)]
+pub(super) struct SparseLists {
+    first: NumberMap,
+    next: NumberMap,
+}
+
+/// A number for each of a few others.
+type NumberMap = HashMap<u32, u32, BuildHasherDefault<Spread>>;
+
+/// Hashes a number by a product: Fibonacci hashing.
+#[derive(Default)]
+struct Spread(u64);
+
+impl Hasher for Spread {
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|&byte| self.write_u32(u32::from(byte)));
+    }
+
+    fn write_u32(&mut self, number: u32) {
+        self.0 = (self.0 ^ u64::from(number)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    }
+
+    fn finish(&self) -> u64 {
+        self.0
+    }
+}
+
+impl SparseLists {
+    pub fn take(&mut self, t: u32) {
+        self.first.remove(&t);
+    }
+
+    pub fn put(&mut self, t: u32, point: u32) {
+        match self.first.insert(t, point) {
+            Some(next) => _ = self.next.insert(point, next),
+            None => _ = self.next.remove(&point),
         }
     }
-    (cell, lambda, depth)
+
+    pub fn iter(&self, t: u32) -> impl Iterator<Item = u32> {
+        std::iter::successors(self.first.get(&t).copied(), |p| self.next.get(p).copied())
+    }
 }
 
 /// The matrix that makes `(λ_1, λ_2, λ_3)` of a point of its position relative to corner 0.

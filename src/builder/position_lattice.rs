@@ -6,9 +6,9 @@ use crate::mesh::{Grid, TetMesh};
 use crate::mt::MtKind;
 
 /// The fewest position bits that are tried unless the caller says otherwise.
-const FEWEST_BITS: u32 = 16;
+pub(super) const FEWEST_BITS: u32 = 16;
 /// Bits added to the fewest that keep every cell positive, so that thin cells keep their shape, too.
-const SPARE_BITS: u32 = 2;
+pub(super) const SPARE_BITS: u32 = 2;
 
 /// Points on a lattice.
 pub(super) struct Placed {
@@ -43,7 +43,7 @@ pub(super) fn largest_move(mesh: &TetMesh, lattice: &Lattice, positions: &[[i32;
 }
 
 /// The distance, a little too large rather than too small; 0 only between equal points.
-fn distance(p: [f64; 3], q: [f64; 3]) -> f64 {
+pub(super) fn distance(p: [f64; 3], q: [f64; 3]) -> f64 {
     let away = [0, 1, 2].map(|i| (p[i] - q[i]).abs());
     let largest = away.into_iter().fold(0.0, f64::max);
     if largest == 0.0 {
@@ -128,12 +128,27 @@ fn flat_cell(mesh: &TetMesh, placed: &Placed) -> Option<u32> {
     mesh.tets.iter().position(flat).map(|cell| cell as u32)
 }
 
+/// The lattice that [`place`] puts the points of a grid on, if it holds each of them exactly.
+#[cfg(feature = "parts")]
+pub(super) fn of_grid(grid: &Grid, config: &BuildConfig) -> Option<Lattice> {
+    let bits = match (config.position_bits, config.position_tolerance) {
+        (Some(bits @ 1..=WIDE_BITS), None) => bits,
+        (None, None) => cell_bits(grid)?.max(1),
+        _ => return None,
+    };
+    grid_lattice(grid, bits)
+}
+
 /// The lattice of `bits` over the mesh: on the points of a regular grid, else with equal steps along all axes.
 fn lattice(mesh: &TetMesh, bits: u32) -> Lattice {
     if let Some(lattice) = mesh.grid.and_then(|grid| grid_lattice(&grid, bits)) {
         return lattice;
     }
-    let bounds = Bounds::of(&mesh.positions);
+    over(&Bounds::of(&mesh.positions), bits)
+}
+
+/// The lattice of `bits` over a box, with equal steps along all axes.
+pub(super) fn over(bounds: &Bounds, bits: u32) -> Lattice {
     let largest = bounds.extent().into_iter().fold(0.0, f64::max);
     let step = if largest > 0.0 { largest / f64::from(1_u32 << bits) } else { 1.0 };
     Lattice { origin: bounds.min, step: [step; 3], bits }

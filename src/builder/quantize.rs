@@ -1,11 +1,12 @@
 //! The input on integer lattices: positions and field levels.
 
 use super::location::Location;
+use super::places::Places;
 use super::points::{as_vec, clamped};
 use super::position_lattice::Placed;
 use super::{BuildConfig, BuildError, field_lattice, field_selection, location, position_lattice};
 use crate::geom::{Lattice, ON_LATTICE, WIDE_BITS};
-use crate::mesh::{Field, TetMesh};
+use crate::mesh::{EDGES, Field, TetMesh};
 use crate::mt::{FieldInfo, MtInfo, MtKind};
 use glam::DVec3;
 use std::sync::Arc;
@@ -14,13 +15,13 @@ use std::sync::Arc;
 pub(super) struct Quantized {
     pub lattice: Lattice,
     pub fields: Vec<FieldInfo>,
-    pub positions: Vec<[i32; 3]>,
+    pub positions: Arc<[[i32; 3]]>,
     /// `levels[point * fields + f]`.
     pub levels: Vec<i32>,
     /// The input's values in units of levels, not rounded; errors are measured against these.
     pub exact: Vec<f64>,
     /// The input's points in steps of the lattice, not rounded; the field is compared there.
-    pub places: Arc<[DVec3]>,
+    pub places: Places,
     /// The locations of the points that the lattice has moved; empty without cells.
     pub locations: Vec<Location>,
     /// How far the lattice moves a point at most: see [`MtInfo::quantization`](crate::mt::MtInfo::quantization).
@@ -40,8 +41,10 @@ impl Quantized {
             let (place, rounded) = ((DVec3::from(*p) - origin) / step, as_vec(q));
             if place.distance(rounded) < ON_LATTICE { rounded } else { place }
         };
-        let places = mesh.positions.iter().zip(&positions).map(place).collect();
+        let rounded = Arc::<[[i32; 3]]>::from(&positions[..]);
+        let places = Places::new(rounded.clone(), mesh.positions.iter().zip(&positions).map(place));
         let quantization = position_lattice::largest_move(mesh, &lattice, &positions);
+        let positions = rounded;
         Self { lattice, fields, positions, levels, exact, places, locations: Vec::new(), quantization }
     }
 
@@ -65,14 +68,34 @@ impl Quantized {
         as_vec(self.positions[point as usize])
     }
 
+    /// All points on the lattice in model units, from its origin.
+    pub fn scaled(&self) -> Vec<DVec3> {
+        let step = DVec3::from_array(self.lattice.step);
+        self.positions.iter().map(|&q| as_vec(q) * step).collect()
+    }
+
+    /// For each point the square of the shortest edge there, in model units; infinite without any.
+    pub fn shortest_edges(&self, tets: &[[u32; 4]]) -> Vec<f64> {
+        let places = self.scaled();
+        let mut shortest = vec![f64::INFINITY; places.len()];
+        for tet in tets {
+            for [a, b] in EDGES.map(|edge| edge.map(|i| tet[i] as usize)) {
+                let squared = places[a].distance_squared(places[b]);
+                shortest[a] = shortest[a].min(squared);
+                shortest[b] = shortest[b].min(squared);
+            }
+        }
+        shortest
+    }
+
     /// Whether the lattice has moved a point.
     pub fn is_moved(&self, point: u32) -> bool {
-        self.places[point as usize] != self.rounded(point)
+        self.places.is_moved(point)
     }
 
     /// By how much the reference mesh, on the lattices, differs from the input's values at the input's points, as a fraction of the
     /// range of each field, where the lattice of the positions has moved them.
-    fn losses(&self, tets: &[[u32; 4]]) -> Vec<f64> {
+    pub fn losses(&self, tets: &[[u32; 4]]) -> Vec<f64> {
         let mut losses = vec![0.0; self.fields.len()];
         for locate in &self.locations {
             let tet = tets[locate.tet as usize];
@@ -114,12 +137,12 @@ impl Quantized {
     ) -> f64 {
         let own = 1.0 - lambda.element_sum();
         let mut largest = 0.0_f64;
-        for (f, field) in self.fields.iter().enumerate() {
+        let exact = &self.exact[point as usize * self.fields.len()..];
+        for (f, ((field, exact), most)) in self.fields.iter().zip(exact).zip(errors).enumerate() {
             let [w, x, y, z] = corners(f).map(f64::from);
             let value = own * w + lambda.x * x + lambda.y * y + lambda.z * z;
-            let exact = self.exact[point as usize * self.fields.len() + f];
             let error = (value - exact).abs() * field.step / field.range();
-            errors[f] = errors[f].max(error);
+            *most = most.max(error);
             largest = largest.max(error);
         }
         largest
@@ -159,11 +182,37 @@ pub(super) fn quantize(mesh: &TetMesh, config: &BuildConfig) -> Result<Quantized
     check_finite(mesh, &chosen)?;
     let placed = position_lattice::place(mesh, config)?;
     let fields = field_lattice::field_lattices(&chosen, config)?;
+    Ok(on_lattices(mesh, placed, &chosen, fields))
+}
+
+/// A mesh on a lattice with these fields on theirs.
+pub(super) fn on_lattices(
+    mesh: &TetMesh,
+    placed: Placed,
+    chosen: &[&Field],
+    fields: Vec<FieldInfo>,
+) -> Quantized {
     let per_point = |i: usize| chosen.iter().zip(&fields).map(move |(field, info)| (field.values[i], info));
     let points = 0..mesh.positions.len();
     let levels = points.clone().flat_map(|i| per_point(i).map(|(value, info)| info.nearest(value))).collect();
     let exact = points.flat_map(|i| per_point(i).map(|(x, info)| (x - info.origin) / info.step)).collect();
-    Ok(Quantized::new(mesh, placed, fields, levels, exact))
+    Quantized::new(mesh, placed, fields, levels, exact)
+}
+
+/// The lattices, without points.
+#[cfg(feature = "parts")]
+pub(super) fn lattices_alone(lattice: Lattice, fields: Vec<FieldInfo>, quantization: f64) -> Quantized {
+    let positions: Arc<[[i32; 3]]> = [].into();
+    Quantized {
+        lattice,
+        fields,
+        places: Places::new(positions.clone(), std::iter::empty()),
+        positions,
+        levels: Vec::new(),
+        exact: Vec::new(),
+        locations: Vec::new(),
+        quantization,
+    }
 }
 
 /// The same for a mesh whose cells are kept: errors are then measured at the input's own points.
@@ -173,10 +222,6 @@ pub(super) fn quantize_cells(mesh: &TetMesh, config: &BuildConfig) -> Result<Qua
     let mut losses = quantized.losses(&mesh.tets);
     // Where cells are thin for what varies across them, a finer lattice is what keeps the reference mesh near the input.
     let is_free = config.position_bits.is_none() && config.position_tolerance.is_none();
-    let is_large = |losses: &[f64], fields: &[FieldInfo]| {
-        let own = fields.iter().map(|field| field.quantization / field.range());
-        losses.iter().zip(own).any(|(&loss, own)| loss > own + LARGEST_LOSS)
-    };
     while is_free && is_large(&losses, &quantized.fields) {
         let bits = quantized.lattice.bits + FINER_BITS;
         if bits > WIDE_BITS {
@@ -195,11 +240,17 @@ pub(super) fn quantize_cells(mesh: &TetMesh, config: &BuildConfig) -> Result<Qua
     Ok(quantized)
 }
 
+/// Whether a mesh loses more of its fields by the lattice of the positions than is wanted.
+pub(super) fn is_large(losses: &[f64], fields: &[FieldInfo]) -> bool {
+    let own = fields.iter().map(|field| field.quantization / field.range());
+    losses.iter().zip(own).any(|(&loss, own)| loss > own + LARGEST_LOSS)
+}
+
 /// By default the position lattice is so fine that the reference mesh has the input's values at the input's points up
 /// to this fraction of the range, besides the rounding of the field lattices.
 const LARGEST_LOSS: f64 = 0.001;
 /// Bits by which it becomes finer at a time.
-const FINER_BITS: u32 = 2;
+pub(super) const FINER_BITS: u32 = 2;
 
 /// The error that is left at full resolution, of whichever field has the largest.
 pub(super) fn floors(info: &MtInfo) -> Vec<f64> {

@@ -17,6 +17,11 @@ impl Default for Reach {
 }
 
 impl Reach {
+    /// Its lowest and its highest corner.
+    pub fn ends(&self) -> [[i32; 3]; 2] {
+        [self.low, self.high]
+    }
+
     pub fn add(&mut self, p: [i32; 3]) {
         self.join(&Self { low: p, high: p });
     }

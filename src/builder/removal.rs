@@ -8,13 +8,22 @@ use super::fill_cost::{FillCost, HoleCost, Input, Removals};
 use super::gift_wrap::GiftWrap;
 use super::half_edge::{Nearby, contract, keeps_topology};
 use super::hole::{Filling, Hole};
-use super::points::squared_length;
+use super::points::{as_vec, squared_length};
 use super::quantize::Quantized;
 use super::reach;
 use super::reach::{Reach, Ruler};
+use super::restrictions::Restrictions;
 use super::work_mesh::WorkMesh;
 use crate::mesh::NONE;
 use glam::DVec3;
+
+/// What removals leave besides the mesh.
+pub(super) struct History {
+    pub buckets: Buckets,
+    pub removals: Removals,
+    /// See [`State::reaches`].
+    pub reaches: Vec<Reach>,
+}
 
 /// What the evaluation of a candidate reads.
 pub(super) struct State<'a> {
@@ -23,6 +32,8 @@ pub(super) struct State<'a> {
     pub gradients: Vec<DVec3>,
     pub reference: Reference<'a>,
     pub frozen: Vec<bool>,
+    /// Vertices that belong to a part of the domain that is built elsewhere, too: their stars are not all here. Empty where there is none.
+    pub open: Vec<bool>,
     pub buckets: Buckets,
     pub removals: Removals,
     /// Counts the changes around each vertex.
@@ -33,25 +44,60 @@ pub(super) struct State<'a> {
     pub reaches: Vec<Reach>,
     pub ruler: Ruler,
     pub levels: Levels,
+    /// What a square of an error counts, times the square of [`Levels::mean`].
+    pub square_weight: f64,
+    pub restrictions: Restrictions,
 }
 
 impl<'a> State<'a> {
     pub fn new(mesh: WorkMesh, reference: Reference<'a>, frozen: Vec<bool>, levels: Levels) -> Self {
         let quantized = reference.quantized;
-        let points = quantized.positions.len();
+        let history = History {
+            buckets: Buckets::new(mesh.tets.len(), quantized),
+            removals: Removals::new(mesh.tets.len()),
+            reaches: reach::of_stars(&mesh.tets, &quantized.positions),
+        };
+        Self::resume(mesh, reference, frozen, levels, history)
+    }
+
+    /// Of a mesh that is what removals have left.
+    pub fn resume(
+        mesh: WorkMesh,
+        reference: Reference<'a>,
+        frozen: Vec<bool>,
+        levels: Levels,
+        history: History,
+    ) -> Self {
+        let quantized = reference.quantized;
+        let History { buckets, removals, reaches } = history;
         Self {
             gradients: quantized.gradients(&mesh.tets),
             reference,
             frozen,
-            buckets: Buckets::new(mesh.tets.len(), quantized),
-            removals: Removals::new(mesh.tets.len()),
-            versions: vec![0; points],
+            open: Vec::new(),
+            buckets,
+            removals,
+            versions: vec![0; quantized.positions.len()],
             degrees: mesh.degrees(),
-            reaches: reach::of_stars(&mesh.tets, &quantized.positions),
+            reaches,
             ruler: Ruler::new(quantized),
             levels,
+            square_weight: 0.0,
+            restrictions: Restrictions::default(),
             mesh,
         }
+    }
+
+    /// Whether a vertex belongs to a part that is built elsewhere, too.
+    fn is_open(&self, v: u32) -> bool {
+        self.open.get(v as usize).copied().unwrap_or(false)
+    }
+
+    /// Lets squares of errors count by how many points a star has on average: with so many vertices left, of which each tetrahedron
+    /// has four.
+    pub fn weigh_squares(&mut self, left: usize) {
+        let mean = self.levels.mean;
+        self.square_weight = mean * mean * left as f64 / (4.0 * f64::from(self.reference.points.max(1)));
     }
 
     /// What orders removals of one level, by [`Key::second`]: what reaches less far comes first, and then what leaves fewer
@@ -68,8 +114,8 @@ pub(super) struct RemovalSearch {
     pub hole: Hole,
     hole_cost: HoleCost,
     nearby: Nearby,
-    /// Link vertices with the predicted error of contracting the edge to them.
-    ends: Vec<(f64, u32)>,
+    /// Link vertices with the predicted error of contracting the edge to them, and their places in the link.
+    ends: Vec<(f64, u32, u8)>,
     /// The filling that is evaluated, and the best one so far.
     now: Candidate,
     pub best: Candidate,
@@ -82,23 +128,26 @@ pub(super) struct RemovalSearch {
 pub(super) struct Candidate {
     pub filling: Filling,
     pub cost: FillCost,
+    /// What decides the level.
     error: f64,
 }
 
 impl Candidate {
     fn evaluate(&mut self, hole: &Hole, hole_cost: &HoleCost, state: &State<'_>, limit: f64) {
         let input = Input { hole, filling: &self.filling, reference: &state.reference };
-        self.error = self.cost.evaluate(hole_cost, &state.buckets, limit, input);
+        let largest = self.cost.evaluate(hole_cost, &state.buckets, limit, input);
+        // What is stored is the largest error. Which level it belongs to may depend on the mean as well.
+        self.error = largest.max((state.square_weight * self.cost.squares).sqrt());
     }
 }
 
 impl RemovalSearch {
-    pub fn new(gift_wrap: Option<GiftWrap>, points: usize) -> Self {
+    pub fn new(gift_wrap: Option<GiftWrap>) -> Self {
         Self {
             gift_wrap,
             hole: Hole::default(),
             hole_cost: HoleCost::default(),
-            nearby: Nearby::new(points),
+            nearby: Nearby::default(),
             ends: Vec::new(),
             now: Candidate::default(),
             best: Candidate::default(),
@@ -109,12 +158,16 @@ impl RemovalSearch {
     /// Evaluates the removal of `a`, by moving it to `end` unless that is [`NONE`]. Returns its key; none if it cannot
     /// be removed. If the key's level is above `level`, it is a lower bound; else `best` is the filling to be made.
     pub fn at(&mut self, state: &State<'_>, a: u32, end: u32, level: u16) -> Option<Key> {
+        if state.restrictions.keeps(a) {
+            return None;
+        }
+        self.hole.feature = state.restrictions.feature;
         self.hole.open(&state.mesh, &state.reference.quantized.positions, a).ok()?;
         if self.hole.star.len() < state.degrees[a as usize] as usize {
             // The tetrahedra around it are not connected through faces: the input overlaps itself.
             return None;
         }
-        self.hole_cost = state.removals.hole_cost(&self.hole, &state.reference);
+        state.removals.find_hole_cost(&self.hole, &state.reference, &mut self.hole_cost);
         let least = state.levels.of(largest(&self.hole_cost.errors));
         if least > level {
             return Some(Key::new(least, 0, 0.0, a, NONE));
@@ -122,43 +175,30 @@ impl RemovalSearch {
         if self.gift_wrap.is_none() { self.find_end(state, end, level) } else { self.wrap(state, level) }
     }
 
-    /// The key of a filling of the hole with so many tetrahedra and this error.
-    fn key(&self, state: &State<'_>, tets: usize, error: f64, b: u32) -> Key {
-        let positions = &state.reference.quantized.positions;
-        let length =
-            positions.get(b as usize).map_or(0.0, |&q| squared_length(positions[self.hole.a as usize], q));
-        let second = state.second(self.hole.a, tets as u32);
-        Key::new(state.levels.of(error), second, length, self.hole.a, b)
-    }
-
     /// Finds the best edge to contract: the one to `known` unless that is [`NONE`]. Its filling becomes `best`.
     fn find_end(&mut self, state: &State<'_>, known: u32, level: u16) -> Option<Key> {
-        self.ends.clear();
-        if known != NONE {
-            self.ends.push((0.0, known));
-        } else {
-            let ends = self
-                .hole
-                .link
-                .iter()
-                .map(|&b| (predicted(&state.reference, &state.gradients, self.hole.a, b), b));
-            self.ends.extend(ends);
-            self.ends.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
-        }
+        self.hole.find_sides();
+        self.list_ends(state, known);
+        let a = self.hole.a;
+        let least = state.levels.of(largest(&self.hole_cost.errors));
+        // What it is but for the tetrahedra that are left.
+        let (centre, second) = (state.reference.quantized.positions[a as usize], state.second(a, 0));
         let mut found: Option<Key> = None;
-        let least = largest(&self.hole_cost.errors);
-        for i in 0..self.ends.len() {
-            let b = self.ends[i].1;
+        for at in 0..self.ends.len() {
+            let (_, b, i) = self.ends[at];
+            let i = usize::from(i);
+            let second = second + self.hole.left_at(i);
+            let length = squared_length(centre, self.hole.points[i]);
             // Its error is at least that of the hole. So most ends cannot be better than the best one so far, whatever
             // their own is.
-            let is_worse = |found| self.key(state, self.hole.left_at(b), least, b) > found;
-            if found.is_some_and(is_worse) || !self.contract(state, b) {
+            let is_worse = |found| Key::new(least, second, length, a, b) > found;
+            if found.is_some_and(is_worse) || !self.contract(state, i) {
                 continue;
             }
             let limit = state.levels.largest(found.map_or(level, |found| found.level().min(level)));
             let Self { hole, hole_cost, now, .. } = self;
             now.evaluate(hole, hole_cost, state, limit);
-            let key = self.key(state, self.now.filling.tets.len(), self.now.error, b);
+            let key = Key::new(state.levels.of(self.now.error), second, length, a, b);
             if found.is_none_or(|found| key < found) {
                 found = Some(key);
                 self.best_end = b;
@@ -168,19 +208,38 @@ impl RemovalSearch {
         found
     }
 
-    /// Fills the hole by moving its vertex to `b`, if that may be.
-    fn contract(&mut self, state: &State<'_>, b: u32) -> bool {
+    /// Lists the ends to try, those with the least predicted error first: `known` alone unless that is [`NONE`].
+    fn list_ends(&mut self, state: &State<'_>, known: u32) {
+        let Self { ends, hole, .. } = self;
+        ends.clear();
+        if known != NONE {
+            ends.extend(hole.place(known).map(|i| (0.0, known, i as u8)));
+            return;
+        }
+        let own = Prediction::new(&state.reference, &state.gradients, hole.a);
+        let link = (0..).zip(hole.link.iter().zip(&hole.points));
+        ends.extend(link.map(|(i, (&b, &q))| (own.error_at(b, q), b, i)));
+        ends.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+    }
+
+    /// Fills the hole by moving its vertex to link vertex `i`, if that may be.
+    fn contract(&mut self, state: &State<'_>, i: usize) -> bool {
         let Self { hole, now, nearby, .. } = self;
         let positions = &state.reference.quantized.positions;
-        if !contract(hole, positions, b, &mut now.filling) || hole.tilts_flat(&now.filling, positions) {
+        if !contract(hole, i, &mut now.filling) || hole.tilts_flat(&now.filling, positions) {
+            return false;
+        }
+        let b = hole.link[i];
+        if !state.restrictions.allow_contraction((hole, b), &now.filling, &state.mesh, positions) {
             return false;
         }
         // Inside, positive tetrahedra are all it takes.
         if state.reference.boundary.at(b).is_empty() {
             return true;
         }
-        let stays = hole.on_boundary() && state.frozen[b as usize];
-        !stays && keeps_topology(hole, &state.mesh, nearby, b)
+        // Whether the topology is kept depends on the whole star of `b`.
+        let stays = state.is_open(b) || hole.on_boundary() && state.frozen[b as usize];
+        !stays && keeps_topology(hole, &state.mesh, nearby, i)
     }
 
     /// Fills the hole by the Delaunay criterion; the filling becomes `best`.
@@ -189,6 +248,7 @@ impl RemovalSearch {
         let positions = &state.reference.quantized.positions;
         if !gift_wrap.as_mut()?.fill(hole, positions, &mut best.filling)
             || hole.tilts_flat(&best.filling, positions)
+            || !state.restrictions.allow_filling(hole, &best.filling, positions)
         {
             return None;
         }
@@ -198,19 +258,38 @@ impl RemovalSearch {
         }
         let limit = state.levels.largest(level);
         best.evaluate(hole, hole_cost, state, limit);
-        Some(self.key(state, self.best.filling.tets.len(), self.best.error, NONE))
+        let (error, tets) = (state.levels.of(self.best.error), self.best.filling.tets.len() as u32);
+        Some(Key::new(error, state.second(self.hole.a, tets), 0.0, self.hole.a, NONE))
     }
 }
 
-/// The second difference of the fields along an edge that is to be contracted to `b`, as an error.
-fn predicted(reference: &Reference<'_>, gradients: &[DVec3], a: u32, b: u32) -> f64 {
-    let Quantized { positions, levels, fields, .. } = reference.quantized;
-    let [p, q] = [a, b].map(|v| DVec3::from_array(positions[v as usize].map(f64::from)));
-    let mut largest = 0.0_f64;
-    for (f, field) in fields.iter().enumerate() {
-        let [u, v] = [a, b].map(|v| v as usize * fields.len() + f);
-        let rise = f64::from(levels[v] - levels[u]);
-        largest = largest.max((rise - gradients[u].dot(q - p)).abs() * field.step / field.range());
+/// Predicts what it costs to contract edges at one vertex.
+struct Prediction<'a> {
+    quantized: &'a Quantized,
+    position: DVec3,
+    levels: &'a [i32],
+    gradients: &'a [DVec3],
+}
+
+impl<'a> Prediction<'a> {
+    fn new(reference: &Reference<'a>, gradients: &'a [DVec3], a: u32) -> Self {
+        let quantized = reference.quantized;
+        let fields = quantized.fields.len();
+        let own = a as usize * fields..(a as usize + 1) * fields;
+        let (levels, gradients) = (&quantized.levels[own.clone()], &gradients[own]);
+        Self { quantized, position: quantized.rounded(a), levels, gradients }
     }
-    largest
+
+    /// The second difference of the fields along the edge to `b`, which is at `q`, as an error.
+    #[inline]
+    fn error_at(&self, b: u32, q: [i32; 3]) -> f64 {
+        let Self { quantized, position, levels, gradients } = *self;
+        let apart = as_vec(q) - position;
+        let mut largest = 0.0_f64;
+        for (f, field) in quantized.fields.iter().enumerate() {
+            let rise = f64::from(quantized.level(b, f) - levels[f]);
+            largest = largest.max((rise - gradients[f].dot(apart)).abs() * field.step / field.range());
+        }
+        largest
+    }
 }

@@ -14,13 +14,13 @@ pub(super) struct Searches {
 }
 
 impl Searches {
-    /// For a mesh of so many vertices, and the threads of rayon's current pool.
-    pub fn new(gift_wrap: Option<&GiftWrap>, vertices: usize) -> Self {
+    /// For the threads of rayon's current pool.
+    pub fn new(gift_wrap: Option<&GiftWrap>) -> Self {
         #[cfg(feature = "parallel")]
         let threads = rayon::current_num_threads();
         #[cfg(not(feature = "parallel"))]
         let threads = 1;
-        let search = |_| Mutex::new(RemovalSearch::new(gift_wrap.cloned(), vertices));
+        let search = |_| Mutex::new(RemovalSearch::new(gift_wrap.cloned()));
         Self { all: (0..threads).map(search).collect() }
     }
 

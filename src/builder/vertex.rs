@@ -11,7 +11,7 @@ use crate::mesh::TetMesh;
 use crate::mt::{ExplicitMt, MAX_UPDATES, VertexId};
 use std::borrow::Cow;
 
-/// Builds a vertex-based MT of `mesh` by this method, as an explicit MT.
+/// Builds a vertex-based MT of `mesh` by this method, as an explicit MT. Also returns how far interfaces have moved, in model units.
 ///
 /// # Errors
 /// As [`decimated_mt`] and [`inserted_mt`].
@@ -20,9 +20,12 @@ pub(super) fn mt_by(
     mesh: &TetMesh,
     config: &BuildConfig,
     progress: OnProgress<'_>,
-) -> Result<(ExplicitMt, Vec<VertexId>), BuildError> {
+) -> Result<(ExplicitMt, Vec<VertexId>, f64), BuildError> {
     match method {
-        VertexMethod::Insert { tet_errors } => inserted_mt(mesh, config, tet_errors, progress),
+        VertexMethod::Insert { tet_errors } => {
+            let (mt, vertices) = inserted_mt(mesh, config, tet_errors, progress)?;
+            Ok((mt, vertices, 0.0))
+        }
         VertexMethod::Decimate { criterion, purpose } => {
             decimated_mt(mesh, config, (criterion, purpose), progress)
         }
@@ -39,10 +42,11 @@ pub(super) fn decimated_mt(
     config: &BuildConfig,
     how: (BuildCriterion, Purpose),
     progress: OnProgress<'_>,
-) -> Result<(ExplicitMt, Vec<VertexId>), BuildError> {
-    let Decimated::<Sequence> { record, quantized, info } =
+) -> Result<(ExplicitMt, Vec<VertexId>, f64), BuildError> {
+    let Decimated::<Sequence> { record, quantized, info, interface_deviation } =
         decimate::decimate(&mut Cow::Borrowed(mesh), config, how, progress)?;
-    record.explicit_mt(info, &quantized, progress)
+    let (mt, vertices) = record.explicit_mt(info, &quantized, progress)?;
+    Ok((mt, vertices, interface_deviation))
 }
 
 /// Builds a vertex-based MT of the points of `mesh` by inserting them into a coarse mesh of their convex hull, the one

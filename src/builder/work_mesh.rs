@@ -5,6 +5,9 @@
 
 use crate::mesh::NONE;
 
+/// Across a face to a part of the domain that is built elsewhere: no tetrahedron, but no boundary either.
+pub(super) const ELSEWHERE: u32 = NONE - 1;
+
 /// A tetrahedral mesh with adjacency, edited by edge collapses or vertex removals.
 pub(super) struct WorkMesh {
     pub tets: Vec<[u32; 4]>,
@@ -22,28 +25,37 @@ pub(super) struct TetSet {
     /// Twice as many places as tetrahedra at least, a power of two; [`NONE`] where there is none.
     table: Vec<u32>,
     len: usize,
+    /// The neighbours of the tetrahedra in the order in which they were found.
+    around: Vec<[u32; 4]>,
 }
+
+/// Places of a set that has not grown.
+const PLACES: usize = 128;
 
 impl TetSet {
     /// Empties the set.
     fn clear(&mut self) {
-        if self.len > 0 {
-            self.table.fill(NONE);
-            self.len = 0;
-        }
+        // A large star is rare: after it the set is small again.
+        self.table.truncate(PLACES);
+        self.table.fill(NONE);
+        self.table.resize(PLACES, NONE);
+        self.len = 0;
+        self.around.clear();
     }
 
-    /// Adds a tetrahedron; false if it is there already.
+    /// Adds a tetrahedron; false if it is there already. Only after [`TetSet::clear`].
     #[inline]
     fn insert(&mut self, t: u32) -> bool {
+        let place = self.place(t);
+        if self.table[place] == t {
+            return false;
+        }
+        self.table[place] = t;
+        self.len += 1;
         if 2 * self.len >= self.table.len() {
             self.grow();
         }
-        let place = self.place(t);
-        let is_new = self.table[place] == NONE;
-        self.table[place] = t;
-        self.len += usize::from(is_new);
-        is_new
+        true
     }
 
     /// Where a tetrahedron is, or would be put.
@@ -60,7 +72,7 @@ impl TetSet {
 
     #[cold]
     fn grow(&mut self) {
-        let size = (2 * self.table.len()).max(128);
+        let size = 2 * self.table.len();
         for t in std::mem::replace(&mut self.table, vec![NONE; size]) {
             if t != NONE {
                 let place = self.place(t);
@@ -115,16 +127,20 @@ impl WorkMesh {
         let first = self.incident[v as usize];
         seen.insert(first);
         star.push(self.star_tet(first, v));
+        seen.around.push(self.neighbors[first as usize]);
         let mut next = 0;
         while next < star.len() {
-            let StarTet { tet, corner } = star[next];
+            let corner = star[next].corner;
+            let around = seen.around[next];
             next += 1;
-            for (i, n) in self.neighbors[tet as usize].into_iter().enumerate() {
-                if i != corner as usize && n != NONE && seen.insert(n) {
+            for (i, n) in around.into_iter().enumerate() {
+                if i != corner as usize && n < ELSEWHERE && seen.insert(n) {
                     if star.len() == most {
                         return false;
                     }
                     star.push(self.star_tet(n, v));
+                    // Read as soon as the tetrahedron is known: the memory delivers several at a time.
+                    seen.around.push(self.neighbors[n as usize]);
                 }
             }
         }

@@ -14,7 +14,7 @@ pub struct BlockScan {
     pub blocks: Vec<BlockInfo>,
     /// The MT with blocks for pages, if its pages were others.
     pub in_blocks: Option<Mt>,
-    /// For each vertex of the reference mesh, ascending, its number and its levels.
+    /// For each vertex of the reference mesh, ascending, its number and its levels; empty if no exact values are to be written.
     pub reference: Vec<(u32, Vec<i32>)>,
     /// Of that mesh, if they are to be written.
     pub histograms: Option<Histograms>,
@@ -25,17 +25,13 @@ impl BlockScan {
         let bits = options.block_bits;
         let is_other = mt.is_paged() && mt.page_bits() != bits;
         let in_blocks = is_other.then(|| mt.in_pages(bits)).transpose().map_err(EncodeError::Update)?;
-        let mut scan = run(mt, options)?;
-        if !mt.needs_parents() {
-            // Each block can be used without the others.
-            scan.blocks.iter_mut().for_each(|block| block.parents.clear());
-        }
-        Ok(Self { in_blocks, ..scan })
+        Ok(Self { in_blocks, ..run(mt, options)? })
     }
 }
 
 fn run(mt: &impl ApplyUpdates, options: &EncodeOptions) -> Result<BlockScan, EncodeError> {
     let mut mesh = mt.start().map_err(EncodeError::Base)?;
+    mesh.make_room(mt.info());
     mt.updates_arrived(&mut mesh, 0);
     let mut margins = Margins::new(mt.info());
     let mut blocks = Vec::new();
@@ -47,7 +43,8 @@ fn run(mt: &impl ApplyUpdates, options: &EncodeOptions) -> Result<BlockScan, Enc
     }
     mesh.compact();
     let histograms = options.histograms.then(|| Histograms::of(mt.info(), &mesh));
-    let slots = 0..mesh.positions().len() as u32;
+    // For exact values alone.
+    let slots = 0..if options.exact.is_empty() { 0 } else { mesh.positions().len() as u32 };
     let mut reference: Vec<(u32, Vec<i32>)> =
         slots.map(|slot| (mesh.vertex(slot).0, mesh.levels(slot).to_vec())).collect();
     reference.sort_unstable();
@@ -70,7 +67,7 @@ fn scan_block(
     };
     let own = updates.start >> options.block_bits;
     let mut parents = BTreeSet::new();
-    let mut tets = Vec::new();
+    let (mut tets, mut vertices) = (Vec::new(), Vec::new());
     for u in updates.map(UpdateId) {
         for (f, error) in block.errors.iter_mut().enumerate() {
             *error = (*error).max(mt.error_of_field(u, f));
@@ -83,8 +80,12 @@ fn scan_block(
                 return Err(EncodeError::Order { update: u.0, parent: parent.0, field });
             }
         }
-        parents.extend(tets.iter().filter_map(|&t| mt.creator(mesh, t)).map(|p| p.0 >> options.block_bits));
-        widen(&mut block, mesh, &tets);
+        // Else each block can be used without the others.
+        if mt.needs_parents() {
+            parents
+                .extend(tets.iter().filter_map(|&t| mt.creator(mesh, t)).map(|p| p.0 >> options.block_bits));
+        }
+        widen(&mut block, mesh, &tets, &mut vertices);
         match mt.refine(mesh, u).map_err(EncodeError::Update)? {
             Applied::Done => {}
             Applied::Blocked(_) => return Err(EncodeError::Update(UpdateError::Error { update: u.0 })),
@@ -92,16 +93,21 @@ fn scan_block(
         mesh.clear_touched();
         tets.clear();
         mt.find_inserted(mesh, u, &mut tets).map_err(EncodeError::Update)?;
-        widen(&mut block, mesh, &tets);
+        widen(&mut block, mesh, &tets, &mut vertices);
     }
     parents.remove(&own);
     block.parents = parents.into_iter().collect();
     Ok(block)
 }
 
-/// Takes tetrahedra of the mesh into the bounds of a block.
-fn widen(block: &mut BlockInfo, mesh: &CurrentMesh, tets: &[u32]) {
-    for v in tets.iter().filter_map(|&t| mesh.tet(t)).flatten() {
+/// Takes tetrahedra of the mesh into the bounds of a block. `vertices` is scratch space.
+fn widen(block: &mut BlockInfo, mesh: &CurrentMesh, tets: &[u32], vertices: &mut Vec<u32>) {
+    vertices.clear();
+    vertices.extend(tets.iter().filter_map(|&t| mesh.tet(t)).flatten());
+    // Each is a corner of many.
+    vertices.sort_unstable();
+    vertices.dedup();
+    for &v in &*vertices {
         let position = mesh.positions()[v as usize];
         let [low, high] = &mut block.bounds;
         for ((low, high), x) in low.iter_mut().zip(high).zip(position) {

@@ -2,6 +2,8 @@
 
 mod bounds;
 mod camera;
+#[cfg(feature = "build")]
+mod dihedral;
 mod groups;
 mod lattice;
 mod morton;
@@ -17,6 +19,8 @@ mod weights;
 
 pub use bounds::Bounds;
 pub use camera::{Camera, CameraError, CameraState, Projection, Ray, Rays, ViewPreset};
+#[cfg(feature = "build")]
+pub use dihedral::sharpness;
 pub(crate) use groups::Groups;
 pub use lattice::Lattice;
 pub(crate) use morton::morton;

@@ -125,7 +125,7 @@ impl From<&Style> for StyleUniform {
             Colouring::Sides(sides) => (*sides, [0.0; 4], [[0; 4]; 256]),
             Colouring::Scale(scale) => ([[0.0; 3]; 2], terms(scale), scale.table()),
         };
-        let [front, back] = sides;
+        let [front, back] = sides.map(|side| side.map(linear));
         let is_mapped = f32::from(matches!(style.colouring, Colouring::Scale(_)) as u8);
         let edges = style.edges.unwrap_or(EdgeLook { colour: [0.0; 4], width: 0.0 });
         let light = match style.lighting {
@@ -144,6 +144,11 @@ impl From<&Style> for StyleUniform {
             palette,
         }
     }
+}
+
+/// The light that a channel of sRGB means.
+fn linear(channel: f32) -> f32 {
+    if channel <= 0.040_45 { channel / 12.92 } else { ((channel + 0.055) / 1.055).powf(2.4) }
 }
 
 impl From<&CellStyle> for StyleUniform {

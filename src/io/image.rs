@@ -34,15 +34,18 @@ pub(super) fn checked_grid(dims: [u64; 3], origin: [f64; 3], spacing: [f64; 3]) 
     Ok(Grid { dims: dims.map(|d| d as u32), origin, spacing })
 }
 
-/// The mesh of a grid whose fields at points and at cubes were read; a grid without any would be a few bytes that claim
+/// The mesh of a grid, without points and tetrahedra unless there are values at cubes, whose fields at points and at cubes were read; a grid without any would be a few bytes that claim
 /// any size.
 pub(super) fn grid_mesh(grid: Grid, fields: Vec<Field>, cubes: Vec<Field>) -> Result<TetMesh, ReadReason> {
     if fields.is_empty() && cubes.iter().all(|field| field.values.is_empty()) {
         return Err(ReadReason::Missing("an array with a value for every point".into()));
     }
-    let mut mesh = TetMesh::from_grid(grid, fields);
+    let mut mesh = TetMesh::of_grid_alone(grid, fields);
     mesh.cell_fields = cubes;
-    sixfold(&mut mesh.cell_fields);
+    if mesh.cell_fields.iter().any(|field| !field.values.is_empty()) {
+        mesh.expand_grid();
+        sixfold(&mut mesh.cell_fields);
+    }
     Ok(mesh)
 }
 

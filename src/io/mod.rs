@@ -40,6 +40,8 @@ mod image;
 mod legacy;
 mod number;
 mod payload;
+#[cfg(feature = "formats")]
+mod pieces;
 mod pvd;
 #[cfg(feature = "formats")]
 mod pvtu;
@@ -56,6 +58,8 @@ mod xz;
 
 pub use error::{ReadError, ReadReason};
 pub use image::MAX_GRID_POINTS;
+#[cfg(feature = "formats")]
+pub use pieces::{PieceCounts, Pieces};
 pub use pvd::{Step, steps, write_pvd};
 pub use surface::{PolyData, write_csv, write_obj, write_ply, write_stl, write_vtp};
 pub use survey::{Survey, format_of, survey, survey_raw};
@@ -107,6 +111,21 @@ pub fn read(path: &Path) -> Result<TetMesh, ReadError> {
 /// # Errors
 /// As [`read`]; a field that is wanted and not there is no error.
 pub fn read_with(path: &Path, options: &ReadOptions) -> Result<TetMesh, ReadError> {
+    read_unexpanded(path, options).map(expanded)
+}
+
+/// The same mesh with the points and tetrahedra of a grid.
+fn expanded(mut mesh: TetMesh) -> TetMesh {
+    mesh.expand_grid();
+    mesh
+}
+
+/// As [`read_with`], but a regular grid without values at its cells comes without points and tetrahedra, which follow from it: see
+/// [`TetMesh::of_grid_alone`].
+///
+/// # Errors
+/// As [`read_with`].
+pub fn read_unexpanded(path: &Path, options: &ReadOptions) -> Result<TetMesh, ReadError> {
     let name = path.display().to_string();
     match lower_extension(path).as_str() {
         "json" => read_raw_by_sidecar(path, None),
@@ -148,7 +167,7 @@ pub fn read_bytes_with(name: &str, bytes: &[u8], options: &ReadOptions) -> Resul
         let what = format!("a file that needs another (\"{file}\")");
         Err(ReadReason::Unsupported { what, remedy: "give it by its path, with the other beside it".into() })
     };
-    read_in(name, bytes, options, &alone)
+    read_in(name, bytes, options, &alone).map(expanded)
 }
 
 /// Gets the bytes of another file, by its path from the folder of the one that is read.
@@ -196,7 +215,7 @@ fn read_other(_: &str, _: &[u8], _: &ReadOptions, _: Beside<'_>) -> Result<TetMe
 /// # Errors
 /// If the sidecar does not say what is needed, or the samples are not as many as it says.
 pub fn read_raw(name: &str, sidecar: &[u8], samples: &[u8]) -> Result<TetMesh, ReadError> {
-    let mesh = raw::Sidecar::parse(sidecar).and_then(|s| s.mesh(samples));
+    let mesh = raw::Sidecar::parse(sidecar).and_then(|s| s.mesh(samples)).map(expanded);
     mesh.at(String::new).map_err(|e| in_file(e, name))
 }
 

@@ -111,7 +111,7 @@ impl Whole {
 }
 
 /// The bits of a position; zero has two signs.
-fn bits(point: [f64; 3]) -> [u64; 3] {
+pub(super) fn bits(point: [f64; 3]) -> [u64; 3] {
     point.map(|x| (x + 0.0).to_bits())
 }
 

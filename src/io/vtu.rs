@@ -165,7 +165,7 @@ impl PieceReader<'_, '_> {
     }
 
     /// The tetrahedra at most that the cells become.
-    fn most_tets(&self) -> Result<u64, ReadError> {
+    pub fn most_tets(&self) -> Result<u64, ReadError> {
         let cells = self.piece.attributes.count("NumberOfCells").at(|| self.place())?;
         let Some(types) = self.piece.section("Cells").find(|a| a.name() == "types").filter(|_| cells > 0)
         else {

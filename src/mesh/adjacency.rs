@@ -107,11 +107,15 @@ impl<'a> FaceTable<'a> {
     /// The first one of `see`.
     pub fn each_group<E>(&self, mut see: impl FnMut(&[HalfFace]) -> Result<(), E>) -> Result<(), E> {
         let mut bucket: Vec<HalfFace> = Vec::new();
+        // As numbers: sorting another type would add much to the wasm.
+        let mut numbers: Vec<u128> = Vec::new();
         for ends in self.starts.windows(2) {
             let codes = &self.codes[ends[0] as usize..ends[1] as usize];
+            numbers.clear();
+            numbers.extend(codes.iter().map(|&code| HalfFace::of(self.tets, code).0));
+            numbers.sort_unstable();
             bucket.clear();
-            bucket.extend(codes.iter().map(|&code| HalfFace::of(self.tets, code)));
-            bucket.sort_unstable_by_key(|face| face.0);
+            bucket.extend(numbers.iter().copied().map(HalfFace));
             bucket.chunk_by(|a, b| a.0 >> 32 == b.0 >> 32).try_for_each(&mut see)?;
         }
         Ok(())
@@ -217,15 +221,23 @@ pub(crate) fn non_manifold(
     points: usize,
     tets: &[[u32; 4]],
     neighbors: &[[u32; 4]],
-    wanted: impl Fn(usize) -> bool,
+    wanted: impl Fn(usize) -> bool + Sync,
 ) -> Vec<bool> {
     let stars = stars(points, tets);
-    let mut scratch = LinkScratch::default();
-    let mut is_marked = |v: usize| {
+    let is_marked = |scratch: &mut LinkScratch, v: usize| {
         let star = stars.of(v);
         wanted(v) && !star.is_empty() && !scratch.link_is_sphere_or_disc(v as u32, star, tets, neighbors)
     };
-    (0..points).map(&mut is_marked).collect()
+    #[cfg(feature = "parallel")]
+    {
+        use rayon::prelude::*;
+        (0..points).into_par_iter().map_init(LinkScratch::default, is_marked).collect()
+    }
+    #[cfg(not(feature = "parallel"))]
+    {
+        let mut scratch = LinkScratch::default();
+        (0..points).map(|v| is_marked(&mut scratch, v)).collect()
+    }
 }
 
 /// The tetrahedra around each of so many vertices, in increasing order.

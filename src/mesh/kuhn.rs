@@ -49,6 +49,41 @@ impl TetMesh {
     }
 }
 
+impl TetMesh {
+    /// A regular grid alone: its points and tetrahedra follow from it, and take no memory until [`TetMesh::expand_grid`] makes them.
+    pub fn of_grid_alone(grid: Grid, fields: Vec<Field>) -> Self {
+        Self { fields, grid: Some(grid), ..Self::default() }
+    }
+
+    /// Whether it is a grid whose points and tetrahedra have not been made: see [`TetMesh::of_grid_alone`].
+    pub fn is_grid_alone(&self) -> bool {
+        self.grid.is_some() && self.positions.is_empty() && self.tets.is_empty()
+    }
+
+    /// How many points and tetrahedra there are, those of a grid alone included.
+    pub fn counts(&self) -> [u64; 2] {
+        match self.grid {
+            Some(Grid { dims, .. }) if self.is_grid_alone() => {
+                let product =
+                    |less: u32| dims.iter().map(|&d| u64::from(d.saturating_sub(less))).product::<u64>();
+                [product(0), 6 * product(1)]
+            }
+            _ => [self.positions.len() as u64, self.tets.len() as u64],
+        }
+    }
+
+    /// Makes the points and tetrahedra of a grid alone; other meshes stay as they are.
+    ///
+    /// # Panics
+    /// If the grid has more points than `u32` can number.
+    pub fn expand_grid(&mut self) {
+        if let Some(grid) = self.grid.filter(|_| self.is_grid_alone()) {
+            let Self { positions, tets, .. } = Self::from_grid(grid, Vec::new());
+            (self.positions, self.tets) = (positions, tets);
+        }
+    }
+}
+
 impl Grid {
     /// The position of the point with these indices.
     pub fn point(&self, index: [u32; 3]) -> [f64; 3] {

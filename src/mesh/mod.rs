@@ -12,6 +12,7 @@ mod grow;
 mod histogram;
 mod kuhn;
 mod layered_grid;
+mod piece;
 mod repair;
 mod series;
 mod tet_mesh;
@@ -23,6 +24,8 @@ pub use adjacency::{MAX_TETS, Topology, neighbors, topology};
 pub(crate) use bit_set::BitSet;
 pub(crate) use changed_blocks::{BLOCK, ChangedBlocks};
 pub use check::check;
+#[cfg(feature = "parts")]
+pub(crate) use check::check_arrays;
 pub use error::MeshError;
 #[cfg(feature = "build")]
 pub use geometry_field::GeometryField;
@@ -33,6 +36,7 @@ pub use histogram::Histogram;
 pub(crate) use histogram::{Sum, volume_of};
 pub use kuhn::kuhn_tets;
 pub use layered_grid::{GridArray, LayeredGrid};
+pub use piece::MeshPiece;
 pub use repair::{MeshFindings, RepairLevel, RepairReport, findings, repair, repair_at};
 pub use series::StepError;
 pub use tet_mesh::{Field, Grid, TetMesh, VectorPart};

@@ -33,7 +33,7 @@ pub use explicit::check::MtFault;
 pub use explicit::check::check_errors;
 pub use explicit::store::{ExplicitMt, ExplicitUpdate};
 #[cfg(feature = "build")]
-pub(crate) use half_edge::builder::{HalfEdgeBuilder, NextUpdate, Remover};
+pub(crate) use half_edge::builder::{HalfEdgeBuilder, NextUpdate};
 pub use half_edge::store::{BaseMark, ForestChild, HalfEdgeMt, HalfEdgeUpdate};
 pub(crate) use margins::{Excess, Margins};
 pub use mesh::base::{BaseMesh, BaseMeshError, MAX_FIELD_BITS, MAX_UPDATES};

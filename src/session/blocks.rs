@@ -5,12 +5,12 @@
 //! not need any more go when the memory that they may take is short.
 
 use super::Session;
+use super::pieces::Pieces;
 use crate::format::{DecodeOptions, Decoder, ErrorBytes, FormatError, Index, Progress};
 use crate::geom::{Bounds, total_order};
 use crate::mt::{ErrorCode, Mt, MultiTessellation, UpdateId, UpdatePages};
 use crate::refine::{Criterion, Front, TetData};
 use std::borrow::Cow;
-use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -72,11 +72,11 @@ pub(super) struct Blocks {
     /// How far the file has been read in order.
     fed: u64,
     /// What has come of blocks that are not complete, by where it begins.
-    pieces: BTreeMap<u64, Vec<u8>>,
+    pieces: Pieces,
     /// The beginning of a range of a block, and where that begins: it came with what stands in front of the blocks.
     beginning: Option<(u64, Vec<u8>)>,
-    /// Complete blocks that wait for others. Numbers as long as those of `pieces`: a type of its own would add much to the wasm.
-    waiting: BTreeMap<u64, Vec<u8>>,
+    /// Complete blocks that wait for others, by number.
+    waiting: Pieces,
     /// What is to be here, most important first, as far as there is memory for it.
     plan: Vec<(f64, u32)>,
     needed: u32,
@@ -96,9 +96,9 @@ impl Session {
         let blocks = Blocks {
             memory,
             fed: 0,
-            pieces: BTreeMap::new(),
+            pieces: Pieces::default(),
             beginning: None,
-            waiting: BTreeMap::new(),
+            waiting: Pieces::default(),
             plan: Vec::new(),
             needed: 0,
             left_out: 0,
@@ -119,11 +119,11 @@ impl Session {
         let Some(mt) = self.decoder.mt().filter(|mt| mt.is_paged()) else { return Vec::new() };
         let mut wanted = Vec::new();
         for &(priority, block) in &blocks.plan {
-            if mt.has_page(block) || blocks.waiting.contains_key(&u64::from(block)) {
+            if mt.has_page(block) || blocks.waiting.has(block.into()) {
                 continue;
             }
             let ranges = self.decoder.block_ranges(block).into_iter();
-            let missing = ranges.filter(|range| !blocks.pieces.contains_key(&range.start));
+            let missing = ranges.filter(|range| !blocks.pieces.has(range.start));
             wanted.extend(missing.map(|range| WantedBytes { range: blocks.rest_of(range), priority }));
         }
         wanted
@@ -197,9 +197,9 @@ impl Session {
         let Some(blocks) = &mut self.blocks else { return Ok(self.progress()) };
         blocks.pieces.insert(start, bytes.to_vec());
         blocks.beginning.take_if(|(at, _)| *at == start);
-        if ranges.iter().all(|range| blocks.pieces.contains_key(&range.start)) {
+        if ranges.iter().all(|range| blocks.pieces.has(range.start)) {
             let parts: Vec<Vec<u8>> =
-                ranges.iter().filter_map(|range| blocks.pieces.remove(&range.start)).collect();
+                ranges.iter().filter_map(|range| blocks.pieces.remove(range.start)).collect();
             blocks.waiting.insert(block.into(), parts.concat());
             self.insert_waiting()?;
         }
@@ -233,7 +233,7 @@ impl Session {
             // A block that no request needs does not wait for memory.
             if let Some(blocks) = &mut self.blocks
                 && blocks.criterion.is_none()
-                && blocks.waiting.remove(&block.into()).is_some()
+                && blocks.waiting.remove(block.into()).is_some()
             {
                 return Ok(());
             }
@@ -252,7 +252,7 @@ impl Session {
                 // When the mesh has followed the request, more can go.
                 break;
             }
-            let bytes = self.blocks.as_mut().and_then(|blocks| blocks.waiting.remove(&block.into()));
+            let bytes = self.blocks.as_mut().and_then(|blocks| blocks.waiting.remove(block.into()));
             self.decoder.take_block(block, &bytes.unwrap_or_default())?;
             if let (Some(front), Some(mt)) = (&mut self.front, self.decoder.mt()) {
                 front.page_inserted(mt, block);
@@ -276,7 +276,7 @@ impl Session {
             let parents = index.blocks.get(*block as usize).map_or(&[][..], |info| &info.parents);
             parents.iter().all(|&parent| mt.has_page(parent))
         };
-        blocks.waiting.keys().map(|&block| block as u32).find(ready)
+        blocks.waiting.numbers().map(|block| block as u32).find(ready)
     }
 
     /// How the blocks stand.
@@ -356,9 +356,9 @@ impl Session {
         blocks.left_out = blocks.needed - plan.len() as u32;
         blocks.plan = plan;
         let is_planned = |block: u32| blocks.plan.iter().any(|&(_, planned)| planned == block);
-        blocks.waiting.retain(|&block, _| is_planned(block as u32));
+        blocks.waiting.retain(|block| is_planned(block as u32));
         let decoder = &self.decoder;
-        blocks.pieces.retain(|&start, _| decoder.block_at(start).is_some_and(is_planned));
+        blocks.pieces.retain(|start| decoder.block_at(start).is_some_and(is_planned));
     }
 
     /// The mesh has moved: what it does not need any more may go, and what waited for that may come.
@@ -452,9 +452,8 @@ impl Session {
 impl Blocks {
     /// Bytes of what waits to be put together.
     fn bytes_beside(&self) -> u64 {
-        let beginning = self.beginning.iter().map(|(_, bytes)| bytes);
-        let all = self.pieces.values().chain(self.waiting.values()).chain(beginning);
-        all.map(|bytes| bytes.len() as u64).sum()
+        let beginning = self.beginning.as_ref().map_or(0, |(_, bytes)| bytes.len() as u64);
+        self.pieces.bytes() + self.waiting.bytes() + beginning
     }
 
     /// What is missing of a range of a block.

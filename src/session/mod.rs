@@ -4,11 +4,15 @@
 //! [`Session::view`] or as a surface with [`Session::isosurface`]. Everything works while the file is still
 //! arriving: a request is then met as far as the updates that are there allow, and made again when more are.
 
+mod behind;
 mod blocks;
 mod depths;
+mod pieces;
 mod quantity;
 mod reading;
 
+#[cfg(feature = "web-tools")]
+pub(crate) use behind::Behind as MeshFollower;
 pub use blocks::{BlockProgress, BlockState, MappedBlock, WantedBytes};
 pub use quantity::TetQuantity;
 pub use reading::Reading;
@@ -19,6 +23,7 @@ use crate::refine::{
     Criterion, Front, LodCriterion, Need, Outcome, Part, RefineStats, Request, RequestError,
 };
 use crate::view::{IsoSurface, MeshView, NormalKind, Plane, Slice, SurfaceChanges};
+use behind::Behind;
 use blocks::Blocks;
 use depths::Depths;
 use std::ops::Range;
@@ -64,6 +69,8 @@ pub struct Session {
     /// What has changed in what is shown since the surface was last asked for.
     behind: Behind,
     /// What has changed in it since [`Session::take_changes`] was last called.
+    taken: Behind,
+    /// What has changed in it since [`Session::take_copied`] was last called.
     copied: Behind,
     slice: Slice,
     /// The plane of the slice, and what has changed since that was last asked for.
@@ -268,6 +275,17 @@ impl Session {
     pub fn take_changes(&mut self) -> MeshChanges {
         self.catch_up();
         let MeshView { positions, tets, .. } = view(self.front.as_ref(), &self.shown);
+        self.taken.take(positions.len(), tets.len())
+    }
+
+    /// The same for one more reader, since this was last called; everything with `all`.
+    #[cfg(feature = "web-session")]
+    pub(crate) fn take_copied(&mut self, all: bool) -> MeshChanges {
+        self.catch_up();
+        if all {
+            self.copied = Behind::default();
+        }
+        let MeshView { positions, tets, .. } = view(self.front.as_ref(), &self.shown);
         self.copied.take(positions.len(), tets.len())
     }
 
@@ -421,6 +439,7 @@ impl Session {
         shown.values.resize(slots, 0.0);
         let value_at = |slot: usize| field.value(mesh.levels(slot as u32)[self.field]) as f32;
         self.behind.add(&changes, shown.stale);
+        self.taken.add(&changes, shown.stale);
         self.copied.add(&changes, shown.stale);
         self.sliced.1.add(&changes, shown.stale);
         for slot in changes.vertices.into_iter().flatten().map(|slot| slot as usize) {
@@ -430,63 +449,6 @@ impl Session {
         if std::mem::take(&mut shown.stale) {
             shown.values.iter_mut().enumerate().for_each(|(slot, value)| *value = value_at(slot));
         }
-    }
-}
-
-/// What has changed since the last call, so that callers need not look at everything.
-#[derive(Debug, Default)]
-struct Behind {
-    /// Kept from the first time on.
-    since: Option<MeshChanges>,
-}
-
-impl Behind {
-    /// More has changed; `all` if every point has.
-    fn add(&mut self, changes: &MeshChanges, all: bool) {
-        let Some(since) = &mut self.since else { return };
-        join(&mut since.tets, &changes.tets);
-        if all {
-            since.vertices.clear();
-            since.vertices.push(0..u32::MAX);
-        } else {
-            join(&mut since.vertices, &changes.vertices);
-        }
-    }
-
-    /// What has changed in a mesh of so many points and tetrahedra; the first time, everything.
-    fn take(&mut self, points: usize, tets: usize) -> MeshChanges {
-        let mut all = MeshChanges::default();
-        all.vertices.push(0..u32::MAX);
-        all.tets.push(0..u32::MAX);
-        let mut changes = self.since.replace(MeshChanges::default()).unwrap_or(all);
-        clip(&mut changes.vertices, points as u32);
-        clip(&mut changes.tets, tets as u32);
-        changes
-    }
-}
-
-/// Adds the ranges `more` to `ranges`; both are in ascending order, and so is what comes out.
-fn join(ranges: &mut Vec<Range<u32>>, more: &[Range<u32>]) {
-    let mut old = std::mem::take(ranges).into_iter().peekable();
-    let mut new = more.iter().cloned().peekable();
-    loop {
-        let from_old = match (old.peek(), new.peek()) {
-            (Some(a), Some(b)) => a.start <= b.start,
-            (a, _) => a.is_some(),
-        };
-        let Some(next) = (if from_old { old.next() } else { new.next() }) else { return };
-        match ranges.last_mut() {
-            Some(last) if next.start <= last.end => last.end = last.end.max(next.end),
-            _ => ranges.push(next),
-        }
-    }
-}
-
-/// Takes away what is beyond `len`.
-fn clip(ranges: &mut Vec<Range<u32>>, len: u32) {
-    ranges.retain(|range| range.start < len);
-    if let Some(last) = ranges.last_mut() {
-        last.end = last.end.min(len);
     }
 }
 

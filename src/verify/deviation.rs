@@ -48,6 +48,20 @@ impl<'a> Deviation<'a> {
                 info.vertices, info.tetrahedra
             ));
         }
+        let neighbors = crate::mesh::neighbors(&input.tets).map_err(|error| format!("the input: {error}"))?;
+        let faces = boundary_faces(&input.tets, &neighbors).map(|(_, face)| face).collect();
+        drop(neighbors);
+        Self::of(info, input, faces, vertices)
+    }
+
+    /// The same of what the input has in some place, and the faces of its boundary there.
+    pub fn of(
+        info: &'a MtInfo,
+        input: &'a TetMesh,
+        faces: Vec<[u32; 3]>,
+        vertices: usize,
+    ) -> Result<Self, String> {
+        let points = input.positions.len();
         let mut fields = Vec::new();
         for field in &info.fields {
             let found = input.fields.iter().find(|f| field.is_of(f) && f.values.len() == points);
@@ -59,9 +73,7 @@ impl<'a> Deviation<'a> {
         let places = input.positions.iter().map(|p| (DVec3::from(*p) - origin) / step).collect();
         let levels = each().map(|(value, field)| field.nearest(value)).collect();
         let values = each().map(|(value, field)| value / field.range()).collect();
-        let neighbors = crate::mesh::neighbors(&input.tets).map_err(|error| format!("the input: {error}"))?;
         let at = |v: u32| DVec3::from(info.lattice.point(positions[v as usize]));
-        let faces: Vec<_> = boundary_faces(&input.tets, &neighbors).map(|(_, face)| face).collect();
         let boundary = TriangleGrid::new(faces.iter().map(|face| face.map(at)).collect());
         let mut boundary_vertices: Vec<u32> = faces.into_iter().flatten().collect();
         boundary_vertices.sort_unstable();

@@ -32,6 +32,9 @@ mod parts;
 mod points;
 mod queries;
 mod same;
+mod samples;
+
+pub use samples::{SampleRequest, run_request, samples};
 
 use crate::mesh::TetMesh;
 use crate::mt::{ApplyUpdates, ErrorCode, UpdateId, check_errors};

@@ -2,9 +2,9 @@
 
 use super::error::WebError;
 use super::file::now;
-use super::results::value;
 use crate::bench::{self, BenchReport, Coherent};
 use serde::Serialize;
+use wasm_bindgen::JsCast;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 #[wasm_bindgen]
@@ -26,7 +26,7 @@ fn described(report: &BenchReport) -> JsBench {
     let updates = |rate| Rates { updates_per_second: Some(rate), tets_per_second: None };
     let tets = |rate| Rates { updates_per_second: None, tets_per_second: Some(rate) };
     let walks = &report.coherent;
-    value(&BenchObject {
+    let described = BenchObject {
         updates: report.updates,
         tetrahedra: report.tetrahedra,
         runs: report.runs,
@@ -35,7 +35,8 @@ fn described(report: &BenchReport) -> JsBench {
         coarsen: updates(report.coarsen_updates),
         isosurface: tets(report.isosurface_tets),
         coherent: Walks { r#box: walk(&walks.roi), iso: walk(&walks.iso), view: walk(&walks.view) },
-    })
+    };
+    serde_wasm_bindgen::to_value(&described).unwrap_or_default().unchecked_into()
 }
 
 #[derive(Serialize)]

@@ -35,7 +35,7 @@ export interface CoreBuildOptions {
   /** By what criterion vertices go or come. Default: `"half-edge"` with method decimate. */
   criterion?: "delaunay" | "half-edge";
   /** What it is for, with method decimate. Default: `"uniform"`. */
-  purpose?: "uniform" | "regions";
+  purpose?: "uniform" | "regions" | "mean";
   /** Whether tetrahedra have errors of their own, with method insert. */
   tetErrors?: boolean;
   /** Names of the fields to keep, in this order; a vector's name for its components. Default: the first field. */
@@ -69,6 +69,10 @@ export interface CoreBuildOptions {
   displacement?: number | string;
   /** The same in lengths of the shortest edge at each place, where that is less. Default: 10. */
   displacementEdges?: number;
+  /** No cell gets a dihedral angle below so many degrees, 0 to 70, except in the place of one that has a smaller one already. */
+  minDihedral?: number;
+  /** Creases and corners where flat parts of the boundary meet at so many degrees or more stay, 1 to 90. Default: 60. */
+  featureAngle?: number;
   /** Updates in a block: a power of two from 16 to 65536. */
   blockUpdates?: number;
 }

@@ -8,7 +8,7 @@ use js_sys::{Array, Object, Reflect};
 use wasm_bindgen::{JsCast, JsValue};
 
 /// The names of all options.
-const NAMES: [&str; 20] = [
+const NAMES: [&str; 22] = [
     "kind",
     "method",
     "criterion",
@@ -28,6 +28,8 @@ const NAMES: [&str; 20] = [
     "lossless",
     "displacement",
     "displacementEdges",
+    "minDihedral",
+    "featureAngle",
     "blockUpdates",
 ];
 
@@ -80,6 +82,11 @@ pub fn build_options(options: &JsValue) -> Result<BuildOptions, WebError> {
         all_lossless,
         displacement: from.fraction("displacement")?.unwrap_or(default.displacement),
         displacement_edges: displacement_edges.unwrap_or(default.displacement_edges),
+        min_dihedral: number("minDihedral", 0.0, 70.0, "0 to 70 degrees")?,
+        feature_angle: number("featureAngle", 1.0, 90.0, "1 to 90 degrees")?,
+        preserve: Vec::new(),
+        preserve_within: default.preserve_within,
+        keep_points: Vec::new(),
         block_bits: from.block_bits()?.unwrap_or(default.block_bits),
     };
     let metadata = from.pairs("metadata")?;

@@ -1,7 +1,8 @@
 //! A need that a JavaScript function decides: it gets many tetrahedra at once and returns the excess of each.
 
+use super::arrays::{floats, object};
 use super::error::WebError;
-use super::results::{floats, object};
+use super::read_error::list;
 use crate::geom::Lattice;
 use crate::mt::{FieldInfo, MtInfo};
 use crate::refine::{ANY, Criterion, TetData, Verdict};
@@ -57,7 +58,7 @@ impl Callback {
             let words = Reflect::get(&thrown, &"message".into()).ok().and_then(|words| words.as_string());
             format!("it threw: {}", words.or_else(|| thrown.as_string()).unwrap_or_default())
         })?;
-        let numbers = super::reader::list(&answer).map(|list| list.to_vec()).unwrap_or_default();
+        let numbers = list(&answer).map(|list| list.to_vec()).unwrap_or_default();
         if numbers.len() != tets.len() {
             return Err("it must return an array of one number for each tetrahedron of the batch".to_owned());
         }

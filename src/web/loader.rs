@@ -1,7 +1,7 @@
 //! The loader of byte ranges, for `ranges.js`: what it says to do comes out as objects, what happens goes in as numbers.
 
+use super::arrays::object;
 use super::error::WebError;
-use super::results;
 use crate::stream::{Action, Failure, Loader, LoaderOptions, ResponseHead, WantedRange};
 use js_sys::{Array, Uint8Array};
 use std::cell::RefCell;
@@ -82,11 +82,11 @@ impl RangeLoader {
         Ok(action.map(|action| match action {
             Action::Fetch { id, range, .. } => {
                 let [start, end] = ends(&range);
-                results::object(&[("id", id.into()), start, end])
+                object(&[("id", id.into()), start, end])
             }
-            Action::Read { range } => results::object(&ends(&range)),
-            Action::Cancel { id } => results::object(&[("id", id.into())]),
-            Action::Wait { until_ms } => results::object(&[("until", (until_ms as f64).into())]),
+            Action::Read { range } => object(&ends(&range)),
+            Action::Cancel { id } => object(&[("id", id.into())]),
+            Action::Wait { until_ms } => object(&[("until", (until_ms as f64).into())]),
         }))
     }
 
@@ -202,5 +202,5 @@ fn ends(range: &Range<u64>) -> [(&'static str, JsValue); 2] {
 
 fn range_object(range: &Range<u64>, bytes: &[u8]) -> JsRange {
     let [start, end] = ends(range);
-    results::object(&[start, end, ("bytes", Uint8Array::from(bytes).into())])
+    object(&[start, end, ("bytes", Uint8Array::from(bytes).into())])
 }

@@ -1,6 +1,7 @@
 //! Meshes and what has changed in them, for JavaScript that follows them.
 
-use super::results::{JsDelta, JsMesh, floats, integers, mesh_arrays, object, put_arrays, set};
+use super::arrays::{floats, integers, object, set};
+use super::results::{JsDelta, JsMesh, mesh_arrays, put_arrays};
 use crate::mt::MeshChanges;
 use crate::view::MeshView;
 use js_sys::Object;
@@ -37,19 +38,16 @@ pub fn delta(mesh: &MeshView<'_>, changes: &Changes, wanted: u32) -> JsDelta {
     delta
 }
 
-/// Where the arrays of `mesh` are in wasm memory: an address and a number of elements each.
-pub fn places(mesh: &MeshView<'_>) -> Vec<usize> {
-    let MeshView { positions, field, tets, neighbors } = mesh;
-    let floats = [positions.as_flattened(), field].map(|array| (array.as_ptr() as usize, array.len()));
-    let integers = [tets, neighbors].map(|array| array.as_flattened());
-    let integers = integers.map(|array| (array.as_ptr() as usize, array.len()));
-    floats.into_iter().chain(integers).flat_map(|(address, length)| [address, length]).collect()
+/// Ranges of the points and of the tetrahedra that have changed: start and end of each.
+pub fn copied(changes: &MeshChanges) -> JsValue {
+    object(&[("vertices", flat(&changes.vertices)), ("tets", flat(&changes.tets))])
+}
+
+fn flat(ranges: &[Range<u32>]) -> JsValue {
+    integers(&ranges.iter().flat_map(|range| [range.start, range.end]).collect::<Vec<_>>())
 }
 
 fn ranges(changes: &Changes) -> JsValue {
-    let flat = |ranges: &[Range<u32>]| {
-        integers(&ranges.iter().flat_map(|range| [range.start, range.end]).collect::<Vec<_>>())
-    };
     let MeshChanges { vertices, tets } = &changes.ranges;
     let all: Object = object(&[
         ("from", (changes.to - 1).into()),

@@ -175,13 +175,3 @@ export interface Mesh {
   /** Where this mesh differs from the one that was handed out before. */
   changes: MeshChanges;
 }
-
-/** Triangles of an isosurface. */
-export interface IsoSurface {
-  /** Three coordinates a vertex. */
-  positions: Float32Array;
-  /** Three components a vertex, of unit length. */
-  normals: Float32Array;
-  /** Three vertices a triangle. */
-  indices: Uint32Array;
-}

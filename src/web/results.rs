@@ -1,14 +1,14 @@
-//! What JavaScript gets: plain objects, and typed arrays that own their memory.
+//! What JavaScript gets of a session: plain objects, and typed arrays that own their memory.
 
+use super::arrays::{doubles, floats, integers, list, object, record, set};
 use super::options::Asked;
 use crate::mt::{FieldInfo, MtInfo};
 use crate::refine::RefineStats;
 use crate::session::{BlockProgress, Progress, Session};
-use crate::view::{IsoSurface, MeshView};
-use js_sys::{Array, Float32Array, Float64Array, Object, Reflect, Uint32Array};
-use serde::Serialize;
+use crate::view::MeshView;
+use js_sys::Array;
+use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
-use wasm_bindgen::{JsCast, JsValue};
 
 #[wasm_bindgen(typescript_custom_section)]
 const TYPES: &str = include_str!("results.d.ts");
@@ -33,164 +33,107 @@ extern "C" {
     /// What has changed in a mesh, as typed arrays.
     #[wasm_bindgen(typescript_type = "MeshDelta")]
     pub type JsDelta;
-    /// A surface as typed arrays.
-    #[wasm_bindgen(typescript_type = "IsoSurface")]
-    pub type JsIsoSurface;
-}
-
-#[derive(Serialize)]
-struct ProgressObject {
-    ready: bool,
-    complete: bool,
-    bytes: f64,
-    total: Option<f64>,
-    updates: u32,
 }
 
 /// `progress` for JavaScript.
 pub fn progress(progress: &Progress) -> JsProgress {
     let Progress { ready, complete, bytes, total, updates } = *progress;
-    let (bytes, total) = (bytes as f64, total.map(|total| total as f64));
-    value(&ProgressObject { ready, complete, bytes, total, updates })
-}
-
-#[derive(Serialize)]
-#[serde(rename_all = "camelCase")]
-struct BlocksObject {
-    all: u32,
-    here: u32,
-    needed: u32,
-    left_out: u32,
-    bytes: f64,
+    object(&[
+        ("ready", ready.into()),
+        ("complete", complete.into()),
+        ("bytes", (bytes as f64).into()),
+        ("total", total.map(|total| total as f64).into()),
+        ("updates", updates.into()),
+    ])
 }
 
 /// How the blocks stand, for JavaScript.
 pub fn blocks(progress: &BlockProgress) -> JsBlocks {
-    let BlockProgress { blocks: all, here, needed, left_out, bytes } = *progress;
-    value(&BlocksObject { all, here, needed, left_out, bytes: bytes as f64 })
-}
-
-#[derive(Serialize)]
-struct InfoObject<'a> {
-    kind: &'static str,
-    fields: Vec<FieldObject<'a>>,
-    /// The box of the position lattice: it holds every mesh of the MT.
-    bounds: [f64; 6],
-    vertices: u32,
-    tetrahedra: u32,
-    updates: u32,
-}
-
-#[derive(Serialize)]
-struct FieldObject<'a> {
-    name: &'a str,
-    min: f64,
-    max: f64,
-    bits: u32,
-    unit: &'a str,
-    time: Option<f64>,
-    vector: Option<VectorObject<'a>>,
-    floor: f64,
-}
-
-#[derive(Serialize)]
-struct VectorObject<'a> {
-    name: &'a str,
-    component: Option<u8>,
+    let BlockProgress { blocks, here, needed, left_out, bytes } = *progress;
+    let counts = [blocks, here, needed, left_out].map(f64::from);
+    let [all, here, needed, left_out] = counts;
+    record(&["all", "here", "needed", "leftOut", "bytes"], &[all, here, needed, left_out, bytes as f64])
 }
 
 /// What is known of the MT of a session, for JavaScript.
 pub fn info(session: &Session) -> Option<JsInfo> {
     let info = session.info()?;
-    let described = describe(info);
-    let fields = Reflect::get(described.as_ref(), &"fields".into()).unwrap_or_default();
-    for (place, field) in Array::from(&fields).iter().enumerate() {
-        let histogram = session.decoder().histogram(place);
-        set(&field, "histogram", &histogram.map_or(JsValue::NULL, |shares| doubles(&shares)));
-        let curve = session.bytes_by_error(place);
-        let list = || Float64Array::new_with_length(curve.len() as u32);
-        let (errors, bytes) = (list(), list());
-        for (at, point) in (0..).zip(&curve) {
-            errors.set_index(at, point.error_in_units(&info.fields[place]));
-            bytes.set_index(at, point.bytes as f64);
-        }
-        let curve: JsValue = object(&[("errors", errors.into()), ("bytes", bytes.into())]);
-        set(&field, "curve", &curve);
-    }
-    Some(described)
-}
-
-fn describe(info: &MtInfo) -> JsInfo {
     let [x0, y0, z0] = info.lattice.origin;
     let [x1, y1, z1] = info.lattice.point([1 << info.lattice.bits; 3]);
-    value(&InfoObject {
-        kind: info.kind.name(),
-        fields: (0..info.fields.len()).map(|index| field(info, index)).collect(),
-        bounds: [x0, y0, z0, x1, y1, z1],
-        vertices: info.vertices,
-        tetrahedra: info.tetrahedra,
-        updates: info.updates,
-    })
+    let fields: Array = (0..info.fields.len()).map(|index| field(session, info, index)).collect();
+    // The box of the position lattice: it holds every mesh of the MT.
+    Some(object(&[
+        ("kind", info.kind.name().into()),
+        ("fields", fields.into()),
+        ("bounds", list(&[x0, y0, z0, x1, y1, z1])),
+        ("vertices", info.vertices.into()),
+        ("tetrahedra", info.tetrahedra.into()),
+        ("updates", info.updates.into()),
+    ]))
 }
 
-fn field(info: &MtInfo, index: usize) -> FieldObject<'_> {
+fn field(session: &Session, info: &MtInfo, index: usize) -> JsValue {
     let FieldInfo { name, min, max, bits, unit, time, vector, .. } = &info.fields[index];
-    let vector = vector.as_ref().map(|part| VectorObject { name: &part.name, component: part.component });
-    let floor = info.floor(index) * info.fields[index].range();
-    FieldObject { name, min: *min, max: *max, bits: *bits, unit, time: *time, vector, floor }
+    let vector = vector.as_ref().map(|part| {
+        object(&[("name", part.name.as_str().into()), ("component", part.component.map(f64::from).into())])
+    });
+    let histogram = session.decoder().histogram(index).map_or(JsValue::NULL, |shares| doubles(&shares));
+    let curve = session.bytes_by_error(index);
+    let errors: Vec<f64> = curve.iter().map(|point| point.error_in_units(&info.fields[index])).collect();
+    let bytes: Vec<f64> = curve.iter().map(|point| point.bytes as f64).collect();
+    object(&[
+        ("name", name.as_str().into()),
+        ("min", (*min).into()),
+        ("max", (*max).into()),
+        ("bits", (*bits).into()),
+        ("unit", unit.as_str().into()),
+        ("time", (*time).into()),
+        ("vector", vector.unwrap_or(JsValue::UNDEFINED)),
+        ("floor", (info.floor(index) * info.fields[index].range()).into()),
+        ("histogram", histogram),
+        ("curve", object(&[("errors", doubles(&errors)), ("bytes", doubles(&bytes))])),
+    ])
 }
 
-#[derive(Serialize)]
-#[serde(rename_all = "camelCase")]
-struct StatsObject {
-    vertices: u32,
-    tetrahedra: u32,
-    applied: u32,
-    refined: f64,
-    coarsened: f64,
-    forced: f64,
-    judged: f64,
-    error_bound: f64,
-    relative_error_bound: f64,
-    field_bound: f64,
-    boundary_bound: f64,
-    bounds: Vec<f64>,
-    excess: f64,
-    satisfied: bool,
-    missing: bool,
-    done: bool,
-}
+/// The numbers among the members of the object for [`RefineStats`].
+const STATS: [&str; 12] = [
+    "vertices",
+    "tetrahedra",
+    "applied",
+    "refined",
+    "coarsened",
+    "forced",
+    "judged",
+    "errorBound",
+    "relativeErrorBound",
+    "fieldBound",
+    "boundaryBound",
+    "excess",
+];
 
 /// `stats` for JavaScript, in the units of what was asked for.
 pub fn stats(stats: &RefineStats, info: &MtInfo, asked: &Asked) -> JsStats {
-    value(&StatsObject {
-        vertices: stats.vertices,
-        tetrahedra: stats.tetrahedra,
-        applied: stats.applied,
-        refined: stats.refined as f64,
-        coarsened: stats.coarsened as f64,
-        forced: stats.forced as f64,
-        judged: stats.judged as f64,
-        error_bound: stats.error_bound * info.fields[asked.field].range(),
-        relative_error_bound: stats.error_bound,
-        field_bound: info.field_bound(asked.field, stats.error_bound),
-        boundary_bound: info.boundary_bound(stats.error_bound),
-        bounds: stats.bounds.iter().zip(&asked.units).map(|(bound, unit)| bound * unit).collect(),
-        excess: stats.excess,
-        satisfied: stats.satisfied,
-        missing: stats.missing,
-        done: stats.done,
-    })
-}
-
-/// A value that serde describes. Numbers are `f64` where they may not fit 32 bits: all else would be refused or a `BigInt`.
-pub fn value<T: JsCast>(described: &impl Serialize) -> T {
-    serde_wasm_bindgen::to_value(described).unwrap_or_default().unchecked_into()
-}
-
-/// Setting a property on a fresh ordinary object cannot fail.
-pub fn set(object: &JsValue, name: &str, value: &JsValue) {
-    let _ = Reflect::set(object, &name.into(), value);
+    let numbers = [
+        f64::from(stats.vertices),
+        f64::from(stats.tetrahedra),
+        f64::from(stats.applied),
+        stats.refined as f64,
+        stats.coarsened as f64,
+        stats.forced as f64,
+        stats.judged as f64,
+        stats.error_bound * info.fields[asked.field].range(),
+        stats.error_bound,
+        info.field_bound(asked.field, stats.error_bound),
+        info.boundary_bound(stats.error_bound),
+        stats.excess,
+    ];
+    let js: JsStats = record(&STATS, &numbers);
+    let bounds: Vec<f64> = stats.bounds.iter().zip(&asked.units).map(|(bound, unit)| bound * unit).collect();
+    set(js.as_ref(), "bounds", &list(&bounds));
+    for (name, answer) in [("satisfied", stats.satisfied), ("missing", stats.missing), ("done", stats.done)] {
+        set(js.as_ref(), name, &answer.into());
+    }
+    js
 }
 
 /// The arrays of a mesh; of a set of them, bit `i` is that of the `i`-th.
@@ -213,35 +156,4 @@ pub fn put_arrays(object: &JsValue, wanted: u32, array: impl Fn(usize) -> JsValu
     for (at, name) in ARRAYS.iter().enumerate().filter(|(at, _)| wanted >> at & 1 == 1) {
         set(object, name, &array(at));
     }
-}
-
-/// A copy of `surface` outside wasm memory.
-pub fn iso_surface(surface: &IsoSurface) -> JsIsoSurface {
-    object(&[
-        ("positions", floats(surface.positions.as_flattened())),
-        ("normals", floats(surface.normals.as_flattened())),
-        ("indices", integers(surface.indices.as_flattened())),
-    ])
-}
-
-pub fn floats(values: &[f32]) -> JsValue {
-    Float32Array::from(values).into()
-}
-
-pub fn doubles(values: &[f64]) -> JsValue {
-    Float64Array::from(values).into()
-}
-
-pub fn integers(values: &[u32]) -> JsValue {
-    Uint32Array::from(values).into()
-}
-
-/// A plain object with these members.
-pub fn object<T: JsCast>(members: &[(&str, JsValue)]) -> T {
-    let object = Object::new();
-    for (name, value) in members {
-        // Setting a property on a fresh ordinary object cannot fail.
-        let _ = Reflect::set(&object, &(*name).into(), value);
-    }
-    object.unchecked_into()
 }

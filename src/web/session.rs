@@ -5,7 +5,8 @@ use super::file::File;
 use super::loader::RangeLoader;
 use super::mesh_changes::{self, Changes};
 use super::options::{RefineOptions, field_index};
-use super::results::{self, JsBlocks, JsDelta, JsInfo, JsIsoSurface, JsMesh, JsProgress, JsStats};
+use super::places::places;
+use super::results::{self, JsBlocks, JsDelta, JsInfo, JsMesh, JsProgress, JsStats};
 use crate::mt::MtInfo;
 use crate::session::Session;
 use wasm_bindgen::JsValue;
@@ -15,7 +16,7 @@ use wasm_bindgen::prelude::wasm_bindgen;
 #[wasm_bindgen]
 #[derive(Default)]
 pub struct CoreSession {
-    pub(super) file: File,
+    file: File,
     /// How many meshes have been handed out.
     handed: u32,
 }
@@ -90,7 +91,7 @@ impl CoreSession {
         self.file.stats(&stats)
     }
 
-    /// The field that `mesh` carries and `isosurface` follows, by name or number.
+    /// The field that `mesh` carries, by name or number.
     #[wasm_bindgen(js_name = setField)]
     pub fn set_field(&mut self, field: &JsValue) -> Result<(), WebError> {
         let index = field_index(self.known()?, field)?;
@@ -113,12 +114,31 @@ impl CoreSession {
     /// Where those four arrays are in wasm memory, until the next call: address and number of elements of each.
     pub fn places(&mut self) -> Result<Vec<usize>, WebError> {
         self.known()?;
-        Ok(mesh_changes::places(&self.session_mut().view()))
+        Ok(places(&self.session_mut().view()))
     }
 
-    /// The isosurface of the current mesh at `value`, in field units.
-    pub fn isosurface(&mut self, value: f64) -> Result<JsIsoSurface, WebError> {
-        Ok(results::iso_surface(self.session_mut().isosurface(value)?))
+    /// Which entries of those arrays have changed since this was last called, or all of them: for the copy of
+    /// [`MeshTools`](super::MeshTools).
+    pub fn copied(&mut self, all: bool) -> Result<JsValue, WebError> {
+        self.known()?;
+        Ok(mesh_changes::copied(&self.session_mut().take_copied(all)))
+    }
+
+    /// A field at the points of the current mesh, by name or number.
+    pub fn values(&self, field: &JsValue) -> Result<Vec<f32>, WebError> {
+        let index = field_index(self.known()?, field)?;
+        Ok(self.file.session().values(index))
+    }
+
+    /// The smallest and the largest value of the field that `mesh` carries.
+    pub fn range(&self) -> Result<Vec<f64>, WebError> {
+        let field = &self.known()?.fields[self.file.session().field()];
+        Ok(vec![field.min, field.min + field.range()])
+    }
+
+    /// A hash of the current mesh, the same wherever the same request was made.
+    pub fn hash(&self) -> String {
+        self.file.hash()
     }
 
     fn session_mut(&mut self) -> &mut Session {

@@ -1,3 +1,13 @@
+/** Triangles of an isosurface. */
+export interface IsoSurface {
+  /** Three coordinates a vertex. */
+  positions: Float32Array;
+  /** Three components a vertex, of unit length. */
+  normals: Float32Array;
+  /** Three vertices a triangle. */
+  indices: Uint32Array;
+}
+
 /** Triangles with one value a vertex. */
 export interface Surface {
   /** Three coordinates a vertex. */

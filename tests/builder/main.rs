@@ -5,9 +5,16 @@ mod exact_values;
 mod fields;
 mod flat_boundaries;
 mod measure;
+#[cfg(feature = "parts")]
+mod parts;
+#[cfg(feature = "parts")]
+mod pieces;
+mod purposes;
 mod repair;
+mod restrictions;
 #[path = "../support/mod.rs"]
 mod support;
 mod theory;
 mod verify_real;
+mod verify_samples;
 mod verify_tampered;

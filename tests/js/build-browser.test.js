@@ -165,7 +165,8 @@ test("broken files and too little memory give typed errors in the page, too", as
   assert.deepEqual(complaints, []);
 });
 
-test("the demo page builds a mesh that is chosen, shows it, and saves it", async () => {
+/** The demo page with a small volume. */
+async function openDemo() {
   const demo = await browser.newPage({ viewport: { width: 1100, height: 760 } });
   demo.on("pageerror", (error) => complaints.push(String(error)));
   await demo.goto(`${server.address}page?url=small.mt`);
@@ -176,8 +177,11 @@ test("the demo page builds a mesh that is chosen, shows it, and saves it", async
       { timeout: 120_000 },
     );
   await reach(24_576);
-  const choose = (name) => demo.setInputFiles("#file", name);
-  const dialog = demo.locator("dialog.build");
+  return { demo, reach, choose: (files) => demo.setInputFiles("#file", files), dialog: demo.locator("dialog.build") };
+}
+
+test("the demo page builds a mesh that is chosen, shows it, and saves it", async () => {
+  const { demo, reach, choose, dialog } = await openDemo();
 
   // A broken file says what is wrong, and the dialog can be closed.
   await choose({ name: "broken.vtu", mimeType: "", buffer: Buffer.from("hello") });
@@ -197,7 +201,7 @@ test("the demo page builds a mesh that is chosen, shows it, and saves it", async
 
   await choose(`${folder}/fields.vtu`);
   await dialog.getByText("vtu, 14,224 points, 79,092 tetrahedra").waitFor();
-  assert.deepEqual(await dialog.locator("fieldset label").allTextContents(), [" pressure", " speed"]);
+  assert.deepEqual(await dialog.getByRole("group", { name: "Fields" }).locator("label").allTextContents(), [" pressure", " speed"]);
   await dialog.getByLabel("speed").check();
   await dialog.getByRole("button", { name: "Build" }).click();
   await reach(79_092);
@@ -208,6 +212,53 @@ test("the demo page builds a mesh that is chosen, shows it, and saves it", async
   assert.ok(saved.length > 100_000, "all of the file is saved");
   await dialog.getByRole("button", { name: "Close" }).click();
   await dialog.waitFor({ state: "detached" });
+  assert.deepEqual(complaints, []);
+  await demo.close();
+});
+
+test("the demo page repairs a chosen mesh as it is told, and says what it did or what would help", async () => {
+  const { demo, reach, choose, dialog } = await openDemo();
+  const level = dialog.getByLabel("Level");
+  const distance = dialog.getByLabel("Weld distance");
+  const said = () => dialog.locator("[role=status] li").allTextContents();
+  const build = (name) => dialog.getByRole("button", { name, exact: true }).click();
+  const hasFocus = (control) => control.evaluate((element) => element === document.activeElement);
+
+  // Two cubes with points of their own: apart, unless they are welded.
+  await choose(`${folder}/blocks.vtk`);
+  assert.equal(await level.inputValue(), "safe");
+  assert.ok(await distance.isHidden(), "a distance without welding means nothing");
+  await build("Build");
+  await reach(12);
+  assert.deepEqual(await said(), ["Kept: 2 parts that share no face"]);
+
+  await level.selectOption("weld");
+  await distance.fill("-1");
+  await build("Build again");
+  assert.ok(await hasFocus(distance) && (await dialog.locator("progress").isHidden()), "nothing is built with such a distance");
+  await distance.fill("1");
+  await build("Build again");
+  await dialog.locator("[role=alert]").waitFor();
+  assert.match(await dialog.locator("[role=alert]").textContent(), /blocks\.vtk.*cell \d+.*give a smaller distance/);
+  assert.ok(await hasFocus(distance));
+  assert.ok(await dialog.getByRole("link", { name: "Save .mt" }).isHidden(), "what is saved is what was built last");
+  await distance.fill("0.25");
+  await build("Build again");
+  await dialog.getByRole("link", { name: "Save .mt" }).waitFor();
+  assert.deepEqual(await said(), ["Repaired: welded 4 points of open seams, of which 4 had other field values"]);
+  await dialog.getByRole("button", { name: "Close" }).click();
+
+  const inverted = (await readFile(`${folder}/blocks.vtk`, "utf8")).replace("4 0 1 3 7", "4 1 0 3 7");
+  await choose({ name: "inverted.vtk", mimeType: "", buffer: Buffer.from(inverted) });
+  await level.selectOption("none");
+  await build("Build");
+  await dialog.locator("[role=alert]").waitFor();
+  assert.match(await dialog.locator("[role=alert]").textContent(), /level "safe" repairs it: turned 1 inverted tetrahedron/);
+  assert.ok(await hasFocus(level));
+  await level.selectOption("safe");
+  await build("Build");
+  await dialog.getByRole("link", { name: "Save .mt" }).waitFor();
+  assert.deepEqual(await said(), ["Repaired: turned 1 inverted tetrahedron", "Kept: 2 parts that share no face"]);
   assert.deepEqual(complaints, []);
   await demo.close();
 });

@@ -77,6 +77,23 @@ test("only files of other kinds than half-edge have the module with all kinds lo
   assert.deepEqual(loaded, [["tetralod_core_bg.wasm"], ["tetralod_core_bg.wasm", "tetralod_all_kinds_bg.wasm"]]);
 });
 
+test("the tools for meshes are loaded by the first call of one", async () => {
+  const fresh = await browser.newPage();
+  await fresh.goto(server.address);
+  const before = server.asked.length;
+  await fresh.evaluate(async () => {
+    const { MultiTessellation } = await import("tetralod");
+    const mt = await MultiTessellation.open("/small.mt");
+    await mt.refine({ error: 0 });
+    await mt.surface();
+    await mt.isosurface(0.5);
+    mt.free();
+  });
+  const loaded = server.asked.slice(before).filter((file) => file.endsWith(".wasm"));
+  await fresh.close();
+  assert.deepEqual(loaded, ["tetralod_core_bg.wasm", "tetralod_tools_bg.wasm"]);
+});
+
 test("what was ended is refused by name", async () => {
   const code = await page.evaluate(async () => {
     const { MultiTessellation } = await import("tetralod");

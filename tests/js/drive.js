@@ -1,6 +1,6 @@
 // Driving the demo page: what its tests have in common. Screenshots go to `target/e2e/` for inspection.
 import assert from "node:assert/strict";
-import { mkdir } from "node:fs/promises";
+import { mkdir, writeFile } from "node:fs/promises";
 import { fileURLToPath } from "node:url";
 import { address, launch } from "./browser.js";
 import { study } from "./study.js";
@@ -63,6 +63,21 @@ export async function picture(page, name) {
   const path = fileURLToPath(new URL(`${name}.png`, pictures));
   const style = "#legend, #loading, #growth, #overlay, #cards, #readout, #divider, #note { visibility: hidden !important } canvas { outline: none !important }";
   return study(page, await page.locator("#canvas").screenshot({ path, style }));
+}
+
+/**
+ * What the viewer draws with a fixed number of samples, saved as `name`, and its numbers. How often the picture on the canvas was drawn
+ * again for smooth edges depends on the speed of the machine: pictures that must be the same are compared in this way.
+ */
+export async function still(page, name) {
+  await settle(page);
+  const base64 = await page.evaluate(async () => {
+    const bytes = new Uint8Array(await (await window.tetralodDemo.viewer.screenshot({ samples: 4 })).arrayBuffer());
+    return btoa(Array.from(bytes, (byte) => String.fromCharCode(byte)).join(""));
+  });
+  const png = Buffer.from(base64, "base64");
+  await writeFile(new URL(`${name}.png`, pictures), png);
+  return study(page, png);
 }
 
 /** Waits until no frame has been drawn for a while, and the mesh is what was asked for. */

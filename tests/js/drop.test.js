@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 import { fileURLToPath } from "node:url";
-import { assertDrawn, begin, differing, drop, end, open, PATIENCE, picture, pictures, reach, setSlider } from "./drive.js";
+import { assertDrawn, begin, differing, drop, end, open, PATIENCE, picture, pictures, reach, setSlider, still } from "./drive.js";
 
 before(begin);
 
@@ -34,7 +34,7 @@ test("a dropped VTU is built and shown, a broken file leaves all as it is", asyn
   const page = await open("data/bucky-explicit.mt", undefined, { viewport: { width: 900, height: 620 } });
   await reach(page, "complete");
   await setSlider(page, "error", 70);
-  const before = await picture(page, "drop-before");
+  const before = await still(page, "drop-before");
   const name = await page.locator("#volume option:checked").innerText();
   const dialog = page.locator("dialog.build");
 
@@ -55,10 +55,10 @@ test("a dropped VTU is built and shown, a broken file leaves all as it is", asyn
   assert.ok(await page.locator("#retry").isHidden(), "the same file would fail again");
   await screenshot(page, "page-broken");
   await page.click("#dismiss");
-  assert.equal(differing(before, await picture(page, "drop-broken")), 0, "the picture stays");
+  assert.equal(differing(before, await still(page, "drop-broken")), 0, "the picture stays");
   assert.equal(await page.locator("#volume option:checked").innerText(), name);
   await page.fill("#isovalue", "700");
-  assert.ok(differing(before, await picture(page, "drop-isovalue")) > 0.01, "the settings work on");
+  assert.ok(differing(before, await still(page, "drop-isovalue")) > 0.01, "the settings work on");
   const { tetrahedra } = await setSlider(page, "error", 60);
   assert.ok(tetrahedra > 0);
 

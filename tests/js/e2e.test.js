@@ -4,7 +4,7 @@ import { readFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
 import { fileURLToPath } from "node:url";
 import { address } from "./browser.js";
-import { addressed, assertDrawn, begin, demo, differing, end, newPage, open, PATIENCE, picture, pictures, reach, setSlider, settle, show, study } from "./drive.js";
+import { addressed, assertDrawn, begin, demo, differing, end, newPage, open, PATIENCE, picture, pictures, reach, setSlider, settle, show, still, study } from "./drive.js";
 
 before(begin);
 
@@ -635,7 +635,7 @@ test("the package runs in a worker of the page, without a viewer", async () => {
 
 test("the address has the whole state: a reload gives the same picture, undo and redo go back and forth", async () => {
   const page = await openSmall();
-  const first = await picture(page, "state-first");
+  const first = await still(page, "state-first");
   await page.fill("#isovalue", "250");
   await addressed(page, /isovalue=/);
   await show(page, "Solid");
@@ -645,11 +645,11 @@ test("the address has the whole state: a reload gives the same picture, undo and
   await page.locator("#canvas").focus();
   for (const key of ["ArrowLeft", "ArrowUp", "+"]) await page.keyboard.press(key);
   await addressed(page, /camera=/);
-  const before = await picture(page, "state-before");
+  const before = await still(page, "state-before");
   const [address, request] = [page.url(), await demo(page, "request")];
   await page.reload();
   await reach(page, "complete");
-  assert.equal(differing(before, await picture(page, "state-after")), 0, "the same picture");
+  assert.equal(differing(before, await still(page, "state-after")), 0, "the same picture");
   assert.deepEqual(await demo(page, "request"), request);
   await settle(page);
   assert.equal(page.url(), address, "the state stays as it was");
@@ -666,11 +666,11 @@ test("the address has the whole state: a reload gives the same picture, undo and
   await page.keyboard.press("Control+Shift+Z");
   assert.equal(await page.inputValue("#map"), "viridis");
   await page.keyboard.press("Control+Z");
-  assert.equal(differing(before, await picture(page, "state-undone")), 0, "the same picture again");
+  assert.equal(differing(before, await still(page, "state-undone")), 0, "the same picture again");
   await page.locator("#reset").click();
   await page.waitForFunction(() => location.hash === "", undefined, { timeout: PATIENCE });
   await setSlider(page, "error", 70);
-  assert.ok(differing(first, await picture(page, "state-reset")) < 0.005, "the first picture");
+  assert.ok(differing(first, await still(page, "state-reset")) < 0.005, "the first picture");
 
   // The isovalue carries over by value.
   await page.fill("#isovalue", "250");

@@ -37,12 +37,14 @@ const FILES = [
   "tetralod_build.d.ts",
   "tetralod_build.js",
   "tetralod_build_bg.wasm",
-  // The types of this module are those of `tetralod_core`, and those of the viewer's are not public.
+  // The types of these modules are those of `tetralod_core`, or are not public.
   "tetralod_all_kinds.js",
   "tetralod_all_kinds_bg.wasm",
   "tetralod_core.d.ts",
   "tetralod_core.js",
   "tetralod_core_bg.wasm",
+  "tetralod_tools.js",
+  "tetralod_tools_bg.wasm",
   "tetralod_viewer.js",
   "tetralod_viewer_bg.wasm",
   "three.d.ts",

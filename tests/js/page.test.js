@@ -4,7 +4,7 @@ import { readFile } from "node:fs/promises";
 import { createRequire } from "node:module";
 import { after, before, test } from "node:test";
 import { fileURLToPath } from "node:url";
-import { addressed, assertDrawn, begin, demo, differing, drop, end, open, PATIENCE, picture, pictures, reach, setSlider, settle, show } from "./drive.js";
+import { addressed, assertDrawn, begin, demo, differing, drop, end, open, PATIENCE, picture, pictures, reach, setSlider, settle, show, still } from "./drive.js";
 
 before(begin);
 
@@ -15,6 +15,23 @@ const SMALL = "data/bucky-explicit.mt";
 const VIEWPORT = { viewport: { width: 900, height: 620 } };
 
 const screenshot = (page, name) => page.screenshot({ path: fileURLToPath(new URL(`${name}.png`, pictures)) });
+
+/** The smallest mesh. */
+const TETRAHEDRON = `# vtk DataFile Version 3.0
+one
+ASCII
+DATASET UNSTRUCTURED_GRID
+POINTS 4 float
+0 0 0 1 0 0 0 1 0 0 0 1
+CELLS 1 5
+4 0 1 2 3
+CELL_TYPES 1
+10
+POINT_DATA 4
+SCALARS p float 1
+LOOKUP_TABLE default
+0 1 2 3
+`;
 
 /** Presses a key outside of the picture. */
 async function press(page, key) {
@@ -145,6 +162,12 @@ test("nor has it with several views, probes, a region, messages, the map of bloc
     await look("a build that fails");
     await page.keyboard.press("Escape");
     await page.locator("dialog.build").waitFor({ state: "detached" });
+    await drop(page, "tetrahedron.vtk", TETRAHEDRON);
+    await page.locator("dialog.build").getByLabel("Level").selectOption("weld");
+    await look("the settings of a build");
+    await screenshot(page, `page-repair-${colorScheme}`);
+    await page.keyboard.press("Escape");
+    await page.locator("dialog.build").waitFor({ state: "detached" });
     await page.click("#share");
     await page.locator("#note").waitFor();
     await look("a note");
@@ -234,7 +257,7 @@ test("a phone shows the picture while a control is moved, and keeps the state wh
 test("a lost network keeps the picture, and the download continues", async () => {
   const page = await open("data/sphere-flow.mt", undefined, VIEWPORT);
   await reach(page, "complete");
-  const before = await picture(page, "network-before");
+  const before = await still(page, "network-before");
   await page.context().setOffline(true);
   await page.fill("#error", "20");
   await page.locator("#message").waitFor({ timeout: PATIENCE });
@@ -249,7 +272,7 @@ test("a lost network keeps the picture, and the download continues", async () =>
   await reach(page, "complete");
   const { satisfied } = await setSlider(page, "error", 50);
   assert.ok(satisfied);
-  assert.ok(differing(before, await picture(page, "network-after")) < 0.01, "as before");
+  assert.ok(differing(before, await still(page, "network-after")) < 0.01, "as before");
   await page.close();
 });
 
@@ -326,14 +349,14 @@ test("any views are shown together, and what is beside the view stays when its s
     assert.deepEqual(await found(), [...names].sort());
   };
   await has("isosurfaces");
-  const alone = await picture(page, "together-surface");
+  const alone = await still(page, "together-surface");
   assert.ok(await also(page, "iso").isHidden(), "the view itself needs no box");
   assert.ok(await also(page, "flow").isDisabled(), "there are no vectors");
   await also(page, "slice").check();
   await press(page, "Shift+4");
   await has("isosurfaces", "slices", "boundary");
   await addressed(page, /also=slice,solid/);
-  const together = await picture(page, "together-three");
+  const together = await still(page, "together-three");
   assert.ok(differing(alone, together) > 0.05, "there is more to see");
   await screenshot(page, "page-together");
 
@@ -341,7 +364,7 @@ test("any views are shown together, and what is beside the view stays when its s
   await show(page, "Slice");
   await has("isosurfaces", "slices", "boundary");
   assert.ok(await also(page, "iso").isChecked());
-  assert.equal(differing(together, await picture(page, "together-turned")), 0, "the picture stays");
+  assert.equal(differing(together, await still(page, "together-turned")), 0, "the picture stays");
   await page.fill("#opacity", "40");
   await addressed(page, /view=slice&also=iso,solid&opacity=40/);
   const opacities = () => page.evaluate(() => [window.tetralodDemo.viewer.state.isosurfaces[0], window.tetralodDemo.viewer.state.slices[0]].map(({ opacity }) => opacity));
@@ -359,10 +382,10 @@ test("any views are shown together, and what is beside the view stays when its s
   await has("isosurfaces", "boundary", "cells");
 
   await addressed(page, /also=solid,wires/);
-  const [address, before] = [page.url(), await picture(page, "together-before")];
+  const [address, before] = [page.url(), await still(page, "together-before")];
   await page.reload();
   await reach(page, "complete");
-  assert.equal(differing(before, await picture(page, "together-reloaded")), 0, "a link shows the same");
+  assert.equal(differing(before, await still(page, "together-reloaded")), 0, "a link shows the same");
   assert.equal(page.url(), address);
   await press(page, "Shift+5");
   await has("isosurfaces", "boundary");

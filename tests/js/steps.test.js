@@ -137,6 +137,7 @@ for (const worker of [true, false]) {
         [{ halfSpace: { normal: [0, 0, 0], offset: 1 } }, "halfSpace"],
         [{ slab: { normal: [0, 0, 1], offset: 1, thickness: -1 } }, "slab"],
         [{ planes: [[1, 0, 0]] }, "planes"],
+        [{ ranges: [[1], [2, 3, 4]] }, "ranges"],
         [{ ranges: [[1, 0]] }, "ranges"],
         [{ ranges: [1] }, "ranges"],
         [{ isovalues: [Infinity] }, "isovalues"],

@@ -1,6 +1,6 @@
 /**
- * Writes `inline.js` of the package in a folder that has all its other files: `index.js` with the wasm module for MTs of all
- * kinds (deflated, as text) and the worker in it. One file, that imports nothing.
+ * Writes `inline.js` of the package in a folder that has all its other files: `index.js` with the wasm modules for MTs of all
+ * kinds and for tools (deflated, as text) and the worker in it. One file, that imports nothing.
  *
  * node xtask/js/inline.mjs FOLDER
  */
@@ -35,7 +35,8 @@ const replacing = (modules) => ({
   },
 });
 
-const wasm = deflateSync(await readFile(join(folder, "tetralod_all_kinds_bg.wasm")), { level: 9 });
+/** A wasm module as text. */
+const packed = async (name) => deflateSync(await readFile(join(folder, `tetralod_${name}_bg.wasm`)), { level: 9 }).toString("base64");
 
 const worker = await build({
   ...OPTIONS,
@@ -43,7 +44,7 @@ const worker = await build({
   format: "iife",
   write: false,
   // The page sends it the bytes.
-  plugins: [replacing({ "./files.js": { contents: "export const coreWasm = () => undefined; export const allKindsWasm = coreWasm;" } })],
+  plugins: [replacing({ "./files.js": { contents: "export const coreWasm = () => undefined; export const [allKindsWasm, toolsWasm] = [coreWasm, coreWasm];" } })],
 });
 
 await build({
@@ -54,7 +55,8 @@ await build({
   plugins: [
     replacing({
       "./files.js": { contents: await readFile(fileURLToPath(new URL("inline-files.mjs", import.meta.url)), "utf8") },
-      "embedded:wasm": { contents: wasm.toString("base64"), loader: "text" },
+      "embedded:wasm": { contents: await packed("all_kinds"), loader: "text" },
+      "embedded:tools": { contents: await packed("tools"), loader: "text" },
       "embedded:worker": { contents: worker.outputFiles[0].text.trim(), loader: "text" },
     }),
   ],

@@ -15,20 +15,21 @@ const { build } = createRequire(new URL("../../tests/js/package.json", import.me
 
 /** Bytes. An entry that outgrows its limit needs a reason for a higher one, in the message of the commit that raises it. */
 const LIMITS = {
-  ".": 15_300,
+  ".": 15_900,
   "./viewer": 7_500,
   "./element": 10_000,
   "./three": 2_500,
   "./vtk": 2_500,
   "./build": 4_000,
-  "./inline": 361_000,
-  "./worker": 9_700,
+  "./inline": 365_000,
+  "./worker": 10_300,
   "./viewer-worker": 18_000,
   "./build-worker": 5_500,
-  "./core.wasm": 200_000,
-  "./all-kinds.wasm": 267_000,
-  "./viewer.wasm": 425_000,
-  "./build.wasm": 487_000,
+  "./core.wasm": 148_000,
+  "./all-kinds.wasm": 216_000,
+  "./tools.wasm": 56_000,
+  "./viewer.wasm": 409_000,
+  "./build.wasm": 512_000,
 };
 
 const folder = resolve(process.argv[2]);

@@ -6,17 +6,23 @@ use anyhow::{Context, Result, bail};
 use serde_json::Value;
 
 use crate::serve::Server;
-use crate::{bench_beside_vtk, bench_build, bench_format, bench_pictures, browser, demo, package, shell};
+use crate::{
+    bench_against_vtk, bench_beside_vtk, bench_build, bench_first_visit, bench_format, bench_kinds,
+    bench_pictures, browser, demo, package, shell,
+};
 
-/// Measures `FILE.mt`, or the demo's volume; with `--browser` also in Chromium. With `--build`, the builders instead, with `--format` the files, with `--pictures` the renderer,
-/// with `--beside-vtk` the same volumes in other programs.
+/// Measures `FILE.mt`, or the demo's volume; with `--browser` also in Chromium. With other options what `cargo xtask` says of them.
 pub fn run(args: &[String]) -> Result<()> {
     match args {
-        [build] if build == "--build" => return bench_build::run(false),
-        [build, large] if build == "--build" && large == "--large" => return bench_build::run(true),
-        [format] if format == "--format" => return bench_format::run(),
-        [beside, options @ ..] if beside == "--beside-vtk" => return bench_beside_vtk::run(options),
-        [pictures, options @ ..] if pictures == "--pictures" => return bench_pictures::run(options),
+        [option, rest @ ..] if option == "--build" => return bench_build::run(rest),
+        [option, rest @ ..] if option == "--against-vtk" => return bench_against_vtk::run(rest),
+        [option, rest @ ..] if option == "--beside-vtk" => return bench_beside_vtk::run(rest),
+        [option, rest @ ..] if option == "--first-visit" => return bench_first_visit::run(rest),
+        [option, rest @ ..] if option == "--pictures" => return bench_pictures::run(rest),
+        [option] if option == "--format" => return bench_format::run(),
+        [option] if option == "--kinds" => return bench_kinds::run(false),
+        [option, large] if option == "--kinds" && large == "--large" => return bench_kinds::run(true),
+        [option] if option == "--all" => return all(),
         _ => {}
     }
     let (mut file, mut in_browser) = (None, false);
@@ -26,7 +32,7 @@ pub fn run(args: &[String]) -> Result<()> {
             path if !path.starts_with('-') && file.is_none() => file = Some(PathBuf::from(path)),
             other => {
                 bail!(
-                    "`bench` knows one FILE.mt and --browser, --build [--large], --format, --pictures or --beside-vtk, not `{other}`"
+                    "`bench` knows one FILE.mt and --browser, --all, --format, --build, --against-vtk, --first-visit, --pictures, --beside-vtk or --kinds, not `{other}`"
                 )
             }
         }
@@ -37,6 +43,16 @@ pub fn run(args: &[String]) -> Result<()> {
     let browser = if in_browser { Some(browser(&file)?) } else { None };
     print(&native, browser.as_deref());
     Ok(())
+}
+
+/// All that `docs/benchmarks.md` and `docs/beside-vtk.md` are made of, one after the other: hours.
+fn all() -> Result<()> {
+    bench_format::run()?;
+    bench_build::run(&[])?;
+    bench_against_vtk::run(&[])?;
+    bench_first_visit::run(&[])?;
+    bench_pictures::run(&[])?;
+    bench_beside_vtk::run(&[])
 }
 
 type Rates = Vec<(String, f64)>;

@@ -6,9 +6,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 
-use crate::{bench_pictures, shell};
-
-pub const PAGE: &str = "docs/benchmarks.md";
+use crate::benchmarks_page::{self, Part};
+use crate::shell;
 
 /// Generated volumes in the tables, by points along a side, those of which only requests are measured, and that of the walk.
 const SIZES: [u32; 2] = [33, 65];
@@ -19,10 +18,11 @@ const WALKED: u32 = 97;
 const KINDS: [&str; 2] = ["edge", "half-edge"];
 
 const HEAD: &str = "\
-# Benchmarks of MT files
+# Benchmarks
 
-Written by `cargo xtask bench --format`, its last part by `cargo xtask bench --pictures`, over the data sets in the folder that `TETRALOD_DATA` names and generated volumes.
-Bytes are the same on every machine; speeds are of the machine that it ran on.
+Written by `cargo xtask bench --all`, over the data sets in the folder that `TETRALOD_DATA` names and generated volumes; its parts
+also by commands of their own: files and requests by `bench --format`, the others by those that they name. Bytes and tetrahedra are
+the same on every machine; speeds are of the machine that it ran on.
 
 ## Bytes
 
@@ -83,10 +83,8 @@ pub fn run() -> Result<()> {
         let walk = bench("walk", &[absolute(&file)?])?;
         write!(walks, "The generated volume of {WALKED}³ points, kind {kind}.\n\n{walk}\n")?;
     }
-    let page = [HEAD, "\n", &table, PICTURE, &requests, WALK, &walks, &bench_pictures::part()].concat();
-    fs::write(PAGE, page).with_context(|| PAGE.to_owned())?;
-    println!("wrote {PAGE}");
-    Ok(())
+    let page = [HEAD, "\n", &table, PICTURE, &requests, WALK, &walks].concat();
+    benchmarks_page::write(Part::Files, &page)
 }
 
 /// Cargo runs benchmarks in the folder of their package.

@@ -1,13 +1,9 @@
 //! `cargo xtask bench --pictures`: how fast the renderer draws; writes its part of `docs/benchmarks.md`.
 
-use std::fs;
+use anyhow::Result;
 
-use anyhow::{Context, Result};
-
-use crate::bench_format::PAGE;
+use crate::benchmarks_page::{self, Part};
 use crate::shell;
-
-const TITLE: &str = "\n## Pictures\n";
 
 const HEAD: &str = "
 A headless renderer draws the generated volume at the smallest error that its number of tetrahedra allows, a picture at a
@@ -17,12 +13,6 @@ style changes. *draw*: until the device has finished the picture. Both are media
 the lists of pixels, *bytes/tet* that of the mesh alone. The goal in software is 4 pictures a second in each mode.
 ";
 
-/// What the page says of pictures, with the title; empty if nothing.
-pub fn part() -> String {
-    let page = fs::read_to_string(PAGE).unwrap_or_default();
-    page.find(TITLE).map_or_else(String::new, |at| page[at..].to_owned())
-}
-
 /// Measures with the options of the benchmark, and puts its table into the page, in place of the one of the same adapter
 /// and size.
 pub fn run(options: &[String]) -> Result<()> {
@@ -30,11 +20,8 @@ pub fn run(options: &[String]) -> Result<()> {
         shell::cargo(["bench", "--package", "tetralod", "--features", "vulkan", "--bench", "pictures"]);
     let table = shell::output(command.args(["--", "run"]).args(options))?;
     println!("{table}");
-    let page = fs::read_to_string(PAGE).with_context(|| PAGE.to_owned())?;
-    let (others, old) = page.split_at(page.find(TITLE).unwrap_or(page.len()));
-    fs::write(PAGE, [others, TITLE, HEAD, &tables(old, &table)].concat()).with_context(|| PAGE.to_owned())?;
-    println!("wrote {PAGE}");
-    Ok(())
+    let old = benchmarks_page::read(Part::Pictures);
+    benchmarks_page::write(Part::Pictures, &[HEAD, &tables(&old, &table)].concat())
 }
 
 /// The tables of a part, with `fresh` in place of the one of the same title.

@@ -69,7 +69,7 @@ fn install() -> Result<()> {
 }
 
 /// Installs packages of Debian; `by_hand` says what to do where that cannot be done.
-fn install_packages(what: &str, packages: &[&str], by_hand: &'static str) -> Result<()> {
+pub fn install_packages(what: &str, packages: &[&str], by_hand: &'static str) -> Result<()> {
     let Some(apt) = shell::find("apt-get") else { bail!(by_hand) };
     let rights: &[&str] = match () {
         () if shell::output(&mut shell::command("id", ["-u"]))?.trim() == "0" => &[],

@@ -7,11 +7,11 @@ use std::thread;
 use anyhow::{Context, Result, anyhow, bail};
 
 use crate::serve::Server;
-use crate::volumes::{self, DATA, LARGE, SMALL};
+use crate::volumes::{self, DATA, LARGE, SMALL, Volume};
 use crate::{package, shell};
 
-/// The memory that the large volume takes to build, in KiB: some 450 bytes a tetrahedron, and its data.
-const LARGE_MEMORY: u64 = 7 << 20;
+/// The memory that the large volume takes to build, in KiB: some 130 bytes a tetrahedron, and its data.
+const LARGE_MEMORY: u64 = 3 << 20;
 
 /// Builds what the page needs first, and serves until interrupted. The rest of the package and the large volume are made meanwhile.
 pub fn run(args: &[String]) -> Result<()> {
@@ -30,30 +30,39 @@ pub fn run(args: &[String]) -> Result<()> {
     }
     // Both take minutes: side by side, no core is idle.
     let viewer = thread::spawn(package::build_viewer);
-    let tetralod = shell::released_command()?;
-    make_data(&tetralod)?;
+    let tetralod = shell::demo_command()?;
+    make_volumes(&tetralod)?;
     viewer.join().map_err(|_| anyhow!("a thread that builds the viewer panicked"))??;
     if !serve {
+        draw_all()?;
         return package::build(&[]);
     }
-    if !small && has_memory() {
-        volumes::write_list(&tetralod, Some(&LARGE))?;
-        let tetralod = tetralod.clone();
-        thread::spawn(move || make_large(&tetralod));
-    }
+    let large = Some(&LARGE).filter(|_| !small && has_memory());
+    volumes::write_list(&tetralod, large)?;
+    let made = tetralod.clone();
+    thread::spawn(move || make_rest(&made, large));
     serve_page(&tetralod, port)
 }
 
-/// Makes the large volume with what the machine has left. An error does not end the page.
-fn make_large(tetralod: &Path) {
+/// Makes what the page does without at first: the large volume with what the machine has left, and thumbnails. An error does not end
+/// the page.
+fn make_rest(tetralod: &Path, large: Option<&Volume>) {
     let prefix: &[&str] = if shell::find("nice").is_some() { &["nice", "-n", "19"] } else { &[] };
-    let made = volumes::make(tetralod, &LARGE, prefix);
-    if let Err(error) = made.and_then(|()| volumes::write_list(tetralod, None)) {
+    let made = large.map_or(Ok(()), |large| volumes::make(tetralod, large, prefix));
+    if let Err(error) = made {
         eprintln!("the large volume was not made: {error:#}");
-        if let Err(error) = volumes::write_list(tetralod, None) {
-            eprintln!("{error:#}");
-        }
     }
+    // What is there is listed before there are thumbnails, and also where they fail.
+    if let Err(error) = volumes::write_list(tetralod, None).and_then(|()| draw_all()) {
+        eprintln!("{error:#}");
+    }
+}
+
+/// Draws the thumbnails of all volumes that are there.
+fn draw_all() -> Result<()> {
+    let tetralod = shell::tested_command()?;
+    volumes::draw_all(&tetralod);
+    volumes::write_list(&tetralod, None)
 }
 
 /// Whether there is memory for the large volume. Where the system does not say, there is.
@@ -71,17 +80,27 @@ fn has_memory() -> bool {
 
 /// The largest of the demo's small volumes, made if necessary: also what the benchmark measures.
 pub fn bench_volume() -> Result<PathBuf> {
-    make_data(&shell::released_command()?)?;
+    make_data(&shell::tested_command()?)?;
     Ok(Path::new(DATA).join("bucky.mt"))
 }
 
-/// Makes the small volumes that are missing or older than the command that builds them, and the list of all.
+/// Makes the small volumes that are missing or older than the command that builds them, with thumbnails, and the list of all.
 pub fn make_data(tetralod: &Path) -> Result<()> {
-    fs::create_dir_all(DATA)?;
-    for volume in &SMALL {
-        volumes::make(tetralod, volume, &[])?;
-    }
+    make_volumes(tetralod)?;
+    volumes::draw_all(tetralod);
     volumes::write_list(tetralod, None)
+}
+
+fn make_volumes(tetralod: &Path) -> Result<()> {
+    fs::create_dir_all(DATA)?;
+    SMALL.iter().try_for_each(|volume| volumes::make(tetralod, volume, &[]))
+}
+
+/// The same, and the large volume.
+pub fn make_all(tetralod: &Path) -> Result<()> {
+    fs::create_dir_all(DATA)?;
+    volumes::make(tetralod, &LARGE, &[])?;
+    make_data(tetralod)
 }
 
 /// Serves the page as a web site would: the package at `pkg/`, everything else from `www/`.

@@ -1,12 +1,16 @@
-//! The project's own commands, behind `cargo xtask`: everything that a fresh machine with Rust, Node and git needs to
+//! The project's own commands, behind `cargo xtask`: everything that a fresh machine with Rust, Node, Python and git needs to
 //! build the package, show the demo, run every check and measure.
 #![forbid(unsafe_code)]
 
 mod bench;
+mod bench_against_vtk;
 mod bench_beside_vtk;
 mod bench_build;
+mod bench_first_visit;
 mod bench_format;
+mod bench_kinds;
 mod bench_pictures;
+mod benchmarks_page;
 mod browser;
 mod demo;
 mod docs;
@@ -21,6 +25,7 @@ mod serve;
 mod shell;
 mod suite;
 mod volumes;
+mod workflows;
 
 use std::process::ExitCode;
 
@@ -30,6 +35,7 @@ const USAGE: &str = "\
 usage: cargo xtask COMMAND
 
   build                          build the npm package into pkg/
+  build MODULE...                only some of its wasm modules: core, all_kinds, tools, viewer, build
   demo [--port N] [--no-serve] [--small]   build everything, make the demo's data, serve the page on localhost; a large
                                  volume is made in the background, unless with --small
   docs                           make the documentation's site in target/docs
@@ -39,12 +45,15 @@ usage: cargo xtask COMMAND
   release [vX.Y.Z]               check that everything can be published, as this version; publishes nothing
   random [MINUTES]               the tests with random inputs for 30 minutes, each time with another TETRALOD_SEED
   bench [FILE.mt] [--browser]    measure decoding, refinement and isosurfaces; natively, or also in the browser
-  bench --build [--large]        measure triangulation, insertion and the kinds of MT side by side
-  bench --format                 measure MT files and what requests need of them; writes docs/benchmarks.md
-  bench --pictures [OPTION...]   measure the renderer in each mode, on the GPU or in software; writes its part of
-                                 docs/benchmarks.md. Options: --size WxH --tets N,N,... --grid N --file FILE.mt
-                                 --pictures N --modes A,B,...
-  bench --beside-vtk             measure the same volumes in a browser with VTK's programs; writes docs/beside-vtk.md
+  bench --kinds [--large]        measure triangulation, insertion and the kinds of MT side by side
+  bench --all                    measure all of the following: writes docs/benchmarks.md and docs/beside-vtk.md. Takes hours
+  bench --format                 measure MT files and what requests need of them
+  bench --build [SIZE...]        measure builds of grids with SIZE³ points, whole and in parts, beside VTK's decimation
+  bench --against-vtk [SET...]   measure meshes of equal size by VTK's decimation of tetrahedra, which comes from PyPI
+  bench --first-visit            measure how soon the demo's page shows what
+  bench --pictures [OPTION...]   measure the renderer in each mode, on the GPU or in software. Options: --size WxH
+                                 --tets N,N,... --grid N --file FILE.mt --pictures N --modes A,B,...
+  bench --beside-vtk             measure the same volumes in a browser with VTK's programs
   paper                          do the paper's experiments again and write docs/paper.md with plots and pictures";
 
 fn main() -> ExitCode {

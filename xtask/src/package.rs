@@ -1,15 +1,16 @@
-//! `cargo xtask build`: the four wasm modules and the hand-written JavaScript, merged into `pkg/`, with `inline.js`, which
+//! `cargo xtask build`: the five wasm modules and the hand-written JavaScript, merged into `pkg/`, with `inline.js`, which
 //! `xtask/js/inline.mjs` makes of them; `xtask/js/sizes.mjs` has the limit of each entry.
 //!
-//! The core (decoder, refinement, isosurfaces) for half-edge MTs, the same for MTs of all kinds, the viewer (also with the
-//! renderer) and the builder are separate modules, so that a page which draws by its own means does not download a renderer, one
-//! that shows files no builder, and one that shows files as `tetralod build` makes them no other kinds of MT.
+//! The core (decoder and refinement) for half-edge MTs, the same for MTs of all kinds, the tools for meshes (surfaces, probes,
+//! streamlines), the viewer (core and tools with the renderer) and the builder are separate modules, so that a page which draws by
+//! its own means does not download a renderer, one that only wants the mesh no tools, one that shows files no builder, and one
+//! that shows files as `tetralod build` makes them no other kinds of MT.
 
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 
@@ -31,9 +32,10 @@ const CORES: [&str; 2] = ["tetralod_core", "tetralod_all_kinds"];
 const VIEWER: Module =
     Module { name: "tetralod_viewer", script: "tetralod_viewer", features: "web,gpu,all-kinds" };
 
-const MODULES: [Module; 4] = [
+const MODULES: [Module; 5] = [
     Module { name: CORES[0], script: CORES[0], features: "web-session" },
     Module { name: CORES[1], script: CORES[0], features: "web-session,all-kinds" },
+    Module { name: "tetralod_tools", script: "tetralod_tools", features: "web-tools" },
     VIEWER,
     Module { name: "tetralod_build", script: "tetralod_build", features: "web-build" },
 ];
@@ -48,10 +50,16 @@ const WASM_FEATURES: [&str; 6] = [
     "--enable-sign-ext",
 ];
 
-/// Builds `pkg/` from nothing and prints the sizes of its wasm files.
-pub fn build(args: &[String]) -> Result<()> {
-    if let Some(arg) = args.first() {
-        bail!("`build` takes no argument, got `{arg}`");
+/// Builds `pkg/` from nothing and prints the sizes of its wasm files; with names, only these modules of it, as [`build_some`] does.
+pub fn build(names: &[String]) -> Result<()> {
+    let named = |name: &String| {
+        let found = MODULES.iter().find(|module| module.name.strip_prefix("tetralod_") == Some(name));
+        found.with_context(|| {
+            format!("`build` takes names of modules such as `core` or `viewer`, got `{name}`")
+        })
+    };
+    if !names.is_empty() {
+        return build_some(&names.iter().map(named).collect::<Result<Vec<_>>>()?);
     }
     prepare()?;
     let staging = Path::new("target/pkg-staging");
@@ -65,13 +73,19 @@ pub fn build(args: &[String]) -> Result<()> {
     shell::run(&mut shell::command("node", ["xtask/js/sizes.mjs", PKG]))
 }
 
-/// Puts into `pkg/` what the demo's page needs to draw: all scripts but `inline.js`, and the viewer's module. [`build`] makes the
-/// rest.
+/// Puts into `pkg/` what the demo's page needs to draw. [`build`] makes the rest.
 pub fn build_viewer() -> Result<()> {
+    build_some(&[&VIEWER])
+}
+
+/// Puts some modules into `pkg/`, and all scripts but `inline.js`.
+fn build_some(modules: &[&Module]) -> Result<()> {
     prepare()?;
-    let staging = Path::new("target/pkg-viewer");
+    let staging = Path::new("target/pkg-part");
     remake(staging)?;
-    compile(&VIEWER, staging)?;
+    for module in modules {
+        compile(module, staging)?;
+    }
     copy_scripts(staging)?;
     move_files(staging, Path::new(PKG))
 }

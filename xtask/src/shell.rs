@@ -1,6 +1,7 @@
 //! Running other programs: every failure names the whole command line.
 
 use std::ffi::OsStr;
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -81,6 +82,19 @@ pub const ALL: [&str; 5] = [
 pub fn tested_command() -> Result<PathBuf> {
     run(cargo(["build", "--bin", "tetralod"]).args(ALL))?;
     Ok(built_in("debug"))
+}
+
+/// The native command without what takes long to compile and no volume of the demo needs: pictures, HDF5, addresses. In a folder of
+/// its own, so that files which it has made are older than the command only where it has changed.
+pub fn demo_command() -> Result<PathBuf> {
+    run(&mut cargo(["build", "--package", "tetralod-cli", "--no-default-features"]))?;
+    let (made, kept) = (built_in("debug"), built_in("demo"));
+    let bytes = fs::read(&made).with_context(|| made.display().to_string())?;
+    if fs::read(&kept).ok().as_ref() != Some(&bytes) {
+        fs::create_dir_all(kept.with_file_name(""))?;
+        fs::copy(&made, &kept).with_context(|| kept.display().to_string())?;
+    }
+    Ok(kept)
 }
 
 /// The native command as users get it.

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, ensure};
 
-use crate::{browser, demo, docs, fixture, package, shell};
+use crate::{browser, demo, docs, fixture, package, shell, workflows};
 
 struct Step {
     name: &'static str,
@@ -18,12 +18,13 @@ struct Step {
     run: fn() -> Result<()>,
 }
 
-const STEPS: [Step; 13] = [
+const STEPS: [Step; 14] = [
     Step { name: "fmt", what: "formatting", run: fmt },
     Step { name: "clippy", what: "lints of everything native", run: clippy },
     Step { name: "features", what: "lints of the feature sets that are shipped", run: features },
     Step { name: "doc", what: "documentation without broken links", run: doc },
     Step { name: "native", what: "unit, integration and documentation tests", run: native },
+    Step { name: "workflows", what: "building in parts, with a process killed", run: workflows::test },
     Step { name: "package", what: "the npm package and its size", run: npm_package },
     Step { name: "wasm", what: "the core and a WebGPU adapter in headless Chromium", run: wasm },
     Step { name: "js", what: "lints and types of all JavaScript, and the package in Node", run: js },
@@ -95,14 +96,17 @@ fn clippy() -> Result<()> {
     shell::run(&mut shell::cargo(["clippy", "--package", "xtask", "--all-targets", "--", "-D", "warnings"]))
 }
 
-/// The core alone, which must not need any feature; with MTs of all kinds; with the builders, as `paper` has it; and what goes
-/// into the package, the viewer with the tests in the browser.
+/// The core alone, which must not need any feature; with MTs of all kinds; with the builders, as `paper` has it; the command as the demo
+/// makes it; and what goes into the package, the viewer with the tests in the browser.
 fn features() -> Result<()> {
     lint_library("", &[])?;
     lint_library("all-kinds", &[])?;
     lint_library("build", &[])?;
+    let command = ["clippy", "--package", "tetralod-cli", "--no-default-features", "--", "-D", "warnings"];
+    shell::run(&mut shell::cargo(command))?;
     shell::add_wasm_target()?;
     lint_library("web-session", &["--target", shell::WASM])?;
+    lint_library("web-tools", &["--target", shell::WASM])?;
     lint_library("web-bench,all-kinds", &["--target", shell::WASM])?;
     lint_library("web-build", &["--target", shell::WASM])?;
     with_fixture(|| {
@@ -241,6 +245,7 @@ fn consumer() -> Result<()> {
         "--exclude-entrypoints",
         "core.wasm",
         "all-kinds.wasm",
+        "tools.wasm",
         "viewer.wasm",
         "build.wasm",
     ];

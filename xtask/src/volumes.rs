@@ -190,7 +190,7 @@ pub const SMALL: [Volume; 8] = [
     },
 ];
 
-/// Makes the files of a volume that are missing, or older than the command that makes them. The commands run with `prefix` in
+/// Makes the MT file of a volume where it is missing, or older than the command that makes it. The commands run with `prefix` in
 /// front of them.
 pub fn make(tetralod: &Path, volume: &Volume, prefix: &[&str]) -> Result<()> {
     let mt = volume.file("mt");
@@ -213,20 +213,32 @@ pub fn make(tetralod: &Path, volume: &Volume, prefix: &[&str]) -> Result<()> {
         run(args)?;
         fs::rename(&part, &mt).with_context(|| format!("moving {}", mt.display()))?;
     }
-    let picture = volume.file("png");
-    if volume.is_shown && !is_newer(&picture, &mt) {
-        let mut args = vec!["render".to_owned(), mt.display().to_string()];
-        args.extend(volume.picture.iter().map(|arg| (*arg).to_owned()));
-        args.extend(
-            ["--size", "480x300", "--samples", "4", "--background", "transparent", "-o"].map(str::to_owned),
-        );
-        args.push(picture.display().to_string());
-        // Without Vulkan there are no thumbnails; the page does without.
-        if let Err(error) = run(args) {
-            println!("no thumbnail of {}: {error:#}", volume.name);
-        }
-    }
     Ok(())
+}
+
+/// Draws the thumbnail of a volume where it is missing, or older than the MT file, by a command that draws. Where there is no Vulkan
+/// there are no thumbnails; the page does without.
+fn draw(tetralod: &Path, volume: &Volume) {
+    let (mt, picture) = (volume.file("mt"), volume.file("png"));
+    if !volume.is_shown || is_newer(&picture, &mt) {
+        return;
+    }
+    let mut command = shell::command(tetralod, ["render"]);
+    command.arg(mt).args(volume.picture);
+    command.args(["--size", "480x300", "--samples", "4", "--background", "transparent", "-o"]).arg(picture);
+    if let Err(error) = shell::run(&mut command) {
+        println!("no thumbnail of {}: {error:#}", volume.name);
+    }
+}
+
+/// Draws the thumbnails of all volumes that are there.
+pub fn draw_all(tetralod: &Path) {
+    there().iter().for_each(|volume| draw(tetralod, volume));
+}
+
+/// The volumes that are there, the largest first.
+fn there() -> Vec<Volume> {
+    [LARGE].into_iter().chain(SMALL).filter(|volume| volume.file("mt").is_file()).collect()
 }
 
 /// Writes the data of a volume; gives the files, one for each time step.
@@ -254,8 +266,7 @@ fn write_data(volume: &Volume, run: &impl Fn(Vec<String>) -> Result<()>) -> Resu
 
 /// Writes the list of the volumes that are there, the largest first. `pending` is one that is being made.
 pub fn write_list(tetralod: &Path, pending: Option<&Volume>) -> Result<()> {
-    let there = [LARGE].into_iter().chain(SMALL).filter(|volume| volume.file("mt").is_file());
-    let listed = there.map(|volume| entry(tetralod, &volume)).collect::<Result<Vec<_>>>()?;
+    let listed = there().iter().map(|volume| entry(tetralod, volume)).collect::<Result<Vec<_>>>()?;
     let pending: Vec<Value> = pending.into_iter().map(|volume| json!({ "title": volume.title })).collect();
     let list = Path::new(DATA).join(LIST);
     // Moved, so that the page reads the old list or the new one.

@@ -14,8 +14,11 @@ fn what_needs_too_much_memory_is_refused_before_it_is_built() {
     let folder = Folder::new("memory");
     let [input, mt] = ["b.vti", "a.mt"].map(|name| folder.path(name));
     good(&["generate", "bucky", "--size", "9", "-o", &input]);
-    let limited = ["build", &input, "-o", &mt, "--memory", "300K"];
-    bad(1, &limited, &["b.vti", "3 072 tetrahedra", "--memory allows"]);
+    // Not in parts either; and other kinds are not built in parts.
+    for more in [&["--memory", "200K"][..], &["--memory", "300K", "--kind", "edge"]] {
+        let limited = [&["build", &input, "-o", &mt][..], more].concat();
+        bad(1, &limited, &["b.vti", "3 072 tetrahedra", "--memory allows"]);
+    }
     assert!(!Path::new(&mt).exists());
     good(&["build", &input, "-o", &mt, "--memory", "8M"]);
 }
@@ -464,7 +467,7 @@ fn an_mt_is_built_for_a_purpose() {
     let [input, mt] = ["b.vti", "b.mt"].map(|name| folder.path(name));
     good(&["generate", "bucky", "--size", "7", "-o", &input]);
     for criterion in ["half-edge", "delaunay"] {
-        for purpose in ["uniform", "regions"] {
+        for purpose in ["uniform", "regions", "mean"] {
             let options = ["--kind", "vertex", "--criterion", criterion, "--for", purpose, "--quiet"];
             good(&[&["build", &input, "-o", &mt], &options[..]].concat());
             assert!(good(&["verify", &mt, "--against", &input]).contains("every promise is kept"));

@@ -7,6 +7,7 @@ mod gallery;
 mod generate;
 mod linking;
 mod npz;
+mod parts;
 mod readme;
 mod remote;
 #[cfg(feature = "render")]

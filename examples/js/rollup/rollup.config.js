@@ -2,10 +2,13 @@ import { copyFile } from "node:fs/promises";
 import { fileURLToPath } from "node:url";
 import resolve from "@rollup/plugin-node-resolve";
 
-const wasm = fileURLToPath(import.meta.resolve("tetralod/core.wasm"));
+/** The wasm files, which the worker looks for beside itself. */
+const wasm = ["core", "tools"];
+
+const copy = (name) => copyFile(fileURLToPath(import.meta.resolve(`tetralod/${name}.wasm`)), `dist/tetralod_${name}_bg.wasm`);
 
 export default {
   input: { main: "main.js", worker: "tetralod/worker" },
   output: { dir: "dist", entryFileNames: "[name].js", chunkFileNames: "[name].js" },
-  plugins: [resolve(), { name: "wasm", writeBundle: () => copyFile(wasm, "dist/tetralod_core_bg.wasm") }],
+  plugins: [resolve(), { name: "wasm", writeBundle: () => Promise.all(wasm.map(copy)) }],
 };

@@ -4,6 +4,7 @@ use super::{BuildCriterion, Decimated, Decimator, Key, Levels, Reference, State,
 use crate::builder::cost::largest;
 use crate::builder::gift_wrap::GiftWrap;
 use crate::builder::location::Location;
+use crate::builder::places::Places;
 use crate::builder::reach::Reach;
 use crate::builder::sequence::{Insertion, Sequence};
 use crate::builder::{BuildConfig, BuildError, Construction, OnProgress, Purpose};
@@ -18,9 +19,10 @@ use std::ops::ControlFlow;
 const CRITERIA: [BuildCriterion; 2] = [BuildCriterion::HalfEdge, BuildCriterion::Delaunay];
 
 /// Every criterion, and every purpose.
-const WAYS: [(BuildCriterion, Purpose); 3] = [
+const WAYS: [(BuildCriterion, Purpose); 4] = [
     (BuildCriterion::HalfEdge, Purpose::Uniform),
     (BuildCriterion::HalfEdge, Purpose::Regions),
+    (BuildCriterion::HalfEdge, Purpose::Mean),
     (BuildCriterion::Delaunay, Purpose::Uniform),
 ];
 
@@ -536,7 +538,9 @@ fn vertices_outside_of_their_tetrahedra_are_known() {
     // The corner of the cube is beside it, and in the bucket of a tetrahedron in its middle.
     let middle = (0..).zip(&mesh.tets).find(|(_, tet)| tet.contains(&(4 * 81 + 4 * 9 + 4)));
     let (tet, _) = middle.expect("the vertex in the middle has tetrahedra");
-    std::sync::Arc::get_mut(&mut quantized.places).expect("nobody else has them")[0] -= DVec3::splat(0.4);
+    let beside = |(point, place)| if point == 0 { place - DVec3::splat(0.4) } else { place };
+    let places = (0..).zip(quantized.places.iter()).map(beside);
+    quantized.places = Places::new(quantized.positions.clone(), places);
     quantized.locations = vec![Location { point: 0, tet, lambda: DVec3::ZERO, outside: true }];
     let topology = topology(mesh.positions.len(), &mesh.tets).expect("a conforming mesh");
     let work = WorkMesh::new(mesh.tets.clone(), topology.neighbors, mesh.positions.len());
@@ -578,8 +582,9 @@ fn insertions(mt: &ExplicitMt, vertices: &[VertexId]) -> Insertions {
 #[test]
 fn collapses_make_the_updates_of_the_explicit_structure() {
     for (name, mesh) in domains() {
-        for purpose in [Purpose::Uniform, Purpose::Regions] {
-            let Decimated { record, quantized, info } = built_for(&mesh, BuildCriterion::HalfEdge, purpose);
+        for purpose in Purpose::ALL {
+            let Decimated { record, quantized, info, .. } =
+                built_for(&mesh, BuildCriterion::HalfEdge, purpose);
             let go_on = &mut |_| ControlFlow::Continue(());
             let (expected, vertices) = record.explicit_mt(info, &quantized, go_on).expect("sound insertions");
             let expected = insertions(&expected, &vertices);

@@ -152,7 +152,7 @@ fn fs_point(in: Point) -> @location(0) vec4f {
     if across > 1.0 || is_clipped(in.position, style.clips.x) {
         discard;
     }
-    var albedo = decode(style.front.rgb);
+    var albedo = style.front.rgb;
     if style.back.w > 0.0 {
         albedo = mapped(in.value);
     }

@@ -313,11 +313,16 @@ fn middle_depth(pixel: vec2i) -> f32 {
     return select(1.0, sum / max(count, 1.0), 2.0 * count >= f32(samples));
 }
 
-// The place of the first sample, and whether there is something opaque.
+// The place of the first sample, and whether there is something opaque. Along the unnormalised direction of a pixel's ray depth
+// grows alike for all pixels, since what the direction changes by over the screen is across the view: that takes no root for
+// each of the many places that the shade looks at.
 fn place_of(pixel: vec2i) -> vec4f {
-    let ray = ray_of(vec2f(pixel));
-    let distance = distance_of(textureLoad(depths, pixel, 0), ray);
-    return vec4f(ray.origin + distance * ray.direction, f32(distance < FAR));
+    let depth = textureLoad(depths, pixel, 0);
+    let at = (vec2f(pixel) + 0.5) / frame.viewport.xy * vec2f(2.0, -2.0) + vec2f(-1.0, 1.0);
+    let origin = frame.origin.xyz + at.x * frame.origin_x.xyz + at.y * frame.origin_y.xyz;
+    let direction = frame.direction.xyz + at.x * frame.direction_x.xyz + at.y * frame.direction_y.xyz;
+    let forward = (frame.depth.x - frame.depth.y * depth) / (frame.depth.z * depth - frame.depth.w);
+    return vec4f(origin + forward / frame.direction.w * direction, f32(depth < 1.0));
 }
 
 // The difference to a neighbour on one of both sides: to the nearer one, so that it does not reach over an
@@ -330,6 +335,8 @@ fn slope_of(middle: vec3f, before: vec4f, after: vec4f) -> vec3f {
 }
 
 const TAPS = 14;
+// Cosine and sine of five turns over that.
+const STEP = vec2f(-0.6234898, 0.7818315);
 
 // How much of the light of the sky does not come to an opaque place, 0 to 1, by what is near it on the screen
 // (McGuire and others, *The Alchemy screen-space ambient obscurance algorithm*, 2011).
@@ -357,11 +364,14 @@ fn shade(pixel: vec2i) -> f32 {
     // Each picture of a mean looks in other directions, so that the noise of one is not left in the mean.
     let turn = 0.5 * frame.key_light.w * frame.viewport.x;
     let noise = fract(52.9829189 * fract(dot(vec2f(pixel), vec2f(0.06711056, 0.00583715))) + turn);
+    // Five turns outwards, one step of the same angle after another.
+    let first = 6.2831853 * (2.5 / f32(TAPS) + noise);
+    var towards = vec2f(cos(first), sin(first));
     var sum = 0.0;
     for (var i = 0; i < TAPS; i += 1) {
         let part = (f32(i) + 0.5) / f32(TAPS);
-        let angle = 6.2831853 * (part * 5.0 + noise);
-        let other = place_of(pixel + vec2i(reach * part * vec2f(cos(angle), sin(angle))));
+        let other = place_of(pixel + vec2i(reach * part * towards));
+        towards = vec2f(dot(towards, vec2f(STEP.x, -STEP.y)), dot(towards, STEP.yx));
         let way = other.xyz - middle;
         let size = dot(way, way);
         if other.w > 0.0 && size < radius * radius {

@@ -2,7 +2,7 @@
 // `Style` in `gpu/style.rs`.
 
 struct Style {
-    // The sides that are seen from lower and from higher values: sRGB; in w opacity, and whether values give
+    // The sides that are seen from lower and from higher values: linear; in w opacity, and whether values give
     // colours.
     front: vec4f,
     back: vec4f,
@@ -77,10 +77,13 @@ struct Seen {
 
 fn lit(albedo: vec3f, n: vec3f, view: vec3f) -> vec3f {
     // Interpolated normals may look away: no more light there than at the very edge.
-    let facing = clamp(dot(n, view), 0.0, 1.0);
-    let rim = pow(1.0 - facing, 3.0) * (0.5 + 0.5 * dot(n, frame.up.xyz));
+    let away = 1.0 - clamp(dot(n, view), 0.0, 1.0);
+    let rim = away * away * away * (0.5 + 0.5 * dot(n, frame.up.xyz));
     let half_way = normalize(view + frame.key_light.xyz);
-    let gloss = pow(max(dot(n, half_way), 0.0), 50.0);
+    // To the power of 50, in products.
+    let second = max(dot(n, half_way), 0.0) * max(dot(n, half_way), 0.0);
+    let eighth = second * second * second * second;
+    let gloss = eighth * eighth * eighth * eighth * eighth * eighth * second;
     return albedo * diffuse(n) + vec3f(0.75, 0.85, 1.0) * (0.16 * rim) + vec3f(0.16 * gloss);
 }
 
@@ -110,7 +113,7 @@ fn edge_strength(seen: Seen) -> f32 {
 
 // sRGB and opacity.
 fn shaded(seen: Seen) -> vec4f {
-    var albedo = decode(select(style.back.rgb, style.front.rgb, seen.is_front));
+    var albedo = select(style.back.rgb, style.front.rgb, seen.is_front);
     if style.back.w > 0.0 {
         albedo = mapped(seen.value);
     }

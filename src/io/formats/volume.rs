@@ -33,7 +33,7 @@ impl Volume {
         bytes.ok_or_else(|| ReadReason::TooLarge { what: "bytes of samples".into(), limit: u64::MAX })
     }
 
-    /// The mesh of these samples.
+    /// The mesh of these samples; a grid along the axes comes without points and tetrahedra.
     pub fn mesh(&self, samples: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadReason> {
         let expected = self.bytes()?;
         if samples.len() != expected {
@@ -50,7 +50,7 @@ impl Volume {
         let is_aligned = (0..9).all(|k| k / 3 == k % 3 || self.steps[k / 3][k % 3] == 0.0);
         if is_aligned && along.iter().all(|step| *step > 0.0) {
             let grid = image::checked_grid(self.dims, self.origin, along)?;
-            return Ok(TetMesh::from_grid(grid, fields.fields));
+            return Ok(TetMesh::of_grid_alone(grid, fields.fields));
         }
         let place = |x: u32, y: u32, z: u32| {
             let by = [x, y, z].map(f64::from);

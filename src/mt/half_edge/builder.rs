@@ -4,7 +4,9 @@ use super::apply::Search;
 use super::scratch::{NEW, Scratch};
 use super::star_code::StarCode;
 use super::store::{ForestChild, HalfEdgeMt, HalfEdgeUpdate};
-use crate::mt::{ApplyUpdates, ConvertError, CurrentMesh, ErrorCode, ReplayError, UpdateError};
+use crate::mt::{
+    ApplyUpdates, ConvertError, CurrentMesh, ErrorCode, MultiTessellation, ReplayError, UpdateError,
+};
 
 const NOT_HALF_EDGE: &str = "it is not the inverse of a half-edge collapse";
 
@@ -46,7 +48,8 @@ impl HalfEdgeBuilder {
     /// # Errors
     /// If the base mesh is not usable.
     pub fn new(mt: HalfEdgeMt) -> Result<Self, ConvertError> {
-        let mesh = mt.start().map_err(|error| ConvertError::Damaged(error.into()))?;
+        let mut mesh = mt.start().map_err(|error| ConvertError::Damaged(error.into()))?;
+        mesh.make_room(mt.info());
         Ok(Self {
             mt,
             mesh,

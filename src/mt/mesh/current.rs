@@ -121,7 +121,33 @@ pub struct CurrentMesh {
     pinched: Vec<u32>,
 }
 
+/// Makes room for so many elements in a list, if there is memory for them.
+fn make_room<T>(list: &mut Vec<T>, len: usize) {
+    // Else the list grows as it must.
+    _ = list.try_reserve_exact(len.saturating_sub(list.len()));
+}
+
 impl CurrentMesh {
+    /// Makes room for the reference mesh, if there is memory for it: lists that grow by doubling are copied again and again, and take up
+    /// to twice as much.
+    pub(crate) fn make_room(&mut self, info: &MtInfo) {
+        // What a file says of its counts does not size the lists: no update inserts more than this.
+        let updates = info.updates as usize;
+        let vertices = self.labels.len().saturating_add(updates);
+        let tets = self.tets.len().saturating_add(updates.saturating_mul(crate::mt::MAX_STAR));
+        let tets = tets.min(info.tetrahedra as usize);
+        make_room(&mut self.labels, vertices);
+        make_room(&mut self.positions, vertices);
+        make_room(&mut self.levels, vertices.saturating_mul(self.fields));
+        make_room(&mut self.incident, vertices);
+        make_room(&mut self.vertex_marks, vertices);
+        make_room(&mut self.tets, tets);
+        make_room(&mut self.neighbors, tets);
+        make_room(&mut self.tags, tets);
+        make_room(&mut self.tet_bytes, tets);
+        make_room(&mut self.marks, tets);
+    }
+
     /// The base mesh as the current mesh: no update applied.
     ///
     /// # Errors

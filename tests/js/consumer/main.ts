@@ -68,13 +68,12 @@ const failed: ErrorCode | undefined = await mt.refine({ error: -1 }).then(
 );
 mt.free();
 
-const examples = await checkOptions(source);
-const built = await checkBuild();
+// They throw where an option does not do what its type says; the compiler asks for an example of each.
+await checkOptions(source);
+await checkBuild();
 
 const good =
   chunks > 0 &&
-  examples === 46 &&
-  built === 26 &&
   positions.length === 3 * mesh.stats.vertices &&
   mesh.tets.length === 4 * mesh.stats.tetrahedra &&
   surface.indices.length % 3 === 0 &&

@@ -1,0 +1,80 @@
+//! `tetralod join`: parts that are built to one MT file.
+
+use super::output::{self, Verbosity};
+use super::{files, parts};
+use anyhow::{Context, Result};
+use serde::Serialize;
+use std::path::PathBuf;
+use tetralod::builder::BuildResult;
+use tetralod::builder::parts::Node;
+use tetralod::format::{EncodeOptions, encode_to};
+
+/// Joins parts that `tetralod build --part` has built: with --node eight of one level to one of the next, with -o all that has been
+/// built to one MT file.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// The folder that `tetralod part` has written.
+    #[arg(value_name = "FOLDER")]
+    folder: PathBuf,
+    /// What to make: level L, from 1, and the number there, from 0.
+    #[arg(long, value_name = "L/K", value_parser = parts::node)]
+    node: Option<Node>,
+    /// The MT file to write, once the last level has been joined.
+    #[arg(short, long, value_name = "FILE", required_unless_present = "node", conflicts_with = "node")]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    verbosity: Verbosity,
+}
+
+/// The summary as programs get it.
+#[derive(Serialize)]
+struct Report {
+    vertices: u32,
+    tetrahedra: u32,
+    base_vertices: u32,
+    base_tetrahedra: u32,
+    updates: u32,
+    depth: u32,
+    file_bytes: u64,
+}
+
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let Arguments { folder, node, output, verbosity } = arguments;
+    if let Some(node) = *node {
+        return parts::join_node(folder, node, verbosity);
+    }
+    let output = output.as_ref().context("-o FILE is missing")?;
+    files::check_ending(output, "mt")?;
+    files::check_output(output, [])?;
+    let (BuildResult { mt, summary, exact, .. }, plan) = parts::assemble(folder, verbosity)?;
+    let options = EncodeOptions {
+        block_bits: plan.block_bits(),
+        check_margins: true,
+        exact,
+        histograms: true,
+        metadata: plan.metadata().clone(),
+    };
+    let file_bytes = files::write_file(output, |out| Ok(encode_to(&mt, &options, out)?))?;
+    let report = Report {
+        vertices: summary.vertices,
+        tetrahedra: summary.tetrahedra,
+        base_vertices: summary.base_vertices,
+        base_tetrahedra: summary.base_tetrahedra,
+        updates: summary.updates,
+        depth: summary.depth,
+        file_bytes,
+    };
+    verbosity.print(
+        &report,
+        &[
+            ("file", output.display().to_string()),
+            ("reference mesh", output::mesh(report.vertices, report.tetrahedra)),
+            ("base mesh", output::mesh(report.base_vertices, report.base_tetrahedra)),
+            (
+                "updates",
+                format!("{}, at most {} deep", output::count(report.updates), output::count(report.depth)),
+            ),
+            ("file size", output::bytes(report.file_bytes)),
+        ],
+    )
+}

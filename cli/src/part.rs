@@ -1,0 +1,75 @@
+//! `tetralod part`: a mesh to parts that are built each on its own.
+
+use super::build::{BuildOptions, Way};
+use super::output::{self, Verbosity};
+use super::parts::Folder;
+use anyhow::{Context, Result};
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Parts a mesh in space, so that each part is built on its own (`tetralod build --part`) and all are joined to one MT file (`tetralod
+/// join`): for meshes that one machine cannot hold, and for clusters.
+#[derive(clap::Args)]
+pub struct Arguments {
+    #[command(flatten)]
+    options: BuildOptions,
+    /// How many parts: a power of two, at most 4096.
+    #[arg(long, value_name = "N")]
+    parts: u32,
+    /// The folder to write the parts into; it is made if need be.
+    #[arg(short, long, value_name = "FOLDER")]
+    output: PathBuf,
+    #[command(flatten)]
+    verbosity: Verbosity,
+}
+
+/// The summary as programs get it.
+#[derive(Serialize)]
+struct Report {
+    folder: String,
+    parts: u32,
+    levels: Vec<u32>,
+    tetrahedra: u64,
+}
+
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let Arguments { options, parts, output, verbosity } = arguments;
+    let mut config = options.config();
+    config.keep_points = options.restrictions.points()?;
+    let metadata = options.metadata(&config);
+    let make_folder =
+        || std::fs::create_dir_all(output).with_context(|| format!("{} could not be made", output.display()));
+    let by_pieces = options.in_pieces(&config, |input| {
+        make_folder()?;
+        match Folder(output).part_pieces(&input, &config, *parts, metadata.clone())? {
+            Ok(plan) => Ok(Some(plan)),
+            Err(why) => {
+                options.tell(&why, verbosity);
+                Ok(None)
+            }
+        }
+    });
+    let plan = if let Some(plan) = by_pieces.with_context(|| options.name())? {
+        plan
+    } else {
+        let (mesh, repaired) = options.read(&config, options.repair.level(), true)?;
+        options.repair_of(&mesh, &repaired, Way::Parts(*parts), verbosity)?;
+        make_folder()?;
+        Folder(output).part(&mesh, &config, *parts, metadata).with_context(|| options.name())?
+    };
+    let report = Report {
+        folder: output.display().to_string(),
+        parts: plan.parts(),
+        levels: plan.levels(),
+        tetrahedra: plan.counts()[1],
+    };
+    let levels: Vec<String> = report.levels.iter().map(u32::to_string).collect();
+    verbosity.print(
+        &report,
+        &[
+            ("folder", report.folder.clone()),
+            ("tetrahedra", output::count(report.tetrahedra)),
+            ("parts", levels.join(", then ")),
+        ],
+    )
+}

@@ -1,0 +1,374 @@
+//! Building in parts: a folder of files, and the steps from file to file.
+
+use super::build::{failed, with_progress};
+use super::files;
+use super::output::{self, Verbosity};
+use anyhow::{Context, Result, bail};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Mutex, PoisonError};
+use tetralod::builder::parts::{
+    self, MOST_PARTS, Node, Part, PartUpdates, PartsError, Piecewise, Plan, Scratch,
+};
+use tetralod::builder::{
+    BuildConfig, BuildResult, Construction, memory_needed_in_parts, memory_needed_in_pieces,
+};
+use tetralod::io::Pieces;
+use tetralod::mesh::TetMesh;
+
+/// Parses `I/N`: a part and how many there are.
+pub fn of_all(text: &str) -> Result<[u32; 2]> {
+    let numbers =
+        text.split_once('/').and_then(|(i, n)| Some([i.trim().parse().ok()?, n.trim().parse().ok()?]));
+    numbers.filter(|[i, n]| i < n).context("it must be I/N, as 0/8 for the first of eight")
+}
+
+/// Parses `L/K`: a level and a number there.
+pub fn node(text: &str) -> Result<Node> {
+    let numbers =
+        text.split_once('/').and_then(|(l, k)| Some((l.trim().parse().ok()?, k.trim().parse().ok()?)));
+    let (level, index) = numbers.context("it must be L/K, as 1/0 for the first of level 1")?;
+    Ok(Node { level, index })
+}
+
+/// The folder in which steps hand each other files.
+pub struct Folder<'a>(pub &'a Path);
+
+/// What `plan.json` says, for programs that plan the steps.
+#[derive(Serialize)]
+struct PlanFile {
+    parts: u32,
+    /// How many files each level has: `built-L-K.part`. Eight of one level make one of the next.
+    levels: Vec<u32>,
+    tetrahedra: u64,
+    vertices: u64,
+}
+
+impl Folder<'_> {
+    fn parted(&self, index: u32) -> PathBuf {
+        self.0.join(format!("input-{index}.part"))
+    }
+
+    fn built(&self, node: Node) -> PathBuf {
+        self.0.join(format!("built-{}-{}.part", node.level, node.index))
+    }
+
+    /// Parts a mesh.
+    pub fn part(
+        &self,
+        mesh: &TetMesh,
+        config: &BuildConfig,
+        count: u32,
+        metadata: BTreeMap<String, String>,
+    ) -> Result<Plan> {
+        let plan = parts::part(mesh, config, count, metadata, &mut |part| self.keep_parted(&part));
+        let plan = plan.map_err(said)?;
+        self.keep_plan(&plan)?;
+        Ok(plan)
+    }
+
+    /// Parts a mesh piece by piece; none, with the reason, if that takes the whole.
+    pub fn part_pieces(
+        &self,
+        input: &InPieces<'_>,
+        config: &BuildConfig,
+        count: u32,
+        metadata: BTreeMap<String, String>,
+    ) -> Result<Result<Plan, PartsError>> {
+        // Beside the parts, and gone afterwards.
+        files::in_folder_beside(&self.0.join("pieces"), |folder| {
+            let mut scratch = ScratchFolder(folder);
+            let mut part = || -> Result<Plan> {
+                let mut parting = Piecewise::new(config, count, &mut scratch)?;
+                input.pieces.for_each::<anyhow::Error>(&mut |mut piece| {
+                    (input.prepare)(&mut piece.mesh)?;
+                    Ok(parting.add(piece)?)
+                })?;
+                let plan = parting.part(metadata.clone(), &mut |part| self.keep_parted(&part))?;
+                self.keep_plan(&plan)?;
+                Ok(plan)
+            };
+            match part() {
+                Ok(plan) => Ok(Ok(plan)),
+                Err(error) => match error.downcast::<PartsError>() {
+                    Ok(error @ PartsError::NeedsWhole { .. }) => Ok(Err(error)),
+                    Ok(error) => Err(said(error)),
+                    Err(error) => Err(error),
+                },
+            }
+        })
+    }
+
+    fn keep_parted(&self, part: &Part) -> Result<(), PartsError> {
+        let write = |out: &mut dyn std::io::Write| Ok(part.write(out)?);
+        files::write_file(&self.parted(part.node().index), |out| write(out)).map_err(PartsError::other)
+    }
+
+    fn keep_plan(&self, plan: &Plan) -> Result<()> {
+        let [vertices, tetrahedra] = plan.counts();
+        let file = PlanFile { parts: plan.parts(), levels: plan.levels(), tetrahedra, vertices };
+        // Last: with it the parts are complete.
+        files::write_file(&self.0.join("plan.json"), |out| Ok(serde_json::to_writer_pretty(out, &file)?))
+    }
+
+    /// Builds a part.
+    fn build(&self, index: u32, verbosity: &Verbosity) -> Result<Step> {
+        let part = self.read(&self.parted(index), "`tetralod part`")?;
+        let before = part.tetrahedra();
+        let built = with_progress(verbosity, |progress| parts::build_part(part, progress))?;
+        self.keep(before, built.map_err(said)?)
+    }
+
+    /// Joins the parts of a node.
+    fn join(&self, node: Node, plan: &Plan, verbosity: &Verbosity) -> Result<Step> {
+        let mut left = Vec::new();
+        for child in plan.children(node).map_err(said)? {
+            left.push(self.read(&self.built(child), &command_for(child, plan))?);
+        }
+        let before = left.iter().map(Part::tetrahedra).sum();
+        let joined = with_progress(verbosity, |progress| parts::join(node, left, progress))?;
+        self.keep(before, joined.map_err(said)?)
+    }
+
+    /// Builds or joins all nodes of a level, some of them at a time, each by one thread; a node that is alone, by all.
+    fn make_level(
+        &self,
+        plan: &Plan,
+        level: u32,
+        nodes: u32,
+        side_by_side: usize,
+        verbosity: &Verbosity,
+    ) -> Result<()> {
+        let make = |index: u32, verbosity: &Verbosity| match level {
+            0 => self.build(index, verbosity),
+            _ => self.join(Node { level, index }, plan, verbosity),
+        };
+        if nodes == 1 || side_by_side == 1 {
+            return (0..nodes).try_for_each(|index| make(index, verbosity).map(drop));
+        }
+        let next = AtomicU32::new(0);
+        let failure = Mutex::new(None);
+        let work = || -> Result<()> {
+            let pool =
+                rayon::ThreadPoolBuilder::new().num_threads(1).build().context("starting the threads")?;
+            loop {
+                let index = next.fetch_add(1, Ordering::Relaxed);
+                if index >= nodes {
+                    return Ok(());
+                }
+                pool.install(|| make(index, &Verbosity::quiet()))?;
+            }
+        };
+        std::thread::scope(|scope| {
+            for _ in 0..side_by_side.min(nodes as usize) {
+                scope.spawn(|| {
+                    if let Err(error) = work() {
+                        // The others have nothing left to do.
+                        next.store(nodes, Ordering::Relaxed);
+                        failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+                    }
+                });
+            }
+        });
+        failure.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), Err)
+    }
+
+    fn keep(&self, before: usize, (part, updates): (Part, PartUpdates)) -> Result<Step> {
+        let path = self.built(part.node());
+        files::write_file(&path, |out| Ok(part.write_built(&updates, out)?))?;
+        Ok(Step {
+            file: path.display().to_string(),
+            tetrahedra: before,
+            left: part.tetrahedra(),
+            updates: updates.len(),
+        })
+    }
+
+    /// Makes the MT of all that has been built.
+    fn assemble(&self, plan: &Plan, verbosity: &Verbosity) -> Result<BuildResult> {
+        let updates = |node: Node| {
+            let path = self.built(node);
+            let file = File::open(&path).map_err(PartsError::Io);
+            file.and_then(|file| PartUpdates::read(&mut BufReader::new(file))).map_err(|error| {
+                PartsError::other(
+                    anyhow::Error::from(error).context(missing(&path, &command_for(node, plan))),
+                )
+            })
+        };
+        let whole = plan.nodes()[0];
+        let part = self.read(&self.built(whole), &command_for(whole, plan))?;
+        let built = with_progress(verbosity, |progress| parts::assemble(part, &updates, progress))?;
+        built.map_err(said)
+    }
+
+    fn read(&self, path: &Path, made_by: &str) -> Result<Part> {
+        let what = || missing(path, made_by);
+        let file = File::open(path).with_context(what)?;
+        Part::read(&mut BufReader::new(file)).with_context(what)
+    }
+
+    /// The plan, as any of the parts has it: this one.
+    fn plan(&self, of: Node) -> Result<Plan> {
+        let path = self.built(of);
+        let step = if of.level == 0 { "build --part" } else { "join --node" };
+        let what = || missing(&path, &format!("`tetralod {step}`"));
+        let file = File::open(&path).with_context(what)?;
+        Plan::read(&mut BufReader::new(file)).with_context(what)
+    }
+}
+
+fn missing(path: &Path, made_by: &str) -> String {
+    format!("{} (written by {made_by})", path.display())
+}
+
+/// The command that writes the file of a node.
+fn command_for(node: Node, plan: &Plan) -> String {
+    match node {
+        Node { level: 0, index } => format!("`tetralod build --part {index}/{}`", plan.parts()),
+        Node { level, index } => format!("`tetralod join --node {level}/{index}`"),
+    }
+}
+
+/// An error of building names the option that helps.
+fn said(error: PartsError) -> anyhow::Error {
+    match error {
+        PartsError::Build(error) => failed(error),
+        PartsError::Other(error) => anyhow::Error::from_boxed(error),
+        error => error.into(),
+    }
+}
+
+/// The summary of a step.
+#[derive(Serialize)]
+struct Step {
+    file: String,
+    tetrahedra: usize,
+    left: usize,
+    updates: usize,
+}
+
+impl Step {
+    fn print(&self, verbosity: &Verbosity) -> Result<()> {
+        let count = |n: usize| output::count(n as u64);
+        verbosity.print(
+            self,
+            &[
+                ("file", self.file.clone()),
+                ("tetrahedra", format!("{}, of which {} are left", count(self.tetrahedra), count(self.left))),
+                ("updates", count(self.updates)),
+            ],
+        )
+    }
+}
+
+/// Builds one part of a folder: `tetralod build --part`.
+pub fn build_part(inputs: &[PathBuf], [index, all]: [u32; 2], verbosity: &Verbosity) -> Result<()> {
+    let [folder] = inputs else { bail!("--part takes one folder, the one that `tetralod part` has written") };
+    let folder = Folder(folder);
+    let path = folder.parted(index);
+    let what = || missing(&path, "`tetralod part`");
+    let plan = Plan::read(&mut BufReader::new(File::open(&path).with_context(what)?)).with_context(what)?;
+    if plan.parts() != all {
+        bail!("{} has {} parts, not {all}", folder.0.display(), plan.parts());
+    }
+    folder.build(index, verbosity)?.print(verbosity)
+}
+
+/// Joins parts of a folder: `tetralod join --node`.
+pub fn join_node(folder: &Path, node: Node, verbosity: &Verbosity) -> Result<()> {
+    let folder = Folder(folder);
+    // No file is read but those that are joined: others may be on other machines.
+    let child = node.first_child().context("parts of level 0 are made by `tetralod build --part`")?;
+    let plan = folder.plan(child)?;
+    folder.join(node, &plan, verbosity)?.print(verbosity)
+}
+
+/// The MT of a folder in which all parts are built and joined, and its plan.
+pub fn assemble(folder: &Path, verbosity: &Verbosity) -> Result<(BuildResult, Plan)> {
+    let folder = Folder(folder);
+    let plan = folder.plan(Node { level: 0, index: 0 })?;
+    Ok((folder.assemble(&plan, verbosity)?, plan))
+}
+
+/// A mesh in several files, and what is to be done to each piece.
+pub struct InPieces<'a> {
+    pub pieces: Pieces,
+    pub prepare: &'a dyn Fn(&mut TetMesh) -> Result<()>,
+}
+
+/// A folder for what is not kept in memory.
+struct ScratchFolder<'a>(&'a Path);
+
+impl Scratch for ScratchFolder<'_> {
+    fn write(&mut self, name: &str, bytes: &[u8]) -> std::io::Result<()> {
+        std::fs::write(self.0.join(name), bytes)
+    }
+
+    fn read(&self, name: &str) -> std::io::Result<Vec<u8>> {
+        std::fs::read(self.0.join(name))
+    }
+
+    fn remove(&mut self, name: &str) -> std::io::Result<()> {
+        std::fs::remove_file(self.0.join(name))
+    }
+}
+
+/// What is parted.
+pub enum Whole<'a> {
+    Mesh(TetMesh),
+    Pieces(InPieces<'a>),
+}
+
+/// A mesh that is built in parts by one process.
+pub struct Parting<'a> {
+    pub whole: Whole<'a>,
+    pub config: &'a BuildConfig,
+    pub count: u32,
+    pub metadata: BTreeMap<String, String>,
+    /// How many parts are built at a time.
+    pub side_by_side: usize,
+}
+
+impl Parting<'_> {
+    /// Builds it, in a folder beside the output that is gone afterwards.
+    ///
+    /// None, with the reason, if pieces of it cannot be parted one by one.
+    pub fn build(self, output: &Path, verbosity: &Verbosity) -> Result<Result<BuildResult, PartsError>> {
+        files::in_folder_beside(output, |path| {
+            let folder = Folder(path);
+            let Self { whole, config, count, metadata, side_by_side } = self;
+            let plan = match whole {
+                Whole::Mesh(mesh) => folder.part(&mesh, config, count, metadata)?,
+                Whole::Pieces(input) => match folder.part_pieces(&input, config, count, metadata)? {
+                    Ok(plan) => plan,
+                    Err(why) => return Ok(Err(why)),
+                },
+            };
+            for (level, nodes) in (0..).zip(plan.levels()) {
+                folder.make_level(&plan, level, nodes, side_by_side, verbosity)?;
+            }
+            folder.assemble(&plan, verbosity).map(Ok)
+        })
+    }
+}
+
+/// In how many parts a mesh of so many points, tetrahedra and fields is built within so much memory, as many at a time as there are
+/// threads; none if it is not.
+///
+/// If it comes in pieces, there are so many, and the largest one has so many tetrahedra.
+pub fn count_for(config: &BuildConfig, counts: [u64; 3], pieces: Option<[u64; 2]>, most: u64) -> Option<u32> {
+    let Construction::HalfEdge { .. } = config.construction else { return None };
+    let parts = std::iter::successors(Some(2_u32), |count| Some(2 * count)).take_while(|&n| n <= MOST_PARTS);
+    parts.into_iter().find(|&count| {
+        let at_a_time = rayon::current_num_threads().min(count as usize);
+        let needed = match pieces {
+            None => memory_needed_in_parts(counts, count, at_a_time as u32),
+            Some(pieces) => memory_needed_in_pieces(counts, pieces, count, at_a_time as u32),
+        };
+        needed <= most
+    })
+}

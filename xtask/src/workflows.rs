@@ -1,0 +1,164 @@
+//! Promise: the workflows of `workflows/`, by Snakemake and by the plain shell, build the file that `tetralod build --parts` builds, byte for
+//! byte, also where a process is killed in the middle and the same command is given again; then nothing that is finished is done twice.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, Result, ensure};
+
+use crate::{browser, shell};
+
+const SOURCES: &str = "workflows";
+const FOLDER: &str = "target/workflows";
+
+/// How many parts: enough for three levels.
+const PARTS: u32 = 16;
+
+/// Options of `build`.
+const OPTIONS: [&str; 2] = ["--position-bits", "16"];
+
+/// What is run in place of the program: it notes down each call, and kills the first process that builds part 1.
+const WRAPPER: &str = r#"#!/bin/sh
+echo "$*" >> "$CALLS"
+case "$1 $*" in
+    "build "*"--part 1/"*)
+        if mkdir "$CALLS.killed" 2>/dev/null; then
+            "$PROGRAM" "$@" &
+            sleep 0.02
+            kill -9 $!
+            wait $!
+            exit
+        fi
+        ;;
+esac
+exec "$PROGRAM" "$@"
+"#;
+
+/// Runs the workflows on a small volume.
+pub fn test() -> Result<()> {
+    let program = shell::tested_command()?;
+    let snakemake = snakemake()?;
+    let run = Run::new(&program)?;
+    shell::run(shell::command(&program, ["generate", "bucky", "--size", "33", "-o"]).arg(&run.input))?;
+    let undisturbed = run.output("undisturbed");
+    let mut one_process = shell::command(&program, ["build", "--quiet", "--parts", &PARTS.to_string()]);
+    shell::run(one_process.args(OPTIONS).arg(&run.input).arg("-o").arg(&undisturbed))?;
+    run.kill_and_go_on("shell", |output, calls| run.shell(output, calls))?;
+    run.kill_and_go_on("snakemake", |output, calls| run.snakemake(&snakemake, output, calls))?;
+    let expected = fs::read(&undisturbed)?;
+    for name in ["shell", "snakemake"] {
+        let built = fs::read(run.output(name))?;
+        ensure!(built == expected, "{name}: the file differs from the one that one process has built");
+    }
+    shell::run(shell::command(&program, ["verify"]).arg(&undisturbed).arg("--against").arg(&run.input))
+}
+
+/// A folder for one run of the test.
+struct Run {
+    folder: PathBuf,
+    input: PathBuf,
+    program: PathBuf,
+    wrapper: PathBuf,
+}
+
+impl Run {
+    fn new(program: &Path) -> Result<Self> {
+        let folder = shell::root().join(FOLDER).join("run");
+        if folder.exists() {
+            fs::remove_dir_all(&folder)?;
+        }
+        fs::create_dir_all(&folder)?;
+        let wrapper = folder.join("wrapper.sh");
+        fs::write(&wrapper, WRAPPER)?;
+        shell::run(shell::command("chmod", ["+x"]).arg(&wrapper))?;
+        let (program, input) = (program.to_owned(), folder.join("volume.vti"));
+        Ok(Self { folder, input, program, wrapper })
+    }
+
+    fn output(&self, name: &str) -> PathBuf {
+        self.folder.join(format!("{name}.mt"))
+    }
+
+    fn shell(&self, output: &Path, calls: &str) -> Command {
+        let mut command = shell::command("sh", [format!("{SOURCES}/build-in-parts.sh")]);
+        command.args(["--jobs", "4", "--parts", &PARTS.to_string(), "--command"]).arg(&self.wrapper);
+        command.arg("-o").arg(output).arg(&self.input).arg("--").args(OPTIONS);
+        self.counted(command, calls)
+    }
+
+    fn snakemake(&self, snakemake: &Path, output: &Path, calls: &str) -> Command {
+        let mut command = shell::command(snakemake, ["--cores", "4", "--keep-going", "--quiet", "all"]);
+        command.args(["--snakefile", &format!("{SOURCES}/Snakefile"), "--directory"]).arg(&self.folder);
+        let setting = |name: &str, path: &Path| format!("{name}={}", path.display());
+        command.arg("--config").args([setting("input", &self.input), setting("output", output)]);
+        command.args([format!("parts={PARTS}"), setting("command", &self.wrapper)]);
+        command.arg(format!("options={}", OPTIONS.join(" ")));
+        self.counted(command, calls)
+    }
+
+    fn counted(&self, mut command: Command, calls: &str) -> Command {
+        command.env("PROGRAM", &self.program).env("CALLS", self.folder.join(calls));
+        command
+    }
+
+    /// Runs a workflow in which a process is killed; then again, to the end.
+    fn kill_and_go_on(&self, name: &str, workflow: impl Fn(&Path, &str) -> Command) -> Result<()> {
+        println!("{name}: a process is killed, which is an error; then it goes on");
+        let (output, calls) = (self.output(name), format!("{name}.calls"));
+        let failed = workflow(&output, &calls).output()?;
+        ensure!(!failed.status.success(), "{name}: a process was killed, and nothing was said");
+        ensure!(!output.exists(), "{name}: there is a file, though a part is missing");
+        let part = self.folder.join(format!("{name}.mt.parts/built-0-1.part"));
+        ensure!(!part.exists(), "{name}: the process that was killed left {}", part.display());
+        shell::run(&mut workflow(&output, &calls))?;
+        self.check_calls(name, &calls)
+    }
+
+    /// Every step was done once, but for the one that was killed.
+    fn check_calls(&self, name: &str, calls: &str) -> Result<()> {
+        let file = self.folder.join(calls);
+        let text = fs::read_to_string(&file).with_context(|| file.display().to_string())?;
+        let mut found: Vec<&str> = text.lines().collect();
+        found.sort_unstable();
+        let all = found.len();
+        found.dedup();
+        ensure!(all == found.len() + 1, "{name}: steps that were finished were done again:\n{text}");
+        // The parts, two nodes over eight of them each, one over these, the first step and the last.
+        ensure!(
+            found.len() as u32 == PARTS + 2 + 1 + 2,
+            "{name}: these are not the steps that are needed:\n{text}"
+        );
+        Ok(())
+    }
+}
+
+/// Snakemake, in an environment of its own, which is made where it is missing or another version.
+fn snakemake() -> Result<PathBuf> {
+    let wanted = fs::read_to_string(Path::new(SOURCES).join("requirements.txt"))?;
+    let environment = shell::root().join(FOLDER).join("venv");
+    let (program, done) = (environment.join("bin/snakemake"), environment.join("installed.txt"));
+    if fs::read_to_string(&done).is_ok_and(|installed| installed == wanted) {
+        return Ok(program);
+    }
+    println!("installing Snakemake");
+    require_python()?;
+    shell::run(shell::command("python3", ["-m", "venv", "--clear"]).arg(&environment))?;
+    let install = ["install", "--quiet", "--disable-pip-version-check", "--requirement"];
+    let requirements = Path::new(SOURCES).join("requirements.txt");
+    shell::run(shell::command(environment.join("bin/pip"), install).arg(requirements))?;
+    fs::write(done, wanted)?;
+    Ok(program)
+}
+
+/// Python as Snakemake needs it.
+fn require_python() -> Result<()> {
+    let check = "import ensurepip, sys, venv; sys.exit(sys.version_info < (3, 11))";
+    let is_there = || shell::succeeds(&mut shell::command("python3", ["-c", check]));
+    let by_hand = "Python 3.11 or later with its module `venv` is needed: install it (Debian: the package `python3-venv`)";
+    if !is_there() {
+        browser::install_packages("Python", &["python3-venv"], by_hand)?;
+    }
+    ensure!(is_there(), by_hand);
+    Ok(())
+}
