@@ -5,7 +5,7 @@ import { count, milliseconds, percentage, pixels, size, vtuBytes } from "./forma
 import { fail } from "./messages.js";
 import { demo, page } from "./page.js";
 import { budget, errorPixels } from "./request.js";
-import { showEmpty, showHistogram } from "./scene.js";
+import { noteEmpty, showEmpty, showHistogram } from "./scene.js";
 
 /** @param {import("tetralod/viewer").ViewerProgress} progress */
 export function showProgress({ bytes, total, complete, blocks }) {
@@ -44,6 +44,7 @@ function showBlocks({ here, all, needed, leftOut }, bytes) {
 
 export function showStats(stats) {
   demo.step = stats;
+  showEmpty();
   const { info } = demo;
   $("n-current").textContent = count(stats.tetrahedra);
   const all = info ? ` of ${count(info.updates)}` : "";
@@ -80,7 +81,7 @@ function limit({ satisfied, missing }) {
 }
 
 export function showFrame(frame) {
-  showEmpty(frame);
+  noteEmpty(frame);
   demo.frame = frame;
   demo.frames++;
   if (!frame.ready) return;

@@ -214,9 +214,18 @@ export function applyCut() {
   if ($("region").value === "cut") refine();
 }
 
-/** Says so where the surface is empty. @param {import("tetralod/viewer").ViewerFrame} frame */
-export function showEmpty({ ready, triangles }) {
-  const isEmpty = mode() === "iso" && ready && page.field !== undefined && triangles === 0 && demo.step?.done === true;
+/** Whether the last frame showed a surface without a triangle. */
+let frameIsEmpty = false;
+
+/** Notes whether a frame shows an empty surface. @param {import("tetralod/viewer").ViewerFrame} frame */
+export function noteEmpty({ ready, triangles }) {
+  frameIsEmpty = mode() === "iso" && ready && triangles === 0;
+  showEmpty();
+}
+
+/** Says so where the surface is empty and no step may yet fill it: the last step may come before or after the last frame. */
+export function showEmpty() {
+  const isEmpty = frameIsEmpty && mode() === "iso" && page.field !== undefined && demo.step?.done === true;
   if (isEmpty !== $("empty").hidden) return;
   $("empty").hidden = !isEmpty;
   if (!isEmpty) return;

@@ -5,7 +5,7 @@ import { fileURLToPath } from "node:url";
 import { address, launch } from "./browser.js";
 import { study } from "./study.js";
 
-export { assertDrawn, differing, study } from "./study.js";
+export { assertDrawn, differing, distance, study } from "./study.js";
 
 export const pictures = new URL("../../target/e2e/", import.meta.url);
 export const PATIENCE = 90_000;

@@ -73,6 +73,16 @@ test("all is reached with keys, and the list of keys has them", async () => {
   await page.locator("#empty").waitFor({ timeout: PATIENCE });
   assert.match(await page.innerText("#empty"), /99 is outside of the range of density/);
   await screenshot(page, "page-empty");
+  // The last step may change nothing: then no frame follows it, and the page must say so all the same.
+  const shown = await page.evaluate(() => {
+    const { viewer, step, frame } = window.tetralodDemo;
+    const after = (name, detail) => {
+      viewer.dispatchEvent(new CustomEvent(name, { detail }));
+      return !document.getElementById("empty").hidden;
+    };
+    return [after("stats", { ...step, done: false }), after("frame", frame), after("stats", { ...step, done: true })];
+  });
+  assert.deepEqual(shown, [false, false, true]);
   await page.click("#empty-middle");
   await page.locator("#empty").waitFor({ state: "hidden", timeout: PATIENCE });
 
