@@ -2,6 +2,7 @@
 //! decimation, and what requests find in them; writes its part of `docs/benchmarks.md`.
 
 use std::fmt::Write;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -15,19 +16,24 @@ use crate::{bench_against_vtk, shell};
 const FOLDER: &str = "target/bench";
 
 /// Points along an edge of the grids.
-const SIZES: [u32; 4] = [33, 65, 97, 129];
+const SIZES: [u32; 5] = [33, 65, 97, 129, LARGE];
+
+/// 99.5 million tetrahedra: built only within a limit of memory, and verified by samples.
+const LARGE: u32 = 256;
+const SAMPLES: &str = "16";
 
 /// Up to this size grids are built several times, and VTK decimates them, too.
 const SMALL: u32 = 65;
 const ROUNDS: usize = 3;
 
-/// How each is built: a name, options, and the least size.
-const WAYS: [(&str, &[&str], u32); 5] = [
-    ("whole, one thread", &["--threads", "1"], 0),
-    ("whole, all threads", &[], 0),
-    ("8 parts, one thread", &["--threads", "1", "--parts", "8"], 65),
-    ("8 parts, all threads", &["--parts", "8"], 65),
-    ("64 parts, all threads", &["--parts", "64"], 97),
+/// How each is built: a name, options, and the sizes.
+const WAYS: [(&str, &[&str], Range<u32>); 6] = [
+    ("whole, one thread", &["--threads", "1"], 0..LARGE),
+    ("whole, all threads", &[], 0..LARGE),
+    ("8 parts, one thread", &["--threads", "1", "--parts", "8"], 65..LARGE),
+    ("8 parts, all threads", &["--parts", "8"], 65..LARGE),
+    ("64 parts, all threads", &["--parts", "64"], 97..LARGE),
+    ("--memory 8G, all threads", &["--memory", "8G"], LARGE..u32::MAX),
 ];
 
 /// What VTK is asked to keep of the tetrahedra.
@@ -76,6 +82,7 @@ pub fn run(sizes: &[String]) -> Result<()> {
     let mut found =
         "| grid | | at 5 % | at 1 % | at 0.2 % | box at 1 % | kB for 1 % | kB for the box |\n".to_owned();
     found += "|--:|---|--:|--:|--:|--:|--:|--:|\n";
+    let mut verified = String::new();
     for &size in if only.is_empty() { &SIZES[..] } else { &only } {
         let tetrahedra = tetrahedra(size);
         for way in measure(&tetralod, size)? {
@@ -101,9 +108,12 @@ pub fn run(sizes: &[String]) -> Result<()> {
                     requests(&tetralod, &file)?
                 )?;
             }
+            if size >= LARGE {
+                verified += &verify(&tetralod, size, &file)?;
+            }
         }
     }
-    let table = [&times, FOUND, &found].concat();
+    let table = [&times, FOUND, &found, &verified].concat();
     println!("{table}");
     if only.is_empty() { benchmarks_page::write(Part::Builds, &[HEAD, &table].concat()) } else { Ok(()) }
 }
@@ -113,17 +123,21 @@ fn tetrahedra(size: u32) -> f64 {
     6.0 * f64::from(size - 1).powi(3)
 }
 
+fn volume(size: u32) -> PathBuf {
+    Path::new(FOLDER).join(format!("bucky{size}.vti"))
+}
+
 /// All ways, one after the other in each round, so that what else the machine does meets all alike.
 fn measure(tetralod: &Path, size: u32) -> Result<Vec<Way>> {
-    let input = Path::new(FOLDER).join(format!("bucky{size}.vti"));
+    let input = volume(size);
     shell::run(
         shell::command(tetralod, ["generate", "bucky", "--size", &size.to_string(), "-o"]).arg(&input),
     )?;
     let rounds = if size <= SMALL { ROUNDS } else { 1 };
     let mut ways = Vec::new();
-    for (i, (name, options, least)) in (0..).zip(WAYS) {
+    for (i, (name, options, sizes)) in (0..).zip(WAYS) {
         let file = Path::new(FOLDER).join(format!("build-{size}-{i}.mt"));
-        if size >= least {
+        if sizes.contains(&size) {
             ways.push((
                 Way {
                     name: name.to_owned(),
@@ -187,6 +201,19 @@ fn requests(tetralod: &Path, file: &Path) -> Result<String> {
     Ok(row)
 }
 
+/// What samples of a file say of it.
+fn verify(tetralod: &Path, size: u32, file: &Path) -> Result<String> {
+    let mut command = shell::command(tetralod, ["verify", "--json", "--samples", SAMPLES, "--against"]);
+    let (seconds, bytes, report) = measured(command.arg(volume(size)).arg(file))?;
+    Ok(format!(
+        "\n`tetralod verify --samples {SAMPLES}` on {size}³: no broken promise, the worst error is {:.0} % of what is promised; {:.0} MB \
+         of the file read, {seconds:.0} s, {:.1} GB of memory, most of it for the input.\n",
+        100.0 * number(&report, "worst_error_ratio")?,
+        number(&report, "bytes_read")? / 1e6,
+        bytes / 1e9
+    ))
+}
+
 /// Runs a command that prints JSON: its seconds, the most memory that it had in bytes, and what it prints.
 fn measured(command: &mut Command) -> Result<(f64, f64, Value)> {
     let start = Instant::now();
@@ -202,7 +229,7 @@ fn measured(command: &mut Command) -> Result<(f64, f64, Value)> {
         if child.try_wait()?.is_some() {
             let seconds = start.elapsed().as_secs_f64();
             let output = child.wait_with_output()?;
-            ensure!(output.status.success(), "building failed");
+            ensure!(output.status.success(), "{command:?} failed");
             return Ok((seconds, most, serde_json::from_slice(&output.stdout)?));
         }
         std::thread::sleep(Duration::from_millis(20));
