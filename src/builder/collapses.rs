@@ -4,12 +4,13 @@
 //! collapse takes away is removed by the update whose inverse has made it. So no tetrahedron is recorded, only the collapse that made
 //! each of a star, and which of its faces were inside of that collapse's filling.
 
-use super::append::{Appender, Ordered, without};
+use super::append::{Appender, Ordered};
 use super::base::{Numbered, number_base};
 use super::block_order;
 use super::decimate::{Record, Removed};
-use super::hole::{Hole, sorted};
+use super::hole::{Across, Hole};
 use super::quantize::Quantized;
+use super::work_mesh::keep;
 use super::{BuildError, BuildProgress, BuildSummary, OnProgress, quantize};
 use crate::mesh::NONE;
 use crate::mt::{ErrorCode, HalfEdgeMt, MtInfo, VertexId};
@@ -48,8 +49,6 @@ pub(super) struct Collapses {
     /// What is left.
     base: Vec<[u32; 4]>,
     base_marks: Vec<(u32, u8)>,
-    /// Scratch space: the faces of a hole, each with its place there.
-    faces: Vec<([u32; 3], u32)>,
 }
 
 /// A star has about so many tetrahedra, or a few less.
@@ -66,12 +65,9 @@ impl Record for Collapses {
 
     fn add(&mut self, removed: &Removed<'_>, quantized: &Quantized) {
         let Removed { hole, makers, errors, step, .. } = *removed;
-        self.faces.clear();
-        self.faces.extend((0..).zip(&hole.faces).map(|(i, &(face, _))| (sorted(face), i)));
-        self.faces.sort_unstable();
         let first = self.makers.len();
-        for &(_, i) in &self.faces {
-            let t = hole.star[i as usize].tet as usize;
+        for &i in &hole.sorted {
+            let t = hole.star[usize::from(i)].tet as usize;
             self.makers.push(makers[t]);
             self.inner.push(self.inner_now[t]);
         }
@@ -85,6 +81,10 @@ impl Record for Collapses {
         self.vertices.push(hole.a);
         self.add_near(removed);
         self.mark_filling(removed);
+    }
+
+    fn renumber(&mut self, live: &[u32]) {
+        keep(&mut self.inner_now, live);
     }
 
     fn finish(&mut self, tets: &[[u32; 4]], makers: &[u32]) {
@@ -206,11 +206,12 @@ impl Collapses {
     /// around it keeps them.
     fn add_near(&mut self, removed: &Removed<'_>) {
         let Removed { hole, filling, end, .. } = *removed;
-        let moves = |tet: &[u32; 4], v: u32| {
+        let moves = |(tet, across): (&[u32; 4], &[Across; 4]), v: u32| {
             let at = tet.iter().position(|&corner| corner == v);
-            at.is_some_and(|i| self.is_face(&sorted(without(*tet, i))))
+            at.is_some_and(|i| matches!(across[i], Across::Face(_)))
         };
-        let shared = |v: &&u32| **v == end || filling.tets.iter().all(|tet| moves(tet, **v));
+        let cells = || filling.tets.iter().zip(&filling.across);
+        let shared = |v: &&u32| **v == end || cells().all(|cell| moves(cell, **v));
         let around = |v: &u32| hole.faces.iter().filter(|(face, _)| face.contains(v)).count();
         let first = filling.tets.first().copied().unwrap_or([end; 4]);
         let found: Vec<(usize, u32)> = first.iter().filter(shared).map(|v| (around(v), *v)).collect();
@@ -221,18 +222,13 @@ impl Collapses {
         self.also_near.extend(best.map(|v| (collapse, v)));
     }
 
-    /// Whether three vertices in increasing order are a face of the hole.
-    fn is_face(&self, face: &[u32; 3]) -> bool {
-        self.faces.binary_search_by(|(other, _)| other.cmp(face)).is_ok()
-    }
-
     /// Notes which faces of the filling are inside: those that are no face of the hole. Those opposite a near vertex all are.
     fn mark_filling(&mut self, removed: &Removed<'_>) {
-        for (&t, &tet) in removed.slots.iter().zip(&removed.filling.tets) {
-            let mut tet = tet;
-            tet.sort_unstable();
-            let inside = |&i: &usize| !self.is_face(&without(tet, i));
-            self.inner_now[t as usize] = (0..4).filter(inside).fold(0, |bits, i| bits | 1 << i);
+        let Removed { slots, filling, .. } = *removed;
+        for ((&t, tet), across) in slots.iter().zip(&filling.tets).zip(&filling.across) {
+            let rank = |v: u32| tet.iter().filter(|&&other| other < v).count();
+            let inside = (0..4).filter(|&i| !matches!(across[i], Across::Face(_)));
+            self.inner_now[t as usize] = inside.fold(0, |bits, i| bits | 1 << rank(tet[i]));
         }
     }
 

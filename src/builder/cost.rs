@@ -56,6 +56,13 @@ impl Buckets {
         Self { inside, border: SparseLists::default(), outside_points }
     }
 
+    /// Keeps the buckets of these tetrahedra, which ascend, under their places as numbers. All others are empty.
+    pub fn renumber(&mut self, live: &[u32]) {
+        self.inside.renumber(live);
+        self.border.renumber(live);
+        self.outside_points.renumber(live);
+    }
+
     /// Empties the buckets of a tetrahedron, which may be a new one.
     pub fn clear(&mut self, t: u32) {
         self.inside.reserve(t);

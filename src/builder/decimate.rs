@@ -11,7 +11,7 @@ use super::removal::{RemovalSearch, State};
 use super::restrictions::Restrictions;
 use super::rounds::{Later, Rounds};
 use super::searches::Searches;
-use super::work_mesh::WorkMesh;
+use super::work_mesh::{WorkMesh, keep};
 use super::{
     BuildConfig, BuildCriterion, BuildError, BuildProgress, OnProgress, Purpose, field_selection, quantize,
 };
@@ -53,6 +53,9 @@ pub(super) trait Record {
 
     /// Adds a removal that has just been carried out.
     fn add(&mut self, removed: &Removed<'_>, quantized: &Quantized);
+
+    /// Tetrahedra have new numbers: their places in this list of the old ones, which ascend.
+    fn renumber(&mut self, live: &[u32]);
 
     /// Ends with the tetrahedra that are left, those that begin with [`NONE`] being dead; and the removal that made each.
     fn finish(&mut self, tets: &[[u32; 4]], makers: &[u32]);
@@ -150,9 +153,6 @@ fn take_tets(mesh: &mut Cow<'_, TetMesh>, config: &BuildConfig) -> Vec<[u32; 4]>
 pub(super) struct Decimator<'a, R: ?Sized> {
     pub state: State<'a>,
     rounds: Rounds,
-    /// That of the vertex which is removed next.
-    search: RemovalSearch,
-    /// Those of candidates.
     searches: Searches,
     slots: Vec<u32>,
     /// The removals so far.
@@ -175,9 +175,8 @@ impl<'a, R: Record + ?Sized> Decimator<'a, R> {
         let mut rounds = Rounds::new(state.levels.of(0.0), state.levels.last(), points);
         let free = (0..points as u32).filter(|&v| state.mesh.has(v) && !state.frozen[v as usize]);
         free.for_each(|v| rounds.wait(v));
-        let searches = Searches::new(gift_wrap.as_ref());
-        let search = RemovalSearch::new(gift_wrap);
-        Self { state, rounds, search, searches, slots: Vec::new(), record }
+        let searches = Searches::new(gift_wrap);
+        Self { state, rounds, searches, slots: Vec::new(), record }
     }
 
     pub fn remove_all(&mut self, progress: OnProgress<'_>) -> Result<(), BuildError> {
@@ -191,10 +190,22 @@ impl<'a, R: Record + ?Sized> Decimator<'a, R> {
             let before = self.record.len();
             self.state.weigh_squares(vertices - before);
             self.round(progress)?;
+            self.compact();
             let after = self.record.len();
             if !self.rounds.end(after - before, vertices - after) || self.state.mesh.live() <= enough {
                 return Ok(());
             }
+        }
+    }
+
+    /// Frees what belongs to tetrahedra that are gone, if they are many.
+    fn compact(&mut self) {
+        let State { mesh, buckets, removals, restrictions, .. } = &mut self.state;
+        if let Some(live) = mesh.compact() {
+            buckets.renumber(&live);
+            keep(&mut removals.makers, &live);
+            restrictions.renumber(&live);
+            self.record.renumber(&live);
         }
     }
 
@@ -254,44 +265,64 @@ impl<'a, R: Record + ?Sized> Decimator<'a, R> {
         }
     }
 
-    /// Removes the vertices that are due before those with this guess, unless the round has changed their stars.
+    /// Removes the vertices that are due before those with this guess, unless the round has changed their stars. Some are prepared at
+    /// a time; what one of them changes decides again about those that come after it.
     fn remove_before(&mut self, guess: u32, ready: &mut BinaryHeap<Reverse<Key>>) {
-        while ready.peek().is_some_and(|Reverse(key)| key.second() < guess) {
-            let Some(Reverse(key)) = ready.pop() else { return };
-            if self.rounds.waits(key.a) {
-                continue;
+        let mut keys = Vec::new();
+        loop {
+            keys.clear();
+            while keys.len() < self.searches.ahead.len()
+                && ready.peek().is_some_and(|Reverse(key)| key.second() < guess)
+            {
+                keys.extend(ready.pop().map(|Reverse(key)| key).filter(|key| !self.rounds.waits(key.a)));
             }
-            // The star and the error are unchanged. The star of the other end may have changed, and the topology check
-            // depends on it.
-            let level = self.rounds.level();
-            match self.search.at(&self.state, key.a, key.b, level) {
-                Some(found) if found.level() <= level => self.remove(),
-                _ => self.rounds.wait(key.a),
+            if keys.is_empty() {
+                return;
+            }
+            let due = self.searches.prepare(&self.state, &keys, self.rounds.level());
+            let before = self.record.len();
+            for (i, (&key, is_due)) in keys.iter().zip(due).enumerate() {
+                if !self.rounds.waits(key.a) {
+                    self.settle(i, key, is_due, self.record.len() > before);
+                }
             }
         }
     }
 
-    /// Removes the vertex that was evaluated last.
-    fn remove(&mut self) {
-        let Self { state, search, slots, record, .. } = self;
-        let RemovalSearch { hole, best, .. } = search;
+    /// Carries out the `i`-th of the prepared removals if it is due. `changed`: others have been carried out since it was prepared.
+    fn settle(&mut self, i: usize, key: Key, is_due: bool, changed: bool) {
+        // The star and the error are unchanged. The star of the other end may have changed, and the topology check depends on it.
+        let search = &mut self.searches.ahead[i];
+        let is_due = match changed && (!is_due || search.is_stale(&self.state)) {
+            true => search.prepare(&self.state, key, self.rounds.level()),
+            false => is_due,
+        };
+        if is_due { self.remove(i) } else { self.rounds.wait(key.a) }
+    }
+
+    /// Carries out the `i`-th of the prepared removals.
+    fn remove(&mut self, i: usize) {
+        let Self { state, searches, rounds, slots, record, .. } = self;
+        let RemovalSearch { hole, best, best_end, .. } = &mut searches.ahead[i];
+        let (hole, end) = (&*hole, *best_end);
         let State { mesh, removals, degrees, reference, reaches, restrictions, .. } = state;
         // Never zero: error 0 is to mean the reference mesh, with every vertex in.
         let stored = |error: &f64| ErrorCode::at_least(*error).max(ErrorCode(1));
         let errors: Vec<ErrorCode> = best.cost.placement.errors.iter().map(stored).collect();
         let removal = (removals.errors.len() / errors.len()) as u32;
         hole.replace(mesh, &best.filling, slots);
+        let reach = reaches[hole.a as usize];
         let removed = Removed {
             hole,
             filling: &best.filling,
             slots,
             makers: &removals.makers,
-            end: search.best_end,
+            end,
             errors: &errors,
             step: best.cost.step,
-            reach: reaches[hole.a as usize],
+            reach,
         };
-        restrictions.contracted(hole, search.best_end, slots, &reference.quantized.positions);
+        restrictions.contracted(hole, end, slots, &reference.quantized.positions);
         record.add(&removed, reference.quantized);
         removals.errors.extend(errors);
         slots.iter().for_each(|&t| removals.makers[t as usize] = removal);
@@ -302,14 +333,12 @@ impl<'a, R: Record + ?Sized> Decimator<'a, R> {
         degrees[hole.a as usize] -= hole.star.len() as u32;
         best.filling.tets.iter().flatten().for_each(|&v| degrees[v as usize] += 1);
         // The neighbours have other stars now, and may have become cheaper.
-        let reach = self.state.reaches[self.search.hole.a as usize];
-        for i in 0..self.search.hole.link.len() {
-            let v = self.search.hole.link[i];
-            self.state.versions[v as usize] = self.state.versions[v as usize].wrapping_add(1);
+        for &v in &hole.link {
+            state.versions[v as usize] = state.versions[v as usize].wrapping_add(1);
             // What was in the star of v, and is not any more, lies within the reach of this removal.
-            self.state.reaches[v as usize].join(&reach);
-            if !self.state.frozen[v as usize] {
-                self.rounds.wait(v);
+            reaches[v as usize].join(&reach);
+            if !state.frozen[v as usize] {
+                rounds.wait(v);
             }
         }
     }

@@ -107,6 +107,11 @@ impl Removals {
 }
 
 impl FillCost {
+    /// Whether the boundary stays where it is.
+    pub fn is_flat(&self) -> bool {
+        self.flat
+    }
+
     /// The largest error of all fields; once it exceeds `limit`, any lower bound above `limit` may be returned.
     pub fn evaluate(&mut self, hole_cost: &HoleCost, buckets: &Buckets, limit: f64, input: Input<'_>) -> f64 {
         let Input { hole, filling, reference } = input;

@@ -1,7 +1,7 @@
 //! Filling a hole by contracting an edge: all that was at its one end moves to the other, which stays where it is.
 
 use super::hole::{FaceSet, Filling, Hole};
-use super::work_mesh::{StarTet, TetSet, WorkMesh};
+use super::work_mesh::{LARGEST_STAR, StarTet, TetSet, WorkMesh};
 use crate::mesh::NONE;
 
 const NEAR_A: u8 = 1;
@@ -9,25 +9,25 @@ const ON_FAN: u8 = 2;
 const BORDER_A: u8 = 4;
 const FAN_END: u8 = 8;
 
-/// Around larger stars than this no edge along the boundary is contracted.
-const LARGEST_STAR: usize = 512;
-
-/// Fills the hole with tetrahedra at its `i`-th link vertex, once [`Hole::find_sides`] was called: false if one of them were not positive, or the boundary does
-/// not allow it.
+/// Whether the hole may be filled with tetrahedra at its `i`-th link vertex, once [`Hole::find_sides`] was called: all of them are
+/// positive, and the edge is not one that the boundary forbids to contract.
 ///
 /// Inside, positive tetrahedra are all it takes: the hole is then star-shaped around `b`, too. Next to the boundary,
 /// which may have come to overlap itself, [`keeps_topology`] must hold, too.
-pub(super) fn contract(hole: &Hole, i: usize, filling: &mut Filling) -> bool {
-    filling.clear();
+pub(super) fn may_contract(hole: &Hole, i: usize) -> bool {
     let b = hole.link[i];
     if hole.on_boundary() && hole.border.iter().flatten().filter(|&&v| v == b).count() != 2 {
         // An edge through the inside between two boundary vertices, or from the boundary into the inside.
         return false;
     }
     let cells = hole.others(i);
-    if cells == 0 || !hole.is_seen_from(i) || (hole.on_boundary() && !hangs_together(hole, cells)) {
-        return false;
-    }
+    cells != 0 && hole.is_seen_from(i) && (!hole.on_boundary() || hangs_together(hole, cells))
+}
+
+/// Fills the hole with tetrahedra at its `i`-th link vertex, where [`may_contract`] holds: false if the boundary does not allow it.
+pub(super) fn contract(hole: &Hole, i: usize, filling: &mut Filling) -> bool {
+    filling.clear();
+    let (b, cells) = (hole.link[i], hole.others(i));
     filling.tets.extend(bits(cells).map(|face| {
         let [x, y, z] = hole.faces[face].0;
         [x, y, z, b]

@@ -41,6 +41,8 @@ pub(super) struct Hole {
     pub feature: Feature,
     /// The planes of the faces, once [`Hole::find_sides`] has found them.
     sides: Sides,
+    /// The numbers of the faces in the order of their vertices, once [`Hole::sort_faces`] has sorted them.
+    pub sorted: Vec<u8>,
     seen: TetSet,
 }
 
@@ -108,6 +110,23 @@ pub(super) struct Filling {
     /// at the removed vertex, then those that were there before.
     pub border: Vec<(u32, [u32; 3])>,
     pub moved: usize,
+    /// What lies across each face of `tets`, once [`Hole::link_filling`] has found it.
+    pub across: Vec<[Across; 4]>,
+    /// Scratch space: faces without a tetrahedron on their other side yet. The places of their vertices in the link, ascending, as a
+    /// number; and what has them.
+    open: Vec<u32>,
+    open_at: Vec<(Across, u8)>,
+}
+
+/// What lies across a face of a tetrahedron that fills a hole.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Across {
+    /// Nothing: it is on the boundary.
+    Nothing,
+    /// Another tetrahedron of the filling.
+    Inside(u8),
+    /// What is outside of a face of the hole.
+    Face(u8),
 }
 
 impl Hole {
@@ -120,7 +139,7 @@ impl Hole {
         self.clear();
         for at in 0..self.star.len() {
             let StarTet { tet, corner } = self.star[at];
-            let (corners, around) = (mesh.tets[tet as usize], mesh.neighbors[tet as usize]);
+            let (corners, around) = (mesh.tets[tet as usize], self.seen.around(at));
             let corner = usize::from(corner) % 4;
             let [x, y, z] = FACES[corner];
             self.add_face([corners[x], corners[y], corners[z]], around[corner], positions);
@@ -141,24 +160,41 @@ impl Hole {
         self.points.clear();
         self.corners.clear();
         self.faces_at.clear();
-        self.places = LinkPlaces::default();
+        self.places.0.fill(NO_PLACE);
         self.border.clear();
     }
 
-    /// Adds the face of a tetrahedron of the star opposite the vertex, and what lies there.
+    /// Adds the face of the next tetrahedron of the star opposite the vertex, and what lies there.
     #[inline]
     fn add_face(&mut self, [x, y, z]: [u32; 3], outer: u32, positions: &[[i32; 3]]) {
-        let own = 1 << self.faces.len();
-        let i = self.add_corner(x, own, positions);
-        let j = self.add_corner(y, own, positions);
-        let k = self.add_corner(z, own, positions);
+        let at = self.faces.len();
+        // Two of the corners are those of the tetrahedron that it was found from.
+        let known = match at {
+            0 => ([NONE; 3], [NO_PLACE; 3]),
+            _ => (self.faces[self.seen.parent(at)].0, self.corners[self.seen.parent(at)]),
+        };
+        let own = 1 << at;
+        let i = self.add_corner(x, known, own, positions);
+        let j = self.add_corner(y, known, own, positions);
+        let k = self.add_corner(z, known, own, positions);
         self.faces.push(([x, z, y], outer));
         self.corners.push([i, k, j]);
     }
 
-    /// Adds a corner of a face, which is `own`. Returns its place in the link.
+    /// Adds a corner of a face, which is `own`. `known` are vertices with their places. Returns its place in the link.
     #[inline]
-    fn add_corner(&mut self, v: u32, own: FaceSet, positions: &[[i32; 3]]) -> u8 {
+    fn add_corner(
+        &mut self,
+        v: u32,
+        known: ([u32; 3], [u8; 3]),
+        own: FaceSet,
+        positions: &[[i32; 3]],
+    ) -> u8 {
+        if let Some(i) = (0..3).find(|&i| known.0[i] == v) {
+            let place = known.1[i];
+            self.faces_at[usize::from(place)] |= own;
+            return place;
+        }
         let place = self.places.place(&mut self.link, v);
         match self.faces_at.get_mut(usize::from(place)) {
             Some(faces) => *faces |= own,
@@ -182,6 +218,14 @@ impl Hole {
     /// Gets ready for [`Hole::is_seen_from`].
     pub fn find_sides(&mut self) {
         self.sides.find(&self.points, &self.corners);
+    }
+
+    /// Sorts the faces by their vertices.
+    pub fn sort_faces(&mut self) {
+        let Self { sorted: order, faces, .. } = self;
+        order.clear();
+        order.extend(0..faces.len() as u8);
+        order.sort_unstable_by_key(|&i| sorted(faces[usize::from(i)].0));
     }
 
     /// Whether all faces but those at link vertex `i` make positive tetrahedra with it.
@@ -280,42 +324,77 @@ impl Hole {
         self.is_flat() && moved.map(|&(_, t)| t.map(|v| positions[v as usize])).all(|t| self.in_plane(t))
     }
 
-    /// Fills the hole, with fewer tetrahedra than were in it. Returns their numbers, in the order of the filling.
-    pub fn replace(&self, mesh: &mut WorkMesh, filling: &Filling, slots: &mut Vec<u32>) {
-        assert!(filling.tets.len() < self.star.len(), "a removal makes the mesh smaller");
-        // The filling takes the first slots of the star; the rest are freed.
-        slots.clear();
-        slots.extend(self.star[..filling.tets.len()].iter().map(|s| s.tet));
-        self.star.iter().skip(filling.tets.len()).for_each(|s| mesh.free(s.tet));
-        mesh.incident[self.a as usize] = NONE;
-        // Faces that wait for the tetrahedron on their other side: which tetrahedron has them, and where.
-        let mut open: Vec<([u32; 3], u32, usize)> = Vec::with_capacity(3 * self.faces.len());
-        for &(face, outer) in self.faces.iter().filter(|(_, outer)| *outer != NONE) {
-            let side = match outer {
-                ELSEWHERE => 0,
-                _ => mesh.tets[outer as usize].iter().position(|v| !face.contains(v)).unwrap_or(0),
-            };
-            open.push((sorted(face), outer, side));
-        }
-        for (&t, &corners) in slots.iter().zip(&filling.tets) {
-            mesh.tets[t as usize] = corners;
-            mesh.neighbors[t as usize] = [NONE; 4];
-            corners.iter().for_each(|&v| mesh.incident[v as usize] = t);
+    /// Finds what lies across the faces of a filling: for [`Hole::replace`].
+    pub fn link_filling(&self, filling: &mut Filling) {
+        let Filling { tets, across, open, open_at, .. } = filling;
+        (open.clear(), open_at.clear());
+        open.extend(self.corners.iter().map(|&corners| face_key(corners)));
+        open_at.extend((0..self.faces.len() as u8).map(|face| (Across::Face(face), 0)));
+        across.clear();
+        across.resize(tets.len(), [Across::Nothing; 4]);
+        for (t, tet) in tets.iter().enumerate() {
+            let places = tet.map(|v| self.place(v).map_or(NO_PLACE, |place| place as u8));
             for (side, face) in FACES.iter().enumerate() {
-                let key = sorted(face.map(|k| corners[k]));
-                match open.iter().position(|(other, ..)| *other == key) {
-                    Some(i) => {
-                        let (_, n, back) = open.swap_remove(i);
-                        mesh.neighbors[t as usize][side] = n;
-                        if n != ELSEWHERE {
-                            mesh.neighbors[n as usize][back] = t;
-                        }
-                    }
-                    None => open.push((key, t, side)),
+                let key = face_key(face.map(|k| places[k]));
+                let Some(i) = open.iter().position(|&other| other == key) else {
+                    open.push(key);
+                    open_at.push((Across::Inside(t as u8), side as u8));
+                    continue;
+                };
+                open.swap_remove(i);
+                let (other, back) = open_at.swap_remove(i);
+                across[t][side] = other;
+                if let Across::Inside(other) = other {
+                    across[usize::from(other)][usize::from(back)] = Across::Inside(t as u8);
                 }
             }
         }
     }
+
+    /// Fills the hole, with fewer tetrahedra than were in it, after [`Hole::link_filling`]. Writes their numbers to `slots`, in the
+    /// order of the filling. What is outside of the hole may have changed since it was opened.
+    pub fn replace(&self, mesh: &mut WorkMesh, filling: &Filling, slots: &mut Vec<u32>) {
+        assert!(filling.tets.len() < self.star.len(), "a removal makes the mesh smaller");
+        // Read before anything is written: the filling takes the first slots of the star; the rest are freed.
+        let mut outside = [(NONE, 0); MAX_HOLE];
+        for (outside, s) in outside.iter_mut().zip(&self.star) {
+            let outer = mesh.neighbors[s.tet as usize][usize::from(s.corner)];
+            let back = match outer {
+                NONE | ELSEWHERE => 0,
+                _ => mesh.neighbors[outer as usize].iter().position(|&t| t == s.tet).unwrap_or(0),
+            };
+            *outside = (outer, back);
+        }
+        slots.clear();
+        slots.extend(self.star[..filling.tets.len()].iter().map(|s| s.tet));
+        self.star.iter().skip(filling.tets.len()).for_each(|s| mesh.free(s.tet));
+        mesh.incident[self.a as usize] = NONE;
+        for ((&t, &corners), across) in slots.iter().zip(&filling.tets).zip(&filling.across) {
+            mesh.tets[t as usize] = corners;
+            corners.iter().for_each(|&v| mesh.incident[v as usize] = t);
+            mesh.neighbors[t as usize] = across.map(|across| match across {
+                Across::Nothing => NONE,
+                Across::Inside(other) => slots[usize::from(other)],
+                Across::Face(face) => outside[usize::from(face)].0,
+            });
+            for face in across.iter().filter_map(|across| match across {
+                Across::Face(face) => Some(usize::from(*face)),
+                _ => None,
+            }) {
+                let (outer, back) = outside[face];
+                if outer < ELSEWHERE {
+                    mesh.neighbors[outer as usize][back] = t;
+                }
+            }
+        }
+    }
+}
+
+/// The places of three vertices in ascending order, as one number.
+#[inline]
+fn face_key(places: [u8; 3]) -> u32 {
+    let [a, b, c] = sorted(places.map(u32::from));
+    a << 16 | b << 8 | c
 }
 
 impl Filling {

@@ -12,14 +12,11 @@ use super::boundary_distance::BoundaryDistance;
 use super::hole::{Hole, sorted};
 use super::points::as_vec;
 use super::quantize::Quantized;
-use super::work_mesh::{TetSet, WorkMesh};
+use super::work_mesh::{LARGEST_STAR, TetSet, WorkMesh};
 use crate::geom::nearest_on_triangle;
 use crate::mesh::FACES;
 use glam::DVec3;
 use std::collections::BTreeMap;
-
-/// Around larger stars than this no vertex is moved to.
-const LARGEST_STAR: usize = 512;
 
 /// The interfaces of the reference mesh, and what has become of their vertices.
 pub(super) struct Interface {

@@ -81,6 +81,11 @@ impl OutsidePoints {
         self.foreign.iter(t)
     }
 
+    /// Keeps those of these tetrahedra, which ascend, under their places as numbers.
+    pub fn renumber(&mut self, live: &[u32]) {
+        self.foreign.renumber(live);
+    }
+
     /// Removes the foreign vertices of a tetrahedron, which may be a new one.
     pub fn clear(&mut self, t: u32) {
         self.foreign.iter(t).for_each(|point| self.is_foreign[point as usize] = false);

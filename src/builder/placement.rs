@@ -107,12 +107,17 @@ impl Placement {
     #[inline]
     fn cell(&mut self, i: usize, new: &impl Replacement) -> &Cell {
         if !self.made[i] {
-            // The orientation was found positive, so the matrices are regular.
-            let corners = new.corners(i);
-            self.cells[i] = Cell { barycentric: barycentric(corners), origin: corners[0] };
-            self.made[i] = true;
+            self.make(i, new);
         }
         &self.cells[i]
+    }
+
+    #[inline(never)]
+    fn make(&mut self, i: usize, new: &impl Replacement) {
+        // The orientation was found positive, so the matrices are regular.
+        let corners = new.corners(i);
+        self.cells[i] = Cell { barycentric: barycentric(corners), origin: corners[0] };
+        self.made[i] = true;
     }
 
     /// Finds the cell for a point, testing `hint` first. Returns the error there and the cell.

@@ -1,5 +1,6 @@
 //! Points and the tetrahedra that contain them: barycentric coordinates, and lists of points for each tetrahedron.
 
+use super::work_mesh::keep;
 use crate::mesh::NONE;
 use glam::{DMat3, DVec3};
 use std::collections::HashMap;
@@ -28,6 +29,11 @@ impl Lists {
 
     pub fn take(&mut self, t: u32) {
         self.first[t as usize] = NONE;
+    }
+
+    /// Keeps the lists of these tetrahedra, which ascend, under their places as numbers.
+    pub fn renumber(&mut self, live: &[u32]) {
+        keep(&mut self.first, live);
     }
 
     pub fn put(&mut self, t: u32, point: u32) {
@@ -71,6 +77,12 @@ impl Hasher for Spread {
 impl SparseLists {
     pub fn take(&mut self, t: u32) {
         self.first.remove(&t);
+    }
+
+    /// Keeps the lists of these tetrahedra, which ascend, under their places as numbers.
+    pub fn renumber(&mut self, live: &[u32]) {
+        let place = |t: u32| live.binary_search(&t).ok().map(|place| place as u32);
+        self.first = self.first.iter().filter_map(|(&t, &point)| Some((place(t)?, point))).collect();
     }
 
     pub fn put(&mut self, t: u32, point: u32) {

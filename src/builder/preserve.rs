@@ -15,7 +15,7 @@
 use super::hole::Hole;
 use super::interface::Interface;
 use super::quantize::Quantized;
-use super::work_mesh::WorkMesh;
+use super::work_mesh::{WorkMesh, keep};
 use super::{BuildConfig, BuildError};
 use crate::geom::orient3d;
 use crate::mesh::{Field, TetMesh};
@@ -43,6 +43,11 @@ impl Regions {
     #[cfg(feature = "parts")]
     pub fn known(of: Vec<u32>) -> Option<Self> {
         (!of.is_empty()).then_some(Self { of, interface: None })
+    }
+
+    /// Tetrahedra have new numbers: their places in this list of the old ones, which ascend.
+    pub fn renumber(&mut self, live: &[u32]) {
+        keep(&mut self.of, live);
     }
 
     /// The region of each tetrahedron.

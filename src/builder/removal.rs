@@ -1,12 +1,12 @@
 //! The removal of a vertex: the best filling of its hole, and its error.
 //!
-//! A search reads [`State`] and writes only to its own [`RemovalSearch`], so candidates could be evaluated in parallel.
+//! A search reads [`State`] and writes only to its own [`RemovalSearch`], so candidates are evaluated in parallel.
 
 use super::candidate_queue::{Key, Levels};
 use super::cost::{Buckets, Reference, largest};
 use super::fill_cost::{FillCost, HoleCost, Input, Removals};
 use super::gift_wrap::GiftWrap;
-use super::half_edge::{Nearby, contract, keeps_topology};
+use super::half_edge::{Nearby, contract, keeps_topology, may_contract};
 use super::hole::{Filling, Hole};
 use super::points::{as_vec, squared_length};
 use super::quantize::Quantized;
@@ -88,6 +88,11 @@ impl<'a> State<'a> {
         }
     }
 
+    /// How often the star of a vertex has changed; 0 for [`NONE`].
+    fn version(&self, v: u32) -> u32 {
+        self.versions.get(v as usize).copied().unwrap_or(0)
+    }
+
     /// Whether a vertex belongs to a part that is built elsewhere, too.
     fn is_open(&self, v: u32) -> bool {
         self.open.get(v as usize).copied().unwrap_or(false)
@@ -114,13 +119,15 @@ pub(super) struct RemovalSearch {
     pub hole: Hole,
     hole_cost: HoleCost,
     nearby: Nearby,
-    /// Link vertices with the predicted error of contracting the edge to them, and their places in the link.
-    ends: Vec<(f64, u32, u8)>,
+    /// Link vertices with the predicted error of contracting the edge to them, and their places in the link: see [`end`].
+    ends: Vec<u128>,
     /// The filling that is evaluated, and the best one so far.
     now: Candidate,
     pub best: Candidate,
     /// The vertex that `best` moves the removed one to; [`NONE`] if it is another filling.
     pub best_end: u32,
+    /// How often the star of `best_end` had changed when it was looked at.
+    version_of_end: u32,
 }
 
 /// A filling and its cost.
@@ -152,7 +159,28 @@ impl RemovalSearch {
             now: Candidate::default(),
             best: Candidate::default(),
             best_end: NONE,
+            version_of_end: 0,
         }
+    }
+
+    /// Evaluates a removal, and gets ready to carry it out. False if its level is above `level` now, or it cannot be made.
+    pub fn prepare(&mut self, state: &State<'_>, key: Key, level: u16) -> bool {
+        let found = self.at(state, key.a, key.b, level);
+        let is_due = found.is_some_and(|found| found.level() <= level);
+        if is_due {
+            self.hole.sort_faces();
+            self.hole.link_filling(&mut self.best.filling);
+            self.version_of_end = state.version(self.best_end);
+        }
+        is_due
+    }
+
+    /// Whether removals since it was prepared may have changed the result, although they have left the star alone.
+    pub fn is_stale(&self, state: &State<'_>) -> bool {
+        // What is kept apart, and what the boundary moves over, may be anywhere; the topology depends on the star of the other end.
+        state.restrictions.look_beyond_holes()
+            || !self.best.cost.is_flat()
+            || state.version(self.best_end) != self.version_of_end
     }
 
     /// Evaluates the removal of `a`, by moving it to `end` unless that is [`NONE`]. Returns its key; none if it cannot
@@ -185,8 +213,7 @@ impl RemovalSearch {
         let (centre, second) = (state.reference.quantized.positions[a as usize], state.second(a, 0));
         let mut found: Option<Key> = None;
         for at in 0..self.ends.len() {
-            let (_, b, i) = self.ends[at];
-            let i = usize::from(i);
+            let (b, i) = vertex_and_place(self.ends[at]);
             let second = second + self.hole.left_at(i);
             let length = squared_length(centre, self.hole.points[i]);
             // Its error is at least that of the hole. So most ends cannot be better than the best one so far, whatever
@@ -208,21 +235,23 @@ impl RemovalSearch {
         found
     }
 
-    /// Lists the ends to try, those with the least predicted error first: `known` alone unless that is [`NONE`].
+    /// Lists the ends to try, those with the least predicted error first: `known` alone unless that is [`NONE`]. Most do not make
+    /// positive tetrahedra, and are left out.
     fn list_ends(&mut self, state: &State<'_>, known: u32) {
         let Self { ends, hole, .. } = self;
         ends.clear();
         if known != NONE {
-            ends.extend(hole.place(known).map(|i| (0.0, known, i as u8)));
+            let place = hole.place(known).filter(|&i| may_contract(hole, i));
+            ends.extend(place.map(|i| end(0.0, known, i)));
             return;
         }
         let own = Prediction::new(&state.reference, &state.gradients, hole.a);
-        let link = (0..).zip(hole.link.iter().zip(&hole.points));
-        ends.extend(link.map(|(i, (&b, &q))| (own.error_at(b, q), b, i)));
-        ends.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+        let seen = (0..hole.link.len()).filter(|&i| may_contract(hole, i));
+        ends.extend(seen.map(|i| end(own.error_at(hole.link[i], hole.points[i]), hole.link[i], i)));
+        ends.sort_unstable();
     }
 
-    /// Fills the hole by moving its vertex to link vertex `i`, if that may be.
+    /// Fills the hole by moving its vertex to link vertex `i`, one of the ends, if that may be.
     fn contract(&mut self, state: &State<'_>, i: usize) -> bool {
         let Self { hole, now, nearby, .. } = self;
         let positions = &state.reference.quantized.positions;
@@ -261,6 +290,19 @@ impl RemovalSearch {
         let (error, tets) = (state.levels.of(self.best.error), self.best.filling.tets.len() as u32);
         Some(Key::new(error, state.second(self.hole.a, tets), 0.0, self.hole.a, NONE))
     }
+}
+
+/// A neighbour and its place in the link as a number: by predicted error, which is not negative, then by vertex.
+#[inline]
+fn end(error: f64, vertex: u32, place: usize) -> u128 {
+    // Bits of floats that are not negative compare as the floats do.
+    u128::from(error.to_bits()) << 64 | u128::from(vertex) << 32 | place as u128
+}
+
+/// The vertex of an end, and its place.
+#[inline]
+fn vertex_and_place(end: u128) -> (u32, usize) {
+    ((end >> 32) as u32, end as u32 as usize)
 }
 
 /// Predicts what it costs to contract edges at one vertex.

@@ -57,6 +57,11 @@ impl Restrictions {
         self.regions.as_ref().map_or(&[], Regions::all)
     }
 
+    /// Whether what they allow depends on more than a hole and what fills it.
+    pub fn look_beyond_holes(&self) -> bool {
+        self.regions.is_some()
+    }
+
     /// Whether a point must stay where it is.
     pub fn keeps(&self, v: u32) -> bool {
         self.kept.get(v as usize).is_some_and(|kept| *kept)
@@ -86,6 +91,13 @@ impl Restrictions {
     pub fn contracted(&mut self, hole: &Hole, end: u32, slots: &[u32], positions: &[[i32; 3]]) {
         if let Some(regions) = &mut self.regions {
             regions.contracted(hole, end, slots, positions);
+        }
+    }
+
+    /// Tetrahedra have new numbers: their places in this list of the old ones, which ascend.
+    pub fn renumber(&mut self, live: &[u32]) {
+        if let Some(regions) = &mut self.regions {
+            regions.renumber(live);
         }
     }
 

@@ -64,6 +64,8 @@ impl Record for Sequence {
         self.steps.push(Insertion { vertex: hole.a, removed, inserted, errors, step });
     }
 
+    fn renumber(&mut self, _: &[u32]) {}
+
     fn finish(&mut self, tets: &[[u32; 4]], _: &[u32]) {
         self.base = tets.iter().copied().filter(|tet| tet[0] != NONE).collect();
         let all = self.tets.len();

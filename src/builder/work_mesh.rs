@@ -8,6 +8,18 @@ use crate::mesh::NONE;
 /// Across a face to a part of the domain that is built elsewhere: no tetrahedron, but no boundary either.
 pub(super) const ELSEWHERE: u32 = NONE - 1;
 
+/// Meshes with fewer numbers are not compacted.
+const SMALLEST: usize = 1 << 8;
+
+/// Keeps what has these indices, which ascend, and frees the rest.
+pub(super) fn keep<T: Copy>(all: &mut Vec<T>, indices: &[u32]) {
+    for (new, &old) in indices.iter().enumerate() {
+        all[new] = all[old as usize];
+    }
+    all.truncate(indices.len());
+    all.shrink_to_fit();
+}
+
 /// A tetrahedral mesh with adjacency, edited by edge collapses or vertex removals.
 pub(super) struct WorkMesh {
     pub tets: Vec<[u32; 4]>,
@@ -20,65 +32,80 @@ pub(super) struct WorkMesh {
 
 /// A small set of tetrahedra: a hash table with open addressing. It takes far less memory than a mark on each tetrahedron, and stays
 /// in the cache.
-#[derive(Default)]
 pub(super) struct TetSet {
-    /// Twice as many places as tetrahedra at least, a power of two; [`NONE`] where there is none.
-    table: Vec<u32>,
-    len: usize,
-    /// The neighbours of the tetrahedra in the order in which they were found.
-    around: Vec<[u32; 4]>,
+    /// A place is taken if its upper half is `epoch`; the lower half is the tetrahedron then. So the set is emptied without writing to
+    /// the table.
+    table: Box<[u64; PLACES]>,
+    epoch: u32,
+    /// The neighbours of the tetrahedra of a star, in its order.
+    around: Box<[[u32; 4]; LARGEST_STAR]>,
+    /// From which of the star each was found; the first one from itself.
+    parents: Box<[u16; LARGEST_STAR]>,
 }
 
-/// Places of a set that has not grown.
-const PLACES: usize = 128;
+/// The most tetrahedra of a star.
+pub(super) const LARGEST_STAR: usize = 512;
+
+/// At most half of the places are taken.
+const PLACES: usize = 2 * LARGEST_STAR;
+
+impl Default for TetSet {
+    fn default() -> Self {
+        Self {
+            table: Box::new([0; PLACES]),
+            epoch: 0,
+            around: Box::new([[NONE; 4]; LARGEST_STAR]),
+            parents: Box::new([0; LARGEST_STAR]),
+        }
+    }
+}
 
 impl TetSet {
     /// Empties the set.
     fn clear(&mut self) {
-        // A large star is rare: after it the set is small again.
-        self.table.truncate(PLACES);
-        self.table.fill(NONE);
-        self.table.resize(PLACES, NONE);
-        self.len = 0;
-        self.around.clear();
+        if self.epoch == u32::MAX {
+            self.table.fill(0);
+            self.epoch = 0;
+        }
+        self.epoch += 1;
     }
 
-    /// Adds a tetrahedron; false if it is there already. Only after [`TetSet::clear`].
+    /// The neighbours of the `i`-th tetrahedron of the star that was found last.
+    #[inline]
+    pub fn around(&self, i: usize) -> [u32; 4] {
+        self.around[i % LARGEST_STAR]
+    }
+
+    /// From which tetrahedron of that star the `i`-th was found, across a face.
+    #[inline]
+    pub fn parent(&self, i: usize) -> usize {
+        usize::from(self.parents[i % LARGEST_STAR])
+    }
+
+    /// Adds a tetrahedron; false if it is there already. Only after [`TetSet::clear`], and no more than [`LARGEST_STAR`].
     #[inline]
     fn insert(&mut self, t: u32) -> bool {
-        let place = self.place(t);
-        if self.table[place] == t {
-            return false;
-        }
-        self.table[place] = t;
-        self.len += 1;
-        if 2 * self.len >= self.table.len() {
-            self.grow();
-        }
-        true
-    }
-
-    /// Where a tetrahedron is, or would be put.
-    #[inline]
-    fn place(&self, t: u32) -> usize {
-        let mask = self.table.len() - 1;
+        let entry = u64::from(self.epoch) << 32 | u64::from(t);
         // Fibonacci hashing: the highest bits of the product depend on all of the number.
-        let mut place = (t.wrapping_mul(0x9E37_79B9) >> 16) as usize & mask;
-        while self.table[place] != NONE && self.table[place] != t {
-            place = (place + 1) & mask;
+        let mut place = (t.wrapping_mul(0x9E37_79B9) >> 16) as usize;
+        loop {
+            let found = &mut self.table[place % PLACES];
+            if *found == entry {
+                return false;
+            }
+            if (*found >> 32) as u32 != self.epoch {
+                *found = entry;
+                return true;
+            }
+            place += 1;
         }
-        place
     }
 
-    #[cold]
-    fn grow(&mut self) {
-        let size = 2 * self.table.len();
-        for t in std::mem::replace(&mut self.table, vec![NONE; size]) {
-            if t != NONE {
-                let place = self.place(t);
-                self.table[place] = t;
-            }
-        }
+    /// Notes the neighbours of the `i`-th tetrahedron of a star, and from which one it was found.
+    #[inline]
+    fn note(&mut self, i: usize, around: [u32; 4], parent: usize) {
+        self.around[i % LARGEST_STAR] = around;
+        self.parents[i % LARGEST_STAR] = parent as u16;
     }
 }
 
@@ -115,34 +142,57 @@ impl WorkMesh {
         (self.tets.len() - self.dead) as u32
     }
 
+    /// Gives the tetrahedra that are left new numbers without gaps, in their order, where at most half of the numbers are still used:
+    /// those that are read together are then nearer to each other in memory, and much of it is free. Returns the old numbers.
+    pub fn compact(&mut self) -> Option<Vec<u32>> {
+        if 2 * self.dead < self.tets.len() || self.tets.len() < SMALLEST {
+            return None;
+        }
+        let mut number = vec![NONE; self.tets.len()];
+        let mut live = Vec::with_capacity(self.tets.len() - self.dead);
+        for (t, _) in (0..).zip(&self.tets).filter(|(_, tet)| tet[0] != NONE) {
+            number[t as usize] = live.len() as u32;
+            live.push(t);
+        }
+        keep(&mut self.tets, &live);
+        keep(&mut self.neighbors, &live);
+        // Not a tetrahedron: [`NONE`] or [`ELSEWHERE`].
+        let renumber = |t: &mut u32| *t = number.get(*t as usize).copied().unwrap_or(*t);
+        self.neighbors.iter_mut().flatten().for_each(renumber);
+        self.incident.iter_mut().for_each(renumber);
+        self.dead = 0;
+        Some(live)
+    }
+
     /// Whether the tetrahedron is in the mesh.
     pub fn is_live(&self, t: u32) -> bool {
         self.tets[t as usize][0] != NONE
     }
 
-    /// The tetrahedra around `v` that are connected through faces; false if there are more than `most`.
+    /// The tetrahedra around `v` that are connected through faces; false if there are more than `most`, which is at most
+    /// [`LARGEST_STAR`].
     pub fn star(&self, v: u32, most: usize, seen: &mut TetSet, star: &mut Vec<StarTet>) -> bool {
         seen.clear();
         star.clear();
         let first = self.incident[v as usize];
         seen.insert(first);
+        seen.note(0, self.neighbors[first as usize], 0);
         star.push(self.star_tet(first, v));
-        seen.around.push(self.neighbors[first as usize]);
         let mut next = 0;
         while next < star.len() {
-            let corner = star[next].corner;
-            let around = seen.around[next];
-            next += 1;
-            for (i, n) in around.into_iter().enumerate() {
-                if i != corner as usize && n < ELSEWHERE && seen.insert(n) {
-                    if star.len() == most {
+            let corner = usize::from(star[next].corner);
+            let from = star[seen.parent(next)].tet;
+            for (i, n) in seen.around(next).into_iter().enumerate() {
+                if i != corner && n < ELSEWHERE && n != from && seen.insert(n) {
+                    if star.len() >= most.min(LARGEST_STAR) {
                         return false;
                     }
-                    star.push(self.star_tet(n, v));
                     // Read as soon as the tetrahedron is known: the memory delivers several at a time.
-                    seen.around.push(self.neighbors[n as usize]);
+                    seen.note(star.len(), self.neighbors[n as usize], next);
+                    star.push(self.star_tet(n, v));
                 }
             }
+            next += 1;
         }
         true
     }

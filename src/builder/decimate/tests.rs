@@ -624,7 +624,8 @@ fn the_best_neighbour_is_found() {
         let mut decimator = Decimator::new(state, None, &mut record);
         let (mut compared, mut several) = (0, 0);
         for _ in 0..6 {
-            let Decimator { state, search, .. } = &mut decimator;
+            let Decimator { state, searches, .. } = &mut decimator;
+            let search = &mut searches.ahead[0];
             let vertices =
                 (0..mesh.positions.len() as u32).filter(|&v| state.mesh.has(v) && !state.frozen[v as usize]);
             for v in vertices.collect::<Vec<u32>>() {
