@@ -89,6 +89,7 @@ export function showFrame(frame) {
     demo.firstFrameBytes = frame.bytes;
     demo.firstFrameMs = performance.now();
     $("poster").hidden = true;
+    $("stage").dataset.shows = "volume";
   }
   $("n-triangles").textContent = count(frame.triangles);
   $("n-uploaded").textContent = size(frame.uploaded);

@@ -185,6 +185,9 @@ test("the message about a missing or wrong file names the file", async () => {
     const page = await open(file);
     await reach(page, "failed");
     assert.match(await page.locator("#message").innerText(), words);
+    assert.equal(await page.innerText("#growth"), "", "nothing is being opened any more");
+    assert.equal(await page.locator("#canvas").evaluate((canvas) => getComputedStyle(canvas).opacity), "0", "the background is that of the page");
+    assert.ok(await page.locator("#retry").isHidden(), "the answer would be the same");
     await page.close();
   }
 });

@@ -54,7 +54,7 @@ pub const LARGE: Volume = Volume {
                12.4 million tetrahedra, of which the page fetches what the picture needs.",
     data: Data::Generated { name: "helix", size: "97", extension: "vti" },
     build: &["--all-fields"],
-    scene: "isovalue=0.55&surface-colour=charge&map=coolwarm&error=50&axes=0&camera=14,14,32.67,116,-0.75,0.12",
+    scene: "isovalue=0.55&surface-colour=charge&map=coolwarm&error=50&axes=0&outline=0&camera=14,14,32.67,116,-0.75,0.12",
     picture: &["--isovalue", "0.55", "--error", "1%", "--no-outline", "--zoom", "1.5"],
     is_shown: true,
 };
