@@ -66,9 +66,7 @@ export class Viewer extends withMeshTools(EventTarget) {
 
   /** Rejects with code `no-webgpu` where nothing can be drawn; resolves to nothing where it can. */
   static async check() {
-    const gpu = globalThis.navigator?.gpu;
-    if (!gpu) throw new TetralodError("no-webgpu", NO_WEBGPU);
-    const adapter = await gpu.requestAdapter().catch(() => null);
+    const adapter = await gpuOfPage().requestAdapter().catch(() => null);
     if (!adapter) throw new TetralodError("no-webgpu", NO_ADAPTER);
   }
 
@@ -89,15 +87,21 @@ export class Viewer extends withMeshTools(EventTarget) {
     if (!(canvas instanceof HTMLCanvasElement)) {
       throw new TetralodError("bad-option", "`canvas` must be a canvas element");
     }
-    await Viewer.check();
-    signal?.throwIfAborted();
+    gpuOfPage();
     const viewer = new Viewer(canvas, places);
     viewer.#frameTime = frameTime;
     try {
+      // An adapter takes a browser some time, in which the worker loads.
+      const checked = Viewer.check();
+      checked.catch(() => {});
       const { wasmUrl } = places;
       const wasm = wasmUrl === undefined ? undefined : absoluteUrl("wasmUrl", wasmUrl).href;
       const ahead = prefetch === undefined ? undefined : absoluteUrl("prefetch", prefetch).href;
-      await loadWasm(viewer.#remote, VIEWER, wasm, ahead);
+      const loaded = loadWasm(viewer.#remote, VIEWER, wasm, ahead);
+      loaded.catch(() => {});
+      await checked;
+      signal?.throwIfAborted();
+      await loaded;
       signal?.throwIfAborted();
       await viewer.#start(frameTime);
       signal?.throwIfAborted();
@@ -467,6 +471,13 @@ function handOver(canvas) {
 function coverStyle({ offsetLeft, offsetTop, offsetWidth, offsetHeight }) {
   const place = `left: ${offsetLeft}px; top: ${offsetTop}px; width: ${offsetWidth}px; height: ${offsetHeight}px`;
   return `position: absolute; pointer-events: none; ${place}`;
+}
+
+/** WebGPU; throws where a browser has none. */
+function gpuOfPage() {
+  const gpu = globalThis.navigator?.gpu;
+  if (!gpu) throw new TetralodError("no-webgpu", NO_WEBGPU);
+  return gpu;
 }
 
 function pixels({ width, height }) {

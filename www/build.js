@@ -105,6 +105,8 @@ class BuildDialog {
       this.#showMemory(info.memory);
       this.#start.focus();
     } catch (error) {
+      // It is not being read any more.
+      this.#about.hidden = true;
       this.#fail(error);
     }
   }

@@ -37,9 +37,11 @@ const TABLE = {
     { keys: ["P"], what: "probe the middle" },
     { keys: ["W", "A", "S", "D", "Q", "E"], what: "fly, with the setting Fly; with Shift faster" },
   ],
-  "Everywhere": [
+  "Views": [
     ...VIEWS.map((name, i) => ({ keys: [String(i + 1)], what: name, act: () => chooseView(i + 1) })),
     ...BESIDE.map((name, i) => ({ keys: [`Shift + ${i + 1}`], what: `also show ${name}`, act: () => toggle(i + 1) })),
+  ],
+  "Everywhere": [
     { keys: ["V"], what: "to the picture", act: () => $("canvas").focus() },
     { keys: ["I"], what: "to the isovalue", act: () => toControl("isovalue") },
     { keys: ["O"], what: "gallery and files", act: openGallery },

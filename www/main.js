@@ -14,7 +14,7 @@ import { attachHistogram } from "./histogram.js";
 import { attachKeys } from "./keys.js";
 import { attachMessages, fail, say } from "./messages.js";
 import { showFrame, showProgress, showStats } from "./numbers.js";
-import { isRemote, onOpened, open, retry, setFirst, showInList } from "./opening.js";
+import { isNew, isRemote, onOpened, open, retry, setFirst, showInList } from "./opening.js";
 import { OverlayView } from "./overlay.js";
 import { demo, page } from "./page.js";
 import { mode } from "./parts.js";
@@ -33,7 +33,7 @@ const canvas = $("canvas");
 
 async function start() {
   $("settings").addEventListener("submit", (event) => event.preventDefault());
-  attachMessages({ onRetry: retry, isRemote });
+  attachMessages({ onRetry: retry, isRemote, isNew });
   attachDialogs();
   attachTabs();
   attachTheme();

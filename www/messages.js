@@ -15,13 +15,17 @@ const TITLES = {
 
 /** Errors that may be gone when the same is tried again. */
 const PASSING = ["network", "server", "changed", "truncated", "timeout"];
+/** Answers to a wrong address, or to a file that is not for this page: they will be the same. */
+const LASTING = /HTTP 4(?!08|25|29)\d\d/;
 
 /** Shows what went wrong. What has arrived stays usable. */
 export function fail(error) {
   demo.error = { code: error.code, message: error.message };
   demo.state = "failed";
   $("loading").classList.add("done");
-  $("retry").hidden = !(PASSING.includes(error.code) && isElsewhere());
+  $("retry").hidden = !(PASSING.includes(error.code) && isElsewhere() && !(LASTING.test(error.message) && isOpening()));
+  // Nothing has come yet: what was said of the opening is over.
+  if (!demo.info) $("growth").textContent = "";
   say(TITLES[error.code] ?? "The file could not be opened", error);
 }
 
@@ -38,10 +42,13 @@ export function say(title, error) {
 
 /** Whether what is opened comes from a server: a file of the user would fail again. */
 let isElsewhere = () => true;
+/** Whether nothing has come of it: a server that has sent a part of a file has it. */
+let isOpening = () => true;
 
-/** @param {{ onRetry: () => void, isRemote: () => boolean }} page */
-export function attachMessages({ onRetry, isRemote }) {
+/** @param {{ onRetry: () => void, isRemote: () => boolean, isNew: () => boolean }} page */
+export function attachMessages({ onRetry, isRemote, isNew }) {
   isElsewhere = isRemote;
+  isOpening = isNew;
   $("dismiss").addEventListener("click", hideMessage);
   $("retry").addEventListener("click", onRetry);
 }

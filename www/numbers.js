@@ -30,7 +30,7 @@ export function showGrowth() {
   const arrived = document.createElement("b");
   arrived.textContent = size(receivedBytes);
   const words = `${count(tetrahedra)} tetrahedra: ${size(vtuBytes({ vertices, tetrahedra, fields: info.fields.length }))} as VTU${whole}, `;
-  $("growth").replaceChildren(words, arrived, demo.state === "complete" ? " fetched" : " so far");
+  $("growth").replaceChildren(words, arrived, ["opening", "streaming"].includes(demo.state) ? " so far" : " fetched");
 }
 
 /** Shows the progress of a file that is fetched in blocks: only those that the mesh needs. */
@@ -89,6 +89,7 @@ export function showFrame(frame) {
     demo.firstFrameBytes = frame.bytes;
     demo.firstFrameMs = performance.now();
     $("poster").hidden = true;
+    $("stage").dataset.shows = "volume";
   }
   $("n-triangles").textContent = count(frame.triangles);
   $("n-uploaded").textContent = size(frame.uploaded);

@@ -35,6 +35,9 @@ export function setFirst(url) {
 /** Whether what was opened last comes from a server. */
 export const isRemote = () => !(tried instanceof File);
 
+/** Whether nothing has come of what was opened last. */
+export const isNew = () => tried !== source || !demo.info;
+
 /** What is open, as in the address of the page. */
 export function sourceWords() {
   if (source instanceof File) return `${FILE}${source.name}`;
@@ -115,7 +118,7 @@ export function onOpened(then) {
 
 /** Continues the download if the file comes in blocks and has not been replaced; otherwise opens it again. */
 export async function retry() {
-  if (tried !== source || !demo.info || !demo.blocks || demo.error?.code === "changed") return open(tried);
+  if (isNew() || !demo.blocks || demo.error?.code === "changed") return open(tried);
   hideMessage();
   demo.error = undefined;
   demo.state = "streaming";

@@ -216,14 +216,16 @@ export class OverlayView {
   #takenBoxes() {
     const { left, top } = this.#svg.getBoundingClientRect();
     const shown = this.#covered.filter((over) => over.offsetParent !== null && over.clientHeight > 0);
+    // On large screens the overlay is enlarged by CSS: its own pixels are not those of the page.
+    const zoom = this.#svg.currentCSSZoom ?? 1;
     return shown.map((over) => {
       const box = over.getBoundingClientRect();
       const margin = 4;
       return {
-        left: box.left - left - margin,
-        top: box.top - top - margin,
-        right: box.right - left + margin,
-        bottom: box.bottom - top + margin,
+        left: (box.left - left) / zoom - margin,
+        top: (box.top - top) / zoom - margin,
+        right: (box.right - left) / zoom + margin,
+        bottom: (box.bottom - top) / zoom + margin,
       };
     });
   }

@@ -1,5 +1,6 @@
 // Shows the same volumes with tetralod and with VTK's programs for browsers, and prints what that costs as a page for docs/:
 // started by `cargo xtask bench --beside-vtk`. Memory is read from /proc, so this needs Linux.
+import { execFileSync } from "node:child_process";
 import { mkdir, readdir, readFile } from "node:fs/promises";
 import { createServer } from "node:http";
 import { cpus, loadavg } from "node:os";
@@ -21,6 +22,7 @@ const SCENES = [
     title: "An isosurface of a grid of 65³ points, 1,572,864 tetrahedra",
     tools: [
       { name: "vtk.js", page: `${here}/vtkjs.html`, file: "bucky.vti" },
+      { name: "VTK.wasm", page: `${here}/vtkwasm.html`, file: "bucky.vti" },
       { name: "tetralod, within 1 %", page: `${here}/tetralod.html?isosurface`, file: "bucky.mt" },
     ],
   },
@@ -33,7 +35,7 @@ const SCENES = [
   },
 ];
 
-const TYPES = { ".html": "text/html", ".js": "text/javascript", ".wasm": "application/wasm" };
+const TYPES = { ".html": "text/html", ".js": "text/javascript", ".mjs": "text/javascript", ".wasm": "application/wasm" };
 /** The rows of a table, with the line below its head. */
 const ROWS = [
   "", "---", "program, MB", "file, MB", "fetched, MB", "first picture, s", "within 5 %, s", "full picture, s",
@@ -125,7 +127,8 @@ async function visit(tool, link) {
       for (let i = 0; i < turns; i++) await window.turn();
       return (performance.now() - start) / turns;
     }, TURNS);
-    const picture = await page.screenshot({ path: join(root, "target/beside-vtk", `${tool.file}.png`) });
+    const name = tool.name.replace(/\W.*/, "");
+    const picture = await page.screenshot({ path: join(root, "target/beside-vtk", `${name}-${tool.file}.png`) });
     if (picture.equals(blank)) throw new Error(`${tool.page} shows nothing`);
     return { ...server.sent, first, near, shown, memory: taken, frame };
   } finally {
@@ -148,7 +151,11 @@ async function measure(tool, link) {
 const MB = (bytes) => (bytes / 1e6).toFixed(2);
 const seconds = (ms) => (ms / 1000).toFixed(1);
 
-await mkdir(join(root, "target/beside-vtk"), { recursive: true });
+const unpacked = join(root, "target/beside-vtk/vtk-wasm");
+await mkdir(unpacked, { recursive: true });
+// The module of VTK.wasm as its developers publish it, mirrored on npm. A site would serve its two files, not the archive of four.
+const archive = join(root, here, "node_modules/@pyvista-wasm/vtk-wasm-binary/vtk-wasm32-emscripten.tar.gz");
+execFileSync("tar", ["-xzf", archive, "-C", unpacked, "./vtkWebAssembly.mjs", "./vtkWebAssembly.wasm"]);
 // The parts of vtk.js that its page uses, as one file.
 await build({
   entryPoints: [join(root, here, "vtkjs.js")],

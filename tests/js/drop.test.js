@@ -48,12 +48,14 @@ test("a dropped VTU is built and shown, a broken file leaves all as it is", asyn
   await drop(page, "broken.vtu", "<VTKFile type='Nothing'>");
   await dialog.locator("[role=alert]").waitFor({ timeout: PATIENCE });
   assert.match(await dialog.locator("[role=alert]").innerText(), /broken\.vtu/);
+  assert.ok(await dialog.getByText("Reading…").isHidden(), "it is not being read any more");
   await dialog.getByRole("button", { name: "Cancel" }).click();
   await drop(page, "broken.mt", "hello");
   await page.locator("#message").waitFor({ timeout: PATIENCE });
   assert.match(await page.innerText("#message"), /broken\.mt: this is not an MT file/);
   assert.ok(await page.locator("#retry").isHidden(), "the same file would fail again");
   await screenshot(page, "page-broken");
+  assert.match(await page.innerText("#growth"), / fetched$/, "the volume that stays has arrived");
   await page.click("#dismiss");
   assert.equal(differing(before, await still(page, "drop-broken")), 0, "the picture stays");
   assert.equal(await page.locator("#volume option:checked").innerText(), name);

@@ -185,6 +185,9 @@ test("the message about a missing or wrong file names the file", async () => {
     const page = await open(file);
     await reach(page, "failed");
     assert.match(await page.locator("#message").innerText(), words);
+    assert.equal(await page.innerText("#growth"), "", "nothing is being opened any more");
+    assert.equal(await page.locator("#canvas").evaluate((canvas) => getComputedStyle(canvas).opacity), "0", "the background is that of the page");
+    assert.ok(await page.locator("#retry").isHidden(), "the answer would be the same");
     await page.close();
   }
 });
@@ -280,19 +283,37 @@ const boxes = (page, selector) =>
     found.map((one) => one.getBoundingClientRect()).filter(({ width }) => width > 0).map(({ left, top, right, bottom }) => ({ left, top, right, bottom })),
   );
 
+/** That no label lies over another one or over the legend; how high one is. */
+async function assertLabelsAreFree(page, where) {
+  const legend = await boxes(page, "#legend");
+  const labels = await boxes(page, "#overlay .axis text, #overlay .scale-bar text");
+  assert.ok(labels.length >= 5, `${where}: ${labels.length} labels`);
+  const all = [...legend, ...labels];
+  const overlaps = (a, b) => a.left < b.right - 1 && b.left < a.right - 1 && a.top < b.bottom - 3 && b.top < a.bottom - 3;
+  for (const [i, one] of all.entries()) {
+    for (const other of all.slice(i + 1)) assert.ok(!overlaps(one, other), `${where}: ${JSON.stringify([one, other])}`);
+  }
+  return labels[0].bottom - labels[0].top;
+}
+
+test("axes are larger on large screens", async () => {
+  const page = await openSmall("Slice");
+  await settle(page);
+  const height = await assertLabelsAreFree(page, "small");
+  await page.setViewportSize({ width: 2600, height: 1200 });
+  await settle(page);
+  const large = await assertLabelsAreFree(page, "large");
+  assert.ok(Math.abs(large / height - 1.5) < 0.1, `${large} and ${height} pixels`);
+  await page.screenshot({ path: fileURLToPath(new URL("page-axes-large.png", pictures)) });
+  await page.close();
+});
+
 test("axes, scale bar and cube lie over the picture, and labels over nothing", async () => {
   const page = await openSmall("Slice");
   for (const side of ["home", "alongX", "againstZ"]) {
     await page.selectOption("#side", side);
     await settle(page);
-    const legend = await boxes(page, "#legend");
-    const labels = await boxes(page, "#overlay .axis text, #overlay .scale-bar text");
-    assert.ok(labels.length >= 5, `${side}: ${labels.length} labels`);
-    const all = [...legend, ...labels];
-    const overlaps = (a, b) => a.left < b.right - 1 && b.left < a.right - 1 && a.top < b.bottom - 3 && b.top < a.bottom - 3;
-    for (const [i, one] of all.entries()) {
-      for (const other of all.slice(i + 1)) assert.ok(!overlaps(one, other), `${side}: ${JSON.stringify([one, other])}`);
-    }
+    await assertLabelsAreFree(page, side);
     await page.screenshot({ path: fileURLToPath(new URL(`page-axes-${side}.png`, pictures)) });
   }
   // A click on a face of the cube looks at it from the front.

@@ -21,8 +21,11 @@ Chromium (`benches/beside_vtk`). Each number is the median of three visits with 
 - **vtk.js** (`@kitware/vtk.js` 37.4.3, bundled by esbuild) reads the grid and extracts the isosurface in JavaScript. It has no tetrahedra.
 - **F3D** (`f3d` 3.5.0) is VTK, compiled to WebAssembly, with readers for many formats. It reads the tetrahedra and draws their
   boundary.
-- **VTK.wasm** (`@kitware/vtk-wasm` 3.0.5) is not measured: its npm package loads the WebAssembly from another site, which this
-  measurement does without.
+- **VTK.wasm** (`@kitware/vtk-wasm` 3.0.5) is VTK in WebAssembly with all classes that can be reached from JavaScript. Its package has
+  no WebAssembly; that comes from `@pyvista-wasm/vtk-wasm-binary` 9.6.20260228, a copy of what its developers publish. The page
+  decodes the grid, since the module has no readers, and extracts the isosurface by `vtkFlyingEdges3D`. It has no filter or mapper that
+  makes a boundary of tetrahedra (`vtkGeometryFilter`, `vtkDataSetSurfaceFilter` and `vtkDataSetMapper` cannot be made), so that the
+  second table is without it.
 - **tetralod** draws a mesh within 1 % of the field's range: for the isosurface only around its value. The others draw the
   full data.
 
@@ -32,7 +35,7 @@ the navigation to the first picture; for tetralod it shows the base mesh, in whi
 mesh within 5 % of the field's range. *full picture*: to the picture that does not change any more.
 The rows with 20 Mbit/s have a server that sends no faster, and answers after 40 ms. *memory*: of all processes of the browser with the
 full picture, less than those of an empty page. *frame*: from one picture to the next while the camera turns, 640 × 480 pixels,
-drawn in software, since the machine has no GPU: WebGL by vtk.js and F3D, WebGPU by tetralod, whose pictures also have shade in hollows.
+drawn in software, since the machine has no GPU: WebGL by VTK's programs, WebGPU by tetralod, whose pictures also have shade in hollows.
 
 ";
 
