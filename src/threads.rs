@@ -31,3 +31,16 @@ pub(crate) fn join<A: Send, B: Send>(a: impl FnOnce() -> A + Send, b: impl FnOnc
 pub(crate) fn join<A, B>(a: impl FnOnce() -> A, b: impl FnOnce() -> B) -> (A, B) {
     (a(), b())
 }
+
+/// Changes each of a few items by itself.
+#[cfg(feature = "parallel")]
+pub(crate) fn change_each<T: Send>(items: &mut [T], change: impl Fn(&mut T) + Send + Sync) {
+    use rayon::prelude::*;
+    items.par_iter_mut().for_each(change);
+}
+
+/// Changes each of a few items by itself.
+#[cfg(all(feature = "build", not(feature = "parallel")))]
+pub(crate) fn change_each<T>(items: &mut [T], change: impl Fn(&mut T)) {
+    items.iter_mut().for_each(change);
+}
