@@ -210,7 +210,8 @@ impl<'a> Parts<'a> {
     fn best_cut(&self, part: std::ops::Range<usize>) -> (usize, usize) {
         let blocks = part.len().div_ceil(self.size);
         let least = (blocks / LEAST_PART).max(1);
-        let of_keys = threads::map(KEYS, 1, |keys| self.best_cut_of(&self.sorted[keys.start][part.clone()], least));
+        let of_keys =
+            threads::map(KEYS, 1, |keys| self.best_cut_of(&self.sorted[keys.start][part.clone()], least));
         let mut best = (f64::INFINITY, (0, least));
         for (key, (sum, cut)) in of_keys.into_iter().enumerate() {
             if sum < best.0 {

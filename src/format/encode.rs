@@ -3,10 +3,10 @@
 use super::block_scan::BlockScan;
 use super::coder::{Counts, Measure, Models, Put, Writer};
 use super::header::{END_BYTES, HEAD_BYTES, HEADER_BYTES, Kind, SectionHead, header, version_for};
+use super::payload::Totals;
 use super::payload::exact::Corrections;
 use super::payload::histogram::Histograms;
 use super::payload::index::{Index, MAX_BLOCK_BITS, MIN_BLOCK_BITS};
-use super::payload::Totals;
 use super::{checksum, payload, write};
 use crate::mt::{BaseMeshError, Exact, Mt, MultiTessellation, UpdateError, UpdatePages, VertexId};
 use crate::threads;
@@ -356,9 +356,11 @@ pub fn breakdown(mt: &Mt, block_bits: u32) -> Result<Vec<(&'static str, f64)>, E
 fn put_blocks(mt: &Mt, index: &Index, models: &Models) -> Result<Vec<Vec<Section>>, EncodeError> {
     let kind = payload::section_of(mt.info().kind);
     if mt.info().kind.is_paged() {
-        return threads::map(index.blocks.len(), 1, |block| put_sections(mt, block.start as u32, index, models))
-            .into_iter()
-            .collect();
+        return threads::map(index.blocks.len(), 1, |block| {
+            put_sections(mt, block.start as u32, index, models)
+        })
+        .into_iter()
+        .collect();
     }
     let mut state = payload::start_state(mt).map_err(EncodeError::Base)?;
     let mut of_block = |block: u32| {
@@ -376,8 +378,7 @@ fn put_blocks(mt: &Mt, index: &Index, models: &Models) -> Result<Vec<Vec<Section
 fn put_sections(mt: &Mt, block: u32, index: &Index, models: &Models) -> Result<Vec<Section>, EncodeError> {
     let updates = index.updates(block, mt.updates());
     let kind = payload::section_of(mt.info().kind);
-    let shared =
-        Section::coded(kind, &[block], models, |out| payload::put_shared(out, mt, updates.clone()));
+    let shared = Section::coded(kind, &[block], models, |out| payload::put_shared(out, mt, updates.clone()));
     let of_field = |field: usize| {
         let put = |out: &mut Writer<'_>| payload::put_field(out, mt, updates.clone(), field);
         Section::coded(Kind::FLDU, &[block, field as u32], models, put)

@@ -103,7 +103,9 @@ impl Margins {
                 let values = corners.map(|levels| levels.get(field).copied().unwrap_or(0));
                 let (low, high) = values.iter().fold((i32::MAX, i32::MIN), |(l, h), &x| (l.min(x), h.max(x)));
                 // An update that depends on a later one is refused elsewhere.
-                let Some(&[least, most]) = self.removed.get(parent.0 as usize * fields + field) else { continue };
+                let Some(&[least, most]) = self.removed.get(parent.0 as usize * fields + field) else {
+                    continue;
+                };
                 let beyond = &mut beyond[start + at * fields + field];
                 *beyond = (*beyond).max(high.saturating_sub(most)).max(least.saturating_sub(low));
             }

@@ -13,7 +13,8 @@ fn is_same(mt: &Mt, name: &str) {
     let scanned = mt.in_pages(bits).expect("a complete MT");
     for block_bits in [bits, bits + 1] {
         for check_margins in [false, true] {
-            let options = EncodeOptions { block_bits, check_margins, histograms: true, ..EncodeOptions::default() };
+            let options =
+                EncodeOptions { block_bits, check_margins, histograms: true, ..EncodeOptions::default() };
             let [noted, found] = [mt, &scanned].map(|mt| encode(mt, &options).expect("a sound MT"));
             assert!(noted == found, "{name}, blocks of 2^{block_bits}");
         }
@@ -22,7 +23,8 @@ fn is_same(mt: &Mt, name: &str) {
 
 #[test]
 fn files_are_the_same_by_what_the_builder_notes() {
-    let mut meshes: Vec<(&str, TetMesh)> = vec![("bent", bent(8)), ("cube", cube(9, &[hilly, |[x, y, _]| x * y]))];
+    let mut meshes: Vec<(&str, TetMesh)> =
+        vec![("bent", bent(8)), ("cube", cube(9, &[hilly, |[x, y, _]| x * y]))];
     meshes.push(("bucky", tetralod::generate::bucky(15).expect("a volume")));
     for (name, mesh) in meshes {
         for all_fields in [false, true] {

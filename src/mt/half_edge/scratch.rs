@@ -222,11 +222,7 @@ pub(super) fn hash_labels(
 }
 
 /// Whether all tetrahedra of a star are positive with the new vertex at `position`, given those of its link.
-pub(super) fn is_positive(
-    star: &[NewTet],
-    link: impl Iterator<Item = [i32; 3]>,
-    position: [i32; 3],
-) -> bool {
+pub(super) fn is_positive(star: &[NewTet], link: impl Iterator<Item = [i32; 3]>, position: [i32; 3]) -> bool {
     let (mut from, mut largest) = ([[0_i64; 3]; MOST], 0);
     for (from, p) in from.iter_mut().zip(link) {
         for k in 0..3 {
