@@ -168,6 +168,7 @@ pub mod remote;
 pub mod scene;
 pub mod session;
 pub mod stream;
+mod threads;
 #[cfg(feature = "build")]
 pub mod verify;
 pub mod view;

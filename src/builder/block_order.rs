@@ -8,6 +8,7 @@
 //! and its error is at least as large. What has the smaller key comes first, so the order extends the partial order.
 
 use crate::mt::ErrorCode;
+use crate::threads;
 use std::collections::BTreeSet;
 
 /// What the order depends on. Updates are numbered by an order that extends the partial order.
@@ -159,11 +160,12 @@ impl<'a> Parts<'a> {
                 _ => -i64::from(errors[u as usize].0),
             }
         };
-        let sorted = std::array::from_fn(|k| {
-            let mut list: Vec<u32> = (0..reach.len() as u32).collect();
-            list.sort_by_cached_key(|&u| (key(k, u), u));
-            list
+        let mut sorted: [(usize, Vec<u32>); KEYS] = std::array::from_fn(|k| (k, Vec::new()));
+        threads::change_each(&mut sorted, |(k, list)| {
+            list.extend(0..reach.len() as u32);
+            list.sort_by_cached_key(|&u| (key(*k, u), u));
         });
+        let sorted = sorted.map(|(_, list)| list);
         let mut whole = Hull::EMPTY;
         reach.iter().zip(errors).for_each(|(reach, &error)| whole.add(reach, error));
         let own = [0, 1, 2].map(|k| f64::from(whole.high[k]) - f64::from(whole.low[k]));
@@ -194,10 +196,9 @@ impl<'a> Parts<'a> {
             let (key, cut) = self.best_cut(part.clone());
             let middle = start + cut * self.size;
             self.sorted[key][start..middle].iter().for_each(|&u| is_first[u as usize] = true);
-            for list in &mut self.sorted {
-                // A stable sort by which part they are in.
-                list[part.clone()].sort_by_key(|&u| !is_first[u as usize]);
-            }
+            threads::change_each(&mut self.sorted, |list| {
+                part_list(&mut list[part.clone()], |u| is_first[u as usize]);
+            });
             self.sorted[key][start..middle].iter().for_each(|&u| is_first[u as usize] = false);
             parts.push((middle, end));
             parts.push((start, middle));
@@ -209,31 +210,57 @@ impl<'a> Parts<'a> {
     fn best_cut(&self, part: std::ops::Range<usize>) -> (usize, usize) {
         let blocks = part.len().div_ceil(self.size);
         let least = (blocks / LEAST_PART).max(1);
+        let of_keys =
+            threads::map(KEYS, 1, |keys| self.best_cut_of(&self.sorted[keys.start][part.clone()], least));
         let mut best = (f64::INFINITY, (0, least));
-        let mut behind = vec![0.0; blocks];
-        for (key, list) in self.sorted.iter().enumerate() {
-            let list = &list[part.clone()];
-            let mut hull = Hull::EMPTY;
-            let add = |hull: &mut Hull, block: usize| {
-                let updates = &list[block * self.size..list.len().min((block + 1) * self.size)];
-                updates.iter().for_each(|&u| hull.add(&self.reach[u as usize], self.errors[u as usize]));
-            };
-            for block in (1..blocks).rev() {
-                add(&mut hull, block);
-                behind[block] = self.weight(&hull) * (list.len() - block * self.size) as f64;
-            }
-            hull = Hull::EMPTY;
-            // In front of the first block there is nothing to cut off.
-            for (cut, behind) in behind.iter().enumerate().skip(1) {
-                add(&mut hull, cut - 1);
-                let sum = self.weight(&hull) * (cut * self.size) as f64 + behind;
-                if (least..=blocks - least).contains(&cut) && sum < best.0 {
-                    best = (sum, (key, cut));
-                }
+        for (key, (sum, cut)) in of_keys.into_iter().enumerate() {
+            if sum < best.0 {
+                best = (sum, (key, cut));
             }
         }
         best.1
     }
+
+    /// How often blocks are read if a list is cut where that is least, and how many of them, at least `least`, go to the first side.
+    fn best_cut_of(&self, list: &[u32], least: usize) -> (f64, usize) {
+        let blocks = list.len().div_ceil(self.size);
+        let mut best = (f64::INFINITY, least);
+        let mut behind = vec![0.0; blocks];
+        let mut hull = Hull::EMPTY;
+        let add = |hull: &mut Hull, block: usize| {
+            let updates = &list[block * self.size..list.len().min((block + 1) * self.size)];
+            updates.iter().for_each(|&u| hull.add(&self.reach[u as usize], self.errors[u as usize]));
+        };
+        for block in (1..blocks).rev() {
+            add(&mut hull, block);
+            behind[block] = self.weight(&hull) * (list.len() - block * self.size) as f64;
+        }
+        hull = Hull::EMPTY;
+        // In front of the first block there is nothing to cut off.
+        for (cut, behind) in behind.iter().enumerate().skip(1) {
+            add(&mut hull, cut - 1);
+            let sum = self.weight(&hull) * (cut * self.size) as f64 + behind;
+            if (least..=blocks - least).contains(&cut) && sum < best.0 {
+                best = (sum, cut);
+            }
+        }
+        best
+    }
+}
+
+/// Moves those that are first to the front of a list; on both sides the order stays.
+fn part_list(list: &mut [u32], is_first: impl Fn(u32) -> bool) {
+    let (mut kept, mut rest) = (0, Vec::with_capacity(list.len()));
+    for i in 0..list.len() {
+        let u = list[i];
+        if is_first(u) {
+            list[kept] = u;
+            kept += 1;
+        } else {
+            rest.push(u);
+        }
+    }
+    list[kept..].copy_from_slice(&rest);
 }
 
 #[cfg(test)]

@@ -367,7 +367,7 @@ impl Collapses {
                 makers.iter().zip(inner).map(|(&maker, &inner)| mark((maker, inner))),
             )?;
         }
-        Ok(appender.finish())
+        appender.finish()
     }
 }
 

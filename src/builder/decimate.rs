@@ -109,8 +109,7 @@ fn decimate_into(
     if mesh.tets.is_empty() {
         return Err(BuildError::Empty);
     }
-    mesh::check(mesh)?;
-    let Topology { neighbors, non_manifold, .. } = mesh::topology(mesh.positions.len(), &mesh.tets)?;
+    let Topology { neighbors, non_manifold, .. } = mesh::check_topology(mesh)?;
     let quantized = quantize::quantize_cells(mesh, config)?;
     let gift_wrap = match criterion {
         BuildCriterion::HalfEdge => None,

@@ -4,7 +4,8 @@ use super::payload::histogram::Histograms;
 use super::payload::index::BlockInfo;
 use super::{EncodeError, EncodeOptions};
 use crate::mt::{
-    Applied, ApplyUpdates, CurrentMesh, Excess, Margins, Mt, UpdateError, UpdateId, UpdatePages,
+    Applied, ApplyUpdates, CurrentMesh, ErrorCode, Excess, HalfEdgeMt, Margins, Mt, MtFacts,
+    MultiTessellation, UpdateError, UpdateId, UpdatePages, level_volumes,
 };
 use std::collections::BTreeSet;
 
@@ -24,9 +25,44 @@ impl BlockScan {
     pub fn of(mt: &Mt, options: &EncodeOptions) -> Result<Self, EncodeError> {
         let bits = options.block_bits;
         let is_other = mt.is_paged() && mt.page_bits() != bits;
+        if let Mt::HalfEdge(mt) = mt
+            && let Some(facts) = mt.facts().filter(|_| !is_other && options.exact.is_empty())
+        {
+            return by_facts(mt, facts, options);
+        }
         let in_blocks = is_other.then(|| mt.in_pages(bits)).transpose().map_err(EncodeError::Update)?;
         Ok(Self { in_blocks, ..run(mt, options)? })
     }
+}
+
+/// What a run would find that was made before.
+fn by_facts(mt: &HalfEdgeMt, facts: &MtFacts, options: &EncodeOptions) -> Result<BlockScan, EncodeError> {
+    let excess = if options.check_margins { facts.excess } else { facts.larger };
+    if let Some(excess) = excess {
+        return Err(out_of_order(excess));
+    }
+    let fields = mt.info().fields.len();
+    let block = |(block, &bounds): (usize, &[[i32; 3]; 2])| {
+        let first = (block as u32) << options.block_bits;
+        let updates = first..mt.updates().min(first + (1 << options.block_bits));
+        let largest = |f: usize| updates.clone().map(|u| mt.error_of_field(UpdateId(u), f)).max();
+        BlockInfo {
+            bounds,
+            errors: (0..fields).map(|f| largest(f).unwrap_or(ErrorCode::ZERO)).collect(),
+            ranges: facts.ranges[block * fields..][..fields].to_vec(),
+            ..BlockInfo::default()
+        }
+    };
+    Ok(BlockScan {
+        blocks: facts.bounds.iter().enumerate().map(block).collect(),
+        in_blocks: None,
+        reference: Vec::new(),
+        histograms: options.histograms.then(|| Histograms::of(&facts.volumes)),
+    })
+}
+
+fn out_of_order(Excess { update, parent, field, .. }: Excess) -> EncodeError {
+    EncodeError::Order { update: update.0, parent: parent.0, field }
 }
 
 fn run(mt: &impl ApplyUpdates, options: &EncodeOptions) -> Result<BlockScan, EncodeError> {
@@ -42,7 +78,7 @@ fn run(mt: &impl ApplyUpdates, options: &EncodeOptions) -> Result<BlockScan, Enc
         first = end;
     }
     mesh.compact();
-    let histograms = options.histograms.then(|| Histograms::of(mt.info(), &mesh));
+    let histograms = options.histograms.then(|| Histograms::of(&level_volumes(mt.info(), &mesh)));
     // For exact values alone.
     let slots = 0..if options.exact.is_empty() { 0 } else { mesh.positions().len() as u32 };
     let mut reference: Vec<(u32, Vec<i32>)> =
@@ -61,7 +97,7 @@ fn scan_block(
     let fields = mt.info().fields.len();
     let mut block = BlockInfo {
         bounds: [[i32::MAX; 3], [i32::MIN; 3]],
-        errors: vec![crate::mt::ErrorCode::ZERO; fields],
+        errors: vec![ErrorCode::ZERO; fields],
         ranges: vec![[i32::MAX, i32::MIN]; fields],
         ..BlockInfo::default()
     };
@@ -75,9 +111,8 @@ fn scan_block(
         tets.clear();
         mt.find_removed(mesh, u, &mut tets).map_err(EncodeError::Update)?;
         if let Some(excess) = margins.check(mt, mesh, u, &tets) {
-            let Excess { parent, field, larger, .. } = excess;
-            if larger || options.check_margins {
-                return Err(EncodeError::Order { update: u.0, parent: parent.0, field });
+            if excess.larger || options.check_margins {
+                return Err(out_of_order(excess));
             }
         }
         // Else each block can be used without the others.

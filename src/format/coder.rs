@@ -105,6 +105,21 @@ impl Put for Counts {
     fn bits(&mut self, _: u32, _: u32) {}
 }
 
+impl Counts {
+    /// Adds those of what was counted elsewhere.
+    pub fn add(&mut self, other: &Self) {
+        if other.0.len() > self.0.len() {
+            self.0.resize_with(other.0.len(), Vec::new);
+        }
+        for (counts, others) in self.0.iter_mut().zip(&other.0) {
+            if others.len() > counts.len() {
+                counts.resize(others.len(), 0);
+            }
+            counts.iter_mut().zip(others).for_each(|(count, other)| *count = count.saturating_add(*other));
+        }
+    }
+}
+
 /// The symbols of one context with where the share of each begins; those that do not occur are left out.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 struct Table {

@@ -3,14 +3,16 @@
 use super::block_scan::BlockScan;
 use super::coder::{Counts, Measure, Models, Put, Writer};
 use super::header::{END_BYTES, HEAD_BYTES, HEADER_BYTES, Kind, SectionHead, header, version_for};
+use super::payload::Totals;
 use super::payload::exact::Corrections;
 use super::payload::histogram::Histograms;
 use super::payload::index::{Index, MAX_BLOCK_BITS, MIN_BLOCK_BITS};
-use super::payload::{State, Totals};
 use super::{checksum, payload, write};
 use crate::mt::{BaseMeshError, Exact, Mt, MultiTessellation, UpdateError, UpdatePages, VertexId};
+use crate::threads;
 use std::collections::BTreeMap;
 use std::io;
+use std::ops::Range;
 use thiserror::Error;
 
 /// What goes into a file besides the MT.
@@ -204,8 +206,7 @@ fn sections(
     exact: &[(u32, Corrections)],
 ) -> Result<Vec<Section>, EncodeError> {
     let fields = mt.info().fields.len();
-    let mut counts = Counts::default();
-    put_all(&mut counts, mt, index.block_bits)?;
+    let mut counts = count_all(mt, index.block_bits)?;
     exact.iter().for_each(|(_, corrections)| corrections.put(&mut counts));
     let models = Models::new(&counts);
     let mut shared = Vec::new();
@@ -234,12 +235,11 @@ fn sections(
         })?);
     }
     index.shared = shared.iter().map(Section::len).sum();
-    let mut blocks = Vec::new();
-    let mut state = payload::start_state(mt).map_err(EncodeError::Base)?;
-    for block in 0..index.blocks.len() {
-        let before = blocks.len();
-        put_block(mt, block as u32, index, &models, state.as_mut(), &mut blocks)?;
-        index.blocks[block].lengths = blocks[before..].iter().map(|section| section.len() as u32).collect();
+    let of_blocks = put_blocks(mt, index, &models)?;
+    let mut blocks = Vec::with_capacity(of_blocks.iter().map(Vec::len).sum());
+    for (block, sections) in index.blocks.iter_mut().zip(of_blocks) {
+        block.lengths = sections.iter().map(|section| section.len() as u32).collect();
+        blocks.extend(sections);
     }
     for (field, corrections) in exact {
         let head = [*field, u32::from(!corrections.is_single()), corrections.count()];
@@ -274,24 +274,57 @@ fn corrections(
     Ok(all)
 }
 
+/// Puts what comes before the updates.
+fn put_base(out: &mut impl Put, mt: &Mt) {
+    payload::put_base(out, mt);
+    (0..mt.info().fields.len()).for_each(|field| payload::put_base_field(out, mt, field));
+}
+
 /// Puts all that is coded of a file.
 fn put_all(out: &mut impl Put, mt: &Mt, block_bits: u32) -> Result<(), EncodeError> {
-    payload::put_base(out, mt);
-    let fields = mt.info().fields.len();
-    (0..fields).for_each(|field| payload::put_base_field(out, mt, field));
+    put_base(out, mt);
     let mut state = payload::start_state(mt).map_err(EncodeError::Base)?;
     let mut first = 0;
     while first < mt.updates() {
         let end = mt.updates().min(first + (1 << block_bits));
         if mt.info().kind.is_paged() {
-            payload::put_shared(out, mt, first..end);
-            (0..fields).for_each(|f| payload::put_field(out, mt, first..end, f));
+            put_page(out, mt, &(first..end));
         } else {
             payload::put_updates(out, mt, first..end, state.as_mut()).map_err(EncodeError::Update)?;
         }
         first = end;
     }
     Ok(())
+}
+
+/// Puts a block of an MT whose blocks do not depend on each other.
+fn put_page(out: &mut impl Put, mt: &Mt, updates: &Range<u32>) {
+    payload::put_shared(out, mt, updates.clone());
+    (0..mt.info().fields.len()).for_each(|field| payload::put_field(out, mt, updates.clone(), field));
+}
+
+/// So many blocks are counted together: each table of counts takes memory.
+const COUNTED: usize = 16;
+
+/// How often each symbol occurs in what [`put_all`] puts.
+fn count_all(mt: &Mt, block_bits: u32) -> Result<Counts, EncodeError> {
+    let mut all = Counts::default();
+    if !mt.info().kind.is_paged() {
+        put_all(&mut all, mt, block_bits)?;
+        return Ok(all);
+    }
+    put_base(&mut all, mt);
+    let updates = mt.updates() as usize;
+    let of_ranges = threads::map(updates.div_ceil(1 << block_bits), COUNTED, |blocks| {
+        let mut counts = Counts::default();
+        for block in blocks {
+            let first = block << block_bits;
+            put_page(&mut counts, mt, &(first as u32..updates.min(first + (1 << block_bits)) as u32));
+        }
+        counts
+    });
+    of_ranges.iter().for_each(|counts| all.add(counts));
+    Ok(all)
 }
 
 /// How many bytes of the file of an MT code what: names and bytes. Only for MTs that came from a file; exact
@@ -319,31 +352,36 @@ pub fn breakdown(mt: &Mt, block_bits: u32) -> Result<Vec<(&'static str, f64)>, E
     Ok(parts)
 }
 
-/// Appends the sections of a block.
-fn put_block(
-    mt: &Mt,
-    block: u32,
-    index: &Index,
-    models: &Models,
-    state: Option<&mut State>,
-    sections: &mut Vec<Section>,
-) -> Result<(), EncodeError> {
+/// The sections of each block.
+fn put_blocks(mt: &Mt, index: &Index, models: &Models) -> Result<Vec<Vec<Section>>, EncodeError> {
+    let kind = payload::section_of(mt.info().kind);
+    if mt.info().kind.is_paged() {
+        return threads::map(index.blocks.len(), 1, |block| {
+            put_sections(mt, block.start as u32, index, models)
+        })
+        .into_iter()
+        .collect();
+    }
+    let mut state = payload::start_state(mt).map_err(EncodeError::Base)?;
+    let mut of_block = |block: u32| {
+        let (updates, mut done) = (index.updates(block, mt.updates()), Ok(()));
+        let section = Section::coded(kind, &[block], models, |out| {
+            done = payload::put_updates(out, mt, updates, state.as_mut());
+        });
+        done.map_err(EncodeError::Update)?;
+        Ok(vec![section?])
+    };
+    (0..index.blocks.len() as u32).map(&mut of_block).collect()
+}
+
+/// The sections of a block of an MT whose blocks do not depend on each other.
+fn put_sections(mt: &Mt, block: u32, index: &Index, models: &Models) -> Result<Vec<Section>, EncodeError> {
     let updates = index.updates(block, mt.updates());
     let kind = payload::section_of(mt.info().kind);
-    if !mt.info().kind.is_paged() {
-        let mut done = Ok(());
-        sections.push(Section::coded(kind, &[block], models, |out| {
-            done = payload::put_updates(out, mt, updates, state);
-        })?);
-        return done.map_err(EncodeError::Update);
-    }
-    sections.push(Section::coded(kind, &[block], models, |out| {
-        payload::put_shared(out, mt, updates.clone());
-    })?);
-    for field in 0..mt.info().fields.len() {
-        sections.push(Section::coded(Kind::FLDU, &[block, field as u32], models, |out| {
-            payload::put_field(out, mt, updates.clone(), field);
-        })?);
-    }
-    Ok(())
+    let shared = Section::coded(kind, &[block], models, |out| payload::put_shared(out, mt, updates.clone()));
+    let of_field = |field: usize| {
+        let put = |out: &mut Writer<'_>| payload::put_field(out, mt, updates.clone(), field);
+        Section::coded(Kind::FLDU, &[block, field as u32], models, put)
+    };
+    std::iter::once(shared).chain((0..mt.info().fields.len()).map(of_field)).collect()
 }

@@ -210,10 +210,14 @@ impl Topology {
 /// As [`neighbors`], and if a tetrahedron names a point that is not there.
 pub fn topology(points: usize, tets: &[[u32; 4]]) -> Result<Topology, MeshError> {
     check_indices(points, tets)?;
-    let neighbors = neighbors(tets)?;
+    Ok(topology_of(points, tets, neighbors(tets)?))
+}
+
+/// The topology of tetrahedra with these neighbours.
+pub(crate) fn topology_of(points: usize, tets: &[[u32; 4]], neighbors: Vec<[u32; 4]>) -> Topology {
     let boundary_faces = neighbors.iter().flatten().filter(|&&n| n == NONE).count();
     let non_manifold = non_manifold(points, tets, &neighbors, |_| true);
-    Ok(Topology { components: components(&neighbors), boundary_faces, non_manifold, neighbors })
+    Topology { components: components(&neighbors), boundary_faces, non_manifold, neighbors }
 }
 
 /// For each vertex whether the mesh is not a 3-manifold there, as [`Topology`] has it, of those that are `wanted`.

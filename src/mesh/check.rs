@@ -3,7 +3,10 @@
 use robust::{Coord, Coord3D};
 
 use crate::mesh::adjacency::{FaceTable, HalfFace, check_indices, crowded, face_of, match_faces};
+#[cfg(feature = "build")]
+use crate::mesh::adjacency::{Topology, topology_of};
 use crate::mesh::{MeshError, TetMesh};
+use crate::threads;
 
 /// Checks that `mesh` is valid: fields and indices fit, every tetrahedron is positive (decided exactly), and
 /// every face has at most two tetrahedra, which lie on opposite sides of it.
@@ -13,21 +16,35 @@ use crate::mesh::{MeshError, TetMesh};
 /// # Errors
 /// The first thing that is wrong.
 pub fn check(mesh: &TetMesh) -> Result<(), MeshError> {
+    check_neighbors(mesh).map(drop)
+}
+
+/// Checks as [`check`] does that a mesh is valid, and works out its [`Topology`].
+#[cfg(feature = "build")]
+pub(crate) fn check_topology(mesh: &TetMesh) -> Result<Topology, MeshError> {
+    Ok(topology_of(mesh.positions.len(), &mesh.tets, check_neighbors(mesh)?))
+}
+
+/// Tetrahedra whose sides are checked together.
+const SHARE: usize = 1 << 14;
+
+/// [`check`], and the neighbours of each tetrahedron.
+fn check_neighbors(mesh: &TetMesh) -> Result<Vec<[u32; 4]>, MeshError> {
     check_arrays(mesh)?;
     let sides = Sides::new(&mesh.positions);
-    for (t, tet) in (0_u32..).zip(&mesh.tets) {
-        match sides.of(*tet) {
-            1 => {}
-            0 => return Err(MeshError::Flat { tet: t }),
-            _ => return Err(MeshError::Inverted { tet: t }),
-        }
-    }
+    let wrong = |t: usize| match sides.of(mesh.tets[t]) {
+        1 => None,
+        0 => Some(MeshError::Flat { tet: t as u32 }),
+        _ => Some(MeshError::Inverted { tet: t as u32 }),
+    };
+    let wrong = threads::map(mesh.tets.len(), SHARE, |mut tets| tets.find_map(wrong));
+    wrong.into_iter().flatten().next().map_or(Ok(()), Err)?;
     let fits = |group: &[HalfFace], folded: bool| match group {
         [a, b] if folded => Err(MeshError::Folded { tets: [a.tet(), b.tet()] }),
         [_, _] => Ok(()),
         _ => Err(crowded(group)),
     };
-    match_faces(&FaceTable::new(&mesh.tets)?, fits).map(drop)
+    match_faces(&FaceTable::new(&mesh.tets)?, fits)
 }
 
 /// Checks what holds before geometry is looked at: lengths, finite coordinates, indices in range.

@@ -70,6 +70,15 @@ impl Histogram {
         }
     }
 
+    /// Adds what another histogram of the same bins has.
+    pub(crate) fn merge(&mut self, other: &Self) {
+        let own = self.bins.iter_mut().chain([&mut self.below, &mut self.above]);
+        for (own, other) in own.zip(other.bins.iter().chain([&other.below, &other.above])) {
+            own.add(other.sum);
+            own.add(other.lost);
+        }
+    }
+
     /// The volume in each bin.
     pub fn volumes(&self) -> Vec<f64> {
         self.bins.iter().map(|bin| bin.total()).collect()

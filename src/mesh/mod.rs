@@ -26,6 +26,8 @@ pub(crate) use changed_blocks::{BLOCK, ChangedBlocks};
 pub use check::check;
 #[cfg(feature = "parts")]
 pub(crate) use check::check_arrays;
+#[cfg(feature = "build")]
+pub(crate) use check::check_topology;
 pub use error::MeshError;
 #[cfg(feature = "build")]
 pub use geometry_field::GeometryField;

@@ -57,9 +57,34 @@ impl Margins {
         parents: &mut Vec<UpdateId>,
         beyond: &mut Vec<i32>,
     ) {
+        let tets = tets.iter().filter_map(|&t| Some((mt.creator(mesh, t), mesh.tet(t)?)));
+        let tets = tets.map(|(parent, corners)| (parent, corners.map(|v| mesh.levels(v))));
+        self.find_beyond(tets.clone(), parents, beyond);
+        self.note(tets.flat_map(|(_, levels)| levels));
+    }
+
+    /// Takes the next update, given the levels of the vertices of what it removes.
+    pub fn note<'a>(&mut self, vertices: impl Iterator<Item = &'a [i32]>) {
+        let own = self.removed.len();
+        self.removed.resize(own + self.levels.len(), [i32::MAX, i32::MIN]);
+        for levels in vertices {
+            for (all, &level) in self.removed[own..].iter_mut().zip(levels) {
+                *all = [all[0].min(level), all[1].max(level)];
+            }
+        }
+    }
+
+    /// Appends the parents of an update, ascending, and for each and every field how many levels what they created is beyond the range of
+    /// what they removed. `tets` has for each tetrahedron that the update removes what created it, and the levels at its corners.
+    pub fn find_beyond<'a>(
+        &self,
+        tets: impl Iterator<Item = (Option<UpdateId>, [&'a [i32]; 4])> + Clone,
+        parents: &mut Vec<UpdateId>,
+        beyond: &mut Vec<i32>,
+    ) {
         let fields = self.levels.len();
         let first = parents.len();
-        parents.extend(tets.iter().filter_map(|&t| mt.creator(mesh, t)));
+        parents.extend(tets.clone().filter_map(|(parent, _)| parent));
         parents[first..].sort_unstable();
         let mut kept = first;
         for i in first..parents.len() {
@@ -71,20 +96,16 @@ impl Margins {
         parents.truncate(kept);
         let start = beyond.len();
         beyond.resize(start + (parents.len() - first) * fields, 0);
-        let own = self.removed.len();
-        self.removed.resize(own + fields, [i32::MAX, i32::MIN]);
-        for &t in tets {
-            let Some(corners) = mesh.tet(t) else { continue };
-            let parent = mt.creator(mesh, t).and_then(|p| parents[first..].binary_search(&p).ok());
+        for (parent, corners) in tets {
+            let Some(parent) = parent else { continue };
+            let Ok(at) = parents[first..].binary_search(&parent) else { continue };
             for field in 0..fields {
-                let values = corners.map(|v| mesh.levels(v).get(field).copied().unwrap_or(0));
+                let values = corners.map(|levels| levels.get(field).copied().unwrap_or(0));
                 let (low, high) = values.iter().fold((i32::MAX, i32::MIN), |(l, h), &x| (l.min(x), h.max(x)));
-                let all = &mut self.removed[own + field];
-                *all = [all[0].min(low), all[1].max(high)];
-                let Some(at) = parent else { continue };
-                let known = parents[first + at].0 as usize * fields + field;
                 // An update that depends on a later one is refused elsewhere.
-                let Some(&[least, most]) = self.removed.get(known) else { continue };
+                let Some(&[least, most]) = self.removed.get(parent.0 as usize * fields + field) else {
+                    continue;
+                };
                 let beyond = &mut beyond[start + at * fields + field];
                 *beyond = (*beyond).max(high.saturating_sub(most)).max(least.saturating_sub(low));
             }
@@ -101,11 +122,22 @@ impl Margins {
     ) -> Option<Excess> {
         let (mut parents, mut beyond) = (Vec::new(), Vec::new());
         self.next(mt, mesh, tets, &mut parents, &mut beyond);
+        self.fault(u, &parents, &beyond, |u, field| mt.error_of_field(u, field))
+    }
+
+    /// The fault of the errors of update `u`, one that is larger than a parent's first, given what [`Margins::find_beyond`] has found.
+    pub fn fault(
+        &self,
+        u: UpdateId,
+        parents: &[UpdateId],
+        beyond: &[i32],
+        error: impl Fn(UpdateId, usize) -> ErrorCode,
+    ) -> Option<Excess> {
         let arcs = parents.iter().zip(beyond.chunks(self.levels.len().max(1)));
         let mut near = None;
         for (&parent, beyond) in arcs {
             for (field, &beyond) in beyond.iter().enumerate() {
-                let [own, above] = [u, parent].map(|u| mt.error_of_field(u, field));
+                let [own, above] = [u, parent].map(|u| error(u, field));
                 let larger = own > above;
                 let excess = Excess { update: u, parent, field, larger };
                 if larger {

@@ -12,6 +12,7 @@ mod edge;
 mod error;
 mod exact;
 mod explicit;
+mod facts;
 mod half_edge;
 mod margins;
 mod mesh;
@@ -32,8 +33,9 @@ pub use explicit::check::MtFault;
 #[cfg(feature = "build")]
 pub use explicit::check::check_errors;
 pub use explicit::store::{ExplicitMt, ExplicitUpdate};
+pub(crate) use facts::{MtFacts, VOLUME_BINS, level_volumes};
 #[cfg(feature = "build")]
-pub(crate) use half_edge::builder::{HalfEdgeBuilder, NextUpdate};
+pub(crate) use half_edge::builder::{Forest, HalfEdgeBuilder, NextUpdate, by_corner};
 pub use half_edge::store::{BaseMark, ForestChild, HalfEdgeMt, HalfEdgeUpdate};
 pub(crate) use margins::{Excess, Margins};
 pub use mesh::base::{BaseMesh, BaseMeshError, MAX_FIELD_BITS, MAX_UPDATES};

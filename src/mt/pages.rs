@@ -152,7 +152,7 @@ impl<P: Page> Pages<P> {
     }
 
     /// Changes the last page.
-    pub fn change_last(&mut self, change: impl FnOnce(&mut P)) {
+    fn change_last(&mut self, change: impl FnOnce(&mut P)) {
         // The last page is present.
         let Some(Some(page)) = self.pages.last_mut() else { return };
         self.bytes -= page.bytes() as u64;
@@ -284,12 +284,6 @@ impl<T: Copy> Rows<T> {
     pub fn push(&mut self, row: &[T]) {
         self.items.extend_from_slice(row);
         self.starts.push(self.items.len() as u32);
-    }
-
-    /// Takes the last row away.
-    pub fn pop(&mut self) {
-        self.starts.pop();
-        self.items.truncate(self.starts.last().map_or(0, |&end| end as usize));
     }
 
     /// The items of all rows.

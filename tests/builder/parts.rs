@@ -90,7 +90,11 @@ pub fn bytes(built: &BuildResult) -> Vec<u8> {
         histograms: true,
         ..EncodeOptions::default()
     };
-    encode(&built.mt, &options).expect("an MT that can be written")
+    let bytes = encode(&built.mt, &options).expect("an MT that can be written");
+    // In pages anew nothing is known of the blocks.
+    let scanned = built.mt.in_pages(block_bits).expect("a complete MT");
+    assert!(encode(&scanned, &options).expect("an MT that can be written") == bytes, "other blocks");
+    bytes
 }
 
 /// A convex grid, one that is not convex, with two fields, and curved boundaries on a lattice that moves points.

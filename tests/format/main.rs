@@ -2,6 +2,7 @@
 
 mod blocks;
 mod damaged;
+mod facts;
 mod golden;
 mod histograms;
 #[allow(dead_code, reason = "each test uses a part of it")]

@@ -8,14 +8,15 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Each module with what it may import besides itself.
-const LAYERS: [(&str, &[&str]); 19] = [
+const LAYERS: [(&str, &[&str]); 20] = [
+    ("threads", &[]),
     ("geom", &[]),
-    ("mesh", &["geom"]),
-    ("mt", &["geom", "mesh"]),
+    ("mesh", &["geom", "threads"]),
+    ("mt", &["geom", "mesh", "threads"]),
     ("generate", &["geom", "mesh"]),
     ("io", &["geom", "mesh"]),
-    ("builder", &["geom", "mesh", "mt"]),
-    ("format", &["geom", "mesh", "mt"]),
+    ("builder", &["geom", "mesh", "mt", "threads"]),
+    ("format", &["geom", "mesh", "mt", "threads"]),
     ("refine", &["geom", "mesh", "mt"]),
     ("measure", &["geom", "mesh", "mt"]),
     ("verify", &["geom", "mesh", "mt", "refine"]),

@@ -56,7 +56,7 @@ pub fn assemble(
     let mut assembly = Assembly { appender, numbers, depths, fields: info.fields.len(), done: 0 };
     assembly.append_all(&plan, updates, progress)?;
     let depth = assembly.depths.into_iter().max().unwrap_or(0);
-    let (mt, vertices) = assembly.appender.finish();
+    let (mt, vertices) = assembly.appender.finish()?;
     let summary = BuildSummary {
         vertices: info.vertices,
         tetrahedra: info.tetrahedra,

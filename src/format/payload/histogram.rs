@@ -2,11 +2,8 @@
 
 use crate::format::read::Reader;
 use crate::format::{FormatError, write};
-use crate::mesh::Histogram;
-use crate::mt::{CurrentMesh, FieldInfo, MtInfo};
+use crate::mt::VOLUME_BINS;
 
-/// Bins of what is written: about 160 bytes a field.
-const BINS: usize = 64;
 /// The most bins that are read.
 const MAX_BINS: u32 = 1 << 10;
 /// What a share of 1 is stored as.
@@ -21,10 +18,17 @@ pub struct Histograms {
 }
 
 impl Histograms {
-    /// Those of the fields of a mesh.
-    pub fn of(info: &MtInfo, mesh: &CurrentMesh) -> Self {
-        let shares = info.fields.iter().enumerate().flat_map(|(number, field)| of_field(number, field, mesh));
-        Self { bins: BINS, shares: shares.collect() }
+    /// Those of the volumes of each field in [`VOLUME_BINS`] bins.
+    pub fn of(volumes: &[f64]) -> Self {
+        let of_field = |volumes: &[f64]| {
+            let whole: f64 = volumes.iter().sum();
+            let stored = |volume: &f64| match volume / whole * WHOLE {
+                share if share > 0.0 => share.round().max(1.0) as u32,
+                _ => 0,
+            };
+            volumes.iter().map(stored).collect::<Vec<u32>>()
+        };
+        Self { bins: VOLUME_BINS, shares: volumes.chunks(VOLUME_BINS).flat_map(of_field).collect() }
     }
 
     pub fn write(&self, out: &mut Vec<u8>) {
@@ -52,27 +56,4 @@ impl Histograms {
         let sum: u64 = stored.iter().copied().map(u64::from).sum();
         Some(stored.iter().map(|&share| f64::from(share) / (sum as f64).max(1.0)).collect())
     }
-}
-
-fn of_field(number: usize, field: &FieldInfo, mesh: &CurrentMesh) -> Vec<u32> {
-    if field.max <= field.min {
-        return (0..BINS).map(|bin| if bin == 0 { WHOLE as u32 } else { 0 }).collect();
-    }
-    let mut histogram = Histogram::new(field.min, field.max, BINS);
-    for tet in (0..mesh.tet_slots() as u32).filter_map(|t| mesh.tet(t)) {
-        // Shares are the same in units of the lattice.
-        let corners = tet.map(|slot| mesh.positions()[slot as usize].map(f64::from));
-        histogram.add(corners, tet.map(|slot| field.value(mesh.levels(slot)[number])));
-    }
-    let mut volumes = histogram.volumes();
-    // Rounding may have moved values beyond the ends.
-    let [below, above] = histogram.outside();
-    volumes[0] += below;
-    volumes[BINS - 1] += above;
-    let whole: f64 = volumes.iter().sum();
-    let stored = |volume: f64| match volume / whole * WHOLE {
-        share if share > 0.0 => share.round().max(1.0) as u32,
-        _ => 0,
-    };
-    volumes.into_iter().map(stored).collect()
 }

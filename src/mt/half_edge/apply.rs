@@ -47,7 +47,7 @@ fn take_state(mesh: &mut CurrentMesh) -> Box<State> {
 
 /// How far to go to name an update that has to come first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::mt) enum Search {
+enum Search {
     /// Around the near vertex.
     Nearby,
     /// Through all updates before, which takes as long as applying them.
@@ -86,42 +86,7 @@ impl HalfEdgeMt {
                 Err(blocking) => return Ok(Applied::Blocked(blocking)),
             },
         };
-        mesh.next_epoch();
-        mesh.number_tet(first, 0);
-        scratch.removed[0] = first;
-        let (mut next, mut len) = (0, 1);
-        while next < len {
-            let t = scratch.removed[next];
-            let (tet, around, inner) = (mesh.tets[t as usize], mesh.neighbors[t as usize], mesh.tet_byte(t));
-            let at = corner_of(&tet, slot);
-            if tet[at] != slot {
-                return Err(torn);
-            }
-            for (face, &n) in around.iter().enumerate() {
-                if face == at || inner >> face & 1 == 0 || n == NONE {
-                    continue;
-                }
-                let tag = mesh.tag(n);
-                if tag != update {
-                    if tag >= update {
-                        return Err(torn);
-                    }
-                    mesh.place_tag(n);
-                    return Ok(Applied::Blocked(UpdateId(tag)));
-                }
-                if len == MOST {
-                    return Err(torn);
-                }
-                if mesh.number_tet(n, len as u32).is_none() {
-                    scratch.removed[len] = n;
-                    len += 1;
-                }
-            }
-            next += 1;
-        }
-        scratch.removed_len = len;
-        scratch.link[0] = slot;
-        Ok(Applied::Done)
+        mesh.collect_tagged(update, slot, first, scratch)
     }
 
     /// A tetrahedron of T_u, if one is in the mesh; else what has to be applied before one can be.
@@ -169,7 +134,7 @@ impl HalfEdgeMt {
     }
 
     /// Finds the star that the insertion makes, whose T_u has been collected.
-    fn find_star(&self, mesh: &mut CurrentMesh, scratch: &mut Scratch) -> Option<()> {
+    pub(super) fn find_star(&self, mesh: &mut CurrentMesh, scratch: &mut Scratch) -> Option<()> {
         let slot = scratch.link[0];
         mesh.number_slot(slot, 0);
         scratch.link_len = 1;
@@ -232,7 +197,7 @@ impl HalfEdgeMt {
 
     /// Gets ready to insert the vertex of `u`: star, position and levels are in the scratch space then, but not yet what
     /// removes the star.
-    pub(in crate::mt) fn prepare(
+    fn prepare(
         &self,
         mesh: &mut CurrentMesh,
         u: UpdateId,
@@ -277,7 +242,7 @@ impl HalfEdgeMt {
         Ok(Applied::Done)
     }
 
-    pub(in crate::mt) fn perform_insertion(
+    pub(super) fn perform_insertion(
         &self,
         mesh: &mut CurrentMesh,
         u: UpdateId,
@@ -392,8 +357,55 @@ impl HalfEdgeMt {
 }
 
 impl CurrentMesh {
+    /// Collects T_u from one of its tetrahedra on, given the slot of the near vertex, or returns what has to be applied first.
+    pub(super) fn collect_tagged(
+        &mut self,
+        update: u32,
+        slot: u32,
+        first: u32,
+        scratch: &mut Scratch,
+    ) -> Result<Applied, UpdateError> {
+        let torn = || UpdateError::Cavity { update };
+        self.next_epoch();
+        self.number_tet(first, 0);
+        scratch.removed[0] = first;
+        let (mut next, mut len) = (0, 1);
+        while next < len {
+            let t = scratch.removed[next];
+            let (tet, around, inner) = (self.tets[t as usize], self.neighbors[t as usize], self.tet_byte(t));
+            let at = corner_of(&tet, slot);
+            if tet[at] != slot {
+                return Err(torn());
+            }
+            for (face, &n) in around.iter().enumerate() {
+                if face == at || inner >> face & 1 == 0 || n == NONE {
+                    continue;
+                }
+                let tag = self.tag(n);
+                if tag != update {
+                    if tag >= update {
+                        return Err(torn());
+                    }
+                    self.place_tag(n);
+                    return Ok(Applied::Blocked(UpdateId(tag)));
+                }
+                if len == MOST {
+                    return Err(torn());
+                }
+                if self.number_tet(n, len as u32).is_none() {
+                    scratch.removed[len] = n;
+                    len += 1;
+                }
+            }
+            next += 1;
+        }
+        scratch.removed_len = len;
+        scratch.link[0] = slot;
+        Ok(Applied::Done)
+    }
+
     /// All tetrahedra around the vertex in `slot`, however many, each with the corner that it is.
-    fn all_around(&mut self, slot: u32) -> Vec<AtVertex> {
+    pub(super) fn all_around(&mut self, slot: u32) -> Vec<AtVertex> {
         self.next_epoch();
         let first = self.incident[slot as usize];
         let mut star = vec![(first, corner_of(&self.tets[first as usize], slot))];

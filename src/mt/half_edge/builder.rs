@@ -1,14 +1,22 @@
 //! Makes half-edge MTs: updates are appended coarse to fine to the mesh that those before make.
+//!
+//! They come in batches. While the updates of one are applied, the stars of the one before are coded, on the other threads where there
+//! are some. Batches do not depend on how many there are.
 
-use super::apply::Search;
-use super::scratch::{NEW, Scratch};
-use super::star_code::StarCode;
-use super::store::{ForestChild, HalfEdgeMt, HalfEdgeUpdate};
+use super::batch::Batch;
+use super::scratch::Scratch;
+use super::store::{BaseMark, ForestChild, HalfEdgeMt};
+use crate::mt::facts::{MtFacts, level_volumes};
 use crate::mt::{
-    ApplyUpdates, ConvertError, CurrentMesh, ErrorCode, MultiTessellation, ReplayError, UpdateError,
+    ApplyUpdates, BaseMesh, ConvertError, CurrentMesh, ErrorCode, Margins, MtInfo, MultiTessellation,
+    ReplayError, UpdateError,
 };
+use crate::threads;
 
 const NOT_HALF_EDGE: &str = "it is not the inverse of a half-edge collapse";
+
+/// Updates of a batch.
+const BATCH: usize = 1024;
 
 /// The update is no inverse half-edge collapse.
 pub(super) fn refused(update: u32) -> ConvertError {
@@ -19,88 +27,167 @@ pub(super) fn damaged(error: UpdateError) -> ConvertError {
     ConvertError::Damaged(ReplayError::Update(error))
 }
 
-/// What removes a tetrahedron, [`NONE`](crate::mesh::NONE) if nothing does, and which of its faces go with it, by corner: see
-/// [`BaseMark`](crate::mt::BaseMark).
+/// What removes a tetrahedron, [`NONE`](crate::mesh::NONE) if nothing does, and which of its faces go with it (see [`BaseMark`]): bit `i` is
+/// that of the face opposite the `i`-th vertex in ascending order.
 pub(crate) type Remover = (u32, u8);
 
-/// The next update, but for what removes its star.
+/// Bits of the vertices of a tetrahedron in ascending order, by its corners.
+pub(crate) fn by_corner(bits: u8, tet: [u32; 4]) -> u8 {
+    let rank = |v: u32| tet.iter().filter(|&&other| other < v).count();
+    (0..4).fold(0, |all, corner| all | (bits >> rank(tet[corner]) & 1) << corner)
+}
+
+/// The updates by near vertex.
+pub(crate) struct Forest {
+    /// Where those of each vertex begin, and one more.
+    starts: Vec<u32>,
+    children: Vec<ForestChild>,
+    /// The near vertex of each update.
+    near: Vec<u32>,
+}
+
+impl Forest {
+    /// Of so many vertices, given the near vertex of each update, and how far from it each inserts its own.
+    pub fn new(vertices: usize, near: Vec<u32>, offset: impl Fn(u32) -> [i32; 3]) -> Self {
+        let mut starts = vec![0_u32; vertices + 1];
+        near.iter().for_each(|&v| starts[v as usize + 1] += 1);
+        (0..vertices).for_each(|v| starts[v + 1] += starts[v]);
+        let mut next = starts.clone();
+        let mut children = vec![ForestChild::default(); near.len()];
+        for (update, &v) in (0..).zip(&near) {
+            let place = &mut next[v as usize];
+            children[*place as usize] = ForestChild { update, offset: offset(update) };
+            *place += 1;
+        }
+        Self { starts, children, near }
+    }
+
+    /// The updates whose near vertex is this one, ascending.
+    pub(super) fn children(&self, vertex: u32) -> &[ForestChild] {
+        let [start, end] = [0, 1].map(|k| self.starts.get(vertex as usize + k).map_or(0, |&at| at as usize));
+        self.children.get(start..end).unwrap_or(&[])
+    }
+
+    pub(super) fn near(&self, update: u32) -> Option<u32> {
+        self.near.get(update as usize).copied()
+    }
+
+    /// How far from its near vertex an update inserts its own.
+    pub(super) fn offset(&self, update: u32, near: u32) -> Option<[i32; 3]> {
+        let children = self.children(near);
+        let at = children.binary_search_by_key(&update, |child| child.update).ok()?;
+        Some(children[at].offset)
+    }
+}
+
+/// The next update.
 pub(crate) struct NextUpdate<'a> {
-    /// The updates whose near vertex is the new one.
-    pub children: &'a [ForestChild],
     /// The levels of the new vertex.
     pub levels: &'a [i32],
     pub errors: &'a [ErrorCode],
+    /// The faces opposite the new vertex of the tetrahedra that it is to insert, each one and all of them in ascending order of names;
+    /// empty if they are those that it does insert.
+    pub faces: &'a [[u32; 3]],
 }
 
-/// A half-edge MT that grows, and the mesh with all of its updates.
+/// A half-edge MT that grows.
 pub(crate) struct HalfEdgeBuilder {
     mt: HalfEdgeMt,
+    forest: Forest,
+    names: Vec<u32>,
+    margins: Margins,
+    facts: MtFacts,
+    /// The mesh with all updates but those of the last batch.
     mesh: CurrentMesh,
     scratch: Box<Scratch>,
-    code: StarCode,
-    star: Vec<[u32; 4]>,
-    removers: Vec<Remover>,
+    /// How many updates have come.
+    len: u32,
+    /// The batch that grows, and the one before, whose stars are not coded yet.
+    next: Batch,
+    applied: Batch,
 }
 
 impl HalfEdgeBuilder {
-    /// Of an MT without updates.
+    /// Without updates yet. `names` are numbers of the MT's vertices in another order, by which stars are sorted.
     ///
     /// # Errors
     /// If the base mesh is not usable.
-    pub fn new(mt: HalfEdgeMt) -> Result<Self, ConvertError> {
+    pub fn new(
+        info: MtInfo,
+        base: BaseMesh,
+        marks: Vec<BaseMark>,
+        (forest, names): (Forest, Vec<u32>),
+        page_bits: u32,
+    ) -> Result<Self, ConvertError> {
+        let vertices = 0..base.positions.len() as u32;
+        let of_base: Vec<Vec<ForestChild>> = vertices.map(|v| forest.children(v).to_vec()).collect();
+        let mt = HalfEdgeMt::new(info, base, marks, &of_base, page_bits).map_err(damaged)?;
         let mut mesh = mt.start().map_err(|error| ConvertError::Damaged(error.into()))?;
         mesh.make_room(mt.info());
         Ok(Self {
+            margins: Margins::new(mt.info()),
             mt,
+            forest,
+            names,
+            facts: MtFacts::default(),
             mesh,
             scratch: Box::default(),
-            code: StarCode::default(),
-            star: Vec::new(),
-            removers: Vec::new(),
+            len: 0,
+            next: Batch::default(),
+            applied: Batch::default(),
         })
     }
 
-    /// Adds an update and applies it. `find_removers` gets the tetrahedra of its star, in numbers of MT vertices, and tells what
-    /// removes each; none if they are not those that the update should insert.
+    /// Adds an update. `star` has for each tetrahedron that it inserts, in the order of their faces opposite the new vertex by names, what
+    /// removes it.
     ///
     /// # Errors
-    /// If it is no inverse half-edge collapse.
+    /// If it, or one before, is no inverse half-edge collapse.
     pub fn push(
         &mut self,
         next: &NextUpdate<'_>,
-        find_removers: impl FnOnce(&[[u32; 4]], &mut Vec<Remover>) -> Option<()>,
+        star: impl Iterator<Item = Remover>,
     ) -> Result<(), ConvertError> {
-        let Self { mt, mesh, scratch, code, star, removers } = self;
-        let &NextUpdate { children, levels, errors } = next;
-        // What is predicted of the levels is known once the link is.
-        let zeros = vec![0; levels.len()];
-        let record = HalfEdgeUpdate { children, level_residuals: &zeros, star: &[], errors };
-        let u = mt.push(&record).map_err(damaged)?;
-        let prepared = mt.prepare(mesh, u, Search::Nearby, scratch).map_err(damaged)?;
-        let position = prepared.map_err(|_| refused(u.0))?;
-        let residuals: Vec<i32> = levels.iter().zip(&scratch.levels).map(|(a, b)| a - b).collect();
-        let vertex = mt.vertex(u);
-        let link = &scratch.link[..scratch.link_len];
-        let number = |corner: u8| match corner {
-            NEW => vertex.0,
-            x => link.get(usize::from(x)).map_or(vertex.0, |&slot| mesh.vertex(slot).0),
-        };
-        star.clear();
-        star.extend(scratch.star[..scratch.star_len].iter().map(|new| new.corners.map(number)));
-        removers.clear();
-        find_removers(star, removers).ok_or_else(|| refused(u.0))?;
-        scratch.hash_star(mesh, vertex.0);
-        let found = mt.code_star(mesh, u, position, (&mut **scratch, &mut *code), removers);
-        mt.set_last_star(&found.ok_or_else(|| refused(u.0))?, &residuals);
-        // Coding has put the removers into the star.
-        scratch.levels.copy_from_slice(levels);
-        mt.perform_insertion(mesh, u, position, scratch);
-        mesh.clear_touched();
-        Ok(())
+        let fields = self.mt.info().fields.len();
+        if next.levels.len() != fields || next.errors.len() != fields {
+            return Err(refused(self.len));
+        }
+        self.next.push(next.levels, next.errors, star);
+        self.next.push_faces(next.faces);
+        self.len += 1;
+        if self.next.len() < BATCH { Ok(()) } else { self.turn() }
+    }
+
+    /// Applies the updates that have come, codes the stars of those before, and begins a new batch.
+    fn turn(&mut self) -> Result<(), ConvertError> {
+        let Self { mt, forest, names, margins, facts, mesh, scratch, next, applied, .. } = self;
+        let (grown, whole, tree) = (&mut *next, &*mt, &*forest);
+        let (done, coded) = threads::join(
+            || grown.apply(whole, tree, names, mesh, scratch),
+            || applied.code(whole, tree, margins),
+        );
+        applied.append(coded, mt, forest, facts)?;
+        if done.is_err() {
+            // What comes before the fault may have one itself.
+            next.append(next.code(mt, forest, margins), mt, forest, facts)?;
+        }
+        std::mem::swap(next, applied);
+        next.clear(self.len);
+        done
     }
 
     /// The MT.
-    pub fn finish(self) -> HalfEdgeMt {
-        self.mt
+    ///
+    /// # Errors
+    /// As [`HalfEdgeBuilder::push`].
+    pub fn finish(mut self) -> Result<HalfEdgeMt, ConvertError> {
+        self.turn()?;
+        self.turn()?;
+        let Self { mut mt, mut facts, mesh, .. } = self;
+        if mt.updates() == mt.info().updates {
+            facts.volumes = level_volumes(mt.info(), &mesh);
+            mt.set_facts(facts);
+        }
+        Ok(mt)
     }
 }

@@ -1,9 +1,8 @@
 //! From an explicit MT to the compact half-edge one, where every update inserts a vertex that collapses onto a neighbour.
 
-use super::builder::{HalfEdgeBuilder, NextUpdate, Remover, damaged, refused};
-use super::store::{BaseMark, ForestChild, HalfEdgeMt};
+use super::builder::{Forest, HalfEdgeBuilder, NextUpdate, by_corner, refused};
+use super::store::{BaseMark, HalfEdgeMt};
 use crate::mesh::NONE;
-use crate::mt::replay::canonical;
 use crate::mt::{ConvertError, ExplicitMt, MtInfo, MtKind, MultiTessellation, UpdateId, VertexId};
 
 impl HalfEdgeMt {
@@ -17,11 +16,6 @@ impl HalfEdgeMt {
         let base = explicit.base().positions.len() as u32;
         let near: Vec<u32> =
             (0..updates).map(|u| near_vertex(explicit, UpdateId(u))).collect::<Result<_, _>>()?;
-        let mut children: Vec<Vec<ForestChild>> = vec![Vec::new(); explicit.vertices() as usize];
-        for (u, &v) in (0..).zip(&near) {
-            let [from, to] = [VertexId(v), VertexId(base + u)].map(|v| explicit.position(v));
-            children[v as usize].push(ForestChild { update: u, offset: [0, 1, 2].map(|k| to[k] - from[k]) });
-        }
         let inner = inner_faces(explicit, &near);
         let mark = |t: u32| BaseMark { remover: explicit.removed_by(t).map_or(NONE, |u| u.0), inner: 0 };
         let mut marks: Vec<BaseMark> = explicit.base_tets().map(mark).collect();
@@ -29,34 +23,39 @@ impl HalfEdgeMt {
             mark.inner = inner.of(t, explicit.base().tets[t as usize]);
         }
         let info = MtInfo { kind: MtKind::HalfEdge, updates, ..explicit.info().clone() };
-        let (of_base, of_updates) = children.split_at(base as usize);
-        let mt = Self::new(info, explicit.base().clone(), marks, of_base, page_bits).map_err(damaged)?;
-        let mut builder = HalfEdgeBuilder::new(mt)?;
-        for (u, children) in (0..).zip(of_updates) {
-            let id = UpdateId(u);
+        let offset = |u: u32| {
+            let [from, to] = [near[u as usize], base + u].map(|v| explicit.position(VertexId(v)));
+            [0, 1, 2].map(|k| to[k] - from[k])
+        };
+        let vertices = explicit.vertices();
+        let forest = Forest::new(vertices as usize, near.clone(), offset);
+        let names = (0..vertices).collect();
+        let mut builder =
+            HalfEdgeBuilder::new(info, explicit.base().clone(), marks, (forest, names), page_bits)?;
+        let mut star = Vec::new();
+        for u in 0..updates {
+            find_star(explicit, UpdateId(u), &mut star).ok_or(refused(u))?;
+            let faces: Vec<[u32; 3]> = star.iter().map(|&(face, _)| face).collect();
             let levels = explicit.levels(VertexId(base + u));
-            let next = NextUpdate { children, levels, errors: explicit.errors(id) };
-            builder.push(&next, |star, removers| removers_of(explicit, &inner, id, star, removers))?;
+            let next = NextUpdate { levels, errors: explicit.errors(UpdateId(u)), faces: &faces };
+            let remover = |t: u32| (explicit.removed_by(t).map_or(NONE, |u| u.0), inner.bits[t as usize]);
+            builder.push(&next, star.iter().map(|&(_, t)| remover(t)))?;
         }
-        Ok(builder.finish())
+        builder.finish()
     }
 }
 
-/// What removes the tetrahedra that an update inserts. None if they are others.
-fn removers_of(
-    explicit: &ExplicitMt,
-    inner: &InnerFaces,
-    u: UpdateId,
-    star: &[[u32; 4]],
-    removers: &mut Vec<Remover>,
-) -> Option<()> {
-    let range = explicit.inserted(u);
-    let inserted = &explicit.tets()[range.start as usize..range.end as usize];
-    for &tet in star {
-        let t = range.start + inserted.binary_search(&canonical(tet)).ok()? as u32;
-        removers.push((explicit.removed_by(t).map_or(NONE, |c| c.0), inner.of(t, tet)));
+/// Finds the tetrahedra that an update inserts, each with its face opposite the new vertex, in the order of these. None if one does not have
+/// the new vertex.
+fn find_star(explicit: &ExplicitMt, u: UpdateId, star: &mut Vec<([u32; 3], u32)>) -> Option<()> {
+    let vertex = explicit.created(u).start;
+    star.clear();
+    for t in explicit.inserted(u) {
+        let tet = explicit.tets()[t as usize];
+        tet.contains(&vertex).then(|| star.push((without(tet, vertex), t)))?;
     }
-    (inserted.len() == star.len()).then_some(())
+    star.sort_unstable();
+    Some(())
 }
 
 /// The vertex that all tetrahedra have which an update removes. It stays in the mesh.
@@ -90,8 +89,7 @@ struct InnerFaces {
 impl InnerFaces {
     /// The faces of tetrahedron `t` that go with it, by corner of `tet`, which are its vertices.
     fn of(&self, t: u32, tet: [u32; 4]) -> u8 {
-        let rank = |v: u32| tet.iter().filter(|&&other| other < v).count();
-        (0..4).fold(0, |bits, corner| bits | (self.bits[t as usize] >> rank(tet[corner]) & 1) << corner)
+        by_corner(self.bits[t as usize], tet)
     }
 }
 

@@ -1,6 +1,7 @@
 //! Half-edge Multi-Tessellations: vertex insertions that half-edge collapses undo, with the removers of tetrahedra coded, so that any page can be used without the others.
 
 pub(super) mod apply;
+mod batch;
 pub(super) mod builder;
 pub(super) mod from_explicit;
 pub(super) mod scratch;

@@ -177,18 +177,9 @@ impl Scratch {
 
     /// Hashes the labels of the star.
     pub fn hash_star(&mut self, mesh: &CurrentMesh, vertex: u32) {
-        self.hashes.clear();
-        self.hashes.extend(self.link[..self.link_len].iter().map(|&slot| spread(mesh.vertex(slot).0)));
-        self.hashes.push(spread(vertex));
-        let last = self.link_len;
-        self.tet_hashes.clear();
-        for new in &self.star[..self.star_len] {
-            let sum = new
-                .corners
-                .iter()
-                .fold(0, |sum: u64, &corner| sum.wrapping_add(self.hashes[usize::from(corner).min(last)]));
-            self.tet_hashes.push(sum);
-        }
+        let Self { star, star_len, link, link_len, hashes, tet_hashes, .. } = self;
+        let labels = link[..*link_len].iter().map(|&slot| mesh.vertex(slot).0).chain([vertex]);
+        hash_labels(labels, &star[..*star_len], hashes, tet_hashes);
     }
 
     /// Puts the star, which has been hashed, into canonical order.
@@ -201,42 +192,72 @@ impl Scratch {
 
     /// Whether all tetrahedra of the star are positive with the new vertex at `position`.
     pub fn is_positive(&self, mesh: &CurrentMesh, position: [i32; 3]) -> bool {
-        let (mut from, mut largest) = ([[0_i64; 3]; MOST], 0);
-        for (from, &v) in from.iter_mut().zip(&self.link[..self.link_len]) {
-            let p = mesh.positions[v as usize];
-            for k in 0..3 {
-                from[k] = i64::from(p[k]) - i64::from(position[k]);
-                largest |= from[k].unsigned_abs();
-            }
-        }
-        let narrow = largest <= 1 << NARROW_BITS;
-        self.star[..self.star_len].iter().all(|new| {
-            let [i, j, k] = FACES[new.own as usize & 3].map(|corner| new.corners[corner] as usize % MOST);
-            if narrow {
-                return det_i64(from[i], from[j], from[k]) > 0;
-            }
-            let at = |x: usize| mesh.positions[self.link[x] as usize];
-            orient3d(position, at(i), at(j), at(k)) > 0
-        })
+        let link = self.link[..self.link_len].iter().map(|&v| mesh.positions[v as usize]);
+        is_positive(&self.star[..self.star_len], link, position)
     }
 
-    /// Predicts the levels of a vertex at `position` from those around it: means by inverse squared distance, in whole
-    /// numbers, so that the order of the link does not matter.
+    /// Predicts the levels of a vertex at `position` from those around it.
     pub fn predict_levels(&mut self, mesh: &CurrentMesh, position: [i32; 3]) {
-        let link = &self.link[..self.link_len];
-        let largest = link.iter().map(|&v| squared(mesh, v, position)).max().unwrap_or(1).max(1);
-        self.levels.clear();
         self.levels.resize(mesh.fields, 0);
-        for (field, level) in self.levels.iter_mut().enumerate() {
-            let (mut total, mut sum) = (0_u128, 0_u128);
-            for &v in link {
-                let weight = weight(largest, squared(mesh, v, position));
-                total += weight;
-                // Levels are not negative.
-                sum += weight * u128::from(mesh.levels(v)[field].unsigned_abs());
-            }
-            *level = mean(sum, total.max(1)) as i32;
+        let link = self.link[..self.link_len].iter();
+        let link = link.map(|&v| (mesh.positions[v as usize], mesh.levels(v)));
+        predict_levels(link, position, &mut self.levels);
+    }
+}
+
+/// Hashes the labels of the vertices of a link, of which the new vertex comes last, and for each tetrahedron of the star the sum of those
+/// of its corners.
+pub(super) fn hash_labels(
+    labels: impl Iterator<Item = u32>,
+    star: &[NewTet],
+    hashes: &mut Vec<u64>,
+    tet_hashes: &mut Vec<u64>,
+) {
+    hashes.clear();
+    hashes.extend(labels.map(spread));
+    tet_hashes.clear();
+    let hash = |corner: u8| hashes[usize::from(corner).min(hashes.len() - 1)];
+    let sum = |new: &NewTet| new.corners.iter().fold(0, |sum: u64, &corner| sum.wrapping_add(hash(corner)));
+    tet_hashes.extend(star.iter().map(sum));
+}
+
+/// Whether all tetrahedra of a star are positive with the new vertex at `position`, given those of its link.
+pub(super) fn is_positive(star: &[NewTet], link: impl Iterator<Item = [i32; 3]>, position: [i32; 3]) -> bool {
+    let (mut from, mut largest) = ([[0_i64; 3]; MOST], 0);
+    for (from, p) in from.iter_mut().zip(link) {
+        for k in 0..3 {
+            from[k] = i64::from(p[k]) - i64::from(position[k]);
+            largest |= from[k].unsigned_abs();
         }
+    }
+    let narrow = largest <= 1 << NARROW_BITS;
+    star.iter().all(|new| {
+        let [i, j, k] = FACES[new.own as usize & 3].map(|corner| new.corners[corner] as usize % MOST);
+        if narrow {
+            return det_i64(from[i], from[j], from[k]) > 0;
+        }
+        let at = |x: usize| [0, 1, 2].map(|k| (from[x][k] + i64::from(position[k])) as i32);
+        orient3d(position, at(i), at(j), at(k)) > 0
+    })
+}
+
+/// Predicts the levels of a vertex at `position` from positions and levels around it: means by inverse squared distance, in whole
+/// numbers, so that the order of the link does not matter.
+pub(super) fn predict_levels<'a>(
+    link: impl Iterator<Item = ([i32; 3], &'a [i32])> + Clone,
+    position: [i32; 3],
+    levels: &mut [i32],
+) {
+    let largest = link.clone().map(|(p, _)| squared(p, position)).max().unwrap_or(1).max(1);
+    for (field, level) in levels.iter_mut().enumerate() {
+        let (mut total, mut sum) = (0_u128, 0_u128);
+        for (p, levels) in link.clone() {
+            let weight = weight(largest, squared(p, position));
+            total += weight;
+            // Levels are not negative.
+            sum += weight * u128::from(levels[field].unsigned_abs());
+        }
+        *level = mean(sum, total.max(1)) as i32;
     }
 }
 
@@ -247,10 +268,9 @@ fn parts(end: u32) -> (u8, u8, u8) {
     (vertex, gap, corner)
 }
 
-/// The squared distance of a vertex from a position.
+/// The squared distance of two positions.
 #[inline]
-fn squared(mesh: &CurrentMesh, v: u32, position: [i32; 3]) -> u64 {
-    let p = mesh.positions[v as usize];
+fn squared(p: [i32; 3], position: [i32; 3]) -> u64 {
     // Less than 2^62 each: positions are on lattices of at most 30 bits.
     (0..3).map(|k| u64::from(p[k].abs_diff(position[k]))).fold(0, |sum, d| sum.saturating_add(d * d))
 }

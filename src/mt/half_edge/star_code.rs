@@ -14,13 +14,14 @@
 //! All of this is the same in every consistent set, for the star is: positions are integers, sums of floating-point
 //! numbers have a fixed order, and ties are broken by labels.
 
-use super::scratch::{MOST, NO_ENTRY, NewTet, Scratch};
+use super::scratch::{MOST, NO_ENTRY, NewTet, Scratch, hash_labels};
 use super::store::{ForestChild, HalfEdgeMt};
 use crate::geom::{orient3d, sort_few};
 use crate::mesh::NONE;
 use crate::mt::mesh::paged_array::PagedArray;
 use crate::mt::mesh::tet::TURN;
 use crate::mt::{CurrentMesh, UpdateId};
+use std::mem::take;
 
 /// Most candidates that have a rank.
 const RANKED: usize = 8;
@@ -65,7 +66,16 @@ pub(in crate::mt) struct StarCode {
     offsets: Vec<[i32; 3]>,
     /// Of which tetrahedra the remover is known by now.
     decided: Vec<bool>,
+    /// When a code is written: the hashes of the vertices and of the tetrahedra, what removes these, and the code so far.
+    hashes: Vec<u64>,
+    tet_hashes: Vec<u64>,
+    truth: Vec<(u32, u8)>,
+    symbols: Vec<u8>,
+    bits: Vec<bool>,
 }
+
+/// A vertex of a link, or the new one: its label, where it is, and its forest children.
+pub(super) type StarVertex<'a> = (u32, [i32; 3], &'a [ForestChild]);
 
 /// Writes or reads what cannot be predicted.
 trait CodeIo {
@@ -192,35 +202,6 @@ impl HalfEdgeMt {
         self.code_with(mesh, u, position, (scratch, code), &mut Reader { symbols, bits, at: 0 })
     }
 
-    /// The code of a star, given the remover and the inner faces of each of its tetrahedra, which are in the scratch space then.
-    /// None if it has none.
-    pub(in crate::mt) fn code_star(
-        &self,
-        mesh: &CurrentMesh,
-        u: UpdateId,
-        position: [i32; 3],
-        scratch: (&mut Scratch, &mut StarCode),
-        truth: &[(u32, u8)],
-    ) -> Option<Vec<u8>> {
-        if truth.len() != scratch.0.star_len {
-            return None;
-        }
-        let mut writer = Writer { truth, symbols: Vec::new(), bits: Vec::new() };
-        self.code_with(mesh, u, position, scratch, &mut writer)?;
-        let Writer { mut symbols, bits, .. } = writer;
-        symbols.truncate(symbols.iter().rposition(|&s| s != 0).map_or(0, |last| last + 1));
-        let used = bits.iter().rposition(|&bit| bit).map_or(0, |last| last + 1);
-        if symbols.is_empty() && used == 0 {
-            return Some(Vec::new());
-        }
-        let mut code = vec![u8::try_from(symbols.len()).ok()?];
-        code.extend(symbols);
-        for eight in bits[..used].chunks(8) {
-            code.push((0..).zip(eight).fold(0, |byte, (i, &bit)| byte | u8::from(bit) << i));
-        }
-        Some(code)
-    }
-
     fn code_with(
         &self,
         mesh: &CurrentMesh,
@@ -238,16 +219,68 @@ impl HalfEdgeMt {
             .chain([vertex])
             .map(|v| later(self.children_of(v), u))
             .collect();
-        star.iter_mut().for_each(|new| (new.remover, new.inner) = (NONE, 0));
-        if lists.iter().all(|list| list.is_empty()) {
-            return Some(());
-        }
-        let around = Around { hashes, tet_hashes, lists };
         code.positions.clear();
         code.positions.extend(link.iter().map(|&slot| mesh.positions[slot as usize]));
         code.positions.push(position);
-        code.find_removers(&around, star, io)?;
-        code.find_inner(&around, star, io);
+        code.run(&Around { hashes, tet_hashes, lists }, star, io)
+    }
+}
+
+impl StarCode {
+    /// Appends the code of the star of `u`, whose tetrahedra have what removes them. `vertices` are those of the link and then the new one.
+    /// None if it has no code.
+    pub(super) fn write<'a>(
+        &mut self,
+        u: UpdateId,
+        star: &mut [NewTet],
+        vertices: impl Iterator<Item = StarVertex<'a>> + Clone,
+        out: &mut Vec<u8>,
+    ) -> Option<()> {
+        let (mut hashes, mut tet_hashes) = (take(&mut self.hashes), take(&mut self.tet_hashes));
+        hash_labels(vertices.clone().map(|vertex| vertex.0), star, &mut hashes, &mut tet_hashes);
+        let mut truth = take(&mut self.truth);
+        truth.clear();
+        truth.extend(star.iter().map(|new| (new.remover, new.inner)));
+        let (mut symbols, mut bits) = (take(&mut self.symbols), take(&mut self.bits));
+        symbols.clear();
+        bits.clear();
+        self.positions.clear();
+        self.positions.extend(vertices.clone().map(|vertex| vertex.1));
+        let lists = vertices.map(|vertex| later(vertex.2, u)).collect();
+        let around = Around { hashes: &hashes, tet_hashes: &tet_hashes, lists };
+        let mut writer = Writer { truth: &truth, symbols, bits };
+        let done = self.run(&around, star, &mut writer).and_then(|()| writer.finish(out));
+        (symbols, bits) = (writer.symbols, writer.bits);
+        (self.hashes, self.tet_hashes, self.truth) = (hashes, tet_hashes, truth);
+        (self.symbols, self.bits) = (symbols, bits);
+        done
+    }
+
+    /// Finds what removes the tetrahedra of a star, given where its vertices are.
+    fn run(&mut self, around: &Around<'_>, star: &mut [NewTet], io: &mut impl CodeIo) -> Option<()> {
+        star.iter_mut().for_each(|new| (new.remover, new.inner) = (NONE, 0));
+        if around.lists.iter().all(|list| list.is_empty()) {
+            return Some(());
+        }
+        self.find_removers(around, star, io)?;
+        self.find_inner(around, star, io);
+        Some(())
+    }
+}
+
+impl Writer<'_> {
+    /// Appends the code.
+    fn finish(&self, out: &mut Vec<u8>) -> Option<()> {
+        let symbols = self.symbols.iter().rposition(|&s| s != 0).map_or(0, |last| last + 1);
+        let used = self.bits.iter().rposition(|&bit| bit).map_or(0, |last| last + 1);
+        if symbols == 0 && used == 0 {
+            return Some(());
+        }
+        out.push(u8::try_from(symbols).ok()?);
+        out.extend_from_slice(&self.symbols[..symbols]);
+        for eight in self.bits[..used].chunks(8) {
+            out.push((0..).zip(eight).fold(0, |byte, (i, &bit)| byte | u8::from(bit) << i));
+        }
         Some(())
     }
 }

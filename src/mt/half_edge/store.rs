@@ -23,6 +23,7 @@
 //! consistent set.
 
 use crate::mesh::NONE;
+use crate::mt::facts::MtFacts;
 use crate::mt::mesh::paged_array::PagedArray;
 use crate::mt::pages::{Page, Pages, Rows};
 use crate::mt::update_errors::Errors;
@@ -79,6 +80,7 @@ pub struct HalfEdgeMt {
     bounds: Vec<ErrorCode>,
     /// One for each field.
     zeros: Vec<ErrorCode>,
+    facts: Option<Box<MtFacts>>,
 }
 
 /// Two MTs are equal if they have the same updates, whatever their pages.
@@ -162,6 +164,7 @@ impl HalfEdgeMt {
             near: PagedArray::new(NONE),
             bounds: vec![ErrorCode::MAX; fields],
             zeros: vec![ErrorCode::ZERO; fields],
+            facts: None,
         };
         for (v, row) in (0..).zip(children) {
             mt.check_children(0, None, row)?;
@@ -212,6 +215,7 @@ impl HalfEdgeMt {
             return Err(UpdateError::Error { update });
         }
         self.check(update, new)?;
+        self.facts = None;
         self.note_children(self.vertex(UpdateId(update)).0, new.children)?;
         let fields = self.info.fields.len();
         self.pages.push(|_| HalfEdgePage::new(fields), |page| page.push(new));
@@ -246,14 +250,14 @@ impl HalfEdgeMt {
         children.iter().for_each(|child| self.near.set(child.update, NONE));
     }
 
-    /// Replaces the star code of the last update.
-    pub(in crate::mt) fn set_last_star(&mut self, star: &[u8], level_residuals: &[i32]) {
-        self.pages.change_last(|page| {
-            page.stars.pop();
-            page.stars.push(star);
-            let kept = page.level_residuals.len() - level_residuals.len();
-            page.level_residuals[kept..].copy_from_slice(level_residuals);
-        });
+    /// Keeps what is known from having applied all updates.
+    pub(super) fn set_facts(&mut self, facts: MtFacts) {
+        self.facts = Some(Box::new(facts));
+    }
+
+    /// What is known from having applied all updates: none of an MT that has changed since, or that was not made update by update.
+    pub(crate) fn facts(&self) -> Option<&MtFacts> {
+        self.facts.as_deref()
     }
 
     /// Adds all updates of a page. Pages on which it depends need not be here.
@@ -275,6 +279,7 @@ impl HalfEdgeMt {
             }
         }
         self.pages.insert(page, new);
+        self.facts = None;
         Ok(())
     }
 
@@ -285,6 +290,7 @@ impl HalfEdgeMt {
     /// If the page is not here.
     pub(super) fn take_page(&mut self, page: u32) -> Result<(), PageError> {
         let gone = self.pages.remove(page).ok_or(PageError::Absent { page })?;
+        self.facts = None;
         self.forget_children(gone.children.items());
         Ok(())
     }
@@ -362,6 +368,7 @@ impl MultiTessellation for HalfEdgeMt {
 
     fn bytes(&self) -> u64 {
         let marks = size_of_val(&self.base_marks[..]) + self.base_children.bytes();
-        self.base.bytes() + (marks + self.near.bytes()) as u64 + self.pages.all_bytes()
+        let facts = self.facts.as_ref().map_or(0, |facts| facts.bytes());
+        self.base.bytes() + (marks + self.near.bytes() + facts) as u64 + self.pages.all_bytes()
     }
 }

@@ -1,0 +1,97 @@
+//! What is known of an MT once all of its updates have been applied, so that it need not be found out again.
+
+use super::{CurrentMesh, Excess, MtInfo};
+use crate::mesh::Histogram;
+use crate::threads;
+
+/// Bins of the volumes by value.
+pub(crate) const VOLUME_BINS: usize = 64;
+
+/// What is known of an MT from having applied all of its updates.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct MtFacts {
+    /// Page by page, a box that holds all tetrahedra that its updates remove or insert: least and largest corner.
+    pub bounds: Vec<[[i32; 3]; 2]>,
+    /// Page by page and field by field, the least and the largest level in these.
+    pub ranges: Vec<[i32; 2]>,
+    /// The first update whose error is larger than that of a parent.
+    pub larger: Option<Excess>,
+    /// The first whose error is too large by [`Margins`](super::Margins).
+    pub excess: Option<Excess>,
+    /// [`level_volumes`] of the reference mesh.
+    pub volumes: Vec<f64>,
+}
+
+impl MtFacts {
+    /// Takes a vertex of what an update of `page` removes or inserts into what is known of the page.
+    pub fn widen(&mut self, page: usize, [low, high]: [[i32; 3]; 2], ranges: &[[i32; 2]]) {
+        if page >= self.bounds.len() {
+            self.bounds.resize(page + 1, [[i32::MAX; 3], [i32::MIN; 3]]);
+            self.ranges.resize((page + 1) * ranges.len(), [i32::MAX, i32::MIN]);
+        }
+        let [lowest, highest] = &mut self.bounds[page];
+        (0..3).for_each(|k| lowest[k] = lowest[k].min(low[k]));
+        (0..3).for_each(|k| highest[k] = highest[k].max(high[k]));
+        for (all, [low, high]) in self.ranges[page * ranges.len()..].iter_mut().zip(ranges) {
+            *all = [all[0].min(*low), all[1].max(*high)];
+        }
+    }
+
+    /// Takes the fault of an update, which comes after those before.
+    pub fn note(&mut self, excess: Excess) {
+        self.larger = self.larger.or(Some(excess).filter(|excess| excess.larger));
+        self.excess = self.excess.or(Some(excess));
+    }
+
+    /// Bytes in memory.
+    pub fn bytes(&self) -> usize {
+        size_of::<Self>()
+            + size_of_val(&self.bounds[..])
+            + size_of_val(&self.ranges[..])
+            + size_of_val(&self.volumes[..])
+    }
+}
+
+/// So many tetrahedra are added up together. Sums may depend on it by rounding, but not on the number of threads.
+const SHARE: usize = 1 << 16;
+
+/// Field by field, the volume of a mesh in each of [`VOLUME_BINS`] equal bins of the field's values; 1 in the first one where there is but one
+/// value.
+pub(crate) fn level_volumes(info: &MtInfo, mesh: &CurrentMesh) -> Vec<f64> {
+    let empty = |field: &super::FieldInfo| {
+        (field.max > field.min).then(|| Histogram::new(field.min, field.max, VOLUME_BINS))
+    };
+    let empty: Vec<Option<Histogram>> = info.fields.iter().map(empty).collect();
+    let of_ranges = threads::map(mesh.tet_slots(), SHARE, |tets| {
+        let mut histograms = empty.clone();
+        for tet in tets.filter_map(|t| mesh.tet(t as u32)) {
+            // Shares are the same in units of the lattice.
+            let corners = tet.map(|slot| mesh.positions()[slot as usize].map(f64::from));
+            for (number, field) in info.fields.iter().enumerate() {
+                let Some(histogram) = &mut histograms[number] else { continue };
+                histogram.add(corners, tet.map(|slot| field.value(mesh.levels(slot)[number])));
+            }
+        }
+        histograms
+    });
+    let mut sums = empty;
+    for histograms in of_ranges {
+        for (sum, histogram) in sums.iter_mut().zip(histograms) {
+            let (Some(sum), Some(histogram)) = (sum, histogram) else { continue };
+            sum.merge(&histogram);
+        }
+    }
+    let volumes = |histogram: Option<Histogram>| {
+        let mut volumes = vec![0.0; VOLUME_BINS];
+        volumes[0] = 1.0;
+        if let Some(histogram) = histogram {
+            volumes = histogram.volumes();
+            // Rounding may have moved values beyond the ends.
+            let [below, above] = histogram.outside();
+            volumes[0] += below;
+            volumes[VOLUME_BINS - 1] += above;
+        }
+        volumes
+    };
+    sums.into_iter().flat_map(volumes).collect()
+}

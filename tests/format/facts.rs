@@ -1,0 +1,38 @@
+//! Promise: what a builder notes of the blocks of a half-edge MT is what a run through the MT finds: files are the same with and without it.
+
+use crate::support::meshes::{bent, cube, hilly};
+use std::ops::ControlFlow;
+use tetralod::builder::{BuildConfig, build};
+use tetralod::format::{EncodeOptions, encode};
+use tetralod::mesh::TetMesh;
+use tetralod::mt::{Mt, MtKind, UpdatePages};
+
+fn is_same(mt: &Mt, name: &str) {
+    let bits = mt.page_bits();
+    // In pages anew nothing is noted.
+    let scanned = mt.in_pages(bits).expect("a complete MT");
+    for block_bits in [bits, bits + 1] {
+        for check_margins in [false, true] {
+            let options =
+                EncodeOptions { block_bits, check_margins, histograms: true, ..EncodeOptions::default() };
+            let [noted, found] = [mt, &scanned].map(|mt| encode(mt, &options).expect("a sound MT"));
+            assert!(noted == found, "{name}, blocks of 2^{block_bits}");
+        }
+    }
+}
+
+#[test]
+fn files_are_the_same_by_what_the_builder_notes() {
+    let mut meshes: Vec<(&str, TetMesh)> =
+        vec![("bent", bent(8)), ("cube", cube(9, &[hilly, |[x, y, _]| x * y]))];
+    meshes.push(("bucky", tetralod::generate::bucky(15).expect("a volume")));
+    for (name, mesh) in meshes {
+        for all_fields in [false, true] {
+            let config = BuildConfig { all_fields, block_bits: 6, ..BuildConfig::default() };
+            let mt = build(&mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a valid mesh").mt;
+            is_same(&mt, name);
+            let explicit = mt.convert(MtKind::Explicit).expect("a sound MT");
+            is_same(&explicit.convert(MtKind::HalfEdge).expect("half-edges"), name);
+        }
+    }
+}
