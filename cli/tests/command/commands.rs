@@ -1,11 +1,12 @@
 //! Promise: the command does what its help says, from data to a checked mesh, and fails with a word about which file
 //! and why, leaving nothing half done.
 
-use crate::support::{Folder, bad, bucky, command, good, json, number, run, text};
+#[cfg(unix)]
+use crate::support::interrupt;
+use crate::support::{Folder, bad, bucky, good, json, number, run, text};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 use tetralod::mesh::{Field, TetMesh};
 
@@ -722,22 +723,6 @@ fn wrong_usage_is_told_apart() {
     ] {
         bad(2, arguments, &["--help"]);
     }
-}
-
-/// Starts a command, waits until `ready`, sends SIGINT, and gives the exit code.
-#[cfg(unix)]
-fn interrupt(arguments: &[&str], ready: impl Fn() -> bool) -> Option<i32> {
-    let quiet = Stdio::null;
-    let mut child = command(arguments).stdout(quiet()).stderr(quiet()).spawn().expect("the command starts");
-    let start = Instant::now();
-    while !ready() {
-        assert!(start.elapsed() < Duration::from_secs(60), "it never got so far");
-        assert!(child.try_wait().expect("a child").is_none(), "it was done too soon");
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill is there");
-    assert!(kill.success());
-    child.wait().expect("a child").code()
 }
 
 #[cfg(unix)]
