@@ -151,7 +151,7 @@ pub fn in_folder_beside<T>(path: &Path, work: impl FnOnce(&Path) -> Result<T>) -
 
 /// Fills the folder at `path`, which is made if need be: the files that `work` writes into another folder are moved there together, once
 /// it is done. The one called `last` says that all are there. What was there before stays if the work fails or is interrupted.
-pub fn fill_folder<T>(path: &Path, last: &str, work: impl FnOnce(&Path) -> Result<T>) -> Result<T> {
+pub fn fill_folder<T>(path: &Path, last: &Path, work: impl FnOnce(&Path) -> Result<T>) -> Result<T> {
     let is_new = !path.exists();
     {
         let mut partial = partial();
@@ -176,14 +176,14 @@ pub fn fill_folder<T>(path: &Path, last: &str, work: impl FnOnce(&Path) -> Resul
 }
 
 /// Moves all files of a folder, the one called `last` at last; before that there is none of that name.
-fn move_all(from: &Path, to: &Path, last: &str) -> std::io::Result<()> {
+fn move_all(from: &Path, to: &Path, last: &Path) -> std::io::Result<()> {
     match fs::remove_file(to.join(last)) {
         Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error),
         _ => (),
     }
     for file in fs::read_dir(from)? {
         let name = file?.file_name();
-        if name != last {
+        if name != last.as_os_str() {
             fs::rename(from.join(&name), to.join(&name))?;
         }
     }

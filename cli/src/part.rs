@@ -43,7 +43,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         let part = |folder: &Path| {
             Folder(folder).part_pieces(&input, &config, *parts, metadata.clone())?.map_err(Into::into)
         };
-        match files::fill_folder(output, PLAN, part) {
+        match files::fill_folder(output, Path::new(PLAN), part) {
             Ok(plan) => Ok(Some(plan)),
             Err(error) => match error.downcast::<PartsError>()? {
                 why @ PartsError::NeedsWhole { .. } => {
@@ -60,7 +60,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         let (mesh, repaired) = options.read(&config, options.repair.level(), true)?;
         options.repair_of(&mesh, &repaired, Way::Parts(*parts), verbosity)?;
         let part = |folder: &Path| Folder(folder).part(&mesh, &config, *parts, metadata);
-        files::fill_folder(output, PLAN, part).with_context(|| options.name())?
+        files::fill_folder(output, Path::new(PLAN), part).with_context(|| options.name())?
     };
     let report = Report {
         folder: output.display().to_string(),
