@@ -17,7 +17,7 @@ use std::time::Instant;
 use tetralod::builder::parts::PartsError;
 use tetralod::builder::{
     BuildConfig, BuildCriterion, BuildError, BuildProgress, BuildResult, BuildSummary, Construction,
-    ConstructionChoice, FieldPrecision, Method, Purpose, Remedy, memory_needed,
+    ConstructionChoice, FieldPrecision, Method, OnProgress, Purpose, Remedy, memory_needed,
 };
 use tetralod::format::{EncodeOptions, encode_to};
 use tetralod::io::{CellData, FieldSelection, PieceCounts, Pieces, ReadOptions};
@@ -375,7 +375,7 @@ pub enum Way {
 impl BuildOptions {
     /// The name of the input, for messages.
     pub fn name(&self) -> String {
-        self.inputs[0].display().to_string()
+        input::name(&self.inputs[0])
     }
 
     /// What the file is to say of itself.
@@ -535,8 +535,12 @@ fn way(
                 tell(format!("{what} of memory at once, so it is built in {parts} parts"));
                 return Ok(Way::Parts(parts));
             }
+            let in_parts = match parts::least_memory(config, [points, tetrahedra, fields], pieces) {
+                Some(least) => format!("in parts about {}, ", bytes(least)),
+                None => "and only kind half-edge is built in parts, ".to_owned(),
+            };
             Err(anyhow!(
-                "{what} of memory, more than --memory allows ({}): allow more, keep fewer fields, or build a coarser mesh",
+                "{what} of memory, {in_parts}more than --memory allows ({}): allow more, keep fewer fields, or build a coarser mesh",
                 bytes(most)
             ))
             .with_context(|| options.name())
@@ -617,13 +621,8 @@ pub fn failed(error: BuildError) -> anyhow::Error {
 }
 
 /// Shows the progress of some work, on stderr and only on a terminal.
-pub fn with_progress<T>(
-    verbosity: &Verbosity,
-    work: impl FnOnce(&mut dyn FnMut(BuildProgress) -> ControlFlow<()>) -> T,
-) -> Result<T> {
-    let bar = if verbosity.quiet { ProgressBar::hidden() } else { ProgressBar::new(0) };
-    let style = "{msg:<12} {wide_bar} {percent:>3} %  {pos}/{len}  {elapsed_precise}  about {eta} left";
-    bar.set_style(ProgressStyle::with_template(style).context("the style of the progress bar")?);
+pub fn with_progress<T>(verbosity: &Verbosity, work: impl FnOnce(OnProgress<'_>) -> T) -> Result<T> {
+    let bar = progress_bar(verbosity, "{pos}/{len}  ")?;
     let mut stage = "";
     let result = work(&mut |progress: BuildProgress| {
         bar.set_length(progress.total.max(1));
@@ -640,13 +639,22 @@ pub fn with_progress<T>(
     Ok(result)
 }
 
+/// A bar with the time that is left, on stderr and only on a terminal; `counts` stands behind the percentage.
+pub fn progress_bar(verbosity: &Verbosity, counts: &str) -> Result<ProgressBar> {
+    let bar = if verbosity.quiet { ProgressBar::hidden() } else { ProgressBar::new(0) };
+    let style =
+        format!("{{msg:<12}} {{wide_bar}} {{percent:>3}} %  {counts}{{elapsed_precise}}  about {{eta}} left");
+    bar.set_style(ProgressStyle::with_template(&style).context("the style of the progress bar")?);
+    Ok(bar)
+}
+
 /// The options that do what a remedy says. `Remedy` may grow.
 fn options_of(remedy: Remedy) -> Option<&'static str> {
     Some(match remedy {
         Remedy::Insert => "--method insert",
         Remedy::Decimate => "--method decimate",
         Remedy::Field => "--field",
-        Remedy::CellsToPoints => "--cell-to-point",
+        Remedy::CellsToPoints => "--cell-to-point; or --field distance, x, y, z or none for the shape alone",
         Remedy::FieldTolerance => "--field-tolerance, --lossless",
         Remedy::PositionTolerance => "--position-tolerance",
         Remedy::PositionBits => "--position-bits",

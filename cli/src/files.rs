@@ -149,6 +149,53 @@ pub fn in_folder_beside<T>(path: &Path, work: impl FnOnce(&Path) -> Result<T>) -
     done
 }
 
+/// Fills the folder at `path`, which is made if need be: the files that `work` writes into another folder are moved there together, once
+/// it is done. The one called `last` says that all are there. What was there before stays if the work fails or is interrupted.
+pub fn fill_folder<T>(path: &Path, last: &Path, work: impl FnOnce(&Path) -> Result<T>) -> Result<T> {
+    let is_new = !path.exists();
+    {
+        let mut partial = partial();
+        fs::create_dir_all(path).with_context(|| format!("{} could not be made", path.display()))?;
+        if is_new {
+            partial.push(path.to_owned());
+        }
+    }
+    // In it, so that files are moved within one file system.
+    let done = in_folder_beside(&path.join("new"), |folder| {
+        let done = work(folder)?;
+        let _uninterrupted = partial();
+        move_all(folder, path, last).with_context(|| format!("{} could not be written", path.display()))?;
+        Ok(done)
+    });
+    let mut partial = partial();
+    partial.retain(|other| other != path);
+    if is_new && done.is_err() {
+        let _ = fs::remove_dir_all(path);
+    }
+    done
+}
+
+/// Moves all files of a folder, the one called `last` at last; before that there is none of that name.
+fn move_all(from: &Path, to: &Path, last: &Path) -> std::io::Result<()> {
+    match fs::remove_file(to.join(last)) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error),
+        _ => (),
+    }
+    for file in fs::read_dir(from)? {
+        let name = file?.file_name();
+        if name != last.as_os_str() {
+            fs::rename(from.join(&name), to.join(&name))?;
+        }
+    }
+    fs::rename(from.join(last), to.join(last))
+}
+
+/// Writes a file of a folder that is not kept. After an interruption, which removes the folder, none appears any more.
+pub fn write_scratch(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let _uninterrupted = partial();
+    fs::write(path, bytes)
+}
+
 /// What can be gone back in.
 pub trait WriteSeek: Write + Seek {}
 

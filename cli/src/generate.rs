@@ -1,7 +1,7 @@
 //! `tetralod generate`: data for trying things out, made by code.
 
 use super::{files, refuse_usage};
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use std::path::{Path, PathBuf};
 use tetralod::generate::{Options, Orbital, VOLUMES, Volume, volume};
@@ -88,17 +88,21 @@ fn write_grid(grid: &LayeredGrid, path: &Path) -> Result<()> {
 
 /// Writes the time steps beside the list of them, which comes last: while it is there, they are.
 fn write_series(list: &Path, size: u32, count: u32) -> Result<()> {
-    let stem = list.file_stem().context("this is no name for a file; give one after -o")?.to_string_lossy();
-    let mut steps = Vec::new();
-    for step in 0..count {
-        let options = Options { phase: f64::from(step) / f64::from(count), ..Options::default() };
-        let name = PathBuf::from(format!("{stem}-{step}.vti"));
-        let path = list.with_file_name(&name);
-        files::check_output(&path, [])?;
-        if let Volume::Grid(grid) = volume(SERIES, size, &options)? {
-            write_grid(&grid, &path)?;
+    let (Some(name), Some(stem)) = (list.file_name(), list.file_stem()) else {
+        bail!("this is no name for a file; give one after -o");
+    };
+    let parent = list.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    files::fill_folder(parent, Path::new(name), |folder| {
+        let mut steps = Vec::new();
+        for step in 0..count {
+            let options = Options { phase: f64::from(step) / f64::from(count), ..Options::default() };
+            let name = PathBuf::from(format!("{}-{step}.vti", stem.to_string_lossy()));
+            files::check_output(&parent.join(&name), [])?;
+            if let Volume::Grid(grid) = volume(SERIES, size, &options)? {
+                write_grid(&grid, &folder.join(&name))?;
+            }
+            steps.push(io::Step { path: name, time: Some(f64::from(step)), number: 0 });
         }
-        steps.push(io::Step { path: name, time: Some(f64::from(step)), number: 0 });
-    }
-    files::write_file(list, |out| Ok(io::write_pvd(&steps, out)?))
+        files::write_file(&folder.join(name), |out| Ok(io::write_pvd(&steps, out)?))
+    })
 }

@@ -24,6 +24,11 @@ pub fn read(
 /// What a path stands for the standard input.
 const STANDARD_INPUT: &str = "-";
 
+/// The name of an input, for messages.
+pub fn name(path: &Path) -> String {
+    if path == Path::new(STANDARD_INPUT) { "standard input".to_owned() } else { path.display().to_string() }
+}
+
 /// Ends the program if a format is given for files.
 pub fn expect_format(paths: &[PathBuf], format: Option<&str>) {
     if format.is_some() && !paths.iter().any(|path| path == Path::new(STANDARD_INPUT)) {
@@ -66,13 +71,11 @@ pub fn read_cells(
         std::io::stdin().read_to_end(&mut input).context("the standard input could not be read")?;
         check_format(&input, format)?;
     }
-    let named: Vec<_> = steps.iter().map(|step| (step.path.display().to_string(), step.time)).collect();
+    let named: Vec<_> = steps.iter().map(|step| (name(&step.path), step.time)).collect();
     let mesh = io::read_time_steps(&named, wanted, &mut |number, options| {
         let options = &ReadOptions { step: steps[number].number, ..options.clone() };
         match &steps[number].path {
-            path if path == Path::new(STANDARD_INPUT) => {
-                io::read_bytes_with("standard input", &input, options)
-            }
+            path if path == Path::new(STANDARD_INPUT) => io::read_bytes_with(&name(path), &input, options),
             path if alone && steps.len() == 1 => io::read_unexpanded(path, options),
             path => io::read_with(path, options),
         }
@@ -130,7 +133,7 @@ pub fn mend(mesh: TetMesh, level: RepairLevel, path: &Path) -> Result<(TetMesh, 
     if mesh.tets.is_empty() {
         return Ok((mesh, RepairReport::default()));
     }
-    repair_at(mesh, level).with_context(|| path.display().to_string())
+    repair_at(mesh, level).with_context(|| name(path))
 }
 
 /// Refuses a mesh that has points but no cells, for those that need cells.
@@ -141,12 +144,12 @@ pub fn expect_cells(mesh: &TetMesh, path: &Path) -> Result<()> {
     if mesh.tets.is_empty() && !mesh.positions.is_empty() {
         bail!(
             "{}: there are points but no tetrahedra; build --kind vertex --method insert makes an MT of points alone",
-            path.display()
+            name(path)
         );
     }
     if mesh.tets.is_empty() {
         // The same as for a mesh of which nothing is left.
-        return Err(tetralod::mesh::MeshError::Empty).with_context(|| path.display().to_string());
+        return Err(tetralod::mesh::MeshError::Empty).with_context(|| name(path));
     }
     Ok(())
 }

@@ -17,11 +17,6 @@ pub struct Verbosity {
 }
 
 impl Verbosity {
-    /// Says nothing.
-    pub fn quiet() -> Self {
-        Self { quiet: true, json: false }
-    }
-
     /// Prints the summary, if it is wanted.
     pub fn print(&self, report: &impl Serialize, rows: &[(&str, String)]) -> Result<()> {
         if self.quiet { Ok(()) } else { result(self.json, report, rows) }

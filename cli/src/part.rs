@@ -1,11 +1,13 @@
 //! `tetralod part`: a mesh to parts that are built each on its own.
 
 use super::build::{BuildOptions, Way};
+use super::files;
 use super::output::{self, Verbosity};
-use super::parts::Folder;
+use super::parts::{Folder, PLAN};
 use anyhow::{Context, Result};
 use serde::Serialize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use tetralod::builder::parts::PartsError;
 
 /// Parts a mesh in space, so that each part is built on its own (`tetralod build --part`) and all are joined to one MT file (`tetralod
 /// join`): for meshes that one machine cannot hold, and for clusters.
@@ -37,16 +39,19 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let mut config = options.config();
     config.keep_points = options.restrictions.points()?;
     let metadata = options.metadata(&config);
-    let make_folder =
-        || std::fs::create_dir_all(output).with_context(|| format!("{} could not be made", output.display()));
     let by_pieces = options.in_pieces(&config, |input| {
-        make_folder()?;
-        match Folder(output).part_pieces(&input, &config, *parts, metadata.clone())? {
+        let part = |folder: &Path| {
+            Folder(folder).part_pieces(&input, &config, *parts, metadata.clone())?.map_err(Into::into)
+        };
+        match files::fill_folder(output, Path::new(PLAN), part) {
             Ok(plan) => Ok(Some(plan)),
-            Err(why) => {
-                options.tell(&why, verbosity);
-                Ok(None)
-            }
+            Err(error) => match error.downcast::<PartsError>()? {
+                why @ PartsError::NeedsWhole { .. } => {
+                    options.tell(&why, verbosity);
+                    Ok(None)
+                }
+                error => Err(error.into()),
+            },
         }
     });
     let plan = if let Some(plan) = by_pieces.with_context(|| options.name())? {
@@ -54,8 +59,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     } else {
         let (mesh, repaired) = options.read(&config, options.repair.level(), true)?;
         options.repair_of(&mesh, &repaired, Way::Parts(*parts), verbosity)?;
-        make_folder()?;
-        Folder(output).part(&mesh, &config, *parts, metadata).with_context(|| options.name())?
+        let part = |folder: &Path| Folder(folder).part(&mesh, &config, *parts, metadata);
+        files::fill_folder(output, Path::new(PLAN), part).with_context(|| options.name())?
     };
     let report = Report {
         folder: output.display().to_string(),

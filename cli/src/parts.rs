@@ -1,6 +1,6 @@
 //! Building in parts: a folder of files, and the steps from file to file.
 
-use super::build::{failed, with_progress};
+use super::build::{failed, progress_bar, with_progress};
 use super::files;
 use super::output::{self, Verbosity};
 use anyhow::{Context, Result, bail};
@@ -8,6 +8,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufReader;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -15,7 +16,8 @@ use tetralod::builder::parts::{
     self, MOST_PARTS, Node, Part, PartUpdates, PartsError, Piecewise, Plan, Scratch,
 };
 use tetralod::builder::{
-    BuildConfig, BuildResult, Construction, memory_needed_in_parts, memory_needed_in_pieces,
+    BuildConfig, BuildProgress, BuildResult, Construction, OnProgress, memory_needed_in_parts,
+    memory_needed_in_pieces,
 };
 use tetralod::io::Pieces;
 use tetralod::mesh::TetMesh;
@@ -35,10 +37,13 @@ pub fn node(text: &str) -> Result<Node> {
     Ok(Node { level, index })
 }
 
+/// The file that says which steps there are.
+pub const PLAN: &str = "plan.json";
+
 /// The folder in which steps hand each other files.
 pub struct Folder<'a>(pub &'a Path);
 
-/// What `plan.json` says, for programs that plan the steps.
+/// What [`PLAN`] says, for programs that plan the steps.
 #[derive(Serialize)]
 struct PlanFile {
     parts: u32,
@@ -112,26 +117,24 @@ impl Folder<'_> {
         let [vertices, tetrahedra] = plan.counts();
         let file = PlanFile { parts: plan.parts(), levels: plan.levels(), tetrahedra, vertices };
         // Last: with it the parts are complete.
-        files::write_file(&self.0.join("plan.json"), |out| Ok(serde_json::to_writer_pretty(out, &file)?))
+        files::write_file(&self.0.join(PLAN), |out| Ok(serde_json::to_writer_pretty(out, &file)?))
     }
 
     /// Builds a part.
-    fn build(&self, index: u32, verbosity: &Verbosity) -> Result<Step> {
+    fn build(&self, index: u32, progress: OnProgress<'_>) -> Result<Step> {
         let part = self.read(&self.parted(index), "`tetralod part`")?;
         let before = part.tetrahedra();
-        let built = with_progress(verbosity, |progress| parts::build_part(part, progress))?;
-        self.keep(before, built.map_err(said)?)
+        self.keep(before, parts::build_part(part, progress).map_err(said)?)
     }
 
     /// Joins the parts of a node.
-    fn join(&self, node: Node, plan: &Plan, verbosity: &Verbosity) -> Result<Step> {
+    fn join(&self, node: Node, plan: &Plan, progress: OnProgress<'_>) -> Result<Step> {
         let mut left = Vec::new();
         for child in plan.children(node).map_err(said)? {
             left.push(self.read(&self.built(child), &command_for(child, plan))?);
         }
         let before = left.iter().map(Part::tetrahedra).sum();
-        let joined = with_progress(verbosity, |progress| parts::join(node, left, progress))?;
-        self.keep(before, joined.map_err(said)?)
+        self.keep(before, parts::join(node, left, progress).map_err(said)?)
     }
 
     /// Builds or joins all nodes of a level, some of them at a time, each by one thread; a node that is alone, by all.
@@ -143,12 +146,28 @@ impl Folder<'_> {
         side_by_side: usize,
         verbosity: &Verbosity,
     ) -> Result<()> {
-        let make = |index: u32, verbosity: &Verbosity| match level {
-            0 => self.build(index, verbosity),
-            _ => self.join(Node { level, index }, plan, verbosity),
+        let bar = progress_bar(verbosity, "")?;
+        bar.set_length(u64::from(nodes) * PER_NODE);
+        bar.set_message(if level == 0 { "build parts" } else { "join parts" });
+        let make = |index: u32| {
+            let mut told = 0;
+            let mut tell = |share: u64| {
+                bar.inc(share.saturating_sub(told));
+                told = told.max(share);
+            };
+            let on_progress: OnProgress<'_> = &mut |progress: BuildProgress| {
+                tell(progress.done * PER_NODE / progress.total.max(1));
+                ControlFlow::Continue(())
+            };
+            let step = match level {
+                0 => self.build(index, on_progress),
+                _ => self.join(Node { level, index }, plan, on_progress),
+            };
+            tell(PER_NODE);
+            step
         };
         if nodes == 1 || side_by_side == 1 {
-            return (0..nodes).try_for_each(|index| make(index, verbosity).map(drop));
+            return (0..nodes).try_for_each(|index| make(index).map(drop));
         }
         let next = AtomicU32::new(0);
         let failure = Mutex::new(None);
@@ -160,7 +179,7 @@ impl Folder<'_> {
                 if index >= nodes {
                     return Ok(());
                 }
-                pool.install(|| make(index, &Verbosity::quiet()))?;
+                pool.install(|| make(index))?;
             }
         };
         std::thread::scope(|scope| {
@@ -275,7 +294,7 @@ pub fn build_part(inputs: &[PathBuf], [index, all]: [u32; 2], verbosity: &Verbos
     if plan.parts() != all {
         bail!("{} has {} parts, not {all}", folder.0.display(), plan.parts());
     }
-    folder.build(index, verbosity)?.print(verbosity)
+    with_progress(verbosity, |progress| folder.build(index, progress))??.print(verbosity)
 }
 
 /// Joins parts of a folder: `tetralod join --node`.
@@ -284,7 +303,7 @@ pub fn join_node(folder: &Path, node: Node, verbosity: &Verbosity) -> Result<()>
     // No file is read but those that are joined: others may be on other machines.
     let child = node.first_child().context("parts of level 0 are made by `tetralod build --part`")?;
     let plan = folder.plan(child)?;
-    folder.join(node, &plan, verbosity)?.print(verbosity)
+    with_progress(verbosity, |progress| folder.join(node, &plan, progress))??.print(verbosity)
 }
 
 /// The MT of a folder in which all parts are built and joined, and its plan.
@@ -305,7 +324,7 @@ struct ScratchFolder<'a>(&'a Path);
 
 impl Scratch for ScratchFolder<'_> {
     fn write(&mut self, name: &str, bytes: &[u8]) -> std::io::Result<()> {
-        std::fs::write(self.0.join(name), bytes)
+        files::write_scratch(&self.0.join(name), bytes)
     }
 
     fn read(&self, name: &str) -> std::io::Result<Vec<u8>> {
@@ -316,6 +335,9 @@ impl Scratch for ScratchFolder<'_> {
         std::fs::remove_file(self.0.join(name))
     }
 }
+
+/// What a part, or a join, counts as in the progress of its level.
+const PER_NODE: u64 = 1000;
 
 /// What is parted.
 pub enum Whole<'a> {
@@ -361,14 +383,24 @@ impl Parting<'_> {
 ///
 /// If it comes in pieces, there are so many, and the largest one has so many tetrahedra.
 pub fn count_for(config: &BuildConfig, counts: [u64; 3], pieces: Option<[u64; 2]>, most: u64) -> Option<u32> {
-    let Construction::HalfEdge { .. } = config.construction else { return None };
+    memory_in_parts(config, counts, pieces).into_iter().find(|&(_, needed)| needed <= most).map(|(n, _)| n)
+}
+
+/// The least memory in which it is built in parts; none if it is not.
+pub fn least_memory(config: &BuildConfig, counts: [u64; 3], pieces: Option<[u64; 2]>) -> Option<u64> {
+    memory_in_parts(config, counts, pieces).into_iter().map(|(_, needed)| needed).min()
+}
+
+/// The memory that each number of parts takes; none if it is not built in parts.
+fn memory_in_parts(config: &BuildConfig, counts: [u64; 3], pieces: Option<[u64; 2]>) -> Vec<(u32, u64)> {
+    let Construction::HalfEdge { .. } = config.construction else { return Vec::new() };
     let parts = std::iter::successors(Some(2_u32), |count| Some(2 * count)).take_while(|&n| n <= MOST_PARTS);
-    parts.into_iter().find(|&count| {
+    let needed = |count: u32| {
         let at_a_time = rayon::current_num_threads().min(count as usize);
-        let needed = match pieces {
+        match pieces {
             None => memory_needed_in_parts(counts, count, at_a_time as u32),
             Some(pieces) => memory_needed_in_pieces(counts, pieces, count, at_a_time as u32),
-        };
-        needed <= most
-    })
+        }
+    };
+    parts.map(|count| (count, needed(count))).collect()
 }

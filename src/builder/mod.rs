@@ -263,11 +263,8 @@ pub enum BuildError {
         /// The names of its fields.
         known: Vec<String>,
     },
-    /// The field has values at cells, not at points.
-    #[error(
-        "'{name}' is a field at cells, but an MT has fields at points; turn it into one at points first, as by \
-         TetMesh::cells_to_points"
-    )]
+    /// The field has values at cells, not at points: see [`TetMesh::cells_to_points`].
+    #[error("'{name}' is a field at cells, but an MT has fields at points; turn it into one at points first")]
     CellField {
         /// Its name.
         name: String,

@@ -4,7 +4,7 @@
 use crate::support::meshes::{bent, cube, hilly, linear};
 use std::ops::ControlFlow;
 use tetralod::builder::{
-    BuildConfig, BuildCriterion, BuildError, BuildResult, Construction, FieldPrecision, Method, build,
+    BuildConfig, BuildCriterion, BuildError, BuildResult, Construction, FieldPrecision, Method, Remedy, build,
 };
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::mesh::{Field, TetMesh, VectorPart};
@@ -275,7 +275,8 @@ fn fields_at_cells_are_refused_with_the_remedy_and_built_once_they_are_at_points
     mesh.cell_fields = vec![Field::new("rho", (0..mesh.tets.len()).map(|i| i as f64).collect())];
     let config = BuildConfig { fields: vec!["rho".into()], ..BuildConfig::of(MtKind::Edge) };
     let error = try_build(&mesh, &config).expect_err("a field at cells");
-    assert!(error.to_string().contains("cells_to_points"), "{error}");
+    assert!(error.to_string().contains("field at cells"), "{error}");
+    assert_eq!(error.remedy(), Some(Remedy::CellsToPoints));
     mesh.cells_to_points();
     let mt = made(&mesh, &config).mt;
     assert_eq!(mt.info().fields[0].name, "rho");

@@ -200,6 +200,33 @@ fn a_grid_alone_has_the_parts_of_its_mesh() {
 }
 
 #[test]
+fn the_progress_of_a_step_is_that_of_the_step() {
+    let mesh = blocks([9; 3], &[hilly], |_| true);
+    let (plan, mut files) = Files::parted(&mesh, &BuildConfig::default(), 8);
+    (0..8).for_each(|index| files.build(index));
+    let whole = plan.nodes()[0];
+    let shares = |work: &dyn Fn(&mut dyn FnMut(BuildProgress) -> ControlFlow<()>)| {
+        let mut shares = Vec::new();
+        work(&mut |now: BuildProgress| {
+            if now.stage == "remove" {
+                shares.push(now.done as f64 / now.total as f64);
+            }
+            go_on(now)
+        });
+        assert!(shares.is_sorted() && shares.iter().all(|share| (0.0..=1.0).contains(share)), "{shares:?}");
+        (shares[0], shares.pop().expect("progress"))
+    };
+    let children = plan.children(whole).expect("children");
+    let left = || children.iter().map(|child| read(&files.built[child]).expect("a part")).collect();
+    // Neither the vertices that were removed before count, nor those that stay.
+    let (first, last) = shares(&|progress| drop(parts::join(whole, left(), progress).expect("a join")));
+    assert!(first < 0.1 && last > 0.5, "{first} to {last}");
+    let part = || read(&files.parted[0]).expect("a part");
+    let (first, last) = shares(&|progress| drop(parts::build_part(part(), progress).expect("a part")));
+    assert!(first < 0.1 && last > 0.5, "{first} to {last}");
+}
+
+#[test]
 fn levels_and_children_are_those_of_an_octree() {
     let mesh = blocks([6; 3], &[hilly], |_| true);
     let (plan, files) = Files::parted(&mesh, &BuildConfig::default(), 32);

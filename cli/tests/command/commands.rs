@@ -1,11 +1,12 @@
 //! Promise: the command does what its help says, from data to a checked mesh, and fails with a word about which file
 //! and why, leaving nothing half done.
 
-use crate::support::{Folder, bad, bucky, command, good, json, number, run, text};
+#[cfg(unix)]
+use crate::support::interrupt;
+use crate::support::{Folder, bad, bucky, good, json, number, run, text};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 use tetralod::mesh::{Field, TetMesh};
 
@@ -724,22 +725,6 @@ fn wrong_usage_is_told_apart() {
     }
 }
 
-/// Starts a command, waits until `ready`, sends SIGINT, and gives the exit code.
-#[cfg(unix)]
-fn interrupt(arguments: &[&str], ready: impl Fn() -> bool) -> Option<i32> {
-    let quiet = Stdio::null;
-    let mut child = command(arguments).stdout(quiet()).stderr(quiet()).spawn().expect("the command starts");
-    let start = Instant::now();
-    while !ready() {
-        assert!(start.elapsed() < Duration::from_secs(60), "it never got so far");
-        assert!(child.try_wait().expect("a child").is_none(), "it was done too soon");
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill is there");
-    assert!(kill.success());
-    child.wait().expect("a child").code()
-}
-
 #[cfg(unix)]
 #[test]
 fn an_interrupt_leaves_what_was_there() {
@@ -751,6 +736,11 @@ fn an_interrupt_leaves_what_was_there() {
     assert_eq!(code, Some(130));
     // The same while a grid is written layer by layer.
     let code = interrupt(&["generate", "bucky", "--size", "200", "-o", &folder.path("big.vti")], writing);
+    assert_eq!(code, Some(130));
+    // Nor are there some of the time steps.
+    let begun = || folder.names().iter().any(|name| name.starts_with(".new") || name == "v-0.vti");
+    let steps = folder.path("v.pvd");
+    let code = interrupt(&["generate", "abc-flow", "--size", "99", "--steps", "9", "-o", &steps], begun);
     assert_eq!(code, Some(130));
     assert_eq!(folder.names(), ["big.vtu"]);
     assert_eq!(fs::read(&out).expect("it is there"), b"old");

@@ -256,5 +256,8 @@ fn the_standard_input_is_read() {
     let refused = piped(&["build", "-", "-o", &same, "--field", "x", "--format", "gmsh"]);
     let error = text(&refused.stderr);
     assert!(!refused.status.success() && error.contains("vtk, not gmsh"), "{error}");
+    let refused = piped(&["build", "-", "-o", &same, "--field", "nothing"]);
+    let error = text(&refused.stderr);
+    assert!(error.starts_with("error: standard input: there is no point field"), "{error}");
     bad(2, &["build", &input, "-o", &mt, "--format", "vtk"], &["--format", "'-'"]);
 }

@@ -1,6 +1,8 @@
 //! Promises of `part`, `build --part`, `join`, `build --parts` and `build --memory`: one file, whoever builds the parts and in whatever
 //! order; what is missing is named with the command that makes it.
 
+#[cfg(unix)]
+use crate::support::interrupt;
 use crate::support::{Folder, bad, good, json, run, text};
 use std::collections::BTreeMap;
 use std::fs;
@@ -74,9 +76,9 @@ fn what_does_not_fit_the_memory_is_built_in_parts() {
     bad(
         1,
         &["build", &input, "-o", &mt, "--memory", &most, "--kind", "edge"],
-        &["more than --memory allows"],
+        &["only kind half-edge is built in parts, more than --memory allows"],
     );
-    bad(1, &["build", &input, "-o", &mt, "--memory", "1M"], &["more than --memory allows"]);
+    bad(1, &["build", &input, "-o", &mt, "--memory", "1M"], &["in parts about", "more than --memory allows"]);
 }
 
 #[test]
@@ -226,4 +228,27 @@ fn samples_of_a_file_are_verified() {
     }
     bad(2, &["verify", &mt, "--against", &input, "--samples", "0"], &["--samples"]);
     bad(2, &["verify", &mt, "--against", &input, "--samples", "3", "--quick"], &["--quick"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_while_a_mesh_is_parted_leaves_what_was_there() {
+    let folder = Folder::new("parts-interrupt");
+    let input = generate(&folder, "41");
+    let [dir, other] = ["dir", "other"].map(|name| folder.path(name));
+    let count = |path: &str| fs::read_dir(path).map_or(0, Iterator::count);
+    let part = ["part", &input, "--parts", "64", "-o"];
+    let code = interrupt(&[&part[..], &[&dir]].concat(), || count(&dir) > 0);
+    assert_eq!(code, Some(130));
+    assert_eq!(folder.names(), ["b41.vti"]);
+
+    good(&["part", &input, "--parts", "2", "-o", &other]);
+    let files = || -> BTreeMap<_, _> {
+        let entries = fs::read_dir(&other).expect("a folder").map(|entry| entry.expect("an entry").path());
+        entries.map(|path| (path.clone(), fs::read(path).expect("a file"))).collect()
+    };
+    let before = files();
+    let code = interrupt(&[&part[..], &[&other]].concat(), || count(&other) > before.len());
+    assert_eq!(code, Some(130));
+    assert!(files() == before, "parts of one plan, and all of them");
 }

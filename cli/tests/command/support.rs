@@ -5,6 +5,8 @@ use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
 use std::process::{Child, Command, Output, Stdio};
+#[cfg(unix)]
+use std::time::{Duration, Instant};
 
 /// A folder of one test, gone when the test is done.
 pub struct Folder(PathBuf);
@@ -147,4 +149,20 @@ pub fn table(path: &str) -> (Vec<String>, Vec<Vec<f64>>) {
     let names = lines.next().expect("a line of names").split(',').map(str::to_owned).collect();
     let number = |word: &str| if word.is_empty() { f64::NAN } else { word.parse().expect("a number") };
     (names, lines.map(|line| line.split(',').map(number).collect()).collect())
+}
+
+/// Starts a command, waits until `ready`, sends SIGINT, and gives the exit code.
+#[cfg(unix)]
+pub fn interrupt(arguments: &[&str], ready: impl Fn() -> bool) -> Option<i32> {
+    let quiet = Stdio::null;
+    let mut child = command(arguments).stdout(quiet()).stderr(quiet()).spawn().expect("the command starts");
+    let start = Instant::now();
+    while !ready() {
+        assert!(start.elapsed() < Duration::from_secs(60), "it never got so far");
+        assert!(child.try_wait().expect("a child").is_none(), "it was done too soon");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill is there");
+    assert!(kill.success());
+    child.wait().expect("a child").code()
 }

@@ -16,7 +16,7 @@ use crate::builder::reach::{self, Reach};
 use crate::builder::removal::{History, State};
 use crate::builder::restrictions::Restrictions;
 use crate::builder::work_mesh::{ELSEWHERE, WorkMesh};
-use crate::builder::{BuildError, OnProgress};
+use crate::builder::{BuildError, BuildProgress, OnProgress};
 use crate::mesh::{NONE, Topology, boundary_faces, growth_order, topology};
 use crate::mt::{ErrorCode, MtInfo};
 use glam::DVec3;
@@ -78,7 +78,7 @@ fn run(head: Head, piece: Piece, progress: OnProgress<'_>) -> Result<(Part, Part
     let mut record = Collapses::resume(&of_piece, earlier, inner);
     let enough = if plan.is_whole(node) { 0 } else { piece.tets.len().div_ceil(LEFT) as u32 };
     let mut decimator = Decimator::new(state, None, &mut record);
-    decimator.remove_until(enough, progress)?;
+    decimator.remove_until(enough, &mut |now| progress(of_step(now, piece.tets.len(), enough)))?;
     let Decimator { state, record: finished, .. } = decimator;
     finished.finish(&state.mesh.tets, &state.removals.makers);
     let places = Left::of(&state.mesh.tets);
@@ -86,6 +86,16 @@ fn run(head: Head, piece: Piece, progress: OnProgress<'_>) -> Result<(Part, Part
     drop(state);
     let head = Head { plan, node, built: true };
     Ok(sorted_out(head, (piece, left), record))
+}
+
+/// The progress of a step by its tetrahedra, from so many to `enough`: it ends before the vertices do, and begins after others.
+fn of_step(now: BuildProgress, before: usize, enough: u32) -> BuildProgress {
+    let left = now.tetrahedra.unwrap_or(enough);
+    BuildProgress {
+        done: (before as u64).saturating_sub(left.into()),
+        total: (before as u64).saturating_sub(enough.into()),
+        ..now
+    }
 }
 
 /// The reference vertices of a piece on the lattices of the whole.

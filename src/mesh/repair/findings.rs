@@ -33,11 +33,12 @@ impl fmt::Display for MeshFindings {
             kept.push(format!("{} parts that share no face", self.components));
         }
         if self.non_manifold_vertices > 0 {
-            kept.push(format!(
-                "a boundary that touches itself at {} and {}",
-                count(self.non_manifold_edges, "edge", "edges"),
-                count(self.non_manifold_vertices, "point", "points")
-            ));
+            let edges = match self.non_manifold_edges {
+                0 => String::new(),
+                n => format!("{} and ", count(n, "edge", "edges")),
+            };
+            let points = count(self.non_manifold_vertices, "point", "points");
+            kept.push(format!("a boundary that touches itself at {edges}{points}"));
         }
         if self.open_seam_faces > 0 {
             let weld = RepairLevel::Weld { distance: 0.0 }.name();

@@ -344,4 +344,6 @@ fn a_boundary_that_touches_itself_is_told() {
     assert_eq!(edge.to_string(), text);
     let point = at(&[[0, 1, 2, 3], [0, 4, 5, 6]]);
     assert_eq!((point.components, point.non_manifold_edges, point.non_manifold_vertices), (2, 0, 1));
+    let text = "kept: 2 parts that share no face; a boundary that touches itself at 1 point";
+    assert_eq!(point.to_string(), text);
 }
