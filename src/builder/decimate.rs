@@ -297,6 +297,7 @@ impl<'a, R: Record + ?Sized> Decimator<'a, R> {
         slots.iter().for_each(|&t| removals.makers[t as usize] = removal);
         let input = Input { hole, filling: &best.filling, reference };
         best.cost.move_points(&mut state.buckets, slots, input);
+        state.squares.set(slots, &best.cost.squares);
         let star = hole.faces.iter().flat_map(|(face, _)| face);
         star.for_each(|&v| degrees[v as usize] -= 1);
         degrees[hole.a as usize] -= hole.star.len() as u32;
