@@ -9,7 +9,7 @@ use super::work_mesh::{StarTet, WorkMesh};
 pub(super) struct Squares(Vec<f32>);
 
 impl Squares {
-    /// Of a mesh that is what removals have left.
+    /// Of a mesh that is what removals have left. Points outside of it count as at a place of the tetrahedron that they belong to.
     pub fn of(mesh: &WorkMesh, buckets: &Buckets, reference: &Reference<'_>) -> Self {
         let quantized = reference.quantized;
         let mut errors = vec![0.0; quantized.fields.len()];

@@ -1,7 +1,7 @@
 //! Values at the vertices of a mesh that fit the values of its reference at all vertices of that.
 //!
 //! A half-edge MT has the reference's own values at the vertices that it keeps, so the linear interpolants of a coarse mesh lie mostly on
-//! one side of a field that is bent. Other values at the same vertices halve what remains of that. Which are best depends on the
+//! one side of a field that is bent. Other values at the same vertices have a mean error that is some fifth less. Which are best depends on the
 //! measure: the least mean square has larger single differences, the least largest one has a larger mean square. Between them lies
 //! the least sum of cubes, which is found here as the least of a weighted sum of squares whose weights are the differences
 //! (iteratively reweighted least squares); each of these by conjugate gradients.
