@@ -9,8 +9,10 @@
 //! boundary within its distance count as well, and the one that fits best is taken.
 
 mod angles;
+mod fit;
 
 pub use angles::CellAngles;
+pub use fit::{Differences, Fit, fit};
 
 use crate::geom::{Bounds, PointGrid, TriangleGrid, weights_at, weights_on_triangle};
 use crate::mesh::boundary_faces;

@@ -75,8 +75,8 @@ pub(super) struct FillCost {
     flat: bool,
     /// How far the boundary moves, as an error.
     pub step: f64,
-    /// The sum of the squares of the errors at all points that are placed.
-    pub squares: f64,
+    /// For each tetrahedron the sum of the squares of the errors at the points that are placed in it.
+    pub squares: Vec<f64>,
 }
 
 impl Removals {
@@ -119,10 +119,9 @@ impl FillCost {
         self.step = 0.0;
         self.placement.start(filling.tets.len());
         self.placement.errors.clone_from(&hole_cost.errors);
-        self.squares = {
-            let own = self.compare_centre(input);
-            own * own
-        };
+        self.squares.clear();
+        self.squares.resize(filling.tets.len(), 0.0);
+        self.compare_centre(input);
         if largest(&self.placement.errors) > limit {
             return largest(&self.placement.errors);
         }
@@ -152,7 +151,7 @@ impl FillCost {
                 let (own, cell) = placement.place(point, hint, &input);
                 hint = cell;
                 error = error.max(own);
-                *squares += own * own;
+                squares[cell] += own * own;
                 if error > limit {
                     return error;
                 }
@@ -164,18 +163,19 @@ impl FillCost {
         error.max(placement.place_foreign(candidates, &input))
     }
 
-    /// Compares the field at the removed vertex first: the error is mostly largest there. Returns it; 0 if the lattice has moved the
-    /// vertex, which is in a bucket then.
-    fn compare_centre(&mut self, input: Input<'_>) -> f64 {
+    /// Compares the field at the removed vertex first: the error is mostly largest there. If the lattice has moved the vertex, it is in a
+    /// bucket.
+    fn compare_centre(&mut self, input: Input<'_>) {
         let (a, quantized) = (input.hole.a, input.reference.quantized);
         if !quantized.is_moved(a) {
-            return self.placement.place(a, 0, &input).0;
+            let (own, cell) = self.placement.place(a, 0, &input);
+            self.squares[cell] += own * own;
+            return;
         }
         let (cell, lambda, depth) = self.placement.locate(quantized.places.at(a), 0, &input);
         if depth >= -SLACK {
             self.placement.compare(a, cell, lambda, &input);
         }
-        0.0
     }
 
     /// Moves the points to the buckets where [`FillCost::evaluate`] found them to belong. `slots` are the numbers of the

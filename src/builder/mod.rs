@@ -65,6 +65,7 @@ mod rounds;
 mod searches;
 mod sequence;
 mod sides;
+mod squares;
 mod vertex;
 mod work_mesh;
 

@@ -13,9 +13,13 @@ use super::quantize::Quantized;
 use super::reach;
 use super::reach::{Reach, Ruler};
 use super::restrictions::Restrictions;
+use super::squares::Squares;
 use super::work_mesh::WorkMesh;
 use crate::mesh::NONE;
 use glam::DVec3;
+
+/// A removal usually takes away about so many tetrahedra more than it makes.
+const USUALLY_FEWER: f64 = 6.0;
 
 /// What removals leave besides the mesh.
 pub(super) struct History {
@@ -46,6 +50,7 @@ pub(super) struct State<'a> {
     pub levels: Levels,
     /// What a square of an error counts, times the square of [`Levels::mean`].
     pub square_weight: f64,
+    pub squares: Squares,
     pub restrictions: Restrictions,
 }
 
@@ -70,6 +75,8 @@ impl<'a> State<'a> {
     ) -> Self {
         let quantized = reference.quantized;
         let History { buckets, removals, reaches } = history;
+        let squares =
+            if levels.mean > 0.0 { Squares::of(&mesh, &buckets, &reference) } else { Squares::default() };
         Self {
             gradients: quantized.gradients(&mesh.tets),
             reference,
@@ -83,6 +90,7 @@ impl<'a> State<'a> {
             ruler: Ruler::new(quantized),
             levels,
             square_weight: 0.0,
+            squares,
             restrictions: Restrictions::default(),
             mesh,
         }
@@ -144,7 +152,14 @@ impl Candidate {
         let input = Input { hole, filling: &self.filling, reference: &state.reference };
         let largest = self.cost.evaluate(hole_cost, &state.buckets, limit, input);
         // What is stored is the largest error. Which level it belongs to may depend on the mean as well.
-        self.error = largest.max((state.square_weight * self.cost.squares).sqrt());
+        self.error = largest;
+        if state.square_weight > 0.0 {
+            // What the removal adds to the sum of squares, for each tetrahedron that it takes away.
+            let added = self.cost.squares.iter().sum::<f64>() - state.squares.sum(&hole.star);
+            let fewer = hole.star.len().saturating_sub(self.filling.tets.len()).max(1);
+            let square = added.max(0.0) * USUALLY_FEWER / fewer as f64;
+            self.error = largest.max((state.square_weight * square).sqrt());
+        }
     }
 }
 

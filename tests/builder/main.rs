@@ -3,6 +3,7 @@
 mod delaunay;
 mod exact_values;
 mod fields;
+mod fit;
 mod flat_boundaries;
 mod measure;
 #[cfg(feature = "parts")]
