@@ -110,10 +110,10 @@ fn scan_block(
         }
         tets.clear();
         mt.find_removed(mesh, u, &mut tets).map_err(EncodeError::Update)?;
-        if let Some(excess) = margins.check(mt, mesh, u, &tets) {
-            if excess.larger || options.check_margins {
-                return Err(out_of_order(excess));
-            }
+        if let Some(excess) = margins.check(mt, mesh, u, &tets)
+            && (excess.larger || options.check_margins)
+        {
+            return Err(out_of_order(excess));
         }
         // Else each block can be used without the others.
         if mt.needs_parents() {

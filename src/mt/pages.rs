@@ -286,6 +286,13 @@ impl<T: Copy> Rows<T> {
         self.starts.push(self.items.len() as u32);
     }
 
+    /// Takes the last row away.
+    #[cfg(test)]
+    pub fn pop(&mut self) {
+        self.starts.pop();
+        self.items.truncate(self.starts.last().map_or(0, |&end| end as usize));
+    }
+
     /// The items of all rows.
     pub fn items(&self) -> &[T] {
         &self.items
