@@ -76,8 +76,3 @@ impl<'a> Appender<'a> {
         Ok((self.builder.finish()?, self.number.into_iter().map(VertexId).collect()))
     }
 }
-
-/// Three of four vertices in increasing order: all but the `i`-th.
-pub(super) fn without(tet: [u32; 4], i: usize) -> [u32; 3] {
-    [0, 1, 2].map(|k| tet[if k < i { k } else { k + 1 }])
-}

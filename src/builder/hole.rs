@@ -183,13 +183,7 @@ impl Hole {
 
     /// Adds a corner of a face, which is `own`. `known` are vertices with their places. Returns its place in the link.
     #[inline]
-    fn add_corner(
-        &mut self,
-        v: u32,
-        known: ([u32; 3], [u8; 3]),
-        own: FaceSet,
-        positions: &[[i32; 3]],
-    ) -> u8 {
+    fn add_corner(&mut self, v: u32, known: ([u32; 3], [u8; 3]), own: FaceSet, positions: &[[i32; 3]]) -> u8 {
         if let Some(i) = (0..3).find(|&i| known.0[i] == v) {
             let place = known.1[i];
             self.faces_at[usize::from(place)] |= own;
@@ -327,7 +321,8 @@ impl Hole {
     /// Finds what lies across the faces of a filling: for [`Hole::replace`].
     pub fn link_filling(&self, filling: &mut Filling) {
         let Filling { tets, across, open, open_at, .. } = filling;
-        (open.clear(), open_at.clear());
+        open.clear();
+        open_at.clear();
         open.extend(self.corners.iter().map(|&corners| face_key(corners)));
         open_at.extend((0..self.faces.len() as u8).map(|face| (Across::Face(face), 0)));
         across.clear();

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::ops::ControlFlow;
 use tetralod::builder::parts::{self, Node, Part, PartUpdates, PartsError, Plan};
-use tetralod::builder::{BuildConfig, BuildError, BuildProgress, BuildResult, build};
+use tetralod::builder::{BuildConfig, BuildError, BuildProgress, BuildResult, OnProgress, build};
 use tetralod::format::{EncodeOptions, encode};
 use tetralod::mesh::{Field, Grid, TetMesh};
 use tetralod::mt::{Mt, MtKind, MultiTessellation};
@@ -205,7 +205,7 @@ fn the_progress_of_a_step_is_that_of_the_step() {
     let (plan, mut files) = Files::parted(&mesh, &BuildConfig::default(), 8);
     (0..8).for_each(|index| files.build(index));
     let whole = plan.nodes()[0];
-    let shares = |work: &dyn Fn(&mut dyn FnMut(BuildProgress) -> ControlFlow<()>)| {
+    let shares = |work: &dyn Fn(OnProgress<'_>)| {
         let mut shares = Vec::new();
         work(&mut |now: BuildProgress| {
             if now.stage == "remove" {
