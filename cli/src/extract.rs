@@ -60,6 +60,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     // What is fitted to must be the mesh of the MT, too.
     let input = arguments.measure.as_deref().or(arguments.fit.as_deref());
     let measured = input.map(|input| measure(input, &answer)).transpose()?.flatten();
+    if let (Some(measured), Some(input)) = (&measured, &arguments.fit) {
+        // Nothing is fitted to another mesh.
+        measured.check(input)?;
+    }
     let mesh = opened.session.mesh().context("there is no mesh")?;
     let mut mesh = reference_units(&opened.session, opened.info()?, mesh);
     let fitted = arguments.fit.as_deref().map(|input| fit_fields(input, &answer, &mut mesh)).transpose()?;
@@ -80,16 +84,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     after.extend(report.measured_error.map(|error| ("measured error", output::number(error))));
     let rows = [vec![("file", arguments.output.display().to_string())], after];
     arguments.query.print_around(&report, rows, (&answer.summary, answer.seconds))?;
-    if let (Some(Measured { error, beyond: Some(bound) }), Some(input)) = (measured, input) {
-        bail!(
-            "the measured error, {}, is above the bound, {}: {} is not what the MT was built from, or the MT is damaged; \
-             `tetralod verify` looks at all of it",
-            output::number(error),
-            output::number(bound),
-            input.display()
-        );
-    }
-    Ok(())
+    measured.zip(input).map_or(Ok(()), |(measured, input)| measured.check(input))
 }
 
 impl FitReport {
@@ -151,6 +146,20 @@ struct Measured {
     error: f64,
     /// The bound that it is above, if it is.
     beyond: Option<f64>,
+}
+
+impl Measured {
+    /// Fails if the input is not that of the MT.
+    fn check(&self, input: &Path) -> Result<()> {
+        let Some(bound) = self.beyond else { return Ok(()) };
+        bail!(
+            "the measured error, {}, is above the bound, {}: {} is not what the MT was built from, or the MT is damaged; \
+             `tetralod verify` looks at all of it",
+            output::number(self.error),
+            output::number(bound),
+            input.display()
+        )
+    }
 }
 
 /// The current mesh in the units of the model and of all its fields.
