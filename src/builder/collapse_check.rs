@@ -1,8 +1,7 @@
 //! Checks of an edge collapse that need no field: topology and orientation.
 
 use super::dihedral::LeastAngle;
-use super::flat;
-use super::flat::Feature;
+use super::flat::{Feature, Planes};
 use super::work_mesh::{StarTet, TetSet, WorkMesh};
 use crate::geom::orient3d;
 use crate::mesh::{FACES, NONE};
@@ -123,17 +122,23 @@ impl CheckedCollapse {
         if self.on_boundary { self.check_flat(mesh, positions) } else { Ok(()) }
     }
 
-    /// Where the boundary at an end must stay, the new vertex has to be in its planes: see [`flat::planes`].
+    /// Where the boundary at an end must stay, the new vertex has to be in its planes: see [`Planes`].
     fn check_flat(&self, mesh: &WorkMesh, positions: &[[i32; 3]]) -> Result<(), Refusal> {
+        let at = |v: u32| positions[v as usize];
+        let is_end = |v: u32| v == self.a || v == self.b;
         for star in [&self.star_a, &self.star_b] {
             let triangles = star.iter().flat_map(|s| {
                 let (corners, around) = (mesh.tets[s.tet as usize], mesh.neighbors[s.tet as usize]);
                 let faces = (0..4).filter(move |&k| k != s.corner as usize && around[k] == NONE);
-                faces.map(move |k| FACES[k].map(|l| positions[corners[l] as usize]))
+                faces.map(move |k| FACES[k].map(|l| corners[l]))
             });
-            if let Some(planes) = flat::planes(triangles, self.feature)
-                && !planes.iter().all(|plane| flat::is_in(plane, self.position))
-            {
+            let Some(planes) = Planes::of(triangles.clone().map(|t| t.map(at)), self.feature) else {
+                continue;
+            };
+            let mut moved = triangles
+                .filter(|t| t.iter().filter(|&&v| is_end(v)).count() == 1)
+                .map(|t| t.map(|v| if is_end(v) { self.position } else { at(v) }));
+            if !planes.meet_at(self.position) || !moved.all(|t| planes.hold(t)) {
                 return Err(Refusal::Blocked);
             }
         }

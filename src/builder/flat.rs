@@ -1,8 +1,10 @@
 //! Where the boundary is flat, or flat parts meet at a sharp crease or corner: there it stays, whatever error is allowed.
 
 use super::dihedral::sharpness_of;
+use super::points::as_vec;
 use super::{BuildConfig, BuildError};
 use crate::geom::orient3d;
+use glam::DVec3;
 
 /// The most planes that meet at a corner.
 const MOST_PLANES: usize = 3;
@@ -32,45 +34,136 @@ impl Feature {
     }
 }
 
-/// The planes of the boundary triangles around a vertex, each by three points, if the vertex must stay in all of them: there is one,
-/// or two or three meet at angles that no curved boundary has: at features. Triangles are ordered as seen from outside.
-pub(super) fn planes(
-    triangles: impl Iterator<Item = [[i32; 3]; 3]>,
-    feature: Feature,
-) -> Option<Vec<[[i32; 3]; 3]>> {
-    let mut planes: Vec<[[i32; 3]; 3]> = Vec::new();
-    for triangle in triangles {
-        if planes.iter().any(|plane| triangle.iter().all(|&p| is_in(plane, p))) {
-            continue;
-        }
-        if planes.len() == MOST_PLANES {
-            return None;
-        }
-        planes.push(triangle);
+/// The planes that the boundary at a vertex must stay in: one, or two or three that meet at angles that no curved boundary has, at
+/// features. Each is given by three points.
+pub(super) struct Planes {
+    planes: Vec<[[i32; 3]; 3]>,
+    /// What features are, if rounding to the lattice has moved points out of the planes.
+    rounded: Option<Feature>,
+}
+
+impl Planes {
+    /// Those of the boundary triangles around a vertex, if it must stay. Triangles are ordered as seen from outside.
+    pub fn of(triangles: impl Iterator<Item = [[i32; 3]; 3]> + Clone, feature: Feature) -> Option<Self> {
+        let exact = Self::exact(triangles.clone(), feature).map(|planes| Self { planes, rounded: None });
+        exact.or_else(|| {
+            let planes = Self::rounded(triangles, feature)?;
+            Some(Self { planes, rounded: Some(feature) })
+        })
     }
-    let normals: Vec<[f64; 3]> = planes.iter().map(normal).collect();
-    let pairs = (0..normals.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
-    let is_sharp = |(i, j): (usize, usize)| {
-        let [across, a, b] =
-            [(i, j), (i, i), (j, j)].map(|(i, j)| (0..3).map(|k| normals[i][k] * normals[j][k]).sum::<f64>());
-        across <= 0.0 || across * across <= feature.square * (a * b)
-    };
-    (!planes.is_empty() && pairs.into_iter().all(is_sharp)).then_some(planes)
+
+    /// Whether a point is in all of them.
+    pub fn meet_at(&self, p: [i32; 3]) -> bool {
+        self.planes
+            .iter()
+            .all(|plane| if self.rounded.is_some() { is_near(plane, p) } else { is_in(plane, p) })
+    }
+
+    /// Whether a triangle is in one of them.
+    pub fn hold(&self, triangle: [[i32; 3]; 3]) -> bool {
+        self.planes.iter().any(|plane| match self.rounded {
+            Some(feature) => feature.goes_on(plane, &triangle),
+            None => triangle.iter().all(|&p| is_in(plane, p)),
+        })
+    }
+
+    fn exact(triangles: impl Iterator<Item = [[i32; 3]; 3]>, feature: Feature) -> Option<Vec<[[i32; 3]; 3]>> {
+        let mut planes: Vec<[[i32; 3]; 3]> = Vec::new();
+        for triangle in triangles {
+            if planes.iter().any(|plane| triangle.iter().all(|&p| is_in(plane, p))) {
+                continue;
+            }
+            if planes.len() == MOST_PLANES {
+                return None;
+            }
+            planes.push(triangle);
+        }
+        feature.divides(&planes).then_some(planes)
+    }
+
+    /// Large triangles come first: their planes are known best.
+    fn rounded(
+        triangles: impl Iterator<Item = [[i32; 3]; 3]>,
+        feature: Feature,
+    ) -> Option<Vec<[[i32; 3]; 3]>> {
+        let mut by_area: Vec<(f64, [[i32; 3]; 3])> =
+            triangles.map(|triangle| (normal(&triangle).length_squared(), triangle)).collect();
+        by_area.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut planes: Vec<[[i32; 3]; 3]> = Vec::new();
+        for (_, triangle) in by_area {
+            if planes.iter().any(|plane| feature.goes_on(plane, &triangle)) {
+                continue;
+            }
+            if planes.len() == MOST_PLANES {
+                return None;
+            }
+            planes.push(triangle);
+        }
+        feature.divides(&planes).then_some(planes)
+    }
+}
+
+impl Feature {
+    /// Whether planes with these normals meet at a feature.
+    fn is_between(self, a: DVec3, b: DVec3) -> bool {
+        let across = a.dot(b);
+        across <= 0.0 || across * across <= self.square * (a.length_squared() * b.length_squared())
+    }
+
+    /// Whether a triangle may have been in a plane before points were rounded, and is not folded over there.
+    fn goes_on(self, plane: &[[i32; 3]; 3], triangle: &[[i32; 3]; 3]) -> bool {
+        triangle.iter().all(|&p| is_near(plane, p))
+            && (is_narrow(triangle) || !self.is_between(normal(plane), normal(triangle)))
+    }
+
+    /// Whether there are planes, and all meet at features.
+    fn divides(self, planes: &[[[i32; 3]; 3]]) -> bool {
+        let normals: Vec<DVec3> = planes.iter().map(normal).collect();
+        let mut pairs = (0..normals.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
+        !planes.is_empty() && pairs.all(|(i, j)| self.is_between(normals[i], normals[j]))
+    }
 }
 
 /// Whether a point is in the plane of three others.
-pub(super) fn is_in(&[a, b, c]: &[[i32; 3]; 3], p: [i32; 3]) -> bool {
+fn is_in(&[a, b, c]: &[[i32; 3]; 3], p: [i32; 3]) -> bool {
     orient3d(a, b, c, p) == 0
 }
 
-fn normal([a, b, c]: &[[i32; 3]; 3]) -> [f64; 3] {
-    let [u, v] = [b, c].map(|p| [0, 1, 2].map(|k| f64::from(p[k]) - f64::from(a[k])));
-    [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
+/// How far rounding has moved points along each axis, in steps of the lattice: half a step where the input's are placed, and as much again
+/// where new ones are, between them.
+const ROUNDED: f64 = 1.0;
+
+/// Whether a point and three others may have been in one plane before they were rounded.
+///
+/// The point is a combination of the three with weights whose sum is 1, and a multiple of the normal. If all four were in a plane before, that
+/// multiple is due to rounding: no more than the tolerance times 1 and the sizes of the weights.
+fn is_near(plane: &[[i32; 3]; 3], p: [i32; 3]) -> bool {
+    let [a, b, c] = plane.map(as_vec);
+    let (n, d) = (normal(plane), as_vec(p) - a);
+    let square = n.length_squared();
+    // The weights of b and c, times the square.
+    let (s, t) = (d.cross(c - a).dot(n), (b - a).cross(d).dot(n));
+    let weights = square + s.abs() + t.abs() + (square - s - t).abs();
+    let [x, y, z] = n.abs().to_array();
+    n.dot(d).abs() * square <= ROUNDED * (x + y + z) * weights
+}
+
+/// Whether rounding may have turned a triangle by any angle: it is hardly higher than rounding moves its corners.
+fn is_narrow(triangle: &[[i32; 3]; 3]) -> bool {
+    let [a, b, c] = triangle.map(as_vec);
+    let longest = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a));
+    normal(triangle).length_squared() <= (2.0 * ROUNDED).powi(2) * longest
+}
+
+/// At a right angle to a triangle, and as long as twice its area.
+fn normal(triangle: &[[i32; 3]; 3]) -> DVec3 {
+    let [a, b, c] = triangle.map(as_vec);
+    (b - a).cross(c - a)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Feature, planes};
+    use super::{Feature, Planes};
     use crate::builder::BuildConfig;
 
     #[test]
@@ -80,13 +173,13 @@ mod tests {
         let kept = |feature_angle| {
             let config = BuildConfig { feature_angle, ..BuildConfig::default() };
             let feature = Feature::of(&config).expect("an angle in range");
-            planes(roof.into_iter(), feature).is_some()
+            Planes::of(roof.into_iter(), feature).is_some()
         };
         assert_eq!(
             [None, Some(60.0), Some(46.0), Some(44.0), Some(1.0)].map(kept),
             [false, false, false, true, true]
         );
         // The default is 60 degrees to the last bit where it matters: 90 is beyond, 45 is not.
-        assert!(planes(roof[..1].iter().copied(), Feature::default()).is_some());
+        assert!(Planes::of(roof[..1].iter().copied(), Feature::default()).is_some());
     }
 }

@@ -1,8 +1,7 @@
 //! The hole that a vertex leaves when it is removed, what fills it, and how a filling is put into the mesh.
 
 use super::collapse_check::Refusal;
-use super::flat;
-use super::flat::Feature;
+use super::flat::{Feature, Planes};
 use super::sides::Sides;
 use super::work_mesh::{ELSEWHERE, StarTet, TetSet, WorkMesh};
 use crate::geom::orient3d;
@@ -35,8 +34,8 @@ pub(super) struct Hole {
     /// The planes of those triangles, if there are no more than two.
     planes: Vec<[[i32; 3]; 3]>,
     many_planes: bool,
-    /// Whether the boundary must stay where it is: see [`flat::planes`].
-    stays: bool,
+    /// Where the boundary must stay, if it must.
+    stays: Option<Planes>,
     /// What the boundary's features are.
     pub feature: Feature,
     /// The planes of the faces, once [`Hole::find_sides`] has found them.
@@ -278,13 +277,12 @@ impl Hole {
 
     fn find_planes(&mut self, positions: &[[i32; 3]]) {
         self.planes.clear();
-        (self.many_planes, self.stays) = (false, false);
+        (self.many_planes, self.stays) = (false, None);
         if !self.on_boundary() {
             return;
         }
         let at = |v: u32| positions[v as usize];
-        self.stays =
-            flat::planes(self.border.iter().map(|&[x, y]| [self.a, x, y].map(at)), self.feature).is_some();
+        self.stays = Planes::of(self.border.iter().map(|&[x, y]| [self.a, x, y].map(at)), self.feature);
         for &[x, y] in &self.border {
             let [p, q, r] = [self.a, x, y].map(at);
             if !self.planes.iter().any(|&[a, b, c]| orient3d(a, b, c, q) == 0 && orient3d(a, b, c, r) == 0) {
@@ -309,13 +307,12 @@ impl Hole {
 
     /// Whether a filling moves the boundary although it must stay.
     pub fn tilts_flat(&self, filling: &Filling, positions: &[[i32; 3]]) -> bool {
-        self.stays && !self.keeps_boundary(filling, positions)
+        self.stays.as_ref().is_some_and(|planes| !moved(filling, positions).all(|t| planes.hold(t)))
     }
 
     /// Whether the boundary stays where it is. In two planes it can only be filled in one way.
     pub fn keeps_boundary(&self, filling: &Filling, positions: &[[i32; 3]]) -> bool {
-        let moved = filling.border[..filling.moved].iter();
-        self.is_flat() && moved.map(|&(_, t)| t.map(|v| positions[v as usize])).all(|t| self.in_plane(t))
+        self.is_flat() && moved(filling, positions).all(|t| self.in_plane(t))
     }
 
     /// Finds what lies across the faces of a filling: for [`Hole::replace`].
@@ -383,6 +380,11 @@ impl Hole {
             }
         }
     }
+}
+
+/// The boundary triangles in the place of those at the removed vertex.
+fn moved(filling: &Filling, positions: &[[i32; 3]]) -> impl Iterator<Item = [[i32; 3]; 3]> {
+    filling.border[..filling.moved].iter().map(|&(_, t)| t.map(|v| positions[v as usize]))
 }
 
 /// The places of three vertices in ascending order, as one number.

@@ -14,9 +14,9 @@
 //!   sets, and grow along the partial order towards the base mesh. (By insertion: where the lattice has put it.)
 //! - **Topology** never changes: the link condition is checked inside and on the boundary, and vertices at which the
 //!   input is not a manifold stay where they are.
-//! - **Geometry**: every tetrahedron is positive on the lattice, exactly. Parts of the boundary that are flat on the lattice stay
-//!   flat, and the creases and corners where such parts meet at 60° or more stay straight and where they are; where
-//!   the boundary moves, that is counted into the error.
+//! - **Geometry**: every tetrahedron is positive on the lattice, exactly. Parts of the boundary that are flat, but for what
+//!   rounding to the lattice has moved their points, stay flat, and the creases and corners where such parts meet at 60° or more stay
+//!   straight and where they are; where the boundary moves, that is counted into the error.
 //! - **Determinism**: the same input gives the same MT on every platform.
 //!
 //! Not guaranteed: distant parts of a curved boundary may come to overlap where they were nearer to each other than the

@@ -55,7 +55,21 @@ pub const LARGE: Volume = Volume {
     data: Data::Generated { name: "helix", size: "97", extension: "vti" },
     build: &["--all-fields"],
     scene: "isovalue=0.55&surface-colour=charge&map=coolwarm&error=50&axes=0&outline=0&camera=14,14,32.67,116,-0.75,0.12",
-    picture: &["--isovalue", "0.55", "--error", "1%", "--no-outline", "--zoom", "1.35"],
+    picture: &[
+        "--isovalue",
+        "0.55",
+        "--error",
+        "1%",
+        "--colour-field",
+        "charge",
+        "--map",
+        "coolwarm",
+        "--colour-range",
+        "-1.7,1.7",
+        "--no-outline",
+        "--zoom",
+        "1.35",
+    ],
     is_shown: true,
 };
 

@@ -65,6 +65,9 @@ pub struct Shown {
     /// A scene to begin with, as --print-scene prints it; the options beside it come on top.
     #[arg(long, value_name = "FILE.json")]
     scene: Option<PathBuf>,
+    /// The field that colours isosurfaces and sections; without it, isosurfaces have one colour, and sections those of the field.
+    #[arg(long, value_name = "NAME", help_heading = COLOURS)]
+    colour_field: Option<String>,
     /// The colour map: viridis, magma, turbo, coolwarm, ... (a wrong name lists all) [default: viridis].
     #[arg(long, value_name = "NAME", value_parser = parse_map, help_heading = COLOURS)]
     map: Option<MapName>,
@@ -263,6 +266,7 @@ impl Shown {
     /// Refuses options for what is not shown.
     fn refuse_idle(&self, state: &SceneState) {
         let faces = !state.isosurfaces.is_empty() || !state.slices.is_empty() || state.boundary.is_some();
+        let coloured = !state.isosurfaces.is_empty() || !state.slices.is_empty();
         let idle = [
             ("isovalue", !self.surfaces.is_empty() && state.isosurfaces.is_empty(), "surface"),
             ("slice", !self.slices.is_empty() && state.slices.is_empty(), "slice"),
@@ -271,6 +275,7 @@ impl Shown {
             ("shrink", self.shrink.is_some() && state.cells.is_none(), "cells"),
             ("cut", self.cut.is_some() && state.cells.is_none(), "cells, wire or points"),
             ("opacity", self.opacity.is_some() && !faces, "surface, slice or boundary"),
+            ("colour-field", self.colour_field.is_some() && !coloured, "surface or slice"),
         ];
         if let Some((option, _, modes)) = idle.into_iter().find(|(_, is_idle, _)| *is_idle) {
             refuse_usage(&format!("--{option} is for what is not shown: add the mode {modes}"));
@@ -283,6 +288,10 @@ impl Shown {
             state.isosurfaces.iter_mut().for_each(|surface| surface.opacity = opacity);
             state.slices.iter_mut().for_each(|slice| slice.opacity = opacity);
             state.boundary.iter_mut().for_each(|boundary| boundary.opacity = opacity);
+        }
+        if self.colour_field.is_some() {
+            state.isosurfaces.iter_mut().for_each(|surface| surface.field.clone_from(&self.colour_field));
+            state.slices.iter_mut().for_each(|slice| slice.field.clone_from(&self.colour_field));
         }
         if self.edges {
             state.isosurfaces.iter_mut().for_each(|surface| surface.edges = true);

@@ -108,6 +108,10 @@ fn options_change_the_picture() {
     for options in [["--colour-by", "size"], ["--shrink", "30%"], ["--cut", "y=0.5"]] {
         assert!(draw(&mt, &out, &options).differing(&before) > 100, "{options:?} changes nothing");
     }
+    // An isosurface has a colour of its own, or that of its value.
+    let before = draw(&mt, &out, &["--isovalue", "0.5", "--background", "light"]);
+    let coloured = ["--isovalue", "0.5", "--background", "light", "--colour-field", "density"];
+    assert!(draw(&mt, &out, &coloured).differing(&before) > 100, "--colour-field changes nothing");
     // A part of the range is visible.
     let before = draw(&mt, &out, &["--mode", "volume"]);
     let after = draw(&mt, &out, &["--opacities", "0.4,0,0.6,0.9"]);
@@ -163,13 +167,14 @@ fn a_scene_is_printed_and_read() {
 #[test]
 fn what_cannot_be_drawn_is_refused() {
     let (_folder, mt, out) = prepared("refused", 5);
-    let wrong: [(&[&str], &[&str]); 13] = [
+    let wrong: [(&[&str], &[&str]); 14] = [
         (&["--map", "jet"], &["--map", "must be a colour map", "viridis", "balance"]),
         (&["--mode", "cloud"], &["--mode", "volume", "points"]),
         (&["--mode", "cells,wire"], &["one of the modes"]),
         (&["--mode", "surface", "--shrink", "0.2"], &["--shrink", "add the mode cells"]),
         (&["--mode", "cells", "--opacity", "0.2"], &["--opacity", "surface, slice or boundary"]),
         (&["--mode", "cells", "--colour-by", "weight"], &["depth", "missing"]),
+        (&["--mode", "volume", "--colour-field", "density"], &["--colour-field", "surface or slice"]),
         (&["--size", "100"], &["--size", "1280x960"]),
         (&["--samples", "0"], &["--samples", "1..=1024"]),
         (&["--from", "x"], &["--from", "+x", "home"]),
