@@ -168,8 +168,8 @@ mod tests {
 
     #[test]
     fn the_angle_of_features_can_be_chosen() {
-        // Two triangles that meet at 45 degrees.
-        let roof = [[[0, 0, 0], [4, 0, 0], [0, 4, 0]], [[0, 0, 0], [0, 4, 0], [-4, 0, -4]]];
+        // Two triangles that meet at 45 degrees, far larger than what rounding moves points by.
+        let roof = [[[0, 0, 0], [400, 0, 0], [0, 400, 0]], [[0, 0, 0], [0, 400, 0], [-400, 0, -400]]];
         let kept = |feature_angle| {
             let config = BuildConfig { feature_angle, ..BuildConfig::default() };
             let feature = Feature::of(&config).expect("an angle in range");
@@ -181,5 +181,25 @@ mod tests {
         );
         // The default is 60 degrees to the last bit where it matters: 90 is beyond, 45 is not.
         assert!(Planes::of(roof[..1].iter().copied(), Feature::default()).is_some());
+    }
+
+    #[test]
+    fn rounded_points_of_a_plane_are_in_it_and_no_others() {
+        // Around the origin, in the plane at a right angle to (3, 5, 7), rounded.
+        let around = [[500.0, -300.0], [420.0, 310.0], [-130.0, 480.0], [-510.0, 20.0], [-90.0, -450.0]];
+        let place =
+            |[x, y]: [f64; 2], lift: f64| [x, y, lift - (3.0 * x + 5.0 * y) / 7.0].map(|c| c.round() as i32);
+        let fan = |lift: f64| {
+            let rim = around.map(|p| place(p, if p[0] < 0.0 { lift } else { 0.0 }));
+            let [a, b, c, d, e] = rim;
+            [[a, b], [b, c], [c, d], [d, e], [e, a]].map(|[x, y]| [[0; 3], x, y])
+        };
+        let planes = Planes::of(fan(0.0).into_iter(), Feature::default()).expect("it is flat");
+        assert!(planes.rounded.is_some() && planes.planes.len() == 1);
+        assert!(planes.meet_at(place([900.0, 100.0], 0.0)) && !planes.meet_at(place([900.0, 100.0], 40.0)));
+        // The other way round, a triangle is folded over.
+        let [o, x, y] = fan(0.0)[0];
+        assert!(planes.hold([o, x, y]) && !planes.hold([o, y, x]));
+        assert!(Planes::of(fan(40.0).into_iter(), Feature::default()).is_none(), "it is bent");
     }
 }

@@ -1,5 +1,7 @@
 //! How much memory building takes: known before it begins, from counts alone.
 
+#[cfg(feature = "parts")]
+use super::parts::LEFT_AT_INTERFACE;
 use super::{Construction, Method};
 use crate::mt::MtKind;
 
@@ -62,8 +64,12 @@ fn after_parting([points, tetrahedra, fields]: [u64; 3], parts: u32, at_a_time: 
     let assembling = of_tets(60).saturating_add(of_points(90 + 30 * fields));
     // Of what has been freed, allocators keep some for each thread. One step alone is done by the thread that assembles.
     let joins = parts.div_ceil(8);
-    let side_by_side =
-        if joins > 1 { joining / u64::from(joins) * u64::from(at_a_time.min(joins)) } else { 0 };
+    // But more stay where parts meet: at both sides of planes across a grid, two triangles for each square.
+    let planes = 3.0 * (libm::cbrt(parts.into()) - 1.0);
+    let triangles = 4.0 * planes * libm::cbrt(points as f64).powi(2);
+    let at_interfaces = (triangles as u64).saturating_mul(LEFT_AT_INTERFACE as u64).min(tetrahedra);
+    let first = joining.saturating_add(at_interfaces.saturating_sub(tetrahedra / 8).saturating_mul(200));
+    let side_by_side = if joins > 1 { first / u64::from(joins) * u64::from(at_a_time.min(joins)) } else { 0 };
     let kept = if at_a_time > 1 { part.max(side_by_side) / 2 } else { 0 };
     part.max(joining.max(assembling).saturating_add(kept))
 }

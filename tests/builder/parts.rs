@@ -201,7 +201,7 @@ fn a_grid_alone_has_the_parts_of_its_mesh() {
 
 #[test]
 fn the_progress_of_a_step_is_that_of_the_step() {
-    let mesh = blocks([9; 3], &[hilly], |_| true);
+    let mesh = blocks([24; 3], &[hilly], |_| true);
     let (plan, mut files) = Files::parted(&mesh, &BuildConfig::default(), 8);
     (0..8).for_each(|index| files.build(index));
     let whole = plan.nodes()[0];

@@ -46,6 +46,7 @@ mod plan;
 mod wire;
 
 pub use assemble::assemble;
+pub(super) use node::LEFT_AT_INTERFACE;
 pub use node::{build_part, join};
 pub use partition::part;
 pub use piece::{Part, PartUpdates};

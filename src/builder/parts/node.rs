@@ -26,6 +26,11 @@ use std::sync::Arc;
 /// A step ends when about so much of its tetrahedra is left: as many of these are joined.
 const LEFT: usize = 8;
 
+/// Or when so many are left for each triangle that it shares with other parts. These triangles stay, and so do the tetrahedra at them: to
+/// get below, all other vertices would be removed, whatever the error is. On 97³ in 64 parts, meshes within 1 % have 527 816 tetrahedra
+/// without this, 327 843 with 4 for each, 276 579 with 8; as a whole they have 281 157.
+pub(in crate::builder) const LEFT_AT_INTERFACE: usize = 8;
+
 /// Builds a part on its own: returns what is left, and the updates.
 ///
 /// # Errors
@@ -76,7 +81,8 @@ fn run(head: Head, piece: Piece, progress: OnProgress<'_>) -> Result<(Part, Part
     let inner = if piece.inner.is_empty() { vec![0; piece.tets.len()] } else { piece.inner.clone() };
     let of_piece = MtInfo { vertices: piece.points.len() as u32, ..info };
     let mut record = Collapses::resume(&of_piece, earlier, inner);
-    let enough = if plan.is_whole(node) { 0 } else { piece.tets.len().div_ceil(LEFT) as u32 };
+    let left = piece.tets.len().div_ceil(LEFT).max(LEFT_AT_INTERFACE * piece.interface.len());
+    let enough = if plan.is_whole(node) { 0 } else { left as u32 };
     let mut decimator = Decimator::new(state, None, &mut record);
     decimator.remove_until(enough, &mut |now| progress(of_step(now, piece.tets.len(), enough)))?;
     let Decimator { state, record: finished, .. } = decimator;
@@ -88,14 +94,14 @@ fn run(head: Head, piece: Piece, progress: OnProgress<'_>) -> Result<(Part, Part
     Ok(sorted_out(head, (piece, left), record))
 }
 
-/// The progress of a step by its tetrahedra, from so many to `enough`: it ends before the vertices do, and begins after others.
+/// The progress of a step by its tetrahedra, from so many to `enough`: it ends before the vertices do, and begins after others. A step
+/// that has nothing to do is done.
 fn of_step(now: BuildProgress, before: usize, enough: u32) -> BuildProgress {
     let left = now.tetrahedra.unwrap_or(enough);
-    BuildProgress {
-        done: (before as u64).saturating_sub(left.into()),
-        total: (before as u64).saturating_sub(enough.into()),
-        ..now
-    }
+    let [done, total] = [left, enough].map(|tets| (before as u64).saturating_sub(tets.into()));
+    // The last removal may take away more than it has to.
+    let [done, total] = if total > 0 { [done.min(total), total] } else { [1, 1] };
+    BuildProgress { done, total, ..now }
 }
 
 /// The reference vertices of a piece on the lattices of the whole.
