@@ -30,7 +30,7 @@ const LOOK = 15_000;
 
 /** @type {Listed[]} */
 let volumes = [];
-/** @type {{ title: string }[]} */
+/** @type {{ title: string, isShown: boolean }[]} */
 let pending = [];
 let timer;
 
@@ -72,10 +72,11 @@ export async function shown(url) {
   if (isNew && !$("gallery").open) showGallery();
 }
 
+/** Says that the volume which is shown first is there now. */
 function announceNew(before) {
-  const fresh = volumes.find(({ url }) => !before.has(url));
-  if (!fresh) return;
-  note(`${fresh.title} is ready`, { label: "Open", act: () => openListed(fresh) });
+  const [first] = volumes;
+  if (before.has(first.url)) return;
+  note(`${first.title} is ready`, { label: "Open", act: () => openListed(first) });
 }
 
 /** The list of data sets. What is open and not in it stays. */
@@ -91,8 +92,9 @@ function showList() {
 function showGallery() {
   const shown = volumes.filter(({ isShown }) => isShown);
   $("gallery-list").replaceChildren(...shown.map(card));
-  $("gallery-pending").hidden = pending.length === 0;
-  $("gallery-pending").textContent = pending.map(({ title }) => `${title} is being made, and appears here when it is ready.`).join(" ");
+  const titles = pending.filter(({ isShown }) => isShown).map(({ title }) => title);
+  $("gallery-pending").hidden = titles.length === 0;
+  $("gallery-pending").textContent = `Being made, and here when ready: ${titles.join(", ")}.`;
 }
 
 /** @param {Listed} volume */

@@ -495,6 +495,35 @@ test("the data view shows where the blocks are, and the memory of the GPU", asyn
   await page.close();
 });
 
+test("a volume that is being made is named, and can be opened once it is there", async () => {
+  let asked = 0;
+  const prepare = (page) =>
+    page.route("**/data/volumes.json", async (route) => {
+      const list = await (await route.fetch()).json();
+      const [{ title }, ...others] = list.volumes;
+      // It is there the second time; what is not shown in the gallery is not named.
+      const pending = [{ title, isShown: true }, { title: "Hidden", isShown: false }];
+      await route.fulfill({ json: asked++ === 0 ? { volumes: others, pending } : list });
+    });
+  const page = await open(SMALL, prepare, VIEWPORT);
+  await reach(page, "complete");
+  const first = await page.evaluate(async () => (await (await fetch("data/volumes.json?")).json()).volumes[0]);
+  const listed = () => page.locator("#volume option").allInnerTexts();
+  assert.ok(!(await listed()).includes(first.title));
+  assert.match(await page.locator("#gallery-pending").textContent(), new RegExp(`: ${first.title}\\.$`));
+  // The page looks for a new list when it gets the focus.
+  await page.evaluate(() => window.dispatchEvent(new Event("focus")));
+  await page.locator("#note", { hasText: `${first.title} is ready` }).waitFor();
+  assert.ok((await listed()).includes(first.title));
+  assert.ok(await page.locator("#gallery-pending").evaluate((element) => element.hidden));
+  await page.locator("#note").getByText("Open").click();
+  await page.waitForFunction((url) => new URLSearchParams(location.search).get("url") === url || location.href.includes(url), first.url);
+  await reach(page, "complete");
+  assert.equal(await page.locator("#volume").inputValue(), first.url);
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
 test("volumes without pictures get some: drawn ones, then those that the page has taken", async () => {
   const prepare = (page) =>
     page.route("**/data/volumes.json", async (route) => {

@@ -3,12 +3,9 @@
 use std::path::PathBuf;
 use std::process::Command;
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, bail};
 
 use crate::shell;
-
-/// The hidden command that cargo calls for each wasm test binary.
-pub const RUNNER: &str = "wasm-test-runner";
 
 const BROWSERS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
 
@@ -90,10 +87,9 @@ pub fn install_packages(what: &str, packages: &[&str], by_hand: &'static str) ->
     shell::run(&mut with_rights(&[&install, packages].concat())).context(by_hand)
 }
 
-/// `cargo test` for wasm, with this program as the runner and `browser` as the place to run; not started yet.
+/// `cargo test` for wasm, with `wasm-test-runner` and `browser` as the place to run; not started yet.
 pub fn wasm_tests(browser: &Browser, cargo_args: &[&str]) -> Result<Command> {
-    let this = std::env::current_exe()?;
-    let runner = serde_json::json!([this.to_string_lossy(), RUNNER]);
+    let runner = serde_json::json!([shell::wasm_test_runner()?.to_string_lossy()]);
     let config = format!("target.{}.runner={runner}", shell::WASM);
     let mut command = shell::cargo(["test", "--config", &config, "--target", shell::WASM]);
     command.args(cargo_args).env("CHROMEDRIVER", &browser.driver);
@@ -110,16 +106,4 @@ fn capabilities(browser: &Browser) -> Result<PathBuf> {
     let file = shell::root().join("target/webdriver.json");
     std::fs::write(&file, json.to_string()).with_context(|| file.display().to_string())?;
     Ok(file)
-}
-
-/// What cargo calls as `RUNNER test.wasm ARGS...`.
-pub fn run_wasm_tests(args: &[String]) -> Result<()> {
-    // wasm-bindgen's runner takes a file without tests for a success; here it would hide that nothing was run.
-    let file = args.first().context("the runner needs a wasm file")?;
-    let wasm = std::fs::read(file).with_context(|| file.clone())?;
-    ensure!(wasm.windows(7).any(|bytes| bytes == b"__wbgt_"), "{file} holds no test");
-    let name = "wasm-bindgen-test-runner".to_owned();
-    wasm_bindgen_cli::wasm_bindgen_test_runner::run_cli_with_args(
-        std::iter::once(name).chain(args.iter().cloned()),
-    )
 }

@@ -7,13 +7,13 @@ use std::thread;
 use anyhow::{Context, Result, anyhow, bail};
 
 use crate::serve::Server;
-use crate::volumes::{self, DATA, LARGE, SMALL, Volume};
+use crate::volumes::{self, BEFORE_PAGE, DATA, LARGE, SMALL, Volume};
 use crate::{package, shell};
 
 /// The memory that the large volume takes to build, in KiB: some 130 bytes a tetrahedron, and its data.
 const LARGE_MEMORY: u64 = 3 << 20;
 
-/// Builds what the page needs first, and serves until interrupted. The rest of the package and the large volume are made meanwhile.
+/// Builds what the page needs first, and serves until interrupted. The rest of the package and of the volumes is made meanwhile.
 pub fn run(args: &[String]) -> Result<()> {
     let (mut port, mut serve, mut small) = (8080, true, false);
     let mut args = args.iter();
@@ -31,29 +31,34 @@ pub fn run(args: &[String]) -> Result<()> {
     // Both take minutes: side by side, no core is idle.
     let viewer = thread::spawn(package::build_viewer);
     let tetralod = shell::demo_command()?;
-    make_volumes(&tetralod)?;
+    let [first, rest] = [&SMALL[..BEFORE_PAGE], &SMALL[BEFORE_PAGE..]];
+    make_volumes(&tetralod, if serve { first } else { &SMALL })?;
     viewer.join().map_err(|_| anyhow!("a thread that builds the viewer panicked"))??;
     if !serve {
         draw_all()?;
         return package::build(&[]);
     }
-    let large = Some(&LARGE).filter(|_| !small && has_memory());
-    volumes::write_list(&tetralod, large)?;
+    let mut rest = rest.to_vec();
+    rest.extend((!small && has_memory()).then_some(LARGE));
+    volumes::write_list(&tetralod, &rest)?;
     let made = tetralod.clone();
-    thread::spawn(move || make_rest(&made, large));
+    thread::spawn(move || make_rest(&made, &rest));
     serve_page(&tetralod, port)
 }
 
-/// Makes what the page does without at first: the large volume with what the machine has left, and thumbnails. An error does not end
-/// the page.
-fn make_rest(tetralod: &Path, large: Option<&Volume>) {
+/// Makes the volumes that the page does without at first with what the machine has left, and thumbnails. An error does not end the
+/// page.
+fn make_rest(tetralod: &Path, volumes: &[Volume]) {
     let prefix: &[&str] = if shell::find("nice").is_some() { &["nice", "-n", "19"] } else { &[] };
-    let made = large.map_or(Ok(()), |large| volumes::make(tetralod, large, prefix));
-    if let Err(error) = made {
-        eprintln!("the large volume was not made: {error:#}");
+    for (i, volume) in volumes.iter().enumerate() {
+        let made = volumes::make(tetralod, volume, prefix);
+        // What is there is listed before the next is made, and before there are thumbnails, and also where they fail.
+        let listed = volumes::write_list(tetralod, &volumes[i + 1..]);
+        for error in [made, listed].into_iter().filter_map(Result::err) {
+            eprintln!("a volume was not made: {error:#}");
+        }
     }
-    // What is there is listed before there are thumbnails, and also where they fail.
-    if let Err(error) = volumes::write_list(tetralod, None).and_then(|()| draw_all()) {
+    if let Err(error) = draw_all() {
         eprintln!("{error:#}");
     }
 }
@@ -62,7 +67,7 @@ fn make_rest(tetralod: &Path, large: Option<&Volume>) {
 fn draw_all() -> Result<()> {
     let tetralod = shell::tested_command()?;
     volumes::draw_all(&tetralod);
-    volumes::write_list(&tetralod, None)
+    volumes::write_list(&tetralod, &[])
 }
 
 /// Whether there is memory for the large volume. Where the system does not say, there is.
@@ -86,14 +91,14 @@ pub fn bench_volume() -> Result<PathBuf> {
 
 /// Makes the small volumes that are missing or older than the command that builds them, with thumbnails, and the list of all.
 pub fn make_data(tetralod: &Path) -> Result<()> {
-    make_volumes(tetralod)?;
+    make_volumes(tetralod, &SMALL)?;
     volumes::draw_all(tetralod);
-    volumes::write_list(tetralod, None)
+    volumes::write_list(tetralod, &[])
 }
 
-fn make_volumes(tetralod: &Path) -> Result<()> {
+fn make_volumes(tetralod: &Path, volumes: &[Volume]) -> Result<()> {
     fs::create_dir_all(DATA)?;
-    SMALL.iter().try_for_each(|volume| volumes::make(tetralod, volume, &[]))
+    volumes.iter().try_for_each(|volume| volumes::make(tetralod, volume, &[]))
 }
 
 /// The same, and the large volume.

@@ -70,10 +70,6 @@ fn run() -> Result<()> {
     // The first argument is the program itself.
     let args: Vec<String> = std::env::args().skip(1).collect();
     let Some((command, rest)) = args.split_first() else { bail!("{USAGE}") };
-    // The test runner is called by cargo from the folder of the package under test, with paths relative to it.
-    if command == browser::RUNNER {
-        return browser::run_wasm_tests(rest);
-    }
     std::env::set_current_dir(shell::root())?;
     match command.as_str() {
         "build" => package::build(rest),

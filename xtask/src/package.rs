@@ -13,6 +13,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, ensure};
 use flate2::Compression;
 use flate2::write::GzEncoder;
+use wasm_bindgen_cli_support::Bindgen;
 
 use crate::{licences, shell};
 
@@ -114,14 +115,14 @@ pub fn build_bench(folder: &Path) -> Result<()> {
     )
 }
 
-/// wasm-bindgen's macro and its command line speak a private protocol: they must be the same version.
+/// wasm-bindgen's macro and its generator of scripts speak a private protocol: they must be the same version.
 fn check_versions() -> Result<()> {
     let lock = fs::read_to_string("Cargo.lock").context("Cargo.lock")?;
-    let (library, tool) = (locked(&lock, "wasm-bindgen")?, locked(&lock, "wasm-bindgen-cli")?);
+    let (library, tool) = (locked(&lock, "wasm-bindgen")?, locked(&lock, "wasm-bindgen-cli-support")?);
     ensure!(
         library == tool,
-        "Cargo.lock has wasm-bindgen {library} but xtask carries wasm-bindgen-cli {tool}: \
-         set the version in xtask/Cargo.toml to ={library}"
+        "Cargo.lock has wasm-bindgen {library} but xtask carries wasm-bindgen-cli-support {tool}: \
+         set the versions in xtask/Cargo.toml to ={library}"
     );
     Ok(())
 }
@@ -140,11 +141,8 @@ fn compile(module: &Module, out: &Path) -> Result<()> {
     command.args(["--no-default-features", "--features", features, "--config", &path_free()?]);
     shell::run(&mut command)?;
     let wasm = Path::new("target").join(shell::WASM).join("wasm/tetralod.wasm");
-    let path = |path: &Path| path.to_string_lossy().into_owned();
     let made = out.join("made");
-    let bindgen =
-        ["wasm-bindgen", "--target", "web", "--out-name", script, "--out-dir", &path(&made), &path(&wasm)];
-    wasm_bindgen_cli::wasm_bindgen::run_cli_with_args(bindgen)?;
+    Bindgen::new().web(true)?.input_path(&wasm).out_name(script).typescript(true).generate(&made)?;
     for file in files_of(&made)? {
         fs::rename(made.join(&file), out.join(file.replacen(script, name, 1)))
             .with_context(|| format!("moving {file}"))?;

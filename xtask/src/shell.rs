@@ -87,7 +87,9 @@ pub fn tested_command() -> Result<PathBuf> {
 /// The native command without what takes long to compile and no volume of the demo needs: pictures, HDF5, addresses. In a folder of
 /// its own, so that files which it has made are older than the command only where it has changed.
 pub fn demo_command() -> Result<PathBuf> {
-    run(&mut cargo(["build", "--package", "tetralod-cli", "--no-default-features"]))?;
+    // Who waits for the page does not change the command: what makes it quicker to compile again would only take time.
+    let mut command = cargo(["build", "--package", "tetralod-cli", "--no-default-features"]);
+    run(command.env("CARGO_INCREMENTAL", "0"))?;
     let (made, kept) = (built_in("debug"), built_in("demo"));
     let bytes = fs::read(&made).with_context(|| made.display().to_string())?;
     if fs::read(&kept).ok().as_ref() != Some(&bytes) {
@@ -103,8 +105,19 @@ pub fn released_command() -> Result<PathBuf> {
     Ok(built_in("release"))
 }
 
+/// The program that cargo calls for each file of wasm tests.
+pub fn wasm_test_runner() -> Result<PathBuf> {
+    let name = "wasm-test-runner";
+    run(&mut cargo(["build", "--package", "xtask", "--features", "wasm-tests", "--bin", name]))?;
+    Ok(program_in("debug", name))
+}
+
 fn built_in(profile: &str) -> PathBuf {
-    root().join("target").join(profile).join(format!("tetralod{}", std::env::consts::EXE_SUFFIX))
+    program_in(profile, "tetralod")
+}
+
+fn program_in(profile: &str, name: &str) -> PathBuf {
+    root().join("target").join(profile).join(format!("{name}{}", std::env::consts::EXE_SUFFIX))
 }
 
 /// Adds the wasm target to the pinned toolchain where it is missing.

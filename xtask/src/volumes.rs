@@ -15,6 +15,7 @@ pub const DATA: &str = "www/data";
 const LIST: &str = "volumes.json";
 
 /// Where the data of a volume comes from.
+#[derive(Clone, Copy)]
 enum Data {
     /// `tetralod generate NAME --size SIZE`.
     Generated { name: &'static str, size: &'static str, extension: &'static str },
@@ -23,6 +24,7 @@ enum Data {
 }
 
 /// A volume of the demo.
+#[derive(Clone, Copy)]
 pub struct Volume {
     /// The name of its MT file.
     name: &'static str,
@@ -46,7 +48,7 @@ impl Volume {
     }
 }
 
-/// Made in the background, and shown first as soon as it is there.
+/// Shown first as soon as it is there.
 pub const LARGE: Volume = Volume {
     name: "helix",
     title: "Double helix",
@@ -72,6 +74,9 @@ pub const LARGE: Volume = Volume {
     ],
     is_shown: true,
 };
+
+/// How many of the small volumes are made before the page is served: the first of them.
+pub const BEFORE_PAGE: usize = 3;
 
 /// Small volumes: each kind of MT is among them, since the page opens all alike.
 pub const SMALL: [Volume; 8] = [
@@ -278,10 +283,11 @@ fn write_data(volume: &Volume, run: &impl Fn(Vec<String>) -> Result<()>) -> Resu
     }
 }
 
-/// Writes the list of the volumes that are there, the largest first. `pending` is one that is being made.
-pub fn write_list(tetralod: &Path, pending: Option<&Volume>) -> Result<()> {
+/// Writes the list of the volumes that are there, the largest first. `pending` are being made.
+pub fn write_list(tetralod: &Path, pending: &[Volume]) -> Result<()> {
     let listed = there().iter().map(|volume| entry(tetralod, volume)).collect::<Result<Vec<_>>>()?;
-    let pending: Vec<Value> = pending.into_iter().map(|volume| json!({ "title": volume.title })).collect();
+    let pending: Vec<Value> =
+        pending.iter().map(|volume| json!({ "title": volume.title, "isShown": volume.is_shown })).collect();
     let list = Path::new(DATA).join(LIST);
     // Moved, so that the page reads the old list or the new one.
     let part = list.with_extension("part");
