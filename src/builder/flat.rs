@@ -45,9 +45,9 @@ pub(super) struct Planes {
 impl Planes {
     /// Those of the boundary triangles around a vertex, if it must stay. Triangles are ordered as seen from outside.
     pub fn of(triangles: impl Iterator<Item = [[i32; 3]; 3]> + Clone, feature: Feature) -> Option<Self> {
-        let exact = Self::exact(triangles.clone(), feature).map(|planes| Self { planes, rounded: None });
+        let exact = Self::exact(&mut triangles.clone(), feature).map(|planes| Self { planes, rounded: None });
         exact.or_else(|| {
-            let planes = Self::rounded(triangles, feature)?;
+            let planes = Self::rounded(triangles.collect(), feature)?;
             Some(Self { planes, rounded: Some(feature) })
         })
     }
@@ -67,7 +67,10 @@ impl Planes {
         })
     }
 
-    fn exact(triangles: impl Iterator<Item = [[i32; 3]; 3]>, feature: Feature) -> Option<Vec<[[i32; 3]; 3]>> {
+    fn exact(
+        triangles: &mut dyn Iterator<Item = [[i32; 3]; 3]>,
+        feature: Feature,
+    ) -> Option<Vec<[[i32; 3]; 3]>> {
         let mut planes: Vec<[[i32; 3]; 3]> = Vec::new();
         for triangle in triangles {
             if planes.iter().any(|plane| triangle.iter().all(|&p| is_in(plane, p))) {
@@ -82,22 +85,15 @@ impl Planes {
     }
 
     /// Large triangles come first: their planes are known best.
-    fn rounded(
-        triangles: impl Iterator<Item = [[i32; 3]; 3]>,
-        feature: Feature,
-    ) -> Option<Vec<[[i32; 3]; 3]>> {
-        let mut by_area: Vec<(f64, [[i32; 3]; 3])> =
-            triangles.map(|triangle| (normal(&triangle).length_squared(), triangle)).collect();
-        by_area.sort_by(|a, b| b.0.total_cmp(&a.0));
+    fn rounded(mut left: Vec<[[i32; 3]; 3]>, feature: Feature) -> Option<Vec<[[i32; 3]; 3]>> {
+        let area = |triangle: &[[i32; 3]; 3]| normal(triangle).length_squared();
         let mut planes: Vec<[[i32; 3]; 3]> = Vec::new();
-        for (_, triangle) in by_area {
-            if planes.iter().any(|plane| feature.goes_on(plane, &triangle)) {
-                continue;
-            }
+        while let Some(plane) = left.iter().copied().reduce(|a, b| if area(&b) > area(&a) { b } else { a }) {
             if planes.len() == MOST_PLANES {
                 return None;
             }
-            planes.push(triangle);
+            planes.push(plane);
+            left.retain(|triangle| !feature.goes_on(&plane, triangle));
         }
         feature.divides(&planes).then_some(planes)
     }

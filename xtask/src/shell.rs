@@ -80,7 +80,8 @@ pub const ALL: [&str; 5] = [
 
 /// The native command as it was compiled for the tests, optimised and with every assertion.
 pub fn tested_command() -> Result<PathBuf> {
-    run(cargo(["build", "--bin", "tetralod"]).args(ALL))?;
+    // With its tests: they give some dependencies more features, and without them the crate would be compiled again by each of the two.
+    run(cargo(["test", "--no-run", "--test", "command"]).args(ALL))?;
     Ok(built_in("debug"))
 }
 
