@@ -515,7 +515,7 @@ test("a volume that is being made is named, and can be opened once it is there",
   await page.evaluate(() => window.dispatchEvent(new Event("focus")));
   await page.locator("#note", { hasText: `${first.title} is ready` }).waitFor();
   assert.ok((await listed()).includes(first.title));
-  assert.ok(await page.locator("#gallery-pending").evaluate((element) => element.hidden));
+  assert.notEqual(await page.locator("#gallery-pending").getAttribute("hidden"), null);
   await page.locator("#note").getByText("Open").click();
   await page.waitForFunction((url) => new URLSearchParams(location.search).get("url") === url || location.href.includes(url), first.url);
   await reach(page, "complete");

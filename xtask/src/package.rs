@@ -142,7 +142,10 @@ fn compile(module: &Module, out: &Path) -> Result<()> {
     shell::run(&mut command)?;
     let wasm = Path::new("target").join(shell::WASM).join("wasm/tetralod.wasm");
     let made = out.join("made");
-    Bindgen::new().web(true)?.input_path(&wasm).out_name(script).typescript(true).generate(&made)?;
+    // As wasm-bindgen's command line has it: the script knows where its module is.
+    let mut bindgen = Bindgen::new();
+    bindgen.web(true)?.input_path(&wasm).out_name(script).typescript(true);
+    bindgen.omit_default_module_path(false).generate(&made)?;
     for file in files_of(&made)? {
         fs::rename(made.join(&file), out.join(file.replacen(script, name, 1)))
             .with_context(|| format!("moving {file}"))?;
