@@ -1,8 +1,9 @@
 //! How much of a file requests need: the first useful picture, and a box at full resolution.
 
+use super::Result;
+use super::mt_file::mt_file;
 use super::sets::Set;
 use super::surfaces::{Interpolant, Mesh, Surface};
-use super::{Result, sets};
 use std::io::Cursor;
 use std::time::Duration;
 use tetralod::builder::Purpose;
@@ -42,7 +43,7 @@ pub fn run(sets: &[Set]) -> Result<()> {
             }
             let name = format!("{}, {name}", set.name);
             eprintln!("{name}");
-            let file = sets::file(&set.mesh, kind, purpose)?;
+            let file = mt_file(&set.mesh, kind, purpose)?;
             if is_usual && (LARGE..=HUGE).contains(&set.mesh.tets.len()) {
                 pictures.push(picture(set, &name, &file)?);
             }

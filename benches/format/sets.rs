@@ -1,11 +1,10 @@
 //! The meshes that are measured.
 
 use super::Result;
+use super::mt_file::mt_file;
 use std::fs;
-use std::ops::ControlFlow;
 use std::path::Path;
-use tetralod::builder::{BuildConfig, Purpose, build};
-use tetralod::format::{EncodeOptions, encode};
+use tetralod::builder::Purpose;
 use tetralod::io::{CellData, ReadOptions};
 use tetralod::mesh::{TetMesh, repair};
 use tetralod::mt::MtKind;
@@ -69,18 +68,9 @@ fn read(path: &Path) -> Option<Set> {
     }
 }
 
-/// The MT file of a mesh.
-pub fn file(mesh: &TetMesh, kind: MtKind, purpose: Purpose) -> Result<Vec<u8>> {
-    let mut config = BuildConfig::of(kind);
-    // Other methods know no purpose.
-    config.construction = config.construction.with_purpose(purpose).unwrap_or(config.construction);
-    let mt = build(mesh, &config, &mut |_| ControlFlow::Continue(()))?.mt;
-    Ok(encode(&mt, &EncodeOptions { block_bits: config.block_bits, ..EncodeOptions::default() })?)
-}
-
 /// Writes the MT file of a generated volume.
 pub fn make(size: u32, kind: &str, file: &Path) -> Result<()> {
     let kind = MtKind::ALL.into_iter().find(|known| known.name() == kind).ok_or("no such kind")?;
-    fs::write(file, self::file(&generate::bucky(size)?, kind, Purpose::default())?)?;
+    fs::write(file, mt_file(&generate::bucky(size)?, kind, Purpose::default())?)?;
     Ok(())
 }

@@ -1,7 +1,8 @@
 //! Bytes of MT files, beside those of other forms of the same mesh, and how fast they are decoded.
 
+use super::Result;
+use super::mt_file::mt_file;
 use super::sets::Set;
-use super::{Result, sets};
 use std::io::{Read, Write};
 use std::process::{Command, Stdio};
 use std::time::Instant;
@@ -82,10 +83,10 @@ fn measure(set: &Set) -> Result<Found> {
     eprintln!("{}", set.name);
     let mesh = &set.mesh;
     let raw = raw(mesh);
-    let edge = sets::file(mesh, MtKind::Edge, Purpose::default())?;
+    let edge = mt_file(mesh, MtKind::Edge, Purpose::default())?;
     let is_small = mesh.positions.len() <= LARGE;
-    let vertex = is_small.then(|| sets::file(mesh, MtKind::Vertex, Purpose::default())).transpose()?;
-    let half_edge = sets::file(mesh, MtKind::HalfEdge, Purpose::default())?;
+    let vertex = is_small.then(|| mt_file(mesh, MtKind::Vertex, Purpose::default())).transpose()?;
+    let half_edge = mt_file(mesh, MtKind::HalfEdge, Purpose::default())?;
     let (decoder, speed) = decode(&edge)?;
     let index = decoder.index().ok_or("no index")?;
     let index_bytes = decoder.head_end().unwrap_or(0).saturating_sub(index.shared);

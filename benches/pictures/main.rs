@@ -4,10 +4,10 @@
 //! A picture is timed from the call to the moment at which the device has finished it; the camera turns between
 //! pictures. Nothing else is under way, so on a fast GPU the times have the way to it in them.
 
-#[path = "../format/sets.rs"]
-#[allow(dead_code, reason = "the other benchmark uses the rest")]
-mod sets;
+#[path = "../format/mt_file.rs"]
+mod mt_file;
 
+use mt_file::mt_file;
 use std::error::Error;
 use std::time::Instant;
 use tetralod::builder::Purpose;
@@ -169,7 +169,7 @@ fn main() -> Result<()> {
     let options = Options::parse(arguments.filter(|argument| argument != "--bench"))?;
     let bytes = match &options.file {
         Some(file) => std::fs::read(file)?,
-        None => sets::file(&generate::bucky(options.grid)?, MtKind::HalfEdge, Purpose::default())?,
+        None => mt_file(&generate::bucky(options.grid)?, MtKind::HalfEdge, Purpose::default())?,
     };
     let renderer = wait(Renderer::headless(options.size))?;
     let [width, height] = renderer.size();

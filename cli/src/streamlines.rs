@@ -133,9 +133,9 @@ impl Lines {
         for line in [&backward, &forward].into_iter().flatten() {
             *self.ends.entry(line.end.name()).or_default() += 1;
         }
-        // Both parts begin at the seed, which belongs into the line once: the forward part goes on behind it.
         let seed_twice = backward.is_some() && forward.is_some();
         self.points.extend(backward.into_iter().flat_map(|line| line.points.into_iter().rev()));
+        // Both parts begin at the seed, which belongs into the line once: the forward part goes on behind it.
         self.points.extend(forward.into_iter().flat_map(|line| line.points).skip(usize::from(seed_twice)));
         self.lines.push((first..self.points.len() as u32).collect());
     }

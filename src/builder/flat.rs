@@ -45,7 +45,7 @@ pub(super) struct Planes {
 impl Planes {
     /// Those of the boundary triangles around a vertex, if it must stay. Triangles are ordered as seen from outside.
     pub fn of(triangles: impl Iterator<Item = [[i32; 3]; 3]> + Clone, feature: Feature) -> Option<Self> {
-        let exact = Self::exact(&mut triangles.clone(), feature).map(|planes| Self { planes, rounded: None });
+        let exact = Self::exact(triangles.clone(), feature).map(|planes| Self { planes, rounded: None });
         exact.or_else(|| {
             let planes = Self::rounded(triangles.collect(), feature)?;
             Some(Self { planes, rounded: Some(feature) })
@@ -67,10 +67,7 @@ impl Planes {
         })
     }
 
-    fn exact(
-        triangles: &mut dyn Iterator<Item = [[i32; 3]; 3]>,
-        feature: Feature,
-    ) -> Option<Vec<[[i32; 3]; 3]>> {
+    fn exact(triangles: impl Iterator<Item = [[i32; 3]; 3]>, feature: Feature) -> Option<Vec<[[i32; 3]; 3]>> {
         let mut planes: Vec<[[i32; 3]; 3]> = Vec::new();
         for triangle in triangles {
             if planes.iter().any(|plane| triangle.iter().all(|&p| is_in(plane, p))) {
@@ -88,6 +85,7 @@ impl Planes {
     fn rounded(mut left: Vec<[[i32; 3]; 3]>, feature: Feature) -> Option<Vec<[[i32; 3]; 3]>> {
         let area = |triangle: &[[i32; 3]; 3]| normal(triangle).length_squared();
         let mut planes: Vec<[[i32; 3]; 3]> = Vec::new();
+        // There are few, and most are in the first plane: looking for the largest is shorter than a sort, in code, too.
         while let Some(plane) = left.iter().copied().reduce(|a, b| if area(&b) > area(&a) { b } else { a }) {
             if planes.len() == MOST_PLANES {
                 return None;

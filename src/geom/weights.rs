@@ -23,15 +23,8 @@ pub(crate) fn weights_at(corners: [[i32; 3]; 4], position: [i32; 3], place: DVec
 
 /// The barycentric coordinates of `p`; none if it is outside the tetrahedron.
 fn barycentric([a, b, c, d]: [[i32; 3]; 4], p: [i32; 3]) -> Option<[f64; 4]> {
-    let mut parts = [0; 4];
-    for (part, tet) in parts.iter_mut().zip([[p, b, c, d], [a, p, c, d], [a, b, p, d], [a, b, c, p]]) {
-        let [a, b, c, d] = tet;
-        *part = orient3d(a, b, c, d);
-        // Most points near a tetrahedron are outside: one face is enough for many of them.
-        if *part < 0 {
-            return None;
-        }
-    }
+    let parts = [orient3d(p, b, c, d), orient3d(a, p, c, d), orient3d(a, b, p, d), orient3d(a, b, c, p)];
     let whole: i128 = parts.iter().sum();
-    (whole > 0).then(|| parts.map(|part| part as f64 / whole as f64))
+    let inside = whole > 0 && parts.iter().all(|&part| part >= 0);
+    inside.then(|| parts.map(|part| part as f64 / whole as f64))
 }

@@ -7,8 +7,8 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 use tetralod::builder::{BuildConfig, BuildCriterion, Construction, Method, build};
 use tetralod::mesh::{Grid, MeshFindings, RepairLevel, TetMesh, findings, repair, repair_at};
-use tetralod::mt::MtKind;
-use tetralod::verify::{Reference, Sample, VerifyReport};
+use tetralod::mt::{ApplyUpdates, MtKind};
+use tetralod::verify::Reference;
 use tetralod::{io, verify};
 
 fn data() -> Option<PathBuf> {
@@ -24,14 +24,10 @@ fn load(name: &str) -> Option<TetMesh> {
     Some(repair(mesh).expect("a mesh that can be repaired").0)
 }
 
-/// Every third request of a verification, at all vertices.
-const THIRD: Sample = Sample { requests: 44, vertices: usize::MAX };
-
-/// Builds and verifies MTs of all kinds; the base mesh of the edge-based one must have at most so many vertices. That one answers all
-/// requests; the others, which the same engine refines, some, so that this does not take a third of the time of all tests.
+/// Builds and verifies MTs of all kinds; the base mesh of the edge-based one must have at most so many vertices.
 fn check(name: &str, mesh: &TetMesh, most: u32) {
     let built = built(mesh);
-    keeps_promises(&format!("{name}, edge"), &verify::run(&built.mt, mesh, Reference::Mesh, &mut |_, _| {}));
+    keeps_promises(&format!("{name}, edge"), &built.mt, mesh, Reference::Mesh);
     let base = built.summary.base_vertices;
     assert!(base <= most, "{name}: {base} vertices in the base mesh");
     for (kind, method, criterion) in [
@@ -47,13 +43,17 @@ fn check(name: &str, mesh: &TetMesh, most: u32) {
         let config = BuildConfig { construction, ..BuildConfig::of(kind) };
         let mt = build(mesh, &config, &mut |_| ControlFlow::Continue(())).expect("a mesh to build on").mt;
         let reference = if method.keeps_the_mesh() { Reference::Mesh } else { Reference::Points };
-        let report = verify::run_sample(&mt, mesh, reference, THIRD, &mut |_, _| {});
-        let words = [kind.name(), method.name(), criterion.name()].join(" ");
-        keeps_promises(&format!("{name}, {words}"), &report);
+        keeps_promises(
+            &format!("{name}, {} {} {}", kind.name(), method.name(), criterion.name()),
+            &mt,
+            mesh,
+            reference,
+        );
     }
 }
 
-fn keeps_promises(name: &str, report: &VerifyReport) {
+fn keeps_promises(name: &str, mt: &impl ApplyUpdates, mesh: &TetMesh, reference: Reference) {
+    let report = verify::run(mt, mesh, reference, &mut |_, _| {});
     assert!(report.valid && report.queries > 40, "{name}: {:#?}", report.failures);
     assert!(report.worst_error_ratio <= 1.0, "{name}: {}", report.worst_error_ratio);
 }
@@ -169,8 +169,7 @@ fn broken_meshes_end_in_a_valid_mt_or_a_reason_at_each_level() {
                         let config = BuildConfig::of(MtKind::HalfEdge);
                         let mt =
                             build(&mended, &config, &mut |_| ControlFlow::Continue(())).expect("an MT").mt;
-                        let report = verify::run(&mt, &mended, Reference::Mesh, &mut |_, _| {});
-                        keeps_promises(&format!("{name}, {}", level.name()), &report);
+                        keeps_promises(&format!("{name}, {}", level.name()), &mt, &mended, Reference::Mesh);
                     }
                     last = Some(mended);
                 }

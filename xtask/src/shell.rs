@@ -88,7 +88,7 @@ pub fn tested_command() -> Result<PathBuf> {
 /// The native command without what takes long to compile and no volume of the demo needs: pictures, HDF5, addresses. In a folder of
 /// its own, so that files which it has made are older than the command only where it has changed.
 pub fn demo_command() -> Result<PathBuf> {
-    // Who waits for the page does not change the command: what makes it quicker to compile again would only take time.
+    // What incremental compilation prepares for the next time takes longer the first time, and somebody waits for the page.
     let mut command = cargo(["build", "--package", "tetralod-cli", "--no-default-features"]);
     run(command.env("CARGO_INCREMENTAL", "0"))?;
     let (made, kept) = (built_in("debug"), built_in("demo"));

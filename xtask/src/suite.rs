@@ -93,16 +93,8 @@ fn fmt() -> Result<()> {
 fn clippy() -> Result<()> {
     let mut command = shell::cargo(["clippy", "--all-targets"]);
     shell::run(command.args(shell::ALL).args(["--", "-D", "warnings"]))?;
-    shell::run(&mut shell::cargo([
-        "clippy",
-        "--package",
-        "xtask",
-        "--all-features",
-        "--all-targets",
-        "--",
-        "-D",
-        "warnings",
-    ]))
+    let mut command = shell::cargo(["clippy", "--package", "xtask", "--all-features", "--all-targets"]);
+    shell::run(command.args(["--", "-D", "warnings"]))
 }
 
 /// The core alone, which must not need any feature; with MTs of all kinds; with the builders, as `paper` has it; the command as the demo

@@ -80,6 +80,7 @@ fn a_mesh_has_the_arrays_of_its_vtu() {
     assert_eq!(found["pressure"].shape, format!("({points},)"));
     assert_eq!(found["pressure"].doubles(), *column("pressure"));
     assert_eq!(found["velocity"].shape, format!("({points}, 3)"));
+    // Each row has x, y and z: the second of every three numbers is y.
     let y: Vec<f64> = found["velocity"].doubles().into_iter().skip(1).step_by(3).collect();
     assert_eq!(y, *column("velocity_y"));
 

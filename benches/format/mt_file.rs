@@ -1,0 +1,17 @@
+//! The MT files that are measured.
+
+use super::Result;
+use std::ops::ControlFlow;
+use tetralod::builder::{BuildConfig, Purpose, build};
+use tetralod::format::{EncodeOptions, encode};
+use tetralod::mesh::TetMesh;
+use tetralod::mt::MtKind;
+
+/// The MT file of a mesh.
+pub fn mt_file(mesh: &TetMesh, kind: MtKind, purpose: Purpose) -> Result<Vec<u8>> {
+    let mut config = BuildConfig::of(kind);
+    // Other methods know no purpose.
+    config.construction = config.construction.with_purpose(purpose).unwrap_or(config.construction);
+    let mt = build(mesh, &config, &mut |_| ControlFlow::Continue(()))?.mt;
+    Ok(encode(&mt, &EncodeOptions { block_bits: config.block_bits, ..EncodeOptions::default() })?)
+}
