@@ -168,6 +168,8 @@ export function arriveWith(words) {
   show(words);
   // What is changed first can be undone, too, however soon.
   if (now === undefined) save();
+  // The address names the volume even if all events of its camera came before it was open.
+  else changed();
 }
 
 /** Shows a state of the volume that is open. @param {Words} words */

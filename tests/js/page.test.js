@@ -214,6 +214,14 @@ test("the gallery opens scenes with the counts of the paper, and files are opene
   await page.keyboard.press("Enter");
   await page.waitForFunction(() => window.tetralodDemo.info?.kind === "explicit", undefined, { timeout: PATIENCE });
   await page.evaluate(async () => {
+    // On a slow machine, the events of the camera come long before the volume is open.
+    const { viewer } = window.tetralodDemo;
+    const open = viewer.open.bind(viewer);
+    viewer.open = async (...wanted) => {
+      const opened = await open(...wanted);
+      await new Promise((resolve) => setTimeout(resolve, 1000));
+      return opened;
+    };
     const bytes = await (await fetch("data/sphere-flow-vertex.mt")).arrayBuffer();
     const dataTransfer = new DataTransfer();
     dataTransfer.items.add(new File([bytes], "dropped.mt"));
