@@ -55,7 +55,7 @@ tetrahedra than VTK's, it is the base mesh, which is the coarsest one.
 Where tetralod has the higher RMS, it is mostly at few tetrahedra: it chooses by the largest error and has the input's values
 at the vertices that it keeps, so that linear interpolants lie on one side of a field that is bent, while VTK places vertices, and values, so that the
 sum of squares is small, and lets the largest error and the boundary go. Other values at the same vertices are what helps: with those of the
-least sum of cubes, which `extract --fit` writes, RMS is 11 to 34 % less from 20 % of the tetrahedra down (`piezo_micro`: 7 to 9 %). Those of the least sum of squares have a little
+least sum of cubes, which `extract --fit` writes, RMS is 9 to 34 % less from 20 % of the tetrahedra down (`piezo_micro`: 7 to 9 %, `cylinder_flow`: 5 to 27 %). Those of the least sum of squares have a little
 less still, but a larger maximum: of bucky at 5 and 2 % RMS 1.89 and 3.37 and maximum 11.7 and 21.8 instead of 1.92 and 3.44, 10.7 and 19.4.
 An MT that is built `--for mean` has, of bucky at 5 and 2 %, RMS 1.98 and 3.36 and maximum 10.9 and 18.7, fitted 1.74 and 3.04 and 10.9 and 18.8.
 
