@@ -65,7 +65,7 @@ impl<'a> Deviation<'a> {
         let mut fields = Vec::new();
         for field in &info.fields {
             let found = input.fields.iter().find(|f| field.is_of(f) && f.values.len() == points);
-            fields.push(&found.ok_or(format!("the input has no field '{}'", field.name))?.values);
+            fields.push(&found.ok_or_else(|| format!("the input has no field '{}'", field.name))?.values);
         }
         let positions: Vec<[i32; 3]> = input.positions.iter().map(|p| info.lattice.nearest(*p)).collect();
         let each = || (0..points).flat_map(|v| fields.iter().zip(&info.fields).map(move |(f, i)| (f[v], i)));

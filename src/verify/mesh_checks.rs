@@ -69,7 +69,7 @@ impl<'a> PlainMesh<'a> {
         let mut used = vec![false; count];
         for (t, tet) in self.tets.iter().enumerate() {
             for &v in tet {
-                *used.get_mut(v as usize).ok_or(format!("tetrahedron {t} has no vertex {v}"))? = true;
+                *used.get_mut(v as usize).ok_or_else(|| format!("tetrahedron {t} has no vertex {v}"))? = true;
             }
         }
         if let Some(v) = used.iter().position(|used| !used) {

@@ -18,7 +18,7 @@ pub fn triangulated(mt: &impl ApplyUpdates, input: &TetMesh) -> Result<TetMesh, 
     let mut levels: Vec<Vec<i32>> = vec![Vec::new(); places.len()];
     for field in &info.fields {
         let found = input.fields.iter().find(|f| field.is_of(f) && f.values.len() == places.len());
-        let values = &found.ok_or(format!("the input has no field '{}'", field.name))?.values;
+        let values = &found.ok_or_else(|| format!("the input has no field '{}'", field.name))?.values;
         levels.iter_mut().zip(values).for_each(|(levels, &value)| levels.push(field.nearest(value)));
     }
     let theirs = sorted(&places, |v| &levels[v as usize]);

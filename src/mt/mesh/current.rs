@@ -668,7 +668,7 @@ impl CurrentMesh {
             if n == NONE {
                 continue;
             }
-            let other = self.tet(n).ok_or(format!("tetrahedron {t} has a free slot as neighbour"))?;
+            let other = self.tet(n).ok_or_else(|| format!("tetrahedron {t} has a free slot as neighbour"))?;
             let shared = face.iter().all(|&j| other.contains(&tet[j]));
             let back = self.neighbors[n as usize].iter().filter(|&&m| m as usize == t).count();
             if !shared || back != 1 {
