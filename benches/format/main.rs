@@ -1,9 +1,7 @@
 //! What MT files cost: bytes beside other forms of the same meshes, what requests need of them by ranges, and a model larger
 //! than the memory for it. Prints Markdown; `cargo xtask bench --format` puts it together as docs/benchmarks.md.
 
-// The slow and plain isosurface of the tests says how near a surface is to the exact one. The file has more that only tests use; a copy
-// of what is used here would have to be kept the same.
-#[allow(dead_code, reason = "the tests of surfaces use the rest of this file")]
+// The slow and plain isosurface of the tests says how near a surface is to the exact one.
 #[path = "../../tests/support/surfaces.rs"]
 mod surfaces;
 

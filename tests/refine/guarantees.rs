@@ -321,7 +321,7 @@ fn check_components(
         there[component as usize] = true;
         let met = &mut met[component as usize];
         let mut samples = (0..=8).map(|i| p.lerp(q, f64::from(i) / 8.0));
-        *met = *met || samples.any(|p| field.values_around(p).is_some_and(spans));
+        *met = *met || samples.any(|p| field.find(p).is_some_and(|(tet, _)| spans(mesh.values_of(tet))));
     }
     assert_eq!(there, met, "{name}: components that no tetrahedron with such values meets");
     met.iter().filter(|met| **met).count()

@@ -197,12 +197,8 @@ impl<'a> Interpolant<'a> {
         Some(self.mesh.values_of(tet).iter().zip(weights).map(|(v, w)| v * w).sum())
     }
 
-    /// The values at the corners of the tetrahedron that a point lies in.
-    pub fn values_around(&self, p: DVec3) -> Option<[f64; 4]> {
-        self.find(p).map(|(tet, _)| self.mesh.values_of(tet))
-    }
-
-    fn find(&self, p: DVec3) -> Option<([u32; 4], [f64; 4])> {
+    /// The tetrahedron that a point lies in, and the point's barycentric coordinates there.
+    pub fn find(&self, p: DVec3) -> Option<([u32; 4], [f64; 4])> {
         let cells = self.grid.between(p, p);
         let near = cells.iter().flat_map(|&cell| &self.grid.lists[cell]);
         let weighted = near.map(|&t| {

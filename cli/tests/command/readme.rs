@@ -97,7 +97,7 @@ fn run(command: &str, folder: &Path) -> String {
 
 /// Writes the files that `page` shows, in blocks such as "```json camera.json".
 pub fn write_files(page: &str, folder: &Path) {
-    // Every second piece is a block.
+    // The first piece is the text before the first block; from then on, blocks and texts take turns.
     for block in page.split("\n```").skip(1).step_by(2) {
         let (head, shown) = block.split_once('\n').expect("a block has lines");
         let Some((_language, name)) = head.split_once(' ') else { continue };
@@ -256,7 +256,7 @@ fn the_files_that_are_named_to_developers_exist() {
     let files = files();
     for page in ["ARCHITECTURE.md", "CONTRIBUTING.md"] {
         let shown = content(page);
-        // Every second piece stands between two backticks.
+        // The first piece is the text before the first backtick; from then on, pieces between two backticks and texts take turns.
         let named = shown.split('`').skip(1).step_by(2).filter(|name| {
             let ending = name.rsplit_once('.').map(|(_, ending)| ending);
             ending.is_some_and(|ending| ["rs", "js", "ts", "wgsl", "md"].contains(&ending))
