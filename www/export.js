@@ -5,7 +5,10 @@ import { count } from "./format.js";
 import { fail } from "./messages.js";
 import { demo, page } from "./page.js";
 import { compose } from "./compose.js";
-import { isovalue, plane } from "./scene.js";
+import { showIdle } from "./idle.js";
+import { volumeName } from "./opening.js";
+import { placeOfPlane, plane, span } from "./planes.js";
+import { isovalue } from "./scene.js";
 import { note } from "./share.js";
 import { onTab } from "./tabs.js";
 import { csv, glb, ply, stl, vtk, vtu } from "./writers.js";
@@ -63,11 +66,24 @@ const MAKERS = {
   csv: async () => [await probes(), "text/csv"],
 };
 
+/** What surfaces that are saved are called. @type {Record<string, () => string>} */
+const SURFACES = {
+  isosurface: () => `isosurface-${isovalue()}`,
+  slice: () => `section-${"xyz"[span().axis]}-${Number(placeOfPlane().toPrecision(6))}`,
+  boundary: () => "boundary",
+};
+const surfaceName = () => SURFACES[$("surface-kind").value]();
+/** What comes behind the name of the volume in that of a file. @type {Record<string, () => string>} */
+const NAMES = { stl: surfaceName, ply: surfaceName, glb: surfaceName, csv: () => "probes" };
+
+/** The name of a file that is made of the volume. */
+const fileName = (words, ending) => `${[volumeName(), ...(words ? [words] : [])].join("-").replaceAll(/[\\/:*?"<>|]/g, "_")}.${ending}`;
+
 async function exportAs(kind) {
   if (!demo.info) return;
   const [parts, type] = await MAKERS[kind]();
   if (!parts) return note("There is no probe: click on the picture first");
-  saveAs(`tetralod.${kind}`, parts, type);
+  saveAs(fileName(NAMES[kind]?.(), kind), parts, type);
 }
 
 async function savePicture(canvas) {
@@ -75,7 +91,7 @@ async function savePicture(canvas) {
   const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((length) => Math.round(length * factor));
   const picture = await page.viewer.screenshot({ width, height });
   const all = $("shot-overlay").checked ? await compose(picture, { width, height, canvas }) : picture;
-  saveAs(`tetralod-${width}x${height}.png`, [all], "image/png");
+  saveAs(fileName(`${width}x${height}`, "png"), [all], "image/png");
 }
 
 /** Runs what a button is for, which may take a while. */
@@ -84,6 +100,7 @@ function onPress(button, act) {
     button.disabled = true;
     await act().catch(fail);
     button.disabled = false;
+    showIdle();
   });
 }
 

@@ -2,14 +2,40 @@
 
 import { takeMesh } from "./build.js";
 import { $ } from "./dom.js";
-import { open } from "./opening.js";
+import { say } from "./messages.js";
+import { open, openBuilt } from "./opening.js";
+
+/** How an MT file begins. */
+const START = [0x89, 0x54, 0x4c, 0x4f, 0x44, 0x0d, 0x0a, 0x1a];
+
+/** Names of files that the command reads, and the page does not. */
+const FOR_COMMAND = /\.(pv(?:d|t[uirs])|vtkhdf|hdf|hdf5|h5|exo|ex2|e|msh|meshb?|solb?|node|ele|vol|nrrd|nhdr|mha|mhd)$/i;
+
+const READ_HERE = "This page opens .mt files, and builds them of .vtu, .vti, .vts, .vtr, .vtk, and .raw with its .json";
+const READ_BY_COMMAND = "VTKHDF, Exodus II, lists of files (.pvtu, .pvd), Gmsh, Medit, TetGen, Netgen, NRRD and MetaImage";
 
 /** Takes files that the user has chosen or dropped: an MT file to open, or a mesh to build one of. @param {File[]} files */
-export function takeFiles(files) {
+export async function takeFiles(files) {
   if (files.length === 0) return;
   $("gallery").close();
-  if (!takeMesh(files, open)) open(files[0]);
+  if (takeMesh(files, (built) => openBuilt(built, files))) return;
+  const [file] = files;
+  // An empty file, and one that cannot be read, are for whoever opens them.
+  const start = new Uint8Array(await file.slice(0, START.length).arrayBuffer().catch(() => new ArrayBuffer(0)));
+  const isOther = start.some((byte, i) => byte !== START[i]);
+  if (isOther && !/\.mt$/i.test(file.name)) return say("This page does not read the file", { message: wordsFor(file.name) });
+  open(file);
 }
+
+/** What to do with a file that the page does not read. @param {string} name */
+function wordsFor(name) {
+  const [stem] = name.split(/\.[^.]*$/);
+  const known = `${READ_HERE}. The command reads this one: tetralod build ${quoted(name)} -o ${quoted(`${stem}.mt`)}`;
+  return `${name}: ${FOR_COMMAND.test(name) ? known : `${READ_HERE}. The command "tetralod build" also reads ${READ_BY_COMMAND}`}`;
+}
+
+/** As a shell takes it. */
+const quoted = (name) => (/^[\w.+-]+$/.test(name) ? name : `'${name.replaceAll("'", "'\\''")}'`);
 
 export function attachFiles() {
   $("choose").addEventListener("click", () => $("file").click());

@@ -1,11 +1,13 @@
 /** The numbers of the page: what has arrived, how good the mesh is, and what a picture takes. */
 
 import { $, all, announce } from "./dom.js";
+import { noteEmpty, showEmpty } from "./empty.js";
 import { count, milliseconds, percentage, pixels, size, vtuBytes } from "./format.js";
 import { fail } from "./messages.js";
 import { demo, page } from "./page.js";
+import { originOf } from "./opening.js";
 import { budget, errorPixels } from "./request.js";
-import { noteEmpty, showEmpty, showHistogram } from "./scene.js";
+import { showHistogram } from "./scene.js";
 
 /** @param {import("tetralod/viewer").ViewerProgress} progress */
 export function showProgress({ bytes, total, complete, blocks }) {
@@ -29,7 +31,9 @@ export function showGrowth() {
   const whole = totalBytes ? `, ${size(totalBytes)} as MT` : "";
   const arrived = document.createElement("b");
   arrived.textContent = size(receivedBytes);
-  const words = `${count(tetrahedra)} tetrahedra: ${size(vtuBytes({ vertices, tetrahedra, fields: info.fields.length }))} as VTU${whole}, `;
+  const origin = originOf();
+  const before = origin ? `${size(origin.bytes)} as ${origin.format}` : `${size(vtuBytes({ vertices, tetrahedra, fields: info.fields.length }))} as VTU`;
+  const words = `${count(tetrahedra)} tetrahedra: ${before}${whole}, `;
   $("growth").replaceChildren(words, arrived, ["opening", "streaming"].includes(demo.state) ? " so far" : " fetched");
 }
 

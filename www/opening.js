@@ -27,6 +27,23 @@ let first = "";
 const files = new Map();
 const FILE = "file:";
 
+/** What MT files were built of by the page: in words, and its bytes. @type {WeakMap<File, { format: string, bytes: number }>} */
+const origins = new WeakMap();
+
+/** Opens an MT file that the page has built of files of the user. @param {File} built @param {File[]} files */
+export function openBuilt(built, files) {
+  const [data] = files.filter(({ name }) => !/\.json$/i.test(name));
+  const format = (data ?? files[0]).name.split(".").pop().toUpperCase();
+  origins.set(built, { format, bytes: files.reduce((sum, { size }) => sum + size, 0) });
+  return open(built);
+}
+
+/** What the volume was built of, if the page has built it. */
+export const originOf = () => (source instanceof File ? origins.get(source) : undefined);
+
+/** The name of the volume, for files that are made of it. */
+export const volumeName = () => (source ? nameOf(source).replace(/\.mt$/i, "") : "tetralod");
+
 /** Says what is open where no address says anything else. @param {string} url */
 export function setFirst(url) {
   first = url;

@@ -6,6 +6,7 @@
  */
 
 import { rounded } from "./format.js";
+import { showIdle } from "./idle.js";
 import { element } from "./overlay.js";
 import { linePlot } from "./plot.js";
 
@@ -198,6 +199,7 @@ export class Probes {
   #setPins(pins) {
     this.#coming = undefined;
     this.#pins = pins;
+    showIdle();
     const cards = pins.map((pin, i) => {
       const card = document.createElement("div");
       card.className = "card";

@@ -1,10 +1,11 @@
 /** The region of the request: a box with handles, the sphere in it, or the side of the clip plane that is shown. */
 
 import { $, all } from "./dom.js";
+import { showEmpty } from "./empty.js";
 import { fail } from "./messages.js";
 import { page } from "./page.js";
 import { refine } from "./request.js";
-import { plane } from "./scene.js";
+import { plane } from "./planes.js";
 
 /** Numbers of the box have so many digits: as many as links keep. */
 const DIGITS = 6;
@@ -31,18 +32,27 @@ export function sphereIn(box) {
   return { center, radius };
 }
 
+/** Whether the region is a box, or the sphere in it. */
+const hasBox = () => ["box", "sphere"].includes($("region").value);
+
+/** The box outside of which everything is cut away; nothing without one. */
+export const cutBox = () => (hasBox() && $("inside").checked ? page.box : undefined);
+
 /** Shows the region that is chosen. */
 export function applyRegion() {
-  const on = ["box", "sphere"].includes($("region").value);
+  const on = hasBox();
   $("box").hidden = !on;
   $("inside-row").hidden = !on;
   showNumbers();
   showSphere();
-  page.viewer.set({ region: on ? page.box : null, clipBox: on ? clipBox() : null }).catch(fail);
+  setBoxes({ region: on ? page.box : null });
 }
 
-/** Outside of which everything is cut away. @returns {any} */
-const clipBox = () => ($("inside").checked ? page.box : null);
+/** Draws with the box that cuts, and more of the scene. @param {any} [more] */
+function setBoxes(more = {}) {
+  page.viewer.set({ ...more, clipBox: /** @type {any} */ (cutBox() ?? null) }).catch(fail);
+  showEmpty();
+}
 
 /** Refines in this box. */
 export function useBox(wanted) {
@@ -57,7 +67,7 @@ export function boxWasDragged(moved) {
   page.box = rounded(moved);
   showNumbers();
   showSphere();
-  page.viewer.set({ clipBox: clipBox() }).catch(fail);
+  setBoxes();
   refine();
 }
 

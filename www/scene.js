@@ -2,10 +2,13 @@
 
 import { $, text } from "./dom.js";
 import { rounded } from "./format.js";
+import { expectFrame } from "./empty.js";
 import { showHistogramLine, showVolumes } from "./histogram.js";
+import { showIdle } from "./idle.js";
 import { fail } from "./messages.js";
 import { demo, page } from "./page.js";
 import { attachParts, beside, hasEdges, mode, opacityOf, showParts, shows } from "./parts.js";
+import { isSection, placeOfPlane, plane, seedPlane, showPlace, span, takePlace } from "./planes.js";
 import { refine } from "./request.js";
 import { background } from "./theme.js";
 
@@ -51,8 +54,9 @@ export function applyIsovalue() {
 export function applyMode() {
   showParts();
   // Slices and seeds have no side.
-  $("flip").parentElement.hidden = isPlane();
-  $("cut-label").textContent = isPlane() ? "Plane" : "Clip plane";
+  $("flip").parentElement.hidden = isSection();
+  $("cut-label").textContent = isSection() ? "Plane" : "Clip plane";
+  showPlace();
   showHistogram().catch(fail);
   // Draws, too.
   applyCut();
@@ -81,8 +85,7 @@ const PARTS = {
     return { isosurfaces: [{ value: isovalue(), opacity: opacityOf("iso"), edges: hasEdges("iso"), ...isBy }] };
   },
   volume: () => ({ volume: { opacities: page.transfer.opacities(page.field, opacityOf("volume")) } }),
-  // What is cut open at the same plane would cover it.
-  slice: () => ({ slices: [{ ...plane(), opacity: opacityOf("slice"), edges: hasEdges("slice"), clipped: false }] }),
+  slice: () => ({ slices: [{ ...plane(), opacity: opacityOf("slice"), edges: hasEdges("slice") }] }),
   solid() {
     if (mode() !== "solid") return { boundary: SHELL };
     return { boundary: { opacity: opacityOf("solid"), edges: hasEdges("solid") }, clips: [plane()] };
@@ -129,6 +132,8 @@ export function draw() {
   const box = { outline: $("outline").checked, shade: $("shade").value / 100 };
   const looks = { colours: { ...colours.state, ...range, ...diverging }, background: background(), compare, ...box };
   viewer.set(/** @type {any} */ (Object.assign(nothing, ...parts, looks))).catch(fail);
+  showIdle();
+  expectFrame();
 }
 
 /** The range of a field that is not the one that is shown; symmetric about 0 where it has values on both sides. */
@@ -149,14 +154,9 @@ export function showLegend(legend) {
   if (label === field?.name) transfer.colours = colours.gradient(legend);
   $("legend-bar").dataset.colours = legend.colours.join(" ");
   $("legend-bar").style.background = `linear-gradient(90deg, ${legend.colours.join(", ")})`;
-  $("legend-ticks").replaceChildren(
-    ...ticks.map(({ label: value, fraction }) => {
-      const tick = document.createElement("span");
-      tick.textContent = value;
-      tick.style.left = `${100 * fraction}%`;
-      return tick;
-    }),
-  );
+  // The ends of the range are shown in any case, what is between them where there is room.
+  const isEnd = ({ fraction }) => fraction === 0 || fraction === 1;
+  $("legend-ticks").replaceChildren(...[...ticks.filter(isEnd), ...ticks.filter((tick) => !isEnd(tick))].map(tickElement));
   leaveOutOverlaps($("legend-ticks"));
   overlay.refresh();
 }
@@ -168,81 +168,44 @@ export function unitOf(label) {
   return shows("flow") ? page.flow.unit : "";
 }
 
-/** Hides the ticks whose words would touch those of the one before. */
+function tickElement({ label, fraction }) {
+  const tick = document.createElement("span");
+  tick.textContent = label.replaceAll("-", "−");
+  tick.style.left = `${100 * fraction}%`;
+  if (fraction === 0 || fraction === 1) tick.className = fraction === 0 ? "first" : "last";
+  return tick;
+}
+
+/** Hides the ticks whose words would touch those of one before. */
 function leaveOutOverlaps(ticks) {
-  let end = Number.NEGATIVE_INFINITY;
+  const taken = [];
   for (const tick of ticks.children) {
     const { left, right } = tick.getBoundingClientRect();
-    tick.hidden = left < end + 4;
-    if (!tick.hidden) end = right;
+    tick.hidden = taken.some((other) => left < other.right + 4 && right > other.left - 4);
+    if (!tick.hidden) taken.push({ left, right });
   }
-}
-
-/** Whether the plane is one to look at, and cuts nothing away. */
-const isPlane = () => mode() === "slice" || mode() === "flow";
-
-/** The coordinate of the plane along its axis. */
-function placeOfPlane() {
-  const axis = Number($("axis").value);
-  const [low, high] = [demo.info.bounds[axis], demo.info.bounds[axis + 3]];
-  return low + ((high - low) * $("cut").value) / 1000;
-}
-
-/** The plane of the seeds. */
-export const seedPlane = () => ({ axis: Number($("axis").value), at: placeOfPlane() });
-
-/** The clip plane. @returns {{ normal: [number, number, number], offset: number }} */
-export function plane() {
-  const axis = Number($("axis").value);
-  const sign = $("flip").checked ? -1 : 1;
-  const along = (other) => (other === axis ? sign : 0);
-  return { normal: [along(0), along(1), along(2)], offset: sign * placeOfPlane() };
 }
 
 /** Shows where the plane is. */
 export function applyCut() {
   if (!demo.info) return;
-  const axis = Number($("axis").value);
-  const [low, high] = [demo.info.bounds[axis], demo.info.bounds[axis + 3]];
-  const { normal, offset } = plane();
-  const at = normal[axis] * offset;
+  const { axis, low, high } = span();
+  const at = placeOfPlane();
   const where = Math.abs(at) < (high - low) * 1e-4 ? 0 : Number(at.toPrecision(3));
   const side = $("flip").checked ? "<" : ">";
-  const shown = isPlane() ? `${"xyz"[axis]} = ${where}` : `Hide ${"xyz"[axis]} ${side} ${where}`;
+  const shown = isSection() ? `${"xyz"[axis]} = ${where}` : `Hide ${"xyz"[axis]} ${side} ${where}`;
   text("cut-text", shown, "cut");
   draw();
   if ($("region").value === "cut") refine();
 }
 
-/** Whether the last frame showed a surface without a triangle. */
-let frameIsEmpty = false;
-
-/** Notes whether a frame shows an empty surface. @param {import("tetralod/viewer").ViewerFrame} frame */
-export function noteEmpty({ ready, triangles }) {
-  frameIsEmpty = mode() === "iso" && ready && triangles === 0;
-  showEmpty();
-}
-
-/** Says so where the surface is empty and no step may yet fill it: the last step may come before or after the last frame. */
-export function showEmpty() {
-  const isEmpty = frameIsEmpty && mode() === "iso" && page.field !== undefined && demo.step?.done === true;
-  if (isEmpty !== $("empty").hidden) return;
-  $("empty").hidden = !isEmpty;
-  if (!isEmpty) return;
-  const { name, min, max } = page.field;
-  const [value, low, high] = [isovalue(), min, max].map((x) => rounded(x, max - min));
-  const isOutside = isovalue() < min || isovalue() > max;
-  const words = isOutside ? `${value} is outside of the range of ${name}, ${low} to ${high}` : `${name} does not pass ${value} in this mesh`;
-  $("empty-text").textContent = `There is no surface: ${words}.`;
-}
-
 export function attachScene() {
   attachParts({ onView: applyMode, onChange: draw });
   $("isovalue").addEventListener("input", () => page.field && setIsovalue($("isovalue").value / 1000));
-  $("empty-middle").addEventListener("click", () => {
-    setIsovalue(0.5);
-    $("isovalue").focus();
+  $("cut").addEventListener("input", () => {
+    takePlace();
+    applyCut();
   });
-  for (const id of ["cut", "axis", "flip"]) $(id).addEventListener("input", applyCut);
+  for (const id of ["axis", "flip"]) $(id).addEventListener("input", applyCut);
   for (const id of ["colour-by", "surface-colour", "outline", "shade"]) $(id).addEventListener("input", draw);
 }

@@ -10,6 +10,7 @@ import { fail } from "./messages.js";
 import { open, sourceWords } from "./opening.js";
 import { demo, page } from "./page.js";
 import { words as ofParts } from "./parts.js";
+import { words as ofPlanes } from "./planes.js";
 import { applyRegion, inner } from "./region.js";
 import { applyFrameTime, applyRefineBy, errorPositions } from "./request.js";
 import { applyMode } from "./scene.js";
@@ -69,7 +70,7 @@ function errorPosition(kind) {
 /** @returns {Record<string, Entry>} */
 function makeEntries() {
   const ids = ["shape", "shrink", "outline", "shade", "inside", "colour-by", "flow-colour", "rake", "arrows", "flow-boundary", "map", "reversed", "log"];
-  const more = ["time", "cut", "axis", "flip", "pixels", "budget", "region", "focus", "background", "axes", "fly", "frame-time"];
+  const more = ["time", "axis", "flip", "pixels", "budget", "region", "focus", "background", "axes", "fly", "frame-time"];
   const simple = Object.fromEntries([...ids, ...more].map((id) => [id, control(id)]));
   return {
     view: radios("mode"),
@@ -83,6 +84,7 @@ function makeEntries() {
       get: () => String(page.isovalue ?? ""),
       set: (words) => (page.isovalue = words && isNumbers(words, 1) ? Number(words) : undefined),
     },
+    ...ofPlanes,
     ...simple,
     refine: radios("refine-by"),
     error: errorPosition("field"),

@@ -84,6 +84,17 @@ export class TransferEditor {
     return this.#points.map(([at, opacity]) => [min + at * (max - min), opacity * factor]);
   }
 
+  /** Whether no value has an opacity. */
+  get isTransparent() {
+    return this.#points.every(([, opacity]) => opacity === 0);
+  }
+
+  /** Takes the function that there is first. */
+  begin() {
+    this.#parts.preset.value = FIRST;
+    this.#set(PRESETS[FIRST](0.5), 0);
+  }
+
   /** The name of a preset, or the points as numbers; nothing for what there is first. */
   get words() {
     const { value } = this.#parts.preset;

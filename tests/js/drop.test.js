@@ -71,7 +71,39 @@ test("a dropped VTU is built and shown, a broken file leaves all as it is", asyn
   await screenshot(page, "page-built");
   await dialog.getByRole("button", { name: "Close" }).click();
   assertDrawn(await picture(page, "drop-built"));
+  const { length } = gridFile(10);
+  const size = length < 999_500 ? `${Math.round(length / 1e3)} kB` : `${(length / 1e6).toPrecision(3)} MB`;
+  assert.match(await page.innerText("#growth"), new RegExp(`^6,000 tetrahedra: ${size} as VTU, `), "the size is that of the file");
   assert.equal(await page.locator("#volume option:checked").innerText(), "grid.mt");
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("files for the command are told so, and others what is read", async () => {
+  const page = await open("data/bucky-explicit.mt", undefined, { viewport: { width: 900, height: 620 } });
+  await reach(page, "complete");
+  const told = async (name, text) => {
+    await drop(page, name, text);
+    await page.locator("#message").waitFor({ timeout: PATIENCE });
+    const words = await page.innerText("#message");
+    await page.click("#dismiss");
+    return words;
+  };
+  for (const ending of ["msh", "mesh", "exo", "nrrd", "mha", "mhd", "vtkhdf", "pvtu", "pvd", "vol", "node"]) {
+    const words = await told(`my mesh.${ending}`, "$MeshFormat");
+    assert.match(words, /does not read the file/);
+    assert.ok(words.includes(`tetralod build 'my mesh.${ending}' -o 'my mesh.mt'`), words);
+  }
+  assert.match(await told("part.stl", "solid part"), /part\.stl: This page opens \.mt files, and builds them of \.vtu.*also reads .*Gmsh/s);
+  assert.equal(await page.evaluate(() => window.tetralodDemo.state), "complete", "the volume stays");
+  // The content says what is an MT file.
+  await page.evaluate(async () => {
+    const bytes = await (await fetch("data/bucky-explicit.mt")).arrayBuffer();
+    const dataTransfer = new DataTransfer();
+    dataTransfer.items.add(new File([bytes], "volume.bin"));
+    window.dispatchEvent(new DragEvent("drop", { dataTransfer, cancelable: true }));
+  });
+  await page.waitForFunction(() => location.hash.includes("volume.bin"), undefined, { timeout: PATIENCE });
   assert.deepEqual(page.complaints, []);
   await page.close();
 });

@@ -83,7 +83,7 @@ test("all is reached with keys, and the list of keys has them", async () => {
     return [after("stats", { ...step, done: false }), after("frame", frame), after("stats", { ...step, done: true })];
   });
   assert.deepEqual(shown, [false, false, true]);
-  await page.click("#empty-middle");
+  await page.click("#empty-act");
   await page.locator("#empty").waitFor({ state: "hidden", timeout: PATIENCE });
 
   // The region that is a sphere is drawn as one.
@@ -162,7 +162,7 @@ test("nor has it with several views, probes, a region, messages, the map of bloc
     await page.evaluate(() => (location.hash = "#isovalue=99"));
     await page.locator("#empty").waitFor({ timeout: PATIENCE });
     await look("an empty surface");
-    await page.click("#empty-middle");
+    await page.click("#empty-act");
     await drop(page, "broken.mt", "hello");
     await page.locator("#message").waitFor({ timeout: PATIENCE });
     await look("a message");
@@ -307,7 +307,7 @@ test("pictures, meshes, surfaces, probes and numbers are saved", async () => {
     return { name: download.suggestedFilename(), bytes: await readFile(await download.path()) };
   };
   const vtu = await save("[data-export=vtu]");
-  assert.equal(vtu.name, "tetralod.vtu");
+  assert.equal(vtu.name, "bucky-explicit.vtu");
   assert.ok(vtu.bytes.includes(`NumberOfPoints="${stats.vertices}" NumberOfCells="${stats.tetrahedra}"`));
   assert.ok((await save("[data-export=vtk]")).bytes.includes(`CELL_TYPES ${stats.tetrahedra}\n`));
   const triangles = await page.evaluate(async () => {
@@ -318,7 +318,8 @@ test("pictures, meshes, surfaces, probes and numbers are saved", async () => {
   assert.equal((await save("[data-export=stl]")).bytes.readUInt32LE(80), triangles);
   assert.ok((await save("[data-export=ply]")).bytes.includes(`element face ${triangles}\n`));
   await page.selectOption("#surface-kind", "boundary");
-  assert.equal((await save("[data-export=glb]")).bytes.toString("latin1", 0, 4), "glTF");
+  const glb = await save("[data-export=glb]");
+  assert.deepEqual([glb.name, glb.bytes.toString("latin1", 0, 4)], ["bucky-explicit-boundary.glb", "glTF"]);
   const rows = (await save("[data-export=csv]")).bytes.toString().trim().split("\n");
   assert.equal(rows[0], "what,x,y,z,distance,density");
   assert.match(rows[1], /^probe A,/);
@@ -328,7 +329,7 @@ test("pictures, meshes, surfaces, probes and numbers are saved", async () => {
   for (const isOverlaid of [true, false]) {
     await page.setChecked("#shot-overlay", isOverlaid);
     const { name, bytes } = await save("#shot");
-    assert.match(name, /^tetralod-\d+x\d+\.png$/);
+    assert.match(name, /^bucky-explicit-\d+x\d+\.png$/);
     sizes.push(await page.evaluate(async (base64) => {
       const image = await createImageBitmap(await (await fetch(`data:image/png;base64,${base64}`)).blob());
       const context = new OffscreenCanvas(image.width, image.height).getContext("2d");
@@ -347,6 +348,57 @@ test("pictures, meshes, surfaces, probes and numbers are saved", async () => {
   assert.equal(copied.stats.tetrahedra, stats.tetrahedra);
   assert.ok(copied.meshes.length > 0 && copied.frames.length > 0 && copied.received > 0);
   await screenshot(page, "page-data");
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+});
+
+test("an empty picture says why, and what does nothing is disabled", async () => {
+  const page = await open(SMALL, undefined, VIEWPORT);
+  await reach(page, "complete");
+  const says = async (pattern) => {
+    await page.locator("#empty").waitFor({ timeout: PATIENCE });
+    assert.match(await page.innerText("#empty"), pattern);
+    await page.click("#empty-act");
+    await page.locator("#empty").waitFor({ state: "hidden", timeout: PATIENCE });
+  };
+  const isDisabled = (id) => page.locator(`#${id}`).isDisabled();
+  await show(page, "Solid");
+  await page.fill("#cut", "1000");
+  await says(/Everything is cut away: the model lies between y = .* and /);
+  // The section has a place of its own: what hid nothing of the solid does not hide it.
+  await page.fill("#cut", "0");
+  await show(page, "Slice");
+  await settle(page);
+  assert.ok(await page.locator("#empty").isHidden());
+  assert.ok((await demo(page, "frame")).triangles > 0);
+  await show(page, "Solid");
+  assert.equal(await page.inputValue("#cut"), "0");
+  await show(page, "Slice");
+  // The box of the region cuts sections, too.
+  await page.selectOption("#region", "box");
+  await settle(page);
+  const whole = await still(page, "section-whole");
+  await page.check("#inside");
+  await settle(page);
+  assert.ok(differing(whole, await still(page, "section-inside")) > 0.02, "what is outside of the box is cut away");
+  await page.fill("#cut", "900");
+  await says(/There is no section: the plane y = .* is outside of the box/);
+  assert.ok(!(await page.isChecked("#inside")));
+  await page.check("#inside");
+  await page.evaluate(() => (location.hash = "#view=volume&region=box&inside=1&box=7,7,7,8,8,8"));
+  await says(/Everything is cut away: nothing of the model is in the box/);
+  await page.evaluate(() => (location.hash = "#view=volume&transfer=0,0,1,0"));
+  await says(/The volume is transparent/);
+
+  assert.ok(await isDisabled("shade"), "shade falls on surfaces");
+  assert.match(await page.locator("#shade").getAttribute("aria-description"), /opaque/);
+  await show(page, "Mesh");
+  assert.ok(!(await isDisabled("shade")) && !(await isDisabled("shrink")));
+  await page.selectOption("#shape", "wire");
+  assert.ok((await isDisabled("shrink")) && (await isDisabled("edges")), "wires are not shrunk");
+  await press(page, "n");
+  await press(page, "x");
+  assert.ok(await page.locator("[data-export=csv]").isDisabled(), "there is no probe");
   assert.deepEqual(page.complaints, []);
   await page.close();
 });

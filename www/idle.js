@@ -1,0 +1,52 @@
+/** Controls that do nothing now: they are disabled, and say why. */
+
+import { $, all } from "./dom.js";
+import { demo, page } from "./page.js";
+import { beside, mode, opacityOf } from "./parts.js";
+
+/** Whether a part of the picture has an opaque surface, on which shade can fall. */
+function isOpaque(name) {
+  // Around other parts, the boundary is transparent.
+  if (name === "solid" && mode() !== "solid") return false;
+  return name !== "volume" && (["iso", "slice", "solid"].includes(name) ? opacityOf(name) === 1 : true);
+}
+
+/** Why each control does nothing now; nothing where it does something. @returns {Record<string, string | false | undefined>} */
+function reasons() {
+  const isWhole = demo.info !== undefined && !demo.blocks && "This file comes as a whole, not in blocks";
+  const isDifference = page.comparison.state?.difference && "Differences have colours and a range of their own";
+  const isSolid = mode() !== "mesh" || $("shape").value === "solid";
+  const none = "There is no probe: click on the picture first";
+  return {
+    shrink: !isSolid && "Only solids are shrunk",
+    edges: !isSolid && "Wires and points have no edges besides",
+    shade: ![mode(), ...beside()].some(isOpaque) && "Nothing in the picture is opaque: shade falls on surfaces",
+    map: isDifference,
+    log: isDifference || (page.field?.max <= 0 && "Logarithms need positive values, and the field has none"),
+    "range-preset": isDifference,
+    "range-low": isDifference,
+    "range-high": isDifference,
+    "also-flow": $("flow").disabled && "This dataset has no vectors",
+    "map-blocks": isWhole,
+    "map-missing": isWhole,
+    csv: page.probes.pins.length === 0 && none,
+  };
+}
+
+/** Disables a control for a reason, or enables it. @param {any} control @param {string | false | undefined} reason */
+function setIdle(control, reason) {
+  control.disabled = Boolean(reason);
+  const label = control.closest("label") ?? control;
+  label.title = reason || "";
+  if (reason) control.setAttribute("aria-description", reason);
+  else control.removeAttribute("aria-description");
+}
+
+/** Disables what does nothing now, and enables all else. */
+export function showIdle() {
+  if (!demo.info) return;
+  const { csv, ...others } = reasons();
+  for (const [id, reason] of Object.entries(others)) setIdle($(id), reason);
+  setIdle(all("[data-export=csv]")[0], csv);
+  for (const option of all("#colour-by [value=block], #colour-by [value=missing]")) setIdle(option, others["map-blocks"]);
+}
