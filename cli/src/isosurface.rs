@@ -5,7 +5,7 @@ use super::query::Query;
 use anyhow::Result;
 use serde::Serialize;
 use std::time::Instant;
-use tetralod::io::PolyData;
+use tetralod::io::{PointValues, PolyData};
 use tetralod::view::is_closed;
 
 /// Writes isosurfaces: where the field has the values given with --iso.
@@ -40,18 +40,20 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let mut answer = arguments.query.answer()?;
     let start = Instant::now();
     let surface = answer.opened.session.isosurfaces(isovalues)?;
+    let (positions, normals) = (surface.positions.clone(), surface.normals.clone());
+    let (values, triangles) = (surface.values.clone(), surface.indices.clone());
     let seconds = start.elapsed().as_secs_f64();
+    let step = answer.opened.info()?.fields[answer.field].step;
     let data = PolyData {
-        positions: surface.positions.clone(),
-        normals: surface.normals.clone(),
-        fields: vec![(answer.summary.field.clone(), surface.values.clone())],
-        triangles: surface.indices.clone(),
-        ..PolyData::default()
+        normals,
+        fields: vec![PointValues { name: answer.summary.field.clone(), values, step }],
+        triangles,
+        ..answer.poly_data(positions)?
     };
-    arguments.output.write(&data)?;
+    let origin = arguments.output.write(&data)?;
     let report = Report {
         isovalues: isovalues.to_vec(),
-        surface: Amount::of(&data),
+        surface: Amount::of(&data, origin),
         closed: is_closed(&data.triangles),
     };
     let mut rows = report.surface.rows(&arguments.output);

@@ -30,7 +30,7 @@ pub fn write_mesh(mesh: &TetMesh, path: &Path) -> Result<()> {
 pub fn write_surface(data: &PolyData, path: &Path) -> Result<()> {
     files::write_seekable(path, |out| {
         let mut archive = Archive::new(out);
-        archive.add("positions", Some(3), data.positions.as_flattened().iter().copied())?;
+        archive.add_numbers("positions", Some(3), data.positions.as_flattened(), data.is_single())?;
         if !data.normals.is_empty() {
             archive.add("normals", Some(3), data.normals.as_flattened().iter().copied())?;
         }
@@ -46,8 +46,8 @@ pub fn write_surface(data: &PolyData, path: &Path) -> Result<()> {
             archive.add("lines", None, points.into_iter())?;
             archive.add("line_ends", None, ends.collect::<Vec<u32>>().into_iter())?;
         }
-        for (name, values) in &data.fields {
-            archive.add(name, None, values.iter().copied())?;
+        for field in &data.fields {
+            archive.add_numbers(&field.name, None, &field.values, field.is_single())?;
         }
         archive.finish()
     })
@@ -88,6 +88,21 @@ struct Archive<W: Write + Seek> {
 impl<W: Write + Seek> Archive<W> {
     fn new(out: W) -> Self {
         Self { zip: ZipWriter::new(out), names: Vec::new() }
+    }
+
+    /// Adds an array in single or double precision.
+    fn add_numbers(
+        &mut self,
+        name: &str,
+        columns: Option<usize>,
+        numbers: &[f64],
+        is_single: bool,
+    ) -> Result<()> {
+        if is_single {
+            self.add(name, columns, numbers.iter().map(|x| *x as f32))
+        } else {
+            self.add(name, columns, numbers.iter().copied())
+        }
     }
 
     /// Adds an array; with a number of columns, it has rows of them.

@@ -44,26 +44,34 @@ impl Target {
         files::check_output(&self.path, inputs)
     }
 
-    /// Writes a surface; a table gets its points.
-    pub fn write(&self, data: &PolyData) -> Result<()> {
+    /// Writes a surface; a table gets its points. Returns what positions in the file are relative to.
+    pub fn write(&self, data: &PolyData) -> Result<Origin> {
         match self.format {
-            Format::Csv => self.write_table(&points_table(data)),
-            Format::Npz => npz::write_surface(data, &self.path),
+            Format::Csv => self.write_table(&points_table(data))?,
+            Format::Npz => npz::write_surface(data, &self.path)?,
+            Format::Stl => {
+                let mut origin = [0.0; 3];
+                files::write_file(&self.path, |out| {
+                    origin = write_stl(data, out)?;
+                    Ok(())
+                })?;
+                return Ok((origin != [0.0; 3]).then_some(origin));
+            }
             _ => files::write_file(&self.path, |out| {
                 match self.format {
                     Format::Vtp => write_vtp(data, out)?,
-                    Format::Stl => write_stl(data, out)?,
                     Format::Ply => write_ply(data, out)?,
-                    Format::Obj | Format::Csv | Format::Npz => write_obj(data, out)?,
+                    _ => write_obj(data, out)?,
                 }
                 Ok(())
-            }),
+            })?,
         }
+        Ok(None)
     }
 
     /// Writes `data`, or `table` if the file is one.
     pub fn write_either(&self, data: &PolyData, table: &[(String, Vec<f64>)]) -> Result<()> {
-        if self.format == Format::Csv { self.write_table(table) } else { self.write(data) }
+        if self.format == Format::Csv { self.write_table(table) } else { self.write(data).map(|_| ()) }
     }
 
     fn write_table(&self, table: &[(String, Vec<f64>)]) -> Result<()> {
@@ -77,25 +85,40 @@ pub struct Amount {
     points: usize,
     triangles: usize,
     area: f64,
+    /// What positions in the file are relative to, where its format has no place for the whole numbers.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    origin: Origin,
 }
 
+/// What positions in a file are relative to, in model units; none if they are absolute.
+pub type Origin = Option<[f64; 3]>;
+
 impl Amount {
-    pub fn of(data: &PolyData) -> Self {
+    pub fn of(data: &PolyData, origin: Origin) -> Self {
         Self {
             points: data.positions.len(),
             triangles: data.triangles.len(),
             area: area(&data.positions, &data.triangles),
+            origin,
         }
     }
 
     /// The same for people.
     pub fn rows(&self, target: &Target) -> Vec<(&'static str, String)> {
-        vec![
+        let mut rows = vec![
             ("file", target.path.display().to_string()),
             ("points", output::count(self.points as u64)),
             ("triangles", output::count(self.triangles as u64)),
             ("area", output::number(self.area)),
-        ]
+        ];
+        if let Some([x, y, z]) = self.origin {
+            let reason = "STL has no place for all of their digits";
+            rows.push((
+                "origin",
+                format!("{x},{y},{z}: positions in the file are relative to it, since {reason}"),
+            ));
+        }
+        rows
     }
 }
 
@@ -105,14 +128,13 @@ pub fn write_table(path: &Path, table: &[(String, Vec<f64>)]) -> Result<()> {
 }
 
 fn points_table(data: &PolyData) -> Vec<(String, Vec<f64>)> {
-    let column = |points: &[[f32; 3]], i: usize| points.iter().map(|p| f64::from(p[i])).collect();
-    let mut table: Vec<_> =
-        (0..3).map(|i| (["x", "y", "z"][i].to_owned(), column(&data.positions, i))).collect();
-    if !data.normals.is_empty() {
-        table.extend((0..3).map(|i| (["nx", "ny", "nz"][i].to_owned(), column(&data.normals, i))));
+    let mut table: Vec<(String, Vec<f64>)> = Vec::new();
+    for (i, name) in ["x", "y", "z"].into_iter().enumerate() {
+        table.push((name.to_owned(), data.positions.iter().map(|p| p[i]).collect()));
     }
-    for (name, values) in &data.fields {
-        table.push((name.clone(), values.iter().map(|v| f64::from(*v)).collect()));
+    for (i, name) in ["nx", "ny", "nz"].into_iter().enumerate().filter(|_| !data.normals.is_empty()) {
+        table.push((name.to_owned(), data.normals.iter().map(|n| f64::from(n[i])).collect()));
     }
+    table.extend(data.fields.iter().map(|field| (field.name.clone(), field.values.clone())));
     table
 }

@@ -3,7 +3,7 @@
 use super::output;
 use super::parse::parse_numbers;
 use super::poly::Target;
-use super::query::Query;
+use super::query::{Answer, Query};
 use anyhow::{Context, Result};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -108,7 +108,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let columns: Vec<Vec<Option<f64>>> =
         (0..names.len()).map(|f| found.samples.iter().map(|sample| value(sample, f)).collect()).collect();
     if let Some(target) = &arguments.output {
-        target.write_either(&poly_data(&found, &names, &columns), &table(&found, &names, &columns))?;
+        target.write_either(&poly_data(&found, &columns, &answer)?, &table(&found, &names, &columns))?;
     }
     let report = report(arguments, &found, &names, &columns);
     arguments.query.print(&report, rows(arguments, &report), (&answer.summary, seconds))
@@ -224,18 +224,16 @@ fn table(found: &Samples, names: &[String], columns: &[Vec<Option<f64>>]) -> Vec
 }
 
 /// The points that are inside, and the lines through them.
-fn poly_data(found: &Samples, names: &[String], columns: &[Vec<Option<f64>>]) -> PolyData {
+fn poly_data(found: &Samples, columns: &[Vec<Option<f64>>], answer: &Answer) -> Result<PolyData> {
     let kept: Vec<usize> = (0..found.samples.len()).filter(|&i| found.samples[i].place.is_some()).collect();
     let mut new = vec![0; found.samples.len()];
     (0..).zip(&kept).for_each(|(v, &i)| new[i] = v);
-    let values =
-        |column: &[Option<f64>]| kept.iter().map(|&i| column[i].unwrap_or_default() as f32).collect();
-    PolyData {
-        positions: kept.iter().map(|&i| found.samples[i].position.map(|x| x as f32)).collect(),
-        fields: names.iter().zip(columns).map(|(name, column)| (name.clone(), values(column))).collect(),
+    let values = |column: &Vec<Option<f64>>| kept.iter().map(|&i| column[i].unwrap_or_default()).collect();
+    Ok(PolyData {
+        fields: answer.point_values(columns.iter().map(values))?,
         lines: found.lines.iter().map(|line| line.iter().map(|&i| new[i as usize]).collect()).collect(),
-        ..PolyData::default()
-    }
+        ..answer.poly_data(kept.iter().map(|&i| found.samples[i].position).collect())?
+    })
 }
 
 fn report(arguments: &Arguments, found: &Samples, names: &[String], columns: &[Vec<Option<f64>>]) -> Report {

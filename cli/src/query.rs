@@ -12,7 +12,8 @@ use std::cell::Cell;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use tetralod::client::{Client, Step};
-use tetralod::mt::{MtInfo, UpdatePages};
+use tetralod::io::{PointValues, PolyData};
+use tetralod::mt::{FieldInfo, MtInfo, UpdatePages};
 use tetralod::refine::{Budget, Need, Outcome, RefineStats, Request};
 
 /// What the options look like in use.
@@ -343,8 +344,25 @@ impl Answer {
         Ok(self.opened.info()?.fields.iter().map(|field| field.name.clone()).collect())
     }
 
+    /// A surface or lines of the mesh at these points, without anything else: what is written of it keeps the steps of the lattice.
+    pub fn poly_data(&self, positions: Vec<[f64; 3]>) -> Result<PolyData> {
+        let step = self.opened.info()?.lattice.step.into_iter().fold(f64::INFINITY, f64::min);
+        Ok(PolyData { positions, step, ..PolyData::default() })
+    }
+
+    /// Values of each field at points: what is written of them keeps the levels of the field.
+    pub fn point_values(&self, values: impl IntoIterator<Item = Vec<f64>>) -> Result<Vec<PointValues>> {
+        let fields = &self.opened.info()?.fields;
+        let named = |(field, values): (&FieldInfo, Vec<f64>)| PointValues {
+            name: field.name.clone(),
+            values,
+            step: field.step,
+        };
+        Ok(fields.iter().zip(values).map(named).collect())
+    }
+
     /// All fields at the vertices of the mesh, in the order of the MT.
-    pub fn all_values(&self) -> Result<Vec<Vec<f32>>> {
+    pub fn all_values(&self) -> Result<Vec<Vec<f64>>> {
         Ok((0..self.opened.info()?.fields.len()).map(|field| self.opened.session.values(field)).collect())
     }
 }

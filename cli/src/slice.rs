@@ -42,7 +42,7 @@ struct Report {
 pub fn run(arguments: &Arguments) -> Result<()> {
     arguments.output.check(arguments.query.files())?;
     let mut answer = arguments.query.answer()?;
-    let (names, fields) = (answer.field_names()?, answer.all_values()?);
+    let fields = answer.all_values()?;
     let mesh = answer.opened.session.view();
     let start = Instant::now();
     let mut slice = Slice::new();
@@ -52,17 +52,16 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         slice.cell_edges(&mut edges);
     }
     let seconds = start.elapsed().as_secs_f64();
-    let values = fields.iter().map(|field| slice.interpolate(&mesh, field));
+    let values: Vec<Vec<f64>> = fields.iter().map(|field| slice.interpolate(&mesh, field)).collect();
     let data = PolyData {
-        positions: slice.positions().to_vec(),
-        normals: Vec::new(),
-        fields: names.into_iter().zip(values).collect(),
+        fields: answer.point_values(values)?,
         triangles: slice.indices().to_vec(),
         lines: edges.iter().map(|edge| edge.to_vec()).collect(),
+        ..answer.poly_data(slice.positions().to_vec())?
     };
-    arguments.output.write(&data)?;
+    let origin = arguments.output.write(&data)?;
     let edges = arguments.edges.then_some(edges.len());
-    let report = Report { surface: Amount::of(&data), edges };
+    let report = Report { surface: Amount::of(&data, origin), edges };
     let mut rows = report.surface.rows(&arguments.output);
     if let Some(edges) = edges {
         rows.push(("cell edges", output::count(edges as u64)));

@@ -114,8 +114,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let answer = arguments.query.answer()?;
     let field = &answer.opened.info()?.fields[answer.field];
     // A constant field is a range, too.
+    let half = (1e-9 * field.min.abs()).max(0.5);
     let whole =
-        if field.min < field.max { [field.min, field.max] } else { [field.min - 0.5, field.min + 0.5] };
+        if field.min < field.max { [field.min, field.max] } else { [field.min - half, field.min + half] };
     let range = arguments.bin_range.unwrap_or(whole);
     let start = Instant::now();
     let sums = of_mesh(&answer, Sums::new(arguments.bins, range))?;

@@ -9,7 +9,7 @@ use anyhow::{Context, Result};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::time::Instant;
-use tetralod::io::PolyData;
+use tetralod::io::{PointValues, PolyData};
 use tetralod::mt::FieldInfo;
 use tetralod::view::{StreamPoint, Streamline, TraceOptions, Tracer};
 
@@ -151,8 +151,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let start = Instant::now();
     let fields = answer.all_values()?;
     let mesh = answer.opened.session.view();
-    let bounds = mesh.positions.iter().map(|p| p.map(f64::from)).collect::<Vec<_>>();
-    let diagonal = tetralod::geom::Bounds::of(&bounds).diagonal();
+    let diagonal = mesh.bounds().diagonal();
     let options = TraceOptions {
         step: arguments.step,
         max_steps: arguments.max_steps,
@@ -171,9 +170,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     let seconds = start.elapsed().as_secs_f64();
     let values = |f: usize| lines.points.iter().map(|p| p.place.interpolate(&mesh, &fields[f])).collect();
-    let columns: Vec<(String, Vec<f64>)> =
-        names.iter().enumerate().map(|(f, name)| (name.clone(), values(f))).collect();
-    arguments.output.write_either(&poly_data(&lines, &columns), &table(&lines, &columns))?;
+    let columns: Vec<Vec<f64>> = (0..names.len()).map(values).collect();
+    let columns = answer.point_values(columns)?;
+    let positions = lines.points.iter().map(|point| point.position).collect();
+    let data = poly_data(&lines, &columns, answer.poly_data(positions)?);
+    arguments.output.write_either(&data, &table(&lines, &columns))?;
     let report = Report {
         seeds: seeds.len(),
         outside: lines.outside,
@@ -215,7 +216,7 @@ fn speed(point: &StreamPoint) -> f64 {
     point.vector.iter().map(|v| v * v).sum::<f64>().sqrt()
 }
 
-fn table(lines: &Lines, columns: &[(String, Vec<f64>)]) -> Vec<(String, Vec<f64>)> {
+fn table(lines: &Lines, columns: &[PointValues]) -> Vec<(String, Vec<f64>)> {
     let number = (0..).zip(&lines.lines).flat_map(|(i, line)| line.iter().map(move |_| f64::from(i)));
     let mut table = vec![("line".to_owned(), number.collect())];
     let mut column = |name: &str, of: &dyn Fn(&StreamPoint) -> f64| {
@@ -226,23 +227,20 @@ fn table(lines: &Lines, columns: &[(String, Vec<f64>)]) -> Vec<(String, Vec<f64>
         column(name, &|point| point.position[i]);
     }
     column("speed", &speed);
-    table.extend_from_slice(columns);
+    table.extend(columns.iter().map(|column| (column.name.clone(), column.values.clone())));
     table
 }
 
-fn poly_data(lines: &Lines, columns: &[(String, Vec<f64>)]) -> PolyData {
-    let mut fields: Vec<(String, Vec<f32>)> = vec![
-        ("speed".to_owned(), lines.points.iter().map(|point| speed(point) as f32).collect()),
-        ("time".to_owned(), lines.points.iter().map(|point| point.time as f32).collect()),
-    ];
-    let single = |values: &[f64]| values.iter().map(|v| *v as f32).collect();
-    fields.extend(columns.iter().map(|(name, values)| (name.clone(), single(values))));
-    PolyData {
-        positions: lines.points.iter().map(|point| point.position.map(|x| x as f32)).collect(),
-        fields,
-        lines: lines.lines.clone(),
-        ..PolyData::default()
-    }
+/// Speed and time, which have no levels, keep all of their digits.
+fn poly_data(lines: &Lines, columns: &[PointValues], positions: PolyData) -> PolyData {
+    let own = |name: &str, of: &dyn Fn(&StreamPoint) -> f64| PointValues {
+        name: name.to_owned(),
+        values: lines.points.iter().map(of).collect(),
+        step: 0.0,
+    };
+    let mut fields = vec![own("speed", &speed), own("time", &|point| point.time)];
+    fields.extend_from_slice(columns);
+    PolyData { fields, lines: lines.lines.clone(), ..positions }
 }
 
 fn rows(arguments: &Arguments, report: &Report) -> Vec<(&'static str, String)> {

@@ -31,18 +31,17 @@ struct Report {
 pub fn run(arguments: &Arguments) -> Result<()> {
     arguments.output.check(arguments.query.files())?;
     let mut answer = arguments.query.answer()?;
-    let (names, fields) = (answer.field_names()?, answer.all_values()?);
+    let fields = answer.all_values()?;
     let start = Instant::now();
     let mut surface = BoundarySurface::new();
     surface.extract(&answer.opened.session.view());
     let seconds = start.elapsed().as_secs_f64();
     let closed = surface.is_closed();
-    let values = |field: &Vec<f32>| surface.points.iter().map(|p| field[*p as usize]).collect();
-    let fields = names.into_iter().zip(fields.iter().map(values)).collect();
-    let data =
-        PolyData { positions: surface.positions, fields, triangles: surface.indices, ..PolyData::default() };
-    arguments.output.write(&data)?;
-    let report = Report { surface: Amount::of(&data), closed };
+    let values = |field: &Vec<f64>| surface.points.iter().map(|p| field[*p as usize]).collect();
+    let fields = answer.point_values(fields.iter().map(values))?;
+    let data = PolyData { fields, triangles: surface.indices, ..answer.poly_data(surface.positions)? };
+    let origin = arguments.output.write(&data)?;
+    let report = Report { surface: Amount::of(&data, origin), closed };
     let mut rows = report.surface.rows(&arguments.output);
     rows.push(("closed", if closed { "yes" } else { "no" }.to_owned()));
     arguments.query.print(&report, rows, (&answer.summary, seconds))

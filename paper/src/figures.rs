@@ -151,7 +151,7 @@ impl Pair {
         let triangles = |shown: &Shown| {
             let mut surface = IsoSurface::new();
             surface.extract(&shown.view(), self.isovalue);
-            let place = |v: u32| surface.positions[v as usize].map(f32::to_bits);
+            let place = |v: u32| surface.positions[v as usize].map(f64::to_bits);
             let sorted = |t: &[u32; 3]| {
                 let mut corners = t.map(place);
                 corners.sort_unstable();

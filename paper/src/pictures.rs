@@ -70,13 +70,13 @@ impl Painter {
         let bounds = pair.roi.unwrap_or_else(|| shown.view().bounds());
         let middle = (bounds.min[1] + bounds.max[1]) / 2.0;
         self.renderer.remove_surface(0);
-        let low = view.field.iter().copied().fold(f32::INFINITY, f32::min);
-        let high = view.field.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        let low = view.field.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = view.field.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         // The dark end of the colours would hide the edges.
         let range = [low - 0.8 * (high - low), high].map(f64::from);
         let cells = CellStyle::default();
         let style = Style { colouring: Colouring::Scale(ColourScale::new(VIRIDIS, range)?), ..cells.style };
-        let cut = ClipPlane { normal: [0.0, -1.0, 0.0], offset: -middle as f32 };
+        let cut = ClipPlane { normal: [0.0, -1.0, 0.0], offset: -middle as f64 };
         self.renderer.set_cells(Some(&CellStyle { style, cut, ..cells }));
         self.renderer.update_mesh(&view, None)?;
         self.picture(shown, pair, 0.97, path)

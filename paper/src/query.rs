@@ -23,8 +23,8 @@ pub fn tetrahedra(mt: &Mt, request: &Request) -> Result<u64> {
 
 /// A mesh as the view takes it.
 pub struct Shown {
-    positions: Vec<[f32; 3]>,
-    values: Vec<f32>,
+    positions: Vec<[f64; 3]>,
+    values: Vec<f64>,
     tets: Vec<[u32; 4]>,
     neighbors: Vec<[u32; 4]>,
 }
@@ -34,9 +34,9 @@ impl Shown {
         let front = front(mt, request)?;
         let (info, mesh) = (mt.info(), front.mesh());
         let field = info.fields.first().context("an MT has a field")?;
-        let value = |slot: usize| field.value(mesh.levels(slot as u32)[0]) as f32;
+        let value = |slot: usize| field.value(mesh.levels(slot as u32)[0]);
         Ok(Self {
-            positions: mesh.positions().iter().map(|&q| info.lattice.point(q).map(|x| x as f32)).collect(),
+            positions: mesh.positions().iter().map(|&q| info.lattice.point(q).map(|x| x as f64)).collect(),
             values: (0..mesh.positions().len()).map(value).collect(),
             tets: mesh.tets().to_vec(),
             neighbors: mesh.neighbors().to_vec(),

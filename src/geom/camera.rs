@@ -1,9 +1,9 @@
 //! An orbit camera: it looks at a target from a distance, and turns around it with z up. It can fly, too.
 
-use crate::geom::Bounds;
+use crate::geom::{Bounds, SinglePoints};
 use glam::dcamera::rh::proj::directx::{orthographic, perspective};
 use glam::dcamera::rh::view::look_at_mat4;
-use glam::{DMat4, DVec2, DVec3, Mat4};
+use glam::{DMat4, DVec2, DVec3};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use thiserror::Error;
 
@@ -155,6 +155,18 @@ impl Camera {
             Self { target: centre, distance: radius, yaw, pitch, fov: 0.6, projection, centre, radius };
         camera.distance = camera.fitting_distance(bounds, aspect);
         camera
+    }
+
+    /// The camera that sees the same of a model whose points are stored in single precision.
+    pub fn relative_to(&self, single: &SinglePoints) -> Self {
+        let place = |p: DVec3| DVec3::from(single.relative(p.into()));
+        Self {
+            target: place(self.target),
+            distance: self.distance / single.unit,
+            centre: place(self.centre),
+            radius: self.radius / single.unit,
+            ..*self
+        }
     }
 
     /// Moves so that all of `bounds` is in view, its middle in the middle of the picture, without turning; as
@@ -406,10 +418,10 @@ impl Camera {
         }
     }
 
-    /// From model space to clip space, with double precision.
+    /// From model space to clip space (depth 0 to 1).
     // One copy for all who project points: it is large in wasm.
     #[inline(never)]
-    pub(crate) fn matrix(&self, aspect: f64) -> DMat4 {
+    pub fn view_projection(&self, aspect: f64) -> DMat4 {
         let [near, far] = self.clip();
         let projection = match self.projection {
             Projection::Perspective => perspective(self.fov, positive(aspect), near, far),
@@ -421,15 +433,10 @@ impl Camera {
         projection * look_at_mat4(self.eye(), self.target, DVec3::Z)
     }
 
-    /// From model space to clip space (depth 0 to 1).
-    pub fn view_projection(&self, aspect: f64) -> Mat4 {
-        self.matrix(aspect).as_mat4()
-    }
-
     /// The normalised screen point of `p`; `None` if it lies behind a perspective camera.
     #[inline(never)]
     pub fn project(&self, p: DVec3, aspect: f64) -> Option<DVec2> {
-        let clip = self.matrix(aspect) * p.extend(1.0);
+        let clip = self.view_projection(aspect) * p.extend(1.0);
         (clip.w > 0.0).then(|| DVec2::new(clip.x, clip.y) / clip.w)
     }
 
@@ -493,7 +500,7 @@ mod tests {
         for aspect in [0.3, 0.46, 1.0, 1.8, 4.0] {
             let camera = Camera::home(&BOX, aspect);
             for corner in corners(&BOX) {
-                let clip = camera.matrix(aspect) * corner.extend(1.0);
+                let clip = camera.view_projection(aspect) * corner.extend(1.0);
                 let p = clip.truncate() / clip.w;
                 assert!(
                     p.x.abs() <= 1.0 && p.y.abs() <= 1.0 && (0.0..=1.0).contains(&p.z),
@@ -586,7 +593,7 @@ mod tests {
         let origin = camera.rays(1.5).origin[0];
         for corner in corners(&BOX) {
             assert!((corner - origin).dot(camera.forward()) > 0.0);
-            let clip = camera.matrix(1.5) * corner.extend(1.0);
+            let clip = camera.view_projection(1.5) * corner.extend(1.0);
             assert!(clip.w == 1.0 && (0.0..=1.0).contains(&clip.z));
             assert_eq!(camera.distance_to(corner), camera.depth(corner));
             assert_eq!(camera.towards_eye(corner), -camera.forward());

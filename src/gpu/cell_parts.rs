@@ -46,7 +46,7 @@ mod tests {
     /// Two tetrahedra with a common face, and a free place between them.
     const TETS: [[u32; 4]; 3] = [[0, 1, 2, 3], [NONE; 4], [4, 1, 3, 2]];
     const AROUND: [[u32; 4]; 3] = [[2, NONE, NONE, NONE], [NONE; 4], [0, NONE, NONE, NONE]];
-    const PLACES: [[f32; 3]; 5] =
+    const PLACES: [[f64; 3]; 5] =
         [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 1.0, 1.0]];
 
     fn mesh() -> MeshView<'static> {

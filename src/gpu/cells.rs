@@ -1,5 +1,6 @@
 //! Draws tetrahedra as they are, or the points of the mesh.
 
+use crate::geom::{SinglePoints, SingleValues};
 use crate::gpu::buffers::GrowBuffer;
 use crate::gpu::cell_parts::{edges, outer_faces};
 use crate::gpu::mesh::MeshBuffers;
@@ -17,6 +18,9 @@ pub(super) struct CellPass {
     layout: wgpu::BindGroupLayout,
     uniform: wgpu::Buffer,
     style: CellStyle,
+    /// How the points and values of the mesh are stored, and the values of tetrahedra.
+    stored: (SinglePoints, SingleValues),
+    own_stored: SingleValues,
     values: GrowBuffer<f32>,
     /// The outer faces of solid tetrahedra, or the edges.
     parts: GrowBuffer<u32>,
@@ -43,6 +47,8 @@ impl CellPass {
             layout,
             uniform: uniform::<StyleUniform>(context, "style of cells"),
             style: CellStyle::default(),
+            stored: Default::default(),
+            own_stored: SingleValues::PLAIN,
             values: GrowBuffer::new("values of tetrahedra", wgpu::BufferUsages::STORAGE),
             parts: GrowBuffer::new("faces or edges of tetrahedra", wgpu::BufferUsages::STORAGE),
             has_parts: false,
@@ -53,11 +59,26 @@ impl CellPass {
         let is_wire = |style: &CellStyle| style.shape == CellShape::Wire;
         self.has_parts &= style.cut == self.style.cut && is_wire(style) == is_wire(&self.style);
         self.style = *style;
-        context.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&StyleUniform::from(style)));
+        self.write_style(context);
     }
 
-    pub(super) fn set_values(&mut self, context: &Context, values: &[f32]) -> Result<(), GpuError> {
-        self.values.write(context, values)
+    /// How the points and values of the mesh are stored.
+    pub(super) fn set_stored(&mut self, context: &Context, points: SinglePoints, values: SingleValues) {
+        self.stored = (points, values);
+        self.write_style(context);
+    }
+
+    pub(super) fn set_values(&mut self, context: &Context, values: &[f64]) -> Result<(), GpuError> {
+        self.own_stored = SingleValues::of_values(values);
+        self.write_style(context);
+        self.values.write(context, &self.own_stored.store_all(values))
+    }
+
+    fn write_style(&self, context: &Context) {
+        let (points, values) = &self.stored;
+        let values = if self.style.own_values { &self.own_stored } else { values };
+        let uniform = StyleUniform::of_cells(&self.style, points, values);
+        context.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&uniform));
     }
 
     /// Whether it lacks what the style shows of the mesh.

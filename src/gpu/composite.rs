@@ -1,5 +1,6 @@
 //! Draws what is not opaque over what is: the volume, surfaces with opacity, and shade. See `composite.wgsl`.
 
+use crate::geom::SingleValues;
 use crate::gpu::buffers::GrowBuffer;
 use crate::gpu::fragments::FragmentLists;
 use crate::gpu::mesh::MeshBuffers;
@@ -74,7 +75,7 @@ impl Composite {
         }
     }
 
-    /// What the values of the volume look like, and which clip planes cut it, a bit each.
+    /// What the values of the volume as they are stored look like, and which clip planes cut it, a bit each.
     pub(super) fn set_medium(
         &mut self,
         context: &Context,
@@ -101,9 +102,9 @@ impl Composite {
     }
 
     /// Where in the mesh the eye is; none outside.
-    pub(super) fn set_eye(&mut self, mesh: &MeshView<'_>, place: Option<&Place>) {
+    pub(super) fn set_eye(&mut self, mesh: &MeshView<'_>, stored: &SingleValues, place: Option<&Place>) {
         (self.corners, self.start) = place.map_or(([0; 4], OUTSIDE), |place| {
-            let value = (place.value(mesh) as f32).to_bits();
+            let value = stored.store(place.value(mesh)).to_bits();
             (mesh.tets[place.tet as usize], [place.tet, value, 0])
         });
     }

@@ -1,6 +1,7 @@
 //! The mesh on the GPU: points with values, tetrahedra with their neighbours for rays, faces of the boundary, and
 //! tetrahedra by their points for cells. Each part is there while something needs it, and kept up by ranges.
 
+use crate::geom::{SinglePoints, SingleValues};
 use crate::gpu::buffers::GrowBuffer;
 use crate::gpu::{Context, GpuError};
 use crate::mesh::boundary_faces;
@@ -10,6 +11,8 @@ use std::ops::Range;
 #[derive(Debug)]
 pub(super) struct MeshBuffers {
     pub(super) points: GrowBuffer<[f32; 4]>,
+    /// How points and values are stored.
+    stored: (SinglePoints, SingleValues),
     /// 20 bytes a tetrahedron.
     pub(super) linked: Part<[u32; 5]>,
     pub(super) faces: GrowBuffer<[u32; 4]>,
@@ -52,9 +55,18 @@ impl MeshBuffers {
         let storage = wgpu::BufferUsages::STORAGE;
         Self {
             points: GrowBuffer::new("points of the mesh", storage),
+            stored: Default::default(),
             linked: Part::new("tetrahedra with their neighbours"),
             faces: GrowBuffer::new("faces of the boundary", storage),
             corners: Part::new("tetrahedra"),
+        }
+    }
+
+    /// How points and values are stored from now on. If that is another way, all must come next.
+    pub(super) fn set_stored(&mut self, points: SinglePoints, values: SingleValues) {
+        if self.stored != (points, values) {
+            self.stored = (points, values);
+            self.forget();
         }
     }
 
@@ -91,9 +103,11 @@ impl MeshBuffers {
         points: &[Range<u32>],
         tets: &[Range<u32>],
     ) -> Result<(), GpuError> {
+        let (places, values) = self.stored;
         self.points.update_with(context, mesh.positions.len(), points, |range| {
             let both = mesh.positions[range.clone()].iter().zip(&mesh.field[range]);
-            both.map(|(&[x, y, z], &value)| [x, y, z, value]).collect()
+            let stored = both.map(|(&point, &value)| (places.store(point), values.store(value)));
+            stored.map(|([x, y, z], value)| [x, y, z, value]).collect()
         })?;
         if let Some(corners) = self.corners.begin_update() {
             corners.update(context, mesh.tets, tets)?;

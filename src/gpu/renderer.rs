@@ -1,6 +1,6 @@
 //! The whole picture: background, mesh, surfaces, boxes.
 
-use crate::geom::Camera;
+use crate::geom::{Camera, SinglePoints, SingleValues};
 use crate::gpu::cells::CellPass;
 use crate::gpu::composite::Composite;
 use crate::gpu::fragments::FragmentLists;
@@ -23,6 +23,9 @@ use std::sync::atomic::{AtomicU32, Ordering};
 /// What is drawn is what has been set: [surfaces](Renderer::set_surface), the [volume](Renderer::set_volume), the
 /// [tetrahedra](Renderer::set_cells), [boxes](Renderer::set_boxes). Volume and tetrahedra are those of
 /// [`Renderer::update_mesh`].
+///
+/// What it gets is absolute, in double precision. On the GPU numbers have single precision: [`Renderer::set_points`] and [`Renderer::set_values`] say what they are relative
+/// to, so that models far from their origin, and fields of a narrow range, are drawn as exactly as others.
 #[derive(Debug)]
 pub struct Renderer {
     pub(super) context: Context,
@@ -32,6 +35,9 @@ pub struct Renderer {
     surface_pipelines: SurfacePipelines,
     surfaces: BTreeMap<u32, Surface>,
     mesh: MeshBuffers,
+    /// How points and values are stored on the GPU.
+    points: SinglePoints,
+    values: SingleValues,
     /// Made when tetrahedra are drawn first.
     cells: Option<CellPass>,
     shows_cells: bool,
@@ -101,6 +107,8 @@ impl Renderer {
             surface_pipelines: SurfacePipelines::new(&context, &common),
             surfaces: BTreeMap::new(),
             mesh: MeshBuffers::new(),
+            points: SinglePoints::PLAIN,
+            values: SingleValues::PLAIN,
             cells: None,
             shows_cells: false,
             lists: FragmentLists::new(&context),
@@ -172,6 +180,36 @@ impl Renderer {
         }
     }
 
+    /// How all points are stored on the GPU; as they are, if it is not said. Whether that is another way than before: then everything that was
+    /// set is gone, and must be set again.
+    pub fn set_points(&mut self, points: SinglePoints) -> bool {
+        let is_other = points != self.points;
+        if is_other {
+            self.points = points;
+            self.surfaces.clear();
+            self.store_mesh_anew();
+        }
+        is_other
+    }
+
+    /// How the values of the mesh are stored on the GPU, as [`Renderer::set_points`] for mesh and volume. Surfaces say themselves how theirs
+    /// are.
+    pub fn set_values(&mut self, values: SingleValues) -> bool {
+        let is_other = values != self.values;
+        if is_other {
+            self.values = values;
+            self.store_mesh_anew();
+        }
+        is_other
+    }
+
+    fn store_mesh_anew(&mut self) {
+        self.mesh.set_stored(self.points, self.values);
+        if let Some(cells) = &mut self.cells {
+            cells.set_stored(&self.context, self.points, self.values);
+        }
+    }
+
     /// Makes surface number `key` these triangles. If `changes` are given, only those differ from the ones that it has, and what
     /// lies beyond the ends of their arrays; what is uploaded is that, so the cost goes with what has changed.
     ///
@@ -191,7 +229,7 @@ impl Renderer {
             surface.set_style(context, &Style::default());
             surface
         });
-        surface.update(context, &self.surface_pipelines, triangles, changes)
+        surface.update(context, &self.surface_pipelines, triangles, changes, &self.points)
     }
 
     /// How surface number `key` looks; does nothing if there is none.
@@ -217,7 +255,8 @@ impl Renderer {
     /// # Errors
     /// If the device refuses it.
     pub fn set_volume(&mut self, medium: Option<(&Medium, u32)>) -> Result<(), GpuError> {
-        self.composite.set_medium(&self.context, medium)?;
+        let stored = medium.map(|(medium, clips)| (medium.relative_to(&self.points, &self.values), clips));
+        self.composite.set_medium(&self.context, stored.as_ref().map(|(medium, clips)| (medium, *clips)))?;
         self.mesh.linked.set_needed(medium.is_some());
         Ok(())
     }
@@ -227,8 +266,8 @@ impl Renderer {
         self.shows_cells = style.is_some();
         self.mesh.corners.set_needed(style.is_some());
         if let Some(style) = style {
-            let (context, common) = (&self.context, &self.common);
-            self.cells.get_or_insert_with(|| CellPass::new(context, common)).set_style(context, style);
+            let (cells, context) = self.cells_mut();
+            cells.set_style(context, style);
         }
     }
 
@@ -237,9 +276,19 @@ impl Renderer {
     ///
     /// # Errors
     /// If they are too many for the device.
-    pub fn set_cell_values(&mut self, values: &[f32]) -> Result<(), GpuError> {
+    pub fn set_cell_values(&mut self, values: &[f64]) -> Result<(), GpuError> {
+        let (cells, context) = self.cells_mut();
+        cells.set_values(context, values)
+    }
+
+    fn cells_mut(&mut self) -> (&mut CellPass, &Context) {
         let (context, common) = (&self.context, &self.common);
-        self.cells.get_or_insert_with(|| CellPass::new(context, common)).set_values(context, values)
+        let cells = self.cells.get_or_insert_with(|| {
+            let mut cells = CellPass::new(context, common);
+            cells.set_stored(context, self.points, self.values);
+            cells
+        });
+        (cells, context)
     }
 
     /// Whether volume or tetrahedra are to be drawn and have no mesh: [`Renderer::update_mesh`] must be called.
@@ -259,7 +308,7 @@ impl Renderer {
         mesh: &MeshView<'_>,
         changes: Option<[&[Range<u32>]; 2]>,
     ) -> Result<(), GpuError> {
-        self.composite.set_eye(mesh, None);
+        self.composite.set_eye(mesh, &self.values, None);
         let is_same = changes.is_some_and(|[points, tets]| points.is_empty() && tets.is_empty());
         if let Some(cells) =
             self.cells.as_mut().filter(|cells| self.shows_cells && (cells.is_behind() || !is_same))
@@ -271,7 +320,7 @@ impl Renderer {
 
     /// Where the eye of the next pictures is in the mesh, as [`Probe::locate`](crate::view::Probe::locate) gives it; none outside.
     pub fn set_eye(&mut self, mesh: &MeshView<'_>, place: Option<&Place>) {
-        self.composite.set_eye(mesh, place);
+        self.composite.set_eye(mesh, &self.values, place);
     }
 
     /// Replaces the boxes.
@@ -279,7 +328,7 @@ impl Renderer {
     /// # Errors
     /// If they are too many for the device.
     pub fn set_boxes(&mut self, boxes: &[BoxLines]) -> Result<(), GpuError> {
-        self.wire.update(&self.context, boxes)
+        self.wire.update(&self.context, boxes, &self.points)
     }
 
     /// Whether the device is well: it calls back at times of its own choice, so this is known between pictures, too.
@@ -417,7 +466,9 @@ impl Renderer {
 
     /// Draws into `view`, as number `count` of pictures whose mean is shown.
     fn encode(&mut self, view: &PictureView<'_>, camera: &Camera, look: &Look, count: u32) {
-        let frame = Frame::new(camera, &self.scaled(look), self.target.drawn_size, shift(count));
+        let look = &self.scaled(look).relative_to(&self.points);
+        let camera = camera.relative_to(&self.points);
+        let frame = Frame::new(&camera, look, self.target.drawn_size, shift(count));
         self.common.write(&self.context, &frame);
         let descriptor = wgpu::CommandEncoderDescriptor { label: Some("picture") };
         let mut encoder = self.context.device.create_command_encoder(&descriptor);

@@ -1,5 +1,7 @@
 //! How a thing is drawn: colours, opacity, light, edges, and the uniform of it in the layout of the shaders.
 
+use crate::geom::{SinglePoints, SingleValues};
+use crate::gpu::types::plane;
 use crate::view::{ClipPlane, ColourScale};
 
 /// What light does on a surface.
@@ -119,11 +121,12 @@ pub(super) struct StyleUniform {
     palette: [[u8; 4]; 256],
 }
 
-impl From<&Style> for StyleUniform {
-    fn from(style: &Style) -> Self {
+impl StyleUniform {
+    /// The style of a surface with values that are stored like this.
+    pub(super) fn of_surface(style: &Style, values: &SingleValues) -> Self {
         let (sides, scale, palette) = match &style.colouring {
             Colouring::Sides(sides) => (*sides, [0.0; 4], [[0; 4]; 256]),
-            Colouring::Scale(scale) => ([[0.0; 3]; 2], terms(scale), scale.table()),
+            Colouring::Scale(scale) => ([[0.0; 3]; 2], terms(scale, values), scale.table()),
         };
         let [front, back] = sides.map(|side| side.map(linear));
         let is_mapped = f32::from(matches!(style.colouring, Colouring::Scale(_)) as u8);
@@ -144,16 +147,10 @@ impl From<&Style> for StyleUniform {
             palette,
         }
     }
-}
 
-/// The light that a channel of sRGB means.
-fn linear(channel: f32) -> f32 {
-    if channel <= 0.040_45 { channel / 12.92 } else { ((channel + 0.055) / 1.055).powf(2.4) }
-}
-
-impl From<&CellStyle> for StyleUniform {
-    fn from(cells: &CellStyle) -> Self {
-        let mut uniform = Self::from(&cells.style);
+    /// The style of tetrahedra with points and values that are stored like this.
+    pub(super) fn of_cells(cells: &CellStyle, points: &SinglePoints, values: &SingleValues) -> Self {
+        let mut uniform = Self::of_surface(&cells.style, values);
         // Smooth light takes normals, which points do not have.
         uniform.shape[1] = uniform.shape[1].max(1.0);
         match cells.shape {
@@ -161,20 +158,34 @@ impl From<&CellStyle> for StyleUniform {
             CellShape::Points(diameter) => uniform.shape[3] = diameter,
             CellShape::Wire => {}
         }
-        let [x, y, z] = cells.cut.normal;
         // A plane at infinity cuts nothing; infinite numbers are not sure to work in shaders.
         let cuts = cells.cut.offset.is_finite();
-        uniform.cut = if cuts { [x, y, z, cells.cut.offset] } else { [0.0; 4] };
+        uniform.cut = if cuts { plane(&cells.cut.relative_to(points)) } else { [0.0; 4] };
         uniform.clips[1] = u32::from(cells.own_values);
         uniform
     }
 }
 
-/// The smallest value, one over the range, and whether both are logarithms.
-fn terms(scale: &ColourScale) -> [f32; 4] {
-    let [low, high] = if scale.is_log { scale.range.map(f64::ln) } else { scale.range };
-    let slope = if high > low { 1.0 / (high - low) } else { 0.0 };
-    [low as f32, slope as f32, f32::from(u8::from(scale.is_log)), 0.0]
+/// The light that a channel of sRGB means.
+fn linear(channel: f32) -> f32 {
+    if channel <= 0.040_45 { channel / 12.92 } else { ((channel + 0.055) / 1.055).powf(2.4) }
+}
+
+/// For values that are stored like this: the smallest value, one over the range, whether both are logarithms, and if these are relative to an
+/// offset one over that.
+fn terms(scale: &ColourScale, values: &SingleValues) -> [f32; 4] {
+    let SingleValues { offset, unit } = *values;
+    let [low, high] = scale.range.map(|end| match (scale.is_log, offset > 0.0) {
+        (false, _) => values.relative(end),
+        (true, false) => end.ln() - unit.ln(),
+        (true, true) => ((end - offset) / offset).ln_1p(),
+    });
+    // No value is positive.
+    let is_below = scale.is_log && offset < 0.0;
+    let slope = if high > low && !is_below { 1.0 / (high - low) } else { 0.0 };
+    let part = if scale.is_log && offset > 0.0 { unit / offset } else { 0.0 };
+    let held = |x: f64| x.clamp(f64::from(f32::MIN), f64::from(f32::MAX)) as f32;
+    [held(low), held(slope), f32::from(u8::from(scale.is_log)), held(part)]
 }
 
 #[cfg(test)]
@@ -193,9 +204,38 @@ mod tests {
     #[test]
     fn scales_become_terms() {
         let scale = ColourScale { map: VIRIDIS, range: [3.0, 3.0], is_reversed: false, is_log: false };
-        assert_eq!(terms(&scale), [3.0, 0.0, 0.0, 0.0]);
+        assert_eq!(terms(&scale, &SingleValues::PLAIN), [3.0, 0.0, 0.0, 0.0]);
         let scale = ColourScale { range: [1.0, 100.0], is_log: true, ..scale };
-        let [low, slope, is_log, _] = terms(&scale);
+        let [low, slope, is_log, _] = terms(&scale, &SingleValues::PLAIN);
         assert!(low == 0.0 && is_log == 1.0 && (slope * 100f32.ln() - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn terms_of_stored_values_give_the_fractions_of_the_values() {
+        let stores = [
+            (SingleValues::PLAIN, [1.0, 100.0]),
+            (SingleValues { offset: 1.7e9, unit: 1.0 }, [1.7e9 - 2.0, 1.7e9 + 2.0]),
+            (SingleValues { offset: 101_325.0, unit: 1.0 }, [101_324.999, 101_325.001]),
+            (SingleValues { offset: 0.0, unit: 1e300 }, [1e298, 4e300]),
+            (SingleValues { offset: 1e200, unit: 1e190 }, [0.9e200, 1.1e200]),
+        ];
+        for (values, range) in stores {
+            for is_log in [false, true] {
+                let scale = ColourScale { map: VIRIDIS, range, is_reversed: false, is_log };
+                let [low, slope, log, part] = terms(&scale, &values).map(f64::from);
+                for t in [0.0, 0.1, 0.5, 1.0] {
+                    let value = range[0] + t * (range[1] - range[0]);
+                    let stored = f64::from(values.store(value));
+                    // As the shader does.
+                    let even = match (log > 0.0, part == 0.0) {
+                        (false, _) => stored,
+                        (true, true) => stored.max(1e-38).ln(),
+                        (true, false) => (stored * part).ln_1p(),
+                    };
+                    let found = (even - low) * slope;
+                    assert!((found - scale.fraction(value)).abs() < 1e-5, "{values:?} {is_log} {t}: {found}");
+                }
+            }
+        }
     }
 }

@@ -1,5 +1,6 @@
 //! Draws surfaces of triangles, each with a style of its own.
 
+use crate::geom::{SinglePoints, SingleValues};
 use crate::gpu::buffers::GrowBuffer;
 use crate::gpu::pipeline::{Binding, Common, Output, PipelineSpec, group, group_layout, uniform};
 use crate::gpu::style::{Style, StyleUniform};
@@ -22,6 +23,8 @@ pub(super) struct Surface {
     values: GrowBuffer<f32>,
     indices: GrowBuffer<[u32; 3]>,
     style: Style,
+    /// How the values are stored.
+    stored: SingleValues,
     uniform: wgpu::Buffer,
     group: Option<wgpu::BindGroup>,
 }
@@ -83,6 +86,7 @@ impl Surface {
             values: GrowBuffer::new("values of a surface", storage),
             indices: GrowBuffer::new("triangles of a surface", storage),
             style: Style::default(),
+            stored: SingleValues::PLAIN,
             uniform: uniform::<StyleUniform>(context, "style"),
             group: None,
         }
@@ -104,29 +108,41 @@ impl Surface {
 
     pub(super) fn set_style(&mut self, context: &Context, style: &Style) {
         self.style = *style;
-        context.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&StyleUniform::from(style)));
+        let uniform = StyleUniform::of_surface(style, &self.stored);
+        context.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&uniform));
     }
 
-    /// Makes it these triangles, of which, if `changes` are given, only those differ from the ones that are there.
+    /// Makes it these triangles, with points stored like this. If `changes` are given, only those differ from the ones that are there.
     pub(super) fn update(
         &mut self,
         context: &Context,
         pipelines: &SurfacePipelines,
         triangles: &Triangles<'_>,
         changes: Option<&SurfaceChanges>,
+        points: &SinglePoints,
     ) -> Result<(), GpuError> {
         self.group = None;
+        let is_stored_alike = self.stored == triangles.single;
+        self.stored = triangles.single;
+        if !is_stored_alike {
+            self.set_style(context, &self.style.clone());
+        }
         let all = SurfaceChanges::default();
-        let SurfaceChanges { vertices, triangles: changed } = match changes {
+        let SurfaceChanges { vertices, triangles: changed } = match changes.filter(|_| is_stored_alike) {
             Some(changes) => changes,
             None => {
                 self.clear();
                 &all
             }
         };
-        self.positions.update(context, triangles.positions, vertices)?;
+        self.positions.update_with(context, triangles.positions.len(), vertices, |range| {
+            triangles.positions[range].iter().map(|point| points.store(*point)).collect()
+        })?;
         self.normals.update(context, or_one(triangles.normals, &[[0.0; 3]]), vertices)?;
-        self.values.update(context, or_one(triangles.values, &[0.0]), vertices)?;
+        let values = or_one(triangles.values, &[0.0]);
+        self.values.update_with(context, values.len(), vertices, |range| {
+            self.stored.store_all(&values[range]).into()
+        })?;
         if triangles.inner_sides.is_empty() {
             self.indices.update(context, triangles.indices, changed)?;
         } else {

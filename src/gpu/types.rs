@@ -1,6 +1,6 @@
 //! The appearance of the picture, and the uniform of a frame in the layout of the shaders.
 
-use crate::geom::{Bounds, Camera};
+use crate::geom::{Bounds, Camera, SinglePoints};
 use crate::view::ClipPlane;
 use glam::{DMat4, DVec2, DVec3, DVec4};
 
@@ -32,6 +32,15 @@ impl Default for Look {
             clips: Vec::new(),
             shade: [0.0, 1.0],
         }
+    }
+}
+
+impl Look {
+    /// The same look of a model whose points are stored in single precision.
+    pub(super) fn relative_to(&self, single: &SinglePoints) -> Self {
+        let clips = self.clips.iter().map(|clip| clip.relative_to(single)).collect();
+        let [strength, radius] = self.shade;
+        Self { clips, shade: [strength, (f64::from(radius) / single.unit) as f32], ..self.clone() }
     }
 }
 
@@ -68,11 +77,11 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// `shift` moves the picture by a part of a pixel, to the right and down.
+    /// Camera and look are those of the model as it is stored. `shift` moves the picture by a part of a pixel, to the right and down.
     pub(super) fn new(camera: &Camera, look: &Look, [width, height]: [u32; 2], shift: [f64; 2]) -> Self {
         let [w, h] = [f64::from(width), f64::from(height)];
         let moved = DVec2::new(2.0 * shift[0] / w, -2.0 * shift[1] / h);
-        let matrix = DMat4::from_translation(moved.extend(0.0)) * camera.matrix(w / h);
+        let matrix = DMat4::from_translation(moved.extend(0.0)) * camera.view_projection(w / h);
         let rays = camera.rays(w / h);
         let with_length = |v: DVec3| v.extend(v.length()).as_vec4().to_array();
         let shifted =
@@ -87,8 +96,7 @@ impl Frame {
         let eye = if is_parallel { back.extend(0.0) } else { camera.eye().extend(1.0) };
         let mut clips = [[0.0; 4]; MOST_CLIPS];
         for (place, clip) in clips.iter_mut().zip(&look.clips) {
-            let [x, y, z] = clip.normal;
-            *place = [x, y, z, clip.offset];
+            *place = plane(clip);
         }
         let count = look.clips.len().min(MOST_CLIPS);
         Self {
@@ -131,6 +139,12 @@ impl Line {
         wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x4, 3 => Float32];
 }
 
+/// A plane for shaders.
+pub(super) fn plane(clip: &ClipPlane) -> [f32; 4] {
+    let [x, y, z] = clip.normal;
+    [x, y, z, clip.offset].map(|number| number as f32)
+}
+
 fn wide(v: DVec3) -> [f32; 4] {
     v.as_vec3().extend(0.0).to_array()
 }
@@ -162,7 +176,7 @@ mod tests {
             camera.set_projection(projection);
             let frame = Frame::new(&camera, &Look::default(), [150, 100], [0.3, -0.2]);
             let [x, y, z, w] = frame.depth.map(f64::from);
-            let matrix = camera.matrix(1.5);
+            let matrix = camera.view_projection(1.5);
             let start = camera.rays(1.5).origin[0];
             for along in [0.7, 1.0, 1.4] {
                 let p = start + camera.forward() * along * camera.distance();

@@ -1,6 +1,6 @@
 //! Draws boxes as lines, with handles on their faces.
 
-use crate::geom::Bounds;
+use crate::geom::{Bounds, SinglePoints};
 use crate::gpu::buffers::GrowBuffer;
 use crate::gpu::pipeline::{Common, Output, PipelineSpec, group, group_layout};
 use crate::gpu::types::Line;
@@ -68,9 +68,15 @@ impl WirePass {
         self.listed = Some((spec.create(context, common), group(context, &nothing, &[])));
     }
 
-    pub(super) fn update(&mut self, context: &Context, boxes: &[BoxLines]) -> Result<(), GpuError> {
-        let lines: Vec<Line> = boxes.iter().flat_map(edges).collect();
-        let handles: Vec<Line> = boxes.iter().filter(|b| b.handles).flat_map(handles).collect();
+    pub(super) fn update(
+        &mut self,
+        context: &Context,
+        boxes: &[BoxLines],
+        stored: &SinglePoints,
+    ) -> Result<(), GpuError> {
+        let lines: Vec<Line> = boxes.iter().flat_map(|b| edges(b, stored)).collect();
+        let handles: Vec<Line> =
+            boxes.iter().filter(|b| b.handles).flat_map(|b| handles(b, stored)).collect();
         self.lines.write(context, &lines)?;
         self.handles.write(context, &handles)
     }
@@ -107,8 +113,8 @@ fn draw(pass: &mut wgpu::RenderPass<'_>, pipeline: &wgpu::RenderPipeline, items:
 }
 
 /// The twelve edges of a box.
-fn edges(lines: &BoxLines) -> impl Iterator<Item = Line> + '_ {
-    let corner = |i: usize| corner(&lines.bounds, i);
+fn edges<'a>(lines: &'a BoxLines, stored: &'a SinglePoints) -> impl Iterator<Item = Line> + 'a {
+    let corner = |i: usize| stored.store(corner(&lines.bounds, i));
     let pairs = (0..8).flat_map(|i| [1, 2, 4].map(|bit| (i, i | bit))).filter(|(a, b)| a != b);
     pairs.map(move |(a, b)| Line {
         from: corner(a),
@@ -118,15 +124,15 @@ fn edges(lines: &BoxLines) -> impl Iterator<Item = Line> + '_ {
     })
 }
 
-fn handles(lines: &BoxLines) -> impl Iterator<Item = Line> + '_ {
+fn handles<'a>(lines: &'a BoxLines, stored: &'a SinglePoints) -> impl Iterator<Item = Line> + 'a {
     BoxFace::ALL.into_iter().map(|face| {
-        let at = face.handle(&lines.bounds).as_vec3().to_array();
+        let at = stored.store(face.handle(&lines.bounds).into());
         Line { from: at, to: at, colour: premultiplied(lines.colour), width: HANDLE }
     })
 }
 
-fn corner(bounds: &Bounds, i: usize) -> [f32; 3] {
-    [0, 1, 2].map(|axis| if i >> axis & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] } as f32)
+fn corner(bounds: &Bounds, i: usize) -> [f64; 3] {
+    [0, 1, 2].map(|axis| if i >> axis & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] })
 }
 
 fn premultiplied([r, g, b, a]: [f32; 4]) -> [f32; 4] {
@@ -141,7 +147,7 @@ mod tests {
     fn a_box_has_twelve_edges_and_six_handles() {
         let bounds = Bounds { min: [0.0; 3], max: [1.0, 2.0, 3.0] };
         let lines = BoxLines { bounds, colour: [1.0, 0.5, 0.0, 0.5], width: 1.0, handles: true };
-        let edges: Vec<_> = edges(&lines).collect();
+        let edges: Vec<_> = edges(&lines, &SinglePoints::PLAIN).collect();
         assert_eq!(edges.len(), 12);
         for edge in &edges {
             let moved: Vec<_> = (0..3).filter(|i| edge.from[*i] != edge.to[*i]).collect();
@@ -149,6 +155,6 @@ mod tests {
             assert_eq!(edge.colour, [0.5, 0.25, 0.0, 0.5]);
             assert_eq!(edges.iter().filter(|other| *other == edge).count(), 1);
         }
-        assert_eq!(handles(&lines).count(), 6);
+        assert_eq!(handles(&lines, &SinglePoints::PLAIN).count(), 6);
     }
 }

@@ -61,7 +61,7 @@ pub use image::MAX_GRID_POINTS;
 #[cfg(feature = "formats")]
 pub use pieces::{PieceCounts, Pieces};
 pub use pvd::{Step, steps, write_pvd};
-pub use surface::{PolyData, write_csv, write_obj, write_ply, write_stl, write_vtp};
+pub use surface::{PointValues, PolyData, write_csv, write_obj, write_ply, write_stl, write_vtp};
 pub use survey::{Survey, format_of, survey, survey_raw};
 pub use time_steps::{FieldSelection, TimeStepsError, read_time_steps};
 pub use write::{PointArray, point_arrays, write_vti, write_vtu};

@@ -53,7 +53,7 @@ pub use vertex::store::{NodeBits, VertexMt};
 pub(crate) use vertex::streaming::Insertion;
 pub use vertex::tet_errors::MAX_QUARTERINGS;
 
-use crate::geom::Lattice;
+use crate::geom::{Lattice, SinglePoints, SingleValues};
 use crate::mesh::{Field, VectorPart};
 use enum_dispatch::enum_dispatch;
 use std::ops::Range;
@@ -175,6 +175,11 @@ impl FieldInfo {
     pub fn range(&self) -> f64 {
         if self.max > self.min { self.max - self.min } else { 1.0 }
     }
+
+    /// How the values are stored in single precision, in all meshes.
+    pub fn single_values(&self) -> SingleValues {
+        SingleValues::of([self.min, self.max], self.step)
+    }
 }
 
 /// log2 of the updates of a page, unless somebody says otherwise.
@@ -206,6 +211,11 @@ pub struct MtInfo {
 }
 
 impl MtInfo {
+    /// How points are stored in single precision, in all meshes.
+    pub fn single_points(&self) -> SinglePoints {
+        SinglePoints::of(&self.lattice)
+    }
+
     /// The error of field `field` that is left when every update is applied, as a fraction of its range: what the
     /// lattices round off. Positions count as displacements of the boundary do, not at all where any displacement would
     /// be an infinite error. No error of an update is smaller.

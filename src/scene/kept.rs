@@ -12,12 +12,12 @@ use crate::view::MeshView;
 /// A copy of a mesh with all of its fields, and what is shown of it.
 #[derive(Debug)]
 pub(super) struct Kept {
-    positions: Vec<[f32; 3]>,
+    positions: Vec<[f64; 3]>,
     tets: Vec<[u32; 4]>,
     neighbors: Vec<[u32; 4]>,
-    fields: Vec<Vec<f32>>,
+    fields: Vec<Vec<f64>>,
     /// Those of [`TetQuantity::ALL`].
-    quantities: Vec<Vec<f32>>,
+    quantities: Vec<Vec<f64>>,
     pub objects: Objects,
 }
 

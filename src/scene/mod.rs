@@ -14,7 +14,7 @@ pub use state::{
     IsosurfaceState, MapName, PlaneState, SceneState, SliceState, StreamlineState, VolumeState,
 };
 
-use crate::geom::{Bounds, Camera, Ray};
+use crate::geom::{Bounds, Camera, Ray, SinglePoints};
 use crate::gpu::{BoxLines, GpuError, Look, MOST_CLIPS, Renderer, SideTarget, TextureView};
 use crate::session::{Session, SessionError};
 use crate::view::{ClipPlane, ColourScale, Probe, ScaleError};
@@ -187,6 +187,9 @@ impl Scene {
         let bounds = self.bounds.unwrap_or(Bounds::EMPTY);
         let is_stale = std::mem::take(&mut self.is_stale);
         if is_stale {
+            // Before anything is stored. The values are those of a field, which the objects know.
+            let points = session.info().map_or(SinglePoints::PLAIN, |info| info.single_points());
+            self.renderer.set_points(points);
             self.look = Look { pixel_ratio: self.look.pixel_ratio, ..look(&self.state, &bounds) };
             self.renderer.set_boxes(&boxes(&self.state, &bounds))?;
         }
@@ -213,6 +216,7 @@ impl Scene {
         };
         self.renderer.set_split(at);
         let other = self.renderer.beside()?;
+        other.set_points(info.single_points());
         other.set_boxes(&boxes(&self.state, bounds))?;
         kept.update(other, info, session.field(), &self.state, bounds)
     }
@@ -352,9 +356,9 @@ fn clips(state: &SceneState) -> Vec<ClipPlane> {
     let mut clips: Vec<ClipPlane> = state.clips.iter().map(PlaneState::clip).collect();
     if let Some(bounds) = state.clip_box.as_ref().and_then(state::bounds) {
         for axis in 0..3 {
-            let normal = |sign: f32| [0, 1, 2].map(|i| if i == axis { sign } else { 0.0 });
-            clips.push(ClipPlane { normal: normal(1.0), offset: bounds.max[axis] as f32 });
-            clips.push(ClipPlane { normal: normal(-1.0), offset: -bounds.min[axis] as f32 });
+            let normal = |sign: f64| [0, 1, 2].map(|i| if i == axis { sign } else { 0.0 });
+            clips.push(ClipPlane { normal: normal(1.0), offset: bounds.max[axis] });
+            clips.push(ClipPlane { normal: normal(-1.0), offset: -bounds.min[axis] });
         }
     }
     clips

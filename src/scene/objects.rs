@@ -3,7 +3,7 @@
 use super::state::{ArrowState, ColourState, StreamlineState};
 use super::styles::{cell_style, isosurface_style, medium, other_clips, quantity, range, scale};
 use super::{Legend, SceneError, SceneState, SliceState, clips};
-use crate::geom::Bounds;
+use crate::geom::{Bounds, SingleValues};
 use crate::gpu::{Colouring, EdgeLook, Lighting, Renderer, Style};
 use crate::mt::{MeshChanges, MtInfo};
 use crate::session::{Session, TetQuantity};
@@ -30,7 +30,7 @@ pub(super) struct Objects {
     pub(super) tubes: Solids,
     pub(super) arrows: Solids,
     /// A number for each tetrahedron.
-    pub values: Vec<f32>,
+    pub values: Vec<f64>,
     /// How many surfaces of each list the renderer has.
     slices: u32,
     caps: u32,
@@ -66,10 +66,10 @@ pub(super) struct Input<'a> {
     /// Its field colours things: that of the mesh, or the difference to another mesh.
     pub mesh: MeshView<'a>,
     /// The field of the mesh, which isosurfaces follow.
-    pub field: &'a [f32],
+    pub field: &'a [f64],
     /// The largest absolute value of the difference, if that is shown.
     pub largest_difference: Option<f64>,
-    pub fields: &'a dyn Fn(usize) -> Vec<f32>,
+    pub fields: &'a dyn Fn(usize) -> Vec<f64>,
     pub info: &'a MtInfo,
     /// The number of the field.
     pub shown: usize,
@@ -103,13 +103,21 @@ impl Input<'_> {
         scale(&self.state.colours, if field == self.shown { self.state.colours.range } else { None }, own)
     }
 
+    /// How the renderer stores the values of a field, or the difference.
+    fn single(&self, field: usize) -> SingleValues {
+        match self.largest_difference.filter(|_| field == self.shown) {
+            Some(largest) => SingleValues::of([-largest, largest], 0.0),
+            None => self.info.fields[field].single_values(),
+        }
+    }
+
     /// What colours by a field: its values, or the difference.
-    fn values(&self, field: usize) -> Cow<'_, [f32]> {
+    fn values(&self, field: usize) -> Cow<'_, [f64]> {
         let is_difference = field == self.shown && self.largest_difference.is_some();
         if is_difference { self.mesh.field.into() } else { (self.fields)(field).into() }
     }
 
-    fn vectors(&self, what: &str, names: &[String; 3]) -> Result<[Vec<f32>; 3], SceneError> {
+    fn vectors(&self, what: &str, names: &[String; 3]) -> Result<[Vec<f64>; 3], SceneError> {
         let mut found = [0; 3];
         for (place, name) in found.iter_mut().zip(names) {
             *place = self.field(what, Some(name))?;
@@ -187,8 +195,9 @@ impl Objects {
         input: &Input<'_>,
         is_stale: bool,
     ) -> Result<(), SceneError> {
+        let is_stored_anew = renderer.set_values(input.single(input.shown));
         self.update_cells(renderer, input)?;
-        self.update_volume(renderer, input, is_stale)?;
+        self.update_volume(renderer, input, is_stale || is_stored_anew)?;
         let MeshChanges { vertices, tets } = input.changes;
         renderer.update_mesh(&input.mesh, Some([vertices, tets]))?;
         self.update_isosurfaces(renderer, input)?;
@@ -236,6 +245,7 @@ impl Objects {
             let is_whole = std::mem::replace(&mut own.is_whole, false) && values.is_none();
             let mut triangles = Triangles::from(&own.surface);
             triangles.values = values.as_deref().unwrap_or_default();
+            triangles.single = coloured.map_or(SingleValues::PLAIN, |field| input.single(field));
             renderer.set_surface(key, &triangles, is_whole.then_some(&changes))?;
             own.is_whole = values.is_none();
             let scale = coloured.map(|field| input.scale(field)).transpose()?;
@@ -269,6 +279,7 @@ impl Objects {
         let inner: Vec<u8> = self.slice.cell_sides().iter().map(|sides| !sides & 7).collect();
         let mut triangles = Triangles { inner_sides: &inner, ..Triangles::from(&self.slice) };
         triangles.values = values.as_deref().unwrap_or(triangles.values);
+        triangles.single = input.single(field);
         renderer.set_surface(key, &triangles, None)?;
         let style = Style {
             colouring: Colouring::Scale(input.scale(field)?),
@@ -290,7 +301,8 @@ impl Objects {
             return Ok(());
         };
         self.boundary.extract(&input.mesh);
-        renderer.set_surface(BOUNDARY, &Triangles::from(&self.boundary), None)?;
+        let triangles = Triangles { single: input.single(input.shown), ..Triangles::from(&self.boundary) };
+        renderer.set_surface(BOUNDARY, &triangles, None)?;
         let scale = Colouring::Scale(input.scale(input.shown)?);
         let style = Style {
             colouring: boundary.colour.map_or(scale, |colour| Colouring::Sides([colour.rgb(); 2])),
@@ -305,8 +317,8 @@ impl Objects {
         for (key, clip) in (CAPS..).zip(closed) {
             let ClipPlane { normal, offset } = *clip;
             let cap = SliceState {
-                normal: normal.map(f64::from),
-                offset: f64::from(offset),
+                normal,
+                offset,
                 opacity: boundary.opacity,
                 edges: boundary.edges,
                 field: None,
@@ -394,7 +406,9 @@ impl Objects {
         own: &str,
     ) -> Result<(), SceneError> {
         let solids = if key == TUBES { &self.tubes } else { &self.arrows };
-        renderer.set_surface(key, &Triangles::from(solids), None)?;
+        let single =
+            field.map_or_else(|| SingleValues::of_values(&solids.values), |field| input.single(field));
+        renderer.set_surface(key, &Triangles { single, ..Triangles::from(solids) }, None)?;
         let colours = match field {
             Some(field) => input.scale(field)?,
             None => scale(&input.state.colours, None, range(&solids.values))?,

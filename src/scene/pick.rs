@@ -36,8 +36,8 @@ impl Objects {
         let caps = clips.iter().filter(|_| is_closed).map(|clip| (*clip, true));
         let sections = state.slices.iter().map(|slice| (slice.plane().clip(), slice.clipped));
         for (section, is_clipped) in sections.chain(caps) {
-            let normal = DVec3::from(section.normal.map(f64::from));
-            let distance = (f64::from(section.offset) - ray.origin.dot(normal)) / ray.direction.dot(normal);
+            let normal = DVec3::from(section.normal);
+            let distance = (section.offset - ray.origin.dot(normal)) / ray.direction.dot(normal);
             let place = ray.at(distance);
             let others = if is_clipped { other_clips(clips, &section) } else { 0 };
             let cutting = clips.iter().enumerate().filter(|(i, _)| others & 1 << i != 0);

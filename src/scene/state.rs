@@ -81,7 +81,7 @@ impl PlaneState {
     }
 
     pub(super) fn clip(&self) -> ClipPlane {
-        ClipPlane { normal: self.normal.map(|x| x as f32), offset: self.offset as f32 }
+        ClipPlane { normal: self.normal, offset: self.offset }
     }
 
     pub(super) fn is_plane(&self) -> bool {

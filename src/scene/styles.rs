@@ -18,10 +18,10 @@ pub(super) fn scale(
 }
 
 /// The smallest and the largest number; 0 and 1 if there is none.
-pub(super) fn range(values: &[f32]) -> [f64; 2] {
+pub(super) fn range(values: &[f64]) -> [f64; 2] {
     let finite = || values.iter().copied().filter(|value| value.is_finite());
-    let range = [finite().fold(f32::INFINITY, f32::min), finite().fold(f32::NEG_INFINITY, f32::max)];
-    if range[0] <= range[1] { range.map(f64::from) } else { [0.0, 1.0] }
+    let range = [finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max)];
+    if range[0] <= range[1] { range } else { [0.0, 1.0] }
 }
 
 /// The quantity that colours tetrahedra; none for the field.
@@ -67,7 +67,7 @@ pub(super) fn isosurface_style(state: &IsosurfaceState, scale: Option<ColourScal
 
 /// A bit for each clip plane but those that are the same plane as `own`, whichever side they cut away.
 pub(super) fn other_clips(clips: &[ClipPlane], own: &ClipPlane) -> u32 {
-    let is_same = |clip: &ClipPlane, sign: f32| {
+    let is_same = |clip: &ClipPlane, sign: f64| {
         clip.normal == own.normal.map(|x| sign * x) && clip.offset == sign * own.offset
     };
     let others = clips.iter().enumerate().filter(|(_, clip)| !is_same(clip, 1.0) && !is_same(clip, -1.0));

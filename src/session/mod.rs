@@ -82,8 +82,8 @@ pub struct Session {
 /// The current mesh in model units, kept up with the mesh at the cost of what changed.
 #[derive(Debug, Default)]
 struct Shown {
-    positions: Vec<[f32; 3]>,
-    values: Vec<f32>,
+    positions: Vec<[f64; 3]>,
+    values: Vec<f64>,
     /// Another field is to be shown: all values are to be set.
     stale: bool,
 }
@@ -338,12 +338,12 @@ impl Session {
     }
 
     /// One of the fields at the vertices of the current mesh, in field units; empty if there is no such field.
-    pub fn values(&self, field: usize) -> Vec<f32> {
+    pub fn values(&self, field: usize) -> Vec<f64> {
         let (Some(mesh), Some(info)) = (self.mesh(), self.info().and_then(|info| info.fields.get(field)))
         else {
             return Vec::new();
         };
-        (0..mesh.positions().len() as u32).map(|slot| info.value(mesh.levels(slot)[field]) as f32).collect()
+        (0..mesh.positions().len() as u32).map(|slot| info.value(mesh.levels(slot)[field])).collect()
     }
 
     /// One of the fields at the vertices of the current mesh in double precision: exact at vertices of the reference mesh if
@@ -419,7 +419,7 @@ impl Session {
 
     /// Bytes that the current mesh takes with its adjacency, its form in model units, and the queues of refinement.
     pub fn mesh_bytes(&self) -> u64 {
-        let shown = 12 * self.shown.positions.len() + 4 * self.shown.values.len();
+        let shown = 24 * self.shown.positions.len() + 8 * self.shown.values.len();
         self.front.as_ref().map_or(0, |front| front.mesh().bytes() + front.queue_bytes()) + shown as u64
     }
 
@@ -437,13 +437,13 @@ impl Session {
         let slots = mesh.positions().len();
         shown.positions.resize(slots, [0.0; 3]);
         shown.values.resize(slots, 0.0);
-        let value_at = |slot: usize| field.value(mesh.levels(slot as u32)[self.field]) as f32;
+        let value_at = |slot: usize| field.value(mesh.levels(slot as u32)[self.field]);
         self.behind.add(&changes, shown.stale);
         self.taken.add(&changes, shown.stale);
         self.copied.add(&changes, shown.stale);
         self.sliced.1.add(&changes, shown.stale);
         for slot in changes.vertices.into_iter().flatten().map(|slot| slot as usize) {
-            shown.positions[slot] = lattice.point(mesh.positions()[slot]).map(|x| x as f32);
+            shown.positions[slot] = lattice.point(mesh.positions()[slot]);
             shown.values[slot] = value_at(slot);
         }
         if std::mem::take(&mut shown.stale) {

@@ -76,7 +76,7 @@ impl Session {
     /// let mut session = Session::new();
     /// assert_eq!(session.tet_quantity(TetQuantity::Size), Err(SessionError::NotReady));
     /// ```
-    pub fn tet_quantity(&mut self, quantity: TetQuantity) -> Result<Vec<f32>, SessionError> {
+    pub fn tet_quantity(&mut self, quantity: TetQuantity) -> Result<Vec<f64>, SessionError> {
         let mut values = Vec::new();
         self.tet_quantity_into(quantity, &mut values)?;
         Ok(values)
@@ -89,7 +89,7 @@ impl Session {
     pub fn tet_quantity_into(
         &mut self,
         quantity: TetQuantity,
-        values: &mut Vec<f32>,
+        values: &mut Vec<f64>,
     ) -> Result<(), SessionError> {
         values.clear();
         let (Some(front), Some(mt)) = (&self.front, self.decoder.mt()) else {
@@ -97,9 +97,9 @@ impl Session {
         };
         match quantity {
             TetQuantity::Size => values.extend(sizes(mt, front.mesh())),
-            TetQuantity::Error => values.extend(front.tet_errors(mt).iter().map(|e| e.error() as f32)),
+            TetQuantity::Error => values.extend(front.tet_errors(mt).iter().map(|e| e.error())),
             TetQuantity::Missing => {
-                values.extend(front.missing_tets(mt).iter().map(|&missing| f32::from(u8::from(missing))));
+                values.extend(front.missing_tets(mt).iter().map(|&missing| f64::from(u8::from(missing))));
             }
             TetQuantity::Block => {
                 let bits = self.decoder.index().map_or(mt.page_bits(), |index| index.block_bits);
@@ -108,7 +108,7 @@ impl Session {
             TetQuantity::Depth => {
                 self.depths.learn(mt, front).map_err(damaged)?;
                 let tets = 0..front.mesh().tets().len() as u32;
-                values.extend(tets.map(|t| self.depths.get(mt.creator(front.mesh(), t)) as f32));
+                values.extend(tets.map(|t| self.depths.get(mt.creator(front.mesh(), t)) as f64));
             }
         }
         Ok(())
@@ -122,9 +122,9 @@ fn damaged(error: ReplayError) -> SessionError {
     })
 }
 
-fn sizes<'a>(mt: &'a Mt, mesh: &'a CurrentMesh) -> impl Iterator<Item = f32> + 'a {
+fn sizes<'a>(mt: &'a Mt, mesh: &'a CurrentMesh) -> impl Iterator<Item = f64> + 'a {
     let lattice = &mt.info().lattice;
-    mesh.tets().iter().map(|tet| size(lattice, mesh, *tet) as f32)
+    mesh.tets().iter().map(|tet| size(lattice, mesh, *tet))
 }
 
 /// The length of the longest edge of a tetrahedron, in model units.
@@ -137,8 +137,8 @@ pub(super) fn size(lattice: &Lattice, mesh: &CurrentMesh, tet: [u32; 4]) -> f64 
     EDGES.map(squared).into_iter().fold(0.0, f64::max).sqrt()
 }
 
-fn blocks<'a>(mt: &'a Mt, front: &'a Front, bits: u32) -> impl Iterator<Item = f32> + 'a {
+fn blocks<'a>(mt: &'a Mt, front: &'a Front, bits: u32) -> impl Iterator<Item = f64> + 'a {
     let mesh = front.mesh();
-    let block = move |t: u32| mt.creator(mesh, t).map_or(0.0, |u| ((u.0 >> bits) + 1) as f32);
+    let block = move |t: u32| mt.creator(mesh, t).map_or(0.0, |u| ((u.0 >> bits) + 1) as f64);
     (0..mesh.tets().len() as u32).map(block)
 }

@@ -203,7 +203,7 @@ fn merit(edge: BoxEdge, bounds: &Bounds, camera: &Camera, aspect: f64) -> Option
 /// Which part of a line, as fractions of it, is on the screen and between the clipping planes (Liang and
 /// Barsky 1984, with homogeneous coordinates).
 fn visible_part(ends: [DVec3; 2], camera: &Camera, aspect: f64) -> Option<[f64; 2]> {
-    let matrix = camera.matrix(aspect);
+    let matrix = camera.view_projection(aspect);
     // How far a point is inside of the sides of the screen, and behind the near plane.
     let inside = |p: DVec4| [p.w - p.x, p.w + p.x, p.w - p.y, p.w + p.y, p.z];
     let [from, to] = ends.map(|p| inside(matrix * p.extend(1.0)));

@@ -11,9 +11,9 @@ use glam::DVec3;
 #[derive(Clone, Debug, Default)]
 pub struct BoundarySurface {
     /// Vertices, in model units.
-    pub positions: Vec<[f32; 3]>,
+    pub positions: Vec<[f64; 3]>,
     /// The field's value at each vertex.
-    pub values: Vec<f32>,
+    pub values: Vec<f64>,
     /// Triangles, counter-clockwise when seen from outside.
     pub indices: Vec<[u32; 3]>,
     /// Which point of the mesh each vertex is.
@@ -71,8 +71,8 @@ impl BoundarySurface {
 ///
 /// # Panics
 /// If a triangle names a vertex that is not there.
-pub fn area(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> f64 {
-    let corner = |v: u32| DVec3::from(positions[v as usize].map(f64::from));
+pub fn area(positions: &[[f64; 3]], triangles: &[[u32; 3]]) -> f64 {
+    let corner = |v: u32| DVec3::from(positions[v as usize]);
     let of = |t: &[u32; 3]| (corner(t[1]) - corner(t[0])).cross(corner(t[2]) - corner(t[0])).length();
     0.5 * triangles.iter().map(of).fold(0.0, |sum, area| sum + area)
 }

@@ -19,7 +19,7 @@ use glam::DVec3;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Difference {
     /// One number for each point of the first mesh, in units of the field.
-    pub values: Vec<f32>,
+    pub values: Vec<f64>,
     /// The root of the mean square over the volume of the first mesh, of what is linear between the values; 0
     /// without a volume.
     pub root_mean_square: f64,
@@ -44,12 +44,11 @@ impl Difference {
             return None;
         }
         let mut boundary = None;
-        let points: Vec<[f64; 3]> = mesh.positions.iter().map(|p| p.map(f64::from)).collect();
         let mut probe = Probe::new(other);
-        let places = probe.locate_all(&points);
+        let places = probe.locate_all(mesh.positions);
         let mut outside = 0;
-        let mut values = Vec::with_capacity(points.len());
-        for ((p, place), own) in points.iter().zip(places).zip(mesh.field) {
+        let mut values = Vec::with_capacity(mesh.positions.len());
+        for ((p, place), own) in mesh.positions.iter().zip(places).zip(mesh.field) {
             let there = match place {
                 Some(place) => place.value(&other),
                 None => {
@@ -57,12 +56,12 @@ impl Difference {
                     boundary.get_or_insert_with(|| Boundary::of(&other)).as_ref()?.nearest_value(*p)
                 }
             };
-            values.push((f64::from(*own) - there) as f32);
+            values.push(own - there);
         }
         let stats = FieldStats::of(&MeshView { field: &values, ..*mesh });
         // Both are over the same volume, so their squares add up.
         let square = stats.mean() * stats.mean() + stats.deviation() * stats.deviation();
-        let largest = values.iter().fold(0.0, |most: f64, value| most.max(f64::from(value.abs())));
+        let largest = values.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
         Some(Self { values, root_mean_square: square.sqrt(), largest, outside })
     }
 }
@@ -78,7 +77,7 @@ impl Boundary {
     fn of(mesh: &MeshView<'_>) -> Option<Self> {
         let mut surface = BoundarySurface::new();
         surface.extract(mesh);
-        let corner = |v: u32| DVec3::from(surface.positions[v as usize].map(f64::from));
+        let corner = |v: u32| DVec3::from(surface.positions[v as usize]);
         let corners: Vec<[DVec3; 3]> = surface.indices.iter().map(|triangle| triangle.map(corner)).collect();
         let is_usable = !corners.is_empty() && corners.iter().flatten().all(|p| p.is_finite());
         is_usable.then(|| Self { surface, grid: TriangleGrid::new(corners) })
@@ -92,6 +91,6 @@ impl Boundary {
         };
         let weights = weights_on_triangle(at, self.grid.corners[triangle as usize]);
         let vertices = self.surface.indices[triangle as usize];
-        (0..3).map(|i| weights[i] * f64::from(self.surface.values[vertices[i] as usize])).sum()
+        (0..3).map(|i| weights[i] * self.surface.values[vertices[i] as usize]).sum()
     }
 }

@@ -49,7 +49,7 @@ struct Arrow {
     middle: DVec3,
     vector: DVec3,
     magnitude: f64,
-    value: f32,
+    value: f64,
 }
 
 impl Solids {
@@ -67,8 +67,8 @@ impl Solids {
     pub fn set_arrows(
         &mut self,
         mesh: MeshView<'_>,
-        vectors: [&[f32]; 3],
-        field: Option<&[f32]>,
+        vectors: [&[f64]; 3],
+        field: Option<&[f64]>,
         options: &ArrowOptions,
     ) -> usize {
         self.clear();
@@ -122,7 +122,7 @@ impl Solids {
 /// box.
 fn grid(mesh: &MeshView<'_>, mut spacing: f64) -> Option<(f64, Vec<[f64; 3]>)> {
     let named = mesh.tets.iter().filter(|tet| tet[0] != NONE).flatten();
-    let corners = named.map(|v| mesh.positions[*v as usize].map(f64::from));
+    let corners = named.map(|v| mesh.positions[*v as usize]);
     let bounds = corners.fold(Bounds::EMPTY, Bounds::with);
     let extent = bounds.extent();
     if !(bounds.min[0] <= bounds.max[0] && extent.iter().all(|e| e.is_finite())) {
@@ -144,12 +144,12 @@ fn grid(mesh: &MeshView<'_>, mut spacing: f64) -> Option<(f64, Vec<[f64; 3]>)> {
 
 fn arrow(
     mesh: &MeshView<'_>,
-    vectors: [&[f32]; 3],
-    field: Option<&[f32]>,
+    vectors: [&[f64]; 3],
+    field: Option<&[f64]>,
     (p, place): ([f64; 3], Place),
 ) -> Option<Arrow> {
     let vector = DVec3::from(vectors.map(|component| place.interpolate(mesh, component)));
     let magnitude = vector.length();
-    let value = field.map_or(magnitude, |field| place.interpolate(mesh, field)) as f32;
+    let value = field.map_or(magnitude, |field| place.interpolate(mesh, field));
     (magnitude > 0.0 && magnitude.is_finite()).then(|| Arrow { middle: p.into(), vector, magnitude, value })
 }

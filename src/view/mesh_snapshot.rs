@@ -8,13 +8,13 @@ use super::MeshView;
 use crate::mesh::{BitSet, NONE};
 use std::ops::Range;
 
-/// A copy of every tetrahedron and every point; per point a tetrahedron and how many there are. 16.3 bytes a tetrahedron and 24
+/// A copy of every tetrahedron and every point; per point a tetrahedron and how many there are. 16.3 bytes a tetrahedron and 40
 /// bytes a point.
 #[derive(Clone, Debug, Default)]
 pub(super) struct MeshSnapshot {
     tets: Vec<[u32; 4]>,
     /// Position and value, as bits.
-    points: Vec<[u32; 4]>,
+    points: Vec<[u64; 4]>,
     stars: Vec<Star>,
     /// Scratch: tetrahedra of a star, and dirty ones; empty between two calls.
     seen: BitSet,
@@ -189,7 +189,7 @@ pub(super) fn entries(ranges: &[Range<u32>], old: usize, new: usize) -> impl Ite
     ranges.chain(common..new as u32)
 }
 
-fn bits(mesh: &MeshView<'_>, point: usize) -> [u32; 4] {
-    let [x, y, z] = mesh.positions[point].map(f32::to_bits);
+fn bits(mesh: &MeshView<'_>, point: usize) -> [u64; 4] {
+    let [x, y, z] = mesh.positions[point].map(f64::to_bits);
     [x, y, z, mesh.field[point].to_bits()]
 }

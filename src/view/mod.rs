@@ -59,13 +59,14 @@ pub struct SurfaceChanges {
     pub triangles: Vec<Range<u32>>,
 }
 
-/// A tetrahedral mesh as slices: what the renderer and the isosurface extraction take.
+/// A tetrahedral mesh as slices: what the renderer and everything of this module take. All numbers are absolute, in double precision:
+/// points are those of the lattice of positions, values those of the levels of the field.
 #[derive(Clone, Copy, Debug)]
 pub struct MeshView<'a> {
     /// Points in model units.
-    pub positions: &'a [[f32; 3]],
+    pub positions: &'a [[f64; 3]],
     /// One field value per point, in the field's own units.
-    pub field: &'a [f32],
+    pub field: &'a [f64],
     /// Positive tetrahedra as indices into `positions`.
     pub tets: &'a [[u32; 4]],
     /// `neighbors[t][i]` is the tetrahedron across face `i` (opposite vertex `i`) of `t`, or
@@ -76,6 +77,6 @@ pub struct MeshView<'a> {
 impl MeshView<'_> {
     /// The box around all points.
     pub fn bounds(&self) -> Bounds {
-        self.positions.iter().fold(Bounds::EMPTY, |bounds, p| bounds.with(p.map(f64::from)))
+        self.positions.iter().fold(Bounds::EMPTY, |bounds, p| bounds.with(*p))
     }
 }

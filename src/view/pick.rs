@@ -68,7 +68,7 @@ pub fn first_hit(surface: &Triangles<'_>, ray: &Ray, planes: &[ClipPlane]) -> Op
         _ => way.nearest::<2>(surface, [near, far]),
     };
     let (distance, triangle, weights) = nearest?;
-    let value_at = |v: u32| surface.values.get(v as usize).map_or(f64::NAN, |value| f64::from(*value));
+    let value_at = |v: u32| surface.values.get(v as usize).copied().unwrap_or(f64::NAN);
     let values = surface.indices.get(triangle as usize)?.map(value_at);
     let value = (0..3).map(|i| weights[i] * values[i]).sum();
     Some(SurfaceHit { distance, position: way.at(distance), triangle, value })
@@ -132,7 +132,7 @@ fn between(span: &Span, part: f64) -> Place {
 }
 
 #[inline]
-fn corners(surface: &Triangles<'_>, triangle: &[u32; 3]) -> Option<[[f32; 3]; 3]> {
+fn corners(surface: &Triangles<'_>, triangle: &[u32; 3]) -> Option<[[f64; 3]; 3]> {
     let [a, b, c] = triangle.map(|v| surface.positions.get(v as usize));
     Some([*a?, *b?, *c?])
 }
@@ -171,8 +171,8 @@ impl Way {
     fn kept(&self, planes: &[ClipPlane]) -> Option<[f64; 2]> {
         let [mut near, mut far] = [0.0_f64, f64::INFINITY];
         for plane in planes {
-            let along = |v: [f64; 3]| (0..3).map(|i| f64::from(plane.normal[i]) * v[i]).sum::<f64>();
-            let (room, speed) = (f64::from(plane.offset) - along(self.origin), along(self.direction));
+            let along = |v: [f64; 3]| (0..3).map(|i| plane.normal[i] * v[i]).sum::<f64>();
+            let (room, speed) = (plane.offset - along(self.origin), along(self.direction));
             if speed > 0.0 {
                 far = far.min(room / speed);
             } else if speed < 0.0 {
@@ -186,9 +186,7 @@ impl Way {
 
     /// The distances between which the ray may meet a mesh; none without a mesh.
     fn through(&self, mesh: &MeshView<'_>, [near, far]: [f64; 2]) -> Option<[f64; 2]> {
-        let along = |p: &[f32; 3]| {
-            (0..3).map(|i| (f64::from(p[i]) - self.origin[i]) * self.direction[i]).sum::<f64>()
-        };
+        let along = |p: &[f64; 3]| (0..3).map(|i| (p[i] - self.origin[i]) * self.direction[i]).sum::<f64>();
         let [first, last] = mesh
             .positions
             .iter()
@@ -223,12 +221,12 @@ impl Way {
     /// The distance at which the line of the ray goes through a triangle, and the weights of the corners
     /// there.
     #[inline]
-    fn cut<const AXIS: usize>(&self, corners: [[f32; 3]; 3]) -> Option<(f64, [f64; 3])> {
-        let along = |p: [f32; 3]| f64::from(p[AXIS]) - self.origin[AXIS];
+    fn cut<const AXIS: usize>(&self, corners: [[f64; 3]; 3]) -> Option<(f64, [f64; 3])> {
+        let along = |p: [f64; 3]| p[AXIS] - self.origin[AXIS];
         // The corners beside the ray, along each of the other two axes.
         let beside = |i: usize| {
             let axis = (AXIS + 1 + i) % 3;
-            corners.map(|p| f64::from(p[axis]) - self.origin[axis] - self.shear[i] * along(p))
+            corners.map(|p| p[axis] - self.origin[axis] - self.shear[i] * along(p))
         };
         // Most triangles are on one side, which is soon seen.
         let is_beside = |[a, b, c]: [f64; 3]| a > 0.0 && b > 0.0 && c > 0.0 || a < 0.0 && b < 0.0 && c < 0.0;

@@ -50,8 +50,8 @@ impl Place {
     ///
     /// # Panics
     /// If the mesh has no such tetrahedron, or the field too few numbers.
-    pub fn interpolate(&self, mesh: &MeshView<'_>, field: &[f32]) -> f64 {
-        let values = mesh.tets[self.tet as usize].map(|p| f64::from(field[p as usize]));
+    pub fn interpolate(&self, mesh: &MeshView<'_>, field: &[f64]) -> f64 {
+        let values = mesh.tets[self.tet as usize].map(|p| field[p as usize]);
         (0..4).map(|i| self.weights[i] * values[i]).sum()
     }
 }
@@ -198,7 +198,7 @@ impl<'a> Probe<'a> {
         let distance = |t: u32| {
             let corner =
                 self.mesh.tets.get(t as usize).and_then(|tet| self.mesh.positions.get(tet[0] as usize));
-            let corner = corner.map(|q| q.map(f64::from))?;
+            let corner = corner?;
             Some((0..3).map(|i| (p[i] - corner[i]) * (p[i] - corner[i])).sum::<f64>())
         };
         let others = (0..STARTS).map(|i| (i * count / STARTS) as u32);
@@ -259,7 +259,7 @@ impl<'a> Probe<'a> {
     }
 
     /// On which side of each face a point is: positive outside, with the exact sign; none for a tetrahedron that
-    /// single precision has made flat or turned inside out: the others cover its place.
+    /// rounding has made flat or turned inside out: the others cover its place.
     fn sides(&self, t: u32, p: [f64; 3]) -> Option<[f64; 4]> {
         let tet = self.proper(t)?;
         Some([0, 1, 2, 3].map(|i| self.side(FACES[i].map(|k| tet[k]), p)))
@@ -276,7 +276,7 @@ impl<'a> Probe<'a> {
         if tet[0] == NONE {
             return None;
         }
-        let [a, b, c, d] = tet.map(|v| self.mesh.positions[v as usize].map(f64::from));
+        let [a, b, c, d] = tet.map(|v| self.mesh.positions[v as usize]);
         (orient(a, b, c, d) > 0.0).then_some(tet)
     }
 
@@ -285,7 +285,7 @@ impl<'a> Probe<'a> {
     fn side(&self, face: [u32; 3], p: [f64; 3]) -> f64 {
         let mut sorted = face;
         sorted.sort_unstable();
-        let [a, b, c] = sorted.map(|v| self.mesh.positions[v as usize].map(f64::from));
+        let [a, b, c] = sorted.map(|v| self.mesh.positions[v as usize]);
         let is_even = [[0, 1, 2], [1, 2, 0], [2, 0, 1]].iter().any(|turn| turn.map(|k| face[k]) == sorted);
         let side = orient(a, b, c, p);
         if is_even { side } else { -side }
@@ -349,8 +349,8 @@ impl NearLine {
             // What rounding may have done.
             (a - b, 1e-15 * (a.abs() + b.abs()))
         };
-        let beyond = |p: &[f32; 3]| {
-            let p = p.map(f64::from);
+        let beyond = |p: &[f64; 3]| {
+            let p = *p;
             let mut bits = 0;
             let mut bit = |is_beyond: bool| bits = bits << 1 | u16::from(is_beyond);
             for i in 0..3 {
@@ -410,7 +410,7 @@ impl Grid {
     fn empty(mesh: &MeshView<'_>) -> Self {
         let (mut min, mut max) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         for &v in mesh.tets.iter().filter(|tet| tet[0] != NONE).flatten() {
-            let p = mesh.positions[v as usize].map(f64::from);
+            let p = mesh.positions[v as usize];
             (0..3).for_each(|i| {
                 min[i] = min[i].min(p[i]);
                 max[i] = max[i].max(p[i]);
@@ -442,9 +442,9 @@ impl Grid {
     fn range(&self, mesh: &MeshView<'_>, tet: &[u32; 4]) -> [[usize; 2]; 3] {
         let corners = tet.map(|v| mesh.positions[v as usize]);
         [0, 1, 2].map(|i| {
-            let low = corners.iter().fold(f32::INFINITY, |m, p| m.min(p[i]));
-            let high = corners.iter().fold(f32::NEG_INFINITY, |m, p| m.max(p[i]));
-            [self.place(f64::from(low), i), self.place(f64::from(high), i)]
+            let low = corners.iter().fold(f64::INFINITY, |m, p| m.min(p[i]));
+            let high = corners.iter().fold(f64::NEG_INFINITY, |m, p| m.max(p[i]));
+            [self.place(low, i), self.place(high, i)]
         })
     }
 

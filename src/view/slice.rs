@@ -31,8 +31,8 @@ impl Plane {
     }
 
     /// How far a point is above the plane, times the length of the normal.
-    pub fn height(&self, p: [f32; 3]) -> f64 {
-        let [x, y, z] = [0, 1, 2].map(|i| self.normal[i] * f64::from(p[i]));
+    pub fn height(&self, p: [f64; 3]) -> f64 {
+        let [x, y, z] = [0, 1, 2].map(|i| self.normal[i] * p[i]);
         x + y + z - self.offset
     }
 
@@ -41,7 +41,7 @@ impl Plane {
     }
 
     /// The position of a vertex and the field's value there.
-    fn vertex(&self, mesh: &MeshView<'_>, crossing: &Crossing) -> ([f32; 3], f32) {
+    fn vertex(&self, mesh: &MeshView<'_>, crossing: &Crossing) -> ([f64; 3], f64) {
         let t = crossing.fraction(0.0, |p| self.height_at(mesh, p));
         (crossing.place(mesh.positions, t), crossing.value(mesh.field, t))
     }
@@ -51,8 +51,8 @@ impl Plane {
 #[derive(Clone, Debug, Default)]
 pub struct Slice {
     plane: Option<Plane>,
-    positions: Vec<[f32; 3]>,
-    values: Vec<f32>,
+    positions: Vec<[f64; 3]>,
+    values: Vec<f64>,
     indices: Vec<[u32; 3]>,
     pieces: Pieces,
     /// Of each point of the mesh, the side of the plane that it is on.
@@ -70,12 +70,12 @@ impl Slice {
     }
 
     /// Vertices in model units.
-    pub fn positions(&self) -> &[[f32; 3]] {
+    pub fn positions(&self) -> &[[f64; 3]] {
         &self.positions
     }
 
     /// The field's value at each vertex.
-    pub fn values(&self) -> &[f32] {
+    pub fn values(&self) -> &[f64] {
         &self.values
     }
 
@@ -83,7 +83,7 @@ impl Slice {
     ///
     /// # Panics
     /// If there are fewer points or numbers than in the mesh that was sliced.
-    pub fn interpolate(&self, mesh: &MeshView<'_>, field: &[f32]) -> Vec<f32> {
+    pub fn interpolate(&self, mesh: &MeshView<'_>, field: &[f64]) -> Vec<f64> {
         let Some(plane) = &self.plane else { return Vec::new() };
         let list = self.pieces.crossings.list.iter();
         list.map(|crossing| crossing.value(field, crossing.fraction(0.0, |p| plane.height_at(mesh, p))))
@@ -200,8 +200,8 @@ impl Slice {
     }
 }
 
-fn bits([x, y, z]: [f32; 3], value: f32) -> [u32; 4] {
-    [x, y, z, value].map(f32::to_bits)
+fn bits([x, y, z]: [f64; 3], value: f64) -> [u64; 4] {
+    [x, y, z, value].map(f64::to_bits)
 }
 
 /// On which side of a plane a point is: bits, so that those of a tetrahedron can be put together.

@@ -13,11 +13,11 @@ use std::f64::consts::TAU;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Solids {
     /// Vertices, in model units.
-    pub positions: Vec<[f32; 3]>,
+    pub positions: Vec<[f64; 3]>,
     /// One unit normal per vertex, outwards.
     pub normals: Vec<[f32; 3]>,
     /// What each vertex is coloured by, in the unit of that field.
-    pub values: Vec<f32>,
+    pub values: Vec<f64>,
     /// Triangles, counter-clockwise when seen from outside.
     pub indices: Vec<[u32; 3]>,
     /// Points of the unit circle: a side of each body begins at each.
@@ -123,9 +123,9 @@ impl Solids {
     }
 
     /// Adds a vertex.
-    pub(super) fn vertex(&mut self, position: DVec3, normal: DVec3, value: f32) -> u32 {
+    pub(super) fn vertex(&mut self, position: DVec3, normal: DVec3, value: f64) -> u32 {
         let vertex = self.positions.len() as u32;
-        self.positions.push(position.to_array().map(|x| x as f32));
+        self.positions.push(position.to_array());
         self.normals.push(normal.to_array().map(|x| x as f32));
         self.values.push(value);
         vertex
@@ -133,7 +133,7 @@ impl Solids {
 
     /// Adds a ring of vertices: `place` makes position and normal of a point of the unit circle. Gives the
     /// first vertex.
-    pub(super) fn ring(&mut self, value: f32, place: impl Fn([f64; 2]) -> (DVec3, DVec3)) -> u32 {
+    pub(super) fn ring(&mut self, value: f64, place: impl Fn([f64; 2]) -> (DVec3, DVec3)) -> u32 {
         let first = self.positions.len() as u32;
         for k in 0..self.circle.len() {
             let (position, normal) = place(self.circle[k]);

@@ -7,6 +7,8 @@ use crate::view::MeshView;
 #[derive(Clone, Copy, Debug)]
 pub struct FieldStats {
     volume: Sum,
+    /// The first value. Sums are of differences from it: squares of values in a narrow range far from 0 have no digits for that.
+    base: f64,
     integral: Sum,
     squares: Sum,
     min: f64,
@@ -17,6 +19,7 @@ impl Default for FieldStats {
     fn default() -> Self {
         Self {
             volume: Sum::default(),
+            base: f64::NAN,
             integral: Sum::default(),
             squares: Sum::default(),
             min: f64::INFINITY,
@@ -39,8 +42,12 @@ impl FieldStats {
     /// Adds a tetrahedron.
     pub fn add(&mut self, corners: [[f64; 3]; 4], values: [f64; 4]) {
         let volume = volume_of(corners);
-        let sum: f64 = values.iter().sum();
-        let squares: f64 = values.iter().map(|v| v * v).sum();
+        if self.base.is_nan() {
+            self.base = values[0];
+        }
+        let differences = values.map(|value| value - self.base);
+        let sum: f64 = differences.iter().sum();
+        let squares: f64 = differences.iter().map(|v| v * v).sum();
         self.volume.add(volume);
         self.integral.add(volume * 0.25 * sum);
         self.squares.add(volume * (sum * sum + squares) / 20.0);
@@ -55,21 +62,26 @@ impl FieldStats {
 
     /// The integral of the field over the volume.
     pub fn integral(&self) -> f64 {
-        self.integral.total()
+        if self.volume() > 0.0 { self.base * self.volume() + self.integral.total() } else { 0.0 }
     }
 
     /// The mean of the field; 0 where there is no volume.
     pub fn mean(&self) -> f64 {
-        if self.volume() > 0.0 { self.integral() / self.volume() } else { 0.0 }
+        if self.volume() > 0.0 { self.base + self.mean_difference() } else { 0.0 }
     }
 
     /// The standard deviation of the field from its mean over the volume.
     pub fn deviation(&self) -> f64 {
         if self.volume() > 0.0 {
-            (self.squares.total() / self.volume() - self.mean() * self.mean()).max(0.0).sqrt()
+            (self.squares.total() / self.volume() - self.mean_difference().powi(2)).max(0.0).sqrt()
         } else {
             0.0
         }
+    }
+
+    /// The mean of the differences from the first value.
+    fn mean_difference(&self) -> f64 {
+        self.integral.total() / self.volume()
     }
 
     /// The smallest and the largest value; infinite where there is nothing.
@@ -90,7 +102,7 @@ impl Histogram {
 
 fn each_tet(mesh: &MeshView<'_>, mut see: impl FnMut([[f64; 3]; 4], [f64; 4])) {
     for tet in mesh.tets.iter().filter(|tet| tet[0] != NONE) {
-        let corners = tet.map(|v| mesh.positions[v as usize].map(f64::from));
-        see(corners, tet.map(|v| f64::from(mesh.field[v as usize])));
+        let corners = tet.map(|v| mesh.positions[v as usize]);
+        see(corners, tet.map(|v| mesh.field[v as usize]));
     }
 }

@@ -105,7 +105,7 @@ pub struct Streamline {
 pub struct Tracer<'a> {
     probe: Probe<'a>,
     /// The components along x, y and z, one number a point each.
-    vectors: [&'a [f32]; 3],
+    vectors: [&'a [f64]; 3],
     largest_speed: f64,
 }
 
@@ -114,8 +114,8 @@ impl<'a> Tracer<'a> {
     ///
     /// # Panics
     /// If a component has fewer numbers than the mesh has points.
-    pub fn new(mesh: MeshView<'a>, vectors: [&'a [f32]; 3]) -> Self {
-        let vector = |p: usize| vectors.map(|component| f64::from(component[p]));
+    pub fn new(mesh: MeshView<'a>, vectors: [&'a [f64]; 3]) -> Self {
+        let vector = |p: usize| vectors.map(|component| component[p]);
         let speeds = (0..mesh.positions.len()).map(|p| length(vector(p)));
         let largest_speed = speeds.fold(0.0, f64::max);
         Self { probe: Probe::new(mesh), vectors, largest_speed }
@@ -193,7 +193,7 @@ impl<'a> Tracer<'a> {
 
     fn shortest_edge(&self, tet: u32) -> f64 {
         let mesh = self.probe.mesh();
-        let corners = mesh.tets[tet as usize].map(|v| mesh.positions[v as usize].map(f64::from));
+        let corners = mesh.tets[tet as usize].map(|v| mesh.positions[v as usize]);
         let edges = crate::mesh::EDGES.map(|[a, b]| distance(corners[a], corners[b]));
         edges.into_iter().fold(f64::INFINITY, f64::min)
     }

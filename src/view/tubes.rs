@@ -47,7 +47,7 @@ impl Default for TubeOptions {
 #[derive(Clone, Copy, Debug)]
 struct Bead {
     at: DVec3,
-    value: f32,
+    value: f64,
 }
 
 /// A ring of vertices.
@@ -166,7 +166,7 @@ fn beads(points: &[StreamPoint], value: &mut impl FnMut(&StreamPoint) -> f64) ->
         let at = DVec3::from(point.position);
         let differs = beads.last().is_none_or(|last| direction(last.at, at).is_some());
         if at.is_finite() && differs {
-            beads.push(Bead { at, value: value(point) as f32 });
+            beads.push(Bead { at, value: value(point) });
         }
     }
     beads

@@ -14,7 +14,7 @@
 //! little optical depth. So there are no steps along the ray, and nothing between samples is missed. This is the slow, plain twin that the
 //! renderer is compared with.
 
-use crate::geom::Camera;
+use crate::geom::{Camera, SinglePoints, SingleValues};
 use crate::view::{MeshView, Probe, Span};
 use glam::DVec2;
 
@@ -112,6 +112,17 @@ impl Medium {
         Self { knots }
     }
 
+    /// The same medium where points and values are stored in single precision.
+    #[must_use]
+    pub fn relative_to(&self, points: &SinglePoints, values: &SingleValues) -> Self {
+        let knot = |knot: &Knot| Knot {
+            value: values.relative(knot.value),
+            extinction: knot.extinction * points.unit,
+            ..*knot
+        };
+        Self { knots: self.knots.iter().map(knot).collect() }
+    }
+
     /// What the medium is where the field is `value`.
     fn at(&self, value: f64) -> Knot {
         let after = self.knots.partition_point(|knot| knot.value <= value);
@@ -184,7 +195,7 @@ impl Medium {
         probe.make_grid();
         let aspect = f64::from(width) / f64::from(height);
         let rays = camera.rays(aspect);
-        let distances = mesh.positions.iter().map(|p| rays.origin[0].distance(p.map(f64::from).into()));
+        let distances = mesh.positions.iter().map(|p| rays.origin[0].distance((*p).into()));
         let farthest = distances.fold(0.0, f64::max);
         let place = |i: u32, count: u32| 2.0 * (f64::from(i) + 0.5) / f64::from(count) - 1.0;
         let pixels = (0..height).flat_map(|row| (0..width).map(move |column| [column, row]));

@@ -1,6 +1,6 @@
 //! A need that a JavaScript function decides: it gets many tetrahedra at once and returns the excess of each.
 
-use super::arrays::{floats, object};
+use super::arrays::{doubles, object};
 use super::error::WebError;
 use super::read_error::list;
 use crate::geom::Lattice;
@@ -72,14 +72,14 @@ impl Callback {
         let mut errors = Vec::with_capacity(tets.len());
         for tet in tets {
             let corners = tet.corners.iter().flat_map(|corner| self.lattice.point(*corner));
-            positions.extend(corners.map(|x| x as f32));
-            values.extend((tet.levels)(self.number).map(|level| self.field.value(level) as f32));
-            errors.push((tet.error.error() * self.field.range()) as f32);
+            positions.extend(corners);
+            values.extend((tet.levels)(self.number).map(|level| self.field.value(level)));
+            errors.push(tet.error.error() * self.field.range());
         }
         object(&[
-            ("positions", floats(&positions)),
-            ("values", floats(&values)),
-            ("errors", floats(&errors)),
+            ("positions", doubles(&positions)),
+            ("values", doubles(&values)),
+            ("errors", doubles(&errors)),
             ("count", tets.len().into()),
         ])
     }

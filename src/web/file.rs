@@ -5,6 +5,7 @@ use super::error::WebError;
 use super::loader::{RangeLoader, SharedLoader};
 use super::options::{Asked, asked};
 use super::results::{self, JsBlocks, JsProgress, JsStats};
+use super::stored::Stored;
 use crate::format::DecodeOptions;
 use crate::mt::MtInfo;
 use crate::refine::{RefineStats, Request, View};
@@ -87,6 +88,11 @@ impl File {
 
     pub fn info(&self) -> Result<&MtInfo, WebError> {
         self.session().info().ok_or_else(WebError::not_ready)
+    }
+
+    /// How the mesh is stored in arrays of single precision, with the field that it carries.
+    pub fn stored(&self) -> Result<Stored, WebError> {
+        Stored::of(self.info()?, self.session().field())
     }
 
     /// What `options` ask for; `camera` is the one of the viewer, if there is one.

@@ -1,7 +1,8 @@
 //! Meshes and what has changed in them, for JavaScript that follows them.
 
-use super::arrays::{floats, integers, object, set};
+use super::arrays::{integers, object, set};
 use super::results::{JsDelta, JsMesh, mesh_arrays, put_arrays};
+use super::stored::Stored;
 use crate::mt::MeshChanges;
 use crate::view::MeshView;
 use js_sys::Object;
@@ -15,23 +16,24 @@ pub struct Changes {
 }
 
 /// A copy of the `wanted` arrays of `view` (see [`put_arrays`]) outside wasm memory, with what has changed in it.
-pub fn mesh(view: &MeshView<'_>, changes: &Changes, wanted: u32) -> JsMesh {
-    let mesh = mesh_arrays(view, wanted);
+pub fn mesh(view: &MeshView<'_>, stored: &Stored, changes: &Changes, wanted: u32) -> JsMesh {
+    let mesh = mesh_arrays(view, stored, wanted);
     set(mesh.as_ref(), "changes", &ranges(changes));
     mesh
 }
 
 /// A copy of those parts of the `wanted` arrays of `mesh` that have changed.
-pub fn delta(mesh: &MeshView<'_>, changes: &Changes, wanted: u32) -> JsDelta {
+pub fn delta(mesh: &MeshView<'_>, stored: &Stored, changes: &Changes, wanted: u32) -> JsDelta {
     let MeshChanges { vertices, tets } = &changes.ranges;
     let delta: JsDelta = object(&[
         ("vertexCount", mesh.positions.len().into()),
         ("tetCount", mesh.tets.len().into()),
         ("changes", ranges(changes)),
     ]);
+    stored.put(delta.as_ref());
     put_arrays(delta.as_ref(), wanted, |at| match at {
-        0 => floats(&parts(mesh.positions.as_flattened(), vertices, 3)),
-        1 => floats(&parts(mesh.field, vertices, 1)),
+        0 => stored.positions(parts(mesh.positions, vertices, 1).into_iter()),
+        1 => stored.values(parts(mesh.field, vertices, 1).into_iter()),
         2 => integers(&parts(mesh.tets.as_flattened(), tets, 4)),
         _ => integers(&parts(mesh.neighbors.as_flattened(), tets, 4)),
     });

@@ -6,6 +6,7 @@
 
 use super::error::WebError;
 use super::places::places;
+use super::stored::Stored;
 use super::tools::{self, JsIsoSurface, JsProfile, JsSlice, JsStats, JsStreamlines, JsSurface, Way};
 use crate::mt::MeshChanges;
 use crate::session::MeshFollower;
@@ -25,13 +26,15 @@ pub struct MeshTools {
     /// What has changed since the surface and the slice were last asked for.
     surface_behind: MeshFollower,
     slice_behind: MeshFollower,
+    /// How what is handed out is stored.
+    stored: Stored,
 }
 
 /// The arrays of a [`MeshView`].
 #[derive(Default)]
 struct MeshCopy {
-    positions: Vec<[f32; 3]>,
-    field: Vec<f32>,
+    positions: Vec<[f64; 3]>,
+    field: Vec<f64>,
     tets: Vec<[u32; 4]>,
     neighbors: Vec<[u32; 4]>,
 }
@@ -51,8 +54,14 @@ impl MeshTools {
         Self::default()
     }
 
+    /// How arrays of single precision are stored: what [`CoreSession::stored`](super::CoreSession::stored) said.
+    #[wasm_bindgen(js_name = setStored)]
+    pub fn set_stored(&mut self, numbers: &[f64]) {
+        self.stored = Stored::from_numbers(numbers);
+    }
+
     /// Makes room for a mesh of so many points and tetrahedra, of which these ranges are written next: start and end of each. Says
-    /// where the arrays are, as [`CoreSession::places`](super::CoreSession::places) does.
+    /// where the arrays are, as [`CoreSession::sources`](super::CoreSession::sources) does.
     pub fn change(
         &mut self,
         points: usize,
@@ -80,7 +89,7 @@ impl MeshTools {
         let mesh = self.mesh.view();
         let MeshChanges { vertices, tets } = self.surface_behind.take(mesh.positions.len(), mesh.tets.len());
         self.surface.update(&mesh, values, &vertices, &tets);
-        Ok(tools::iso_surface(&self.surface))
+        Ok(tools::iso_surface(&self.surface, &self.stored))
     }
 
     /// The section of the mesh with the plane `normal · p = offset`.
@@ -93,12 +102,12 @@ impl MeshTools {
         } else {
             self.slice.extract(&mesh, &plane);
         }
-        Ok(tools::section(&self.slice))
+        Ok(tools::section(&self.slice, &self.stored))
     }
 
     /// The boundary of the mesh.
     pub fn surface(&self) -> JsSurface {
-        tools::boundary(&self.mesh.view())
+        tools::boundary(&self.mesh.view(), &self.stored)
     }
 
     /// The field at some points, three coordinates each; NaN outside of the mesh.
@@ -116,9 +125,9 @@ impl MeshTools {
     #[expect(clippy::too_many_arguments, reason = "wasm-bindgen passes no structures of slices")]
     pub fn streamlines(
         &self,
-        x: &[f32],
-        y: &[f32],
-        z: &[f32],
+        x: &[f64],
+        y: &[f64],
+        z: &[f64],
         seeds: &[f64],
         backward: bool,
         max_length: f64,

@@ -42,6 +42,8 @@ mod reader;
 mod results;
 #[cfg(feature = "web-session")]
 mod session;
+#[cfg(any(feature = "web-session", feature = "web-tools", feature = "gpu"))]
+mod stored;
 #[cfg(any(feature = "web-tools", all(feature = "gpu", target_arch = "wasm32")))]
 mod tools;
 #[cfg(all(feature = "gpu", target_arch = "wasm32"))]

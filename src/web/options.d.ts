@@ -67,11 +67,11 @@ export interface TetBatch {
   /** Number of tetrahedra. */
   count: number;
   /** Twelve coordinates a tetrahedron. */
-  positions: Float32Array;
+  positions: Float64Array;
   /** Four values a tetrahedron, in field units. */
-  values: Float32Array;
+  values: Float64Array;
   /** The error of each tetrahedron, in field units: what is removed with it differs from the reference by so much. */
-  errors: Float32Array;
+  errors: Float64Array;
 }
 
 /** How often the error of each tetrahedron exceeds what is wanted there: above 1 it is refined. */

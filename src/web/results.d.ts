@@ -22,6 +22,9 @@ export interface FieldInfo {
   max: number;
   /** Bits that a value takes on its lattice. */
   bits: number;
+  /** How arrays of single precision hold the values: `offset + scale * v`. 0 and 1 unless the field needs it; see {@link Stored}. */
+  offset: number;
+  scale: number;
   /** The unit of the values; empty if it is not known. */
   unit: string;
   /** The time that the values are of. Time steps of one field are fields of one name. */
@@ -90,6 +93,8 @@ export interface MtInfo {
   fields: FieldInfo[];
   /** A box that holds every mesh of the volume, and may be larger: `[x0, y0, z0, x1, y1, z1]` in model units. */
   bounds: number[];
+  /** What positions in arrays of single precision are relative to. 0 unless the volume needs it; see {@link Stored}. */
+  origin: [number, number, number];
   /** Size of the reference mesh, the finest one. */
   vertices: number;
   tetrahedra: number;
@@ -150,7 +155,7 @@ export interface MeshChanges {
 }
 
 /** Only what has changed in a mesh. `applyChanges` makes the mesh of it. */
-export interface MeshDelta {
+export interface MeshDelta extends Stored {
   /** Size of the mesh. */
   vertexCount: number;
   tetCount: number;
@@ -163,10 +168,10 @@ export interface MeshDelta {
 }
 
 /** A conforming tetrahedral mesh with one value per vertex. */
-export interface Mesh {
-  /** Three coordinates a vertex. */
+export interface Mesh extends Stored {
+  /** Three coordinates a vertex, relative to `origin`. */
   positions: Float32Array;
-  /** One value a vertex, in field units. */
+  /** One value a vertex, relative to `offset`: `offset + scale * v` in field units. */
   field: Float32Array;
   /** Four vertices a tetrahedron, positive: (b - a) x (c - a) . (d - a) > 0. */
   tets: Uint32Array;

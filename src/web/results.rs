@@ -1,7 +1,8 @@
 //! What JavaScript gets of a session: plain objects, and typed arrays that own their memory.
 
-use super::arrays::{doubles, floats, integers, list, object, record, set};
+use super::arrays::{doubles, integers, list, object, record, set};
 use super::options::Asked;
+use super::stored::Stored;
 use crate::mt::{FieldInfo, MtInfo};
 use crate::refine::RefineStats;
 use crate::session::{BlockProgress, Progress, Session};
@@ -66,6 +67,7 @@ pub fn info(session: &Session) -> Option<JsInfo> {
         ("kind", info.kind.name().into()),
         ("fields", fields.into()),
         ("bounds", list(&[x0, y0, z0, x1, y1, z1])),
+        ("origin", list(&info.single_points().origin)),
         ("vertices", info.vertices.into()),
         ("tetrahedra", info.tetrahedra.into()),
         ("updates", info.updates.into()),
@@ -81,11 +83,14 @@ fn field(session: &Session, info: &MtInfo, index: usize) -> JsValue {
     let curve = session.bytes_by_error(index);
     let errors: Vec<f64> = curve.iter().map(|point| point.error_in_units(&info.fields[index])).collect();
     let bytes: Vec<f64> = curve.iter().map(|point| point.bytes as f64).collect();
+    let single = info.fields[index].single_values();
     object(&[
         ("name", name.as_str().into()),
         ("min", (*min).into()),
         ("max", (*max).into()),
         ("bits", (*bits).into()),
+        ("offset", single.offset.into()),
+        ("scale", single.unit.into()),
         ("unit", unit.as_str().into()),
         ("time", (*time).into()),
         ("vector", vector.unwrap_or(JsValue::UNDEFINED)),
@@ -140,11 +145,12 @@ pub fn stats(stats: &RefineStats, info: &MtInfo, asked: &Asked) -> JsStats {
 const ARRAYS: [&str; 4] = ["positions", "field", "tets", "neighbors"];
 
 /// A copy of the `wanted` arrays of `mesh` outside wasm memory.
-pub fn mesh_arrays(mesh: &MeshView<'_>, wanted: u32) -> JsMesh {
+pub fn mesh_arrays(mesh: &MeshView<'_>, stored: &Stored, wanted: u32) -> JsMesh {
     let arrays: JsMesh = object(&[]);
+    stored.put(arrays.as_ref());
     put_arrays(arrays.as_ref(), wanted, |at| match at {
-        0 => floats(mesh.positions.as_flattened()),
-        1 => floats(mesh.field),
+        0 => stored.positions(mesh.positions.iter().copied()),
+        1 => stored.values(mesh.field.iter().copied()),
         2 => integers(mesh.tets.as_flattened()),
         _ => integers(mesh.neighbors.as_flattened()),
     });

@@ -5,9 +5,9 @@ use super::file::File;
 use super::loader::RangeLoader;
 use super::mesh_changes::{self, Changes};
 use super::options::{RefineOptions, field_index};
-use super::places::places;
+use super::places::{place, places};
 use super::results::{self, JsBlocks, JsDelta, JsInfo, JsMesh, JsProgress, JsStats};
-use crate::mt::MtInfo;
+use crate::mt::{MeshChanges, MtInfo};
 use crate::session::Session;
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -19,6 +19,8 @@ pub struct CoreSession {
     file: File,
     /// How many meshes have been handed out.
     handed: u32,
+    /// Positions and values of the mesh in single precision, for who reads wasm memory; kept up from the first time on.
+    single: Option<(Vec<[f32; 3]>, Vec<f32>)>,
 }
 
 #[wasm_bindgen]
@@ -26,14 +28,14 @@ impl CoreSession {
     /// An empty session for the fields of these names, or for all if none is named, that is fed from front to back.
     #[wasm_bindgen(constructor)]
     pub fn new(fields: Vec<String>) -> Self {
-        Self { file: File::whole(fields), handed: 0 }
+        Self { file: File::whole(fields), ..Self::default() }
     }
 
     /// A session for a file that `loader` brings in parts: `supply` takes them, and those that are not needed go when they take
     /// more bytes than `memory`.
     #[wasm_bindgen(js_name = inParts)]
     pub fn in_parts(fields: Vec<String>, memory: f64, loader: &RangeLoader) -> Self {
-        Self { file: File::in_parts(fields, memory, loader), handed: 0 }
+        Self { file: File::in_parts(fields, memory, loader), ..Self::default() }
     }
 
     /// Takes the complete ranges of the loader, and gives it those that are wanted then; whether there was any.
@@ -101,20 +103,38 @@ impl CoreSession {
     /// The current mesh, and what has changed in it since `mesh` or `delta` was last called. `arrays` is a set of bits: 1 for
     /// positions, 2 for the field, 4 for tetrahedra, 8 for neighbours.
     pub fn mesh(&mut self, arrays: u32) -> Result<JsMesh, WebError> {
-        let changes = self.changes()?;
-        Ok(mesh_changes::mesh(&self.session_mut().view(), &changes, arrays))
+        let (stored, changes) = (self.file.stored()?, self.changes()?);
+        Ok(mesh_changes::mesh(&self.session_mut().view(), &stored, &changes, arrays))
     }
 
     /// Of the current mesh only what has changed since `mesh` or `delta` was last called.
     pub fn delta(&mut self, arrays: u32) -> Result<JsDelta, WebError> {
-        let changes = self.changes()?;
-        Ok(mesh_changes::delta(&self.session_mut().view(), &changes, arrays))
+        let (stored, changes) = (self.file.stored()?, self.changes()?);
+        Ok(mesh_changes::delta(&self.session_mut().view(), &stored, &changes, arrays))
     }
 
-    /// Where those four arrays are in wasm memory, until the next call: address and number of elements of each.
+    /// Where those four arrays are in wasm memory, as `mesh` last handed them out, until the next call: address and number of elements of
+    /// each.
     pub fn places(&mut self) -> Result<Vec<usize>, WebError> {
+        let stored = self.file.stored()?;
+        let mesh = self.file.session_mut().view();
+        let (positions, values) = self.single.get_or_insert_with(|| {
+            let positions = mesh.positions.iter().map(|point| stored.position(*point));
+            (positions.collect(), mesh.field.iter().map(|value| stored.value(*value)).collect())
+        });
+        let arrays = [place(positions.as_flattened()), place(values)];
+        Ok([arrays.concat(), places(&mesh)[4..].to_vec()].concat())
+    }
+
+    /// The same of the mesh itself, with positions and values in double precision: for the copy of [`MeshTools`](super::MeshTools).
+    pub fn sources(&mut self) -> Result<Vec<usize>, WebError> {
         self.known()?;
         Ok(places(&self.session_mut().view()))
+    }
+
+    /// How arrays of single precision are stored: `origin`, `offset` and `scale`.
+    pub fn stored(&self) -> Result<Vec<f64>, WebError> {
+        Ok(self.file.stored()?.numbers())
     }
 
     /// Which entries of those arrays have changed since this was last called, or all of them: for the copy of
@@ -125,7 +145,7 @@ impl CoreSession {
     }
 
     /// A field at the points of the current mesh, by name or number.
-    pub fn values(&self, field: &JsValue) -> Result<Vec<f32>, WebError> {
+    pub fn values(&self, field: &JsValue) -> Result<Vec<f64>, WebError> {
         let index = field_index(self.known()?, field)?;
         Ok(self.file.session().values(index))
     }
@@ -149,7 +169,24 @@ impl CoreSession {
     fn changes(&mut self) -> Result<Changes, WebError> {
         self.known()?;
         self.handed += 1;
-        Ok(Changes { ranges: self.session_mut().take_changes(), to: self.handed })
+        let ranges = self.session_mut().take_changes();
+        if self.single.is_some() {
+            self.keep_up(&ranges)?;
+        }
+        Ok(Changes { ranges, to: self.handed })
+    }
+
+    /// Brings the mesh in single precision up to date.
+    fn keep_up(&mut self, changes: &MeshChanges) -> Result<(), WebError> {
+        let stored = self.file.stored()?;
+        let mesh = self.file.session_mut().view();
+        let Some((positions, values)) = &mut self.single else { return Ok(()) };
+        positions.resize(mesh.positions.len(), [0.0; 3]);
+        values.resize(mesh.field.len(), 0.0);
+        for v in changes.vertices.iter().cloned().flatten().map(|v| v as usize) {
+            (positions[v], values[v]) = (stored.position(mesh.positions[v]), stored.value(mesh.field[v]));
+        }
+        Ok(())
     }
 
     fn known(&self) -> Result<&MtInfo, WebError> {

@@ -1,21 +1,30 @@
-/** Triangles of an isosurface. */
-export interface IsoSurface {
-  /** Three coordinates a vertex. */
-  positions: Float32Array;
-  /** Three components a vertex, of unit length. */
-  normals: Float32Array;
-  /** Three vertices a triangle. */
-  indices: Uint32Array;
+/**
+ * How numbers are stored in arrays of single precision, which graphics take: relative to numbers near them where single precision would lose
+ * steps of the positions or levels of the field otherwise, as in UTM coordinates or a field of seconds since 1970. This depends on the file
+ * alone, so it never changes for a field while the file is open. Stored so, numbers are those of the mesh within half a step or level.
+ */
+export interface Stored {
+  /** What positions are relative to, in model units: a vertex is at `origin + positions`. 0 unless the data needs it. */
+  origin: [number, number, number];
+  /** What values are relative to: a value is `offset + scale * v`, in field units. 0 and 1 unless the data needs them. */
+  offset: number;
+  scale: number;
 }
 
 /** Triangles with one value a vertex. */
-export interface Surface {
-  /** Three coordinates a vertex. */
+export interface Surface extends Stored {
+  /** Three coordinates a vertex, relative to `origin`. */
   positions: Float32Array;
-  /** One value a vertex, in field units. */
+  /** One value a vertex, relative to `offset`. */
   values: Float32Array;
   /** Three vertices a triangle, counter-clockwise when seen from the side that they face. */
   indices: Uint32Array;
+}
+
+/** Triangles of isosurfaces; the value of a vertex is its isovalue. */
+export interface IsoSurface extends Surface {
+  /** Three components a vertex, of unit length. */
+  normals: Float32Array;
 }
 
 /** The mesh in a plane. */

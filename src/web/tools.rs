@@ -2,6 +2,7 @@
 
 use super::arrays::{doubles, floats, integers, object, set};
 use super::error::WebError;
+use super::stored::Stored;
 use crate::view::{
     BoundarySurface, FieldStats, Histogram, IsoSurface, MeshView, Plane, Probe, Slice, Streamline,
     TraceOptions, Tracer,
@@ -36,13 +37,10 @@ extern "C" {
 const MOST_BINS: u32 = 1 << 20;
 
 /// A copy of `surface` outside wasm memory.
-pub fn iso_surface(surface: &IsoSurface) -> JsIsoSurface {
-    object(&[
-        ("positions", floats(surface.positions.as_flattened())),
-        ("normals", floats(surface.normals.as_flattened())),
-        ("indices", integers(surface.indices.as_flattened())),
-        ("values", floats(&surface.values)),
-    ])
+pub fn iso_surface(surface: &IsoSurface, stored: &Stored) -> JsIsoSurface {
+    let js = triangles(&surface.positions, &surface.values, &surface.indices, stored);
+    set(&js, "normals", &floats(surface.normals.as_flattened()));
+    js.unchecked_into()
 }
 
 /// The plane `normal · p = offset`.
@@ -55,8 +53,8 @@ pub fn plane(normal: &[f64], offset: f64) -> Result<Plane, WebError> {
 }
 
 /// A copy of `slice` outside wasm memory.
-pub fn section(slice: &Slice) -> JsSlice {
-    let js = triangles(slice.positions(), slice.values(), slice.indices());
+pub fn section(slice: &Slice, stored: &Stored) -> JsSlice {
+    let js = triangles(slice.positions(), slice.values(), slice.indices(), stored);
     let mut edges = Vec::new();
     slice.cell_edges(&mut edges);
     set(&js, "edges", &integers(edges.as_flattened()));
@@ -64,10 +62,10 @@ pub fn section(slice: &Slice) -> JsSlice {
 }
 
 /// The boundary of `mesh`.
-pub fn boundary(mesh: &MeshView<'_>) -> JsSurface {
+pub fn boundary(mesh: &MeshView<'_>, stored: &Stored) -> JsSurface {
     let mut boundary = BoundarySurface::new();
     boundary.extract(mesh);
-    triangles(&boundary.positions, &boundary.values, &boundary.indices).unchecked_into()
+    triangles(&boundary.positions, &boundary.values, &boundary.indices, stored).unchecked_into()
 }
 
 /// The field at some points, three coordinates each; NaN outside of the mesh.
@@ -100,7 +98,7 @@ pub struct Way {
 /// The streamlines from some seeds, three coordinates each, through the vector field of three fields.
 pub fn streamlines(
     mesh: MeshView<'_>,
-    vectors: [&[f32]; 3],
+    vectors: [&[f64]; 3],
     seeds: &[f64],
     way: &Way,
 ) -> Result<JsStreamlines, WebError> {
@@ -155,12 +153,14 @@ pub fn stats(
     ]))
 }
 
-fn triangles(positions: &[[f32; 3]], values: &[f32], indices: &[[u32; 3]]) -> Object {
-    object(&[
-        ("positions", floats(positions.as_flattened())),
-        ("values", floats(values)),
+fn triangles(positions: &[[f64; 3]], values: &[f64], indices: &[[u32; 3]], stored: &Stored) -> Object {
+    let js: Object = object(&[
+        ("positions", stored.positions(positions.iter().copied())),
+        ("values", stored.values(values.iter().copied())),
         ("indices", integers(indices.as_flattened())),
-    ])
+    ]);
+    stored.put(&js);
+    js
 }
 
 fn streamline(line: &Streamline, mesh: &MeshView<'_>) -> JsValue {

@@ -279,8 +279,8 @@ impl Viewer {
 
     /// A copy of the mesh that is shown.
     pub fn mesh(&mut self) -> Result<JsMesh, WebError> {
-        self.file.info()?;
-        Ok(results::mesh_arrays(&self.file.session_mut().view(), 0b1111))
+        let stored = self.file.stored()?;
+        Ok(results::mesh_arrays(&self.file.session_mut().view(), &stored, 0b1111))
     }
 
     /// Sets what is drawn: a [`SceneState`](crate::scene::SceneState) as a plain object.
@@ -519,7 +519,7 @@ impl Viewer {
 
     /// What the camera sees.
     pub(super) fn view(&self) -> View {
-        let matrix = self.camera.view_projection(self.aspect()).to_cols_array().map(f64::from);
+        let matrix = self.camera.view_projection(self.aspect()).to_cols_array();
         View { matrix, viewport: self.scene.renderer().size().map(f64::from) }
     }
 

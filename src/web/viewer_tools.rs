@@ -13,19 +13,21 @@ impl Viewer {
     pub fn isosurfaces(&mut self, values: &[f64], smooth: bool) -> Result<JsIsoSurface, WebError> {
         let session = self.file.session_mut();
         session.set_normal_kind(if smooth { NormalKind::Smooth } else { NormalKind::Gradient });
-        Ok(tools::iso_surface(session.isosurfaces(values)?))
+        let stored = self.file.stored()?;
+        Ok(tools::iso_surface(self.file.session_mut().isosurfaces(values)?, &stored))
     }
 
     /// The section of the current mesh with the plane `normal · p = offset`.
     pub fn slice(&mut self, normal: &[f64], offset: f64) -> Result<JsSlice, WebError> {
         let plane = tools::plane(normal, offset)?;
-        Ok(tools::section(self.file.session_mut().slice(&plane)?))
+        let stored = self.file.stored()?;
+        Ok(tools::section(self.file.session_mut().slice(&plane)?, &stored))
     }
 
     /// The boundary of the current mesh.
     pub fn surface(&mut self) -> Result<JsSurface, WebError> {
-        self.file.info()?;
-        Ok(tools::boundary(&self.file.session_mut().view()))
+        let stored = self.file.stored()?;
+        Ok(tools::boundary(&self.file.session_mut().view(), &stored))
     }
 
     /// The field at some points, three coordinates each; NaN outside of the mesh.

@@ -2,14 +2,15 @@
 
 use flate2::read::ZlibDecoder;
 use std::io::{ErrorKind, Read};
-use tetralod::io::{PolyData, write_csv, write_obj, write_ply, write_stl, write_vtp};
+use tetralod::io::{PointValues, PolyData, write_csv, write_obj, write_ply, write_stl, write_vtp};
 
 /// Two triangles of a square, or a zigzag through its corners.
 fn square(lines: bool) -> PolyData {
     let data = PolyData {
         positions: vec![[0.0, 0.0, 0.5], [2.0, 0.0, 0.5], [2.0, 2.0, 0.5], [0.0, 2.0, 0.5]],
         normals: vec![[0.0, 0.0, 1.0]; 4],
-        fields: vec![("a <b>".to_owned(), vec![1.0, 2.0, 3.0, 4.0]), ("x".to_owned(), vec![-0.5; 4])],
+        step: 1e-6,
+        fields: vec![values("a <b>", vec![1.0, 2.0, 3.0, 4.0]), values("x", vec![-0.5; 4])],
         triangles: vec![[0, 1, 2], [0, 2, 3]],
         lines: Vec::new(),
     };
@@ -18,6 +19,23 @@ fn square(lines: bool) -> PolyData {
     } else {
         data
     }
+}
+
+fn values(name: &str, values: Vec<f64>) -> PointValues {
+    PointValues { name: name.to_owned(), values, step: 1e-6 }
+}
+
+/// The same far from the origin, with values in a narrow range.
+fn far() -> PolyData {
+    let data = square(false);
+    let positions = data.positions.iter().map(|p| [p[0] + 600_000.1, p[1] + 5_800_000.3, p[2]]).collect();
+    let values =
+        PointValues { step: 1e-5, ..values("t", vec![1.7e9, 1.7e9 + 0.25, 1.7e9 + 0.5, 1.7e9 + 3.0]) };
+    PolyData { positions, fields: vec![values], ..data }
+}
+
+fn doubles(bytes: &[u8]) -> Vec<f64> {
+    bytes.as_chunks::<8>().0.iter().map(|c| f64::from_le_bytes(*c)).collect()
 }
 
 fn floats(bytes: &[u8]) -> Vec<f32> {
@@ -118,7 +136,7 @@ fn vtp_holds_all_there_is() {
             rest[..rest.find('"').expect("its end")].parse::<usize>().expect("a number")
         };
         assert_eq!(
-            floats(&array(&out, offset("<Points>", "Points"))),
+            floats(&array(&out, offset("<Points>", "Points"))).into_iter().map(f64::from).collect::<Vec<_>>(),
             square(lines).positions.as_flattened()
         );
         assert_eq!(floats(&array(&out, offset("<PointData", "x"))), [-0.5; 4]);
@@ -135,6 +153,63 @@ fn vtp_holds_all_there_is() {
 }
 
 #[test]
+fn what_single_precision_would_lose_is_written_in_double_precision() {
+    let data = far();
+    let mut out = Vec::new();
+    write_vtp(&data, &mut out).expect("written");
+    let text = String::from_utf8_lossy(&out).into_owned();
+    assert!(
+        text.contains("type=\"Float64\" Name=\"Points\"") && text.contains("type=\"Float64\" Name=\"t\"")
+    );
+    assert!(text.contains("type=\"Float32\" Name=\"Normals\""));
+    assert_eq!(doubles(&array(&out, 0)), data.fields[0].values);
+
+    let mut out = Vec::new();
+    write_ply(&data, &mut out).expect("written");
+    let end = b"end_header\n";
+    let at = out.windows(end.len()).position(|w| w == end).expect("a header") + end.len();
+    let header = String::from_utf8_lossy(&out[..at]).into_owned();
+    for line in ["double x", "double y", "double z", "float nx", "double t"] {
+        assert!(header.contains(&format!("property {line}\n")), "{header}");
+    }
+    let second = &out[at + 44..at + 88];
+    assert_eq!(
+        (doubles(&second[..24]), doubles(&second[36..])),
+        (data.positions[1].to_vec(), vec![1.7e9 + 0.25])
+    );
+
+    let mut out = Vec::new();
+    write_obj(&data, &mut out).expect("written");
+    let [x, y, z] = data.positions[2];
+    assert!(String::from_utf8(out).expect("text").contains(&format!("v {x} {y} {z}\n")));
+    // What single precision keeps is as short as it was.
+    let mut out = Vec::new();
+    let third = PolyData { positions: vec![[1.0 / 3.0; 3]; 4], ..square(false) };
+    write_obj(&third, &mut out).expect("written");
+    assert!(String::from_utf8(out).expect("text").contains("v 0.33333334 0.33333334 0.33333334\n"));
+}
+
+#[test]
+fn stl_says_what_its_positions_are_relative_to() {
+    let data = far();
+    let mut out = Vec::new();
+    let origin = write_stl(&data, &mut out).expect("written");
+    assert!(origin[0] > 5e5 && origin[1] > 5e6 && origin[2] == 0.0, "{origin:?}");
+    let [x, y, z] = origin;
+    assert!(String::from_utf8_lossy(&out[..80]).contains(&format!("relative to {x:e} {y:e} {z:e} ")));
+    let corners = floats(&out[84 + 12..84 + 48]);
+    for (stored, triangle) in corners.as_chunks::<3>().0.iter().zip(data.triangles[0]) {
+        for i in 0..3 {
+            let back = origin[i] + f64::from(stored[i]);
+            assert!((back - data.positions[triangle as usize][i]).abs() <= 0.5e-6, "{stored:?}");
+        }
+    }
+    assert_eq!(write_stl(&square(false), &mut Vec::new()).expect("written"), [0.0; 3]);
+    let too_far = PolyData { positions: vec![[0.0; 3], [1e39; 3], [0.0; 3], [1.0; 3]], ..square(false) };
+    assert!(write_stl(&too_far, &mut Vec::new()).is_err());
+}
+
+#[test]
 fn tables_read_back_exactly() {
     let third = 1.0 / 3.0;
     let columns = [("a".to_owned(), vec![1.0, third]), ("b, \"c\"".to_owned(), vec![f64::NAN, -1e-300])];
@@ -148,7 +223,7 @@ fn tables_read_back_exactly() {
 fn arrays_that_do_not_fit_are_refused() {
     let spoilt: [fn(&mut PolyData); 4] = [
         |data| data.normals.truncate(1),
-        |data| data.fields[1].1.push(0.0),
+        |data| data.fields[1].values.push(0.0),
         |data| data.triangles[1][2] = 4,
         |data| data.lines.push(vec![0, 9]),
     ];
@@ -156,9 +231,12 @@ fn arrays_that_do_not_fit_are_refused() {
         let mut data = square(false);
         spoil(&mut data);
         let out = &mut Vec::new();
-        for result in
-            [write_vtp(&data, out), write_stl(&data, out), write_ply(&data, out), write_obj(&data, out)]
-        {
+        for result in [
+            write_vtp(&data, out),
+            write_stl(&data, out).map(|_| ()),
+            write_ply(&data, out),
+            write_obj(&data, out),
+        ] {
             assert_eq!(result.expect_err("it does not fit").kind(), ErrorKind::InvalidInput);
         }
         assert!(out.is_empty());

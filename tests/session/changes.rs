@@ -10,8 +10,8 @@ use tetralod::session::Session;
 /// A copy of the mesh, kept up by change lists.
 #[derive(Default)]
 struct Copy {
-    positions: Vec<[f32; 3]>,
-    field: Vec<f32>,
+    positions: Vec<[f64; 3]>,
+    field: Vec<f64>,
     tets: Vec<[u32; 4]>,
     neighbors: Vec<[u32; 4]>,
 }

@@ -31,7 +31,7 @@ fn opened(kind: MtKind) -> Session {
     session
 }
 
-fn of(session: &mut Session, quantity: TetQuantity) -> Vec<f32> {
+fn of(session: &mut Session, quantity: TetQuantity) -> Vec<f64> {
     let values = session.tet_quantity(quantity).expect("the base mesh is there");
     assert_eq!(values.len(), session.view().tets.len(), "{quantity}");
     values
@@ -60,21 +60,21 @@ fn nothing_is_said_before_there_is_a_mesh() {
 fn sizes_are_longest_edges_and_errors_are_within_the_request() {
     for kind in MtKind::ALL {
         let mut session = opened(kind);
-        let mut largest = f32::INFINITY;
+        let mut largest = f64::INFINITY;
         for error in [0.3, 0.1, 0.02, 0.0] {
             session.refine(&Request::within(error)).expect("a good request");
             let sizes = of(&mut session, TetQuantity::Size);
             let view = session.view();
             for (size, tet) in sizes.iter().zip(view.tets) {
                 let p = tet.map(|v| view.positions[v as usize]);
-                let length = |a: usize, b: usize| (0..3).map(|i| (p[a][i] - p[b][i]).powi(2)).sum::<f32>();
+                let length = |a: usize, b: usize| (0..3).map(|i| (p[a][i] - p[b][i]).powi(2)).sum::<f64>();
                 let pairs = (0..4).flat_map(|a| (0..a).map(move |b| (a, b)));
-                let longest = pairs.map(|(a, b)| length(a, b)).fold(0.0, f32::max).sqrt();
+                let longest = pairs.map(|(a, b)| length(a, b)).fold(0.0, f64::max).sqrt();
                 assert!((size - longest).abs() < 1e-5, "{kind:?}: {size} {longest}");
             }
             let errors = of(&mut session, TetQuantity::Error);
             assert!(errors.iter().all(|e| f64::from(*e) <= error), "{kind:?} within {error}");
-            let most = errors.iter().copied().fold(0.0, f32::max);
+            let most = errors.iter().copied().fold(0.0, f64::max);
             assert!(most <= largest, "{kind:?}");
             largest = most;
             assert!(of(&mut session, TetQuantity::Missing).iter().all(|m| *m == 0.0), "{kind:?}");
@@ -113,9 +113,9 @@ fn depths_grow_where_the_mesh_gets_finer() {
             }
         }
         assert!(before.iter().any(|d| *d > 3.0), "{kind:?}");
-        let most = of(&mut session, TetQuantity::Depth).into_iter().fold(0.0, f32::max);
+        let most = of(&mut session, TetQuantity::Depth).into_iter().fold(0.0, f64::max);
         let stats = tetralod::mt::stats(session.mt().expect("it is open")).expect("a sound MT");
-        assert!(most <= stats.depth as f32, "{kind:?}: {most} of {}", stats.depth);
+        assert!(most <= stats.depth as f64, "{kind:?}: {most} of {}", stats.depth);
         // What was learnt with other meshes is what a fresh session finds.
         let region = Bounds { min: [0.0; 3], max: [0.4; 3] };
         let request = Request::from(Need::within(0.01).inside(region));
@@ -125,7 +125,7 @@ fn depths_grow_where_the_mesh_gets_finer() {
         }
         let sorted = |session: &mut Session| {
             let mut depths = of(session, TetQuantity::Depth);
-            depths.sort_by(f32::total_cmp);
+            depths.sort_by(f64::total_cmp);
             depths
         };
         assert_eq!(sorted(&mut session), sorted(&mut fresh), "{kind:?}");
@@ -140,7 +140,7 @@ fn blocks_are_those_of_the_file() {
         session.refine(&Request::within(0.0)).expect("a good request");
         let count = session.decoder().index().expect("a whole file").blocks.len();
         let blocks = of(&mut session, TetQuantity::Block);
-        assert!(blocks.iter().all(|b| *b >= 0.0 && *b <= count as f32), "{kind:?}");
+        assert!(blocks.iter().all(|b| *b >= 0.0 && *b <= count as f64), "{kind:?}");
         assert!(blocks.iter().any(|b| *b > 1.0), "{kind:?}");
     }
 }
@@ -207,7 +207,7 @@ fn a_reading_tells_all_fields() {
     assert_eq!((reading.position, reading.values.len(), reading.error), (p, 2, 0.0));
     assert!((reading.values[1] - linear(p)).abs() < 0.01, "{reading:?}");
     assert!((reading.values[0] - hilly(p)).abs() < 0.1, "{reading:?}");
-    assert_eq!(reading.size as f32, sizes[reading.tet as usize]);
+    assert_eq!(reading.size as f64, sizes[reading.tet as usize]);
     assert_eq!(session.reading([2.0; 3]), Ok(None));
     assert_eq!(session.reading([f64::NAN; 3]), Ok(None));
 }

@@ -34,7 +34,7 @@ fn picture(renderer: &mut Renderer, scene: &Scene, style: &CellStyle, camera: &C
 }
 
 /// The faces of all tetrahedra, shrunk, with the values of their points or, if given, of the tetrahedra.
-fn faces(scene: &Scene, shrunk: f64, own: Option<&[f32]>) -> Vec<Triangle> {
+fn faces(scene: &Scene, shrunk: f64, own: Option<&[f64]>) -> Vec<Triangle> {
     let of = |(t, tet): (usize, &[u32; 4])| {
         let corners = tet.map(|p| twin::vec(scene.positions[p as usize]));
         let centroid = corners.iter().sum::<DVec3>() / 4.0;
@@ -75,7 +75,7 @@ fn coloured(pixels: &[[f64; 3]]) -> usize {
 fn solid_tetrahedra_are_those_of_the_twin() {
     let Some(mut renderer) = twin::renderer(SIZE) else { return };
     for (mesh, scene) in [("ball", Scene::ball(3)), ("hollow", twin::hollow())] {
-        let own: Vec<f32> = (0..scene.tets.len()).map(|t| (t * 37 % 101) as f32 / 55.0 - 0.8).collect();
+        let own: Vec<f64> = (0..scene.tets.len()).map(|t| (t * 37 % 101) as f64 / 55.0 - 0.8).collect();
         renderer.set_cell_values(&own).unwrap();
         for camera in cameras() {
             let mut covered = usize::MAX;

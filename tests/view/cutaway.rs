@@ -11,9 +11,9 @@ use tetralod::view::{ClipPlane, MeshView};
 #[derive(Clone, Debug, Default)]
 pub struct Cutaway {
     /// Corners in model units, three per triangle, counter-clockwise when seen from outside.
-    pub positions: Vec<[f32; 3]>,
+    pub positions: Vec<[f64; 3]>,
     /// The field's value at each corner.
-    pub values: Vec<f32>,
+    pub values: Vec<f64>,
     /// Tetrahedra that were kept.
     pub kept: usize,
     keep: Vec<bool>,

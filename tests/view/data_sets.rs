@@ -100,8 +100,8 @@ fn gpu_matches_cpu_on_data_sets() {
                 continue;
             }
         };
-        let positions: Vec<[f32; 3]> = mesh.positions.iter().map(|p| p.map(|x| x as f32)).collect();
-        let field: Vec<f32> = mesh.fields[0].values.iter().map(|value| *value as f32).collect();
+        let positions: Vec<[f64; 3]> = mesh.positions.clone();
+        let field: Vec<f64> = mesh.fields[0].values.clone();
         let range = field.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
             [low.min(f64::from(*value)), high.max(f64::from(*value))]
         });

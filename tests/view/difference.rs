@@ -7,8 +7,8 @@ use tetralod::view::{Difference, FieldStats, MeshView};
 
 fn scene(n: u32, field: fn([f64; 3]) -> f64) -> Scene {
     let mesh = cube(n, &[field]);
-    let positions = mesh.positions.iter().map(|p| p.map(|x| x as f32)).collect();
-    Scene::new(positions, mesh.fields[0].values.iter().map(|v| *v as f32).collect(), mesh.tets.clone())
+    let positions = mesh.positions.clone();
+    Scene::new(positions, mesh.fields[0].values.clone(), mesh.tets.clone())
 }
 
 #[test]
@@ -69,7 +69,7 @@ fn bad_meshes_do_no_harm() {
     assert_eq!(nothing, Difference::default());
     assert_eq!(Difference::of(&Scene::default().view(), Scene::default().view()), None);
     let mut broken = scene(2, linear);
-    broken.positions[3] = [f32::NAN; 3];
+    broken.positions[3] = [f64::NAN; 3];
     let difference = Difference::of(&broken.view(), a.view()).expect("a mesh");
     assert!(difference.values[3].is_nan() && difference.largest.is_finite());
 }

@@ -23,8 +23,8 @@ struct Domain {
 fn domains() -> [Domain; 2] {
     let scene = |is_inside: fn([u32; 3]) -> bool| {
         let mesh = blocks([8; 3], &[linear], is_inside);
-        let positions = mesh.positions.iter().map(|p| p.map(|x| x as f32)).collect();
-        Scene::new(positions, mesh.fields[0].values.iter().map(|v| *v as f32).collect(), mesh.tets)
+        let positions = mesh.positions.clone();
+        Scene::new(positions, mesh.fields[0].values.clone(), mesh.tets)
     };
     let is_shell = |cell: [u32; 3]| !cell.iter().all(|c| (2..6).contains(c));
     [

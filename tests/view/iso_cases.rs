@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use tetralod::mesh::{EDGES, NONE};
 use tetralod::view::{ClipPlane, IsoSurface};
 
-type Point = [f32; 3];
+type Point = [f64; 3];
 
 fn extract(scene: &Scene, value: f64) -> IsoSurface {
     let mut surface = IsoSurface::new();
@@ -47,7 +47,7 @@ fn on_border(p: Point) -> bool {
 fn all_patterns_of_signs_give_the_right_triangles() {
     // Below, at, above the isovalue at each of the four corners: 81 patterns, all 16 masks among them.
     for pattern in 0..81 {
-        let field = [1, 3, 9, 27].map(|place| (pattern / place % 3 - 1) as f32);
+        let field = [1, 3, 9, 27].map(|place| (pattern / place % 3 - 1) as f64);
         let surface = extract(&Scene::tet(field), 0.0);
         let [below, at, above] = [-1.0, 0.0, 1.0].map(|v| field.iter().filter(|f| **f == v).count());
         // A polygon with a corner for each crossed edge (below-above) and each touched point, if there is both an
@@ -157,7 +157,7 @@ fn normals_are_unit_vectors_even_where_the_gradient_cancels() {
 }
 
 /// The plain twin: vertices in a map by the edge they lie on, triangles cut from tetrahedra by definition.
-fn plain(scene: &Scene, iso: f32) -> BTreeSet<[[u32; 2]; 3]> {
+fn plain(scene: &Scene, iso: f64) -> BTreeSet<[[u32; 2]; 3]> {
     let inside = |p: u32| scene.field[p as usize] < iso;
     let mut triangles = BTreeMap::new();
     for tet in &scene.tets {
@@ -201,11 +201,11 @@ fn equals_the_plain_version() {
             if fa < iso && iso <= fb {
                 let [p, q] = [a, b].map(|p| scene.positions[p as usize].map(f64::from));
                 let t = (iso - fa) / (fb - fa);
-                let at = [0, 1, 2].map(|i| ((p[i] + t * (q[i] - p[i])) as f32).to_bits());
+                let at = [0, 1, 2].map(|i| ((p[i] + t * (q[i] - p[i])) as f64).to_bits());
                 names.insert(at, if fb == iso { [b, b] } else { [a, b] });
             }
         }
-        let name = |v: u32| names[&surface.positions[v as usize].map(f32::to_bits)];
+        let name = |v: u32| names[&surface.positions[v as usize].map(f64::to_bits)];
         let mut found = BTreeSet::new();
         let mut quads = 0;
         let wanted = plain(&scene, iso);
@@ -242,16 +242,16 @@ fn reuse_and_order_change_nothing() {
 }
 
 #[test]
-fn values_at_the_ends_of_f32_stay_finite() {
-    let surface = extract(&Scene::tet([-f32::MAX, f32::MAX, f32::MAX, f32::MAX]), 0.0);
+fn values_at_the_ends_of_f64_stay_finite() {
+    let surface = extract(&Scene::tet([-f64::MAX, f64::MAX, f64::MAX, f64::MAX]), 0.0);
     assert_eq!(surface.indices.len(), 1);
-    assert!(
-        surface.positions.iter().flatten().chain(surface.normals.iter().flatten()).all(|x| x.is_finite())
-    );
-    let infinite = extract(&Scene::tet([f32::NEG_INFINITY, f32::INFINITY, 1.0, f32::NAN]), 0.0);
-    assert!(
-        infinite.positions.iter().flatten().chain(infinite.normals.iter().flatten()).all(|x| x.is_finite())
-    );
+    let is_finite = |surface: &IsoSurface| {
+        let normals = surface.normals.iter().flatten().copied().map(f64::from);
+        surface.positions.iter().flatten().copied().chain(normals).all(f64::is_finite)
+    };
+    assert!(is_finite(&surface));
+    let infinite = extract(&Scene::tet([f64::NEG_INFINITY, f64::INFINITY, 1.0, f64::NAN]), 0.0);
+    assert!(is_finite(&infinite));
 }
 
 #[test]

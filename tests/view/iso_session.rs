@@ -11,13 +11,13 @@ use tetralod::refine::{Budget, Need, Region, Request};
 use tetralod::session::Session;
 use tetralod::view::{IsoSurface, NormalKind};
 
-type Corner = [u32; 6];
+type Corner = [u64; 6];
 
 /// The triangles as bits of positions and normals, each from its least corner on, in order.
 fn triangles(surface: &IsoSurface) -> Vec<[Corner; 3]> {
     let corner = |v: u32| {
         let ([x, y, z], [a, b, c]) = (surface.positions[v as usize], surface.normals[v as usize]);
-        [x, y, z, a, b, c].map(f32::to_bits)
+        [x, y, z, a.into(), b.into(), c.into()].map(f64::to_bits)
     };
     let turned = |t: &[u32; 3]| {
         let [a, b, c] = t.map(corner);
@@ -60,7 +60,7 @@ fn next(wish: &Wish, random: &mut Random) -> Wish {
 }
 
 /// Every directed edge that is not at the border of the domain has as many opposite ones.
-fn assert_closed(surface: &IsoSurface, inside: impl Fn([f32; 3]) -> bool) {
+fn assert_closed(surface: &IsoSurface, inside: impl Fn([f64; 3]) -> bool) {
     let mut edges = BTreeMap::new();
     for [a, b, c] in &surface.indices {
         for edge in [[*a, *b], [*b, *c], [*c, *a]] {
@@ -75,7 +75,7 @@ fn assert_closed(surface: &IsoSurface, inside: impl Fn([f32; 3]) -> bool) {
 
 #[test]
 fn the_surface_follows_every_kind_of_mt_from_request_to_request() {
-    let in_cube = |p: [f32; 3]| p.iter().all(|x| 0.001 < *x && *x < 0.999);
+    let in_cube = |p: [f64; 3]| p.iter().all(|x| 0.001 < *x && *x < 0.999);
     for how in [EDGE, SPELLED_EDGE, HALF_EDGE, DELAUNAY, INSERTED, SPELLED_VERTEX] {
         for (is_cube, mesh) in [(true, cube(7, &[hilly, linear])), (false, bent(6))] {
             if how == INSERTED && !is_cube {

@@ -8,11 +8,11 @@ use tetralod::mesh::NONE;
 use tetralod::view::{IsoSurface, MeshView, NormalKind, SurfaceChanges};
 
 /// A vertex of a surface, as bits: value, position, normal.
-type Vertex = [u32; 7];
+type Vertex = [u64; 7];
 
 fn vertex(surface: &IsoSurface, v: u32) -> Vertex {
-    let (p, n) = (surface.positions[v as usize], surface.normals[v as usize]);
-    [surface.values[v as usize], p[0], p[1], p[2], n[0], n[1], n[2]].map(f32::to_bits)
+    let (p, n) = (surface.positions[v as usize], surface.normals[v as usize].map(f64::from));
+    [surface.values[v as usize], p[0], p[1], p[2], n[0], n[1], n[2]].map(f64::to_bits)
 }
 
 /// The triangles, each from its least vertex on, in order.
@@ -82,15 +82,15 @@ impl Walk {
         let point = random.below(positions.len());
         match random.below(10) {
             0..=2 => {
-                let special = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0, f32::MAX];
+                let special = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 0.0, f64::MAX];
                 field[point] = match random.below(12) {
                     i if i < 5 => special[i],
-                    i => i as f32 / 8.0 - 0.8,
+                    i => i as f64 / 8.0 - 0.8,
                 };
                 self.vertices.push(point as u32);
             }
             3..=4 => {
-                positions[point][random.below(3)] += random.between(-9, 9) as f32 / 400.0;
+                positions[point][random.below(3)] += random.between(-9, 9) as f64 / 400.0;
                 self.vertices.push(point as u32);
             }
             5 => {
@@ -178,7 +178,7 @@ fn wander(scene: Scene, seed: u64, kind: NormalKind, change_values: bool) {
     }
 }
 
-fn wavy(p: [f32; 3]) -> f32 {
+fn wavy(p: [f64; 3]) -> f64 {
     (p[0] * 9.0).sin() * 0.6 + (p[1] * 7.0).cos() * (p[2] * 5.0).sin()
 }
 
@@ -193,7 +193,7 @@ fn whatever_changes_the_surface_is_the_one_from_scratch() {
 #[test]
 fn so_it_is_with_ties_and_with_other_isovalues() {
     for seed in 0..5 {
-        let eighths = |p: [f32; 3]| (wavy(p) * 8.0).round() / 8.0;
+        let eighths = |p: [f64; 3]| (wavy(p) * 8.0).round() / 8.0;
         wander(Scene::cube(5, eighths), seed, NormalKind::Gradient, true);
         wander(Scene::cube(4, eighths), seed, NormalKind::Smooth, true);
     }
@@ -245,7 +245,7 @@ fn several_isovalues_are_the_union_of_single_ones() {
             let mut single = IsoSurface::new();
             single.set_normal_kind(kind);
             single.extract(&scene.view(), value);
-            assert!(single.values.iter().all(|v| *v == value as f32));
+            assert!(single.values.iter().all(|v| *v == value as f64));
             singles.extend(triangles(&single));
         }
         singles.sort_unstable();
@@ -260,7 +260,7 @@ fn several_isovalues_are_the_union_of_single_ones() {
 fn normals_of_both_kinds_agree_with_the_gradient() {
     // A field with the gradient 2 (p - c): gradients of linear pieces are off by what the gradient changes within a
     // cell, which is sqrt(3) / 20 at half a diagonal against a length of at least 0.6.
-    let square = |p: [f32; 3]| distance_to_centre(p).powi(2);
+    let square = |p: [f64; 3]| distance_to_centre(p).powi(2);
     let scene = Scene::cube(20, square);
     for (kind, least) in [(NormalKind::Gradient, 0.999), (NormalKind::Smooth, 0.99)] {
         let mut surface = IsoSurface::new();
@@ -269,8 +269,8 @@ fn normals_of_both_kinds_agree_with_the_gradient() {
         assert!(surface.positions.len() > 1000);
         for (p, n) in surface.positions.iter().zip(&surface.normals) {
             let inwards = p.map(|x| 0.5 - x);
-            let length = inwards.iter().map(|x| x * x).sum::<f32>().sqrt();
-            let cosine = (0..3).map(|i| n[i] * inwards[i] / length).sum::<f32>();
+            let length = inwards.iter().map(|x| x * x).sum::<f64>().sqrt();
+            let cosine = (0..3).map(|i| f64::from(n[i]) * inwards[i] / length).sum::<f64>();
             assert!(cosine > least, "{kind:?} at {p:?}: {n:?} has the cosine {cosine}");
         }
     }

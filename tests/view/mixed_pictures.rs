@@ -103,12 +103,12 @@ fn mixed_pictures_are_those_of_the_twin() {
 }
 
 /// The triangles of a ball around the middle of the unit cube.
-fn ball(radius: f64, parts: u32) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
+fn ball(radius: f64, parts: u32) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
     use std::f64::consts::{PI, TAU};
     let at = |i: u32, j: u32| {
         let (around, up) =
             (TAU * f64::from(i % (2 * parts)) / f64::from(2 * parts), PI * f64::from(j) / f64::from(parts));
-        [up.sin() * around.cos(), up.sin() * around.sin(), -up.cos()].map(|x| (0.5 + radius * x) as f32)
+        [up.sin() * around.cos(), up.sin() * around.sin(), -up.cos()].map(|x| (0.5 + radius * x) as f64)
     };
     let places = (0..2 * parts).flat_map(|i| (0..parts).map(move |j| (i, j)));
     let corners = places.map(|(i, j)| [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);

@@ -12,8 +12,8 @@ use tetralod::view::{
 
 fn scene(n: u32, field: fn([f64; 3]) -> f64) -> Scene {
     let mesh = cube(n, &[field]);
-    let positions = mesh.positions.iter().map(|p| p.map(|x| x as f32)).collect();
-    Scene::new(positions, mesh.fields[0].values.iter().map(|v| *v as f32).collect(), mesh.tets.clone())
+    let positions = mesh.positions.clone();
+    Scene::new(positions, mesh.fields[0].values.clone(), mesh.tets.clone())
 }
 
 fn direction(random: &mut Random) -> DVec3 {
@@ -83,8 +83,8 @@ fn rays_through_corners_and_edges_do_not_slip_through() {
 
 #[test]
 fn planes_cut_hits_away() {
-    let square = |z: f32| [[-1.0, -1.0, z], [3.0, -1.0, z], [-1.0, 3.0, z]];
-    let positions: Vec<[f32; 3]> = [1.0, 2.0, 3.0].into_iter().flat_map(square).collect();
+    let square = |z: f64| [[-1.0, -1.0, z], [3.0, -1.0, z], [-1.0, 3.0, z]];
+    let positions: Vec<[f64; 3]> = [1.0, 2.0, 3.0].into_iter().flat_map(square).collect();
     let indices = [[0, 1, 2], [3, 4, 5], [6, 8, 7]];
     let surface =
         Triangles { positions: &positions, values: &[1.0; 9], indices: &indices, ..Triangles::default() };
@@ -105,7 +105,7 @@ fn planes_cut_hits_away() {
 
 #[test]
 fn bad_rays_and_surfaces_are_not_hit() {
-    let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [f32::NAN; 3], [0.0, 1.0, 1.0]];
+    let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [f64::NAN; 3], [0.0, 1.0, 1.0]];
     let indices = [[0, 1, 9], [0, 1, 2], [0, 0, 1], [0, 1, 3]];
     let surface =
         Triangles { positions: &positions, values: &[1.0], indices: &indices, ..Triangles::default() };

@@ -10,8 +10,8 @@ use tetralod::mesh::TetMesh;
 use tetralod::view::{FieldStats, Histogram, MeshView, Place, Probe, Span, StreamEnd, TraceOptions, Tracer};
 
 fn scene(mesh: &TetMesh) -> Scene {
-    let positions = mesh.positions.iter().map(|p| p.map(|x| x as f32)).collect();
-    let field = mesh.fields[0].values.iter().map(|v| *v as f32).collect();
+    let positions = mesh.positions.clone();
+    let field = mesh.fields[0].values.clone();
     Scene::new(positions, field, mesh.tets.clone())
 }
 
@@ -202,8 +202,8 @@ fn lines_have_gaps_where_they_are_outside() {
 }
 
 /// The components of a vector field at the points.
-fn vectors(scene: &Scene, f: impl Fn([f64; 3]) -> [f64; 3]) -> [Vec<f32>; 3] {
-    [0, 1, 2].map(|i| scene.positions.iter().map(|p| f(p.map(f64::from))[i] as f32).collect())
+fn vectors(scene: &Scene, f: impl Fn([f64; 3]) -> [f64; 3]) -> [Vec<f64>; 3] {
+    [0, 1, 2].map(|i| scene.positions.iter().map(|p| f(p.map(f64::from))[i] as f64).collect())
 }
 
 #[test]

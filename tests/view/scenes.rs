@@ -7,30 +7,30 @@ use tetralod::view::MeshView;
 /// A mesh that owns what a `MeshView` borrows.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
-    pub positions: Vec<[f32; 3]>,
-    pub field: Vec<f32>,
+    pub positions: Vec<[f64; 3]>,
+    pub field: Vec<f64>,
     pub tets: Vec<[u32; 4]>,
     pub neighbors: Vec<[u32; 4]>,
 }
 
 impl Scene {
-    pub fn new(positions: Vec<[f32; 3]>, field: Vec<f32>, tets: Vec<[u32; 4]>) -> Self {
+    pub fn new(positions: Vec<[f64; 3]>, field: Vec<f64>, tets: Vec<[u32; 4]>) -> Self {
         let neighbors = neighbors(&tets);
         Self { positions, field, tets, neighbors }
     }
 
     /// One positive tetrahedron with these values at its corners.
-    pub fn tet(field: [f32; 4]) -> Self {
+    pub fn tet(field: [f64; 4]) -> Self {
         let corners = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         Self::new(corners, field.to_vec(), vec![[0, 1, 2, 3]])
     }
 
     /// The unit cube as `cells`³ cubes of six tetrahedra each, with `field` at its points.
-    pub fn cube(cells: usize, field: impl Fn([f32; 3]) -> f32) -> Self {
+    pub fn cube(cells: usize, field: impl Fn([f64; 3]) -> f64) -> Self {
         let side = cells + 1;
         let at = |x: usize, y: usize, z: usize| (x + side * (y + side * z)) as u32;
         let positions: Vec<_> = (0..side * side * side)
-            .map(|i| [i % side, i / side % side, i / side / side].map(|c| c as f32 / cells as f32))
+            .map(|i| [i % side, i / side % side, i / side / side].map(|c| c as f64 / cells as f64))
             .collect();
         let mut tets = Vec::new();
         for cell in 0..cells * cells * cells {
@@ -72,8 +72,8 @@ impl Scene {
     }
 }
 
-pub fn distance_to_centre(p: [f32; 3]) -> f32 {
-    p.iter().map(|c| (c - 0.5) * (c - 0.5)).sum::<f32>().sqrt()
+pub fn distance_to_centre(p: [f64; 3]) -> f64 {
+    p.iter().map(|c| (c - 0.5) * (c - 0.5)).sum::<f64>().sqrt()
 }
 
 fn neighbors(tets: &[[u32; 4]]) -> Vec<[u32; 4]> {

@@ -12,15 +12,15 @@ const RED: [f32; 3] = [1.0, 0.0, 0.0];
 const GREEN: [f32; 3] = [0.0, 1.0, 0.0];
 
 /// Balls that have grown together, with bumps all over.
-fn bumpy(cells: usize, bumps: f32) -> Scene {
+fn bumpy(cells: usize, bumps: f64) -> Scene {
     let balls = [[0.36, 0.42, 0.45], [0.62, 0.55, 0.40], [0.50, 0.40, 0.63], [0.45, 0.64, 0.55]];
     Scene::cube(cells, |p| {
-        let near = |ball: &[f32; 3]| {
-            let square: f32 = (0..3).map(|i| (p[i] - ball[i]).powi(2)).sum();
+        let near = |ball: &[f64; 3]| {
+            let square: f64 = (0..3).map(|i| (p[i] - ball[i]).powi(2)).sum();
             (-square / 0.012).exp()
         };
         let wave = (40.0 * p[0]).sin() * (37.0 * p[1]).sin() * (43.0 * p[2]).sin();
-        balls.iter().map(near).sum::<f32>() + bumps * wave
+        balls.iter().map(near).sum::<f64>() + bumps * wave
     })
 }
 

@@ -10,7 +10,7 @@ use tetralod::format::{EncodeOptions, encode};
 use tetralod::session::Session;
 use tetralod::view::{BoundarySurface, MeshView, Plane, Slice, area, is_closed};
 
-fn linear([x, y, z]: [f32; 3]) -> f32 {
+fn linear([x, y, z]: [f64; 3]) -> f64 {
     x + 2.0 * y - 3.0 * z
 }
 
@@ -25,14 +25,14 @@ fn plane(normal: [f64; 3], offset: f64) -> Plane {
 }
 
 /// The parts of a triangle's area along the axes, doubled.
-fn doubled(corners: [[f32; 3]; 3]) -> [f64; 3] {
+fn doubled(corners: [[f64; 3]; 3]) -> [f64; 3] {
     let [a, b, c] = corners.map(|p| p.map(f64::from));
     let [u, v] = [b, c].map(|p| [0, 1, 2].map(|i| p[i] - a[i]));
     [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
 }
 
 /// What must hold for every slice; `border` tells where it may end.
-fn check(slice: &Slice, plane: &Plane, border: impl Fn([f32; 3]) -> bool) {
+fn check(slice: &Slice, plane: &Plane, border: impl Fn([f64; 3]) -> bool) {
     let corner = |v: u32| slice.positions()[v as usize];
     let length = plane.normal.iter().map(|x| x * x).sum::<f64>().sqrt();
     let mut sides: BTreeMap<[u32; 2], usize> = BTreeMap::new();
@@ -55,7 +55,7 @@ fn check(slice: &Slice, plane: &Plane, border: impl Fn([f32; 3]) -> bool) {
     }
 }
 
-fn on_cube(p: [f32; 3]) -> bool {
+fn on_cube(p: [f64; 3]) -> bool {
     p.iter().any(|c| c.abs() < 1e-6 || (c - 1.0).abs() < 1e-6)
 }
 
@@ -137,23 +137,23 @@ fn cell_edges_are_the_sides_of_the_polygons_each_once() {
 }
 
 /// Triangles by the bits of their corners and values, from the smallest corner on.
-fn as_set(slice: &Slice) -> Vec<[[u32; 4]; 3]> {
+fn as_set(slice: &Slice) -> Vec<[[u64; 4]; 3]> {
     let bits = |v: u32| {
         let [x, y, z] = slice.positions()[v as usize];
-        [x, y, z, slice.values()[v as usize]].map(f32::to_bits)
+        [x, y, z, slice.values()[v as usize]].map(f64::to_bits)
     };
     let turned =
-        |[a, b, c]: [[u32; 4]; 3]| [[a, b, c], [b, c, a], [c, a, b]].into_iter().min().unwrap_or_default();
+        |[a, b, c]: [[u64; 4]; 3]| [[a, b, c], [b, c, a], [c, a, b]].into_iter().min().unwrap_or_default();
     let mut set: Vec<_> = slice.indices().iter().map(|t| turned(t.map(bits))).collect();
     set.sort_unstable();
     set
 }
 
-fn lines_as_set(slice: &Slice) -> Vec<[[u32; 3]; 2]> {
+fn lines_as_set(slice: &Slice) -> Vec<[[u64; 3]; 2]> {
     let mut lines = Vec::new();
     slice.cell_edges(&mut lines);
-    let bits = |v: u32| slice.positions()[v as usize].map(f32::to_bits);
-    let ordered = |[a, b]: [[u32; 3]; 2]| [a.min(b), a.max(b)];
+    let bits = |v: u32| slice.positions()[v as usize].map(f64::to_bits);
+    let ordered = |[a, b]: [[u64; 3]; 2]| [a.min(b), a.max(b)];
     let mut set: Vec<_> = lines.iter().map(|line| ordered(line.map(bits))).collect();
     set.sort_unstable();
     set
@@ -162,16 +162,16 @@ fn lines_as_set(slice: &Slice) -> Vec<[[u32; 3]; 2]> {
 /// A copy of a slice's arrays that follows its changes.
 #[derive(Default, PartialEq, Debug)]
 struct Copy {
-    positions: Vec<[f32; 3]>,
-    values: Vec<f32>,
+    positions: Vec<[f64; 3]>,
+    values: Vec<f64>,
     indices: Vec<[u32; 3]>,
 }
 
 impl Copy {
     fn follow(&mut self, slice: &mut Slice) {
         let changes = slice.take_changes();
-        self.positions.resize(slice.positions().len(), [f32::NAN; 3]);
-        self.values.resize(slice.values().len(), f32::NAN);
+        self.positions.resize(slice.positions().len(), [f64::NAN; 3]);
+        self.values.resize(slice.values().len(), f64::NAN);
         self.indices.resize(slice.indices().len(), [u32::MAX; 3]);
         for v in changes.vertices.into_iter().flatten().map(|v| v as usize) {
             self.positions[v] = slice.positions()[v];
@@ -267,8 +267,8 @@ fn values_may_change_where_tetrahedra_do_not() {
     // Part by part, then another field altogether.
     for (i, range) in [0..0, 100..150, 200..240, 0..100, 0..points].into_iter().enumerate() {
         for p in range.clone().map(|p| p as usize) {
-            scene.field[p] = linear(scene.positions[p]) * (1.0 + i as f32);
-            scene.positions[p][0] += if i < 4 { 0.01 * (p % 7) as f32 } else { 0.0 };
+            scene.field[p] = linear(scene.positions[p]) * (1.0 + i as f64);
+            scene.positions[p][0] += if i < 4 { 0.01 * (p % 7) as f64 } else { 0.0 };
         }
         slice.update(&scene.view(), std::slice::from_ref(&range), &[]);
         assert_eq!(as_set(&slice), as_set(&cut(&scene.view(), &plane)), "{range:?}");

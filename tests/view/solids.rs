@@ -45,7 +45,7 @@ fn volume(solids: &Solids) -> f64 {
 /// Every directed edge between places has as many opposite ones, normals have length 1, and no array is
 /// short.
 fn check(solids: &Solids, name: &str) {
-    let mut edges = BTreeMap::<[[u32; 3]; 2], i64>::new();
+    let mut edges = BTreeMap::<[[u64; 3]; 2], i64>::new();
     let place = |v: u32| solids.positions[v as usize].map(|x| (x + 0.0).to_bits());
     for triangle in &solids.indices {
         for i in 0..3 {
@@ -177,14 +177,14 @@ fn bad_lines_have_no_tubes() {
     let broken = line([[0.0; 3], [f64::NAN; 3], [1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]]);
     solids.set_tubes_with(&[broken, good], &TubeOptions::default(), |p| p.position[0]);
     check(&solids, "a line with gaps");
-    assert_eq!(solids.values.iter().copied().fold(0.0, f32::max), 2.0);
+    assert_eq!(solids.values.iter().copied().fold(0.0, f64::max), 2.0);
     assert_eq!(solids.indices.len(), (2 * 16 * 2 + 14 * 2) + (2 * 16 + 14 * 2), "sixteen sides");
 }
 
 fn scene() -> Scene {
     let mesh = cube(6, &[linear]);
-    let positions = mesh.positions.iter().map(|p| p.map(|x| x as f32)).collect();
-    Scene::new(positions, mesh.fields[0].values.iter().map(|v| *v as f32).collect(), mesh.tets.clone())
+    let positions = mesh.positions.clone();
+    Scene::new(positions, mesh.fields[0].values.clone(), mesh.tets.clone())
 }
 
 /// How far the vertices of one arrow reach.
@@ -201,7 +201,7 @@ fn arrows_are_closed_and_as_long_as_their_vectors() {
     let view = scene.view();
     let count = view.positions.len();
     let zero = vec![0.0; count];
-    let along_z: Vec<f32> = view.positions.iter().map(|p| 1.0 + p[0]).collect();
+    let along_z: Vec<f64> = view.positions.iter().map(|p| 1.0 + p[0]).collect();
     for sides in [3, 8, 16] {
         let mut solids = Solids::with_sides(sides);
         let options = ArrowOptions { spacing: 0.2, length: ArrowLength::Magnitude };
@@ -210,7 +210,7 @@ fn arrows_are_closed_and_as_long_as_their_vectors() {
         check(&solids, "arrows");
         check_normals(&solids, "arrows");
         assert!(volume(&solids) > 0.0);
-        let largest = solids.values.iter().copied().fold(0.0, f32::max);
+        let largest = solids.values.iter().copied().fold(0.0, f64::max);
         let each = solids.positions.len() / arrows;
         for arrow in 0..arrows {
             let part = f64::from(solids.values[arrow * each] / largest);
@@ -238,7 +238,7 @@ fn arrows_are_closed_and_as_long_as_their_vectors() {
 fn bad_fields_have_no_arrows() {
     let scene = scene();
     let view = scene.view();
-    let [zero, nan, one] = [0.0, f32::NAN, 1.0].map(|x| vec![x; view.positions.len()]);
+    let [zero, nan, one] = [0.0, f64::NAN, 1.0].map(|x| vec![x; view.positions.len()]);
     let mut solids = Solids::with_sides(3);
     let options = ArrowOptions::default();
     assert_eq!(solids.set_arrows(view, [&zero, &zero, &zero], None, &options), 0);

@@ -149,8 +149,8 @@ pub fn encode(c: f64) -> f64 {
     if c <= 0.0031308 { c * 12.92 } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 }
 }
 
-pub fn vec(c: [f32; 3]) -> DVec3 {
-    DVec3::from(c.map(f64::from))
+pub fn vec(c: [impl Into<f64>; 3]) -> DVec3 {
+    DVec3::from(c.map(Into::into))
 }
 
 pub fn rgb([r, g, b, _]: [f32; 4]) -> DVec3 {
@@ -288,7 +288,7 @@ pub fn media() -> [(&'static str, Medium); 2] {
 pub fn hollow() -> Scene {
     let is_inside = |cell: [u32; 3]| !cell.iter().all(|c| (2..6).contains(c)) && (cell[0] < 6 || cell[1] > 2);
     let mesh = blocks([8, 8, 8], &[linear], is_inside);
-    let positions: Vec<[f32; 3]> = mesh.positions.iter().map(|p| p.map(|x| x as f32)).collect();
+    let positions: Vec<[f64; 3]> = mesh.positions.clone();
     let field = positions.iter().map(|p| 1.0 - 2.0 * distance_to_centre(*p)).collect();
     Scene::new(positions, field, mesh.tets)
 }

@@ -9,8 +9,8 @@ use tetralod::mesh::TetMesh;
 use tetralod::view::{Light, Medium, MeshView, Probe};
 
 fn scene(mesh: &TetMesh) -> Scene {
-    let positions = mesh.positions.iter().map(|p| p.map(|x| x as f32)).collect();
-    let field = mesh.fields[0].values.iter().map(|v| *v as f32).collect();
+    let positions = mesh.positions.clone();
+    let field = mesh.fields[0].values.clone();
     Scene::new(positions, field, mesh.tets.clone())
 }
 

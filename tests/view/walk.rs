@@ -28,8 +28,8 @@ pub struct Walk {
     mt: Mt,
     mesh: CurrentMesh,
     applied: Vec<bool>,
-    positions: Vec<[f32; 3]>,
-    values: Vec<f32>,
+    positions: Vec<[f64; 3]>,
+    values: Vec<f64>,
     pub random: Random,
 }
 
@@ -93,8 +93,8 @@ impl Walk {
         self.values.resize(slots, 0.0);
         for slot in changes.vertices.iter().cloned().flatten() {
             let position = lattice.point(self.mesh.positions()[slot as usize]);
-            self.positions[slot as usize] = position.map(|x| x as f32);
-            self.values[slot as usize] = field.value(self.mesh.levels(slot)[0]) as f32;
+            self.positions[slot as usize] = position;
+            self.values[slot as usize] = field.value(self.mesh.levels(slot)[0]);
         }
         changes
     }

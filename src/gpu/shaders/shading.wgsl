@@ -6,8 +6,8 @@ struct Style {
     // colours.
     front: vec4f,
     back: vec4f,
-    // Of values: the smallest (or its logarithm), one over the range of them, whether it is logarithmic (w
-    // unused).
+    // Of values: the smallest (or its logarithm), one over the range of them, whether it is logarithmic; if
+    // logarithms are of values over an offset to which values are relative, one over that, else 0.
     scale: vec4f,
     // Of edges: sRGB and strength.
     edge: vec4f,
@@ -47,9 +47,19 @@ fn palette_entry(i: u32) -> vec3f {
     return unpack4x8unorm(style.palette[i / 4u][i % 4u]).rgb;
 }
 
+fn logarithm(value: f32) -> f32 {
+    if style.scale.w == 0.0 {
+        return log(max(value, 1e-38));
+    }
+    // Of 1 + part, a sum in which a small part loses its digits.
+    let part = value * style.scale.w;
+    let series = part * (1.0 - part * (0.5 - part * (1.0 / 3.0 - 0.25 * part)));
+    return select(log(max(1.0 + part, 1e-38)), series, abs(part) < 0.01);
+}
+
 // The colour of a value on the scale: linear.
 fn mapped(value: f32) -> vec3f {
-    let even = select(value, log(max(value, 1e-38)), style.scale.z > 0.0);
+    let even = select(value, logarithm(value), style.scale.z > 0.0);
     let place = clamp((even - style.scale.x) * style.scale.y, 0.0, 1.0) * 255.0;
     let below = min(u32(place), 254u);
     return decode(mix(palette_entry(below), palette_entry(below + 1u), place - f32(below)));

@@ -11,8 +11,13 @@ use crate::io::surface::PolyData;
 /// With [`io::ErrorKind::InvalidInput`] if the arrays do not fit together, and if `out` fails.
 pub fn write_obj(data: &PolyData, out: &mut impl Write) -> io::Result<()> {
     data.check()?;
-    for [x, y, z] in &data.positions {
-        writeln!(out, "v {x} {y} {z}")?;
+    let is_single = data.is_single();
+    for &[x, y, z] in &data.positions {
+        if is_single {
+            writeln!(out, "v {} {} {}", x as f32, y as f32, z as f32)?;
+        } else {
+            writeln!(out, "v {x} {y} {z}")?;
+        }
     }
     for [x, y, z] in &data.normals {
         writeln!(out, "vn {x} {y} {z}")?;

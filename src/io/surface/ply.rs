@@ -3,7 +3,7 @@
 use std::io;
 use std::io::Write;
 
-use crate::io::surface::PolyData;
+use crate::io::surface::{PointValues, PolyData};
 
 /// Writes points, triangles and the segments of lines as a binary little-endian PLY file, with normals and fields as
 /// properties of the points.
@@ -13,12 +13,14 @@ use crate::io::surface::PolyData;
 pub fn write_ply(data: &PolyData, out: &mut impl Write) -> io::Result<()> {
     data.check()?;
     write_header(data, out)?;
+    let are_single: Vec<bool> = data.fields.iter().map(PointValues::is_single).collect();
+    let is_single = data.is_single();
     for (v, position) in data.positions.iter().enumerate() {
+        position.iter().try_for_each(|x| put(*x, is_single, out))?;
         let normal = data.normals.get(v).into_iter().flatten();
-        let values = data.fields.iter().map(|(_, values)| &values[v]);
-        for number in position.iter().chain(normal).chain(values) {
-            out.write_all(&number.to_le_bytes())?;
-        }
+        normal.into_iter().try_for_each(|x| out.write_all(&x.to_le_bytes()))?;
+        let mut values = data.fields.iter().map(|field| field.values[v]).zip(&are_single);
+        values.try_for_each(|(value, is_single)| put(value, *is_single, out))?;
     }
     for triangle in &data.triangles {
         out.write_all(&[3])?;
@@ -30,16 +32,30 @@ pub fn write_ply(data: &PolyData, out: &mut impl Write) -> io::Result<()> {
     Ok(())
 }
 
+fn put(number: f64, is_single: bool, out: &mut impl Write) -> io::Result<()> {
+    if is_single {
+        out.write_all(&(number as f32).to_le_bytes())
+    } else {
+        out.write_all(&number.to_le_bytes())
+    }
+}
+
+fn word(is_single: bool) -> &'static str {
+    if is_single { "float" } else { "double" }
+}
+
 fn write_header(data: &PolyData, out: &mut impl Write) -> io::Result<()> {
     write!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {}\n", data.positions.len())?;
-    let normals: &[&str] = if data.normals.is_empty() { &[] } else { &["nx", "ny", "nz"] };
-    for name in ["x", "y", "z"].iter().chain(normals) {
+    for name in ["x", "y", "z"] {
+        writeln!(out, "property {} {name}", word(data.is_single()))?;
+    }
+    for name in ["nx", "ny", "nz"].iter().filter(|_| !data.normals.is_empty()) {
         writeln!(out, "property float {name}")?;
     }
     let mut names: Vec<String> = Vec::new();
-    for (name, _) in &data.fields {
-        let name = property_name(name, &names);
-        writeln!(out, "property float {name}")?;
+    for field in &data.fields {
+        let name = property_name(&field.name, &names);
+        writeln!(out, "property {} {name}", word(field.is_single()))?;
         names.push(name);
     }
     if !data.triangles.is_empty() {

@@ -14,8 +14,7 @@ pub fn write_vtp(data: &PolyData, out: &mut impl Write) -> io::Result<()> {
     data.check()?;
     let mut appended = Appended::default();
     let point_data = point_data(data, &mut appended)?;
-    let points = appended.append(data.positions.as_flattened(), f32::to_le_bytes)?;
-    let points = array("Float32", "Points", 3, points);
+    let points = numbers("Points", 3, data.positions.as_flattened(), data.is_single(), &mut appended)?;
     let single: Vec<Vec<u32>> = if data.is_points() {
         (0..data.positions.len() as u32).map(|v| vec![v]).collect()
     } else {
@@ -39,12 +38,11 @@ pub fn write_vtp(data: &PolyData, out: &mut impl Write) -> io::Result<()> {
 fn point_data(data: &PolyData, appended: &mut Appended) -> io::Result<String> {
     let mut arrays = String::new();
     let mut attributes = String::new();
-    if let Some((name, _)) = data.fields.first() {
-        attributes.push_str(&format!(" Scalars=\"{}\"", escaped(name)));
+    if let Some(field) = data.fields.first() {
+        attributes.push_str(&format!(" Scalars=\"{}\"", escaped(&field.name)));
     }
-    for (name, values) in &data.fields {
-        let offset = appended.append(values, f32::to_le_bytes)?;
-        arrays.push_str(&array("Float32", name, 1, offset));
+    for field in &data.fields {
+        arrays.push_str(&numbers(&field.name, 1, &field.values, field.is_single(), appended)?);
     }
     if !data.normals.is_empty() {
         attributes.push_str(" Normals=\"Normals\"");
@@ -52,6 +50,22 @@ fn point_data(data: &PolyData, appended: &mut Appended) -> io::Result<String> {
         arrays.push_str(&array("Float32", "Normals", 3, offset));
     }
     Ok(format!("      <PointData{attributes}>\n{arrays}      </PointData>\n"))
+}
+
+/// The element of an array in single or double precision.
+fn numbers(
+    name: &str,
+    components: usize,
+    numbers: &[f64],
+    is_single: bool,
+    appended: &mut Appended,
+) -> io::Result<String> {
+    let (kind, offset) = if is_single {
+        ("Float32", appended.append(numbers, |x| (x as f32).to_le_bytes())?)
+    } else {
+        ("Float64", appended.append(numbers, f64::to_le_bytes)?)
+    };
+    Ok(array(kind, name, components, offset))
 }
 
 /// The element `name` with cells of any number of points.

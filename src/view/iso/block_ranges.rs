@@ -5,7 +5,7 @@ use crate::view::MeshView;
 
 /// Per block of tetrahedra the smallest and the largest value.
 #[derive(Clone, Debug)]
-pub(super) struct BlockRanges(Vec<[f32; 2]>);
+pub(super) struct BlockRanges(Vec<[f64; 2]>);
 
 impl BlockRanges {
     pub fn new(mesh: &MeshView<'_>) -> Self {
@@ -13,13 +13,13 @@ impl BlockRanges {
     }
 
     /// The blocks in which a tetrahedron can have points on both sides of `value`.
-    pub fn blocks_at(&self, value: f32) -> impl Iterator<Item = usize> {
-        let spans = move |range: &[f32; 2]| range[0] < value && range[1] >= value;
+    pub fn blocks_at(&self, value: f64) -> impl Iterator<Item = usize> {
+        let spans = move |range: &[f64; 2]| range[0] < value && range[1] >= value;
         self.0.iter().enumerate().filter(move |(_, range)| spans(range)).map(|(block, _)| block)
     }
 
     /// Whether `value` is in the ranges of so many blocks that selecting them is not worth while.
-    pub fn is_passed_widely(&self, value: f32) -> bool {
+    pub fn is_passed_widely(&self, value: f64) -> bool {
         2 * self.blocks_at(value).count() > self.0.len()
     }
 
@@ -41,13 +41,13 @@ impl BlockRanges {
 
 /// The smallest and the largest value at the points of some tetrahedra. What is not a number is not smaller than
 /// any isovalue, as if it were large.
-fn range(tets: &[[u32; 4]], field: &[f32]) -> [f32; 2] {
-    let mut range = [f32::INFINITY, f32::NEG_INFINITY];
+fn range(tets: &[[u32; 4]], field: &[f64]) -> [f64; 2] {
+    let mut range = [f64::INFINITY, f64::NEG_INFINITY];
     for point in tets.iter().flatten() {
         let value = field[*point as usize];
         let [low, high] = &mut range;
         *low = if value < *low { value } else { *low };
-        let value = if value.is_nan() { f32::INFINITY } else { value };
+        let value = if value.is_nan() { f64::INFINITY } else { value };
         *high = if value > *high { value } else { *high };
     }
     range

@@ -157,8 +157,8 @@ fn add(a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
 /// Six times volume · gradient, and six times the volume, of one tetrahedron.
 fn weighted(mesh: &MeshView<'_>, t: u32) -> [f64; 4] {
     let tet = mesh.tets[t as usize];
-    let [a, b, c, d] = tet.map(|p| DVec3::from(mesh.positions[p as usize].map(f64::from)));
-    let [fa, fb, fc, fd] = tet.map(|p| f64::from(mesh.field[p as usize]));
+    let [a, b, c, d] = tet.map(|p| DVec3::from(mesh.positions[p as usize]));
+    let [fa, fb, fc, fd] = tet.map(|p| mesh.field[p as usize]);
     let (u, v, w) = (b - a, c - a, d - a);
     let (p, q, r) = (fb - fa, fc - fa, fd - fa);
     // p v x w + q w x u + r u x v, with two products instead of three.

@@ -7,7 +7,7 @@
 //! What holds for the triangles:
 //! - Normals and counter-clockwise sides point towards **lower** values, so the surface around a blob of high
 //!   values shows its front to the outside.
-//! - No triangle names a vertex twice. Triangles of no area remain possible where rounding to `f32` makes
+//! - No triangle names a vertex twice. Triangles of no area remain possible where rounding makes
 //!   neighbouring crossings coincide.
 //! - Inside the domain every directed edge has exactly as many opposite ones: the surface is closed. An edge has
 //!   two triangles, or an even number where the surface touches itself along points of exactly the isovalue.
@@ -51,15 +51,15 @@ pub enum NormalKind {
 #[derive(Clone, Debug, Default)]
 pub struct IsoSurface {
     /// Vertices, in model units.
-    pub positions: Vec<[f32; 3]>,
+    pub positions: Vec<[f64; 3]>,
     /// One unit normal per vertex, towards lower values.
     pub normals: Vec<[f32; 3]>,
     /// The isovalue of each vertex, in units of the field.
-    pub values: Vec<f32>,
+    pub values: Vec<f64>,
     /// Triangles, counter-clockwise when seen from lower values.
     pub indices: Vec<[u32; 3]>,
     kind: NormalKind,
-    isovalues: Vec<f32>,
+    isovalues: Vec<f64>,
     pieces: Pieces,
     gradients: Gradients,
     /// Scratch: a byte per point.
@@ -104,7 +104,7 @@ impl IsoSurface {
         self.kind = kind;
     }
 
-    /// Replaces this surface by the one of `mesh` at `value` (rounded to `f32`, as the field is).
+    /// Replaces this surface by the one of `mesh` at `value`.
     ///
     /// Costs one pass over the tetrahedra, and a second one for the normals if there is a surface.
     ///
@@ -129,7 +129,7 @@ impl IsoSurface {
     ///
     /// # Panics
     /// If there are fewer points or numbers than in that mesh.
-    pub fn interpolate(&self, mesh: &MeshView<'_>, field: &[f32]) -> Vec<f32> {
+    pub fn interpolate(&self, mesh: &MeshView<'_>, field: &[f64]) -> Vec<f64> {
         let value = |crossing: &Crossing| {
             crossing.value(field, fraction(crossing, mesh, self.isovalues[crossing.which as usize]))
         };
@@ -143,7 +143,7 @@ impl IsoSurface {
     }
 
     /// Extracts the whole surface, using the block ranges if there are any.
-    fn rebuild(&mut self, mesh: &MeshView<'_>, isovalues: Vec<f32>) {
+    fn rebuild(&mut self, mesh: &MeshView<'_>, isovalues: Vec<f64>) {
         let points = mesh.positions.len();
         self.isovalues = isovalues;
         self.state = State::Of(points, mesh.tets.len());
@@ -168,7 +168,7 @@ impl IsoSurface {
     }
 
     /// Finds the tetrahedra that are cut at `value`.
-    fn find_cut(&mut self, mesh: &MeshView<'_>, value: f32) {
+    fn find_cut(&mut self, mesh: &MeshView<'_>, value: f64) {
         let Self { cut, sides, followed, .. } = self;
         cut.clear();
         let ranges = followed.as_ref().map(|followed| &followed.ranges);
@@ -223,14 +223,14 @@ impl IsoSurface {
 
     /// Twice the area of a triangle, along its normal.
     fn area(&self, triangle: [u32; 3]) -> DVec3 {
-        let [a, b, c] = triangle.map(|v| DVec3::from(self.positions[v as usize].map(f64::from)));
+        let [a, b, c] = triangle.map(|v| DVec3::from(self.positions[v as usize]));
         (b - a).cross(c - a)
     }
 }
 
 /// The piece of the surface at `value` in a tetrahedron.
 #[inline]
-fn polygon(mesh: &MeshView<'_>, t: u32, value: f32) -> Polygon {
+fn polygon(mesh: &MeshView<'_>, t: u32, value: f64) -> Polygon {
     let tet = mesh.tets[t as usize];
     let values = tet.map(|p| mesh.field[p as usize]);
     let bits = |holds: [bool; 4]| (0..4).fold(0, |bits, i| bits | usize::from(holds[i]) << i);
@@ -245,8 +245,8 @@ fn is_cut(inside: [u8; 4]) -> bool {
 
 /// How far a crossing is from its inside end to its outside end.
 #[inline]
-fn fraction(crossing: &Crossing, mesh: &MeshView<'_>, value: f32) -> f64 {
-    crossing.fraction(f64::from(value), |end| f64::from(mesh.field[end as usize]))
+fn fraction(crossing: &Crossing, mesh: &MeshView<'_>, value: f64) -> f64 {
+    crossing.fraction(value, |end| mesh.field[end as usize])
 }
 
 /// In place of an undefined normal.
@@ -255,10 +255,10 @@ const NO_NORMAL: [f32; 3] = [0.0; 3];
 /// The normal of a vertex that has no other.
 const UP: [f32; 3] = [0.0, 0.0, 1.0];
 
-/// The isovalues rounded like the field, without duplicates and NaN.
-fn distinct(values: &[f64]) -> Vec<f32> {
+/// The isovalues without duplicates and NaN.
+fn distinct(values: &[f64]) -> Vec<f64> {
     let mut distinct = Vec::with_capacity(values.len());
-    for value in values.iter().map(|value| *value as f32) {
+    for &value in values {
         if !value.is_nan() && !distinct.contains(&value) {
             distinct.push(value);
         }

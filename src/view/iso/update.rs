@@ -94,7 +94,7 @@ impl IsoSurface {
         pieces.place_again(&edited.list, old, |v, crossing| {
             let place = crossing.place(mesh.positions, fraction(crossing, mesh, values[v]));
             let before = std::mem::replace(&mut positions[v], place);
-            before.map(f32::to_bits) != place.map(f32::to_bits)
+            before.map(f64::to_bits) != place.map(f64::to_bits)
         });
     }
 

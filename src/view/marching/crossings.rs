@@ -37,27 +37,34 @@ impl Crossing {
             return 0.0;
         }
         let [low, high] = self.ends.map(at);
-        let t = (value - low) / (high - low);
+        let span = high - low;
+        // Halves of numbers are exact where their difference is too large for one.
+        let t = if span.is_finite() {
+            (value - low) / span
+        } else {
+            (0.5 * value - 0.5 * low) / (0.5 * high - 0.5 * low)
+        };
         // Only infinite values make it NaN.
         if t.is_nan() { 0.0 } else { t.clamp(0.0, 1.0) }
     }
 
     /// The place of the crossing, the fraction `t` along its edge.
     #[inline]
-    pub fn place(&self, positions: &[[f32; 3]], t: f64) -> [f32; 3] {
+    pub fn place(&self, positions: &[[f64; 3]], t: f64) -> [f64; 3] {
         let [p, q] = self.ends.map(|end| positions[end as usize]);
         [0, 1, 2].map(|i| between(p[i], q[i], t))
     }
 
     /// The value there of a field with one number a point.
-    pub fn value(&self, field: &[f32], t: f64) -> f32 {
+    pub fn value(&self, field: &[f64], t: f64) -> f64 {
         let [a, b] = self.ends.map(|end| field[end as usize]);
         between(a, b, t)
     }
 }
 
-fn between(a: f32, b: f32, t: f64) -> f32 {
-    (f64::from(a) + t * (f64::from(b) - f64::from(a))) as f32
+fn between(a: f64, b: f64, t: f64) -> f64 {
+    let span = b - a;
+    if span.is_finite() { a + t * span } else { a * (1.0 - t) + b * t }
 }
 
 impl Crossings {
