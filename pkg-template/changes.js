@@ -14,6 +14,9 @@ const ARRAYS = [
   ["neighbors", "tets", 4],
 ];
 
+/** How positions and values are stored in the arrays. */
+const STORED = ["origin", "offset", "scale"];
+
 /** The bits of all arrays. */
 const ALL = 2 ** ARRAYS.length - 1;
 
@@ -32,9 +35,10 @@ export function arrayBits(names) {
  * @param {ArrayBuffer} buffer
  * @param {Uint32Array} places address and length of each
  * @param {number} bits
+ * @param {Float32ArrayConstructor | Float64ArrayConstructor} [Floats] of positions and values
  */
-export function arraysIn(buffer, places, bits) {
-  const kinds = [Float32Array, Float32Array, Uint32Array, Uint32Array];
+export function arraysIn(buffer, places, bits, Floats = Float32Array) {
+  const kinds = [Floats, Floats, Uint32Array, Uint32Array];
   const entries = ARRAYS.map(([name], at) => [name, new kinds[at](buffer, places[2 * at], places[2 * at + 1])]);
   return Object.fromEntries(entries.filter((_, at) => (bits >> at) & 1));
 }
@@ -47,7 +51,8 @@ export function arraysIn(buffer, places, bits) {
  * @param {{ vertices: Uint32Array, tets: Uint32Array }} changed start and end of each range
  */
 export function copyChanged([from, places], [to, copies], changed) {
-  const [source, target] = [arraysIn(from, places, ALL), arraysIn(to, copies, ALL)];
+  // Modules have the mesh in double precision.
+  const [source, target] = [arraysIn(from, places, ALL, Float64Array), arraysIn(to, copies, ALL, Float64Array)];
   for (const [name, kind, size] of ARRAYS) {
     const ranges = changed[kind];
     for (let i = 0; i < ranges.length; i += 2) {
@@ -64,6 +69,9 @@ export function emptyMesh() {
     field: new Float32Array(),
     tets: new Uint32Array(),
     neighbors: new Uint32Array(),
+    origin: [0, 0, 0],
+    offset: 0,
+    scale: 1,
     changes: { from: 0, to: 0, vertices: new Uint32Array(), tets: new Uint32Array() },
   };
 }
@@ -90,6 +98,7 @@ export function applyChanges(mesh, delta) {
     copyRanges(array, delta[name], delta.changes[kind], size);
     mesh[name] = array;
   }
+  for (const name of STORED) mesh[name] = delta[name];
   mesh.changes = delta.changes;
   return mesh;
 }

@@ -119,9 +119,9 @@ export function coreMethods(emit, shared = new SharedRanges()) {
   /** The mesh as it is now, or what has changed in it, after a step. */
   const result = ({ stats, more }, { deltas, arrays, zeroCopy }) => {
     if (!zeroCopy) return { ...(deltas ? session.delta(arrays) : session.mesh(arrays)), stats, more };
-    const { changes } = session.mesh(0);
+    const mesh = session.mesh(0);
     const places = session.places();
-    return { ...arraysIn(wasm.memory.buffer, places, arrays), changes, stats, more };
+    return { ...mesh, ...arraysIn(wasm.memory.buffer, places, arrays), stats, more };
   };
   /** The tools, with the mesh as it is now: what has changed since the last time is copied. */
   const toolsNow = async () => {
@@ -130,7 +130,8 @@ export function coreMethods(emit, shared = new SharedRanges()) {
     const made = tools ?? new Tools();
     // If this fails, the next call begins with another copy.
     tools = undefined;
-    const places = session.places();
+    made.setStored(session.stored());
+    const places = session.sources();
     const copies = made.change(places[1] / 3, places[5] / 4, changed.vertices, changed.tets);
     copyChanged([wasm.memory.buffer, places], [memory.buffer, copies], changed);
     tools = made;

@@ -6,7 +6,9 @@
  * import { createSurface } from "tetralod/three";
  *
  * const surface = await createSurface(mt, { isosurface: 0.5 });
- * scene.add(new THREE.Mesh(surface.geometry, new THREE.MeshStandardMaterial()));
+ * const object = new THREE.Mesh(surface.geometry, new THREE.MeshStandardMaterial());
+ * object.position.set(...surface.origin); // not 0 in volumes far from their origin
+ * scene.add(object);
  * await mt.refine({ error: "0.1%", isovalues: [0.5] });
  * await surface.update(); // writes into the same geometry
  * ```
@@ -20,11 +22,19 @@ export type { SurfaceOptions };
 /** A geometry that shows a surface of the current mesh. */
 export interface ThreeSurface {
   /**
-   * Always the same object. Its attributes are `position`, `normal` (of isosurfaces; others want `flatShading`), `value` (in units
-   * of the field) and, with the option `color`, `color`. They are longer than what is drawn: the draw range and the bounding box
+   * Always the same object. Its attributes are `position` (relative to `origin`), `normal` (of isosurfaces; others want `flatShading`),
+   * `value` (relative to `offset`) and, with the option `color`, `color`. They are longer than what is drawn: the draw range and the bounding box
    * and sphere are set.
    */
   readonly geometry: BufferGeometry;
+  /**
+   * What positions are relative to, in model units: `object.position.set(...surface.origin)` puts an object with the geometry where it is.
+   * 0 unless the volume is far from its origin for its size; the same as `info.origin`.
+   */
+  readonly origin: [number, number, number];
+  /** What the attribute `value` is relative to: a value is `offset + scale * v`, in field units. 0 and 1 unless the field needs it. */
+  readonly offset: number;
+  readonly scale: number;
   /**
    * Extracts the surface from the mesh as it is now, and writes it into `geometry`. Where arrays are too short, it replaces
    * them. `what` asks for another surface, now and later. Of calls that are faster than the worker, the last one counts.
@@ -41,7 +51,7 @@ export interface ThreeOptions {
   /** The module `three`, for a page that has loaded it in its own way. Default: it is imported by this name. */
   three?: typeof import("three");
   /**
-   * The colour of a value: red, green and blue, 0 to 1, in the working colour space of three.js; for materials with `vertexColors`.
+   * The colour of a value in field units: red, green and blue, 0 to 1, in the working colour space of three.js; for materials with `vertexColors`.
    * Default: no colours.
    */
   color?: (value: number) => ArrayLike<number>;

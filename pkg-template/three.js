@@ -26,6 +26,12 @@ class ThreeSurface {
     this.#surface = new Surface(volume, what, (triangles) => this.#take(triangles));
   }
 
+  /** What the positions of the geometry are relative to. @type {[number, number, number]} */
+  origin = [0, 0, 0];
+  /** What the attribute `value` is relative to. */
+  offset = 0;
+  scale = 1;
+
   async update(what) {
     await this.#surface.update(what);
     return this.geometry;
@@ -40,7 +46,8 @@ class ThreeSurface {
     this.dispose();
   }
 
-  #take({ positions, indices, normals, values }) {
+  #take({ positions, indices, normals, values, origin, offset, scale }) {
+    Object.assign(this, { origin, offset, scale });
     const arrays = { position: [positions, 3], normal: [normals, 3], value: [values, 1], color: [this.#colors(values), 3], index: [indices, 1] };
     if (!Object.entries(arrays).every(([name, [array]]) => this.#fits(name, array))) this.#replace(arrays);
     for (const [name, [array]] of Object.entries(arrays)) {
@@ -88,7 +95,7 @@ class ThreeSurface {
   #colors(values) {
     if (!this.#color || !values) return undefined;
     const colors = new Float32Array(3 * values.length);
-    values.forEach((value, i) => colors.set(this.#color(value), 3 * i));
+    values.forEach((value, i) => colors.set(this.#color(this.offset + this.scale * value), 3 * i));
     return colors;
   }
 }

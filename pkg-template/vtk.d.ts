@@ -21,7 +21,10 @@ export type { SurfaceOptions };
 
 /** Polydata that show a surface of the current mesh. */
 export interface VtkSurface {
-  /** Always the same object: points, triangles, the values as scalars, and normals of isosurfaces. */
+  /**
+   * Always the same object: points, triangles, the values as scalars, and normals of isosurfaces. Points and values are absolute: in double
+   * precision where single precision would lose digits of the volume.
+   */
   readonly polyData: vtkPolyData;
   /**
    * Extracts the surface from the mesh as it is now, writes it into `polyData`, and marks that as modified. `what` asks for

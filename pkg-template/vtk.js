@@ -1,6 +1,6 @@
 /** Surfaces of a volume as a `vtkPolyData` of vtk.js, which is updated in place. */
 
-import { Surface } from "./surfaces.js";
+import { Surface, absolute } from "./surfaces.js";
 import { checkNames } from "./tools.js";
 
 export async function createSurface(volume, what, options = {}) {
@@ -45,8 +45,9 @@ class VtkSurface {
     this.dispose();
   }
 
-  #take({ positions, indices, normals, values }) {
+  #take({ indices, normals, ...stored }) {
     const { polyData } = this;
+    const { positions, values } = absolute(stored);
     polyData.getPoints().setData(positions, 3);
     polyData.getPolys().setData(cellsOf(indices), 1);
     const data = polyData.getPointData();

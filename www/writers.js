@@ -1,19 +1,33 @@
 /** Meshes and triangles as files that other programs read. Each gives the parts of a file, one after the other. */
 
-/** @typedef {{ positions: Float32Array, field: Float32Array, tets: Uint32Array }} TetMesh */
-/** @typedef {{ positions: Float32Array, indices: Uint32Array, values?: Float32Array, normals?: Float32Array, name: string }} Triangles */
+/** @typedef {{ origin: number[], offset: number, scale: number }} Stored what positions and values are relative to */
+/** @typedef {Stored & { positions: Float32Array, field: Float32Array, tets: Uint32Array }} TetMesh */
+/** @typedef {Stored & { positions: Float32Array, indices: Uint32Array, values?: Float32Array, normals?: Float32Array, name: string }} Triangles */
 
 const TETRAHEDRON = 10;
 
 /** A name without what has a meaning in the formats. */
 const plain = (name) => name.replaceAll(/[^\w.-]/g, "_");
 
+/** Absolute positions: in double precision where single precision would lose digits. @param {Float32Array} positions @param {Stored} stored */
+const absolutePositions = (positions, { origin }) =>
+  origin.every((x) => x === 0) ? positions : Float64Array.from(positions, (x, i) => origin[i % 3] + x);
+
+/** The same of values. @param {Float32Array} values @param {Stored} stored */
+const absoluteValues = (values, { offset, scale }) =>
+  offset === 0 && scale === 1 ? values : Float64Array.from(values, (v) => offset + scale * v);
+
+/** Which of two words is that of the numbers of an array. */
+const ofType = (array, single, double) => (array instanceof Float64Array ? double : single);
+
 /**
  * VTK XML, unstructured grid, arrays appended as they are.
  *
  * @param {TetMesh} mesh @param {string} name of the field @returns {BlobPart[]}
  */
-export function vtu({ positions, field, tets }, name) {
+export function vtu(mesh, name) {
+  const { tets } = mesh;
+  const [positions, field] = [absolutePositions(mesh.positions, mesh), absoluteValues(mesh.field, mesh)];
   const [points, cells] = [positions.length / 3, tets.length / 4];
   const ends = Uint32Array.from({ length: cells }, (_, i) => 4 * (i + 1));
   const types = new Uint8Array(cells).fill(TETRAHEDRON);
@@ -28,8 +42,8 @@ export function vtu({ positions, field, tets }, name) {
   const head = `<?xml version="1.0"?>
 <VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64">
 <UnstructuredGrid><Piece NumberOfPoints="${points}" NumberOfCells="${cells}">
-<PointData Scalars="${plain(name)}">${array("Float32", plain(name), "", values)}</PointData>
-<Points>${array("Float32", "Points", ' NumberOfComponents="3"', places)}</Points>
+<PointData Scalars="${plain(name)}">${array(ofType(field, "Float32", "Float64"), plain(name), "", values)}</PointData>
+<Points>${array(ofType(positions, "Float32", "Float64"), "Points", ' NumberOfComponents="3"', places)}</Points>
 <Cells>${array("UInt32", "connectivity", "", corners)}${array("UInt32", "offsets", "", offsets)}${array("UInt8", "types", "", kinds)}</Cells>
 </Piece></UnstructuredGrid>
 <AppendedData encoding="raw">_`;
@@ -40,7 +54,8 @@ export function vtu({ positions, field, tets }, name) {
 /** The same numbers, the highest byte first. */
 function swapped(array) {
   const bytes = new Uint8Array(array.buffer.slice(array.byteOffset, array.byteOffset + array.byteLength));
-  for (let i = 0; i < bytes.length; i += 4) bytes.subarray(i, i + 4).reverse();
+  const size = array.BYTES_PER_ELEMENT;
+  for (let i = 0; i < bytes.length; i += size) bytes.subarray(i, i + size).reverse();
   return bytes;
 }
 
@@ -49,7 +64,9 @@ function swapped(array) {
  *
  * @param {TetMesh} mesh @param {string} name of the field @returns {BlobPart[]}
  */
-export function vtk({ positions, field, tets }, name) {
+export function vtk(mesh, name) {
+  const { tets } = mesh;
+  const [positions, field] = [absolutePositions(mesh.positions, mesh), absoluteValues(mesh.field, mesh)];
   const [points, cells] = [positions.length / 3, tets.length / 4];
   const corners = new Uint32Array(5 * cells);
   for (let i = 0; i < cells; i++) {
@@ -58,22 +75,28 @@ export function vtk({ positions, field, tets }, name) {
   }
   const types = new Uint32Array(cells).fill(TETRAHEDRON);
   return [
-    `# vtk DataFile Version 3.0\ntetralod\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS ${points} float\n`,
+    `# vtk DataFile Version 3.0\ntetralod\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS ${points} ${ofType(positions, "float", "double")}\n`,
     swapped(positions),
     `\nCELLS ${cells} ${corners.length}\n`,
     swapped(corners),
     `\nCELL_TYPES ${cells}\n`,
     swapped(types),
-    `\nPOINT_DATA ${points}\nSCALARS ${plain(name)} float 1\nLOOKUP_TABLE default\n`,
+    `\nPOINT_DATA ${points}\nSCALARS ${plain(name)} ${ofType(field, "float", "double")} 1\nLOOKUP_TABLE default\n`,
     swapped(field),
     "\n",
   ];
 }
 
-/** STL, binary. @param {Triangles} surface @returns {BlobPart[]} */
-export function stl({ positions, indices }) {
+/**
+ * STL, binary, which holds single precision: positions stay relative to the origin, which the head of the file names if it is not 0.
+ *
+ * @param {Triangles} surface @returns {BlobPart[]}
+ */
+export function stl({ positions, indices, origin }) {
   const count = indices.length / 3;
   const data = new DataView(new ArrayBuffer(84 + 50 * count));
+  const head = origin.every((x) => x === 0) ? "tetralod" : `tetralod, relative to ${origin.join(" ")}`;
+  new Uint8Array(data.buffer, 0, 80).set(new TextEncoder().encode(head.slice(0, 80)));
   data.setUint32(80, count, true);
   for (let i = 0; i < count; i++) {
     const corners = [0, 1, 2].map((k) => positions.subarray(3 * indices[3 * i + k], 3 * indices[3 * i + k] + 3));
@@ -88,16 +111,23 @@ export function stl({ positions, indices }) {
 }
 
 /** PLY, binary, with normals or the value of the field at each vertex. @param {Triangles} surface @returns {BlobPart[]} */
-export function ply({ positions, indices, values, normals, name }) {
+export function ply(surface) {
+  const { indices, normals, name } = surface;
+  const positions = absolutePositions(surface.positions, surface);
+  const values = surface.values && absoluteValues(surface.values, surface);
   const [points, count] = [positions.length / 3, indices.length / 3];
-  const label = plain(name);
-  const properties = ["x", "y", "z", ...(normals ? ["nx", "ny", "nz"] : []), ...(values ? [label] : [])];
-  const width = properties.length;
-  const vertices = new Float32Array(width * points);
+  /** @type {[array: Float32Array | Float64Array | undefined, names: string[]][]} */
+  const all = [[positions, ["x", "y", "z"]], [normals, ["nx", "ny", "nz"]], [values, [plain(name)]]];
+  const columns = all.flatMap(([array, names]) => (array ? names.map((label, k) => ({ array, label, k, step: names.length })) : []));
+  const width = columns.reduce((sum, { array }) => sum + array.BYTES_PER_ELEMENT, 0);
+  const vertices = new DataView(new ArrayBuffer(width * points));
+  let at = 0;
   for (let i = 0; i < points; i++) {
-    vertices.set(positions.subarray(3 * i, 3 * i + 3), width * i);
-    if (normals) vertices.set(normals.subarray(3 * i, 3 * i + 3), width * i + 3);
-    if (values) vertices[width * (i + 1) - 1] = values[i];
+    for (const { array, k, step } of columns) {
+      if (array instanceof Float64Array) vertices.setFloat64(at, array[step * i + k], true);
+      else vertices.setFloat32(at, array[step * i + k], true);
+      at += array.BYTES_PER_ELEMENT;
+    }
   }
   const faces = new DataView(new ArrayBuffer(13 * count));
   for (let i = 0; i < count; i++) {
@@ -105,7 +135,7 @@ export function ply({ positions, indices, values, normals, name }) {
     for (let k = 0; k < 3; k++) faces.setUint32(13 * i + 1 + 4 * k, indices[3 * i + k], true);
   }
   const head = ["ply", "format binary_little_endian 1.0", "comment tetralod", `element vertex ${points}`]
-    .concat(properties.map((property) => `property float ${property}`))
+    .concat(columns.map(({ array, label }) => `property ${ofType(array, "float", "double")} ${label}`))
     .concat([`element face ${count}`, "property list uchar uint vertex_indices", "end_header", ""]);
   return [head.join("\n"), vertices, faces];
 }
@@ -120,8 +150,13 @@ function bounds(positions) {
   return { min, max };
 }
 
-/** glTF 2.0, binary (`.glb`). The value of the field is the attribute `_VALUE`. @param {Triangles} surface @returns {BlobPart[]} */
-export function glb({ positions, indices, values, normals }) {
+/**
+ * glTF 2.0, binary (`.glb`), which holds single precision: positions stay relative to the origin, by which the node is moved. The value of the
+ * field is the attribute `_VALUE`, relative to what `extras` of the mesh say: it is `offset + scale * v`.
+ *
+ * @param {Triangles} surface @returns {BlobPart[]}
+ */
+export function glb({ positions, indices, values, normals, origin, offset, scale }) {
   const [FLOAT, UINT, VERTICES, ELEMENTS] = [5126, 5125, 34962, 34963];
   /** @type {[array: Float32Array | Uint32Array, accessor: object, target: number, attribute?: string][]} */
   const all = [
@@ -141,8 +176,8 @@ export function glb({ positions, indices, values, normals }) {
     asset: { version: "2.0", generator: "tetralod" },
     scene: 0,
     scenes: [{ nodes: [0] }],
-    nodes: [{ mesh: 0 }],
-    meshes: [{ primitives: [{ attributes, indices: 0, material: 0 }] }],
+    nodes: [origin.every((x) => x === 0) ? { mesh: 0 } : { mesh: 0, translation: origin }],
+    meshes: [{ ...(offset === 0 && scale === 1 ? {} : { extras: { offset, scale } }), primitives: [{ attributes, indices: 0, material: 0 }] }],
     materials: [{ doubleSided: true, pbrMetallicRoughness: { metallicFactor: 0, roughnessFactor: 0.7 } }],
     accessors: all.map(([, accessor], bufferView) => ({ bufferView, ...accessor })),
     bufferViews,
