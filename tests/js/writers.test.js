@@ -3,12 +3,15 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { csv, glb, ply, stl, vtk, vtu } from "../../www/writers.js";
 
+const plainly = { origin: [0, 0, 0], offset: 0, scale: 1 };
 const mesh = {
+  ...plainly,
   positions: Float32Array.of(0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 1, 1),
   field: Float32Array.of(0.5, -1.25, 2, 3, 4),
   tets: Uint32Array.of(0, 1, 2, 3, 1, 2, 3, 4),
 };
 const surface = {
+  ...plainly,
   positions: mesh.positions.slice(0, 12),
   indices: Uint32Array.of(0, 1, 2, 0, 3, 1),
   values: Float32Array.of(1, 2, 3, 4),
@@ -92,4 +95,43 @@ test("glTF: the chunks hold what the accessors name", async () => {
 
 test("CSV: words with commas are in quotes, missing numbers are empty", async () => {
   assert.equal((await bytesOf(csv([["a,b", 'c"d'], [1.5, undefined]]))).toString(), '"a,b","c""d"\n1.5,\n');
+});
+
+test("what is relative to an origin is saved in absolute numbers of double precision, or the origin with it", async () => {
+  const stored = { origin: [600_000, 5_800_000.25, 0], offset: 1.7e9, scale: 1 };
+  const far = { ...mesh, ...stored };
+  const places = [...mesh.positions].map((x, i) => stored.origin[i % 3] + x);
+  const values = [...mesh.field].map((v) => stored.offset + v);
+  const doubles = (bytes, at, count, how) => Array.from({ length: count }, (_, i) => bytes[`readDouble${how}`](at + 8 * i));
+
+  const grid = await bytesOf(vtu(far, "t"));
+  const text = grid.toString("latin1");
+  assert.match(text, /type="Float64" Name="t"/);
+  assert.match(text, /type="Float64" Name="Points"/);
+  const start = text.indexOf('encoding="raw">_') + 'encoding="raw">_'.length + 8;
+  assert.deepEqual(doubles(grid, start, 5, "LE"), values);
+  assert.deepEqual(doubles(grid, start + 5 * 8 + 8, 15, "LE"), places);
+
+  const legacy = await bytesOf(vtk(far, "t"));
+  const head = "POINTS 5 double\n";
+  assert.deepEqual(doubles(legacy, legacy.indexOf(head) + head.length, 15, "BE"), places);
+  const lookup = "SCALARS t double 1\nLOOKUP_TABLE default\n";
+  assert.deepEqual(doubles(legacy, legacy.indexOf(lookup) + lookup.length, 5, "BE"), values);
+
+  const farSurface = { ...surface, ...stored };
+  const polygons = await bytesOf(ply(farSurface));
+  const end = "end_header\n";
+  const body = polygons.indexOf(end) + end.length;
+  assert.match(polygons.toString("latin1"), /property double x\n[^]*property float nx\n[^]*property double the_density\n/);
+  assert.deepEqual(doubles(polygons, body + 44, 3, "LE"), places.slice(3, 6));
+  assert.deepEqual(doubles(polygons, body + 36, 1, "LE"), [stored.offset + 1]);
+
+  const triangles = await bytesOf(stl(farSurface));
+  assert.match(triangles.toString("latin1", 0, 80), /relative to 600000 5800000.25 0/);
+  assert.deepEqual(read(triangles, 84 + 12, 9, "FloatLE"), [0, 0, 0, 1, 0, 0, 0, 1, 0]);
+
+  const bytes = await bytesOf(glb(farSurface));
+  const json = JSON.parse(bytes.toString("utf8", 20, 20 + bytes.readUInt32LE(12)));
+  assert.deepEqual(json.nodes, [{ mesh: 0, translation: stored.origin }]);
+  assert.deepEqual(json.meshes[0].extras, { offset: stored.offset, scale: 1 });
 });
