@@ -302,7 +302,7 @@ export interface MeshTools<Aside = { request?: never }> {
     } & Aside,
   ): Promise<FieldStats>;
 
-  /** A hash of the current mesh: the same request gives the same hash on every machine. */
+  /** A hash of the current mesh: the same request gives the same hash on every machine. A viewer gives it when it is at rest. */
   hash(): Promise<string>;
 }
 

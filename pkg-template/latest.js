@@ -8,6 +8,8 @@ export class Latest {
   #run;
   #merge;
   #busy = false;
+  /** Resolves when the call that is under way has ended. */
+  #running;
   #waiting = null;
 
   constructor(run, merge = (_, next) => next) {
@@ -26,12 +28,17 @@ export class Latest {
     return promise;
   }
 
+  /** Resolves when none is running and none waits. */
+  async idle() {
+    while (this.#busy) await this.#running;
+  }
+
   #next() {
     if (this.#busy || !this.#waiting) return;
     const { value, resolve, reject } = this.#waiting;
     this.#waiting = null;
     this.#busy = true;
-    this.#run(value)
+    this.#running = this.#run(value)
       .then(resolve, reject)
       .finally(() => {
         this.#busy = false;

@@ -181,13 +181,16 @@ const methods = {
     return { progress: { ...mine.progress, traffic: mine.traffic }, info: { ...viewer.info(), bounds: Array.from(viewer.bounds()) } };
   },
 
-  /** Resolves when all data that the mesh needs has arrived. Arriving blocks may show that others are needed. */
+  /**
+   * Resolves when the mesh is what was asked for, for the camera as it is, and all data that it needs has arrived. Arriving blocks may
+   * show that others are needed; a mesh that is held to fewer tetrahedra while something moves is not the one.
+   */
   async settled() {
     const mine = parts;
     await mine?.settled();
-    while (mine && mine === parts && !broken && (following !== undefined || viewer.moving || held !== undefined)) {
+    while (ready && mine === parts && !broken && (following !== undefined || viewer.moving || held !== undefined)) {
       await drawn();
-      await mine.settled();
+      await mine?.settled();
     }
   },
 
@@ -301,8 +304,14 @@ const methods = {
   },
 
   ...meshToolMethods(() => viewer),
+
+  /** The same for the same request, whatever moved before: so of the mesh at rest. */
+  async hash() {
+    await methods.settled();
+    return viewer.hash();
+  },
 };
-const emit = serve(webEndpoint(globalThis), methods, ["openParts", "settled"]);
+const emit = serve(webEndpoint(globalThis), methods, ["openParts", "settled", "hash"]);
 
 /** The first bytes of a file that will be opened. @type {{ url: string, range: string, response: Promise<Response> } | undefined} */
 let ahead;

@@ -429,8 +429,8 @@ export class Viewer extends EventTargetWithMeshTools {
    */
   open(source: Source, options?: ReadOptions & { signal?: AbortSignal }): Promise<OpenedVolume>;
   /**
-   * Of a file that is fetched in parts: resolves when all data that the mesh needs has arrived, rejects with the error
-   * that prevents it.
+   * Resolves when the viewer is at rest: all that was set has reached it, the mesh is what was asked for, for the camera as it is, and all
+   * data that it needs has arrived. Rejects with the error that prevents it.
    */
   settled(): Promise<void>;
   /** Continues such a file after an error. Rejects with `changed` if it was replaced on the server: open it again. */

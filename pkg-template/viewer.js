@@ -282,9 +282,23 @@ export class Viewer extends withMeshTools(EventTarget) {
     return { info: opened.info, name: options.name ?? url, total: opened.progress.total, finished };
   }
 
-  /** Of a file that is fetched in parts: resolves when all data that the mesh needs now has arrived. */
+  /**
+   * Resolves when the viewer is at rest: all that was set has reached it, the mesh is what was asked for, for the camera as it is, and all
+   * data that it needs has arrived.
+   */
   async settled() {
+    await this.#sent();
     await this.#remote.call("settled");
+  }
+
+  /** Resolves when the worker has all that was set. */
+  async #sent() {
+    await Promise.all([this.#update.idle(), this.#setRequest.idle()]);
+  }
+
+  async hash() {
+    await this.#sent();
+    return super.hash();
   }
 
   /** Continues after a network error. */

@@ -80,11 +80,11 @@ export async function still(page, name) {
   return study(page, png);
 }
 
-/** Waits until no frame has been drawn for a while, and the mesh is what was asked for. */
+/** Waits until the viewer is at rest, and no frame has been drawn for a while. */
 export async function settle(page) {
   for (let seen = -1; ; ) {
-    // What was set before has reached the worker.
-    await page.evaluate(() => window.tetralodDemo.viewer?.pickRegion(0, 0));
+    // What cannot be fetched is the page's to say.
+    await page.evaluate(() => window.tetralodDemo.viewer?.settled().catch(() => {}));
     const [frames, step] = [await demo(page, "frames"), await demo(page, "step")];
     if (frames === seen && step?.done !== false) return;
     seen = frames;

@@ -39,6 +39,23 @@ test("a call that fails does not stop the ones after it", async () => {
   assert.equal(await good, "yes");
 });
 
+test("it is idle when nothing runs and nothing waits", async () => {
+  const { calls, run } = byHand();
+  const latest = new Latest(run);
+  await latest.idle();
+  const bad = latest.call("bad");
+  latest.call("good");
+  let idle = false;
+  latest.idle().then(() => (idle = true));
+  calls[0].reject(new Error("no"));
+  await assert.rejects(bad, /no/);
+  await soon();
+  assert.deepEqual([idle, calls.map((call) => call.value)], [false, ["bad", "good"]]);
+  calls[1].resolve("yes");
+  await soon();
+  assert.ok(idle);
+});
+
 test("movements that wait add up; of everything else the later one counts", () => {
   const a = { orbit: [1, 2], zoom: [2, 0, 0], scene: { volume: {} }, size: [4, 5, 1] };
   const b = { orbit: [10, 20], pan: [5, 6], zoom: [0.25, 0.1, 0.2], scene: { slices: [] } };
