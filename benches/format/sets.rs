@@ -45,7 +45,10 @@ pub fn all(inputs: &[&str]) -> Result<Vec<Set>> {
 fn read(path: &Path) -> Option<Set> {
     let name = path.file_name()?.to_str()?.to_owned();
     let read = || -> Result<Option<TetMesh>> {
-        let mut mesh = io::read_with(path, &ReadOptions { fields: None, cells: CellData::Values, step: 0 })?;
+        let mut mesh = io::read_with(
+            path,
+            &ReadOptions { fields: None, first: false, cells: CellData::Values, step: 0 },
+        )?;
         if mesh.tets.is_empty() {
             return Ok(None);
         }

@@ -396,7 +396,9 @@ impl BuildOptions {
         let is_sound = way != Way::Whole && mesh.grid.is_some();
         let repair = if is_sound { None } else { Repair::of(mesh, self.repair.level(), repaired)? };
         let repaired = repaired.to_string();
-        for line in [Some(&repaired), repair.as_ref().map(|repair| &repair.kept)].into_iter().flatten() {
+        let notes = mesh.input.lines();
+        let repaired = [Some(&repaired), repair.as_ref().map(|repair| &repair.kept)];
+        for line in notes.iter().chain(repaired.into_iter().flatten()) {
             if !line.is_empty() && !verbosity.quiet {
                 eprintln!("{}: {line}", self.name());
             }
@@ -415,7 +417,8 @@ impl BuildOptions {
     ) -> Result<(TetMesh, RepairReport)> {
         let with_labels = !config.preserve.is_empty();
         let cells = if self.cell_to_point || with_labels { CellData::Values } else { CellData::Names };
-        let wanted = FieldSelection { names: &config.fields, all: config.all_fields, cells };
+        let wanted =
+            FieldSelection { names: &config.fields, all: config.all_fields, labels: &config.preserve, cells };
         let needs_points = |name: &String| GeometryField::named(name).is_some();
         let alone = in_parts
             && cells == CellData::Names
@@ -450,7 +453,10 @@ impl BuildOptions {
                 field.unit.clone_from(unit);
                 found += 1;
             });
-            if found == 0 {
+            let is_other = |field: &Field| {
+                field.name == *name || field.vector.as_ref().is_some_and(|vector| vector.name == *name)
+            };
+            if found == 0 && !mesh.input.other_fields.iter().any(is_other) {
                 anyhow::bail!("--unit {name}={unit}: there is no field '{name}'");
             }
         }
@@ -476,7 +482,13 @@ impl BuildOptions {
         if self.step.is_some_and(|step| step != 0) {
             return Ok(None);
         }
-        let options = ReadOptions { cells: CellData::Names, step: step.number, ..ReadOptions::default() };
+        let wanted = FieldSelection {
+            names: &config.fields,
+            all: config.all_fields,
+            labels: &config.preserve,
+            cells: CellData::Names,
+        };
+        let options = ReadOptions { step: step.number, ..wanted.options() };
         let Some(pieces) = Pieces::open(&step.path, &options)? else { return Ok(None) };
         let prepare = |mesh: &mut TetMesh| {
             if step.time.is_some() {

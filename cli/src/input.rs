@@ -156,7 +156,7 @@ pub fn expect_cells(mesh: &TetMesh, path: &Path) -> Result<()> {
 
 /// Reads a mesh and mends what can be mended.
 pub fn read_mesh(path: &Path) -> Result<(TetMesh, RepairReport)> {
-    let wanted = FieldSelection { names: &[], all: true, cells: CellData::LeaveOut };
+    let wanted = FieldSelection { names: &[], all: true, labels: &[], cells: CellData::LeaveOut };
     let (mesh, report) = read(&[path.to_owned()], &wanted, RepairLevel::Safe)?;
     expect_cells(&mesh, path)?;
     Ok((mesh, report))
@@ -173,7 +173,7 @@ pub fn read_reference(paths: &[PathBuf], opened: &Opened) -> Result<TetMesh> {
 pub fn read_reference_alone(paths: &[PathBuf], opened: &Opened) -> Result<TetMesh> {
     let fields = &opened.info()?.fields;
     let names: Vec<String> = fields.iter().map(|field| field.name.clone()).collect();
-    let wanted = FieldSelection { names: &names, all: false, cells: CellData::Values };
+    let wanted = FieldSelection { names: &names, all: false, labels: &[], cells: CellData::Values };
     // Of several time steps it may have been built from one.
     let time = fields.first().and_then(|field| field.time);
     let is_one = fields.iter().all(|field| field.time == time);

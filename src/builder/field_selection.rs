@@ -60,10 +60,11 @@ fn in_steps(mesh: &TetMesh, wanted: impl Fn(&Field) -> bool) -> Vec<&Field> {
 }
 
 fn unknown(mesh: &TetMesh, name: &str) -> BuildError {
-    if mesh.cell_fields.iter().any(|field| field.answers_to(name)) {
+    if mesh.cell_fields.iter().chain(&mesh.input.other_cell_fields).any(|field| field.answers_to(name)) {
         return BuildError::CellField { name: name.to_owned() };
     }
-    let mut known: Vec<String> = mesh.fields.iter().map(|field| field.name.clone()).collect();
+    let all = mesh.fields.iter().chain(&mesh.input.other_fields);
+    let mut known: Vec<String> = all.map(|field| field.name.clone()).collect();
     known.dedup();
     BuildError::UnknownField { name: name.to_owned(), known }
 }

@@ -80,7 +80,7 @@ pub use memory::{memory_needed_in_parts, memory_needed_in_pieces};
 pub use method::{BuildCriterion, Construction, ConstructionChoice, Method, Purpose, VertexMethod};
 pub use remedy::Remedy;
 
-use crate::mesh::{MeshError, TetMesh};
+use crate::mesh::{InputCell, MeshError, TetMesh};
 use crate::mt::{
     ConvertError, Exact, ExplicitMt, Mt, MtKind, MultiTessellation, UpdateError, UpdateId, VertexId,
 };
@@ -343,7 +343,7 @@ pub enum BuildError {
     )]
     TooThin {
         /// The cell.
-        cell: u32,
+        cell: InputCell,
         /// The bits of the configuration, or those tried last.
         bits: u32,
         /// The fewest bits that keep all cells positive, unless all are too few.

@@ -60,7 +60,7 @@ fn with_bits(mesh: &TetMesh, bits: u32) -> Result<Placed, BuildError> {
         None => Ok(placed),
         Some(cell) => {
             let enough = (bits + 1..=WIDE_BITS).find(|&bits| flat_cell(mesh, &on(mesh, bits)).is_none());
-            Err(BuildError::TooThin { cell, bits, enough })
+            Err(BuildError::TooThin { cell: mesh.input.cells.cell_of(cell), bits, enough })
         }
     }
 }
@@ -80,10 +80,15 @@ fn within(mesh: &TetMesh, tolerance: f64) -> Result<Placed, BuildError> {
         let finest = on(mesh, WIDE_BITS);
         let reached = largest_move(mesh, &finest.lattice, &finest.positions);
         match flat_cell(mesh, &finest) {
-            Some(cell) if reached <= tolerance => BuildError::TooThin { cell, bits: WIDE_BITS, enough: None },
+            Some(cell) if reached <= tolerance => too_thin(mesh, cell),
             _ => BuildError::Tolerance { field: None, reached },
         }
     })
+}
+
+/// Why a mesh is refused of which a tetrahedron is flat on the finest lattice.
+fn too_thin(mesh: &TetMesh, tet: u32) -> BuildError {
+    BuildError::TooThin { cell: mesh.input.cells.cell_of(tet), bits: WIDE_BITS, enough: None }
 }
 
 fn by_cells(mesh: &TetMesh) -> Result<Placed, BuildError> {
@@ -91,7 +96,7 @@ fn by_cells(mesh: &TetMesh) -> Result<Placed, BuildError> {
     let Some(placed) = found else {
         let finest = on(mesh, WIDE_BITS);
         return match flat_cell(mesh, &finest) {
-            Some(cell) => Err(BuildError::TooThin { cell, bits: WIDE_BITS, enough: None }),
+            Some(cell) => Err(too_thin(mesh, cell)),
             // Two points are in the same place in the input.
             None => Ok(finest),
         };

@@ -18,7 +18,7 @@ use super::quantize::Quantized;
 use super::work_mesh::{WorkMesh, keep};
 use super::{BuildConfig, BuildError};
 use crate::geom::orient3d;
-use crate::mesh::{Field, TetMesh};
+use crate::mesh::{Field, MeshInput, TetMesh};
 use std::collections::BTreeMap;
 
 /// The regions of the cells.
@@ -216,21 +216,21 @@ fn tolerance(config: &BuildConfig) -> Result<Option<f64>, BuildError> {
 
 /// The label of each cell by a field at cells; or, by a field at points, the least of its corners'.
 fn labels(mesh: &TetMesh, name: &str) -> Result<Vec<i64>, BuildError> {
-    let whole = |(i, value): (usize, &f64)| {
+    let whole = |(at, value): (u32, &f64)| {
         let is_whole = value.trunc() == *value && value.abs() <= LARGEST_LABEL;
         // Exact: it is an integer that a double holds.
         if is_whole {
             Ok(*value as i64)
         } else {
-            Err(BuildError::Label { name: name.to_owned(), at: i as u32, value: *value })
+            Err(BuildError::Label { name: name.to_owned(), at, value: *value })
         }
     };
-    let all = |field: &Field| field.values.iter().enumerate().map(whole).collect::<Result<Vec<i64>, _>>();
+    let all = |field: &Field| (0..).zip(&field.values).map(whole).collect::<Result<Vec<i64>, _>>();
     let is_it = |field: &&Field| field.name == name;
     if let Some(field) =
         mesh.cell_fields.iter().filter(is_it).find(|field| field.values.len() == mesh.tets.len())
     {
-        return all(field);
+        return all(field).map_err(|error| at_cell(error, mesh));
     }
     match mesh.fields.iter().find(is_it) {
         Some(field) => {
@@ -239,9 +239,22 @@ fn labels(mesh: &TetMesh, name: &str) -> Result<Vec<i64>, BuildError> {
             Ok(mesh.tets.iter().map(least).collect())
         }
         None => {
-            let known = mesh.cell_fields.iter().chain(&mesh.fields).map(|field| field.name.clone()).collect();
+            let MeshInput { other_fields, other_cell_fields, .. } = &mesh.input;
+            let known =
+                mesh.cell_fields.iter().chain(other_cell_fields).chain(&mesh.fields).chain(other_fields);
+            let known = known.map(|field| field.name.clone()).collect();
             Err(BuildError::UnknownLabel { name: name.to_owned(), known })
         }
+    }
+}
+
+/// The same with the number of the cell in the input.
+fn at_cell(error: BuildError, mesh: &TetMesh) -> BuildError {
+    match error {
+        BuildError::Label { name, at, value } => {
+            BuildError::Label { name, at: mesh.input.cells.cell_of(at).number, value }
+        }
+        error => error,
     }
 }
 

@@ -45,6 +45,8 @@ const FOURTHS: [[usize; 3]; 4] = [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]];
 
 /// A quadratic pyramid with a point at the middle of its base, which VTK has no number for and Gmsh has.
 pub(super) const PYRAMID_14: i64 = 1014;
+/// A wedge with a point at the middle of everything, which VTK has as a Lagrange wedge of 21 points.
+pub(super) const WEDGE_21: i64 = 1021;
 /// The parts of that: pyramids of five points and tetrahedra.
 const PARTS_14: [&[u8]; 10] = [
     &[0, 5, 13, 8, 9],

@@ -5,9 +5,10 @@
 
 use std::collections::BTreeMap;
 
-use crate::io::cell_shapes::{Recipe, recipe};
-use crate::io::error::{ReadReason, cell_name};
-use crate::mesh::Field;
+use crate::io::cell_shapes::{PYRAMID_14, Recipe, WEDGE_21, recipe};
+use crate::io::error::{ReadReason, cell_name, named_counts, names};
+use crate::io::vtu::{GHOST_CELL, HIDDEN_CELL};
+use crate::mesh::{CellNumbers, Field, MeshInput};
 
 /// VTK's number for no cell at all; also that of cells which are to be left out.
 pub(super) const EMPTY: i64 = 0;
@@ -16,7 +17,55 @@ pub(super) const TETRAHEDRON: i64 = 10;
 /// And for cells that say no more than that there are points.
 const VERTICES: [i64; 2] = [1, 2];
 /// And for cells without a volume: linear, quadratic, and of any order.
-const FLAT: [i64; 22] = [EMPTY, 1, 2, 3, 4, 5, 6, 7, 8, 9, 21, 22, 23, 28, 30, 34, 35, 36, 68, 69, 70, 75];
+const FLAT: [i64; 31] = [
+    EMPTY, HIDDEN, GHOST, 1, 2, 3, 4, 5, 6, 7, 8, 9, 21, 22, 23, 28, 30, 34, 35, 36, 51, 52, 53, 54, 60, 61,
+    62, 63, 68, 69, 70,
+];
+/// And for those of Bezier.
+const FLAT_BEZIER: [i64; 3] = [75, 76, 77];
+/// Numbers of our own for cells that are marked as hidden, and as those of another piece.
+pub(super) const HIDDEN: i64 = -1;
+pub(super) const GHOST: i64 = -2;
+/// VTK's number for a hexahedron of any order.
+pub(super) const LAGRANGE_HEXAHEDRON: i64 = 72;
+/// Types of any order, and a number of our own for each with its points: this times the type, and the points.
+const ANY_ORDERS: [i64; 8] = [71, 72, 73, 74, 78, 79, 80, 81];
+pub(super) const ANY_ORDER: i64 = 10_000;
+
+/// Cells of any order that are those of another type: type, points, and that one.
+const SAME_AS: [(i64, i64, i64); 13] = [
+    (71, 4, 10),
+    (71, 10, 24),
+    (72, 8, 12),
+    (72, 27, 29),
+    (73, 6, 13),
+    (73, 18, 32),
+    (73, 21, WEDGE_21),
+    (74, 5, 14),
+    (74, 14, PYRAMID_14),
+    (78, 4, 10),
+    (79, 8, 12),
+    (80, 6, 13),
+    (81, 5, 14),
+];
+
+/// Whether the number of points of cells of these types says what they are.
+pub(super) fn depend_on_points(types: &[i64]) -> bool {
+    types.iter().any(|kind| ANY_ORDERS.contains(kind))
+}
+
+/// Gives cells of any order the types that they have with their number of points; those of a higher order get a number of our own.
+pub(super) fn resolve_orders(types: &mut [i64], ends: &[i64]) {
+    let mut start = 0;
+    for (kind, &end) in types.iter_mut().zip(ends) {
+        let points = end.saturating_sub(start);
+        start = end;
+        if ANY_ORDERS.contains(kind) {
+            let same = SAME_AS.iter().find(|(of, count, _)| (*of, *count) == (*kind, points));
+            *kind = same.map_or(*kind * ANY_ORDER + points.clamp(0, ANY_ORDER - 1), |(.., same)| *same);
+        }
+    }
+}
 
 /// Whether the cells are vertices and poly-vertices alone, as of data sets that are only points.
 pub(super) fn are_points(types: &[i64]) -> bool {
@@ -31,28 +80,53 @@ fn points_of_flat(kind: i64) -> Option<i64> {
 
 /// Whether a file may list cells of this type, which are then left out.
 pub(super) fn is_flat(kind: i64) -> bool {
-    FLAT.contains(&kind)
+    FLAT.contains(&kind) || FLAT_BEZIER.contains(&kind)
 }
 
 /// The tetrahedra at most that cells of these types become. Refuses types that cannot be split, and cells none of which has a
 /// volume, with the number of each type.
 pub(super) fn most_tets(types: &[i64]) -> Result<u64, ReadReason> {
-    let mut counts = BTreeMap::new();
-    for kind in types {
-        *counts.entry(*kind).or_insert(0_u64) += 1;
-    }
+    let counts = counts_of(types);
     let mut tets = 0_u64;
     for (&kind, &count) in &counts {
         match recipe(kind) {
             Some(recipe) => tets = tets.saturating_add(count.saturating_mul(recipe.most_tets() as u64)),
+            // How many a cell of any order has is known with its points: the most of the second order.
+            None if ANY_ORDERS.contains(&kind) => tets = tets.saturating_add(count.saturating_mul(48)),
             None if is_flat(kind) => {}
             None => return Err(ReadReason::CellTypes(counts.into_iter().collect())),
         }
     }
     if tets == 0 && !types.is_empty() {
-        return Err(ReadReason::CellTypes(counts.into_iter().collect()));
+        return Err(no_volume(&counts.into_iter().collect::<Vec<_>>()));
     }
     Ok(tets)
+}
+
+fn counts_of(types: &[i64]) -> BTreeMap<i64, u64> {
+    let mut counts = BTreeMap::new();
+    for kind in types {
+        *counts.entry(*kind).or_insert(0_u64) += 1;
+    }
+    counts
+}
+
+/// Why a mesh of nothing but these cells, types and counts, is refused.
+fn no_volume(counts: &[(i64, u64)]) -> ReadReason {
+    ReadReason::NoVolume(named_counts(counts))
+}
+
+/// The number of our own for a cell that VTK's flags leave out.
+pub(super) fn left_out_by(flags: i64) -> Option<i64> {
+    if flags & HIDDEN_CELL != 0 { Some(HIDDEN) } else { (flags & GHOST_CELL != 0).then_some(GHOST) }
+}
+
+/// Notes which cells are left out.
+pub(super) fn leave_out(types: &[i64], input: &mut MeshInput) {
+    for (kind, count) in counts_of(types).into_iter().filter(|(kind, _)| is_flat(*kind)) {
+        let (one, many) = names(kind).unwrap_or(("cell without a volume", "cells without a volume"));
+        input.leave_out(count, one, many);
+    }
 }
 
 /// Recipes that were looked up.
@@ -120,6 +194,8 @@ pub(super) struct Split {
     pub tets: Vec<[u32; 4]>,
     /// The cell of each tetrahedron; none while they are the same.
     cells: Option<Vec<u32>>,
+    /// What is known of the cells.
+    pub input: MeshInput,
 }
 
 impl Split {
@@ -140,6 +216,27 @@ impl Split {
         let cells = self.cells.get_or_insert_with(|| (0..first as u32).collect());
         cells.resize(self.tets.len(), cell as u32);
     }
+
+    /// Keeps for messages which cells the tetrahedra are of.
+    fn describe(&mut self, types: &[i64]) {
+        leave_out(types, &mut self.input);
+        self.input.cells = match &self.cells {
+            None => CellNumbers::same(self.tets.len()),
+            Some(cells) => CellNumbers::each(cells.clone(), types.len(), runs(types)),
+        };
+    }
+}
+
+/// The first cell of each run of cells of one type, with its name.
+fn runs(types: &[i64]) -> Vec<(u32, &'static str)> {
+    let mut runs = Vec::new();
+    let mut last = None;
+    for (cell, &kind) in (0..).zip(types).filter(|(_, kind)| !is_flat(**kind)) {
+        if last.replace(kind) != Some(kind) {
+            runs.push((cell, names(kind).map_or("cell", |(one, _)| one)));
+        }
+    }
+    runs
 }
 
 /// Cells as a file lists them, whose ends were checked.
@@ -156,18 +253,78 @@ impl CellList {
     pub fn split(self, numbering: &Numbering) -> Result<Split, ReadReason> {
         split(&self, numbering)
     }
+
+    /// Which of so many points cells with a volume use.
+    pub fn used(&self, points: usize) -> Vec<bool> {
+        let mut used = vec![false; points];
+        for (_, listed) in self.solid() {
+            let listed = listed.iter().filter_map(|&point| usize::try_from(point).ok());
+            listed.for_each(|point| used.get_mut(point).into_iter().for_each(|used| *used = true));
+        }
+        used
+    }
+
+    /// The cells that have a volume: their numbers and points.
+    fn solid(&self) -> impl Iterator<Item = (usize, &[i64])> {
+        let mut start = 0;
+        let cells = self.types.iter().zip(&self.ends).enumerate().map(move |(cell, (&kind, &end))| {
+            let end = usize::try_from(end).unwrap_or(usize::MAX);
+            let listed = self.connectivity.get(start..end).unwrap_or_default();
+            start = end;
+            (cell, kind, listed)
+        });
+        cells.filter(|(_, kind, _)| !is_flat(*kind)).map(|(cell, _, listed)| (cell, listed))
+    }
+
+    /// Leaves out the cells that VTK's flags mark as another piece's or as hidden.
+    pub fn leave_out(&mut self, flags: &[i64]) {
+        for (kind, flags) in self.types.iter_mut().zip(flags).filter(|(kind, _)| !is_flat(**kind)) {
+            *kind = left_out_by(*flags).unwrap_or(*kind);
+        }
+    }
+
+    /// Puts the points of these cells, hexahedra of the second order, into the order that VTK has had since version 9: two edges come in
+    /// another one.
+    pub fn order_as_before_9(&mut self, cells: Vec<bool>) {
+        let mut start = 0;
+        for (swapped, &end) in cells.into_iter().zip(&self.ends) {
+            let end = usize::try_from(end).unwrap_or(usize::MAX);
+            if let Some(points @ [_, .., _]) = self.connectivity.get_mut(start..end)
+                && swapped
+                && points.len() == 27
+            {
+                points.swap(18, 19);
+            }
+            start = end;
+        }
+    }
+
+    /// Leaves out the cells with a point that is hidden.
+    pub fn hide(&mut self, hidden: &[bool]) {
+        let is_hidden = |point: &i64| {
+            usize::try_from(*point).ok().and_then(|p| hidden.get(p)).is_some_and(|hidden| *hidden)
+        };
+        let cells: Vec<usize> =
+            self.solid().filter(|(_, listed)| listed.iter().any(is_hidden)).map(|(cell, _)| cell).collect();
+        cells.into_iter().for_each(|cell| self.types[cell] = HIDDEN);
+    }
 }
 
 fn split(
     CellList { types, ends, connectivity }: &CellList,
     numbering: &Numbering,
 ) -> Result<Split, ReadReason> {
+    let mut split = Split::default();
+    if !types.is_empty() && types.iter().all(|kind| [HIDDEN, GHOST].contains(kind)) {
+        split.describe(types);
+        return Ok(split);
+    }
     let tets = most_tets(types)?;
     let room = usize::try_from(tets).unwrap_or(usize::MAX);
     if types.len() > u32::MAX as usize || room > u32::MAX as usize {
         return Err(ReadReason::TooLarge { what: "cells".into(), limit: u64::from(u32::MAX) });
     }
-    let mut split = Split { tets: Vec::with_capacity(room), cells: None };
+    split.tets.reserve_exact(room);
     let (mut start, mut recipes) = (0, Recipes::default());
     let mut vertices = Vec::new();
     for (cell, (&kind, &end)) in types.iter().zip(ends).enumerate() {
@@ -191,6 +348,7 @@ fn split(
     if split.tets.len() < split.tets.capacity() / 2 {
         split.tets.shrink_to_fit();
     }
+    split.describe(types);
     Ok(split)
 }
 
@@ -215,12 +373,25 @@ mod tests {
         split.spread(&mut fields);
         assert_eq!(fields[0].values, [6.0, 7.0, 7.0, 7.0, 7.0, 7.0, 7.0]);
         assert!(fields[1].values.is_empty());
+        let cells = &split.input.cells;
+        assert_eq!([0, 6].map(|tet| cells.cell_of(tet).to_string()), ["1 (tetrahedron)", "2 (hexahedron)"]);
+        assert_eq!(split.input.lines(), ["left out: 1 triangle"]);
+    }
+
+    #[test]
+    fn cells_of_any_order_are_known_by_their_points() {
+        let (mut types, ends) = ([71, 10, 71, 71, 72], [4, 8, 18, 38, 46]);
+        assert!(depend_on_points(&types));
+        resolve_orders(&mut types, &ends);
+        assert_eq!(types, [10, 10, 24, 710_020, 12]);
+        let refused = most_tets(&types).unwrap_err().to_string();
+        assert!(refused.contains("1 Lagrange tetrahedron of 20 points"), "{refused}");
     }
 
     #[test]
     fn cells_that_are_wrong_are_refused() {
         assert_eq!(most_tets(&[10, 42]), Err(ReadReason::CellTypes(vec![(10, 1), (42, 1)])));
-        assert_eq!(most_tets(&[5, 5]), Err(ReadReason::CellTypes(vec![(5, 2)])));
+        assert_eq!(most_tets(&[5, 5]), Err(ReadReason::NoVolume("2 triangles".into())));
         assert_eq!(most_tets(&[]), Ok(0));
         let wrong = |ends: &[i64]| checked_ends(&[10, 12], ends).unwrap_err().to_string();
         assert!(wrong(&[4, 8]).contains("cell 1, a hexahedron, has 4 points, not 8"));

@@ -3,6 +3,7 @@
 use thiserror::Error;
 
 use crate::io::cell_shapes::PYRAMID_14;
+use crate::io::cells::{ANY_ORDER, GHOST, HIDDEN};
 
 /// A file that could not be read.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -69,23 +70,34 @@ pub enum ReadReason {
         /// What to do instead.
         remedy: String,
     },
-    /// There are cells that cannot be split into tetrahedra, or none that has a volume: VTK cell type and count of all.
+    /// There are cells that cannot be split into tetrahedra: VTK cell type and count of all.
     #[error(
-        "{total} cells: {list}; tetrahedra, hexahedra, voxels, wedges, pyramids and prisms are read, also quadratic ones, and what \
-         has no volume is left out beside them: convert the others (in ParaView: Tetrahedralize)",
-        list = .0.iter().map(|&(kind, n)| named_count(kind, n)).collect::<Vec<_>>().join(", "),
+        "{total} cells: {list}; tetrahedra, hexahedra, voxels, wedges, pyramids and prisms are read, also quadratic ones and \
+         Lagrange cells of the first two orders, and what has no volume is left out beside them: convert the others (in ParaView: \
+         Tetrahedralize), or save them with an order of at most 2",
+        list = named_counts(.0),
         total = .0.iter().map(|c| c.1).sum::<u64>()
     )]
     CellTypes(Vec<(i64, u64)>),
-    /// A value or coordinate is infinite or not a number.
-    #[error("the value at point {point} is infinite or not a number; replace it or leave this array out")]
+    /// Nothing but what has no volume, in words.
+    #[error(
+        "{0}: surfaces, lines and points have no volume, which an MT is of; fill the surface with tetrahedra first (with Gmsh, \
+         TetGen or fTetWild, for example)"
+    )]
+    NoVolume(String),
+    /// A value or coordinate is infinite or not a number, at a point that cells use.
+    #[error("{}", not_finite(.array, "point", *.point))]
     NotFinite {
+        /// The array; empty for coordinates.
+        array: String,
         /// The point that it belongs to.
         point: u64,
     },
     /// A value of a field at cells is infinite or not a number.
-    #[error("the value at cell {cell} is infinite or not a number; replace it or leave this array out")]
+    #[error("{}", not_finite(.array, "cell", *.cell))]
     NotFiniteCell {
+        /// The array.
+        array: String,
         /// The cell that it belongs to.
         cell: u64,
     },
@@ -111,14 +123,13 @@ pub enum ReadReason {
     },
 }
 
-impl ReadReason {
-    /// The same of a field at cells: what was a point is a cell.
-    pub(super) fn at_cells(self) -> Self {
-        match self {
-            Self::NotFinite { point } => Self::NotFiniteCell { cell: point },
-            reason => reason,
-        }
+fn not_finite(array: &str, owner: &str, number: u64) -> String {
+    if array.is_empty() {
+        return format!("{owner} {number} has a coordinate that is infinite or not a number; replace it");
     }
+    format!(
+        "the value of \"{array}\" at {owner} {number} is infinite or not a number; replace it, or name other fields to read"
+    )
 }
 
 /// A place in front of a reason; nothing for the whole file.
@@ -138,11 +149,20 @@ impl<T> At<T> for Result<T, ReadReason> {
     }
 }
 
-/// "1 hexahedron", "3 wedges", "2 cells of type 99".
+/// "1 hexahedron, 3 wedges".
+pub(super) fn named_counts(counts: &[(i64, u64)]) -> String {
+    counts.iter().map(|&(kind, count)| named_count(kind, count)).collect::<Vec<_>>().join(", ")
+}
+
+/// "1 hexahedron", "3 wedges", "2 cells of type 99", "5 Lagrange tetrahedra of 20 points".
 fn named_count(kind: i64, count: u64) -> String {
-    match names(kind) {
-        Some((one, many)) => format!("{count} {}", if count == 1 { one } else { many }),
-        None => format!("{count} {} of type {kind}", if count == 1 { "cell" } else { "cells" }),
+    let (of, points) = match kind.checked_div(ANY_ORDER) {
+        Some(of) if of > 1 => (of, format!(" of {} points", kind % ANY_ORDER)),
+        _ => (kind, String::new()),
+    };
+    match names(of) {
+        Some((one, many)) => format!("{count} {}{points}", if count == 1 { one } else { many }),
+        None => format!("{count} {} of type {of}{points}", if count == 1 { "cell" } else { "cells" }),
     }
 }
 
@@ -152,8 +172,10 @@ pub(super) fn cell_name(kind: i64) -> String {
 }
 
 /// What one cell of this type, by VTK's number, is called, and several.
-fn names(kind: i64) -> Option<(&'static str, &'static str)> {
+pub(super) fn names(kind: i64) -> Option<(&'static str, &'static str)> {
     Some(match kind {
+        HIDDEN => ("hidden cell", "hidden cells"),
+        GHOST => ("ghost cell", "ghost cells"),
         0 => ("empty cell", "empty cells"),
         1 => ("vertex", "vertices"),
         2 => ("poly-vertex", "poly-vertices"),
@@ -178,12 +200,36 @@ fn names(kind: i64) -> Option<(&'static str, &'static str)> {
         25 => ("quadratic hexahedron", "quadratic hexahedra"),
         26 => ("quadratic wedge", "quadratic wedges"),
         27 => ("quadratic pyramid", "quadratic pyramids"),
+        28 => ("biquadratic quad", "biquadratic quads"),
         29 => ("triquadratic hexahedron", "triquadratic hexahedra"),
+        30 => ("quadratic-linear quad", "quadratic-linear quads"),
+        31 => ("quadratic-linear wedge", "quadratic-linear wedges"),
         32 => ("biquadratic wedge", "biquadratic wedges"),
+        33 => ("biquadratic hexahedron", "biquadratic hexahedra"),
+        34 => ("biquadratic triangle", "biquadratic triangles"),
+        35 => ("cubic line", "cubic lines"),
+        36 => ("quadratic polygon", "quadratic polygons"),
+        37 => ("triquadratic pyramid", "triquadratic pyramids"),
+        41 => ("convex point set", "convex point sets"),
         42 => ("polyhedron", "polyhedra"),
+        64 => ("higher-order tetrahedron", "higher-order tetrahedra"),
+        65 => ("higher-order wedge", "higher-order wedges"),
+        66 => ("higher-order pyramid", "higher-order pyramids"),
+        67 => ("higher-order hexahedron", "higher-order hexahedra"),
+        68 => ("Lagrange curve", "Lagrange curves"),
+        69 => ("Lagrange triangle", "Lagrange triangles"),
+        70 => ("Lagrange quad", "Lagrange quads"),
         71 => ("Lagrange tetrahedron", "Lagrange tetrahedra"),
         72 => ("Lagrange hexahedron", "Lagrange hexahedra"),
+        73 => ("Lagrange wedge", "Lagrange wedges"),
+        74 => ("Lagrange pyramid", "Lagrange pyramids"),
+        75 => ("Bezier curve", "Bezier curves"),
+        76 => ("Bezier triangle", "Bezier triangles"),
+        77 => ("Bezier quad", "Bezier quads"),
         78 => ("Bezier tetrahedron", "Bezier tetrahedra"),
+        79 => ("Bezier hexahedron", "Bezier hexahedra"),
+        80 => ("Bezier wedge", "Bezier wedges"),
+        81 => ("Bezier pyramid", "Bezier pyramids"),
         PYRAMID_14 => ("quadratic pyramid of 14 points", "quadratic pyramids of 14 points"),
         _ => return None,
     })

@@ -6,10 +6,13 @@
 
 use crate::io::cells::{CellList, Numbering};
 use crate::io::error::{At, ReadError, ReadReason};
-use crate::io::fields::Collector;
+use crate::io::fields::{Collector, check_finite, check_finite_cells};
+use crate::io::image::{GridValues, Placement};
 use crate::io::number::NumberType;
+use crate::io::structured::Ghosts;
+use crate::io::vtu::{GHOST_LEVELS, GHOST_TYPE, HIDDEN_POINT};
 use crate::io::{CellData, ReadOptions, Survey, cells, image, points_from, structured};
-use crate::mesh::{Field, Grid, TetMesh};
+use crate::mesh::{Field, MeshInput, TetMesh};
 
 /// How every legacy file starts.
 pub(super) const MAGIC: &[u8] = b"# vtk DataFile Version ";
@@ -28,7 +31,7 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadE
     }
     let time = body.time;
     let mut mesh = match kind.as_str() {
-        "unstructured_grid" => body.unstructured(file.version >= 5)?,
+        "unstructured_grid" => body.unstructured(file.version)?,
         "polydata" => body.points_alone()?,
         "structured_grid" => body.curvilinear(Vec::new())?,
         "rectilinear_grid" => body.rectilinear()?,
@@ -42,14 +45,21 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadE
 pub(super) fn survey(bytes: &[u8]) -> Result<Survey, ReadError> {
     let (mut file, kind, _) = Reader::open(bytes).at(|| "header".into())?;
     file.skims = true;
-    let options = ReadOptions { fields: None, cells: CellData::Names, step: 0 };
-    let mut body = Body { skims: true, ..Body::new(&options, None) };
+    let options = ReadOptions { cells: CellData::Names, ..ReadOptions::default() };
+    let [fields, cell_fields] = [(); 2].map(|()| Collector::of_names());
+    let mut body = Body { skims: true, fields, cell_fields, ..Body::new(&options, None) };
     while let Some(keyword) = file.next_word().at(|| "body".into())? {
         let keyword = keyword.to_ascii_lowercase();
         body.section(&mut file, &keyword).at(|| shortened(&keyword).to_ascii_uppercase())?;
     }
     if kind == "structured_points" {
-        return Ok(Survey::of_grid("vtk", body.grid()?, [body.fields.fields, body.cell_fields.fields]));
+        let placement = body.placement()?;
+        let fields = [body.fields.fields, body.cell_fields.fields];
+        return Survey::of_placement("vtk", &placement, fields).at(|| "DIMENSIONS".into());
+    }
+    if cells::depend_on_points(&body.types) {
+        let ends = body.ends_of_cells(file.version).at(|| "CELLS".into())?;
+        cells::resolve_orders(&mut body.types, &ends);
     }
     let (points, cells) = match body.dims {
         Some(dims) => (dims.iter().fold(1_u64, |n, d| n.saturating_mul(*d)), structured::most_tets(dims)),
@@ -60,11 +70,8 @@ pub(super) fn survey(bytes: &[u8]) -> Result<Survey, ReadError> {
     Ok(Survey { format: "vtk", points, cells, grid: None, fields, cell_fields })
 }
 
-/// The time in the arrays of the whole data set, as VTK writes it.
-fn time_in(arrays: &[ArrayData]) -> Option<f64> {
-    let array = arrays.iter().find(|array| array.name == "TimeValue")?;
-    array.values.first().copied().filter(|time| time.is_finite())
-}
+/// The array of the whole data set in which VTK writes its time.
+const TIME: &str = "TimeValue";
 
 /// What an array's numbers are.
 #[derive(Clone, Copy)]
@@ -136,7 +143,7 @@ impl<'a> Reader<'a> {
             match file.word()?.to_ascii_lowercase().as_str() {
                 "dataset" => break,
                 // Field data may come before the data set.
-                "field" => time = time_in(&file.field_block()?).or(time),
+                "field" => time = file.time_in_field()?.or(time),
                 "metadata" => _ = file.metadata(),
                 other => return Err(instead(other, "DATASET")),
             }
@@ -316,17 +323,17 @@ impl<'a> Reader<'a> {
         unit
     }
 
-    /// A FIELD block, its keyword read.
-    fn field_block(&mut self) -> Result<Vec<ArrayData>, ReadReason> {
+    /// A FIELD block, its keyword read: `take` gets each array, of which the numbers come next, and the unit of the last one when it is
+    /// known.
+    fn field_block(&mut self, take: TakeArray<'_, 'a>) -> Result<(), ReadReason> {
         self.word()?;
         let arrays = self.count()?;
-        let mut list = Vec::new();
         for _ in 0..arrays {
             let mut name = self.word()?;
             if name.eq_ignore_ascii_case("metadata") {
                 // What is known of the array before this one.
                 let unit = self.metadata().unwrap_or_default();
-                list.last_mut().into_iter().for_each(|array: &mut ArrayData| array.unit.clone_from(&unit));
+                take(self, Taken::Unit(&unit))?;
                 name = self.word()?;
             }
             if name == "NULL_ARRAY" {
@@ -335,15 +342,61 @@ impl<'a> Reader<'a> {
             }
             let (components, tuples) = (self.count()?, self.count()?);
             let kind = Kind::named(self.word()?)?;
-            if let Some(values) = self.floats(components.checked_mul(tuples), kind)? {
-                let name = decoded_name(name);
-                let integer = kind.is_integer();
-                list.push(ArrayData { name, components, values, integer, unit: String::new() });
-            }
+            take(self, Taken::Array(&ArrayHead { name: decoded_name(name), components, tuples, kind }))?;
         }
-        Ok(list)
+        Ok(())
+    }
+
+    /// The time in a FIELD block of the whole data set, whose other arrays are stepped over.
+    fn time_in_field(&mut self) -> Result<Option<f64>, ReadReason> {
+        let mut time = None;
+        self.field_block(&mut |file, taken| {
+            let Taken::Array(head) = taken else { return Ok(()) };
+            let values = file.floats_if(head.name == TIME, head.count(), head.kind)?;
+            let first = values.and_then(|values| values.first().copied());
+            time = first.filter(|time| time.is_finite()).or(time);
+            Ok(())
+        })?;
+        Ok(time)
+    }
+
+    /// As [`Reader::floats`], or steps over the numbers if they are not wanted.
+    fn floats_if(
+        &mut self,
+        wanted: bool,
+        count: Option<usize>,
+        kind: Kind,
+    ) -> Result<Option<Vec<f64>>, ReadReason> {
+        let skims = self.skims;
+        self.skims |= !wanted;
+        let values = self.floats(count, kind);
+        self.skims = skims;
+        values
     }
 }
+
+/// What is said of an array before its numbers.
+struct ArrayHead {
+    name: String,
+    components: usize,
+    tuples: usize,
+    kind: Kind,
+}
+
+impl ArrayHead {
+    fn count(&self) -> Option<usize> {
+        self.components.checked_mul(self.tuples)
+    }
+}
+
+/// What a FIELD block has: an array, whose numbers come next, or the unit of the last one.
+enum Taken<'b> {
+    Array(&'b ArrayHead),
+    Unit(&'b str),
+}
+
+/// Reads an array of a FIELD block.
+type TakeArray<'b, 'a> = &'b mut dyn FnMut(&mut Reader<'a>, Taken<'_>) -> Result<(), ReadReason>;
 
 fn text(bytes: &[u8]) -> Result<&str, ReadReason> {
     std::str::from_utf8(bytes).map_err(|_| ReadReason::Syntax("binary data where text is expected".into()))
@@ -369,14 +422,6 @@ fn decoded_name(name: &str) -> String {
     String::from_utf8(bytes).unwrap_or_else(|_| name.to_owned())
 }
 
-struct ArrayData {
-    name: String,
-    components: usize,
-    values: Vec<f64>,
-    integer: bool,
-    unit: String,
-}
-
 /// What the attributes that follow belong to.
 #[derive(Clone, Copy, Default, PartialEq)]
 enum Owner {
@@ -389,7 +434,7 @@ enum Owner {
 /// Everything after the data set's type.
 #[derive(Default)]
 struct Body<'a> {
-    positions: Option<Vec<f64>>,
+    positions: Option<Vec<[f64; 3]>>,
     /// Those of a rectilinear grid, along each axis.
     coordinates: [Vec<f64>; 3],
     /// Before version 5 counts and indices; since then indices alone.
@@ -405,6 +450,10 @@ struct Body<'a> {
     fields: Collector<'a>,
     cell_fields: Collector<'a>,
     cell_data: CellData,
+    /// VTK's flags of hidden points and cells.
+    ghosts: [Option<Vec<i64>>; 2],
+    /// What is left out is noted here.
+    input: MeshInput,
     time: Option<f64>,
     /// How many points there are.
     points: usize,
@@ -416,7 +465,7 @@ struct Body<'a> {
 
 impl<'a> Body<'a> {
     fn new(options: &'a ReadOptions, time: Option<f64>) -> Self {
-        let [fields, cell_fields] = [(); 2].map(|()| Collector::new(options.fields.as_deref()));
+        let [fields, cell_fields] = [(); 2].map(|()| Collector::new(options));
         Self { fields, cell_fields, cell_data: options.cells, time, ..Self::default() }
     }
 
@@ -431,8 +480,8 @@ impl<'a> Body<'a> {
                 self.points = count;
                 let kind = Kind::named(file.word()?)?;
                 let values = file.floats(count.checked_mul(3), kind)?;
-                self.positions =
-                    Some(values.ok_or_else(|| ReadReason::Syntax("points made of text".into()))?);
+                let values = values.ok_or_else(|| ReadReason::Syntax("points made of text".into()))?;
+                self.positions = Some(points_from(&values));
             }
             "cells" => self.cells(file)?,
             "cell_types" => {
@@ -456,9 +505,8 @@ impl<'a> Body<'a> {
                 self.cells = None;
             }
             "lines" | "polygons" | "triangle_strips" => {
-                let what = format!("a data set of type POLYDATA with {}", keyword.to_ascii_uppercase());
-                let remedy = "give an unstructured grid of tetrahedra, or points alone".into();
-                return Err(ReadReason::Unsupported { what, remedy });
+                let what = format!("{} {}", file.count()?, keyword.replace('_', " "));
+                return Err(ReadReason::NoVolume(what));
             }
             "dimensions" => self.dims = Some(file.three()?),
             "origin" => self.origin = file.three()?,
@@ -470,12 +518,17 @@ impl<'a> Body<'a> {
                 unit.iter().for_each(|unit| self.last_fields().set_unit_of_last(unit));
             }
             "field" => {
-                let arrays = file.field_block()?;
                 if self.owner == Owner::Nothing {
-                    self.time = time_in(&arrays).or(self.time);
-                }
-                for array in arrays {
-                    self.keep(array)?;
+                    self.time = file.time_in_field()?.or(self.time);
+                } else {
+                    file.field_block(&mut |file, taken| match taken {
+                        Taken::Array(head) => self.array(file, head),
+                        Taken::Unit(unit) => {
+                            self.last_fields().set_unit_of_last(unit);
+                            Ok(())
+                        }
+                    })?;
+                    self.last_fields().forget_last();
                 }
             }
             _ => self.attribute(file, keyword)?,
@@ -533,14 +586,11 @@ impl<'a> Body<'a> {
                 (scalar_components(file)?, owned, kind)
             }
         };
-        let values = file.floats(components.checked_mul(tuples), kind)?;
-        let integer = kind.is_integer();
-        match values {
-            Some(values) if keyword != "lookup_table" => {
-                self.keep(ArrayData { name, components, values, integer, unit: String::new() })
-            }
-            _ => Ok(()),
+        let head = ArrayHead { name, components, tuples, kind };
+        if keyword == "lookup_table" {
+            return file.floats_if(false, head.count(), kind).map(|_| ());
         }
+        self.array(file, &head)
     }
 
     /// The fields of the owner of what was read last.
@@ -548,101 +598,149 @@ impl<'a> Body<'a> {
         if matches!(self.owner, Owner::Cells(_)) { &mut self.cell_fields } else { &mut self.fields }
     }
 
-    /// Makes fields of an array at points and, if they are asked for, at cells; others are read and left out.
-    fn keep(&mut self, array: ArrayData) -> Result<(), ReadReason> {
-        self.tuples = self.tuples.max(array.values.len() / array.components.max(1));
-        let (fields, tuples, values) = match self.owner {
-            Owner::Points(points) => (&mut self.fields, points, true),
-            Owner::Cells(cells) if self.cell_data != CellData::LeaveOut => {
-                (&mut self.cell_fields, cells, self.cell_data == CellData::Values)
-            }
-            _ => return Ok(()),
+    /// Reads an array whose numbers come next: fields at points and, if they are asked for, at cells; others are stepped over.
+    fn array(&mut self, file: &mut Reader<'_>, head: &ArrayHead) -> Result<(), ReadReason> {
+        let ArrayHead { name, components, kind, .. } = head;
+        let (at_cells, tuples) = match self.owner {
+            Owner::Nothing => return file.floats_if(false, head.count(), *kind).map(|_| ()),
+            Owner::Points(points) => (false, points),
+            Owner::Cells(cells) => (true, cells),
         };
-        let ArrayData { name, components, values: numbers, integer, unit } = array;
-        if self.skims {
-            let claim = fields.claim(&name, components)?;
-            claim.into_iter().for_each(|claim| fields.keep_names(claim, &unit));
+        if matches!(kind, Kind::Text) {
+            return file.floats_if(false, head.count(), *kind).map(|_| ());
+        }
+        if [GHOST_TYPE, GHOST_LEVELS].contains(&name.as_str()) {
+            let values = file.floats(head.count(), *kind)?.unwrap_or_default();
+            let to_flags =
+                |value: &f64| if name == GHOST_TYPE { *value as i64 } else { i64::from(*value != 0.0) };
+            self.ghosts[usize::from(at_cells)] = Some(values.iter().map(to_flags).collect());
             return Ok(());
         }
-        if tuples.checked_mul(components) != Some(numbers.len()) {
-            let what = format!("values of \"{name}\"");
-            let expected = (tuples as u64).saturating_mul(components as u64);
-            return Err(ReadReason::Count { what, expected, found: numbers.len() as u64 });
-        }
-        let Some(claim) = fields.claim(&name, components)? else { return Ok(()) };
-        if !values {
-            fields.keep_names(claim, &unit);
+        let is_left_out = at_cells && self.cell_data == CellData::LeaveOut;
+        let only_names = self.skims || at_cells && self.cell_data != CellData::Values;
+        let fields = if at_cells { &mut self.cell_fields } else { &mut self.fields };
+        let claim = if is_left_out { None } else { fields.claim(name, *components)? };
+        let claim = match claim {
+            Some(claim) if only_names => {
+                fields.keep_names(claim, "");
+                None
+            }
+            claim => claim,
+        };
+        let Some(claim) = claim else {
+            file.floats_if(false, head.count(), *kind)?;
+            self.tuples = self.tuples.max(head.tuples);
             return Ok(());
+        };
+        let found = head.count();
+        if tuples.checked_mul(*components) != found {
+            let expected = (tuples as u64).saturating_mul(*components as u64);
+            let found = found.unwrap_or(usize::MAX) as u64;
+            return Err(ReadReason::Count { what: format!("values of \"{name}\""), expected, found });
         }
-        fields.fill(claim, numbers, integer, &unit).map_err(|reason| match (self.owner, reason) {
-            (Owner::Cells(_), ReadReason::NotFinite { point }) => ReadReason::NotFiniteCell { cell: point },
-            (_, reason) => reason,
-        })
+        let numbers = file.floats(found, *kind)?.unwrap_or_default();
+        self.tuples = self.tuples.max(head.tuples);
+        let fields = if at_cells { &mut self.cell_fields } else { &mut self.fields };
+        fields.fill(claim, numbers, kind.is_integer(), "");
+        Ok(())
     }
 
-    /// The fields at cells, of which there are `cells`.
+    /// The fields at cells, of which there are `cells`, beside those at points.
     fn take_cell_fields(&mut self, cells: usize) -> Result<Vec<Field>, ReadReason> {
+        if !self.fields.fields.is_empty() {
+            self.cell_fields.drop_first();
+        }
         if self.cell_data == CellData::Values {
             check_values(&self.cell_fields, cells as u64)?;
         }
         Ok(std::mem::take(&mut self.cell_fields.fields))
     }
 
-    fn checked_positions(&self) -> Result<Vec<[f64; 3]>, ReadError> {
-        let coordinates = self.positions.as_deref().ok_or_else(|| missing("POINTS")).at(String::new)?;
-        check_values(&self.fields, coordinates.len() as u64 / 3).at(|| "POINT_DATA".into())?;
-        points_from(coordinates).at(|| "POINTS".into())
+    /// The positions, of which there are as many as values.
+    fn take_positions(&mut self) -> Result<Vec<[f64; 3]>, ReadError> {
+        let positions = self.positions.take().ok_or_else(|| missing("POINTS")).at(String::new)?;
+        check_values(&self.fields, positions.len() as u64).at(|| "POINT_DATA".into())?;
+        Ok(positions)
     }
 
-    fn points_alone(self) -> Result<TetMesh, ReadError> {
-        Ok(TetMesh { positions: self.checked_positions()?, fields: self.fields.fields, ..TetMesh::default() })
+    /// The mesh of these points and cells, of which one has values that were read.
+    fn mesh(mut self, positions: Vec<[f64; 3]>, listed: Option<CellList>) -> Result<TetMesh, ReadError> {
+        let used = || listed.as_ref().map(|listed| listed.used(positions.len()));
+        check_finite(&positions, &self.fields.fields, &used).at(|| "POINT_DATA".into())?;
+        let mut mesh = TetMesh { positions, input: std::mem::take(&mut self.input), ..TetMesh::default() };
+        if let Some(listed) = listed {
+            mesh.cell_fields = self.take_cell_fields(listed.types.len()).at(|| "CELL_DATA".into())?;
+            let is_there = |cell: usize| listed.types.get(cell).is_some_and(|kind| !cells::is_flat(*kind));
+            check_finite_cells(&mesh.cell_fields, is_there).at(|| "CELL_DATA".into())?;
+            let numbering = Numbering::From { first: 0, points: mesh.positions.len() };
+            let split = listed.split(&numbering).at(|| "CELLS".into())?;
+            split.spread(&mut mesh.cell_fields);
+            mesh.tets = split.tets;
+            mesh.input.append(split.input);
+        }
+        mesh.input.other_fields = self.fields.others;
+        mesh.input.other_cell_fields = self.cell_fields.others;
+        mesh.fields = self.fields.fields;
+        Ok(mesh)
     }
 
-    fn unstructured(mut self, since_5: bool) -> Result<TetMesh, ReadError> {
+    fn points_alone(mut self) -> Result<TetMesh, ReadError> {
+        let positions = self.take_positions()?;
+        self.mesh(positions, None)
+    }
+
+    fn unstructured(mut self, version: u32) -> Result<TetMesh, ReadError> {
         let cells = self.cells.ok_or_else(|| missing("CELLS")).at(String::new)?;
-        let positions = self.checked_positions()?;
+        let positions = self.take_positions()?;
         expect("cell types", cells, self.types.len()).at(|| "CELL_TYPES".into())?;
         if cells > 0 && cells::are_points(&self.types) {
-            return Ok(TetMesh { positions, fields: self.fields.fields, ..TetMesh::default() });
+            return self.mesh(positions, None);
         }
         cells::most_tets(&self.types).at(|| "CELL_TYPES".into())?;
-        let list = if since_5 { self.indices_by_offsets(cells) } else { self.indices_by_counts(cells) };
-        let (ends, connectivity) = list.at(|| "CELLS".into())?;
-        let numbering = Numbering::From { first: 0, points: positions.len() };
-        let types = std::mem::take(&mut self.types);
-        let split = CellList { types, ends, connectivity }.split(&numbering).at(|| "CELLS".into())?;
-        let mut cell_fields = self.take_cell_fields(cells).at(|| "CELL_DATA".into())?;
-        split.spread(&mut cell_fields);
-        Ok(TetMesh {
-            positions,
-            fields: self.fields.fields,
-            tets: split.tets,
-            cell_fields,
-            ..TetMesh::default()
-        })
+        let ends = self.ends_of_cells(version).at(|| "CELLS".into())?;
+        let is_old = |kind: &i64| *kind == cells::LAGRANGE_HEXAHEDRON && version < 5;
+        let swapped = self.types.iter().map(is_old).collect();
+        cells::resolve_orders(&mut self.types, &ends);
+        cells::most_tets(&self.types).at(|| "CELL_TYPES".into())?;
+        let length = cells::checked_ends(&self.types, &ends).at(|| "CELLS".into())?;
+        expect("numbers in the cell list", length, self.connectivity.len()).at(|| "CELLS".into())?;
+        let (types, connectivity) = (std::mem::take(&mut self.types), std::mem::take(&mut self.connectivity));
+        let mut listed = CellList { types, ends, connectivity };
+        listed.order_as_before_9(swapped);
+        let [of_points, of_cells] = std::mem::take(&mut self.ghosts);
+        if let Some(flags) = of_cells {
+            listed.leave_out(&flags);
+        }
+        if let Some(flags) = of_points {
+            listed.hide(&flags.iter().map(|flags| flags & HIDDEN_POINT != 0).collect::<Vec<_>>());
+        }
+        self.mesh(positions, Some(listed))
     }
 
-    /// Where each cell ends in the list of indices, and that.
-    fn indices_by_offsets(&mut self, cells: usize) -> Result<(Vec<i64>, Vec<i64>), ReadReason> {
+    /// Where each cell ends in the list of indices, which has nothing else then.
+    fn ends_of_cells(&mut self, version: u32) -> Result<Vec<i64>, ReadReason> {
+        let cells = self.cells.ok_or_else(|| missing("CELLS"))?;
+        if version >= 5 { self.ends_by_offsets(cells) } else { self.ends_by_counts(cells) }
+    }
+
+    fn ends_by_offsets(&mut self, cells: usize) -> Result<Vec<i64>, ReadReason> {
         let mut ends = std::mem::take(&mut self.offsets);
         if ends.first().is_some_and(|s| *s != 0) {
             return Err(ReadReason::Syntax("the offsets do not start at 0".into()));
         }
         ends.drain(..ends.len().min(1));
         expect("offsets of cells", cells, ends.len())?;
-        let length = cells::checked_ends(&self.types, &ends)?;
-        expect("numbers in the cell list", length, self.connectivity.len())?;
-        Ok((ends, std::mem::take(&mut self.connectivity)))
+        Ok(ends)
     }
 
-    fn indices_by_counts(&mut self, cells: usize) -> Result<(Vec<i64>, Vec<i64>), ReadReason> {
+    fn ends_by_counts(&mut self, cells: usize) -> Result<Vec<i64>, ReadReason> {
         let counted = std::mem::take(&mut self.connectivity);
         let short = || ReadReason::Count {
             what: "cells in the cell list".into(),
             expected: cells as u64,
             found: counted.len() as u64,
         };
-        let mut ends = Vec::with_capacity(cells);
+        let mut ends = Vec::with_capacity(cells.min(counted.len()));
         let mut connectivity = Vec::with_capacity(counted.len());
         let mut rest = counted.as_slice();
         for _ in 0..cells {
@@ -655,14 +753,38 @@ impl<'a> Body<'a> {
             rest = after;
         }
         expect("numbers in the cell list", counted.len() - rest.len(), counted.len())?;
-        cells::checked_ends(&self.types, &ends)?;
-        Ok((ends, connectivity))
+        self.connectivity = connectivity;
+        Ok(ends)
     }
 
-    fn grid(&self) -> Result<Grid, ReadError> {
+    fn placement(&self) -> Result<Placement, ReadError> {
         let place = || "DIMENSIONS".to_owned();
         let dims = self.dims.ok_or_else(|| ReadReason::Missing("DIMENSIONS".into())).at(place)?;
-        image::checked_grid(dims, self.origin, self.spacing.unwrap_or([1.0; 3])).at(place)
+        structured::checked_dims(dims).at(place)?;
+        let whole = [0, dims[0] as i64 - 1, 0, dims[1] as i64 - 1, 0, dims[2] as i64 - 1];
+        let spacing = self.spacing.unwrap_or([1.0; 3]);
+        let placed = image::placed(whole, self.origin, spacing, image::ALONG_THE_AXES);
+        Ok(placed.at(|| "SPACING".to_owned())?.0)
+    }
+
+    /// Checks that an array has as many values: without, a few coordinates claim any size.
+    fn expect_tuples(&self, cubes: usize) -> Result<(), ReadError> {
+        if self.tuples < cubes {
+            let what = "an array with a value for every point or cell".into();
+            return Err(ReadReason::Missing(what)).at(String::new);
+        }
+        Ok(())
+    }
+
+    /// The values of a grid with so many cubes.
+    fn values(&mut self, cubes: usize) -> Result<GridValues, ReadError> {
+        self.expect_tuples(cubes)?;
+        let cell_fields = self.take_cell_fields(cubes).at(|| "CELL_DATA".into())?;
+        let [points, of_cubes] = std::mem::take(&mut self.ghosts);
+        let others =
+            [&mut self.fields, &mut self.cell_fields].map(|fields| std::mem::take(&mut fields.others));
+        let fields = std::mem::take(&mut self.fields.fields);
+        Ok(GridValues { fields, cubes: cell_fields, ghosts: Ghosts { points, cubes: of_cubes }, others })
     }
 
     /// A grid whose coordinates are given along each axis.
@@ -673,36 +795,31 @@ impl<'a> Body<'a> {
             expect("coordinates", dims[axis] as usize, found).at(|| name.to_owned())?;
         }
         let coordinates = std::mem::take(&mut self.coordinates);
-        // Without, a few coordinates claim any size.
-        if self.tuples < structured::cubes(dims) {
-            let what = "an array with a value for every point or cell".into();
-            return Err(ReadReason::Missing(what)).at(String::new);
-        }
-        self.curvilinear(structured::rectilinear(&coordinates))
+        self.expect_tuples(structured::cubes(dims))?;
+        self.curvilinear(points_from(&structured::rectilinear(&coordinates)))
     }
 
     /// A grid of which each point has a place of its own: these, or those of the section POINTS.
-    fn curvilinear(mut self, positions: Vec<f64>) -> Result<TetMesh, ReadError> {
+    fn curvilinear(mut self, positions: Vec<[f64; 3]>) -> Result<TetMesh, ReadError> {
         let place = || "DIMENSIONS".to_owned();
         let dims = self.dims.ok_or_else(|| missing("DIMENSIONS")).at(place)?;
         let dims = structured::checked_dims(dims).at(place)?;
         if !positions.is_empty() {
             self.positions = Some(positions);
         }
-        let positions = self.checked_positions()?;
-        let cubes = structured::cubes(dims);
-        let cell_fields = self.take_cell_fields(cubes).at(|| "CELL_DATA".into())?;
-        structured::mesh(dims, positions, self.fields.fields, cell_fields).at(|| "POINTS".into())
+        let positions = self.take_positions()?;
+        // As many points as there are cannot be claimed.
+        self.tuples = self.tuples.max(positions.len());
+        let values = self.values(structured::cubes(dims))?;
+        structured::mesh(dims, positions, values).at(|| "POINTS".into())
     }
 
     fn structured(mut self) -> Result<TetMesh, ReadError> {
-        let grid = self.grid()?;
-        let product = |less: u32| grid.dims.iter().map(|&d| u64::from(d - less)).product::<u64>();
-        check_values(&self.fields, product(0)).at(|| "POINT_DATA".into())?;
-        // Fewer cubes than points, which were counted.
-        let cubes = product(1) as usize;
-        let cell_fields = self.take_cell_fields(cubes).at(|| "CELL_DATA".into())?;
-        image::grid_mesh(grid, self.fields.fields, cell_fields).at(|| "POINT_DATA".into())
+        let placement = self.placement()?;
+        check_values(&self.fields, placement.dims.iter().product()).at(|| "POINT_DATA".into())?;
+        let dims = structured::checked_dims(placement.dims).at(|| "DIMENSIONS".into())?;
+        let values = self.values(structured::cubes(dims))?;
+        placement.mesh(values).at(|| "POINT_DATA".into())
     }
 }
 

@@ -39,6 +39,7 @@ mod formats;
 mod image;
 mod legacy;
 mod number;
+mod packed;
 mod payload;
 #[cfg(feature = "formats")]
 mod pieces;
@@ -62,7 +63,7 @@ pub use image::MAX_GRID_POINTS;
 pub use pieces::{PieceCounts, Pieces};
 pub use pvd::{Step, steps, write_pvd};
 pub use surface::{PointValues, PolyData, write_csv, write_obj, write_ply, write_stl, write_vtp};
-pub use survey::{Survey, format_of, survey, survey_raw};
+pub use survey::{Survey, format_of, held_bytes, survey, survey_raw};
 pub use time_steps::{FieldSelection, TimeStepsError, read_time_steps};
 pub use write::{PointArray, point_arrays, write_vti, write_vtu};
 pub use write_layers::write_vti_layers;
@@ -75,9 +76,12 @@ use crate::mesh::TetMesh;
 /// What to read of a file.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ReadOptions {
-    /// Names of the fields to keep, a vector's name for all its components; all if none. Others take no memory, and may
-    /// hold values that are not finite.
+    /// Names of the fields to keep, a vector's name for all its components; all if none. Others are not decoded, and may be
+    /// anything: see [`MeshInput::other_fields`](crate::mesh::MeshInput::other_fields).
     pub fields: Option<Vec<String>>,
+    /// Keep the first field beside those that are named, and none else if none are: the first at points, or at cells where points have
+    /// none.
+    pub first: bool,
     /// What to do with fields at cells.
     pub cells: CellData,
     /// Which step to read of a file that has several (see [`Step::number`]): the first one is 0. Others have one.
@@ -114,6 +118,12 @@ pub fn read_with(path: &Path, options: &ReadOptions) -> Result<TetMesh, ReadErro
     read_unexpanded(path, options).map(expanded)
 }
 
+/// The same mesh with finite numbers at points that no cell uses.
+fn settled(mut mesh: TetMesh) -> TetMesh {
+    fields::settle_unused(&mut mesh);
+    mesh
+}
+
 /// The same mesh with the points and tetrahedra of a grid.
 fn expanded(mut mesh: TetMesh) -> TetMesh {
     mesh.expand_grid();
@@ -126,6 +136,10 @@ fn expanded(mut mesh: TetMesh) -> TetMesh {
 /// # Errors
 /// As [`read_with`].
 pub fn read_unexpanded(path: &Path, options: &ReadOptions) -> Result<TetMesh, ReadError> {
+    read_unsettled(path, options).map(settled)
+}
+
+fn read_unsettled(path: &Path, options: &ReadOptions) -> Result<TetMesh, ReadError> {
     let name = path.display().to_string();
     match lower_extension(path).as_str() {
         "json" => read_raw_by_sidecar(path, None),
@@ -167,7 +181,7 @@ pub fn read_bytes_with(name: &str, bytes: &[u8], options: &ReadOptions) -> Resul
         let what = format!("a file that needs another (\"{file}\")");
         Err(ReadReason::Unsupported { what, remedy: "give it by its path, with the other beside it".into() })
     };
-    read_in(name, bytes, options, &alone).map(expanded)
+    read_in(name, bytes, options, &alone).map(settled).map(expanded)
 }
 
 /// Gets the bytes of another file, by its path from the folder of the one that is read.
@@ -180,6 +194,8 @@ fn read_in(
     options: &ReadOptions,
     beside: Beside<'_>,
 ) -> Result<TetMesh, ReadError> {
+    let unpacked = packed::unpacked(bytes).at(String::new).map_err(|e| in_file(e, name))?;
+    let (bytes, name) = (unpacked.as_ref(), without_gz(name));
     let start = without_mark(bytes);
     let result = if bytes.starts_with(legacy::MAGIC) {
         legacy::read(bytes, options)
@@ -308,6 +324,9 @@ fn read_pieces(
 /// Why an XML file of this type is refused.
 fn not_read(kind: &str) -> ReadReason {
     let (what, remedy) = match kind {
+        "PolyData" | "PPolyData" => {
+            return ReadReason::NoVolume("a data set of type PolyData".into());
+        }
         "Collection" => ("a list of time steps as one mesh".into(), "give one of the files that it lists"),
         "PUnstructuredGrid" | "PImageData" | "PRectilinearGrid" | "PStructuredGrid" => {
             ("a list of pieces".into(), "give one of the files that it lists")
@@ -318,6 +337,15 @@ fn not_read(kind: &str) -> ReadReason {
         ),
     };
     ReadReason::Unsupported { what, remedy: remedy.into() }
+}
+
+/// The name of a file before it was packed.
+fn without_gz(name: &str) -> &str {
+    let end = name.len().wrapping_sub(3);
+    match name.get(end..) {
+        Some(ending) if ending.eq_ignore_ascii_case(".gz") => &name[..end],
+        _ => name,
+    }
 }
 
 /// XML may have a byte order mark and white space in front of it.
@@ -350,10 +378,7 @@ fn lower_extension(path: &Path) -> String {
     path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
 }
 
-/// Positions from three coordinates each, all of which must be finite.
-fn points_from(coordinates: &[f64]) -> Result<Vec<[f64; 3]>, ReadReason> {
-    if let Some(at) = coordinates.iter().position(|x| !x.is_finite()) {
-        return Err(ReadReason::NotFinite { point: (at / 3) as u64 });
-    }
-    Ok(coordinates.as_chunks::<3>().0.to_vec())
+/// Positions from three coordinates each.
+fn points_from(coordinates: &[f64]) -> Vec<[f64; 3]> {
+    coordinates.as_chunks::<3>().0.to_vec()
 }

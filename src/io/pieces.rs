@@ -8,10 +8,11 @@ use std::path::{Path, PathBuf};
 
 use crate::io::cells::Numbering;
 use crate::io::error::{At, ReadError, ReadReason};
+use crate::io::fields::settle_unused;
 use crate::io::pvtu::{bits, for_each_file};
 use crate::io::vtu::{PieceReader, first_number};
 use crate::io::xml::Document;
-use crate::io::{ReadOptions, in_file, load, load_beside, without_mark};
+use crate::io::{ReadOptions, in_file, load, load_beside, packed, without_mark};
 use crate::mesh::{Field, MeshPiece, TetMesh};
 
 /// A mesh in several files, of which one is read at a time.
@@ -44,6 +45,10 @@ impl Pieces {
     /// If the list cannot be read or is damaged.
     pub fn open(path: &Path, options: &ReadOptions) -> Result<Option<Self>, ReadError> {
         let bytes = load(path)?;
+        let bytes = packed::unpacked(&bytes)
+            .at(String::new)
+            .map_err(|e| in_file(e, &path.display().to_string()))?
+            .into_owned();
         if super::format_of(&bytes) != Some("pvtu") {
             return Ok(None);
         }
@@ -134,7 +139,7 @@ impl Pieces {
         read: &mut dyn FnMut(&PieceReader<'_, '_>) -> Result<(), ReadError>,
     ) -> Result<(), ReadError> {
         let options = &self.options;
-        let mut pieces = document.pieces.iter().enumerate();
+        let mut pieces = document.full_pieces();
         pieces.try_for_each(|(number, piece)| read(&PieceReader { document, piece, number, options }))
     }
 }
@@ -212,7 +217,8 @@ impl Seen {
         }
         for &i in &numbered.new {
             let position = mesh.positions[i];
-            if self.several.binary_search(&hash(position)).is_ok() {
+            let has_values = mesh.fields.iter().all(|field| field.values[i].is_finite());
+            if has_values && self.several.binary_search(&hash(position)).is_ok() {
                 let (number, at) = (numbered.numbers[i], self.first.len());
                 if let std::collections::hash_map::Entry::Vacant(entry) = self.known.entry(bits(position)) {
                     entry.insert((number, at));
@@ -222,6 +228,7 @@ impl Seen {
             }
         }
         self.points += numbered.new.len();
+        settle_unused(&mut mesh);
         Ok(MeshPiece { points: numbered.numbers, mesh })
     }
 

@@ -12,7 +12,7 @@ use crate::io::error::{At, ReadError, ReadReason};
 use crate::io::formats;
 use crate::io::write::escaped;
 use crate::io::xml::Attributes;
-use crate::io::{in_file, load, lower_extension};
+use crate::io::{in_file, load, lower_extension, packed, without_gz};
 
 /// A file that holds one time step.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,7 +31,7 @@ pub struct Step {
 /// # Errors
 /// If the list cannot be read, is damaged or empty, or has several files for one time.
 pub fn steps(path: &Path) -> Result<Vec<Step>, ReadError> {
-    if lower_extension(path) != "pvd" {
+    if lower_extension(Path::new(without_gz(&path.to_string_lossy()))) != "pvd" {
         let step = |(number, time)| Step { path: path.to_owned(), time, number };
         let times = times_in(path)?;
         // The reader of a file with one step knows its time.
@@ -40,10 +40,11 @@ pub fn steps(path: &Path) -> Result<Vec<Step>, ReadError> {
         }
         return Ok(times.into_iter().map(Some).enumerate().map(step).collect());
     }
-    let listed = load(path).and_then(|bytes| parse(&bytes).at(String::new));
+    let listed =
+        load(path).and_then(|bytes| packed::unpacked(&bytes).and_then(|bytes| parse(&bytes)).at(String::new));
     let listed = listed.map_err(|error| in_file(error, &path.display().to_string()))?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    let step = |(time, file): (f64, String)| Step { path: folder.join(file), time: Some(time), number: 0 };
+    let step = |(time, file): (Option<f64>, String)| Step { path: folder.join(file), time, number: 0 };
     Ok(listed.into_iter().map(step).collect())
 }
 
@@ -71,8 +72,8 @@ pub fn write_pvd(steps: &[Step], out: &mut impl Write) -> io::Result<()> {
     writeln!(out, "  </Collection>\n</VTKFile>")
 }
 
-/// Times and files, in ascending order.
-fn parse(bytes: &[u8]) -> Result<Vec<(f64, String)>, ReadReason> {
+/// Times and files, in ascending order; the time need not be stated where there is one file.
+fn parse(bytes: &[u8]) -> Result<Vec<(Option<f64>, String)>, ReadReason> {
     let not_xml = |what: String| ReadReason::Syntax(format!("not well-formed XML: {what}"));
     let text = std::str::from_utf8(bytes).map_err(|_| ReadReason::Syntax("the text is not UTF-8".into()))?;
     let mut reader = Reader::from_str(text);
@@ -100,9 +101,14 @@ fn parse(bytes: &[u8]) -> Result<Vec<(f64, String)>, ReadReason> {
     if listed.is_empty() {
         return Err(ReadReason::Missing("an entry <DataSet>".into()));
     }
-    listed.sort_by(|a, b| a.0.total_cmp(&b.0));
+    if listed.len() > 1 && listed.iter().any(|(time, _)| time.is_none()) {
+        let what = "a <DataSet> without a timestep among others, so a part of each time step,".into();
+        let remedy = "give each file its timestep, or merge the parts of each time step into one file".into();
+        return Err(ReadReason::Unsupported { what, remedy });
+    }
+    listed.sort_by(|a, b| a.0.unwrap_or_default().total_cmp(&b.0.unwrap_or_default()));
     if let Some(pair) = listed.windows(2).find(|pair| pair[0].0 == pair[1].0) {
-        let what = format!("time {} with more than one file", pair[0].0);
+        let what = format!("time {} with more than one file", pair[0].0.unwrap_or_default());
         let remedy = "merge the parts of each time step into one file".into();
         return Err(ReadReason::Unsupported { what, remedy });
     }
@@ -110,12 +116,13 @@ fn parse(bytes: &[u8]) -> Result<Vec<(f64, String)>, ReadReason> {
 }
 
 /// The time and the file of an entry, which must lie in the list's folder or below.
-fn entry(attributes: &Attributes) -> Result<(f64, String), ReadReason> {
+fn entry(attributes: &Attributes) -> Result<(Option<f64>, String), ReadReason> {
     let missing = |name: &str| ReadReason::Missing(format!("attribute {name} of <DataSet>"));
     let file = attributes.get("file").ok_or_else(|| missing("file"))?;
-    let time = attributes.get("timestep").ok_or_else(|| missing("timestep"))?;
-    let time = time.parse().ok().filter(|time: &f64| time.is_finite());
-    let time = time.ok_or_else(|| ReadReason::Syntax("a timestep is not a number".into()))?;
+    let finite = |time: &str| time.parse().ok().filter(|time: &f64| time.is_finite());
+    let not_a_time = || ReadReason::Syntax("a timestep is not a number".into());
+    let time = attributes.get("timestep").filter(|time| !time.is_empty());
+    let time = time.map(|time| finite(time).ok_or_else(not_a_time)).transpose()?;
     let below = |part: Component<'_>| matches!(part, Component::Normal(_) | Component::CurDir);
     if file.is_empty() || !Path::new(file).components().all(below) {
         let what = format!("a <DataSet> in another folder (\"{file}\")");
@@ -123,14 +130,14 @@ fn entry(attributes: &Attributes) -> Result<(f64, String), ReadReason> {
         return Err(ReadReason::Unsupported { what, remedy });
     }
     // Zero has two signs, which would not sort as equal.
-    Ok((time + 0.0, file.to_owned()))
+    Ok((time.map(|time| time + 0.0), file.to_owned()))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn list(entries: &str) -> Result<Vec<(f64, String)>, ReadReason> {
+    fn list(entries: &str) -> Result<Vec<(Option<f64>, String)>, ReadReason> {
         parse(format!("<VTKFile type=\"Collection\"><Collection>{entries}</Collection></VTKFile>").as_bytes())
     }
 
@@ -138,7 +145,14 @@ mod tests {
     fn steps_come_in_order_of_time() {
         let entries = "<DataSet timestep=\"1.5\" part=\"0\" file=\"b/1.vtu\"/>\
                        <DataSet timestep=\"-0.5\" group=\"\" file=\"0.vtu\"></DataSet>";
-        assert_eq!(list(entries).unwrap(), [(-0.5, "0.vtu".into()), (1.5, "b/1.vtu".into())]);
+        assert_eq!(list(entries).unwrap(), [(Some(-0.5), "0.vtu".into()), (Some(1.5), "b/1.vtu".into())]);
+    }
+
+    #[test]
+    fn one_file_needs_no_time() {
+        assert_eq!(list("<DataSet file=\"a.vtu\"/>").unwrap(), [(None, "a.vtu".into())]);
+        let parts = "<DataSet part=\"0\" file=\"a.vtu\"/><DataSet part=\"1\" file=\"b.vtu\"/>";
+        assert!(list(parts).unwrap_err().to_string().contains("merge the parts"));
     }
 
     #[test]
@@ -146,7 +160,7 @@ mod tests {
         let step = |file: &str, time| Step { path: file.into(), time, number: 0 };
         let mut list = Vec::new();
         write_pvd(&[step("a & \"b\".vti", None), step("c/d.vti", Some(1.5))], &mut list).unwrap();
-        let expected = [(0.0, "a & \"b\".vti".to_owned()), (1.5, "c/d.vti".to_owned())];
+        let expected = [(Some(0.0), "a & \"b\".vti".to_owned()), (Some(1.5), "c/d.vti".to_owned())];
         assert_eq!(parse(&list).unwrap(), expected);
     }
 
@@ -172,7 +186,11 @@ mod tests {
             let mut flipped = file.to_vec();
             flipped[bit / 8] ^= 1 << (bit % 8);
             for (time, path) in parse(&flipped).unwrap_or_default() {
-                assert!(time.is_finite() && !Path::new(&path).is_absolute() && !path.contains(".."));
+                assert!(
+                    time.is_none_or(f64::is_finite)
+                        && !Path::new(&path).is_absolute()
+                        && !path.contains("..")
+                );
             }
         }
     }

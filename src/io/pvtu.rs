@@ -11,7 +11,7 @@ use crate::io::cells::Numbering;
 use crate::io::error::{At, ReadError, ReadReason};
 use crate::io::vtu::{NumberPoints, PieceReader, first_number, join};
 use crate::io::xml::Document;
-use crate::io::{Beside, IN_FILES, ReadFile, ReadOptions, in_file, without_mark};
+use crate::io::{Beside, IN_FILES, ReadFile, ReadOptions, in_file, packed, without_mark};
 use crate::mesh::TetMesh;
 
 /// Reads a document of type `PUnstructuredGrid`, and the time of its pieces.
@@ -36,8 +36,10 @@ pub(super) fn for_each_file(
         let missing = || ReadReason::Missing("attribute Source".into());
         let source = piece.attributes.get("Source").ok_or_else(missing).at(|| format!("piece {number}"))?;
         let bytes = beside(source).at(|| format!("piece {number}"))?;
+        let bytes = packed::unpacked(&bytes).at(|| format!("piece {number}"))?;
         let mut read_file = || {
-            let file = Document::parse(without_mark(&bytes))?;
+            let mut file = Document::parse(without_mark(&bytes))?;
+            source.clone_into(&mut file.name);
             if document.kind.strip_prefix(IN_FILES) != Some(&file.kind) {
                 let what = format!("a piece of type {}", file.kind);
                 let remedy = format!("list files of type {}", document.kind.trim_start_matches(IN_FILES));
@@ -64,7 +66,7 @@ pub(super) struct Whole {
 impl Whole {
     /// Appends the pieces in a file.
     fn append(&mut self, document: &Document<'_>, options: &ReadOptions) -> Result<(), ReadError> {
-        for (number, piece) in document.pieces.iter().enumerate() {
+        for (number, piece) in document.full_pieces() {
             let reader = PieceReader { document, piece, number, options };
             let place = || format!("piece {number}, <PointData>");
             self.add(&mut |numbers| reader.read(numbers), &place)?;
@@ -88,8 +90,11 @@ impl Whole {
         })?;
         keep(&mut part.positions, &new);
         part.fields.iter_mut().for_each(|field| keep(&mut field.values, &new));
-        for (number, point) in (first as u32..).zip(&part.positions) {
-            self.known.entry(bits(*point)).or_insert(number);
+        for (number, (at, point)) in (first as u32..).zip(part.positions.iter().enumerate()) {
+            // Points that no cell uses may have no values; another piece has them.
+            if part.fields.iter().all(|field| field.values[at].is_finite()) {
+                self.known.entry(bits(*point)).or_insert(number);
+            }
         }
         let is_first = !std::mem::replace(&mut self.has_pieces, true);
         join(&mut self.mesh, part, is_first).at(place)

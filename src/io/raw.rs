@@ -8,6 +8,7 @@
 use serde_json::Value;
 
 use crate::io::error::ReadReason;
+use crate::io::image::GridValues;
 use crate::io::number::NumberType;
 use crate::io::{Survey, image};
 use crate::mesh::{Field, Grid, TetMesh};
@@ -73,15 +74,12 @@ impl Sidecar {
             });
         }
         let values = self.number.floats(samples, self.big);
-        if let Some(at) = values.iter().position(|v| !v.is_finite()) {
-            return Err(ReadReason::NotFinite { point: at as u64 });
-        }
         let field = Field {
             unit: self.unit.clone(),
             integer: self.number.is_integer(),
             ..Field::new(self.field.clone(), values)
         };
-        image::grid_mesh(self.grid, vec![field], Vec::new())
+        image::grid_mesh(self.grid, GridValues { fields: vec![field], ..GridValues::default() })
     }
 }
 

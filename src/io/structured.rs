@@ -4,12 +4,12 @@
 //! Every cube is split as that of a regular grid, so neighbours agree.
 
 use crate::io::error::{At, ReadError, ReadReason};
-use crate::io::fields::component_of;
-use crate::io::image::{self, Extent, MAX_GRID_POINTS, Part};
-use crate::io::vtu::PieceReader;
+use crate::io::fields::{check_finite, check_finite_cells, component_of};
+use crate::io::image::{self, Extent, GridValues, MAX_GRID_POINTS};
+use crate::io::vtu::{HIDDEN_POINT, PieceReader};
 use crate::io::xml::Document;
-use crate::io::{Beside, ReadOptions, Survey, for_each_file, points_from, vtu};
-use crate::mesh::{Field, TetMesh, kuhn_tets};
+use crate::io::{Beside, ReadOptions, Survey, cells, for_each_file, vtu};
+use crate::mesh::{CellNumbers, Field, MeshInput, TetMesh, kuhn_tets};
 
 /// Points along each axis: at least two, and not too many together.
 pub(super) fn checked_dims(dims: [u64; 3]) -> Result<[u32; 3], ReadReason> {
@@ -37,20 +37,111 @@ pub(super) fn rectilinear([x, y, z]: &[Vec<f64>; 3]) -> Vec<f64> {
     positions
 }
 
+/// What VTK's flags hide of a grid; none without flags.
+#[derive(Debug, Default)]
+pub(super) struct Ghosts {
+    pub points: Option<Vec<i64>>,
+    pub cubes: Option<Vec<i64>>,
+}
+
+impl Ghosts {
+    /// Why each cube is left out, or 0 where it is not; none if all are there.
+    fn left_out(&self, dims: [u32; 3]) -> Option<Vec<i64>> {
+        let mut left_out = vec![0; cubes(dims)];
+        for (kind, flags) in left_out.iter_mut().zip(self.cubes.iter().flatten()) {
+            *kind = cells::left_out_by(*flags).unwrap_or(0);
+        }
+        if let Some(points) = self.points.as_ref().filter(|flags| flags.iter().any(|f| f & HIDDEN_POINT != 0))
+        {
+            let hidden = |corners: [usize; 8]| {
+                corners.iter().any(|&p| points.get(p).is_some_and(|f| f & HIDDEN_POINT != 0))
+            };
+            let around = (0..left_out.len()).map(|cube| hidden(corners(dims, cube)));
+            left_out
+                .iter_mut()
+                .zip(around)
+                .filter(|(_, hidden)| *hidden)
+                .for_each(|(kind, _)| *kind = cells::HIDDEN);
+        }
+        left_out.iter().any(|kind| *kind != 0).then_some(left_out)
+    }
+}
+
+/// The points at the corners of a cube.
+fn corners(dims: [u32; 3], cube: usize) -> [usize; 8] {
+    let [x, y, _] = dims.map(|d| d as usize);
+    let (row, layer) = (x - 1, (x - 1) * (y - 1));
+    let first = cube % row + x * (cube % layer / row) + x * y * (cube / layer);
+    [0, 1, x, x + 1, x * y, x * y + 1, x * y + x, x * y + x + 1].map(|offset| first + offset)
+}
+
 /// The mesh of a grid of checked dimensions with these points, and fields at points and cubes.
 pub(super) fn mesh(
     dims: [u32; 3],
     positions: Vec<[f64; 3]>,
-    fields: Vec<Field>,
-    mut cell_fields: Vec<Field>,
+    values: GridValues,
 ) -> Result<TetMesh, ReadReason> {
     let expected = dims.iter().map(|d| u64::from(*d)).product();
     if positions.len() as u64 != expected {
         let found = positions.len() as u64;
         return Err(ReadReason::Count { what: "points".into(), expected, found });
     }
-    image::sixfold(&mut cell_fields);
-    Ok(TetMesh { positions, fields, tets: kuhn_tets(dims), grid: None, cell_fields })
+    with_values(TetMesh { positions, tets: kuhn_tets(dims), ..TetMesh::default() }, dims, values)
+}
+
+/// A grid, alone or with its points and tetrahedra, with its values and without what is hidden.
+pub(super) fn with_values(
+    mut mesh: TetMesh,
+    dims: [u32; 3],
+    values: GridValues,
+) -> Result<TetMesh, ReadReason> {
+    let GridValues { fields, cubes, ghosts, others: [other_fields, other_cell_fields] } = values;
+    let left_out = ghosts.left_out(dims);
+    check_finite(&mesh.positions, &fields, &|| left_out.as_ref().map(|left_out| used(dims, left_out)))?;
+    check_finite_cells(&cubes, |cube| left_out.as_ref().is_none_or(|left_out| left_out[cube] == 0))?;
+    (mesh.fields, mesh.cell_fields) = (fields, cubes);
+    mesh.input = MeshInput { other_fields, other_cell_fields, ..MeshInput::default() };
+    let count = self::cubes(dims);
+    if left_out.is_some() || mesh.cell_fields.iter().any(|field| !field.values.is_empty()) {
+        mesh.expand_grid();
+    }
+    let Some(left_out) = left_out else {
+        mesh.input.cells = CellNumbers::equal(count, 6, CUBE);
+        let spread = |&value: &f64| [value; 6];
+        mesh.cell_fields.iter_mut().for_each(|f| f.values = f.values.iter().flat_map(spread).collect());
+        return Ok(mesh);
+    };
+    // What is left is no regular grid.
+    let is_there = |cube: usize| left_out[cube] == 0;
+    mesh.grid = None;
+    cells::leave_out(
+        &left_out.iter().copied().filter(|kind| *kind != 0).collect::<Vec<_>>(),
+        &mut mesh.input,
+    );
+    let kept: Vec<u32> =
+        (0..count as u32).filter(|&cube| is_there(cube as usize)).flat_map(|cube| [cube; 6]).collect();
+    let mut tet = 0;
+    mesh.tets.retain(|_| {
+        tet += 1;
+        is_there((tet - 1) / 6)
+    });
+    for field in mesh.cell_fields.iter_mut().filter(|field| !field.values.is_empty()) {
+        field.values = kept.iter().map(|&cube| field.values[cube as usize]).collect();
+    }
+    mesh.input.cells = CellNumbers::each(kept, count, vec![(0, CUBE)]);
+    Ok(mesh)
+}
+
+/// What the cells of a grid are called in messages.
+const CUBE: &str = "cube of the grid";
+
+/// Which points the cubes use that are not left out.
+fn used(dims: [u32; 3], left_out: &[i64]) -> Vec<bool> {
+    let mut used = vec![false; dims.iter().map(|d| *d as usize).product()];
+    for (cube, _) in left_out.iter().enumerate().filter(|(_, kind)| **kind == 0) {
+        corners(dims, cube).into_iter().for_each(|point| used[point] = true);
+    }
+    used
 }
 
 /// Reads a document of type `RectilinearGrid` or `StructuredGrid`, or a list of files with the pieces of one, and its time.
@@ -61,27 +152,24 @@ pub(super) fn read(
 ) -> Result<(TetMesh, Option<f64>), ReadError> {
     let place = || format!("<{}>", document.kind);
     let (whole, dims) = whole(document).at(place)?;
-    let mut parts = Vec::new();
-    let mut cubes = image::Cubes::default();
+    let mut grid = image::InParts::default();
     let time = for_each_file(document, beside, &mut |file| {
-        for (number, piece) in file.pieces.iter().enumerate() {
+        for (number, piece) in file.full_pieces() {
             let reader = PieceReader { document: file, piece, number, options };
-            parts.push(read_part(&reader, whole)?);
-            cubes.add(&reader, whole)?;
+            grid.add(&reader, whole, coordinates(&reader, whole)?)?;
         }
         Ok(())
     })?;
     // The first three are the coordinates.
-    let mut fields = image::assemble(parts, whole).at(place)?;
-    if fields.len() < AXES.len() {
+    let mut values = grid.finish(whole).at(place)?;
+    if values.fields.len() < AXES.len() {
         return Err(ReadReason::Missing("a piece of the grid".into())).at(place);
     }
-    let rest = fields.split_off(AXES.len());
-    let coordinates = |i: usize| fields.iter().map(move |field| field.values[i]);
-    let points: Vec<f64> = (0..fields[0].values.len()).flat_map(coordinates).collect();
-    let positions = points_from(&points).at(place)?;
-    let cubes = cubes.finish(whole).at(place)?;
-    Ok((mesh(dims.map(|d| d as u32), positions, rest, cubes).at(place)?, time))
+    let rest = values.fields.split_off(AXES.len());
+    let axes = std::mem::replace(&mut values.fields, rest);
+    let point = |p: usize| [0, 1, 2].map(|axis| axes[axis].values[p]);
+    let positions = (0..axes[0].values.len()).map(point).collect();
+    Ok((mesh(dims.map(|d| d as u32), positions, values).at(place)?, time))
 }
 
 /// Says what a document of type `RectilinearGrid` or `StructuredGrid` contains.
@@ -110,34 +198,18 @@ fn whole(document: &Document<'_>) -> Result<(Extent, [u64; 3]), ReadReason> {
     Ok((whole, dims))
 }
 
-/// A piece: its coordinates as three fields, then its own.
-fn read_part(reader: &PieceReader<'_, '_>, whole: Extent) -> Result<Part, ReadError> {
-    let place = || reader.place();
-    let extent = reader.piece.attributes.numbers("Extent").at(place)?.unwrap_or(whole);
-    let dims = image::dims_in(extent, whole).at(place)?;
+/// The coordinates of a piece as three fields.
+fn coordinates(reader: &PieceReader<'_, '_>, whole: Extent) -> Result<Vec<Field>, ReadError> {
+    let dims = image::dims_in(image::extent_of(reader, whole)?, whole).at(|| reader.place())?;
     let points = dims.iter().product::<u64>().min(MAX_GRID_POINTS) as usize;
     let coordinates = if reader.document.kind == RECTILINEAR {
-        expect_values(reader, points, dims)?;
+        image::expect_values(reader, points, dims)?;
         along_axes(reader, dims)?
     } else {
         reader.points(points)?.into_flattened()
     };
     let axis = |(i, name): (usize, &&str)| Field::new(*name, component_of(&coordinates, i, 3));
-    let mut fields: Vec<Field> = AXES.iter().enumerate().map(axis).collect();
-    fields.extend(reader.fields("PointData", points)?);
-    Ok(Part { extent, fields })
-}
-
-/// Checks that there is an array of as many values as there are points or cubes: without, a few coordinates claim any size.
-fn expect_values(reader: &PieceReader<'_, '_>, points: usize, dims: [u64; 3]) -> Result<(), ReadError> {
-    let cubes = dims.iter().map(|d| *d as usize - 1).product();
-    for (section, tuples) in [("PointData", points), ("CellData", cubes)] {
-        if let Some(array) = reader.piece.section(section).find(|array| array.number_type().is_some()) {
-            let components = array.components().at(|| array.place())?;
-            return reader.document.floats(array, tuples, components).map(|_| ()).at(|| array.place());
-        }
-    }
-    Err(ReadReason::Missing("an array with a value for every point or cell".into())).at(|| reader.place())
+    Ok(AXES.iter().enumerate().map(axis).collect())
 }
 
 /// The positions in a piece of a rectilinear grid.

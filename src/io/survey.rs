@@ -3,7 +3,7 @@
 use crate::io::error::{At, ReadError, ReadReason};
 #[cfg(feature = "formats")]
 use crate::io::{CellData, ReadOptions, formats};
-use crate::io::{image, in_file, legacy, raw, structured, vtu, xml};
+use crate::io::{image, in_file, legacy, packed, raw, structured, vtu, xml};
 use crate::mesh::{Field, Grid};
 
 /// What a file says that it contains. The data may be damaged even so.
@@ -25,6 +25,27 @@ pub struct Survey {
 }
 
 impl Survey {
+    /// A grid that may be turned.
+    pub(super) fn of_placement(
+        format: &'static str,
+        placement: &image::Placement,
+        fields: [Vec<Field>; 2],
+    ) -> Result<Self, ReadReason> {
+        if let Some(grid) = placement.grid()? {
+            return Ok(Self::of_grid(format, grid, fields));
+        }
+        structured::checked_dims(placement.dims)?;
+        let ([fields, cell_fields], points) = (fields, placement.dims.iter().product());
+        Ok(Self {
+            format,
+            points,
+            cells: structured::most_tets(placement.dims),
+            grid: None,
+            fields,
+            cell_fields,
+        })
+    }
+
     /// A grid; six tetrahedra a cube.
     pub(super) fn of_grid(format: &'static str, grid: Grid, [fields, cell_fields]: [Vec<Field>; 2]) -> Self {
         let product =
@@ -39,6 +60,8 @@ impl Survey {
 /// # Errors
 /// As [`read_bytes`](super::read_bytes), as far as that follows from the structure of the file.
 pub fn survey(name: &str, bytes: &[u8]) -> Result<Survey, ReadError> {
+    let unpacked = packed::unpacked(bytes).at(String::new).map_err(|e| in_file(e, name))?;
+    let bytes = unpacked.as_ref();
     let start = super::without_mark(bytes);
     let result = if bytes.starts_with(legacy::MAGIC) {
         legacy::survey(bytes)
@@ -82,9 +105,16 @@ pub fn survey_raw(name: &str, sidecar: &[u8]) -> Result<Survey, ReadError> {
     Ok(sidecar.survey())
 }
 
+/// How many bytes of memory a file takes while it is read, beside what is read of it: itself, and what it becomes when it is in gzip.
+pub fn held_bytes(bytes: &[u8]) -> u64 {
+    packed::stated_size(bytes)
+}
+
 /// What the format of a file with these bytes is called, as [`Survey::format`] has it; none if it is not known. The rest of the
 /// content is not looked at.
 pub fn format_of(bytes: &[u8]) -> Option<&'static str> {
+    let head = packed::head(bytes);
+    let bytes = head.as_ref();
     let start = super::without_mark(bytes);
     if bytes.starts_with(legacy::MAGIC) {
         return Some("vtk");

@@ -12,6 +12,8 @@ pub struct FieldSelection<'a> {
     pub names: &'a [String],
     /// All fields.
     pub all: bool,
+    /// Names of labels of regions, which are wanted beside these.
+    pub labels: &'a [String],
     /// What to do with fields at cells.
     pub cells: CellData,
 }
@@ -63,17 +65,26 @@ pub fn read_time_steps(
     read: &mut dyn FnMut(usize, &ReadOptions) -> Result<TetMesh, ReadError>,
 ) -> Result<TetMesh, TimeStepsError> {
     let ((_, first_time), later) = steps.split_first().ok_or(TimeStepsError::None)?;
-    let mut options = ReadOptions { cells: wanted.cells, ..ReadOptions::default() };
+    let mut options = wanted.options();
     let mut mesh = read(0, &options)?;
     if !later.is_empty() {
         if let Some(names) = reduce(&mut mesh, wanted) {
-            options.fields = Some(names);
+            (options.fields, options.first) = (Some(names), false);
             append(&mut mesh, *first_time, later, &options, read)?;
         }
     } else if let Some(time) = *first_time {
         set_time(&mut mesh, time);
     }
     Ok(mesh)
+}
+
+impl FieldSelection<'_> {
+    /// What to read of a file.
+    pub fn options(&self) -> ReadOptions {
+        let names = self.names.iter().chain(self.labels).cloned().collect();
+        let fields = if self.all { None } else { Some(names) };
+        ReadOptions { fields, first: !self.all && self.names.is_empty(), cells: self.cells, step: 0 }
+    }
 }
 
 /// Leaves the fields that are wanted; returns their names. None if one is missing: that is for the builder to refuse, who
@@ -85,14 +96,23 @@ fn reduce(mesh: &mut TetMesh, wanted: &FieldSelection<'_>) -> Option<Vec<String>
     if !wanted.names.iter().all(is_known) {
         return None;
     }
+    let is_named =
+        |field: &Field| wanted.names.iter().chain(wanted.labels).any(|name| field.answers_to(name));
     if wanted.names.is_empty() && !wanted.all {
+        let first = |fields: &mut Vec<Field>, count: usize| {
+            let mut at = 0;
+            fields.retain(|field| {
+                at += 1;
+                at <= count || is_named(field)
+            });
+        };
         // Where points have no field, the first one comes from the cells.
-        mesh.fields.truncate(1);
-        mesh.cell_fields.truncate(usize::from(mesh.fields.is_empty()));
-    } else {
-        let keep = |field: &Field| wanted.all || wanted.names.iter().any(|name| field.answers_to(name));
-        mesh.fields.retain(keep);
-        mesh.cell_fields.retain(keep);
+        let at_points = usize::from(!mesh.fields.is_empty());
+        first(&mut mesh.fields, at_points);
+        first(&mut mesh.cell_fields, 1 - at_points);
+    } else if !wanted.all {
+        mesh.fields.retain(is_named);
+        mesh.cell_fields.retain(is_named);
     }
     Some(mesh.fields.iter().chain(&mesh.cell_fields).map(|field| field.name.clone()).collect())
 }

@@ -3,20 +3,20 @@
 
 use crate::io::cells::{CellList, Numbering};
 use crate::io::error::{At, ReadError, ReadReason};
-use crate::io::fields::Collector;
+use crate::io::fields::{Collector, check_finite, check_finite_cells};
 use crate::io::xml::{Array, Document, Piece};
 use crate::io::{CellData, ReadOptions, Survey, cells, points_from};
-use crate::mesh::{Field, TetMesh};
+use crate::mesh::{Field, MeshInput, TetMesh};
 
 /// Reads a document of type `UnstructuredGrid`. The points of different pieces stay different points.
 pub(super) fn read(document: &Document<'_>, options: &ReadOptions) -> Result<TetMesh, ReadError> {
     let mut mesh = TetMesh::default();
-    for (i, piece) in document.pieces.iter().enumerate() {
+    for (i, (number, piece)) in document.full_pieces().enumerate() {
         let first = mesh.positions.len();
-        let part = PieceReader { document, piece, number: i, options }.read(&mut |points| {
+        let part = PieceReader { document, piece, number, options }.read(&mut |points| {
             Ok(Numbering::From { first: first_number(first, points.len())?, points: points.len() })
         })?;
-        join(&mut mesh, part, i == 0).at(|| format!("piece {i}, <PointData>"))?;
+        join(&mut mesh, part, i == 0).at(|| format!("piece {number}, <PointData>"))?;
     }
     Ok(mesh)
 }
@@ -32,7 +32,7 @@ pub(super) fn first_number(first: usize, points: usize) -> Result<u32, ReadReaso
 pub(super) fn survey(document: &Document<'_>) -> Result<Survey, ReadError> {
     let (mut points, mut cells) = (0_u64, 0_u64);
     let options = &ReadOptions::default();
-    for (number, piece) in document.pieces.iter().enumerate() {
+    for (number, piece) in document.full_pieces() {
         let reader = PieceReader { document, piece, number, options };
         let count = piece.attributes.count("NumberOfPoints").at(|| reader.place())?;
         points = points.saturating_add(count as u64);
@@ -44,9 +44,9 @@ pub(super) fn survey(document: &Document<'_>) -> Result<Survey, ReadError> {
 
 /// The fields at points and at cells of the first piece, without values.
 pub(super) fn names(document: &Document<'_>) -> Result<[Vec<Field>; 2], ReadError> {
-    let Some(piece) = document.pieces.first() else { return Ok([Vec::new(), Vec::new()]) };
+    let Some((number, piece)) = document.full_pieces().next() else { return Ok([Vec::new(), Vec::new()]) };
     let options = &ReadOptions::default();
-    let reader = PieceReader { document, piece, number: 0, options };
+    let reader = PieceReader { document, piece, number, options };
     Ok([reader.field_names("PointData")?, reader.field_names("CellData")?])
 }
 
@@ -72,27 +72,46 @@ impl PieceReader<'_, '_> {
         let place = || self.place();
         let points = self.piece.attributes.count("NumberOfPoints").at(place)?;
         let cells = self.piece.attributes.count("NumberOfCells").at(place)?;
-        let listed = self.cells(cells)?;
+        let mut listed = self.cells(cells)?;
+        if let (Some(listed), Some(ghosts)) = (&mut listed, self.ghosts("PointData", points)?) {
+            listed.hide(&ghosts.iter().map(|flags| flags & HIDDEN_POINT != 0).collect::<Vec<_>>());
+        }
         let positions = self.points(points)?;
+        let [fields, other_fields] = self.fields("PointData", points)?;
+        let used = || listed.as_ref().map(|listed| listed.used(points));
+        check_finite(&positions, &fields, &used).at(place)?;
+        // Where all cells were left out, so is what is known of them.
+        let [mut cell_fields, other_cell_fields] = match &listed {
+            None => Default::default(),
+            Some(listed) => {
+                let at_cells = self.cell_fields(cells, &fields)?;
+                check_finite_cells(&at_cells[0], |cell| {
+                    listed.types.get(cell).is_some_and(|kind| !cells::is_flat(*kind))
+                })
+                .at(place)?;
+                at_cells
+            }
+        };
         let numbering = numbers(&positions).at(place)?;
         let split = listed.map(|listed| listed.split(&numbering)).transpose();
-        let split = split.at(|| format!("{}, <Cells>, array \"connectivity\"", place()))?;
-        let fields = self.fields("PointData", points)?;
-        let mut cell_fields = match self.options.cells {
-            // Where all cells were left out, so is what is known of them.
-            _ if split.is_none() => Vec::new(),
-            CellData::LeaveOut => Vec::new(),
-            CellData::Names => self.field_names("CellData")?,
-            CellData::Values => self.cell_fields(cells)?,
-        };
-        let split = split.unwrap_or_default();
+        let split = split.at(|| format!("{}, <Cells>, array \"connectivity\"", place()))?.unwrap_or_default();
         split.spread(&mut cell_fields);
-        Ok(TetMesh { positions, fields, tets: split.tets, grid: None, cell_fields })
+        let mut input = MeshInput { other_fields, other_cell_fields, ..split.input };
+        self.document.part_name(self.number).into_iter().for_each(|name| input.cells.name_part(name));
+        Ok(TetMesh { positions, fields, tets: split.tets, grid: None, cell_fields, input })
     }
 
-    /// The fields in a section, each of `tuples` values.
-    pub fn fields(&self, section: &str, tuples: usize) -> Result<Vec<Field>, ReadError> {
-        let mut collector = Collector::new(self.options.fields.as_deref());
+    /// The fields in a section, each of `tuples` values, and the names of those that are not asked for.
+    pub fn fields(&self, section: &str, tuples: usize) -> Result<[Vec<Field>; 2], ReadError> {
+        self.collect(Collector::new(self.options), section, tuples)
+    }
+
+    fn collect(
+        &self,
+        mut collector: Collector<'_>,
+        section: &str,
+        tuples: usize,
+    ) -> Result<[Vec<Field>; 2], ReadError> {
         for array in self.piece.section(section).filter(|array| is_field(array)) {
             let Some(number) = array.number_type() else { continue };
             let components = array.components().at(|| array.place())?;
@@ -100,20 +119,23 @@ impl PieceReader<'_, '_> {
                 continue;
             };
             let values = self.document.floats(array, tuples, components).at(|| array.place())?;
-            collector.fill(claim, values, number.is_integer(), array.unit()).at(|| array.place())?;
+            collector.fill(claim, values, number.is_integer(), array.unit());
         }
-        Ok(collector.fields)
+        Ok([collector.fields, collector.others])
     }
 
-    /// The fields at cells.
-    pub fn cell_fields(&self, cells: usize) -> Result<Vec<Field>, ReadError> {
-        let named = |error: ReadError| ReadError { reason: error.reason.at_cells(), ..error };
-        self.fields("CellData", cells).map_err(named)
+    /// The fields at cells, beside these at points, as far as the options ask for them.
+    pub fn cell_fields(&self, cells: usize, fields: &[Field]) -> Result<[Vec<Field>; 2], ReadError> {
+        match self.options.cells {
+            CellData::LeaveOut => Ok([Vec::new(), Vec::new()]),
+            CellData::Names => Ok([self.field_names("CellData")?, Vec::new()]),
+            CellData::Values => self.collect(Collector::at_cells(self.options, fields), "CellData", cells),
+        }
     }
 
     /// The fields in a section without their values.
     pub fn field_names(&self, section: &str) -> Result<Vec<Field>, ReadError> {
-        let mut collector = Collector::new(self.options.fields.as_deref());
+        let mut collector = Collector::of_names();
         for array in self.piece.section(section).filter(|array| is_field(array)) {
             let components = array.components().at(|| array.place())?;
             if let Some(claim) = collector.claim(array.name(), components).at(|| array.place())? {
@@ -136,7 +158,7 @@ impl PieceReader<'_, '_> {
             return Err(ReadReason::Count { what, expected: 3, found }).at(|| array.place());
         }
         let values = self.document.floats(array, points, 3).at(|| array.place())?;
-        points_from(&values).at(|| array.place())
+        Ok(points_from(&values))
     }
 
     /// The cells; none if the piece has points alone.
@@ -157,11 +179,21 @@ impl PieceReader<'_, '_> {
         cells::most_tets(&kinds).at(|| types.place())?;
         let offsets = find("offsets")?;
         let ends = self.document.integers(offsets, cells).at(|| offsets.place())?;
+        let is_old = self.document.is_before([2, 1]);
+        let swapped = is_old.then(|| kinds.iter().map(|kind| *kind == cells::LAGRANGE_HEXAHEDRON).collect());
+        cells::resolve_orders(&mut kinds, &ends);
+        cells::most_tets(&kinds).at(|| types.place())?;
         let length = cells::checked_ends(&kinds, &ends).at(|| offsets.place())?;
         let connectivity = find("connectivity")?;
         let list = self.document.integers(connectivity, length).at(|| connectivity.place())?;
-        self.leave_out_ghosts(&mut kinds)?;
-        Ok(Some(CellList { types: kinds, ends, connectivity: list }))
+        let mut list = CellList { types: kinds, ends, connectivity: list };
+        if let Some(swapped) = swapped {
+            list.order_as_before_9(swapped);
+        }
+        if let Some(ghosts) = self.ghosts("CellData", cells)? {
+            list.leave_out(&ghosts);
+        }
+        Ok(Some(list))
     }
 
     /// The tetrahedra at most that the cells become.
@@ -171,32 +203,43 @@ impl PieceReader<'_, '_> {
         else {
             return Ok(0);
         };
-        let kinds = self.document.integers(types, cells).at(|| types.place())?;
+        let mut kinds = self.document.integers(types, cells).at(|| types.place())?;
+        if cells::depend_on_points(&kinds)
+            && let Some(offsets) = self.piece.section("Cells").find(|a| a.name() == "offsets")
+        {
+            cells::resolve_orders(
+                &mut kinds,
+                &self.document.integers(offsets, cells).at(|| offsets.place())?,
+            );
+        }
         if cells::are_points(&kinds) { Ok(0) } else { cells::most_tets(&kinds).at(|| types.place()) }
     }
 
-    /// Makes empty cells of those that are another piece's, or hidden.
-    fn leave_out_ghosts(&self, kinds: &mut [i64]) -> Result<(), ReadError> {
-        for array in self.piece.section("CellData") {
-            let left_out = match array.name() {
-                GHOST_TYPE => GHOST_OR_HIDDEN,
-                GHOST_LEVELS => i64::MAX,
+    /// The flags by which VTK marks points or cells that are hidden, or another piece's, if there are any.
+    pub fn ghosts(&self, section: &str, tuples: usize) -> Result<Option<Vec<i64>>, ReadError> {
+        for array in self.piece.section(section) {
+            let to_flags: fn(i64) -> i64 = match array.name() {
+                GHOST_TYPE => |flags| flags,
+                // Old files say how far a cell is from the piece.
+                GHOST_LEVELS => |levels| i64::from(levels != 0),
                 _ => continue,
             };
-            let flags = self.document.integers(array, kinds.len()).at(|| array.place())?;
-            let ghosts = kinds.iter_mut().zip(flags).filter(|(_, flags)| flags & left_out != 0);
-            ghosts.for_each(|(kind, _)| *kind = cells::EMPTY);
+            let flags = self.document.integers(array, tuples).at(|| array.place())?;
+            return Ok(Some(flags.into_iter().map(to_flags).collect()));
         }
-        Ok(())
+        Ok(None)
     }
 }
 
 /// Arrays at cells and points by which VTK marks what belongs to another piece, or is hidden: flags of each, and how far it is
 /// from the piece in old files.
 pub(super) const GHOST_TYPE: &str = "vtkGhostType";
-const GHOST_LEVELS: &str = "vtkGhostLevels";
-/// The flags of cells that another piece has, and of those that are hidden.
-pub(super) const GHOST_OR_HIDDEN: i64 = 1 | 32;
+pub(super) const GHOST_LEVELS: &str = "vtkGhostLevels";
+/// The flags of cells that another piece has, and of those that are hidden or that finer ones take the place of.
+pub(super) const GHOST_CELL: i64 = 1;
+pub(super) const HIDDEN_CELL: i64 = 32 | 8;
+/// The flag of points that are hidden; so are the cells there.
+pub(super) const HIDDEN_POINT: i64 = 2;
 
 /// Whether an array is a field, not a mark of VTK's.
 fn is_field(array: &Array<'_>) -> bool {
@@ -211,6 +254,7 @@ pub(super) fn join(mesh: &mut TetMesh, part: TetMesh, is_first: bool) -> Result<
     }
     join_fields(&mut mesh.fields, &part.fields)?;
     join_fields(&mut mesh.cell_fields, &part.cell_fields)?;
+    mesh.input.append(part.input);
     mesh.positions.extend(part.positions);
     mesh.tets.extend(part.tets);
     Ok(())

@@ -93,6 +93,18 @@ impl Array<'_> {
         }
     }
 
+    /// Where the values are. As VTK has it, what is not stated otherwise is text, and an offset is enough to say that they come later.
+    fn encoding(&self) -> Encoding {
+        let format = self.attributes.get("format").unwrap_or_default().to_ascii_lowercase();
+        match format.as_str() {
+            "binary" => Encoding::Binary,
+            "appended" => Encoding::Appended,
+            "ascii" => Encoding::Ascii,
+            _ if self.attributes.get("offset").is_some() => Encoding::Appended,
+            _ => Encoding::Ascii,
+        }
+    }
+
     /// The number type, or `None` for strings and the like.
     pub fn number_type(&self) -> Option<NumberType> {
         self.attributes.get("type").and_then(NumberType::named)
@@ -109,6 +121,18 @@ pub(super) struct Piece<'a> {
 }
 
 impl<'a> Piece<'a> {
+    /// Whether it has neither points nor cells, as pieces of parallel programs may.
+    fn is_empty(&self) -> bool {
+        let is_zero = |name: &str| self.attributes.get(name).is_none_or(|count| count == "0");
+        match self.attributes.numbers::<i64, 6>("Extent") {
+            Ok(Some([x0, x1, y0, y1, z0, z1])) => x0 > x1 || y0 > y1 || z0 > z1,
+            _ => {
+                let counted = self.attributes.get("NumberOfPoints").is_some();
+                counted && is_zero("NumberOfPoints") && is_zero("NumberOfCells")
+            }
+        }
+    }
+
     /// The arrays of one section.
     pub fn section(&self, name: &str) -> impl Iterator<Item = &Array<'a>> {
         self.arrays.iter().filter(move |a| a.section == name)
@@ -119,6 +143,9 @@ impl<'a> Piece<'a> {
 pub(super) struct Document<'a> {
     /// The data set's type, as `UnstructuredGrid`.
     pub kind: String,
+    version: [u32; 2],
+    /// The name of the file where several are listed; else empty.
+    pub name: String,
     /// Attributes of the element named like the type.
     pub dataset: Attributes,
     /// The parts.
@@ -159,6 +186,26 @@ impl<'a> Document<'a> {
             }
         }
         parser.finish(data)
+    }
+
+    /// The parts that are not empty, with their numbers.
+    pub fn full_pieces(&self) -> impl Iterator<Item = (usize, &Piece<'a>)> {
+        self.pieces.iter().enumerate().filter(|(_, piece)| !piece.is_empty())
+    }
+
+    /// What the part of this number is called in messages about its cells.
+    pub fn part_name(&self, number: usize) -> Option<String> {
+        match (self.name.as_str(), self.pieces.len() > 1) {
+            ("", false) => None,
+            ("", true) => Some(format!("piece {number}")),
+            (name, false) => Some(name.to_owned()),
+            (name, true) => Some(format!("{name}, piece {number}")),
+        }
+    }
+
+    /// Whether the file is of an older version of the format than this one.
+    pub fn is_before(&self, version: [u32; 2]) -> bool {
+        self.version < version
     }
 
     /// The time of the data set, as VTK writes it; none if that is not a finite number.
@@ -203,7 +250,7 @@ impl<'a> Document<'a> {
         let (Some(needed), Some(bytes)) = (needed, bytes) else {
             return Err(ReadReason::Truncated { needed: u64::MAX, found: array.text.len() as u64 });
         };
-        if array.attributes.get("format") == Some("ascii") {
+        if array.encoding() == Encoding::Ascii {
             return parse_text(&array.text, needed, |token| parse(number, token));
         }
         if needed == 0 {
@@ -214,9 +261,9 @@ impl<'a> Document<'a> {
     }
 
     fn source<'b>(&'b self, array: &'b Array<'a>) -> Result<Source<'b>, ReadReason> {
-        match array.attributes.get("format") {
-            Some("binary") => Ok(Source::base64(array.text.as_bytes())),
-            Some("appended") => {
+        match array.encoding() {
+            Encoding::Ascii | Encoding::Binary => Ok(Source::base64(array.text.as_bytes())),
+            Encoding::Appended => {
                 let offset = array.attributes.count("offset")?;
                 let appended =
                     self.appended.as_ref().ok_or_else(|| ReadReason::Missing("<AppendedData>".into()))?;
@@ -226,11 +273,19 @@ impl<'a> Document<'a> {
                 })?;
                 Ok(if appended.base64 { Source::base64(bytes) } else { Source::Raw(bytes) })
             }
-            other => {
-                Err(ReadReason::Syntax(format!("format=\"{}\" is not known", other.unwrap_or_default())))
-            }
         }
     }
+}
+
+/// Where the values of an array are.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Encoding {
+    /// Inline, as text.
+    Ascii,
+    /// Inline, in base64.
+    Binary,
+    /// Behind the XML.
+    Appended,
 }
 
 /// Exactly `needed` numbers of white-space separated text.
@@ -356,9 +411,16 @@ impl<'a> Parser<'a> {
         let dataset = self.dataset.ok_or_else(|| ReadReason::Missing(format!("<{kind}>"))).at(String::new)?;
         let appended =
             self.appended.map(|a| appended(&a, data)).transpose().at(|| "<AppendedData>".into())?;
-        let (pieces, field_data) = (self.pieces, self.field_data);
-        Ok(Document { kind, dataset, pieces, field_data, framing, appended })
+        let (pieces, field_data, version) = (self.pieces, self.field_data, version(&file));
+        Ok(Document { kind, version, name: String::new(), dataset, pieces, field_data, framing, appended })
     }
+}
+
+/// The version of the format, the oldest if it is not stated.
+fn version(file: &Attributes) -> [u32; 2] {
+    let mut numbers = file.get("version").unwrap_or_default().split('.').map(|number| number.parse().ok());
+    let mut next = || numbers.next().flatten().unwrap_or(0);
+    [next(), next()]
 }
 
 fn appended<'a>(attributes: &Attributes, bytes: &'a [u8]) -> Result<Appended<'a>, ReadReason> {

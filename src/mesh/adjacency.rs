@@ -167,7 +167,7 @@ pub(crate) fn boundary_faces<'a>(
 
 /// The error for a face with three or more tetrahedra.
 pub(crate) fn crowded(group: &[HalfFace]) -> MeshError {
-    MeshError::CrowdedFace { face: group[0].vertices(), tets: group.iter().map(|f| f.tet()).collect() }
+    MeshError::CrowdedFace { face: group[0].vertices(), tets: group.iter().map(|f| f.tet().into()).collect() }
 }
 
 /// Checks that every tetrahedron refers to existing points.
@@ -177,7 +177,7 @@ pub(crate) fn check_indices(points: usize, tets: &[[u32; 4]]) -> Result<(), Mesh
     }
     for (tet, vertices) in (0_u32..).zip(tets) {
         if let Some(&point) = vertices.iter().find(|&&v| v as usize >= points) {
-            return Err(MeshError::MissingPoint { tet, point, points });
+            return Err(MeshError::MissingPoint { tet: tet.into(), point, points });
         }
     }
     Ok(())
@@ -395,7 +395,10 @@ mod tests {
     #[test]
     fn crowded_faces_are_refused_with_their_cells() {
         let error = neighbors(&[[0, 1, 2, 3], [9, 8, 7, 6], [0, 1, 2, 4], [2, 1, 5, 0]]).unwrap_err();
-        assert_eq!(error, MeshError::CrowdedFace { face: [0, 1, 2], tets: vec![0, 2, 3] });
+        assert_eq!(
+            error,
+            MeshError::CrowdedFace { face: [0, 1, 2], tets: [0, 2, 3].map(Into::into).to_vec() }
+        );
     }
 
     #[test]

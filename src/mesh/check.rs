@@ -30,17 +30,22 @@ const SHARE: usize = 1 << 14;
 
 /// [`check`], and the neighbours of each tetrahedron.
 fn check_neighbors(mesh: &TetMesh) -> Result<Vec<[u32; 4]>, MeshError> {
+    check_tets(mesh).map_err(|error| error.in_input(|tet| mesh.input.cells.cell_of(tet)))
+}
+
+/// The same, with the numbers of tetrahedra in errors.
+fn check_tets(mesh: &TetMesh) -> Result<Vec<[u32; 4]>, MeshError> {
     check_arrays(mesh)?;
     let sides = Sides::new(&mesh.positions);
     let wrong = |t: usize| match sides.of(mesh.tets[t]) {
         1 => None,
-        0 => Some(MeshError::Flat { tet: t as u32 }),
-        _ => Some(MeshError::Inverted { tet: t as u32 }),
+        0 => Some(MeshError::Flat { tet: (t as u32).into() }),
+        _ => Some(MeshError::Inverted { tet: (t as u32).into() }),
     };
     let wrong = threads::map(mesh.tets.len(), SHARE, |mut tets| tets.find_map(wrong));
     wrong.into_iter().flatten().next().map_or(Ok(()), Err)?;
     let fits = |group: &[HalfFace], folded: bool| match group {
-        [a, b] if folded => Err(MeshError::Folded { tets: [a.tet(), b.tet()] }),
+        [a, b] if folded => Err(MeshError::Folded { tets: [a, b].map(|face| face.tet().into()) }),
         [_, _] => Ok(()),
         _ => Err(crowded(group)),
     };
@@ -183,9 +188,9 @@ mod tests {
         assert_eq!(check(&good), Ok(()));
         let with = |tets: Vec<[u32; 4]>| check(&TetMesh { tets, ..good.clone() }).unwrap_err();
         assert_eq!(with(vec![]), MeshError::Empty);
-        assert_eq!(with(vec![[0, 1, 2, 4]]), MeshError::MissingPoint { tet: 0, point: 4, points: 4 });
-        assert_eq!(with(vec![[0, 1, 2, 3], [0, 2, 1, 3]]), MeshError::Inverted { tet: 1 });
-        assert_eq!(with(vec![[0, 1, 2, 2]]), MeshError::Flat { tet: 0 });
-        assert_eq!(with(vec![[0, 1, 2, 3], [1, 2, 0, 3]]), MeshError::Folded { tets: [0, 1] });
+        assert_eq!(with(vec![[0, 1, 2, 4]]), MeshError::MissingPoint { tet: 0.into(), point: 4, points: 4 });
+        assert_eq!(with(vec![[0, 1, 2, 3], [0, 2, 1, 3]]), MeshError::Inverted { tet: 1.into() });
+        assert_eq!(with(vec![[0, 1, 2, 2]]), MeshError::Flat { tet: 0.into() });
+        assert_eq!(with(vec![[0, 1, 2, 3], [1, 2, 0, 3]]), MeshError::Folded { tets: [0.into(), 1.into()] });
     }
 }

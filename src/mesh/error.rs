@@ -1,9 +1,9 @@
 //! What can be wrong with a mesh, named by the cells of the file it came from.
 
-use super::MAX_TETS;
+use super::{InputCell, MAX_TETS};
 use thiserror::Error;
 
-/// Why a mesh cannot be used. Cells and points are numbered as in the input, from 0.
+/// Why a mesh cannot be used. Cells are those of the input, numbered as there, from 0; so are points.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum MeshError {
     /// There is no tetrahedron, or none is left.
@@ -45,7 +45,7 @@ pub enum MeshError {
     #[error("cell {tet} refers to point {point}, but there are {points} points; mend the input")]
     MissingPoint {
         /// The cell.
-        tet: u32,
+        tet: InputCell,
         /// The index it holds.
         point: u32,
         /// How many points there are.
@@ -55,19 +55,19 @@ pub enum MeshError {
     #[error("cell {tet} has the same vertex twice; remove it")]
     RepeatedVertex {
         /// The cell.
-        tet: u32,
+        tet: InputCell,
     },
     /// A tetrahedron has no volume.
     #[error("cell {tet} has no volume; repair the mesh first")]
     Flat {
         /// The cell.
-        tet: u32,
+        tet: InputCell,
     },
     /// A tetrahedron is turned inside out.
     #[error("cell {tet} is turned inside out; repair the mesh first")]
     Inverted {
         /// The cell.
-        tet: u32,
+        tet: InputCell,
     },
     /// Three or more tetrahedra share a face.
     #[error(
@@ -78,16 +78,13 @@ pub enum MeshError {
         /// The face's points.
         face: [u32; 3],
         /// The cells, in increasing order.
-        tets: Vec<u32>,
+        tets: Vec<InputCell>,
     },
     /// Two tetrahedra lie on the same side of the face they share: the mesh is folded there.
-    #[error(
-        "cells {} and {} lie on the same side of the face they share: the mesh is folded there; remesh this region",
-        .tets[0], .tets[1]
-    )]
+    #[error("{}; remesh this region", folded(.tets))]
     Folded {
         /// The cells, in increasing order.
-        tets: [u32; 2],
+        tets: [InputCell; 2],
     },
     /// A tetrahedron without volume cannot be dropped without tearing the mesh.
     #[error(
@@ -96,7 +93,7 @@ pub enum MeshError {
     )]
     InnerFlat {
         /// The cell.
-        tet: u32,
+        tet: InputCell,
         /// How many of its faces are shared with other cells.
         shared: u32,
     },
@@ -118,16 +115,43 @@ pub enum MeshError {
     )]
     WeldTooFar {
         /// The cell.
-        tet: u32,
+        tet: InputCell,
     },
 }
 
+impl MeshError {
+    /// The same of the input's cells, given the cell of each tetrahedron; cells are numbers of tetrahedra until then.
+    pub(super) fn in_input(self, cell_of: impl Fn(u32) -> InputCell) -> Self {
+        let cell = |tet: InputCell| cell_of(tet.number);
+        match self {
+            Self::MissingPoint { tet, point, points } => Self::MissingPoint { tet: cell(tet), point, points },
+            Self::RepeatedVertex { tet } => Self::RepeatedVertex { tet: cell(tet) },
+            Self::Flat { tet } => Self::Flat { tet: cell(tet) },
+            Self::Inverted { tet } => Self::Inverted { tet: cell(tet) },
+            Self::CrowdedFace { face, tets } => {
+                Self::CrowdedFace { face, tets: tets.into_iter().map(cell).collect() }
+            }
+            Self::Folded { tets } => Self::Folded { tets: tets.map(cell) },
+            Self::InnerFlat { tet, shared } => Self::InnerFlat { tet: cell(tet), shared },
+            Self::WeldTooFar { tet } => Self::WeldTooFar { tet: cell(tet) },
+            other => other,
+        }
+    }
+}
+
 /// The first few of `tets`, as text.
-fn listed(tets: &[u32]) -> String {
+fn listed(tets: &[InputCell]) -> String {
     const SHOWN: usize = 8;
-    let mut text = tets.iter().take(SHOWN).map(u32::to_string).collect::<Vec<_>>().join(", ");
+    let mut text = tets.iter().take(SHOWN).map(InputCell::to_string).collect::<Vec<_>>().join(", ");
     if tets.len() > SHOWN {
         text.push_str(", ...");
     }
     text
+}
+
+fn folded([a, b]: &[InputCell; 2]) -> String {
+    if a == b {
+        return format!("cell {a} is folded: parts of it lie on the same side of the face they share");
+    }
+    format!("cells {a} and {b} lie on the same side of the face they share: the mesh is folded there")
 }

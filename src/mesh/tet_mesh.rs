@@ -1,5 +1,7 @@
 //! A tetrahedral mesh as files give it and builders take it.
 
+use crate::mesh::MeshInput;
+
 /// A scalar field with one value per point (or per tetrahedron), and what is known of it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Field {
@@ -50,8 +52,9 @@ pub struct Grid {
     pub spacing: [f64; 3],
 }
 
-/// A tetrahedral mesh with scalar fields at its points: plain arrays that need not be valid.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// A tetrahedral mesh with scalar fields at its points: plain arrays that need not be valid. What it was read from does not
+/// count when two are compared.
+#[derive(Clone, Debug, Default)]
 pub struct TetMesh {
     /// Coordinates of the points, in model units.
     pub positions: Vec<[f64; 3]>,
@@ -63,4 +66,17 @@ pub struct TetMesh {
     pub grid: Option<Grid>,
     /// Scalar fields at the cells, each as long as `tets`; without values where only their names were asked for.
     pub cell_fields: Vec<Field>,
+    /// What is known of the input that it was read from.
+    pub input: MeshInput,
+}
+
+impl PartialEq for TetMesh {
+    fn eq(&self, other: &Self) -> bool {
+        let Self { positions, fields, tets, grid, cell_fields, input: _ } = self;
+        *positions == other.positions
+            && *fields == other.fields
+            && *tets == other.tets
+            && *grid == other.grid
+            && *cell_fields == other.cell_fields
+    }
 }

@@ -73,7 +73,7 @@ impl InputFile {
     }
 
     fn size(&self) -> u64 {
-        (self.bytes.len() + self.sidecar.as_ref().map_or(0, |(_, bytes)| bytes.len())) as u64
+        io::held_bytes(&self.bytes) + self.sidecar.as_ref().map_or(0, |(_, bytes)| bytes.len() as u64)
     }
 }
 
@@ -141,7 +141,7 @@ impl MeshBuilder {
             Some(grid) => Some(Bounds::of(&[grid.point([0; 3]), grid.point(grid.dims.map(|d| d - 1))])),
             None if forecast.reading > self.memory => None,
             None => {
-                let options = ReadOptions { fields: Some(Vec::new()), cells: CellData::LeaveOut, step: 0 };
+                let options = ReadOptions { fields: Some(Vec::new()), ..ReadOptions::default() };
                 let points = first.read(&options)?.positions;
                 Some(Bounds::of(&points)).filter(|_| !points.is_empty())
             }
@@ -154,13 +154,13 @@ impl MeshBuilder {
     pub fn build(&mut self, options: JsBuildOptions, progress: &Function) -> Result<JsBuilt, WebError> {
         let options = build_options(&options)?;
         let (_, survey) = self.first()?;
-        let fields = self.wanted(&survey, &options)?;
+        Self::check_fields(&survey, &options)?;
         let forecast = self.forecast(&survey, &options);
         if forecast.peak() > self.memory {
             return Err(no_memory(&survey, forecast.peak(), self.memory));
         }
         let stages = Stages { progress, stopped: false };
-        self.build_of(fields, options, stages)
+        self.build_of(options, stages)
     }
 }
 
@@ -179,8 +179,8 @@ impl MeshBuilder {
         Forecast::of(survey, files, self.files.len() as u64, options)
     }
 
-    /// The names of the fields that are read; none for all. Refuses those that are not there before anything is read.
-    fn wanted(&self, survey: &Survey, options: &BuildOptions) -> Result<Option<Vec<String>>, WebError> {
+    /// Refuses fields that are not there before anything is read.
+    fn check_fields(survey: &Survey, options: &BuildOptions) -> Result<(), WebError> {
         let BuildOptions { config, cells, .. } = options;
         let has = |fields: &[Field], name: &str| fields.iter().any(|field| field.answers_to(name));
         for name in &config.fields {
@@ -195,24 +195,13 @@ impl MeshBuilder {
             let known = all.map(|field| field.name.clone()).collect();
             return Err(BuildError::UnknownField { name: name.clone(), known }.into());
         }
-        let first = survey.fields.first().or(survey.cell_fields.first().filter(|_| *cells));
-        Ok(match first {
-            _ if config.all_fields => None,
-            _ if !config.fields.is_empty() => Some(config.fields.clone()),
-            Some(first) => Some(vec![first.name.clone()]),
-            None => None,
-        })
+        Ok(())
     }
 
-    fn build_of(
-        &mut self,
-        fields: Option<Vec<String>>,
-        options: BuildOptions,
-        mut stages: Stages<'_>,
-    ) -> Result<JsBuilt, WebError> {
+    fn build_of(&mut self, options: BuildOptions, mut stages: Stages<'_>) -> Result<JsBuilt, WebError> {
         let BuildOptions { config, cells, repair: level, units, metadata } = options;
         let name = self.files.first().map(|file| file.name.clone()).unwrap_or_default();
-        let mesh = self.read(fields, &config, cells, &mut stages)?;
+        let mesh = self.read(&config, cells, &mut stages)?;
         stages.begin("repair")?;
         let (mut mesh, repaired) = if mesh.tets.is_empty() {
             expect_points(&mesh, &config, &name)?;
@@ -249,7 +238,6 @@ impl MeshBuilder {
     /// The mesh as the files have it. Each file is dropped when it was read.
     fn read(
         &mut self,
-        fields: Option<Vec<String>>,
         config: &BuildConfig,
         cells: bool,
         stages: &mut Stages<'_>,
@@ -259,12 +247,11 @@ impl MeshBuilder {
         let mut files: Vec<_> = files.into_iter().map(Some).collect();
         let total = steps.len() as u64;
         let cells = if cells { CellData::Values } else { CellData::Names };
-        let wanted = FieldSelection { names: &config.fields, all: config.all_fields, cells };
+        let wanted = FieldSelection { names: &config.fields, all: config.all_fields, labels: &[], cells };
         let mut read = |number: usize, options: &ReadOptions| {
             let file = files.get_mut(number).and_then(Option::take).unwrap_or_default();
             stages.count("parse", number as u64, total);
-            let fields = options.fields.clone().or(fields.clone());
-            file.read(&ReadOptions { fields, ..options.clone() })
+            file.read(options)
         };
         let mesh = read_time_steps(&steps, &wanted, &mut read)?;
         if stages.stopped { Err(BuildError::Stopped.into()) } else { Ok(mesh) }
@@ -532,7 +519,9 @@ impl From<ReadError> for WebError {
         let code = match error.reason {
             ReadReason::Io(_) => "bad-source",
             ReadReason::UnknownFormat => "unknown-format",
-            ReadReason::Unsupported { .. } | ReadReason::CellTypes(_) => "unsupported",
+            ReadReason::Unsupported { .. } | ReadReason::CellTypes(_) | ReadReason::NoVolume(_) => {
+                "unsupported"
+            }
             ReadReason::Truncated { .. } => "truncated",
             ReadReason::TooLarge { .. } => "limit",
             ReadReason::NotFinite { .. } | ReadReason::NotFiniteCell { .. } => "bad-mesh",

@@ -84,7 +84,7 @@ fn each_time_step_is_found() {
     assert_eq!(found, [(Some(0.0), 0), (Some(0.5), 1), (Some(2.0), 2)]);
     assert_eq!(io::steps(&path(PIECES.0)).unwrap()[0].time, None);
     let named: Vec<_> = steps.iter().map(|step| (step.path.display().to_string(), step.time)).collect();
-    let wanted = FieldSelection { names: &[], all: true, cells: CellData::LeaveOut };
+    let wanted = FieldSelection { names: &[], all: true, labels: &[], cells: CellData::LeaveOut };
     let series = io::read_time_steps(&named, &wanted, &mut |number, options| {
         io::read_with(&steps[number].path, &ReadOptions { step: number, ..options.clone() })
     });

@@ -20,7 +20,7 @@ fn assert_agrees(survey: &Survey, mesh: &TetMesh, name: &str) {
     assert!(survey.fields.iter().chain(&survey.cell_fields).all(|field| field.values.is_empty()), "{name}");
 }
 
-const EVERYTHING: ReadOptions = ReadOptions { fields: None, cells: CellData::Values, step: 0 };
+const EVERYTHING: ReadOptions = ReadOptions { fields: None, first: false, cells: CellData::Values, step: 0 };
 
 #[test]
 fn of_every_format_and_encoding() {

@@ -14,7 +14,7 @@ use crate::builder::quantize::{self, Quantized};
 use crate::builder::restrictions::Restrictions;
 use crate::builder::{BuildConfig, BuildError, Construction, Purpose, field_lattice, field_selection};
 use crate::geom::{Bounds, Lattice, WIDE_BITS, orient3d};
-use crate::mesh::{FACES, Field, MAX_TETS, MeshPiece, TetMesh};
+use crate::mesh::{FACES, Field, MAX_TETS, MeshInput, MeshPiece, TetMesh};
 use crate::mt::{FieldInfo, MAX_UPDATES};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -60,6 +60,8 @@ struct Sums {
     /// The fields with their least and largest values alone.
     fields: Vec<Field>,
     cell_fields: Vec<Field>,
+    /// Fields that nobody asked for, as the first piece has them.
+    input: MeshInput,
     /// Points that are in several pieces.
     shared: Vec<u32>,
     /// Points that no tetrahedron of the first piece that has them uses, and shared points that one of a later piece uses.
@@ -124,6 +126,7 @@ impl<'a> Piecewise<'a> {
             tets: 0,
             fields: Vec::new(),
             cell_fields: Vec::new(),
+            input: MeshInput::default(),
             shared: Vec::new(),
             unused: Vec::new(),
             used: Vec::new(),
@@ -160,6 +163,8 @@ impl<'a> Piecewise<'a> {
             let bare = |field: &Field| Field { values: Vec::new(), ..field.clone() };
             sums.fields = mesh.fields.iter().map(bare).collect();
             sums.cell_fields = mesh.cell_fields.iter().map(bare).collect();
+            sums.input.other_fields.clone_from(&mesh.input.other_fields);
+            sums.input.other_cell_fields.clone_from(&mesh.input.other_cell_fields);
             sums.of_fields = mesh.fields.iter().map(|_| crc32fast::Hasher::new()).collect();
         }
         let is_new = |i: &usize| points[*i] >= first;
@@ -211,6 +216,7 @@ impl<'a> Piecewise<'a> {
         let mock = TetMesh {
             fields: self.sums.fields.clone(),
             cell_fields: self.sums.cell_fields.clone(),
+            input: self.sums.input.clone(),
             ..TetMesh::default()
         };
         let fields = field_selection::fields(&mock, self.config)?;

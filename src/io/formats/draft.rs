@@ -2,9 +2,9 @@
 
 use crate::io::cells::{self, CellList, Numbering};
 use crate::io::error::ReadReason;
-use crate::io::fields::Collector;
+use crate::io::fields::{Collector, check_finite, check_finite_cells};
 use crate::io::{CellData, ReadOptions, points_from};
-use crate::mesh::{Field, TetMesh};
+use crate::mesh::{Field, MeshInput, TetMesh};
 
 /// Points, cells and fields as they were read.
 pub(super) struct Draft<'a> {
@@ -13,12 +13,21 @@ pub(super) struct Draft<'a> {
     list: CellList,
     pub fields: Collector<'a>,
     pub cell_fields: Collector<'a>,
+    /// What is left out is noted here.
+    pub input: MeshInput,
 }
 
 impl<'a> Draft<'a> {
     pub fn new(options: &'a ReadOptions) -> Self {
-        let [fields, cell_fields] = [(); 2].map(|()| Collector::new(options.fields.as_deref()));
-        Self { options, coordinates: Vec::new(), list: CellList::default(), fields, cell_fields }
+        let [fields, cell_fields] = [(); 2].map(|()| Collector::new(options));
+        Self {
+            options,
+            coordinates: Vec::new(),
+            list: CellList::default(),
+            fields,
+            cell_fields,
+            input: MeshInput::default(),
+        }
     }
 
     /// How many cells there are.
@@ -54,8 +63,9 @@ impl<'a> Draft<'a> {
     ) -> Result<(), ReadReason> {
         match self.fields.claim(name, components)? {
             Some(claim) => self.fields.fill(claim, read()?, integer, ""),
-            None => Ok(()),
+            None => {}
         }
+        Ok(())
     }
 
     /// Keeps an array with values at cells, if that is wanted.
@@ -82,31 +92,40 @@ impl<'a> Draft<'a> {
         }
         match self.cell_fields.claim(name, components)? {
             Some(claim) if self.options.cells == CellData::Names => self.cell_fields.keep_names(claim, ""),
-            Some(claim) => {
-                self.cell_fields.fill(claim, read()?, integer, "").map_err(ReadReason::at_cells)?;
-            }
+            Some(claim) => self.cell_fields.fill(claim, read()?, integer, ""),
             None => {}
         }
         Ok(())
     }
 
     /// The mesh. Without cells it has points alone.
-    pub fn finish(self) -> Result<TetMesh, ReadReason> {
-        let positions = points_from(&self.coordinates)?;
+    pub fn finish(mut self) -> Result<TetMesh, ReadReason> {
+        let positions = points_from(&self.coordinates);
         if positions.len() > u32::MAX as usize {
             return Err(ReadReason::TooLarge { what: "points".into(), limit: u64::from(u32::MAX) });
         }
         let fields = expect_values(self.fields.fields, positions.len())?;
+        let others = [self.fields.others, std::mem::take(&mut self.cell_fields.others)];
+        let [other_fields, other_cell_fields] = others;
+        self.input.other_fields = other_fields;
         if self.list.types.is_empty() {
-            return Ok(TetMesh { positions, fields, ..TetMesh::default() });
+            check_finite(&positions, &fields, &|| None)?;
+            return Ok(TetMesh { positions, fields, input: self.input, ..TetMesh::default() });
         }
+        if !fields.is_empty() {
+            self.cell_fields.drop_first();
+        }
+        check_finite(&positions, &fields, &|| Some(self.list.used(positions.len())))?;
         let cells = self.list.types.len();
         cells::checked_ends(&self.list.types, &self.list.ends)?;
         let numbering = Numbering::From { first: 0, points: positions.len() };
         let split = self.list.split(&numbering)?;
         let mut cell_fields = expect_values(self.cell_fields.fields, cells)?;
+        check_finite_cells(&cell_fields, |_| true)?;
         split.spread(&mut cell_fields);
-        Ok(TetMesh { positions, fields, tets: split.tets, grid: None, cell_fields })
+        let mut input = MeshInput { other_cell_fields, ..self.input };
+        input.append(split.input);
+        Ok(TetMesh { positions, fields, tets: split.tets, grid: None, cell_fields, input })
     }
 }
 

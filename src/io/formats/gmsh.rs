@@ -266,7 +266,8 @@ mod tests {
     use super::*;
     use crate::io::CellData;
 
-    const EVERYTHING: ReadOptions = ReadOptions { fields: None, cells: CellData::Values, step: 0 };
+    const EVERYTHING: ReadOptions =
+        ReadOptions { fields: None, first: false, cells: CellData::Values, step: 0 };
 
     /// A tetrahedron and a triangle, with tags that are not in order.
     pub(super) const TWO: &str = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n1\n3 1 \"a $b\"\n$EndPhysicalNames\n\

@@ -141,7 +141,7 @@ mod tests {
     const SOL: &str = "MeshVersionFormatted 2\nDimension 3\nSolAtVertices\n5\n2 1 2\n1 0 0 9\n2 0 0 9\n3 0 0 9\n4 0 0 9\n5 0 0 9\nEnd\n";
 
     fn read_both(mesh: &str, sol: &str) -> Result<TetMesh, ReadError> {
-        let options = ReadOptions { fields: None, cells: CellData::Values, step: 0 };
+        let options = ReadOptions { fields: None, first: false, cells: CellData::Values, step: 0 };
         let beside = |name: &str| match (name, sol) {
             ("a.sol", "") => Err(ReadReason::Io("none".into())),
             ("a.sol", sol) => Ok(sol.as_bytes().to_vec()),

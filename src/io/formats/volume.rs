@@ -4,8 +4,9 @@ use std::io::Read;
 
 use crate::io::error::ReadReason;
 use crate::io::fields::Collector;
+use crate::io::image::{GridValues, Placement};
 use crate::io::number::NumberType;
-use crate::io::{ReadOptions, image, structured};
+use crate::io::{ReadOptions, structured};
 use crate::mesh::TetMesh;
 
 /// What a header says of the samples that follow.
@@ -40,32 +41,17 @@ impl Volume {
             let (expected, found) = (expected as u64, samples.len() as u64);
             return Err(ReadReason::Count { what: "bytes of samples".into(), expected, found });
         }
-        let mut fields = Collector::new(options.fields.as_deref());
+        let mut fields = Collector::new(options);
         if let Some(claim) = fields.claim(&self.field, self.components)? {
             let values = self.number.floats(samples, self.big);
-            fields.fill(claim, values, self.number.is_integer(), "")?;
+            fields.fill(claim, values, self.number.is_integer(), "");
         }
-        let dims = structured::checked_dims(self.dims)?;
-        let along = [0, 1, 2].map(|i| self.steps[i][i]);
-        let is_aligned = (0..9).all(|k| k / 3 == k % 3 || self.steps[k / 3][k % 3] == 0.0);
-        if is_aligned && along.iter().all(|step| *step > 0.0) {
-            let grid = image::checked_grid(self.dims, self.origin, along)?;
-            return Ok(TetMesh::of_grid_alone(grid, fields.fields));
-        }
-        let place = |x: u32, y: u32, z: u32| {
-            let by = [x, y, z].map(f64::from);
-            [0, 1, 2].map(|i| self.origin[i] + (0..3).map(|axis| by[axis] * self.steps[axis][i]).sum::<f64>())
+        let values = GridValues {
+            fields: fields.fields,
+            others: [fields.others, Vec::new()],
+            ..GridValues::default()
         };
-        let mut positions = Vec::with_capacity(dims.iter().map(|d| *d as usize).product());
-        for z in 0..dims[2] {
-            for y in 0..dims[1] {
-                positions.extend((0..dims[0]).map(|x| place(x, y, z)));
-            }
-        }
-        if positions.as_flattened().iter().any(|x| !x.is_finite()) {
-            return Err(ReadReason::Syntax("the origin or a direction of the grid is not finite".into()));
-        }
-        structured::mesh(dims, positions, fields.fields, Vec::new())
+        Placement { dims: self.dims, origin: self.origin, steps: self.steps }.mesh(values)
     }
 }
 

@@ -8,15 +8,16 @@ use hdf5_reader::{Dataset, Hdf5File};
 
 use crate::io::cells::{self, CellList, Numbering};
 use crate::io::error::{At, ReadError, ReadReason};
-use crate::io::fields::Collector;
+use crate::io::fields::{Collector, check_finite, check_finite_cells};
 use crate::io::formats::hdf5::{
     all_integers, attribute_values, checked_times, floats, integers, number_kind, reason, row_length, rows,
 };
-use crate::io::image::{self, Extent};
+use crate::io::image::{self, Extent, GridValues, Placement};
 use crate::io::pvtu::Whole;
-use crate::io::vtu::{GHOST_OR_HIDDEN, GHOST_TYPE, NumberPoints, first_number};
+use crate::io::structured::Ghosts;
+use crate::io::vtu::{GHOST_TYPE, HIDDEN_POINT, NumberPoints, first_number};
 use crate::io::{CellData, ReadOptions, points_from};
-use crate::mesh::{Field, Grid, TetMesh};
+use crate::mesh::{Field, MeshInput, TetMesh};
 
 /// The group that makes a file of this format.
 pub(super) const ROOT: &str = "VTKHDF";
@@ -211,20 +212,31 @@ impl Reader<'_> {
     /// Reads a piece. Its points are numbered as `numbers` says.
     fn piece(&self, piece: &Piece, number: usize, numbers: NumberPoints<'_>) -> Result<TetMesh, ReadError> {
         let place = |array: &str| format!("piece {number}, {ROOT}/{array}");
-        let listed = self.cells(piece).at(|| place("Types, Offsets and Connectivity"))?;
+        let mut listed = self.cells(piece).at(|| place("Types, Offsets and Connectivity"))?;
+        if let Some(listed) = &mut listed {
+            self.leave_out_ghosts(listed, piece).at(|| place(GHOST_TYPE))?;
+        }
         let positions = self.positions(piece).at(|| place("Points"))?;
+        let [fields, other_fields] = self.fields("PointData", piece, &[])?;
+        let used = || listed.as_ref().map(|listed| listed.used(positions.len()));
+        check_finite(&positions, &fields, &used).at(|| place("PointData"))?;
+        let [mut cell_fields, other_cell_fields] = match &listed {
+            None => Default::default(),
+            Some(_) => self.fields("CellData", piece, &fields)?,
+        };
+        let is_there = |cell: usize| {
+            listed
+                .as_ref()
+                .and_then(|listed| listed.types.get(cell))
+                .is_some_and(|kind| !cells::is_flat(*kind))
+        };
+        check_finite_cells(&cell_fields, is_there).at(|| place("CellData"))?;
         let numbering = numbers(&positions).at(|| place("Points"))?;
         let split = listed.map(|listed| listed.split(&numbering)).transpose();
-        let split = split.at(|| place("Connectivity"))?;
-        let fields = self.fields("PointData", 0, piece)?;
-        let mut cell_fields = match self.options.cells {
-            _ if split.is_none() => Vec::new(),
-            CellData::LeaveOut => Vec::new(),
-            CellData::Names | CellData::Values => self.fields("CellData", 1, piece)?,
-        };
-        let split = split.unwrap_or_default();
+        let split = split.at(|| place("Connectivity"))?.unwrap_or_default();
         split.spread(&mut cell_fields);
-        Ok(TetMesh { positions, fields, tets: split.tets, grid: None, cell_fields })
+        let input = MeshInput { other_fields, other_cell_fields, ..split.input };
+        Ok(TetMesh { positions, fields, tets: split.tets, grid: None, cell_fields, input })
     }
 
     fn positions(&self, piece: &Piece) -> Result<Vec<[f64; 3]>, ReadReason> {
@@ -234,7 +246,7 @@ impl Reader<'_> {
             let what = "components of the points".into();
             return Err(ReadReason::Count { what, expected: 3, found: length as u64 });
         }
-        points_from(&floats(&points, piece.points.clone())?)
+        Ok(points_from(&floats(&points, piece.points.clone())?))
     }
 
     /// The cells of a piece; none if it has points alone.
@@ -252,41 +264,65 @@ impl Reader<'_> {
             return Err(ReadReason::Syntax("the first cell of a piece does not begin at 0".into()));
         }
         ends.remove(0);
+        cells::resolve_orders(&mut types, &ends);
+        cells::most_tets(&types)?;
         let found = cells::checked_ends(&types, &ends)? as u64;
         let expected = piece.ids.end - piece.ids.start;
         if found != expected {
             return Err(ReadReason::Count { what: "points of cells".into(), expected, found });
         }
         let connectivity = integers(&self.dataset("Connectivity")?, piece.ids.clone())?;
-        if let Some(ghosts) = self.dataset_if(&format!("CellData/{GHOST_TYPE}"))? {
-            let flags = integers(&ghosts, piece.cells.clone())?;
-            let ghosts = types.iter_mut().zip(flags).filter(|(_, flags)| flags & GHOST_OR_HIDDEN != 0);
-            ghosts.for_each(|(kind, _)| *kind = cells::EMPTY);
-        }
         Ok(Some(CellList { types, ends, connectivity }))
     }
 
-    /// The fields in a group, of points (0) or cells (1).
-    fn fields(&self, group: &str, of: usize, piece: &Piece) -> Result<Vec<Field>, ReadError> {
-        let own = if of == 0 { &piece.points } else { &piece.cells };
-        let count = own.end - own.start;
-        self.collect(group, &|dataset, components| {
+    /// Leaves out the cells that VTK's flags mark as another piece's or as hidden.
+    fn leave_out_ghosts(&self, listed: &mut CellList, piece: &Piece) -> Result<(), ReadReason> {
+        if let Some(ghosts) = self.dataset_if(&format!("CellData/{GHOST_TYPE}"))? {
+            listed.leave_out(&integers(&ghosts, self.rows_of("CellData", GHOST_TYPE, piece)?)?);
+        }
+        if let Some(ghosts) = self.dataset_if(&format!("PointData/{GHOST_TYPE}"))? {
+            let flags = integers(&ghosts, self.rows_of("PointData", GHOST_TYPE, piece)?)?;
+            listed.hide(&flags.iter().map(|flags| flags & HIDDEN_POINT != 0).collect::<Vec<_>>());
+        }
+        Ok(())
+    }
+
+    /// The rows of an array that are a piece's.
+    fn rows_of(&self, group: &str, name: &str, piece: &Piece) -> Result<Range<u64>, ReadReason> {
+        let (of, own) = if group == "PointData" { (0, &piece.points) } else { (1, &piece.cells) };
+        let first = self.beginning(&format!("{group}Offsets/{name}"))?.unwrap_or(piece.first[of]);
+        let start = first.saturating_add(piece.before[of]);
+        Ok(start..start.saturating_add(own.end - own.start))
+    }
+
+    /// The fields in a group, beside these at points, and those that nobody asked for.
+    fn fields(&self, group: &str, piece: &Piece, at_points: &[Field]) -> Result<[Vec<Field>; 2], ReadError> {
+        self.collect(group, at_points, &|dataset, components| {
             let length = row_length(dataset)?;
             if length != components {
                 let what = format!("components of \"{}\"", dataset.name());
                 return Err(ReadReason::Count { what, expected: components as u64, found: length as u64 });
             }
             let name = dataset.name().rsplit('/').next().unwrap_or_default();
-            let first = self.beginning(&format!("{group}Offsets/{name}"))?.unwrap_or(piece.first[of]);
-            let start = first.saturating_add(piece.before[of]);
-            floats(dataset, start..start.saturating_add(count))
+            floats(dataset, self.rows_of(group, name, piece)?)
         })
     }
 
-    /// The fields in a group, whose values `values` reads, given how many components there are.
-    fn collect(&self, group: &str, values: ReadValues<'_>) -> Result<Vec<Field>, ReadError> {
+    /// The fields in a group, whose values `values` reads, given how many components there are, and those that nobody asked for.
+    fn collect(
+        &self,
+        group: &str,
+        at_points: &[Field],
+        values: ReadValues<'_>,
+    ) -> Result<[Vec<Field>; 2], ReadError> {
         let at_cells = group == "CellData";
-        let mut collector = Collector::new(self.options.fields.as_deref());
+        let cells = self.options.cells;
+        let mut collector = match (at_cells, cells) {
+            (false, _) => Collector::new(self.options),
+            (true, CellData::Values) => Collector::at_cells(self.options, at_points),
+            (true, CellData::Names) => Collector::of_names(),
+            (true, CellData::LeaveOut) => return Ok(Default::default()),
+        };
         for name in self.members(group).at(|| format!("{ROOT}/{group}"))? {
             let place = || format!("{ROOT}/{group}/{name}");
             if name == GHOST_TYPE {
@@ -296,15 +332,14 @@ impl Reader<'_> {
             let Some(integer) = number_kind(&dataset) else { continue };
             let components = self.components(&dataset);
             let Some(claim) = collector.claim(&name, components).at(place)? else { continue };
-            if at_cells && self.options.cells == CellData::Names {
+            if at_cells && cells == CellData::Names {
                 collector.keep_names(claim, "");
                 continue;
             }
-            let filled =
-                values(&dataset, components).and_then(|values| collector.fill(claim, values, integer, ""));
-            filled.map_err(|reason| if at_cells { reason.at_cells() } else { reason }).at(place)?;
+            let values = values(&dataset, components).at(place)?;
+            collector.fill(claim, values, integer, "");
         }
-        Ok(collector.fields)
+        Ok([collector.fields, collector.others])
     }
 
     /// How many components an array has: what follows behind rows, or behind the axes of a grid.
@@ -315,50 +350,107 @@ impl Reader<'_> {
 
     fn image(&self) -> Result<TetMesh, ReadError> {
         let place = || ROOT.to_owned();
-        let (grid, whole) = self.grid().at(place)?;
-        let fields = self.samples("PointData", whole)?;
-        let cubes = match self.options.cells {
-            CellData::LeaveOut => Vec::new(),
-            CellData::Names | CellData::Values => self.samples("CellData", image::cubes_of(whole))?,
+        let (placement, whole) = self.placement().at(place)?;
+        let inner = image::cubes_of(whole);
+        let [fields, others] = self.samples("PointData", whole, &[])?;
+        let [cubes, other_cubes] = self.samples("CellData", inner, &fields)?;
+        if fields.is_empty() && cubes.iter().all(|field| field.values.is_empty()) {
+            self.expect_values(whole)?;
+        }
+        let ghosts = Ghosts {
+            points: self.grid_ghosts("PointData", whole)?,
+            cubes: self.grid_ghosts("CellData", inner)?,
         };
-        image::grid_mesh(grid, fields, cubes).at(place)
+        placement.mesh(GridValues { fields, cubes, ghosts, others: [others, other_cubes] }).at(place)
     }
 
     /// The grid and its extent, as those of a `.vti`.
-    fn grid(&self) -> Result<(Grid, Extent), ReadReason> {
+    fn placement(&self) -> Result<(Placement, Extent), ReadReason> {
         let whole: [f64; 6] = fixed(&self.attribute("WholeExtent")?, "WholeExtent")?;
         let whole: Extent = whole.map(|index| index as i64);
         let origin = fixed(&self.attribute("Origin")?, "Origin")?;
         let spacing = fixed(&self.attribute("Spacing")?, "Spacing")?;
-        let direction = self.attribute("Direction").ok();
-        image::placed_grid(whole, origin, spacing, direction.as_deref())
+        let root = self.file.group(ROOT).map_err(reason)?;
+        let direction = match root.attribute("Direction") {
+            Ok(direction) => fixed(&attribute_values(&direction)?, "Direction")?,
+            Err(_) => image::ALONG_THE_AXES,
+        };
+        image::placed(whole, origin, spacing, direction)
     }
 
-    /// The fields with a value for each place in `extent`.
-    fn samples(&self, group: &str, extent: Extent) -> Result<Vec<Field>, ReadError> {
-        let dims = image::dims_in(extent, extent).at(|| ROOT.to_owned())?;
-        self.collect(group, &|dataset, components| {
-            let steps = self.step.map(|_| rows(dataset));
-            let expected: Vec<u64> = steps.into_iter().chain(dims.into_iter().rev()).collect();
-            let shape = dataset.shape();
-            if shape.get(..expected.len()) != Some(&expected) || shape.len() > expected.len() + 1 {
-                let what = format!("an array of shape {shape:?} where it begins with {expected:?}");
-                return Err(ReadReason::Syntax(what));
-            }
-            let name = dataset.name().rsplit('/').next().unwrap_or_default();
-            let values = match self.step {
-                None => floats(dataset, 0..rows(dataset)),
-                Some(step) => {
-                    let first = self.beginning(&format!("{group}Offsets/{name}"))?.unwrap_or(step);
-                    floats(dataset, first..first.saturating_add(1))
+    /// Checks that there is an array with a value for each point or cube: without, a few words claim any size.
+    fn expect_values(&self, whole: Extent) -> Result<(), ReadError> {
+        let expected = |extent: Extent| -> Result<u64, ReadReason> {
+            Ok(image::dims_in(extent, extent)?.iter().product())
+        };
+        for (group, extent) in [("PointData", whole), ("CellData", image::cubes_of(whole))] {
+            let count = expected(extent).at(|| ROOT.to_owned())?;
+            for name in self.members(group).at(|| format!("{ROOT}/{group}"))? {
+                let dataset =
+                    self.dataset(&format!("{group}/{name}")).at(|| format!("{ROOT}/{group}/{name}"))?;
+                if self
+                    .grid_values(group, extent, &dataset, self.components(&dataset))
+                    .is_ok_and(|v| v.len() as u64 >= count)
+                {
+                    return Ok(());
                 }
-            }?;
-            let (expected, found) = (dims.iter().product::<u64>() * components as u64, values.len() as u64);
-            if found != expected {
-                return Err(ReadReason::Count { what: format!("values of \"{name}\""), expected, found });
             }
-            Ok(values)
+        }
+        Err(ReadReason::Missing("an array with a value for every point or cell".into()))
+            .at(|| ROOT.to_owned())
+    }
+
+    /// VTK's flags in a group, for each place in `extent`.
+    fn grid_ghosts(&self, group: &str, extent: Extent) -> Result<Option<Vec<i64>>, ReadError> {
+        let place = || format!("{ROOT}/{group}/{GHOST_TYPE}");
+        let Some(ghosts) = self.dataset_if(&format!("{group}/{GHOST_TYPE}")).at(place)? else {
+            return Ok(None);
+        };
+        let flags = self.grid_values(group, extent, &ghosts, 1).at(place)?;
+        Ok(Some(flags.into_iter().map(|flags| flags as i64).collect()))
+    }
+
+    /// The fields with a value for each place in `extent`, beside these at points, and those that nobody asked for.
+    fn samples(
+        &self,
+        group: &str,
+        extent: Extent,
+        at_points: &[Field],
+    ) -> Result<[Vec<Field>; 2], ReadError> {
+        self.collect(group, at_points, &|dataset, components| {
+            self.grid_values(group, extent, dataset, components)
         })
+    }
+
+    /// The values of an array for each place in `extent`.
+    fn grid_values(
+        &self,
+        group: &str,
+        extent: Extent,
+        dataset: &Dataset,
+        components: usize,
+    ) -> Result<Vec<f64>, ReadReason> {
+        let dims = image::dims_in(extent, extent)?;
+        let steps = self.step.map(|_| rows(dataset));
+        let expected: Vec<u64> = steps.into_iter().chain(dims.into_iter().rev()).collect();
+        let shape = dataset.shape();
+        if shape.get(..expected.len()) != Some(&expected) || shape.len() > expected.len() + 1 {
+            let what = format!("an array of shape {shape:?} where it begins with {expected:?}");
+            return Err(ReadReason::Syntax(what));
+        }
+        let name = dataset.name().rsplit('/').next().unwrap_or_default();
+        let values = match self.step {
+            None => floats(dataset, 0..rows(dataset)),
+            Some(step) => {
+                let first = self.beginning(&format!("{group}Offsets/{name}"))?.unwrap_or(step);
+                floats(dataset, first..first.saturating_add(1))
+            }
+        }?;
+        let (expected, found) = (dims.iter().product::<u64>() * components as u64, values.len() as u64);
+        if found != expected {
+            return Err(ReadReason::Count { what: format!("values of \"{name}\""), expected, found });
+        }
+        Ok(values)
     }
 }
 

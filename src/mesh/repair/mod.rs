@@ -32,7 +32,7 @@ use std::fmt;
 
 use crate::mesh::adjacency::{DisjointSets, FaceTable, HalfFace, crowded, match_faces};
 use crate::mesh::check::{Sides, check_arrays};
-use crate::mesh::{FACES, MeshError, NONE, TetMesh};
+use crate::mesh::{FACES, InputCell, MeshError, NONE, TetMesh};
 
 /// What [`repair_at`] did; displays as one line, empty when there was nothing to do.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -116,7 +116,7 @@ pub fn repair(mesh: TetMesh) -> Result<(TetMesh, RepairReport), MeshError> {
 /// # Errors
 /// If something cannot be mended, or may not be at this level; cells and points are numbered as in `mesh`.
 pub fn repair_at(mesh: TetMesh, level: RepairLevel) -> Result<(TetMesh, RepairReport), MeshError> {
-    check_arrays(&mesh)?;
+    check_arrays(&mesh).map_err(|error| error.in_input(|tet| mesh.input.cells.cell_of(tet)))?;
     let mut work = Work::new(mesh);
     work.merge_collapsed_edges();
     work.drop_collapsed();
@@ -129,6 +129,7 @@ pub fn repair_at(mesh: TetMesh, level: RepairLevel) -> Result<(TetMesh, RepairRe
     let faces = work.conforming_faces(&flat)?;
     work.drop_flat(flat, &faces)?;
     work.drop_unused_points();
+    work.mesh.input.cells.keep(&work.cells);
     if work.mesh.tets.is_empty() {
         return Err(MeshError::Empty);
     }
@@ -141,7 +142,7 @@ pub fn repair_at(mesh: TetMesh, level: RepairLevel) -> Result<(TetMesh, RepairRe
 
 struct Work {
     mesh: TetMesh,
-    /// The input's number of each tetrahedron that is left.
+    /// The number that each tetrahedron that is left had at first.
     cells: Vec<u32>,
     report: RepairReport,
 }
@@ -257,7 +258,7 @@ impl Work {
             let sides = Sides::new(&self.mesh.positions);
             let changed = |(tet, flat): (&[u32; 4], &bool)| !flat && sides.of(*tet) != 1;
             if let Some(t) = self.mesh.tets.iter().zip(flat).position(changed) {
-                return Err(MeshError::WeldTooFar { tet: self.cells[t] });
+                return Err(MeshError::WeldTooFar { tet: self.cell(t as u32) });
             }
         }
         if pairs.is_empty() { Ok(()) } else { self.drop_duplicates() }
@@ -267,7 +268,7 @@ impl Work {
     fn conforming_faces(&self, flat: &[bool]) -> Result<Vec<[u32; 4]>, MeshError> {
         let fits = |group: &[HalfFace], folded: bool| match group {
             [a, b] if folded && !flat[a.tet() as usize] && !flat[b.tet() as usize] => {
-                Err(MeshError::Folded { tets: [a, b].map(|face| self.cells[face.tet() as usize]) })
+                Err(MeshError::Folded { tets: [a, b].map(|face| self.cell(face.tet())) })
             }
             [_, _] => Ok(()),
             _ => Err(self.with_cells(crowded(group))),
@@ -277,13 +278,12 @@ impl Work {
 
     /// `error` with the input's numbers.
     fn with_cells(&self, error: MeshError) -> MeshError {
-        match error {
-            MeshError::CrowdedFace { face, tets } => {
-                MeshError::CrowdedFace { face, tets: tets.iter().map(|&t| self.cells[t as usize]).collect() }
-            }
-            MeshError::WeldTooFar { tet } => MeshError::WeldTooFar { tet: self.cells[tet as usize] },
-            other => other,
-        }
+        error.in_input(|tet| self.cell(tet))
+    }
+
+    /// The input's cell that a tetrahedron is of.
+    fn cell(&self, tet: u32) -> InputCell {
+        self.mesh.input.cells.cell_of(self.cells[tet as usize])
     }
 
     /// Rule 6: peels flat tetrahedra off the boundary until none can go.
@@ -306,7 +306,7 @@ impl Work {
         }
         if let Some(t) = flat.iter().position(|&left| left) {
             let shared = neighbors[t].iter().filter(|&&n| n != NONE && !gone[n as usize]).count();
-            return Err(MeshError::InnerFlat { tet: self.cells[t], shared: shared as u32 });
+            return Err(MeshError::InnerFlat { tet: self.cell(t as u32), shared: shared as u32 });
         }
         self.report.flat_tets = self.retain(|t, _| !gone[t]);
         Ok(())

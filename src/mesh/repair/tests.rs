@@ -53,7 +53,7 @@ fn folds_are_refused() {
     // The second tetrahedron's apex was pulled through the shared face.
     let points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.1, 0.1, 1.0], [0.2, 0.2, 0.5]];
     let error = repair(mesh(&points, &[[0, 1, 2, 3], [0, 2, 1, 4]])).unwrap_err();
-    assert_eq!(error, MeshError::Folded { tets: [0, 1] });
+    assert_eq!(error, MeshError::Folded { tets: [0.into(), 1.into()] });
 }
 
 #[test]
@@ -93,7 +93,7 @@ fn isolated_flat_tetrahedra_go() {
 fn inner_slivers_are_refused() {
     let tets = [BELOW[0], BELOW[1], SLIVER, ABOVE[0], ABOVE[1]];
     let error = repair(mesh(&SQUARE, &tets)).unwrap_err();
-    assert_eq!(error, MeshError::InnerFlat { tet: 2, shared: 4 });
+    assert_eq!(error, MeshError::InnerFlat { tet: 2.into(), shared: 4 });
     assert!(error.to_string().contains("cell 2"));
 }
 
@@ -104,7 +104,10 @@ fn slivers_half_covered_are_refused() {
     {
         let sliver = tets.iter().position(|t| *t == SLIVER).unwrap();
         let error = repair(mesh(&SQUARE, &tets)).unwrap_err();
-        assert_eq!(error, MeshError::InnerFlat { tet: sliver as u32, shared: tets.len() as u32 - 1 });
+        assert_eq!(
+            error,
+            MeshError::InnerFlat { tet: (sliver as u32).into(), shared: tets.len() as u32 - 1 }
+        );
     }
 }
 
@@ -135,7 +138,7 @@ fn duplicates_go_and_crowds_are_refused_with_the_numbers_of_the_input() {
     let points = [SQUARE[0], SQUARE[1], SQUARE[2], SQUARE[4], SQUARE[5], [0.3, 0.3, 2.0]];
     let tets = [[0, 1, 2, 3], [0, 1, 1, 3], [0, 1, 2, 4], [0, 1, 2, 5]];
     let error = repair(mesh(&points, &tets)).unwrap_err();
-    assert_eq!(error, MeshError::CrowdedFace { face: [0, 1, 2], tets: vec![0, 2, 3] });
+    assert_eq!(error, MeshError::CrowdedFace { face: [0, 1, 2], tets: [0, 2, 3].map(Into::into).to_vec() });
 }
 
 #[test]
@@ -276,7 +279,7 @@ fn points_within_the_weld_distance_become_one() {
 #[test]
 fn cells_that_do_not_survive_the_weld_distance_are_refused() {
     let (points, tets) = two_pyramids(ABOVE_ALIKE, 0.01);
-    assert_eq!(welded(&points, &tets, 1.0).unwrap_err(), MeshError::WeldTooFar { tet: 0 });
+    assert_eq!(welded(&points, &tets, 1.0).unwrap_err(), MeshError::WeldTooFar { tet: 0.into() });
     for distance in [f64::NAN, f64::INFINITY, -1.0] {
         assert_eq!(welded(&points, &tets, distance).unwrap_err(), MeshError::WeldDistance);
     }
@@ -289,7 +292,7 @@ fn cells_that_do_not_survive_the_weld_distance_are_refused() {
     points[4..7].iter_mut().for_each(|p| p[2] = gap);
     points[7] = [0.3, 0.3, 0.1];
     let error = welded(&points, &[[0, 1, 2, 3], [4, 6, 5, 7]], 0.21).unwrap_err();
-    assert_eq!(error, MeshError::WeldTooFar { tet: 1 });
+    assert_eq!(error, MeshError::WeldTooFar { tet: 1.into() });
     assert!(error.to_string().contains("cell 1"));
 }
 
@@ -329,7 +332,7 @@ fn without_repair_only_valid_meshes_are_taken() {
     assert!(error.to_string().contains("level \"safe\" repairs it: turned 1"), "{error}");
     // What no level mends is refused for its own reason.
     let tets = [BELOW[0], BELOW[1], SLIVER, ABOVE[0], ABOVE[1]];
-    assert_eq!(refused(&SQUARE, &tets), MeshError::InnerFlat { tet: 2, shared: 4 });
+    assert_eq!(refused(&SQUARE, &tets), MeshError::InnerFlat { tet: 2.into(), shared: 4 });
     assert_eq!(refused(&SQUARE, &[SLIVER]), MeshError::Empty);
 }
 

@@ -16,7 +16,7 @@ pub(super) fn seam_pairs(mesh: &TetMesh, flat: &[bool], distance: f64) -> Result
     if distance > 0.0
         && let Some(t) = tets.iter().position(is_short)
     {
-        return Err(MeshError::WeldTooFar { tet: t as u32 });
+        return Err(MeshError::WeldTooFar { tet: (t as u32).into() });
     }
     let mut used = vec![false; positions.len()];
     tets.iter().flatten().for_each(|&v| used[v as usize] = true);
@@ -28,7 +28,7 @@ pub(super) fn seam_pairs(mesh: &TetMesh, flat: &[bool], distance: f64) -> Result
     }
     let is_collapsed = |tet: &[u32; 4]| EDGES.iter().any(|&[i, j]| tet[i] == tet[j]);
     if let Some(t) = placed.iter().position(is_collapsed) {
-        return Err(MeshError::WeldTooFar { tet: t as u32 });
+        return Err(MeshError::WeldTooFar { tet: (t as u32).into() });
     }
     let mut pairs = Vec::new();
     FaceTable::new(&placed)?.each_group(|group| {
