@@ -40,13 +40,19 @@ const GRID_27: [u8; 27] =
     [0, 8, 1, 11, 24, 9, 3, 10, 2, 16, 22, 17, 20, 26, 21, 19, 23, 18, 4, 12, 5, 15, 25, 13, 7, 14, 6];
 /// The three triangles of a wedge with points at the middle of edges and quadrilaterals: corners, then middles.
 const LAYERS_18: [[u8; 6]; 3] = [[0, 1, 2, 6, 7, 8], [12, 13, 14, 15, 16, 17], [3, 4, 5, 9, 10, 11]];
+/// The same of a wedge without points at the middle of quadrilaterals and upright edges.
+const LAYERS_12: [[u8; 6]; 2] = [[0, 1, 2, 6, 7, 8], [3, 4, 5, 9, 10, 11]];
+/// The three quadrilaterals of a hexahedron with points at the middle of edges and upright faces: corners, then middles.
+const LAYERS_24: [[u8; 8]; 3] =
+    [[0, 1, 2, 3, 8, 9, 10, 11], [16, 17, 18, 19, 22, 21, 23, 20], [4, 5, 6, 7, 12, 13, 14, 15]];
+/// The middles of the faces of a pyramid of 19 points, in the order of the faces, and of the whole.
+const MIDDLES_19: [u8; 5] = [13, 14, 15, 16, 17];
+const MIDDLE_OF_19: u8 = 18;
 /// The triangles that such a triangle is cut into.
 const FOURTHS: [[usize; 3]; 4] = [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]];
 
 /// A quadratic pyramid with a point at the middle of its base, which VTK has no number for and Gmsh has.
 pub(super) const PYRAMID_14: i64 = 1014;
-/// A wedge with a point at the middle of everything, which VTK has as a Lagrange wedge of 21 points.
-pub(super) const WEDGE_21: i64 = 1021;
 /// The parts of that: pyramids of five points and tetrahedra.
 const PARTS_14: [&[u8]; 10] = [
     &[0, 5, 13, 8, 9],
@@ -78,7 +84,10 @@ pub(super) fn recipe(kind: i64) -> Option<Recipe> {
         26 => quadratic(WEDGE, WEDGE_EDGES),
         27 => quadratic(PYRAMID, PYRAMID_EDGES),
         29 => Recipe { points: 27, parts: eighths() },
-        32 => Recipe { points: 18, parts: wedges() },
+        31 => Recipe { points: 12, parts: wedges(&LAYERS_12) },
+        32 => Recipe { points: 18, parts: wedges(&LAYERS_18) },
+        33 => Recipe { points: 24, parts: slabs() },
+        37 => Recipe { points: 19, parts: pyramids_around() },
         PYRAMID_14 => {
             let part_of =
                 |points: &&[u8]| part(if points.len() == 4 { TETRAHEDRON } else { PYRAMID }, Some(points));
@@ -154,13 +163,43 @@ fn eighths() -> Vec<Part> {
     corners.map(hexahedron).to_vec()
 }
 
-/// The eight wedges of one with points at the middle of edges and quadrilaterals.
-fn wedges() -> Vec<Part> {
+/// The wedges between the triangles of one, four between two.
+fn wedges(layers: &[[u8; 6]]) -> Vec<Part> {
     let between = |layers: &[[u8; 6]]| {
         let (low, high) = (layers[0], layers[1]);
         FOURTHS.map(|[a, b, c]| part(WEDGE, Some(&[low[a], low[b], low[c], high[a], high[b], high[c]])))
     };
-    LAYERS_18.windows(2).flat_map(between).collect()
+    layers.windows(2).flat_map(between).collect()
+}
+
+/// The parts between the layers of a hexahedron of 24 points: at each upright edge a wedge, and what is left between them.
+fn slabs() -> Vec<Part> {
+    let between = |layers: &[[u8; 8]]| -> Vec<Part> {
+        let points = |of: &[usize]| -> Vec<u8> {
+            layers.iter().flat_map(|layer| of.iter().map(move |&i| layer[i])).collect()
+        };
+        let at_corner = |i: usize| part(WEDGE, Some(&points(&[i, 4 + i, 4 + (i + 3) % 4])));
+        (0..4).map(at_corner).chain([part(HEXAHEDRON, Some(&points(&[4, 5, 6, 7])))]).collect()
+    };
+    LAYERS_24.windows(2).flat_map(between).collect()
+}
+
+/// The pyramids of one with points at the middle of everything: from its middle to the quadrilaterals at each corner of each face.
+fn pyramids_around() -> Vec<Part> {
+    let middle = |a: u8, b: u8| {
+        let edge = PYRAMID_EDGES.iter().zip(5..).find(|(edge, _)| **edge == [a, b] || **edge == [b, a]);
+        edge.map_or(0, |(_, point)| point)
+    };
+    let of_face = |(face, center): (&&[u8], u8)| -> Vec<Part> {
+        let n = face.len();
+        let at_corner = |i: usize| {
+            let (last, corner, next) = (face[(i + n - 1) % n], face[i], face[(i + 1) % n]);
+            let points = [corner, middle(last, corner), center, middle(corner, next), MIDDLE_OF_19];
+            part(PYRAMID, Some(&points))
+        };
+        (0..n).map(at_corner).collect()
+    };
+    PYRAMID.iter().zip(MIDDLES_19).flat_map(of_face).collect()
 }
 
 impl Recipe {
@@ -246,6 +285,21 @@ mod tests {
                 }
                 (points, 1.0)
             }
+            31 => (with_middles(layers(&triangle), &WEDGE_EDGES[..6]), 0.5),
+            33 => {
+                let mut points = with_middles(layers(&square), HEXAHEDRON_EDGES);
+                points.extend([[0.0, 0.5, 0.5], [1.0, 0.5, 0.5], [0.5, 0.0, 0.5], [0.5, 1.0, 0.5]]);
+                (points, 1.0)
+            }
+            37 => {
+                let faces =
+                    PYRAMID.iter().map(|face| face.iter().map(|&p| pyramid[usize::from(p)]).collect());
+                let mut middles: Vec<[f64; 3]> = faces.map(|face: Vec<[f64; 3]>| mean(&face)).collect();
+                middles.push(mean(&pyramid));
+                let mut points = with_middles(pyramid, PYRAMID_EDGES);
+                points.extend(middles);
+                (points, 1.0 / 3.0)
+            }
             32 => {
                 let mut points = with_middles(layers(&triangle), WEDGE_EDGES);
                 points.extend([[12, 13], [13, 14], [14, 12]].map(|[a, b]| mean(&[points[a], points[b]])));
@@ -269,7 +323,7 @@ mod tests {
         (b - a).cross(c - a).dot(d - a) / 6.0
     }
 
-    const KINDS: [i64; 14] = [10, 11, 12, 13, 14, 15, 16, 24, 25, 26, 27, 29, 32, PYRAMID_14];
+    const KINDS: [i64; 17] = [10, 11, 12, 13, 14, 15, 16, 24, 25, 26, 27, 29, 31, 32, 33, 37, PYRAMID_14];
 
     /// Every order of few points, and many of others.
     fn orders(n: usize) -> Vec<Vec<u32>> {
@@ -309,7 +363,7 @@ mod tests {
             assert_eq!(recipe.most_tets(), most, "{kind}");
         }
         let counts = KINDS.map(|kind| recipe(kind).unwrap().most_tets());
-        assert_eq!(counts, [1, 6, 6, 3, 2, 9, 12, 8, 22, 15, 13, 48, 24, 16]);
+        assert_eq!(counts, [1, 6, 6, 3, 2, 9, 12, 8, 22, 15, 13, 48, 12, 24, 36, 32, 16]);
     }
 
     /// The triangles of the boundary, each with its vertices in ascending order.
@@ -333,7 +387,7 @@ mod tests {
     fn both_cells_at_a_quadrilateral_cut_it_alike() {
         // A square of the points 0 to 3 (and 4 to 7 in the middle of its edges, 8 in its own) as a face of each type; other
         // points have higher or lower numbers.
-        let faces: [(i64, &[usize]); 11] = [
+        let faces: [(i64, &[usize]); 14] = [
             (12, &[0, 3, 2, 1]),
             (12, &[1, 2, 6, 5]),
             (11, &[0, 2, 3, 1]),
@@ -344,6 +398,9 @@ mod tests {
             (27, &[0, 3, 2, 1, 8, 7, 6, 5]),
             (29, &[0, 3, 2, 1, 11, 10, 9, 8, 24]),
             (32, &[0, 3, 4, 1, 12, 9, 13, 6, 15]),
+            (33, &[0, 3, 2, 1, 11, 10, 9, 8]),
+            (33, &[0, 4, 5, 1, 16, 12, 17, 8, 22]),
+            (37, &[0, 3, 2, 1, 8, 7, 6, 5, 13]),
             (PYRAMID_14, &[0, 3, 2, 1, 8, 7, 6, 5, 13]),
         ];
         for order in orders(9).iter().take(200) {

@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::io::cell_shapes::{PYRAMID_14, Recipe, WEDGE_21, recipe};
+use crate::io::cell_shapes::{PYRAMID_14, Recipe, recipe};
 use crate::io::error::{ReadReason, cell_name, named_counts, names};
 use crate::io::vtu::{GHOST_CELL, HIDDEN_CELL};
 use crate::mesh::{CellNumbers, Field, MeshInput};
@@ -33,14 +33,13 @@ const ANY_ORDERS: [i64; 8] = [71, 72, 73, 74, 78, 79, 80, 81];
 pub(super) const ANY_ORDER: i64 = 10_000;
 
 /// Cells of any order that are those of another type: type, points, and that one.
-const SAME_AS: [(i64, i64, i64); 13] = [
+const SAME_AS: [(i64, i64, i64); 12] = [
     (71, 4, 10),
     (71, 10, 24),
     (72, 8, 12),
     (72, 27, 29),
     (73, 6, 13),
     (73, 18, 32),
-    (73, 21, WEDGE_21),
     (74, 5, 14),
     (74, 14, PYRAMID_14),
     (78, 4, 10),

@@ -31,7 +31,7 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions) -> Result<TetMesh, ReadE
     }
     let time = body.time;
     let mut mesh = match kind.as_str() {
-        "unstructured_grid" => body.unstructured(file.version)?,
+        "unstructured_grid" => body.unstructured(&file)?,
         "polydata" => body.points_alone()?,
         "structured_grid" => body.curvilinear(Vec::new())?,
         "rectilinear_grid" => body.rectilinear()?,
@@ -117,6 +117,7 @@ struct Reader<'a> {
     at: usize,
     binary: bool,
     version: u32,
+    is_before_5_1: bool,
     /// Steps over numbers instead of reading them.
     skims: bool,
 }
@@ -125,13 +126,17 @@ impl<'a> Reader<'a> {
     /// Reads the header up to the data set's type, in lower case, and the time that the data set is of.
     fn open(bytes: &'a [u8]) -> Result<(Self, String, Option<f64>), ReadReason> {
         let mut time = None;
-        let mut file = Self { bytes, at: MAGIC.len(), binary: false, version: 0, skims: false };
+        let mut file =
+            Self { bytes, at: MAGIC.len(), binary: false, version: 0, is_before_5_1: true, skims: false };
         let version = file.line()?.trim();
-        let major = version.split('.').next().and_then(|v| v.parse().ok()).filter(|v| (1..=5).contains(v));
+        let mut numbers = version.split('.').map(|number| number.parse().ok());
+        let major = numbers.next().flatten().filter(|major| (1..=5).contains(major));
+        let minor: u32 = numbers.next().flatten().unwrap_or(0);
         file.version = major.ok_or_else(|| ReadReason::Unsupported {
             what: format!("version \"{}\"", shortened(version)),
             remedy: "write it as version 1.0 to 5.1".into(),
         })?;
+        file.is_before_5_1 = file.version < 5 || file.version == 5 && minor < 1;
         // The title may hold any bytes.
         file.skip_line();
         file.binary = match file.word()?.to_ascii_lowercase().as_str() {
@@ -689,7 +694,7 @@ impl<'a> Body<'a> {
         self.mesh(positions, None)
     }
 
-    fn unstructured(mut self, version: u32) -> Result<TetMesh, ReadError> {
+    fn unstructured(mut self, file: &Reader<'_>) -> Result<TetMesh, ReadError> {
         let cells = self.cells.ok_or_else(|| missing("CELLS")).at(String::new)?;
         let positions = self.take_positions()?;
         expect("cell types", cells, self.types.len()).at(|| "CELL_TYPES".into())?;
@@ -697,8 +702,8 @@ impl<'a> Body<'a> {
             return self.mesh(positions, None);
         }
         cells::most_tets(&self.types).at(|| "CELL_TYPES".into())?;
-        let ends = self.ends_of_cells(version).at(|| "CELLS".into())?;
-        let is_old = |kind: &i64| *kind == cells::LAGRANGE_HEXAHEDRON && version < 5;
+        let ends = self.ends_of_cells(file.version).at(|| "CELLS".into())?;
+        let is_old = |kind: &i64| *kind == cells::LAGRANGE_HEXAHEDRON && file.is_before_5_1;
         let swapped = self.types.iter().map(is_old).collect();
         cells::resolve_orders(&mut self.types, &ends);
         cells::most_tets(&self.types).at(|| "CELL_TYPES".into())?;

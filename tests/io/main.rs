@@ -10,6 +10,7 @@ mod files;
 mod hdf5;
 #[cfg(feature = "formats")]
 mod meshers;
+mod odd;
 #[cfg(feature = "formats")]
 mod pieces;
 mod real;
