@@ -254,6 +254,7 @@ pub(super) fn placed(
     direction: [f64; 9],
 ) -> Result<(Placement, Extent), ReadReason> {
     let dims = dims_in(whole, whole)?;
+    structured::checked_dims(dims)?;
     // Products with 0 must not have a sign, or be not finite.
     let times = |a: f64, b: f64| if a == 0.0 || b == 0.0 { 0.0 } else { a * b };
     let steps = [0, 1, 2].map(|axis| [0, 1, 2].map(|i| times(direction[3 * i + axis], spacing[axis])));

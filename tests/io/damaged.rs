@@ -167,8 +167,8 @@ fn grids_without_data_do_not_size_anything() {
 
 #[test]
 fn components_without_points_do_not_size_anything() {
-    let file = "<VTKFile type=\"UnstructuredGrid\"><UnstructuredGrid><Piece NumberOfPoints=\"0\" NumberOfCells=\"0\">\
-                <PointData><DataArray type=\"Int8\" NumberOfComponents=\"4000000000\" format=\"ascii\"/></PointData>\
+    let file = "<VTKFile type=\"UnstructuredGrid\"><UnstructuredGrid><Piece NumberOfPoints=\"1\" NumberOfCells=\"0\">\
+                <Points><DataArray type=\"Int8\" NumberOfComponents=\"3\">0 0 0</DataArray></Points><PointData><DataArray type=\"Int8\" NumberOfComponents=\"4000000000\" format=\"ascii\"/></PointData>\
                 </Piece></UnstructuredGrid></VTKFile>";
     let error = io::read_bytes("a.vtu", file.as_bytes()).unwrap_err();
     assert!(matches!(error.reason, ReadReason::TooLarge { .. }), "{error}");
@@ -206,14 +206,15 @@ fn errors_say_file_place_reason_and_remedy() {
     };
     assert_eq!(
         text("\n-2 -1.625", "\n-2 nan"),
-        "dir/a.vtu: piece 0, <PointData>, array \"scalar <&> \"1\"\": the value at point 1 is infinite or not a \
-         number; replace it or leave this array out"
+        "dir/a.vtu: piece 0: the value of \"scalar <&> \"1\"\" at point 1 is infinite or not a number; replace it, or name other \
+         fields to read"
     );
     assert_eq!(
         text("\n10 10 10 10", "\n42 42 13 5"),
         "dir/a.vtu: piece 0, <Cells>, array \"types\": 12 cells: 1 triangle, 8 tetrahedra, 1 wedge, 2 polyhedra; \
-         tetrahedra, hexahedra, voxels, wedges, pyramids and prisms are read, also quadratic ones, and what has no volume is \
-         left out beside them: convert the others (in ParaView: Tetrahedralize)"
+         tetrahedra, hexahedra, voxels, wedges, pyramids and prisms are read, also quadratic ones and Lagrange cells of the first \
+         two orders, and what has no volume is left out beside them: convert the others (in ParaView: Tetrahedralize), or save them \
+         with an order of at most 2"
     );
     assert_eq!(
         text("\n0 1 4 10", "\n0 1 4 12"),
@@ -221,7 +222,9 @@ fn errors_say_file_place_reason_and_remedy() {
          cells and the points do not belong together"
     );
     assert!(text("\n0 1 4 10", "\n0 -1 4 10").contains("refers to point -1"));
-    assert!(text("\n-1.5 0.25 1000", "\n-1.5 0.25 inf").contains("array \"Points\": the value at point 0"));
+    assert!(
+        text("\n-1.5 0.25 1000", "\n-1.5 0.25 inf").contains("point 0 has a coordinate that is infinite")
+    );
     assert!(text("4 8 12", "4 9 12").contains("cell 1, a tetrahedron, has 5 points, not 4"));
     assert!(text("Name=\"types\"", "Name=\"tapes\"").contains("array \"types\" of <Cells> is missing"));
     assert!(
