@@ -122,7 +122,7 @@ test("what is relative to an origin is saved in absolute numbers of double preci
   const polygons = await bytesOf(ply(farSurface));
   const end = "end_header\n";
   const body = polygons.indexOf(end) + end.length;
-  assert.match(polygons.toString("latin1"), /property double x\n[^]*property float nx\n[^]*property double the_density\n/);
+  assert.match(polygons.toString("latin1"), /property double x\n[\s\S]*property float nx\n[\s\S]*property double the_density\n/);
   assert.deepEqual(doubles(polygons, body + 44, 3, "LE"), places.slice(3, 6));
   assert.deepEqual(doubles(polygons, body + 36, 1, "LE"), [stored.offset + 1]);
 
