@@ -313,7 +313,7 @@ export interface Legend {
   log: boolean;
   /** Evenly spaced CSS colours from the lower to the upper end of the range. */
   colours: string[];
-  /** `fraction` is where the tick is in the range, 0 to 1. */
+  /** The ends of the range, and round numbers between them, ascending; `fraction` is where the tick is in the range, 0 to 1. */
   ticks: { value: number; label: string; fraction: number }[];
 }
 

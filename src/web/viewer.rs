@@ -31,7 +31,7 @@ const REACH: f64 = 18.0;
 const SAMPLES: u32 = 8;
 
 /// Ticks of the legend, at most.
-const TICKS: usize = 6;
+const TICKS: usize = 7;
 
 /// An MT and its picture on a canvas.
 #[wasm_bindgen]

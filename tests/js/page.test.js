@@ -399,6 +399,13 @@ test("an empty picture says why, and what does nothing is disabled", async () =>
   await press(page, "n");
   await press(page, "x");
   assert.ok(await page.locator("[data-export=csv]").isDisabled(), "there is no probe");
+
+  // The ends of the range are on the colour bar.
+  const ticks = await page.locator("#legend-ticks span:visible").allInnerTexts();
+  const { min, max } = (await demo(page, "info")).fields[0];
+  const numbers = ticks.map((words) => Number(words.replaceAll("−", "-")));
+  const off = Math.max(Math.abs(Math.min(...numbers) - min), Math.abs(Math.max(...numbers) - max));
+  assert.ok(off < 0.002 * (max - min), `${ticks}: ${min} to ${max}`);
   assert.deepEqual(page.complaints, []);
   await page.close();
 });
