@@ -6,7 +6,7 @@ import { save } from "./state.js";
 
 /** How long a note stays (in ms); longer ones stay longer. */
 const NOTE = 4000;
-const A_LETTER = 60;
+const A_LETTER = 100;
 
 let timer;
 

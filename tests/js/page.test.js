@@ -634,7 +634,9 @@ async function openAnother(page, url, kind) {
   await reach(page, "complete");
 }
 
-const noted = (page, words) => page.locator("#note", { hasText: words }).waitFor({ timeout: PATIENCE });
+/** Waits for a note, which hides again after a while. */
+const noted = (page, { source }) =>
+  page.waitForFunction((source) => new RegExp(source).test(document.getElementById("note").textContent), source, { timeout: PATIENCE });
 
 test("another volume gets what fits it of the settings before, is told what does not, and undo goes back to all of it", async () => {
   const page = await open(FLOW, undefined, VIEWPORT);
