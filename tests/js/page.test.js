@@ -320,6 +320,9 @@ test("pictures, meshes, surfaces, probes and numbers are saved", async () => {
   await page.selectOption("#surface-kind", "boundary");
   const glb = await save("[data-export=glb]");
   assert.deepEqual([glb.name, glb.bytes.toString("latin1", 0, 4)], ["bucky-explicit-boundary.glb", "glTF"]);
+  const { accessors, meshes } = JSON.parse(glb.bytes.toString("utf8", 20, 20 + glb.bytes.readUInt32LE(12)));
+  const { COLOR_0: colours, POSITION: places } = meshes[0].primitives[0].attributes;
+  assert.equal(accessors[colours].count, accessors[places].count, "each vertex has a colour");
   const rows = (await save("[data-export=csv]")).bytes.toString().trim().split("\n");
   assert.equal(rows[0], "what,x,y,z,distance,density");
   assert.match(rows[1], /^probe A,/);
