@@ -3,6 +3,7 @@
 use thiserror::Error;
 
 use crate::io::cell_shapes::PYRAMID_14;
+use crate::io::cells::is_flat;
 
 /// A file that could not be read.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -70,12 +71,7 @@ pub enum ReadReason {
         remedy: String,
     },
     /// There are cells that cannot be split into tetrahedra, or none that has a volume: VTK cell type and count of all.
-    #[error(
-        "{total} cells: {list}; tetrahedra, hexahedra, voxels, wedges, pyramids and prisms are read, also quadratic ones, and what \
-         has no volume is left out beside them: convert the others (in ParaView: Tetrahedralize)",
-        list = .0.iter().map(|&(kind, n)| named_count(kind, n)).collect::<Vec<_>>().join(", "),
-        total = .0.iter().map(|c| c.1).sum::<u64>()
-    )]
+    #[error("{}", of_cells(.0))]
     CellTypes(Vec<(i64, u64)>),
     /// A value or coordinate is infinite or not a number.
     #[error("the value at point {point} is infinite or not a number; replace it or leave this array out")]
@@ -144,6 +140,22 @@ fn named_count(kind: i64, count: u64) -> String {
         Some((one, many)) => format!("{count} {}", if count == 1 { one } else { many }),
         None => format!("{count} {} of type {kind}", if count == 1 { "cell" } else { "cells" }),
     }
+}
+
+/// Why cells of these types, and so many, are refused.
+fn of_cells(counts: &[(i64, u64)]) -> String {
+    let total: u64 = counts.iter().map(|(_, count)| count).sum();
+    let list: Vec<String> = counts.iter().map(|&(kind, count)| named_count(kind, count)).collect();
+    let list = list.join(", ");
+    if counts.iter().all(|(kind, _)| is_flat(*kind)) {
+        return format!(
+            "a mesh of surfaces or lines ({list}), which has no volume; fill it with tetrahedra first, with Gmsh, TetGen or fTetWild"
+        );
+    }
+    format!(
+        "{total} cells: {list}; tetrahedra, hexahedra, voxels, wedges, pyramids and prisms are read, also quadratic ones, and what \
+         has no volume is left out beside them: convert the others (in ParaView: Tetrahedralize)"
+    )
 }
 
 /// What a cell of this type is called.

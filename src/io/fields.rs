@@ -16,6 +16,8 @@ pub(super) struct Collector<'a> {
     wanted: Option<&'a [String]>,
     /// Every name that an array has taken, wanted or not: what a field is called does not depend on what is wanted.
     names: Vec<String>,
+    /// Those of vectors and tensors, which no field has, but the array that is written of them.
+    vectors: Vec<String>,
     /// How many fields came with the last array.
     last: usize,
     pub fields: Vec<Field>,
@@ -39,16 +41,32 @@ impl<'a> Collector<'a> {
     ///
     /// An array without a name is called `field`; a name that is taken gets a number.
     pub fn claim(&mut self, name: &str, components: usize) -> Result<Option<Claim>, ReadReason> {
+        self.check_room(components)?;
+        let names: Vec<String> = (0..components).map(|c| component_name(components, c)).collect();
+        self.claim_named(name, &names, true)
+    }
+
+    /// Without points a few bytes can claim any number of components.
+    fn check_room(&self, components: usize) -> Result<(), ReadReason> {
         if components == 0 {
             return Err(ReadReason::Syntax("an array without components".into()));
         }
-        // Without points a few bytes can claim any number of components.
         if self.names.len().saturating_add(components) >= MAX_FIELDS {
-            return Err(ReadReason::TooLarge {
-                what: "fields and components".into(),
-                limit: MAX_FIELDS as u64,
-            });
+            let what = "fields and components".into();
+            return Err(ReadReason::TooLarge { what, limit: MAX_FIELDS as u64 });
         }
+        Ok(())
+    }
+
+    /// The same for an array whose components have these names; `has_length` if it is a vector or tensor.
+    pub fn claim_named(
+        &mut self,
+        name: &str,
+        of_components: &[String],
+        has_length: bool,
+    ) -> Result<Option<Claim>, ReadReason> {
+        let components = of_components.len();
+        self.check_room(components)?;
         self.last = 0;
         let name = self.free_name(if name.is_empty() { "field" } else { name });
         let part = |component| Some(VectorPart { name: name.clone(), component });
@@ -56,14 +74,17 @@ impl<'a> Collector<'a> {
             vec![Field::new(self.take_name(&name), Vec::new())]
         } else {
             let mut fields = Vec::new();
-            for c in 0..components {
-                let own = self.take_name(&format!("{name}_{}", component_name(components, c)));
+            self.vectors.push(name.clone());
+            for (c, of_component) in of_components.iter().enumerate() {
+                let own = self.take_name(&format!("{name}_{of_component}"));
                 // The number of a component is a byte.
                 let vector = u8::try_from(c).ok().and_then(|c| part(Some(c)));
                 fields.push(Field { vector, ..Field::new(own, Vec::new()) });
             }
-            let own = self.take_name(&format!("{name}_magnitude"));
-            fields.push(Field { vector: part(None), ..Field::new(own, Vec::new()) });
+            if has_length {
+                let own = self.take_name(&format!("{name}_magnitude"));
+                fields.push(Field { vector: part(None), ..Field::new(own, Vec::new()) });
+            }
             fields
         };
         let is_wanted =
@@ -129,12 +150,12 @@ impl<'a> Collector<'a> {
     }
 
     fn free_name(&self, name: &str) -> String {
-        let taken = |name: &str| self.names.iter().any(|n| n == name);
+        let taken = |name: &str| self.names.iter().chain(&self.vectors).any(|n| n == name);
         if !taken(name) {
             return name.to_owned();
         }
-        // One of the first `len + 1` numbers is free.
-        (2..self.names.len() + 3)
+        // One more number than there are names: one is free.
+        (2..self.names.len() + self.vectors.len() + 3)
             .map(|i| format!("{name}_{i}"))
             .find(|n| !taken(n))
             .unwrap_or_else(|| name.to_owned())
@@ -148,6 +169,12 @@ fn length(vector: &[f64]) -> f64 {
         return 0.0;
     }
     largest * vector.iter().map(|x| (x / largest) * (x / largest)).sum::<f64>().sqrt()
+}
+
+/// Some components of values that have so many each, in this order.
+#[cfg(feature = "formats")]
+pub(super) fn in_order(values: &[f64], components: usize, order: &[usize]) -> Vec<f64> {
+    values.chunks_exact(components).flat_map(|tuple| order.iter().map(|&c| tuple[c])).collect()
 }
 
 /// One component of values that have so many each, one value after the other.
@@ -206,6 +233,16 @@ mod tests {
             append(&mut all, "", 1, vec![0.0]).unwrap();
         }
         assert_eq!(names(&all), ["field", "field_2", "field_3"]);
+    }
+
+    #[test]
+    fn no_two_arrays_have_one_name() {
+        let mut all = Collector::default();
+        append(&mut all, "v", 2, vec![3.0, 4.0]).unwrap();
+        append(&mut all, "v", 2, vec![3.0, 4.0]).unwrap();
+        append(&mut all, "v", 1, vec![1.0]).unwrap();
+        assert_eq!(names(&all), ["v_x", "v_y", "v_magnitude", "v_2_x", "v_2_y", "v_2_magnitude", "v_3"]);
+        assert_eq!(all.fields[3].vector, Some(VectorPart { name: "v_2".into(), component: Some(0) }));
     }
 
     #[test]

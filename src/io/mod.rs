@@ -34,6 +34,7 @@ mod cell_shapes;
 mod cells;
 mod error;
 mod fields;
+mod foreign;
 #[cfg(feature = "formats")]
 mod formats;
 mod image;
@@ -127,6 +128,9 @@ fn expanded(mut mesh: TetMesh) -> TetMesh {
 /// As [`read_with`].
 pub fn read_unexpanded(path: &Path, options: &ReadOptions) -> Result<TetMesh, ReadError> {
     let name = path.display().to_string();
+    if path.is_dir() {
+        return Err(foreign::refused_folder(path)).at(String::new).map_err(|error| in_file(error, &name));
+    }
     match lower_extension(path).as_str() {
         "json" => read_raw_by_sidecar(path, None),
         "raw" => read_raw_by_sidecar(&path.with_extension("json"), Some(path)),
@@ -183,7 +187,7 @@ fn read_in(
     let start = without_mark(bytes);
     let result = if bytes.starts_with(legacy::MAGIC) {
         legacy::read(bytes, options)
-    } else if start.starts_with(b"<") {
+    } else if start.starts_with(b"<") && !foreign::is_foreign_xml(start) {
         read_xml(start, options, beside)
     } else {
         read_other(name, bytes, options, beside)
@@ -200,12 +204,12 @@ fn read_other(
     beside: Beside<'_>,
 ) -> Result<TetMesh, ReadError> {
     formats::read(name, bytes, options, beside)
-        .unwrap_or_else(|| Err(ReadReason::UnknownFormat).at(String::new))
+        .unwrap_or_else(|| Err(foreign::refused(name, bytes)).at(String::new))
 }
 
 #[cfg(not(feature = "formats"))]
-fn read_other(_: &str, _: &[u8], _: &ReadOptions, _: Beside<'_>) -> Result<TetMesh, ReadError> {
-    Err(ReadReason::UnknownFormat).at(String::new)
+fn read_other(name: &str, bytes: &[u8], _: &ReadOptions, _: Beside<'_>) -> Result<TetMesh, ReadError> {
+    Err(foreign::refused(name, bytes)).at(String::new)
 }
 
 /// Reads raw samples, given their JSON sidecar:

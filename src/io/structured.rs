@@ -50,7 +50,7 @@ pub(super) fn mesh(
         return Err(ReadReason::Count { what: "points".into(), expected, found });
     }
     image::sixfold(&mut cell_fields);
-    Ok(TetMesh { positions, fields, tets: kuhn_tets(dims), grid: None, cell_fields })
+    Ok(TetMesh { positions, fields, tets: kuhn_tets(dims), cell_fields, ..TetMesh::default() })
 }
 
 /// Reads a document of type `RectilinearGrid` or `StructuredGrid`, or a list of files with the pieces of one, and its time.

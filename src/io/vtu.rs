@@ -87,7 +87,7 @@ impl PieceReader<'_, '_> {
         };
         let split = split.unwrap_or_default();
         split.spread(&mut cell_fields);
-        Ok(TetMesh { positions, fields, tets: split.tets, grid: None, cell_fields })
+        Ok(TetMesh { positions, fields, tets: split.tets, cell_fields, ..TetMesh::default() })
     }
 
     /// The fields in a section, each of `tuples` values.

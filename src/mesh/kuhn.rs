@@ -45,7 +45,7 @@ impl TetMesh {
                 positions.extend((0..nx).map(|x| grid.point([x, y, z])));
             }
         }
-        Self { positions, fields, tets, grid: Some(grid), cell_fields: Vec::new() }
+        Self { positions, fields, tets, grid: Some(grid), ..Self::default() }
     }
 }
 

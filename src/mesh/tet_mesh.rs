@@ -63,4 +63,6 @@ pub struct TetMesh {
     pub grid: Option<Grid>,
     /// Scalar fields at the cells, each as long as `tets`; without values where only their names were asked for.
     pub cell_fields: Vec<Field>,
+    /// What its reader left out of the file, or took in a way that the file does not state: in words, for users.
+    pub notes: Vec<String>,
 }

@@ -224,7 +224,7 @@ impl Reader<'_> {
         };
         let split = split.unwrap_or_default();
         split.spread(&mut cell_fields);
-        Ok(TetMesh { positions, fields, tets: split.tets, grid: None, cell_fields })
+        Ok(TetMesh { positions, fields, tets: split.tets, cell_fields, ..TetMesh::default() })
     }
 
     fn positions(&self, piece: &Piece) -> Result<Vec<[f64; 3]>, ReadReason> {
