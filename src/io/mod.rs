@@ -12,8 +12,8 @@
 //! | Medit | `.mesh`, `.sol`, `.meshb`, `.solb` | text and binary; feature `formats` | |
 //! | TetGen | `.node` + `.ele` | by [`read`]; feature `formats` | |
 //! | Netgen | `.vol` | feature `formats` | |
-//! | NRRD | `.nrrd`, `.nhdr` | raw, gzip, text; feature `formats` | |
-//! | `MetaImage` | `.mha`, `.mhd` | raw, zlib; feature `formats` | |
+//! | NRRD | `.nrrd`, `.nhdr` | raw, gzip, text, hexadecimal; feature `formats` | |
+//! | `MetaImage` | `.mha`, `.mhd` | raw, zlib, text; feature `formats` | |
 //! | VTKHDF | `.vtkhdf`, `.hdf` | unstructured grids and image data; feature `hdf5` | |
 //! | Exodus II | `.exo`, `.ex2`, `.e` | feature `hdf5` | |
 //! | VTK XML poly data | `.vtp` | | appended raw, zlib |

@@ -202,9 +202,9 @@ pub(super) fn from_text(data: &[u8], number: NumberType, big: bool) -> Result<Ve
     Ok(bytes)
 }
 
-/// The samples in files, each of which has as many; `read` makes them of the bytes of a file.
+/// The samples in files that the header names as `key`, each of which has as many; `read` makes them of the bytes of a file.
 pub(super) fn from_files(
-    names: &[String],
+    (key, names): (&str, &[String]),
     expected: usize,
     beside: Beside<'_>,
     read: &dyn Fn(&[u8], usize) -> Result<Vec<u8>, ReadReason>,
@@ -215,7 +215,7 @@ pub(super) fn from_files(
     let mut samples = Vec::new();
     for name in names {
         let place = || format!("\"{name}\"");
-        let mut of_one = read(&beside(name).at(|| "data file".into())?, part).at(place)?;
+        let mut of_one = read(&beside(name).at(|| key.to_owned())?, part).at(place)?;
         if of_one.len() != part {
             let (expected, found) = (part as u64, of_one.len() as u64);
             return Err(ReadReason::Count { what: "bytes of samples".into(), expected, found }).at(place);
